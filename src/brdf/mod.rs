@@ -1,0 +1,3 @@
+//! Reflection models: measured data → evaluable BRDF, and the analytic materials.
+
+pub mod table;

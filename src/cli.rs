@@ -1,0 +1,63 @@
+//! The command line: clap types and the way from arguments to an exit status.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::{command, error::Error};
+
+/// Arguments of `fenestra`.
+#[derive(Debug, Parser)]
+#[command(name = "fenestra", version, about, propagate_version = true)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands; each variant holds the arguments that `command/<name>.rs` declares.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// List Vulkan devices with the limits that matter here, and which one would be chosen.
+    Devices(command::devices::Arguments),
+}
+
+/// Parses the arguments, runs the command and prints the error chain of a failure.
+pub fn run() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // A closed output pipe is no reason to fail.
+            let _ = error.print();
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+        }
+    };
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn"))
+        .format_timestamp(None)
+        .format_target(false)
+        .init();
+    let result = match &cli.command {
+        Command::Devices(arguments) => command::devices::run(arguments),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            report(&error);
+            ExitCode::from(error.exit_status())
+        }
+    }
+}
+
+/// Prints an error, its causes and, where one is known, the remedy.
+fn report(error: &Error) {
+    eprintln!("error: {error}");
+    let mut source = std::error::Error::source(error);
+    // `Io` prints its source in its own line already.
+    while let Some(cause) = source.filter(|_| !matches!(error, Error::Io { .. })) {
+        eprintln!("  caused by: {cause}");
+        source = cause.source();
+    }
+    if let Error::Device { help, .. } = error {
+        eprintln!("help: {help}");
+    }
+}

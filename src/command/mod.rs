@@ -1,0 +1,3 @@
+//! One file per subcommand: orchestration only, no mathematics, no Vulkan.
+
+pub mod devices;

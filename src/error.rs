@@ -1,0 +1,120 @@
+//! The one error type of the library.
+
+use std::path::{Path, PathBuf};
+
+/// Result with Fenestra's [`Error`].
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Everything that can go wrong, each with what, where, expected and found.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The operating system refused to read or write a file.
+    #[error("{}: cannot {action}: {source}", path.display())]
+    Io {
+        /// File or folder concerned.
+        path: PathBuf,
+        /// What was attempted: "read", "write", …
+        action: &'static str,
+        /// The system's own error.
+        source: std::io::Error,
+    },
+    /// A text file does not parse; line and column count from 1 (0 where unknown).
+    #[error("{}:{line}:{column}: {message}", path.display())]
+    Parse {
+        /// File concerned.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// Expected and found.
+        message: String,
+    },
+    /// A file that can be read does not hold what it should.
+    #[error("{}: {message}", path.display())]
+    Format {
+        /// File concerned.
+        path: PathBuf,
+        /// Expected and found.
+        message: String,
+    },
+    /// A scene that parses but cannot be rendered.
+    #[error("{}: {message}", path.display())]
+    Scene {
+        /// Scene file.
+        path: PathBuf,
+        /// Expected and found, naming the object or material.
+        message: String,
+    },
+    /// A Vulkan call failed.
+    #[error("Vulkan: {call} failed: {result}")]
+    Vulkan {
+        /// Name of the call and of the pass or resource.
+        call: String,
+        /// The result code, or the allocator's message.
+        result: String,
+    },
+    /// No device, or one that cannot do what is needed.
+    #[error("{reason}")]
+    Device {
+        /// Needed against found.
+        reason: String,
+        /// What the user can do about it.
+        help: String,
+    },
+    /// Options that contradict each other or are out of range.
+    #[error("{message}")]
+    Usage {
+        /// Option, value, allowed values.
+        message: String,
+    },
+    /// A fit into spherical radial basis functions cannot be made.
+    #[error("fit of {what}: {message}")]
+    Fit {
+        /// The map or material.
+        what: String,
+        /// Expected and found.
+        message: String,
+    },
+    /// A comparison is over its threshold.
+    #[error("{message}")]
+    Threshold {
+        /// Metric, value and threshold.
+        message: String,
+    },
+    /// The user interrupted the command; what there is has been written.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+impl Error {
+    /// An [`Error::Io`] for `path`.
+    pub fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
+        Self::Io { path: path.to_path_buf(), action, source }
+    }
+
+    /// An [`Error::Format`] for `path`.
+    pub fn format(path: &Path, message: impl Into<String>) -> Self {
+        Self::Format { path: path.to_path_buf(), message: message.into() }
+    }
+
+    /// An [`Error::Scene`] for `path`.
+    pub fn scene(path: &Path, message: impl Into<String>) -> Self {
+        Self::Scene { path: path.to_path_buf(), message: message.into() }
+    }
+
+    /// An [`Error::Usage`].
+    pub fn usage(message: impl Into<String>) -> Self {
+        Self::Usage { message: message.into() }
+    }
+
+    /// Exit status: 2 wrong usage, 3 comparison over its threshold, 130 interrupted, else 1.
+    pub fn exit_status(&self) -> u8 {
+        match self {
+            Self::Usage { .. } => 2,
+            Self::Threshold { .. } => 3,
+            Self::Interrupted => 130,
+            _ => 1,
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Radiometric images: sums of samples on their way to files.

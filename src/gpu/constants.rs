@@ -1,0 +1,96 @@
+//! Numbers with one owner: `build.rs` hands each of these to the GLSL compiler as a macro of the
+//! same name, so that host and shaders cannot differ.
+
+/// Invocations of a workgroup along x; every pass is one-dimensional.
+pub const WORKGROUP_SIZE: u32 = 64;
+
+/// Descriptor set of the scene: constant during a render.
+pub const SET_SCENE: u32 = 0;
+/// Descriptor set of the SRBF tables (environment lobes, BRDF lobes).
+pub const SET_SRBF: u32 = 1;
+/// Descriptor set of per-invocation state, sized by the wave in flight.
+pub const SET_WAVE: u32 = 2;
+/// Descriptor set of the film.
+pub const SET_FILM: u32 = 3;
+
+/// Scene set: [`SceneParameters`](super::layout::SceneParameters), one element.
+pub const BINDING_PARAMETERS: u32 = 0;
+/// Scene set: CWBVH nodes.
+pub const BINDING_BVH_NODES: u32 = 1;
+/// Scene set: triangle vertices in BVH order, first page; pages 1 to 3 follow.
+pub const BINDING_TRIANGLES_0: u32 = 2;
+/// Second page of triangles.
+pub const BINDING_TRIANGLES_1: u32 = 3;
+/// Third page of triangles.
+pub const BINDING_TRIANGLES_2: u32 = 4;
+/// Fourth page of triangles.
+pub const BINDING_TRIANGLES_3: u32 = 5;
+/// Scene set: packed vertex normals, three per triangle in BVH order.
+pub const BINDING_TRIANGLE_NORMALS: u32 = 6;
+/// Scene set: material index per triangle in BVH order.
+pub const BINDING_TRIANGLE_MATERIALS: u32 = 7;
+/// Scene set: [`Material`](super::layout::Material) per material.
+pub const BINDING_MATERIALS: u32 = 8;
+/// Scene set: 32-bit words of the BRDF tables; materials hold offsets into it.
+pub const BINDING_BRDF_TABLE: u32 = 9;
+/// Scene set: radiance per texel of the environment map.
+pub const BINDING_ENVIRONMENT_TEXELS: u32 = 10;
+/// Scene set: cumulative probability over the rows of cells of the environment map.
+pub const BINDING_ENVIRONMENT_ROWS: u32 = 11;
+/// Scene set: cumulative probability over the cells of each row of the environment map.
+pub const BINDING_ENVIRONMENT_CELLS: u32 = 12;
+
+/// Wave set: [`Ray`](super::layout::Ray) per path, the next one to trace.
+pub const BINDING_RAYS: u32 = 0;
+/// Wave set: [`Hit`](super::layout::Hit) per path.
+pub const BINDING_HITS: u32 = 1;
+/// Wave set: [`ShadowRay`](super::layout::ShadowRay) per path and direction.
+pub const BINDING_SHADOW_RAYS: u32 = 2;
+/// Wave set: 1 where the shadow ray reaches the environment, 0 where it is blocked.
+pub const BINDING_VISIBILITY: u32 = 3;
+/// Wave set: [`PathState`](super::layout::PathState) per path.
+pub const BINDING_PATHS: u32 = 4;
+
+/// [`Hit::material`](super::layout::Hit::material) of a ray that left the scene or was not traced.
+pub const NO_MATERIAL: u32 = 0xffff_ffff;
+
+/// [`Material::kind`](super::layout::Material::kind): Lambertian.
+pub const MATERIAL_DIFFUSE: u32 = 0;
+/// Dielectric coat over a diffuse base.
+pub const MATERIAL_PLASTIC: u32 = 1;
+/// Conductor.
+pub const MATERIAL_CONDUCTOR: u32 = 2;
+/// Tabulated measurement.
+pub const MATERIAL_MEASURED: u32 = 3;
+
+/// Names and values that become GLSL macros.
+pub const SHADER_MACROS: &[(&str, u32)] = &[
+    ("WORKGROUP_SIZE", WORKGROUP_SIZE),
+    ("SET_SCENE", SET_SCENE),
+    ("SET_SRBF", SET_SRBF),
+    ("SET_WAVE", SET_WAVE),
+    ("SET_FILM", SET_FILM),
+    ("BINDING_PARAMETERS", BINDING_PARAMETERS),
+    ("BINDING_BVH_NODES", BINDING_BVH_NODES),
+    ("BINDING_TRIANGLES_0", BINDING_TRIANGLES_0),
+    ("BINDING_TRIANGLES_1", BINDING_TRIANGLES_1),
+    ("BINDING_TRIANGLES_2", BINDING_TRIANGLES_2),
+    ("BINDING_TRIANGLES_3", BINDING_TRIANGLES_3),
+    ("BINDING_TRIANGLE_NORMALS", BINDING_TRIANGLE_NORMALS),
+    ("BINDING_TRIANGLE_MATERIALS", BINDING_TRIANGLE_MATERIALS),
+    ("BINDING_MATERIALS", BINDING_MATERIALS),
+    ("BINDING_BRDF_TABLE", BINDING_BRDF_TABLE),
+    ("BINDING_ENVIRONMENT_TEXELS", BINDING_ENVIRONMENT_TEXELS),
+    ("BINDING_ENVIRONMENT_ROWS", BINDING_ENVIRONMENT_ROWS),
+    ("BINDING_ENVIRONMENT_CELLS", BINDING_ENVIRONMENT_CELLS),
+    ("BINDING_RAYS", BINDING_RAYS),
+    ("BINDING_HITS", BINDING_HITS),
+    ("BINDING_SHADOW_RAYS", BINDING_SHADOW_RAYS),
+    ("BINDING_VISIBILITY", BINDING_VISIBILITY),
+    ("BINDING_PATHS", BINDING_PATHS),
+    ("NO_MATERIAL", NO_MATERIAL),
+    ("MATERIAL_DIFFUSE", MATERIAL_DIFFUSE),
+    ("MATERIAL_PLASTIC", MATERIAL_PLASTIC),
+    ("MATERIAL_CONDUCTOR", MATERIAL_CONDUCTOR),
+    ("MATERIAL_MEASURED", MATERIAL_MEASURED),
+];

@@ -1,0 +1,1 @@
+//! One file per dispatch: name = `glsl/<name>.comp` = debug label = timer row.

@@ -1,0 +1,20 @@
+//! The viewer: a pinhole or thin-lens perspective camera.
+
+use glam::Vec3;
+
+/// Perspective camera; right-handed, looks from `position` to `look_at`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Centre of projection, metres.
+    pub position: Vec3,
+    /// Point in the middle of the image, metres.
+    pub look_at: Vec3,
+    /// Direction that points up in the image; need not be orthogonal to the view.
+    pub up: Vec3,
+    /// Angle between the lower and the upper edge of the image, degrees.
+    pub vertical_fov_deg: f32,
+    /// Radius of the thin lens, metres; 0 is a pinhole.
+    pub aperture_radius: f32,
+    /// Distance from the lens to the plane in focus along the view axis, metres.
+    pub focus_distance: f32,
+}

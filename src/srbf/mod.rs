@@ -1,0 +1,1 @@
+//! Spherical radial basis functions (spherical Gaussians): pure functions.
