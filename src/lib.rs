@@ -18,6 +18,7 @@
 
 pub mod accel;
 pub mod brdf;
+pub mod cache;
 pub mod cli;
 pub mod command;
 pub mod error;

@@ -1,10 +1,19 @@
-//! `fenestra devices`.
+//! `fenestra devices`: the Vulkan devices with the limits that matter here, and the choice.
 
-use crate::error::Result;
+use crate::{
+    error::Result,
+    gpu::{
+        device::{Capabilities, choose, list},
+        instance::Instance,
+    },
+};
 
 /// Arguments of `devices`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
+    /// Show which device this option of the other commands would choose: index or part of a name.
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
     /// Print JSON to standard output.
     #[arg(long)]
     pub json: bool,
@@ -13,7 +22,51 @@ pub struct Arguments {
 /// Lists the Vulkan devices.
 ///
 /// # Errors
-/// No Vulkan loader.
-pub fn run(_arguments: &Arguments) -> Result<()> {
-    Ok(())
+/// No Vulkan loader, no device, or none that fits.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let instance = Instance::new(false)?;
+    let devices = list(&instance)?;
+    let chosen = choose(&devices, arguments.device.as_deref());
+    let chosen_index = chosen.as_ref().ok().map(|device| device.index);
+    if arguments.json {
+        let list: Vec<_> = devices
+            .iter()
+            .map(|device| {
+                serde_json::json!({
+                    "device": device,
+                    "missing": device.missing(),
+                    "chosen": Some(device.index) == chosen_index,
+                })
+            })
+            .collect();
+        println!("{:#}", serde_json::Value::Array(list));
+    } else {
+        for device in &devices {
+            print_device(device, Some(device.index) == chosen_index);
+        }
+    }
+    chosen.map(|_| ())
+}
+
+fn print_device(device: &Capabilities, is_chosen: bool) {
+    const MEBI: f64 = (1 << 20) as f64;
+    let (major, minor, patch) = device.api_version;
+    let mark = if is_chosen { "   <- chosen" } else { "" };
+    println!("[{}] {} ({}){mark}", device.index, device.name, device.kind);
+    println!("    driver               {}", device.driver);
+    println!("    Vulkan               {major}.{minor}.{patch}");
+    println!("    device memory        {:.0} MiB", device.device_memory as f64 / MEBI);
+    println!("    one storage buffer   {:.0} MiB", device.max_storage_buffer_range as f64 / MEBI);
+    println!("    storage buffers      {} per stage", device.max_storage_buffers);
+    println!("    push constants       {} bytes", device.max_push_constants_size);
+    println!("    shared memory        {} KiB", device.max_shared_memory / 1024);
+    println!("    subgroup             {} invocations", device.subgroup_size);
+    println!(
+        "    timestamps           {} bits, {} ns per tick",
+        device.timestamp_valid_bits, device.timestamp_period
+    );
+    let missing = device.missing();
+    if !missing.is_empty() {
+        println!("    cannot be used       {}", missing.join("; "));
+    }
 }

@@ -1,0 +1,20 @@
+// Adds one to every word: tests the host itself.
+#version 460
+
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+layout(scalar, set = SET_FILM, binding = 0) readonly buffer Input {
+    uint probe_input[];
+};
+layout(scalar, set = SET_FILM, binding = 1) writeonly buffer Output {
+    uint probe_output[];
+};
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index < probe_input.length()) {
+        probe_output[index] = probe_input[index] + 1u;
+    }
+}

@@ -1,0 +1,229 @@
+//! Storage buffers, uploads and downloads.
+
+use std::sync::Arc;
+
+use ash::vk;
+use bytemuck::Pod;
+use gpu_allocator::{
+    MemoryLocation,
+    vulkan::{Allocation, AllocationCreateDesc, AllocationScheme},
+};
+
+use super::{commands::Commands, device::Device, labels, vulkan_error};
+use crate::error::{Error, Result};
+
+/// Largest piece copied at once between host and device, bytes.
+const STAGING_BYTES: usize = 16 << 20;
+
+/// A named storage buffer in device memory.
+pub struct Buffer {
+    raw: vk::Buffer,
+    size: u64,
+    name: String,
+    allocation: Option<Allocation>,
+    device: Arc<Device>,
+}
+
+impl Buffer {
+    /// Creates a storage buffer of `size` bytes (at least 16) with undefined content.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if `size` is over the device's range for a storage buffer, [`Error::Vulkan`]
+    /// if memory runs out.
+    pub fn new(device: &Arc<Device>, name: &str, size: u64) -> Result<Self> {
+        let allowed = device.capabilities().max_storage_buffer_range;
+        if size > allowed {
+            return Err(Error::Device {
+                reason: format!(
+                    "buffer {name} needs {size} bytes, but {} allows {allowed} bytes for one \
+                     storage buffer",
+                    device.capabilities().name
+                ),
+                help: "choose another device with --device, or a smaller scene, map or film".into(),
+            });
+        }
+        Self::with_location(
+            device,
+            name,
+            size,
+            MemoryLocation::GpuOnly,
+            vk::BufferUsageFlags::STORAGE_BUFFER
+                | vk::BufferUsageFlags::TRANSFER_SRC
+                | vk::BufferUsageFlags::TRANSFER_DST,
+        )
+    }
+
+    /// Creates a storage buffer that holds `data`.
+    ///
+    /// # Errors
+    /// As [`Buffer::new`].
+    pub fn from_slice<T: Pod>(device: &Arc<Device>, name: &str, data: &[T]) -> Result<Self> {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let buffer = Self::new(device, name, bytes.len() as u64)?;
+        buffer.upload(bytes)?;
+        Ok(buffer)
+    }
+
+    /// Creates a storage buffer filled with zeros.
+    ///
+    /// # Errors
+    /// As [`Buffer::new`].
+    pub fn zeroed(device: &Arc<Device>, name: &str, size: u64) -> Result<Self> {
+        let buffer = Self::new(device, name, size)?;
+        let mut commands = Commands::begin(device)?;
+        commands.fill(&buffer, 0);
+        commands.submit_and_wait()?;
+        Ok(buffer)
+    }
+
+    fn with_location(
+        device: &Arc<Device>,
+        name: &str,
+        size: u64,
+        location: MemoryLocation,
+        usage: vk::BufferUsageFlags,
+    ) -> Result<Self> {
+        let size = size.max(16).next_multiple_of(4);
+        let info = vk::BufferCreateInfo::default()
+            .size(size)
+            .usage(usage)
+            .sharing_mode(vk::SharingMode::EXCLUSIVE);
+        // SAFETY: the device is alive and `info` valid.
+        let raw = unsafe { device.raw().create_buffer(&info, None) }
+            .map_err(|result| vulkan_error(&format!("vkCreateBuffer({name})"), result))?;
+        // SAFETY: `raw` was just created from this device.
+        let requirements = unsafe { device.raw().get_buffer_memory_requirements(raw) };
+        // From here on `Drop` cleans up.
+        let mut buffer =
+            Self { raw, size, name: name.to_owned(), allocation: None, device: Arc::clone(device) };
+        let allocation = device
+            .allocator()
+            .as_mut()
+            .ok_or_else(|| vulkan_error(name, vk::Result::ERROR_DEVICE_LOST))?
+            .allocate(&AllocationCreateDesc {
+                name,
+                requirements,
+                location,
+                linear: true,
+                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+            })
+            .map_err(|error| Error::Vulkan {
+                call: format!("memory for buffer {name} ({size} bytes)"),
+                result: error.to_string(),
+            })?;
+        // SAFETY: the allocation was made for this buffer's requirements and is bound once.
+        unsafe { device.raw().bind_buffer_memory(raw, allocation.memory(), allocation.offset()) }
+            .map_err(|result| vulkan_error(&format!("vkBindBufferMemory({name})"), result))?;
+        buffer.allocation = Some(allocation);
+        labels::name_object(device, raw, name);
+        Ok(buffer)
+    }
+
+    /// Size in bytes.
+    pub fn size(&self) -> u64 {
+        self.size
+    }
+
+    /// Name, as debug tools and memory reports show it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(super) fn raw(&self) -> vk::Buffer {
+        self.raw
+    }
+
+    /// Copies `bytes` into the buffer, from its start.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if a call fails.
+    ///
+    /// # Panics
+    /// If `bytes` does not fit: a mistake of the caller.
+    pub fn upload(&self, bytes: &[u8]) -> Result<()> {
+        assert!(bytes.len() as u64 <= self.size, "upload into {} is too long", self.name);
+        if bytes.is_empty() {
+            return Ok(());
+        }
+        let mut staging = Self::with_location(
+            &self.device,
+            "staging (upload)",
+            bytes.len().min(STAGING_BYTES) as u64,
+            MemoryLocation::CpuToGpu,
+            vk::BufferUsageFlags::TRANSFER_SRC,
+        )?;
+        for (index, piece) in bytes.chunks(STAGING_BYTES).enumerate() {
+            staging.mapped()?[..piece.len()].copy_from_slice(piece);
+            let mut commands = Commands::begin(&self.device)?;
+            commands.copy(
+                &staging,
+                0,
+                self,
+                (index * STAGING_BYTES) as u64,
+                piece.len().next_multiple_of(4) as u64,
+            );
+            commands.submit_and_wait()?;
+        }
+        Ok(())
+    }
+
+    /// Copies the first `length` elements out of the buffer.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if a call fails.
+    ///
+    /// # Panics
+    /// If the buffer is shorter: a mistake of the caller.
+    pub fn download<T: Pod>(&self, length: usize) -> Result<Vec<T>> {
+        let mut result: Vec<T> = vec![T::zeroed(); length];
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut result);
+        assert!(bytes.len() as u64 <= self.size, "download from {} is too long", self.name);
+        if bytes.is_empty() {
+            return Ok(result);
+        }
+        let mut staging = Self::with_location(
+            &self.device,
+            "staging (download)",
+            bytes.len().min(STAGING_BYTES) as u64,
+            MemoryLocation::GpuToCpu,
+            vk::BufferUsageFlags::TRANSFER_DST,
+        )?;
+        for (index, piece) in bytes.chunks_mut(STAGING_BYTES).enumerate() {
+            let mut commands = Commands::begin(&self.device)?;
+            commands.copy(
+                self,
+                (index * STAGING_BYTES) as u64,
+                &staging,
+                0,
+                piece.len().next_multiple_of(4) as u64,
+            );
+            commands.make_visible_to_host();
+            commands.submit_and_wait()?;
+            let length = piece.len();
+            piece.copy_from_slice(&staging.mapped()?[..length]);
+        }
+        Ok(result)
+    }
+
+    fn mapped(&mut self) -> Result<&mut [u8]> {
+        self.allocation.as_mut().and_then(Allocation::mapped_slice_mut).ok_or_else(|| {
+            Error::Vulkan {
+                call: format!("mapping of {}", self.name),
+                result: "memory is not visible to the host".into(),
+            }
+        })
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        // SAFETY: every submission is waited for, so the device does not use the buffer any more.
+        unsafe { self.device.raw().destroy_buffer(self.raw, None) };
+        if let (Some(allocator), Some(allocation)) =
+            (self.device.allocator().as_mut(), self.allocation.take())
+            && let Err(error) = allocator.free(allocation)
+        {
+            log::error!("memory of buffer {} was not freed: {error}", self.name);
+        }
+    }
+}

@@ -1,0 +1,262 @@
+//! Recording and submission of command buffers.
+
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
+
+use ash::vk;
+
+use super::{
+    buffer::Buffer, constants::WORKGROUP_SIZE, descriptors::DescriptorSet, device::Device, labels,
+    pipeline::Pipeline, timestamps::Timestamps, vulkan_error,
+};
+use crate::error::{Error, Result};
+
+/// Longest wait for one submission; dispatches are sized to a tenth of a second.
+const SUBMISSION_TIMEOUT: Duration = Duration::from_secs(120);
+
+/// Device milliseconds by pass name.
+pub type PassTimes = BTreeMap<String, f64>;
+
+/// A command buffer being recorded; submitted once, then dropped.
+pub struct Commands {
+    pool: vk::CommandPool,
+    raw: vk::CommandBuffer,
+    fence: vk::Fence,
+    timestamps: Option<Timestamps>,
+    last_pass: String,
+    device: Arc<Device>,
+}
+
+impl Commands {
+    /// Starts recording.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if a call fails.
+    pub fn begin(device: &Arc<Device>) -> Result<Self> {
+        let raw_device = device.raw();
+        let pool_info = vk::CommandPoolCreateInfo::default()
+            .queue_family_index(device.queue_family())
+            .flags(vk::CommandPoolCreateFlags::TRANSIENT);
+        // SAFETY: the family belongs to the device.
+        let pool = unsafe { raw_device.create_command_pool(&pool_info, None) }
+            .map_err(|result| vulkan_error("vkCreateCommandPool", result))?;
+        // From here on `Drop` cleans up.
+        let mut commands = Self {
+            pool,
+            raw: vk::CommandBuffer::null(),
+            fence: vk::Fence::null(),
+            timestamps: None,
+            last_pass: "none".into(),
+            device: Arc::clone(device),
+        };
+        let allocate = vk::CommandBufferAllocateInfo::default()
+            .command_pool(pool)
+            .level(vk::CommandBufferLevel::PRIMARY)
+            .command_buffer_count(1);
+        let begin = vk::CommandBufferBeginInfo::default()
+            .flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the pool was just created and nobody else uses it.
+        unsafe {
+            commands.raw = raw_device
+                .allocate_command_buffers(&allocate)
+                .map_err(|result| vulkan_error("vkAllocateCommandBuffers", result))?[0];
+            commands.fence = raw_device
+                .create_fence(&vk::FenceCreateInfo::default(), None)
+                .map_err(|result| vulkan_error("vkCreateFence", result))?;
+            raw_device
+                .begin_command_buffer(commands.raw, &begin)
+                .map_err(|result| vulkan_error("vkBeginCommandBuffer", result))?;
+        }
+        Ok(commands)
+    }
+
+    /// Starts recording with room for `capacity` timed passes.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if a call fails.
+    pub fn begin_timed(device: &Arc<Device>, capacity: u32) -> Result<Self> {
+        let mut commands = Self::begin(device)?;
+        commands.timestamps = Some(Timestamps::new(device, commands.raw, capacity)?);
+        Ok(commands)
+    }
+
+    /// Records one pass: a compute dispatch of at least `invocations` invocations, labelled with the
+    /// pipeline's name and, in a timed command buffer, bracketed by timestamps. Everything that
+    /// earlier passes wrote is visible to it.
+    ///
+    /// `sets` are bound at their own set numbers; `push_constants` may be empty.
+    ///
+    /// # Panics
+    /// If a dispatch would exceed the device's workgroup count or the push constants exceed 128
+    /// bytes: callers size their waves by [`Capabilities`](super::device::Capabilities).
+    pub fn dispatch(
+        &mut self,
+        pipeline: &Pipeline,
+        sets: &[&DescriptorSet],
+        push_constants: &[u8],
+        invocations: u32,
+    ) {
+        let groups = invocations.div_ceil(WORKGROUP_SIZE).max(1);
+        assert!(
+            groups <= self.device.capabilities().max_workgroup_count,
+            "{}: {groups} workgroups are too many",
+            pipeline.name()
+        );
+        assert!(push_constants.len() <= 128, "{}: too many push constants", pipeline.name());
+        let raw = self.device.raw();
+        labels::begin(&self.device, self.raw, pipeline.name());
+        self.barrier(
+            vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER,
+            vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE,
+            vk::PipelineStageFlags::COMPUTE_SHADER,
+            vk::AccessFlags::SHADER_READ | vk::AccessFlags::SHADER_WRITE,
+        );
+        if let Some(timestamps) = &mut self.timestamps {
+            timestamps.start(pipeline.name());
+        }
+        // SAFETY: the command buffer is recording; pipeline, layout and sets belong to the device
+        // and the caller keeps them alive until the submission has been waited for.
+        unsafe {
+            raw.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
+            for set in sets {
+                raw.cmd_bind_descriptor_sets(
+                    self.raw,
+                    vk::PipelineBindPoint::COMPUTE,
+                    pipeline.layout(),
+                    set.index(),
+                    &[set.raw()],
+                    &[],
+                );
+            }
+            if !push_constants.is_empty() {
+                raw.cmd_push_constants(
+                    self.raw,
+                    pipeline.layout(),
+                    vk::ShaderStageFlags::COMPUTE,
+                    0,
+                    push_constants,
+                );
+            }
+            raw.cmd_dispatch(self.raw, groups, 1, 1);
+        }
+        if let Some(timestamps) = &mut self.timestamps {
+            timestamps.stop();
+        }
+        labels::end(&self.device, self.raw);
+        pipeline.name().clone_into(&mut self.last_pass);
+    }
+
+    /// Fills a whole buffer with a repeated 32-bit word.
+    pub fn fill(&mut self, buffer: &Buffer, word: u32) {
+        self.barrier(
+            vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER,
+            vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE,
+            vk::PipelineStageFlags::TRANSFER,
+            vk::AccessFlags::TRANSFER_WRITE,
+        );
+        // SAFETY: recording; the buffer has transfer usage and the caller keeps it alive.
+        unsafe {
+            self.device.raw().cmd_fill_buffer(self.raw, buffer.raw(), 0, vk::WHOLE_SIZE, word);
+        }
+    }
+
+    /// Copies `size` bytes from one buffer to another.
+    pub fn copy(
+        &mut self,
+        from: &Buffer,
+        from_offset: u64,
+        to: &Buffer,
+        to_offset: u64,
+        size: u64,
+    ) {
+        self.barrier(
+            vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER,
+            vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE,
+            vk::PipelineStageFlags::TRANSFER,
+            vk::AccessFlags::TRANSFER_READ | vk::AccessFlags::TRANSFER_WRITE,
+        );
+        let region =
+            vk::BufferCopy::default().src_offset(from_offset).dst_offset(to_offset).size(size);
+        // SAFETY: recording; both buffers have transfer usage and the caller keeps them alive.
+        unsafe { self.device.raw().cmd_copy_buffer(self.raw, from.raw(), to.raw(), &[region]) };
+    }
+
+    /// Makes everything written so far readable by the host once the submission has finished.
+    pub fn make_visible_to_host(&mut self) {
+        self.barrier(
+            vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER,
+            vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE,
+            vk::PipelineStageFlags::HOST,
+            vk::AccessFlags::HOST_READ,
+        );
+    }
+
+    fn barrier(
+        &self,
+        source: vk::PipelineStageFlags,
+        source_access: vk::AccessFlags,
+        destination: vk::PipelineStageFlags,
+        destination_access: vk::AccessFlags,
+    ) {
+        let barrier = vk::MemoryBarrier::default()
+            .src_access_mask(source_access)
+            .dst_access_mask(destination_access);
+        // SAFETY: the command buffer is recording.
+        unsafe {
+            self.device.raw().cmd_pipeline_barrier(
+                self.raw,
+                source,
+                destination,
+                vk::DependencyFlags::empty(),
+                &[barrier],
+                &[],
+                &[],
+            );
+        }
+    }
+
+    /// Submits, waits, and returns the device time per pass (empty if not timed).
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`]; a lost device names the last pass of the submission.
+    pub fn submit_and_wait(self) -> Result<PassTimes> {
+        let raw = self.device.raw();
+        let failed = |call: &str, result| {
+            vulkan_error(&format!("{call} (last pass {})", self.last_pass), result)
+        };
+        // SAFETY: recording ends here; the queue is locked during submission, and the wait keeps
+        // every object that the commands use alive in the callers.
+        unsafe {
+            raw.end_command_buffer(self.raw)
+                .map_err(|result| failed("vkEndCommandBuffer", result))?;
+            let buffers = [self.raw];
+            let submit = vk::SubmitInfo::default().command_buffers(&buffers);
+            raw.queue_submit(*self.device.queue(), &[submit], self.fence)
+                .map_err(|result| failed("vkQueueSubmit", result))?;
+            let timeout = u64::try_from(SUBMISSION_TIMEOUT.as_nanos()).unwrap_or(u64::MAX);
+            match raw.wait_for_fences(&[self.fence], true, timeout) {
+                Ok(()) => {}
+                Err(vk::Result::TIMEOUT) => {
+                    // The commands still use the callers' objects, so returning is not safe before
+                    // the device is idle.
+                    raw.device_wait_idle().map_err(|result| failed("vkDeviceWaitIdle", result))?;
+                    return Err(Error::Vulkan {
+                        call: format!("pass {}", self.last_pass),
+                        result: format!("took longer than {} s", SUBMISSION_TIMEOUT.as_secs()),
+                    });
+                }
+                Err(result) => return Err(failed("vkWaitForFences", result)),
+            }
+        }
+        self.timestamps.as_ref().map_or_else(|| Ok(PassTimes::new()), Timestamps::read)
+    }
+}
+
+impl Drop for Commands {
+    fn drop(&mut self) {
+        // SAFETY: either never submitted or waited for; destroying null handles is allowed.
+        unsafe {
+            self.device.raw().destroy_fence(self.fence, None);
+            self.device.raw().destroy_command_pool(self.pool, None);
+        }
+    }
+}

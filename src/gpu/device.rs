@@ -1,0 +1,397 @@
+//! Device choice and the logical device.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use ash::{ext, vk};
+use gpu_allocator::{
+    AllocationSizes, AllocatorDebugSettings,
+    vulkan::{Allocator, AllocatorCreateDesc},
+};
+use serde::Serialize;
+
+use super::{
+    descriptors::{SET_BINDING_COUNTS, SetLayouts},
+    instance::{Instance, no_driver},
+    pipeline::PipelineCache,
+    vulkan_error,
+};
+use crate::error::{Error, Result};
+
+/// What a Vulkan device is and can do, as far as Fenestra cares.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Capabilities {
+    /// Position in the loader's list.
+    pub index: usize,
+    /// Name that the driver gives.
+    pub name: String,
+    /// "discrete", "integrated", "virtual", "software" or "other".
+    pub kind: &'static str,
+    /// Driver name and version text.
+    pub driver: String,
+    /// Vulkan version as (major, minor, patch).
+    pub api_version: (u32, u32, u32),
+    /// Largest range of one storage-buffer binding, bytes.
+    pub max_storage_buffer_range: u64,
+    /// Storage buffers that one pipeline may see.
+    pub max_storage_buffers: u32,
+    /// Push constants, bytes.
+    pub max_push_constants_size: u32,
+    /// Workgroups of one dispatch along x.
+    pub max_workgroup_count: u32,
+    /// Invocations of one workgroup.
+    pub max_workgroup_invocations: u32,
+    /// Shared memory of one workgroup, bytes.
+    pub max_shared_memory: u32,
+    /// Invocations of a subgroup.
+    pub subgroup_size: u32,
+    /// Memory heaps that are local to the device, bytes in all.
+    pub device_memory: u64,
+    /// Whether structs may have `scalar` layout.
+    pub scalar_block_layout: bool,
+    /// Queue family with compute and timestamps, if there is one.
+    pub queue_family: Option<u32>,
+    /// Valid bits of that family's timestamps.
+    pub timestamp_valid_bits: u32,
+    /// Nanoseconds per timestamp tick.
+    pub timestamp_period: f32,
+    /// Driver's identity, for the pipeline cache's name.
+    pub pipeline_cache_uuid: [u8; 16],
+}
+
+impl Capabilities {
+    /// What Fenestra needs and this device lacks; empty if it can be used.
+    pub fn missing(&self) -> Vec<String> {
+        let mut missing = Vec::new();
+        let mut need = |what: &str, needed: u64, found: u64| {
+            if found < needed {
+                missing.push(format!("{what}: needed {needed}, found {found}"));
+            }
+        };
+        need(
+            "storage buffers per stage",
+            u64::from(most_bindings()),
+            self.max_storage_buffers.into(),
+        );
+        need("push constants in bytes", 128, self.max_push_constants_size.into());
+        need("workgroup invocations", 64, self.max_workgroup_invocations.into());
+        need("workgroups per dispatch", 65_535, self.max_workgroup_count.into());
+        need("storage buffer range in bytes", 128 << 20, self.max_storage_buffer_range);
+        if self.api_version < (1, 2, 0) {
+            let (major, minor, patch) = self.api_version;
+            missing.push(format!("Vulkan version: needed 1.2, found {major}.{minor}.{patch}"));
+        }
+        if !self.scalar_block_layout {
+            missing.push("feature scalarBlockLayout: needed, not found".into());
+        }
+        if self.queue_family.is_none() {
+            missing.push("a compute queue with timestamps: needed, not found".into());
+        }
+        missing
+    }
+
+    /// Rank for the choice of a device; the smallest wins.
+    fn rank(&self) -> u32 {
+        match self.kind {
+            "discrete" => 0,
+            "integrated" => 1,
+            "virtual" => 2,
+            "other" => 3,
+            _ => 4,
+        }
+    }
+}
+
+/// Storage buffers of the pipeline that sees most: scene, wave and the larger of the other two sets.
+fn most_bindings() -> u32 {
+    let [scene, srbf, wave, film] = SET_BINDING_COUNTS;
+    scene + wave + srbf.max(film)
+}
+
+/// Lists the devices of an instance.
+///
+/// # Errors
+/// [`Error::Device`] if there is none.
+pub fn list(instance: &Instance) -> Result<Vec<Capabilities>> {
+    Ok(enumerate(instance)?.into_iter().map(|(_, capabilities)| capabilities).collect())
+}
+
+fn enumerate(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, Capabilities)>> {
+    // SAFETY: the instance is alive.
+    let devices = unsafe { instance.raw().enumerate_physical_devices() }
+        .map_err(|result| vulkan_error("vkEnumeratePhysicalDevices", result))?;
+    if devices.is_empty() {
+        return Err(no_driver());
+    }
+    Ok(devices
+        .into_iter()
+        .enumerate()
+        .map(|(index, device)| (device, capabilities(instance, index, device)))
+        .collect())
+}
+
+fn capabilities(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> Capabilities {
+    let raw = instance.raw();
+    let mut driver = vk::PhysicalDeviceDriverProperties::default();
+    let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
+    let mut properties =
+        vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut subgroup);
+    let mut features12 = vk::PhysicalDeviceVulkan12Features::default();
+    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut features12);
+    // SAFETY: `physical` comes from this instance; the chained structures live through the calls.
+    let (families, memory) = unsafe {
+        raw.get_physical_device_properties2(physical, &mut properties);
+        raw.get_physical_device_features2(physical, &mut features);
+        (
+            raw.get_physical_device_queue_family_properties(physical),
+            raw.get_physical_device_memory_properties(physical),
+        )
+    };
+    let properties = properties.properties;
+    let limits = properties.limits;
+    // A family that also has graphics is preferred: capture tools want one.
+    let queue_family = families
+        .iter()
+        .enumerate()
+        .filter(|(_, family)| {
+            family.queue_flags.contains(vk::QueueFlags::COMPUTE) && family.timestamp_valid_bits > 0
+        })
+        .max_by_key(|(_, family)| family.queue_flags.contains(vk::QueueFlags::GRAPHICS))
+        .and_then(|(index, family)| {
+            Some((u32::try_from(index).ok()?, family.timestamp_valid_bits))
+        });
+    let text = |text: Result<&std::ffi::CStr, _>| match text {
+        Ok(text) => text.to_string_lossy().into_owned(),
+        Err(std::ffi::FromBytesUntilNulError { .. }) => String::new(),
+    };
+    Capabilities {
+        index,
+        name: text(properties.device_name_as_c_str()),
+        kind: match properties.device_type {
+            vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
+            vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
+            vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
+            vk::PhysicalDeviceType::CPU => "software",
+            _ => "other",
+        },
+        driver: format!(
+            "{} {}",
+            text(driver.driver_name_as_c_str()),
+            text(driver.driver_info_as_c_str())
+        )
+        .trim()
+        .to_owned(),
+        api_version: (
+            vk::api_version_major(properties.api_version),
+            vk::api_version_minor(properties.api_version),
+            vk::api_version_patch(properties.api_version),
+        ),
+        max_storage_buffer_range: limits.max_storage_buffer_range.into(),
+        max_storage_buffers: limits
+            .max_per_stage_descriptor_storage_buffers
+            .min(limits.max_descriptor_set_storage_buffers),
+        max_push_constants_size: limits.max_push_constants_size,
+        max_workgroup_count: limits.max_compute_work_group_count[0],
+        max_workgroup_invocations: limits
+            .max_compute_work_group_invocations
+            .min(limits.max_compute_work_group_size[0]),
+        max_shared_memory: limits.max_compute_shared_memory_size,
+        subgroup_size: subgroup.subgroup_size,
+        device_memory: memory
+            .memory_heaps_as_slice()
+            .iter()
+            .filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
+            .map(|heap| heap.size)
+            .sum(),
+        scalar_block_layout: features12.scalar_block_layout == vk::TRUE,
+        queue_family: queue_family.map(|(index, _)| index),
+        timestamp_valid_bits: queue_family.map_or(0, |(_, bits)| bits),
+        timestamp_period: limits.timestamp_period,
+        pipeline_cache_uuid: properties.pipeline_cache_uuid,
+    }
+}
+
+/// Chooses among devices: the one that `wanted` names by index or by part of its name, else a
+/// discrete GPU before an integrated one before a software device.
+///
+/// # Errors
+/// [`Error::Device`] if none fits; the message lists the devices and what each lacks.
+pub fn choose<'a>(devices: &'a [Capabilities], wanted: Option<&str>) -> Result<&'a Capabilities> {
+    let describe = || {
+        devices
+            .iter()
+            .map(|device| {
+                let missing = device.missing();
+                let state = if missing.is_empty() { "usable".into() } else { missing.join(", ") };
+                format!("[{}] {} ({}): {state}", device.index, device.name, device.kind)
+            })
+            .collect::<Vec<_>>()
+            .join("; ")
+    };
+    let mut candidates: Vec<&Capabilities> = match wanted {
+        None => devices.iter().collect(),
+        Some(wanted) => {
+            let lower = wanted.to_lowercase();
+            let index = wanted.parse::<usize>().ok();
+            devices
+                .iter()
+                .filter(|device| {
+                    index.map_or_else(
+                        || device.name.to_lowercase().contains(&lower),
+                        |index| device.index == index,
+                    )
+                })
+                .collect()
+        }
+    };
+    if candidates.is_empty() {
+        return Err(Error::Device {
+            reason: format!(
+                "no Vulkan device matches --device {}; there are: {}",
+                wanted.unwrap_or_default(),
+                describe()
+            ),
+            help: "`fenestra devices` lists the devices with their index".into(),
+        });
+    }
+    candidates.retain(|device| device.missing().is_empty());
+    candidates.into_iter().min_by_key(|device| (device.rank(), device.index)).ok_or_else(|| {
+        Error::Device {
+            reason: format!("no Vulkan device can run Fenestra: {}", describe()),
+            help: "update the driver, or run ./setup to install the software device lavapipe"
+                .into(),
+        }
+    })
+}
+
+/// A logical device with its queue, allocator, set layouts and pipeline cache.
+pub struct Device {
+    raw: ash::Device,
+    debug_names: Option<ext::debug_utils::Device>,
+    queue: Mutex<vk::Queue>,
+    capabilities: Capabilities,
+    set_layouts: SetLayouts,
+    pipeline_cache: PipelineCache,
+    // Emptied in `drop`, before the device goes.
+    allocator: Mutex<Option<Allocator>>,
+    // Last: the instance must outlive the device.
+    instance: Arc<Instance>,
+}
+
+impl Device {
+    /// Opens the device that [`choose`] picks.
+    ///
+    /// # Errors
+    /// No loader, no device, a device that lacks something, or a failing driver.
+    pub fn open(wanted: Option<&str>, validate: bool) -> Result<Arc<Self>> {
+        let instance = Arc::new(Instance::new(validate)?);
+        let devices = enumerate(&instance)?;
+        let list: Vec<Capabilities> =
+            devices.iter().map(|(_, capabilities)| capabilities.clone()).collect();
+        let capabilities = choose(&list, wanted)?.clone();
+        let (physical, _) = devices[capabilities.index];
+        let queue_family = capabilities.queue_family.unwrap_or_default();
+
+        let priorities = [1.0];
+        let queues = [vk::DeviceQueueCreateInfo::default()
+            .queue_family_index(queue_family)
+            .queue_priorities(&priorities)];
+        let mut features12 =
+            vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true);
+        let info =
+            vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut features12);
+        // SAFETY: `physical` belongs to this instance and has the family and feature asked for.
+        let raw = unsafe { instance.raw().create_device(physical, &info, None) }
+            .map_err(|result| vulkan_error("vkCreateDevice", result))?;
+        // SAFETY: the queue was requested at creation.
+        let queue = unsafe { raw.get_device_queue(queue_family, 0) };
+        let debug_names =
+            instance.has_debug_utils().then(|| ext::debug_utils::Device::new(instance.raw(), &raw));
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.raw().clone(),
+            device: raw.clone(),
+            physical_device: physical,
+            debug_settings: AllocatorDebugSettings::default(),
+            buffer_device_address: false,
+            allocation_sizes: AllocationSizes::new(16 << 20, 16 << 20),
+        })
+        .map_err(|error| Error::Vulkan {
+            call: "memory allocator".into(),
+            result: error.to_string(),
+        })?;
+        let set_layouts = SetLayouts::new(&raw)?;
+        let pipeline_cache = PipelineCache::load(&raw, &capabilities);
+        log::info!(
+            "device {}: {} ({}), {}",
+            capabilities.index,
+            capabilities.name,
+            capabilities.kind,
+            capabilities.driver
+        );
+        Ok(Arc::new(Self {
+            raw,
+            debug_names,
+            queue: Mutex::new(queue),
+            capabilities,
+            set_layouts,
+            pipeline_cache,
+            allocator: Mutex::new(Some(allocator)),
+            instance,
+        }))
+    }
+
+    /// What this device is and can do.
+    pub fn capabilities(&self) -> &Capabilities {
+        &self.capabilities
+    }
+
+    /// What the validation layers have said so far; empty without validation.
+    pub fn validation_messages(&self) -> Vec<String> {
+        self.instance.validation_messages()
+    }
+
+    /// Writes compiled pipelines to the user's cache folder; failures are only logged.
+    pub fn save_pipeline_cache(&self) {
+        self.pipeline_cache.save(&self.raw, &self.capabilities);
+    }
+
+    pub(super) fn raw(&self) -> &ash::Device {
+        &self.raw
+    }
+
+    pub(super) fn debug_names(&self) -> Option<&ext::debug_utils::Device> {
+        self.debug_names.as_ref()
+    }
+
+    pub(super) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn queue_family(&self) -> u32 {
+        self.capabilities.queue_family.unwrap_or_default()
+    }
+
+    pub(super) fn set_layouts(&self) -> &SetLayouts {
+        &self.set_layouts
+    }
+
+    pub(super) fn pipeline_cache(&self) -> vk::PipelineCache {
+        self.pipeline_cache.raw()
+    }
+
+    pub(super) fn allocator(&self) -> MutexGuard<'_, Option<Allocator>> {
+        self.allocator.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        // SAFETY: every object made from the device holds it in an `Arc`, so none is left but those
+        // destroyed here, before the device itself; the queue is idle since every submission waits.
+        unsafe {
+            drop(self.allocator().take());
+            self.set_layouts.destroy(&self.raw);
+            self.pipeline_cache.destroy(&self.raw);
+            self.raw.destroy_device(None);
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! Compute pipelines with specialization constants, and their cache on disk.
+
+use std::{ffi::CStr, fs, path::PathBuf, sync::Arc};
+
+use ash::vk;
+
+use super::{
+    device::{Capabilities, Device},
+    labels,
+    shaders::used_sets,
+    vulkan_error,
+};
+use crate::{cache, error::Result, film};
+
+/// A compute pipeline.
+pub struct Pipeline {
+    raw: vk::Pipeline,
+    layout: vk::PipelineLayout,
+    name: String,
+    device: Arc<Device>,
+}
+
+impl Pipeline {
+    /// Compiles `spirv` with its specialization constants given as (`constant_id`, 32-bit value).
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`](crate::Error::Vulkan) if a call fails.
+    pub fn new(
+        device: &Arc<Device>,
+        name: &str,
+        spirv: &[u8],
+        constants: &[(u32, u32)],
+    ) -> Result<Self> {
+        let words: Vec<u32> = bytemuck::pod_collect_to_vec(spirv);
+        let used = used_sets(&words);
+        let layouts: Vec<_> = (0..4_u32)
+            .map(|set| {
+                if used[set as usize] {
+                    device.set_layouts().get(set)
+                } else {
+                    device.set_layouts().empty()
+                }
+            })
+            .collect();
+        let push_constants =
+            [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(128)];
+        let layout_info = vk::PipelineLayoutCreateInfo::default()
+            .set_layouts(&layouts)
+            .push_constant_ranges(&push_constants);
+        let raw_device = device.raw();
+        // SAFETY: the set layouts live as long as the device.
+        let layout = unsafe { raw_device.create_pipeline_layout(&layout_info, None) }
+            .map_err(|result| vulkan_error(&format!("vkCreatePipelineLayout({name})"), result))?;
+        // From here on `Drop` cleans up.
+        let mut pipeline = Self {
+            raw: vk::Pipeline::null(),
+            layout,
+            name: name.to_owned(),
+            device: Arc::clone(device),
+        };
+
+        let module_info = vk::ShaderModuleCreateInfo::default().code(&words);
+        // SAFETY: `words` is SPIR-V that the build compiled.
+        let module = unsafe { raw_device.create_shader_module(&module_info, None) }
+            .map_err(|result| vulkan_error(&format!("vkCreateShaderModule({name})"), result))?;
+        let entries: Vec<_> = constants
+            .iter()
+            .enumerate()
+            .map(|(position, (id, _))| {
+                vk::SpecializationMapEntry::default()
+                    .constant_id(*id)
+                    .offset(u32::try_from(4 * position).unwrap_or(u32::MAX))
+                    .size(4)
+            })
+            .collect();
+        let values: Vec<u32> = constants.iter().map(|(_, value)| *value).collect();
+        let specialization = vk::SpecializationInfo::default()
+            .map_entries(&entries)
+            .data(bytemuck::cast_slice(&values));
+        const MAIN: &CStr = c"main";
+        let stage = vk::PipelineShaderStageCreateInfo::default()
+            .stage(vk::ShaderStageFlags::COMPUTE)
+            .module(module)
+            .name(MAIN)
+            .specialization_info(&specialization);
+        let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
+        // SAFETY: module, layout and cache are alive; the module is not needed afterwards.
+        let result = unsafe {
+            let result = raw_device.create_compute_pipelines(device.pipeline_cache(), &info, None);
+            raw_device.destroy_shader_module(module, None);
+            result
+        };
+        pipeline.raw = result
+            .map_err(|(_, result)| {
+                vulkan_error(&format!("vkCreateComputePipelines({name})"), result)
+            })?
+            .first()
+            .copied()
+            .unwrap_or_default();
+        labels::name_object(device, pipeline.raw, name);
+        Ok(pipeline)
+    }
+
+    /// Name of the pass.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(super) fn raw(&self) -> vk::Pipeline {
+        self.raw
+    }
+
+    pub(super) fn layout(&self) -> vk::PipelineLayout {
+        self.layout
+    }
+}
+
+impl Drop for Pipeline {
+    fn drop(&mut self) {
+        // SAFETY: every submission is waited for; destroying null handles is allowed.
+        unsafe {
+            self.device.raw().destroy_pipeline(self.raw, None);
+            self.device.raw().destroy_pipeline_layout(self.layout, None);
+        }
+    }
+}
+
+/// The driver's pipeline cache, kept in the user's cache folder per device and driver.
+pub(super) struct PipelineCache {
+    raw: vk::PipelineCache,
+}
+
+impl PipelineCache {
+    /// Reads the cache of this device; anything unreadable or foreign is an empty cache.
+    pub(super) fn load(device: &ash::Device, capabilities: &Capabilities) -> Self {
+        let data = file(capabilities).and_then(|path| fs::read(path).ok()).unwrap_or_default();
+        // Header: length, version, vendor, device, then the driver's identity.
+        let is_ours = data.get(16..32) == Some(&capabilities.pipeline_cache_uuid[..]);
+        let info =
+            vk::PipelineCacheCreateInfo::default().initial_data(if is_ours { &data } else { &[] });
+        // SAFETY: drivers validate the header of the initial data; the identity was compared.
+        // Without a cache everything still works, so a failure gives none.
+        let raw = unsafe { device.create_pipeline_cache(&info, None) }.unwrap_or_default();
+        Self { raw }
+    }
+
+    pub(super) fn raw(&self) -> vk::PipelineCache {
+        self.raw
+    }
+
+    /// Writes the cache; a failure costs compile time in the next run and nothing else.
+    pub(super) fn save(&self, device: &ash::Device, capabilities: &Capabilities) {
+        let (Some(path), false) = (file(capabilities), self.raw == vk::PipelineCache::null())
+        else {
+            return;
+        };
+        // SAFETY: the cache is alive.
+        let data = unsafe { device.get_pipeline_cache_data(self.raw) }.unwrap_or_default();
+        let write = film::write_atomically(&path, |file| std::io::Write::write_all(file, &data));
+        if let Err(error) = write {
+            log::debug!("pipeline cache not written: {error}");
+        }
+    }
+
+    /// # Safety
+    /// The device must be alive and no pipeline creation in progress.
+    pub(super) unsafe fn destroy(&self, device: &ash::Device) {
+        // SAFETY: promised by the caller; destroying a null handle is allowed.
+        unsafe { device.destroy_pipeline_cache(self.raw, None) };
+    }
+}
+
+fn file(capabilities: &Capabilities) -> Option<PathBuf> {
+    let identity: String =
+        capabilities.pipeline_cache_uuid.iter().map(|byte| format!("{byte:02x}")).collect();
+    Some(cache::folder("pipelines")?.join(format!("{identity}.bin")))
+}

@@ -1,0 +1,113 @@
+//! The Vulkan host itself: uploads, dispatches, timestamps, device choice, limits.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+mod support;
+
+use fenestra::gpu::{
+    Buffer, Commands, DescriptorSet, Pipeline,
+    constants::SET_FILM,
+    device::{Capabilities, choose},
+};
+
+const PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/probe.spv"));
+
+#[test]
+fn a_probe_sees_its_input_and_returns_its_output() {
+    let input: Vec<u32> = (0..1000).map(|i| i * i).collect();
+    let output =
+        support::run_probe(PROBE, &[(SET_FILM, 0, bytemuck::cast_slice(&input))], 4000, 1000);
+    let output: &[u32] = bytemuck::cast_slice(&output);
+    assert!(input.iter().zip(output).all(|(input, output)| input + 1 == *output));
+}
+
+#[test]
+fn copies_longer_than_one_staging_piece_arrive_whole() {
+    let device = support::device();
+    let words: Vec<u32> = (0..(20 << 20) / 4 + 3).collect();
+    let buffer = Buffer::from_slice(device, "long", &words).unwrap();
+    assert_eq!(buffer.download::<u32>(words.len()).unwrap(), words);
+    support::assert_silent();
+}
+
+#[test]
+fn every_timed_pass_has_its_row() {
+    let device = support::device();
+    let input = Buffer::zeroed(device, "input", 4 << 20).unwrap();
+    let output = Buffer::zeroed(device, "output", 4 << 20).unwrap();
+    let forth = DescriptorSet::new(device, SET_FILM, &[(0, &input), (1, &output)]).unwrap();
+    let back = DescriptorSet::new(device, SET_FILM, &[(0, &output), (1, &input)]).unwrap();
+    let pipeline = Pipeline::new(device, "probe", PROBE, &[]).unwrap();
+    let mut commands = Commands::begin_timed(device, 4).unwrap();
+    for _ in 0..2 {
+        commands.dispatch(&pipeline, &[&forth], &[], 1 << 20);
+        commands.dispatch(&pipeline, &[&back], &[], 1 << 20);
+    }
+    let times = commands.submit_and_wait().unwrap();
+    assert_eq!(times.keys().collect::<Vec<_>>(), ["probe"]);
+    assert!(times["probe"] > 0.0);
+    // Each dispatch sees what the one before wrote.
+    assert!(input.download::<u32>(1 << 20).unwrap().iter().all(|word| *word == 4));
+    support::assert_silent();
+}
+
+#[test]
+fn a_buffer_over_the_limit_is_refused_with_both_figures() {
+    let device = support::device();
+    let allowed = device.capabilities().max_storage_buffer_range;
+    let Err(error) = Buffer::new(device, "too large", allowed + 4) else {
+        panic!("a buffer of {} bytes was created", allowed + 4)
+    };
+    let text = error.to_string();
+    assert!(text.contains(&allowed.to_string()), "{text}");
+    assert!(text.contains(&(allowed + 4).to_string()), "{text}");
+    assert!(text.contains("too large"), "{text}");
+}
+
+fn capabilities(index: usize, name: &str, kind: &'static str) -> Capabilities {
+    Capabilities { index, name: name.into(), kind, ..support::device().capabilities().clone() }
+}
+
+#[test]
+fn a_discrete_device_comes_before_an_integrated_one_before_software() {
+    let list = [
+        capabilities(0, "llvmpipe", "software"),
+        capabilities(1, "Small", "integrated"),
+        capabilities(2, "Big", "discrete"),
+    ];
+    assert_eq!(choose(&list, None).unwrap().index, 2);
+    assert_eq!(choose(&list[..2], None).unwrap().index, 1);
+    assert_eq!(choose(&list, Some("0")).unwrap().name, "llvmpipe");
+    assert_eq!(choose(&list, Some("small")).unwrap().index, 1);
+    let error = choose(&list, Some("huge")).unwrap_err().to_string();
+    assert!(error.contains("huge") && error.contains("[2] Big"), "{error}");
+}
+
+#[test]
+fn a_device_without_a_needed_limit_is_refused_with_needed_and_found() {
+    let mut weak = capabilities(0, "Weak", "discrete");
+    weak.scalar_block_layout = false;
+    weak.max_storage_buffers = 4;
+    weak.api_version = (1, 1, 0);
+    let error = choose(std::slice::from_ref(&weak), None).unwrap_err().to_string();
+    for part in ["Weak", "scalarBlockLayout", "found 4", "needed 1.2, found 1.1.0"] {
+        assert!(error.contains(part), "{part} is missing from: {error}");
+    }
+    // It is passed over where another device can do it.
+    let list = [weak, capabilities(1, "llvmpipe", "software")];
+    assert_eq!(choose(&list, None).unwrap().index, 1);
+}
+
+#[test]
+fn a_mistake_is_heard_by_the_validation_layers() {
+    // On a device of its own, so that the shared one stays silent.
+    let device = fenestra::gpu::Device::open(None, true).unwrap();
+    let buffer = Buffer::zeroed(&device, "buffer", 64).unwrap();
+    let set = DescriptorSet::new(&device, SET_FILM, &[(0, &buffer), (1, &buffer)]).unwrap();
+    let pipeline = Pipeline::new(&device, "probe", PROBE, &[]).unwrap();
+    let mut commands = Commands::begin(&device).unwrap();
+    // Push constants come in multiples of four bytes.
+    commands.dispatch(&pipeline, &[&set], &[0; 3], 1);
+    let _ = commands.submit_and_wait();
+    let messages = device.validation_messages();
+    assert!(messages.iter().any(|message| message.contains("vkCmdPushConstants")), "{messages:?}");
+}

@@ -1,0 +1,77 @@
+//! What the integration tests share: the Vulkan device and probes of single shader functions.
+#![allow(dead_code, reason = "every test binary uses a part of this")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
+
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, OnceLock},
+};
+
+use fenestra::gpu::{
+    Buffer, Commands, DescriptorSet, Device, Pipeline,
+    constants::{SET_FILM, WORKGROUP_SIZE},
+};
+
+/// The device all tests of one binary share, with validation and synchronization validation on.
+///
+/// # Panics
+/// Without a Vulkan device or the validation layers: run `./setup`.
+pub fn device() -> &'static Arc<Device> {
+    static DEVICE: OnceLock<Arc<Device>> = OnceLock::new();
+    DEVICE.get_or_init(|| match Device::open(None, true) {
+        Ok(device) => {
+            eprintln!("device: {} ({})", device.capabilities().name, device.capabilities().driver);
+            device
+        }
+        Err(error) => {
+            panic!("GPU tests need a Vulkan device and validation layers, run ./setup: {error}")
+        }
+    })
+}
+
+/// Fails if the validation layers have said anything since the device was opened.
+pub fn assert_silent() {
+    let messages = device().validation_messages();
+    assert!(messages.is_empty(), "validation messages:\n{}", messages.join("\n"));
+}
+
+/// Runs a probe shader once over `invocations` invocations and returns what it wrote to binding 1
+/// of the film set; `buffers` are (set, binding, content), the probe's input being binding 0 of the
+/// film set.
+pub fn run_probe(
+    spirv: &[u8],
+    buffers: &[(u32, u32, &[u8])],
+    output_bytes: usize,
+    invocations: u32,
+) -> Vec<u8> {
+    let device = device();
+    let uploaded: Vec<(u32, u32, Buffer)> = buffers
+        .iter()
+        .map(|(set, binding, bytes)| {
+            let name = format!("probe {set}.{binding}");
+            (*set, *binding, Buffer::from_slice(device, &name, bytes).unwrap())
+        })
+        .collect();
+    let output = Buffer::zeroed(device, "probe output", output_bytes as u64).unwrap();
+    let mut by_set: BTreeMap<u32, Vec<(u32, &Buffer)>> = BTreeMap::new();
+    for (set, binding, buffer) in &uploaded {
+        by_set.entry(*set).or_default().push((*binding, buffer));
+    }
+    by_set.entry(SET_FILM).or_default().push((1, &output));
+    let sets: Vec<DescriptorSet> = by_set
+        .iter()
+        .map(|(set, buffers)| DescriptorSet::new(device, *set, buffers).unwrap())
+        .collect();
+    let pipeline = Pipeline::new(device, "probe", spirv, &[]).unwrap();
+    let mut commands = Commands::begin(device).unwrap();
+    commands.dispatch(
+        &pipeline,
+        &sets.iter().collect::<Vec<_>>(),
+        &[],
+        invocations.next_multiple_of(WORKGROUP_SIZE),
+    );
+    commands.submit_and_wait().unwrap();
+    let result = output.download(output_bytes).unwrap();
+    assert_silent();
+    result
+}
