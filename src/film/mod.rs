@@ -1,32 +1,74 @@
-//! Radiometric images: sums of samples on their way to files.
+//! The film: sums of samples on their way to files.
+//!
+//! The device accumulates [`Sums`] over `n` samples of every pixel; from them come the image file
+//! ([`Sums::to_image`] → [`Image::write_exr`]), the preview ([`png`]), and the [`Checkpoint`] from
+//! which a render continues to the bit. [`Metadata`] says in every file what it was rendered with.
+
+pub mod checkpoint;
+pub mod exr;
+pub mod metadata;
+pub mod png;
+pub mod statistics;
+pub mod sums;
 
 use std::{
-    fs::{self, File},
-    io::{self, BufWriter, Write},
+    fs::{self, File, OpenOptions},
+    io::{BufWriter, Write},
     path::Path,
 };
 
+pub use self::{
+    checkpoint::Checkpoint,
+    exr::{Attribute, Image, RgbImage},
+    metadata::{Metadata, SampleRange},
+    statistics::Statistics,
+    sums::{Aov, Sums},
+};
 use crate::error::{Error, Result};
 
-/// Writes a file so that nobody ever sees half of it: to a temporary name in the same folder, then
-/// renamed. Parent folders are created.
+/// Writes a file so that it appears complete or not at all.
+///
+/// Parent folders are created, `write` fills a file of a temporary name in the same folder, and that
+/// file is renamed to `path`, which replaces an older one. On any failure the temporary file is
+/// removed and an older file at `path` is as it was. A `path` that exists and is neither a file nor
+/// a folder (`/dev/stdout`, a pipe) is written directly.
 ///
 /// # Errors
-/// [`Error::Io`] with the path; the temporary file is removed.
+/// [`Error::Io`] with `path` and the cause (no permission, full disk, …).
 pub fn write_atomically(
     path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
 ) -> Result<()> {
-    let failed = |source| Error::io(path, "write", source);
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
+    let parent = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
-    fs::create_dir_all(folder).map_err(failed)?;
-    let temporary = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
-    let mut writer = BufWriter::new(temporary.as_file().try_clone().map_err(failed)?);
-    write(&mut writer).and_then(|()| writer.flush()).map_err(failed)?;
-    drop(writer);
-    temporary.persist(path).map_err(|error| failed(error.error))?;
-    Ok(())
+    let fill = |file: File| -> std::io::Result<File> {
+        let mut writer = BufWriter::with_capacity(1 << 16, file);
+        write(&mut writer)?;
+        writer.flush()?;
+        writer.into_inner().map_err(std::io::IntoInnerError::into_error)
+    };
+    let is_special =
+        fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir());
+    if is_special {
+        return OpenOptions::new()
+            .write(true)
+            .open(path)
+            .and_then(fill)
+            .map(drop)
+            .map_err(|source| Error::io(path, "write", source));
+    }
+    fs::create_dir_all(parent).map_err(|source| Error::io(parent, "create folder", source))?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".fenestra-").suffix(".tmp");
+    // A temporary file is private by default; the result has the permissions of any new file.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let attempt = || -> std::io::Result<()> {
+        let (file, temporary) = builder.tempfile_in(parent)?.into_parts();
+        fill(file)?.sync_all()?;
+        temporary.persist(path).map_err(|error| error.error)
+    };
+    attempt().map_err(|source| Error::io(path, "write", source))
 }

@@ -1,0 +1,154 @@
+//! Progress on standard error: a bar on a terminal, plain lines that back off otherwise.
+
+use std::{
+    io::IsTerminal,
+    time::{Duration, Instant},
+};
+
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// Steps of the bar; only its resolution.
+const STEPS: u64 = 10_000;
+/// First interval between plain lines; it doubles up to [`LONGEST_INTERVAL`].
+const FIRST_INTERVAL: Duration = Duration::from_secs(1);
+/// Longest interval between plain lines.
+const LONGEST_INTERVAL: Duration = Duration::from_secs(60);
+
+/// Where a run stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Standing {
+    /// Share done, 0…1, by the stop rule that is nearest to its end.
+    pub fraction: f64,
+    /// Camera paths per pixel so far.
+    pub samples: u32,
+    /// Rays a second so far; 0 where unknown.
+    pub rays_per_second: f64,
+    /// Mean relative standard error; absent where unknown.
+    pub relative_error: Option<f64>,
+}
+
+impl Standing {
+    /// "64 spp, 3.21 Mrays/s, error 4.2%".
+    fn describe(&self) -> String {
+        let mut parts = vec![format!("{} spp", self.samples)];
+        if self.rays_per_second > 0.0 {
+            parts.push(format!("{:.2} Mrays/s", self.rays_per_second * 1e-6));
+        }
+        if let Some(error) = self.relative_error.filter(|error| error.is_finite()) {
+            parts.push(format!("error {:.2}%", 100.0 * error));
+        }
+        parts.join(", ")
+    }
+}
+
+enum Output {
+    Bar(ProgressBar),
+    Lines { last: Instant, interval: Duration },
+    Quiet,
+}
+
+/// Progress of one run.
+pub struct Progress {
+    label: String,
+    start: Instant,
+    output: Output,
+}
+
+impl Progress {
+    /// Starts the clock. `quiet` shows nothing.
+    pub fn new(label: impl Into<String>, quiet: bool) -> Self {
+        let label = label.into();
+        let output = if quiet {
+            Output::Quiet
+        } else if std::io::stderr().is_terminal() {
+            let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
+            let template = "{prefix} [{bar:30}] {percent:>3}% {msg}";
+            if let Ok(style) = ProgressStyle::with_template(template) {
+                bar.set_style(style.progress_chars("=> "));
+            }
+            bar.set_prefix(label.clone());
+            Output::Bar(bar)
+        } else {
+            Output::Lines { last: Instant::now(), interval: FIRST_INTERVAL }
+        };
+        Self { label, start: Instant::now(), output }
+    }
+
+    /// Shows where the run stands; call it as often as convenient.
+    pub fn update(&mut self, standing: &Standing) {
+        let elapsed = self.start.elapsed();
+        let message = || {
+            let remaining = remaining(elapsed, standing.fraction)
+                .map_or_else(String::new, |time| format!(", {} left", HumanDuration(time)));
+            format!("{}, {}{remaining}", standing.describe(), HumanDuration(elapsed))
+        };
+        match &mut self.output {
+            Output::Bar(bar) => {
+                bar.set_position((standing.fraction.clamp(0.0, 1.0) * STEPS as f64) as u64);
+                bar.set_message(message());
+            }
+            Output::Lines { last, interval } => {
+                if last.elapsed() >= *interval {
+                    *last = Instant::now();
+                    *interval = (*interval * 2).min(LONGEST_INTERVAL);
+                    let percent = 100.0 * standing.fraction.clamp(0.0, 1.0);
+                    eprintln!("{}: {percent:.0}%, {}", self.label, message());
+                }
+            }
+            Output::Quiet => {}
+        }
+    }
+
+    /// Prints a line that stays (a warning, a file written), above the bar.
+    pub fn print(&self, line: &str) {
+        match &self.output {
+            Output::Bar(bar) => bar.suspend(|| eprintln!("{line}")),
+            Output::Lines { .. } => eprintln!("{line}"),
+            Output::Quiet => {}
+        }
+    }
+
+    /// Removes the bar and prints the last line: where the run ended and why.
+    pub fn finish(self, standing: &Standing, reason: &str) {
+        if let Output::Bar(bar) = &self.output {
+            bar.finish_and_clear();
+        }
+        if !matches!(self.output, Output::Quiet) {
+            let elapsed = self.start.elapsed().as_secs_f64();
+            eprintln!("{}: {} in {elapsed:.1} s ({reason})", self.label, standing.describe());
+        }
+    }
+}
+
+/// Time left at the rate so far; absent at the start and where the end is unknown.
+fn remaining(elapsed: Duration, fraction: f64) -> Option<Duration> {
+    if !(0.001..1.0).contains(&fraction) {
+        return None;
+    }
+    Duration::try_from_secs_f64(elapsed.as_secs_f64() * (1.0 - fraction) / fraction).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn remaining_time_follows_the_rate_so_far() {
+        let time = |seconds| Duration::from_secs(seconds);
+        assert_eq!(remaining(time(10), 0.25), Some(time(30)));
+        assert_eq!(remaining(time(10), 0.0), None);
+        assert_eq!(remaining(time(10), 1.0), None);
+        assert_eq!(remaining(time(10), f64::NAN), None);
+    }
+
+    #[test]
+    fn standing_leaves_out_what_is_unknown() {
+        let mut standing = Standing { samples: 64, ..Standing::default() };
+        assert_eq!(standing.describe(), "64 spp");
+        standing.rays_per_second = 3.21e6;
+        standing.relative_error = Some(0.042);
+        assert_eq!(standing.describe(), "64 spp, 3.21 Mrays/s, error 4.20%");
+        standing.relative_error = Some(f64::INFINITY);
+        assert_eq!(standing.describe(), "64 spp, 3.21 Mrays/s");
+    }
+}

@@ -1,0 +1,319 @@
+//! OpenEXR files: an [`Image`] of named float channels and attributes, written and read.
+//!
+//! Files have one part. The picture is `R`, `G`, `B`, linear with Rec.709 primaries; other layers
+//! have dotted names (`Albedo.R`, `N.X`), which viewers group by prefix. OpenEXR stores channels
+//! sorted by name, so that readers look them up by name.
+
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::{BufReader, BufWriter},
+    path::Path,
+};
+
+use exr::prelude::{
+    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, IntegerBounds, Layer,
+    LayerAttributes, LineOrder, ReadChannels, ReadLayers, Text, Vec2, WritableImage,
+    attribute::{AttributeValue, Chromaticities},
+};
+
+use super::write_atomically;
+use crate::error::{Error, Result};
+
+/// Primaries and white point of ITU-R BT.709 (red, green, blue, white; CIE x, y).
+const REC_709: Chromaticities = Chromaticities {
+    red: Vec2(0.64, 0.33),
+    green: Vec2(0.30, 0.60),
+    blue: Vec2(0.15, 0.06),
+    white: Vec2(0.3127, 0.3290),
+};
+
+/// No lossless compression of OpenEXR shrinks real pixels further than this; a header that promises
+/// more than this times the file's size is corrupt, and believing it would exhaust memory.
+const LARGEST_COMPRESSION_RATIO: u64 = 4096;
+
+/// Value of a file attribute.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Attribute {
+    /// UTF-8 text.
+    Text(String),
+    /// 32-bit integer.
+    Integer(i32),
+    /// 32-bit float.
+    Float(f32),
+    /// 64-bit float.
+    Double(f64),
+}
+
+/// Image of named float channels, row by row from the top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// Width of the stored window in pixels.
+    pub width: u32,
+    /// Height of the stored window in pixels.
+    pub height: u32,
+    /// Upper left pixel of the stored window in the whole film (OpenEXR's data window).
+    pub origin: [i32; 2],
+    /// Width and height of the whole film in pixels (OpenEXR's display window).
+    pub film_size: [u32; 2],
+    /// Samples by channel name, each `width * height` long.
+    pub channels: BTreeMap<String, Vec<f32>>,
+    /// Attributes by name, without those of the format itself.
+    pub attributes: BTreeMap<String, Attribute>,
+}
+
+/// Linear Rec.709 picture without anything else; what error metrics and previews work on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RgbImage {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Row by row from the top.
+    pub pixels: Vec<[f32; 3]>,
+}
+
+impl Image {
+    /// Image without channels whose window is the whole film.
+    pub fn new(width: u32, height: u32) -> Self {
+        Self {
+            width,
+            height,
+            origin: [0, 0],
+            film_size: [width, height],
+            channels: BTreeMap::new(),
+            attributes: BTreeMap::new(),
+        }
+    }
+
+    /// `width * height`.
+    pub fn pixel_count(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// Adds three channels, `names` in the order of the components of `values`.
+    ///
+    /// # Panics
+    /// `values` is not `width * height` long.
+    pub fn insert_triple(&mut self, names: [&str; 3], values: &[[f32; 3]]) {
+        assert_eq!(values.len(), self.pixel_count(), "one value per pixel of layer {names:?}");
+        for (component, name) in names.into_iter().enumerate() {
+            let samples = values.iter().map(|value| value[component]).collect();
+            self.channels.insert(name.to_owned(), samples);
+        }
+    }
+
+    /// Three channels as vectors; `None` where one is missing.
+    pub fn triple(&self, names: [&str; 3]) -> Option<Vec<[f32; 3]>> {
+        let [x, y, z] = names.map(|name| self.channels.get(name));
+        let (x, y, z) = (x?, y?, z?);
+        Some(x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z]).collect())
+    }
+
+    /// The picture `R`, `G`, `B`, or a single channel `Y` as grey. `path` serves the message only.
+    ///
+    /// # Errors
+    /// [`Error::Format`] that lists the channels there are.
+    pub fn rgb(&self, path: &Path) -> Result<RgbImage> {
+        let pixels = self
+            .triple(["R", "G", "B"])
+            .or_else(|| self.triple(["Y", "Y", "Y"]))
+            .ok_or_else(|| {
+                let names: Vec<&str> = self.channels.keys().map(String::as_str).collect();
+                Error::format(
+                    path,
+                    format!("expected channels R, G, B (or Y), found {}", names.join(", ")),
+                )
+            })?;
+        Ok(RgbImage { width: self.width, height: self.height, pixels })
+    }
+
+    /// Writes the image with ZIP compression, atomically.
+    ///
+    /// # Errors
+    /// [`Error::Io`] with the cause; [`Error::Format`] for an image that OpenEXR cannot hold (no
+    /// channel, no pixel).
+    ///
+    /// # Panics
+    /// A channel is not `width * height` long.
+    pub fn write_exr(&self, path: &Path) -> Result<()> {
+        self.write_exr_compressed(path, Compression::ZIP16)
+    }
+
+    /// Writes the image without compression: sums have no regularity that would be worth the time.
+    ///
+    /// # Errors
+    /// As [`Image::write_exr`].
+    pub fn write_exr_uncompressed(&self, path: &Path) -> Result<()> {
+        self.write_exr_compressed(path, Compression::Uncompressed)
+    }
+
+    fn write_exr_compressed(&self, path: &Path, compression: Compression) -> Result<()> {
+        if self.channels.is_empty() || self.pixel_count() == 0 {
+            return Err(Error::format(
+                path,
+                format!(
+                    "an OpenEXR file needs at least one channel and one pixel, found {} channels \
+                     of {}x{} pixels",
+                    self.channels.len(),
+                    self.width,
+                    self.height
+                ),
+            ));
+        }
+        let channels = self
+            .channels
+            .iter()
+            .map(|(name, samples)| {
+                assert_eq!(samples.len(), self.pixel_count(), "samples of channel {name}");
+                AnyChannel::new(text(name), FlatSamples::F32(samples.clone()))
+            })
+            .collect();
+        let mut attributes = LayerAttributes {
+            layer_position: Vec2(self.origin[0], self.origin[1]),
+            ..LayerAttributes::default()
+        };
+        for (name, value) in &self.attributes {
+            let value = match value {
+                Attribute::Text(value) => AttributeValue::Text(text(value)),
+                Attribute::Integer(value) => AttributeValue::I32(*value),
+                Attribute::Float(value) => AttributeValue::F32(*value),
+                Attribute::Double(value) => AttributeValue::F64(*value),
+            };
+            attributes.other.insert(text(name), value);
+        }
+        let layer = Layer::new(
+            (self.width as usize, self.height as usize),
+            attributes,
+            Encoding { compression, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing },
+            AnyChannels::sort(channels),
+        );
+        let mut image = exr::prelude::Image::from_layer(layer);
+        let [film_width, film_height] = self.film_size;
+        image.attributes.display_window =
+            IntegerBounds::from_dimensions((film_width as usize, film_height as usize));
+        image.attributes.chromaticities = Some(REC_709);
+        write_atomically(path, |file: &mut BufWriter<File>| {
+            image.write().to_buffered(file).map_err(io_error)
+        })
+    }
+
+    /// Reads the first flat layer of an OpenEXR file; half and integer channels become floats.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where the file cannot be read, [`Error::Format`] where it is no OpenEXR file,
+    /// is truncated or corrupt, or holds deep data only.
+    pub fn read_exr(path: &Path) -> Result<Self> {
+        let open = || File::open(path).map_err(|source| Error::io(path, "read", source));
+        let malformed = |error: exr::error::Error| match error {
+            exr::error::Error::Io(source)
+                if source.kind() != std::io::ErrorKind::UnexpectedEof
+                    && source.raw_os_error().is_some() =>
+            {
+                Error::io(path, "read", source)
+            }
+            exr::error::Error::NotSupported(what) => {
+                Error::format(path, format!("OpenEXR feature not supported: {what}"))
+            }
+            other => Error::format(path, format!("not a complete OpenEXR file: {other}")),
+        };
+        let file = open()?;
+        let file_bytes = file.metadata().map_err(|source| Error::io(path, "read", source))?.len();
+        let meta_data = exr::meta::MetaData::read_from_buffered(BufReader::new(file), false)
+            .map_err(malformed)?;
+        for header in &meta_data.headers {
+            let promised = header.layer_size.area() as u64 * header.channels.bytes_per_pixel as u64;
+            if promised / LARGEST_COMPRESSION_RATIO > file_bytes {
+                return Err(Error::format(
+                    path,
+                    format!(
+                        "corrupt OpenEXR file: its header promises {}x{} pixels ({promised} \
+                         bytes), the file has {file_bytes} bytes",
+                        header.layer_size.width(),
+                        header.layer_size.height()
+                    ),
+                ));
+            }
+        }
+        let image = exr::prelude::read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .first_valid_layer()
+            .all_attributes()
+            .from_buffered(BufReader::new(open()?))
+            .map_err(malformed)?;
+        Self::from_layer(path, image)
+    }
+
+    fn from_layer(
+        path: &Path,
+        image: exr::prelude::Image<Layer<AnyChannels<FlatSamples>>>,
+    ) -> Result<Self> {
+        let layer = image.layer_data;
+        let dimension = |value: usize| {
+            u32::try_from(value)
+                .map_err(|_| Error::format(path, format!("{value} pixels along one side")))
+        };
+        let display = image.attributes.display_window.size;
+        let position = layer.attributes.layer_position;
+        let mut result = Self {
+            width: dimension(layer.size.width())?,
+            height: dimension(layer.size.height())?,
+            origin: [position.x(), position.y()],
+            film_size: [dimension(display.width())?, dimension(display.height())?],
+            channels: BTreeMap::new(),
+            attributes: BTreeMap::new(),
+        };
+        for channel in layer.channel_data.list {
+            let name = string(&channel.name);
+            let samples: Vec<f32> = match channel.sample_data {
+                FlatSamples::F32(samples) => samples,
+                other => other.values_as_f32().collect(),
+            };
+            if samples.len() != result.pixel_count() {
+                return Err(Error::format(
+                    path,
+                    format!(
+                        "channel {name} has {} samples, expected {} ({}x{}); subsampled channels \
+                         are not supported",
+                        samples.len(),
+                        result.pixel_count(),
+                        result.width,
+                        result.height
+                    ),
+                ));
+            }
+            result.channels.insert(name, samples);
+        }
+        let others = layer.attributes.other.iter().chain(&image.attributes.other);
+        for (name, value) in others {
+            let value = match value {
+                AttributeValue::Text(value) => Attribute::Text(string(value)),
+                AttributeValue::I32(value) => Attribute::Integer(*value),
+                AttributeValue::F32(value) => Attribute::Float(*value),
+                AttributeValue::F64(value) => Attribute::Double(*value),
+                _ => continue,
+            };
+            result.attributes.insert(string(name), value);
+        }
+        Ok(result)
+    }
+}
+
+/// OpenEXR text of the UTF-8 bytes of `value`.
+fn text(value: &str) -> Text {
+    Text::from_slice_unchecked(value.as_bytes())
+}
+
+/// Text of an OpenEXR file, which should be UTF-8.
+fn string(value: &Text) -> String {
+    String::from_utf8_lossy(value.as_slice()).into_owned()
+}
+
+fn io_error(error: exr::error::Error) -> std::io::Error {
+    match error {
+        exr::error::Error::Io(source) => source,
+        other => std::io::Error::other(other.to_string()),
+    }
+}

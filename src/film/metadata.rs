@@ -1,0 +1,242 @@
+//! What an image was rendered with, as attributes of its file.
+//!
+//! `samplesPerPixel` and `renderTimeSeconds` are pbrt's names, `generatedBy` is Mitsuba's; the rest
+//! is under `fenestra.`. [`Metadata::sample_ranges`] make `merge` and `--resume` safe: no sample is
+//! counted twice.
+
+use std::{collections::BTreeMap, fmt, path::Path, str::FromStr};
+
+use super::exr::{Attribute, Image};
+use crate::error::{Error, Result};
+
+/// Samples `first … first + count − 1` of every pixel, drawn with one seed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct SampleRange {
+    /// Seed of the random numbers.
+    pub seed: u32,
+    /// Index of the first sample.
+    pub first: u32,
+    /// Number of samples.
+    pub count: u32,
+}
+
+impl SampleRange {
+    /// Whether both hold a sample of the same seed and index.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        let end = |range: &Self| u64::from(range.first) + u64::from(range.count);
+        self.seed == other.seed
+            && u64::from(self.first) < end(other)
+            && u64::from(other.first) < end(self)
+    }
+}
+
+impl fmt::Display for SampleRange {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}:{}+{}", self.seed, self.first, self.count)
+    }
+}
+
+impl FromStr for SampleRange {
+    type Err = String;
+
+    /// Reads `seed:first+count`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parse = || {
+            let (seed, range) = text.split_once(':')?;
+            let (first, count) = range.split_once('+')?;
+            Some(Self {
+                seed: seed.parse().ok()?,
+                first: first.parse().ok()?,
+                count: count.parse().ok()?,
+            })
+        };
+        parse().ok_or_else(|| format!("expected seed:first+count, found {text:?}"))
+    }
+}
+
+/// What an image was rendered with.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Metadata {
+    /// Fenestra's version.
+    pub version: String,
+    /// Scene name.
+    pub scene: String,
+    /// `Scene::hash`.
+    pub scene_hash: String,
+    /// Hash of each fit used, by what was fitted.
+    pub fit_hashes: BTreeMap<String, String>,
+    /// Sampler's name.
+    pub sampler: String,
+    /// Sampler's parameters as text, by name.
+    pub sampler_parameters: BTreeMap<String, String>,
+    /// Directions traced at every vertex of every camera path.
+    pub shadow_rays: u32,
+    /// Path vertices at which environment light is gathered.
+    pub depth: u32,
+    /// Which samples of every pixel the image holds.
+    pub sample_ranges: Vec<SampleRange>,
+    /// Wall time of the passes, seconds.
+    pub seconds: f64,
+    /// Device time by pass, seconds.
+    pub gpu_seconds: BTreeMap<String, f64>,
+    /// Vulkan device.
+    pub device: String,
+    /// Its driver.
+    pub driver: String,
+}
+
+impl Metadata {
+    /// Samples per pixel over all ranges.
+    pub fn sample_count(&self) -> u64 {
+        self.sample_ranges.iter().map(|range| u64::from(range.count)).sum()
+    }
+
+    /// Writes everything into the attributes of `image`.
+    pub fn store(&self, image: &mut Image) {
+        let mut put = |name: &str, value: Attribute| {
+            image.attributes.insert(name.to_owned(), value);
+        };
+        let text = |value: &str| Attribute::Text(value.to_owned());
+        put("generatedBy", Attribute::Text(format!("Fenestra {}", self.version)));
+        let count = i32::try_from(self.sample_count()).unwrap_or(i32::MAX);
+        put("samplesPerPixel", Attribute::Integer(count));
+        put("renderTimeSeconds", Attribute::Float(self.seconds as f32));
+        put("fenestra.version", text(&self.version));
+        put("fenestra.scene", text(&self.scene));
+        put("fenestra.scene_hash", text(&self.scene_hash));
+        put("fenestra.sampler", text(&self.sampler));
+        put("fenestra.shadow_rays", Attribute::Text(self.shadow_rays.to_string()));
+        put("fenestra.depth", Attribute::Text(self.depth.to_string()));
+        if let [range] = self.sample_ranges[..] {
+            put("fenestra.seed", Attribute::Text(range.seed.to_string()));
+        }
+        let ranges: Vec<String> = self.sample_ranges.iter().map(ToString::to_string).collect();
+        put("fenestra.sample_ranges", Attribute::Text(ranges.join(" ")));
+        put("fenestra.seconds", Attribute::Double(self.seconds));
+        put("fenestra.device", text(&self.device));
+        put("fenestra.driver", text(&self.driver));
+        for (name, value) in &self.sampler_parameters {
+            put(&format!("fenestra.sampler_parameters.{name}"), text(value));
+        }
+        for (name, value) in &self.fit_hashes {
+            put(&format!("fenestra.fit_hashes.{name}"), text(value));
+        }
+        for (name, value) in &self.gpu_seconds {
+            put(&format!("fenestra.gpu_seconds.{name}"), Attribute::Double(*value));
+        }
+    }
+
+    /// Reads the attributes of `image` back; `path` serves the messages only.
+    ///
+    /// # Errors
+    /// [`Error::Format`] that names the attribute which is missing or malformed.
+    pub fn load(image: &Image, path: &Path) -> Result<Self> {
+        let text = |name: &str| match image.attributes.get(name) {
+            Some(Attribute::Text(value)) => Ok(value.clone()),
+            Some(other) => Err(Error::format(
+                path,
+                format!("attribute {name}: expected text, found {other:?}"),
+            )),
+            None => Err(Error::format(
+                path,
+                format!("no attribute {name}: not an image that Fenestra rendered"),
+            )),
+        };
+        let number = |name: &str| {
+            text(name)?.parse::<u32>().map_err(|error| {
+                Error::format(path, format!("attribute {name}: expected a number: {error}"))
+            })
+        };
+        let named = |prefix: &'static str| {
+            image.attributes.iter().filter_map(move |(name, value)| {
+                name.strip_prefix(prefix).map(|rest| (rest.to_owned(), value))
+            })
+        };
+        let texts = |prefix: &'static str| {
+            named(prefix)
+                .filter_map(|(name, value)| match value {
+                    Attribute::Text(value) => Some((name, value.clone())),
+                    _ => None,
+                })
+                .collect()
+        };
+        let double = |value: &Attribute| match *value {
+            Attribute::Double(value) => Some(value),
+            Attribute::Float(value) => Some(f64::from(value)),
+            _ => None,
+        };
+        let sample_ranges = text("fenestra.sample_ranges")?
+            .split_whitespace()
+            .map(SampleRange::from_str)
+            .collect::<Result<_, _>>()
+            .map_err(|message| {
+                Error::format(path, format!("attribute fenestra.sample_ranges: {message}"))
+            })?;
+        Ok(Self {
+            version: text("fenestra.version")?,
+            scene: text("fenestra.scene")?,
+            scene_hash: text("fenestra.scene_hash")?,
+            fit_hashes: texts("fenestra.fit_hashes."),
+            sampler: text("fenestra.sampler")?,
+            sampler_parameters: texts("fenestra.sampler_parameters."),
+            shadow_rays: number("fenestra.shadow_rays")?,
+            depth: number("fenestra.depth")?,
+            sample_ranges,
+            seconds: image.attributes.get("fenestra.seconds").and_then(double).unwrap_or(0.0),
+            gpu_seconds: named("fenestra.gpu_seconds.")
+                .filter_map(|(name, value)| Some((name, double(value)?)))
+                .collect(),
+            device: text("fenestra.device")?,
+            driver: text("fenestra.driver")?,
+        })
+    }
+
+    /// What keeps two renders from being parts of one image, as "what: ours, theirs" lines; empty
+    /// where nothing does. Seeds, sample ranges, devices and times may differ.
+    pub fn differences(&self, other: &Self) -> Vec<String> {
+        let mut found = Vec::new();
+        let mut compare = |what: &str, ours: String, theirs: String| {
+            if ours != theirs {
+                found.push(format!("{what}: {ours} against {theirs}"));
+            }
+        };
+        compare("scene hash", self.scene_hash.clone(), other.scene_hash.clone());
+        compare("sampler", self.sampler.clone(), other.sampler.clone());
+        compare("shadow rays", self.shadow_rays.to_string(), other.shadow_rays.to_string());
+        compare("depth", self.depth.to_string(), other.depth.to_string());
+        let names = self.sampler_parameters.keys().chain(other.sampler_parameters.keys());
+        for name in names.collect::<std::collections::BTreeSet<_>>() {
+            let value = |metadata: &Self| {
+                metadata.sampler_parameters.get(name).map_or("default".to_owned(), Clone::clone)
+            };
+            compare(&format!("sampler parameter {name}"), value(self), value(other));
+        }
+        let names = self.fit_hashes.keys().chain(other.fit_hashes.keys());
+        for name in names.collect::<std::collections::BTreeSet<_>>() {
+            let value = |metadata: &Self| {
+                metadata.fit_hashes.get(name).map_or("none".to_owned(), Clone::clone)
+            };
+            compare(&format!("fit of {name}"), value(self), value(other));
+        }
+        found
+    }
+
+    /// Adds the ranges of `other` and joins neighbours of one seed.
+    pub fn add_ranges(&mut self, other: &Self) {
+        self.sample_ranges.extend(&other.sample_ranges);
+        self.sample_ranges.sort_by_key(|range| (range.seed, range.first));
+        let mut joined: Vec<SampleRange> = Vec::new();
+        for range in self.sample_ranges.drain(..) {
+            match joined.last_mut() {
+                Some(last)
+                    if last.seed == range.seed
+                        && last.first.checked_add(last.count) == Some(range.first) =>
+                {
+                    last.count = last.count.saturating_add(range.count);
+                }
+                _ => joined.push(range),
+            }
+        }
+        self.sample_ranges = joined;
+    }
+}

@@ -1,0 +1,53 @@
+//! Tone-mapped previews.
+
+use std::path::Path;
+
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+
+use super::{exr::RgbImage, write_atomically};
+use crate::error::Result;
+
+/// sRGB transfer function (IEC 61966-2-1): linear 0…1 → display 0…1.
+pub fn srgb_from_linear(value: f32) -> f32 {
+    if value <= 0.003_130_8 { 12.92 * value } else { 1.055 * value.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Eight-bit display value of a linear one: clamped to 0…1, sRGB curve, rounded. NaN becomes 0.
+pub fn display_from_linear(value: f32) -> u8 {
+    // `as` saturates and turns NaN into 0.
+    (srgb_from_linear(value.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8
+}
+
+/// Writes the picture times 2^`exposure` (in stops), clamped, with the sRGB curve: no tone curve
+/// beyond that, so that two previews of one exposure can be compared.
+///
+/// # Errors
+/// [`crate::Error::Io`] with the cause.
+pub fn write_preview(path: &Path, picture: &RgbImage, exposure: f32) -> Result<()> {
+    let scale = exposure.exp2();
+    let bytes: Vec<[u8; 3]> = picture
+        .pixels
+        .iter()
+        .map(|pixel| pixel.map(|value| display_from_linear(value * scale)))
+        .collect();
+    write_rgb8(path, picture.width, picture.height, &bytes)
+}
+
+/// Writes display values as they are.
+///
+/// # Errors
+/// [`crate::Error::Io`] with the cause.
+///
+/// # Panics
+/// `pixels` is not `width * height` long.
+pub fn write_rgb8(path: &Path, width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<()> {
+    assert_eq!(pixels.len(), width as usize * height as usize, "one value per pixel");
+    write_atomically(path, |file| {
+        PngEncoder::new(file)
+            .write_image(pixels.as_flattened(), width, height, ExtendedColorType::Rgb8)
+            .map_err(|error| match error {
+                image::ImageError::IoError(source) => source,
+                other => std::io::Error::other(other.to_string()),
+            })
+    })
+}

@@ -1,0 +1,80 @@
+//! Statistics of a render as JSON: what `render --stats` writes and `bench` and `study` reuse.
+
+use std::{collections::BTreeMap, io::Write, path::Path};
+
+use super::{metadata::SampleRange, write_atomically};
+use crate::error::Result;
+
+/// Numbers of one render. Times are of this run only, also where it continued a checkpoint.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
+pub struct Statistics {
+    /// Fenestra's version.
+    pub version: String,
+    /// Scene name.
+    pub scene: String,
+    /// `Scene::hash`.
+    pub scene_hash: String,
+    /// Triangles in the scene.
+    pub triangles: u64,
+    /// Width of the rendered window in pixels.
+    pub width: u32,
+    /// Height of the rendered window in pixels.
+    pub height: u32,
+    /// Vulkan device.
+    pub device: String,
+    /// Its driver.
+    pub driver: String,
+    /// Sampler's name.
+    pub sampler: String,
+    /// Sampler's parameters as text, by name.
+    pub sampler_parameters: BTreeMap<String, String>,
+    /// Directions traced at every vertex.
+    pub shadow_rays_per_vertex: u32,
+    /// Path vertices at which environment light is gathered.
+    pub depth: u32,
+    /// Which samples of every pixel the image holds.
+    pub sample_ranges: Vec<SampleRange>,
+    /// Camera paths per pixel, over all ranges.
+    pub samples_per_pixel: u32,
+    /// Which rule ended the run: `spp`, `time`, `error`, `interrupt`.
+    pub stop_reason: String,
+    /// Mean relative standard error of the pixels (`Sums::relative_standard_error`); absent below
+    /// two samples.
+    pub relative_standard_error: Option<f64>,
+    /// Wall time of the passes, seconds.
+    pub seconds: f64,
+    /// Rays traced by kind: `camera`, `shadow`, `bounce`.
+    pub rays: BTreeMap<String, u64>,
+    /// Share of shadow rays that reached the environment; absent where none was traced.
+    pub visible_share: Option<f64>,
+    /// Mean entries in the visibility cache per hit, for samplers that have one.
+    pub cache_entries_per_hit: Option<f64>,
+    /// Mean lobes kept of the product per hit, for samplers that have one.
+    pub lobes_per_hit: Option<f64>,
+    /// Mean rebuilds of the lobe probabilities per hit, for samplers that have them.
+    pub cdf_rebuilds_per_hit: Option<f64>,
+    /// Samples dropped because their radiance was not finite.
+    pub dropped_samples: u64,
+    /// Device time by pass, milliseconds.
+    pub gpu_ms: BTreeMap<String, f64>,
+    /// Host time by stage (`load`, `fit`, `bvh`, `upload`, …), milliseconds.
+    pub host_ms: BTreeMap<String, f64>,
+    /// Pipeline compile time by pass, milliseconds.
+    pub pipeline_compile_ms: BTreeMap<String, f64>,
+    /// Device memory by buffer, bytes.
+    pub buffer_bytes: BTreeMap<String, u64>,
+}
+
+impl Statistics {
+    /// Writes the statistics as JSON, atomically.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] with the cause.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        write_atomically(path, |file| {
+            serde_json::to_writer_pretty(&mut *file, self)?;
+            file.write_all(b"\n")
+        })
+    }
+}

@@ -1,0 +1,245 @@
+//! What the device's film holds after `n` samples of every pixel, and what follows from it.
+
+use super::exr::Image;
+
+/// Extra layers of an image file; names and meaning as pbrt's where pbrt has them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, clap::ValueEnum)]
+pub enum Aov {
+    /// `Variance.R/G/B`: variance of the pixel mean.
+    Variance,
+    /// `SampleCount.Y`: camera paths per pixel.
+    SampleCount,
+    /// `Albedo.R/G/B`: share of light that the first surface reflects, 0…1.
+    Albedo,
+    /// `N.X/Y/Z`: shading normal at the first hit, world space.
+    Normal,
+    /// `P.X/Y/Z`: position of the first hit, world space, metres.
+    Position,
+    /// `Visible.Y`: share of shadow rays that reached the environment, and `ShadowRays.Y`: how many
+    /// were traced for the pixel.
+    Visible,
+}
+
+/// Sums over the samples of every pixel of the rendered window, row by row from the top.
+///
+/// `sum` and `compensation` are the two parts of a two-float sum: the value is their sum taken in
+/// 64-bit floats, and it stays exact to about 2⁻⁴⁸ however many samples are added.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sums {
+    /// Width of the rendered window in pixels.
+    pub width: u32,
+    /// Height of the rendered window in pixels.
+    pub height: u32,
+    /// Upper left pixel of the rendered window in the whole film.
+    pub origin: [u32; 2],
+    /// Width and height of the whole film in pixels.
+    pub film_size: [u32; 2],
+    /// Samples (camera paths) per pixel, the same for every pixel.
+    pub sample_count: u32,
+    /// Leading part of Σ radiance, W·sr⁻¹·m⁻².
+    pub sum: Vec<[f32; 3]>,
+    /// Rest of Σ radiance.
+    pub compensation: Vec<[f32; 3]>,
+    /// Σ radiance², per sample.
+    pub squares: Vec<[f32; 3]>,
+    /// Σ albedo at the first hit, 0 where there is none; empty where not asked for.
+    pub albedo: Vec<[f32; 3]>,
+    /// Σ shading normal at the first hit, 0 where there is none; empty where not asked for.
+    pub normal: Vec<[f32; 3]>,
+    /// Σ position of the first hit, 0 where there is none; empty where not asked for.
+    pub position: Vec<[f32; 3]>,
+    /// Shadow rays that reached the environment, and all that were traced; empty where not asked
+    /// for.
+    pub visible: Vec<[u32; 2]>,
+}
+
+impl Sums {
+    /// Sums of no samples, without extra layers.
+    pub fn new(origin: [u32; 2], width: u32, height: u32, film_size: [u32; 2]) -> Self {
+        let zeros = vec![[0.0; 3]; width as usize * height as usize];
+        Self {
+            width,
+            height,
+            origin,
+            film_size,
+            sum: zeros.clone(),
+            compensation: zeros.clone(),
+            squares: zeros,
+            ..Self::default()
+        }
+    }
+
+    /// `width * height`.
+    pub fn pixel_count(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// Σ radiance of one pixel in 64-bit floats.
+    pub fn total(&self, pixel: usize) -> [f64; 3] {
+        let (sum, rest) = (self.sum[pixel], self.compensation[pixel]);
+        std::array::from_fn(|channel| f64::from(sum[channel]) + f64::from(rest[channel]))
+    }
+
+    /// Mean radiance of one pixel; 0 before the first sample.
+    pub fn mean(&self, pixel: usize) -> [f64; 3] {
+        let count = f64::from(self.sample_count.max(1));
+        self.total(pixel).map(|total| total / count)
+    }
+
+    /// Unbiased estimate of the variance of the pixel's mean, (Σx² − (Σx)²/n) / (n (n − 1)).
+    ///
+    /// The estimate takes samples as independent; under stratified samples the true variance is
+    /// lower, so that this is an upper estimate. 0 below two samples, as pbrt does.
+    pub fn variance_of_mean(&self, pixel: usize) -> [f64; 3] {
+        if self.sample_count < 2 {
+            return [0.0; 3];
+        }
+        let count = f64::from(self.sample_count);
+        let total = self.total(pixel);
+        std::array::from_fn(|channel| {
+            let squares = f64::from(self.squares[pixel][channel]);
+            let deviation = squares - total[channel] * total[channel] / count;
+            deviation.max(0.0) / (count * (count - 1.0))
+        })
+    }
+
+    /// Mean over the pixels of s / √(m² + 0.01·M²): m the mean over RGB of the pixel's mean
+    /// radiance, s that of its standard errors (an upper bound of the standard error of m, reached
+    /// where the channels' noise is one and the same), M the mean of m over the image.
+    ///
+    /// The denominator is that of relMSE (`study::metrics`), so that the square of this figure is
+    /// comparable with it. Infinite below two samples, 0 for a black image. A pixel that no sample
+    /// has lit yet counts as free of error, so that rare bright events make this too low.
+    pub fn relative_standard_error(&self) -> f64 {
+        if self.sample_count < 2 || self.pixel_count() == 0 {
+            return f64::INFINITY;
+        }
+        let average = |value: [f64; 3]| (value[0] + value[1] + value[2]) / 3.0;
+        let pixel_count = self.pixel_count();
+        let image_mean = (0..pixel_count).map(|pixel| average(self.mean(pixel))).sum::<f64>()
+            / pixel_count as f64;
+        let floor = 0.01 * image_mean * image_mean;
+        let relative = |pixel: usize| {
+            let mean = average(self.mean(pixel));
+            let error = average(self.variance_of_mean(pixel).map(f64::sqrt));
+            if error == 0.0 { 0.0 } else { error / (mean * mean + floor).sqrt() }
+        };
+        (0..pixel_count).map(relative).sum::<f64>() / pixel_count as f64
+    }
+
+    /// Pixels with a sum that is not finite. Passes drop such samples, so that anything but 0 is a
+    /// defect.
+    pub fn non_finite_count(&self) -> usize {
+        let is_bad = |value: &[f32; 3]| value.iter().any(|component| !component.is_finite());
+        self.sum
+            .iter()
+            .zip(&self.squares)
+            .filter(|(sum, squares)| is_bad(sum) || is_bad(squares))
+            .count()
+    }
+
+    /// The picture: `R`, `G`, `B` and those of `aovs` whose sums are there.
+    ///
+    /// Albedo, normal and position are means over all samples of the pixel; a sample that leaves the
+    /// scene counts as 0. Deviation: pbrt divides by the weight of the samples that hit something,
+    /// which could not be merged from image files exactly.
+    pub fn to_image(&self, aovs: &[Aov]) -> Image {
+        let mut image = Image::new(self.width, self.height);
+        image.origin = self.origin.map(|value| i32::try_from(value).unwrap_or(i32::MAX));
+        image.film_size = self.film_size;
+        let pixels = || 0..self.pixel_count();
+        let narrow = |value: [f64; 3]| value.map(|component| component as f32);
+        let means: Vec<[f32; 3]> = pixels().map(|pixel| narrow(self.mean(pixel))).collect();
+        image.insert_triple(["R", "G", "B"], &means);
+        let count = f64::from(self.sample_count.max(1));
+        for aov in aovs {
+            let (names, sums) = match aov {
+                Aov::Variance => {
+                    let variances: Vec<[f32; 3]> =
+                        pixels().map(|pixel| narrow(self.variance_of_mean(pixel))).collect();
+                    image.insert_triple(["Variance.R", "Variance.G", "Variance.B"], &variances);
+                    continue;
+                }
+                Aov::SampleCount => {
+                    let counts = vec![self.sample_count as f32; self.pixel_count()];
+                    image.channels.insert("SampleCount.Y".to_owned(), counts);
+                    continue;
+                }
+                Aov::Visible => {
+                    if !self.visible.is_empty() {
+                        let share = |&[visible, traced]: &[u32; 2]| {
+                            (f64::from(visible) / f64::from(traced.max(1))) as f32
+                        };
+                        let shares = self.visible.iter().map(share).collect();
+                        let traced = self.visible.iter().map(|pair| pair[1] as f32).collect();
+                        image.channels.insert("Visible.Y".to_owned(), shares);
+                        image.channels.insert("ShadowRays.Y".to_owned(), traced);
+                    }
+                    continue;
+                }
+                Aov::Albedo => (["Albedo.R", "Albedo.G", "Albedo.B"], &self.albedo),
+                Aov::Normal => (["N.X", "N.Y", "N.Z"], &self.normal),
+                Aov::Position => (["P.X", "P.Y", "P.Z"], &self.position),
+            };
+            if !sums.is_empty() {
+                let means: Vec<[f32; 3]> = sums
+                    .iter()
+                    .map(|sum| sum.map(|value| (f64::from(value) / count) as f32))
+                    .collect();
+                image.insert_triple(names, &means);
+            }
+        }
+        image
+    }
+
+    /// Adds the samples of `other`, which must show the same window of the same film.
+    ///
+    /// Sums are added in 64-bit floats and split again. A layer that one side lacks is dropped.
+    ///
+    /// # Panics
+    /// The windows differ.
+    pub fn add(&mut self, other: &Self) {
+        assert_eq!(
+            (self.origin, self.width, self.height, self.film_size),
+            (other.origin, other.width, other.height, other.film_size),
+            "sums of one window are added"
+        );
+        for pixel in 0..self.pixel_count() {
+            let (ours, theirs) = (self.total(pixel), other.total(pixel));
+            for channel in 0..3 {
+                let (sum, rest) = split(ours[channel] + theirs[channel]);
+                self.sum[pixel][channel] = sum;
+                self.compensation[pixel][channel] = rest;
+            }
+        }
+        let add_all = |ours: &mut Vec<[f32; 3]>, theirs: &[[f32; 3]]| {
+            if theirs.is_empty() {
+                ours.clear();
+            }
+            for (our, their) in ours.iter_mut().zip(theirs) {
+                for (value, more) in our.iter_mut().zip(their) {
+                    *value += more;
+                }
+            }
+        };
+        add_all(&mut self.squares, &other.squares);
+        add_all(&mut self.albedo, &other.albedo);
+        add_all(&mut self.normal, &other.normal);
+        add_all(&mut self.position, &other.position);
+        if other.visible.is_empty() {
+            self.visible.clear();
+        }
+        for (our, their) in self.visible.iter_mut().zip(&other.visible) {
+            for (value, more) in our.iter_mut().zip(their) {
+                *value = value.saturating_add(*more);
+            }
+        }
+        self.sample_count = self.sample_count.saturating_add(other.sample_count);
+    }
+}
+
+/// The two floats whose sum is nearest to `value`: its rounding and the rest.
+pub fn split(value: f64) -> (f32, f32) {
+    let leading = value as f32;
+    (leading, (value - f64::from(leading)) as f32)
+}
