@@ -1,0 +1,145 @@
+//! `glsl/include/srbf.glsl` against its Rust twin over the whole range of bandwidths.
+
+#![expect(clippy::expect_used, reason = "tests may panic")]
+
+use std::f64::consts::PI;
+
+use bytemuck::{Pod, Zeroable};
+use fenestra::srbf::{self, Lobe, special};
+use glam::{DVec3, Vec2, Vec3};
+
+mod support;
+
+/// Bandwidths of the tests, from wider than the sphere to a sixth of a degree.
+const BANDWIDTHS: [f32; 17] = [
+    1e-3, 3e-3, 0.01, 0.05, 0.099, 0.101, 0.3, 0.499, 0.501, 1.0, 3.0, 8.0, 30.0, 300.0, 3e3, 3e4,
+    1e5,
+];
+
+/// Reproducible numbers in 0…1 (splitmix64).
+struct Random(u64);
+
+impl Random {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn direction(&mut self) -> Vec3 {
+        let z = 2.0 * self.uniform() - 1.0;
+        let azimuth = 2.0 * PI * self.uniform();
+        let radius = (1.0 - z * z).sqrt();
+        DVec3::new(radius * azimuth.cos(), radius * azimuth.sin(), z).as_vec3().normalize()
+    }
+
+    fn bandwidth(&mut self) -> f32 {
+        10_f64.powf(-3.0 + 8.0 * self.uniform()) as f32
+    }
+}
+
+/// Twin of `Input` in `glsl/test/srbf.comp`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct ProbeInput {
+    a: Lobe,
+    b: Lobe,
+    direction: Vec3,
+    u: Vec2,
+    x: f32,
+}
+
+/// Twin of `Output` in `glsl/test/srbf.comp`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct ProbeOutput {
+    expm1_x: f32,
+    log1p_x: f32,
+    erf_x: f32,
+    integral: f32,
+    deviation: f32,
+    hemisphere_part: f32,
+    value: f32,
+    product: Lobe,
+    convolution: f32,
+    distance: f32,
+    sampled: Vec3,
+    pdf: f32,
+    inverse: Vec2,
+}
+
+/// Relative difference, or absolute where both are tiny.
+fn difference(a: f32, b: f32) -> f32 {
+    (a - b).abs() / a.abs().max(b.abs()).max(1e-30)
+}
+
+#[test]
+fn shader_twin_agrees_over_the_whole_range() {
+    let mut random = Random(5);
+    let inputs: Vec<ProbeInput> = (0..10_000)
+        .map(|i| {
+            let axis = random.direction();
+            let bandwidth = BANDWIDTHS.get(i).copied().unwrap_or_else(|| random.bandwidth());
+            let u = Vec2::new(random.uniform() as f32, random.uniform() as f32);
+            let near = srbf::kernel_sample(axis, bandwidth, u).normalize();
+            let other = if i % 2 == 0 { near } else { random.direction() };
+            let magnitude = 10_f64.powf(-7.0 + 8.0 * random.uniform()) as f32;
+            ProbeInput {
+                a: Lobe { axis, bandwidth, amplitude: 1.0 + random.uniform() as f32 },
+                b: Lobe { axis: other, bandwidth: random.bandwidth(), amplitude: 1.0 },
+                direction: near,
+                u: Vec2::new(random.uniform() as f32, random.uniform() as f32),
+                x: if i % 2 == 0 { magnitude } else { -magnitude },
+            }
+        })
+        .collect();
+    let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/srbf.spv"));
+    let bytes = support::run_probe(
+        spirv,
+        &[(3, 0, bytemuck::cast_slice(&inputs))],
+        inputs.len() * size_of::<ProbeOutput>(),
+        u32::try_from(inputs.len()).expect("ten thousand fit"),
+    );
+    for (index, input) in inputs.iter().enumerate() {
+        let size = size_of::<ProbeOutput>();
+        let shader: ProbeOutput =
+            bytemuck::pod_read_unaligned(&bytes[index * size..(index + 1) * size]);
+        let a = &input.a;
+        let check = |name: &str, found: f32, expected: f32, tolerance: f32| {
+            assert!(
+                difference(found, expected) < tolerance || (found - expected).abs() < 1e-30,
+                "{name}: shader {found:e}, host {expected:e} at {input:?}"
+            );
+        };
+        check("expm1", shader.expm1_x, special::expm1(input.x), 2e-6);
+        check("log1p", shader.log1p_x, special::log1p(input.x.max(-0.9999)), 2e-6);
+        check("erf", shader.erf_x, special::erf(input.x), 1e-6);
+        check("integral", shader.integral, srbf::lobe_integral(a), 1e-6);
+        check("deviation", shader.deviation, srbf::kernel_deviation(a.bandwidth), 1e-5);
+        let part = srbf::kernel_hemisphere_part(a.bandwidth, a.axis.dot(input.direction));
+        check("hemisphere part", shader.hemisphere_part, part, 1e-5);
+        // The exponent is reproduced to a few units in its last place.
+        let d = input.direction - a.axis;
+        let exponent = 0.5 * a.bandwidth * d.dot(d);
+        let value = srbf::lobe_value(a, input.direction);
+        check("value", shader.value, value, 2e-6 + 5e-7 * exponent);
+        let pdf = srbf::kernel_pdf(a.axis, a.bandwidth, input.direction);
+        check("pdf", shader.pdf, pdf, 2e-6 + 5e-7 * exponent);
+        let product = srbf::lobe_product(a, &input.b);
+        check("product bandwidth", shader.product.bandwidth, product.bandwidth, 1e-4);
+        if product.bandwidth > 1e-3 * a.bandwidth {
+            assert!(shader.product.axis.distance(product.axis) < 1e-3, "{input:?}");
+        }
+        let tolerance = 2e-5 - 5e-7 * (product.amplitude / a.amplitude).max(1e-38).ln();
+        check("product amplitude", shader.product.amplitude, product.amplitude, tolerance);
+        let convolution = srbf::lobe_convolution(a, &input.b);
+        check("convolution", shader.convolution, convolution, tolerance + 1e-4);
+        let distance = srbf::kernel_sample_distance(a.bandwidth, input.u.x);
+        check("distance", shader.distance, distance, 5e-6);
+        let sampled = srbf::kernel_sample(a.axis, a.bandwidth, input.u);
+        assert!(shader.sampled.distance(sampled) < 5e-6, "{input:?}");
+        assert!((shader.inverse.x - input.u.x).abs() < 5e-4, "{input:?} {shader:?}");
+    }
+}
