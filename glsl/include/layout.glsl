@@ -34,7 +34,7 @@ struct SceneParameters {
 
 struct Ray {
     vec3 origin;
-    uint active;
+    uint is_active;
     vec3 direction;
     uint reserved;
 };
@@ -56,6 +56,17 @@ struct ShadowRay {
 struct PathState {
     vec3 throughput;
     vec3 radiance;
+    uint shadow_rays_traced;
+    uint shadow_rays_visible;
+    uint rays_traced;
+};
+
+struct Counters {
+    uint camera_rays;
+    uint bounce_rays;
+    uint shadow_rays_traced;
+    uint shadow_rays_visible;
+    uint dropped_samples;
 };
 
 struct Material {
@@ -76,6 +87,8 @@ struct Wave {
     uint seed;
     uint vertex;
     uint shadow_ray_count;
+    uint first_shadow_ray;
+    uint total_shadow_rays;
     uint aovs;
 };
 
@@ -181,8 +194,43 @@ layout(scalar, set = SET_WAVE, binding = BINDING_VISIBILITY)
 #endif
 
 #ifdef NEEDS_PATHS
-layout(scalar, set = SET_WAVE, binding = BINDING_PATHS) buffer PathsBuffer {
+#ifdef WRITES_PATHS
+#define ACCESS_PATHS
+#else
+#define ACCESS_PATHS readonly
+#endif
+layout(scalar, set = SET_WAVE, binding = BINDING_PATHS) ACCESS_PATHS buffer PathsBuffer {
     PathState paths[];
+};
+#endif
+
+#ifdef NEEDS_FILM
+layout(scalar, set = SET_FILM, binding = BINDING_FILM_SUM) buffer FilmSumBuffer {
+    vec3 film_sum[];
+};
+layout(scalar, set = SET_FILM, binding = BINDING_FILM_COMPENSATION) buffer FilmCompensationBuffer {
+    vec3 film_compensation[];
+};
+layout(scalar, set = SET_FILM, binding = BINDING_FILM_SQUARES) buffer FilmSquaresBuffer {
+    vec3 film_squares[];
+};
+layout(scalar, set = SET_FILM, binding = BINDING_COUNTERS) buffer CountersBuffer {
+    Counters counters;
+};
+#endif
+
+#ifdef NEEDS_FILM_AOVS
+layout(scalar, set = SET_FILM, binding = BINDING_FILM_ALBEDO) buffer FilmAlbedoBuffer {
+    vec3 film_albedo[];
+};
+layout(scalar, set = SET_FILM, binding = BINDING_FILM_NORMAL) buffer FilmNormalBuffer {
+    vec3 film_normal[];
+};
+layout(scalar, set = SET_FILM, binding = BINDING_FILM_POSITION) buffer FilmPositionBuffer {
+    vec3 film_position[];
+};
+layout(scalar, set = SET_FILM, binding = BINDING_FILM_VISIBLE) buffer FilmVisibleBuffer {
+    uvec2 film_visible[];
 };
 #endif
 

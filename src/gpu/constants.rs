@@ -51,6 +51,45 @@ pub const BINDING_VISIBILITY: u32 = 3;
 /// Wave set: [`PathState`](super::layout::PathState) per path.
 pub const BINDING_PATHS: u32 = 4;
 
+/// Film set: leading part of Σ radiance per pixel.
+pub const BINDING_FILM_SUM: u32 = 0;
+/// Film set: rest of Σ radiance per pixel.
+pub const BINDING_FILM_COMPENSATION: u32 = 1;
+/// Film set: Σ radiance² per pixel.
+pub const BINDING_FILM_SQUARES: u32 = 2;
+/// Film set: [`Counters`](super::layout::Counters), one element.
+pub const BINDING_COUNTERS: u32 = 3;
+/// Film set: Σ albedo at the first hit.
+pub const BINDING_FILM_ALBEDO: u32 = 4;
+/// Film set: Σ shading normal at the first hit.
+pub const BINDING_FILM_NORMAL: u32 = 5;
+/// Film set: Σ position of the first hit.
+pub const BINDING_FILM_POSITION: u32 = 6;
+/// Film set: shadow rays visible and traced per pixel.
+pub const BINDING_FILM_VISIBLE: u32 = 7;
+
+/// Bit of [`Wave::aovs`](super::layout::Wave::aovs): write albedo.
+pub const AOV_ALBEDO: u32 = 1;
+/// Bit of `Wave::aovs`: write the shading normal.
+pub const AOV_NORMAL: u32 = 2;
+/// Bit of `Wave::aovs`: write the position.
+pub const AOV_POSITION: u32 = 4;
+/// Bit of `Wave::aovs`: write visible and traced shadow rays.
+pub const AOV_VISIBLE: u32 = 8;
+
+/// Specialization constant `SAMPLER`: uniform over the hemisphere.
+pub const SAMPLER_UNIFORM: u32 = 0;
+/// Proportional to the cosine.
+pub const SAMPLER_COSINE: u32 = 1;
+/// The BRDF's own sampling.
+pub const SAMPLER_BRDF: u32 = 2;
+/// The environment map's luminance.
+pub const SAMPLER_ENV: u32 = 3;
+/// BRDF and environment by turns, one-sample balance heuristic.
+pub const SAMPLER_MIS: u32 = 4;
+/// Resampling over the candidates of `mis`.
+pub const SAMPLER_RIS: u32 = 5;
+
 /// [`Hit::material`](super::layout::Hit::material) of a ray that left the scene or was not traced.
 pub const NO_MATERIAL: u32 = 0xffff_ffff;
 
@@ -88,6 +127,24 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("BINDING_SHADOW_RAYS", BINDING_SHADOW_RAYS),
     ("BINDING_VISIBILITY", BINDING_VISIBILITY),
     ("BINDING_PATHS", BINDING_PATHS),
+    ("BINDING_FILM_SUM", BINDING_FILM_SUM),
+    ("BINDING_FILM_COMPENSATION", BINDING_FILM_COMPENSATION),
+    ("BINDING_FILM_SQUARES", BINDING_FILM_SQUARES),
+    ("BINDING_COUNTERS", BINDING_COUNTERS),
+    ("BINDING_FILM_ALBEDO", BINDING_FILM_ALBEDO),
+    ("BINDING_FILM_NORMAL", BINDING_FILM_NORMAL),
+    ("BINDING_FILM_POSITION", BINDING_FILM_POSITION),
+    ("BINDING_FILM_VISIBLE", BINDING_FILM_VISIBLE),
+    ("AOV_ALBEDO", AOV_ALBEDO),
+    ("AOV_NORMAL", AOV_NORMAL),
+    ("AOV_POSITION", AOV_POSITION),
+    ("AOV_VISIBLE", AOV_VISIBLE),
+    ("SAMPLER_UNIFORM", SAMPLER_UNIFORM),
+    ("SAMPLER_COSINE", SAMPLER_COSINE),
+    ("SAMPLER_BRDF", SAMPLER_BRDF),
+    ("SAMPLER_ENV", SAMPLER_ENV),
+    ("SAMPLER_MIS", SAMPLER_MIS),
+    ("SAMPLER_RIS", SAMPLER_RIS),
     ("NO_MATERIAL", NO_MATERIAL),
     ("MATERIAL_DIFFUSE", MATERIAL_DIFFUSE),
     ("MATERIAL_PLASTIC", MATERIAL_PLASTIC),

@@ -57,7 +57,7 @@ pub struct Ray {
     /// Start, metres.
     pub origin: Float3,
     /// 1 to trace, 0 for a path that has ended.
-    pub active: u32,
+    pub is_active: u32,
     /// Unit direction.
     pub direction: Float3,
     /// Unused by traversal; keeps rays at 32 bytes.
@@ -100,6 +100,28 @@ pub struct PathState {
     pub throughput: Float3,
     /// Radiance gathered so far.
     pub radiance: Float3,
+    /// Shadow rays of this path that were traced; directions that bring nothing are not.
+    pub shadow_rays_traced: u32,
+    /// Shadow rays of this path that reached the environment.
+    pub shadow_rays_visible: u32,
+    /// Camera and bounce rays of this path.
+    pub rays_traced: u32,
+}
+
+/// Totals over the film since the host last set them to zero.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Counters {
+    /// Camera rays.
+    pub camera_rays: u32,
+    /// Bounce rays.
+    pub bounce_rays: u32,
+    /// Shadow rays that were traced.
+    pub shadow_rays_traced: u32,
+    /// Shadow rays that reached the environment.
+    pub shadow_rays_visible: u32,
+    /// Samples left out of the film because their radiance was not finite.
+    pub dropped_samples: u32,
 }
 
 /// A material; which members mean something depends on `kind`.
@@ -141,8 +163,12 @@ pub struct Wave {
     pub seed: u32,
     /// Path vertex this dispatch works at; 0 is the first hit of the camera ray.
     pub vertex: u32,
-    /// Shadow rays per hit.
+    /// Shadow rays per hit in this dispatch.
     pub shadow_ray_count: u32,
+    /// Index of the first of them among all shadow rays of the hit.
+    pub first_shadow_ray: u32,
+    /// Shadow rays per hit over all dispatches.
+    pub total_shadow_rays: u32,
     /// Bits `AOV_…`: which extra film buffers are written.
     pub aovs: u32,
 }

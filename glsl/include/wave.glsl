@@ -1,0 +1,75 @@
+// Which pixel and sample a path of the wave belongs to, and the dimensions of its random numbers.
+// Needs NEEDS_WAVE and NEEDS_PARAMETERS.
+
+#ifndef WAVE_GLSL
+#define WAVE_GLSL
+
+#include "layout.glsl"
+
+// Dimensions of random_2d and random_1d along a path: two for the camera, then per vertex.
+const uint DIMENSION_FILTER = 0u;
+const uint DIMENSION_LENS = 1u;
+const uint DIMENSION_VERTEX = 2u;
+// Offsets from the first dimension of a vertex. The directions of resampling's candidates take one
+// dimension per candidate.
+const uint DIMENSION_TECHNIQUE = 0u;
+const uint DIMENSION_RESAMPLING = 1u;
+const uint DIMENSION_BOUNCE = 2u;
+const uint DIMENSION_BOUNCE_LOBE = 3u;
+const uint DIMENSION_ROULETTE = 4u;
+const uint DIMENSION_BRDF_LOBE = 8u;
+const uint DIMENSION_BRDF_DIRECTION = 16u;
+const uint DIMENSION_ENVIRONMENT_DIRECTION = 24u;
+const uint DIMENSIONS_PER_VERTEX = 32u;
+
+// Film order walks through blocks of 8x8 pixels, so that neighbouring invocations trace
+// neighbouring rays.
+const uint FILM_BLOCK = 8u;
+
+struct PathIndex {
+    // Pixel in the crop window.
+    uvec2 crop_pixel;
+    // Index of the pixel in the buffers of the film.
+    uint film_index;
+    // Index of the pixel in the whole film: random numbers do not depend on the crop window.
+    uint pixel;
+    uint sample_index;
+    // Whether the pixel lies in the crop window; blocks at its edges reach beyond it.
+    bool inside;
+};
+
+uint wave_path_count() {
+    return wave.pixel_count * wave.sample_count;
+}
+
+// The pixel at a position in film order.
+PathIndex wave_pixel(uint film_position) {
+    PathIndex index;
+    uint blocks_per_row = (parameters.crop_width + FILM_BLOCK - 1u) / FILM_BLOCK;
+    uint block = film_position / (FILM_BLOCK * FILM_BLOCK);
+    uint within = film_position % (FILM_BLOCK * FILM_BLOCK);
+    index.crop_pixel = uvec2(
+        (block % blocks_per_row) * FILM_BLOCK + within % FILM_BLOCK,
+        (block / blocks_per_row) * FILM_BLOCK + within / FILM_BLOCK);
+    index.inside = index.crop_pixel.x < parameters.crop_width
+        && index.crop_pixel.y < parameters.crop_height;
+    index.film_index = index.crop_pixel.y * parameters.crop_width + index.crop_pixel.x;
+    index.pixel = (index.crop_pixel.y + parameters.crop_y) * parameters.film_width
+        + index.crop_pixel.x + parameters.crop_x;
+    index.sample_index = wave.first_sample;
+    return index;
+}
+
+// The pixel and sample of a path of the wave.
+PathIndex wave_path(uint path) {
+    PathIndex index = wave_pixel(wave.first_pixel + path % wave.pixel_count);
+    index.sample_index = wave.first_sample + path / wave.pixel_count;
+    return index;
+}
+
+// First dimension of the vertex this dispatch works at.
+uint vertex_dimension() {
+    return DIMENSION_VERTEX + wave.vertex * DIMENSIONS_PER_VERTEX;
+}
+
+#endif
