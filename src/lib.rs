@@ -24,6 +24,7 @@ pub mod command;
 pub mod error;
 pub mod film;
 pub mod fit;
+pub mod frame;
 pub mod gpu;
 pub mod pass;
 pub mod random;

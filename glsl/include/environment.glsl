@@ -1,0 +1,184 @@
+// The environment map: bilinear lookup and its exact sampling density. Twin of
+// src/scene/environment. Needs NEEDS_PARAMETERS and NEEDS_ENVIRONMENT; densities per steradian.
+//
+// environment_rows: cumulative probability over height + 1 rows of cells, then the mean sine of the
+// polar angle of each of them. environment_cells: cumulative probability over the width cells of
+// each row. src/scene/environment/table.rs describes both.
+
+#ifndef ENVIRONMENT_GLSL
+#define ENVIRONMENT_GLSL
+
+#include "frame.glsl"
+#include "layout.glsl"
+
+// Densities are evaluated no closer to a pole than this, so that they stay finite.
+const float ENVIRONMENT_MIN_SIN_THETA = 1e-7;
+
+struct EnvironmentSample {
+    vec3 direction;
+    vec3 radiance;
+    // Per steradian; 0 where the map is black and nothing can be sampled.
+    float pdf;
+};
+
+// A cell with its four texels: c_ij at column offset i, row offset j.
+struct EnvironmentCell {
+    vec3 c00;
+    vec3 c10;
+    vec3 c01;
+    vec3 c11;
+};
+
+// Luminance of linear Rec.709.
+float luminance(vec3 radiance) {
+    return dot(radiance, vec3(0.2126, 0.7152, 0.0722));
+}
+
+// Turns a direction from the world into the frame of the map.
+vec3 environment_map_from_world(vec3 direction) {
+    float c = parameters.environment_cos_rotation;
+    float s = parameters.environment_sin_rotation;
+    return vec3(c * direction.x - s * direction.z, direction.y, s * direction.x + c * direction.z);
+}
+
+vec3 environment_world_from_map(vec3 direction) {
+    float c = parameters.environment_cos_rotation;
+    float s = parameters.environment_sin_rotation;
+    return vec3(c * direction.x + s * direction.z, direction.y, c * direction.z - s * direction.x);
+}
+
+EnvironmentCell environment_cell(uint column, uint row) {
+    uint width = parameters.environment_width;
+    uint next_column = column + 1u == width ? 0u : column + 1u;
+    uint upper = (row == 0u ? 0u : row - 1u) * width;
+    uint lower = min(row, parameters.environment_height - 1u) * width;
+    return EnvironmentCell(
+        environment_texels[upper + column], environment_texels[upper + next_column],
+        environment_texels[lower + column], environment_texels[lower + next_column]);
+}
+
+vec3 environment_interpolate(EnvironmentCell cell, vec2 position) {
+    return mix(
+        mix(cell.c00, cell.c10, position.x), mix(cell.c01, cell.c11, position.x), position.y);
+}
+
+// Radiance from a direction: bilinear between texel centres, wrapping in u, clamped in v.
+vec3 environment_radiance(vec3 direction) {
+    vec2 uv = lat_long_from_direction(environment_map_from_world(direction));
+    int width = int(parameters.environment_width);
+    int height = int(parameters.environment_height);
+    float x = uv.x * float(width) - 0.5;
+    float y = uv.y * float(height) + 0.5;
+    int column = int(floor(x));
+    column = column < 0 ? width - 1 : min(column, width - 1);
+    int row = clamp(int(floor(y)), 0, height);
+    return environment_interpolate(
+        environment_cell(uint(column), uint(row)), vec2(x - floor(x), y - floor(y)));
+}
+
+// Density per steradian of environment_sample at a direction whose radiance is
+// environment_radiance(direction).
+float environment_pdf(vec3 direction, vec3 radiance) {
+    float total = parameters.environment_total;
+    if (total <= 0.0) {
+        return 0.0;
+    }
+    float height = float(parameters.environment_height);
+    float sin_theta = sqrt(direction.x * direction.x + direction.z * direction.z);
+    float v = atan(sin_theta, direction.y) / PI;
+    uint row = min(uint(v * height + 0.5), parameters.environment_height);
+    float mean_sine = environment_rows[parameters.environment_height + 1u + row];
+    return luminance(radiance) * mean_sine
+        / (total * 2.0 * PI * PI * max(sin_theta, ENVIRONMENT_MIN_SIN_THETA));
+}
+
+// Position in [0, 1) with density proportional to mix(a, b, position).
+float environment_sample_linear(float a, float b, float u) {
+    float sum = a + b;
+    float start = sum > 0.0 ? a / sum : 0.5;
+    float end = 1.0 - start;
+    float divisor = start + sqrt(mix(start * start, end * end, u));
+    return divisor > 0.0 ? min(u / divisor, 0.99999994) : 0.0;
+}
+
+// Direction with the density environment_pdf, from two numbers in [0, 1).
+EnvironmentSample environment_sample(vec2 u) {
+    if (parameters.environment_total <= 0.0) {
+        return EnvironmentSample(vec3(0.0, 1.0, 0.0), vec3(0.0), 0.0);
+    }
+    uint width = parameters.environment_width;
+    uint height = parameters.environment_height;
+
+    // First row, then first cell, whose cumulative probability exceeds u: never an empty one.
+    uint row = 0u;
+    uint last = height;
+    float before = 0.0;
+    float after = 1.0;
+    while (row < last) {
+        uint middle = (row + last) >> 1u;
+        float cumulative = environment_rows[middle];
+        if (cumulative > u.y) {
+            last = middle;
+            after = cumulative;
+        } else {
+            row = middle + 1u;
+            before = cumulative;
+        }
+    }
+    float row_remainder = min((u.y - before) / (after - before), 0.99999994);
+
+    uint first_cell = row * width;
+    uint column = 0u;
+    last = width - 1u;
+    before = 0.0;
+    after = 1.0;
+    while (column < last) {
+        uint middle = (column + last) >> 1u;
+        float cumulative = environment_cells[first_cell + middle];
+        if (cumulative > u.x) {
+            last = middle;
+            after = cumulative;
+        } else {
+            column = middle + 1u;
+            before = cumulative;
+        }
+    }
+    float column_remainder = min((u.x - before) / (after - before), 0.99999994);
+
+    // The bilinear patch: its marginal along v, then the row of the patch at that v.
+    EnvironmentCell cell = environment_cell(column, row);
+    float l00 = luminance(cell.c00);
+    float l10 = luminance(cell.c10);
+    float l01 = luminance(cell.c01);
+    float l11 = luminance(cell.c11);
+    vec2 position;
+    position.y = environment_sample_linear(l00 + l10, l01 + l11, row_remainder);
+    position.x = environment_sample_linear(
+        mix(l00, l01, position.y), mix(l10, l11, position.y), column_remainder);
+    vec3 radiance = environment_interpolate(cell, position);
+
+    // Polar angle from the nearer pole, in rows, so that it keeps its relative accuracy; the first
+    // and the last row are half cells.
+    bool northern = 2u * row <= height;
+    float from_pole = northern ? float(row) - 0.5 + position.y
+                               : float(height - row) + 0.5 - position.y;
+    if (row == 0u) {
+        from_pole = 0.5 * position.y;
+    } else if (row == height) {
+        from_pole = 0.5 * (1.0 - position.y);
+    }
+    vec2 theta = sin_cos_pi(from_pole / float(height));
+    float x = float(column) + 0.5 + position.x;
+    x = x >= float(width) ? x - float(width) : x;
+    vec2 azimuth = sin_cos_pi(2.0 * x / float(width));
+    vec3 direction = vec3(
+        -theta.x * azimuth.x, northern ? theta.y : -theta.y, theta.x * azimuth.y);
+
+    float mean_sine = environment_rows[height + 1u + row];
+    float pdf = luminance(radiance) * mean_sine
+        / (parameters.environment_total * 2.0 * PI * PI
+            * max(theta.x, ENVIRONMENT_MIN_SIN_THETA));
+    return EnvironmentSample(environment_world_from_map(direction), radiance, pdf);
+}
+
+#endif

@@ -1,0 +1,71 @@
+// Orthonormal frames and the lat-long mapping: twin of src/frame.rs.
+//
+// Local frames have the normal as z axis; names of vectors in them end in _local. The lat-long
+// mapping is from unit directions to the unit square; its Jacobian is 2 pi^2 sin(theta), theta
+// measured from +Y.
+
+#ifndef FRAME_GLSL
+#define FRAME_GLSL
+
+const float PI = 3.14159265358979;
+
+struct Frame {
+    vec3 tangent;
+    vec3 bitangent;
+    vec3 normal;
+};
+
+// Right-handed orthonormal basis around a unit normal, without branches or a singularity.
+// Duff et al. 2017, "Building an Orthonormal Basis, Revisited", listing 3.
+Frame frame_from_normal(vec3 normal) {
+    float handedness = normal.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (handedness + normal.z);
+    float b = normal.x * normal.y * a;
+    return Frame(
+        vec3(1.0 + handedness * normal.x * normal.x * a, handedness * b, -handedness * normal.x),
+        vec3(b, handedness + normal.y * normal.y * a, -normal.y),
+        normal);
+}
+
+vec3 to_local(Frame frame, vec3 direction) {
+    return vec3(
+        dot(frame.tangent, direction), dot(frame.bitangent, direction), dot(frame.normal, direction));
+}
+
+vec3 to_world(Frame frame, vec3 direction_local) {
+    return frame.tangent * direction_local.x + frame.bitangent * direction_local.y
+        + frame.normal * direction_local.z;
+}
+
+// (sin(pi x), cos(pi x)) for 0 <= x <= 2 with small *relative* error near the zeros, which the
+// built-in functions do not promise: densities over the sphere divide by the sine near the poles.
+// Polynomials of Cephes' sinf and cosf (Moshier 1992), |argument| <= pi/4.
+vec2 sin_cos_pi(float x) {
+    float quarter_turns = floor(2.0 * x + 0.5);
+    float angle = PI * (x - 0.5 * quarter_turns);
+    float z = angle * angle;
+    float s = ((-1.9515295891e-4 * z + 8.3321608736e-3) * z - 1.6666654611e-1) * z * angle + angle;
+    float c = ((2.443315711809948e-5 * z - 1.388731625493765e-3) * z + 4.166664568298827e-2) * z * z
+        - 0.5 * z + 1.0;
+    uint quadrant = uint(quarter_turns) & 3u;
+    vec2 turned = (quadrant & 1u) == 0u ? vec2(s, c) : vec2(c, -s);
+    return (quadrant & 2u) == 0u ? turned : -turned;
+}
+
+// Lat-long coordinates of a unit direction: u = 0.5 + atan2(x, -z) / 2 pi, v = theta / pi; the
+// direction need not be exactly unit. u is 0.5 at the poles.
+vec2 lat_long_from_direction(vec3 direction) {
+    float sin_theta = sqrt(direction.x * direction.x + direction.z * direction.z);
+    bool pole = sin_theta == 0.0;
+    float azimuth = pole ? 0.0 : atan(direction.x, -direction.z);
+    return vec2(0.5 + azimuth / (2.0 * PI), atan(sin_theta, direction.y) / PI);
+}
+
+// Unit direction at lat-long coordinates in the unit square; inverse of lat_long_from_direction.
+vec3 direction_from_lat_long(vec2 uv) {
+    vec2 azimuth = sin_cos_pi(2.0 * uv.x);
+    vec2 theta = sin_cos_pi(uv.y);
+    return vec3(-theta.x * azimuth.x, theta.y, theta.x * azimuth.y);
+}
+
+#endif

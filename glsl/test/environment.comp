@@ -1,0 +1,41 @@
+// Probe of environment.glsl: a direction and two random numbers in, lookup and sample out.
+#version 460
+
+#define NEEDS_PARAMETERS
+#define NEEDS_ENVIRONMENT
+#include "environment.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+struct ProbeInput {
+    vec3 direction;
+    vec2 u;
+};
+
+struct ProbeOutput {
+    vec3 radiance;
+    float pdf;
+    vec3 sampled_direction;
+    vec3 sampled_radiance;
+    float sampled_pdf;
+};
+
+layout(scalar, set = SET_FILM, binding = 0) readonly buffer Inputs {
+    ProbeInput inputs[];
+};
+layout(scalar, set = SET_FILM, binding = 1) writeonly buffer Outputs {
+    ProbeOutput outputs[];
+};
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= uint(inputs.length())) {
+        return;
+    }
+    vec3 direction = inputs[index].direction;
+    vec3 radiance = environment_radiance(direction);
+    EnvironmentSample environment = environment_sample(inputs[index].u);
+    outputs[index] = ProbeOutput(
+        radiance, environment_pdf(direction, radiance), environment.direction,
+        environment.radiance, environment.pdf);
+}

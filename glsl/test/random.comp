@@ -1,0 +1,34 @@
+// Probe of random.glsl: (pixel, sample, dimension, seed) in, all kinds of numbers out.
+#version 460
+
+#include "random.glsl"
+
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+struct ProbeOutput {
+    vec2 stratified;
+    float stratified_1d;
+    vec2 independent;
+    float independent_1d;
+};
+
+layout(scalar, set = SET_FILM, binding = 0) readonly buffer Inputs {
+    uvec4 inputs[];
+};
+layout(scalar, set = SET_FILM, binding = 1) writeonly buffer Outputs {
+    ProbeOutput outputs[];
+};
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= uint(inputs.length())) {
+        return;
+    }
+    uvec4 key = inputs[index];
+    outputs[index] = ProbeOutput(
+        random_2d(key.x, key.y, key.z, key.w), random_1d(key.x, key.y, key.z, key.w),
+        random_independent_2d(key.x, key.y, key.z, key.w),
+        random_independent_1d(key.x, key.y, key.z, key.w));
+}

@@ -1,0 +1,239 @@
+//! Environment maps from files: radiance `.hdr`, OpenEXR, PFM.
+
+use std::{fs, io::Cursor, path::Path};
+
+use exr::prelude::{ReadChannels, ReadLayers};
+use glam::Vec3;
+use image::{ImageDecoder, codecs::hdr::HdrDecoder};
+use rayon::prelude::*;
+
+use super::{EnvironmentMap, MAX_RADIANCE};
+use crate::error::{Error, Result};
+
+/// Most texels a map may have: 16384×8192.
+const MAX_TEXELS: u64 = 1 << 27;
+
+/// Radiance as the file has it, the first row at the top.
+struct Image {
+    width: u32,
+    height: u32,
+    texels: Vec<Vec3>,
+}
+
+impl EnvironmentMap {
+    /// Reads a lat-long map; the format follows from the extension: `.hdr`, `.exr` or `.pfm`.
+    ///
+    /// Radiance is multiplied by `scale`; the map is turned by `rotation_deg` about +Y,
+    /// counter-clockwise seen from above. Texels with a negative, infinite or NaN component become 0
+    /// with a warning that counts them; a ratio other than 2:1 and an all-black map are warnings.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where the file cannot be read, [`Error::Format`] where it is truncated, of
+    /// another format, of an absurd size or without the channels R, G, B or Y.
+    pub fn load(
+        path: &Path,
+        scale: f32,
+        rotation_deg: f32,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self> {
+        check_placement(scale, rotation_deg).map_err(|message| Error::format(path, message))?;
+        let extension =
+            path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
+        let read = match extension.as_deref() {
+            Some("hdr") => read_hdr,
+            Some("exr") => read_exr,
+            Some("pfm") => read_pfm,
+            _ => {
+                return Err(Error::format(
+                    path,
+                    "unknown kind of environment map; expected .hdr, .exr or .pfm",
+                ));
+            }
+        };
+        let bytes = fs::read(path).map_err(|error| Error::io(path, "read", error))?;
+        let image = read(&bytes).map_err(|message| Error::format(path, message))?;
+        drop(bytes);
+        if image.width != 2 * image.height {
+            warnings.push(format!(
+                "{}: {}×{} texels; a lat-long map is expected to be twice as wide as high and is \
+                 stretched to the whole sphere",
+                path.display(),
+                image.width,
+                image.height
+            ));
+        }
+        let mut map = Self {
+            width: image.width,
+            height: image.height,
+            texels: image.texels,
+            rotation_rad: rotation_deg.rem_euclid(360.0).to_radians(),
+            source: path.display().to_string(),
+        };
+        map.clean(scale, warnings);
+        Ok(map)
+    }
+
+    /// Applies `scale`, sets texels that are not radiance to 0 and warns of them and of a black map.
+    fn clean(&mut self, scale: f32, warnings: &mut Vec<String>) {
+        let invalid = self
+            .texels
+            .par_iter_mut()
+            .map(|texel| {
+                let scaled = *texel * scale;
+                let valid = texel.is_finite()
+                    && texel.min_element() >= 0.0
+                    && scaled.max_element() <= MAX_RADIANCE;
+                *texel = if valid { scaled } else { Vec3::ZERO };
+                usize::from(!valid)
+            })
+            .sum::<usize>();
+        if invalid > 0 {
+            warnings.push(format!(
+                "{}: {invalid} of {} texels are negative, infinite (above {MAX_RADIANCE:e}) or NaN \
+                 and were set to 0",
+                self.source,
+                self.texels.len()
+            ));
+        }
+        if self.texels.par_iter().all(|texel| *texel == Vec3::ZERO) {
+            warnings.push(format!("{}: the map is black: nothing is lit", self.source));
+        }
+    }
+}
+
+/// Refuses a scale that is negative or not finite and a rotation that is not finite.
+pub(super) fn check_placement(scale: f32, rotation_deg: f32) -> Result<(), String> {
+    if !(scale.is_finite() && scale >= 0.0) {
+        return Err(format!("scale = {scale}; expected a finite number, 0 or more"));
+    }
+    if !rotation_deg.is_finite() {
+        return Err(format!("rotation_deg = {rotation_deg}; expected a finite number"));
+    }
+    Ok(())
+}
+
+fn check_size(width: u64, height: u64) -> Result<(), String> {
+    if width == 0 || height == 0 || width.saturating_mul(height) > MAX_TEXELS {
+        return Err(format!(
+            "{width}×{height} texels; expected at least 1×1 and at most {MAX_TEXELS} in all"
+        ));
+    }
+    Ok(())
+}
+
+fn read_hdr(bytes: &[u8]) -> Result<Image, String> {
+    let message = |error: image::ImageError| format!("not a readable Radiance file: {error}");
+    let decoder = HdrDecoder::new(Cursor::new(bytes)).map_err(message)?;
+    let (width, height) = decoder.dimensions();
+    check_size(width.into(), height.into())?;
+    let mut components = vec![0_f32; width as usize * height as usize * 3];
+    decoder.read_image(bytemuck::cast_slice_mut(&mut components)).map_err(message)?;
+    Ok(Image { width, height, texels: bytemuck::cast_vec(components) })
+}
+
+fn read_exr(bytes: &[u8]) -> Result<Image, String> {
+    let message = |error: exr::error::Error| format!("not a readable OpenEXR file: {error}");
+    let meta =
+        exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(message)?;
+    for header in &meta.headers {
+        check_size(header.layer_size.width() as u64, header.layer_size.height() as u64)?;
+    }
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(message)?;
+    let mut found = Vec::new();
+    for layer in &image.layer_data {
+        let channels = &layer.channel_data.list;
+        let channel = |name: &str| channels.iter().find(|channel| channel.name.eq(name));
+        let rgb = match (channel("R"), channel("G"), channel("B"), channel("Y")) {
+            (Some(red), Some(green), Some(blue), _) => [red, green, blue],
+            (None, None, None, Some(grey)) => [grey; 3],
+            _ => {
+                found.extend(channels.iter().map(|channel| channel.name.to_string()));
+                continue;
+            }
+        };
+        if rgb.iter().any(|channel| channel.sampling != exr::math::Vec2(1, 1)) {
+            return Err("subsampled channels are not supported".into());
+        }
+        let [red, green, blue] = rgb.map(|channel| &channel.sample_data);
+        let texels = (0..layer.size.area())
+            .into_par_iter()
+            .map(|index| {
+                Vec3::new(
+                    red.value_by_flat_index(index).to_f32(),
+                    green.value_by_flat_index(index).to_f32(),
+                    blue.value_by_flat_index(index).to_f32(),
+                )
+            })
+            .collect();
+        return Ok(Image {
+            width: layer.size.width() as u32,
+            height: layer.size.height() as u32,
+            texels,
+        });
+    }
+    Err(format!("expected the channels R, G, B or Y, found {}", found.join(", ")))
+}
+
+/// Portable float map: `PF` or `Pf`, width, height, scale (negative for little-endian), then rows of
+/// floats from the bottom up. The magnitude of the scale is ignored, as most readers do.
+fn read_pfm(bytes: &[u8]) -> Result<Image, String> {
+    let mut position = 0;
+    let mut token = |what: &str| -> Result<&str, String> {
+        let start = position
+            + bytes[position..].iter().take_while(|byte| byte.is_ascii_whitespace()).count();
+        let length =
+            bytes[start..].iter().take(32).take_while(|byte| byte.is_ascii_graphic()).count();
+        let text = std::str::from_utf8(&bytes[start..start + length]).unwrap_or_default();
+        position = start + length;
+        if text.is_empty() { Err(format!("PFM header ends before the {what}")) } else { Ok(text) }
+    };
+    let magic = token("magic number")?;
+    let component_count = match magic {
+        "PF" => 3,
+        "Pf" => 1,
+        _ => return Err(format!("not a PFM file: expected PF or Pf, found {magic:?}")),
+    };
+    let mut size = |what: &str| {
+        let text = token(what)?;
+        text.parse::<u32>().map_err(|_| format!("PFM {what}: expected an integer, found {text:?}"))
+    };
+    let (width, height) = (size("width")?, size("height")?);
+    check_size(width.into(), height.into())?;
+    let text = token("scale")?;
+    let scale: f32 = text
+        .parse()
+        .ok()
+        .filter(|scale: &f32| scale.is_finite() && *scale != 0.0)
+        .ok_or_else(|| format!("PFM scale: expected a number other than 0, found {text:?}"))?;
+    let data = bytes.get(position + 1..).unwrap_or_default();
+    let row_bytes = width as usize * component_count * 4;
+    let expected = row_bytes * height as usize;
+    if data.len() < expected {
+        return Err(format!(
+            "truncated: {width}×{height} texels of {component_count} floats need {expected} bytes, \
+             found {}",
+            data.len()
+        ));
+    }
+    let float = |bytes: &[u8]| {
+        let bytes = [bytes[0], bytes[1], bytes[2], bytes[3]];
+        if scale < 0.0 { f32::from_le_bytes(bytes) } else { f32::from_be_bytes(bytes) }
+    };
+    let texels = data[..expected]
+        .chunks_exact(row_bytes)
+        .rev()
+        .flat_map(|row| row.chunks_exact(component_count * 4))
+        .map(|texel| match texel.len() {
+            4 => Vec3::splat(float(texel)),
+            _ => Vec3::new(float(texel), float(&texel[4..]), float(&texel[8..])),
+        })
+        .collect();
+    Ok(Image { width, height, texels })
+}

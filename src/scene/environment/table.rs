@@ -1,0 +1,214 @@
+//! Sampling tables of an environment map: the exact density of its bilinear radiance.
+//!
+//! [`EnvironmentMap`] → [`EnvironmentTables`], the contents of the device buffers
+//! `environment_rows` and `environment_cells`. Twin of `environment_pdf` and `environment_sample`
+//! in `glsl/include/environment.glsl`.
+//!
+//! The atoms are the cells between four texel centres: `height + 1` rows of `width` cells, the first
+//! and the last row half as high, since v is clamped there. A cell is chosen with probability
+//! P = s(row) · ∬ lum L du dv / total over the cell, where s(row) is the mean of sin θ over the v of
+//! that row and total makes the sum 1; inside the cell (u, v) is drawn from the bilinear patch
+//! exactly. Hence, per steradian,
+//!
+//! pdf(ω) = lum L(ω) · s(row) / (total · 2π² sin θ),
+//!
+//! which needs no table per cell, and in which L/pdf varies only with sin θ within one row.
+//! Cumulative probabilities are single precision, so a cell's real probability within its row is off
+//! by up to 2⁻²⁴, with errors of opposite sign in its neighbours.
+
+use std::f64::consts::PI;
+
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::{EnvironmentMap, luminance};
+use crate::frame::sin_cos_pi;
+
+/// Densities are evaluated no closer to a pole than this, so that they stay finite.
+const MIN_SIN_THETA: f32 = 1e-7;
+
+/// Largest number below 1.
+const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
+
+/// Contents of the device buffers that sample an environment map.
+#[derive(Clone, Debug)]
+pub struct EnvironmentTables {
+    /// `2 * (height + 1)` numbers: the cumulative probability up to and including each row of cells
+    /// (1 from the last row that is not black on), then the mean of sin θ over each row.
+    pub rows: Vec<f32>,
+    /// `width` numbers for each of the `height + 1` rows: the cumulative probability, within the
+    /// row, up to and including each cell (1 from the last cell that is not black on; all 1 in a row
+    /// that is black).
+    pub cells: Vec<f32>,
+    /// Σ s(row) · ∬ lum L du dv over all cells; 0 for a black map, where [`Self::sample`] returns
+    /// the pdf 0.
+    pub total: f32,
+}
+
+/// A sampled direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnvironmentSample {
+    /// Unit direction in the world.
+    pub direction: Vec3,
+    /// Radiance from there.
+    pub radiance: Vec3,
+    /// Density per steradian; 0 where the map is black and nothing can be sampled.
+    pub pdf: f32,
+}
+
+/// Mean of sin θ over row `row` of cells, in closed form.
+fn mean_sine(row: u32, height: u32) -> f64 {
+    let row_angle = PI / f64::from(height);
+    let half = 0.5 * row_angle;
+    if row == 0 || row == height {
+        // (1 − cos half) / half without cancellation.
+        2.0 * (0.5 * half).sin().powi(2) / half
+    } else {
+        (row_angle * f64::from(row.min(height - row))).sin() * half.sin() / half
+    }
+}
+
+/// Position in [0, 1) with density proportional to the linear interpolation from `a` to `b`.
+fn sample_linear(a: f32, b: f32, u: f32) -> f32 {
+    let sum = a + b;
+    let start = if sum > 0.0 { a / sum } else { 0.5 };
+    let end = 1.0 - start;
+    let divisor = start + lerp(start * start, end * end, u).sqrt();
+    if divisor > 0.0 { (u / divisor).min(BELOW_ONE) } else { 0.0 }
+}
+
+fn lerp(a: f32, b: f32, t: f32) -> f32 {
+    a * (1.0 - t) + b * t
+}
+
+/// Writes the cumulative distribution of `weights` as single precision: non-decreasing, equal to the
+/// previous entry where the weight is 0, 1 from the last positive weight on. Returns the sum.
+fn write_cumulative(weights: impl Iterator<Item = f64> + Clone, cumulative: &mut [f32]) -> f64 {
+    let sum: f64 = weights.clone().sum();
+    let last = weights.clone().enumerate().filter(|(_, weight)| *weight > 0.0).last();
+    let last = last.map_or(0, |(index, _)| index);
+    let mut running = 0.0;
+    for (index, (weight, entry)) in weights.zip(cumulative.iter_mut()).enumerate() {
+        running += weight;
+        *entry = if index >= last { 1.0 } else { ((running / sum) as f32).min(1.0) };
+    }
+    sum
+}
+
+/// First index in `cumulative` whose entry exceeds `u`, with the probabilities before and up to it.
+fn search(cumulative: &[f32], u: f32) -> (usize, f32, f32) {
+    let (mut first, mut last) = (0, cumulative.len() - 1);
+    let (mut before, mut after) = (0.0, 1.0);
+    while first < last {
+        let middle = (first + last) / 2;
+        if cumulative[middle] > u {
+            last = middle;
+            after = cumulative[middle];
+        } else {
+            first = middle + 1;
+            before = cumulative[middle];
+        }
+    }
+    (first, before, after)
+}
+
+impl EnvironmentTables {
+    /// Tables of `map`; O(texels), in parallel over rows, summed in double precision.
+    pub fn new(map: &EnvironmentMap) -> Self {
+        let (width, height) = (map.width as usize, map.height);
+        let row_count = height as usize + 1;
+        let mut cells = vec![0.0; width * row_count];
+        let row_weights: Vec<f64> = cells
+            .par_chunks_mut(width)
+            .enumerate()
+            .map(|(row, cumulative)| {
+                let row = row as u32;
+                let texel_row = |row: u32| &map.texels[row as usize * width..][..width];
+                let (upper, lower) =
+                    (texel_row(row.saturating_sub(1)), texel_row(row.min(height - 1)));
+                let edge: Vec<f64> = upper
+                    .iter()
+                    .zip(lower)
+                    .map(|(a, b)| f64::from(luminance(*a)) + f64::from(luminance(*b)))
+                    .collect();
+                let weights = (0..width).map(|column| {
+                    edge[column] + edge[if column + 1 == width { 0 } else { column + 1 }]
+                });
+                let row_height = if row == 0 || row == height { 0.5 } else { 1.0 };
+                0.25 * row_height * mean_sine(row, height) * write_cumulative(weights, cumulative)
+            })
+            .collect();
+        let mut rows = vec![0.0; row_count];
+        let sum = write_cumulative(row_weights.iter().copied(), &mut rows);
+        rows.extend((0..=height).map(|row| mean_sine(row, height) as f32));
+        let total = (sum / (width as f64 * f64::from(height))) as f32;
+        Self { rows, cells, total: if total.is_normal() { total } else { 0.0 } }
+    }
+
+    /// Density per steradian of [`Self::sample`] at a direction whose radiance is
+    /// `map.radiance(direction)`. Twin of `environment_pdf`.
+    pub fn pdf(&self, map: &EnvironmentMap, direction: Vec3, radiance: Vec3) -> f32 {
+        if self.total <= 0.0 {
+            return 0.0;
+        }
+        let sin_theta = (direction.x * direction.x + direction.z * direction.z).sqrt();
+        let v = sin_theta.atan2(direction.y) / std::f32::consts::PI;
+        let row = ((v * map.height as f32 + 0.5) as u32).min(map.height);
+        self.density(map, radiance, row, sin_theta)
+    }
+
+    fn density(&self, map: &EnvironmentMap, radiance: Vec3, row: u32, sin_theta: f32) -> f32 {
+        let mean_sine = self.rows[(map.height + 1 + row) as usize];
+        let pi = std::f32::consts::PI;
+        luminance(radiance) * mean_sine
+            / (self.total * 2.0 * pi * pi * sin_theta.max(MIN_SIN_THETA))
+    }
+
+    /// Direction with the density [`Self::pdf`], from two numbers in [0, 1). Twin of
+    /// `environment_sample`.
+    pub fn sample(&self, map: &EnvironmentMap, u: [f32; 2]) -> EnvironmentSample {
+        if self.total <= 0.0 {
+            return EnvironmentSample { direction: Vec3::Y, radiance: Vec3::ZERO, pdf: 0.0 };
+        }
+        let (width, height) = (map.width as usize, map.height);
+        let (row, before, after) = search(&self.rows[..=height as usize], u[1]);
+        let row_remainder = ((u[1] - before) / (after - before)).min(BELOW_ONE);
+        let (column, before, after) = search(&self.cells[row * width..][..width], u[0]);
+        let column_remainder = ((u[0] - before) / (after - before)).min(BELOW_ONE);
+        let (row, column) = (row as u32, column as u32);
+
+        // The bilinear patch: its marginal along v, then the row of the patch at that v.
+        let cell = map.cell(column, row);
+        let [l00, l10, l01, l11] = [cell.c00, cell.c10, cell.c01, cell.c11].map(luminance);
+        let y = sample_linear(l00 + l10, l01 + l11, row_remainder);
+        let x = sample_linear(lerp(l00, l01, y), lerp(l10, l11, y), column_remainder);
+        let radiance = cell.interpolate(Vec2::new(x, y));
+
+        // Polar angle from the nearer pole, in rows, so that it keeps its relative accuracy; the
+        // first and the last row are half cells.
+        let northern = 2 * row <= height;
+        let from_pole = if row == 0 {
+            0.5 * y
+        } else if row == height {
+            0.5 * (1.0 - y)
+        } else if northern {
+            row as f32 - 0.5 + y
+        } else {
+            (height - row) as f32 + 0.5 - y
+        };
+        let theta = sin_cos_pi(from_pole / height as f32);
+        let u = column as f32 + 0.5 + x;
+        let u = if u >= width as f32 { u - width as f32 } else { u };
+        let azimuth = sin_cos_pi(2.0 * u / width as f32);
+        let direction = Vec3::new(
+            -theta.x * azimuth.x,
+            if northern { theta.y } else { -theta.y },
+            theta.x * azimuth.y,
+        );
+        EnvironmentSample {
+            direction: map.world_from_map(direction),
+            radiance,
+            pdf: self.density(map, radiance, row, theta.x),
+        }
+    }
+}
