@@ -14,7 +14,7 @@ fn aligned_powers_of_two_are_nets_in_every_elementary_interval() {
     for (pixel, dimension, seed) in [(0, 0, 0), (17, 3, 1), (1 << 21, 40, 9), (u32::MAX, 7, 5)] {
         for bits in 0..=10 {
             let count = 1_u32 << bits;
-            for run in [0, 1, 5, (1 << (32 - bits.max(1))) - 1] {
+            for run in [0_u32, 1, 5, (1 << (32 - bits.max(1))) - 1] {
                 let points: Vec<[f32; 2]> = (0..count)
                     .map(|i| random_2d(pixel, run.wrapping_mul(count) + i, dimension, seed))
                     .collect();
