@@ -76,6 +76,12 @@ pub enum Error {
         /// Expected and found.
         message: String,
     },
+    /// Two pictures that cannot be compared.
+    #[error("cannot compare: {message}")]
+    Comparison {
+        /// Expected and found.
+        message: String,
+    },
     /// A comparison is over its threshold.
     #[error("{message}")]
     Threshold {

@@ -6,6 +6,7 @@
 
 pub mod checkpoint;
 pub mod exr;
+pub mod merge;
 pub mod metadata;
 pub mod png;
 pub mod statistics;

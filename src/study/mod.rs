@@ -1,1 +1,4 @@
 //! Error metrics and comparisons.
+
+pub mod falsecolour;
+pub mod metrics;

@@ -1,0 +1,171 @@
+//! `fenestra compare`: error metrics of an image against a reference.
+
+use std::path::{Path, PathBuf};
+
+use crate::{
+    error::{Error, Result},
+    film::{Attribute, Image},
+    study::{
+        falsecolour::{self, Scale},
+        metrics::{self, Metrics},
+    },
+};
+
+/// Arguments of `compare`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Image to judge (EXR).
+    pub image: PathBuf,
+    /// Reference (EXR).
+    pub reference: PathBuf,
+    /// Second, independent half of the reference: squared errors become (x − r₁)(x − r₂), which is
+    /// free of the reference's own noise.
+    #[arg(long, value_name = "EXR")]
+    pub second_reference: Option<PathBuf>,
+    /// Write the error of every pixel (root of the mean over RGB of the squared error) in false
+    /// colour, blue low, red high, with its scale.
+    #[arg(long, value_name = "PNG")]
+    pub heatmap: Option<PathBuf>,
+    /// Error shown red in the heatmap; default: what 99% of the pixels stay below.
+    #[arg(long, value_name = "ERROR", requires = "heatmap")]
+    pub heatmap_high: Option<f64>,
+    /// Exit with status 3 if a metric is above a value, as in relmse=0.01. May be repeated.
+    #[arg(long, value_name = "METRIC=VALUE", value_parser = parse_threshold)]
+    pub fail_above: Vec<(String, f64)>,
+    /// Exit with status 3 if a metric is below a value, as in mean_ratio=0.99. May be repeated.
+    #[arg(long, value_name = "METRIC=VALUE", value_parser = parse_threshold)]
+    pub fail_below: Vec<(String, f64)>,
+    /// Print JSON to standard output; a value that is not finite is null.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Reads `metric=value`.
+fn parse_threshold(text: &str) -> Result<(String, f64), String> {
+    let known = || format!("known metrics: {}", Metrics::NAMES.join(", "));
+    let (name, value) = text
+        .split_once('=')
+        .ok_or_else(|| format!("expected METRIC=VALUE, as in relmse=0.01; {}", known()))?;
+    if !Metrics::NAMES.contains(&name) {
+        return Err(format!("no metric {name:?}; {}", known()));
+    }
+    match value.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok((name.to_owned(), value)),
+        _ => Err(format!("expected a finite number after {name}=, found {value:?}")),
+    }
+}
+
+/// Compares two images.
+///
+/// # Errors
+/// Files that cannot be read or compared; [`Error::Usage`] for a heatmap scale that is not positive;
+/// [`Error::Threshold`] where a metric is over its threshold.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    if let Some(high) = arguments.heatmap_high.filter(|high| !(high.is_finite() && *high > 0.0)) {
+        return Err(Error::usage(format!("--heatmap-high {high}: expected a positive number")));
+    }
+    let image = Image::read_exr(&arguments.image)?;
+    let reference = Image::read_exr(&arguments.reference)?;
+    check_same_picture(&image, &arguments.image, &reference, &arguments.reference)?;
+    let picture = image.rgb(&arguments.image)?;
+    let first = reference.rgb(&arguments.reference)?;
+    let second = match &arguments.second_reference {
+        Some(path) => {
+            let second = Image::read_exr(path)?;
+            check_same_picture(&image, &arguments.image, &second, path)?;
+            Some(second.rgb(path)?)
+        }
+        None => None,
+    };
+    let second = second.as_ref().unwrap_or(&first);
+    let metrics = Metrics::of_halves(&picture, &first, second)?;
+    print(arguments, &picture, &metrics)?;
+    if let Some(path) = &arguments.heatmap {
+        let squared = metrics::squared_errors(&picture, &first, second)?;
+        let errors: Vec<f64> = squared.into_iter().map(|error| error.max(0.0).sqrt()).collect();
+        let scale = arguments
+            .heatmap_high
+            .map_or_else(|| Scale::of(&errors), |high| Scale { low: 0.0, high });
+        falsecolour::picture(&errors, picture.width as usize, scale).write_png(path)?;
+    }
+    check_thresholds(arguments, &metrics)
+}
+
+/// Refuses other parts of the film; warns where the files say that they show different scenes.
+fn check_same_picture(image: &Image, path: &Path, reference: &Image, other: &Path) -> Result<()> {
+    let window = |image: &Image| {
+        let [x, y] = image.origin;
+        format!("{}x{} pixels at {x},{y}", image.width, image.height)
+    };
+    if window(image) != window(reference) {
+        return Err(Error::Comparison {
+            message: format!(
+                "{} shows {}, {} shows {}; render both with one --size and --crop",
+                path.display(),
+                window(image),
+                other.display(),
+                window(reference)
+            ),
+        });
+    }
+    let hash = |image: &Image| match image.attributes.get("fenestra.scene_hash") {
+        Some(Attribute::Text(hash)) => Some(hash.clone()),
+        _ => None,
+    };
+    if let (Some(ours), Some(theirs)) = (hash(image), hash(reference))
+        && ours != theirs
+    {
+        log::warn!(
+            "{} and {} show different scenes (hashes {ours} and {theirs})",
+            path.display(),
+            other.display()
+        );
+    }
+    Ok(())
+}
+
+fn print(
+    arguments: &Arguments,
+    picture: &crate::film::RgbImage,
+    metrics: &Metrics,
+) -> Result<()> {
+    if arguments.json {
+        let mut result = serde_json::json!({
+            "image": arguments.image.display().to_string(),
+            "reference": arguments.reference.display().to_string(),
+            "width": picture.width,
+            "height": picture.height,
+        });
+        for (name, value) in Metrics::NAMES.into_iter().zip(metrics.values()) {
+            result[name] = serde_json::json!(value);
+        }
+        super::print_line(&format!("{result:#}"))
+    } else {
+        let lines: Vec<String> = Metrics::NAMES
+            .into_iter()
+            .zip(metrics.values())
+            .map(|(name, value)| format!("{name:<15} {value:.6e}"))
+            .collect();
+        super::print_line(&lines.join("\n"))
+    }
+}
+
+fn check_thresholds(arguments: &Arguments, metrics: &Metrics) -> Result<()> {
+    let value = |name: &str| metrics.get(name).unwrap_or(f64::NAN);
+    let above = arguments.fail_above.iter().filter_map(|(name, threshold)| {
+        let value = value(name);
+        // A NaN is over every threshold.
+        let within = value <= *threshold;
+        (!within).then(|| format!("{name} is {value:.6e}, above the threshold {threshold}"))
+    });
+    let below = arguments.fail_below.iter().filter_map(|(name, threshold)| {
+        let value = value(name);
+        let within = value >= *threshold;
+        (!within).then(|| format!("{name} is {value:.6e}, below the threshold {threshold}"))
+    });
+    let failures: Vec<String> = above.chain(below).collect();
+    if failures.is_empty() {
+        return Ok(());
+    }
+    Err(Error::Threshold { message: failures.join("; ") })
+}

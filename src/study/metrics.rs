@@ -1,0 +1,241 @@
+//! Error metrics of a picture against a reference, in linear radiance and unclamped.
+//!
+//! For pixel `p` and colour channel `c` let `d = x − r`, `e(p)` the mean of `d²` over the three
+//! channels, `L(p)` the reference's mean over RGB box-filtered over the 5×5 pixels around `p` (those
+//! inside the image), and `L̄` the mean of the reference over pixels and channels.
+//!
+//! | metric | definition |
+//! |---|---|
+//! | `mse` | mean of `e` over the pixels |
+//! | `rmse` | √mse |
+//! | `mae` | mean of abs `d` over pixels and channels |
+//! | `relmse` | mean over the pixels of `e / (L² + 0.01·L̄²)` |
+//! | `relmse_trimmed` | the same without the worst 0.1% of the pixels |
+//! | `mean_ratio` | mean of `x` / mean of `r` |
+//! | `psnr` | 10·log₁₀(peak² / mse), peak the reference's largest channel value, decibels |
+//! | `max_error` | largest abs `d` |
+//!
+//! With the reference in two independent halves, `d²` is replaced by `(x − r₁)(x − r₂)`, whose
+//! expectation is free of the reference's own noise; `r` elsewhere is the mean of the halves. The
+//! estimates of `mse` and `relmse` can then be negative, which says that the reference is too noisy
+//! to judge the picture.
+
+use crate::{
+    error::{Error, Result},
+    film::RgbImage,
+};
+
+/// Side of the box filter of relMSE's denominator is `2·RADIUS + 1`.
+const RADIUS: usize = 2;
+/// Share of L̄² that keeps relMSE's denominator from vanishing.
+const RELATIVE_FLOOR: f64 = 0.01;
+/// Pixels left out of `relmse_trimmed`: one in this many, rounded down.
+const TRIMMED_ONE_IN: usize = 1000;
+
+/// Error of a picture against a reference; definitions in the [module](self)'s text.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Metrics {
+    /// Mean squared error.
+    pub mse: f64,
+    /// Root of the mean squared error; 0 where a two-halves estimate of it is negative.
+    pub rmse: f64,
+    /// Mean absolute error.
+    pub mae: f64,
+    /// Mean relative squared error.
+    pub relmse: f64,
+    /// Mean relative squared error without the worst 0.1% of the pixels.
+    pub relmse_trimmed: f64,
+    /// Mean of the picture over that of the reference; 1 where both are black.
+    pub mean_ratio: f64,
+    /// Peak signal-to-noise ratio, decibels; infinite for equal pictures.
+    pub psnr: f64,
+    /// Largest absolute error of any channel.
+    pub max_error: f64,
+}
+
+impl Metrics {
+    /// Names of the metrics in the order of [`Metrics::values`].
+    pub const NAMES: [&'static str; 8] =
+        ["mse", "rmse", "mae", "relmse", "relmse_trimmed", "mean_ratio", "psnr", "max_error"];
+
+    /// Every metric, in the order of [`Metrics::NAMES`].
+    pub fn values(&self) -> [f64; 8] {
+        [
+            self.mse,
+            self.rmse,
+            self.mae,
+            self.relmse,
+            self.relmse_trimmed,
+            self.mean_ratio,
+            self.psnr,
+            self.max_error,
+        ]
+    }
+
+    /// Metric by name.
+    pub fn get(&self, name: &str) -> Option<f64> {
+        Self::NAMES.iter().position(|&known| known == name).map(|index| self.values()[index])
+    }
+
+    /// Compares a picture with a reference taken as exact.
+    ///
+    /// # Errors
+    /// [`Error::Comparison`]: no pixels, different sizes, values that are not finite.
+    pub fn of(picture: &RgbImage, reference: &RgbImage) -> Result<Self> {
+        Self::of_halves(picture, reference, reference)
+    }
+
+    /// Compares a picture with a reference rendered in two independent halves.
+    ///
+    /// # Errors
+    /// As [`Metrics::of`].
+    pub fn of_halves(picture: &RgbImage, first: &RgbImage, second: &RgbImage) -> Result<Self> {
+        let squared = squared_errors(picture, first, second)?;
+        let reference = mean_picture(first, second);
+        let relative = relative_errors(&squared, &reference);
+        let pixel_count = squared.len() as f64;
+        let mse = squared.iter().sum::<f64>() / pixel_count;
+        let (mut absolute_sum, mut max_error) = (0.0_f64, 0.0_f64);
+        let (mut picture_sum, mut reference_sum, mut peak) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for (x, r) in picture.pixels.iter().zip(&reference.pixels) {
+            for channel in 0..3 {
+                let (x, r) = (f64::from(x[channel]), r[channel]);
+                absolute_sum += (x - r).abs();
+                max_error = max_error.max((x - r).abs());
+                picture_sum += x;
+                reference_sum += r;
+                peak = peak.max(r);
+            }
+        }
+        let mean_ratio =
+            if picture_sum == reference_sum { 1.0 } else { picture_sum / reference_sum };
+        Ok(Self {
+            mse,
+            rmse: mse.max(0.0).sqrt(),
+            mae: absolute_sum / (3.0 * pixel_count),
+            relmse: relative.iter().sum::<f64>() / pixel_count,
+            relmse_trimmed: trimmed_mean(relative),
+            mean_ratio,
+            psnr: if mse > 0.0 { 10.0 * (peak * peak / mse).log10() } else { f64::INFINITY },
+            max_error,
+        })
+    }
+}
+
+/// Reference with 64-bit channels, so that the mean of two halves is exact.
+struct Reference {
+    width: usize,
+    height: usize,
+    pixels: Vec<[f64; 3]>,
+}
+
+fn mean_picture(first: &RgbImage, second: &RgbImage) -> Reference {
+    let mean = |(a, b): (&[f32; 3], &[f32; 3])| {
+        std::array::from_fn(|channel| 0.5 * (f64::from(a[channel]) + f64::from(b[channel])))
+    };
+    Reference {
+        width: first.width as usize,
+        height: first.height as usize,
+        pixels: first.pixels.iter().zip(&second.pixels).map(mean).collect(),
+    }
+}
+
+/// `e(p)` of every pixel: the mean over RGB of `(x − r₁)(x − r₂)`. Pass one reference twice for the
+/// plain squared error.
+///
+/// # Errors
+/// [`Error::Comparison`]: no pixels, different sizes, values that are not finite.
+pub fn squared_errors(picture: &RgbImage, first: &RgbImage, second: &RgbImage) -> Result<Vec<f64>> {
+    check(picture, first, second)?;
+    let error = |((x, r1), r2): ((&[f32; 3], &[f32; 3]), &[f32; 3])| {
+        let product = |channel: usize| {
+            let x = f64::from(x[channel]);
+            (x - f64::from(r1[channel])) * (x - f64::from(r2[channel]))
+        };
+        (product(0) + product(1) + product(2)) / 3.0
+    };
+    Ok(picture.pixels.iter().zip(&first.pixels).zip(&second.pixels).map(error).collect())
+}
+
+/// `e / (L² + 0.01·L̄²)` of every pixel, from [`squared_errors`] against the same reference.
+///
+/// # Errors
+/// As [`squared_errors`].
+pub fn relative_squared_errors(
+    picture: &RgbImage,
+    first: &RgbImage,
+    second: &RgbImage,
+) -> Result<Vec<f64>> {
+    let squared = squared_errors(picture, first, second)?;
+    Ok(relative_errors(&squared, &mean_picture(first, second)))
+}
+
+/// A black reference makes the denominator 0: no error stays 0, any other becomes infinite.
+fn relative_errors(squared: &[f64], reference: &Reference) -> Vec<f64> {
+    let grey: Vec<f64> =
+        reference.pixels.iter().map(|pixel| pixel.iter().sum::<f64>() / 3.0).collect();
+    let image_mean = grey.iter().sum::<f64>() / grey.len() as f64;
+    let floor = RELATIVE_FLOOR * image_mean * image_mean;
+    let filtered = box_filter(&grey, reference.width, reference.height);
+    let relative = |(&error, local): (&f64, f64)| {
+        if error == 0.0 { 0.0 } else { error / (local * local + floor) }
+    };
+    squared.iter().zip(filtered).map(relative).collect()
+}
+
+/// Mean over the 5×5 pixels around each, of those inside the image.
+fn box_filter(values: &[f64], width: usize, height: usize) -> Vec<f64> {
+    let around =
+        |centre: usize, end: usize| centre.saturating_sub(RADIUS)..(centre + RADIUS + 1).min(end);
+    let mean_at = |index: usize| {
+        let rows = around(index / width, height);
+        let columns = around(index % width, width);
+        let count = (rows.len() * columns.len()) as f64;
+        let sum: f64 = rows.map(|y| values[y * width..][columns.clone()].iter().sum::<f64>()).sum();
+        sum / count
+    };
+    (0..values.len()).map(mean_at).collect()
+}
+
+/// Mean without the largest [`TRIMMED_ONE_IN`]-th of the values.
+fn trimmed_mean(mut values: Vec<f64>) -> f64 {
+    let kept = values.len() - values.len() / TRIMMED_ONE_IN;
+    if kept < values.len() {
+        values.select_nth_unstable_by(kept, f64::total_cmp);
+    }
+    values[..kept].iter().sum::<f64>() / kept as f64
+}
+
+fn check(picture: &RgbImage, first: &RgbImage, second: &RgbImage) -> Result<()> {
+    let comparison = |message: String| Err(Error::Comparison { message });
+    let size = |image: &RgbImage| format!("{}x{}", image.width, image.height);
+    if picture.pixels.is_empty() {
+        return comparison("the picture has no pixels".to_owned());
+    }
+    for reference in [first, second] {
+        if (picture.width, picture.height) != (reference.width, reference.height) {
+            return comparison(format!(
+                "the picture has {} pixels, the reference {}; render both at one size and crop",
+                size(picture),
+                size(reference)
+            ));
+        }
+    }
+    for (name, image) in [("picture", picture), ("reference", first), ("reference", second)] {
+        let is_bad = |pixel: &[f32; 3]| pixel.iter().any(|value| !value.is_finite());
+        if let Some(index) = image.pixels.iter().position(is_bad) {
+            let count = image.pixels.iter().filter(|pixel| is_bad(pixel)).count();
+            let width = image.width as usize;
+            return comparison(format!(
+                "{count} pixels of the {name} are not finite, the first at {},{}: {:?}",
+                index % width,
+                index / width,
+                image.pixels[index]
+            ));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;
