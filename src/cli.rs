@@ -18,6 +18,10 @@ pub struct Cli {
 /// The commands; each variant holds the arguments that `command/<name>.rs` declares.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Error metrics of an image against a reference, with thresholds for scripts.
+    Compare(command::compare::Arguments),
+    /// Combine renders of one scene made with different seeds or sample ranges.
+    Merge(command::merge::Arguments),
     /// List Vulkan devices with the limits that matter here, and which one would be chosen.
     Devices(command::devices::Arguments),
 }
@@ -37,6 +41,8 @@ pub fn run() -> ExitCode {
         .format_target(false)
         .init();
     let result = match &cli.command {
+        Command::Compare(arguments) => command::compare::run(arguments),
+        Command::Merge(arguments) => command::merge::run(arguments),
         Command::Devices(arguments) => command::devices::run(arguments),
     };
     match result {

@@ -124,11 +124,7 @@ fn check_same_picture(image: &Image, path: &Path, reference: &Image, other: &Pat
     Ok(())
 }
 
-fn print(
-    arguments: &Arguments,
-    picture: &crate::film::RgbImage,
-    metrics: &Metrics,
-) -> Result<()> {
+fn print(arguments: &Arguments, picture: &crate::film::RgbImage, metrics: &Metrics) -> Result<()> {
     if arguments.json {
         let mut result = serde_json::json!({
             "image": arguments.image.display().to_string(),

@@ -73,10 +73,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         for (path, image) in images {
             parts.push(load_part(path, image)?);
         }
-        let borrowed: Vec<Part<'_>> = parts
-            .iter()
-            .map(|(path, image, metadata)| Part { path, image, metadata })
-            .collect();
+        let borrowed: Vec<Part<'_>> =
+            parts.iter().map(|(path, image, metadata)| Part { path, image, metadata }).collect();
         let (image, metadata) = merge_images(&borrowed)?;
         warn_of_dropped_channels(&borrowed, &image);
         image.write_exr(&arguments.output)?;

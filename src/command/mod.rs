@@ -1,4 +1,25 @@
 //! One file per subcommand: orchestration only, no mathematics, no Vulkan.
 
+pub mod compare;
 pub mod devices;
+pub mod merge;
 pub mod progress;
+
+use std::io::Write;
+
+use crate::error::{Error, Result};
+
+/// Writes `text` and a line break to standard output. A reader that has gone away (`| head`) is no
+/// failure.
+///
+/// # Errors
+/// Standard output cannot be written.
+pub fn print_line(text: &str) -> Result<()> {
+    let mut output = std::io::stdout().lock();
+    match writeln!(output, "{text}").and_then(|()| output.flush()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::io("standard output".as_ref(), "write", error))
+        }
+        _ => Ok(()),
+    }
+}

@@ -5,11 +5,7 @@
 
 use std::{collections::BTreeSet, path::Path};
 
-use super::{
-    checkpoint::Checkpoint,
-    exr::Image,
-    metadata::Metadata,
-};
+use super::{checkpoint::Checkpoint, exr::Image, metadata::Metadata};
 use crate::error::{Error, Result};
 
 /// One image to merge.
@@ -78,9 +74,8 @@ pub fn merge_images(parts: &[Part<'_>]) -> Result<(Image, Metadata)> {
         attributes: first.image.attributes.clone(),
         ..*first.image
     };
-    let is_common = |name: &&String| {
-        others.iter().all(|part| part.image.channels.contains_key(name.as_str()))
-    };
+    let is_common =
+        |name: &&String| others.iter().all(|part| part.image.channels.contains_key(name.as_str()));
     for name in first.image.channels.keys().filter(is_common) {
         merged.channels.insert(name.clone(), merge_channel(name, parts));
     }
@@ -88,38 +83,67 @@ pub fn merge_images(parts: &[Part<'_>]) -> Result<(Image, Metadata)> {
     Ok((merged, metadata))
 }
 
+/// One channel of one part with the channel that weights or explains it.
+struct Samples<'a> {
+    /// Samples per pixel of the part.
+    count: f64,
+    own: &'a [f32],
+    /// The mean of a variance, the traced shadow rays of a visible share.
+    companion: &'a [f32],
+}
+
 /// Merges one channel that every part has.
 fn merge_channel(name: &str, parts: &[Part<'_>]) -> Vec<f32> {
-    let count = |part: &Part<'_>| part.metadata.sample_count() as f64;
-    let value = |part: &Part<'_>, channel: &str, pixel: usize| {
-        f64::from(part.image.channels[channel][pixel])
+    let wanted = match name {
+        "Visible.Y" => Some("ShadowRays.Y"),
+        _ => name.strip_prefix("Variance."),
     };
-    let has = |channel: &str| parts.iter().all(|part| part.image.channels.contains_key(channel));
-    let sum = |term: &dyn Fn(&Part<'_>) -> f64| parts.iter().map(term).sum::<f64>();
-    let total = sum(&count);
-    let colour = name.strip_prefix("Variance.").filter(|colour| has(colour));
-    let at = |pixel: usize| match (name, colour) {
-        ("SampleCount.Y" | "ShadowRays.Y", _) => sum(&|part| value(part, name, pixel)),
-        ("Visible.Y", _) if has("ShadowRays.Y") => {
-            let traced = |part: &Part<'_>| value(part, "ShadowRays.Y", pixel);
-            let visible = sum(&|part| traced(part) * value(part, name, pixel));
-            visible / sum(&traced).max(1.0)
+    let has = |name: &&str| parts.iter().all(|part| part.image.channels.contains_key(*name));
+    let companion = wanted.filter(has);
+    let samples: Vec<Samples<'_>> = parts
+        .iter()
+        .map(|part| Samples {
+            count: part.metadata.sample_count() as f64,
+            own: &part.image.channels[name],
+            companion: companion.map_or(&[], |name| &part.image.channels[name]),
+        })
+        .collect();
+    let total: f64 = samples.iter().map(|part| part.count).sum();
+    let merge_pixel: &dyn Fn(usize) -> f64 = match (name, companion) {
+        ("SampleCount.Y" | "ShadowRays.Y", _) => {
+            &|pixel| samples.iter().map(|part| f64::from(part.own[pixel])).sum()
         }
-        (_, Some(colour)) => {
-            // Undo the mean and its variance into Σx and Σx², add, and estimate again:
-            // `Sums::variance_of_mean`.
-            let mean = |part: &Part<'_>| value(part, colour, pixel);
-            let squares = sum(&|part| {
-                let n = count(part);
-                n * (n - 1.0) * value(part, name, pixel) + n * mean(part) * mean(part)
-            });
-            let radiance = sum(&|part| count(part) * mean(part));
-            let deviation = (squares - radiance * radiance / total).max(0.0);
-            if total < 2.0 { 0.0 } else { deviation / (total * (total - 1.0)) }
-        }
-        _ => sum(&|part| count(part) * value(part, name, pixel)) / total,
+        ("Visible.Y", Some(_)) => &|pixel| pooled_share(&samples, pixel),
+        (_, Some(_)) => &|pixel| pooled_variance(&samples, total, pixel),
+        (_, None) => &|pixel| {
+            let weighted = |part: &Samples<'_>| part.count * f64::from(part.own[pixel]);
+            samples.iter().map(weighted).sum::<f64>() / total
+        },
     };
-    (0..parts[0].image.pixel_count()).map(|pixel| at(pixel) as f32).collect()
+    (0..parts[0].image.pixel_count()).map(|pixel| merge_pixel(pixel) as f32).collect()
+}
+
+/// Share of all rays from the shares of the parts, weighted with their rays.
+fn pooled_share(samples: &[Samples<'_>], pixel: usize) -> f64 {
+    let traced = |part: &Samples<'_>| f64::from(part.companion[pixel]);
+    let visible: f64 = samples.iter().map(|part| traced(part) * f64::from(part.own[pixel])).sum();
+    visible / samples.iter().map(traced).sum::<f64>().max(1.0)
+}
+
+/// Variance of the mean of all samples: turns each part's mean and its variance back into Σx and
+/// Σx², adds those, and estimates as [`Sums::variance_of_mean`](super::Sums::variance_of_mean).
+fn pooled_variance(samples: &[Samples<'_>], total: f64, pixel: usize) -> f64 {
+    if total < 2.0 {
+        return 0.0;
+    }
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for part in samples {
+        let n = part.count;
+        let (mean, variance) = (f64::from(part.companion[pixel]), f64::from(part.own[pixel]));
+        sum += n * mean;
+        squares += n * (n - 1.0) * variance + n * mean * mean;
+    }
+    (squares - sum * sum / total).max(0.0) / (total * (total - 1.0))
 }
 
 /// Origin, width, height and film size of a part.
@@ -134,21 +158,11 @@ fn check_window(first_path: &Path, first: Window, path: &Path, part: Window) -> 
     };
     Err(Error::format(
         path,
-        format!(
-            "shows {}, but {} shows {}",
-            describe(part),
-            first_path.display(),
-            describe(first)
-        ),
+        format!("shows {}, but {} shows {}", describe(part), first_path.display(), describe(first)),
     ))
 }
 
-fn check_metadata(
-    first_path: &Path,
-    first: &Metadata,
-    path: &Path,
-    part: &Metadata,
-) -> Result<()> {
+fn check_metadata(first_path: &Path, first: &Metadata, path: &Path, part: &Metadata) -> Result<()> {
     let differences = part.differences(first);
     if differences.is_empty() {
         return Ok(());
@@ -159,12 +173,7 @@ fn check_metadata(
     ))
 }
 
-fn check_overlap(
-    first_path: &Path,
-    first: &Metadata,
-    path: &Path,
-    part: &Metadata,
-) -> Result<()> {
+fn check_overlap(first_path: &Path, first: &Metadata, path: &Path, part: &Metadata) -> Result<()> {
     for range in &part.sample_ranges {
         if let Some(other) = first.sample_ranges.iter().find(|other| other.overlaps(range)) {
             return Err(Error::format(
