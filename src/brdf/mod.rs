@@ -1,3 +1,82 @@
-//! Reflection models: measured data → evaluable BRDF, and the analytic materials.
+//! Reflection models: materials of the scene → [`MaterialTables`] for the device, and the twin of
+//! `glsl/include/brdf.glsl` that reads them: evaluate, pdf, sample and directional albedo.
+//!
+//! Directions are unit vectors in the shading frame (z is the normal) and point away from the
+//! surface. Values are per steradian and hold no cosine; pdfs are per steradian of incident
+//! directions. Both are 0 unless both directions are above the surface.
+//!
+//! | kind | value | samples |
+//! |---|---|---|
+//! | diffuse | reflectance / π | cosine |
+//! | plastic | GGX coat, exact dielectric Fresnel, over ρ/π·T(θ_o)·T(θ_i), T² = (1−E)²/(1−Ē) | visible normals or cosine, by albedo |
+//! | conductor | GGX, exact conductor Fresnel or Schlick's | visible normals |
+//! | measured | trilinear on the half/difference grid | tabulated half vectors or cosine |
+//!
+//! E(θ) is the directional albedo of the coat and Ē its cosine-weighted mean, so that coat and
+//! base together reflect exactly E + ρ(1 − E): reciprocal, and a white base loses nothing
+//! [KelemenSzirmayKalos01].
+//!
+//! References: [Walter07] Microfacet models for refraction. [Heitz14] Understanding the
+//! masking-shadowing function, JCGT 3(2). [DupuyBenyoub23] Sampling visible GGX normals with
+//! spherical caps. [EtoTokuyoshi23] Bounded VNDF sampling for Smith-GGX reflections.
+//! [KelemenSzirmayKalos01] A microfacet based coupled specular-matte BRDF model. [Rusinkiewicz98]
+//! A new change of variables for efficient BRDF representation. [Schlick94] An inexpensive BRDF
+//! model for physically based rendering.
 
+pub mod cornell;
+pub mod materials;
+pub mod merl;
+pub mod spectrum;
 pub mod table;
+pub mod twin;
+
+use glam::Vec3;
+
+pub use materials::MaterialTables;
+pub use table::MeasuredTable;
+
+/// Value of a material (1/sr, without the cosine) and density of [`sample`].
+pub fn evaluate_and_pdf(
+    tables: &MaterialTables,
+    material_index: usize,
+    outgoing_local: Vec3,
+    incident_local: Vec3,
+) -> (Vec3, f32) {
+    let material = &tables.materials[material_index];
+    twin::brdf_evaluate_and_pdf(&tables.words, material, outgoing_local, incident_local)
+}
+
+/// Value of a material, 1/sr, without the cosine.
+pub fn evaluate(
+    tables: &MaterialTables,
+    material_index: usize,
+    outgoing_local: Vec3,
+    incident_local: Vec3,
+) -> Vec3 {
+    evaluate_and_pdf(tables, material_index, outgoing_local, incident_local).0
+}
+
+/// Density of [`sample`] per steradian; integrates to 1 less the share of samples below the surface.
+pub fn pdf(
+    tables: &MaterialTables,
+    material_index: usize,
+    outgoing_local: Vec3,
+    incident_local: Vec3,
+) -> f32 {
+    evaluate_and_pdf(tables, material_index, outgoing_local, incident_local).1
+}
+
+/// Incident direction from three numbers in [0, 1); z ≤ 0 means no sample.
+pub fn sample(
+    tables: &MaterialTables,
+    material_index: usize,
+    outgoing_local: Vec3,
+    u: Vec3,
+) -> Vec3 {
+    twin::brdf_sample(&tables.words, &tables.materials[material_index], outgoing_local, u)
+}
+
+/// Share of light from a uniform white hemisphere that is reflected toward the outgoing direction.
+pub fn albedo(tables: &MaterialTables, material_index: usize, outgoing_local: Vec3) -> Vec3 {
+    twin::brdf_albedo(&tables.words, &tables.materials[material_index], outgoing_local)
+}

@@ -102,6 +102,41 @@ pub const MATERIAL_CONDUCTOR: u32 = 2;
 /// Tabulated measurement.
 pub const MATERIAL_MEASURED: u32 = 3;
 
+/// Intervals of the tables over the cosine 0…1 of a direction with the normal; one more node.
+pub const BRDF_COSINE_INTERVALS: u32 = 64;
+/// Nodes of such a table.
+pub const BRDF_COSINE_NODES: u32 = BRDF_COSINE_INTERVALS + 1;
+/// First word of a plastic's transmission table, from its `table_offset`; the albedo is at 0.
+pub const PLASTIC_TRANSMISSION_OFFSET: u32 = 3 * BRDF_COSINE_NODES;
+/// First word of a plastic's probability of sampling the coat.
+pub const PLASTIC_SPECULAR_SHARE_OFFSET: u32 = PLASTIC_TRANSMISSION_OFFSET + BRDF_COSINE_NODES;
+
+/// Bins of the measured grid in θ_h; the edge of bin k is at (k/90)²·90°.
+pub const MEASURED_THETA_HALF_BINS: u32 = 90;
+/// Bins of the measured grid in θ_d, of equal width.
+pub const MEASURED_THETA_DIFFERENCE_BINS: u32 = 90;
+/// Bins of the measured grid in φ_d, of equal width over 0…π.
+pub const MEASURED_PHI_DIFFERENCE_BINS: u32 = 180;
+/// Bins of the outgoing polar angle in a measured material's sampling table, of equal width.
+pub const MEASURED_ELEVATION_BINS: u32 = 32;
+/// Bins of θ_h in a measured material's sampling table; the edge of bin k is at (k/32)²·90°.
+pub const MEASURED_POLAR_BINS: u32 = 32;
+/// Bins of |φ_h − φ_o| in a measured material's sampling table, of equal width over 0…π.
+pub const MEASURED_AZIMUTH_BINS: u32 = 16;
+/// Cells of the sampling table for one outgoing elevation; a power of two.
+pub const MEASURED_SAMPLING_CELLS: u32 = MEASURED_POLAR_BINS * MEASURED_AZIMUTH_BINS;
+/// First word of the probability of the cosine lobe by elevation, from `table_offset`; the albedo
+/// is at 0.
+pub const MEASURED_COSINE_SHARE_OFFSET: u32 = 3 * BRDF_COSINE_NODES;
+/// First word of the cumulative probabilities of the sampling cells by elevation.
+pub const MEASURED_CUMULATIVE_OFFSET: u32 = MEASURED_COSINE_SHARE_OFFSET + MEASURED_ELEVATION_BINS;
+/// First word of the densities of the sampling cells by elevation, per steradian of half vectors.
+pub const MEASURED_DENSITY_OFFSET: u32 =
+    MEASURED_CUMULATIVE_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
+/// First word of the grid cells, two words each: halves red and green, half blue.
+pub const MEASURED_GRID_OFFSET: u32 =
+    MEASURED_DENSITY_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
+
 /// Names and values that become GLSL macros.
 pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("WORKGROUP_SIZE", WORKGROUP_SIZE),
@@ -150,4 +185,19 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("MATERIAL_PLASTIC", MATERIAL_PLASTIC),
     ("MATERIAL_CONDUCTOR", MATERIAL_CONDUCTOR),
     ("MATERIAL_MEASURED", MATERIAL_MEASURED),
+    ("BRDF_COSINE_INTERVALS", BRDF_COSINE_INTERVALS),
+    ("BRDF_COSINE_NODES", BRDF_COSINE_NODES),
+    ("PLASTIC_TRANSMISSION_OFFSET", PLASTIC_TRANSMISSION_OFFSET),
+    ("PLASTIC_SPECULAR_SHARE_OFFSET", PLASTIC_SPECULAR_SHARE_OFFSET),
+    ("MEASURED_THETA_HALF_BINS", MEASURED_THETA_HALF_BINS),
+    ("MEASURED_THETA_DIFFERENCE_BINS", MEASURED_THETA_DIFFERENCE_BINS),
+    ("MEASURED_PHI_DIFFERENCE_BINS", MEASURED_PHI_DIFFERENCE_BINS),
+    ("MEASURED_ELEVATION_BINS", MEASURED_ELEVATION_BINS),
+    ("MEASURED_POLAR_BINS", MEASURED_POLAR_BINS),
+    ("MEASURED_AZIMUTH_BINS", MEASURED_AZIMUTH_BINS),
+    ("MEASURED_SAMPLING_CELLS", MEASURED_SAMPLING_CELLS),
+    ("MEASURED_COSINE_SHARE_OFFSET", MEASURED_COSINE_SHARE_OFFSET),
+    ("MEASURED_CUMULATIVE_OFFSET", MEASURED_CUMULATIVE_OFFSET),
+    ("MEASURED_DENSITY_OFFSET", MEASURED_DENSITY_OFFSET),
+    ("MEASURED_GRID_OFFSET", MEASURED_GRID_OFFSET),
 ];
