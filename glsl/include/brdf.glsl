@@ -10,7 +10,7 @@
 #ifndef BRDF_GLSL
 #define BRDF_GLSL
 
-const float BRDF_PI = 3.14159265358979;
+#include "frame.glsl"
 
 // Word of the BRDF table as a float.
 float table_value(uint index) {
@@ -28,7 +28,7 @@ float cosine_table(uint offset, uint stride, float cosine) {
 // Direction with density cosθ/π.
 vec3 sample_cosine_hemisphere(vec2 u) {
     float radius = sqrt(u.x);
-    float azimuth = 2.0 * BRDF_PI * u.y;
+    float azimuth = 2.0 * PI * u.y;
     return vec3(radius * cos(azimuth), radius * sin(azimuth), sqrt(max(0.0, 1.0 - u.x)));
 }
 
@@ -71,7 +71,7 @@ float ggx_normal_density(vec3 half_vector, float alpha) {
     float tangential = dot(half_vector.xy, half_vector.xy);
     float normal = half_vector.z * half_vector.z;
     float ratio = (tangential + normal) / (tangential + alpha * alpha * normal);
-    return alpha * alpha * ratio * ratio / BRDF_PI;
+    return alpha * alpha * ratio * ratio / PI;
 }
 
 // Length of the direction after the surface is stretched to α = 1: √(cos²θ + α² sin²θ).
@@ -113,7 +113,7 @@ vec3 ggx_sample(vec3 outgoing_local, float alpha, vec2 u) {
     // 1 − z and not z: the root below then holds near the pole.
     float below_pole = u.x * (1.0 + cap);
     float sine = sqrt(max(0.0, below_pole * (2.0 - below_pole)));
-    float azimuth = 2.0 * BRDF_PI * u.y;
+    float azimuth = 2.0 * PI * u.y;
     vec3 normal = stretched + vec3(sine * cos(azimuth), sine * sin(azimuth), 1.0 - below_pole);
     normal = normalize(vec3(alpha * normal.xy, max(1e-7, normal.z)));
     return 2.0 * dot(outgoing_local, normal) * normal - outgoing_local;
@@ -149,12 +149,12 @@ vec3 measured_cell(uint grid, uint row, uint phi_index) {
 // Measured BRDF, trilinear between the centres of the grid's bins; periodic in φ_d.
 vec3 measured_value(uint table_offset, vec3 angles) {
     float theta_half = clamp(
-        float(MEASURED_THETA_HALF_BINS) * sqrt(angles.x * (2.0 / BRDF_PI)) - 0.5,
+        float(MEASURED_THETA_HALF_BINS) * sqrt(angles.x * (2.0 / PI)) - 0.5,
         0.0, float(MEASURED_THETA_HALF_BINS - 1u));
     float theta_difference = clamp(
-        float(MEASURED_THETA_DIFFERENCE_BINS) * angles.y * (2.0 / BRDF_PI) - 0.5,
+        float(MEASURED_THETA_DIFFERENCE_BINS) * angles.y * (2.0 / PI) - 0.5,
         0.0, float(MEASURED_THETA_DIFFERENCE_BINS - 1u));
-    float phi = float(MEASURED_PHI_DIFFERENCE_BINS) * angles.z / BRDF_PI - 0.5;
+    float phi = float(MEASURED_PHI_DIFFERENCE_BINS) * angles.z / PI - 0.5;
     if (phi < 0.0) {
         phi += float(MEASURED_PHI_DIFFERENCE_BINS);
     }
@@ -187,7 +187,7 @@ vec3 measured_value(uint table_offset, vec3 angles) {
 // Bin of the outgoing polar angle in the sampling table.
 uint measured_elevation_bin(vec3 outgoing_local) {
     float theta = atan(length(outgoing_local.xy), outgoing_local.z);
-    return min(uint(theta * (2.0 / BRDF_PI) * float(MEASURED_ELEVATION_BINS)),
+    return min(uint(theta * (2.0 / PI) * float(MEASURED_ELEVATION_BINS)),
         MEASURED_ELEVATION_BINS - 1u);
 }
 
@@ -203,18 +203,18 @@ float measured_pdf(uint table_offset, vec3 outgoing_local, vec3 incident_local, 
     uint elevation = measured_elevation_bin(outgoing_local);
     float cosine_share = table_value(table_offset + MEASURED_COSINE_SHARE_OFFSET + elevation);
     uint polar = min(
-        uint(float(MEASURED_POLAR_BINS) * sqrt(theta_half * (2.0 / BRDF_PI))),
+        uint(float(MEASURED_POLAR_BINS) * sqrt(theta_half * (2.0 / PI))),
         MEASURED_POLAR_BINS - 1u);
     vec2 axis = measured_azimuth_axis(outgoing_local);
     float y = abs(axis.x * half_vector.y - axis.y * half_vector.x);
     float x = dot(axis, half_vector.xy);
     float phi = (x == 0.0 && y == 0.0) ? 0.0 : atan(y, x);
     uint azimuth = min(
-        uint(float(MEASURED_AZIMUTH_BINS) * phi / BRDF_PI), MEASURED_AZIMUTH_BINS - 1u);
+        uint(float(MEASURED_AZIMUTH_BINS) * phi / PI), MEASURED_AZIMUTH_BINS - 1u);
     float density = table_value(table_offset + MEASURED_DENSITY_OFFSET
         + elevation * MEASURED_SAMPLING_CELLS + polar * MEASURED_AZIMUTH_BINS + azimuth);
     // dω_h/dω_i = 1/(4 ω_o·h), and ω_o·h is half the length of the half vector.
-    return cosine_share * incident_local.z / BRDF_PI
+    return cosine_share * incident_local.z / PI
         + (1.0 - cosine_share) * density / (2.0 * length(half_vector));
 }
 
@@ -240,11 +240,11 @@ vec3 measured_sample(uint table_offset, vec3 outgoing_local, vec3 u) {
     // 1 − cosθ_h is uniform within the cell; the cell's edges as 2 sin²(θ/2).
     float edge_0 = float(polar) / float(MEASURED_POLAR_BINS);
     float edge_1 = float(polar + 1u) / float(MEASURED_POLAR_BINS);
-    float sine_0 = sin(0.25 * BRDF_PI * edge_0 * edge_0);
-    float sine_1 = sin(0.25 * BRDF_PI * edge_1 * edge_1);
+    float sine_0 = sin(0.25 * PI * edge_0 * edge_0);
+    float sine_1 = sin(0.25 * PI * edge_1 * edge_1);
     float below_pole = 2.0 * mix(sine_0 * sine_0, sine_1 * sine_1, u.z);
     float sine = sqrt(max(0.0, below_pole * (2.0 - below_pole)));
-    float phi = BRDF_PI * (float(cell % MEASURED_AZIMUTH_BINS) + fraction)
+    float phi = PI * (float(cell % MEASURED_AZIMUTH_BINS) + fraction)
         / float(MEASURED_AZIMUTH_BINS);
     // The table holds |φ_h|; either sign is as likely.
     if (u.x - cosine_share < 0.5 * (1.0 - cosine_share)) {
@@ -264,9 +264,9 @@ void brdf_evaluate_and_pdf(
     if (outgoing_local.z <= 0.0 || incident_local.z <= 0.0) {
         return;
     }
-    float cosine_pdf = incident_local.z / BRDF_PI;
+    float cosine_pdf = incident_local.z / PI;
     if (material.kind == MATERIAL_DIFFUSE) {
-        value = material.reflectance / BRDF_PI;
+        value = material.reflectance / PI;
         pdf = cosine_pdf;
         return;
     }
@@ -285,7 +285,7 @@ void brdf_evaluate_and_pdf(
         float specular_share = cosine_table(
             material.table_offset + PLASTIC_SPECULAR_SHARE_OFFSET, 1u, outgoing_local.z);
         float base = cosine_table(transmission, 1u, outgoing_local.z)
-            * cosine_table(transmission, 1u, incident_local.z) / BRDF_PI;
+            * cosine_table(transmission, 1u, incident_local.z) / PI;
         value = vec3(reflection * fresnel_dielectric(cosine_difference, material.ior))
             + base * material.reflectance;
         pdf = mix(cosine_pdf, pdf, specular_share);

@@ -218,8 +218,11 @@ impl SampleSet {
                 }
             }
             if found >= FEWEST_SAMPLES || squared_radius > LARGEST_SQUARED_RADIUS {
-                // A weight that underflows leaves no sample: NaN, an invalid cell.
-                return (sum / weight_sum).max(Vec3::ZERO * weight_sum.recip().recip());
+                return if weight_sum > 0.0 {
+                    (sum / weight_sum).max(Vec3::ZERO)
+                } else {
+                    Vec3::NAN
+                };
             }
             squared_radius *= 2.0;
         }
