@@ -2,8 +2,12 @@
 
 #[path = "support/statistics.rs"]
 mod statistics;
+mod support;
 
-use fenestra::random::{random_1d, random_2d, random_independent_1d, random_independent_2d};
+use fenestra::{
+    gpu::constants::SET_FILM,
+    random::{random_1d, random_2d, random_independent_1d, random_independent_2d},
+};
 use statistics::{chi_square_p_value, z_p_value};
 
 /// Every test here that can fail by chance fails for less than one seed in a million.
@@ -174,4 +178,42 @@ fn the_mean_over_scrambles_is_unbiased_and_converges_faster_than_independent_num
     // Independent: π/4 (1 − π/4) / 64 = 0.00263. A net is about ten times better here.
     assert!((variance(&independent) / 0.002_633 - 1.0).abs() < 0.15);
     assert!(variance(&stratified) < variance(&independent) / 5.0);
+}
+
+const RANDOM_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/random.spv"));
+
+#[test]
+fn the_shader_draws_the_same_numbers_bit_for_bit() {
+    let mut keys: Vec<[u32; 4]> = Vec::new();
+    for i in 0..20_000_u32 {
+        keys.push(fenestra::random::hash_4d([i, 1, 2, 3]));
+        keys.push([i % 640, i, i % 37, 1]);
+    }
+    keys.push([u32::MAX; 4]);
+    keys.push([0; 4]);
+    let words = 6;
+    let output = support::run_probe(
+        RANDOM_PROBE,
+        &[(SET_FILM, 0, bytemuck::cast_slice(&keys))],
+        keys.len() * words * 4,
+        keys.len() as u32,
+    );
+    let output: &[[f32; 6]] = bytemuck::cast_slice(&output);
+    for (&[pixel, sample, dimension, seed], shader) in keys.iter().zip(output) {
+        let stratified = random_2d(pixel, sample, dimension, seed);
+        let independent = random_independent_2d(pixel, sample, dimension, seed);
+        let host = [
+            stratified[0],
+            stratified[1],
+            random_1d(pixel, sample, dimension, seed),
+            independent[0],
+            independent[1],
+            random_independent_1d(pixel, sample, dimension, seed),
+        ];
+        assert_eq!(
+            host.map(f32::to_bits),
+            shader.map(f32::to_bits),
+            "pixel {pixel}, sample {sample}, dimension {dimension}, seed {seed}"
+        );
+    }
 }
