@@ -62,16 +62,21 @@ fn host_structs() -> Vec<HostStruct> {
             crop_y, crop_width, crop_height, film_filter, environment_width, environment_height,
             environment_cos_rotation, environment_sin_rotation, environment_total,
         }
-        Ray { origin, active, direction, reserved }
+        Ray { origin, is_active, direction, reserved }
         Hit {
             position, material, geometric_normal, distance, shading_normal, triangle,
         }
         ShadowRay { direction, contribution }
-        PathState { throughput, radiance }
+        PathState {
+            throughput, radiance, shadow_rays_traced, shadow_rays_visible, rays_traced,
+        }
+        Counters {
+            camera_rays, bounce_rays, shadow_rays_traced, shadow_rays_visible, dropped_samples,
+        }
         Material { kind, table_offset, alpha, ior, reflectance, eta, k }
         Wave {
             first_pixel, pixel_count, first_sample, sample_count, seed, vertex, shadow_ray_count,
-            aovs,
+            first_shadow_ray, total_shadow_rays, aovs,
         }
     }
 }
@@ -400,7 +405,7 @@ fn missing_and_retyped_members_are_found() {
     );
     let mut retyped = ray.members.clone();
     retyped[1].kind = "f32".into();
-    assert_eq!(member_drifts(ray, &retyped), ["Ray.active: host u32, shader f32"]);
+    assert_eq!(member_drifts(ray, &retyped), ["Ray.is_active: host u32, shader f32"]);
 }
 
 /// Blocks declared in `layout.glsl`: name → (set, binding).
