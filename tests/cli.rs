@@ -1,0 +1,194 @@
+//! The command line: help, exit statuses, and the messages of the commands that need no scene.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+#[path = "support/command.rs"]
+mod command;
+
+use std::process::Stdio;
+
+use command::{Folder, Run, program};
+use fenestra::film::Image;
+
+/// An image of one colour.
+fn image(width: u32, height: u32, value: f32) -> Image {
+    let mut image = Image::new(width, height);
+    image.insert_triple(["R", "G", "B"], &vec![[value; 3]; (width * height) as usize]);
+    image
+}
+
+/// A folder with the images `a.exr` and `b.exr` of values 1 and 1.1, and `wide.exr` of another size.
+fn images() -> Folder {
+    let folder = Folder::new();
+    image(8, 8, 1.0).write_exr(&folder.path().join("a.exr")).unwrap();
+    image(8, 8, 1.1).write_exr(&folder.path().join("b.exr")).unwrap();
+    image(16, 8, 1.0).write_exr(&folder.path().join("wide.exr")).unwrap();
+    folder
+}
+
+/// The commands that `--help` lists.
+fn commands(folder: &Folder) -> Vec<String> {
+    let help = folder.run(&["--help"]).output;
+    let (_, list) = help.split_once("Commands:\n").expect("help lists the commands");
+    list.lines()
+        .take_while(|line| !line.is_empty())
+        // Continuation lines of a description are indented further.
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn every_command_has_help() {
+    let folder = Folder::new();
+    let commands = commands(&folder);
+    for expected in ["compare", "merge", "devices"] {
+        assert!(commands.iter().any(|command| command == expected), "{expected}: {commands:?}");
+    }
+    for name in commands.iter().filter(|name| *name != "help") {
+        let help = folder.run(&[name, "--help"]);
+        assert_eq!(help.status, Some(0), "{name} --help: {}", help.messages);
+        assert!(help.output.contains(&format!("Usage: fenestra {name}")), "{}", help.output);
+    }
+    assert_eq!(folder.files(), [""; 0], "help writes nothing");
+}
+
+#[test]
+fn version_is_that_of_the_package() {
+    let version = Folder::new().run(&["--version"]);
+    assert_eq!(version.status, Some(0));
+    assert_eq!(version.output.trim(), concat!("fenestra ", env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn wrong_usage_exits_with_2() {
+    let folder = images();
+    let cases: &[(&[&str], &str)] = &[
+        (&[], "Usage: fenestra"),
+        (&["paint"], "unrecognized subcommand 'paint'"),
+        (&["compare"], "required arguments were not provided"),
+        (&["compare", "a.exr", "b.exr", "--colour"], "unexpected argument '--colour'"),
+        (&["compare", "a.exr", "b.exr", "--fail-above", "relmse"], "expected METRIC=VALUE"),
+        (&["compare", "a.exr", "b.exr", "--fail-above", "beauty=1"], "known metrics: "),
+        (&["compare", "a.exr", "b.exr", "--fail-above", "mse=low"], "expected a finite number"),
+        (
+            &["compare", "a.exr", "b.exr", "--heatmap", "h.png", "--heatmap-high", "0"],
+            "--heatmap-high 0: expected a positive number",
+        ),
+        (&["merge", "a.exr"], "--output <OUT.exr>"),
+    ];
+    for (arguments, message) in cases {
+        folder.run(arguments).assert(2, &[message]);
+    }
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let folder = images();
+    for arguments in
+        [["compare", "a.exr", "absent.exr"], ["merge", "absent.exr", "--output=out.exr"]]
+    {
+        let parts = ["error: absent.exr: cannot read: No such file"];
+        folder.run(&arguments).assert(1, &parts);
+    }
+    assert_eq!(folder.files(), ["a.exr", "b.exr", "wide.exr"], "nothing is written");
+}
+
+#[test]
+fn a_truncated_or_foreign_image_is_named() {
+    let folder = images();
+    let bytes = std::fs::read(folder.path().join("a.exr")).unwrap();
+    for length in [0, 3, bytes.len() / 2, bytes.len() - 1] {
+        folder.write("short.exr", &bytes[..length]);
+        let run = folder.run(&["compare", "short.exr", "b.exr"]);
+        run.assert(1, &["error: short.exr: not a complete OpenEXR file"]);
+    }
+    folder.write("text.exr", "not an image, but long enough to hold the start of one");
+    folder.run(&["compare", "a.exr", "text.exr"]).assert(1, &["text.exr: not a complete OpenEXR"]);
+    folder.run(&["merge", "text.exr", "-o", "out.exr"]).assert(1, &["text.exr: not a complete"]);
+}
+
+#[test]
+fn images_of_different_size_are_not_compared() {
+    let parts = ["8x8 pixels at 0,0", "16x8 pixels at 0,0", "render both with one --size"];
+    images().run(&["compare", "a.exr", "wide.exr"]).assert(1, &parts);
+}
+
+#[test]
+fn comparison_prints_the_metrics_and_fails_over_a_threshold() {
+    let folder = images();
+    let run = folder.run(&["compare", "b.exr", "a.exr", "--json", "--fail-above", "mse=0.02"]);
+    run.assert(0, &[]);
+    let metrics: serde_json::Value = serde_json::from_str(&run.output).expect("JSON");
+    let mse = metrics["mse"].as_f64().expect("mse is a number");
+    assert!((mse - 0.01).abs() < 1e-6, "the squared error of 1.1 against 1 is 0.01, found {mse}");
+    let run = folder.run(&["compare", "b.exr", "a.exr", "--fail-above", "mse=0.009"]);
+    run.assert(3, &["error: mse is ", "above the threshold 0.009"]);
+}
+
+#[test]
+fn a_heatmap_is_written_into_a_new_folder() {
+    let folder = images();
+    folder.run(&["compare", "b.exr", "a.exr", "--heatmap", "new/folder/heat.png"]).assert(0, &[]);
+    let png = std::fs::read(folder.path().join("new/folder/heat.png")).unwrap();
+    assert_eq!(&png[..4], b"\x89PNG");
+}
+
+#[test]
+fn a_full_disk_is_reported() {
+    // Every write to this device fails for want of space.
+    let run = images().run(&["compare", "b.exr", "a.exr", "--heatmap", "/dev/full"]);
+    run.assert(1, &["error: /dev/full: cannot write: No space left on device"]);
+}
+
+#[test]
+fn a_closed_output_is_no_failure() {
+    let folder = images();
+    let mut child = program(folder.path())
+        .args(["compare", "b.exr", "a.exr"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    Run::of(&child.wait_with_output().unwrap()).assert(0, &[]);
+}
+
+#[test]
+fn devices_lists_the_choice() {
+    let folder = Folder::new();
+    let run = folder.run(&["devices"]);
+    run.assert(0, &[]);
+    assert!(run.output.contains("<- chosen"), "{}", run.output);
+    let run = folder.run(&["devices", "--json"]);
+    let devices: serde_json::Value = serde_json::from_str(&run.output).expect("JSON");
+    let chosen = devices.as_array().unwrap().iter().filter(|device| device["chosen"] == true);
+    assert_eq!(chosen.count(), 1);
+    let parts = ["no Vulkan device matches --device no such device", "help: ", "fenestra devices"];
+    folder.run(&["devices", "--device", "no such device"]).assert(1, &parts);
+}
+
+#[test]
+fn no_driver_is_explained() {
+    let folder = Folder::new();
+    for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
+        let mut command = program(folder.path());
+        command.arg("devices").env_remove("VK_DRIVER_FILES").env_remove("VK_ICD_FILENAMES");
+        command.env(variable, "/nonexistent");
+        let run = Run::of(&command.output().unwrap());
+        run.assert(1, &["finds no driver", "help: ", "./setup", variable]);
+    }
+}
+
+#[test]
+fn a_missing_loader_is_explained() {
+    let folder = Folder::new();
+    // The search ends at the first file of that name, and this one is no library.
+    folder.write("libvulkan.so.1", "");
+    folder.write("libvulkan.so", "");
+    let mut command = program(folder.path());
+    command.arg("devices").env("LD_LIBRARY_PATH", folder.path());
+    let run = Run::of(&command.output().unwrap());
+    run.assert(1, &["no Vulkan loader (libvulkan.so.1)", "help: ", "./setup"]);
+}
