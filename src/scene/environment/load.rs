@@ -2,7 +2,10 @@
 
 use std::{fs, io::Cursor, path::Path};
 
-use exr::prelude::{ReadChannels, ReadLayers};
+use exr::{
+    math::Vec2,
+    prelude::{ReadChannels, ReadLayers, ReadSpecificChannel},
+};
 use glam::Vec3;
 use image::{ImageDecoder, codecs::hdr::HdrDecoder};
 use rayon::prelude::*;
@@ -131,54 +134,74 @@ fn read_hdr(bytes: &[u8]) -> Result<Image, String> {
     Ok(Image { width, height, texels: bytemuck::cast_vec(components) })
 }
 
+/// The first layer with the channels R, G, B, else the first with Y.
 fn read_exr(bytes: &[u8]) -> Result<Image, String> {
     let message = |error: exr::error::Error| format!("not a readable OpenEXR file: {error}");
     let meta =
         exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(message)?;
+    let has = |name: &str| {
+        let flat = meta.headers.iter().filter(|header| !header.deep);
+        flat.flat_map(|header| &header.channels.list).any(|channel| channel.name.eq(name))
+    };
+    let names = if has("R") && has("G") && has("B") {
+        ["R", "G", "B"]
+    } else if has("Y") {
+        ["Y"; 3]
+    } else {
+        let channels = meta.headers.iter().flat_map(|header| &header.channels.list);
+        let found: Vec<String> = channels.map(|channel| channel.name.to_string()).collect();
+        return Err(format!("expected the channels R, G, B or Y, found {}", found.join(", ")));
+    };
     for header in &meta.headers {
         check_size(header.layer_size.width() as u64, header.layer_size.height() as u64)?;
-    }
-    let image = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .all_layers()
-        .all_attributes()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(message)?;
-    let mut found = Vec::new();
-    for layer in &image.layer_data {
-        let channels = &layer.channel_data.list;
-        let channel = |name: &str| channels.iter().find(|channel| channel.name.eq(name));
-        let rgb = match (channel("R"), channel("G"), channel("B"), channel("Y")) {
-            (Some(red), Some(green), Some(blue), _) => [red, green, blue],
-            (None, None, None, Some(grey)) => [grey; 3],
-            _ => {
-                found.extend(channels.iter().map(|channel| channel.name.to_string()));
-                continue;
+        for channel in &header.channels.list {
+            if names.iter().any(|name| channel.name.eq(name)) && channel.sampling != Vec2(1, 1) {
+                return Err(format!("channel {} is subsampled, which is not read", channel.name));
             }
-        };
-        if rgb.iter().any(|channel| channel.sampling != exr::math::Vec2(1, 1)) {
-            return Err("subsampled channels are not supported".into());
         }
-        let [red, green, blue] = rgb.map(|channel| &channel.sample_data);
-        let texels = (0..layer.size.area())
-            .into_par_iter()
-            .map(|index| {
-                Vec3::new(
-                    red.value_by_flat_index(index).to_f32(),
-                    green.value_by_flat_index(index).to_f32(),
-                    blue.value_by_flat_index(index).to_f32(),
-                )
-            })
-            .collect();
-        return Ok(Image {
-            width: layer.size.width() as u32,
-            height: layer.size.height() as u32,
-            texels,
-        });
     }
-    Err(format!("expected the channels R, G, B or Y, found {}", found.join(", ")))
+    let size = |size: Vec2<usize>| (size.width(), vec![Vec3::ZERO; size.area()]);
+    let channels = exr::prelude::read().no_deep_data().largest_resolution_level();
+    let read = Cursor::new(bytes);
+    let (width, texels) = if names[0] == "Y" {
+        channels
+            .specific_channels()
+            .required("Y")
+            .collect_pixels(
+                move |resolution, _| size(resolution),
+                |(width, texels): &mut (usize, Vec<Vec3>), at, (grey,): (f32,)| {
+                    texels[at.y() * *width + at.x()] = Vec3::splat(grey);
+                },
+            )
+            .first_valid_layer()
+            .all_attributes()
+            .from_buffered(read)
+            .map_err(message)?
+            .layer_data
+            .channel_data
+            .pixels
+    } else {
+        channels
+            .specific_channels()
+            .required("R")
+            .required("G")
+            .required("B")
+            .collect_pixels(
+                move |resolution, _| size(resolution),
+                |(width, texels): &mut (usize, Vec<Vec3>), at, rgb: (f32, f32, f32)| {
+                    texels[at.y() * *width + at.x()] = rgb.into();
+                },
+            )
+            .first_valid_layer()
+            .all_attributes()
+            .from_buffered(read)
+            .map_err(message)?
+            .layer_data
+            .channel_data
+            .pixels
+    };
+    let height = texels.len() / width;
+    Ok(Image { width: width as u32, height: height as u32, texels })
 }
 
 /// Portable float map: `PF` or `Pf`, width, height, scale (negative for little-endian), then rows of
@@ -226,14 +249,12 @@ fn read_pfm(bytes: &[u8]) -> Result<Image, String> {
         let bytes = [bytes[0], bytes[1], bytes[2], bytes[3]];
         if scale < 0.0 { f32::from_le_bytes(bytes) } else { f32::from_be_bytes(bytes) }
     };
-    let texels = data[..expected]
-        .chunks_exact(row_bytes)
-        .rev()
-        .flat_map(|row| row.chunks_exact(component_count * 4))
-        .map(|texel| match texel.len() {
+    let mut texels = Vec::with_capacity(width as usize * height as usize);
+    for row in data[..expected].chunks_exact(row_bytes).rev() {
+        texels.extend(row.chunks_exact(component_count * 4).map(|texel| match texel.len() {
             4 => Vec3::splat(float(texel)),
             _ => Vec3::new(float(texel), float(&texel[4..]), float(&texel[8..])),
-        })
-        .collect();
+        }));
+    }
     Ok(Image { width, height, texels })
 }

@@ -43,7 +43,7 @@ impl Default for SkyParameters {
             sun_elevation_deg: 40.0,
             sun_azimuth_deg: 50.0,
             sun_radius_deg: 0.27,
-            sun_radiance: [2.4e4, 2.2e4, 1.8e4],
+            sun_radiance: [8.0e4, 7.4e4, 6.2e4],
         }
     }
 }
@@ -330,6 +330,8 @@ fn paving_radiance(parameters: &CourtParameters, x: f32, z: f32) -> Vec3 {
     let half_width = 0.5 * parameters.court_width;
     let to_edge = |distance: f32| distance / distance.hypot(parameters.facade_height);
     let sky_share = 0.5 * (to_edge(half_width - x) + to_edge(half_width + x));
+    // Half a course off, so that no joint runs through the point below the viewer.
+    let z = z + 0.35;
     let course = (z / 0.7).floor();
     let offset = irregularity(parameters, 0, course as i32, 0);
     let slab = (x / 1.1 + offset).floor();

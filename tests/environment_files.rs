@@ -1,0 +1,373 @@
+//! Environment maps from files and from parameters: what is read, repaired, warned of and refused.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage,
+};
+use fenestra::{
+    frame::direction_from_lat_long,
+    scene::environment::{
+        CourtParameters, EnvironmentMap, EnvironmentTables, SkyParameters, luminance,
+    },
+};
+use glam::{Vec2, Vec3};
+use tempfile::TempDir;
+
+/// 8×4 texels that RGBE and half floats hold exactly, all different.
+fn texel(index: usize) -> Vec3 {
+    Vec3::new(1.0 + index as f32, 0.5, 2.0 * index as f32)
+}
+
+fn texels() -> Vec<Vec3> {
+    (0..32).map(texel).collect()
+}
+
+fn write(folder: &TempDir, name: &str, bytes: &[u8]) -> PathBuf {
+    let path = folder.path().join(name);
+    fs::write(&path, bytes).unwrap();
+    path
+}
+
+/// The map and its warnings.
+fn load(path: &Path) -> (EnvironmentMap, Vec<String>) {
+    let mut warnings = Vec::new();
+    let map = EnvironmentMap::load(path, 1.0, 0.0, &mut warnings).unwrap();
+    (map, warnings)
+}
+
+/// The message of a failed load, which must name the file.
+fn refusal(path: &Path) -> String {
+    let mut warnings = Vec::new();
+    let message =
+        EnvironmentMap::load(path, 1.0, 0.0, &mut warnings).expect_err("is refused").to_string();
+    assert!(message.starts_with(&path.display().to_string()), "{message}");
+    message
+}
+
+fn hdr_bytes(width: usize, height: usize, texels: &[Vec3]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let texels: Vec<image::Rgb<f32>> = texels.iter().map(|t| image::Rgb(t.to_array())).collect();
+    image::codecs::hdr::HdrEncoder::new(&mut bytes).encode(&texels, width, height).unwrap();
+    bytes
+}
+
+fn pfm_bytes(
+    width: usize,
+    height: usize,
+    texels: &[Vec3],
+    big_endian: bool,
+    grey: bool,
+) -> Vec<u8> {
+    let (magic, scale) = (if grey { "Pf" } else { "PF" }, if big_endian { "1.0" } else { "-1.0" });
+    let mut bytes = format!("{magic}\n{width} {height}\n{scale}\n").into_bytes();
+    for row in texels.chunks(width).rev() {
+        for texel in row {
+            for value in texel.to_array().into_iter().take(if grey { 1 } else { 3 }) {
+                let value = if big_endian { value.to_be_bytes() } else { value.to_le_bytes() };
+                bytes.extend(value);
+            }
+        }
+    }
+    bytes
+}
+
+fn write_exr(path: &Path, channels: Vec<(&str, FlatSamples)>) {
+    let channels =
+        channels.into_iter().map(|(name, samples)| AnyChannel::new(name, samples)).collect();
+    let layer = Layer::new(
+        (8, 4),
+        LayerAttributes::named("map"),
+        Encoding::FAST_LOSSLESS,
+        AnyChannels::sort(channels),
+    );
+    Image::from_layer(layer).write().to_file(path).unwrap();
+}
+
+#[test]
+fn every_format_gives_the_same_map_with_the_first_row_on_top() {
+    let folder = TempDir::new().unwrap();
+    let mut paths = vec![write(&folder, "map.hdr", &hdr_bytes(8, 4, &texels()))];
+    for (name, big_endian) in [("little.pfm", false), ("big.PFM", true)] {
+        paths.push(write(&folder, name, &pfm_bytes(8, 4, &texels(), big_endian, false)));
+    }
+    let component = |c: usize| texels().iter().map(move |texel| texel[c]).collect::<Vec<f32>>();
+    let half = |c: usize| component(c).into_iter().map(half::f16::from_f32).collect::<Vec<_>>();
+    let path = folder.path().join("mixed.exr");
+    // Channels of several types, with others between them.
+    write_exr(
+        &path,
+        vec![
+            ("R", FlatSamples::F32(component(0))),
+            ("G", FlatSamples::F16(half(1))),
+            ("B", FlatSamples::F16(half(2))),
+            ("A", FlatSamples::F32(vec![0.25; 32])),
+            ("Z", FlatSamples::F32(vec![9.0; 32])),
+        ],
+    );
+    paths.push(path);
+    for path in paths {
+        let (map, warnings) = load(&path);
+        assert_eq!((map.width, map.height), (8, 4), "{}", path.display());
+        assert_eq!(map.texels, texels(), "{}", path.display());
+        assert_eq!(map.source, path.display().to_string());
+        assert!(warnings.is_empty(), "{warnings:?}");
+        // The first row is up.
+        let up = map.radiance(Vec3::Y).x;
+        assert!((1.0..=8.0).contains(&up), "{}: {up}", path.display());
+    }
+}
+
+#[test]
+fn grey_files_give_grey_maps() {
+    let folder = TempDir::new().unwrap();
+    let grey: Vec<Vec3> = texels().iter().map(|texel| Vec3::splat(texel.x)).collect();
+    for big_endian in [false, true] {
+        let path = write(&folder, "grey.pfm", &pfm_bytes(8, 4, &texels(), big_endian, true));
+        assert_eq!(load(&path).0.texels, grey);
+    }
+    let path = folder.path().join("grey.exr");
+    write_exr(&path, vec![("Y", FlatSamples::F32(grey.iter().map(|texel| texel.x).collect()))]);
+    assert_eq!(load(&path).0.texels, grey);
+}
+
+#[test]
+fn scale_and_rotation_are_applied() {
+    let folder = TempDir::new().unwrap();
+    let path = write(&folder, "map.hdr", &hdr_bytes(8, 4, &texels()));
+    let map = EnvironmentMap::load(&path, 2.5, -270.0, &mut Vec::new()).unwrap();
+    assert_eq!(map.texels[3], texel(3) * 2.5);
+    assert!((map.rotation_rad - std::f32::consts::FRAC_PI_2).abs() < 1e-6);
+    for (scale, rotation_deg, word) in
+        [(-1.0, 0.0, "scale"), (f32::NAN, 0.0, "scale"), (1.0, f32::INFINITY, "rotation_deg")]
+    {
+        let error = EnvironmentMap::load(&path, scale, rotation_deg, &mut Vec::new());
+        assert!(error.unwrap_err().to_string().contains(word));
+    }
+}
+
+#[test]
+fn texels_that_are_not_radiance_become_black_and_are_counted() {
+    let folder = TempDir::new().unwrap();
+    let mut broken = texels();
+    broken[0].y = -0.5;
+    broken[5].x = f32::NAN;
+    broken[6].z = f32::INFINITY;
+    broken[31] = Vec3::NEG_INFINITY;
+    broken[30].x = 1e30;
+    let path = write(&folder, "broken.pfm", &pfm_bytes(8, 4, &broken, false, false));
+    let (map, warnings) = load(&path);
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    assert!(warnings[0].contains("5 of 32 texels"), "{warnings:?}");
+    for (index, value) in map.texels.iter().enumerate() {
+        let expected = if [0, 5, 6, 30, 31].contains(&index) { Vec3::ZERO } else { texel(index) };
+        assert_eq!(*value, expected, "texel {index}");
+    }
+}
+
+#[test]
+fn black_maps_and_other_ratios_are_warned_of() {
+    let folder = TempDir::new().unwrap();
+    let path = write(&folder, "black.pfm", &pfm_bytes(8, 4, &[Vec3::ZERO; 32], false, false));
+    let (_, warnings) = load(&path);
+    assert!(warnings.len() == 1 && warnings[0].contains("black"), "{warnings:?}");
+    let path = write(&folder, "square.pfm", &pfm_bytes(4, 8, &texels(), false, false));
+    let (map, warnings) = load(&path);
+    assert!(warnings.len() == 1 && warnings[0].contains("4×8"), "{warnings:?}");
+    assert!((EnvironmentTables::new(&map).total).is_normal());
+}
+
+#[test]
+fn damaged_files_are_refused_with_a_reason() {
+    let folder = TempDir::new().unwrap();
+    let hdr = hdr_bytes(8, 4, &texels());
+    let pfm = pfm_bytes(8, 4, &texels(), false, false);
+    let exr_path = folder.path().join("whole.exr");
+    write_exr(&exr_path, vec![("Y", FlatSamples::F32(vec![1.0; 32]))]);
+    let exr = fs::read(&exr_path).unwrap();
+    for (name, whole) in [("cut.hdr", &hdr), ("cut.pfm", &pfm), ("cut.exr", &exr)] {
+        for length in [0, 1, 7, whole.len() / 3, whole.len() / 2, whole.len() - 1] {
+            let path = write(&folder, name, &whole[..length]);
+            assert!(refusal(&path).len() > path.display().to_string().len() + 10);
+        }
+    }
+    let cases: [(&str, &[u8], &str); 12] = [
+        ("magic.hdr", &pfm, "not a readable Radiance file"),
+        ("magic.exr", &hdr, "not a readable OpenEXR file"),
+        ("magic.pfm", &exr, "PFM"),
+        ("word.pfm", b"P6\n2 1\n-1\n", "expected PF or Pf, found \"P6\""),
+        ("width.pfm", b"PF\nwide 1\n-1\n", "width: expected an integer, found \"wide\""),
+        ("height.pfm", b"PF\n2 -1\n-1\n", "height: expected an integer, found \"-1\""),
+        ("scale.pfm", b"PF\n2 1\n0\n", "scale: expected a number other than 0"),
+        ("short.pfm", b"PF\n2 1\n-1\n1234", "need 24 bytes, found 4"),
+        ("zero.pfm", b"PF\n0 1\n-1\n", "0×1 texels"),
+        ("absurd.pfm", b"PF\n4000000000 4000000000\n-1\n", "4000000000×4000000000 texels"),
+        (
+            "absurd.hdr",
+            b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 400000 +X 800000\n",
+            "800000×400000 texels",
+        ),
+        ("map.jpg", b"", "expected .hdr, .exr or .pfm"),
+    ];
+    for (name, bytes, expected) in cases {
+        let message = refusal(&write(&folder, name, bytes));
+        assert!(message.contains(expected), "{message}");
+    }
+    let message = refusal(&folder.path().join("missing.hdr"));
+    assert!(message.contains("cannot read"), "{message}");
+    let path = folder.path().join("normals.exr");
+    write_exr(&path, vec![("N.X", FlatSamples::F32(vec![1.0; 32]))]);
+    let message = refusal(&path);
+    assert!(message.contains("R, G, B or Y") && message.contains("N.X"), "{message}");
+}
+
+#[test]
+fn a_file_with_flipped_bytes_never_panics() {
+    let folder = TempDir::new().unwrap();
+    let exr_path = folder.path().join("whole.exr");
+    write_exr(&exr_path, vec![("Y", FlatSamples::F32(vec![1.0; 32]))]);
+    let sources = [
+        ("flip.exr", fs::read(&exr_path).unwrap()),
+        ("flip.hdr", hdr_bytes(8, 4, &texels())),
+        ("flip.pfm", pfm_bytes(8, 4, &texels(), true, false)),
+    ];
+    for (name, bytes) in sources {
+        for position in 0..bytes.len().min(400) {
+            let mut damaged = bytes.clone();
+            damaged[position] ^= 0xff;
+            let path = write(&folder, name, &damaged);
+            // Either outcome is fine; what is read must be radiance.
+            if let Ok(map) = EnvironmentMap::load(&path, 1.0, 0.0, &mut Vec::new()) {
+                assert!(map.texels.iter().all(|t| t.is_finite() && t.min_element() >= 0.0));
+            }
+        }
+    }
+}
+
+#[test]
+fn the_uffizi_map_loads_where_it_is_present() {
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes/env/uffizi_1200x600.hdr");
+    if !path.exists() {
+        return;
+    }
+    let (map, warnings) = load(&path);
+    assert_eq!((map.width, map.height), (1200, 600));
+    assert!(warnings.is_empty(), "{warnings:?}");
+    // Bright sky, dark paving.
+    assert!(luminance(map.radiance(Vec3::Y)) > 10.0 * luminance(map.radiance(-Vec3::Y)));
+}
+
+/// ∫ lum L dω over directions that satisfy `condition`, midpoint rule over the texels.
+fn flux(map: &EnvironmentMap, condition: impl Fn(Vec3) -> bool) -> f64 {
+    let (width, height) = (map.width, map.height);
+    let mut sum = 0.0;
+    for row in 0..height {
+        let edge = |row: u32| (std::f64::consts::PI * f64::from(row) / f64::from(height)).cos();
+        let solid_angle =
+            2.0 * std::f64::consts::PI / f64::from(width) * (edge(row) - edge(row + 1));
+        for column in 0..width {
+            let uv =
+                Vec2::new((column as f32 + 0.5) / width as f32, (row as f32 + 0.5) / height as f32);
+            if condition(direction_from_lat_long(uv)) {
+                let texel = map.texels[(row * width + column) as usize];
+                sum += f64::from(luminance(texel)) * solid_angle;
+            }
+        }
+    }
+    sum
+}
+
+#[test]
+fn the_sun_stands_where_it_should_with_the_power_it_should() {
+    for width in [16, 64, 512, 1024] {
+        for radius_deg in [0.02_f32, 0.27, 3.0] {
+            let parameters = SkyParameters {
+                width,
+                sun_elevation_deg: 30.0,
+                sun_azimuth_deg: 90.0,
+                sun_radius_deg: radius_deg,
+                sun_radiance: [1e5; 3],
+                zenith: [0.0; 3],
+                horizon: [0.0; 3],
+                ground: [0.0; 3],
+            };
+            let map = EnvironmentMap::sky(&parameters, 1.0, 0.0).unwrap();
+            // 90° clockwise from −Z is +X.
+            let sun = Vec3::new(0.866_025_4, 0.5, 0.0);
+            let reach = (radius_deg + 2.0 * 360.0 / width as f32).to_radians().cos();
+            let near = flux(&map, |direction| direction.dot(sun) > reach);
+            let expected =
+                1e5 * 2.0 * std::f64::consts::PI * (1.0 - f64::from(radius_deg).to_radians().cos());
+            assert!((near / expected - 1.0).abs() < 1e-4, "{width}, {radius_deg}°: {near}");
+            assert!((near / flux(&map, |_| true) - 1.0).abs() < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn procedural_maps_are_lit_as_their_names_say() {
+    let sky = EnvironmentMap::sky(&SkyParameters::default(), 1.0, 0.0).unwrap();
+    let brightest = sky.texels.iter().map(|texel| luminance(*texel)).fold(0.0, f32::max);
+    assert!(brightest > 1e4, "{brightest}");
+    let horizon = sky.radiance(Vec3::new(-1.0, 0.02, 0.0).normalize());
+    assert!(luminance(horizon) > luminance(sky.radiance(Vec3::Y)));
+
+    let court = EnvironmentMap::court(&CourtParameters::default(), 1.0, 0.0).unwrap();
+    assert_eq!((court.width, court.height), (1024, 512));
+    let (up, wall) = (court.radiance(Vec3::Y), court.radiance(Vec3::new(1.0, 0.3, 0.2)));
+    assert!(luminance(up) > 10.0 * luminance(wall));
+    let sky_share = flux(&court, |direction| direction.y > 0.7) / flux(&court, |_| true);
+    assert!((0.4..0.95).contains(&sky_share), "{sky_share}");
+    let glints = court.texels.iter().filter(|texel| texel.x > 30.0).count();
+    assert!(glints > 20, "{glints} texels of glinting windows");
+    assert!(court.texels.iter().all(|texel| texel.is_finite() && texel.min_element() > 0.0));
+    let again = EnvironmentMap::court(&CourtParameters::default(), 1.0, 0.0).unwrap();
+    assert_eq!(court.texels, again.texels);
+    let other = CourtParameters { seed: 2, ..CourtParameters::default() };
+    assert_ne!(court.texels, EnvironmentMap::court(&other, 1.0, 0.0).unwrap().texels);
+    let scaled = EnvironmentMap::court(&CourtParameters::default(), 2.0, 90.0).unwrap();
+    assert_eq!(scaled.texels[1000], court.texels[1000] * 2.0);
+    let turned = scaled.radiance(-Vec3::X).distance(2.0 * court.radiance(-Vec3::Z));
+    assert!(turned < 1e-3, "{turned}");
+}
+
+#[test]
+fn parameters_out_of_range_are_refused_by_name() {
+    let sky = |text: &str| {
+        let parameters: SkyParameters = toml::from_str(text).map_err(|e| e.to_string())?;
+        EnvironmentMap::sky(&parameters, 1.0, 0.0).map(|_| ())
+    };
+    let court = |text: &str| {
+        let parameters: CourtParameters = toml::from_str(text).map_err(|e| e.to_string())?;
+        EnvironmentMap::court(&parameters, 1.0, 0.0).map(|_| ())
+    };
+    sky("width = 64\nsun_radius_deg = 5").unwrap();
+    court("width = 64\nstoreys = 20\nglint_share = 1").unwrap();
+    let cases = [
+        (sky("width = 63"), "width = 63"),
+        (sky("width = 100000"), "16…16384"),
+        (sky("sun_radius_deg = 0"), "sun_radius_deg = 0"),
+        (sky("sun_elevation_deg = nan"), "sun_elevation_deg = NaN; expected 0…90"),
+        (sky("zenith = [0, -1, 0]"), "zenith"),
+        (sky("sun_radiance = [inf, 1, 1]"), "sun_radiance"),
+        (sky("moon = 1"), "unknown field `moon`"),
+        (court("width = 0"), "width = 0"),
+        (court("eye_height = 30"), "eye_height = 30"),
+        (court("storeys = 0"), "storeys = 0"),
+        (court("facade = [2, 0, 0]"), "facade = 2"),
+        (court("window_spacing = 0"), "window_spacing"),
+        (court("glint_share = 1.5"), "glint_share = 1.5; expected 0…1"),
+        (court("eye_hight = 1"), "unknown field `eye_hight`"),
+    ];
+    for (result, expected) in cases {
+        let message = result.unwrap_err();
+        assert!(message.contains(expected), "{message} should hold {expected}");
+    }
+    assert!(EnvironmentMap::constant(Vec3::new(1.0, -1.0, 0.0), 1.0).is_err());
+    assert!(EnvironmentMap::constant(Vec3::ONE, f32::NAN).is_err());
+}
