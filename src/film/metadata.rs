@@ -25,6 +25,8 @@ impl SampleRange {
     pub fn overlaps(&self, other: &Self) -> bool {
         let end = |range: &Self| u64::from(range.first) + u64::from(range.count);
         self.seed == other.seed
+            && self.count > 0
+            && other.count > 0
             && u64::from(self.first) < end(other)
             && u64::from(other.first) < end(self)
     }

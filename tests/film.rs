@@ -1,0 +1,508 @@
+//! The film: files written whole or not at all, sums and their estimates, checkpoints to the bit,
+//! merging.
+
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+use std::{collections::BTreeMap, fs, io, path::Path};
+
+use clap::ValueEnum;
+use fenestra::film::{
+    Aov, Attribute, Checkpoint, Image, Metadata, RgbImage, SampleRange, Sums,
+    checkpoint::checkpoint_path,
+    merge::{Part, merge_checkpoints, merge_images},
+    png, write_atomically,
+};
+use io::Write;
+
+/// Uniform numbers in 0…1 from a linear congruential generator.
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f32 {
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 40) as f32 / (1_u64 << 24) as f32
+    }
+}
+
+fn names_in(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+fn metadata(ranges: &[SampleRange]) -> Metadata {
+    let named = |name: &str, value: &str| BTreeMap::from([(name.to_owned(), value.to_owned())]);
+    Metadata {
+        version: "0.1.0".to_owned(),
+        scene: "room".to_owned(),
+        scene_hash: "ab12".to_owned(),
+        fit_hashes: named("environment", "77ff"),
+        sampler: "ris".to_owned(),
+        sampler_parameters: named("candidates", "4"),
+        shadow_rays: 5,
+        depth: 1,
+        sample_ranges: ranges.to_vec(),
+        seconds: 1.0 / 3.0,
+        gpu_seconds: BTreeMap::from([("trace".to_owned(), 0.1)]),
+        device: "llvmpipe (LLVM 15, 256 bits) “ä”".to_owned(),
+        driver: "Mesa 22.3.6".to_owned(),
+    }
+}
+
+fn range(seed: u32, first: u32, count: u32) -> SampleRange {
+    SampleRange { seed, first, count }
+}
+
+/// Accumulates as the device does: two-float sums of radiance in 0…1 times `scale`.
+fn accumulate(numbers: &mut Numbers, sample_count: u32, scale: f32) -> (Sums, Vec<Vec<f64>>) {
+    let mut sums = Sums::new([3, 1], 4, 2, [10, 6]);
+    let mut drawn = vec![Vec::new(); 8];
+    sums.albedo = vec![[0.0; 3]; 8];
+    sums.normal = vec![[0.0; 3]; 8];
+    sums.position = vec![[0.0; 3]; 8];
+    sums.visible = vec![[0; 2]; 8];
+    for _ in 0..sample_count {
+        for pixel in 0..8 {
+            for channel in 0..3 {
+                let value = scale * numbers.next();
+                if channel == 0 {
+                    drawn[pixel].push(f64::from(value));
+                }
+                let (sum, rest) = (&mut sums.sum[pixel], &mut sums.compensation[pixel]);
+                let before = sum[channel];
+                let after = before + value;
+                let virtual_value = after - before;
+                rest[channel] += (before - (after - virtual_value)) + (value - virtual_value);
+                sum[channel] = after;
+                sums.squares[pixel][channel] += value * value;
+                sums.albedo[pixel][channel] += 0.5;
+                sums.normal[pixel][channel] -= numbers.next();
+                sums.position[pixel][channel] += 100.0 * numbers.next();
+            }
+            sums.visible[pixel][0] += 2;
+            sums.visible[pixel][1] += 5;
+        }
+    }
+    sums.sample_count = sample_count;
+    (sums, drawn)
+}
+
+#[test]
+fn writing_creates_folders_and_leaves_only_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a/b/out.txt");
+    write_atomically(&path, |file| file.write_all(b"first")).unwrap();
+    write_atomically(&path, |file| file.write_all(b"second")).unwrap();
+    assert_eq!(fs::read(&path).unwrap(), b"second");
+    assert_eq!(names_in(path.parent().unwrap()), ["out.txt"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn written_files_have_the_permissions_of_any_new_file() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let (ours, plain) = (folder.path().join("ours"), folder.path().join("plain"));
+    write_atomically(&ours, |file| file.write_all(b"x")).unwrap();
+    fs::write(&plain, b"x").unwrap();
+    let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
+    assert_eq!(mode(&ours), mode(&plain));
+}
+
+#[test]
+fn a_failed_write_keeps_the_old_file_and_leaves_no_temporary_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.txt");
+    fs::write(&path, b"old").unwrap();
+    let error = write_atomically(&path, |file| {
+        file.write_all(&[0; 100_000])?;
+        Err(io::ErrorKind::StorageFull.into())
+    })
+    .unwrap_err();
+    assert!(error.to_string().contains("out.txt: cannot write: no storage space"), "{error}");
+    assert_eq!(fs::read(&path).unwrap(), b"old");
+    assert_eq!(names_in(folder.path()), ["out.txt"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_device_is_reported_with_path_and_cause() {
+    let mut image = Image::new(2, 2);
+    image.channels.insert("Y".to_owned(), vec![1.0; 4]);
+    let error = image.write_exr(Path::new("/dev/full")).unwrap_err().to_string();
+    assert!(error.contains("/dev/full: cannot write: No space left on device"), "{error}");
+}
+
+#[test]
+fn a_folder_in_the_way_or_a_file_for_a_folder_is_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    fs::write(&file, b"x").unwrap();
+    let error = write_atomically(&file.join("out"), |_| Ok(())).unwrap_err().to_string();
+    assert!(error.contains("file: cannot create folder"), "{error}");
+    let taken = folder.path().join("taken");
+    fs::create_dir(&taken).unwrap();
+    let error = write_atomically(&taken, |_| Ok(())).unwrap_err().to_string();
+    assert!(error.contains("taken: cannot write"), "{error}");
+    assert_eq!(names_in(folder.path()), ["file", "taken"]);
+}
+
+#[test]
+fn two_float_sums_stay_exact_where_floats_stagnate() {
+    // 2²⁵ ones cannot be counted in floats, which stop at 2²⁴; start high to keep the test short.
+    let mut sums = Sums::new([0, 0], 1, 1, [1, 1]);
+    sums.sum[0] = [16_777_216.0; 3];
+    let (mut sum, mut rest) = (16_777_216.0_f32, 0.0_f32);
+    for _ in 0..1001 {
+        let after = sum + 1.0;
+        let virtual_value = after - sum;
+        rest += (sum - (after - virtual_value)) + (1.0 - virtual_value);
+        sum = after;
+    }
+    assert_eq!(sum, 16_777_216.0, "a float alone does not move");
+    sums.compensation[0] = [rest; 3];
+    assert_eq!(sums.total(0), [16_778_217.0; 3]);
+}
+
+#[test]
+fn mean_and_variance_agree_with_64_bit_sums() {
+    for (sample_count, scale) in [(2, 1.0), (64, 1e-3), (1000, 1e4), (5000, 1.0)] {
+        let (sums, drawn) = accumulate(&mut Numbers(7), sample_count, scale);
+        for (pixel, values) in drawn.iter().enumerate() {
+            let n = f64::from(sample_count);
+            let mean = values.iter().sum::<f64>() / n;
+            let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+            let variance = squares / (n - 1.0) / n;
+            assert!((sums.mean(pixel)[0] / mean - 1.0).abs() < 1e-12);
+            let found = sums.variance_of_mean(pixel)[0];
+            assert!((found / variance - 1.0).abs() < 1e-4, "{found} against {variance}");
+        }
+    }
+}
+
+#[test]
+fn relative_error_of_a_picture_worked_by_hand() {
+    // Two pixels, two samples each: 0 and 2 in every channel, and 3 and 3. Means 1 and 3, variance
+    // of the mean 1 and 0, image mean 2: the average of 1/√(1 + 0.04) and 0.
+    let mut sums = Sums::new([0, 0], 2, 1, [2, 1]);
+    assert_eq!(sums.relative_standard_error(), f64::INFINITY);
+    sums.sum = vec![[2.0; 3], [6.0; 3]];
+    sums.squares = vec![[4.0; 3], [18.0; 3]];
+    sums.sample_count = 2;
+    assert_eq!(sums.variance_of_mean(0), [1.0; 3]);
+    let expected = 0.5 / 1.04_f64.sqrt();
+    assert!((sums.relative_standard_error() - expected).abs() < 1e-15);
+    let mut black = Sums::new([0, 0], 2, 1, [2, 1]);
+    black.sample_count = 2;
+    assert_eq!(black.relative_standard_error(), 0.0);
+}
+
+#[test]
+fn relative_error_falls_as_one_over_root_n() {
+    let error = |count| accumulate(&mut Numbers(3), count, 1.0).0.relative_standard_error();
+    let ratio = error(100) / error(6400);
+    assert!((ratio / 8.0 - 1.0).abs() < 0.1, "{ratio}");
+}
+
+#[test]
+fn image_layers_have_pbrts_names_and_the_means() {
+    let (sums, _) = accumulate(&mut Numbers(1), 10, 1.0);
+    let image = sums.to_image(Aov::value_variants());
+    let names: Vec<&str> = image.channels.keys().map(String::as_str).collect();
+    let expected = "Albedo.B Albedo.G Albedo.R B G N.X N.Y N.Z P.X P.Y P.Z R SampleCount.Y \
+                    ShadowRays.Y Variance.B Variance.G Variance.R Visible.Y";
+    assert_eq!(names.join(" "), expected);
+    assert_eq!((image.origin, image.film_size), ([3, 1], [10, 6]));
+    assert_eq!(image.channels["Albedo.G"], [0.5; 8]);
+    assert_eq!(image.channels["SampleCount.Y"], [10.0; 8]);
+    assert_eq!(image.channels["Visible.Y"], [0.4; 8]);
+    assert_eq!(image.channels["ShadowRays.Y"], [50.0; 8]);
+    assert_eq!(image.channels["G"][5], sums.mean(5)[1] as f32);
+    assert_eq!(image.channels["N.Z"][5], (f64::from(sums.normal[5][2]) / 10.0) as f32);
+    let plain = sums.to_image(&[]);
+    assert_eq!(plain.channels.keys().collect::<Vec<_>>(), ["B", "G", "R"]);
+    let bare = Sums::new([0, 0], 1, 1, [1, 1]).to_image(&[Aov::Albedo, Aov::Visible]);
+    assert_eq!(bare.channels.len(), 3, "layers without sums are left out");
+}
+
+#[test]
+fn sums_that_are_not_finite_are_counted() {
+    let mut sums = Sums::new([0, 0], 2, 2, [2, 2]);
+    assert_eq!(sums.non_finite_count(), 0);
+    sums.sum[1][2] = f32::NAN;
+    sums.squares[1][0] = f32::INFINITY;
+    sums.squares[3][0] = f32::INFINITY;
+    assert_eq!(sums.non_finite_count(), 2);
+}
+
+#[test]
+fn metadata_survives_the_attributes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.exr");
+    let written = metadata(&[range(u32::MAX, 0, 64), range(9, 5, 6)]);
+    let mut image = accumulate(&mut Numbers(1), 2, 1.0).0.to_image(&[]);
+    written.store(&mut image);
+    image.write_exr(&path).unwrap();
+    let image = Image::read_exr(&path).unwrap();
+    assert_eq!(Metadata::load(&image, &path).unwrap(), written);
+    assert_eq!(image.attributes["samplesPerPixel"], Attribute::Integer(70));
+    assert_eq!(image.attributes["renderTimeSeconds"], Attribute::Float(1.0 / 3.0));
+    let error = Metadata::load(&Image::new(1, 1), &path).unwrap_err().to_string();
+    assert!(error.contains("out.exr: no attribute fenestra."), "{error}");
+    let mut broken = image.clone();
+    let nonsense = Attribute::Text("7:0-64".to_owned());
+    broken.attributes.insert("fenestra.sample_ranges".to_owned(), nonsense);
+    let error = Metadata::load(&broken, &path).unwrap_err().to_string();
+    assert!(error.contains("expected seed:first+count, found \"7:0-64\""), "{error}");
+}
+
+#[test]
+fn sample_ranges_overlap_only_within_a_seed() {
+    let overlaps = |a: SampleRange, b: SampleRange| {
+        assert_eq!(a.overlaps(&b), b.overlaps(&a));
+        a.overlaps(&b)
+    };
+    assert!(overlaps(range(1, 0, 64), range(1, 63, 1)));
+    assert!(!overlaps(range(1, 0, 64), range(1, 64, 64)));
+    assert!(!overlaps(range(1, 0, 64), range(2, 0, 64)));
+    assert!(overlaps(range(1, u32::MAX, 2), range(1, u32::MAX, 1)));
+    assert!(!overlaps(range(1, 5, 0), range(1, 0, 64)), "an empty range holds nothing");
+    let mut joined = metadata(&[range(1, 64, 64)]);
+    joined.add_ranges(&metadata(&[range(1, 0, 64), range(2, 128, 1)]));
+    assert_eq!(joined.sample_ranges, [range(1, 0, 128), range(2, 128, 1)]);
+}
+
+#[test]
+fn checkpoints_come_back_to_the_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = checkpoint_path(&folder.path().join("room.exr"));
+    assert!(path.ends_with("room.checkpoint.exr"));
+    let (mut sums, _) = accumulate(&mut Numbers(5), 1000, 1e3);
+    sums.sum[0] = [-0.0, f32::MIN_POSITIVE / 8.0, f32::MAX];
+    sums.visible[0] = [u32::MAX - 1, u32::MAX];
+    let checkpoint = Checkpoint { sums, metadata: metadata(&[range(4, 0, 1000)]) };
+    checkpoint.write(&path).unwrap();
+    let read = Checkpoint::read(&path).unwrap();
+    let bits = |values: &[[f32; 3]]| {
+        values.as_flattened().iter().map(|value| value.to_bits()).collect::<Vec<_>>()
+    };
+    assert_eq!(bits(&read.sums.sum), bits(&checkpoint.sums.sum));
+    assert_eq!(bits(&read.sums.compensation), bits(&checkpoint.sums.compensation));
+    assert_eq!(read, checkpoint);
+    let picture = Image::read_exr(&path).unwrap().rgb(&path).unwrap();
+    assert_eq!(picture.pixels[3][1], checkpoint.sums.mean(3)[1] as f32, "viewers see the picture");
+}
+
+#[test]
+fn a_checkpoint_without_its_sums_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("room.checkpoint.exr");
+    let (sums, _) = accumulate(&mut Numbers(5), 4, 1.0);
+    let checkpoint = Checkpoint { sums, metadata: metadata(&[range(4, 0, 4)]) };
+    checkpoint.write(&path).unwrap();
+    let image = Image::read_exr(&path).unwrap();
+    let message = |image: &Image| Checkpoint::from_image(image, &path).unwrap_err().to_string();
+
+    let mut incomplete = image.clone();
+    incomplete.channels.remove("Squares.G");
+    assert!(message(&incomplete).contains("no channels [\"Squares.R\", \"Squares.G\""));
+    let mut plain = image.clone();
+    plain.attributes.remove("fenestra.checkpoint");
+    assert!(message(&plain).contains("not a checkpoint"));
+    let mut newer = image.clone();
+    newer.attributes.insert("fenestra.checkpoint".to_owned(), Attribute::Integer(2));
+    assert!(message(&newer).contains("another version: expected 1, found Integer(2)"));
+    let mut outside = image.clone();
+    outside.origin = [-1, 0];
+    assert!(message(&outside).contains("outside the film"));
+    let mut broken = image;
+    broken.channels.get_mut("Sum.R").unwrap()[3] = f32::NAN;
+    assert!(message(&broken).contains("1 pixels with sums that are not finite"));
+}
+
+#[test]
+fn a_checkpoint_of_another_render_is_refused_with_every_difference() {
+    let (sums, _) = accumulate(&mut Numbers(5), 4, 1.0);
+    let window = Sums::new(sums.origin, 4, 2, sums.film_size);
+    let checkpoint = Checkpoint { sums, metadata: metadata(&[range(4, 8, 4)]) };
+    let path = Path::new("room.checkpoint.exr");
+    let expected = Metadata { sample_ranges: Vec::new(), seconds: 0.0, ..metadata(&[]) };
+    checkpoint.check_resume(path, &expected, &window, 4, 8).unwrap();
+
+    let mut other = expected.clone();
+    other.scene_hash = "cd34".to_owned();
+    other.sampler = "mis".to_owned();
+    other.sampler_parameters.clear();
+    other.fit_hashes.clear();
+    other.shadow_rays = 6;
+    other.depth = 2;
+    let smaller = Sums::new([0, 0], 3, 2, [10, 6]);
+    let message = checkpoint.check_resume(path, &other, &smaller, 5, 8).unwrap_err().to_string();
+    for part in [
+        "room.checkpoint.exr: the checkpoint belongs to another render",
+        "scene hash: ab12 against cd34",
+        "sampler: ris against mis",
+        "sampler parameter candidates: 4 against default",
+        "fit of environment: 77ff against none",
+        "shadow rays: 5 against 6",
+        "depth: 1 against 2",
+        "window: 4x2 at 3,1 of 10x6 against 3x2 at 0,0 of 10x6",
+        "seed: 4 against 5",
+        "--resume",
+    ] {
+        assert!(message.contains(part), "no {part:?} in {message}");
+    }
+    let message = |seed, first| {
+        checkpoint.check_resume(path, &expected, &window, seed, first).unwrap_err().to_string()
+    };
+    assert!(message(4, 0).contains("first sample: 8 against 0"));
+    let mut merged = checkpoint.clone();
+    merged.metadata.sample_ranges.push(range(9, 0, 4));
+    let error = merged.check_resume(path, &expected, &window, 4, 8).unwrap_err().to_string();
+    assert!(error.contains("a merged checkpoint cannot be continued"), "{error}");
+    let mut bare = checkpoint.clone();
+    bare.sums.albedo.clear();
+    let error = bare.check_resume(path, &expected, &checkpoint.sums, 4, 8).unwrap_err().to_string();
+    assert!(error.contains("layer albedo: absent against asked for"), "{error}");
+}
+
+/// One accumulation of 30 samples, and the same samples in parts of 10 and 20.
+fn whole_and_parts() -> (Checkpoint, Checkpoint, Checkpoint) {
+    let checkpoint = |sums: Sums, first: u32| {
+        let count = sums.sample_count;
+        Checkpoint { sums, metadata: metadata(&[range(1, first, count)]) }
+    };
+    let whole = accumulate(&mut Numbers(11), 30, 10.0).0;
+    let mut numbers = Numbers(11);
+    let first = accumulate(&mut numbers, 10, 10.0).0;
+    let second = accumulate(&mut numbers, 20, 10.0).0;
+    (checkpoint(whole, 0), checkpoint(first, 0), checkpoint(second, 10))
+}
+
+fn assert_close(found: &Image, expected: &Image, tolerance: f32) {
+    assert_eq!(
+        found.channels.keys().collect::<Vec<_>>(),
+        expected.channels.keys().collect::<Vec<_>>()
+    );
+    for (name, values) in &found.channels {
+        for (found, expected) in values.iter().zip(&expected.channels[name]) {
+            let allowed = tolerance * expected.abs().max(1e-3);
+            assert!((found - expected).abs() <= allowed, "{name}: {found} against {expected}");
+        }
+    }
+}
+
+#[test]
+fn merged_checkpoints_equal_one_run() {
+    let (whole, first, second) = whole_and_parts();
+    let (a, b) = (Path::new("a"), Path::new("b"));
+    let merged = merge_checkpoints(&[(b, &second), (a, &first)]).unwrap();
+    assert_eq!(merged.metadata.sample_ranges, [range(1, 0, 30)]);
+    assert_eq!(merged.sums.sample_count, 30);
+    assert_eq!(merged.sums.visible, whole.sums.visible);
+    for pixel in 0..8 {
+        for channel in 0..3 {
+            let (found, expected) =
+                (merged.sums.total(pixel)[channel], whole.sums.total(pixel)[channel]);
+            // Both add the same floats; each two-float sum keeps 48 bits.
+            assert!((found / expected - 1.0).abs() < 1e-12, "{found} against {expected}");
+        }
+    }
+    let all = Aov::value_variants();
+    assert_close(&merged.sums.to_image(all), &whole.sums.to_image(all), 1e-5);
+    // Order does not matter.
+    let other = merge_checkpoints(&[(a, &first), (b, &second)]).unwrap();
+    assert_eq!(other.sums, merged.sums);
+}
+
+#[test]
+fn merged_images_equal_one_run_up_to_rounding() {
+    let (whole, mut first, second) = whole_and_parts();
+    // Different shares of visible rays must be weighted with the rays.
+    first.sums.visible[2] = [1, 7];
+    let all = Aov::value_variants();
+    let images = [&first, &second].map(|checkpoint| checkpoint.sums.to_image(all));
+    let part = |image, checkpoint: &'static str, metadata| Part {
+        path: Path::new(checkpoint),
+        image,
+        metadata,
+    };
+    let parts = [part(&images[0], "a", &first.metadata), part(&images[1], "b", &second.metadata)];
+    let (merged, metadata) = merge_images(&parts).unwrap();
+    let mut expected = whole.sums.clone();
+    expected.visible[2] = [1 + 40, 7 + 100];
+    assert_close(&merged, &expected.to_image(all), 1e-5);
+    assert_eq!(metadata.sample_ranges, [range(1, 0, 30)]);
+    assert_eq!(metadata.gpu_seconds["trace"], 0.2);
+    assert_eq!(merged.attributes["samplesPerPixel"], Attribute::Integer(30));
+    assert_eq!((merged.origin, merged.film_size), ([3, 1], [10, 6]));
+}
+
+#[test]
+fn merging_leaves_out_channels_that_a_part_lacks() {
+    let (_, first, second) = whole_and_parts();
+    let rich = first.sums.to_image(&[Aov::Albedo, Aov::Variance]);
+    let plain = second.sums.to_image(&[Aov::Variance]);
+    let parts = [
+        Part { path: Path::new("a"), image: &rich, metadata: &first.metadata },
+        Part { path: Path::new("b"), image: &plain, metadata: &second.metadata },
+    ];
+    let (merged, _) = merge_images(&parts).unwrap();
+    assert_eq!(
+        merged.channels.keys().collect::<Vec<_>>(),
+        ["B", "G", "R", "Variance.B", "Variance.G", "Variance.R"]
+    );
+}
+
+#[test]
+fn parts_that_do_not_belong_together_are_refused() {
+    let (_, first, second) = whole_and_parts();
+    let (a, b) = (Path::new("a.exr"), Path::new("b.exr"));
+    let message = |first: &Checkpoint, second: &Checkpoint| {
+        let exact = merge_checkpoints(&[(a, first), (b, second)]).unwrap_err().to_string();
+        let images = [first, second].map(|checkpoint| checkpoint.sums.to_image(&[]));
+        let parts = [
+            Part { path: a, image: &images[0], metadata: &first.metadata },
+            Part { path: b, image: &images[1], metadata: &second.metadata },
+        ];
+        assert_eq!(merge_images(&parts).unwrap_err().to_string(), exact);
+        exact
+    };
+    let mut other = second.clone();
+    other.metadata.sample_ranges = vec![range(1, 9, 20)];
+    let text = message(&first, &other);
+    assert!(
+        text.contains("b.exr: holds samples 9..29 of seed 1, but a.exr holds samples 0..10"),
+        "{text}"
+    );
+    let mut other = second.clone();
+    other.metadata.scene_hash = "cd34".to_owned();
+    let text = message(&first, &other);
+    assert!(text.contains("not of one render with a.exr: scene hash: cd34 against ab12"), "{text}");
+    let mut other = second.clone();
+    other.sums.origin = [0, 0];
+    let text = message(&first, &other);
+    assert!(text.contains("b.exr: shows 4x2 pixels at 0,0 of 10x6"), "{text}");
+    assert!(merge_checkpoints(&[]).is_err() && merge_images(&[]).is_err());
+}
+
+#[test]
+fn previews_apply_exposure_and_the_srgb_curve() {
+    // IEC 61966-2-1: 0.5 linear is 188, 0.0021 is on the linear foot.
+    assert_eq!(png::display_from_linear(0.5), 188);
+    assert_eq!(png::display_from_linear(0.0021), 7);
+    assert_eq!(png::display_from_linear(-1.0), 0);
+    assert_eq!(png::display_from_linear(7.0), 255);
+    assert_eq!(png::display_from_linear(f32::NAN), 0);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("preview.png");
+    let picture = RgbImage { width: 2, height: 1, pixels: vec![[0.25, 0.5, 1.0], [0.0; 3]] };
+    png::write_preview(&path, &picture, 1.0).unwrap();
+    let read = image::open(&path).unwrap().into_rgb8();
+    assert_eq!(read.dimensions(), (2, 1));
+    assert_eq!(read.into_raw(), [188, 255, 255, 0, 0, 0]);
+}
