@@ -22,6 +22,8 @@ pub enum Command {
     Compare(command::compare::Arguments),
     /// Combine renders of one scene made with different seeds or sample ranges.
     Merge(command::merge::Arguments),
+    /// Say what a scene, image, environment map or BRDF file holds and whether it is sane.
+    Info(command::info::Arguments),
     /// List Vulkan devices with the limits that matter here, and which one would be chosen.
     Devices(command::devices::Arguments),
 }
@@ -42,6 +44,7 @@ pub fn run() -> ExitCode {
         .init();
     let result = match &cli.command {
         Command::Compare(arguments) => command::compare::run(arguments),
+        Command::Info(arguments) => command::info::run(arguments),
         Command::Merge(arguments) => command::merge::run(arguments),
         Command::Devices(arguments) => command::devices::run(arguments),
     };

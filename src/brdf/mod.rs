@@ -26,6 +26,7 @@
 pub mod cornell;
 pub mod materials;
 pub mod merl;
+pub mod sanity;
 pub mod spectrum;
 pub mod table;
 pub mod twin;

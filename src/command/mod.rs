@@ -2,6 +2,7 @@
 
 pub mod compare;
 pub mod devices;
+pub mod info;
 pub mod merge;
 pub mod progress;
 

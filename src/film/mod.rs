@@ -10,6 +10,7 @@ pub mod merge;
 pub mod metadata;
 pub mod png;
 pub mod statistics;
+pub mod summary;
 pub mod sums;
 
 use std::{

@@ -1,0 +1,129 @@
+//! Whether a measured BRDF is physically plausible: how much it reflects, and whether it stays the
+//! same when the two directions are interchanged.
+
+use std::{path::Path, sync::Arc};
+
+use glam::{Vec3, vec3};
+
+use super::{MaterialTables, MeasuredTable, albedo};
+use crate::{
+    error::Result,
+    scene::{Material, material::MaterialKind},
+};
+
+/// Elevations at which the albedo is reported, degrees from the normal.
+pub const ELEVATIONS_DEG: [f32; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
+
+/// Angle between the directions that are tried in pairs, degrees.
+const STEP_DEG: usize = 15;
+
+/// What a measured BRDF does to light.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Sanity {
+    /// Linear Rec.709 share of light from a uniform hemisphere that is reflected, at each of
+    /// [`ELEVATIONS_DEG`].
+    pub albedo: Vec<[f32; 3]>,
+    /// Largest of these.
+    pub largest_albedo: f32,
+    /// Largest value among the pairs of directions tried, 1/sr.
+    pub largest_value: f32,
+    /// Largest difference when the directions of a pair are interchanged, relative to the value.
+    pub largest_reciprocity_error: f32,
+}
+
+impl Sanity {
+    /// Looks at a table that was read from `path`.
+    ///
+    /// # Errors
+    /// A table too large for the device.
+    pub fn of(path: &Path, table: &Arc<MeasuredTable>) -> Result<Self> {
+        let kind = MaterialKind::Measured { path: path.to_path_buf(), table: Arc::clone(table) };
+        let tables = MaterialTables::new(&[Material { name: path.display().to_string(), kind }])?;
+        let at = |elevation_deg: &f32| {
+            let (sine, cosine) = elevation_deg.to_radians().sin_cos();
+            albedo(&tables, 0, vec3(sine, 0.0, cosine)).to_array()
+        };
+        let albedo: Vec<[f32; 3]> = ELEVATIONS_DEG.iter().map(at).collect();
+        let (largest_value, largest_reciprocity_error) = try_pairs(table);
+        Ok(Self {
+            largest_albedo: albedo.as_flattened().iter().copied().fold(0.0, f32::max),
+            albedo,
+            largest_value,
+            largest_reciprocity_error,
+        })
+    }
+
+    /// What a user should know before rendering with it.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if self.largest_albedo > 1.0 {
+            warnings.push(format!(
+                "reflects more light than it receives: albedo {:.3}",
+                self.largest_albedo
+            ));
+        }
+        if self.largest_reciprocity_error > 0.01 {
+            warnings.push(format!(
+                "not reciprocal: interchanged directions differ by {:.1}%",
+                100.0 * self.largest_reciprocity_error
+            ));
+        }
+        if self.largest_value == 0.0 {
+            warnings.push("black at every pair of directions tried".to_owned());
+        }
+        warnings
+    }
+}
+
+/// Largest value and largest relative reciprocity error over pairs of directions.
+fn try_pairs(table: &MeasuredTable) -> (f32, f32) {
+    let direction = |elevation_deg: usize, azimuth_deg: usize| -> Vec3 {
+        let (sine, cosine) = (elevation_deg as f32).to_radians().sin_cos();
+        let (sine_azimuth, cosine_azimuth) = (azimuth_deg as f32).to_radians().sin_cos();
+        vec3(sine * cosine_azimuth, sine * sine_azimuth, cosine)
+    };
+    let (mut largest, mut error) = (0.0_f32, 0.0_f32);
+    for outgoing_deg in (0..90).step_by(STEP_DEG) {
+        for incident_deg in (0..90).step_by(STEP_DEG) {
+            for azimuth_deg in (0..=180).step_by(STEP_DEG) {
+                let outgoing = direction(outgoing_deg, 0);
+                let incident = direction(incident_deg, azimuth_deg);
+                let value = table.evaluate(outgoing, incident);
+                let interchanged = table.evaluate(incident, outgoing);
+                largest = largest.max(value.max_element());
+                let scale = value.max_element().max(interchanged.max_element());
+                if scale > 0.0 {
+                    error = error.max((value - interchanged).abs().max_element() / scale);
+                }
+            }
+        }
+    }
+    (largest, error)
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+    use std::f32::consts::PI;
+
+    use super::*;
+
+    #[test]
+    fn a_white_lambertian_table_is_sane_and_one_twice_as_bright_is_not() {
+        let sanity = |value: f32| {
+            let table = MeasuredTable::tabulate(|_, _| Vec3::splat(value)).unwrap();
+            Sanity::of(Path::new("white.binary"), &Arc::new(table)).unwrap()
+        };
+        let white = sanity(0.9 / PI);
+        for albedo in white.albedo.as_flattened() {
+            assert!((albedo - 0.9).abs() < 0.01, "{albedo}");
+        }
+        assert!((white.largest_value - 0.9 / PI).abs() < 1e-3);
+        assert!(white.largest_reciprocity_error < 1e-3);
+        assert_eq!(white.warnings(), [""; 0]);
+        let warnings = sanity(2.0 / PI).warnings();
+        assert!(warnings[0].contains("more light than it receives: albedo 2.0"), "{warnings:?}");
+        assert!(sanity(0.0).warnings()[0].contains("black"));
+    }
+}

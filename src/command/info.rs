@@ -1,0 +1,215 @@
+//! `fenestra info`: what a file holds and whether it is sane; without a file, what is installed.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use serde_json::{Value, json};
+
+use crate::{
+    brdf::{
+        MeasuredTable,
+        sanity::{ELEVATIONS_DEG, Sanity},
+    },
+    cache,
+    error::{Error, Result},
+    film::{Attribute, Checkpoint, Image, summary::ChannelSummary},
+    scene::EnvironmentMap,
+};
+
+/// Arguments of `info`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Scene (.toml), image (.exr), environment map (.hdr, .pfm; .exr with --map) or measured BRDF
+    /// (.binary, .brdf).
+    pub file: Option<PathBuf>,
+    /// Read an .exr file as an environment map.
+    #[arg(long, requires = "file")]
+    pub map: bool,
+    /// Print JSON to standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What is known of a file, once for machines and once for people.
+struct Report {
+    value: Value,
+    lines: Vec<String>,
+    warnings: Vec<String>,
+}
+
+/// Reports on a file or on the installation.
+///
+/// # Errors
+/// A file that cannot be read, or of no known kind.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let mut report = match &arguments.file {
+        None => installation(),
+        Some(path) => file(path, arguments.map)?,
+    };
+    if arguments.json {
+        report.value["warnings"] = json!(report.warnings);
+        return super::print_line(&format!("{:#}", report.value));
+    }
+    report.lines.extend(report.warnings.iter().map(|warning| format!("warning: {warning}")));
+    super::print_line(&report.lines.join("\n"))
+}
+
+fn file(path: &Path, is_map: bool) -> Result<Report> {
+    let extension = path
+        .extension()
+        .map(|extension| extension.to_string_lossy().to_lowercase())
+        .unwrap_or_default();
+    match extension.as_str() {
+        "hdr" | "pfm" => environment_map(path),
+        "exr" if is_map => environment_map(path),
+        "exr" => image(path),
+        "binary" | "brdf" => measured_brdf(path),
+        _ => {
+            // A missing file of unknown kind is a missing file first.
+            fs::metadata(path).map_err(|source| Error::io(path, "read", source))?;
+            Err(Error::format(
+                path,
+                "unknown kind of file; expected .toml, .exr, .hdr, .pfm, .binary or .brdf",
+            ))
+        }
+    }
+}
+
+/// Bytes and number of the files in a folder; 0 where there is none.
+fn folder_size(folder: &Path) -> (u64, u64) {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let files = entries.filter_map(|entry| entry.metadata().ok()).filter(fs::Metadata::is_file);
+    files.fold((0, 0), |(bytes, count), file| (bytes + file.len(), count + 1))
+}
+
+fn installation() -> Report {
+    let mut lines = vec![format!("Fenestra {}", env!("CARGO_PKG_VERSION"))];
+    let mut caches = serde_json::Map::new();
+    for kind in ["fits", "pipelines"] {
+        let Some(folder) = cache::folder(kind) else {
+            lines.push(format!("cache of {kind}: none (neither XDG_CACHE_HOME nor HOME is set)"));
+            continue;
+        };
+        let (bytes, count) = folder_size(&folder);
+        lines.push(format!(
+            "cache of {kind}: {} ({count} files, {:.1} MiB; may be deleted)",
+            folder.display(),
+            bytes as f64 / f64::from(1 << 20)
+        ));
+        let folder = folder.display().to_string();
+        caches.insert(kind.to_owned(), json!({ "folder": folder, "files": count, "bytes": bytes }));
+    }
+    lines.push("devices: run `fenestra devices`".to_owned());
+    let value = json!({ "version": env!("CARGO_PKG_VERSION"), "caches": caches });
+    Report { value, lines, warnings: Vec::new() }
+}
+
+fn image(path: &Path) -> Result<Report> {
+    let image = Image::read_exr(path)?;
+    let is_checkpoint = Checkpoint::is_checkpoint(&image);
+    let kind = if is_checkpoint { "checkpoint" } else { "image" };
+    let [x, y] = image.origin;
+    let [film_width, film_height] = image.film_size;
+    let mut lines = vec![format!(
+        "{kind} of {}x{} pixels at {x},{y} of {film_width}x{film_height}",
+        image.width, image.height
+    )];
+    let (mut channels, mut warnings) = (serde_json::Map::new(), Vec::new());
+    for (name, samples) in &image.channels {
+        let summary = ChannelSummary::of(samples.iter().copied());
+        lines.push(format!("channel {name:<24} {}", describe(&summary)));
+        if summary.nan + summary.infinite > 0 {
+            warnings.push(format!(
+                "channel {name}: {} samples are not finite",
+                summary.nan + summary.infinite
+            ));
+        }
+        channels.insert(name.clone(), json!(summary));
+    }
+    let mut attributes = serde_json::Map::new();
+    for (name, attribute) in &image.attributes {
+        let value = match attribute {
+            Attribute::Text(value) => json!(value),
+            Attribute::Integer(value) => json!(value),
+            Attribute::Float(value) => json!(value),
+            Attribute::Double(value) => json!(value),
+        };
+        lines.push(format!("{name} = {value}"));
+        attributes.insert(name.clone(), value);
+    }
+    if is_checkpoint && let Err(error) = Checkpoint::from_image(&image, path) {
+        warnings.push(error.to_string());
+    }
+    let value = json!({
+        "kind": kind,
+        "width": image.width,
+        "height": image.height,
+        "origin": image.origin,
+        "film_size": image.film_size,
+        "channels": channels,
+        "attributes": attributes,
+    });
+    Ok(Report { value, lines, warnings })
+}
+
+fn describe(summary: &ChannelSummary) -> String {
+    let mut text = match (summary.minimum, summary.maximum, summary.mean) {
+        (Some(minimum), Some(maximum), Some(mean)) => {
+            format!("{minimum:.6e} to {maximum:.6e}, mean {mean:.6e}")
+        }
+        _ => "no finite sample".to_owned(),
+    };
+    for (count, what) in
+        [(summary.nan, "NaN"), (summary.infinite, "infinite"), (summary.negative, "negative")]
+    {
+        if count > 0 {
+            text += &format!(", {count} {what}");
+        }
+    }
+    text
+}
+
+fn environment_map(path: &Path) -> Result<Report> {
+    let mut warnings = Vec::new();
+    let map = EnvironmentMap::load(path, 1.0, 0.0, &mut warnings)?;
+    let mut lines = vec![format!("environment map of {}x{} texels", map.width, map.height)];
+    let mut channels = serde_json::Map::new();
+    for (index, name) in ["R", "G", "B"].into_iter().enumerate() {
+        let summary = ChannelSummary::of(map.texels.iter().map(|texel| texel[index]));
+        lines.push(format!("channel {name:<24} {}", describe(&summary)));
+        channels.insert(name.to_owned(), json!(summary));
+    }
+    let value = json!({
+        "kind": "environment map",
+        "width": map.width,
+        "height": map.height,
+        "channels": channels,
+    });
+    Ok(Report { value, lines, warnings })
+}
+
+fn measured_brdf(path: &Path) -> Result<Report> {
+    let table = Arc::new(MeasuredTable::load(path)?);
+    let sanity = Sanity::of(path, &table)?;
+    let mut warnings = table.warnings.clone();
+    warnings.extend(sanity.warnings());
+    let mut lines = vec![
+        "measured BRDF on 90 x 90 x 180 cells".to_owned(),
+        format!("cells without measurement  {}", table.invalid_cell_count),
+        format!("largest value tried        {:.4} /sr", sanity.largest_value),
+        format!("largest reciprocity error  {:.2e}", sanity.largest_reciprocity_error),
+    ];
+    for (elevation, [red, green, blue]) in ELEVATIONS_DEG.iter().zip(&sanity.albedo) {
+        lines.push(format!("albedo at {elevation:>2} deg           {red:.3} {green:.3} {blue:.3}"));
+    }
+    let value = json!({
+        "kind": "measured BRDF",
+        "invalid_cells": table.invalid_cell_count,
+        "elevations_deg": ELEVATIONS_DEG,
+        "sanity": sanity,
+    });
+    Ok(Report { value, lines, warnings })
+}
