@@ -5,6 +5,7 @@
 //! which a render continues to the bit. [`Metadata`] says in every file what it was rendered with.
 
 pub mod checkpoint;
+pub mod display;
 pub mod exr;
 pub mod merge;
 pub mod metadata;
@@ -21,6 +22,7 @@ use std::{
 
 pub use self::{
     checkpoint::Checkpoint,
+    display::DisplayServer,
     exr::{Attribute, Image, RgbImage},
     metadata::{Metadata, SampleRange},
     statistics::Statistics,
