@@ -1,5 +1,7 @@
 //! Triangles in world space.
 
+use super::{mesh::Mesh, transform::Transform};
+
 /// Every triangle of the scene in world space; one mesh used many times is repeated here.
 #[derive(Clone, Debug, Default)]
 pub struct Geometry {
@@ -12,4 +14,131 @@ pub struct Geometry {
     pub triangles: Vec<[u32; 3]>,
     /// Material index per triangle.
     pub materials: Vec<u32>,
+}
+
+/// What was left out of a mesh when it was placed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Dropped {
+    /// Triangles without area, or too small for the direction of their normal to be computed.
+    pub degenerate: usize,
+    /// Triangles with an infinite or NaN corner.
+    pub non_finite: usize,
+    /// Vertex normals that were infinite or NaN; their triangles are flat-shaded.
+    pub normals: usize,
+}
+
+impl Geometry {
+    /// Places a mesh in the world; `material_of` gives the material of a triangle of the mesh.
+    ///
+    /// Keeps every vertex, so that indices stay as they are; one with a position that is not finite is
+    /// put where the object's origin is, and no triangle uses it.
+    ///
+    /// # Panics
+    ///
+    /// Panics where the vertices would be more than 32-bit indices can tell apart.
+    pub fn append(
+        &mut self,
+        mesh: &Mesh,
+        transform: &Transform,
+        material_of: impl Fn(usize) -> u32,
+    ) -> Dropped {
+        let mut dropped = Dropped::default();
+        let first_vertex = self.positions.len();
+        assert!(
+            u32::try_from(first_vertex + mesh.positions.len()).is_ok(),
+            "vertices are counted before they are appended"
+        );
+        let first_vertex = first_vertex as u32;
+        self.positions.extend(mesh.positions.iter().map(|&position| transform.position(position)));
+        if mesh.normals.is_empty() {
+            self.normals.resize(self.positions.len(), [0.0; 3]);
+        } else {
+            assert_eq!(mesh.normals.len(), mesh.positions.len(), "one normal per vertex");
+            self.normals.extend(mesh.normals.iter().map(|&normal| {
+                dropped.normals += usize::from(!is_finite(normal));
+                transform.normal(normal)
+            }));
+        }
+        for (index, &triangle) in mesh.triangles.iter().enumerate() {
+            let [a, b, c] = triangle.map(|corner| first_vertex + corner);
+            let corners = [a, b, c].map(|corner| self.positions[corner as usize]);
+            if !corners.iter().all(|corner| is_finite(*corner)) {
+                dropped.non_finite += 1;
+            } else if !has_normal(corners) {
+                dropped.degenerate += 1;
+            } else {
+                self.triangles.push(if transform.mirrors { [a, c, b] } else { [a, b, c] });
+                self.materials.push(material_of(index));
+            }
+        }
+        for position in &mut self.positions[first_vertex as usize..] {
+            if !is_finite(*position) {
+                *position = transform.translate.to_array();
+            }
+        }
+        dropped
+    }
+}
+
+fn is_finite(vector: [f32; 3]) -> bool {
+    vector.iter().all(|component| component.is_finite())
+}
+
+/// Whether single precision can tell the direction of a triangle's normal.
+fn has_normal(corners: [[f32; 3]; 3]) -> bool {
+    let [a, b, c] = corners.map(glam::Vec3::from_array);
+    let squared = (b - a).cross(c - a).length_squared();
+    squared.is_finite() && squared >= f32::MIN_POSITIVE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn corner_mesh() -> Mesh {
+        Mesh {
+            positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0]],
+            triangles: vec![[0, 1, 2]],
+            ..Mesh::default()
+        }
+    }
+
+    #[test]
+    fn bad_triangles_are_dropped_and_counted() {
+        let mut mesh = corner_mesh();
+        mesh.positions.push([f32::NAN, 0.0, 0.0]);
+        mesh.positions.push([1e-20, 1e-20, 0.0]);
+        mesh.triangles = vec![[0, 1, 3], [0, 1, 2], [1, 1, 2], [0, 1, 4], [0, 1, 5]];
+        let mut geometry = Geometry::default();
+        let place = Transform::new([1.0; 3], [0.0; 3], [5.0, 0.0, 0.0]);
+        let dropped = geometry.append(&mesh, &place, |index| index as u32);
+        // In world space the sixth vertex falls onto the first.
+        assert_eq!(dropped, Dropped { degenerate: 3, non_finite: 1, normals: 0 });
+        assert_eq!(geometry.triangles, [[0, 1, 2]]);
+        assert_eq!(geometry.materials, [1]);
+        assert_eq!(geometry.normals.len(), geometry.positions.len());
+        assert!(geometry.positions.iter().all(|position| is_finite(*position)));
+    }
+
+    #[test]
+    fn a_mirror_turns_the_winding() {
+        let mut geometry = Geometry::default();
+        let mirror = Transform::new([-1.0, 1.0, 1.0], [0.0; 3], [0.0; 3]);
+        geometry.append(&corner_mesh(), &mirror, |_| 0);
+        assert_eq!(geometry.triangles, [[0, 2, 1]]);
+        let [a, b, c] = geometry.triangles[0]
+            .map(|index| glam::Vec3::from_array(geometry.positions[index as usize]));
+        assert!((b - a).cross(c - a).z > 0.0, "the outside stays outside");
+    }
+
+    #[test]
+    fn normals_that_are_not_finite_mark_flat_shading() {
+        let mut mesh = corner_mesh();
+        mesh.normals = vec![[0.0, 0.0, 2.0], [f32::INFINITY, 0.0, 0.0], [0.0; 3], [0.0, 0.0, 1.0]];
+        let mut geometry = Geometry::default();
+        let place = Transform::new([1.0; 3], [0.0; 3], [0.0; 3]);
+        assert_eq!(geometry.append(&mesh, &place, |_| 0).normals, 1);
+        let expected = [[0.0, 0.0, 1.0], [0.0; 3], [0.0; 3], [0.0, 0.0, 1.0]];
+        assert_eq!(geometry.normals, expected);
+    }
 }

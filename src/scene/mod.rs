@@ -2,8 +2,15 @@
 
 pub mod camera;
 pub mod environment;
+pub mod file;
 pub mod geometry;
+mod hash;
+pub mod load;
 pub mod material;
+pub mod mesh;
+pub mod shapes;
+pub mod transform;
+pub mod triangulate;
 
 use std::path::PathBuf;
 

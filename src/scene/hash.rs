@@ -1,0 +1,102 @@
+//! SHA-256 of everything that changes the picture.
+
+use std::fmt::Write;
+
+use glam::Vec3;
+use sha2::{Digest, Sha256};
+
+use super::{
+    Filter, Scene,
+    material::{ConductorFresnel, MaterialKind},
+};
+
+/// Lower-case hexadecimal digest of camera, film, environment, materials and geometry.
+///
+/// Names, paths and the order of the text do not enter. Every array is preceded by its length, every
+/// variant by a tag, so that no two scenes give the same bytes.
+pub fn hash(scene: &Scene) -> String {
+    let mut hasher = Hasher(Sha256::new());
+    let camera = &scene.camera;
+    hasher.vectors(&[camera.position, camera.look_at, camera.up]);
+    hasher.floats(&[camera.vertical_fov_deg, camera.aperture_radius, camera.focus_distance]);
+    let filter = match scene.film.filter {
+        Filter::Box => 0,
+        Filter::Gaussian => 1,
+    };
+    hasher.integers(&[scene.film.width, scene.film.height, filter]);
+    let environment = &scene.environment;
+    hasher.integers(&[environment.width, environment.height]);
+    hasher.floats(&[environment.rotation_rad]);
+    hasher.vectors(&environment.texels);
+    hasher.length(scene.materials.len());
+    for material in &scene.materials {
+        hasher.material(&material.kind);
+    }
+    let geometry = &scene.geometry;
+    hasher.array(bytemuck::cast_slice(&geometry.positions));
+    hasher.array(bytemuck::cast_slice(&geometry.normals));
+    hasher.array(bytemuck::cast_slice(&geometry.triangles));
+    hasher.array(bytemuck::cast_slice(&geometry.materials));
+    let mut hexadecimal = String::with_capacity(64);
+    for byte in hasher.0.finalize() {
+        // Writing into a string cannot fail.
+        let _ = write!(hexadecimal, "{byte:02x}");
+    }
+    hexadecimal
+}
+
+struct Hasher(Sha256);
+
+impl Hasher {
+    fn length(&mut self, length: usize) {
+        self.0.update((length as u64).to_le_bytes());
+    }
+
+    fn array(&mut self, bytes: &[u8]) {
+        self.length(bytes.len());
+        self.0.update(bytes);
+    }
+
+    fn integers(&mut self, integers: &[u32]) {
+        self.array(bytemuck::cast_slice(integers));
+    }
+
+    fn floats(&mut self, floats: &[f32]) {
+        self.array(bytemuck::cast_slice(floats));
+    }
+
+    fn vectors(&mut self, vectors: &[Vec3]) {
+        self.array(bytemuck::cast_slice(vectors));
+    }
+
+    fn material(&mut self, kind: &MaterialKind) {
+        match kind {
+            MaterialKind::Diffuse { reflectance } => {
+                self.integers(&[0]);
+                self.vectors(&[*reflectance]);
+            }
+            MaterialKind::Plastic { diffuse, alpha, ior } => {
+                self.integers(&[1]);
+                self.vectors(&[*diffuse]);
+                self.floats(&[*alpha, *ior]);
+            }
+            MaterialKind::Conductor {
+                alpha,
+                fresnel: ConductorFresnel::Schlick { reflectance },
+            } => {
+                self.integers(&[2]);
+                self.floats(&[*alpha]);
+                self.vectors(&[*reflectance]);
+            }
+            MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } => {
+                self.integers(&[3]);
+                self.floats(&[*alpha]);
+                self.vectors(&[*eta, *k]);
+            }
+            MaterialKind::Measured { table, .. } => {
+                self.integers(&[4]);
+                self.integers(table.words());
+            }
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! Mesh file → indexed triangles in object space, with normals where the file has them.
+//!
+//! PLY, OBJ and glTF are told apart by the file's extension. Each reader streams the file, keeps single
+//! precision, and leaves nothing but the arrays of [`Mesh`] behind.
+
+pub mod gltf;
+pub mod obj;
+pub mod ply;
+
+use std::{ffi::OsStr, path::Path};
+
+use crate::error::{Error, Result};
+
+/// Triangles in object space.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Vertex positions, metres before the object's scale.
+    pub positions: Vec<[f32; 3]>,
+    /// Vertex normals, of any length, a zero vector where there is none; as long as `positions`, or
+    /// empty where the mesh has no normals at all.
+    pub normals: Vec<[f32; 3]>,
+    /// Three vertex indices per triangle, counter-clockwise seen from outside; all in range.
+    pub triangles: Vec<[u32; 3]>,
+    /// Runs of triangles by the material the file gives them, in order, from triangle 0 on; empty
+    /// where the file knows no materials.
+    pub runs: Vec<MaterialRun>,
+    /// Materials of the file.
+    pub materials: Vec<MeshMaterial>,
+}
+
+/// Where a run of triangles of one material begins; it ends where the next begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MaterialRun {
+    /// First triangle of the run.
+    pub first_triangle: usize,
+    /// Index into [`Mesh::materials`]; none where the file gives these triangles no material.
+    pub material: Option<usize>,
+}
+
+/// What a mesh file says about a material, as far as it is used.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshMaterial {
+    /// Name in the file; may be empty.
+    pub name: String,
+    /// Linear Rec.709 colour of the diffuse reflection, 0…1.
+    pub base_color: [f32; 3],
+}
+
+impl Mesh {
+    /// Reads a mesh file; what was left out is added to `warnings`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`] where the file cannot be read, [`Error::Format`] or [`Error::Parse`] where it
+    /// does not hold what it should: unknown format, truncation, an index out of range.
+    pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
+        let extension = path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
+        match extension.as_deref() {
+            Some("ply") => ply::read(path),
+            Some("obj") => obj::read(path, warnings),
+            Some("gltf" | "glb") => gltf::read(path, warnings),
+            found => Err(Error::format(
+                path,
+                format!(
+                    "expected a mesh in .ply, .obj, .gltf or .glb, found {}",
+                    found.map_or("no extension".to_owned(), |found| format!(".{found}"))
+                ),
+            )),
+        }
+    }
+
+    /// Begins a run of triangles of `material` at the next triangle.
+    fn start_run(&mut self, material: Option<usize>) {
+        let first_triangle = self.triangles.len();
+        match self.runs.last_mut() {
+            Some(last) if last.first_triangle == first_triangle => last.material = material,
+            Some(last) if last.material == material => {}
+            _ => self.runs.push(MaterialRun { first_triangle, material }),
+        }
+    }
+}

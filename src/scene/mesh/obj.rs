@@ -1,0 +1,310 @@
+//! Wavefront OBJ: positions, normals, faces of every group, and the diffuse colours of its MTL
+//! library.
+//!
+//! Deviation: read here and not through a crate, so that every message names the line and the index,
+//! and so that a large file needs no more memory than its mesh.
+
+use std::{
+    fs::File,
+    io::{BufRead, BufReader},
+    path::Path,
+};
+
+use super::{Mesh, MeshMaterial};
+use crate::{
+    error::{Error, Result},
+    scene::triangulate::triangulate_in_space,
+};
+
+/// Ends a chain of vertices; also the normal of a corner that has none.
+const NONE: u32 = u32::MAX;
+
+/// Reads an OBJ file and the material libraries beside it; a library that is missing is a warning.
+///
+/// # Errors
+///
+/// [`Error::Io`], or [`Error::Parse`] with the line.
+pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
+    let file = File::open(path).map_err(|source| Error::io(path, "read", source))?;
+    let mut reader = ObjReader {
+        path,
+        line: 0,
+        positions: Vec::new(),
+        normals: Vec::new(),
+        vertices: Vec::new(),
+        chains: Vec::new(),
+        mesh: Mesh::default(),
+        library_colors: Vec::new(),
+    };
+    for_each_line(path, BufReader::with_capacity(1 << 16, file), |line, text| {
+        reader.line = line;
+        reader.read_line(text, warnings)
+    })?;
+    Ok(reader.finish())
+}
+
+/// Hands out every line with its number from 1; a line that ends in a backslash goes on in the next.
+fn for_each_line(
+    path: &Path,
+    mut reader: impl BufRead,
+    mut use_line: impl FnMut(usize, &str) -> Result<()>,
+) -> Result<()> {
+    let mut bytes = Vec::new();
+    let mut number = 0;
+    loop {
+        bytes.clear();
+        let first_line = number + 1;
+        loop {
+            let read = reader
+                .read_until(b'\n', &mut bytes)
+                .map_err(|source| Error::io(path, "read", source))?;
+            number += 1;
+            while matches!(bytes.last(), Some(b'\n' | b'\r')) {
+                bytes.pop();
+            }
+            if read > 0 && bytes.last() == Some(&b'\\') {
+                bytes.pop();
+                bytes.push(b' ');
+                continue;
+            }
+            if read == 0 && bytes.is_empty() {
+                return Ok(());
+            }
+            break;
+        }
+        use_line(first_line, &String::from_utf8_lossy(&bytes))?;
+    }
+}
+
+/// A pair of position and normal that some face uses, and the next of the same position.
+#[derive(Clone, Copy)]
+struct Vertex {
+    normal: u32,
+    next: u32,
+}
+
+struct ObjReader<'a> {
+    path: &'a Path,
+    line: usize,
+    positions: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    /// As long as `mesh.positions`.
+    vertices: Vec<Vertex>,
+    /// First of `vertices` with a position; as long as `positions`.
+    chains: Vec<u32>,
+    mesh: Mesh,
+    library_colors: Vec<MeshMaterial>,
+}
+
+impl ObjReader<'_> {
+    fn error(&self, message: impl Into<String>) -> Error {
+        Error::Parse {
+            path: self.path.to_path_buf(),
+            line: self.line,
+            column: 1,
+            message: message.into(),
+        }
+    }
+
+    fn read_line(&mut self, text: &str, warnings: &mut Vec<String>) -> Result<()> {
+        let text = text.split('#').next().unwrap_or_default().trim();
+        let (keyword, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+        match keyword {
+            "v" => {
+                let position = self.vector(rest)?;
+                self.positions.push(position);
+                self.chains.push(NONE);
+            }
+            "vn" => {
+                let normal = self.vector(rest)?;
+                self.normals.push(normal);
+            }
+            "f" => self.read_face(rest)?,
+            "usemtl" => {
+                let material = self.material_index(rest.trim());
+                self.mesh.start_run(Some(material));
+            }
+            "mtllib" => self.read_library(rest.trim(), warnings)?,
+            // Texture coordinates, names of groups and objects, smoothing groups, points, lines and
+            // free-form surfaces change nothing here.
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn vector(&self, words: &str) -> Result<[f32; 3]> {
+        let mut words = words.split_ascii_whitespace();
+        let mut vector = [0.0; 3];
+        for component in &mut vector {
+            let word = words.next().unwrap_or_default();
+            *component = word
+                .parse()
+                .map_err(|_| self.error(format!("expected three numbers, found `{word}`")))?;
+        }
+        Ok(vector)
+    }
+
+    fn read_face(&mut self, words: &str) -> Result<()> {
+        let mut corners = [NONE; 4];
+        let mut polygon = Vec::new();
+        let mut count = 0;
+        for word in words.split_ascii_whitespace() {
+            let corner = self.corner(word)?;
+            if count < corners.len() {
+                corners[count] = corner;
+            } else {
+                if polygon.is_empty() {
+                    polygon.extend(corners);
+                }
+                polygon.push(corner);
+            }
+            count += 1;
+        }
+        if count < 3 {
+            return Err(self.error(format!("a face needs three corners or more, found {count}")));
+        }
+        if count == 3 {
+            self.mesh.triangles.push([corners[0], corners[1], corners[2]]);
+            return Ok(());
+        }
+        let corners = if count == 4 { &corners[..] } else { &polygon[..] };
+        let positions: Vec<_> =
+            corners.iter().map(|&corner| self.mesh.positions[corner as usize]).collect();
+        let triangles = triangulate_in_space(&positions);
+        self.mesh
+            .triangles
+            .extend(triangles.iter().map(|triangle| triangle.map(|index| corners[index])));
+        Ok(())
+    }
+
+    /// Vertex of `position`, `position/uv`, `position/uv/normal` or `position//normal`.
+    fn corner(&mut self, word: &str) -> Result<u32> {
+        let mut parts = word.split('/');
+        let position = parts.next().unwrap_or_default();
+        let position = self.index(position, self.positions.len(), "position")?;
+        let normal = match parts.nth(1) {
+            Some(normal) if !normal.is_empty() => {
+                self.index(normal, self.normals.len(), "normal")?
+            }
+            _ => NONE,
+        };
+        let mut vertex = self.chains[position as usize];
+        while vertex != NONE {
+            let Vertex { normal: found, next } = self.vertices[vertex as usize];
+            if found == normal {
+                return Ok(vertex);
+            }
+            vertex = next;
+        }
+        let vertex = u32::try_from(self.vertices.len())
+            .ok()
+            .filter(|&vertex| vertex != NONE)
+            .ok_or_else(|| self.error("more than 4,294,967,294 vertices"))?;
+        let next = std::mem::replace(&mut self.chains[position as usize], vertex);
+        self.vertices.push(Vertex { normal, next });
+        self.mesh.positions.push(self.positions[position as usize]);
+        Ok(vertex)
+    }
+
+    /// Index from 0; the file counts from 1, or backwards from −1, the last one so far.
+    fn index(&self, word: &str, count: usize, what: &str) -> Result<u32> {
+        let stated: i64 = word
+            .parse()
+            .map_err(|_| self.error(format!("expected the index of a {what}, found `{word}`")))?;
+        let index = if stated < 0 { stated + count as i64 } else { stated - 1 };
+        if (0..count as i64).contains(&index)
+            && let Ok(index) = u32::try_from(index)
+            && index != NONE
+        {
+            Ok(index)
+        } else {
+            let face = self.mesh.triangles.len();
+            Err(self.error(format!(
+                "face after {face} triangles: {what} index {stated} is out of range, there are \
+                 {count} {what}s so far"
+            )))
+        }
+    }
+
+    /// Material of the file by name; one that no library has described is white.
+    fn material_index(&mut self, name: &str) -> usize {
+        if let Some(index) = self.mesh.materials.iter().position(|found| found.name == name) {
+            return index;
+        }
+        let described = self.library_colors.iter().find(|found| found.name == name);
+        let base_color = described.map_or([1.0; 3], |found| found.base_color);
+        self.mesh.materials.push(MeshMaterial { name: name.to_owned(), base_color });
+        self.mesh.materials.len() - 1
+    }
+
+    /// Reads the colours (`Kd`) of an MTL library; one line may name several files.
+    fn read_library(&mut self, names: &str, warnings: &mut Vec<String>) -> Result<()> {
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        let whole = folder.join(names);
+        let paths = if whole.is_file() {
+            vec![whole]
+        } else {
+            names.split_ascii_whitespace().map(|name| folder.join(name)).collect()
+        };
+        for path in paths {
+            let Ok(file) = File::open(&path) else {
+                warnings.push(format!(
+                    "{}:{}: cannot read the material library {}; its materials are white",
+                    self.path.display(),
+                    self.line,
+                    path.display()
+                ));
+                continue;
+            };
+            let colors = &mut self.library_colors;
+            for_each_line(&path, BufReader::new(file), |line, text| {
+                let mut words = text.split_ascii_whitespace();
+                match words.next() {
+                    Some("newmtl") => {
+                        let name = text.trim()["newmtl".len()..].trim().to_owned();
+                        colors.push(MeshMaterial { name, base_color: [1.0; 3] });
+                    }
+                    Some("Kd") => {
+                        let color: Vec<f32> = words.map_while(|word| word.parse().ok()).collect();
+                        let color = match color[..] {
+                            [grey] => [grey; 3],
+                            [red, green, blue, ..] => [red, green, blue],
+                            _ => [f32::NAN; 3],
+                        };
+                        if !color.iter().all(|channel| (0.0..=1.0).contains(channel)) {
+                            return Err(Error::Parse {
+                                path: path.clone(),
+                                line,
+                                column: 1,
+                                message: format!(
+                                    "expected `Kd` with three numbers from 0 to 1, found `{}`",
+                                    text.trim()
+                                ),
+                            });
+                        }
+                        if let Some(material) = colors.last_mut() {
+                            material.base_color = color;
+                        }
+                    }
+                    _ => {}
+                }
+                Ok(())
+            })?;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Mesh {
+        if self.vertices.iter().any(|vertex| vertex.normal != NONE) {
+            let normal_of = |vertex: &Vertex| {
+                self.normals.get(vertex.normal as usize).copied().unwrap_or_default()
+            };
+            self.mesh.normals = self.vertices.iter().map(normal_of).collect();
+        }
+        if self.mesh.runs.first().is_some_and(|first| first.first_triangle > 0) {
+            let unnamed = super::MaterialRun { first_triangle: 0, material: None };
+            self.mesh.runs.insert(0, unnamed);
+        }
+        self.mesh
+    }
+}

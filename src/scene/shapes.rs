@@ -1,0 +1,220 @@
+//! Procedural shapes: parameters of a scene file → a closed mesh, wound and with normals outward.
+//!
+//! Every shape is in metres in its own space, +Y up:
+//!
+//! | shape | where it stands |
+//! |---|---|
+//! | `box`, `sphere`, `torus` | centre at the origin |
+//! | `cylinder`, `cone` | base on y = 0, axis +Y |
+//! | `lathe` | turned about +Y, where its profile puts it |
+//! | `extrude` | outline in the x-y plane, from z = −depth / 2 to depth / 2 |
+//! | `tube`, `blobs` | where their points put them |
+//! | `grid` | centred on the origin in x and z, heights along +Y |
+//!
+//! Lengths of lists and counts are bounded, so that no scene text asks for more memory than a machine
+//! has.
+
+mod blobs;
+mod curve;
+mod extrude;
+mod grid;
+mod revolve;
+mod rounded_box;
+#[cfg(test)]
+mod tests;
+mod tube;
+
+use std::ops::RangeInclusive;
+
+pub use blobs::{Blob, Blobs};
+pub use extrude::Extrude;
+use glam::DVec3;
+pub use grid::{Grid, Wave};
+pub use revolve::{Cone, Cylinder, Lathe, Sphere, Torus};
+pub use rounded_box::RoundedBox;
+pub use tube::Tube;
+
+use super::mesh::Mesh;
+
+/// Counts of segments a shape may be cut into.
+const SEGMENT_RANGE: RangeInclusive<usize> = 3..=4096;
+
+/// Most points of a profile, outline or path.
+const MAX_POINTS: usize = 1024;
+
+/// A procedural shape with its parameters.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// `box`.
+    Box(RoundedBox),
+    /// `sphere`.
+    Sphere(Sphere),
+    /// `cylinder`.
+    Cylinder(Cylinder),
+    /// `cone`.
+    Cone(Cone),
+    /// `torus`.
+    Torus(Torus),
+    /// `lathe`.
+    Lathe(Lathe),
+    /// `extrude`.
+    Extrude(Extrude),
+    /// `tube`.
+    Tube(Tube),
+    /// `blobs`.
+    Blobs(Blobs),
+    /// `grid`.
+    Grid(Grid),
+}
+
+impl Shape {
+    /// Name in the scene file.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Box(_) => "box",
+            Self::Sphere(_) => "sphere",
+            Self::Cylinder(_) => "cylinder",
+            Self::Cone(_) => "cone",
+            Self::Torus(_) => "torus",
+            Self::Lathe(_) => "lathe",
+            Self::Extrude(_) => "extrude",
+            Self::Tube(_) => "tube",
+            Self::Blobs(_) => "blobs",
+            Self::Grid(_) => "grid",
+        }
+    }
+
+    /// The shape as a closed mesh.
+    ///
+    /// # Errors
+    ///
+    /// A message that names the parameter, what is expected and what was found.
+    pub fn mesh(&self) -> Result<Mesh, String> {
+        match self {
+            Self::Box(shape) => shape.mesh(),
+            Self::Sphere(shape) => shape.mesh(),
+            Self::Cylinder(shape) => shape.mesh(),
+            Self::Cone(shape) => shape.mesh(),
+            Self::Torus(shape) => shape.mesh(),
+            Self::Lathe(shape) => shape.mesh(),
+            Self::Extrude(shape) => shape.mesh(),
+            Self::Tube(shape) => shape.mesh(),
+            Self::Blobs(shape) => shape.mesh(),
+            Self::Grid(shape) => shape.mesh(),
+        }
+    }
+}
+
+/// A length that must be more than nothing.
+fn positive(key: &str, length: f32) -> Result<f64, String> {
+    if length > 0.0 && length.is_finite() {
+        Ok(f64::from(length))
+    } else {
+        Err(format!("{key}: expected a finite number above 0, found {length}"))
+    }
+}
+
+/// A length that may be nothing, up to `limit`.
+fn from_zero_to(key: &str, length: f32, limit: f64) -> Result<f64, String> {
+    let length = f64::from(length);
+    if (0.0..=limit).contains(&length) {
+        Ok(length)
+    } else {
+        Err(format!("{key}: expected a number from 0 to {limit}, found {length}"))
+    }
+}
+
+fn finite(key: &str, numbers: &[f32]) -> Result<(), String> {
+    match numbers.iter().find(|number| !number.is_finite()) {
+        None => Ok(()),
+        Some(found) => Err(format!("{key}: expected finite numbers, found {found}")),
+    }
+}
+
+fn count(key: &str, count: usize, range: RangeInclusive<usize>) -> Result<usize, String> {
+    if range.contains(&count) {
+        Ok(count)
+    } else {
+        Err(format!("{key}: expected {} to {}, found {count}", range.start(), range.end()))
+    }
+}
+
+/// Puts a surface together from patches.
+#[derive(Debug, Default)]
+struct Builder {
+    mesh: Mesh,
+}
+
+impl Builder {
+    fn vertex(&mut self, position: DVec3, normal: DVec3) -> u32 {
+        self.mesh.positions.push(position.as_vec3().to_array());
+        self.mesh.normals.push(normal.normalize_or_zero().as_vec3().to_array());
+        (self.mesh.positions.len() - 1) as u32
+    }
+
+    /// A triangle, unless two of its corners fall together, as at a pole.
+    fn triangle(&mut self, corners: [u32; 3]) {
+        let [a, b, c] = corners.map(|corner| self.mesh.positions[corner as usize]);
+        if a != b && b != c && c != a {
+            self.mesh.triangles.push(corners);
+        }
+    }
+
+    /// A patch of `rows` × `columns` vertices; columns × rows (cross product) points outward.
+    fn patch(
+        &mut self,
+        rows: usize,
+        columns: usize,
+        position_and_normal: impl Fn(usize, usize) -> (DVec3, DVec3),
+    ) {
+        let first = self.mesh.positions.len() as u32;
+        for row in 0..rows {
+            for column in 0..columns {
+                let (position, normal) = position_and_normal(row, column);
+                self.vertex(position, normal);
+            }
+        }
+        let at = |row: usize, column: usize| first + (row * columns + column) as u32;
+        for row in 1..rows {
+            for column in 1..columns {
+                let (a, b) = (at(row - 1, column - 1), at(row - 1, column));
+                let (c, d) = (at(row, column), at(row, column - 1));
+                self.triangle([a, b, c]);
+                self.triangle([a, c, d]);
+            }
+        }
+    }
+
+    /// A flat face with its triangles, given as indices into `positions`.
+    fn face(&mut self, positions: &[DVec3], normal: DVec3, triangles: &[[usize; 3]]) {
+        let first = self.mesh.positions.len() as u32;
+        for &position in positions {
+            self.vertex(position, normal);
+        }
+        for triangle in triangles {
+            self.triangle(triangle.map(|index| first + index as u32));
+        }
+    }
+
+    /// The mesh, turned inside out where its outside was within (a profile given from top to bottom).
+    fn finish(self) -> Mesh {
+        let mut mesh = self.mesh;
+        if volume(&mesh) < 0.0 {
+            mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+            mesh.normals.iter_mut().flatten().for_each(|component| *component = -*component);
+        }
+        mesh
+    }
+}
+
+/// Volume inside a closed mesh, by the divergence theorem; negative where it is wound inward.
+fn volume(mesh: &Mesh) -> f64 {
+    mesh.triangles
+        .iter()
+        .map(|triangle| {
+            let [a, b, c] = triangle
+                .map(|index| DVec3::from_array(mesh.positions[index as usize].map(f64::from)));
+            a.dot(b.cross(c)) / 6.0
+        })
+        .sum()
+}

@@ -1,0 +1,71 @@
+//! `box`: a cuboid, with rounded edges where it has a bevel.
+
+use std::f64::consts::FRAC_PI_4;
+
+use glam::DVec3;
+use serde::Deserialize;
+
+use super::{Builder, Mesh, count, from_zero_to, positive};
+
+/// `box`: centre at the origin.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RoundedBox {
+    /// Full lengths along x, y, z, metres.
+    pub size: [f32; 3],
+    /// Radius of the rounded edges, metres; 0 is sharp. At most half the shortest length.
+    #[serde(default)]
+    pub bevel: f32,
+    /// Pieces of half a rounded edge, that is 45°.
+    #[serde(default = "default_bevel_segments")]
+    pub bevel_segments: usize,
+}
+
+fn default_bevel_segments() -> usize {
+    3
+}
+
+impl RoundedBox {
+    /// Closed mesh: 12 triangles where there is no bevel.
+    ///
+    /// # Errors
+    ///
+    /// A message about the parameter at fault.
+    pub fn mesh(&self) -> Result<Mesh, String> {
+        let [x, y, z] = self.size;
+        let half =
+            0.5 * DVec3::new(positive("size", x)?, positive("size", y)?, positive("size", z)?);
+        let bevel = from_zero_to("bevel", self.bevel, half.min_element())?;
+        let segments = count("bevel_segments", self.bevel_segments, 1..=64)?;
+        let inner = half - bevel;
+        // Along each axis: the rounded edge up to 45°, the flat part, the other edge; as the corner of
+        // the inner box and the offset from it in units of the bevel before normalisation.
+        let lines: Vec<(f64, f64)> = if bevel > 0.0 {
+            let tangent = |step: usize| (FRAC_PI_4 * step as f64 / segments as f64).tan();
+            let low = (0..=segments).rev().map(|step| (-1.0, -tangent(step)));
+            let high = (0..=segments).map(|step| (1.0, tangent(step)));
+            low.chain(high).collect()
+        } else {
+            vec![(-1.0, 0.0), (1.0, 0.0)]
+        };
+        let mut builder = Builder::default();
+        for axis in 0..3 {
+            for sign in [-1.0, 1.0] {
+                // Columns × rows points outward: (axis + 1) × (axis + 2) = axis.
+                let (mut column_axis, mut row_axis) = ((axis + 1) % 3, (axis + 2) % 3);
+                if sign < 0.0 {
+                    std::mem::swap(&mut column_axis, &mut row_axis);
+                }
+                builder.patch(lines.len(), lines.len(), |row, column| {
+                    let (mut corner, mut offset) = (DVec3::ZERO, DVec3::ZERO);
+                    (corner[axis], offset[axis]) = (sign, sign);
+                    (corner[column_axis], offset[column_axis]) = lines[column];
+                    (corner[row_axis], offset[row_axis]) = lines[row];
+                    let normal = offset.normalize();
+                    (corner * inner + bevel * normal, normal)
+                });
+            }
+        }
+        Ok(builder.finish())
+    }
+}

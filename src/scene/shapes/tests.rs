@@ -1,0 +1,276 @@
+#![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+use std::{collections::HashMap, f64::consts::PI};
+
+use glam::{DVec2, Vec3};
+
+use super::*;
+
+/// A shape from the keys of its table.
+fn shape<T: serde::de::DeserializeOwned>(keys: &str) -> T {
+    toml::from_str(keys).unwrap()
+}
+
+/// Asserts that every edge is walked as often one way as the other, that normals and winding agree and
+/// nothing is degenerate; returns the volume and the Euler characteristic.
+fn check_closed(mesh: &Mesh) -> (f64, i64) {
+    let mut ids = HashMap::new();
+    let mut id = |index: u32| {
+        let bits = mesh.positions[index as usize].map(|component| (component + 0.0).to_bits());
+        let next = ids.len();
+        *ids.entry(bits).or_insert(next)
+    };
+    let mut edges: HashMap<(usize, usize), i64> = HashMap::new();
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(&mut id);
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            assert_ne!(from, to, "a triangle has an edge without length");
+            *edges.entry((from.min(to), from.max(to))).or_default() +=
+                if from < to { 1 } else { -1 };
+        }
+    }
+    let open = edges.values().filter(|balance| **balance != 0).count();
+    assert_eq!(open, 0, "of {} edges so many are open", edges.len());
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|index| Vec3::from_array(mesh.positions[index as usize]));
+        let face = (b - a).cross(c - a);
+        assert!(face.length() > 0.0);
+        for &index in triangle {
+            let normal = Vec3::from_array(mesh.normals[index as usize]);
+            assert!((normal.length() - 1.0).abs() < 1e-5, "{normal}");
+            assert!(face.normalize().dot(normal) > 0.3, "normal {normal} on a face to {face}");
+        }
+    }
+    let characteristic = ids.len() as i64 - edges.len() as i64 + mesh.triangles.len() as i64;
+    (volume(mesh), characteristic)
+}
+
+fn assert_close(found: f64, expected: f64, relative: f64) {
+    assert!((found / expected - 1.0).abs() < relative, "found {found}, expected {expected}");
+}
+
+#[test]
+fn box_has_twelve_triangles_and_its_volume() {
+    let mesh = shape::<RoundedBox>("size = [2.0, 3.0, 0.5]").mesh().unwrap();
+    assert_eq!(mesh.triangles.len(), 12);
+    let (volume, characteristic) = check_closed(&mesh);
+    assert_close(volume, 3.0, 1e-6);
+    assert_eq!(characteristic, 2);
+    let low = mesh.positions.iter().copied().reduce(|a, b| [0, 1, 2].map(|i| a[i].min(b[i])));
+    assert_eq!(low, Some([-1.0, -1.5, -0.25]));
+}
+
+#[test]
+fn rounded_box_has_the_volume_of_a_box_swept_by_a_ball() {
+    let mesh = shape::<RoundedBox>("size = [2.0, 3.0, 1.0]\nbevel = 0.2\nbevel_segments = 8")
+        .mesh()
+        .unwrap();
+    let (found, characteristic) = check_closed(&mesh);
+    // Steiner's formula for the inner box of 1.6 × 2.6 × 0.6 and radius 0.2.
+    let (x, y, z, r) = (1.6, 2.6, 0.6, 0.2);
+    let expected = x * y * z
+        + 2.0 * r * (x * y + y * z + z * x)
+        + PI * r * r * (x + y + z)
+        + 4.0 / 3.0 * PI * r * r * r;
+    assert_close(found, expected, 1e-3);
+    assert_eq!(characteristic, 2);
+    // A bevel of half the length makes a ball.
+    let ball = shape::<RoundedBox>("size = [2.0, 2.0, 2.0]\nbevel = 1.0\nbevel_segments = 12");
+    assert_close(check_closed(&ball.mesh().unwrap()).0, 4.0 / 3.0 * PI, 5e-3);
+}
+
+#[test]
+fn surfaces_of_revolution_have_their_volumes() {
+    let sphere = shape::<Sphere>("radius = 2.0\nsegments = 128").mesh().unwrap();
+    assert_eq!(check_closed(&sphere).1, 2);
+    assert_close(check_closed(&sphere).0, 4.0 / 3.0 * PI * 8.0, 2e-3);
+    for (position, normal) in sphere.positions.iter().zip(&sphere.normals) {
+        let radial = Vec3::from_array(*position).normalize();
+        assert!(radial.dot(Vec3::from_array(*normal)) > 1.0 - 1e-6);
+    }
+
+    let cylinder = shape::<Cylinder>("radius = 0.5\nheight = 3.0\nsegments = 256").mesh().unwrap();
+    assert_eq!(check_closed(&cylinder).1, 2);
+    assert_close(check_closed(&cylinder).0, PI * 0.25 * 3.0, 1e-3);
+    let rounded = shape::<Cylinder>("radius = 0.5\nheight = 3.0\nbevel = 0.1").mesh().unwrap();
+    assert_eq!(check_closed(&rounded).1, 2);
+    let ball = shape::<Cylinder>("radius = 0.5\nheight = 1.0\nbevel = 0.5\nsegments = 128");
+    assert_close(check_closed(&ball.mesh().unwrap()).0, 4.0 / 3.0 * PI * 0.125, 2e-2);
+
+    let cone = shape::<Cone>("radius = 1.0\nheight = 3.0\nsegments = 256").mesh().unwrap();
+    assert_eq!(check_closed(&cone).1, 2);
+    assert_close(check_closed(&cone).0, PI, 1e-3);
+    let frustum = shape::<Cone>("radius = 2.0\ntop_radius = 1.0\nheight = 3.0\nsegments = 256");
+    assert_close(check_closed(&frustum.mesh().unwrap()).0, 7.0 * PI, 1e-3);
+
+    let torus =
+        shape::<Torus>("radius = 2.0\ntube_radius = 0.5\nsegments = 128\ntube_segments = 64");
+    let (found, characteristic) = check_closed(&torus.mesh().unwrap());
+    assert_close(found, 2.0 * PI * PI * 2.0 * 0.25, 3e-3);
+    assert_eq!(characteristic, 0);
+}
+
+#[test]
+fn lathe_caps_open_ends_and_takes_profiles_either_way() {
+    // Pappus: area 0.5 × 2, its centroid at radius 1.25.
+    let expected = 2.0 * PI * 1.25;
+    for profile in [
+        "[[1.0, 0.0], [1.5, 0.0], [1.5, 2.0], [1.0, 2.0]]",
+        "[[1.0, 2.0], [1.5, 2.0], [1.5, 0.0], [1.0, 0.0]]",
+    ] {
+        let keys = format!("closed = true\nsegments = 256\nprofile = {profile}");
+        let (found, characteristic) = check_closed(&shape::<Lathe>(&keys).mesh().unwrap());
+        assert_close(found, expected, 1e-3);
+        assert_eq!(characteristic, 0);
+    }
+    for profile in ["[[1.0, 0.0], [1.0, 3.0]]", "[[1.0, 3.0], [1.0, 0.0]]"] {
+        let keys = format!("segments = 256\nprofile = {profile}");
+        let (found, characteristic) = check_closed(&shape::<Lathe>(&keys).mesh().unwrap());
+        assert_close(found, 3.0 * PI, 1e-3);
+        assert_eq!(characteristic, 2);
+    }
+}
+
+#[test]
+fn lathe_splines_are_smooth_but_for_their_corners() {
+    let vase = "smooth = 8\nprofile = [[0.5, 0.0], [0.5, 0.0], [0.8, 0.5], [0.3, 1.0], [0.5, 1.2]]";
+    let mesh = shape::<Lathe>(vase).mesh().unwrap();
+    assert_eq!(check_closed(&mesh).1, 2);
+    assert!(
+        mesh.positions.iter().any(|p| *p == [0.5, 0.0, 0.0]),
+        "control points are on the curve"
+    );
+    // Straight wall: every spline point keeps its radius.
+    let wall = "smooth = 8\nprofile = [[0.5, 0.0], [0.5, 0.7], [0.5, 1.0]]";
+    let (found, _) = check_closed(&shape::<Lathe>(wall).mesh().unwrap());
+    assert_close(found, PI * 0.25, 2e-3);
+}
+
+#[test]
+fn extrusions_of_either_turn_and_with_bevel_are_closed() {
+    for outline in
+        ["[[0,0],[2,0],[2,1],[1,1],[1,3],[0,3]]", "[[0,3],[1,3],[1,1],[2,1],[2,0],[0,0]]"]
+    {
+        let keys = format!("depth = 0.5\noutline = {outline}");
+        let (found, characteristic) = check_closed(&shape::<Extrude>(&keys).mesh().unwrap());
+        assert_close(found, 2.0, 1e-6);
+        assert_eq!(characteristic, 2);
+        let keys = format!("{keys}\nbevel = 0.1");
+        let (rounded, characteristic) = check_closed(&shape::<Extrude>(&keys).mesh().unwrap());
+        assert!((1.85..2.0).contains(&rounded), "{rounded}");
+        assert_eq!(characteristic, 2);
+    }
+    let corners: Vec<_> =
+        (0..12).map(|corner| DVec2::from_angle(PI * f64::from(corner) / 6.0)).collect();
+    let disk = format!("smooth = 16\ndepth = 1.0\noutline = {corners:?}")
+        .replace("DVec2(", "[")
+        .replace(')', "]");
+    let (found, _) = check_closed(&shape::<Extrude>(&disk).mesh().unwrap());
+    assert_close(found, PI, 2e-2);
+    let half_disk = "smooth = 16\ndepth = 1.0\noutline = [[1,0],[1,0],[0,1],[-1,0],[-1,0]]";
+    let (found, characteristic) = check_closed(&shape::<Extrude>(half_disk).mesh().unwrap());
+    assert!((1.0..PI / 2.0).contains(&found), "{found}");
+    assert_eq!(characteristic, 2);
+}
+
+#[test]
+fn tubes_have_the_volume_of_their_path() {
+    let straight = "radius = 0.1\nsegments = 128\npath = [[0,0,0],[0,2,0]]";
+    let (found, characteristic) = check_closed(&shape::<Tube>(straight).mesh().unwrap());
+    assert_close(found, PI * 0.01 * 2.0, 1e-3);
+    assert_eq!(characteristic, 2);
+    let capsule = shape::<Tube>(&format!("round = true\n{straight}")).mesh().unwrap();
+    assert_close(check_closed(&capsule).0, PI * 0.01 * 2.0 + 4.0 / 3.0 * PI * 0.001, 5e-3);
+    let tapered = "radius = [0.1, 0.2]\nsegments = 128\npath = [[0,0,0],[1,0,0]]";
+    assert_close(check_closed(&shape::<Tube>(tapered).mesh().unwrap()).0, PI * 0.07 / 3.0, 1e-3);
+    // A ring out of its plane: the frame has to close.
+    let ring = "radius = 0.1\nclosed = true\nsmooth = 24\n\
+        path = [[1,0.2,0],[0,-0.2,1],[-1,0.2,0],[0,-0.2,-1]]";
+    let (_, characteristic) = check_closed(&shape::<Tube>(ring).mesh().unwrap());
+    assert_eq!(characteristic, 0);
+    let bent = "radius = 0.05\nround = true\npath = [[0,0,0],[0,1,0],[1,1,0],[1,1,1]]";
+    assert_eq!(check_closed(&shape::<Tube>(bent).mesh().unwrap()).1, 2);
+    let sharp = "radius = 0.05\nsmooth = 1\npath = [[0,0,0],[0,1,0],[1,1,0],[1,1,1]]";
+    assert_eq!(check_closed(&shape::<Tube>(sharp).mesh().unwrap()).1, 2);
+}
+
+#[test]
+fn blobs_lie_on_the_surface_and_melt_together() {
+    let ball =
+        shape::<Blobs>("cells = 48\nballs = [{ at = [1, 2, 3], radius = 0.5 }]").mesh().unwrap();
+    let (found, characteristic) = check_closed(&ball);
+    assert_close(found, 4.0 / 3.0 * PI * 0.125, 1e-2);
+    assert_eq!(characteristic, 2);
+    for position in &ball.positions {
+        let radius = Vec3::from_array(*position).distance(Vec3::new(1.0, 2.0, 3.0));
+        assert!((radius - 0.5).abs() < 1e-3, "{radius}");
+    }
+    let egg = "cells = 64\nballs = [{ at = [0, 0, 0], radius = [0.5, 1.0, 0.25] }]";
+    assert_close(check_closed(&shape::<Blobs>(egg).mesh().unwrap()).0, PI / 6.0, 2e-2);
+    let capsule = "cells = 96\nballs = [{ at = [0, 0, 0], to = [0, 1, 0], radius = 0.2 }]";
+    let expected = PI * 0.04 + 4.0 / 3.0 * PI * 0.008;
+    assert_close(check_closed(&shape::<Blobs>(capsule).mesh().unwrap()).0, expected, 1e-2);
+
+    let pair = "balls = [{ at = [0, 0, 0], radius = 0.5 }, { at = [1.1, 0, 0], radius = 0.5 }]";
+    assert_eq!(check_closed(&shape::<Blobs>(pair).mesh().unwrap()).1, 4, "two surfaces");
+    let melted = shape::<Blobs>(&format!("blend = 0.15\n{pair}")).mesh().unwrap();
+    assert_eq!(check_closed(&melted).1, 2, "one surface");
+
+    let shell = "cells = 64\nballs = [{ at = [0, 0, 0], radius = 0.5 }, \
+        { at = [0, 0, 0], radius = 0.3, carve = true }]";
+    let (found, characteristic) = check_closed(&shape::<Blobs>(shell).mesh().unwrap());
+    assert_close(found, 4.0 / 3.0 * PI * (0.125 - 0.027), 1e-2);
+    assert_eq!(characteristic, 4);
+}
+
+#[test]
+fn grids_are_sheets_of_their_thickness() {
+    let flat = shape::<Grid>("size = [2.0, 3.0]\nthickness = 0.1\ncells = [8, 8]").mesh().unwrap();
+    let (found, characteristic) = check_closed(&flat);
+    assert_close(found, 0.6, 1e-5);
+    assert_eq!(characteristic, 2);
+    let folded = "size = [2.0, 2.0]\nthickness = 0.004\ncells = [200, 4]\n\
+        waves = [{ amplitude = 0.05, wavelength = 0.25 }]";
+    let mesh = shape::<Grid>(folded).mesh().unwrap();
+    assert_eq!(check_closed(&mesh).1, 2);
+    let highest = mesh.positions.iter().map(|position| position[1]).fold(0.0, f32::max);
+    assert!((highest - 0.052).abs() < 1e-3, "{highest}");
+    let hill = "size = [1.0, 1.0]\nthickness = 0.002\nheights = [[0,0,0],[0,0.3,0],[0,0,0]]";
+    let mesh = shape::<Grid>(hill).mesh().unwrap();
+    assert_eq!(check_closed(&mesh).1, 2);
+    let middle =
+        mesh.positions.iter().find(|p| p[0].abs() < 1e-6 && p[2].abs() < 1e-6 && p[1] > 0.3);
+    assert!((middle.unwrap()[1] - 0.301).abs() < 1e-5);
+}
+
+#[test]
+fn impossible_parameters_name_the_key_and_the_value() {
+    let message = |result: Result<Mesh, String>| result.unwrap_err();
+    let negative = shape::<RoundedBox>("size = [1, -2, 1]").mesh();
+    assert_eq!(message(negative), "size: expected a finite number above 0, found -2");
+    let wide = shape::<RoundedBox>("size = [1, 1, 1]\nbevel = 0.6").mesh();
+    assert_eq!(message(wide), "bevel: expected a number from 0 to 0.5, found 0.6000000238418579");
+    let infinite = shape::<Sphere>("radius = inf").mesh();
+    assert_eq!(message(infinite), "radius: expected a finite number above 0, found inf");
+    let many = shape::<Sphere>("radius = 1\nsegments = 1000000").mesh();
+    assert_eq!(message(many), "segments: expected 3 to 4096, found 1000000");
+    let fat = shape::<Torus>("radius = 1\ntube_radius = 1").mesh();
+    assert!(message(fat).starts_with("tube_radius: expected less than radius (1), found 1"));
+    let flat = shape::<Lathe>("profile = [[0, 0], [0, 1]]").mesh();
+    assert!(message(flat).contains("off the axis"));
+    let inside_out = shape::<Lathe>("profile = [[-1, 0], [1, 1]]").mesh();
+    assert!(message(inside_out).contains("radii of 0 or more, found -1"));
+    let bow_tie = shape::<Extrude>("depth = 1\noutline = [[0,0],[1,1],[1,0],[0,1]]").mesh();
+    assert!(message(bow_tie).contains("does not cross"));
+    let narrow =
+        shape::<Extrude>("depth = 1\nbevel = 0.2\noutline = [[0,0],[1,0],[1,0.1],[0,0.1]]");
+    assert!(message(narrow.mesh()).contains("too large for the narrow parts"));
+    let lists = shape::<Tube>("path = [[0,0,0],[0,1,0]]\nradius = [0.1, 0.2, 0.3]").mesh();
+    assert!(message(lists).contains("expected one number or 2, one per point of path, found 3"));
+    let point = shape::<Tube>("path = [[0,0,0],[0,0,0]]\nradius = 0.1").mesh();
+    assert!(message(point).contains("points that differ"));
+    let hollow = shape::<Blobs>("balls = [{ at = [0,0,0], radius = 1, carve = true }]").mesh();
+    assert!(message(hollow).contains("expected one to carve from"));
+    let ragged = shape::<Grid>("size = [1, 1]\nheights = [[0, 0], [0]]").mesh();
+    assert!(message(ragged).contains("expected rows of 2 numbers, found 1"));
+}

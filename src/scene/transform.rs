@@ -1,0 +1,108 @@
+//! Placement of an object: scale, then turns about X, Y, Z, then a shift.
+
+use glam::{DMat3, DVec3, Mat3, Vec3};
+
+/// `world = Rz·Ry·Rx·scale · object + translate`, with the matrix for normals.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transform {
+    /// Linear part.
+    pub linear: Mat3,
+    /// Shift, metres.
+    pub translate: Vec3,
+    /// Inverse transpose of the linear part: takes normals, up to their length.
+    pub normal: Mat3,
+    /// The linear part mirrors: triangles must be wound the other way.
+    pub mirrors: bool,
+}
+
+impl Transform {
+    /// From the numbers of a scene file; no component of `scale` may be 0.
+    pub fn new(scale: [f32; 3], rotate_deg: [f32; 3], translate: [f32; 3]) -> Self {
+        let [x, y, z] = rotate_deg.map(sine_cosine_deg);
+        let rotate_x =
+            DMat3::from_cols(DVec3::X, DVec3::new(0.0, x.1, x.0), DVec3::new(0.0, -x.0, x.1));
+        let rotate_y =
+            DMat3::from_cols(DVec3::new(y.1, 0.0, -y.0), DVec3::Y, DVec3::new(y.0, 0.0, y.1));
+        let rotate_z =
+            DMat3::from_cols(DVec3::new(z.1, z.0, 0.0), DVec3::new(-z.0, z.1, 0.0), DVec3::Z);
+        let rotation = rotate_z * rotate_y * rotate_x;
+        let scale = DVec3::from_array(scale.map(f64::from));
+        assert!(scale.min_element().abs() > 0.0 && scale.is_finite(), "scale must not be 0");
+        Self {
+            linear: (rotation * DMat3::from_diagonal(scale)).as_mat3(),
+            translate: Vec3::from_array(translate),
+            // Scaled back to the size of the numbers in `rotation`, so that it neither over- nor
+            // underflows in single precision.
+            normal: (rotation * DMat3::from_diagonal(scale.abs().min_element() / scale)).as_mat3(),
+            mirrors: scale.x * scale.y * scale.z < 0.0,
+        }
+    }
+
+    /// Object space to world space.
+    pub fn position(&self, position: [f32; 3]) -> [f32; 3] {
+        (self.linear * Vec3::from_array(position) + self.translate).to_array()
+    }
+
+    /// Unit normal in world space; zero where the normal has no direction.
+    pub fn normal(&self, normal: [f32; 3]) -> [f32; 3] {
+        let normal = self.normal * Vec3::from_array(normal).normalize_or_zero();
+        normal.normalize_or_zero().to_array()
+    }
+}
+
+/// Sine and cosine of an angle in degrees; exact for quarter turns.
+fn sine_cosine_deg(angle_deg: f32) -> (f64, f64) {
+    let angle_deg = f64::from(angle_deg).rem_euclid(360.0);
+    match angle_deg {
+        0.0 => (0.0, 1.0),
+        90.0 => (1.0, 0.0),
+        180.0 => (0.0, -1.0),
+        270.0 => (-1.0, 0.0),
+        _ => angle_deg.to_radians().sin_cos(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn close(found: [f32; 3], expected: [f32; 3]) -> bool {
+        Vec3::from_array(found).abs_diff_eq(Vec3::from_array(expected), 1e-6)
+    }
+
+    #[test]
+    fn turns_go_about_x_then_y_then_z() {
+        // X takes +Y to +Z, Y takes +Z to +X, Z takes +X to +Y.
+        let transform = Transform::new([1.0; 3], [90.0, 90.0, 90.0], [0.0; 3]);
+        assert!(close(transform.position([0.0, 1.0, 0.0]), [0.0, 1.0, 0.0]));
+        let transform = Transform::new([1.0; 3], [90.0, 90.0, 0.0], [0.0; 3]);
+        assert!(close(transform.position([0.0, 1.0, 0.0]), [1.0, 0.0, 0.0]));
+    }
+
+    #[test]
+    fn scale_comes_first_and_shift_last() {
+        let transform = Transform::new([2.0, 1.0, 1.0], [0.0, 90.0, 0.0], [10.0, 0.0, 0.0]);
+        assert_eq!(transform.position([1.0, 0.0, 0.0]), [10.0, 0.0, -2.0]);
+    }
+
+    #[test]
+    fn normals_stay_at_right_angles_to_the_surface() {
+        let transform = Transform::new([4.0, 1.0, -0.5], [20.0, 40.0, 60.0], [0.0; 3]);
+        let tangent = Vec3::new(1.0, -1.0, 0.5);
+        let normal = Vec3::new(1.0, 1.0, 0.0).normalize();
+        let world_tangent = transform.linear * tangent;
+        let world_normal = Vec3::from_array(transform.normal(normal.to_array()));
+        assert!(world_tangent.normalize().dot(world_normal).abs() < 1e-6);
+        assert!((world_normal.length() - 1.0).abs() < 1e-6);
+        assert!(transform.mirrors);
+    }
+
+    #[test]
+    fn tiny_and_huge_scales_keep_their_normals() {
+        for factor in [1e-30, 1e30] {
+            let transform = Transform::new([factor; 3], [0.0, 0.0, 30.0], [0.0; 3]);
+            let normal = Vec3::from_array(transform.normal([0.0, 1.0, 0.0]));
+            assert!((normal.length() - 1.0).abs() < 1e-6, "{factor}: {normal}");
+        }
+    }
+}

@@ -1,0 +1,781 @@
+//! Scene files, meshes and their messages, read as a user reads them.
+
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+use std::path::{Path, PathBuf};
+
+use fenestra::{
+    Error,
+    scene::{
+        Scene,
+        material::{ConductorFresnel, MaterialKind},
+        mesh::Mesh,
+    },
+};
+use glam::Vec3;
+use tempfile::TempDir;
+
+const HEAD: &str = r#"
+[camera]
+position = [0, 1, 5]
+look_at = [0, 1, 0]
+vertical_fov_deg = 40
+
+[environment]
+constant = [1, 1, 1]
+
+[[material]]
+name = "grey"
+type = "diffuse"
+reflectance = [0.5, 0.5, 0.5]
+"#;
+
+struct Folder(TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.0.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, bytes).unwrap();
+        path
+    }
+
+    fn load(&self, text: &str) -> Result<Scene, Error> {
+        Scene::load(&self.write("room.toml", text))
+    }
+
+    /// The message without the folder.
+    fn message(&self, text: &str) -> String {
+        self.strip(&self.load(text).expect_err("the scene must be refused"))
+    }
+
+    fn mesh_message(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
+        let path = self.write(name, bytes);
+        self.strip(&Mesh::read(&path, &mut Vec::new()).expect_err("the mesh must be refused"))
+    }
+
+    fn strip(&self, error: &Error) -> String {
+        error.to_string().replace(&format!("{}/", self.0.path().display()), "")
+    }
+}
+
+fn with_box(extra: &str) -> String {
+    format!("{HEAD}[[object]]\nshape = \"box\"\nsize = [1, 1, 1]\nmaterial = \"grey\"\n{extra}\n")
+}
+
+fn read(folder: &Folder, name: &str, bytes: impl AsRef<[u8]>) -> Mesh {
+    Mesh::read(&folder.write(name, bytes), &mut Vec::new()).unwrap()
+}
+
+// Scene files
+
+#[test]
+fn defaults_are_those_of_the_format() {
+    let folder = Folder::new();
+    let scene = folder.load(&with_box("")).unwrap();
+    assert_eq!(scene.name, "room");
+    assert_eq!(scene.camera.up, Vec3::Y);
+    assert_eq!((scene.film.width, scene.film.height), (640, 480));
+    assert_eq!(scene.film.filter, fenestra::scene::Filter::Gaussian);
+    assert_eq!(scene.geometry.triangles.len(), 12);
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+}
+
+#[test]
+fn materials_take_every_form() {
+    let folder = Folder::new();
+    let text = format!(
+        "{HEAD}
+        [[material]]
+        name = \"coat\"
+        type = \"plastic\"
+        diffuse = [0.1, 0.2, 0.3]
+        roughness = 0.5
+        [[material]]
+        name = \"gold\"
+        type = \"conductor\"
+        alpha = 0.1
+        eta = [0.14, 0.37, 1.44]
+        k = [3.98, 2.38, 1.6]
+        [[material]]
+        name = \"steel\"
+        type = \"conductor\"
+        alpha = 0.2
+        reflectance = [0.5, 0.5, 0.6]"
+    );
+    let scene = folder.load(&text).unwrap();
+    let kinds: Vec<_> = scene.materials.iter().map(|material| &material.kind).collect();
+    assert!(matches!(kinds[1], MaterialKind::Plastic { alpha, ior, .. }
+        if *alpha == 0.25 && *ior == 1.5));
+    assert!(
+        matches!(kinds[2], MaterialKind::Conductor { fresnel: ConductorFresnel::Exact { k, .. }, .. }
+        if k.x == 3.98)
+    );
+    assert!(matches!(
+        kinds[3],
+        MaterialKind::Conductor { fresnel: ConductorFresnel::Schlick { .. }, .. }
+    ));
+}
+
+#[test]
+fn a_file_called_scene_is_named_after_its_folder() {
+    let folder = Folder::new();
+    let path = folder.write("gallery/scene.toml", HEAD);
+    assert_eq!(Scene::load(&path).unwrap().name, "gallery");
+}
+
+#[test]
+fn a_scene_without_objects_has_a_material_and_no_triangles() {
+    let folder = Folder::new();
+    let text = HEAD.split("[[material]]").next().unwrap();
+    let scene = folder.load(text).unwrap();
+    assert_eq!(scene.materials.len(), 1);
+    assert!(scene.geometry.triangles.is_empty());
+}
+
+#[test]
+fn transforms_scale_turn_and_shift_in_this_order() {
+    let folder = Folder::new();
+    let scene = folder
+        .load(&with_box("scale = [2, 1, 1]\nrotate_deg = [0, 90, 0]\ntranslate = [10, 0, 0]"))
+        .unwrap();
+    let bounds = |axis: usize| {
+        let values = scene.geometry.positions.iter().map(|position| position[axis]);
+        values.fold((f32::MAX, f32::MIN), |(low, high), value| (low.min(value), high.max(value)))
+    };
+    assert_eq!((bounds(0), bounds(1), bounds(2)), ((9.5, 10.5), (-0.5, 0.5), (-1.0, 1.0)));
+}
+
+#[test]
+fn one_mesh_used_twice_is_placed_twice() {
+    let folder = Folder::new();
+    folder.write("meshes/corner.ply", ascii_ply("3 0 1 2"));
+    let object = "[[object]]\nmesh = \"meshes/corner.ply\"\nmaterial = \"grey\"\n";
+    let scene =
+        folder.load(&format!("{HEAD}{object}scale = 2\n{object}scale = [-1, 1, 1]")).unwrap();
+    assert_eq!(scene.geometry.positions.len(), 8);
+    assert_eq!(scene.geometry.triangles, [[0, 1, 2], [4, 6, 5]]);
+    assert_eq!(scene.geometry.positions[1], [2.0, 0.0, 0.0]);
+}
+
+#[test]
+fn text_that_is_no_scene_is_refused_with_line_and_column() {
+    let folder = Folder::new();
+    let case = |text: &str, expected: &str| {
+        let message = folder.message(text);
+        assert!(message.contains(expected), "expected `{expected}`, found `{message}`");
+    };
+    case("[camera\n", "room.toml:1:8: ");
+    case(
+        &format!("{HEAD}[lamp]\n"),
+        "room.toml:14:2: unknown key `lamp` in the scene, expected one of `camera`, `film`, `environment`, `material`, `object`",
+    );
+    case(
+        &HEAD.replace("look_at", "lookat"),
+        "room.toml:4:1: unknown field `lookat`, expected one of `position`, `look_at`, `up`, `vertical_fov_deg`, `aperture_radius`, `focus_distance`",
+    );
+    case(
+        &HEAD.replace("vertical_fov_deg = 40", ""),
+        "room.toml:2:1: missing field `vertical_fov_deg`",
+    );
+    case(
+        &HEAD.replace("[0, 1, 5]", "[0, 1]"),
+        "room.toml:3:12: invalid length 2, expected an array of length 3",
+    );
+    case(
+        &HEAD.replace("[0, 1, 5]", "[0, \"1\", 5]"),
+        "room.toml:3:16: invalid type: string \"1\", expected f32",
+    );
+    case(
+        &HEAD.replace("\"diffuse\"", "\"metal\""),
+        "room.toml:12:8: unknown material type `metal`, expected one of `diffuse`, `plastic`, `conductor`, `measured`",
+    );
+    case(
+        &HEAD.replace("reflectance", "color"),
+        "room.toml:13:1: unknown key `color` in material `grey` of type `diffuse`, expected one of `name`, `type`, `reflectance`",
+    );
+    case(
+        &HEAD.replace("reflectance = [0.5, 0.5, 0.5]", ""),
+        "material `grey` of type `diffuse`: missing field `reflectance`",
+    );
+    case(
+        &format!("{HEAD}[film]\nfilter = \"tent\"\n"),
+        "room.toml:15:10: unknown variant `tent`, expected `box` or `gaussian`",
+    );
+    case(
+        &format!("{HEAD}[film]\nwidth = -5\n"),
+        "room.toml:15:9: invalid value: integer `-5`, expected u32",
+    );
+    case(
+        &with_box("radius = 2"),
+        "room.toml:18:1: unknown key `radius` in object of shape `box`, expected one of `name`, `mesh`, `shape`, `material`, `scale`, `rotate_deg`, `translate`, `size`, `bevel`, `bevel_segments`",
+    );
+    case(
+        &with_box("").replace("\"box\"", "\"cube\""),
+        "room.toml:15:9: unknown shape `cube`, expected one of `box`, `sphere`",
+    );
+    case(&with_box("mesh = \"a.ply\""), "needs exactly one of `mesh` and `shape`, found both");
+    case(
+        &with_box("").replace("shape = \"box\"", ""),
+        "needs exactly one of `mesh` and `shape`, found neither",
+    );
+    case(
+        &with_box("scale = \"big\""),
+        "room.toml:18:9: invalid type: string \"big\", expected a number or an array of three numbers",
+    );
+    case(
+        &with_box("scale = [1, 2]"),
+        "room.toml:18:9: invalid length 2, expected an array of length 3",
+    );
+    case(&format!("{HEAD}object = 3\n"), "room.toml:14:1: ");
+    case(
+        &HEAD.replace("[[material]]", "[material]"),
+        "expected an array of tables, `[[material]]`",
+    );
+    case(
+        &HEAD.replace("constant = [1, 1, 1]", "court = { wide = 3 }"),
+        "room.toml:8:11: unknown field `wide`, expected one of ",
+    );
+}
+
+#[test]
+fn numbers_that_cannot_be_rendered_are_refused_by_name() {
+    let folder = Folder::new();
+    let case = |text: &str, expected: &str| {
+        let message = folder.message(text);
+        assert!(message.contains(expected), "expected `{expected}`, found `{message}`");
+    };
+    let set = |from: &str, to: &str| HEAD.replace(from, to);
+    case(
+        &set("= 40", "= 0"),
+        "camera.vertical_fov_deg: expected a number from 0.01 to 179, found 0",
+    );
+    case(&set("= 40", "= 180"), "camera.vertical_fov_deg");
+    case(
+        &set("= 40", "= nan"),
+        "camera.vertical_fov_deg: expected a number from 0.01 to 179, found NaN",
+    );
+    case(&set("[0, 1, 5]", "[0, inf, 5]"), "camera.position: expected a finite number, found inf");
+    case(
+        &set("[0, 1, 5]", "[0, 1e300, 5]"),
+        "camera.position: expected a finite number, found inf",
+    );
+    case(&set("[0, 1, 5]", "[0, 1, 0]"), "camera.position and camera.look_at must differ");
+    case(&set("= 40", "= 40\nup = [0, 0, 2]"), "camera.up must not be zero or along the view");
+    case(&set("= 40", "= 40\nup = [0, 0, 0]"), "camera.up must not be zero");
+    case(
+        &set("= 40", "= 40\naperture_radius = 0.1"),
+        "camera.aperture_radius needs camera.focus_distance",
+    );
+    case(&set("= 40", "= 40\nfocus_distance = 0"), "camera.focus_distance");
+    case(&format!("{HEAD}[film]\nwidth = 0"), "film.width: expected 1 to 16384 pixels, found 0");
+    case(
+        &format!("{HEAD}[film]\nheight = 100000"),
+        "film.height: expected 1 to 16384 pixels, found 100000",
+    );
+    case(
+        &set("constant = [1, 1, 1]", ""),
+        "environment: expected exactly one of map, constant, court, sky, found none",
+    );
+    case(&set("[1, 1, 1]", "[1, 1, 1]\nmap = \"a.hdr\""), "found map and constant");
+    case(
+        &set("[1, 1, 1]", "[1, -1, 1]"),
+        "environment.constant: expected a finite number of at least 0, found -1",
+    );
+    case(&set("[1, 1, 1]", "[1, 1, 1]\nscale = -1"), "environment.scale");
+    case(
+        &set("[1, 1, 1]", "[1, 1, 1]\nrotation_deg = nan"),
+        "environment.rotation_deg: expected a finite number, found NaN",
+    );
+    case(&set("constant = [1, 1, 1]", "map = \"missing.hdr\""), "missing.hdr: cannot read");
+    case(
+        &set("[0.5, 0.5, 0.5]", "[0.5, -0.5, 0.5]"),
+        "material `grey` (line 10): reflectance: expected a number from 0 to 1, found -0.5",
+    );
+    case(&set("[0.5, 0.5, 0.5]", "[0.5, 1.5, 0.5]"), "found 1.5");
+    case(
+        &format!("{HEAD}{}", &HEAD[HEAD.find("[[material]]").unwrap()..]),
+        "material `grey` (line 14): the name is taken by the material of line 10",
+    );
+    let material = |keys: &str| format!("{HEAD}[[material]]\nname = \"m\"\n{keys}\n");
+    case(
+        &material("type = \"plastic\"\ndiffuse = [0, 0, 0]"),
+        "material `m` (line 14): expected exactly one of alpha and roughness, found neither",
+    );
+    case(
+        &material("type = \"plastic\"\ndiffuse = [0, 0, 0]\nalpha = 0.1\nroughness = 0.1"),
+        "found both",
+    );
+    case(
+        &material("type = \"plastic\"\ndiffuse = [0, 0, 0]\nalpha = 0"),
+        "alpha: expected a number from 0.001 to 1, found 0",
+    );
+    case(
+        &material("type = \"plastic\"\ndiffuse = [0, 0, 0]\nalpha = 0.1\nior = 0.5"),
+        "ior: expected a number from 1.01 to 4, found 0.5",
+    );
+    case(
+        &material("type = \"conductor\"\nalpha = 0.1"),
+        "a conductor needs either reflectance, or eta and k",
+    );
+    case(
+        &material("type = \"conductor\"\nalpha = 0.1\neta = [1, 1, 1]"),
+        "either reflectance, or eta and k",
+    );
+    case(
+        &material("type = \"conductor\"\nalpha = 0.1\neta = [0, 1, 1]\nk = [1, 1, 1]"),
+        "eta: expected a number from 0.01 to 100, found 0",
+    );
+    case(
+        &material("type = \"measured\"\nfile = \"missing.binary\""),
+        "missing.binary: cannot read",
+    );
+    case(
+        &with_box("").replace("material = \"grey\"", "material = \"gray\""),
+        "object 0 (box, line 14): unknown material `gray`, the scene has grey",
+    );
+    case(
+        &with_box("").replace("material = \"grey\"", ""),
+        "object 0 (box, line 14): expected a material, found none",
+    );
+    case(&with_box("name = \"a\"\nscale = 0"), "object `a` (box, line 14): scale must not be 0");
+    case(&with_box("scale = [1, nan, 1]"), "scale: expected a finite number, found NaN");
+    case(&with_box("rotate_deg = [0, inf, 0]"), "rotate_deg: expected a finite number, found inf");
+    case(&with_box("translate = [0, -inf, 0]"), "translate: expected a finite number, found -inf");
+    case(
+        &with_box("bevel = 2"),
+        "object 0 (box, line 14): bevel: expected a number from 0 to 0.5, found 2",
+    );
+    let object = "[[object]]\nname = \"a\"\nshape = \"sphere\"\nradius = 1\nmaterial = \"grey\"\n";
+    case(
+        &format!("{HEAD}{object}{object}"),
+        "object `a` (sphere, line 19): the name is taken by the object of line 14",
+    );
+    case(
+        &format!("{HEAD}[[object]]\nmesh = \"missing.ply\"\nmaterial = \"grey\""),
+        "missing.ply: cannot read",
+    );
+    case(
+        &format!("{HEAD}[[object]]\nmesh = \"room.toml\"\nmaterial = \"grey\""),
+        "expected a mesh in .ply, .obj, .gltf or .glb, found .toml",
+    );
+}
+
+#[test]
+fn other_kinds_of_scenes_are_refused_by_name() {
+    for (name, expected) in
+        [("a.gltf", "a glTF file"), ("a.glb", "a glTF file"), ("a.PBRT", "a pbrt file")]
+    {
+        let message = Scene::load(Path::new(name)).unwrap_err().to_string();
+        assert!(message.contains(expected) && message.contains(".toml"), "{message}");
+    }
+    let message = Scene::load(Path::new("missing.toml")).unwrap_err().to_string();
+    assert!(message.contains("missing.toml: cannot read"), "{message}");
+    let folder = Folder::new();
+    let path = folder.write("binary.toml", [b'a', 0xff, 0xfe]);
+    assert!(Scene::load(&path).unwrap_err().to_string().contains("byte 1 is not UTF-8"));
+}
+
+#[test]
+fn the_hash_follows_the_picture_and_not_the_text() {
+    let folder = Folder::new();
+    let hash = |text: &str| folder.load(text).unwrap().hash;
+    let original = hash(&with_box(""));
+    assert_eq!(original.len(), 64);
+    assert_eq!(original, hash(&with_box("# a comment\nname = \"crate\"")));
+    assert_eq!(original, hash(&with_box("").replace("grey", "gray")));
+    for (from, to) in [
+        ("[0, 1, 5]", "[0, 1, 5.001]"),
+        ("= 40", "= 41"),
+        ("= 40", "= 40\nup = [0.1, 1, 0]"),
+        ("constant = [1, 1, 1]", "constant = [1, 1, 1.001]"),
+        ("0.5, 0.5, 0.5", "0.5, 0.5, 0.501"),
+        ("type = \"diffuse\"\nreflectance", "type = \"conductor\"\nalpha = 0.5\nreflectance"),
+        ("size = [1, 1, 1]", "size = [1, 1, 1.001]"),
+        ("[camera]", "[film]\nfilter = \"box\"\n[camera]"),
+        ("[camera]", "[film]\nwidth = 641\n[camera]"),
+    ] {
+        assert_ne!(original, hash(&with_box("").replace(from, to)), "{from} → {to}");
+    }
+}
+
+// Meshes
+
+/// Four vertices, the given faces.
+fn ascii_ply(faces: &str) -> String {
+    format!(
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+         property float z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n\
+         0 0 0\n1 0 0\n1 1 0\n0 1 0\n{faces}\n",
+        faces.lines().count()
+    )
+}
+
+/// A quad and a triangle with normals, foreign properties and an element in between.
+fn binary_ply(big_endian: bool) -> Vec<u8> {
+    let name = if big_endian { "binary_big_endian" } else { "binary_little_endian" };
+    let mut bytes = format!(
+        "ply\nformat {name} 1.0\ncomment made by a test\nelement vertex 4\nproperty double x\n\
+         property uchar quality\nproperty float y\nproperty float z\nproperty float nx\n\
+         property float ny\nproperty float nz\nelement edge 1\nproperty list ushort short ends\n\
+         property int64_like_comment x\nelement face 2\nproperty uchar flags\n\
+         property list uint ushort vertex_index\nend_header\n"
+    )
+    .replace("property int64_like_comment x\n", "")
+    .into_bytes();
+    let mut push = |little: &[u8]| {
+        let reversed = little.iter().rev().copied();
+        if big_endian { bytes.extend(reversed) } else { bytes.extend_from_slice(little) }
+    };
+    for [x, y] in [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]] {
+        push(&f64::to_le_bytes(x));
+        push(&[7]);
+        for component in [y as f32, 0.0, 0.0, 0.0, 1.0] {
+            push(&component.to_le_bytes());
+        }
+    }
+    push(&2_u16.to_le_bytes());
+    push(&3_i16.to_le_bytes());
+    push(&(-4_i16).to_le_bytes());
+    for face in [&[0_u16, 1, 2, 3][..], &[0, 2, 3]] {
+        push(&[1]);
+        push(&(face.len() as u32).to_le_bytes());
+        face.iter().for_each(|index| push(&index.to_le_bytes()));
+    }
+    bytes
+}
+
+#[test]
+fn ply_reads_all_three_encodings() {
+    let folder = Folder::new();
+    let little = read(&folder, "little.ply", binary_ply(false));
+    assert_eq!(little, read(&folder, "big.ply", binary_ply(true)));
+    assert_eq!(little.positions, [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
+    assert_eq!(little.normals, [[0.0, 0.0, 1.0]; 4]);
+    assert_eq!(little.triangles.len(), 3);
+    let ascii = read(&folder, "ascii.ply", ascii_ply("3 0 1 2\n4 0 1 2 3"));
+    assert_eq!(ascii.positions, little.positions);
+    assert!(ascii.normals.is_empty());
+    assert_eq!(ascii.triangles[0], [0, 1, 2]);
+    assert_eq!(ascii.triangles.len(), 3);
+    let windows = ascii_ply("3 0 1 2").replace('\n', "\r\n");
+    assert_eq!(read(&folder, "windows.ply", windows).triangles, [[0, 1, 2]]);
+}
+
+#[test]
+fn ply_faces_may_come_first_and_polygons_may_be_concave() {
+    let folder = Folder::new();
+    let text = "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\n\
+        element vertex 5\nproperty float x\nproperty float y\nproperty float z\nend_header\n\
+        5 0 1 2 3 4\n0 0 0\n2 0 0\n2 2 0\n1 0.5 0\n0 2 0\n";
+    let mesh = read(&folder, "arrow.ply", text);
+    let area: f32 = mesh
+        .triangles
+        .iter()
+        .map(|triangle| {
+            let [a, b, c] = triangle.map(|index| Vec3::from_array(mesh.positions[index as usize]));
+            let area = 0.5 * (b - a).cross(c - a).z;
+            assert!(area > 0.0, "a triangle is turned over");
+            area
+        })
+        .sum();
+    assert!((area - 2.5).abs() < 1e-6, "{area}");
+}
+
+#[test]
+fn broken_ply_files_are_refused_with_their_place() {
+    let folder = Folder::new();
+    let case = |bytes: &[u8], expected: &str| {
+        let message = folder.mesh_message("broken.ply", bytes);
+        assert!(message.contains(expected), "expected `{expected}`, found `{message}`");
+    };
+    let good = ascii_ply("3 0 1 2");
+    let set = |from: &str, to: &str| good.replace(from, to).into_bytes();
+    case(b"", "truncated: the file ends before `end_header`");
+    case(b"PK\x03\x04", "expected a PLY file that starts with `ply`, found `PK");
+    case(b"ply\nformat ascii 1.0\n", "truncated: the file ends before `end_header`");
+    case(
+        &set("ascii", "EBCDIC"),
+        "broken.ply:2:1: expected format ascii, binary_little_endian or binary_big_endian, found `EBCDIC 1.0`",
+    );
+    case(&set("format ascii 1.0\n", ""), "the header has no line `format`");
+    case(
+        &set("property float x", "property half x"),
+        "broken.ply:4:1: property `x` has the unknown type `half`",
+    );
+    case(&set("property float x\n", ""), "expected the properties `x`, `y` and `z`");
+    case(
+        &set("element vertex 4", "element vertex four"),
+        "broken.ply:3:1: expected the number of `vertex`, found `four`",
+    );
+    case(&set("element vertex", "element point"), "expected one element `vertex`, found 0");
+    case(&set("vertex_indices", "corners"), "expected the list property `vertex_indices`");
+    case(
+        &set("element vertex 4", "element vertex 4000000000"),
+        "truncated: 4000000000 elements `vertex` need at least",
+    );
+    case(&set("element vertex 4", "element vertex 9000000000"), "9000000000 vertices, at most");
+    case(
+        &set("3 0 1 2", "3 0 1 4"),
+        "broken.ply:14:1: face 0 of 1: vertex index 4 is out of range, the file has 4 vertices",
+    );
+    case(&set("3 0 1 2", "3 0 1 -1"), "face 0 of 1: vertex index -1 is out of range");
+    case(&set("3 0 1 2", "3 0 1"), "truncated: the file ends in face 0 of 1");
+    case(
+        &set("1 1 0", "1 one 0"),
+        "broken.ply:12:1: vertex 2 of 4: expected a number, found `one`",
+    );
+    case(&set("element face", "element tristrips"), "expected one element `face`, found 0");
+    let binary = binary_ply(false);
+    case(&binary[..binary.len() - 1], "truncated: the file ends in face 1 of 2");
+    case(&binary[..binary.len() - 40], "truncated: ");
+    let mut long = binary.clone();
+    let count = long.len() - 10;
+    long[count..count + 4].copy_from_slice(&u32::MAX.to_le_bytes());
+    case(&long, "face 1 of 2");
+}
+
+#[test]
+fn obj_reads_groups_polygons_normals_and_colors() {
+    let folder = Folder::new();
+    folder.write(
+        "colors.mtl",
+        "# two\nnewmtl red paint\nKd 0.8 0.1 0.1\nNs 10\nnewmtl grey\nKd 0.5\n",
+    );
+    let text = "# a square and two triangles\nmtllib colors.mtl\nv 0 0 0\nv 1 0 0 1.0\nv 1 1 0\nv 0 1 0\n\
+        vt 0 0\nvn 0 0 1\nvn 0 0 -1\no first\ng a b\nusemtl red paint\nf 1//1 2//1 3//1 4//1\n\
+        s off\ng c\nusemtl grey\nf -4/1/2 \\\n -2/1/2 -3/1/2\nl 1 2\nf 1 2 3\n";
+    let mesh = read(&folder, "shapes.obj", text);
+    assert_eq!(mesh.triangles.len(), 4);
+    assert_eq!(mesh.materials[0].base_color, [0.8, 0.1, 0.1]);
+    assert_eq!(mesh.materials[1].base_color, [0.5; 3]);
+    assert_eq!(mesh.runs.iter().map(|run| run.first_triangle).collect::<Vec<_>>(), [0, 2]);
+    let corners = |triangle: usize| mesh.triangles[triangle].map(|corner| corner as usize);
+    assert!(corners(0).iter().all(|&corner| mesh.normals[corner] == [0.0, 0.0, 1.0]));
+    assert!(corners(2).iter().all(|&corner| mesh.normals[corner] == [0.0, 0.0, -1.0]));
+    assert!(corners(3).iter().all(|&corner| mesh.normals[corner] == [0.0; 3]));
+    assert_eq!(corners(2).map(|corner| mesh.positions[corner][0]), [0.0, 1.0, 1.0]);
+
+    // Without a material of the scene the colours of the file are used.
+    let scene =
+        folder.load(&format!("{HEAD}[[object]]\nname = \"o\"\nmesh = \"shapes.obj\"\n")).unwrap();
+    let names: Vec<_> = scene.materials.iter().map(|material| material.name.as_str()).collect();
+    assert_eq!(names, ["grey", "o/red paint", "o/grey"]);
+    assert_eq!(scene.geometry.materials, [1, 1, 2, 2]);
+    let plain = text.replace("usemtl red paint\n", "");
+    folder.write("shapes.obj", plain);
+    let message =
+        folder.message(&format!("{HEAD}[[object]]\nname = \"o\"\nmesh = \"shapes.obj\"\n"));
+    assert!(message.contains("object `o` (shapes.obj, line 14): expected a material"), "{message}");
+}
+
+#[test]
+fn broken_obj_files_are_refused_with_their_line() {
+    let folder = Folder::new();
+    let good = "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n";
+    let case = |from: &str, to: &str, expected: &str| {
+        let message = folder.mesh_message("broken.obj", good.replace(from, to));
+        assert!(message.contains(expected), "expected `{expected}`, found `{message}`");
+    };
+    case(
+        "f 1 2 3",
+        "f 1 2 4",
+        "broken.obj:4:1: face after 0 triangles: position index 4 is out of range, there are 3 positions so far",
+    );
+    case("f 1 2 3", "f 0 1 2", "position index 0 is out of range");
+    case("f 1 2 3", "f -4 1 2", "position index -4 is out of range");
+    case(
+        "f 1 2 3",
+        "f 1//1 2//1 3//1",
+        "normal index 1 is out of range, there are 0 normals so far",
+    );
+    case("f 1 2 3", "f 1 2", "broken.obj:4:1: a face needs three corners or more, found 2");
+    case("f 1 2 3", "f 1 2 x", "expected the index of a position, found `x`");
+    case("f 1 2 3", "f 1 2 99999999999999999999", "expected the index of a position");
+    case("v 1 0 0", "v 1 zero 0", "broken.obj:2:1: expected three numbers, found `zero`");
+    case("v 1 0 0", "v 1 0", "broken.obj:2:1: expected three numbers, found ``");
+    let mut warnings = Vec::new();
+    let path = folder.write("lost.obj", format!("mtllib lost.mtl\n{good}"));
+    Mesh::read(&path, &mut warnings).unwrap();
+    assert!(warnings[0].contains("lost.obj:1: cannot read the material library"), "{warnings:?}");
+}
+
+/// A triangle under a node that shifts and one that mirrors, as JSON; `uri` names the buffer.
+fn gltf_json(uri: &str) -> String {
+    let uri = if uri.is_empty() { String::new() } else { format!("\"uri\": \"{uri}\",") };
+    format!(
+        r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0]}}],
+        "nodes": [{{"translation": [10, 0, 0], "children": [1]}},
+                  {{"mesh": 0, "scale": [-1, 1, 1]}}],
+        "materials": [{{"name": "leaf", "pbrMetallicRoughness": {{"baseColorFactor": [0.1, 0.6, 0.2, 1]}}}}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0, "NORMAL": 1}}, "indices": 2,
+                                      "material": 0}},
+                                    {{"attributes": {{"POSITION": 0}}, "mode": 0}}]}}],
+        "accessors": [
+          {{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+            "min": [0, 0, 0], "max": [1, 1, 0]}},
+          {{"bufferView": 0, "byteOffset": 36, "componentType": 5126, "count": 3, "type": "VEC3"}},
+          {{"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"}}],
+        "bufferViews": [{{"buffer": 0, "byteOffset": 0, "byteLength": 72}},
+                        {{"buffer": 0, "byteOffset": 72, "byteLength": 6}}],
+        "buffers": [{{{uri} "byteLength": 80}}]}}"#
+    )
+}
+
+fn gltf_buffer() -> Vec<u8> {
+    let positions = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let normals = [0.0_f32, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0];
+    let mut bytes: Vec<u8> =
+        positions.iter().chain(&normals).flat_map(|component| component.to_le_bytes()).collect();
+    bytes.extend([0_u16, 1, 2, 0].iter().flat_map(|index| index.to_le_bytes()));
+    bytes
+}
+
+fn glb(json: &str, buffer: &[u8]) -> Vec<u8> {
+    let mut json = json.as_bytes().to_vec();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut bytes = b"glTF\x02\0\0\0".to_vec();
+    bytes.extend(((28 + json.len() + buffer.len()) as u32).to_le_bytes());
+    bytes.extend((json.len() as u32).to_le_bytes());
+    bytes.extend(b"JSON");
+    bytes.extend(&json);
+    bytes.extend((buffer.len() as u32).to_le_bytes());
+    bytes.extend(b"BIN\0");
+    bytes.extend(buffer);
+    bytes
+}
+
+/// 80 bytes of [`gltf_buffer`] in base64.
+fn base64(bytes: &[u8]) -> String {
+    const DIGITS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    bytes
+        .chunks(3)
+        .flat_map(|group| {
+            let bits = group.iter().fold(0, |bits, byte| bits << 8 | u32::from(*byte))
+                << (8 * (3 - group.len()));
+            let digit = move |place: usize| match place <= group.len() {
+                true => DIGITS[(bits >> (18 - 6 * place) & 63) as usize] as char,
+                false => '=',
+            };
+            (0..4).map(digit).collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+#[test]
+fn gltf_reads_nodes_from_every_kind_of_buffer() {
+    let folder = Folder::new();
+    folder.write("my buffer.bin", gltf_buffer());
+    let inline = format!("data:application/octet-stream;base64,{}", base64(&gltf_buffer()));
+    let files = [
+        ("beside.gltf", gltf_json("my%20buffer.bin").into_bytes()),
+        ("inline.gltf", gltf_json(&inline).into_bytes()),
+        ("one.glb", glb(&gltf_json(""), &gltf_buffer())),
+    ];
+    for (name, bytes) in files {
+        let mut warnings = Vec::new();
+        let mesh = Mesh::read(&folder.write(name, bytes), &mut warnings).unwrap();
+        assert_eq!(mesh.positions, [[10.0, 0.0, 0.0], [9.0, 0.0, 0.0], [10.0, 1.0, 0.0]]);
+        assert_eq!(mesh.triangles, [[0, 2, 1]], "{name}: a mirror turns the winding");
+        assert_eq!(mesh.normals, [[0.0, 0.0, 1.0]; 3]);
+        assert_eq!(mesh.materials[0].base_color, [0.1, 0.6, 0.2]);
+        assert!(warnings[0].contains("left out 1 primitives"), "{warnings:?}");
+    }
+}
+
+#[test]
+fn broken_gltf_files_are_refused() {
+    let folder = Folder::new();
+    folder.write("buffer.bin", gltf_buffer());
+    let good = gltf_json("buffer.bin");
+    let case = |from: &str, to: &str, expected: &str| {
+        assert!(good.contains(from), "the case `{from}` must change something");
+        let message = folder.mesh_message("broken.gltf", good.replace(from, to));
+        assert!(message.contains(expected), "expected `{expected}`, found `{message}`");
+    };
+    case("\"scene\": 0,", "\"scene\": 0", "broken.gltf:1:");
+    case("buffer.bin", "missing.bin", "missing.bin: cannot read");
+    case("buffer.bin", "data:;base64,AAAA", "truncated: buffer 0 should have 80 bytes, found 3");
+    case("buffer.bin", "data:;base64,*", "buffer 0 is not base64 data");
+    case(
+        "\"byteLength\": 72",
+        "\"byteLength\": 720",
+        "truncated: buffer view 0 needs 720 bytes from byte 0, its buffer has 80",
+    );
+    case(
+        "\"count\": 3, \"type\": \"SCALAR\"",
+        "\"count\": 4, \"type\": \"SCALAR\"",
+        "accessor 2: 4 elements of 2 bytes every 2 from byte 0 do not fit into the 6 bytes",
+    );
+    case(
+        "\"componentType\": 5123",
+        "\"componentType\": 5122",
+        "accessor 2: expected unsigned indices",
+    );
+    case("\"children\": [1]", "\"children\": [1, 0]", "node 0 has more than one parent");
+    case(
+        "\"asset\"",
+        "\"extensionsRequired\": [\"KHR_draco_mesh_compression\"], \"asset\"",
+        "KHR_draco_mesh_compression",
+    );
+    case("\"scene\": 0, \"scenes\": [{\"nodes\": [0]}],", "", "expected a scene with nodes");
+    let mut bytes = gltf_buffer();
+    bytes[74] = 9;
+    folder.write("buffer.bin", bytes);
+    case(
+        "\"scene\": 0",
+        "\"scene\": 0 ",
+        "accessor 2, element 1 (triangle 0): vertex index 9 is out of range, the primitive has 3 vertices",
+    );
+    let whole = glb(&gltf_json(""), &gltf_buffer());
+    let message = folder.mesh_message("short.glb", &whole[..whole.len() - 8]);
+    let expected =
+        format!("truncated: the header states {} bytes, found {}", whole.len(), whole.len() - 8);
+    assert!(message.contains(&expected), "{message}");
+    for length in 0..whole.len().min(200) {
+        folder.mesh_message("short.glb", &whole[..length]);
+    }
+}
+
+#[test]
+fn bad_triangles_are_dropped_with_a_warning_that_counts_them() {
+    let folder = Folder::new();
+    let faces = "3 0 1 2\n3 0 1 1\n3 0 0 0\n3 1 2 3";
+    folder.write("bad.ply", ascii_ply(faces).replace("0 1 0\n", "nan 1 0\n"));
+    let scene = folder
+        .load(&format!("{HEAD}[[object]]\nname = \"b\"\nmesh = \"bad.ply\"\nmaterial = \"grey\"\n"))
+        .unwrap();
+    assert_eq!(scene.geometry.triangles, [[0, 1, 2]]);
+    assert!(scene.geometry.positions.iter().flatten().all(|component| component.is_finite()));
+    assert_eq!(
+        scene.warnings,
+        [
+            "object `b` (bad.ply, line 14): dropped 2 triangles of zero area of 4",
+            "object `b` (bad.ply, line 14): dropped 1 triangles with infinite or NaN corners of 4"
+        ]
+    );
+}
+
+// Real input
+
+#[test]
+fn the_four_test_scenes_have_their_triangles() {
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
+    if !scenes.is_dir() {
+        return;
+    }
+    for (name, triangles) in [
+        ("buddha_and_car", 163_983),
+        ("bathroom", 96_168),
+        ("meeting_room", 125_842),
+        ("restroom", 63_113),
+    ] {
+        let scene = Scene::load(&scenes.join(name).join("scene.toml")).unwrap();
+        assert_eq!(scene.name, name);
+        assert_eq!(scene.geometry.triangles.len(), triangles, "{name}: {:?}", scene.warnings);
+    }
+}
