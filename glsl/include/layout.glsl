@@ -67,6 +67,7 @@ struct Counters {
     uint shadow_rays_traced;
     uint shadow_rays_visible;
     uint dropped_samples;
+    uint traversal_overruns;
 };
 
 struct Material {
@@ -98,25 +99,14 @@ layout(scalar, set = SET_SCENE, binding = BINDING_PARAMETERS) readonly buffer Pa
 };
 #endif
 
+// Geometry and the inputs of traversal are read through texel buffers: on lavapipe a texel of four
+// words costs a fraction of four loads from a storage buffer (docs/traversal.md).
 #ifdef NEEDS_GEOMETRY
-layout(scalar, set = SET_SCENE, binding = BINDING_BVH_NODES) readonly buffer BvhNodesBuffer {
-    uvec4 bvh_nodes[];
-};
-layout(scalar, set = SET_SCENE, binding = BINDING_TRIANGLES_0) readonly buffer Triangles0Buffer {
-    float triangles_0[];
-};
-layout(scalar, set = SET_SCENE, binding = BINDING_TRIANGLES_1) readonly buffer Triangles1Buffer {
-    float triangles_1[];
-};
-layout(scalar, set = SET_SCENE, binding = BINDING_TRIANGLES_2) readonly buffer Triangles2Buffer {
-    float triangles_2[];
-};
-layout(scalar, set = SET_SCENE, binding = BINDING_TRIANGLES_3) readonly buffer Triangles3Buffer {
-    float triangles_3[];
-};
-layout(scalar, set = SET_SCENE, binding = BINDING_TRIANGLE_NORMALS) readonly buffer NormalsBuffer {
-    uint triangle_normals[];
-};
+layout(set = SET_SCENE, binding = BINDING_BVH_NODES) uniform usamplerBuffer bvh_nodes;
+layout(set = SET_SCENE, binding = BINDING_TRIANGLES_0) uniform usamplerBuffer triangles_0;
+layout(set = SET_SCENE, binding = BINDING_TRIANGLES_1) uniform usamplerBuffer triangles_1;
+layout(set = SET_SCENE, binding = BINDING_TRIANGLES_2) uniform usamplerBuffer triangles_2;
+layout(set = SET_SCENE, binding = BINDING_TRIANGLES_3) uniform usamplerBuffer triangles_3;
 layout(scalar, set = SET_SCENE, binding = BINDING_TRIANGLE_MATERIALS)
     readonly buffer TriangleMaterialsBuffer {
     uint triangle_materials[];
@@ -158,6 +148,16 @@ layout(scalar, set = SET_WAVE, binding = BINDING_RAYS) ACCESS_RAYS buffer RaysBu
 };
 #endif
 
+// The rays again, as texels of four words.
+#ifdef NEEDS_RAY_TEXELS
+layout(set = SET_WAVE, binding = BINDING_RAY_TEXELS) uniform usamplerBuffer ray_texels;
+Ray load_ray(uint index) {
+    uvec4 first = texelFetch(ray_texels, int(2u * index));
+    uvec4 second = texelFetch(ray_texels, int(2u * index + 1u));
+    return Ray(uintBitsToFloat(first.xyz), first.w, uintBitsToFloat(second.xyz), second.w);
+}
+#endif
+
 #ifdef NEEDS_HITS
 #ifdef WRITES_HITS
 #define ACCESS_HITS writeonly
@@ -167,6 +167,21 @@ layout(scalar, set = SET_WAVE, binding = BINDING_RAYS) ACCESS_RAYS buffer RaysBu
 layout(scalar, set = SET_WAVE, binding = BINDING_HITS) ACCESS_HITS buffer HitsBuffer {
     Hit hits[];
 };
+#endif
+
+// What a ray that starts at a hit needs to know of it, from texels of four words.
+#ifdef NEEDS_HIT_TEXELS
+layout(set = SET_WAVE, binding = BINDING_HIT_TEXELS) uniform usamplerBuffer hit_texels;
+struct HitOrigin {
+    vec3 position;
+    uint material;
+    vec3 geometric_normal;
+};
+HitOrigin load_hit_origin(uint index) {
+    uvec4 first = texelFetch(hit_texels, int(3u * index));
+    uvec4 second = texelFetch(hit_texels, int(3u * index + 1u));
+    return HitOrigin(uintBitsToFloat(first.xyz), first.w, uintBitsToFloat(second.xyz));
+}
 #endif
 
 #ifdef NEEDS_SHADOW_RAYS
@@ -179,6 +194,17 @@ layout(scalar, set = SET_WAVE, binding = BINDING_SHADOW_RAYS)
     ACCESS_SHADOW_RAYS buffer ShadowRaysBuffer {
     ShadowRay shadow_rays[];
 };
+#endif
+
+// The shadow rays again, as texels of two words.
+#ifdef NEEDS_SHADOW_RAY_TEXELS
+layout(set = SET_WAVE, binding = BINDING_SHADOW_RAY_TEXELS) uniform usamplerBuffer shadow_ray_texels;
+ShadowRay load_shadow_ray(uint index) {
+    uvec2 first = texelFetch(shadow_ray_texels, int(3u * index)).xy;
+    uvec2 second = texelFetch(shadow_ray_texels, int(3u * index + 1u)).xy;
+    uvec2 third = texelFetch(shadow_ray_texels, int(3u * index + 2u)).xy;
+    return ShadowRay(uintBitsToFloat(uvec3(first, second.x)), uintBitsToFloat(uvec3(second.y, third)));
+}
 #endif
 
 #ifdef NEEDS_VISIBILITY
@@ -214,6 +240,9 @@ layout(scalar, set = SET_FILM, binding = BINDING_FILM_COMPENSATION) buffer FilmC
 layout(scalar, set = SET_FILM, binding = BINDING_FILM_SQUARES) buffer FilmSquaresBuffer {
     vec3 film_squares[];
 };
+#endif
+
+#if defined(NEEDS_FILM) || defined(NEEDS_COUNTERS)
 layout(scalar, set = SET_FILM, binding = BINDING_COUNTERS) buffer CountersBuffer {
     Counters counters;
 };

@@ -23,14 +23,12 @@ use obvhs::{
 
 use crate::{
     error::{Error, Result},
+    gpu::constants::{BVH_STACK_ENTRIES, FLAT_NORMAL},
     scene::Geometry,
 };
 
 /// Pages (buffers) the triangles may be spread over, bindings `BINDING_TRIANGLES_0` to `_3`.
 pub const MAX_TRIANGLE_PAGES: usize = 4;
-
-/// Entries of the traversal stack in `bvh.glsl`; one node group per level of the tree is stacked.
-pub const STACK_ENTRIES: usize = 32;
 
 /// Largest magnitude of a coordinate, metres; products of four coordinates stay finite in `f32`.
 pub const MAX_COORDINATE: f32 = 1e9;
@@ -44,7 +42,7 @@ pub type Node = [u32; 20];
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct TriangleRecord {
-    /// Position, metres, and normal ([`normal::pack`]; [`normal::FLAT`] for a flat triangle).
+    /// Position, metres, and normal ([`normal::pack`]; [`FLAT_NORMAL`] for a flat triangle).
     pub vertices: [VertexRecord; 3],
 }
 
@@ -72,7 +70,7 @@ pub struct Accel {
     pub triangle_materials: Vec<u32>,
     /// Triangle of the scene per triangle in BVH order.
     pub scene_triangles: Vec<u32>,
-    /// Levels of nodes below the root, checked against [`STACK_ENTRIES`].
+    /// Levels of nodes below the root, checked against [`BVH_STACK_ENTRIES`].
     pub depth: usize,
 }
 
@@ -258,9 +256,9 @@ fn depth(nodes: &[CwBvhNode]) -> Result<usize> {
         let children = node.imask.count_ones();
         pending.extend((0..children).map(|child| (node.child_base_idx + child, level + 1)));
     }
-    if deepest >= STACK_ENTRIES {
+    if deepest >= BVH_STACK_ENTRIES as usize {
         return Err(geometry_error(format!(
-            "the BVH is {deepest} levels deep, traversal can stack {STACK_ENTRIES}: the scene has \
+            "the BVH is {deepest} levels deep, traversal can stack {BVH_STACK_ENTRIES}: the scene has \
              many coincident triangles; remove duplicates"
         )));
     }
@@ -274,7 +272,7 @@ fn record(geometry: &Geometry, triangle: u32) -> TriangleRecord {
     let flat = normals.iter().any(|normal| !(normal.length_squared() > 0.25));
     let vertices = [0, 1, 2].map(|corner| VertexRecord {
         position: geometry.positions[indices[corner] as usize],
-        normal: if flat { normal::FLAT } else { normal::pack(normals[corner]) },
+        normal: if flat { FLAT_NORMAL } else { normal::pack(normals[corner]) },
     });
     TriangleRecord { vertices }
 }

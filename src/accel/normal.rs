@@ -6,9 +6,6 @@
 
 use glam::{Vec2, Vec3};
 
-/// Marks a flat triangle: −32,768 twice, which [`pack`] never gives.
-pub const FLAT: u32 = 0x8000_8000;
-
 /// Largest magnitude of a coordinate.
 const SCALE: f32 = 32767.0;
 
@@ -46,7 +43,7 @@ mod tests {
             let phi = i as f32 * 2.399_963;
             let r = (1.0 - z * z).sqrt();
             let n = Vec3::new(r * phi.cos(), r * phi.sin(), z);
-            assert_ne!(pack(n), FLAT);
+            assert_ne!(pack(n), crate::gpu::constants::FLAT_NORMAL);
             assert!(unpack(pack(n)).distance(n) < 1e-4, "{n}");
         }
         for n in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z] {

@@ -1,1 +1,321 @@
-//! Traversal on the host over the arrays of [`Accel`](super::Accel): the Rust twin of `bvh.glsl`.
+//! Traversal on the host over the arrays of [`Accel`]: the Rust twin of `bvh.glsl`, same names, same
+//! order of operations, so that on a device that does not fuse multiplications and additions both
+//! find the same triangle at the same distance to the bit.
+
+use glam::{UVec2, Vec3};
+
+use super::{Accel, Node, TriangleRecord, VertexRecord, normal};
+use crate::gpu::constants::{BVH_STACK_ENTRIES, FLAT_NORMAL};
+
+/// What a ray meets first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Intersection {
+    /// Triangle in BVH order.
+    pub triangle: u32,
+    /// Distance along the ray, metres.
+    pub distance: f32,
+}
+
+/// The surface where a ray meets a triangle; twin of the shader's `Hit`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surface {
+    /// Point on the triangle, metres.
+    pub position: Vec3,
+    /// Distance along the ray, metres.
+    pub distance: f32,
+    /// Unit normal of the triangle, turned toward the ray's origin.
+    pub geometric_normal: Vec3,
+    /// Unit interpolated normal, turned toward the ray's origin, with a positive cosine to it.
+    pub shading_normal: Vec3,
+}
+
+/// Work that one ray took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Calls of the step function.
+    pub steps: u32,
+    /// Nodes visited.
+    pub nodes: u32,
+    /// Triangles tested.
+    pub triangles: u32,
+}
+
+/// Distance of a ray that has met nothing yet.
+const FAR_AWAY: f32 = 3.0e38;
+
+/// Share of the scene's size by which ray origins are moved off their surface.
+const RAY_OFFSET_SHARE: f32 = 7.629_394_5e-6;
+
+/// Cosine with the outgoing direction below which shading normals are turned.
+const LEAST_SHADING_COSINE: f32 = 0.01;
+
+impl Accel {
+    /// First triangle that the ray meets; `direction` is a unit vector.
+    pub fn closest(&self, origin: Vec3, direction: Vec3) -> Option<Intersection> {
+        self.closest_with_work(origin, direction).0
+    }
+
+    /// As [`Accel::closest`], with the work it took.
+    pub fn closest_with_work(&self, origin: Vec3, direction: Vec3) -> (Option<Intersection>, Work) {
+        let mut ray = Traversal::start(origin, direction);
+        while ray.step(self, false) {}
+        (ray.hit(), ray.work)
+    }
+
+    /// Whether the ray meets any triangle; `direction` is a unit vector.
+    pub fn is_occluded(&self, origin: Vec3, direction: Vec3) -> bool {
+        let mut ray = Traversal::start(origin, direction);
+        while ray.step(self, true) {}
+        ray.hit().is_some()
+    }
+
+    /// The surface that a ray meets on `triangle`.
+    ///
+    /// # Panics
+    /// `triangle` is out of range.
+    pub fn surface_at(&self, triangle: u32, origin: Vec3, direction: Vec3) -> Surface {
+        let TriangleRecord { vertices } = self.triangle(triangle);
+        let [a, b, c] = vertices.map(|vertex| Vec3::from_array(vertex.position));
+        let areas = edge_functions(a - origin, b - origin, c - origin, direction);
+        let area = areas.x + areas.y + areas.z;
+        let weights = areas / area;
+        let distance = (areas.x * (a - origin).dot(direction)
+            + areas.y * (b - origin).dot(direction)
+            + areas.z * (c - origin).dot(direction))
+            / area;
+        let normal = (b - a).cross(c - a);
+        let normal = (normal / normal.abs().max_element()).normalize();
+        let geometric_normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
+        let mut shading_normal = geometric_normal;
+        if vertices[0].normal != FLAT_NORMAL {
+            let [a, b, c] = vertices.map(|vertex: VertexRecord| normal::unpack(vertex.normal));
+            let interpolated = weights.x * a + weights.y * b + weights.z * c;
+            if interpolated.length_squared() > 1e-12 {
+                let unit = interpolated.normalize();
+                shading_normal = if unit.dot(geometric_normal) < 0.0 { -unit } else { unit };
+            }
+        }
+        let cosine = -geometric_normal.dot(direction);
+        Surface {
+            position: weights.x * a + weights.y * b + weights.z * c,
+            distance,
+            geometric_normal,
+            shading_normal: consistent_normal(
+                shading_normal,
+                -direction,
+                LEAST_SHADING_COSINE.min(cosine).max(1e-6),
+            ),
+        }
+    }
+
+    /// Distance by which ray origins are moved off their surface, metres.
+    pub fn ray_offset(&self) -> f32 {
+        let root = &self.nodes[0];
+        let corner = node_corner(root);
+        let size = corner.abs().max((corner + 255.0 * node_spacing(root)).abs());
+        RAY_OFFSET_SHARE * size.max_element()
+    }
+
+    /// Origin of a ray that leaves a surface: off it by more than the error of positions and of the
+    /// triangle test.
+    pub fn offset_ray_origin(
+        &self,
+        position: Vec3,
+        geometric_normal: Vec3,
+        direction: Vec3,
+    ) -> Vec3 {
+        let offset = self.ray_offset();
+        position
+            + (if geometric_normal.dot(direction) < 0.0 { -offset } else { offset })
+                * geometric_normal
+    }
+}
+
+/// Turns a shading normal toward `outgoing_direction` until its cosine with it is `least`, if it is
+/// less.
+fn consistent_normal(shading_normal: Vec3, outgoing_direction: Vec3, least: f32) -> Vec3 {
+    let cosine = shading_normal.dot(outgoing_direction);
+    let tangential = shading_normal - cosine * outgoing_direction;
+    let size = tangential.length();
+    if cosine >= least || size == 0.0 {
+        return shading_normal;
+    }
+    tangential * ((1.0 - least * least).sqrt() / size) + least * outgoing_direction
+}
+
+/// Twice the signed areas of the three sub-triangles seen along the ray. S. Woop, C. Benthin, I.
+/// Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, without the shear.
+fn edge_functions(a: Vec3, b: Vec3, c: Vec3, direction: Vec3) -> Vec3 {
+    let edge = |p: Vec3, q: Vec3| {
+        let cross = Vec3::new(p.y * q.z - p.z * q.y, p.z * q.x - p.x * q.z, p.x * q.y - p.y * q.x);
+        direction.x * cross.x + direction.y * cross.y + direction.z * cross.z
+    };
+    Vec3::new(edge(c, b), edge(a, c), edge(b, a))
+}
+
+/// Corner of a node's box.
+fn node_corner(node: &Node) -> Vec3 {
+    Vec3::new(f32::from_bits(node[0]), f32::from_bits(node[1]), f32::from_bits(node[2]))
+}
+
+/// Distance between neighbouring quantised planes of a node's children, per axis.
+fn node_spacing(node: &Node) -> Vec3 {
+    Vec3::new(
+        f32::from_bits((node[3] & 0xff) << 23),
+        f32::from_bits((node[3] & 0xff00) << 15),
+        f32::from_bits((node[3] & 0x00ff_0000) << 7),
+    )
+}
+
+/// 1 / x, finite also for a zero component.
+fn inverse(x: f32) -> f32 {
+    if x.abs() > 1e-18 {
+        1.0 / x
+    } else if x < 0.0 {
+        -1e18
+    } else {
+        1e18
+    }
+}
+
+/// State of one ray.
+struct Traversal {
+    origin: Vec3,
+    direction: Vec3,
+    inverse_direction: Vec3,
+    octant4: u32,
+    distance: f32,
+    triangle: Option<u32>,
+    nodes_waiting: UVec2,
+    triangles_waiting: UVec2,
+    triangles_next: UVec2,
+    stack: [UVec2; BVH_STACK_ENTRIES as usize],
+    stack_size: usize,
+    work: Work,
+}
+
+impl Traversal {
+    fn start(origin: Vec3, direction: Vec3) -> Self {
+        let octant = |x: f32, bits| if x < 0.0 { 0 } else { bits };
+        Self {
+            origin,
+            direction,
+            inverse_direction: Vec3::new(
+                inverse(direction.x),
+                inverse(direction.y),
+                inverse(direction.z),
+            ),
+            octant4: octant(direction.x, 0x0404_0404)
+                | octant(direction.y, 0x0202_0202)
+                | octant(direction.z, 0x0101_0101),
+            distance: FAR_AWAY,
+            triangle: None,
+            nodes_waiting: UVec2::new(0, 0x8000_0000),
+            triangles_waiting: UVec2::ZERO,
+            triangles_next: UVec2::ZERO,
+            stack: [UVec2::ZERO; BVH_STACK_ENTRIES as usize],
+            stack_size: 0,
+            work: Work::default(),
+        }
+    }
+
+    fn hit(&self) -> Option<Intersection> {
+        self.triangle.map(|triangle| Intersection { triangle, distance: self.distance })
+    }
+
+    /// At most one node and one triangle; false when the ray is finished.
+    fn step(&mut self, accel: &Accel, any_hit: bool) -> bool {
+        self.work.steps += 1;
+        if self.nodes_waiting.y <= 0x00ff_ffff && self.stack_size > 0 {
+            self.stack_size -= 1;
+            self.nodes_waiting = self.stack[self.stack_size];
+        }
+        if self.nodes_waiting.y > 0x00ff_ffff && self.triangles_next.y == 0 {
+            self.visit_node(accel);
+        }
+        if self.triangles_waiting.y != 0 {
+            self.test_triangle(accel, any_hit);
+        }
+        if self.triangles_waiting.y == 0 {
+            self.triangles_waiting = self.triangles_next;
+            self.triangles_next.y = 0;
+        }
+        self.triangles_waiting.y != 0 || self.nodes_waiting.y > 0x00ff_ffff || self.stack_size > 0
+    }
+
+    fn visit_node(&mut self, accel: &Accel) {
+        self.work.nodes += 1;
+        let hits = self.nodes_waiting.y;
+        let bit = 31 - hits.leading_zeros();
+        self.nodes_waiting.y &= !(1 << bit);
+        if self.nodes_waiting.y > 0x00ff_ffff {
+            self.stack[self.stack_size] = self.nodes_waiting;
+            self.stack_size += 1;
+        }
+        let slot = (bit - 24) ^ (self.octant4 & 0xff);
+        let index = self.nodes_waiting.x + (hits & !(u32::MAX << slot)).count_ones();
+        let node = &accel.nodes[index as usize];
+
+        let scale = node_spacing(node) * self.inverse_direction;
+        let bias = (node_corner(node) - self.origin) * self.inverse_direction;
+        let mut found = 0;
+        for child in 0..8 {
+            let half = child / 4;
+            let byte = |word: usize| (node[word + half] >> (8 * (child % 4))) & 0xff;
+            let mut near = Vec3::ZERO;
+            let mut far = Vec3::ZERO;
+            for axis in 0..3 {
+                let (lower, upper) = (byte(8 + 4 * axis), byte(10 + 4 * axis));
+                let (enter, leave) =
+                    if self.direction[axis] < 0.0 { (upper, lower) } else { (lower, upper) };
+                near[axis] = enter as f32;
+                far[axis] = leave as f32;
+            }
+            let enter = near * scale + bias;
+            let leave = far * scale + bias;
+            let first = enter.max_element().max(0.0);
+            let last = leave.min_element().min(self.distance);
+            if first <= last {
+                let meta = byte(6);
+                let is_inner = meta & 0x18 == 0x18;
+                let octant = if is_inner { self.octant4 & 0xff } else { 0 };
+                found |= (meta >> 5) << ((meta ^ octant) & 0x1f);
+            }
+        }
+        self.nodes_waiting = UVec2::new(node[4], (found & 0xff00_0000) | (node[3] >> 24));
+        let triangles = UVec2::new(node[5], found & 0x00ff_ffff);
+        if self.triangles_waiting.y == 0 {
+            self.triangles_waiting = triangles;
+        } else {
+            self.triangles_next = triangles;
+        }
+    }
+
+    fn test_triangle(&mut self, accel: &Accel, any_hit: bool) {
+        self.work.triangles += 1;
+        let bit = 31 - self.triangles_waiting.y.leading_zeros();
+        self.triangles_waiting.y &= !(1 << bit);
+        let triangle = self.triangles_waiting.x + bit;
+        let [a, b, c] = accel
+            .triangle(triangle)
+            .vertices
+            .map(|vertex| Vec3::from_array(vertex.position) - self.origin);
+        let areas = edge_functions(a, b, c, self.direction);
+        let area = areas.x + areas.y + areas.z;
+        let distance = (areas.x * a.dot(self.direction)
+            + areas.y * b.dot(self.direction)
+            + areas.z * c.dot(self.direction))
+            / area;
+        let inside = areas.min_element() >= 0.0 || areas.max_element() <= 0.0;
+        if inside && area != 0.0 && distance > 0.0 && distance < self.distance {
+            self.distance = distance;
+            self.triangle = Some(triangle);
+            if any_hit {
+                self.nodes_waiting.y = 0;
+                self.triangles_waiting.y = 0;
+                self.triangles_next.y = 0;
+                self.stack_size = 0;
+            }
+        }
+    }
+}

@@ -48,9 +48,30 @@ impl Buffer {
             size,
             MemoryLocation::GpuOnly,
             vk::BufferUsageFlags::STORAGE_BUFFER
+                | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
                 | vk::BufferUsageFlags::TRANSFER_SRC
                 | vk::BufferUsageFlags::TRANSFER_DST,
         )
+    }
+
+    /// Creates a buffer that holds `data` and is read as a uniform texel buffer only, so that it may
+    /// be larger than a storage buffer; the descriptor set checks the number of texels.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if memory runs out.
+    pub fn texels_from_slice<T: Pod>(device: &Arc<Device>, name: &str, data: &[T]) -> Result<Self> {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let buffer = Self::with_location(
+            device,
+            name,
+            bytes.len() as u64,
+            MemoryLocation::GpuOnly,
+            vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
+                | vk::BufferUsageFlags::TRANSFER_SRC
+                | vk::BufferUsageFlags::TRANSFER_DST,
+        )?;
+        buffer.upload(bytes)?;
+        Ok(buffer)
     }
 
     /// Creates a storage buffer that holds `data`.

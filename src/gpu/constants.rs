@@ -15,9 +15,10 @@ pub const SET_FILM: u32 = 3;
 
 /// Scene set: [`SceneParameters`](super::layout::SceneParameters), one element.
 pub const BINDING_PARAMETERS: u32 = 0;
-/// Scene set: CWBVH nodes.
+/// Scene set: CWBVH nodes, texels of four words, five to a node.
 pub const BINDING_BVH_NODES: u32 = 1;
-/// Scene set: triangle vertices in BVH order, first page; pages 1 to 3 follow.
+/// Scene set: triangle vertices in BVH order, texels of four words, three to a triangle; first page,
+/// pages 1 to 3 follow.
 pub const BINDING_TRIANGLES_0: u32 = 2;
 /// Second page of triangles.
 pub const BINDING_TRIANGLES_1: u32 = 3;
@@ -25,8 +26,6 @@ pub const BINDING_TRIANGLES_1: u32 = 3;
 pub const BINDING_TRIANGLES_2: u32 = 4;
 /// Fourth page of triangles.
 pub const BINDING_TRIANGLES_3: u32 = 5;
-/// Scene set: packed vertex normals, three per triangle in BVH order.
-pub const BINDING_TRIANGLE_NORMALS: u32 = 6;
 /// Scene set: material index per triangle in BVH order.
 pub const BINDING_TRIANGLE_MATERIALS: u32 = 7;
 /// Scene set: [`Material`](super::layout::Material) per material.
@@ -51,6 +50,13 @@ pub const BINDING_VISIBILITY: u32 = 3;
 /// Wave set: [`PathState`](super::layout::PathState) per path.
 pub const BINDING_PATHS: u32 = 4;
 
+/// Wave set: the rays again, texels of four words, two to a ray.
+pub const BINDING_RAY_TEXELS: u32 = 5;
+/// Wave set: the hits again, texels of four words, three to a hit.
+pub const BINDING_HIT_TEXELS: u32 = 6;
+/// Wave set: the shadow rays again, texels of two words, three to a shadow ray.
+pub const BINDING_SHADOW_RAY_TEXELS: u32 = 7;
+
 /// Film set: leading part of Σ radiance per pixel.
 pub const BINDING_FILM_SUM: u32 = 0;
 /// Film set: rest of Σ radiance per pixel.
@@ -67,6 +73,22 @@ pub const BINDING_FILM_NORMAL: u32 = 5;
 pub const BINDING_FILM_POSITION: u32 = 6;
 /// Film set: shadow rays visible and traced per pixel.
 pub const BINDING_FILM_VISIBLE: u32 = 7;
+
+/// Specialization constant of the passes that traverse: pages of triangles in use.
+pub const CONSTANT_TRIANGLE_PAGES: u32 = 0;
+/// Specialization constant: base-2 logarithm of the triangles per page.
+pub const CONSTANT_TRIANGLE_PAGE_SHIFT: u32 = 1;
+/// Specialization constant: rays that one invocation traces, 1 to 32.
+pub const CONSTANT_RAYS_PER_INVOCATION: u32 = 2;
+/// Specialization constant: lanes of a subgroup that have finished when they take their next rays.
+pub const CONSTANT_REFILL_LANES: u32 = 3;
+/// Entries of the traversal stack; one group of nodes per level of the tree is stacked.
+pub const BVH_STACK_ENTRIES: u32 = 32;
+/// Steps of traversal that one invocation may take for all its rays; Mesa 22.3 silently ends the
+/// loops of an invocation after 65,535 iterations in all, and two loops count every step here.
+pub const TRAVERSAL_STEP_LIMIT: u32 = 30_000;
+/// Packed normal of the vertices of a flat triangle, which no unit vector packs to.
+pub const FLAT_NORMAL: u32 = 0x8000_8000;
 
 /// Bit of [`Wave::aovs`](super::layout::Wave::aovs): write albedo.
 pub const AOV_ALBEDO: u32 = 1;
@@ -150,7 +172,6 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("BINDING_TRIANGLES_1", BINDING_TRIANGLES_1),
     ("BINDING_TRIANGLES_2", BINDING_TRIANGLES_2),
     ("BINDING_TRIANGLES_3", BINDING_TRIANGLES_3),
-    ("BINDING_TRIANGLE_NORMALS", BINDING_TRIANGLE_NORMALS),
     ("BINDING_TRIANGLE_MATERIALS", BINDING_TRIANGLE_MATERIALS),
     ("BINDING_MATERIALS", BINDING_MATERIALS),
     ("BINDING_BRDF_TABLE", BINDING_BRDF_TABLE),
@@ -162,6 +183,9 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("BINDING_SHADOW_RAYS", BINDING_SHADOW_RAYS),
     ("BINDING_VISIBILITY", BINDING_VISIBILITY),
     ("BINDING_PATHS", BINDING_PATHS),
+    ("BINDING_RAY_TEXELS", BINDING_RAY_TEXELS),
+    ("BINDING_HIT_TEXELS", BINDING_HIT_TEXELS),
+    ("BINDING_SHADOW_RAY_TEXELS", BINDING_SHADOW_RAY_TEXELS),
     ("BINDING_FILM_SUM", BINDING_FILM_SUM),
     ("BINDING_FILM_COMPENSATION", BINDING_FILM_COMPENSATION),
     ("BINDING_FILM_SQUARES", BINDING_FILM_SQUARES),
@@ -170,6 +194,13 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("BINDING_FILM_NORMAL", BINDING_FILM_NORMAL),
     ("BINDING_FILM_POSITION", BINDING_FILM_POSITION),
     ("BINDING_FILM_VISIBLE", BINDING_FILM_VISIBLE),
+    ("CONSTANT_TRIANGLE_PAGES", CONSTANT_TRIANGLE_PAGES),
+    ("CONSTANT_TRIANGLE_PAGE_SHIFT", CONSTANT_TRIANGLE_PAGE_SHIFT),
+    ("CONSTANT_RAYS_PER_INVOCATION", CONSTANT_RAYS_PER_INVOCATION),
+    ("CONSTANT_REFILL_LANES", CONSTANT_REFILL_LANES),
+    ("BVH_STACK_ENTRIES", BVH_STACK_ENTRIES),
+    ("TRAVERSAL_STEP_LIMIT", TRAVERSAL_STEP_LIMIT),
+    ("FLAT_NORMAL", FLAT_NORMAL),
     ("AOV_ALBEDO", AOV_ALBEDO),
     ("AOV_NORMAL", AOV_NORMAL),
     ("AOV_POSITION", AOV_POSITION),

@@ -1,17 +1,39 @@
 //! Descriptor sets by rate of change: 0 scene, 1 SRBF tables, 2 wave, 3 film.
 //!
-//! Every binding is a storage buffer. A pipeline sees only the sets that its shader uses, and a set
-//! may leave bindings unwritten that the shader does not use.
+//! Every binding is a storage buffer, but for those that [`texel_format`] names: traversal reads
+//! geometry and rays through uniform texel buffers, which lavapipe loads several times as fast. A
+//! pipeline sees only the sets that its shader uses, and a set may leave bindings unwritten that the
+//! shader does not use.
 
 use std::sync::Arc;
 
 use ash::vk;
 
-use super::{buffer::Buffer, device::Device, labels, vulkan_error};
-use crate::error::Result;
+use super::{buffer::Buffer, constants as c, device::Device, labels, vulkan_error};
+use crate::error::{Error, Result};
 
 /// Bindings of the four sets.
 pub const SET_BINDING_COUNTS: [u32; 4] = [13, 4, 8, 8];
+
+/// Format and bytes of the texels of a binding that is a uniform texel buffer.
+pub(super) fn texel_format(set: u32, binding: u32) -> Option<(vk::Format, u64)> {
+    match (set, binding) {
+        (c::SET_SCENE, c::BINDING_BVH_NODES..=c::BINDING_TRIANGLES_3)
+        | (c::SET_WAVE, c::BINDING_RAY_TEXELS | c::BINDING_HIT_TEXELS) => {
+            Some((vk::Format::R32G32B32A32_UINT, 16))
+        }
+        (c::SET_WAVE, c::BINDING_SHADOW_RAY_TEXELS) => Some((vk::Format::R32G32_UINT, 8)),
+        _ => None,
+    }
+}
+
+fn descriptor_type(set: u32, binding: u32) -> vk::DescriptorType {
+    if texel_format(set, binding).is_some() {
+        vk::DescriptorType::UNIFORM_TEXEL_BUFFER
+    } else {
+        vk::DescriptorType::STORAGE_BUFFER
+    }
+}
 
 /// The layouts of the four sets and an empty one for the sets that a shader does not use.
 pub(super) struct SetLayouts {
@@ -25,10 +47,10 @@ impl SetLayouts {
             sets: [vk::DescriptorSetLayout::null(); 4],
             empty: vk::DescriptorSetLayout::null(),
         };
-        for (layout, count) in layouts.sets.iter_mut().zip(SET_BINDING_COUNTS) {
-            *layout = create_layout(device, count)?;
+        for ((set, layout), count) in (0..).zip(&mut layouts.sets).zip(SET_BINDING_COUNTS) {
+            *layout = create_layout(device, set, count)?;
         }
-        layouts.empty = create_layout(device, 0)?;
+        layouts.empty = create_layout(device, 0, 0)?;
         Ok(layouts)
     }
 
@@ -50,12 +72,12 @@ impl SetLayouts {
     }
 }
 
-fn create_layout(device: &ash::Device, count: u32) -> Result<vk::DescriptorSetLayout> {
+fn create_layout(device: &ash::Device, set: u32, count: u32) -> Result<vk::DescriptorSetLayout> {
     let bindings: Vec<_> = (0..count)
         .map(|binding| {
             vk::DescriptorSetLayoutBinding::default()
                 .binding(binding)
-                .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
+                .descriptor_type(descriptor_type(set, binding))
                 .descriptor_count(1)
                 .stage_flags(vk::ShaderStageFlags::COMPUTE)
         })
@@ -70,6 +92,7 @@ fn create_layout(device: &ash::Device, count: u32) -> Result<vk::DescriptorSetLa
 pub struct DescriptorSet {
     pool: vk::DescriptorPool,
     raw: vk::DescriptorSet,
+    views: Vec<vk::BufferView>,
     index: u32,
     device: Arc<Device>,
 }
@@ -79,22 +102,27 @@ impl DescriptorSet {
     /// every submission that uses the set.
     ///
     /// # Errors
-    /// [`Error::Vulkan`](crate::Error::Vulkan) if a call fails.
+    /// [`Error::Vulkan`] if a call fails, [`Error::Device`] if a texel buffer has more texels than
+    /// the device allows.
     ///
     /// # Panics
     /// If a binding is outside [`SET_BINDING_COUNTS`].
     pub fn new(device: &Arc<Device>, index: u32, buffers: &[(u32, &Buffer)]) -> Result<Self> {
         let count = SET_BINDING_COUNTS[index as usize];
-        let sizes = [vk::DescriptorPoolSize::default()
-            .ty(vk::DescriptorType::STORAGE_BUFFER)
-            .descriptor_count(count)];
+        let sizes = [vk::DescriptorType::STORAGE_BUFFER, vk::DescriptorType::UNIFORM_TEXEL_BUFFER]
+            .map(|ty| vk::DescriptorPoolSize::default().ty(ty).descriptor_count(count));
         let pool_info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
         // SAFETY: the device is alive.
         let pool = unsafe { device.raw().create_descriptor_pool(&pool_info, None) }
             .map_err(|result| vulkan_error("vkCreateDescriptorPool", result))?;
         // From here on `Drop` cleans up.
-        let mut set =
-            Self { pool, raw: vk::DescriptorSet::null(), index, device: Arc::clone(device) };
+        let mut set = Self {
+            pool,
+            raw: vk::DescriptorSet::null(),
+            views: Vec::new(),
+            index,
+            device: Arc::clone(device),
+        };
         let layouts = [device.set_layouts().get(index)];
         let allocate =
             vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
@@ -106,15 +134,56 @@ impl DescriptorSet {
             assert!(*binding < count, "set {index} has no binding {binding}");
             let info =
                 [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(vk::WHOLE_SIZE)];
+            let mut view = [vk::BufferView::null()];
             let write = vk::WriteDescriptorSet::default()
                 .dst_set(set.raw)
                 .dst_binding(*binding)
-                .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
-                .buffer_info(&info);
+                .descriptor_type(descriptor_type(index, *binding));
+            let write = match texel_format(index, *binding) {
+                None => write.buffer_info(&info),
+                Some((format, texel_bytes)) => {
+                    view[0] = set.add_view(buffer, format, texel_bytes)?;
+                    write.texel_buffer_view(&view)
+                }
+            };
             // SAFETY: set and buffer are alive and nothing uses the set yet.
             unsafe { device.raw().update_descriptor_sets(&[write], &[]) };
         }
         Ok(set)
+    }
+
+    /// Makes a view of `buffer` that lives as long as the set.
+    fn add_view(
+        &mut self,
+        buffer: &Buffer,
+        format: vk::Format,
+        texel_bytes: u64,
+    ) -> Result<vk::BufferView> {
+        let texels = buffer.size() / texel_bytes;
+        let capabilities = self.device.capabilities();
+        if texels > capabilities.max_texel_buffer_elements {
+            return Err(Error::Device {
+                reason: format!(
+                    "buffer {} needs {texels} texels, but {} allows {} for one texel buffer",
+                    buffer.name(),
+                    capabilities.name,
+                    capabilities.max_texel_buffer_elements
+                ),
+                help: "choose another device with --device, or a smaller scene or film".into(),
+            });
+        }
+        let info = vk::BufferViewCreateInfo::default()
+            .buffer(buffer.raw())
+            .format(format)
+            .range(texels * texel_bytes);
+        // SAFETY: the buffer is alive, has texel-buffer usage and holds that many texels.
+        let view =
+            unsafe { self.device.raw().create_buffer_view(&info, None) }.map_err(|result| {
+                vulkan_error(&format!("vkCreateBufferView({})", buffer.name()), result)
+            })?;
+        self.views.push(view);
+        labels::name_object(&self.device, view, buffer.name());
+        Ok(view)
     }
 
     pub(super) fn raw(&self) -> vk::DescriptorSet {
@@ -129,7 +198,13 @@ impl DescriptorSet {
 
 impl Drop for DescriptorSet {
     fn drop(&mut self) {
-        // SAFETY: every submission is waited for; destroying the pool frees the set.
-        unsafe { self.device.raw().destroy_descriptor_pool(self.pool, None) };
+        // SAFETY: every submission is waited for; destroying the pool frees the set, and the views
+        // belong to the set alone.
+        unsafe {
+            self.device.raw().destroy_descriptor_pool(self.pool, None);
+            for view in &self.views {
+                self.device.raw().destroy_buffer_view(*view, None);
+            }
+        }
     }
 }

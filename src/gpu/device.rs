@@ -32,6 +32,8 @@ pub struct Capabilities {
     pub api_version: (u32, u32, u32),
     /// Largest range of one storage-buffer binding, bytes.
     pub max_storage_buffer_range: u64,
+    /// Most texels of a texel buffer.
+    pub max_texel_buffer_elements: u64,
     /// Storage buffers that one pipeline may see.
     pub max_storage_buffers: u32,
     /// Push constants, bytes.
@@ -44,6 +46,8 @@ pub struct Capabilities {
     pub max_shared_memory: u32,
     /// Invocations of a subgroup.
     pub subgroup_size: u32,
+    /// Whether compute shaders may vote and ballot within a subgroup.
+    pub subgroup_ballot: bool,
     /// Memory heaps that are local to the device, bytes in all.
     pub device_memory: u64,
     /// Whether structs may have `scalar` layout.
@@ -82,6 +86,9 @@ impl Capabilities {
         }
         if !self.scalar_block_layout {
             missing.push("feature scalarBlockLayout: needed, not found".into());
+        }
+        if !self.subgroup_ballot {
+            missing.push("subgroup vote and ballot in compute shaders: needed, not found".into());
         }
         if self.queue_family.is_none() {
             missing.push("a compute queue with timestamps: needed, not found".into());
@@ -186,6 +193,7 @@ fn capabilities(instance: &Instance, index: usize, physical: vk::PhysicalDevice)
             vk::api_version_patch(properties.api_version),
         ),
         max_storage_buffer_range: limits.max_storage_buffer_range.into(),
+        max_texel_buffer_elements: limits.max_texel_buffer_elements.into(),
         max_storage_buffers: limits
             .max_per_stage_descriptor_storage_buffers
             .min(limits.max_descriptor_set_storage_buffers),
@@ -196,6 +204,10 @@ fn capabilities(instance: &Instance, index: usize, physical: vk::PhysicalDevice)
             .min(limits.max_compute_work_group_size[0]),
         max_shared_memory: limits.max_compute_shared_memory_size,
         subgroup_size: subgroup.subgroup_size,
+        subgroup_ballot: subgroup.supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
+            && subgroup
+                .supported_operations
+                .contains(vk::SubgroupFeatureFlags::VOTE | vk::SubgroupFeatureFlags::BALLOT),
         device_memory: memory
             .memory_heaps_as_slice()
             .iter()

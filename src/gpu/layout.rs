@@ -122,6 +122,9 @@ pub struct Counters {
     pub shadow_rays_visible: u32,
     /// Samples left out of the film because their radiance was not finite.
     pub dropped_samples: u32,
+    /// Rays given up after `TRAVERSAL_STEP_LIMIT` steps, counted as blocked or by the nearest hit so
+    /// far.
+    pub traversal_overruns: u32,
 }
 
 /// A material; which members mean something depends on `kind`.

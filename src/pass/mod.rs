@@ -1,1 +1,5 @@
 //! One file per dispatch: name = `glsl/<name>.comp` = debug label = timer row.
+
+pub mod geometry;
+pub mod shadow;
+pub mod trace;

@@ -1,0 +1,329 @@
+// Traversal of the compressed wide BVH: one step at a time, so that a pass may keep several rays in
+// flight per invocation. Twin: src/accel/traverse.rs.
+//
+// H. Ylitie, T. Karras, S. Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed
+// Wide BVHs", HPG 2017. Node layout as in obvhs (planes of x, y, z; low bytes first):
+//   texel 0: corner.xyz, exponents x, y, z and the mask of inner children (one byte each)
+//   texel 1: first child node, first triangle, meta bytes of children 0-3 and 4-7
+//   texel 2: lower x planes of children 0-3 and 4-7, upper x planes of both; 3: y; 4: z
+//
+// Deviation: two groups of triangles may wait while nodes are traversed ("speculative traversal";
+// T. Aila, S. Laine, "Understanding the Efficiency of Ray Traversal on GPUs", HPG 2009): a step
+// tests one node and one triangle, so that lanes of a subgroup that are at different places do both
+// kinds of work together.
+//
+// Define NEEDS_GEOMETRY before including this file.
+
+#ifndef BVH_GLSL
+#define BVH_GLSL
+
+#include "layout.glsl"
+
+// Triangles per page are 1 << TRIANGLE_PAGE_SHIFT; with one page the choice folds away.
+layout(constant_id = CONSTANT_TRIANGLE_PAGES) const uint TRIANGLE_PAGES = 1u;
+layout(constant_id = CONSTANT_TRIANGLE_PAGE_SHIFT) const uint TRIANGLE_PAGE_SHIFT = 30u;
+
+const uint NO_TRIANGLE = 0xffffffffu;
+const float FAR_AWAY = 3.0e38;
+
+// State of the ray in flight.
+vec3 bvh_origin;
+vec3 bvh_direction;
+vec3 bvh_inverse_direction;
+// Octant of the direction in each byte: children are visited in the order of slot ^ octant.
+uint bvh_octant4;
+// Distance of the nearest hit so far, and its triangle.
+float bvh_distance;
+uint bvh_triangle;
+// Group of nodes: first child; bits 24-31 hits in visiting order, bits 0-7 mask of inner children.
+uvec2 bvh_nodes_waiting;
+// Groups of triangles: first triangle; one bit for each one to test.
+uvec2 bvh_triangles_waiting;
+uvec2 bvh_triangles_next;
+// Groups of nodes left for later, one per level of the tree; the host checks the depth.
+uvec2 bvh_stack[BVH_STACK_ENTRIES];
+uint bvh_stack_size;
+
+// 1 / x, finite also for a zero component: the product with a distance in a scene stays finite.
+float bvh_inverse(float x) {
+    return abs(x) > 1.0e-18 ? 1.0 / x : (x < 0.0 ? -1.0e18 : 1.0e18);
+}
+
+// Starts the traversal of a ray; `direction` is a unit vector.
+void bvh_start(vec3 origin, vec3 direction) {
+    bvh_origin = origin;
+    bvh_direction = direction;
+    bvh_inverse_direction =
+        vec3(bvh_inverse(direction.x), bvh_inverse(direction.y), bvh_inverse(direction.z));
+    bvh_octant4 = (direction.x < 0.0 ? 0u : 0x04040404u) | (direction.y < 0.0 ? 0u : 0x02020202u)
+        | (direction.z < 0.0 ? 0u : 0x01010101u);
+    bvh_distance = FAR_AWAY;
+    bvh_triangle = NO_TRIANGLE;
+    bvh_nodes_waiting = uvec2(0u, 0x80000000u);
+    bvh_triangles_waiting = uvec2(0u);
+    bvh_triangles_next = uvec2(0u);
+    bvh_stack_size = 0u;
+}
+
+// Texel `corner` (0 to 2) of a triangle: position and packed normal of a vertex.
+uvec4 triangle_texel(uint triangle, uint corner) {
+    if (TRIANGLE_PAGES == 1u) {
+        return texelFetch(triangles_0, int(3u * triangle + corner));
+    }
+    uint page = triangle >> TRIANGLE_PAGE_SHIFT;
+    int texel = int(3u * (triangle - (page << TRIANGLE_PAGE_SHIFT)) + corner);
+    if (page == 0u) {
+        return texelFetch(triangles_0, texel);
+    }
+    if (page == 1u) {
+        return texelFetch(triangles_1, texel);
+    }
+    if (page == 2u) {
+        return texelFetch(triangles_2, texel);
+    }
+    return texelFetch(triangles_3, texel);
+}
+
+// Twice the signed areas of the three sub-triangles seen along the ray: barycentric coordinates
+// before division by their sum. `a`, `b`, `c` are the vertices relative to the ray's origin.
+//
+// Every edge enters by one cross product that only changes its sign when the edge is taken the other
+// way round, so that two triangles agree on which side of their common edge a ray passes: no ray
+// slips through (S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1),
+// 2013, whose shear to a common axis this form does without).
+vec3 edge_functions(vec3 a, vec3 b, vec3 c, vec3 direction) {
+    precise vec3 bc = c.yzx * b.zxy - c.zxy * b.yzx;
+    precise vec3 ca = a.yzx * c.zxy - a.zxy * c.yzx;
+    precise vec3 ab = b.yzx * a.zxy - b.zxy * a.yzx;
+    precise float u = direction.x * bc.x + direction.y * bc.y + direction.z * bc.z;
+    precise float v = direction.x * ca.x + direction.y * ca.y + direction.z * ca.z;
+    precise float w = direction.x * ab.x + direction.y * ab.y + direction.z * ab.z;
+    return vec3(u, v, w);
+}
+
+uint bvh_byte(uint word, int index) {
+    return index == 3 ? word >> 24 : (word >> (8 * index)) & 0xffu;
+}
+
+// Hit bits of four children: triangles in bits 0 to 23, nodes in bits 24 to 31. `near` and `far` are
+// the planes where the ray enters and leaves, one byte per child; t = plane · scale + bias.
+//
+// Distances are compared as signed integers: that is the order of floats as long as one of them is
+// not negative, and no case with NaN has to be told apart. All of them are finite.
+uint bvh_children(
+    uint meta4, uint near_x, uint far_x, uint near_y, uint far_y, uint near_z, uint far_z, vec3 scale,
+    vec3 bias
+) {
+    uint is_inner4 = (meta4 & (meta4 << 1)) & 0x10101010u;
+    uint inner_mask4 = (is_inner4 >> 4) * 0xffu;
+    uint bit_index4 = (meta4 ^ (bvh_octant4 & inner_mask4)) & 0x1f1f1f1fu;
+    uint child_bits4 = (meta4 >> 5) & 0x07070707u;
+    uint hits = 0u;
+    for (int child = 0; child < 4; child++) {
+        vec3 near = vec3(
+            float(int(bvh_byte(near_x, child))), float(int(bvh_byte(near_y, child))),
+            float(int(bvh_byte(near_z, child))));
+        vec3 far = vec3(
+            float(int(bvh_byte(far_x, child))), float(int(bvh_byte(far_y, child))),
+            float(int(bvh_byte(far_z, child))));
+        ivec3 enter = floatBitsToInt(near * scale + bias);
+        ivec3 leave = floatBitsToInt(far * scale + bias);
+        int first = max(max(enter.x, enter.y), max(enter.z, 0));
+        int last = min(min(leave.x, leave.y), min(leave.z, floatBitsToInt(bvh_distance)));
+        hits |= first <= last ? bvh_byte(child_bits4, child) << bvh_byte(bit_index4, child) : 0u;
+    }
+    return hits;
+}
+
+// Takes the next node of the group and replaces the group by the children that the ray meets.
+void bvh_visit_node() {
+    uint hits = bvh_nodes_waiting.y;
+    uint bit = uint(findMSB(hits));
+    bvh_nodes_waiting.y &= ~(1u << bit);
+    if (bvh_nodes_waiting.y > 0x00ffffffu) {
+        bvh_stack[bvh_stack_size] = bvh_nodes_waiting;
+        bvh_stack_size++;
+    }
+    uint slot = (bit - 24u) ^ (bvh_octant4 & 0xffu);
+    uint node = bvh_nodes_waiting.x + uint(bitCount(hits & ~(0xffffffffu << slot)));
+    int texel = int(5u * node);
+    uvec4 frame = texelFetch(bvh_nodes, texel);
+    uvec4 children = texelFetch(bvh_nodes, texel + 1);
+    uvec4 x = texelFetch(bvh_nodes, texel + 2);
+    uvec4 y = texelFetch(bvh_nodes, texel + 3);
+    uvec4 z = texelFetch(bvh_nodes, texel + 4);
+
+    // A plane q lies at corner + q·2^exponent; the ray meets it at q·scale + bias.
+    vec3 spacing = vec3(
+        uintBitsToFloat((frame.w & 0xffu) << 23), uintBitsToFloat((frame.w & 0xff00u) << 15),
+        uintBitsToFloat((frame.w & 0xff0000u) << 7));
+    vec3 scale = spacing * bvh_inverse_direction;
+    vec3 bias = (uintBitsToFloat(frame.xyz) - bvh_origin) * bvh_inverse_direction;
+    x = bvh_direction.x < 0.0 ? x.zwxy : x;
+    y = bvh_direction.y < 0.0 ? y.zwxy : y;
+    z = bvh_direction.z < 0.0 ? z.zwxy : z;
+    uint found = bvh_children(children.z, x.x, x.z, y.x, y.z, z.x, z.z, scale, bias)
+        | bvh_children(children.w, x.y, x.w, y.y, y.w, z.y, z.w, scale, bias);
+
+    bvh_nodes_waiting = uvec2(children.x, (found & 0xff000000u) | (frame.w >> 24));
+    uvec2 triangles = uvec2(children.y, found & 0x00ffffffu);
+    if (bvh_triangles_waiting.y == 0u) {
+        bvh_triangles_waiting = triangles;
+    } else {
+        bvh_triangles_next = triangles;
+    }
+}
+
+// Tests the next triangle of the group. A triangle seen edge on has no area and is not hit.
+void bvh_test_triangle(bool any_hit) {
+    uint bit = uint(findMSB(bvh_triangles_waiting.y));
+    bvh_triangles_waiting.y &= ~(1u << bit);
+    uint triangle = bvh_triangles_waiting.x + bit;
+    vec3 a = uintBitsToFloat(triangle_texel(triangle, 0u).xyz) - bvh_origin;
+    vec3 b = uintBitsToFloat(triangle_texel(triangle, 1u).xyz) - bvh_origin;
+    vec3 c = uintBitsToFloat(triangle_texel(triangle, 2u).xyz) - bvh_origin;
+    vec3 areas = edge_functions(a, b, c, bvh_direction);
+    float area = areas.x + areas.y + areas.z;
+    // A weighted mean of the vertices' distances: within the triangle however badly conditioned.
+    float distance = (areas.x * dot(a, bvh_direction) + areas.y * dot(b, bvh_direction)
+        + areas.z * dot(c, bvh_direction)) / area;
+    bool inside = min(areas.x, min(areas.y, areas.z)) >= 0.0
+        || max(areas.x, max(areas.y, areas.z)) <= 0.0;
+    if (inside && area != 0.0 && distance > 0.0 && distance < bvh_distance) {
+        bvh_distance = distance;
+        bvh_triangle = triangle;
+        if (any_hit) {
+            bvh_nodes_waiting.y = 0u;
+            bvh_triangles_waiting.y = 0u;
+            bvh_triangles_next.y = 0u;
+            bvh_stack_size = 0u;
+        }
+    }
+}
+
+// Does at most one node and one triangle; false when the ray is finished. With `any_hit` the first
+// hit found ends it.
+bool bvh_step(bool any_hit) {
+    if (bvh_nodes_waiting.y <= 0x00ffffffu && bvh_stack_size > 0u) {
+        bvh_stack_size--;
+        bvh_nodes_waiting = bvh_stack[bvh_stack_size];
+    }
+    if (bvh_nodes_waiting.y > 0x00ffffffu && bvh_triangles_next.y == 0u) {
+        bvh_visit_node();
+    }
+    if (bvh_triangles_waiting.y != 0u) {
+        bvh_test_triangle(any_hit);
+    }
+    if (bvh_triangles_waiting.y == 0u) {
+        bvh_triangles_waiting = bvh_triangles_next;
+        bvh_triangles_next.y = 0u;
+    }
+    return (bvh_triangles_waiting.y | (bvh_nodes_waiting.y & 0xff000000u) | bvh_stack_size) != 0u;
+}
+
+// Unit vector from the octahedral map, twin of accel::normal::unpack.
+vec3 unpack_normal(uint packed_normal) {
+    ivec2 quantised = ivec2(int(packed_normal << 16) >> 16, int(packed_normal) >> 16);
+    vec2 p = vec2(quantised) / 32767.0;
+    float z = 1.0 - abs(p.x) - abs(p.y);
+    if (z < 0.0) {
+        vec2 sign_of = vec2(p.x < 0.0 ? -1.0 : 1.0, p.y < 0.0 ? -1.0 : 1.0);
+        p = (1.0 - abs(p.yx)) * sign_of;
+    }
+    return normalize(vec3(p, z));
+}
+
+// Turns a shading normal, in the plane that it spans with `outgoing_direction`, until its cosine with
+// that direction is `least` if it is less: what is seen is lit as if seen at grazing angle, and the
+// change is continuous where the cosine falls below `least`.
+vec3 consistent_normal(vec3 shading_normal, vec3 outgoing_direction, float least) {
+    float cosine = dot(shading_normal, outgoing_direction);
+    vec3 tangential = shading_normal - cosine * outgoing_direction;
+    float size = length(tangential);
+    if (cosine >= least || size == 0.0) {
+        return shading_normal;
+    }
+    return tangential * (sqrt(1.0 - least * least) / size) + least * outgoing_direction;
+}
+
+// Cosine with the outgoing direction below which shading normals are turned.
+const float LEAST_SHADING_COSINE = 0.01;
+
+// The surface that a ray meets on `triangle`; `distance` is what traversal found.
+Hit surface_at(uint triangle, vec3 origin, vec3 direction) {
+    uvec4 texel_a = triangle_texel(triangle, 0u);
+    uvec4 texel_b = triangle_texel(triangle, 1u);
+    uvec4 texel_c = triangle_texel(triangle, 2u);
+    vec3 a = uintBitsToFloat(texel_a.xyz);
+    vec3 b = uintBitsToFloat(texel_b.xyz);
+    vec3 c = uintBitsToFloat(texel_c.xyz);
+    vec3 areas = edge_functions(a - origin, b - origin, c - origin, direction);
+    float area = areas.x + areas.y + areas.z;
+    vec3 weights = areas / area;
+
+    Hit hit;
+    hit.position = weights.x * a + weights.y * b + weights.z * c;
+    hit.distance = (areas.x * dot(a - origin, direction) + areas.y * dot(b - origin, direction)
+        + areas.z * dot(c - origin, direction)) / area;
+    hit.triangle = triangle;
+    hit.material = triangle_materials[triangle];
+    vec3 normal = cross(b - a, c - a);
+    // Scaled first: the squares of a small triangle's components would underflow.
+    vec3 size = abs(normal);
+    normal = normalize(normal / max(size.x, max(size.y, size.z)));
+    hit.geometric_normal = dot(normal, direction) > 0.0 ? -normal : normal;
+    vec3 shading_normal = hit.geometric_normal;
+    if (texel_a.w != FLAT_NORMAL) {
+        vec3 interpolated = weights.x * unpack_normal(texel_a.w)
+            + weights.y * unpack_normal(texel_b.w) + weights.z * unpack_normal(texel_c.w);
+        float squared = dot(interpolated, interpolated);
+        if (squared > 1.0e-12) {
+            interpolated *= inversesqrt(squared);
+            shading_normal =
+                dot(interpolated, hit.geometric_normal) < 0.0 ? -interpolated : interpolated;
+        }
+    }
+    float cosine = -dot(hit.geometric_normal, direction);
+    hit.shading_normal = consistent_normal(
+        shading_normal, -direction, max(min(LEAST_SHADING_COSINE, cosine), 1.0e-6));
+    return hit;
+}
+
+// What a ray that met nothing, or was not traced, leaves behind.
+Hit no_surface() {
+    return Hit(vec3(0.0), NO_MATERIAL, vec3(0.0), -1.0, vec3(0.0), NO_TRIANGLE);
+}
+
+// How far a ray's origin is moved off its surface, as a share of the scene's size; 128 units of
+// roundoff. See docs/traversal.md for the error bound and the measured margin.
+const float RAY_OFFSET_SHARE = 7.62939453125e-6;
+
+// Distance by which ray origins are moved off their surface, metres. It is a fixed share of the
+// scene's size, read from the root node, so that a scene in millimetres and one in kilometres are
+// the same scene to every bit if their scales differ by a power of two.
+float ray_offset() {
+    uvec4 root = texelFetch(bvh_nodes, 0);
+    vec3 corner = uintBitsToFloat(root.xyz);
+    vec3 extent = 255.0 * vec3(
+        uintBitsToFloat((root.w & 0xffu) << 23), uintBitsToFloat((root.w & 0xff00u) << 15),
+        uintBitsToFloat((root.w & 0xff0000u) << 7));
+    vec3 size = max(abs(corner), abs(corner + extent));
+    return RAY_OFFSET_SHARE * max(size.x, max(size.y, size.z));
+}
+
+// `position` moved by `offset` to the side of the surface that `direction` leads to.
+vec3 moved_off_surface(vec3 position, vec3 geometric_normal, vec3 direction, float offset) {
+    return position + (dot(geometric_normal, direction) < 0.0 ? -offset : offset) * geometric_normal;
+}
+
+// Origin of a ray that leaves a surface: off it by more than the error of positions and of the
+// triangle test, so that the ray does not meet that surface again.
+//
+// Deviation: C. Wächter, N. Binder, "A Fast and Robust Method for Avoiding Self-Intersection", Ray
+// Tracing Gems, 2019, ch. 6, moves by a count of floats, with a fixed distance near the coordinate
+// origin that is too much for a scene in millimetres.
+vec3 offset_ray_origin(vec3 position, vec3 geometric_normal, vec3 direction) {
+    return moved_off_surface(position, geometric_normal, direction, ray_offset());
+}
+
+#endif

@@ -1,0 +1,89 @@
+// Whether the environment is visible along every shadow ray of the wave: shadow_rays, hits ->
+// visibility. Ray direction_index · path_count + path_index starts at the hit of path path_index, so
+// that neighbouring invocations work at neighbouring paths.
+//
+// As in trace.comp, an invocation takes several rays in one traversal loop.
+#version 460
+#extension GL_KHR_shader_subgroup_ballot : require
+#extension GL_KHR_shader_subgroup_vote : require
+
+#define NEEDS_WAVE
+#define NEEDS_GEOMETRY
+#define NEEDS_HIT_TEXELS
+#define NEEDS_SHADOW_RAY_TEXELS
+#define NEEDS_VISIBILITY
+#define WRITES_VISIBILITY
+#define NEEDS_COUNTERS
+#include "bvh.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+// At most 32: results are kept as bits until the end.
+layout(constant_id = CONSTANT_RAYS_PER_INVOCATION) const uint RAYS_PER_INVOCATION = 1u;
+layout(constant_id = CONSTANT_REFILL_LANES) const uint REFILL_LANES = 0xffffffffu;
+
+// Path of a ray: index % path_count without an integer division, which is slow in software.
+uint path_of(uint index, uint path_count) {
+    uint quotient = uint(float(index) / float(path_count));
+    int remainder = int(index - quotient * path_count);
+    remainder += remainder < 0 ? int(path_count) : 0;
+    remainder -= remainder >= int(path_count) ? int(path_count) : 0;
+    return uint(remainder);
+}
+
+// Starts the ray `index`; one that brings nothing is finished at once. Returns whether it is traced.
+bool start_ray(uint index, uint path_count, float offset) {
+    uint path = path_of(index, path_count);
+    HitOrigin hit = load_hit_origin(path);
+    ShadowRay ray = load_shadow_ray(index);
+    bool is_traced = hit.material != NO_MATERIAL && ray.contribution != vec3(0.0);
+    bvh_start(
+        moved_off_surface(hit.position, hit.geometric_normal, ray.direction, offset), ray.direction);
+    bvh_nodes_waiting.y = is_traced ? bvh_nodes_waiting.y : 0u;
+    return is_traced;
+}
+
+void main() {
+    uint path_count = wave.pixel_count * wave.sample_count;
+    uint ray_count = path_count * wave.shadow_ray_count;
+    uint first = gl_WorkGroupID.x * WORKGROUP_SIZE * RAYS_PER_INVOCATION + gl_LocalInvocationID.x;
+    float offset = ray_offset();
+
+    uint visible_bits = 0u;
+    uint turn = 0u;
+    uint steps = 0u;
+    bool has_ray = first < ray_count;
+    bool is_traced = false;
+    if (has_ray) {
+        is_traced = start_ray(first, path_count, offset);
+    }
+    while (has_ray) {
+        bool running = true;
+        do {
+            if (running) {
+                running = bvh_step(true);
+            }
+            steps++;
+        } while (subgroupBallotBitCount(subgroupBallot(!running)) < REFILL_LANES
+            && subgroupAny(running) && steps < TRAVERSAL_STEP_LIMIT);
+        if (!running || steps >= TRAVERSAL_STEP_LIMIT) {
+            if (running) {
+                atomicAdd(counters.traversal_overruns, 1u);
+            }
+            bool is_visible = is_traced && !running && bvh_triangle == NO_TRIANGLE;
+            visible_bits |= is_visible ? 1u << turn : 0u;
+            turn++;
+            has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
+            if (has_ray) {
+                is_traced = start_ray(first + turn * WORKGROUP_SIZE, path_count, offset);
+            }
+        }
+    }
+
+    for (turn = 0u; turn < RAYS_PER_INVOCATION; turn++) {
+        uint index = first + turn * WORKGROUP_SIZE;
+        if (index < ray_count) {
+            visibility[index] = (visible_bits >> turn) & 1u;
+        }
+    }
+}

@@ -1,0 +1,72 @@
+// Closest hit of every ray of the wave: rays -> hits.
+//
+// An invocation takes RAYS_PER_INVOCATION rays, one after the other, in one traversal loop: when
+// enough lanes of the subgroup have finished theirs, all of these take their next one. The surfaces
+// are worked out afterwards, with all lanes in step.
+#version 460
+#extension GL_KHR_shader_subgroup_ballot : require
+#extension GL_KHR_shader_subgroup_vote : require
+
+#define NEEDS_WAVE
+#define NEEDS_GEOMETRY
+#define NEEDS_RAY_TEXELS
+#define NEEDS_HITS
+#define WRITES_HITS
+#define NEEDS_COUNTERS
+#include "bvh.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+layout(constant_id = CONSTANT_RAYS_PER_INVOCATION) const uint RAYS_PER_INVOCATION = 1u;
+layout(constant_id = CONSTANT_REFILL_LANES) const uint REFILL_LANES = 0xffffffffu;
+
+void main() {
+    uint ray_count = wave.pixel_count * wave.sample_count;
+    uint first = gl_WorkGroupID.x * WORKGROUP_SIZE * RAYS_PER_INVOCATION + gl_LocalInvocationID.x;
+    uint found[RAYS_PER_INVOCATION];
+
+    uint turn = 0u;
+    uint steps = 0u;
+    bool has_ray = first < ray_count;
+    if (has_ray) {
+        Ray ray = load_ray(first);
+        bvh_start(ray.origin, ray.direction);
+        bvh_nodes_waiting.y = ray.is_active != 0u ? bvh_nodes_waiting.y : 0u;
+    }
+    while (has_ray) {
+        bool running = true;
+        do {
+            if (running) {
+                running = bvh_step(false);
+            }
+            steps++;
+        } while (subgroupBallotBitCount(subgroupBallot(!running)) < REFILL_LANES
+            && subgroupAny(running) && steps < TRAVERSAL_STEP_LIMIT);
+        if (!running || steps >= TRAVERSAL_STEP_LIMIT) {
+            if (running) {
+                atomicAdd(counters.traversal_overruns, 1u);
+            }
+            found[turn] = bvh_triangle;
+            turn++;
+            has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
+            if (has_ray) {
+                Ray ray = load_ray(first + turn * WORKGROUP_SIZE);
+                bvh_start(ray.origin, ray.direction);
+                bvh_nodes_waiting.y = ray.is_active != 0u ? bvh_nodes_waiting.y : 0u;
+            }
+        }
+    }
+
+    for (turn = 0u; turn < RAYS_PER_INVOCATION; turn++) {
+        uint index = first + turn * WORKGROUP_SIZE;
+        if (index < ray_count) {
+            Ray ray = load_ray(index);
+            uint triangle = found[turn];
+            if (triangle == NO_TRIANGLE) {
+                hits[index] = no_surface();
+            } else {
+                hits[index] = surface_at(triangle, ray.origin, ray.direction);
+            }
+        }
+    }
+}
