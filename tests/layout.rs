@@ -71,7 +71,7 @@ fn host_structs() -> Vec<HostStruct> {
             throughput, radiance, shadow_rays_traced, shadow_rays_visible, rays_traced,
         }
         Counters {
-            camera_rays, bounce_rays, shadow_rays_traced, shadow_rays_visible, dropped_samples,
+            camera_rays, bounce_rays, shadow_rays_traced, shadow_rays_visible, dropped_samples, traversal_overruns,
         }
         Material { kind, table_offset, alpha, ior, reflectance, eta, k }
         Wave {
@@ -222,12 +222,13 @@ impl Module {
         kinds.iter().enumerate().map(member).collect()
     }
 
-    /// Name of the block, set and binding of every buffer.
+    /// Name of the block (of the variable, for texel buffers), set and binding of every buffer.
     fn buffers(&self) -> impl Iterator<Item = (&str, u32, u32)> {
         self.variables.iter().filter_map(|(variable, pointer)| {
             let (set, binding) = (*self.sets.get(variable)?, *self.bindings.get(variable)?);
             let Type::Pointer { pointee } = self.types[pointer] else { return None };
-            Some((self.name(pointee), set, binding))
+            let block = self.name(pointee);
+            Some((if block.is_empty() { self.name(*variable) } else { block }, set, binding))
         })
     }
 }
@@ -408,7 +409,7 @@ fn missing_and_retyped_members_are_found() {
     assert_eq!(member_drifts(ray, &retyped), ["Ray.is_active: host u32, shader f32"]);
 }
 
-/// Blocks declared in `layout.glsl`: name → (set, binding).
+/// Blocks and texel buffers declared in `layout.glsl`: name → (set, binding).
 fn declared_blocks() -> BTreeMap<String, (u32, u32)> {
     let macro_value = |name: &str| {
         let found = constants::SHADER_MACROS.iter().find(|(other, _)| *other == name);
@@ -422,6 +423,12 @@ fn declared_blocks() -> BTreeMap<String, (u32, u32)> {
         let (_, rest) = rest.split_once(" buffer ").expect("every binding is a buffer");
         let (name, _) = rest.split_once(" {").expect("the block opens");
         assert!(set.starts_with("SET_") && binding.starts_with("BINDING_"), "{set} {binding}");
+        blocks.insert(name.to_owned(), (macro_value(set), macro_value(binding)));
+    }
+    for declaration in source.split("layout(set = ").skip(1) {
+        let (set, rest) = declaration.split_once(", binding = ").expect("a binding follows");
+        let (binding, rest) = rest.split_once(") uniform usamplerBuffer ").expect("a texel buffer");
+        let (name, _) = rest.split_once(';').expect("the declaration ends");
         blocks.insert(name.to_owned(), (macro_value(set), macro_value(binding)));
     }
     blocks
