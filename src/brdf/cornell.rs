@@ -9,10 +9,15 @@
 use std::{f32::consts::PI, fs, path::Path};
 
 use glam::{DVec3, Vec3, vec3};
+use rayon::prelude::*;
 
 use crate::{
-    brdf::{spectrum, table::MeasuredTable},
+    brdf::{
+        spectrum,
+        table::{CELL_COUNT, MeasuredTable, bin_directions},
+    },
     error::{Error, Result},
+    gpu::constants::*,
 };
 
 /// Largest count of wavelengths that is believed.
@@ -66,16 +71,34 @@ pub fn load(path: &Path) -> Result<MeasuredTable> {
         ));
     }
     let samples = SampleSet::new(samples);
-    let mut table = MeasuredTable::tabulate(|outgoing, incident| {
-        samples.interpolate(mapped_point(outgoing, incident))
-    })
-    .map_err(|message| Error::format(path, message))?;
+    let mut table = MeasuredTable::from_cells(bake(&samples))
+        .map_err(|message| Error::format(path, message))?;
     if left_out > 0 {
         table.warnings.push(format!(
             "{left_out} records that are not finite or below the surface were left out"
         ));
     }
     Ok(table)
+}
+
+/// The samples interpolated at the centres of the grid's bins. The coordinates of the interpolation
+/// are the same at φ_d and π − φ_d, so that half of the grid is enough.
+fn bake(samples: &SampleSet) -> Vec<Vec3> {
+    const THETA_DIFFERENCE: usize = MEASURED_THETA_DIFFERENCE_BINS as usize;
+    const PHI_DIFFERENCE: usize = MEASURED_PHI_DIFFERENCE_BINS as usize;
+    let mut cells = vec![Vec3::NAN; CELL_COUNT];
+    cells.par_chunks_mut(PHI_DIFFERENCE).enumerate().for_each(|(row, cells)| {
+        for phi in 0..PHI_DIFFERENCE / 2 {
+            let (outgoing, incident) =
+                bin_directions(row / THETA_DIFFERENCE, row % THETA_DIFFERENCE, phi);
+            if outgoing.z > 0.0 && incident.z > 0.0 {
+                let value = samples.interpolate(mapped_point(outgoing, incident));
+                cells[phi] = value;
+                cells[PHI_DIFFERENCE - 1 - phi] = value;
+            }
+        }
+    });
+    cells
 }
 
 /// The samples of a file, and how many records were left out.

@@ -29,6 +29,7 @@ pub mod merl;
 pub mod sanity;
 pub mod spectrum;
 pub mod table;
+mod tabulate;
 pub mod twin;
 
 use glam::Vec3;

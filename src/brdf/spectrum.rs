@@ -1,4 +1,4 @@
-//! Reflectance spectra → linear sRGB by the CIE 1931 standard observer.
+//! Reflectance spectra → linear sRGB by the CIE 1931 standard observer under illuminant D65.
 
 use glam::{DMat3, DVec3, dvec3};
 
@@ -53,6 +53,16 @@ const COLOUR_MATCHING: [[f64; 3]; 41] = [
     [0.000042, 0.000015, 0.000000],
 ];
 
+/// Relative spectral power of the CIE standard illuminant D65, 380 to 780 nm by 10:
+/// ISO/CIE 11664-2:2022, every second row of its table.
+const ILLUMINANT_D65: [f64; 41] = [
+    49.9755, 54.6482, 82.7549, 91.4860, 93.4318, 86.6823, 104.8650, 117.0080, 117.8120, 114.8610,
+    115.9230, 108.8110, 109.3540, 107.8020, 104.7900, 107.6890, 104.4050, 104.0460, 100.0000,
+    96.3342, 95.7880, 88.6856, 90.0062, 89.5991, 87.6987, 83.2886, 83.6992, 80.0268, 80.2146,
+    82.2778, 78.2842, 69.7213, 71.6091, 74.3490, 61.6040, 69.8856, 75.0870, 63.5927, 46.4182,
+    66.8054, 63.3828,
+];
+
 /// Linear sRGB from XYZ: IEC 61966-2-1:1999, rows of the inverse of its matrix, by columns.
 const SRGB_FROM_XYZ: DMat3 = DMat3::from_cols(
     dvec3(3.2406, -0.9689, 0.0557),
@@ -60,22 +70,25 @@ const SRGB_FROM_XYZ: DMat3 = DMat3::from_cols(
     dvec3(-0.4986, 0.0415, 1.0570),
 );
 
-/// x̄, ȳ, z̄ at a wavelength in nm, linear between the rows and 0 outside them.
-fn colour_matching(wavelength_nm: f64) -> DVec3 {
+/// x̄, ȳ, z̄ times the illuminant at a wavelength in nm, linear between the rows and 0 outside them.
+fn weighted_colour_matching(wavelength_nm: f64) -> DVec3 {
     let position = (wavelength_nm - FIRST_NM) / STEP_NM;
     let last = COLOUR_MATCHING.len() - 1;
     if !(0.0..=last as f64).contains(&position) {
         return DVec3::ZERO;
     }
     let row = (position as usize).min(last - 1);
-    DVec3::from(COLOUR_MATCHING[row])
-        .lerp(DVec3::from(COLOUR_MATCHING[row + 1]), position - row as f64)
+    let at = |row: usize| DVec3::from(COLOUR_MATCHING[row]) * ILLUMINANT_D65[row];
+    at(row).lerp(at(row + 1), position - row as f64)
 }
 
-/// Weights w such that Σ w_j·s(λ_j) is the linear sRGB colour of a spectrum s sampled at increasing
-/// wavelengths: ∫ s·(x̄, ȳ, z̄) dλ / ∫ ȳ dλ by the trapezoid rule, turned into sRGB. Equal energy
-/// is the illuminant, so that a constant spectrum has Y = 1 and is slightly warm in sRGB, whose
-/// white is D65. `None` where the wavelengths see no light.
+/// Weights w such that Σ w_j·s(λ_j) is the linear sRGB colour of a reflectance spectrum s sampled
+/// at increasing wavelengths: ∫ s·D65·(x̄, ȳ, z̄) dλ / ∫ D65·ȳ dλ by the trapezoid rule, turned
+/// into sRGB. `None` where the wavelengths see no light.
+///
+/// Deviation: pbrt-v2 integrates without an illuminant, which turns a grey reflectance into
+/// (1.20, 0.95, 0.91) of its value. The light of a scene is given in colours whose white is D65, so
+/// a grey surface must keep it.
 pub fn srgb_weights(wavelengths_nm: &[f64]) -> Option<Vec<DVec3>> {
     let count = wavelengths_nm.len();
     let weighted: Vec<DVec3> = (0..count)
@@ -83,7 +96,7 @@ pub fn srgb_weights(wavelengths_nm: &[f64]) -> Option<Vec<DVec3>> {
             let before = wavelengths_nm[index.saturating_sub(1)];
             let after = wavelengths_nm[(index + 1).min(count - 1)];
             let width = if count == 1 { 1.0 } else { 0.5 * (after - before) };
-            colour_matching(wavelengths_nm[index]) * width
+            weighted_colour_matching(wavelengths_nm[index]) * width
         })
         .collect();
     let luminous: f64 = weighted.iter().map(|xyz| xyz.y).sum();
@@ -97,13 +110,12 @@ mod tests {
 
     use super::*;
 
-    /// The chromaticity of equal energy is (1/3, 1/3), which the table gives to three digits.
+    /// The white of sRGB is D65: a grey reflectance is grey, to the digits of the matrix.
     #[test]
-    fn constant_spectrum_is_equal_energy_white() {
+    fn constant_spectrum_is_white() {
         let wavelengths: Vec<f64> = (0..41).map(|index| 380.0 + 10.0 * f64::from(index)).collect();
         let colour: DVec3 = srgb_weights(&wavelengths).unwrap().iter().sum();
-        let expected = SRGB_FROM_XYZ * DVec3::ONE;
-        assert!((colour - expected).abs().max_element() < 2e-3, "{colour} against {expected}");
+        assert!((colour - DVec3::ONE).abs().max_element() < 2e-3, "{colour}");
     }
 
     /// A spectrum given twice as finely has the same colour.

@@ -1,5 +1,5 @@
-//! Measured BRDFs on the half/difference grid of the MERL files: cells in any order of validity →
-//! the words that `measured_value`, `measured_pdf` and `measured_sample` of `brdf.glsl` read.
+//! Measured BRDFs on the half/difference grid of the MERL files: cells, some of them without a
+//! value → the words that `measured_value`, `measured_pdf` and `measured_sample` of `brdf.glsl` read.
 //!
 //! Layout of the words: directional albedo, cosine shares, cumulative probabilities and densities
 //! of the sampling table, grid cells of two words; the offsets are `MEASURED_…_OFFSET` of
@@ -17,7 +17,11 @@ use half::f16;
 use rayon::prelude::*;
 
 use crate::{
-    brdf::{cornell, merl, twin},
+    brdf::{
+        cornell, merl,
+        tabulate::{EnergyLimit, SamplingRow, directional_albedo},
+        twin,
+    },
     error::{Error, Result},
     gpu::constants::*,
 };
@@ -117,6 +121,9 @@ impl MeasuredTable {
     /// negative or non-finite component is invalid and takes the value of the nearest valid one, so
     /// that interpolation needs no case of its own. Fails where no cell is valid.
     ///
+    /// A table whose directional albedo exceeds 1 somewhere, as extrapolated measurements do at
+    /// grazing angles, is scaled by a product of factors of the two polar angles until it does not.
+    ///
     /// The bins at θ_h = 0 and θ_d = 0, of which 0.01° and 1° are the widths, are replaced by their
     /// mean over φ_d: the angle means nothing at a pole, and a value that turns with it there would
     /// make the BRDF discontinuous.
@@ -136,12 +143,16 @@ impl MeasuredTable {
             warnings.push(format!("{clamped} cells above {largest}/sr were clamped to that"));
         }
         let mut words = vec![0; MEASURED_GRID_OFFSET as usize + 2 * CELL_COUNT];
-        let grid = &mut words[MEASURED_GRID_OFFSET as usize..];
-        grid.par_chunks_exact_mut(2).zip(&cells).for_each(|(words, cell)| {
-            let half = |value: f32| u32::from(f16::from_f32(value.min(largest)).to_bits());
-            words[0] = half(cell.x) | half(cell.y) << 16;
-            words[1] = half(cell.z);
-        });
+        pack(&cells, &mut words);
+        if let Some(limit) = EnergyLimit::new(&words) {
+            scale(&mut cells, &limit);
+            average_poles(&mut cells);
+            pack(&cells, &mut words);
+            warnings.push(format!(
+                "reflected up to {:.2} times the light it receives and was scaled down to 1",
+                limit.largest_albedo
+            ));
+        }
         drop(cells);
 
         let rows: Vec<SamplingRow> = (0..MEASURED_ELEVATION_BINS)
@@ -234,172 +245,24 @@ fn fill_line(cells: &mut [Vec3], first: usize, stride: usize, count: usize) {
     }
 }
 
-/// Sampling table of one bin of outgoing elevation.
-struct SamplingRow {
-    /// Probability of the cosine lobe.
-    cosine_share: f32,
-    /// Cumulative probabilities of the cells, the last one exactly 1.
-    cumulative: Vec<f32>,
-    /// Density of each cell, per steradian of half vectors.
-    density: Vec<f32>,
+/// Writes the cells as halves into the grid's words.
+fn pack(cells: &[Vec3], words: &mut [u32]) {
+    let grid = &mut words[MEASURED_GRID_OFFSET as usize..];
+    grid.par_chunks_exact_mut(2).zip(cells).for_each(|(words, cell)| {
+        let half = |value: f32| u32::from(f16::from_f32(value.min(f16::MAX.to_f32())).to_bits());
+        words[0] = half(cell.x) | half(cell.y) << 16;
+        words[1] = half(cell.z);
+    });
 }
 
-/// One point of the quadrature over half vectors.
-struct QuadraturePoint {
-    /// Luminance of BRDF × cosine, 1/sr.
-    value: f64,
-    /// cosθ_i / π.
-    cosine_pdf: f64,
-    /// dω_i/dω_h = 4 ω_o·h.
-    jacobian: f64,
-}
-
-impl SamplingRow {
-    /// Shares of the cosine lobe among which the one of least variance is taken. None is 0, since
-    /// the tabulated density may vanish where the BRDF does not.
-    const COSINE_SHARES: [f64; 7] = [0.05, 0.1, 0.15, 0.25, 0.4, 0.6, 0.8];
-    /// Points per cell and dimension: outgoing elevation, θ_h, φ_h.
-    const POINTS: u32 = 3;
-
-    fn new(words: &[u32], elevation: u32) -> Self {
-        let cells: Vec<Vec<QuadraturePoint>> = (0..MEASURED_SAMPLING_CELLS)
-            .map(|cell| Self::quadrature(words, elevation, cell))
-            .collect();
-        let solid_angle = |cell: u32| {
-            let (lower, upper) = Self::edges(cell);
-            // Both signs of φ_h.
-            2.0 * (upper - lower) * std::f64::consts::PI / f64::from(MEASURED_AZIMUTH_BINS)
-        };
-        let mut masses: Vec<f64> = cells
-            .iter()
-            .zip(0..)
-            .map(|(points, cell)| {
-                let sum: f64 = points.iter().map(|point| point.value * point.jacobian).sum();
-                sum / points.len() as f64 * solid_angle(cell)
-            })
-            .collect();
-        let mut total: f64 = masses.iter().sum();
-        if total <= 0.0 {
-            // A black material: any density serves.
-            masses = (0..MEASURED_SAMPLING_CELLS).map(solid_angle).collect();
-            total = masses.iter().sum();
+/// Applies the factors of both directions to every cell; those below the surface, which are read
+/// only as neighbours, take the factor of the horizon.
+fn scale(cells: &mut [Vec3], limit: &EnergyLimit) {
+    cells.par_chunks_mut(PHI_DIFFERENCE).enumerate().for_each(|(row, cells)| {
+        for (phi, cell) in cells.iter_mut().enumerate() {
+            let (outgoing, incident) =
+                bin_directions(row / THETA_DIFFERENCE, row % THETA_DIFFERENCE, phi);
+            *cell *= limit.factor(outgoing) * limit.factor(incident);
         }
-        let mut sum = 0.0;
-        let mut cumulative: Vec<f32> = masses
-            .iter()
-            .map(|mass| {
-                sum += mass;
-                (sum / total) as f32
-            })
-            .collect();
-        // Rounding must leave no probability behind the last cell that has any.
-        if let Some(last) = masses.iter().rposition(|mass| *mass > 0.0) {
-            cumulative[last..].fill(1.0);
-        }
-        // The density is that of the rounded probabilities: exactly what is sampled.
-        let mut before = 0.0;
-        let density: Vec<f32> = cumulative
-            .iter()
-            .zip(0..)
-            .map(|(&upper, cell)| {
-                let mass = f64::from(upper) - before;
-                before = f64::from(upper);
-                (mass / solid_angle(cell)) as f32
-            })
-            .collect();
-
-        let second_moment = |share: f64| -> f64 {
-            let cell_moment = |points: &[QuadraturePoint], density: f32| -> f64 {
-                let moments = points.iter().filter(|point| point.value > 0.0).map(|point| {
-                    let pdf = share * point.cosine_pdf
-                        + (1.0 - share) * f64::from(density) / point.jacobian;
-                    point.value * point.value / pdf * point.jacobian
-                });
-                moments.sum::<f64>() / points.len() as f64
-            };
-            cells
-                .iter()
-                .zip(&density)
-                .zip(0..)
-                .map(|((points, &density), cell)| cell_moment(points, density) * solid_angle(cell))
-                .sum()
-        };
-        let cosine_share = Self::COSINE_SHARES
-            .into_iter()
-            .map(|share| (second_moment(share), share))
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .map_or(0.5, |(_, share)| share) as f32;
-        Self { cosine_share, cumulative, density }
-    }
-
-    /// Lower and upper 1 − cosθ_h of a cell.
-    fn edges(cell: u32) -> (f64, f64) {
-        let edge = |polar: u32| {
-            let root = f64::from(polar) / f64::from(MEASURED_POLAR_BINS);
-            let sine = (0.25 * std::f64::consts::PI * root * root).sin();
-            2.0 * sine * sine
-        };
-        let polar = cell / MEASURED_AZIMUTH_BINS;
-        (edge(polar), edge(polar + 1))
-    }
-
-    fn quadrature(words: &[u32], elevation: u32, cell: u32) -> Vec<QuadraturePoint> {
-        let (lower, upper) = Self::edges(cell);
-        let middle = |index: u32| (f64::from(index) + 0.5) / f64::from(Self::POINTS);
-        let mut points = Vec::with_capacity(Self::POINTS.pow(3) as usize);
-        for index in 0..Self::POINTS.pow(3) {
-            let theta = (f64::from(elevation) + middle(index % Self::POINTS))
-                / f64::from(MEASURED_ELEVATION_BINS)
-                * std::f64::consts::FRAC_PI_2;
-            let below_pole = lower + (upper - lower) * middle(index / Self::POINTS % Self::POINTS);
-            let azimuth = f64::from(cell % MEASURED_AZIMUTH_BINS)
-                + middle(index / Self::POINTS / Self::POINTS);
-            let phi = azimuth * std::f64::consts::PI / f64::from(MEASURED_AZIMUTH_BINS);
-            let outgoing = vec3(theta.sin() as f32, 0.0, theta.cos() as f32);
-            let sine = (below_pole * (2.0 - below_pole)).sqrt();
-            let half_vector = vec3(
-                (sine * phi.cos()) as f32,
-                (sine * phi.sin()) as f32,
-                (1.0 - below_pole) as f32,
-            );
-            let cosine_difference = outgoing.dot(half_vector);
-            let incident = 2.0 * cosine_difference * half_vector - outgoing;
-            let mut value = 0.0;
-            if cosine_difference > 0.0 && incident.z > 0.0 {
-                let angles = twin::half_difference_angles(outgoing, incident);
-                value = twin::measured_value(words, 0, angles).dot(LUMINANCE) * incident.z;
-            }
-            points.push(QuadraturePoint {
-                value: f64::from(value),
-                cosine_pdf: f64::from(incident.z / PI),
-                jacobian: f64::from(4.0 * cosine_difference),
-            });
-        }
-        points
-    }
-}
-
-/// ∫ BRDF·cosθ_i dω_i by 1024 samples of the material's own density at the points of an additive
-/// lattice of irrational steps; within about 1%, for images only.
-fn directional_albedo(words: &[u32], cosine: f32) -> Vec3 {
-    const SAMPLES: u32 = 1024;
-    let cosine = cosine.max(0.5 / BRDF_COSINE_INTERVALS as f32 / 8.0);
-    let outgoing = vec3((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine);
-    // Steps of the three-dimensional golden ratio: powers of the root of x⁴ = x + 1, inverted.
-    let step = [0.819_172_513_396_164_4_f64, 0.671_043_606_703_789_2, 0.549_700_477_901_970_5];
-    let mut sum = Vec3::ZERO;
-    for index in 0..SAMPLES {
-        let coordinate =
-            |dimension: usize| (0.5 + f64::from(index) * step[dimension]).fract().min(0.999_999);
-        let u = vec3(coordinate(0) as f32, coordinate(1) as f32, coordinate(2) as f32);
-        let incident = twin::measured_sample(words, 0, outgoing, u);
-        if incident.z > 0.0 {
-            let angles = twin::half_difference_angles(outgoing, incident);
-            let pdf = twin::measured_pdf(words, 0, outgoing, incident, angles.x);
-            if pdf > 0.0 {
-                sum += twin::measured_value(words, 0, angles) * (incident.z / pdf);
-            }
-        }
-    }
-    (sum / SAMPLES as f32).clamp(Vec3::ZERO, Vec3::ONE)
+    });
 }

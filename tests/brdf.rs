@@ -1,0 +1,330 @@
+//! The reflection models against what they must obey: reciprocity, energy, densities that are what
+//! is sampled.
+
+#![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use fenestra::brdf::{self, MaterialTables, twin};
+use glam::{DVec3, Vec3, vec3};
+use rayon::prelude::*;
+
+#[path = "support/materials.rs"]
+mod materials;
+#[path = "support/statistics.rs"]
+mod statistics;
+
+use materials::{cases, direction, hemisphere, tables, uniform};
+
+/// Polar angles of the outgoing direction, degrees.
+const ANGLES_DEG: [f64; 6] = [0.0, 20.0, 50.0, 75.0, 85.0, 89.5];
+
+/// Outgoing direction of a test, away from the axes.
+fn outgoing(angle_deg: f64) -> Vec3 {
+    direction(angle_deg.to_radians(), 0.7)
+}
+
+/// Every case with every angle.
+fn case_angles() -> impl ParallelIterator<Item = (usize, f64)> {
+    (0..cases().len() * ANGLES_DEG.len())
+        .into_par_iter()
+        .map(|index| (index / ANGLES_DEG.len(), ANGLES_DEG[index % ANGLES_DEG.len()]))
+}
+
+#[test]
+fn values_are_reciprocal() {
+    for (material, case) in cases().iter().enumerate() {
+        for index in 0..20_000 {
+            let a = hemisphere(index, 1);
+            // Half of the pairs near the mirror direction, where lobes are.
+            let b = if index % 2 == 0 {
+                hemisphere(index, 2)
+            } else {
+                brdf::sample(tables(), material, a, uniform(index, 2))
+            };
+            let (there, back) = (
+                brdf::evaluate(tables(), material, a, b),
+                brdf::evaluate(tables(), material, b, a),
+            );
+            let difference = (there - back).abs().max_element();
+            assert!(
+                difference <= 1e-4 * there.max_element(),
+                "{}: {there} against {back} for {a}, {b}",
+                case.material.name
+            );
+        }
+    }
+}
+
+#[test]
+fn nothing_is_reflected_below_the_surface() {
+    for material in 0..cases().len() {
+        for (a, b) in [
+            (vec3(0.6, 0.0, 0.8), vec3(-0.6, 0.0, -0.8)),
+            (vec3(0.6, 0.0, -0.8), vec3(-0.6, 0.0, 0.8)),
+            (vec3(0.6, 0.0, 0.8), vec3(1.0, 0.0, 0.0)),
+        ] {
+            assert_eq!(brdf::evaluate_and_pdf(tables(), material, a, b), (Vec3::ZERO, 0.0));
+        }
+        let below = brdf::sample(tables(), material, vec3(0.6, 0.0, -0.8), uniform(0, 3));
+        assert!(below.z <= 0.0, "a sample was drawn from below the surface: {below}");
+    }
+}
+
+/// Mean and standard error of BRDF·cosine/pdf, the directional albedo, by `count` samples.
+fn sampled_albedo(material: usize, outgoing: Vec3, count: u32) -> (DVec3, DVec3) {
+    let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
+    for index in 0..count {
+        let incident = brdf::sample(tables(), material, outgoing, uniform(index, 4));
+        if incident.z > 0.0 {
+            let (value, pdf) = brdf::evaluate_and_pdf(tables(), material, outgoing, incident);
+            let weight = (value * incident.z / pdf).as_dvec3();
+            assert!(
+                weight.is_finite() && weight.min_element() >= 0.0,
+                "{}: weight {weight} at {incident} seen from {outgoing}",
+                cases()[material].material.name
+            );
+            sum += weight;
+            squares += weight * weight;
+        }
+    }
+    let mean = sum / f64::from(count);
+    let variance = (squares / f64::from(count) - mean * mean).max(DVec3::ZERO);
+    let error = variance / f64::from(count);
+    (mean, DVec3::new(error.x.sqrt(), error.y.sqrt(), error.z.sqrt()))
+}
+
+/// White furnace: no material reflects more light than it receives, and the albedo image shows what
+/// is reflected.
+#[test]
+fn no_material_creates_energy() {
+    case_angles().for_each(|(material, angle)| {
+        let (albedo, error) = sampled_albedo(material, outgoing(angle), 40_000);
+        let name = &cases()[material].material.name;
+        assert!(
+            (albedo - 4.0 * error).max_element() <= 1.0 + 2e-3,
+            "{name} at {angle}° reflects {albedo} ± {error}"
+        );
+        let shown = brdf::albedo(tables(), material, outgoing(angle)).as_dvec3();
+        let tolerance = DVec3::splat(0.015) + 5.0 * error;
+        assert!(
+            (shown - albedo).abs().cmple(tolerance).all(),
+            "{name} at {angle}°: albedo {shown} shown, {albedo} ± {error} reflected"
+        );
+    });
+}
+
+/// Coat and white base together reflect everything, at every angle.
+#[test]
+fn white_plastic_loses_nothing() {
+    let white: Vec<usize> = (0..cases().len())
+        .filter(|&index| cases()[index].material.name.ends_with("-like plastic"))
+        .chain((0..cases().len()).filter(|&index| cases()[index].material.name == "rough plastic"))
+        .collect();
+    assert_eq!(white.len(), 2);
+    for material in white {
+        for angle in ANGLES_DEG {
+            let (albedo, error) = sampled_albedo(material, outgoing(angle), 100_000);
+            assert!(
+                (albedo - DVec3::ONE).abs().cmple(DVec3::splat(3e-3) + 4.0 * error).all(),
+                "{} at {angle}° reflects {albedo} ± {error}",
+                cases()[material].material.name
+            );
+        }
+    }
+}
+
+/// A lossless mirror-like conductor reflects everything but what the masking hides.
+#[test]
+fn smooth_white_conductor_loses_nothing() {
+    let material = cases().iter().position(|case| case.material.name.ends_with("-like conductor"));
+    for angle in [0.0, 20.0, 50.0, 75.0, 85.0] {
+        let (albedo, _) = sampled_albedo(material.unwrap(), outgoing(angle), 20_000);
+        assert!((albedo - DVec3::ONE).abs().max_element() < 1e-3, "{angle}°: {albedo}");
+    }
+}
+
+/// Cells over half vectors, logarithmic in θ_h from a tenth of the lobe's width, and the mass of the
+/// density in them.
+struct HalfVectorBins {
+    /// Edges of θ_h.
+    edges: Vec<f64>,
+    /// ∫ pdf dω_i of each cell, θ_h outermost.
+    masses: Vec<f64>,
+}
+
+/// Cells around the azimuth.
+const AZIMUTH_BINS: usize = 12;
+
+impl HalfVectorBins {
+    fn new(material: usize, outgoing: Vec3, lobe_width: f32) -> Self {
+        const POLAR_BINS: i32 = 24;
+        const POINTS: usize = 24;
+        let smallest = 0.1 * f64::from(lobe_width);
+        let edges: Vec<f64> = std::iter::once(0.0)
+            .chain((0..=POLAR_BINS).map(|bin| {
+                smallest * (FRAC_PI_2 / smallest).powf(f64::from(bin) / f64::from(POLAR_BINS))
+            }))
+            .collect();
+        let mass = |polar: usize, azimuth: usize| -> f64 {
+            let (lower, upper) = (edges[polar], edges[polar + 1]);
+            let mut sum = 0.0;
+            for index in 0..POINTS * POINTS {
+                let middle = |index: usize| (index as f64 + 0.5) / POINTS as f64;
+                let theta = lower + (upper - lower) * middle(index % POINTS);
+                let phi =
+                    (azimuth as f64 + middle(index / POINTS)) / AZIMUTH_BINS as f64 * 2.0 * PI;
+                let half_vector = direction(theta, phi);
+                let cosine = outgoing.dot(half_vector);
+                let incident = 2.0 * cosine * half_vector - outgoing;
+                if cosine > 0.0 && incident.z > 0.0 {
+                    let pdf = brdf::pdf(tables(), material, outgoing, incident.normalize());
+                    sum += f64::from(pdf) * 4.0 * f64::from(cosine) * theta.sin();
+                }
+            }
+            sum * (upper - lower) * 2.0 * PI / (AZIMUTH_BINS * POINTS * POINTS) as f64
+        };
+        let masses = (0..(edges.len() - 1) * AZIMUTH_BINS)
+            .map(|cell| mass(cell / AZIMUTH_BINS, cell % AZIMUTH_BINS))
+            .collect();
+        Self { edges, masses }
+    }
+
+    fn cell(&self, outgoing: Vec3, incident: Vec3) -> usize {
+        let half_vector = (outgoing.as_dvec3() + incident.as_dvec3()).normalize();
+        let theta = half_vector.truncate().length().atan2(half_vector.z);
+        let phi = half_vector.y.atan2(half_vector.x).rem_euclid(2.0 * PI);
+        let polar =
+            self.edges.partition_point(|edge| *edge <= theta).clamp(1, self.edges.len() - 1);
+        let azimuth = ((phi / (2.0 * PI) * AZIMUTH_BINS as f64) as usize).min(AZIMUTH_BINS - 1);
+        (polar - 1) * AZIMUTH_BINS + azimuth
+    }
+}
+
+/// χ² of the sampled directions against the density, for every material from straight above to
+/// grazing; the mass that the density lacks is the share of samples below the surface.
+#[test]
+fn samples_follow_their_density() {
+    const SAMPLES: u32 = 100_000;
+    case_angles().for_each(|(material, angle)| {
+        let case = &cases()[material];
+        let outgoing = outgoing(angle);
+        let bins = HalfVectorBins::new(material, outgoing, case.lobe_width);
+        let mut observed = vec![0.0; bins.masses.len()];
+        let mut below = 0;
+        for index in 0..SAMPLES {
+            let incident = brdf::sample(tables(), material, outgoing, uniform(index, 5));
+            if incident.z > 0.0 {
+                observed[bins.cell(outgoing, incident)] += 1.0;
+            } else {
+                below += 1;
+            }
+        }
+        let name = &case.material.name;
+        let mass: f64 = bins.masses.iter().sum();
+        let lost = f64::from(below) / f64::from(SAMPLES);
+        assert!(
+            (mass + lost - 1.0).abs() < 0.01,
+            "{name} at {angle}°: the density integrates to {mass}, {lost} fall below the surface"
+        );
+        let p_value = statistics::chi_square_p_value(&observed, &bins.masses);
+        assert!(p_value > 1e-5, "{name} at {angle}°: p = {p_value:e}");
+    });
+}
+
+/// The bounded cap wastes few samples even where the surface is rough and seen at a grazing angle.
+#[test]
+fn few_samples_fall_below_the_surface() {
+    case_angles().for_each(|(material, angle)| {
+        let below = (0..10_000)
+            .filter(|&index| {
+                brdf::sample(tables(), material, outgoing(angle), uniform(index, 6)).z <= 0.0
+            })
+            .count();
+        assert!(below < 2_000, "{} at {angle}°: {below}", cases()[material].material.name);
+    });
+}
+
+/// Fresnel reflectance against closed forms: normal incidence, Brewster's angle, grazing.
+#[test]
+fn fresnel_has_its_closed_forms() {
+    for ior in [1.0_f32, 1.33, 1.5, 2.4] {
+        let normal = ((ior - 1.0) / (ior + 1.0)).powi(2);
+        assert!((twin::fresnel_dielectric(1.0, ior) - normal).abs() < 1e-6, "{ior}");
+        // At tanθ = n only the perpendicular part is left: ½((n² − 1)/(n² + 1))².
+        let brewster = 0.5 * ((ior * ior - 1.0) / (ior * ior + 1.0)).powi(2);
+        let cosine = 1.0 / (1.0 + ior * ior).sqrt();
+        assert!((twin::fresnel_dielectric(cosine, ior) - brewster).abs() < 1e-6, "{ior}");
+        if ior > 1.0 {
+            assert!((twin::fresnel_dielectric(0.0, ior) - 1.0).abs() < 1e-6, "{ior}");
+        }
+        // A conductor without extinction is a dielectric.
+        for cosine in [0.05, 0.3, 0.7, 0.95] {
+            let conductor = twin::fresnel_conductor(cosine, Vec3::splat(ior), Vec3::ZERO).x;
+            let dielectric = twin::fresnel_dielectric(cosine, ior);
+            assert!((conductor - dielectric).abs() < 1e-4, "{ior}, {cosine}: {conductor}");
+        }
+    }
+    let (eta, k) = (0.2_f32, 3.9_f32);
+    let normal = ((eta - 1.0).powi(2) + k * k) / ((eta + 1.0).powi(2) + k * k);
+    let found = twin::fresnel_conductor(1.0, Vec3::splat(eta), Vec3::splat(k)).x;
+    assert!((found - normal).abs() < 1e-5, "{found} against {normal}");
+}
+
+/// The density of normals projects to 1: ∫ D cosθ dω = 1, down to the narrowest lobe.
+#[test]
+fn ggx_normals_project_to_one() {
+    for alpha in [1e-3_f32, 0.01, 0.1, 0.5, 1.0] {
+        // With tanθ = α√(t/(1−t)) the integrand is 1 for all t.
+        let points = 1000;
+        let sum: f64 = (0..points)
+            .map(|point| {
+                let t = (f64::from(point) + 0.5) / f64::from(points);
+                let alpha = f64::from(alpha);
+                let theta = (alpha * (t / (1.0 - t)).sqrt()).atan();
+                let normal = direction(theta, 0.3);
+                // dθ/dt by tanθ = α√(t/(1−t)).
+                let tangent = theta.tan();
+                let slope = alpha * alpha
+                    / (2.0 * tangent * (1.0 - t) * (1.0 - t))
+                    / (1.0 + tangent * tangent);
+                let density = f64::from(twin::ggx_normal_density(normal, alpha as f32));
+                density * theta.cos() * theta.sin() * 2.0 * PI * slope
+            })
+            .sum();
+        let mean = sum / f64::from(points);
+        assert!((mean - 1.0).abs() < 1e-3, "α = {alpha}: {mean}");
+    }
+}
+
+#[test]
+fn materials_that_share_a_table_share_its_words() {
+    let material = &cases()[9].material;
+    let one = MaterialTables::new(std::slice::from_ref(material)).unwrap();
+    let two = MaterialTables::new(&[material.clone(), material.clone()]).unwrap();
+    assert_eq!(one.words.len(), two.words.len());
+    assert_eq!(two.materials[0], two.materials[1]);
+}
+
+#[test]
+fn tables_beyond_one_buffer_are_refused_by_name() {
+    use std::sync::Arc;
+
+    use fenestra::scene::material::MaterialKind;
+    let original = &cases()[9].material;
+    let materials: Vec<_> = (0..12)
+        .map(|index| {
+            let mut material = original.clone();
+            material.name = format!("paint {index}");
+            if let MaterialKind::Measured { table, .. } = &mut material.kind {
+                *table = Arc::new(table.as_ref().clone());
+            }
+            material
+        })
+        .collect();
+    assert!(MaterialTables::new(&materials[..11]).is_ok());
+    let message = MaterialTables::new(&materials).unwrap_err().to_string();
+    for part in ["128 MiB", "paint 0 (11.2 MiB)", "paint 11"] {
+        assert!(message.contains(part), "{part:?} is missing in {message:?}");
+    }
+}

@@ -1,0 +1,295 @@
+//! MERL and Cornell files: what is read, and what is refused with which message.
+
+#![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use fenestra::brdf::{
+    MeasuredTable,
+    merl::{FILE_BYTES, HEADER_BYTES, SCALES},
+    table::{CELL_COUNT, bin_directions, cell_index},
+};
+use glam::Vec3;
+use tempfile::TempDir;
+
+/// A file in a folder of its own.
+fn file(folder: &TempDir, name: &str, content: &[u8]) -> PathBuf {
+    let path = folder.path().join(name);
+    fs::write(&path, content).unwrap();
+    path
+}
+
+/// Message of the error that reading a file of this content gives.
+fn message(name: &str, content: &[u8]) -> String {
+    let folder = TempDir::new().unwrap();
+    MeasuredTable::load(&file(&folder, name, content)).unwrap_err().to_string()
+}
+
+fn assert_contains(message: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(message.contains(part), "{part:?} is missing in {message:?}");
+    }
+}
+
+/// Bytes of a MERL file of the given stored values (before the scales) by channel and cell.
+fn merl_bytes(dimensions: [i32; 3], stored: impl Fn(usize, usize) -> f64) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(FILE_BYTES);
+    dimensions.iter().for_each(|count| bytes.extend(count.to_le_bytes()));
+    for channel in 0..3 {
+        (0..CELL_COUNT).for_each(|cell| bytes.extend(stored(channel, cell).to_le_bytes()));
+    }
+    bytes
+}
+
+/// Value in 1/sr that names a cell by its indices, small enough to reflect less than it receives.
+fn cell_name(theta_half: usize, theta_difference: usize, phi: usize) -> Vec3 {
+    Vec3::new(
+        0.05 + 0.001 * theta_half as f32,
+        0.05 + 0.001 * theta_difference as f32,
+        0.05 + 0.0005 * phi as f32,
+    )
+}
+
+/// The value at a bin's centre is the stored one times its channel's scale: index order, angles and
+/// scales at once.
+#[test]
+fn merl_cells_lie_where_the_format_says() {
+    let bytes = merl_bytes([90, 90, 180], |channel, cell| {
+        let (phi, rest) = (cell % 180, cell / 180);
+        let name = cell_name(rest / 90, rest % 90, phi);
+        f64::from(name[channel]) / [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0][channel]
+    });
+    let folder = TempDir::new().unwrap();
+    let table = MeasuredTable::load(&file(&folder, "named.binary", &bytes)).unwrap();
+    assert_eq!(table.warnings, Vec::<String>::new());
+    assert_eq!(table.invalid_cell_count, 0);
+    let mut checked = 0;
+    for theta_half in (1..90).step_by(4) {
+        for theta_difference in (1..90).step_by(4) {
+            for phi in (0..180).step_by(7) {
+                let (outgoing, incident) = bin_directions(theta_half, theta_difference, phi);
+                if outgoing.z > 1e-3 && incident.z > 1e-3 {
+                    let found = table.evaluate(outgoing, incident);
+                    let expected = cell_name(theta_half, theta_difference, phi);
+                    assert!(
+                        ((found - expected) / expected).abs().max_element() < 2e-3,
+                        "cell {theta_half}, {theta_difference}, {phi}: {found} against {expected}"
+                    );
+                    checked += 1;
+                }
+            }
+        }
+    }
+    assert!(checked > 5_000, "{checked}");
+}
+
+/// The first indices by hand: θ_h = 45° and θ_d = 30° with φ_d = 60° lie in bins 63, 30 and 60.
+#[test]
+fn merl_index_has_its_closed_form() {
+    let bin_45 = (90.0 * (0.5_f64).sqrt()).floor() as usize;
+    assert_eq!(cell_index(bin_45, 30, 60), 60 + 180 * (30 + 90 * 63));
+    let (outgoing, incident) = bin_directions(63, 30, 60);
+    let half_vector = (outgoing + incident).normalize();
+    let theta_half = half_vector.z.acos().to_degrees();
+    let (lower, upper) = ((63.0_f32 / 90.0).powi(2) * 90.0, (64.0_f32 / 90.0).powi(2) * 90.0);
+    assert!(theta_half > lower && theta_half < upper, "{lower}, {theta_half}, {upper}");
+    let theta_difference = incident.dot(half_vector).acos().to_degrees();
+    assert!((theta_difference - 30.5).abs() < 1e-3, "{theta_difference}");
+}
+
+/// Invalid cells take a neighbour's value, are counted, and never reach the shader.
+#[test]
+fn merl_invalid_cells_are_filled_from_their_neighbours() {
+    let is_nan = |cell: usize| cell.is_multiple_of(1_000_003);
+    let bytes = merl_bytes([90, 90, 180], |channel, cell| {
+        if is_nan(cell) {
+            [f64::NAN, f64::INFINITY, 1.0][channel]
+        } else if (cell / 180) % 90 >= 60 {
+            -1.0
+        } else {
+            0.1 / SCALES[channel]
+        }
+    });
+    let folder = TempDir::new().unwrap();
+    let table = MeasuredTable::load(&file(&folder, "holes.binary", &bytes)).unwrap();
+    assert_eq!(table.invalid_cell_count, CELL_COUNT / 3 + 2);
+    assert_contains(&table.warnings.join("\n"), &["2 cells that are not finite"]);
+    for (theta_half, theta_difference, phi) in [(0, 0, 0), (61, 11, 103), (20, 70, 90), (3, 89, 0)]
+    {
+        let (outgoing, incident) = bin_directions(theta_half, theta_difference, phi);
+        if outgoing.z > 0.0 && incident.z > 0.0 {
+            let value = table.evaluate(outgoing, incident);
+            assert!((value - Vec3::splat(0.1)).abs().max_element() < 1e-4, "{value}");
+        }
+    }
+    let all_invalid = merl_bytes([90, 90, 180], |_, _| -1.0);
+    assert_contains(&message("void.binary", &all_invalid), &["void.binary", "none of the 1458000"]);
+}
+
+#[test]
+fn merl_sizes_are_checked_before_reading() {
+    let with_header = |dimensions: [i32; 3], length: usize| {
+        let mut bytes: Vec<u8> = dimensions.iter().flat_map(|count| count.to_le_bytes()).collect();
+        bytes.resize(length, 0);
+        bytes
+    };
+    let size = FILE_BYTES.to_string();
+    assert_eq!(FILE_BYTES, 34_992_012);
+    assert_contains(&message("a.binary", &[]), &["truncated", &size, "found 0"]);
+    assert_contains(&message("a.binary", &[90, 0, 0, 0]), &["truncated", &size, "found 4"]);
+    assert_contains(
+        &message("a.binary", &with_header([90, 90, 360], 1000)),
+        &["a.binary", "90 × 90 × 180", "90 × 90 × 360"],
+    );
+    assert_contains(
+        &message("a.binary", &with_header([-5, i32::MAX, 0], 1000)),
+        &["90 × 90 × 180", "-5 × 2147483647 × 0"],
+    );
+    assert_contains(
+        &message("a.binary", &with_header([90, 90, 180], HEADER_BYTES + 800)),
+        &["truncated", &size, "found 812"],
+    );
+    // The header is recognised whatever the name.
+    assert_contains(&message("a.data", &with_header([90, 90, 180], 5000)), &["truncated", "5000"]);
+    let too_long = with_header([90, 90, 180], FILE_BYTES + 1);
+    assert_contains(&message("a.binary", &too_long), &["too long", "found 34992013"]);
+}
+
+/// A Cornell file of three wavelengths and the records of a Lambertian surface.
+fn cornell_text(value: f64) -> String {
+    let mut text = String::from("# a comment\n3 # wavelengths\n450 550\n650\n");
+    for theta_incident in [0.3_f64, 0.8, 1.3] {
+        for theta_outgoing in [0.2_f64, 0.7, 1.2] {
+            for phi in [-2.0_f64, 0.0, 1.0, 3.1] {
+                let values = format!("{value} {value} {value}");
+                text += &format!("{theta_incident} 0 {theta_outgoing} {phi}  {values}\n");
+            }
+        }
+    }
+    text
+}
+
+#[test]
+fn cornell_constant_samples_give_a_constant_grid() {
+    let folder = TempDir::new().unwrap();
+    let path = file(&folder, "grey.brdf", cornell_text(0.1).as_bytes());
+    let table = MeasuredTable::load(&path).unwrap();
+    assert_eq!(table.warnings, Vec::<String>::new());
+    let mut values = Vec::new();
+    for (theta_half, theta_difference, phi) in [(0, 0, 0), (30, 20, 50), (60, 40, 90), (10, 80, 3)]
+    {
+        let (outgoing, incident) = bin_directions(theta_half, theta_difference, phi);
+        assert!(outgoing.z > 0.0 && incident.z > 0.0);
+        values.push(table.evaluate(outgoing, incident));
+        // Three wavelengths are a coarse spectrum, yet of the right luminance.
+        let luminance = values[0].dot(Vec3::new(0.2126, 0.7152, 0.0722));
+        assert!((luminance - 0.1).abs() < 2e-3, "{luminance}");
+        let difference = (values[0] - values[values.len() - 1]).abs().max_element();
+        assert!(difference < 1e-3 * values[0].max_element(), "{values:?}");
+    }
+}
+
+#[test]
+fn cornell_records_that_cannot_be_used_are_counted() {
+    let folder = TempDir::new().unwrap();
+    let mut text = cornell_text(0.1);
+    text += "0.5 0 0.5 1  nan 0.1 0.1\n2.0 0 0.5 1  0.1 0.1 0.1\n0.5 0 inf 1  0.1 0.1 0.1\n";
+    let table = MeasuredTable::load(&file(&folder, "a.brdf", text.as_bytes())).unwrap();
+    assert_contains(&table.warnings.join("\n"), &["3 records"]);
+    let (outgoing, incident) = bin_directions(30, 20, 50);
+    assert!(table.evaluate(outgoing, incident).is_finite());
+    let unusable = "1\n550\n0.5 0 0.5 1 nan\n";
+    assert_contains(&message("a.brdf", unusable.as_bytes()), &["a.brdf", "no usable record"]);
+}
+
+#[test]
+fn cornell_text_is_refused_with_its_place() {
+    let error = |text: &str| message("a.brdf", text.as_bytes());
+    assert_contains(&error(""), &["a.brdf", "empty"]);
+    assert_contains(&error("# nothing\n"), &["empty"]);
+    assert_contains(&error("2\n400 spam"), &["a.brdf:2:5", "number", "spam"]);
+    assert_contains(&error("2.5 400 500"), &["a.brdf:1:1", "integer", "2.5"]);
+    assert_contains(&error("-3"), &["count of wavelengths", "-3"]);
+    assert_contains(&error("1e30"), &["count of wavelengths"]);
+    assert_contains(&error("nan"), &["count of wavelengths"]);
+    assert_contains(&error("3 400 500"), &["truncated", "3 wavelengths", "found 2"]);
+    assert_contains(&error("2 500\n400 0 0 0 0 1 1"), &["a.brdf:2:1", "increasing", "400"]);
+    assert_contains(&error("2 400 500"), &["records of 6", "found 0"]);
+    assert_contains(
+        &error("2 400 500\n0 0 0 0 1 1\n0 0 0"),
+        &["a.brdf:3:5", "records of 6", "1 records and 3 left over"],
+    );
+    assert_contains(&error("2 1400 1500\n0 0 0 0 1 1"), &["visible"]);
+    assert_contains(&message("a.brdf", &[0x35, 0x20, 0xff, 0xfe]), &["UTF-8", "byte 2"]);
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let message = MeasuredTable::load(Path::new("no/such.brdf")).unwrap_err().to_string();
+    assert_contains(&message, &["no/such.brdf", "cannot read"]);
+}
+
+/// Grid values that would reflect more light than they receive are scaled until they do not, and
+/// stay reciprocal.
+#[test]
+fn energy_is_limited() {
+    let table = MeasuredTable::tabulate(|outgoing, incident| {
+        Vec3::new(1.0, 0.5, 0.1) * 0.2 / (outgoing.z * incident.z).max(1e-4).sqrt()
+    })
+    .unwrap();
+    assert_contains(&table.warnings.join("\n"), &["times the light"]);
+    for angle in [0.1_f64, 0.8, 1.3, 1.5] {
+        let outgoing = Vec3::new(angle.sin() as f32, 0.0, angle.cos() as f32);
+        let (mut albedo, points) = (0.0, 400);
+        for index in 0..points * points {
+            let theta = (f64::from(index % points) + 0.5) / f64::from(points) * 1.570_796;
+            let phi = (f64::from(index / points) + 0.5) / f64::from(points) * 6.283_185;
+            let incident = Vec3::new(
+                (theta.sin() * phi.cos()) as f32,
+                (theta.sin() * phi.sin()) as f32,
+                theta.cos() as f32,
+            );
+            let value = table.evaluate(outgoing, incident);
+            assert_eq!(value, table.evaluate(incident, outgoing));
+            albedo += f64::from(value.x) * theta.cos() * theta.sin();
+        }
+        albedo *= 1.570_796 * 6.283_185 / f64::from(points * points);
+        assert!(albedo < 1.02, "{angle}: {albedo}");
+    }
+}
+
+/// The interpolation has no seam where φ_d wraps around, nor at the poles of θ_h and θ_d, where it
+/// turns quickly.
+#[test]
+fn interpolation_is_continuous() {
+    // Every cell different, as noise would be.
+    let mut cells = vec![Vec3::ZERO; CELL_COUNT];
+    for (index, cell) in cells.iter_mut().enumerate() {
+        *cell = Vec3::splat(0.05 + 0.1 * ((index * 7919) % 1000) as f32 / 1000.0);
+    }
+    let table = MeasuredTable::from_cells(cells).unwrap();
+    let step = 1e-6_f32;
+    let around = |axis: Vec3, turn: f32| -> Vec3 {
+        let tangent = axis.any_orthonormal_vector();
+        (axis + step * (turn.cos() * tangent + turn.sin() * axis.cross(tangent))).normalize()
+    };
+    let mirror = |v: Vec3| Vec3::new(-v.x, -v.y, v.z);
+    for index in 0..200_u32 {
+        let theta = 0.1 + 1.2 * index as f32 / 200.0;
+        let outgoing = Vec3::new(theta.sin() * 0.6, theta.sin() * 0.8, theta.cos());
+        // Half vector at the normal; directions equal; both in one plane with the normal.
+        let in_plane =
+            Vec3::new((0.5 * theta).sin() * 0.6, (0.5 * theta).sin() * 0.8, (0.5 * theta).cos());
+        for incident in [mirror(outgoing), outgoing, in_plane, mirror(in_plane)] {
+            let values: Vec<f32> = (0..8)
+                .map(|turn| table.evaluate(outgoing, around(incident, turn as f32 * 0.785)).x)
+                .collect();
+            let smallest = values.iter().copied().fold(f32::INFINITY, f32::min);
+            let largest = values.iter().copied().fold(0.0, f32::max);
+            assert!(largest - smallest < 0.01, "{outgoing}, {incident}: {values:?}");
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! `glsl/include/brdf.glsl` against its Rust twin, over all kinds of materials.
+
+#![expect(clippy::expect_used, reason = "tests may panic")]
+
+use bytemuck::{Pod, Zeroable};
+use fenestra::{
+    brdf,
+    gpu::constants::{
+        BINDING_BRDF_TABLE, BINDING_MATERIALS, MATERIAL_MEASURED, SET_FILM, SET_SCENE,
+    },
+};
+use glam::Vec3;
+
+#[path = "support/materials.rs"]
+mod materials;
+mod support;
+
+use materials::{cases, direction, hemisphere, tables, uniform};
+
+/// Twin of `BrdfQuery` in `glsl/test/brdf.comp`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct BrdfQuery {
+    outgoing_local: Vec3,
+    incident_local: Vec3,
+    u: Vec3,
+    material: u32,
+}
+
+/// Twin of `BrdfAnswer` in `glsl/test/brdf.comp`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct BrdfAnswer {
+    value: Vec3,
+    pdf: f32,
+    sampled_local: Vec3,
+    albedo: Vec3,
+}
+
+/// Pairs over the hemisphere, in lobes, in retro-reflection, below the surface and at grazing angles.
+fn query(index: u32) -> BrdfQuery {
+    let material = index % cases().len() as u32;
+    let u = uniform(index, 7);
+    let outgoing_local = match index % 5 {
+        0 => Vec3::Z,
+        1 => direction(f64::from(1.5 + 0.07 * u.x), f64::from(6.0 * u.y)),
+        _ => hemisphere(index, 8),
+    };
+    let incident_local = match index % 7 {
+        0 => outgoing_local,
+        1 => -hemisphere(index, 9),
+        2 | 3 => hemisphere(index, 9),
+        _ => brdf::sample(tables(), material as usize, outgoing_local, uniform(index, 9)),
+    };
+    BrdfQuery { outgoing_local, incident_local, u: uniform(index, 10), material }
+}
+
+/// Largest difference of two vectors relative to the second, with an absolute part.
+fn difference(found: Vec3, expected: Vec3, absolute: f32) -> f32 {
+    (found - expected).abs().max_element() / (expected.abs().max_element() + absolute)
+}
+
+#[test]
+fn shader_agrees_with_its_twin() {
+    let queries: Vec<BrdfQuery> = (0..20_000).map(query).collect();
+    let bytes = support::run_probe(
+        include_bytes!(concat!(env!("OUT_DIR"), "/test/brdf.spv")),
+        &[
+            (SET_FILM, 0, bytemuck::cast_slice(&queries)),
+            (SET_SCENE, BINDING_MATERIALS, bytemuck::cast_slice(&tables().materials)),
+            (SET_SCENE, BINDING_BRDF_TABLE, bytemuck::cast_slice(&tables().words)),
+        ],
+        size_of::<BrdfAnswer>() * queries.len(),
+        queries.len() as u32,
+    );
+    let answers: Vec<BrdfAnswer> = bytemuck::pod_collect_to_vec(&bytes);
+
+    // A direction whose rounding puts it into the next bin of a sampling table has another density
+    // there; that may happen, rarely.
+    let mut other_bins = 0;
+    for (query, answer) in queries.iter().zip(&answers) {
+        let material = query.material as usize;
+        let name = &cases()[material].material.name;
+        let is_measured = tables().materials[material].kind == MATERIAL_MEASURED;
+        let (value, pdf) =
+            brdf::evaluate_and_pdf(tables(), material, query.outgoing_local, query.incident_local);
+        assert!(
+            difference(answer.value, value, 1e-6) < 2e-3,
+            "{name}: value {} in the shader, {value} in its twin, for {query:?}",
+            answer.value
+        );
+        if difference(Vec3::splat(answer.pdf), Vec3::splat(pdf), 1e-6) >= 2e-3 {
+            assert!(
+                is_measured,
+                "{name}: pdf {} in the shader, {pdf} in its twin, for {query:?}",
+                answer.pdf
+            );
+            other_bins += 1;
+        }
+        let sampled = brdf::sample(tables(), material, query.outgoing_local, query.u);
+        assert!(
+            difference(answer.sampled_local, sampled, 0.0) < 3e-4,
+            "{name}: sample {} in the shader, {sampled} in its twin, for {query:?}",
+            answer.sampled_local
+        );
+        let albedo = brdf::albedo(tables(), material, query.outgoing_local);
+        assert!(
+            difference(answer.albedo, albedo, 0.0) < 1e-4,
+            "{name}: albedo {} in the shader, {albedo} in its twin, for {query:?}",
+            answer.albedo
+        );
+    }
+    assert!(other_bins < queries.len() / 500, "{other_bins} densities differ");
+    assert!(answers.iter().filter(|answer| answer.pdf > 0.0).count() > queries.len() / 2);
+    let first = answers.first().expect("there are answers");
+    assert_eq!(first.sampled_local.is_finite(), first.value.is_finite());
+}

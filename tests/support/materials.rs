@@ -1,0 +1,106 @@
+//! Materials of every kind for the tests of the reflection models, and directions to try them in.
+
+#![allow(dead_code, reason = "every test binary uses its own part")]
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+use std::{
+    path::PathBuf,
+    sync::{Arc, OnceLock},
+};
+
+use fenestra::{
+    brdf::{self, MaterialTables, MeasuredTable},
+    random::hash_4d,
+    scene::{
+        Material,
+        material::{ConductorFresnel, MaterialKind},
+    },
+};
+use glam::{Vec3, vec3};
+
+/// A material of the tests and the angular scale of its narrowest lobe.
+pub struct Case {
+    pub material: Material,
+    pub lobe_width: f32,
+}
+
+fn case(name: &str, lobe_width: f32, kind: MaterialKind) -> Case {
+    Case { material: Material { name: name.to_string(), kind }, lobe_width }
+}
+
+fn plastic(diffuse: Vec3, alpha: f32, ior: f32) -> MaterialKind {
+    MaterialKind::Plastic { diffuse, alpha, ior }
+}
+
+/// Gold near 600, 550 and 450 nm.
+const GOLD: ConductorFresnel =
+    ConductorFresnel::Exact { eta: vec3(0.18, 0.42, 1.37), k: vec3(3.42, 2.35, 1.77) };
+
+/// A measured table made from a plastic, with energy, reciprocity and every cell known.
+pub fn synthetic_table(diffuse: Vec3, alpha: f32) -> Arc<MeasuredTable> {
+    let model = MaterialTables::new(&[case("model", alpha, plastic(diffuse, alpha, 1.5)).material])
+        .unwrap();
+    let table =
+        MeasuredTable::tabulate(|outgoing, incident| brdf::evaluate(&model, 0, outgoing, incident));
+    Arc::new(table.unwrap())
+}
+
+fn measured(diffuse: Vec3, alpha: f32) -> MaterialKind {
+    MaterialKind::Measured {
+        path: PathBuf::from("synthetic"),
+        table: synthetic_table(diffuse, alpha),
+    }
+}
+
+/// Every kind over its range of parameters.
+pub fn cases() -> &'static [Case] {
+    static CASES: OnceLock<Vec<Case>> = OnceLock::new();
+    CASES.get_or_init(|| {
+        let grey = ConductorFresnel::Schlick { reflectance: vec3(0.9, 0.7, 0.5) };
+        let white = ConductorFresnel::Schlick { reflectance: Vec3::ONE };
+        vec![
+            case("diffuse", 1.0, MaterialKind::Diffuse { reflectance: vec3(0.8, 0.5, 0.2) }),
+            case("mirror-like plastic", 1e-3, plastic(Vec3::ONE, 1e-3, 1.5)),
+            case("glossy plastic", 0.1, plastic(vec3(0.1, 0.4, 0.7), 0.1, 1.5)),
+            case("rough plastic", 0.5, plastic(Vec3::ONE, 0.5, 1.8)),
+            case("black plastic", 0.3, plastic(Vec3::ZERO, 0.3, 1.33)),
+            case(
+                "mirror-like conductor",
+                1e-3,
+                MaterialKind::Conductor { alpha: 1e-3, fresnel: white },
+            ),
+            case("gold", 0.1, MaterialKind::Conductor { alpha: 0.1, fresnel: GOLD }),
+            case("rough conductor", 0.5, MaterialKind::Conductor { alpha: 0.5, fresnel: grey }),
+            case("roughest conductor", 1.0, MaterialKind::Conductor { alpha: 1.0, fresnel: GOLD }),
+            case("measured glossy", 0.05, measured(vec3(0.1, 0.2, 0.05), 0.05)),
+            case("measured rough", 0.3, measured(vec3(0.6, 0.5, 0.4), 0.3)),
+        ]
+    })
+}
+
+/// The device tables of [`cases`].
+pub fn tables() -> &'static MaterialTables {
+    static TABLES: OnceLock<MaterialTables> = OnceLock::new();
+    TABLES.get_or_init(|| {
+        let materials: Vec<Material> = cases().iter().map(|case| case.material.clone()).collect();
+        MaterialTables::new(&materials).unwrap()
+    })
+}
+
+/// Three reproducible numbers in [0, 1).
+pub fn uniform(index: u32, stream: u32) -> Vec3 {
+    let [x, y, z, _] = hash_4d([index, stream, 17, 4711]);
+    let unit = |bits: u32| (bits >> 8) as f32 / 16_777_216.0;
+    vec3(unit(x), unit(y), unit(z))
+}
+
+/// Unit vector of polar angle θ and azimuth φ, radians.
+pub fn direction(theta: f64, phi: f64) -> Vec3 {
+    glam::dvec3(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()).as_vec3()
+}
+
+/// A direction above the surface, uniform over the hemisphere.
+pub fn hemisphere(index: u32, stream: u32) -> Vec3 {
+    let u = uniform(index, stream);
+    direction(f64::from(1.0 - u.x).acos(), f64::from(u.y) * std::f64::consts::TAU)
+}
