@@ -184,6 +184,8 @@ pub fn directional_albedo(words: &[u32], cosine: f32) -> Vec3 {
 
 /// Bins of the polar angle of a direction when energy is balanced.
 const POLAR_BINS: usize = 90;
+/// Albedo that limited materials keep below: the rest of 1 is the error of the quadrature.
+const LARGEST_ALBEDO: f32 = 0.97;
 /// Points over the azimuth between two directions, 0…π.
 const AZIMUTH_POINTS: usize = 90;
 
@@ -198,7 +200,7 @@ pub struct EnergyLimit {
 
 impl EnergyLimit {
     /// Measures the albedo of the grid in `words` at every polar angle; where one exceeds 1, finds
-    /// s(θ) ≤ 1 such that s(θ_o)·∫ f·s(θ_i)·cosθ_i dω_i ≤ 1 everywhere. The product form keeps the
+    /// s(θ) ≤ 1 such that s(θ_o)·∫ f·s(θ_i)·cosθ_i dω_i stays below 1 everywhere. The product form keeps the
     /// BRDF reciprocal. `None` where nothing exceeds 1.
     pub fn new(words: &[u32]) -> Option<Self> {
         let theta = |bin: usize| (bin as f32 + 0.5) / POLAR_BINS as f32 * FRAC_PI_2;
@@ -240,8 +242,9 @@ impl EnergyLimit {
         }
         // The square root damps the step, as both directions' factors move at once.
         for _ in 0..200 {
-            let steps: Vec<f32> =
-                (0..POLAR_BINS).map(|bin| albedo(&factors, bin).max(1.0).sqrt().recip()).collect();
+            let steps: Vec<f32> = (0..POLAR_BINS)
+                .map(|bin| (albedo(&factors, bin) / LARGEST_ALBEDO).max(1.0).sqrt().recip())
+                .collect();
             factors.iter_mut().zip(&steps).for_each(|(factor, step)| *factor *= step);
             if steps.iter().all(|step| *step > 0.9999) {
                 break;
