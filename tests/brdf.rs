@@ -227,7 +227,28 @@ fn samples_follow_their_density() {
             (mass + lost - 1.0).abs() < 0.01,
             "{name} at {angle}°: the density integrates to {mass}, {lost} fall below the surface"
         );
-        let p_value = statistics::chi_square_p_value(&observed, &bins.masses);
+        // Cells that lie almost wholly below the surface may have no point of the quadrature above
+        // it: all that expect less than a count are one.
+        let is_small = |mass: f64| mass * f64::from(SAMPLES) < 1.0;
+        let mut expected = vec![0.0];
+        let mut counts = vec![0.0];
+        for (&count, &mass) in observed.iter().zip(&bins.masses) {
+            if is_small(mass) {
+                counts[0] += count;
+                expected[0] += mass;
+            } else {
+                counts.push(count);
+                expected.push(mass);
+            }
+        }
+        let rest = (counts[0], expected[0] * f64::from(SAMPLES));
+        assert!(
+            rest.0 <= rest.1 + 6.0 * rest.1.max(1.0).sqrt(),
+            "{name} at {angle}°: {} samples where {} are expected",
+            rest.0,
+            rest.1
+        );
+        let p_value = statistics::chi_square_p_value(&counts[1..], &expected[1..]);
         assert!(p_value > 1e-5, "{name} at {angle}°: p = {p_value:e}");
     });
 }

@@ -120,10 +120,10 @@ fn check_size(materials: &[Material]) -> Result<()> {
     })
 }
 
-/// Direction at node `node` of a table over the cosine. At the horizon, where nothing is reflected
-/// by a rough surface, the limit is taken from just above it.
-fn node_direction(node: u32) -> Vec3 {
-    let cosine = (node as f32 / BRDF_COSINE_INTERVALS as f32).max(1e-4);
+/// A direction of that cosine. At the horizon, where nothing is reflected by a rough surface, the
+/// limit is taken from just above it.
+fn direction_of_cosine(cosine: f32) -> Vec3 {
+    let cosine = cosine.max(1e-4);
     vec3((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine)
 }
 
@@ -150,13 +150,20 @@ fn ggx_albedo(outgoing: Vec3, alpha: f32, fresnel: impl Fn(f32) -> Vec3) -> Vec3
 /// Words of a plastic: directional albedo, transmission into and out of the base, probability of
 /// sampling the coat; see `PLASTIC_…_OFFSET`.
 fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
-    let coat: Vec<f32> = (0..BRDF_COSINE_NODES)
+    let fresnel = |cosine| Vec3::splat(twin::fresnel_dielectric(cosine, ior));
+    let coat_albedo = |direction| ggx_albedo(direction, alpha, fresnel).x.min(1.0);
+    let mut coat: Vec<f32> = (0..BRDF_COSINE_NODES)
         .into_par_iter()
-        .map(|node| {
-            let fresnel = |cosine| Vec3::splat(twin::fresnel_dielectric(cosine, ior));
-            ggx_albedo(node_direction(node), alpha, fresnel).x.min(1.0)
-        })
+        .map(|node| coat_albedo(direction_of_cosine(node as f32 / BRDF_COSINE_INTERVALS as f32)))
         .collect();
+    // Next to the horizon E falls steeply where the cosine is about α. The node there takes the
+    // least value that keeps the line to the next node above E, so that coat and base together
+    // never reflect more than they receive.
+    let horizon = [0.02, 0.06, 0.12, 0.25, 0.5, 0.75].into_iter().map(|fraction| {
+        let e = coat_albedo(direction_of_cosine(fraction / BRDF_COSINE_INTERVALS as f32));
+        (e - fraction * coat[1]) / (1.0 - fraction)
+    });
+    coat[0] = horizon.fold(coat[0], f32::max).min(1.0);
     // Ē = 2∫E(μ)μ dμ of the piecewise linear E, exactly, so that the base is energy conserving as
     // interpolated: per interval of width w, ∫ = w·(μ₀(2E₀+E₁)+μ₁(E₀+2E₁))/6.
     let width = 1.0 / f64::from(BRDF_COSINE_INTERVALS);
@@ -196,9 +203,13 @@ fn conductor_words(material: &layout::Material) -> Vec<u32> {
     (0..BRDF_COSINE_NODES)
         .into_par_iter()
         .flat_map_iter(|node| {
-            ggx_albedo(node_direction(node), material.alpha, fresnel)
-                .clamp(Vec3::ZERO, Vec3::ONE)
-                .to_array()
+            ggx_albedo(
+                direction_of_cosine(node as f32 / BRDF_COSINE_INTERVALS as f32),
+                material.alpha,
+                fresnel,
+            )
+            .clamp(Vec3::ZERO, Vec3::ONE)
+            .to_array()
         })
         .map(f32::to_bits)
         .collect()
