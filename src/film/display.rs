@@ -7,7 +7,7 @@
 use std::{
     io::Write,
     net::{TcpStream, ToSocketAddrs},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use crate::error::{Error, Result};
@@ -23,11 +23,11 @@ const UPDATE_IMAGE_V3: u8 = 6;
 /// Names of the channels sent.
 const CHANNELS: [&str; 3] = ["R", "G", "B"];
 
-/// Longest wait for a connection, and for the viewer to take data, before it is given up.
+/// Longest wait for a connection, and for the viewer to take one packet, before it is given up.
 const TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Most pixels in one packet: 12 MiB.
-const PACKET_PIXELS: usize = 1 << 20;
+/// Most pixels in one packet: 3 MiB.
+const PACKET_PIXELS: usize = 1 << 18;
 
 /// One image shown by a display server. A server that is absent, or goes away, costs one warning in
 /// the log and nothing else: rendering goes on.
@@ -119,7 +119,7 @@ impl DisplayServer {
     /// Sends a packet; on failure the connection is closed with a warning.
     fn send(&mut self, packet: Packet) {
         let Some(stream) = &mut self.stream else { return };
-        if let Err(error) = stream.write_all(&packet.finish()) {
+        if let Err(error) = write_in_time(stream, &packet.finish()) {
             log::warn!("the display server at {} is gone: {error}", self.address);
             self.stream = None;
         }
@@ -158,6 +158,21 @@ fn open(address: &str) -> std::io::Result<TcpStream> {
         }
     }
     Err(failure)
+}
+
+/// Writes all of `bytes` within [`TIMEOUT`], or little more: a stalled reader still lets the system
+/// take a few bytes now and then, so that the limit of a single write is not enough.
+fn write_in_time(stream: &mut TcpStream, bytes: &[u8]) -> std::io::Result<()> {
+    let start = Instant::now();
+    let mut rest = bytes;
+    while !rest.is_empty() {
+        let written = stream.write(rest)?;
+        rest = &rest[written..];
+        if written == 0 || (!rest.is_empty() && start.elapsed() > TIMEOUT) {
+            return Err(std::io::Error::new(std::io::ErrorKind::TimedOut, "it takes no data"));
+        }
+    }
+    Ok(())
 }
 
 /// A packet under construction; its first four bytes are the length.
