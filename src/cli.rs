@@ -18,6 +18,8 @@ pub struct Cli {
 /// The commands; each variant holds the arguments that `command/<name>.rs` declares.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Render a scene to an image.
+    Render(Box<command::render::Arguments>),
     /// Error metrics of an image against a reference, with thresholds for scripts.
     Compare(command::compare::Arguments),
     /// Combine renders of one scene made with different seeds or sample ranges.
@@ -43,6 +45,7 @@ pub fn run() -> ExitCode {
         .format_target(false)
         .init();
     let result = match &cli.command {
+        Command::Render(arguments) => command::render::run(arguments),
         Command::Compare(arguments) => command::compare::run(arguments),
         Command::Info(arguments) => command::info::run(arguments),
         Command::Merge(arguments) => command::merge::run(arguments),

@@ -28,6 +28,8 @@ pub mod frame;
 pub mod gpu;
 pub mod pass;
 pub mod random;
+pub mod renderer;
+pub mod sampler;
 pub mod scene;
 pub mod srbf;
 pub mod study;

@@ -4,7 +4,9 @@ pub mod compare;
 pub mod devices;
 pub mod info;
 pub mod merge;
+pub mod options;
 pub mod progress;
+pub mod render;
 
 use std::io::Write;
 

@@ -82,6 +82,12 @@ pub const CONSTANT_TRIANGLE_PAGE_SHIFT: u32 = 1;
 pub const CONSTANT_RAYS_PER_INVOCATION: u32 = 2;
 /// Specialization constant: lanes of a subgroup that have finished when they take their next rays.
 pub const CONSTANT_REFILL_LANES: u32 = 3;
+/// Specialization constant of `sample`: which sampler, `SAMPLER_…`.
+pub const CONSTANT_SAMPLER: u32 = 16;
+/// Specialization constant of `sample`: candidates per shadow ray.
+pub const CONSTANT_CANDIDATES: u32 = 17;
+/// Specialization constant of `bounce`: first vertex at which russian roulette may end a path.
+pub const CONSTANT_ROULETTE_VERTEX: u32 = 18;
 /// Entries of the traversal stack; one group of nodes per level of the tree is stacked.
 pub const BVH_STACK_ENTRIES: u32 = 32;
 /// Steps of traversal that one invocation may take for all its rays; Mesa 22.3 silently ends the
@@ -198,6 +204,9 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("CONSTANT_TRIANGLE_PAGE_SHIFT", CONSTANT_TRIANGLE_PAGE_SHIFT),
     ("CONSTANT_RAYS_PER_INVOCATION", CONSTANT_RAYS_PER_INVOCATION),
     ("CONSTANT_REFILL_LANES", CONSTANT_REFILL_LANES),
+    ("CONSTANT_SAMPLER", CONSTANT_SAMPLER),
+    ("CONSTANT_CANDIDATES", CONSTANT_CANDIDATES),
+    ("CONSTANT_ROULETTE_VERTEX", CONSTANT_ROULETTE_VERTEX),
     ("BVH_STACK_ENTRIES", BVH_STACK_ENTRIES),
     ("TRAVERSAL_STEP_LIMIT", TRAVERSAL_STEP_LIMIT),
     ("FLAT_NORMAL", FLAT_NORMAL),

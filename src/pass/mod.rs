@@ -1,5 +1,207 @@
-//! One file per dispatch: name = `glsl/<name>.comp` = debug label = timer row.
+//! The passes of the path tracer, in the order they run in. A pass is one dispatch: its name is
+//! `glsl/<name>.comp`, its debug label and its row in the timings.
+//!
+//! Per wave of paths: `camera`; then per vertex `trace`, and per group of shadow rays `sample`,
+//! `shadow`, `gather`; `features` after the first vertex where albedo, normal or position are asked
+//! for; `bounce` between vertices; at last `accumulate`.
 
 pub mod geometry;
 pub mod shadow;
 pub mod trace;
+
+use std::{sync::Arc, time::Instant};
+
+use crate::{
+    error::Result,
+    gpu::{
+        Commands, DescriptorSet, Device, PassTimes, Pipeline,
+        constants::{
+            AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, CONSTANT_CANDIDATES, CONSTANT_ROULETTE_VERTEX,
+            CONSTANT_SAMPLER,
+        },
+        layout::Wave,
+        shaders,
+    },
+    sampler::{Parameters, Sampler},
+};
+pub use geometry::{GeometryBuffers, Schedule};
+use shadow::Shadow;
+use trace::Trace;
+
+/// Shadow rays per hit in one group: bounds the work of an invocation and the size of the buffers.
+pub const SHADOW_RAYS_PER_GROUP: u32 = 8;
+
+/// Bits of [`Wave::aovs`] that the `features` pass writes.
+const FEATURES: u32 = AOV_ALBEDO | AOV_NORMAL | AOV_POSITION;
+
+/// What shapes the passes of a render.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PassSettings {
+    /// How directions are chosen.
+    pub sampler: Sampler,
+    /// Parameters of the sampler.
+    pub parameters: Parameters,
+    /// Shadow rays per hit; 0 renders emission seen by the camera only.
+    pub shadow_rays: u32,
+    /// Path vertices at which environment light is gathered.
+    pub depth: u32,
+    /// Bits `AOV_…`.
+    pub aovs: u32,
+    /// First vertex at which russian roulette may end a path.
+    pub roulette_vertex: u32,
+}
+
+/// The descriptor sets that the passes see.
+pub struct Sets<'a> {
+    /// Scene: geometry, materials, environment.
+    pub scene: &'a DescriptorSet,
+    /// State of the wave.
+    pub wave: &'a DescriptorSet,
+    /// Film.
+    pub film: &'a DescriptorSet,
+}
+
+/// The pipelines of all passes.
+pub struct Passes {
+    settings: PassSettings,
+    camera: Pipeline,
+    /// For camera rays, which stay together.
+    trace: Trace,
+    /// For bounce rays, which part at once.
+    trace_bounce: Trace,
+    sample: Pipeline,
+    shadow: Shadow,
+    gather: Pipeline,
+    bounce: Pipeline,
+    features: Pipeline,
+    accumulate: Pipeline,
+}
+
+impl Passes {
+    /// Creates the pipelines that `settings` call for.
+    ///
+    /// # Errors
+    /// [`crate::Error::Vulkan`] if the driver refuses one.
+    pub fn new(
+        device: &Arc<Device>,
+        geometry: &GeometryBuffers,
+        settings: PassSettings,
+    ) -> Result<Self> {
+        let incoherent = Schedule::incoherent(device.capabilities());
+        let create = |name: &str, constants: &[(u32, u32)]| {
+            Pipeline::new(device, name, shaders::pass(name), constants)
+        };
+        let candidates = match settings.sampler {
+            Sampler::Ris => settings.parameters.candidates,
+            _ => 1,
+        };
+        Ok(Self {
+            camera: create("camera", &[])?,
+            trace: Trace::new(device, geometry, Schedule::SINGLE)?,
+            trace_bounce: Trace::new(device, geometry, incoherent)?,
+            sample: create(
+                "sample",
+                &[(CONSTANT_SAMPLER, settings.sampler.tag()), (CONSTANT_CANDIDATES, candidates)],
+            )?,
+            shadow: Shadow::new(device, geometry, incoherent)?,
+            gather: create("gather", &[])?,
+            bounce: create("bounce", &[(CONSTANT_ROULETTE_VERTEX, settings.roulette_vertex)])?,
+            features: create("features", &[])?,
+            accumulate: create("accumulate", &[])?,
+            settings,
+        })
+    }
+
+    /// Number of dispatches of one wave.
+    pub fn dispatches_per_wave(&self) -> u32 {
+        let groups = self.settings.shadow_rays.div_ceil(SHADOW_RAYS_PER_GROUP).max(1);
+        3 + self.settings.depth * (2 + 3 * groups)
+    }
+
+    /// Records all passes of one wave.
+    pub fn record(&self, commands: &mut Commands, sets: &Sets<'_>, wave: Wave) {
+        let Sets { scene, wave: wave_set, film } = *sets;
+        let paths = wave.pixel_count * wave.sample_count;
+        let mut wave = Wave { aovs: self.settings.aovs, ..wave };
+        wave.total_shadow_rays = self.settings.shadow_rays;
+
+        let dispatch = |commands: &mut Commands,
+                        pipeline: &Pipeline,
+                        sets: &[&DescriptorSet],
+                        wave: &Wave,
+                        invocations: u32| {
+            commands.dispatch(pipeline, sets, bytemuck::bytes_of(wave), invocations);
+        };
+        dispatch(commands, &self.camera, &[scene, wave_set], &wave, paths);
+        for vertex in 0..self.settings.depth {
+            wave.vertex = vertex;
+            let trace = if vertex == 0 { &self.trace } else { &self.trace_bounce };
+            trace.record(commands, &[scene, wave_set, film], &wave);
+            let mut first = 0;
+            loop {
+                wave.first_shadow_ray = first;
+                wave.shadow_ray_count =
+                    (self.settings.shadow_rays - first).min(SHADOW_RAYS_PER_GROUP);
+                if wave.shadow_ray_count > 0 {
+                    dispatch(commands, &self.sample, &[scene, wave_set], &wave, paths);
+                    self.shadow.record(commands, &[scene, wave_set, film], &wave);
+                }
+                dispatch(commands, &self.gather, &[scene, wave_set], &wave, paths);
+                first += wave.shadow_ray_count;
+                if first >= self.settings.shadow_rays {
+                    break;
+                }
+            }
+            if vertex == 0 && wave.aovs & FEATURES != 0 {
+                dispatch(
+                    commands,
+                    &self.features,
+                    &[scene, wave_set, film],
+                    &wave,
+                    wave.pixel_count,
+                );
+            }
+            if vertex + 1 < self.settings.depth {
+                dispatch(commands, &self.bounce, &[scene, wave_set], &wave, paths);
+            }
+        }
+        dispatch(commands, &self.accumulate, &[scene, wave_set, film], &wave, wave.pixel_count);
+    }
+
+    /// Runs every pass that a render will use once over nothing, which makes drivers that compile
+    /// late compile now. Returns milliseconds by pass.
+    ///
+    /// # Errors
+    /// [`crate::Error::Vulkan`] if a call fails.
+    pub fn warm_up(&self, device: &Arc<Device>, sets: &Sets<'_>) -> Result<PassTimes> {
+        let Sets { scene, wave, film } = *sets;
+        let mut times = PassTimes::new();
+        let mut run = |name: &str, record: &dyn Fn(&mut Commands)| -> Result<()> {
+            let start = Instant::now();
+            let mut commands = Commands::begin(device)?;
+            record(&mut commands);
+            commands.submit_and_wait()?;
+            times.insert(name.to_owned(), start.elapsed().as_secs_f64() * 1e3);
+            Ok(())
+        };
+        let nothing = Wave::default();
+        let push = bytemuck::bytes_of(&nothing);
+        let all = [scene, wave, film];
+        run("camera", &|commands| commands.dispatch(&self.camera, &all[..2], push, 1))?;
+        run("trace", &|commands| self.trace.record(commands, &all, &nothing))?;
+        if self.settings.shadow_rays > 0 {
+            run("sample", &|commands| commands.dispatch(&self.sample, &all[..2], push, 1))?;
+            run("shadow", &|commands| self.shadow.record(commands, &all, &nothing))?;
+        }
+        run("gather", &|commands| commands.dispatch(&self.gather, &all[..2], push, 1))?;
+        if self.settings.depth > 1 {
+            run("bounce", &|commands| commands.dispatch(&self.bounce, &all[..2], push, 1))?;
+            run("trace (bounce)", &|commands| self.trace_bounce.record(commands, &all, &nothing))?;
+        }
+        if self.settings.aovs & FEATURES != 0 {
+            run("features", &|commands| commands.dispatch(&self.features, &all, push, 1))?;
+        }
+        run("accumulate", &|commands| commands.dispatch(&self.accumulate, &all, push, 1))?;
+        Ok(times)
+    }
+}

@@ -2,6 +2,9 @@
 #![allow(dead_code, reason = "every test binary uses a part of this")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
+pub mod scenes;
+pub mod statistics;
+
 use std::{
     collections::BTreeMap,
     sync::{Arc, OnceLock},

@@ -1,0 +1,63 @@
+// Adds the finished paths of the wave to the film, one invocation per pixel, sample after sample, so
+// that the sums do not depend on how samples are grouped into waves.
+#version 460
+
+#define NEEDS_PARAMETERS
+#define NEEDS_WAVE
+#define NEEDS_PATHS
+#define NEEDS_FILM
+#define NEEDS_FILM_AOVS
+#include "layout.glsl"
+#include "wave.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+void main() {
+    uint pixel = gl_GlobalInvocationID.x;
+    PathIndex index = wave_pixel(wave.first_pixel + pixel);
+    if (pixel >= wave.pixel_count || !index.inside) {
+        return;
+    }
+    vec3 sum = film_sum[index.film_index];
+    vec3 compensation = film_compensation[index.film_index];
+    vec3 squares = film_squares[index.film_index];
+    uint bounce_rays = 0u;
+    uint dropped = 0u;
+    uvec2 shadow_rays = uvec2(0u);
+    for (uint i = 0u; i < wave.sample_count; ++i) {
+        PathState state = paths[i * wave.pixel_count + pixel];
+        bounce_rays += state.rays_traced - 1u;
+        shadow_rays += uvec2(state.shadow_rays_visible, state.shadow_rays_traced);
+        vec3 radiance = state.radiance;
+        // A value that is not finite would spoil its pixel for good.
+        if (any(isnan(radiance)) || any(isinf(radiance))) {
+            dropped += 1u;
+            continue;
+        }
+        // Knuth's two-sum: `rest` is exactly what the rounding of `total` lost.
+        precise vec3 total = sum + radiance;
+        precise vec3 added = total - sum;
+        precise vec3 rest = (sum - (total - added)) + (radiance - added);
+        precise vec3 next_compensation = compensation + rest;
+        sum = total;
+        compensation = next_compensation;
+        squares += radiance * radiance;
+    }
+    film_sum[index.film_index] = sum;
+    film_compensation[index.film_index] = compensation;
+    film_squares[index.film_index] = squares;
+    if ((wave.aovs & AOV_VISIBLE) != 0u) {
+        film_visible[index.film_index] += shadow_rays;
+    }
+    atomicAdd(counters.camera_rays, wave.sample_count);
+    if (bounce_rays > 0u) {
+        atomicAdd(counters.bounce_rays, bounce_rays);
+    }
+    if (shadow_rays.y > 0u) {
+        atomicAdd(counters.shadow_rays_visible, shadow_rays.x);
+        atomicAdd(counters.shadow_rays_traced, shadow_rays.y);
+    }
+    if (dropped > 0u) {
+        atomicAdd(counters.dropped_samples, dropped);
+    }
+}

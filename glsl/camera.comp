@@ -1,0 +1,62 @@
+// Starts the paths of a wave: one camera ray each, with filter importance sampling over the pixel
+// and, for a thin lens, over the lens.
+#version 460
+
+#define NEEDS_PARAMETERS
+#define NEEDS_WAVE
+#define NEEDS_RAYS
+#define WRITES_RAYS
+#define NEEDS_PATHS
+#define WRITES_PATHS
+#include "layout.glsl"
+#include "frame.glsl"
+#include "random.glsl"
+#include "wave.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+const uint FILTER_GAUSSIAN = 1u;
+// Gaussian of standard deviation half a pixel, cut off at one and a half.
+const float FILTER_SIGMA = 0.5;
+const float FILTER_RADIUS = 1.5;
+
+// Offset from the pixel's centre, in pixels, with the density of the reconstruction filter.
+vec2 sample_filter(vec2 u) {
+    if (parameters.film_filter != FILTER_GAUSSIAN) {
+        return u - 0.5;
+    }
+    const float outside =
+        exp(-FILTER_RADIUS * FILTER_RADIUS / (2.0 * FILTER_SIGMA * FILTER_SIGMA));
+    float radius = FILTER_SIGMA * sqrt(max(0.0, -2.0 * log(1.0 - u.x * (1.0 - outside))));
+    vec2 azimuth = sin_cos_pi(2.0 * u.y);
+    return radius * azimuth.yx;
+}
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    if (path >= wave_path_count()) {
+        return;
+    }
+    PathIndex index = wave_path(path);
+    vec2 position = vec2(index.crop_pixel + uvec2(parameters.crop_x, parameters.crop_y)) + 0.5
+        + sample_filter(
+            random_2d(index.pixel, index.sample_index, DIMENSION_FILTER, wave.seed));
+
+    vec2 film_size = vec2(parameters.film_width, parameters.film_height);
+    vec2 plane = (2.0 * position - film_size) / film_size.y * parameters.camera_tan_half_fov;
+    vec3 direction = parameters.camera_forward + plane.x * parameters.camera_right
+        - plane.y * parameters.camera_up;
+    vec3 origin = parameters.camera_position;
+    if (parameters.camera_aperture_radius > 0.0) {
+        vec2 u = random_2d(index.pixel, index.sample_index, DIMENSION_LENS, wave.seed);
+        vec2 azimuth = sin_cos_pi(2.0 * u.y);
+        vec2 lens = parameters.camera_aperture_radius * sqrt(u.x) * azimuth.yx;
+        vec3 shift = lens.x * parameters.camera_right + lens.y * parameters.camera_up;
+        // Every lens point sees the same point of the plane in focus.
+        direction = parameters.camera_focus_distance * direction - shift;
+        origin += shift;
+    }
+
+    rays[path] = Ray(origin, index.inside ? 1u : 0u, normalize(direction), 0u);
+    paths[path] = PathState(vec3(1.0), vec3(0.0), 0u, 0u, index.inside ? 1u : 0u);
+}

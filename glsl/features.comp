@@ -1,0 +1,46 @@
+// Adds albedo, shading normal and position of the camera rays' hits to the film, where asked for.
+#version 460
+
+#define NEEDS_PARAMETERS
+#define NEEDS_WAVE
+#define NEEDS_RAYS
+#define NEEDS_HITS
+#define NEEDS_MATERIALS
+#define NEEDS_FILM_AOVS
+#include "layout.glsl"
+#include "frame.glsl"
+#include "wave.glsl"
+#include "brdf.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+void main() {
+    uint pixel = gl_GlobalInvocationID.x;
+    PathIndex index = wave_pixel(wave.first_pixel + pixel);
+    if (pixel >= wave.pixel_count || !index.inside) {
+        return;
+    }
+    vec3 albedo = vec3(0.0);
+    vec3 normal = vec3(0.0);
+    vec3 position = vec3(0.0);
+    for (uint i = 0u; i < wave.sample_count; ++i) {
+        uint path = i * wave.pixel_count + pixel;
+        Hit hit = hits[path];
+        if (hit.material == NO_MATERIAL) {
+            continue;
+        }
+        Frame frame = frame_from_normal(hit.shading_normal);
+        albedo += brdf_albedo(materials[hit.material], to_local(frame, -rays[path].direction));
+        normal += hit.shading_normal;
+        position += hit.position;
+    }
+    if ((wave.aovs & AOV_ALBEDO) != 0u) {
+        film_albedo[index.film_index] += albedo;
+    }
+    if ((wave.aovs & AOV_NORMAL) != 0u) {
+        film_normal[index.film_index] += normal;
+    }
+    if ((wave.aovs & AOV_POSITION) != 0u) {
+        film_position[index.film_index] += position;
+    }
+}

@@ -1,0 +1,53 @@
+// Adds what the visible shadow rays bring to every path of the wave; at the first vertex also the
+// environment that the camera sees directly.
+#version 460
+
+#define NEEDS_PARAMETERS
+#define NEEDS_WAVE
+#define NEEDS_RAYS
+#define NEEDS_HITS
+#define NEEDS_SHADOW_RAYS
+#define NEEDS_VISIBILITY
+#define NEEDS_PATHS
+#define WRITES_PATHS
+#define NEEDS_ENVIRONMENT
+#include "layout.glsl"
+#include "wave.glsl"
+#include "environment.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    uint path_count = wave_path_count();
+    if (path >= path_count) {
+        return;
+    }
+    if (hits[path].material == NO_MATERIAL) {
+        // Later vertices sample the environment already where they are; a bounce ray that escapes
+        // would count it twice.
+        if (wave.vertex == 0u && wave.first_shadow_ray == 0u && rays[path].is_active != 0u) {
+            paths[path].radiance += environment_radiance(rays[path].direction);
+        }
+        return;
+    }
+    vec3 sum = vec3(0.0);
+    uint traced = 0u;
+    uint visible = 0u;
+    for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
+        uint ray = i * path_count + path;
+        vec3 contribution = shadow_rays[ray].contribution;
+        // The same test as in shadow.comp: what brings nothing is not traced.
+        bool is_traced = any(notEqual(contribution, vec3(0.0)));
+        traced += is_traced ? 1u : 0u;
+        if (is_traced && visibility[ray] != 0u) {
+            visible += 1u;
+            sum += contribution;
+        }
+    }
+    PathState state = paths[path];
+    state.radiance += state.throughput * (sum / float(max(wave.total_shadow_rays, 1u)));
+    state.shadow_rays_traced += traced;
+    state.shadow_rays_visible += visible;
+    paths[path] = state;
+}

@@ -1,0 +1,519 @@
+//! `fenestra render`: a scene file to a finished image.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::{Duration, Instant},
+};
+
+use super::{
+    options::{parse_crop, parse_duration, parse_size},
+    progress::{Progress, Standing},
+};
+use crate::{
+    error::{Error, Result},
+    film::{
+        Aov, Checkpoint, Metadata, SampleRange, Statistics, Sums, checkpoint::checkpoint_path,
+        png::write_preview,
+    },
+    gpu::Device,
+    renderer::{Renderer, Settings, Window},
+    sampler::{Parameters, Sampler},
+    scene::Scene,
+};
+
+/// Samples per pixel where no stop rule is given.
+const DEFAULT_SPP: u32 = 64;
+/// Passes are grouped so that the loop looks around about this often.
+const LOOK_AROUND: Duration = Duration::from_millis(250);
+/// How often the error is estimated, which needs the film on the host.
+const ERROR_INTERVAL: Duration = Duration::from_secs(1);
+/// Film size and samples of `--quick`.
+const QUICK_WIDTH: u32 = 240;
+const QUICK_SPP: u32 = 16;
+
+/// Arguments of `render`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Scene file (.toml).
+    pub scene: PathBuf,
+    /// Image to write; named after the scene in the working folder if absent.
+    #[arg(short, long, value_name = "FILE.exr", visible_alias = "outfile")]
+    pub output: Option<PathBuf>,
+    /// How directions are chosen at a hit.
+    #[arg(long, value_enum, default_value = "mis")]
+    pub sampler: Sampler,
+    /// Stop after this many camera paths per pixel (64 if no stop rule is given).
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub spp: Option<u32>,
+    /// Stop after this much wall time of passes: 500ms, 30s, 5m, 1h.
+    #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
+    pub time: Option<Duration>,
+    /// Stop when the mean relative standard error is below this; stopping by the data is slightly
+    /// biased.
+    #[arg(long, value_name = "E")]
+    pub error: Option<f64>,
+    /// Directions traced at every vertex of every camera path.
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    pub shadow_rays: u32,
+    /// Path vertices at which environment light is gathered; 1 is direct light.
+    #[arg(long, value_name = "D", default_value_t = 1)]
+    pub depth: u32,
+    /// Path vertex from which russian roulette may end a path.
+    #[arg(long, value_name = "D", default_value_t = 8)]
+    pub roulette_depth: u32,
+    /// Film size in pixels instead of the scene's.
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub size: Option<[u32; 2]>,
+    /// Render only pixels x0 ≤ x < x1, y0 ≤ y < y1.
+    #[arg(long, value_name = "x0,y0,x1,y1", value_parser = parse_crop)]
+    pub crop: Option<Window>,
+    /// Seed of the random numbers.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u32,
+    /// Index of the first sample of every pixel, to render disjoint parts for `merge`.
+    #[arg(long, value_name = "K", default_value_t = 0)]
+    pub sample_offset: u32,
+    /// Continue from the checkpoint of the output, if there is one.
+    #[arg(long)]
+    pub resume: bool,
+    /// Write a checkpoint this often and at the end.
+    #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
+    pub checkpoint_interval: Option<Duration>,
+    /// Device to use, by index or part of its name; see `fenestra devices`.
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
+    /// Run with the Vulkan validation layers; any message fails the command.
+    #[arg(long)]
+    pub validate: bool,
+    /// Write statistics as JSON.
+    #[arg(long, value_name = "FILE.json")]
+    pub stats: Option<PathBuf>,
+    /// Write a PNG preview beside the image.
+    #[arg(long)]
+    pub png: bool,
+    /// Exposure of the preview, stops.
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub exposure: f32,
+    /// Extra layers of the image.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
+    pub aov: Vec<Aov>,
+    /// Sampler parameter, may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// A small, fast version: film at most 240 pixels wide, 16 samples.
+    #[arg(long)]
+    pub quick: bool,
+    /// No progress and no messages but errors.
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// Which rule ended a render.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum StopReason {
+    Spp,
+    Time,
+    Error,
+    Interrupt,
+}
+
+impl StopReason {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Spp => "spp",
+            Self::Time => "time",
+            Self::Error => "error",
+            Self::Interrupt => "interrupt",
+        }
+    }
+
+    fn explain(self) -> &'static str {
+        match self {
+            Self::Spp => "stopped by --spp",
+            Self::Time => "stopped by --time",
+            Self::Error => "stopped by --error (stopping by the data is slightly biased)",
+            Self::Interrupt => "interrupted",
+        }
+    }
+}
+
+/// Renders a scene.
+///
+/// # Errors
+/// Wrong options, an unusable scene, no device, a failing device or disk; [`Error::Interrupted`]
+/// after Ctrl-C, when what there is has been written.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let interrupted = listen_for_interrupt();
+    let settings = settings(arguments)?;
+    let start = Instant::now();
+    let mut scene = Scene::load(&arguments.scene)?;
+    let load_ms = start.elapsed().as_secs_f64() * 1e3;
+    for warning in &scene.warnings {
+        log::warn!("{warning}");
+    }
+    if let Some([width, height]) = arguments.size {
+        (scene.film.width, scene.film.height) = (width, height);
+    } else if arguments.quick && scene.film.width > QUICK_WIDTH {
+        let scaled =
+            u64::from(scene.film.height) * u64::from(QUICK_WIDTH) / u64::from(scene.film.width);
+        scene.film.height = u32::try_from(scaled).unwrap_or(1).max(1);
+        scene.film.width = QUICK_WIDTH;
+    }
+    let output =
+        arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.exr", scene.name)));
+
+    let device = Device::open(arguments.device.as_deref(), arguments.validate)?;
+    if !arguments.quiet {
+        let capabilities = device.capabilities();
+        eprintln!("device: {} ({})", capabilities.name, capabilities.driver);
+    }
+    let mut renderer = Renderer::new(&device, &scene, settings)?;
+    let mut job = Job::new(arguments, &scene, &device, output);
+    job.resume(&mut renderer)?;
+
+    let reason = job.render(&mut renderer, &interrupted)?;
+    device.save_pipeline_cache();
+    job.finish(&renderer, reason, load_ms)?;
+    if arguments.validate {
+        let messages = device.validation_messages();
+        if let Some(first) = messages.first() {
+            return Err(Error::Vulkan {
+                call: "validation".into(),
+                result: format!("{} messages, the first: {first}", messages.len()),
+            });
+        }
+    }
+    if reason == StopReason::Interrupt { Err(Error::Interrupted) } else { Ok(()) }
+}
+
+/// A flag that Ctrl-C raises; a second Ctrl-C ends the process at once.
+fn listen_for_interrupt() -> Arc<AtomicBool> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let raised = Arc::clone(&flag);
+    let listening = ctrlc::set_handler(move || {
+        if raised.swap(true, Ordering::SeqCst) {
+            std::process::exit(130);
+        }
+    });
+    if let Err(error) = listening {
+        log::warn!("Ctrl-C will end the program without writing the image: {error}");
+    }
+    flag
+}
+
+fn settings(arguments: &Arguments) -> Result<Settings> {
+    let mut parameters = Parameters::default();
+    for assignment in &arguments.set {
+        parameters.set(assignment)?;
+    }
+    if let Some(error) = arguments.error
+        && (error.is_nan() || error <= 0.0)
+    {
+        return Err(Error::usage(format!("--error {error}: expected a positive number")));
+    }
+    if !arguments.exposure.is_finite() {
+        return Err(Error::usage("--exposure: expected a finite number of stops"));
+    }
+    Ok(Settings {
+        sampler: arguments.sampler,
+        parameters,
+        shadow_rays: arguments.shadow_rays,
+        depth: arguments.depth,
+        seed: arguments.seed,
+        first_sample: arguments.sample_offset,
+        window: arguments.crop,
+        aovs: arguments.aov.clone(),
+        roulette_vertex: arguments.roulette_depth,
+    })
+}
+
+/// One render from its first pass to its files.
+struct Job<'a> {
+    arguments: &'a Arguments,
+    scene: &'a Scene,
+    output: PathBuf,
+    metadata: Metadata,
+    /// Wall time of the passes of earlier runs, seconds.
+    earlier_seconds: f64,
+    /// Wall time of the passes of this run.
+    elapsed: Duration,
+    relative_error: Option<f64>,
+}
+
+impl<'a> Job<'a> {
+    fn new(arguments: &'a Arguments, scene: &'a Scene, device: &Device, output: PathBuf) -> Self {
+        let capabilities = device.capabilities();
+        let parameters = {
+            let mut parameters = Parameters::default();
+            for assignment in &arguments.set {
+                // Checked in `settings` already.
+                let _ = parameters.set(assignment);
+            }
+            parameters.describe(arguments.sampler)
+        };
+        let metadata = Metadata {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            scene: scene.name.clone(),
+            scene_hash: scene.hash.clone(),
+            sampler: arguments.sampler.name().to_owned(),
+            sampler_parameters: parameters,
+            shadow_rays: arguments.shadow_rays,
+            depth: arguments.depth,
+            device: capabilities.name.clone(),
+            driver: capabilities.driver.clone(),
+            ..Metadata::default()
+        };
+        Self {
+            arguments,
+            scene,
+            output,
+            metadata,
+            earlier_seconds: 0.0,
+            elapsed: Duration::ZERO,
+            relative_error: None,
+        }
+    }
+
+    /// Takes up the checkpoint of the output where `--resume` asks for it and there is one.
+    fn resume(&mut self, renderer: &mut Renderer) -> Result<()> {
+        let path = checkpoint_path(&self.output);
+        if !self.arguments.resume {
+            return Ok(());
+        }
+        if !path.exists() {
+            log::warn!("--resume: there is no {}; starting from the beginning", path.display());
+            return Ok(());
+        }
+        let checkpoint = Checkpoint::read(&path)?;
+        let sums = renderer.sums()?;
+        checkpoint.check_resume(
+            &path,
+            &self.metadata,
+            &sums,
+            self.arguments.seed,
+            self.arguments.sample_offset,
+        )?;
+        renderer.restore(&checkpoint.sums)?;
+        self.earlier_seconds = checkpoint.metadata.seconds;
+        Ok(())
+    }
+
+    fn seconds(&self) -> f64 {
+        self.earlier_seconds + self.elapsed.as_secs_f64()
+    }
+
+    /// Target of `--spp`, or the default where no rule at all is given.
+    fn target_spp(&self) -> Option<u32> {
+        let none = self.arguments.time.is_none() && self.arguments.error.is_none();
+        let default = if self.arguments.quick { QUICK_SPP } else { DEFAULT_SPP };
+        self.arguments.spp.or_else(|| none.then_some(default))
+    }
+
+    /// Renders passes until a rule ends it.
+    fn render(&mut self, renderer: &mut Renderer, interrupted: &AtomicBool) -> Result<StopReason> {
+        let mut progress = Progress::new(self.scene.name.clone(), self.arguments.quiet);
+        let mut last_error = Instant::now();
+        let mut last_checkpoint = Instant::now();
+        let mut pass_samples = 1;
+        let reason = loop {
+            if let Some(reason) = self.stop_reason(renderer, interrupted) {
+                break reason;
+            }
+            let left = self
+                .target_spp()
+                .map_or(u32::MAX, |spp| spp.saturating_sub(renderer.sample_count()));
+            let samples = pass_samples.min(left);
+            let start = Instant::now();
+            renderer.render_pass(samples)?;
+            let took = start.elapsed();
+            self.elapsed += took;
+            pass_samples = next_pass_samples(samples, took, self.time_left());
+
+            if last_error.elapsed() > ERROR_INTERVAL || self.arguments.error.is_some() {
+                self.relative_error = Some(renderer.sums()?.relative_standard_error());
+                last_error = Instant::now();
+            }
+            if let Some(interval) = self.arguments.checkpoint_interval
+                && last_checkpoint.elapsed() >= interval
+            {
+                self.write_checkpoint(renderer, renderer.sums()?)?;
+                last_checkpoint = Instant::now();
+            }
+            progress.update(&self.standing(renderer));
+        };
+        let sums = renderer.sums()?;
+        self.relative_error = Some(sums.relative_standard_error());
+        progress.finish(&self.standing(renderer), reason.explain());
+        Ok(reason)
+    }
+
+    fn time_left(&self) -> Option<f64> {
+        self.arguments.time.map(|time| time.as_secs_f64() - self.seconds())
+    }
+
+    fn stop_reason(&self, renderer: &Renderer, interrupted: &AtomicBool) -> Option<StopReason> {
+        let samples = renderer.sample_count();
+        if interrupted.load(Ordering::SeqCst) && samples > 0 {
+            return Some(StopReason::Interrupt);
+        }
+        if self.target_spp().is_some_and(|spp| samples >= spp) {
+            return Some(StopReason::Spp);
+        }
+        if samples > 0 && self.time_left().is_some_and(|left| left <= 0.0) {
+            return Some(StopReason::Time);
+        }
+        let reached = |limit: f64| samples > 1 && self.relative_error.is_some_and(|e| e <= limit);
+        if self.arguments.error.is_some_and(reached) {
+            return Some(StopReason::Error);
+        }
+        None
+    }
+
+    fn standing(&self, renderer: &Renderer) -> Standing {
+        let totals = renderer.totals();
+        let rays = totals.camera_rays + totals.bounce_rays + totals.shadow_rays_traced;
+        let share = |done: f64, target: f64| (done / target).clamp(0.0, 1.0);
+        let by_spp =
+            self.target_spp().map(|spp| share(f64::from(renderer.sample_count()), f64::from(spp)));
+        let by_time = self.arguments.time.map(|time| share(self.seconds(), time.as_secs_f64()));
+        // The error falls with the square root of the work.
+        let by_error = self.arguments.error.zip(self.relative_error).map(|(target, error)| {
+            if error > 0.0 { share((target / error).powi(2), 1.0) } else { 0.0 }
+        });
+        let fraction = [by_spp, by_time, by_error].into_iter().flatten().fold(0.0, f64::max);
+        Standing {
+            fraction,
+            samples: renderer.sample_count(),
+            rays_per_second: rays as f64 / self.elapsed.as_secs_f64().max(1e-9),
+            relative_error: self.relative_error,
+        }
+    }
+
+    /// The metadata as of now.
+    fn metadata(&self, renderer: &Renderer) -> Metadata {
+        Metadata {
+            sample_ranges: vec![SampleRange {
+                seed: self.arguments.seed,
+                first: self.arguments.sample_offset,
+                count: renderer.sample_count(),
+            }],
+            seconds: self.seconds(),
+            gpu_seconds: renderer
+                .totals()
+                .gpu_ms
+                .iter()
+                .map(|(pass, ms)| (pass.clone(), ms * 1e-3))
+                .collect(),
+            ..self.metadata.clone()
+        }
+    }
+
+    fn write_checkpoint(&self, renderer: &Renderer, sums: Sums) -> Result<()> {
+        let checkpoint = Checkpoint { sums, metadata: self.metadata(renderer) };
+        checkpoint.write(&checkpoint_path(&self.output))
+    }
+
+    /// Writes every file.
+    fn finish(&self, renderer: &Renderer, reason: StopReason, load_ms: f64) -> Result<()> {
+        let sums = renderer.sums()?;
+        let totals = renderer.totals();
+        if totals.dropped_samples > 0 {
+            log::warn!(
+                "{} samples were left out because their radiance was not finite",
+                totals.dropped_samples
+            );
+        }
+        let metadata = self.metadata(renderer);
+        let mut image = sums.to_image(&self.arguments.aov);
+        metadata.store(&mut image);
+        image.write_exr(&self.output)?;
+        let mut written = vec![self.output.clone()];
+        if self.arguments.png {
+            let path = self.output.with_extension("png");
+            write_preview(&path, &image.rgb(&self.output)?, self.arguments.exposure)?;
+            written.push(path);
+        }
+        if let Some(path) = &self.arguments.stats {
+            self.statistics(renderer, &metadata, reason, load_ms).write(path)?;
+            written.push(path.clone());
+        }
+        if reason == StopReason::Interrupt || self.arguments.checkpoint_interval.is_some() {
+            self.write_checkpoint(renderer, sums)?;
+            written.push(checkpoint_path(&self.output));
+        }
+        if !self.arguments.quiet {
+            let names: Vec<_> = written.iter().map(|path: &PathBuf| display(path)).collect();
+            eprintln!("wrote {}", names.join(", "));
+        }
+        Ok(())
+    }
+
+    fn statistics(
+        &self,
+        renderer: &Renderer,
+        metadata: &Metadata,
+        reason: StopReason,
+        load_ms: f64,
+    ) -> Statistics {
+        let totals = renderer.totals();
+        let window = self.arguments.crop.unwrap_or(Window {
+            x: 0,
+            y: 0,
+            width: self.scene.film.width,
+            height: self.scene.film.height,
+        });
+        let mut host_ms = renderer.host_ms().clone();
+        host_ms.insert("load".into(), load_ms);
+        Statistics {
+            version: metadata.version.clone(),
+            scene: metadata.scene.clone(),
+            scene_hash: metadata.scene_hash.clone(),
+            triangles: self.scene.geometry.triangles.len() as u64,
+            width: window.width,
+            height: window.height,
+            device: metadata.device.clone(),
+            driver: metadata.driver.clone(),
+            sampler: metadata.sampler.clone(),
+            sampler_parameters: metadata.sampler_parameters.clone(),
+            shadow_rays_per_vertex: metadata.shadow_rays,
+            depth: metadata.depth,
+            sample_ranges: metadata.sample_ranges.clone(),
+            samples_per_pixel: renderer.sample_count(),
+            stop_reason: reason.name().to_owned(),
+            relative_standard_error: self.relative_error.filter(|error| error.is_finite()),
+            seconds: self.seconds(),
+            rays: [
+                ("camera".to_owned(), totals.camera_rays),
+                ("shadow".to_owned(), totals.shadow_rays_traced),
+                ("bounce".to_owned(), totals.bounce_rays),
+            ]
+            .into(),
+            visible_share: (totals.shadow_rays_traced > 0)
+                .then(|| totals.shadow_rays_visible as f64 / totals.shadow_rays_traced as f64),
+            dropped_samples: totals.dropped_samples,
+            gpu_ms: totals.gpu_ms.clone(),
+            host_ms,
+            pipeline_compile_ms: renderer.compile_ms().clone(),
+            buffer_bytes: renderer.buffer_bytes(),
+            ..Statistics::default()
+        }
+    }
+}
+
+fn display(path: &Path) -> String {
+    path.display().to_string()
+}
+
+/// Samples of the next pass: about [`LOOK_AROUND`] long, and not beyond the time that is left.
+fn next_pass_samples(samples: u32, took: Duration, time_left: Option<f64>) -> u32 {
+    let per_sample = took.as_secs_f64().max(1e-6) / f64::from(samples);
+    let wanted = time_left
+        .map_or(LOOK_AROUND.as_secs_f64(), |left| left.clamp(0.0, LOOK_AROUND.as_secs_f64()));
+    let next = (wanted / per_sample).floor().clamp(1.0, f64::from(samples) * 2.0);
+    // Clamped to a small positive number above.
+    next as u32
+}

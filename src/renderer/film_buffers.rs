@@ -1,0 +1,177 @@
+//! The film on the device.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use bytemuck::Zeroable;
+
+use super::{BLOCK_PIXELS, Window};
+use crate::{
+    error::Result,
+    film::Sums,
+    gpu::{
+        Buffer, Commands, DescriptorSet, Device,
+        constants::{
+            AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, AOV_VISIBLE, BINDING_COUNTERS,
+            BINDING_FILM_ALBEDO, BINDING_FILM_COMPENSATION, BINDING_FILM_NORMAL,
+            BINDING_FILM_POSITION, BINDING_FILM_SQUARES, BINDING_FILM_SUM, BINDING_FILM_VISIBLE,
+            SET_FILM,
+        },
+        layout::Counters,
+    },
+};
+
+/// Edge of a block of the film order, pixels.
+const BLOCK_EDGE: u32 = 8;
+
+/// Sums per pixel of the window, row by row.
+pub struct FilmBuffers {
+    set: DescriptorSet,
+    sum: Buffer,
+    compensation: Buffer,
+    squares: Buffer,
+    counters: Buffer,
+    albedo: Buffer,
+    normal: Buffer,
+    position: Buffer,
+    visible: Buffer,
+    aovs: u32,
+    window: Window,
+}
+
+impl FilmBuffers {
+    /// An empty film of the window, with the extra layers whose bits are in `aovs`.
+    pub fn new(device: &Arc<Device>, window: Window, aovs: u32) -> Result<Self> {
+        let pixels = u64::from(window.width) * u64::from(window.height);
+        let triple = |name: &str, wanted: bool| {
+            Buffer::zeroed(device, name, if wanted { 12 * pixels } else { 0 })
+        };
+        let sum = triple("film sum", true)?;
+        let compensation = triple("film compensation", true)?;
+        let squares = triple("film squares", true)?;
+        let counters = Buffer::from_slice(device, "counters", &[Counters::zeroed()])?;
+        let albedo = triple("film albedo", aovs & AOV_ALBEDO != 0)?;
+        let normal = triple("film normal", aovs & AOV_NORMAL != 0)?;
+        let position = triple("film position", aovs & AOV_POSITION != 0)?;
+        let visible_bytes = if aovs & AOV_VISIBLE == 0 { 0 } else { 8 * pixels };
+        let visible = Buffer::zeroed(device, "film visible", visible_bytes)?;
+        let set = DescriptorSet::new(
+            device,
+            SET_FILM,
+            &[
+                (BINDING_FILM_SUM, &sum),
+                (BINDING_FILM_COMPENSATION, &compensation),
+                (BINDING_FILM_SQUARES, &squares),
+                (BINDING_COUNTERS, &counters),
+                (BINDING_FILM_ALBEDO, &albedo),
+                (BINDING_FILM_NORMAL, &normal),
+                (BINDING_FILM_POSITION, &position),
+                (BINDING_FILM_VISIBLE, &visible),
+            ],
+        )?;
+        Ok(Self {
+            set,
+            sum,
+            compensation,
+            squares,
+            counters,
+            albedo,
+            normal,
+            position,
+            visible,
+            aovs,
+            window,
+        })
+    }
+
+    /// The film set.
+    pub fn set(&self) -> &DescriptorSet {
+        &self.set
+    }
+
+    /// Pixels in film order, blocks that reach beyond the window counted whole.
+    pub fn padded_pixels(&self) -> u32 {
+        let blocks =
+            self.window.width.div_ceil(BLOCK_EDGE) * self.window.height.div_ceil(BLOCK_EDGE);
+        blocks * BLOCK_PIXELS
+    }
+
+    /// Sets everything to zero.
+    pub fn clear(&self, device: &Arc<Device>) -> Result<()> {
+        let mut commands = Commands::begin(device)?;
+        for buffer in self.buffers() {
+            commands.fill(buffer, 0);
+        }
+        commands.submit_and_wait()?;
+        Ok(())
+    }
+
+    /// Reads the counters and sets them to zero.
+    pub fn take_counters(&self) -> Result<Counters> {
+        let counters = self.counters.download::<Counters>(1)?;
+        self.counters.upload(bytemuck::bytes_of(&Counters::zeroed()))?;
+        Ok(counters.first().copied().unwrap_or_default())
+    }
+
+    /// Everything but the sample count and the film's size, which the renderer knows.
+    pub fn download(&self) -> Result<Sums> {
+        let pixels = self.window.width as usize * self.window.height as usize;
+        let layer = |buffer: &Buffer, bit: u32| {
+            buffer.download::<[f32; 3]>(if self.aovs & bit == 0 { 0 } else { pixels })
+        };
+        Ok(Sums {
+            width: self.window.width,
+            height: self.window.height,
+            origin: [self.window.x, self.window.y],
+            sum: self.sum.download(pixels)?,
+            compensation: self.compensation.download(pixels)?,
+            squares: self.squares.download(pixels)?,
+            albedo: layer(&self.albedo, AOV_ALBEDO)?,
+            normal: layer(&self.normal, AOV_NORMAL)?,
+            position: layer(&self.position, AOV_POSITION)?,
+            visible: self.visible.download(if self.aovs & AOV_VISIBLE == 0 {
+                0
+            } else {
+                pixels
+            })?,
+            ..Sums::default()
+        })
+    }
+
+    /// Replaces the film's content by sums of the same window.
+    pub fn upload(&self, sums: &Sums) -> Result<()> {
+        self.sum.upload(bytemuck::cast_slice(&sums.sum))?;
+        self.compensation.upload(bytemuck::cast_slice(&sums.compensation))?;
+        self.squares.upload(bytemuck::cast_slice(&sums.squares))?;
+        for (buffer, bit, layer) in [
+            (&self.albedo, AOV_ALBEDO, &sums.albedo),
+            (&self.normal, AOV_NORMAL, &sums.normal),
+            (&self.position, AOV_POSITION, &sums.position),
+        ] {
+            if self.aovs & bit != 0 {
+                buffer.upload(bytemuck::cast_slice(layer))?;
+            }
+        }
+        if self.aovs & AOV_VISIBLE != 0 {
+            self.visible.upload(bytemuck::cast_slice(&sums.visible))?;
+        }
+        Ok(())
+    }
+
+    /// Bytes by buffer name.
+    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+        self.buffers().into_iter().map(|buffer| (buffer.name().to_owned(), buffer.size())).collect()
+    }
+
+    fn buffers(&self) -> [&Buffer; 8] {
+        [
+            &self.sum,
+            &self.compensation,
+            &self.squares,
+            &self.counters,
+            &self.albedo,
+            &self.normal,
+            &self.position,
+            &self.visible,
+        ]
+    }
+}

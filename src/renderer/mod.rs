@@ -1,0 +1,379 @@
+//! Progressive rendering of a scene on a device: scene → buffers → waves of paths → film sums.
+
+mod film_buffers;
+mod scene_buffers;
+mod wave_buffers;
+
+use std::{collections::BTreeMap, sync::Arc, time::Instant};
+
+use crate::{
+    error::{Error, Result},
+    film::{Aov, Sums},
+    gpu::{
+        Commands, Device, PassTimes,
+        constants::{AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, AOV_VISIBLE},
+        layout::Wave,
+    },
+    pass::{PassSettings, Passes, SHADOW_RAYS_PER_GROUP, Sets},
+    sampler::{Parameters, Sampler},
+    scene::Scene,
+};
+use film_buffers::FilmBuffers;
+pub use scene_buffers::SceneBuffers;
+use wave_buffers::WaveBuffers;
+
+/// Pixels of a block of the film order; waves hold whole blocks.
+const BLOCK_PIXELS: u32 = 64;
+
+/// Dispatches are steered between these, milliseconds: short enough for the watchdog of a desktop
+/// GPU, long enough for the submission not to count.
+const SHORT_DISPATCH_MS: f64 = 50.0;
+const LONG_DISPATCH_MS: f64 = 100.0;
+
+/// Part of the film that is rendered, in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// Left edge.
+    pub x: u32,
+    /// Upper edge.
+    pub y: u32,
+    /// Width, at least 1.
+    pub width: u32,
+    /// Height, at least 1.
+    pub height: u32,
+}
+
+/// What a render does with a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// How directions are chosen.
+    pub sampler: Sampler,
+    /// Parameters of the sampler.
+    pub parameters: Parameters,
+    /// Directions traced at every vertex of every camera path.
+    pub shadow_rays: u32,
+    /// Path vertices at which environment light is gathered; 1 is direct light.
+    pub depth: u32,
+    /// Seed of the random numbers.
+    pub seed: u32,
+    /// Index of the first sample of every pixel.
+    pub first_sample: u32,
+    /// Part of the film; the whole film if absent.
+    pub window: Option<Window>,
+    /// Extra layers.
+    pub aovs: Vec<Aov>,
+    /// First vertex at which russian roulette may end a path, where `depth` reaches it.
+    pub roulette_vertex: u32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            sampler: Sampler::Mis,
+            parameters: Parameters::default(),
+            shadow_rays: 5,
+            depth: 1,
+            seed: 0,
+            first_sample: 0,
+            window: None,
+            aovs: Vec::new(),
+            roulette_vertex: 8,
+        }
+    }
+}
+
+/// Totals since the start of a renderer.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Totals {
+    /// Camera rays.
+    pub camera_rays: u64,
+    /// Bounce rays.
+    pub bounce_rays: u64,
+    /// Shadow rays traced.
+    pub shadow_rays_traced: u64,
+    /// Shadow rays that reached the environment.
+    pub shadow_rays_visible: u64,
+    /// Samples left out because their radiance was not finite.
+    pub dropped_samples: u64,
+    /// Rays given up after too many steps of traversal.
+    pub traversal_overruns: u64,
+    /// Device milliseconds by pass.
+    pub gpu_ms: PassTimes,
+}
+
+/// A scene on a device, and the film it is rendered to.
+pub struct Renderer {
+    device: Arc<Device>,
+    scene: Arc<SceneBuffers>,
+    settings: Settings,
+    window: Window,
+    film_size: [u32; 2],
+    passes: Passes,
+    waves: WaveBuffers,
+    film: FilmBuffers,
+    /// Paths of the next wave.
+    wave_paths: u32,
+    sample_count: u32,
+    totals: Totals,
+    compile_ms: PassTimes,
+}
+
+impl Renderer {
+    /// Uploads `scene` and prepares to render it.
+    ///
+    /// # Errors
+    /// A limit of the device, memory, or options out of range.
+    pub fn new(device: &Arc<Device>, scene: &Scene, settings: Settings) -> Result<Self> {
+        let window = window_of(&settings, scene);
+        check(&settings, window, [scene.film.width, scene.film.height])?;
+        let buffers = Arc::new(SceneBuffers::new(device, scene, window)?);
+        Self::with_scene_buffers(device, buffers, scene, settings)
+    }
+
+    /// As [`Renderer::new`], sharing buffers that were made from the same scene and window.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    ///
+    /// # Panics
+    /// If the buffers were made for another window.
+    pub fn with_scene_buffers(
+        device: &Arc<Device>,
+        buffers: Arc<SceneBuffers>,
+        scene: &Scene,
+        settings: Settings,
+    ) -> Result<Self> {
+        let film_size = [scene.film.width, scene.film.height];
+        let window = window_of(&settings, scene);
+        check(&settings, window, film_size)?;
+        assert_eq!(window, buffers.window(), "buffers belong to one window");
+
+        let start = Instant::now();
+        let aovs = settings.aovs.iter().fold(0, |bits, aov| {
+            bits | match aov {
+                Aov::Albedo => AOV_ALBEDO,
+                Aov::Normal => AOV_NORMAL,
+                Aov::Position => AOV_POSITION,
+                Aov::Visible => AOV_VISIBLE,
+                Aov::Variance | Aov::SampleCount => 0,
+            }
+        });
+        let passes = Passes::new(
+            device,
+            buffers.geometry(),
+            PassSettings {
+                sampler: settings.sampler,
+                parameters: settings.parameters,
+                shadow_rays: settings.shadow_rays,
+                depth: settings.depth,
+                aovs,
+                roulette_vertex: settings.roulette_vertex,
+            },
+        )?;
+        let create_ms = start.elapsed().as_secs_f64() * 1e3;
+        let film = FilmBuffers::new(device, window, aovs)?;
+        let rays = settings.shadow_rays.clamp(1, SHADOW_RAYS_PER_GROUP);
+        let waves = WaveBuffers::new(device, film.padded_pixels(), rays)?;
+        let mut renderer = Self {
+            device: Arc::clone(device),
+            scene: buffers,
+            settings,
+            window,
+            film_size,
+            passes,
+            wave_paths: waves.first_wave_paths(),
+            waves,
+            film,
+            sample_count: 0,
+            totals: Totals::default(),
+            compile_ms: PassTimes::new(),
+        };
+        renderer.compile_ms = renderer.passes.warm_up(device, &renderer.sets())?;
+        renderer.compile_ms.insert("pipelines".into(), create_ms);
+        Ok(renderer)
+    }
+
+    fn sets(&self) -> Sets<'_> {
+        Sets { scene: self.scene.set(), wave: self.waves.set(), film: self.film.set() }
+    }
+
+    /// Adds `samples` samples to every pixel.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if the device fails.
+    pub fn render_pass(&mut self, samples: u32) -> Result<()> {
+        let mut left = samples;
+        while left > 0 {
+            let together = (self.wave_paths / self.film.padded_pixels()).clamp(1, left);
+            self.render_samples(together)?;
+            left -= together;
+        }
+        Ok(())
+    }
+
+    /// One sweep over the film with `samples` samples per pixel.
+    fn render_samples(&mut self, samples: u32) -> Result<()> {
+        let padded = self.film.padded_pixels();
+        let mut first_pixel = 0;
+        while first_pixel < padded {
+            let pixels = (self.wave_paths / samples / BLOCK_PIXELS).max(1) * BLOCK_PIXELS;
+            let wave = Wave {
+                first_pixel,
+                pixel_count: pixels.min(padded - first_pixel),
+                first_sample: self.settings.first_sample.wrapping_add(self.sample_count),
+                sample_count: samples,
+                seed: self.settings.seed,
+                ..Wave::default()
+            };
+            let mut commands =
+                Commands::begin_timed(&self.device, self.passes.dispatches_per_wave())?;
+            self.passes.record(&mut commands, &self.sets(), wave);
+            let times = commands.submit_and_wait()?;
+            self.steer(&times, wave);
+            for (pass, ms) in times {
+                *self.totals.gpu_ms.entry(pass).or_default() += ms;
+            }
+            first_pixel += wave.pixel_count;
+        }
+        self.sample_count += samples;
+        let counters = self.film.take_counters()?;
+        self.totals.camera_rays += u64::from(counters.camera_rays);
+        self.totals.bounce_rays += u64::from(counters.bounce_rays);
+        self.totals.shadow_rays_traced += u64::from(counters.shadow_rays_traced);
+        self.totals.shadow_rays_visible += u64::from(counters.shadow_rays_visible);
+        self.totals.dropped_samples += u64::from(counters.dropped_samples);
+        self.totals.traversal_overruns += u64::from(counters.traversal_overruns);
+        Ok(())
+    }
+
+    /// Sizes the next wave so that its longest pass stays between the two bounds. Times are per
+    /// pass name, summed over the vertices and groups of the wave, so this errs on the short side.
+    fn steer(&mut self, times: &PassTimes, wave: Wave) {
+        let longest = times.values().copied().fold(0.0, f64::max);
+        let paths = wave.pixel_count * wave.sample_count;
+        if longest > LONG_DISPATCH_MS {
+            let shrink = 0.75 * LONG_DISPATCH_MS / longest;
+            self.wave_paths = ((f64::from(paths) * shrink) as u32).max(BLOCK_PIXELS);
+        } else if longest < SHORT_DISPATCH_MS && paths >= self.wave_paths / 2 {
+            self.wave_paths = self.wave_paths.saturating_mul(2).min(self.waves.capacity());
+        }
+    }
+
+    /// Empties the film to render the same settings with another seed.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if the device fails.
+    pub fn restart(&mut self, seed: u32) -> Result<()> {
+        self.film.clear(&self.device)?;
+        self.settings.seed = seed;
+        self.sample_count = 0;
+        self.totals = Totals::default();
+        Ok(())
+    }
+
+    /// Samples per pixel in the film.
+    pub fn sample_count(&self) -> u32 {
+        self.sample_count
+    }
+
+    /// What has been done so far.
+    pub fn totals(&self) -> &Totals {
+        &self.totals
+    }
+
+    /// Milliseconds that the first use of each pass took, and the creation of all as `pipelines`.
+    pub fn compile_ms(&self) -> &PassTimes {
+        &self.compile_ms
+    }
+
+    /// Host milliseconds by stage of the preparation.
+    pub fn host_ms(&self) -> &BTreeMap<String, f64> {
+        self.scene.host_ms()
+    }
+
+    /// Device memory by buffer, bytes.
+    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+        let mut bytes = self.scene.buffer_bytes();
+        bytes.extend(self.waves.buffer_bytes());
+        bytes.extend(self.film.buffer_bytes());
+        bytes
+    }
+
+    /// Reads the film.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if the device fails.
+    pub fn sums(&self) -> Result<Sums> {
+        let mut sums = self.film.download()?;
+        sums.film_size = self.film_size;
+        sums.sample_count = self.sample_count;
+        Ok(sums)
+    }
+
+    /// Continues from sums that an earlier renderer with the same settings left.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if the window or the layers differ, [`Error::Vulkan`] if the device fails.
+    pub fn restore(&mut self, sums: &Sums) -> Result<()> {
+        if sums.film_size != self.film_size
+            || sums.origin != [self.window.x, self.window.y]
+            || [sums.width, sums.height] != [self.window.width, self.window.height]
+        {
+            return Err(Error::usage(format!(
+                "the checkpoint holds pixels {}x{} from {:?} of a film of {:?}, expected {}x{} from \
+                 {:?} of {:?}",
+                sums.width,
+                sums.height,
+                sums.origin,
+                sums.film_size,
+                self.window.width,
+                self.window.height,
+                [self.window.x, self.window.y],
+                self.film_size
+            )));
+        }
+        self.film.upload(sums)?;
+        self.sample_count = sums.sample_count;
+        Ok(())
+    }
+}
+
+/// The window of `settings`, or the whole film.
+pub fn window_of(settings: &Settings, scene: &Scene) -> Window {
+    settings.window.unwrap_or(Window {
+        x: 0,
+        y: 0,
+        width: scene.film.width,
+        height: scene.film.height,
+    })
+}
+
+/// Refuses settings that cannot be rendered, before anything is allocated.
+fn check(settings: &Settings, window: Window, film_size: [u32; 2]) -> Result<()> {
+    let end = |start: u32, length: u32| u64::from(start) + u64::from(length);
+    if window.width == 0
+        || window.height == 0
+        || end(window.x, window.width) > u64::from(film_size[0])
+        || end(window.y, window.height) > u64::from(film_size[1])
+    {
+        return Err(Error::usage(format!(
+            "crop window {},{},{},{} does not lie in the film of {}x{} pixels",
+            window.x,
+            window.y,
+            end(window.x, window.width),
+            end(window.y, window.height),
+            film_size[0],
+            film_size[1]
+        )));
+    }
+    if settings.shadow_rays > 4096 {
+        return Err(Error::usage(format!(
+            "--shadow-rays {}: expected at most 4096; use more samples per pixel",
+            settings.shadow_rays
+        )));
+    }
+    if !(1..=64).contains(&settings.depth) {
+        return Err(Error::usage(format!("--depth {}: expected 1 to 64", settings.depth)));
+    }
+    Ok(())
+}

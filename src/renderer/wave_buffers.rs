@@ -1,0 +1,95 @@
+//! Buffers for the paths in flight.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use crate::{
+    error::Result,
+    gpu::{
+        Buffer, DescriptorSet, Device,
+        constants::{
+            BINDING_HIT_TEXELS, BINDING_HITS, BINDING_PATHS, BINDING_RAY_TEXELS, BINDING_RAYS,
+            BINDING_SHADOW_RAY_TEXELS, BINDING_SHADOW_RAYS, BINDING_VISIBILITY, SET_WAVE,
+            WORKGROUP_SIZE,
+        },
+        layout::{Hit, PathState, Ray, ShadowRay},
+    },
+};
+
+/// Most paths in flight on a software device; more would only fall out of its caches.
+const SOFTWARE_PATHS: u32 = 1 << 17;
+/// Most paths in flight on a GPU.
+const GPU_PATHS: u32 = 1 << 21;
+/// Paths of the very first wave, before any timing is known.
+const FIRST_PATHS: u32 = 1 << 14;
+
+/// Rays, hits, shadow rays and path states of one wave.
+pub struct WaveBuffers {
+    set: DescriptorSet,
+    buffers: Vec<Buffer>,
+    capacity: u32,
+}
+
+impl WaveBuffers {
+    /// Room for waves of a film of `padded_pixels` with up to `shadow_rays` rays per hit at a time.
+    pub fn new(device: &Arc<Device>, padded_pixels: u32, shadow_rays: u32) -> Result<Self> {
+        let capabilities = device.capabilities();
+        let most = if capabilities.kind == "software" { SOFTWARE_PATHS } else { GPU_PATHS };
+        let widest =
+            (size_of::<Hit>() as u64).max(u64::from(shadow_rays) * size_of::<ShadowRay>() as u64);
+        let by_binding = capabilities.max_storage_buffer_range / widest;
+        let by_groups = u64::from(capabilities.max_workgroup_count) * u64::from(WORKGROUP_SIZE)
+            / u64::from(shadow_rays);
+        let by_memory = capabilities.device_memory / 8 / (widest * 3);
+        let limit = by_binding.min(by_groups).min(by_memory).min(u64::from(most));
+        // A small film needs no more than a handful of its samples in flight.
+        let useful = u64::from(padded_pixels) * 64;
+        let capacity = u32::try_from(limit.min(useful)).unwrap_or(most).max(WORKGROUP_SIZE)
+            / WORKGROUP_SIZE
+            * WORKGROUP_SIZE;
+
+        let rays = u64::from(capacity) * u64::from(shadow_rays);
+        let make = |name, count: u64, size: usize| Buffer::new(device, name, count * size as u64);
+        let paths = u64::from(capacity);
+        let ray_buffer = make("rays", paths, size_of::<Ray>())?;
+        let hit_buffer = make("hits", paths, size_of::<Hit>())?;
+        let shadow_ray_buffer = make("shadow rays", rays, size_of::<ShadowRay>())?;
+        let visibility = make("visibility", rays, size_of::<u32>())?;
+        let path_buffer = make("paths", paths, size_of::<PathState>())?;
+        let set = DescriptorSet::new(
+            device,
+            SET_WAVE,
+            &[
+                (BINDING_RAYS, &ray_buffer),
+                (BINDING_RAY_TEXELS, &ray_buffer),
+                (BINDING_HITS, &hit_buffer),
+                (BINDING_HIT_TEXELS, &hit_buffer),
+                (BINDING_SHADOW_RAYS, &shadow_ray_buffer),
+                (BINDING_SHADOW_RAY_TEXELS, &shadow_ray_buffer),
+                (BINDING_VISIBILITY, &visibility),
+                (BINDING_PATHS, &path_buffer),
+            ],
+        )?;
+        let buffers = vec![ray_buffer, hit_buffer, shadow_ray_buffer, visibility, path_buffer];
+        Ok(Self { set, buffers, capacity })
+    }
+
+    /// The wave set.
+    pub fn set(&self) -> &DescriptorSet {
+        &self.set
+    }
+
+    /// Most paths of a wave.
+    pub fn capacity(&self) -> u32 {
+        self.capacity
+    }
+
+    /// Paths of the first wave.
+    pub fn first_wave_paths(&self) -> u32 {
+        FIRST_PATHS.min(self.capacity)
+    }
+
+    /// Bytes by buffer name.
+    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+        self.buffers.iter().map(|buffer| (buffer.name().to_owned(), buffer.size())).collect()
+    }
+}

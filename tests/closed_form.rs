@@ -1,0 +1,141 @@
+//! Scenes whose picture is known in closed form, through every sampler.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+mod support;
+
+use fenestra::{
+    film::Sums,
+    renderer::{Renderer, Settings},
+    sampler::Sampler,
+    scene::Scene,
+};
+use glam::{DVec3, Vec3};
+use support::scenes::{self, diffuse};
+
+fn render(scene: &Scene, settings: Settings, samples: u32) -> Sums {
+    let mut renderer = Renderer::new(support::device(), scene, settings).unwrap();
+    renderer.render_pass(samples).unwrap();
+    assert_eq!(renderer.totals().dropped_samples, 0);
+    support::assert_silent();
+    renderer.sums().unwrap()
+}
+
+fn image_mean(sums: &Sums) -> DVec3 {
+    (0..sums.pixel_count()).map(|pixel| DVec3::from(sums.mean(pixel))).sum::<DVec3>()
+        / sums.pixel_count() as f64
+}
+
+/// Mean over `seeds` independent renders and its standard error, per channel.
+fn mean_and_error(scene: &Scene, settings: &Settings, samples: u32, seeds: u32) -> [DVec3; 2] {
+    let mut renderer = Renderer::new(support::device(), scene, settings.clone()).unwrap();
+    let means: Vec<DVec3> = (0..seeds)
+        .map(|seed| {
+            renderer.restart(seed).unwrap();
+            renderer.render_pass(samples).unwrap();
+            image_mean(&renderer.sums().unwrap())
+        })
+        .collect();
+    support::assert_silent();
+    let mean = means.iter().sum::<DVec3>() / f64::from(seeds);
+    let variance = means.iter().map(|m| (m - mean) * (m - mean)).sum::<DVec3>()
+        / f64::from(seeds * (seeds - 1));
+    [mean, DVec3::new(variance.x.sqrt(), variance.y.sqrt(), variance.z.sqrt())]
+}
+
+#[test]
+fn without_shadow_rays_only_the_environment_is_seen() {
+    let scene = scenes::convex_furnace(diffuse(Vec3::splat(0.5)), Vec3::new(1.0, 2.0, 3.0));
+    let sums = render(&scene, Settings { shadow_rays: 0, ..Settings::default() }, 1);
+    let background = sums.mean(0);
+    assert!((DVec3::from(background) - DVec3::new(1.0, 2.0, 3.0)).abs().max_element() < 1e-5);
+    assert_eq!(sums.mean(sums.pixel_count() / 2 + 12), [0.0; 3]);
+}
+
+#[test]
+fn a_convex_diffuse_body_in_a_furnace_is_its_reflectance() {
+    let reflectance = Vec3::new(0.2, 0.5, 1.0);
+    let radiance = Vec3::new(3.0, 2.0, 1.0);
+    let scene = scenes::convex_furnace(diffuse(reflectance), radiance);
+    // Samplers proportional to the cosine have no variance here, at any pixel and any seed.
+    for sampler in [Sampler::Cosine, Sampler::Brdf] {
+        let sums = render(&scene, Settings { sampler, ..Settings::default() }, 2);
+        let expected = (reflectance * radiance).as_dvec3();
+        for pixel in 0..sums.pixel_count() {
+            let mean = DVec3::from(sums.mean(pixel));
+            let is_background = (mean - radiance.as_dvec3()).abs().max_element() < 1e-4;
+            let is_body = (mean - expected).abs().max_element() < 1e-4;
+            // Pixels at the silhouette mix both; a box filter over two samples gives their mean.
+            let is_edge =
+                (mean - 0.5 * (expected + radiance.as_dvec3())).abs().max_element() < 1e-4;
+            assert!(is_background || is_body || is_edge, "{} {pixel}: {mean}", sampler.name());
+        }
+        assert!((DVec3::from(sums.mean(8 * 24 + 12)) - expected).abs().max_element() < 1e-4);
+    }
+}
+
+#[test]
+fn irradiance_of_a_plane_is_the_integral_of_the_map() {
+    // f64 quadrature of the very map, bilinear as the renderer sees it.
+    let reflectance = Vec3::new(0.3, 0.6, 0.9);
+    let scene = scenes::plane(reflectance, scenes::sky());
+    let steps = 1024;
+    let mut irradiance = DVec3::ZERO;
+    for i in 0..steps {
+        for j in 0..steps {
+            let cos_theta = ((f64::from(i) + 0.5) / f64::from(steps)).sqrt();
+            let phi = std::f64::consts::TAU * (f64::from(j) + 0.5) / f64::from(steps);
+            let sin_theta = (1.0 - cos_theta * cos_theta).sqrt();
+            let direction = DVec3::new(sin_theta * phi.cos(), cos_theta, sin_theta * phi.sin());
+            irradiance += scene.environment.radiance(direction.as_vec3()).as_dvec3();
+        }
+    }
+    irradiance *= std::f64::consts::PI / f64::from(steps * steps);
+    let expected = reflectance.as_dvec3() * irradiance / std::f64::consts::PI;
+    for sampler in Sampler::ALL {
+        let settings = Settings { sampler, ..Settings::default() };
+        let [mean, error] = mean_and_error(&scene, &settings, 16, 12);
+        let z = (mean - expected) / error;
+        // 18 comparisons with 11 degrees of freedom: |t| > 7 has a chance of 4e-4 in all. The
+        // quadrature is good to 1e-4.
+        let close = (mean / expected - 1.0).abs().max_element() < 2e-4;
+        assert!(
+            z.abs().max_element() < 7.0 || close,
+            "{}: {mean} against {expected}, z {z}",
+            sampler.name()
+        );
+        let relative_error = (error / expected).max_element();
+        assert!(relative_error < 0.03, "{}: error {relative_error}", sampler.name());
+    }
+}
+
+#[test]
+fn a_concave_white_body_vanishes_in_the_furnace() {
+    let scene = scenes::concave_furnace();
+    let settings = Settings { depth: 24, roulette_vertex: 64, ..Settings::default() };
+    for sampler in [Sampler::Cosine, Sampler::Mis, Sampler::Ris] {
+        let sums = render(&scene, Settings { sampler, ..settings.clone() }, 64);
+        let mean = image_mean(&sums);
+        // The crevice between sphere and box keeps a little beyond 24 vertices.
+        assert!((mean - 1.0).abs().max_element() < 4e-3, "{}: {mean}", sampler.name());
+        for pixel in 0..sums.pixel_count() {
+            let value = sums.mean(pixel)[1];
+            assert!((0.7..1.3).contains(&value), "{} pixel {pixel}: {value}", sampler.name());
+        }
+    }
+    // With direct light alone the crevice is dark: the test above needs its bounces.
+    let direct = image_mean(&render(&scene, Settings::default(), 64));
+    assert!(direct.x < 0.99, "{direct}");
+}
+
+#[test]
+fn roulette_keeps_the_mean() {
+    let scene = scenes::concave_furnace();
+    let settings = Settings { depth: 24, roulette_vertex: 2, ..Settings::default() };
+    let mut scene = scene;
+    scene.materials = vec![diffuse(Vec3::splat(0.7))];
+    let [with, with_error] = mean_and_error(&scene, &settings, 32, 8);
+    let without = Settings { roulette_vertex: 64, ..settings };
+    let [without, without_error] = mean_and_error(&scene, &without, 32, 8);
+    let z = (with.x - without.x) / with_error.x.hypot(without_error.x);
+    assert!(z.abs() < 6.0, "{with} against {without}, z {z}");
+}

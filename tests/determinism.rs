@@ -1,0 +1,100 @@
+//! The same seed gives the same bits, however samples are grouped, cropped, stopped and resumed.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+mod support;
+
+use fenestra::{
+    film::{Aov, Sums},
+    renderer::{Renderer, Settings, Window},
+    sampler::Sampler,
+    scene::Scene,
+};
+use glam::Vec3;
+use support::scenes;
+
+fn scene() -> Scene {
+    scenes::room(vec![scenes::diffuse(Vec3::splat(0.7)), scenes::plastic(0.1), scenes::copper(0.2)])
+}
+
+fn settings(sampler: Sampler) -> Settings {
+    Settings {
+        sampler,
+        depth: 3,
+        seed: 7,
+        aovs: vec![Aov::Albedo, Aov::Normal, Aov::Position, Aov::Visible],
+        ..Settings::default()
+    }
+}
+
+fn render(settings: Settings, passes: &[u32]) -> Sums {
+    let mut renderer = Renderer::new(support::device(), &scene(), settings).unwrap();
+    for samples in passes {
+        renderer.render_pass(*samples).unwrap();
+    }
+    support::assert_silent();
+    renderer.sums().unwrap()
+}
+
+#[test]
+fn one_pass_of_64_equals_64_passes_of_one() {
+    for sampler in Sampler::ALL {
+        let together = render(settings(sampler), &[64]);
+        let apart = render(settings(sampler), &[1; 64]);
+        assert!(together == apart, "{} differs", sampler.name());
+        assert_eq!(together.sample_count, 64);
+    }
+}
+
+#[test]
+fn another_seed_gives_another_picture() {
+    let one = render(settings(Sampler::Mis), &[4]);
+    let other = render(Settings { seed: 8, ..settings(Sampler::Mis) }, &[4]);
+    assert_ne!(one.sum, other.sum);
+}
+
+#[test]
+fn a_resumed_render_equals_an_uninterrupted_one() {
+    let uninterrupted = render(settings(Sampler::Ris), &[16]);
+    let half = render(settings(Sampler::Ris), &[7]);
+    let mut renderer = Renderer::new(support::device(), &scene(), settings(Sampler::Ris)).unwrap();
+    renderer.restore(&half).unwrap();
+    renderer.render_pass(9).unwrap();
+    assert!(renderer.sums().unwrap() == uninterrupted);
+}
+
+#[test]
+fn sums_of_another_window_are_refused() {
+    let mut sums = render(settings(Sampler::Mis), &[1]);
+    sums.origin = [1, 0];
+    let mut renderer = Renderer::new(support::device(), &scene(), settings(Sampler::Mis)).unwrap();
+    let error = renderer.restore(&sums).unwrap_err().to_string();
+    assert!(error.contains("[1, 0]"), "{error}");
+}
+
+#[test]
+fn a_crop_window_shows_the_same_pixels() {
+    let whole = render(settings(Sampler::Mis), &[4]);
+    let window = Window { x: 5, y: 3, width: 13, height: 9 };
+    let crop = render(Settings { window: Some(window), ..settings(Sampler::Mis) }, &[4]);
+    for y in 0..window.height {
+        for x in 0..window.width {
+            let inner = (y * window.width + x) as usize;
+            let outer = ((y + window.y) * whole.width + x + window.x) as usize;
+            assert_eq!(crop.sum[inner], whole.sum[outer], "pixel {x},{y}");
+            assert_eq!(crop.normal[inner], whole.normal[outer], "pixel {x},{y}");
+        }
+    }
+}
+
+#[test]
+fn sample_ranges_add_up() {
+    let whole = render(settings(Sampler::Cosine), &[12]);
+    let mut first = render(settings(Sampler::Cosine), &[5]);
+    let rest = render(Settings { first_sample: 5, ..settings(Sampler::Cosine) }, &[7]);
+    first.add(&rest);
+    for pixel in 0..whole.pixel_count() {
+        for (a, b) in first.total(pixel).into_iter().zip(whole.total(pixel)) {
+            assert!((a - b).abs() <= 1e-12 * b.abs(), "pixel {pixel}: {a} against {b}");
+        }
+    }
+}
