@@ -1,15 +1,12 @@
 //! Whether a measured BRDF is physically plausible: how much it reflects, and whether it stays the
 //! same when the two directions are interchanged.
 
-use std::{path::Path, sync::Arc};
+use std::f32::consts::{FRAC_PI_2, TAU};
 
-use glam::{Vec3, vec3};
+use glam::{DVec3, Vec3, vec3};
+use rayon::prelude::*;
 
-use super::{MaterialTables, MeasuredTable, albedo};
-use crate::{
-    error::Result,
-    scene::{Material, material::MaterialKind},
-};
+use super::MeasuredTable;
 
 /// Elevations at which the albedo is reported, degrees from the normal.
 pub const ELEVATIONS_DEG: [f32; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
@@ -17,11 +14,16 @@ pub const ELEVATIONS_DEG: [f32; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
 /// Angle between the directions that are tried in pairs, degrees.
 const STEP_DEG: usize = 15;
 
+/// Steps of the quadrature over the incident direction's elevation and azimuth: a quarter and half
+/// a degree, finer than measured highlights.
+const QUADRATURE_STEPS: [usize; 2] = [360, 720];
+
 /// What a measured BRDF does to light.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Sanity {
     /// Linear Rec.709 share of light from a uniform hemisphere that is reflected, at each of
-    /// [`ELEVATIONS_DEG`].
+    /// [`ELEVATIONS_DEG`]: ∫ value · cosine dω by the midpoint rule. Unlike the albedo that
+    /// rendering uses, it is not clamped.
     pub albedo: Vec<[f32; 3]>,
     /// Largest of these.
     pub largest_albedo: f32,
@@ -32,25 +34,17 @@ pub struct Sanity {
 }
 
 impl Sanity {
-    /// Looks at a table that was read from `path`.
-    ///
-    /// # Errors
-    /// A table too large for the device.
-    pub fn of(path: &Path, table: &Arc<MeasuredTable>) -> Result<Self> {
-        let kind = MaterialKind::Measured { path: path.to_path_buf(), table: Arc::clone(table) };
-        let tables = MaterialTables::new(&[Material { name: path.display().to_string(), kind }])?;
-        let at = |elevation_deg: &f32| {
-            let (sine, cosine) = elevation_deg.to_radians().sin_cos();
-            albedo(&tables, 0, vec3(sine, 0.0, cosine)).to_array()
-        };
-        let albedo: Vec<[f32; 3]> = ELEVATIONS_DEG.iter().map(at).collect();
+    /// Looks at a table.
+    pub fn of(table: &MeasuredTable) -> Self {
+        let albedo: Vec<[f32; 3]> =
+            ELEVATIONS_DEG.iter().map(|&elevation_deg| albedo(table, elevation_deg)).collect();
         let (largest_value, largest_reciprocity_error) = try_pairs(table);
-        Ok(Self {
+        Self {
             largest_albedo: albedo.as_flattened().iter().copied().fold(0.0, f32::max),
             albedo,
             largest_value,
             largest_reciprocity_error,
-        })
+        }
     }
 
     /// What a user should know before rendering with it.
@@ -75,19 +69,40 @@ impl Sanity {
     }
 }
 
+/// Unit vector at an angle from the normal and an azimuth, radians.
+fn direction(elevation: f32, azimuth: f32) -> Vec3 {
+    let ((sine, cosine), (sine_azimuth, cosine_azimuth)) = (elevation.sin_cos(), azimuth.sin_cos());
+    vec3(sine * cosine_azimuth, sine * sine_azimuth, cosine)
+}
+
+/// ∫ value · cosine dω over the incident hemisphere.
+fn albedo(table: &MeasuredTable, elevation_deg: f32) -> [f32; 3] {
+    let outgoing = direction(elevation_deg.to_radians(), 0.0);
+    let [rings, sectors] = QUADRATURE_STEPS;
+    let (ring_width, sector_width) = (FRAC_PI_2 / rings as f32, TAU / sectors as f32);
+    let ring = |index: usize| {
+        let elevation = (index as f32 + 0.5) * ring_width;
+        let sum: DVec3 = (0..sectors)
+            .map(|sector| direction(elevation, (sector as f32 + 0.5) * sector_width))
+            .map(|incident| table.evaluate(outgoing, incident).as_dvec3())
+            .sum();
+        sum * f64::from(elevation.sin() * elevation.cos())
+    };
+    // Collected in order, so that the sum does not depend on the threads.
+    let sums: Vec<DVec3> = (0..rings).into_par_iter().map(ring).collect();
+    let total: DVec3 = sums.into_iter().sum();
+    (total * f64::from(ring_width * sector_width)).as_vec3().to_array()
+}
+
 /// Largest value and largest relative reciprocity error over pairs of directions.
 fn try_pairs(table: &MeasuredTable) -> (f32, f32) {
-    let direction = |elevation_deg: usize, azimuth_deg: usize| -> Vec3 {
-        let (sine, cosine) = (elevation_deg as f32).to_radians().sin_cos();
-        let (sine_azimuth, cosine_azimuth) = (azimuth_deg as f32).to_radians().sin_cos();
-        vec3(sine * cosine_azimuth, sine * sine_azimuth, cosine)
-    };
+    let radians = |degrees: usize| (degrees as f32).to_radians();
     let (mut largest, mut error) = (0.0_f32, 0.0_f32);
     for outgoing_deg in (0..90).step_by(STEP_DEG) {
         for incident_deg in (0..90).step_by(STEP_DEG) {
             for azimuth_deg in (0..=180).step_by(STEP_DEG) {
-                let outgoing = direction(outgoing_deg, 0);
-                let incident = direction(incident_deg, azimuth_deg);
+                let outgoing = direction(radians(outgoing_deg), 0.0);
+                let incident = direction(radians(incident_deg), radians(azimuth_deg));
                 let value = table.evaluate(outgoing, incident);
                 let interchanged = table.evaluate(incident, outgoing);
                 largest = largest.max(value.max_element());
@@ -113,7 +128,7 @@ mod tests {
     fn a_white_lambertian_table_is_sane_and_one_twice_as_bright_is_not() {
         let sanity = |value: f32| {
             let table = MeasuredTable::tabulate(|_, _| Vec3::splat(value)).unwrap();
-            Sanity::of(Path::new("white.binary"), &Arc::new(table)).unwrap()
+            Sanity::of(&table)
         };
         let white = sanity(0.9 / PI);
         for albedo in white.albedo.as_flattened() {

@@ -3,7 +3,6 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    sync::Arc,
 };
 
 use serde_json::{Value, json};
@@ -16,7 +15,7 @@ use crate::{
     cache,
     error::{Error, Result},
     film::{Attribute, Checkpoint, Image, summary::ChannelSummary},
-    scene::EnvironmentMap,
+    scene::{EnvironmentMap, Scene, material::MaterialKind},
 };
 
 /// Arguments of `info`.
@@ -63,6 +62,7 @@ fn file(path: &Path, is_map: bool) -> Result<Report> {
         .map(|extension| extension.to_string_lossy().to_lowercase())
         .unwrap_or_default();
     match extension.as_str() {
+        "toml" | "gltf" | "glb" | "pbrt" => scene(path),
         "hdr" | "pfm" => environment_map(path),
         "exr" if is_map => environment_map(path),
         "exr" => image(path),
@@ -105,6 +105,47 @@ fn installation() -> Report {
     lines.push("devices: run `fenestra devices`".to_owned());
     let value = json!({ "version": env!("CARGO_PKG_VERSION"), "caches": caches });
     Report { value, lines, warnings: Vec::new() }
+}
+
+fn scene(path: &Path) -> Result<Report> {
+    let scene = Scene::load(path)?;
+    let kind = |kind: &MaterialKind| match kind {
+        MaterialKind::Diffuse { .. } => "diffuse",
+        MaterialKind::Plastic { .. } => "plastic",
+        MaterialKind::Conductor { .. } => "conductor",
+        MaterialKind::Measured { .. } => "measured",
+    };
+    let mut triangle_counts = vec![0_u64; scene.materials.len()];
+    for &material in &scene.geometry.materials {
+        if let Some(count) = triangle_counts.get_mut(material as usize) {
+            *count += 1;
+        }
+    }
+    let map = &scene.environment;
+    let mut lines = vec![
+        format!("scene {}", scene.name),
+        format!("film         {}x{} pixels", scene.film.width, scene.film.height),
+        format!("triangles    {}", scene.geometry.triangles.len()),
+        format!("environment  {} ({}x{} texels)", map.source, map.width, map.height),
+        format!("hash         {}", scene.hash),
+    ];
+    let mut materials = Vec::new();
+    for (material, count) in scene.materials.iter().zip(&triangle_counts) {
+        let kind = kind(&material.kind);
+        lines.push(format!("material     {} ({kind}, {count} triangles)", material.name));
+        materials.push(json!({ "name": material.name, "type": kind, "triangles": count }));
+    }
+    let value = json!({
+        "kind": "scene",
+        "name": scene.name,
+        "width": scene.film.width,
+        "height": scene.film.height,
+        "triangles": scene.geometry.triangles.len(),
+        "environment": { "source": map.source, "width": map.width, "height": map.height },
+        "materials": materials,
+        "hash": scene.hash,
+    });
+    Ok(Report { value, lines, warnings: scene.warnings })
 }
 
 fn image(path: &Path) -> Result<Report> {
@@ -192,8 +233,8 @@ fn environment_map(path: &Path) -> Result<Report> {
 }
 
 fn measured_brdf(path: &Path) -> Result<Report> {
-    let table = Arc::new(MeasuredTable::load(path)?);
-    let sanity = Sanity::of(path, &table)?;
+    let table = MeasuredTable::load(path)?;
+    let sanity = Sanity::of(&table);
     let mut warnings = table.warnings.clone();
     warnings.extend(sanity.warnings());
     let mut lines = vec![

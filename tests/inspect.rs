@@ -1,0 +1,251 @@
+//! `merge` and `info` on the command line.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+#[path = "support/command.rs"]
+mod command;
+
+use command::Folder;
+use fenestra::film::{Checkpoint, Image, Metadata, SampleRange, Sums};
+use serde_json::Value;
+
+/// A checkpoint of 4×2 pixels all of whose samples are `value`.
+fn checkpoint(seed: u32, count: u32, value: f32) -> Checkpoint {
+    let mut sums = Sums::new([0, 0], 4, 2, [4, 2]);
+    sums.sample_count = count;
+    sums.sum = vec![[count as f32 * value; 3]; 8];
+    sums.squares = vec![[count as f32 * value * value; 3]; 8];
+    let metadata = Metadata {
+        version: "0.1.0".to_owned(),
+        scene_hash: "ab12".to_owned(),
+        sampler: "mis".to_owned(),
+        shadow_rays: 5,
+        depth: 1,
+        sample_ranges: vec![SampleRange { seed, first: 0, count }],
+        seconds: 2.0,
+        ..Metadata::default()
+    };
+    Checkpoint { sums, metadata }
+}
+
+/// `NAME.exr` and `NAME.checkpoint.exr` of the same render.
+fn write(folder: &Folder, name: &str, checkpoint: &Checkpoint) {
+    let mut image = checkpoint.sums.to_image(&[]);
+    checkpoint.metadata.store(&mut image);
+    image.write_exr(&folder.path().join(format!("{name}.exr"))).unwrap();
+    checkpoint.write(&folder.path().join(format!("{name}.checkpoint.exr"))).unwrap();
+}
+
+fn parts() -> Folder {
+    let folder = Folder::new();
+    write(&folder, "a", &checkpoint(1, 10, 1.0));
+    write(&folder, "b", &checkpoint(2, 30, 2.0));
+    folder
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).expect("JSON on standard output")
+}
+
+#[test]
+fn images_are_merged_by_their_sample_counts() {
+    let folder = parts();
+    folder
+        .run(&["merge", "a.exr", "b.exr", "-o", "new/out.exr"])
+        .assert(0, &["new/out.exr: 40 samples per pixel from 2 parts"]);
+    let path = folder.path().join("new/out.exr");
+    let merged = Image::read_exr(&path).unwrap();
+    // (10·1 + 30·2)/40.
+    assert_eq!(merged.channels["R"], [1.75; 8]);
+    let metadata = Metadata::load(&merged, &path).unwrap();
+    assert_eq!((metadata.sample_count(), metadata.seconds), (40, 4.0));
+    // A merged image is a part like any other.
+    write(&folder, "c", &checkpoint(3, 40, 0.25));
+    let run = folder.run(&["merge", "new/out.exr", "c.exr", "--output", "all.exr", "--json"]);
+    run.assert(0, &[]);
+    assert_eq!(json(&run.output)["samples_per_pixel"], 80);
+    assert_eq!(json(&run.output)["sample_ranges"].as_array().unwrap().len(), 3);
+    let merged = Image::read_exr(&folder.path().join("all.exr")).unwrap();
+    assert_eq!(merged.channels["G"], [1.0; 8]);
+}
+
+#[test]
+fn checkpoints_are_merged_into_a_checkpoint_or_an_image() {
+    let folder = parts();
+    let arguments = ["merge", "a.checkpoint.exr", "b.checkpoint.exr", "--quiet", "-o"];
+    let run = folder.run(&[&arguments[..], &["out.checkpoint.exr"]].concat());
+    run.assert(0, &[]);
+    assert_eq!(run.messages, "");
+    let merged = Checkpoint::read(&folder.path().join("out.checkpoint.exr")).unwrap();
+    assert_eq!(merged.sums.sum, vec![[70.0; 3]; 8]);
+    assert_eq!(merged.sums.squares, vec![[130.0; 3]; 8]);
+    folder.run(&[&arguments[..], &["out.exr"]].concat()).assert(0, &[]);
+    let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+    assert!(!Checkpoint::is_checkpoint(&image));
+    assert_eq!(image.channels["SampleCount.Y"], [40.0; 8]);
+    // Σx² − (Σx)²/n = 130 − 122.5, over n(n − 1) = 1560.
+    assert!((image.channels["Variance.B"][5] - 7.5 / 1560.0).abs() < 1e-9);
+    // An image and a checkpoint give an image, but no checkpoint.
+    folder.run(&["merge", "a.exr", "b.checkpoint.exr", "-o", "mixed.exr"]).assert(0, &[]);
+    let mixed = Image::read_exr(&folder.path().join("mixed.exr")).unwrap();
+    assert_eq!(mixed.channels["R"], [1.75; 8]);
+    let run = folder.run(&["merge", "a.exr", "b.checkpoint.exr", "-o", "mixed.checkpoint.exr"]);
+    run.assert(2, &["mixed.checkpoint.exr would be a checkpoint, but a.exr is an image"]);
+}
+
+#[test]
+fn parts_that_share_samples_or_show_something_else_are_refused() {
+    let folder = parts();
+    write(&folder, "again", &checkpoint(1, 4, 1.0));
+    let run = folder.run(&["merge", "a.exr", "again.exr", "-o", "out.exr"]);
+    run.assert(1, &["again.exr: holds samples 0..4 of seed 1, but a.exr holds", "--seed"]);
+    let mut other = checkpoint(7, 4, 1.0);
+    other.metadata.scene_hash = "cd34".to_owned();
+    other.metadata.sampler = "env".to_owned();
+    write(&folder, "other", &other);
+    let run = folder.run(&["merge", "a.exr", "other.checkpoint.exr", "-o", "out.exr"]);
+    run.assert(1, &["not of one render with a.exr", "cd34 against ab12", "env against mis"]);
+    let mut foreign = Image::new(4, 2);
+    foreign.insert_triple(["R", "G", "B"], &[[1.0; 3]; 8]);
+    foreign.write_exr(&folder.path().join("foreign.exr")).unwrap();
+    let run = folder.run(&["merge", "a.exr", "foreign.exr", "-o", "out.exr"]);
+    run.assert(1, &["foreign.exr: no attribute fenestra."]);
+    assert!(!folder.files().contains(&"out.exr".to_owned()));
+}
+
+#[test]
+fn info_shows_channels_and_attributes_of_an_image() {
+    let folder = parts();
+    let run = folder.run(&["info", "b.exr"]);
+    run.assert(0, &[]);
+    for part in ["image of 4x2 pixels", "mean 2.000000e0", "fenestra.sampler = \"mis\""] {
+        assert!(run.output.contains(part), "no {part:?} in {}", run.output);
+    }
+    assert!(!run.output.contains("warning"), "{}", run.output);
+    let report = json(&folder.run(&["info", "b.checkpoint.exr", "--json"]).output);
+    assert_eq!(report["kind"], "checkpoint");
+    assert_eq!(report["attributes"]["samplesPerPixel"], 30);
+    assert_eq!(report["channels"]["Sum.R"]["maximum"], 60.0);
+    assert_eq!(report["warnings"].as_array().unwrap().len(), 0);
+}
+
+#[test]
+fn info_warns_of_samples_that_are_not_finite() {
+    let folder = Folder::new();
+    let mut image = Image::new(2, 1);
+    image.channels.insert("Y".to_owned(), vec![f32::NAN, f32::NEG_INFINITY]);
+    image.write_exr(&folder.path().join("bad.exr")).unwrap();
+    let run = folder.run(&["info", "bad.exr"]);
+    run.assert(0, &[]);
+    for part in ["1 NaN, 1 infinite, 1 negative", "warning: channel Y: 2 samples are not finite"] {
+        assert!(run.output.contains(part), "no {part:?} in {}", run.output);
+    }
+}
+
+#[test]
+fn info_reads_environment_maps() {
+    let folder = Folder::new();
+    let mut map = b"PF\n2 1\n-1.0\n".to_vec();
+    for value in [1.0_f32, 2.0, 3.0, f32::NAN, 5.0, 6.0] {
+        map.extend(value.to_le_bytes());
+    }
+    folder.write("map.pfm", &map);
+    let run = folder.run(&["info", "map.pfm"]);
+    run.assert(0, &[]);
+    assert!(run.output.contains("environment map of 2x1 texels"), "{}", run.output);
+    assert!(run.output.contains("warning: "), "the NaN is reported: {}", run.output);
+    let report = json(&folder.run(&["info", "map.pfm", "--json"]).output);
+    assert_eq!(report["channels"]["G"]["maximum"], 2.0);
+    assert_eq!(report["warnings"].as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn info_judges_measured_brdfs() {
+    // A Lambertian of albedo 0.5 at every wavelength.
+    let folder = Folder::new();
+    let wavelengths: Vec<String> = (0..31).map(|step| (400 + 10 * step).to_string()).collect();
+    let mut text = format!("# grey in many directions\n31 {}\n", wavelengths.join(" "));
+    for incident in [10, 40, 70] {
+        for outgoing in [10, 40, 70] {
+            for azimuth in [0, 60, 120, 180] {
+                let radians = |degrees: i32| f64::from(degrees).to_radians();
+                let value = format!(" {}", 0.5 / std::f64::consts::PI);
+                text += &format!(
+                    "{} 0 {} {}{}\n",
+                    radians(incident),
+                    radians(outgoing),
+                    radians(azimuth),
+                    value.repeat(31)
+                );
+            }
+        }
+    }
+    folder.write("grey.brdf", text);
+    let run = folder.run(&["info", "grey.brdf", "--json"]);
+    run.assert(0, &[]);
+    let report = json(&run.output);
+    // Equal energy is not quite the white of Rec.709, but its luminance is that of white.
+    let albedo = |channel: usize| report["sanity"]["albedo"][1][channel].as_f64().unwrap();
+    let luminance = 0.2126 * albedo(0) + 0.7152 * albedo(1) + 0.0722 * albedo(2);
+    assert!((luminance - 0.5).abs() < 0.02, "{luminance}");
+    assert!(report["sanity"]["largest_reciprocity_error"].as_f64().unwrap() < 1e-3);
+}
+
+#[test]
+fn info_counts_what_a_scene_holds() {
+    let folder = Folder::new();
+    folder.write(
+        "room.toml",
+        r#"
+        [camera]
+        position = [0, 1, 4]
+        look_at = [0, 1, 0]
+        vertical_fov_deg = 45
+        [film]
+        width = 64
+        height = 48
+        [environment]
+        constant = [1, 1, 1]
+        [[material]]
+        name = "walls"
+        type = "diffuse"
+        reflectance = [0.8, 0.8, 0.8]
+        [[object]]
+        name = "block"
+        shape = "box"
+        size = [1, 1, 1]
+        material = "walls"
+        "#,
+    );
+    let run = folder.run(&["info", "room.toml"]);
+    run.assert(0, &[]);
+    for part in ["scene room", "64x48 pixels", "walls (diffuse, 12 triangles)", "hash"] {
+        assert!(run.output.contains(part), "no {part:?} in {}", run.output);
+    }
+    let report = json(&folder.run(&["info", "room.toml", "--json"]).output);
+    assert_eq!(report["triangles"], 12);
+    assert_eq!(report["hash"].as_str().unwrap().len(), 64);
+}
+
+#[test]
+fn info_without_a_file_describes_the_installation() {
+    let run = Folder::new().run(&["info"]);
+    run.assert(0, &[]);
+    for part in
+        [concat!("Fenestra ", env!("CARGO_PKG_VERSION")), "cache of fits: ", "fenestra devices"]
+    {
+        assert!(run.output.contains(part), "no {part:?} in {}", run.output);
+    }
+    let report = json(&Folder::new().run(&["info", "--json"]).output);
+    assert!(report["caches"]["pipelines"]["folder"].is_string(), "{report}");
+}
+
+#[test]
+fn info_refuses_what_it_does_not_know() {
+    let folder = Folder::new();
+    folder.write("notes.txt", "hello");
+    folder.run(&["info", "notes.txt"]).assert(1, &["notes.txt: unknown kind of file; expected"]);
+    folder.run(&["info", "absent.txt"]).assert(1, &["absent.txt: cannot read"]);
+    folder.run(&["info", "absent.exr"]).assert(1, &["absent.exr: cannot read"]);
+    folder.run(&["info", "--map"]).assert(2, &["<FILE>"]);
+}
