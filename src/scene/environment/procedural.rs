@@ -234,7 +234,10 @@ fn check_range(name: &str, value: f32, least: f32, most: f32) -> Result<(), Stri
 fn check_radiance(name: &str, radiance: [f32; 3], scale: f32) -> Result<(), String> {
     // Room for the factors by which the formulas brighten parts of the map.
     let most = 0.01 * MAX_RADIANCE;
-    if radiance.iter().any(|value| !(0.0..=most).contains(value) || !(value * scale <= most)) {
+    if radiance
+        .iter()
+        .any(|value| !(0.0..=most).contains(value) || !(0.0..=most).contains(&(value * scale)))
+    {
         return Err(format!(
             "{name} = {radiance:?} with scale = {scale}; expected numbers from 0 to {most:e}"
         ));
