@@ -26,21 +26,31 @@ fn direction(theta: f64, phi: f64) -> Vec3 {
     dvec3(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()).as_vec3()
 }
 
-/// ∫ f(incident) dω over the hemisphere, midpoint rule in θ and φ.
-fn integrate(f: impl Fn(Vec3) -> DVec3 + Sync) -> DVec3 {
-    const POLAR: u32 = 450;
-    const AZIMUTH: u32 = 720;
+/// ∫ f(incident) dω over the hemisphere by the midpoint rule over half vectors, dense in θ_h near 0:
+/// dω_i = 4 ω_o·h dω_h.
+fn integrate(outgoing: Vec3, f: impl Fn(Vec3) -> DVec3 + Sync) -> DVec3 {
+    const POLAR: u32 = 400;
+    const AZIMUTH: u32 = 240;
     let ring = |polar: u32| -> DVec3 {
-        let theta = (f64::from(polar) + 0.5) / f64::from(POLAR) * FRAC_PI_2;
+        let root = (f64::from(polar) + 0.5) / f64::from(POLAR);
+        let theta = root * root * FRAC_PI_2;
         let sum: DVec3 = (0..AZIMUTH)
             .map(|index| {
-                f(direction(theta, (f64::from(index) + 0.5) / f64::from(AZIMUTH) * 2.0 * PI))
+                let phi = (f64::from(index) + 0.5) / f64::from(AZIMUTH) * 2.0 * PI;
+                let half_vector = direction(theta, phi);
+                let cosine = outgoing.dot(half_vector);
+                let incident = 2.0 * cosine * half_vector - outgoing;
+                if cosine > 0.0 && incident.z > 0.0 {
+                    f(incident) * f64::from(4.0 * cosine)
+                } else {
+                    DVec3::ZERO
+                }
             })
             .sum();
-        sum * theta.sin()
+        sum * theta.sin() * root * PI
     };
     let sum: DVec3 = (0..POLAR).into_par_iter().map(ring).reduce(|| DVec3::ZERO, |a, b| a + b);
-    sum * (FRAC_PI_2 / f64::from(POLAR)) * (2.0 * PI / f64::from(AZIMUTH))
+    sum / f64::from(POLAR) * (2.0 * PI / f64::from(AZIMUTH))
 }
 
 fn tables(path: &Path) -> MaterialTables {
@@ -49,24 +59,26 @@ fn tables(path: &Path) -> MaterialTables {
     MaterialTables::new(&[Material { name: "measured".to_string(), kind }]).unwrap()
 }
 
-/// Cosine-weighted albedo at 15° and, for the Cornell files, 60°. Those at 15° hold for a direct
-/// interpolation of the same samples, which the grid follows within its resolution.
+/// Cosine-weighted albedo at 15° and, for the Cornell files, 60°, against those of pbrt-v2's
+/// interpolation of the same samples. At 60° the two coated paints get a third of theirs from one
+/// sample in the highlight, which pbrt-v2 spreads over ten degrees and we do not: they may be darker
+/// by that, and not brighter.
 #[test]
 fn albedos_are_as_known() {
     let known = [
-        ("mystique.brdf", 15.0, [0.003, 0.018, 0.017], 0.12),
-        ("mystique.brdf", 60.0, [0.097, 0.079, 0.080], 0.12),
-        ("garnet_red.brdf", 15.0, [0.197, 0.046, 0.046], 0.12),
-        ("garnet_red.brdf", 60.0, [0.218, 0.096, 0.095], 0.12),
-        ("cayman.brdf", 15.0, [0.0, 0.050, 0.076], 0.12),
-        ("cayman.brdf", 60.0, [0.047, 0.075, 0.096], 0.12),
-        ("orange-paint.binary", 15.0, [0.436, 0.146, 0.018], 0.01),
-        ("teflon.binary", 15.0, [0.339, 0.335, 0.331], 0.01),
-        ("white-paint.binary", 15.0, [0.351, 0.340, 0.329], 0.015),
-        ("fruitwood-241.binary", 15.0, [0.063, 0.048, 0.033], 0.02),
+        ("mystique.brdf", 15.0, [0.003, 0.018, 0.017], 0.12, 0.12),
+        ("mystique.brdf", 60.0, [0.097, 0.079, 0.080], 0.45, 0.1),
+        ("garnet_red.brdf", 15.0, [0.197, 0.046, 0.046], 0.12, 0.12),
+        ("garnet_red.brdf", 60.0, [0.218, 0.096, 0.095], 0.12, 0.12),
+        ("cayman.brdf", 15.0, [0.0, 0.050, 0.076], 0.12, 0.12),
+        ("cayman.brdf", 60.0, [0.047, 0.075, 0.096], 0.45, 0.1),
+        ("orange-paint.binary", 15.0, [0.436, 0.146, 0.018], 0.01, 0.01),
+        ("teflon.binary", 15.0, [0.339, 0.335, 0.331], 0.01, 0.01),
+        ("white-paint.binary", 15.0, [0.351, 0.340, 0.329], 0.015, 0.015),
+        ("fruitwood-241.binary", 15.0, [0.063, 0.048, 0.033], 0.02, 0.02),
     ];
     let mut loaded: Option<(PathBuf, MaterialTables)> = None;
-    for (name, angle_deg, albedo, tolerance) in known {
+    for (name, angle_deg, albedo, darker, brighter) in known {
         let Some(path) = shared(name) else {
             eprintln!("{name}: not present, skipped");
             continue;
@@ -76,21 +88,25 @@ fn albedos_are_as_known() {
             _ => tables(&path),
         };
         let outgoing = direction(f64::to_radians(angle_deg), 0.3);
-        let found = integrate(|incident| {
+        let found = integrate(outgoing, |incident| {
             (brdf::evaluate(&tables, 0, outgoing, incident) * incident.z).as_dvec3()
         });
         let expected = DVec3::from(albedo);
-        let allowed = expected * tolerance + DVec3::splat(0.002);
+        eprintln!("{name} at {angle_deg}°: albedo {found:.3}");
+        let (lowest, highest) = (
+            expected * (1.0 - darker) - DVec3::splat(0.002),
+            expected * (1.0 + brighter) + DVec3::splat(0.002),
+        );
         assert!(
-            (found - expected).abs().cmple(allowed).all(),
+            found.cmpge(lowest).all() && found.cmple(highest).all(),
             "{name} at {angle_deg}°: {found} against {expected}"
         );
         loaded = Some((path, tables));
     }
 }
 
-/// Relative variance of f·cos/pdf, in luminance: below 1.5 from straight above to grazing, where
-/// cosine sampling of the same materials has up to 900; 0.1 where the file has no facets.
+/// Relative variance of f·cos/pdf, in luminance: below 1 from straight above to grazing, where
+/// cosine sampling of the same materials has up to 50,000; 0.1 for the smooth tables.
 #[test]
 fn measured_materials_are_sampled_well() {
     for name in [
@@ -107,9 +123,9 @@ fn measured_materials_are_sampled_well() {
             continue;
         };
         let tables = tables(&path);
-        for angle_deg in [0.0_f64, 30.0, 60.0, 80.0, 88.0] {
+        for angle_deg in [0.0_f64, 45.0, 75.0, 88.0] {
             let outgoing = direction(angle_deg.to_radians(), 0.3);
-            let moments = integrate(|incident| {
+            let moments = integrate(outgoing, |incident| {
                 let (value, pdf) = brdf::evaluate_and_pdf(&tables, 0, outgoing, incident);
                 let reflected = f64::from(value.dot(LUMINANCE) * incident.z);
                 let second =
@@ -119,7 +135,7 @@ fn measured_materials_are_sampled_well() {
             let variance = moments.y / (moments.x * moments.x) - 1.0;
             eprintln!("{name} {angle_deg}°: variance {variance:.3}, pdf mass {:.3}", moments.z);
             assert!((moments.z - 1.0).abs() < 0.04, "{name} at {angle_deg}°: {}", moments.z);
-            let allowed = if name.ends_with(".brdf") { 1.5 } else { 0.1 };
+            let allowed = if name.ends_with(".brdf") { 1.0 } else { 0.1 };
             assert!(variance < allowed, "{name} at {angle_deg}°: relative variance {variance}");
         }
     }

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
 use std::{
+    f64::consts::{FRAC_PI_2, TAU},
     fs,
     path::{Path, PathBuf},
 };
@@ -246,8 +247,8 @@ fn energy_is_limited() {
         let outgoing = Vec3::new(angle.sin() as f32, 0.0, angle.cos() as f32);
         let (mut albedo, points) = (0.0, 400);
         for index in 0..points * points {
-            let theta = (f64::from(index % points) + 0.5) / f64::from(points) * 1.570_796;
-            let phi = (f64::from(index / points) + 0.5) / f64::from(points) * 6.283_185;
+            let theta = (f64::from(index % points) + 0.5) / f64::from(points) * FRAC_PI_2;
+            let phi = (f64::from(index / points) + 0.5) / f64::from(points) * TAU;
             let incident = Vec3::new(
                 (theta.sin() * phi.cos()) as f32,
                 (theta.sin() * phi.sin()) as f32,
@@ -257,7 +258,7 @@ fn energy_is_limited() {
             assert_eq!(value, table.evaluate(incident, outgoing));
             albedo += f64::from(value.x) * theta.cos() * theta.sin();
         }
-        albedo *= 1.570_796 * 6.283_185 / f64::from(points * points);
+        albedo *= FRAC_PI_2 * TAU / f64::from(points * points);
         assert!(albedo < 1.02, "{angle}: {albedo}");
     }
 }

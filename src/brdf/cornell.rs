@@ -3,10 +3,19 @@
 //! The format: `#` starts a comment; numbers separated by white space. The count N of wavelengths,
 //! N wavelengths in nm, then records of θ_i φ_i θ_o φ_o (radians) and N values in 1/sr.
 //!
-//! The samples are interpolated as in pbrt-v2 (Pharr & Humphreys, Physically Based Rendering,
-//! second edition, section 8.6.2) and the result is baked on the half/difference grid.
+//! The samples are interpolated by a mean with weights that decay with the distance, as in pbrt-v2
+//! (Pharr & Humphreys, Physically Based Rendering, second edition, section 8.6.2), and the result
+//! is baked on the half/difference grid.
+//!
+//! Deviation: pbrt-v2 measures distances between the points (sinθ_i·sinθ_o, |Δφ|/π, cosθ_i·cosθ_o).
+//! There a pair near the mirror direction is as close to pairs along the plane of incidence as to
+//! other mirror pairs, so that the single sample in the highlight of a coated paint shows as a row
+//! of bright patches, one in eight directions, and the one at 80° makes grazing light come back
+//! fivefold; and at normal incidence, where Δφ means nothing, the value jumps. Here the points are
+//! (2·√(θ_h/90°), θ_d/90°, ½|cosθ_i − cosθ_o|): continuous in the directions, the same for the two
+//! interchanged, fine in the highlight, and coarse along it, where the BRDF changes slowly.
 
-use std::{f32::consts::PI, fs, path::Path};
+use std::{f32::consts::FRAC_PI_2, fs, path::Path};
 
 use glam::{DVec3, Vec3, vec3};
 use rayon::prelude::*;
@@ -15,6 +24,7 @@ use crate::{
     brdf::{
         spectrum,
         table::{CELL_COUNT, MeasuredTable, bin_directions},
+        twin,
     },
     error::{Error, Result},
     gpu::constants::*,
@@ -22,19 +32,23 @@ use crate::{
 
 /// Largest count of wavelengths that is believed.
 const LARGEST_WAVELENGTH_COUNT: f64 = 10_000.0;
-/// Squared radius of the first search.
-const FIRST_SQUARED_RADIUS: f32 = 0.001;
-/// Beyond this squared radius the search stops widening.
-const LARGEST_SQUARED_RADIUS: f32 = 1.5;
-/// Fewest samples to average, unless the search has reached its end.
-const FEWEST_SAMPLES: usize = 3;
+/// Least squared radius of the mean.
+const LEAST_SQUARED_RADIUS: f32 = 0.001;
+/// Squared radius in which the nearest samples are looked for first.
+const FIRST_SQUARED_SEARCH: f32 = 0.008;
+/// Beyond this squared radius the search stops widening: no two points are farther apart.
+const LARGEST_SQUARED_SEARCH: f32 = 6.0;
+/// Samples that the mean takes in everywhere.
+const NEAREST_SAMPLES: usize = 4;
+/// Squared radius of the mean in units of the squared distance of the farthest of these.
+const RADIUS_MARGIN: f32 = 1.5;
 /// Decay of the weights exp(−100·d²).
 const WEIGHT_DECAY: f32 = 100.0;
 
 /// One measured pair of directions in the interpolation's coordinates.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
-    /// (sinθ_i·sinθ_o, |Δφ|/π, cosθ_i·cosθ_o): the same for the two directions interchanged.
+    /// Coordinates of the pair: see [`mapped_point`].
     point: Vec3,
     /// Linear sRGB in 1/sr; channels may be negative for saturated colours.
     value: Vec3,
@@ -133,7 +147,8 @@ fn parse(path: &Path, text: &str) -> Result<(Vec<Sample>, usize)> {
     }
     let (wavelengths, records) = rest.split_at(count);
     for pair in wavelengths.windows(2) {
-        if !(pair[0].value < pair[1].value) {
+        let increases = pair[0].value < pair[1].value;
+        if !increases {
             let message = format!(
                 "expected increasing wavelengths, found {} after {}",
                 pair[1].value, pair[0].value
@@ -200,54 +215,75 @@ fn direction(theta: f64, phi: f64) -> Vec3 {
     DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()).as_vec3()
 }
 
-/// (sinθ_i·sinθ_o, |Δφ|/π, cosθ_i·cosθ_o) of two directions.
+/// (2·√(θ_h/90°), θ_d/90°, ½|cosθ_i − cosθ_o|) of two directions.
 fn mapped_point(outgoing: Vec3, incident: Vec3) -> Vec3 {
-    let (a, b) = (outgoing.truncate(), incident.truncate());
-    let sines = a.length() * b.length();
-    let azimuth = if sines > 0.0 { a.perp_dot(b).abs().atan2(a.dot(b)) } else { 0.0 };
-    vec3(sines, azimuth / PI, outgoing.z * incident.z)
+    let angles = twin::half_difference_angles(outgoing, incident);
+    vec3(
+        2.0 * (angles.x / FRAC_PI_2).sqrt(),
+        angles.y / FRAC_PI_2,
+        0.5 * (incident.z - outgoing.z).abs(),
+    )
 }
 
-/// Samples in the order of their azimuth, so that a search looks at a slab only.
+/// Samples in the order of their first coordinate, so that a search looks at a slab only.
 struct SampleSet {
     samples: Vec<Sample>,
 }
 
 impl SampleSet {
     fn new(mut samples: Vec<Sample>) -> Self {
-        samples.sort_by(|a, b| a.point.y.total_cmp(&b.point.y));
+        samples.sort_by(|a, b| a.point.x.total_cmp(&b.point.x));
         Self { samples }
     }
 
-    /// Mean of the samples near a point with weights exp(−100·d²), the squared radius doubling
-    /// from 0.001 until three samples are found or it exceeds 1.5; negative channels become 0. NaN
-    /// where nothing was found.
+    /// Mean of the samples near a point, negative channels set to 0.
+    ///
+    /// Weights are exp(−100·d²)·(1 − d²/r²)² within a radius r that takes in the four nearest
+    /// samples. Deviation: pbrt-v2 starts at r² = 0.001, doubles it until more than two samples are
+    /// found and has no second factor, so that the mean jumps wherever a sample enters or the radius
+    /// changes. Here both are continuous in the point.
     fn interpolate(&self, point: Vec3) -> Vec3 {
-        let mut squared_radius = FIRST_SQUARED_RADIUS;
-        loop {
-            let radius = squared_radius.sqrt();
-            let first = self.samples.partition_point(|sample| sample.point.y < point.y - radius);
-            let (mut found, mut sum, mut weight_sum) = (0, Vec3::ZERO, 0.0);
-            for sample in &self.samples[first..] {
-                if sample.point.y > point.y + radius {
-                    break;
-                }
-                let squared_distance = sample.point.distance_squared(point);
-                if squared_distance < squared_radius {
-                    let weight = (-WEIGHT_DECAY * squared_distance).exp();
-                    found += 1;
-                    sum += weight * sample.value;
-                    weight_sum += weight;
-                }
+        let nearest = self.nearest(point);
+        let farthest = nearest.iter().copied().filter(|d| d.is_finite()).fold(0.0, f32::max);
+        let squared_radius = (RADIUS_MARGIN * farthest).max(LEAST_SQUARED_RADIUS);
+        let (mut sum, mut weight_sum) = (Vec3::ZERO, 0.0);
+        for sample in self.slab(point, squared_radius.sqrt()) {
+            let squared_distance = sample.point.distance_squared(point);
+            if squared_distance < squared_radius {
+                let window = 1.0 - squared_distance / squared_radius;
+                // Counted from the nearest, so that far from all samples no weight underflows.
+                let decay = (-WEIGHT_DECAY * (squared_distance - nearest[0])).exp();
+                let weight = decay * window * window;
+                sum += weight * sample.value;
+                weight_sum += weight;
             }
-            if found >= FEWEST_SAMPLES || squared_radius > LARGEST_SQUARED_RADIUS {
-                return if weight_sum > 0.0 {
-                    (sum / weight_sum).max(Vec3::ZERO)
-                } else {
-                    Vec3::NAN
-                };
-            }
-            squared_radius *= 2.0;
         }
+        (sum / weight_sum).max(Vec3::ZERO)
+    }
+
+    /// Squared distances of the nearest samples in rising order; infinite where there are fewer.
+    fn nearest(&self, point: Vec3) -> [f32; NEAREST_SAMPLES] {
+        let mut searched = FIRST_SQUARED_SEARCH;
+        loop {
+            let mut nearest = [f32::INFINITY; NEAREST_SAMPLES];
+            for sample in self.slab(point, searched.sqrt()) {
+                let squared_distance = sample.point.distance_squared(point);
+                let place = nearest.partition_point(|other| *other < squared_distance);
+                if place < NEAREST_SAMPLES {
+                    nearest[place..].rotate_right(1);
+                    nearest[place] = squared_distance;
+                }
+            }
+            if nearest[NEAREST_SAMPLES - 1] <= searched || searched > LARGEST_SQUARED_SEARCH {
+                return nearest;
+            }
+            searched *= 2.0;
+        }
+    }
+
+    /// The samples whose first coordinate differs by at most `radius` from that of the point.
+    fn slab(&self, point: Vec3, radius: f32) -> impl Iterator<Item = &Sample> {
+        let first = self.samples.partition_point(|sample| sample.point.x < point.x - radius);
+        self.samples[first..].iter().take_while(move |sample| sample.point.x <= point.x + radius)
     }
 }
