@@ -17,7 +17,9 @@ pub fn parse_duration(text: &str) -> Result<Duration, String> {
         "m" | "min" => 60.0,
         "h" => 3600.0,
         _ => {
-            return Err(format!("expected a duration such as 30s, 500ms, 5m or 1h, found {text:?}"));
+            return Err(format!(
+                "expected a duration such as 30s, 500ms, 5m or 1h, found {text:?}"
+            ));
         }
     };
     number

@@ -6,13 +6,16 @@
 //! Radiance between texel centres is bilinear, wrapping in u and clamped in v; camera, shading and
 //! sampling all see that one function.
 
+mod court;
 mod load;
 mod procedural;
+mod sky;
 mod table;
 
 use glam::{Vec2, Vec3};
 
-pub use procedural::{CourtParameters, SkyParameters};
+pub use court::CourtParameters;
+pub use sky::SkyParameters;
 pub use table::{EnvironmentSample, EnvironmentTables};
 
 use crate::frame::lat_long_from_direction;

@@ -1,0 +1,139 @@
+//! A clear sky with a sun, computed from a few parameters.
+
+use glam::Vec3;
+use rayon::prelude::*;
+use serde::Deserialize;
+
+use super::{
+    EnvironmentMap,
+    load::check_placement,
+    procedural::{check_radiance, check_range, check_width, render, texel_direction},
+};
+use crate::frame::{lat_long_from_direction, sin_cos_pi};
+
+/// A clear sky with a sun disc above a uniform ground.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SkyParameters {
+    /// Width of the map in texels, even, 16…16384; the height is half of it.
+    pub width: u32,
+    /// Radiance straight up.
+    pub zenith: [f32; 3],
+    /// Radiance at the horizon.
+    pub horizon: [f32; 3],
+    /// Radiance of the ground straight down; it fades into `horizon` in the last 2° below it.
+    pub ground: [f32; 3],
+    /// Height of the sun's centre above the horizon, degrees, 0…90.
+    pub sun_elevation_deg: f32,
+    /// Direction of the sun, degrees clockwise seen from above, from −Z (the middle of the map)
+    /// toward +X.
+    pub sun_azimuth_deg: f32,
+    /// Angular radius of the sun disc, degrees, above 0 and at most 45.
+    pub sun_radius_deg: f32,
+    /// Radiance of the sun disc.
+    pub sun_radiance: [f32; 3],
+}
+
+impl Default for SkyParameters {
+    fn default() -> Self {
+        Self {
+            width: 2048,
+            zenith: [0.15, 0.32, 0.75],
+            horizon: [0.75, 0.88, 1.0],
+            ground: [0.18, 0.16, 0.13],
+            sun_elevation_deg: 40.0,
+            sun_azimuth_deg: 50.0,
+            sun_radius_deg: 0.27,
+            sun_radiance: [8.0e4, 7.4e4, 6.2e4],
+        }
+    }
+}
+
+/// Points along each side of a texel at which the sun disc is tested.
+const SUN_GRID: usize = 16;
+
+impl EnvironmentMap {
+    /// The map of [`SkyParameters`], its radiance times `scale`, turned by `rotation_deg`.
+    ///
+    /// The sun's texels hold the power of its disc whatever the resolution: where the disc is smaller
+    /// than a texel, the texel is darker than `sun_radiance`.
+    ///
+    /// # Errors
+    /// A message that names the parameter, its value and what is allowed.
+    pub fn sky(parameters: &SkyParameters, scale: f32, rotation_deg: f32) -> Result<Self, String> {
+        check_placement(scale, rotation_deg)?;
+        let SkyParameters { sun_elevation_deg, sun_azimuth_deg, sun_radius_deg, .. } = *parameters;
+        check_width(parameters.width)?;
+        check_radiance("zenith", parameters.zenith, scale)?;
+        check_radiance("horizon", parameters.horizon, scale)?;
+        check_radiance("ground", parameters.ground, scale)?;
+        check_radiance("sun_radiance", parameters.sun_radiance, scale)?;
+        check_range("sun_elevation_deg", sun_elevation_deg, 0.0, 90.0)?;
+        check_range("sun_azimuth_deg", sun_azimuth_deg, -360.0, 360.0)?;
+        check_range("sun_radius_deg", sun_radius_deg, 1e-3, 45.0)?;
+
+        let (width, height) = (parameters.width, parameters.width / 2);
+        let (sin_elevation, cos_elevation) = sun_elevation_deg.to_radians().sin_cos();
+        let (sin_azimuth, cos_azimuth) = sun_azimuth_deg.to_radians().sin_cos();
+        let sun =
+            Vec3::new(cos_elevation * sin_azimuth, sin_elevation, -cos_elevation * cos_azimuth);
+        let mut texels = render(width, 1, |direction| sky_radiance(parameters, sun, direction));
+
+        // Share of every texel that the disc covers, then the share of the disc's solid angle that
+        // the texels got.
+        let radius = sun_radius_deg.to_radians();
+        let cos_reach = (radius + 4.0 * std::f32::consts::PI / width as f32).cos();
+        let chord_squared = 4.0 * (0.5 * radius).sin().powi(2);
+        let covered: Vec<(usize, f32)> = (0..texels.len())
+            .into_par_iter()
+            .filter_map(|index| {
+                let (column, row) = (index % width as usize, index / width as usize);
+                let at = |x: f32, y: f32| texel_direction(width, column as f32 + x, row as f32 + y);
+                if at(0.5, 0.5).dot(sun) < cos_reach {
+                    return None;
+                }
+                let inside = (0..SUN_GRID * SUN_GRID).filter(|sample| {
+                    let x = ((sample % SUN_GRID) as f32 + 0.5) / SUN_GRID as f32;
+                    let y = ((sample / SUN_GRID) as f32 + 0.5) / SUN_GRID as f32;
+                    at(x, y).distance_squared(sun) <= chord_squared
+                });
+                let share = inside.count() as f32 / (SUN_GRID * SUN_GRID) as f32;
+                (share > 0.0).then_some((index, share))
+            })
+            .collect();
+        let covered = if covered.is_empty() {
+            let uv = lat_long_from_direction(sun);
+            let column = ((uv.x * width as f32) as u32).min(width - 1);
+            let row = ((uv.y * height as f32) as u32).min(height - 1);
+            vec![((row * width + column) as usize, 1.0)]
+        } else {
+            covered
+        };
+        let solid_angle = |index: usize| {
+            let row = (index / width as usize) as f32;
+            let edge = |row: f32| sin_cos_pi(row / height as f32).y;
+            2.0 * std::f32::consts::PI / width as f32 * (edge(row) - edge(row + 1.0))
+        };
+        let disc = std::f32::consts::PI * chord_squared;
+        let drawn: f32 = covered.iter().map(|&(index, share)| share * solid_angle(index)).sum();
+        let sun_radiance = Vec3::from(parameters.sun_radiance) * (disc / drawn);
+        for (index, share) in covered {
+            texels[index] += sun_radiance * share;
+        }
+        Ok(Self::procedural("sky", width, texels, scale, rotation_deg))
+    }
+}
+
+/// Sky and ground of [`SkyParameters`] without the sun disc.
+fn sky_radiance(parameters: &SkyParameters, sun: Vec3, direction: Vec3) -> Vec3 {
+    let horizon = Vec3::from(parameters.horizon);
+    if direction.y < 0.0 {
+        let two_degrees = 0.0349;
+        return horizon.lerp(parameters.ground.into(), (-direction.y / two_degrees).min(1.0));
+    }
+    // The air thickens toward the horizon; a glow of about ten degrees surrounds the sun.
+    let height = 1.0 - (1.0 - direction.y).powi(3);
+    let sky = horizon.lerp(parameters.zenith.into(), height);
+    let angle = 2.0 * (0.5 * direction.distance(sun)).min(1.0).asin();
+    sky + horizon * (1.5 * (-angle / 0.17).exp())
+}
