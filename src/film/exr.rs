@@ -11,10 +11,19 @@ use std::{
     path::Path,
 };
 
-use exr::prelude::{
-    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, IntegerBounds, Layer,
-    LayerAttributes, LineOrder, ReadChannels, ReadLayers, Text, Vec2, WritableImage,
-    attribute::{AttributeValue, Chromaticities},
+use exr::{
+    block::lines::LineRefMut,
+    image::write::samples::{SamplesWriter, WritableSamples},
+    math::RoundingMode,
+    meta::{
+        attribute::{LevelMode, SampleType},
+        header::Header,
+    },
+    prelude::{
+        AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, IntegerBounds, Layer,
+        LayerAttributes, LineOrder, ReadChannels, ReadLayers, Text, Vec2, WritableImage,
+        attribute::{AttributeValue, Chromaticities},
+    },
 };
 
 use super::write_atomically;
@@ -166,7 +175,7 @@ impl Image {
             .iter()
             .map(|(name, samples)| {
                 assert_eq!(samples.len(), self.pixel_count(), "samples of channel {name}");
-                AnyChannel::new(text(name), FlatSamples::F32(samples.clone()))
+                AnyChannel::new(text(name), BorrowedSamples(samples))
             })
             .collect();
         let mut attributes = LayerAttributes {
@@ -298,6 +307,40 @@ impl Image {
             result.attributes.insert(string(name), value);
         }
         Ok(result)
+    }
+}
+
+/// Samples of a channel, written from where they are: large films are not copied.
+struct BorrowedSamples<'a>(&'a [f32]);
+
+/// Hands rows of [`BorrowedSamples`] to the encoder.
+struct BorrowedWriter<'a> {
+    samples: &'a [f32],
+    width: usize,
+}
+
+impl<'a> WritableSamples<'a> for BorrowedSamples<'_> {
+    type Writer = BorrowedWriter<'a>;
+
+    fn sample_type(&self) -> SampleType {
+        SampleType::F32
+    }
+
+    fn infer_level_modes(&self) -> (LevelMode, RoundingMode) {
+        (LevelMode::Singular, RoundingMode::Down)
+    }
+
+    fn create_samples_writer(&'a self, header: &Header) -> Self::Writer {
+        BorrowedWriter { samples: self.0, width: header.layer_size.width() }
+    }
+}
+
+impl SamplesWriter for BorrowedWriter<'_> {
+    fn extract_line(&self, line: LineRefMut<'_>) {
+        let start = line.location.position.y() * self.width + line.location.position.x();
+        let end = start + line.location.sample_count;
+        let written = line.write_samples_from_slice(&self.samples[start..end]);
+        assert!(written.is_ok(), "a row of floats fits into the encoder's row");
     }
 }
 
