@@ -230,6 +230,22 @@ fn image_layers_have_pbrts_names_and_the_means() {
 }
 
 #[test]
+fn layers_may_be_called_by_their_names_in_the_file() {
+    for (name, aov) in [
+        ("variance", Aov::Variance),
+        ("Variance", Aov::Variance),
+        ("sample-count", Aov::SampleCount),
+        ("SampleCount", Aov::SampleCount),
+        ("Albedo", Aov::Albedo),
+        ("N", Aov::Normal),
+        ("P", Aov::Position),
+        ("Visible", Aov::Visible),
+    ] {
+        assert_eq!(Aov::from_str(name, false), Ok(aov), "{name}");
+    }
+}
+
+#[test]
 fn sums_that_are_not_finite_are_counted() {
     let mut sums = Sums::new([0, 0], 2, 2, [2, 2]);
     assert_eq!(sums.non_finite_count(), 0);

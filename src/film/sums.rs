@@ -2,21 +2,28 @@
 
 use super::exr::Image;
 
-/// Extra layers of an image file; names and meaning as pbrt's where pbrt has them.
+/// Extra layers of an image file; names and meaning as pbrt's where pbrt has them. On the command line
+/// the layer's name in the file serves as well.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, clap::ValueEnum)]
 pub enum Aov {
     /// `Variance.R/G/B`: variance of the pixel mean.
+    #[value(aliases = ["Variance"])]
     Variance,
     /// `SampleCount.Y`: camera paths per pixel.
+    #[value(aliases = ["samplecount", "SampleCount"])]
     SampleCount,
     /// `Albedo.R/G/B`: share of light that the first surface reflects, 0…1.
+    #[value(aliases = ["Albedo"])]
     Albedo,
     /// `N.X/Y/Z`: shading normal at the first hit, world space.
+    #[value(aliases = ["N"])]
     Normal,
     /// `P.X/Y/Z`: position of the first hit, world space, metres.
+    #[value(aliases = ["P"])]
     Position,
     /// `Visible.Y`: share of shadow rays that reached the environment, and `ShadowRays.Y`: how many
     /// were traced for the pixel.
+    #[value(aliases = ["Visible"])]
     Visible,
 }
 
