@@ -1,0 +1,413 @@
+//! Bad input given to `render`: each case ends with its exit status and a message that names the
+//! file and what is wrong with it, or, where a part can be left out, with a warning that counts it
+//! and a finite image.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+#[path = "support/command.rs"]
+mod command;
+
+use std::{
+    fs,
+    io::{BufRead, BufReader, Read},
+    process::{Command, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+use command::{Folder, Run, program};
+use fenestra::film::{Attribute, Image};
+
+/// A scene of one quad, `quad.ply`, under a constant environment; cases change a part of it.
+const SCENE: &str = r#"[camera]
+position = [0.0, 0.0, 3.0]
+look_at = [0.0, 0.0, 0.0]
+vertical_fov_deg = 45.0
+
+[film]
+width = 16
+height = 12
+
+[environment]
+constant = [1.0, 1.0, 1.0]
+
+[[material]]
+name = "grey"
+type = "diffuse"
+reflectance = [0.5, 0.5, 0.5]
+
+[[object]]
+name = "quad"
+mesh = "quad.ply"
+material = "grey"
+"#;
+
+/// Text of a PLY mesh.
+fn ply(vertices: &[&str], faces: &[&str]) -> String {
+    format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
+         property float z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n\
+         {}\n{}\n",
+        vertices.len(),
+        faces.len(),
+        vertices.join("\n"),
+        faces.join("\n")
+    )
+}
+
+const QUAD_VERTICES: [&str; 4] = ["-1 -1 0", "1 -1 0", "1 1 0", "-1 1 0"];
+const QUAD_FACES: [&str; 2] = ["3 0 1 2", "3 0 2 3"];
+
+/// A PFM map of 4×2 texels, all of `value`.
+fn pfm(value: f32) -> Vec<u8> {
+    let mut bytes = b"PF\n4 2\n-1.0\n".to_vec();
+    bytes.extend([value; 24].iter().flat_map(|component| component.to_le_bytes()));
+    bytes
+}
+
+/// A folder with `scene.toml`, in which `old` is replaced by `new`, and `quad.ply`.
+fn scene(old: &str, new: &str) -> Folder {
+    assert!(old.is_empty() || SCENE.contains(old), "{old:?} is in the scene");
+    let folder = Folder::new();
+    let text = if old.is_empty() { format!("{new}{SCENE}") } else { SCENE.replace(old, new) };
+    folder.write("scene.toml", text);
+    folder.write("quad.ply", ply(&QUAD_VERTICES, &QUAD_FACES));
+    folder
+}
+
+const RENDER: [&str; 5] = ["render", "scene.toml", "--spp=2", "-o", "out.exr"];
+
+/// Renders and checks that it fails with status 1, with these messages, and writes nothing.
+#[track_caller]
+fn assert_refused(folder: &Folder, parts: &[&str]) {
+    let before = folder.files();
+    folder.run(&RENDER).assert(1, parts);
+    assert_eq!(folder.files(), before, "a failed render leaves no file behind");
+}
+
+/// Renders and checks that it succeeds with these warnings and that every pixel is finite.
+#[track_caller]
+fn assert_renders(folder: &Folder, warnings: &[&str]) -> Image {
+    folder.run(&RENDER).assert(0, warnings);
+    let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+    for (name, samples) in &image.channels {
+        assert!(samples.iter().all(|sample| sample.is_finite()), "channel {name} is finite");
+    }
+    assert!(image.channels["G"].iter().any(|sample| *sample > 0.0), "the image is not black");
+    image
+}
+
+#[test]
+fn the_unchanged_scene_renders() {
+    let image = assert_renders(&scene("", ""), &[]);
+    assert_eq!([image.width, image.height], [16, 12]);
+}
+
+#[test]
+fn a_missing_scene_is_named() {
+    Folder::new().run(&RENDER).assert(1, &["error: scene.toml: cannot read: No such file"]);
+}
+
+#[test]
+fn text_that_is_no_toml_has_line_and_column() {
+    assert_refused(&scene("width = 16", "width = = 16"), &["error: scene.toml:7:9: "]);
+    assert_refused(&scene("width = 16", "width = \"wide\""), &["error: scene.toml:7:9: ", "u32"]);
+    let folder = scene("", "");
+    folder.write("scene.toml", &SCENE.as_bytes()[..SCENE.len() / 2]);
+    assert_refused(&folder, &["error: scene.toml:"]);
+    folder.write("scene.toml", b"\xff\xfe binary");
+    assert_refused(&folder, &["error: scene.toml: not a text file: byte 0 is not UTF-8"]);
+}
+
+#[test]
+fn an_unknown_key_has_line_and_column() {
+    let folder = scene("reflectance = [", "reflectanse = [");
+    assert_refused(&folder, &["error: scene.toml:16:1: ", "reflectanse", "reflectance"]);
+    let folder = scene("vertical_fov_deg = 45.0", "vertical_fov_deg = 45.0\nfov = 1");
+    assert_refused(&folder, &["error: scene.toml:5:1: ", "fov", "vertical_fov_deg"]);
+}
+
+#[test]
+fn numbers_that_cannot_be_rendered_are_named() {
+    let cases = [
+        ("look_at = [0.0, 0.0, 0.0]", "look_at = [nan, 0.0, 0.0]", "camera.look_at"),
+        ("look_at = [0.0, 0.0, 0.0]", "look_at = [0.0, 0.0, 3.0]", "must differ"),
+        ("vertical_fov_deg = 45.0", "vertical_fov_deg = 180.0", "camera.vertical_fov_deg"),
+        ("[1.0, 1.0, 1.0]", "[1.0, inf, 1.0]", "environment.constant"),
+        ("[1.0, 1.0, 1.0]", "[1.0, -1.0, 1.0]", "environment.constant"),
+        ("[0.5, 0.5, 0.5]", "[0.5, 1.5, 0.5]", "material `grey` (line 13): reflectance"),
+        ("material = \"grey\"", "material = \"gray\"", "unknown material `gray`"),
+        ("material = \"grey\"", "material = \"grey\"\nscale = 0", "scale must not be 0"),
+        ("width = 16", "width = 0", "film.width: expected 1 to"),
+        ("height = 12", "height = 1000000", "film.height: expected 1 to"),
+    ];
+    for (old, new, message) in cases {
+        assert_refused(&scene(old, new), &["error: scene.toml: ", message]);
+    }
+}
+
+#[test]
+fn impossible_sizes_are_refused() {
+    let folder = scene("", "");
+    for size in ["0x12", "16", "16x0", "100000x100000", "-1x5"] {
+        let run = folder.run(&["render", "scene.toml", &format!("--size={size}")]);
+        run.assert(2, &["--size", "expected WIDTHxHEIGHT"]);
+    }
+    for crop in ["0,0,0,5", "5,0,1,5", "1,2,3"] {
+        let run = folder.run(&["render", "scene.toml", &format!("--crop={crop}")]);
+        run.assert(2, &["--crop", "expected x0,y0,x1,y1"]);
+    }
+    // The film has 16×12 pixels.
+    let run = folder.run(&["render", "scene.toml", "--crop=0,0,17,5"]);
+    run.assert(2, &["crop", "16"]);
+}
+
+#[test]
+fn wrong_options_exit_with_2() {
+    let folder = scene("", "");
+    let cases = [
+        ("--spp=0", "--spp"),
+        ("--time=soon", "expected a duration"),
+        ("--error=-1", "--error"),
+        ("--sampler=best", "possible values: "),
+        ("--shadow-rays=0", "--shadow-rays"),
+        ("--depth=0", "--depth"),
+        ("--set=colour=1", "colour"),
+        ("--aov=beauty", "possible values: "),
+    ];
+    for (option, message) in cases {
+        folder.run(&["render", "scene.toml", option]).assert(2, &[message]);
+    }
+}
+
+#[test]
+fn other_scene_formats_are_refused_by_name() {
+    let folder = Folder::new();
+    for (name, format) in [("room.gltf", "a glTF file"), ("room.pbrt", "a pbrt file")] {
+        folder.write(name, "");
+        folder.run(&["render", name]).assert(1, &[&format!("error: {name}: "), format]);
+    }
+}
+
+#[test]
+fn a_missing_or_truncated_mesh_is_named() {
+    let folder = scene("quad.ply", "absent.ply");
+    assert_refused(&folder, &["error: absent.ply: cannot read: No such file"]);
+    let folder = scene("", "");
+    let whole = ply(&QUAD_VERTICES, &QUAD_FACES);
+    folder.write("quad.ply", &whole[..whole.len() - 8]);
+    assert_refused(&folder, &["error: quad.ply:", "truncated"]);
+    folder.write("quad.ply", &whole[..40]);
+    assert_refused(&folder, &["error: quad.ply:", "truncated: the file ends before `end_header`"]);
+    folder.write("quad.ply", "solid quad\n");
+    assert_refused(&folder, &["error: quad.ply:1:1: expected a PLY file that starts with `ply`"]);
+}
+
+#[test]
+fn an_index_out_of_range_is_named() {
+    let folder = scene("", "");
+    folder.write("quad.ply", ply(&QUAD_VERTICES, &["3 0 1 2", "3 0 2 4"]));
+    let parts =
+        ["error: quad.ply:15:", "face 1 of 2: vertex index 4 is out of range", "4 vertices"];
+    assert_refused(&folder, &parts);
+}
+
+#[test]
+fn triangles_that_cannot_be_hit_are_dropped_with_a_warning() {
+    let folder = scene("", "");
+    let vertices = ["-1 -1 0", "1 -1 0", "1 1 0", "-1 1 0", "nan 0 1", "inf 0 1"];
+    // Two good ones, one point, one line, one with a NaN corner, one with an infinite corner.
+    let faces = ["3 0 1 2", "3 0 2 3", "3 0 0 0", "3 0 1 1", "3 0 1 4", "3 2 3 5"];
+    folder.write("quad.ply", ply(&vertices, &faces));
+    let warnings = [
+        "object `quad` (quad.ply, line 18): dropped 2 triangles of zero area of 6",
+        "object `quad` (quad.ply, line 18): dropped 2 triangles with infinite or NaN corners of 6",
+    ];
+    assert_renders(&folder, &warnings);
+}
+
+#[test]
+fn a_mesh_without_triangles_leaves_the_environment() {
+    let folder = scene("", "");
+    folder.write("quad.ply", ply(&QUAD_VERTICES, &[]));
+    let image = assert_renders(&folder, &["the mesh has no triangles"]);
+    assert!(image.channels["R"].iter().all(|sample| (sample - 1.0).abs() < 1e-5));
+}
+
+#[test]
+fn a_missing_or_truncated_map_is_named() {
+    let with_map = |name: &str| scene("constant = [1.0, 1.0, 1.0]", &format!("map = {name:?}"));
+    for name in ["sky.hdr", "sky.exr", "sky.pfm"] {
+        let folder = with_map(name);
+        assert_refused(&folder, &[&format!("error: {name}: cannot read: No such file")]);
+        folder.write(name, "neither of them");
+        assert_refused(&folder, &[&format!("error: {name}: not a ")]);
+    }
+    let folder = with_map("sky.pfm");
+    let whole = pfm(1.0);
+    folder.write("sky.pfm", &whole[..whole.len() - 4]);
+    let parts = ["error: sky.pfm: truncated: 4×2 texels of 3 floats need 96 bytes, found 92"];
+    assert_refused(&folder, &parts);
+    let folder = with_map("sky.hdr");
+    folder.write("sky.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n\u{1}\u{1}");
+    assert_refused(&folder, &["error: sky.hdr: not a readable Radiance file"]);
+    let folder = with_map("sky.exr");
+    let mut image = Image::new(8, 4);
+    image.insert_triple(["R", "G", "B"], &[[1.0; 3]; 32]);
+    let path = folder.path().join("sky.exr");
+    image.write_exr(&path).unwrap();
+    let whole = fs::read(&path).unwrap();
+    folder.write("sky.exr", &whole[..whole.len() - 5]);
+    assert_refused(&folder, &["error: sky.exr: not a readable OpenEXR file"]);
+    let folder = with_map("sky.png");
+    assert_refused(&folder, &["sky.png: ", "expected .hdr, .exr or .pfm"]);
+}
+
+#[test]
+fn texels_that_are_not_radiance_never_reach_the_film() {
+    let folder = scene("constant = [1.0, 1.0, 1.0]", "map = \"sky.pfm\"");
+    let mut map = pfm(1.0);
+    let first = map.len() - 96;
+    for (texel, bad) in [(0, f32::NAN), (3, f32::INFINITY), (5, -1.0)] {
+        map[first + 12 * texel..first + 12 * texel + 4].copy_from_slice(&bad.to_le_bytes());
+    }
+    folder.write("sky.pfm", map);
+    assert_renders(&folder, &["sky.pfm: 3 of 8 texels are negative, infinite", "were set to 0"]);
+}
+
+/// The scene with a measured material in place of the diffuse one.
+fn measured(file: &str) -> Folder {
+    scene(
+        "type = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]",
+        &format!("type = \"measured\"\nfile = {file:?}"),
+    )
+}
+
+#[test]
+fn a_missing_or_truncated_brdf_is_named() {
+    for name in ["paint.binary", "paint.brdf"] {
+        let parts = [&*format!("error: {name}: cannot read: No such file")];
+        assert_refused(&measured(name), &parts);
+    }
+    let folder = measured("paint.binary");
+    let header = |sizes: [i32; 3]| sizes.iter().flat_map(|size| size.to_le_bytes()).collect();
+    let mut bytes: Vec<u8> = header([90, 90, 180]);
+    bytes.extend([0; 100]);
+    folder.write("paint.binary", &bytes);
+    let parts =
+        ["error: paint.binary: truncated: expected a MERL file of 34992012 bytes, found 112"];
+    assert_refused(&folder, &parts);
+    folder.write("paint.binary", header([90, 90, 360]));
+    assert_refused(&folder, &["paint.binary: ", "90 × 90 × 180", "90 × 90 × 360"]);
+    let folder = measured("paint.brdf");
+    folder.write("paint.brdf", "3 450 550 650\n0.1 0 0.1 3.1 0.2 0.2\n");
+    assert_refused(&folder, &["error: paint.brdf:2:", "records of 7 numbers", "6 left over"]);
+    folder.write("paint.brdf", "3 450 550 650\n0.1 0 0.1 3.1 0.2 0.2 high\n");
+    assert_refused(&folder, &["error: paint.brdf:2:23: expected a number, found \"high\""]);
+}
+
+#[test]
+fn a_nan_in_a_brdf_never_reaches_the_film() {
+    let folder = measured("paint.brdf");
+    let mut text = String::from("3 450 550 650\n");
+    for theta_in in [10, 30, 50, 70] {
+        for theta_out in [5, 25, 45, 65] {
+            for phi in (-150..=180).step_by(30) {
+                let [a, b, c] = [theta_in, theta_out, phi].map(|deg| f64::from(deg).to_radians());
+                let value = if (theta_in, theta_out, phi) == (30, 25, 0) { "nan" } else { "0.2" };
+                text += &format!("{a} 0 {b} {c} {value} 0.2 0.2\n");
+            }
+        }
+    }
+    folder.write("paint.brdf", text);
+    assert_renders(&folder, &["paint.brdf", "1 records that are not finite"]);
+}
+
+#[test]
+fn no_device_is_explained() {
+    let folder = scene("", "");
+    for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
+        let mut command = program(folder.path());
+        command.args(RENDER).env_remove("VK_DRIVER_FILES").env_remove("VK_ICD_FILENAMES");
+        command.env(variable, "/nonexistent");
+        let run = Run::of(&command.output().unwrap());
+        run.assert(1, &["finds no driver", "help: ", "./setup"]);
+    }
+    let run = folder.run(&["render", "scene.toml", "--device=no such device"]);
+    run.assert(1, &["no Vulkan device matches --device no such device", "help: "]);
+}
+
+#[test]
+fn a_full_disk_is_reported_and_the_older_image_kept() {
+    let folder = scene("", "");
+    folder.write("out.exr", "older image");
+    let before = folder.files();
+    // A limit on the size of files stands in for a full disk: writes past it fail, once the signal
+    // that would end the process is ignored. The caches do without their files.
+    let mut shell = Command::new("sh");
+    shell.args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$@\"", "sh"]);
+    let rendering = program(folder.path());
+    shell.arg(rendering.get_program()).args(RENDER).current_dir(folder.path());
+    for (name, value) in rendering.get_envs() {
+        if let Some(value) = value {
+            shell.env(name, value);
+        }
+    }
+    let run = Run::of(&shell.output().unwrap());
+    run.assert(1, &["error: out.exr: cannot write: File too large"]);
+    assert_eq!(folder.files(), before, "no temporary file is left");
+    assert_eq!(fs::read(folder.path().join("out.exr")).unwrap(), b"older image");
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_named() {
+    let folder = scene("", "");
+    folder.write("file", "");
+    let run = folder.run(&["render", "scene.toml", "--spp=2", "-o", "file/out.exr"]);
+    run.assert(1, &["error: file", "cannot "]);
+    fs::create_dir(folder.path().join("folder.exr")).unwrap();
+    let run = folder.run(&["render", "scene.toml", "--spp=2", "-o", "folder.exr"]);
+    run.assert(1, &["error: folder.exr: cannot write"]);
+}
+
+#[test]
+fn an_interrupt_writes_what_there_is() {
+    const LONGEST: Duration = Duration::from_secs(120);
+    let folder = scene("", "");
+    let mut child = program(folder.path())
+        .args(["render", "scene.toml", "--spp=100000000", "-o", "out.exr"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // The device is named once the program listens for interrupts.
+    let mut messages = BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    while !line.contains("device: ") {
+        line.clear();
+        assert_ne!(messages.read_line(&mut line).unwrap(), 0, "the program ended early");
+    }
+    let rest = thread::spawn(move || {
+        let mut text = String::new();
+        messages.read_to_string(&mut text).map(|_| text)
+    });
+    let signal = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(signal.success());
+    let start = Instant::now();
+    let status = loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            break status;
+        }
+        if start.elapsed() > LONGEST {
+            child.kill().unwrap();
+        }
+        thread::sleep(Duration::from_millis(20));
+    };
+    let messages = rest.join().unwrap().unwrap();
+    assert_eq!(status.code(), Some(130), "messages:\n{messages}");
+    assert!(messages.contains("interrupted"), "{messages}");
+    let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+    let samples = &image.attributes["samplesPerPixel"];
+    assert!(matches!(samples, Attribute::Integer(1..100_000_000)), "{samples:?}");
+    assert!(image.channels["R"].iter().all(|sample| sample.is_finite() && *sample > 0.0));
+}
