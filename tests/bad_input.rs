@@ -138,6 +138,7 @@ fn numbers_that_cannot_be_rendered_are_named() {
         ("[0.5, 0.5, 0.5]", "[0.5, 1.5, 0.5]", "material `grey` (line 13): reflectance"),
         ("material = \"grey\"", "material = \"gray\"", "unknown material `gray`"),
         ("material = \"grey\"", "material = \"grey\"\nscale = 0", "scale must not be 0"),
+        ("material = \"grey\"", "material = \"grey\"\nscale = 1e20", "expected at most 1e9 m"),
         ("width = 16", "width = 0", "film.width: expected 1 to"),
         ("height = 12", "height = 1000000", "film.height: expected 1 to"),
     ];
@@ -173,6 +174,8 @@ fn wrong_options_exit_with_2() {
         ("--shadow-rays=0", "--shadow-rays"),
         ("--depth=0", "--depth"),
         ("--set=colour=1", "colour"),
+        ("--sample-offset=4294967295", "the last sample must be below 4294967295"),
+        ("--output=out.png", "expected a name that ends in .exr"),
         ("--aov=beauty", "possible values: "),
     ];
     for (option, message) in cases {
@@ -197,7 +200,7 @@ fn a_missing_or_truncated_mesh_is_named() {
     let whole = ply(&QUAD_VERTICES, &QUAD_FACES);
     folder.write("quad.ply", &whole[..whole.len() - 8]);
     assert_refused(&folder, &["error: quad.ply:", "truncated"]);
-    folder.write("quad.ply", &whole[..40]);
+    folder.write("quad.ply", &whole[..whole.find("end_header").unwrap()]);
     assert_refused(&folder, &["error: quad.ply:", "truncated: the file ends before `end_header`"]);
     folder.write("quad.ply", "solid quad\n");
     assert_refused(&folder, &["error: quad.ply:1:1: expected a PLY file that starts with `ply`"]);
@@ -342,6 +345,9 @@ fn a_full_disk_is_reported_and_the_older_image_kept() {
     let folder = scene("", "");
     folder.write("out.exr", "older image");
     let before = folder.files();
+    // Every write to this device fails for want of space.
+    let run = folder.run(&["render", "scene.toml", "--spp=2", "--output=/dev/full"]);
+    run.assert(1, &["error: /dev/full: cannot write: No space left on device"]);
     // A limit on the size of files stands in for a full disk: writes past it fail, once the signal
     // that would end the process is ignored. The caches do without their files.
     let mut shell = Command::new("sh");
@@ -368,6 +374,7 @@ fn an_output_that_cannot_be_written_is_named() {
     fs::create_dir(folder.path().join("folder.exr")).unwrap();
     let run = folder.run(&["render", "scene.toml", "--spp=2", "-o", "folder.exr"]);
     run.assert(1, &["error: folder.exr: cannot write"]);
+    assert!(!run.messages.contains("2 spp"), "found before the work:\n{}", run.messages);
 }
 
 #[test]

@@ -16,8 +16,8 @@ use super::{
 use crate::{
     error::{Error, Result},
     film::{
-        Aov, Checkpoint, Metadata, SampleRange, Statistics, Sums, checkpoint::checkpoint_path,
-        png::write_preview,
+        Aov, Checkpoint, Metadata, SampleRange, Statistics, Sums, check_writable,
+        checkpoint::checkpoint_path, is_special_file, png::write_preview,
     },
     gpu::Device,
     renderer::{Renderer, Settings, Window},
@@ -57,7 +57,7 @@ pub struct Arguments {
     #[arg(long, value_name = "E")]
     pub error: Option<f64>,
     /// Directions traced at every vertex of every camera path.
-    #[arg(long, value_name = "N", default_value_t = 5)]
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
     pub shadow_rays: u32,
     /// Path vertices at which environment light is gathered; 1 is direct light.
     #[arg(long, value_name = "D", default_value_t = 1)]
@@ -165,6 +165,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let output =
         arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.exr", scene.name)));
+    // Before the work, not after it.
+    check_writable(&output)?;
 
     let device = Device::open(arguments.device.as_deref(), arguments.validate)?;
     if !arguments.quiet {
@@ -206,6 +208,15 @@ fn listen_for_interrupt() -> Arc<AtomicBool> {
 }
 
 fn settings(arguments: &Arguments) -> Result<Settings> {
+    if let Some(output) = &arguments.output
+        && output.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("exr"))
+        && !is_special_file(output)
+    {
+        return Err(Error::usage(format!(
+            "--output {}: expected a name that ends in .exr; --png writes a preview beside it",
+            output.display()
+        )));
+    }
     let mut parameters = Parameters::default();
     for assignment in &arguments.set {
         parameters.set(assignment)?;
@@ -214,6 +225,14 @@ fn settings(arguments: &Arguments) -> Result<Settings> {
         && (error.is_nan() || error <= 0.0)
     {
         return Err(Error::usage(format!("--error {error}: expected a positive number")));
+    }
+    let spp = arguments.spp.unwrap_or(DEFAULT_SPP);
+    if arguments.sample_offset.checked_add(spp).is_none() {
+        return Err(Error::usage(format!(
+            "--sample-offset {} and {spp} samples per pixel: the last sample must be below {}",
+            arguments.sample_offset,
+            u32::MAX
+        )));
     }
     if !arguments.exposure.is_finite() {
         return Err(Error::usage("--exposure: expected a finite number of stops"));

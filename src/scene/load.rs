@@ -23,6 +23,7 @@ use super::{
     transform::Transform,
 };
 use crate::{
+    accel::MAX_COORDINATE,
     brdf::table::MeasuredTable,
     error::{Error, Result},
 };
@@ -243,7 +244,10 @@ impl Loader<'_> {
             let kind = self.material_kind(&label, &entry.kind, &mut tables)?;
             materials.push(Material { name: entry.name.clone(), kind });
         }
-        warnings.extend(tables.values().flat_map(|table| table.warnings.iter().cloned()));
+        for (path, table) in &tables {
+            let named = |warning: &String| format!("{}: {warning}", path.display());
+            warnings.extend(table.warnings.iter().map(named));
+        }
         Ok(materials)
     }
 
@@ -431,6 +435,18 @@ impl Loader<'_> {
         }
     }
 
+    /// Refuses an object that lies too far out for traversal.
+    fn check_extent(&self, label: &str, positions: &[[f32; 3]]) -> Result<()> {
+        let distances = positions.iter().flatten().map(|coordinate| coordinate.abs());
+        let farthest = distances.fold(0.0, f32::max);
+        self.check(farthest <= MAX_COORDINATE, || {
+            format!(
+                "{label}: a vertex has the coordinate {farthest:e}; expected at most \
+                 {MAX_COORDINATE:e} m: scale or move the object"
+            )
+        })
+    }
+
     /// Appends one object to the geometry, and the materials of its mesh file where it names none.
     fn place(
         &self,
@@ -443,6 +459,7 @@ impl Loader<'_> {
     ) -> Result<()> {
         let label = object_label(index, object);
         let transform = Transform::new(object.scale, object.rotate_deg, object.translate);
+        let first_vertex = geometry.positions.len();
         let named = object
             .material
             .as_ref()
@@ -469,6 +486,7 @@ impl Loader<'_> {
             })
         };
         let of = mesh.triangles.len();
+        self.check_extent(&label, &geometry.positions[first_vertex..])?;
         for (count, what) in [
             (dropped.degenerate, format!("triangles of zero area of {of}")),
             (dropped.non_finite, format!("triangles with infinite or NaN corners of {of}")),
