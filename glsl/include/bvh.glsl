@@ -17,6 +17,7 @@
 #ifndef BVH_GLSL
 #define BVH_GLSL
 
+#include "frame.glsl"
 #include "layout.glsl"
 
 // Triangles per page are 1 << TRIANGLE_PAGE_SHIFT; with one page the choice folds away.
@@ -29,6 +30,8 @@ const float FAR_AWAY = 3.0e38;
 // State of the ray in flight.
 vec3 bvh_origin;
 vec3 bvh_direction;
+// Frame around the direction: the z coordinate of a point in it is its distance along the ray.
+Frame bvh_frame;
 vec3 bvh_inverse_direction;
 // Octant of the direction in each byte: children are visited in the order of slot ^ octant.
 uint bvh_octant4;
@@ -53,6 +56,7 @@ float bvh_inverse(float x) {
 void bvh_start(vec3 origin, vec3 direction) {
     bvh_origin = origin;
     bvh_direction = direction;
+    bvh_frame = frame_from_normal(direction);
     bvh_inverse_direction =
         vec3(bvh_inverse(direction.x), bvh_inverse(direction.y), bvh_inverse(direction.z));
     bvh_octant4 = (direction.x < 0.0 ? 0u : 0x04040404u) | (direction.y < 0.0 ? 0u : 0x02020202u)
@@ -84,21 +88,16 @@ uvec4 triangle_texel(uint triangle, uint corner) {
     return texelFetch(triangles_3, texel);
 }
 
-// Twice the signed areas of the three sub-triangles seen along the ray: barycentric coordinates
-// before division by their sum. `a`, `b`, `c` are the vertices relative to the ray's origin.
+// Twice the signed areas of the three sub-triangles around the ray, given the vertices in its frame:
+// barycentric coordinates before division by their sum. All of one sign where the ray passes inside.
 //
-// Every edge enters by one cross product that only changes its sign when the edge is taken the other
-// way round, so that two triangles agree on which side of their common edge a ray passes: no ray
-// slips through (S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1),
-// 2013, whose shear to a common axis this form does without).
-vec3 edge_functions(vec3 a, vec3 b, vec3 c, vec3 direction) {
-    precise vec3 bc = c.yzx * b.zxy - c.zxy * b.yzx;
-    precise vec3 ca = a.yzx * c.zxy - a.zxy * c.yzx;
-    precise vec3 ab = b.yzx * a.zxy - b.zxy * a.yzx;
-    precise float u = direction.x * bc.x + direction.y * bc.y + direction.z * bc.z;
-    precise float v = direction.x * ca.x + direction.y * ca.y + direction.z * ca.z;
-    precise float w = direction.x * ab.x + direction.y * ab.y + direction.z * ab.z;
-    return vec3(u, v, w);
+// S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013: every vertex
+// is projected in one way whatever triangle it belongs to, and an edge taken the other way round only
+// changes the sign, so that no ray slips through between triangles that share vertices. Deviation:
+// projected along the ray by an orthonormal frame, without choosing axes for a shear.
+vec3 edge_functions(vec3 a, vec3 b, vec3 c) {
+    precise vec3 areas = vec3(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
+    return areas;
 }
 
 uint bvh_byte(uint word, int index) {
@@ -179,14 +178,13 @@ void bvh_test_triangle(bool any_hit) {
     uint bit = uint(findMSB(bvh_triangles_waiting.y));
     bvh_triangles_waiting.y &= ~(1u << bit);
     uint triangle = bvh_triangles_waiting.x + bit;
-    vec3 a = uintBitsToFloat(triangle_texel(triangle, 0u).xyz) - bvh_origin;
-    vec3 b = uintBitsToFloat(triangle_texel(triangle, 1u).xyz) - bvh_origin;
-    vec3 c = uintBitsToFloat(triangle_texel(triangle, 2u).xyz) - bvh_origin;
-    vec3 areas = edge_functions(a, b, c, bvh_direction);
+    vec3 a = to_local(bvh_frame, uintBitsToFloat(triangle_texel(triangle, 0u).xyz) - bvh_origin);
+    vec3 b = to_local(bvh_frame, uintBitsToFloat(triangle_texel(triangle, 1u).xyz) - bvh_origin);
+    vec3 c = to_local(bvh_frame, uintBitsToFloat(triangle_texel(triangle, 2u).xyz) - bvh_origin);
+    vec3 areas = edge_functions(a, b, c);
     float area = areas.x + areas.y + areas.z;
     // A weighted mean of the vertices' distances: within the triangle however badly conditioned.
-    float distance = (areas.x * dot(a, bvh_direction) + areas.y * dot(b, bvh_direction)
-        + areas.z * dot(c, bvh_direction)) / area;
+    float distance = (areas.x * a.z + areas.y * b.z + areas.z * c.z) / area;
     bool inside = min(areas.x, min(areas.y, areas.z)) >= 0.0
         || max(areas.x, max(areas.y, areas.z)) <= 0.0;
     if (inside && area != 0.0 && distance > 0.0 && distance < bvh_distance) {
@@ -249,7 +247,7 @@ vec3 consistent_normal(vec3 shading_normal, vec3 outgoing_direction, float least
 // Cosine with the outgoing direction below which shading normals are turned.
 const float LEAST_SHADING_COSINE = 0.01;
 
-// The surface that a ray meets on `triangle`; `distance` is what traversal found.
+// The surface that a ray meets on `triangle`, which traversal has found.
 Hit surface_at(uint triangle, vec3 origin, vec3 direction) {
     uvec4 texel_a = triangle_texel(triangle, 0u);
     uvec4 texel_b = triangle_texel(triangle, 1u);
@@ -257,14 +255,17 @@ Hit surface_at(uint triangle, vec3 origin, vec3 direction) {
     vec3 a = uintBitsToFloat(texel_a.xyz);
     vec3 b = uintBitsToFloat(texel_b.xyz);
     vec3 c = uintBitsToFloat(texel_c.xyz);
-    vec3 areas = edge_functions(a - origin, b - origin, c - origin, direction);
+    Frame frame = frame_from_normal(direction);
+    vec3 a_local = to_local(frame, a - origin);
+    vec3 b_local = to_local(frame, b - origin);
+    vec3 c_local = to_local(frame, c - origin);
+    vec3 areas = edge_functions(a_local, b_local, c_local);
     float area = areas.x + areas.y + areas.z;
     vec3 weights = areas / area;
 
     Hit hit;
     hit.position = weights.x * a + weights.y * b + weights.z * c;
-    hit.distance = (areas.x * dot(a - origin, direction) + areas.y * dot(b - origin, direction)
-        + areas.z * dot(c - origin, direction)) / area;
+    hit.distance = (areas.x * a_local.z + areas.y * b_local.z + areas.z * c_local.z) / area;
     hit.triangle = triangle;
     hit.material = triangle_materials[triangle];
     vec3 normal = cross(b - a, c - a);
@@ -294,9 +295,9 @@ Hit no_surface() {
     return Hit(vec3(0.0), NO_MATERIAL, vec3(0.0), -1.0, vec3(0.0), NO_TRIANGLE);
 }
 
-// How far a ray's origin is moved off its surface, as a share of the scene's size; 128 units of
-// roundoff. See docs/traversal.md for the error bound and the measured margin.
-const float RAY_OFFSET_SHARE = 7.62939453125e-6;
+// How far a ray's origin is moved off its surface, as a share of the scene's size: 64 units of
+// roundoff. docs/traversal.md has the error bound and the measured margin.
+const float RAY_OFFSET_SHARE = 3.814697265625e-6;
 
 // Distance by which ray origins are moved off their surface, metres. It is a fixed share of the
 // scene's size, read from the root node, so that a scene in millimetres and one in kilometres are

@@ -9,6 +9,7 @@
 //! [`Accel`] holds exactly what the shaders read (`glsl/include/bvh.glsl`); [`traverse`] is the Rust
 //! twin of the shader's traversal over the very same arrays.
 
+mod binary;
 pub mod normal;
 pub mod traverse;
 
@@ -16,9 +17,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3, Vec3A};
 use obvhs::{
     aabb::Aabb,
-    bvh2::reinsertion::ReinsertionOptimizer,
     cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh, node::CwBvhNode},
-    ploc::{PlocBuilder, PlocSearchDistance, SortPrecision},
 };
 
 use crate::{
@@ -208,15 +207,7 @@ fn build_tree(geometry: &Geometry, kept: &[u32]) -> Result<CwBvh> {
 
 fn build_tree_here(geometry: &Geometry, kept: &[u32]) -> CwBvh {
     let boxes = padded_boxes(geometry, kept);
-    let mut binary = PlocBuilder::with_capacity(kept.len()).build(
-        PlocSearchDistance::Medium,
-        &boxes,
-        (0..kept.len() as u32).collect(),
-        SortPrecision::U64,
-        3,
-    );
-    drop(boxes);
-    ReinsertionOptimizer::default().run(&mut binary, 0.05, None);
+    let binary = binary::build(boxes);
     bvh2_to_cwbvh(&binary, 3, true, false)
 }
 

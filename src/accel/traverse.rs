@@ -5,7 +5,10 @@
 use glam::{UVec2, Vec3};
 
 use super::{Accel, Node, TriangleRecord, VertexRecord, normal};
-use crate::gpu::constants::{BVH_STACK_ENTRIES, FLAT_NORMAL};
+use crate::{
+    frame::{Frame, frame_from_normal},
+    gpu::constants::{BVH_STACK_ENTRIES, FLAT_NORMAL},
+};
 
 /// What a ray meets first.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +47,7 @@ pub struct Work {
 const FAR_AWAY: f32 = 3.0e38;
 
 /// Share of the scene's size by which ray origins are moved off their surface.
-const RAY_OFFSET_SHARE: f32 = 7.629_394_5e-6;
+const RAY_OFFSET_SHARE: f32 = 3.814_697_3e-6;
 
 /// Cosine with the outgoing direction below which shading normals are turned.
 const LEAST_SHADING_COSINE: f32 = 0.01;
@@ -76,13 +79,11 @@ impl Accel {
     pub fn surface_at(&self, triangle: u32, origin: Vec3, direction: Vec3) -> Surface {
         let TriangleRecord { vertices } = self.triangle(triangle);
         let [a, b, c] = vertices.map(|vertex| Vec3::from_array(vertex.position));
-        let areas = edge_functions(a - origin, b - origin, c - origin, direction);
+        let frame = frame_from_normal(direction);
+        let local = [a, b, c].map(|vertex| frame.to_local(vertex - origin));
+        let areas = edge_functions(local);
         let area = areas.x + areas.y + areas.z;
         let weights = areas / area;
-        let distance = (areas.x * (a - origin).dot(direction)
-            + areas.y * (b - origin).dot(direction)
-            + areas.z * (c - origin).dot(direction))
-            / area;
         let normal = (b - a).cross(c - a);
         let normal = (normal / normal.abs().max_element()).normalize();
         let geometric_normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
@@ -98,7 +99,7 @@ impl Accel {
         let cosine = -geometric_normal.dot(direction);
         Surface {
             position: weights.x * a + weights.y * b + weights.z * c,
-            distance,
+            distance: depth(areas, local) / area,
             geometric_normal,
             shading_normal: consistent_normal(
                 shading_normal,
@@ -143,14 +144,16 @@ fn consistent_normal(shading_normal: Vec3, outgoing_direction: Vec3, least: f32)
     tangential * ((1.0 - least * least).sqrt() / size) + least * outgoing_direction
 }
 
-/// Twice the signed areas of the three sub-triangles seen along the ray. S. Woop, C. Benthin, I.
-/// Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, without the shear.
-fn edge_functions(a: Vec3, b: Vec3, c: Vec3, direction: Vec3) -> Vec3 {
-    let edge = |p: Vec3, q: Vec3| {
-        let cross = Vec3::new(p.y * q.z - p.z * q.y, p.z * q.x - p.x * q.z, p.x * q.y - p.y * q.x);
-        direction.x * cross.x + direction.y * cross.y + direction.z * cross.z
-    };
-    Vec3::new(edge(c, b), edge(a, c), edge(b, a))
+/// Twice the signed areas of the three sub-triangles around a ray, given the vertices in its frame.
+/// S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, with an
+/// orthonormal frame for the shear.
+fn edge_functions([a, b, c]: [Vec3; 3]) -> Vec3 {
+    Vec3::new(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x)
+}
+
+/// Mean of the vertices' distances along the ray, weighted by `areas`.
+fn depth(areas: Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
+    areas.x * a.z + areas.y * b.z + areas.z * c.z
 }
 
 /// Corner of a node's box.
@@ -182,6 +185,7 @@ fn inverse(x: f32) -> f32 {
 struct Traversal {
     origin: Vec3,
     direction: Vec3,
+    frame: Frame,
     inverse_direction: Vec3,
     octant4: u32,
     distance: f32,
@@ -200,6 +204,7 @@ impl Traversal {
         Self {
             origin,
             direction,
+            frame: frame_from_normal(direction),
             inverse_direction: Vec3::new(
                 inverse(direction.x),
                 inverse(direction.y),
@@ -296,16 +301,13 @@ impl Traversal {
         let bit = 31 - self.triangles_waiting.y.leading_zeros();
         self.triangles_waiting.y &= !(1 << bit);
         let triangle = self.triangles_waiting.x + bit;
-        let [a, b, c] = accel
+        let local = accel
             .triangle(triangle)
             .vertices
-            .map(|vertex| Vec3::from_array(vertex.position) - self.origin);
-        let areas = edge_functions(a, b, c, self.direction);
+            .map(|vertex| self.frame.to_local(Vec3::from_array(vertex.position) - self.origin));
+        let areas = edge_functions(local);
         let area = areas.x + areas.y + areas.z;
-        let distance = (areas.x * a.dot(self.direction)
-            + areas.y * b.dot(self.direction)
-            + areas.z * c.dot(self.direction))
-            / area;
+        let distance = depth(areas, local) / area;
         let inside = areas.min_element() >= 0.0 || areas.max_element() <= 0.0;
         if inside && area != 0.0 && distance > 0.0 && distance < self.distance {
             self.distance = distance;

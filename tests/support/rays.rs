@@ -1,0 +1,215 @@
+//! Geometry and rays for tests of traversal, and traversal on the device through the passes.
+#![allow(dead_code, reason = "every test binary uses a part of this")]
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+use fenestra::{
+    accel::Accel,
+    gpu::{
+        Buffer, Commands, DescriptorSet,
+        constants::{
+            BINDING_COUNTERS, BINDING_HIT_TEXELS, BINDING_HITS, BINDING_RAY_TEXELS,
+            BINDING_SHADOW_RAY_TEXELS, BINDING_VISIBILITY, SET_FILM, SET_SCENE, SET_WAVE,
+        },
+        layout::{Counters, Hit, Ray, ShadowRay, Wave},
+    },
+    pass::{
+        geometry::{GeometryBuffers, Schedule},
+        shadow::Shadow,
+        trace::Trace,
+    },
+    scene::Geometry,
+};
+use glam::{Quat, Vec3};
+
+/// A page that holds every test scene.
+pub const ONE_PAGE: u64 = 128 << 20;
+
+/// Schedule that refills the lanes of a subgroup of eight.
+pub const REFILLING: Schedule = Schedule { rays_per_invocation: 16, refill_lanes: 4 };
+
+/// SplitMix64 numbers in [0, 1).
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 40) as f32 / 16_777_216.0
+    }
+
+    pub fn point(&mut self) -> Vec3 {
+        Vec3::new(self.next(), self.next(), self.next()) * 2.0 - 1.0
+    }
+
+    pub fn direction(&mut self) -> Vec3 {
+        loop {
+            let p = self.point();
+            if (0.01..1.0).contains(&p.length_squared()) {
+                return p.normalize();
+            }
+        }
+    }
+}
+
+/// Adds a flat triangle.
+pub fn push(geometry: &mut Geometry, corners: [Vec3; 3]) {
+    let first = geometry.positions.len() as u32;
+    geometry.positions.extend(corners.map(|corner| corner.to_array()));
+    geometry.normals.extend([[0.0; 3]; 3]);
+    geometry.triangles.push([first, first + 1, first + 2]);
+    geometry.materials.push(geometry.materials.len() as u32 % 7);
+}
+
+/// Triangles of mixed sizes in the cube −1…1.
+pub fn soup(count: usize, seed: u64) -> Geometry {
+    let mut random = Random(seed);
+    let mut geometry = Geometry::default();
+    for _ in 0..count {
+        let centre = random.point();
+        let size = 0.01 * 50.0_f32.powf(random.next());
+        push(&mut geometry, [0; 3].map(|_| centre + size * random.point()));
+    }
+    geometry
+}
+
+/// The twelve triangles of a box with shared vertices, turned by `rotation`, added to `geometry`.
+pub fn push_box(geometry: &mut Geometry, centre: Vec3, half: Vec3, rotation: Quat) {
+    let first = geometry.positions.len() as u32;
+    for corner in 0..8_u32 {
+        let sign = Vec3::new(
+            if corner & 1 == 0 { -1.0 } else { 1.0 },
+            if corner & 2 == 0 { -1.0 } else { 1.0 },
+            if corner & 4 == 0 { -1.0 } else { 1.0 },
+        );
+        geometry.positions.push((centre + rotation * (sign * half)).to_array());
+        geometry.normals.push([0.0; 3]);
+    }
+    for [a, b, c, d] in
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    {
+        for triangle in [[a, b, c], [a, c, d]] {
+            geometry.triangles.push(triangle.map(|corner: u32| first + corner));
+            geometry.materials.push(0);
+        }
+    }
+}
+
+/// A closed sphere of `rows`·2·`rows` quads about the origin with smooth normals.
+pub fn sphere(rows: u32, radius: f32) -> Geometry {
+    let columns = 2 * rows;
+    let mut geometry = Geometry::default();
+    for row in 0..=rows {
+        for column in 0..columns {
+            let theta = std::f32::consts::PI * row as f32 / rows as f32;
+            let phi = std::f32::consts::TAU * column as f32 / columns as f32;
+            let normal = Vec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
+            // The poles are one point each, so that the mesh is closed.
+            let normal = match row {
+                0 => Vec3::Y,
+                row if row == rows => Vec3::NEG_Y,
+                _ => normal.normalize(),
+            };
+            geometry.positions.push((radius * normal).to_array());
+            geometry.normals.push(normal.to_array());
+        }
+    }
+    for row in 0..rows {
+        for column in 0..columns {
+            let next = (column + 1) % columns;
+            let (a, b) = (row * columns + column, row * columns + next);
+            let (c, d) = (a + columns, b + columns);
+            for triangle in [[a, b, d], [a, d, c]] {
+                geometry.triangles.push(triangle);
+                geometry.materials.push(3);
+            }
+        }
+    }
+    geometry
+}
+
+/// The same geometry, every coordinate multiplied by `scale`.
+pub fn scaled(geometry: &Geometry, scale: f32) -> Geometry {
+    let positions = geometry.positions.iter().map(|position| position.map(|x| x * scale)).collect();
+    Geometry { positions, ..geometry.clone() }
+}
+
+pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
+    Ray { origin: origin.into(), is_active: 1, direction: direction.into(), reserved: 0 }
+}
+
+fn wave(paths: usize, shadow_ray_count: u32) -> Wave {
+    Wave { pixel_count: paths as u32, sample_count: 1, shadow_ray_count, ..Wave::default() }
+}
+
+/// Geometry on the shared device.
+pub struct OnDevice {
+    geometry: GeometryBuffers,
+    scene: DescriptorSet,
+    counters: Buffer,
+    film: DescriptorSet,
+}
+
+impl OnDevice {
+    pub fn new(accel: &Accel) -> Self {
+        let device = crate::support::device();
+        let geometry = GeometryBuffers::new(device, accel).unwrap();
+        let scene = DescriptorSet::new(device, SET_SCENE, &geometry.bindings()).unwrap();
+        let counters = Buffer::zeroed(device, "counters", size_of::<Counters>() as u64).unwrap();
+        let film = DescriptorSet::new(device, SET_FILM, &[(BINDING_COUNTERS, &counters)]).unwrap();
+        Self { geometry, scene, counters, film }
+    }
+
+    /// Rays given up so far.
+    pub fn overruns(&self) -> u32 {
+        self.counters.download::<Counters>(1).unwrap()[0].traversal_overruns
+    }
+
+    /// Hits of `rays` by the pass.
+    pub fn trace(&self, rays: &[Ray], schedule: Schedule) -> Vec<Hit> {
+        let device = crate::support::device();
+        let ray_buffer = Buffer::from_slice(device, "rays", rays).unwrap();
+        let hits = Buffer::zeroed(device, "hits", (size_of::<Hit>() * rays.len()) as u64).unwrap();
+        let wave_set = DescriptorSet::new(
+            device,
+            SET_WAVE,
+            &[(BINDING_RAY_TEXELS, &ray_buffer), (BINDING_HITS, &hits)],
+        )
+        .unwrap();
+        let pass = Trace::new(device, &self.geometry, schedule).unwrap();
+        let mut commands = Commands::begin(device).unwrap();
+        pass.record(&mut commands, &[&self.scene, &wave_set, &self.film], &wave(rays.len(), 0));
+        commands.submit_and_wait().unwrap();
+        crate::support::assert_silent();
+        hits.download(rays.len()).unwrap()
+    }
+
+    /// Visibility of `shadow_rays`, a multiple of the number of hits, by the pass.
+    pub fn shadow(&self, hits: &[Hit], shadow_rays: &[ShadowRay], schedule: Schedule) -> Vec<u32> {
+        let device = crate::support::device();
+        let hit_buffer = Buffer::from_slice(device, "hits", hits).unwrap();
+        let ray_buffer = Buffer::from_slice(device, "shadow rays", shadow_rays).unwrap();
+        let visibility =
+            Buffer::from_slice(device, "visibility", &vec![0xdead_beef_u32; shadow_rays.len()])
+                .unwrap();
+        let wave_set = DescriptorSet::new(
+            device,
+            SET_WAVE,
+            &[
+                (BINDING_HIT_TEXELS, &hit_buffer),
+                (BINDING_SHADOW_RAY_TEXELS, &ray_buffer),
+                (BINDING_VISIBILITY, &visibility),
+            ],
+        )
+        .unwrap();
+        let pass = Shadow::new(device, &self.geometry, schedule).unwrap();
+        let mut commands = Commands::begin(device).unwrap();
+        let directions = (shadow_rays.len() / hits.len()) as u32;
+        let wave = wave(hits.len(), directions);
+        pass.record(&mut commands, &[&self.scene, &wave_set, &self.film], &wave);
+        commands.submit_and_wait().unwrap();
+        crate::support::assert_silent();
+        visibility.download(shadow_rays.len()).unwrap()
+    }
+}

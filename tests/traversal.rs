@@ -1,0 +1,506 @@
+//! Traversal: device against Rust twin against brute force against obvhs's own, degenerate input,
+//! watertight edges, self-intersection at every scale, pages, bounds.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+#[path = "support/rays.rs"]
+mod rays;
+mod support;
+
+use fenestra::{
+    accel::Accel,
+    gpu::{
+        constants::NO_MATERIAL,
+        layout::{Hit, Ray, ShadowRay},
+    },
+    pass::geometry::Schedule,
+    scene::Geometry,
+};
+use glam::{DVec3, Quat, Vec3};
+use obvhs::{
+    cwbvh::{CwBvh, node::CwBvhNode},
+    ray::RayHit,
+    rt_triangle::RtTriangle,
+};
+use rays::{ONE_PAGE, OnDevice, REFILLING, Random, push, push_box, ray, scaled, soup, sphere};
+use support::device;
+
+/// Distance of the nearest triangle by testing all of them in double precision, and the smallest
+/// barycentric coordinate there; a second result for the nearest one whose edges are only touched.
+fn brute_force(geometry: &Geometry, ray: &Ray) -> (Option<f64>, bool) {
+    let origin = Vec3::from(ray.origin).as_dvec3();
+    let direction = Vec3::from(ray.direction).as_dvec3();
+    let mut nearest: Option<f64> = None;
+    let mut doubtful = false;
+    for triangle in &geometry.triangles {
+        let [a, b, c] = triangle.map(|v| Vec3::from(geometry.positions[v as usize]).as_dvec3());
+        let normal = (b - a).cross(c - a);
+        let along = normal.dot(direction);
+        if normal == DVec3::ZERO {
+            continue;
+        }
+        if along.abs() < 1e-5 * normal.length() {
+            // Seen edge on: whether it is hit is a matter of rounding.
+            let closest = (a - origin).dot(normal).abs() < 1e-5 * normal.length();
+            doubtful |= closest;
+            continue;
+        }
+        let distance = normal.dot(a - origin) / along;
+        let point = origin + distance * direction;
+        let area = normal.length_squared();
+        let smallest = [(b, c), (c, a), (a, b)]
+            .map(|(p, q)| (q - p).cross(point - p).dot(normal) / area)
+            .into_iter()
+            .fold(f64::INFINITY, f64::min);
+        let size = (a - origin).abs().max_element().max((b - a).abs().max_element());
+        if smallest.abs() < 1e-4 || distance.abs() < 1e-5 * size {
+            doubtful |= smallest > -1e-4;
+        }
+        if smallest >= 0.0 && distance > 0.0 && nearest.is_none_or(|nearest| distance < nearest) {
+            nearest = Some(distance);
+        }
+    }
+    (nearest, doubtful)
+}
+
+/// Checks the device, under both schedules, and the twin against brute force; returns the share of
+/// rays that brute force could not decide.
+fn check(name: &str, geometry: &Geometry, rays: &[Ray]) -> f64 {
+    let accel = Accel::build(geometry, ONE_PAGE).unwrap();
+    let on_device = OnDevice::new(&accel);
+    let single = on_device.trace(rays, Schedule::SINGLE);
+    let refilled = on_device.trace(rays, REFILLING);
+    assert_eq!(single, refilled, "{name}: the schedule changes hits");
+    assert_eq!(on_device.overruns(), 0, "{name}");
+    let size =
+        geometry.positions.iter().flatten().fold(0.0, |size: f64, x| size.max(x.abs().into()));
+    let mut doubtful = 0;
+    for (index, (ray, hit)) in rays.iter().zip(&single).enumerate() {
+        let twin = accel.closest(ray.origin.into(), ray.direction.into());
+        let distance = f64::from(hit.distance);
+        let found = (hit.material != NO_MATERIAL).then_some(distance);
+        assert_eq!(
+            found.is_some(),
+            twin.is_some(),
+            "{name}, ray {index} {ray:?}: device {found:?}, twin {twin:?}"
+        );
+        if let Some(twin) = twin {
+            assert!(
+                (distance - f64::from(twin.distance)).abs() <= 1e-5 * distance,
+                "{name}, ray {index}: device {hit:?}, twin {twin:?}"
+            );
+        }
+        let (expected, is_doubtful) = brute_force(geometry, ray);
+        if is_doubtful {
+            doubtful += 1;
+            continue;
+        }
+        match (found, expected) {
+            (None, None) => {}
+            (Some(found), Some(expected)) => assert!(
+                (found - expected).abs() <= 2e-5 * expected + 2e-6 * size,
+                "{name}, ray {index} {ray:?}: device {found}, brute force {expected}"
+            ),
+            _ => panic!("{name}, ray {index} {ray:?}: device {found:?}, brute force {expected:?}"),
+        }
+    }
+    doubtful as f64 / rays.len() as f64
+}
+
+fn random_rays(count: usize, seed: u64, scale: f32) -> Vec<Ray> {
+    let mut random = Random(seed);
+    (0..count).map(|_| ray(1.5 * scale * random.point(), random.direction())).collect()
+}
+
+#[test]
+fn random_soups_match_brute_force() {
+    for (count, seed) in [(1, 1), (2, 2), (9, 3), (100, 4), (3000, 5)] {
+        let geometry = soup(count, seed);
+        let doubtful = check("soup", &geometry, &random_rays(2000, 100 + seed, 1.0));
+        assert!(doubtful < 0.05, "{count} triangles: {doubtful} of the rays undecided");
+    }
+}
+
+#[test]
+fn an_empty_scene_is_left_by_every_ray() {
+    let mut zero_area = Geometry::default();
+    push(&mut zero_area, [Vec3::ZERO, Vec3::X, Vec3::X]);
+    push(&mut zero_area, [Vec3::ONE; 3]);
+    for geometry in [Geometry::default(), zero_area] {
+        let accel = Accel::build(&geometry, ONE_PAGE).unwrap();
+        assert_eq!(accel.triangle_count(), 0);
+        let on_device = OnDevice::new(&accel);
+        let rays = random_rays(100, 7, 1.0);
+        for hit in on_device.trace(&rays, REFILLING) {
+            assert_eq!((hit.material, hit.distance), (NO_MATERIAL, -1.0));
+        }
+        let hits = vec![Hit::default(); 100];
+        let towards = ShadowRay { direction: [0.0, 1.0, 0.0], contribution: [1.0; 3] };
+        let visible = on_device.shadow(&hits, &[towards; 300], REFILLING);
+        assert!(visible.iter().all(|visible| *visible == 1));
+        assert_eq!(accel.closest(Vec3::ONE, Vec3::X), None);
+    }
+}
+
+#[test]
+fn degenerate_triangles_do_no_harm() {
+    let mut geometry = soup(300, 11);
+    let mut random = Random(12);
+    for _ in 0..300 {
+        let (p, q) = (random.point(), random.point());
+        // Points, segments, needles.
+        push(&mut geometry, [p, p, p]);
+        push(&mut geometry, [p, q, q]);
+        push(&mut geometry, [p, q, p.lerp(q, 0.5) + 1e-7 * random.point()]);
+        push(&mut geometry, [p, q, p + 1e-4 * random.point()]);
+    }
+    let doubtful = check("degenerate", &geometry, &random_rays(2000, 13, 1.0));
+    assert!(doubtful < 0.1, "{doubtful}");
+}
+
+#[test]
+fn coincident_triangles_are_one() {
+    let mut geometry = Geometry::default();
+    for _ in 0..2000 {
+        push(&mut geometry, [Vec3::ZERO, Vec3::X, Vec3::Y]);
+    }
+    check("coincident", &geometry, &random_rays(500, 17, 1.0));
+}
+
+#[test]
+fn small_and_large_coordinates_match_brute_force() {
+    for scale in [1e-9, 1e-3, 1e3, 1e8] {
+        let geometry = scaled(&soup(500, 21), scale);
+        let doubtful = check(&format!("scale {scale}"), &geometry, &random_rays(1000, 22, scale));
+        assert!(doubtful < 0.1, "scale {scale}: {doubtful}");
+    }
+}
+
+/// Rays along the axes and in the planes of the faces of a grid of boxes.
+#[test]
+fn axis_aligned_boxes_and_rays() {
+    let mut geometry = Geometry::default();
+    for index in 0..27_u32 {
+        let cell = Vec3::new((index % 3) as f32, (index / 3 % 3) as f32, (index / 9) as f32);
+        push_box(&mut geometry, 2.0 * cell, Vec3::splat(0.75), Quat::IDENTITY);
+    }
+    let mut rays = Vec::new();
+    let mut random = Random(31);
+    for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+        for sign in [-1.0, 1.0] {
+            for _ in 0..500 {
+                let origin = 4.0 * random.point() + 2.0;
+                rays.push(ray(origin, sign * axis));
+                // In the planes of faces, along edges and through corners.
+                let on_plane = (origin * 4.0).round() / 4.0;
+                rays.push(ray(on_plane, sign * axis));
+                let slanted = (random.direction() * (Vec3::ONE - axis)).normalize();
+                rays.push(ray(on_plane, slanted));
+                rays.push(ray(origin, slanted));
+            }
+        }
+    }
+    let doubtful = check("boxes", &geometry, &rays);
+    assert!(doubtful < 0.6, "{doubtful}");
+}
+
+#[test]
+fn obvhs_finds_the_same() {
+    let geometry = soup(2000, 41);
+    let accel = Accel::build(&geometry, ONE_PAGE).unwrap();
+    let triangles: Vec<RtTriangle> = (0..accel.triangle_count() as u32)
+        .map(|index| {
+            let [a, b, c] = accel.triangle(index).vertices.map(|v| v.position.into());
+            RtTriangle::new(a, b, c)
+        })
+        .collect();
+    let bvh = CwBvh {
+        nodes: bytemuck::cast_slice::<_, CwBvhNode>(&accel.nodes).to_vec(),
+        ..CwBvh::default()
+    };
+    let rays = random_rays(20_000, 42, 1.0);
+    let hits = OnDevice::new(&accel).trace(&rays, REFILLING);
+    let mut different = 0;
+    for (ray, hit) in rays.iter().zip(&hits) {
+        let theirs = obvhs::ray::Ray::new_inf(ray.origin.into(), ray.direction.into());
+        let mut nearest = RayHit::none();
+        bvh.ray_traverse(theirs, &mut nearest, |ray, index| triangles[index].intersect(ray));
+        let ours = if hit.distance < 0.0 { f32::INFINITY } else { hit.distance };
+        different +=
+            usize::from(ours != nearest.t && (ours - nearest.t).abs() > 1e-6 + 1e-5 * ours);
+    }
+    // Rays through edges are decided by rounding.
+    assert!(different <= 2, "{different} of 20,000 rays differ");
+}
+
+/// Rays from inside at the vertices and edges of closed meshes: none may get out.
+#[test]
+fn closed_meshes_do_not_leak() {
+    let mut turned = Geometry::default();
+    push_box(&mut turned, Vec3::ZERO, Vec3::new(3.0, 1.5, 4.0), Quat::from_rotation_y(0.7));
+    let mut straight = Geometry::default();
+    push_box(&mut straight, Vec3::ZERO, Vec3::new(3.0, 1.5, 4.0), Quat::IDENTITY);
+    let far_away = {
+        let mut geometry = sphere(24, 1.0);
+        for position in &mut geometry.positions {
+            position[0] += 100.0;
+        }
+        geometry
+    };
+    for (name, geometry, centre) in [
+        ("sphere", sphere(24, 1.0), Vec3::ZERO),
+        ("sphere at 100 m", far_away, 100.0 * Vec3::X),
+        ("turned box", turned, Vec3::ZERO),
+        ("box", straight, Vec3::ZERO),
+    ] {
+        let mut random = Random(51);
+        let mut rays = Vec::new();
+        while rays.len() < 40_000 {
+            let pick = (random.next() * geometry.triangles.len() as f32) as usize;
+            let corners = geometry.triangles[pick.min(geometry.triangles.len() - 1)];
+            let [a, b, _] = corners.map(|v| Vec3::from(geometry.positions[v as usize]));
+            let origin = centre + 0.3 * random.point();
+            let target = match rays.len() % 3 {
+                0 => a,
+                1 => a.lerp(b, 0.5),
+                _ => a.lerp(b, random.next()),
+            };
+            rays.push(ray(origin, (target - origin).normalize()));
+        }
+        let accel = Accel::build(&geometry, ONE_PAGE).unwrap();
+        let on_device = OnDevice::new(&accel);
+        let hits = on_device.trace(&rays, REFILLING);
+        let leaks = hits.iter().filter(|hit| hit.material == NO_MATERIAL).count();
+        assert_eq!(leaks, 0, "{name}: {leaks} of {} rays leak", rays.len());
+    }
+}
+
+/// Hits inside and outside closed meshes of slivers, and rays that leave them to either side.
+fn leaving_rays(geometry: &Geometry, scale: f32, count: usize) -> (Vec<Hit>, Vec<ShadowRay>) {
+    let mut random = Random(61);
+    let mut hits = Vec::new();
+    let mut shadow_rays = Vec::new();
+    for _ in 0..count {
+        let pick = (random.next() * geometry.triangles.len() as f32) as usize;
+        let corners = geometry.triangles[pick.min(geometry.triangles.len() - 1)];
+        let [a, b, c] = corners.map(|v| Vec3::from(geometry.positions[v as usize]));
+        let (u, v) = (random.next(), random.next());
+        let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+        // Not on an edge: there the surface beyond it would have to be left as well.
+        let (u, v) = (0.002 + 0.994 * u, 0.002 + 0.994 * v);
+        let normal = ((b - a) / scale).cross((c - a) / scale).normalize();
+        hits.push(Hit {
+            position: ((1.0 - u - v) * a + u * b + v * c).into(),
+            geometric_normal: normal.into(),
+            ..Hit::default()
+        });
+        // Half of them at grazing angles, but not so that rounding decides which side they go to.
+        let along = random.direction();
+        let cosine = random.next().max(1e-3) * if random.next() < 0.5 { 1.0 } else { 1e-2 };
+        let outward = (along - along.dot(normal) * normal).normalize()
+            * (1.0 - cosine * cosine).sqrt()
+            + cosine * normal;
+        shadow_rays.push(ShadowRay { direction: outward.into(), contribution: [1.0; 3] });
+    }
+    (hits, shadow_rays)
+}
+
+#[test]
+fn rays_leave_their_surface_at_every_scale() {
+    // A convex body seen from outside: whatever leaves it must not meet it again.
+    for rotation in [Quat::IDENTITY, Quat::from_euler(glam::EulerRot::XYZ, 0.3, 0.7, 1.1)] {
+        for half in
+            [Vec3::new(3.0, 1.5, 4.0), Vec3::new(3.0, 0.01, 4.0), Vec3::new(4.0, 0.02, 0.02)]
+        {
+            let mut geometry = Geometry::default();
+            push_box(&mut geometry, Vec3::new(0.5, 1.0, -0.5), half, rotation);
+            for scale in [1.0, 1e-3, 1e3, 1.0 / 1024.0, 1024.0] {
+                let geometry = scaled(&geometry, scale);
+                let accel = Accel::build(&geometry, ONE_PAGE).unwrap();
+                let (hits, outward) = leaving_rays(&geometry, scale, 20_000);
+                let on_device = OnDevice::new(&accel);
+                let visible = on_device.shadow(&hits, &outward, REFILLING);
+                let blocked = visible.iter().filter(|visible| **visible == 0).count();
+                assert_eq!(blocked, 0, "outside, half size {half}, scale {scale}");
+                let inward: Vec<ShadowRay> = outward
+                    .iter()
+                    .map(|ray| ShadowRay { direction: ray.direction.map(|x| -x), ..*ray })
+                    .collect();
+                let visible = on_device.shadow(&hits, &inward, REFILLING);
+                let leaks = visible.iter().filter(|visible| **visible == 1).count();
+                assert_eq!(leaks, 0, "inside, half size {half}, scale {scale}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_power_of_two_of_scale_changes_nothing() {
+    let geometry = soup(1000, 71);
+    let rays = random_rays(3000, 72, 1.0);
+    let unscaled = Accel::build(&geometry, ONE_PAGE).unwrap();
+    let reference = OnDevice::new(&unscaled).trace(&rays, REFILLING);
+    for scale in [1024.0, 1.0 / 1024.0] {
+        let accel = Accel::build(&scaled(&geometry, scale), ONE_PAGE).unwrap();
+        assert_eq!(accel.ray_offset(), scale * unscaled.ray_offset());
+        let rays: Vec<Ray> =
+            rays.iter().map(|ray| Ray { origin: ray.origin.map(|x| x * scale), ..*ray }).collect();
+        let hits = OnDevice::new(&accel).trace(&rays, REFILLING);
+        for (hit, reference) in hits.iter().zip(&reference) {
+            assert_eq!(hit.material, reference.material);
+            assert_eq!(hit.shading_normal, reference.shading_normal);
+            if hit.material != NO_MATERIAL {
+                assert_eq!(hit.distance, scale * reference.distance);
+            }
+        }
+    }
+}
+
+#[test]
+fn pages_of_triangles_make_no_difference() {
+    let geometry = soup(1000, 81);
+    let rays = random_rays(2000, 82, 1.0);
+    let whole = Accel::build(&geometry, ONE_PAGE).unwrap();
+    let reference = OnDevice::new(&whole).trace(&rays, REFILLING);
+    // 256, 512 and 1,024 triangles a page: four, two and one page.
+    for (page_bytes, pages) in [(48 * 256 + 47, 4), (48 * 512, 2), (48 * 1024, 1)] {
+        let accel = Accel::build(&geometry, page_bytes).unwrap();
+        assert_eq!(accel.triangle_pages.len(), pages);
+        assert_eq!(OnDevice::new(&accel).trace(&rays, REFILLING), reference, "{pages} pages");
+    }
+    let error = Accel::build(&geometry, 48 * 128).unwrap_err().to_string();
+    assert!(error.contains("1000 triangles") && error.contains("512"), "{error}");
+}
+
+#[test]
+fn rays_without_need_are_not_traced() {
+    let geometry = soup(200, 91);
+    let on_device = OnDevice::new(&Accel::build(&geometry, ONE_PAGE).unwrap());
+    let mut rays = random_rays(1000, 92, 1.0);
+    let all = on_device.trace(&rays, Schedule::SINGLE);
+    for ray in rays.iter_mut().skip(1).step_by(3) {
+        ray.is_active = 0;
+    }
+    for schedule in [Schedule::SINGLE, REFILLING] {
+        for (index, (hit, full)) in on_device.trace(&rays, schedule).iter().zip(&all).enumerate() {
+            if index % 3 == 1 {
+                assert_eq!((hit.material, hit.distance), (NO_MATERIAL, -1.0));
+            } else {
+                assert_eq!(hit, full);
+            }
+        }
+    }
+    // Visibility is 0 for a path that has ended and for a direction that brings nothing.
+    let mut hits = vec![Hit { position: [50.0, 0.0, 0.0], ..Hit::default() }; 77];
+    for hit in hits.iter_mut().step_by(5) {
+        hit.material = NO_MATERIAL;
+    }
+    let mut shadow_rays =
+        vec![ShadowRay { direction: [1.0, 0.0, 0.0], contribution: [0.0, 0.0, 1e-30] }; 5 * 77];
+    for ray in shadow_rays.iter_mut().step_by(3) {
+        ray.contribution = [0.0; 3];
+    }
+    for schedule in [Schedule::SINGLE, REFILLING] {
+        for (index, visible) in on_device.shadow(&hits, &shadow_rays, schedule).iter().enumerate() {
+            let expected = index % 77 % 5 != 0 && index % 3 != 0;
+            assert_eq!(*visible, u32::from(expected), "ray {index}");
+        }
+    }
+}
+
+#[test]
+fn shadow_rays_agree_with_closest_hits() {
+    let geometry = soup(2000, 101);
+    let accel = Accel::build(&geometry, ONE_PAGE).unwrap();
+    let on_device = OnDevice::new(&accel);
+    let hits: Vec<Hit> = on_device
+        .trace(&random_rays(3001, 102, 1.0), Schedule::SINGLE)
+        .into_iter()
+        .filter(|hit| hit.material != NO_MATERIAL)
+        .collect();
+    let mut random = Random(103);
+    let shadow_rays: Vec<ShadowRay> = (0..4 * hits.len())
+        .map(|_| ShadowRay { direction: random.direction().into(), contribution: [1.0; 3] })
+        .collect();
+    let single = on_device.shadow(&hits, &shadow_rays, Schedule::SINGLE);
+    let refilled = on_device.shadow(&hits, &shadow_rays, REFILLING);
+    assert_eq!(single, refilled);
+    let mut visible_count = 0;
+    for (index, (ray, visible)) in shadow_rays.iter().zip(&single).enumerate() {
+        let hit = &hits[index % hits.len()];
+        let direction = Vec3::from(ray.direction);
+        let origin =
+            accel.offset_ray_origin(hit.position.into(), hit.geometric_normal.into(), direction);
+        assert_eq!(*visible == 0, accel.is_occluded(origin, direction), "ray {index}");
+        assert_eq!(*visible == 0, accel.closest(origin, direction).is_some(), "ray {index}");
+        visible_count += visible;
+    }
+    // Both outcomes occur.
+    assert!((100..single.len() as u32 - 100).contains(&visible_count), "{visible_count}");
+}
+
+#[test]
+fn surfaces_are_consistent() {
+    let geometry = sphere(4, 1.0);
+    let accel = Accel::build(&geometry, ONE_PAGE).unwrap();
+    // From inside and from outside, many at grazing angles to the coarse sphere.
+    let rays = random_rays(20_000, 111, 1.0);
+    let mut turned = 0;
+    for (ray, hit) in rays.iter().zip(OnDevice::new(&accel).trace(&rays, REFILLING)) {
+        if hit.material == NO_MATERIAL {
+            continue;
+        }
+        assert_eq!(hit.material, 3);
+        let (origin, direction) = (Vec3::from(ray.origin), Vec3::from(ray.direction));
+        let position = Vec3::from(hit.position);
+        let geometric = Vec3::from(hit.geometric_normal);
+        let shading = Vec3::from(hit.shading_normal);
+        assert!((geometric.length() - 1.0).abs() < 1e-5 && (shading.length() - 1.0).abs() < 1e-5);
+        assert!(geometric.dot(direction) <= 0.0, "{hit:?}");
+        assert!(shading.dot(direction) < 0.0, "{hit:?}");
+        assert!(position.distance(origin + hit.distance * direction) < 1e-5, "{hit:?}");
+        let twin = accel.surface_at(hit.triangle, origin, direction);
+        assert!(twin.position.distance(position) < 1e-6, "{hit:?} {twin:?}");
+        assert!(twin.geometric_normal.distance(geometric) < 1e-5, "{hit:?} {twin:?}");
+        assert!(twin.shading_normal.distance(shading) < 1e-4, "{hit:?} {twin:?}");
+        // The interpolated normal of a sphere is its radius.
+        let side = if geometric.dot(position) > 0.0 { 1.0 } else { -1.0 };
+        if side * position.normalize().dot(direction) < -0.02 {
+            assert!(shading.distance(side * position.normalize()) < 0.1, "{hit:?}");
+        } else {
+            turned += 1;
+        }
+    }
+    assert!(turned > 20, "only {turned} grazing hits");
+}
+
+/// More triangles at one place than the steps of an invocation: counted, and still a hit.
+#[test]
+fn rays_that_take_too_long_are_counted() {
+    let mut geometry = Geometry::default();
+    for _ in 0..40_000 {
+        push(&mut geometry, [Vec3::ZERO, Vec3::X, Vec3::Y]);
+    }
+    let accel = Accel::build(&geometry, ONE_PAGE).unwrap();
+    let on_device = OnDevice::new(&accel);
+    let through = ray(Vec3::new(0.2, 0.2, 1.0), Vec3::NEG_Z);
+    let hits = on_device.trace(&[through; 8], Schedule::SINGLE);
+    assert!(hits.iter().all(|hit| hit.distance == 1.0));
+    assert_eq!(on_device.overruns(), 8);
+}
+
+#[test]
+fn impossible_geometry_is_refused() {
+    let mut geometry = soup(2, 121);
+    geometry.positions[4][1] = f32::NAN;
+    let error = Accel::build(&geometry, ONE_PAGE).unwrap_err().to_string();
+    assert!(error.contains("vertex 4") && error.contains("NaN"), "{error}");
+    geometry.positions[4][1] = 1e30;
+    let error = Accel::build(&geometry, ONE_PAGE).unwrap_err().to_string();
+    assert!(error.contains("vertex 4") && error.contains("1e9"), "{error}");
+    geometry.positions[4][1] = 0.0;
+    geometry.triangles[1][2] = 6;
+    let error = Accel::build(&geometry, ONE_PAGE).unwrap_err().to_string();
+    assert!(error.contains("triangle 1") && error.contains("vertex 6"), "{error}");
+    assert!(Accel::build(&soup(1, 1), 47).is_err());
+    assert!(device().capabilities().missing().is_empty());
+}
