@@ -160,7 +160,8 @@ fn read_exr(bytes: &[u8]) -> Result<Image, String> {
             }
         }
     }
-    let size = |size: Vec2<usize>| (size.width(), vec![Vec3::ZERO; size.area()]);
+    // Zeroed by the system on first use: a damaged header may claim what the file does not hold.
+    let size = |size: Vec2<usize>| (size.width(), bytemuck::zeroed_vec::<Vec3>(size.area()));
     let channels = exr::prelude::read().no_deep_data().largest_resolution_level();
     let read = Cursor::new(bytes);
     let (width, texels) = if names[0] == "Y" {
