@@ -349,15 +349,13 @@ impl Loader<'_> {
             }
             self.check_placement(&label, object)?;
             self.check_material(&label, object, materials)?;
-            if let ObjectSource::Mesh(mesh) = &object.source {
-                *uses.entry(self.folder.join(mesh)).or_default() += 1;
-            }
+            *uses.entry(self.mesh_key(object)).or_default() += 1;
         }
         // All meshes are read before any is placed, so that the arrays are allocated once.
         let mut meshes = HashMap::new();
         let (mut vertices, mut triangles) = (0, 0);
         for (index, object) in objects.iter().enumerate() {
-            let key = self.mesh_key(index, object);
+            let key = self.mesh_key(object);
             if !meshes.contains_key(&key) {
                 let mesh = match &object.source {
                     ObjectSource::Mesh(_) => Mesh::read(&key, warnings)?,
@@ -382,7 +380,7 @@ impl Loader<'_> {
         geometry.triangles.reserve_exact(triangles);
         geometry.materials.reserve_exact(triangles);
         for (index, object) in objects.iter().enumerate() {
-            let key = self.mesh_key(index, object);
+            let key = self.mesh_key(object);
             self.place(index, object, &meshes[&key], &mut geometry, materials, warnings)?;
             // A mesh is let go with its last use, so that a large one is not held twice for long.
             let left = uses.get_mut(&key).map_or(0, |left| {
@@ -396,11 +394,11 @@ impl Loader<'_> {
         Ok(geometry)
     }
 
-    /// What tells meshes apart: the path of a mesh file; shapes are all different.
-    fn mesh_key(&self, index: usize, object: &ObjectEntry) -> PathBuf {
+    /// What tells meshes apart: the path of a mesh file, the parameters of a shape.
+    fn mesh_key(&self, object: &ObjectEntry) -> PathBuf {
         match &object.source {
             ObjectSource::Mesh(mesh) => self.folder.join(mesh),
-            ObjectSource::Shape(_) => PathBuf::from(format!("shape of object {index}")),
+            ObjectSource::Shape(shape) => PathBuf::from(format!("{shape:?}")),
         }
     }
 

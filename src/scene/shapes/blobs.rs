@@ -5,7 +5,7 @@
 //! (Gibson, "Constrained elastic surface nets", 1998): a vertex in every cell of a grid that the surface
 //! passes, moved onto the surface along the gradient, and a quad around every edge it crosses.
 
-use glam::{DVec3, USizeVec3};
+use glam::{DVec3, USizeVec3, Vec3};
 use rayon::prelude::*;
 use serde::Deserialize;
 
@@ -88,8 +88,15 @@ impl Part {
     }
 }
 
+/// Cells along the side of a block, within which only the parts near it are looked at.
+const BLOCK_CELLS: usize = 8;
+
+/// Most by which a distance changes over a unit of length; 1 for true distances, more where the bound
+/// for ellipsoids is loose.
+const STEEPEST: f64 = 1.5;
+
 /// The joined distance: negative inside.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Field {
     added: Vec<Part>,
     carved: Vec<Part>,
@@ -109,6 +116,19 @@ impl Field {
 
     fn join(&self, parts: &[Part], point: DVec3) -> f64 {
         soft_minimum(parts.iter().map(|part| part.distance(point)), self.blend)
+    }
+
+    /// The field with those parts alone that matter within `reach` of `point`; the others add less than
+    /// exp(−36) to the sum.
+    fn near(&self, point: DVec3, reach: f64) -> Self {
+        let keep = |parts: &[Part]| -> Vec<Part> {
+            let distances: Vec<f64> = parts.iter().map(|part| part.distance(point)).collect();
+            let least = distances.iter().copied().fold(f64::INFINITY, f64::min);
+            let limit = least + 2.0 * STEEPEST * reach + 36.0 * self.blend;
+            let near = parts.iter().zip(distances).filter(|(_, distance)| *distance <= limit);
+            near.map(|(part, _)| *part).collect()
+        };
+        Self { added: keep(&self.added), carved: keep(&self.carved), blend: self.blend }
     }
 
     fn gradient(&self, point: DVec3, step: f64) -> DVec3 {
@@ -183,71 +203,151 @@ impl Blob {
     }
 }
 
-/// Surface of level 0 within `counts` cells of side `cell` from the corner `low`.
-fn surface_net(field: &Field, low: DVec3, cell: f64, counts: USizeVec3) -> Mesh {
-    let corners = counts + 1;
-    let corner_index = |at: USizeVec3| at.x + corners.x * (at.y + corners.y * at.z);
-    let at = |index: usize, sides: USizeVec3| {
-        USizeVec3::new(index % sides.x, index / sides.x % sides.y, index / (sides.x * sides.y))
-    };
-    let distances: Vec<f32> = (0..corners.element_product())
-        .into_par_iter()
-        .map(|index| field.distance(low + cell * at(index, corners).as_dvec3()) as f32)
-        .collect();
-    let inside = |corner: USizeVec3| distances[corner_index(corner)] < 0.0;
-    let axes = [USizeVec3::X, USizeVec3::Y, USizeVec3::Z];
-    let mut builder = Builder::default();
-    let mut vertices = vec![u32::MAX; counts.element_product()];
-    let cell_index = |at: USizeVec3| at.x + counts.x * (at.y + counts.y * at.z);
-    for (index, vertex) in vertices.iter_mut().enumerate() {
-        let first = at(index, counts);
+/// A grid of distances, and the fields that are enough in each of its blocks.
+struct Lattice {
+    low: DVec3,
+    cell: f64,
+    /// Cells along each axis; there is one corner more.
+    counts: USizeVec3,
+    distances: Vec<f32>,
+    block_counts: USizeVec3,
+    /// None where the surface is far.
+    blocks: Vec<Option<Field>>,
+}
+
+impl Lattice {
+    fn new(field: &Field, low: DVec3, cell: f64, counts: USizeVec3) -> Self {
+        let corners = counts + 1;
+        let block_counts = (corners + BLOCK_CELLS - 1) / BLOCK_CELLS;
+        // From the centre of a block to where its farthest vertex may lie, a cell beyond its corners.
+        let reach = 0.5 * 3.0_f64.sqrt() * (BLOCK_CELLS + 1) as f64 * cell;
+        let sampled: Vec<(f64, Option<Field>, Vec<f32>)> = (0..block_counts.element_product())
+            .into_par_iter()
+            .map(|block| {
+                let first = grid_position(block, block_counts) * BLOCK_CELLS;
+                let center = low + cell * (first.as_dvec3() + 0.5 * BLOCK_CELLS as f64);
+                let distance = field.distance(center);
+                if distance.abs() > STEEPEST * reach {
+                    return (distance, None, Vec::new());
+                }
+                let near = field.near(center, reach);
+                let side = USizeVec3::splat(BLOCK_CELLS);
+                let distances = (0..BLOCK_CELLS.pow(3))
+                    .map(|index| {
+                        let corner = first + grid_position(index, side);
+                        near.distance(low + cell * corner.as_dvec3()) as f32
+                    })
+                    .collect();
+                (distance, Some(near), distances)
+            })
+            .collect();
+        let distances = (0..corners.element_product())
+            .map(|index| {
+                let corner = grid_position(index, corners);
+                let (distance, _, distances) =
+                    &sampled[grid_index(corner / BLOCK_CELLS, block_counts)];
+                let within = grid_index(corner % BLOCK_CELLS, USizeVec3::splat(BLOCK_CELLS));
+                distances.get(within).copied().unwrap_or(*distance as f32)
+            })
+            .collect();
+        let blocks = sampled.into_iter().map(|(_, field, _)| field).collect();
+        Self { low, cell, counts, distances, block_counts, blocks }
+    }
+
+    fn distance(&self, corner: USizeVec3) -> f32 {
+        self.distances[grid_index(corner, self.counts + 1)]
+    }
+
+    fn is_inside(&self, corner: USizeVec3) -> bool {
+        self.distance(corner) < 0.0
+    }
+
+    /// The vertex of a cell and its normal, where the surface passes the cell.
+    fn vertex(&self, field: &Field, first: USizeVec3) -> Option<(DVec3, DVec3)> {
         let mut sum = DVec3::ZERO;
         let mut crossings = 0;
         for axis in 0..3 {
-            let (along, u, v) = (axes[axis], axes[(axis + 1) % 3], axes[(axis + 2) % 3]);
+            let [along, u, v] = axes_from(axis);
             for from in [first, first + u, first + v, first + u + v] {
                 let to = from + along;
-                if inside(from) != inside(to) {
-                    let (a, b) = (distances[corner_index(from)], distances[corner_index(to)]);
-                    let part = f64::from(a / (a - b));
-                    sum += from.as_dvec3().lerp(to.as_dvec3(), part);
+                if self.is_inside(from) != self.is_inside(to) {
+                    let (a, b) = (self.distance(from), self.distance(to));
+                    sum += from.as_dvec3().lerp(to.as_dvec3(), f64::from(a / (a - b)));
                     crossings += 1;
                 }
             }
         }
-        if crossings > 0 {
-            let (cell_low, cell_high) = (first.as_dvec3(), (first + 1).as_dvec3());
-            let mut position = low + cell * sum / f64::from(crossings);
-            // Newton's method, kept to the cell so that the net does not fold.
-            for _ in 0..2 {
-                let gradient = field.gradient(position, 1e-3 * cell);
-                let squared = gradient.length_squared();
-                if squared > 0.0 {
-                    position -= gradient * (field.distance(position) / squared);
-                }
-                position = position.clamp(low + cell * cell_low, low + cell * cell_high);
-            }
-            *vertex = builder.vertex(position, field.gradient(position, 1e-3 * cell));
+        if crossings == 0 {
+            return None;
         }
+        let block = grid_index(first / BLOCK_CELLS, self.block_counts);
+        let field = self.blocks[block].as_ref().unwrap_or(field);
+        let (cell_low, cell_high) = (first.as_dvec3(), (first + 1).as_dvec3());
+        let mut position = self.low + self.cell * sum / f64::from(crossings);
+        // Newton's method, kept to the cell so that the net does not fold.
+        for _ in 0..2 {
+            let gradient = field.gradient(position, 1e-3 * self.cell);
+            let squared = gradient.length_squared();
+            if squared > 0.0 {
+                position -= gradient * (field.distance(position) / squared);
+            }
+            let [low, high] = [cell_low, cell_high].map(|corner| self.low + self.cell * corner);
+            position = position.clamp(low, high);
+        }
+        Some((position, field.gradient(position, 1e-3 * self.cell)))
     }
+}
+
+/// Index of a position in a grid of `counts`, x first.
+fn grid_index(at: USizeVec3, counts: USizeVec3) -> usize {
+    at.x + counts.x * (at.y + counts.y * at.z)
+}
+
+/// Inverse of [`grid_index`].
+fn grid_position(index: usize, counts: USizeVec3) -> USizeVec3 {
+    USizeVec3::new(index % counts.x, index / counts.x % counts.y, index / (counts.x * counts.y))
+}
+
+/// Steps along an axis and the two after it.
+fn axes_from(axis: usize) -> [USizeVec3; 3] {
+    let axes = [USizeVec3::X, USizeVec3::Y, USizeVec3::Z];
+    [axes[axis], axes[(axis + 1) % 3], axes[(axis + 2) % 3]]
+}
+
+/// Surface of level 0 within `counts` cells of side `cell` from the corner `low`.
+fn surface_net(field: &Field, low: DVec3, cell: f64, counts: USizeVec3) -> Mesh {
+    let lattice = Lattice::new(field, low, cell, counts);
+    let found: Vec<_> = (0..counts.element_product())
+        .into_par_iter()
+        .filter_map(|index| {
+            lattice.vertex(field, grid_position(index, counts)).map(|vertex| (index, vertex))
+        })
+        .collect();
+    let mut builder = Builder::default();
+    let mut vertices = vec![u32::MAX; counts.element_product()];
+    for (index, (position, normal)) in found {
+        vertices[index] = builder.vertex(position, normal);
+    }
+    let corners = counts + 1;
     for index in 0..corners.element_product() {
-        let from = at(index, corners);
+        let from = grid_position(index, corners);
         for axis in 0..3 {
-            let (along, u, v) = (axes[axis], axes[(axis + 1) % 3], axes[(axis + 2) % 3]);
+            let [along, u, v] = axes_from(axis);
             let to = from + along;
             // The surface keeps off the border, so the four cells around the edge exist.
-            if to[axis] > counts[axis] || inside(from) == inside(to) {
+            if to[axis] > counts[axis] || lattice.is_inside(from) == lattice.is_inside(to) {
                 continue;
             }
-            let mut quad =
-                [from - u - v, from - v, from, from - u].map(|c| vertices[cell_index(c)]);
-            if inside(to) {
+            let mut quad = [from - u - v, from - v, from, from - u]
+                .map(|cell| vertices[grid_index(cell, counts)]);
+            if lattice.is_inside(to) {
                 quad.reverse();
             }
             let [a, b, c, d] = quad;
             let length = |from: u32, to: u32| {
-                let [from, to] = [from, to].map(|index| builder.mesh.positions[index as usize]);
-                glam::Vec3::from_array(from).distance_squared(glam::Vec3::from_array(to))
+                let [from, to] = [from, to]
+                    .map(|index| Vec3::from_array(builder.mesh.positions[index as usize]));
+                from.distance_squared(to)
             };
             // The shorter diagonal.
             if length(a, c) <= length(b, d) {
@@ -260,4 +360,35 @@ fn surface_net(field: &Field, low: DVec3, cell: f64, counts: USizeVec3) -> Mesh 
         }
     }
     builder.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Blocks look at the parts near them only; that must not be seen.
+    #[test]
+    fn distances_by_blocks_are_those_of_all_parts() {
+        let ring = (0..40).map(|index| {
+            let direction = glam::DVec2::from_angle(f64::from(index));
+            let center = DVec3::new(direction.x, 0.02 * f64::from(index), direction.y);
+            match index % 2 {
+                0 => Part::Ellipsoid { center, radii: DVec3::new(0.3, 0.06, 0.15) },
+                _ => Part::Cone { from: center, to: DVec3::Y, from_radius: 0.1, to_radius: 0.05 },
+            }
+        });
+        let carved = vec![Part::Ellipsoid { center: DVec3::Y, radii: DVec3::splat(0.3) }];
+        let field = Field { added: ring.collect(), carved, blend: 0.02 };
+        let (low, cell, counts) = (DVec3::splat(-2.0), 0.05, USizeVec3::splat(80));
+        let lattice = Lattice::new(&field, low, cell, counts);
+        for index in (0..(counts + 1).element_product()).step_by(17) {
+            let corner = grid_position(index, counts + 1);
+            let expected = field.distance(low + cell * corner.as_dvec3());
+            let found = f64::from(lattice.distance(corner));
+            let is_far =
+                lattice.blocks[grid_index(corner / BLOCK_CELLS, lattice.block_counts)].is_none();
+            assert!(found * expected > 0.0 || expected.abs() < 1e-6, "{found} for {expected}");
+            assert!(is_far || (found - expected).abs() < 1e-6, "{found} for {expected}");
+        }
+    }
 }
