@@ -1,7 +1,7 @@
 //! The film: files written whole or not at all, sums and their estimates, checkpoints to the bit,
 //! merging.
 
-#![expect(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+#![expect(clippy::unwrap_used, reason = "tests may panic")]
 
 use std::{collections::BTreeMap, fs, io, path::Path};
 
@@ -57,6 +57,14 @@ fn range(seed: u32, first: u32, count: u32) -> SampleRange {
     SampleRange { seed, first, count }
 }
 
+/// Adds without loss: Knuth's two-sum, its error gathered in `rest`.
+fn add_two_float(sum: &mut f32, rest: &mut f32, value: f32) {
+    let before = *sum;
+    *sum = before + value;
+    let added = *sum - before;
+    *rest += (before - (*sum - added)) + (value - added);
+}
+
 /// Accumulates as the device does: two-float sums of radiance in 0…1 times `scale`.
 fn accumulate(numbers: &mut Numbers, sample_count: u32, scale: f32) -> (Sums, Vec<Vec<f64>>) {
     let mut sums = Sums::new([3, 1], 4, 2, [10, 6]);
@@ -66,18 +74,14 @@ fn accumulate(numbers: &mut Numbers, sample_count: u32, scale: f32) -> (Sums, Ve
     sums.position = vec![[0.0; 3]; 8];
     sums.visible = vec![[0; 2]; 8];
     for _ in 0..sample_count {
-        for pixel in 0..8 {
+        for (pixel, drawn) in drawn.iter_mut().enumerate() {
             for channel in 0..3 {
                 let value = scale * numbers.next();
                 if channel == 0 {
-                    drawn[pixel].push(f64::from(value));
+                    drawn.push(f64::from(value));
                 }
                 let (sum, rest) = (&mut sums.sum[pixel], &mut sums.compensation[pixel]);
-                let before = sum[channel];
-                let after = before + value;
-                let virtual_value = after - before;
-                rest[channel] += (before - (after - virtual_value)) + (value - virtual_value);
-                sum[channel] = after;
+                add_two_float(&mut sum[channel], &mut rest[channel], value);
                 sums.squares[pixel][channel] += value * value;
                 sums.albedo[pixel][channel] += 0.5;
                 sums.normal[pixel][channel] -= numbers.next();
@@ -158,10 +162,7 @@ fn two_float_sums_stay_exact_where_floats_stagnate() {
     sums.sum[0] = [16_777_216.0; 3];
     let (mut sum, mut rest) = (16_777_216.0_f32, 0.0_f32);
     for _ in 0..1001 {
-        let after = sum + 1.0;
-        let virtual_value = after - sum;
-        rest += (sum - (after - virtual_value)) + (1.0 - virtual_value);
-        sum = after;
+        add_two_float(&mut sum, &mut rest, 1.0);
     }
     assert_eq!(sum, 16_777_216.0, "a float alone does not move");
     sums.compensation[0] = [rest; 3];
