@@ -1,7 +1,5 @@
 //! `glsl/include/brdf.glsl` against its Rust twin, over all kinds of materials.
 
-#![expect(clippy::expect_used, reason = "tests may panic")]
-
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     brdf,
@@ -112,6 +110,4 @@ fn shader_agrees_with_its_twin() {
     }
     assert!(other_bins < queries.len() / 500, "{other_bins} densities differ");
     assert!(answers.iter().filter(|answer| answer.pdf > 0.0).count() > queries.len() / 2);
-    let first = answers.first().expect("there are answers");
-    assert_eq!(first.sampled_local.is_finite(), first.value.is_finite());
 }

@@ -1,5 +1,5 @@
 // Reflection models: evaluate, pdf, sample and directional albedo of every material; twin of
-// src/brdf/mod.rs, same names, same order.
+// src/brdf/twin.rs, same names, same order.
 //
 // Directions are unit vectors in the shading frame (z is the normal) and point away from the
 // surface. Values are per steradian and hold no cosine; pdfs are per steradian of incident
@@ -58,15 +58,15 @@ vec3 fresnel_conductor(float cosine, vec3 eta, vec3 k) {
     return 0.5 * (perpendicular + parallel);
 }
 
-// Reflectance of a conductor from that at normal incidence. [Schlick94]
+// Reflectance of a conductor from that at normal incidence. Schlick 1994.
 vec3 fresnel_schlick(float cosine, vec3 reflectance) {
     float complement = 1.0 - cosine;
     float square = complement * complement;
     return reflectance + (vec3(1.0) - reflectance) * (square * square * complement);
 }
 
-// Density of GGX normals, per steradian, for a half vector of any length. [Walter07] eq. 33,
-// written without the cancellation in 1 − cos²θ, which matters for α below 0.01.
+// Density of GGX normals, per steradian, for a half vector of any length. Walter et al. 2007,
+// eq. 33, written without the cancellation in 1 − cos²θ, which matters for α below 0.01.
 float ggx_normal_density(vec3 half_vector, float alpha) {
     float tangential = dot(half_vector.xy, half_vector.xy);
     float normal = half_vector.z * half_vector.z;
@@ -79,7 +79,7 @@ float ggx_stretched_length(vec3 direction, float alpha) {
     return length(vec3(alpha * direction.xy, direction.z));
 }
 
-// Lower end of the spherical cap of bounded sampling, as a factor. [EtoTokuyoshi23] eq. 5
+// Lower end of the spherical cap of bounded sampling, as a factor: Eto & Tokuyoshi 2023, eq. 5.
 float ggx_cap_factor(vec3 outgoing_local, float alpha) {
     float bounded_alpha = min(alpha, 1.0);
     float alpha_squared = bounded_alpha * bounded_alpha;
@@ -90,14 +90,14 @@ float ggx_cap_factor(vec3 outgoing_local, float alpha) {
 }
 
 // Microfacet reflection of unit reflectance, per steradian: D·G₂/(4 cosθ_o cosθ_i), with the
-// height-correlated masking of [Heitz14] eq. 99.
+// height-correlated masking of Heitz 2014, eq. 99.
 float ggx_reflection(vec3 half_vector, vec3 outgoing_local, vec3 incident_local, float alpha) {
     float masking = incident_local.z * ggx_stretched_length(outgoing_local, alpha)
         + outgoing_local.z * ggx_stretched_length(incident_local, alpha);
     return 0.5 * ggx_normal_density(half_vector, alpha) / masking;
 }
 
-// Density of ggx_sample. [EtoTokuyoshi23] eq. 8 with the Jacobian of the reflection.
+// Density of ggx_sample: Eto & Tokuyoshi 2023, eq. 8, with the Jacobian of the reflection.
 float ggx_pdf(vec3 half_vector, vec3 outgoing_local, float alpha) {
     float cap = ggx_cap_factor(outgoing_local, alpha) * outgoing_local.z
         + ggx_stretched_length(outgoing_local, alpha);
@@ -105,8 +105,8 @@ float ggx_pdf(vec3 half_vector, vec3 outgoing_local, float alpha) {
 }
 
 // Incident direction by the visible normals of GGX, on the spherical cap that leaves out most
-// reflections below the surface. [DupuyBenyoub23], [EtoTokuyoshi23]. What still falls below has
-// z ≤ 0: no sample.
+// reflections below the surface: Dupuy & Benyoub 2023, Eto & Tokuyoshi 2023. What still falls
+// below has z ≤ 0: no sample.
 vec3 ggx_sample(vec3 outgoing_local, float alpha, vec2 u) {
     vec3 stretched = normalize(vec3(alpha * outgoing_local.xy, outgoing_local.z));
     float cap = ggx_cap_factor(outgoing_local, alpha) * stretched.z;
@@ -119,8 +119,8 @@ vec3 ggx_sample(vec3 outgoing_local, float alpha, vec2 u) {
     return 2.0 * dot(outgoing_local, normal) * normal - outgoing_local;
 }
 
-// (θ_h, θ_d, φ_d) of two directions, φ_d in 0…π: the half/difference angles of [Rusinkiewicz98]
-// with the two directions interchangeable, to the last bit.
+// (θ_h, θ_d, φ_d) of two directions, φ_d in 0…π: the half/difference angles of
+// Rusinkiewicz 1998 with the two directions interchangeable, to the last bit.
 vec3 half_difference_angles(vec3 outgoing_local, vec3 incident_local) {
     vec3 half_vector = outgoing_local + incident_local;
     vec3 difference = incident_local - outgoing_local;

@@ -1,5 +1,5 @@
 //! MERL `.binary` files: header, half/difference angle indexing, the three RGB scales →
-//! [`MeasuredTable`]. [Matusik03] A data-driven reflectance model.
+//! [`MeasuredTable`]. Matusik et al. 2003, "A Data-Driven Reflectance Model".
 
 use std::{fs, io::Read, path::Path};
 

@@ -13,15 +13,16 @@
 //! | measured | trilinear on the half/difference grid | tabulated half vectors or cosine |
 //!
 //! E(θ) is the directional albedo of the coat and Ē its cosine-weighted mean, so that coat and
-//! base together reflect exactly E + ρ(1 − E): reciprocal, and a white base loses nothing
-//! [KelemenSzirmayKalos01].
+//! base together reflect exactly E + ρ(1 − E): reciprocal, and a white base loses nothing (Kelemen &
+//! Szirmay-Kalos 2001).
 //!
-//! References: [Walter07] Microfacet models for refraction. [Heitz14] Understanding the
-//! masking-shadowing function, JCGT 3(2). [DupuyBenyoub23] Sampling visible GGX normals with
-//! spherical caps. [EtoTokuyoshi23] Bounded VNDF sampling for Smith-GGX reflections.
-//! [KelemenSzirmayKalos01] A microfacet based coupled specular-matte BRDF model. [Rusinkiewicz98]
-//! A new change of variables for efficient BRDF representation. [Schlick94] An inexpensive BRDF
-//! model for physically based rendering.
+//! References: Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces".
+//! Heitz 2014, "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", JCGT 3(2).
+//! Dupuy & Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps". Eto & Tokuyoshi 2023,
+//! "Bounded VNDF Sampling for Smith–GGX Reflections". Kelemen & Szirmay-Kalos 2001, "A Microfacet
+//! Based Coupled Specular-Matte BRDF Model with Importance Sampling". Rusinkiewicz 1998, "A New
+//! Change of Variables for Efficient BRDF Representation". Schlick 1994, "An Inexpensive BRDF Model
+//! for Physically-based Rendering".
 
 pub mod cornell;
 pub mod materials;

@@ -8,7 +8,7 @@ const FIRST_NM: f64 = 380.0;
 const STEP_NM: f64 = 10.0;
 
 /// Colour matching functions x̄, ȳ, z̄ of the CIE 1931 standard observer (2°), 380 to 780 nm by 10:
-/// CIE 015:2018, Colorimetry, table of the 1931 observer, every second row.
+/// CIE 015:2018, "Colorimetry", table of the 1931 observer.
 const COLOUR_MATCHING: [[f64; 3]; 41] = [
     [0.001368, 0.000039, 0.006450],
     [0.004243, 0.000120, 0.020050],
@@ -54,7 +54,7 @@ const COLOUR_MATCHING: [[f64; 3]; 41] = [
 ];
 
 /// Relative spectral power of the CIE standard illuminant D65, 380 to 780 nm by 10:
-/// ISO/CIE 11664-2:2022, every second row of its table.
+/// ISO/CIE 11664-2:2022.
 const ILLUMINANT_D65: [f64; 41] = [
     49.9755, 54.6482, 82.7549, 91.4860, 93.4318, 86.6823, 104.8650, 117.0080, 117.8120, 114.8610,
     115.9230, 108.8110, 109.3540, 107.8020, 104.7900, 107.6890, 104.4050, 104.0460, 100.0000,

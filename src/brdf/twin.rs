@@ -69,15 +69,15 @@ fn square_root(v: Vec3) -> Vec3 {
     vec3(v.x.sqrt(), v.y.sqrt(), v.z.sqrt())
 }
 
-/// Reflectance of a conductor from that at normal incidence. [Schlick94]
+/// Reflectance of a conductor from that at normal incidence. Schlick 1994.
 pub fn fresnel_schlick(cosine: f32, reflectance: Vec3) -> Vec3 {
     let complement = 1.0 - cosine;
     let square = complement * complement;
     reflectance + (Vec3::ONE - reflectance) * (square * square * complement)
 }
 
-/// Density of GGX normals, per steradian, for a half vector of any length. [Walter07] eq. 33,
-/// written without the cancellation in 1 − cos²θ, which matters for α below 0.01.
+/// Density of GGX normals, per steradian, for a half vector of any length. Walter et al. 2007,
+/// eq. 33, written without the cancellation in 1 − cos²θ, which matters for α below 0.01.
 pub fn ggx_normal_density(half_vector: Vec3, alpha: f32) -> f32 {
     let tangential = half_vector.truncate().dot(half_vector.truncate());
     let normal = half_vector.z * half_vector.z;
@@ -90,7 +90,7 @@ fn ggx_stretched_length(direction: Vec3, alpha: f32) -> f32 {
     (alpha * direction.truncate()).extend(direction.z).length()
 }
 
-/// Lower end of the spherical cap of bounded sampling, as a factor. [EtoTokuyoshi23] eq. 5
+/// Lower end of the spherical cap of bounded sampling, as a factor: Eto & Tokuyoshi 2023, eq. 5.
 fn ggx_cap_factor(outgoing_local: Vec3, alpha: f32) -> f32 {
     let bounded_alpha = alpha.min(1.0);
     let alpha_squared = bounded_alpha * bounded_alpha;
@@ -101,7 +101,7 @@ fn ggx_cap_factor(outgoing_local: Vec3, alpha: f32) -> f32 {
 }
 
 /// Microfacet reflection of unit reflectance, per steradian: D·G₂/(4 cosθ_o cosθ_i), with the
-/// height-correlated masking of [Heitz14] eq. 99.
+/// height-correlated masking of Heitz 2014, eq. 99.
 pub fn ggx_reflection(
     half_vector: Vec3,
     outgoing_local: Vec3,
@@ -113,7 +113,7 @@ pub fn ggx_reflection(
     0.5 * ggx_normal_density(half_vector, alpha) / masking
 }
 
-/// Density of [`ggx_sample`]. [EtoTokuyoshi23] eq. 8 with the Jacobian of the reflection.
+/// Density of [`ggx_sample`]: Eto & Tokuyoshi 2023, eq. 8, with the Jacobian of the reflection.
 pub fn ggx_pdf(half_vector: Vec3, outgoing_local: Vec3, alpha: f32) -> f32 {
     let cap = ggx_cap_factor(outgoing_local, alpha) * outgoing_local.z
         + ggx_stretched_length(outgoing_local, alpha);
@@ -121,8 +121,8 @@ pub fn ggx_pdf(half_vector: Vec3, outgoing_local: Vec3, alpha: f32) -> f32 {
 }
 
 /// Incident direction by the visible normals of GGX, on the spherical cap that leaves out most
-/// reflections below the surface. [DupuyBenyoub23], [EtoTokuyoshi23]. What still falls below has
-/// z ≤ 0: no sample.
+/// reflections below the surface: Dupuy & Benyoub 2023, Eto & Tokuyoshi 2023. What still falls
+/// below has z ≤ 0: no sample.
 pub fn ggx_sample(outgoing_local: Vec3, alpha: f32, u: Vec2) -> Vec3 {
     let stretched = (alpha * outgoing_local.truncate()).extend(outgoing_local.z).normalize();
     let cap = ggx_cap_factor(outgoing_local, alpha) * stretched.z;
@@ -135,7 +135,7 @@ pub fn ggx_sample(outgoing_local: Vec3, alpha: f32, u: Vec2) -> Vec3 {
     2.0 * outgoing_local.dot(normal) * normal - outgoing_local
 }
 
-/// (θ_h, θ_d, φ_d) of two directions, φ_d in 0…π: the half/difference angles of [Rusinkiewicz98]
+/// (θ_h, θ_d, φ_d) of two directions, φ_d in 0…π: the half/difference angles of Rusinkiewicz 1998
 /// with the two directions interchangeable, to the last bit.
 pub fn half_difference_angles(outgoing_local: Vec3, incident_local: Vec3) -> Vec3 {
     let half_vector = outgoing_local + incident_local;
