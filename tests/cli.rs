@@ -43,7 +43,7 @@ fn commands(folder: &Folder) -> Vec<String> {
 fn every_command_has_help() {
     let folder = Folder::new();
     let commands = commands(&folder);
-    for expected in ["compare", "merge", "devices"] {
+    for expected in ["render", "compare", "merge", "info", "devices"] {
         assert!(commands.iter().any(|command| command == expected), "{expected}: {commands:?}");
     }
     for name in commands.iter().filter(|name| *name != "help") {
@@ -86,11 +86,13 @@ fn wrong_usage_exits_with_2() {
 #[test]
 fn a_missing_file_is_named() {
     let folder = images();
-    for arguments in
-        [["compare", "a.exr", "absent.exr"], ["merge", "absent.exr", "--output=out.exr"]]
-    {
+    for arguments in [
+        &["compare", "a.exr", "absent.exr"][..],
+        &["merge", "absent.exr", "--output=out.exr"],
+        &["info", "absent.exr"],
+    ] {
         let parts = ["error: absent.exr: cannot read: No such file"];
-        folder.run(&arguments).assert(1, &parts);
+        folder.run(arguments).assert(1, &parts);
     }
     assert_eq!(folder.files(), ["a.exr", "b.exr", "wide.exr"], "nothing is written");
 }

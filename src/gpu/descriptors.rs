@@ -1,6 +1,6 @@
 //! Descriptor sets by rate of change: 0 scene, 1 SRBF tables, 2 wave, 3 film.
 //!
-//! Every binding is a storage buffer, but for those that [`texel_format`] names: traversal reads
+//! Every binding is a storage buffer, but for those that `texel_format` names: traversal reads
 //! geometry and rays through uniform texel buffers, which lavapipe loads several times as fast. A
 //! pipeline sees only the sets that its shader uses, and a set may leave bindings unwritten that the
 //! shader does not use.
