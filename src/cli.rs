@@ -24,6 +24,8 @@ pub enum Command {
     Compare(command::compare::Arguments),
     /// Combine renders of one scene made with different seeds or sample ranges.
     Merge(command::merge::Arguments),
+    /// Measure how fast a scene's rays are traced, and where time and memory go.
+    Bench(command::bench::Arguments),
     /// Say what a scene, image, environment map or BRDF file holds and whether it is sane.
     Info(command::info::Arguments),
     /// List Vulkan devices with the limits that matter here, and which one would be chosen.
@@ -46,6 +48,7 @@ pub fn run() -> ExitCode {
         .init();
     let result = match &cli.command {
         Command::Render(arguments) => command::render::run(arguments),
+        Command::Bench(arguments) => command::bench::run(arguments),
         Command::Compare(arguments) => command::compare::run(arguments),
         Command::Info(arguments) => command::info::run(arguments),
         Command::Merge(arguments) => command::merge::run(arguments),

@@ -17,6 +17,7 @@
 //! Radiance is linear Rec.709.
 
 pub mod accel;
+pub mod benchmark;
 pub mod brdf;
 pub mod cache;
 pub mod cli;

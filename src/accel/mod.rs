@@ -260,7 +260,7 @@ fn depth(nodes: &[CwBvhNode]) -> Result<usize> {
 fn record(geometry: &Geometry, triangle: u32) -> TriangleRecord {
     let indices = geometry.triangles[triangle as usize];
     let normals = indices.map(|vertex| Vec3::from_array(geometry.normals[vertex as usize]));
-    let flat = normals.iter().any(|normal| !(normal.length_squared() > 0.25));
+    let flat = !normals.iter().all(|normal| normal.length_squared() > 0.25);
     let vertices = [0, 1, 2].map(|corner| VertexRecord {
         position: geometry.positions[indices[corner] as usize],
         normal: if flat { FLAT_NORMAL } else { normal::pack(normals[corner]) },

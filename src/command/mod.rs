@@ -1,5 +1,6 @@
 //! One file per subcommand: orchestration only, no mathematics, no Vulkan.
 
+pub mod bench;
 pub mod compare;
 pub mod devices;
 pub mod info;

@@ -36,6 +36,40 @@ impl SceneBuffers {
     /// # Errors
     /// A limit of the device, a scene that cannot be traced, or a failing device.
     pub fn new(device: &Arc<Device>, scene: &Scene, window: Window) -> Result<Self> {
+        // Each stage frees its host copy before the next one starts: large scenes need the memory.
+        let start = Instant::now();
+        let accel = Accel::build(&scene.geometry, triangle_page_bytes(device.capabilities()))?;
+        let bvh_ms = start.elapsed().as_secs_f64() * 1e3;
+        let start = Instant::now();
+        let geometry = GeometryBuffers::new(device, &accel)?;
+        drop(accel);
+        let mut scene_buffers = Self::with_geometry(device, scene, window, geometry, start)?;
+        scene_buffers.host_ms.insert("bvh".to_owned(), bvh_ms);
+        Ok(scene_buffers)
+    }
+
+    /// As [`SceneBuffers::new`], with an acceleration structure that the caller keeps.
+    ///
+    /// # Errors
+    /// A limit of the device or a failing device.
+    pub fn from_accel(
+        device: &Arc<Device>,
+        scene: &Scene,
+        window: Window,
+        accel: &Accel,
+    ) -> Result<Self> {
+        let start = Instant::now();
+        let geometry = GeometryBuffers::new(device, accel)?;
+        Self::with_geometry(device, scene, window, geometry, start)
+    }
+
+    fn with_geometry(
+        device: &Arc<Device>,
+        scene: &Scene,
+        window: Window,
+        geometry: GeometryBuffers,
+        start: Instant,
+    ) -> Result<Self> {
         let mut host_ms = BTreeMap::new();
         let mut buffers = Vec::new();
         let mut bindings = Vec::new();
@@ -43,14 +77,6 @@ impl SceneBuffers {
             bindings.push(binding);
             buffers.push(buffer);
         };
-
-        // Each stage frees its host copy before the next one starts: large scenes need the memory.
-        let start = Instant::now();
-        let accel = Accel::build(&scene.geometry, triangle_page_bytes(device.capabilities()))?;
-        host_ms.insert("bvh".to_owned(), start.elapsed().as_secs_f64() * 1e3);
-        let start = Instant::now();
-        let geometry = GeometryBuffers::new(device, &accel)?;
-        drop(accel);
 
         let tables = MaterialTables::new(&scene.materials)?;
         add(BINDING_MATERIALS, Buffer::from_slice(device, "materials", &tables.materials)?);

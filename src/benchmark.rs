@@ -1,0 +1,390 @@
+//! How fast rays are traced: the passes of a render on its own rays, beside obvhs's CPU traversal of
+//! the same tree and the same rays.
+//!
+//! One wave over the whole film goes through the passes of a render: `camera`, `trace`, `sample`,
+//! `shadow`, `bounce`, `trace`. The rays are read back and given to obvhs on every core. Device and
+//! CPU take turns, so that both see the same state of the machine.
+
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
+    time::Instant,
+};
+
+use obvhs::{
+    cwbvh::{CwBvh, node::CwBvhNode},
+    ray::RayHit,
+    rt_triangle::RtTriangle,
+};
+use serde::Serialize;
+
+use crate::{
+    accel::Accel,
+    error::Result,
+    gpu::{
+        Buffer, Commands, DescriptorSet, Device, Pipeline,
+        constants::{
+            BINDING_COUNTERS, BINDING_HIT_TEXELS, BINDING_HITS, BINDING_PATHS, BINDING_RAY_TEXELS,
+            BINDING_RAYS, BINDING_SHADOW_RAY_TEXELS, BINDING_SHADOW_RAYS, BINDING_VISIBILITY,
+            CONSTANT_SAMPLER, NO_MATERIAL, SET_FILM, SET_WAVE,
+        },
+        layout::{Counters, Hit, PathState, Ray, ShadowRay, Wave},
+        shaders,
+    },
+    pass::{Schedule, shadow::Shadow, trace::Trace},
+    renderer::SceneBuffers,
+    sampler::Sampler,
+};
+
+/// Rays that a thread of the CPU takes at a time.
+const CHUNK: usize = 4096;
+
+/// What to measure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// How the directions of shadow rays are chosen; not `ris`.
+    pub sampler: Sampler,
+    /// Shadow rays per hit.
+    pub shadow_rays: u32,
+    /// Paths of the wave: pixels of the film in film order.
+    pub paths: u32,
+    /// Measurements of each kind of ray.
+    pub repetitions: usize,
+    /// Threads of the CPU traversal.
+    pub threads: usize,
+}
+
+/// Median of repeated measurements with the extremes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// Middle value.
+    pub median: f64,
+    /// Least value.
+    pub least: f64,
+    /// Largest value.
+    pub most: f64,
+}
+
+impl Spread {
+    /// Median and extremes of `values`; zeros if there are none.
+    pub fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let at = |index: usize| values.get(index).copied().unwrap_or(0.0);
+        let last = values.len().saturating_sub(1);
+        let median = 0.5 * (at(last / 2) + at(last.div_ceil(2)));
+        Self { median, least: at(0), most: at(last) }
+    }
+}
+
+/// Rates of one kind of ray.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RayRate {
+    /// `camera`, `shadow` or `bounce`.
+    pub kind: &'static str,
+    /// Rays traced in one measurement; those that need no tracing are not counted.
+    pub rays: usize,
+    /// Share of them that met a surface.
+    pub hit_share: f64,
+    /// Million rays a second on the device, by timestamps.
+    pub device_mrays: Spread,
+    /// Million rays a second of obvhs's traversal on the CPU.
+    pub obvhs_mrays: Spread,
+    /// Ratios of neighbouring measurements, device to obvhs.
+    pub ratio: Spread,
+    /// Rays for which the two disagree whether a surface is met.
+    pub disagreements: usize,
+}
+
+/// A ray of the CPU traversal.
+type CpuRay = obvhs::ray::Ray;
+
+/// obvhs's own traversal of the arrays of an [`Accel`].
+struct Yardstick {
+    bvh: CwBvh,
+    triangles: Vec<RtTriangle>,
+    threads: usize,
+}
+
+impl Yardstick {
+    fn new(accel: &Accel, threads: usize) -> Self {
+        let count = accel.triangle_count() as u32;
+        Self {
+            bvh: CwBvh {
+                nodes: bytemuck::cast_slice::<_, CwBvhNode>(&accel.nodes).to_vec(),
+                ..CwBvh::default()
+            },
+            triangles: (0..count)
+                .map(|index| {
+                    let [a, b, c] = accel.triangle(index).vertices.map(|v| v.position.into());
+                    RtTriangle::new(a, b, c)
+                })
+                .collect(),
+            threads,
+        }
+    }
+
+    fn meets(&self, ray: &CpuRay, any_hit: bool) -> bool {
+        let test = |ray: &CpuRay, triangle: usize| self.triangles[triangle].intersect(ray);
+        if any_hit {
+            !self.bvh.ray_traverse_miss(*ray, test)
+        } else {
+            self.bvh.ray_traverse(*ray, &mut RayHit::none(), test)
+        }
+    }
+
+    /// Traces all rays; seconds of wall time and whether each meets a surface.
+    fn trace(&self, rays: &[CpuRay], any_hit: bool) -> (f64, Vec<bool>) {
+        let mut met = vec![false; rays.len()];
+        let start = Instant::now();
+        let next = AtomicUsize::new(0);
+        let results: Vec<Vec<(usize, Vec<bool>)>> = std::thread::scope(|scope| {
+            let work = || {
+                let mut done = Vec::new();
+                loop {
+                    let first = next.fetch_add(CHUNK, Ordering::Relaxed);
+                    let Some(rest) = rays.get(first..).filter(|rest| !rest.is_empty()) else {
+                        return done;
+                    };
+                    let chunk = &rest[..rest.len().min(CHUNK)];
+                    done.push((first, chunk.iter().map(|ray| self.meets(ray, any_hit)).collect()));
+                }
+            };
+            let threads: Vec<_> = (0..self.threads.max(1)).map(|_| scope.spawn(work)).collect();
+            // A panic in a thread is passed on by the scope.
+            threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
+        });
+        let seconds = start.elapsed().as_secs_f64();
+        for (first, chunk) in results.into_iter().flatten() {
+            met[first..first + chunk.len()].copy_from_slice(&chunk);
+        }
+        (seconds, met)
+    }
+}
+
+/// The passes of a render with the buffers of one wave.
+struct Bench<'a> {
+    device: &'a Arc<Device>,
+    scene: &'a SceneBuffers,
+    wave_set: DescriptorSet,
+    film_set: DescriptorSet,
+    rays: Buffer,
+    hits: Buffer,
+    shadow_rays: Buffer,
+    visibility: Buffer,
+    // Bound by the sets.
+    _paths: Buffer,
+    _counters: Buffer,
+    wave: Wave,
+}
+
+impl<'a> Bench<'a> {
+    fn new(device: &'a Arc<Device>, scene: &'a SceneBuffers, plan: &Plan) -> Result<Self> {
+        let paths = u64::from(plan.paths);
+        let make = |name, count: u64, size: usize| Buffer::new(device, name, count * size as u64);
+        let rays = make("rays", paths, size_of::<Ray>())?;
+        let hits = make("hits", paths, size_of::<Hit>())?;
+        let shadow_ray_count = paths * u64::from(plan.shadow_rays);
+        let shadow_rays = make("shadow rays", shadow_ray_count, size_of::<ShadowRay>())?;
+        let visibility = make("visibility", shadow_ray_count, size_of::<u32>())?;
+        let path_states = make("paths", paths, size_of::<PathState>())?;
+        let counters = Buffer::zeroed(device, "counters", size_of::<Counters>() as u64)?;
+        let wave_set = DescriptorSet::new(
+            device,
+            SET_WAVE,
+            &[
+                (BINDING_RAYS, &rays),
+                (BINDING_RAY_TEXELS, &rays),
+                (BINDING_HITS, &hits),
+                (BINDING_HIT_TEXELS, &hits),
+                (BINDING_SHADOW_RAYS, &shadow_rays),
+                (BINDING_SHADOW_RAY_TEXELS, &shadow_rays),
+                (BINDING_VISIBILITY, &visibility),
+                (BINDING_PATHS, &path_states),
+            ],
+        )?;
+        let film_set = DescriptorSet::new(device, SET_FILM, &[(BINDING_COUNTERS, &counters)])?;
+        let wave = Wave {
+            pixel_count: plan.paths,
+            sample_count: 1,
+            shadow_ray_count: plan.shadow_rays,
+            total_shadow_rays: plan.shadow_rays,
+            ..Wave::default()
+        };
+        Ok(Self {
+            device,
+            scene,
+            wave_set,
+            film_set,
+            rays,
+            hits,
+            shadow_rays,
+            visibility,
+            _paths: path_states,
+            _counters: counters,
+            wave,
+        })
+    }
+
+    fn sets(&self) -> [&DescriptorSet; 3] {
+        [self.scene.set(), &self.wave_set, &self.film_set]
+    }
+
+    /// Runs one pass; device seconds.
+    fn run(&self, record: impl FnOnce(&mut Commands)) -> Result<f64> {
+        let mut commands = Commands::begin_timed(self.device, 1)?;
+        record(&mut commands);
+        Ok(commands.submit_and_wait()?.values().sum::<f64>() * 1e-3)
+    }
+
+    /// Runs a pass of one invocation per path.
+    fn run_per_path(&self, name: &str, constants: &[(u32, u32)]) -> Result<()> {
+        let pipeline = Pipeline::new(self.device, name, shaders::pass(name), constants)?;
+        self.run(|commands| {
+            let push = bytemuck::bytes_of(&self.wave);
+            commands.dispatch(&pipeline, &self.sets()[..2], push, self.wave.pixel_count);
+        })?;
+        Ok(())
+    }
+
+    /// The rays that `trace` would follow.
+    fn active_rays(&self) -> Result<Vec<Option<CpuRay>>> {
+        let rays: Vec<Ray> = self.rays.download(self.wave.pixel_count as usize)?;
+        Ok(rays
+            .iter()
+            .map(|ray| {
+                (ray.is_active != 0)
+                    .then(|| CpuRay::new_inf(ray.origin.into(), ray.direction.into()))
+            })
+            .collect())
+    }
+
+    /// The rays that `shadow` would follow.
+    fn active_shadow_rays(&self, accel: &Accel) -> Result<Vec<Option<CpuRay>>> {
+        let paths = self.wave.pixel_count as usize;
+        let hits: Vec<Hit> = self.hits.download(paths)?;
+        let count = paths * self.wave.shadow_ray_count as usize;
+        let shadow_rays: Vec<ShadowRay> = self.shadow_rays.download(count)?;
+        Ok(shadow_rays
+            .iter()
+            .zip(hits.iter().cycle())
+            .map(|(ray, hit)| {
+                (hit.material != NO_MATERIAL && ray.contribution != [0.0; 3]).then(|| {
+                    let origin = accel.offset_ray_origin(
+                        hit.position.into(),
+                        hit.geometric_normal.into(),
+                        ray.direction.into(),
+                    );
+                    CpuRay::new_inf(origin.into(), ray.direction.into())
+                })
+            })
+            .collect())
+    }
+
+    /// Whether each ray met a surface, after `trace`.
+    fn hits_met(&self) -> Result<Vec<bool>> {
+        let hits: Vec<Hit> = self.hits.download(self.wave.pixel_count as usize)?;
+        Ok(hits.iter().map(|hit| hit.material != NO_MATERIAL).collect())
+    }
+}
+
+/// Measures camera, shadow and bounce rays; `accel` is what `scene` was made from.
+///
+/// # Errors
+/// [`crate::Error::Vulkan`] or [`crate::Error::Device`] if the device fails or memory is not enough.
+pub fn measure(
+    device: &Arc<Device>,
+    scene: &SceneBuffers,
+    accel: &Accel,
+    plan: &Plan,
+) -> Result<Vec<RayRate>> {
+    let bench = Bench::new(device, scene, plan)?;
+    let yardstick = Yardstick::new(accel, plan.threads);
+    let incoherent = Schedule::incoherent(device.capabilities());
+    let trace = Trace::new(device, scene.geometry(), Schedule::SINGLE)?;
+    let trace_bounce = Trace::new(device, scene.geometry(), incoherent)?;
+    let shadow = Shadow::new(device, scene.geometry(), incoherent)?;
+    let compare = |kind, rays: &[Option<CpuRay>], any_hit, run: &dyn Fn() -> Result<f64>| {
+        compare(kind, &yardstick, rays, any_hit, plan.repetitions, run)
+    };
+    let mut rates = Vec::new();
+    let disagreements = |rays: &[Option<CpuRay>], device: &[bool], cpu: &[bool]| {
+        let device = rays.iter().zip(device).filter_map(|(ray, met)| ray.is_some().then_some(met));
+        device.zip(cpu).filter(|(device, cpu)| device != cpu).count()
+    };
+
+    bench.run_per_path("camera", &[])?;
+    let rays = bench.active_rays()?;
+    let (mut rate, met) = compare("camera", &rays, false, &|| {
+        bench.run(|commands| trace.record(commands, &bench.sets(), &bench.wave))
+    })?;
+    rate.disagreements = disagreements(&rays, &bench.hits_met()?, &met);
+    rates.push(rate);
+
+    bench.run_per_path("sample", &[(CONSTANT_SAMPLER, plan.sampler.tag())])?;
+    let rays = bench.active_shadow_rays(accel)?;
+    let (mut rate, met) = compare("shadow", &rays, true, &|| {
+        bench.run(|commands| shadow.record(commands, &bench.sets(), &bench.wave))
+    })?;
+    let visibility: Vec<u32> = bench.visibility.download(rays.len())?;
+    let blocked: Vec<bool> = visibility.iter().map(|visible| *visible == 0).collect();
+    rate.disagreements = disagreements(&rays, &blocked, &met);
+    rates.push(rate);
+
+    bench.run_per_path("bounce", &[])?;
+    let rays = bench.active_rays()?;
+    let (mut rate, met) = compare("bounce", &rays, false, &|| {
+        bench.run(|commands| trace_bounce.record(commands, &bench.sets(), &bench.wave))
+    })?;
+    rate.disagreements = disagreements(&rays, &bench.hits_met()?, &met);
+    rates.push(rate);
+    Ok(rates)
+}
+
+/// Device and CPU by turns over the same rays; `run` gives device seconds.
+fn compare(
+    kind: &'static str,
+    yardstick: &Yardstick,
+    rays: &[Option<CpuRay>],
+    any_hit: bool,
+    repetitions: usize,
+    run: &dyn Fn() -> Result<f64>,
+) -> Result<(RayRate, Vec<bool>)> {
+    let rays: Vec<CpuRay> = rays.iter().flatten().copied().collect();
+    // Drivers that compile late compile now.
+    run()?;
+    let (_, met) = yardstick.trace(&rays, any_hit);
+    let (mut device, mut cpu, mut ratio) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..repetitions {
+        let millions = rays.len() as f64 * 1e-6;
+        let device_seconds = run()?.max(1e-9);
+        let cpu_seconds = yardstick.trace(&rays, any_hit).0.max(1e-9);
+        device.push(millions / device_seconds);
+        cpu.push(millions / cpu_seconds);
+        ratio.push(cpu_seconds / device_seconds);
+    }
+    let hits = met.iter().filter(|met| **met).count();
+    let rate = RayRate {
+        kind,
+        rays: rays.len(),
+        hit_share: hits as f64 / rays.len().max(1) as f64,
+        device_mrays: Spread::of(device),
+        obvhs_mrays: Spread::of(cpu),
+        ratio: Spread::of(ratio),
+        disagreements: 0,
+    };
+    Ok((rate, met))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spreads_have_the_middle_value() {
+        assert_eq!(Spread::of(vec![3.0, 1.0, 2.0]), Spread { median: 2.0, least: 1.0, most: 3.0 });
+        assert_eq!(Spread::of(vec![4.0, 1.0]), Spread { median: 2.5, least: 1.0, most: 4.0 });
+        assert_eq!(Spread::of(vec![]), Spread { median: 0.0, least: 0.0, most: 0.0 });
+    }
+}
