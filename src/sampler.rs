@@ -85,7 +85,7 @@ impl Parameters {
                 self.candidates = value
                     .parse()
                     .ok()
-                    .filter(|count: &u32| (2..=8).contains(count) && count % 2 == 0)
+                    .filter(|count: &u32| (2..=8).contains(count) && count.is_multiple_of(2))
                     .ok_or_else(|| {
                         Error::usage(format!(
                             "--set candidates={value}: expected 2, 4, 6 or 8 (half from the BRDF, \

@@ -1,8 +1,6 @@
 //! The environment map: orientation, lookup, and the density its tables sample; the shader twin.
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-#[path = "support/statistics.rs"]
-mod statistics;
 mod support;
 
 use std::f64::consts::PI;
@@ -20,7 +18,7 @@ use fenestra::{
     scene::environment::{EnvironmentMap, EnvironmentTables, luminance},
 };
 use glam::{Vec2, Vec3};
-use statistics::chi_square_p_value;
+use support::statistics::chi_square_p_value;
 
 const ENVIRONMENT_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/environment.spv"));
 
@@ -327,7 +325,7 @@ fn estimates_of_reflected_light_are_unbiased() {
             })
             .collect();
         let mean = replicates.iter().sum::<f64>() / 64.0;
-        let z = statistics::z_of_mean(&replicates, truth);
+        let z = support::statistics::z_of_mean(&replicates, truth);
         assert!(
             z.abs() < 6.0 || (mean / truth - 1.0).abs() < 1e-3,
             "{name}: mean {mean}, truth {truth}, z = {z}"

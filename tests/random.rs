@@ -1,14 +1,12 @@
 //! Random numbers: stratification, uniformity, independence; the shader twin bit for bit.
 
-#[path = "support/statistics.rs"]
-mod statistics;
 mod support;
 
 use fenestra::{
     gpu::constants::SET_FILM,
     random::{random_1d, random_2d, random_independent_1d, random_independent_2d},
 };
-use statistics::{chi_square_p_value, z_p_value};
+use support::statistics::{chi_square_p_value, z_p_value};
 
 /// Every test here that can fail by chance fails for less than one seed in a million.
 const FALSE_ALARM: f64 = 1e-6;
@@ -172,7 +170,7 @@ fn the_mean_over_scrambles_is_unbiased_and_converges_faster_than_independent_num
     };
     let (stratified, independent) = (replicates(random_2d), replicates(random_independent_2d));
     for values in [&stratified, &independent] {
-        let z = statistics::z_of_mean(values, truth);
+        let z = support::statistics::z_of_mean(values, truth);
         assert!(z_p_value(z) > FALSE_ALARM, "z = {z}");
     }
     // Independent: π/4 (1 − π/4) / 64 = 0.00263. A net is about ten times better here.
