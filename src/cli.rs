@@ -28,6 +28,8 @@ pub enum Command {
     Bench(command::bench::Arguments),
     /// Say what a scene, image, environment map or BRDF file holds and whether it is sane.
     Info(command::info::Arguments),
+    /// Fit environment maps and BRDFs into spherical radial basis functions.
+    Fit(command::fit::Arguments),
     /// List Vulkan devices with the limits that matter here, and which one would be chosen.
     Devices(command::devices::Arguments),
 }
@@ -52,6 +54,7 @@ pub fn run() -> ExitCode {
         Command::Compare(arguments) => command::compare::run(arguments),
         Command::Info(arguments) => command::info::run(arguments),
         Command::Merge(arguments) => command::merge::run(arguments),
+        Command::Fit(arguments) => command::fit::run(arguments),
         Command::Devices(arguments) => command::devices::run(arguments),
     };
     match result {

@@ -15,14 +15,15 @@ use crate::{
     cache,
     error::{Error, Result},
     film::{Attribute, Checkpoint, Image, summary::ChannelSummary},
+    fit,
     scene::{EnvironmentMap, Scene, material::MaterialKind},
 };
 
 /// Arguments of `info`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Scene (.toml), image (.exr), environment map (.hdr, .pfm; .exr with --map) or measured BRDF
-    /// (.binary, .brdf).
+    /// Scene (.toml), image (.exr), environment map (.hdr, .pfm; .exr with --map), measured BRDF
+    /// (.binary, .brdf) or fit (.fit).
     pub file: Option<PathBuf>,
     /// Read an .exr file as an environment map.
     #[arg(long, requires = "file")]
@@ -67,12 +68,16 @@ fn file(path: &Path, is_map: bool) -> Result<Report> {
         "exr" if is_map => environment_map(path),
         "exr" => image(path),
         "binary" | "brdf" => measured_brdf(path),
+        fit::cache::EXTENSION => {
+            let fit::report::Description { value, lines, warnings } = fit::describe(path)?;
+            Ok(Report { value, lines, warnings })
+        }
         _ => {
             // A missing file of unknown kind is a missing file first.
             fs::metadata(path).map_err(|source| Error::io(path, "read", source))?;
             Err(Error::format(
                 path,
-                "unknown kind of file; expected .toml, .exr, .hdr, .pfm, .binary or .brdf",
+                "unknown kind of file; expected .toml, .exr, .hdr, .pfm, .binary, .brdf or .fit",
             ))
         }
     }

@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod compare;
 pub mod devices;
+pub mod fit;
 pub mod info;
 pub mod merge;
 pub mod options;

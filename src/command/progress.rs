@@ -28,9 +28,12 @@ pub struct Standing {
 }
 
 impl Standing {
-    /// "64 spp, 3.21 Mrays/s, error 4.2%".
+    /// "64 spp, 3.21 Mrays/s, error 4.2%", without what is 0 or unknown.
     fn describe(&self) -> String {
-        let mut parts = vec![format!("{} spp", self.samples)];
+        let mut parts = Vec::new();
+        if self.samples > 0 {
+            parts.push(format!("{} spp", self.samples));
+        }
         if self.rays_per_second > 0.0 {
             parts.push(format!("{:.2} Mrays/s", self.rays_per_second * 1e-6));
         }
@@ -80,7 +83,9 @@ impl Progress {
         let message = || {
             let remaining = remaining(elapsed, standing.fraction)
                 .map_or_else(String::new, |time| format!(", {} left", HumanDuration(time)));
-            format!("{}, {}{remaining}", standing.describe(), HumanDuration(elapsed))
+            let mut parts = vec![standing.describe(), HumanDuration(elapsed).to_string()];
+            parts.retain(|part| !part.is_empty());
+            parts.join(", ") + &remaining
         };
         match &mut self.output {
             Output::Bar(bar) => {
@@ -115,7 +120,9 @@ impl Progress {
         }
         if !matches!(self.output, Output::Quiet) {
             let elapsed = self.start.elapsed().as_secs_f64();
-            eprintln!("{}: {} in {elapsed:.1} s ({reason})", self.label, standing.describe());
+            let mut parts = vec![standing.describe(), format!("in {elapsed:.1} s ({reason})")];
+            parts.retain(|part| !part.is_empty());
+            eprintln!("{}: {}", self.label, parts.join(" "));
         }
     }
 }

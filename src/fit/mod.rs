@@ -1,1 +1,38 @@
-//! Off-line fits of environment maps and BRDFs into spherical radial basis functions.
+//! Off-line fits of environment maps and BRDFs into spherical radial basis functions: Figure 4.1 of
+//! \[Wu & Shih 2009\], after \[Tsai et al. 2008\].
+//!
+//! Environment map → [`environment_lobes`] → [`EnvironmentFit`]; BRDF × cosine for a row of view
+//! elevations → [`brdf_lobes`] → [`BrdfFit`]. The target is cut into patches ([`points`]), a mixture
+//! grows on them ([`growth`]) by expectation maximization ([`expectation`]), colours are added by
+//! least squares ([`colour`]), every cell of the target judges the result ([`judge`]), and the fit is
+//! kept under the hash of what it was made from ([`cache`]). The squared error by L-BFGS
+//! ([`squared_error`], [`solver`]) is the second method.
+//!
+//! Deviation: \[Tsai et al. 2008\] minimize the squared error. A sampling density wants the
+//! Kullback-Leibler divergence small, and expectation maximization keeps amplitudes from turning
+//! negative by itself.
+
+pub mod brdf;
+pub mod cache;
+pub mod colour;
+pub mod component;
+pub mod config;
+pub mod environment;
+pub mod expectation;
+pub mod grid;
+pub mod growth;
+pub mod hemisphere;
+pub mod judge;
+pub mod options;
+pub mod picture;
+pub mod points;
+pub mod report;
+pub mod solver;
+pub mod squared_error;
+
+pub use brdf::{BrdfFit, BrdfOptions, brdf_lobes};
+pub use cache::{Cache, Fit, read_fit, write_fit};
+pub use environment::{EnvironmentFit, EnvironmentLobe, EnvironmentOptions, environment_lobes};
+pub use judge::FitErrors;
+pub use options::Method;
+pub use report::describe;

@@ -49,7 +49,16 @@ impl Scene {
             let valid_bytes = error.utf8_error().valid_up_to();
             Error::format(path, format!("not a text file: byte {valid_bytes} is not UTF-8"))
         })?;
-        let file = SceneFile::parse(path, &text)?;
+        Self::parse(path, &text)
+    }
+
+    /// Makes a scene of its text; `path` is for messages, and its folder is that of relative paths.
+    ///
+    /// # Errors
+    ///
+    /// As [`Scene::load`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self> {
+        let file = SceneFile::parse(path, text)?;
         let loader = Loader { path, folder: path.parent().unwrap_or(Path::new("")) };
         let mut warnings = Vec::new();
         let camera = loader.camera(&file.camera)?;

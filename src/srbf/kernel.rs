@@ -4,12 +4,14 @@ use std::f32::consts::PI;
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use super::special::{erf, expm1};
 
 /// `amplitude · exp(λ(ω·ξ − 1))`. Twin of `Lobe` in `srbf.glsl`: scalar layout, 20 bytes.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
+#[serde(from = "[f32; 5]", into = "[f32; 5]")]
 pub struct Lobe {
     /// Unit axis ξ.
     pub axis: Vec3,
@@ -20,6 +22,19 @@ pub struct Lobe {
 }
 
 const _: () = assert!(size_of::<Lobe>() == 20);
+
+impl From<[f32; 5]> for Lobe {
+    /// Axis, bandwidth, amplitude.
+    fn from([x, y, z, bandwidth, amplitude]: [f32; 5]) -> Self {
+        Self { axis: Vec3::new(x, y, z), bandwidth, amplitude }
+    }
+}
+
+impl From<Lobe> for [f32; 5] {
+    fn from(lobe: Lobe) -> Self {
+        [lobe.axis.x, lobe.axis.y, lobe.axis.z, lobe.bandwidth, lobe.amplitude]
+    }
+}
 
 /// Kernel `exp(λ(ω·ξ − 1))`, in the form `exp(−½λ|ω − ξ|²)`: `λ·dot − λ` is off by 1e-2 at λ = 1e5.
 pub fn kernel_value(axis: Vec3, bandwidth: f32, direction: Vec3) -> f32 {

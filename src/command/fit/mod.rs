@@ -1,0 +1,182 @@
+//! `fenestra fit`: environment maps and BRDFs into spherical radial basis functions.
+
+mod source;
+mod table;
+
+use std::path::{Path, PathBuf};
+
+use clap::Subcommand;
+
+use super::progress::{Progress, Standing};
+use crate::{
+    error::Result,
+    fit::{
+        BrdfOptions, Cache, EnvironmentOptions, Fit, Method, brdf_lobes, environment_lobes,
+        picture,
+        report::{Description, describe_brdf, describe_environment},
+        write_fit,
+    },
+};
+
+/// Arguments of `fit`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// What to fit.
+    #[command(subcommand)]
+    pub target: Target,
+}
+
+/// What can be fitted.
+#[derive(Debug, Subcommand)]
+pub enum Target {
+    /// Fit an environment map.
+    Env(EnvironmentArguments),
+    /// Fit BRDF × cosine for a row of view elevations.
+    Brdf(BrdfArguments),
+    /// Fit many maps and BRDFs and print a table of errors and seconds in Markdown.
+    Table(table::Arguments),
+}
+
+/// Options that both kinds of fit share.
+#[derive(Debug, clap::Args)]
+pub struct Shared {
+    /// What the fit minimizes.
+    #[arg(long, value_enum, default_value_t)]
+    pub method: Method,
+    /// Fit file to write; the picture goes beside it. Default: named after the source, in the
+    /// working folder.
+    #[arg(short, long, value_name = "FIT")]
+    pub output: Option<PathBuf>,
+    /// Neither read nor write the cache of fits.
+    #[arg(long)]
+    pub no_cache: bool,
+    /// Print JSON to standard output.
+    #[arg(long)]
+    pub json: bool,
+    /// No progress.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// Arguments of `fit env`.
+#[derive(Debug, clap::Args)]
+pub struct EnvironmentArguments {
+    /// Environment map (.hdr, .exr, .pfm), or a scene whose environment is taken.
+    pub map: PathBuf,
+    /// Lobes of the mixture.
+    #[arg(long, default_value_t = 100)]
+    pub lobes: usize,
+    /// Shared options.
+    #[command(flatten)]
+    pub shared: Shared,
+}
+
+/// Arguments of `fit brdf`.
+#[derive(Debug, clap::Args)]
+pub struct BrdfArguments {
+    /// Measured BRDF (.binary, .brdf), material of a scene (SCENE.toml#name), or a material in
+    /// words: TYPE:key=value,… with the keys of a scene's material, as in
+    /// plastic:diffuse=0.5,alpha=0.1 or conductor:reflectance=[0.9,0.6,0.3],alpha=0.05.
+    pub material: String,
+    /// Lobes per view.
+    #[arg(long, default_value_t = 20)]
+    pub lobes: usize,
+    /// Elevations of the view between normal and horizon.
+    #[arg(long, default_value_t = 32)]
+    pub views: usize,
+    /// Shared options.
+    #[command(flatten)]
+    pub shared: Shared,
+}
+
+/// Fits.
+///
+/// # Errors
+/// A source that cannot be read or fitted, options out of range, a file that cannot be written.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    match &arguments.target {
+        Target::Env(arguments) => environment(arguments),
+        Target::Brdf(arguments) => brdf(arguments),
+        Target::Table(arguments) => table::run(arguments),
+    }
+}
+
+/// Runs `work` with a progress bar.
+fn with_progress<T>(
+    label: &str,
+    quiet: bool,
+    work: impl FnOnce(&mut dyn FnMut(f64)) -> Result<T>,
+) -> Result<T> {
+    let mut progress = Progress::new(label, quiet);
+    let result = work(&mut |fraction| {
+        progress.update(&Standing { fraction, ..Standing::default() });
+    });
+    let end = if result.is_ok() { "done" } else { "failed" };
+    progress.finish(&Standing { fraction: 1.0, ..Standing::default() }, end);
+    result
+}
+
+fn cache(shared: &Shared) -> Option<Cache> {
+    if shared.no_cache { None } else { Cache::user() }
+}
+
+/// Output file: as asked, or the source's name with the extension `fit`.
+fn output(shared: &Shared, name: &str) -> PathBuf {
+    shared.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.fit")))
+}
+
+/// Prints what was made and where it is.
+fn report(
+    mut description: Description,
+    shared: &Shared,
+    (seconds, is_cached): (f64, bool),
+    (fit, picture): (&Path, &Path),
+) -> Result<()> {
+    if shared.json {
+        description.value["seconds"] = seconds.into();
+        description.value["cached"] = is_cached.into();
+        description.value["fit"] = fit.display().to_string().into();
+        description.value["picture"] = picture.display().to_string().into();
+        description.value["notes"] = description.warnings.into();
+        return super::print_line(&format!("{:#}", description.value));
+    }
+    let from = if is_cached { " (read from the cache)" } else { "" };
+    description.lines.push(format!("seconds          {seconds:.2}{from}"));
+    description.lines.push(format!("written          {}", fit.display()));
+    description.lines.push(format!("                 {}", picture.display()));
+    description.lines.extend(description.warnings.iter().map(|note| format!("note: {note}")));
+    super::print_line(&description.lines.join("\n"))
+}
+
+fn environment(arguments: &EnvironmentArguments) -> Result<()> {
+    let shared = &arguments.shared;
+    let (map, name) = source::environment(&arguments.map)?;
+    let options = EnvironmentOptions { lobes: arguments.lobes, method: shared.method };
+    let fit = with_progress(&format!("fit {name}"), shared.quiet, |progress| {
+        environment_lobes(&map, options, cache(shared).as_ref(), progress)
+    })?;
+    let path = output(shared, &name);
+    let picture_path = path.with_extension("png");
+    write_fit(&path, &Fit::Environment(fit.clone()))?;
+    picture::write_environment(&picture_path, &map, &fit)?;
+    let took = (fit.seconds, fit.is_cached);
+    report(describe_environment(&fit), shared, took, (&path, &picture_path))
+}
+
+fn brdf(arguments: &BrdfArguments) -> Result<()> {
+    let shared = &arguments.shared;
+    let source = source::material(&arguments.material)?;
+    let options =
+        BrdfOptions { lobes: arguments.lobes, views: arguments.views, method: shared.method };
+    let name = &source.name;
+    let fit = with_progress(&format!("fit {name}"), shared.quiet, |progress| {
+        let cache = cache(shared);
+        brdf_lobes(&source.tables, 0, &arguments.material, options, cache.as_ref(), progress)
+    })?;
+    let path = output(shared, name);
+    let picture_path = path.with_extension("png");
+    write_fit(&path, &Fit::Brdf(fit.clone()))?;
+    picture::write_brdf(&picture_path, &source.tables, 0, &fit)?;
+    let took = (fit.seconds, fit.is_cached);
+    report(describe_brdf(&fit), shared, took, (&path, &picture_path))
+}

@@ -1,0 +1,357 @@
+//! BRDF × cosine → mixtures of lobes, one per elevation of the view, in the local frame.
+//!
+//! The view `v` of n stands at `θ = (v + ½)/n · 90°` from the normal, toward +x; an isotropic BRDF needs
+//! no azimuth. Lobes of equal index belong together from view to view: each view starts from the
+//! lobes of its neighbour, turned with the mirror direction as far as they are narrow, so that
+//! [`BrdfFit::lobes_at`] may interpolate between views.
+
+use std::{f64::consts::FRAC_PI_2, f64::consts::PI, time::Instant};
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    cache::{self, Cache, Fit},
+    component::{Component, kernel_integral},
+    config,
+    expectation::maximize,
+    growth::grow,
+    hemisphere::{HemisphereTarget, sample_hemisphere},
+    judge::{FitErrors, judge_hemisphere},
+    options::{Method, check_lobes, check_views},
+    points::PointSet,
+    solver,
+    squared_error::SquaredError,
+};
+use crate::{
+    brdf::{self, MaterialTables},
+    error::{Error, Result},
+    scene::environment::luminance,
+    srbf::Lobe,
+};
+
+/// How a BRDF is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BrdfOptions {
+    /// Lobes per view, 1 to [`config::MAX_LOBES`].
+    pub lobes: usize,
+    /// Elevations of the view, 1 to [`config::MAX_VIEWS`].
+    pub views: usize,
+    /// Objective.
+    pub method: Method,
+}
+
+/// The fit for one view.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BrdfView {
+    /// Angle between normal and view, radians.
+    pub theta: f32,
+    /// Lobes of BRDF × cosine (luminance, 1/sr) in the local frame, the view toward +x; as many as in
+    /// every other view, those without use with an amplitude of 0.
+    pub lobes: Vec<Lobe>,
+    /// Integral of BRDF × cosine over the hemisphere: the albedo for this view.
+    pub albedo: f32,
+    /// How good it is.
+    pub errors: FitErrors,
+}
+
+/// A fitted BRDF.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BrdfFit {
+    /// Name of the material or path of the file.
+    pub source: String,
+    /// Objective.
+    pub method: Method,
+    /// Lobes asked for per view.
+    pub requested_lobes: usize,
+    /// The views, from the normal to the horizon.
+    pub views: Vec<BrdfView>,
+    /// Figures of the views up to [`config::SUMMARY_ANGLE_DEG`].
+    pub summary: BrdfSummary,
+    /// What the fit did besides what was asked.
+    pub notes: Vec<String>,
+    /// Seconds the fit took; of a fit from the cache, that reading it took.
+    #[serde(skip)]
+    pub seconds: f64,
+    /// Whether the fit comes from the cache.
+    #[serde(skip)]
+    pub is_cached: bool,
+}
+
+/// Figures over the views up to [`config::SUMMARY_ANGLE_DEG`] from the normal.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BrdfSummary {
+    /// Means over the views.
+    pub mean: FitErrors,
+    /// Largest χ² of a view.
+    pub largest_chi_squared: f64,
+    /// Largest χ² halfway between two views, of the interpolated lobes.
+    pub largest_chi_squared_between: f64,
+}
+
+/// Angle between normal and view of a view's index, radians.
+pub fn view_theta(view: usize, views: usize) -> f64 {
+    (view as f64 + 0.5) / views as f64 * FRAC_PI_2
+}
+
+impl BrdfFit {
+    /// Lobes for any view in the plane of +x, by interpolation between the lobes of two views: axes
+    /// and logarithms of the bandwidths, and the integrals.
+    pub fn lobes_at(&self, theta: f32) -> Vec<Lobe> {
+        let count = self.views.len();
+        let position = f64::from(theta) / FRAC_PI_2 * count as f64 - 0.5;
+        let lower = (position.max(0.0) as usize).min(count.saturating_sub(1));
+        let upper = (lower + 1).min(count.saturating_sub(1));
+        let t = (position - lower as f64).clamp(0.0, 1.0);
+        let pairs = self.views[lower].lobes.iter().zip(&self.views[upper].lobes);
+        pairs.map(|(a, b)| interpolate(a, b, t)).collect()
+    }
+}
+
+fn interpolate(a: &Lobe, b: &Lobe, t: f64) -> Lobe {
+    // A lobe that holds nothing at one end has its shape from the other.
+    let t_shape = if a.amplitude <= 0.0 {
+        1.0
+    } else if b.amplitude <= 0.0 {
+        0.0
+    } else {
+        t
+    };
+    let (from, to) = (Component::from_lobe(a, 1.0), Component::from_lobe(b, 1.0));
+    let bandwidth = (from.bandwidth.ln() * (1.0 - t_shape) + to.bandwidth.ln() * t_shape).exp();
+    let shape = Component {
+        axis: from.axis.lerp(to.axis, t_shape).normalize_or(from.axis),
+        bandwidth,
+        share: (1.0 - t) * from.share + t * to.share,
+    };
+    shape.lobe(1.0)
+}
+
+/// Fits a material, or reads the fit from the cache. `name` is for messages. `progress` is called with
+/// the share of the work that is done.
+///
+/// # Errors
+/// A material that reflects nothing in any view; lobes or views out of range. A cache that cannot be
+/// read or written is a warning in the log.
+///
+/// # Panics
+/// `material_index` is out of range.
+pub fn brdf_lobes(
+    tables: &MaterialTables,
+    material_index: usize,
+    name: &str,
+    options: BrdfOptions,
+    cache: Option<&Cache>,
+    progress: &mut dyn FnMut(f64),
+) -> Result<BrdfFit> {
+    let start = Instant::now();
+    check_lobes(options.lobes)?;
+    check_views(options.views)?;
+    let view = |theta: f64| sample_view(tables, material_index, theta);
+    // The views themselves and those halfway between, which judge the interpolation.
+    let targets: Vec<HemisphereTarget> = (0..2 * options.views - 1)
+        .into_par_iter()
+        .map(|index| view((index as f64 + 1.0) / (2 * options.views) as f64 * FRAC_PI_2))
+        .collect();
+    // What was sampled decides the fit, so it names the cache file.
+    let header = format!("brdf {} {} {:?}", options.lobes, options.views, options.method);
+    let values: Vec<f64> =
+        targets.iter().flat_map(|target| target.samples.iter().map(|s| s.value)).collect();
+    let key = cache::key(&[header.as_bytes(), bytemuck::cast_slice(&values)]);
+    if let Some(Fit::Brdf(fit)) = cache.and_then(|cache| cache.load(&key)) {
+        let seconds = start.elapsed().as_secs_f64();
+        return Ok(BrdfFit { source: name.to_owned(), seconds, is_cached: true, ..fit });
+    }
+    let mut fit = fit_views(&targets, name, options, progress)?;
+    fit.seconds = start.elapsed().as_secs_f64();
+    if let Some(cache) = cache {
+        cache.store(&key, &Fit::Brdf(fit.clone()));
+    }
+    Ok(fit)
+}
+
+/// BRDF × cosine, luminance, for a view at `theta` from the normal.
+pub(super) fn sample_view(
+    tables: &MaterialTables,
+    material_index: usize,
+    theta: f64,
+) -> HemisphereTarget {
+    let outgoing_local = Vec3::new(theta.sin() as f32, 0.0, theta.cos() as f32);
+    let value = |direction: DVec3| {
+        let incident_local = direction.as_vec3();
+        let value = brdf::evaluate(tables, material_index, outgoing_local, incident_local);
+        f64::from(luminance(value)) * direction.z
+    };
+    sample_hemisphere(&value, DVec3::new(-theta.sin(), 0.0, theta.cos()))
+}
+
+fn fit_views(
+    targets: &[HemisphereTarget],
+    name: &str,
+    options: BrdfOptions,
+    progress: &mut dyn FnMut(f64),
+) -> Result<BrdfFit> {
+    let fail = |message: String| Error::Fit { what: name.to_owned(), message };
+    let points: Vec<PointSet> =
+        targets.iter().step_by(2).map(|target| PointSet::new(&target.patches)).collect();
+    if points.iter().all(PointSet::is_empty) {
+        return Err(fail(
+            "the material reflects nothing in any view; expected a value above 0".into(),
+        ));
+    }
+    let mut fitted = chain(&points, options, progress);
+    if options.method == Method::L2 {
+        let minimized: Vec<Vec<Component>> = fitted
+            .par_iter()
+            .zip(targets.par_iter().step_by(2))
+            .map(|(components, target)| minimize_view(target, components))
+            .collect();
+        fitted = minimized;
+    } else {
+        for (components, points) in fitted.iter_mut().zip(&points) {
+            for component in components {
+                component.share *= points.energy;
+            }
+        }
+    }
+    let mut notes = Vec::new();
+    let empty = points.iter().filter(|points| points.is_empty()).count();
+    if empty > 0 {
+        notes.push(format!("{empty} of {} views reflect nothing", points.len()));
+    }
+    let count = fitted.iter().map(Vec::len).max().unwrap_or(0);
+    if count < options.lobes {
+        notes.push(format!("{} lobes asked for, {count} used at most", options.lobes));
+    }
+    let view = |(index, components): (usize, &Vec<Component>)| {
+        // Shares hold integrals here.
+        let mut lobes: Vec<Lobe> = components.iter().map(|component| component.lobe(1.0)).collect();
+        lobes.resize(count, Lobe { axis: Vec3::Z, bandwidth: 1.0, amplitude: 0.0 });
+        let target = &targets[2 * index];
+        BrdfView {
+            theta: view_theta(index, options.views) as f32,
+            albedo: target.energy() as f32,
+            errors: judge_hemisphere(target, &lobes),
+            lobes,
+        }
+    };
+    let mut fit = BrdfFit {
+        source: name.to_owned(),
+        method: options.method,
+        requested_lobes: options.lobes,
+        views: fitted.iter().enumerate().map(view).collect(),
+        summary: BrdfSummary::default(),
+        notes,
+        seconds: 0.0,
+        is_cached: false,
+    };
+    fit.summary = summarize(&fit, targets);
+    progress(1.0);
+    Ok(fit)
+}
+
+/// Mixtures for all views, lobes of equal index belonging together; shares of the view's energy.
+fn chain(
+    points: &[PointSet],
+    options: BrdfOptions,
+    progress: &mut dyn FnMut(f64),
+) -> Vec<Vec<Component>> {
+    let count = points.len();
+    let mut fitted: Vec<Vec<Component>> = vec![Vec::new(); count];
+    let mut base = count / 3;
+    if points[base].is_empty() {
+        base = points.iter().position(|points| !points.is_empty()).unwrap_or(base);
+    }
+    fitted[base] = grow(&points[base], options.lobes, &mut |_| ());
+    let mut done = 1;
+    let outward = (base + 1..count).map(|view| (view - 1, view));
+    let inward = (0..base).rev().map(|view| (view + 1, view));
+    for (neighbour, view) in outward.chain(inward) {
+        let mut components = fitted[neighbour].clone();
+        if !points[view].is_empty() {
+            let turn = view_theta(view, count) - view_theta(neighbour, count);
+            for component in &mut components {
+                follow(component, turn);
+            }
+            maximize(&points[view], &mut components, config::VIEW_STEPS, config::VIEW_TOLERANCE);
+        } else {
+            for component in &mut components {
+                component.share = 0.0;
+            }
+        }
+        fitted[view] = components;
+        done += 1;
+        progress(0.9 * done as f64 / count as f64);
+    }
+    fitted
+}
+
+/// Turns a lobe with the mirror direction when the view turns by `turn` radians away from the normal:
+/// wide lobes stay.
+fn follow(component: &mut Component, turn: f64) {
+    let part = component.bandwidth / (component.bandwidth + config::FOLLOWING_BANDWIDTH);
+    let (s, c) = (-turn * part).sin_cos();
+    let DVec3 { x, y, z } = component.axis;
+    component.axis = DVec3::new(c * x + s * z, y, c * z - s * x);
+    // A lobe without energy may earn some here.
+    component.share = component.share.max(1e-4);
+}
+
+/// Lowers the squared error of a view; shares of the result hold integrals.
+fn minimize_view(target: &HemisphereTarget, components: &[Component]) -> Vec<Component> {
+    let square: f64 = target.samples.iter().map(|s| s.solid_angle * s.value * s.value).sum();
+    if square <= 0.0 {
+        return components.to_vec();
+    }
+    let (objective, mut unknowns) = SquaredError::new(&target.patches, square, components);
+    solver::minimize(
+        &|unknowns| objective.evaluate(unknowns),
+        &objective.bounds(),
+        &mut unknowns,
+        config::L2_STEPS,
+        config::L2_TOLERANCE,
+        &mut |_| (),
+    );
+    let (mut components, energy) = objective.components(&unknowns);
+    for component in &mut components {
+        component.share *= energy;
+    }
+    components
+}
+
+fn summarize(fit: &BrdfFit, targets: &[HemisphereTarget]) -> BrdfSummary {
+    let limit = config::SUMMARY_ANGLE_DEG.to_radians() as f32;
+    let mut summary = BrdfSummary::default();
+    let mut count = 0.0;
+    let first = fit.views.iter().take(1);
+    for view in first.chain(fit.views.iter().skip(1).filter(|view| view.theta <= limit)) {
+        count += 1.0;
+        summary.mean.relative_l2 += view.errors.relative_l2;
+        summary.mean.chi_squared += view.errors.chi_squared;
+        summary.mean.kullback_leibler += view.errors.kullback_leibler;
+        summary.mean.energy_captured += view.errors.energy_captured;
+        summary.largest_chi_squared = summary.largest_chi_squared.max(view.errors.chi_squared);
+    }
+    summary.mean.relative_l2 /= count;
+    summary.mean.chi_squared /= count;
+    summary.mean.kullback_leibler /= count;
+    summary.mean.energy_captured /= count;
+    for (pair, target) in fit.views.windows(2).zip(targets.iter().skip(1).step_by(2)) {
+        let theta = 0.5 * (pair[0].theta + pair[1].theta);
+        if theta <= limit {
+            let errors = judge_hemisphere(target, &fit.lobes_at(theta));
+            summary.largest_chi_squared_between =
+                summary.largest_chi_squared_between.max(errors.chi_squared);
+        }
+    }
+    summary
+}
+
+/// Solid angle of the domain that BRDF fits are judged on.
+pub(super) const HEMISPHERE: f64 = 2.0 * PI;
+
+/// Integral of a lobe in 64 bits.
+pub(super) fn lobe_energy(lobe: &Lobe) -> f64 {
+    f64::from(lobe.amplitude) * kernel_integral(lobe.bandwidth.into())
+}

@@ -1,0 +1,248 @@
+//! Environment map → mixture of lobes in the frame of the map.
+
+use std::time::Instant;
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    cache::{self, Cache, Fit},
+    colour::colour_amplitudes,
+    component::{Component, kernel_integral},
+    config,
+    grid::{ColouredPatch, Grid, patch_count},
+    growth::grow,
+    judge::{ColouredComponent, FitErrors, judge_environment},
+    options::{Method, check_lobes},
+    points::{Patch, PointSet},
+    solver,
+    squared_error::SquaredError,
+};
+use crate::{
+    error::{Error, Result},
+    scene::{EnvironmentMap, environment::luminance},
+    srbf::Lobe,
+};
+
+/// A lobe of an environment map, ready for upload: scalar layout, 32 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
+pub struct EnvironmentLobe {
+    /// Unit axis in the frame of the map.
+    pub axis: [f32; 3],
+    /// Bandwidth λ.
+    pub bandwidth: f32,
+    /// Radiance at the axis per colour channel, by non-negative least squares: for pictures and
+    /// weights. A channel may be 0.
+    pub colour: [f32; 3],
+    /// Luminance at the axis, not negative: what is sampled.
+    pub amplitude: f32,
+}
+
+const _: () = assert!(size_of::<EnvironmentLobe>() == 32);
+
+impl EnvironmentLobe {
+    /// The luminance lobe.
+    pub fn lobe(&self) -> Lobe {
+        Lobe {
+            axis: Vec3::from_array(self.axis),
+            bandwidth: self.bandwidth,
+            amplitude: self.amplitude,
+        }
+    }
+}
+
+/// How a map is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EnvironmentOptions {
+    /// Lobes, 1 to [`config::MAX_LOBES`].
+    pub lobes: usize,
+    /// Objective.
+    pub method: Method,
+}
+
+/// A fitted environment map.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EnvironmentFit {
+    /// Where the map came from.
+    pub source: String,
+    /// Objective.
+    pub method: Method,
+    /// Lobes asked for; there are fewer where the map has less to fit.
+    pub requested_lobes: usize,
+    /// The lobes in the frame of the map, largest luminance integral first.
+    pub lobes: Vec<EnvironmentLobe>,
+    /// How good it is.
+    pub errors: FitErrors,
+    /// What the fit did besides what was asked.
+    pub notes: Vec<String>,
+    /// Seconds the fit took; of a fit from the cache, that reading it took.
+    #[serde(skip)]
+    pub seconds: f64,
+    /// Whether the fit comes from the cache.
+    #[serde(skip)]
+    pub is_cached: bool,
+}
+
+impl EnvironmentFit {
+    /// The lobes in the world, for a map that is turned about +Y.
+    pub fn world_lobes(&self, rotation_rad: f32) -> Vec<EnvironmentLobe> {
+        let (s, c) = rotation_rad.sin_cos();
+        let turn = |lobe: &EnvironmentLobe| {
+            let [x, y, z] = lobe.axis;
+            EnvironmentLobe { axis: [c * x + s * z, y, c * z - s * x], ..*lobe }
+        };
+        self.lobes.iter().map(turn).collect()
+    }
+
+    /// The luminance lobes as components of their sum, with colours.
+    pub(super) fn components(&self) -> Vec<ColouredComponent> {
+        let energy_of = |lobe: &EnvironmentLobe| {
+            f64::from(lobe.amplitude) * kernel_integral(lobe.bandwidth.into())
+        };
+        let energy: f64 = self.lobes.iter().map(energy_of).sum();
+        let coloured = |lobe: &EnvironmentLobe| ColouredComponent {
+            component: Component::from_lobe(&lobe.lobe(), energy),
+            colour: Vec3::from_array(lobe.colour).as_dvec3(),
+        };
+        self.lobes.iter().map(coloured).collect()
+    }
+}
+
+/// Fits a map, or reads the fit from the cache. The rotation of the map does not matter; see
+/// [`EnvironmentFit::world_lobes`]. `progress` is called with the share of the work that is done.
+///
+/// # Errors
+/// A map that is black or holds numbers that are not finite or negative; lobes out of range. A cache
+/// that cannot be read or written is a warning in the log.
+pub fn environment_lobes(
+    map: &EnvironmentMap,
+    options: EnvironmentOptions,
+    cache: Option<&Cache>,
+    progress: &mut dyn FnMut(f64),
+) -> Result<EnvironmentFit> {
+    let start = Instant::now();
+    check_lobes(options.lobes)?;
+    let key = key(map, options);
+    if let Some(Fit::Environment(fit)) = cache.and_then(|cache| cache.load(&key)) {
+        let seconds = start.elapsed().as_secs_f64();
+        return Ok(EnvironmentFit { source: map.source.clone(), seconds, is_cached: true, ..fit });
+    }
+    let mut fit = fit_map(map, options, progress)?;
+    fit.seconds = start.elapsed().as_secs_f64();
+    if let Some(cache) = cache {
+        cache.store(&key, &Fit::Environment(fit.clone()));
+    }
+    Ok(fit)
+}
+
+/// Everything the fit depends on, as the name of its cache file.
+fn key(map: &EnvironmentMap, options: EnvironmentOptions) -> String {
+    let header =
+        format!("environment {} {:?} {} {}", options.lobes, options.method, map.width, map.height);
+    cache::key(&[header.as_bytes(), bytemuck::cast_slice(&map.texels)])
+}
+
+fn fit_map(
+    map: &EnvironmentMap,
+    options: EnvironmentOptions,
+    progress: &mut dyn FnMut(f64),
+) -> Result<EnvironmentFit> {
+    let fail = |message: String| Error::Fit { what: map.source.clone(), message };
+    let is_sound = |texel: &Vec3| texel.is_finite() && texel.min_element() >= 0.0;
+    if let Some(index) = map.texels.iter().position(|texel| !is_sound(texel)) {
+        let (x, y) = (index % map.width as usize, index / map.width as usize);
+        let texel = map.texels[index];
+        return Err(fail(format!(
+            "texel ({x}, {y}) is {texel}; expected finite radiance that is not negative"
+        )));
+    }
+    let grid = Grid::new(map);
+    let energy = grid.energy();
+    if energy <= 0.0 {
+        return Err(fail("the map is black; expected light from somewhere".into()));
+    }
+    let patches = grid.patches(patch_count(options.lobes));
+    let luminance_patches: Vec<Patch> = patches.iter().map(|patch| patch.patch).collect();
+    let points = PointSet::new(&luminance_patches);
+    let mut notes = Vec::new();
+    if points.len() < options.lobes {
+        notes.push(format!(
+            "{} lobes asked for, but light comes from {} places only",
+            options.lobes,
+            points.len()
+        ));
+    }
+    let l2 = options.method == Method::L2;
+    let em_part = if l2 { 0.3 } else { 0.9 };
+    let components = grow(&points, options.lobes, &mut |share| progress(em_part * share));
+    let (components, fitted_energy) = if l2 {
+        let square = squared_integral(&grid);
+        let (objective, mut unknowns) = SquaredError::new(&luminance_patches, square, &components);
+        solver::minimize(
+            &|unknowns| objective.evaluate(unknowns),
+            &objective.bounds(),
+            &mut unknowns,
+            config::L2_STEPS,
+            config::L2_TOLERANCE,
+            &mut |step| progress(0.3 + 0.6 * step as f64 / config::L2_STEPS as f64),
+        );
+        objective.components(&unknowns)
+    } else {
+        (components, energy)
+    };
+    let mut components: Vec<Component> =
+        components.into_iter().filter(|component| component.share > 0.0).collect();
+    components.sort_by(|a, b| b.share.total_cmp(&a.share));
+    if components.len() < options.lobes.min(points.len()) {
+        notes.push(format!(
+            "{} lobes asked for, {} have any light",
+            options.lobes,
+            components.len()
+        ));
+    }
+    let lobes = coloured_lobes(&patches, &components, fitted_energy);
+    let mut fit = EnvironmentFit {
+        source: map.source.clone(),
+        method: options.method,
+        requested_lobes: options.lobes,
+        lobes,
+        errors: FitErrors::default(),
+        notes,
+        seconds: 0.0,
+        is_cached: false,
+    };
+    fit.errors = judge_environment(&grid, &fit.components());
+    progress(1.0);
+    Ok(fit)
+}
+
+/// `∫L²` of luminance over the sphere.
+fn squared_integral(grid: &Grid) -> f64 {
+    let row = |y: usize| {
+        let cells = &grid.radiance[y * grid.width..(y + 1) * grid.width];
+        let sum: f64 = cells.iter().map(|texel| f64::from(luminance(*texel)).powi(2)).sum();
+        sum * grid.cell_solid_angle(y)
+    };
+    (0..grid.height).map(row).sum()
+}
+
+/// Lobes with colours by least squares.
+fn coloured_lobes(
+    patches: &[ColouredPatch],
+    components: &[Component],
+    energy: f64,
+) -> Vec<EnvironmentLobe> {
+    let amplitudes: Vec<f64> =
+        components.iter().map(|c| energy * c.share / kernel_integral(c.bandwidth)).collect();
+    let start: Vec<DVec3> = amplitudes.iter().map(|amplitude| DVec3::splat(*amplitude)).collect();
+    let colours = colour_amplitudes(patches, components, &start);
+    let lobe = |((component, amplitude), colour): ((&Component, &f64), &DVec3)| EnvironmentLobe {
+        axis: component.axis.as_vec3().to_array(),
+        bandwidth: component.bandwidth as f32,
+        colour: colour.as_vec3().to_array(),
+        amplitude: *amplitude as f32,
+    };
+    components.iter().zip(&amplitudes).zip(&colours).map(lobe).collect()
+}

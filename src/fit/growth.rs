@@ -1,0 +1,149 @@
+//! From points to a mixture of any size: k-means++ for the first lobes, then splits.
+//!
+//! A mixture grows by splitting the lobes that hold the most divergence, a quarter of them at a time,
+//! with a few steps of expectation maximization between; so the mixture of 2n lobes starts where
+//! that of n lobes ended and cannot be worse.
+
+use glam::{DMat3, DVec3};
+
+use super::{
+    component::{Component, MAX_BANDWIDTH, MIN_BANDWIDTH, bandwidth_from_shortfall},
+    config,
+    expectation::{holdings, maximize},
+    points::PointSet,
+};
+
+/// Reproducible numbers in [0, 1): splitmix64 \[Steele et al. 2014\] with the seed of every fit.
+struct Random(u64);
+
+impl Random {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// Index of the first entry at which the running sum of `weights` exceeds `target`.
+fn choose(weights: &[f64], target: f64) -> usize {
+    let mut sum = 0.0;
+    let mut last = 0;
+    for (index, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+        sum += weight;
+        last = index;
+        if sum > target {
+            break;
+        }
+    }
+    last
+}
+
+/// Lobes at points chosen with a probability that grows with energy and with the squared distance to
+/// the lobes there are. \[Arthur & Vassilvitskii 2007\]. At most `count`, and at most one per point.
+fn k_means_plus_plus(points: &PointSet, count: usize) -> Vec<Component> {
+    let mut random = Random(config::SEED);
+    let mut distances = vec![1.0_f64; points.len()];
+    let mut axes: Vec<DVec3> = Vec::new();
+    while axes.len() < count {
+        let weights: Vec<f64> =
+            distances.iter().zip(&points.weight).map(|(d, w)| d * f64::from(*w)).collect();
+        let total: f64 = weights.iter().sum();
+        if total <= 0.0 {
+            break;
+        }
+        let chosen = choose(&weights, random.uniform() * total);
+        let axis = points.mean(chosen).normalize_or(DVec3::Y);
+        for (index, distance) in distances.iter_mut().enumerate() {
+            *distance = distance.min(1.0 - points.mean(index).dot(axis));
+        }
+        distances[chosen] = 0.0;
+        axes.push(axis);
+    }
+    let nearest = |index: usize| {
+        let mean = points.mean(index);
+        let nearer = |a: &usize, b: &usize| mean.dot(axes[*a]).total_cmp(&mean.dot(axes[*b]));
+        (0..axes.len()).max_by(nearer).unwrap_or(0)
+    };
+    let mut energies = vec![0.0_f64; axes.len()];
+    let mut moments = vec![DVec3::ZERO; axes.len()];
+    for index in 0..points.len() {
+        let cluster = nearest(index);
+        energies[cluster] += f64::from(points.weight[index]);
+        moments[cluster] += f64::from(points.weight[index]) * points.mean(index);
+    }
+    let component = |k: usize| {
+        let mean = moments[k] / energies[k].max(1e-30);
+        Component {
+            axis: mean.normalize_or(axes[k]),
+            bandwidth: bandwidth_from_shortfall(1.0 - mean.length()),
+            share: energies[k],
+        }
+    };
+    (0..axes.len()).map(component).collect()
+}
+
+/// Largest eigenvalue and its vector of a covariance within the plane across `axis`, and the
+/// smaller one.
+fn principal(covariance: DMat3, axis: DVec3) -> (f64, DVec3, f64) {
+    let (tangent, bitangent) = axis.any_orthonormal_pair();
+    let a = tangent.dot(covariance * tangent);
+    let b = tangent.dot(covariance * bitangent);
+    let c = bitangent.dot(covariance * bitangent);
+    let middle = 0.5 * (a + c);
+    let radius = (0.25 * (a - c) * (a - c) + b * b).sqrt();
+    let angle = 0.5 * (2.0 * b).atan2(a - c);
+    (middle + radius, angle.cos() * tangent + angle.sin() * bitangent, (middle - radius).max(0.0))
+}
+
+/// Splits the `count` lobes that hold the most divergence along their longest extent; lobes without
+/// energy are replaced first. The new lobes stand at the end.
+fn split(points: &PointSet, components: &mut Vec<Component>, count: usize) {
+    let held = holdings(points, components);
+    let mut order: Vec<usize> = (0..components.len()).collect();
+    order.sort_by(|a, b| held[*b].divergence.total_cmp(&held[*a].divergence).then(a.cmp(b)));
+    order.retain(|k| components[*k].share > 0.0);
+    for &parent in order.iter().take(count) {
+        let Component { axis, share, bandwidth } = components[parent];
+        let (long, direction, short) = principal(held[parent].covariance, axis);
+        let offset = (config::SPLIT_OFFSET * long.sqrt()).clamp(1e-4, 1.0);
+        // Half the variance left along the split, averaged with that across it.
+        let rest = long * (1.0 - config::SPLIT_OFFSET * config::SPLIT_OFFSET).max(0.0);
+        let variance = 0.5 * (rest + short);
+        let bandwidth = (1.0 / variance.max(1e-9)).max(bandwidth);
+        let bandwidth = bandwidth.clamp(MIN_BANDWIDTH, MAX_BANDWIDTH);
+        let child = |sign: f64| Component {
+            axis: (axis + sign * offset * direction).normalize(),
+            bandwidth,
+            share: 0.5 * share,
+        };
+        components[parent] = child(1.0);
+        components.push(child(-1.0));
+    }
+}
+
+/// A mixture of `count` lobes for the points, or of as many as there are points. `progress` is called
+/// with the share of the work that is done.
+pub fn grow(points: &PointSet, count: usize, progress: &mut dyn FnMut(f64)) -> Vec<Component> {
+    let count = count.min(points.len());
+    let mut components = k_means_plus_plus(points, count.min(config::FIRST_LOBES));
+    maximize(points, &mut components, config::GROWTH_STEPS, config::GROWTH_TOLERANCE);
+    while components.len() < count {
+        let size = components.len();
+        let next = (size + size.div_ceil(4)).min(count);
+        split(points, &mut components, next - size);
+        let grown = components.len();
+        maximize(points, &mut components, config::GROWTH_STEPS, config::GROWTH_TOLERANCE);
+        progress(0.5 * grown as f64 / count as f64);
+        if grown == size {
+            break;
+        }
+    }
+    for round in 0..config::FINAL_ROUNDS {
+        maximize(points, &mut components, config::FINAL_STEPS, config::FINAL_TOLERANCE);
+        progress(0.5 + 0.5 * (round + 1) as f64 / config::FINAL_ROUNDS as f64);
+    }
+    components.retain(|component| component.share > 0.0);
+    components
+}

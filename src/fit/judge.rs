@@ -1,0 +1,194 @@
+//! How good a fit is: the error figures, over every cell of the target.
+
+use std::f64::consts::PI;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    brdf::{HEMISPHERE, lobe_energy},
+    component::{Component, kernel_integral},
+    config,
+    expectation::fast_exp,
+    grid::Grid,
+    hemisphere::HemisphereTarget,
+};
+use crate::{scene::environment::luminance, srbf::Lobe};
+
+/// Error figures of a fit. With the target density p, the fit's density f (both per steradian, with
+/// the integral 1) and the target's values L against the fit's values F:
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FitErrors {
+    /// `‖L − F‖ / ‖L‖` over the sphere (all colour channels together).
+    pub relative_l2: f64,
+    /// `∫p²/q dω − 1` for `q = 0.9·f + 0.1·uniform`: the variance of an estimator that samples q.
+    pub chi_squared: f64,
+    /// Kullback-Leibler divergence `∫p ln(p/f) dω`, nats.
+    pub kullback_leibler: f64,
+    /// `∫F dω / ∫L dω`, luminance.
+    pub energy_captured: f64,
+}
+
+/// Cells of a tile are compared with the lobes that matter there.
+const TILE: usize = 16;
+/// Points along each side of a cell where the map is steep.
+const STEEP_PARTS: usize = 4;
+/// Exponent below the largest at which a lobe of a tile no longer matters.
+const CULL: f64 = 18.0;
+
+/// A lobe with its colour: the luminance density from `component`, the value from `colour`.
+#[derive(Clone, Copy, Debug)]
+pub struct ColouredComponent {
+    /// Shape and share of the sampling density.
+    pub component: Component,
+    /// Value at the axis per colour channel.
+    pub colour: DVec3,
+}
+
+/// Lobes that matter in a tile, structure of arrays.
+#[derive(Default)]
+struct Selection {
+    lobes: Vec<[f32; 8]>,
+}
+
+impl Selection {
+    /// Lobes whose part of the density, or of the value, is not negligible within `radius` radians
+    /// of `centre`. Returns the exponent that `log_density` is relative to.
+    fn choose(&mut self, lobes: &[ColouredComponent], centre: DVec3, radius: f64) -> f64 {
+        let bounds = |lobe: &ColouredComponent| {
+            let c = &lobe.component;
+            let angle = c.axis.cross(centre).length().atan2(c.axis.dot(centre));
+            let near = (angle - radius).max(0.0);
+            let far = (angle + radius).min(PI);
+            let log_scale = (c.share / kernel_integral(c.bandwidth)).max(1e-300).ln();
+            let exponent = |angle: f64| -2.0 * c.bandwidth * (0.5 * angle).sin().powi(2);
+            (log_scale + exponent(near), log_scale + exponent(far), exponent(near), log_scale)
+        };
+        let bounds: Vec<_> = lobes.iter().map(bounds).collect();
+        let floor = bounds.iter().map(|b| b.1).fold(f64::MIN, f64::max);
+        let value_floor = lobes
+            .iter()
+            .zip(&bounds)
+            .map(|(lobe, b)| (lobe.colour.max_element() + 1e-300).ln() + b.1 - b.3)
+            .fold(f64::MIN, f64::max);
+        self.lobes.clear();
+        for (lobe, b) in lobes.iter().zip(&bounds) {
+            let value = (lobe.colour.max_element() + 1e-300).ln() + b.2;
+            if b.0 < floor - CULL && value < value_floor - CULL {
+                continue;
+            }
+            let c = &lobe.component;
+            let [x, y, z] = c.axis.as_vec3().to_array();
+            let [red, green, blue] = lobe.colour.as_vec3().to_array();
+            let scale = (b.3 - floor) as f32;
+            self.lobes.push([x, y, z, c.bandwidth as f32, scale, red, green, blue]);
+        }
+        floor
+    }
+
+    /// Logarithm of the density relative to the floor, and the value.
+    fn evaluate(&self, direction: Vec3) -> (f64, Vec3) {
+        let (mut density, mut value) = (0.0_f32, Vec3::ZERO);
+        for &[x, y, z, bandwidth, scale, red, green, blue] in &self.lobes {
+            let d = direction - Vec3::new(x, y, z);
+            let exponent = -0.5 * bandwidth * d.dot(d);
+            // Relative to a lobe that reaches every cell of the tile, so at most some e³⁰ here.
+            density += fast_exp(exponent + scale);
+            let kernel = fast_exp(exponent);
+            value += kernel * Vec3::new(red, green, blue);
+        }
+        (f64::from(density.max(1e-37)).ln(), value)
+    }
+}
+
+/// Error figures of a fit of a map.
+pub fn judge_environment(grid: &Grid, lobes: &[ColouredComponent]) -> FitErrors {
+    let energy = grid.energy();
+    let (columns, rows) = (grid.width.div_ceil(TILE), grid.height.div_ceil(TILE));
+    let share: f64 = lobes.iter().map(|lobe| lobe.component.share).sum();
+    let tiles: Vec<[f64; 5]> = (0..columns * rows)
+        .into_par_iter()
+        .map_init(Selection::default, |selection, tile| {
+            let (x0, y0) = (tile % columns * TILE, tile / columns * TILE);
+            let (x1, y1) = ((x0 + TILE).min(grid.width), (y0 + TILE).min(grid.height));
+            let centre = grid.direction(0.5 * (x0 + x1) as f64, 0.5 * (y0 + y1) as f64);
+            // Half a tile's diagonal, measured along meridian and parallel.
+            let radius = PI * TILE as f64 * 1.5 / grid.height.min(grid.width / 2).max(1) as f64;
+            let floor = selection.choose(lobes, centre, radius);
+            let mut sums = [0.0; 5];
+            for (x, y) in (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y))) {
+                let parts = if grid.is_steep(x, y) { STEEP_PARTS } else { 1 };
+                let solid_angle = grid.cell_solid_angle(y) / (parts * parts) as f64;
+                for part in 0..parts * parts {
+                    let inside = |part: usize| (part as f64 + 0.5) / parts as f64;
+                    let column = x as f64 + inside(part % parts);
+                    let row = y as f64 + inside(part / parts);
+                    let direction = grid.direction(column, row).as_vec3();
+                    let (log_density, value) = selection.evaluate(direction);
+                    let log_density = log_density + floor - share.ln();
+                    let radiance = grid.lookup(column, row);
+                    let p = f64::from(luminance(radiance)) / energy;
+                    let q = (1.0 - config::DEFENSIVE_SHARE) * log_density.exp()
+                        + config::DEFENSIVE_SHARE / (4.0 * PI);
+                    let difference = (radiance - value).as_dvec3();
+                    sums[0] += solid_angle * difference.length_squared();
+                    sums[1] += solid_angle * radiance.as_dvec3().length_squared();
+                    sums[2] += solid_angle * p * p / q;
+                    if p > 0.0 {
+                        sums[3] += solid_angle * p * (p.ln() - log_density);
+                    }
+                    sums[4] += solid_angle * f64::from(luminance(value));
+                }
+            }
+            sums
+        })
+        .collect();
+    let mut sums = [0.0; 5];
+    for tile in tiles {
+        for (sum, value) in sums.iter_mut().zip(tile) {
+            *sum += value;
+        }
+    }
+    FitErrors {
+        relative_l2: (sums[0] / sums[1]).sqrt(),
+        chi_squared: sums[2] - 1.0,
+        kullback_leibler: sums[3],
+        energy_captured: sums[4] / energy,
+    }
+}
+
+/// Error figures of a fit of BRDF × cosine for one view. The uniform part of q is on the hemisphere;
+/// what the lobes hold below the horizon is lost, in f, in F's energy and in q.
+pub fn judge_hemisphere(target: &HemisphereTarget, lobes: &[Lobe]) -> FitErrors {
+    let energy = target.energy();
+    let lobe_sum: f64 = lobes.iter().map(lobe_energy).sum();
+    if energy <= 0.0 || lobe_sum <= 0.0 {
+        return FitErrors::default();
+    }
+    let components: Vec<Component> =
+        lobes.iter().map(|lobe| Component::from_lobe(lobe, 1.0)).collect();
+    let mut sums = [0.0; 5];
+    for sample in &target.samples {
+        let kernel = |c: &Component| {
+            let d = sample.direction - c.axis;
+            c.share / kernel_integral(c.bandwidth) * (-0.5 * c.bandwidth * d.length_squared()).exp()
+        };
+        let value: f64 = components.iter().map(kernel).sum();
+        let (f, p) = (value / lobe_sum, sample.value / energy);
+        let q = (1.0 - config::DEFENSIVE_SHARE) * f + config::DEFENSIVE_SHARE / HEMISPHERE;
+        sums[0] += sample.solid_angle * (sample.value - value).powi(2);
+        sums[1] += sample.solid_angle * sample.value.powi(2);
+        sums[2] += sample.solid_angle * p * p / q;
+        if p > 0.0 {
+            sums[3] += sample.solid_angle * p * (p / f.max(1e-300)).ln();
+        }
+        sums[4] += sample.solid_angle * value;
+    }
+    FitErrors {
+        relative_l2: (sums[0] / sums[1]).sqrt(),
+        chi_squared: sums[2] - 1.0,
+        kullback_leibler: sums[3],
+        energy_captured: sums[4] / energy,
+    }
+}

@@ -1,0 +1,50 @@
+//! Choices that environment and BRDF fits share.
+
+use serde::{Deserialize, Serialize};
+
+use super::config;
+use crate::error::{Error, Result};
+
+/// What a fit minimizes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Kullback-Leibler divergence, by expectation maximization: what a sampling density wants.
+    #[default]
+    Em,
+    /// Squared error, by projected L-BFGS from the result of `em`: the fits of \[Tsai et al. 2008\].
+    L2,
+}
+
+impl std::fmt::Display for Method {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str(match self {
+            Self::Em => "em",
+            Self::L2 => "l2",
+        })
+    }
+}
+
+/// Refuses a number of lobes that no fit can have.
+///
+/// # Errors
+/// [`Error::Usage`] with the limits.
+pub fn check_lobes(lobes: usize) -> Result<()> {
+    if (1..=config::MAX_LOBES).contains(&lobes) {
+        return Ok(());
+    }
+    let most = config::MAX_LOBES;
+    Err(Error::usage(format!("{lobes} lobes asked for; expected 1 to {most}")))
+}
+
+/// Refuses a number of view elevations that no fit can have.
+///
+/// # Errors
+/// [`Error::Usage`] with the limits.
+pub fn check_views(views: usize) -> Result<()> {
+    if (1..=config::MAX_VIEWS).contains(&views) {
+        return Ok(());
+    }
+    let most = config::MAX_VIEWS;
+    Err(Error::usage(format!("{views} view elevations asked for; expected 1 to {most}")))
+}
