@@ -4,20 +4,21 @@
 //! `nx ny nz` of `vertex` and the list `vertex_indices` (or `vertex_index`) of `face`. Polygons with
 //! more than three corners are triangulated in the plane of their Newell normal.
 
+mod header;
+
 use std::{
     fs::File,
-    io::{BufRead, BufReader, ErrorKind, Read},
+    io::{BufRead, BufReader, ErrorKind},
     path::Path,
 };
+
+use header::{Element, Encoding, Property, Scalar};
 
 use super::Mesh;
 use crate::{
     error::{Error, Result},
     scene::triangulate::triangulate_in_space,
 };
-
-/// A header longer than this is taken for another kind of file.
-const MAX_HEADER_LINE_BYTES: u64 = 65_536;
 
 /// Reads a PLY file.
 ///
@@ -28,91 +29,6 @@ pub fn read(path: &Path) -> Result<Mesh> {
     let file = File::open(path).map_err(|source| Error::io(path, "read", source))?;
     let file_bytes = file.metadata().map_err(|source| Error::io(path, "read", source))?.len();
     read_from(path, BufReader::with_capacity(1 << 16, file), file_bytes)
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Encoding {
-    Ascii,
-    BinaryLittleEndian,
-    BinaryBigEndian,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Scalar {
-    Int8,
-    Uint8,
-    Int16,
-    Uint16,
-    Int32,
-    Uint32,
-    Float32,
-    Float64,
-}
-
-impl Scalar {
-    fn parse(name: &str) -> Option<Self> {
-        Some(match name {
-            "char" | "int8" => Self::Int8,
-            "uchar" | "uint8" => Self::Uint8,
-            "short" | "int16" => Self::Int16,
-            "ushort" | "uint16" => Self::Uint16,
-            "int" | "int32" => Self::Int32,
-            "uint" | "uint32" => Self::Uint32,
-            "float" | "float32" => Self::Float32,
-            "double" | "float64" => Self::Float64,
-            _ => return None,
-        })
-    }
-
-    fn byte_count(self) -> usize {
-        match self {
-            Self::Int8 | Self::Uint8 => 1,
-            Self::Int16 | Self::Uint16 => 2,
-            Self::Int32 | Self::Uint32 | Self::Float32 => 4,
-            Self::Float64 => 8,
-        }
-    }
-
-    /// Value of little-endian bytes; every type fits a double exactly.
-    fn value(self, bytes: [u8; 8]) -> f64 {
-        let [a, b, c, d, ..] = bytes;
-        match self {
-            Self::Int8 => f64::from(i8::from_le_bytes([a])),
-            Self::Uint8 => f64::from(a),
-            Self::Int16 => f64::from(i16::from_le_bytes([a, b])),
-            Self::Uint16 => f64::from(u16::from_le_bytes([a, b])),
-            Self::Int32 => f64::from(i32::from_le_bytes([a, b, c, d])),
-            Self::Uint32 => f64::from(u32::from_le_bytes([a, b, c, d])),
-            Self::Float32 => f64::from(f32::from_le_bytes([a, b, c, d])),
-            Self::Float64 => f64::from_le_bytes(bytes),
-        }
-    }
-}
-
-#[derive(Clone, Debug)]
-struct Property {
-    name: String,
-    value: Scalar,
-    /// Type of the count where the property is a list.
-    list_count: Option<Scalar>,
-}
-
-#[derive(Clone, Debug)]
-struct Element {
-    name: String,
-    count: u64,
-    properties: Vec<Property>,
-}
-
-impl Element {
-    /// Bytes the element needs at least, in the shortest form of each property.
-    fn least_bytes(&self, encoding: Encoding) -> u64 {
-        let of_property = |property: &Property| match encoding {
-            Encoding::Ascii => 2,
-            _ => property.list_count.unwrap_or(property.value).byte_count() as u64,
-        };
-        self.properties.iter().map(of_property).sum::<u64>().saturating_mul(self.count)
-    }
 }
 
 fn read_from<R: BufRead>(path: &Path, reader: R, file_bytes: u64) -> Result<Mesh> {
@@ -211,89 +127,6 @@ impl<R: BufRead> Source<'_, R> {
             },
             _ => Error::format(self.path, message),
         }
-    }
-
-    fn header_line(&mut self) -> Result<String> {
-        let mut bytes = Vec::new();
-        self.reader
-            .by_ref()
-            .take(MAX_HEADER_LINE_BYTES)
-            .read_until(b'\n', &mut bytes)
-            .map_err(|source| Error::io(self.path, "read", source))?;
-        if bytes.is_empty() {
-            return Err(self.error("truncated: the file ends before `end_header`"));
-        }
-        self.bytes_read += bytes.len() as u64;
-        Ok(String::from_utf8_lossy(&bytes).trim().to_owned())
-    }
-
-    fn read_header(&mut self) -> Result<Vec<Element>> {
-        let magic = self.header_line()?;
-        if magic != "ply" {
-            let start: String = magic.chars().take(16).collect();
-            return Err(
-                self.error(format!("expected a PLY file that starts with `ply`, found `{start}`"))
-            );
-        }
-        let mut elements: Vec<Element> = Vec::new();
-        let mut encoding = None;
-        loop {
-            self.line += 1;
-            let text = self.header_line()?;
-            let words: Vec<&str> = text.split_whitespace().collect();
-            match words.as_slice() {
-                ["format", name, version] => {
-                    encoding = Some(match *name {
-                        "ascii" => Encoding::Ascii,
-                        "binary_little_endian" => Encoding::BinaryLittleEndian,
-                        "binary_big_endian" => Encoding::BinaryBigEndian,
-                        _ => {
-                            return Err(self.error(format!(
-                                "expected format ascii, binary_little_endian or binary_big_endian, \
-                                 found `{name} {version}`"
-                            )));
-                        }
-                    });
-                }
-                ["element", name, count] => {
-                    let count = count.parse().map_err(|_| {
-                        self.error(format!("expected the number of `{name}`, found `{count}`"))
-                    })?;
-                    elements.push(Element {
-                        name: (*name).to_owned(),
-                        count,
-                        properties: Vec::new(),
-                    });
-                }
-                ["property", kind @ .., name] => {
-                    let property = self.property(kind, name)?;
-                    let Some(element) = elements.last_mut() else {
-                        return Err(self.error(format!("property `{name}` before any element")));
-                    };
-                    element.properties.push(property);
-                }
-                ["comment" | "obj_info", ..] | [] => {}
-                ["end_header"] => break,
-                _ => return Err(self.error(format!("cannot read the header line `{text}`"))),
-            }
-        }
-        self.line += 1;
-        self.encoding = encoding.ok_or_else(|| self.error("the header has no line `format`"))?;
-        Ok(elements)
-    }
-
-    fn property(&self, kind: &[&str], name: &str) -> Result<Property> {
-        let scalar = |word: &str| {
-            Scalar::parse(word).ok_or_else(|| {
-                self.error(format!("property `{name}` has the unknown type `{word}`"))
-            })
-        };
-        let (value, list_count) = match kind {
-            [value] => (scalar(value)?, None),
-            ["list", count, value] => (scalar(value)?, Some(scalar(count)?)),
-            _ => return Err(self.error(format!("cannot read the type of property `{name}`"))),
-        };
-        Ok(Property { name: name.to_owned(), value, list_count })
     }
 
     fn read_vertices(&mut self, element: &Element, mesh: &mut Mesh) -> Result<()> {

@@ -1,0 +1,202 @@
+//! Objects of the scene file → triangles in world space.
+
+use std::{collections::HashMap, path::PathBuf};
+
+use glam::Vec3;
+
+use super::Loader;
+use crate::{
+    accel::MAX_COORDINATE,
+    error::Result,
+    scene::{
+        Geometry, Material,
+        file::{ObjectEntry, ObjectSource},
+        material::MaterialKind,
+        mesh::Mesh,
+        transform::Transform,
+    },
+};
+
+impl Loader<'_> {
+    pub(super) fn geometry(
+        &self,
+        objects: &[ObjectEntry],
+        materials: &mut Vec<Material>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Geometry> {
+        let mut named = HashMap::new();
+        let mut uses: HashMap<PathBuf, usize> = HashMap::new();
+        for (index, object) in objects.iter().enumerate() {
+            let label = object_label(index, object);
+            if let Some(name) = &object.name
+                && let Some(first) = named.insert(name, object.line)
+            {
+                return Err(
+                    self.error(format!("{label}: the name is taken by the object of line {first}"))
+                );
+            }
+            self.check_placement(&label, object)?;
+            self.check_material(&label, object, materials)?;
+            *uses.entry(self.mesh_key(object)).or_default() += 1;
+        }
+        // All meshes are read before any is placed, so that the arrays are allocated once.
+        let mut meshes = HashMap::new();
+        let (mut vertices, mut triangles) = (0, 0);
+        for (index, object) in objects.iter().enumerate() {
+            let key = self.mesh_key(object);
+            if !meshes.contains_key(&key) {
+                let mesh = match &object.source {
+                    ObjectSource::Mesh(_) => Mesh::read(&key, warnings)?,
+                    ObjectSource::Shape(shape) => shape.mesh().map_err(|message| {
+                        self.error(format!("{}: {message}", object_label(index, object)))
+                    })?,
+                };
+                meshes.insert(key.clone(), mesh);
+            }
+            vertices += meshes[&key].positions.len();
+            triangles += meshes[&key].triangles.len();
+        }
+        self.check(u32::try_from(vertices).is_ok() && u32::try_from(triangles).is_ok(), || {
+            format!(
+                "{vertices} vertices and {triangles} triangles, at most {} can be used",
+                u32::MAX
+            )
+        })?;
+        let mut geometry = Geometry::default();
+        geometry.positions.reserve_exact(vertices);
+        geometry.normals.reserve_exact(vertices);
+        geometry.triangles.reserve_exact(triangles);
+        geometry.materials.reserve_exact(triangles);
+        for (index, object) in objects.iter().enumerate() {
+            let key = self.mesh_key(object);
+            self.place(index, object, &meshes[&key], &mut geometry, materials, warnings)?;
+            // A mesh is let go with its last use, so that a large one is not held twice for long.
+            let left = uses.get_mut(&key).map_or(0, |left| {
+                *left -= 1;
+                *left
+            });
+            if left == 0 {
+                meshes.remove(&key);
+            }
+        }
+        Ok(geometry)
+    }
+
+    /// What tells meshes apart: the path of a mesh file, the parameters of a shape.
+    fn mesh_key(&self, object: &ObjectEntry) -> PathBuf {
+        match &object.source {
+            ObjectSource::Mesh(mesh) => self.folder.join(mesh),
+            ObjectSource::Shape(shape) => PathBuf::from(format!("{shape:?}")),
+        }
+    }
+
+    fn check_placement(&self, label: &str, object: &ObjectEntry) -> Result<()> {
+        let finite = (f32::MIN, f32::MAX);
+        self.check_range(&format!("{label}: translate"), &object.translate, finite)?;
+        self.check_range(&format!("{label}: rotate_deg"), &object.rotate_deg, finite)?;
+        self.check_range(&format!("{label}: scale"), &object.scale, finite)?;
+        self.check(!object.scale.contains(&0.0), || {
+            format!("{label}: scale must not be 0, found {:?}", object.scale)
+        })
+    }
+
+    fn check_material(
+        &self,
+        label: &str,
+        object: &ObjectEntry,
+        materials: &[Material],
+    ) -> Result<()> {
+        match &object.material {
+            Some(name) => {
+                let is_known = materials.iter().any(|material| material.name == *name);
+                self.check(is_known, || {
+                    let known: Vec<_> = materials.iter().map(|known| known.name.as_str()).collect();
+                    let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+                    format!("{label}: unknown material `{name}`, the scene has {known}")
+                })
+            }
+            None => self.check(matches!(object.source, ObjectSource::Mesh(_)), || {
+                format!("{label}: expected a material, found none")
+            }),
+        }
+    }
+
+    /// Refuses an object that lies too far out for traversal.
+    fn check_extent(&self, label: &str, positions: &[[f32; 3]]) -> Result<()> {
+        let distances = positions.iter().flatten().map(|coordinate| coordinate.abs());
+        let farthest = distances.fold(0.0, f32::max);
+        self.check(farthest <= MAX_COORDINATE, || {
+            format!(
+                "{label}: a vertex has the coordinate {farthest:e}; expected at most \
+                 {MAX_COORDINATE:e} m: scale or move the object"
+            )
+        })
+    }
+
+    /// Appends one object to the geometry, and the materials of its mesh file where it names none.
+    fn place(
+        &self,
+        index: usize,
+        object: &ObjectEntry,
+        mesh: &Mesh,
+        geometry: &mut Geometry,
+        materials: &mut Vec<Material>,
+        warnings: &mut Vec<String>,
+    ) -> Result<()> {
+        let label = object_label(index, object);
+        let transform = Transform::new(object.scale, object.rotate_deg, object.translate);
+        let first_vertex = geometry.positions.len();
+        let named = object
+            .material
+            .as_ref()
+            .and_then(|name| materials.iter().position(|material| material.name == *name));
+        let dropped = if let Some(material) = named {
+            geometry.append(mesh, &transform, |_| material as u32)
+        } else {
+            let first = materials.len();
+            let colored =
+                !mesh.runs.is_empty() && mesh.runs.iter().all(|run| run.material.is_some());
+            self.check(colored, || {
+                format!(
+                    "{label}: expected a material, found none, and the mesh file does not give one \
+                     to every triangle"
+                )
+            })?;
+            materials.extend(mesh.materials.iter().map(|material| Material {
+                name: format!("{}/{}", object.name.as_deref().unwrap_or("mesh"), material.name),
+                kind: MaterialKind::Diffuse { reflectance: Vec3::from_array(material.base_color) },
+            }));
+            geometry.append(mesh, &transform, |triangle| {
+                let run = mesh.runs.partition_point(|run| run.first_triangle <= triangle) - 1;
+                (first + mesh.runs[run].material.unwrap_or(0)) as u32
+            })
+        };
+        let of = mesh.triangles.len();
+        self.check_extent(&label, &geometry.positions[first_vertex..])?;
+        for (count, what) in [
+            (dropped.degenerate, format!("triangles of zero area of {of}")),
+            (dropped.non_finite, format!("triangles with infinite or NaN corners of {of}")),
+            (dropped.normals, "infinite or NaN normals (shaded flat there)".to_owned()),
+        ] {
+            if count > 0 {
+                warnings.push(format!("{label}: dropped {count} {what}"));
+            }
+        }
+        if of == 0 {
+            warnings.push(format!("{label}: the mesh has no triangles"));
+        }
+        Ok(())
+    }
+}
+
+/// The object in messages: its name, or its number and what it is made of.
+fn object_label(index: usize, object: &ObjectEntry) -> String {
+    let source = match &object.source {
+        ObjectSource::Mesh(mesh) => mesh.display().to_string(),
+        ObjectSource::Shape(shape) => shape.name().to_owned(),
+    };
+    match &object.name {
+        Some(name) => format!("object `{name}` ({source}, line {})", object.line),
+        None => format!("object {index} ({source}, line {})", object.line),
+    }
+}
