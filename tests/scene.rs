@@ -763,6 +763,17 @@ fn bad_triangles_are_dropped_with_a_warning_that_counts_them() {
 // Real input
 
 #[test]
+fn the_scenes_of_the_repository_load_without_a_warning() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    for name in ["buddha_and_car", "bathroom", "meeting_room", "restroom", "courtyard", "furnace"] {
+        let scene = Scene::load(&folder.join(format!("{name}.toml"))).unwrap();
+        assert_eq!(scene.name, name);
+        assert!(scene.warnings.is_empty(), "{name}: {:?}", scene.warnings);
+        assert!(scene.geometry.triangles.len() > 10_000, "{name}");
+    }
+}
+
+#[test]
 fn the_four_test_scenes_have_their_triangles() {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
     if !scenes.is_dir() {
