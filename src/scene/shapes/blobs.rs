@@ -104,7 +104,7 @@ impl Part {
 }
 
 /// Cells along the side of a block, within which only the parts near it are looked at.
-const BLOCK_CELLS: usize = 8;
+const BLOCK_CELLS: usize = 4;
 
 /// Most by which a distance changes over a unit of length; 1 for true distances, more where the bound
 /// for ellipsoids is loose.
