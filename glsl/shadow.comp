@@ -5,7 +5,6 @@
 // As in trace.comp, an invocation takes several rays in one traversal loop.
 #version 460
 #extension GL_KHR_shader_subgroup_ballot : require
-#extension GL_KHR_shader_subgroup_vote : require
 
 #define NEEDS_WAVE
 #define NEEDS_GEOMETRY
@@ -38,7 +37,8 @@ bool start_ray(uint index, uint path_count, float offset) {
     ShadowRay ray = load_shadow_ray(index);
     bool is_traced = hit.material != NO_MATERIAL && ray.contribution != vec3(0.0);
     bvh_start(
-        moved_off_surface(hit.position, hit.geometric_normal, ray.direction, offset), ray.direction);
+        moved_off_surface(hit.position, hit.geometric_normal, ray.direction, offset), ray.direction,
+        true);
     bvh_nodes_waiting.y = is_traced ? bvh_nodes_waiting.y : 0u;
     return is_traced;
 }
@@ -59,13 +59,15 @@ void main() {
     }
     while (has_ray) {
         bool running = true;
+        // One ballot a step, since software devices take turns over the lanes for each.
+        uint refill = min(REFILL_LANES, subgroupBallotBitCount(subgroupBallot(true)));
         do {
             if (running) {
                 running = bvh_step(true);
             }
             steps++;
-        } while (subgroupBallotBitCount(subgroupBallot(!running)) < REFILL_LANES
-            && subgroupAny(running) && steps < TRAVERSAL_STEP_LIMIT);
+        } while (subgroupBallotBitCount(subgroupBallot(!running)) < refill
+            && steps < TRAVERSAL_STEP_LIMIT);
         if (!running || steps >= TRAVERSAL_STEP_LIMIT) {
             if (running) {
                 atomicAdd(counters.traversal_overruns, 1u);

@@ -5,7 +5,6 @@
 // are worked out afterwards, with all lanes in step.
 #version 460
 #extension GL_KHR_shader_subgroup_ballot : require
-#extension GL_KHR_shader_subgroup_vote : require
 
 #define NEEDS_WAVE
 #define NEEDS_GEOMETRY
@@ -30,18 +29,20 @@ void main() {
     bool has_ray = first < ray_count;
     if (has_ray) {
         Ray ray = load_ray(first);
-        bvh_start(ray.origin, ray.direction);
+        bvh_start(ray.origin, ray.direction, false);
         bvh_nodes_waiting.y = ray.is_active != 0u ? bvh_nodes_waiting.y : 0u;
     }
     while (has_ray) {
         bool running = true;
+        // One ballot a step, since software devices take turns over the lanes for each.
+        uint refill = min(REFILL_LANES, subgroupBallotBitCount(subgroupBallot(true)));
         do {
             if (running) {
                 running = bvh_step(false);
             }
             steps++;
-        } while (subgroupBallotBitCount(subgroupBallot(!running)) < REFILL_LANES
-            && subgroupAny(running) && steps < TRAVERSAL_STEP_LIMIT);
+        } while (subgroupBallotBitCount(subgroupBallot(!running)) < refill
+            && steps < TRAVERSAL_STEP_LIMIT);
         if (!running || steps >= TRAVERSAL_STEP_LIMIT) {
             if (running) {
                 atomicAdd(counters.traversal_overruns, 1u);
@@ -51,7 +52,7 @@ void main() {
             has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
             if (has_ray) {
                 Ray ray = load_ray(first + turn * WORKGROUP_SIZE);
-                bvh_start(ray.origin, ray.direction);
+                bvh_start(ray.origin, ray.direction, false);
                 bvh_nodes_waiting.y = ray.is_active != 0u ? bvh_nodes_waiting.y : 0u;
             }
         }

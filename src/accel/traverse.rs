@@ -60,14 +60,14 @@ impl Accel {
 
     /// As [`Accel::closest`], with the work it took.
     pub fn closest_with_work(&self, origin: Vec3, direction: Vec3) -> (Option<Intersection>, Work) {
-        let mut ray = Traversal::start(origin, direction);
+        let mut ray = Traversal::start(origin, direction, false);
         while ray.step(self, false) {}
         (ray.hit(), ray.work)
     }
 
     /// Whether the ray meets any triangle; `direction` is a unit vector.
     pub fn is_occluded(&self, origin: Vec3, direction: Vec3) -> bool {
-        let mut ray = Traversal::start(origin, direction);
+        let mut ray = Traversal::start(origin, direction, true);
         while ray.step(self, true) {}
         ray.hit().is_some()
     }
@@ -199,8 +199,9 @@ struct Traversal {
 }
 
 impl Traversal {
-    fn start(origin: Vec3, direction: Vec3) -> Self {
-        let octant = |x: f32, bits| if x < 0.0 { 0 } else { bits };
+    /// Nearest children first for the closest hit, farthest first for any hit.
+    fn start(origin: Vec3, direction: Vec3, any_hit: bool) -> Self {
+        let octant = |x: f32, bits| if (x < 0.0) == any_hit { bits } else { 0 };
         Self {
             origin,
             direction,

@@ -46,7 +46,7 @@ pub struct Capabilities {
     pub max_shared_memory: u32,
     /// Invocations of a subgroup.
     pub subgroup_size: u32,
-    /// Whether compute shaders may vote and ballot within a subgroup.
+    /// Whether compute shaders may ballot within a subgroup.
     pub subgroup_ballot: bool,
     /// Memory heaps that are local to the device, bytes in all.
     pub device_memory: u64,
@@ -88,7 +88,7 @@ impl Capabilities {
             missing.push("feature scalarBlockLayout: needed, not found".into());
         }
         if !self.subgroup_ballot {
-            missing.push("subgroup vote and ballot in compute shaders: needed, not found".into());
+            missing.push("subgroup ballot in compute shaders: needed, not found".into());
         }
         if self.queue_family.is_none() {
             missing.push("a compute queue with timestamps: needed, not found".into());

@@ -94,7 +94,7 @@ impl Schedule {
     /// `docs/traversal.md`.
     pub fn incoherent(capabilities: &Capabilities) -> Self {
         if capabilities.kind == "software" {
-            Self { rays_per_invocation: 16, refill_lanes: capabilities.subgroup_size.div_ceil(2) }
+            Self { rays_per_invocation: 16, refill_lanes: capabilities.subgroup_size.div_ceil(3) }
         } else {
             Self::SINGLE
         }

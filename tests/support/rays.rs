@@ -25,7 +25,7 @@ use glam::{Quat, Vec3};
 pub const ONE_PAGE: u64 = 128 << 20;
 
 /// Schedule that refills the lanes of a subgroup of eight.
-pub const REFILLING: Schedule = Schedule { rays_per_invocation: 16, refill_lanes: 4 };
+pub const REFILLING: Schedule = Schedule { rays_per_invocation: 16, refill_lanes: 3 };
 
 /// SplitMix64 numbers in [0, 1).
 pub struct Random(pub u64);
