@@ -20,9 +20,14 @@ void main() {
     if (pixel >= wave.pixel_count || !index.inside) {
         return;
     }
-    vec3 albedo = vec3(0.0);
-    vec3 normal = vec3(0.0);
-    vec3 position = vec3(0.0);
+    // Sample after sample onto the film's sums, so that these do not depend on the grouping into
+    // waves.
+    bool wants_albedo = (wave.aovs & AOV_ALBEDO) != 0u;
+    bool wants_normal = (wave.aovs & AOV_NORMAL) != 0u;
+    bool wants_position = (wave.aovs & AOV_POSITION) != 0u;
+    vec3 albedo = wants_albedo ? film_albedo[index.film_index] : vec3(0.0);
+    vec3 normal = wants_normal ? film_normal[index.film_index] : vec3(0.0);
+    vec3 position = wants_position ? film_position[index.film_index] : vec3(0.0);
     for (uint i = 0u; i < wave.sample_count; ++i) {
         uint path = i * wave.pixel_count + pixel;
         Hit hit = hits[path];
@@ -34,13 +39,13 @@ void main() {
         normal += hit.shading_normal;
         position += hit.position;
     }
-    if ((wave.aovs & AOV_ALBEDO) != 0u) {
-        film_albedo[index.film_index] += albedo;
+    if (wants_albedo) {
+        film_albedo[index.film_index] = albedo;
     }
-    if ((wave.aovs & AOV_NORMAL) != 0u) {
-        film_normal[index.film_index] += normal;
+    if (wants_normal) {
+        film_normal[index.film_index] = normal;
     }
-    if ((wave.aovs & AOV_POSITION) != 0u) {
-        film_position[index.film_index] += position;
+    if (wants_position) {
+        film_position[index.film_index] = position;
     }
 }

@@ -4,7 +4,8 @@ use bytemuck::{Pod, Zeroable};
 use fenestra::{
     brdf,
     gpu::constants::{
-        BINDING_BRDF_TABLE, BINDING_MATERIALS, MATERIAL_MEASURED, SET_FILM, SET_SCENE,
+        BINDING_BRDF_CELLS, BINDING_BRDF_TABLE, BINDING_MATERIALS, MATERIAL_MEASURED, SET_FILM,
+        SET_SCENE,
     },
 };
 use glam::Vec3;
@@ -67,6 +68,7 @@ fn shader_agrees_with_its_twin() {
             (SET_FILM, 0, bytemuck::cast_slice(&queries)),
             (SET_SCENE, BINDING_MATERIALS, bytemuck::cast_slice(&tables().materials)),
             (SET_SCENE, BINDING_BRDF_TABLE, bytemuck::cast_slice(&tables().words)),
+            (SET_SCENE, BINDING_BRDF_CELLS, bytemuck::cast_slice(&tables().words)),
         ],
         size_of::<BrdfAnswer>() * queries.len(),
         queries.len() as u32,

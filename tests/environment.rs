@@ -178,7 +178,7 @@ fn the_tables_hold_the_probabilities_of_the_density() {
                 "{name}: row {row}"
             );
             for (column, cell) in cells.iter().enumerate() {
-                let cumulative = &tables.cells[row * width..][..width];
+                let cumulative = tables.cell_cumulative(&map, row);
                 let before = if column == 0 { 0.0 } else { cumulative[column - 1] };
                 let table = row_probability * f64::from(cumulative[column] - before);
                 assert!((table - cell).abs() < 2e-6, "{name}: cell {column}, {row}");
@@ -356,12 +356,14 @@ fn the_shader_agrees() {
             let [u, v] = random_independent_2d(i, 1, 0, 2);
             inputs.push([direction.x, direction.y, direction.z, u, v]);
         }
+        let texels: Vec<[f32; 4]> =
+            map.texels.iter().map(|texel| texel.extend(0.0).to_array()).collect();
         let output = support::run_probe(
             ENVIRONMENT_PROBE,
             &[
                 (SET_FILM, 0, bytemuck::cast_slice(&inputs)),
                 (SET_SCENE, BINDING_PARAMETERS, bytemuck::bytes_of(&parameters)),
-                (SET_SCENE, BINDING_ENVIRONMENT_TEXELS, bytemuck::cast_slice(&map.texels)),
+                (SET_SCENE, BINDING_ENVIRONMENT_TEXELS, bytemuck::cast_slice(&texels)),
                 (SET_SCENE, BINDING_ENVIRONMENT_ROWS, bytemuck::cast_slice(&tables.rows)),
                 (SET_SCENE, BINDING_ENVIRONMENT_CELLS, bytemuck::cast_slice(&tables.cells)),
             ],

@@ -12,9 +12,19 @@
 
 #include "frame.glsl"
 
+// Bits of the kinds of material that the scene has.
+layout(constant_id = CONSTANT_MATERIAL_KINDS) const uint MATERIAL_KINDS = 0xffffffffu;
+
+// Whether a material is of a kind; known when the pipeline is made where the scene has no such
+// material, or none but such.
+bool is_kind(Material material, uint kind) {
+    uint bit = 1u << kind;
+    return MATERIAL_KINDS == bit || ((MATERIAL_KINDS & bit) != 0u && material.kind == kind);
+}
+
 // Word of the BRDF table as a float.
 float table_value(uint index) {
-    return uintBitsToFloat(brdf_table[index]);
+    return texelFetch(brdf_table, int(index)).x;
 }
 
 // Linear interpolation between equally spaced nodes over the cosine 0…1, `stride` words apart.
@@ -142,8 +152,8 @@ vec3 half_difference_angles(vec3 outgoing_local, vec3 incident_local) {
 
 // Cell of the measured grid: RGB per steradian from three halves.
 vec3 measured_cell(uint grid, uint row, uint phi_index) {
-    uint index = grid + 2u * (row * MEASURED_PHI_DIFFERENCE_BINS + phi_index);
-    return vec3(unpackHalf2x16(brdf_table[index]), unpackHalf2x16(brdf_table[index + 1u]).x);
+    uint index = grid / 2u + row * MEASURED_PHI_DIFFERENCE_BINS + phi_index;
+    return texelFetch(brdf_cells, int(index)).xyz;
 }
 
 // Measured BRDF, trilinear between the centres of the grid's bins; periodic in φ_d.
@@ -265,12 +275,12 @@ void brdf_evaluate_and_pdf(
         return;
     }
     float cosine_pdf = incident_local.z / PI;
-    if (material.kind == MATERIAL_DIFFUSE) {
+    if (is_kind(material, MATERIAL_DIFFUSE)) {
         value = material.reflectance / PI;
         pdf = cosine_pdf;
         return;
     }
-    if (material.kind == MATERIAL_MEASURED) {
+    if (is_kind(material, MATERIAL_MEASURED)) {
         vec3 angles = half_difference_angles(outgoing_local, incident_local);
         value = measured_value(material.table_offset, angles);
         pdf = measured_pdf(material.table_offset, outgoing_local, incident_local, angles.x);
@@ -280,7 +290,7 @@ void brdf_evaluate_and_pdf(
     float cosine_difference = min(1.0, 0.5 * length(half_vector));
     float reflection = ggx_reflection(half_vector, outgoing_local, incident_local, material.alpha);
     pdf = ggx_pdf(half_vector, outgoing_local, material.alpha);
-    if (material.kind == MATERIAL_PLASTIC) {
+    if (is_kind(material, MATERIAL_PLASTIC)) {
         uint transmission = material.table_offset + PLASTIC_TRANSMISSION_OFFSET;
         float specular_share = cosine_table(
             material.table_offset + PLASTIC_SPECULAR_SHARE_OFFSET, 1u, outgoing_local.z);
@@ -289,9 +299,9 @@ void brdf_evaluate_and_pdf(
         value = vec3(reflection * fresnel_dielectric(cosine_difference, material.ior))
             + base * material.reflectance;
         pdf = mix(cosine_pdf, pdf, specular_share);
-    } else if (material.ior > 0.0) {
+    } else if (is_kind(material, MATERIAL_CONDUCTOR) && material.ior > 0.0) {
         value = reflection * fresnel_conductor(cosine_difference, material.eta, material.k);
-    } else {
+    } else if (is_kind(material, MATERIAL_CONDUCTOR)) {
         value = reflection * fresnel_schlick(cosine_difference, material.reflectance);
     }
 }
@@ -319,11 +329,11 @@ vec3 brdf_sample(Material material, vec3 outgoing_local, vec3 u) {
     if (outgoing_local.z <= 0.0) {
         return vec3(0.0, 0.0, -1.0);
     }
-    if (material.kind == MATERIAL_MEASURED) {
+    if (is_kind(material, MATERIAL_MEASURED)) {
         return measured_sample(material.table_offset, outgoing_local, u);
     }
-    float specular_share = material.kind == MATERIAL_CONDUCTOR ? 1.0 : 0.0;
-    if (material.kind == MATERIAL_PLASTIC) {
+    float specular_share = is_kind(material, MATERIAL_CONDUCTOR) ? 1.0 : 0.0;
+    if (is_kind(material, MATERIAL_PLASTIC)) {
         specular_share = cosine_table(
             material.table_offset + PLASTIC_SPECULAR_SHARE_OFFSET, 1u, outgoing_local.z);
     }
@@ -336,7 +346,7 @@ vec3 brdf_sample(Material material, vec3 outgoing_local, vec3 u) {
 // Share of light from a uniform white hemisphere that is reflected toward the outgoing direction,
 // 0…1, for the albedo image.
 vec3 brdf_albedo(Material material, vec3 outgoing_local) {
-    if (material.kind == MATERIAL_DIFFUSE) {
+    if (is_kind(material, MATERIAL_DIFFUSE)) {
         return material.reflectance;
     }
     uint offset = material.table_offset;

@@ -2,8 +2,9 @@
 // src/scene/environment. Needs NEEDS_PARAMETERS and NEEDS_ENVIRONMENT; densities per steradian.
 //
 // environment_rows: cumulative probability over height + 1 rows of cells, then the mean sine of the
-// polar angle of each of them. environment_cells: cumulative probability over the width cells of
-// each row. src/scene/environment/table.rs describes both.
+// polar angle of each of them, then a guide to the former. environment_cells: cumulative probability
+// over the width cells of each row, then a guide to them. src/scene/environment/table.rs describes
+// both.
 
 #ifndef ENVIRONMENT_GLSL
 #define ENVIRONMENT_GLSL
@@ -47,14 +48,29 @@ vec3 environment_world_from_map(vec3 direction) {
     return vec3(c * direction.x + s * direction.z, direction.y, c * direction.z - s * direction.x);
 }
 
+float environment_row(uint index) {
+    return texelFetch(environment_rows, int(index)).x;
+}
+
+float environment_cell_value(uint index) {
+    return texelFetch(environment_cells, int(index)).x;
+}
+
+// Intervals of the guide of a cumulative distribution: a power of two, at least half of its entries.
+uint guide_size(uint count) {
+    return count > 2u ? 1u << uint(findMSB(count - 1u)) : 1u;
+}
+
 EnvironmentCell environment_cell(uint column, uint row) {
     uint width = parameters.environment_width;
     uint next_column = column + 1u == width ? 0u : column + 1u;
     uint upper = (row == 0u ? 0u : row - 1u) * width;
     uint lower = min(row, parameters.environment_height - 1u) * width;
     return EnvironmentCell(
-        environment_texels[upper + column], environment_texels[upper + next_column],
-        environment_texels[lower + column], environment_texels[lower + next_column]);
+        texelFetch(environment_texels, int(upper + column)).xyz,
+        texelFetch(environment_texels, int(upper + next_column)).xyz,
+        texelFetch(environment_texels, int(lower + column)).xyz,
+        texelFetch(environment_texels, int(lower + next_column)).xyz);
 }
 
 vec3 environment_interpolate(EnvironmentCell cell, vec2 position) {
@@ -87,7 +103,7 @@ float environment_pdf(vec3 direction, vec3 radiance) {
     float sin_theta = sqrt(direction.x * direction.x + direction.z * direction.z);
     float v = atan(sin_theta, direction.y) / PI;
     uint row = min(uint(v * height + 0.5), parameters.environment_height);
-    float mean_sine = environment_rows[parameters.environment_height + 1u + row];
+    float mean_sine = environment_row(parameters.environment_height + 1u + row);
     return luminance(radiance) * mean_sine
         / (total * 2.0 * PI * PI * max(sin_theta, ENVIRONMENT_MIN_SIN_THETA));
 }
@@ -109,41 +125,40 @@ EnvironmentSample environment_sample(vec2 u) {
     uint width = parameters.environment_width;
     uint height = parameters.environment_height;
 
-    // First row, then first cell, whose cumulative probability exceeds u: never an empty one.
-    uint row = 0u;
-    uint last = height;
-    float before = 0.0;
-    float after = 1.0;
+    // First row, then first cell, whose cumulative probability exceeds u: never an empty one. The
+    // guides say between which two to search.
+    uint row_guide = 2u * (height + 1u);
+    uint interval = uint(u.y * float(guide_size(height + 1u)));
+    uint row = uint(environment_row(row_guide + interval));
+    uint last = uint(environment_row(row_guide + interval + 1u));
     while (row < last) {
         uint middle = (row + last) >> 1u;
-        float cumulative = environment_rows[middle];
-        if (cumulative > u.y) {
+        if (environment_row(middle) > u.y) {
             last = middle;
-            after = cumulative;
         } else {
             row = middle + 1u;
-            before = cumulative;
         }
     }
-    float row_remainder = min((u.y - before) / (after - before), 0.99999994);
+    float before = row > 0u ? environment_row(row - 1u) : 0.0;
+    float row_remainder =
+        min((u.y - before) / (environment_row(row) - before), 0.99999994);
 
-    uint first_cell = row * width;
-    uint column = 0u;
-    last = width - 1u;
-    before = 0.0;
-    after = 1.0;
+    uint guide = guide_size(width);
+    uint first_cell = row * (width + guide + 1u);
+    interval = first_cell + width + uint(u.x * float(guide));
+    uint column = uint(environment_cell_value(interval));
+    last = uint(environment_cell_value(interval + 1u));
     while (column < last) {
         uint middle = (column + last) >> 1u;
-        float cumulative = environment_cells[first_cell + middle];
-        if (cumulative > u.x) {
+        if (environment_cell_value(first_cell + middle) > u.x) {
             last = middle;
-            after = cumulative;
         } else {
             column = middle + 1u;
-            before = cumulative;
         }
     }
-    float column_remainder = min((u.x - before) / (after - before), 0.99999994);
+    before = column > 0u ? environment_cell_value(first_cell + column - 1u) : 0.0;
+    float column_remainder = min(
+        (u.x - before) / (environment_cell_value(first_cell + column) - before), 0.99999994);
 
     // The bilinear patch: its marginal along v, then the row of the patch at that v.
     EnvironmentCell cell = environment_cell(column, row);
@@ -174,7 +189,7 @@ EnvironmentSample environment_sample(vec2 u) {
     vec3 direction = vec3(
         -theta.x * azimuth.x, northern ? theta.y : -theta.y, theta.x * azimuth.y);
 
-    float mean_sine = environment_rows[height + 1u + row];
+    float mean_sine = environment_row(height + 1u + row);
     float pdf = luminance(radiance) * mean_sine
         / (parameters.environment_total * 2.0 * PI * PI
             * max(theta.x, ENVIRONMENT_MIN_SIN_THETA));

@@ -117,24 +117,17 @@ layout(scalar, set = SET_SCENE, binding = BINDING_TRIANGLE_MATERIALS)
 layout(scalar, set = SET_SCENE, binding = BINDING_MATERIALS) readonly buffer MaterialsBuffer {
     Material materials[];
 };
-layout(scalar, set = SET_SCENE, binding = BINDING_BRDF_TABLE) readonly buffer BrdfTableBuffer {
-    uint brdf_table[];
-};
+// One buffer seen as floats, and as cells of four halves.
+layout(set = SET_SCENE, binding = BINDING_BRDF_TABLE) uniform samplerBuffer brdf_table;
+layout(set = SET_SCENE, binding = BINDING_BRDF_CELLS) uniform samplerBuffer brdf_cells;
 #endif
 
 #ifdef NEEDS_ENVIRONMENT
-layout(scalar, set = SET_SCENE, binding = BINDING_ENVIRONMENT_TEXELS)
-    readonly buffer EnvironmentTexelsBuffer {
-    vec3 environment_texels[];
-};
-layout(scalar, set = SET_SCENE, binding = BINDING_ENVIRONMENT_ROWS)
-    readonly buffer EnvironmentRowsBuffer {
-    float environment_rows[];
-};
-layout(scalar, set = SET_SCENE, binding = BINDING_ENVIRONMENT_CELLS)
-    readonly buffer EnvironmentCellsBuffer {
-    float environment_cells[];
-};
+layout(set = SET_SCENE, binding = BINDING_ENVIRONMENT_TEXELS) uniform samplerBuffer
+    environment_texels;
+layout(set = SET_SCENE, binding = BINDING_ENVIRONMENT_ROWS) uniform samplerBuffer environment_rows;
+layout(set = SET_SCENE, binding = BINDING_ENVIRONMENT_CELLS) uniform samplerBuffer
+    environment_cells;
 #endif
 
 #ifdef NEEDS_RAYS

@@ -70,11 +70,15 @@ impl MaterialTables {
                 }
                 MaterialKind::Measured { table, .. } => {
                     converted.kind = MATERIAL_MEASURED;
-                    let next = tables.words.len() as u32;
                     converted.table_offset =
                         *measured_offsets.entry(Arc::as_ptr(table)).or_insert_with(|| {
+                            // The cells of the grid are read in pairs of words.
+                            if (tables.words.len() + MEASURED_GRID_OFFSET as usize) % 2 == 1 {
+                                tables.words.push(0);
+                            }
+                            let first = tables.words.len() as u32;
                             tables.words.extend_from_slice(table.words());
-                            next
+                            first
                         });
                 }
             }

@@ -17,7 +17,7 @@ use crate::{
     error::{Error, Result},
     film::{
         Aov, Checkpoint, Metadata, SampleRange, Statistics, Sums, check_writable,
-        checkpoint::checkpoint_path, is_special_file, png::write_preview,
+        checkpoint::checkpoint_path, display::DisplayServer, is_special_file, png::write_preview,
     },
     gpu::Device,
     renderer::{Renderer, Settings, Window},
@@ -29,8 +29,8 @@ use crate::{
 const DEFAULT_SPP: u32 = 64;
 /// Passes are grouped so that the loop looks around about this often.
 const LOOK_AROUND: Duration = Duration::from_millis(250);
-/// How often the error is estimated, which needs the film on the host.
-const ERROR_INTERVAL: Duration = Duration::from_secs(1);
+/// How often the error is estimated and the picture shown, which needs the film on the host.
+const LOOK_INTERVAL: Duration = Duration::from_secs(1);
 /// Film size and samples of `--quick`.
 const QUICK_WIDTH: u32 = 240;
 const QUICK_SPP: u32 = 16;
@@ -98,6 +98,9 @@ pub struct Arguments {
     /// Exposure of the preview, stops.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
     pub exposure: f32,
+    /// Show the image as it is rendered in the viewer tev, which listens at this address.
+    #[arg(long, value_name = "HOST:PORT")]
+    pub display_server: Option<String>,
     /// Extra layers of the image.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     pub aov: Vec<Aov>,
@@ -173,8 +176,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let capabilities = device.capabilities();
         eprintln!("device: {} ({})", capabilities.name, capabilities.driver);
     }
+    let mut job = Job::new(arguments, &settings, &scene, &device, output);
     let mut renderer = Renderer::new(&device, &scene, settings)?;
-    let mut job = Job::new(arguments, &scene, &device, output);
     job.resume(&mut renderer)?;
 
     let reason = job.render(&mut renderer, &interrupted)?;
@@ -264,16 +267,19 @@ struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
-    fn new(arguments: &'a Arguments, scene: &'a Scene, device: &Device, output: PathBuf) -> Self {
+    fn new(
+        arguments: &'a Arguments,
+        settings: &Settings,
+        scene: &'a Scene,
+        device: &Device,
+        output: PathBuf,
+    ) -> Self {
         let capabilities = device.capabilities();
-        let parameters = {
-            let mut parameters = Parameters::default();
-            for assignment in &arguments.set {
-                // Checked in `settings` already.
-                let _ = parameters.set(assignment);
-            }
-            parameters.describe(arguments.sampler)
-        };
+        let mut parameters = settings.parameters.describe(settings.sampler);
+        if settings.depth > settings.roulette_vertex {
+            let vertex = settings.roulette_vertex.to_string();
+            parameters.insert("roulette_depth".to_owned(), vertex);
+        }
         let metadata = Metadata {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             scene: scene.name.clone(),
@@ -335,7 +341,8 @@ impl<'a> Job<'a> {
     /// Renders passes until a rule ends it.
     fn render(&mut self, renderer: &mut Renderer, interrupted: &AtomicBool) -> Result<StopReason> {
         let mut progress = Progress::new(self.scene.name.clone(), self.arguments.quiet);
-        let mut last_error = Instant::now();
+        let mut display = self.open_display()?;
+        let mut next_look = Instant::now() + LOOK_INTERVAL;
         let mut last_checkpoint = Instant::now();
         let mut pass_samples = 1;
         let reason = loop {
@@ -352,9 +359,18 @@ impl<'a> Job<'a> {
             self.elapsed += took;
             pass_samples = next_pass_samples(samples, took, self.time_left());
 
-            if last_error.elapsed() > ERROR_INTERVAL || self.arguments.error.is_some() {
-                self.relative_error = Some(renderer.sums()?.relative_standard_error());
-                last_error = Instant::now();
+            if Instant::now() >= next_look || self.arguments.error.is_some() {
+                let start = Instant::now();
+                let sums = renderer.sums()?;
+                self.relative_error = Some(sums.relative_standard_error());
+                if let Some(display) = display.as_mut().filter(|display| display.is_connected()) {
+                    let pixels: Vec<[f32; 3]> = (0..sums.pixel_count())
+                        .map(|pixel| sums.mean(pixel).map(|value| value as f32))
+                        .collect();
+                    display.update(&pixels);
+                }
+                // Looking at a large film takes time that belongs to the passes.
+                next_look = Instant::now() + LOOK_INTERVAL.max(20 * start.elapsed());
             }
             if let Some(interval) = self.arguments.checkpoint_interval
                 && last_checkpoint.elapsed() >= interval
@@ -368,6 +384,28 @@ impl<'a> Job<'a> {
         self.relative_error = Some(sums.relative_standard_error());
         progress.finish(&self.standing(renderer), reason.explain());
         Ok(reason)
+    }
+
+    /// The viewer that `--display-server` names.
+    fn open_display(&self) -> Result<Option<DisplayServer>> {
+        let window = self.window();
+        self.arguments
+            .display_server
+            .as_deref()
+            .map(|address| {
+                DisplayServer::connect(address, &self.scene.name, window.width, window.height)
+            })
+            .transpose()
+    }
+
+    /// The part of the film that is rendered.
+    fn window(&self) -> Window {
+        self.arguments.crop.unwrap_or(Window {
+            x: 0,
+            y: 0,
+            width: self.scene.film.width,
+            height: self.scene.film.height,
+        })
     }
 
     fn time_left(&self) -> Option<f64> {
@@ -446,6 +484,12 @@ impl<'a> Job<'a> {
                 totals.dropped_samples
             );
         }
+        if totals.traversal_overruns > 0 {
+            log::warn!(
+                "{} rays were given up after too many steps of traversal",
+                totals.traversal_overruns
+            );
+        }
         let metadata = self.metadata(renderer);
         let mut image = sums.to_image(&self.arguments.aov);
         metadata.store(&mut image);
@@ -479,12 +523,7 @@ impl<'a> Job<'a> {
         load_ms: f64,
     ) -> Statistics {
         let totals = renderer.totals();
-        let window = self.arguments.crop.unwrap_or(Window {
-            x: 0,
-            y: 0,
-            width: self.scene.film.width,
-            height: self.scene.film.height,
-        });
+        let window = self.window();
         let mut host_ms = renderer.host_ms().clone();
         host_ms.insert("load".into(), load_ms);
         Statistics {

@@ -32,7 +32,9 @@ pub const BINDING_TRIANGLE_MATERIALS: u32 = 7;
 pub const BINDING_MATERIALS: u32 = 8;
 /// Scene set: 32-bit words of the BRDF tables; materials hold offsets into it.
 pub const BINDING_BRDF_TABLE: u32 = 9;
-/// Scene set: radiance per texel of the environment map.
+/// Scene set: the same buffer as cells of four halves.
+pub const BINDING_BRDF_CELLS: u32 = 6;
+/// Scene set: radiance per texel of the environment map, the fourth component unused.
 pub const BINDING_ENVIRONMENT_TEXELS: u32 = 10;
 /// Scene set: cumulative probability over the rows of cells of the environment map.
 pub const BINDING_ENVIRONMENT_ROWS: u32 = 11;
@@ -88,6 +90,9 @@ pub const CONSTANT_SAMPLER: u32 = 16;
 pub const CONSTANT_CANDIDATES: u32 = 17;
 /// Specialization constant of `bounce`: first vertex at which russian roulette may end a path.
 pub const CONSTANT_ROULETTE_VERTEX: u32 = 18;
+/// Specialization constant of the passes that evaluate materials: bit `1 << kind` for every kind that
+/// the scene has. Devices that run both sides of a branch save the kinds that it has not.
+pub const CONSTANT_MATERIAL_KINDS: u32 = 19;
 /// Entries of the traversal stack; one group of nodes per level of the tree is stacked.
 pub const BVH_STACK_ENTRIES: u32 = 32;
 /// Steps of traversal that one invocation may take for all its rays; Mesa 22.3 silently ends the
@@ -181,6 +186,7 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("BINDING_TRIANGLE_MATERIALS", BINDING_TRIANGLE_MATERIALS),
     ("BINDING_MATERIALS", BINDING_MATERIALS),
     ("BINDING_BRDF_TABLE", BINDING_BRDF_TABLE),
+    ("BINDING_BRDF_CELLS", BINDING_BRDF_CELLS),
     ("BINDING_ENVIRONMENT_TEXELS", BINDING_ENVIRONMENT_TEXELS),
     ("BINDING_ENVIRONMENT_ROWS", BINDING_ENVIRONMENT_ROWS),
     ("BINDING_ENVIRONMENT_CELLS", BINDING_ENVIRONMENT_CELLS),
@@ -207,6 +213,7 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("CONSTANT_SAMPLER", CONSTANT_SAMPLER),
     ("CONSTANT_CANDIDATES", CONSTANT_CANDIDATES),
     ("CONSTANT_ROULETTE_VERTEX", CONSTANT_ROULETTE_VERTEX),
+    ("CONSTANT_MATERIAL_KINDS", CONSTANT_MATERIAL_KINDS),
     ("BVH_STACK_ENTRIES", BVH_STACK_ENTRIES),
     ("TRAVERSAL_STEP_LIMIT", TRAVERSAL_STEP_LIMIT),
     ("FLAT_NORMAL", FLAT_NORMAL),

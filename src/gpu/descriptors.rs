@@ -22,6 +22,14 @@ pub(super) fn texel_format(set: u32, binding: u32) -> Option<(vk::Format, u64)> 
         | (c::SET_WAVE, c::BINDING_RAY_TEXELS | c::BINDING_HIT_TEXELS) => {
             Some((vk::Format::R32G32B32A32_UINT, 16))
         }
+        (c::SET_SCENE, c::BINDING_ENVIRONMENT_TEXELS) => {
+            Some((vk::Format::R32G32B32A32_SFLOAT, 16))
+        }
+        (c::SET_SCENE, c::BINDING_BRDF_CELLS) => Some((vk::Format::R16G16B16A16_SFLOAT, 8)),
+        (
+            c::SET_SCENE,
+            c::BINDING_BRDF_TABLE | c::BINDING_ENVIRONMENT_ROWS | c::BINDING_ENVIRONMENT_CELLS,
+        ) => Some((vk::Format::R32_SFLOAT, 4)),
         (c::SET_WAVE, c::BINDING_SHADOW_RAY_TEXELS) => Some((vk::Format::R32G32_UINT, 8)),
         _ => None,
     }

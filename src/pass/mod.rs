@@ -16,8 +16,8 @@ use crate::{
     gpu::{
         Commands, DescriptorSet, Device, PassTimes, Pipeline,
         constants::{
-            AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, CONSTANT_CANDIDATES, CONSTANT_ROULETTE_VERTEX,
-            CONSTANT_SAMPLER,
+            AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS,
+            CONSTANT_ROULETTE_VERTEX, CONSTANT_SAMPLER,
         },
         layout::Wave,
         shaders,
@@ -49,6 +49,8 @@ pub struct PassSettings {
     pub aovs: u32,
     /// First vertex at which russian roulette may end a path.
     pub roulette_vertex: u32,
+    /// Bit `1 << kind` for every kind of material in the scene.
+    pub material_kinds: u32,
 }
 
 /// The descriptor sets that the passes see.
@@ -101,12 +103,22 @@ impl Passes {
             trace_bounce: Trace::new(device, geometry, incoherent)?,
             sample: create(
                 "sample",
-                &[(CONSTANT_SAMPLER, settings.sampler.tag()), (CONSTANT_CANDIDATES, candidates)],
+                &[
+                    (CONSTANT_SAMPLER, settings.sampler.tag()),
+                    (CONSTANT_CANDIDATES, candidates),
+                    (CONSTANT_MATERIAL_KINDS, settings.material_kinds),
+                ],
             )?,
             shadow: Shadow::new(device, geometry, incoherent)?,
             gather: create("gather", &[])?,
-            bounce: create("bounce", &[(CONSTANT_ROULETTE_VERTEX, settings.roulette_vertex)])?,
-            features: create("features", &[])?,
+            bounce: create(
+                "bounce",
+                &[
+                    (CONSTANT_ROULETTE_VERTEX, settings.roulette_vertex),
+                    (CONSTANT_MATERIAL_KINDS, settings.material_kinds),
+                ],
+            )?,
+            features: create("features", &[(CONSTANT_MATERIAL_KINDS, settings.material_kinds)])?,
             accumulate: create("accumulate", &[])?,
             settings,
         })

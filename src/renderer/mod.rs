@@ -168,6 +168,7 @@ impl Renderer {
                 depth: settings.depth,
                 aovs,
                 roulette_vertex: settings.roulette_vertex,
+                material_kinds: buffers.material_kinds(),
             },
         )?;
         let create_ms = start.elapsed().as_secs_f64() * 1e3;

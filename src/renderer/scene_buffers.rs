@@ -12,8 +12,9 @@ use crate::{
     gpu::{
         Buffer, DescriptorSet, Device,
         constants::{
-            BINDING_BRDF_TABLE, BINDING_ENVIRONMENT_CELLS, BINDING_ENVIRONMENT_ROWS,
-            BINDING_ENVIRONMENT_TEXELS, BINDING_MATERIALS, BINDING_PARAMETERS, SET_SCENE,
+            BINDING_BRDF_CELLS, BINDING_BRDF_TABLE, BINDING_ENVIRONMENT_CELLS,
+            BINDING_ENVIRONMENT_ROWS, BINDING_ENVIRONMENT_TEXELS, BINDING_MATERIALS,
+            BINDING_PARAMETERS, SET_SCENE,
         },
         layout::SceneParameters,
     },
@@ -26,6 +27,7 @@ pub struct SceneBuffers {
     set: DescriptorSet,
     geometry: GeometryBuffers,
     buffers: Vec<Buffer>,
+    material_kinds: u32,
     window: Window,
     host_ms: BTreeMap<String, f64>,
 }
@@ -79,30 +81,38 @@ impl SceneBuffers {
         };
 
         let tables = MaterialTables::new(&scene.materials)?;
+        let material_kinds =
+            tables.materials.iter().fold(0, |bits, material| bits | 1 << material.kind);
         add(BINDING_MATERIALS, Buffer::from_slice(device, "materials", &tables.materials)?);
-        add(BINDING_BRDF_TABLE, Buffer::from_slice(device, "BRDF tables", &tables.words)?);
+        let brdf_table = Buffer::texels_from_slice(device, "BRDF tables", &tables.words)?;
         drop(tables);
 
         let tables = EnvironmentTables::new(&scene.environment);
         let parameters = parameters(scene, &scene.environment, tables.total, window);
         add(BINDING_PARAMETERS, Buffer::from_slice(device, "parameters", &[parameters])?);
         let map = &scene.environment;
+        let texels: Vec<[f32; 4]> =
+            map.texels.iter().map(|texel| texel.extend(0.0).to_array()).collect();
         add(
             BINDING_ENVIRONMENT_TEXELS,
-            Buffer::from_slice(device, "environment texels", &map.texels)?,
+            Buffer::texels_from_slice(device, "environment texels", &texels)?,
         );
         add(
             BINDING_ENVIRONMENT_ROWS,
-            Buffer::from_slice(device, "environment rows", &tables.rows)?,
+            Buffer::texels_from_slice(device, "environment rows", &tables.rows)?,
         );
         add(
             BINDING_ENVIRONMENT_CELLS,
-            Buffer::from_slice(device, "environment cells", &tables.cells)?,
+            Buffer::texels_from_slice(device, "environment cells", &tables.cells)?,
         );
-        let bound: Vec<_> = bindings.into_iter().zip(&buffers).chain(geometry.bindings()).collect();
+        let mut bound: Vec<_> =
+            bindings.into_iter().zip(&buffers).chain(geometry.bindings()).collect();
+        bound.push((BINDING_BRDF_TABLE, &brdf_table));
+        bound.push((BINDING_BRDF_CELLS, &brdf_table));
         let set = DescriptorSet::new(device, SET_SCENE, &bound)?;
+        buffers.push(brdf_table);
         host_ms.insert("upload".to_owned(), start.elapsed().as_secs_f64() * 1e3);
-        Ok(Self { set, geometry, buffers, window, host_ms })
+        Ok(Self { set, geometry, buffers, material_kinds, window, host_ms })
     }
 
     /// The scene set.
@@ -113,6 +123,11 @@ impl SceneBuffers {
     /// Tree and triangles.
     pub fn geometry(&self) -> &GeometryBuffers {
         &self.geometry
+    }
+
+    /// Bit `1 << kind` for every kind of material.
+    pub fn material_kinds(&self) -> u32 {
+        self.material_kinds
     }
 
     /// The part of the film that the parameters describe.

@@ -34,11 +34,12 @@ const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 #[derive(Clone, Debug)]
 pub struct EnvironmentTables {
     /// `2 * (height + 1)` numbers: the cumulative probability up to and including each row of cells
-    /// (1 from the last row that is not black on), then the mean of sin θ over each row.
+    /// (1 from the last row that is not black on), then the mean of sin θ over each row; after them
+    /// the guide of the first (see [`guide_size`]).
     pub rows: Vec<f32>,
-    /// `width` numbers for each of the `height + 1` rows: the cumulative probability, within the
-    /// row, up to and including each cell (1 from the last cell that is not black on; all 1 in a row
-    /// that is black).
+    /// For each of the `height + 1` rows `width` numbers, the cumulative probability, within the row,
+    /// up to and including each cell (1 from the last cell that is not black on; all 1 in a row that
+    /// is black), then their guide.
     pub cells: Vec<f32>,
     /// Σ s(row) · ∬ lum L du dv over all cells; 0 for a black map, where [`Self::sample`] returns
     /// the pdf 0.
@@ -95,21 +96,43 @@ fn write_cumulative(weights: impl Iterator<Item = f64> + Clone, cumulative: &mut
     sum
 }
 
+/// Intervals of the guide of a cumulative distribution of `count` entries: a power of two, so that
+/// u · size is exact, and at least half of `count`.
+///
+/// Entry k of the guide is the first index whose cumulative probability exceeds k / size, and the
+/// last entry the last index: u in interval k is found between entries k and k + 1. Chen & Asau 1974,
+/// "On Generating Random Variates from an Empirical Distribution".
+pub fn guide_size(count: usize) -> usize {
+    if count > 2 { 1 << (count - 1).ilog2() } else { 1 }
+}
+
+/// Writes the guide of `cumulative`, `guide_size + 1` entries, as numbers that `f32` holds exactly.
+fn write_guide(cumulative: &[f32], guide: &mut [f32]) {
+    let size = guide.len() - 1;
+    let mut index = 0;
+    for (interval, entry) in guide.iter_mut().enumerate() {
+        let start = interval as f32 / size as f32;
+        while index + 1 < cumulative.len() && cumulative[index] <= start {
+            index += 1;
+        }
+        *entry = index as f32;
+    }
+}
+
 /// First index in `cumulative` whose entry exceeds `u`, with the probabilities before and up to it.
-fn search(cumulative: &[f32], u: f32) -> (usize, f32, f32) {
-    let (mut first, mut last) = (0, cumulative.len() - 1);
-    let (mut before, mut after) = (0.0, 1.0);
+fn search(cumulative: &[f32], guide: &[f32], u: f32) -> (usize, f32, f32) {
+    let interval = (u * (guide.len() - 1) as f32) as usize;
+    let (mut first, mut last) = (guide[interval] as usize, guide[interval + 1] as usize);
     while first < last {
         let middle = (first + last) / 2;
         if cumulative[middle] > u {
             last = middle;
-            after = cumulative[middle];
         } else {
             first = middle + 1;
-            before = cumulative[middle];
         }
     }
-    (first, before, after)
+    let before = if first > 0 { cumulative[first - 1] } else { 0.0 };
+    (first, before, cumulative[first])
 }
 
 impl EnvironmentTables {
@@ -117,11 +140,13 @@ impl EnvironmentTables {
     pub fn new(map: &EnvironmentMap) -> Self {
         let (width, height) = (map.width as usize, map.height);
         let row_count = height as usize + 1;
-        let mut cells = vec![0.0; width * row_count];
+        let stride = width + guide_size(width) + 1;
+        let mut cells = vec![0.0; stride * row_count];
         let row_weights: Vec<f64> = cells
-            .par_chunks_mut(width)
+            .par_chunks_mut(stride)
             .enumerate()
-            .map(|(row, cumulative)| {
+            .map(|(row, chunk)| {
+                let (cumulative, guide) = chunk.split_at_mut(width);
                 let row = row as u32;
                 let texel_row = |row: u32| &map.texels[row as usize * width..][..width];
                 let (upper, lower) =
@@ -135,14 +160,36 @@ impl EnvironmentTables {
                     edge[column] + edge[if column + 1 == width { 0 } else { column + 1 }]
                 });
                 let row_height = if row == 0 || row == height { 0.5 } else { 1.0 };
-                0.25 * row_height * mean_sine(row, height) * write_cumulative(weights, cumulative)
+                let sum = write_cumulative(weights, cumulative);
+                write_guide(cumulative, guide);
+                0.25 * row_height * mean_sine(row, height) * sum
             })
             .collect();
         let mut rows = vec![0.0; row_count];
         let sum = write_cumulative(row_weights.iter().copied(), &mut rows);
+        let mut guide = vec![0.0; guide_size(row_count) + 1];
+        write_guide(&rows, &mut guide);
         rows.extend((0..=height).map(|row| mean_sine(row, height) as f32));
+        rows.extend(guide);
         let total = (sum / (width as f64 * f64::from(height))) as f32;
         Self { rows, cells, total: if total.is_normal() { total } else { 0.0 } }
+    }
+
+    /// Cumulative probabilities of the rows of cells of `map`.
+    pub fn row_cumulative(&self, map: &EnvironmentMap) -> &[f32] {
+        &self.rows[..=map.height as usize]
+    }
+
+    /// Cumulative probabilities of the cells of one row of `map`.
+    pub fn cell_cumulative(&self, map: &EnvironmentMap, row: usize) -> &[f32] {
+        self.row(map, row).0
+    }
+
+    /// Cumulative probabilities of the cells of one row, and their guide.
+    fn row(&self, map: &EnvironmentMap, row: usize) -> (&[f32], &[f32]) {
+        let width = map.width as usize;
+        let stride = width + guide_size(width) + 1;
+        self.cells[row * stride..][..stride].split_at(width)
     }
 
     /// Density per steradian of [`Self::sample`] at a direction whose radiance is
@@ -171,9 +218,11 @@ impl EnvironmentTables {
             return EnvironmentSample { direction: Vec3::Y, radiance: Vec3::ZERO, pdf: 0.0 };
         }
         let (width, height) = (map.width as usize, map.height);
-        let (row, before, after) = search(&self.rows[..=height as usize], u[1]);
+        let row_guide = &self.rows[2 * (height as usize + 1)..];
+        let (row, before, after) = search(self.row_cumulative(map), row_guide, u[1]);
         let row_remainder = ((u[1] - before) / (after - before)).min(BELOW_ONE);
-        let (column, before, after) = search(&self.cells[row * width..][..width], u[0]);
+        let (cumulative, guide) = self.row(map, row);
+        let (column, before, after) = search(cumulative, guide, u[0]);
         let column_remainder = ((u[0] - before) / (after - before)).min(BELOW_ONE);
         let (row, column) = (row as u32, column as u32);
 
