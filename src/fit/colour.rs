@@ -1,15 +1,20 @@
-//! Colour amplitudes of lobes whose shapes are given: non-negative least squares per channel.
+//! Colour amplitudes of lobes whose shapes are given, by the objective of the fit.
 //!
-//! Minimizes `∫(L − Σ a_l G_l)² dω` over a ≥ 0. The Gram matrix `∫G_iG_j` is in closed form
-//! (\[Wu & Shih 2009\] Eq. 7), so that lobes narrower than a patch are not mistaken for nothing; only
-//! `∫L·G_i` is summed over patches.
+//! Under the divergence each channel's shares come from expectation maximization with fixed shapes:
+//! no channel loses energy, and a sun spoils nothing. Under the squared error they minimize
+//! `∫(L − Σ a_l G_l)² dω` over a ≥ 0: closest to the map where it is bright, at the cost of what is
+//! near a sun. The Gram matrix `∫G_iG_j` is in closed form (\[Wu & Shih 2009\] Eq. 7), so that lobes
+//! narrower than a patch are not mistaken for nothing; only `∫L·G_i` is summed over patches.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    component::{Component, convolution},
+    component::{Component, convolution, kernel_integral},
+    config,
+    expectation::reweigh,
     grid::ColouredPatch,
+    points::{PointSet, blurred},
 };
 
 /// Coordinate updates per fit at most; bounds the time of large fits.
@@ -19,8 +24,26 @@ const MAX_SWEEPS: usize = 400;
 /// Largest change of a sweep, relative to the largest amplitude, at which it ends.
 const TOLERANCE: f64 = 1e-5;
 
-/// Amplitudes per lobe and channel. `start` holds the first guess.
-pub fn colour_amplitudes(
+/// Amplitudes per lobe and channel that lower the divergence of each channel.
+pub fn divergence_colours(patches: &[ColouredPatch], components: &[Component]) -> Vec<DVec3> {
+    let channel = |index: usize| -> Vec<f64> {
+        let points =
+            PointSet::weighted(patches.iter().map(|patch| (&patch.patch, patch.colour[index])));
+        if points.is_empty() {
+            return vec![0.0; components.len()];
+        }
+        let mut weighted = components.to_vec();
+        for _ in 0..config::COLOUR_STEPS {
+            reweigh(&points, &mut weighted);
+        }
+        weighted.iter().map(|c| points.energy * c.share / kernel_integral(c.bandwidth)).collect()
+    };
+    let [red, green, blue] = [0, 1, 2].map(channel);
+    (0..components.len()).map(|k| DVec3::new(red[k], green[k], blue[k])).collect()
+}
+
+/// Amplitudes per lobe and channel of the smallest squared error. `start` holds the first guess.
+pub fn least_squares_colours(
     patches: &[ColouredPatch],
     components: &[Component],
     start: &[DVec3],
@@ -34,13 +57,12 @@ pub fn colour_amplitudes(
         .par_iter()
         .map(|component| {
             let kernel = |patch: &ColouredPatch| {
-                if patch.patch.energy <= 0.0 {
-                    return DVec3::ZERO;
-                }
-                let mean = patch.patch.moment / patch.patch.energy;
-                patch.colour * (component.bandwidth * (mean.dot(component.axis) - 1.0)).exp()
+                let (direction, variance) = patch.patch.spread()?;
+                let (bandwidth, factor) = blurred(component.bandwidth, variance);
+                let exponent = bandwidth * (direction.dot(component.axis) - 1.0);
+                Some(patch.colour * factor * exponent.exp())
             };
-            patches.iter().map(kernel).sum()
+            patches.iter().filter_map(kernel).sum()
         })
         .collect();
     let mut amplitudes = start.to_vec();

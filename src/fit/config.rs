@@ -30,13 +30,15 @@ pub const PATCHES_PER_LOBE: usize = 80;
 pub const MIN_PATCHES: usize = 8192;
 /// … and at most.
 pub const MAX_PATCHES: usize = 65_536;
+/// Steps of expectation maximization that give the lobes their colours.
+pub const COLOUR_STEPS: usize = 10;
 /// Share of a uniform density in the sampling density that χ² judges.
 pub const DEFENSIVE_SHARE: f64 = 0.1;
 
 /// Steps of L-BFGS at most (method `l2`).
-pub const L2_STEPS: usize = 150;
+pub const L2_STEPS: usize = 300;
 /// Relative fall of the squared error over ten steps at which L-BFGS ends.
-pub const L2_TOLERANCE: f64 = 2e-3;
+pub const L2_TOLERANCE: f64 = 1e-4;
 
 /// Cells of the hemisphere per view of a BRDF, four samples each.
 pub const HEMISPHERE_CELLS: usize = 4000;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     cache::{self, Cache, Fit},
-    colour::colour_amplitudes,
+    colour::{divergence_colours, least_squares_colours},
     component::{Component, kernel_integral},
     config,
     grid::{ColouredPatch, Grid, patch_count},
@@ -33,8 +33,7 @@ pub struct EnvironmentLobe {
     pub axis: [f32; 3],
     /// Bandwidth λ.
     pub bandwidth: f32,
-    /// Radiance at the axis per colour channel, by non-negative least squares: for pictures and
-    /// weights. A channel may be 0.
+    /// Radiance at the axis per colour channel, not negative: for pictures and weights.
     pub colour: [f32; 3],
     /// Luminance at the axis, not negative: what is sampled.
     pub amplitude: f32,
@@ -202,7 +201,7 @@ fn fit_map(
             components.len()
         ));
     }
-    let lobes = coloured_lobes(&patches, &components, fitted_energy);
+    let lobes = coloured_lobes(&patches, &components, fitted_energy, options.method);
     let mut fit = EnvironmentFit {
         source: map.source.clone(),
         method: options.method,
@@ -228,16 +227,22 @@ fn squared_integral(grid: &Grid) -> f64 {
     (0..grid.height).map(row).sum()
 }
 
-/// Lobes with colours by least squares.
+/// Lobes with colours by the method of the fit.
 fn coloured_lobes(
     patches: &[ColouredPatch],
     components: &[Component],
     energy: f64,
+    method: Method,
 ) -> Vec<EnvironmentLobe> {
     let amplitudes: Vec<f64> =
         components.iter().map(|c| energy * c.share / kernel_integral(c.bandwidth)).collect();
-    let start: Vec<DVec3> = amplitudes.iter().map(|amplitude| DVec3::splat(*amplitude)).collect();
-    let colours = colour_amplitudes(patches, components, &start);
+    let colours = match method {
+        Method::Em => divergence_colours(patches, components),
+        Method::L2 => {
+            let start: Vec<DVec3> = amplitudes.iter().map(|a| DVec3::splat(*a)).collect();
+            least_squares_colours(patches, components, &start)
+        }
+    };
     let lobe = |((component, amplitude), colour): ((&Component, &f64), &DVec3)| EnvironmentLobe {
         axis: component.axis.as_vec3().to_array(),
         bandwidth: component.bandwidth as f32,

@@ -213,6 +213,19 @@ pub fn step(points: &PointSet, components: &mut [Component]) -> f64 {
     divergence
 }
 
+/// One step that changes the shares only: axes and bandwidths stay.
+pub fn reweigh(points: &PointSet, components: &mut [Component]) {
+    let (sums, _) = sum_over_points::<1>(points, components, |share, _, _, sums| {
+        for k in 0..LANES {
+            sums[0][k] += share[k];
+        }
+    });
+    let total: f64 = sums.iter().map(|sums| sums[0]).sum();
+    for (component, [share]) in components.iter_mut().zip(sums) {
+        component.share = share / total;
+    }
+}
+
 /// Steps until the divergence falls by less than `tolerance` in a step, at most `steps` times.
 /// Returns the divergence before the last step.
 pub fn maximize(

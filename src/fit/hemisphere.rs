@@ -191,8 +191,9 @@ mod tests {
         assert!((total - 2.0 * PI).abs() < 1e-9);
         // A highlight of a sixth of a degree, found through the hint.
         let peak = DVec3::new(-0.6, 0.0, 0.8);
-        let narrow =
-            |direction: DVec3| (-5e4 * (direction - peak).length_squared()).exp() * 1e5 / PI;
+        let narrow = |direction: DVec3| {
+            (-5e4 * (direction - peak).length_squared()).exp() * 1e5 / (2.0 * PI)
+        };
         let target = sample_hemisphere(&narrow, peak);
         assert!((target.energy() - 1.0).abs() < 0.02, "{}", target.energy());
     }

@@ -46,59 +46,67 @@ pub struct ColouredComponent {
     pub colour: DVec3,
 }
 
-/// Lobes that matter in a tile, structure of arrays.
+/// Lobes that matter in a tile.
 #[derive(Default)]
 struct Selection {
+    /// Axis, bandwidth, logarithm of the density at the axis, value at the axis.
     lobes: Vec<[f32; 8]>,
+    /// Logarithm of each lobe's part of the density at a point.
+    exponents: Vec<f32>,
 }
 
 impl Selection {
-    /// Lobes whose part of the density, or of the value, is not negligible within `radius` radians
-    /// of `centre`. Returns the exponent that `log_density` is relative to.
-    fn choose(&mut self, lobes: &[ColouredComponent], centre: DVec3, radius: f64) -> f64 {
+    /// Takes the lobes whose part of the density, or of the value, is not negligible within `radius`
+    /// radians of `centre`.
+    fn choose(&mut self, lobes: &[ColouredComponent], centre: DVec3, radius: f64) {
+        struct Bounds {
+            log_scale: f64,
+            log_value: f64,
+            near: f64,
+            far: f64,
+        }
         let bounds = |lobe: &ColouredComponent| {
             let c = &lobe.component;
             let angle = c.axis.cross(centre).length().atan2(c.axis.dot(centre));
-            let near = (angle - radius).max(0.0);
-            let far = (angle + radius).min(PI);
-            let log_scale = (c.share / kernel_integral(c.bandwidth)).max(1e-300).ln();
             let exponent = |angle: f64| -2.0 * c.bandwidth * (0.5 * angle).sin().powi(2);
-            (log_scale + exponent(near), log_scale + exponent(far), exponent(near), log_scale)
+            Bounds {
+                log_scale: (c.share / kernel_integral(c.bandwidth)).max(1e-300).ln(),
+                log_value: (lobe.colour.max_element() + 1e-300).ln(),
+                near: exponent((angle - radius).max(0.0)),
+                far: exponent((angle + radius).min(PI)),
+            }
         };
-        let bounds: Vec<_> = lobes.iter().map(bounds).collect();
-        let floor = bounds.iter().map(|b| b.1).fold(f64::MIN, f64::max);
-        let value_floor = lobes
-            .iter()
-            .zip(&bounds)
-            .map(|(lobe, b)| (lobe.colour.max_element() + 1e-300).ln() + b.1 - b.3)
-            .fold(f64::MIN, f64::max);
+        let bounds: Vec<Bounds> = lobes.iter().map(bounds).collect();
+        let density_floor = bounds.iter().map(|b| b.log_scale + b.far).fold(f64::MIN, f64::max);
+        let value_floor = bounds.iter().map(|b| b.log_value + b.far).fold(f64::MIN, f64::max);
         self.lobes.clear();
         for (lobe, b) in lobes.iter().zip(&bounds) {
-            let value = (lobe.colour.max_element() + 1e-300).ln() + b.2;
-            if b.0 < floor - CULL && value < value_floor - CULL {
+            if b.log_scale + b.near < density_floor - CULL
+                && b.log_value + b.near < value_floor - CULL
+            {
                 continue;
             }
-            let c = &lobe.component;
-            let [x, y, z] = c.axis.as_vec3().to_array();
+            let [x, y, z] = lobe.component.axis.as_vec3().to_array();
             let [red, green, blue] = lobe.colour.as_vec3().to_array();
-            let scale = (b.3 - floor) as f32;
-            self.lobes.push([x, y, z, c.bandwidth as f32, scale, red, green, blue]);
+            let bandwidth = lobe.component.bandwidth as f32;
+            self.lobes.push([x, y, z, bandwidth, b.log_scale as f32, red, green, blue]);
         }
-        floor
+        self.exponents.resize(self.lobes.len(), 0.0);
     }
 
-    /// Logarithm of the density relative to the floor, and the value.
-    fn evaluate(&self, direction: Vec3) -> (f64, Vec3) {
-        let (mut density, mut value) = (0.0_f32, Vec3::ZERO);
-        for &[x, y, z, bandwidth, scale, red, green, blue] in &self.lobes {
+    /// Logarithm of the density, and the value.
+    fn evaluate(&mut self, direction: Vec3) -> (f64, Vec3) {
+        let (mut largest, mut value) = (f32::MIN, Vec3::ZERO);
+        for (lobe, slot) in self.lobes.iter().zip(&mut self.exponents) {
+            let &[x, y, z, bandwidth, log_scale, red, green, blue] = lobe;
             let d = direction - Vec3::new(x, y, z);
             let exponent = -0.5 * bandwidth * d.dot(d);
-            // Relative to a lobe that reaches every cell of the tile, so at most some e³⁰ here.
-            density += fast_exp(exponent + scale);
-            let kernel = fast_exp(exponent);
-            value += kernel * Vec3::new(red, green, blue);
+            value += fast_exp(exponent) * Vec3::new(red, green, blue);
+            *slot = exponent + log_scale;
+            largest = largest.max(*slot);
         }
-        (f64::from(density.max(1e-37)).ln(), value)
+        let sum: f32 = self.exponents.iter().map(|exponent| fast_exp(exponent - largest)).sum();
+        (f64::from(largest) + f64::from(sum).ln(), value)
     }
 }
 
@@ -115,7 +123,7 @@ pub fn judge_environment(grid: &Grid, lobes: &[ColouredComponent]) -> FitErrors 
             let centre = grid.direction(0.5 * (x0 + x1) as f64, 0.5 * (y0 + y1) as f64);
             // Half a tile's diagonal, measured along meridian and parallel.
             let radius = PI * TILE as f64 * 1.5 / grid.height.min(grid.width / 2).max(1) as f64;
-            let floor = selection.choose(lobes, centre, radius);
+            selection.choose(lobes, centre, radius);
             let mut sums = [0.0; 5];
             for (x, y) in (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y))) {
                 let parts = if grid.is_steep(x, y) { STEEP_PARTS } else { 1 };
@@ -126,7 +134,7 @@ pub fn judge_environment(grid: &Grid, lobes: &[ColouredComponent]) -> FitErrors 
                     let row = y as f64 + inside(part / parts);
                     let direction = grid.direction(column, row).as_vec3();
                     let (log_density, value) = selection.evaluate(direction);
-                    let log_density = log_density + floor - share.ln();
+                    let log_density = log_density - share.ln();
                     let radiance = grid.lookup(column, row);
                     let p = f64::from(luminance(radiance)) / energy;
                     let q = (1.0 - config::DEFENSIVE_SHARE) * log_density.exp()

@@ -3,8 +3,8 @@
 //!
 //! Environment map → [`environment_lobes`] → [`EnvironmentFit`]; BRDF × cosine for a row of view
 //! elevations → [`brdf_lobes`] → [`BrdfFit`]. The target is cut into patches ([`points`]), a mixture
-//! grows on them ([`growth`]) by expectation maximization ([`expectation`]), colours are added by
-//! least squares ([`colour`]), every cell of the target judges the result ([`judge`]), and the fit is
+//! grows on them ([`growth`]) by expectation maximization ([`expectation`]), colours are added
+//! ([`colour`]), every cell of the target judges the result ([`judge`]), and the fit is
 //! kept under the hash of what it was made from ([`cache`]). The squared error by L-BFGS
 //! ([`squared_error`], [`solver`]) is the second method.
 //!

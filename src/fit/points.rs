@@ -13,6 +13,23 @@ pub struct Patch {
     pub solid_angle: f64,
 }
 
+impl Patch {
+    /// Unit mean direction and variance per axis, `½(1 − |m|²)`; none for a patch without energy.
+    pub fn spread(&self) -> Option<(DVec3, f64)> {
+        let mean = self.moment / self.energy;
+        let direction = mean.try_normalize().filter(|_| self.energy > 0.0)?;
+        Some((direction, (0.5 * (1.0 - mean.length_squared())).max(0.0)))
+    }
+}
+
+/// The mean of a kernel over a patch of the given variance, as that of a Gaussian over a Gaussian: its
+/// bandwidth and the factor before it. The kernel at the patch's mean would be too large where the
+/// lobe is narrower than the patch.
+pub fn blurred(bandwidth: f64, variance: f64) -> (f64, f64) {
+    let factor = 1.0 / (1.0 + bandwidth * variance);
+    (bandwidth * factor, factor)
+}
+
 /// Patches in the form expectation maximization reads, structure of arrays.
 ///
 /// The log-kernel averaged over a patch is `λ(m·ξ − 1) = −½λ|m − ξ|² − λ·slack`, with m the patch's
@@ -39,11 +56,19 @@ pub struct PointSet {
 impl PointSet {
     /// The patches that hold energy, in their order.
     pub fn new(patches: &[Patch]) -> Self {
-        let energy: f64 = patches.iter().map(|patch| patch.energy).sum();
+        Self::weighted(patches.iter().map(|patch| (patch, patch.energy)))
+    }
+
+    /// Patches with an energy in place of their own, of a colour channel for instance.
+    pub fn weighted<'a>(patches: impl Iterator<Item = (&'a Patch, f64)> + Clone) -> Self {
+        let energy: f64 = patches.clone().map(|(_, energy)| energy).sum();
         let mut points = Self { energy, ..Self::default() };
-        for patch in patches.iter().filter(|patch| patch.energy > 0.0 && patch.solid_angle > 0.0) {
+        for (patch, patch_energy) in patches {
+            if patch_energy <= 0.0 || patch.energy <= 0.0 || patch.solid_angle <= 0.0 {
+                continue;
+            }
             let mean = patch.moment / patch.energy;
-            let weight = patch.energy / energy;
+            let weight = patch_energy / energy;
             // Next to nothing, and slow: its products would be denormal numbers.
             if weight < 1e-14 {
                 continue;

@@ -11,7 +11,7 @@ use super::{
     component::{
         Component, MAX_BANDWIDTH, MIN_BANDWIDTH, convolution, kernel_integral, mean_shortfall,
     },
-    points::Patch,
+    points::{Patch, blurred},
     solver::Bounds,
 };
 
@@ -20,8 +20,8 @@ const UNKNOWNS: usize = 5;
 
 /// Objective over all lobes.
 pub struct SquaredError {
-    /// Energies and mean directions of the patches that hold energy.
-    patches: Vec<(f64, DVec3)>,
+    /// Energies, mean directions and variances of the patches that hold energy.
+    patches: Vec<(f64, DVec3, f64)>,
     /// `∫L²`.
     square: f64,
     /// Amplitudes at the start; unknowns are relative to them.
@@ -50,8 +50,10 @@ impl SquaredError {
         }
         let patches = patches
             .iter()
-            .filter(|patch| patch.energy > 0.0)
-            .map(|patch| (patch.energy, patch.moment / patch.energy))
+            .filter_map(|patch| {
+                let (direction, variance) = patch.spread()?;
+                Some((patch.energy, direction, variance))
+            })
             .collect();
         (Self { patches, square, scales }, unknowns)
     }
@@ -110,15 +112,16 @@ impl SquaredError {
             }
             let quadratic = amplitude * value;
             let mut linear = 0.0;
-            for (energy, mean) in &self.patches {
-                let exponent = a.bandwidth * (mean.dot(a.axis) - 1.0);
-                if exponent < -40.0 {
+            for (energy, direction, variance) in &self.patches {
+                let (bandwidth, factor) = blurred(a.bandwidth, *variance);
+                let cosine = direction.dot(a.axis) - 1.0;
+                if bandwidth * cosine < -40.0 {
                     continue;
                 }
-                let kernel = energy * exponent.exp();
+                let kernel = energy * factor * (bandwidth * cosine).exp();
                 linear += kernel;
-                by_axis -= kernel * a.bandwidth * *mean;
-                by_bandwidth -= kernel * (mean.dot(a.axis) - 1.0);
+                by_axis -= kernel * bandwidth * *direction;
+                by_bandwidth -= kernel * (cosine * factor * factor - variance * factor);
             }
             let scale = 2.0 / self.square;
             // Through the normalization of the axis: only the tangential part counts.

@@ -15,7 +15,7 @@ const TYPES: [&str; 4] = ["diffuse", "plastic", "conductor", "measured"];
 /// A scene around a material in words.
 const SCENE: &str = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n\
     vertical_fov_deg = 45\n[film]\nwidth = 1\nheight = 1\n[environment]\nconstant = [1, 1, 1]\n\
-    [[object]]\nshape = \"sphere\"\nmaterial = \"material\"\n";
+    [[object]]\nshape = \"sphere\"\nradius = 1\nmaterial = \"material\"\n";
 
 /// A material with its tables and a name for files.
 pub struct Source {
@@ -134,7 +134,13 @@ fn in_words(text: &str, kind: &str, keys: &str) -> Result<Source> {
         };
         scene += &format!("{key} = {value}\n");
     }
-    let scene = Scene::parse(Path::new(text), &scene)?;
+    // Lines of the text above mean nothing to the user.
+    let scene = Scene::parse(Path::new(text), &scene).map_err(|error| match error {
+        Error::Parse { message, .. } | Error::Scene { message, .. } => {
+            Error::usage(format!("`{text}`: {message}"))
+        }
+        other => other,
+    })?;
     let name: String =
         text.chars().map(|c| if c.is_ascii_alphanumeric() || c == '.' { c } else { '_' }).collect();
     // A dot would pass for an extension.
