@@ -306,7 +306,7 @@ fn minimize_view(target: &HemisphereTarget, components: &[Component]) -> Vec<Com
     }
     let (objective, mut unknowns) = SquaredError::new(&target.patches, square, components);
     solver::minimize(
-        &|unknowns| objective.evaluate(unknowns),
+        |unknowns| objective.evaluate(unknowns),
         &objective.bounds(),
         &mut unknowns,
         config::L2_STEPS,

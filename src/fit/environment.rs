@@ -180,7 +180,7 @@ fn fit_map(
         let square = squared_integral(&grid);
         let (objective, mut unknowns) = SquaredError::new(&luminance_patches, square, &components);
         solver::minimize(
-            &|unknowns| objective.evaluate(unknowns),
+            |unknowns| objective.evaluate(unknowns),
             &objective.bounds(),
             &mut unknowns,
             config::L2_STEPS,

@@ -49,7 +49,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// Lowers `function` (value and gradient) from `unknowns`, in place. Ends when ten steps gain less than
 /// `tolerance` relative to the value. `progress` is called after every step with its number.
 pub fn minimize(
-    function: &dyn Fn(&[f64]) -> (f64, Vec<f64>),
+    function: impl Fn(&[f64]) -> (f64, Vec<f64>),
     bounds: &Bounds,
     unknowns: &mut Vec<f64>,
     steps: usize,
@@ -155,11 +155,11 @@ mod tests {
         };
         let free = Bounds { limits: vec![(-5.0, 5.0); 2] };
         let mut x = vec![-1.2, 1.0];
-        minimize(&function, &free, &mut x, 500, 1e-15, &mut |_| ());
+        minimize(function, &free, &mut x, 500, 1e-15, &mut |_| ());
         assert!((x[0] - 1.0).abs() < 1e-4 && (x[1] - 1.0).abs() < 1e-4, "{x:?}");
         let tight = Bounds { limits: vec![(-5.0, 0.5), (-5.0, 5.0)] };
         let mut x = vec![-1.2, 1.0];
-        minimize(&function, &tight, &mut x, 500, 1e-15, &mut |_| ());
+        minimize(function, &tight, &mut x, 500, 1e-15, &mut |_| ());
         assert!((x[0] - 0.5).abs() < 1e-6 && (x[1] - 0.25).abs() < 1e-4, "{x:?}");
     }
 }
