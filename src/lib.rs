@@ -1,20 +1,103 @@
 //! Fenestra: a physically based renderer for scenes lit by an environment map, in Vulkan compute.
 //!
-//! Modules stand in pipeline order:
+//! `docs/architecture.md` follows one sample from the scene file to the image. Modules stand in
+//! pipeline order:
 //!
 //! | stage | module | shader |
 //! |---|---|---|
-//! | scene file → validated [`scene::Scene`] | [`scene`], [`brdf`] | |
+//! | command line, errors, cache folder | [`cli`], [`command`], [`error`], [`cache`] | |
+//! | scene file → validated [`scene::Scene`] | [`scene`], [`brdf`] | `include/environment.glsl`, `include/brdf.glsl` |
+//! | maps and BRDFs → lobes | [`srbf`], [`fit`] | `include/srbf.glsl` |
 //! | triangles → wide BVH | [`accel`] | `include/bvh.glsl` |
-//! | scene → device buffers | [`gpu`] | `include/layout.glsl` |
-//! | progressive passes | [`pass`] | `camera`, `trace`, `sample`, `shadow`, `gather`, `bounce`, `accumulate` |
+//! | frames, random numbers, samplers | [`frame`], [`random`], [`sampler`] | `include/frame.glsl`, `include/random.glsl`, `include/wave.glsl` |
+//! | scene → device buffers | [`gpu`], [`renderer`] | `include/layout.glsl` |
+//! | progressive passes | [`pass`], [`renderer`] | `camera`, `trace`, `sample`, `shadow`, `gather`, `features`, `bounce`, `accumulate` |
 //! | sums → image files | [`film`] | |
-//! | comparisons | [`study`] | |
+//! | comparisons, ray rates | [`study`], [`benchmark`] | |
 //!
 //! Notation: directions point away from the surface; `outgoing_direction` leads to the viewer,
 //! `incident_direction` to the light; names that end in `_local` are in the shading frame, whose
 //! z axis is the shading normal. Densities (`pdf`) are per steradian unless named otherwise.
 //! Radiance is linear Rec.709.
+//!
+//! # Bibliography
+//!
+//! Comments cite by authors and year, in the code and in `glsl`.
+//!
+//! - \[Abramowitz & Stegun 1964\] *Handbook of Mathematical Functions*, National Bureau of
+//!   Standards.
+//! - \[Aila & Laine 2009\] "Understanding the Efficiency of Ray Traversal on GPUs", High
+//!   Performance Graphics.
+//! - \[Arthur & Vassilvitskii 2007\] "k-means++: The Advantages of Careful Seeding", SODA.
+//! - \[Banerjee et al. 2005\] "Clustering on the Unit Hypersphere using von Mises-Fisher
+//!   Distributions", JMLR 6.
+//! - \[Burke et al. 2005\] "Bidirectional Importance Sampling for Direct Illumination",
+//!   Eurographics Symposium on Rendering.
+//! - \[Burley 2020\] "Practical Hash-based Owen Scrambling", JCGT 9(4).
+//! - \[Chen & Asau 1974\] "On Generating Random Variates from an Empirical Distribution", AIIE
+//!   Transactions 6(2).
+//! - \[CIE 015:2018\] *Colorimetry*, fourth edition.
+//! - \[Cigolle et al. 2014\] "A Survey of Efficient Representations for Independent Unit Vectors",
+//!   JCGT 3(2).
+//! - \[Duff et al. 2017\] "Building an Orthonormal Basis, Revisited", JCGT 6(1).
+//! - \[Dupuy & Benyoub 2023\] "Sampling Visible GGX Normals with Spherical Caps", Computer
+//!   Graphics Forum 42(8).
+//! - \[Eto & Tokuyoshi 2023\] "Bounded VNDF Sampling for Smith–GGX Reflections", SIGGRAPH Asia
+//!   Technical Communications.
+//! - \[Gibson 1998\] "Constrained Elastic Surface Nets", MICCAI.
+//! - \[Heitz 2014\] "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", JCGT
+//!   3(2).
+//! - \[IEC 61966-2-1:1999\] *Default RGB colour space – sRGB*.
+//! - \[ISO/CIE 11664-2:2022\] *Colorimetry – CIE standard illuminants*.
+//! - \[Jarzynski & Olano 2020\] "Hash Functions for GPU Rendering", JCGT 9(3).
+//! - \[Joe & Kuo 2008\] "Constructing Sobol Sequences with Better Two-Dimensional Projections",
+//!   SIAM Journal on Scientific Computing 30(5).
+//! - \[Kelemen & Szirmay-Kalos 2001\] "A Microfacet Based Coupled Specular-Matte BRDF Model with
+//!   Importance Sampling", Eurographics short presentations.
+//! - \[Knuth 1997\] *The Art of Computer Programming*, volume 2, third edition, section 4.2.2.
+//! - \[Laine & Karras 2011\] "Stratified Sampling for Stochastic Transparency", Computer Graphics
+//!   Forum 30(4).
+//! - \[Matusik et al. 2003\] "A Data-Driven Reflectance Model", ACM Transactions on Graphics
+//!   22(3).
+//! - \[Meister & Bittner 2018\] "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy
+//!   Construction", IEEE TVCG 24(3); "Parallel Reinsertion for Bounding Volume Hierarchy
+//!   Optimization", Computer Graphics Forum 37(2).
+//! - \[Meisters 1975\] "Polygons Have Ears", American Mathematical Monthly 82(6).
+//! - \[Moshier 1992\] Cephes Mathematical Library.
+//! - \[Nocedal & Wright 2006\] *Numerical Optimization*, second edition, Springer.
+//! - \[Pharr & Humphreys 2010\] *Physically Based Rendering*, second edition, Morgan Kaufmann.
+//! - \[Quilez 2008\] "Distance functions", <https://iquilezles.org/articles/distfunctions/>.
+//! - \[Rusinkiewicz 1998\] "A New Change of Variables for Efficient BRDF Representation",
+//!   Eurographics Workshop on Rendering.
+//! - \[Schlick 1994\] "An Inexpensive BRDF Model for Physically-based Rendering", Computer
+//!   Graphics Forum 13(3).
+//! - \[Shirley & Chiu 1997\] "A Low Distortion Map Between Disk and Square", Journal of Graphics
+//!   Tools 2(3).
+//! - \[Steele et al. 2014\] "Fast Splittable Pseudorandom Number Generators", OOPSLA.
+//! - \[Talbot et al. 2005\] "Importance Resampling for Global Illumination", Eurographics
+//!   Symposium on Rendering.
+//! - \[Tsai & Shih 2006\] "All-Frequency Precomputed Radiance Transfer using Spherical Radial
+//!   Basis Functions and Clustered Tensor Approximation", ACM Transactions on Graphics 25(3).
+//! - \[Tsai et al. 2008\] "Importance Sampling of Products from Illumination and BRDF Using
+//!   Spherical Radial Basis Functions", The Visual Computer 24.
+//! - \[Turk 1994\] "The PLY Polygon File Format", Stanford University.
+//! - \[Veach & Guibas 1995\] "Optimally Combining Sampling Techniques for Monte Carlo Rendering",
+//!   SIGGRAPH.
+//! - \[Vegdahl 2021\] "Building a Better LK Hash",
+//!   <https://psychopath.io/post/2021_01_30_building_a_better_lk_hash>.
+//! - \[Wächter & Binder 2019\] "A Fast and Robust Method for Avoiding Self-Intersection", Ray
+//!   Tracing Gems, chapter 6.
+//! - \[Walter et al. 2007\] "Microfacet Models for Refraction through Rough Surfaces",
+//!   Eurographics Symposium on Rendering.
+//! - \[Wang et al. 2008\] "Computation of Rotation Minimizing Frames", ACM Transactions on
+//!   Graphics 27(1).
+//! - \[Woop et al. 2013\] "Watertight Ray/Triangle Intersection", JCGT 2(1).
+//! - \[Wu & Shih 2009\] Y.-T. Wu, advised by Z.-C. Shih, "Visibility-Guided Importance Sampling",
+//!   master's thesis, National Chiao Tung University; "the thesis" in comments.
+//! - \[Ylitie et al. 2017\] "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide
+//!   BVHs", High Performance Graphics.
+//! - \[Yuksel et al. 2009\] "On the Parameterization of Catmull-Rom Curves", SIAM/ACM Joint
+//!   Conference on Geometric and Physical Modeling.
 
 pub mod accel;
 pub mod benchmark;

@@ -427,8 +427,9 @@ fn declared_blocks() -> BTreeMap<String, (u32, u32)> {
     }
     for declaration in source.split("layout(set = ").skip(1) {
         let (set, rest) = declaration.split_once(", binding = ").expect("a binding follows");
-        let (binding, rest) = rest.split_once(") uniform usamplerBuffer ").expect("a texel buffer");
-        let (name, _) = rest.split_once(';').expect("the declaration ends");
+        let (binding, rest) = rest.split_once(") uniform ").expect("a texel buffer");
+        let (_, rest) = rest.split_once("samplerBuffer").expect("a texel buffer");
+        let (name, _) = rest.trim_start().split_once(';').expect("the declaration ends");
         blocks.insert(name.to_owned(), (macro_value(set), macro_value(binding)));
     }
     blocks
