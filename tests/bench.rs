@@ -1,0 +1,89 @@
+//! `fenestra bench` on a small scene: every figure is there, and device and CPU see the same hits.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+#[path = "support/command.rs"]
+mod command;
+
+use command::Folder;
+
+const SCENE: &str = r#"
+[camera]
+position = [0.0, 1.0, 4.0]
+look_at = [0.0, 0.0, 0.0]
+vertical_fov_deg = 45.0
+
+[film]
+width = 61
+height = 47
+
+[environment]
+constant = [1, 1, 1]
+
+[[material]]
+name = "grey"
+type = "diffuse"
+reflectance = [0.5, 0.5, 0.5]
+
+[[object]]
+name = "box"
+shape = "box"
+size = [1.0, 1.0, 1.0]
+material = "grey"
+
+[[object]]
+name = "floor"
+shape = "box"
+size = [6.0, 0.2, 6.0]
+material = "grey"
+translate = [0.0, -0.6, 0.0]
+"#;
+
+#[test]
+fn every_figure_is_there() {
+    let folder = Folder::new();
+    folder.write("two_boxes.toml", SCENE);
+    let run = folder.run(&["bench", "two_boxes.toml", "--repetitions", "2", "--json"]);
+    run.assert(0, &[]);
+    let report: serde_json::Value = serde_json::from_str(&run.output).unwrap();
+    assert_eq!(report["triangles"], 24);
+    assert_eq!(report["film"], serde_json::json!([61, 47]));
+    let rates = report["rays"].as_array().unwrap();
+    let kinds: Vec<_> = rates.iter().map(|rate| rate["kind"].as_str().unwrap()).collect();
+    assert_eq!(kinds, ["camera", "shadow", "bounce"]);
+    for rate in rates {
+        assert!(rate["rays"].as_u64().unwrap() > 500, "{rate}");
+        for figure in ["device_mrays", "obvhs_mrays", "ratio"] {
+            assert!(rate[figure]["median"].as_f64().unwrap() > 0.0, "{rate}");
+        }
+        // Rays along edges are decided by rounding.
+        assert!(rate["disagreements"].as_u64().unwrap() <= 5, "{rate}");
+    }
+    // Camera rays: one per pixel and no more.
+    assert_eq!(rates[0]["rays"], 61 * 47);
+    for pass in ["camera", "trace", "sample", "shadow", "gather", "accumulate"] {
+        assert!(report["pass_ms"][pass].as_f64().unwrap() > 0.0, "{pass}");
+    }
+    assert!(report["compile_ms"]["pipelines"].as_f64().unwrap() > 0.0);
+    assert_eq!(report["buffer_bytes"]["triangles 0"], 24 * 48);
+    assert!(report["direct_light_share"]["median"].as_f64().unwrap() < 1.0);
+
+    let text = folder.run(&["bench", "two_boxes.toml", "--repetitions", "1"]);
+    text.assert(0, &[]);
+    assert!(
+        text.output.contains("ratio") && text.output.contains("triangles 0"),
+        "{}",
+        text.output
+    );
+}
+
+#[test]
+fn what_cannot_be_measured_is_said() {
+    let folder = Folder::new();
+    folder.write("two_boxes.toml", SCENE);
+    let run = folder.run(&["bench", "two_boxes.toml", "--sampler", "ris"]);
+    run.assert(2, &["ris", "mis"]);
+    let run = folder.run(&["bench", "nowhere.toml"]);
+    run.assert(1, &["nowhere.toml"]);
+    let run = folder.run(&["bench", "two_boxes.toml", "--device", "no such device"]);
+    run.assert(1, &["no such device"]);
+}
