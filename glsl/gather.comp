@@ -4,9 +4,9 @@
 
 #define NEEDS_PARAMETERS
 #define NEEDS_WAVE
-#define NEEDS_RAYS
-#define NEEDS_HITS
-#define NEEDS_SHADOW_RAYS
+#define NEEDS_RAY_TEXELS
+#define NEEDS_HIT_TEXELS
+#define NEEDS_SHADOW_RAY_TEXELS
 #define NEEDS_VISIBILITY
 #define NEEDS_PATHS
 #define WRITES_PATHS
@@ -23,11 +23,12 @@ void main() {
     if (path >= path_count) {
         return;
     }
-    if (hits[path].material == NO_MATERIAL) {
+    if (load_hit_origin(path).material == NO_MATERIAL) {
         // Later vertices sample the environment already where they are; a bounce ray that escapes
         // would count it twice.
-        if (wave.vertex == 0u && wave.first_shadow_ray == 0u && rays[path].is_active != 0u) {
-            paths[path].radiance += environment_radiance(rays[path].direction);
+        Ray ray = load_ray(path);
+        if (wave.vertex == 0u && wave.first_shadow_ray == 0u && ray.is_active != 0u) {
+            paths[path].radiance += environment_radiance(ray.direction);
         }
         return;
     }
@@ -36,7 +37,7 @@ void main() {
     uint visible = 0u;
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
         uint ray = i * path_count + path;
-        vec3 contribution = shadow_rays[ray].contribution;
+        vec3 contribution = load_shadow_ray(ray).contribution;
         // The same test as in shadow.comp: what brings nothing is not traced.
         bool is_traced = any(notEqual(contribution, vec3(0.0)));
         traced += is_traced ? 1u : 0u;

@@ -4,8 +4,8 @@
 
 #define NEEDS_PARAMETERS
 #define NEEDS_WAVE
-#define NEEDS_RAYS
-#define NEEDS_HITS
+#define NEEDS_RAY_TEXELS
+#define NEEDS_HIT_TEXELS
 #define NEEDS_SHADOW_RAYS
 #define WRITES_SHADOW_RAYS
 #define NEEDS_MATERIALS
@@ -147,14 +147,14 @@ void main() {
         return;
     }
     Vertex vertex;
-    vertex.hit = hits[path];
+    vertex.hit = load_hit(path);
     if (vertex.hit.material == NO_MATERIAL) {
         return;
     }
     PathIndex index = wave_path(path);
     vertex.frame = frame_from_normal(vertex.hit.shading_normal);
     vertex.material = materials[vertex.hit.material];
-    vertex.outgoing_local = to_local(vertex.frame, -rays[path].direction);
+    vertex.outgoing_local = to_local(vertex.frame, -load_ray(path).direction);
     vertex.pixel = index.pixel;
     vertex.dimension = vertex_dimension();
     // Rays are numbered through all samples, since they share one sequence.

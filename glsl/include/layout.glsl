@@ -175,6 +175,14 @@ HitOrigin load_hit_origin(uint index) {
     uvec4 second = texelFetch(hit_texels, int(3u * index + 1u));
     return HitOrigin(uintBitsToFloat(first.xyz), first.w, uintBitsToFloat(second.xyz));
 }
+Hit load_hit(uint index) {
+    uvec4 first = texelFetch(hit_texels, int(3u * index));
+    uvec4 second = texelFetch(hit_texels, int(3u * index + 1u));
+    uvec4 third = texelFetch(hit_texels, int(3u * index + 2u));
+    return Hit(
+        uintBitsToFloat(first.xyz), first.w, uintBitsToFloat(second.xyz), uintBitsToFloat(second.w),
+        uintBitsToFloat(third.xyz), third.w);
+}
 #endif
 
 #ifdef NEEDS_SHADOW_RAYS
