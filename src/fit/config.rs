@@ -1,7 +1,7 @@
 //! Every number a fit depends on. A change here must come with a new [`VERSION`].
 
 /// Version of the fitting procedure and of the fit files; part of the cache key.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 /// Seed of the k-means++ start.
 pub const SEED: u64 = 0x5eed;
 /// Most lobes a fit may have.
@@ -11,6 +11,10 @@ pub const MAX_VIEWS: usize = 1024;
 
 /// Lobes placed by k-means++; larger mixtures grow by splitting.
 pub const FIRST_LOBES: usize = 16;
+/// Starts by k-means++ of which the best is taken.
+pub const STARTS: u64 = 6;
+/// Steps of expectation maximization of each start.
+pub const START_STEPS: usize = 20;
 /// Steps of expectation maximization after each split.
 pub const GROWTH_STEPS: usize = 10;
 /// Fall of the divergence per step, nats, at which growing goes on.

@@ -158,12 +158,12 @@ fn fit_map(
         )));
     }
     let grid = Grid::new(map);
-    let energy = grid.energy();
+    let patches = grid.patches(patch_count(options.lobes));
+    let luminance_patches: Vec<Patch> = patches.iter().map(|patch| patch.patch).collect();
+    let energy: f64 = luminance_patches.iter().map(|patch| patch.energy).sum();
     if energy <= 0.0 {
         return Err(fail("the map is black; expected light from somewhere".into()));
     }
-    let patches = grid.patches(patch_count(options.lobes));
-    let luminance_patches: Vec<Patch> = patches.iter().map(|patch| patch.patch).collect();
     let points = PointSet::new(&luminance_patches);
     let mut notes = Vec::new();
     if points.len() < options.lobes {
@@ -212,7 +212,7 @@ fn fit_map(
         seconds: 0.0,
         is_cached: false,
     };
-    fit.errors = judge_environment(&grid, &fit.components());
+    fit.errors = judge_environment(&grid, energy, &fit.components());
     progress(1.0);
     Ok(fit)
 }

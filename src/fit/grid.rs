@@ -16,6 +16,17 @@ const MIN_WIDTH: usize = 512;
 /// Sums kept per cell: luminance, red, green, blue, first moments of luminance.
 const CHANNELS: usize = 7;
 
+/// Parts along each side of a cell where the map is steep.
+pub const STEEP_PARTS: usize = 4;
+/// Share of the energy from which on a steep cell is cut into its parts.
+const HEAVY_SHARE: f64 = 1e-4;
+
+/// The sums of a patch.
+fn channels(patch: &ColouredPatch) -> [f64; CHANNELS] {
+    let (colour, moment) = (patch.colour, patch.patch.moment);
+    [patch.patch.energy, colour.x, colour.y, colour.z, moment.x, moment.y, moment.z]
+}
+
 /// Radiance per cell, row 0 at +Y.
 #[derive(Clone, Debug)]
 pub struct Grid {
@@ -132,14 +143,24 @@ impl Grid {
         brightest > 4.0 * darkest
     }
 
-    /// Integral of luminance over the sphere.
-    pub fn energy(&self) -> f64 {
-        let row = |y: usize| {
-            let cells = &self.radiance[y * self.width..(y + 1) * self.width];
-            let sum: f64 = cells.iter().map(|texel| f64::from(luminance(*texel))).sum();
-            sum * self.cell_solid_angle(y)
+    /// A cell in [`STEEP_PARTS`]² parts, with the map between the middles of the cells as it is looked
+    /// up.
+    fn parts(&self, x: usize, y: usize) -> Vec<ColouredPatch> {
+        let count = STEEP_PARTS * STEEP_PARTS;
+        let solid_angle = self.cell_solid_angle(y) / count as f64;
+        // Variance of a part along both its sides, about solid angle / 12 each.
+        let extent = 1.0 - solid_angle / 12.0;
+        let part = |index: usize| {
+            let inside = |part: usize| (part as f64 + 0.5) / STEEP_PARTS as f64;
+            let column = x as f64 + inside(index % STEEP_PARTS);
+            let row = y as f64 + inside(index / STEEP_PARTS);
+            let radiance = self.lookup(column, row);
+            let energy = f64::from(luminance(radiance)) * solid_angle;
+            let moment = energy * extent * self.direction(column, row);
+            let patch = Patch { energy, moment, solid_angle };
+            ColouredPatch { patch, colour: radiance.as_dvec3() * solid_angle }
         };
-        (0..self.height).map(row).sum()
+        (0..count).map(part).collect()
     }
 
     /// Summed-area table, `(width + 1) × (height + 1)` entries.
@@ -152,12 +173,24 @@ impl Grid {
         for y in 0..self.height {
             let solid_angle = self.cell_solid_angle(y);
             let (sine, cosine) = (PI * (y as f64 + 0.5) / self.height as f64).sin_cos();
-            // A texel is a tent as wide as two cells (variance: a sixth of a cell squared), which
-            // pulls its mean direction inward.
+            // The extent of a cell pulls its mean direction inward.
             let (across, along) = (2.0 * PI / self.width as f64 * sine, PI / self.height as f64);
-            let extent = 1.0 - (across * across + along * along) / 12.0;
+            let extent = 1.0 - (across * across + along * along) / 24.0;
             let mut row = [0.0; CHANNELS];
             for x in 0..self.width {
+                if self.is_steep(x, y) {
+                    let above = table[y * stride + x + 1];
+                    let cell = self.parts(x, y).iter().fold([0.0; CHANNELS], |sum, part| {
+                        let values = channels(part);
+                        std::array::from_fn(|c| sum[c] + values[c])
+                    });
+                    let entry = &mut table[(y + 1) * stride + x + 1];
+                    for c in 0..CHANNELS {
+                        row[c] += cell[c];
+                        entry[c] = above[c] + row[c];
+                    }
+                    continue;
+                }
                 let texel = self.radiance[y * self.width + x];
                 let energy = f64::from(luminance(texel)) * solid_angle;
                 let [r, g, b] = texel.to_array().map(|value| f64::from(value) * solid_angle);
@@ -240,6 +273,17 @@ impl Grid {
                     measured[slot] = patch;
                 }
                 queue.push(Queued { priority: priority(half, &patch), index: slot });
+            }
+        }
+        // A sun of a few texels is the case where what lies within a cell matters.
+        let total: f64 = measured.iter().map(|patch| patch.patch.energy).sum();
+        for (index, r) in rectangles.iter().enumerate() {
+            let is_cell = r.x1 - r.x0 == 1 && r.y1 - r.y0 == 1;
+            let is_heavy = measured[index].patch.energy > HEAVY_SHARE * total;
+            if is_cell && is_heavy && self.is_steep(r.x0, r.y0) {
+                let parts = self.parts(r.x0, r.y0);
+                measured[index] = parts[0];
+                measured.extend(&parts[1..]);
             }
         }
         measured

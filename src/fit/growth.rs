@@ -42,8 +42,8 @@ fn choose(weights: &[f64], target: f64) -> usize {
 
 /// Lobes at points chosen with a probability that grows with energy and with the squared distance to
 /// the lobes there are. \[Arthur & Vassilvitskii 2007\]. At most `count`, and at most one per point.
-fn k_means_plus_plus(points: &PointSet, count: usize) -> Vec<Component> {
-    let mut random = Random(config::SEED);
+fn k_means_plus_plus(points: &PointSet, count: usize, seed: u64) -> Vec<Component> {
+    let mut random = Random(seed);
     let mut distances = vec![1.0_f64; points.len()];
     let mut axes: Vec<DVec3> = Vec::new();
     while axes.len() < count {
@@ -123,12 +123,27 @@ fn split(points: &PointSet, components: &mut Vec<Component>, count: usize) {
     }
 }
 
+/// The best of several starts: one may leave two lobes in one place and none in another, which
+/// expectation maximization does not undo.
+fn start(points: &PointSet, count: usize) -> Vec<Component> {
+    let attempt = |attempt: u64| {
+        let mut components = k_means_plus_plus(points, count, config::SEED + attempt);
+        let steps = config::START_STEPS;
+        let divergence = maximize(points, &mut components, steps, config::GROWTH_TOLERANCE);
+        (divergence, components)
+    };
+    (0..config::STARTS)
+        .map(attempt)
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, components)| components)
+        .unwrap_or_default()
+}
+
 /// A mixture of `count` lobes for the points, or of as many as there are points. `progress` is called
 /// with the share of the work that is done.
 pub fn grow(points: &PointSet, count: usize, progress: &mut dyn FnMut(f64)) -> Vec<Component> {
     let count = count.min(points.len());
-    let mut components = k_means_plus_plus(points, count.min(config::FIRST_LOBES));
-    maximize(points, &mut components, config::GROWTH_STEPS, config::GROWTH_TOLERANCE);
+    let mut components = start(points, count.min(config::FIRST_LOBES));
     while components.len() < count {
         let size = components.len();
         let next = (size + size.div_ceil(4)).min(count);

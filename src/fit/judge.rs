@@ -11,7 +11,7 @@ use super::{
     component::{Component, kernel_integral},
     config,
     expectation::fast_exp,
-    grid::Grid,
+    grid::{Grid, STEEP_PARTS},
     hemisphere::HemisphereTarget,
 };
 use crate::{scene::environment::luminance, srbf::Lobe};
@@ -32,8 +32,6 @@ pub struct FitErrors {
 
 /// Cells of a tile are compared with the lobes that matter there.
 const TILE: usize = 16;
-/// Points along each side of a cell where the map is steep.
-const STEEP_PARTS: usize = 4;
 /// Exponent below the largest at which a lobe of a tile no longer matters.
 const CULL: f64 = 18.0;
 
@@ -110,9 +108,8 @@ impl Selection {
     }
 }
 
-/// Error figures of a fit of a map.
-pub fn judge_environment(grid: &Grid, lobes: &[ColouredComponent]) -> FitErrors {
-    let energy = grid.energy();
+/// Error figures of a fit of a map whose luminance has the integral `energy`.
+pub fn judge_environment(grid: &Grid, energy: f64, lobes: &[ColouredComponent]) -> FitErrors {
     let (columns, rows) = (grid.width.div_ceil(TILE), grid.height.div_ceil(TILE));
     let share: f64 = lobes.iter().map(|lobe| lobe.component.share).sum();
     let tiles: Vec<[f64; 5]> = (0..columns * rows)
