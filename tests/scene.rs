@@ -781,7 +781,8 @@ fn the_four_test_scenes_have_their_triangles() {
     }
     for (name, triangles) in [
         ("buddha_and_car", 163_983),
-        ("bathroom", 96_168),
+        // 236 slivers of the radiator have no area any more where it stands: 96,168 as a file.
+        ("bathroom", 95_932),
         ("meeting_room", 125_842),
         ("restroom", 63_113),
     ] {
