@@ -270,7 +270,7 @@ impl SceneFile {
     ///
     /// # Errors
     ///
-    /// [`Error::Parse`] with line and column.
+    /// [`crate::Error::Parse`] with line and column.
     pub fn parse(path: &Path, text: &str) -> Result<Self> {
         read::read_root(text).map_err(|failure| failure.locate(path, text))
     }

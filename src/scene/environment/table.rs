@@ -35,7 +35,7 @@ const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 pub struct EnvironmentTables {
     /// `2 * (height + 1)` numbers: the cumulative probability up to and including each row of cells
     /// (1 from the last row that is not black on), then the mean of sin θ over each row; after them
-    /// the guide of the first (see [`guide_size`]).
+    /// the guide of the first (see `guide_size`).
     pub rows: Vec<f32>,
     /// For each of the `height + 1` rows `width` numbers, the cumulative probability, within the row,
     /// up to and including each cell (1 from the last cell that is not black on; all 1 in a row that
