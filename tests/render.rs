@@ -1,0 +1,132 @@
+//! The render command from its options to its files: stop rules, layers, previews, checkpoints.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
+
+#[path = "support/command.rs"]
+mod command;
+
+use command::Folder;
+use fenestra::film::{Attribute, Image, Statistics};
+
+const SCENE: &str = r#"
+[camera]
+position = [0.0, 1.0, 3.0]
+look_at = [0.0, 0.3, 0.0]
+vertical_fov_deg = 45.0
+
+[film]
+width = 40
+height = 24
+
+[environment]
+sky = {}
+
+[[material]]
+name = "clay"
+type = "diffuse"
+reflectance = [0.6, 0.4, 0.3]
+
+[[object]]
+shape = "box"
+size = [4.0, 0.2, 4.0]
+material = "clay"
+translate = [0.0, -0.1, 0.0]
+
+[[object]]
+shape = "sphere"
+radius = 0.5
+material = "clay"
+translate = [0.0, 0.5, 0.0]
+"#;
+
+/// Renders with the options given and returns image and statistics.
+fn render(folder: &Folder, output: &str, options: &[&str]) -> (Image, Statistics) {
+    let mut arguments = vec!["render", "scene.toml", "-o", output, "--stats", "stats.json"];
+    arguments.extend(options);
+    folder.run(&arguments).assert(0, &[]);
+    let image = Image::read_exr(&folder.path().join(output)).unwrap();
+    let text = std::fs::read_to_string(folder.path().join("stats.json")).unwrap();
+    (image, serde_json::from_str(&text).unwrap())
+}
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    folder.write("scene.toml", SCENE);
+    folder
+}
+
+#[test]
+fn the_first_rule_that_is_reached_ends_the_render() {
+    let folder = folder();
+    let run = |options: &[&str]| render(&folder, "out.exr", options).1;
+
+    let default = run(&[]);
+    assert_eq!((default.stop_reason.as_str(), default.samples_per_pixel), ("spp", 64));
+    let both = run(&["--spp", "3", "--time", "1h"]);
+    assert_eq!((both.stop_reason.as_str(), both.samples_per_pixel), ("spp", 3));
+    let time = run(&["--spp", "100000000", "--time", "300ms"]);
+    assert_eq!(time.stop_reason, "time");
+    assert!(time.seconds >= 0.3 && time.samples_per_pixel > 1, "{} s", time.seconds);
+    let error = run(&["--error", "0.2", "--spp", "100000"]);
+    assert_eq!(error.stop_reason, "error");
+    let reached = error.relative_standard_error.unwrap();
+    assert!(reached <= 0.2 && error.samples_per_pixel < 100_000, "{reached}");
+}
+
+#[test]
+fn rays_are_counted_by_kind() {
+    let folder = folder();
+    let pixels = 40 * 24;
+    let (_, direct) = render(&folder, "out.exr", &["--spp", "4", "--sampler", "cosine"]);
+    assert_eq!(direct.rays["camera"], 4 * pixels);
+    assert_eq!(direct.rays["bounce"], 0);
+    assert!(direct.rays["shadow"] > 0 && direct.rays["shadow"] % 5 == 0);
+    let share = direct.visible_share.unwrap();
+    assert!((0.5..1.0).contains(&share), "an open scene: {share}");
+    let (_, deep) = render(&folder, "out.exr", &["--spp", "4", "--depth", "3"]);
+    assert!(deep.rays["bounce"] > 0 && deep.rays["shadow"] > direct.rays["shadow"] / 2);
+    assert_eq!(deep.dropped_samples, 0);
+    for pass in ["camera", "trace", "sample", "shadow", "gather", "bounce", "accumulate"] {
+        assert!(deep.gpu_ms[pass] > 0.0, "{pass}");
+    }
+}
+
+#[test]
+fn layers_preview_and_window_are_written() {
+    let folder = folder();
+    let options = [
+        "--spp",
+        "2",
+        "--aov",
+        "Albedo,N,P,Visible,Variance,SampleCount",
+        "--png",
+        "--crop",
+        "10,5,30,20",
+        "--validate",
+    ];
+    let (image, statistics) = render(&folder, "sub/out.exr", &options);
+    assert_eq!((image.width, image.height, image.origin), (20, 15, [10, 5]));
+    assert_eq!(image.film_size, [40, 24]);
+    for channel in ["R", "Albedo.G", "N.Y", "P.Z", "Visible.Y", "Variance.B", "SampleCount.Y"] {
+        assert!(image.channels.contains_key(channel), "{channel}");
+    }
+    assert!(image.channels["SampleCount.Y"].iter().all(|count| *count == 2.0));
+    // The floor of reflectance 0.6 fills the lower edge.
+    let albedo = image.channels["Albedo.R"].last().unwrap();
+    assert!((albedo - 0.6).abs() < 1e-5, "{albedo}");
+    assert!((image.channels["N.Y"].last().unwrap() - 1.0).abs() < 1e-4);
+    assert!(matches!(image.attributes["samplesPerPixel"], Attribute::Integer(2)));
+    assert!(folder.path().join("sub/out.png").exists());
+    assert_eq!((statistics.width, statistics.height), (20, 15));
+}
+
+#[test]
+fn a_render_continued_from_its_checkpoint_has_the_same_bits() {
+    let folder = folder();
+    let (whole, _) = render(&folder, "whole.exr", &["--spp", "9", "--depth", "2"]);
+    let keep = ["--spp", "4", "--depth", "2", "--checkpoint-interval", "1h"];
+    render(&folder, "part.exr", &keep);
+    let (part, statistics) =
+        render(&folder, "part.exr", &["--spp", "9", "--depth", "2", "--resume"]);
+    assert_eq!(statistics.samples_per_pixel, 9);
+    assert_eq!(part.channels, whole.channels);
+}
