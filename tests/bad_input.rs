@@ -398,7 +398,9 @@ fn an_interrupt_writes_what_there_is() {
         let mut text = String::new();
         messages.read_to_string(&mut text).map(|_| text)
     });
-    let signal = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    // The shell's own `kill`: the program of that name is not on every system.
+    let interrupt = format!("kill -INT {}", child.id());
+    let signal = Command::new("sh").args(["-c", &interrupt]).status().unwrap();
     assert!(signal.success());
     let start = Instant::now();
     let status = loop {
