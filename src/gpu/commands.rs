@@ -223,14 +223,16 @@ impl Commands {
         let failed = |call: &str, result| {
             vulkan_error(&format!("{call} (last pass {})", self.last_pass), result)
         };
-        // SAFETY: recording ends here; the queue is locked during submission, and the wait keeps
-        // every object that the commands use alive in the callers.
+        // Held until the work is done: see `Device::queue`.
+        let queue = self.device.queue();
+        // SAFETY: recording ends here; the queue is locked, and the wait keeps every object that the
+        // commands use alive in the callers.
         unsafe {
             raw.end_command_buffer(self.raw)
                 .map_err(|result| failed("vkEndCommandBuffer", result))?;
             let buffers = [self.raw];
             let submit = vk::SubmitInfo::default().command_buffers(&buffers);
-            raw.queue_submit(*self.device.queue(), &[submit], self.fence)
+            raw.queue_submit(*queue, &[submit], self.fence)
                 .map_err(|result| failed("vkQueueSubmit", result))?;
             let timeout = u64::try_from(SUBMISSION_TIMEOUT.as_nanos()).unwrap_or(u64::MAX);
             match raw.wait_for_fences(&[self.fence], true, timeout) {
@@ -247,6 +249,7 @@ impl Commands {
                 Err(result) => return Err(failed("vkWaitForFences", result)),
             }
         }
+        drop(queue);
         self.timestamps.as_ref().map_or_else(|| Ok(PassTimes::new()), Timestamps::read)
     }
 }

@@ -374,6 +374,9 @@ impl Device {
         self.debug_names.as_ref()
     }
 
+    /// The queue, for one thread at a time. Pipelines are created and destroyed under the same lock:
+    /// software drivers compile a pipeline when a dispatch first uses it, on the queue's own thread,
+    /// and with tests in several threads Mesa 22.3 was seen to crash.
     pub(super) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -84,12 +84,14 @@ impl Pipeline {
             .name(MAIN)
             .specialization_info(&specialization);
         let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
+        let queue = device.queue();
         // SAFETY: module, layout and cache are alive; the module is not needed afterwards.
         let result = unsafe {
             let result = raw_device.create_compute_pipelines(device.pipeline_cache(), &info, None);
             raw_device.destroy_shader_module(module, None);
             result
         };
+        drop(queue);
         pipeline.raw = result
             .map_err(|(_, result)| {
                 vulkan_error(&format!("vkCreateComputePipelines({name})"), result)
@@ -117,6 +119,7 @@ impl Pipeline {
 
 impl Drop for Pipeline {
     fn drop(&mut self) {
+        let _queue = self.device.queue();
         // SAFETY: every submission is waited for; destroying null handles is allowed.
         unsafe {
             self.device.raw().destroy_pipeline(self.raw, None);
