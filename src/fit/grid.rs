@@ -1,11 +1,11 @@
 //! An environment map as a fit sees it: radiance per cell of a lat-long grid in the frame of the map,
 //! cut into patches, and compared with a mixture.
 
-use std::{cmp::Ordering, collections::BinaryHeap, f64::consts::PI};
+use std::{collections::BinaryHeap, f64::consts::PI};
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::{config, points::Patch};
+use super::{config, points::Patch, queue::Queued};
 use crate::{
     frame::direction_from_lat_long,
     scene::{EnvironmentMap, environment::luminance},
@@ -45,32 +45,6 @@ struct Rectangle {
     y0: usize,
     x1: usize,
     y1: usize,
-}
-
-/// A rectangle in the queue: the one with the largest priority is split next, ties by age.
-struct Queued {
-    priority: f64,
-    index: usize,
-}
-
-impl PartialEq for Queued {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Queued {}
-
-impl PartialOrd for Queued {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Queued {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.priority.total_cmp(&other.priority).then(other.index.cmp(&self.index))
-    }
 }
 
 /// A patch of a map with its colour.

@@ -1,11 +1,11 @@
 //! A BRDF × cosine for one view as a fit sees it: samples on an equal-area grid of the hemisphere that
 //! is finest where the energy is.
 
-use std::{cmp::Ordering, collections::BinaryHeap, f64::consts::PI};
+use std::{collections::BinaryHeap, f64::consts::PI};
 
 use glam::{DVec2, DVec3};
 
-use super::{config, points::Patch};
+use super::{config, points::Patch, queue::Queued};
 
 /// Cells along each side of the square at the start.
 const FIRST_CELLS: u32 = 24;
@@ -100,32 +100,6 @@ impl Cell {
             let (x, y) = (2 * self.x + (index % 2) as u32, 2 * self.y + (index / 2) as u32);
             Self::new(self.depth + 1, x, y, function)
         })
-    }
-}
-
-/// A cell in the queue, by priority, ties by age.
-struct Queued {
-    priority: f64,
-    index: usize,
-}
-
-impl PartialEq for Queued {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Queued {}
-
-impl PartialOrd for Queued {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Queued {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.priority.total_cmp(&other.priority).then(other.index.cmp(&self.index))
     }
 }
 

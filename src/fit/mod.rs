@@ -26,6 +26,7 @@ pub mod judge;
 pub mod options;
 pub mod picture;
 pub mod points;
+mod queue;
 pub mod report;
 pub mod solver;
 pub mod squared_error;
