@@ -10,12 +10,7 @@
 #define WRITES_SHADOW_RAYS
 #define NEEDS_MATERIALS
 #define NEEDS_ENVIRONMENT
-#include "layout.glsl"
-#include "frame.glsl"
-#include "random.glsl"
-#include "wave.glsl"
-#include "brdf.glsl"
-#include "environment.glsl"
+#include "vertex.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
@@ -23,110 +18,49 @@ layout(constant_id = CONSTANT_SAMPLER) const uint SAMPLER = SAMPLER_MIS;
 // Candidates per shadow ray of `ris`, half from the BRDF and half from the environment; 1 otherwise.
 layout(constant_id = CONSTANT_CANDIDATES) const uint CANDIDATES = 1u;
 
-// What does not change from ray to ray at one hit.
-struct Vertex {
-    Hit hit;
-    Frame frame;
-    Material material;
-    vec3 outgoing_local;
-    uint pixel;
-    // First dimension of the random numbers.
-    uint dimension;
-};
-
-// A direction considered at a hit.
-struct Candidate {
-    vec3 direction;
-    // BRDF * radiance * cosine, radiance as if unoccluded.
-    vec3 integrand;
-    // Density of the whole technique or mixture it was drawn from; 0 where nothing was drawn.
-    float pdf;
-};
-
-// Completes a candidate. `pdf` is the density of a technique that is neither the BRDF's own nor the
-// environment's, which `SAMPLER` says.
-Candidate evaluate(
-    Vertex vertex, vec3 direction, vec3 incident_local, vec3 radiance, float environment_density,
-    float pdf) {
-    Candidate candidate = Candidate(direction, vec3(0.0), pdf);
-    vec3 value;
-    float brdf_density;
-    brdf_evaluate_and_pdf(
-        vertex.material, vertex.outgoing_local, incident_local, value, brdf_density);
+// Density of the whole technique or mixture that SAMPLER draws from, where that is neither uniform
+// nor the cosine.
+float density(Considered considered) {
     if (SAMPLER == SAMPLER_MIS || SAMPLER == SAMPLER_RIS) {
-        candidate.pdf = 0.5 * (brdf_density + environment_density);
-    } else if (SAMPLER == SAMPLER_ENV) {
-        candidate.pdf = environment_density;
-    } else if (SAMPLER == SAMPLER_BRDF) {
-        candidate.pdf = brdf_density;
+        return 0.5 * (considered.brdf_pdf + considered.environment_pdf);
     }
-    // Below the shading or the geometric horizon there is nothing to see.
-    if (incident_local.z > 0.0 && dot(direction, vertex.hit.geometric_normal) > 0.0) {
-        candidate.integrand = value * radiance * incident_local.z;
-    }
-    return candidate;
+    return SAMPLER == SAMPLER_ENV ? considered.environment_pdf : considered.brdf_pdf;
 }
 
-// A direction proportional to the environment's luminance.
-Candidate draw_from_environment(Vertex vertex, uint sequence_index, uint candidate) {
-    vec2 u = random_2d(
-        vertex.pixel, sequence_index,
-        vertex.dimension + DIMENSION_ENVIRONMENT_DIRECTION + candidate, wave.seed);
-    EnvironmentSample light = environment_sample(u);
-    vec3 incident_local = to_local(vertex.frame, light.direction);
-    return evaluate(vertex, light.direction, incident_local, light.radiance, light.pdf, 0.0);
+Considered draw_environment_candidate(Vertex vertex, uint sequence_index, uint candidate) {
+    return draw_from_environment(
+        vertex,
+        random_2d(
+            vertex.index.pixel, sequence_index,
+            vertex.dimension + DIMENSION_ENVIRONMENT_DIRECTION + candidate, wave.seed));
 }
 
-// A direction from the BRDF, or from a fixed density over the hemisphere.
-Candidate draw_from_surface(Vertex vertex, uint sequence_index, uint candidate) {
-    vec2 u = random_2d(
-        vertex.pixel, sequence_index, vertex.dimension + DIMENSION_BRDF_DIRECTION + candidate,
+vec2 surface_numbers(Vertex vertex, uint sequence_index, uint candidate) {
+    return random_2d(
+        vertex.index.pixel, sequence_index, vertex.dimension + DIMENSION_BRDF_DIRECTION + candidate,
         wave.seed);
-    vec3 incident_local;
-    float pdf = 0.0;
-    if (SAMPLER == SAMPLER_UNIFORM) {
-        vec2 azimuth = sin_cos_pi(2.0 * u.y);
-        incident_local = vec3(sqrt(u.x * (2.0 - u.x)) * azimuth.yx, 1.0 - u.x);
-        pdf = 0.5 / PI;
-    } else if (SAMPLER == SAMPLER_COSINE) {
-        incident_local = sample_cosine_hemisphere(u);
-        pdf = incident_local.z / PI;
-    } else {
-        float lobe = random_1d(
-            vertex.pixel, sequence_index, vertex.dimension + DIMENSION_BRDF_LOBE + candidate,
-            wave.seed);
-        incident_local = brdf_sample(vertex.material, vertex.outgoing_local, vec3(u, lobe));
-    }
-    vec3 direction = to_world(vertex.frame, incident_local);
-    vec3 radiance = environment_radiance(direction);
-    float environment_density = SAMPLER == SAMPLER_MIS || SAMPLER == SAMPLER_RIS
-        ? environment_pdf(direction, radiance)
-        : 0.0;
-    return evaluate(vertex, direction, incident_local, radiance, environment_density, pdf);
 }
 
-void write_ray(uint index, vec3 direction, vec3 contribution) {
-    shadow_rays[index] = ShadowRay(direction, contribution);
-}
-
-void write_candidate(uint index, Candidate candidate) {
-    write_ray(
-        index, candidate.direction,
-        candidate.pdf > 0.0 ? candidate.integrand / candidate.pdf : vec3(0.0));
+Considered draw_brdf_candidate(Vertex vertex, uint sequence_index, uint candidate) {
+    float lobe = random_1d(
+        vertex.index.pixel, sequence_index, vertex.dimension + DIMENSION_BRDF_LOBE + candidate,
+        wave.seed);
+    return draw_from_brdf(vertex, vec3(surface_numbers(vertex, sequence_index, candidate), lobe));
 }
 
 // One of the candidates seen so far, chosen in proportion to target / pdf.
 struct Reservoir {
-    Candidate chosen;
+    Considered chosen;
     float chosen_target;
     float weight_sum;
     // Stretched after each choice to be used again.
     float u;
 };
 
-void consider(inout Reservoir reservoir, Candidate candidate) {
+void add_to(inout Reservoir reservoir, Considered candidate) {
     float target = luminance(candidate.integrand);
-    float weight = candidate.pdf > 0.0 ? target / candidate.pdf : 0.0;
+    float pdf = density(candidate);
+    float weight = pdf > 0.0 ? target / pdf : 0.0;
     reservoir.weight_sum += weight;
     if (weight > 0.0) {
         float probability = weight / reservoir.weight_sum;
@@ -146,31 +80,26 @@ void main() {
     if (path >= path_count) {
         return;
     }
-    Vertex vertex;
-    vertex.hit = load_hit(path);
-    if (vertex.hit.material == NO_MATERIAL) {
+    Hit hit = load_hit(path);
+    if (hit.material == NO_MATERIAL) {
         return;
     }
-    PathIndex index = wave_path(path);
-    vertex.frame = frame_from_normal(vertex.hit.shading_normal);
-    vertex.material = materials[vertex.hit.material];
-    vertex.outgoing_local = to_local(vertex.frame, -load_ray(path).direction);
-    vertex.pixel = index.pixel;
-    vertex.dimension = vertex_dimension();
+    Vertex vertex = load_vertex(path, hit);
     // Rays are numbered through all samples, since they share one sequence.
-    uint first_ray = index.sample_index * wave.total_shadow_rays + wave.first_shadow_ray;
+    uint first_ray = vertex.index.sample_index * wave.total_shadow_rays + wave.first_shadow_ray;
 
     if (SAMPLER == SAMPLER_RIS) {
         for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
             Reservoir reservoir;
-            reservoir.chosen = Candidate(vec3(0.0), vec3(0.0), 0.0);
+            reservoir.chosen = Considered(vec3(0.0), vec3(0.0), 0.0, 0.0);
             reservoir.chosen_target = 0.0;
             reservoir.weight_sum = 0.0;
             reservoir.u = random_1d(
-                vertex.pixel, first_ray + i, vertex.dimension + DIMENSION_RESAMPLING, wave.seed);
+                vertex.index.pixel, first_ray + i, vertex.dimension + DIMENSION_RESAMPLING,
+                wave.seed);
             for (uint c = 0u; c < CANDIDATES / 2u; ++c) {
-                consider(reservoir, draw_from_environment(vertex, first_ray + i, c));
-                consider(reservoir, draw_from_surface(vertex, first_ray + i, c));
+                add_to(reservoir, draw_environment_candidate(vertex, first_ray + i, c));
+                add_to(reservoir, draw_brdf_candidate(vertex, first_ray + i, c));
             }
             // Talbot et al. 2005, Eq. 6: f / target * mean weight.
             float factor = reservoir.chosen_target > 0.0
@@ -184,31 +113,40 @@ void main() {
         // The two techniques take turns from a random start, so that each ray's technique is a fair
         // coin. The coin is shared by a block of 8x8 pixels, and each technique has its own loop:
         // devices that run both sides of a branch then run one technique per ray.
-        uvec2 block =
-            uvec2(index.pixel % parameters.film_width, index.pixel / parameters.film_width)
-            / FILM_BLOCK;
-        uint coin =
-            hash_4d(uvec4(block, vertex.dimension + DIMENSION_TECHNIQUE, wave.seed)).x & 1u;
+        uint coin = block_random_bits(vertex.index, DIMENSION_TECHNIQUE).x & 1u;
         uint turn = (first_ray + coin) & 1u;
         for (uint i = turn; i < wave.shadow_ray_count; i += 2u) {
-            write_candidate(
-                i * path_count + path,
-                draw_from_environment(vertex, (first_ray + i + coin) >> 1u, 0u));
+            Considered considered =
+                draw_environment_candidate(vertex, (first_ray + i + coin) >> 1u, 0u);
+            write_considered(i * path_count + path, considered, density(considered));
         }
         for (uint i = 1u - turn; i < wave.shadow_ray_count; i += 2u) {
-            write_candidate(
-                i * path_count + path,
-                draw_from_surface(vertex, (first_ray + i + coin) >> 1u, 0u));
+            Considered considered = draw_brdf_candidate(vertex, (first_ray + i + coin) >> 1u, 0u);
+            write_considered(i * path_count + path, considered, density(considered));
         }
     } else {
         for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
-            Candidate candidate;
-            if (SAMPLER == SAMPLER_ENV) {
-                candidate = draw_from_environment(vertex, first_ray + i, 0u);
+            Considered considered;
+            float pdf;
+            if (SAMPLER == SAMPLER_UNIFORM) {
+                vec2 u = surface_numbers(vertex, first_ray + i, 0u);
+                vec2 azimuth = sin_cos_pi(2.0 * u.y);
+                considered = consider_local(
+                    vertex, vec3(sqrt(u.x * (2.0 - u.x)) * azimuth.yx, 1.0 - u.x));
+                pdf = 0.5 / PI;
+            } else if (SAMPLER == SAMPLER_COSINE) {
+                vec3 incident_local =
+                    sample_cosine_hemisphere(surface_numbers(vertex, first_ray + i, 0u));
+                considered = consider_local(vertex, incident_local);
+                pdf = incident_local.z / PI;
+            } else if (SAMPLER == SAMPLER_ENV) {
+                considered = draw_environment_candidate(vertex, first_ray + i, 0u);
+                pdf = density(considered);
             } else {
-                candidate = draw_from_surface(vertex, first_ray + i, 0u);
+                considered = draw_brdf_candidate(vertex, first_ray + i, 0u);
+                pdf = density(considered);
             }
-            write_candidate(i * path_count + path, candidate);
+            write_considered(i * path_count + path, considered, pdf);
         }
     }
 }

@@ -5,6 +5,7 @@
 #define WAVE_GLSL
 
 #include "layout.glsl"
+#include "random.glsl"
 
 // Dimensions of random_2d and random_1d along a path: two for the camera, then per vertex.
 const uint DIMENSION_FILTER = 0u;
@@ -70,6 +71,15 @@ PathIndex wave_path(uint path) {
 // First dimension of the vertex this dispatch works at.
 uint vertex_dimension() {
     return DIMENSION_VERTEX + wave.vertex * DIMENSIONS_PER_VERTEX;
+}
+
+// Random bits that the paths of a block of 8x8 pixels share, for choices that neighbouring
+// invocations had better make alike. `dimension` counts from the first one of the vertex.
+uvec4 block_random_bits(PathIndex index, uint dimension) {
+    uvec2 block =
+        uvec2(index.pixel % parameters.film_width, index.pixel / parameters.film_width)
+        / FILM_BLOCK;
+    return hash_4d(uvec4(block, vertex_dimension() + dimension, wave.seed));
 }
 
 #endif

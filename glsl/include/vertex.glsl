@@ -1,0 +1,91 @@
+// One vertex of a path as the sampling passes see it: the surface, what a direction brings there, and
+// how densely the two basic techniques, the BRDF's own sampling and the environment's, draw it. All
+// densities per steradian. Needs NEEDS_PARAMETERS, NEEDS_WAVE, NEEDS_RAY_TEXELS, NEEDS_HIT_TEXELS,
+// NEEDS_SHADOW_RAYS, WRITES_SHADOW_RAYS, NEEDS_MATERIALS and NEEDS_ENVIRONMENT.
+
+#ifndef VERTEX_GLSL
+#define VERTEX_GLSL
+
+#include "layout.glsl"
+#include "frame.glsl"
+#include "random.glsl"
+#include "wave.glsl"
+#include "brdf.glsl"
+#include "environment.glsl"
+
+// What does not change from ray to ray at one hit.
+struct Vertex {
+    Hit hit;
+    Frame frame;
+    Material material;
+    vec3 outgoing_local;
+    PathIndex index;
+    // First dimension of the random numbers.
+    uint dimension;
+};
+
+// A direction considered at a vertex.
+struct Considered {
+    vec3 direction;
+    // BRDF * radiance * cosine, radiance as if unoccluded.
+    vec3 integrand;
+    float brdf_pdf;
+    float environment_pdf;
+};
+
+// The vertex of a path whose hit is on a surface.
+Vertex load_vertex(uint path, Hit hit) {
+    Vertex vertex;
+    vertex.hit = hit;
+    vertex.index = wave_path(path);
+    vertex.frame = frame_from_normal(hit.shading_normal);
+    vertex.material = materials[hit.material];
+    vertex.outgoing_local = to_local(vertex.frame, -load_ray(path).direction);
+    vertex.dimension = vertex_dimension();
+    return vertex;
+}
+
+Considered consider(
+    Vertex vertex, vec3 direction, vec3 incident_local, vec3 radiance, float environment_density) {
+    Considered considered = Considered(direction, vec3(0.0), 0.0, environment_density);
+    vec3 value;
+    brdf_evaluate_and_pdf(
+        vertex.material, vertex.outgoing_local, incident_local, value, considered.brdf_pdf);
+    // Below the shading or the geometric horizon there is nothing to see.
+    if (incident_local.z > 0.0 && dot(direction, vertex.hit.geometric_normal) > 0.0) {
+        considered.integrand = value * radiance * incident_local.z;
+    }
+    return considered;
+}
+
+// Any direction given in the frame of the vertex.
+Considered consider_local(Vertex vertex, vec3 incident_local) {
+    vec3 direction = to_world(vertex.frame, incident_local);
+    vec3 radiance = environment_radiance(direction);
+    return consider(
+        vertex, direction, incident_local, radiance, environment_pdf(direction, radiance));
+}
+
+// A direction proportional to the environment's luminance, from two numbers in [0, 1).
+Considered draw_from_environment(Vertex vertex, vec2 u) {
+    EnvironmentSample light = environment_sample(u);
+    return consider(
+        vertex, light.direction, to_local(vertex.frame, light.direction), light.radiance,
+        light.pdf);
+}
+
+// A direction from the BRDF's own sampling, from three numbers in [0, 1).
+Considered draw_from_brdf(Vertex vertex, vec3 u) {
+    return consider_local(vertex, brdf_sample(vertex.material, vertex.outgoing_local, u));
+}
+
+void write_ray(uint index, vec3 direction, vec3 contribution) {
+    shadow_rays[index] = ShadowRay(direction, contribution);
+}
+
+// Writes a direction that was drawn with density `pdf`, 0 where nothing was drawn.
+void write_considered(uint index, Considered considered, float pdf) {
+    write_ray(index, considered.direction, pdf > 0.0 ? considered.integrand / pdf : vec3(0.0));
+}
+
+#endif
