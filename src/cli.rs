@@ -20,6 +20,8 @@ pub struct Cli {
 pub enum Command {
     /// Render a scene to an image.
     Render(Box<command::render::Arguments>),
+    /// Compare samplers against a reference over scenes and seeds, as a report to read in a browser.
+    Study(Box<command::study::Arguments>),
     /// Error metrics of an image against a reference, with thresholds for scripts.
     Compare(command::compare::Arguments),
     /// Combine renders of one scene made with different seeds or sample ranges.
@@ -50,6 +52,7 @@ pub fn run() -> ExitCode {
         .init();
     let result = match &cli.command {
         Command::Render(arguments) => command::render::run(arguments),
+        Command::Study(arguments) => command::study::run(arguments),
         Command::Bench(arguments) => command::bench::run(arguments),
         Command::Compare(arguments) => command::compare::run(arguments),
         Command::Info(arguments) => command::info::run(arguments),

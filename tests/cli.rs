@@ -43,7 +43,7 @@ fn commands(folder: &Folder) -> Vec<String> {
 fn every_command_has_help() {
     let folder = Folder::new();
     let commands = commands(&folder);
-    for expected in ["render", "compare", "merge", "info", "devices"] {
+    for expected in ["render", "study", "compare", "merge", "info", "devices"] {
         assert!(commands.iter().any(|command| command == expected), "{expected}: {commands:?}");
     }
     for name in commands.iter().filter(|name| *name != "help") {

@@ -9,6 +9,7 @@ pub mod merge;
 pub mod options;
 pub mod progress;
 pub mod render;
+pub mod study;
 
 use std::io::Write;
 

@@ -196,7 +196,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// A flag that Ctrl-C raises; a second Ctrl-C ends the process at once.
-fn listen_for_interrupt() -> Arc<AtomicBool> {
+pub(super) fn listen_for_interrupt() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&flag);
     let listening = ctrlc::set_handler(move || {

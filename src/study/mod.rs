@@ -1,4 +1,22 @@
-//! Error metrics and comparisons.
+//! Comparisons of samplers as experiments.
+//!
+//! A study file and the command line ([`file`], [`plan`], [`contender`]) → runs against a reference in
+//! two halves ([`engine`], [`job`], [`reference`], [`overhead`]), each kept as a [`record`] in the
+//! report [`folder`] → figures over the seeds ([`summary`], [`statistics`]) → `results.json`,
+//! `results.csv` ([`results`]). Errors are defined in [`metrics`].
 
+pub mod contender;
+pub mod engine;
 pub mod falsecolour;
+pub mod file;
+pub mod folder;
+pub mod job;
 pub mod metrics;
+pub mod overhead;
+pub mod plan;
+pub mod record;
+pub mod reference;
+pub mod results;
+pub mod statistics;
+pub mod summary;
+pub mod watch;

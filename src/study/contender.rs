@@ -1,0 +1,105 @@
+//! What a study compares: a sampler with its parameters.
+
+use std::collections::BTreeMap;
+
+use crate::{
+    error::{Error, Result},
+    sampler::{Parameters, Sampler},
+};
+
+/// A sampler with parameters, written `ris` or `ris:candidates=8` (more parameters after further
+/// colons).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Contender {
+    /// The text it was read from: its name in tables and files.
+    pub label: String,
+    /// How directions are chosen.
+    pub sampler: Sampler,
+    /// Its parameters.
+    pub parameters: Parameters,
+}
+
+impl Contender {
+    /// Reads `name` or `name:key=value:…`; the parameters start from `defaults`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] that lists the samplers or the parameters there are.
+    pub fn parse(text: &str, defaults: Parameters) -> Result<Self> {
+        let label = text.trim();
+        let mut parts = label.split(':');
+        let name = parts.next().unwrap_or_default();
+        let sampler =
+            Sampler::ALL.into_iter().find(|sampler| sampler.name() == name).ok_or_else(|| {
+                let known = Sampler::ALL.map(Sampler::name).join(", ");
+                Error::usage(format!("there is no sampler {name:?}; known: {known}"))
+            })?;
+        let mut parameters = defaults;
+        for assignment in parts {
+            parameters.set(assignment)?;
+        }
+        Ok(Self { label: label.to_owned(), sampler, parameters })
+    }
+
+    /// Reads a list; every label may occur once.
+    ///
+    /// # Errors
+    /// As [`Contender::parse`], and for labels that occur twice or would share their files' names.
+    pub fn parse_all<'a>(
+        texts: impl IntoIterator<Item = &'a str>,
+        defaults: Parameters,
+    ) -> Result<Vec<Self>> {
+        let mut contenders: Vec<Self> = Vec::new();
+        for text in texts {
+            let contender = Self::parse(text, defaults)?;
+            if contenders.iter().any(|other| other.file_stem() == contender.file_stem()) {
+                return Err(Error::usage(format!("sampler {:?} is listed twice", contender.label)));
+            }
+            contenders.push(contender);
+        }
+        Ok(contenders)
+    }
+
+    /// Name in file names: what is neither letter, digit nor underscore becomes a hyphen.
+    pub fn file_stem(&self) -> String {
+        let keep = |character: char| character.is_ascii_alphanumeric() || character == '_';
+        self.label.chars().map(|c| if keep(c) { c } else { '-' }).collect()
+    }
+
+    /// The parameters that matter to the sampler, by name.
+    pub fn describe_parameters(&self) -> BTreeMap<String, String> {
+        self.parameters.describe(self.sampler)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+    use super::*;
+
+    #[test]
+    fn parameters_follow_colons() {
+        let contender = Contender::parse("ris:candidates=8", Parameters::default()).unwrap();
+        assert_eq!((contender.sampler, contender.parameters.candidates), (Sampler::Ris, 8));
+        assert_eq!(contender.file_stem(), "ris-candidates-8");
+        let plain = Contender::parse("ris", contender.parameters).unwrap();
+        assert_eq!(plain.parameters.candidates, 8, "defaults are kept");
+    }
+
+    #[test]
+    fn what_does_not_exist_is_listed() {
+        let message = |text| Contender::parse(text, Parameters::default()).unwrap_err().to_string();
+        let unknown = message("best");
+        assert!(unknown.contains("\"best\"") && unknown.contains("known: uniform"), "{unknown}");
+        let parameter = message("ris:colour=1");
+        assert!(parameter.contains("colour") && parameter.contains("candidates"), "{parameter}");
+    }
+
+    #[test]
+    fn labels_are_unique() {
+        let parse =
+            |texts: &[&str]| Contender::parse_all(texts.iter().copied(), Parameters::default());
+        assert_eq!(parse(&["ris", "ris:candidates=8"]).unwrap().len(), 2);
+        assert!(parse(&["mis", "env", "mis"]).unwrap_err().to_string().contains("listed twice"));
+    }
+}

@@ -1,0 +1,393 @@
+//! Runs a plan: scenes one after the other, in each the reference, the runs interleaved over seeds
+//! and samplers, and the overhead rounds. Every finished run is written at once, and runs that an
+//! earlier study of the same folder finished are taken up.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use super::{
+    contender::Contender,
+    folder::Folder,
+    job::{Job, exposure, image_of},
+    overhead,
+    plan::{Plan, ReferencePlan},
+    record::{Conditions, Round, Rule, Run, SceneRecord, run_stem},
+    reference::{self, Reference},
+    watch::{Observer, Watch},
+};
+use crate::{
+    error::{Error, Result},
+    film::{Metadata, png::write_preview},
+    gpu::Device,
+    renderer::{Renderer, SceneBuffers, Settings, window_of},
+    scene::Scene,
+};
+
+/// Everything a study has measured.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Results {
+    /// Scenes in the plan's order.
+    pub scenes: Vec<SceneRecord>,
+    /// Finished runs.
+    pub runs: Vec<Run>,
+    /// Finished overhead rounds.
+    pub rounds: Vec<Round>,
+}
+
+/// Carries out `plan` in `folder`.
+///
+/// `redo` removes finished runs that were made under other conditions; without it they are an error.
+/// The second value is what ended the study early; what was finished until then is in the results.
+///
+/// # Errors
+/// Whatever keeps the study from starting: a scene or reference that cannot be used, runs made under
+/// other conditions.
+pub fn run(
+    plan: &Plan,
+    folder: &Folder,
+    device: &Arc<Device>,
+    observer: &mut dyn Observer,
+    redo: bool,
+) -> Result<(Results, Option<Error>)> {
+    let mut study = Study { plan, folder, device, watch: Watch::new(observer) };
+    let scenes = study.load_scenes()?;
+    study.check_finished_runs(&scenes, redo)?;
+    let mut results = Results::default();
+    for scene in &scenes {
+        study.expect(scene);
+    }
+    for scene in &scenes {
+        if let Err(error) = study.run_scene(scene, &mut results) {
+            return Ok((results, Some(error)));
+        }
+    }
+    Ok((results, None))
+}
+
+/// A study under way.
+struct Study<'a> {
+    plan: &'a Plan,
+    folder: &'a Folder,
+    device: &'a Arc<Device>,
+    watch: Watch<'a>,
+}
+
+impl Study<'_> {
+    fn load_scenes(&mut self) -> Result<Vec<Scene>> {
+        let mut scenes: Vec<Scene> = Vec::new();
+        for path in &self.plan.scenes {
+            let mut scene = Scene::load(path)?;
+            for warning in &scene.warnings {
+                log::warn!("{warning}");
+            }
+            if let Some([width, height]) = self.plan.size {
+                (scene.film.width, scene.film.height) = (width, height);
+            }
+            if let Some(other) = scenes.iter().find(|other| other.name == scene.name) {
+                return Err(Error::usage(format!(
+                    "{} and {} are both named {:?}: scenes of one study need names of their own",
+                    other.path.display(),
+                    path.display(),
+                    scene.name
+                )));
+            }
+            self.watch.check()?;
+            scenes.push(scene);
+        }
+        Ok(scenes)
+    }
+
+    /// Conditions of the runs of one contender; `None` for overhead rounds, which have no reference
+    /// and several contenders.
+    fn conditions(&self, scene: &Scene, contender: Option<&Contender>) -> Result<Conditions> {
+        let capabilities = self.device.capabilities();
+        let (reference, parameters) = match (contender, &self.plan.overhead) {
+            (Some(contender), _) => (
+                reference::identity(&self.plan.reference, &scene.name)?,
+                contender.describe_parameters(),
+            ),
+            (None, Some(overhead)) => ("none".to_owned(), overhead::describe_parameters(overhead)),
+            (None, None) => ("none".to_owned(), BTreeMap::new()),
+        };
+        Ok(Conditions {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            scene_hash: scene.hash.clone(),
+            film: [scene.film.width, scene.film.height],
+            device: capabilities.name.clone(),
+            driver: capabilities.driver.clone(),
+            shadow_rays: self.plan.shadow_rays,
+            depth: self.plan.depth,
+            reference,
+            parameters,
+        })
+    }
+
+    /// The record of a run that is finished with everything this plan asks of it.
+    fn finished_run(
+        &self,
+        scene: &Scene,
+        (rule, seed, contender): (Rule, u32, &Contender),
+    ) -> Result<Option<Run>> {
+        let path = self.folder.record(&scene.name, &run_stem(contender, rule, seed));
+        Ok(self.folder.read_json::<Run>(&path)?.filter(|run| {
+            let has_image = |level: &Rule| {
+                run.at(*level).is_some_and(|measurement| measurement.image.is_some())
+            };
+            matches!(rule, Rule::Seconds(_))
+                || self.plan.spp.iter().map(|spp| Rule::Spp(*spp)).all(|level| has_image(&level))
+        }))
+    }
+
+    /// The record of a finished overhead round.
+    fn finished_round(&self, scene: &Scene, repetition: u32) -> Result<Option<Round>> {
+        let path = self.folder.record(&scene.name, &format!("overhead-{repetition}"));
+        let round = self.folder.read_json::<Round>(&path)?;
+        Ok(round.filter(|round| Some(round.spp) == self.plan.overhead.as_ref().map(|o| o.spp)))
+    }
+
+    /// Refuses finished runs that were made under other conditions, or removes them.
+    fn check_finished_runs(&self, scenes: &[Scene], redo: bool) -> Result<()> {
+        let mut stale = Vec::new();
+        for scene in scenes {
+            for task in tasks(self.plan) {
+                if let Some(run) = self.finished_run(scene, task)? {
+                    let asked = self.conditions(scene, Some(task.2))?;
+                    stale.extend(run.conditions.differences(&asked).into_iter().next());
+                }
+            }
+            let rounds = self.plan.overhead.as_ref().map_or(0, |overhead| overhead.repetitions);
+            for repetition in 1..=rounds {
+                if let Some(round) = self.finished_round(scene, repetition)? {
+                    let asked = self.conditions(scene, None)?;
+                    stale.extend(round.conditions.differences(&asked).into_iter().next());
+                }
+            }
+        }
+        let Some(first) = stale.first() else { return Ok(()) };
+        if redo {
+            return self.folder.clear();
+        }
+        Err(Error::format(
+            self.folder.path(),
+            format!(
+                "the folder holds {} finished runs made under other conditions ({first}); choose \
+                 another folder with -o, or give --redo to remove them and start again",
+                stale.len()
+            ),
+        ))
+    }
+
+    /// Tells the forecast about a scene's work.
+    fn expect(&mut self, scene: &Scene) {
+        let pixels = pixels(scene);
+        if let (true, ReferencePlan::Render { half_spp, .. }) =
+            (self.plan.compares(), &self.plan.reference)
+        {
+            self.watch.expect(2.0 * pixels * f64::from(*half_spp), 0.0);
+        }
+        for (rule, ..) in tasks(self.plan) {
+            expect_run(&mut self.watch, rule, pixels, 1.0);
+        }
+        if let Some(overhead) = &self.plan.overhead {
+            let runs = (overhead.repetitions + 1) * (overhead.contenders.len() as u32 + 1);
+            self.watch.expect(pixels * f64::from(runs) * f64::from(overhead.spp), 0.0);
+        }
+    }
+
+    fn run_scene(&mut self, scene: &Scene, results: &mut Results) -> Result<()> {
+        let mut buffers = SharedBuffers { device: self.device, scene, made: None };
+        results.scenes.push(SceneRecord {
+            name: scene.name.clone(),
+            path: scene.path.display().to_string(),
+            hash: scene.hash.clone(),
+            width: scene.film.width,
+            height: scene.film.height,
+            triangles: scene.geometry.triangles.len() as u64,
+            reference: None,
+        });
+        if self.plan.compares() {
+            let reference = self.reference(scene, &mut buffers)?;
+            if let Some(record) = results.scenes.last_mut() {
+                record.reference = Some(reference.own.clone());
+            }
+            self.compare(scene, &mut buffers, &reference, results)?;
+        }
+        if let Some(overhead) = &self.plan.overhead {
+            let finished: Vec<Option<Round>> = (1..=overhead.repetitions)
+                .map(|repetition| self.finished_round(scene, repetition))
+                .collect::<Result<_>>()?;
+            let conditions = self.conditions(scene, None)?;
+            let job = overhead::Job { plan: overhead, scene, conditions, folder: self.folder };
+            let all = std::iter::once(&overhead.baseline).chain(&overhead.contenders);
+            let settings: Vec<Settings> = all.map(|contender| self.settings(contender)).collect();
+            let make = &mut |index: usize| buffers.renderer(settings[index].clone());
+            job.execute(finished, make, &mut self.watch, &mut results.rounds)?;
+        }
+        self.device.save_pipeline_cache();
+        Ok(())
+    }
+
+    fn settings(&self, contender: &Contender) -> Settings {
+        Settings {
+            sampler: contender.sampler,
+            parameters: contender.parameters,
+            shadow_rays: self.plan.shadow_rays,
+            depth: self.plan.depth,
+            ..Settings::default()
+        }
+    }
+
+    /// What the files of a contender's renders say, without samples and times.
+    fn metadata(&self, scene: &Scene, contender: &Contender) -> Metadata {
+        let capabilities = self.device.capabilities();
+        Metadata {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            scene: scene.name.clone(),
+            scene_hash: scene.hash.clone(),
+            sampler: contender.sampler.name().to_owned(),
+            sampler_parameters: contender.describe_parameters(),
+            shadow_rays: self.plan.shadow_rays,
+            depth: self.plan.depth,
+            device: capabilities.name.clone(),
+            driver: capabilities.driver.clone(),
+            ..Metadata::default()
+        }
+    }
+
+    fn reference(&mut self, scene: &Scene, buffers: &mut SharedBuffers<'_>) -> Result<Reference> {
+        let reference = match &self.plan.reference {
+            ReferencePlan::Render { contender, half_spp } => {
+                let settings = self.settings(contender);
+                let metadata = self.metadata(scene, contender);
+                let make = &mut || buffers.renderer(settings.clone());
+                let what = (contender, *half_spp);
+                Reference::render(self.folder, scene, what, &metadata, make, &mut self.watch)?
+            }
+            plan => {
+                let reference = Reference::read(plan, scene)?;
+                self.keep_halves(scene, &reference)?;
+                reference
+            }
+        };
+        let path = self.folder.image(&scene.name, "reference");
+        let mean = reference.mean();
+        write_preview(&path.with_extension("png"), &mean, exposure(&mean))?;
+        Ok(reference)
+    }
+
+    /// Copies halves that were read into the folder, so that it holds all that the page needs.
+    fn keep_halves(&self, scene: &Scene, reference: &Reference) -> Result<()> {
+        for (stem, half) in
+            reference::half_stems().into_iter().zip([&reference.first, &reference.second])
+        {
+            image_of(half).write_exr(&self.folder.image(&scene.name, stem))?;
+        }
+        Ok(())
+    }
+
+    /// Every run against the reference.
+    fn compare(
+        &mut self,
+        scene: &Scene,
+        buffers: &mut SharedBuffers<'_>,
+        reference: &Reference,
+        results: &mut Results,
+    ) -> Result<()> {
+        let exposure = exposure(&reference.mean());
+        let mut renderers: BTreeMap<String, Renderer> = BTreeMap::new();
+        for task in tasks(self.plan) {
+            let (rule, seed, contender) = task;
+            if let Some(run) = self.finished_run(scene, task)? {
+                expect_run(&mut self.watch, rule, pixels(scene), -1.0);
+                results.runs.push(run);
+                continue;
+            }
+            self.watch.check()?;
+            if !renderers.contains_key(&contender.label) {
+                let renderer = buffers.renderer(self.settings(contender))?;
+                renderers.insert(contender.label.clone(), renderer);
+            }
+            let Some(renderer) = renderers.get_mut(&contender.label) else { continue };
+            let job = Job {
+                scene,
+                reference,
+                exposure,
+                contender,
+                rule,
+                seed,
+                levels: &self.plan.spp,
+                conditions: self.conditions(scene, Some(contender))?,
+                metadata: self.metadata(scene, contender),
+                folder: self.folder,
+            };
+            let run = job.execute(renderer, &mut self.watch)?;
+            let stem = run_stem(contender, rule, seed);
+            self.folder.write_json(&self.folder.record(&scene.name, &stem), &run)?;
+            if let Some(last) = run.last() {
+                self.watch.note(&format!(
+                    "{}: {}, {}, seed {seed}: {} spp in {:.2} s, RMSE {:.4e}",
+                    scene.name,
+                    contender.label,
+                    rule.describe(),
+                    last.spp,
+                    last.seconds,
+                    last.rmse
+                ));
+            }
+            results.runs.push(run);
+        }
+        Ok(())
+    }
+}
+
+/// Every run of a scene in the order of the work, by rule (the largest number of samples, and the
+/// time), seed and sampler; the order of the samplers turns by one from seed to seed, so that none is
+/// always the first.
+fn tasks(plan: &Plan) -> Vec<(Rule, u32, &Contender)> {
+    let samples = plan.spp.last().copied().map(Rule::Spp);
+    let contenders = &plan.contenders;
+    let mut tasks = Vec::new();
+    for rule in samples.into_iter().chain(plan.time.map(Rule::time)) {
+        for seed in 1..=plan.seeds {
+            for index in 0..contenders.len() {
+                let turned = (index + seed as usize - 1) % contenders.len();
+                tasks.push((rule, seed, &contenders[turned]));
+            }
+        }
+    }
+    tasks
+}
+
+/// Pixels of a scene's film.
+fn pixels(scene: &Scene) -> f64 {
+    f64::from(scene.film.width) * f64::from(scene.film.height)
+}
+
+/// Tells the forecast about `count` runs ended by `rule`.
+fn expect_run(watch: &mut Watch<'_>, rule: Rule, pixels: f64, count: f64) {
+    match rule {
+        Rule::Spp(spp) => watch.expect(count * pixels * f64::from(spp), 0.0),
+        Rule::Seconds(seconds) => watch.expect(0.0, count * seconds),
+    }
+}
+
+/// The device buffers of a scene, made when the first renderer needs them.
+struct SharedBuffers<'a> {
+    device: &'a Arc<Device>,
+    scene: &'a Scene,
+    made: Option<Arc<SceneBuffers>>,
+}
+
+impl SharedBuffers<'_> {
+    fn renderer(&mut self, settings: Settings) -> Result<Renderer> {
+        let buffers = match &self.made {
+            Some(buffers) => Arc::clone(buffers),
+            None => {
+                let window = window_of(&settings, self.scene);
+                let buffers = Arc::new(SceneBuffers::new(self.device, self.scene, window)?);
+                self.made = Some(Arc::clone(&buffers));
+                buffers
+            }
+        };
+        Renderer::with_scene_buffers(self.device, buffers, self.scene, settings)
+    }
+}

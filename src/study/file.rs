@@ -1,0 +1,321 @@
+//! Study files: TOML text → scenes, description and options.
+//!
+//! ```toml
+//! study = "Title of the report"
+//! notes = ["A paragraph under the title."]
+//! scenes = ["../meeting_room.toml"]      # relative to this file
+//!
+//! [settings]                             # names as on the command line
+//! samplers = ["mis", "ris:candidates=8"]
+//! spp = [200, 400]
+//! time = "30s"
+//!
+//! [quick]                                # what --quick puts in place of settings
+//! spp = [16]
+//!
+//! [[published.errors]]                   # a publication's figures
+//! scene = "meeting_room"
+//! source = "Table 6.3"
+//! spp = 200
+//! values = { product = 0.127465, visibility = 0.091346 }
+//! ```
+
+use std::{
+    collections::BTreeMap,
+    ops::Range,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use serde::Deserialize;
+use toml::{Spanned, de::DeTable};
+
+use super::{
+    contender::Contender,
+    plan::{Description, Options, PublishedErrors, PublishedOverhead},
+};
+use crate::{
+    error::{Error, Result},
+    sampler::Parameters,
+};
+
+/// A study file as it stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StudyFile {
+    /// Scene files, resolved against the study file's folder.
+    pub scenes: Vec<PathBuf>,
+    /// Title, notes, published figures.
+    pub description: Description,
+    /// `[settings]`.
+    pub settings: Options,
+    /// `[quick]`.
+    pub quick: Options,
+}
+
+/// How the values of options are read, which the command line does as well.
+#[derive(Clone, Copy)]
+pub struct ValueParsers {
+    /// `30s`.
+    pub duration: fn(&str) -> Result<Duration, String>,
+    /// `160x120`.
+    pub size: fn(&str) -> Result<[u32; 2], String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Root {
+    study: String,
+    #[serde(default)]
+    notes: Vec<String>,
+    scenes: Spanned<Vec<PathBuf>>,
+    #[serde(default)]
+    settings: Entries,
+    #[serde(default)]
+    quick: Entries,
+    #[serde(default)]
+    published: Published,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entries {
+    samplers: Option<Spanned<Vec<String>>>,
+    spp: Option<Vec<u32>>,
+    time: Option<Spanned<String>>,
+    seeds: Option<u32>,
+    size: Option<Spanned<String>>,
+    shadow_rays: Option<u32>,
+    depth: Option<u32>,
+    reference_sampler: Option<Spanned<String>>,
+    reference_spp: Option<u32>,
+    overhead: Option<bool>,
+    overhead_baseline: Option<Spanned<String>>,
+    overhead_spp: Option<u32>,
+    overhead_repetitions: Option<u32>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Published {
+    #[serde(default)]
+    errors: Vec<ErrorsEntry>,
+    #[serde(default)]
+    overheads: Vec<OverheadEntry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ErrorsEntry {
+    scene: String,
+    source: String,
+    spp: u32,
+    values: BTreeMap<String, f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OverheadEntry {
+    label: String,
+    low: f64,
+    high: f64,
+}
+
+/// A message with the byte range of the text it is about.
+struct Failure {
+    span: Range<usize>,
+    message: String,
+}
+
+impl From<toml::de::Error> for Failure {
+    fn from(error: toml::de::Error) -> Self {
+        Self { span: error.span().unwrap_or(0..0), message: error.message().to_owned() }
+    }
+}
+
+impl Failure {
+    fn locate(self, path: &Path, text: &str) -> Error {
+        let before = text.get(..self.span.start).unwrap_or(text);
+        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+        Error::Parse {
+            path: path.to_path_buf(),
+            line: before.matches('\n').count() + 1,
+            column: before[line_start..].chars().count() + 1,
+            message: self.message,
+        }
+    }
+}
+
+/// Whether `path` is a study file: TOML with the key `study`. A scene has a `[camera]` instead.
+///
+/// # Errors
+/// The file cannot be read, is no TOML, or has neither key.
+pub fn is_study(path: &Path) -> Result<bool> {
+    if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("toml")) {
+        return Ok(false);
+    }
+    let text = read_text(path)?;
+    let table = DeTable::parse(&text).map_err(|error| Failure::from(error).locate(path, &text))?;
+    let has = |key: &str| table.get_ref().contains_key(key);
+    match (has("study"), has("camera")) {
+        (true, _) => Ok(true),
+        (false, true) => Ok(false),
+        (false, false) => Err(Error::format(
+            path,
+            "expected a scene (with a table [camera]) or a study (with a line study = \"title\"), \
+             found neither",
+        )),
+    }
+}
+
+fn read_text(path: &Path) -> Result<String> {
+    let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read", source))?;
+    String::from_utf8(bytes).map_err(|error| {
+        let offset = error.utf8_error().valid_up_to();
+        Error::format(path, format!("not a text file: byte {offset} is not UTF-8"))
+    })
+}
+
+impl StudyFile {
+    /// Reads a study file; sampler parameters start from `defaults`.
+    ///
+    /// # Errors
+    /// The file cannot be read, or [`Error::Parse`] with line and column: text that is no TOML, an
+    /// unknown key, an unknown sampler, a value out of range.
+    pub fn load(path: &Path, defaults: Parameters, parsers: ValueParsers) -> Result<Self> {
+        let text = read_text(path)?;
+        Self::parse(&text, path.parent().unwrap_or(Path::new("")), defaults, parsers)
+            .map_err(|failure| failure.locate(path, &text))
+    }
+
+    fn parse(
+        text: &str,
+        folder: &Path,
+        defaults: Parameters,
+        parsers: ValueParsers,
+    ) -> Result<Self, Failure> {
+        let root: Root = toml::from_str(text)?;
+        let published = root.published;
+        Ok(Self {
+            scenes: root.scenes.into_inner().iter().map(|scene| folder.join(scene)).collect(),
+            description: Description {
+                title: Some(root.study),
+                notes: root.notes,
+                published_errors: published
+                    .errors
+                    .into_iter()
+                    .map(|entry| PublishedErrors {
+                        scene: entry.scene,
+                        source: entry.source,
+                        spp: entry.spp,
+                        values: entry.values,
+                    })
+                    .collect(),
+                published_overheads: published
+                    .overheads
+                    .into_iter()
+                    .map(|entry| PublishedOverhead {
+                        label: entry.label,
+                        low: entry.low,
+                        high: entry.high,
+                    })
+                    .collect(),
+            },
+            settings: root.settings.into_options(defaults, parsers)?,
+            quick: root.quick.into_options(defaults, parsers)?,
+        })
+    }
+}
+
+/// Reads a value where there is one; a failure has the place of the value.
+fn read<T, V>(
+    entry: Option<Spanned<V>>,
+    parse: impl FnOnce(&V) -> Result<T, String>,
+) -> Result<Option<T>, Failure> {
+    entry
+        .map(|entry| {
+            let span = entry.span();
+            parse(entry.get_ref()).map_err(|message| Failure { span, message })
+        })
+        .transpose()
+}
+
+impl Entries {
+    fn into_options(self, defaults: Parameters, parsers: ValueParsers) -> Result<Options, Failure> {
+        let contender =
+            |text: &String| Contender::parse(text, defaults).map_err(|error| error.to_string());
+        Ok(Options {
+            samplers: read(self.samplers, |texts| {
+                Contender::parse_all(texts.iter().map(String::as_str), defaults)
+                    .map_err(|error| error.to_string())
+            })?,
+            spp: self.spp,
+            time: read(self.time, |text| (parsers.duration)(text))?,
+            seeds: self.seeds,
+            size: read(self.size, |text| (parsers.size)(text))?,
+            shadow_rays: self.shadow_rays,
+            depth: self.depth,
+            reference_sampler: read(self.reference_sampler, contender)?,
+            reference_spp: self.reference_spp,
+            overhead: self.overhead,
+            overhead_baseline: read(self.overhead_baseline, contender)?,
+            overhead_spp: self.overhead_spp,
+            overhead_repetitions: self.overhead_repetitions,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+    use super::*;
+    use crate::sampler::Sampler;
+
+    fn parse(text: &str) -> Result<StudyFile> {
+        let parsers = ValueParsers {
+            duration: |text| {
+                if text == "30s" { Ok(Duration::from_secs(30)) } else { Err("time?".into()) }
+            },
+            size: |_| Ok([160, 120]),
+        };
+        StudyFile::parse(text, Path::new("studies"), Parameters::default(), parsers)
+            .map_err(|failure| failure.locate(Path::new("study.toml"), text))
+    }
+
+    #[test]
+    fn every_key_is_read() {
+        let study = parse(
+            "study = \"Title\"\nnotes = [\"Why.\"]\nscenes = [\"../a.toml\"]\n\
+             [settings]\nsamplers = [\"mis\", \"ris:candidates=8\"]\nspp = [2, 4]\ntime = \"30s\"\n\
+             seeds = 4\nsize = \"160x120\"\nshadow_rays = 3\ndepth = 2\n\
+             reference_sampler = \"ris\"\nreference_spp = 99\noverhead = true\n\
+             overhead_baseline = \"mis\"\noverhead_spp = 7\noverhead_repetitions = 8\n\
+             [quick]\nspp = [1]\n\
+             [[published.errors]]\nscene = \"a\"\nsource = \"Table 1\"\nspp = 2\n\
+             values = { mis = 0.5 }\n\
+             [[published.overheads]]\nlabel = \"open\"\nlow = 1.0\nhigh = 1.02\n",
+        )
+        .unwrap();
+        assert_eq!(study.scenes, [PathBuf::from("studies/../a.toml")]);
+        let settings = &study.settings;
+        assert_eq!(settings.samplers.as_ref().unwrap()[1].parameters.candidates, 8);
+        assert_eq!(settings.time, Some(Duration::from_secs(30)));
+        assert_eq!(settings.reference_sampler.as_ref().unwrap().sampler, Sampler::Ris);
+        assert_eq!((settings.overhead_spp, settings.overhead_repetitions), (Some(7), Some(8)));
+        assert_eq!(study.quick, Options { spp: Some(vec![1]), ..Options::default() });
+        assert_eq!(study.description.published_errors[0].values["mis"], 0.5);
+        assert_eq!(study.description.published_overheads[0].high, 1.02);
+    }
+
+    #[test]
+    fn mistakes_have_line_and_column() {
+        let start = "study = \"T\"\nscenes = []\n[settings]\n";
+        let message = |line: &str| parse(&format!("{start}{line}")).unwrap_err().to_string();
+        let sampler = message("samplers = [\"mis\", \"best\"]");
+        assert!(sampler.starts_with("study.toml:4:12: there is no sampler \"best\"; known: "));
+        let key = message("sampels = 4");
+        assert!(key.starts_with("study.toml:4:1: ") && key.contains("sampels"), "{key}");
+        assert!(message("time = \"soon\"").starts_with("study.toml:4:8: time?"));
+        assert!(message("spp = -1").starts_with("study.toml:4:7: "));
+    }
+}

@@ -1,0 +1,198 @@
+//! The report folder: what lies where, and how a study finds its finished runs again.
+//!
+//! ```text
+//! study.json                       marks the folder
+//! results.json, results.csv        every run
+//! index.html                       the page
+//! runs/SCENE/SAMPLER-RULE-seedN.json
+//! runs/SCENE/overhead-N.json
+//! images/SCENE/reference_1.exr, reference_2.exr, reference.png
+//! images/SCENE/SAMPLER-RULE-seedN.exr, .png
+//! ```
+
+use std::{
+    fs,
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+use serde::{Serialize, de::DeserializeOwned};
+
+use crate::{
+    error::{Error, Result},
+    film::{check_writable, write_atomically},
+};
+
+/// The file that marks a report folder.
+const MARK: &str = "study.json";
+/// What it says.
+const FORMAT: &str = "fenestra study 1";
+
+/// A report folder.
+#[derive(Clone, Debug)]
+pub struct Folder {
+    path: PathBuf,
+}
+
+#[derive(Serialize, serde::Deserialize)]
+struct Mark {
+    format: String,
+}
+
+impl Folder {
+    /// Opens a report folder, or makes one out of a folder that is absent or empty.
+    ///
+    /// # Errors
+    /// [`Error::Format`] where `path` holds something else; [`Error::Io`] where it cannot be written.
+    pub fn open(path: &Path) -> Result<Self> {
+        let folder = Self { path: path.to_path_buf() };
+        let mark = path.join(MARK);
+        if path.exists() && !path.is_dir() {
+            return Err(Error::format(path, "expected a folder for the report, found a file"));
+        }
+        if mark.exists() {
+            let found: Option<Mark> = folder.read_json(&mark)?;
+            let format = found.map(|mark| mark.format).unwrap_or_default();
+            if format != FORMAT {
+                return Err(Error::format(
+                    &mark,
+                    format!(
+                        "expected format {FORMAT:?}, found {format:?}: a study of another version; \
+                         choose another folder with -o"
+                    ),
+                ));
+            }
+            check_writable(&path.join("results.json"))?;
+            return Ok(folder);
+        }
+        if path.is_dir() {
+            let mut entries =
+                fs::read_dir(path).map_err(|source| Error::io(path, "read", source))?;
+            if let Some(Ok(entry)) = entries.next() {
+                return Err(Error::format(
+                    path,
+                    format!(
+                        "the folder holds something else than a study ({}); choose an empty or new \
+                         one with -o",
+                        entry.file_name().display()
+                    ),
+                ));
+            }
+        }
+        folder.write_json(&mark, &Mark { format: FORMAT.to_owned() })?;
+        Ok(folder)
+    }
+
+    /// The folder of another study, to read only.
+    ///
+    /// # Errors
+    /// [`Error::Format`] where it is none.
+    pub fn existing(path: &Path) -> Result<Self> {
+        if path.join(MARK).exists() {
+            Ok(Self { path: path.to_path_buf() })
+        } else {
+            Err(Error::format(path, format!("expected the report folder of a study: no {MARK}")))
+        }
+    }
+
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Removes the records and images of all runs and references.
+    ///
+    /// # Errors
+    /// [`Error::Io`] with the cause.
+    pub fn clear(&self) -> Result<()> {
+        for name in ["runs", "images"] {
+            let path = self.path.join(name);
+            if path.exists() {
+                fs::remove_dir_all(&path).map_err(|source| Error::io(&path, "remove", source))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Record of a run or round.
+    pub fn record(&self, scene: &str, stem: &str) -> PathBuf {
+        self.path.join("runs").join(scene).join(format!("{stem}.json"))
+    }
+
+    /// Picture of a run or reference, as the path inside this folder.
+    pub fn image_name(scene: &str, stem: &str) -> String {
+        format!("images/{scene}/{stem}.exr")
+    }
+
+    /// Picture of a run or reference.
+    pub fn image(&self, scene: &str, stem: &str) -> PathBuf {
+        self.path.join(Self::image_name(scene, stem))
+    }
+
+    /// Reads a record; `None` where there is no such file.
+    ///
+    /// # Errors
+    /// [`Error::Io`], or [`Error::Format`] where the file does not hold what it should.
+    pub fn read_json<T: DeserializeOwned>(&self, path: &Path) -> Result<Option<T>> {
+        let text = match fs::read_to_string(path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            result => result.map_err(|source| Error::io(path, "read", source))?,
+        };
+        serde_json::from_str(&text).map(Some).map_err(|error| {
+            Error::format(
+                path,
+                format!("damaged record ({error}); delete the file to redo the run"),
+            )
+        })
+    }
+
+    /// Writes a record, atomically.
+    ///
+    /// # Errors
+    /// [`Error::Io`] with the cause.
+    pub fn write_json(&self, path: &Path, record: &impl Serialize) -> Result<()> {
+        write_atomically(path, |file| {
+            serde_json::to_writer_pretty(&mut *file, record)?;
+            file.write_all(b"\n")
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+    use super::*;
+
+    #[test]
+    fn a_folder_of_something_else_is_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("thesis.txt"), "precious").unwrap();
+        let error = Folder::open(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("something else") && error.contains("thesis.txt"), "{error}");
+        let file = folder.path().join("thesis.txt");
+        assert!(Folder::open(&file).unwrap_err().to_string().contains("found a file"));
+    }
+
+    #[test]
+    fn records_come_back() {
+        let parent = tempfile::tempdir().unwrap();
+        let folder = Folder::open(&parent.path().join("report")).unwrap();
+        let path = folder.record("room", "mis-4spp-seed1");
+        assert_eq!(folder.read_json::<Vec<u32>>(&path).unwrap(), None);
+        folder.write_json(&path, &[1, 2, 3]).unwrap();
+        let again = Folder::open(folder.path()).unwrap();
+        assert_eq!(again.read_json(&path).unwrap(), Some(vec![1, 2, 3]));
+        fs::write(&path, "[1, 2").unwrap();
+        assert!(again.read_json::<Vec<u32>>(&path).unwrap_err().to_string().contains("damaged"));
+        again.clear().unwrap();
+        assert!(!path.exists());
+    }
+
+    #[test]
+    fn another_version_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join(MARK), r#"{"format": "fenestra study 99"}"#).unwrap();
+        assert!(Folder::open(folder.path()).unwrap_err().to_string().contains("another version"));
+    }
+}

@@ -1,0 +1,158 @@
+//! One run: a sampler with one seed, rendered to its end and compared with the reference on the way.
+
+use super::{
+    contender::Contender,
+    folder::Folder,
+    record::{Conditions, Figures, Measurement, Rule, Run, run_stem},
+    reference::Reference,
+    watch::{Pace, Watch},
+};
+use crate::{
+    error::Result,
+    film::{Image, Metadata, RgbImage, SampleRange, png::write_preview},
+    renderer::Renderer,
+    scene::Scene,
+};
+
+/// The seed whose pictures are also written as PNG.
+pub const SHOWN_SEED: u32 = 1;
+
+/// A run to do.
+pub(super) struct Job<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) reference: &'a Reference,
+    /// Of previews, stops.
+    pub(super) exposure: f32,
+    pub(super) contender: &'a Contender,
+    pub(super) rule: Rule,
+    pub(super) seed: u32,
+    /// Samples at which pictures are kept, where the run ends by samples; ascending.
+    pub(super) levels: &'a [u32],
+    pub(super) conditions: Conditions,
+    /// What the pictures' files say, without samples and times.
+    pub(super) metadata: Metadata,
+    pub(super) folder: &'a Folder,
+}
+
+impl Job<'_> {
+    /// Renders and measures. The film is compared at powers of two of samples and at the levels;
+    /// reading and comparing it does not count as time of the passes.
+    pub(super) fn execute(self, renderer: &mut Renderer, watch: &mut Watch<'_>) -> Result<Run> {
+        renderer.restart(self.seed)?;
+        let pixels = f64::from(self.scene.film.width) * f64::from(self.scene.film.height);
+        let limit = match self.rule {
+            Rule::Spp(_) => None,
+            Rule::Seconds(seconds) => Some(seconds),
+        };
+        let mut pace = Pace::new(pixels, limit.is_some());
+        let mut measurements: Vec<Measurement> = Vec::new();
+        loop {
+            let target = self.next_stop(renderer.sample_count());
+            pace.advance(renderer, target, limit, watch)?;
+            let (mut measurement, picture) =
+                Measurement::of(renderer, pace.seconds, self.reference)?;
+            let spp = measurement.spp;
+            let is_level = match self.rule {
+                Rule::Spp(_) => self.levels.contains(&spp),
+                Rule::Seconds(_) => pace.is_over(limit, renderer),
+            };
+            if is_level {
+                let level = if limit.is_some() { self.rule } else { Rule::Spp(spp) };
+                measurement.image = Some(self.keep(&picture, &measurement, renderer, level)?);
+            }
+            measurements.push(measurement);
+            let done = match self.rule {
+                Rule::Spp(end) => spp >= end,
+                Rule::Seconds(_) => is_level,
+            };
+            if done {
+                break;
+            }
+        }
+        let figures = Figures::of(renderer);
+        Ok(Run {
+            scene: self.scene.name.clone(),
+            sampler: self.contender.label.clone(),
+            rule: self.rule,
+            seed: self.seed,
+            conditions: self.conditions,
+            measurements,
+            gpu_ms_per_sample: figures.gpu_ms_per_sample,
+            rays: figures.rays,
+            visible_share: figures.visible_share,
+            statistics: figures.statistics,
+        })
+    }
+
+    /// Samples at which the film is compared next: the next power of two or level.
+    fn next_stop(&self, samples: u32) -> u32 {
+        let power = samples.checked_add(1).and_then(u32::checked_next_power_of_two);
+        let power = power.unwrap_or(u32::MAX);
+        match self.rule {
+            Rule::Spp(end) => {
+                let level = self.levels.iter().copied().find(|level| *level > samples);
+                power.min(level.unwrap_or(end)).min(end)
+            }
+            Rule::Seconds(_) => power,
+        }
+    }
+
+    /// Writes the picture; its name inside the report folder.
+    fn keep(
+        &self,
+        picture: &RgbImage,
+        measurement: &Measurement,
+        renderer: &Renderer,
+        level: Rule,
+    ) -> Result<String> {
+        let mut image = image_of(picture);
+        let gpu_ms = &renderer.totals().gpu_ms;
+        let metadata = Metadata {
+            sample_ranges: vec![SampleRange { seed: self.seed, first: 0, count: measurement.spp }],
+            seconds: measurement.seconds,
+            gpu_seconds: gpu_ms.iter().map(|(pass, ms)| (pass.clone(), ms * 1e-3)).collect(),
+            ..self.metadata.clone()
+        };
+        metadata.store(&mut image);
+        let stem = run_stem(self.contender, level, self.seed);
+        let path = self.folder.image(&self.scene.name, &stem);
+        image.write_exr(&path)?;
+        if self.seed == SHOWN_SEED {
+            write_preview(&path.with_extension("png"), picture, self.exposure)?;
+        }
+        Ok(Folder::image_name(&self.scene.name, &stem))
+    }
+}
+
+/// A picture as an image of three channels.
+pub(super) fn image_of(picture: &RgbImage) -> Image {
+    let mut image = Image::new(picture.width, picture.height);
+    image.insert_triple(["R", "G", "B"], &picture.pixels);
+    image
+}
+
+/// Exposure in stops at which 95% of the pixels stay below white, by their brightest channel.
+pub fn exposure(picture: &RgbImage) -> f32 {
+    let mut brightest: Vec<f32> =
+        picture.pixels.iter().map(|pixel| pixel[0].max(pixel[1]).max(pixel[2])).collect();
+    brightest.sort_unstable_by(f32::total_cmp);
+    let index = (brightest.len() * 95).div_ceil(100).max(1) - 1;
+    match brightest.get(index) {
+        Some(value) if *value > 0.0 => -value.log2(),
+        _ => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn most_pixels_are_below_white() {
+        let pixels: Vec<[f32; 3]> = (1..=100u8).map(|value| [f32::from(value), 0.0, 1.0]).collect();
+        let picture = RgbImage { width: 10, height: 10, pixels };
+        assert!((exposure(&picture) + 95.0_f32.log2()).abs() < 1e-6);
+        let black = RgbImage { width: 1, height: 1, pixels: vec![[0.0; 3]] };
+        assert_eq!(exposure(&black), 0.0);
+    }
+}

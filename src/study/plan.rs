@@ -1,0 +1,364 @@
+//! What a study does: options in layers → a complete plan.
+//!
+//! Options come from the study file's `[settings]`, its `[quick]` table and the command line; a later
+//! layer replaces what an earlier one said. [`Plan::new`] fills in defaults and refuses what cannot
+//! be done.
+
+use std::{path::PathBuf, time::Duration};
+
+use serde::Serialize;
+
+use super::contender::Contender;
+use crate::{
+    error::{Error, Result},
+    sampler::{Parameters, Sampler},
+};
+
+/// Samples per pixel where neither samples nor time are given.
+const DEFAULT_SPP: u32 = 64;
+/// Samples of the reference over the largest number of samples compared.
+const REFERENCE_FACTOR: u32 = 16;
+/// Least samples of a reference by default.
+const LEAST_REFERENCE_SPP: u32 = 1024;
+/// The study's own name where none is given.
+const DEFAULT_TITLE: &str = "Comparison of samplers";
+
+/// Options of one layer; what is absent is left to the layers below.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options {
+    /// What is compared; the first is the one that ratios are taken to.
+    pub samplers: Option<Vec<Contender>>,
+    /// Samples per pixel at which the samplers are compared; empty for none.
+    pub spp: Option<Vec<u32>>,
+    /// Wall time of passes at which the samplers are compared.
+    pub time: Option<Duration>,
+    /// Runs of each sampler, with seeds 1, 2, ….
+    pub seeds: Option<u32>,
+    /// Film size instead of the scenes' own.
+    pub size: Option<[u32; 2]>,
+    /// Directions traced at every vertex.
+    pub shadow_rays: Option<u32>,
+    /// Path vertices at which environment light is gathered.
+    pub depth: Option<u32>,
+    /// Sampler of the reference.
+    pub reference_sampler: Option<Contender>,
+    /// Samples per pixel of the reference, both halves together.
+    pub reference_spp: Option<u32>,
+    /// Whether overhead is measured.
+    pub overhead: Option<bool>,
+    /// The sampler whose time overhead is measured against.
+    pub overhead_baseline: Option<Contender>,
+    /// Samples per pixel of one overhead measurement.
+    pub overhead_spp: Option<u32>,
+    /// Overhead measurements of each sampler, interleaved.
+    pub overhead_repetitions: Option<u32>,
+}
+
+impl Options {
+    /// These options, and those of `below` where there are none.
+    #[must_use]
+    pub fn over(self, below: Self) -> Self {
+        Self {
+            samplers: self.samplers.or(below.samplers),
+            spp: self.spp.or(below.spp),
+            time: self.time.or(below.time),
+            seeds: self.seeds.or(below.seeds),
+            size: self.size.or(below.size),
+            shadow_rays: self.shadow_rays.or(below.shadow_rays),
+            depth: self.depth.or(below.depth),
+            reference_sampler: self.reference_sampler.or(below.reference_sampler),
+            reference_spp: self.reference_spp.or(below.reference_spp),
+            overhead: self.overhead.or(below.overhead),
+            overhead_baseline: self.overhead_baseline.or(below.overhead_baseline),
+            overhead_spp: self.overhead_spp.or(below.overhead_spp),
+            overhead_repetitions: self.overhead_repetitions.or(below.overhead_repetitions),
+        }
+    }
+}
+
+/// Errors that a publication reports for one scene and one number of samples.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PublishedErrors {
+    /// Scene by name.
+    pub scene: String,
+    /// Where the figures stand, such as "Table 6.1".
+    pub source: String,
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Figure by sampler, in the publication's own units.
+    pub values: std::collections::BTreeMap<String, f64>,
+}
+
+/// A ratio of times that a publication reports.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PublishedOverhead {
+    /// What it is about.
+    pub label: String,
+    /// Least ratio.
+    pub low: f64,
+    /// Largest ratio.
+    pub high: f64,
+}
+
+/// What the study file says beyond options.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Description {
+    /// Heading of the report.
+    pub title: Option<String>,
+    /// Paragraphs under the heading.
+    pub notes: Vec<String>,
+    /// Published figures to set beside the study's.
+    pub published_errors: Vec<PublishedErrors>,
+    /// Published overheads.
+    pub published_overheads: Vec<PublishedOverhead>,
+}
+
+/// How overhead is measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OverheadPlan {
+    /// The sampler in the denominator.
+    pub baseline: Contender,
+    /// The samplers in the numerator; without the baseline.
+    pub contenders: Vec<Contender>,
+    /// Samples per pixel of one measurement.
+    pub spp: u32,
+    /// Rounds of measurements; in each, every sampler is measured once.
+    pub repetitions: u32,
+}
+
+/// Where the reference comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ReferencePlan {
+    /// Rendered in two halves.
+    Render {
+        /// Its sampler.
+        contender: Contender,
+        /// Samples per pixel of each half.
+        half_spp: u32,
+    },
+    /// Read from one image, or from two independent halves, of the only scene.
+    Files(Vec<PathBuf>),
+    /// Read from another study's folder.
+    Study(PathBuf),
+}
+
+/// Everything a study does.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Heading of the report.
+    pub title: String,
+    /// The rest of the study file.
+    pub description: Description,
+    /// Scene files.
+    pub scenes: Vec<PathBuf>,
+    /// Film size instead of the scenes' own.
+    pub size: Option<[u32; 2]>,
+    /// What is compared.
+    pub contenders: Vec<Contender>,
+    /// Samples per pixel at which the samplers are compared, ascending; may be empty.
+    pub spp: Vec<u32>,
+    /// Wall time at which they are compared.
+    pub time: Option<Duration>,
+    /// Runs of each sampler.
+    pub seeds: u32,
+    /// Directions traced at every vertex.
+    pub shadow_rays: u32,
+    /// Path vertices at which environment light is gathered.
+    pub depth: u32,
+    /// Where the reference comes from.
+    pub reference: ReferencePlan,
+    /// How overhead is measured, if it is.
+    pub overhead: Option<OverheadPlan>,
+}
+
+impl Plan {
+    /// Completes `options`; `references` are images, or the folder of another study.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the option, what was expected and what was found.
+    pub fn new(
+        scenes: Vec<PathBuf>,
+        description: Description,
+        options: Options,
+        references: Vec<PathBuf>,
+    ) -> Result<Self> {
+        if scenes.is_empty() {
+            return Err(Error::usage("no scene: name scene files (.toml) or a study file"));
+        }
+        let contenders = options.samplers.unwrap_or_else(default_contenders);
+        if contenders.is_empty() {
+            return Err(Error::usage("--samplers: expected at least one sampler"));
+        }
+        let overhead = options.overhead.unwrap_or(false);
+        let mut spp = options.spp.unwrap_or_else(|| {
+            if options.time.is_none() && !overhead { vec![DEFAULT_SPP] } else { Vec::new() }
+        });
+        spp.sort_unstable();
+        spp.dedup();
+        let range = |what: &str, value: u32, low: u32, high: u32| {
+            if (low..=high).contains(&value) {
+                return Ok(value);
+            }
+            Err(Error::usage(format!("{what}: expected {low} to {high}, found {value}")))
+        };
+        for &count in &spp {
+            range("--spp", count, 1, 1 << 24)?;
+        }
+        let seeds = range("--seeds", options.seeds.unwrap_or(3), 1, 1000)?;
+        let shadow_rays = range("--shadow-rays", options.shadow_rays.unwrap_or(5), 1, 4096)?;
+        let depth = range("--depth", options.depth.unwrap_or(1), 1, 64)?;
+        let compares = !spp.is_empty() || options.time.is_some();
+        let largest = spp.last().copied().unwrap_or(0);
+        let reference_spp = options.reference_spp.unwrap_or_else(|| {
+            largest.saturating_mul(REFERENCE_FACTOR).clamp(LEAST_REFERENCE_SPP, 1 << 26)
+        });
+        range("--reference-spp", reference_spp, 2, 1 << 26)?;
+        let reference = match &references[..] {
+            [] => ReferencePlan::Render {
+                contender: options.reference_sampler.unwrap_or_else(|| plain(Sampler::Mis)),
+                half_spp: reference_spp.div_ceil(2),
+            },
+            [folder] if folder.is_dir() => ReferencePlan::Study(folder.clone()),
+            [_] | [_, _] if scenes.len() == 1 => ReferencePlan::Files(references),
+            [_] | [_, _] => {
+                return Err(Error::usage(format!(
+                    "--reference {}: an image serves one scene, found {} scenes; give the report \
+                     folder of another study instead",
+                    references[0].display(),
+                    scenes.len()
+                )));
+            }
+            _ => {
+                return Err(Error::usage(format!(
+                    "--reference: expected one image, two independent halves or a report folder, \
+                     found {} paths",
+                    references.len()
+                )));
+            }
+        };
+        let overhead = if overhead {
+            let baseline = options.overhead_baseline.unwrap_or_else(|| contenders[0].clone());
+            let others: Vec<Contender> =
+                contenders.iter().filter(|other| other.label != baseline.label).cloned().collect();
+            if others.is_empty() {
+                return Err(Error::usage(format!(
+                    "--overhead: expected a sampler besides the baseline {}; name more with \
+                     --samplers",
+                    baseline.label
+                )));
+            }
+            Some(OverheadPlan {
+                baseline,
+                contenders: others,
+                spp: range("overhead spp", options.overhead_spp.unwrap_or(16), 1, 1 << 16)?,
+                repetitions: range(
+                    "--repetitions",
+                    options.overhead_repetitions.unwrap_or(15),
+                    2,
+                    1000,
+                )?,
+            })
+        } else {
+            None
+        };
+        if !compares && overhead.is_none() {
+            return Err(Error::usage(
+                "nothing to do: give --spp, --time or --overhead, here or in the study file",
+            ));
+        }
+        Ok(Self {
+            title: description.title.clone().unwrap_or_else(|| DEFAULT_TITLE.to_owned()),
+            description,
+            scenes,
+            size: options.size,
+            contenders,
+            spp,
+            time: options.time,
+            seeds,
+            shadow_rays,
+            depth,
+            reference,
+            overhead,
+        })
+    }
+
+    /// Whether errors are compared, for which a reference is needed.
+    pub fn compares(&self) -> bool {
+        !self.spp.is_empty() || self.time.is_some()
+    }
+}
+
+/// A sampler with its default parameters.
+fn plain(sampler: Sampler) -> Contender {
+    Contender { label: sampler.name().to_owned(), sampler, parameters: Parameters::default() }
+}
+
+/// Every sampler that combines BRDF and environment.
+fn default_contenders() -> Vec<Contender> {
+    let single = [Sampler::Uniform, Sampler::Cosine, Sampler::Brdf, Sampler::Env];
+    Sampler::ALL.into_iter().filter(|sampler| !single.contains(sampler)).map(plain).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+    use super::*;
+
+    fn plan(options: Options) -> Result<Plan> {
+        Plan::new(vec!["room.toml".into()], Description::default(), options, Vec::new())
+    }
+
+    #[test]
+    fn later_layers_win() {
+        let file = Options { seeds: Some(5), depth: Some(2), ..Options::default() };
+        let line = Options { seeds: Some(1), ..Options::default() };
+        let both = line.over(file);
+        assert_eq!((both.seeds, both.depth), (Some(1), Some(2)));
+    }
+
+    #[test]
+    fn defaults_make_a_whole_plan() {
+        let plan = plan(Options::default()).unwrap();
+        assert_eq!((&plan.spp[..], plan.seeds, plan.shadow_rays, plan.depth), (&[64][..], 3, 5, 1));
+        assert!(plan.contenders.iter().any(|contender| contender.label == "mis"));
+        assert!(plan.compares() && plan.overhead.is_none());
+        let ReferencePlan::Render { contender, half_spp } = plan.reference else { unreachable!() };
+        assert_eq!((contender.label.as_str(), half_spp), ("mis", 512));
+    }
+
+    #[test]
+    fn levels_are_sorted() {
+        let options = Options { spp: Some(vec![400, 200, 400]), ..Options::default() };
+        let plan = plan(options).unwrap();
+        assert_eq!(plan.spp, [200, 400]);
+        assert!(matches!(plan.reference, ReferencePlan::Render { half_spp: 3200, .. }));
+    }
+
+    #[test]
+    fn overhead_alone_needs_no_reference() {
+        let samplers = Some(vec![plain(Sampler::Mis), plain(Sampler::Ris)]);
+        let options = Options { overhead: Some(true), samplers, ..Options::default() };
+        let plan = plan(options).unwrap();
+        assert!(!plan.compares());
+        let overhead = plan.overhead.unwrap();
+        assert_eq!(overhead.baseline.label, "mis");
+        assert_eq!(overhead.contenders.len(), 1);
+    }
+
+    #[test]
+    fn what_cannot_be_done_is_refused() {
+        let message = |options| plan(options).unwrap_err().to_string();
+        let one = Some(vec![plain(Sampler::Mis)]);
+        let alone = Options { overhead: Some(true), samplers: one, ..Options::default() };
+        assert!(message(alone).contains("besides the baseline mis"));
+        let none = Options { spp: Some(Vec::new()), ..Options::default() };
+        assert!(message(none).contains("nothing to do"));
+        let zero = Options { spp: Some(vec![0]), ..Options::default() };
+        assert!(message(zero).contains("--spp: expected 1 to"));
+        let references = vec!["a.exr".into()];
+        let scenes = vec!["a.toml".into(), "b.toml".into()];
+        let error = Plan::new(scenes, Description::default(), Options::default(), references);
+        assert!(error.unwrap_err().to_string().contains("an image serves one scene"));
+    }
+}

@@ -1,0 +1,400 @@
+//! What a study keeps of every run: the records of `runs/` and of `results.json`.
+
+use std::{collections::BTreeMap, time::Duration};
+
+use serde::{Deserialize, Serialize};
+
+use super::{contender::Contender, reference::Reference};
+use crate::{
+    error::Result,
+    film::RgbImage,
+    renderer::{Renderer, Totals},
+    study::metrics::Metrics,
+};
+
+/// A run is judged where its mean squared error is at least this many times the reference's own.
+pub const JUDGED_FROM: f64 = 4.0;
+
+/// What a run was made under, besides its sampler, rule and seed. A run is taken up again only where
+/// all of it is the same.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Conditions {
+    /// Fenestra's version.
+    pub version: String,
+    /// `Scene::hash`.
+    pub scene_hash: String,
+    /// Width and height of the film in pixels.
+    pub film: [u32; 2],
+    /// Vulkan device.
+    pub device: String,
+    /// Its driver.
+    pub driver: String,
+    /// Directions traced at every vertex.
+    pub shadow_rays: u32,
+    /// Path vertices at which environment light is gathered.
+    pub depth: u32,
+    /// What the errors were measured against.
+    pub reference: String,
+    /// Parameters of the samplers, as text, by sampler's label and name.
+    pub parameters: BTreeMap<String, String>,
+}
+
+impl Conditions {
+    /// What differs, as "what: there against here".
+    pub fn differences(&self, asked: &Self) -> Vec<String> {
+        let mut found = Vec::new();
+        let mut compare = |what: &str, ours: String, theirs: String| {
+            if ours != theirs {
+                found.push(format!("{what}: {ours} there, {theirs} asked for"));
+            }
+        };
+        compare("version", self.version.clone(), asked.version.clone());
+        compare("scene hash", short(&self.scene_hash), short(&asked.scene_hash));
+        let film = |[width, height]: [u32; 2]| format!("{width}x{height}");
+        compare("film", film(self.film), film(asked.film));
+        compare("device", self.device.clone(), asked.device.clone());
+        compare("driver", self.driver.clone(), asked.driver.clone());
+        compare("shadow rays", self.shadow_rays.to_string(), asked.shadow_rays.to_string());
+        compare("depth", self.depth.to_string(), asked.depth.to_string());
+        compare("reference", self.reference.clone(), asked.reference.clone());
+        compare("parameters", join(&self.parameters), join(&asked.parameters));
+        found
+    }
+}
+
+/// The first digits of a hash, which tell scenes apart.
+fn short(hash: &str) -> String {
+    hash.chars().take(12).collect()
+}
+
+fn join(parameters: &BTreeMap<String, String>) -> String {
+    if parameters.is_empty() {
+        return "default".to_owned();
+    }
+    let pairs: Vec<String> =
+        parameters.iter().map(|(name, value)| format!("{name}={value}")).collect();
+    pairs.join(" ")
+}
+
+/// What ends a run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Rule {
+    /// Samples per pixel.
+    Spp(u32),
+    /// Wall time of the passes, seconds.
+    Seconds(f64),
+}
+
+impl Rule {
+    /// Rule of a duration.
+    pub fn time(time: Duration) -> Self {
+        Self::Seconds(time.as_secs_f64())
+    }
+
+    /// "400 spp" or "30 s".
+    pub fn describe(self) -> String {
+        match self {
+            Self::Spp(spp) => format!("{spp} spp"),
+            Self::Seconds(seconds) => format!("{seconds} s"),
+        }
+    }
+
+    /// "400spp" or "30s", for file names.
+    pub fn file_stem(self) -> String {
+        self.describe().replace(' ', "")
+    }
+}
+
+/// A film after some samples, against the reference.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Measurement {
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Wall time of the passes so far, seconds.
+    pub seconds: f64,
+    /// Device time of the passes so far, seconds.
+    pub gpu_seconds: f64,
+    /// Rays of every kind so far.
+    pub rays: u64,
+    /// Mean squared error; may be negative, see [`super::metrics`].
+    pub mse: f64,
+    /// Its root, 0 where it is negative.
+    pub rmse: f64,
+    /// Mean relative squared error.
+    pub relmse: f64,
+    /// The same without the worst 0.1% of the pixels.
+    pub relmse_trimmed: f64,
+    /// Mean of the picture over that of the reference.
+    pub mean_ratio: f64,
+    /// Difference of the two means in its standard errors; absent where the reference does not say
+    /// how sure its mean is, or below two samples.
+    pub mean_deviation: Option<f64>,
+    /// Whether `mse` is well above the reference's own.
+    pub mse_judged: bool,
+    /// Whether both relative errors are well above the reference's own.
+    pub relmse_judged: bool,
+    /// Picture in the report folder, for those that are kept.
+    pub image: Option<String>,
+}
+
+impl Measurement {
+    /// Compares the film of `renderer` after `seconds` of passes.
+    ///
+    /// # Errors
+    /// The device fails, or a pixel is not finite.
+    pub fn of(
+        renderer: &Renderer,
+        seconds: f64,
+        reference: &Reference,
+    ) -> Result<(Self, RgbImage)> {
+        let sums = renderer.sums()?;
+        let pixels = 0..sums.pixel_count();
+        let picture = RgbImage {
+            width: sums.width,
+            height: sums.height,
+            pixels: pixels.map(|pixel| sums.mean(pixel).map(|value| value as f32)).collect(),
+        };
+        let metrics = Metrics::of_halves(&picture, &reference.first, &reference.second)?;
+        let variances = (0..sums.pixel_count()).map(|pixel| sums.variance_of_mean(pixel));
+        let error = (sums.sample_count > 1)
+            .then(|| mean_standard_error(variances.map(|v| v.map(f64::sqrt))));
+        let totals = renderer.totals();
+        let own = &reference.own;
+        let measurement = Self {
+            spp: sums.sample_count,
+            seconds,
+            gpu_seconds: totals.gpu_ms.values().sum::<f64>() * 1e-3,
+            rays: totals.camera_rays + totals.bounce_rays + totals.shadow_rays_traced,
+            mse: metrics.mse,
+            rmse: metrics.rmse,
+            relmse: metrics.relmse,
+            relmse_trimmed: metrics.relmse_trimmed,
+            mean_ratio: metrics.mean_ratio,
+            mean_deviation: error.zip(own.mean_standard_error).map(|(error, theirs)| {
+                let deviation = (metrics.mean_ratio - 1.0) * own.mean;
+                deviation / error.hypot(theirs).max(f64::MIN_POSITIVE)
+            }),
+            mse_judged: is_judged(metrics.mse, own.mse),
+            relmse_judged: is_judged(metrics.relmse, own.relmse)
+                && is_judged(metrics.relmse_trimmed, own.relmse_trimmed),
+            image: None,
+        };
+        Ok((measurement, picture))
+    }
+}
+
+/// Whether an error is well above the reference's own. Where that is unknown, every error that is
+/// positive is taken.
+pub fn is_judged(error: f64, own: Option<f64>) -> bool {
+    error > 0.0 && own.is_none_or(|own| error >= JUDGED_FROM * own)
+}
+
+/// Standard error of the mean over pixels and channels, from the standard errors of the pixels;
+/// channels are taken as fully correlated, pixels as independent.
+pub fn mean_standard_error(errors: impl Iterator<Item = [f64; 3]>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0_f64);
+    for error in errors {
+        let mean = (error[0] + error[1] + error[2]) / 3.0;
+        sum += mean * mean;
+        count += 1.0;
+    }
+    sum.sqrt() / count.max(1.0)
+}
+
+/// One finished run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Run {
+    /// Scene's name.
+    pub scene: String,
+    /// Contender's label.
+    pub sampler: String,
+    /// What ended it.
+    pub rule: Rule,
+    /// Seed of the random numbers.
+    pub seed: u32,
+    /// What it was made under.
+    pub conditions: Conditions,
+    /// The film on its way, ascending in samples; the last is the finished film.
+    pub measurements: Vec<Measurement>,
+    /// Device milliseconds per sample of every pixel, by pass.
+    pub gpu_ms_per_sample: BTreeMap<String, f64>,
+    /// Rays traced by kind.
+    pub rays: BTreeMap<String, u64>,
+    /// Share of shadow rays that reached the environment; absent where none was traced.
+    pub visible_share: Option<f64>,
+    /// Other figures of the sampler, by name.
+    pub statistics: BTreeMap<String, f64>,
+}
+
+impl Run {
+    /// The finished film's measurement.
+    pub fn last(&self) -> Option<&Measurement> {
+        self.measurements.last()
+    }
+
+    /// The measurement of a rule: at so many samples, or the last of a run by time.
+    pub fn at(&self, rule: Rule) -> Option<&Measurement> {
+        match (rule, self.rule) {
+            (Rule::Spp(spp), Rule::Spp(_)) => {
+                self.measurements.iter().find(|measurement| measurement.spp == spp)
+            }
+            _ => (rule == self.rule).then(|| self.last()).flatten(),
+        }
+    }
+}
+
+/// Device milliseconds per sample, rays by kind, visible share and other figures of a renderer.
+pub struct Figures {
+    /// See [`Run::gpu_ms_per_sample`].
+    pub gpu_ms_per_sample: BTreeMap<String, f64>,
+    /// See [`Run::rays`].
+    pub rays: BTreeMap<String, u64>,
+    /// See [`Run::visible_share`].
+    pub visible_share: Option<f64>,
+    /// See [`Run::statistics`].
+    pub statistics: BTreeMap<String, f64>,
+}
+
+impl Figures {
+    /// What a renderer has counted since its last restart.
+    pub fn of(renderer: &Renderer) -> Self {
+        let totals = renderer.totals();
+        let samples = f64::from(renderer.sample_count().max(1));
+        let gpu_ms = totals.gpu_ms.iter();
+        Self {
+            gpu_ms_per_sample: gpu_ms.map(|(pass, ms)| (pass.clone(), ms / samples)).collect(),
+            rays: [
+                ("camera".to_owned(), totals.camera_rays),
+                ("bounce".to_owned(), totals.bounce_rays),
+                ("shadow".to_owned(), totals.shadow_rays_traced),
+            ]
+            .into(),
+            visible_share: (totals.shadow_rays_traced > 0)
+                .then(|| totals.shadow_rays_visible as f64 / totals.shadow_rays_traced as f64),
+            statistics: statistics(totals),
+        }
+    }
+}
+
+/// Figures of the totals that only some samplers or some runs have; 0 is left out.
+fn statistics(totals: &Totals) -> BTreeMap<String, f64> {
+    [
+        ("dropped_samples", totals.dropped_samples as f64),
+        ("traversal_overruns", totals.traversal_overruns as f64),
+    ]
+    .into_iter()
+    .filter(|(_, value)| *value != 0.0)
+    .map(|(name, value)| (name.to_owned(), value))
+    .collect()
+}
+
+/// Device time of one sampler in one round of overhead measurements.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Timing {
+    /// Contender's label.
+    pub sampler: String,
+    /// Wall milliseconds of the passes per sample.
+    pub wall_ms_per_sample: f64,
+    /// Device milliseconds per sample, by pass.
+    pub gpu_ms_per_sample: BTreeMap<String, f64>,
+    /// Share of shadow rays that reached the environment.
+    pub visible_share: Option<f64>,
+    /// Other figures of the sampler, by name.
+    pub statistics: BTreeMap<String, f64>,
+}
+
+impl Timing {
+    /// Device milliseconds per sample of all passes.
+    pub fn total_ms(&self) -> f64 {
+        self.gpu_ms_per_sample.values().sum()
+    }
+}
+
+/// One round of overhead measurements: every sampler once, one after the other.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Round {
+    /// Scene's name.
+    pub scene: String,
+    /// Number of the round from 1, which is also the seed.
+    pub repetition: u32,
+    /// Samples per pixel of each measurement.
+    pub spp: u32,
+    /// What it was made under.
+    pub conditions: Conditions,
+    /// In the order they were made; that order turns by one from round to round.
+    pub timings: Vec<Timing>,
+}
+
+/// A scene of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SceneRecord {
+    /// Name.
+    pub name: String,
+    /// File.
+    pub path: String,
+    /// `Scene::hash`.
+    pub hash: String,
+    /// Film width in pixels.
+    pub width: u32,
+    /// Film height in pixels.
+    pub height: u32,
+    /// Triangles.
+    pub triangles: u64,
+    /// The reference, where errors were compared.
+    pub reference: Option<super::reference::OwnErrors>,
+}
+
+/// The part of a file's name that says which run it belongs to.
+pub fn run_stem(contender: &Contender, rule: Rule, seed: u32) -> String {
+    format!("{}-{}-seed{seed}", contender.file_stem(), rule.file_stem())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn judged_is_what_stands_out_of_the_references_noise() {
+        assert!(is_judged(4.0, Some(1.0)) && !is_judged(3.9, Some(1.0)));
+        assert!(is_judged(1e-9, None) && !is_judged(0.0, None) && !is_judged(-1.0, None));
+        assert!(!is_judged(f64::NAN, Some(1.0)));
+    }
+
+    #[test]
+    fn the_means_error_shrinks_with_the_pixels() {
+        let four = mean_standard_error([[2.0, 2.0, 2.0]; 4].into_iter());
+        assert!((four - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn differing_conditions_are_listed() {
+        let there = Conditions {
+            version: "1".into(),
+            scene_hash: "0123456789abcdef".into(),
+            film: [4, 3],
+            device: "d".into(),
+            driver: "e".into(),
+            shadow_rays: 5,
+            depth: 1,
+            reference: "mis".into(),
+            parameters: BTreeMap::new(),
+        };
+        assert!(there.differences(&there.clone()).is_empty());
+        let parameters = BTreeMap::from([("candidates".to_owned(), "8".to_owned())]);
+        let asked = Conditions { shadow_rays: 4, parameters, ..there.clone() };
+        assert_eq!(
+            there.differences(&asked),
+            [
+                "shadow rays: 5 there, 4 asked for",
+                "parameters: default there, candidates=8 asked for"
+            ]
+        );
+    }
+
+    #[test]
+    fn rules_name_files() {
+        assert_eq!(Rule::Spp(400).file_stem(), "400spp");
+        assert_eq!(Rule::time(Duration::from_millis(500)).describe(), "0.5 s");
+    }
+}

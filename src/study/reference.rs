@@ -1,0 +1,390 @@
+//! The reference of a scene: two independent halves r₁ and r₂, rendered or read.
+//!
+//! Errors are estimated by (x − r₁)(x − r₂), which is free of the reference's own noise on average.
+//! The reference's own error, that of the mean of the halves, is ¼·mean (r₁ − r₂)², and a sampler
+//! whose error is not well above it is not judged ([`super::record::is_judged`]).
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::{
+    contender::Contender,
+    folder::Folder,
+    metrics::Metrics,
+    plan::ReferencePlan,
+    record::mean_standard_error,
+    watch::{Pace, Watch},
+};
+use crate::{
+    error::{Error, Result},
+    film::{
+        Aov, Attribute, Checkpoint, Image, Metadata, RgbImage, SampleRange,
+        checkpoint::checkpoint_path,
+    },
+    renderer::Renderer,
+    scene::Scene,
+};
+
+/// Seeds of the halves; those of runs count up from 1.
+pub const SEEDS: [u32; 2] = [u32::MAX - 1, u32::MAX];
+/// An interrupted half loses at most the passes of this time, even where the program is killed.
+const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
+
+/// A reference with its own errors.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// First half.
+    pub first: RgbImage,
+    /// Second half; the first again where there is only one image.
+    pub second: RgbImage,
+    /// How sure it is.
+    pub own: OwnErrors,
+}
+
+/// What is known of a reference's own error.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct OwnErrors {
+    /// Where it comes from.
+    pub description: String,
+    /// Samples per pixel of both halves, where known.
+    pub spp: Option<u64>,
+    /// Wall time of the passes of both halves, seconds, where known.
+    pub seconds: Option<f64>,
+    /// Mean squared error of the mean of the halves; absent for one image without variances.
+    pub mse: Option<f64>,
+    /// Mean relative squared error of the same.
+    pub relmse: Option<f64>,
+    /// The same without the worst 0.1% of the pixels.
+    pub relmse_trimmed: Option<f64>,
+    /// Mean over pixels and channels.
+    pub mean: f64,
+    /// Standard error of that mean, an upper estimate; absent where the files have no variances.
+    pub mean_standard_error: Option<f64>,
+}
+
+/// What tells references apart in the records of runs.
+///
+/// # Errors
+/// [`Error::Io`] for a reference file that cannot be read.
+pub fn identity(plan: &ReferencePlan, scene: &str) -> Result<String> {
+    match plan {
+        ReferencePlan::Render { contender, half_spp } => {
+            let parameters: Vec<String> = contender
+                .describe_parameters()
+                .iter()
+                .map(|(name, value)| format!(" {name}={value}"))
+                .collect();
+            let name = contender.sampler.name();
+            Ok(format!("{name}{}, 2 x {half_spp} spp", parameters.concat()))
+        }
+        ReferencePlan::Files(_) | ReferencePlan::Study(_) => {
+            let mut hasher = Sha256::new();
+            for path in given_files(plan, scene)? {
+                let bytes = fs::read(&path).map_err(|source| Error::io(&path, "read", source))?;
+                hasher.update((bytes.len() as u64).to_le_bytes());
+                hasher.update(bytes);
+            }
+            let digits: String =
+                hasher.finalize().iter().take(6).map(|byte| format!("{byte:02x}")).collect();
+            Ok(format!("given images {digits}"))
+        }
+    }
+}
+
+/// The files of a reference that is not rendered here.
+fn given_files(plan: &ReferencePlan, scene: &str) -> Result<Vec<PathBuf>> {
+    match plan {
+        ReferencePlan::Render { .. } => Ok(Vec::new()),
+        ReferencePlan::Files(files) => Ok(files.clone()),
+        ReferencePlan::Study(folder) => {
+            let folder = Folder::existing(folder)?;
+            Ok(half_stems().map(|stem| folder.image(scene, stem)).to_vec())
+        }
+    }
+}
+
+/// File stems of the halves.
+pub fn half_stems() -> [&'static str; 2] {
+    ["reference_1", "reference_2"]
+}
+
+impl Reference {
+    /// Reads images that were given: one, or two independent halves.
+    ///
+    /// # Errors
+    /// Files that cannot be read; [`Error::Comparison`] for another size or scene, values that are
+    /// not finite, a black picture, or halves that share samples.
+    pub fn read(plan: &ReferencePlan, scene: &Scene) -> Result<Self> {
+        let paths = given_files(plan, &scene.name)?;
+        let images: Vec<(PathBuf, Image)> = paths
+            .into_iter()
+            .map(|path| {
+                let image = Image::read_exr(&path)?;
+                check(&image, &path, scene)?;
+                Ok((path, image))
+            })
+            .collect::<Result<_>>()?;
+        if let [(first_path, first), (second_path, second)] = &images[..] {
+            let metadata = (Metadata::load(first, first_path), Metadata::load(second, second_path));
+            if let (Ok(ours), Ok(theirs)) = metadata
+                && let Some(range) = ours
+                    .sample_ranges
+                    .iter()
+                    .find(|range| theirs.sample_ranges.iter().any(|other| range.overlaps(other)))
+            {
+                return Err(Error::Comparison {
+                    message: format!(
+                        "{} and {} share samples ({range}); a reference's halves must be \
+                         independent: render them with different seeds",
+                        first_path.display(),
+                        second_path.display()
+                    ),
+                });
+            }
+        }
+        let names: Vec<String> =
+            images.iter().map(|(path, _)| path.display().to_string()).collect();
+        Self::from_images(&images, format!("read from {}", names.join(" and ")))
+    }
+
+    /// Renders what is missing of the two halves in `folder` and reads both. A half that was
+    /// interrupted is continued from its checkpoint.
+    ///
+    /// `metadata` describes the render without its samples; `make_renderer` is called where there is
+    /// something to render.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] after the checkpoint has been written; a failing device or disk.
+    pub fn render(
+        folder: &Folder,
+        scene: &Scene,
+        (contender, half_spp): (&Contender, u32),
+        metadata: &Metadata,
+        make_renderer: &mut dyn FnMut() -> Result<Renderer>,
+        watch: &mut Watch<'_>,
+    ) -> Result<Self> {
+        let pixels = f64::from(scene.film.width) * f64::from(scene.film.height);
+        let mut renderer = None;
+        for (stem, seed) in half_stems().into_iter().zip(SEEDS) {
+            let path = folder.image(&scene.name, stem);
+            let range = SampleRange { seed, first: 0, count: half_spp };
+            let metadata = Metadata { sample_ranges: vec![range], ..metadata.clone() };
+            if is_finished(&path, &metadata)? {
+                watch.expect(-pixels * f64::from(half_spp), 0.0);
+                continue;
+            }
+            let renderer = match &mut renderer {
+                Some(renderer) => renderer,
+                none => none.insert(make_renderer()?),
+            };
+            watch.note(&format!(
+                "{}: reference {} of 2 by {}, {half_spp} spp",
+                scene.name,
+                seed - SEEDS[0] + 1,
+                contender.label
+            ));
+            render_half(renderer, &path, metadata, pixels, watch)?;
+        }
+        let images: Vec<(PathBuf, Image)> = half_stems()
+            .into_iter()
+            .map(|stem| {
+                let path = folder.image(&scene.name, stem);
+                let image = Image::read_exr(&path)?;
+                check(&image, &path, scene)?;
+                Ok((path, image))
+            })
+            .collect::<Result<_>>()?;
+        Self::from_images(&images, format!("{}, two halves of {half_spp} spp", contender.label))
+    }
+
+    fn from_images(images: &[(PathBuf, Image)], description: String) -> Result<Self> {
+        let rgb = |index: usize| {
+            let (path, image) = &images[index];
+            image.rgb(path)
+        };
+        let last = images.len() - 1;
+        let (first, second) = (rgb(0)?, rgb(last)?);
+        let average = |picture: &RgbImage| {
+            let sum: f64 = picture.pixels.iter().flatten().map(|value| f64::from(*value)).sum();
+            sum / (3.0 * picture.pixels.len() as f64)
+        };
+        let mean = 0.5 * (average(&first) + average(&second));
+        if mean <= 0.0 {
+            return Err(Error::Comparison {
+                message: format!(
+                    "the reference {} is black: no error can be put in relation to it",
+                    images[0].0.display()
+                ),
+            });
+        }
+        let metadata: Vec<Metadata> =
+            images.iter().filter_map(|(path, image)| Metadata::load(image, path).ok()).collect();
+        let whole = metadata.len() == images.len();
+        let mut own = OwnErrors {
+            description,
+            spp: whole.then(|| metadata.iter().map(Metadata::sample_count).sum()),
+            seconds: whole.then(|| metadata.iter().map(|metadata| metadata.seconds).sum()),
+            mean,
+            ..OwnErrors::default()
+        };
+        let variances: Option<Vec<Vec<[f32; 3]>>> = images
+            .iter()
+            .map(|(_, image)| image.triple(["Variance.R", "Variance.G", "Variance.B"]))
+            .collect();
+        if let Some(variances) = &variances {
+            let error = |variances: &Vec<[f32; 3]>| {
+                mean_standard_error(
+                    variances.iter().map(|v| v.map(|value| f64::from(value).max(0.0).sqrt())),
+                )
+            };
+            let errors: Vec<f64> = variances.iter().map(error).collect();
+            let squares: f64 = errors.iter().map(|error| error * error).sum();
+            own.mean_standard_error = Some(squares.sqrt() / errors.len() as f64);
+        }
+        if last > 0 {
+            let halves = Metrics::of_halves(&first, &second, &second)?;
+            own.mse = Some(0.25 * halves.mse);
+            own.relmse = Some(0.25 * halves.relmse);
+            own.relmse_trimmed = Some(0.25 * halves.relmse_trimmed);
+        } else if let Some(variances) = &variances {
+            let sum: f64 = variances[0].iter().flatten().map(|value| f64::from(*value)).sum();
+            own.mse = Some(sum / (3.0 * variances[0].len() as f64));
+        }
+        Ok(Self { first, second, own })
+    }
+
+    /// Mean of the halves.
+    pub fn mean(&self) -> RgbImage {
+        let mean = |(a, b): (&[f32; 3], &[f32; 3])| {
+            std::array::from_fn(|channel| 0.5 * (a[channel] + b[channel]))
+        };
+        RgbImage {
+            width: self.first.width,
+            height: self.first.height,
+            pixels: self.first.pixels.iter().zip(&self.second.pixels).map(mean).collect(),
+        }
+    }
+}
+
+/// Whether `path` holds the render that `metadata` describes.
+fn is_finished(path: &Path, metadata: &Metadata) -> Result<bool> {
+    if !path.exists() {
+        return Ok(false);
+    }
+    let found = Metadata::load(&Image::read_exr(path)?, path)?;
+    Ok(found.differences(metadata).is_empty()
+        && found.sample_ranges == metadata.sample_ranges
+        && (&found.device, &found.driver, &found.version)
+            == (&metadata.device, &metadata.driver, &metadata.version))
+}
+
+/// Renders one half, from its checkpoint if there is one; `metadata` has its one sample range.
+fn render_half(
+    renderer: &mut Renderer,
+    path: &Path,
+    mut metadata: Metadata,
+    pixels: f64,
+    watch: &mut Watch<'_>,
+) -> Result<()> {
+    let SampleRange { seed, count, .. } = metadata.sample_ranges[0];
+    let checkpoint_path = checkpoint_path(path);
+    renderer.restart(seed)?;
+    let mut earlier_seconds = 0.0;
+    if checkpoint_path.exists() {
+        let checkpoint = Checkpoint::read(&checkpoint_path)?;
+        let empty = renderer.sums()?;
+        if checkpoint.sums.sample_count <= count
+            && checkpoint.check_resume(&checkpoint_path, &metadata, &empty, seed, 0).is_ok()
+        {
+            renderer.restore(&checkpoint.sums)?;
+            earlier_seconds = checkpoint.metadata.seconds;
+            watch.expect(-pixels * f64::from(renderer.sample_count()), 0.0);
+        }
+    }
+    let mut pace = Pace::new(pixels, false);
+    let mut last_checkpoint = Instant::now();
+    while renderer.sample_count() < count {
+        // As many samples as look about a checkpoint's interval long, in whole passes.
+        let step = renderer.sample_count().max(1).saturating_mul(2).min(count);
+        let limit = (last_checkpoint + CHECKPOINT_INTERVAL)
+            .saturating_duration_since(Instant::now())
+            .as_secs_f64();
+        let result = pace.advance(renderer, step, Some(pace.seconds + limit), watch);
+        metadata.seconds = earlier_seconds + pace.seconds;
+        metadata.gpu_seconds =
+            renderer.totals().gpu_ms.iter().map(|(pass, ms)| (pass.clone(), ms * 1e-3)).collect();
+        let interrupted = matches!(result, Err(Error::Interrupted));
+        if (interrupted || last_checkpoint.elapsed() >= CHECKPOINT_INTERVAL)
+            && renderer.sample_count() > 0
+        {
+            let range = SampleRange { seed, first: 0, count: renderer.sample_count() };
+            let metadata = Metadata { sample_ranges: vec![range], ..metadata.clone() };
+            Checkpoint { sums: renderer.sums()?, metadata }.write(&checkpoint_path)?;
+            last_checkpoint = Instant::now();
+        }
+        result?;
+    }
+    let mut image = renderer.sums()?.to_image(&[Aov::Variance]);
+    metadata.store(&mut image);
+    image.write_exr(path)?;
+    if checkpoint_path.exists() {
+        fs::remove_file(&checkpoint_path)
+            .map_err(|source| Error::io(&checkpoint_path, "remove", source))?;
+    }
+    Ok(())
+}
+
+/// Refuses a picture of another size or scene or with values that are not finite.
+fn check(image: &Image, path: &Path, scene: &Scene) -> Result<()> {
+    let refuse = |message: String| Err(Error::Comparison { message });
+    let (width, height) = (scene.film.width, scene.film.height);
+    if (image.width, image.height) != (width, height) || image.origin != [0, 0] {
+        return refuse(format!(
+            "the reference {} shows {}x{} pixels at {},{}; the film of {} has {width}x{height}: give \
+             --size {}x{} or another reference",
+            path.display(),
+            image.width,
+            image.height,
+            image.origin[0],
+            image.origin[1],
+            scene.name,
+            image.width,
+            image.height
+        ));
+    }
+    match image.attributes.get("fenestra.scene_hash") {
+        Some(Attribute::Text(hash)) if *hash != scene.hash => {
+            return refuse(format!(
+                "the reference {} shows another scene than {} (hashes {hash} and {})",
+                path.display(),
+                scene.path.display(),
+                scene.hash
+            ));
+        }
+        Some(_) => {}
+        None => log::warn!(
+            "{} does not say which scene it shows; taken as {}",
+            path.display(),
+            scene.name
+        ),
+    }
+    let picture = image.rgb(path)?;
+    let is_bad = |pixel: &[f32; 3]| pixel.iter().any(|value| !value.is_finite());
+    if let Some(index) = picture.pixels.iter().position(is_bad) {
+        let count = picture.pixels.iter().filter(|pixel| is_bad(pixel)).count();
+        return refuse(format!(
+            "the reference {} has {count} pixels that are not finite, the first at {},{}: {:?}",
+            path.display(),
+            index % width as usize,
+            index / width as usize,
+            picture.pixels[index]
+        ));
+    }
+    Ok(())
+}

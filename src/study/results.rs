@@ -1,0 +1,288 @@
+//! `results.json` and `results.csv`: every run of a study with what it was made on.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    io::Write,
+    time::{SystemTime, UNIX_EPOCH},
+};
+
+use serde::Serialize;
+
+use super::{
+    engine::Results,
+    folder::Folder,
+    overhead::{Overhead, overheads},
+    plan::{Plan, PublishedErrors, PublishedOverhead},
+    record::{Measurement, Round, Rule, Run, SceneRecord},
+    summary::{Curve, Summary, curves, rules, summaries},
+};
+use crate::{error::Result, film::write_atomically, gpu::Device};
+
+/// What a study was made on and how it was asked for.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Circumstances {
+    /// Fenestra's version.
+    pub version: String,
+    /// When the results were written, UTC.
+    pub date: String,
+    /// The command line.
+    pub command: String,
+    /// The processor and how many of it the program may use.
+    pub machine: String,
+    /// Vulkan device.
+    pub device: String,
+    /// Its driver.
+    pub driver: String,
+}
+
+impl Circumstances {
+    /// As of now, for the command line of this process.
+    pub fn new(device: &Device) -> Self {
+        let capabilities = device.capabilities();
+        let arguments: Vec<String> = std::env::args_os()
+            .enumerate()
+            .map(|(index, argument)| {
+                // The program's own folder says nothing about the study.
+                let text = argument.to_string_lossy().into_owned();
+                if index == 0 { "fenestra".to_owned() } else { text }
+            })
+            .collect();
+        Self {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            date: date(SystemTime::now()),
+            command: arguments.join(" "),
+            machine: machine(),
+            device: capabilities.name.clone(),
+            driver: capabilities.driver.clone(),
+        }
+    }
+}
+
+/// Name of the processor where the system tells it, and the number of cores.
+fn machine() -> String {
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let information = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = information
+        .lines()
+        .find_map(|line| line.strip_prefix("model name")?.split_once(':').map(|(_, name)| name))
+        .map_or_else(|| std::env::consts::ARCH.to_owned(), |name| name.trim().to_owned());
+    format!("{name}, {cores} cores, {}", std::env::consts::OS)
+}
+
+/// "2026-11-21 05:40 UTC". The day follows from the days since 1 March 2000, after which every block
+/// of 400, 100, 4 and 1 years has its leap day at its end.
+fn date(now: SystemTime) -> String {
+    let seconds = now.duration_since(UNIX_EPOCH).map_or(0, |elapsed| elapsed.as_secs());
+    const DAYS_TO_MARCH_2000: i64 = 11_017;
+    let days = i64::try_from(seconds / 86_400).unwrap_or(0) - DAYS_TO_MARCH_2000;
+    let (blocks, rest) = (days.div_euclid(146_097), days.rem_euclid(146_097));
+    let centuries = (rest / 36_524).min(3);
+    let rest = rest - centuries * 36_524;
+    let (leaps, rest) = (rest / 1461, rest % 1461);
+    let years = (rest / 365).min(3);
+    let day_of_year = rest - years * 365;
+    let year = 2000 + 400 * blocks + 100 * centuries + 4 * leaps + years;
+    // Months from March have 31, 30, 31, 30, 31 days, twice, and then January and February.
+    let month = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * month + 2) / 5 + 1;
+    let (year, month) = if month < 10 { (year, month + 3) } else { (year + 1, month - 9) };
+    let (hour, minute) = (seconds / 3600 % 24, seconds / 60 % 60);
+    format!("{year:04}-{month:02}-{day:02} {hour:02}:{minute:02} UTC")
+}
+
+/// Everything in `results.json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// Heading.
+    pub title: String,
+    /// Paragraphs under the heading.
+    pub notes: Vec<String>,
+    /// Whether the study was interrupted before its end.
+    pub is_complete: bool,
+    /// What it was made on.
+    pub circumstances: Circumstances,
+    /// Directions traced at every vertex.
+    pub shadow_rays: u32,
+    /// Path vertices at which environment light is gathered.
+    pub depth: u32,
+    /// Runs of each sampler.
+    pub seeds: u32,
+    /// Samplers' parameters by label, where they are not all at their defaults' names.
+    pub samplers: BTreeMap<String, BTreeMap<String, String>>,
+    /// Samplers in the order of the plan.
+    pub order: Vec<String>,
+    /// Scenes.
+    pub scenes: Vec<SceneRecord>,
+    /// Figures over the seeds.
+    pub summaries: Vec<Summary>,
+    /// Errors on the way.
+    pub curves: Vec<Curve>,
+    /// Overheads.
+    pub overheads: Vec<Overhead>,
+    /// Published errors to compare ratios with.
+    pub published_errors: Vec<PublishedErrors>,
+    /// Published overheads.
+    pub published_overheads: Vec<PublishedOverhead>,
+    /// Every run.
+    pub runs: Vec<Run>,
+    /// Every overhead round.
+    pub rounds: Vec<Round>,
+}
+
+impl Report {
+    /// Puts results in order.
+    pub fn new(
+        plan: &Plan,
+        results: Results,
+        is_complete: bool,
+        circumstances: Circumstances,
+    ) -> Self {
+        let baseline = plan.overhead.as_ref().map(|overhead| overhead.baseline.label.clone());
+        Self {
+            title: plan.title.clone(),
+            notes: plan.description.notes.clone(),
+            is_complete,
+            circumstances,
+            shadow_rays: plan.shadow_rays,
+            depth: plan.depth,
+            seeds: plan.seeds,
+            samplers: plan
+                .contenders
+                .iter()
+                .map(|contender| (contender.label.clone(), contender.describe_parameters()))
+                .collect(),
+            order: plan.contenders.iter().map(|contender| contender.label.clone()).collect(),
+            summaries: summaries(plan, &results.scenes, &results.runs),
+            curves: curves(plan, &results.scenes, &results.runs),
+            overheads: baseline
+                .map_or_else(Vec::new, |baseline| overheads(&results.rounds, &baseline)),
+            published_errors: plan.description.published_errors.clone(),
+            published_overheads: plan.description.published_overheads.clone(),
+            scenes: results.scenes,
+            runs: results.runs,
+            rounds: results.rounds,
+        }
+    }
+
+    /// Writes `results.json` and `results.csv`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] with the cause.
+    pub fn write(&self, plan: &Plan, folder: &Folder) -> Result<()> {
+        folder.write_json(&folder.path().join("results.json"), self)?;
+        let table = self.csv(&rules(plan));
+        write_atomically(&folder.path().join("results.csv"), |file| {
+            file.write_all(table.as_bytes())
+        })
+    }
+
+    /// One row for every run and rule, a column for every figure; a figure that a run does not have
+    /// is empty.
+    fn csv(&self, rules: &[Rule]) -> String {
+        let names = |of: &dyn Fn(&Run) -> Vec<String>| -> BTreeSet<String> {
+            self.runs.iter().flat_map(of).collect()
+        };
+        let passes = names(&|run| run.gpu_ms_per_sample.keys().cloned().collect());
+        let kinds = names(&|run| run.rays.keys().cloned().collect());
+        let statistics = names(&|run| run.statistics.keys().cloned().collect());
+        let mut columns: Vec<String> =
+            ["scene", "sampler", "parameters", "rule", "seed", "shadow_rays", "depth", "spp"]
+                .map(str::to_owned)
+                .to_vec();
+        columns.extend(["seconds", "gpu_seconds", "rays"].map(str::to_owned));
+        columns.extend(kinds.iter().map(|kind| format!("rays_{kind}_of_run")));
+        columns.push("visible_share".to_owned());
+        columns.extend(
+            ["rmse", "mse", "relmse", "relmse_trimmed", "mean_ratio", "mean_deviation"]
+                .map(str::to_owned),
+        );
+        columns.extend(["mse_judged", "relmse_judged"].map(str::to_owned));
+        columns.extend(passes.iter().map(|pass| format!("gpu_ms_per_sample_{pass}")));
+        columns.extend(statistics.iter().cloned());
+        let mut text = columns.join(",") + "\n";
+        for run in &self.runs {
+            for rule in rules {
+                if let Some(measurement) = run.at(*rule) {
+                    let mut row = row(run, *rule, measurement, &kinds);
+                    let number = |of: &BTreeMap<String, f64>, name: &String| {
+                        of.get(name).map(f64::to_string).unwrap_or_default()
+                    };
+                    row.extend(passes.iter().map(|pass| number(&run.gpu_ms_per_sample, pass)));
+                    row.extend(statistics.iter().map(|name| number(&run.statistics, name)));
+                    let fields: Vec<String> = row.iter().map(|field| quoted(field)).collect();
+                    text += &(fields.join(",") + "\n");
+                }
+            }
+        }
+        text
+    }
+}
+
+/// The columns that every run has.
+fn row(run: &Run, rule: Rule, measurement: &Measurement, kinds: &BTreeSet<String>) -> Vec<String> {
+    let parameters: Vec<String> =
+        run.conditions.parameters.iter().map(|(name, value)| format!("{name}={value}")).collect();
+    let optional = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
+    let mut row = vec![
+        run.scene.clone(),
+        run.sampler.clone(),
+        parameters.join(" "),
+        rule.describe(),
+        run.seed.to_string(),
+        run.conditions.shadow_rays.to_string(),
+        run.conditions.depth.to_string(),
+        measurement.spp.to_string(),
+        measurement.seconds.to_string(),
+        measurement.gpu_seconds.to_string(),
+        measurement.rays.to_string(),
+    ];
+    let count = |kind: &String| run.rays.get(kind).map(u64::to_string).unwrap_or_default();
+    row.extend(kinds.iter().map(count));
+    row.push(optional(run.visible_share));
+    row.extend(
+        [
+            measurement.rmse,
+            measurement.mse,
+            measurement.relmse,
+            measurement.relmse_trimmed,
+            measurement.mean_ratio,
+        ]
+        .map(|value| value.to_string()),
+    );
+    row.push(optional(measurement.mean_deviation));
+    row.extend([measurement.mse_judged, measurement.relmse_judged].map(|is| is.to_string()));
+    row
+}
+
+/// A field, in quotation marks where it needs them (RFC 4180).
+fn quoted(field: &str) -> String {
+    if field.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", field.replace('"', "\"\""))
+    } else {
+        field.to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        let at = |seconds| date(UNIX_EPOCH + Duration::from_secs(seconds));
+        assert_eq!(at(0), "1970-01-01 00:00 UTC");
+        assert_eq!(at(951_782_400), "2000-02-29 00:00 UTC");
+        assert_eq!(at(951_868_800), "2000-03-01 00:00 UTC");
+        assert_eq!(at(1_709_164_800 + 3600 * 23 + 59 * 60), "2024-02-29 23:59 UTC");
+        assert_eq!(at(1_709_251_200), "2024-03-01 00:00 UTC");
+        assert_eq!(at(4_107_542_400), "2100-03-01 00:00 UTC");
+    }
+
+    #[test]
+    fn fields_with_commas_are_quoted() {
+        assert_eq!(quoted("plain"), "plain");
+        assert_eq!(quoted("a,\"b\""), "\"a,\"\"b\"\"\"");
+    }
+}

@@ -1,0 +1,282 @@
+//! Figures over the seeds of a study: one summary for every scene, sampler and rule, and the curves
+//! of error against samples and time.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::Serialize;
+
+use super::{
+    plan::Plan,
+    record::{JUDGED_FROM, Measurement, Rule, Run, SceneRecord},
+    statistics::{Interval, geometric_interval, mean_interval, slope},
+};
+
+/// Where the mean differs by more than so many standard errors, it is pointed out.
+pub const SUSPICIOUS_DEVIATION: f64 = 4.0;
+
+/// One sampler in one scene under one rule, over all seeds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// Scene's name.
+    pub scene: String,
+    /// Contender's label.
+    pub sampler: String,
+    /// What ended the runs, or the number of samples on the way.
+    pub rule: Rule,
+    /// Runs.
+    pub runs: usize,
+    /// Mean samples per pixel.
+    pub spp: f64,
+    /// Mean wall time of the passes, seconds.
+    pub seconds: f64,
+    /// Mean device time of the passes, seconds.
+    pub gpu_seconds: f64,
+    /// Mean of the mean squared errors.
+    pub mse: f64,
+    /// Its root.
+    pub rmse: f64,
+    /// Mean of the mean relative squared errors.
+    pub relmse: f64,
+    /// The same without the worst 0.1% of the pixels of each run.
+    pub relmse_trimmed: f64,
+    /// Whether `mse` is at least [`JUDGED_FROM`] times the reference's own.
+    pub mse_judged: bool,
+    /// Whether the relative errors are.
+    pub relmse_judged: bool,
+    /// RMSE over that of the first sampler, from pairs of the same seed; absent where one of them is
+    /// not judged.
+    pub rmse_ratio: Option<Interval>,
+    /// MSE · seconds of the first sampler over that of this one: how many times as fast this one
+    /// reaches the same error. Absent where one of them is not judged.
+    pub efficiency: Option<Interval>,
+    /// Mean over the seeds of the picture's mean over the reference's.
+    pub mean_ratio: Interval,
+    /// The largest deviation of a run's mean in standard errors.
+    pub mean_deviation: Option<f64>,
+    /// Mean share of shadow rays that reached the environment, over the whole run.
+    pub visible_share: Option<f64>,
+    /// Mean device milliseconds per sample by pass, over the whole run.
+    pub gpu_ms_per_sample: BTreeMap<String, f64>,
+    /// Mean of the sampler's other figures, over the whole run.
+    pub statistics: BTreeMap<String, f64>,
+}
+
+impl Summary {
+    /// Whether the mean is further from the reference's than noise explains.
+    pub fn is_suspicious(&self) -> bool {
+        self.mean_deviation.is_some_and(|deviation| deviation.abs() > SUSPICIOUS_DEVIATION)
+    }
+
+    /// Device milliseconds per sample of all passes.
+    pub fn total_ms(&self) -> f64 {
+        self.gpu_ms_per_sample.values().sum()
+    }
+}
+
+/// Every rule of a plan that summaries are made for.
+pub fn rules(plan: &Plan) -> Vec<Rule> {
+    plan.spp.iter().copied().map(Rule::Spp).chain(plan.time.map(Rule::time)).collect()
+}
+
+/// Summaries in the plan's order of scenes, rules and samplers; those without a finished run are left
+/// out.
+pub fn summaries(plan: &Plan, scenes: &[SceneRecord], runs: &[Run]) -> Vec<Summary> {
+    let mut all = Vec::new();
+    for scene in scenes {
+        for rule in rules(plan) {
+            let first = plan.contenders.first();
+            let baseline = first.map(|first| pairs(runs, &scene.name, &first.label, rule));
+            for contender in &plan.contenders {
+                let own = pairs(runs, &scene.name, &contender.label, rule);
+                if !own.is_empty() {
+                    let baseline = baseline.as_deref().unwrap_or_default();
+                    all.push(summary(scene, &contender.label, rule, &own, baseline));
+                }
+            }
+        }
+    }
+    all
+}
+
+/// The runs of a scene and sampler with their measurement under `rule`.
+fn pairs<'a>(
+    runs: &'a [Run],
+    scene: &str,
+    sampler: &str,
+    rule: Rule,
+) -> Vec<(&'a Run, &'a Measurement)> {
+    runs.iter()
+        .filter(|run| run.scene == scene && run.sampler == sampler)
+        .filter_map(|run| run.at(rule).map(|measurement| (run, measurement)))
+        .collect()
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    sum / f64::max(count, 1.0)
+}
+
+fn summary(
+    scene: &SceneRecord,
+    sampler: &str,
+    rule: Rule,
+    own: &[(&Run, &Measurement)],
+    baseline: &[(&Run, &Measurement)],
+) -> Summary {
+    let average = |value: &dyn Fn(&Measurement) -> f64| mean(own.iter().map(|(_, m)| value(m)));
+    let reference = scene.reference.clone().unwrap_or_default();
+    let is_judged =
+        |mean: f64, own: Option<f64>| mean > 0.0 && own.is_none_or(|own| mean >= JUDGED_FROM * own);
+    let mse = average(&|m| m.mse);
+    let (relmse, relmse_trimmed) = (average(&|m| m.relmse), average(&|m| m.relmse_trimmed));
+    let mse_judged = is_judged(mse, reference.mse);
+    let baseline_mse = mean(baseline.iter().map(|(_, m)| m.mse));
+    let both_judged = mse_judged && is_judged(baseline_mse, reference.mse);
+    let by_seed = |value: &dyn Fn(&Measurement, &Measurement) -> f64| {
+        let ratios: Vec<f64> = own
+            .iter()
+            .filter_map(|(run, ours)| {
+                let (_, theirs) = baseline.iter().find(|(other, _)| other.seed == run.seed)?;
+                Some(value(ours, theirs))
+            })
+            .collect();
+        geometric_interval(&ratios).filter(|_| both_judged)
+    };
+    let names: BTreeSet<&String> = own.iter().flat_map(|(run, _)| run.statistics.keys()).collect();
+    let passes: BTreeSet<&String> =
+        own.iter().flat_map(|(run, _)| run.gpu_ms_per_sample.keys()).collect();
+    let ratios: Vec<f64> = own.iter().map(|(_, m)| m.mean_ratio).collect();
+    let largest = |a: f64, b: f64| if b.abs() > a.abs() { b } else { a };
+    Summary {
+        scene: scene.name.clone(),
+        sampler: sampler.to_owned(),
+        rule,
+        runs: own.len(),
+        spp: average(&|m| f64::from(m.spp)),
+        seconds: average(&|m| m.seconds),
+        gpu_seconds: average(&|m| m.gpu_seconds),
+        mse,
+        rmse: mse.max(0.0).sqrt(),
+        relmse,
+        relmse_trimmed,
+        mse_judged,
+        relmse_judged: is_judged(relmse, reference.relmse)
+            && is_judged(relmse_trimmed, reference.relmse_trimmed),
+        rmse_ratio: by_seed(&|ours, theirs| (ours.mse / theirs.mse).sqrt()),
+        efficiency: by_seed(&|ours, theirs| {
+            theirs.mse * theirs.seconds / (ours.mse * ours.seconds)
+        }),
+        mean_ratio: mean_interval(&ratios).unwrap_or(Interval { middle: 1.0, low: 1.0, high: 1.0 }),
+        mean_deviation: own.iter().filter_map(|(_, m)| m.mean_deviation).reduce(largest),
+        visible_share: {
+            let shares: Option<Vec<f64>> = own.iter().map(|(run, _)| run.visible_share).collect();
+            shares.map(|shares| mean(shares.into_iter()))
+        },
+        gpu_ms_per_sample: passes
+            .into_iter()
+            .map(|pass| {
+                let ms = |run: &Run| run.gpu_ms_per_sample.get(pass).copied().unwrap_or(0.0);
+                (pass.clone(), mean(own.iter().map(|(run, _)| ms(run))))
+            })
+            .collect(),
+        statistics: names
+            .into_iter()
+            .map(|name| {
+                let value = |run: &Run| run.statistics.get(name).copied().unwrap_or(0.0);
+                (name.clone(), mean(own.iter().map(|(run, _)| value(run))))
+            })
+            .collect(),
+    }
+}
+
+/// A film on its way, over all seeds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Point {
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Mean wall time of the passes, seconds.
+    pub seconds: f64,
+    /// Root of the mean over the seeds of the mean squared errors, with the interval of the single
+    /// runs' geometric mean around it.
+    pub rmse: Interval,
+}
+
+/// Error of one sampler in one scene on its way.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Curve {
+    /// Scene's name.
+    pub scene: String,
+    /// Contender's label.
+    pub sampler: String,
+    /// Ascending in samples, judged points only.
+    pub points: Vec<Point>,
+    /// Slope of log RMSE against log samples: −½ for independent samples.
+    pub slope_spp: Option<f64>,
+    /// Slope of log RMSE against log seconds.
+    pub slope_seconds: Option<f64>,
+}
+
+/// Curves in the plan's order. Runs by samples are taken where there are some, else those by time, of
+/// which only numbers of samples that every run has reached.
+pub fn curves(plan: &Plan, scenes: &[SceneRecord], runs: &[Run]) -> Vec<Curve> {
+    let mut all = Vec::new();
+    for scene in scenes {
+        for contender in &plan.contenders {
+            let own: Vec<&Run> = runs
+                .iter()
+                .filter(|run| run.scene == scene.name && run.sampler == contender.label)
+                .collect();
+            let by_samples = own.iter().any(|run| matches!(run.rule, Rule::Spp(_)));
+            let own: Vec<&Run> = own
+                .into_iter()
+                .filter(|run| matches!(run.rule, Rule::Spp(_)) == by_samples)
+                .collect();
+            if !own.is_empty() {
+                all.push(curve(scene, &contender.label, &own));
+            }
+        }
+    }
+    all
+}
+
+fn curve(scene: &SceneRecord, sampler: &str, runs: &[&Run]) -> Curve {
+    let own = scene.reference.as_ref().and_then(|reference| reference.mse);
+    let counts: BTreeSet<u32> =
+        runs.iter().flat_map(|run| run.measurements.iter().map(|m| m.spp)).collect();
+    let points: Vec<Point> = counts
+        .into_iter()
+        .filter_map(|spp| {
+            let at: Option<Vec<&Measurement>> = runs
+                .iter()
+                .map(|run| run.measurements.iter().find(|measurement| measurement.spp == spp))
+                .collect();
+            let at = at?;
+            let mse = mean(at.iter().map(|measurement| measurement.mse));
+            let is_judged = mse > 0.0 && own.is_none_or(|own| mse >= JUDGED_FROM * own);
+            let single: Vec<f64> = at.iter().map(|m| m.mse.max(0.0).sqrt()).collect();
+            let around = geometric_interval(&single).filter(|_| is_judged)?;
+            let middle = mse.sqrt();
+            let scale = middle / around.middle;
+            Some(Point {
+                spp,
+                seconds: mean(at.iter().map(|measurement| measurement.seconds)),
+                rmse: Interval { middle, low: around.low * scale, high: around.high * scale },
+            })
+        })
+        .collect();
+    let line = |x: &dyn Fn(&Point) -> f64| {
+        let logarithms: Vec<[f64; 2]> =
+            points.iter().map(|point| [x(point).ln(), point.rmse.middle.ln()]).collect();
+        slope(&logarithms).filter(|slope| slope.is_finite())
+    };
+    Curve {
+        scene: scene.name.clone(),
+        sampler: sampler.to_owned(),
+        slope_spp: line(&|point| f64::from(point.spp)),
+        slope_seconds: line(&|point| point.seconds),
+        points,
+    }
+}
+
+#[cfg(test)]
+mod tests;

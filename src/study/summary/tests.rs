@@ -1,0 +1,134 @@
+//! Summaries and curves of made-up runs with known answers.
+#![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+use super::*;
+use crate::study::{
+    plan::{Description, Options},
+    record::Conditions,
+    reference::OwnErrors,
+};
+
+fn scene(own_mse: f64) -> SceneRecord {
+    SceneRecord {
+        name: "room".into(),
+        path: "room.toml".into(),
+        hash: String::new(),
+        width: 4,
+        height: 3,
+        triangles: 1,
+        reference: Some(OwnErrors { mse: Some(own_mse), mean: 1.0, ..OwnErrors::default() }),
+    }
+}
+
+fn plan() -> Plan {
+    let contenders = ["mis", "ris"].into_iter();
+    let samplers = crate::study::contender::Contender::parse_all(contenders, Default::default());
+    let options = Options { samplers: samplers.ok(), spp: Some(vec![2, 4]), ..Options::default() };
+    Plan::new(vec!["room.toml".into()], Description::default(), options, Vec::new()).unwrap()
+}
+
+/// A run whose MSE is `variance` / samples, at 1, 2 and 4 samples, a tenth of a second each.
+fn run(sampler: &str, seed: u32, variance: f64) -> Run {
+    let measurement = |spp: u32| Measurement {
+        spp,
+        seconds: 0.1 * f64::from(spp),
+        gpu_seconds: 0.09 * f64::from(spp),
+        rays: 12,
+        mse: variance / f64::from(spp),
+        rmse: (variance / f64::from(spp)).sqrt(),
+        relmse: 1.0,
+        relmse_trimmed: 1.0,
+        mean_ratio: 1.0 + 0.01 * f64::from(seed),
+        mean_deviation: Some(-f64::from(seed)),
+        mse_judged: true,
+        relmse_judged: true,
+        image: None,
+    };
+    Run {
+        scene: "room".into(),
+        sampler: sampler.into(),
+        rule: Rule::Spp(4),
+        seed,
+        conditions: Conditions {
+            version: String::new(),
+            scene_hash: String::new(),
+            film: [4, 3],
+            device: String::new(),
+            driver: String::new(),
+            shadow_rays: 5,
+            depth: 1,
+            reference: String::new(),
+            parameters: BTreeMap::new(),
+        },
+        measurements: [1, 2, 4].map(measurement).to_vec(),
+        gpu_ms_per_sample: BTreeMap::from([("sample".into(), 3.0)]),
+        rays: BTreeMap::new(),
+        visible_share: Some(0.1 * f64::from(seed)),
+        statistics: BTreeMap::from([("rebuilds".into(), f64::from(seed))]),
+    }
+}
+
+fn runs() -> Vec<Run> {
+    // `ris` has a quarter of the variance under either seed, at the same time.
+    vec![run("mis", 1, 8.0), run("ris", 1, 2.0), run("mis", 2, 16.0), run("ris", 2, 4.0)]
+}
+
+#[test]
+fn ratios_are_of_pairs_of_one_seed() {
+    let all = summaries(&plan(), &[scene(0.01)], &runs());
+    let order: Vec<(&str, Rule)> =
+        all.iter().map(|summary| (summary.sampler.as_str(), summary.rule)).collect();
+    let expected = [
+        ("mis", Rule::Spp(2)),
+        ("ris", Rule::Spp(2)),
+        ("mis", Rule::Spp(4)),
+        ("ris", Rule::Spp(4)),
+    ];
+    assert_eq!(order, expected);
+    let ris = &all[3];
+    assert!((ris.mse - 0.75).abs() < 1e-12 && (ris.rmse - 0.75_f64.sqrt()).abs() < 1e-12);
+    let (ratio, efficiency) = (ris.rmse_ratio.unwrap(), ris.efficiency.unwrap());
+    for value in [ratio.low, ratio.middle, ratio.high] {
+        assert!((value - 0.5).abs() < 1e-9, "{ratio:?}");
+    }
+    assert!((efficiency.middle - 4.0).abs() < 1e-9);
+    assert!((ris.mean_ratio.middle - 1.015).abs() < 1e-12);
+    assert_eq!(ris.mean_deviation, Some(-2.0));
+    assert!((ris.visible_share.unwrap() - 0.15).abs() < 1e-12);
+    assert_eq!((ris.statistics["rebuilds"], ris.total_ms()), (1.5, 3.0));
+}
+
+#[test]
+fn what_drowns_in_the_references_noise_is_not_judged() {
+    // At 4 samples `ris` has a mean squared error of 0.75, `mis` of 3.
+    let all = summaries(&plan(), &[scene(0.5)], &runs());
+    assert!(all[2].mse_judged && !all[3].mse_judged);
+    assert_eq!((all[3].rmse_ratio, all[3].efficiency), (None, None));
+    let all = summaries(&plan(), &[scene(0.75 / 4.0)], &runs());
+    assert!(all[3].mse_judged && all[3].rmse_ratio.is_some());
+}
+
+#[test]
+fn independent_samples_have_a_slope_of_minus_one_half() {
+    let all = curves(&plan(), &[scene(0.01)], &runs());
+    assert_eq!(all.len(), 2);
+    for curve in &all {
+        assert_eq!(curve.points.iter().map(|point| point.spp).collect::<Vec<_>>(), [1, 2, 4]);
+        assert!((curve.slope_spp.unwrap() + 0.5).abs() < 1e-9);
+        assert!((curve.slope_seconds.unwrap() + 0.5).abs() < 1e-9);
+        for Point { rmse, .. } in &curve.points {
+            assert!(rmse.low < rmse.middle && rmse.middle < rmse.high);
+        }
+    }
+    // 12/n falls below 4·0.8 after the second point.
+    let judged = &curves(&plan(), &[scene(0.8)], &runs())[0];
+    assert_eq!(judged.points.len(), 2);
+}
+
+#[test]
+fn a_mean_that_is_off_is_pointed_out() {
+    let mut runs = runs();
+    runs[1].measurements[2].mean_deviation = Some(4.5);
+    let all = summaries(&plan(), &[scene(0.01)], &runs);
+    assert!(all[3].is_suspicious() && !all[1].is_suspicious());
+}

@@ -1,0 +1,502 @@
+//! The study command from its options to its report: runs, figures, what is taken up again, and the
+//! messages of bad input.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
+
+#[path = "support/command.rs"]
+mod command;
+
+use std::{
+    fs,
+    io::{BufRead, BufReader},
+    process::{Command, Stdio},
+};
+
+use command::{Folder, Run, program};
+use fenestra::film::{Attribute, Image, Metadata};
+use serde_json::Value;
+
+/// A box on a floor under the sky.
+const SCENE: &str = r#"
+[camera]
+position = [0.0, 1.0, 3.0]
+look_at = [0.0, 0.3, 0.0]
+vertical_fov_deg = 45.0
+
+[film]
+width = 24
+height = 16
+
+[environment]
+sky = {}
+
+[[material]]
+name = "clay"
+type = "plastic"
+diffuse = [0.6, 0.4, 0.3]
+alpha = 0.2
+
+[[object]]
+shape = "box"
+size = [4.0, 0.2, 4.0]
+material = "clay"
+translate = [0.0, -0.1, 0.0]
+
+[[object]]
+shape = "box"
+size = [0.6, 0.6, 0.6]
+material = "clay"
+translate = [0.0, 0.3, 0.0]
+"#;
+
+const SMALL: [&str; 10] = [
+    "study",
+    "yard.toml",
+    "--samplers=mis,ris",
+    "--spp=4,6",
+    "--seeds=2",
+    "--reference-spp=128",
+    "--shadow-rays=2",
+    "-o",
+    "report",
+    "--quiet",
+];
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    folder.write("yard.toml", SCENE);
+    folder
+}
+
+fn with<'a>(options: &[&'a str], more: &[&'a str]) -> Vec<&'a str> {
+    options.iter().chain(more).copied().collect()
+}
+
+fn json(folder: &Folder, name: &str) -> Value {
+    let text = fs::read_to_string(folder.path().join("report").join(name)).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+/// Time of the last change of a run's record, which tells whether it was made again.
+fn changed(folder: &Folder, name: &str) -> std::time::SystemTime {
+    fs::metadata(folder.path().join("report").join(name)).unwrap().modified().unwrap()
+}
+
+#[test]
+fn a_study_has_every_figure() {
+    let folder = folder();
+    let run = folder.run(&with(&SMALL, &["--time=100ms", "--json", "--validate"]));
+    run.assert(0, &[]);
+    let results = json(&folder, "results.json");
+    let printed: Value = serde_json::from_str(&run.output).unwrap();
+    assert_eq!(printed, results);
+
+    // Two samplers, two seeds, by samples and by time.
+    let runs = results["runs"].as_array().unwrap();
+    assert_eq!(runs.len(), 8);
+    for run in runs {
+        let measurements = run["measurements"].as_array().unwrap();
+        let last = measurements.last().unwrap();
+        assert!(last["seconds"].as_f64().unwrap() > 0.0);
+        assert!((last["mean_ratio"].as_f64().unwrap() - 1.0).abs() < 0.2, "{last}");
+        assert!(last["mean_deviation"].as_f64().unwrap().abs() < 5.0, "{last}");
+        assert!(run["visible_share"].as_f64().unwrap() > 0.2);
+        assert!(run["gpu_ms_per_sample"]["sample"].as_f64().unwrap() > 0.0);
+        if run["rule"]["spp"].is_number() {
+            let counts: Vec<_> = measurements.iter().map(|m| m["spp"].as_u64().unwrap()).collect();
+            assert_eq!(counts, [1, 2, 4, 6]);
+            assert!(last["rmse"].as_f64().unwrap() > 0.0, "{last}");
+            assert_eq!(run["rays"]["camera"], 24 * 16 * 6);
+        } else {
+            assert!(last["seconds"].as_f64().unwrap() >= 0.1);
+        }
+    }
+    // Two levels of samples and the time, for two samplers.
+    assert_eq!(results["summaries"].as_array().unwrap().len(), 6);
+    assert_eq!(results["curves"].as_array().unwrap().len(), 2);
+    let reference = &results["scenes"][0]["reference"];
+    assert_eq!(reference["spp"], 128);
+    assert!(reference["mse"].as_f64().unwrap() > 0.0);
+    assert!(results["circumstances"]["device"].is_string());
+
+    let table = fs::read_to_string(folder.path().join("report/results.csv")).unwrap();
+    let mut lines = table.lines();
+    let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
+    for column in [
+        "scene",
+        "sampler",
+        "parameters",
+        "seed",
+        "spp",
+        "seconds",
+        "rays",
+        "visible_share",
+        "rmse",
+        "mse",
+        "relmse",
+        "relmse_trimmed",
+        "mean_ratio",
+        "gpu_ms_per_sample_sample",
+    ] {
+        assert!(columns.contains(&column), "{column}: {columns:?}");
+    }
+    let rows: Vec<&str> = lines.collect();
+    // Eight at numbers of samples, four at a time.
+    assert_eq!(rows.len(), 12);
+    for row in rows {
+        assert_eq!(row.split(',').count(), columns.len(), "{row}");
+    }
+
+    for name in ["mis-4spp-seed1", "mis-6spp-seed2", "ris-0.1s-seed1", "reference_1"] {
+        let path = folder.path().join(format!("report/images/yard/{name}.exr"));
+        let image = Image::read_exr(&path).unwrap();
+        assert_eq!((image.width, image.height), (24, 16));
+        Metadata::load(&image, &path).unwrap();
+    }
+    assert!(folder.path().join("report/images/yard/ris-6spp-seed1.png").exists());
+    assert!(folder.path().join("report/images/yard/reference.png").exists());
+}
+
+#[test]
+fn the_same_seed_has_the_same_error() {
+    let folder = folder();
+    folder.run(&SMALL).assert(0, &[]);
+    let first = json(&folder, "results.json");
+    folder.run(&with(&SMALL, &["--redo", "--depth=1"])).assert(0, &[]);
+    let kept = changed(&folder, "runs/yard/mis-6spp-seed1.json");
+    assert_eq!(json(&folder, "results.json")["runs"], first["runs"], "nothing was redone");
+    fs::remove_dir_all(folder.path().join("report/runs")).unwrap();
+    folder.run(&SMALL).assert(0, &[]);
+    assert!(changed(&folder, "runs/yard/mis-6spp-seed1.json") > kept);
+    let second = json(&folder, "results.json");
+    for (a, b) in first["runs"].as_array().unwrap().iter().zip(second["runs"].as_array().unwrap()) {
+        let errors = |run: &Value| -> Vec<Value> {
+            run["measurements"].as_array().unwrap().iter().map(|m| m["mse"].clone()).collect()
+        };
+        assert_eq!(errors(a), errors(b));
+    }
+}
+
+#[test]
+fn finished_runs_are_kept_and_new_ones_added() {
+    let folder = folder();
+    folder.run(&SMALL).assert(0, &[]);
+    let record = "runs/yard/mis-6spp-seed1.json";
+    let before = changed(&folder, record);
+    let more = ["--samplers=mis,ris,env", "--seeds=3"];
+    let options: Vec<&str> = SMALL
+        .iter()
+        .filter(|o| !o.starts_with("--sa") && !o.starts_with("--se"))
+        .copied()
+        .collect();
+    folder.run(&with(&options, &more)).assert(0, &[]);
+    assert_eq!(changed(&folder, record), before);
+    assert_eq!(json(&folder, "results.json")["runs"].as_array().unwrap().len(), 9);
+}
+
+#[test]
+fn runs_made_under_other_conditions_are_not_mixed_in() {
+    let folder = folder();
+    folder.run(&SMALL).assert(0, &[]);
+    let record = "runs/yard/mis-6spp-seed1.json";
+    let before = changed(&folder, record);
+    let options: Vec<&str> = SMALL.iter().filter(|o| !o.starts_with("--shadow")).copied().collect();
+    let other = with(&options, &["--shadow-rays=3"]);
+    folder.run(&other).assert(1, &["error: report: ", "shadow rays: 2 there, 3", "--redo"]);
+    assert_eq!(changed(&folder, record), before);
+    folder.run(&with(&other, &["--redo"])).assert(0, &[]);
+    assert_eq!(json(&folder, record)["conditions"]["shadow_rays"], 3);
+    folder.write("yard.toml", SCENE.replace("0.6, 0.4", "0.5, 0.4"));
+    folder.run(&other).assert(1, &["scene hash: ", "--redo"]);
+}
+
+#[test]
+fn overhead_is_measured_in_rounds() {
+    let folder = folder();
+    let options = [
+        "study",
+        "yard.toml",
+        "--samplers=mis,ris,ris:candidates=8",
+        "--overhead",
+        "--repetitions=3",
+        "-o",
+        "report",
+        "--quiet",
+    ];
+    folder.run(&options).assert(0, &[]);
+    let results = json(&folder, "results.json");
+    assert_eq!(results["rounds"].as_array().unwrap().len(), 3);
+    let overheads = results["overheads"].as_array().unwrap();
+    let names: Vec<_> = overheads.iter().map(|o| o["sampler"].as_str().unwrap()).collect();
+    assert_eq!(names, ["ris:candidates=8", "ris"].iter().rev().copied().collect::<Vec<_>>());
+    for overhead in overheads {
+        assert_eq!(overhead["baseline"], "mis");
+        assert_eq!(overhead["rounds"], 3);
+        assert!(overhead["total"]["middle"].as_f64().unwrap() > 0.3, "{overhead}");
+        let blocked = overhead["blocked_share"].as_f64().unwrap();
+        assert!((0.0..1.0).contains(&blocked), "{blocked}");
+        let passes: Vec<_> = overhead["passes"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|pass| pass["pass"].as_str().unwrap())
+            .collect();
+        assert!(passes.contains(&"sample") && passes.contains(&"shadow"), "{passes:?}");
+    }
+    let record = "runs/yard/overhead-2.json";
+    let before = changed(&folder, record);
+    folder.run(&options).assert(0, &[]);
+    assert_eq!(changed(&folder, record), before);
+}
+
+/// A study that takes long, started in `folder`; returns when its first run is finished.
+fn start_long_study(
+    folder: &Folder,
+) -> (std::process::Child, BufReader<std::process::ChildStderr>) {
+    let mut child = program(folder.path())
+        .args(["study", "yard.toml", "--samplers=mis,ris", "--spp=4", "--time=60s", "--seeds=1"])
+        .args(["--reference-spp=16", "-o", "report"])
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut messages = BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    while !line.starts_with("yard: ris, 4 spp") {
+        line.clear();
+        assert!(messages.read_line(&mut line).unwrap() > 0, "the first runs end");
+    }
+    (child, messages)
+}
+
+#[test]
+#[cfg(unix)]
+fn an_interrupted_study_keeps_its_runs_and_continues() {
+    let folder = folder();
+    let (mut child, mut messages) = start_long_study(&folder);
+    let kill = format!("kill -INT {}", child.id());
+    assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
+    let mut rest = String::new();
+    std::io::Read::read_to_string(&mut messages, &mut rest).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(130), "{rest}");
+    assert!(rest.contains("interrupted"), "{rest}");
+    let results = json(&folder, "results.json");
+    assert_eq!(results["runs"].as_array().unwrap().len(), 2);
+    assert_eq!(results["is_complete"], false);
+
+    let record = "runs/yard/ris-4spp-seed1.json";
+    let before = changed(&folder, record);
+    let run = folder.run(&[
+        "study",
+        "yard.toml",
+        "--samplers=mis,ris",
+        "--spp=4",
+        "--seeds=1",
+        "--reference-spp=16",
+        "-o",
+        "report",
+    ]);
+    run.assert(0, &["study: in", "(finished)"]);
+    assert_eq!(changed(&folder, record), before);
+    assert_eq!(json(&folder, "results.json")["is_complete"], true);
+}
+
+#[test]
+fn a_study_file_gives_scenes_and_settings() {
+    let folder = folder();
+    folder.write(
+        "study.toml",
+        "study = \"Yards\"\nscenes = [\"yard.toml\"]\n[settings]\nsamplers = [\"mis\", \"ris\"]\n\
+         spp = [64]\nseeds = 5\nreference_spp = 128\n[quick]\nspp = [2]\nseeds = 1\n",
+    );
+    folder.write("other.toml", SCENE);
+    let options = ["study", "study.toml", "--quick", "--size=12x8", "-o", "report", "--quiet"];
+    folder.run(&options).assert(0, &[]);
+    let results = json(&folder, "results.json");
+    assert_eq!(results["title"], "Yards");
+    assert_eq!(results["runs"].as_array().unwrap().len(), 2);
+    assert_eq!(results["scenes"][0]["width"], 12);
+    folder.run(&with(&options, &["other.toml"])).assert(0, &[]);
+    assert_eq!(json(&folder, "results.json")["scenes"][0]["name"], "other");
+}
+
+#[test]
+fn mistakes_in_study_files_have_line_and_column() {
+    let folder = folder();
+    let start = "study = \"T\"\nscenes = [\"yard.toml\"]\n[settings]\n";
+    let refuse = |text: &str, parts: &[&str]| {
+        folder.write("study.toml", format!("{start}{text}"));
+        folder.run(&["study", "study.toml"]).assert(1, parts);
+    };
+    refuse("samplers = [\"mis\", \"best\"]", &["study.toml:4:12: ", "\"best\"", "known: uniform"]);
+    refuse("colour = 1", &["study.toml:4:1: ", "colour", "samplers"]);
+    refuse("time = \"soon\"", &["study.toml:4:8: ", "expected a duration"]);
+    refuse("size = \"big\"", &["study.toml:4:8: ", "expected WIDTHxHEIGHT"]);
+    refuse("spp = = 3", &["study.toml:4:7: "]);
+    folder.write("study.toml", "title = \"neither\"\n");
+    folder
+        .run(&["study", "study.toml"])
+        .assert(1, &["study.toml: expected a scene", "found neither"]);
+    folder.run(&["study", "absent.toml"]).assert(1, &["absent.toml: cannot read"]);
+    let start = start.replace("yard", "absent");
+    folder.write("study.toml", start);
+    folder.run(&["study", "study.toml"]).assert(1, &["absent.toml: cannot read"]);
+}
+
+#[test]
+fn wrong_options_exit_with_2() {
+    let folder = folder();
+    folder.write("study.toml", "study = \"T\"\nscenes = [\"yard.toml\"]\n");
+    let refuse = |options: &[&str], message: &str| {
+        folder.run(&with(&["study", "yard.toml"], options)).assert(2, &[message]);
+    };
+    refuse(&["--samplers=mis,best"], "--samplers: there is no sampler \"best\"; known: uniform");
+    refuse(&["--samplers=ris:colour=1"], "known: candidates");
+    refuse(&["--samplers=mis,mis"], "sampler \"mis\" is listed twice");
+    refuse(&["--reference-sampler=best"], "there is no sampler \"best\"");
+    refuse(&["--baseline=best"], "there is no sampler \"best\"");
+    refuse(&["--spp=0"], "--spp: expected 1 to");
+    refuse(&["--seeds=0"], "--seeds: expected 1 to");
+    refuse(&["--depth=65"], "--depth: expected 1 to 64");
+    refuse(&["--time=soon"], "expected a duration");
+    refuse(&["--reference-spp=1"], "--reference-spp: expected 2 to");
+    refuse(&["--overhead", "--samplers=mis"], "besides the baseline mis");
+    refuse(&["study.toml", "study.toml"], "expected one study file at most");
+    folder.run(&["study"]).assert(2, &["<SCENE|STUDY>"]);
+    folder.run(&["study", "yard.toml", "yard.toml"]).assert(2, &["both named \"yard\""]);
+    assert!(!folder.path().join("report/runs").exists());
+}
+
+#[test]
+fn a_folder_that_holds_something_else_is_refused() {
+    let folder = folder();
+    fs::create_dir(folder.path().join("report")).unwrap();
+    folder.write("report/thesis.txt", "precious");
+    folder.run(&SMALL).assert(1, &["error: report: ", "something else", "thesis.txt", "-o"]);
+    assert_eq!(fs::read_dir(folder.path().join("report")).unwrap().count(), 1);
+    folder.write("file", "precious");
+    let options = ["study", "yard.toml", "--spp=2", "-o", "file"];
+    folder.run(&options).assert(1, &["error: file: ", "found a file"]);
+    assert_eq!(fs::read_to_string(folder.path().join("file")).unwrap(), "precious");
+}
+
+/// Renders `yard.toml` as a reference.
+fn reference(folder: &Folder, name: &str, options: &[&str]) {
+    let render = ["render", "yard.toml", "--spp=64", "--aov=variance", "--quiet", "-o", name];
+    folder.run(&with(&render, options)).assert(0, &[]);
+}
+
+const WITH_REFERENCE: [&str; 7] =
+    ["study", "yard.toml", "--samplers=mis", "--spp=2", "-o", "report", "--quiet"];
+
+#[test]
+fn references_can_be_given() {
+    let folder = folder();
+    reference(&folder, "a.exr", &["--seed=100"]);
+    reference(&folder, "b.exr", &["--seed=101"]);
+    let halves = ["--reference=a.exr", "--reference=b.exr"];
+    folder.run(&with(&WITH_REFERENCE, &halves)).assert(0, &[]);
+    let own = json(&folder, "results.json")["scenes"][0]["reference"].clone();
+    assert_eq!(own["spp"], 128);
+    assert!(own["mse"].as_f64().unwrap() > 0.0 && own["relmse"].as_f64().unwrap() > 0.0);
+
+    // One image: its own error is that of its variances.
+    let one = ["study", "yard.toml", "--samplers=mis", "--spp=2", "--reference=a.exr", "-o", "one"];
+    folder.run(&one).assert(0, &[]);
+    let text = fs::read_to_string(folder.path().join("one/results.json")).unwrap();
+    let results: Value = serde_json::from_str(&text).unwrap();
+    let single = &results["scenes"][0]["reference"];
+    assert!(single["mse"].as_f64().unwrap() > own["mse"].as_f64().unwrap());
+    assert!(single["relmse"].is_null());
+
+    // Those of another study.
+    folder
+        .run(&[
+            "study",
+            "yard.toml",
+            "--samplers=ris",
+            "--spp=2",
+            "--reference=report",
+            "-o",
+            "more",
+        ])
+        .assert(0, &[]);
+    let text = fs::read_to_string(folder.path().join("more/results.json")).unwrap();
+    let results: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(results["scenes"][0]["reference"]["mean"], own["mean"]);
+}
+
+#[test]
+fn references_that_do_not_fit_are_refused() {
+    let folder = folder();
+    let refuse = |options: &[&str], parts: &[&str]| -> Run {
+        let run = folder.run(&with(&WITH_REFERENCE, options));
+        run.assert(1, parts);
+        run
+    };
+    reference(&folder, "wide.exr", &["--size=32x16"]);
+    refuse(&["--reference=wide.exr"], &["wide.exr shows 32x16", "24x16", "--size 32x16"]);
+    reference(&folder, "a.exr", &[]);
+    let twice = ["--reference=a.exr", "--reference=a.exr"];
+    refuse(&twice, &["share samples (0:0+64)", "different seeds"]);
+    let path = folder.path().join("a.exr");
+    let mut image = Image::read_exr(&path).unwrap();
+    let hash = image.attributes.insert("fenestra.scene_hash".into(), Attribute::Text("0".into()));
+    image.write_exr(&path).unwrap();
+    refuse(&["--reference=a.exr"], &["a.exr shows another scene than yard.toml"]);
+    image.attributes.insert("fenestra.scene_hash".into(), hash.unwrap());
+    image.channels.get_mut("G").unwrap()[24 * 3 + 5] = f32::NAN;
+    image.write_exr(&path).unwrap();
+    refuse(&["--reference=a.exr"], &["a.exr has 1 pixels that are not finite, the first at 5,3"]);
+    for channel in image.channels.values_mut() {
+        channel.fill(0.0);
+    }
+    image.write_exr(&path).unwrap();
+    refuse(&["--reference=a.exr"], &["a.exr is black"]);
+    refuse(&["--reference=absent.exr"], &["absent.exr: cannot read"]);
+    fs::create_dir(folder.path().join("empty")).unwrap();
+    refuse(&["--reference=empty"], &["empty: expected the report folder of a study"]);
+}
+
+#[test]
+fn a_sampler_below_the_references_noise_is_not_judged() {
+    let folder = folder();
+    let options = [
+        "study",
+        "yard.toml",
+        "--samplers=mis,ris",
+        "--spp=64",
+        "--seeds=1",
+        "--reference-spp=2",
+        "-o",
+        "report",
+        "--quiet",
+    ];
+    folder.run(&options).assert(0, &[]);
+    let results = json(&folder, "results.json");
+    let summary = &results["summaries"][1];
+    assert_eq!(summary["mse_judged"], false, "{summary}");
+    assert!(summary["rmse_ratio"].is_null() && summary["efficiency"].is_null());
+}
+
+/// A limit on the size of files stands in for a disk without space.
+#[test]
+#[cfg(unix)]
+fn no_space_is_an_error_and_finished_runs_stay() {
+    let folder = folder();
+    folder.run(&SMALL).assert(0, &[]);
+    let record = "runs/yard/mis-6spp-seed1.json";
+    let before = changed(&folder, record);
+    // Files of at most 512 bytes, and an error in place of the signal.
+    let script = "trap '' XFSZ; ulimit -f 1; exec \"$0\" \"$@\"";
+    let output = Command::new("sh")
+        .args(["-c", script, env!("CARGO_BIN_EXE_fenestra")])
+        .args(SMALL.iter().map(|o| if o.starts_with("--seeds") { "--seeds=3" } else { o }))
+        .current_dir(folder.path())
+        .env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"))
+        .output()
+        .unwrap();
+    Run::of(&output).assert(1, &["error: report/", ": cannot write: File too large"]);
+    assert_eq!(changed(&folder, record), before);
+    let results = json(&folder, "results.json");
+    assert_eq!(results["runs"].as_array().unwrap().len(), 4, "the old results stand");
+    folder.run(&SMALL).assert(0, &[]);
+}
