@@ -76,6 +76,20 @@ fn json(folder: &Folder, name: &str) -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
+/// A page is whole, closes what it opens, and fetches nothing.
+#[track_caller]
+fn check_page(page: &str) {
+    assert!(page.starts_with("<!DOCTYPE html>") && page.trim_end().ends_with("</html>"));
+    for text in ["{{", "NaN", "http:", "https:", "src=", "@import", "<link"] {
+        assert!(!page.contains(text), "{text}");
+    }
+    for name in ["section", "table", "figure", "svg", "div", "ul", "select", "details", "dl", "p"] {
+        let opened =
+            page.matches(&format!("<{name}>")).count() + page.matches(&format!("<{name} ")).count();
+        assert_eq!(opened, page.matches(&format!("</{name}>")).count(), "<{name}>");
+    }
+}
+
 /// Time of the last change of a run's record, which tells whether it was made again.
 fn changed(folder: &Folder, name: &str) -> std::time::SystemTime {
     fs::metadata(folder.path().join("report").join(name)).unwrap().modified().unwrap()
@@ -146,6 +160,26 @@ fn a_study_has_every_figure() {
         assert_eq!(row.split(',').count(), columns.len(), "{row}");
     }
 
+    let page = fs::read_to_string(folder.path().join("report/index.html")).unwrap();
+    check_page(&page);
+    for part in [
+        "At a glance",
+        "id=\"scene-0\"",
+        "mis, 6 spp",
+        "ris, 0.1 s: error",
+        "RMSE against samples",
+        "RMSE against time",
+        "two halves of 64 spp",
+        "2 shadow rays per path vertex",
+        "1 to 2;",
+        "--samplers=mis,ris",
+        "Definitions",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    // Reference, two samplers at three rules with their errors.
+    assert_eq!(page.matches("{background-image:url(data:image/png;base64,").count(), 1 + 2 * 6);
+
     for name in ["mis-4spp-seed1", "mis-6spp-seed2", "ris-0.1s-seed1", "reference_1"] {
         let path = folder.path().join(format!("report/images/yard/{name}.exr"));
         let image = Image::read_exr(&path).unwrap();
@@ -154,6 +188,7 @@ fn a_study_has_every_figure() {
     }
     assert!(folder.path().join("report/images/yard/ris-6spp-seed1.png").exists());
     assert!(folder.path().join("report/images/yard/reference.png").exists());
+    assert!(folder.path().join("report/images/yard/mis-4spp-error.png").exists());
 }
 
 #[test]
@@ -242,6 +277,11 @@ fn overhead_is_measured_in_rounds() {
             .collect();
         assert!(passes.contains(&"sample") && passes.contains(&"shadow"), "{passes:?}");
     }
+    let page = fs::read_to_string(folder.path().join("report/index.html")).unwrap();
+    check_page(&page);
+    assert!(page.contains("Overhead over mis against blocked shadow rays"));
+    assert!(page.contains("ris:candidates=8 in yard, pass by pass"));
+    assert!(!page.contains("At a glance"), "nothing was compared");
     let record = "runs/yard/overhead-2.json";
     let before = changed(&folder, record);
     folder.run(&options).assert(0, &[]);
@@ -281,6 +321,8 @@ fn an_interrupted_study_keeps_its_runs_and_continues() {
     let results = json(&folder, "results.json");
     assert_eq!(results["runs"].as_array().unwrap().len(), 2);
     assert_eq!(results["is_complete"], false);
+    let page = fs::read_to_string(folder.path().join("report/index.html")).unwrap();
+    assert!(page.contains("This study ended early"));
 
     let record = "runs/yard/ris-4spp-seed1.json";
     let before = changed(&folder, record);
@@ -304,14 +346,21 @@ fn a_study_file_gives_scenes_and_settings() {
     let folder = folder();
     folder.write(
         "study.toml",
-        "study = \"Yards\"\nscenes = [\"yard.toml\"]\n[settings]\nsamplers = [\"mis\", \"ris\"]\n\
-         spp = [64]\nseeds = 5\nreference_spp = 128\n[quick]\nspp = [2]\nseeds = 1\n",
+        "study = \"Yards <&>\"\nnotes = [\"A <b>note</b>.\"]\nscenes = [\"yard.toml\"]\n[settings]\nsamplers = [\"mis\", \"ris\"]\n\
+         spp = [64]\nseeds = 5\nreference_spp = 128\n[quick]\nspp = [2]\nseeds = 1\n\
+         [[published.errors]]\nscene = \"yard\"\nsource = \"Table 7\"\nspp = 2\n\
+         values = { mis = 0.5, ris = 0.25 }\n",
     );
     folder.write("other.toml", SCENE);
     let options = ["study", "study.toml", "--quick", "--size=12x8", "-o", "report", "--quiet"];
     folder.run(&options).assert(0, &[]);
     let results = json(&folder, "results.json");
-    assert_eq!(results["title"], "Yards");
+    assert_eq!(results["title"], "Yards <&>");
+    let page = fs::read_to_string(folder.path().join("report/index.html")).unwrap();
+    check_page(&page);
+    assert!(page.contains("<h1>Yards &lt;&amp;&gt;</h1>") && page.contains("A &lt;b&gt;note"));
+    assert!(page.contains("Table 7 beside this study: yard"), "the published figures are shown");
+    assert!(page.contains("<td>0.5</td><td>0.25</td><td>0.500</td>"));
     assert_eq!(results["runs"].as_array().unwrap().len(), 2);
     assert_eq!(results["scenes"][0]["width"], 12);
     folder.run(&with(&options, &["other.toml"])).assert(0, &[]);
@@ -475,6 +524,9 @@ fn a_sampler_below_the_references_noise_is_not_judged() {
     let summary = &results["summaries"][1];
     assert_eq!(summary["mse_judged"], false, "{summary}");
     assert!(summary["rmse_ratio"].is_null() && summary["efficiency"].is_null());
+    let page = fs::read_to_string(folder.path().join("report/index.html")).unwrap();
+    check_page(&page);
+    assert!(page.contains("not judged") && page.contains("--reference-spp"));
 }
 
 /// A limit on the size of files stands in for a disk without space.

@@ -21,6 +21,7 @@ use crate::{
         file::{StudyFile, ValueParsers, is_study},
         folder::Folder,
         plan::{Description, Options, Plan},
+        report,
         results::{Circumstances, Report},
         watch::Observer,
     },
@@ -134,7 +135,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
     let finished = results.runs.len() + results.rounds.len();
     let report = Report::new(&plan, results, end.is_none(), Circumstances::new(&device));
-    let written = if finished > 0 { report.write(&plan, &folder) } else { Ok(()) };
+    let write = || {
+        report.write(&plan, &folder)?;
+        report::write(&report, &plan, &folder)
+    };
+    let written = if finished > 0 { write() } else { Ok(()) };
     // What ended the study matters more than that its report could not be written.
     if let Some(error) = end {
         return Err(error);
@@ -144,7 +149,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         super::print_line(&format!("{:#}", serde_json::json!(report)))?;
     }
     if !arguments.quiet {
-        eprintln!("wrote {}", folder.path().join("results.json").display());
+        eprintln!("wrote {}", folder.path().join("index.html").display());
     }
     if let Some(first) = device.validation_messages().first().filter(|_| arguments.validate) {
         return Err(Error::Vulkan {

@@ -8,6 +8,7 @@
 //! runs/SCENE/overhead-N.json
 //! images/SCENE/reference_1.exr, reference_2.exr, reference.png
 //! images/SCENE/SAMPLER-RULE-seedN.exr, .png
+//! images/SCENE/SAMPLER-RULE-error.png
 //! ```
 
 use std::{

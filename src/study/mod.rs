@@ -3,7 +3,7 @@
 //! A study file and the command line ([`file`], [`plan`], [`contender`]) → runs against a reference in
 //! two halves ([`engine`], [`job`], [`reference`], [`overhead`]), each kept as a [`record`] in the
 //! report [`folder`] → figures over the seeds ([`summary`], [`statistics`]) → `results.json`,
-//! `results.csv` ([`results`]). Errors are defined in [`metrics`].
+//! `results.csv` ([`results`]) and the page ([`report`]). Errors are defined in [`metrics`].
 
 pub mod contender;
 pub mod engine;
@@ -16,6 +16,7 @@ pub mod overhead;
 pub mod plan;
 pub mod record;
 pub mod reference;
+pub mod report;
 pub mod results;
 pub mod statistics;
 pub mod summary;

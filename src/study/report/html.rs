@@ -1,0 +1,173 @@
+//! Small pieces of HTML: escaped text, numbers as people read them, tables.
+
+use std::fmt::Write;
+
+use crate::study::statistics::Interval;
+
+/// Text with the characters that mean something in HTML replaced; fit for content and attributes.
+pub fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\'' => escaped.push_str("&#39;"),
+            // Two of them mark the places of the templates.
+            '{' => escaped.push_str("&#123;"),
+            other => escaped.push(other),
+        }
+    }
+    escaped
+}
+
+/// A number with `digits` significant digits: 0.0213, 14.5, 2.1e-5.
+pub fn number(value: f64, digits: usize) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return if value == 0.0 { "0".to_owned() } else { "–".to_owned() };
+    }
+    let rounded = format!("{value:.*e}", digits.saturating_sub(1));
+    let exponent: i32 =
+        rounded.split_once('e').and_then(|(_, exponent)| exponent.parse().ok()).unwrap_or(0);
+    if (-4..6).contains(&exponent) {
+        let decimals = usize::try_from(digits as i32 - 1 - exponent).unwrap_or(0);
+        format!("{value:.decimals$}").replace('-', "−")
+    } else {
+        rounded.replace('-', "−")
+    }
+}
+
+/// "0.54 (0.50–0.58)".
+pub fn interval(interval: &Interval, digits: usize) -> String {
+    let [middle, low, high] =
+        [interval.middle, interval.low, interval.high].map(|value| number(value, digits));
+    if low == high {
+        return middle;
+    }
+    format!("{middle} <span class=\"interval\">({low}–{high})</span>")
+}
+
+/// A ratio of times as a percentage more or less: "+12.3% (+11.9–+12.8)".
+pub fn percent_more(ratio: &Interval) -> String {
+    let percent = |value: f64| format!("{:+.1}", 100.0 * (value - 1.0)).replace('-', "−");
+    let [middle, low, high] = [ratio.middle, ratio.low, ratio.high].map(percent);
+    format!("{middle}% <span class=\"interval\">({low} to {high})</span>")
+}
+
+/// A number of samples, whole or a mean.
+pub fn count(value: f64) -> String {
+    if value.fract() == 0.0 { format!("{value:.0}") } else { format!("{value:.1}") }
+}
+
+/// A share as a percentage.
+pub fn percent(share: f64) -> String {
+    format!("{}%", number(100.0 * share, 3))
+}
+
+/// A table with a caption in plain, escaped text; the first column is its rows' headings. Cells are
+/// HTML.
+pub struct Table {
+    caption: String,
+    head: Vec<String>,
+    rows: Vec<(bool, Vec<String>)>,
+}
+
+impl Table {
+    /// A table without rows.
+    pub fn new(caption: impl Into<String>, head: &[&str]) -> Self {
+        Self {
+            caption: caption.into(),
+            head: head.iter().map(|text| (*text).to_owned()).collect(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// Adds a column.
+    pub fn column(&mut self, head: impl Into<String>) {
+        self.head.push(head.into());
+    }
+
+    /// Adds a row; `starts_group` draws a line above it.
+    pub fn row(&mut self, starts_group: bool, cells: Vec<String>) {
+        self.rows.push((starts_group, cells));
+    }
+
+    /// Whether there are rows.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// The table, in a frame that scrolls sideways where it is too wide for the page.
+    pub fn html(&self) -> String {
+        let mut html = format!(
+            "<p class=\"caption\">{0}</p><div class=\"table\" role=\"region\" tabindex=\"0\" \
+             aria-label=\"{0}\"><table><thead><tr>",
+            self.caption
+        );
+        for cell in &self.head {
+            let _ = write!(html, "<th scope=\"col\">{cell}</th>");
+        }
+        html += "</tr></thead><tbody>";
+        for (starts_group, cells) in &self.rows {
+            html += if *starts_group { "<tr class=\"group\">" } else { "<tr>" };
+            for (index, cell) in cells.iter().enumerate() {
+                let _ = if index == 0 {
+                    write!(html, "<th scope=\"row\">{cell}</th>")
+                } else {
+                    write!(html, "<td>{cell}</td>")
+                };
+            }
+            html += "</tr>";
+        }
+        html + "</tbody></table></div>"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_cannot_become_markup() {
+        assert_eq!(escape("<a b=\"c\">'&{"), "&lt;a b=&quot;c&quot;&gt;&#39;&amp;&#123;");
+    }
+
+    #[test]
+    fn numbers_have_their_digits() {
+        for (value, expected) in [
+            (0.0, "0"),
+            (0.021345, "0.0213"),
+            (14.55, "14.6"),
+            (999.96, "1000"),
+            (12345.0, "12345"),
+            (-0.5, "−0.500"),
+            (2.13e-5, "2.13e−5"),
+            (1.5e9, "1.50e9"),
+            (f64::NAN, "–"),
+        ] {
+            assert_eq!(number(value, 3), expected);
+        }
+    }
+
+    #[test]
+    fn intervals_show_both_ends() {
+        let spread = Interval { middle: 0.5, low: 0.25, high: 1.0 };
+        let text = interval(&spread, 2);
+        assert!(text.starts_with("0.50 ") && text.contains("(0.25–1.0)"), "{text}");
+        assert_eq!(interval(&Interval { middle: 2.0, low: 2.0, high: 2.0 }, 2), "2.0");
+        let more = percent_more(&Interval { middle: 1.123, low: 0.98, high: 1.2 });
+        assert!(more.starts_with("+12.3%") && more.contains("(−2.0 to +20.0)"), "{more}");
+    }
+
+    #[test]
+    fn tables_have_headings_for_columns_and_rows() {
+        let mut table = Table::new("Errors", &["sampler"]);
+        assert!(table.is_empty());
+        table.column("RMSE");
+        table.row(true, vec!["mis".into(), "0.1".into()]);
+        let html = table.html();
+        assert!(html.contains("<th scope=\"col\">RMSE</th>"), "{html}");
+        assert!(html.contains("<tr class=\"group\"><th scope=\"row\">mis</th><td>0.1</td></tr>"));
+    }
+}

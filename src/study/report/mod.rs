@@ -1,0 +1,539 @@
+//! The page of a study, `index.html`: one file that needs no network.
+//!
+//! Text, tables and plots are written here and stand without JavaScript; `page.js` adds the viewer
+//! (two pictures over each other, one zoom and pan for all pictures of a scene). Colours follow the
+//! reader's choice of light or dark (`page.css`).
+
+pub mod html;
+pub mod pictures;
+pub mod plot;
+pub mod tables;
+
+use std::{fmt::Write as _, io::Write as _};
+
+use super::{
+    falsecolour::Scale,
+    folder::Folder,
+    plan::Plan,
+    record::{JUDGED_FROM, Rule, SceneRecord},
+    results::Report,
+    summary::{Curve, Point, rules},
+};
+use crate::{error::Result, film::write_atomically};
+use html::{escape, number};
+use pictures::{Picture, ScenePictures};
+use plot::{STYLE_COUNT, Series};
+
+/// Up to so many samplers, pictures of every rule are shown; of more, only those of the largest
+/// number of samples and of the time.
+const FEW_SAMPLERS: usize = 3;
+/// Colours of the false-colour legend.
+const RAMP_STEPS: u32 = 16;
+
+/// Writes `index.html`.
+///
+/// # Errors
+/// A picture cannot be read, or the page cannot be written.
+pub fn write(report: &Report, plan: &Plan, folder: &Folder) -> Result<()> {
+    let rules = rules(plan);
+    let shown: Vec<Rule> = rules
+        .iter()
+        .copied()
+        .filter(|rule| {
+            report.order.len() <= FEW_SAMPLERS
+                || matches!(rule, Rule::Seconds(_))
+                || plan.spp.last().is_some_and(|spp| *rule == Rule::Spp(*spp))
+        })
+        .collect();
+    let mut body = start(report);
+    let mut style = String::new();
+    if !report.summaries.is_empty() {
+        body += "<section id=\"glance\"><h2>At a glance</h2>";
+        body += &tables::at_a_glance(report, &rules);
+        body += "</section>";
+        let published = tables::published(report);
+        if !published.is_empty() {
+            let _ = write!(
+                body,
+                "<section id=\"published\"><h2>Beside the published figures</h2>{}{published}\
+                 </section>",
+                include_str!("published.html")
+            );
+        }
+        for (index, scene) in report.scenes.iter().enumerate() {
+            let own = report.summaries.iter().any(|summary| summary.scene == scene.name);
+            if scene.reference.is_some() && own {
+                let pictures = pictures::load(folder, scene, &report.order, &shown, &report.runs)?;
+                for (number, picture) in pictures.pictures.iter().enumerate() {
+                    style += &picture_style(index, number, picture);
+                }
+                body += &scene_section(report, index, scene, &pictures, &rules);
+            }
+        }
+    }
+    body += &overhead_section(report);
+    body += &end(report);
+    let page = include_str!("page.html")
+        .replace("{{title}}", &escape(&report.title))
+        .replace("{{style}}", include_str!("page.css"))
+        .replace("{{script}}", include_str!("page.js"))
+        .replace("{{pictures}}", &style)
+        .replace("{{body}}", &body);
+    write_atomically(&folder.path().join("index.html"), |file| file.write_all(page.as_bytes()))
+}
+
+/// Title, notes, links.
+fn start(report: &Report) -> String {
+    let facts = &report.circumstances;
+    let mut html = format!(
+        "<header><h1>{}</h1><p class=\"facts\">Fenestra {}, {}, {}</p>",
+        escape(&report.title),
+        escape(&facts.version),
+        escape(&facts.date),
+        escape(&facts.device)
+    );
+    if !report.is_complete {
+        html += "<p class=\"warning\"><strong class=\"warn\">This study ended early.</strong> The \
+                 page shows the runs that were finished; the same command continues it.</p>";
+    }
+    for note in &report.notes {
+        let _ = write!(html, "<p>{}</p>", escape(note));
+    }
+    html += "<nav aria-label=\"Sections\"><ul>";
+    let mut link = |id: &str, text: &str| {
+        let _ = write!(html, "<li><a href=\"#{id}\">{}</a></li>", escape(text));
+    };
+    if !report.summaries.is_empty() {
+        link("glance", "At a glance");
+        for (index, scene) in report.scenes.iter().enumerate() {
+            if report.summaries.iter().any(|summary| summary.scene == scene.name) {
+                link(&format!("scene-{index}"), &scene.name);
+            }
+        }
+    }
+    if !report.overheads.is_empty() {
+        link("overhead", "Overhead");
+    }
+    link("definitions", "Definitions");
+    link("circumstances", "Circumstances");
+    html + "</ul></nav></header>"
+}
+
+/// Name of a picture's class in the style sheet.
+fn picture_class(scene: usize, picture: usize, is_error: bool) -> String {
+    format!("{}{scene}-{picture}", if is_error { "e" } else { "p" })
+}
+
+fn picture_style(scene: usize, number: usize, picture: &Picture) -> String {
+    let rule = |is_error, uri: &String| {
+        if uri.is_empty() {
+            return String::new();
+        }
+        format!(".{}{{background-image:url({uri})}}\n", picture_class(scene, number, is_error))
+    };
+    rule(false, &picture.colour) + &rule(true, &picture.error)
+}
+
+/// "visibility, 400 spp", or "reference".
+fn picture_name(picture: &Picture) -> String {
+    match picture.rule {
+        Some(rule) => format!("{}, {}", escape(&picture.sampler), rule.describe()),
+        None => "reference".to_owned(),
+    }
+}
+
+fn scene_section(
+    report: &Report,
+    index: usize,
+    scene: &SceneRecord,
+    pictures: &ScenePictures,
+    rules: &[Rule],
+) -> String {
+    let mut html = format!(
+        "<section id=\"scene-{index}\"><h2>{}</h2><p class=\"facts\">{}×{} pixels, {} triangles. ",
+        escape(&scene.name),
+        scene.width,
+        scene.height,
+        scene.triangles
+    );
+    if let Some(reference) = &scene.reference {
+        let _ = write!(html, "Reference: {}", escape(&reference.description));
+        html += &match (reference.mse, reference.seconds) {
+            (Some(mse), Some(seconds)) => format!(
+                "; its own RMSE is {}, it took {} s.</p>",
+                number(mse.max(0.0).sqrt(), 3),
+                number(seconds, 3)
+            ),
+            (Some(mse), None) => {
+                format!("; its own RMSE is {}.</p>", number(mse.max(0.0).sqrt(), 3))
+            }
+            (None, _) => "; how noisy it is itself is not known, and its noise is part of every \
+                          error here.</p>"
+                .to_owned(),
+        };
+    }
+    let refused = report
+        .summaries
+        .iter()
+        .filter(|summary| summary.scene == scene.name && !summary.mse_judged)
+        .count();
+    if refused > 0 {
+        let _ = write!(
+            html,
+            "<p class=\"warning\">Figures that are not judged, because the error is not well above the \
+             reference's own: {refused}. A longer reference (<code>--reference-spp</code>) \
+             helps.</p>"
+        );
+    }
+    html += &picture_group(index, scene, pictures);
+    html += &plots(report, scene);
+    html += &tables::figures(report, &scene.name, rules);
+    html + "</section>"
+}
+
+/// Viewer, panes, error maps and crops.
+fn picture_group(index: usize, scene: &SceneRecord, scene_pictures: &ScenePictures) -> String {
+    let ScenePictures { pictures, scale, crops } = scene_pictures;
+    let aspect = format!("--aspect:{}/{}", scene.width, scene.height);
+    let mut html = format!("<div class=\"pictures\" style=\"{aspect}\">");
+    let options = |chosen: usize| {
+        let mut options = String::new();
+        for (number, picture) in pictures.iter().enumerate() {
+            let mut option = |is_error: bool, name: String| {
+                let selected = if number == chosen && !is_error { " selected" } else { "" };
+                let _ = write!(
+                    options,
+                    "<option value=\"{}\"{selected}>{name}</option>",
+                    picture_class(index, number, is_error)
+                );
+            };
+            option(false, picture_name(picture));
+            if !picture.error.is_empty() {
+                option(true, format!("{}: error", picture_name(picture)));
+            }
+        }
+        options
+    };
+    let _ = write!(
+        html,
+        "{}",
+        include_str!("viewer.html")
+            .replace("{{scene}}", &escape(&scene.name))
+            .replace("{{left}}", &options(pictures.len() - 1))
+            .replace("{{right}}", &options(0))
+    );
+    let pane = |number: usize, is_error: bool, caption: &str| {
+        format!(
+            "<figure><div class=\"pane linked\"><div class=\"picture {}\" role=\"img\" \
+             aria-label=\"{caption}\"></div></div><figcaption>{caption}</figcaption></figure>",
+            picture_class(index, number, is_error)
+        )
+    };
+    html += "<div class=\"grid-of-panes\">";
+    for (number, picture) in pictures.iter().enumerate() {
+        html += &pane(number, false, &picture_name(picture));
+    }
+    html += "</div><h3>Errors</h3><p class=\"soft\">Error of every pixel: root of the mean over \
+             RGB and the seeds of the squared error. One scale for the whole scene; what 1% of the \
+             pixels exceed is shown as its end.</p>";
+    html += &ramp(*scale);
+    html += "<div class=\"grid-of-panes\">";
+    for (number, picture) in pictures.iter().enumerate().skip(1) {
+        html += &pane(number, true, &picture_name(picture));
+    }
+    html += "</div><h3>Details</h3><div class=\"crops\">";
+    let mut frames = String::new();
+    for (crop, name) in crops.iter().zip(["A", "B", "C"]) {
+        let _ = write!(
+            frames,
+            "<div class=\"frame\" style=\"--left:{:.2}%;--top:{:.2}%;--side:{:.2}%\">{name}</div>",
+            100.0 * crop.left,
+            100.0 * crop.top,
+            100.0 * crop.size
+        );
+    }
+    let _ = write!(
+        html,
+        "<figure><div class=\"pane\"><div class=\"picture {}\" role=\"img\" aria-label=\"where the \
+         details lie\"></div>{frames}</div><figcaption>where the errors are largest</figcaption>\
+         </figure>",
+        picture_class(index, 0, false)
+    );
+    // Magnified, the largest number of samples shows best; without one, whatever there is.
+    let last = pictures
+        .iter()
+        .filter_map(|picture| picture.rule)
+        .rfind(|rule| matches!(rule, Rule::Spp(_)));
+    let is_magnified = |picture: &&(usize, &Picture)| {
+        last.is_none() || picture.1.rule.is_none() || picture.1.rule == last
+    };
+    for (crop, name) in crops.iter().zip(["A", "B", "C"]) {
+        for (number, picture) in pictures.iter().enumerate().filter(|item| is_magnified(&item)) {
+            let caption = format!("{name}: {}", picture_name(picture));
+            // Positions of backgrounds count in shares of what is left over.
+            let position = |start: f64| 100.0 * start / (1.0 - crop.size).max(1e-6);
+            let _ = write!(
+                html,
+                "<figure><div class=\"pane\"><div class=\"picture {}\" role=\"img\" \
+                 aria-label=\"{caption}\" style=\"--size:{:.2}%;--px:{:.2}%;--py:{:.2}%\"></div>\
+                 </div><figcaption>{caption}</figcaption></figure>",
+                picture_class(index, number, false),
+                100.0 / crop.size,
+                position(crop.left),
+                position(crop.top)
+            );
+        }
+    }
+    html + "</div></div>"
+}
+
+/// Legend of the false colours.
+fn ramp(scale: Scale) -> String {
+    let colours: Vec<String> = (0..=RAMP_STEPS)
+        .map(|step| {
+            let share = f64::from(step) / f64::from(RAMP_STEPS);
+            let [red, green, blue] = scale.colour(scale.low + share * (scale.high - scale.low));
+            format!("rgb({red} {green} {blue})")
+        })
+        .collect();
+    format!(
+        "<div class=\"ramp\" role=\"img\" aria-label=\"blue {} to red {}\"><span>{}</span><span \
+         class=\"bar\" style=\"background:linear-gradient(to right,{})\"></span><span>{}</span></div>",
+        number(scale.low, 3),
+        number(scale.high, 3),
+        number(scale.low, 3),
+        colours.join(","),
+        number(scale.high, 3)
+    )
+}
+
+/// Error against samples and against time.
+fn plots(report: &Report, scene: &SceneRecord) -> String {
+    let curves: Vec<(usize, &Curve)> = report
+        .order
+        .iter()
+        .enumerate()
+        .filter_map(|(style, name)| {
+            let own = |curve: &&Curve| curve.scene == scene.name && curve.sampler == *name;
+            report.curves.iter().find(own).map(|curve| (style, curve))
+        })
+        .filter(|(_, curve)| !curve.points.is_empty())
+        .collect();
+    if curves.is_empty() {
+        return String::new();
+    }
+    let series = |x: &dyn Fn(&Point) -> f64| -> Vec<Series> {
+        curves
+            .iter()
+            .map(|(style, curve)| Series {
+                style: *style,
+                name: curve.sampler.clone(),
+                points: curve
+                    .points
+                    .iter()
+                    .map(|point| plot::Point {
+                        x: x(point),
+                        y: point.rmse.middle,
+                        low: point.rmse.low,
+                        high: point.rmse.high,
+                        label: String::new(),
+                    })
+                    .collect(),
+            })
+            .collect()
+    };
+    let legend = |slope: &dyn Fn(&Curve) -> Option<f64>| {
+        let mut html = "<ul class=\"legend\">".to_owned();
+        for (style, curve) in &curves {
+            let slope = slope(curve)
+                .map_or_else(String::new, |slope| format!(", slope {}", number(slope, 3)));
+            html += &legend_entry(*style, &format!("{}{slope}", escape(&curve.sampler)));
+        }
+        html + "</ul>"
+    };
+    let name = &scene.name;
+    format!(
+        "<h3>Error on the way</h3><div class=\"plots\"><figure>{}{}</figure><figure>{}{}</figure>\
+         </div><p class=\"soft\">Both axes logarithmic. Bands: 95% interval of the mean over the \
+         seeds. Dashed: slope −½, that of independent samples. Points that are not judged are left \
+         out.</p>",
+        plot::log_log(
+            &format!("{name}: RMSE against samples"),
+            "samples per pixel",
+            "RMSE",
+            &series(&|point| f64::from(point.spp))
+        ),
+        legend(&|curve| curve.slope_spp),
+        plot::log_log(
+            &format!("{name}: RMSE against time"),
+            "seconds of passes",
+            "RMSE",
+            &series(&|point| point.seconds)
+        ),
+        legend(&|curve| curve.slope_seconds)
+    )
+}
+
+/// Marker and text; `text` is HTML.
+fn legend_entry(style: usize, text: &str) -> String {
+    format!(
+        "<li class=\"s{}\"><svg viewBox=\"-6 -6 12 12\" aria-hidden=\"true\"><g class=\"mark\">{}\
+         </g></svg>{text}</li>",
+        style % STYLE_COUNT,
+        plot::marker(style)
+    )
+}
+
+/// Overhead against the share of blocked rays, and the tables.
+fn overhead_section(report: &Report) -> String {
+    let Some(first) = report.overheads.first() else { return String::new() };
+    let mut samplers: Vec<&str> = Vec::new();
+    for overhead in &report.overheads {
+        if !samplers.contains(&overhead.sampler.as_str()) {
+            samplers.push(&overhead.sampler);
+        }
+    }
+    let style_of = |sampler: &str| {
+        report.order.iter().position(|name| name == sampler).unwrap_or(STYLE_COUNT - 1)
+    };
+    let more = |ratio: f64| 100.0 * (ratio - 1.0);
+    let series: Vec<Series> = samplers
+        .iter()
+        .map(|sampler| Series {
+            style: style_of(sampler),
+            name: (*sampler).to_owned(),
+            points: report
+                .overheads
+                .iter()
+                .filter(|overhead| overhead.sampler == *sampler)
+                .filter_map(|overhead| {
+                    Some(plot::Point {
+                        x: 100.0 * overhead.blocked_share?,
+                        y: more(overhead.total.middle),
+                        low: more(overhead.total.low),
+                        high: more(overhead.total.high),
+                        label: if *sampler == samplers[0] {
+                            overhead.scene.clone()
+                        } else {
+                            String::new()
+                        },
+                    })
+                })
+                .collect(),
+        })
+        .collect();
+    let ranges: Vec<plot::Range> = report
+        .published_overheads
+        .iter()
+        .map(|published| plot::Range {
+            label: published.label.clone(),
+            low: more(published.low),
+            high: more(published.high),
+        })
+        .collect();
+    let legend: String =
+        samplers.iter().map(|sampler| legend_entry(style_of(sampler), &escape(sampler))).collect();
+    let baseline = &first.baseline;
+    format!(
+        "<section id=\"overhead\"><h2>Overhead</h2><p>How much more device time a sample takes than \
+         with {}, at equal samples: in every round all samplers take turns over the same seed, and \
+         each round gives one ratio.</p><figure>{}<ul class=\"legend\">{legend}</ul></figure>{}\
+         </section>",
+        escape(baseline),
+        plot::scatter(
+            &format!("Overhead over {baseline} against blocked shadow rays"),
+            &format!("blocked shadow rays of {baseline}, %"),
+            "more device time, %",
+            &series,
+            &ranges
+        ),
+        tables::overheads(&report.overheads)
+    )
+}
+
+/// Definitions and what the study was made on.
+fn end(report: &Report) -> String {
+    let facts = &report.circumstances;
+    let mut rows = String::new();
+    let mut row = |what: &str, value: &str| {
+        let _ = write!(rows, "<dt>{what}</dt><dd>{value}</dd>");
+    };
+    row("Machine", &escape(&facts.machine));
+    row("Device and driver", &format!("{} ({})", escape(&facts.device), escape(&facts.driver)));
+    row("Command", &format!("<code>{}</code>", escape(&facts.command)));
+    row(
+        "Version and date",
+        &format!("Fenestra {}, {}", escape(&facts.version), escape(&facts.date)),
+    );
+    row(
+        "Rays and depth",
+        &format!(
+            "{} shadow rays per path vertex, light gathered at {}",
+            report.shadow_rays,
+            if report.depth == 1 {
+                "the first vertex (direct light)".to_owned()
+            } else {
+                format!("{} vertices", report.depth)
+            }
+        ),
+    );
+    row(
+        "Seeds",
+        &match report.seeds {
+            1 => "1".to_owned(),
+            seeds => format!("1 to {seeds}; pictures are of seed 1"),
+        },
+    );
+    let samplers: Vec<String> = report
+        .order
+        .iter()
+        .map(|label| {
+            let parameters: Vec<String> = report
+                .samplers
+                .get(label)
+                .into_iter()
+                .flatten()
+                .map(|(name, value)| {
+                    format!("{} {}", escape(&name.replace('_', " ")), escape(value))
+                })
+                .collect();
+            if parameters.is_empty() {
+                escape(label)
+            } else {
+                format!("{} ({})", escape(label), parameters.join(", "))
+            }
+        })
+        .collect();
+    row("Samplers", &samplers.join(", "));
+    format!(
+        "<section id=\"definitions\"><h2>Definitions</h2>{}</section><section \
+         id=\"circumstances\"><h2>Circumstances</h2><dl>{rows}</dl><p class=\"soft\">Every run is in \
+         <code>results.csv</code> and <code>results.json</code> beside this page.</p></section>",
+        include_str!("definitions.html").replace("{{judged_from}}", &number(JUDGED_FROM, 1))
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ramp_runs_from_blue_to_red() {
+        let html = ramp(Scale { low: 0.0, high: 0.5 });
+        assert!(html.contains("0.500") && html.matches("rgb(").count() == 17, "{html}");
+    }
+
+    #[test]
+    fn templates_have_the_places_that_are_filled() {
+        let page = include_str!("page.html");
+        for place in ["title", "style", "script", "pictures", "body"] {
+            assert!(page.contains(&format!("{{{{{place}}}}}")), "{place}");
+        }
+        // Nothing is fetched from anywhere.
+        for text in [page, include_str!("page.css"), include_str!("page.js")] {
+            assert!(
+                !text.contains("http:") && !text.contains("https:") && !text.contains("@import")
+            );
+        }
+    }
+}

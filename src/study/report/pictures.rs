@@ -1,0 +1,240 @@
+//! Pictures of the page: display PNGs as data URIs, error maps in false colour, and which parts are
+//! worth a magnified look.
+
+use std::path::PathBuf;
+
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+
+use crate::{
+    error::{Error, Result},
+    film::{Image, RgbImage, png::display_from_linear},
+    study::{
+        falsecolour::{self, Scale},
+        folder::Folder,
+        job::exposure,
+        metrics::squared_errors,
+        record::{Rule, Run, SceneRecord},
+        reference::half_stems,
+    },
+};
+
+/// A picture that the page shows, once in its style sheet and wherever its class is used.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Contender's label; empty for the reference.
+    pub sampler: String,
+    /// What ended the run; absent for the reference.
+    pub rule: Option<Rule>,
+    /// Display picture as a data URI.
+    pub colour: String,
+    /// Error map as a data URI; empty for the reference.
+    pub error: String,
+}
+
+/// A magnified part, in shares of the picture's width and height.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crop {
+    /// Left edge.
+    pub left: f64,
+    /// Upper edge.
+    pub top: f64,
+    /// Share of width and height that is shown.
+    pub size: f64,
+}
+
+/// Pictures of a scene: the reference first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScenePictures {
+    /// All of one size.
+    pub pictures: Vec<Picture>,
+    /// Of every error map of the scene.
+    pub scale: Scale,
+    /// Parts with the largest errors.
+    pub crops: Vec<Crop>,
+}
+
+/// Share of width and height that a crop shows.
+const CROP_SIZE: f64 = 0.2;
+const CROP_COUNT: usize = 2;
+
+/// Reads the pictures of a scene from the report folder; those of the first seed are shown, errors are
+/// root mean squares over all seeds. The error maps are written beside the pictures as well, with
+/// their legend.
+///
+/// # Errors
+/// A picture cannot be read, or an error map cannot be written.
+pub fn load(
+    folder: &Folder,
+    scene: &SceneRecord,
+    samplers: &[String],
+    rules: &[Rule],
+    runs: &[Run],
+) -> Result<ScenePictures> {
+    let read = |stem: &str| {
+        let path = folder.image(&scene.name, stem);
+        Image::read_exr(&path)?.rgb(&path)
+    };
+    let [first, second] = half_stems();
+    let (first, second) = (read(first)?, read(second)?);
+    let mean = RgbImage {
+        pixels: first
+            .pixels
+            .iter()
+            .zip(&second.pixels)
+            .map(|(a, b)| std::array::from_fn(|channel| 0.5 * (a[channel] + b[channel])))
+            .collect(),
+        ..first
+    };
+    let stops = exposure(&mean);
+    let mut pictures = vec![Picture {
+        sampler: String::new(),
+        rule: None,
+        colour: display_uri(&mean, stops)?,
+        error: String::new(),
+    }];
+    let mut maps: Vec<Vec<f64>> = Vec::new();
+    let mut error_paths: Vec<PathBuf> = Vec::new();
+    for rule in rules {
+        for sampler in samplers {
+            let mut shown = None;
+            let (mut sum, mut count) = (vec![0.0; mean.pixels.len()], 0.0);
+            let own = runs.iter().filter(|run| run.scene == scene.name && run.sampler == *sampler);
+            for run in own {
+                let Some(name) = run.at(*rule).and_then(|m| m.image.as_ref()) else { continue };
+                let path = folder.path().join(name);
+                let picture = Image::read_exr(&path)?.rgb(&path)?;
+                for (sum, error) in sum.iter_mut().zip(squared_errors(&picture, &first, &second)?) {
+                    *sum += error;
+                }
+                count += 1.0;
+                shown.get_or_insert((picture, path));
+            }
+            if let Some((shown, path)) = shown {
+                let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+                let stem = stem.rsplit_once("-seed").map_or(&*stem, |(run, _)| run);
+                error_paths.push(path.with_file_name(format!("{stem}-error.png")));
+                pictures.push(Picture {
+                    sampler: sampler.clone(),
+                    rule: Some(*rule),
+                    colour: display_uri(&shown, stops)?,
+                    error: String::new(),
+                });
+                maps.push(sum.into_iter().map(|sum| (sum / count).max(0.0).sqrt()).collect());
+            }
+        }
+    }
+    let scale = Scale::of(&maps.concat());
+    for ((picture, map), path) in pictures[1..].iter_mut().zip(&maps).zip(&error_paths) {
+        let colours: Vec<[u8; 3]> = map.iter().map(|error| scale.colour(*error)).collect();
+        picture.error = data_uri(mean.width, mean.height, &colours)?;
+        falsecolour::picture(map, mean.width as usize, scale).write_png(path)?;
+    }
+    let mut worst = vec![0.0_f64; mean.pixels.len()];
+    for map in &maps {
+        for (worst, error) in worst.iter_mut().zip(map) {
+            *worst = worst.max(*error);
+        }
+    }
+    let crops = choose_crops(&worst, mean.width as usize, mean.height as usize);
+    Ok(ScenePictures { pictures, scale, crops })
+}
+
+fn display_uri(picture: &RgbImage, stops: f32) -> Result<String> {
+    let scale = stops.exp2();
+    let bytes: Vec<[u8; 3]> = picture
+        .pixels
+        .iter()
+        .map(|pixel| pixel.map(|value| display_from_linear(value * scale)))
+        .collect();
+    data_uri(picture.width, picture.height, &bytes)
+}
+
+fn data_uri(width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<String> {
+    let mut png = Vec::new();
+    PngEncoder::new(&mut png)
+        .write_image(pixels.as_flattened(), width, height, ExtendedColorType::Rgb8)
+        .map_err(|error| Error::Comparison {
+            message: format!("a picture of the page: {error}"),
+        })?;
+    Ok(format!("data:image/png;base64,{}", base64(&png)))
+}
+
+/// Base 64 with padding (RFC 4648).
+fn base64(bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for group in bytes.chunks(3) {
+        let byte = |index: usize| u32::from(group.get(index).copied().unwrap_or(0));
+        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
+        for digit in 0..4 {
+            let index = (bits >> (18 - 6 * digit) & 63) as usize;
+            text.push(if digit <= group.len() { char::from(DIGITS[index]) } else { '=' });
+        }
+    }
+    text
+}
+
+/// The parts with the largest mean error that do not overlap.
+fn choose_crops(errors: &[f64], width: usize, height: usize) -> Vec<Crop> {
+    let side = |length: usize| ((length as f64 * CROP_SIZE).round() as usize).clamp(1, length);
+    let (crop_width, crop_height) = (side(width), side(height));
+    let mut candidates = Vec::new();
+    for top in (0..=height - crop_height).step_by((crop_height / 4).max(1)) {
+        for left in (0..=width - crop_width).step_by((crop_width / 4).max(1)) {
+            let rows = (top..top + crop_height)
+                .map(|y| &errors[y * width + left..y * width + left + crop_width]);
+            candidates.push((rows.flatten().sum::<f64>(), left, top));
+        }
+    }
+    candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut chosen: Vec<(usize, usize)> = Vec::new();
+    for (_, left, top) in candidates {
+        let is_free = chosen
+            .iter()
+            .all(|(x, y)| x.abs_diff(left) >= crop_width || y.abs_diff(top) >= crop_height);
+        if is_free && chosen.len() < CROP_COUNT {
+            chosen.push((left, top));
+        }
+    }
+    chosen
+        .into_iter()
+        .map(|(left, top)| Crop {
+            left: left as f64 / width as f64,
+            top: top as f64 / height as f64,
+            size: CROP_SIZE,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn base64_is_that_of_the_standard() {
+        for (bytes, text) in
+            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")]
+        {
+            assert_eq!(base64(bytes.as_bytes()), text);
+        }
+        assert_eq!(base64(&[0xfb, 0xff, 0xfe]), "+//+");
+    }
+
+    #[test]
+    fn crops_lie_where_the_errors_are() {
+        let mut errors = vec![0.0; 40 * 20];
+        errors[3 * 40 + 5] = 2.0;
+        errors[17 * 40 + 33] = 1.0;
+        let crops = choose_crops(&errors, 40, 20);
+        let holds = |crop: &Crop, x: f64, y: f64| {
+            (crop.left..crop.left + crop.size).contains(&(x / 40.0))
+                && (crop.top..crop.top + crop.size).contains(&(y / 20.0))
+        };
+        assert!(holds(&crops[0], 5.5, 3.5) && holds(&crops[1], 33.5, 17.5), "{crops:?}");
+    }
+
+    #[test]
+    fn pictures_of_one_pixel_have_a_crop() {
+        assert_eq!(choose_crops(&[1.0], 1, 1).len(), 1);
+    }
+}

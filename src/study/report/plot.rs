@@ -1,0 +1,371 @@
+//! Plots as inline SVG whose colours follow the page (classes `s0`, `s1`, … in `page.css`).
+
+use std::fmt::Write;
+
+use super::html::escape;
+
+const WIDTH: f64 = 460.0;
+const HEIGHT: f64 = 330.0;
+const LEFT: f64 = 58.0;
+const RIGHT: f64 = 12.0;
+const TOP: f64 = 10.0;
+const BOTTOM: f64 = 46.0;
+/// Colours and markers of the page.
+pub const STYLE_COUNT: usize = 8;
+
+/// A point with its band or error bar.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// Abscissa.
+    pub x: f64,
+    /// Ordinate.
+    pub y: f64,
+    /// Lower end of the ordinate's interval.
+    pub low: f64,
+    /// Upper end of the ordinate's interval.
+    pub high: f64,
+    /// Text at the point; empty for none.
+    pub label: String,
+}
+
+/// Points of one colour.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// Index of colour and marker.
+    pub style: usize,
+    /// What it is, for the tooltip.
+    pub name: String,
+    /// In the order in which they are joined.
+    pub points: Vec<Point>,
+}
+
+/// One axis: from values to a share of its length.
+struct Axis {
+    low: f64,
+    high: f64,
+    is_logarithmic: bool,
+    ticks: Vec<f64>,
+}
+
+impl Axis {
+    /// Logarithmic with ticks at 1, 2 and 5 of every decade, or at the decades where there are many.
+    fn logarithmic(values: impl Iterator<Item = f64>) -> Self {
+        let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
+        for value in values.filter(|value| *value > 0.0 && value.is_finite()) {
+            (low, high) = (low.min(value), high.max(value));
+        }
+        if low > high {
+            (low, high) = (0.1, 1.0);
+        }
+        (low, high) = (low / 1.15, high * 1.15);
+        let decades = (low.log10().floor() as i32)..=(high.log10().ceil() as i32);
+        let steps: &[f64] = if (high / low).log10() > 3.0 { &[1.0] } else { &[1.0, 2.0, 5.0] };
+        let ticks = decades
+            .flat_map(|decade| steps.iter().map(move |step| step * 10.0_f64.powi(decade)))
+            .filter(|tick| (low..=high).contains(tick))
+            .collect();
+        Self { low, high, is_logarithmic: true, ticks }
+    }
+
+    /// Linear over `low`…`high`, with ticks at round steps.
+    fn linear(low: f64, high: f64) -> Self {
+        let rough = (high - low) / 5.0;
+        let decade = 10.0_f64.powf(rough.log10().floor());
+        let factors = [1.0, 2.0, 5.0, 10.0];
+        let factor = factors.into_iter().find(|factor| factor * decade >= rough).unwrap_or(10.0);
+        let step = factor * decade;
+        let count = ((high - low) / step).floor() as i32;
+        let first = (low / step).ceil() as i32;
+        let ticks = (first..=first + count)
+            .map(|index| f64::from(index) * step)
+            .filter(|tick| *tick <= high + 1e-9)
+            .collect();
+        Self { low, high, is_logarithmic: false, ticks }
+    }
+
+    fn share(&self, value: f64) -> f64 {
+        if self.is_logarithmic {
+            (value.max(self.low * 1e-3) / self.low).ln() / (self.high / self.low).ln()
+        } else {
+            (value - self.low) / (self.high - self.low)
+        }
+    }
+
+    fn label(&self, value: f64) -> String {
+        if value == 0.0 {
+            return "0".to_owned();
+        }
+        let magnitude = value.abs();
+        let text = if !(1e-4..1e5).contains(&magnitude) {
+            format!("{value:e}")
+        } else {
+            let decimals = if magnitude >= 1.0 { 0 } else { (-magnitude.log10()).ceil() as usize };
+            format!("{value:.decimals$}")
+        };
+        text.replace('-', "−")
+    }
+}
+
+/// Coordinates of the drawing.
+struct Frame {
+    x: Axis,
+    y: Axis,
+}
+
+impl Frame {
+    fn x(&self, value: f64) -> f64 {
+        LEFT + self.x.share(value) * (WIDTH - LEFT - RIGHT)
+    }
+
+    fn y(&self, value: f64) -> f64 {
+        let bottom = HEIGHT - BOTTOM;
+        (bottom - self.y.share(value) * (bottom - TOP)).clamp(TOP, bottom)
+    }
+
+    /// Opening tag, grid, ticks and axis titles.
+    fn start(&self, title: &str, x_title: &str, y_title: &str) -> String {
+        let mut svg = format!(
+            "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" \
+             aria-label=\"{}\"><title>{}</title>",
+            escape(title),
+            escape(title)
+        );
+        let bottom = HEIGHT - BOTTOM;
+        for tick in &self.x.ticks {
+            let x = self.x(*tick);
+            let _ = write!(
+                svg,
+                "<line class=\"grid\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{TOP}\" y2=\"{bottom}\"/>\
+                 <text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
+                bottom + 17.0,
+                self.x.label(*tick)
+            );
+        }
+        for tick in &self.y.ticks {
+            let y = self.y(*tick);
+            let _ = write!(
+                svg,
+                "<line class=\"grid\" x1=\"{LEFT}\" x2=\"{:.1}\" y1=\"{y:.1}\" y2=\"{y:.1}\"/>\
+                 <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+                WIDTH - RIGHT,
+                LEFT - 6.0,
+                y + 4.0,
+                self.y.label(*tick)
+            );
+        }
+        let _ = write!(
+            svg,
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>\
+             <text transform=\"translate(14 {:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
+            0.5 * (LEFT + WIDTH - RIGHT),
+            HEIGHT - 8.0,
+            escape(x_title),
+            0.5 * (TOP + bottom),
+            escape(y_title)
+        );
+        svg
+    }
+}
+
+/// A marker centred on the origin, of a shape of its own for each style.
+pub fn marker(style: usize) -> &'static str {
+    match style % STYLE_COUNT {
+        0 => "<circle r=\"4\"/>",
+        1 => "<rect x=\"-3.6\" y=\"-3.6\" width=\"7.2\" height=\"7.2\"/>",
+        2 => "<path d=\"M0-4.8 4.6 3.6H-4.6Z\"/>",
+        3 => "<path d=\"M0-5 5 0 0 5-5 0Z\"/>",
+        4 => "<path d=\"M0 4.8 4.6-3.6H-4.6Z\"/>",
+        5 => "<path d=\"M-4.4-1.6h2.8v-2.8h3.2v2.8h2.8v3.2h-2.8v2.8h-3.2v-2.8h-2.8z\"/>",
+        6 => "<rect x=\"-4.6\" y=\"-2.2\" width=\"9.2\" height=\"4.4\"/>",
+        _ => "<rect x=\"-2.2\" y=\"-4.6\" width=\"4.4\" height=\"9.2\"/>",
+    }
+}
+
+fn tooltip(series: &Series, point: &Point) -> String {
+    let number = |value| super::html::number(value, 3);
+    format!("<title>{}: {}, {}</title>", escape(&series.name), number(point.x), number(point.y))
+}
+
+/// Lines with bands on two logarithmic axes, and a faint line of slope −½ through the middle.
+pub fn log_log(title: &str, x_title: &str, y_title: &str, series: &[Series]) -> String {
+    let all = || series.iter().flat_map(|series| &series.points);
+    let frame = Frame {
+        x: Axis::logarithmic(all().map(|point| point.x)),
+        // Of bands that are much wider than the curves are apart, only a part is shown.
+        y: Axis::logarithmic(all().flat_map(|point| {
+            [point.y, point.low.max(point.y / 3.0), point.high.min(point.y * 3.0)]
+        })),
+    };
+    let mut svg = frame.start(title, x_title, y_title);
+    let [x0, x1] = [frame.x.low, frame.x.high];
+    let middle = (frame.y.low * frame.y.high).sqrt() * (x0 * x1).powf(0.25);
+    // The part of the guide that lies in the frame.
+    let inside = |x: f64| x.clamp((middle / frame.y.high).powi(2), (middle / frame.y.low).powi(2));
+    let [x0, x1] = [inside(x0), inside(x1)];
+    let _ = write!(
+        svg,
+        "<line class=\"guide\" x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\"><title>slope \
+         −½</title></line>",
+        frame.x(x0),
+        frame.y(middle / x0.sqrt()),
+        frame.x(x1),
+        frame.y(middle / x1.sqrt())
+    );
+    for line in series {
+        let style = line.style % STYLE_COUNT;
+        let place = |x: f64, y: f64| format!("{:.1},{:.1}", frame.x(x), frame.y(y));
+        let upper = line.points.iter().map(|point| place(point.x, point.high));
+        let lower = line.points.iter().rev().map(|point| place(point.x, point.low));
+        let band: Vec<String> = upper.chain(lower).collect();
+        let middle: Vec<String> = line.points.iter().map(|p| place(p.x, p.y)).collect();
+        let _ = write!(
+            svg,
+            "<g class=\"s{style}\"><polygon class=\"band\" points=\"{}\"/><polyline \
+             class=\"line\" points=\"{}\"/>",
+            band.join(" "),
+            middle.join(" ")
+        );
+        for point in &line.points {
+            let _ = write!(
+                svg,
+                "<g class=\"mark\" transform=\"translate({:.1} {:.1})\">{}{}</g>",
+                frame.x(point.x),
+                frame.y(point.y),
+                tooltip(line, point),
+                marker(style)
+            );
+        }
+        svg += "</g>";
+    }
+    svg + "</svg>"
+}
+
+/// A published range, drawn as a band over the whole width.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Range {
+    /// What it is.
+    pub label: String,
+    /// Lower ordinate.
+    pub low: f64,
+    /// Upper ordinate.
+    pub high: f64,
+}
+
+/// Points with error bars over 0…100% on linear axes; ordinates in percent.
+pub fn scatter(
+    title: &str,
+    x_title: &str,
+    y_title: &str,
+    series: &[Series],
+    ranges: &[Range],
+) -> String {
+    let ordinates = series
+        .iter()
+        .flat_map(|series| series.points.iter().flat_map(|point| [point.low, point.y, point.high]))
+        .chain(ranges.iter().flat_map(|range| [range.low, range.high]));
+    let (low, high) =
+        ordinates.fold((0.0_f64, 5.0_f64), |(low, high), value| (low.min(value), high.max(value)));
+    let room = 0.06 * (high - low);
+    let frame = Frame {
+        x: Axis::linear(0.0, 100.0),
+        y: Axis::linear(if low < 0.0 { low - room } else { 0.0 }, high + room),
+    };
+    let mut svg = frame.start(title, x_title, y_title);
+    for range in ranges {
+        let (top, bottom) = (frame.y(range.high), frame.y(range.low));
+        let _ = write!(
+            svg,
+            "<rect class=\"range\" x=\"{LEFT}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\"/>\
+             <text class=\"small\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+            top - 1.0,
+            WIDTH - LEFT - RIGHT,
+            bottom - top + 2.0,
+            LEFT + 6.0,
+            if top - 5.0 > TOP + 8.0 { top - 5.0 } else { bottom + 14.0 },
+            escape(&range.label)
+        );
+    }
+    for dots in series {
+        let style = dots.style % STYLE_COUNT;
+        let _ = write!(svg, "<g class=\"s{style}\">");
+        for point in &dots.points {
+            let (x, y) = (frame.x(point.x), frame.y(point.y));
+            let anchor = if point.x > 60.0 { "end" } else { "start" };
+            let shift = if point.x > 60.0 { -9.0 } else { 9.0 };
+            let _ = write!(
+                svg,
+                "<line class=\"bar\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{:.1}\" y2=\"{:.1}\"/><g \
+                 class=\"mark\" transform=\"translate({x:.1} {y:.1})\">{}{}</g><text class=\"small\" \
+                 x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{}</text>",
+                frame.y(point.low),
+                frame.y(point.high),
+                tooltip(dots, point),
+                marker(style),
+                x + shift,
+                y + 4.0,
+                escape(&point.label)
+            );
+        }
+        svg += "</g>";
+    }
+    svg + "</svg>"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(x: f64, y: f64) -> Point {
+        Point { x, y, low: 0.8 * y, high: 1.2 * y, label: "room".into() }
+    }
+
+    fn attribute(svg: &str, name: &str) -> Vec<f64> {
+        svg.split(&format!(" {name}=\""))
+            .skip(1)
+            .filter_map(|rest| rest.split('"').next()?.parse().ok())
+            .collect()
+    }
+
+    #[test]
+    fn everything_lies_inside_the_drawing() {
+        let points: Vec<Point> =
+            (0..8).map(|i| point(f64::from(1 << i), 1.0 / f64::from(1 << i).sqrt())).collect();
+        let series = [Series { style: 0, name: "mis".into(), points }];
+        let svg = log_log("t", "samples", "RMSE", &series);
+        for name in ["x1", "x2", "x"] {
+            assert!(attribute(&svg, name).iter().all(|x| (0.0..=WIDTH).contains(x)), "{name}");
+        }
+        for name in ["y1", "y2", "y"] {
+            assert!(attribute(&svg, name).iter().all(|y| (0.0..=HEIGHT).contains(y)), "{name}");
+        }
+        assert_eq!(svg.matches("class=\"mark\"").count(), 8);
+        assert!(!svg.contains("NaN"));
+    }
+
+    #[test]
+    fn a_plot_of_nothing_is_empty_but_whole() {
+        for svg in [log_log("t", "x", "y", &[]), scatter("t", "x", "y", &[], &[])] {
+            assert!(svg.ends_with("</svg>") && !svg.contains("NaN") && !svg.contains("inf"));
+        }
+    }
+
+    #[test]
+    fn ticks_are_round_numbers() {
+        let axis = Axis::logarithmic([1.0, 64.0].into_iter());
+        assert_eq!(axis.ticks, [1.0, 2.0, 5.0, 10.0, 20.0, 50.0]);
+        assert_eq!(Axis::linear(0.0, 100.0).ticks, [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]);
+        assert_eq!(axis.label(0.02), "0.02");
+        assert_eq!(axis.label(2e-5), "2e−5");
+        let steep = Axis::logarithmic([1.0, 1e6].into_iter());
+        assert!(steep.ticks.len() <= 8, "{:?}", steep.ticks);
+    }
+
+    #[test]
+    fn overheads_have_bars_and_published_ranges() {
+        let series = [Series { style: 1, name: "v".into(), points: vec![point(80.0, 40.0)] }];
+        let range = Range { label: "thesis <closed>".into(), low: 40.0, high: 50.0 };
+        let svg = scatter("t", "x", "y", &series, &[range]);
+        assert!(svg.contains("class=\"range\"") && svg.contains("class=\"bar\""));
+        assert!(svg.contains("thesis &lt;closed&gt;"));
+    }
+}

@@ -1,0 +1,296 @@
+//! Tables of the page: ratios at a glance, published figures beside ours, every figure of a scene,
+//! overheads.
+
+use std::collections::BTreeSet;
+
+use super::html::{Table, count, escape, interval, number, percent, percent_more};
+use crate::study::{
+    overhead::Overhead,
+    record::Rule,
+    results::Report,
+    summary::{SUSPICIOUS_DEVIATION, Summary},
+};
+
+const NOT_JUDGED: &str = "<span class=\"refused\">not judged</span>";
+
+/// A ratio that is marked where the whole interval is below 1, or why there is none.
+fn ratio_cell(ratio: Option<&crate::study::statistics::Interval>, is_better: bool) -> String {
+    match ratio {
+        Some(ratio) if is_better => format!("<span class=\"best\">{}</span>", interval(ratio, 3)),
+        Some(ratio) => interval(ratio, 3),
+        None => NOT_JUDGED.to_owned(),
+    }
+}
+
+fn find<'a>(report: &'a Report, scene: &str, sampler: &str, rule: Rule) -> Option<&'a Summary> {
+    report.summaries.iter().find(|summary| {
+        summary.scene == scene && summary.sampler == sampler && summary.rule == rule
+    })
+}
+
+/// Ratios of RMSE and of efficiency to the first sampler, in every scene.
+pub fn at_a_glance(report: &Report, rules: &[Rule]) -> String {
+    let [first, others @ ..] = &report.order[..] else { return String::new() };
+    if others.is_empty() || report.summaries.is_empty() {
+        return String::new();
+    }
+    let heads: Vec<String> = others.iter().map(|name| escape(name)).collect();
+    let first = escape(first);
+    let mut errors = Table::new(
+        format!(
+            "RMSE over that of {first}: less is better. Geometric mean over pairs of the same seed \
+             with its 95% interval; bold where all of it is below 1."
+        ),
+        &["scene", "at"],
+    );
+    let mut efficiencies = Table::new(
+        format!(
+            "Efficiency over that of {first}: MSE × seconds of {first} over that of the sampler, so \
+             that 2 means the same error in half the time. Wall time of passes; bold where all of \
+             the interval is above 1."
+        ),
+        &["scene", "at"],
+    );
+    for head in heads {
+        errors.column(head.clone());
+        efficiencies.column(head);
+    }
+    for scene in &report.scenes {
+        for (index, rule) in rules.iter().enumerate() {
+            let found: Vec<Option<&Summary>> =
+                others.iter().map(|name| find(report, &scene.name, name, *rule)).collect();
+            if found.iter().all(Option::is_none) {
+                continue;
+            }
+            let start = || vec![escape(&scene.name), rule.describe()];
+            let cells = |cell: &dyn Fn(&Summary) -> String| {
+                let cells = found.iter().map(|summary| summary.map_or_else(String::new, cell));
+                start().into_iter().chain(cells).collect()
+            };
+            errors.row(
+                index == 0,
+                cells(&|summary| {
+                    let ratio = summary.rmse_ratio.as_ref();
+                    ratio_cell(ratio, ratio.is_some_and(|ratio| ratio.high < 1.0))
+                }),
+            );
+            efficiencies.row(
+                index == 0,
+                cells(&|summary| {
+                    let ratio = summary.efficiency.as_ref();
+                    ratio_cell(ratio, ratio.is_some_and(|ratio| ratio.low > 1.0))
+                }),
+            );
+        }
+    }
+    errors.html() + &efficiencies.html()
+}
+
+/// One table for each source and scene that the study has figures of its own for.
+pub fn published(report: &Report) -> String {
+    let mut sources: Vec<(&str, &str)> = Vec::new();
+    for entry in &report.published_errors {
+        let key = (entry.source.as_str(), entry.scene.as_str());
+        let is_studied = report.scenes.iter().any(|scene| scene.name == entry.scene);
+        if is_studied && !sources.contains(&key) {
+            sources.push(key);
+        }
+    }
+    let mut html = String::new();
+    for (source, scene) in sources {
+        let entries: Vec<_> = report
+            .published_errors
+            .iter()
+            .filter(|entry| entry.source == source && entry.scene == scene)
+            .collect();
+        let names: Vec<&String> = report
+            .order
+            .iter()
+            .filter(|name| entries.iter().any(|entry| entry.values.contains_key(*name)))
+            .collect();
+        let [first, second] = names[..] else { continue };
+        let mut table = Table::new(
+            format!(
+                "{} beside this study: {}. The published unit is unknown, so that only the ratios \
+                 can be compared.",
+                escape(source),
+                escape(scene)
+            ),
+            &["samples per pixel"],
+        );
+        for who in ["published", "RMSE here"] {
+            for name in [first, second] {
+                table.column(format!("{who},<br>{}", escape(name)));
+            }
+            table.column(if who == "published" { "published<br>ratio" } else { "ratio<br>here" });
+        }
+        for entry in &entries {
+            let value = |name: &String| entry.values.get(name).copied();
+            let published = |name| value(name).map_or_else(String::new, |value| value.to_string());
+            let ratio = value(first).zip(value(second)).map(|(a, b)| number(b / a, 3));
+            let rule = Rule::Spp(entry.spp);
+            let ours = |name: &str| find(report, scene, name, rule);
+            let rmse = |name| ours(name).map_or_else(|| "–".to_owned(), rmse_cell);
+            table.row(
+                false,
+                vec![
+                    entry.spp.to_string(),
+                    published(first),
+                    published(second),
+                    ratio.unwrap_or_default(),
+                    rmse(first),
+                    rmse(second),
+                    ours(second).map_or_else(
+                        || "–".to_owned(),
+                        |summary| ratio_cell(summary.rmse_ratio.as_ref(), false),
+                    ),
+                ],
+            );
+        }
+        html += &table.html();
+    }
+    html
+}
+
+fn rmse_cell(summary: &Summary) -> String {
+    if summary.mse_judged { number(summary.rmse, 3) } else { NOT_JUDGED.to_owned() }
+}
+
+/// Every figure of one scene.
+pub fn figures(report: &Report, scene: &str, rules: &[Rule]) -> String {
+    let own: Vec<&Summary> =
+        report.summaries.iter().filter(|summary| summary.scene == scene).collect();
+    let names: BTreeSet<&String> =
+        own.iter().flat_map(|summary| summary.statistics.keys()).collect();
+    let mut table = Table::new(
+        format!(
+            "Means over the seeds. Mean ratio: the picture's mean over the reference's, with its \
+             95% interval; a mean further off than {SUSPICIOUS_DEVIATION} standard errors is marked."
+        ),
+        &[
+            "sampler",
+            "at",
+            "runs",
+            "samples",
+            "seconds",
+            "RMSE",
+            "MSE",
+            "relMSE",
+            "relMSE,<br>trimmed",
+            "mean ratio",
+            "visible<br>rays",
+            "GPU ms<br>per sample",
+        ],
+    );
+    for name in &names {
+        table.column(escape(&name.replace('_', " ")));
+    }
+    for rule in rules {
+        let of_rule: Vec<&&Summary> = own.iter().filter(|summary| summary.rule == *rule).collect();
+        for (index, summary) in of_rule.into_iter().enumerate() {
+            let relative = |value: f64| {
+                if summary.relmse_judged { number(value, 3) } else { NOT_JUDGED.to_owned() }
+            };
+            let mut mean = interval(&summary.mean_ratio, 4);
+            if summary.is_suspicious() {
+                let deviation = number(summary.mean_deviation.unwrap_or(0.0), 2);
+                mean += &format!(" <strong class=\"warn\">{deviation} σ</strong>");
+            }
+            let mut cells = vec![
+                escape(&summary.sampler),
+                rule.describe(),
+                summary.runs.to_string(),
+                count(summary.spp),
+                number(summary.seconds, 3),
+                rmse_cell(summary),
+                if summary.mse_judged { number(summary.mse, 3) } else { NOT_JUDGED.to_owned() },
+                relative(summary.relmse),
+                relative(summary.relmse_trimmed),
+                mean,
+                summary.visible_share.map_or_else(String::new, percent),
+                number(summary.total_ms(), 3),
+            ];
+            cells.extend(names.iter().map(|name| {
+                summary.statistics.get(*name).map_or_else(String::new, |value| number(*value, 3))
+            }));
+            table.row(index == 0, cells);
+        }
+    }
+    if table.is_empty() { String::new() } else { table.html() }
+}
+
+/// Overhead of every sampler in every scene, then pass by pass.
+pub fn overheads(overheads: &[Overhead]) -> String {
+    let Some(first) = overheads.first() else { return String::new() };
+    let baseline = escape(&first.baseline);
+    let mut table = Table::new(
+        format!(
+            "Time per sample over that of {baseline}, by the device's timestamps and by the wall \
+             clock: median over {} interleaved rounds with the interval that holds it with 95% \
+             confidence.",
+            first.rounds
+        ),
+        &["scene", "sampler", "blocked rays<br>of the baseline", "blocked rays<br>of the sampler"],
+    );
+    for head in
+        ["device time", "wall time", "ms per sample,<br>baseline", "ms per sample,<br>sampler"]
+    {
+        table.column(head);
+    }
+    let mut scene = "";
+    for overhead in overheads {
+        let share = |share: Option<f64>| share.map_or_else(String::new, percent);
+        table.row(
+            scene != overhead.scene,
+            vec![
+                escape(&overhead.scene),
+                escape(&overhead.sampler),
+                share(overhead.blocked_share),
+                share(overhead.own_blocked_share),
+                percent_more(&overhead.total),
+                percent_more(&overhead.wall),
+                number(overhead.total_ms[0], 3),
+                number(overhead.total_ms[1], 3),
+            ],
+        );
+        scene = &overhead.scene;
+    }
+    let mut html = table.html();
+    for overhead in overheads {
+        let (scene, sampler) = (escape(&overhead.scene), escape(&overhead.sampler));
+        let mut table =
+            Table::new(format!("{sampler} against {baseline} in {scene}, pass by pass"), &["pass"]);
+        for head in [
+            "ms per sample,<br>baseline",
+            "ms per sample,<br>sampler",
+            "ratio",
+            "adds to the<br>whole time",
+        ] {
+            table.column(head);
+        }
+        for pass in &overhead.passes {
+            let added = &pass.added_share;
+            let percent = |value: f64| format!("{:+.1}", 100.0 * value).replace('-', "−");
+            table.row(
+                false,
+                vec![
+                    escape(&pass.pass),
+                    number(pass.ms[0], 3),
+                    number(pass.ms[1], 3),
+                    pass.ratio.map_or_else(|| "–".to_owned(), |ratio| interval(&ratio, 3)),
+                    format!(
+                        "{}% <span class=\"interval\">({} to {})</span>",
+                        percent(added.middle),
+                        percent(added.low),
+                        percent(added.high)
+                    ),
+                ],
+            );
+        }
+        html += &format!(
+            "<details><summary>{sampler} in {scene}, pass by pass</summary>{}</details>",
+            table.html()
+        );
+    }
+    html
+}
