@@ -14,7 +14,7 @@ layout(local_size_x = WORKGROUP_SIZE) in;
 
 void main() {
     uint pixel = gl_GlobalInvocationID.x;
-    PathIndex index = wave_pixel(wave.first_pixel + pixel);
+    PathIndex index = wave_pixel(wave_film_position(pixel));
     if (pixel >= wave.pixel_count || !index.inside) {
         return;
     }
@@ -43,11 +43,14 @@ void main() {
         compensation = next_compensation;
         squares += radiance * radiance;
     }
-    film_sum[index.film_index] = sum;
-    film_compensation[index.film_index] = compensation;
-    film_squares[index.film_index] = squares;
-    if ((wave.aovs & AOV_VISIBLE) != 0u) {
-        film_visible[index.film_index] += shadow_rays;
+    // Training counts its rays, but what it gathers is not in the picture.
+    if (wave.is_training == 0u) {
+        film_sum[index.film_index] = sum;
+        film_compensation[index.film_index] = compensation;
+        film_squares[index.film_index] = squares;
+        if ((wave.aovs & AOV_VISIBLE) != 0u) {
+            film_visible[index.film_index] += shadow_rays;
+        }
     }
     atomicAdd(counters.camera_rays, wave.sample_count);
     if (bounce_rays > 0u) {

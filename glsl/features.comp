@@ -16,7 +16,7 @@ layout(local_size_x = WORKGROUP_SIZE) in;
 
 void main() {
     uint pixel = gl_GlobalInvocationID.x;
-    PathIndex index = wave_pixel(wave.first_pixel + pixel);
+    PathIndex index = wave_pixel(wave_film_position(pixel));
     if (pixel >= wave.pixel_count || !index.inside) {
         return;
     }

@@ -11,7 +11,8 @@
 //! | triangles → wide BVH | [`accel`] | `include/bvh.glsl` |
 //! | frames, random numbers, samplers | [`frame`], [`random`], [`sampler`] | `include/frame.glsl`, `include/random.glsl`, `include/wave.glsl` |
 //! | scene → device buffers | [`gpu`], [`renderer`] | `include/layout.glsl` |
-//! | progressive passes | [`pass`], [`renderer`] | `camera`, `trace`, `sample`, `shadow`, `gather`, `features`, `bounce`, `accumulate` |
+//! | learned visibility | [`guide`] | `include/guide.glsl` |
+//! | progressive passes | [`pass`], [`renderer`] | `camera`, `trace`, `sample` or `sample_guided`, `shadow`, `learn`, `gather`, `features`, `bounce`, `accumulate` |
 //! | sums → image files | [`film`] | |
 //! | comparisons, ray rates | [`study`], [`benchmark`] | |
 //!
@@ -28,6 +29,7 @@
 //!   Standards.
 //! - \[Aila & Laine 2009\] "Understanding the Efficiency of Ray Traversal on GPUs", High
 //!   Performance Graphics.
+//! - \[Appleby 2011\] MurmurHash3, <https://github.com/aappleby/smhasher>.
 //! - \[Arthur & Vassilvitskii 2007\] "k-means++: The Advantages of Careful Seeding", SODA.
 //! - \[Banerjee et al. 2005\] "Clustering on the Unit Hypersphere using von Mises-Fisher
 //!   Distributions", JMLR 6.
@@ -81,12 +83,18 @@
 //! - \[Tsai et al. 2008\] "Importance Sampling of Products from Illumination and BRDF Using
 //!   Spherical Radial Basis Functions", The Visual Computer 24.
 //! - \[Turk 1994\] "The PLY Polygon File Format", Stanford University.
+//! - \[Vévoda et al. 2018\] "Bayesian Online Regression for Adaptive Direct Illumination
+//!   Sampling", ACM Transactions on Graphics 37(4).
 //! - \[Veach & Guibas 1995\] "Optimally Combining Sampling Techniques for Monte Carlo Rendering",
 //!   SIGGRAPH.
 //! - \[Vegdahl 2021\] "Building a Better LK Hash",
 //!   <https://psychopath.io/post/2021_01_30_building_a_better_lk_hash>.
 //! - \[Wächter & Binder 2019\] "A Fast and Robust Method for Avoiding Self-Intersection", Ray
 //!   Tracing Gems, chapter 6.
+//! - \[Vose 1991\] "A Linear Algorithm for Generating Random Numbers with a Given
+//!   Distribution", IEEE Transactions on Software Engineering 17(9).
+//! - \[Walker 1977\] "An Efficient Method for Generating Discrete Random Variables with General
+//!   Distributions", ACM Transactions on Mathematical Software 3(3).
 //! - \[Walter et al. 2007\] "Microfacet Models for Refraction through Rough Surfaces",
 //!   Eurographics Symposium on Rendering.
 //! - \[Wang et al. 2008\] "Computation of Rotation Minimizing Frames", ACM Transactions on
@@ -110,6 +118,7 @@ pub mod film;
 pub mod fit;
 pub mod frame;
 pub mod gpu;
+pub mod guide;
 pub mod pass;
 pub mod random;
 pub mod renderer;

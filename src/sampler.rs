@@ -23,12 +23,15 @@ pub enum Sampler {
     /// Resampled importance sampling over candidates of `mis` (Burke et al. 2005; Talbot et al.
     /// 2005).
     Ris,
+    /// Regions of the environment by visibility that was learned in cells of the scene, across
+    /// pixels and passes.
+    Guided,
 }
 
 impl Sampler {
     /// Every sampler, simplest first.
-    pub const ALL: [Self; 6] =
-        [Self::Uniform, Self::Cosine, Self::Brdf, Self::Env, Self::Mis, Self::Ris];
+    pub const ALL: [Self; 7] =
+        [Self::Uniform, Self::Cosine, Self::Brdf, Self::Env, Self::Mis, Self::Ris, Self::Guided];
 
     /// Name on the command line, in files and in tables.
     pub fn name(self) -> &'static str {
@@ -39,6 +42,7 @@ impl Sampler {
             Self::Env => "env",
             Self::Mis => "mis",
             Self::Ris => "ris",
+            Self::Guided => "guided",
         }
     }
 
@@ -51,6 +55,7 @@ impl Sampler {
             Self::Env => constants::SAMPLER_ENV,
             Self::Mis => constants::SAMPLER_MIS,
             Self::Ris => constants::SAMPLER_RIS,
+            Self::Guided => constants::SAMPLER_GUIDED,
         }
     }
 }
@@ -58,19 +63,24 @@ impl Sampler {
 /// Parameters of the samplers, set by `--set key=value`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parameters {
-    /// `candidates`: directions that `ris` chooses each shadow ray from, half from the BRDF and half
-    /// from the environment; 2, 4, 6 or 8.
-    pub candidates: u32,
+    /// `candidates`: directions that each shadow ray is chosen from; `None` is `auto`. `ris` takes 2,
+    /// 4, 6 or 8 (auto 4), half from the BRDF and half from the environment; `guided` takes 1, 4 or 8
+    /// (auto 4), a quarter from the BRDF.
+    pub candidates: Option<u32>,
+    /// `guide-memory`: most bytes for the cells of `guided`.
+    pub guide_memory: u64,
+    /// `regions`: regions of the environment for `guided`, 16 to 1024.
+    pub regions: u32,
 }
 
 impl Default for Parameters {
     fn default() -> Self {
-        Self { candidates: 4 }
+        Self { candidates: None, guide_memory: 128 << 20, regions: 256 }
     }
 }
 
 impl Parameters {
-    const KEYS: [&'static str; 1] = ["candidates"];
+    const KEYS: [&'static str; 3] = ["candidates", "guide-memory", "regions"];
 
     /// Sets one parameter from `key=value`.
     ///
@@ -82,16 +92,33 @@ impl Parameters {
         })?;
         match key {
             "candidates" => {
-                self.candidates = value
-                    .parse()
-                    .ok()
-                    .filter(|count: &u32| (2..=8).contains(count) && count.is_multiple_of(2))
+                self.candidates = if value == "auto" {
+                    None
+                } else {
+                    let count =
+                        value.parse().ok().filter(|count| matches!(count, 1 | 2 | 4 | 6 | 8));
+                    Some(count.ok_or_else(|| {
+                        Error::usage(format!(
+                            "--set candidates={value}: expected auto, 2, 4, 6 or 8 for ris, auto, 1, \
+                             4 or 8 for guided"
+                        ))
+                    })?)
+                };
+            }
+            "guide-memory" => {
+                self.guide_memory = parse_bytes(value)
+                    .filter(|bytes| (1 << 20..=1 << 40).contains(bytes))
                     .ok_or_else(|| {
                         Error::usage(format!(
-                            "--set candidates={value}: expected 2, 4, 6 or 8 (half from the BRDF, \
-                             half from the environment)"
+                            "--set guide-memory={value}: expected 1MiB or more, as in 128MiB"
                         ))
                     })?;
+            }
+            "regions" => {
+                self.regions =
+                    value.parse().ok().filter(|count| (16..=1024).contains(count)).ok_or_else(
+                        || Error::usage(format!("--set regions={value}: expected 16 to 1024")),
+                    )?;
             }
             _ => {
                 return Err(Error::usage(format!(
@@ -103,15 +130,55 @@ impl Parameters {
         Ok(())
     }
 
+    /// Candidates per shadow ray of `sampler`, 1 where it does not resample.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where the sampler cannot take as many as were asked for.
+    pub fn candidates_of(&self, sampler: Sampler) -> Result<u32> {
+        let (allowed, auto): (&[u32], u32) = match sampler {
+            Sampler::Ris => (&[2, 4, 6, 8], 4),
+            Sampler::Guided => (&[1, 4, 8], 4),
+            _ => return Ok(1),
+        };
+        let count = self.candidates.unwrap_or(auto);
+        if allowed.contains(&count) {
+            return Ok(count);
+        }
+        Err(Error::usage(format!(
+            "--set candidates={count}: {} takes auto or one of {allowed:?}",
+            sampler.name()
+        )))
+    }
+
     /// The parameters that matter to `sampler`, by name, for metadata and statistics.
     pub fn describe(&self, sampler: Sampler) -> BTreeMap<String, String> {
         match sampler {
-            Sampler::Ris => {
-                BTreeMap::from([("candidates".to_owned(), self.candidates.to_string())])
+            Sampler::Ris | Sampler::Guided => {
+                let count = self.candidates_of(sampler).map_or(0, |count| count);
+                let mut named = BTreeMap::from([("candidates".to_owned(), count.to_string())]);
+                if sampler == Sampler::Guided {
+                    named.insert("regions".to_owned(), self.regions.to_string());
+                    named.insert("guide-memory".to_owned(), self.guide_memory.to_string());
+                }
+                named
             }
             _ => BTreeMap::new(),
         }
     }
+}
+
+/// Bytes from a number with an optional unit: B, KiB, MiB, GiB.
+fn parse_bytes(text: &str) -> Option<u64> {
+    let digits = text.len() - text.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+    let number: u64 = text[..digits].parse().ok()?;
+    let shift = match &text[digits..] {
+        "" | "B" => 0,
+        "KiB" => 10,
+        "MiB" => 20,
+        "GiB" => 30,
+        _ => return None,
+    };
+    number.checked_mul(1 << shift)
 }
 
 #[cfg(test)]
@@ -134,7 +201,19 @@ mod tests {
         }
         let mut parameters = Parameters::default();
         parameters.set("candidates=8").unwrap();
-        assert_eq!(parameters.candidates, 8);
+        assert_eq!(parameters.candidates, Some(8));
+        assert_eq!(parameters.candidates_of(Sampler::Ris).unwrap(), 8);
+        assert_eq!(parameters.candidates_of(Sampler::Mis).unwrap(), 1);
+        parameters.set("candidates=1").unwrap();
+        let error = parameters.candidates_of(Sampler::Ris).unwrap_err().to_string();
+        assert!(error.contains("[2, 4, 6, 8]"), "{error}");
+        parameters.set("candidates=auto").unwrap();
+        assert_eq!(parameters.candidates_of(Sampler::Guided).unwrap(), 4);
+        parameters.set("guide-memory=16MiB").unwrap();
+        assert_eq!(parameters.guide_memory, 16 << 20);
+        for wrong in ["guide-memory=1", "guide-memory=x", "guide-memory=4TB", "regions=2000"] {
+            assert!(parameters.set(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

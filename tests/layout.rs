@@ -76,7 +76,11 @@ fn host_structs() -> Vec<HostStruct> {
         Material { kind, table_offset, alpha, ior, reflectance, eta, k }
         Wave {
             first_pixel, pixel_count, first_sample, sample_count, seed, vertex, shadow_ray_count,
-            first_shadow_ray, total_shadow_rays, aovs,
+            first_shadow_ray, total_shadow_rays, aovs, pixel_stride, is_training,
+        }
+        GuideParameters {
+            grid_origin, finest_edge, edge_per_distance, largest_edge, region_count, table_mask,
+            wanted_mask,
         }
     }
 }

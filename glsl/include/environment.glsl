@@ -78,8 +78,14 @@ vec3 environment_interpolate(EnvironmentCell cell, vec2 position) {
         mix(cell.c00, cell.c10, position.x), mix(cell.c01, cell.c11, position.x), position.y);
 }
 
-// Radiance from a direction: bilinear between texel centres, wrapping in u, clamped in v.
-vec3 environment_radiance(vec3 direction) {
+// Where a direction meets the map: the cell between four texel centres, and the position in it.
+struct EnvironmentLocation {
+    uint column;
+    uint row;
+    vec2 position;
+};
+
+EnvironmentLocation environment_locate(vec3 direction) {
     vec2 uv = lat_long_from_direction(environment_map_from_world(direction));
     int width = int(parameters.environment_width);
     int height = int(parameters.environment_height);
@@ -88,8 +94,14 @@ vec3 environment_radiance(vec3 direction) {
     int column = int(floor(x));
     column = column < 0 ? width - 1 : min(column, width - 1);
     int row = clamp(int(floor(y)), 0, height);
+    return EnvironmentLocation(uint(column), uint(row), vec2(x - floor(x), y - floor(y)));
+}
+
+// Radiance from a direction: bilinear between texel centres, wrapping in u, clamped in v.
+vec3 environment_radiance(vec3 direction) {
+    EnvironmentLocation location = environment_locate(direction);
     return environment_interpolate(
-        environment_cell(uint(column), uint(row)), vec2(x - floor(x), y - floor(y)));
+        environment_cell(location.column, location.row), location.position);
 }
 
 // Density per steradian of environment_sample at a direction whose radiance is
@@ -115,6 +127,47 @@ float environment_sample_linear(float a, float b, float u) {
     float end = 1.0 - start;
     float divisor = start + sqrt(mix(start * start, end * end, u));
     return divisor > 0.0 ? min(u / divisor, 0.99999994) : 0.0;
+}
+
+// Direction within one cell with density proportional to the luminance there in (u, v), from two
+// numbers in [0, 1); its pdf is that of environment_sample, over the whole map.
+EnvironmentSample environment_sample_cell(uint column, uint row, vec2 u) {
+    uint width = parameters.environment_width;
+    uint height = parameters.environment_height;
+    // The bilinear patch: its marginal along v, then the row of the patch at that v.
+    EnvironmentCell cell = environment_cell(column, row);
+    float l00 = luminance(cell.c00);
+    float l10 = luminance(cell.c10);
+    float l01 = luminance(cell.c01);
+    float l11 = luminance(cell.c11);
+    vec2 position;
+    position.y = environment_sample_linear(l00 + l10, l01 + l11, u.y);
+    position.x = environment_sample_linear(
+        mix(l00, l01, position.y), mix(l10, l11, position.y), u.x);
+    vec3 radiance = environment_interpolate(cell, position);
+
+    // Polar angle from the nearer pole, in rows, so that it keeps its relative accuracy; the first
+    // and the last row are half cells.
+    bool northern = 2u * row <= height;
+    float from_pole = northern ? float(row) - 0.5 + position.y
+                               : float(height - row) + 0.5 - position.y;
+    if (row == 0u) {
+        from_pole = 0.5 * position.y;
+    } else if (row == height) {
+        from_pole = 0.5 * (1.0 - position.y);
+    }
+    vec2 theta = sin_cos_pi(from_pole / float(height));
+    float x = float(column) + 0.5 + position.x;
+    x = x >= float(width) ? x - float(width) : x;
+    vec2 azimuth = sin_cos_pi(2.0 * x / float(width));
+    vec3 direction = vec3(
+        -theta.x * azimuth.x, northern ? theta.y : -theta.y, theta.x * azimuth.y);
+
+    float mean_sine = environment_row(height + 1u + row);
+    float pdf = luminance(radiance) * mean_sine
+        / (parameters.environment_total * 2.0 * PI * PI
+            * max(theta.x, ENVIRONMENT_MIN_SIN_THETA));
+    return EnvironmentSample(environment_world_from_map(direction), radiance, pdf);
 }
 
 // Direction with the density environment_pdf, from two numbers in [0, 1).
@@ -159,41 +212,7 @@ EnvironmentSample environment_sample(vec2 u) {
     before = column > 0u ? environment_cell_value(first_cell + column - 1u) : 0.0;
     float column_remainder = min(
         (u.x - before) / (environment_cell_value(first_cell + column) - before), 0.99999994);
-
-    // The bilinear patch: its marginal along v, then the row of the patch at that v.
-    EnvironmentCell cell = environment_cell(column, row);
-    float l00 = luminance(cell.c00);
-    float l10 = luminance(cell.c10);
-    float l01 = luminance(cell.c01);
-    float l11 = luminance(cell.c11);
-    vec2 position;
-    position.y = environment_sample_linear(l00 + l10, l01 + l11, row_remainder);
-    position.x = environment_sample_linear(
-        mix(l00, l01, position.y), mix(l10, l11, position.y), column_remainder);
-    vec3 radiance = environment_interpolate(cell, position);
-
-    // Polar angle from the nearer pole, in rows, so that it keeps its relative accuracy; the first
-    // and the last row are half cells.
-    bool northern = 2u * row <= height;
-    float from_pole = northern ? float(row) - 0.5 + position.y
-                               : float(height - row) + 0.5 - position.y;
-    if (row == 0u) {
-        from_pole = 0.5 * position.y;
-    } else if (row == height) {
-        from_pole = 0.5 * (1.0 - position.y);
-    }
-    vec2 theta = sin_cos_pi(from_pole / float(height));
-    float x = float(column) + 0.5 + position.x;
-    x = x >= float(width) ? x - float(width) : x;
-    vec2 azimuth = sin_cos_pi(2.0 * x / float(width));
-    vec3 direction = vec3(
-        -theta.x * azimuth.x, northern ? theta.y : -theta.y, theta.x * azimuth.y);
-
-    float mean_sine = environment_row(height + 1u + row);
-    float pdf = luminance(radiance) * mean_sine
-        / (parameters.environment_total * 2.0 * PI * PI
-            * max(theta.x, ENVIRONMENT_MIN_SIN_THETA));
-    return EnvironmentSample(environment_world_from_map(direction), radiance, pdf);
+    return environment_sample_cell(column, row, vec2(column_remainder, row_remainder));
 }
 
 #endif

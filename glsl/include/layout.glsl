@@ -91,6 +91,18 @@ struct Wave {
     uint first_shadow_ray;
     uint total_shadow_rays;
     uint aovs;
+    uint pixel_stride;
+    uint is_training;
+};
+
+struct GuideParameters {
+    vec3 grid_origin;
+    float finest_edge;
+    float edge_per_distance;
+    float largest_edge;
+    uint region_count;
+    uint table_mask;
+    uint wanted_mask;
 };
 
 #ifdef NEEDS_PARAMETERS
@@ -128,6 +140,40 @@ layout(set = SET_SCENE, binding = BINDING_ENVIRONMENT_TEXELS) uniform samplerBuf
 layout(set = SET_SCENE, binding = BINDING_ENVIRONMENT_ROWS) uniform samplerBuffer environment_rows;
 layout(set = SET_SCENE, binding = BINDING_ENVIRONMENT_CELLS) uniform samplerBuffer
     environment_cells;
+#endif
+
+#ifdef NEEDS_GUIDE
+layout(scalar, set = SET_SRBF, binding = BINDING_GUIDE_PARAMETERS)
+    readonly buffer GuideParametersBuffer {
+    GuideParameters guide;
+};
+layout(set = SET_SRBF, binding = BINDING_GUIDE_TABLE) uniform usamplerBuffer guide_table;
+layout(set = SET_SRBF, binding = BINDING_GUIDE_ENTRIES) uniform usamplerBuffer guide_entries;
+layout(set = SET_SRBF, binding = BINDING_GUIDE_REGIONS) uniform usamplerBuffer guide_regions;
+layout(set = SET_SRBF, binding = BINDING_GUIDE_ALIASES) uniform usamplerBuffer guide_aliases;
+layout(set = SET_SRBF, binding = BINDING_GUIDE_REGION_OF_CELL) uniform usamplerBuffer
+    guide_region_of_cell;
+layout(scalar, set = SET_SRBF, binding = BINDING_GUIDE_WANTED) buffer GuideWantedBuffer {
+    uint guide_wanted[];
+};
+#endif
+
+#ifdef NEEDS_GUIDE_COUNTS
+layout(scalar, set = SET_SRBF, binding = BINDING_GUIDE_COUNTS) buffer GuideCountsBuffer {
+    uint guide_counts[];
+};
+#endif
+
+#ifdef NEEDS_LEARN_TARGETS
+#ifdef WRITES_LEARN_TARGETS
+#define ACCESS_LEARN_TARGETS writeonly
+#else
+#define ACCESS_LEARN_TARGETS readonly
+#endif
+layout(scalar, set = SET_SRBF, binding = BINDING_LEARN_TARGETS)
+    ACCESS_LEARN_TARGETS buffer LearnTargetsBuffer {
+    uint learn_targets[];
+};
 #endif
 
 #ifdef NEEDS_RAYS

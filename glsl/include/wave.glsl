@@ -43,6 +43,11 @@ uint wave_path_count() {
     return wave.pixel_count * wave.sample_count;
 }
 
+// Position in film order of pixel `index` of the wave.
+uint wave_film_position(uint index) {
+    return wave.first_pixel + index * max(wave.pixel_stride, 1u);
+}
+
 // The pixel at a position in film order.
 PathIndex wave_pixel(uint film_position) {
     PathIndex index;
@@ -63,7 +68,7 @@ PathIndex wave_pixel(uint film_position) {
 
 // The pixel and sample of a path of the wave.
 PathIndex wave_path(uint path) {
-    PathIndex index = wave_pixel(wave.first_pixel + path % wave.pixel_count);
+    PathIndex index = wave_pixel(wave_film_position(path % wave.pixel_count));
     index.sample_index = wave.first_sample + path / wave.pixel_count;
     return index;
 }

@@ -143,7 +143,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     device.save_pipeline_cache();
 
     let capabilities = device.capabilities();
-    let mut host_ms = renderer.host_ms().clone();
+    let mut host_ms = renderer.host_ms();
     host_ms.insert("load".into(), load_ms);
     host_ms.insert("bvh".into(), bvh_ms);
     let report = Report {

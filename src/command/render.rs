@@ -524,7 +524,7 @@ impl<'a> Job<'a> {
     ) -> Statistics {
         let totals = renderer.totals();
         let window = self.window();
-        let mut host_ms = renderer.host_ms().clone();
+        let mut host_ms = renderer.host_ms();
         host_ms.insert("load".into(), load_ms);
         Statistics {
             version: metadata.version.clone(),

@@ -41,6 +41,26 @@ pub const BINDING_ENVIRONMENT_ROWS: u32 = 11;
 /// Scene set: cumulative probability over the cells of each row of the environment map.
 pub const BINDING_ENVIRONMENT_CELLS: u32 = 12;
 
+/// SRBF set: [`GuideParameters`](super::layout::GuideParameters), one element.
+pub const BINDING_GUIDE_PARAMETERS: u32 = 4;
+/// SRBF set: hash table from keys to cells of the scene, texels of two words: key, index of the cell.
+pub const BINDING_GUIDE_TABLE: u32 = 5;
+/// SRBF set: what is known of each cell and region, texels of two words (see `guide::decode_entry`).
+pub const BINDING_GUIDE_ENTRIES: u32 = 6;
+/// SRBF set: regions of the environment, texels of four words: first entry of the alias table,
+/// columns, rows, first column and 65,536 times first row.
+pub const BINDING_GUIDE_REGIONS: u32 = 7;
+/// SRBF set: alias tables over the cells of each region, texels of two words: threshold, alias.
+pub const BINDING_GUIDE_ALIASES: u32 = 8;
+/// SRBF set: region of every cell of the environment, 16 bits each.
+pub const BINDING_GUIDE_REGION_OF_CELL: u32 = 9;
+/// SRBF set: rays traced and rays visible per cell and region since the last rebuild.
+pub const BINDING_GUIDE_COUNTS: u32 = 10;
+/// SRBF set: keys of the cells that a pass missed.
+pub const BINDING_GUIDE_WANTED: u32 = 11;
+/// SRBF set: index into the counts per shadow ray, or `NOTHING_TO_LEARN`.
+pub const BINDING_LEARN_TARGETS: u32 = 12;
+
 /// Wave set: [`Ray`](super::layout::Ray) per path, the next one to trace.
 pub const BINDING_RAYS: u32 = 0;
 /// Wave set: [`Hit`](super::layout::Hit) per path.
@@ -88,6 +108,8 @@ pub const CONSTANT_REFILL_LANES: u32 = 3;
 pub const CONSTANT_SAMPLER: u32 = 16;
 /// Specialization constant of `sample`: candidates per shadow ray.
 pub const CONSTANT_CANDIDATES: u32 = 17;
+/// Specialization constant of `sample_guided`: candidates from the BRDF among the candidates.
+pub const CONSTANT_BRDF_CANDIDATES: u32 = 24;
 /// Specialization constant of `bounce`: first vertex at which russian roulette may end a path.
 pub const CONSTANT_ROULETTE_VERTEX: u32 = 18;
 /// Specialization constant of the passes that evaluate materials: bit `1 << kind` for every kind that
@@ -122,6 +144,18 @@ pub const SAMPLER_ENV: u32 = 3;
 pub const SAMPLER_MIS: u32 = 4;
 /// Resampling over the candidates of `mis`.
 pub const SAMPLER_RIS: u32 = 5;
+
+/// Learned visibility; a shader of its own.
+pub const SAMPLER_GUIDED: u32 = 8;
+
+/// Slots of the hash table of cells that are looked at for one key.
+pub const GUIDE_PROBES: u32 = 8;
+/// Levels of the visibility in an entry.
+pub const GUIDE_VISIBILITY_LEVELS: u32 = 64;
+/// Key of no cell.
+pub const GUIDE_NO_KEY: u32 = 0xffff_ffff;
+/// Learning target of a shadow ray that was not traced.
+pub const NOTHING_TO_LEARN: u32 = 0xffff_ffff;
 
 /// [`Hit::material`](super::layout::Hit::material) of a ray that left the scene or was not traced.
 pub const NO_MATERIAL: u32 = 0xffff_ffff;
@@ -227,6 +261,7 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("SAMPLER_ENV", SAMPLER_ENV),
     ("SAMPLER_MIS", SAMPLER_MIS),
     ("SAMPLER_RIS", SAMPLER_RIS),
+    ("SAMPLER_GUIDED", SAMPLER_GUIDED),
     ("NO_MATERIAL", NO_MATERIAL),
     ("MATERIAL_DIFFUSE", MATERIAL_DIFFUSE),
     ("MATERIAL_PLASTIC", MATERIAL_PLASTIC),
@@ -247,4 +282,18 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("MEASURED_CUMULATIVE_OFFSET", MEASURED_CUMULATIVE_OFFSET),
     ("MEASURED_DENSITY_OFFSET", MEASURED_DENSITY_OFFSET),
     ("MEASURED_GRID_OFFSET", MEASURED_GRID_OFFSET),
+    ("BINDING_GUIDE_PARAMETERS", BINDING_GUIDE_PARAMETERS),
+    ("BINDING_GUIDE_TABLE", BINDING_GUIDE_TABLE),
+    ("BINDING_GUIDE_ENTRIES", BINDING_GUIDE_ENTRIES),
+    ("BINDING_GUIDE_REGIONS", BINDING_GUIDE_REGIONS),
+    ("BINDING_GUIDE_ALIASES", BINDING_GUIDE_ALIASES),
+    ("BINDING_GUIDE_REGION_OF_CELL", BINDING_GUIDE_REGION_OF_CELL),
+    ("BINDING_GUIDE_COUNTS", BINDING_GUIDE_COUNTS),
+    ("BINDING_GUIDE_WANTED", BINDING_GUIDE_WANTED),
+    ("BINDING_LEARN_TARGETS", BINDING_LEARN_TARGETS),
+    ("CONSTANT_BRDF_CANDIDATES", CONSTANT_BRDF_CANDIDATES),
+    ("GUIDE_PROBES", GUIDE_PROBES),
+    ("GUIDE_VISIBILITY_LEVELS", GUIDE_VISIBILITY_LEVELS),
+    ("GUIDE_NO_KEY", GUIDE_NO_KEY),
+    ("NOTHING_TO_LEARN", NOTHING_TO_LEARN),
 ];

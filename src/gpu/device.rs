@@ -10,7 +10,7 @@ use gpu_allocator::{
 use serde::Serialize;
 
 use super::{
-    descriptors::{SET_BINDING_COUNTS, SetLayouts},
+    descriptors::{SET_BINDING_COUNTS, SetLayouts, texel_format},
     instance::{Instance, no_driver},
     pipeline::PipelineCache,
     vulkan_error,
@@ -109,8 +109,12 @@ impl Capabilities {
 }
 
 /// Storage buffers of the pipeline that sees most: scene, wave and the larger of the other two sets.
+/// Texel buffers do not count.
 fn most_bindings() -> u32 {
-    let [scene, srbf, wave, film] = SET_BINDING_COUNTS;
+    let [scene, srbf, wave, film] = std::array::from_fn(|set| {
+        let bindings = 0..SET_BINDING_COUNTS[set];
+        bindings.filter(|binding| texel_format(set as u32, *binding).is_none()).count() as u32
+    });
     scene + wave + srbf.max(film)
 }
 

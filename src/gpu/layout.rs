@@ -149,7 +149,7 @@ pub struct Material {
 
 /// Push constants of the passes that work on a wave of paths.
 ///
-/// Path `i` of the wave belongs to pixel `first_pixel + i % pixel_count` in film order and to sample
+/// Path `i` of the wave belongs to pixel `first_pixel + (i % pixel_count) · pixel_stride` in film order and to sample
 /// `first_sample + i / pixel_count`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -174,4 +174,28 @@ pub struct Wave {
     pub total_shadow_rays: u32,
     /// Bits `AOV_…`: which extra film buffers are written.
     pub aovs: u32,
+    /// Pixels in film order from one pixel of the wave to the next; 0 counts as 1.
+    pub pixel_stride: u32,
+    /// 1 where the paths only teach the guide: their rays are counted, their light is not.
+    pub is_training: u32,
+}
+
+/// How the cells of the guide follow from places in the scene.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct GuideParameters {
+    /// Corner of the grids, metres.
+    pub grid_origin: Float3,
+    /// Edge of a cell of level 0, metres.
+    pub finest_edge: f32,
+    /// Edge of a cell per metre of distance to the camera.
+    pub edge_per_distance: f32,
+    /// Largest edge of a cell, metres.
+    pub largest_edge: f32,
+    /// Regions of the environment.
+    pub region_count: u32,
+    /// Slots of the hash table less one.
+    pub table_mask: u32,
+    /// Slots for missed keys less one.
+    pub wanted_mask: u32,
 }

@@ -6,6 +6,7 @@
 //! for; `bounce` between vertices; at last `accumulate`.
 
 pub mod geometry;
+pub mod guided;
 pub mod shadow;
 pub mod trace;
 
@@ -25,6 +26,7 @@ use crate::{
     sampler::{Parameters, Sampler},
 };
 pub use geometry::{GeometryBuffers, Schedule};
+use guided::Guided;
 use shadow::Shadow;
 use trace::Trace;
 
@@ -61,6 +63,8 @@ pub struct Sets<'a> {
     pub wave: &'a DescriptorSet,
     /// Film.
     pub film: &'a DescriptorSet,
+    /// What was learned, for the sampler `guided`.
+    pub guide: Option<&'a DescriptorSet>,
 }
 
 /// The pipelines of all passes.
@@ -72,6 +76,8 @@ pub struct Passes {
     /// For bounce rays, which part at once.
     trace_bounce: Trace,
     sample: Pipeline,
+    /// For the sampler `guided`, in the place of `sample`.
+    guided: Option<Guided>,
     shadow: Shadow,
     gather: Pipeline,
     bounce: Pipeline,
@@ -93,10 +99,7 @@ impl Passes {
         let create = |name: &str, constants: &[(u32, u32)]| {
             Pipeline::new(device, name, shaders::pass(name), constants)
         };
-        let candidates = match settings.sampler {
-            Sampler::Ris => settings.parameters.candidates,
-            _ => 1,
-        };
+        let candidates = settings.parameters.candidates_of(settings.sampler)?;
         Ok(Self {
             camera: create("camera", &[])?,
             trace: Trace::new(device, geometry, Schedule::SINGLE)?,
@@ -109,6 +112,9 @@ impl Passes {
                     (CONSTANT_MATERIAL_KINDS, settings.material_kinds),
                 ],
             )?,
+            guided: (settings.sampler == Sampler::Guided)
+                .then(|| Guided::new(device, candidates, settings.material_kinds))
+                .transpose()?,
             shadow: Shadow::new(device, geometry, incoherent)?,
             gather: create("gather", &[])?,
             bounce: create(
@@ -127,12 +133,12 @@ impl Passes {
     /// Number of dispatches of one wave.
     pub fn dispatches_per_wave(&self) -> u32 {
         let groups = self.settings.shadow_rays.div_ceil(SHADOW_RAYS_PER_GROUP).max(1);
-        3 + self.settings.depth * (2 + 3 * groups)
+        3 + self.settings.depth * (2 + 4 * groups)
     }
 
     /// Records all passes of one wave.
     pub fn record(&self, commands: &mut Commands, sets: &Sets<'_>, wave: Wave) {
-        let Sets { scene, wave: wave_set, film } = *sets;
+        let Sets { scene, wave: wave_set, film, guide } = *sets;
         let paths = wave.pixel_count * wave.sample_count;
         let mut wave = Wave { aovs: self.settings.aovs, ..wave };
         wave.total_shadow_rays = self.settings.shadow_rays;
@@ -155,8 +161,15 @@ impl Passes {
                 wave.shadow_ray_count =
                     (self.settings.shadow_rays - first).min(SHADOW_RAYS_PER_GROUP);
                 if wave.shadow_ray_count > 0 {
-                    dispatch(commands, &self.sample, &[scene, wave_set], &wave, paths);
+                    if let (Some(guided), Some(guide)) = (&self.guided, guide) {
+                        guided.record_sample(commands, &[scene, guide, wave_set], &wave);
+                    } else {
+                        dispatch(commands, &self.sample, &[scene, wave_set], &wave, paths);
+                    }
                     self.shadow.record(commands, &[scene, wave_set, film], &wave);
+                    if let (Some(guided), Some(guide)) = (&self.guided, guide) {
+                        guided.record_learn(commands, &[guide, wave_set], &wave);
+                    }
                 }
                 dispatch(commands, &self.gather, &[scene, wave_set], &wave, paths);
                 first += wave.shadow_ray_count;
@@ -164,7 +177,7 @@ impl Passes {
                     break;
                 }
             }
-            if vertex == 0 && wave.aovs & FEATURES != 0 {
+            if vertex == 0 && wave.aovs & FEATURES != 0 && wave.is_training == 0 {
                 dispatch(
                     commands,
                     &self.features,
@@ -186,7 +199,7 @@ impl Passes {
     /// # Errors
     /// [`crate::Error::Vulkan`] if a call fails.
     pub fn warm_up(&self, device: &Arc<Device>, sets: &Sets<'_>) -> Result<PassTimes> {
-        let Sets { scene, wave, film } = *sets;
+        let Sets { scene, wave, film, guide } = *sets;
         let mut times = PassTimes::new();
         let mut run = |name: &str, record: &dyn Fn(&mut Commands)| -> Result<()> {
             let start = Instant::now();
@@ -202,7 +215,16 @@ impl Passes {
         run("camera", &|commands| commands.dispatch(&self.camera, &all[..2], push, 1))?;
         run("trace", &|commands| self.trace.record(commands, &all, &nothing))?;
         if self.settings.shadow_rays > 0 {
-            run("sample", &|commands| commands.dispatch(&self.sample, &all[..2], push, 1))?;
+            if let (Some(guided), Some(guide)) = (&self.guided, guide) {
+                run("sample_guided", &|commands| {
+                    guided.record_sample(commands, &[scene, guide, wave], &nothing);
+                })?;
+                run("learn", &|commands| {
+                    guided.record_learn(commands, &[guide, wave], &nothing);
+                })?;
+            } else {
+                run("sample", &|commands| commands.dispatch(&self.sample, &all[..2], push, 1))?;
+            }
             run("shadow", &|commands| self.shadow.record(commands, &all, &nothing))?;
         }
         run("gather", &|commands| commands.dispatch(&self.gather, &all[..2], push, 1))?;

@@ -1,6 +1,7 @@
 //! Progressive rendering of a scene on a device: scene → buffers → waves of paths → film sums.
 
 mod film_buffers;
+mod guide_buffers;
 mod scene_buffers;
 mod wave_buffers;
 
@@ -19,11 +20,17 @@ use crate::{
     scene::Scene,
 };
 use film_buffers::FilmBuffers;
+use guide_buffers::GuideBuffers;
 pub use scene_buffers::SceneBuffers;
 use wave_buffers::WaveBuffers;
 
 /// Pixels of a block of the film order; waves hold whole blocks.
 const BLOCK_PIXELS: u32 = 64;
+
+/// Sweeps that teach the guide before the first sample, each over one pixel in as many.
+const TRAINING_SWEEPS: u32 = 8;
+/// Tells the random numbers of training from those of the picture.
+const TRAINING_SEED: u32 = 0x7e11_ab1e;
 
 /// Dispatches are steered between these, milliseconds: short enough for the watchdog of a desktop
 /// GPU, long enough for the submission not to count.
@@ -111,9 +118,15 @@ pub struct Renderer {
     passes: Passes,
     waves: WaveBuffers,
     film: FilmBuffers,
+    /// What the sampler `guided` has learned.
+    guide: Option<GuideBuffers>,
     /// Paths of the next wave.
     wave_paths: u32,
     sample_count: u32,
+    /// Whether the training sweeps are behind.
+    is_trained: bool,
+    /// Samples at the last rebuild of the guide.
+    rebuilt_at: u32,
     totals: Totals,
     compile_ms: PassTimes,
 }
@@ -175,6 +188,12 @@ impl Renderer {
         let film = FilmBuffers::new(device, window, aovs)?;
         let rays = settings.shadow_rays.clamp(1, SHADOW_RAYS_PER_GROUP);
         let waves = WaveBuffers::new(device, film.padded_pixels(), rays)?;
+        let guide = (settings.sampler == Sampler::Guided)
+            .then(|| {
+                let rays = u64::from(waves.capacity()) * u64::from(rays);
+                GuideBuffers::new(device, scene, &settings.parameters, film.padded_pixels(), rays)
+            })
+            .transpose()?;
         let mut renderer = Self {
             device: Arc::clone(device),
             scene: buffers,
@@ -185,7 +204,10 @@ impl Renderer {
             wave_paths: waves.first_wave_paths(),
             waves,
             film,
+            guide,
             sample_count: 0,
+            is_trained: false,
+            rebuilt_at: 0,
             totals: Totals::default(),
             compile_ms: PassTimes::new(),
         };
@@ -195,7 +217,12 @@ impl Renderer {
     }
 
     fn sets(&self) -> Sets<'_> {
-        Sets { scene: self.scene.set(), wave: self.waves.set(), film: self.film.set() }
+        Sets {
+            scene: self.scene.set(),
+            wave: self.waves.set(),
+            film: self.film.set(),
+            guide: self.guide.as_ref().map(GuideBuffers::set),
+        }
     }
 
     /// Adds `samples` samples to every pixel.
@@ -205,26 +232,72 @@ impl Renderer {
     pub fn render_pass(&mut self, samples: u32) -> Result<()> {
         let mut left = samples;
         while left > 0 {
-            let together = (self.wave_paths / self.film.padded_pixels()).clamp(1, left);
+            let mut together = (self.wave_paths / self.film.padded_pixels()).clamp(1, left);
+            if self.guide.is_some() {
+                together = together.min(self.learn()?);
+            }
             self.render_samples(together)?;
             left -= together;
         }
         Ok(())
     }
 
+    /// Learns what is due before the next sample. Returns how many samples may follow before there
+    /// is more to learn; that depends on their number alone, not on how they are grouped.
+    fn learn(&mut self) -> Result<u32> {
+        if self.sample_count == 0 && !self.is_trained {
+            for sweep in 0..TRAINING_SWEEPS {
+                let wave = Wave {
+                    first_pixel: sweep,
+                    first_sample: self.settings.first_sample,
+                    sample_count: 1,
+                    seed: self.settings.seed ^ TRAINING_SEED,
+                    pixel_stride: TRAINING_SWEEPS,
+                    is_training: 1,
+                    ..Wave::default()
+                };
+                self.sweep(wave, self.film.padded_pixels() / TRAINING_SWEEPS)?;
+                self.rebuild()?;
+            }
+            self.is_trained = true;
+            self.take_counters()?;
+        } else if self.rebuilt_at != self.sample_count
+            && guide_schedule(self.sample_count) == self.sample_count
+        {
+            self.rebuild()?;
+        }
+        Ok(guide_schedule(self.sample_count + 1) - self.sample_count)
+    }
+
+    fn rebuild(&mut self) -> Result<()> {
+        self.rebuilt_at = self.sample_count;
+        self.guide.as_mut().map_or(Ok(()), GuideBuffers::rebuild)
+    }
+
     /// One sweep over the film with `samples` samples per pixel.
     fn render_samples(&mut self, samples: u32) -> Result<()> {
-        let padded = self.film.padded_pixels();
-        let mut first_pixel = 0;
-        while first_pixel < padded {
-            let pixels = (self.wave_paths / samples / BLOCK_PIXELS).max(1) * BLOCK_PIXELS;
+        let wave = Wave {
+            first_sample: self.settings.first_sample.wrapping_add(self.sample_count),
+            sample_count: samples,
+            seed: self.settings.seed,
+            pixel_stride: 1,
+            ..Wave::default()
+        };
+        self.sweep(wave, self.film.padded_pixels())?;
+        self.sample_count += samples;
+        self.take_counters()
+    }
+
+    /// Waves like `wave` until `pixels` are done, the first of them at the first pixel of `wave`.
+    fn sweep(&mut self, wave: Wave, pixels: u32) -> Result<()> {
+        let mut done = 0;
+        while done < pixels {
+            let together =
+                (self.wave_paths / wave.sample_count / BLOCK_PIXELS).max(1) * BLOCK_PIXELS;
             let wave = Wave {
-                first_pixel,
-                pixel_count: pixels.min(padded - first_pixel),
-                first_sample: self.settings.first_sample.wrapping_add(self.sample_count),
-                sample_count: samples,
-                seed: self.settings.seed,
-                ..Wave::default()
+                first_pixel: wave.first_pixel + done * wave.pixel_stride,
+                pixel_count: together.min(pixels - done),
+                ..wave
             };
             let mut commands =
                 Commands::begin_timed(&self.device, self.passes.dispatches_per_wave())?;
@@ -234,9 +307,13 @@ impl Renderer {
             for (pass, ms) in times {
                 *self.totals.gpu_ms.entry(pass).or_default() += ms;
             }
-            first_pixel += wave.pixel_count;
+            done += wave.pixel_count;
         }
-        self.sample_count += samples;
+        Ok(())
+    }
+
+    /// Adds what the device counted to the totals.
+    fn take_counters(&mut self) -> Result<()> {
         let counters = self.film.take_counters()?;
         self.totals.camera_rays += u64::from(counters.camera_rays);
         self.totals.bounce_rays += u64::from(counters.bounce_rays);
@@ -266,6 +343,11 @@ impl Renderer {
     /// [`Error::Vulkan`] if the device fails.
     pub fn restart(&mut self, seed: u32) -> Result<()> {
         self.film.clear(&self.device)?;
+        if let Some(guide) = &mut self.guide {
+            guide.forget()?;
+        }
+        self.is_trained = false;
+        self.rebuilt_at = 0;
         self.settings.seed = seed;
         self.sample_count = 0;
         self.totals = Totals::default();
@@ -287,9 +369,13 @@ impl Renderer {
         &self.compile_ms
     }
 
-    /// Host milliseconds by stage of the preparation.
-    pub fn host_ms(&self) -> &BTreeMap<String, f64> {
-        self.scene.host_ms()
+    /// Host milliseconds by stage of the preparation, and of all rebuilds of the guide.
+    pub fn host_ms(&self) -> BTreeMap<String, f64> {
+        let mut host_ms = self.scene.host_ms().clone();
+        if let Some(guide) = &self.guide {
+            host_ms.insert("guide rebuilds".to_owned(), guide.rebuild_ms());
+        }
+        host_ms
     }
 
     /// Device memory by buffer, bytes.
@@ -297,6 +383,7 @@ impl Renderer {
         let mut bytes = self.scene.buffer_bytes();
         bytes.extend(self.waves.buffer_bytes());
         bytes.extend(self.film.buffer_bytes());
+        bytes.extend(self.guide.iter().flat_map(GuideBuffers::buffer_bytes));
         bytes
     }
 
@@ -333,10 +420,24 @@ impl Renderer {
                 self.film_size
             )));
         }
+        if self.guide.is_some() {
+            return Err(Error::usage(
+                "--resume: a checkpoint does not hold what the sampler guided has learned; render \
+                 another part with --seed or --sample-offset and put the two together with merge",
+            ));
+        }
         self.film.upload(sums)?;
         self.sample_count = sums.sample_count;
         Ok(())
     }
+}
+
+/// The first number of samples, not below `samples`, after which the guide is rebuilt: 1, 2, 3, 4, 6,
+/// 8, 12, 16, 24, …
+fn guide_schedule(samples: u32) -> u32 {
+    let power = samples.next_power_of_two();
+    let middle = power / 4 * 3;
+    if middle >= samples { middle } else { power }
 }
 
 /// The window of `settings`, or the whole film.
@@ -373,6 +474,7 @@ fn check(settings: &Settings, window: Window, film_size: [u32; 2]) -> Result<()>
             settings.shadow_rays
         )));
     }
+    settings.parameters.candidates_of(settings.sampler)?;
     if !(1..=64).contains(&settings.depth) {
         return Err(Error::usage(format!("--depth {}: expected 1 to 64", settings.depth)));
     }

@@ -80,10 +80,10 @@ mod tests {
     #[test]
     fn parameters_follow_colons() {
         let contender = Contender::parse("ris:candidates=8", Parameters::default()).unwrap();
-        assert_eq!((contender.sampler, contender.parameters.candidates), (Sampler::Ris, 8));
+        assert_eq!((contender.sampler, contender.parameters.candidates), (Sampler::Ris, Some(8)));
         assert_eq!(contender.file_stem(), "ris-candidates-8");
         let plain = Contender::parse("ris", contender.parameters).unwrap();
-        assert_eq!(plain.parameters.candidates, 8, "defaults are kept");
+        assert_eq!(plain.parameters.candidates, Some(8), "defaults are kept");
     }
 
     #[test]

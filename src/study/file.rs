@@ -298,7 +298,7 @@ mod tests {
         .unwrap();
         assert_eq!(study.scenes, [PathBuf::from("studies/../a.toml")]);
         let settings = &study.settings;
-        assert_eq!(settings.samplers.as_ref().unwrap()[1].parameters.candidates, 8);
+        assert_eq!(settings.samplers.as_ref().unwrap()[1].parameters.candidates, Some(8));
         assert_eq!(settings.time, Some(Duration::from_secs(30)));
         assert_eq!(settings.reference_sampler.as_ref().unwrap().sampler, Sampler::Ris);
         assert_eq!((settings.overhead_spp, settings.overhead_repetitions), (Some(7), Some(8)));

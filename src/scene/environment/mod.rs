@@ -16,6 +16,7 @@ use glam::{Vec2, Vec3};
 
 pub use court::CourtParameters;
 pub use sky::SkyParameters;
+pub(crate) use table::mean_sine;
 pub use table::{EnvironmentSample, EnvironmentTables};
 
 use crate::frame::lat_long_from_direction;

@@ -58,7 +58,7 @@ pub struct EnvironmentSample {
 }
 
 /// Mean of sin θ over row `row` of cells, in closed form.
-fn mean_sine(row: u32, height: u32) -> f64 {
+pub(crate) fn mean_sine(row: u32, height: u32) -> f64 {
     let row_angle = PI / f64::from(height);
     let half = 0.5 * row_angle;
     if row == 0 || row == height {
@@ -217,20 +217,31 @@ impl EnvironmentTables {
         if self.total <= 0.0 {
             return EnvironmentSample { direction: Vec3::Y, radiance: Vec3::ZERO, pdf: 0.0 };
         }
-        let (width, height) = (map.width as usize, map.height);
+        let height = map.height;
         let row_guide = &self.rows[2 * (height as usize + 1)..];
         let (row, before, after) = search(self.row_cumulative(map), row_guide, u[1]);
         let row_remainder = ((u[1] - before) / (after - before)).min(BELOW_ONE);
         let (cumulative, guide) = self.row(map, row);
         let (column, before, after) = search(cumulative, guide, u[0]);
         let column_remainder = ((u[0] - before) / (after - before)).min(BELOW_ONE);
-        let (row, column) = (row as u32, column as u32);
+        self.sample_cell(map, [column as u32, row as u32], [column_remainder, row_remainder])
+    }
 
+    /// Direction within the cell `[column, row]` with density proportional to the luminance there in
+    /// (u, v), from two numbers in [0, 1); the pdf of the sample is that of [`Self::sample`], over
+    /// the whole map. Twin of `environment_sample_cell`.
+    pub fn sample_cell(
+        &self,
+        map: &EnvironmentMap,
+        [column, row]: [u32; 2],
+        u: [f32; 2],
+    ) -> EnvironmentSample {
+        let (width, height) = (map.width, map.height);
         // The bilinear patch: its marginal along v, then the row of the patch at that v.
         let cell = map.cell(column, row);
         let [l00, l10, l01, l11] = [cell.c00, cell.c10, cell.c01, cell.c11].map(luminance);
-        let y = sample_linear(l00 + l10, l01 + l11, row_remainder);
-        let x = sample_linear(lerp(l00, l01, y), lerp(l10, l11, y), column_remainder);
+        let y = sample_linear(l00 + l10, l01 + l11, u[1]);
+        let x = sample_linear(lerp(l00, l01, y), lerp(l10, l11, y), u[0]);
         let radiance = cell.interpolate(Vec2::new(x, y));
 
         // Polar angle from the nearer pole, in rows, so that it keeps its relative accuracy; the

@@ -1,0 +1,180 @@
+// Learned visibility: cells of the scene, regions of the environment, and directions drawn by them.
+// Twin of src/guide. Needs what vertex.glsl needs, and NEEDS_GUIDE. Densities per steradian.
+//
+// A pass reads what earlier passes learned and nothing else, so every density here is fixed while
+// the pass runs.
+
+#ifndef GUIDE_GLSL
+#define GUIDE_GLSL
+
+#include "vertex.glsl"
+
+// First cells: one for each face of the cube, for places that have no cell of their own.
+const uint GUIDE_COARSE = 0x80000000u;
+
+struct GuideEntry {
+    // Probability of the region divided by its share of the map's energy: the density of a guided
+    // direction is this times the density of the whole map.
+    float ratio;
+    // The alias table over the regions: of 65,536.
+    uint threshold;
+    uint alias;
+    // Weight of a candidate by the region's visibility.
+    float visibility;
+};
+
+GuideEntry guide_entry(uint index) {
+    uvec2 words = texelFetch(guide_entries, int(index)).xy;
+    float level = float(words.y >> 26u);
+    return GuideEntry(
+        uintBitsToFloat(words.x), words.y & 0xffffu, (words.y >> 16u) & 0x3ffu,
+        exp2(-level * (10.5 / float(GUIDE_VISIBILITY_LEVELS - 1u))));
+}
+
+// Index 0 to 5 of the face of a cube that a normal points at most: +x, -x, +y, -y, +z, -z.
+uint guide_face(vec3 normal) {
+    vec3 size = abs(normal);
+    uint axis = size.x >= size.y && size.x >= size.z ? 0u : (size.y >= size.z ? 1u : 2u);
+    float along = axis == 0u ? normal.x : (axis == 1u ? normal.y : normal.z);
+    return 2u * axis + (along < 0.0 ? 1u : 0u);
+}
+
+// Key of the fine cell around a place: the edge is a power of two times the finest, from the
+// distance to the camera; `bits` move the place by up to half an edge and blur the levels.
+uint guide_key(vec3 position, uint face, uvec4 bits) {
+    float wanted = min(
+        guide.largest_edge,
+        guide.edge_per_distance * distance(position, parameters.camera_position));
+    float blurred = wanted / guide.finest_edge * (1.0 + unit_float(bits.w));
+    uint level = uint(clamp(int(floatBitsToUint(blurred) >> 23u) - 127, 0, 15));
+    float edge = guide.finest_edge * uintBitsToFloat((level + 127u) << 23u);
+    vec3 jitter = vec3(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z)) - 0.5;
+    ivec3 place = ivec3(floor((position - guide.grid_origin) / edge + jitter)) & 255;
+    return uint(place.x) | (uint(place.y) << 8u) | (uint(place.z) << 16u) | (level << 24u)
+        | (face << 28u);
+}
+
+uint guide_coarse_key(uint key) {
+    return ((key >> 2u) & 0x003f3f3fu) | (key & 0x7f000000u) | GUIDE_COARSE;
+}
+
+// Finalizer of MurmurHash3 (Appleby 2011).
+uint guide_hash(uint key) {
+    key ^= key >> 16u;
+    key *= 0x85ebca6bu;
+    key ^= key >> 13u;
+    key *= 0xc2b2ae35u;
+    return key ^ (key >> 16u);
+}
+
+// Index of the cell with a key, or GUIDE_NO_KEY.
+uint guide_find(uint key) {
+    uint slot = guide_hash(key);
+    uint found = GUIDE_NO_KEY;
+    for (uint probe = 0u; probe < GUIDE_PROBES; ++probe) {
+        uvec2 words = texelFetch(guide_table, int((slot + probe) & guide.table_mask)).xy;
+        if (words.x == key) {
+            found = words.y;
+        }
+        if (words.x == key || words.x == GUIDE_NO_KEY) {
+            break;
+        }
+    }
+    return found;
+}
+
+// Notes that a cell is missing. What finds no slot is noted another time.
+void guide_want(uint key) {
+    uint slot = guide_hash(key);
+    for (uint probe = 0u; probe < GUIDE_PROBES; ++probe) {
+        uint before =
+            atomicCompSwap(guide_wanted[(slot + probe) & guide.wanted_mask], GUIDE_NO_KEY, key);
+        if (before == GUIDE_NO_KEY || before == key) {
+            break;
+        }
+    }
+}
+
+// The cell of a vertex: the fine one, else the coarse one around it, else that of its face.
+uint guide_cell(Vertex vertex, uvec4 bits) {
+    uint face = guide_face(vertex.hit.geometric_normal);
+    uint key = guide_key(vertex.hit.position, face, bits);
+    uint cell = guide_find(key);
+    // Loops, since branches cost their body everywhere on some devices.
+    bool is_missing = cell == GUIDE_NO_KEY;
+    while (is_missing) {
+        guide_want(key);
+        cell = guide_find(guide_coarse_key(key));
+        cell = cell == GUIDE_NO_KEY ? face : cell;
+        is_missing = false;
+    }
+    return cell;
+}
+
+// bits * count / 2^32.
+uint scaled(uint bits, uint count) {
+    uint high;
+    uint low;
+    umulExtended(bits, count, high, low);
+    return high;
+}
+
+// A direction with its region and what the cell knows of that.
+struct Guided {
+    Considered considered;
+    uint region;
+    GuideEntry entry;
+};
+
+// Region by the cell's alias table, cell of the map by the region's, direction by the bilinear patch.
+// `first` is the index of the first entry of the cell.
+Guided draw_guided(Vertex vertex, uint first, uvec4 bits, uvec4 more_bits) {
+    Guided guided;
+    guided.region = scaled(bits.x, guide.region_count);
+    guided.entry = guide_entry(first + guided.region);
+    if ((bits.y >> 16u) >= guided.entry.threshold) {
+        guided.region = guided.entry.alias;
+    }
+    guided.entry = guide_entry(first + guided.region);
+
+    uvec4 region = texelFetch(guide_regions, int(guided.region));
+    uint count = region.y * region.z;
+    uint chosen = scaled(bits.z, count);
+    uvec2 alias = texelFetch(guide_aliases, int(region.x + chosen)).xy;
+    chosen = bits.w < alias.x ? chosen : alias.y;
+    // chosen / columns without an integer division.
+    uint row = uint(float(chosen) / float(region.y));
+    int column = int(chosen) - int(row * region.y);
+    row = column < 0 ? row - 1u : (column >= int(region.y) ? row + 1u : row);
+    column += column < 0 ? int(region.y) : (column >= int(region.y) ? -int(region.y) : 0);
+
+    EnvironmentSample light = environment_sample_cell(
+        (region.w & 0xffffu) + uint(column), (region.w >> 16u) + row,
+        vec2(unit_float(more_bits.x), unit_float(more_bits.y)));
+    // A black map has a density of 0 over 0.
+    light.pdf = parameters.environment_total > 0.0 ? light.pdf : 0.0;
+    guided.considered = consider(
+        vertex, light.direction, to_local(vertex.frame, light.direction), light.radiance,
+        light.pdf);
+    return guided;
+}
+
+// A direction from the BRDF, and where it meets the partition.
+Guided draw_brdf_guided(Vertex vertex, uint first, uvec4 bits) {
+    vec3 u = vec3(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z));
+    Guided guided;
+    guided.considered = draw_from_brdf(vertex, u);
+    EnvironmentLocation location = environment_locate(guided.considered.direction);
+    guided.region = texelFetch(
+        guide_region_of_cell,
+        int(location.row * parameters.environment_width + location.column)).x;
+    guided.entry = guide_entry(first + guided.region);
+    return guided;
+}
+
+// Density of guided directions.
+float guided_pdf(Guided guided) {
+    return guided.entry.ratio * guided.considered.environment_pdf;
+}
+
+#endif

@@ -1,0 +1,25 @@
+// Counts every shadow ray that was traced, and whether it reached the environment, into the cell and
+// region that sample_guided.comp noted. The counts are read between passes only.
+#version 460
+
+#define NEEDS_WAVE
+#define NEEDS_VISIBILITY
+#define NEEDS_GUIDE_COUNTS
+#define NEEDS_LEARN_TARGETS
+#include "layout.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+void main() {
+    uint ray = gl_GlobalInvocationID.x;
+    if (ray >= wave.pixel_count * wave.sample_count * wave.shadow_ray_count) {
+        return;
+    }
+    uint target = learn_targets[ray];
+    if (target != NOTHING_TO_LEARN) {
+        atomicAdd(guide_counts[2u * target], 1u);
+        if (visibility[ray] != 0u) {
+            atomicAdd(guide_counts[2u * target + 1u], 1u);
+        }
+    }
+}

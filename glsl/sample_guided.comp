@@ -1,0 +1,193 @@
+// Chooses directions at every hit of the wave by learned visibility: as sample.comp, it writes one
+// shadow ray for each with what it brings if nothing is in the way. It also says which count each
+// ray belongs to, for learn.comp, and which cells are missing.
+//
+// All random numbers are independent: what the cells hold depends on earlier samples of the same
+// pixels, and a stratified sequence would continue where those left off.
+#version 460
+
+#define NEEDS_PARAMETERS
+#define NEEDS_WAVE
+#define NEEDS_RAY_TEXELS
+#define NEEDS_HIT_TEXELS
+#define NEEDS_SHADOW_RAYS
+#define WRITES_SHADOW_RAYS
+#define NEEDS_MATERIALS
+#define NEEDS_ENVIRONMENT
+#define NEEDS_GUIDE
+#define NEEDS_LEARN_TARGETS
+#define WRITES_LEARN_TARGETS
+#include "guide.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+// 1 draws each ray from BRDF or guide (one-sample model); more resample, a fixed number of the
+// candidates from the BRDF and the rest from the guide.
+layout(constant_id = CONSTANT_CANDIDATES) const uint CANDIDATES = 1u;
+layout(constant_id = CONSTANT_BRDF_CANDIDATES) const uint BRDF_CANDIDATES = 1u;
+
+// Offsets of dimensions from the first of a vertex, for independent numbers.
+const uint DIMENSION_GUIDE_CELL = 5u;
+const uint DIMENSION_GUIDE_TECHNIQUE = 6u;
+const uint DIMENSION_GUIDE_RESAMPLING = 7u;
+const uint DIMENSION_GUIDE_BRDF = 8u;
+const uint DIMENSION_GUIDE_REGION = 16u;
+const uint DIMENSION_GUIDE_PATCH = 24u;
+
+// Share of candidates chosen without regard to visibility.
+const float UNGUIDED_CHOICE = 0.1;
+
+uvec4 independent_bits(Vertex vertex, uint index, uint dimension) {
+    return hash_4d(uvec4(vertex.index.pixel, index, vertex.dimension + dimension, wave.seed));
+}
+
+// Probability of sampling the BRDF in the one-sample model.
+float brdf_share(Material material) {
+    float share = 0.3;
+    if (is_kind(material, MATERIAL_DIFFUSE)) {
+        share = 0.1;
+    } else if (!is_kind(material, MATERIAL_MEASURED)) {
+        share = material.alpha > 0.3 ? 0.1 : (material.alpha > 0.1 ? 0.3 : 0.5);
+    }
+    return share;
+}
+
+Guided draw_candidate(Vertex vertex, uint first, uint ray, uint candidate) {
+    return draw_guided(
+        vertex, first, independent_bits(vertex, ray, DIMENSION_GUIDE_REGION + candidate),
+        independent_bits(vertex, ray, DIMENSION_GUIDE_PATCH + candidate));
+}
+
+Guided draw_brdf_candidate(Vertex vertex, uint first, uint ray, uint candidate) {
+    return draw_brdf_guided(
+        vertex, first, independent_bits(vertex, ray, DIMENSION_GUIDE_BRDF + candidate));
+}
+
+// Writes a ray that brings integrand * factor, and what it will teach.
+void finish(uint index, uint first, Guided guided, float factor) {
+    vec3 contribution = guided.considered.integrand * factor;
+    write_ray(index, guided.considered.direction, contribution);
+    learn_targets[index] = contribution != vec3(0.0) ? first + guided.region : NOTHING_TO_LEARN;
+}
+
+// A ray of the one-sample model: balance heuristic over BRDF and guide.
+void finish_one(uint index, uint first, Guided guided, float share) {
+    float pdf = share * guided.considered.brdf_pdf + (1.0 - share) * guided_pdf(guided);
+    finish(index, first, guided, pdf > 0.0 ? 1.0 / pdf : 0.0);
+}
+
+// One of the candidates seen so far. It is chosen with the probability
+// 0.9 guided / guided_sum + 0.1 unguided / unguided_sum: bounded estimates where the guide is wrong.
+struct Reservoir {
+    Guided chosen;
+    float chosen_pdf;
+    float chosen_guided;
+    float chosen_unguided;
+    float guided_sum;
+    float unguided_sum;
+    bool is_unguided;
+    float u;
+};
+
+void add_to(inout Reservoir reservoir, Guided candidate) {
+    const float brdf_part = float(BRDF_CANDIDATES) / float(CANDIDATES);
+    float pdf =
+        brdf_part * candidate.considered.brdf_pdf + (1.0 - brdf_part) * guided_pdf(candidate);
+    float unguided = pdf > 0.0 ? luminance(candidate.considered.integrand) / pdf : 0.0;
+    float guided = unguided * candidate.entry.visibility;
+    reservoir.guided_sum += guided;
+    reservoir.unguided_sum += unguided;
+    float weight = reservoir.is_unguided ? unguided : guided;
+    float sum = reservoir.is_unguided ? reservoir.unguided_sum : reservoir.guided_sum;
+    if (weight > 0.0) {
+        float probability = weight / sum;
+        if (reservoir.u < probability) {
+            reservoir.u /= probability;
+            reservoir.chosen = candidate;
+            reservoir.chosen_pdf = pdf;
+            reservoir.chosen_guided = guided;
+            reservoir.chosen_unguided = unguided;
+        } else {
+            reservoir.u = (reservoir.u - probability) / (1.0 - probability);
+        }
+    }
+}
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    uint path_count = wave_path_count();
+    if (path >= path_count) {
+        return;
+    }
+    Hit hit = load_hit(path);
+    if (hit.material == NO_MATERIAL) {
+        for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
+            learn_targets[i * path_count + path] = NOTHING_TO_LEARN;
+        }
+        return;
+    }
+    Vertex vertex = load_vertex(path, hit);
+    uint cell = guide_cell(
+        vertex, independent_bits(vertex, vertex.index.sample_index, DIMENSION_GUIDE_CELL));
+    uint first = cell * guide.region_count;
+    uint first_ray = vertex.index.sample_index * wave.total_shadow_rays + wave.first_shadow_ray;
+
+    if (CANDIDATES == 1u) {
+        // The coins of a block of 8x8 pixels are shared, and each technique has its own loop: devices
+        // that run both sides of a branch then run one technique per ray.
+        float share = brdf_share(vertex.material);
+        uint from_brdf = 0u;
+        uvec2 block = uvec2(
+            vertex.index.pixel % parameters.film_width, vertex.index.pixel / parameters.film_width)
+            / FILM_BLOCK;
+        for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
+            uint bits = hash_4d(uvec4(
+                block.x | (block.y << 16u), first_ray + i,
+                vertex.dimension + DIMENSION_GUIDE_TECHNIQUE, wave.seed)).x;
+            from_brdf |= unit_float(bits) < share ? 1u << i : 0u;
+        }
+        uint left = from_brdf;
+        while (left != 0u) {
+            uint i = uint(findLSB(left));
+            left &= left - 1u;
+            Guided guided = draw_brdf_candidate(vertex, first, first_ray + i, 0u);
+            finish_one(i * path_count + path, first, guided, share);
+        }
+        left = ~from_brdf & ((1u << wave.shadow_ray_count) - 1u);
+        while (left != 0u) {
+            uint i = uint(findLSB(left));
+            left &= left - 1u;
+            Guided guided = draw_candidate(vertex, first, first_ray + i, 0u);
+            finish_one(i * path_count + path, first, guided, share);
+        }
+    } else {
+        for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
+            uvec4 bits = independent_bits(vertex, first_ray + i, DIMENSION_GUIDE_RESAMPLING);
+            Reservoir reservoir;
+            reservoir.chosen.considered = Considered(vec3(0.0), vec3(0.0), 0.0, 0.0);
+            reservoir.chosen.region = 0u;
+            reservoir.chosen.entry = GuideEntry(0.0, 0u, 0u, 0.0);
+            reservoir.chosen_pdf = 0.0;
+            reservoir.chosen_guided = 0.0;
+            reservoir.chosen_unguided = 0.0;
+            reservoir.guided_sum = 0.0;
+            reservoir.unguided_sum = 0.0;
+            reservoir.is_unguided = unit_float(bits.x) < UNGUIDED_CHOICE;
+            reservoir.u = unit_float(bits.y);
+            for (uint c = 0u; c < BRDF_CANDIDATES; ++c) {
+                add_to(reservoir, draw_brdf_candidate(vertex, first, first_ray + i, c));
+            }
+            for (uint c = 0u; c < CANDIDATES - BRDF_CANDIDATES; ++c) {
+                add_to(reservoir, draw_candidate(vertex, first, first_ray + i, c));
+            }
+            float factor = 0.0;
+            if (reservoir.chosen_unguided > 0.0 && reservoir.guided_sum > 0.0) {
+                float chance =
+                    (1.0 - UNGUIDED_CHOICE) * reservoir.chosen_guided / reservoir.guided_sum
+                    + UNGUIDED_CHOICE * reservoir.chosen_unguided / reservoir.unguided_sum;
+                factor = 1.0 / (float(CANDIDATES) * reservoir.chosen_pdf * chance);
+            }
+            finish(i * path_count + path, first, reservoir.chosen, factor);
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Names of cells of the scene: where, how large, facing where, in 32 bits.
+//!
+//! A cell is a cube of an infinite grid whose edge follows from the distance to the camera, together
+//! with the face of the cube that the surface's normal points at most. The grid coordinates are kept
+//! modulo 256: two places share a name only if they are at least 256 edges apart at the same edge,
+//! which costs precision and no correctness. Twin of `guide_key` in `glsl/include/guide.glsl`.
+
+use glam::Vec3;
+
+/// Faces of a cube, in the order +x, −x, +y, −y, +z, −z.
+pub const FACE_COUNT: usize = 6;
+
+/// Outward normal of a face of the cube.
+pub fn face_normal(face: usize) -> Vec3 {
+    [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z][face % FACE_COUNT]
+}
+
+/// Name of a cell: x, y, z in 8 bits each, the level of size in 4, the face in 3; the highest bit
+/// marks coarse cells, four times as long, which belong to 64 fine ones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct CellKey(pub u32);
+
+impl CellKey {
+    /// No cell.
+    pub const NONE: Self = Self(u32::MAX);
+
+    const COARSE: u32 = 1 << 31;
+
+    /// The fine cell at grid coordinates `position` (taken modulo 256).
+    ///
+    /// # Panics
+    /// If the level is above 15 or the face above 5: a mistake of the caller.
+    pub fn fine(position: [i32; 3], level: u32, face: usize) -> Self {
+        assert!(level < 16 && face < FACE_COUNT, "level {level}, face {face}");
+        let [x, y, z] = position.map(|coordinate| (coordinate & 255) as u32);
+        Self(x | y << 8 | z << 16 | level << 24 | (face as u32) << 28)
+    }
+
+    /// The coarse cell that a fine one belongs to; a coarse one is its own.
+    pub fn coarse(self) -> Self {
+        if self.is_coarse() {
+            return self;
+        }
+        Self((self.0 >> 2 & 0x003f_3f3f) | (self.0 & 0x7f00_0000) | Self::COARSE)
+    }
+
+    /// Whether this is a coarse cell.
+    pub fn is_coarse(self) -> bool {
+        self.0 & Self::COARSE != 0
+    }
+
+    /// The face that surfaces in the cell point at.
+    pub fn face(self) -> usize {
+        (self.0 >> 28 & 7) as usize
+    }
+
+    /// Whether a word read back from the device names a fine cell at all.
+    pub fn is_valid_fine(self) -> bool {
+        !self.is_coarse() && self.face() < FACE_COUNT
+    }
+
+    /// First slot in a table of `mask + 1` slots. Finalizer of MurmurHash3 (Appleby 2011).
+    pub fn slot(self, mask: u32) -> u32 {
+        let mut hash = self.0;
+        hash ^= hash >> 16;
+        hash = hash.wrapping_mul(0x85eb_ca6b);
+        hash ^= hash >> 13;
+        hash = hash.wrapping_mul(0xc2b2_ae35);
+        (hash ^ hash >> 16) & mask
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coarse_cells_hold_four_fine_ones_along_each_axis() {
+        let key = CellKey::fine([7, -1, 300], 9, 5);
+        assert_eq!(key.0, 7 | 255 << 8 | 44 << 16 | 9 << 24 | 5 << 28);
+        assert_eq!(key.coarse(), CellKey::fine([4, 252, 47], 9, 5).coarse());
+        assert_ne!(key.coarse(), CellKey::fine([8, -1, 300], 9, 5).coarse());
+        assert_ne!(key.coarse(), CellKey::fine([7, -1, 300], 8, 5).coarse());
+        assert!(key.coarse().is_coarse() && key.coarse().coarse() == key.coarse());
+        assert_eq!((key.face(), key.coarse().face()), (5, 5));
+        assert!(key.is_valid_fine() && !CellKey::NONE.is_valid_fine());
+    }
+}

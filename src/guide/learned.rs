@@ -1,0 +1,193 @@
+//! What was learned so far, and the snapshot of it that a pass reads.
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use super::{
+    estimate::{Count, EstimateOptions, Estimates},
+    key::{CellKey, FACE_COUNT, face_normal},
+    partition::Partition,
+};
+use crate::gpu::constants::GUIDE_PROBES;
+
+/// Trials of one region and cell above which both counts are halved.
+const LARGEST_COUNT: u64 = 1 << 24;
+
+/// Cells and counts. The first [`FACE_COUNT`] cells are the faces: rays from places that have no
+/// cell of their own count there.
+#[derive(Clone, Debug)]
+pub struct Learned {
+    capacity: usize,
+    slots: usize,
+    keys: Vec<CellKey>,
+    index_of: HashMap<CellKey, usize>,
+    /// Rays that were counted in the cell itself, cell by cell and region by region.
+    counts: Vec<Count>,
+    region_count: usize,
+    refused: u64,
+}
+
+/// What the next pass reads, as it lies on the device.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Snapshot {
+    /// Hash table: key and index of a cell, [`CellKey::NONE`] where empty.
+    pub table: Vec<[u32; 2]>,
+    /// Entries of every cell, region by region.
+    pub entries: Vec<[u32; 2]>,
+}
+
+impl Learned {
+    /// Nothing learned, room for `capacity` cells (at least the faces) and a table of `slots`, a
+    /// power of two.
+    ///
+    /// # Panics
+    /// If there is no room for the faces or `slots` is not a power of two.
+    pub fn new(region_count: usize, capacity: usize, slots: usize) -> Self {
+        assert!(capacity >= FACE_COUNT && slots.is_power_of_two(), "{capacity} cells, {slots}");
+        Self {
+            capacity,
+            slots,
+            keys: vec![CellKey::NONE; FACE_COUNT],
+            index_of: HashMap::new(),
+            counts: vec![Count::default(); FACE_COUNT * region_count],
+            region_count,
+            refused: 0,
+        }
+    }
+
+    /// Number of cells, faces included.
+    pub fn cell_count(&self) -> usize {
+        self.keys.len()
+    }
+
+    /// Keys of all cells; those of the faces mean nothing.
+    pub fn keys(&self) -> &[CellKey] {
+        &self.keys
+    }
+
+    /// Hits and trials of one cell, region by region.
+    pub fn counts(&self, cell: usize) -> &[Count] {
+        &self.counts[cell * self.region_count..][..self.region_count]
+    }
+
+    /// Cells that found no room, counted again at every rebuild.
+    pub fn refused(&self) -> u64 {
+        self.refused
+    }
+
+    /// Adds what one stretch of passes counted, trials and hits per cell and region in the order of
+    /// the cells as they were.
+    ///
+    /// # Panics
+    /// If there are more counts than cells.
+    pub fn add(&mut self, counted: &[[u32; 2]]) {
+        assert!(counted.len() <= self.counts.len(), "counts of cells that are there");
+        for (count, [trials, hits]) in self.counts.iter_mut().zip(counted) {
+            count.trials += u64::from(*trials);
+            count.hits += u64::from(*hits.min(trials));
+            if count.trials > LARGEST_COUNT {
+                count.trials /= 2;
+                count.hits /= 2;
+            }
+        }
+    }
+
+    /// Makes room for the fine cells `wanted`, in any order and repeated at will: first for their
+    /// coarse cells, then for themselves, as long as there is room.
+    pub fn want(&mut self, wanted: &[u32]) {
+        let mut keys: Vec<CellKey> =
+            wanted.iter().map(|&word| CellKey(word)).filter(|key| key.is_valid_fine()).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        // Neighbours in the order of a hash are nowhere near each other: what finds no room is
+        // scattered over the scene.
+        keys.sort_by_key(|key| (key.slot(u32::MAX), key.0));
+        let coarse: Vec<CellKey> = keys.iter().map(|key| key.coarse()).collect();
+        for key in coarse.into_iter().chain(keys) {
+            if self.index_of.contains_key(&key) {
+                continue;
+            }
+            if self.keys.len() == self.capacity {
+                self.refused += 1;
+                continue;
+            }
+            self.index_of.insert(key, self.keys.len());
+            self.keys.push(key);
+            self.counts.resize(self.counts.len() + self.region_count, Count::default());
+        }
+    }
+
+    /// The tables for the next pass.
+    pub fn snapshot(&self, partition: &Partition, options: &EstimateOptions) -> Snapshot {
+        let regions = self.region_count;
+        // Every count also belongs to the coarse cell and the face above it.
+        let mut sums = self.counts.clone();
+        let mut scene = Count::default();
+        let mut faces = vec![Count::default(); FACE_COUNT * regions];
+        let add = |sums: &mut [Count], to: usize, counts: &[Count]| {
+            for (sum, count) in sums[to * regions..][..regions].iter_mut().zip(counts) {
+                sum.hits += count.hits;
+                sum.trials += count.trials;
+            }
+        };
+        for (index, key) in self.keys.iter().enumerate() {
+            let counts = self.counts(index);
+            for count in counts {
+                scene.hits += count.hits;
+                scene.trials += count.trials;
+            }
+            if index < FACE_COUNT {
+                add(&mut faces, index, counts);
+                continue;
+            }
+            add(&mut faces, key.face(), counts);
+            if !key.is_coarse()
+                && let Some(&coarse) = self.index_of.get(&key.coarse())
+            {
+                add(&mut sums, coarse, counts);
+            }
+        }
+        let faces: Vec<Estimates> =
+            faces.chunks(regions).map(|counts| Estimates::of_face(counts, scene)).collect();
+        let flat = Estimates::of_face(&vec![Count::default(); regions], scene);
+        let coarse_of = |key: CellKey| {
+            let prior = if options.hierarchy { &faces[key.face()] } else { &flat };
+            match self.index_of.get(&key.coarse()) {
+                Some(&index) if options.hierarchy => {
+                    Estimates::of_coarse(&sums[index * regions..][..regions], prior)
+                }
+                _ => prior.clone(),
+            }
+        };
+        let mut entries = vec![[0; 2]; self.keys.len() * regions];
+        entries.par_chunks_mut(regions).enumerate().for_each(|(index, entries)| {
+            let key = self.keys[index];
+            let (face, estimates) = if index < FACE_COUNT {
+                (index, faces[index].clone())
+            } else if key.is_coarse() {
+                (key.face(), coarse_of(key))
+            } else {
+                let coarse = coarse_of(key);
+                (key.face(), Estimates::of_fine(self.counts(index), &coarse, partition))
+            };
+            entries.copy_from_slice(&estimates.entries(face_normal(face), partition, options));
+        });
+        Snapshot { table: self.table(), entries }
+    }
+
+    /// The hash table; what finds no slot within [`GUIDE_PROBES`] is left out, and its place falls
+    /// back to the coarse cell or the face.
+    fn table(&self) -> Vec<[u32; 2]> {
+        let mut table = vec![[CellKey::NONE.0, 0]; self.slots];
+        let mask = (self.slots - 1) as u32;
+        for (index, key) in self.keys.iter().enumerate().skip(FACE_COUNT) {
+            let first = key.slot(mask);
+            let slots = (0..GUIDE_PROBES).map(|probe| ((first + probe) & mask) as usize);
+            if let Some(slot) = slots.into_iter().find(|&slot| table[slot][0] == CellKey::NONE.0) {
+                table[slot] = [key.0, index as u32];
+            }
+        }
+        table
+    }
+}

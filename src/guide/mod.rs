@@ -1,0 +1,22 @@
+//! Learned visibility: the sampler `guided` as tables.
+//!
+//! The environment is split once into a few hundred rectangles of its sampling cells
+//! ([`Partition`]); within a rectangle directions are drawn exactly in proportion to the map. What
+//! is learned is how often each rectangle is visible from each cell of the scene: passes count, and
+//! between passes [`Guide`] turns the counts into the probabilities that the next passes read.
+//! A pass reads only what earlier passes learned, so that its samples are independent of what they
+//! read and every estimate stays unbiased (Vévoda et al. 2018 learn light sources in this way).
+//!
+//! Rectangles, counts → `guide_regions`, `guide_entries` on the device; shader `sample_guided`.
+
+mod alias;
+mod estimate;
+mod key;
+mod learned;
+mod partition;
+
+pub use alias::{AliasEntry, alias_table, probabilities};
+pub use estimate::{EstimateOptions, Estimates, VISIBILITY_LEVELS, decode_entry};
+pub use key::{CellKey, FACE_COUNT, face_normal};
+pub use learned::{Learned, Snapshot};
+pub use partition::{PARENT_COUNT, Partition, Region};

@@ -1,0 +1,246 @@
+//! Learned visibility on the device: what passes read, what they count, and the rebuild in between.
+
+use std::{collections::BTreeMap, sync::Arc, time::Instant};
+
+use glam::Vec3;
+
+use crate::{
+    error::Result,
+    gpu::{
+        Buffer, Commands, DescriptorSet, Device,
+        constants::{
+            BINDING_GUIDE_ALIASES, BINDING_GUIDE_COUNTS, BINDING_GUIDE_ENTRIES,
+            BINDING_GUIDE_PARAMETERS, BINDING_GUIDE_REGION_OF_CELL, BINDING_GUIDE_REGIONS,
+            BINDING_GUIDE_TABLE, BINDING_GUIDE_WANTED, BINDING_LEARN_TARGETS, GUIDE_NO_KEY,
+            SET_SRBF,
+        },
+        layout::GuideParameters,
+    },
+    guide::{EstimateOptions, FACE_COUNT, Learned, Partition, Snapshot},
+    sampler::Parameters,
+    scene::Scene,
+};
+
+/// Edge of a cell in pixels, where it is not limited by the scene.
+const CELL_PIXELS: f32 = 24.0;
+/// Cells along the longest side of the scene, at least.
+const CELLS_PER_SCENE: f32 = 20.0;
+/// Levels of size below the largest cell.
+const LEVELS: i32 = 12;
+/// Bytes of a cell per region: an entry to read and two counts to write.
+const BYTES_PER_REGION: u64 = 16;
+/// Fewest cells there is room for, memory permitting.
+const FEW_CELLS: u64 = 4096;
+/// Pixels per cell beyond those: no film can fill more.
+const PIXELS_PER_CELL: u64 = 4;
+
+/// Everything of one render that learns.
+pub struct GuideBuffers {
+    device: Arc<Device>,
+    set: DescriptorSet,
+    partition: Partition,
+    options: EstimateOptions,
+    learned: Learned,
+    capacity: usize,
+    parameters: Buffer,
+    table: Buffer,
+    entries: Buffer,
+    regions: Buffer,
+    aliases: Buffer,
+    region_of_cell: Buffer,
+    counts: Buffer,
+    wanted: Buffer,
+    targets: Buffer,
+    wanted_slots: usize,
+    rebuild_ms: f64,
+}
+
+impl GuideBuffers {
+    /// Splits the environment and makes room for `pixels` of film and waves of `rays` shadow rays.
+    ///
+    /// # Errors
+    /// A limit of the device or a failing device.
+    pub fn new(
+        device: &Arc<Device>,
+        scene: &Scene,
+        parameters: &Parameters,
+        pixels: u32,
+        rays: u64,
+    ) -> Result<Self> {
+        let partition = Partition::new(&scene.environment, parameters.regions as usize);
+        let region_count = partition.regions.len();
+        let bytes_per_cell = BYTES_PER_REGION * region_count as u64;
+        let by_range = device.capabilities().max_storage_buffer_range / (bytes_per_cell / 2);
+        let useful = FEW_CELLS.max(u64::from(pixels) / PIXELS_PER_CELL);
+        let capacity = (parameters.guide_memory / bytes_per_cell)
+            .min(by_range)
+            .min(useful)
+            .max(FACE_COUNT as u64) as usize;
+        let slots = (4 * capacity).next_power_of_two();
+        let wanted_slots = (2 * capacity).next_power_of_two();
+        let learned = Learned::new(region_count, capacity, slots);
+
+        let regions: Vec<[u32; 4]> = partition
+            .regions
+            .iter()
+            .map(|region| {
+                let first = region.first[0] | region.first[1] << 16;
+                [region.first_entry as u32, region.size[0], region.size[1], first]
+            })
+            .collect();
+        let aliases: Vec<[u32; 2]> = partition
+            .entries
+            .iter()
+            .map(|entry| [u32::try_from(entry.threshold).unwrap_or(u32::MAX), entry.alias])
+            .collect();
+        let cells = capacity * region_count * 8;
+        let guide = guide_parameters(scene, region_count, slots, wanted_slots);
+        let parameters = Buffer::from_slice(device, "guide parameters", &[guide])?;
+        let table = Buffer::new(device, "guide table", 8 * slots as u64)?;
+        let entries = Buffer::new(device, "guide entries", cells as u64)?;
+        let regions = Buffer::texels_from_slice(device, "guide regions", &regions)?;
+        let aliases = Buffer::texels_from_slice(device, "guide aliases", &aliases)?;
+        let region_of_cell =
+            Buffer::texels_from_slice(device, "guide region of cell", &partition.region_of_cell)?;
+        let counts = Buffer::new(device, "guide counts", cells as u64)?;
+        let wanted = Buffer::new(device, "guide wanted", 4 * wanted_slots as u64)?;
+        let targets = Buffer::new(device, "learn targets", 4 * rays)?;
+        let set = DescriptorSet::new(
+            device,
+            SET_SRBF,
+            &[
+                (BINDING_GUIDE_PARAMETERS, &parameters),
+                (BINDING_GUIDE_TABLE, &table),
+                (BINDING_GUIDE_ENTRIES, &entries),
+                (BINDING_GUIDE_REGIONS, &regions),
+                (BINDING_GUIDE_ALIASES, &aliases),
+                (BINDING_GUIDE_REGION_OF_CELL, &region_of_cell),
+                (BINDING_GUIDE_COUNTS, &counts),
+                (BINDING_GUIDE_WANTED, &wanted),
+                (BINDING_LEARN_TARGETS, &targets),
+            ],
+        )?;
+        let mut buffers = Self {
+            device: Arc::clone(device),
+            set,
+            partition,
+            options: EstimateOptions::default(),
+            learned,
+            capacity,
+            parameters,
+            table,
+            entries,
+            regions,
+            aliases,
+            region_of_cell,
+            counts,
+            wanted,
+            targets,
+            wanted_slots,
+            rebuild_ms: 0.0,
+        };
+        buffers.forget()?;
+        Ok(buffers)
+    }
+
+    /// The SRBF set, as `sample_guided` and `learn` see it.
+    pub fn set(&self) -> &DescriptorSet {
+        &self.set
+    }
+
+    /// Starts from nothing.
+    ///
+    /// # Errors
+    /// A failing device.
+    pub fn forget(&mut self) -> Result<()> {
+        self.learned = Learned::new(
+            self.partition.regions.len(),
+            self.capacity,
+            self.table.size() as usize / 8,
+        );
+        self.rebuild_ms = 0.0;
+        self.clear_counts()?;
+        self.upload()
+    }
+
+    /// Turns what passes counted into what the next ones read.
+    ///
+    /// # Errors
+    /// A failing device.
+    pub fn rebuild(&mut self) -> Result<()> {
+        let start = Instant::now();
+        let counted = self.learned.cell_count() * self.partition.regions.len();
+        self.learned.add(&self.counts.download::<[u32; 2]>(counted)?);
+        self.learned.want(&self.wanted.download::<u32>(self.wanted_slots)?);
+        self.clear_counts()?;
+        self.upload()?;
+        self.rebuild_ms += start.elapsed().as_secs_f64() * 1e3;
+        Ok(())
+    }
+
+    /// Host milliseconds of all rebuilds since the start.
+    pub fn rebuild_ms(&self) -> f64 {
+        self.rebuild_ms
+    }
+
+    fn clear_counts(&self) -> Result<()> {
+        let mut commands = Commands::begin(&self.device)?;
+        commands.fill(&self.counts, 0);
+        commands.fill(&self.wanted, GUIDE_NO_KEY);
+        commands.submit_and_wait()?;
+        Ok(())
+    }
+
+    fn upload(&self) -> Result<()> {
+        let Snapshot { table, entries } = self.learned.snapshot(&self.partition, &self.options);
+        self.table.upload(bytemuck::cast_slice(&table))?;
+        self.entries.upload(bytemuck::cast_slice(&entries))
+    }
+
+    /// Bytes by buffer name.
+    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+        [
+            &self.parameters,
+            &self.table,
+            &self.entries,
+            &self.regions,
+            &self.aliases,
+            &self.region_of_cell,
+            &self.counts,
+            &self.wanted,
+            &self.targets,
+        ]
+        .into_iter()
+        .map(|buffer| (buffer.name().to_owned(), buffer.size()))
+        .collect()
+    }
+}
+
+/// Cells about [`CELL_PIXELS`] wide in the picture, at most a twentieth of the scene.
+fn guide_parameters(
+    scene: &Scene,
+    region_count: usize,
+    slots: usize,
+    wanted_slots: usize,
+) -> GuideParameters {
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for corner in scene.geometry.triangles.iter().flatten() {
+        let position = Vec3::from(scene.geometry.positions[*corner as usize]);
+        low = low.min(position);
+        high = high.max(position);
+    }
+    let size = (high - low).max_element();
+    let size = if size.is_finite() && size > 0.0 { size } else { 1.0 };
+    let pixel_angle = 2.0 * (0.5 * scene.camera.vertical_fov_deg).to_radians().tan()
+        / scene.film.height.max(1) as f32;
+    let largest_edge = size / CELLS_PER_SCENE;
+    GuideParameters {
+        grid_origin: if low.is_finite() { low.into() } else { [0.0; 3] },
+        finest_edge: largest_edge * 0.5_f32.powi(LEVELS),
+        edge_per_distance: CELL_PIXELS * pixel_angle,
+        largest_edge,
+        region_count: region_count as u32,
+        table_mask: (slots - 1) as u32,
+        wanted_mask: (wanted_slots - 1) as u32,
+    }
+}

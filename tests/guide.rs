@@ -1,0 +1,412 @@
+//! Learned visibility on the host: the partition of the environment, what cells estimate, and the
+//! estimators by exact enumeration.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+mod support;
+
+use fenestra::{
+    gpu::constants::{BINDING_GUIDE_COUNTS, GUIDE_NO_KEY, SET_SRBF},
+    guide::{CellKey, EstimateOptions, FACE_COUNT, Learned, PARENT_COUNT, Partition, decode_entry},
+    random::{hash_4d, random_independent_2d},
+    scene::environment::{EnvironmentMap, EnvironmentTables},
+};
+use glam::Vec3;
+use support::{scenes, statistics::chi_square_p_value};
+
+/// A sky with a small sun and a black ground: bright, dim and empty regions.
+fn sunny() -> EnvironmentMap {
+    let sun = Vec3::new(0.3, 0.5, -0.8).normalize();
+    let mut map = scenes::environment(96, |direction| {
+        if direction.y < -0.3 {
+            return Vec3::ZERO;
+        }
+        Vec3::new(0.3, 0.5, 1.0) * (1.2 + direction.y)
+            + 3000.0 * Vec3::splat(((direction.dot(sun) - 1.0) * 900.0).exp())
+    });
+    map.rotation_rad = -0.7;
+    map
+}
+
+#[test]
+fn regions_are_nested_rectangles_that_fill_the_map() {
+    let map = sunny();
+    let coarse = Partition::new(&map, PARENT_COUNT);
+    let fine = Partition::new(&map, 256);
+    assert_eq!((coarse.regions.len(), fine.regions.len()), (PARENT_COUNT, 256));
+    let (width, rows) = (fine.width, fine.rows);
+    assert_eq!((width, rows), (map.width, map.height + 1));
+    let mut covered = vec![0; fine.region_of_cell.len()];
+    for (index, region) in fine.regions.iter().enumerate() {
+        for row in region.first[1]..region.first[1] + region.size[1] {
+            for column in region.first[0]..region.first[0] + region.size[0] {
+                let cell = (row * width + column) as usize;
+                covered[cell] += 1;
+                assert_eq!(usize::from(fine.region_of_cell[cell]), index);
+                let parent = usize::from(coarse.region_of_cell[cell]);
+                assert_eq!(region.parent, parent, "the first 64 rectangles are the parents");
+            }
+        }
+    }
+    assert!(covered.iter().all(|count| *count == 1), "every cell lies in one region");
+    let sum = |value: &dyn Fn(&fenestra::guide::Region) -> f64| -> f64 {
+        fine.regions.iter().map(value).sum()
+    };
+    assert!((sum(&|region| region.share) - 1.0).abs() < 1e-12);
+    assert!((sum(&|region| region.solid_angle) - 1.0).abs() < 1e-12);
+    let brightest = fine.regions.iter().max_by(|a, b| a.share.total_cmp(&b.share)).unwrap();
+    assert!(brightest.solid_angle < 1e-3, "the sun has a region of its own: {brightest:?}");
+}
+
+#[test]
+fn small_and_black_maps_have_fewer_regions() {
+    let constant = EnvironmentMap::constant(Vec3::ONE, 1.0).unwrap();
+    assert_eq!(Partition::new(&constant, 1024).regions.len(), 1024);
+    let tiny = scenes::environment(4, |_| Vec3::ONE);
+    let partition = Partition::new(&tiny, 256);
+    assert_eq!(partition.regions.len(), 4 * 3);
+    assert_eq!(partition.parent_count, 4 * 3);
+    let black = Partition::new(&scenes::environment(16, |_| Vec3::ZERO), 256);
+    assert_eq!(black.regions.len(), 1);
+    assert_eq!(black.regions[0].share, 0.0);
+}
+
+/// Probability of the cell of every sample point of a fine grid in (u, v), from the density.
+#[test]
+fn the_density_integrates_to_one_over_every_region() {
+    let map = sunny();
+    let tables = EnvironmentTables::new(&map);
+    let partition = Partition::new(&map, 64);
+    let mut integrals = vec![0.0; partition.regions.len()];
+    // Points in every cell; a Gauss-Legendre rule of two points is exact for the bilinear patch but
+    // for the variation of the sine, which the density divides by.
+    let offsets = [0.5 - 0.5 / 3.0_f64.sqrt(), 0.5 + 0.5 / 3.0_f64.sqrt()];
+    let (width, height) = (f64::from(map.width), f64::from(map.height));
+    for row in 0..partition.rows {
+        let (top, extent) = match row {
+            0 => (0.0, 0.5),
+            row if row == map.height => (height - 0.5, 0.5),
+            row => (f64::from(row) - 0.5, 1.0),
+        };
+        for column in 0..partition.width {
+            let region = partition.region_of_cell[(row * partition.width + column) as usize];
+            for (dx, dy) in offsets.iter().flat_map(|x| offsets.iter().map(move |y| (*x, *y))) {
+                let u = ((f64::from(column) + 0.5 + dx) / width).fract();
+                let v = (top + extent * dy) / height;
+                let direction = direction_from(&map, u, v);
+                let radiance = map.radiance(direction);
+                let pdf = f64::from(tables.pdf(&map, direction, radiance));
+                let jacobian =
+                    2.0 * std::f64::consts::PI.powi(2) * (std::f64::consts::PI * v).sin();
+                integrals[usize::from(region)] += pdf * jacobian * 0.25 * extent / (width * height);
+            }
+        }
+    }
+    for (region, integral) in partition.regions.iter().zip(&integrals) {
+        if region.share > 0.0 {
+            let ratio = integral / region.share;
+            assert!((ratio - 1.0).abs() < 2e-2, "{ratio} over {region:?}");
+        }
+    }
+    assert!((integrals.iter().sum::<f64>() - 1.0).abs() < 1e-3);
+}
+
+/// World direction of lat-long coordinates of the map.
+fn direction_from(map: &EnvironmentMap, u: f64, v: f64) -> Vec3 {
+    let (azimuth, theta) = (2.0 * std::f64::consts::PI * u, std::f64::consts::PI * v);
+    let (s, c) = f64::from(map.rotation_rad).sin_cos();
+    let (x, z) = (-theta.sin() * azimuth.sin(), theta.sin() * azimuth.cos());
+    glam::DVec3::new(c * x + s * z, theta.cos(), c * z - s * x).as_vec3()
+}
+
+#[test]
+fn samples_of_a_region_have_its_density() {
+    let map = sunny();
+    let tables = EnvironmentTables::new(&map);
+    let partition = Partition::new(&map, 64);
+    for (index, region) in partition.regions.iter().enumerate().step_by(5) {
+        let count = region.size[0] * region.size[1];
+        if region.share <= 0.0 || count < 4 {
+            continue;
+        }
+        let energy = |cell: [u32; 2]| -> f64 {
+            // P_cell from a quadrature of the density over the cell, by its table's own rows.
+            let column = tables.cell_cumulative(&map, cell[1] as usize);
+            let before = if cell[0] > 0 { column[cell[0] as usize - 1] } else { 0.0 };
+            let row = tables.row_cumulative(&map);
+            let above = if cell[1] > 0 { row[cell[1] as usize - 1] } else { 0.0 };
+            f64::from(column[cell[0] as usize] - before) * f64::from(row[cell[1] as usize] - above)
+        };
+        let cell_of = |index: u32| {
+            [region.first[0] + index % region.size[0], region.first[1] + index / region.size[0]]
+        };
+        let expected: Vec<f64> = (0..count).map(|index| energy(cell_of(index))).collect();
+        let mut observed = vec![0.0; count as usize];
+        for sample in 0..20_000 {
+            let bits = hash_4d([sample, index as u32, 7, 1]);
+            let cell = partition.choose_cell(index, [bits[0], bits[1]]);
+            let local = [cell[0] - region.first[0], cell[1] - region.first[1]];
+            observed[(local[1] * region.size[0] + local[0]) as usize] += 1.0;
+            if sample < 50 {
+                let u = random_independent_2d(sample, 0, index as u32, 2);
+                let drawn = tables.sample_cell(&map, cell, u);
+                let pdf = tables.pdf(&map, drawn.direction, drawn.radiance);
+                assert!((drawn.pdf / pdf - 1.0).abs() < 1e-3, "{} {pdf}", drawn.pdf);
+            }
+        }
+        if expected.iter().filter(|e| **e > 0.0).count() > 2 {
+            let p = chi_square_p_value(&observed, &expected);
+            assert!(p > 1e-5, "region {index}: p = {p}");
+        }
+    }
+}
+
+/// Draws many regions from the entries of a cell as the shader does and compares with their ratios.
+#[test]
+fn entries_hold_the_probabilities_they_are_drawn_with() {
+    let map = sunny();
+    let partition = Partition::new(&map, 64);
+    let learned = taught(&partition, 1 << 12, 1 << 14);
+    let snapshot = learned.snapshot(&partition, &EstimateOptions::default());
+    let regions = partition.regions.len();
+    for cell in [0, FACE_COUNT, learned.cell_count() - 1] {
+        let entries = &snapshot.entries[cell * regions..][..regions];
+        let expected: Vec<f64> = entries
+            .iter()
+            .zip(&partition.regions)
+            .map(|(entry, region)| f64::from(decode_entry(*entry).0) * region.share)
+            .collect();
+        assert!((expected.iter().sum::<f64>() - 1.0).abs() < 1e-6);
+        let mut observed = vec![0.0; regions];
+        for sample in 0..200_000 {
+            let bits = hash_4d([sample, cell as u32, 3, 3]);
+            let own = ((u64::from(bits[0]) * regions as u64) >> 32) as usize;
+            let (_, threshold, alias, _) = decode_entry(entries[own]);
+            observed[if bits[1] >> 16 < threshold { own } else { alias as usize }] += 1.0;
+        }
+        let p = chi_square_p_value(&observed, &expected);
+        assert!(p > 1e-5, "cell {cell}: p = {p}");
+        for (entry, region) in entries.iter().zip(&partition.regions) {
+            let (ratio, .., weight) = decode_entry(*entry);
+            assert_eq!(ratio > 0.0, region.share > 0.0, "whatever shines can be drawn");
+            assert!((7e-4..=1.0).contains(&weight));
+        }
+    }
+}
+
+/// A guide that was taught: eastern regions visible from one fine cell, nothing from another.
+fn taught(partition: &Partition, capacity: usize, slots: usize) -> Learned {
+    let mut learned = Learned::new(partition.regions.len(), capacity, slots);
+    let keys = [CellKey::fine([3, 4, 5], 6, 2), CellKey::fine([40, 4, 5], 6, 2)];
+    learned.want(&keys.map(|key| key.0));
+    let regions = partition.regions.len();
+    let mut counted = vec![[0_u32; 2]; learned.cell_count() * regions];
+    for (cell, key) in learned.keys().iter().enumerate() {
+        for (region, count) in partition.regions.iter().zip(&mut counted[cell * regions..]) {
+            let sees = *key == keys[0] && region.direction.x > 0.0;
+            if !key.is_coarse() && cell >= FACE_COUNT {
+                *count = [40, if sees { 40 } else { 0 }];
+            }
+        }
+    }
+    learned.add(&counted);
+    learned
+}
+
+#[test]
+fn cells_learn_and_lean_on_their_surroundings() {
+    let map = sunny();
+    let partition = Partition::new(&map, 64);
+    let mut learned = taught(&partition, 1 << 12, 1 << 14);
+    // A neighbour of the first cell that has seen nothing, and a stranger on another face.
+    let neighbour = CellKey::fine([2, 4, 5], 6, 2);
+    let stranger = CellKey::fine([3, 4, 5], 6, 3);
+    learned.want(&[neighbour.0, stranger.0]);
+    let snapshot = learned.snapshot(&partition, &EstimateOptions::default());
+    let regions = partition.regions.len();
+    let share_east = |key: CellKey| -> f64 {
+        let slot = snapshot.table.iter().find(|entry| entry[0] == key.0).unwrap();
+        let entries = &snapshot.entries[slot[1] as usize * regions..][..regions];
+        entries
+            .iter()
+            .zip(&partition.regions)
+            .filter(|(_, region)| region.direction.x > 0.0)
+            .map(|(entry, region)| f64::from(decode_entry(*entry).0) * region.share)
+            .sum()
+    };
+    let prior: f64 = partition
+        .regions
+        .iter()
+        .filter(|region| region.direction.x > 0.0)
+        .map(|region| region.share)
+        .sum();
+    let seen = share_east(CellKey::fine([3, 4, 5], 6, 2));
+    let blind = share_east(CellKey::fine([40, 4, 5], 6, 2));
+    assert!(seen > 0.9, "{seen}");
+    assert!(share_east(neighbour) > 0.8, "through the coarse cell: {}", share_east(neighbour));
+    assert!((share_east(stranger) - prior).abs() < 0.25, "{} {prior}", share_east(stranger));
+    assert!(blind < seen, "{blind}");
+}
+
+#[test]
+fn overflow_and_collisions_fall_back() {
+    let map = sunny();
+    let partition = Partition::new(&map, 16);
+    let wanted: Vec<u32> = (0..500)
+        .map(|index| CellKey::fine([index % 50, index / 50, 0], 3, 2).0)
+        .chain([GUIDE_NO_KEY, 0xf000_0000, CellKey::fine([0; 3], 0, 0).coarse().0])
+        .collect();
+    let mut learned = Learned::new(partition.regions.len(), 64, 64);
+    learned.want(&wanted);
+    assert_eq!(learned.cell_count(), 64, "no more than there is room for");
+    assert!(learned.refused() > 0);
+    let coarse = learned.keys()[FACE_COUNT..].iter().filter(|key| key.is_coarse()).count();
+    assert_eq!(coarse, 13 * 3, "coarse cells come first");
+    let snapshot = learned.snapshot(&partition, &EstimateOptions::default());
+    let entered = snapshot.table.iter().filter(|entry| entry[0] != GUIDE_NO_KEY).count();
+    assert!(entered <= 58, "{entered}");
+    // A table far too small: what has no slot is left out, and nothing breaks.
+    let mut crowded = Learned::new(partition.regions.len(), 400, 16);
+    crowded.want(&wanted);
+    let snapshot = crowded.snapshot(&partition, &EstimateOptions::default());
+    assert!(snapshot.table.iter().all(|entry| entry[0] != GUIDE_NO_KEY), "16 slots are full");
+    assert_eq!(snapshot.entries.len(), crowded.cell_count() * partition.regions.len());
+}
+
+#[test]
+fn the_order_in_which_cells_are_found_does_not_matter() {
+    let map = sunny();
+    let partition = Partition::new(&map, 32);
+    let wanted: Vec<u32> =
+        (0..300).map(|index| CellKey::fine([index, 7, index / 3], 4, 1).0).collect();
+    let mut repeated: Vec<u32> = wanted.iter().rev().copied().collect();
+    repeated.extend(&wanted[20..90]);
+    let snapshot = |wanted: &[u32]| {
+        let mut learned = Learned::new(partition.regions.len(), 128, 512);
+        learned.want(wanted);
+        learned.snapshot(&partition, &EstimateOptions::default())
+    };
+    assert_eq!(snapshot(&wanted), snapshot(&repeated));
+}
+
+/// A toy environment of four directions: what each brings if visible, whether it is, two densities,
+/// and a guess of the visibility.
+struct Toy {
+    integrand: [f64; 4],
+    visible: [f64; 4],
+    brdf: [f64; 4],
+    guided: [f64; 4],
+    guess: [f64; 4],
+}
+
+const TOY: Toy = Toy {
+    integrand: [4.0, 1.0, 2.5, 0.5],
+    visible: [1.0, 0.0, 0.0, 1.0],
+    brdf: [0.1, 0.2, 0.3, 0.4],
+    guided: [0.55, 0.05, 0.1, 0.3],
+    guess: [0.9, 0.02, 0.3, 0.05],
+};
+
+impl Toy {
+    fn truth(&self) -> f64 {
+        self.integrand.iter().zip(self.visible).map(|(value, seen)| value * seen).sum()
+    }
+
+    /// Expectation of the resampled estimate with `from_brdf` and `from_guide` candidates, over
+    /// every tuple of candidates and every choice; `brdf_part` is the weight of the BRDF's density.
+    fn resampled(&self, from_brdf: u32, from_guide: u32, brdf_part: f64) -> f64 {
+        let count = from_brdf + from_guide;
+        let pdf = |y: usize| brdf_part * self.brdf[y] + (1.0 - brdf_part) * self.guided[y];
+        let unguided = |y: usize| self.integrand[y] / pdf(y);
+        let guided = |y: usize| unguided(y) * self.guess[y].powf(0.7);
+        let mut expectation = 0.0;
+        for tuple in 0..4_usize.pow(count) {
+            let chosen: Vec<usize> =
+                (0..count).map(|index| tuple / 4_usize.pow(index) % 4).collect();
+            let probability: f64 = chosen
+                .iter()
+                .enumerate()
+                .map(
+                    |(index, &y)| {
+                        if (index as u32) < from_brdf { self.brdf[y] } else { self.guided[y] }
+                    },
+                )
+                .product();
+            let sums = chosen
+                .iter()
+                .fold((0.0, 0.0), |sums, &y| (sums.0 + guided(y), sums.1 + unguided(y)));
+            for &y in &chosen {
+                let chance = 0.9 * guided(y) / sums.0 + 0.1 * unguided(y) / sums.1;
+                let estimate =
+                    self.integrand[y] * self.visible[y] / (f64::from(count) * pdf(y) * chance);
+                expectation += probability * chance * estimate;
+            }
+        }
+        expectation
+    }
+}
+
+#[test]
+fn the_resampled_estimator_is_exact_with_unequal_counts() {
+    for (from_brdf, from_guide) in [(1, 3), (2, 6), (1, 1), (3, 1)] {
+        let part = f64::from(from_brdf) / f64::from(from_brdf + from_guide);
+        let found = TOY.resampled(from_brdf, from_guide, part);
+        assert!((found - TOY.truth()).abs() < 1e-10, "{from_brdf} + {from_guide}: {found}");
+    }
+    // The density of the one-sample model in its place is wrong, and the enumeration says so.
+    let wrong = TOY.resampled(1, 3, 0.1);
+    assert!((wrong - TOY.truth()).abs() > 0.05, "{wrong}");
+}
+
+/// Two rays in turn; what the first sees changes the density of the second. Divided by the density
+/// in force when it was drawn, the second is exact; by what was known afterwards, it is not.
+#[test]
+fn feedback_inside_a_pass_would_be_caught() {
+    let after = |seen: usize| -> [f64; 4] {
+        // What is known after one ray: its direction is chosen more often if it was visible.
+        let mut weights = TOY.guided;
+        weights[seen] *= if TOY.visible[seen] > 0.0 { 3.0 } else { 0.2 };
+        let sum: f64 = weights.iter().sum();
+        weights.map(|weight| weight / sum)
+    };
+    let value = |y: usize| TOY.integrand[y] * TOY.visible[y];
+    let (mut snapshot, mut feedback) = (0.0, 0.0);
+    for first in 0..4 {
+        let later = after(first);
+        for second in 0..4 {
+            let probability = TOY.guided[first] * later[second];
+            snapshot += probability
+                * 0.5
+                * (value(first) / TOY.guided[first] + value(second) / later[second]);
+            // A pass that reads what it writes: the first ray divided by the table as it is when
+            // the pass ends.
+            feedback +=
+                probability * 0.5 * (value(first) / later[first] + value(second) / later[second]);
+        }
+    }
+    assert!((snapshot - TOY.truth()).abs() < 1e-12, "{snapshot}");
+    assert!((feedback - TOY.truth()).abs() > 0.2, "{feedback}");
+    // The shaders cannot do so: the one that samples has no access to the counts.
+    let (_, spirv) = fenestra::gpu::shaders::PASSES
+        .iter()
+        .find(|(name, _)| *name == "sample_guided")
+        .expect("the pass exists");
+    assert!(!binds(spirv, SET_SRBF, BINDING_GUIDE_COUNTS));
+    let (_, spirv) =
+        fenestra::gpu::shaders::PASSES.iter().find(|(name, _)| *name == "learn").unwrap();
+    assert!(binds(spirv, SET_SRBF, BINDING_GUIDE_COUNTS));
+}
+
+/// Whether a shader declares a variable at a set and binding (SPIR-V decorations 33 and 34).
+fn binds(spirv: &[u8], set: u32, binding: u32) -> bool {
+    let words: Vec<u32> =
+        spirv.chunks_exact(4).map(|bytes| u32::from_le_bytes(bytes.try_into().unwrap())).collect();
+    let decorated = |decoration: u32, value: u32| -> Vec<u32> {
+        words
+            .windows(4)
+            .filter(|w| w[0] == (4 << 16 | 71) && w[2] == decoration && w[3] == value)
+            .map(|w| w[1])
+            .collect()
+    };
+    let sets = decorated(34, set);
+    decorated(33, binding).iter().any(|id| sets.contains(id))
+}
