@@ -236,7 +236,7 @@ fn runs_made_under_other_conditions_are_not_mixed_in() {
     let before = changed(&folder, record);
     let options: Vec<&str> = SMALL.iter().filter(|o| !o.starts_with("--shadow")).copied().collect();
     let other = with(&options, &["--shadow-rays=3"]);
-    folder.run(&other).assert(1, &["error: report: ", "shadow rays: 2 there, 3", "--redo"]);
+    folder.run(&other).assert(1, &["shadow rays: 2 there, 3", "one of 4 such runs", "--redo"]);
     assert_eq!(changed(&folder, record), before);
     folder.run(&with(&other, &["--redo"])).assert(0, &[]);
     assert_eq!(json(&folder, record)["conditions"]["shadow_rays"], 3);
@@ -360,7 +360,7 @@ fn a_study_file_gives_scenes_and_settings() {
     check_page(&page);
     assert!(page.contains("<h1>Yards &lt;&amp;&gt;</h1>") && page.contains("A &lt;b&gt;note"));
     assert!(page.contains("Table 7 beside this study: yard"), "the published figures are shown");
-    assert!(page.contains("<td>0.5</td><td>0.25</td><td>0.500</td>"));
+    assert!(page.contains("<td>0.500000</td><td>0.250000</td><td>0.500</td>"));
     assert_eq!(results["runs"].as_array().unwrap().len(), 2);
     assert_eq!(results["scenes"][0]["width"], 12);
     folder.run(&with(&options, &["other.toml"])).assert(0, &[]);

@@ -2,7 +2,7 @@
 //! and samplers, and the overhead rounds. Every finished run is written at once, and runs that an
 //! earlier study of the same folder finished are taken up.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{collections::BTreeMap, fs, path::PathBuf, sync::Arc};
 
 use super::{
     contender::Contender,
@@ -121,56 +121,72 @@ impl Study<'_> {
         })
     }
 
-    /// The record of a run that is finished with everything this plan asks of it.
-    fn finished_run(
+    /// Where the record of a run lies.
+    fn run_record(
         &self,
         scene: &Scene,
         (rule, seed, contender): (Rule, u32, &Contender),
-    ) -> Result<Option<Run>> {
-        let path = self.folder.record(&scene.name, &run_stem(contender, rule, seed));
+    ) -> PathBuf {
+        self.folder.record(&scene.name, &run_stem(contender, rule, seed))
+    }
+
+    /// Where the record of an overhead round lies.
+    fn round_record(&self, scene: &Scene, repetition: u32) -> PathBuf {
+        self.folder.record(&scene.name, &format!("overhead-{repetition}"))
+    }
+
+    /// The record of a run that is finished with everything this plan asks of it.
+    fn finished_run(&self, scene: &Scene, task: (Rule, u32, &Contender)) -> Result<Option<Run>> {
+        let path = self.run_record(scene, task);
         Ok(self.folder.read_json::<Run>(&path)?.filter(|run| {
             let has_image = |level: &Rule| {
                 run.at(*level).is_some_and(|measurement| measurement.image.is_some())
             };
-            matches!(rule, Rule::Seconds(_))
+            matches!(task.0, Rule::Seconds(_))
                 || self.plan.spp.iter().map(|spp| Rule::Spp(*spp)).all(|level| has_image(&level))
         }))
     }
 
     /// The record of a finished overhead round.
     fn finished_round(&self, scene: &Scene, repetition: u32) -> Result<Option<Round>> {
-        let path = self.folder.record(&scene.name, &format!("overhead-{repetition}"));
-        let round = self.folder.read_json::<Round>(&path)?;
+        let round = self.folder.read_json::<Round>(&self.round_record(scene, repetition))?;
         Ok(round.filter(|round| Some(round.spp) == self.plan.overhead.as_ref().map(|o| o.spp)))
     }
 
     /// Refuses finished runs that were made under other conditions, or removes them.
     fn check_finished_runs(&self, scenes: &[Scene], redo: bool) -> Result<()> {
-        let mut stale = Vec::new();
+        let mut stale: Vec<(PathBuf, String)> = Vec::new();
+        let mut compare = |path: PathBuf, found: &Conditions, asked: &Conditions| {
+            let difference = found.differences(asked).into_iter().next();
+            stale.extend(difference.map(|difference| (path, difference)));
+        };
         for scene in scenes {
             for task in tasks(self.plan) {
                 if let Some(run) = self.finished_run(scene, task)? {
                     let asked = self.conditions(scene, Some(task.2))?;
-                    stale.extend(run.conditions.differences(&asked).into_iter().next());
+                    compare(self.run_record(scene, task), &run.conditions, &asked);
                 }
             }
             let rounds = self.plan.overhead.as_ref().map_or(0, |overhead| overhead.repetitions);
             for repetition in 1..=rounds {
                 if let Some(round) = self.finished_round(scene, repetition)? {
                     let asked = self.conditions(scene, None)?;
-                    stale.extend(round.conditions.differences(&asked).into_iter().next());
+                    compare(self.round_record(scene, repetition), &round.conditions, &asked);
                 }
             }
         }
-        let Some(first) = stale.first() else { return Ok(()) };
+        let Some((path, first)) = stale.first() else { return Ok(()) };
         if redo {
-            return self.folder.clear();
+            return stale.iter().try_for_each(|(path, _)| {
+                fs::remove_file(path).map_err(|source| Error::io(path, "remove", source))
+            });
         }
         Err(Error::format(
-            self.folder.path(),
+            path,
             format!(
-                "the folder holds {} finished runs made under other conditions ({first}); choose \
-                 another folder with -o, or give --redo to remove them and start again",
+                "made under other conditions than those asked for ({first}), one of {} such runs in \
+                 the folder; choose another folder with -o, or give --redo to remove them and make \
+                 them again",
                 stale.len()
             ),
         ))
@@ -320,8 +336,7 @@ impl Study<'_> {
                 folder: self.folder,
             };
             let run = job.execute(renderer, &mut self.watch)?;
-            let stem = run_stem(contender, rule, seed);
-            self.folder.write_json(&self.folder.record(&scene.name, &stem), &run)?;
+            self.folder.write_json(&self.run_record(scene, task), &run)?;
             if let Some(last) = run.last() {
                 self.watch.note(&format!(
                     "{}: {}, {}, seed {seed}: {} spp in {:.2} s, RMSE {:.4e}",

@@ -101,20 +101,6 @@ impl Folder {
         &self.path
     }
 
-    /// Removes the records and images of all runs and references.
-    ///
-    /// # Errors
-    /// [`Error::Io`] with the cause.
-    pub fn clear(&self) -> Result<()> {
-        for name in ["runs", "images"] {
-            let path = self.path.join(name);
-            if path.exists() {
-                fs::remove_dir_all(&path).map_err(|source| Error::io(&path, "remove", source))?;
-            }
-        }
-        Ok(())
-    }
-
     /// Record of a run or round.
     pub fn record(&self, scene: &str, stem: &str) -> PathBuf {
         self.path.join("runs").join(scene).join(format!("{stem}.json"))
@@ -186,8 +172,6 @@ mod tests {
         assert_eq!(again.read_json(&path).unwrap(), Some(vec![1, 2, 3]));
         fs::write(&path, "[1, 2").unwrap();
         assert!(again.read_json::<Vec<u32>>(&path).unwrap_err().to_string().contains("damaged"));
-        again.clear().unwrap();
-        assert!(!path.exists());
     }
 
     #[test]

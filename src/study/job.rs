@@ -131,12 +131,12 @@ pub(super) fn image_of(picture: &RgbImage) -> Image {
     image
 }
 
-/// Exposure in stops at which 95% of the pixels stay below white, by their brightest channel.
+/// Exposure in stops at which 85% of the pixels stay below white, by their brightest channel.
 pub fn exposure(picture: &RgbImage) -> f32 {
     let mut brightest: Vec<f32> =
         picture.pixels.iter().map(|pixel| pixel[0].max(pixel[1]).max(pixel[2])).collect();
     brightest.sort_unstable_by(f32::total_cmp);
-    let index = (brightest.len() * 95).div_ceil(100).max(1) - 1;
+    let index = (brightest.len() * 85).div_ceil(100).max(1) - 1;
     match brightest.get(index) {
         Some(value) if *value > 0.0 => -value.log2(),
         _ => 0.0,
@@ -151,7 +151,7 @@ mod tests {
     fn most_pixels_are_below_white() {
         let pixels: Vec<[f32; 3]> = (1..=100u8).map(|value| [f32::from(value), 0.0, 1.0]).collect();
         let picture = RgbImage { width: 10, height: 10, pixels };
-        assert!((exposure(&picture) + 95.0_f32.log2()).abs() < 1e-6);
+        assert!((exposure(&picture) + 85.0_f32.log2()).abs() < 1e-6);
         let black = RgbImage { width: 1, height: 1, pixels: vec![[0.0; 3]] };
         assert_eq!(exposure(&black), 0.0);
     }

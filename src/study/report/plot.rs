@@ -290,25 +290,61 @@ pub fn scatter(
         let _ = write!(svg, "<g class=\"s{style}\">");
         for point in &dots.points {
             let (x, y) = (frame.x(point.x), frame.y(point.y));
-            let anchor = if point.x > 60.0 { "end" } else { "start" };
-            let shift = if point.x > 60.0 { -9.0 } else { 9.0 };
             let _ = write!(
                 svg,
                 "<line class=\"bar\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{:.1}\" y2=\"{:.1}\"/><g \
-                 class=\"mark\" transform=\"translate({x:.1} {y:.1})\">{}{}</g><text class=\"small\" \
-                 x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{}</text>",
+                 class=\"mark\" transform=\"translate({x:.1} {y:.1})\">{}{}</g>",
                 frame.y(point.low),
                 frame.y(point.high),
                 tooltip(dots, point),
-                marker(style),
-                x + shift,
-                y + 4.0,
-                escape(&point.label)
+                marker(style)
             );
         }
         svg += "</g>";
     }
-    svg + "</svg>"
+    svg + &labels(&frame, series) + "</svg>"
+}
+
+/// Texts of the points of a scatter plot: right of points on the left, and in a column left of those on
+/// the right, where scenes crowd; pushed apart, with a line to the point.
+fn labels(frame: &Frame, series: &[Series]) -> String {
+    const CROWDED_FROM: f64 = 60.0;
+    const SPACING: f64 = 15.0;
+    let labelled = series.iter().flat_map(|series| &series.points).filter(|p| !p.label.is_empty());
+    let (mut crowded, free): (Vec<&Point>, Vec<&Point>) =
+        labelled.partition(|point| point.x > CROWDED_FROM);
+    let mut svg = String::new();
+    for point in free {
+        let _ = write!(
+            svg,
+            "<text class=\"small\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+            frame.x(point.x) + 9.0,
+            frame.y(point.y) + 4.0,
+            escape(&point.label)
+        );
+    }
+    crowded.sort_by(|a, b| frame.y(a.y).total_cmp(&frame.y(b.y)));
+    let column = crowded.iter().map(|point| frame.x(point.x)).fold(WIDTH, f64::min) - 26.0;
+    // Centred on the points as a block, but inside the frame.
+    let count = crowded.len() as f64;
+    let centre = crowded.iter().map(|point| frame.y(point.y)).sum::<f64>() / count.max(1.0);
+    let height = SPACING * (count - 1.0).max(0.0);
+    let lowest = (HEIGHT - BOTTOM - 6.0 - height).max(TOP + 6.0);
+    let start = (centre - 0.5 * height).clamp(TOP + 6.0, lowest);
+    for (index, point) in crowded.iter().enumerate() {
+        let y = start + SPACING * index as f64;
+        let _ = write!(
+            svg,
+            "<line class=\"leader\" x1=\"{:.1}\" y1=\"{y:.1}\" x2=\"{:.1}\" y2=\"{:.1}\"/><text \
+             class=\"small\" x=\"{column:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+            column + 3.0,
+            frame.x(point.x),
+            frame.y(point.y),
+            y + 4.0,
+            escape(&point.label)
+        );
+    }
+    svg
 }
 
 #[cfg(test)]
@@ -367,5 +403,21 @@ mod tests {
         let svg = scatter("t", "x", "y", &series, &[range]);
         assert!(svg.contains("class=\"range\"") && svg.contains("class=\"bar\""));
         assert!(svg.contains("thesis &lt;closed&gt;"));
+    }
+
+    #[test]
+    fn crowded_labels_are_apart() {
+        let points =
+            vec![point(97.0, 40.0), point(97.5, 40.5), point(98.0, 41.0), point(20.0, 1.0)];
+        let series = [Series { style: 1, name: "v".into(), points }];
+        let svg = scatter("t", "x", "y", &series, &[]);
+        let mut heights: Vec<f64> = svg
+            .split("<text ")
+            .filter(|text| text.contains(">room<"))
+            .flat_map(|text| attribute(&format!(" {text}"), "y"))
+            .collect();
+        heights.sort_by(f64::total_cmp);
+        assert_eq!(heights.len(), 4);
+        assert!(heights.windows(2).all(|pair| pair[1] - pair[0] > 12.0), "{heights:?}");
     }
 }

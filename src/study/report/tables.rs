@@ -56,34 +56,43 @@ pub fn at_a_glance(report: &Report, rules: &[Rule]) -> String {
         efficiencies.column(head);
     }
     for scene in &report.scenes {
-        for (index, rule) in rules.iter().enumerate() {
+        let mut started = false;
+        for rule in rules {
             let found: Vec<Option<&Summary>> =
                 others.iter().map(|name| find(report, &scene.name, name, *rule)).collect();
             if found.iter().all(Option::is_none) {
                 continue;
             }
-            let start = || vec![escape(&scene.name), rule.describe()];
+            let name = if started { String::new() } else { escape(&scene.name) };
+            let start = || vec![name.clone(), rule.describe()];
             let cells = |cell: &dyn Fn(&Summary) -> String| {
                 let cells = found.iter().map(|summary| summary.map_or_else(String::new, cell));
                 start().into_iter().chain(cells).collect()
             };
             errors.row(
-                index == 0,
+                !started,
                 cells(&|summary| {
                     let ratio = summary.rmse_ratio.as_ref();
-                    ratio_cell(ratio, ratio.is_some_and(|ratio| ratio.high < 1.0))
+                    let better = ratio.is_some_and(|ratio| ratio.high < 1.0 && summary.runs > 1);
+                    ratio_cell(ratio, better)
                 }),
             );
             efficiencies.row(
-                index == 0,
+                !started,
                 cells(&|summary| {
                     let ratio = summary.efficiency.as_ref();
-                    ratio_cell(ratio, ratio.is_some_and(|ratio| ratio.low > 1.0))
+                    let better = ratio.is_some_and(|ratio| ratio.low > 1.0 && summary.runs > 1);
+                    ratio_cell(ratio, better)
                 }),
             );
+            started = true;
         }
     }
-    errors.html() + &efficiencies.html()
+    format!(
+        "<div class=\"side\"><div>{}</div><div>{}</div></div>",
+        errors.html(),
+        efficiencies.html()
+    )
 }
 
 /// One table for each source and scene that the study has figures of its own for.
@@ -126,7 +135,7 @@ pub fn published(report: &Report) -> String {
         }
         for entry in &entries {
             let value = |name: &String| entry.values.get(name).copied();
-            let published = |name| value(name).map_or_else(String::new, |value| value.to_string());
+            let published = |name| value(name).map_or_else(String::new, |value| number(value, 6));
             let ratio = value(first).zip(value(second)).map(|(a, b)| number(b / a, 3));
             let rule = Rule::Spp(entry.spp);
             let ours = |name: &str| find(report, scene, name, rule);
