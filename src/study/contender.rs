@@ -37,6 +37,7 @@ impl Contender {
         for assignment in parts {
             parameters.set(assignment)?;
         }
+        parameters.candidates_of(sampler)?;
         Ok(Self { label: label.to_owned(), sampler, parameters })
     }
 
@@ -93,6 +94,7 @@ mod tests {
         assert!(unknown.contains("\"best\"") && unknown.contains("known: uniform"), "{unknown}");
         let parameter = message("ris:colour=1");
         assert!(parameter.contains("colour") && parameter.contains("candidates"), "{parameter}");
+        assert!(message("ris:candidates=1").contains("candidates"), "not for this sampler");
     }
 
     #[test]

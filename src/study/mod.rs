@@ -9,6 +9,7 @@ pub mod contender;
 pub mod engine;
 pub mod falsecolour;
 pub mod file;
+mod finished;
 pub mod folder;
 pub mod job;
 pub mod metrics;

@@ -302,9 +302,15 @@ fn render_half(
         if checkpoint.sums.sample_count <= count
             && checkpoint.check_resume(&checkpoint_path, &metadata, &empty, seed, 0).is_ok()
         {
-            renderer.restore(&checkpoint.sums)?;
-            earlier_seconds = checkpoint.metadata.seconds;
-            watch.expect(-pixels * f64::from(renderer.sample_count()), 0.0);
+            match renderer.restore(&checkpoint.sums) {
+                Ok(()) => {
+                    earlier_seconds = checkpoint.metadata.seconds;
+                    watch.expect(-pixels * f64::from(renderer.sample_count()), 0.0);
+                }
+                // A sampler that learns cannot continue from a picture; it starts again.
+                Err(Error::Usage { .. }) => {}
+                Err(error) => return Err(error),
+            }
         }
     }
     let mut pace = Pace::new(pixels, false);

@@ -1,0 +1,122 @@
+//! Finished runs that an earlier study of the same folder left: which of them a plan takes up, and which
+//! were made under other conditions.
+
+use std::{collections::BTreeMap, fs, path::PathBuf};
+
+use super::{
+    contender::Contender,
+    engine::{Study, tasks},
+    overhead,
+    record::{Conditions, Round, Rule, Run, run_stem},
+    reference,
+};
+use crate::{
+    error::{Error, Result},
+    scene::Scene,
+};
+
+impl Study<'_> {
+    /// Conditions of the runs of one contender; `None` for overhead rounds, which have no reference
+    /// and several contenders.
+    pub(super) fn conditions(
+        &self,
+        scene: &Scene,
+        contender: Option<&Contender>,
+    ) -> Result<Conditions> {
+        let capabilities = self.device.capabilities();
+        let (reference, parameters) = match (contender, &self.plan.overhead) {
+            (Some(contender), _) => (
+                reference::identity(&self.plan.reference, &scene.name)?,
+                contender.describe_parameters(),
+            ),
+            (None, Some(overhead)) => ("none".to_owned(), overhead::describe_parameters(overhead)),
+            (None, None) => ("none".to_owned(), BTreeMap::new()),
+        };
+        Ok(Conditions {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            scene_hash: scene.hash.clone(),
+            film: [scene.film.width, scene.film.height],
+            device: capabilities.name.clone(),
+            driver: capabilities.driver.clone(),
+            shadow_rays: self.plan.shadow_rays,
+            depth: self.plan.depth,
+            reference,
+            parameters,
+        })
+    }
+
+    /// Where the record of a run lies.
+    pub(super) fn run_record(
+        &self,
+        scene: &Scene,
+        (rule, seed, contender): (Rule, u32, &Contender),
+    ) -> PathBuf {
+        self.folder.record(&scene.name, &run_stem(contender, rule, seed))
+    }
+
+    /// Where the record of an overhead round lies.
+    pub(super) fn round_record(&self, scene: &Scene, repetition: u32) -> PathBuf {
+        self.folder.record(&scene.name, &format!("overhead-{repetition}"))
+    }
+
+    /// The record of a run that is finished with everything this plan asks of it.
+    pub(super) fn finished_run(
+        &self,
+        scene: &Scene,
+        task: (Rule, u32, &Contender),
+    ) -> Result<Option<Run>> {
+        let path = self.run_record(scene, task);
+        Ok(self.folder.read_json::<Run>(&path)?.filter(|run| {
+            let has_image = |level: &Rule| {
+                run.at(*level).is_some_and(|measurement| measurement.image.is_some())
+            };
+            matches!(task.0, Rule::Seconds(_))
+                || self.plan.spp.iter().map(|spp| Rule::Spp(*spp)).all(|level| has_image(&level))
+        }))
+    }
+
+    /// The record of a finished overhead round.
+    pub(super) fn finished_round(&self, scene: &Scene, repetition: u32) -> Result<Option<Round>> {
+        let round = self.folder.read_json::<Round>(&self.round_record(scene, repetition))?;
+        Ok(round.filter(|round| Some(round.spp) == self.plan.overhead.as_ref().map(|o| o.spp)))
+    }
+
+    /// Refuses finished runs that were made under other conditions, or removes them.
+    pub(super) fn check_finished_runs(&self, scenes: &[Scene], redo: bool) -> Result<()> {
+        let mut stale: Vec<(PathBuf, String)> = Vec::new();
+        let mut compare = |path: PathBuf, found: &Conditions, asked: &Conditions| {
+            let difference = found.differences(asked).into_iter().next();
+            stale.extend(difference.map(|difference| (path, difference)));
+        };
+        for scene in scenes {
+            for task in tasks(self.plan) {
+                if let Some(run) = self.finished_run(scene, task)? {
+                    let asked = self.conditions(scene, Some(task.2))?;
+                    compare(self.run_record(scene, task), &run.conditions, &asked);
+                }
+            }
+            let rounds = self.plan.overhead.as_ref().map_or(0, |overhead| overhead.repetitions);
+            for repetition in 1..=rounds {
+                if let Some(round) = self.finished_round(scene, repetition)? {
+                    let asked = self.conditions(scene, None)?;
+                    compare(self.round_record(scene, repetition), &round.conditions, &asked);
+                }
+            }
+        }
+        let Some((path, first)) = stale.first() else { return Ok(()) };
+        if redo {
+            return stale.iter().try_for_each(|(path, _)| {
+                fs::remove_file(path).map_err(|source| Error::io(path, "remove", source))
+            });
+        }
+        Err(Error::format(
+            path,
+            format!(
+                "made under other conditions than those asked for ({first}), one of {} such runs in \
+                 the folder; choose another folder with -o, or give --redo to remove them and make \
+                 them again",
+                stale.len()
+            ),
+        ))
+    }
+}
