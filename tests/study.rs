@@ -8,11 +8,21 @@ mod command;
 use std::{
     fs,
     io::{BufRead, BufReader},
+    path::Path,
     process::{Command, Stdio},
 };
 
 use command::{Folder, Run, program};
-use fenestra::film::{Attribute, Image, Metadata};
+use fenestra::{
+    command::options::{parse_duration, parse_size},
+    film::{Attribute, Image, Metadata},
+    sampler::Parameters,
+    scene::Scene,
+    study::{
+        file::{StudyFile, ValueParsers, is_study},
+        plan::{Options, Plan},
+    },
+};
 use serde_json::Value;
 
 /// A box on a floor under the sky.
@@ -365,6 +375,33 @@ fn a_study_file_gives_scenes_and_settings() {
     assert_eq!(results["scenes"][0]["width"], 12);
     folder.run(&with(&options, &["other.toml"])).assert(0, &[]);
     assert_eq!(json(&folder, "results.json")["scenes"][0]["name"], "other");
+}
+
+#[test]
+fn the_studies_that_ship_can_be_run() {
+    let parsers = ValueParsers { duration: parse_duration, size: parse_size };
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
+    let mut count = 0;
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if !is_study(&path).unwrap() {
+            Scene::load(&path).unwrap_or_else(|error| panic!("{error}"));
+            continue;
+        }
+        count += 1;
+        let study = StudyFile::load(&path, Parameters::default(), parsers)
+            .unwrap_or_else(|error| panic!("{error}"));
+        for scene in &study.scenes {
+            assert!(scene.exists(), "{}: {}", path.display(), scene.display());
+        }
+        for options in [study.settings.clone(), study.quick.clone().over(study.settings.clone())] {
+            let description = study.description.clone();
+            let plan = Plan::new(study.scenes.clone(), description, options, Vec::new());
+            plan.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        }
+        assert_ne!(study.quick, Options::default(), "{}: --quick", path.display());
+    }
+    assert!(count > 0);
 }
 
 #[test]

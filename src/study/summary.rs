@@ -46,6 +46,8 @@ pub struct Summary {
     /// RMSE over that of the first sampler, from pairs of the same seed; absent where one of them is
     /// not judged.
     pub rmse_ratio: Option<Interval>,
+    /// Root of trimmed relMSE over that of the first sampler, likewise.
+    pub relative_ratio: Option<Interval>,
     /// MSE · seconds of the first sampler over that of this one: how many times as fast this one
     /// reaches the same error. Absent where one of them is not judged.
     pub efficiency: Option<Interval>,
@@ -132,6 +134,14 @@ fn summary(
     let mse_judged = is_judged(mse, reference.mse);
     let baseline_mse = mean(baseline.iter().map(|(_, m)| m.mse));
     let both_judged = mse_judged && is_judged(baseline_mse, reference.mse);
+    let baseline_relative = [
+        mean(baseline.iter().map(|(_, m)| m.relmse)),
+        mean(baseline.iter().map(|(_, m)| m.relmse_trimmed)),
+    ];
+    let is_relative_judged = |[relmse, relmse_trimmed]: [f64; 2]| {
+        is_judged(relmse, reference.relmse) && is_judged(relmse_trimmed, reference.relmse_trimmed)
+    };
+    let relmse_judged = is_relative_judged([relmse, relmse_trimmed]);
     let by_seed = |value: &dyn Fn(&Measurement, &Measurement) -> f64| {
         let ratios: Vec<f64> = own
             .iter()
@@ -140,7 +150,7 @@ fn summary(
                 Some(value(ours, theirs))
             })
             .collect();
-        geometric_interval(&ratios).filter(|_| both_judged)
+        geometric_interval(&ratios)
     };
     let names: BTreeSet<&String> = own.iter().flat_map(|(run, _)| run.statistics.keys()).collect();
     let passes: BTreeSet<&String> =
@@ -160,12 +170,16 @@ fn summary(
         relmse,
         relmse_trimmed,
         mse_judged,
-        relmse_judged: is_judged(relmse, reference.relmse)
-            && is_judged(relmse_trimmed, reference.relmse_trimmed),
-        rmse_ratio: by_seed(&|ours, theirs| (ours.mse / theirs.mse).sqrt()),
+        relmse_judged,
+        rmse_ratio: by_seed(&|ours, theirs| (ours.mse / theirs.mse).sqrt()).filter(|_| both_judged),
+        relative_ratio: by_seed(&|ours, theirs| {
+            (ours.relmse_trimmed / theirs.relmse_trimmed).sqrt()
+        })
+        .filter(|_| relmse_judged && is_relative_judged(baseline_relative)),
         efficiency: by_seed(&|ours, theirs| {
             theirs.mse * theirs.seconds / (ours.mse * ours.seconds)
-        }),
+        })
+        .filter(|_| both_judged),
         mean_ratio: mean_interval(&ratios).unwrap_or(Interval { middle: 1.0, low: 1.0, high: 1.0 }),
         mean_deviation: own.iter().filter_map(|(_, m)| m.mean_deviation).reduce(largest),
         visible_share: {

@@ -8,13 +8,14 @@ use crate::study::{
     overhead::Overhead,
     record::Rule,
     results::Report,
+    statistics::Interval,
     summary::{SUSPICIOUS_DEVIATION, Summary},
 };
 
 const NOT_JUDGED: &str = "<span class=\"refused\">not judged</span>";
 
 /// A ratio that is marked where the whole interval is below 1, or why there is none.
-fn ratio_cell(ratio: Option<&crate::study::statistics::Interval>, is_better: bool) -> String {
+fn ratio_cell(ratio: Option<&Interval>, is_better: bool) -> String {
     match ratio {
         Some(ratio) if is_better => format!("<span class=\"best\">{}</span>", interval(ratio, 3)),
         Some(ratio) => interval(ratio, 3),
@@ -28,71 +29,80 @@ fn find<'a>(report: &'a Report, scene: &str, sampler: &str, rule: Rule) -> Optio
     })
 }
 
-/// Ratios of RMSE and of efficiency to the first sampler, in every scene.
+/// What the tables at a glance show of a summary.
+struct Glance {
+    caption: &'static str,
+    value: fn(&Summary) -> Option<&Interval>,
+    is_less_better: bool,
+}
+
+const GLANCES: [Glance; 3] = [
+    Glance {
+        caption: "RMSE over that of {first}: less is better. Bright pixels count most.",
+        value: |summary| summary.rmse_ratio.as_ref(),
+        is_less_better: true,
+    },
+    Glance {
+        caption: "Root of trimmed relMSE over that of {first}: less is better. Dark pixels count as \
+                  much as bright ones.",
+        value: |summary| summary.relative_ratio.as_ref(),
+        is_less_better: true,
+    },
+    Glance {
+        caption: "Efficiency over that of {first}: MSE × seconds of {first} over that of the sampler. \
+                  More is better; 2 means the same error in half the time.",
+        value: |summary| summary.efficiency.as_ref(),
+        is_less_better: false,
+    },
+];
+
+/// Ratios to the first sampler in every scene.
 pub fn at_a_glance(report: &Report, rules: &[Rule]) -> String {
     let [first, others @ ..] = &report.order[..] else { return String::new() };
     if others.is_empty() || report.summaries.is_empty() {
         return String::new();
     }
-    let heads: Vec<String> = others.iter().map(|name| escape(name)).collect();
-    let first = escape(first);
-    let mut errors = Table::new(
-        format!(
-            "RMSE over that of {first}: less is better. Geometric mean over pairs of the same seed \
-             with its 95% interval; bold where all of it is below 1."
-        ),
-        &["scene", "at"],
-    );
-    let mut efficiencies = Table::new(
-        format!(
-            "Efficiency over that of {first}: MSE × seconds of {first} over that of the sampler, so \
-             that 2 means the same error in half the time. Wall time of passes; bold where all of \
-             the interval is above 1."
-        ),
-        &["scene", "at"],
-    );
-    for head in heads {
-        errors.column(head.clone());
-        efficiencies.column(head);
+    let mut html = "<p>Geometric means over pairs of the same seed with their 95% intervals; bold \
+                    where the whole interval is better than 1.</p><div class=\"side\">"
+        .to_owned();
+    for glance in &GLANCES {
+        html += &format!("<div>{}</div>", glance_table(report, rules, (first, others), glance));
+    }
+    html + "</div>"
+}
+
+fn glance_table(
+    report: &Report,
+    rules: &[Rule],
+    (first, others): (&str, &[String]),
+    glance: &Glance,
+) -> String {
+    let mut table = Table::new(glance.caption.replace("{first}", &escape(first)), &["scene", "at"]);
+    for name in others {
+        table.column(escape(name));
     }
     for scene in &report.scenes {
-        let mut started = false;
+        let mut is_first = true;
         for rule in rules {
             let found: Vec<Option<&Summary>> =
                 others.iter().map(|name| find(report, &scene.name, name, *rule)).collect();
             if found.iter().all(Option::is_none) {
                 continue;
             }
-            let name = if started { String::new() } else { escape(&scene.name) };
-            let start = || vec![name.clone(), rule.describe()];
-            let cells = |cell: &dyn Fn(&Summary) -> String| {
-                let cells = found.iter().map(|summary| summary.map_or_else(String::new, cell));
-                start().into_iter().chain(cells).collect()
+            let name = if is_first { escape(&scene.name) } else { String::new() };
+            let cell = |summary: &Summary| {
+                let ratio = (glance.value)(summary);
+                let is_better = |ratio: &Interval| {
+                    if glance.is_less_better { ratio.high < 1.0 } else { ratio.low > 1.0 }
+                };
+                ratio_cell(ratio, summary.runs > 1 && ratio.is_some_and(is_better))
             };
-            errors.row(
-                !started,
-                cells(&|summary| {
-                    let ratio = summary.rmse_ratio.as_ref();
-                    let better = ratio.is_some_and(|ratio| ratio.high < 1.0 && summary.runs > 1);
-                    ratio_cell(ratio, better)
-                }),
-            );
-            efficiencies.row(
-                !started,
-                cells(&|summary| {
-                    let ratio = summary.efficiency.as_ref();
-                    let better = ratio.is_some_and(|ratio| ratio.low > 1.0 && summary.runs > 1);
-                    ratio_cell(ratio, better)
-                }),
-            );
-            started = true;
+            let cells = found.into_iter().map(|summary| summary.map_or_else(String::new, cell));
+            table.row(is_first, [name, rule.describe()].into_iter().chain(cells).collect());
+            is_first = false;
         }
     }
-    format!(
-        "<div class=\"side\"><div>{}</div><div>{}</div></div>",
-        errors.html(),
-        efficiencies.html()
-    )
+    table.html()
 }
 
 /// One table for each source and scene that the study has figures of its own for.

@@ -37,7 +37,7 @@ fn run(sampler: &str, seed: u32, variance: f64) -> Run {
         mse: variance / f64::from(spp),
         rmse: (variance / f64::from(spp)).sqrt(),
         relmse: 1.0,
-        relmse_trimmed: 1.0,
+        relmse_trimmed: if sampler == "ris" { 0.49 } else { 1.0 },
         mean_ratio: 1.0 + 0.01 * f64::from(seed),
         mean_deviation: Some(-f64::from(seed)),
         mse_judged: true,
@@ -92,6 +92,7 @@ fn ratios_are_of_pairs_of_one_seed() {
         assert!((value - 0.5).abs() < 1e-9, "{ratio:?}");
     }
     assert!((efficiency.middle - 4.0).abs() < 1e-9);
+    assert!((ris.relative_ratio.unwrap().middle - 0.7).abs() < 1e-9);
     assert!((ris.mean_ratio.middle - 1.015).abs() < 1e-12);
     assert_eq!(ris.mean_deviation, Some(-2.0));
     assert!((ris.visible_share.unwrap() - 0.15).abs() < 1e-12);
