@@ -15,7 +15,7 @@ use std::{
 use command::{Folder, Run, program};
 use fenestra::{
     command::options::{parse_duration, parse_size},
-    film::{Attribute, Image, Metadata},
+    film::{Attribute, Checkpoint, Image, Metadata},
     sampler::Parameters,
     scene::Scene,
     study::{
@@ -349,6 +349,60 @@ fn an_interrupted_study_keeps_its_runs_and_continues() {
     run.assert(0, &["study: in", "(finished)"]);
     assert_eq!(changed(&folder, record), before);
     assert_eq!(json(&folder, "results.json")["is_complete"], true);
+}
+
+#[test]
+#[cfg(unix)]
+fn an_interrupted_reference_continues_to_the_bit() {
+    let folder = folder();
+    let options = [
+        "study",
+        "yard.toml",
+        "--samplers=mis",
+        "--spp=1",
+        "--seeds=1",
+        "--reference-spp=6000",
+        "-o",
+        "report",
+    ];
+    let mut child = program(folder.path()).args(options).stderr(Stdio::piped()).spawn().unwrap();
+    let mut messages = BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    while !line.starts_with("yard: reference 1 of 2") {
+        line.clear();
+        assert!(messages.read_line(&mut line).unwrap() > 0, "the reference begins");
+    }
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    let kill = format!("kill -INT {}", child.id());
+    assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
+    let mut rest = String::new();
+    std::io::Read::read_to_string(&mut messages, &mut rest).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(130), "{rest}");
+    let images = folder.path().join("report/images/yard");
+    let checkpoint = ["reference_1", "reference_2"]
+        .map(|half| images.join(format!("{half}.checkpoint.exr")))
+        .into_iter()
+        .find(|path| path.exists())
+        .expect("what was rendered is kept");
+    let samples = Checkpoint::read(&checkpoint).unwrap().sums.sample_count;
+    assert!((1..3000).contains(&samples), "{samples}");
+
+    folder.run(&options).assert(0, &[]);
+    assert!(!checkpoint.exists());
+    let seed = u32::MAX - 1;
+    let whole = [
+        "render",
+        "yard.toml",
+        "--spp=3000",
+        &format!("--seed={seed}"),
+        "--aov=variance",
+        "-o",
+        "whole.exr",
+        "--quiet",
+    ];
+    folder.run(&whole).assert(0, &[]);
+    let image = |path: &Path| Image::read_exr(path).unwrap().channels;
+    assert_eq!(image(&images.join("reference_1.exr")), image(&folder.path().join("whole.exr")));
 }
 
 #[test]

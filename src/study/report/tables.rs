@@ -63,8 +63,10 @@ pub fn at_a_glance(report: &Report, rules: &[Rule]) -> String {
         return String::new();
     }
     let mut html = "<p>Geometric means over pairs of the same seed with their 95% intervals; bold \
-                    where the whole interval is better than 1.</p><div class=\"side\">"
+                    where the whole interval is better than 1.</p>"
         .to_owned();
+    // Of many samplers the tables are too wide to stand side by side.
+    html += if others.len() <= 2 { "<div class=\"side\">" } else { "<div>" };
     for glance in &GLANCES {
         html += &format!("<div>{}</div>", glance_table(report, rules, (first, others), glance));
     }
