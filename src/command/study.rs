@@ -87,7 +87,7 @@ pub struct Arguments {
     /// Sampler parameter for all samplers, may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// A small, fast version: the study file's [quick] settings, or a film of 80x60 and few samples.
+    /// A small, fast version: the study file's quick settings, or a film of 80x60 and few samples.
     #[arg(long)]
     pub quick: bool,
     /// Remove finished runs in the folder that were made under other conditions.

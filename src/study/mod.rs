@@ -1,7 +1,7 @@
 //! Comparisons of samplers as experiments.
 //!
-//! A study file and the command line ([`file`], [`plan`], [`contender`]) → runs against a reference in
-//! two halves ([`engine`], [`job`], [`reference`], [`overhead`]), each kept as a [`record`] in the
+//! A study file and the command line ([`mod@file`], [`plan`], [`contender`]) → runs against a reference in
+//! two halves ([`engine`], [`job`], [`mod@reference`], [`overhead`]), each kept as a [`record`] in the
 //! report [`folder`] → figures over the seeds ([`summary`], [`statistics`]) → `results.json`,
 //! `results.csv` ([`results`]) and the page ([`report`]). Errors are defined in [`metrics`].
 

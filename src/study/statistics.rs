@@ -21,7 +21,7 @@ const T_QUANTILES: [f64; 30] = [
 ];
 
 /// 97.5% quantile of Student's t distribution; above 30 degrees of freedom by the first two
-/// terms of its expansion around the normal quantile z [Abramowitz & Stegun 1964] 26.7.5.
+/// terms of its expansion around the normal quantile z \[Abramowitz & Stegun 1964\] 26.7.5.
 fn t_quantile(degrees_of_freedom: usize) -> f64 {
     T_QUANTILES.get(degrees_of_freedom - 1).copied().unwrap_or_else(|| {
         let (z, nu) = (1.959_964_f64, degrees_of_freedom as f64);
