@@ -199,6 +199,66 @@ fn passes_may_be_grouped_at_will() {
 }
 
 #[test]
+fn a_renderer_goes_on_where_another_stopped() {
+    let scene = room();
+    let renderer = || Renderer::new(support::device(), &scene, guided(4)).unwrap();
+    let mut whole = renderer();
+    whole.render_pass(9).unwrap();
+    let mut first = renderer();
+    first.render_pass(5).unwrap();
+    let (sums, state) = (first.sums().unwrap(), first.guide_state().unwrap().unwrap());
+    assert_eq!((state.samples, state.rebuilt_at), (5, 4));
+    let mut second = renderer();
+    second.restore(&sums).unwrap();
+    assert!(!second.restore_guide(&state).unwrap());
+    second.render_pass(4).unwrap();
+    let (whole, parts) = (whole.sums().unwrap(), second.sums().unwrap());
+    for pixel in 0..whole.pixel_count() {
+        assert_eq!(whole.mean(pixel), parts.mean(pixel), "pixel {pixel}");
+    }
+    support::assert_silent();
+}
+
+#[test]
+fn a_guide_of_another_scene_is_refused_or_mostly_forgotten() {
+    let room = room();
+    let mut teacher = Renderer::new(support::device(), &room, guided(1)).unwrap();
+    teacher.render_pass(4).unwrap();
+    let state = teacher.guide_state().unwrap().unwrap();
+    let mut moved = room.clone();
+    for position in &mut moved.geometry.positions[72..] {
+        position[1] += 0.2;
+    }
+    let mut pupil = Renderer::new(support::device(), &moved, guided(1)).unwrap();
+    assert!(pupil.restore_guide(&state).unwrap(), "something moved");
+    pupil.render_pass(2).unwrap();
+    assert_eq!(pupil.totals().camera_rays, 2 * 32 * 24, "no training");
+    let mut darker = room.clone();
+    darker.environment.texels[7] *= 0.5;
+    let mut pupil = Renderer::new(support::device(), &darker, guided(1)).unwrap();
+    let error = pupil.restore_guide(&state).unwrap_err().to_string();
+    assert!(error.contains("another environment"), "{error}");
+    let mut mis = Renderer::new(support::device(), &room, Settings::default()).unwrap();
+    assert!(mis.restore_guide(&state).is_err() && mis.guide_state().unwrap().is_none());
+}
+
+#[test]
+fn in_the_open_it_samples_as_mis_does() {
+    let scene = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5)), scenes::plastic(0.2)]);
+    let render = |settings: Settings| {
+        let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
+        renderer.render_pass(6).unwrap();
+        (renderer.sums().unwrap(), renderer.totals().camera_rays)
+    };
+    let (mis, rays) = render(Settings::default());
+    let (guided, guided_rays) = render(guided(4));
+    assert_eq!(guided_rays, rays + rays / 6 / 8, "one sweep over an eighth of the pixels");
+    for pixel in 0..mis.pixel_count() {
+        assert_eq!(mis.mean(pixel), guided.mean(pixel), "pixel {pixel}");
+    }
+}
+
+#[test]
 fn rays_of_training_are_counted_and_more_rays_are_visible() {
     let scene = room();
     let share = |settings: Settings| {

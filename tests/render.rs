@@ -130,3 +130,33 @@ fn a_render_continued_from_its_checkpoint_has_the_same_bits() {
     assert_eq!(statistics.samples_per_pixel, 9);
     assert_eq!(part.channels, whole.channels);
 }
+
+#[test]
+fn what_guided_learned_is_kept_with_the_checkpoint_and_in_files() {
+    let folder = folder();
+    let options = |spp: &'static str| ["--sampler", "guided", "--spp", spp];
+    let (whole, _) = render(&folder, "whole.exr", &options("9"));
+    let keep = [&options("4")[..], &["--checkpoint-interval", "1h"]].concat();
+    render(&folder, "part.exr", &keep);
+    let guide = folder.path().join("part.checkpoint.guide");
+    assert!(guide.exists());
+    let resume = [&options("9")[..], &["--resume"]].concat();
+    let (part, _) = render(&folder, "part.exr", &resume);
+    assert_eq!(part.channels, whole.channels);
+    // A checkpoint without what was learned, or with that of another moment, is refused.
+    std::fs::remove_file(&guide).unwrap();
+    let refuse = |texts: &[&str]| {
+        let arguments = ["render", "scene.toml", "-o", "part.exr", "--sampler", "guided"];
+        folder.run(&[&arguments[..], &["--spp", "12", "--resume"]].concat()).assert(1, texts);
+    };
+    refuse(&["part.checkpoint.guide", "cannot read"]);
+    render(&folder, "other.exr", &[&options("2")[..], &["--save-guide", "other.guide"]].concat());
+    std::fs::copy(folder.path().join("other.guide"), &guide).unwrap();
+    refuse(&["belongs to 2 samples per pixel", "holds 4"]);
+
+    let loaded = [&options("3")[..], &["--load-guide", "other.guide"]].concat();
+    let (_, statistics) = render(&folder, "loaded.exr", &loaded);
+    assert_eq!(statistics.rays["camera"], 3 * 40 * 24, "no training");
+    let arguments = ["render", "scene.toml", "--load-guide", "other.guide", "--sampler", "mis"];
+    folder.run(&arguments).assert(2, &["--load-guide other.guide", "expected --sampler guided"]);
+}

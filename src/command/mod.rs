@@ -4,6 +4,7 @@ pub mod bench;
 pub mod compare;
 pub mod devices;
 pub mod fit;
+mod guide;
 pub mod info;
 pub mod merge;
 pub mod options;

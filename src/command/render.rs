@@ -10,6 +10,7 @@ use std::{
 };
 
 use super::{
+    guide,
     options::{parse_crop, parse_duration, parse_size},
     progress::{Progress, Standing},
 };
@@ -107,6 +108,12 @@ pub struct Arguments {
     /// Sampler parameter, may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
+    /// Write what the sampler `guided` has learned.
+    #[arg(long, value_name = "FILE.guide")]
+    pub save_guide: Option<PathBuf>,
+    /// Start from what an earlier render under the same environment learned, instead of training.
+    #[arg(long, value_name = "FILE.guide")]
+    pub load_guide: Option<PathBuf>,
     /// A small, fast version: film at most 240 pixels wide, 16 samples.
     #[arg(long)]
     pub quick: bool,
@@ -178,6 +185,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let mut job = Job::new(arguments, &settings, &scene, &device, output);
     let mut renderer = Renderer::new(&device, &scene, settings)?;
+    if let Some(path) = &arguments.load_guide {
+        guide::load(&mut renderer, path)?;
+    }
     job.resume(&mut renderer)?;
 
     let reason = job.render(&mut renderer, &interrupted)?;
@@ -220,6 +230,8 @@ fn settings(arguments: &Arguments) -> Result<Settings> {
             output.display()
         )));
     }
+    let (save, load) = (arguments.save_guide.as_deref(), arguments.load_guide.as_deref());
+    guide::check(arguments.sampler, save, load)?;
     let mut parameters = Parameters::default();
     for assignment in &arguments.set {
         parameters.set(assignment)?;
@@ -323,6 +335,9 @@ impl<'a> Job<'a> {
             self.arguments.sample_offset,
         )?;
         renderer.restore(&checkpoint.sums)?;
+        if self.arguments.sampler == Sampler::Guided {
+            guide::resume(renderer, &path)?;
+        }
         self.earlier_seconds = checkpoint.metadata.seconds;
         Ok(())
     }
@@ -471,7 +486,9 @@ impl<'a> Job<'a> {
 
     fn write_checkpoint(&self, renderer: &Renderer, sums: Sums) -> Result<()> {
         let checkpoint = Checkpoint { sums, metadata: self.metadata(renderer) };
-        checkpoint.write(&checkpoint_path(&self.output))
+        let path = checkpoint_path(&self.output);
+        guide::save(renderer, &guide::guide_path(&path))?;
+        checkpoint.write(&path)
     }
 
     /// Writes every file.
@@ -507,6 +524,10 @@ impl<'a> Job<'a> {
         if reason == StopReason::Interrupt || self.arguments.checkpoint_interval.is_some() {
             self.write_checkpoint(renderer, sums)?;
             written.push(checkpoint_path(&self.output));
+        }
+        if let Some(path) = &self.arguments.save_guide {
+            guide::save(renderer, path)?;
+            written.push(path.clone());
         }
         if !self.arguments.quiet {
             let names: Vec<_> = written.iter().map(|path: &PathBuf| display(path)).collect();

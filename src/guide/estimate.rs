@@ -17,7 +17,7 @@ const PRIOR: f64 = 4.0;
 /// Largest factor by which a parent region raises the prior.
 const LARGEST_RATIO: f64 = 8.0;
 /// Least estimate of visibility.
-const FLOOR: f64 = 1e-3;
+const FLOOR: f64 = 1e-4;
 /// Share of the regions' probability that does not look at what was learned.
 const DEFENSIVE_SHARE: f64 = 0.05;
 

@@ -56,6 +56,44 @@ impl Learned {
         }
     }
 
+    /// As [`Self::new`], with the keys and counts (trials, hits) that an earlier one had; what finds no
+    /// room is left out. With `forget`, every count is divided by that number.
+    ///
+    /// # Panics
+    /// As [`Self::new`]; if there are not as many counts as keys and regions, the faces first.
+    pub fn resume(
+        region_count: usize,
+        capacity: usize,
+        slots: usize,
+        keys: &[u32],
+        counts: &[[u32; 2]],
+        forget: u32,
+    ) -> Self {
+        assert!(keys.len() >= FACE_COUNT && counts.len() == keys.len() * region_count, "lengths");
+        let mut learned = Self::new(region_count, capacity, slots);
+        for key in keys[FACE_COUNT..].iter().take(capacity - FACE_COUNT).map(|&word| CellKey(word))
+        {
+            learned.index_of.insert(key, learned.keys.len());
+            learned.keys.push(key);
+        }
+        let count = learned.keys.len() * region_count;
+        learned.counts = counts[..count]
+            .iter()
+            .map(|[trials, hits]| Count {
+                hits: u64::from(hits.min(trials) / forget),
+                trials: u64::from(trials / forget),
+            })
+            .collect();
+        learned
+    }
+
+    /// Trials and hits of all cells, as [`Self::resume`] takes them.
+    pub fn trials_and_hits(&self) -> Vec<[u32; 2]> {
+        // Counts stay below LARGEST_COUNT and what one stretch of passes adds.
+        let word = |count: u64| u32::try_from(count).unwrap_or(u32::MAX);
+        self.counts.iter().map(|count| [word(count.trials), word(count.hits)]).collect()
+    }
+
     /// Number of cells, faces included.
     pub fn cell_count(&self) -> usize {
         self.keys.len()

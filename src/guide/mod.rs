@@ -11,12 +11,14 @@
 
 mod alias;
 mod estimate;
+mod file;
 mod key;
 mod learned;
 mod partition;
 
 pub use alias::{AliasEntry, alias_table, probabilities};
 pub use estimate::{EstimateOptions, Estimates, VISIBILITY_LEVELS, decode_entry};
+pub use file::{GuideState, Origin};
 pub use key::{CellKey, FACE_COUNT, face_normal};
 pub use learned::{Learned, Snapshot};
 pub use partition::{PARENT_COUNT, Partition, Region};

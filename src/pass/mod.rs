@@ -99,7 +99,13 @@ impl Passes {
         let create = |name: &str, constants: &[(u32, u32)]| {
             Pipeline::new(device, name, shaders::pass(name), constants)
         };
-        let candidates = settings.parameters.candidates_of(settings.sampler)?;
+        let candidates = settings
+            .parameters
+            .candidates_of(settings.sampler, device.capabilities().kind == "software")?;
+        let basic = match settings.sampler {
+            Sampler::Guided => Sampler::Mis,
+            sampler => sampler,
+        };
         Ok(Self {
             camera: create("camera", &[])?,
             trace: Trace::new(device, geometry, Schedule::SINGLE)?,
@@ -107,7 +113,8 @@ impl Passes {
             sample: create(
                 "sample",
                 &[
-                    (CONSTANT_SAMPLER, settings.sampler.tag()),
+                    // Where nothing is blocked, `guided` samples as `mis` does.
+                    (CONSTANT_SAMPLER, basic.tag()),
                     (CONSTANT_CANDIDATES, candidates),
                     (CONSTANT_MATERIAL_KINDS, settings.material_kinds),
                 ],
@@ -222,9 +229,8 @@ impl Passes {
                 run("learn", &|commands| {
                     guided.record_learn(commands, &[guide, wave], &nothing);
                 })?;
-            } else {
-                run("sample", &|commands| commands.dispatch(&self.sample, &all[..2], push, 1))?;
             }
+            run("sample", &|commands| commands.dispatch(&self.sample, &all[..2], push, 1))?;
             run("shadow", &|commands| self.shadow.record(commands, &all, &nothing))?;
         }
         run("gather", &|commands| commands.dispatch(&self.gather, &all[..2], push, 1))?;

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, sync::Arc, time::Instant};
 use glam::Vec3;
 
 use crate::{
-    error::Result,
+    error::{Error, Result},
     gpu::{
         Buffer, Commands, DescriptorSet, Device,
         constants::{
@@ -16,9 +16,11 @@ use crate::{
         },
         layout::GuideParameters,
     },
-    guide::{EstimateOptions, FACE_COUNT, Learned, Partition, Snapshot},
+    guide::{
+        CellKey, EstimateOptions, FACE_COUNT, GuideState, Learned, Origin, Partition, Snapshot,
+    },
     sampler::Parameters,
-    scene::Scene,
+    scene::{self, Scene},
 };
 
 /// Edge of a cell in pixels, where it is not limited by the scene.
@@ -29,6 +31,8 @@ const CELLS_PER_SCENE: f32 = 20.0;
 const LEVELS: i32 = 12;
 /// Bytes of a cell per region: an entry to read and two counts to write.
 const BYTES_PER_REGION: u64 = 16;
+/// What counts are divided by where the geometry is another.
+const FORGETTING: u32 = 8;
 /// Fewest cells there is room for, memory permitting.
 const FEW_CELLS: u64 = 4096;
 /// Pixels per cell beyond those: no film can fill more.
@@ -42,6 +46,8 @@ pub struct GuideBuffers {
     options: EstimateOptions,
     learned: Learned,
     capacity: usize,
+    origin: Origin,
+    layout: GuideParameters,
     parameters: Buffer,
     table: Buffer,
     entries: Buffer,
@@ -95,6 +101,13 @@ impl GuideBuffers {
             .collect();
         let cells = capacity * region_count * 8;
         let guide = guide_parameters(scene, region_count, slots, wanted_slots);
+        let origin = Origin {
+            environment: scene::environment_hash(scene),
+            geometry: scene::geometry_hash(scene),
+            regions: region_count as u32,
+            grid_origin: guide.grid_origin,
+            largest_edge: guide.largest_edge,
+        };
         let parameters = Buffer::from_slice(device, "guide parameters", &[guide])?;
         let table = Buffer::new(device, "guide table", 8 * slots as u64)?;
         let entries = Buffer::new(device, "guide entries", cells as u64)?;
@@ -127,6 +140,8 @@ impl GuideBuffers {
             options: EstimateOptions::default(),
             learned,
             capacity,
+            origin,
+            layout: guide,
             parameters,
             table,
             entries,
@@ -181,6 +196,74 @@ impl GuideBuffers {
     /// Host milliseconds of all rebuilds since the start.
     pub fn rebuild_ms(&self) -> f64 {
         self.rebuild_ms
+    }
+
+    /// What was learned, with what was counted since the last rebuild.
+    ///
+    /// # Errors
+    /// A failing device.
+    pub fn state(&self) -> Result<GuideState> {
+        let counted = self.learned.cell_count() * self.partition.regions.len();
+        let wanted = self.wanted.download::<u32>(self.wanted_slots)?;
+        Ok(GuideState {
+            origin: self.origin.clone(),
+            samples: 0,
+            rebuilt_at: 0,
+            is_open: false,
+            keys: self.learned.keys().iter().map(|key| key.0).collect(),
+            counts: self.learned.trials_and_hits(),
+            pending: self.counts.download(counted)?,
+            wanted: wanted.into_iter().filter(|key| *key != CellKey::NONE.0).collect(),
+        })
+    }
+
+    /// Continues from a state, in the grids of that one. Under another geometry most of what was
+    /// counted is forgotten. Returns whether that was so.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for another environment or number of regions; a failing device.
+    pub fn restore(&mut self, state: &GuideState) -> Result<bool> {
+        let (here, there) = (&self.origin, &state.origin);
+        if (&here.environment, here.regions) != (&there.environment, there.regions) {
+            return Err(Error::usage(format!(
+                "the guide belongs to another environment: map {} in {} regions, expected {} in {}; \
+                 learn it again under this map, with the same --set regions",
+                &there.environment[..there.environment.len().min(12)],
+                there.regions,
+                &here.environment[..12],
+                here.regions
+            )));
+        }
+        let edge = there.largest_edge;
+        let is_sane =
+            edge.is_finite() && edge > 0.0 && there.grid_origin.iter().all(|x| x.is_finite());
+        if state.keys.len() < FACE_COUNT || !is_sane {
+            return Err(Error::usage("the guide holds no cells, or none that could be found"));
+        }
+        let has_moved = here.geometry != there.geometry;
+        let forget = if has_moved { FORGETTING } else { 1 };
+        self.learned = Learned::resume(
+            self.partition.regions.len(),
+            self.capacity,
+            self.table.size() as usize / 8,
+            &state.keys,
+            &state.counts,
+            forget,
+        );
+        self.origin.grid_origin = there.grid_origin;
+        self.origin.largest_edge = edge;
+        self.layout.grid_origin = there.grid_origin;
+        self.layout.largest_edge = edge;
+        self.layout.finest_edge = edge * 0.5_f32.powi(LEVELS);
+        self.parameters.upload(bytemuck::bytes_of(&self.layout))?;
+        self.clear_counts()?;
+        let room = self.learned.cell_count() * self.partition.regions.len();
+        self.counts
+            .upload(bytemuck::cast_slice(&state.pending[..state.pending.len().min(room)]))?;
+        let wanted = &state.wanted[..state.wanted.len().min(self.wanted_slots)];
+        self.wanted.upload(bytemuck::cast_slice(wanted))?;
+        self.upload()?;
+        Ok(has_moved)
     }
 
     fn clear_counts(&self) -> Result<()> {

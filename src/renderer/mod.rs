@@ -15,6 +15,7 @@ use crate::{
         constants::{AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, AOV_VISIBLE},
         layout::Wave,
     },
+    guide::GuideState,
     pass::{PassSettings, Passes, SHADOW_RAYS_PER_GROUP, Sets},
     sampler::{Parameters, Sampler},
     scene::Scene,
@@ -29,6 +30,9 @@ const BLOCK_PIXELS: u32 = 64;
 
 /// Sweeps that teach the guide before the first sample, each over one pixel in as many.
 const TRAINING_SWEEPS: u32 = 8;
+/// Share of visible rays above which a scene is rendered as by `mis`: little is blocked, and learning
+/// costs more than it brings.
+const OPEN_SHARE: f64 = 0.5;
 /// Tells the random numbers of training from those of the picture.
 const TRAINING_SEED: u32 = 0x7e11_ab1e;
 
@@ -125,6 +129,8 @@ pub struct Renderer {
     sample_count: u32,
     /// Whether the training sweeps are behind.
     is_trained: bool,
+    /// Whether so little is blocked that there is nothing to learn.
+    is_open: bool,
     /// Samples at the last rebuild of the guide.
     rebuilt_at: u32,
     totals: Totals,
@@ -207,6 +213,7 @@ impl Renderer {
             guide,
             sample_count: 0,
             is_trained: false,
+            is_open: false,
             rebuilt_at: 0,
             totals: Totals::default(),
             compile_ms: PassTimes::new(),
@@ -221,7 +228,7 @@ impl Renderer {
             scene: self.scene.set(),
             wave: self.waves.set(),
             film: self.film.set(),
-            guide: self.guide.as_ref().map(GuideBuffers::set),
+            guide: self.guide.as_ref().filter(|_| !self.is_open).map(GuideBuffers::set),
         }
     }
 
@@ -245,22 +252,38 @@ impl Renderer {
     /// Learns what is due before the next sample. Returns how many samples may follow before there
     /// is more to learn; that depends on their number alone, not on how they are grouped.
     fn learn(&mut self) -> Result<u32> {
-        if self.sample_count == 0 && !self.is_trained {
+        if self.is_open {
+            return Ok(u32::MAX);
+        }
+        if !self.is_trained {
             for sweep in 0..TRAINING_SWEEPS {
                 let wave = Wave {
                     first_pixel: sweep,
-                    first_sample: self.settings.first_sample,
+                    first_sample: self.settings.first_sample.wrapping_add(self.sample_count),
                     sample_count: 1,
                     seed: self.settings.seed ^ TRAINING_SEED,
                     pixel_stride: TRAINING_SWEEPS,
                     is_training: 1,
                     ..Wave::default()
                 };
+                let before = self.totals.clone();
                 self.sweep(wave, self.film.padded_pixels() / TRAINING_SWEEPS)?;
-                self.rebuild()?;
+                self.take_counters()?;
+                // The first sweep draws by environment and BRDF alone: nothing is known yet. It is
+                // not in the picture, so the picture does not depend on its own samples here.
+                let visible = self.totals.shadow_rays_visible - before.shadow_rays_visible;
+                let traced = self.totals.shadow_rays_traced - before.shadow_rays_traced;
+                if sweep == 0 && visible as f64 > OPEN_SHARE * traced as f64 {
+                    log::info!("{visible} of {traced} rays of the first sweep are visible: as mis");
+                    self.is_open = true;
+                    return Ok(u32::MAX);
+                }
+                // Every rebuild costs time: after 1, 2, 4 and 8 sweeps.
+                if (sweep + 1).is_power_of_two() {
+                    self.rebuild()?;
+                }
             }
             self.is_trained = true;
-            self.take_counters()?;
         } else if self.rebuilt_at != self.sample_count
             && guide_schedule(self.sample_count) == self.sample_count
         {
@@ -347,6 +370,7 @@ impl Renderer {
             guide.forget()?;
         }
         self.is_trained = false;
+        self.is_open = false;
         self.rebuilt_at = 0;
         self.settings.seed = seed;
         self.sample_count = 0;
@@ -420,15 +444,49 @@ impl Renderer {
                 self.film_size
             )));
         }
-        if self.guide.is_some() {
-            return Err(Error::usage(
-                "--resume: a checkpoint does not hold what the sampler guided has learned; render \
-                 another part with --seed or --sample-offset and put the two together with merge",
-            ));
-        }
         self.film.upload(sums)?;
         self.sample_count = sums.sample_count;
         Ok(())
+    }
+
+    /// What the sampler `guided` has learned; `None` for the others.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if the device fails.
+    pub fn guide_state(&self) -> Result<Option<GuideState>> {
+        let state = self.guide.as_ref().map(GuideBuffers::state).transpose()?;
+        Ok(state.map(|state| GuideState {
+            samples: self.sample_count,
+            rebuilt_at: self.rebuilt_at,
+            is_open: self.is_open,
+            ..state
+        }))
+    }
+
+    /// Goes on from what an earlier renderer learned, without training. With as many samples in the
+    /// film as the state was taken at, this continues that renderer to the bit. Returns whether the
+    /// geometry is another, so that most was forgotten.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if the environment or the regions differ, or if this sampler learns nothing;
+    /// [`Error::Vulkan`] if the device fails.
+    pub fn restore_guide(&mut self, state: &GuideState) -> Result<bool> {
+        let Some(guide) = &mut self.guide else {
+            return Err(Error::usage(format!(
+                "the sampler {} learns nothing; a guide is for --sampler guided",
+                self.settings.sampler.name()
+            )));
+        };
+        let has_moved = guide.restore(state)?;
+        self.is_open = state.is_open && !has_moved;
+        if state.samples == self.sample_count {
+            self.rebuilt_at = state.rebuilt_at;
+        } else {
+            guide.rebuild()?;
+            self.rebuilt_at = self.sample_count;
+        }
+        self.is_trained = true;
+        Ok(has_moved)
     }
 }
 
@@ -474,7 +532,7 @@ fn check(settings: &Settings, window: Window, film_size: [u32; 2]) -> Result<()>
             settings.shadow_rays
         )));
     }
-    settings.parameters.candidates_of(settings.sampler)?;
+    settings.parameters.candidates_of(settings.sampler, false)?;
     if !(1..=64).contains(&settings.depth) {
         return Err(Error::usage(format!("--depth {}: expected 1 to 64", settings.depth)));
     }

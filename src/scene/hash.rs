@@ -24,10 +24,7 @@ pub fn hash(scene: &Scene) -> String {
         Filter::Gaussian => 1,
     };
     hasher.integers(&[scene.film.width, scene.film.height, filter]);
-    let environment = &scene.environment;
-    hasher.integers(&[environment.width, environment.height]);
-    hasher.floats(&[environment.rotation_rad]);
-    hasher.vectors(&environment.texels);
+    hasher.environment(scene);
     hasher.length(scene.materials.len());
     for material in &scene.materials {
         hasher.material(&material.kind);
@@ -37,17 +34,43 @@ pub fn hash(scene: &Scene) -> String {
     hasher.array(bytemuck::cast_slice(&geometry.normals));
     hasher.array(bytemuck::cast_slice(&geometry.triangles));
     hasher.array(bytemuck::cast_slice(&geometry.materials));
-    let mut hexadecimal = String::with_capacity(64);
-    for byte in hasher.0.finalize() {
-        // Writing into a string cannot fail.
-        let _ = write!(hexadecimal, "{byte:02x}");
-    }
-    hexadecimal
+    hasher.finish()
+}
+
+/// Lower-case hexadecimal digest of the environment alone.
+pub fn environment_hash(scene: &Scene) -> String {
+    let mut hasher = Hasher(Sha256::new());
+    hasher.environment(scene);
+    hasher.finish()
+}
+
+/// Lower-case hexadecimal digest of what can be in the way of light: positions and triangles.
+pub fn geometry_hash(scene: &Scene) -> String {
+    let mut hasher = Hasher(Sha256::new());
+    hasher.array(bytemuck::cast_slice(&scene.geometry.positions));
+    hasher.array(bytemuck::cast_slice(&scene.geometry.triangles));
+    hasher.finish()
 }
 
 struct Hasher(Sha256);
 
 impl Hasher {
+    fn finish(self) -> String {
+        let mut hexadecimal = String::with_capacity(64);
+        for byte in self.0.finalize() {
+            // Writing into a string cannot fail.
+            let _ = write!(hexadecimal, "{byte:02x}");
+        }
+        hexadecimal
+    }
+
+    fn environment(&mut self, scene: &Scene) {
+        let environment = &scene.environment;
+        self.integers(&[environment.width, environment.height]);
+        self.floats(&[environment.rotation_rad]);
+        self.vectors(&environment.texels);
+    }
+
     fn length(&mut self, length: usize) {
         self.0.update((length as u64).to_le_bytes());
     }

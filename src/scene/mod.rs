@@ -17,6 +17,7 @@ use std::path::PathBuf;
 pub use camera::Camera;
 pub use environment::EnvironmentMap;
 pub use geometry::Geometry;
+pub use hash::{environment_hash, geometry_hash};
 pub use material::Material;
 
 /// Reconstruction filter of the film, importance sampled so that every sample belongs to one pixel.

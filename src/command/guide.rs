@@ -1,0 +1,81 @@
+//! What `guided` has learned, between `render` and files.
+
+use std::path::{Path, PathBuf};
+
+use crate::{
+    error::{Error, Result},
+    guide::GuideState,
+    renderer::Renderer,
+    sampler::Sampler,
+};
+
+/// `image.checkpoint.exr` → `image.checkpoint.guide`.
+pub fn guide_path(checkpoint: &Path) -> PathBuf {
+    checkpoint.with_extension("guide")
+}
+
+/// Refuses options that no other sampler can follow.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn check(sampler: Sampler, save: Option<&Path>, load: Option<&Path>) -> Result<()> {
+    for (name, path) in [("--save-guide", save), ("--load-guide", load)] {
+        if let Some(path) = path
+            && sampler != Sampler::Guided
+        {
+            return Err(Error::usage(format!(
+                "{name} {}: the sampler {} learns nothing; expected --sampler guided",
+                path.display(),
+                sampler.name()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Starts from what an earlier render learned, perhaps in another frame of an animation.
+///
+/// # Errors
+/// A file that cannot be read or belongs to another environment; a failing device.
+pub fn load(renderer: &mut Renderer, path: &Path) -> Result<()> {
+    let state = GuideState::read(path)?;
+    // Taken up as something learned before the first sample, whatever film it came from.
+    let state = GuideState { samples: u32::MAX, ..state };
+    if renderer.restore_guide(&state)? {
+        log::warn!("{} was learned in another geometry: most of it counts no more", path.display());
+    }
+    Ok(())
+}
+
+/// Continues a checkpoint exactly.
+///
+/// # Errors
+/// A file that is missing, cannot be read or belongs to another checkpoint; a failing device.
+pub fn resume(renderer: &mut Renderer, checkpoint: &Path) -> Result<()> {
+    let path = guide_path(checkpoint);
+    let state = GuideState::read(&path)?;
+    if state.samples != renderer.sample_count() {
+        return Err(Error::format(
+            &path,
+            format!(
+                "what was learned belongs to {} samples per pixel, the checkpoint {} holds {}; keep \
+                 the two files together",
+                state.samples,
+                checkpoint.display(),
+                renderer.sample_count()
+            ),
+        ));
+    }
+    if renderer.restore_guide(&state)? {
+        return Err(Error::format(&path, "it was learned in another geometry".to_owned()));
+    }
+    Ok(())
+}
+
+/// Writes what was learned, if the sampler learns.
+///
+/// # Errors
+/// A failing device or disk.
+pub fn save(renderer: &Renderer, path: &Path) -> Result<()> {
+    renderer.guide_state()?.map_or(Ok(()), |state| state.write(path))
+}

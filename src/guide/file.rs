@@ -1,0 +1,220 @@
+//! What was learned, in a file: `--save-guide`, `--load-guide`, and beside a checkpoint.
+//!
+//! One line of JSON, then 32-bit words in little-endian order: the keys of the cells, trials and hits
+//! per cell and region, what passes counted since the last rebuild, and the keys they missed. The
+//! header has the SHA-256 of the words.
+
+use std::{fs, io::Write, path::Path};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::{
+    error::{Error, Result},
+    film::write_atomically,
+};
+
+const FORMAT: &str = "fenestra-guide";
+const VERSION: u32 = 1;
+
+/// Everything a renderer needs to go on learning where another stopped.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GuideState {
+    /// What it was learned in.
+    pub origin: Origin,
+    /// Samples per pixel of the film when this was taken; 0 where it belongs to no film.
+    pub samples: u32,
+    /// Samples per pixel at the last rebuild.
+    pub rebuilt_at: u32,
+    /// Whether the scene was found open, so that nothing more is learned.
+    pub is_open: bool,
+    /// Key of every cell, the faces first.
+    pub keys: Vec<u32>,
+    /// Trials and hits per cell and region up to the last rebuild.
+    pub counts: Vec<[u32; 2]>,
+    /// Trials and hits per cell and region since then; empty where there are none.
+    pub pending: Vec<[u32; 2]>,
+    /// Keys that were missed since then.
+    pub wanted: Vec<u32>,
+}
+
+/// The scene that a guide was learned in, as far as it matters.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Origin {
+    /// SHA-256 of environment map and partition: regions mean nothing under another.
+    pub environment: String,
+    /// SHA-256 of the geometry: under another, what was learned is worth less.
+    pub geometry: String,
+    /// Number of regions.
+    pub regions: u32,
+    /// Corner of the grids, metres.
+    pub grid_origin: [f32; 3],
+    /// Largest edge of a cell, metres; the others are powers of two below it.
+    pub largest_edge: f32,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Header {
+    format: String,
+    version: u32,
+    checksum: String,
+    origin: Origin,
+    samples: u32,
+    rebuilt_at: u32,
+    is_open: bool,
+    cells: usize,
+    pending: usize,
+    wanted: usize,
+}
+
+fn checksum(words: &[u8]) -> String {
+    Sha256::digest(words).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+impl GuideState {
+    /// Writes the file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let mut words: Vec<u8> = Vec::new();
+        let all = self
+            .keys
+            .iter()
+            .chain(self.counts.as_flattened())
+            .chain(self.pending.as_flattened())
+            .chain(&self.wanted);
+        words.extend(all.flat_map(|word| word.to_le_bytes()));
+        let header = Header {
+            format: FORMAT.to_owned(),
+            version: VERSION,
+            checksum: checksum(&words),
+            origin: self.origin.clone(),
+            samples: self.samples,
+            rebuilt_at: self.rebuilt_at,
+            is_open: self.is_open,
+            cells: self.keys.len(),
+            pending: self.pending.len(),
+            wanted: self.wanted.len(),
+        };
+        let header =
+            serde_json::to_vec(&header).map_err(|error| Error::io(path, "write", error.into()))?;
+        write_atomically(path, |file| {
+            file.write_all(&header)?;
+            file.write_all(b"\n")?;
+            file.write_all(&words)
+        })
+    }
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where it cannot be read; [`Error::Format`] where it is no guide, of another
+    /// version, or damaged.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = fs::read(path).map_err(|source| Error::io(path, "read", source))?;
+        let no_guide = || {
+            Error::format(path, "not a guide; expected a file written by --save-guide".to_owned())
+        };
+        let damaged = |what: &str| Error::format(path, format!("damaged guide: {what}"));
+        let split = bytes.iter().position(|byte| *byte == b'\n').ok_or_else(no_guide)?;
+        let header: Header = serde_json::from_slice(&bytes[..split]).map_err(|_| no_guide())?;
+        if header.format != FORMAT {
+            return Err(no_guide());
+        }
+        if header.version != VERSION {
+            return Err(Error::format(
+                path,
+                format!(
+                    "guide of version {}; this program reads version {VERSION}: learn it again",
+                    header.version
+                ),
+            ));
+        }
+        let words = &bytes[split + 1..];
+        if checksum(words) != header.checksum {
+            return Err(damaged("its checksum does not match its content"));
+        }
+        let counts = header.cells.checked_mul(header.origin.regions as usize);
+        let length = counts.and_then(|counts| {
+            let pairs = counts.checked_add(header.pending)?.checked_mul(2)?;
+            pairs.checked_add(header.cells)?.checked_add(header.wanted)?.checked_mul(4)
+        });
+        let (Some(counts), Some(length)) = (counts, length) else {
+            return Err(damaged("its header holds impossible lengths"));
+        };
+        if length != words.len() || header.pending > counts {
+            return Err(damaged(&format!("{length} bytes expected, {} found", words.len())));
+        }
+        let mut words = words
+            .chunks_exact(4)
+            .map(|word| word.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte)));
+        let mut take = |count: usize| words.by_ref().take(count).collect::<Vec<u32>>();
+        let pairs =
+            |words: Vec<u32>| words.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
+        Ok(Self {
+            origin: header.origin,
+            samples: header.samples,
+            rebuilt_at: header.rebuilt_at,
+            is_open: header.is_open,
+            keys: take(header.cells),
+            counts: pairs(take(2 * counts)),
+            pending: pairs(take(2 * header.pending)),
+            wanted: take(header.wanted),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+    use super::*;
+
+    fn state() -> GuideState {
+        let origin = Origin { regions: 2, largest_edge: 0.3, ..Origin::default() };
+        GuideState {
+            origin,
+            samples: 5,
+            rebuilt_at: 4,
+            is_open: true,
+            keys: vec![u32::MAX, 7, 8],
+            counts: vec![[1, 0], [2, 1], [3, 3], [0, 0], [1 << 24, 5], [9, 9]],
+            pending: vec![[4, 4]],
+            wanted: vec![0x1234_5678],
+        }
+    }
+
+    #[test]
+    fn a_file_brings_back_what_was_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new/room.guide");
+        state().write(&path).unwrap();
+        assert_eq!(GuideState::read(&path).unwrap(), state());
+    }
+
+    #[test]
+    fn files_that_are_damaged_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("room.guide");
+        let message = |bytes: &[u8]| {
+            fs::write(&path, bytes).unwrap();
+            GuideState::read(&path).unwrap_err().to_string()
+        };
+        assert!(message(b"").contains("not a guide"));
+        assert!(message(b"{\"format\":\"other\"}\n").contains("not a guide"));
+        state().write(&path).unwrap();
+        let good = fs::read(&path).unwrap();
+        assert!(message(&good[..good.len() - 1]).contains("damaged guide"));
+        let text = String::from_utf8_lossy(&good[..40]).into_owned();
+        assert!(text.contains("\"version\":1"), "{text}");
+        let mut other = good.clone();
+        let place = good.windows(11).position(|w| w == b"\"version\":1").unwrap() + 10;
+        other[place] = b'9';
+        assert!(message(&other).contains("version 9"));
+        let place = good.windows(9).position(|w| w == b"\"cells\":3").unwrap() + 8;
+        let mut other = good;
+        other[place] = b'4';
+        assert!(message(&other).contains("bytes expected"));
+    }
+}
