@@ -1,11 +1,15 @@
 //! The samplers by name, their parameters, and how `--set key=value` reaches them.
 
+mod lobes;
+
 use std::collections::BTreeMap;
 
 use crate::{
     error::{Error, Result},
     gpu::constants,
 };
+
+pub use lobes::{CacheScope, Elevation, LobeOrder, LobeParameters, Threshold};
 
 /// How directions are chosen at a hit. All are unbiased and trace one shadow ray per direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, clap::ValueEnum)]
@@ -23,6 +27,10 @@ pub enum Sampler {
     /// Resampled importance sampling over candidates of `mis` (Burke et al. 2005; Talbot et al.
     /// 2005).
     Ris,
+    /// Lobes of the product of environment and BRDF (Tsai et al. 2008).
+    Product,
+    /// `product`, with less weight on lobes near directions that turned out blocked (Wu & Shih 2009).
+    Visibility,
     /// Regions of the environment by visibility that was learned in cells of the scene, across
     /// pixels and passes.
     Guided,
@@ -30,8 +38,17 @@ pub enum Sampler {
 
 impl Sampler {
     /// Every sampler, simplest first.
-    pub const ALL: [Self; 7] =
-        [Self::Uniform, Self::Cosine, Self::Brdf, Self::Env, Self::Mis, Self::Ris, Self::Guided];
+    pub const ALL: [Self; 9] = [
+        Self::Uniform,
+        Self::Cosine,
+        Self::Brdf,
+        Self::Env,
+        Self::Mis,
+        Self::Ris,
+        Self::Product,
+        Self::Visibility,
+        Self::Guided,
+    ];
 
     /// Name on the command line, in files and in tables.
     pub fn name(self) -> &'static str {
@@ -42,6 +59,8 @@ impl Sampler {
             Self::Env => "env",
             Self::Mis => "mis",
             Self::Ris => "ris",
+            Self::Product => "product",
+            Self::Visibility => "visibility",
             Self::Guided => "guided",
         }
     }
@@ -55,13 +74,20 @@ impl Sampler {
             Self::Env => constants::SAMPLER_ENV,
             Self::Mis => constants::SAMPLER_MIS,
             Self::Ris => constants::SAMPLER_RIS,
+            Self::Product => constants::SAMPLER_PRODUCT,
+            Self::Visibility => constants::SAMPLER_VISIBILITY,
             Self::Guided => constants::SAMPLER_GUIDED,
         }
+    }
+
+    /// Whether the sampler needs fits of environment and materials.
+    pub fn uses_lobes(self) -> bool {
+        matches!(self, Self::Product | Self::Visibility)
     }
 }
 
 /// Parameters of the samplers, set by `--set key=value`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
     /// `candidates`: directions that each shadow ray is chosen from; `None` is `auto`. `ris` takes 2,
     /// 4, 6 or 8 (auto 4), half from the BRDF and half from the environment; `guided` takes 1, 4 or 8
@@ -71,11 +97,18 @@ pub struct Parameters {
     pub guide_memory: u64,
     /// `regions`: regions of the environment for `guided`, 16 to 1024.
     pub regions: u32,
+    /// Those of `product` and `visibility`.
+    pub lobes: LobeParameters,
 }
 
 impl Default for Parameters {
     fn default() -> Self {
-        Self { candidates: None, guide_memory: 128 << 20, regions: 256 }
+        Self {
+            candidates: None,
+            guide_memory: 128 << 20,
+            regions: 256,
+            lobes: LobeParameters::default(),
+        }
     }
 }
 
@@ -120,10 +153,13 @@ impl Parameters {
                         || Error::usage(format!("--set regions={value}: expected 16 to 1024")),
                     )?;
             }
+            _ if self.lobes.set(key, value)? => {}
             _ => {
+                let known: Vec<&str> =
+                    Self::KEYS.iter().chain(&LobeParameters::KEYS).copied().collect();
                 return Err(Error::usage(format!(
                     "--set {key}: unknown parameter; known: {}",
-                    Self::KEYS.join(", ")
+                    known.join(", ")
                 )));
             }
         }
@@ -165,6 +201,9 @@ impl Parameters {
                     named.insert("guide-memory".to_owned(), self.guide_memory.to_string());
                 }
                 named
+            }
+            Sampler::Product | Sampler::Visibility => {
+                self.lobes.describe(sampler == Sampler::Visibility)
             }
             _ => BTreeMap::new(),
         }

@@ -71,7 +71,8 @@ fn host_structs() -> Vec<HostStruct> {
             throughput, radiance, shadow_rays_traced, shadow_rays_visible, rays_traced,
         }
         Counters {
-            camera_rays, bounce_rays, shadow_rays_traced, shadow_rays_visible, dropped_samples, traversal_overruns,
+            camera_rays, bounce_rays, shadow_rays_traced, shadow_rays_visible, dropped_samples,
+            traversal_overruns, product_hits, lobes_kept, energy_kept, cache_entries, cdf_rebuilds,
         }
         Material { kind, table_offset, alpha, ior, reflectance, eta, k }
         Wave {

@@ -224,18 +224,6 @@ bool bvh_step(bool any_hit) {
     return (bvh_triangles_waiting.y | (bvh_nodes_waiting.y & 0xff000000u) | bvh_stack_size) != 0u;
 }
 
-// Unit vector from the octahedral map, twin of accel::normal::unpack.
-vec3 unpack_normal(uint packed_normal) {
-    ivec2 quantised = ivec2(int(packed_normal << 16) >> 16, int(packed_normal) >> 16);
-    vec2 p = vec2(quantised) / 32767.0;
-    float z = 1.0 - abs(p.x) - abs(p.y);
-    if (z < 0.0) {
-        vec2 sign_of = vec2(p.x < 0.0 ? -1.0 : 1.0, p.y < 0.0 ? -1.0 : 1.0);
-        p = (1.0 - abs(p.yx)) * sign_of;
-    }
-    return normalize(vec3(p, z));
-}
-
 // Turns a shading normal, in the plane that it spans with `outgoing_direction`, until its cosine with
 // that direction is `least` if it is less: what is seen is lit as if seen at grazing angle, and the
 // change is continuous where the cosine falls below `least`.

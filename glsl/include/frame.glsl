@@ -37,6 +37,29 @@ vec3 to_world(Frame frame, vec3 direction_local) {
         + frame.normal * direction_local.z;
 }
 
+// Unit vector to the octahedral map, 16 bits a coordinate, twin of accel::normal::pack.
+uint pack_normal(vec3 normal) {
+    vec2 p = normal.xy / (abs(normal.x) + abs(normal.y) + abs(normal.z));
+    if (normal.z < 0.0) {
+        vec2 sign_of = vec2(p.x < 0.0 ? -1.0 : 1.0, p.y < 0.0 ? -1.0 : 1.0);
+        p = (1.0 - abs(p.yx)) * sign_of;
+    }
+    ivec2 quantised = ivec2(round(clamp(p, -1.0, 1.0) * 32767.0));
+    return (uint(quantised.x) & 0xffffu) | (uint(quantised.y) << 16u);
+}
+
+// Unit vector from the octahedral map, twin of accel::normal::unpack.
+vec3 unpack_normal(uint packed_normal) {
+    ivec2 quantised = ivec2(int(packed_normal << 16) >> 16, int(packed_normal) >> 16);
+    vec2 p = vec2(quantised) / 32767.0;
+    float z = 1.0 - abs(p.x) - abs(p.y);
+    if (z < 0.0) {
+        vec2 sign_of = vec2(p.x < 0.0 ? -1.0 : 1.0, p.y < 0.0 ? -1.0 : 1.0);
+        p = (1.0 - abs(p.yx)) * sign_of;
+    }
+    return normalize(vec3(p, z));
+}
+
 // (sin(pi x), cos(pi x)) for 0 <= x <= 2 with small *relative* error near the zeros, which the
 // built-in functions do not promise: densities over the sphere divide by the sine near the poles.
 // Polynomials of Cephes' sinf and cosf (Moshier 1992), |argument| <= pi/4.

@@ -68,6 +68,11 @@ struct Counters {
     uint shadow_rays_visible;
     uint dropped_samples;
     uint traversal_overruns;
+    uint product_hits;
+    uint lobes_kept;
+    uint energy_kept;
+    uint cache_entries;
+    uint cdf_rebuilds;
 };
 
 struct Material {
@@ -263,6 +268,65 @@ ShadowRay load_shadow_ray(uint index) {
 layout(scalar, set = SET_WAVE, binding = BINDING_VISIBILITY)
     ACCESS_VISIBILITY buffer VisibilityBuffer {
     uint visibility[];
+};
+#endif
+
+#ifdef NEEDS_FITS
+layout(set = SET_SRBF, binding = BINDING_ENVIRONMENT_LOBES) uniform samplerBuffer environment_lobes;
+layout(set = SET_SRBF, binding = BINDING_BRDF_LOBES) uniform samplerBuffer brdf_lobes;
+layout(set = SET_SRBF, binding = BINDING_MATERIAL_LOBES) uniform usamplerBuffer material_lobes;
+#endif
+
+#ifdef NEEDS_LOBES
+#ifdef WRITES_LOBES
+#define ACCESS_LOBES writeonly
+#else
+#define ACCESS_LOBES readonly
+#endif
+layout(scalar, set = SET_WAVE, binding = BINDING_LOBES) ACCESS_LOBES buffer LobesBuffer {
+    uvec4 lobes[];
+};
+#endif
+
+#ifdef NEEDS_LOBE_COUNTS
+#ifdef WRITES_LOBE_COUNTS
+#define ACCESS_LOBE_COUNTS writeonly
+#else
+#define ACCESS_LOBE_COUNTS readonly
+#endif
+layout(scalar, set = SET_WAVE, binding = BINDING_LOBE_COUNTS)
+    ACCESS_LOBE_COUNTS buffer LobeCountsBuffer {
+    uint lobe_counts[];
+};
+#endif
+
+#ifdef NEEDS_CUMULATIVE
+#ifdef WRITES_CUMULATIVE
+#define ACCESS_CUMULATIVE writeonly
+#else
+#define ACCESS_CUMULATIVE readonly
+#endif
+layout(scalar, set = SET_WAVE, binding = BINDING_CUMULATIVE)
+    ACCESS_CUMULATIVE buffer CumulativeBuffer {
+    float cumulative[];
+};
+#endif
+
+#ifdef NEEDS_LOBE_TEXELS
+layout(set = SET_WAVE, binding = BINDING_LOBE_TEXELS) uniform usamplerBuffer lobe_texels;
+#endif
+#ifdef NEEDS_CUMULATIVE_TEXELS
+layout(set = SET_WAVE, binding = BINDING_CUMULATIVE_TEXELS) uniform samplerBuffer cumulative_texels;
+#endif
+
+#ifdef NEEDS_CACHE
+#ifdef WRITES_CACHE
+#define ACCESS_CACHE
+#else
+#define ACCESS_CACHE readonly
+#endif
+layout(scalar, set = SET_WAVE, binding = BINDING_CACHE) ACCESS_CACHE buffer CacheBuffer {
+    uint visibility_cache[];
 };
 #endif
 

@@ -58,6 +58,14 @@ Considered consider(
     return considered;
 }
 
+// Any direction in the world.
+Considered consider_world(Vertex vertex, vec3 direction) {
+    vec3 radiance = environment_radiance(direction);
+    return consider(
+        vertex, direction, to_local(vertex.frame, direction), radiance,
+        environment_pdf(direction, radiance));
+}
+
 // Any direction given in the frame of the vertex.
 Considered consider_local(Vertex vertex, vec3 incident_local) {
     vec3 direction = to_world(vertex.frame, incident_local);

@@ -22,6 +22,12 @@ const uint DIMENSION_BRDF_LOBE = 8u;
 const uint DIMENSION_BRDF_DIRECTION = 16u;
 const uint DIMENSION_ENVIRONMENT_DIRECTION = 24u;
 const uint DIMENSIONS_PER_VERTEX = 32u;
+// First dimension of the rays of adaptive samplers, which each have their own: technique, direction
+// and lobe. At most 4096 rays a vertex.
+const uint DIMENSION_ADAPTIVE = 0x10000u;
+const uint DIMENSIONS_PER_ADAPTIVE_RAY = 3u;
+// First dimension of random walks.
+const uint DIMENSION_WALK = 0x8000000u;
 
 // Film order walks through blocks of 8x8 pixels, so that neighbouring invocations trace
 // neighbouring rays.

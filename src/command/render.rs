@@ -480,6 +480,7 @@ impl<'a> Job<'a> {
                 .iter()
                 .map(|(pass, ms)| (pass.clone(), ms * 1e-3))
                 .collect(),
+            fit_hashes: renderer.fit_hashes(),
             ..self.metadata.clone()
         }
     }
@@ -547,6 +548,8 @@ impl<'a> Job<'a> {
         let window = self.window();
         let mut host_ms = renderer.host_ms();
         host_ms.insert("load".into(), load_ms);
+        let sampler_statistics = totals.sampler_statistics();
+        let figure = |name: &str| sampler_statistics.get(name).copied();
         Statistics {
             version: metadata.version.clone(),
             scene: metadata.scene.clone(),
@@ -573,6 +576,10 @@ impl<'a> Job<'a> {
             .into(),
             visible_share: (totals.shadow_rays_traced > 0)
                 .then(|| totals.shadow_rays_visible as f64 / totals.shadow_rays_traced as f64),
+            cache_entries_per_hit: figure("cache_entries_per_hit"),
+            lobes_per_hit: figure("lobes_per_hit"),
+            energy_kept: figure("energy_kept"),
+            cdf_rebuilds_per_hit: figure("cdf_rebuilds_per_hit"),
             dropped_samples: totals.dropped_samples,
             gpu_ms: totals.gpu_ms.clone(),
             host_ms,

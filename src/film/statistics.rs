@@ -52,6 +52,8 @@ pub struct Statistics {
     pub cache_entries_per_hit: Option<f64>,
     /// Mean lobes kept of the product per hit, for samplers that have one.
     pub lobes_per_hit: Option<f64>,
+    /// Mean share of the product's energy that the kept lobes hold, for samplers that have one.
+    pub energy_kept: Option<f64>,
     /// Mean rebuilds of the lobe probabilities per hit, for samplers that have them.
     pub cdf_rebuilds_per_hit: Option<f64>,
     /// Samples dropped because their radiance was not finite.

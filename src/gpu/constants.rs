@@ -41,6 +41,14 @@ pub const BINDING_ENVIRONMENT_ROWS: u32 = 11;
 /// Scene set: cumulative probability over the cells of each row of the environment map.
 pub const BINDING_ENVIRONMENT_CELLS: u32 = 12;
 
+/// SRBF set: lobes of the environment in the world, largest integral first, two texels of four floats
+/// each: axis and bandwidth; colour and amplitude.
+pub const BINDING_ENVIRONMENT_LOBES: u32 = 0;
+/// SRBF set: lobes of BRDF · cosine by material and view, two texels of four floats each: axis and
+/// bandwidth; amplitude.
+pub const BINDING_BRDF_LOBES: u32 = 1;
+/// SRBF set: first lobe of each material and its lobes per view, texels of two words.
+pub const BINDING_MATERIAL_LOBES: u32 = 2;
 /// SRBF set: [`GuideParameters`](super::layout::GuideParameters), one element.
 pub const BINDING_GUIDE_PARAMETERS: u32 = 4;
 /// SRBF set: hash table from keys to cells of the scene, texels of two words: key, index of the cell.
@@ -79,6 +87,20 @@ pub const BINDING_HIT_TEXELS: u32 = 6;
 /// Wave set: the shadow rays again, texels of two words, three to a shadow ray.
 pub const BINDING_SHADOW_RAY_TEXELS: u32 = 7;
 
+/// Wave set: lobes of the product, lobe `l` of path `i` at `l · path_count + i` (see `product.glsl`).
+pub const BINDING_LOBES: u32 = 8;
+/// Wave set: the lobes again, texels of four words.
+pub const BINDING_LOBE_TEXELS: u32 = 9;
+/// Wave set: lobes kept per path.
+pub const BINDING_LOBE_COUNTS: u32 = 10;
+/// Wave set: cumulative weight of the lobes, not normalised, ordered as the lobes.
+pub const BINDING_CUMULATIVE: u32 = 11;
+/// Wave set: the cumulative weights again, texels of one float.
+pub const BINDING_CUMULATIVE_TEXELS: u32 = 12;
+/// Wave set: visibility caches, a head and `CACHE_CAPACITY` directions each, by path or by pixel of the
+/// film.
+pub const BINDING_CACHE: u32 = 13;
+
 /// Film set: leading part of Σ radiance per pixel.
 pub const BINDING_FILM_SUM: u32 = 0;
 /// Film set: rest of Σ radiance per pixel.
@@ -115,6 +137,34 @@ pub const CONSTANT_ROULETTE_VERTEX: u32 = 18;
 /// Specialization constant of the passes that evaluate materials: bit `1 << kind` for every kind that
 /// the scene has. Devices that run both sides of a branch save the kinds that it has not.
 pub const CONSTANT_MATERIAL_KINDS: u32 = 19;
+/// Specialization constant of `product`: lobes of the environment.
+pub const CONSTANT_ENVIRONMENT_LOBES: u32 = 32;
+/// Specialization constant of `product`: most lobes of a material in one view.
+pub const CONSTANT_BRDF_LOBES: u32 = 33;
+/// Specialization constant of `product`: view elevations of a BRDF fit.
+pub const CONSTANT_VIEWS: u32 = 34;
+/// Specialization constant of `product`: most lobes kept at a hit.
+pub const CONSTANT_KEPT_LOBES: u32 = 35;
+/// Specialization constant of `product`: 1 keeps lobes by coefficient instead of integral.
+pub const CONSTANT_ORDER_BY_COEFFICIENT: u32 = 36;
+/// Specialization constant of `product`, bits of a float: τ, closeness in deviations of a lobe.
+pub const CONSTANT_THRESHOLD_SCALE: u32 = 37;
+/// Specialization constant of `product`: 1 uses one closeness for lobes of all bandwidths.
+pub const CONSTANT_FIXED_THRESHOLD: u32 = 38;
+/// Specialization constant of `sample_lobes`, bits of a float: share of directions from the BRDF.
+pub const CONSTANT_BRDF_SHARE: u32 = 39;
+/// Specialization constant of `sample_lobes`, bits of a float: share from the environment map.
+pub const CONSTANT_ENVIRONMENT_SHARE: u32 = 40;
+/// Specialization constant of `sample_lobes`: 1 draws elevations by a random walk, which is biased.
+pub const CONSTANT_METROPOLIS: u32 = 41;
+/// Specialization constant: directions that a visibility cache holds; 0 where there is none.
+pub const CONSTANT_CACHE_CAPACITY: u32 = 42;
+/// Specialization constant: 1 keeps a cache for all samples of a pixel, 0 for one hit.
+pub const CONSTANT_CACHE_OF_PIXEL: u32 = 43;
+/// Specialization constant of `cache`: 1 records visible directions too.
+pub const CONSTANT_COUNT_VISIBLE: u32 = 44;
+/// Specialization constant of `cdf`, bits of a float: k of V = (1 / (1 + Num))^k.
+pub const CONSTANT_VISIBILITY_EXPONENT: u32 = 45;
 /// Entries of the traversal stack; one group of nodes per level of the tree is stacked.
 pub const BVH_STACK_ENTRIES: u32 = 32;
 /// Steps of traversal that one invocation may take for all its rays; Mesa 22.3 silently ends the
@@ -145,6 +195,10 @@ pub const SAMPLER_MIS: u32 = 4;
 /// Resampling over the candidates of `mis`.
 pub const SAMPLER_RIS: u32 = 5;
 
+/// Lobes of the product of environment and BRDF.
+pub const SAMPLER_PRODUCT: u32 = 6;
+/// The same with a visibility cache per hit.
+pub const SAMPLER_VISIBILITY: u32 = 7;
 /// Learned visibility; a shader of its own.
 pub const SAMPLER_GUIDED: u32 = 8;
 
@@ -262,6 +316,31 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("SAMPLER_MIS", SAMPLER_MIS),
     ("SAMPLER_RIS", SAMPLER_RIS),
     ("SAMPLER_GUIDED", SAMPLER_GUIDED),
+    ("BINDING_ENVIRONMENT_LOBES", BINDING_ENVIRONMENT_LOBES),
+    ("BINDING_BRDF_LOBES", BINDING_BRDF_LOBES),
+    ("BINDING_MATERIAL_LOBES", BINDING_MATERIAL_LOBES),
+    ("BINDING_LOBES", BINDING_LOBES),
+    ("BINDING_LOBE_TEXELS", BINDING_LOBE_TEXELS),
+    ("BINDING_LOBE_COUNTS", BINDING_LOBE_COUNTS),
+    ("BINDING_CUMULATIVE", BINDING_CUMULATIVE),
+    ("BINDING_CUMULATIVE_TEXELS", BINDING_CUMULATIVE_TEXELS),
+    ("BINDING_CACHE", BINDING_CACHE),
+    ("CONSTANT_ENVIRONMENT_LOBES", CONSTANT_ENVIRONMENT_LOBES),
+    ("CONSTANT_BRDF_LOBES", CONSTANT_BRDF_LOBES),
+    ("CONSTANT_VIEWS", CONSTANT_VIEWS),
+    ("CONSTANT_KEPT_LOBES", CONSTANT_KEPT_LOBES),
+    ("CONSTANT_ORDER_BY_COEFFICIENT", CONSTANT_ORDER_BY_COEFFICIENT),
+    ("CONSTANT_THRESHOLD_SCALE", CONSTANT_THRESHOLD_SCALE),
+    ("CONSTANT_FIXED_THRESHOLD", CONSTANT_FIXED_THRESHOLD),
+    ("CONSTANT_BRDF_SHARE", CONSTANT_BRDF_SHARE),
+    ("CONSTANT_ENVIRONMENT_SHARE", CONSTANT_ENVIRONMENT_SHARE),
+    ("CONSTANT_METROPOLIS", CONSTANT_METROPOLIS),
+    ("CONSTANT_CACHE_CAPACITY", CONSTANT_CACHE_CAPACITY),
+    ("CONSTANT_CACHE_OF_PIXEL", CONSTANT_CACHE_OF_PIXEL),
+    ("CONSTANT_COUNT_VISIBLE", CONSTANT_COUNT_VISIBLE),
+    ("CONSTANT_VISIBILITY_EXPONENT", CONSTANT_VISIBILITY_EXPONENT),
+    ("SAMPLER_PRODUCT", SAMPLER_PRODUCT),
+    ("SAMPLER_VISIBILITY", SAMPLER_VISIBILITY),
     ("NO_MATERIAL", NO_MATERIAL),
     ("MATERIAL_DIFFUSE", MATERIAL_DIFFUSE),
     ("MATERIAL_PLASTIC", MATERIAL_PLASTIC),

@@ -125,6 +125,16 @@ pub struct Counters {
     /// Rays given up after `TRAVERSAL_STEP_LIMIT` steps, counted as blocked or by the nearest hit so
     /// far.
     pub traversal_overruns: u32,
+    /// Hits with lobes of a product.
+    pub product_hits: u32,
+    /// Lobes kept at these hits.
+    pub lobes_kept: u32,
+    /// Share of the product's energy that was kept, summed over these hits, in 256ths.
+    pub energy_kept: u32,
+    /// Directions recorded in visibility caches.
+    pub cache_entries: u32,
+    /// Rebuilds of a cumulative distribution because a cache had grown.
+    pub cdf_rebuilds: u32,
 }
 
 /// A material; which members mean something depends on `kind`.

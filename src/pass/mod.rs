@@ -2,11 +2,13 @@
 //! `glsl/<name>.comp`, its debug label and its row in the timings.
 //!
 //! Per wave of paths: `camera`; then per vertex `trace`, and per group of shadow rays `sample`,
-//! `shadow`, `gather`; `features` after the first vertex where albedo, normal or position are asked
+//! `shadow`, `gather`, with `product` before the first group and `cache` and `cdf` after each for the
+//! samplers that need them; `features` after the first vertex where albedo, normal or position are asked
 //! for; `bounce` between vertices; at last `accumulate`.
 
 pub mod geometry;
 pub mod guided;
+mod lobes;
 pub mod shadow;
 pub mod trace;
 
@@ -27,6 +29,8 @@ use crate::{
 };
 pub use geometry::{GeometryBuffers, Schedule};
 use guided::Guided;
+pub use lobes::FitSizes;
+use lobes::Lobes;
 use shadow::Shadow;
 use trace::Trace;
 
@@ -53,6 +57,8 @@ pub struct PassSettings {
     pub roulette_vertex: u32,
     /// Bit `1 << kind` for every kind of material in the scene.
     pub material_kinds: u32,
+    /// Sizes of the fits, for the samplers that use lobes.
+    pub fit_sizes: Option<FitSizes>,
 }
 
 /// The descriptor sets that the passes see.
@@ -65,6 +71,8 @@ pub struct Sets<'a> {
     pub film: &'a DescriptorSet,
     /// What was learned, for the sampler `guided`.
     pub guide: Option<&'a DescriptorSet>,
+    /// SRBF tables, for the samplers `product` and `visibility`.
+    pub fits: Option<&'a DescriptorSet>,
 }
 
 /// The pipelines of all passes.
@@ -78,6 +86,8 @@ pub struct Passes {
     sample: Pipeline,
     /// For the sampler `guided`, in the place of `sample`.
     guided: Option<Guided>,
+    /// For the samplers `product` and `visibility`, in the place of `sample`.
+    lobes: Option<Lobes>,
     shadow: Shadow,
     gather: Pipeline,
     bounce: Pipeline,
@@ -122,6 +132,18 @@ impl Passes {
             guided: (settings.sampler == Sampler::Guided)
                 .then(|| Guided::new(device, candidates, settings.material_kinds))
                 .transpose()?,
+            lobes: settings
+                .fit_sizes
+                .map(|sizes| {
+                    Lobes::new(
+                        device,
+                        settings.sampler,
+                        &settings.parameters.lobes,
+                        sizes,
+                        settings.material_kinds,
+                    )
+                })
+                .transpose()?,
             shadow: Shadow::new(device, geometry, incoherent)?,
             gather: create("gather", &[])?,
             bounce: create(
@@ -137,15 +159,25 @@ impl Passes {
         })
     }
 
+    /// Shadow rays per hit in one group of dispatches.
+    fn rays_per_group(&self) -> u32 {
+        if self.lobes.as_ref().is_some_and(Lobes::learns_from_rays) {
+            1
+        } else {
+            SHADOW_RAYS_PER_GROUP
+        }
+    }
+
     /// Number of dispatches of one wave.
     pub fn dispatches_per_wave(&self) -> u32 {
-        let groups = self.settings.shadow_rays.div_ceil(SHADOW_RAYS_PER_GROUP).max(1);
-        3 + self.settings.depth * (2 + 4 * groups)
+        let groups = self.settings.shadow_rays.div_ceil(self.rays_per_group()).max(1);
+        3 + self.settings.depth * (4 + 5 * groups)
     }
 
     /// Records all passes of one wave.
     pub fn record(&self, commands: &mut Commands, sets: &Sets<'_>, wave: Wave) {
-        let Sets { scene, wave: wave_set, film, guide } = *sets;
+        let Sets { scene, wave: wave_set, film, guide, fits } = *sets;
+        let lobes = self.lobes.as_ref().zip(fits.map(|fits| [scene, fits, wave_set, film]));
         let paths = wave.pixel_count * wave.sample_count;
         let mut wave = Wave { aovs: self.settings.aovs, ..wave };
         wave.total_shadow_rays = self.settings.shadow_rays;
@@ -163,19 +195,30 @@ impl Passes {
             let trace = if vertex == 0 { &self.trace } else { &self.trace_bounce };
             trace.record(commands, &[scene, wave_set, film], &wave);
             let mut first = 0;
+            if let Some((lobes, sets)) = &lobes
+                && self.settings.shadow_rays > 0
+            {
+                wave.first_shadow_ray = 0;
+                lobes.record_product(commands, sets, &wave);
+            }
             loop {
                 wave.first_shadow_ray = first;
                 wave.shadow_ray_count =
-                    (self.settings.shadow_rays - first).min(SHADOW_RAYS_PER_GROUP);
+                    (self.settings.shadow_rays - first).min(self.rays_per_group());
                 if wave.shadow_ray_count > 0 {
                     if let (Some(guided), Some(guide)) = (&self.guided, guide) {
                         guided.record_sample(commands, &[scene, guide, wave_set], &wave);
+                    } else if let Some((lobes, sets)) = &lobes {
+                        lobes.record_sample(commands, sets, &wave);
                     } else {
                         dispatch(commands, &self.sample, &[scene, wave_set], &wave, paths);
                     }
                     self.shadow.record(commands, &[scene, wave_set, film], &wave);
                     if let (Some(guided), Some(guide)) = (&self.guided, guide) {
                         guided.record_learn(commands, &[guide, wave_set], &wave);
+                    }
+                    if let Some((lobes, sets)) = &lobes {
+                        lobes.record_learn(commands, sets, &wave);
                     }
                 }
                 dispatch(commands, &self.gather, &[scene, wave_set], &wave, paths);
@@ -206,7 +249,7 @@ impl Passes {
     /// # Errors
     /// [`crate::Error::Vulkan`] if a call fails.
     pub fn warm_up(&self, device: &Arc<Device>, sets: &Sets<'_>) -> Result<PassTimes> {
-        let Sets { scene, wave, film, guide } = *sets;
+        let Sets { scene, wave, film, guide, fits } = *sets;
         let mut times = PassTimes::new();
         let mut run = |name: &str, record: &dyn Fn(&mut Commands)| -> Result<()> {
             let start = Instant::now();
@@ -229,6 +272,13 @@ impl Passes {
                 run("learn", &|commands| {
                     guided.record_learn(commands, &[guide, wave], &nothing);
                 })?;
+            } else if let (Some(lobes), Some(fits)) = (&self.lobes, fits) {
+                let sets = [scene, fits, wave, film];
+                run("product", &|commands| lobes.record_product(commands, &sets, &nothing))?;
+                run("sample_lobes", &|commands| lobes.record_sample(commands, &sets, &nothing))?;
+                // A ray that is not the last one, so that both passes of the cache run.
+                let first = Wave { total_shadow_rays: 1, ..nothing };
+                run("cache, cdf", &|commands| lobes.record_learn(commands, &sets, &first))?;
             }
             run("sample", &|commands| commands.dispatch(&self.sample, &all[..2], push, 1))?;
             run("shadow", &|commands| self.shadow.record(commands, &all, &nothing))?;

@@ -2,6 +2,7 @@
 
 mod film_buffers;
 mod guide_buffers;
+mod lobe_buffers;
 mod scene_buffers;
 mod wave_buffers;
 
@@ -17,13 +18,14 @@ use crate::{
     },
     guide::GuideState,
     pass::{PassSettings, Passes, SHADOW_RAYS_PER_GROUP, Sets},
-    sampler::{Parameters, Sampler},
+    sampler::{CacheScope, Parameters, Sampler},
     scene::Scene,
 };
 use film_buffers::FilmBuffers;
 use guide_buffers::GuideBuffers;
+use lobe_buffers::LobeBuffers;
 pub use scene_buffers::SceneBuffers;
-use wave_buffers::WaveBuffers;
+use wave_buffers::{LobeRoom, WaveBuffers};
 
 /// Pixels of a block of the film order; waves hold whole blocks.
 const BLOCK_PIXELS: u32 = 64;
@@ -108,6 +110,16 @@ pub struct Totals {
     pub dropped_samples: u64,
     /// Rays given up after too many steps of traversal.
     pub traversal_overruns: u64,
+    /// Hits with lobes of a product.
+    pub product_hits: u64,
+    /// Lobes kept at these hits.
+    pub lobes_kept: u64,
+    /// Share of the product's energy that was kept, summed over these hits, in 256ths.
+    pub energy_kept: u64,
+    /// Directions recorded in visibility caches.
+    pub cache_entries: u64,
+    /// Rebuilds of a cumulative distribution.
+    pub cdf_rebuilds: u64,
     /// Device milliseconds by pass.
     pub gpu_ms: PassTimes,
 }
@@ -124,6 +136,8 @@ pub struct Renderer {
     film: FilmBuffers,
     /// What the sampler `guided` has learned.
     guide: Option<GuideBuffers>,
+    /// Fits, for the samplers that use lobes.
+    lobes: Option<LobeBuffers>,
     /// Paths of the next wave.
     wave_paths: u32,
     sample_count: u32,
@@ -167,7 +181,6 @@ impl Renderer {
         check(&settings, window, film_size)?;
         assert_eq!(window, buffers.window(), "buffers belong to one window");
 
-        let start = Instant::now();
         let aovs = settings.aovs.iter().fold(0, |bits, aov| {
             bits | match aov {
                 Aov::Albedo => AOV_ALBEDO,
@@ -177,6 +190,12 @@ impl Renderer {
                 Aov::Variance | Aov::SampleCount => 0,
             }
         });
+        let lobes = settings
+            .sampler
+            .uses_lobes()
+            .then(|| LobeBuffers::new(device, scene, &settings.parameters.lobes))
+            .transpose()?;
+        let start = Instant::now();
         let passes = Passes::new(
             device,
             buffers.geometry(),
@@ -188,12 +207,14 @@ impl Renderer {
                 aovs,
                 roulette_vertex: settings.roulette_vertex,
                 material_kinds: buffers.material_kinds(),
+                fit_sizes: lobes.as_ref().map(LobeBuffers::sizes),
             },
         )?;
         let create_ms = start.elapsed().as_secs_f64() * 1e3;
         let film = FilmBuffers::new(device, window, aovs)?;
         let rays = settings.shadow_rays.clamp(1, SHADOW_RAYS_PER_GROUP);
-        let waves = WaveBuffers::new(device, film.padded_pixels(), rays)?;
+        let waves =
+            WaveBuffers::new(device, film.padded_pixels(), rays, lobe_room(&settings, window))?;
         let guide = (settings.sampler == Sampler::Guided)
             .then(|| {
                 let rays = u64::from(waves.capacity()) * u64::from(rays);
@@ -211,6 +232,7 @@ impl Renderer {
             waves,
             film,
             guide,
+            lobes,
             sample_count: 0,
             is_trained: false,
             is_open: false,
@@ -229,6 +251,7 @@ impl Renderer {
             wave: self.waves.set(),
             film: self.film.set(),
             guide: self.guide.as_ref().filter(|_| !self.is_open).map(GuideBuffers::set),
+            fits: self.lobes.as_ref().map(LobeBuffers::set),
         }
     }
 
@@ -242,6 +265,10 @@ impl Renderer {
             let mut together = (self.wave_paths / self.film.padded_pixels()).clamp(1, left);
             if self.guide.is_some() {
                 together = together.min(self.learn()?);
+            }
+            if self.waves.keeps_caches() {
+                // A sample learns from the samples before it.
+                together = 1;
             }
             self.render_samples(together)?;
             left -= together;
@@ -344,6 +371,11 @@ impl Renderer {
         self.totals.shadow_rays_visible += u64::from(counters.shadow_rays_visible);
         self.totals.dropped_samples += u64::from(counters.dropped_samples);
         self.totals.traversal_overruns += u64::from(counters.traversal_overruns);
+        self.totals.product_hits += u64::from(counters.product_hits);
+        self.totals.lobes_kept += u64::from(counters.lobes_kept);
+        self.totals.energy_kept += u64::from(counters.energy_kept);
+        self.totals.cache_entries += u64::from(counters.cache_entries);
+        self.totals.cdf_rebuilds += u64::from(counters.cdf_rebuilds);
         Ok(())
     }
 
@@ -366,6 +398,7 @@ impl Renderer {
     /// [`Error::Vulkan`] if the device fails.
     pub fn restart(&mut self, seed: u32) -> Result<()> {
         self.film.clear(&self.device)?;
+        self.waves.clear_caches(&self.device)?;
         if let Some(guide) = &mut self.guide {
             guide.forget()?;
         }
@@ -399,7 +432,15 @@ impl Renderer {
         if let Some(guide) = &self.guide {
             host_ms.insert("guide rebuilds".to_owned(), guide.rebuild_ms());
         }
+        if let Some(lobes) = &self.lobes {
+            host_ms.insert("fits".to_owned(), lobes.fit_ms());
+        }
         host_ms
+    }
+
+    /// Hashes of the fits by what was fitted; empty for samplers that use none.
+    pub fn fit_hashes(&self) -> BTreeMap<String, String> {
+        self.lobes.as_ref().map(|lobes| lobes.hashes().clone()).unwrap_or_default()
     }
 
     /// Device memory by buffer, bytes.
@@ -407,6 +448,7 @@ impl Renderer {
         let mut bytes = self.scene.buffer_bytes();
         bytes.extend(self.waves.buffer_bytes());
         bytes.extend(self.film.buffer_bytes());
+        bytes.extend(self.lobes.iter().flat_map(LobeBuffers::buffer_bytes));
         bytes.extend(self.guide.iter().flat_map(GuideBuffers::buffer_bytes));
         bytes
     }
@@ -498,6 +540,36 @@ fn guide_schedule(samples: u32) -> u32 {
     if middle >= samples { middle } else { power }
 }
 
+impl Totals {
+    /// Means per hit that tell what the sampler did, by name; empty for samplers without lobes.
+    pub fn sampler_statistics(&self) -> BTreeMap<String, f64> {
+        if self.product_hits == 0 {
+            return BTreeMap::new();
+        }
+        let per_hit = |count: u64| count as f64 / self.product_hits as f64;
+        [
+            ("lobes_per_hit", per_hit(self.lobes_kept)),
+            ("energy_kept", per_hit(self.energy_kept) / 256.0),
+            ("cache_entries_per_hit", per_hit(self.cache_entries)),
+            ("cdf_rebuilds_per_hit", per_hit(self.cdf_rebuilds)),
+        ]
+        .map(|(name, value)| (name.to_owned(), value))
+        .into()
+    }
+}
+
+/// What product sampling with `settings` needs room for.
+fn lobe_room(settings: &Settings, window: Window) -> Option<LobeRoom> {
+    let parameters = &settings.parameters.lobes;
+    let with_cache = settings.sampler == Sampler::Visibility;
+    settings.sampler.uses_lobes().then(|| LobeRoom {
+        kept_lobes: parameters.kept_lobes,
+        cache_capacity: if with_cache { parameters.cache_capacity } else { 0 },
+        film_pixels: (with_cache && parameters.cache == CacheScope::Pixel)
+            .then(|| u64::from(window.width) * u64::from(window.height)),
+    })
+}
+
 /// The window of `settings`, or the whole film.
 pub fn window_of(settings: &Settings, scene: &Scene) -> Window {
     settings.window.unwrap_or(Window {
@@ -533,6 +605,9 @@ fn check(settings: &Settings, window: Window, film_size: [u32; 2]) -> Result<()>
         )));
     }
     settings.parameters.candidates_of(settings.sampler, false)?;
+    if settings.sampler.uses_lobes() {
+        settings.parameters.lobes.check(settings.depth)?;
+    }
     if !(1..=64).contains(&settings.depth) {
         return Err(Error::usage(format!("--depth {}: expected 1 to 64", settings.depth)));
     }

@@ -9,7 +9,7 @@ use crate::{
 
 /// A sampler with parameters, written `ris` or `ris:candidates=8` (more parameters after further
 /// colons).
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Contender {
     /// The text it was read from: its name in tables and files.
     pub label: String,

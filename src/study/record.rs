@@ -286,6 +286,7 @@ fn statistics(totals: &Totals) -> BTreeMap<String, f64> {
     .into_iter()
     .filter(|(_, value)| *value != 0.0)
     .map(|(name, value)| (name.to_owned(), value))
+    .chain(totals.sampler_statistics())
     .collect()
 }
 

@@ -1,0 +1,140 @@
+//! The fits of environment and materials on the device, for `product` and `visibility`.
+
+use std::{collections::BTreeMap, sync::Arc, time::Instant};
+
+use crate::{
+    brdf::MaterialTables,
+    error::{Error, Result},
+    fit::{
+        self, BrdfFit, BrdfOptions, EnvironmentLobe, EnvironmentOptions, Method, brdf_lobes,
+        environment_lobes,
+    },
+    gpu::{
+        Buffer, DescriptorSet, Device,
+        constants::{
+            BINDING_BRDF_LOBES, BINDING_ENVIRONMENT_LOBES, BINDING_MATERIAL_LOBES, SET_SRBF,
+        },
+    },
+    pass::FitSizes,
+    sampler::LobeParameters,
+    scene::Scene,
+};
+
+/// The SRBF tables of a scene.
+pub struct LobeBuffers {
+    set: DescriptorSet,
+    buffers: [Buffer; 3],
+    sizes: FitSizes,
+    hashes: BTreeMap<String, String>,
+    fit_ms: f64,
+}
+
+impl LobeBuffers {
+    /// Fits the environment and every material, or takes the fits from the user's cache, and uploads
+    /// them. What cannot be fitted, as a black map or material, has no lobes and a warning.
+    ///
+    /// # Errors
+    /// Numbers of lobes or views out of range; a failing device.
+    pub fn new(device: &Arc<Device>, scene: &Scene, parameters: &LobeParameters) -> Result<Self> {
+        let start = Instant::now();
+        let cache = fit::Cache::user();
+        let mut hashes = BTreeMap::new();
+
+        log::info!("fitting the environment of {}", scene.name);
+        let options = EnvironmentOptions {
+            lobes: parameters.environment_lobes as usize,
+            method: Method::default(),
+        };
+        let fitted = environment_lobes(&scene.environment, options, cache.as_ref(), &mut |_| ());
+        let environment: Vec<EnvironmentLobe> = or_warn(fitted)?
+            .map(|fit| fit.world_lobes(scene.environment.rotation_rad))
+            .unwrap_or_default();
+        hashes.insert(
+            "environment".to_owned(),
+            fit::cache::key(&[bytemuck::cast_slice(&environment)]),
+        );
+
+        let tables = MaterialTables::new(&scene.materials)?;
+        let options = BrdfOptions {
+            lobes: parameters.brdf_lobes as usize,
+            views: parameters.views as usize,
+            method: Method::default(),
+        };
+        let mut lobes: Vec<[f32; 8]> = Vec::new();
+        let mut materials: Vec<[u32; 2]> = Vec::new();
+        for (index, material) in scene.materials.iter().enumerate() {
+            log::info!("fitting the material {}", material.name);
+            let fitted =
+                brdf_lobes(&tables, index, &material.name, options, cache.as_ref(), &mut |_| ());
+            let first = lobes.len();
+            let per_view = or_warn(fitted)?.map_or(0, |fit| append(&mut lobes, &fit));
+            materials.push([first as u32, per_view]);
+            hashes.insert(
+                format!("material {}", material.name),
+                fit::cache::key(&[bytemuck::cast_slice(&lobes[first..])]),
+            );
+        }
+        let sizes = FitSizes {
+            environment_lobes: environment.len() as u32,
+            brdf_lobes: materials.iter().map(|material| material[1]).max().unwrap_or(0),
+            views: parameters.views,
+        };
+        let fit_ms = start.elapsed().as_secs_f64() * 1e3;
+
+        let buffers = [
+            Buffer::texels_from_slice(device, "environment lobes", &environment)?,
+            Buffer::texels_from_slice(device, "BRDF lobes", &lobes)?,
+            Buffer::texels_from_slice(device, "material lobes", &materials)?,
+        ];
+        let bindings = [BINDING_ENVIRONMENT_LOBES, BINDING_BRDF_LOBES, BINDING_MATERIAL_LOBES];
+        let bound: Vec<_> = bindings.into_iter().zip(&buffers).collect();
+        let set = DescriptorSet::new(device, SET_SRBF, &bound)?;
+        Ok(Self { set, buffers, sizes, hashes, fit_ms })
+    }
+
+    /// The SRBF set.
+    pub fn set(&self) -> &DescriptorSet {
+        &self.set
+    }
+
+    /// Numbers of lobes and views.
+    pub fn sizes(&self) -> FitSizes {
+        self.sizes
+    }
+
+    /// Hash of each fit by what was fitted.
+    pub fn hashes(&self) -> &BTreeMap<String, String> {
+        &self.hashes
+    }
+
+    /// Milliseconds for all fits, or for finding them in the cache.
+    pub fn fit_ms(&self) -> f64 {
+        self.fit_ms
+    }
+
+    /// Bytes by buffer name.
+    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+        self.buffers.iter().map(|buffer| (buffer.name().to_owned(), buffer.size())).collect()
+    }
+}
+
+/// A fit, or a warning where there is nothing to fit.
+fn or_warn<T>(fitted: Result<T>) -> Result<Option<T>> {
+    match fitted {
+        Ok(fit) => Ok(Some(fit)),
+        Err(error @ Error::Fit { .. }) => {
+            log::warn!("{error}; sampling does without its lobes");
+            Ok(None)
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// Appends the lobes of all views; returns how many each view has.
+fn append(lobes: &mut Vec<[f32; 8]>, fit: &BrdfFit) -> u32 {
+    for lobe in fit.views.iter().flat_map(|view| &view.lobes) {
+        let [x, y, z] = lobe.axis.to_array();
+        lobes.push([x, y, z, lobe.bandwidth, lobe.amplitude, 0.0, 0.0, 0.0]);
+    }
+    fit.views.first().map_or(0, |view| view.lobes.len() as u32)
+}
