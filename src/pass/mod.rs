@@ -280,7 +280,9 @@ impl Passes {
                 let first = Wave { total_shadow_rays: 1, ..nothing };
                 run("cache, cdf", &|commands| lobes.record_learn(commands, &sets, &first))?;
             }
-            run("sample", &|commands| commands.dispatch(&self.sample, &all[..2], push, 1))?;
+            if self.lobes.is_none() {
+                run("sample", &|commands| commands.dispatch(&self.sample, &all[..2], push, 1))?;
+            }
             run("shadow", &|commands| self.shadow.record(commands, &all, &nothing))?;
         }
         run("gather", &|commands| commands.dispatch(&self.gather, &all[..2], push, 1))?;
