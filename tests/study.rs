@@ -351,9 +351,11 @@ fn an_interrupted_study_keeps_its_runs_and_continues() {
     assert_eq!(json(&folder, "results.json")["is_complete"], true);
 }
 
-#[test]
+/// Interrupts a study within its reference, continues it, and compares the first half with a render
+/// that was not interrupted.
 #[cfg(unix)]
-fn an_interrupted_reference_continues_to_the_bit() {
+fn interrupt_reference(sampler: &str) {
+    let reference_sampler = format!("--reference-sampler={sampler}");
     let folder = folder();
     let options = [
         "study",
@@ -362,6 +364,7 @@ fn an_interrupted_reference_continues_to_the_bit() {
         "--spp=1",
         "--seeds=1",
         "--reference-spp=6000",
+        &reference_sampler,
         "-o",
         "report",
     ];
@@ -396,6 +399,7 @@ fn an_interrupted_reference_continues_to_the_bit() {
         "--spp=3000",
         &format!("--seed={seed}"),
         "--aov=variance",
+        &format!("--sampler={sampler}"),
         "-o",
         "whole.exr",
         "--quiet",
@@ -403,6 +407,18 @@ fn an_interrupted_reference_continues_to_the_bit() {
     folder.run(&whole).assert(0, &[]);
     let image = |path: &Path| Image::read_exr(path).unwrap().channels;
     assert_eq!(image(&images.join("reference_1.exr")), image(&folder.path().join("whole.exr")));
+}
+
+#[test]
+#[cfg(unix)]
+fn an_interrupted_reference_continues_to_the_bit() {
+    interrupt_reference("mis");
+}
+
+#[test]
+#[cfg(unix)]
+fn an_interrupted_reference_by_guided_continues_to_the_bit() {
+    interrupt_reference("guided");
 }
 
 #[test]

@@ -27,6 +27,7 @@ use crate::{
         Aov, Attribute, Checkpoint, Image, Metadata, RgbImage, SampleRange,
         checkpoint::checkpoint_path,
     },
+    guide::GuideState,
     renderer::Renderer,
     scene::Scene,
 };
@@ -295,24 +296,8 @@ fn render_half(
     let SampleRange { seed, count, .. } = metadata.sample_ranges[0];
     let checkpoint_path = checkpoint_path(path);
     renderer.restart(seed)?;
-    let mut earlier_seconds = 0.0;
-    if checkpoint_path.exists() {
-        let checkpoint = Checkpoint::read(&checkpoint_path)?;
-        let empty = renderer.sums()?;
-        if checkpoint.sums.sample_count <= count
-            && checkpoint.check_resume(&checkpoint_path, &metadata, &empty, seed, 0).is_ok()
-        {
-            match renderer.restore(&checkpoint.sums) {
-                Ok(()) => {
-                    earlier_seconds = checkpoint.metadata.seconds;
-                    watch.expect(-pixels * f64::from(renderer.sample_count()), 0.0);
-                }
-                // A sampler that learns cannot continue from a picture; it starts again.
-                Err(Error::Usage { .. }) => {}
-                Err(error) => return Err(error),
-            }
-        }
-    }
+    let earlier_seconds = resume(renderer, &checkpoint_path, &metadata)?;
+    watch.expect(-pixels * f64::from(renderer.sample_count()), 0.0);
     let mut pace = Pace::new(pixels, false);
     let mut last_checkpoint = Instant::now();
     while renderer.sample_count() < count {
@@ -331,6 +316,9 @@ fn render_half(
         {
             let range = SampleRange { seed, first: 0, count: renderer.sample_count() };
             let metadata = Metadata { sample_ranges: vec![range], ..metadata.clone() };
+            if let Some(state) = renderer.guide_state()? {
+                state.write(&guide_path(&checkpoint_path))?;
+            }
             Checkpoint { sums: renderer.sums()?, metadata }.write(&checkpoint_path)?;
             last_checkpoint = Instant::now();
         }
@@ -339,11 +327,45 @@ fn render_half(
     let mut image = renderer.sums()?.to_image(&[Aov::Variance]);
     metadata.store(&mut image);
     image.write_exr(path)?;
-    if checkpoint_path.exists() {
-        fs::remove_file(&checkpoint_path)
-            .map_err(|source| Error::io(&checkpoint_path, "remove", source))?;
+    for path in [guide_path(&checkpoint_path), checkpoint_path] {
+        if path.exists() {
+            fs::remove_file(&path).map_err(|source| Error::io(&path, "remove", source))?;
+        }
     }
     Ok(())
+}
+
+/// What was learned up to a checkpoint, beside it.
+fn guide_path(checkpoint: &Path) -> PathBuf {
+    checkpoint.with_extension("guide")
+}
+
+/// Takes up the checkpoint of a half where there is one of the same render, with what was learned if
+/// the sampler learns; else the half starts from its first sample. Seconds that the passes took before.
+fn resume(renderer: &mut Renderer, path: &Path, metadata: &Metadata) -> Result<f64> {
+    let SampleRange { seed, count, .. } = metadata.sample_ranges[0];
+    if !path.exists() {
+        return Ok(0.0);
+    }
+    let checkpoint = Checkpoint::read(path)?;
+    let empty = renderer.sums()?;
+    let samples = checkpoint.sums.sample_count;
+    if samples > count || checkpoint.check_resume(path, metadata, &empty, seed, 0).is_err() {
+        return Ok(0.0);
+    }
+    let mut guide = None;
+    if renderer.guide_state()?.is_some() {
+        // The two files are written one after the other; a study that was killed in between has two
+        // that do not belong together.
+        let state = GuideState::read(&guide_path(path)).ok();
+        let Some(state) = state.filter(|state| state.samples == samples) else { return Ok(0.0) };
+        guide = Some(state);
+    }
+    renderer.restore(&checkpoint.sums)?;
+    if let Some(state) = guide {
+        renderer.restore_guide(&state)?;
+    }
+    Ok(checkpoint.metadata.seconds)
 }
 
 /// Refuses a picture of another size or scene or with values that are not finite.
