@@ -42,7 +42,7 @@ pub const BINDING_ENVIRONMENT_ROWS: u32 = 11;
 pub const BINDING_ENVIRONMENT_CELLS: u32 = 12;
 
 /// SRBF set: lobes of the environment in the world, largest integral first, two texels of four floats
-/// each: axis and bandwidth; colour and amplitude.
+/// each: axis and amplitude; bandwidth · axis and ln(amplitude) − bandwidth.
 pub const BINDING_ENVIRONMENT_LOBES: u32 = 0;
 /// SRBF set: lobes of BRDF · cosine by material and view, two texels of four floats each: axis and
 /// bandwidth; amplitude.
@@ -139,6 +139,9 @@ pub const CONSTANT_ROULETTE_VERTEX: u32 = 18;
 pub const CONSTANT_MATERIAL_KINDS: u32 = 19;
 /// Specialization constant of `product`: lobes of the environment.
 pub const CONSTANT_ENVIRONMENT_LOBES: u32 = 32;
+/// Specialization constant of `product`, bits of a float: logarithm of the largest integral of an
+/// environment lobe over 2π, or of the largest amplitude.
+pub const CONSTANT_STRONGEST_ENVIRONMENT_LOBE: u32 = 46;
 /// Specialization constant of `product`: most lobes of a material in one view.
 pub const CONSTANT_BRDF_LOBES: u32 = 33;
 /// Specialization constant of `product`: view elevations of a BRDF fit.
@@ -326,6 +329,7 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("BINDING_CUMULATIVE_TEXELS", BINDING_CUMULATIVE_TEXELS),
     ("BINDING_CACHE", BINDING_CACHE),
     ("CONSTANT_ENVIRONMENT_LOBES", CONSTANT_ENVIRONMENT_LOBES),
+    ("CONSTANT_STRONGEST_ENVIRONMENT_LOBE", CONSTANT_STRONGEST_ENVIRONMENT_LOBE),
     ("CONSTANT_BRDF_LOBES", CONSTANT_BRDF_LOBES),
     ("CONSTANT_VIEWS", CONSTANT_VIEWS),
     ("CONSTANT_KEPT_LOBES", CONSTANT_KEPT_LOBES),

@@ -12,8 +12,8 @@ use crate::{
             CONSTANT_CACHE_OF_PIXEL, CONSTANT_COUNT_VISIBLE, CONSTANT_ENVIRONMENT_LOBES,
             CONSTANT_ENVIRONMENT_SHARE, CONSTANT_FIXED_THRESHOLD, CONSTANT_KEPT_LOBES,
             CONSTANT_MATERIAL_KINDS, CONSTANT_METROPOLIS, CONSTANT_ORDER_BY_COEFFICIENT,
-            CONSTANT_SAMPLER, CONSTANT_THRESHOLD_SCALE, CONSTANT_VIEWS,
-            CONSTANT_VISIBILITY_EXPONENT,
+            CONSTANT_SAMPLER, CONSTANT_STRONGEST_ENVIRONMENT_LOBE, CONSTANT_THRESHOLD_SCALE,
+            CONSTANT_VIEWS, CONSTANT_VISIBILITY_EXPONENT,
         },
         layout::Wave,
         shaders,
@@ -22,10 +22,13 @@ use crate::{
 };
 
 /// Sizes of the fits on the device.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitSizes {
     /// Lobes of the environment; 0 where nothing could be fitted.
     pub environment_lobes: u32,
+    /// Logarithm of the largest integral of an environment lobe over 2π, in the form of
+    /// `product.comp`; of the largest amplitude where lobes are ordered by coefficient.
+    pub strongest_environment_lobe: f32,
     /// Most lobes of a material in one view.
     pub brdf_lobes: u32,
     /// View elevations.
@@ -70,6 +73,7 @@ impl Lobes {
             "product",
             &[
                 (CONSTANT_ENVIRONMENT_LOBES, sizes.environment_lobes),
+                (CONSTANT_STRONGEST_ENVIRONMENT_LOBE, sizes.strongest_environment_lobe.to_bits()),
                 (CONSTANT_BRDF_LOBES, sizes.brdf_lobes.max(1)),
                 (CONSTANT_VIEWS, sizes.views),
                 (CONSTANT_KEPT_LOBES, parameters.kept_lobes),

@@ -16,7 +16,7 @@ use crate::{
         },
     },
     pass::FitSizes,
-    sampler::LobeParameters,
+    sampler::{LobeOrder, LobeParameters},
     scene::Scene,
 };
 
@@ -74,13 +74,19 @@ impl LobeBuffers {
                 fit::cache::key(&[bytemuck::cast_slice(&lobes[first..])]),
             );
         }
+        let strength = |lobe: &EnvironmentLobe| match parameters.order {
+            LobeOrder::Integral => lobe.amplitude.ln() - (lobe.bandwidth + 0.5).ln(),
+            LobeOrder::Coefficient => lobe.amplitude.ln(),
+        };
         let sizes = FitSizes {
+            strongest_environment_lobe: environment.iter().map(strength).fold(f32::MIN, f32::max),
             environment_lobes: environment.len() as u32,
             brdf_lobes: materials.iter().map(|material| material[1]).max().unwrap_or(0),
             views: parameters.views,
         };
         let fit_ms = start.elapsed().as_secs_f64() * 1e3;
 
+        let environment: Vec<[f32; 8]> = environment.iter().map(environment_texels).collect();
         let buffers = [
             Buffer::texels_from_slice(device, "environment lobes", &environment)?,
             Buffer::texels_from_slice(device, "BRDF lobes", &lobes)?,
@@ -128,6 +134,13 @@ fn or_warn<T>(fitted: Result<T>) -> Result<Option<T>> {
         }
         Err(error) => Err(error),
     }
+}
+
+/// The two texels of an environment lobe, see `BINDING_ENVIRONMENT_LOBES`.
+fn environment_texels(lobe: &EnvironmentLobe) -> [f32; 8] {
+    let [x, y, z] = lobe.axis;
+    let b = lobe.bandwidth;
+    [x, y, z, lobe.amplitude, b * x, b * y, b * z, lobe.amplitude.max(1e-30).ln() - b]
 }
 
 /// Appends the lobes of all views; returns how many each view has.
