@@ -95,6 +95,9 @@ pub struct Parameters {
     pub candidates: Option<u32>,
     /// `guide-memory`: most bytes for the cells of `guided`.
     pub guide_memory: u64,
+    /// `hierarchy`: whether cells of `guided` that have seen little lean on larger ones; off for
+    /// experiments.
+    pub hierarchy: bool,
     /// `regions`: regions of the environment for `guided`, 16 to 1024.
     pub regions: u32,
     /// Those of `product` and `visibility`.
@@ -106,6 +109,7 @@ impl Default for Parameters {
         Self {
             candidates: None,
             guide_memory: 128 << 20,
+            hierarchy: true,
             regions: 256,
             lobes: LobeParameters::default(),
         }
@@ -113,7 +117,7 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    const KEYS: [&'static str; 3] = ["candidates", "guide-memory", "regions"];
+    const KEYS: [&'static str; 4] = ["candidates", "guide-memory", "hierarchy", "regions"];
 
     /// Sets one parameter from `key=value`.
     ///
@@ -146,6 +150,17 @@ impl Parameters {
                             "--set guide-memory={value}: expected 1MiB or more, as in 128MiB"
                         ))
                     })?;
+            }
+            "hierarchy" => {
+                self.hierarchy = match value {
+                    "on" => true,
+                    "off" => false,
+                    _ => {
+                        return Err(Error::usage(format!(
+                            "--set hierarchy={value}: expected on or off"
+                        )));
+                    }
+                };
             }
             "regions" => {
                 self.regions =
@@ -198,6 +213,8 @@ impl Parameters {
                 let mut named = BTreeMap::from([("candidates".to_owned(), count)]);
                 if sampler == Sampler::Guided {
                     named.insert("regions".to_owned(), self.regions.to_string());
+                    let hierarchy = if self.hierarchy { "on" } else { "off" };
+                    named.insert("hierarchy".to_owned(), hierarchy.to_owned());
                     named.insert("guide-memory".to_owned(), self.guide_memory.to_string());
                 }
                 named
@@ -255,7 +272,9 @@ mod tests {
         assert_eq!(parameters.candidates_of(Sampler::Guided, true).unwrap(), 1);
         parameters.set("guide-memory=16MiB").unwrap();
         assert_eq!(parameters.guide_memory, 16 << 20);
-        for wrong in ["guide-memory=1", "guide-memory=x", "guide-memory=4TB", "regions=2000"] {
+        for wrong in
+            ["guide-memory=1", "guide-memory=x", "guide-memory=4TB", "regions=2000", "hierarchy=1"]
+        {
             assert!(parameters.set(wrong).is_err(), "{wrong}");
         }
     }

@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use super::{
     alias::{AliasEntry, alias_table, probabilities},
-    partition::Partition,
+    partition::{Partition, Region},
 };
 
 /// Weight of the prior, in rays.
@@ -26,22 +26,20 @@ const REGION_SCALE: u64 = 1 << 16;
 /// Levels of the estimate of visibility that candidates are weighted with.
 pub const VISIBILITY_LEVELS: u32 = 64;
 /// Exponent of the visibility in the weight of a candidate.
-const TARGET_EXPONENT: f64 = 0.7;
+const TARGET_EXPONENT: f32 = 0.7;
 /// Binary orders of magnitude that the levels cover.
-const TARGET_RANGE: f64 = 10.5;
+const TARGET_RANGE: f32 = 10.5;
 
-/// What experiments turn off or change.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What experiments turn off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EstimateOptions {
     /// Whether cells lean on coarser ones; else on the rate of the whole scene.
     pub hierarchy: bool,
-    /// Exponent of the visibility in the probability of a region.
-    pub exponent: f64,
 }
 
 impl Default for EstimateOptions {
     fn default() -> Self {
-        Self { hierarchy: true, exponent: 1.0 }
+        Self { hierarchy: true }
     }
 }
 
@@ -99,47 +97,36 @@ impl Estimates {
     /// The entries of the device for a cell whose surfaces point along `normal`: an alias table over
     /// the regions with, for each, its probability divided by its share of the energy and the
     /// visibility that weights candidates. See [`decode_entry`].
-    pub fn entries(
-        &self,
-        normal: Vec3,
-        partition: &Partition,
-        options: &EstimateOptions,
-    ) -> Vec<[u32; 2]> {
+    pub fn entries(&self, normal: Vec3, partition: &Partition) -> Vec<[u32; 2]> {
         let normal = normal.as_dvec3();
-        let guided: Vec<f64> = self
-            .0
-            .iter()
-            .zip(&partition.regions)
-            .map(|(visibility, region)| {
-                let facing = ((normal.dot(region.direction) + 0.25) / 1.25).max(0.03);
-                region.share * facing * visibility.max(FLOOR).powf(options.exponent)
-            })
-            .collect();
-        let sum: f64 = guided.iter().sum();
-        let weights: Vec<f64> = guided
-            .iter()
-            .zip(&partition.regions)
-            .map(|(weight, region)| {
-                (1.0 - DEFENSIVE_SHARE) * weight / sum.max(f64::MIN_POSITIVE)
-                    + DEFENSIVE_SHARE * region.share
-            })
-            .collect();
+        let guided = |(visibility, region): (&f64, &Region)| {
+            let facing = ((normal.dot(region.direction) + 0.25) / 1.25).max(0.03);
+            region.share * facing * visibility.max(FLOOR)
+        };
+        let mut weights: Vec<f64> = self.0.iter().zip(&partition.regions).map(guided).collect();
+        let sum = weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        for (weight, region) in weights.iter_mut().zip(&partition.regions) {
+            *weight = (1.0 - DEFENSIVE_SHARE) * *weight / sum + DEFENSIVE_SHARE * region.share;
+        }
         let Some(table) = alias_table(&weights, REGION_SCALE) else {
             return vec![[0; 2]; weights.len()];
         };
         let chosen = probabilities(&table, REGION_SCALE);
-        let encode =
-            |((entry, probability), (visibility, share)): ((&AliasEntry, &f64), (&f64, f64))| {
-                let ratio = if share > 0.0 { (probability / share) as f32 } else { 0.0 };
-                // A full column keeps its own index either way.
-                let threshold = entry.threshold.min(REGION_SCALE - 1) as u32;
-                let target = -TARGET_EXPONENT * visibility.clamp(FLOOR, 1.0).log2();
-                let steps = f64::from(VISIBILITY_LEVELS - 1);
-                let level = (target / TARGET_RANGE * steps).round().clamp(0.0, steps) as u32;
-                [ratio.to_bits(), threshold | entry.alias << 16 | level << 26]
-            };
-        let shares = partition.regions.iter().map(|region| region.share);
-        table.iter().zip(&chosen).zip(self.0.iter().zip(shares)).map(encode).collect()
+        let steps = (VISIBILITY_LEVELS - 1) as f32;
+        let per_octave = TARGET_EXPONENT / TARGET_RANGE * steps;
+        let encode = |((entry, probability), (visibility, region)): (
+            (&AliasEntry, &f64),
+            (&f64, &Region),
+        )| {
+            let share = region.share;
+            let ratio = if share > 0.0 { (probability / share) as f32 } else { 0.0 };
+            // A full column keeps its own index either way.
+            let threshold = entry.threshold.min(REGION_SCALE - 1) as u32;
+            let octaves = -(*visibility as f32).clamp(1e-5, 1.0).log2();
+            let level = (octaves * per_octave).round().min(steps) as u32;
+            [ratio.to_bits(), threshold | entry.alias << 16 | level << 26]
+        };
+        table.iter().zip(&chosen).zip(self.0.iter().zip(&partition.regions)).map(encode).collect()
     }
 }
 
@@ -147,7 +134,7 @@ impl Estimates {
 /// twin of what `glsl/include/guide.glsl` reads.
 pub fn decode_entry(entry: [u32; 2]) -> (f32, u32, u32, f32) {
     let level = (entry[1] >> 26) as f32;
-    let range = TARGET_RANGE as f32;
+    let range = TARGET_RANGE;
     let weight = (-level * (range / (VISIBILITY_LEVELS - 1) as f32)).exp2();
     (f32::from_bits(entry[0]), entry[1] & 0xffff, entry[1] >> 16 & 0x3ff, weight)
 }

@@ -209,7 +209,7 @@ impl Learned {
                 let coarse = coarse_of(key);
                 (key.face(), Estimates::of_fine(self.counts(index), &coarse, partition))
             };
-            entries.copy_from_slice(&estimates.entries(face_normal(face), partition, options));
+            entries.copy_from_slice(&estimates.entries(face_normal(face), partition));
         });
         Snapshot { table: self.table(), entries }
     }

@@ -73,6 +73,7 @@ impl GuideBuffers {
         pixels: u32,
         rays: u64,
     ) -> Result<Self> {
+        let hierarchy = parameters.hierarchy;
         let partition = Partition::new(&scene.environment, parameters.regions as usize);
         let region_count = partition.regions.len();
         let bytes_per_cell = BYTES_PER_REGION * region_count as u64;
@@ -137,7 +138,7 @@ impl GuideBuffers {
             device: Arc::clone(device),
             set,
             partition,
-            options: EstimateOptions::default(),
+            options: EstimateOptions { hierarchy },
             learned,
             capacity,
             origin,
