@@ -7,6 +7,8 @@
 
 mod support;
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use fenestra::{
     film::Sums,
     renderer::{Renderer, Settings},
@@ -15,6 +17,13 @@ use fenestra::{
 };
 use glam::Vec3;
 use support::scenes;
+
+/// One test at a time: the validation layers were seen to crash when several threads made and dropped
+/// renderers at once.
+fn alone() -> MutexGuard<'static, ()> {
+    static LOCK: Mutex<()> = Mutex::new(());
+    LOCK.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 const REPLICATES: u32 = 8;
 const BLOCK: u32 = 8;
@@ -104,6 +113,7 @@ fn agree(scene: &Scene, depth: u32, samples: u32, modes: &[(&str, Settings)]) {
 
 #[test]
 fn every_mode_is_unbiased_in_a_room() {
+    let _alone = alone();
     let with = |candidates: u32, change: &dyn Fn(&mut Settings)| {
         let mut settings = guided(candidates);
         change(&mut settings);
@@ -113,7 +123,7 @@ fn every_mode_is_unbiased_in_a_room() {
     agree(
         &room(),
         1,
-        48,
+        32,
         &[
             ("one-sample", with(1, &unchanged)),
             ("4 candidates", with(4, &unchanged)),
@@ -137,10 +147,11 @@ fn every_mode_is_unbiased_in_a_room() {
 
 #[test]
 fn the_first_pass_after_training_is_unbiased() {
+    let _alone = alone();
     // Many replicates of one sample: what only ever reads the training.
     let scene = room();
     let cosine = Settings { sampler: Sampler::Cosine, ..Settings::default() };
-    let reference = replicates(&scene, &cosine, 256);
+    let reference = replicates(&scene, &cosine, 128);
     let mut renderer = Renderer::new(support::device(), &scene, guided(4)).unwrap();
     let rows: Vec<Vec<f64>> = (0..48)
         .map(|seed| {
@@ -154,14 +165,15 @@ fn the_first_pass_after_training_is_unbiased() {
         let found = values.iter().sum::<f64>() / 48.0;
         let error = values.iter().map(|value| (value - found).powi(2)).sum::<f64>() / (48.0 * 47.0);
         // Where the camera rarely sees the window itself, the spread of few samples says nothing:
-        // at least the reference's, as if for as few samples, of which it has 8 · 256.
-        let t = (found - mean) / (error.max(variance * 2048.0 / 48.0) + variance).sqrt();
+        // at least the reference's, as if for as few samples, of which it has 8 · 128.
+        let t = (found - mean) / (error.max(variance * 1024.0 / 48.0) + variance).sqrt();
         assert!(t.abs() < 5.5, "value {index}: {found} against {mean}, t = {t}");
     }
 }
 
 #[test]
 fn every_vertex_of_a_path_is_unbiased() {
+    let _alone = alone();
     let scene = scenes::room(vec![
         scenes::diffuse(Vec3::splat(0.8)),
         scenes::copper(0.4),
@@ -172,6 +184,7 @@ fn every_vertex_of_a_path_is_unbiased() {
 
 #[test]
 fn in_the_open_it_is_unbiased_too() {
+    let _alone = alone();
     let scene = scenes::open(vec![
         scenes::diffuse(Vec3::new(0.5, 0.4, 0.3)),
         scenes::plastic(0.05),
@@ -182,6 +195,7 @@ fn in_the_open_it_is_unbiased_too() {
 
 #[test]
 fn passes_may_be_grouped_at_will() {
+    let _alone = alone();
     let scene = room();
     let render = |passes: &[u32]| {
         let mut renderer = Renderer::new(support::device(), &scene, guided(4)).unwrap();
@@ -200,6 +214,7 @@ fn passes_may_be_grouped_at_will() {
 
 #[test]
 fn a_renderer_goes_on_where_another_stopped() {
+    let _alone = alone();
     let scene = room();
     let renderer = || Renderer::new(support::device(), &scene, guided(4)).unwrap();
     let mut whole = renderer();
@@ -221,6 +236,7 @@ fn a_renderer_goes_on_where_another_stopped() {
 
 #[test]
 fn a_guide_of_another_scene_is_refused_or_mostly_forgotten() {
+    let _alone = alone();
     let room = room();
     let mut teacher = Renderer::new(support::device(), &room, guided(1)).unwrap();
     teacher.render_pass(4).unwrap();
@@ -244,6 +260,7 @@ fn a_guide_of_another_scene_is_refused_or_mostly_forgotten() {
 
 #[test]
 fn in_the_open_it_samples_as_mis_does() {
+    let _alone = alone();
     let scene = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5)), scenes::plastic(0.2)]);
     let render = |settings: Settings| {
         let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
@@ -260,6 +277,7 @@ fn in_the_open_it_samples_as_mis_does() {
 
 #[test]
 fn rays_of_training_are_counted_and_more_rays_are_visible() {
+    let _alone = alone();
     let scene = room();
     let share = |settings: Settings| {
         let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
