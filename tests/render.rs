@@ -160,3 +160,38 @@ fn what_guided_learned_is_kept_with_the_checkpoint_and_in_files() {
     let arguments = ["render", "scene.toml", "--load-guide", "other.guide", "--sampler", "mis"];
     folder.run(&arguments).assert(2, &["--load-guide other.guide", "expected --sampler guided"]);
 }
+
+#[test]
+fn a_render_makes_the_fits_it_needs_and_keeps_them() {
+    let folder = folder();
+    let cache = folder.path().join("cache");
+    let render = |name: &str| {
+        let options = ["--sampler", "visibility", "--spp", "1", "--set", "environment_lobes=8"];
+        let mut command = command::program(folder.path());
+        command.env("XDG_CACHE_HOME", &cache).args(["render", "scene.toml", "-o", name]);
+        let run = command::Run::of(&command.args(options).output().unwrap());
+        run.assert(0, &[]);
+        std::fs::read(folder.path().join(name)).unwrap()
+    };
+    let fits = || {
+        let mut paths: Vec<_> = std::fs::read_dir(cache.join("fenestra/fits"))
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .collect();
+        paths.sort();
+        paths
+    };
+    render("first.exr");
+    let kept = fits();
+    assert!(kept.len() >= 2, "one of the environment, one of a material: {kept:?}");
+    let content = std::fs::read(&kept[0]).unwrap();
+    // A damaged fit is made anew.
+    std::fs::write(&kept[0], &content[..content.len() / 2]).unwrap();
+    render("second.exr");
+    assert_eq!(fits(), kept);
+    assert_eq!(std::fs::read(&kept[0]).unwrap().len(), content.len());
+    let info = folder.run(&["info", "second.exr"]);
+    info.assert(0, &[]);
+    assert!(info.output.contains("fenestra.fit_hashes.environment"), "{}", info.output);
+    folder.run(&["compare", "first.exr", "second.exr", "--fail-above", "mse=0"]).assert(0, &[]);
+}
