@@ -585,7 +585,6 @@ impl<'a> Job<'a> {
             host_ms,
             pipeline_compile_ms: renderer.compile_ms().clone(),
             buffer_bytes: renderer.buffer_bytes(),
-            ..Statistics::default()
         }
     }
 }
