@@ -3,7 +3,7 @@
 //! The environment is split once into a few hundred rectangles of its sampling cells
 //! ([`Partition`]); within a rectangle directions are drawn exactly in proportion to the map. What
 //! is learned is how often each rectangle is visible from each cell of the scene: passes count, and
-//! between passes [`Guide`] turns the counts into the probabilities that the next passes read.
+//! between passes [`Estimates`] turns the counts into the probabilities that the next passes read.
 //! A pass reads only what earlier passes learned, so that its samples are independent of what they
 //! read and every estimate stays unbiased (Vévoda et al. 2018 learn light sources in this way).
 //!
