@@ -11,7 +11,8 @@ use crate::{
 
 pub use lobes::{CacheScope, Elevation, LobeOrder, LobeParameters, Threshold};
 
-/// How directions are chosen at a hit. All are unbiased and trace one shadow ray per direction.
+/// How directions are chosen at a hit. All are unbiased, but for [`Elevation::Metropolis`], and trace
+/// one shadow ray per direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, clap::ValueEnum)]
 pub enum Sampler {
     /// Uniform over the hemisphere.

@@ -29,8 +29,7 @@ use crate::{
 };
 pub use geometry::{GeometryBuffers, Schedule};
 use guided::Guided;
-pub use lobes::FitSizes;
-use lobes::Lobes;
+pub use lobes::{FitSizes, Lobes};
 use shadow::Shadow;
 use trace::Trace;
 

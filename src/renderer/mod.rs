@@ -4,6 +4,7 @@ mod film_buffers;
 mod guide_buffers;
 mod lobe_buffers;
 mod scene_buffers;
+mod totals;
 mod wave_buffers;
 
 use std::{collections::BTreeMap, sync::Arc, time::Instant};
@@ -18,14 +19,15 @@ use crate::{
     },
     guide::GuideState,
     pass::{PassSettings, Passes, SHADOW_RAYS_PER_GROUP, Sets},
-    sampler::{CacheScope, Parameters, Sampler},
+    sampler::{CacheScope, Elevation, Parameters, Sampler},
     scene::Scene,
 };
 use film_buffers::FilmBuffers;
 use guide_buffers::GuideBuffers;
-use lobe_buffers::LobeBuffers;
+pub use lobe_buffers::LobeBuffers;
 pub use scene_buffers::SceneBuffers;
-use wave_buffers::{LobeRoom, WaveBuffers};
+pub use totals::Totals;
+pub use wave_buffers::{LobeRoom, WaveBuffers};
 
 /// Pixels of a block of the film order; waves hold whole blocks.
 const BLOCK_PIXELS: u32 = 64;
@@ -95,35 +97,6 @@ impl Default for Settings {
     }
 }
 
-/// Totals since the start of a renderer.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Totals {
-    /// Camera rays.
-    pub camera_rays: u64,
-    /// Bounce rays.
-    pub bounce_rays: u64,
-    /// Shadow rays traced.
-    pub shadow_rays_traced: u64,
-    /// Shadow rays that reached the environment.
-    pub shadow_rays_visible: u64,
-    /// Samples left out because their radiance was not finite.
-    pub dropped_samples: u64,
-    /// Rays given up after too many steps of traversal.
-    pub traversal_overruns: u64,
-    /// Hits with lobes of a product.
-    pub product_hits: u64,
-    /// Lobes kept at these hits.
-    pub lobes_kept: u64,
-    /// Share of the product's energy that was kept, summed over these hits, in 256ths.
-    pub energy_kept: u64,
-    /// Directions recorded in visibility caches.
-    pub cache_entries: u64,
-    /// Rebuilds of a cumulative distribution.
-    pub cdf_rebuilds: u64,
-    /// Device milliseconds by pass.
-    pub gpu_ms: PassTimes,
-}
-
 /// A scene on a device, and the film it is rendered to.
 pub struct Renderer {
     device: Arc<Device>,
@@ -190,9 +163,11 @@ impl Renderer {
                 Aov::Variance | Aov::SampleCount => 0,
             }
         });
-        let lobes = settings
-            .sampler
-            .uses_lobes()
+        let uses_lobes = settings.sampler.uses_lobes();
+        if uses_lobes && settings.parameters.lobes.elevation == Elevation::Metropolis {
+            log::warn!("--set elevation=metropolis: a short random walk, so the image is biased");
+        }
+        let lobes = uses_lobes
             .then(|| LobeBuffers::new(device, scene, &settings.parameters.lobes))
             .transpose()?;
         let start = Instant::now();
@@ -364,18 +339,7 @@ impl Renderer {
 
     /// Adds what the device counted to the totals.
     fn take_counters(&mut self) -> Result<()> {
-        let counters = self.film.take_counters()?;
-        self.totals.camera_rays += u64::from(counters.camera_rays);
-        self.totals.bounce_rays += u64::from(counters.bounce_rays);
-        self.totals.shadow_rays_traced += u64::from(counters.shadow_rays_traced);
-        self.totals.shadow_rays_visible += u64::from(counters.shadow_rays_visible);
-        self.totals.dropped_samples += u64::from(counters.dropped_samples);
-        self.totals.traversal_overruns += u64::from(counters.traversal_overruns);
-        self.totals.product_hits += u64::from(counters.product_hits);
-        self.totals.lobes_kept += u64::from(counters.lobes_kept);
-        self.totals.energy_kept += u64::from(counters.energy_kept);
-        self.totals.cache_entries += u64::from(counters.cache_entries);
-        self.totals.cdf_rebuilds += u64::from(counters.cdf_rebuilds);
+        self.totals.add(&self.film.take_counters()?);
         Ok(())
     }
 
@@ -467,8 +431,19 @@ impl Renderer {
     /// Continues from sums that an earlier renderer with the same settings left.
     ///
     /// # Errors
-    /// [`Error::Usage`] if the window or the layers differ, [`Error::Vulkan`] if the device fails.
+    /// [`Error::Usage`] if the window or the layers differ, or if pixels keep visibility caches, which
+    /// sums do not hold; [`Error::Vulkan`] if the device fails.
     pub fn restore(&mut self, sums: &Sums) -> Result<()> {
+        if self.waves.keeps_caches() && sums.sample_count > 0 {
+            return Err(Error::usage(format!(
+                "--resume with --set cache=pixel: the {} samples per pixel of the checkpoint taught \
+                 visibility caches that it does not hold, so the image would not be that of one \
+                 render; render without --resume, or with --sample-offset {} and merge the two, or \
+                 use cache=hit",
+                sums.sample_count,
+                self.settings.first_sample.saturating_add(sums.sample_count)
+            )));
+        }
         if sums.film_size != self.film_size
             || sums.origin != [self.window.x, self.window.y]
             || [sums.width, sums.height] != [self.window.width, self.window.height]
@@ -538,24 +513,6 @@ fn guide_schedule(samples: u32) -> u32 {
     let power = samples.next_power_of_two();
     let middle = power / 4 * 3;
     if middle >= samples { middle } else { power }
-}
-
-impl Totals {
-    /// Means per hit that tell what the sampler did, by name; empty for samplers without lobes.
-    pub fn sampler_statistics(&self) -> BTreeMap<String, f64> {
-        if self.product_hits == 0 {
-            return BTreeMap::new();
-        }
-        let per_hit = |count: u64| count as f64 / self.product_hits as f64;
-        [
-            ("lobes_per_hit", per_hit(self.lobes_kept)),
-            ("energy_kept", per_hit(self.energy_kept) / 256.0),
-            ("cache_entries_per_hit", per_hit(self.cache_entries)),
-            ("cdf_rebuilds_per_hit", per_hit(self.cdf_rebuilds)),
-        ]
-        .map(|(name, value)| (name.to_owned(), value))
-        .into()
-    }
 }
 
 /// What product sampling with `settings` needs room for.

@@ -40,6 +40,15 @@ pub enum Elevation {
     Metropolis,
 }
 
+impl Elevation {
+    fn describe(self) -> &'static str {
+        match self {
+            Self::Inverse => "inverse",
+            Self::Metropolis => "metropolis (biased)",
+        }
+    }
+}
+
 /// Parameters of `product` and `visibility`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LobeParameters {
@@ -213,7 +222,7 @@ impl LobeParameters {
             ("order", format!("{:?}", self.order).to_lowercase()),
             ("brdf_share", self.brdf_share.to_string()),
             ("environment_share", self.environment_share.to_string()),
-            ("elevation", format!("{:?}", self.elevation).to_lowercase()),
+            ("elevation", self.elevation.describe().to_owned()),
         ]
         .map(|(key, value)| (key.to_owned(), value))
         .into();
