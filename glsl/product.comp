@@ -1,10 +1,11 @@
 // The product of environment and BRDF at every hit: hits, SRBF tables -> the strongest lobes and their
 // cumulative weights. [Tsai et al. 2008]; [Wu & Shih 2009], Eq. 8.
 //
-// Pairs are counted by strength first, which gives the strength above which as many as are wanted are
-// left; those are noted, and worked out in full at last. Strengths are logarithms, so that a pair
-// costs a square root and a logarithm. Environment lobes below the horizon are skipped: a loop of no
-// rounds, since devices that run both sides of a branch end loops early.
+// What matters of a pair is whether it is stronger than the n-th strongest. That strength is guessed from
+// every eighth pair, and corrected by rounds over all of them, each of which notes the stronger ones as
+// bits. Strengths are logarithms, so that a pair costs a square root, and another logarithm where lobes
+// are ordered by integral. Environment lobes below the horizon are skipped: a loop of no rounds, since
+// devices that run both sides of a branch end loops early.
 //
 // Deviation: the weight of a lobe is the part of its integral above the horizon [Tokuyoshi], not the
 // whole integral, since what is drawn below the horizon is lost.
@@ -40,11 +41,18 @@ layout(constant_id = CONSTANT_CACHE_OF_PIXEL) const uint CACHE_OF_PIXEL = 0u;
 layout(constant_id = CONSTANT_STRONGEST_ENVIRONMENT_LOBE)
     const float STRONGEST_ENVIRONMENT_LOBE = 0.0;
 
-// Bins of strength, each a factor of the square root of two wide.
+// Bins of strength of the guess, each a factor of the square root of two wide.
 const uint BINS = 64u;
 const float BINS_PER_E_FOLD = 2.0 / 0.69314718;
-// BRDF lobes that are held in registers at a time.
-const uint GROUP = 4u;
+// Every so many pairs enter the guess.
+const uint GUESS_STRIDE = 8u;
+// Pairs over the wanted number with which a round is near enough; those of the strongest environment
+// lobes are kept. And most rounds.
+const uint SLACK = (KEPT_LOBES + 1u) / 2u;
+const uint ROUNDS = 8u;
+// BRDF lobes that are held in registers at a time, and how many times.
+const uint GROUP = BRDF_LOBES < 32u ? BRDF_LOBES : 32u;
+const uint GROUPS = (BRDF_LOBES + GROUP - 1u) / GROUP;
 // An environment lobe whose value is everywhere above the horizon below exp(-7) of its top is skipped.
 const float BELOW_HORIZON = 7.0;
 // Deviation of a lobe of bandwidth 20, for the fixed threshold.
@@ -53,7 +61,10 @@ const float FIXED_DEVIATION = 0.0707;
 const float NO_STRENGTH = -1e30;
 
 uint histogram[BINS];
-// BRDF lobe and environment lobe, 16 bits each.
+vec4 brdf[GROUP];
+// A bit for each BRDF lobe of a group whose product with an environment lobe is kept.
+uint stronger[GROUPS * ENVIRONMENT_LOBES];
+// BRDF lobe and environment lobe of what is kept, 16 bits each.
 uint selected[KEPT_LOBES];
 
 // The surface at a hit as the fits see it: their views lie in the plane of +x.
@@ -66,40 +77,51 @@ struct View {
     uint lobe_count;
 };
 
-Lobe environment_lobe(uint index) {
-    vec4 first = texelFetch(environment_lobes, int(2u * index));
-    vec4 second = texelFetch(environment_lobes, int(2u * index + 1u));
-    return Lobe(first.xyz, length(second.xyz), first.w);
+// bandwidth * axis and ln(amplitude) - bandwidth of a BRDF lobe: what a product is made of. Those of the
+// factors add up.
+vec4 brdf_exponents(View view, uint index) {
+    vec4 local = texelFetch(brdf_lobes, int(view.first_lobe + index));
+    vec3 axis = view.tangent * local.x + view.bitangent * local.y + view.normal * local.z;
+    return vec4(axis, index < view.lobe_count ? local.w : NO_STRENGTH);
 }
 
-Lobe brdf_lobe(View view, uint index) {
-    vec4 shape = texelFetch(brdf_lobes, int(2u * (view.first_lobe + index)));
-    float amplitude = texelFetch(brdf_lobes, int(2u * (view.first_lobe + index) + 1u)).x;
-    vec3 axis = view.tangent * shape.x + view.bitangent * shape.y + view.normal * shape.z;
-    return Lobe(axis, shape.w, amplitude);
+// The same of an environment lobe.
+vec4 environment_exponents(uint index) {
+    return texelFetch(environment_lobes, int(index));
 }
 
-// bandwidth * axis and ln(amplitude) - bandwidth: what a product's strength is made of.
-vec4 exponents(View view, uint index) {
-    vec4 result = vec4(0.0, 0.0, 0.0, NO_STRENGTH);
-    if (index < view.lobe_count) {
-        Lobe lobe = brdf_lobe(view, index);
-        result = vec4(
-            lobe.bandwidth * lobe.axis,
-            lobe.amplitude > 0.0 ? log(lobe.amplitude) - lobe.bandwidth : NO_STRENGTH);
-    }
-    return result;
+// ln(x) to within 0.06: the bits of a float are a logarithm by straight pieces.
+float coarse_logarithm(float x) {
+    return 0.69314718 * (float(floatBitsToInt(x)) * 1.1920929e-7 - 126.957);
 }
 
-// Bin of a product: of its coefficient, or of its integral over 2 pi, which is the coefficient times
-// (1 - exp(-2 bandwidth)) / bandwidth, here 1 / (bandwidth + 1/2). 0 is next to the bound.
-uint bin_of(vec4 environment, vec4 brdf, float bound) {
-    float bandwidth = length(environment.xyz + brdf.xyz);
-    float strength = environment.w + brdf.w + bandwidth;
+// Strength of a product: logarithm of its coefficient, or of its integral over 2 pi, which is the
+// coefficient times (1 - exp(-2 bandwidth)) / bandwidth, here the inverse root of bandwidth^2 + 1/4.
+float strength_of(vec4 environment, vec4 brdf) {
+    vec3 sum = environment.xyz + brdf.xyz;
+    float square = dot(sum, sum);
+    float strength = environment.w + brdf.w + sqrt(square);
     if (ORDER_BY_COEFFICIENT == 0u) {
-        strength -= log(bandwidth + 0.5);
+        strength -= 0.5 * coarse_logarithm(square + 0.25);
     }
-    return uint(clamp((bound - strength) * BINS_PER_E_FOLD, 0.0, float(BINS - 1u)));
+    return strength;
+}
+
+// erf to 2e-4. [Winitzki 2008, A handy approximation for the error function and its inverse].
+float coarse_erf(float x) {
+    float square = x * x;
+    float exponent = -square * (1.2732395 + 0.147 * square) / (1.0 + 0.147 * square);
+    return sign(x) * sqrt(1.0 - exp(exponent));
+}
+
+// Share of a kernel's integral above the horizon, for a weight: kernel_hemisphere_part with a coarse
+// error function.
+float part_above_horizon(float bandwidth, float cosine) {
+    float steepness = kernel_steepness(bandwidth);
+    float ratio = steepness < 1e-2
+        ? cosine
+        : coarse_erf(steepness * cosine) / coarse_erf(steepness);
+    return kernel_part_of_ratio(bandwidth, ratio);
 }
 
 // 1 for an environment lobe with a part above the horizon, else 0.
@@ -110,8 +132,75 @@ uint is_above_horizon(vec4 environment, vec3 normal) {
     return cosine < 0.0 && bandwidth - sine > BELOW_HORIZON ? 0u : 1u;
 }
 
-void count_bin(uint bin) {
-    histogram[bin] += 1u;
+void load_group(View view, uint group) {
+    for (uint i = 0u; i < GROUP; ++i) {
+        brdf[i] = brdf_exponents(view, group * GROUP + i);
+    }
+}
+
+// Strengths of products as a guess sees them.
+struct Guess {
+    // About as many pairs as are wanted are stronger.
+    float threshold;
+    // Sum of the exponentials of all strengths, relative to the bound.
+    float energy;
+};
+
+Guess guess(View view, float bound) {
+    for (uint i = 0u; i < BINS; ++i) {
+        histogram[i] = 0u;
+    }
+    for (uint group = 0u; group < GROUPS; ++group) {
+        if (GROUPS > 1u) {
+            load_group(view, group);
+        }
+        for (uint stretch = 0u; stretch < ENVIRONMENT_LOBES; stretch += GUESS_STRIDE) {
+            for (uint i = 0u; i < GROUP; ++i) {
+                uint e = stretch + (5u * i + 3u * (stretch / GUESS_STRIDE)) % GUESS_STRIDE;
+                vec4 environment = environment_exponents(min(e, ENVIRONMENT_LOBES - 1u));
+                bool counts =
+                    e < ENVIRONMENT_LOBES && is_above_horizon(environment, view.normal) > 0u;
+                float below = counts ? bound - strength_of(environment, brdf[i]) : float(BINS);
+                histogram[uint(clamp(below * BINS_PER_E_FOLD, 0.0, float(BINS - 1u)))] += 1u;
+            }
+        }
+    }
+    // The last bin holds what is too weak to tell apart, products of zero among it.
+    float energy = 0.0;
+    float wanted = float(KEPT_LOBES + SLACK / 2u) / float(GUESS_STRIDE);
+    float bins = 0.0;
+    for (uint i = 0u; i < BINS - 1u; ++i) {
+        float here = float(histogram[i]);
+        energy += here * exp2(-0.5 * (float(i) + 0.5));
+        bins += here > wanted ? wanted / here : wanted > 0.0 ? 1.0 : 0.0;
+        wanted = here > wanted ? 0.0 : wanted - here;
+    }
+    return Guess(bound - bins / BINS_PER_E_FOLD, float(GUESS_STRIDE) * energy);
+}
+
+// Notes the pairs that are stronger than a threshold; returns their number, and the largest strength.
+uint note_stronger(View view, float threshold, out float strongest) {
+    uint count = 0u;
+    strongest = NO_STRENGTH;
+    for (uint group = 0u; group < GROUPS; ++group) {
+        if (GROUPS > 1u) {
+            load_group(view, group);
+        }
+        for (uint e = 0u; e < ENVIRONMENT_LOBES; ++e) {
+            vec4 environment = environment_exponents(e);
+            uint bits = 0u;
+            for (uint once = is_above_horizon(environment, view.normal); once > 0u; --once) {
+                for (uint i = 0u; i < GROUP; ++i) {
+                    float strength = strength_of(environment, brdf[i]);
+                    strongest = max(strongest, strength);
+                    bits |= strength > threshold ? 1u << i : 0u;
+                }
+            }
+            stronger[group * ENVIRONMENT_LOBES + e] = bits;
+            count += bitCount(bits);
+        }
+    }
+    return count;
 }
 
 void main() {
@@ -145,106 +234,88 @@ void main() {
 
     // No product is stronger than the strongest amplitude times the largest integral, or, for
     // coefficients, than the product of the amplitudes.
-    float strongest = 0.0;
+    float strongest_brdf_lobe = NO_STRENGTH;
     for (uint i = 0u; i < view.lobe_count; ++i) {
-        strongest = max(
-            strongest, texelFetch(brdf_lobes, int(2u * (view.first_lobe + i) + 1u)).x);
+        vec4 lobe = brdf_exponents(view, i);
+        strongest_brdf_lobe = max(strongest_brdf_lobe, lobe.w + length(lobe.xyz));
     }
-    float bound = log(max(strongest, 1e-30)) + STRONGEST_ENVIRONMENT_LOBE;
-
-    for (uint i = 0u; i < BINS; ++i) {
-        histogram[i] = 0u;
-    }
-    for (uint first = 0u; first < view.lobe_count; first += GROUP) {
-        vec4 brdf_0 = exponents(view, first);
-        vec4 brdf_1 = exponents(view, first + 1u);
-        vec4 brdf_2 = exponents(view, first + 2u);
-        vec4 brdf_3 = exponents(view, first + 3u);
-        for (uint e = 0u; e < ENVIRONMENT_LOBES; ++e) {
-            vec4 environment = texelFetch(environment_lobes, int(2u * e + 1u));
-            for (uint once = is_above_horizon(environment, view.normal); once > 0u; --once) {
-                count_bin(bin_of(environment, brdf_0, bound));
-                count_bin(bin_of(environment, brdf_1, bound));
-                count_bin(bin_of(environment, brdf_2, bound));
-                count_bin(bin_of(environment, brdf_3, bound));
-            }
-        }
+    float bound = strongest_brdf_lobe + STRONGEST_ENVIRONMENT_LOBE;
+    if (GROUPS == 1u) {
+        load_group(view, 0u);
     }
 
-    // The bin in which the wanted number is reached, and how many of it are wanted. The last bin holds
-    // what is too weak to tell apart, products of zero among it.
-    uint last_bin = 0u;
-    uint left = KEPT_LOBES;
-    uint first_bin = BINS - 1u;
-    float energy = 0.0;
-    float kept = 0.0;
-    bool is_full = false;
-    for (uint i = 0u; i < BINS - 1u; ++i) {
-        uint here = histogram[i];
-        float strength = exp2(-0.5 * float(i));
-        first_bin = here > 0u ? min(first_bin, i) : first_bin;
-        energy += float(here) * strength;
-        if (!is_full) {
-            last_bin = i;
-            is_full = here > left;
-            kept += float(min(here, left)) * strength;
-            left -= is_full ? 0u : here;
+    // From the guess by steps that take the number of stronger pairs to fall as fast as strength grows,
+    // within what earlier rounds have shown; what is weaker than the last bin is nothing.
+    Guess guessed = guess(view, bound);
+    float threshold = guessed.threshold;
+    float too_weak = bound - float(BINS) / BINS_PER_E_FOLD;
+    float too_strong = bound + 1.0;
+    float strongest;
+    uint pair_count = note_stronger(view, threshold, strongest);
+    for (uint round = 1u; round < ROUNDS; ++round) {
+        bool is_near = pair_count >= KEPT_LOBES && pair_count <= KEPT_LOBES + SLACK;
+        bool is_all = pair_count < KEPT_LOBES && threshold <= too_weak;
+        if (is_near || is_all) {
+            break;
         }
+        if (pair_count < KEPT_LOBES) {
+            too_strong = threshold;
+        } else {
+            too_weak = threshold;
+        }
+        threshold += log(float(pair_count + 1u) / float(KEPT_LOBES + SLACK / 2u + 1u));
+        bool is_between = threshold > too_weak && threshold < too_strong;
+        threshold = is_between ? threshold : 0.5 * (too_weak + too_strong);
+        // The last round takes what is known to be enough.
+        threshold = round + 1u < ROUNDS && too_strong - too_weak > 0.01 ? threshold : too_weak;
+        pair_count = note_stronger(view, threshold, strongest);
     }
 
     uint count = 0u;
-    for (uint first = 0u; first < view.lobe_count; first += GROUP) {
-        vec4 brdf_0 = exponents(view, first);
-        vec4 brdf_1 = exponents(view, first + 1u);
-        vec4 brdf_2 = exponents(view, first + 2u);
-        vec4 brdf_3 = exponents(view, first + 3u);
+    for (uint group = 0u; group < GROUPS; ++group) {
         for (uint e = 0u; e < ENVIRONMENT_LOBES; ++e) {
-            vec4 environment = texelFetch(environment_lobes, int(2u * e + 1u));
-            uvec4 bins = uvec4(BINS);
-            for (uint once = is_above_horizon(environment, view.normal); once > 0u; --once) {
-                bins = uvec4(
-                    bin_of(environment, brdf_0, bound), bin_of(environment, brdf_1, bound),
-                    bin_of(environment, brdf_2, bound), bin_of(environment, brdf_3, bound));
-            }
-            bool any_kept = any(lessThanEqual(bins, uvec4(last_bin)));
-            for (uint i = 0u; i < (any_kept ? GROUP : 0u); ++i) {
-                uint bin = bins[i];
-                bool is_last = is_full && bin == last_bin;
-                if (bin <= last_bin && (!is_last || left > 0u) && count < KEPT_LOBES) {
-                    selected[count] = (first + i) << 16u | e;
-                    count += 1u;
-                    left -= is_last ? 1u : 0u;
-                }
+            uint bits = stronger[group * ENVIRONMENT_LOBES + e];
+            while (bits != 0u && count < KEPT_LOBES) {
+                selected[count] = (group * GROUP + uint(findLSB(bits))) << 16u | e;
+                bits &= bits - 1u;
+                count += 1u;
             }
         }
     }
 
-    // Weights are relative to the strongest bin that is not empty, so that halves can hold them.
-    float to_weight =
-        exp(-bound + 0.34657359 * float(first_bin)) * (0.5 / SRBF_PI);
+    // Weights are relative to the strongest, so that halves can hold them.
     float sum = 0.0;
+    float kept = 0.0;
     for (uint l = 0u; l < count; ++l) {
-        Lobe product = lobe_product(
-            environment_lobe(selected[l] & 0xffffu), brdf_lobe(view, selected[l] >> 16u));
-        float integral = kernel_integral(product.bandwidth);
-        float above = ORDER_BY_COEFFICIENT != 0u
-            ? 1.0
-            : kernel_hemisphere_part(product.bandwidth, dot(product.axis, view.normal));
-        float deviation =
-            FIXED_THRESHOLD != 0u ? FIXED_DEVIATION : kernel_deviation(product.bandwidth);
-        ProductLobe lobe = ProductLobe(
-            product.axis, product.bandwidth,
-            min(product.amplitude * integral * above * to_weight, 6e4),
-            THRESHOLD_SCALE * deviation, 1.0 / integral);
-        uvec4 words = pack_lobe(lobe);
+        vec4 product = environment_exponents(selected[l] & 0xffffu)
+            + brdf_exponents(view, selected[l] >> 16u);
+        float bandwidth = length(product.xyz);
+        vec3 axis = bandwidth > 1e-20 ? product.xyz / bandwidth : view.normal;
+        float integral = kernel_integral(bandwidth);
+        float weight = exp(product.w + bandwidth - strongest);
+        if (ORDER_BY_COEFFICIENT == 0u) {
+            weight *= integral * (0.5 / SRBF_PI);
+        }
+        kept += weight;
+        if (ORDER_BY_COEFFICIENT == 0u) {
+            weight *= part_above_horizon(bandwidth, dot(axis, view.normal));
+        }
+        float closeness = 0.0;
+        if (CACHE_CAPACITY > 0u) {
+            closeness = THRESHOLD_SCALE
+                * (FIXED_THRESHOLD != 0u ? FIXED_DEVIATION : kernel_deviation(bandwidth));
+        }
+        uvec4 words = pack_lobe(
+            ProductLobe(axis, bandwidth, min(weight, 6e4), closeness, 1.0 / integral));
         sum += unpackHalf2x16(words.z).x;
         lobes[l * path_count + path] = words;
         cumulative[l * path_count + path] = sum;
     }
+    kept *= exp(strongest - bound);
     lobe_counts[path] = count;
     if (count > 0u) {
         atomicAdd(counters.product_hits, 1u);
         atomicAdd(counters.lobes_kept, count);
-        atomicAdd(counters.energy_kept, uint(256.0 * min(kept / max(energy, 1e-30), 1.0)));
+        atomicAdd(counters.energy_kept, uint(256.0 * min(kept / max(guessed.energy, 1e-30), 1.0)));
     }
 }

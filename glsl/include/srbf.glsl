@@ -108,14 +108,24 @@ float kernel_deviation(float bandwidth) {
     return sqrt(second_moment / (1.0 - e));
 }
 
-// Share of the kernel's integral where dot(direction, n) > 0; cosine is dot(axis, n). [Tokuyoshi].
-float kernel_hemisphere_part(float bandwidth, float cosine) {
-    float steepness = bandwidth
+// Steepness of the error function in the share of a kernel's integral above a plane. [Tokuyoshi].
+float kernel_steepness(float bandwidth) {
+    return bandwidth
         * sqrt((0.5 * bandwidth + 0.651733) / ((bandwidth + 1.341828) * bandwidth + 7.221669));
-    float ratio = steepness < 1e-4 ? cosine : erf(steepness * cosine) / erf(steepness);
+}
+
+// That share, where ratio is erf(steepness * cosine) / erf(steepness).
+float kernel_part_of_ratio(float bandwidth, float ratio) {
     float blend = clamp(0.5 + 0.5 * ratio, 0.0, 1.0);
     float e = exp(-bandwidth);
     return (e + (1.0 - e) * blend) / (1.0 + e);
+}
+
+// Share of the kernel's integral where dot(direction, n) > 0; cosine is dot(axis, n). [Tokuyoshi].
+float kernel_hemisphere_part(float bandwidth, float cosine) {
+    float steepness = kernel_steepness(bandwidth);
+    float ratio = steepness < 1e-4 ? cosine : erf(steepness * cosine) / erf(steepness);
+    return kernel_part_of_ratio(bandwidth, ratio);
 }
 
 // Value of a lobe.

@@ -41,11 +41,11 @@ pub const BINDING_ENVIRONMENT_ROWS: u32 = 11;
 /// Scene set: cumulative probability over the cells of each row of the environment map.
 pub const BINDING_ENVIRONMENT_CELLS: u32 = 12;
 
-/// SRBF set: lobes of the environment in the world, largest integral first, two texels of four floats
-/// each: axis and amplitude; bandwidth · axis and ln(amplitude) − bandwidth.
+/// SRBF set: lobes of the environment in the world, largest integral first, texels of four floats:
+/// bandwidth · axis and ln(amplitude) − bandwidth.
 pub const BINDING_ENVIRONMENT_LOBES: u32 = 0;
-/// SRBF set: lobes of BRDF · cosine by material and view, two texels of four floats each: axis and
-/// bandwidth; amplitude.
+/// SRBF set: lobes of BRDF · cosine by material and view, texels of four floats as for the environment,
+/// in the frame of view and normal.
 pub const BINDING_BRDF_LOBES: u32 = 1;
 /// SRBF set: first lobe of each material and its lobes per view, texels of two words.
 pub const BINDING_MATERIAL_LOBES: u32 = 2;

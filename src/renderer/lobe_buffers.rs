@@ -60,7 +60,7 @@ impl LobeBuffers {
             views: parameters.views as usize,
             method: Method::default(),
         };
-        let mut lobes: Vec<[f32; 8]> = Vec::new();
+        let mut lobes: Vec<[f32; 4]> = Vec::new();
         let mut materials: Vec<[u32; 2]> = Vec::new();
         for (index, material) in scene.materials.iter().enumerate() {
             log::info!("fitting the material {}", material.name);
@@ -75,7 +75,7 @@ impl LobeBuffers {
             );
         }
         let strength = |lobe: &EnvironmentLobe| match parameters.order {
-            LobeOrder::Integral => lobe.amplitude.ln() - (lobe.bandwidth + 0.5).ln(),
+            LobeOrder::Integral => lobe.amplitude.ln() - lobe.bandwidth.hypot(0.5).ln(),
             LobeOrder::Coefficient => lobe.amplitude.ln(),
         };
         let sizes = FitSizes {
@@ -86,7 +86,10 @@ impl LobeBuffers {
         };
         let fit_ms = start.elapsed().as_secs_f64() * 1e3;
 
-        let environment: Vec<[f32; 8]> = environment.iter().map(environment_texels).collect();
+        let environment: Vec<[f32; 4]> = environment
+            .iter()
+            .map(|lobe| exponents(lobe.axis, lobe.bandwidth, lobe.amplitude))
+            .collect();
         let buffers = [
             Buffer::texels_from_slice(device, "environment lobes", &environment)?,
             Buffer::texels_from_slice(device, "BRDF lobes", &lobes)?,
@@ -136,18 +139,21 @@ fn or_warn<T>(fitted: Result<T>) -> Result<Option<T>> {
     }
 }
 
-/// The two texels of an environment lobe, see `BINDING_ENVIRONMENT_LOBES`.
-fn environment_texels(lobe: &EnvironmentLobe) -> [f32; 8] {
-    let [x, y, z] = lobe.axis;
-    let b = lobe.bandwidth;
-    [x, y, z, lobe.amplitude, b * x, b * y, b * z, lobe.amplitude.max(1e-30).ln() - b]
+/// The texel of a lobe: what adds up where lobes are multiplied, see `BINDING_ENVIRONMENT_LOBES`.
+fn exponents(axis: [f32; 3], bandwidth: f32, amplitude: f32) -> [f32; 4] {
+    let [x, y, z] = axis.map(|component| bandwidth * component);
+    // A lobe of no amplitude is weaker than all others.
+    let logarithm = if amplitude > 0.0 { amplitude.ln() } else { -1e30 };
+    [x, y, z, logarithm - bandwidth]
 }
 
 /// Appends the lobes of all views; returns how many each view has.
-fn append(lobes: &mut Vec<[f32; 8]>, fit: &BrdfFit) -> u32 {
-    for lobe in fit.views.iter().flat_map(|view| &view.lobes) {
-        let [x, y, z] = lobe.axis.to_array();
-        lobes.push([x, y, z, lobe.bandwidth, lobe.amplitude, 0.0, 0.0, 0.0]);
-    }
+fn append(lobes: &mut Vec<[f32; 4]>, fit: &BrdfFit) -> u32 {
+    lobes.extend(
+        fit.views
+            .iter()
+            .flat_map(|view| &view.lobes)
+            .map(|lobe| exponents(lobe.axis.to_array(), lobe.bandwidth, lobe.amplitude)),
+    );
     fit.views.first().map_or(0, |view| view.lobes.len() as u32)
 }
