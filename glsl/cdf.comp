@@ -22,6 +22,7 @@ layout(local_size_x = WORKGROUP_SIZE) in;
 
 layout(constant_id = CONSTANT_CACHE_CAPACITY) const uint CACHE_CAPACITY = 8u;
 layout(constant_id = CONSTANT_CACHE_OF_PIXEL) const uint CACHE_OF_PIXEL = 0u;
+layout(constant_id = CONSTANT_COUNT_VISIBLE) const uint COUNT_VISIBLE = 0u;
 layout(constant_id = CONSTANT_VISIBILITY_EXPONENT) const float VISIBILITY_EXPONENT = 2.0;
 
 void main() {
@@ -43,11 +44,13 @@ void main() {
     if (entries == 0u || ((head & CACHE_GROWN) == 0u && !is_new)) {
         return;
     }
+    // Places that hold nothing yet are close to no lobe. Loops of a constant length, so that all of this
+    // stays in registers.
     vec3 directions[CACHE_CAPACITY];
     float visible[CACHE_CAPACITY];
-    for (uint i = 0u; i < entries; ++i) {
+    for (uint i = 0u; i < CACHE_CAPACITY; ++i) {
         uint outcome = visibility_cache[first + 1u + i];
-        directions[i] = unpack_normal(outcome);
+        directions[i] = i < entries ? unpack_normal(outcome) : vec3(1e3);
         visible[i] = float(outcome & 1u);
     }
     float sum = 0.0;
@@ -55,10 +58,10 @@ void main() {
         ProductLobe lobe = unpack_lobe(texelFetch(lobe_texels, int(l * path_count + path)));
         float close_count = 0.0;
         float visible_count = 0.0;
-        for (uint i = 0u; i < entries; ++i) {
+        for (uint i = 0u; i < CACHE_CAPACITY; ++i) {
             float close = is_close(lobe, directions[i]) ? 1.0 : 0.0;
             close_count += close;
-            visible_count += close * visible[i];
+            visible_count += COUNT_VISIBLE != 0u ? close * visible[i] : 0.0;
         }
         float ratio = (1.0 + visible_count) / (1.0 + close_count);
         sum += lobe.weight

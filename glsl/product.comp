@@ -51,7 +51,7 @@ const uint GUESS_STRIDE = 8u;
 const uint SLACK = (KEPT_LOBES + 1u) / 2u;
 const uint ROUNDS = 8u;
 // BRDF lobes that are held in registers at a time, and how many times.
-const uint GROUP = BRDF_LOBES < 32u ? BRDF_LOBES : 32u;
+const uint GROUP = BRDF_LOBES < 20u ? BRDF_LOBES : 20u;
 const uint GROUPS = (BRDF_LOBES + GROUP - 1u) / GROUP;
 // An environment lobe whose value is everywhere above the horizon below exp(-7) of its top is skipped.
 const float BELOW_HORIZON = 7.0;

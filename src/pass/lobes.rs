@@ -49,7 +49,7 @@ struct Cache {
 }
 
 impl Lobes {
-    /// Creates the pipelines for one of the two samplers.
+    /// Creates the pipelines for one of the two samplers at `shadow_rays` rays per hit.
     ///
     /// # Errors
     /// A Vulkan call fails.
@@ -57,11 +57,12 @@ impl Lobes {
         device: &Arc<Device>,
         sampler: Sampler,
         parameters: &LobeParameters,
+        shadow_rays: u32,
         sizes: FitSizes,
         material_kinds: u32,
     ) -> Result<Self> {
         let with_cache = sampler == Sampler::Visibility;
-        let capacity = if with_cache { parameters.cache_capacity } else { 0 };
+        let capacity = if with_cache { parameters.cache_places(shadow_rays) } else { 0 };
         let of_pixel = u32::from(with_cache && parameters.cache == CacheScope::Pixel);
         let cache_constants =
             [(CONSTANT_CACHE_CAPACITY, capacity), (CONSTANT_CACHE_OF_PIXEL, of_pixel)];
@@ -102,7 +103,10 @@ impl Lobes {
                     record: create("cache", &[(CONSTANT_COUNT_VISIBLE, count_visible)])?,
                     rebuild: create(
                         "cdf",
-                        &[(CONSTANT_VISIBILITY_EXPONENT, parameters.exponent.to_bits())],
+                        &[
+                            (CONSTANT_COUNT_VISIBLE, count_visible),
+                            (CONSTANT_VISIBILITY_EXPONENT, parameters.exponent.to_bits()),
+                        ],
                     )?,
                     scope: parameters.cache,
                 })

@@ -138,6 +138,7 @@ impl Passes {
                         device,
                         settings.sampler,
                         &settings.parameters.lobes,
+                        settings.shadow_rays,
                         sizes,
                         settings.material_kinds,
                     )

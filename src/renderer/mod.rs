@@ -521,7 +521,7 @@ fn lobe_room(settings: &Settings, window: Window) -> Option<LobeRoom> {
     let with_cache = settings.sampler == Sampler::Visibility;
     settings.sampler.uses_lobes().then(|| LobeRoom {
         kept_lobes: parameters.kept_lobes,
-        cache_capacity: if with_cache { parameters.cache_capacity } else { 0 },
+        cache_capacity: if with_cache { parameters.cache_places(settings.shadow_rays) } else { 0 },
         film_pixels: (with_cache && parameters.cache == CacheScope::Pixel)
             .then(|| u64::from(window.width) * u64::from(window.height)),
     })

@@ -103,8 +103,8 @@ impl Default for LobeParameters {
     }
 }
 
-/// Loops of the product pass over all pairs; Mesa 22.3 ends the loops of an invocation after 65,535
-/// rounds in all, and two loops see every pair.
+/// Most products at a hit. Mesa 22.3 ends the loops of an invocation after 65,535 rounds in all; the
+/// product pass makes up to 17 for every environment lobe and 20 BRDF lobes.
 const MOST_PAIRS: u32 = 25_000;
 
 impl LobeParameters {
@@ -210,6 +210,15 @@ impl LobeParameters {
             )));
         }
         Ok(())
+    }
+
+    /// Places of a visibility cache at `shadow_rays` rays per hit: a cache that is cleared at every hit
+    /// holds no more than the rays before the last.
+    pub fn cache_places(&self, shadow_rays: u32) -> u32 {
+        match self.cache {
+            CacheScope::Hit => self.cache_capacity.min(shadow_rays.saturating_sub(1)).max(1),
+            CacheScope::Pixel => self.cache_capacity,
+        }
     }
 
     /// The parameters by name; those of the visibility cache where `with_cache`.
