@@ -1,11 +1,11 @@
 // The product of environment and BRDF at every hit: hits, SRBF tables -> the strongest lobes and their
 // cumulative weights. [Tsai et al. 2008]; [Wu & Shih 2009], Eq. 8.
 //
-// What matters of a pair is whether it is stronger than the n-th strongest. That strength is guessed from
-// every eighth pair, and corrected by rounds over all of them, each of which notes the stronger ones as
-// bits. Strengths are logarithms, so that a pair costs a square root, and another logarithm where lobes
-// are ordered by integral. Environment lobes below the horizon are skipped: a loop of no rounds, since
-// devices that run both sides of a branch end loops early.
+// What matters of a pair is whether it is stronger than the n-th strongest. That strength is guessed
+// from every eighth pair, and corrected by rounds over all of them, each of which notes the stronger
+// ones as bits. Strengths are logarithms; where lobes are ordered by integral, a pair costs another
+// logarithm. Environment lobes below the horizon are skipped: a loop of no rounds, since devices that
+// run both sides of a branch end loops early.
 //
 // Deviation: the weight of a lobe is the part of its integral above the horizon [Tokuyoshi], not the
 // whole integral, since what is drawn below the horizon is lost.
@@ -41,9 +41,9 @@ layout(constant_id = CONSTANT_CACHE_OF_PIXEL) const uint CACHE_OF_PIXEL = 0u;
 layout(constant_id = CONSTANT_STRONGEST_ENVIRONMENT_LOBE)
     const float STRONGEST_ENVIRONMENT_LOBE = 0.0;
 
-// Bins of strength of the guess, each a factor of the square root of two wide.
-const uint BINS = 64u;
-const float BINS_PER_E_FOLD = 2.0 / 0.69314718;
+// Bins of strength of the guess, each a factor of two wide.
+const uint BINS = 24u;
+const float BINS_PER_E_FOLD = 1.0 / 0.69314718;
 // Every so many pairs enter the guess.
 const uint GUESS_STRIDE = 8u;
 // Pairs over the wanted number with which a round is near enough; those of the strongest environment
@@ -142,11 +142,14 @@ void load_group(View view, uint group) {
 struct Guess {
     // About as many pairs as are wanted are stronger.
     float threshold;
+    // Largest strength among the pairs that were looked at.
+    float strongest;
     // Sum of the exponentials of all strengths, relative to the bound.
     float energy;
 };
 
 Guess guess(View view, float bound) {
+    float strongest = NO_STRENGTH;
     for (uint i = 0u; i < BINS; ++i) {
         histogram[i] = 0u;
     }
@@ -160,8 +163,9 @@ Guess guess(View view, float bound) {
                 vec4 environment = environment_exponents(min(e, ENVIRONMENT_LOBES - 1u));
                 bool counts =
                     e < ENVIRONMENT_LOBES && is_above_horizon(environment, view.normal) > 0u;
-                float below = counts ? bound - strength_of(environment, brdf[i]) : float(BINS);
-                histogram[uint(clamp(below * BINS_PER_E_FOLD, 0.0, float(BINS - 1u)))] += 1u;
+                float strength = counts ? strength_of(environment, brdf[i]) : NO_STRENGTH;
+                strongest = max(strongest, strength);
+                histogram[uint(clamp((bound - strength) * BINS_PER_E_FOLD, 0.0, float(BINS - 1u)))] += 1u;
             }
         }
     }
@@ -171,17 +175,29 @@ Guess guess(View view, float bound) {
     float bins = 0.0;
     for (uint i = 0u; i < BINS - 1u; ++i) {
         float here = float(histogram[i]);
-        energy += here * exp2(-0.5 * (float(i) + 0.5));
+        energy += here * exp2(-float(i) - 0.5);
         bins += here > wanted ? wanted / here : wanted > 0.0 ? 1.0 : 0.0;
         wanted = here > wanted ? 0.0 : wanted - here;
     }
-    return Guess(bound - bins / BINS_PER_E_FOLD, float(GUESS_STRIDE) * energy);
+    float threshold = bound - bins / BINS_PER_E_FOLD;
+    return Guess(threshold, max(strongest, threshold), float(GUESS_STRIDE) * energy);
 }
 
-// Notes the pairs that are stronger than a threshold; returns their number, and the largest strength.
-uint note_stronger(View view, float threshold, out float strongest) {
+// Whether the strength of a product exceeds a threshold, of which the environment's part is already
+// subtracted; strength_of without the root.
+bool is_stronger(vec3 environment, vec4 brdf, float threshold) {
+    vec3 sum = environment + brdf.xyz;
+    float square = dot(sum, sum);
+    float root = threshold - brdf.w;
+    if (ORDER_BY_COEFFICIENT == 0u) {
+        root += 0.5 * coarse_logarithm(square + 0.25);
+    }
+    return square > root * abs(root);
+}
+
+// Notes the pairs that are stronger than a threshold, and returns their number.
+uint note_stronger(View view, float threshold) {
     uint count = 0u;
-    strongest = NO_STRENGTH;
     for (uint group = 0u; group < GROUPS; ++group) {
         if (GROUPS > 1u) {
             load_group(view, group);
@@ -190,10 +206,9 @@ uint note_stronger(View view, float threshold, out float strongest) {
             vec4 environment = environment_exponents(e);
             uint bits = 0u;
             for (uint once = is_above_horizon(environment, view.normal); once > 0u; --once) {
+                float left = threshold - environment.w;
                 for (uint i = 0u; i < GROUP; ++i) {
-                    float strength = strength_of(environment, brdf[i]);
-                    strongest = max(strongest, strength);
-                    bits |= strength > threshold ? 1u << i : 0u;
+                    bits |= is_stronger(environment.xyz, brdf[i], left) ? 1u << i : 0u;
                 }
             }
             stronger[group * ENVIRONMENT_LOBES + e] = bits;
@@ -250,8 +265,7 @@ void main() {
     float threshold = guessed.threshold;
     float too_weak = bound - float(BINS) / BINS_PER_E_FOLD;
     float too_strong = bound + 1.0;
-    float strongest;
-    uint pair_count = note_stronger(view, threshold, strongest);
+    uint pair_count = note_stronger(view, threshold);
     for (uint round = 1u; round < ROUNDS; ++round) {
         bool is_near = pair_count >= KEPT_LOBES && pair_count <= KEPT_LOBES + SLACK;
         bool is_all = pair_count < KEPT_LOBES && threshold <= too_weak;
@@ -268,7 +282,7 @@ void main() {
         threshold = is_between ? threshold : 0.5 * (too_weak + too_strong);
         // The last round takes what is known to be enough.
         threshold = round + 1u < ROUNDS && too_strong - too_weak > 0.01 ? threshold : too_weak;
-        pair_count = note_stronger(view, threshold, strongest);
+        pair_count = note_stronger(view, threshold);
     }
 
     uint count = 0u;
@@ -283,7 +297,7 @@ void main() {
         }
     }
 
-    // Weights are relative to the strongest, so that halves can hold them.
+    // Weights are relative to the strongest of the guess, so that halves can hold them.
     float sum = 0.0;
     float kept = 0.0;
     for (uint l = 0u; l < count; ++l) {
@@ -292,7 +306,7 @@ void main() {
         float bandwidth = length(product.xyz);
         vec3 axis = bandwidth > 1e-20 ? product.xyz / bandwidth : view.normal;
         float integral = kernel_integral(bandwidth);
-        float weight = exp(product.w + bandwidth - strongest);
+        float weight = exp(product.w + bandwidth - guessed.strongest);
         if (ORDER_BY_COEFFICIENT == 0u) {
             weight *= integral * (0.5 / SRBF_PI);
         }
@@ -311,7 +325,7 @@ void main() {
         lobes[l * path_count + path] = words;
         cumulative[l * path_count + path] = sum;
     }
-    kept *= exp(strongest - bound);
+    kept *= exp(guessed.strongest - bound);
     lobe_counts[path] = count;
     if (count > 0u) {
         atomicAdd(counters.product_hits, 1u);
