@@ -1,0 +1,86 @@
+// Draws from the mixture of product sampling at a path, or takes a direction as given, and evaluates
+// its densities there. For tests/product.rs.
+#version 460
+
+#define NEEDS_PARAMETERS
+#define NEEDS_WAVE
+#define NEEDS_RAY_TEXELS
+#define NEEDS_HIT_TEXELS
+#define NEEDS_SHADOW_RAYS
+#define WRITES_SHADOW_RAYS
+#define NEEDS_MATERIALS
+#define NEEDS_ENVIRONMENT
+#define NEEDS_LOBE_TEXELS
+#define NEEDS_LOBE_COUNTS
+#define NEEDS_CUMULATIVE_TEXELS
+#include "mixture.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+struct MixtureQuery {
+    uint path;
+    // 1 draws a direction by the numbers, 0 takes the one given.
+    uint draws;
+    vec3 direction;
+    float technique;
+    vec2 direction_numbers;
+    float lobe;
+};
+
+struct MixtureAnswer {
+    vec3 direction;
+    float pdf;
+    float lobe_density;
+    // The lobes by the weights of the product alone, whatever is known to be blocked.
+    float unguided_lobe_density;
+    float environment_pdf;
+    float brdf_pdf;
+    float lobe_share;
+    float environment_share;
+    float brdf_share;
+    vec3 integrand;
+};
+
+layout(scalar, set = SET_FILM, binding = 0) readonly buffer Queries {
+    MixtureQuery queries[];
+};
+layout(scalar, set = SET_FILM, binding = 1) writeonly buffer Answers {
+    MixtureAnswer answers[];
+};
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= queries.length()) {
+        return;
+    }
+    MixtureQuery query = queries[index];
+    Vertex vertex = load_vertex(query.path, load_hit(query.path));
+    Mixture mixture = load_mixture(query.path, wave_path_count(), lobe_counts[query.path]);
+    vec3 direction = query.direction;
+    if (query.draws != 0u) {
+        MixtureNumbers numbers =
+            MixtureNumbers(query.technique, query.direction_numbers, query.lobe);
+        direction = mixture_sample(vertex, mixture, 0u, numbers);
+    }
+    float sum = 0.0;
+    float unguided = 0.0;
+    for (uint l = 0u; l < mixture.lobe_count; ++l) {
+        ProductLobe lobe = mixture_lobe(mixture, l);
+        sum += lobe.weight;
+        unguided += lobe.weight * lobe.inverse_integral
+            * kernel_value(lobe.axis, lobe.bandwidth, direction);
+    }
+    Considered considered = consider_world(vertex, direction);
+    MixtureAnswer answer;
+    answer.direction = direction;
+    answer.lobe_density = mixture_lobe_density(mixture, direction);
+    answer.pdf = mixture_pdf(mixture, considered, answer.lobe_density);
+    answer.unguided_lobe_density = sum > 0.0 ? unguided / sum : 0.0;
+    answer.environment_pdf = considered.environment_pdf;
+    answer.brdf_pdf = considered.brdf_pdf;
+    answer.lobe_share = mixture.lobe_share;
+    answer.environment_share = mixture.environment_share;
+    answer.brdf_share = mixture.brdf_share;
+    answer.integrand = considered.integrand;
+    answers[index] = answer;
+}

@@ -1,0 +1,39 @@
+// Puts paths into the state that the passes of product sampling find: a ray, the hit it made, and a
+// shadow ray with its outcome. For tests/product.rs.
+#version 460
+
+#define NEEDS_RAYS
+#define WRITES_RAYS
+#define NEEDS_HITS
+#define WRITES_HITS
+#define NEEDS_SHADOW_RAYS
+#define WRITES_SHADOW_RAYS
+#define NEEDS_VISIBILITY
+#define WRITES_VISIBILITY
+#include "layout.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+struct PathInput {
+    vec3 normal;
+    uint material;
+    vec3 outgoing;
+    vec3 shadow_direction;
+    uint is_visible;
+};
+
+layout(scalar, set = SET_FILM, binding = 0) readonly buffer Inputs {
+    PathInput inputs[];
+};
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    if (path >= inputs.length()) {
+        return;
+    }
+    PathInput given = inputs[path];
+    rays[path] = Ray(given.outgoing, 1u, -given.outgoing, 0u);
+    hits[path] = Hit(vec3(0.0), given.material, given.normal, 1.0, given.normal, 0u);
+    shadow_rays[path] = ShadowRay(given.shadow_direction, vec3(1.0));
+    visibility[path] = given.is_visible;
+}

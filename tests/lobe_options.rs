@@ -1,0 +1,152 @@
+//! `product` and `visibility` on the command line: what cannot be done is refused with its remedy, what
+//! cannot be fitted is done without, and what is biased says so.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
+
+#[path = "support/command.rs"]
+mod command;
+
+use command::Folder;
+use fenestra::film::{Image, Statistics};
+
+/// A floor and a ball under an even sky.
+fn scene(radiance: &str, reflectance: &str) -> Folder {
+    let folder = Folder::new();
+    folder.write(
+        "scene.toml",
+        format!(
+            r#"
+[camera]
+position = [0.0, 1.0, 3.0]
+look_at = [0.0, 0.3, 0.0]
+vertical_fov_deg = 45.0
+
+[film]
+width = 24
+height = 16
+
+[environment]
+constant = {radiance}
+
+[[material]]
+name = "clay"
+type = "diffuse"
+reflectance = {reflectance}
+
+[[object]]
+shape = "box"
+size = [4.0, 0.2, 4.0]
+material = "clay"
+translate = [0.0, -0.1, 0.0]
+
+[[object]]
+shape = "sphere"
+radius = 0.5
+material = "clay"
+translate = [0.0, 0.5, 0.0]
+"#
+        ),
+    );
+    folder
+}
+
+fn clay() -> Folder {
+    scene("[1.0, 0.9, 0.8]", "[0.6, 0.4, 0.3]")
+}
+
+/// Few lobes and few samples, then the options given.
+fn run(folder: &Folder, options: &[&str]) -> command::Run {
+    let few = ["environment_lobes=8", "brdf_lobes=4", "views=4", "lobes=8"];
+    let mut arguments = vec!["render", "scene.toml", "-o", "out.exr", "--spp", "2"];
+    arguments.extend(["--stats", "stats.json", "--validate"]);
+    arguments.extend(few.iter().flat_map(|assignment| ["--set", assignment]));
+    arguments.extend(options);
+    folder.run(&arguments)
+}
+
+fn statistics(folder: &Folder) -> Statistics {
+    let text = std::fs::read_to_string(folder.path().join("stats.json")).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+#[test]
+fn what_cannot_be_rendered_is_refused_with_its_remedy() {
+    let folder = clay();
+    for (options, parts) in [
+        (
+            &["--set", "cache=pixel", "--depth", "2"][..],
+            &["cache=pixel", "--depth 2", "use --depth 1 or cache=hit"][..],
+        ),
+        (
+            &["--set", "brdf_share=0.7", "--set", "environment_share=0.7"],
+            &["brdf_share=0.7 and environment_share=0.7", "at most 1"],
+        ),
+        (
+            &["--set", "environment_lobes=1000", "--set", "brdf_lobes=64"],
+            &["64000 products", "at most 25000"],
+        ),
+        (&["--set", "tau=wide"], &["--set tau=wide: expected 0 to 100"]),
+        (&["--set", "lobe=3"], &["--set lobe: unknown parameter", "cache_capacity"]),
+        (&["--set", "cache"], &["--set cache: expected key=value"]),
+        (&["--shadow-rays", "0"], &["--shadow-rays"]),
+        (&["--shadow-rays", "4097"], &["--shadow-rays 4097: expected at most 4096"]),
+    ] {
+        let options = [&["--sampler", "visibility"][..], options].concat();
+        run(&folder, &options).assert(2, parts);
+        assert!(!folder.path().join("out.exr").exists(), "{options:?} left an image");
+    }
+}
+
+#[test]
+fn a_render_whose_pixels_keep_caches_is_not_resumed() {
+    let folder = clay();
+    let options = ["--sampler", "visibility", "--checkpoint-interval", "1h", "--set"];
+    let pixel = [&options[..], &["cache=pixel"]].concat();
+    run(&folder, &pixel).assert(0, &[]);
+    let resume = [&pixel[..], &["--resume"]].concat();
+    let parts = ["--resume with --set cache=pixel", "--sample-offset 2", "use cache=hit"];
+    run(&folder, &resume).assert(2, &parts);
+    // The remedies work.
+    let rest = ["--sample-offset", "2", "-o", "rest.exr"];
+    let mut arguments = vec!["render", "scene.toml", "--spp", "2", "--sampler", "visibility"];
+    arguments.extend(["--set", "cache=pixel", "--set", "environment_lobes=8", "--set"]);
+    arguments.extend(["brdf_lobes=4", "--set", "views=4", "--set", "lobes=8"]);
+    arguments.extend(["--checkpoint-interval", "1h"]);
+    arguments.extend(rest);
+    folder.run(&arguments).assert(0, &[]);
+    let merge = ["merge", "out.checkpoint.exr", "rest.checkpoint.exr", "-o", "both.exr"];
+    let present = folder.files();
+    assert!(present.iter().any(|name| name.contains("checkpoint")), "{present:?}");
+    folder.run(&merge).assert(0, &[]);
+    let hit = [&options[..], &["cache=hit"]].concat();
+    run(&folder, &hit).assert(0, &[]);
+    run(&folder, &[&hit[..], &["--resume", "--spp", "3"]].concat()).assert(0, &[]);
+}
+
+#[test]
+fn what_cannot_be_fitted_is_done_without() {
+    for (folder, what) in [
+        (scene("[0.0, 0.0, 0.0]", "[0.6, 0.4, 0.3]"), "environment"),
+        (scene("[1.0, 0.9, 0.8]", "[0.0, 0.0, 0.0]"), "clay"),
+    ] {
+        for sampler in ["product", "visibility"] {
+            let run = run(&folder, &["--sampler", sampler]);
+            run.assert(0, &["sampling does without its lobes"]);
+            assert!(run.messages.contains(what), "{what} in {}", run.messages);
+            let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+            // The floor fills the lower edge.
+            assert_eq!(image.channels["R"].last(), Some(&0.0), "{what}, {sampler}");
+            assert_eq!(statistics(&folder).dropped_samples, 0);
+        }
+    }
+}
+
+#[test]
+fn the_walk_is_named_biased() {
+    let folder = clay();
+    let run = run(&folder, &["--sampler", "product", "--set", "elevation=metropolis"]);
+    run.assert(0, &["elevation=metropolis", "biased"]);
+    let statistics = statistics(&folder);
+    assert_eq!(statistics.sampler_parameters["elevation"], "metropolis (biased)");
+    let info = folder.run(&["info", "out.exr"]);
+    assert!(info.output.contains("metropolis (biased)"), "{}", info.output);
+}

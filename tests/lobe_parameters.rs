@@ -1,0 +1,367 @@
+//! `product` and `visibility` with parameters that are not their defaults: images are those of `mis`,
+//! counters are those that scenes call for, and what cannot be rendered is refused.
+//!
+//! Images are compared by 12 block means × 3 channels of 8 + 8 replicates, as in `unbiased.rs`; a value
+//! raises a false alarm, |t| > 7.5, with a chance of 3e-6, so the 10 comparisons once in 900 runs.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+mod support;
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use fenestra::{
+    film::Sums,
+    renderer::{Renderer, Settings, Totals},
+    sampler::{CacheScope, LobeOrder, LobeParameters, Parameters, Sampler, Threshold},
+    scene::Scene,
+};
+use glam::Vec3;
+use support::scenes;
+
+/// One test at a time: the validation layers were seen to crash when several threads made and dropped
+/// renderers at once.
+fn alone() -> MutexGuard<'static, ()> {
+    static LOCK: Mutex<()> = Mutex::new(());
+    LOCK.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+const REPLICATES: u32 = 8;
+const BLOCK: u32 = 8;
+const LIMIT: f64 = 7.5;
+
+/// Parameters by `--set` assignments, on top of few lobes.
+fn parameters(assignments: &[&str]) -> Parameters {
+    let mut parameters = Parameters::default();
+    // A preset replaces all: it comes first, and the numbers of lobes after it.
+    let (presets, others): (Vec<&str>, Vec<&str>) =
+        assignments.iter().partition(|assignment| assignment.starts_with("preset="));
+    let few = ["environment_lobes=40", "brdf_lobes=8", "views=16", "lobes=32"];
+    for assignment in presets.iter().chain(&few).chain(&others) {
+        parameters.set(assignment).unwrap();
+    }
+    parameters
+}
+
+fn settings(sampler: Sampler, assignments: &[&str]) -> Settings {
+    Settings { sampler, parameters: parameters(assignments), ..Settings::default() }
+}
+
+fn render(scene: &Scene, settings: Settings, samples: u32) -> (Sums, Totals) {
+    let mut renderer = Renderer::new(support::device(), scene, settings).unwrap();
+    renderer.render_pass(samples).unwrap();
+    let sums = renderer.sums().unwrap();
+    support::assert_silent();
+    (sums, renderer.totals().clone())
+}
+
+/// Mean and squared standard error of every block mean over the replicates.
+fn replicates(scene: &Scene, settings: Settings, samples: u32) -> Vec<(f64, f64)> {
+    let first_seed = 500 * settings.sampler.tag();
+    let mut renderer = Renderer::new(support::device(), scene, settings).unwrap();
+    let rows: Vec<Vec<f64>> = (0..REPLICATES)
+        .map(|replicate| {
+            renderer.restart(first_seed + replicate).unwrap();
+            renderer.render_pass(samples).unwrap();
+            assert_eq!(renderer.totals().dropped_samples, 0);
+            let sums = renderer.sums().unwrap();
+            let blocks_per_row = sums.width / BLOCK;
+            let mut means = vec![0.0; 3 * (blocks_per_row * (sums.height / BLOCK)) as usize];
+            for pixel in 0..sums.pixel_count() {
+                let (x, y) = (pixel as u32 % sums.width, pixel as u32 / sums.width);
+                let block = (y / BLOCK * blocks_per_row + x / BLOCK) as usize;
+                for (channel, value) in sums.mean(pixel).into_iter().enumerate() {
+                    means[3 * block + channel] += value / f64::from(BLOCK * BLOCK);
+                }
+            }
+            means
+        })
+        .collect();
+    support::assert_silent();
+    let count = f64::from(REPLICATES);
+    (0..rows[0].len())
+        .map(|index| {
+            let mean = rows.iter().map(|row| row[index]).sum::<f64>() / count;
+            let squares = rows.iter().map(|row| (row[index] - mean).powi(2)).sum::<f64>();
+            (mean, squares / (count * (count - 1.0)))
+        })
+        .collect()
+}
+
+fn largest_deviation(a: &[(f64, f64)], b: &[(f64, f64)]) -> f64 {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a.0 - b.0).abs() / (a.1 + b.1).sqrt().max(1e-12))
+        .fold(0.0, f64::max)
+}
+
+/// Compares the sampler with every list of assignments with `mis`.
+fn agree(scene: &Scene, samples: u32, cases: &[(Sampler, &[&str])]) {
+    let mis = Settings { shadow_rays: 16, ..Settings::default() };
+    let reference = replicates(scene, mis, 4 * samples);
+    let expected: f64 = reference.iter().map(|value| value.0).sum();
+    for (sampler, assignments) in cases {
+        let values = replicates(scene, settings(*sampler, assignments), samples);
+        let deviation = largest_deviation(&values, &reference);
+        let ratio = values.iter().map(|value| value.0).sum::<f64>() / expected;
+        let name = format!("{} {} {assignments:?}", scene.name, sampler.name());
+        eprintln!("{name}: largest |t| {deviation:.2}, ratio {ratio:.4}");
+        assert!(deviation < LIMIT, "{name}: |t| = {deviation}");
+        let wrong: Vec<_> = values.iter().map(|(mean, v)| (1.1 * mean, 1.21 * v)).collect();
+        assert!(
+            largest_deviation(&wrong, &reference) > LIMIT || (ratio - 1.0).abs() < 0.03,
+            "{name}: too noisy to judge"
+        );
+    }
+}
+
+#[test]
+fn parameters_change_no_image_in_a_room() {
+    let _alone = alone();
+    let scene = scenes::room(vec![
+        scenes::diffuse(Vec3::splat(0.6)),
+        scenes::copper(0.2),
+        scenes::plastic(0.3),
+    ]);
+    agree(
+        &scene,
+        48,
+        &[
+            (Sampler::Visibility, &["preset=strict"]),
+            (Sampler::Visibility, &["cache=pixel"]),
+            (Sampler::Visibility, &["cache=pixel", "count_visible=yes", "cache_capacity=2", "k=4"]),
+            (Sampler::Visibility, &["count_visible=yes", "tau=2"]),
+            (Sampler::Visibility, &["threshold=fixed", "cache_capacity=2", "k=4"]),
+            (Sampler::Visibility, &["lobes=1"]),
+            (Sampler::Product, &["order=coefficient", "lobes=1", "brdf_share=0.5"]),
+        ],
+    );
+}
+
+#[test]
+fn parameters_change_no_image_of_glossy_things_in_the_open() {
+    let _alone = alone();
+    let scene = scenes::open(vec![
+        scenes::diffuse(Vec3::new(0.5, 0.4, 0.3)),
+        scenes::plastic(0.05),
+        scenes::copper(0.08),
+    ]);
+    agree(
+        &scene,
+        32,
+        &[
+            (Sampler::Visibility, &["order=coefficient", "cache=pixel"]),
+            (Sampler::Visibility, &["preset=strict", "brdf_lobes=2", "views=1"]),
+            (Sampler::Product, &["environment_lobes=1", "brdf_lobes=1", "lobes=1"]),
+        ],
+    );
+}
+
+/// A box around the camera: every direction from every hit is blocked.
+fn closed_box() -> Scene {
+    let mut scene = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5))]);
+    scenes::add_box(&mut scene.geometry, Vec3::new(0.0, 1.0, 0.0), Vec3::splat(9.0), 0);
+    scene
+}
+
+const PIXELS: u64 = 32 * 24;
+
+#[test]
+fn where_everything_is_blocked_all_rays_but_the_last_are_learned_from() {
+    let _alone = alone();
+    let scene = closed_box();
+    for (cache, recorded) in [("cache=hit", 4), ("cache=pixel", 5)] {
+        let (sums, totals) = render(&scene, settings(Sampler::Visibility, &[cache]), 3);
+        assert!((0..sums.pixel_count()).all(|pixel| sums.mean(pixel) == [0.0; 3]));
+        assert_eq!(totals.product_hits, 3 * PIXELS);
+        assert_eq!(totals.shadow_rays_visible, 0);
+        // Directions below the horizon are drawn too; they bring nothing and are not traced. What the
+        // last ray of a hit finds is of use to the next sample of its pixel only.
+        let traced = totals.shadow_rays_traced as f64 / (15 * PIXELS) as f64;
+        let entries = totals.cache_entries as f64 / totals.shadow_rays_traced as f64;
+        assert!((0.7..=1.0).contains(&traced), "{cache}: {traced} traced");
+        let expected = f64::from(recorded) / 5.0;
+        assert!((entries - expected).abs() < 0.01, "{cache}: {entries}, expected {expected}");
+        if cache == "cache=hit" {
+            assert_eq!(totals.cdf_rebuilds, totals.cache_entries, "one rebuild for every entry");
+        }
+        let statistics = totals.sampler_statistics();
+        let per_hit = totals.cache_entries as f64 / totals.product_hits as f64;
+        assert_eq!(statistics["cache_entries_per_hit"], per_hit);
+        assert!(totals.lobes_kept <= 32 * totals.product_hits);
+        assert!(statistics["energy_kept"] > 0.0 && statistics["energy_kept"] <= 1.0);
+    }
+}
+
+#[test]
+fn where_nothing_is_blocked_nothing_is_learned() {
+    let _alone = alone();
+    let scene = scenes::plane(Vec3::splat(0.5), scenes::sky());
+    let pixels = u64::from(scene.film.width * scene.film.height);
+    let (guided, totals) = render(&scene, settings(Sampler::Visibility, &[]), 4);
+    assert_eq!(totals.product_hits, 4 * pixels, "the plane fills the image");
+    assert_eq!((totals.cache_entries, totals.cdf_rebuilds), (0, 0));
+    assert_eq!(totals.shadow_rays_visible, totals.shadow_rays_traced);
+    // k counts for nothing then.
+    let (same, _) = render(&scene, settings(Sampler::Visibility, &["k=7", "tau=3"]), 4);
+    for pixel in 0..guided.pixel_count() {
+        assert_eq!(guided.mean(pixel), same.mean(pixel), "pixel {pixel}");
+    }
+    // Visible directions, where they are recorded, are those of all rays but the last.
+    let (_, totals) = render(&scene, settings(Sampler::Visibility, &["count_visible=yes"]), 4);
+    let share = totals.cache_entries as f64 / totals.shadow_rays_traced as f64;
+    assert!((share - 0.8).abs() < 0.01, "{share} of the visible rays recorded");
+    assert_eq!(totals.cdf_rebuilds, totals.cache_entries);
+    // Pixels that see no surface have no product.
+    let scene = scenes::convex_furnace(scenes::diffuse(Vec3::splat(0.5)), Vec3::ONE);
+    let (sums, totals) = render(&scene, settings(Sampler::Product, &[]), 2);
+    let empty = (0..sums.pixel_count()).filter(|pixel| sums.mean(*pixel) == [1.0; 3]).count();
+    assert!(empty > 0 && totals.product_hits < 2 * sums.pixel_count() as u64);
+    assert!(totals.product_hits >= 2 * (sums.pixel_count() - empty - 40) as u64);
+    assert_eq!((totals.cache_entries, totals.cdf_rebuilds), (0, 0), "product keeps no cache");
+}
+
+#[test]
+fn darkness_is_black_and_a_black_surface_too() {
+    let _alone = alone();
+    let mut dark = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5)), scenes::plastic(0.2)]);
+    dark.environment = scenes::environment(16, |_| Vec3::ZERO);
+    let mut black = scenes::open(vec![scenes::diffuse(Vec3::ZERO)]);
+    black.environment = scenes::environment(16, |_| Vec3::ONE);
+    for sampler in [Sampler::Product, Sampler::Visibility] {
+        let (sums, totals) = render(&dark, settings(sampler, &[]), 2);
+        assert_eq!((totals.product_hits, totals.dropped_samples), (0, 0), "no fit, no lobes");
+        assert!((0..sums.pixel_count()).all(|pixel| sums.mean(pixel) == [0.0; 3]));
+        let (sums, totals) = render(&black, settings(sampler, &["cache_capacity=1"]), 2);
+        assert_eq!((totals.product_hits, totals.dropped_samples), (0, 0), "no fit, no lobes");
+        for pixel in 0..sums.pixel_count() {
+            let mean = sums.mean(pixel);
+            assert!(mean == [0.0; 3] || mean[0] <= 1.0 && mean[0] > 0.0, "{mean:?}");
+        }
+        assert_eq!(sums.mean(sums.pixel_count() - 1), [0.0; 3], "the ground is black");
+    }
+    // A black surface beside others leaves them their lobes.
+    let mixed = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5)), scenes::diffuse(Vec3::ZERO)]);
+    let (_, totals) = render(&mixed, settings(Sampler::Visibility, &[]), 2);
+    assert!(totals.product_hits > 0 && totals.product_hits < 2 * PIXELS);
+}
+
+#[test]
+fn without_shadow_rays_there_is_what_the_camera_sees() {
+    let _alone = alone();
+    let scene = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5))]);
+    let none = |sampler| Settings { shadow_rays: 0, ..settings(sampler, &[]) };
+    let (expected, _) = render(&scene, none(Sampler::Mis), 2);
+    for sampler in [Sampler::Product, Sampler::Visibility] {
+        let (sums, totals) = render(&scene, none(sampler), 2);
+        assert_eq!((totals.product_hits, totals.shadow_rays_traced), (0, 0));
+        for pixel in 0..sums.pixel_count() {
+            assert_eq!(sums.mean(pixel), expected.mean(pixel), "pixel {pixel}");
+        }
+    }
+}
+
+#[test]
+fn one_ray_teaches_nothing_but_the_pixel() {
+    let _alone = alone();
+    let scene = closed_box();
+    let one = |assignments: &[&str]| {
+        let settings = Settings { shadow_rays: 1, ..settings(Sampler::Visibility, assignments) };
+        render(&scene, settings, 4).1
+    };
+    let hit = one(&[]);
+    assert_eq!((hit.cache_entries, hit.cdf_rebuilds), (0, 0));
+    let pixel = one(&["cache=pixel"]);
+    assert_eq!(pixel.cache_entries, pixel.shadow_rays_traced);
+    assert!(pixel.cdf_rebuilds > 2 * PIXELS && pixel.cdf_rebuilds <= 3 * PIXELS);
+}
+
+#[test]
+fn grouping_of_passes_changes_nothing_where_pixels_keep_caches() {
+    let _alone = alone();
+    let scene = scenes::room(vec![scenes::diffuse(Vec3::splat(0.6)), scenes::copper(0.3)]);
+    let render = |passes: &[u32]| {
+        let settings = settings(Sampler::Visibility, &["cache=pixel"]);
+        let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
+        for samples in passes {
+            renderer.render_pass(*samples).unwrap();
+        }
+        let first = renderer.sums().unwrap();
+        // Another picture by the same renderer starts from empty caches.
+        renderer.restart(0).unwrap();
+        renderer.render_pass(passes.iter().sum()).unwrap();
+        (first, renderer.sums().unwrap())
+    };
+    let (whole, again) = render(&[6]);
+    let (parts, _) = render(&[1, 3, 2]);
+    for pixel in 0..whole.pixel_count() {
+        assert_eq!(whole.mean(pixel), parts.mean(pixel), "pixel {pixel}");
+        assert_eq!(whole.mean(pixel), again.mean(pixel), "pixel {pixel} after a restart");
+    }
+}
+
+#[test]
+fn sums_taught_by_caches_that_are_gone_are_not_continued() {
+    let _alone = alone();
+    let scene = scenes::plane(Vec3::splat(0.5), scenes::sky());
+    let settings = |cache| settings(Sampler::Visibility, &[cache]);
+    let new = |cache| Renderer::new(support::device(), &scene, settings(cache)).unwrap();
+    let mut first = new("cache=pixel");
+    let empty = first.sums().unwrap();
+    first.render_pass(3).unwrap();
+    let sums = first.sums().unwrap();
+    let error = new("cache=pixel").restore(&sums).unwrap_err().to_string();
+    for part in ["--resume", "cache=pixel", "3 samples", "--sample-offset 3", "cache=hit"] {
+        assert!(error.contains(part), "expected {part:?} in {error}");
+    }
+    new("cache=pixel").restore(&empty).unwrap();
+    new("cache=hit").restore(&sums).unwrap();
+}
+
+#[test]
+fn presets_are_the_parameters_they_name() {
+    let strict = {
+        let mut parameters = Parameters::default();
+        parameters.set("preset=strict").unwrap();
+        parameters.lobes
+    };
+    assert_eq!(strict, LobeParameters::strict());
+    assert_eq!(strict.order, LobeOrder::Coefficient);
+    assert_eq!((strict.cache, strict.threshold), (CacheScope::Hit, Threshold::Sigma));
+    assert!(strict.brdf_share > 0.0, "something must cover the hemisphere");
+}
+
+#[test]
+fn every_range_is_named_where_it_is_left() {
+    for (key, bad, range) in [
+        ("environment_lobes", ["0", "1001"], "1 to 1000"),
+        ("brdf_lobes", ["0", "65"], "1 to 64"),
+        ("views", ["0", "257"], "1 to 256"),
+        ("lobes", ["0", "513"], "1 to 512"),
+        ("order", ["", "size"], "integral or coefficient"),
+        ("brdf_share", ["0", "1.01"], "0.001 to 1"),
+        ("environment_share", ["-0.1", "1"], "0 to 0.999"),
+        ("k", ["-1", "inf"], "0 to 16"),
+        ("tau", ["-1", "NaN"], "0 to 100"),
+        ("threshold", ["0", "angle"], "sigma or fixed"),
+        ("cache", ["scene", "Hit"], "hit or pixel"),
+        ("cache_capacity", ["0", "65"], "1 to 64"),
+        ("count_visible", ["1", "true"], "no or yes"),
+        ("elevation", ["walk", "0"], "inverse or metropolis"),
+        ("preset", ["none", "thesis"], "default or strict"),
+    ] {
+        assert!(LobeParameters::KEYS.contains(&key), "{key}");
+        for value in bad {
+            let error = Parameters::default().set(&format!("{key}={value}")).unwrap_err();
+            let expected = format!("--set {key}={value}: expected {range}");
+            assert!(error.to_string().contains(&expected), "{error}, expected {expected}");
+        }
+    }
+    assert_eq!(LobeParameters::KEYS.len(), 15, "every parameter is in the list above");
+}
+
+#[test]
+fn the_walk_is_named_biased() {
+    let named = parameters(&["elevation=metropolis"]).describe(Sampler::Product);
+    assert_eq!(named["elevation"], "metropolis (biased)");
+    assert_eq!(parameters(&[]).describe(Sampler::Visibility)["elevation"], "inverse");
+}
