@@ -53,10 +53,14 @@ fn clay() -> Folder {
     scene("[1.0, 0.9, 0.8]", "[0.6, 0.4, 0.3]")
 }
 
-/// Few lobes and few samples, then the options given.
+/// Two samples with few lobes to out.exr, with the options given.
 fn run(folder: &Folder, options: &[&str]) -> command::Run {
+    run_to(folder, "out.exr", "2", options)
+}
+
+fn run_to(folder: &Folder, output: &str, spp: &str, options: &[&str]) -> command::Run {
     let few = ["environment_lobes=8", "brdf_lobes=4", "views=4", "lobes=8"];
-    let mut arguments = vec!["render", "scene.toml", "-o", "out.exr", "--spp", "2"];
+    let mut arguments = vec!["render", "scene.toml", "-o", output, "--spp", spp];
     arguments.extend(["--stats", "stats.json", "--validate"]);
     arguments.extend(few.iter().flat_map(|assignment| ["--set", assignment]));
     arguments.extend(options);
@@ -97,35 +101,41 @@ fn what_cannot_be_rendered_is_refused_with_its_remedy() {
 }
 
 #[test]
-fn a_render_whose_pixels_keep_caches_is_not_resumed() {
+fn a_render_whose_pixels_keep_caches_is_not_resumed_but_merged() {
     let folder = clay();
     let options = ["--sampler", "visibility", "--checkpoint-interval", "1h", "--set"];
     let pixel = [&options[..], &["cache=pixel"]].concat();
     run(&folder, &pixel).assert(0, &[]);
-    let resume = [&pixel[..], &["--resume"]].concat();
     let parts = ["--resume with --set cache=pixel", "--sample-offset 2", "use cache=hit"];
-    run(&folder, &resume).assert(2, &parts);
-    // The remedies work.
-    let rest = ["--sample-offset", "2", "-o", "rest.exr"];
-    let mut arguments = vec!["render", "scene.toml", "--spp", "2", "--sampler", "visibility"];
-    arguments.extend(["--set", "cache=pixel", "--set", "environment_lobes=8", "--set"]);
-    arguments.extend(["brdf_lobes=4", "--set", "views=4", "--set", "lobes=8"]);
-    arguments.extend(["--checkpoint-interval", "1h"]);
-    arguments.extend(rest);
-    folder.run(&arguments).assert(0, &[]);
+    run(&folder, &[&pixel[..], &["--resume"]].concat()).assert(2, &parts);
+    let rest = [&pixel[..], &["--sample-offset", "2"]].concat();
+    run_to(&folder, "rest.exr", "3", &rest).assert(0, &[]);
     let merge = ["merge", "out.checkpoint.exr", "rest.checkpoint.exr", "-o", "both.exr"];
-    let present = folder.files();
-    assert!(present.iter().any(|name| name.contains("checkpoint")), "{present:?}");
     folder.run(&merge).assert(0, &[]);
-    let hit = [&options[..], &["cache=hit"]].concat();
-    run(&folder, &hit).assert(0, &[]);
-    run(&folder, &[&hit[..], &["--resume", "--spp", "3"]].concat()).assert(0, &[]);
+}
+
+#[test]
+fn a_render_with_lobes_continued_from_its_checkpoint_has_the_same_bits() {
+    let folder = clay();
+    for sampler in ["product", "visibility"] {
+        let options = ["--sampler", sampler, "--checkpoint-interval", "1h"];
+        run_to(&folder, "whole.exr", "5", &options).assert(0, &[]);
+        run(&folder, &options).assert(0, &[]);
+        let resume = [&options[..], &["--resume"]].concat();
+        run_to(&folder, "out.exr", "5", &resume).assert(0, &[]);
+        assert_eq!(statistics(&folder).samples_per_pixel, 5);
+        let channels = |name| Image::read_exr(&folder.path().join(name)).unwrap().channels;
+        assert_eq!(channels("out.exr"), channels("whole.exr"), "{sampler}");
+        // Other lobes are another render.
+        let others = [&resume[..], &["--set", "environment_lobes=9"]].concat();
+        run_to(&folder, "out.exr", "6", &others).assert(1, &["environment_lobes: 8 against 9"]);
+    }
 }
 
 #[test]
 fn what_cannot_be_fitted_is_done_without() {
     for (folder, what) in [
-        (scene("[0.0, 0.0, 0.0]", "[0.6, 0.4, 0.3]"), "environment"),
+        (scene("[0.0, 0.0, 0.0]", "[0.6, 0.4, 0.3]"), "the map is black"),
         (scene("[1.0, 0.9, 0.8]", "[0.0, 0.0, 0.0]"), "clay"),
     ] {
         for sampler in ["product", "visibility"] {

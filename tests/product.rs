@@ -352,7 +352,7 @@ impl Paths {
     }
 
     /// One direction per path from its lobes alone.
-    fn from_lobes(&self, index: u32) -> Vec<DVec3> {
+    fn draw_lobes(&self, index: u32) -> Vec<DVec3> {
         let queries: Vec<_> = (0..self.surfaces.len() as u32)
             .map(|path| {
                 let u = materials::uniform(index, 900 + path);
@@ -515,7 +515,7 @@ fn every_state_of_the_cache(paths: &Paths, feeds: &[u32], outcome: impl Fn(u32) 
     for (state, feed) in feeds.iter().enumerate() {
         for _ in 0..*feed {
             let index = history.len() as u32;
-            let directions = paths.from_lobes(index);
+            let directions = paths.draw_lobes(index);
             let outcomes: Vec<_> =
                 directions.into_iter().map(|direction| (direction, outcome(index))).collect();
             paths.learn(&outcomes);

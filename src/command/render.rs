@@ -188,6 +188,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.load_guide {
         guide::load(&mut renderer, path)?;
     }
+    job.metadata.fit_hashes = renderer.fit_hashes();
     job.resume(&mut renderer)?;
 
     let reason = job.render(&mut renderer, &interrupted)?;
@@ -480,7 +481,6 @@ impl<'a> Job<'a> {
                 .iter()
                 .map(|(pass, ms)| (pass.clone(), ms * 1e-3))
                 .collect(),
-            fit_hashes: renderer.fit_hashes(),
             ..self.metadata.clone()
         }
     }
