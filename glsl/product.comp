@@ -63,7 +63,7 @@ const float NO_STRENGTH = -1e30;
 uint histogram[BINS];
 vec4 brdf[GROUP];
 // A bit for each BRDF lobe of a group whose product with an environment lobe is kept.
-uint stronger[GROUPS * ENVIRONMENT_LOBES];
+uint stronger[GROUPS * (ENVIRONMENT_LOBES > 0u ? ENVIRONMENT_LOBES : 1u)];
 // BRDF lobe and environment lobe of what is kept, 16 bits each.
 uint selected[KEPT_LOBES];
 

