@@ -244,6 +244,9 @@ void main() {
     float theta = atan(sine, max(cosine, 0.0));
     uint nearest = min(uint(theta * (2.0 / PI) * float(VIEWS)), VIEWS - 1u);
     uvec2 material = texelFetch(material_lobes, int(hit.material)).xy;
+    if (material.y == 0u) {
+        return;
+    }
     view.lobe_count = min(material.y, BRDF_LOBES);
     view.first_lobe = material.x + nearest * material.y;
 
