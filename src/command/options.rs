@@ -59,6 +59,16 @@ pub fn parse_crop(text: &str) -> Result<Window, String> {
     }
 }
 
+/// Parses `x,y` in pixels.
+///
+/// # Errors
+/// A message with the expected form.
+pub fn parse_pixel(text: &str) -> Result<[u32; 2], String> {
+    text.split_once(',')
+        .and_then(|(x, y)| Some([x.trim().parse().ok()?, y.trim().parse().ok()?]))
+        .ok_or_else(|| format!("expected x,y in pixels from the upper left, found {text:?}"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -80,6 +90,14 @@ mod tests {
         assert_eq!(parse_size("640x480"), Ok([640, 480]));
         for wrong in ["640", "0x480", "640x", "640x99999", "640x-1", "axb"] {
             assert!(parse_size(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn pixels_have_two_coordinates() {
+        assert_eq!(parse_pixel("12, 7"), Ok([12, 7]));
+        for wrong in ["", "1", "1,2,3", "-1,2", "1.5,2", "a,b"] {
+            assert!(parse_pixel(wrong).is_err(), "{wrong}");
         }
     }
 

@@ -92,6 +92,8 @@ pub struct Passes {
     bounce: Pipeline,
     features: Pipeline,
     accumulate: Pipeline,
+    /// Shadow rays per hit that the passes were made for.
+    most_shadow_rays: u32,
 }
 
 impl Passes {
@@ -155,12 +157,22 @@ impl Passes {
             )?,
             features: create("features", &[(CONSTANT_MATERIAL_KINDS, settings.material_kinds)])?,
             accumulate: create("accumulate", &[])?,
+            most_shadow_rays: settings.shadow_rays,
             settings,
         })
     }
 
+    /// Traces fewer shadow rays per hit from now on than the passes were made for.
+    ///
+    /// # Panics
+    /// If there are more: buffers have no room for them.
+    pub fn limit_shadow_rays(&mut self, shadow_rays: u32) {
+        assert!(shadow_rays <= self.most_shadow_rays, "buffers have room for {shadow_rays}");
+        self.settings.shadow_rays = shadow_rays;
+    }
+
     /// Shadow rays per hit in one group of dispatches.
-    fn rays_per_group(&self) -> u32 {
+    pub fn rays_per_group(&self) -> u32 {
         if self.lobes.as_ref().is_some_and(Lobes::learns_from_rays) {
             1
         } else {

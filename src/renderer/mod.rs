@@ -3,6 +3,7 @@
 mod film_buffers;
 mod guide_buffers;
 mod lobe_buffers;
+mod pixel;
 mod scene_buffers;
 mod totals;
 mod wave_buffers;
@@ -25,6 +26,7 @@ use crate::{
 use film_buffers::FilmBuffers;
 use guide_buffers::GuideBuffers;
 pub use lobe_buffers::LobeBuffers;
+pub use pixel::{RecordedLobe, RecordedPixel, RecordedRay};
 pub use scene_buffers::SceneBuffers;
 pub use totals::Totals;
 pub use wave_buffers::{LobeRoom, WaveBuffers};

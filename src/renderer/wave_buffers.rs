@@ -131,6 +131,11 @@ impl WaveBuffers {
         Ok(())
     }
 
+    /// The buffer of that name, to read it back.
+    pub fn buffer(&self, name: &str) -> Option<&Buffer> {
+        self.buffers.iter().find(|buffer| buffer.name() == name)
+    }
+
     /// The wave set.
     pub fn set(&self) -> &DescriptorSet {
         &self.set

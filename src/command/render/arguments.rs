@@ -1,0 +1,157 @@
+//! Options of `fenestra render`.
+
+use std::{path::PathBuf, time::Duration};
+
+use super::{
+    super::{
+        guide,
+        options::{parse_crop, parse_duration, parse_pixel, parse_size},
+    },
+    DEFAULT_SPP,
+};
+use crate::{
+    error::{Error, Result},
+    film::{Aov, is_special_file},
+    renderer::{Settings, Window},
+    sampler::{Parameters, Sampler},
+};
+
+/// Arguments of `render`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Scene file (.toml).
+    pub scene: PathBuf,
+    /// Image to write; named after the scene in the working folder if absent.
+    #[arg(short, long, value_name = "FILE.exr", visible_alias = "outfile")]
+    pub output: Option<PathBuf>,
+    /// How directions are chosen at a hit.
+    #[arg(long, value_enum, default_value = "mis")]
+    pub sampler: Sampler,
+    /// Stop after this many camera paths per pixel (64 if no stop rule is given).
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub spp: Option<u32>,
+    /// Stop after this much wall time of passes: 500ms, 30s, 5m, 1h.
+    #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
+    pub time: Option<Duration>,
+    /// Stop when the mean relative standard error is below this; stopping by the data is slightly
+    /// biased.
+    #[arg(long, value_name = "E")]
+    pub error: Option<f64>,
+    /// Directions traced at every vertex of every camera path.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
+    pub shadow_rays: u32,
+    /// Path vertices at which environment light is gathered; 1 is direct light.
+    #[arg(long, value_name = "D", default_value_t = 1)]
+    pub depth: u32,
+    /// Path vertex from which russian roulette may end a path.
+    #[arg(long, value_name = "D", default_value_t = 8)]
+    pub roulette_depth: u32,
+    /// Film size in pixels instead of the scene's.
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub size: Option<[u32; 2]>,
+    /// Render only pixels x0 ≤ x < x1, y0 ≤ y < y1.
+    #[arg(long, value_name = "x0,y0,x1,y1", value_parser = parse_crop)]
+    pub crop: Option<Window>,
+    /// Seed of the random numbers.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u32,
+    /// Index of the first sample of every pixel, to render disjoint parts for `merge`.
+    #[arg(long, value_name = "K", default_value_t = 0)]
+    pub sample_offset: u32,
+    /// Continue from the checkpoint of the output, if there is one.
+    #[arg(long)]
+    pub resume: bool,
+    /// Write a checkpoint this often and at the end.
+    #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
+    pub checkpoint_interval: Option<Duration>,
+    /// Device to use, by index or part of its name; see `fenestra devices`.
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
+    /// Run with the Vulkan validation layers; any message fails the command.
+    #[arg(long)]
+    pub validate: bool,
+    /// Write statistics as JSON.
+    #[arg(long, value_name = "FILE.json")]
+    pub stats: Option<PathBuf>,
+    /// Write a PNG preview beside the image.
+    #[arg(long)]
+    pub png: bool,
+    /// Exposure of the preview, stops.
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub exposure: f32,
+    /// Show the image as it is rendered in the viewer tev, which listens at this address.
+    #[arg(long, value_name = "HOST:PORT")]
+    pub display_server: Option<String>,
+    /// Write pictures that explain how the sampler saw the first hit of this pixel.
+    #[arg(long, value_name = "X,Y", value_parser = parse_pixel)]
+    pub pixel: Option<[u32; 2]>,
+    /// Extra layers of the image.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
+    pub aov: Vec<Aov>,
+    /// Sampler parameter, may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Write what the sampler `guided` has learned.
+    #[arg(long, value_name = "FILE.guide")]
+    pub save_guide: Option<PathBuf>,
+    /// Start from what an earlier render under the same environment learned, instead of training.
+    #[arg(long, value_name = "FILE.guide")]
+    pub load_guide: Option<PathBuf>,
+    /// A small, fast version: film at most 240 pixels wide, 16 samples.
+    #[arg(long)]
+    pub quick: bool,
+    /// No progress and no messages but errors.
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+impl Arguments {
+    /// What the renderer is told.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for options that contradict each other or are out of range.
+    pub(super) fn settings(&self) -> Result<Settings> {
+        if let Some(output) = &self.output
+            && output.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("exr"))
+            && !is_special_file(output)
+        {
+            return Err(Error::usage(format!(
+                "--output {}: expected a name that ends in .exr; --png writes a preview beside it",
+                output.display()
+            )));
+        }
+        let (save, load) = (self.save_guide.as_deref(), self.load_guide.as_deref());
+        guide::check(self.sampler, save, load)?;
+        let mut parameters = Parameters::default();
+        for assignment in &self.set {
+            parameters.set(assignment)?;
+        }
+        if let Some(error) = self.error
+            && (error.is_nan() || error <= 0.0)
+        {
+            return Err(Error::usage(format!("--error {error}: expected a positive number")));
+        }
+        let spp = self.spp.unwrap_or(DEFAULT_SPP);
+        if self.sample_offset.checked_add(spp).is_none() {
+            return Err(Error::usage(format!(
+                "--sample-offset {} and {spp} samples per pixel: the last sample must be below {}",
+                self.sample_offset,
+                u32::MAX
+            )));
+        }
+        if !self.exposure.is_finite() {
+            return Err(Error::usage("--exposure: expected a finite number of stops"));
+        }
+        Ok(Settings {
+            sampler: self.sampler,
+            parameters,
+            shadow_rays: self.shadow_rays,
+            depth: self.depth,
+            seed: self.seed,
+            first_sample: self.sample_offset,
+            window: self.crop,
+            aovs: self.aov.clone(),
+            roulette_vertex: self.roulette_depth,
+        })
+    }
+}

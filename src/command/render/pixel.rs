@@ -1,0 +1,218 @@
+//! `--pixel x,y`: the picture that explains how the sampler saw one hit.
+//!
+//! Four lat-long panels, −Z in the middle, +Y on top, darkened below the horizon of the hit:
+//! environment with the samples taken (green reached it, red were blocked, grey brought nothing and
+//! were not traced), lobes of the product by their probability for the first ray, by that for the
+//! last ray, and the directions recorded as blocked. The story of figures 4.3 to 4.8 of
+//! [Wu & Shih 2009], in the order of reading. Samplers without lobes have the first panel alone.
+
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use glam::Vec3;
+use serde_json::json;
+
+use crate::{
+    error::{Error, Result},
+    film::{
+        png::{display_from_linear, write_rgb8},
+        write_atomically,
+    },
+    frame::{direction_from_lat_long, lat_long_from_direction},
+    gpu::Device,
+    renderer::{RecordedLobe, RecordedPixel, Renderer, Settings, Window, window_of},
+    sampler::Sampler,
+    scene::Scene,
+    srbf::kernel_value,
+};
+
+/// Size of a panel, pixels.
+const WIDTH: usize = 512;
+const HEIGHT: usize = WIDTH / 2;
+/// White line between panels, pixels.
+const GAP: usize = 4;
+/// Share of the environment's pixels that may be over-exposed.
+const CLIPPED: f32 = 0.02;
+/// What is left of a colour below the horizon.
+const BELOW: f32 = 0.25;
+
+const VISIBLE: [u8; 3] = [40, 220, 70];
+const BLOCKED: [u8; 3] = [235, 40, 40];
+const UNTRACED: [u8; 3] = [150, 150, 150];
+const HORIZON: [u8; 3] = [90, 160, 255];
+
+/// `out.exr` → `out.pixel_x_y.png`.
+pub fn picture_path(output: &Path, [x, y]: [u32; 2]) -> PathBuf {
+    output.with_extension(format!("pixel_{x}_{y}.png"))
+}
+
+/// Refuses what cannot have a picture, before any work.
+///
+/// # Errors
+/// [`Error::Usage`] for a pixel outside of the window or the sampler `guided`; [`Error::Io`] where
+/// nothing can be written.
+pub fn check(settings: &Settings, scene: &Scene, output: &Path, pixel: [u32; 2]) -> Result<()> {
+    let [x, y] = pixel;
+    let window = window_of(settings, scene);
+    let is_inside = |at: u32, start: u32, length: u32| at >= start && at - start < length;
+    if !is_inside(x, window.x, window.width) || !is_inside(y, window.y, window.height) {
+        return Err(Error::usage(format!(
+            "--pixel {x},{y}: expected {} ≤ x < {} and {} ≤ y < {}, the part of the film that is \
+             rendered",
+            window.x,
+            u64::from(window.x) + u64::from(window.width),
+            window.y,
+            u64::from(window.y) + u64::from(window.height)
+        )));
+    }
+    if settings.sampler == Sampler::Guided {
+        return Err(Error::usage(
+            "--pixel: guided has no picture of a pixel; expected one of uniform, cosine, brdf, env, \
+             mis, ris, product, visibility",
+        ));
+    }
+    crate::film::check_writable(&picture_path(output, pixel))
+}
+
+/// Renders the first sample of `pixel` once more, and writes the picture and, beside it, the numbers
+/// as JSON. Returns the files written; none, with a warning, where the pixel sees the environment.
+///
+/// # Errors
+/// A failing device or disk.
+pub fn write(
+    device: &Arc<Device>,
+    scene: &Scene,
+    settings: &Settings,
+    output: &Path,
+    pixel: [u32; 2],
+) -> Result<Vec<PathBuf>> {
+    let [x, y] = pixel;
+    let window = Some(Window { x, y, width: 1, height: 1 });
+    let settings = Settings { window, aovs: Vec::new(), depth: 1, ..settings.clone() };
+    let Some(recorded) = Renderer::new(device, scene, settings)?.record_pixel()? else {
+        log::warn!("--pixel {x},{y}: the pixel sees the environment; there is no hit to explain");
+        return Ok(Vec::new());
+    };
+    let path = picture_path(output, pixel);
+    let panels = draw(scene, &recorded);
+    let mut rows: Vec<[u8; 3]> = Vec::new();
+    for (index, panel) in panels.iter().enumerate() {
+        if index > 0 {
+            rows.extend(std::iter::repeat_n([255; 3], GAP * WIDTH));
+        }
+        rows.extend(&panel.0);
+    }
+    write_rgb8(&path, WIDTH as u32, (rows.len() / WIDTH) as u32, &rows)?;
+    let numbers = path.with_extension("json");
+    let text = numbers_of(&recorded).to_string();
+    write_atomically(&numbers, |file| file.write_all(text.as_bytes()))?;
+    Ok(vec![path, numbers])
+}
+
+fn numbers_of(recorded: &RecordedPixel) -> serde_json::Value {
+    json!({
+        "position": recorded.position.to_array(),
+        "normal": recorded.normal.to_array(),
+        "rays": recorded.rays.iter().map(|ray| json!({
+            "direction": ray.direction.to_array(),
+            "contribution": ray.contribution.to_array(),
+            "visible": ray.is_visible,
+        })).collect::<Vec<_>>(),
+        "lobes": recorded.lobes.iter().map(|lobe| json!({
+            "axis": lobe.axis.to_array(),
+            "bandwidth": lobe.bandwidth,
+            "before": lobe.before,
+            "after": lobe.after,
+        })).collect::<Vec<_>>(),
+        "cached": recorded.cached.iter().map(|axis| axis.to_array()).collect::<Vec<_>>(),
+    })
+}
+
+/// The panels from top to bottom.
+fn draw(scene: &Scene, recorded: &RecordedPixel) -> Vec<Panel> {
+    let normal = recorded.normal;
+    let environment = |direction| scene.environment.radiance(direction);
+    let mut samples = Panel::new(normal, CLIPPED, environment);
+    for ray in &recorded.rays {
+        let colour = match (ray.contribution == Vec3::ZERO, ray.is_visible) {
+            (true, _) => UNTRACED,
+            (false, true) => VISIBLE,
+            (false, false) => BLOCKED,
+        };
+        samples.mark(ray.direction, colour);
+    }
+    let mut panels = vec![samples];
+    if recorded.lobes.is_empty() {
+        return panels;
+    }
+    let density = |probability: fn(&RecordedLobe) -> f64| {
+        move |direction| {
+            let part = |lobe: &RecordedLobe| {
+                let integral = crate::srbf::kernel_integral(lobe.bandwidth);
+                let kernel = kernel_value(lobe.axis, lobe.bandwidth, direction);
+                probability(lobe) as f32 * kernel / integral
+            };
+            Vec3::splat(recorded.lobes.iter().map(part).sum::<f32>())
+        }
+    };
+    panels.push(Panel::new(normal, CLIPPED, density(|lobe| lobe.before)));
+    if !recorded.cached.is_empty() {
+        let mut after = Panel::new(normal, CLIPPED, density(|lobe| lobe.after));
+        for &direction in &recorded.cached {
+            after.mark(direction, BLOCKED);
+        }
+        panels.push(after);
+    }
+    panels
+}
+
+/// A lat-long picture.
+struct Panel(Vec<[u8; 3]>);
+
+impl Panel {
+    /// A function of the direction, exposed so that all but `clipped` of it is below white.
+    fn new(normal: Vec3, clipped: f32, value: impl Fn(Vec3) -> Vec3) -> Self {
+        let values: Vec<Vec3> = (0..WIDTH * HEIGHT).map(|i| value(direction_of(i))).collect();
+        let mut sorted: Vec<f32> = values.iter().map(|value| value.max_element()).collect();
+        sorted.sort_by(f32::total_cmp);
+        let largest = sorted.last().copied().unwrap_or(0.0);
+        let index = ((1.0 - clipped) * sorted.len() as f32) as usize;
+        let white = sorted.get(index).copied().filter(|white| *white > 0.0).unwrap_or(largest);
+        let show = |(index, value): (usize, &Vec3)| {
+            let cosine = direction_of(index).dot(normal);
+            if cosine.abs() < 2.0 / HEIGHT as f32 {
+                return HORIZON;
+            }
+            let scale = if cosine < 0.0 { BELOW } else { 1.0 } / white.max(f32::MIN_POSITIVE);
+            (*value * scale).to_array().map(display_from_linear)
+        };
+        Self(values.iter().enumerate().map(show).collect())
+    }
+
+    /// A dot with a black rim.
+    fn mark(&mut self, direction: Vec3, colour: [u8; 3]) {
+        let uv = lat_long_from_direction(direction);
+        let centre = [(uv.x * WIDTH as f32) as i32, (uv.y * HEIGHT as f32) as i32];
+        for dy in -4_i32..=4 {
+            for dx in -4_i32..=4 {
+                let squared = dx * dx + dy * dy;
+                let row = centre[1] + dy;
+                if squared > 18 || !(0..HEIGHT as i32).contains(&row) {
+                    continue;
+                }
+                let column = (centre[0] + dx).rem_euclid(WIDTH as i32);
+                let colour = if squared > 9 { [0; 3] } else { colour };
+                self.0[row as usize * WIDTH + column as usize] = colour;
+            }
+        }
+    }
+}
+
+fn direction_of(pixel: usize) -> Vec3 {
+    let u = ((pixel % WIDTH) as f32 + 0.5) / WIDTH as f32;
+    let v = ((pixel / WIDTH) as f32 + 0.5) / HEIGHT as f32;
+    direction_from_lat_long(glam::Vec2::new(u, v))
+}
