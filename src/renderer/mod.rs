@@ -26,7 +26,7 @@ use crate::{
 use film_buffers::FilmBuffers;
 use guide_buffers::GuideBuffers;
 pub use lobe_buffers::LobeBuffers;
-pub use pixel::{RecordedLobe, RecordedPixel, RecordedRay};
+pub use pixel::{CachedDirection, RecordedLobe, RecordedPixel, RecordedRay};
 pub use scene_buffers::SceneBuffers;
 pub use totals::Totals;
 pub use wave_buffers::{LobeRoom, WaveBuffers};

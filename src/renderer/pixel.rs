@@ -51,9 +51,18 @@ pub struct RecordedPixel {
     pub rays: Vec<RecordedRay>,
     /// Lobes of the product; empty for samplers without.
     pub lobes: Vec<RecordedLobe>,
-    /// Directions in the visibility cache when the last ray was drawn, the oldest first, as many as
-    /// it holds.
-    pub cached: Vec<Vec3>,
+    /// Visibility cache when the last ray was drawn, the oldest entry first; `None` for samplers
+    /// without.
+    pub cached: Option<Vec<CachedDirection>>,
+}
+
+/// An entry of a visibility cache.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CachedDirection {
+    /// Unit direction, world space.
+    pub direction: Vec3,
+    /// Whether it was visible; always `false` without `count_visible`.
+    pub is_visible: bool,
 }
 
 impl Renderer {
@@ -90,7 +99,7 @@ impl Renderer {
                 normal: hit.shading_normal.into(),
                 rays: Vec::new(),
                 lobes: Vec::new(),
-                cached: Vec::new(),
+                cached: None,
             });
             if most == 0 {
                 break;
@@ -106,7 +115,7 @@ impl Renderer {
                 self.read_lobes(&mut pixel.lobes)?;
             }
             if self.settings.sampler == Sampler::Visibility {
-                pixel.cached = self.read_cache()?;
+                pixel.cached = Some(self.read_cache()?);
             }
         }
         self.passes.limit_shadow_rays(most);
@@ -155,7 +164,7 @@ impl Renderer {
         Ok(())
     }
 
-    fn read_cache(&self) -> Result<Vec<Vec3>> {
+    fn read_cache(&self) -> Result<Vec<CachedDirection>> {
         let places =
             self.settings.parameters.lobes.cache_places(self.settings.shadow_rays) as usize;
         let words: Vec<u32> = self.read_all("visibility caches", 1 + places)?;
@@ -163,7 +172,12 @@ impl Renderer {
         let recorded = (words[0] & 0x7fff_ffff) as usize;
         let oldest = if recorded > places { recorded % places } else { 0 };
         let in_order = (0..recorded.min(places)).map(|i| words[1 + (oldest + i) % places]);
-        Ok(in_order.map(unpack_normal).collect())
+        // The last bit of an entry tells whether it was visible.
+        let entry = |word: u32| CachedDirection {
+            direction: unpack_normal(word & !1),
+            is_visible: word & 1 != 0,
+        };
+        Ok(in_order.map(entry).collect())
     }
 }
 

@@ -1,10 +1,11 @@
 //! `--pixel x,y`: the picture that explains how the sampler saw one hit.
 //!
-//! Four lat-long panels, −Z in the middle, +Y on top, darkened below the horizon of the hit:
+//! Lat-long panels, −Z in the middle, +Y on top, darkened below the horizon of the hit (blue): the
 //! environment with the samples taken (green reached it, red were blocked, grey brought nothing and
-//! were not traced), lobes of the product by their probability for the first ray, by that for the
-//! last ray, and the directions recorded as blocked. The story of figures 4.3 to 4.8 of
-//! [Wu & Shih 2009], in the order of reading. Samplers without lobes have the first panel alone.
+//! were not traced); the density of the product's lobes for the first ray; the same for the last ray,
+//! in the same exposure, with the directions in the visibility cache (red blocked, green visible).
+//! The story of figures 4.3 to 4.8 of Wu & Shih 2009. `product` has the first two panels, samplers
+//! without lobes the first.
 
 use std::{
     io::Write,
@@ -91,7 +92,8 @@ pub fn write(
 ) -> Result<Vec<PathBuf>> {
     let [x, y] = pixel;
     let window = Some(Window { x, y, width: 1, height: 1 });
-    let settings = Settings { window, aovs: Vec::new(), depth: 1, ..settings.clone() };
+    let settings =
+        Settings { window, aovs: Vec::new(), depth: 1, first_sample: 0, ..settings.clone() };
     let Some(recorded) = Renderer::new(device, scene, settings)?.record_pixel()? else {
         log::warn!("--pixel {x},{y}: the pixel sees the environment; there is no hit to explain");
         return Ok(Vec::new());
@@ -127,7 +129,10 @@ fn numbers_of(recorded: &RecordedPixel) -> serde_json::Value {
             "before": lobe.before,
             "after": lobe.after,
         })).collect::<Vec<_>>(),
-        "cached": recorded.cached.iter().map(|axis| axis.to_array()).collect::<Vec<_>>(),
+        "cached": recorded.cached.iter().flatten().map(|entry| json!({
+            "direction": entry.direction.to_array(),
+            "visible": entry.is_visible,
+        })).collect::<Vec<_>>(),
     })
 }
 
@@ -135,7 +140,7 @@ fn numbers_of(recorded: &RecordedPixel) -> serde_json::Value {
 fn draw(scene: &Scene, recorded: &RecordedPixel) -> Vec<Panel> {
     let normal = recorded.normal;
     let environment = |direction| scene.environment.radiance(direction);
-    let mut samples = Panel::new(normal, CLIPPED, environment);
+    let mut samples = Panel::new(normal, white_of(&environment), environment);
     for ray in &recorded.rays {
         let colour = match (ray.contribution == Vec3::ZERO, ray.is_visible) {
             (true, _) => UNTRACED,
@@ -158,29 +163,36 @@ fn draw(scene: &Scene, recorded: &RecordedPixel) -> Vec<Panel> {
             Vec3::splat(recorded.lobes.iter().map(part).sum::<f32>())
         }
     };
-    panels.push(Panel::new(normal, CLIPPED, density(|lobe| lobe.before)));
-    if !recorded.cached.is_empty() {
-        let mut after = Panel::new(normal, CLIPPED, density(|lobe| lobe.after));
-        for &direction in &recorded.cached {
-            after.mark(direction, BLOCKED);
+    let before = density(|lobe| lobe.before);
+    let white = white_of(&before);
+    panels.push(Panel::new(normal, white, before));
+    if let Some(cached) = &recorded.cached {
+        let mut after = Panel::new(normal, white, density(|lobe| lobe.after));
+        for entry in cached {
+            after.mark(entry.direction, if entry.is_visible { VISIBLE } else { BLOCKED });
         }
         panels.push(after);
     }
     panels
 }
 
+/// What all but [`CLIPPED`] of a function of the direction are below.
+fn white_of(value: impl Fn(Vec3) -> Vec3) -> f32 {
+    let mut sorted: Vec<f32> =
+        (0..WIDTH * HEIGHT).map(|i| value(direction_of(i)).max_element()).collect();
+    sorted.sort_by(f32::total_cmp);
+    let largest = sorted.last().copied().unwrap_or(0.0);
+    let index = ((1.0 - CLIPPED) * sorted.len() as f32) as usize;
+    sorted.get(index).copied().filter(|white| *white > 0.0).unwrap_or(largest)
+}
+
 /// A lat-long picture.
 struct Panel(Vec<[u8; 3]>);
 
 impl Panel {
-    /// A function of the direction, exposed so that all but `clipped` of it is below white.
-    fn new(normal: Vec3, clipped: f32, value: impl Fn(Vec3) -> Vec3) -> Self {
+    /// A function of the direction, with `white` shown as white.
+    fn new(normal: Vec3, white: f32, value: impl Fn(Vec3) -> Vec3) -> Self {
         let values: Vec<Vec3> = (0..WIDTH * HEIGHT).map(|i| value(direction_of(i))).collect();
-        let mut sorted: Vec<f32> = values.iter().map(|value| value.max_element()).collect();
-        sorted.sort_by(f32::total_cmp);
-        let largest = sorted.last().copied().unwrap_or(0.0);
-        let index = ((1.0 - clipped) * sorted.len() as f32) as usize;
-        let white = sorted.get(index).copied().filter(|white| *white > 0.0).unwrap_or(largest);
         let show = |(index, value): (usize, &Vec3)| {
             let cosine = direction_of(index).dot(normal);
             if cosine.abs() < 2.0 / HEIGHT as f32 {
