@@ -35,8 +35,8 @@ const WIDTH: usize = 512;
 const HEIGHT: usize = WIDTH / 2;
 /// White line between panels, pixels.
 const GAP: usize = 4;
-/// Share of the environment's pixels that may be over-exposed.
-const CLIPPED: f32 = 0.02;
+/// Share of a panel's pixels that may be over-exposed.
+const CLIPPED: f32 = 0.005;
 /// What is left of a colour below the horizon.
 const BELOW: f32 = 0.25;
 

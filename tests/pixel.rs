@@ -1,0 +1,158 @@
+//! `--pixel x,y`: the picture of one hit and its numbers.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
+
+#[path = "support/command.rs"]
+mod command;
+
+use command::Folder;
+use serde_json::Value;
+
+/// A clay ball in the open, or in a closed box; the camera sees sky above the ball in the open.
+fn scene(is_closed: bool) -> Folder {
+    let folder = Folder::new();
+    let roof = if is_closed {
+        "[[object]]\nshape = \"box\"\nsize = [9.0, 9.0, 9.0]\nmaterial = \"clay\"\n"
+    } else {
+        ""
+    };
+    folder.write(
+        "scene.toml",
+        format!(
+            r#"
+[camera]
+position = [0.0, 0.5, 3.0]
+look_at = [0.0, 0.5, 0.0]
+vertical_fov_deg = 45.0
+
+[film]
+width = 24
+height = 16
+
+[environment.sky]
+
+[[material]]
+name = "clay"
+type = "diffuse"
+reflectance = [0.6, 0.4, 0.3]
+
+[[object]]
+shape = "sphere"
+radius = 0.5
+material = "clay"
+translate = [0.0, 0.5, 0.0]
+{roof}"#
+        ),
+    );
+    folder
+}
+
+fn run(folder: &Folder, options: &[&str]) -> command::Run {
+    let few = ["environment_lobes=24", "brdf_lobes=4", "views=4", "lobes=32"];
+    let mut arguments = vec!["render", "scene.toml", "-o", "out.exr", "--spp", "1", "--validate"];
+    let has_lobes = options.iter().any(|option| ["product", "visibility"].contains(option));
+    if has_lobes {
+        arguments.extend(few.iter().flat_map(|assignment| ["--set", assignment]));
+    }
+    arguments.extend(options);
+    folder.run(&arguments)
+}
+
+fn numbers(folder: &Folder) -> Value {
+    let text = std::fs::read(folder.path().join("out.pixel_12_8.json")).unwrap();
+    serde_json::from_slice(&text).unwrap()
+}
+
+fn vector(value: &Value) -> [f64; 3] {
+    [0, 1, 2].map(|i| value[i].as_f64().unwrap())
+}
+
+fn sum(numbers: &Value, key: &str) -> f64 {
+    numbers["lobes"].as_array().unwrap().iter().map(|lobe| lobe[key].as_f64().unwrap()).sum()
+}
+
+fn height(folder: &Folder) -> u32 {
+    let picture = image::open(folder.path().join("out.pixel_12_8.png")).unwrap();
+    assert_eq!(picture.width(), 512);
+    picture.height()
+}
+
+#[test]
+fn lobes_near_blocked_directions_lose_weight() {
+    let folder = scene(true);
+    let options = ["--sampler", "visibility", "--shadow-rays", "12", "--pixel", "12,8"];
+    run(&folder, &options).assert(0, &[]);
+    let numbers = numbers(&folder);
+
+    let rays = numbers["rays"].as_array().unwrap();
+    assert_eq!(rays.len(), 12);
+    assert!(rays.iter().all(|ray| ray["visible"] == false));
+    let cached = numbers["cached"].as_array().unwrap();
+    // What was traced before the last ray, in that order.
+    let traced: Vec<_> =
+        rays[..11].iter().filter(|ray| vector(&ray["contribution"]) != [0.0; 3]).collect();
+    assert!(traced.len() > 3, "{} rays were traced", traced.len());
+    assert_eq!(cached.len(), traced.len());
+    for (entry, ray) in cached.iter().zip(&traced) {
+        let (entry, ray) = (vector(&entry["direction"]), vector(&ray["direction"]));
+        assert!((0..3).all(|i| (entry[i] - ray[i]).abs() < 2e-4), "{entry:?} {ray:?}");
+    }
+
+    assert!((sum(&numbers, "before") - 1.0).abs() < 1e-6);
+    assert!((sum(&numbers, "after") - 1.0).abs() < 1e-6);
+    // V = (1 / (1 + Num))²: lobes with many cached directions close to them fall against the others.
+    let mut ratios: Vec<(usize, f64)> = numbers["lobes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|lobe| lobe["before"].as_f64().unwrap() > 1e-4)
+        .map(|lobe| {
+            let axis = vector(&lobe["axis"]);
+            let bandwidth = lobe["bandwidth"].as_f64().unwrap();
+            let deviation = fenestra::srbf::kernel_deviation(bandwidth as f32);
+            let is_close = |entry: &&Value| {
+                let direction = vector(&entry["direction"]);
+                let cosine: f64 = (0..3).map(|i| axis[i] * direction[i]).sum();
+                1.0 - cosine < f64::from(deviation)
+            };
+            let close = cached.iter().filter(is_close).count();
+            (close, lobe["after"].as_f64().unwrap() / lobe["before"].as_f64().unwrap())
+        })
+        .collect();
+    ratios.sort_by(|a, b| a.0.cmp(&b.0));
+    let (least, most) = (ratios[0], ratios[ratios.len() - 1]);
+    assert!(most.0 > least.0, "every lobe has {} directions close to it", least.0);
+    let expected = ((1.0 + least.0 as f64) / (1.0 + most.0 as f64)).powi(2);
+    assert!((most.1 / least.1 / expected - 1.0).abs() < 0.01, "{least:?} {most:?}");
+
+    // Three panels with two lines between them.
+    assert_eq!(height(&folder), 3 * 256 + 2 * 4);
+}
+
+#[test]
+fn each_kind_of_sampler_has_its_panels() {
+    let folder = scene(false);
+    run(&folder, &["--sampler", "mis", "--pixel", "12,8"]).assert(0, &[]);
+    assert_eq!(height(&folder), 256);
+    let rays = numbers(&folder)["rays"].as_array().unwrap().clone();
+    assert_eq!(rays.len(), 5);
+    assert!(rays.iter().any(|ray| ray["visible"] == true));
+
+    run(&folder, &["--sampler", "product", "--pixel", "12,8"]).assert(0, &[]);
+    assert_eq!(height(&folder), 2 * 256 + 4);
+    let numbers = numbers(&folder);
+    assert!((sum(&numbers, "before") - 1.0).abs() < 1e-6);
+    assert_eq!(sum(&numbers, "before"), sum(&numbers, "after"));
+}
+
+#[test]
+fn what_has_no_picture_says_so() {
+    let folder = scene(false);
+    run(&folder, &["--pixel", "24,8"]).assert(2, &["--pixel 24,8"]);
+    run(&folder, &["--pixel", "1"]).assert(2, &["x,y"]);
+    run(&folder, &["--sampler", "guided", "--pixel", "12,8"]).assert(2, &["guided"]);
+    assert!(!folder.path().join("out.exr").exists());
+    // The sky: the image is written, and a warning says why there is no picture.
+    run(&folder, &["--pixel", "0,0"]).assert(0, &["the pixel sees the environment"]);
+    assert!(folder.path().join("out.exr").exists());
+    assert!(!folder.path().join("out.pixel_0_0.png").exists());
+}
