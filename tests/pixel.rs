@@ -118,7 +118,7 @@ fn lobes_near_blocked_directions_lose_weight() {
             (close, lobe["after"].as_f64().unwrap() / lobe["before"].as_f64().unwrap())
         })
         .collect();
-    ratios.sort_by(|a, b| a.0.cmp(&b.0));
+    ratios.sort_by_key(|ratio| ratio.0);
     let (least, most) = (ratios[0], ratios[ratios.len() - 1]);
     assert!(most.0 > least.0, "every lobe has {} directions close to it", least.0);
     let expected = ((1.0 + least.0 as f64) / (1.0 + most.0 as f64)).powi(2);

@@ -140,7 +140,7 @@ fn numbers_of(recorded: &RecordedPixel) -> serde_json::Value {
 fn draw(scene: &Scene, recorded: &RecordedPixel) -> Vec<Panel> {
     let normal = recorded.normal;
     let environment = |direction| scene.environment.radiance(direction);
-    let mut samples = Panel::new(normal, white_of(&environment), environment);
+    let mut samples = Panel::new(normal, white_of(environment), environment);
     for ray in &recorded.rays {
         let colour = match (ray.contribution == Vec3::ZERO, ray.is_visible) {
             (true, _) => UNTRACED,
@@ -164,7 +164,7 @@ fn draw(scene: &Scene, recorded: &RecordedPixel) -> Vec<Panel> {
         }
     };
     let before = density(|lobe| lobe.before);
-    let white = white_of(&before);
+    let white = white_of(before);
     panels.push(Panel::new(normal, white, before));
     if let Some(cached) = &recorded.cached {
         let mut after = Panel::new(normal, white, density(|lobe| lobe.after));
