@@ -2,8 +2,9 @@
 // shadow ray for each with what it brings if nothing is in the way. It also says which count each
 // ray belongs to, for learn.comp, and which cells are missing.
 //
-// All random numbers are independent: what the cells hold depends on earlier samples of the same
-// pixels, and a stratified sequence would continue where those left off.
+// What the cells hold depends on earlier samples of the same pixels, so a sequence must not continue
+// across a rebuild: it starts anew, with another scramble, after each. Samples between two rebuilds
+// read the same cells, which makes it legal to stratify them.
 #version 460
 
 #define NEEDS_PARAMETERS
@@ -31,36 +32,47 @@ const uint DIMENSION_GUIDE_CELL = 5u;
 const uint DIMENSION_GUIDE_TECHNIQUE = 6u;
 const uint DIMENSION_GUIDE_RESAMPLING = 7u;
 const uint DIMENSION_GUIDE_BRDF = 8u;
+const uint DIMENSION_GUIDE_LOBE = 9u;
 const uint DIMENSION_GUIDE_REGION = 16u;
 const uint DIMENSION_GUIDE_PATCH = 24u;
 
 // Share of candidates chosen without regard to visibility.
 const float UNGUIDED_CHOICE = 0.1;
 
-uvec4 independent_bits(Vertex vertex, uint index, uint dimension) {
-    return hash_4d(uvec4(vertex.index.pixel, index, vertex.dimension + dimension, wave.seed));
+// Numbers that are stratified over the samples since the last rebuild, scrambled anew for each: what
+// the cells hold does not depend on them.
+uvec2 epoch_bits(Vertex vertex, uint index, uint dimension) {
+    return random_bits_2d(
+        vertex.index.pixel, index, vertex.dimension + dimension, wave.epoch_seed);
 }
 
-// Probability of sampling the BRDF in the one-sample model.
-float brdf_share(Material material) {
-    float share = 0.3;
+uvec4 independent_bits(Vertex vertex, uint index, uint dimension) {
+    return hash_4d(uvec4(vertex.index.pixel, index, vertex.dimension + dimension, wave.epoch_seed));
+}
+
+// Share of the rays that sample the BRDF in the one-sample model, in 256ths.
+uint brdf_share(Material material) {
+    uint share = 77u;
     if (is_kind(material, MATERIAL_DIFFUSE)) {
-        share = 0.1;
+        share = 26u;
     } else if (!is_kind(material, MATERIAL_MEASURED)) {
-        share = material.alpha > 0.3 ? 0.1 : (material.alpha > 0.1 ? 0.3 : 0.5);
+        share = material.alpha > 0.3 ? 26u : (material.alpha > 0.1 ? 77u : 128u);
     }
     return share;
 }
 
-Guided draw_candidate(Vertex vertex, uint first, uint ray, uint candidate) {
+Guided draw_candidate(Vertex vertex, uint first, uint index) {
     return draw_guided(
-        vertex, first, independent_bits(vertex, ray, DIMENSION_GUIDE_REGION + candidate),
-        independent_bits(vertex, ray, DIMENSION_GUIDE_PATCH + candidate));
+        vertex, first, epoch_bits(vertex, index, DIMENSION_GUIDE_REGION),
+        independent_bits(vertex, index, DIMENSION_GUIDE_PATCH));
 }
 
-Guided draw_brdf_candidate(Vertex vertex, uint first, uint ray, uint candidate) {
+Guided draw_brdf_candidate(Vertex vertex, uint first, uint index) {
+    uvec2 bits = epoch_bits(vertex, index, DIMENSION_GUIDE_BRDF);
+    float lobe = random_1d(
+        vertex.index.pixel, index, vertex.dimension + DIMENSION_GUIDE_LOBE, wave.epoch_seed);
     return draw_brdf_guided(
-        vertex, first, independent_bits(vertex, ray, DIMENSION_GUIDE_BRDF + candidate));
+        vertex, first, vec3(unit_float(bits.x), unit_float(bits.y), lobe));
 }
 
 // Writes a ray that brings integrand * factor, and what it will teach.
@@ -130,39 +142,49 @@ void main() {
     uint cell = guide_cell(
         vertex, independent_bits(vertex, vertex.index.sample_index, DIMENSION_GUIDE_CELL));
     uint first = cell * guide.region_count;
-    uint first_ray = vertex.index.sample_index * wave.total_shadow_rays + wave.first_shadow_ray;
+    // Rays are numbered through all samples since the rebuild, since they share one sequence.
+    uint first_ray = (vertex.index.sample_index - wave.epoch_start) * wave.total_shadow_rays
+        + wave.first_shadow_ray;
 
     if (CANDIDATES == 1u) {
-        // The coins of a block of 8x8 pixels are shared, and each technique has its own loop: devices
+        // The techniques take turns in proportion to their shares, from a random start, so that ray k
+        // is from the BRDF with exactly that probability and both sequences are used without gaps.
+        // The start is shared by a block of 8x8 pixels, and each technique has its own loop: devices
         // that run both sides of a branch then run one technique per ray.
-        float share = brdf_share(vertex.material);
-        uint from_brdf = 0u;
+        uint share = brdf_share(vertex.material);
         uvec2 block = uvec2(
             vertex.index.pixel % parameters.film_width, vertex.index.pixel / parameters.film_width)
             / FILM_BLOCK;
+        uint start = hash_4d(uvec4(
+            block, vertex.dimension + DIMENSION_GUIDE_TECHNIQUE, wave.epoch_seed)).x & 255u;
+        uint before = (first_ray * share + start) >> 8u;
+        uint from_brdf = 0u;
         for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
-            uint bits = hash_4d(uvec4(
-                block.x | (block.y << 16u), first_ray + i,
-                vertex.dimension + DIMENSION_GUIDE_TECHNIQUE, wave.seed)).x;
-            from_brdf |= unit_float(bits) < share ? 1u << i : 0u;
+            uint sum = ((first_ray + i) * share + start) & 255u;
+            from_brdf |= sum + share >= 256u ? 1u << i : 0u;
         }
+        float probability = float(share) * (1.0 / 256.0);
+        uint index = before;
         uint left = from_brdf;
         while (left != 0u) {
             uint i = uint(findLSB(left));
             left &= left - 1u;
-            Guided guided = draw_brdf_candidate(vertex, first, first_ray + i, 0u);
-            finish_one(i * path_count + path, first, guided, share);
+            Guided guided = draw_brdf_candidate(vertex, first, index);
+            index++;
+            finish_one(i * path_count + path, first, guided, probability);
         }
+        index = first_ray - before;
         left = ~from_brdf & ((1u << wave.shadow_ray_count) - 1u);
         while (left != 0u) {
             uint i = uint(findLSB(left));
             left &= left - 1u;
-            Guided guided = draw_candidate(vertex, first, first_ray + i, 0u);
-            finish_one(i * path_count + path, first, guided, share);
+            Guided guided = draw_candidate(vertex, first, index);
+            index++;
+            finish_one(i * path_count + path, first, guided, probability);
         }
     } else {
         for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
-            uvec4 bits = independent_bits(vertex, first_ray + i, DIMENSION_GUIDE_RESAMPLING);
+            uvec2 bits = epoch_bits(vertex, first_ray + i, DIMENSION_GUIDE_RESAMPLING);
             Reservoir reservoir;
             reservoir.chosen.considered = Considered(vec3(0.0), vec3(0.0), 0.0, 0.0);
             reservoir.chosen.region = 0u;
@@ -175,10 +197,12 @@ void main() {
             reservoir.is_unguided = unit_float(bits.x) < UNGUIDED_CHOICE;
             reservoir.u = unit_float(bits.y);
             for (uint c = 0u; c < BRDF_CANDIDATES; ++c) {
-                add_to(reservoir, draw_brdf_candidate(vertex, first, first_ray + i, c));
+                uint index = (first_ray + i) * BRDF_CANDIDATES + c;
+                add_to(reservoir, draw_brdf_candidate(vertex, first, index));
             }
             for (uint c = 0u; c < CANDIDATES - BRDF_CANDIDATES; ++c) {
-                add_to(reservoir, draw_candidate(vertex, first, first_ray + i, c));
+                uint index = (first_ray + i) * (CANDIDATES - BRDF_CANDIDATES) + c;
+                add_to(reservoir, draw_candidate(vertex, first, index));
             }
             float factor = 0.0;
             if (reservoir.chosen_unguided > 0.0 && reservoir.guided_sum > 0.0) {

@@ -179,9 +179,7 @@ fn entries_hold_the_probabilities_they_are_drawn_with() {
         let mut observed = vec![0.0; regions];
         for sample in 0..200_000 {
             let bits = hash_4d([sample, cell as u32, 3, 3]);
-            let own = ((u64::from(bits[0]) * regions as u64) >> 32) as usize;
-            let (_, threshold, alias, _) = decode_entry(entries[own]);
-            observed[if bits[1] >> 16 < threshold { own } else { alias as usize }] += 1.0;
+            observed[choose_region(entries, bits[0])] += 1.0;
         }
         let p = chi_square_p_value(&observed, &expected);
         assert!(p > 1e-5, "cell {cell}: p = {p}");
@@ -191,6 +189,23 @@ fn entries_hold_the_probabilities_they_are_drawn_with() {
             assert!((7e-4..=1.0).contains(&weight));
         }
     }
+}
+
+/// The region that `bits` choose among the entries of a cell; twin of `draw_guided`.
+fn choose_region(entries: &[[u32; 2]], bits: u32) -> usize {
+    let start = |interval: usize| decode_entry(entries[interval]).2 as usize;
+    let interval = ((u64::from(bits) * entries.len() as u64) >> 32) as usize;
+    let mut low = if interval == 0 { 0 } else { start(interval) };
+    let mut high = start((interval + 1) % entries.len());
+    while low < high {
+        let middle = (low + high).div_ceil(2);
+        if decode_entry(entries[middle]).1 <= bits >> 16 {
+            low = middle;
+        } else {
+            high = middle - 1;
+        }
+    }
+    low
 }
 
 /// A guide that was taught: eastern regions visible from one fine cell, nothing from another.

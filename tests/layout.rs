@@ -78,6 +78,7 @@ fn host_structs() -> Vec<HostStruct> {
         Wave {
             first_pixel, pixel_count, first_sample, sample_count, seed, vertex, shadow_ray_count,
             first_shadow_ray, total_shadow_rays, aovs, pixel_stride, is_training,
+            epoch_seed, epoch_start,
         }
         GuideParameters {
             grid_origin, finest_edge, edge_per_distance, largest_edge, region_count, table_mask,

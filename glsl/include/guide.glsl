@@ -16,9 +16,11 @@ struct GuideEntry {
     // Probability of the region divided by its share of the map's energy: the density of a guided
     // direction is this times the density of the whole map.
     float ratio;
-    // The alias table over the regions: of 65,536.
-    uint threshold;
-    uint alias;
+    // Cumulative probability of the regions before this one, of 65,536.
+    uint before;
+    // First region that the interval with this index, of as many equal ones, reaches into; at index
+    // 0 the last region that can be drawn.
+    uint start;
     // Weight of a candidate by the region's visibility.
     float visibility;
 };
@@ -126,22 +128,37 @@ struct Guided {
     GuideEntry entry;
 };
 
-// Region by the cell's alias table, cell of the map by the region's, direction by the bilinear patch.
-// `first` is the index of the first entry of the cell.
-Guided draw_guided(Vertex vertex, uint first, uvec4 bits, uvec4 more_bits) {
+uint guide_word(uint index) {
+    return texelFetch(guide_entries, int(index)).y;
+}
+
+// Region by the cell's cumulative probabilities from bits.x, cell of the map by the region's alias
+// table from bits.y, direction by the bilinear patch. `first` is the index of the first entry of the
+// cell. Regions that are neighbours in the map are mostly neighbours in their order, so that
+// stratified bits give stratified directions.
+Guided draw_guided(Vertex vertex, uint first, uvec2 bits, uvec4 more_bits) {
     Guided guided;
-    guided.region = scaled(bits.x, guide.region_count);
-    guided.entry = guide_entry(first + guided.region);
-    if ((bits.y >> 16u) >= guided.entry.threshold) {
-        guided.region = guided.entry.alias;
+    uint interval = scaled(bits.x, guide.region_count);
+    uint next = interval + 1u < guide.region_count ? interval + 1u : 0u;
+    uint low = interval > 0u ? (guide_word(first + interval) >> 16u) & 0x3ffu : 0u;
+    uint high = (guide_word(first + next) >> 16u) & 0x3ffu;
+    // The last region whose probabilities before are not above the number.
+    while (low < high) {
+        uint middle = (low + high + 1u) >> 1u;
+        if ((guide_word(first + middle) & 0xffffu) <= bits.x >> 16u) {
+            low = middle;
+        } else {
+            high = middle - 1u;
+        }
     }
+    guided.region = low;
     guided.entry = guide_entry(first + guided.region);
 
     uvec4 region = texelFetch(guide_regions, int(guided.region));
     uint count = region.y * region.z;
-    uint chosen = scaled(bits.z, count);
+    uint chosen = scaled(bits.y, count);
     uvec2 alias = texelFetch(guide_aliases, int(region.x + chosen)).xy;
-    chosen = bits.w < alias.x ? chosen : alias.y;
+    chosen = more_bits.z < alias.x ? chosen : alias.y;
     // chosen / columns without an integer division.
     uint row = uint(float(chosen) / float(region.y));
     int column = int(chosen) - int(row * region.y);
@@ -160,8 +177,7 @@ Guided draw_guided(Vertex vertex, uint first, uvec4 bits, uvec4 more_bits) {
 }
 
 // A direction from the BRDF, and where it meets the partition.
-Guided draw_brdf_guided(Vertex vertex, uint first, uvec4 bits) {
-    vec3 u = vec3(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z));
+Guided draw_brdf_guided(Vertex vertex, uint first, vec3 u) {
     Guided guided;
     guided.considered = draw_from_brdf(vertex, u);
     EnvironmentLocation location = environment_locate(guided.considered.direction);

@@ -98,6 +98,8 @@ struct Wave {
     uint aovs;
     uint pixel_stride;
     uint is_training;
+    uint epoch_seed;
+    uint epoch_start;
 };
 
 struct GuideParameters {

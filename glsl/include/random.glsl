@@ -58,15 +58,20 @@ uvec4 random_keys(uint pixel, uint dimension, uint seed) {
 }
 
 // Sample `sample_index` of a shuffled, Owen-scrambled Sobol (0,2)-sequence that belongs to this
-// pixel and dimension alone. Burley 2020, "Practical Hash-based Owen Scrambling".
-vec2 random_2d(uint pixel, uint sample_index, uint dimension, uint seed) {
+// pixel and dimension alone, in 2^-32. Burley 2020, "Practical Hash-based Owen Scrambling".
+uvec2 random_bits_2d(uint pixel, uint sample_index, uint dimension, uint seed) {
     uvec4 keys = random_keys(pixel, dimension, seed);
     uint shuffled =
         bitfieldReverse(laine_karras_permutation(bitfieldReverse(sample_index), keys.x));
-    uint first = bitfieldReverse(laine_karras_permutation(shuffled, keys.y));
-    uint second =
-        bitfieldReverse(laine_karras_permutation(reversed_sobol_1(shuffled), keys.z));
-    return vec2(unit_float(first), unit_float(second));
+    return uvec2(
+        bitfieldReverse(laine_karras_permutation(shuffled, keys.y)),
+        bitfieldReverse(laine_karras_permutation(reversed_sobol_1(shuffled), keys.z)));
+}
+
+// random_bits_2d as numbers in [0, 1).
+vec2 random_2d(uint pixel, uint sample_index, uint dimension, uint seed) {
+    uvec2 bits = random_bits_2d(pixel, sample_index, dimension, seed);
+    return vec2(unit_float(bits.x), unit_float(bits.y));
 }
 
 // First coordinate of random_2d.

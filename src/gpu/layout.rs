@@ -188,6 +188,10 @@ pub struct Wave {
     pub pixel_stride: u32,
     /// 1 where the paths only teach the guide: their rays are counted, their light is not.
     pub is_training: u32,
+    /// Seed of the numbers of `guided`, another one after every rebuild.
+    pub epoch_seed: u32,
+    /// First sample after the last rebuild.
+    pub epoch_start: u32,
 }
 
 /// How the cells of the guide follow from places in the scene.

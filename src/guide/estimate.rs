@@ -7,10 +7,7 @@
 
 use glam::Vec3;
 
-use super::{
-    alias::{AliasEntry, alias_table, probabilities},
-    partition::{Partition, Region},
-};
+use super::partition::{Partition, Region};
 
 /// Weight of the prior, in rays.
 const PRIOR: f64 = 4.0;
@@ -21,8 +18,8 @@ const FLOOR: f64 = 1e-4;
 /// Share of the regions' probability that does not look at what was learned.
 const DEFENSIVE_SHARE: f64 = 0.05;
 
-/// Scale of the thresholds of an alias table over regions.
-const REGION_SCALE: u64 = 1 << 16;
+/// Probabilities of regions are multiples of one over this.
+const REGION_SCALE: u32 = 1 << 16;
 /// Levels of the estimate of visibility that candidates are weighted with.
 pub const VISIBILITY_LEVELS: u32 = 64;
 /// Exponent of the visibility in the weight of a candidate.
@@ -94,9 +91,9 @@ impl Estimates {
         )
     }
 
-    /// The entries of the device for a cell whose surfaces point along `normal`: an alias table over
-    /// the regions with, for each, its probability divided by its share of the energy and the
-    /// visibility that weights candidates. See [`decode_entry`].
+    /// The entries of the device for a cell whose surfaces point along `normal`: cumulative
+    /// probabilities of the regions with, for each, its probability divided by its share of the
+    /// energy and the visibility that weights candidates. See [`decode_entry`].
     pub fn entries(&self, normal: Vec3, partition: &Partition) -> Vec<[u32; 2]> {
         let normal = normal.as_dvec3();
         let guided = |(visibility, region): (&f64, &Region)| {
@@ -108,33 +105,109 @@ impl Estimates {
         for (weight, region) in weights.iter_mut().zip(&partition.regions) {
             *weight = (1.0 - DEFENSIVE_SHARE) * *weight / sum + DEFENSIVE_SHARE * region.share;
         }
-        let Some(table) = alias_table(&weights, REGION_SCALE) else {
-            return vec![[0; 2]; weights.len()];
-        };
-        let chosen = probabilities(&table, REGION_SCALE);
+        let parts = whole_parts(&weights);
         let steps = (VISIBILITY_LEVELS - 1) as f32;
         let per_octave = TARGET_EXPONENT / TARGET_RANGE * steps;
-        let encode = |((entry, probability), (visibility, region)): (
-            (&AliasEntry, &f64),
-            (&f64, &Region),
-        )| {
-            let share = region.share;
-            let ratio = if share > 0.0 { (probability / share) as f32 } else { 0.0 };
-            // A full column keeps its own index either way.
-            let threshold = entry.threshold.min(REGION_SCALE - 1) as u32;
+        let starts = interval_starts(&parts);
+        let mut before = 0;
+        let mut entries = Vec::with_capacity(weights.len());
+        for (((part, start), visibility), region) in
+            parts.iter().zip(starts).zip(&self.0).zip(&partition.regions)
+        {
+            let probability = f64::from(*part) / f64::from(REGION_SCALE);
+            let ratio = if region.share > 0.0 { (probability / region.share) as f32 } else { 0.0 };
             let octaves = -(*visibility as f32).clamp(1e-5, 1.0).log2();
             let level = (octaves * per_octave).round().min(steps) as u32;
-            [ratio.to_bits(), threshold | entry.alias << 16 | level << 26]
-        };
-        table.iter().zip(&chosen).zip(self.0.iter().zip(&partition.regions)).map(encode).collect()
+            // What follows the last region that can be drawn is never looked at.
+            let word = before.min(REGION_SCALE - 1) | start << 16 | level << 26;
+            entries.push([ratio.to_bits(), word]);
+            before += part;
+        }
+        entries
     }
 }
 
-/// Ratio of probability to share, threshold of 65,536, alias and weight of visibility of an entry;
-/// twin of what `glsl/include/guide.glsl` reads.
+/// Whole numbers in proportion to `weights` that sum to [`REGION_SCALE`], at least 1 where there is
+/// any weight: what is drawn, however seldom, keeps the sampler unbiased. All 0 if the weights are.
+fn whole_parts(weights: &[f64]) -> Vec<u32> {
+    let sum: f64 = weights.iter().sum();
+    if sum <= 0.0 || sum.is_subnormal() {
+        return vec![0; weights.len()];
+    }
+    let scale = f64::from(REGION_SCALE - weights.len() as u32) / sum;
+    let part = |weight: f64| if weight > 0.0 { 1 + (weight * scale) as u32 } else { 0 };
+    let mut parts: Vec<u32> = weights.iter().map(|&weight| part(weight)).collect();
+    // What rounding down leaves over goes to the largest.
+    let total: u32 = parts.iter().sum();
+    if let Some(largest) = parts.iter_mut().max_by_key(|part| **part) {
+        *largest += REGION_SCALE.saturating_sub(total);
+    }
+    parts
+}
+
+/// For each of as many equal intervals as there are regions, the last region that begins at or before
+/// its start; for the first, where that is the first one, the last region that can be drawn.
+fn interval_starts(parts: &[u32]) -> Vec<u32> {
+    let count = parts.len() as u64;
+    let mut starts = Vec::with_capacity(parts.len());
+    let (mut region, mut end) = (0, parts.first().copied().unwrap_or(0));
+    for interval in 0..count {
+        // The least 32 bits that fall into the interval, and their upper half.
+        let least = ((interval << 32).div_ceil(count) >> 16) as u32;
+        while end <= least && region + 1 < parts.len() {
+            region += 1;
+            end += parts[region];
+        }
+        starts.push(region as u32);
+    }
+    if let (Some(first), Some(last)) = (starts.first_mut(), parts.iter().rposition(|&p| p > 0)) {
+        *first = last as u32;
+    }
+    starts
+}
+
+/// Ratio of probability to share, cumulative probability of the regions before in 65,536ths, first
+/// region of the interval (of the first one, the last region) and weight of visibility of an entry; twin of what `glsl/include/guide.glsl` reads.
 pub fn decode_entry(entry: [u32; 2]) -> (f32, u32, u32, f32) {
     let level = (entry[1] >> 26) as f32;
     let range = TARGET_RANGE;
     let weight = (-level * (range / (VISIBILITY_LEVELS - 1) as f32)).exp2();
     (f32::from_bits(entry[0]), entry[1] & 0xffff, entry[1] >> 16 & 0x3ff, weight)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_fill_the_scale_and_leave_out_nothing_that_has_weight() {
+        for weights in [vec![0.0, 1e-12, 3.0, 0.0, 1.0, 0.0], vec![1.0; 1024], vec![0.0, 5.0]] {
+            let parts = whole_parts(&weights);
+            assert_eq!(parts.iter().sum::<u32>(), REGION_SCALE);
+            for (weight, part) in weights.iter().zip(&parts) {
+                assert_eq!(*weight > 0.0, *part > 0, "{weight} {part}");
+            }
+        }
+        assert_eq!(whole_parts(&[0.0; 3]), [0; 3]);
+    }
+
+    #[test]
+    fn intervals_start_where_a_search_from_the_first_region_would_arrive() {
+        let parts = whole_parts(&[0.0, 0.1, 0.0, 7.0, 1e-9, 2.0, 0.5, 0.0, 0.0]);
+        let starts = interval_starts(&parts);
+        assert_eq!(starts[0], 6, "the last region that can be drawn");
+        let count = parts.len() as u64;
+        for bits in (0..=u32::MAX).step_by(99_991) {
+            let mut end = 0;
+            let wanted = parts.iter().position(|part| {
+                end += part;
+                bits >> 16 < end
+            });
+            let interval = ((u64::from(bits) * count) >> 32) as usize;
+            let low = if interval == 0 { 0 } else { starts[interval] };
+            let high = starts[(interval + 1) % parts.len()];
+            let wanted = wanted.map_or(u32::MAX, |region| region as u32);
+            assert!((low..=high).contains(&wanted), "{bits}: {wanted} not in {low} to {high}");
+        }
+    }
 }

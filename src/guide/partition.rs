@@ -215,6 +215,12 @@ impl Ord for Queued {
     }
 }
 
+/// Indices from 0 on, each followed by `next` of it.
+fn in_order(next: &[usize]) -> Vec<usize> {
+    std::iter::successors(Some(0), |&index| Some(next[index]).filter(|&next| next != usize::MAX))
+        .collect()
+}
+
 impl Partition {
     /// Splits `map` into `region_count` regions, or as many as it has cells that can be split.
     ///
@@ -228,9 +234,16 @@ impl Partition {
         let mut parents: Option<Vec<usize>> = None;
         let mut parent_count = 1;
         let mut queue = BinaryHeap::from([Queued { cost: cells.cost(whole), index: 0 }]);
+        // What comes after each rectangle in the order of the tree, so that neighbours in that order
+        // are mostly neighbours in the map.
+        let mut next = vec![usize::MAX];
         while rectangles.len() < region_count {
             if rectangles.len() == PARENT_COUNT && parents.is_none() {
-                parents = Some((0..PARENT_COUNT).collect());
+                let mut ranks = vec![0; PARENT_COUNT];
+                for (rank, index) in in_order(&next).into_iter().enumerate() {
+                    ranks[index] = rank;
+                }
+                parents = Some(ranks);
                 parent_count = PARENT_COUNT;
             }
             // What is black need not be told apart.
@@ -241,6 +254,8 @@ impl Partition {
             let Some([low, high]) = cells.split(rectangles[index]) else { continue };
             rectangles[index] = low;
             rectangles.push(high);
+            next.push(next[index]);
+            next[index] = rectangles.len() - 1;
             if let Some(parents) = &mut parents {
                 parents.push(parents[index]);
             }
@@ -248,10 +263,15 @@ impl Partition {
                 queue.push(Queued { cost: cells.cost(rectangles[index]), index });
             }
         }
-        let parents = parents.unwrap_or_else(|| {
-            parent_count = rectangles.len();
-            (0..rectangles.len()).collect()
-        });
+        let order = in_order(&next);
+        let parents: Vec<usize> = parents.map_or_else(
+            || {
+                parent_count = rectangles.len();
+                (0..rectangles.len()).collect()
+            },
+            |parents| order.iter().map(|&index| parents[index]).collect(),
+        );
+        let rectangles: Vec<Rectangle> = order.iter().map(|&index| rectangles[index]).collect();
 
         let energy: f64 = cells.energy.iter().sum();
         let mut regions = Vec::with_capacity(rectangles.len());

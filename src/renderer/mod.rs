@@ -20,6 +20,7 @@ use crate::{
     },
     guide::GuideState,
     pass::{PassSettings, Passes, SHADOW_RAYS_PER_GROUP, Sets},
+    random::hash_4d,
     sampler::{CacheScope, Elevation, Parameters, Sampler},
     scene::Scene,
 };
@@ -39,6 +40,8 @@ const TRAINING_SWEEPS: u32 = 8;
 /// Share of visible rays above which a scene is rendered as by `mis`: little is blocked, and learning
 /// costs more than it brings.
 const OPEN_SHARE: f64 = 0.5;
+/// Tells the seeds of epochs from other hashes.
+const EPOCH_TAG: u32 = 0x6b43_a9b5;
 /// Tells the random numbers of training from those of the picture.
 const TRAINING_SEED: u32 = 0x7e11_ab1e;
 
@@ -270,6 +273,7 @@ impl Renderer {
                     is_training: 1,
                     ..Wave::default()
                 };
+                let wave = with_epoch(wave, wave.first_sample);
                 let before = self.totals.clone();
                 self.sweep(wave, self.film.padded_pixels() / TRAINING_SWEEPS)?;
                 self.take_counters()?;
@@ -310,7 +314,8 @@ impl Renderer {
             pixel_stride: 1,
             ..Wave::default()
         };
-        self.sweep(wave, self.film.padded_pixels())?;
+        let epoch = self.settings.first_sample.wrapping_add(self.rebuilt_at);
+        self.sweep(with_epoch(wave, epoch), self.film.padded_pixels())?;
         self.sample_count += samples;
         self.take_counters()
     }
@@ -507,6 +512,13 @@ impl Renderer {
         self.is_trained = true;
         Ok(has_moved)
     }
+}
+
+/// `wave` with numbers of its own for the epoch that begins at `sample`: those of the sampler `guided`
+/// start anew after every rebuild.
+fn with_epoch(wave: Wave, sample: u32) -> Wave {
+    let [epoch_seed, ..] = hash_4d([wave.seed, sample, EPOCH_TAG, wave.is_training]);
+    Wave { epoch_seed, epoch_start: sample, ..wave }
 }
 
 /// The first number of samples, not below `samples`, after which the guide is rebuilt: 1, 2, 3, 4, 6,
