@@ -15,7 +15,7 @@ use crate::{
 };
 
 const FORMAT: &str = "fenestra-guide";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Everything a renderer needs to go on learning where another stopped.
 #[derive(Clone, Debug, Default, PartialEq)]
