@@ -88,7 +88,8 @@ pub struct Arguments {
     /// Extra layers of the image.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     pub aov: Vec<Aov>,
-    /// Sampler parameter, may be repeated.
+    /// Sampler parameter, may be repeated: candidates=4, lobes=64, cache=pixel, … (elevation=metropolis
+    /// is biased).
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
     /// Write what the sampler `guided` has learned.
