@@ -12,9 +12,10 @@
 //! ```
 
 use std::{
-    fs,
+    fs::{self, File, TryLockError},
     io::Write,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use serde::{Serialize, de::DeserializeOwned};
@@ -33,6 +34,8 @@ const FORMAT: &str = "fenestra study 1";
 #[derive(Clone, Debug)]
 pub struct Folder {
     path: PathBuf,
+    /// The mark, locked while a study writes here; the system lets go of it when the program ends.
+    _lock: Option<Arc<File>>,
 }
 
 #[derive(Serialize, serde::Deserialize)]
@@ -41,12 +44,14 @@ struct Mark {
 }
 
 impl Folder {
-    /// Opens a report folder, or makes one out of a folder that is absent or empty.
+    /// Opens a report folder, or makes one out of a folder that is absent or empty, and keeps other
+    /// studies out of it.
     ///
     /// # Errors
-    /// [`Error::Format`] where `path` holds something else; [`Error::Io`] where it cannot be written.
+    /// [`Error::Format`] where `path` holds something else; [`Error::Io`] where it cannot be written;
+    /// [`Error::Usage`] where another study is at work in it.
     pub fn open(path: &Path) -> Result<Self> {
-        let folder = Self { path: path.to_path_buf() };
+        let folder = Self { path: path.to_path_buf(), _lock: None };
         let mark = path.join(MARK);
         if path.exists() && !path.is_dir() {
             return Err(Error::format(path, "expected a folder for the report, found a file"));
@@ -64,7 +69,7 @@ impl Folder {
                 ));
             }
             check_writable(&path.join("results.json"))?;
-            return Ok(folder);
+            return folder.locked();
         }
         if path.is_dir() {
             let mut entries =
@@ -81,7 +86,27 @@ impl Folder {
             }
         }
         folder.write_json(&mark, &Mark { format: FORMAT.to_owned() })?;
-        Ok(folder)
+        folder.locked()
+    }
+
+    fn locked(self) -> Result<Self> {
+        let mark = self.path.join(MARK);
+        let file = File::open(&mark).map_err(|source| Error::io(&mark, "open", source))?;
+        match file.try_lock() {
+            Ok(()) => Ok(Self { _lock: Some(Arc::new(file)), ..self }),
+            Err(TryLockError::WouldBlock) => Err(Error::Usage {
+                message: format!(
+                    "{}: another study is at work in this folder; wait for its end, or choose \
+                     another folder with -o",
+                    self.path.display()
+                ),
+            }),
+            // Some network file systems have no locks.
+            Err(TryLockError::Error(error)) if error.kind() == std::io::ErrorKind::Unsupported => {
+                Ok(self)
+            }
+            Err(TryLockError::Error(source)) => Err(Error::io(&mark, "lock", source)),
+        }
     }
 
     /// The folder of another study, to read only.
@@ -90,7 +115,7 @@ impl Folder {
     /// [`Error::Format`] where it is none.
     pub fn existing(path: &Path) -> Result<Self> {
         if path.join(MARK).exists() {
-            Ok(Self { path: path.to_path_buf() })
+            Ok(Self { path: path.to_path_buf(), _lock: None })
         } else {
             Err(Error::format(path, format!("expected the report folder of a study: no {MARK}")))
         }
@@ -168,7 +193,11 @@ mod tests {
         let path = folder.record("room", "mis-4spp-seed1");
         assert_eq!(folder.read_json::<Vec<u32>>(&path).unwrap(), None);
         folder.write_json(&path, &[1, 2, 3]).unwrap();
-        let again = Folder::open(folder.path()).unwrap();
+        let other = Folder::open(folder.path()).unwrap_err().to_string();
+        assert!(other.contains("another study is at work"), "{other}");
+        let folder_path = folder.path().to_path_buf();
+        drop(folder);
+        let again = Folder::open(&folder_path).unwrap();
         assert_eq!(again.read_json(&path).unwrap(), Some(vec![1, 2, 3]));
         fs::write(&path, "[1, 2").unwrap();
         assert!(again.read_json::<Vec<u32>>(&path).unwrap_err().to_string().contains("damaged"));
