@@ -33,6 +33,7 @@ const uint DIMENSION_GUIDE_TECHNIQUE = 6u;
 const uint DIMENSION_GUIDE_RESAMPLING = 7u;
 const uint DIMENSION_GUIDE_BRDF = 8u;
 const uint DIMENSION_GUIDE_LOBE = 9u;
+const uint DIMENSION_GUIDE_REDRAW = 15u;
 const uint DIMENSION_GUIDE_REGION = 16u;
 const uint DIMENSION_GUIDE_PATCH = 24u;
 
@@ -64,7 +65,9 @@ uint brdf_share(Material material) {
 Guided draw_candidate(Vertex vertex, uint first, uint index) {
     return draw_guided(
         vertex, first, epoch_bits(vertex, index, DIMENSION_GUIDE_REGION),
-        independent_bits(vertex, index, DIMENSION_GUIDE_PATCH));
+        independent_bits(vertex, index, DIMENSION_GUIDE_PATCH),
+        random_1d(
+            vertex.index.pixel, index, vertex.dimension + DIMENSION_GUIDE_REDRAW, wave.epoch_seed));
 }
 
 Guided draw_brdf_candidate(Vertex vertex, uint first, uint index) {
@@ -142,6 +145,9 @@ void main() {
     uint cell = guide_cell(
         vertex, independent_bits(vertex, vertex.index.sample_index, DIMENSION_GUIDE_CELL));
     uint first = cell * guide.region_count;
+    if (PRODUCT_WEIGHTS != 0u) {
+        guide_weight_by_brdf(vertex, cell);
+    }
     // Rays are numbered through all samples since the rebuild, since they share one sequence.
     uint first_ray = (vertex.index.sample_index - wave.epoch_start) * wave.total_shadow_rays
         + wave.first_shadow_ray;
@@ -189,6 +195,7 @@ void main() {
             reservoir.chosen.considered = Considered(vec3(0.0), vec3(0.0), 0.0, 0.0);
             reservoir.chosen.region = 0u;
             reservoir.chosen.entry = GuideEntry(0.0, 0u, 0u, 0.0);
+            reservoir.chosen.product_factor = 1.0;
             reservoir.chosen_pdf = 0.0;
             reservoir.chosen_guided = 0.0;
             reservoir.chosen_unguided = 0.0;

@@ -87,6 +87,15 @@ impl Sampler {
     }
 }
 
+/// What `guided` weights the regions of the environment with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Weights {
+    /// What the cell has learned: energy × visibility.
+    Cell,
+    /// That times BRDF × cosine at the hit, for the likeliest regions.
+    Product,
+}
+
 /// Parameters of the samplers, set by `--set key=value`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
@@ -101,6 +110,8 @@ pub struct Parameters {
     pub hierarchy: bool,
     /// `regions`: regions of the environment for `guided`, 16 to 1024.
     pub regions: u32,
+    /// `weights`: what `guided` weights the regions with.
+    pub weights: Weights,
     /// Those of `product` and `visibility`.
     pub lobes: LobeParameters,
 }
@@ -112,13 +123,15 @@ impl Default for Parameters {
             guide_memory: 128 << 20,
             hierarchy: true,
             regions: 256,
+            weights: Weights::Cell,
             lobes: LobeParameters::default(),
         }
     }
 }
 
 impl Parameters {
-    const KEYS: [&'static str; 4] = ["candidates", "guide-memory", "hierarchy", "regions"];
+    const KEYS: [&'static str; 5] =
+        ["candidates", "guide-memory", "hierarchy", "regions", "weights"];
 
     /// Sets one parameter from `key=value`.
     ///
@@ -169,6 +182,17 @@ impl Parameters {
                         || Error::usage(format!("--set regions={value}: expected 16 to 1024")),
                     )?;
             }
+            "weights" => {
+                self.weights = match value {
+                    "cell" => Weights::Cell,
+                    "product" => Weights::Product,
+                    _ => {
+                        return Err(Error::usage(format!(
+                            "--set weights={value}: expected cell or product"
+                        )));
+                    }
+                };
+            }
             _ if self.lobes.set(key, value)? => {}
             _ => {
                 let known: Vec<&str> =
@@ -216,6 +240,8 @@ impl Parameters {
                     named.insert("regions".to_owned(), self.regions.to_string());
                     let hierarchy = if self.hierarchy { "on" } else { "off" };
                     named.insert("hierarchy".to_owned(), hierarchy.to_owned());
+                    let weights = if self.weights == Weights::Cell { "cell" } else { "product" };
+                    named.insert("weights".to_owned(), weights.to_owned());
                     named.insert("guide-memory".to_owned(), self.guide_memory.to_string());
                 }
                 named
@@ -273,9 +299,14 @@ mod tests {
         assert_eq!(parameters.candidates_of(Sampler::Guided, true).unwrap(), 1);
         parameters.set("guide-memory=16MiB").unwrap();
         assert_eq!(parameters.guide_memory, 16 << 20);
-        for wrong in
-            ["guide-memory=1", "guide-memory=x", "guide-memory=4TB", "regions=2000", "hierarchy=1"]
-        {
+        for wrong in [
+            "guide-memory=1",
+            "guide-memory=x",
+            "guide-memory=4TB",
+            "regions=2000",
+            "hierarchy=1",
+            "weights=brdf",
+        ] {
             assert!(parameters.set(wrong).is_err(), "{wrong}");
         }
     }

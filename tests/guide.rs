@@ -6,7 +6,10 @@ mod support;
 
 use fenestra::{
     gpu::constants::{BINDING_GUIDE_COUNTS, GUIDE_NO_KEY, SET_SRBF},
-    guide::{CellKey, EstimateOptions, FACE_COUNT, Learned, PARENT_COUNT, Partition, decode_entry},
+    guide::{
+        CellKey, EstimateOptions, FACE_COUNT, Learned, PARENT_COUNT, Partition, decode_entry,
+        likely_regions,
+    },
     random::{hash_4d, random_independent_2d},
     scene::environment::{EnvironmentMap, EnvironmentTables},
 };
@@ -206,6 +209,80 @@ fn choose_region(entries: &[[u32; 2]], bits: u32) -> usize {
         }
     }
     low
+}
+
+/// Draws regions as the shader does with `weights=product` (`guide_redraw`) and compares with the
+/// probabilities it divides by (`guide_product_factor`), for reflections from none at all to a
+/// narrow lobe.
+#[test]
+fn the_likeliest_regions_are_drawn_with_the_probabilities_divided_by() {
+    const PRODUCT_PART: f64 = 0.7;
+    let map = sunny();
+    let partition = Partition::new(&map, 64);
+    let snapshot =
+        taught(&partition, 1 << 12, 1 << 14).snapshot(&partition, &EstimateOptions::default());
+    let entries = &snapshot.entries[FACE_COUNT * 64..][..64];
+    let probability: Vec<f64> = entries
+        .iter()
+        .zip(&partition.regions)
+        .map(|(entry, region)| f64::from(decode_entry(*entry).0) * region.share)
+        .collect();
+    let likely = likely_regions(entries, &partition);
+    let index = |word: u32| (word & 0x3ff) as usize;
+    assert!(likely.windows(2).all(|pair| index(pair[0][3]) < index(pair[1][3])));
+    let least = likely.iter().map(|l| l[3] >> 10).min().unwrap();
+    for (region, probability) in probability.iter().enumerate() {
+        let listed = likely.iter().find(|likely| index(likely[3]) == region);
+        let part = (probability * 65_536.0).round() as u32;
+        assert!(listed.map_or(part <= least, |listed| listed[3] >> 10 == part));
+    }
+    let lobe = |slot: usize| if slot == 5 { 1.0 } else { 0.0 };
+    let uneven = |slot: usize| (slot * 7 % 5) as f64;
+    for (seed, reflected) in
+        [lobe as fn(usize) -> f64, uneven, |_| 0.0, |slot| f64::from(u32::from(slot == 15))]
+            .into_iter()
+            .enumerate()
+    {
+        let part = |slot: usize| f64::from(likely[slot][3] >> 10) / 65_536.0;
+        let listed: f64 = (0..likely.len()).map(part).sum();
+        let mut sum = 0.0;
+        let cumulative: Vec<f64> = (0..likely.len())
+            .map(|slot| {
+                sum += part(slot) * reflected(slot);
+                sum
+            })
+            .collect();
+        let expected: Vec<f64> = (0..64)
+            .map(|region| {
+                let slot = likely.iter().position(|likely| index(likely[3]) == region);
+                let factor = slot.filter(|_| sum > 0.0).map_or(1.0, |slot| {
+                    1.0 - PRODUCT_PART + PRODUCT_PART * listed * reflected(slot) / sum
+                });
+                probability[region] * factor
+            })
+            .collect();
+        assert!((expected.iter().sum::<f64>() - 1.0).abs() < 1e-6, "the density is normalised");
+        let mut observed = vec![0.0; 64];
+        for sample in 0..200_000 {
+            let bits = hash_4d([sample, seed as u32, 7, 9]);
+            let mut region = choose_region(entries, bits[0]);
+            let u = f64::from(bits[1]) / 4_294_967_296.0;
+            let wanted = u / PRODUCT_PART * sum;
+            if u < PRODUCT_PART
+                && wanted < sum
+                && likely.iter().any(|likely| index(likely[3]) == region)
+            {
+                let slot = cumulative.partition_point(|&up_to| up_to <= wanted);
+                region = index(likely[slot][3]);
+            }
+            observed[region] += 1.0;
+        }
+        let p = chi_square_p_value(&observed, &expected);
+        assert!(p > 1e-5, "reflection {seed}: p = {p}");
+    }
+    // A map of few regions fills the list with nothing.
+    let few = likely_regions(&entries[..5], &partition);
+    assert!(few.len() == likely.len() && few[5..].iter().all(|likely| likely[3] == 0x3ff));
 }
 
 /// A guide that was taught: eastern regions visible from one fine cell, nothing from another.

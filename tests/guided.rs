@@ -12,7 +12,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use fenestra::{
     film::Sums,
     renderer::{Renderer, Settings},
-    sampler::{Parameters, Sampler},
+    sampler::{Parameters, Sampler, Weights},
     scene::Scene,
 };
 use glam::Vec3;
@@ -137,6 +137,19 @@ fn every_mode_is_unbiased_in_a_room() {
                 "overflow, one-sample",
                 with(1, &|settings| {
                     settings.parameters.guide_memory = 15 * 16 * 256;
+                }),
+            ),
+            ("product", with(1, &|settings| settings.parameters.weights = Weights::Product)),
+            (
+                "product, 4 candidates",
+                with(4, &|settings| settings.parameters.weights = Weights::Product),
+            ),
+            (
+                "product, overflow, few regions",
+                with(1, &|settings| {
+                    settings.parameters.weights = Weights::Product;
+                    settings.parameters.guide_memory = 15 * 16 * 256;
+                    settings.parameters.regions = 16;
                 }),
             ),
             ("few regions", with(4, &|settings| settings.parameters.regions = 16)),

@@ -9,6 +9,9 @@
 
 #include "vertex.glsl"
 
+// 1 weights the likeliest regions of a cell with the BRDF at every hit.
+layout(constant_id = CONSTANT_PRODUCT_WEIGHTS) const uint PRODUCT_WEIGHTS = 0u;
+
 // First cells: one for each face of the cube, for places that have no cell of their own.
 const uint GUIDE_COARSE = 0x80000000u;
 
@@ -126,7 +129,84 @@ struct Guided {
     Considered considered;
     uint region;
     GuideEntry entry;
+    // Probability of the region at this hit divided by that in the cell.
+    float product_factor;
 };
+
+// The likeliest regions of the cell share their probability anew at a hit: this part of it in
+// proportion to probability · BRDF · cosine toward the mean direction, the rest as in the cell.
+const float GUIDE_PRODUCT_PART = 0.7;
+// Cosine that mean directions near or below the horizon are raised to: parts of their regions may be
+// above it.
+const float GUIDE_LEAST_COSINE = 0.1;
+
+uint guide_likely_first;
+// Sum of the probabilities of the likeliest regions.
+float guide_likely_sum;
+// Luminance of BRDF · cosine toward each of them, by the cosine that the cell counts already.
+float guide_reflected[GUIDE_LIKELY_REGIONS];
+// Sums of probability · guide_reflected up to each and with it.
+float guide_cumulative[GUIDE_LIKELY_REGIONS];
+
+uint guide_likely_word(uint slot) {
+    return texelFetch(guide_likely, int(guide_likely_first + slot)).w;
+}
+
+// Weighs the likeliest regions of `cell` for the hit.
+void guide_weight_by_brdf(Vertex vertex, uint cell) {
+    guide_likely_first = cell * GUIDE_LIKELY_REGIONS;
+    guide_likely_sum = 0.0;
+    float sum = 0.0;
+    for (uint slot = 0u; slot < GUIDE_LIKELY_REGIONS; ++slot) {
+        uvec4 likely = texelFetch(guide_likely, int(guide_likely_first + slot));
+        float probability = float(likely.w >> 10u) * (1.0 / 65536.0);
+        vec3 incident_local = to_local(vertex.frame, uintBitsToFloat(likely.xyz));
+        // The cell's probability has a cosine of its own (estimate.rs).
+        float facing = max((incident_local.z + 0.25) / 1.25, 0.03);
+        incident_local.z = max(incident_local.z, GUIDE_LEAST_COSINE);
+        incident_local = normalize(incident_local);
+        vec3 value = brdf_evaluate(vertex.material, vertex.outgoing_local, incident_local);
+        float reflected = luminance(value) * incident_local.z / facing;
+        sum += probability * reflected;
+        guide_likely_sum += probability;
+        guide_reflected[slot] = reflected;
+        guide_cumulative[slot] = sum;
+    }
+}
+
+// Slot of a region among the likeliest, or GUIDE_LIKELY_REGIONS.
+uint guide_likely_slot(uint region) {
+    uint slot = 0u;
+    for (uint span = GUIDE_LIKELY_REGIONS / 2u; span > 0u; span /= 2u) {
+        slot += (guide_likely_word(slot + span - 1u) & 0x3ffu) < region ? span : 0u;
+    }
+    return (guide_likely_word(slot) & 0x3ffu) == region ? slot : GUIDE_LIKELY_REGIONS;
+}
+
+float guide_product_factor(uint region) {
+    uint slot = guide_likely_slot(region);
+    float sum = guide_cumulative[GUIDE_LIKELY_REGIONS - 1u];
+    float factor = 1.0;
+    if (slot < GUIDE_LIKELY_REGIONS && sum > 0.0) {
+        factor = 1.0 - GUIDE_PRODUCT_PART
+            + GUIDE_PRODUCT_PART * guide_likely_sum * guide_reflected[slot] / sum;
+    }
+    return factor;
+}
+
+// The region to take in the place of one that the cell drew, by a number in [0, 1).
+uint guide_redraw(uint region, float u) {
+    float sum = guide_cumulative[GUIDE_LIKELY_REGIONS - 1u];
+    float wanted = u / GUIDE_PRODUCT_PART * sum;
+    bool is_redrawn = u < GUIDE_PRODUCT_PART && wanted < sum
+        && guide_likely_slot(region) < GUIDE_LIKELY_REGIONS;
+    // The first whose sum is above the number.
+    uint slot = 0u;
+    for (uint span = GUIDE_LIKELY_REGIONS / 2u; span > 0u; span /= 2u) {
+        slot += guide_cumulative[slot + span - 1u] <= wanted ? span : 0u;
+    }
+    return is_redrawn ? guide_likely_word(slot) & 0x3ffu : region;
+}
 
 uint guide_word(uint index) {
     return texelFetch(guide_entries, int(index)).y;
@@ -136,7 +216,8 @@ uint guide_word(uint index) {
 // table from bits.y, direction by the bilinear patch. `first` is the index of the first entry of the
 // cell. Regions that are neighbours in the map are mostly neighbours in their order, so that
 // stratified bits give stratified directions.
-Guided draw_guided(Vertex vertex, uint first, uvec2 bits, uvec4 more_bits) {
+// `redraw` chooses again among the likeliest regions where they are weighted with the BRDF.
+Guided draw_guided(Vertex vertex, uint first, uvec2 bits, uvec4 more_bits, float redraw) {
     Guided guided;
     uint interval = scaled(bits.x, guide.region_count);
     uint next = interval + 1u < guide.region_count ? interval + 1u : 0u;
@@ -152,6 +233,11 @@ Guided draw_guided(Vertex vertex, uint first, uvec2 bits, uvec4 more_bits) {
         }
     }
     guided.region = low;
+    guided.product_factor = 1.0;
+    if (PRODUCT_WEIGHTS != 0u) {
+        guided.region = guide_redraw(guided.region, redraw);
+        guided.product_factor = guide_product_factor(guided.region);
+    }
     guided.entry = guide_entry(first + guided.region);
 
     uvec4 region = texelFetch(guide_regions, int(guided.region));
@@ -185,12 +271,16 @@ Guided draw_brdf_guided(Vertex vertex, uint first, vec3 u) {
         guide_region_of_cell,
         int(location.row * parameters.environment_width + location.column)).x;
     guided.entry = guide_entry(first + guided.region);
+    guided.product_factor = 1.0;
+    if (PRODUCT_WEIGHTS != 0u) {
+        guided.product_factor = guide_product_factor(guided.region);
+    }
     return guided;
 }
 
 // Density of guided directions.
 float guided_pdf(Guided guided) {
-    return guided.entry.ratio * guided.considered.environment_pdf;
+    return guided.entry.ratio * guided.product_factor * guided.considered.environment_pdf;
 }
 
 #endif

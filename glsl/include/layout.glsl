@@ -160,6 +160,7 @@ layout(set = SET_SRBF, binding = BINDING_GUIDE_REGIONS) uniform usamplerBuffer g
 layout(set = SET_SRBF, binding = BINDING_GUIDE_ALIASES) uniform usamplerBuffer guide_aliases;
 layout(set = SET_SRBF, binding = BINDING_GUIDE_REGION_OF_CELL) uniform usamplerBuffer
     guide_region_of_cell;
+layout(set = SET_SRBF, binding = BINDING_GUIDE_LIKELY) uniform usamplerBuffer guide_likely;
 layout(scalar, set = SET_SRBF, binding = BINDING_GUIDE_WANTED) buffer GuideWantedBuffer {
     uint guide_wanted[];
 };

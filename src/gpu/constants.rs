@@ -68,6 +68,9 @@ pub const BINDING_GUIDE_COUNTS: u32 = 10;
 pub const BINDING_GUIDE_WANTED: u32 = 11;
 /// SRBF set: index into the counts per shadow ray, or `NOTHING_TO_LEARN`.
 pub const BINDING_LEARN_TARGETS: u32 = 12;
+/// SRBF set: the likeliest regions of each cell, texels of four words (see
+/// `guide::LikelyRegion`).
+pub const BINDING_GUIDE_LIKELY: u32 = 13;
 
 /// Wave set: [`Ray`](super::layout::Ray) per path, the next one to trace.
 pub const BINDING_RAYS: u32 = 0;
@@ -132,6 +135,9 @@ pub const CONSTANT_SAMPLER: u32 = 16;
 pub const CONSTANT_CANDIDATES: u32 = 17;
 /// Specialization constant of `sample_guided`: candidates from the BRDF among the candidates.
 pub const CONSTANT_BRDF_CANDIDATES: u32 = 24;
+/// Specialization constant of `sample_guided`: 1 weights the likeliest regions of a cell with the BRDF
+/// at every hit.
+pub const CONSTANT_PRODUCT_WEIGHTS: u32 = 25;
 /// Specialization constant of `bounce`: first vertex at which russian roulette may end a path.
 pub const CONSTANT_ROULETTE_VERTEX: u32 = 18;
 /// Specialization constant of the passes that evaluate materials: bit `1 << kind` for every kind that
@@ -207,6 +213,8 @@ pub const SAMPLER_GUIDED: u32 = 8;
 
 /// Slots of the hash table of cells that are looked at for one key.
 pub const GUIDE_PROBES: u32 = 8;
+/// Regions of a cell that are weighted with the BRDF; a power of two.
+pub const GUIDE_LIKELY_REGIONS: u32 = 16;
 /// Levels of the visibility in an entry.
 pub const GUIDE_VISIBILITY_LEVELS: u32 = 64;
 /// Key of no cell.
@@ -374,8 +382,11 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("BINDING_GUIDE_COUNTS", BINDING_GUIDE_COUNTS),
     ("BINDING_GUIDE_WANTED", BINDING_GUIDE_WANTED),
     ("BINDING_LEARN_TARGETS", BINDING_LEARN_TARGETS),
+    ("BINDING_GUIDE_LIKELY", BINDING_GUIDE_LIKELY),
     ("CONSTANT_BRDF_CANDIDATES", CONSTANT_BRDF_CANDIDATES),
+    ("CONSTANT_PRODUCT_WEIGHTS", CONSTANT_PRODUCT_WEIGHTS),
     ("GUIDE_PROBES", GUIDE_PROBES),
+    ("GUIDE_LIKELY_REGIONS", GUIDE_LIKELY_REGIONS),
     ("GUIDE_VISIBILITY_LEVELS", GUIDE_VISIBILITY_LEVELS),
     ("GUIDE_NO_KEY", GUIDE_NO_KEY),
     ("NOTHING_TO_LEARN", NOTHING_TO_LEARN),

@@ -13,7 +13,7 @@ use super::{buffer::Buffer, constants as c, device::Device, labels, vulkan_error
 use crate::error::{Error, Result};
 
 /// Bindings of the four sets.
-pub const SET_BINDING_COUNTS: [u32; 4] = [13, 13, 14, 8];
+pub const SET_BINDING_COUNTS: [u32; 4] = [13, 14, 14, 8];
 
 /// Format and bytes of the texels of a binding that is a uniform texel buffer.
 pub(super) fn texel_format(set: u32, binding: u32) -> Option<(vk::Format, u64)> {
@@ -36,7 +36,9 @@ pub(super) fn texel_format(set: u32, binding: u32) -> Option<(vk::Format, u64)> 
         (c::SET_SRBF, c::BINDING_MATERIAL_LOBES) => Some((vk::Format::R32G32_UINT, 8)),
         (c::SET_WAVE, c::BINDING_LOBE_TEXELS) => Some((vk::Format::R32G32B32A32_UINT, 16)),
         (c::SET_WAVE, c::BINDING_CUMULATIVE_TEXELS) => Some((vk::Format::R32_SFLOAT, 4)),
-        (c::SET_SRBF, c::BINDING_GUIDE_REGIONS) => Some((vk::Format::R32G32B32A32_UINT, 16)),
+        (c::SET_SRBF, c::BINDING_GUIDE_REGIONS | c::BINDING_GUIDE_LIKELY) => {
+            Some((vk::Format::R32G32B32A32_UINT, 16))
+        }
         (
             c::SET_SRBF,
             c::BINDING_GUIDE_TABLE | c::BINDING_GUIDE_ENTRIES | c::BINDING_GUIDE_ALIASES,

@@ -14,6 +14,7 @@ mod estimate;
 mod file;
 mod key;
 mod learned;
+mod likely;
 mod partition;
 
 pub use alias::{AliasEntry, alias_table, probabilities};
@@ -21,4 +22,5 @@ pub use estimate::{EstimateOptions, Estimates, VISIBILITY_LEVELS, decode_entry};
 pub use file::{GuideState, Origin};
 pub use key::{CellKey, FACE_COUNT, face_normal};
 pub use learned::{Learned, Snapshot};
+pub use likely::{LikelyRegion, likely_regions};
 pub use partition::{PARENT_COUNT, Partition, Region};

@@ -7,10 +7,14 @@ use crate::{
     error::Result,
     gpu::{
         Commands, DescriptorSet, Device, Pipeline,
-        constants::{CONSTANT_BRDF_CANDIDATES, CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS},
+        constants::{
+            CONSTANT_BRDF_CANDIDATES, CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS,
+            CONSTANT_PRODUCT_WEIGHTS,
+        },
         layout::Wave,
         shaders,
     },
+    sampler::Weights,
 };
 
 /// Both pipelines.
@@ -25,11 +29,17 @@ impl Guided {
     ///
     /// # Errors
     /// A Vulkan call fails.
-    pub fn new(device: &Arc<Device>, candidates: u32, material_kinds: u32) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        candidates: u32,
+        weights: Weights,
+        material_kinds: u32,
+    ) -> Result<Self> {
         let constants = [
             (CONSTANT_CANDIDATES, candidates),
             (CONSTANT_BRDF_CANDIDATES, (candidates / 4).max(1)),
             (CONSTANT_MATERIAL_KINDS, material_kinds),
+            (CONSTANT_PRODUCT_WEIGHTS, u32::from(weights == Weights::Product)),
         ];
         let name = "sample_guided";
         Ok(Self {

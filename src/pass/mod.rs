@@ -131,7 +131,14 @@ impl Passes {
                 ],
             )?,
             guided: (settings.sampler == Sampler::Guided)
-                .then(|| Guided::new(device, candidates, settings.material_kinds))
+                .then(|| {
+                    Guided::new(
+                        device,
+                        candidates,
+                        settings.parameters.weights,
+                        settings.material_kinds,
+                    )
+                })
                 .transpose()?,
             lobes: settings
                 .fit_sizes

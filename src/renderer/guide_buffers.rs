@@ -3,6 +3,7 @@
 use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use crate::{
     error::{Error, Result},
@@ -10,16 +11,17 @@ use crate::{
         Buffer, Commands, DescriptorSet, Device,
         constants::{
             BINDING_GUIDE_ALIASES, BINDING_GUIDE_COUNTS, BINDING_GUIDE_ENTRIES,
-            BINDING_GUIDE_PARAMETERS, BINDING_GUIDE_REGION_OF_CELL, BINDING_GUIDE_REGIONS,
-            BINDING_GUIDE_TABLE, BINDING_GUIDE_WANTED, BINDING_LEARN_TARGETS, GUIDE_NO_KEY,
-            SET_SRBF,
+            BINDING_GUIDE_LIKELY, BINDING_GUIDE_PARAMETERS, BINDING_GUIDE_REGION_OF_CELL,
+            BINDING_GUIDE_REGIONS, BINDING_GUIDE_TABLE, BINDING_GUIDE_WANTED,
+            BINDING_LEARN_TARGETS, GUIDE_LIKELY_REGIONS, GUIDE_NO_KEY, SET_SRBF,
         },
         layout::GuideParameters,
     },
     guide::{
-        CellKey, EstimateOptions, FACE_COUNT, GuideState, Learned, Origin, Partition, Snapshot,
+        CellKey, EstimateOptions, FACE_COUNT, GuideState, Learned, LikelyRegion, Origin, Partition,
+        Snapshot, likely_regions,
     },
-    sampler::Parameters,
+    sampler::{Parameters, Weights},
     scene::{self, Scene},
 };
 
@@ -57,6 +59,9 @@ pub struct GuideBuffers {
     counts: Buffer,
     wanted: Buffer,
     targets: Buffer,
+    /// Likeliest regions of every cell; of one cell where they are not used.
+    likely: Buffer,
+    uses_likely: bool,
     wanted_slots: usize,
     rebuild_ms: f64,
 }
@@ -73,10 +78,13 @@ impl GuideBuffers {
         pixels: u32,
         rays: u64,
     ) -> Result<Self> {
-        let hierarchy = parameters.hierarchy;
+        let (hierarchy, weights) = (parameters.hierarchy, parameters.weights);
         let partition = Partition::new(&scene.environment, parameters.regions as usize);
         let region_count = partition.regions.len();
-        let bytes_per_cell = BYTES_PER_REGION * region_count as u64;
+        let uses_likely = weights == Weights::Product;
+        let likely_bytes = 16 * u64::from(GUIDE_LIKELY_REGIONS);
+        let bytes_per_cell =
+            BYTES_PER_REGION * region_count as u64 + if uses_likely { likely_bytes } else { 0 };
         let by_range = device.capabilities().max_storage_buffer_range / (bytes_per_cell / 2);
         let useful = FEW_CELLS.max(u64::from(pixels) / PIXELS_PER_CELL);
         let capacity = (parameters.guide_memory / bytes_per_cell)
@@ -119,6 +127,8 @@ impl GuideBuffers {
         let counts = Buffer::new(device, "guide counts", cells as u64)?;
         let wanted = Buffer::new(device, "guide wanted", 4 * wanted_slots as u64)?;
         let targets = Buffer::new(device, "learn targets", 4 * rays)?;
+        let lists = if uses_likely { capacity as u64 } else { 1 };
+        let likely = Buffer::new(device, "guide likely", lists * likely_bytes)?;
         let set = DescriptorSet::new(
             device,
             SET_SRBF,
@@ -132,6 +142,7 @@ impl GuideBuffers {
                 (BINDING_GUIDE_COUNTS, &counts),
                 (BINDING_GUIDE_WANTED, &wanted),
                 (BINDING_LEARN_TARGETS, &targets),
+                (BINDING_GUIDE_LIKELY, &likely),
             ],
         )?;
         let mut buffers = Self {
@@ -152,6 +163,8 @@ impl GuideBuffers {
             counts,
             wanted,
             targets,
+            likely,
+            uses_likely,
             wanted_slots,
             rebuild_ms: 0.0,
         };
@@ -278,6 +291,13 @@ impl GuideBuffers {
     fn upload(&self) -> Result<()> {
         let Snapshot { table, entries } = self.learned.snapshot(&self.partition, &self.options);
         self.table.upload(bytemuck::cast_slice(&table))?;
+        if self.uses_likely {
+            let likely: Vec<LikelyRegion> = entries
+                .par_chunks(self.partition.regions.len())
+                .flat_map_iter(|entries| likely_regions(entries, &self.partition))
+                .collect();
+            self.likely.upload(bytemuck::cast_slice(&likely))?;
+        }
         self.entries.upload(bytemuck::cast_slice(&entries))
     }
 
@@ -293,6 +313,7 @@ impl GuideBuffers {
             &self.counts,
             &self.wanted,
             &self.targets,
+            &self.likely,
         ]
         .into_iter()
         .map(|buffer| (buffer.name().to_owned(), buffer.size()))
