@@ -28,7 +28,6 @@ layout(constant_id = CONSTANT_CANDIDATES) const uint CANDIDATES = 1u;
 layout(constant_id = CONSTANT_BRDF_CANDIDATES) const uint BRDF_CANDIDATES = 1u;
 
 // Offsets of dimensions from the first of a vertex, for independent numbers.
-const uint DIMENSION_GUIDE_CELL = 5u;
 const uint DIMENSION_GUIDE_TECHNIQUE = 6u;
 const uint DIMENSION_GUIDE_RESAMPLING = 7u;
 const uint DIMENSION_GUIDE_BRDF = 8u;
@@ -142,8 +141,7 @@ void main() {
         return;
     }
     Vertex vertex = load_vertex(path, hit);
-    uint cell = guide_cell(
-        vertex, independent_bits(vertex, vertex.index.sample_index, DIMENSION_GUIDE_CELL));
+    uint cell = guide_cell(vertex, guide_cell_bits(vertex.index, vertex.dimension));
     uint first = cell * guide.region_count;
     if (PRODUCT_WEIGHTS != 0u) {
         guide_weight_by_brdf(vertex, cell);

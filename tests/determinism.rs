@@ -17,13 +17,13 @@ fn scene() -> Scene {
 }
 
 fn settings(sampler: Sampler) -> Settings {
-    Settings {
-        sampler,
-        depth: 3,
-        seed: 7,
-        aovs: vec![Aov::Albedo, Aov::Normal, Aov::Position, Aov::Visible],
-        ..Settings::default()
+    let mut aovs = vec![Aov::Albedo, Aov::Normal, Aov::Position, Aov::Visible];
+    match sampler {
+        Sampler::Visibility => aovs.push(Aov::CacheEntries),
+        Sampler::Guided => aovs.push(Aov::GuideCell),
+        _ => {}
     }
+    Settings { sampler, depth: 3, seed: 7, aovs, ..Settings::default() }
 }
 
 fn render(settings: Settings, passes: &[u32]) -> Sums {

@@ -72,7 +72,10 @@ fn accumulate(numbers: &mut Numbers, sample_count: u32, scale: f32) -> (Sums, Ve
     sums.albedo = vec![[0.0; 3]; 8];
     sums.normal = vec![[0.0; 3]; 8];
     sums.position = vec![[0.0; 3]; 8];
+    sums.guide_cell = vec![[0.0; 3]; 8];
+    sums.guide_level = vec![[0.0; 3]; 8];
     sums.visible = vec![[0; 2]; 8];
+    sums.cache_entries = vec![[0; 2]; 8];
     for _ in 0..sample_count {
         for (pixel, drawn) in drawn.iter_mut().enumerate() {
             for channel in 0..3 {
@@ -86,7 +89,11 @@ fn accumulate(numbers: &mut Numbers, sample_count: u32, scale: f32) -> (Sums, Ve
                 sums.albedo[pixel][channel] += 0.5;
                 sums.normal[pixel][channel] -= numbers.next();
                 sums.position[pixel][channel] += 100.0 * numbers.next();
+                sums.guide_cell[pixel][channel] += 0.25;
             }
+            sums.guide_level[pixel][2] += 1.0;
+            sums.cache_entries[pixel][0] += 3;
+            sums.cache_entries[pixel][1] += 2;
             sums.visible[pixel][0] += 2;
             sums.visible[pixel][1] += 5;
         }
@@ -214,14 +221,19 @@ fn image_layers_have_pbrts_names_and_the_means() {
     let (sums, _) = accumulate(&mut Numbers(1), 10, 1.0);
     let image = sums.to_image(Aov::value_variants());
     let names: Vec<&str> = image.channels.keys().map(String::as_str).collect();
-    let expected = "Albedo.B Albedo.G Albedo.R B G N.X N.Y N.Z P.X P.Y P.Z R SampleCount.Y \
-                    ShadowRays.Y Variance.B Variance.G Variance.R Visible.Y";
+    let expected = "Albedo.B Albedo.G Albedo.R B CacheEntries.Y G GuideCell.B GuideCell.G \
+                    GuideCell.R GuideLevel.B GuideLevel.G GuideLevel.R Hits.Y N.X N.Y N.Z P.X P.Y \
+                    P.Z R SampleCount.Y ShadowRays.Y Variance.B Variance.G Variance.R Visible.Y";
     assert_eq!(names.join(" "), expected);
     assert_eq!((image.origin, image.film_size), ([3, 1], [10, 6]));
     assert_eq!(image.channels["Albedo.G"], [0.5; 8]);
     assert_eq!(image.channels["SampleCount.Y"], [10.0; 8]);
     assert_eq!(image.channels["Visible.Y"], [0.4; 8]);
     assert_eq!(image.channels["ShadowRays.Y"], [50.0; 8]);
+    assert_eq!(image.channels["CacheEntries.Y"], [1.5; 8]);
+    assert_eq!(image.channels["Hits.Y"], [20.0; 8]);
+    assert_eq!(image.channels["GuideCell.B"], [0.25; 8]);
+    assert_eq!(image.channels["GuideLevel.B"], [1.0; 8]);
     assert_eq!(image.channels["G"][5], sums.mean(5)[1] as f32);
     assert_eq!(image.channels["N.Z"][5], (f64::from(sums.normal[5][2]) / 10.0) as f32);
     let plain = sums.to_image(&[]);
@@ -241,6 +253,9 @@ fn layers_may_be_called_by_their_names_in_the_file() {
         ("N", Aov::Normal),
         ("P", Aov::Position),
         ("Visible", Aov::Visible),
+        ("CacheEntries", Aov::CacheEntries),
+        ("cache-entries", Aov::CacheEntries),
+        ("GuideCell", Aov::GuideCell),
     ] {
         assert_eq!(Aov::from_str(name, false), Ok(aov), "{name}");
     }
@@ -301,6 +316,7 @@ fn checkpoints_come_back_to_the_bit() {
     let (mut sums, _) = accumulate(&mut Numbers(5), 1000, 1e3);
     sums.sum[0] = [-0.0, f32::MIN_POSITIVE / 8.0, f32::MAX];
     sums.visible[0] = [u32::MAX - 1, u32::MAX];
+    sums.cache_entries[1] = [u32::MAX - 3, 16_777_217];
     let checkpoint = Checkpoint { sums, metadata: metadata(&[range(4, 0, 1000)]) };
     checkpoint.write(&path).unwrap();
     let read = Checkpoint::read(&path).unwrap();
@@ -383,8 +399,12 @@ fn a_checkpoint_of_another_render_is_refused_with_every_difference() {
     assert!(error.contains("a merged checkpoint cannot be continued"), "{error}");
     let mut bare = checkpoint.clone();
     bare.sums.albedo.clear();
+    bare.sums.cache_entries.clear();
+    bare.sums.guide_cell.clear();
     let error = bare.check_resume(path, &expected, &checkpoint.sums, 4, 8).unwrap_err().to_string();
-    assert!(error.contains("layer albedo: absent against asked for"), "{error}");
+    for layer in ["albedo", "cache-entries", "guide-cell"] {
+        assert!(error.contains(&format!("layer {layer}: absent against asked for")), "{error}");
+    }
 }
 
 /// One accumulation of 30 samples, and the same samples in parts of 10 and 20.
@@ -421,6 +441,8 @@ fn merged_checkpoints_equal_one_run() {
     assert_eq!(merged.metadata.sample_ranges, [range(1, 0, 30)]);
     assert_eq!(merged.sums.sample_count, 30);
     assert_eq!(merged.sums.visible, whole.sums.visible);
+    assert_eq!(merged.sums.cache_entries, whole.sums.cache_entries);
+    assert_eq!(merged.sums.guide_level, whole.sums.guide_level);
     for pixel in 0..8 {
         for channel in 0..3 {
             let (found, expected) =
@@ -441,6 +463,7 @@ fn merged_images_equal_one_run_up_to_rounding() {
     let (whole, mut first, second) = whole_and_parts();
     // Different shares of visible rays must be weighted with the rays.
     first.sums.visible[2] = [1, 7];
+    first.sums.cache_entries[3] = [9, 2];
     let all = Aov::value_variants();
     let images = [&first, &second].map(|checkpoint| checkpoint.sums.to_image(all));
     let part = |image, checkpoint: &'static str, metadata| Part {
@@ -452,6 +475,7 @@ fn merged_images_equal_one_run_up_to_rounding() {
     let (merged, metadata) = merge_images(&parts).unwrap();
     let mut expected = whole.sums.clone();
     expected.visible[2] = [1 + 40, 7 + 100];
+    expected.cache_entries[3] = [9 + 60, 2 + 40];
     assert_close(&merged, &expected.to_image(all), 1e-5);
     assert_eq!(metadata.sample_ranges, [range(1, 0, 30)]);
     assert_eq!(metadata.gpu_seconds["trace"], 0.2);

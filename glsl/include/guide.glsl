@@ -15,6 +15,9 @@ layout(constant_id = CONSTANT_PRODUCT_WEIGHTS) const uint PRODUCT_WEIGHTS = 0u;
 // First cells: one for each face of the cube, for places that have no cell of their own.
 const uint GUIDE_COARSE = 0x80000000u;
 
+// Offset from the first dimension of a vertex, for the choice of its cell.
+const uint DIMENSION_GUIDE_CELL = 5u;
+
 struct GuideEntry {
     // Probability of the region divided by its share of the map's energy: the density of a guided
     // direction is this times the density of the whole map.
@@ -70,6 +73,12 @@ uint guide_hash(uint key) {
     key ^= key >> 13u;
     key *= 0xc2b2ae35u;
     return key ^ (key >> 16u);
+}
+
+// Bits that choose among the cells around a place, for one vertex of a path.
+uvec4 guide_cell_bits(PathIndex index, uint dimension) {
+    return hash_4d(uvec4(
+        index.pixel, index.sample_index, dimension + DIMENSION_GUIDE_CELL, wave.epoch_seed));
 }
 
 // Index of the cell with a key, or GUIDE_NO_KEY.

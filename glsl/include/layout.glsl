@@ -375,6 +375,16 @@ layout(scalar, set = SET_FILM, binding = BINDING_FILM_POSITION) buffer FilmPosit
 layout(scalar, set = SET_FILM, binding = BINDING_FILM_VISIBLE) buffer FilmVisibleBuffer {
     uvec2 film_visible[];
 };
+layout(scalar, set = SET_FILM, binding = BINDING_FILM_CACHE_ENTRIES)
+    buffer FilmCacheEntriesBuffer {
+    uvec2 film_cache_entries[];
+};
+layout(scalar, set = SET_FILM, binding = BINDING_FILM_GUIDE_CELL) buffer FilmGuideCellBuffer {
+    vec3 film_guide_cell[];
+};
+layout(scalar, set = SET_FILM, binding = BINDING_FILM_GUIDE_LEVEL) buffer FilmGuideLevelBuffer {
+    vec3 film_guide_level[];
+};
 #endif
 
 #ifdef NEEDS_WAVE

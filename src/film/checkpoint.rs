@@ -1,8 +1,8 @@
 //! Checkpoints: the film's sums with what they were rendered with, as an OpenEXR file.
 //!
 //! The channels are the sums themselves (`Sum.R/G/B`, `SumCompensation.R/G/B`, `Squares.R/G/B`,
-//! `AlbedoSum.R/G/B`, `NSum.X/Y/Z`, `PSum.X/Y/Z`, and the shadow ray counts as pairs of floats whose
-//! sum is the integer), bit by bit, beside the picture `R`, `G`, `B` that lets any viewer open them.
+//! `AlbedoSum.R/G/B`, `NSum.X/Y/Z`, `PSum.X/Y/Z`, `GuideCellSum.R/G/B`, `GuideLevelSum.R/G/B`, and the
+//! counts of shadow rays and cache entries as pairs of floats whose sum is the integer), bit by bit, beside the picture `R`, `G`, `B` that lets any viewer open them.
 
 use std::path::{Path, PathBuf};
 
@@ -23,12 +23,21 @@ const SQUARES: [&str; 3] = ["Squares.R", "Squares.G", "Squares.B"];
 const ALBEDO: [&str; 3] = ["AlbedoSum.R", "AlbedoSum.G", "AlbedoSum.B"];
 const NORMAL: [&str; 3] = ["NSum.X", "NSum.Y", "NSum.Z"];
 const POSITION: [&str; 3] = ["PSum.X", "PSum.Y", "PSum.Z"];
+const GUIDE_CELL: [&str; 3] = ["GuideCellSum.R", "GuideCellSum.G", "GuideCellSum.B"];
+const GUIDE_LEVEL: [&str; 3] = ["GuideLevelSum.R", "GuideLevelSum.G", "GuideLevelSum.B"];
 /// Visible and traced shadow rays: leading part and rest of each count.
 const SHADOW_RAYS: [&str; 4] = [
     "ShadowRays.Visible",
     "ShadowRays.VisibleCompensation",
     "ShadowRays.Traced",
     "ShadowRays.TracedCompensation",
+];
+/// Entries of visibility caches and hits that have one, in the same way.
+const CACHE_ENTRIES: [&str; 4] = [
+    "CacheEntries.Entries",
+    "CacheEntries.EntriesCompensation",
+    "CacheEntries.Hits",
+    "CacheEntries.HitsCompensation",
 ];
 
 /// Everything needed to continue a render as if it had not stopped.
@@ -68,22 +77,16 @@ impl Checkpoint {
             (ALBEDO, &sums.albedo),
             (NORMAL, &sums.normal),
             (POSITION, &sums.position),
+            (GUIDE_CELL, &sums.guide_cell),
+            (GUIDE_LEVEL, &sums.guide_level),
         ];
         for (names, values) in layers {
             if !values.is_empty() {
                 image.insert_triple(names, values);
             }
         }
-        if !sums.visible.is_empty() {
-            for (index, name) in SHADOW_RAYS.into_iter().enumerate() {
-                let part = |pair: &[u32; 2]| {
-                    let (leading, rest) = split(f64::from(pair[index / 2]));
-                    if index % 2 == 0 { leading } else { rest }
-                };
-                let samples = sums.visible.iter().map(part).collect();
-                image.channels.insert(name.to_owned(), samples);
-            }
-        }
+        insert_counts(&mut image, SHADOW_RAYS, &sums.visible);
+        insert_counts(&mut image, CACHE_ENTRIES, &sums.cache_entries);
         self.metadata.store(&mut image);
         image.attributes.insert(FORMAT_ATTRIBUTE.to_owned(), Attribute::Integer(FORMAT_VERSION));
         image
@@ -146,20 +149,6 @@ impl Checkpoint {
                 )
             })?;
         }
-        let visible = match SHADOW_RAYS.map(|name| image.channels.get(name)) {
-            [Some(visible), Some(visible_rest), Some(traced), Some(traced_rest)] => {
-                let count = |leading: f32, rest: f32| (f64::from(leading) + f64::from(rest)) as u32;
-                (0..image.pixel_count())
-                    .map(|pixel| {
-                        [
-                            count(visible[pixel], visible_rest[pixel]),
-                            count(traced[pixel], traced_rest[pixel]),
-                        ]
-                    })
-                    .collect()
-            }
-            _ => Vec::new(),
-        };
         let sums = Sums {
             width: image.width,
             height: image.height,
@@ -172,7 +161,10 @@ impl Checkpoint {
             albedo: image.triple(ALBEDO).unwrap_or_default(),
             normal: image.triple(NORMAL).unwrap_or_default(),
             position: image.triple(POSITION).unwrap_or_default(),
-            visible,
+            visible: counts(image, SHADOW_RAYS),
+            cache_entries: counts(image, CACHE_ENTRIES),
+            guide_cell: image.triple(GUIDE_CELL).unwrap_or_default(),
+            guide_level: image.triple(GUIDE_LEVEL).unwrap_or_default(),
         };
         if sums.non_finite_count() > 0 {
             return Err(Error::format(
@@ -232,6 +224,8 @@ impl Checkpoint {
             ("normal", self.sums.normal.is_empty(), window.normal.is_empty()),
             ("position", self.sums.position.is_empty(), window.position.is_empty()),
             ("visible", self.sums.visible.is_empty(), window.visible.is_empty()),
+            ("cache-entries", self.sums.cache_entries.is_empty(), window.cache_entries.is_empty()),
+            ("guide-cell", self.sums.guide_cell.is_empty(), window.guide_cell.is_empty()),
         ];
         for (name, ours_missing, theirs_missing) in layers {
             if ours_missing && !theirs_missing {
@@ -250,4 +244,34 @@ impl Checkpoint {
             ),
         ))
     }
+}
+
+/// Four channels from pairs of counts: leading part and rest of the first, then of the second; none
+/// without pairs.
+fn insert_counts(image: &mut Image, names: [&str; 4], counts: &[[u32; 2]]) {
+    if counts.is_empty() {
+        return;
+    }
+    for (index, name) in names.into_iter().enumerate() {
+        let part = |pair: &[u32; 2]| {
+            let (leading, rest) = split(f64::from(pair[index / 2]));
+            if index % 2 == 0 { leading } else { rest }
+        };
+        image.channels.insert(name.to_owned(), counts.iter().map(part).collect());
+    }
+}
+
+/// Twin of [`insert_counts`]; empty where a channel is missing.
+fn counts(image: &Image, names: [&str; 4]) -> Vec<[u32; 2]> {
+    let [Some(first), Some(first_rest), Some(second), Some(second_rest)] =
+        names.map(|name| image.channels.get(name))
+    else {
+        return Vec::new();
+    };
+    let count = |leading: f32, rest: f32| (f64::from(leading) + f64::from(rest)) as u32;
+    (0..image.pixel_count())
+        .map(|pixel| {
+            [count(first[pixel], first_rest[pixel]), count(second[pixel], second_rest[pixel])]
+        })
+        .collect()
 }

@@ -88,7 +88,7 @@ struct Samples<'a> {
     /// Samples per pixel of the part.
     count: f64,
     own: &'a [f32],
-    /// The mean of a variance, the traced shadow rays of a visible share.
+    /// The mean of a variance, the traced shadow rays of a visible share, the hits of cache entries.
     companion: &'a [f32],
 }
 
@@ -96,6 +96,7 @@ struct Samples<'a> {
 fn merge_channel(name: &str, parts: &[Part<'_>]) -> Vec<f32> {
     let wanted = match name {
         "Visible.Y" => Some("ShadowRays.Y"),
+        "CacheEntries.Y" => Some("Hits.Y"),
         _ => name.strip_prefix("Variance."),
     };
     let has = |name: &&str| parts.iter().all(|part| part.image.channels.contains_key(*name));
@@ -110,10 +111,10 @@ fn merge_channel(name: &str, parts: &[Part<'_>]) -> Vec<f32> {
         .collect();
     let total: f64 = samples.iter().map(|part| part.count).sum();
     let merge_pixel: &dyn Fn(usize) -> f64 = match (name, companion) {
-        ("SampleCount.Y" | "ShadowRays.Y", _) => {
+        ("SampleCount.Y" | "ShadowRays.Y" | "Hits.Y", _) => {
             &|pixel| samples.iter().map(|part| f64::from(part.own[pixel])).sum()
         }
-        ("Visible.Y", Some(_)) => &|pixel| pooled_share(&samples, pixel),
+        ("Visible.Y" | "CacheEntries.Y", Some(_)) => &|pixel| pooled_share(&samples, pixel),
         (_, Some(_)) => &|pixel| pooled_variance(&samples, total, pixel),
         (_, None) => &|pixel| {
             let weighted = |part: &Samples<'_>| part.count * f64::from(part.own[pixel]);
@@ -123,7 +124,8 @@ fn merge_channel(name: &str, parts: &[Part<'_>]) -> Vec<f32> {
     (0..parts[0].image.pixel_count()).map(|pixel| merge_pixel(pixel) as f32).collect()
 }
 
-/// Share of all rays from the shares of the parts, weighted with their rays.
+/// Share of all rays from the shares of the parts, weighted with their rays; likewise entries per
+/// hit.
 fn pooled_share(samples: &[Samples<'_>], pixel: usize) -> f64 {
     let traced = |part: &Samples<'_>| f64::from(part.companion[pixel]);
     let visible: f64 = samples.iter().map(|part| traced(part) * f64::from(part.own[pixel])).sum();

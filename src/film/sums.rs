@@ -25,6 +25,15 @@ pub enum Aov {
     /// were traced for the pixel.
     #[value(aliases = ["Visible"])]
     Visible,
+    /// Sampler `visibility`: `CacheEntries.Y`: directions in the visibility cache after the last ray
+    /// of a hit, mean over the pixel's hits, and `Hits.Y`: how many hits those are.
+    #[value(aliases = ["CacheEntries"])]
+    CacheEntries,
+    /// Sampler `guided`, first hits: `GuideCell.R/G/B`: colour of the cell of learned visibility, one
+    /// for each; `GuideLevel.R/G/B`: share of samples that found only the cell of their face (R), a
+    /// coarse cell (G), a fine one (B).
+    #[value(aliases = ["GuideCell"])]
+    GuideCell,
 }
 
 /// Sums over the samples of every pixel of the rendered window, row by row from the top.
@@ -58,6 +67,15 @@ pub struct Sums {
     /// Shadow rays that reached the environment, and all that were traced; empty where not asked
     /// for.
     pub visible: Vec<[u32; 2]>,
+    /// Directions in the visibility caches after the last ray of every hit, and these hits; empty where
+    /// not asked for.
+    pub cache_entries: Vec<[u32; 2]>,
+    /// Σ colour of the guide's cell at the first hit, 0 where there is none; empty where not asked
+    /// for.
+    pub guide_cell: Vec<[f32; 3]>,
+    /// Number of first hits whose cell was that of its face, a coarse one, a fine one; empty where
+    /// not asked for.
+    pub guide_level: Vec<[f32; 3]>,
 }
 
 impl Sums {
@@ -159,41 +177,40 @@ impl Sums {
         let means: Vec<[f32; 3]> = pixels().map(|pixel| narrow(self.mean(pixel))).collect();
         image.insert_triple(["R", "G", "B"], &means);
         let count = f64::from(self.sample_count.max(1));
+        let insert_means = |image: &mut Image, names: [&str; 3], sums: &[[f32; 3]]| {
+            if !sums.is_empty() {
+                let mean = |sum: &[f32; 3]| sum.map(|value| (f64::from(value) / count) as f32);
+                image.insert_triple(names, &sums.iter().map(mean).collect::<Vec<_>>());
+            }
+        };
         for aov in aovs {
-            let (names, sums) = match aov {
+            match aov {
                 Aov::Variance => {
                     let variances: Vec<[f32; 3]> =
                         pixels().map(|pixel| narrow(self.variance_of_mean(pixel))).collect();
                     image.insert_triple(["Variance.R", "Variance.G", "Variance.B"], &variances);
-                    continue;
                 }
                 Aov::SampleCount => {
                     let counts = vec![self.sample_count as f32; self.pixel_count()];
                     image.channels.insert("SampleCount.Y".to_owned(), counts);
-                    continue;
                 }
                 Aov::Visible => {
-                    if !self.visible.is_empty() {
-                        let share = |&[visible, traced]: &[u32; 2]| {
-                            (f64::from(visible) / f64::from(traced.max(1))) as f32
-                        };
-                        let shares = self.visible.iter().map(share).collect();
-                        let traced = self.visible.iter().map(|pair| pair[1] as f32).collect();
-                        image.channels.insert("Visible.Y".to_owned(), shares);
-                        image.channels.insert("ShadowRays.Y".to_owned(), traced);
-                    }
-                    continue;
+                    insert_ratio(&mut image, ["Visible.Y", "ShadowRays.Y"], &self.visible);
                 }
-                Aov::Albedo => (["Albedo.R", "Albedo.G", "Albedo.B"], &self.albedo),
-                Aov::Normal => (["N.X", "N.Y", "N.Z"], &self.normal),
-                Aov::Position => (["P.X", "P.Y", "P.Z"], &self.position),
-            };
-            if !sums.is_empty() {
-                let means: Vec<[f32; 3]> = sums
-                    .iter()
-                    .map(|sum| sum.map(|value| (f64::from(value) / count) as f32))
-                    .collect();
-                image.insert_triple(names, &means);
+                Aov::CacheEntries => {
+                    insert_ratio(&mut image, ["CacheEntries.Y", "Hits.Y"], &self.cache_entries);
+                }
+                Aov::Albedo => {
+                    insert_means(&mut image, ["Albedo.R", "Albedo.G", "Albedo.B"], &self.albedo);
+                }
+                Aov::Normal => insert_means(&mut image, ["N.X", "N.Y", "N.Z"], &self.normal),
+                Aov::Position => insert_means(&mut image, ["P.X", "P.Y", "P.Z"], &self.position),
+                Aov::GuideCell => {
+                    let names = ["GuideCell.R", "GuideCell.G", "GuideCell.B"];
+                    insert_means(&mut image, names, &self.guide_cell);
+                    let names = ["GuideLevel.R", "GuideLevel.G", "GuideLevel.B"];
+                    insert_means(&mut image, names, &self.guide_level);
+                }
             }
         }
         image
@@ -233,15 +250,31 @@ impl Sums {
         add_all(&mut self.albedo, &other.albedo);
         add_all(&mut self.normal, &other.normal);
         add_all(&mut self.position, &other.position);
-        if other.visible.is_empty() {
-            self.visible.clear();
-        }
-        for (our, their) in self.visible.iter_mut().zip(&other.visible) {
-            for (value, more) in our.iter_mut().zip(their) {
+        add_all(&mut self.guide_cell, &other.guide_cell);
+        add_all(&mut self.guide_level, &other.guide_level);
+        let add_counts = |ours: &mut Vec<[u32; 2]>, theirs: &[[u32; 2]]| {
+            if theirs.is_empty() {
+                ours.clear();
+            }
+            for (value, more) in ours.as_flattened_mut().iter_mut().zip(theirs.as_flattened()) {
                 *value = value.saturating_add(*more);
             }
-        }
+        };
+        add_counts(&mut self.visible, &other.visible);
+        add_counts(&mut self.cache_entries, &other.cache_entries);
         self.sample_count = self.sample_count.saturating_add(other.sample_count);
+    }
+}
+
+/// Two channels from pairs of counts: the first by the second, and the second;
+/// none without pairs.
+fn insert_ratio(image: &mut Image, [ratio, whole]: [&str; 2], counts: &[[u32; 2]]) {
+    if !counts.is_empty() {
+        let quotient =
+            |&[part, whole]: &[u32; 2]| (f64::from(part) / f64::from(whole.max(1))) as f32;
+        image.channels.insert(ratio.to_owned(), counts.iter().map(quotient).collect());
+        let wholes = counts.iter().map(|pair| pair[1] as f32).collect();
+        image.channels.insert(whole.to_owned(), wholes);
     }
 }
 

@@ -120,6 +120,12 @@ pub const BINDING_FILM_NORMAL: u32 = 5;
 pub const BINDING_FILM_POSITION: u32 = 6;
 /// Film set: shadow rays visible and traced per pixel.
 pub const BINDING_FILM_VISIBLE: u32 = 7;
+/// Film set: entries in the visibility caches and hits with such a cache, per pixel.
+pub const BINDING_FILM_CACHE_ENTRIES: u32 = 8;
+/// Film set: Σ colour of the guide's cell at the first hit.
+pub const BINDING_FILM_GUIDE_CELL: u32 = 9;
+/// Film set: number of first hits whose cell was that of its face, a coarse one, a fine one.
+pub const BINDING_FILM_GUIDE_LEVEL: u32 = 10;
 
 /// Specialization constant of the passes that traverse: pages of triangles in use.
 pub const CONSTANT_TRIANGLE_PAGES: u32 = 0;
@@ -190,6 +196,10 @@ pub const AOV_NORMAL: u32 = 2;
 pub const AOV_POSITION: u32 = 4;
 /// Bit of `Wave::aovs`: write visible and traced shadow rays.
 pub const AOV_VISIBLE: u32 = 8;
+/// Bit of `Wave::aovs`: write how full the visibility caches are.
+pub const AOV_CACHE_ENTRIES: u32 = 16;
+/// Bit of `Wave::aovs`: write the guide's cells.
+pub const AOV_GUIDE_CELL: u32 = 32;
 
 /// Specialization constant `SAMPLER`: uniform over the hemisphere.
 pub const SAMPLER_UNIFORM: u32 = 0;
@@ -305,6 +315,9 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("BINDING_FILM_NORMAL", BINDING_FILM_NORMAL),
     ("BINDING_FILM_POSITION", BINDING_FILM_POSITION),
     ("BINDING_FILM_VISIBLE", BINDING_FILM_VISIBLE),
+    ("BINDING_FILM_CACHE_ENTRIES", BINDING_FILM_CACHE_ENTRIES),
+    ("BINDING_FILM_GUIDE_CELL", BINDING_FILM_GUIDE_CELL),
+    ("BINDING_FILM_GUIDE_LEVEL", BINDING_FILM_GUIDE_LEVEL),
     ("CONSTANT_TRIANGLE_PAGES", CONSTANT_TRIANGLE_PAGES),
     ("CONSTANT_TRIANGLE_PAGE_SHIFT", CONSTANT_TRIANGLE_PAGE_SHIFT),
     ("CONSTANT_RAYS_PER_INVOCATION", CONSTANT_RAYS_PER_INVOCATION),
@@ -320,6 +333,8 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("AOV_NORMAL", AOV_NORMAL),
     ("AOV_POSITION", AOV_POSITION),
     ("AOV_VISIBLE", AOV_VISIBLE),
+    ("AOV_CACHE_ENTRIES", AOV_CACHE_ENTRIES),
+    ("AOV_GUIDE_CELL", AOV_GUIDE_CELL),
     ("SAMPLER_UNIFORM", SAMPLER_UNIFORM),
     ("SAMPLER_COSINE", SAMPLER_COSINE),
     ("SAMPLER_BRDF", SAMPLER_BRDF),

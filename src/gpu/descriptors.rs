@@ -13,7 +13,7 @@ use super::{buffer::Buffer, constants as c, device::Device, labels, vulkan_error
 use crate::error::{Error, Result};
 
 /// Bindings of the four sets.
-pub const SET_BINDING_COUNTS: [u32; 4] = [13, 14, 14, 8];
+pub const SET_BINDING_COUNTS: [u32; 4] = [13, 14, 14, 11];
 
 /// Format and bytes of the texels of a binding that is a uniform texel buffer.
 pub(super) fn texel_format(set: u32, binding: u32) -> Option<(vk::Format, u64)> {

@@ -1,5 +1,5 @@
 //! The passes of learned visibility: `sample_guided` in the place of `sample`, and `learn` after
-//! `shadow`.
+//! `shadow`; `guide_cells` where that layer is asked for.
 
 use std::sync::Arc;
 
@@ -17,10 +17,11 @@ use crate::{
     sampler::Weights,
 };
 
-/// Both pipelines.
+/// The pipelines.
 pub struct Guided {
     sample: Pipeline,
     learn: Pipeline,
+    cells: Pipeline,
 }
 
 impl Guided {
@@ -45,6 +46,7 @@ impl Guided {
         Ok(Self {
             sample: Pipeline::new(device, name, shaders::pass(name), &constants)?,
             learn: Pipeline::new(device, "learn", shaders::pass("learn"), &[])?,
+            cells: Pipeline::new(device, "guide_cells", shaders::pass("guide_cells"), &[])?,
         })
     }
 
@@ -58,5 +60,12 @@ impl Guided {
     pub fn record_learn(&self, commands: &mut Commands, sets: &[&DescriptorSet], wave: &Wave) {
         let rays = wave.pixel_count * wave.sample_count * wave.shadow_ray_count;
         commands.dispatch(&self.learn, sets, bytemuck::bytes_of(wave), rays.max(1));
+    }
+
+    /// Records which cells the paths of `wave` find at this vertex, into the film; `sets` are scene,
+    /// guide, wave and film.
+    pub fn record_cells(&self, commands: &mut Commands, sets: &[&DescriptorSet], wave: &Wave) {
+        let push = bytemuck::bytes_of(wave);
+        commands.dispatch(&self.cells, sets, push, wave.pixel_count.max(1));
     }
 }

@@ -1,5 +1,6 @@
 //! The passes of product sampling and visibility guidance: `product` once per hit, `sample_lobes` in
-//! the place of `sample`, and for the sampler `visibility` `cache` and `cdf` after every shadow ray.
+//! the place of `sample`, and for the sampler `visibility` `cache` and `cdf` after every shadow ray, with
+//! `cache_entries` after the last one where that layer is asked for.
 
 use std::sync::Arc;
 
@@ -45,6 +46,7 @@ pub struct Lobes {
 struct Cache {
     record: Pipeline,
     rebuild: Pipeline,
+    entries: Pipeline,
     scope: CacheScope,
 }
 
@@ -108,6 +110,7 @@ impl Lobes {
                             (CONSTANT_VISIBILITY_EXPONENT, parameters.exponent.to_bits()),
                         ],
                     )?,
+                    entries: create("cache_entries", &[])?,
                     scope: parameters.cache,
                 })
             })
@@ -149,6 +152,16 @@ impl Lobes {
         dispatch(commands, &cache.record, &sets, wave);
         if !is_last {
             dispatch(commands, &cache.rebuild, &sets, wave);
+        }
+    }
+
+    /// Records how many directions the caches of `wave` hold after the last shadow ray of a vertex, into
+    /// the film; nothing for `product`.
+    pub fn record_entries(&self, commands: &mut Commands, sets: &[&DescriptorSet; 4], wave: &Wave) {
+        if let Some(cache) = &self.cache {
+            let sets = [sets[0], sets[2], sets[3]];
+            let push = bytemuck::bytes_of(wave);
+            commands.dispatch(&cache.entries, &sets, push, wave.pixel_count.max(1));
         }
     }
 }

@@ -3,8 +3,8 @@
 //!
 //! Per wave of paths: `camera`; then per vertex `trace`, and per group of shadow rays `sample`,
 //! `shadow`, `gather`, with `product` before the first group and `cache` and `cdf` after each for the
-//! samplers that need them; `features` after the first vertex where albedo, normal or position are asked
-//! for; `bounce` between vertices; at last `accumulate`.
+//! samplers that need them; `cache_entries` after every vertex, `guide_cells` and `features` after the
+//! first one, where their layers are asked for; `bounce` between vertices; at last `accumulate`.
 
 pub mod geometry;
 pub mod guided;
@@ -19,8 +19,9 @@ use crate::{
     gpu::{
         Commands, DescriptorSet, Device, PassTimes, Pipeline,
         constants::{
-            AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS,
-            CONSTANT_ROULETTE_VERTEX, CONSTANT_SAMPLER,
+            AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, AOV_NORMAL, AOV_POSITION,
+            CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS, CONSTANT_ROULETTE_VERTEX,
+            CONSTANT_SAMPLER,
         },
         layout::Wave,
         shaders,
@@ -190,7 +191,7 @@ impl Passes {
     /// Number of dispatches of one wave.
     pub fn dispatches_per_wave(&self) -> u32 {
         let groups = self.settings.shadow_rays.div_ceil(self.rays_per_group()).max(1);
-        3 + self.settings.depth * (4 + 5 * groups)
+        4 + self.settings.depth * (5 + 5 * groups)
     }
 
     /// Records all passes of one wave.
@@ -246,6 +247,19 @@ impl Passes {
                     break;
                 }
             }
+            if let Some((lobes, sets)) = &lobes
+                && self.settings.shadow_rays > 0
+                && wave.aovs & AOV_CACHE_ENTRIES != 0
+            {
+                lobes.record_entries(commands, sets, &wave);
+            }
+            if let (Some(guided), Some(guide)) = (&self.guided, guide)
+                && vertex == 0
+                && wave.aovs & AOV_GUIDE_CELL != 0
+                && wave.is_training == 0
+            {
+                guided.record_cells(commands, &[scene, guide, wave_set, film], &wave);
+            }
             if vertex == 0 && wave.aovs & FEATURES != 0 && wave.is_training == 0 {
                 dispatch(
                     commands,
@@ -291,6 +305,11 @@ impl Passes {
                 run("learn", &|commands| {
                     guided.record_learn(commands, &[guide, wave], &nothing);
                 })?;
+                if self.settings.aovs & AOV_GUIDE_CELL != 0 {
+                    run("guide_cells", &|commands| {
+                        guided.record_cells(commands, &[scene, guide, wave, film], &nothing);
+                    })?;
+                }
             } else if let (Some(lobes), Some(fits)) = (&self.lobes, fits) {
                 let sets = [scene, fits, wave, film];
                 run("product", &|commands| lobes.record_product(commands, &sets, &nothing))?;
@@ -298,6 +317,11 @@ impl Passes {
                 // A ray that is not the last one, so that both passes of the cache run.
                 let first = Wave { total_shadow_rays: 1, ..nothing };
                 run("cache, cdf", &|commands| lobes.record_learn(commands, &sets, &first))?;
+                if self.settings.aovs & AOV_CACHE_ENTRIES != 0 {
+                    run("cache_entries", &|commands| {
+                        lobes.record_entries(commands, &sets, &nothing);
+                    })?;
+                }
             }
             if self.lobes.is_none() {
                 run("sample", &|commands| commands.dispatch(&self.sample, &all[..2], push, 1))?;

@@ -7,14 +7,15 @@ use bytemuck::Zeroable;
 use super::{BLOCK_PIXELS, Window};
 use crate::{
     error::Result,
-    film::Sums,
+    film::{Aov, Sums},
     gpu::{
         Buffer, Commands, DescriptorSet, Device,
         constants::{
-            AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, AOV_VISIBLE, BINDING_COUNTERS,
-            BINDING_FILM_ALBEDO, BINDING_FILM_COMPENSATION, BINDING_FILM_NORMAL,
-            BINDING_FILM_POSITION, BINDING_FILM_SQUARES, BINDING_FILM_SUM, BINDING_FILM_VISIBLE,
-            SET_FILM,
+            AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, AOV_NORMAL, AOV_POSITION, AOV_VISIBLE,
+            BINDING_COUNTERS, BINDING_FILM_ALBEDO, BINDING_FILM_CACHE_ENTRIES,
+            BINDING_FILM_COMPENSATION, BINDING_FILM_GUIDE_CELL, BINDING_FILM_GUIDE_LEVEL,
+            BINDING_FILM_NORMAL, BINDING_FILM_POSITION, BINDING_FILM_SQUARES, BINDING_FILM_SUM,
+            BINDING_FILM_VISIBLE, SET_FILM,
         },
         layout::Counters,
     },
@@ -22,6 +23,20 @@ use crate::{
 
 /// Edge of a block of the film order, pixels.
 const BLOCK_EDGE: u32 = 8;
+
+/// Bits `AOV_…` of the layers that passes write.
+pub fn aov_bits(aovs: &[Aov]) -> u32 {
+    let bit = |aov: &Aov| match aov {
+        Aov::Albedo => AOV_ALBEDO,
+        Aov::Normal => AOV_NORMAL,
+        Aov::Position => AOV_POSITION,
+        Aov::Visible => AOV_VISIBLE,
+        Aov::CacheEntries => AOV_CACHE_ENTRIES,
+        Aov::GuideCell => AOV_GUIDE_CELL,
+        Aov::Variance | Aov::SampleCount => 0,
+    };
+    aovs.iter().map(bit).fold(0, |bits, bit| bits | bit)
+}
 
 /// Sums per pixel of the window, row by row.
 pub struct FilmBuffers {
@@ -34,6 +49,9 @@ pub struct FilmBuffers {
     normal: Buffer,
     position: Buffer,
     visible: Buffer,
+    cache_entries: Buffer,
+    guide_cell: Buffer,
+    guide_level: Buffer,
     aovs: u32,
     window: Window,
 }
@@ -52,8 +70,13 @@ impl FilmBuffers {
         let albedo = triple("film albedo", aovs & AOV_ALBEDO != 0)?;
         let normal = triple("film normal", aovs & AOV_NORMAL != 0)?;
         let position = triple("film position", aovs & AOV_POSITION != 0)?;
-        let visible_bytes = if aovs & AOV_VISIBLE == 0 { 0 } else { 8 * pixels };
-        let visible = Buffer::zeroed(device, "film visible", visible_bytes)?;
+        let pair = |name: &str, bit: u32| {
+            Buffer::zeroed(device, name, if aovs & bit == 0 { 0 } else { 8 * pixels })
+        };
+        let visible = pair("film visible", AOV_VISIBLE)?;
+        let cache_entries = pair("film cache entries", AOV_CACHE_ENTRIES)?;
+        let guide_cell = triple("film guide cell", aovs & AOV_GUIDE_CELL != 0)?;
+        let guide_level = triple("film guide level", aovs & AOV_GUIDE_CELL != 0)?;
         let set = DescriptorSet::new(
             device,
             SET_FILM,
@@ -66,6 +89,9 @@ impl FilmBuffers {
                 (BINDING_FILM_NORMAL, &normal),
                 (BINDING_FILM_POSITION, &position),
                 (BINDING_FILM_VISIBLE, &visible),
+                (BINDING_FILM_CACHE_ENTRIES, &cache_entries),
+                (BINDING_FILM_GUIDE_CELL, &guide_cell),
+                (BINDING_FILM_GUIDE_LEVEL, &guide_level),
             ],
         )?;
         Ok(Self {
@@ -78,6 +104,9 @@ impl FilmBuffers {
             normal,
             position,
             visible,
+            cache_entries,
+            guide_cell,
+            guide_level,
             aovs,
             window,
         })
@@ -118,6 +147,9 @@ impl FilmBuffers {
         let layer = |buffer: &Buffer, bit: u32| {
             buffer.download::<[f32; 3]>(if self.aovs & bit == 0 { 0 } else { pixels })
         };
+        let counts = |buffer: &Buffer, bit: u32| {
+            buffer.download::<[u32; 2]>(if self.aovs & bit == 0 { 0 } else { pixels })
+        };
         Ok(Sums {
             width: self.window.width,
             height: self.window.height,
@@ -128,11 +160,10 @@ impl FilmBuffers {
             albedo: layer(&self.albedo, AOV_ALBEDO)?,
             normal: layer(&self.normal, AOV_NORMAL)?,
             position: layer(&self.position, AOV_POSITION)?,
-            visible: self.visible.download(if self.aovs & AOV_VISIBLE == 0 {
-                0
-            } else {
-                pixels
-            })?,
+            visible: counts(&self.visible, AOV_VISIBLE)?,
+            cache_entries: counts(&self.cache_entries, AOV_CACHE_ENTRIES)?,
+            guide_cell: layer(&self.guide_cell, AOV_GUIDE_CELL)?,
+            guide_level: layer(&self.guide_level, AOV_GUIDE_CELL)?,
             ..Sums::default()
         })
     }
@@ -146,13 +177,20 @@ impl FilmBuffers {
             (&self.albedo, AOV_ALBEDO, &sums.albedo),
             (&self.normal, AOV_NORMAL, &sums.normal),
             (&self.position, AOV_POSITION, &sums.position),
+            (&self.guide_cell, AOV_GUIDE_CELL, &sums.guide_cell),
+            (&self.guide_level, AOV_GUIDE_CELL, &sums.guide_level),
         ] {
             if self.aovs & bit != 0 {
                 buffer.upload(bytemuck::cast_slice(layer))?;
             }
         }
-        if self.aovs & AOV_VISIBLE != 0 {
-            self.visible.upload(bytemuck::cast_slice(&sums.visible))?;
+        for (buffer, bit, counts) in [
+            (&self.visible, AOV_VISIBLE, &sums.visible),
+            (&self.cache_entries, AOV_CACHE_ENTRIES, &sums.cache_entries),
+        ] {
+            if self.aovs & bit != 0 {
+                buffer.upload(bytemuck::cast_slice(counts))?;
+            }
         }
         Ok(())
     }
@@ -162,7 +200,7 @@ impl FilmBuffers {
         self.buffers().into_iter().map(|buffer| (buffer.name().to_owned(), buffer.size())).collect()
     }
 
-    fn buffers(&self) -> [&Buffer; 8] {
+    fn buffers(&self) -> [&Buffer; 11] {
         [
             &self.sum,
             &self.compensation,
@@ -172,6 +210,9 @@ impl FilmBuffers {
             &self.normal,
             &self.position,
             &self.visible,
+            &self.cache_entries,
+            &self.guide_cell,
+            &self.guide_level,
         ]
     }
 }

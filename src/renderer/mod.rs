@@ -5,6 +5,7 @@ mod guide_buffers;
 mod lobe_buffers;
 mod pixel;
 mod scene_buffers;
+mod settings;
 mod totals;
 mod wave_buffers;
 
@@ -12,16 +13,12 @@ use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
 use crate::{
     error::{Error, Result},
-    film::{Aov, Sums},
-    gpu::{
-        Commands, Device, PassTimes,
-        constants::{AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, AOV_VISIBLE},
-        layout::Wave,
-    },
+    film::Sums,
+    gpu::{Commands, Device, PassTimes, layout::Wave},
     guide::GuideState,
     pass::{PassSettings, Passes, SHADOW_RAYS_PER_GROUP, Sets},
     random::hash_4d,
-    sampler::{CacheScope, Elevation, Parameters, Sampler},
+    sampler::{CacheScope, Elevation, Sampler},
     scene::Scene,
 };
 use film_buffers::FilmBuffers;
@@ -29,6 +26,8 @@ use guide_buffers::GuideBuffers;
 pub use lobe_buffers::LobeBuffers;
 pub use pixel::{CachedDirection, RecordedLobe, RecordedPixel, RecordedRay};
 pub use scene_buffers::SceneBuffers;
+use settings::check;
+pub use settings::{Settings, Window, window_of};
 pub use totals::Totals;
 pub use wave_buffers::{LobeRoom, WaveBuffers};
 
@@ -49,58 +48,6 @@ const TRAINING_SEED: u32 = 0x7e11_ab1e;
 /// GPU, long enough for the submission not to count.
 const SHORT_DISPATCH_MS: f64 = 50.0;
 const LONG_DISPATCH_MS: f64 = 100.0;
-
-/// Part of the film that is rendered, in pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Window {
-    /// Left edge.
-    pub x: u32,
-    /// Upper edge.
-    pub y: u32,
-    /// Width, at least 1.
-    pub width: u32,
-    /// Height, at least 1.
-    pub height: u32,
-}
-
-/// What a render does with a scene.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
-    /// How directions are chosen.
-    pub sampler: Sampler,
-    /// Parameters of the sampler.
-    pub parameters: Parameters,
-    /// Directions traced at every vertex of every camera path.
-    pub shadow_rays: u32,
-    /// Path vertices at which environment light is gathered; 1 is direct light.
-    pub depth: u32,
-    /// Seed of the random numbers.
-    pub seed: u32,
-    /// Index of the first sample of every pixel.
-    pub first_sample: u32,
-    /// Part of the film; the whole film if absent.
-    pub window: Option<Window>,
-    /// Extra layers.
-    pub aovs: Vec<Aov>,
-    /// First vertex at which russian roulette may end a path, where `depth` reaches it.
-    pub roulette_vertex: u32,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            sampler: Sampler::Mis,
-            parameters: Parameters::default(),
-            shadow_rays: 5,
-            depth: 1,
-            seed: 0,
-            first_sample: 0,
-            window: None,
-            aovs: Vec::new(),
-            roulette_vertex: 8,
-        }
-    }
-}
 
 /// A scene on a device, and the film it is rendered to.
 pub struct Renderer {
@@ -159,15 +106,7 @@ impl Renderer {
         check(&settings, window, film_size)?;
         assert_eq!(window, buffers.window(), "buffers belong to one window");
 
-        let aovs = settings.aovs.iter().fold(0, |bits, aov| {
-            bits | match aov {
-                Aov::Albedo => AOV_ALBEDO,
-                Aov::Normal => AOV_NORMAL,
-                Aov::Position => AOV_POSITION,
-                Aov::Visible => AOV_VISIBLE,
-                Aov::Variance | Aov::SampleCount => 0,
-            }
-        });
+        let aovs = film_buffers::aov_bits(&settings.aovs);
         let uses_lobes = settings.sampler.uses_lobes();
         if uses_lobes && settings.parameters.lobes.elevation == Elevation::Metropolis {
             log::warn!("--set elevation=metropolis: a short random walk, so the image is biased");
@@ -539,48 +478,4 @@ fn lobe_room(settings: &Settings, window: Window) -> Option<LobeRoom> {
         film_pixels: (with_cache && parameters.cache == CacheScope::Pixel)
             .then(|| u64::from(window.width) * u64::from(window.height)),
     })
-}
-
-/// The window of `settings`, or the whole film.
-pub fn window_of(settings: &Settings, scene: &Scene) -> Window {
-    settings.window.unwrap_or(Window {
-        x: 0,
-        y: 0,
-        width: scene.film.width,
-        height: scene.film.height,
-    })
-}
-
-/// Refuses settings that cannot be rendered, before anything is allocated.
-fn check(settings: &Settings, window: Window, film_size: [u32; 2]) -> Result<()> {
-    let end = |start: u32, length: u32| u64::from(start) + u64::from(length);
-    if window.width == 0
-        || window.height == 0
-        || end(window.x, window.width) > u64::from(film_size[0])
-        || end(window.y, window.height) > u64::from(film_size[1])
-    {
-        return Err(Error::usage(format!(
-            "crop window {},{},{},{} does not lie in the film of {}x{} pixels",
-            window.x,
-            window.y,
-            end(window.x, window.width),
-            end(window.y, window.height),
-            film_size[0],
-            film_size[1]
-        )));
-    }
-    if settings.shadow_rays > 4096 {
-        return Err(Error::usage(format!(
-            "--shadow-rays {}: expected at most 4096; use more samples per pixel",
-            settings.shadow_rays
-        )));
-    }
-    settings.parameters.candidates_of(settings.sampler, false)?;
-    if settings.sampler.uses_lobes() {
-        settings.parameters.lobes.check(settings.depth)?;
-    }
-    if !(1..=64).contains(&settings.depth) {
-        return Err(Error::usage(format!("--depth {}: expected 1 to 64", settings.depth)));
-    }
-    Ok(())
 }

@@ -1,0 +1,116 @@
+//! What a render does with a scene, and what of it cannot be done.
+
+use crate::{
+    error::{Error, Result},
+    film::Aov,
+    sampler::{Parameters, Sampler},
+    scene::Scene,
+};
+
+/// Part of the film that is rendered, in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// Left edge.
+    pub x: u32,
+    /// Upper edge.
+    pub y: u32,
+    /// Width, at least 1.
+    pub width: u32,
+    /// Height, at least 1.
+    pub height: u32,
+}
+
+/// What a render does with a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// How directions are chosen.
+    pub sampler: Sampler,
+    /// Parameters of the sampler.
+    pub parameters: Parameters,
+    /// Directions traced at every vertex of every camera path.
+    pub shadow_rays: u32,
+    /// Path vertices at which environment light is gathered; 1 is direct light.
+    pub depth: u32,
+    /// Seed of the random numbers.
+    pub seed: u32,
+    /// Index of the first sample of every pixel.
+    pub first_sample: u32,
+    /// Part of the film; the whole film if absent.
+    pub window: Option<Window>,
+    /// Extra layers.
+    pub aovs: Vec<Aov>,
+    /// First vertex at which russian roulette may end a path, where `depth` reaches it.
+    pub roulette_vertex: u32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            sampler: Sampler::Mis,
+            parameters: Parameters::default(),
+            shadow_rays: 5,
+            depth: 1,
+            seed: 0,
+            first_sample: 0,
+            window: None,
+            aovs: Vec::new(),
+            roulette_vertex: 8,
+        }
+    }
+}
+
+/// The window of `settings`, or the whole film.
+pub fn window_of(settings: &Settings, scene: &Scene) -> Window {
+    settings.window.unwrap_or(Window {
+        x: 0,
+        y: 0,
+        width: scene.film.width,
+        height: scene.film.height,
+    })
+}
+
+/// Refuses settings that cannot be rendered, before anything is allocated.
+pub(super) fn check(settings: &Settings, window: Window, film_size: [u32; 2]) -> Result<()> {
+    let end = |start: u32, length: u32| u64::from(start) + u64::from(length);
+    if window.width == 0
+        || window.height == 0
+        || end(window.x, window.width) > u64::from(film_size[0])
+        || end(window.y, window.height) > u64::from(film_size[1])
+    {
+        return Err(Error::usage(format!(
+            "crop window {},{},{},{} does not lie in the film of {}x{} pixels",
+            window.x,
+            window.y,
+            end(window.x, window.width),
+            end(window.y, window.height),
+            film_size[0],
+            film_size[1]
+        )));
+    }
+    if settings.shadow_rays > 4096 {
+        return Err(Error::usage(format!(
+            "--shadow-rays {}: expected at most 4096; use more samples per pixel",
+            settings.shadow_rays
+        )));
+    }
+    settings.parameters.candidates_of(settings.sampler, false)?;
+    for (aov, layer, only) in [
+        (Aov::CacheEntries, "cache-entries", Sampler::Visibility),
+        (Aov::GuideCell, "guide-cell", Sampler::Guided),
+    ] {
+        if settings.aovs.contains(&aov) && settings.sampler != only {
+            return Err(Error::usage(format!(
+                "--aov {layer}: the sampler {} has no such layer; expected --sampler {}",
+                settings.sampler.name(),
+                only.name()
+            )));
+        }
+    }
+    if settings.sampler.uses_lobes() {
+        settings.parameters.lobes.check(settings.depth)?;
+    }
+    if !(1..=64).contains(&settings.depth) {
+        return Err(Error::usage(format!("--depth {}: expected 1 to 64", settings.depth)));
+    }
+    Ok(())
+}

@@ -1,0 +1,231 @@
+//! Layers of the image that show what samplers learned: how full visibility caches are, and which cells
+//! of learned visibility were found.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+mod support;
+
+use std::{
+    collections::BTreeMap,
+    sync::{Mutex, MutexGuard, PoisonError},
+};
+
+use fenestra::{
+    film::{Aov, Sums},
+    guide::{CellKey, FACE_COUNT, face_normal},
+    renderer::{Renderer, Settings, Totals},
+    sampler::{Parameters, Sampler},
+    scene::Scene,
+};
+use glam::Vec3;
+use support::scenes;
+
+/// One test at a time: the validation layers were seen to crash when several threads made and dropped
+/// renderers at once.
+fn alone() -> MutexGuard<'static, ()> {
+    static LOCK: Mutex<()> = Mutex::new(());
+    LOCK.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The sampler `visibility` with few lobes, `assignments` and the layer of its caches.
+fn visibility(assignments: &[&str]) -> Settings {
+    let mut parameters = Parameters::default();
+    let few = ["environment_lobes=24", "brdf_lobes=4", "views=8", "lobes=24"];
+    for assignment in few.iter().chain(assignments) {
+        parameters.set(assignment).unwrap();
+    }
+    Settings {
+        sampler: Sampler::Visibility,
+        parameters,
+        aovs: vec![Aov::CacheEntries],
+        ..Settings::default()
+    }
+}
+
+fn guided() -> Settings {
+    Settings {
+        sampler: Sampler::Guided,
+        aovs: vec![Aov::GuideCell, Aov::Normal],
+        ..Settings::default()
+    }
+}
+
+fn room() -> Scene {
+    scenes::room(vec![scenes::diffuse(Vec3::splat(0.6)), scenes::copper(0.3)])
+}
+
+fn renderer(scene: &Scene, settings: Settings) -> Renderer {
+    Renderer::new(support::device(), scene, settings).unwrap()
+}
+
+fn render(scene: &Scene, settings: Settings, samples: u32) -> (Sums, Totals) {
+    let mut renderer = renderer(scene, settings);
+    renderer.render_pass(samples).unwrap();
+    support::assert_silent();
+    (renderer.sums().unwrap(), renderer.totals().clone())
+}
+
+/// Sums of the two counts over all pixels.
+fn total(counts: &[[u32; 2]]) -> [u64; 2] {
+    counts.iter().fold([0; 2], |sum, pair| [0, 1].map(|i| sum[i] + u64::from(pair[i])))
+}
+
+#[test]
+fn cache_entries_are_those_of_the_statistics() {
+    let _alone = alone();
+    for depth in [1, 3] {
+        let settings = Settings { depth, ..visibility(&[]) };
+        let (sums, totals) = render(&room(), settings, 5);
+        assert!(totals.cache_entries > totals.product_hits, "mostly walls are seen");
+        assert_eq!(total(&sums.cache_entries), [totals.cache_entries, totals.product_hits]);
+        let image = sums.to_image(&[Aov::CacheEntries]);
+        let (entries, hits) = (&image.channels["CacheEntries.Y"], &image.channels["Hits.Y"]);
+        let most = sums.cache_entries.iter().map(|pair| pair[0]).max().unwrap();
+        let found = entries.iter().zip(hits).map(|(entries, hits)| entries * hits);
+        let found = found.fold(0.0, f32::max);
+        assert!((found - most as f32).abs() < 1e-3, "{found} {most}");
+    }
+}
+
+#[test]
+fn where_nothing_is_blocked_caches_are_empty() {
+    let _alone = alone();
+    let scene = scenes::plane(Vec3::splat(0.5), scenes::sky());
+    let (sums, _) = render(&scene, visibility(&[]), 3);
+    assert!(sums.cache_entries.iter().all(|pair| *pair == [0, 3]), "the plane fills the image");
+    // Where the camera sees the sky there is no hit.
+    let scene = scenes::convex_furnace(scenes::diffuse(Vec3::splat(0.5)), Vec3::ONE);
+    let (sums, totals) = render(&scene, visibility(&[]), 3);
+    assert_eq!(total(&sums.cache_entries), [0, totals.product_hits]);
+    assert!(sums.cache_entries.contains(&[0; 2]) && sums.cache_entries.contains(&[0, 3]));
+}
+
+#[test]
+fn a_cache_holds_no_more_than_it_has_room_for() {
+    let _alone = alone();
+    // A box around the camera: every direction from every hit is blocked.
+    let mut scene = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5))]);
+    scenes::add_box(&mut scene.geometry, Vec3::new(0.0, 1.0, 0.0), Vec3::splat(9.0), 0);
+    let (sums, totals) = render(&scene, visibility(&["cache=pixel", "cache_capacity=7"]), 6);
+    let [entries, hits] = total(&sums.cache_entries);
+    assert_eq!(hits, totals.product_hits);
+    assert!(sums.cache_entries.iter().all(|pair| pair[0] <= 7 * 6));
+    // About 4 of 5 rays bring something and are recorded: a cache is full after two samples.
+    let mean = entries as f64 / hits as f64;
+    assert!((6.0..6.9).contains(&mean), "{mean} directions");
+    assert!(totals.cache_entries > 2 * entries / 3, "the oldest were forgotten");
+}
+
+#[test]
+fn entries_are_kept_by_checkpoints_and_add_up() {
+    let _alone = alone();
+    let scene = room();
+    let (whole, _) = render(&scene, visibility(&[]), 7);
+    let (first, _) = render(&scene, visibility(&[]), 3);
+    let mut resumed = renderer(&scene, visibility(&[]));
+    resumed.restore(&first).unwrap();
+    resumed.render_pass(4).unwrap();
+    assert!(resumed.sums().unwrap() == whole);
+    let (rest, _) = render(&scene, Settings { first_sample: 3, ..visibility(&[]) }, 4);
+    let mut added = first;
+    added.add(&rest);
+    assert_eq!(added.cache_entries, whole.cache_entries);
+}
+
+#[test]
+fn layers_of_other_samplers_are_refused() {
+    let scene = room();
+    for (aov, sampler, expected) in [
+        (Aov::CacheEntries, Sampler::Product, "--aov cache-entries: the sampler product"),
+        (Aov::CacheEntries, Sampler::Guided, "expected --sampler visibility"),
+        (Aov::GuideCell, Sampler::Mis, "--aov guide-cell: the sampler mis"),
+    ] {
+        let settings = Settings { sampler, aovs: vec![aov], ..Settings::default() };
+        let error = Renderer::new(support::device(), &scene, settings).err().unwrap().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+}
+
+/// Three bytes of the key's hash; twin of `guide_cells.comp`.
+fn colour_of(key: CellKey) -> [u32; 3] {
+    let hash = key.slot(u32::MAX);
+    [hash & 255, hash >> 8 & 255, hash >> 16 & 255]
+}
+
+/// What stands for the cell of a face.
+fn face_key(face: u32) -> CellKey {
+    CellKey(0xf000_0000 | face)
+}
+
+/// The keys that colours belong to.
+fn keys_by_colour(keys: &[u32]) -> BTreeMap<[u32; 3], Vec<CellKey>> {
+    let faces = (0..FACE_COUNT as u32).map(face_key);
+    let mut by_colour: BTreeMap<[u32; 3], Vec<CellKey>> = BTreeMap::new();
+    for key in keys[FACE_COUNT..].iter().map(|key| CellKey(*key)).chain(faces) {
+        by_colour.entry(colour_of(key)).or_default().push(key);
+    }
+    by_colour
+}
+
+#[test]
+fn a_sample_shows_the_cell_it_found() {
+    let _alone = alone();
+    // Room for 9 cells besides the faces; for all coarse and some fine ones; for all.
+    for memory in [15 * 16 * 256, 150 * 16 * 256, 1 << 27] {
+        let mut settings = guided();
+        settings.parameters.guide_memory = memory;
+        let mut renderer = renderer(&room(), settings);
+        renderer.render_pass(1).unwrap();
+        support::assert_silent();
+        let keys = renderer.guide_state().unwrap().unwrap().keys;
+        let (sums, by_colour) = (renderer.sums().unwrap(), keys_by_colour(&keys));
+        let mut found = [0; 3];
+        for pixel in 0..sums.pixel_count() {
+            if sums.normal[pixel] == [0.0; 3] {
+                assert_eq!(sums.guide_level[pixel], [0.0; 3], "the sky has no cell");
+                continue;
+            }
+            let level = sums.guide_level[pixel].iter().position(|count| *count == 1.0);
+            let level = level.expect("every hit has a cell, be it that of its face");
+            found[level] += 1;
+            assert_eq!(sums.guide_level[pixel].iter().sum::<f32>(), 1.0);
+            let colour = sums.guide_cell[pixel].map(|value| (256.0 * value) as u32);
+            let keys = by_colour.get(&colour).expect("a colour of a cell");
+            let normal = Vec3::from(sums.normal[pixel]);
+            let fits = |key: &CellKey| match level {
+                0 => normal.dot(face_normal(key.0 as usize & 7)) > 0.4 && key.face() == 7,
+                1 => normal.dot(face_normal(key.face())) > 0.4 && key.is_coarse(),
+                _ => normal.dot(face_normal(key.face())) > 0.4 && !key.is_coarse(),
+            };
+            assert!(keys.iter().any(fits), "pixel {pixel}: level {level}, keys {keys:?}");
+        }
+        eprintln!("{memory} bytes: {found:?} samples in cells of faces, coarse, fine");
+        match memory {
+            61_440 => assert!(found[0] > 400 && found[1] > 0 && found[2] == 0, "{found:?}"),
+            614_400 => assert!(found[1] > 50 && found[2] > 50, "{found:?}"),
+            _ => assert!(found[0] < 40 && found[2] > 350, "{found:?}"),
+        }
+    }
+}
+
+#[test]
+fn where_nothing_is_learned_no_cell_is_shown() {
+    let _alone = alone();
+    let scene = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5)), scenes::plastic(0.2)]);
+    let (sums, _) = render(&scene, guided(), 2);
+    assert!(sums.guide_level.iter().chain(&sums.guide_cell).all(|sum| *sum == [0.0; 3]));
+    assert!(sums.normal.iter().any(|sum| *sum != [0.0; 3]));
+}
+
+#[test]
+fn cells_are_kept_by_checkpoints() {
+    let _alone = alone();
+    let scene = room();
+    let (whole, _) = render(&scene, guided(), 6);
+    let mut first = renderer(&scene, guided());
+    first.render_pass(2).unwrap();
+    let mut second = renderer(&scene, guided());
+    second.restore(&first.sums().unwrap()).unwrap();
+    second.restore_guide(&first.guide_state().unwrap().unwrap()).unwrap();
+    second.render_pass(4).unwrap();
+    assert!(second.sums().unwrap() == whole);
+}
