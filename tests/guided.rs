@@ -58,10 +58,21 @@ fn block_means(sums: &Sums) -> Vec<f64> {
 
 /// Mean and squared standard error of every block mean over the replicates.
 fn replicates(scene: &Scene, settings: &Settings, samples: u32) -> Vec<(f64, f64)> {
+    replicates_after(scene, settings, samples, |_| {})
+}
+
+/// As [`replicates`], where something is done to the renderer before each.
+fn replicates_after(
+    scene: &Scene,
+    settings: &Settings,
+    samples: u32,
+    prepare: impl Fn(&mut Renderer),
+) -> Vec<(f64, f64)> {
     let mut renderer = Renderer::new(support::device(), scene, settings.clone()).unwrap();
     let rows: Vec<Vec<f64>> = (0..REPLICATES)
         .map(|replicate| {
             renderer.restart(7000 + replicate).unwrap();
+            prepare(&mut renderer);
             renderer.render_pass(samples).unwrap();
             assert_eq!(renderer.totals().dropped_samples, 0);
             block_means(&renderer.sums().unwrap())
@@ -156,6 +167,60 @@ fn every_mode_is_unbiased_in_a_room() {
             ("many regions", with(1, &|settings| settings.parameters.regions = 1024)),
         ],
     );
+}
+
+/// Keys are forced to collide: by cells so large that all walls share a few, and by cells so small that
+/// their coordinates, kept modulo 256, repeat every 26 cm or less. With room for all of them, for few,
+/// and for none but the faces.
+#[test]
+fn places_that_share_a_key_are_unbiased() {
+    let _alone = alone();
+    let scene = room();
+    let mis = Settings { shadow_rays: 16, ..Settings::default() };
+    let reference = replicates(&scene, &mis, 128);
+    let expected: f64 = reference.iter().map(|value| value.0).sum();
+    let mut teacher = Renderer::new(support::device(), &scene, guided(1)).unwrap();
+    teacher.render_pass(4).unwrap();
+    let taught = teacher.guide_state().unwrap().unwrap();
+    for (name, edge, memory, candidates) in [
+        ("huge cells", 1e3, 1 << 27, 1),
+        ("huge cells", 1e3, 1 << 27, 4),
+        ("repeating cells", 1e-3, 1 << 27, 4),
+        ("repeating cells, little room", 1e-3, 40 * 16 * 256, 1),
+        ("faces only", 0.22, 1, 1),
+        ("faces only", 0.22, 1, 4),
+    ] {
+        let mut settings = guided(candidates);
+        settings.parameters.guide_memory = memory;
+        // What was learned stays with its keys, which now name other places.
+        let mut state = taught.clone();
+        state.origin.largest_edge = edge;
+        state.samples = u32::MAX;
+        let prepare = |renderer: &mut Renderer| {
+            renderer.restore_guide(&state).unwrap();
+        };
+        let values = replicates_after(&scene, &settings, 32, prepare);
+        let deviation = largest_deviation(&values, &reference);
+        let ratio = values.iter().map(|value| value.0).sum::<f64>() / expected;
+        eprintln!("{name}, {candidates}: largest |t| {deviation:.2}, ratio {ratio:.4}");
+        assert!(deviation < LIMIT, "{name}, {candidates} candidates: |t| = {deviation}");
+        assert!((ratio - 1.0).abs() < 0.05, "{name}, {candidates} candidates: {ratio}");
+
+        // That keys are shared, or not, as the name says.
+        let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
+        state.keys.truncate(6);
+        state.counts.truncate(6 * state.origin.regions as usize);
+        (state.pending, state.wanted) = (Vec::new(), Vec::new());
+        renderer.restore_guide(&state).unwrap();
+        renderer.render_pass(8).unwrap();
+        let cells = renderer.guide_state().unwrap().unwrap().keys.len();
+        match name {
+            "huge cells" => assert!((12..400).contains(&cells), "{cells} cells"),
+            "repeating cells" => assert!(cells > 4000, "{cells} cells"),
+            "faces only" => assert_eq!(cells, 6),
+            _ => assert_eq!(cells, 40),
+        }
+    }
 }
 
 /// Many replicates of one sample, which reads the training and nothing else, against `mis` with the

@@ -48,7 +48,10 @@ translate = [0.0, 0.5, 0.0]
 
 fn run(folder: &Folder, options: &[&str]) -> command::Run {
     let few = ["environment_lobes=24", "brdf_lobes=4", "views=4", "lobes=32"];
-    let mut arguments = vec!["render", "scene.toml", "-o", "out.exr", "--spp", "1", "--validate"];
+    let mut arguments = vec!["render", "scene.toml", "-o", "out.exr", "--validate"];
+    if !options.contains(&"--spp") {
+        arguments.extend(["--spp", "1"]);
+    }
     let has_lobes = options.iter().any(|option| ["product", "visibility"].contains(option));
     if has_lobes {
         arguments.extend(few.iter().flat_map(|assignment| ["--set", assignment]));
@@ -144,12 +147,95 @@ fn each_kind_of_sampler_has_its_panels() {
     assert_eq!(sum(&numbers, "before"), sum(&numbers, "after"));
 }
 
+/// The ball in a room that is open to the front, where the camera is.
+fn room() -> Folder {
+    let folder = scene(false);
+    let mut text = std::fs::read_to_string(folder.path().join("scene.toml")).unwrap();
+    for (size, translate) in [
+        ([6.2, 0.2, 8.0], [0.0, -0.1, 0.0]),
+        ([6.2, 0.2, 8.0], [0.0, 4.1, 0.0]),
+        ([0.2, 4.0, 8.0], [-3.1, 2.0, 0.0]),
+        ([0.2, 4.0, 8.0], [3.1, 2.0, 0.0]),
+        ([6.2, 4.0, 0.2], [0.0, 2.0, -4.1]),
+    ] {
+        text.push_str(&format!(
+            "\n[[object]]\nshape = \"box\"\nsize = {size:?}\nmaterial = \"clay\"\n\
+             translate = {translate:?}\n"
+        ));
+    }
+    folder.write("scene.toml", text);
+    folder
+}
+
+#[test]
+fn guided_shows_what_the_cell_of_the_hit_knows() {
+    let folder = room();
+    let options = ["--sampler", "guided", "--spp", "16", "--pixel", "12,8", "--set", "regions=64"];
+    run(&folder, &options).assert(0, &[]);
+    assert_eq!(height(&folder), 3 * 256 + 2 * 4);
+    let numbers = numbers(&folder);
+    let regions = numbers["regions"].as_array().unwrap();
+    let number = |region: &Value, key: &str| region[key].as_f64().unwrap();
+    let total = |key: &str| regions.iter().map(|region| number(region, key)).sum::<f64>();
+    assert_eq!(regions.len(), 64);
+    assert!((total("probability") - 1.0).abs() < 1e-3, "{}", total("probability"));
+    assert!((total("share") - 1.0).abs() < 1e-6);
+    assert!((total("solid_angle") / (4.0 * std::f64::consts::PI) - 1.0).abs() < 1e-6);
+    let cell = &numbers["cell"];
+    assert!(["fine", "coarse"].contains(&cell["level"].as_str().unwrap()), "{cell}");
+    assert_eq!(total("trials"), cell["trials"].as_f64().unwrap());
+    assert_eq!(total("hits"), cell["hits"].as_f64().unwrap());
+    let face = cell["face"].as_str().unwrap();
+    let axis = ["x", "y", "z"].iter().position(|axis| face.ends_with(axis)).unwrap();
+    let along = vector(&numbers["normal"])[axis];
+    assert!((if face.starts_with('-') { -along } else { along }) > 0.5, "{face} {along}");
+
+    // Sky is seen to the front only, past the edges of the room, and that is where rays go. What lies
+    // below the horizon has not been looked at.
+    let mean = |front: bool, key: &str| {
+        let is_chosen = |region: &&Value| {
+            let z = vector(&region["direction"])[2];
+            if front { z > 0.85 } else { z < 0.5 && number(region, "trials") > 0.0 }
+        };
+        let chosen: Vec<f64> =
+            regions.iter().filter(is_chosen).map(|region| number(region, key)).collect();
+        chosen.iter().sum::<f64>() / chosen.len() as f64
+    };
+    let (front, back) = (mean(true, "visibility"), mean(false, "visibility"));
+    assert!(front > 2.0 * back, "V: {front} to the front, {back} to the back");
+    let gain = |front| mean(front, "probability") / mean(front, "share");
+    assert!(gain(true) > 2.0 * gain(false), "{} {}", gain(true), gain(false));
+
+    let rays = numbers["rays"].as_array().unwrap();
+    assert_eq!(rays.len(), 13 * 5, "five of each of the next samples");
+    assert_eq!((&rays[0]["sample"], &rays[5]["sample"]), (&Value::from(16), &Value::from(17)));
+    for ray in rays {
+        let traced = vector(&ray["contribution"]) != [0.0; 3];
+        assert_eq!(traced, ray["region"].is_u64(), "{ray}");
+        if ray["visible"] == true {
+            assert!(vector(&ray["direction"])[2] > 0.0, "the only way out: {ray}");
+        }
+    }
+    assert!(rays.iter().filter(|ray| ray["visible"] == true).count() > 8);
+}
+
+#[test]
+fn where_guided_learned_nothing_it_shows_its_rays() {
+    let folder = scene(false);
+    run(&folder, &["--sampler", "guided", "--pixel", "12,8"]).assert(0, &[]);
+    assert_eq!(height(&folder), 256);
+    let numbers = numbers(&folder);
+    assert!(numbers["cell"].is_null());
+    assert_eq!(numbers["rays"].as_array().unwrap().len(), 65);
+    run(&folder, &["--sampler", "guided", "--pixel", "0,0"])
+        .assert(0, &["the pixel sees the environment"]);
+}
+
 #[test]
 fn what_has_no_picture_says_so() {
     let folder = scene(false);
     run(&folder, &["--pixel", "24,8"]).assert(2, &["--pixel 24,8"]);
     run(&folder, &["--pixel", "1"]).assert(2, &["x,y"]);
-    run(&folder, &["--sampler", "guided", "--pixel", "12,8"]).assert(2, &["guided"]);
     assert!(!folder.path().join("out.exr").exists());
     // The sky: the image is written, and a warning says why there is no picture.
     run(&folder, &["--pixel", "0,0"]).assert(0, &["the pixel sees the environment"]);

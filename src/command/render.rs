@@ -36,8 +36,7 @@ const DEFAULT_SPP: u32 = 64;
 const LOOK_AROUND: Duration = Duration::from_millis(250);
 /// How often the error is estimated and the picture shown, which needs the film on the host.
 const LOOK_INTERVAL: Duration = Duration::from_secs(1);
-/// Film size and samples of `--quick`.
-const QUICK_WIDTH: u32 = 240;
+/// Samples of `--quick`.
 const QUICK_SPP: u32 = 16;
 
 /// Which rule ended a render.
@@ -83,14 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     for warning in &scene.warnings {
         log::warn!("{warning}");
     }
-    if let Some([width, height]) = arguments.size {
-        (scene.film.width, scene.film.height) = (width, height);
-    } else if arguments.quick && scene.film.width > QUICK_WIDTH {
-        let scaled =
-            u64::from(scene.film.height) * u64::from(QUICK_WIDTH) / u64::from(scene.film.width);
-        scene.film.height = u32::try_from(scaled).unwrap_or(1).max(1);
-        scene.film.width = QUICK_WIDTH;
-    }
+    arguments.resize(&mut scene.film);
     let output =
         arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.exr", scene.name)));
     // Before the work, not after it.
@@ -115,9 +107,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let reason = job.render(&mut renderer, &interrupted)?;
     device.save_pipeline_cache();
     job.finish(&renderer, reason, load_ms)?;
-    drop(renderer);
     if let Some(at) = arguments.pixel {
-        for path in pixel::write(&device, &scene, &settings, &job.output, at)? {
+        let written = if settings.sampler == Sampler::Guided {
+            pixel::write_guided(&renderer, &scene, &job.output, at)?
+        } else {
+            drop(renderer);
+            pixel::write(&device, &scene, &settings, &job.output, at)?
+        };
+        for path in written {
             if !arguments.quiet {
                 eprintln!("wrote {}", display(&path));
             }

@@ -175,6 +175,11 @@ pub fn decode_entry(entry: [u32; 2]) -> (f32, u32, u32, f32) {
     (f32::from_bits(entry[0]), entry[1] & 0xffff, entry[1] >> 16 & 0x3ff, weight)
 }
 
+/// V̂, the estimate of visibility that an entry was made from, in steps of its levels.
+pub fn decode_visibility(entry: [u32; 2]) -> f64 {
+    f64::from(decode_entry(entry).3.powf(1.0 / TARGET_EXPONENT))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -18,7 +18,9 @@ mod likely;
 mod partition;
 
 pub use alias::{AliasEntry, alias_table, probabilities};
-pub use estimate::{EstimateOptions, Estimates, VISIBILITY_LEVELS, decode_entry};
+pub use estimate::{
+    EstimateOptions, Estimates, VISIBILITY_LEVELS, decode_entry, decode_visibility,
+};
 pub use file::{GuideState, Origin};
 pub use key::{CellKey, FACE_COUNT, face_normal};
 pub use learned::{Learned, Snapshot};

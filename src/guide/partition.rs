@@ -12,7 +12,7 @@
 
 use std::{cmp::Ordering, collections::BinaryHeap};
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::alias::{AliasEntry, alias_table};
 use crate::scene::environment::{EnvironmentMap, luminance, mean_sine};
@@ -313,6 +313,12 @@ impl Partition {
             width: map.width,
             rows: map.height + 1,
         }
+    }
+
+    /// Index of the region of `map` that a unit direction lies in.
+    pub fn region_of(&self, map: &EnvironmentMap, direction: Vec3) -> usize {
+        let (column, row, _) = map.locate(direction);
+        usize::from(self.region_of_cell[(row * self.width + column) as usize])
     }
 
     /// Column and row of the cell that `bits` choose in region `index`, as the shader does: the

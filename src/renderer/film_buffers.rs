@@ -24,6 +24,12 @@ use crate::{
 /// Edge of a block of the film order, pixels.
 const BLOCK_EDGE: u32 = 8;
 
+/// Position in film order of a pixel of the window; twin of `wave_pixel` in `glsl/include/wave.glsl`.
+pub fn position_in_film_order(window: Window, column: u32, row: u32) -> u32 {
+    let block = row / BLOCK_EDGE * window.width.div_ceil(BLOCK_EDGE) + column / BLOCK_EDGE;
+    block * BLOCK_PIXELS + row % BLOCK_EDGE * BLOCK_EDGE + column % BLOCK_EDGE
+}
+
 /// Bits `AOV_…` of the layers that passes write.
 pub fn aov_bits(aovs: &[Aov]) -> u32 {
     let bit = |aov: &Aov| match aov {

@@ -5,6 +5,7 @@ use std::{collections::BTreeMap, sync::Arc, time::Instant};
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::guided_pixel::{CellLevel, RecordedCell, RecordedRegion};
 use crate::{
     error::{Error, Result},
     gpu::{
@@ -19,7 +20,7 @@ use crate::{
     },
     guide::{
         CellKey, EstimateOptions, FACE_COUNT, GuideState, Learned, LikelyRegion, Origin, Partition,
-        Snapshot, likely_regions,
+        Snapshot, decode_entry, decode_visibility, likely_regions,
     },
     sampler::{Parameters, Weights},
     scene::{self, Scene},
@@ -210,6 +211,47 @@ impl GuideBuffers {
     /// Host milliseconds of all rebuilds since the start.
     pub fn rebuild_ms(&self) -> f64 {
         self.rebuild_ms
+    }
+
+    /// The regions of the environment.
+    pub fn partition(&self) -> &Partition {
+        &self.partition
+    }
+
+    /// For the first `count` shadow rays of the last group: region + number of regions · cell, or
+    /// `NOTHING_TO_LEARN`.
+    ///
+    /// # Errors
+    /// A failing device.
+    pub fn targets(&self, count: usize) -> Result<Vec<u32>> {
+        self.targets.download(count)
+    }
+
+    /// What a cell knows, as passes read it.
+    ///
+    /// # Errors
+    /// A failing device.
+    ///
+    /// # Panics
+    /// If there is no such cell.
+    pub fn cell(&self, index: usize) -> Result<RecordedCell> {
+        let key = self.learned.keys()[index];
+        let level = match (index < FACE_COUNT, key.is_coarse()) {
+            (true, _) => CellLevel::Face(index),
+            (false, true) => CellLevel::Coarse(key),
+            (false, false) => CellLevel::Fine(key),
+        };
+        let count = self.partition.regions.len();
+        let entries: Vec<[u32; 2]> = self.entries.download((index + 1) * count)?;
+        let known = entries[index * count..].iter().zip(&self.partition.regions);
+        let regions =
+            known.zip(self.learned.counts(index)).map(|((entry, region), count)| RecordedRegion {
+                trials: count.trials,
+                hits: count.hits,
+                visibility: decode_visibility(*entry),
+                probability: f64::from(decode_entry(*entry).0) * region.share,
+            });
+        Ok(RecordedCell { level, regions: regions.collect() })
     }
 
     /// What was learned, with what was counted since the last rebuild.

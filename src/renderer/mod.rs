@@ -2,6 +2,7 @@
 
 mod film_buffers;
 mod guide_buffers;
+mod guided_pixel;
 mod lobe_buffers;
 mod pixel;
 mod scene_buffers;
@@ -22,7 +23,8 @@ use crate::{
     scene::Scene,
 };
 use film_buffers::FilmBuffers;
-use guide_buffers::GuideBuffers;
+pub use guide_buffers::GuideBuffers;
+pub use guided_pixel::{CellLevel, GuidedRay, RecordedCell, RecordedGuide, RecordedRegion};
 pub use lobe_buffers::LobeBuffers;
 pub use pixel::{CachedDirection, RecordedLobe, RecordedPixel, RecordedRay};
 pub use scene_buffers::SceneBuffers;

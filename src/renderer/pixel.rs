@@ -70,8 +70,8 @@ impl Renderer {
     /// camera ray left the scene. The film is emptied.
     ///
     /// # Errors
-    /// [`Error::Usage`] for the sampler `guided`, whose choices rest on the whole picture;
-    /// [`Error::Vulkan`] if the device fails.
+    /// [`Error::Usage`] for the sampler `guided`, whose choices rest on the whole picture: see
+    /// [`Renderer::record_guided_pixel`]; [`Error::Vulkan`] if the device fails.
     ///
     /// # Panics
     /// If the window is larger than one pixel.
@@ -79,8 +79,7 @@ impl Renderer {
         assert!(self.window.width == 1 && self.window.height == 1, "a window of one pixel");
         if self.settings.sampler == Sampler::Guided {
             return Err(Error::usage(
-                "--pixel: guided learns from the whole picture and has no picture of one pixel; \
-                 expected another sampler, such as visibility or product",
+                "guided learns from the whole picture: one pixel alone has nothing to record",
             ));
         }
         let most = self.settings.shadow_rays;
@@ -123,12 +122,16 @@ impl Renderer {
     }
 
     /// Element `index` of a wave buffer.
-    fn read<T: bytemuck::Pod>(&self, name: &'static str, index: u32) -> Result<T> {
+    pub(super) fn read<T: bytemuck::Pod>(&self, name: &'static str, index: u32) -> Result<T> {
         let values = self.read_all(name, index as usize + 1)?;
         Ok(values[index as usize])
     }
 
-    fn read_all<T: bytemuck::Pod>(&self, name: &'static str, count: usize) -> Result<Vec<T>> {
+    pub(super) fn read_all<T: bytemuck::Pod>(
+        &self,
+        name: &'static str,
+        count: usize,
+    ) -> Result<Vec<T>> {
         let buffer = self.waves.buffer(name);
         assert!(buffer.is_some(), "the sampler has a buffer {name}");
         buffer.map_or_else(|| Ok(Vec::new()), |buffer| buffer.download(count))

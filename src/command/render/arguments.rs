@@ -14,6 +14,7 @@ use crate::{
     film::{Aov, is_special_file},
     renderer::{Settings, Window},
     sampler::{Parameters, Sampler},
+    scene::FilmSettings,
 };
 
 /// Arguments of `render`.
@@ -106,7 +107,21 @@ pub struct Arguments {
     pub quiet: bool,
 }
 
+/// Film width of `--quick`, pixels.
+const QUICK_WIDTH: u32 = 240;
+
 impl Arguments {
+    /// The film as `--size` or `--quick` want it.
+    pub(super) fn resize(&self, film: &mut FilmSettings) {
+        if let Some([width, height]) = self.size {
+            (film.width, film.height) = (width, height);
+        } else if self.quick && film.width > QUICK_WIDTH {
+            let scaled = u64::from(film.height) * u64::from(QUICK_WIDTH) / u64::from(film.width);
+            film.height = u32::try_from(scaled).unwrap_or(1).max(1);
+            film.width = QUICK_WIDTH;
+        }
+    }
+
     /// What the renderer is told.
     ///
     /// # Errors

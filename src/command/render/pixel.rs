@@ -6,6 +6,10 @@
 //! in the same exposure, with the directions in the visibility cache (red blocked, green visible).
 //! The story of figures 4.3 to 4.8 of Wu & Shih 2009. `product` has the first two panels, samplers
 //! without lobes the first.
+//!
+//! `guided` has, below the environment with the next samples of the pixel, what the cell of the hit
+//! knows: V̂ of every region, white where all is visible, blue where only its surroundings have
+//! counted; and the probability of the regions per steradian.
 
 use std::{
     io::Write,
@@ -24,12 +28,16 @@ use crate::{
     },
     frame::{direction_from_lat_long, lat_long_from_direction},
     gpu::Device,
-    renderer::{RecordedLobe, RecordedPixel, Renderer, Settings, Window, window_of},
-    sampler::Sampler,
+    renderer::{
+        CellLevel, GuidedRay, RecordedCell, RecordedGuide, RecordedLobe, RecordedPixel,
+        RecordedRay, Renderer, Settings, Window, window_of,
+    },
     scene::Scene,
     srbf::kernel_value,
 };
 
+/// Rays in the picture of `guided`, as far as whole samples give.
+const GUIDED_RAYS: u32 = 64;
 /// Size of a panel, pixels.
 const WIDTH: usize = 512;
 const HEIGHT: usize = WIDTH / 2;
@@ -44,6 +52,10 @@ const VISIBLE: [u8; 3] = [40, 220, 70];
 const BLOCKED: [u8; 3] = [235, 40, 40];
 const UNTRACED: [u8; 3] = [150, 150, 150];
 const HORIZON: [u8; 3] = [90, 160, 255];
+/// Names of the faces of a cube, in the order of the guide.
+const FACES: [&str; 6] = ["+x", "-x", "+y", "-y", "+z", "-z"];
+/// Tint of what a cell has not counted itself, linear.
+const UNCOUNTED: Vec3 = Vec3::new(0.35, 0.6, 1.0);
 
 /// `out.exr` → `out.pixel_x_y.png`.
 pub fn picture_path(output: &Path, [x, y]: [u32; 2]) -> PathBuf {
@@ -53,8 +65,7 @@ pub fn picture_path(output: &Path, [x, y]: [u32; 2]) -> PathBuf {
 /// Refuses what cannot have a picture, before any work.
 ///
 /// # Errors
-/// [`Error::Usage`] for a pixel outside of the window or the sampler `guided`; [`Error::Io`] where
-/// nothing can be written.
+/// [`Error::Usage`] for a pixel outside of the window; [`Error::Io`] where nothing can be written.
 pub fn check(settings: &Settings, scene: &Scene, output: &Path, pixel: [u32; 2]) -> Result<()> {
     let [x, y] = pixel;
     let window = window_of(settings, scene);
@@ -68,12 +79,6 @@ pub fn check(settings: &Settings, scene: &Scene, output: &Path, pixel: [u32; 2])
             window.y,
             u64::from(window.y) + u64::from(window.height)
         )));
-    }
-    if settings.sampler == Sampler::Guided {
-        return Err(Error::usage(
-            "--pixel: guided has no picture of a pixel; expected one of uniform, cosine, brdf, env, \
-             mis, ris, product, visibility",
-        ));
     }
     crate::film::check_writable(&picture_path(output, pixel))
 }
@@ -95,11 +100,35 @@ pub fn write(
     let settings =
         Settings { window, aovs: Vec::new(), depth: 1, first_sample: 0, ..settings.clone() };
     let Some(recorded) = Renderer::new(device, scene, settings)?.record_pixel()? else {
-        log::warn!("--pixel {x},{y}: the pixel sees the environment; there is no hit to explain");
+        warn_of_no_hit(pixel);
         return Ok(Vec::new());
     };
-    let path = picture_path(output, pixel);
-    let panels = draw(scene, &recorded);
+    write_files(&picture_path(output, pixel), &draw(scene, &recorded), &numbers_of(&recorded))
+}
+
+/// As [`write`] for the sampler `guided`, from the renderer that made the picture and goes no further.
+///
+/// # Errors
+/// A failing device or disk.
+pub fn write_guided(
+    renderer: &Renderer,
+    scene: &Scene,
+    output: &Path,
+    pixel: [u32; 2],
+) -> Result<Vec<PathBuf>> {
+    let Some(recorded) = renderer.record_guided_pixel(pixel, GUIDED_RAYS)? else {
+        warn_of_no_hit(pixel);
+        return Ok(Vec::new());
+    };
+    let panels = draw_guided(scene, &recorded);
+    write_files(&picture_path(output, pixel), &panels, &guided_numbers_of(&recorded))
+}
+
+fn warn_of_no_hit([x, y]: [u32; 2]) {
+    log::warn!("--pixel {x},{y}: the pixel sees the environment; there is no hit to explain");
+}
+
+fn write_files(path: &Path, panels: &[Panel], numbers: &serde_json::Value) -> Result<Vec<PathBuf>> {
     let mut rows: Vec<[u8; 3]> = Vec::new();
     for (index, panel) in panels.iter().enumerate() {
         if index > 0 {
@@ -107,22 +136,18 @@ pub fn write(
         }
         rows.extend(&panel.0);
     }
-    write_rgb8(&path, WIDTH as u32, (rows.len() / WIDTH) as u32, &rows)?;
-    let numbers = path.with_extension("json");
-    let text = numbers_of(&recorded).to_string();
-    write_atomically(&numbers, |file| file.write_all(text.as_bytes()))?;
-    Ok(vec![path, numbers])
+    write_rgb8(path, WIDTH as u32, (rows.len() / WIDTH) as u32, &rows)?;
+    let numbers_path = path.with_extension("json");
+    let text = numbers.to_string();
+    write_atomically(&numbers_path, |file| file.write_all(text.as_bytes()))?;
+    Ok(vec![path.to_owned(), numbers_path])
 }
 
 fn numbers_of(recorded: &RecordedPixel) -> serde_json::Value {
     json!({
         "position": recorded.position.to_array(),
         "normal": recorded.normal.to_array(),
-        "rays": recorded.rays.iter().map(|ray| json!({
-            "direction": ray.direction.to_array(),
-            "contribution": ray.contribution.to_array(),
-            "visible": ray.is_visible,
-        })).collect::<Vec<_>>(),
+        "rays": recorded.rays.iter().map(numbers_of_ray).collect::<Vec<_>>(),
         "lobes": recorded.lobes.iter().map(|lobe| json!({
             "axis": lobe.axis.to_array(),
             "bandwidth": lobe.bandwidth,
@@ -136,20 +161,104 @@ fn numbers_of(recorded: &RecordedPixel) -> serde_json::Value {
     })
 }
 
-/// The panels from top to bottom.
-fn draw(scene: &Scene, recorded: &RecordedPixel) -> Vec<Panel> {
-    let normal = recorded.normal;
+fn numbers_of_ray(ray: &RecordedRay) -> serde_json::Value {
+    json!({
+        "direction": ray.direction.to_array(),
+        "contribution": ray.contribution.to_array(),
+        "visible": ray.is_visible,
+    })
+}
+
+fn guided_numbers_of(recorded: &RecordedGuide) -> serde_json::Value {
+    let ray = |ray: &GuidedRay| {
+        let mut numbers = numbers_of_ray(&ray.ray);
+        numbers["sample"] = json!(ray.sample);
+        numbers["region"] = json!(ray.region);
+        numbers
+    };
+    let cell = |cell: &RecordedCell| {
+        let (level, key) = match cell.level {
+            CellLevel::Face(_) => ("face", None),
+            CellLevel::Coarse(key) => ("coarse", Some(key)),
+            CellLevel::Fine(key) => ("fine", Some(key)),
+        };
+        let face = match cell.level {
+            CellLevel::Face(face) => face,
+            CellLevel::Coarse(key) | CellLevel::Fine(key) => key.face(),
+        };
+        json!({
+            "level": level,
+            "key": key.map(|key| key.0),
+            "face": FACES.get(face),
+            "trials": cell.regions.iter().map(|region| region.trials).sum::<u64>(),
+            "hits": cell.regions.iter().map(|region| region.hits).sum::<u64>(),
+        })
+    };
+    let known = recorded.cell.iter().flat_map(|cell| &cell.regions);
+    let regions = known.zip(&recorded.partition.regions).map(|(known, region)| {
+        json!({
+            "direction": region.direction.to_array(),
+            "share": region.share,
+            "solid_angle": 4.0 * std::f64::consts::PI * region.solid_angle,
+            "trials": known.trials,
+            "hits": known.hits,
+            "visibility": known.visibility,
+            "probability": known.probability,
+        })
+    });
+    json!({
+        "position": recorded.position.to_array(),
+        "normal": recorded.normal.to_array(),
+        "rays": recorded.rays.iter().map(ray).collect::<Vec<_>>(),
+        "cell": recorded.cell.as_ref().map(cell),
+        "regions": regions.collect::<Vec<_>>(),
+    })
+}
+
+/// The environment with rays: green reached it, red were blocked, grey brought nothing.
+fn draw_rays<'a>(
+    scene: &Scene,
+    normal: Vec3,
+    rays: impl Iterator<Item = &'a RecordedRay>,
+) -> Panel {
     let environment = |direction| scene.environment.radiance(direction);
-    let mut samples = Panel::new(normal, white_of(environment), environment);
-    for ray in &recorded.rays {
+    let mut panel = Panel::new(normal, white_of(environment), environment);
+    for ray in rays {
         let colour = match (ray.contribution == Vec3::ZERO, ray.is_visible) {
             (true, _) => UNTRACED,
             (false, true) => VISIBLE,
             (false, false) => BLOCKED,
         };
-        samples.mark(ray.direction, colour);
+        panel.mark(ray.direction, colour);
     }
-    let mut panels = vec![samples];
+    panel
+}
+
+/// The panels of `guided` from top to bottom: one where nothing was learned, else three.
+fn draw_guided(scene: &Scene, recorded: &RecordedGuide) -> Vec<Panel> {
+    let normal = recorded.normal;
+    let mut panels = vec![draw_rays(scene, normal, recorded.rays.iter().map(|ray| &ray.ray))];
+    if let Some(cell) = &recorded.cell {
+        let region_of = |direction| recorded.partition.region_of(&scene.environment, direction);
+        panels.push(Panel::new(normal, 1.0, |direction| {
+            let region = cell.regions[region_of(direction)];
+            let colour = if region.trials == 0 { UNCOUNTED } else { Vec3::ONE };
+            region.visibility as f32 * colour
+        }));
+        let density = |direction| {
+            let index = region_of(direction);
+            let solid_angle = recorded.partition.regions[index].solid_angle;
+            Vec3::splat((cell.regions[index].probability / solid_angle) as f32)
+        };
+        panels.push(Panel::new(normal, white_of(density), density));
+    }
+    panels
+}
+
+/// The panels from top to bottom.
+fn draw(scene: &Scene, recorded: &RecordedPixel) -> Vec<Panel> {
+    let normal = recorded.normal;
+    let mut panels = vec![draw_rays(scene, normal, recorded.rays.iter())];
     if recorded.lobes.is_empty() {
         return panels;
     }

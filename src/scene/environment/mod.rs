@@ -117,14 +117,21 @@ impl EnvironmentMap {
         }
     }
 
-    /// Radiance from a unit direction: bilinear between texel centres, wrapping in u, clamped in v.
-    /// Twin of `environment_radiance`.
-    pub fn radiance(&self, direction: Vec3) -> Vec3 {
+    /// Column and row of the cell between texel centres that a unit direction lies in, and where in it.
+    /// Twin of `environment_locate`.
+    pub fn locate(&self, direction: Vec3) -> (u32, u32, Vec2) {
         let uv = lat_long_from_direction(self.map_from_world(direction));
         let x = uv.x * self.width as f32 - 0.5;
         let y = uv.y * self.height as f32 + 0.5;
         let column = if x < 0.0 { self.width - 1 } else { (x.floor() as u32).min(self.width - 1) };
         let row = (y.floor() as u32).min(self.height);
-        self.cell(column, row).interpolate(Vec2::new(x - x.floor(), y - y.floor()))
+        (column, row, Vec2::new(x - x.floor(), y - y.floor()))
+    }
+
+    /// Radiance from a unit direction: bilinear between texel centres, wrapping in u, clamped in v.
+    /// Twin of `environment_radiance`.
+    pub fn radiance(&self, direction: Vec3) -> Vec3 {
+        let (column, row, position) = self.locate(direction);
+        self.cell(column, row).interpolate(position)
     }
 }

@@ -1,0 +1,159 @@
+//! What the sampler `guided` knows and does at one pixel, read back from the device.
+//!
+//! Its choices rest on what the whole picture taught it, so the renderer of that picture traces the next
+//! samples of one pixel with its tables as they stand. The light they gather is not kept.
+
+use glam::Vec3;
+
+use super::{Renderer, film_buffers, pixel::RecordedRay, with_epoch};
+use crate::{
+    error::Result,
+    gpu::{
+        Commands,
+        constants::{NO_MATERIAL, NOTHING_TO_LEARN},
+        layout::{Hit, ShadowRay, Wave},
+    },
+    guide::{CellKey, Partition},
+};
+
+/// How closely a cell belongs to the place that found it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CellLevel {
+    /// All places whose surface points at this face of the cube.
+    Face(usize),
+    /// Four fine cells along each axis.
+    Coarse(CellKey),
+    /// The place itself.
+    Fine(CellKey),
+}
+
+/// What a cell knows about one region of the environment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RecordedRegion {
+    /// Rays that were counted in the cell itself when its estimates were made.
+    pub trials: u64,
+    /// Those of them that reached the environment.
+    pub hits: u64,
+    /// V̂: estimated share of rays that reach it, by the hierarchy; in the steps of the tables.
+    pub visibility: f64,
+    /// P: probability that a guided direction lies in it.
+    pub probability: f64,
+}
+
+/// A cell of learned visibility.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedCell {
+    /// Which it is.
+    pub level: CellLevel,
+    /// What it knows, region by region of [`RecordedGuide::partition`].
+    pub regions: Vec<RecordedRegion>,
+}
+
+/// A shadow ray with what it belongs to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GuidedRay {
+    /// The ray.
+    pub ray: RecordedRay,
+    /// Index of its sample.
+    pub sample: u32,
+    /// Region of the environment; absent for rays that brought nothing.
+    pub region: Option<usize>,
+}
+
+/// One pixel as the sampler `guided` saw it.
+#[derive(Clone, Debug)]
+pub struct RecordedGuide {
+    /// First hit of the first of the samples, metres.
+    pub position: Vec3,
+    /// Unit shading normal there.
+    pub normal: Vec3,
+    /// Rays of all samples whose camera ray hit something, sample after sample; of more than eight rays
+    /// a hit, the last group.
+    pub rays: Vec<GuidedRay>,
+    /// The cell that the first of the samples with a ray to trace found; absent where the scene is
+    /// open or no ray brought anything.
+    pub cell: Option<RecordedCell>,
+    /// The regions of the environment.
+    pub partition: Partition,
+}
+
+impl Renderer {
+    /// Traces `rays` shadow rays of the pixel at `x`, `y` of the film, in whole samples that follow those
+    /// in the film and as far as a wave has room; `None` where no camera ray hit anything, without
+    /// shadow rays, or for other samplers. The rays are counted among those to learn from, so the
+    /// renderer had better not go on.
+    ///
+    /// # Errors
+    /// [`crate::Error::Vulkan`] if the device fails.
+    ///
+    /// # Panics
+    /// If the pixel is not in the window.
+    pub fn record_guided_pixel(
+        &self,
+        [x, y]: [u32; 2],
+        rays: u32,
+    ) -> Result<Option<RecordedGuide>> {
+        let Some(guide) = &self.guide else { return Ok(None) };
+        let most = self.settings.shadow_rays;
+        if most == 0 {
+            return Ok(None);
+        }
+        let (column, row) = (x.wrapping_sub(self.window.x), y.wrapping_sub(self.window.y));
+        assert!(column < self.window.width && row < self.window.height, "a pixel of the window");
+        let per_group = (most - 1) % self.passes.rays_per_group() + 1;
+        let samples = rays.div_ceil(per_group).clamp(1, self.waves.capacity());
+        let first_sample = self.settings.first_sample.wrapping_add(self.sample_count);
+        let wave = Wave {
+            first_pixel: film_buffers::position_in_film_order(self.window, column, row),
+            pixel_count: 1,
+            first_sample,
+            sample_count: samples,
+            seed: self.settings.seed,
+            pixel_stride: 1,
+            ..Wave::default()
+        };
+        let epoch = self.settings.first_sample.wrapping_add(self.rebuilt_at);
+        let wave = Wave { is_training: 1, ..with_epoch(wave, epoch) };
+        let mut commands = Commands::begin(&self.device)?;
+        self.passes.record(&mut commands, &self.sets(), wave);
+        commands.submit_and_wait()?;
+        self.film.take_counters()?;
+
+        let hits: Vec<Hit> = self.read_all("hits", samples as usize)?;
+        let is_hit = |hit: &&Hit| hit.material != NO_MATERIAL;
+        let Some(first_hit) = hits.iter().find(is_hit) else { return Ok(None) };
+        let count = (samples * per_group) as usize;
+        let shadow_rays: Vec<ShadowRay> = self.read_all("shadow rays", count)?;
+        let visible: Vec<u32> = self.read_all("visibility", count)?;
+        let targets =
+            if self.is_open { vec![NOTHING_TO_LEARN; count] } else { guide.targets(count)? };
+        let region_count = guide.partition().regions.len() as u32;
+        let mut rays = Vec::new();
+        let mut cell = None;
+        for (sample, _) in (0..samples).zip(&hits).filter(|(_, hit)| is_hit(hit)) {
+            for ray in 0..per_group {
+                let index = (ray * samples + sample) as usize;
+                let learns = targets[index] != NOTHING_TO_LEARN;
+                if learns && cell.is_none() {
+                    cell = Some(guide.cell((targets[index] / region_count) as usize)?);
+                }
+                rays.push(GuidedRay {
+                    ray: RecordedRay {
+                        direction: shadow_rays[index].direction.into(),
+                        contribution: shadow_rays[index].contribution.into(),
+                        is_visible: visible[index] != 0,
+                    },
+                    sample: first_sample.wrapping_add(sample),
+                    region: learns.then_some((targets[index] % region_count) as usize),
+                });
+            }
+        }
+        Ok(Some(RecordedGuide {
+            position: first_hit.position.into(),
+            normal: first_hit.shading_normal.into(),
+            rays,
+            cell,
+            partition: guide.partition().clone(),
+        }))
+    }
+}
