@@ -304,7 +304,7 @@ fn every_part_of_the_sky_has_its_weight() {
                     format!("{}, {candidates} candidates, {weights:?}, {state}", surface.name);
                 let recorded = record(&renderer, surface);
                 let host = Host::new(surface, &recorded);
-                let mut truth = vec![0.0; PARTS];
+                let mut truth = [0.0; PARTS];
                 for (direction, solid_angle) in host.directions() {
                     let part = part_of(host.bin(direction));
                     truth[part] += solid_angle * host.consider(direction).integrand;
