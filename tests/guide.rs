@@ -73,6 +73,93 @@ fn small_and_black_maps_have_fewer_regions() {
     assert_eq!(black.regions[0].share, 0.0);
 }
 
+/// The second partition of the sunny map, by an interest in its eastern half only.
+fn eastern(partition: &Partition) -> Partition {
+    let interest: Vec<f64> = partition
+        .regions
+        .iter()
+        .map(|region| if region.direction.x > 0.0 { 1.0 } else { 0.01 })
+        .collect();
+    partition.split_by(&interest).expect("the map has enough cells")
+}
+
+#[test]
+fn regions_are_split_anew_where_the_scene_looks() {
+    let map = sunny();
+    let before = Partition::new(&map, 256);
+    let after = eastern(&before);
+    let in_the_east = |partition: &Partition| {
+        partition.regions.iter().filter(|region| region.direction.x > 0.0).count()
+    };
+    assert_eq!(after.regions.len(), 256);
+    assert!(in_the_east(&before) < 180 && in_the_east(&after) > 220, "{}", in_the_east(&after));
+    let sum: f64 = after.regions.iter().map(|region| region.share).sum();
+    assert!((sum - 1.0).abs() < 1e-12);
+    assert!(after.regions.iter().all(|region| region.parent < PARENT_COUNT));
+    // Interest that is the same everywhere gives the first regions, to the bit.
+    let again = after.split_by(&[1.0; 256]).unwrap();
+    assert_eq!((&again.regions, &again.entries), (&before.regions, &before.entries));
+}
+
+#[test]
+fn rectangles_bring_back_the_regions_unless_they_are_damaged() {
+    let map = sunny();
+    let partition = Partition::new(&map, 256);
+    let other = eastern(&partition);
+    let rectangles = other.rectangles();
+    let restored = partition.with_rectangles(&rectangles).unwrap();
+    assert_eq!((&restored.regions, &restored.entries), (&other.regions, &other.entries));
+    assert_eq!(restored.region_of_cell, other.region_of_cell);
+    let refused = |change: &dyn Fn(&mut Vec<[u32; 5]>)| {
+        let mut damaged = rectangles.clone();
+        change(&mut damaged);
+        assert!(partition.with_rectangles(&damaged).is_none());
+    };
+    refused(&|all| all[3][2] += 1);
+    refused(&|all| all[3][2] -= 1);
+    refused(&|all| all[0][0] = u32::MAX);
+    refused(&|all| all[7] = all[6]);
+    refused(&|all| all[9][4] = 64);
+    refused(&|all| {
+        all.pop();
+    });
+}
+
+#[test]
+fn counts_follow_the_regions() {
+    let map = sunny();
+    let before = Partition::new(&map, 64);
+    let after = eastern(&before);
+    let mut learned = taught(&before, 1 << 12, 1 << 14);
+    // What shines: nothing is drawn in black regions.
+    let sums = |learned: &Learned, cell: usize, partition: &Partition| {
+        let counts = learned.counts(cell).iter().zip(&partition.regions);
+        counts
+            .filter(|(_, region)| region.share > 0.0)
+            .fold((0, 0), |sum, (count, _)| (sum.0 + count.hits, sum.1 + count.trials))
+    };
+    let seeing = learned.keys().iter().position(|key| *key == CellKey::fine([3, 4, 5], 6, 2));
+    let cell = seeing.unwrap();
+    let old = sums(&learned, cell, &before);
+    learned.carry_over(&before, &after);
+    let new = sums(&learned, cell, &after);
+    // Each share is rounded to a sixteenth of a ray.
+    assert!(new.1.abs_diff(old.1) < 64 && new.0.abs_diff(old.0) < 64, "{old:?} → {new:?}");
+    // Regions keep the rate of where they lie.
+    for (region, count) in after.regions.iter().zip(learned.counts(cell)) {
+        if region.direction.x.abs() > 0.4 && count.trials >= 16 {
+            let rate = count.hits as f64 / count.trials as f64;
+            let expected = if region.direction.x > 0.0 { 1.0 } else { 0.0 };
+            assert!((rate - expected).abs() < 0.3, "{rate} {region:?}");
+        }
+    }
+    let shares = before.shares_in(&after);
+    for (region, shares) in before.regions.iter().zip(&shares) {
+        let sum: f64 = shares.iter().map(|(_, share)| share).sum();
+        assert!((sum - if region.share > 0.0 { 1.0 } else { 0.0 }).abs() < 1e-12);
+    }
+}
+
 /// Probability of the cell of every sample point of a fine grid in (u, v), from the density.
 #[test]
 fn the_density_integrates_to_one_over_every_region() {

@@ -296,8 +296,9 @@ fn passes_may_be_grouped_at_will() {
         }
         (renderer.sums().unwrap(), renderer.totals().shadow_rays_traced)
     };
-    let (whole, rays) = render(&[13]);
-    let (parts, rays_of_parts) = render(&[1, 5, 1, 6]);
+    // The regions are split anew after 16.
+    let (whole, rays) = render(&[21]);
+    let (parts, rays_of_parts) = render(&[1, 5, 1, 8, 2, 4]);
     assert_eq!(rays, rays_of_parts);
     for pixel in 0..whole.pixel_count() {
         assert_eq!(whole.mean(pixel), parts.mean(pixel), "pixel {pixel}");
@@ -310,20 +311,39 @@ fn a_renderer_goes_on_where_another_stopped() {
     let scene = room();
     let renderer = || Renderer::new(support::device(), &scene, guided(4)).unwrap();
     let mut whole = renderer();
-    whole.render_pass(9).unwrap();
-    let mut first = renderer();
-    first.render_pass(5).unwrap();
-    let (sums, state) = (first.sums().unwrap(), first.guide_state().unwrap().unwrap());
-    assert_eq!((state.samples, state.rebuilt_at), (5, 4));
-    let mut second = renderer();
-    second.restore(&sums).unwrap();
-    assert!(!second.restore_guide(&state).unwrap());
-    second.render_pass(4).unwrap();
-    let (whole, parts) = (whole.sums().unwrap(), second.sums().unwrap());
-    for pixel in 0..whole.pixel_count() {
-        assert_eq!(whole.mean(pixel), parts.mean(pixel), "pixel {pixel}");
+    whole.render_pass(21).unwrap();
+    let whole = whole.sums().unwrap();
+    // Before and after the regions are split anew.
+    for (stop, rebuilt_at) in [(5, 4), (16, 12), (19, 16)] {
+        let mut first = renderer();
+        first.render_pass(stop).unwrap();
+        let (sums, state) = (first.sums().unwrap(), first.guide_state().unwrap().unwrap());
+        assert_eq!((state.samples, state.rebuilt_at), (stop, rebuilt_at));
+        let mut second = renderer();
+        second.restore(&sums).unwrap();
+        assert!(!second.restore_guide(&state).unwrap());
+        second.render_pass(21 - stop).unwrap();
+        let parts = second.sums().unwrap();
+        for pixel in 0..whole.pixel_count() {
+            assert_eq!(whole.mean(pixel), parts.mean(pixel), "{stop} samples, pixel {pixel}");
+        }
     }
     support::assert_silent();
+}
+
+#[test]
+fn a_restart_forgets_the_regions_too() {
+    let _alone = alone();
+    let scene = room();
+    let mut renderer = Renderer::new(support::device(), &scene, guided(1)).unwrap();
+    renderer.render_pass(18).unwrap();
+    let first = renderer.guide_state().unwrap().unwrap();
+    let sums = renderer.sums().unwrap();
+    renderer.restart(0).unwrap();
+    renderer.render_pass(18).unwrap();
+    assert!(renderer.guide_state().unwrap().unwrap() == first, "the same was learned");
+    let again = renderer.sums().unwrap();
+    assert!((0..sums.pixel_count()).all(|pixel| sums.mean(pixel) == again.mean(pixel)));
 }
 
 #[test]
@@ -341,6 +361,11 @@ fn a_guide_of_another_scene_is_refused_or_mostly_forgotten() {
     assert!(pupil.restore_guide(&state).unwrap(), "something moved");
     pupil.render_pass(2).unwrap();
     assert_eq!(pupil.totals().camera_rays, 2 * 32 * 24, "no training");
+    let mut damaged = state.clone();
+    damaged.rectangles[3][2] += 1;
+    let mut pupil = Renderer::new(support::device(), &room, guided(1)).unwrap();
+    let error = pupil.restore_guide(&damaged).unwrap_err().to_string();
+    assert!(error.contains("do not fill the map"), "{error}");
     let mut darker = room.clone();
     darker.environment.texels[7] *= 0.5;
     let mut pupil = Renderer::new(support::device(), &darker, guided(1)).unwrap();

@@ -44,7 +44,10 @@ impl Default for EstimateOptions {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimates(pub Vec<f64>);
 
-/// Hits and trials per region.
+/// A ray, as it is counted: regions that are split anew share what was counted.
+pub const PARTS_PER_RAY: u64 = 16;
+
+/// Hits and trials per region, [`PARTS_PER_RAY`] for each ray.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Count {
     /// Rays that reached the environment.
@@ -54,15 +57,31 @@ pub struct Count {
 }
 
 impl Count {
+    /// Rays that reached the environment; of regions that were split anew, a share.
+    pub fn hits_in_rays(self) -> f64 {
+        self.hits as f64 / PARTS_PER_RAY as f64
+    }
+
+    /// Rays traced; of regions that were split anew, a share.
+    pub fn trials_in_rays(self) -> f64 {
+        self.trials as f64 / PARTS_PER_RAY as f64
+    }
+
     fn rate(self, prior: f64, weight: f64) -> f64 {
-        (self.hits as f64 + weight * prior) / (self.trials as f64 + weight)
+        (self.hits_in_rays() + weight * prior) / (self.trials_in_rays() + weight)
+    }
+
+    /// Adds `share` of another count.
+    pub fn add_share(&mut self, other: Self, share: f64) {
+        self.hits += (other.hits as f64 * share).round() as u64;
+        self.trials += (other.trials as f64 * share).round() as u64;
     }
 }
 
 impl Estimates {
     /// Of all cells of one face, against the rate of the whole scene.
     pub fn of_face(counts: &[Count], scene: Count) -> Self {
-        let rate = (scene.hits as f64 + 1.0) / (scene.trials as f64 + 2.0);
+        let rate = (scene.hits_in_rays() + 1.0) / (scene.trials_in_rays() + 2.0);
         Self(counts.iter().map(|count| count.rate(rate, 2.0)).collect())
     }
 
@@ -77,8 +96,8 @@ impl Estimates {
         let mut found = vec![0.0; partition.parent_count];
         let mut expected = vec![0.0; partition.parent_count];
         for ((count, prior), region) in counts.iter().zip(&coarse.0).zip(&partition.regions) {
-            found[region.parent] += count.hits as f64;
-            expected[region.parent] += count.trials as f64 * prior;
+            found[region.parent] += count.hits_in_rays();
+            expected[region.parent] += count.trials_in_rays() * prior;
         }
         let rates = counts.iter().zip(&coarse.0).zip(&partition.regions);
         Self(

@@ -1,7 +1,7 @@
 //! What was learned, in a file: `--save-guide`, `--load-guide`, and beside a checkpoint.
 //!
-//! One line of JSON, then 32-bit words in little-endian order: the keys of the cells, trials and hits
-//! per cell and region, what passes counted since the last rebuild, and the keys they missed. The
+//! One line of JSON, then 32-bit words in little-endian order: the rectangles that are the regions, the
+//! keys of the cells, trials and hits per cell and region in sixteenths of rays, what passes counted since the last rebuild, and the keys they missed. The
 //! header has the SHA-256 of the words.
 
 use std::{fs, io::Write, path::Path};
@@ -15,7 +15,7 @@ use crate::{
 };
 
 const FORMAT: &str = "fenestra-guide";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// Everything a renderer needs to go on learning where another stopped.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,9 +28,11 @@ pub struct GuideState {
     pub rebuilt_at: u32,
     /// Whether the scene was found open, so that nothing more is learned.
     pub is_open: bool,
+    /// First column and row, columns, rows and parent of every region.
+    pub rectangles: Vec<[u32; 5]>,
     /// Key of every cell, the faces first.
     pub keys: Vec<u32>,
-    /// Trials and hits per cell and region up to the last rebuild.
+    /// Trials and hits per cell and region up to the last rebuild, in sixteenths of rays.
     pub counts: Vec<[u32; 2]>,
     /// Trials and hits per cell and region since then; empty where there are none.
     pub pending: Vec<[u32; 2]>,
@@ -41,7 +43,7 @@ pub struct GuideState {
 /// The scene that a guide was learned in, as far as it matters.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Origin {
-    /// SHA-256 of environment map and partition: regions mean nothing under another.
+    /// SHA-256 of the environment map: regions mean nothing under another.
     pub environment: String,
     /// SHA-256 of the geometry: under another, what was learned is worth less.
     pub geometry: String,
@@ -79,8 +81,10 @@ impl GuideState {
     pub fn write(&self, path: &Path) -> Result<()> {
         let mut words: Vec<u8> = Vec::new();
         let all = self
-            .keys
+            .rectangles
+            .as_flattened()
             .iter()
+            .chain(&self.keys)
             .chain(self.counts.as_flattened())
             .chain(self.pending.as_flattened())
             .chain(&self.wanted);
@@ -138,7 +142,12 @@ impl GuideState {
         let counts = header.cells.checked_mul(header.origin.regions as usize);
         let length = counts.and_then(|counts| {
             let pairs = counts.checked_add(header.pending)?.checked_mul(2)?;
-            pairs.checked_add(header.cells)?.checked_add(header.wanted)?.checked_mul(4)
+            let fives = (header.origin.regions as usize).checked_mul(5)?;
+            pairs
+                .checked_add(fives)?
+                .checked_add(header.cells)?
+                .checked_add(header.wanted)?
+                .checked_mul(4)
         });
         let (Some(counts), Some(length)) = (counts, length) else {
             return Err(damaged("its header holds impossible lengths"));
@@ -152,11 +161,16 @@ impl GuideState {
         let mut take = |count: usize| words.by_ref().take(count).collect::<Vec<u32>>();
         let pairs =
             |words: Vec<u32>| words.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
+        let regions = header.origin.regions as usize;
         Ok(Self {
             origin: header.origin,
             samples: header.samples,
             rebuilt_at: header.rebuilt_at,
             is_open: header.is_open,
+            rectangles: take(5 * regions)
+                .chunks_exact(5)
+                .map(|words| [words[0], words[1], words[2], words[3], words[4]])
+                .collect(),
             keys: take(header.cells),
             counts: pairs(take(2 * counts)),
             pending: pairs(take(2 * header.pending)),
@@ -178,6 +192,7 @@ mod tests {
             samples: 5,
             rebuilt_at: 4,
             is_open: true,
+            rectangles: vec![[0, 0, 5, 9, 0], [5, 0, 3, 9, 1]],
             keys: vec![u32::MAX, 7, 8],
             counts: vec![[1, 0], [2, 1], [3, 3], [0, 0], [1 << 24, 5], [9, 9]],
             pending: vec![[4, 4]],

@@ -5,14 +5,14 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::{
-    estimate::{Count, EstimateOptions, Estimates},
+    estimate::{Count, EstimateOptions, Estimates, PARTS_PER_RAY, decode_entry},
     key::{CellKey, FACE_COUNT, face_normal},
     partition::Partition,
 };
 use crate::gpu::constants::GUIDE_PROBES;
 
 /// Trials of one region and cell above which both counts are halved.
-const LARGEST_COUNT: u64 = 1 << 24;
+const LARGEST_COUNT: u64 = (1 << 24) * PARTS_PER_RAY;
 
 /// Cells and counts. The first [`FACE_COUNT`] cells are the faces: rays from places that have no
 /// cell of their own count there.
@@ -56,8 +56,8 @@ impl Learned {
         }
     }
 
-    /// As [`Self::new`], with the keys and counts (trials, hits) that an earlier one had; what finds no
-    /// room is left out. With `forget`, every count is divided by that number.
+    /// As [`Self::new`], with the keys and counts (trials, hits, in sixteenths of rays) that an earlier
+    /// one had; what finds no room is left out. With `forget`, every count is divided by that number.
     ///
     /// # Panics
     /// As [`Self::new`]; if there are not as many counts as keys and regions, the faces first.
@@ -122,8 +122,8 @@ impl Learned {
     pub fn add(&mut self, counted: &[[u32; 2]]) {
         assert!(counted.len() <= self.counts.len(), "counts of cells that are there");
         for (count, [trials, hits]) in self.counts.iter_mut().zip(counted) {
-            count.trials += u64::from(*trials);
-            count.hits += u64::from(*hits.min(trials));
+            count.trials += PARTS_PER_RAY * u64::from(*trials);
+            count.hits += PARTS_PER_RAY * u64::from(*hits.min(trials));
             if count.trials > LARGEST_COUNT {
                 count.trials /= 2;
                 count.hits /= 2;
@@ -154,6 +154,47 @@ impl Learned {
             self.keys.push(key);
             self.counts.resize(self.counts.len() + self.region_count, Count::default());
         }
+    }
+
+    /// What every region is worth to the scene by `snapshot`: the root of the mean over all fine cells
+    /// of its probability divided by its share of the energy.
+    pub fn interest(&self, snapshot: &Snapshot) -> Vec<f64> {
+        let mut sums = vec![0.0; self.region_count];
+        let mut cells = 0_u32;
+        for (key, entries) in
+            self.keys.iter().zip(snapshot.entries.chunks(self.region_count)).skip(FACE_COUNT)
+        {
+            if key.is_coarse() {
+                continue;
+            }
+            cells += 1;
+            for (sum, entry) in sums.iter_mut().zip(entries) {
+                *sum += f64::from(decode_entry(*entry).0);
+            }
+        }
+        if cells == 0 {
+            return vec![1.0; self.region_count];
+        }
+        sums.into_iter().map(|sum| (sum / f64::from(cells)).sqrt()).collect()
+    }
+
+    /// Counts for the regions of `to` in the place of those of `from`: each inherits its share, by
+    /// energy, of what was counted where it lies.
+    pub fn carry_over(&mut self, from: &Partition, to: &Partition) {
+        let shares = from.shares_in(to);
+        let count = to.regions.len();
+        let mut counts = vec![Count::default(); self.keys.len() * count];
+        counts.par_chunks_mut(count).zip(self.counts.par_chunks(self.region_count)).for_each(
+            |(new, old)| {
+                for (old, shares) in old.iter().zip(&shares) {
+                    for (region, share) in shares {
+                        new[*region].add_share(*old, *share);
+                    }
+                }
+            },
+        );
+        self.counts = counts;
+        self.region_count = count;
     }
 
     /// The tables for the next pass.

@@ -4,18 +4,23 @@
 //! [`EnvironmentTables`](crate::scene::environment::EnvironmentTables): `height + 1` rows of `width`
 //! cells between texel centres, a cell's share of the whole density being P_cell. Greedy splits of
 //! the rectangle with the largest E^¼ · Ω^¾ (E its share of the energy, Ω its solid angle) give
-//! rectangles that are small where the map is bright without leaving the dark parts coarse.
+//! rectangles that are small where the map is bright without leaving the dark parts coarse. Once it
+//! is known which regions the scene sees, the map is split anew with both weighted by that.
 //!
 //! A region r is chosen first, then one of its cells by an alias table with P_cell / P_region, then
 //! a direction in the cell's bilinear patch. Hence p(ω|r) = pdf(ω) / P_region with the pdf of the
 //! whole map: one table per region and no residual of any fit.
 
-use std::{cmp::Ordering, collections::BinaryHeap};
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
-use super::alias::{AliasEntry, alias_table};
-use crate::scene::environment::{EnvironmentMap, luminance, mean_sine};
+use super::{
+    alias::{AliasEntry, alias_table},
+    split::{Cells, Rectangle, Sums, grow},
+};
+use crate::scene::environment::EnvironmentMap;
 
 /// Number of regions that are the angular parents of all others.
 pub const PARENT_COUNT: usize = 64;
@@ -57,168 +62,7 @@ pub struct Partition {
     pub width: u32,
     /// Rows of cells, one more than the map has.
     pub rows: u32,
-}
-
-/// Energy and solid angle of every cell, unnormalised, and sums over rectangles.
-struct Cells {
-    width: usize,
-    rows: usize,
-    /// Energy per cell.
-    energy: Vec<f64>,
-    /// Sums of `energy` over all cells above and to the left.
-    sums: Vec<f64>,
-    /// Solid angle of one cell by row, as a share of the sphere, and its running sums.
-    row_angle: Vec<f64>,
-    row_angle_sums: Vec<f64>,
-}
-
-impl Cells {
-    fn new(map: &EnvironmentMap) -> Self {
-        let (width, rows) = (map.width as usize, map.height as usize + 1);
-        let texel = |column: usize, row: usize| {
-            f64::from(luminance(map.texels[row * width + column % width]))
-        };
-        let mut energy = Vec::with_capacity(width * rows);
-        let mut row_angle = Vec::with_capacity(rows);
-        let mut row_angle_sums = vec![0.0];
-        for row in 0..rows {
-            let (upper, lower) = (row.saturating_sub(1), row.min(rows - 2));
-            let height = if row == 0 || row + 1 == rows { 0.5 } else { 1.0 };
-            let sine = height * mean_sine(row as u32, map.height);
-            let edge: Vec<f64> =
-                (0..width).map(|column| texel(column, upper) + texel(column, lower)).collect();
-            energy.extend(
-                (0..width).map(|column| 0.25 * sine * (edge[column] + edge[(column + 1) % width])),
-            );
-            row_angle.push(sine);
-        }
-        let whole: f64 = row_angle.iter().sum::<f64>() * width as f64;
-        for angle in &mut row_angle {
-            *angle /= whole;
-            row_angle_sums.push(row_angle_sums.last().copied().unwrap_or(0.0) + *angle);
-        }
-        let mut sums = vec![0.0; (width + 1) * (rows + 1)];
-        for row in 0..rows {
-            let mut running = 0.0;
-            for column in 0..width {
-                running += energy[row * width + column];
-                sums[(row + 1) * (width + 1) + column + 1] =
-                    sums[row * (width + 1) + column + 1] + running;
-            }
-        }
-        Self { width, rows, energy, sums, row_angle, row_angle_sums }
-    }
-
-    fn energy_of(&self, rectangle: Rectangle) -> f64 {
-        let [c0, r0] = rectangle.first;
-        let [c1, r1] = [c0 + rectangle.size[0], r0 + rectangle.size[1]];
-        let at = |column: usize, row: usize| self.sums[row * (self.width + 1) + column];
-        (at(c1, r1) - at(c0, r1) - at(c1, r0) + at(c0, r0)).max(0.0)
-    }
-
-    fn solid_angle_of(&self, rectangle: Rectangle) -> f64 {
-        let [_, r0] = rectangle.first;
-        (self.row_angle_sums[r0 + rectangle.size[1]] - self.row_angle_sums[r0])
-            * rectangle.size[0] as f64
-    }
-
-    /// What the greedy splits make small: E^¼ Ω^¾.
-    fn cost(&self, rectangle: Rectangle) -> f64 {
-        self.energy_of(rectangle).powf(0.25) * self.solid_angle_of(rectangle).powf(0.75)
-    }
-
-    /// Splits across the longer side where the two costs are nearest to each other.
-    fn split(&self, rectangle: Rectangle) -> Option<[Rectangle; 2]> {
-        let [columns, rows] = rectangle.size;
-        let middle = rectangle.first[1] + rows / 2;
-        let pi = std::f64::consts::PI;
-        let sine = (pi * middle as f64 / (self.rows - 1) as f64).sin().max(1e-3);
-        let width = columns as f64 * 2.0 * pi / self.width as f64 * sine;
-        let height = rows as f64 * pi / (self.rows - 1) as f64;
-        let axis = usize::from(columns == 1 || (rows > 1 && height > width));
-        let length = rectangle.size[axis];
-        if length < 2 {
-            return None;
-        }
-        let halves = |at: usize| {
-            let (mut low, mut high) = (rectangle, rectangle);
-            low.size[axis] = at;
-            high.first[axis] += at;
-            high.size[axis] = length - at;
-            [low, high]
-        };
-        // The difference grows with the position: bisect.
-        let (mut first, mut last) = (1, length - 1);
-        while first < last {
-            let at = usize::midpoint(first, last);
-            let [low, high] = halves(at);
-            if self.cost(low) < self.cost(high) {
-                first = at + 1;
-            } else {
-                last = at;
-            }
-        }
-        Some(halves(first))
-    }
-
-    /// Sum of directions in the frame of the map, weighted by energy, or by solid angle where there
-    /// is none.
-    fn direction_of(&self, rectangle: Rectangle) -> DVec3 {
-        let pi = std::f64::consts::PI;
-        let dark = self.energy_of(rectangle) <= 0.0;
-        let mut sum = DVec3::ZERO;
-        for row in rectangle.first[1]..rectangle.first[1] + rectangle.size[1] {
-            let theta = pi * row as f64 / (self.rows - 1) as f64;
-            let (sin_theta, cos_theta) = theta.sin_cos();
-            for column in rectangle.first[0]..rectangle.first[0] + rectangle.size[0] {
-                let azimuth = 2.0 * pi * (column as f64 + 1.0) / self.width as f64;
-                let weight =
-                    if dark { self.row_angle[row] } else { self.energy[row * self.width + column] };
-                let direction =
-                    DVec3::new(-sin_theta * azimuth.sin(), cos_theta, sin_theta * azimuth.cos());
-                sum += weight * direction;
-            }
-        }
-        sum.normalize_or(DVec3::Y)
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Rectangle {
-    first: [usize; 2],
-    size: [usize; 2],
-}
-
-/// A rectangle in the queue of those to split; ties go to the one that was made first.
-struct Queued {
-    cost: f64,
-    index: usize,
-}
-
-impl PartialEq for Queued {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Queued {}
-
-impl PartialOrd for Queued {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Queued {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.cost.total_cmp(&other.cost).then(other.index.cmp(&self.index))
-    }
-}
-
-/// Indices from 0 on, each followed by `next` of it.
-fn in_order(next: &[usize]) -> Vec<usize> {
-    std::iter::successors(Some(0), |&index| Some(next[index]).filter(|&next| next != usize::MAX))
-        .collect()
+    cells: Arc<Cells>,
 }
 
 impl Partition {
@@ -228,90 +72,130 @@ impl Partition {
     /// If `region_count` is not from 1 to 1024.
     pub fn new(map: &EnvironmentMap, region_count: usize) -> Self {
         assert!((1..=1024).contains(&region_count), "1 to 1024 regions");
-        let cells = Cells::new(map);
-        let whole = Rectangle { first: [0, 0], size: [cells.width, cells.rows] };
-        let mut rectangles = vec![whole];
-        let mut parents: Option<Vec<usize>> = None;
-        let mut parent_count = 1;
-        let mut queue = BinaryHeap::from([Queued { cost: cells.cost(whole), index: 0 }]);
-        // What comes after each rectangle in the order of the tree, so that neighbours in that order
-        // are mostly neighbours in the map.
-        let mut next = vec![usize::MAX];
-        while rectangles.len() < region_count {
-            if rectangles.len() == PARENT_COUNT && parents.is_none() {
-                let mut ranks = vec![0; PARENT_COUNT];
-                for (rank, index) in in_order(&next).into_iter().enumerate() {
-                    ranks[index] = rank;
+        let cells = Arc::new(Cells::new(map));
+        let rectangles = grow(&Sums::new(&cells, |_| 1.0), region_count);
+        Self::assemble(cells, &rectangles)
+    }
+
+    /// Splits the same map into as many regions anew, where a cell counts by the `interest` of the
+    /// region that it lies in now. `None` where that many cannot be had.
+    ///
+    /// # Panics
+    /// If there are not as many interests as regions.
+    pub fn split_by(&self, interest: &[f64]) -> Option<Self> {
+        assert_eq!(interest.len(), self.regions.len(), "an interest for every region");
+        let weight = |cell: usize| interest[usize::from(self.region_of_cell[cell])];
+        let rectangles = grow(&Sums::new(&self.cells, weight), self.regions.len());
+        (rectangles.len() == self.regions.len())
+            .then(|| Self::assemble(Arc::clone(&self.cells), &rectangles))
+    }
+
+    /// First column and row, columns, rows and parent of every region, for a file.
+    pub fn rectangles(&self) -> Vec<[u32; 5]> {
+        let of = |region: &Region| {
+            let ([column, row], [columns, rows]) = (region.first, region.size);
+            [column, row, columns, rows, region.parent as u32]
+        };
+        self.regions.iter().map(of).collect()
+    }
+
+    /// The same map in the regions that [`Self::rectangles`] gave. `None` unless they are as many and
+    /// fill the map without overlap.
+    pub fn with_rectangles(&self, rectangles: &[[u32; 5]]) -> Option<Self> {
+        let (width, rows) = (self.width, self.rows);
+        let mut is_covered = vec![false; self.region_of_cell.len()];
+        let mut found = Vec::with_capacity(rectangles.len());
+        for &[column, row, columns, count, parent] in rectangles {
+            let is_inside = column.checked_add(columns).is_some_and(|end| end <= width)
+                && row.checked_add(count).is_some_and(|end| end <= rows)
+                && columns > 0
+                && count > 0
+                && (parent as usize) < rectangles.len().min(PARENT_COUNT);
+            if !is_inside {
+                return None;
+            }
+            let rectangle = Rectangle {
+                first: [column as usize, row as usize],
+                size: [columns as usize, count as usize],
+                parent: parent as usize,
+            };
+            for row in rectangle.rows() {
+                for cell in &mut is_covered[rectangle.cells(row, width as usize)] {
+                    if std::mem::replace(cell, true) {
+                        return None;
+                    }
                 }
-                parents = Some(ranks);
-                parent_count = PARENT_COUNT;
             }
-            // What is black need not be told apart.
-            let Some(Queued { index, cost }) = queue.pop() else { break };
-            if cost <= 0.0 {
-                break;
-            }
-            let Some([low, high]) = cells.split(rectangles[index]) else { continue };
-            rectangles[index] = low;
-            rectangles.push(high);
-            next.push(next[index]);
-            next[index] = rectangles.len() - 1;
-            if let Some(parents) = &mut parents {
-                parents.push(parents[index]);
-            }
-            for index in [index, rectangles.len() - 1] {
-                queue.push(Queued { cost: cells.cost(rectangles[index]), index });
+            found.push(rectangle);
+        }
+        let is_whole = found.len() == self.regions.len() && is_covered.iter().all(|&cell| cell);
+        is_whole.then(|| Self::assemble(Arc::clone(&self.cells), &found))
+    }
+
+    /// For every region of this partition the regions of `other`, of the same map, that it lies in,
+    /// with the share of its energy there.
+    pub fn shares_in(&self, other: &Self) -> Vec<Vec<(usize, f64)>> {
+        let count = other.regions.len();
+        let mut energy = vec![0.0; self.regions.len() * count];
+        for ((own, others), cell) in
+            self.region_of_cell.iter().zip(&other.region_of_cell).zip(&self.cells.energy)
+        {
+            energy[usize::from(*own) * count + usize::from(*others)] += cell;
+        }
+        let shares = |row: &[f64]| {
+            let whole: f64 = row.iter().sum();
+            let parts = row.iter().enumerate().filter(|(_, part)| **part > 0.0);
+            parts.map(|(region, part)| (region, part / whole)).collect()
+        };
+        energy.chunks(count).map(shares).collect()
+    }
+
+    fn assemble(cells: Arc<Cells>, rectangles: &[Rectangle]) -> Self {
+        let energy: f64 = cells.energy.iter().sum();
+        let mut region_of_cell = vec![0; cells.energy.len()];
+        for (index, rectangle) in rectangles.iter().enumerate() {
+            for row in rectangle.rows() {
+                region_of_cell[rectangle.cells(row, cells.width)].fill(index as u16);
             }
         }
-        let order = in_order(&next);
-        let parents: Vec<usize> = parents.map_or_else(
-            || {
-                parent_count = rectangles.len();
-                (0..rectangles.len()).collect()
-            },
-            |parents| order.iter().map(|&index| parents[index]).collect(),
-        );
-        let rectangles: Vec<Rectangle> = order.iter().map(|&index| rectangles[index]).collect();
-
-        let energy: f64 = cells.energy.iter().sum();
+        let tables: Vec<(f64, DVec3, Vec<AliasEntry>)> = rectangles
+            .par_iter()
+            .map(|rectangle| {
+                let mut weights = Vec::with_capacity(rectangle.size[0] * rectangle.size[1]);
+                for row in rectangle.rows() {
+                    weights.extend_from_slice(&cells.energy[rectangle.cells(row, cells.width)]);
+                }
+                let table = alias_table(&weights, CELL_SCALE).unwrap_or_else(|| {
+                    // A black region is never chosen.
+                    vec![AliasEntry { threshold: CELL_SCALE, alias: 0 }; weights.len()]
+                });
+                // Summed again: differences of large sums would lose what is dim.
+                (weights.iter().sum(), cells.direction_of(*rectangle), table)
+            })
+            .collect();
         let mut regions = Vec::with_capacity(rectangles.len());
         let mut entries = Vec::with_capacity(cells.energy.len());
-        let mut region_of_cell = vec![0; cells.energy.len()];
-        let (s, c) = f64::from(map.rotation_rad).sin_cos();
-        for (index, (rectangle, parent)) in rectangles.iter().zip(parents).enumerate() {
-            let mut weights = Vec::with_capacity(rectangle.size[0] * rectangle.size[1]);
-            for row in rectangle.first[1]..rectangle.first[1] + rectangle.size[1] {
-                let first = row * cells.width + rectangle.first[0];
-                weights.extend_from_slice(&cells.energy[first..][..rectangle.size[0]]);
-                region_of_cell[first..][..rectangle.size[0]].fill(index as u16);
-            }
-            let in_map = cells.direction_of(*rectangle);
+        for (rectangle, (sum, direction, table)) in rectangles.iter().zip(tables) {
             regions.push(Region {
                 first: rectangle.first.map(|value| value as u32),
                 size: rectangle.size.map(|value| value as u32),
-                // Summed again: differences of large sums would lose what is dim.
-                share: if energy > 0.0 { weights.iter().sum::<f64>() / energy } else { 0.0 },
-                solid_angle: cells.solid_angle_of(*rectangle),
-                direction: DVec3::new(
-                    c * in_map.x + s * in_map.z,
-                    in_map.y,
-                    c * in_map.z - s * in_map.x,
-                ),
-                parent,
+                share: if energy > 0.0 { sum / energy } else { 0.0 },
+                solid_angle: cells.row_angle[rectangle.rows()].iter().sum::<f64>()
+                    * rectangle.size[0] as f64,
+                direction,
+                parent: rectangle.parent,
                 first_entry: entries.len(),
             });
-            entries.extend(alias_table(&weights, CELL_SCALE).unwrap_or_else(|| {
-                // A black region is never chosen.
-                vec![AliasEntry { threshold: CELL_SCALE, alias: 0 }; weights.len()]
-            }));
+            entries.extend(table);
         }
         Self {
+            parent_count: rectangles.len().min(PARENT_COUNT),
             regions,
-            parent_count,
             entries,
             region_of_cell,
-            width: map.width,
-            rows: map.height + 1,
+            width: cells.width as u32,
+            rows: cells.rows as u32,
+            cells,
         }
     }
 

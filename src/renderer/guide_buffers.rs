@@ -41,11 +41,24 @@ const FEW_CELLS: u64 = 4096;
 /// Pixels per cell beyond those: no film can fill more.
 const PIXELS_PER_CELL: u64 = 4;
 
+/// Samples per pixel after which the map is split a second time; the first is after the training.
+pub const SPLIT_AFTER: u32 = 16;
+
+/// The first number of samples, not below `samples`, after which the guide is rebuilt: 1, 2, 3, 4, 6,
+/// 8, 12, 16, 24, …
+pub fn guide_schedule(samples: u32) -> u32 {
+    let power = samples.next_power_of_two();
+    let middle = power / 4 * 3;
+    if middle >= samples { middle } else { power }
+}
+
 /// Everything of one render that learns.
 pub struct GuideBuffers {
     device: Arc<Device>,
     set: DescriptorSet,
     partition: Partition,
+    /// Whether the regions are others than those of the start.
+    is_split: bool,
     options: EstimateOptions,
     learned: Learned,
     capacity: usize,
@@ -96,19 +109,7 @@ impl GuideBuffers {
         let wanted_slots = (2 * capacity).next_power_of_two();
         let learned = Learned::new(region_count, capacity, slots);
 
-        let regions: Vec<[u32; 4]> = partition
-            .regions
-            .iter()
-            .map(|region| {
-                let first = region.first[0] | region.first[1] << 16;
-                [region.first_entry as u32, region.size[0], region.size[1], first]
-            })
-            .collect();
-        let aliases: Vec<[u32; 2]> = partition
-            .entries
-            .iter()
-            .map(|entry| [u32::try_from(entry.threshold).unwrap_or(u32::MAX), entry.alias])
-            .collect();
+        let (regions, aliases) = region_tables(&partition);
         let cells = capacity * region_count * 8;
         let guide = guide_parameters(scene, region_count, slots, wanted_slots);
         let origin = Origin {
@@ -150,6 +151,7 @@ impl GuideBuffers {
             device: Arc::clone(device),
             set,
             partition,
+            is_split: false,
             options: EstimateOptions { hierarchy },
             learned,
             capacity,
@@ -183,6 +185,13 @@ impl GuideBuffers {
     /// # Errors
     /// A failing device.
     pub fn forget(&mut self) -> Result<()> {
+        if self.is_split {
+            let alike = vec![1.0; self.partition.regions.len()];
+            if let Some(partition) = self.partition.split_by(&alike) {
+                self.take_regions(partition)?;
+            }
+            self.is_split = false;
+        }
         self.learned = Learned::new(
             self.partition.regions.len(),
             self.capacity,
@@ -193,15 +202,23 @@ impl GuideBuffers {
         self.upload()
     }
 
-    /// Turns what passes counted into what the next ones read.
+    /// Turns what passes counted into what the next ones read; `splits` the regions anew where it is
+    /// time.
     ///
     /// # Errors
     /// A failing device.
-    pub fn rebuild(&mut self) -> Result<()> {
+    pub fn rebuild(&mut self, splits: bool) -> Result<()> {
         let start = Instant::now();
         let counted = self.learned.cell_count() * self.partition.regions.len();
         self.learned.add(&self.counts.download::<[u32; 2]>(counted)?);
         self.learned.want(&self.wanted.download::<u32>(self.wanted_slots)?);
+        if splits {
+            let snapshot = self.learned.snapshot(&self.partition, &self.options);
+            if let Some(partition) = self.partition.split_by(&self.learned.interest(&snapshot)) {
+                self.learned.carry_over(&self.partition, &partition);
+                self.take_regions(partition)?;
+            }
+        }
         self.clear_counts()?;
         self.upload()?;
         self.rebuild_ms += start.elapsed().as_secs_f64() * 1e3;
@@ -246,8 +263,8 @@ impl GuideBuffers {
         let known = entries[index * count..].iter().zip(&self.partition.regions);
         let regions =
             known.zip(self.learned.counts(index)).map(|((entry, region), count)| RecordedRegion {
-                trials: count.trials,
-                hits: count.hits,
+                trials: count.trials_in_rays(),
+                hits: count.hits_in_rays(),
                 visibility: decode_visibility(*entry),
                 probability: f64::from(decode_entry(*entry).0) * region.share,
             });
@@ -266,6 +283,7 @@ impl GuideBuffers {
             samples: 0,
             rebuilt_at: 0,
             is_open: false,
+            rectangles: self.partition.rectangles(),
             keys: self.learned.keys().iter().map(|key| key.0).collect(),
             counts: self.learned.trials_and_hits(),
             pending: self.counts.download(counted)?,
@@ -296,8 +314,12 @@ impl GuideBuffers {
         if state.keys.len() < FACE_COUNT || !is_sane {
             return Err(Error::usage("the guide holds no cells, or none that could be found"));
         }
+        let partition = self.partition.with_rectangles(&state.rectangles).ok_or_else(|| {
+            Error::usage("the regions of the guide do not fill the map; learn it again")
+        })?;
         let has_moved = here.geometry != there.geometry;
         let forget = if has_moved { FORGETTING } else { 1 };
+        self.take_regions(partition)?;
         self.learned = Learned::resume(
             self.partition.regions.len(),
             self.capacity,
@@ -320,6 +342,16 @@ impl GuideBuffers {
         self.wanted.upload(bytemuck::cast_slice(wanted))?;
         self.upload()?;
         Ok(has_moved)
+    }
+
+    fn take_regions(&mut self, partition: Partition) -> Result<()> {
+        let (regions, aliases) = region_tables(&partition);
+        self.regions.upload(bytemuck::cast_slice(&regions))?;
+        self.aliases.upload(bytemuck::cast_slice(&aliases))?;
+        self.region_of_cell.upload(bytemuck::cast_slice(&partition.region_of_cell))?;
+        self.partition = partition;
+        self.is_split = true;
+        Ok(())
     }
 
     fn clear_counts(&self) -> Result<()> {
@@ -361,6 +393,20 @@ impl GuideBuffers {
         .map(|buffer| (buffer.name().to_owned(), buffer.size()))
         .collect()
     }
+}
+
+/// First alias entry, columns, rows, first column and row of every region, and all alias entries, as
+/// they lie on the device.
+fn region_tables(partition: &Partition) -> (Vec<[u32; 4]>, Vec<[u32; 2]>) {
+    let regions = partition.regions.iter().map(|region| {
+        let first = region.first[0] | region.first[1] << 16;
+        [region.first_entry as u32, region.size[0], region.size[1], first]
+    });
+    let aliases = partition
+        .entries
+        .iter()
+        .map(|entry| [u32::try_from(entry.threshold).unwrap_or(u32::MAX), entry.alias]);
+    (regions.collect(), aliases.collect())
 }
 
 /// Cells about [`CELL_PIXELS`] wide in the picture, at most a twentieth of the scene.

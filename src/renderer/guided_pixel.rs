@@ -30,10 +30,11 @@ pub enum CellLevel {
 /// What a cell knows about one region of the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecordedRegion {
-    /// Rays that were counted in the cell itself when its estimates were made.
-    pub trials: u64,
+    /// Rays that were counted in the cell itself when its estimates were made; shares of rays where the
+    /// regions were split since they were counted.
+    pub trials: f64,
     /// Those of them that reached the environment.
-    pub hits: u64,
+    pub hits: f64,
     /// V̂: estimated share of rays that reach it, by the hierarchy; in the steps of the tables.
     pub visibility: f64,
     /// P: probability that a guided direction lies in it.

@@ -24,6 +24,7 @@ use crate::{
 };
 use film_buffers::FilmBuffers;
 pub use guide_buffers::GuideBuffers;
+use guide_buffers::{SPLIT_AFTER, guide_schedule};
 pub use guided_pixel::{CellLevel, GuidedRay, RecordedCell, RecordedGuide, RecordedRegion};
 pub use lobe_buffers::LobeBuffers;
 pub use pixel::{CachedDirection, RecordedLobe, RecordedPixel, RecordedRay};
@@ -229,21 +230,21 @@ impl Renderer {
                 }
                 // Every rebuild costs time: after 1, 2, 4 and 8 sweeps.
                 if (sweep + 1).is_power_of_two() {
-                    self.rebuild()?;
+                    self.rebuild(sweep + 1 == TRAINING_SWEEPS)?;
                 }
             }
             self.is_trained = true;
         } else if self.rebuilt_at != self.sample_count
             && guide_schedule(self.sample_count) == self.sample_count
         {
-            self.rebuild()?;
+            self.rebuild(self.sample_count == SPLIT_AFTER)?;
         }
         Ok(guide_schedule(self.sample_count + 1) - self.sample_count)
     }
 
-    fn rebuild(&mut self) -> Result<()> {
+    fn rebuild(&mut self, splits: bool) -> Result<()> {
         self.rebuilt_at = self.sample_count;
-        self.guide.as_mut().map_or(Ok(()), GuideBuffers::rebuild)
+        self.guide.as_mut().map_or(Ok(()), |guide| guide.rebuild(splits))
     }
 
     /// One sweep over the film with `samples` samples per pixel.
@@ -447,7 +448,7 @@ impl Renderer {
         if state.samples == self.sample_count {
             self.rebuilt_at = state.rebuilt_at;
         } else {
-            guide.rebuild()?;
+            guide.rebuild(false)?;
             self.rebuilt_at = self.sample_count;
         }
         self.is_trained = true;
@@ -460,14 +461,6 @@ impl Renderer {
 fn with_epoch(wave: Wave, sample: u32) -> Wave {
     let [epoch_seed, ..] = hash_4d([wave.seed, sample, EPOCH_TAG, wave.is_training]);
     Wave { epoch_seed, epoch_start: sample, ..wave }
-}
-
-/// The first number of samples, not below `samples`, after which the guide is rebuilt: 1, 2, 3, 4, 6,
-/// 8, 12, 16, 24, …
-fn guide_schedule(samples: u32) -> u32 {
-    let power = samples.next_power_of_two();
-    let middle = power / 4 * 3;
-    if middle >= samples { middle } else { power }
 }
 
 /// What product sampling with `settings` needs room for.

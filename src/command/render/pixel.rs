@@ -190,8 +190,8 @@ fn guided_numbers_of(recorded: &RecordedGuide) -> serde_json::Value {
             "level": level,
             "key": key.map(|key| key.0),
             "face": FACES.get(face),
-            "trials": cell.regions.iter().map(|region| region.trials).sum::<u64>(),
-            "hits": cell.regions.iter().map(|region| region.hits).sum::<u64>(),
+            "trials": cell.regions.iter().map(|region| region.trials).sum::<f64>(),
+            "hits": cell.regions.iter().map(|region| region.hits).sum::<f64>(),
         })
     };
     let known = recorded.cell.iter().flat_map(|cell| &cell.regions);
@@ -242,7 +242,7 @@ fn draw_guided(scene: &Scene, recorded: &RecordedGuide) -> Vec<Panel> {
         let region_of = |direction| recorded.partition.region_of(&scene.environment, direction);
         panels.push(Panel::new(normal, 1.0, |direction| {
             let region = cell.regions[region_of(direction)];
-            let colour = if region.trials == 0 { UNCOUNTED } else { Vec3::ONE };
+            let colour = if region.trials <= 0.0 { UNCOUNTED } else { Vec3::ONE };
             region.visibility as f32 * colour
         }));
         let density = |direction| {

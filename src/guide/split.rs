@@ -1,0 +1,237 @@
+//! Greedy splits of the map's cells into rectangles.
+//!
+//! Energy of every cell, and how much each cell matters → rectangles with little E^¼ · Ω^¾, E being
+//! their energy and Ω their solid angle, both weighted.
+
+use std::{cmp::Ordering, collections::BinaryHeap, ops::Range};
+
+use glam::DVec3;
+
+use super::partition::PARENT_COUNT;
+use crate::scene::environment::{EnvironmentMap, luminance, mean_sine};
+
+/// Energy and solid angle of every cell, unnormalised.
+#[derive(Debug)]
+pub struct Cells {
+    /// Columns.
+    pub width: usize,
+    /// Rows, one more than the map has.
+    pub rows: usize,
+    /// Energy per cell.
+    pub energy: Vec<f64>,
+    /// Solid angle of one cell by row, as a share of the sphere.
+    pub row_angle: Vec<f64>,
+    /// Rotation of the map about +y, radians.
+    rotation_rad: f64,
+}
+
+impl Cells {
+    /// Of a map: luminance × sine, summed over the four corners of every cell.
+    pub fn new(map: &EnvironmentMap) -> Self {
+        let (width, rows) = (map.width as usize, map.height as usize + 1);
+        let texel = |column: usize, row: usize| {
+            f64::from(luminance(map.texels[row * width + column % width]))
+        };
+        let mut energy = Vec::with_capacity(width * rows);
+        let mut row_angle = Vec::with_capacity(rows);
+        for row in 0..rows {
+            let (upper, lower) = (row.saturating_sub(1), row.min(rows - 2));
+            let height = if row == 0 || row + 1 == rows { 0.5 } else { 1.0 };
+            let sine = height * mean_sine(row as u32, map.height);
+            let edge: Vec<f64> =
+                (0..width).map(|column| texel(column, upper) + texel(column, lower)).collect();
+            energy.extend(
+                (0..width).map(|column| 0.25 * sine * (edge[column] + edge[(column + 1) % width])),
+            );
+            row_angle.push(sine);
+        }
+        let whole: f64 = row_angle.iter().sum::<f64>() * width as f64;
+        for angle in &mut row_angle {
+            *angle /= whole;
+        }
+        Self { width, rows, energy, row_angle, rotation_rad: f64::from(map.rotation_rad) }
+    }
+
+    /// Unit mean of the directions in the world, weighted by energy, or by solid angle where there is
+    /// none.
+    pub fn direction_of(&self, rectangle: Rectangle) -> DVec3 {
+        let pi = std::f64::consts::PI;
+        let energies = rectangle.rows().map(|row| &self.energy[rectangle.cells(row, self.width)]);
+        let dark = energies.flatten().sum::<f64>() <= 0.0;
+        let mut sum = DVec3::ZERO;
+        for row in rectangle.rows() {
+            let theta = pi * row as f64 / (self.rows - 1) as f64;
+            let (sin_theta, cos_theta) = theta.sin_cos();
+            for column in rectangle.first[0]..rectangle.first[0] + rectangle.size[0] {
+                let azimuth = 2.0 * pi * (column as f64 + 1.0) / self.width as f64;
+                let weight =
+                    if dark { self.row_angle[row] } else { self.energy[row * self.width + column] };
+                let direction =
+                    DVec3::new(-sin_theta * azimuth.sin(), cos_theta, sin_theta * azimuth.cos());
+                sum += weight * direction;
+            }
+        }
+        let in_map = sum.normalize_or(DVec3::Y);
+        let (s, c) = self.rotation_rad.sin_cos();
+        DVec3::new(c * in_map.x + s * in_map.z, in_map.y, c * in_map.z - s * in_map.x)
+    }
+}
+
+/// Energy and solid angle of rectangles, each cell weighted by how much it matters.
+pub struct Sums<'a> {
+    cells: &'a Cells,
+    /// Sums over all cells above and to the left: energy, solid angle.
+    sums: Vec<[f64; 2]>,
+}
+
+impl<'a> Sums<'a> {
+    /// `weight` is how much a cell matters, by its index.
+    pub fn new(cells: &'a Cells, weight: impl Fn(usize) -> f64) -> Self {
+        let (width, rows) = (cells.width, cells.rows);
+        let mut sums = vec![[0.0; 2]; (width + 1) * (rows + 1)];
+        for row in 0..rows {
+            let mut running = [0.0; 2];
+            for column in 0..width {
+                let weight = weight(row * width + column);
+                running[0] += weight * cells.energy[row * width + column];
+                running[1] += weight * cells.row_angle[row];
+                let above = sums[row * (width + 1) + column + 1];
+                sums[(row + 1) * (width + 1) + column + 1] =
+                    [above[0] + running[0], above[1] + running[1]];
+            }
+        }
+        Self { cells, sums }
+    }
+
+    /// What the greedy splits make small: E^¼ Ω^¾.
+    fn cost(&self, rectangle: Rectangle) -> f64 {
+        let [c0, r0] = rectangle.first;
+        let [c1, r1] = [c0 + rectangle.size[0], r0 + rectangle.size[1]];
+        let at = |column: usize, row: usize| self.sums[row * (self.cells.width + 1) + column];
+        let of = |index: usize| {
+            (at(c1, r1)[index] - at(c0, r1)[index] - at(c1, r0)[index] + at(c0, r0)[index]).max(0.0)
+        };
+        of(0).powf(0.25) * of(1).powf(0.75)
+    }
+
+    /// Splits across the longer side where the two costs are nearest to each other.
+    fn split(&self, rectangle: Rectangle) -> Option<[Rectangle; 2]> {
+        let [columns, rows] = rectangle.size;
+        let middle = rectangle.first[1] + rows / 2;
+        let pi = std::f64::consts::PI;
+        let sine = (pi * middle as f64 / (self.cells.rows - 1) as f64).sin().max(1e-3);
+        let width = columns as f64 * 2.0 * pi / self.cells.width as f64 * sine;
+        let height = rows as f64 * pi / (self.cells.rows - 1) as f64;
+        let axis = usize::from(columns == 1 || (rows > 1 && height > width));
+        let length = rectangle.size[axis];
+        if length < 2 {
+            return None;
+        }
+        let halves = |at: usize| {
+            let (mut low, mut high) = (rectangle, rectangle);
+            low.size[axis] = at;
+            high.first[axis] += at;
+            high.size[axis] = length - at;
+            [low, high]
+        };
+        // The difference grows with the position: bisect.
+        let (mut first, mut last) = (1, length - 1);
+        while first < last {
+            let at = usize::midpoint(first, last);
+            let [low, high] = halves(at);
+            if self.cost(low) < self.cost(high) {
+                first = at + 1;
+            } else {
+                last = at;
+            }
+        }
+        Some(halves(first))
+    }
+}
+
+/// A rectangle of cells.
+#[derive(Clone, Copy, Debug)]
+pub struct Rectangle {
+    /// First column and row.
+    pub first: [usize; 2],
+    /// Columns and rows.
+    pub size: [usize; 2],
+    /// Index of its parent.
+    pub parent: usize,
+}
+
+impl Rectangle {
+    /// Its rows.
+    pub fn rows(&self) -> Range<usize> {
+        self.first[1]..self.first[1] + self.size[1]
+    }
+
+    /// Indices of its cells in a row of the map.
+    pub fn cells(&self, row: usize, width: usize) -> Range<usize> {
+        row * width + self.first[0]..row * width + self.first[0] + self.size[0]
+    }
+}
+
+/// A rectangle in the queue of those to split; ties go to the one that was made first.
+struct Queued {
+    cost: f64,
+    index: usize,
+}
+
+impl PartialEq for Queued {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Queued {}
+
+impl PartialOrd for Queued {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Queued {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.cost.total_cmp(&other.cost).then(other.index.cmp(&self.index))
+    }
+}
+
+/// Indices from 0 on, each followed by `next` of it.
+fn in_order(next: &[usize]) -> Vec<usize> {
+    std::iter::successors(Some(0), |&index| Some(next[index]).filter(|&next| next != usize::MAX))
+        .collect()
+}
+
+/// Splits the whole map into `region_count` rectangles, or as many as it has cells that can be split,
+/// in the order of the tree, so that neighbours in that order are mostly neighbours in the map.
+pub fn grow(sums: &Sums, region_count: usize) -> Vec<Rectangle> {
+    let whole = Rectangle { first: [0, 0], size: [sums.cells.width, sums.cells.rows], parent: 0 };
+    let mut rectangles = vec![whole];
+    let mut queue = BinaryHeap::from([Queued { cost: sums.cost(whole), index: 0 }]);
+    // What comes after each rectangle in the order of the tree.
+    let mut next = vec![usize::MAX];
+    while rectangles.len() < region_count {
+        // What is black need not be told apart.
+        let Some(Queued { index, cost }) = queue.pop() else { break };
+        if cost <= 0.0 {
+            break;
+        }
+        let Some([low, high]) = sums.split(rectangles[index]) else { continue };
+        rectangles[index] = low;
+        rectangles.push(high);
+        next.push(next[index]);
+        next[index] = rectangles.len() - 1;
+        for index in [index, rectangles.len() - 1] {
+            queue.push(Queued { cost: sums.cost(rectangles[index]), index });
+        }
+        if rectangles.len() <= PARENT_COUNT {
+            // From here on, halves inherit what is the last to be set.
+            for (rank, index) in in_order(&next).into_iter().enumerate() {
+                rectangles[index].parent = rank;
+            }
+        }
+    }
+    in_order(&next).into_iter().map(|index| rectangles[index]).collect()
+}
