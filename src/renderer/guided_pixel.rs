@@ -80,8 +80,8 @@ pub struct RecordedGuide {
 
 impl Renderer {
     /// Traces `rays` shadow rays of the pixel at `x`, `y` of the film, in whole samples that follow those
-    /// in the film and as far as a wave has room; `None` where no camera ray hit anything, without
-    /// shadow rays, or for other samplers. The rays are counted among those to learn from, so the
+    /// in the film and as far as a wave has room; `None` where no camera ray hit anything, or for
+    /// other samplers. The rays are counted among those to learn from, so the
     /// renderer had better not go on.
     ///
     /// # Errors
@@ -95,14 +95,13 @@ impl Renderer {
         rays: u32,
     ) -> Result<Option<RecordedGuide>> {
         let Some(guide) = &self.guide else { return Ok(None) };
-        let most = self.settings.shadow_rays;
-        if most == 0 {
-            return Ok(None);
-        }
         let (column, row) = (x.wrapping_sub(self.window.x), y.wrapping_sub(self.window.y));
         assert!(column < self.window.width && row < self.window.height, "a pixel of the window");
-        let per_group = (most - 1) % self.passes.rays_per_group() + 1;
-        let samples = rays.div_ceil(per_group).clamp(1, self.waves.capacity());
+        let per_group = match self.settings.shadow_rays {
+            0 => 0,
+            most => (most - 1) % self.passes.rays_per_group() + 1,
+        };
+        let samples = rays.div_ceil(per_group.max(1)).clamp(1, self.waves.capacity());
         let first_sample = self.settings.first_sample.wrapping_add(self.sample_count);
         let wave = Wave {
             first_pixel: film_buffers::position_in_film_order(self.window, column, row),
