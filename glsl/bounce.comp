@@ -8,7 +8,7 @@
 #define NEEDS_HITS
 #define NEEDS_PATHS
 #define WRITES_PATHS
-#define NEEDS_MATERIALS
+#define NEEDS_MATERIAL_TEXELS
 #define NEEDS_GEOMETRY
 #include "layout.glsl"
 #include "frame.glsl"
@@ -34,7 +34,7 @@ void main() {
     }
     PathIndex index = wave_path(path);
     PathState state = paths[path];
-    Material material = materials[hit.material];
+    Material material = load_material(hit.material);
     Frame frame = frame_from_normal(hit.shading_normal);
     vec3 outgoing_local = to_local(frame, -rays[path].direction);
     uint first_dimension = vertex_dimension();

@@ -15,31 +15,31 @@
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
-layout(constant_id = CONSTANT_CACHE_CAPACITY) const uint CACHE_CAPACITY = 8u;
-layout(constant_id = CONSTANT_CACHE_OF_PIXEL) const uint CACHE_OF_PIXEL = 0u;
-layout(constant_id = CONSTANT_COUNT_VISIBLE) const uint COUNT_VISIBLE = 0u;
-
 void main() {
     uint path = gl_GlobalInvocationID.x;
     uint path_count = wave_path_count();
     if (path >= path_count || load_hit_origin(path).material == NO_MATERIAL) {
         return;
     }
-    PathIndex index = wave_path(path);
-    if (!index.inside) {
-        return;
+    uint film_index = 0u;
+    if (CACHE_OF_PIXEL != 0u) {
+        PathIndex index = wave_path(path);
+        if (!index.inside) {
+            return;
+        }
+        film_index = index.film_index;
     }
-    uint first = (CACHE_OF_PIXEL != 0u ? index.film_index : path) * (CACHE_CAPACITY + 1u);
+    uint head = cache_head(path, film_index);
     uint recorded = 0u;
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
         ShadowRay ray = load_shadow_ray(i * path_count + path);
         bool is_visible = visibility[i * path_count + path] != 0u;
         // What brings nothing was not traced.
         if (ray.contribution != vec3(0.0) && (!is_visible || COUNT_VISIBLE != 0u)) {
-            uint count = visibility_cache[first] & ~CACHE_GROWN;
-            visibility_cache[first + 1u + count % CACHE_CAPACITY] =
+            uint count = visibility_cache[head] & ~CACHE_GROWN;
+            visibility_cache[head + 1u + count % CACHE_CAPACITY] =
                 pack_outcome(ray.direction, is_visible);
-            visibility_cache[first] = (count + 1u) | CACHE_GROWN;
+            visibility_cache[head] = (count + 1u) | CACHE_GROWN;
             recorded += 1u;
         }
     }

@@ -12,9 +12,6 @@
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
-layout(constant_id = CONSTANT_CACHE_CAPACITY) const uint CACHE_CAPACITY = 8u;
-layout(constant_id = CONSTANT_CACHE_OF_PIXEL) const uint CACHE_OF_PIXEL = 0u;
-
 void main() {
     uint pixel = gl_GlobalInvocationID.x;
     PathIndex index = wave_pixel(wave_film_position(pixel));
@@ -27,8 +24,7 @@ void main() {
         if (load_hit_origin(path).material == NO_MATERIAL) {
             continue;
         }
-        uint cache = CACHE_OF_PIXEL != 0u ? index.film_index : path;
-        uint recorded = visibility_cache[cache * (CACHE_CAPACITY + 1u)] & ~CACHE_GROWN;
+        uint recorded = visibility_cache[cache_head(path, index.film_index)] & ~CACHE_GROWN;
         entries_and_hits += uvec2(min(recorded, CACHE_CAPACITY), 1u);
     }
     film_cache_entries[index.film_index] = entries_and_hits;

@@ -1,29 +1,90 @@
-// Rebuilds the cumulative weights of the lobes at every hit whose visibility cache has grown: lobes,
-// visibility_cache -> cumulative. [Wu & Shih 2009], section 4.2: Num(l) counts the cached directions
-// close to lobe l, V(l) lowers its weight.
+// Adds up the weights of the lobes at every hit whose visibility cache has grown: lobes,
+// visibility_cache, close_lobes -> lobe_sums. [Wu & Shih 2009], section 4.2. Weights themselves are
+// worked out where lobes are chosen, see weights.glsl.
 //
-// Deviation: V = (1 / (1 + Num))^k instead of (1 / Num)^k, which is infinite for lobes nothing is known
-// of. Where visible directions are recorded too, V = ((1 + visible) / (1 + visible + Num))^k.
+// The first ray of a sample finds in the cache of its pixel what earlier samples recorded: it is then
+// worked out which lobes each entry is close to.
 #version 460
 
 #define NEEDS_PARAMETERS
 #define NEEDS_WAVE
 #define NEEDS_LOBE_TEXELS
 #define NEEDS_LOBE_COUNTS
-#define NEEDS_CUMULATIVE
-#define WRITES_CUMULATIVE
+#define NEEDS_LOBE_SUMS
+#define WRITES_LOBE_SUMS
 #define NEEDS_CACHE
 #define WRITES_CACHE
+#define NEEDS_CLOSE_LOBES
+#define WRITES_CLOSE_LOBES
+#define NEEDS_CLOSE_LOBE_TEXELS
 #define NEEDS_COUNTERS
-#include "product.glsl"
+#include "weights.glsl"
 #include "wave.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
-layout(constant_id = CONSTANT_CACHE_CAPACITY) const uint CACHE_CAPACITY = 8u;
-layout(constant_id = CONSTANT_CACHE_OF_PIXEL) const uint CACHE_OF_PIXEL = 0u;
-layout(constant_id = CONSTANT_COUNT_VISIBLE) const uint COUNT_VISIBLE = 0u;
-layout(constant_id = CONSTANT_VISIBILITY_EXPONENT) const float VISIBILITY_EXPONENT = 2.0;
+// No array without elements in the passes of a sampler without a cache.
+const uint PLACES = CACHE_CAPACITY > 0u ? CACHE_CAPACITY : 1u;
+
+void write_sum(Lobes lobes, uint l, float sum) {
+    for (uint once = is_sum_kept(l, lobes.count) ? 1u : 0u; once > 0u; --once) {
+        lobe_sums[l / LOBES_PER_SUM * lobes.path_count + lobes.path] = sum;
+    }
+}
+
+// Adds up the weights in force, in the order in which lobes are chosen.
+void sum_weights(Lobes lobes) {
+    float sum = 0.0;
+    for (uint word = 0u; 32u * word < lobes.count; ++word) {
+        load_counts(lobes, word);
+        uint end = min(lobes.count - 32u * word, 32u);
+        for (uint bit = 0u; bit < end; ++bit) {
+            sum += weight_of_words(lobe_words(lobes, 32u * word + bit)) * counted_weight(bit);
+            write_sum(lobes, 32u * word + bit, sum);
+        }
+    }
+}
+
+// Adds up the weights with all entries tested against all lobes; notes which are close.
+void sum_with_all_entries(Lobes lobes) {
+    uint entries = min(lobes.recorded, CACHE_CAPACITY);
+    vec3 directions[PLACES];
+    float visible[PLACES];
+    uint masks[PLACES];
+    for (uint i = 0u; i < CACHE_CAPACITY; ++i) {
+        uint entry = lobes.recorded - 1u - min(i, lobes.recorded - 1u);
+        uint outcome = visibility_cache[lobes.head + 1u + entry % CACHE_CAPACITY];
+        directions[i] = unpack_normal(outcome);
+        visible[i] = float(outcome & 1u);
+    }
+    float sum = 0.0;
+    for (uint word = 0u; 32u * word < lobes.count; ++word) {
+        for (uint i = 0u; i < CACHE_CAPACITY; ++i) {
+            masks[i] = 0u;
+        }
+        uint end = min(lobes.count - 32u * word, 32u);
+        for (uint bit = 0u; bit < end; ++bit) {
+            ProductLobe lobe = unpack_lobe(lobe_words(lobes, 32u * word + bit));
+            float tail = exp(-2.0 * lobe.bandwidth);
+            float close_count = 0.0;
+            float visible_count = 0.0;
+            for (uint i = 0u; i < CACHE_CAPACITY; ++i) {
+                bool close = i < entries
+                    && is_close(
+                        lobe.bandwidth, tail, distance_from_axis(lobe.axis, directions[i]));
+                masks[i] |= close ? 1u << bit : 0u;
+                close_count += close ? 1.0 : 0.0;
+                visible_count += COUNT_VISIBLE != 0u && close ? visible[i] : 0.0;
+            }
+            sum += lobe.weight * visibility_weight(close_count, visible_count);
+            write_sum(lobes, 32u * word + bit, sum);
+        }
+        for (uint i = 0u; i < entries; ++i) {
+            close_lobes[close_lobes_index(
+                lobes.path, lobes.path_count, lobes.recorded - 1u - i, word)] = masks[i];
+        }
+    }
+}
 
 void main() {
     uint path = gl_GlobalInvocationID.x;
@@ -31,43 +92,28 @@ void main() {
     if (path >= path_count) {
         return;
     }
-    uint lobe_count = lobe_counts[path];
-    PathIndex index = wave_path(path);
-    if (lobe_count == 0u || !index.inside) {
-        return;
-    }
-    uint first = (CACHE_OF_PIXEL != 0u ? index.film_index : path) * (CACHE_CAPACITY + 1u);
-    uint head = visibility_cache[first];
-    uint entries = min(head & ~CACHE_GROWN, CACHE_CAPACITY);
-    // The lobes of a sample's first ray are new to the cache of its pixel.
-    bool is_new = CACHE_OF_PIXEL != 0u && wave.first_shadow_ray == 0u;
-    if (entries == 0u || ((head & CACHE_GROWN) == 0u && !is_new)) {
-        return;
-    }
-    // Places that hold nothing yet are close to no lobe. Loops of a constant length, so that all of this
-    // stays in registers.
-    vec3 directions[CACHE_CAPACITY];
-    float visible[CACHE_CAPACITY];
-    for (uint i = 0u; i < CACHE_CAPACITY; ++i) {
-        uint outcome = visibility_cache[first + 1u + i];
-        directions[i] = i < entries ? unpack_normal(outcome) : vec3(1e3);
-        visible[i] = float(outcome & 1u);
-    }
-    float sum = 0.0;
-    for (uint l = 0u; l < lobe_count; ++l) {
-        ProductLobe lobe = unpack_lobe(texelFetch(lobe_texels, int(l * path_count + path)));
-        float close_count = 0.0;
-        float visible_count = 0.0;
-        for (uint i = 0u; i < CACHE_CAPACITY; ++i) {
-            float close = is_close(lobe, directions[i]) ? 1.0 : 0.0;
-            close_count += close;
-            visible_count += COUNT_VISIBLE != 0u ? close * visible[i] : 0.0;
+    uint film_index = 0u;
+    if (CACHE_OF_PIXEL != 0u) {
+        PathIndex index = wave_path(path);
+        if (!index.inside) {
+            return;
         }
-        float ratio = (1.0 + visible_count) / (1.0 + close_count);
-        sum += lobe.weight
-            * (VISIBILITY_EXPONENT == 2.0 ? ratio * ratio : pow(ratio, VISIBILITY_EXPONENT));
-        cumulative[l * path_count + path] = sum;
+        film_index = index.film_index;
     }
-    visibility_cache[first] = head & ~CACHE_GROWN;
+    Lobes lobes = load_lobes(path, path_count, film_index);
+    if (lobes.count == 0u || lobes.recorded == 0u) {
+        return;
+    }
+    bool is_new = CACHE_OF_PIXEL != 0u && wave.first_shadow_ray == 0u;
+    bool has_grown = (visibility_cache[lobes.head] & CACHE_GROWN) != 0u;
+    if (!has_grown && !is_new) {
+        return;
+    }
+    if (is_new) {
+        sum_with_all_entries(lobes);
+    } else {
+        sum_weights(lobes);
+    }
+    visibility_cache[lobes.head] = lobes.recorded;
     atomicAdd(counters.cdf_rebuilds, 1u);
 }

@@ -1,5 +1,5 @@
-// The product of environment and BRDF at every hit: hits, SRBF tables -> the strongest lobes and their
-// cumulative weights. [Tsai et al. 2008]; [Wu & Shih 2009], Eq. 8.
+// The product of environment and BRDF at every hit: hits, SRBF tables -> the strongest lobes and sums
+// of their weights. [Tsai et al. 2008]; [Wu & Shih 2009], Eq. 8.
 //
 // What matters of a pair is whether it is stronger than the n-th strongest. That strength is guessed
 // from every eighth pair, and corrected by rounds over all of them, each of which notes the stronger
@@ -19,8 +19,8 @@
 #define WRITES_LOBES
 #define NEEDS_LOBE_COUNTS
 #define WRITES_LOBE_COUNTS
-#define NEEDS_CUMULATIVE
-#define WRITES_CUMULATIVE
+#define NEEDS_LOBE_SUMS
+#define WRITES_LOBE_SUMS
 #define NEEDS_CACHE
 #define WRITES_CACHE
 #define NEEDS_COUNTERS
@@ -31,12 +31,7 @@ layout(local_size_x = WORKGROUP_SIZE) in;
 layout(constant_id = CONSTANT_ENVIRONMENT_LOBES) const uint ENVIRONMENT_LOBES = 100u;
 layout(constant_id = CONSTANT_BRDF_LOBES) const uint BRDF_LOBES = 20u;
 layout(constant_id = CONSTANT_VIEWS) const uint VIEWS = 32u;
-layout(constant_id = CONSTANT_KEPT_LOBES) const uint KEPT_LOBES = 64u;
 layout(constant_id = CONSTANT_ORDER_BY_COEFFICIENT) const uint ORDER_BY_COEFFICIENT = 0u;
-layout(constant_id = CONSTANT_THRESHOLD_SCALE) const float THRESHOLD_SCALE = 1.0;
-layout(constant_id = CONSTANT_FIXED_THRESHOLD) const uint FIXED_THRESHOLD = 0u;
-layout(constant_id = CONSTANT_CACHE_CAPACITY) const uint CACHE_CAPACITY = 0u;
-layout(constant_id = CONSTANT_CACHE_OF_PIXEL) const uint CACHE_OF_PIXEL = 0u;
 
 layout(constant_id = CONSTANT_STRONGEST_ENVIRONMENT_LOBE)
     const float STRONGEST_ENVIRONMENT_LOBE = 0.0;
@@ -55,8 +50,6 @@ const uint GROUP = BRDF_LOBES < 20u ? BRDF_LOBES : 20u;
 const uint GROUPS = (BRDF_LOBES + GROUP - 1u) / GROUP;
 // An environment lobe whose value is everywhere above the horizon below exp(-7) of its top is skipped.
 const float BELOW_HORIZON = 7.0;
-// Deviation of a lobe of bandwidth 20, for the fixed threshold.
-const float FIXED_DEVIATION = 0.0707;
 // Strength of what is nothing.
 const float NO_STRENGTH = -1e30;
 
@@ -225,7 +218,7 @@ void main() {
         return;
     }
     if (CACHE_CAPACITY > 0u && CACHE_OF_PIXEL == 0u) {
-        visibility_cache[path * (CACHE_CAPACITY + 1u)] = 0u;
+        visibility_cache[cache_head(path, 0u)] = 0u;
     }
     lobe_counts[path] = 0u;
     Hit hit = load_hit(path);
@@ -308,25 +301,22 @@ void main() {
             + brdf_exponents(view, selected[l] >> 16u);
         float bandwidth = length(product.xyz);
         vec3 axis = bandwidth > 1e-20 ? product.xyz / bandwidth : view.normal;
-        float integral = kernel_integral(bandwidth);
+        float drawn_bandwidth = clamp(bandwidth, SMALLEST_BANDWIDTH, LARGEST_BANDWIDTH);
         float weight = exp(product.w + bandwidth - guessed.strongest);
         if (ORDER_BY_COEFFICIENT == 0u) {
-            weight *= integral * (0.5 / SRBF_PI);
+            weight *= (1.0 - exp(-2.0 * drawn_bandwidth)) / drawn_bandwidth;
         }
         kept += weight;
         if (ORDER_BY_COEFFICIENT == 0u) {
-            weight *= part_above_horizon(bandwidth, dot(axis, view.normal));
+            weight *= part_above_horizon(drawn_bandwidth, dot(axis, view.normal));
         }
-        float closeness = 0.0;
-        if (CACHE_CAPACITY > 0u) {
-            closeness = THRESHOLD_SCALE
-                * (FIXED_THRESHOLD != 0u ? FIXED_DEVIATION : kernel_deviation(bandwidth));
-        }
-        uvec4 words = pack_lobe(
-            ProductLobe(axis, bandwidth, min(weight, 6e4), closeness, 1.0 / integral));
-        sum += unpackHalf2x16(words.z).x;
+        uvec2 words = pack_lobe(ProductLobe(axis, drawn_bandwidth, min(weight, 6e4)));
+        sum += unpackHalf2x16(words.y).y;
         lobes[l * path_count + path] = words;
-        cumulative[l * path_count + path] = sum;
+        // A loop of no rounds instead of a branch, as above.
+        for (uint once = is_sum_kept(l, count) ? 1u : 0u; once > 0u; --once) {
+            lobe_sums[l / LOBES_PER_SUM * path_count + path] = sum;
+        }
     }
     kept *= exp(guessed.strongest - bound);
     lobe_counts[path] = count;

@@ -8,7 +8,7 @@
 #define NEEDS_HIT_TEXELS
 #define NEEDS_SHADOW_RAYS
 #define WRITES_SHADOW_RAYS
-#define NEEDS_MATERIALS
+#define NEEDS_MATERIAL_TEXELS
 #define NEEDS_ENVIRONMENT
 #include "vertex.glsl"
 

@@ -1,6 +1,6 @@
 // Chooses directions at every hit of the wave from the lobes of the product, with shares of the BRDF's
 // and the environment's own sampling, and writes one shadow ray for each: Algorithm 5.1 of
-// [Wu & Shih 2009]. The density is that of the whole mixture with the cumulative weights in force.
+// [Wu & Shih 2009]. The density is that of the whole mixture with the weights in force.
 #version 460
 
 #define NEEDS_PARAMETERS
@@ -9,17 +9,20 @@
 #define NEEDS_HIT_TEXELS
 #define NEEDS_SHADOW_RAYS
 #define WRITES_SHADOW_RAYS
-#define NEEDS_MATERIALS
+#define NEEDS_MATERIAL_TEXELS
 #define NEEDS_ENVIRONMENT
 #define NEEDS_LOBE_TEXELS
 #define NEEDS_LOBE_COUNTS
-#define NEEDS_CUMULATIVE_TEXELS
+#define NEEDS_LOBE_SUM_TEXELS
+#define NEEDS_CACHE
+#define NEEDS_CLOSE_LOBES
+#define WRITES_CLOSE_LOBES
+#define NEEDS_CLOSE_LOBE_TEXELS
 #include "mixture.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
 layout(constant_id = CONSTANT_SAMPLER) const uint SAMPLER = SAMPLER_PRODUCT;
-layout(constant_id = CONSTANT_CACHE_OF_PIXEL) const uint CACHE_OF_PIXEL = 0u;
 
 // Numbers of one ray; pixels of a block share the technique. Where rays learn from the rays before
 // them, each has dimensions of its own; where samples learn from samples, numbers without any relation.
@@ -65,11 +68,13 @@ void main() {
         return;
     }
     Vertex vertex = load_vertex(path, hit);
-    Mixture mixture = load_mixture(path, path_count, lobe_counts[path]);
+    Mixture mixture = load_mixture(path, path_count, vertex.index.film_index);
+    // What the last ray of a hit is close to is of no use: the next sample has other lobes.
+    bool is_noted = wave.first_shadow_ray + wave.shadow_ray_count < wave.total_shadow_rays;
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
         uint ray = wave.first_shadow_ray + i;
         vec3 direction = mixture_sample(vertex, mixture, ray, draw_numbers(vertex, ray));
-        float lobe_density = mixture_lobe_density(mixture, direction);
+        float lobe_density = mixture_lobe_density(mixture, direction, is_noted);
         Considered considered = consider_world(vertex, direction);
         write_considered(
             i * path_count + path, considered, mixture_pdf(mixture, considered, lobe_density));

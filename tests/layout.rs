@@ -74,7 +74,7 @@ fn host_structs() -> Vec<HostStruct> {
             camera_rays, bounce_rays, shadow_rays_traced, shadow_rays_visible, dropped_samples,
             traversal_overruns, product_hits, lobes_kept, energy_kept, cache_entries, cdf_rebuilds,
         }
-        Material { kind, table_offset, alpha, ior, reflectance, eta, k }
+        Material { kind, table_offset, alpha, ior, reflectance, eta, k, reserved }
         Wave {
             first_pixel, pixel_count, first_sample, sample_count, seed, vertex, shadow_ray_count,
             first_shadow_ray, total_shadow_rays, aovs, pixel_stride, is_training,

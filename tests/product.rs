@@ -3,7 +3,7 @@
 //! wrong density is found out.
 //!
 //! Paths are put in front of surfaces of every kind by a probe; the product, the visibility cache and
-//! the cumulative weights are then made by the passes of a render, and a probe draws from them with the
+//! the weights in force are then made by the passes of a render, and a probe draws from them with the
 //! functions that the sampling pass uses. Seeds are fixed; limits are such that another seed would
 //! raise a false alarm once in some hundred runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
@@ -18,13 +18,18 @@ use bytemuck::{Pod, Zeroable};
 use fenestra::{
     gpu::{
         Buffer, Commands, DescriptorSet, Pipeline,
-        constants::{BINDING_COUNTERS, CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_SHARE, SET_FILM},
+        constants::{
+            BINDING_COUNTERS, CONSTANT_BRDF_SHARE, CONSTANT_CACHE_CAPACITY, CONSTANT_COUNT_VISIBLE,
+            CONSTANT_ENVIRONMENT_SHARE, CONSTANT_FIXED_THRESHOLD, CONSTANT_KEPT_LOBES,
+            CONSTANT_THRESHOLD_SCALE, CONSTANT_VISIBILITY_EXPONENT, SET_FILM,
+        },
         layout::{Counters, Wave},
     },
     pass::Lobes,
     renderer::{LobeBuffers, LobeRoom, SceneBuffers, Settings, WaveBuffers, window_of},
     sampler::{LobeOrder, LobeParameters, Sampler, Threshold},
     scene::{Material, Scene, material::MaterialKind},
+    srbf::kernel_deviation,
 };
 use glam::{DVec3, Vec3, dvec3, vec3};
 use support::{scenes, statistics};
@@ -93,10 +98,9 @@ struct LobeAnswer {
     axis: [f32; 3],
     bandwidth: f32,
     weight: f32,
-    closeness: f32,
-    inverse_integral: f32,
-    cumulative: f32,
+    weight_in_force: f32,
     lobe_count: u32,
+    total: f32,
 }
 
 /// A surface before the camera.
@@ -208,6 +212,8 @@ impl Paths {
             pixel_count: surfaces.len() as u32,
             sample_count: 1,
             shadow_ray_count: 1,
+            // As many as the caches are taught here.
+            first_shadow_ray: SHADOW_RAYS / 2,
             total_shadow_rays: SHADOW_RAYS,
             ..Wave::default()
         };
@@ -261,6 +267,10 @@ impl Paths {
     /// Teaches the caches what became of one shadow ray per path.
     fn learn(&self, outcomes: &[(DVec3, bool)]) {
         self.put(outcomes);
+        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_note.spv"));
+        let densities: Vec<f32> =
+            self.probe(spirv, false, &self.constants(), &vec![0_u32; self.surfaces.len()]);
+        assert!(densities.iter().all(|density| *density > 0.0), "{densities:?}");
         self.record(|lobes, commands, sets, wave| lobes.record_learn(commands, sets, wave));
     }
 
@@ -290,13 +300,24 @@ impl Paths {
         answers
     }
 
+    /// What the passes are specialized by, for the probes.
+    fn constants(&self) -> [(u32, u32); 8] {
+        let parameters = &self.parameters;
+        [
+            (CONSTANT_BRDF_SHARE, parameters.brdf_share.to_bits()),
+            (CONSTANT_ENVIRONMENT_SHARE, parameters.environment_share.to_bits()),
+            (CONSTANT_KEPT_LOBES, parameters.kept_lobes),
+            (CONSTANT_THRESHOLD_SCALE, parameters.threshold_scale.to_bits()),
+            (CONSTANT_FIXED_THRESHOLD, u32::from(parameters.threshold == Threshold::Fixed)),
+            (CONSTANT_CACHE_CAPACITY, parameters.cache_places(SHADOW_RAYS)),
+            (CONSTANT_COUNT_VISIBLE, u32::from(parameters.count_visible)),
+            (CONSTANT_VISIBILITY_EXPONENT, parameters.exponent.to_bits()),
+        ]
+    }
+
     fn mixture(&self, queries: &[MixtureQuery]) -> Vec<MixtureAnswer> {
-        let constants = [
-            (CONSTANT_BRDF_SHARE, self.parameters.brdf_share.to_bits()),
-            (CONSTANT_ENVIRONMENT_SHARE, self.parameters.environment_share.to_bits()),
-        ];
         let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_mixture.spv"));
-        self.probe(spirv, true, &constants, queries)
+        self.probe(spirv, true, &self.constants(), queries)
     }
 
     /// `count` directions of every path, path by path, from numbers of the given stream.
@@ -347,7 +368,7 @@ impl Paths {
             .flat_map(|path| (0..kept).map(move |lobe| [path, lobe]))
             .collect();
         let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_lobe.spv"));
-        let answers: Vec<LobeAnswer> = self.probe(spirv, false, &[], &queries);
+        let answers: Vec<LobeAnswer> = self.probe(spirv, false, &self.constants(), &queries);
         answers
             .chunks(kept as usize)
             .map(|lobes| lobes[..lobes[0].lobe_count as usize].to_vec())
@@ -448,12 +469,21 @@ fn z_of(samples: &[MixtureAnswer], truth: f64, pdf: impl Fn(&MixtureAnswer) -> f
     statistics::z_of_mean(&values, truth)
 }
 
+/// 1 − cos below which a direction is close to a lobe.
+fn closeness(lobe: &LobeAnswer, parameters: &LobeParameters) -> f64 {
+    let deviation = match parameters.threshold {
+        Threshold::Sigma => f64::from(kernel_deviation(lobe.bandwidth)),
+        Threshold::Fixed => 0.0707,
+    };
+    f64::from(parameters.threshold_scale) * deviation
+}
+
 /// Weight of a lobe after `cached` outcomes: the thesis's visibility weight, in its own words.
 fn guided_weight(lobe: &LobeAnswer, cached: &[(DVec3, bool)], parameters: &LobeParameters) -> f64 {
     let axis = Vec3::from(lobe.axis).as_dvec3();
     let close: Vec<bool> = cached
         .iter()
-        .filter(|(direction, _)| 1.0 - axis.dot(*direction) < f64::from(lobe.closeness))
+        .filter(|(direction, _)| 1.0 - axis.dot(*direction) < closeness(lobe, parameters))
         .map(|(_, is_visible)| *is_visible)
         .collect();
     let visible = close.iter().filter(|is_visible| **is_visible).count() as f64;
@@ -462,11 +492,11 @@ fn guided_weight(lobe: &LobeAnswer, cached: &[(DVec3, bool)], parameters: &LobeP
 }
 
 /// Whether a cached direction is so near the bound that rounding decides.
-fn is_doubtful(lobe: &LobeAnswer, cached: &[(DVec3, bool)]) -> bool {
+fn is_doubtful(lobe: &LobeAnswer, cached: &[(DVec3, bool)], parameters: &LobeParameters) -> bool {
     let axis = Vec3::from(lobe.axis).as_dvec3();
     cached.iter().any(|(direction, _)| {
         let distance = 1.0 - axis.dot(*direction);
-        (distance / f64::from(lobe.closeness) - 1.0).abs() < 0.01
+        (distance / closeness(lobe, parameters) - 1.0).abs() < 0.01
     })
 }
 
@@ -481,12 +511,12 @@ fn weights_are_those_of_the_thesis(paths: &Paths, history: &[Vec<(DVec3, bool)>]
             .filter(|(_, is_visible)| paths.parameters.count_visible || !is_visible)
             .collect();
         let cached = &cached[cached.len().saturating_sub(capacity)..];
-        let total = f64::from(lobes[lobes.len() - 1].cumulative);
-        let mut before = 0.0;
+        let total = f64::from(lobes[0].total);
+        let sum: f64 = lobes.iter().map(|lobe| f64::from(lobe.weight_in_force)).sum();
+        assert!((sum / total - 1.0).abs() < 1e-5, "path {path}: weights {sum}, total {total}");
         for (index, lobe) in lobes.iter().enumerate() {
-            let weight = f64::from(lobe.cumulative) - before;
-            before = f64::from(lobe.cumulative);
-            if is_doubtful(lobe, cached) {
+            let weight = f64::from(lobe.weight_in_force);
+            if is_doubtful(lobe, cached, &paths.parameters) {
                 continue;
             }
             compared += 1;

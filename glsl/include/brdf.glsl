@@ -5,7 +5,7 @@
 // surface. Values are per steradian and hold no cosine; pdfs are per steradian of incident
 // directions. Both are 0 unless both directions are above the surface.
 //
-// The includer defines NEEDS_MATERIALS and includes layout.glsl first.
+// The includer defines NEEDS_MATERIALS or NEEDS_MATERIAL_TEXELS and includes layout.glsl first.
 
 #ifndef BRDF_GLSL
 #define BRDF_GLSL

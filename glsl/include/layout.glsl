@@ -83,6 +83,7 @@ struct Material {
     vec3 reflectance;
     vec3 eta;
     vec3 k;
+    vec3 reserved;
 };
 
 struct Wave {
@@ -136,6 +137,24 @@ layout(scalar, set = SET_SCENE, binding = BINDING_TRIANGLE_MATERIALS)
 layout(scalar, set = SET_SCENE, binding = BINDING_MATERIALS) readonly buffer MaterialsBuffer {
     Material materials[];
 };
+#endif
+
+// The materials again, as texels of four words.
+#ifdef NEEDS_MATERIAL_TEXELS
+layout(set = SET_SCENE, binding = BINDING_MATERIAL_TEXELS) uniform usamplerBuffer material_texels;
+Material load_material(uint index) {
+    uvec4 first = texelFetch(material_texels, int(4u * index));
+    uvec4 second = texelFetch(material_texels, int(4u * index + 1u));
+    uvec4 third = texelFetch(material_texels, int(4u * index + 2u));
+    uint last = texelFetch(material_texels, int(4u * index + 3u)).x;
+    return Material(
+        first.x, first.y, uintBitsToFloat(first.z), uintBitsToFloat(first.w),
+        uintBitsToFloat(second.xyz), uintBitsToFloat(uvec3(second.w, third.xy)),
+        uintBitsToFloat(uvec3(third.zw, last)), vec3(0.0));
+}
+#endif
+
+#if defined(NEEDS_MATERIALS) || defined(NEEDS_MATERIAL_TEXELS)
 // One buffer seen as floats, and as cells of four halves.
 layout(set = SET_SCENE, binding = BINDING_BRDF_TABLE) uniform samplerBuffer brdf_table;
 layout(set = SET_SCENE, binding = BINDING_BRDF_CELLS) uniform samplerBuffer brdf_cells;
@@ -287,7 +306,7 @@ layout(set = SET_SRBF, binding = BINDING_MATERIAL_LOBES) uniform usamplerBuffer 
 #define ACCESS_LOBES readonly
 #endif
 layout(scalar, set = SET_WAVE, binding = BINDING_LOBES) ACCESS_LOBES buffer LobesBuffer {
-    uvec4 lobes[];
+    uvec2 lobes[];
 };
 #endif
 
@@ -303,23 +322,39 @@ layout(scalar, set = SET_WAVE, binding = BINDING_LOBE_COUNTS)
 };
 #endif
 
-#ifdef NEEDS_CUMULATIVE
-#ifdef WRITES_CUMULATIVE
-#define ACCESS_CUMULATIVE writeonly
+#ifdef NEEDS_LOBE_SUMS
+#ifdef WRITES_LOBE_SUMS
+#define ACCESS_LOBE_SUMS writeonly
 #else
-#define ACCESS_CUMULATIVE readonly
+#define ACCESS_LOBE_SUMS readonly
 #endif
-layout(scalar, set = SET_WAVE, binding = BINDING_CUMULATIVE)
-    ACCESS_CUMULATIVE buffer CumulativeBuffer {
-    float cumulative[];
+layout(scalar, set = SET_WAVE, binding = BINDING_LOBE_SUMS)
+    ACCESS_LOBE_SUMS buffer LobeSumsBuffer {
+    float lobe_sums[];
 };
 #endif
 
 #ifdef NEEDS_LOBE_TEXELS
 layout(set = SET_WAVE, binding = BINDING_LOBE_TEXELS) uniform usamplerBuffer lobe_texels;
 #endif
-#ifdef NEEDS_CUMULATIVE_TEXELS
-layout(set = SET_WAVE, binding = BINDING_CUMULATIVE_TEXELS) uniform samplerBuffer cumulative_texels;
+#ifdef NEEDS_LOBE_SUM_TEXELS
+layout(set = SET_WAVE, binding = BINDING_LOBE_SUM_TEXELS) uniform samplerBuffer lobe_sum_texels;
+#endif
+
+#ifdef NEEDS_CLOSE_LOBES
+#ifdef WRITES_CLOSE_LOBES
+#define ACCESS_CLOSE_LOBES writeonly
+#else
+#define ACCESS_CLOSE_LOBES readonly
+#endif
+layout(scalar, set = SET_WAVE, binding = BINDING_CLOSE_LOBES)
+    ACCESS_CLOSE_LOBES buffer CloseLobesBuffer {
+    uint close_lobes[];
+};
+#endif
+
+#ifdef NEEDS_CLOSE_LOBE_TEXELS
+layout(set = SET_WAVE, binding = BINDING_CLOSE_LOBE_TEXELS) uniform usamplerBuffer close_lobe_texels;
 #endif
 
 #ifdef NEEDS_CACHE

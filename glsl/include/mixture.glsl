@@ -1,7 +1,7 @@
 // The mixture that `product` and `visibility` draw directions from at one vertex: the lobes of the
-// product by their cumulative weights, the environment's own sampling and the BRDF's. Algorithm 5.1 of
-// [Wu & Shih 2009]. All densities per steradian. Needs what vertex.glsl needs, NEEDS_LOBE_TEXELS and
-// NEEDS_CUMULATIVE_TEXELS.
+// product by their weights in force, the environment's own sampling and the BRDF's. Algorithm 5.1 of
+// [Wu & Shih 2009]. All densities per steradian. Needs what vertex.glsl and weights.glsl need and
+// NEEDS_LOBE_SUM_TEXELS; NEEDS_CLOSE_LOBES and WRITES_CLOSE_LOBES for mixture_lobe_density.
 //
 // Deviation: elevations by inversion of the closed form; the Metropolis walk of the thesis is an
 // option, and biased.
@@ -10,7 +10,7 @@
 #define MIXTURE_GLSL
 
 #include "vertex.glsl"
-#include "product.glsl"
+#include "weights.glsl"
 
 layout(constant_id = CONSTANT_BRDF_SHARE) const float BRDF_SHARE = 0.25;
 layout(constant_id = CONSTANT_ENVIRONMENT_SHARE) const float ENVIRONMENT_SHARE = 0.25;
@@ -20,10 +20,7 @@ const uint WALK_STEPS = 16u;
 
 // The weights in force at one vertex.
 struct Mixture {
-    uint path;
-    // Lobe `l` of a path is at `l * path_count + path`.
-    uint path_count;
-    uint lobe_count;
+    Lobes lobes;
     // Sum of the weights of the lobes.
     float total;
     // Probabilities of the three techniques.
@@ -39,18 +36,12 @@ struct MixtureNumbers {
     float lobe;
 };
 
-float cumulative_weight(Mixture mixture, uint l) {
-    return texelFetch(cumulative_texels, int(l * mixture.path_count + mixture.path)).x;
-}
-
-ProductLobe mixture_lobe(Mixture mixture, uint l) {
-    return unpack_lobe(texelFetch(lobe_texels, int(l * mixture.path_count + mixture.path)));
-}
-
-// The mixture at a path with `lobe_count` lobes.
-Mixture load_mixture(uint path, uint path_count, uint lobe_count) {
-    Mixture mixture = Mixture(path, path_count, lobe_count, 0.0, 0.0, 0.0, 0.0);
-    mixture.total = lobe_count > 0u ? cumulative_weight(mixture, lobe_count - 1u) : 0.0;
+// The mixture at a path; `film_index` matters where caches belong to pixels.
+Mixture load_mixture(uint path, uint path_count, uint film_index) {
+    Mixture mixture = Mixture(load_lobes(path, path_count, film_index), 0.0, 0.0, 0.0, 0.0);
+    mixture.total = mixture.lobes.count > 0u
+        ? sum_of_stretch(mixture.lobes, (mixture.lobes.count - 1u) / LOBES_PER_SUM)
+        : 0.0;
     // Without lobes or in the dark the BRDF's own sampling is left.
     float lobe_share = mixture.total > 0.0 ? 1.0 - BRDF_SHARE - ENVIRONMENT_SHARE : 0.0;
     float environment_share = parameters.environment_total > 0.0 ? ENVIRONMENT_SHARE : 0.0;
@@ -60,21 +51,6 @@ Mixture load_mixture(uint path, uint path_count, uint lobe_count) {
     mixture.environment_share = environment_share / shares;
     mixture.brdf_share = brdf_share / shares;
     return mixture;
-}
-
-// First lobe whose cumulative weight exceeds the target.
-uint find_lobe(Mixture mixture, float target) {
-    uint first = 0u;
-    uint last = mixture.lobe_count - 1u;
-    while (first < last) {
-        uint middle = (first + last) >> 1u;
-        if (cumulative_weight(mixture, middle) > target) {
-            last = middle;
-        } else {
-            first = middle + 1u;
-        }
-    }
-    return first;
 }
 
 // 1 - cos of the elevation by a random walk, as in the thesis; biased, since the walk is short.
@@ -112,8 +88,9 @@ vec3 mixture_sample(Vertex vertex, Mixture mixture, uint ray, MixtureNumbers num
     vec3 direction = vertex.frame.normal;
     // Loops of one round instead of branches: devices that run both sides of a branch skip them.
     for (uint once = from_lobe ? 1u : 0u; once > 0u; --once) {
-        uint l = find_lobe(mixture, numbers.lobe * mixture.total);
-        direction = draw_from_lobe(vertex, ray, mixture_lobe(mixture, l), numbers.direction);
+        uint l = find_lobe(mixture.lobes, numbers.lobe * mixture.total);
+        ProductLobe lobe = unpack_lobe(lobe_words(mixture.lobes, l));
+        direction = draw_from_lobe(vertex, ray, lobe, numbers.direction);
     }
     for (uint once = from_environment ? 1u : 0u; once > 0u; --once) {
         direction = environment_sample(numbers.direction).direction;
@@ -127,18 +104,31 @@ vec3 mixture_sample(Vertex vertex, Mixture mixture, uint ray, MixtureNumbers num
     return direction;
 }
 
-// Density of the lobes alone, with the cumulative weights in force; 0 without lobes.
-float mixture_lobe_density(Mixture mixture, vec3 direction) {
+// Density of the lobes alone, with the weights in force; 0 without lobes. Where `is_noted`, notes which
+// lobes the direction is close to, for the case that it is recorded.
+float mixture_lobe_density(Mixture mixture, vec3 direction, bool is_noted) {
+    Lobes lobes = mixture.lobes;
     float density = 0.0;
-    float before = 0.0;
-    for (uint l = 0u; l < mixture.lobe_count; ++l) {
-        ProductLobe lobe = mixture_lobe(mixture, l);
-        float up_to = cumulative_weight(mixture, l);
-        density += (up_to - before) * lobe.inverse_integral
-            * kernel_value(lobe.axis, lobe.bandwidth, direction);
-        before = up_to;
+    for (uint word = 0u; 32u * word < lobes.count; ++word) {
+        load_counts(lobes, word);
+        uint mask = 0u;
+        uint end = min(lobes.count - 32u * word, 32u);
+        for (uint bit = 0u; bit < end; ++bit) {
+            ProductLobe lobe = unpack_lobe(lobe_words(lobes, 32u * word + bit));
+            float distance = distance_from_axis(lobe.axis, direction);
+            float tail = exp(-2.0 * lobe.bandwidth);
+            density += lobe.weight * counted_weight(bit) * lobe.bandwidth / (1.0 - tail)
+                * exp(-lobe.bandwidth * distance);
+            if (CACHE_CAPACITY > 0u) {
+                mask |= is_close(lobe.bandwidth, tail, distance) ? 1u << bit : 0u;
+            }
+        }
+        if (CACHE_CAPACITY > 0u && is_noted) {
+            close_lobes[close_lobes_index(lobes.path, lobes.path_count, lobes.recorded, word)] =
+                mask;
+        }
     }
-    return mixture.total > 0.0 ? density / mixture.total : 0.0;
+    return mixture.total > 0.0 ? density / (2.0 * SRBF_PI * mixture.total) : 0.0;
 }
 
 // Density of the whole mixture at a direction for which the lobes alone have `lobe_density`.

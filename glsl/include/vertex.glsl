@@ -1,7 +1,7 @@
 // One vertex of a path as the sampling passes see it: the surface, what a direction brings there, and
 // how densely the two basic techniques, the BRDF's own sampling and the environment's, draw it. All
 // densities per steradian. Needs NEEDS_PARAMETERS, NEEDS_WAVE, NEEDS_RAY_TEXELS, NEEDS_HIT_TEXELS,
-// NEEDS_SHADOW_RAYS, WRITES_SHADOW_RAYS, NEEDS_MATERIALS and NEEDS_ENVIRONMENT.
+// NEEDS_SHADOW_RAYS, WRITES_SHADOW_RAYS, NEEDS_MATERIAL_TEXELS and NEEDS_ENVIRONMENT.
 
 #ifndef VERTEX_GLSL
 #define VERTEX_GLSL
@@ -39,7 +39,7 @@ Vertex load_vertex(uint path, Hit hit) {
     vertex.hit = hit;
     vertex.index = wave_path(path);
     vertex.frame = frame_from_normal(hit.shading_normal);
-    vertex.material = materials[hit.material];
+    vertex.material = load_material(hit.material);
     vertex.outgoing_local = to_local(vertex.frame, -load_ray(path).direction);
     vertex.dimension = vertex_dimension();
     return vertex;

@@ -45,6 +45,21 @@ struct PathIndex {
     bool inside;
 };
 
+// Quotient and remainder, where the quotient is below 2^22: by floats, corrected by one, since
+// software devices divide integers lane by lane.
+uvec2 divide(uint dividend, uint divisor) {
+    uint quotient = uint(float(dividend) / float(divisor));
+    uint remainder = dividend - quotient * divisor;
+    if (remainder >= 0x80000000u) {
+        quotient -= 1u;
+        remainder += divisor;
+    } else if (remainder >= divisor) {
+        quotient += 1u;
+        remainder -= divisor;
+    }
+    return uvec2(quotient, remainder);
+}
+
 uint wave_path_count() {
     return wave.pixel_count * wave.sample_count;
 }
@@ -60,9 +75,9 @@ PathIndex wave_pixel(uint film_position) {
     uint blocks_per_row = (parameters.crop_width + FILM_BLOCK - 1u) / FILM_BLOCK;
     uint block = film_position / (FILM_BLOCK * FILM_BLOCK);
     uint within = film_position % (FILM_BLOCK * FILM_BLOCK);
-    index.crop_pixel = uvec2(
-        (block % blocks_per_row) * FILM_BLOCK + within % FILM_BLOCK,
-        (block / blocks_per_row) * FILM_BLOCK + within / FILM_BLOCK);
+    uvec2 block_position = divide(block, blocks_per_row).yx;
+    index.crop_pixel =
+        block_position * FILM_BLOCK + uvec2(within % FILM_BLOCK, within / FILM_BLOCK);
     index.inside = index.crop_pixel.x < parameters.crop_width
         && index.crop_pixel.y < parameters.crop_height;
     index.film_index = index.crop_pixel.y * parameters.crop_width + index.crop_pixel.x;
@@ -74,8 +89,9 @@ PathIndex wave_pixel(uint film_position) {
 
 // The pixel and sample of a path of the wave.
 PathIndex wave_path(uint path) {
-    PathIndex index = wave_pixel(wave_film_position(path % wave.pixel_count));
-    index.sample_index = wave.first_sample + path / wave.pixel_count;
+    uvec2 sample_and_pixel = divide(path, wave.pixel_count);
+    PathIndex index = wave_pixel(wave_film_position(sample_and_pixel.y));
+    index.sample_index = wave.first_sample + sample_and_pixel.x;
     return index;
 }
 
@@ -87,9 +103,7 @@ uint vertex_dimension() {
 // Random bits that the paths of a block of 8x8 pixels share, for choices that neighbouring
 // invocations had better make alike. `dimension` counts from the first one of the vertex.
 uvec4 block_random_bits(PathIndex index, uint dimension) {
-    uvec2 block =
-        uvec2(index.pixel % parameters.film_width, index.pixel / parameters.film_width)
-        / FILM_BLOCK;
+    uvec2 block = divide(index.pixel, parameters.film_width).yx / FILM_BLOCK;
     return hash_4d(uvec4(block, vertex_dimension() + dimension, wave.seed));
 }
 

@@ -1,11 +1,13 @@
-// Reads the lobes of paths and their cumulative weights back. For tests/product.rs.
+// Reads the lobes of paths and their weights in force back. For tests/product.rs.
 #version 460
 
 #define NEEDS_WAVE
 #define NEEDS_LOBE_TEXELS
 #define NEEDS_LOBE_COUNTS
-#define NEEDS_CUMULATIVE_TEXELS
-#include "product.glsl"
+#define NEEDS_LOBE_SUM_TEXELS
+#define NEEDS_CACHE
+#define NEEDS_CLOSE_LOBE_TEXELS
+#include "weights.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
@@ -13,10 +15,11 @@ struct LobeAnswer {
     vec3 axis;
     float bandwidth;
     float weight;
-    float closeness;
-    float inverse_integral;
-    float cumulative;
+    // With what the cache knows.
+    float weight_in_force;
     uint lobe_count;
+    // Sum of the weights in force of all lobes of the path.
+    float total;
 };
 
 layout(scalar, set = SET_FILM, binding = 0) readonly buffer Queries {
@@ -33,9 +36,11 @@ void main() {
         return;
     }
     uvec2 query = queries[index];
-    int texel = int(query.y * wave.pixel_count * wave.sample_count + query.x);
-    ProductLobe lobe = unpack_lobe(texelFetch(lobe_texels, texel));
+    Lobes lobes = load_lobes(query.x, wave.pixel_count * wave.sample_count, 0u);
+    ProductLobe lobe = unpack_lobe(lobe_words(lobes, query.y));
+    load_counts(lobes, query.y / 32u);
     answers[index] = LobeAnswer(
-        lobe.axis, lobe.bandwidth, lobe.weight, lobe.closeness, lobe.inverse_integral,
-        texelFetch(cumulative_texels, texel).x, lobe_counts[query.x]);
+        lobe.axis, lobe.bandwidth, lobe.weight, lobe.weight * counted_weight(query.y % 32u),
+        lobes.count, 
+        sum_of_stretch(lobes, (lobes.count - 1u) / LOBES_PER_SUM));
 }

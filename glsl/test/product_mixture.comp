@@ -8,11 +8,15 @@
 #define NEEDS_HIT_TEXELS
 #define NEEDS_SHADOW_RAYS
 #define WRITES_SHADOW_RAYS
-#define NEEDS_MATERIALS
+#define NEEDS_MATERIAL_TEXELS
 #define NEEDS_ENVIRONMENT
 #define NEEDS_LOBE_TEXELS
 #define NEEDS_LOBE_COUNTS
-#define NEEDS_CUMULATIVE_TEXELS
+#define NEEDS_LOBE_SUM_TEXELS
+#define NEEDS_CACHE
+#define NEEDS_CLOSE_LOBES
+#define WRITES_CLOSE_LOBES
+#define NEEDS_CLOSE_LOBE_TEXELS
 #include "mixture.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
@@ -55,7 +59,7 @@ void main() {
     }
     MixtureQuery query = queries[index];
     Vertex vertex = load_vertex(query.path, load_hit(query.path));
-    Mixture mixture = load_mixture(query.path, wave_path_count(), lobe_counts[query.path]);
+    Mixture mixture = load_mixture(query.path, wave_path_count(), 0u);
     vec3 direction = query.direction;
     if (query.draws != 0u) {
         MixtureNumbers numbers =
@@ -64,16 +68,16 @@ void main() {
     }
     float sum = 0.0;
     float unguided = 0.0;
-    for (uint l = 0u; l < mixture.lobe_count; ++l) {
-        ProductLobe lobe = mixture_lobe(mixture, l);
+    for (uint l = 0u; l < mixture.lobes.count; ++l) {
+        ProductLobe lobe = unpack_lobe(lobe_words(mixture.lobes, l));
         sum += lobe.weight;
-        unguided += lobe.weight * lobe.inverse_integral
+        unguided += lobe.weight / kernel_integral(lobe.bandwidth)
             * kernel_value(lobe.axis, lobe.bandwidth, direction);
     }
     Considered considered = consider_world(vertex, direction);
     MixtureAnswer answer;
     answer.direction = direction;
-    answer.lobe_density = mixture_lobe_density(mixture, direction);
+    answer.lobe_density = mixture_lobe_density(mixture, direction, false);
     answer.pdf = mixture_pdf(mixture, considered, answer.lobe_density);
     answer.unguided_lobe_density = sum > 0.0 ? unguided / sum : 0.0;
     answer.environment_pdf = considered.environment_pdf;

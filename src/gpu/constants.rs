@@ -30,6 +30,8 @@ pub const BINDING_TRIANGLES_3: u32 = 5;
 pub const BINDING_TRIANGLE_MATERIALS: u32 = 7;
 /// Scene set: [`Material`](super::layout::Material) per material.
 pub const BINDING_MATERIALS: u32 = 8;
+/// Scene set: the materials again, texels of four words, four to a material.
+pub const BINDING_MATERIAL_TEXELS: u32 = 13;
 /// Scene set: 32-bit words of the BRDF tables; materials hold offsets into it.
 pub const BINDING_BRDF_TABLE: u32 = 9;
 /// Scene set: the same buffer as cells of four halves.
@@ -92,17 +94,26 @@ pub const BINDING_SHADOW_RAY_TEXELS: u32 = 7;
 
 /// Wave set: lobes of the product, lobe `l` of path `i` at `l · path_count + i` (see `product.glsl`).
 pub const BINDING_LOBES: u32 = 8;
-/// Wave set: the lobes again, texels of four words.
+/// Wave set: the lobes again, texels of two words.
 pub const BINDING_LOBE_TEXELS: u32 = 9;
 /// Wave set: lobes kept per path.
 pub const BINDING_LOBE_COUNTS: u32 = 10;
-/// Wave set: cumulative weight of the lobes, not normalised, ordered as the lobes.
-pub const BINDING_CUMULATIVE: u32 = 11;
-/// Wave set: the cumulative weights again, texels of one float.
-pub const BINDING_CUMULATIVE_TEXELS: u32 = 12;
+/// Wave set: sums of the weights in force of the lobes of a path, from the first one to every
+/// [`LOBES_PER_SUM`]th and to the last, sum `s` of path `i` at `s · path_count + i`.
+pub const BINDING_LOBE_SUMS: u32 = 11;
+/// Wave set: a bit for every lobe that a cached direction is close to, one word of 32 lobes per path
+/// after the other (see `close_lobes_index` in `product.glsl`).
+pub const BINDING_CLOSE_LOBES: u32 = 12;
 /// Wave set: visibility caches, a head and `CACHE_CAPACITY` directions each, by path or by pixel of the
 /// film.
 pub const BINDING_CACHE: u32 = 13;
+/// Wave set: the bits of close lobes again, texels of one word.
+pub const BINDING_CLOSE_LOBE_TEXELS: u32 = 14;
+/// Wave set: the sums of weights again, texels of one float.
+pub const BINDING_LOBE_SUM_TEXELS: u32 = 15;
+
+/// Lobes between two sums of their weights; a power of two up to 32.
+pub const LOBES_PER_SUM: u32 = 16;
 
 /// Film set: leading part of Σ radiance per pixel.
 pub const BINDING_FILM_SUM: u32 = 0;
@@ -294,6 +305,7 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("BINDING_TRIANGLES_3", BINDING_TRIANGLES_3),
     ("BINDING_TRIANGLE_MATERIALS", BINDING_TRIANGLE_MATERIALS),
     ("BINDING_MATERIALS", BINDING_MATERIALS),
+    ("BINDING_MATERIAL_TEXELS", BINDING_MATERIAL_TEXELS),
     ("BINDING_BRDF_TABLE", BINDING_BRDF_TABLE),
     ("BINDING_BRDF_CELLS", BINDING_BRDF_CELLS),
     ("BINDING_ENVIRONMENT_TEXELS", BINDING_ENVIRONMENT_TEXELS),
@@ -348,9 +360,12 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("BINDING_LOBES", BINDING_LOBES),
     ("BINDING_LOBE_TEXELS", BINDING_LOBE_TEXELS),
     ("BINDING_LOBE_COUNTS", BINDING_LOBE_COUNTS),
-    ("BINDING_CUMULATIVE", BINDING_CUMULATIVE),
-    ("BINDING_CUMULATIVE_TEXELS", BINDING_CUMULATIVE_TEXELS),
+    ("BINDING_LOBE_SUMS", BINDING_LOBE_SUMS),
+    ("BINDING_CLOSE_LOBES", BINDING_CLOSE_LOBES),
     ("BINDING_CACHE", BINDING_CACHE),
+    ("BINDING_CLOSE_LOBE_TEXELS", BINDING_CLOSE_LOBE_TEXELS),
+    ("BINDING_LOBE_SUM_TEXELS", BINDING_LOBE_SUM_TEXELS),
+    ("LOBES_PER_SUM", LOBES_PER_SUM),
     ("CONSTANT_ENVIRONMENT_LOBES", CONSTANT_ENVIRONMENT_LOBES),
     ("CONSTANT_STRONGEST_ENVIRONMENT_LOBE", CONSTANT_STRONGEST_ENVIRONMENT_LOBE),
     ("CONSTANT_BRDF_LOBES", CONSTANT_BRDF_LOBES),

@@ -13,12 +13,15 @@ use super::{buffer::Buffer, constants as c, device::Device, labels, vulkan_error
 use crate::error::{Error, Result};
 
 /// Bindings of the four sets.
-pub const SET_BINDING_COUNTS: [u32; 4] = [13, 14, 14, 11];
+pub const SET_BINDING_COUNTS: [u32; 4] = [14, 14, 16, 11];
 
 /// Format and bytes of the texels of a binding that is a uniform texel buffer.
 pub(super) fn texel_format(set: u32, binding: u32) -> Option<(vk::Format, u64)> {
     match (set, binding) {
-        (c::SET_SCENE, c::BINDING_BVH_NODES..=c::BINDING_TRIANGLES_3)
+        (
+            c::SET_SCENE,
+            c::BINDING_BVH_NODES..=c::BINDING_TRIANGLES_3 | c::BINDING_MATERIAL_TEXELS,
+        )
         | (c::SET_WAVE, c::BINDING_RAY_TEXELS | c::BINDING_HIT_TEXELS) => {
             Some((vk::Format::R32G32B32A32_UINT, 16))
         }
@@ -34,8 +37,9 @@ pub(super) fn texel_format(set: u32, binding: u32) -> Option<(vk::Format, u64)> 
             Some((vk::Format::R32G32B32A32_SFLOAT, 16))
         }
         (c::SET_SRBF, c::BINDING_MATERIAL_LOBES) => Some((vk::Format::R32G32_UINT, 8)),
-        (c::SET_WAVE, c::BINDING_LOBE_TEXELS) => Some((vk::Format::R32G32B32A32_UINT, 16)),
-        (c::SET_WAVE, c::BINDING_CUMULATIVE_TEXELS) => Some((vk::Format::R32_SFLOAT, 4)),
+        (c::SET_WAVE, c::BINDING_LOBE_TEXELS) => Some((vk::Format::R32G32_UINT, 8)),
+        (c::SET_WAVE, c::BINDING_LOBE_SUM_TEXELS) => Some((vk::Format::R32_SFLOAT, 4)),
+        (c::SET_WAVE, c::BINDING_CLOSE_LOBE_TEXELS) => Some((vk::Format::R32_UINT, 4)),
         (c::SET_SRBF, c::BINDING_GUIDE_REGIONS | c::BINDING_GUIDE_LIKELY) => {
             Some((vk::Format::R32G32B32A32_UINT, 16))
         }

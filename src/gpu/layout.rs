@@ -155,6 +155,8 @@ pub struct Material {
     pub eta: Float3,
     /// Extinction coefficient of a conductor.
     pub k: Float3,
+    /// Zero; fills up the last of four texels of four words.
+    pub reserved: Float3,
 }
 
 /// Push constants of the passes that work on a wave of paths.

@@ -66,10 +66,18 @@ impl Lobes {
         let with_cache = sampler == Sampler::Visibility;
         let capacity = if with_cache { parameters.cache_places(shadow_rays) } else { 0 };
         let of_pixel = u32::from(with_cache && parameters.cache == CacheScope::Pixel);
-        let cache_constants =
-            [(CONSTANT_CACHE_CAPACITY, capacity), (CONSTANT_CACHE_OF_PIXEL, of_pixel)];
+        // What product.glsl and weights.glsl are specialized by.
+        let shared_constants = [
+            (CONSTANT_KEPT_LOBES, parameters.kept_lobes),
+            (CONSTANT_THRESHOLD_SCALE, parameters.threshold_scale.to_bits()),
+            (CONSTANT_FIXED_THRESHOLD, u32::from(parameters.threshold == Threshold::Fixed)),
+            (CONSTANT_CACHE_CAPACITY, capacity),
+            (CONSTANT_CACHE_OF_PIXEL, of_pixel),
+            (CONSTANT_COUNT_VISIBLE, u32::from(parameters.count_visible)),
+            (CONSTANT_VISIBILITY_EXPONENT, parameters.exponent.to_bits()),
+        ];
         let create = |name: &str, constants: &[(u32, u32)]| {
-            let all: Vec<_> = cache_constants.iter().chain(constants).copied().collect();
+            let all: Vec<_> = shared_constants.iter().chain(constants).copied().collect();
             Pipeline::new(device, name, shaders::pass(name), &all)
         };
         let product = create(
@@ -79,13 +87,10 @@ impl Lobes {
                 (CONSTANT_STRONGEST_ENVIRONMENT_LOBE, sizes.strongest_environment_lobe.to_bits()),
                 (CONSTANT_BRDF_LOBES, sizes.brdf_lobes.max(1)),
                 (CONSTANT_VIEWS, sizes.views),
-                (CONSTANT_KEPT_LOBES, parameters.kept_lobes),
                 (
                     CONSTANT_ORDER_BY_COEFFICIENT,
                     u32::from(parameters.order == LobeOrder::Coefficient),
                 ),
-                (CONSTANT_THRESHOLD_SCALE, parameters.threshold_scale.to_bits()),
-                (CONSTANT_FIXED_THRESHOLD, u32::from(parameters.threshold == Threshold::Fixed)),
             ],
         )?;
         let sample = create(
@@ -100,16 +105,9 @@ impl Lobes {
         )?;
         let cache = with_cache
             .then(|| -> Result<Cache> {
-                let count_visible = u32::from(parameters.count_visible);
                 Ok(Cache {
-                    record: create("cache", &[(CONSTANT_COUNT_VISIBLE, count_visible)])?,
-                    rebuild: create(
-                        "cdf",
-                        &[
-                            (CONSTANT_COUNT_VISIBLE, count_visible),
-                            (CONSTANT_VISIBILITY_EXPONENT, parameters.exponent.to_bits()),
-                        ],
-                    )?,
+                    record: create("cache", &[])?,
+                    rebuild: create("cdf", &[])?,
                     entries: create("cache_entries", &[])?,
                     scope: parameters.cache,
                 })

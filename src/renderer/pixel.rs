@@ -144,19 +144,15 @@ impl Renderer {
             return Ok(());
         }
         let stride = BLOCK_PIXELS as usize;
-        let length = (count - 1) * stride + 1;
-        let cumulative: Vec<f32> = self.read_all("cumulative weights", length)?;
-        let total = f64::from(cumulative[length - 1]);
-        let probability = |lobe: usize| {
-            let below = if lobe == 0 { 0.0 } else { cumulative[(lobe - 1) * stride] };
-            let weight = f64::from(cumulative[lobe * stride]) - f64::from(below);
-            if total > 0.0 { weight / total } else { 0.0 }
-        };
+        let words: Vec<[u32; 2]> = self.read_all("product lobes", (count - 1) * stride + 1)?;
+        let factors = self.visibility_weights(count)?;
+        let weight = |lobe: usize| f64::from(half(words[lobe * stride][1] >> 16)) * factors[lobe];
+        let total: f64 = (0..count).map(weight).sum();
+        let probability = |lobe: usize| if total > 0.0 { weight(lobe) / total } else { 0.0 };
         if lobes.is_empty() {
-            let words: Vec<[u32; 4]> = self.read_all("product lobes", length)?;
             lobes.extend((0..count).map(|lobe| RecordedLobe {
                 axis: unpack_normal(words[lobe * stride][0]),
-                bandwidth: f32::from_bits(words[lobe * stride][1]),
+                bandwidth: half(words[lobe * stride][1]),
                 before: probability(lobe),
                 after: 0.0,
             }));
@@ -167,11 +163,40 @@ impl Renderer {
         Ok(())
     }
 
+    /// V of every lobe for the last ray; twin of `weights.glsl`.
+    fn visibility_weights(&self, lobe_count: usize) -> Result<Vec<f64>> {
+        if self.settings.sampler != Sampler::Visibility {
+            return Ok(vec![1.0; lobe_count]);
+        }
+        let parameters = &self.settings.parameters.lobes;
+        let places = parameters.cache_places(self.settings.shadow_rays) as usize;
+        let cache: Vec<u32> = self.read_all("visibility caches", 1 + places)?;
+        // What the last ray taught is not in force: the top bit tells that weights are out of date.
+        let recorded = (cache[0] & 0x7fff_ffff) as usize - (cache[0] >> 31) as usize;
+        let stride = BLOCK_PIXELS as usize;
+        let words_per_mask = parameters.kept_lobes.div_ceil(32) as usize;
+        let length = ((places + 1) * words_per_mask - 1) * stride + 1;
+        let masks: Vec<u32> = self.read_all("close lobes", length)?;
+        let weight = |lobe: usize| {
+            let is_close = |entry: &usize| {
+                let word = entry % (places + 1) * words_per_mask + lobe / 32;
+                masks[word * stride] >> (lobe % 32) & 1 != 0
+            };
+            let entries = recorded - recorded.min(places)..recorded;
+            let close: Vec<usize> = entries.filter(is_close).collect();
+            let is_visible = |entry: &&usize| cache[1 + *entry % places] & 1 != 0;
+            let visible = close.iter().filter(is_visible).count() as f64;
+            let ratio = (1.0 + visible) / (1.0 + close.len() as f64);
+            ratio.powf(f64::from(parameters.exponent))
+        };
+        Ok((0..lobe_count).map(weight).collect())
+    }
+
     fn read_cache(&self) -> Result<Vec<CachedDirection>> {
         let places =
             self.settings.parameters.lobes.cache_places(self.settings.shadow_rays) as usize;
         let words: Vec<u32> = self.read_all("visibility caches", 1 + places)?;
-        // The top bit tells that the cumulative weights are to be rebuilt.
+        // The top bit tells that the weights are to be added up again.
         let recorded = (words[0] & 0x7fff_ffff) as usize;
         let oldest = if recorded > places { recorded % places } else { 0 };
         let in_order = (0..recorded.min(places)).map(|i| words[1 + (oldest + i) % places]);
@@ -182,6 +207,11 @@ impl Renderer {
         };
         Ok(in_order.map(entry).collect())
     }
+}
+
+/// The half in the lower 16 bits.
+fn half(word: u32) -> f32 {
+    half::f16::from_bits(word as u16).to_f32()
 }
 
 /// Twin of `unpack_normal` of `glsl/include/frame.glsl`.

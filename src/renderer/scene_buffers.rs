@@ -13,8 +13,8 @@ use crate::{
         Buffer, DescriptorSet, Device,
         constants::{
             BINDING_BRDF_CELLS, BINDING_BRDF_TABLE, BINDING_ENVIRONMENT_CELLS,
-            BINDING_ENVIRONMENT_ROWS, BINDING_ENVIRONMENT_TEXELS, BINDING_MATERIALS,
-            BINDING_PARAMETERS, SET_SCENE,
+            BINDING_ENVIRONMENT_ROWS, BINDING_ENVIRONMENT_TEXELS, BINDING_MATERIAL_TEXELS,
+            BINDING_MATERIALS, BINDING_PARAMETERS, SET_SCENE,
         },
         layout::SceneParameters,
     },
@@ -83,7 +83,7 @@ impl SceneBuffers {
         let tables = MaterialTables::new(&scene.materials)?;
         let material_kinds =
             tables.materials.iter().fold(0, |bits, material| bits | 1 << material.kind);
-        add(BINDING_MATERIALS, Buffer::from_slice(device, "materials", &tables.materials)?);
+        let materials = Buffer::from_slice(device, "materials", &tables.materials)?;
         let brdf_table = Buffer::texels_from_slice(device, "BRDF tables", &tables.words)?;
         drop(tables);
 
@@ -107,10 +107,12 @@ impl SceneBuffers {
         );
         let mut bound: Vec<_> =
             bindings.into_iter().zip(&buffers).chain(geometry.bindings()).collect();
+        bound.push((BINDING_MATERIALS, &materials));
+        bound.push((BINDING_MATERIAL_TEXELS, &materials));
         bound.push((BINDING_BRDF_TABLE, &brdf_table));
         bound.push((BINDING_BRDF_CELLS, &brdf_table));
         let set = DescriptorSet::new(device, SET_SCENE, &bound)?;
-        buffers.push(brdf_table);
+        buffers.extend([materials, brdf_table]);
         host_ms.insert("upload".to_owned(), start.elapsed().as_secs_f64() * 1e3);
         Ok(Self { set, geometry, buffers, material_kinds, window, host_ms })
     }

@@ -7,10 +7,11 @@ use crate::{
     gpu::{
         Buffer, Commands, DescriptorSet, Device,
         constants::{
-            BINDING_CACHE, BINDING_CUMULATIVE, BINDING_CUMULATIVE_TEXELS, BINDING_HIT_TEXELS,
-            BINDING_HITS, BINDING_LOBE_COUNTS, BINDING_LOBE_TEXELS, BINDING_LOBES, BINDING_PATHS,
-            BINDING_RAY_TEXELS, BINDING_RAYS, BINDING_SHADOW_RAY_TEXELS, BINDING_SHADOW_RAYS,
-            BINDING_VISIBILITY, SET_WAVE, WORKGROUP_SIZE,
+            BINDING_CACHE, BINDING_CLOSE_LOBE_TEXELS, BINDING_CLOSE_LOBES, BINDING_HIT_TEXELS,
+            BINDING_HITS, BINDING_LOBE_COUNTS, BINDING_LOBE_SUM_TEXELS, BINDING_LOBE_SUMS,
+            BINDING_LOBE_TEXELS, BINDING_LOBES, BINDING_PATHS, BINDING_RAY_TEXELS, BINDING_RAYS,
+            BINDING_SHADOW_RAY_TEXELS, BINDING_SHADOW_RAYS, BINDING_VISIBILITY, LOBES_PER_SUM,
+            SET_WAVE, WORKGROUP_SIZE,
         },
         layout::{Hit, PathState, Ray, ShadowRay},
     },
@@ -32,6 +33,14 @@ pub struct LobeRoom {
     pub cache_capacity: u32,
     /// Pixels that keep their caches; none where caches belong to paths.
     pub film_pixels: Option<u64>,
+}
+
+impl LobeRoom {
+    /// Words per path that tell which lobes cached directions are close to: `MASK_WORDS` of
+    /// `product.glsl` for every place of the cache and for the direction under way.
+    fn mask_words(self) -> u64 {
+        u64::from(self.kept_lobes.div_ceil(32)) * (u64::from(self.cache_capacity) + 1)
+    }
 }
 
 /// Rays, hits, shadow rays and path states of one wave.
@@ -57,9 +66,10 @@ impl WaveBuffers {
         let widest =
             (size_of::<Hit>() as u64).max(u64::from(shadow_rays) * size_of::<ShadowRay>() as u64);
         let lobes = lobe_room.map_or(0, |room| u64::from(room.kept_lobes));
-        let widest = widest.max(16 * lobes);
+        let masks = lobe_room.map_or(0, LobeRoom::mask_words);
+        let widest = widest.max(8 * lobes).max(4 * masks);
         let by_binding = capabilities.max_storage_buffer_range / widest;
-        let by_texels = capabilities.max_texel_buffer_elements / lobes.max(1);
+        let by_texels = capabilities.max_texel_buffer_elements / lobes.max(masks).max(1);
         let by_groups = u64::from(capabilities.max_workgroup_count) * u64::from(WORKGROUP_SIZE)
             / u64::from(shadow_rays);
         let by_memory = capabilities.device_memory / 8 / (widest * 3);
@@ -83,9 +93,10 @@ impl WaveBuffers {
             let words =
                 if room.cache_capacity > 0 { 1 + u64::from(room.cache_capacity) } else { 0 };
             Ok([
-                make("product lobes", paths * lobes, 16)?,
+                make("product lobes", paths * lobes, 8)?,
                 make("lobe counts", paths, 4)?,
-                make("cumulative weights", paths * lobes, 4)?,
+                make("lobe sums", paths * lobes.div_ceil(u64::from(LOBES_PER_SUM)), 4)?,
+                make("close lobes", paths * masks, 4)?,
                 Buffer::zeroed(device, "visibility caches", 4 * caches * words)?,
             ])
         });
@@ -100,13 +111,15 @@ impl WaveBuffers {
             (BINDING_VISIBILITY, &visibility),
             (BINDING_PATHS, &path_buffer),
         ];
-        if let Some([lobes, counts, cumulative, caches]) = &lobe_buffers {
+        if let Some([lobes, counts, sums, close, caches]) = &lobe_buffers {
             bound.extend([
                 (BINDING_LOBES, lobes),
                 (BINDING_LOBE_TEXELS, lobes),
                 (BINDING_LOBE_COUNTS, counts),
-                (BINDING_CUMULATIVE, cumulative),
-                (BINDING_CUMULATIVE_TEXELS, cumulative),
+                (BINDING_LOBE_SUMS, sums),
+                (BINDING_LOBE_SUM_TEXELS, sums),
+                (BINDING_CLOSE_LOBES, close),
+                (BINDING_CLOSE_LOBE_TEXELS, close),
                 (BINDING_CACHE, caches),
             ]);
         }
