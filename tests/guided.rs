@@ -134,7 +134,7 @@ fn every_mode_is_unbiased_in_a_room() {
     agree(
         &room(),
         1,
-        32,
+        64,
         &[
             ("one-sample", with(1, &unchanged)),
             ("4 candidates", with(4, &unchanged)),

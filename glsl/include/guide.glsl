@@ -48,16 +48,16 @@ uint guide_face(vec3 normal) {
 }
 
 // Key of the fine cell around a place: the edge is a power of two times the finest, from the
-// distance to the camera; `bits` move the place by up to half an edge and blur the levels.
-uint guide_key(vec3 position, uint face, uvec4 bits) {
+// distance to the camera; `bits` blurs the levels.
+uint guide_key(vec3 position, uint face, uint bits) {
     float wanted = min(
         guide.largest_edge,
         guide.edge_per_distance * distance(position, parameters.camera_position));
-    float blurred = wanted / guide.finest_edge * (1.0 + unit_float(bits.w));
+    float blurred = wanted / guide.finest_edge * (1.0 + unit_float(bits));
     uint level = uint(clamp(int(floatBitsToUint(blurred) >> 23u) - 127, 0, 15));
     float edge = guide.finest_edge * uintBitsToFloat((level + 127u) << 23u);
-    vec3 jitter = vec3(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z)) - 0.5;
-    ivec3 place = ivec3(floor((position - guide.grid_origin) / edge + jitter)) & 255;
+    // Off the corner of the scene, since walls at its sides should not lie between two cells.
+    ivec3 place = ivec3(floor((position - guide.grid_origin) / edge + 0.38)) & 255;
     return uint(place.x) | (uint(place.y) << 8u) | (uint(place.z) << 16u) | (level << 24u)
         | (face << 28u);
 }
@@ -75,10 +75,10 @@ uint guide_hash(uint key) {
     return key ^ (key >> 16u);
 }
 
-// Bits that choose among the cells around a place, for one vertex of a path.
-uvec4 guide_cell_bits(PathIndex index, uint dimension) {
+// Bits that choose between the two cell sizes that fit best, for one vertex of a path.
+uint guide_cell_bits(PathIndex index, uint dimension) {
     return hash_4d(uvec4(
-        index.pixel, index.sample_index, dimension + DIMENSION_GUIDE_CELL, wave.epoch_seed));
+        index.pixel, index.sample_index, dimension + DIMENSION_GUIDE_CELL, wave.epoch_seed)).w;
 }
 
 // Index of the cell with a key, or GUIDE_NO_KEY.
@@ -110,7 +110,7 @@ void guide_want(uint key) {
 }
 
 // The cell of a vertex: the fine one, else the coarse one around it, else that of its face.
-uint guide_cell(Vertex vertex, uvec4 bits) {
+uint guide_cell(Vertex vertex, uint bits) {
     uint face = guide_face(vertex.hit.geometric_normal);
     uint key = guide_key(vertex.hit.position, face, bits);
     uint cell = guide_find(key);
