@@ -121,6 +121,7 @@ pub mod gpu;
 pub mod guide;
 pub mod pass;
 pub mod random;
+mod refinement;
 pub mod renderer;
 pub mod sampler;
 pub mod scene;

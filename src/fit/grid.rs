@@ -5,9 +5,10 @@ use std::{collections::BinaryHeap, f64::consts::PI};
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::{config, points::Patch, queue::Queued};
+use super::{config, points::Patch};
 use crate::{
     frame::direction_from_lat_long,
+    refinement::Queued,
     scene::{EnvironmentMap, environment::luminance},
 };
 

@@ -26,7 +26,6 @@ pub mod judge;
 pub mod options;
 pub mod picture;
 pub mod points;
-mod queue;
 pub mod report;
 pub mod solver;
 pub mod squared_error;

@@ -3,12 +3,15 @@
 //! Energy of every cell, and how much each cell matters → rectangles with little E^¼ · Ω^¾, E being
 //! their energy and Ω their solid angle, both weighted.
 
-use std::{cmp::Ordering, collections::BinaryHeap, ops::Range};
+use std::{collections::BinaryHeap, ops::Range};
 
 use glam::DVec3;
 
 use super::partition::PARENT_COUNT;
-use crate::scene::environment::{EnvironmentMap, luminance, mean_sine};
+use crate::{
+    refinement::Queued,
+    scene::environment::{EnvironmentMap, luminance, mean_sine},
+};
 
 /// Energy and solid angle of every cell, unnormalised.
 #[derive(Debug)]
@@ -172,32 +175,6 @@ impl Rectangle {
     }
 }
 
-/// A rectangle in the queue of those to split; ties go to the one that was made first.
-struct Queued {
-    cost: f64,
-    index: usize,
-}
-
-impl PartialEq for Queued {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Queued {}
-
-impl PartialOrd for Queued {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Queued {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.cost.total_cmp(&other.cost).then(other.index.cmp(&self.index))
-    }
-}
-
 /// Indices from 0 on, each followed by `next` of it.
 fn in_order(next: &[usize]) -> Vec<usize> {
     std::iter::successors(Some(0), |&index| Some(next[index]).filter(|&next| next != usize::MAX))
@@ -209,13 +186,13 @@ fn in_order(next: &[usize]) -> Vec<usize> {
 pub fn grow(sums: &Sums, region_count: usize) -> Vec<Rectangle> {
     let whole = Rectangle { first: [0, 0], size: [sums.cells.width, sums.cells.rows], parent: 0 };
     let mut rectangles = vec![whole];
-    let mut queue = BinaryHeap::from([Queued { cost: sums.cost(whole), index: 0 }]);
+    let mut queue = BinaryHeap::from([Queued { priority: sums.cost(whole), index: 0 }]);
     // What comes after each rectangle in the order of the tree.
     let mut next = vec![usize::MAX];
     while rectangles.len() < region_count {
         // What is black need not be told apart.
-        let Some(Queued { index, cost }) = queue.pop() else { break };
-        if cost <= 0.0 {
+        let Some(Queued { index, priority }) = queue.pop() else { break };
+        if priority <= 0.0 {
             break;
         }
         let Some([low, high]) = sums.split(rectangles[index]) else { continue };
@@ -224,7 +201,7 @@ pub fn grow(sums: &Sums, region_count: usize) -> Vec<Rectangle> {
         next.push(next[index]);
         next[index] = rectangles.len() - 1;
         for index in [index, rectangles.len() - 1] {
-            queue.push(Queued { cost: sums.cost(rectangles[index]), index });
+            queue.push(Queued { priority: sums.cost(rectangles[index]), index });
         }
         if rectangles.len() <= PARENT_COUNT {
             // From here on, halves inherit what is the last to be set.

@@ -1,11 +1,13 @@
-//! The order in which adaptive partitions are refined.
+//! The order in which adaptive partitions are refined, those of fits and that of the guide.
 
 use std::cmp::Ordering;
 
 /// A part that waits to be split: the largest priority is next, the older one where two are equal.
-pub(super) struct Queued {
-    pub(super) priority: f64,
-    pub(super) index: usize,
+pub struct Queued {
+    /// How much a split is worth.
+    pub priority: f64,
+    /// Which part.
+    pub index: usize,
 }
 
 impl PartialEq for Queued {
