@@ -27,7 +27,7 @@ pub struct Totals {
     pub energy_kept: u64,
     /// Directions recorded in visibility caches.
     pub cache_entries: u64,
-    /// Rebuilds of a cumulative distribution.
+    /// Times that the weights of a hit's lobes were added up anew, since the cache had grown.
     pub cdf_rebuilds: u64,
     /// Device milliseconds by pass.
     pub gpu_ms: PassTimes,
