@@ -108,7 +108,7 @@ pub struct Parameters {
     /// `hierarchy`: whether cells of `guided` that have seen little lean on larger ones; off for
     /// experiments.
     pub hierarchy: bool,
-    /// `regions`: regions of the environment for `guided`, 16 to 1024.
+    /// `regions`: most regions of the environment for `guided`, 16 to 1024; it starts with 256.
     pub regions: u32,
     /// `weights`: what `guided` weights the regions with.
     pub weights: Weights,
@@ -122,7 +122,7 @@ impl Default for Parameters {
             candidates: None,
             guide_memory: 128 << 20,
             hierarchy: true,
-            regions: 256,
+            regions: 1024,
             weights: Weights::Cell,
             lobes: LobeParameters::default(),
         }

@@ -80,7 +80,7 @@ fn eastern(partition: &Partition) -> Partition {
         .iter()
         .map(|region| if region.direction.x > 0.0 { 1.0 } else { 0.01 })
         .collect();
-    partition.split_by(&interest).expect("the map has enough cells")
+    partition.split_by(&interest, partition.regions.len()).expect("the map has enough cells")
 }
 
 #[test]
@@ -97,7 +97,14 @@ fn regions_are_split_anew_where_the_scene_looks() {
     assert!((sum - 1.0).abs() < 1e-12);
     assert!(after.regions.iter().all(|region| region.parent < PARENT_COUNT));
     // Interest that is the same everywhere gives the first regions, to the bit.
-    let again = after.split_by(&[1.0; 256]).unwrap();
+    let again = after.split_by(&[1.0; 256], 256).unwrap();
+    assert_eq!((&again.regions, &again.entries), (&before.regions, &before.entries));
+    // More of them, and fewer again.
+    let more = after.split_by(&[1.0; 256], 1024).unwrap();
+    assert_eq!(more.regions.len(), 1024);
+    let sum: f64 = more.regions.iter().map(|region| region.share).sum();
+    assert!((sum - 1.0).abs() < 1e-9, "{sum}");
+    let again = more.split_by(&[1.0; 1024], 256).unwrap();
     assert_eq!((&again.regions, &again.entries), (&before.regions, &before.entries));
 }
 
@@ -141,7 +148,7 @@ fn counts_follow_the_regions() {
     let seeing = learned.keys().iter().position(|key| *key == CellKey::fine([3, 4, 5], 6, 2));
     let cell = seeing.unwrap();
     let old = sums(&learned, cell, &before);
-    learned.carry_over(&before, &after);
+    learned.carry_over(&before, &after, 64);
     let new = sums(&learned, cell, &after);
     // Each share is rounded to a sixteenth of a ray.
     assert!(new.1.abs_diff(old.1) < 64 && new.0.abs_diff(old.0) < 64, "{old:?} → {new:?}");

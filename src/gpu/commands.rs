@@ -147,6 +147,12 @@ impl Commands {
 
     /// Fills a whole buffer with a repeated 32-bit word.
     pub fn fill(&mut self, buffer: &Buffer, word: u32) {
+        self.fill_start(buffer, vk::WHOLE_SIZE, word);
+    }
+
+    /// Records filling the first `bytes` of a buffer, a multiple of 4 and not 0, with a repeated word,
+    /// after all earlier use of it.
+    pub fn fill_start(&mut self, buffer: &Buffer, bytes: u64, word: u32) {
         self.barrier(
             vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER,
             vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE,
@@ -155,7 +161,7 @@ impl Commands {
         );
         // SAFETY: recording; the buffer has transfer usage and the caller keeps it alive.
         unsafe {
-            self.device.raw().cmd_fill_buffer(self.raw, buffer.raw(), 0, vk::WHOLE_SIZE, word);
+            self.device.raw().cmd_fill_buffer(self.raw, buffer.raw(), 0, bytes, word);
         }
     }
 

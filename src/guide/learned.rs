@@ -109,6 +109,11 @@ impl Learned {
         &self.counts[cell * self.region_count..][..self.region_count]
     }
 
+    /// Rays that were counted in all cells together.
+    pub fn rays(&self) -> u64 {
+        self.counts.iter().map(|count| count.trials).sum::<u64>() / PARTS_PER_RAY
+    }
+
     /// Cells that found no room, counted again at every rebuild.
     pub fn refused(&self) -> u64 {
         self.refused
@@ -179,8 +184,13 @@ impl Learned {
     }
 
     /// Counts for the regions of `to` in the place of those of `from`: each inherits its share, by
-    /// energy, of what was counted where it lies.
-    pub fn carry_over(&mut self, from: &Partition, to: &Partition) {
+    /// energy, of what was counted where it lies. From here on there is room for `capacity` cells.
+    ///
+    /// # Panics
+    /// If there are more cells than that.
+    pub fn carry_over(&mut self, from: &Partition, to: &Partition, capacity: usize) {
+        assert!(self.keys.len() <= capacity, "{} cells, room for {capacity}", self.keys.len());
+        self.capacity = capacity;
         let shares = from.shares_in(to);
         let count = to.regions.len();
         let mut counts = vec![Count::default(); self.keys.len() * count];

@@ -25,6 +25,9 @@ use crate::scene::environment::EnvironmentMap;
 /// Number of regions that are the angular parents of all others.
 pub const PARENT_COUNT: usize = 64;
 
+/// Most regions that a map is split into: their index has ten bits on the device.
+pub const MOST_REGIONS: usize = 1024;
+
 /// Scale of the thresholds of the cells' alias tables.
 pub const CELL_SCALE: u64 = 1 << 32;
 
@@ -71,22 +74,24 @@ impl Partition {
     /// # Panics
     /// If `region_count` is not from 1 to 1024.
     pub fn new(map: &EnvironmentMap, region_count: usize) -> Self {
-        assert!((1..=1024).contains(&region_count), "1 to 1024 regions");
+        assert!((1..=MOST_REGIONS).contains(&region_count), "1 to 1024 regions");
         let cells = Arc::new(Cells::new(map));
         let rectangles = grow(&Sums::new(&cells, |_| 1.0), region_count);
         Self::assemble(cells, &rectangles)
     }
 
-    /// Splits the same map into as many regions anew, where a cell counts by the `interest` of the
-    /// region that it lies in now. `None` where that many cannot be had.
+    /// Splits the same map anew into `region_count` regions, or as many as can be had, where a cell
+    /// counts by the `interest` of the region that it lies in now. `None` where that would be fewer
+    /// than asked for and than now.
     ///
     /// # Panics
-    /// If there are not as many interests as regions.
-    pub fn split_by(&self, interest: &[f64]) -> Option<Self> {
+    /// If there are not as many interests as regions or more than 1024 are asked for.
+    pub fn split_by(&self, interest: &[f64], region_count: usize) -> Option<Self> {
         assert_eq!(interest.len(), self.regions.len(), "an interest for every region");
+        assert!(region_count <= MOST_REGIONS, "at most 1024 regions");
         let weight = |cell: usize| interest[usize::from(self.region_of_cell[cell])];
-        let rectangles = grow(&Sums::new(&self.cells, weight), self.regions.len());
-        (rectangles.len() == self.regions.len())
+        let rectangles = grow(&Sums::new(&self.cells, weight), region_count);
+        (rectangles.len() >= region_count.min(self.regions.len()))
             .then(|| Self::assemble(Arc::clone(&self.cells), &rectangles))
     }
 
@@ -99,8 +104,8 @@ impl Partition {
         self.regions.iter().map(of).collect()
     }
 
-    /// The same map in the regions that [`Self::rectangles`] gave. `None` unless they are as many and
-    /// fill the map without overlap.
+    /// The same map in the regions that [`Self::rectangles`] gave. `None` unless they fill the
+    /// map without overlap and are no more than [`MOST_REGIONS`].
     pub fn with_rectangles(&self, rectangles: &[[u32; 5]]) -> Option<Self> {
         let (width, rows) = (self.width, self.rows);
         let mut is_covered = vec![false; self.region_of_cell.len()];
@@ -128,7 +133,7 @@ impl Partition {
             }
             found.push(rectangle);
         }
-        let is_whole = found.len() == self.regions.len() && is_covered.iter().all(|&cell| cell);
+        let is_whole = found.len() <= MOST_REGIONS && is_covered.iter().all(|&cell| cell);
         is_whole.then(|| Self::assemble(Arc::clone(&self.cells), &found))
     }
 

@@ -44,12 +44,49 @@ const PIXELS_PER_CELL: u64 = 4;
 /// Samples per pixel after which the map is split a second time; the first is after the training.
 pub const SPLIT_AFTER: u32 = 16;
 
+/// Regions that a render starts with.
+const FIRST_REGIONS: usize = 256;
+/// Rays per cell and region that twice as many regions would have, for there to be as many.
+const RAYS_PER_REGION: u64 = 4;
+
 /// The first number of samples, not below `samples`, after which the guide is rebuilt: 1, 2, 3, 4, 6,
 /// 8, 12, 16, 24, …
 pub fn guide_schedule(samples: u32) -> u32 {
     let power = samples.next_power_of_two();
     let middle = power / 4 * 3;
     if middle >= samples { middle } else { power }
+}
+
+/// How much can be learned.
+#[derive(Clone, Copy, Debug)]
+struct Room {
+    /// Pairs of cell and region that the buffers hold.
+    counts: usize,
+    /// Cells that the film can fill.
+    useful_cells: usize,
+    /// Most regions.
+    most_regions: usize,
+}
+
+impl Room {
+    /// Cells of `region_count` regions.
+    fn cells(&self, region_count: usize) -> usize {
+        (self.counts / region_count).min(self.useful_cells).max(FACE_COUNT)
+    }
+
+    /// How many regions there should be where there are `now`: twice as many as long as the `rays`
+    /// that were counted in `cells` cells tell them apart, and as the cells do not crowd out new ones.
+    fn regions(&self, now: usize, cells: usize, rays: u64) -> usize {
+        let mut count = now;
+        loop {
+            let next = (2 * count).min(self.most_regions);
+            let is_known = rays >= RAYS_PER_REGION * (cells * next) as u64;
+            if next <= count || !is_known || cells + cells / 4 > self.cells(next) {
+                return count;
+            }
+            count = next;
+        }
+    }
 }
 
 /// Everything of one render that learns.
@@ -61,7 +98,7 @@ pub struct GuideBuffers {
     is_split: bool,
     options: EstimateOptions,
     learned: Learned,
-    capacity: usize,
+    room: Room,
     origin: Origin,
     layout: GuideParameters,
     parameters: Buffer,
@@ -93,24 +130,30 @@ impl GuideBuffers {
         rays: u64,
     ) -> Result<Self> {
         let (hierarchy, weights) = (parameters.hierarchy, parameters.weights);
-        let partition = Partition::new(&scene.environment, parameters.regions as usize);
+        let most_regions = parameters.regions as usize;
+        let partition = Partition::new(&scene.environment, most_regions.min(FIRST_REGIONS));
         let region_count = partition.regions.len();
         let uses_likely = weights == Weights::Product;
         let likely_bytes = 16 * u64::from(GUIDE_LIKELY_REGIONS);
-        let bytes_per_cell =
-            BYTES_PER_REGION * region_count as u64 + if uses_likely { likely_bytes } else { 0 };
-        let by_range = device.capabilities().max_storage_buffer_range / (bytes_per_cell / 2);
-        let useful = FEW_CELLS.max(u64::from(pixels) / PIXELS_PER_CELL);
-        let capacity = (parameters.guide_memory / bytes_per_cell)
-            .min(by_range)
-            .min(useful)
-            .max(FACE_COUNT as u64) as usize;
+        let useful_cells = FEW_CELLS.max(u64::from(pixels) / PIXELS_PER_CELL) as usize;
+        let lists_per_region = if uses_likely { likely_bytes / region_count as u64 } else { 0 };
+        let by_memory = parameters.guide_memory / (BYTES_PER_REGION + lists_per_region);
+        let by_range = device.capabilities().max_storage_buffer_range / (BYTES_PER_REGION / 2);
+        let room = Room {
+            counts: (by_memory.min(by_range) as usize)
+                .min(useful_cells * most_regions)
+                .max(FACE_COUNT * region_count),
+            useful_cells,
+            most_regions,
+        };
+        let capacity = room.cells(region_count);
         let slots = (4 * capacity).next_power_of_two();
         let wanted_slots = (2 * capacity).next_power_of_two();
         let learned = Learned::new(region_count, capacity, slots);
 
-        let (regions, aliases) = region_tables(&partition);
-        let cells = capacity * region_count * 8;
+        let (mut regions, aliases) = region_tables(&partition);
+        regions.resize(most_regions.max(region_count), [0; 4]);
+        let cells = 8 * room.counts;
         let guide = guide_parameters(scene, region_count, slots, wanted_slots);
         let origin = Origin {
             environment: scene::environment_hash(scene),
@@ -154,7 +197,7 @@ impl GuideBuffers {
             is_split: false,
             options: EstimateOptions { hierarchy },
             learned,
-            capacity,
+            room,
             origin,
             layout: guide,
             parameters,
@@ -187,14 +230,15 @@ impl GuideBuffers {
     pub fn forget(&mut self) -> Result<()> {
         if self.is_split {
             let alike = vec![1.0; self.partition.regions.len()];
-            if let Some(partition) = self.partition.split_by(&alike) {
+            if let Some(partition) = self.partition.split_by(&alike, FIRST_REGIONS.min(alike.len()))
+            {
                 self.take_regions(partition)?;
             }
             self.is_split = false;
         }
         self.learned = Learned::new(
             self.partition.regions.len(),
-            self.capacity,
+            self.room.cells(self.partition.regions.len()),
             self.table.size() as usize / 8,
         );
         self.rebuild_ms = 0.0;
@@ -202,8 +246,8 @@ impl GuideBuffers {
         self.upload()
     }
 
-    /// Turns what passes counted into what the next ones read; `splits` the regions anew where it is
-    /// time.
+    /// Turns what passes counted into what the next ones read; splits the map anew where it is time
+    /// (`splits`) and where there is enough to tell more regions apart.
     ///
     /// # Errors
     /// A failing device.
@@ -212,10 +256,14 @@ impl GuideBuffers {
         let counted = self.learned.cell_count() * self.partition.regions.len();
         self.learned.add(&self.counts.download::<[u32; 2]>(counted)?);
         self.learned.want(&self.wanted.download::<u32>(self.wanted_slots)?);
-        if splits {
+        let now = self.partition.regions.len();
+        let count = self.room.regions(now, self.learned.cell_count(), self.learned.rays());
+        if splits || count > now {
             let snapshot = self.learned.snapshot(&self.partition, &self.options);
-            if let Some(partition) = self.partition.split_by(&self.learned.interest(&snapshot)) {
-                self.learned.carry_over(&self.partition, &partition);
+            let interest = self.learned.interest(&snapshot);
+            if let Some(partition) = self.partition.split_by(&interest, count) {
+                let capacity = self.room.cells(partition.regions.len());
+                self.learned.carry_over(&self.partition, &partition, capacity);
                 self.take_regions(partition)?;
             }
         }
@@ -298,14 +346,14 @@ impl GuideBuffers {
     /// [`Error::Usage`] for another environment or number of regions; a failing device.
     pub fn restore(&mut self, state: &GuideState) -> Result<bool> {
         let (here, there) = (&self.origin, &state.origin);
-        if (&here.environment, here.regions) != (&there.environment, there.regions) {
+        if here.environment != there.environment || there.regions > self.room.most_regions as u32 {
             return Err(Error::usage(format!(
-                "the guide belongs to another environment: map {} in {} regions, expected {} in {}; \
-                 learn it again under this map, with the same --set regions",
+                "the guide belongs to another environment: map {} in {} regions, expected {} in at most \
+                 {}; learn it again under this map, with the same --set regions",
                 &there.environment[..there.environment.len().min(12)],
                 there.regions,
                 &here.environment[..12],
-                here.regions
+                self.room.most_regions
             )));
         }
         let edge = there.largest_edge;
@@ -322,7 +370,7 @@ impl GuideBuffers {
         self.take_regions(partition)?;
         self.learned = Learned::resume(
             self.partition.regions.len(),
-            self.capacity,
+            self.room.cells(self.partition.regions.len()),
             self.table.size() as usize / 8,
             &state.keys,
             &state.counts,
@@ -349,6 +397,9 @@ impl GuideBuffers {
         self.regions.upload(bytemuck::cast_slice(&regions))?;
         self.aliases.upload(bytemuck::cast_slice(&aliases))?;
         self.region_of_cell.upload(bytemuck::cast_slice(&partition.region_of_cell))?;
+        self.layout.region_count = partition.regions.len() as u32;
+        self.parameters.upload(bytemuck::bytes_of(&self.layout))?;
+        self.origin.regions = self.layout.region_count;
         self.partition = partition;
         self.is_split = true;
         Ok(())
@@ -356,7 +407,9 @@ impl GuideBuffers {
 
     fn clear_counts(&self) -> Result<()> {
         let mut commands = Commands::begin(&self.device)?;
-        commands.fill(&self.counts, 0);
+        // What lies behind belongs to no cell.
+        let used = self.learned.cell_count() * self.partition.regions.len();
+        commands.fill_start(&self.counts, 8 * used as u64, 0);
         commands.fill(&self.wanted, GUIDE_NO_KEY);
         commands.submit_and_wait()?;
         Ok(())
@@ -435,5 +488,25 @@ fn guide_parameters(
         region_count: region_count as u32,
         table_mask: (slots - 1) as u32,
         wanted_mask: (wanted_slots - 1) as u32,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regions_grow_with_what_was_counted_as_long_as_cells_have_room() {
+        let room = Room { counts: 1 << 20, useful_cells: 4096, most_regions: 1024 };
+        assert_eq!((room.cells(256), room.cells(1024)), (4096, 1024));
+        let rays = |regions: u64, cells: u64| RAYS_PER_REGION * regions * cells;
+        assert_eq!(room.regions(256, 800, rays(512, 800) - 1), 256);
+        assert_eq!(room.regions(256, 800, rays(512, 800)), 512);
+        assert_eq!(room.regions(256, 800, rays(1024, 800)), 1024, "in one step");
+        assert_eq!(room.regions(1024, 6, u64::MAX), 1024, "never more than asked for");
+        assert_eq!(room.regions(512, 900, u64::MAX), 512, "a fifth of the room is for new cells");
+        assert_eq!(Room { most_regions: 300, ..room }.regions(256, 6, u64::MAX), 300);
+        let tiny = Room { counts: 6 * 256, ..room };
+        assert_eq!((tiny.cells(256), tiny.regions(256, 6, u64::MAX)), (6, 256));
     }
 }
