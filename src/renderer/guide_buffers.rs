@@ -47,7 +47,7 @@ pub const SPLIT_AFTER: u32 = 16;
 /// Regions that a render starts with.
 const FIRST_REGIONS: usize = 256;
 /// Rays per cell and region that twice as many regions would have, for there to be as many.
-const RAYS_PER_REGION: u64 = 4;
+const RAYS_PER_REGION: u64 = 2;
 
 /// The first number of samples, not below `samples`, after which the guide is rebuilt: 1, 2, 3, 4, 6,
 /// 8, 12, 16, 24, …
