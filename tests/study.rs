@@ -123,6 +123,8 @@ fn a_study_has_every_figure() {
         assert!(last["seconds"].as_f64().unwrap() > 0.0);
         assert!((last["mean_ratio"].as_f64().unwrap() - 1.0).abs() < 0.2, "{last}");
         assert!(last["mean_deviation"].as_f64().unwrap().abs() < 5.0, "{last}");
+        let [p999, max] = ["relmse_p999", "relmse_max"].map(|name| last[name].as_f64().unwrap());
+        assert!(max > 0.0 && p999 <= max && last["relmse_trimmed"].as_f64() < Some(p999), "{last}");
         assert!(run["visible_share"].as_f64().unwrap() > 0.2);
         assert!(run["gpu_ms_per_sample"]["sample"].as_f64().unwrap() > 0.0);
         if run["rule"]["spp"].is_number() {
@@ -158,6 +160,8 @@ fn a_study_has_every_figure() {
         "mse",
         "relmse",
         "relmse_trimmed",
+        "relmse_p999",
+        "relmse_max",
         "mean_ratio",
         "gpu_ms_per_sample_sample",
     ] {

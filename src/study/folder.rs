@@ -28,7 +28,7 @@ use crate::{
 /// The file that marks a report folder.
 const MARK: &str = "study.json";
 /// What it says.
-const FORMAT: &str = "fenestra study 1";
+const FORMAT: &str = "fenestra study 2";
 
 /// A report folder.
 #[derive(Clone, Debug)]

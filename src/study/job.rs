@@ -69,7 +69,7 @@ impl Job<'_> {
                 break;
             }
         }
-        let figures = Figures::of(renderer);
+        let figures = Figures::of(renderer, pace.seconds);
         Ok(Run {
             scene: self.scene.name.clone(),
             sampler: self.contender.label.clone(),

@@ -11,6 +11,8 @@
 //! | `mae` | mean of abs `d` over pixels and channels |
 //! | `relmse` | mean over the pixels of `e / (L² + 0.01·L̄²)` |
 //! | `relmse_trimmed` | the same without the worst 0.1% of the pixels |
+//! | `relmse_p999` | 99.9th percentile of `e / (L² + 0.01·L̄²)`: the largest that `relmse_trimmed` keeps |
+//! | `relmse_max` | the largest of all pixels |
 //! | `mean_ratio` | mean of `x` / mean of `r` |
 //! | `psnr` | 10·log₁₀(peak² / mse), peak the reference's largest channel value, decibels |
 //! | `max_error` | largest abs `d` |
@@ -45,6 +47,10 @@ pub struct Metrics {
     pub relmse: f64,
     /// Mean relative squared error without the worst 0.1% of the pixels.
     pub relmse_trimmed: f64,
+    /// 99.9th percentile of the pixels' relative squared errors: the largest without the worst 0.1%.
+    pub relmse_p999: f64,
+    /// Largest relative squared error of a pixel.
+    pub relmse_max: f64,
     /// Mean of the picture over that of the reference; 1 where both are black.
     pub mean_ratio: f64,
     /// Peak signal-to-noise ratio, decibels; infinite for equal pictures.
@@ -55,17 +61,29 @@ pub struct Metrics {
 
 impl Metrics {
     /// Names of the metrics in the order of [`Metrics::values`].
-    pub const NAMES: [&'static str; 8] =
-        ["mse", "rmse", "mae", "relmse", "relmse_trimmed", "mean_ratio", "psnr", "max_error"];
+    pub const NAMES: [&'static str; 10] = [
+        "mse",
+        "rmse",
+        "mae",
+        "relmse",
+        "relmse_trimmed",
+        "relmse_p999",
+        "relmse_max",
+        "mean_ratio",
+        "psnr",
+        "max_error",
+    ];
 
     /// Every metric, in the order of [`Metrics::NAMES`].
-    pub fn values(&self) -> [f64; 8] {
+    pub fn values(&self) -> [f64; 10] {
         [
             self.mse,
             self.rmse,
             self.mae,
             self.relmse,
             self.relmse_trimmed,
+            self.relmse_p999,
+            self.relmse_max,
             self.mean_ratio,
             self.psnr,
             self.max_error,
@@ -92,7 +110,7 @@ impl Metrics {
     pub fn of_halves(picture: &RgbImage, first: &RgbImage, second: &RgbImage) -> Result<Self> {
         let squared = squared_errors(picture, first, second)?;
         let reference = mean_picture(first, second);
-        let relative = relative_errors(&squared, &reference);
+        let relative = RelativeErrors::of(relative_errors(&squared, &reference));
         let pixel_count = squared.len() as f64;
         let mse = squared.iter().sum::<f64>() / pixel_count;
         let (mut absolute_sum, mut max_error) = (0.0_f64, 0.0_f64);
@@ -113,8 +131,10 @@ impl Metrics {
             mse,
             rmse: mse.max(0.0).sqrt(),
             mae: absolute_sum / (3.0 * pixel_count),
-            relmse: relative.iter().sum::<f64>() / pixel_count,
-            relmse_trimmed: trimmed_mean(relative),
+            relmse: relative.mean,
+            relmse_trimmed: relative.trimmed,
+            relmse_p999: relative.p999,
+            relmse_max: relative.max,
             mean_ratio,
             psnr: if mse > 0.0 { 10.0 * (peak * peak / mse).log10() } else { f64::INFINITY },
             max_error,
@@ -197,13 +217,32 @@ fn box_filter(values: &[f64], width: usize, height: usize) -> Vec<f64> {
     (0..values.len()).map(mean_at).collect()
 }
 
-/// Mean without the largest [`TRIMMED_ONE_IN`]-th of the values.
-fn trimmed_mean(mut values: Vec<f64>) -> f64 {
-    let kept = values.len() - values.len() / TRIMMED_ONE_IN;
-    if kept < values.len() {
-        values.select_nth_unstable_by(kept, f64::total_cmp);
+/// What is told of the relative squared errors of all pixels.
+struct RelativeErrors {
+    mean: f64,
+    /// Mean without the largest [`TRIMMED_ONE_IN`]-th.
+    trimmed: f64,
+    /// The largest without the largest [`TRIMMED_ONE_IN`]-th.
+    p999: f64,
+    max: f64,
+}
+
+impl RelativeErrors {
+    /// Of at least one value.
+    fn of(mut values: Vec<f64>) -> Self {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let kept = values.len() - values.len() / TRIMMED_ONE_IN;
+        if kept < values.len() {
+            values.select_nth_unstable_by(kept, f64::total_cmp);
+        }
+        let largest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Self {
+            mean,
+            trimmed: values[..kept].iter().sum::<f64>() / kept as f64,
+            p999: largest(&values[..kept]),
+            max: largest(&values),
+        }
     }
-    values[..kept].iter().sum::<f64>() / kept as f64
 }
 
 fn check(picture: &RgbImage, first: &RgbImage, second: &RgbImage) -> Result<()> {

@@ -61,7 +61,7 @@ impl Job<'_> {
                 renderer.restart(repetition)?;
                 let mut pace = Pace::new(pixels, false);
                 pace.advance(renderer, *spp, None, watch)?;
-                let figures = Figures::of(renderer);
+                let figures = Figures::of(renderer, pace.seconds);
                 timings.push(Timing {
                     sampler: samplers[turned].label.clone(),
                     wall_ms_per_sample: pace.seconds * 1e3 / f64::from(*spp),

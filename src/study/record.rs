@@ -15,6 +15,9 @@ use crate::{
 /// A run is judged where its mean squared error is at least this many times the reference's own.
 pub const JUDGED_FROM: f64 = 4.0;
 
+/// What [`Renderer::host_ms`] calls the rebuilds of the guide.
+const GUIDE_REBUILDS: &str = "guide rebuilds";
+
 /// What a run was made under, besides its sampler, rule and seed. A run is taken up again only where
 /// all of it is the same.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -125,6 +128,10 @@ pub struct Measurement {
     pub relmse: f64,
     /// The same without the worst 0.1% of the pixels.
     pub relmse_trimmed: f64,
+    /// 99.9th percentile of the pixels' relative squared errors.
+    pub relmse_p999: f64,
+    /// Their largest.
+    pub relmse_max: f64,
     /// Mean of the picture over that of the reference.
     pub mean_ratio: f64,
     /// Difference of the two means in its standard errors; absent where the reference does not say
@@ -170,6 +177,8 @@ impl Measurement {
             rmse: metrics.rmse,
             relmse: metrics.relmse,
             relmse_trimmed: metrics.relmse_trimmed,
+            relmse_p999: metrics.relmse_p999,
+            relmse_max: metrics.relmse_max,
             mean_ratio: metrics.mean_ratio,
             mean_deviation: error.zip(own.mean_standard_error).map(|(error, theirs)| {
                 let deviation = (metrics.mean_ratio - 1.0) * own.mean;
@@ -257,8 +266,8 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// What a renderer has counted since its last restart.
-    pub fn of(renderer: &Renderer) -> Self {
+    /// What a renderer has counted since its last restart, in `seconds` of passes.
+    pub fn of(renderer: &Renderer, seconds: f64) -> Self {
         let totals = renderer.totals();
         let samples = f64::from(renderer.sample_count().max(1));
         let gpu_ms = totals.gpu_ms.iter();
@@ -272,13 +281,15 @@ impl Figures {
             .into(),
             visible_share: (totals.shadow_rays_traced > 0)
                 .then(|| totals.shadow_rays_visible as f64 / totals.shadow_rays_traced as f64),
-            statistics: statistics(totals),
+            statistics: statistics(totals)
+                .chain(guide_rebuild_share(&renderer.host_ms(), seconds))
+                .collect(),
         }
     }
 }
 
 /// Figures of the totals that only some samplers or some runs have; 0 is left out.
-fn statistics(totals: &Totals) -> BTreeMap<String, f64> {
+fn statistics(totals: &Totals) -> impl Iterator<Item = (String, f64)> {
     [
         ("dropped_samples", totals.dropped_samples as f64),
         ("traversal_overruns", totals.traversal_overruns as f64),
@@ -287,7 +298,13 @@ fn statistics(totals: &Totals) -> BTreeMap<String, f64> {
     .filter(|(_, value)| *value != 0.0)
     .map(|(name, value)| (name.to_owned(), value))
     .chain(totals.sampler_statistics())
-    .collect()
+}
+
+/// Share of the wall time of the passes that the host took to rebuild the guide; none for samplers that
+/// have no guide.
+fn guide_rebuild_share(host_ms: &BTreeMap<String, f64>, seconds: f64) -> Option<(String, f64)> {
+    let ms = host_ms.get(GUIDE_REBUILDS)?;
+    (seconds > 0.0).then(|| ("guide_rebuild_share".to_owned(), 1e-3 * ms / seconds))
 }
 
 /// Device time of one sampler in one round of overhead measurements.
@@ -366,6 +383,15 @@ mod tests {
     fn the_means_error_shrinks_with_the_pixels() {
         let four = mean_standard_error([[2.0, 2.0, 2.0]; 4].into_iter());
         assert!((four - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_share_of_rebuilds_is_of_the_wall_time() {
+        let host_ms = BTreeMap::from([(GUIDE_REBUILDS.to_owned(), 500.0), ("bvh".into(), 9.0)]);
+        let share = guide_rebuild_share(&host_ms, 20.0);
+        assert_eq!(share, Some(("guide_rebuild_share".to_owned(), 0.025)));
+        assert_eq!(guide_rebuild_share(&host_ms, 0.0), None);
+        assert_eq!(guide_rebuild_share(&BTreeMap::new(), 20.0), None);
     }
 
     #[test]

@@ -193,10 +193,12 @@ impl Report {
         columns.extend(kinds.iter().map(|kind| format!("rays_{kind}_of_run")));
         columns.push("visible_share".to_owned());
         columns.extend(
-            ["rmse", "mse", "relmse", "relmse_trimmed", "mean_ratio", "mean_deviation"]
+            ["rmse", "mse", "relmse", "relmse_trimmed", "relmse_p999", "relmse_max"]
                 .map(str::to_owned),
         );
-        columns.extend(["mse_judged", "relmse_judged"].map(str::to_owned));
+        columns.extend(
+            ["mean_ratio", "mean_deviation", "mse_judged", "relmse_judged"].map(str::to_owned),
+        );
         columns.extend(passes.iter().map(|pass| format!("gpu_ms_per_sample_{pass}")));
         columns.extend(statistics.iter().cloned());
         let mut text = columns.join(",") + "\n";
@@ -245,6 +247,8 @@ fn row(run: &Run, rule: Rule, measurement: &Measurement, kinds: &BTreeSet<String
             measurement.mse,
             measurement.relmse,
             measurement.relmse_trimmed,
+            measurement.relmse_p999,
+            measurement.relmse_max,
             measurement.mean_ratio,
         ]
         .map(|value| value.to_string()),

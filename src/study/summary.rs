@@ -39,6 +39,10 @@ pub struct Summary {
     pub relmse: f64,
     /// The same without the worst 0.1% of the pixels of each run.
     pub relmse_trimmed: f64,
+    /// Mean of the 99.9th percentiles of the pixels' relative squared errors.
+    pub relmse_p999: f64,
+    /// Mean of the largest.
+    pub relmse_max: f64,
     /// Whether `mse` is at least [`JUDGED_FROM`] times the reference's own.
     pub mse_judged: bool,
     /// Whether the relative errors are.
@@ -169,6 +173,8 @@ fn summary(
         rmse: mse.max(0.0).sqrt(),
         relmse,
         relmse_trimmed,
+        relmse_p999: average(&|m| m.relmse_p999),
+        relmse_max: average(&|m| m.relmse_max),
         mse_judged,
         relmse_judged,
         rmse_ratio: by_seed(&|ours, theirs| (ours.mse / theirs.mse).sqrt()).filter(|_| both_judged),

@@ -113,10 +113,29 @@ fn trimming_drops_one_pixel_in_a_thousand() {
     assert!((metrics.relmse_trimmed - (1997.0 + 100.0) / 1998.0 / 1.01).abs() < 1e-12);
     let all = (1997.0 + 100.0 + 400.0 + 900.0) / 2000.0 / 1.01;
     assert!((metrics.relmse - all).abs() < 1e-12);
+    // The third of 2000 is the largest that at least 99.9% do not exceed.
+    assert!((metrics.relmse_p999 - 100.0 / 1.01).abs() < 1e-12);
+    assert!((metrics.relmse_max - 900.0 / 1.01).abs() < 1e-12);
     // Below a thousand pixels nothing is dropped.
     let (x, r) = example();
     let small = Metrics::of(&x, &r).unwrap();
     assert_eq!(small.relmse_trimmed, small.relmse);
+    assert_eq!([small.relmse_p999, small.relmse_max], [4.0 / 3.0 / 4.04; 2]);
+}
+
+#[test]
+fn the_percentile_is_the_nearest_rank() {
+    // 999 errors 1, 2, … 999 over 1.01: none is dropped; with a thousandth, the one before the last.
+    let percentile = |count: u16| {
+        let values = (1..=count).map(|value| [f32::from(value).sqrt() + 1.0; 3]);
+        let pixels: Vec<[f32; 3]> = values.collect();
+        let reference = picture(1, &vec![[1.0; 3]; pixels.len()]);
+        1.01 * Metrics::of(&picture(1, &pixels), &reference).unwrap().relmse_p999
+    };
+    for (count, rank) in [(1, 1.0), (999, 999.0), (1000, 999.0), (1999, 1998.0), (2000, 1998.0)] {
+        let found = percentile(count);
+        assert!((found - rank).abs() < 1e-2, "{count}: {found}");
+    }
 }
 
 #[test]

@@ -38,6 +38,8 @@ fn run(sampler: &str, seed: u32, variance: f64) -> Run {
         rmse: (variance / f64::from(spp)).sqrt(),
         relmse: 1.0,
         relmse_trimmed: if sampler == "ris" { 0.49 } else { 1.0 },
+        relmse_p999: 10.0 * f64::from(seed),
+        relmse_max: 100.0 * f64::from(seed),
         mean_ratio: 1.0 + 0.01 * f64::from(seed),
         mean_deviation: Some(-f64::from(seed)),
         mse_judged: true,
