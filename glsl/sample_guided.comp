@@ -18,37 +18,16 @@
 #define NEEDS_GUIDE
 #define NEEDS_LEARN_TARGETS
 #define WRITES_LEARN_TARGETS
-#include "guide.glsl"
+#include "candidates.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
-
-// 1 draws each ray from BRDF or guide (one-sample model); more resample, a fixed number of the
-// candidates from the BRDF and the rest from the guide.
-layout(constant_id = CONSTANT_CANDIDATES) const uint CANDIDATES = 1u;
-layout(constant_id = CONSTANT_BRDF_CANDIDATES) const uint BRDF_CANDIDATES = 1u;
 
 // Offsets of dimensions from the first of a vertex, for independent numbers.
 const uint DIMENSION_GUIDE_TECHNIQUE = 6u;
 const uint DIMENSION_GUIDE_RESAMPLING = 7u;
-const uint DIMENSION_GUIDE_BRDF = 8u;
-const uint DIMENSION_GUIDE_LOBE = 9u;
-const uint DIMENSION_GUIDE_REDRAW = 15u;
-const uint DIMENSION_GUIDE_REGION = 16u;
-const uint DIMENSION_GUIDE_PATCH = 24u;
 
 // Share of candidates chosen without regard to visibility.
 const float UNGUIDED_CHOICE = 0.1;
-
-// Numbers that are stratified over the samples since the last rebuild, scrambled anew for each: what
-// the cells hold does not depend on them.
-uvec2 epoch_bits(Vertex vertex, uint index, uint dimension) {
-    return random_bits_2d(
-        vertex.index.pixel, index, vertex.dimension + dimension, wave.epoch_seed);
-}
-
-uvec4 independent_bits(Vertex vertex, uint index, uint dimension) {
-    return hash_4d(uvec4(vertex.index.pixel, index, vertex.dimension + dimension, wave.epoch_seed));
-}
 
 // Share of the rays that sample the BRDF in the one-sample model, in 256ths.
 uint brdf_share(Material material) {
@@ -59,22 +38,6 @@ uint brdf_share(Material material) {
         share = material.alpha > 0.3 ? 26u : (material.alpha > 0.1 ? 77u : 128u);
     }
     return share;
-}
-
-Guided draw_candidate(Vertex vertex, uint first, uint index) {
-    return draw_guided(
-        vertex, first, epoch_bits(vertex, index, DIMENSION_GUIDE_REGION),
-        independent_bits(vertex, index, DIMENSION_GUIDE_PATCH),
-        random_1d(
-            vertex.index.pixel, index, vertex.dimension + DIMENSION_GUIDE_REDRAW, wave.epoch_seed));
-}
-
-Guided draw_brdf_candidate(Vertex vertex, uint first, uint index) {
-    uvec2 bits = epoch_bits(vertex, index, DIMENSION_GUIDE_BRDF);
-    float lobe = random_1d(
-        vertex.index.pixel, index, vertex.dimension + DIMENSION_GUIDE_LOBE, wave.epoch_seed);
-    return draw_brdf_guided(
-        vertex, first, vec3(unit_float(bits.x), unit_float(bits.y), lobe));
 }
 
 // Writes a ray that brings integrand * factor, and what it will teach.
@@ -104,9 +67,7 @@ struct Reservoir {
 };
 
 void add_to(inout Reservoir reservoir, Guided candidate) {
-    const float brdf_part = float(BRDF_CANDIDATES) / float(CANDIDATES);
-    float pdf =
-        brdf_part * candidate.considered.brdf_pdf + (1.0 - brdf_part) * guided_pdf(candidate);
+    float pdf = candidates_pdf(candidate);
     float unguided = pdf > 0.0 ? luminance(candidate.considered.integrand) / pdf : 0.0;
     float guided = unguided * candidate.entry.visibility;
     reservoir.guided_sum += guided;

@@ -271,10 +271,10 @@ Guided draw_guided(Vertex vertex, uint first, uvec2 bits, uvec4 more_bits, float
     return guided;
 }
 
-// A direction from the BRDF, and where it meets the partition.
-Guided draw_brdf_guided(Vertex vertex, uint first, vec3 u) {
+// A direction, and where it meets the partition.
+Guided locate_guided(uint first, Considered considered) {
     Guided guided;
-    guided.considered = draw_from_brdf(vertex, u);
+    guided.considered = considered;
     EnvironmentLocation location = environment_locate(guided.considered.direction);
     guided.region = texelFetch(
         guide_region_of_cell,
@@ -285,6 +285,11 @@ Guided draw_brdf_guided(Vertex vertex, uint first, vec3 u) {
         guided.product_factor = guide_product_factor(guided.region);
     }
     return guided;
+}
+
+// A direction from the BRDF.
+Guided draw_brdf_guided(Vertex vertex, uint first, vec3 u) {
+    return locate_guided(first, draw_from_brdf(vertex, u));
 }
 
 // Density of guided directions.

@@ -1,5 +1,5 @@
 // Puts paths into the state that the passes of product sampling find: a ray, the hit it made, and a
-// shadow ray with its outcome. For tests/product.rs.
+// shadow ray with its outcome. For tests/product.rs and tests/guided_candidates.rs.
 #version 460
 
 #define NEEDS_RAYS

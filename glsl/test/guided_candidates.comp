@@ -1,0 +1,67 @@
+// Draws one candidate of a shadow ray of the first path, or takes a direction as given, and evaluates
+// the densities there. For tests/guided_candidates.rs.
+#version 460
+
+#define NEEDS_PARAMETERS
+#define NEEDS_WAVE
+#define NEEDS_RAY_TEXELS
+#define NEEDS_HIT_TEXELS
+#define NEEDS_SHADOW_RAYS
+#define WRITES_SHADOW_RAYS
+#define NEEDS_MATERIAL_TEXELS
+#define NEEDS_ENVIRONMENT
+#define NEEDS_GUIDE
+#include "candidates.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+struct CandidateQuery {
+    // 1 draws a candidate, 0 takes the direction.
+    uint draws;
+    uint ray;
+    // Number of the candidate among those of the ray.
+    uint candidate;
+    vec3 direction;
+};
+
+struct CandidateAnswer {
+    vec3 direction;
+    float pdf;
+    float brdf_pdf;
+    float guided_pdf;
+};
+
+layout(scalar, set = SET_FILM, binding = 0) readonly buffer Queries {
+    CandidateQuery queries[];
+};
+layout(scalar, set = SET_FILM, binding = 1) writeonly buffer Answers {
+    CandidateAnswer answers[];
+};
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= queries.length()) {
+        return;
+    }
+    CandidateQuery query = queries[index];
+    Vertex vertex = load_vertex(0u, load_hit(0u));
+    uint cell = guide_cell(vertex, guide_cell_bits(vertex.index, vertex.dimension));
+    uint first = cell * guide.region_count;
+    if (PRODUCT_WEIGHTS != 0u) {
+        guide_weight_by_brdf(vertex, cell);
+    }
+    Guided guided;
+    if (query.draws == 0u) {
+        guided = locate_guided(first, consider_world(vertex, query.direction));
+    } else if (query.candidate < BRDF_CANDIDATES) {
+        uint number = query.ray * BRDF_CANDIDATES + query.candidate;
+        guided = draw_brdf_candidate(vertex, first, number);
+    } else {
+        uint guided_count = CANDIDATES - BRDF_CANDIDATES;
+        uint number = query.ray * guided_count + query.candidate - BRDF_CANDIDATES;
+        guided = draw_candidate(vertex, first, number);
+    }
+    answers[index] = CandidateAnswer(
+        guided.considered.direction, candidates_pdf(guided), guided.considered.brdf_pdf,
+        guided_pdf(guided));
+}

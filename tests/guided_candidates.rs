@@ -1,0 +1,314 @@
+//! The candidates that `guided` resamples are distributed as the density that they are divided by, and
+//! that density integrates to one: for 4 and 8 candidates, weights by the cell and by the product, a
+//! table that knows nothing and one that was trained, and every kind of material.
+//!
+//! A path is put in front of a surface by a probe; another draws the candidates of many shadow rays, with
+//! the functions of the sampling pass, and evaluates the density in directions of a quadrature. There is
+//! room for the cells of faces only. What becomes of the candidates is tested in
+//! `tests/guided_density.rs`. Seeds are fixed; another would raise a false alarm once in some hundred runs.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+#[path = "support/materials.rs"]
+mod materials;
+mod support;
+
+use std::f64::consts::PI;
+
+use bytemuck::{Pod, Zeroable};
+use fenestra::{
+    gpu::{
+        Buffer, Commands, DescriptorSet, Pipeline,
+        constants::{
+            CONSTANT_BRDF_CANDIDATES, CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS,
+            CONSTANT_PRODUCT_WEIGHTS, SET_FILM,
+        },
+        layout::Wave,
+    },
+    guide::GuideState,
+    renderer::{GuideBuffers, Renderer, SceneBuffers, Settings, WaveBuffers, window_of},
+    sampler::{Parameters, Sampler, Weights},
+    scene::{Material, Scene, material::MaterialKind},
+};
+use glam::{DVec3, Vec3, dvec3, vec3};
+use support::{scenes, statistics};
+
+/// Candidates per surface and state.
+const DRAWN: u32 = 1 << 15;
+/// Points of the quadrature over the sphere about the normal, in polar angle and azimuth.
+const ROWS: usize = 384;
+const COLUMNS: usize = 768;
+/// Bins in polar angle above the horizon and in azimuth; one more holds what is below.
+const BIN_ROWS: usize = 12;
+const BIN_COLUMNS: usize = 24;
+const BINS: usize = BIN_ROWS * BIN_COLUMNS + 1;
+/// Part of the candidates that samples the BRDF.
+const BRDF_PART: f64 = 0.25;
+/// That of the one-sample model on a diffuse surface: not what these candidates are divided by.
+const OTHER_BRDF_PART: f64 = 26.0 / 256.0;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct PathInput {
+    normal: [f32; 3],
+    material: u32,
+    outgoing: [f32; 3],
+    shadow_direction: [f32; 3],
+    is_visible: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct CandidateQuery {
+    draws: u32,
+    ray: u32,
+    candidate: u32,
+    direction: [f32; 3],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct CandidateAnswer {
+    direction: [f32; 3],
+    pdf: f32,
+    brdf_pdf: f32,
+    guided_pdf: f32,
+}
+
+/// A surface before the camera that points at a face which the room's picture sees, with the angle between normal and outgoing direction.
+struct Surface {
+    name: &'static str,
+    material: u32,
+    normal: DVec3,
+    theta: f64,
+}
+
+impl Surface {
+    /// Direction at a height over the surface and an azimuth about its normal.
+    fn to_world(&self, height: f64, phi: f64) -> DVec3 {
+        let tangent = self.normal.cross(dvec3(0.31, -0.7, 0.64)).normalize();
+        let bitangent = self.normal.cross(tangent);
+        let radius = (1.0 - height * height).max(0.0).sqrt();
+        radius * (phi.cos() * tangent + phi.sin() * bitangent) + height * self.normal
+    }
+
+    fn bin(&self, direction: [f32; 3]) -> usize {
+        let direction = Vec3::from(direction).as_dvec3();
+        let height = direction.dot(self.normal);
+        if height <= 0.0 {
+            return BINS - 1;
+        }
+        let (x, y) = (self.to_world(0.0, 0.0), self.to_world(0.0, 0.5 * PI));
+        let (x, y) = (direction.dot(x), direction.dot(y));
+        let (theta, phi) = (x.hypot(y).atan2(height), y.atan2(x).rem_euclid(2.0 * PI));
+        let row = ((theta / (0.5 * PI) * BIN_ROWS as f64) as usize).min(BIN_ROWS - 1);
+        let column = ((phi / (2.0 * PI) * BIN_COLUMNS as f64) as usize).min(BIN_COLUMNS - 1);
+        row * BIN_COLUMNS + column
+    }
+}
+
+fn surfaces() -> [Surface; 4] {
+    let surface = |name, material, normal: DVec3, theta| Surface {
+        name,
+        material,
+        normal: normal.normalize(),
+        theta,
+    };
+    [
+        surface("diffuse", 0, dvec3(0.1, 1.0, 0.2), 0.5),
+        surface("plastic", 1, dvec3(-0.6, 0.3, 1.0), 1.1),
+        surface("copper", 2, dvec3(-0.5, 0.8, -0.4), 0.8),
+        surface("measured", 3, dvec3(0.0, 1.0, 0.0), 0.9),
+    ]
+}
+
+fn scene() -> Scene {
+    let table = materials::synthetic_table(vec3(0.3, 0.2, 0.1), 0.3);
+    scenes::room(vec![
+        scenes::diffuse(vec3(0.6, 0.5, 0.4)),
+        scenes::plastic(0.25),
+        scenes::copper(0.3),
+        Material {
+            name: "measured".into(),
+            kind: MaterialKind::Measured { path: "synthetic".into(), table },
+        },
+    ])
+}
+
+fn parameters(weights: Weights) -> Parameters {
+    // No room for any cell but those of the faces.
+    Parameters { weights, guide_memory: 1, candidates: Some(4), ..Parameters::default() }
+}
+
+/// What a render has learned.
+fn trained(scene: &Scene) -> GuideState {
+    let parameters = parameters(Weights::Cell);
+    let settings = Settings { sampler: Sampler::Guided, parameters, ..Settings::default() };
+    let mut renderer = Renderer::new(support::device(), scene, settings).unwrap();
+    renderer.render_pass(64).unwrap();
+    renderer.guide_state().unwrap().unwrap()
+}
+
+/// Buffers around one path.
+struct Paths {
+    scene: SceneBuffers,
+    guide: GuideBuffers,
+    waves: WaveBuffers,
+    weights: Weights,
+}
+
+impl Paths {
+    fn new(scene: &Scene, weights: Weights) -> Self {
+        let device = support::device();
+        let window = window_of(&Settings::default(), scene);
+        Self {
+            scene: SceneBuffers::new(device, scene, window).unwrap(),
+            guide: GuideBuffers::new(device, scene, &parameters(weights), 64, 64).unwrap(),
+            waves: WaveBuffers::new(device, 64, 1, None).unwrap(),
+            weights,
+        }
+    }
+
+    /// Writes the ray and the hit of the path.
+    fn put(&self, surface: &Surface) {
+        let input = PathInput {
+            normal: surface.normal.as_vec3().into(),
+            material: surface.material,
+            outgoing: surface.to_world(surface.theta.cos(), 0.4).as_vec3().into(),
+            shadow_direction: [0.0, 1.0, 0.0],
+            is_visible: 1,
+        };
+        let device = support::device();
+        let input = Buffer::from_slice(device, "paths", &[input]).unwrap();
+        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_state.spv"));
+        let pipeline = Pipeline::new(device, "product_state", spirv, &[]).unwrap();
+        let film = DescriptorSet::new(device, SET_FILM, &[(0, &input)]).unwrap();
+        let mut commands = Commands::begin(device).unwrap();
+        commands.dispatch(&pipeline, &[self.waves.set(), &film], &[], 1);
+        commands.submit_and_wait().unwrap();
+    }
+
+    fn probe(&self, candidates: u32, queries: &[CandidateQuery]) -> Vec<CandidateAnswer> {
+        let device = support::device();
+        let constants = [
+            (CONSTANT_CANDIDATES, candidates),
+            (CONSTANT_BRDF_CANDIDATES, candidates / 4),
+            (CONSTANT_MATERIAL_KINDS, self.scene.material_kinds()),
+            (CONSTANT_PRODUCT_WEIGHTS, u32::from(self.weights == Weights::Product)),
+        ];
+        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/guided_candidates.spv"));
+        let pipeline = Pipeline::new(device, "guided_candidates", spirv, &constants).unwrap();
+        let input = Buffer::from_slice(device, "queries", queries).unwrap();
+        let bytes = (queries.len() * size_of::<CandidateAnswer>()) as u64;
+        let output = Buffer::zeroed(device, "answers", bytes).unwrap();
+        let film = DescriptorSet::new(device, SET_FILM, &[(0, &input), (1, &output)]).unwrap();
+        let wave = Wave {
+            pixel_count: 1,
+            sample_count: 1,
+            shadow_ray_count: 1,
+            total_shadow_rays: 1,
+            epoch_seed: 0x5eed + candidates,
+            ..Wave::default()
+        };
+        let sets = [self.scene.set(), self.guide.set(), self.waves.set(), &film];
+        let mut commands = Commands::begin(device).unwrap();
+        commands.dispatch(&pipeline, &sets, bytemuck::bytes_of(&wave), queries.len() as u32);
+        commands.submit_and_wait().unwrap();
+        let answers = output.download(queries.len()).unwrap();
+        support::assert_silent();
+        answers
+    }
+
+    /// How many of the candidates of many rays are in every bin.
+    fn observed(&self, surface: &Surface, candidates: u32) -> Vec<f64> {
+        let query = |index: u32| CandidateQuery {
+            draws: 1,
+            ray: index / candidates,
+            candidate: index % candidates,
+            direction: [0.0; 3],
+        };
+        let mut counts = vec![0.0; BINS];
+        for answer in self.probe(candidates, &(0..DRAWN).map(query).collect::<Vec<_>>()) {
+            counts[surface.bin(answer.direction)] += 1.0;
+        }
+        counts
+    }
+
+    /// The integrals over every bin of the candidates' density, and of those of BRDF and guide.
+    fn integrals(&self, surface: &Surface, candidates: u32) -> [Vec<f64>; 3] {
+        // One at random in each cell, so that edges of regions do no harm.
+        let query = |cell: usize| {
+            let u = materials::uniform(cell as u32, 31).as_dvec3();
+            let height = 1.0 - 2.0 * ((cell / COLUMNS) as f64 + u.x) / ROWS as f64;
+            let phi = ((cell % COLUMNS) as f64 + u.y) * 2.0 * PI / COLUMNS as f64;
+            let direction = surface.to_world(height, phi).as_vec3().into();
+            CandidateQuery { draws: 0, ray: 0, candidate: 0, direction }
+        };
+        let solid_angle = 4.0 * PI / (ROWS * COLUMNS) as f64;
+        let mut integrals = [(); 3].map(|()| vec![0.0; BINS]);
+        let queries: Vec<CandidateQuery> = (0..ROWS * COLUMNS).map(query).collect();
+        for (query, answer) in queries.iter().zip(self.probe(candidates, &queries)) {
+            let bin = surface.bin(query.direction);
+            let densities = [answer.pdf, answer.brdf_pdf, answer.guided_pdf];
+            for (integral, density) in integrals.iter_mut().zip(densities) {
+                integral[bin] += solid_angle * f64::from(density);
+            }
+        }
+        integrals
+    }
+}
+
+#[test]
+fn candidates_follow_the_density_that_they_are_divided_by() {
+    let scene = scene();
+    let state = trained(&scene);
+    for weights in [Weights::Cell, Weights::Product] {
+        let mut paths = Paths::new(&scene, weights);
+        // By surface and number of candidates.
+        let mut untrained: Vec<Vec<f64>> = Vec::new();
+        for is_trained in [false, true] {
+            if is_trained {
+                assert!(!paths.guide.restore(&state).unwrap(), "the same scene");
+            }
+            let mut known = untrained.into_iter();
+            let mut now = Vec::new();
+            for surface in &surfaces() {
+                paths.put(surface);
+                for candidates in [4, 8] {
+                    let name = format!(
+                        "{}, {candidates} candidates, {weights:?}, trained: {is_trained}",
+                        surface.name
+                    );
+                    let [mut expected, brdf, guided] = paths.integrals(surface, candidates);
+                    let [whole, of_brdf, of_guide] =
+                        [&expected, &brdf, &guided].map(|integral| integral.iter().sum::<f64>());
+                    assert!((of_guide - 1.0).abs() < 3e-3, "{name}: guided {of_guide}");
+                    assert!((0.5..1.003).contains(&of_brdf), "{name}: BRDF {of_brdf}");
+                    // Samples of the BRDF that its density leaves out are below the horizon.
+                    let lost = BRDF_PART * (1.0 - of_brdf);
+                    assert!((whole + lost - 1.0).abs() < 3e-3, "{name}: {whole} and {lost} lost");
+                    expected[BINS - 1] += lost.max(0.0);
+                    let observed = paths.observed(surface, candidates);
+                    let p = statistics::chi_square_p_value(&observed, &expected);
+                    eprintln!("{name}: integral {whole:.5}, {lost:.5} lost, p {p:.3}");
+                    assert!(p > 1e-4, "{name}: p = {p}");
+
+                    // The density of another share of the BRDF, and what is not learned, are found out.
+                    let mut other: Vec<f64> = brdf
+                        .iter()
+                        .zip(&guided)
+                        .map(|(a, b)| OTHER_BRDF_PART * a + (1.0 - OTHER_BRDF_PART) * b)
+                        .collect();
+                    other[BINS - 1] += OTHER_BRDF_PART * (1.0 - of_brdf).max(0.0);
+                    let p = statistics::chi_square_p_value(&observed, &other);
+                    assert!(p < 1e-6, "{name}: by another share, p = {p}");
+                    if let Some(before) = known.next() {
+                        let p = statistics::chi_square_p_value(&observed, &before);
+                        assert!(p < 1e-6, "{name}: as if untrained, p = {p}");
+                    }
+                    now.push(expected);
+                }
+            }
+            untrained = now;
+        }
+    }
+}
