@@ -1,5 +1,6 @@
 // Counts every shadow ray that was traced, and whether it reached the environment, into the cell and
-// region that sample_guided.comp noted. The counts are read between passes only.
+// region that sample_guided.comp noted, and of those that did, what they say about the share of the
+// BRDF. The counts are read between passes only.
 #version 460
 
 #define NEEDS_WAVE
@@ -15,11 +16,17 @@ void main() {
     if (ray >= wave.pixel_count * wave.sample_count * wave.shadow_ray_count) {
         return;
     }
-    uint target = learn_targets[ray];
-    if (target != NOTHING_TO_LEARN) {
-        atomicAdd(guide_counts[2u * target], 1u);
+    uvec2 target = learn_targets[ray];
+    if (target.x != NOTHING_TO_LEARN) {
+        atomicAdd(guide_counts[2u * target.x], 1u);
         if (visibility[ray] != 0u) {
-            atomicAdd(guide_counts[2u * target + 1u], 1u);
+            atomicAdd(guide_counts[2u * target.x + 1u], 1u);
+            if (target.y != NO_SHARE_TO_LEARN) {
+                uint cell = target.x / guide.region_count;
+                uint octave = cell * GUIDE_SHARE_OCTAVES + (target.y & 255u);
+                atomicAdd(guide_shares[2u * octave], 1u);
+                atomicAdd(guide_shares[2u * octave + 1u], target.y >> 8u);
+            }
         }
     }
 }

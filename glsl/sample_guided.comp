@@ -29,7 +29,8 @@ const uint DIMENSION_GUIDE_RESAMPLING = 7u;
 // Share of candidates chosen without regard to visibility.
 const float UNGUIDED_CHOICE = 0.1;
 
-// Share of the rays that sample the BRDF in the one-sample model, in 256ths.
+// Share of the rays that sample the BRDF in the one-sample model where the cell has learned none, in
+// 256ths.
 uint brdf_share(Material material) {
     uint share = 77u;
     if (is_kind(material, MATERIAL_DIFFUSE)) {
@@ -40,17 +41,25 @@ uint brdf_share(Material material) {
     return share;
 }
 
-// Writes a ray that brings integrand * factor, and what it will teach.
-void finish(uint index, uint first, Guided guided, float factor) {
+// Writes a ray that brings integrand * factor, and what it will teach. `from_brdf` is the part of its
+// density that is the BRDF's, in 256ths, of the one-sample model.
+void finish(uint index, uint first, Guided guided, float factor, uint from_brdf) {
     vec3 contribution = guided.considered.integrand * factor;
     write_ray(index, guided.considered.direction, contribution);
-    learn_targets[index] = contribution != vec3(0.0) ? first + guided.region : NOTHING_TO_LEARN;
+    int exponent = int(floatBitsToUint(luminance(contribution)) >> 23u) - 127;
+    uint octave = uint(clamp(
+        exponent + int(GUIDE_SHARE_OCTAVES / 2u), 0, int(GUIDE_SHARE_OCTAVES) - 1));
+    learn_targets[index] = uvec2(
+        contribution != vec3(0.0) ? first + guided.region : NOTHING_TO_LEARN,
+        CANDIDATES == 1u ? octave | from_brdf << 8u : NO_SHARE_TO_LEARN);
 }
 
 // A ray of the one-sample model: balance heuristic over BRDF and guide.
 void finish_one(uint index, uint first, Guided guided, float share) {
     float pdf = share * guided.considered.brdf_pdf + (1.0 - share) * guided_pdf(guided);
-    finish(index, first, guided, pdf > 0.0 ? 1.0 / pdf : 0.0);
+    float factor = pdf > 0.0 ? 1.0 / pdf : 0.0;
+    uint from_brdf = uint(256.0 * min(share * guided.considered.brdf_pdf * factor, 1.0) + 0.5);
+    finish(index, first, guided, factor, from_brdf);
 }
 
 // One of the candidates seen so far. It is chosen with the probability
@@ -97,12 +106,14 @@ void main() {
     Hit hit = load_hit(path);
     if (hit.material == NO_MATERIAL) {
         for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
-            learn_targets[i * path_count + path] = NOTHING_TO_LEARN;
+            learn_targets[i * path_count + path] = uvec2(NOTHING_TO_LEARN);
         }
         return;
     }
     Vertex vertex = load_vertex(path, hit);
-    uint cell = guide_cell(vertex, guide_cell_bits(vertex.index, vertex.dimension));
+    uint found = guide_cell(vertex, guide_cell_bits(vertex.index, vertex.dimension));
+    uint cell = guide_cell_index(found);
+    uint learned_share = found >> GUIDE_SHARE_SHIFT;
     uint first = cell * guide.region_count;
     if (PRODUCT_WEIGHTS != 0u) {
         guide_weight_by_brdf(vertex, cell);
@@ -116,7 +127,7 @@ void main() {
         // is from the BRDF with exactly that probability and both sequences are used without gaps.
         // The start is shared by a block of 8x8 pixels, and each technique has its own loop: devices
         // that run both sides of a branch then run one technique per ray.
-        uint share = brdf_share(vertex.material);
+        uint share = learned_share > 0u ? learned_share : brdf_share(vertex.material);
         uvec2 block = uvec2(
             vertex.index.pixel % parameters.film_width, vertex.index.pixel / parameters.film_width)
             / FILM_BLOCK;
@@ -177,7 +188,7 @@ void main() {
                     + UNGUIDED_CHOICE * reservoir.chosen_unguided / reservoir.unguided_sum;
                 factor = 1.0 / (float(CANDIDATES) * reservoir.chosen_pdf * chance);
             }
-            finish(i * path_count + path, first, reservoir.chosen, factor);
+            finish(i * path_count + path, first, reservoir.chosen, factor, 0u);
         }
     }
 }

@@ -108,6 +108,9 @@ pub struct Parameters {
     /// `hierarchy`: whether cells of `guided` that have seen little lean on larger ones; off for
     /// experiments.
     pub hierarchy: bool,
+    /// `learned-share`: whether `guided` with one candidate learns the share of rays from the BRDF; off
+    /// for experiments.
+    pub learned_share: bool,
     /// `regions`: most regions of the environment for `guided`, 16 to 1024; it starts with 256.
     pub regions: u32,
     /// `weights`: what `guided` weights the regions with.
@@ -122,6 +125,7 @@ impl Default for Parameters {
             candidates: None,
             guide_memory: 128 << 20,
             hierarchy: true,
+            learned_share: true,
             regions: 1024,
             weights: Weights::Cell,
             lobes: LobeParameters::default(),
@@ -130,8 +134,8 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    const KEYS: [&'static str; 5] =
-        ["candidates", "guide-memory", "hierarchy", "regions", "weights"];
+    const KEYS: [&'static str; 6] =
+        ["candidates", "guide-memory", "hierarchy", "learned-share", "regions", "weights"];
 
     /// Sets one parameter from `key=value`.
     ///
@@ -165,17 +169,8 @@ impl Parameters {
                         ))
                     })?;
             }
-            "hierarchy" => {
-                self.hierarchy = match value {
-                    "on" => true,
-                    "off" => false,
-                    _ => {
-                        return Err(Error::usage(format!(
-                            "--set hierarchy={value}: expected on or off"
-                        )));
-                    }
-                };
-            }
+            "hierarchy" => self.hierarchy = parse_switch(key, value)?,
+            "learned-share" => self.learned_share = parse_switch(key, value)?,
             "regions" => {
                 self.regions =
                     value.parse().ok().filter(|count| (16..=1024).contains(count)).ok_or_else(
@@ -238,8 +233,9 @@ impl Parameters {
                 let mut named = BTreeMap::from([("candidates".to_owned(), count)]);
                 if sampler == Sampler::Guided {
                     named.insert("regions".to_owned(), self.regions.to_string());
-                    let hierarchy = if self.hierarchy { "on" } else { "off" };
-                    named.insert("hierarchy".to_owned(), hierarchy.to_owned());
+                    let switch = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
+                    named.insert("hierarchy".to_owned(), switch(self.hierarchy));
+                    named.insert("learned-share".to_owned(), switch(self.learned_share));
                     let weights = if self.weights == Weights::Cell { "cell" } else { "product" };
                     named.insert("weights".to_owned(), weights.to_owned());
                     named.insert("guide-memory".to_owned(), self.guide_memory.to_string());
@@ -251,6 +247,14 @@ impl Parameters {
             }
             _ => BTreeMap::new(),
         }
+    }
+}
+
+fn parse_switch(key: &str, value: &str) -> Result<bool> {
+    match value {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err(Error::usage(format!("--set {key}={value}: expected on or off"))),
     }
 }
 

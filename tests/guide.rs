@@ -5,7 +5,7 @@
 mod support;
 
 use fenestra::{
-    gpu::constants::{BINDING_GUIDE_COUNTS, GUIDE_NO_KEY, SET_SRBF},
+    gpu::constants::{BINDING_GUIDE_COUNTS, BINDING_GUIDE_SHARES, GUIDE_NO_KEY, SET_SRBF},
     guide::{
         CellKey, EstimateOptions, FACE_COUNT, Learned, PARENT_COUNT, Partition, decode_entry,
         likely_regions,
@@ -577,9 +577,11 @@ fn feedback_inside_a_pass_would_be_caught() {
         .find(|(name, _)| *name == "sample_guided")
         .expect("the pass exists");
     assert!(!binds(spirv, SET_SRBF, BINDING_GUIDE_COUNTS));
+    assert!(!binds(spirv, SET_SRBF, BINDING_GUIDE_SHARES));
     let (_, spirv) =
         fenestra::gpu::shaders::PASSES.iter().find(|(name, _)| *name == "learn").unwrap();
     assert!(binds(spirv, SET_SRBF, BINDING_GUIDE_COUNTS));
+    assert!(binds(spirv, SET_SRBF, BINDING_GUIDE_SHARES));
 }
 
 /// Whether a shader declares a variable at a set and binding (SPIR-V decorations 33 and 34).

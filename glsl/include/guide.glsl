@@ -109,7 +109,8 @@ void guide_want(uint key) {
     }
 }
 
-// The cell of a vertex: the fine one, else the coarse one around it, else that of its face.
+// The cell of a vertex: the fine one, else the coarse one around it, else that of its face; with its
+// share of the BRDF, 256ths, from bit GUIDE_SHARE_SHIFT on, 0 where it has none.
 uint guide_cell(Vertex vertex, uint bits) {
     uint face = guide_face(vertex.hit.geometric_normal);
     uint key = guide_key(vertex.hit.position, face, bits);
@@ -123,6 +124,11 @@ uint guide_cell(Vertex vertex, uint bits) {
         is_missing = false;
     }
     return cell;
+}
+
+// Index of the cell that guide_cell found.
+uint guide_cell_index(uint found) {
+    return found & ((1u << GUIDE_SHARE_SHIFT) - 1u);
 }
 
 // bits * count / 2^32.

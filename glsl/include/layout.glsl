@@ -168,11 +168,14 @@ layout(set = SET_SCENE, binding = BINDING_ENVIRONMENT_CELLS) uniform samplerBuff
     environment_cells;
 #endif
 
-#ifdef NEEDS_GUIDE
+#if defined(NEEDS_GUIDE) || defined(NEEDS_GUIDE_COUNTS)
 layout(scalar, set = SET_SRBF, binding = BINDING_GUIDE_PARAMETERS)
     readonly buffer GuideParametersBuffer {
     GuideParameters guide;
 };
+#endif
+
+#ifdef NEEDS_GUIDE
 layout(set = SET_SRBF, binding = BINDING_GUIDE_TABLE) uniform usamplerBuffer guide_table;
 layout(set = SET_SRBF, binding = BINDING_GUIDE_ENTRIES) uniform usamplerBuffer guide_entries;
 layout(set = SET_SRBF, binding = BINDING_GUIDE_REGIONS) uniform usamplerBuffer guide_regions;
@@ -189,6 +192,9 @@ layout(scalar, set = SET_SRBF, binding = BINDING_GUIDE_WANTED) buffer GuideWante
 layout(scalar, set = SET_SRBF, binding = BINDING_GUIDE_COUNTS) buffer GuideCountsBuffer {
     uint guide_counts[];
 };
+layout(scalar, set = SET_SRBF, binding = BINDING_GUIDE_SHARES) buffer GuideSharesBuffer {
+    uint guide_shares[];
+};
 #endif
 
 #ifdef NEEDS_LEARN_TARGETS
@@ -199,7 +205,7 @@ layout(scalar, set = SET_SRBF, binding = BINDING_GUIDE_COUNTS) buffer GuideCount
 #endif
 layout(scalar, set = SET_SRBF, binding = BINDING_LEARN_TARGETS)
     ACCESS_LEARN_TARGETS buffer LearnTargetsBuffer {
-    uint learn_targets[];
+    uvec2 learn_targets[];
 };
 #endif
 

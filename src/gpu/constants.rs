@@ -51,6 +51,9 @@ pub const BINDING_ENVIRONMENT_LOBES: u32 = 0;
 pub const BINDING_BRDF_LOBES: u32 = 1;
 /// SRBF set: first lobe of each material and its lobes per view, texels of two words.
 pub const BINDING_MATERIAL_LOBES: u32 = 2;
+/// SRBF set: per cell and octave of light, visible rays and their c p_B / q in 256ths, since the last
+/// rebuild.
+pub const BINDING_GUIDE_SHARES: u32 = 3;
 /// SRBF set: [`GuideParameters`](super::layout::GuideParameters), one element.
 pub const BINDING_GUIDE_PARAMETERS: u32 = 4;
 /// SRBF set: hash table from keys to cells of the scene, texels of two words: key, index of the cell.
@@ -68,7 +71,8 @@ pub const BINDING_GUIDE_REGION_OF_CELL: u32 = 9;
 pub const BINDING_GUIDE_COUNTS: u32 = 10;
 /// SRBF set: keys of the cells that a pass missed.
 pub const BINDING_GUIDE_WANTED: u32 = 11;
-/// SRBF set: index into the counts per shadow ray, or `NOTHING_TO_LEARN`.
+/// SRBF set: two words per shadow ray: index into the counts, or `NOTHING_TO_LEARN`; octave of its
+/// light + 256 · c p_B / q in 256ths (see `guide::ShareEvidence`), or `NO_SHARE_TO_LEARN`.
 pub const BINDING_LEARN_TARGETS: u32 = 12;
 /// SRBF set: the likeliest regions of each cell, texels of four words (see
 /// `guide::LikelyRegion`).
@@ -238,10 +242,17 @@ pub const GUIDE_PROBES: u32 = 8;
 pub const GUIDE_LIKELY_REGIONS: u32 = 16;
 /// Levels of the visibility in an entry.
 pub const GUIDE_VISIBILITY_LEVELS: u32 = 64;
+/// Octaves of light by which rays are counted for the share of the BRDF, from 2^-32 on.
+pub const GUIDE_SHARE_OCTAVES: u32 = 64;
+/// First bit of a cell's share of the BRDF in the hash table, 256ths; below it is the cell's index.
+pub const GUIDE_SHARE_SHIFT: u32 = 24;
 /// Key of no cell.
 pub const GUIDE_NO_KEY: u32 = 0xffff_ffff;
 /// Learning target of a shadow ray that was not traced.
 pub const NOTHING_TO_LEARN: u32 = 0xffff_ffff;
+
+/// Second learning target of a shadow ray that was not drawn from one of two techniques.
+pub const NO_SHARE_TO_LEARN: u32 = 0xffff_ffff;
 
 /// [`Hit::material`](super::layout::Hit::material) of a ray that left the scene or was not traced.
 pub const NO_MATERIAL: u32 = 0xffff_ffff;
@@ -413,11 +424,15 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("BINDING_GUIDE_WANTED", BINDING_GUIDE_WANTED),
     ("BINDING_LEARN_TARGETS", BINDING_LEARN_TARGETS),
     ("BINDING_GUIDE_LIKELY", BINDING_GUIDE_LIKELY),
+    ("BINDING_GUIDE_SHARES", BINDING_GUIDE_SHARES),
     ("CONSTANT_BRDF_CANDIDATES", CONSTANT_BRDF_CANDIDATES),
     ("CONSTANT_PRODUCT_WEIGHTS", CONSTANT_PRODUCT_WEIGHTS),
     ("GUIDE_PROBES", GUIDE_PROBES),
     ("GUIDE_LIKELY_REGIONS", GUIDE_LIKELY_REGIONS),
     ("GUIDE_VISIBILITY_LEVELS", GUIDE_VISIBILITY_LEVELS),
+    ("GUIDE_SHARE_OCTAVES", GUIDE_SHARE_OCTAVES),
+    ("GUIDE_SHARE_SHIFT", GUIDE_SHARE_SHIFT),
+    ("NO_SHARE_TO_LEARN", NO_SHARE_TO_LEARN),
     ("GUIDE_NO_KEY", GUIDE_NO_KEY),
     ("NOTHING_TO_LEARN", NOTHING_TO_LEARN),
 ];

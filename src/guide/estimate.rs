@@ -32,11 +32,13 @@ const TARGET_RANGE: f32 = 10.5;
 pub struct EstimateOptions {
     /// Whether cells lean on coarser ones; else on the rate of the whole scene.
     pub hierarchy: bool,
+    /// Whether the share of rays from the BRDF is learned; else it goes by the material.
+    pub learned_share: bool,
 }
 
 impl Default for EstimateOptions {
     fn default() -> Self {
-        Self { hierarchy: true }
+        Self { hierarchy: true, learned_share: true }
     }
 }
 

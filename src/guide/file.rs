@@ -1,7 +1,8 @@
 //! What was learned, in a file: `--save-guide`, `--load-guide`, and beside a checkpoint.
 //!
 //! One line of JSON, then 32-bit words in little-endian order: the rectangles that are the regions, the
-//! keys of the cells, trials and hits per cell and region in sixteenths of rays, what passes counted since the last rebuild, and the keys they missed. The
+//! keys of the cells, trials and hits per cell and region in sixteenths of rays, what visible rays say about
+//! the share of the BRDF, what passes counted of both since the last rebuild, and the keys they missed. The
 //! header has the SHA-256 of the words.
 
 use std::{fs, io::Write, path::Path};
@@ -9,13 +10,14 @@ use std::{fs, io::Write, path::Path};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::share::SHARE_WORDS;
 use crate::{
     error::{Error, Result},
     film::write_atomically,
 };
 
 const FORMAT: &str = "fenestra-guide";
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// Everything a renderer needs to go on learning where another stopped.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,8 +36,13 @@ pub struct GuideState {
     pub keys: Vec<u32>,
     /// Trials and hits per cell and region up to the last rebuild, in sixteenths of rays.
     pub counts: Vec<[u32; 2]>,
+    /// Visible rays and their c p_B / q per cell and octave of light up to then, see
+    /// [`ShareEvidence`](super::ShareEvidence).
+    pub shares: Vec<u32>,
     /// Trials and hits per cell and region since then; empty where there are none.
     pub pending: Vec<[u32; 2]>,
+    /// Of the shares since then; empty where there are none.
+    pub pending_shares: Vec<u32>,
     /// Keys that were missed since then.
     pub wanted: Vec<u32>,
 }
@@ -66,6 +73,7 @@ struct Header {
     is_open: bool,
     cells: usize,
     pending: usize,
+    pending_shares: usize,
     wanted: usize,
 }
 
@@ -86,7 +94,9 @@ impl GuideState {
             .iter()
             .chain(&self.keys)
             .chain(self.counts.as_flattened())
+            .chain(&self.shares)
             .chain(self.pending.as_flattened())
+            .chain(&self.pending_shares)
             .chain(&self.wanted);
         words.extend(all.flat_map(|word| word.to_le_bytes()));
         let header = Header {
@@ -99,6 +109,7 @@ impl GuideState {
             is_open: self.is_open,
             cells: self.keys.len(),
             pending: self.pending.len(),
+            pending_shares: self.pending_shares.len(),
             wanted: self.wanted.len(),
         };
         let header =
@@ -143,8 +154,11 @@ impl GuideState {
         let length = counts.and_then(|counts| {
             let pairs = counts.checked_add(header.pending)?.checked_mul(2)?;
             let fives = (header.origin.regions as usize).checked_mul(5)?;
+            let shares = header.cells.checked_mul(SHARE_WORDS)?;
             pairs
                 .checked_add(fives)?
+                .checked_add(shares)?
+                .checked_add(header.pending_shares)?
                 .checked_add(header.cells)?
                 .checked_add(header.wanted)?
                 .checked_mul(4)
@@ -152,7 +166,8 @@ impl GuideState {
         let (Some(counts), Some(length)) = (counts, length) else {
             return Err(damaged("its header holds impossible lengths"));
         };
-        if length != words.len() || header.pending > counts {
+        let shares = header.cells * SHARE_WORDS;
+        if length != words.len() || header.pending > counts || header.pending_shares > shares {
             return Err(damaged(&format!("{length} bytes expected, {} found", words.len())));
         }
         let mut words = words
@@ -173,7 +188,9 @@ impl GuideState {
                 .collect(),
             keys: take(header.cells),
             counts: pairs(take(2 * counts)),
+            shares: take(shares),
             pending: pairs(take(2 * header.pending)),
+            pending_shares: take(header.pending_shares),
             wanted: take(header.wanted),
         })
     }
@@ -195,7 +212,9 @@ mod tests {
             rectangles: vec![[0, 0, 5, 9, 0], [5, 0, 3, 9, 1]],
             keys: vec![u32::MAX, 7, 8],
             counts: vec![[1, 0], [2, 1], [3, 3], [0, 0], [1 << 24, 5], [9, 9]],
+            shares: (0..3 * SHARE_WORDS as u32).collect(),
             pending: vec![[4, 4]],
+            pending_shares: vec![1, 2, 3],
             wanted: vec![0x1234_5678],
         }
     }

@@ -8,8 +8,9 @@ use super::{
     estimate::{Count, EstimateOptions, Estimates, PARTS_PER_RAY, decode_entry},
     key::{CellKey, FACE_COUNT, face_normal},
     partition::Partition,
+    share::{SHARE_WORDS, ShareEvidence, share_in_256ths},
 };
-use crate::gpu::constants::GUIDE_PROBES;
+use crate::gpu::constants::{GUIDE_PROBES, GUIDE_SHARE_SHIFT};
 
 /// Trials of one region and cell above which both counts are halved.
 const LARGEST_COUNT: u64 = (1 << 24) * PARTS_PER_RAY;
@@ -25,13 +26,16 @@ pub struct Learned {
     /// Rays that were counted in the cell itself, cell by cell and region by region.
     counts: Vec<Count>,
     region_count: usize,
+    /// What visible rays say about the share of the BRDF, [`SHARE_WORDS`] words per cell.
+    shares: Vec<u32>,
     refused: u64,
 }
 
 /// What the next pass reads, as it lies on the device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Snapshot {
-    /// Hash table: key and index of a cell, [`CellKey::NONE`] where empty.
+    /// Hash table: key of a cell, [`CellKey::NONE`] where empty; its index and, from bit
+    /// [`GUIDE_SHARE_SHIFT`] on, its share of the BRDF in 256ths, 0 where that goes by the material.
     pub table: Vec<[u32; 2]>,
     /// Entries of every cell, region by region.
     pub entries: Vec<[u32; 2]>,
@@ -52,24 +56,29 @@ impl Learned {
             index_of: HashMap::new(),
             counts: vec![Count::default(); FACE_COUNT * region_count],
             region_count,
+            shares: vec![0; FACE_COUNT * SHARE_WORDS],
             refused: 0,
         }
     }
 
-    /// As [`Self::new`], with the keys and counts (trials, hits, in sixteenths of rays) that an earlier
-    /// one had; what finds no room is left out. With `forget`, every count is divided by that number.
+    /// As [`Self::new`], with the keys, counts (trials, hits, in sixteenths of rays) and shares that an
+    /// earlier one had; what finds no room is left out. With `forget`, every count is divided by that
+    /// number.
     ///
     /// # Panics
-    /// As [`Self::new`]; if there are not as many counts as keys and regions, the faces first.
+    /// As [`Self::new`]; if there are not as many counts as keys and regions, the faces first, or
+    /// shares.
     pub fn resume(
         region_count: usize,
         capacity: usize,
         slots: usize,
         keys: &[u32],
         counts: &[[u32; 2]],
+        shares: &[u32],
         forget: u32,
     ) -> Self {
         assert!(keys.len() >= FACE_COUNT && counts.len() == keys.len() * region_count, "lengths");
+        assert_eq!(shares.len(), keys.len() * SHARE_WORDS, "lengths");
         let mut learned = Self::new(region_count, capacity, slots);
         for key in keys[FACE_COUNT..].iter().take(capacity - FACE_COUNT).map(|&word| CellKey(word))
         {
@@ -84,6 +93,8 @@ impl Learned {
                 trials: u64::from(trials / forget),
             })
             .collect();
+        let count = learned.keys.len() * SHARE_WORDS;
+        learned.shares = shares[..count].iter().map(|count| count / forget).collect();
         learned
     }
 
@@ -92,6 +103,11 @@ impl Learned {
         // Counts stay below LARGEST_COUNT and what one stretch of passes adds.
         let word = |count: u64| u32::try_from(count).unwrap_or(u32::MAX);
         self.counts.iter().map(|count| [word(count.trials), word(count.hits)]).collect()
+    }
+
+    /// What visible rays say about the share of the BRDF, as [`Self::resume`] takes it.
+    pub fn shares(&self) -> &[u32] {
+        &self.shares
     }
 
     /// Number of cells, faces included.
@@ -136,6 +152,18 @@ impl Learned {
         }
     }
 
+    /// Adds what one stretch of passes found about the share of the BRDF, [`SHARE_WORDS`] words per
+    /// cell; what was found before counts half from now on.
+    ///
+    /// # Panics
+    /// If there are more words than cells have.
+    pub fn add_shares(&mut self, found: &[u32]) {
+        assert!(found.len() <= self.shares.len(), "shares of cells that are there");
+        for (share, found) in self.shares.iter_mut().zip(found) {
+            *share = (*share / 2).saturating_add(*found);
+        }
+    }
+
     /// Makes room for the fine cells `wanted`, in any order and repeated at will: first for their
     /// coarse cells, then for themselves, as long as there is room.
     pub fn want(&mut self, wanted: &[u32]) {
@@ -158,6 +186,7 @@ impl Learned {
             self.index_of.insert(key, self.keys.len());
             self.keys.push(key);
             self.counts.resize(self.counts.len() + self.region_count, Count::default());
+            self.shares.resize(self.shares.len() + SHARE_WORDS, 0);
         }
     }
 
@@ -262,19 +291,59 @@ impl Learned {
             };
             entries.copy_from_slice(&estimates.entries(face_normal(face), partition));
         });
-        Snapshot { table: self.table(), entries }
+        let shares = if options.learned_share {
+            self.shares_in_256ths(options.hierarchy)
+        } else {
+            vec![0; self.keys.len()]
+        };
+        Snapshot { table: self.table(&shares), entries }
     }
 
-    /// The hash table; what finds no slot within [`GUIDE_PROBES`] is left out, and its place falls
+    /// Share of the BRDF of every cell, 256ths, 0 where it is left to the material. A cell leans on
+    /// its coarse cell, that on its face, that on the scene.
+    fn shares_in_256ths(&self, hierarchy: bool) -> Vec<u32> {
+        let own: Vec<ShareEvidence> =
+            self.shares.par_chunks(SHARE_WORDS).map(ShareEvidence::of).collect();
+        let mut sums = own.clone();
+        let mut scene = ShareEvidence::default();
+        let mut faces = [ShareEvidence::default(); FACE_COUNT];
+        for (index, (key, evidence)) in self.keys.iter().zip(&own).enumerate() {
+            scene.add(*evidence);
+            faces[if index < FACE_COUNT { index } else { key.face() }].add(*evidence);
+            if index >= FACE_COUNT
+                && !key.is_coarse()
+                && let Some(&coarse) = self.index_of.get(&key.coarse())
+            {
+                sums[coarse].add(*evidence);
+            }
+        }
+        let scene = scene.share(None);
+        let share = |(index, key): (usize, &CellKey)| {
+            let face = if index < FACE_COUNT { index } else { key.face() };
+            let mut around = faces[face].share(scene);
+            if !hierarchy {
+                around = scene;
+            } else if index >= FACE_COUNT
+                && !key.is_coarse()
+                && let Some(&coarse) = self.index_of.get(&key.coarse())
+            {
+                around = sums[coarse].share(around);
+            }
+            share_in_256ths(sums[index].share(around))
+        };
+        self.keys.iter().enumerate().map(share).collect()
+    }
+
+    /// The hash table, with `shares` of the BRDF by cell; what finds no slot within [`GUIDE_PROBES`] is left out, and its place falls
     /// back to the coarse cell or the face.
-    fn table(&self) -> Vec<[u32; 2]> {
+    fn table(&self, shares: &[u32]) -> Vec<[u32; 2]> {
         let mut table = vec![[CellKey::NONE.0, 0]; self.slots];
         let mask = (self.slots - 1) as u32;
         for (index, key) in self.keys.iter().enumerate().skip(FACE_COUNT) {
             let first = key.slot(mask);
             let slots = (0..GUIDE_PROBES).map(|probe| ((first + probe) & mask) as usize);
             if let Some(slot) = slots.into_iter().find(|&slot| table[slot][0] == CellKey::NONE.0) {
-                table[slot] = [key.0, index as u32];
+                table[slot] = [key.0, index as u32 | shares[index] << GUIDE_SHARE_SHIFT];
             }
         }
         table

@@ -17,6 +17,7 @@ mod key;
 mod learned;
 mod likely;
 mod partition;
+mod share;
 mod split;
 
 pub use alias::{AliasEntry, alias_table, probabilities};
@@ -27,4 +28,5 @@ pub use file::{GuideState, Origin};
 pub use key::{CellKey, FACE_COUNT, face_normal};
 pub use learned::{Learned, Snapshot};
 pub use likely::{LikelyRegion, likely_regions};
-pub use partition::{PARENT_COUNT, Partition, Region};
+pub use partition::{MOST_REGIONS, PARENT_COUNT, Partition, Region};
+pub use share::{SHARE_WORDS, ShareEvidence, share_in_256ths};

@@ -13,14 +13,14 @@ use crate::{
         constants::{
             BINDING_GUIDE_ALIASES, BINDING_GUIDE_COUNTS, BINDING_GUIDE_ENTRIES,
             BINDING_GUIDE_LIKELY, BINDING_GUIDE_PARAMETERS, BINDING_GUIDE_REGION_OF_CELL,
-            BINDING_GUIDE_REGIONS, BINDING_GUIDE_TABLE, BINDING_GUIDE_WANTED,
+            BINDING_GUIDE_REGIONS, BINDING_GUIDE_SHARES, BINDING_GUIDE_TABLE, BINDING_GUIDE_WANTED,
             BINDING_LEARN_TARGETS, GUIDE_LIKELY_REGIONS, GUIDE_NO_KEY, SET_SRBF,
         },
         layout::GuideParameters,
     },
     guide::{
         CellKey, EstimateOptions, FACE_COUNT, GuideState, Learned, LikelyRegion, Origin, Partition,
-        Snapshot, decode_entry, decode_visibility, likely_regions,
+        SHARE_WORDS, Snapshot, decode_entry, decode_visibility, likely_regions,
     },
     sampler::{Parameters, Weights},
     scene::{self, Scene},
@@ -108,6 +108,7 @@ pub struct GuideBuffers {
     aliases: Buffer,
     region_of_cell: Buffer,
     counts: Buffer,
+    shares: Buffer,
     wanted: Buffer,
     targets: Buffer,
     /// Likeliest regions of every cell; of one cell where they are not used.
@@ -130,14 +131,17 @@ impl GuideBuffers {
         rays: u64,
     ) -> Result<Self> {
         let (hierarchy, weights) = (parameters.hierarchy, parameters.weights);
+        let learned_share = parameters.learned_share;
         let most_regions = parameters.regions as usize;
         let partition = Partition::new(&scene.environment, most_regions.min(FIRST_REGIONS));
         let region_count = partition.regions.len();
         let uses_likely = weights == Weights::Product;
         let likely_bytes = 16 * u64::from(GUIDE_LIKELY_REGIONS);
         let useful_cells = FEW_CELLS.max(u64::from(pixels) / PIXELS_PER_CELL) as usize;
-        let lists_per_region = if uses_likely { likely_bytes / region_count as u64 } else { 0 };
-        let by_memory = parameters.guide_memory / (BYTES_PER_REGION + lists_per_region);
+        // What cells take besides is most per region where these are fewest.
+        let besides = 4 * SHARE_WORDS as u64 + if uses_likely { likely_bytes } else { 0 };
+        let by_memory =
+            parameters.guide_memory / (BYTES_PER_REGION + besides.div_ceil(region_count as u64));
         let by_range = device.capabilities().max_storage_buffer_range / (BYTES_PER_REGION / 2);
         let room = Room {
             counts: (by_memory.min(by_range) as usize)
@@ -170,8 +174,9 @@ impl GuideBuffers {
         let region_of_cell =
             Buffer::texels_from_slice(device, "guide region of cell", &partition.region_of_cell)?;
         let counts = Buffer::new(device, "guide counts", cells as u64)?;
+        let shares = Buffer::new(device, "guide shares", 4 * (capacity * SHARE_WORDS) as u64)?;
         let wanted = Buffer::new(device, "guide wanted", 4 * wanted_slots as u64)?;
-        let targets = Buffer::new(device, "learn targets", 4 * rays)?;
+        let targets = Buffer::new(device, "learn targets", 8 * rays)?;
         let lists = if uses_likely { capacity as u64 } else { 1 };
         let likely = Buffer::new(device, "guide likely", lists * likely_bytes)?;
         let set = DescriptorSet::new(
@@ -185,6 +190,7 @@ impl GuideBuffers {
                 (BINDING_GUIDE_ALIASES, &aliases),
                 (BINDING_GUIDE_REGION_OF_CELL, &region_of_cell),
                 (BINDING_GUIDE_COUNTS, &counts),
+                (BINDING_GUIDE_SHARES, &shares),
                 (BINDING_GUIDE_WANTED, &wanted),
                 (BINDING_LEARN_TARGETS, &targets),
                 (BINDING_GUIDE_LIKELY, &likely),
@@ -195,7 +201,7 @@ impl GuideBuffers {
             set,
             partition,
             is_split: false,
-            options: EstimateOptions { hierarchy },
+            options: EstimateOptions { hierarchy, learned_share },
             learned,
             room,
             origin,
@@ -207,6 +213,7 @@ impl GuideBuffers {
             aliases,
             region_of_cell,
             counts,
+            shares,
             wanted,
             targets,
             likely,
@@ -255,6 +262,8 @@ impl GuideBuffers {
         let start = Instant::now();
         let counted = self.learned.cell_count() * self.partition.regions.len();
         self.learned.add(&self.counts.download::<[u32; 2]>(counted)?);
+        let words = self.learned.cell_count() * SHARE_WORDS;
+        self.learned.add_shares(&self.shares.download::<u32>(words)?);
         self.learned.want(&self.wanted.download::<u32>(self.wanted_slots)?);
         let now = self.partition.regions.len();
         let count = self.room.regions(now, self.learned.cell_count(), self.learned.rays());
@@ -289,7 +298,8 @@ impl GuideBuffers {
     /// # Errors
     /// A failing device.
     pub fn targets(&self, count: usize) -> Result<Vec<u32>> {
-        self.targets.download(count)
+        let words: Vec<[u32; 2]> = self.targets.download(count)?;
+        Ok(words.into_iter().map(|[target, _]| target).collect())
     }
 
     /// What a cell knows, as passes read it.
@@ -334,7 +344,9 @@ impl GuideBuffers {
             rectangles: self.partition.rectangles(),
             keys: self.learned.keys().iter().map(|key| key.0).collect(),
             counts: self.learned.trials_and_hits(),
+            shares: self.learned.shares().to_vec(),
             pending: self.counts.download(counted)?,
+            pending_shares: self.shares.download(self.learned.cell_count() * SHARE_WORDS)?,
             wanted: wanted.into_iter().filter(|key| *key != CellKey::NONE.0).collect(),
         })
     }
@@ -374,6 +386,7 @@ impl GuideBuffers {
             self.table.size() as usize / 8,
             &state.keys,
             &state.counts,
+            &state.shares,
             forget,
         );
         self.origin.grid_origin = there.grid_origin;
@@ -386,6 +399,9 @@ impl GuideBuffers {
         let room = self.learned.cell_count() * self.partition.regions.len();
         self.counts
             .upload(bytemuck::cast_slice(&state.pending[..state.pending.len().min(room)]))?;
+        let room = self.learned.cell_count() * SHARE_WORDS;
+        let shares = &state.pending_shares[..state.pending_shares.len().min(room)];
+        self.shares.upload(bytemuck::cast_slice(shares))?;
         let wanted = &state.wanted[..state.wanted.len().min(self.wanted_slots)];
         self.wanted.upload(bytemuck::cast_slice(wanted))?;
         self.upload()?;
@@ -410,6 +426,8 @@ impl GuideBuffers {
         // What lies behind belongs to no cell.
         let used = self.learned.cell_count() * self.partition.regions.len();
         commands.fill_start(&self.counts, 8 * used as u64, 0);
+        let used = self.learned.cell_count() * SHARE_WORDS;
+        commands.fill_start(&self.shares, 4 * used as u64, 0);
         commands.fill(&self.wanted, GUIDE_NO_KEY);
         commands.submit_and_wait()?;
         Ok(())
@@ -438,6 +456,7 @@ impl GuideBuffers {
             &self.aliases,
             &self.region_of_cell,
             &self.counts,
+            &self.shares,
             &self.wanted,
             &self.targets,
             &self.likely,
