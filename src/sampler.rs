@@ -1,5 +1,6 @@
 //! The samplers by name, their parameters, and how `--set key=value` reaches them.
 
+mod candidates;
 mod lobes;
 
 use std::collections::BTreeMap;
@@ -9,6 +10,10 @@ use crate::{
     gpu::constants,
 };
 
+pub use candidates::{
+    CandidateCost, GUIDED_CANDIDATES, Spread, choose, climb, is_most_a_clear_loss,
+    relative_variances,
+};
 pub use lobes::{CacheScope, Elevation, LobeOrder, LobeParameters, Threshold};
 
 /// How directions are chosen at a hit. All are unbiased, but for [`Elevation::Metropolis`], and trace
@@ -101,7 +106,7 @@ pub enum Weights {
 pub struct Parameters {
     /// `candidates`: directions that each shadow ray is chosen from; `None` is `auto`. `ris` takes 2,
     /// 4, 6 or 8 (auto 4), half from the BRDF and half from the environment; `guided` takes 1, 4 or 8
-    /// (auto 1 on software devices, else 4), a quarter from the BRDF.
+    /// (auto by measured cost), a quarter from the BRDF.
     pub candidates: Option<u32>,
     /// `guide-memory`: most bytes for the cells of `guided`.
     pub guide_memory: u64,
@@ -201,17 +206,15 @@ impl Parameters {
         Ok(())
     }
 
-    /// Candidates per shadow ray of `sampler` on a software device or another, 1 where it does not
-    /// resample.
+    /// Candidates per shadow ray that `sampler` begins with, 1 where it does not resample.
     ///
     /// # Errors
     /// [`Error::Usage`] where the sampler cannot take as many as were asked for.
-    pub fn candidates_of(&self, sampler: Sampler, is_software: bool) -> Result<u32> {
+    pub fn candidates_of(&self, sampler: Sampler) -> Result<u32> {
         let (allowed, auto): (&[u32], u32) = match sampler {
             Sampler::Ris => (&[2, 4, 6, 8], 4),
-            // Four candidates take about three times the time of one, and lower the variance per ray
-            // by a fifth: worth it where rays dominate. Measured in docs/guided.md.
-            Sampler::Guided => (&[1, 4, 8], if is_software { 1 } else { 4 }),
+            // Until it is measured whether more are worth their time.
+            Sampler::Guided => (&GUIDED_CANDIDATES, GUIDED_CANDIDATES[0]),
             _ => return Ok(1),
         };
         let count = self.candidates.unwrap_or(auto);
@@ -293,14 +296,13 @@ mod tests {
         let mut parameters = Parameters::default();
         parameters.set("candidates=8").unwrap();
         assert_eq!(parameters.candidates, Some(8));
-        assert_eq!(parameters.candidates_of(Sampler::Ris, true).unwrap(), 8);
-        assert_eq!(parameters.candidates_of(Sampler::Mis, true).unwrap(), 1);
+        assert_eq!(parameters.candidates_of(Sampler::Ris).unwrap(), 8);
+        assert_eq!(parameters.candidates_of(Sampler::Mis).unwrap(), 1);
         parameters.set("candidates=1").unwrap();
-        let error = parameters.candidates_of(Sampler::Ris, true).unwrap_err().to_string();
+        let error = parameters.candidates_of(Sampler::Ris).unwrap_err().to_string();
         assert!(error.contains("[2, 4, 6, 8]"), "{error}");
         parameters.set("candidates=auto").unwrap();
-        assert_eq!(parameters.candidates_of(Sampler::Guided, false).unwrap(), 4);
-        assert_eq!(parameters.candidates_of(Sampler::Guided, true).unwrap(), 1);
+        assert_eq!(parameters.candidates_of(Sampler::Guided).unwrap(), 1);
         parameters.set("guide-memory=16MiB").unwrap();
         assert_eq!(parameters.guide_memory, 16 << 20);
         for wrong in [

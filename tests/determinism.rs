@@ -6,7 +6,7 @@ mod support;
 use fenestra::{
     film::{Aov, Sums},
     renderer::{Renderer, Settings, Window},
-    sampler::Sampler,
+    sampler::{Parameters, Sampler},
     scene::Scene,
 };
 use glam::Vec3;
@@ -16,6 +16,7 @@ fn scene() -> Scene {
     scenes::room(vec![scenes::diffuse(Vec3::splat(0.7)), scenes::plastic(0.1), scenes::copper(0.2)])
 }
 
+/// `candidates` are given, since `auto` is measured and may differ from run to run.
 fn settings(sampler: Sampler) -> Settings {
     let mut aovs = vec![Aov::Albedo, Aov::Normal, Aov::Position, Aov::Visible];
     match sampler {
@@ -23,7 +24,9 @@ fn settings(sampler: Sampler) -> Settings {
         Sampler::Guided => aovs.push(Aov::GuideCell),
         _ => {}
     }
-    Settings { sampler, depth: 3, seed: 7, aovs, ..Settings::default() }
+    let candidates = (sampler == Sampler::Guided).then_some(1);
+    let parameters = Parameters { candidates, ..Parameters::default() };
+    Settings { sampler, parameters, depth: 3, seed: 7, aovs, ..Settings::default() }
 }
 
 fn render(settings: Settings, passes: &[u32]) -> Sums {

@@ -43,6 +43,7 @@ fn metadata(ranges: &[SampleRange]) -> Metadata {
         fit_hashes: named("environment", "77ff"),
         sampler: "ris".to_owned(),
         sampler_parameters: named("candidates", "4"),
+        candidates: Some(4),
         shadow_rays: 5,
         depth: 1,
         sample_ranges: ranges.to_vec(),
@@ -456,6 +457,12 @@ fn merged_checkpoints_equal_one_run() {
     // Order does not matter.
     let other = merge_checkpoints(&[(a, &first), (b, &second)]).unwrap();
     assert_eq!(other.sums, merged.sums);
+    // Parts may have been drawn from other numbers of candidates, which a measurement chose.
+    assert_eq!(other.metadata.candidates, Some(4));
+    let mut second = second.clone();
+    second.metadata.candidates = Some(1);
+    let mixed = merge_checkpoints(&[(a, &first), (b, &second)]).unwrap();
+    assert_eq!(mixed.metadata.candidates, None);
 }
 
 #[test]

@@ -137,6 +137,7 @@ fn every_mode_is_unbiased_in_a_room() {
         1,
         64,
         &[
+            ("as measured", with(1, &|settings| settings.parameters.candidates = None)),
             ("one-sample", with(1, &unchanged)),
             ("4 candidates", with(4, &unchanged)),
             ("8 candidates", with(8, &unchanged)),

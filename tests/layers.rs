@@ -44,6 +44,8 @@ fn visibility(assignments: &[&str]) -> Settings {
 fn guided() -> Settings {
     Settings {
         sampler: Sampler::Guided,
+        // `auto` is measured and may differ from run to run.
+        parameters: Parameters { candidates: Some(1), ..Parameters::default() },
         aovs: vec![Aov::GuideCell, Aov::Normal],
         ..Settings::default()
     }

@@ -2,6 +2,7 @@
 
 mod arguments;
 mod pixel;
+mod statistics;
 
 use std::{
     path::{Path, PathBuf},
@@ -21,8 +22,8 @@ use super::{
 use crate::{
     error::{Error, Result},
     film::{
-        Checkpoint, Metadata, SampleRange, Statistics, Sums, check_writable,
-        checkpoint::checkpoint_path, display::DisplayServer, png::write_preview,
+        Checkpoint, Metadata, SampleRange, Sums, check_writable, checkpoint::checkpoint_path,
+        display::DisplayServer, png::write_preview,
     },
     gpu::Device,
     renderer::{Renderer, Settings, Window},
@@ -355,6 +356,7 @@ impl<'a> Job<'a> {
                 first: self.arguments.sample_offset,
                 count: renderer.sample_count(),
             }],
+            candidates: renderer.candidates(),
             seconds: self.seconds(),
             gpu_seconds: renderer
                 .totals()
@@ -416,57 +418,6 @@ impl<'a> Job<'a> {
             eprintln!("wrote {}", names.join(", "));
         }
         Ok(())
-    }
-
-    fn statistics(
-        &self,
-        renderer: &Renderer,
-        metadata: &Metadata,
-        reason: StopReason,
-        load_ms: f64,
-    ) -> Statistics {
-        let totals = renderer.totals();
-        let window = self.window();
-        let mut host_ms = renderer.host_ms();
-        host_ms.insert("load".into(), load_ms);
-        let sampler_statistics = totals.sampler_statistics();
-        let figure = |name: &str| sampler_statistics.get(name).copied();
-        Statistics {
-            version: metadata.version.clone(),
-            scene: metadata.scene.clone(),
-            scene_hash: metadata.scene_hash.clone(),
-            triangles: self.scene.geometry.triangles.len() as u64,
-            width: window.width,
-            height: window.height,
-            device: metadata.device.clone(),
-            driver: metadata.driver.clone(),
-            sampler: metadata.sampler.clone(),
-            sampler_parameters: metadata.sampler_parameters.clone(),
-            shadow_rays_per_vertex: metadata.shadow_rays,
-            depth: metadata.depth,
-            sample_ranges: metadata.sample_ranges.clone(),
-            samples_per_pixel: renderer.sample_count(),
-            stop_reason: reason.name().to_owned(),
-            relative_standard_error: self.relative_error.filter(|error| error.is_finite()),
-            seconds: self.seconds(),
-            rays: [
-                ("camera".to_owned(), totals.camera_rays),
-                ("shadow".to_owned(), totals.shadow_rays_traced),
-                ("bounce".to_owned(), totals.bounce_rays),
-            ]
-            .into(),
-            visible_share: (totals.shadow_rays_traced > 0)
-                .then(|| totals.shadow_rays_visible as f64 / totals.shadow_rays_traced as f64),
-            cache_entries_per_hit: figure("cache_entries_per_hit"),
-            lobes_per_hit: figure("lobes_per_hit"),
-            energy_kept: figure("energy_kept"),
-            cdf_rebuilds_per_hit: figure("cdf_rebuilds_per_hit"),
-            dropped_samples: totals.dropped_samples,
-            gpu_ms: totals.gpu_ms.clone(),
-            host_ms,
-            pipeline_compile_ms: renderer.compile_ms().clone(),
-            buffer_bytes: renderer.buffer_bytes(),
-        }
     }
 }
 

@@ -198,6 +198,7 @@ fn check_overlap(first_path: &Path, first: &Metadata, path: &Path, part: &Metada
 
 fn add_metadata(merged: &mut Metadata, part: &Metadata) {
     merged.add_ranges(part);
+    merged.candidates = merged.candidates.filter(|_| merged.candidates == part.candidates);
     merged.seconds += part.seconds;
     for (name, seconds) in &part.gpu_seconds {
         *merged.gpu_seconds.entry(name.clone()).or_default() += seconds;

@@ -71,6 +71,9 @@ pub struct Metadata {
     pub sampler: String,
     /// Sampler's parameters as text, by name.
     pub sampler_parameters: BTreeMap<String, String>,
+    /// Candidates that `guided` chose each shadow ray from, where they are known and the same in all
+    /// parts; the parameter of that name is what was asked for.
+    pub candidates: Option<u32>,
     /// Directions traced at every vertex of every camera path.
     pub shadow_rays: u32,
     /// Path vertices at which environment light is gathered.
@@ -119,6 +122,9 @@ impl Metadata {
         put("fenestra.driver", text(&self.driver));
         for (name, value) in &self.sampler_parameters {
             put(&format!("fenestra.sampler_parameters.{name}"), text(value));
+        }
+        if let Some(candidates) = self.candidates {
+            put("fenestra.candidates", Attribute::Text(candidates.to_string()));
         }
         for (name, value) in &self.fit_hashes {
             put(&format!("fenestra.fit_hashes.{name}"), text(value));
@@ -181,6 +187,10 @@ impl Metadata {
             fit_hashes: texts("fenestra.fit_hashes."),
             sampler: text("fenestra.sampler")?,
             sampler_parameters: texts("fenestra.sampler_parameters."),
+            candidates: match image.attributes.contains_key("fenestra.candidates") {
+                true => Some(number("fenestra.candidates")?),
+                false => None,
+            },
             shadow_rays: number("fenestra.shadow_rays")?,
             depth: number("fenestra.depth")?,
             sample_ranges,

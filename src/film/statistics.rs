@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, io::Write, path::Path};
 
 use super::{metadata::SampleRange, write_atomically};
-use crate::error::Result;
+use crate::{error::Result, sampler::CandidateCost};
 
 /// Numbers of one render. Times are of this run only, also where it continued a checkpoint.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -29,6 +29,11 @@ pub struct Statistics {
     pub sampler: String,
     /// Sampler's parameters as text, by name.
     pub sampler_parameters: BTreeMap<String, String>,
+    /// Candidates that `guided` chose each shadow ray from, asked for or measured; absent for other
+    /// samplers and in open scenes.
+    pub candidates: Option<u32>,
+    /// What was measured to choose them in this run; empty where nothing was.
+    pub candidate_costs: Vec<CandidateCost>,
     /// Directions traced at every vertex.
     pub shadow_rays_per_vertex: u32,
     /// Path vertices at which environment light is gathered.

@@ -14,6 +14,7 @@ use super::share::SHARE_WORDS;
 use crate::{
     error::{Error, Result},
     film::write_atomically,
+    sampler::GUIDED_CANDIDATES,
 };
 
 const FORMAT: &str = "fenestra-guide";
@@ -30,6 +31,8 @@ pub struct GuideState {
     pub rebuilt_at: u32,
     /// Whether the scene was found open, so that nothing more is learned.
     pub is_open: bool,
+    /// Candidates per shadow ray, one of [`GUIDED_CANDIDATES`]; absent where that is not decided.
+    pub candidates: Option<u32>,
     /// First column and row, columns, rows and parent of every region.
     pub rectangles: Vec<[u32; 5]>,
     /// Key of every cell, the faces first.
@@ -71,6 +74,7 @@ struct Header {
     samples: u32,
     rebuilt_at: u32,
     is_open: bool,
+    candidates: Option<u32>,
     cells: usize,
     pending: usize,
     pending_shares: usize,
@@ -107,6 +111,7 @@ impl GuideState {
             samples: self.samples,
             rebuilt_at: self.rebuilt_at,
             is_open: self.is_open,
+            candidates: self.candidates,
             cells: self.keys.len(),
             pending: self.pending.len(),
             pending_shares: self.pending_shares.len(),
@@ -150,6 +155,9 @@ impl GuideState {
         if checksum(words) != header.checksum {
             return Err(damaged("its checksum does not match its content"));
         }
+        if header.candidates.is_some_and(|count| !GUIDED_CANDIDATES.contains(&count)) {
+            return Err(damaged("its header holds an impossible number of candidates"));
+        }
         let counts = header.cells.checked_mul(header.origin.regions as usize);
         let length = counts.and_then(|counts| {
             let pairs = counts.checked_add(header.pending)?.checked_mul(2)?;
@@ -182,6 +190,7 @@ impl GuideState {
             samples: header.samples,
             rebuilt_at: header.rebuilt_at,
             is_open: header.is_open,
+            candidates: header.candidates,
             rectangles: take(5 * regions)
                 .chunks_exact(5)
                 .map(|words| [words[0], words[1], words[2], words[3], words[4]])
@@ -209,6 +218,7 @@ mod tests {
             samples: 5,
             rebuilt_at: 4,
             is_open: true,
+            candidates: Some(8),
             rectangles: vec![[0, 0, 5, 9, 0], [5, 0, 3, 9, 1]],
             keys: vec![u32::MAX, 7, 8],
             counts: vec![[1, 0], [2, 1], [3, 3], [0, 0], [1 << 24, 5], [9, 9]],
@@ -247,8 +257,12 @@ mod tests {
         other[place] = b'9';
         assert!(message(&other).contains("version 9"));
         let place = good.windows(9).position(|w| w == b"\"cells\":3").unwrap() + 8;
-        let mut other = good;
+        let mut other = good.clone();
         other[place] = b'4';
         assert!(message(&other).contains("bytes expected"));
+        let place = good.windows(14).position(|w| w == b"\"candidates\":8").unwrap() + 13;
+        let mut other = good;
+        other[place] = b'3';
+        assert!(message(&other).contains("impossible number of candidates"));
     }
 }

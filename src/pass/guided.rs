@@ -1,7 +1,7 @@
 //! The passes of learned visibility: `sample_guided` in the place of `sample`, and `learn` after
 //! `shadow`; `guide_cells` where that layer is asked for.
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use crate::{
     error::Result,
@@ -19,7 +19,13 @@ use crate::{
 
 /// The pipelines.
 pub struct Guided {
-    sample: Pipeline,
+    device: Arc<Device>,
+    weights: Weights,
+    material_kinds: u32,
+    /// By the number of candidates.
+    sample: BTreeMap<u32, Pipeline>,
+    /// The number in use.
+    candidates: u32,
     learn: Pipeline,
     cells: Pipeline,
 }
@@ -36,24 +42,51 @@ impl Guided {
         weights: Weights,
         material_kinds: u32,
     ) -> Result<Self> {
-        let constants = [
-            (CONSTANT_CANDIDATES, candidates),
-            (CONSTANT_BRDF_CANDIDATES, (candidates / 4).max(1)),
-            (CONSTANT_MATERIAL_KINDS, material_kinds),
-            (CONSTANT_PRODUCT_WEIGHTS, u32::from(weights == Weights::Product)),
-        ];
-        let name = "sample_guided";
-        Ok(Self {
-            sample: Pipeline::new(device, name, shaders::pass(name), &constants)?,
+        let mut guided = Self {
+            device: Arc::clone(device),
+            weights,
+            material_kinds,
+            sample: BTreeMap::new(),
+            candidates,
             learn: Pipeline::new(device, "learn", shaders::pass("learn"), &[])?,
             cells: Pipeline::new(device, "guide_cells", shaders::pass("guide_cells"), &[])?,
-        })
+        };
+        guided.use_candidates(candidates)?;
+        Ok(guided)
+    }
+
+    /// Chooses shadow rays from `candidates` from now on. Returns whether the pipeline had to be
+    /// created.
+    ///
+    /// # Errors
+    /// A Vulkan call fails.
+    pub fn use_candidates(&mut self, candidates: u32) -> Result<bool> {
+        let is_new = !self.sample.contains_key(&candidates);
+        if is_new {
+            let constants = [
+                (CONSTANT_CANDIDATES, candidates),
+                (CONSTANT_BRDF_CANDIDATES, (candidates / 4).max(1)),
+                (CONSTANT_MATERIAL_KINDS, self.material_kinds),
+                (CONSTANT_PRODUCT_WEIGHTS, u32::from(self.weights == Weights::Product)),
+            ];
+            let name = "sample_guided";
+            let pipeline = Pipeline::new(&self.device, name, shaders::pass(name), &constants)?;
+            self.sample.insert(candidates, pipeline);
+        }
+        self.candidates = candidates;
+        Ok(is_new)
+    }
+
+    /// Drops the pipelines for other numbers of candidates than the one in use.
+    pub fn drop_others(&mut self) {
+        self.sample.retain(|candidates, _| *candidates == self.candidates);
     }
 
     /// Records the choice of directions at every hit of `wave`; `sets` are scene, guide and wave.
     pub fn record_sample(&self, commands: &mut Commands, sets: &[&DescriptorSet], wave: &Wave) {
         let paths = wave.pixel_count * wave.sample_count;
-        commands.dispatch(&self.sample, sets, bytemuck::bytes_of(wave), paths.max(1));
+        let pipeline = &self.sample[&self.candidates];
+        commands.dispatch(pipeline, sets, bytemuck::bytes_of(wave), paths.max(1));
     }
 
     /// Records the counting of every shadow ray of `wave`; `sets` are guide and wave.

@@ -111,9 +111,7 @@ impl Passes {
         let create = |name: &str, constants: &[(u32, u32)]| {
             Pipeline::new(device, name, shaders::pass(name), constants)
         };
-        let candidates = settings
-            .parameters
-            .candidates_of(settings.sampler, device.capabilities().kind == "software")?;
+        let candidates = settings.parameters.candidates_of(settings.sampler)?;
         let basic = match settings.sampler {
             Sampler::Guided => Sampler::Mis,
             sampler => sampler,
@@ -177,6 +175,11 @@ impl Passes {
     pub fn limit_shadow_rays(&mut self, shadow_rays: u32) {
         assert!(shadow_rays <= self.most_shadow_rays, "buffers have room for {shadow_rays}");
         self.settings.shadow_rays = shadow_rays;
+    }
+
+    /// The passes of the sampler `guided`.
+    pub fn guided(&mut self) -> Option<&mut Guided> {
+        self.guided.as_mut()
     }
 
     /// Shadow rays per hit in one group of dispatches.

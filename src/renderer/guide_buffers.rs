@@ -341,6 +341,7 @@ impl GuideBuffers {
             samples: 0,
             rebuilt_at: 0,
             is_open: false,
+            candidates: None,
             rectangles: self.partition.rectangles(),
             keys: self.learned.keys().iter().map(|key| key.0).collect(),
             counts: self.learned.trials_and_hits(),
@@ -421,7 +422,11 @@ impl GuideBuffers {
         Ok(())
     }
 
-    fn clear_counts(&self) -> Result<()> {
+    /// Forgets what passes counted since the last rebuild.
+    ///
+    /// # Errors
+    /// A failing device.
+    pub fn clear_counts(&self) -> Result<()> {
         let mut commands = Commands::begin(&self.device)?;
         // What lies behind belongs to no cell.
         let used = self.learned.cell_count() * self.partition.regions.len();

@@ -1,10 +1,12 @@
 //! Progressive rendering of a scene on a device: scene → buffers → waves of paths → film sums.
 
+mod candidates;
 mod film_buffers;
 mod guide_buffers;
 mod guided_pixel;
 mod lobe_buffers;
 mod pixel;
+mod resume;
 mod scene_buffers;
 mod settings;
 mod totals;
@@ -13,15 +15,15 @@ mod wave_buffers;
 use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
 use crate::{
-    error::{Error, Result},
+    error::Result,
     film::Sums,
     gpu::{Commands, Device, PassTimes, layout::Wave},
-    guide::GuideState,
     pass::{PassSettings, Passes, SHADOW_RAYS_PER_GROUP, Sets},
     random::hash_4d,
     sampler::{CacheScope, Elevation, Sampler},
     scene::Scene,
 };
+use candidates::Choice;
 use film_buffers::FilmBuffers;
 pub use guide_buffers::GuideBuffers;
 use guide_buffers::{SPLIT_AFTER, guide_schedule};
@@ -75,6 +77,8 @@ pub struct Renderer {
     is_open: bool,
     /// Samples at the last rebuild of the guide.
     rebuilt_at: u32,
+    /// From how many candidates the sampler `guided` chooses.
+    choice: Choice,
     totals: Totals,
     compile_ms: PassTimes,
 }
@@ -159,11 +163,13 @@ impl Renderer {
             is_trained: false,
             is_open: false,
             rebuilt_at: 0,
+            choice: Choice::default(),
             totals: Totals::default(),
             compile_ms: PassTimes::new(),
         };
         renderer.compile_ms = renderer.passes.warm_up(device, &renderer.sets())?;
         renderer.compile_ms.insert("pipelines".into(), create_ms);
+        renderer.forget_choice()?;
         Ok(renderer)
     }
 
@@ -239,6 +245,9 @@ impl Renderer {
         {
             self.rebuild(self.sample_count == SPLIT_AFTER)?;
         }
+        if self.choice.candidates.is_none() {
+            self.choose_candidates()?;
+        }
         Ok(guide_schedule(self.sample_count + 1) - self.sample_count)
     }
 
@@ -305,7 +314,8 @@ impl Renderer {
         }
     }
 
-    /// Empties the film to render the same settings with another seed.
+    /// Empties the film to render the same settings with another seed, from nothing: a sampler that
+    /// learns forgets, and `candidates=auto` is measured anew, since every run has to pay for it.
     ///
     /// # Errors
     /// [`Error::Vulkan`] if the device fails.
@@ -321,7 +331,7 @@ impl Renderer {
         self.settings.seed = seed;
         self.sample_count = 0;
         self.totals = Totals::default();
-        Ok(())
+        self.forget_choice()
     }
 
     /// Samples per pixel in the film.
@@ -344,6 +354,7 @@ impl Renderer {
         let mut host_ms = self.scene.host_ms().clone();
         if let Some(guide) = &self.guide {
             host_ms.insert("guide rebuilds".to_owned(), guide.rebuild_ms());
+            host_ms.insert("choice of candidates".to_owned(), self.choice.ms);
         }
         if let Some(lobes) = &self.lobes {
             host_ms.insert("fits".to_owned(), lobes.fit_ms());
@@ -375,84 +386,6 @@ impl Renderer {
         sums.film_size = self.film_size;
         sums.sample_count = self.sample_count;
         Ok(sums)
-    }
-
-    /// Continues from sums that an earlier renderer with the same settings left.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] if the window or the layers differ, or if pixels keep visibility caches, which
-    /// sums do not hold; [`Error::Vulkan`] if the device fails.
-    pub fn restore(&mut self, sums: &Sums) -> Result<()> {
-        if self.waves.keeps_caches() && sums.sample_count > 0 {
-            return Err(Error::usage(format!(
-                "--resume with --set cache=pixel: the {} samples per pixel of the checkpoint taught \
-                 visibility caches that it does not hold, so the image would not be that of one \
-                 render; render without --resume, or with --sample-offset {} and merge the two, or \
-                 use cache=hit",
-                sums.sample_count,
-                self.settings.first_sample.saturating_add(sums.sample_count)
-            )));
-        }
-        if sums.film_size != self.film_size
-            || sums.origin != [self.window.x, self.window.y]
-            || [sums.width, sums.height] != [self.window.width, self.window.height]
-        {
-            return Err(Error::usage(format!(
-                "the checkpoint holds pixels {}x{} from {:?} of a film of {:?}, expected {}x{} from \
-                 {:?} of {:?}",
-                sums.width,
-                sums.height,
-                sums.origin,
-                sums.film_size,
-                self.window.width,
-                self.window.height,
-                [self.window.x, self.window.y],
-                self.film_size
-            )));
-        }
-        self.film.upload(sums)?;
-        self.sample_count = sums.sample_count;
-        Ok(())
-    }
-
-    /// What the sampler `guided` has learned; `None` for the others.
-    ///
-    /// # Errors
-    /// [`Error::Vulkan`] if the device fails.
-    pub fn guide_state(&self) -> Result<Option<GuideState>> {
-        let state = self.guide.as_ref().map(GuideBuffers::state).transpose()?;
-        Ok(state.map(|state| GuideState {
-            samples: self.sample_count,
-            rebuilt_at: self.rebuilt_at,
-            is_open: self.is_open,
-            ..state
-        }))
-    }
-
-    /// Goes on from what an earlier renderer learned, without training. With as many samples in the
-    /// film as the state was taken at, this continues that renderer to the bit. Returns whether the
-    /// geometry is another, so that most was forgotten.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] if the environment or the regions differ, or if this sampler learns nothing;
-    /// [`Error::Vulkan`] if the device fails.
-    pub fn restore_guide(&mut self, state: &GuideState) -> Result<bool> {
-        let Some(guide) = &mut self.guide else {
-            return Err(Error::usage(format!(
-                "the sampler {} learns nothing; a guide is for --sampler guided",
-                self.settings.sampler.name()
-            )));
-        };
-        let has_moved = guide.restore(state)?;
-        self.is_open = state.is_open && !has_moved;
-        if state.samples == self.sample_count {
-            self.rebuilt_at = state.rebuilt_at;
-        } else {
-            guide.rebuild(false)?;
-            self.rebuilt_at = self.sample_count;
-        }
-        self.is_trained = true;
-        Ok(has_moved)
     }
 }
 

@@ -93,7 +93,7 @@ pub(super) fn check(settings: &Settings, window: Window, film_size: [u32; 2]) ->
             settings.shadow_rays
         )));
     }
-    settings.parameters.candidates_of(settings.sampler, false)?;
+    settings.parameters.candidates_of(settings.sampler)?;
     for (aov, layer, only) in [
         (Aov::CacheEntries, "cache-entries", Sampler::Visibility),
         (Aov::GuideCell, "guide-cell", Sampler::Guided),

@@ -37,7 +37,7 @@ impl Contender {
         for assignment in parts {
             parameters.set(assignment)?;
         }
-        parameters.candidates_of(sampler, false)?;
+        parameters.candidates_of(sampler)?;
         Ok(Self { label: label.to_owned(), sampler, parameters })
     }
 

@@ -283,6 +283,9 @@ impl Figures {
                 .then(|| totals.shadow_rays_visible as f64 / totals.shadow_rays_traced as f64),
             statistics: statistics(totals)
                 .chain(guide_rebuild_share(&renderer.host_ms(), seconds))
+                .chain(
+                    renderer.candidates().map(|count| ("candidates".to_owned(), f64::from(count))),
+                )
                 .collect(),
         }
     }

@@ -315,7 +315,8 @@ fn render_half(
             && renderer.sample_count() > 0
         {
             let range = SampleRange { seed, first: 0, count: renderer.sample_count() };
-            let metadata = Metadata { sample_ranges: vec![range], ..metadata.clone() };
+            let candidates = renderer.candidates();
+            let metadata = Metadata { sample_ranges: vec![range], candidates, ..metadata.clone() };
             if let Some(state) = renderer.guide_state()? {
                 state.write(&guide_path(&checkpoint_path))?;
             }
@@ -324,6 +325,7 @@ fn render_half(
         }
         result?;
     }
+    metadata.candidates = renderer.candidates();
     let mut image = renderer.sums()?.to_image(&[Aov::Variance]);
     metadata.store(&mut image);
     image.write_exr(path)?;

@@ -1,0 +1,271 @@
+//! From how many candidates `guided` chooses a shadow ray under `auto`: samples of a few pixels and
+//! the time they took → what a sample costs → a number.
+//!
+//! The error at equal time is variance × time. The variance is that of a pixel's samples, relative to
+//! the squared mean of the block of pixels around it, so that dark regions count as bright ones do; the
+//! geometric mean over the blocks keeps a few fireflies from deciding.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::Result;
+
+/// Numbers of candidates that `guided` can choose a shadow ray from.
+pub const GUIDED_CANDIDATES: [u32; 3] = [1, 4, 8];
+
+/// More candidates must lower variance × time to this share of what fewer have, so that the choice
+/// does not turn on the noise of the measurement.
+const CLEAR_GAIN: f64 = 0.9;
+/// At this multiple they are not worth another look.
+const CLEAR_LOSS: f64 = 1.4;
+
+/// What was measured of a number of candidates.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CandidateCost {
+    /// Candidates per shadow ray.
+    pub candidates: u32,
+    /// Device milliseconds of all passes for one sample of every pixel.
+    pub ms_per_sample: f64,
+    /// Variance of a pixel's samples relative to the squared mean around it, geometric mean over
+    /// blocks of pixels.
+    pub relative_variance: f64,
+}
+
+impl fmt::Display for CandidateCost {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { candidates, ms_per_sample, relative_variance } = self;
+        write!(
+            formatter,
+            "{candidates}: {ms_per_sample:.2} ms a sample, relative variance {relative_variance:.3}"
+        )
+    }
+}
+
+impl CandidateCost {
+    /// Relative variance after a millisecond.
+    fn variance_time(&self) -> f64 {
+        self.relative_variance * self.ms_per_sample
+    }
+}
+
+/// The number of candidates to take: the fewest, unless more are clearly better. `costs` are in
+/// ascending order.
+///
+/// # Panics
+/// If there are no costs.
+pub fn choose(costs: &[CandidateCost]) -> u32 {
+    assert!(!costs.is_empty(), "something was measured");
+    let mut chosen = &costs[0];
+    for more in &costs[1..] {
+        if more.variance_time() < CLEAR_GAIN * chosen.variance_time() {
+            chosen = more;
+        }
+    }
+    chosen.candidates
+}
+
+/// Whether the largest number of candidates has so much more variance × time than a smaller one that
+/// measuring on would not change the choice.
+pub fn is_most_a_clear_loss(costs: &[CandidateCost]) -> bool {
+    let Some((most, fewer)) = costs.split_last() else { return false };
+    fewer.iter().any(|cost| most.variance_time() > CLEAR_LOSS * cost.variance_time())
+}
+
+/// Chooses from the fewest candidates up, as long as more are worth it. `compare` measures two numbers
+/// and returns the costs of all that were measured so far, in ascending order; none where nothing can
+/// be measured. Returns the choice and the last costs.
+///
+/// # Errors
+/// Those of `compare`.
+pub fn climb(
+    mut compare: impl FnMut(u32, u32) -> Result<Vec<CandidateCost>>,
+) -> Result<(u32, Vec<CandidateCost>)> {
+    let mut chosen = GUIDED_CANDIDATES[0];
+    let mut costs = Vec::new();
+    for &more in &GUIDED_CANDIDATES[1..] {
+        costs = compare(chosen, more)?;
+        if costs.is_empty() {
+            break;
+        }
+        chosen = choose(&costs);
+        if chosen != more {
+            break;
+        }
+    }
+    Ok((chosen, costs))
+}
+
+/// Samples of pixels in one block.
+#[derive(Clone, Copy, Debug, Default)]
+struct Block {
+    count: f64,
+    sum: f64,
+    squared_deviations: f64,
+    degrees_of_freedom: f64,
+    has_rays: bool,
+}
+
+/// Spread of the samples of some pixels, by block of pixels.
+#[derive(Clone, Debug, Default)]
+pub struct Spread {
+    blocks: Vec<Block>,
+}
+
+impl Spread {
+    /// Adds the samples of a pixel; `has_rays` tells whether any of them traced a shadow ray.
+    pub fn add(&mut self, block: usize, samples: &[f64], has_rays: bool) {
+        if self.blocks.len() <= block {
+            self.blocks.resize(block + 1, Block::default());
+        }
+        let block = &mut self.blocks[block];
+        block.has_rays |= has_rays;
+        if samples.is_empty() || samples.iter().any(|sample| !sample.is_finite()) {
+            return;
+        }
+        let count = samples.len() as f64;
+        let mean = samples.iter().sum::<f64>() / count;
+        block.count += count;
+        block.sum += count * mean;
+        block.squared_deviations +=
+            samples.iter().map(|sample| (sample - mean).powi(2)).sum::<f64>();
+        block.degrees_of_freedom += count - 1.0;
+    }
+}
+
+/// Relative variance of each of the spreads over the same pixels: geometric mean over the blocks
+/// where all of them vary, each relative to the mean over all of them. Blocks without a shadow ray
+/// have none, since no choice of directions changes them; `None` where no block is left.
+pub fn relative_variances(spreads: &[&Spread]) -> Option<Vec<f64>> {
+    let block_count = spreads.iter().map(|spread| spread.blocks.len()).min().unwrap_or(0);
+    let mut logarithms = vec![0.0; spreads.len()];
+    let mut used = 0.0;
+    for index in 0..block_count {
+        let blocks = || spreads.iter().map(|spread| &spread.blocks[index]);
+        let count: f64 = blocks().map(|block| block.count).sum();
+        let mean = blocks().map(|block| block.sum).sum::<f64>() / count;
+        if !blocks().any(|block| block.has_rays)
+            || !blocks().all(|block| block.squared_deviations > 0.0)
+            || mean <= 0.0
+        {
+            continue;
+        }
+        used += 1.0;
+        for (logarithm, block) in logarithms.iter_mut().zip(blocks()) {
+            let variance = block.squared_deviations / block.degrees_of_freedom;
+            *logarithm += (variance / (mean * mean)).ln();
+        }
+    }
+    (used > 0.0).then(|| logarithms.into_iter().map(|sum| (sum / used).exp()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+    use super::*;
+
+    fn cost(candidates: u32, ms_per_sample: f64, relative_variance: f64) -> CandidateCost {
+        CandidateCost { candidates, ms_per_sample, relative_variance }
+    }
+
+    fn variances(spreads: &[&Spread]) -> Vec<f64> {
+        relative_variances(spreads).unwrap()
+    }
+
+    #[test]
+    fn the_least_variance_by_time_is_chosen_and_fewer_where_it_is_not_clear() {
+        let choice = |four: (f64, f64)| choose(&[cost(1, 2.0, 3.0), cost(4, four.0, four.1)]);
+        assert_eq!(choice((4.0, 2.0)), 1, "a third less variance in twice the time");
+        assert_eq!(choice((2.4, 2.0)), 4, "in a fifth more time");
+        assert_eq!(choice((2.0, 2.75)), 1, "a twelfth less is not clear");
+        assert_eq!(choice((2.0, 2.65)), 4, "an eighth less is");
+        assert_eq!(choice((f64::NAN, 1.0)), 1);
+        assert_eq!(choice((1.0, f64::NAN)), 1);
+        assert_eq!(choose(&[cost(1, f64::NAN, f64::NAN), cost(4, 1.0, 1.0)]), 1);
+        let four = [cost(1, 2.0, 3.0), cost(4, 2.2, 2.0)];
+        assert_eq!(choose(&[four[0], four[1], cost(8, 2.6, 1.8)]), 4);
+        assert_eq!(choose(&[four[0], four[1], cost(8, 2.4, 1.5)]), 8);
+        assert_eq!(choose(&four[..1]), 1);
+    }
+
+    #[test]
+    fn more_are_tried_as_long_as_they_are_worth_it() {
+        let all = [cost(1, 1.0, 8.0), cost(4, 2.0, 2.0), cost(8, 3.0, 1.0)];
+        let try_all = |all: [CandidateCost; 3]| {
+            let mut compared = Vec::new();
+            let result = climb(|chosen, more| {
+                compared.push((chosen, more));
+                Ok(all.iter().filter(|cost| cost.candidates <= more).copied().collect())
+            });
+            (result.unwrap().0, compared)
+        };
+        assert_eq!(try_all(all), (8, vec![(1, 4), (4, 8)]));
+        assert_eq!(try_all([all[0], all[1], cost(8, 4.0, 1.0)]), (4, vec![(1, 4), (4, 8)]));
+        // 8 would be best of all, but one looks no further than where it stops to pay.
+        assert_eq!(try_all([all[0], cost(4, 4.0, 2.0), all[2]]), (1, vec![(1, 4)]));
+        assert_eq!(climb(|_, _| Ok(Vec::new())).unwrap(), (1, Vec::new()));
+    }
+
+    #[test]
+    fn only_losses_are_clear_early() {
+        let is_loss = |four: f64| is_most_a_clear_loss(&[cost(1, 2.0, 3.0), cost(4, four, 3.0)]);
+        assert!(is_loss(2.9) && !is_loss(2.7) && !is_loss(0.1));
+        assert!(!is_most_a_clear_loss(&[cost(1, 2.0, 3.0)]) && !is_most_a_clear_loss(&[]));
+        let best = [cost(1, 4.0, 1.0), cost(4, 2.0, 1.0), cost(8, 3.0, 1.0)];
+        assert!(is_most_a_clear_loss(&best), "against the best of the fewer");
+    }
+
+    #[test]
+    fn evenly_spaced_samples_have_their_variance() {
+        // 0 … n − 1 have the sample variance n (n + 1) / 12 and the mean (n − 1) / 2.
+        let samples = |count: u32| (0..count).map(f64::from).collect::<Vec<_>>();
+        let mut spread = Spread::default();
+        spread.add(0, &samples(7), true);
+        let expected = 7.0 * 8.0 / 12.0 / 9.0;
+        assert!((variances(&[&spread])[0] / expected - 1.0).abs() < 1e-12);
+        // A second pixel of the block, far brighter: means are of the block, deviations of the pixel.
+        let shifted: Vec<f64> = samples(5).iter().map(|value| value + 100.0).collect();
+        spread.add(0, &shifted, true);
+        let (variance, mean) = ((28.0 + 10.0) / 10.0, (7.0 * 3.0 + 5.0 * 102.0) / 12.0);
+        let expected = variance / (mean * mean);
+        assert!((variances(&[&spread])[0] / expected - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn every_block_counts_alike_however_bright() {
+        // Two pixels of samples ±d around m have the relative variance 2 d² / m².
+        let pair = |mean: f64, deviation: f64| [mean - deviation, mean + deviation];
+        let (mut one, mut four) = (Spread::default(), Spread::default());
+        for (block, brightness) in [1.0, 1e4, 1e-4].into_iter().enumerate() {
+            one.add(block, &pair(brightness, 0.4 * brightness), true);
+            four.add(block, &pair(brightness, 0.2 * brightness), true);
+        }
+        let both = variances(&[&one, &four]);
+        assert!((both[0] - 0.32).abs() < 1e-12 && (both[1] - 0.08).abs() < 1e-12, "{both:?}");
+        // One firefly in one of them multiplies the result by the cube root of what it does there.
+        four.add(0, &pair(0.0, 0.0), true);
+        let lone = variances(&[&four])[0];
+        four.blocks[0].squared_deviations *= 1000.0;
+        assert!((variances(&[&four])[0] / lone - 10.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn blocks_that_say_nothing_are_left_out() {
+        let (mut one, mut four) = (Spread::default(), Spread::default());
+        assert_eq!(relative_variances(&[&one, &four]), None);
+        // The environment itself: samples differ, but not by the choice of directions.
+        one.add(0, &[1.0, 2.0], false);
+        four.add(0, &[1.0, 2.0], false);
+        // Dark, or the same in every sample, for one of them.
+        one.add(1, &[0.0, 0.0], true);
+        four.add(1, &[0.0, 1.0], true);
+        one.add(2, &[1.0, f64::NAN], true);
+        four.add(2, &[1.0, 2.0], true);
+        assert_eq!(relative_variances(&[&one, &four]), None);
+        one.add(3, &[1.0, 3.0], true);
+        four.add(3, &[1.5, 2.5], true);
+        let both = variances(&[&one, &four]);
+        assert!((both[0] - 0.5).abs() < 1e-12 && (both[1] - 0.125).abs() < 1e-12, "{both:?}");
+    }
+}
