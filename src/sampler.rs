@@ -12,7 +12,7 @@ use crate::{
 
 pub use candidates::{
     CandidateCost, GUIDED_CANDIDATES, Spread, choose, climb, is_most_a_clear_loss,
-    relative_variances,
+    relative_variances, upper_median,
 };
 pub use lobes::{CacheScope, Elevation, LobeOrder, LobeParameters, Threshold};
 

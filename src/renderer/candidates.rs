@@ -16,6 +16,7 @@ use crate::{
     },
     sampler::{
         CandidateCost, GUIDED_CANDIDATES, Spread, climb, is_most_a_clear_loss, relative_variances,
+        upper_median,
     },
     scene::environment::luminance,
 };
@@ -52,16 +53,12 @@ pub(super) struct Choice {
 }
 
 /// Waves of one number of candidates.
+#[derive(Default)]
 struct Measured {
-    /// Of the fastest wave: what slows others down is rarely the wave itself.
-    ms_per_path: f64,
+    /// Of the first wave for the fewest candidates. For more it is that of fewer times a ratio of
+    /// waves that followed each other, since other work may slow all of them down.
+    ms_per_path: Option<f64>,
     spread: Spread,
-}
-
-impl Default for Measured {
-    fn default() -> Self {
-        Self { ms_per_path: f64::INFINITY, spread: Spread::default() }
-    }
 }
 
 impl Renderer {
@@ -111,16 +108,26 @@ impl Renderer {
                 return Ok(Vec::new());
             }
             let samples = self.samples_to_measure(chosen)?;
+            let mut ratios = Vec::new();
             let mut costs = Vec::new();
             for _ in 0..MOST_ROUNDS {
                 let mut turn = [chosen, more];
                 turn.rotate_left(round as usize % 2);
+                let mut ms = BTreeMap::new();
                 for candidates in turn {
-                    let (ms, paths) = self.measure(candidates, round, samples)?;
+                    let (wave_ms, paths) = self.measure(candidates, round, samples)?;
+                    ms.insert(candidates, wave_ms / paths.len() as f64);
                     let known: &mut Measured = measured.entry(candidates).or_default();
-                    known.add(ms, &paths, samples);
+                    known.add(&paths, samples);
                 }
                 round += 1;
+                ratios.push(ms[&more] / ms[&chosen]);
+                let ms_of_chosen = measured
+                    .get_mut(&chosen)
+                    .map_or(f64::NAN, |known| *known.ms_per_path.get_or_insert(ms[&chosen]));
+                if let Some(known) = measured.get_mut(&more) {
+                    known.ms_per_path = Some(ms_of_chosen * upper_median(&ratios));
+                }
                 costs = costs_of(&measured, self.film.padded_pixels());
                 if is_most_a_clear_loss(&costs) {
                     break;
@@ -209,8 +216,7 @@ impl Renderer {
 
 impl Measured {
     /// Adds a wave of `samples` per pixel.
-    fn add(&mut self, ms: f64, paths: &[PathState], samples: u32) {
-        self.ms_per_path = self.ms_per_path.min(ms / paths.len() as f64);
+    fn add(&mut self, paths: &[PathState], samples: u32) {
         let pixel_count = paths.len() / samples as usize;
         for pixel in 0..pixel_count {
             let of_pixel = || paths[pixel..].iter().step_by(pixel_count);
@@ -233,7 +239,7 @@ fn costs_of(measured: &BTreeMap<u32, Measured>, pixels: u32) -> Vec<CandidateCos
     let variances = relative_variances(&spreads).unwrap_or_default();
     let cost = |((candidates, measured), variance): ((&u32, &Measured), f64)| CandidateCost {
         candidates: *candidates,
-        ms_per_sample: measured.ms_per_path * f64::from(pixels),
+        ms_per_sample: measured.ms_per_path.unwrap_or(f64::NAN) * f64::from(pixels),
         relative_variance: variance,
     };
     measured.iter().zip(variances).map(cost).collect()
