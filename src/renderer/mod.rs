@@ -186,7 +186,7 @@ impl Renderer {
     /// Adds `samples` samples to every pixel.
     ///
     /// # Errors
-    /// [`Error::Vulkan`] if the device fails.
+    /// [`crate::Error::Vulkan`] if the device fails.
     pub fn render_pass(&mut self, samples: u32) -> Result<()> {
         let mut left = samples;
         while left > 0 {
@@ -318,7 +318,7 @@ impl Renderer {
     /// learns forgets, and `candidates=auto` is measured anew, since every run has to pay for it.
     ///
     /// # Errors
-    /// [`Error::Vulkan`] if the device fails.
+    /// [`crate::Error::Vulkan`] if the device fails.
     pub fn restart(&mut self, seed: u32) -> Result<()> {
         self.film.clear(&self.device)?;
         self.waves.clear_caches(&self.device)?;
@@ -380,7 +380,7 @@ impl Renderer {
     /// Reads the film.
     ///
     /// # Errors
-    /// [`Error::Vulkan`] if the device fails.
+    /// [`crate::Error::Vulkan`] if the device fails.
     pub fn sums(&self) -> Result<Sums> {
         let mut sums = self.film.download()?;
         sums.film_size = self.film_size;
