@@ -18,7 +18,7 @@ use crate::{
 };
 
 const FORMAT: &str = "fenestra-guide";
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 
 /// Everything a renderer needs to go on learning where another stopped.
 #[derive(Clone, Debug, Default, PartialEq)]
