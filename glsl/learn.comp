@@ -1,4 +1,4 @@
-// Counts every shadow ray that was traced, and whether it reached the environment, into the cell and
+// Counts every shadow ray that teaches, and whether it reached the environment, into the cell and
 // region that sample_guided.comp noted, and of those that did, what they say about the share of the
 // BRDF. The counts are read between passes only.
 #version 460

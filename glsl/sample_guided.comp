@@ -42,15 +42,18 @@ uint brdf_share(Material material) {
 }
 
 // Writes a ray that brings integrand * factor, and what it will teach. `from_brdf` is the part of its
-// density that is the BRDF's, in 256ths, of the one-sample model.
+// density that is the BRDF's, in 256ths, of the one-sample model. There a direction that brings nothing,
+// mostly since it is below the horizon, is not traced and counts as blocked; candidates are not known
+// to be so one by one.
 void finish(uint index, uint first, Guided guided, float factor, uint from_brdf) {
     vec3 contribution = guided.considered.integrand * factor;
     write_ray(index, guided.considered.direction, contribution);
     int exponent = int(floatBitsToUint(luminance(contribution)) >> 23u) - 127;
     uint octave = uint(clamp(
         exponent + int(GUIDE_SHARE_OCTAVES / 2u), 0, int(GUIDE_SHARE_OCTAVES) - 1));
+    bool teaches = CANDIDATES == 1u || contribution != vec3(0.0);
     learn_targets[index] = uvec2(
-        contribution != vec3(0.0) ? first + guided.region : NOTHING_TO_LEARN,
+        teaches ? first + guided.region : NOTHING_TO_LEARN,
         CANDIDATES == 1u ? octave | from_brdf << 8u : NO_SHARE_TO_LEARN);
 }
 

@@ -248,7 +248,7 @@ pub const GUIDE_SHARE_OCTAVES: u32 = 64;
 pub const GUIDE_SHARE_SHIFT: u32 = 24;
 /// Key of no cell.
 pub const GUIDE_NO_KEY: u32 = 0xffff_ffff;
-/// Learning target of a shadow ray that was not traced.
+/// Learning target of a shadow ray that teaches nothing.
 pub const NOTHING_TO_LEARN: u32 = 0xffff_ffff;
 
 /// Second learning target of a shadow ray that was not drawn from one of two techniques.

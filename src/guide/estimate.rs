@@ -54,7 +54,7 @@ pub const PARTS_PER_RAY: u64 = 16;
 pub struct Count {
     /// Rays that reached the environment.
     pub hits: u64,
-    /// Rays traced.
+    /// Rays traced, and directions that brought nothing.
     pub trials: u64,
 }
 

@@ -30,7 +30,8 @@ pub enum CellLevel {
 /// What a cell knows about one region of the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecordedRegion {
-    /// Rays that were counted in the cell itself when its estimates were made; shares of rays where the
+    /// Rays that were counted in the cell itself when its estimates were made, with one candidate also
+    /// directions that brought nothing; shares of rays where the
     /// regions were split since they were counted.
     pub trials: f64,
     /// Those of them that reached the environment.
@@ -133,18 +134,20 @@ impl Renderer {
         for (sample, _) in (0..samples).zip(&hits).filter(|(_, hit)| is_hit(hit)) {
             for ray in 0..per_group {
                 let index = (ray * samples + sample) as usize;
-                let learns = targets[index] != NOTHING_TO_LEARN;
-                if learns && cell.is_none() {
+                let contribution = Vec3::from(shadow_rays[index].contribution);
+                let is_counted = targets[index] != NOTHING_TO_LEARN;
+                if is_counted && cell.is_none() {
                     cell = Some(guide.cell((targets[index] / region_count) as usize)?);
                 }
                 rays.push(GuidedRay {
                     ray: RecordedRay {
                         direction: shadow_rays[index].direction.into(),
-                        contribution: shadow_rays[index].contribution.into(),
+                        contribution,
                         is_visible: visible[index] != 0,
                     },
                     sample: first_sample.wrapping_add(sample),
-                    region: learns.then_some((targets[index] % region_count) as usize),
+                    region: (is_counted && contribution != Vec3::ZERO)
+                        .then_some((targets[index] % region_count) as usize),
                 });
             }
         }
