@@ -1,10 +1,10 @@
 //! Learned visibility: the sampler `guided` as tables.
 //!
-//! The environment is split into a few hundred rectangles of its sampling cells
+//! The environment is split into up to 1024 rectangles of its sampling cells
 //! ([`Partition`]); within a rectangle directions are drawn exactly in proportion to the map. What
 //! is learned is how often each rectangle is visible from each cell of the scene: passes count, and
 //! between passes [`Estimates`] turns the counts into the probabilities that the next passes read.
-//! Now and then the environment is split anew, finely where the scene sees it.
+//! Now and then the environment is split anew, finely where the scene sees it, and into more of them.
 //! A pass reads only what earlier passes learned, so that its samples are independent of what they
 //! read and every estimate stays unbiased (Vévoda et al. 2018 learn light sources in this way).
 //!
