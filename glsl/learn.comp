@@ -1,6 +1,6 @@
 // Counts every shadow ray that teaches, and whether it reached the environment, into the cell and
-// region that sample_guided.comp noted, and of those that did, what they say about the share of the
-// BRDF. The counts are read between passes only.
+// region that sample_guided.comp noted, and of those that did, their response and what they say about
+// the share of the BRDF. The counts are read between passes only.
 #version 460
 
 #define NEEDS_WAVE
@@ -18,14 +18,18 @@ void main() {
     }
     uvec2 target = learn_targets[ray];
     if (target.x != NOTHING_TO_LEARN) {
-        atomicAdd(guide_counts[2u * target.x], 1u);
+        uint count = GUIDE_COUNT_WORDS * target.x;
+        atomicAdd(guide_counts[count], 1u);
         if (visibility[ray] != 0u) {
-            atomicAdd(guide_counts[2u * target.x + 1u], 1u);
-            if (target.y != NO_SHARE_TO_LEARN) {
+            atomicAdd(guide_counts[count + 1u], 1u);
+            atomicAdd(guide_counts[count + 2u], target.y >> LEARN_RESPONSE_SHIFT);
+            uint from_brdf = (target.y >> LEARN_FROM_BRDF_SHIFT) & NO_SHARE_TO_LEARN;
+            if (from_brdf != NO_SHARE_TO_LEARN) {
                 uint cell = target.x / guide.region_count;
-                uint octave = cell * GUIDE_SHARE_OCTAVES + (target.y & 255u);
+                uint octave = cell * GUIDE_SHARE_OCTAVES
+                    + (target.y & ((1u << LEARN_FROM_BRDF_SHIFT) - 1u));
                 atomicAdd(guide_shares[2u * octave], 1u);
-                atomicAdd(guide_shares[2u * octave + 1u], target.y >> 8u);
+                atomicAdd(guide_shares[2u * octave + 1u], from_brdf);
             }
         }
     }

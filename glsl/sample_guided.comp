@@ -42,19 +42,28 @@ uint brdf_share(Material material) {
 }
 
 // Writes a ray that brings integrand * factor, and what it will teach. `from_brdf` is the part of its
-// density that is the BRDF's, in 256ths, of the one-sample model. There a direction that brings nothing,
-// mostly since it is below the horizon, is not traced and counts as blocked; candidates are not known
-// to be so one by one.
+// density that is the BRDF's, in 256ths, of the one-sample model. There, at what the camera sees, a
+// direction that brings nothing, mostly since it is below the horizon, is not traced and counts as
+// blocked; candidates are not known to be so one by one, and at later vertices, which see less of their
+// cell alike, the rays in its place were not worth their time (docs/guided.md).
 void finish(uint index, uint first, Guided guided, float factor, uint from_brdf) {
     vec3 contribution = guided.considered.integrand * factor;
     write_ray(index, guided.considered.direction, contribution);
     int exponent = int(floatBitsToUint(luminance(contribution)) >> 23u) - 127;
     uint octave = uint(clamp(
         exponent + int(GUIDE_SHARE_OCTAVES / 2u), 0, int(GUIDE_SHARE_OCTAVES) - 1));
-    bool teaches = CANDIDATES == 1u || contribution != vec3(0.0);
+    // BRDF * cosine, weighed by the colours of the light: luminance is that of the map's density but for
+    // how sin(theta) varies within a row.
+    float light = guided.considered.environment_pdf * parameters.environment_total * 2.0 * PI * PI;
+    float response = light > 0.0 ? luminance(guided.considered.integrand) / light : 0.0;
+    uint response_units = uint(clamp(
+        response * float(GUIDE_RESPONSE_UNITS) + 0.5, 1.0, float(GUIDE_RESPONSE_MOST)));
+    bool teaches =
+        contribution != vec3(0.0) || (CANDIDATES == 1u && wave.vertex == 0u);
     learn_targets[index] = uvec2(
         teaches ? first + guided.region : NOTHING_TO_LEARN,
-        CANDIDATES == 1u ? octave | from_brdf << 8u : NO_SHARE_TO_LEARN);
+        octave | (CANDIDATES == 1u ? from_brdf : NO_SHARE_TO_LEARN) << LEARN_FROM_BRDF_SHIFT
+            | response_units << LEARN_RESPONSE_SHIFT);
 }
 
 // A ray of the one-sample model: balance heuristic over BRDF and guide.

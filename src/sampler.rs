@@ -113,6 +113,9 @@ pub struct Parameters {
     /// `hierarchy`: whether cells of `guided` that have seen little lean on larger ones; off for
     /// experiments.
     pub hierarchy: bool,
+    /// `learned-response`: whether `guided` with `weights=cell` learns how the surfaces of a cell
+    /// reflect each region; off for experiments.
+    pub learned_response: bool,
     /// `learned-share`: whether `guided` with one candidate learns the share of rays from the BRDF; off
     /// for experiments.
     pub learned_share: bool,
@@ -130,6 +133,7 @@ impl Default for Parameters {
             candidates: None,
             guide_memory: 128 << 20,
             hierarchy: true,
+            learned_response: true,
             learned_share: true,
             regions: 1024,
             weights: Weights::Cell,
@@ -139,8 +143,15 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    const KEYS: [&'static str; 6] =
-        ["candidates", "guide-memory", "hierarchy", "learned-share", "regions", "weights"];
+    const KEYS: [&'static str; 7] = [
+        "candidates",
+        "guide-memory",
+        "hierarchy",
+        "learned-response",
+        "learned-share",
+        "regions",
+        "weights",
+    ];
 
     /// Sets one parameter from `key=value`.
     ///
@@ -175,6 +186,7 @@ impl Parameters {
                     })?;
             }
             "hierarchy" => self.hierarchy = parse_switch(key, value)?,
+            "learned-response" => self.learned_response = parse_switch(key, value)?,
             "learned-share" => self.learned_share = parse_switch(key, value)?,
             "regions" => {
                 self.regions =
@@ -238,6 +250,7 @@ impl Parameters {
                     named.insert("regions".to_owned(), self.regions.to_string());
                     let switch = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
                     named.insert("hierarchy".to_owned(), switch(self.hierarchy));
+                    named.insert("learned-response".to_owned(), switch(self.learned_response));
                     named.insert("learned-share".to_owned(), switch(self.learned_share));
                     let weights = if self.weights == Weights::Cell { "cell" } else { "product" };
                     named.insert("weights".to_owned(), weights.to_owned());

@@ -5,7 +5,9 @@
 mod support;
 
 use fenestra::{
-    gpu::constants::{BINDING_GUIDE_COUNTS, BINDING_GUIDE_SHARES, GUIDE_NO_KEY, SET_SRBF},
+    gpu::constants::{
+        BINDING_GUIDE_COUNTS, BINDING_GUIDE_SHARES, GUIDE_NO_KEY, GUIDE_RESPONSE_UNITS, SET_SRBF,
+    },
     guide::{
         CellKey, EstimateOptions, FACE_COUNT, Learned, PARENT_COUNT, Partition, decode_entry,
         likely_regions,
@@ -385,12 +387,13 @@ fn taught(partition: &Partition, capacity: usize, slots: usize) -> Learned {
     let keys = [CellKey::fine([3, 4, 5], 6, 2), CellKey::fine([40, 4, 5], 6, 2)];
     learned.want(&keys.map(|key| key.0));
     let regions = partition.regions.len();
-    let mut counted = vec![[0_u32; 2]; learned.cell_count() * regions];
+    let mut counted = vec![[0_u32; 3]; learned.cell_count() * regions];
     for (cell, key) in learned.keys().iter().enumerate() {
         for (region, count) in partition.regions.iter().zip(&mut counted[cell * regions..]) {
             let sees = *key == keys[0] && region.direction.x > 0.0;
             if !key.is_coarse() && cell >= FACE_COUNT {
-                *count = [40, if sees { 40 } else { 0 }];
+                let hits = if sees { 40 } else { 0 };
+                *count = [40, hits, hits * GUIDE_RESPONSE_UNITS / 10];
             }
         }
     }
@@ -431,6 +434,63 @@ fn cells_learn_and_lean_on_their_surroundings() {
     assert!(share_east(neighbour) > 0.8, "through the coarse cell: {}", share_east(neighbour));
     assert!((share_east(stranger) - prior).abs() < 0.25, "{} {prior}", share_east(stranger));
     assert!(blind < seen, "{blind}");
+}
+
+/// Two regions are seen alike and one is reflected ten times as much: what is believed of them, in the cell
+/// that found it and in its neighbour.
+#[test]
+fn cells_learn_what_their_surfaces_reflect() {
+    const RAYS: u32 = 4000;
+    let map = sunny();
+    let partition = Partition::new(&map, 64);
+    let regions = partition.regions.len();
+    let cell = CellKey::fine([3, 4, 5], 6, 2);
+    let neighbour = CellKey::fine([2, 4, 5], 6, 2);
+    let mut learned = Learned::new(regions, 1 << 12, 1 << 14);
+    learned.want(&[cell.0, neighbour.0]);
+    // The two regions with most energy above the horizon of the face, whose normal is up.
+    let mut bright: Vec<usize> =
+        (0..regions).filter(|&index| partition.regions[index].direction.y > 0.2).collect();
+    bright.sort_by(|a, b| partition.regions[*b].share.total_cmp(&partition.regions[*a].share));
+    let [strong, weak] = [bright[0], bright[1]];
+    let place = learned.keys().iter().position(|key| *key == cell).unwrap();
+    let mut counted = vec![[0_u32; 3]; learned.cell_count() * regions];
+    for index in 0..regions {
+        let response = match index {
+            _ if index == strong => RAYS * GUIDE_RESPONSE_UNITS / 2,
+            _ if index == weak => RAYS * GUIDE_RESPONSE_UNITS / 20,
+            _ => 0,
+        };
+        let hits = if response > 0 { RAYS } else { 0 };
+        counted[place * regions + index] = [RAYS, hits, response];
+    }
+    learned.add(&counted);
+    let ratio = |key: CellKey, options: &EstimateOptions| {
+        let snapshot = learned.snapshot(&partition, options);
+        let slot = snapshot.table.iter().find(|entry| entry[0] == key.0).unwrap();
+        let entries = &snapshot.entries[slot[1] as usize * regions..][..regions];
+        let density = |index: usize| f64::from(decode_entry(entries[index]).0);
+        density(strong) / density(weak)
+    };
+    let learns = EstimateOptions::default();
+    // The defensive share, which does not look at what was learned, takes a little off.
+    assert!((8.0..10.5).contains(&ratio(cell, &learns)), "{}", ratio(cell, &learns));
+    assert!(
+        ratio(neighbour, &learns) > 5.0,
+        "through the coarse cell: {}",
+        ratio(neighbour, &learns)
+    );
+    let cosine = EstimateOptions { learned_response: false, ..learns };
+    assert!((0.3..3.0).contains(&ratio(cell, &cosine)), "{}", ratio(cell, &cosine));
+    // What was counted survives a file to the bit, also where a count was halved.
+    learned.add(&counted.iter().map(|count| count.map(|word| 16 * word)).collect::<Vec<_>>());
+    learned.add(&counted.iter().map(|count| count.map(|word| 16 * word)).collect::<Vec<_>>());
+    let keys: Vec<u32> = learned.keys().iter().map(|key| key.0).collect();
+    let words = learned.count_words();
+    let again = Learned::resume(regions, 1 << 12, 1 << 14, &keys, &words, learned.shares(), 1);
+    assert_eq!(again.count_words(), words);
+    assert_eq!(again.snapshot(&partition, &learns), learned.snapshot(&partition, &learns));
+    assert!(learned.counts(place)[strong].trials_in_rays() <= 65_536.0);
 }
 
 #[test]

@@ -11,7 +11,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use fenestra::{
     film::Sums,
-    guide::SHARE_WORDS,
+    gpu::constants::GUIDE_RESPONSE_UNITS,
+    guide::{CellKey, FACE_COUNT, PARTS_PER_RAY, Partition, SHARE_WORDS, face_normal},
     renderer::{Renderer, Settings},
     sampler::{Parameters, Sampler, Weights},
     scene::Scene,
@@ -413,6 +414,41 @@ fn rays_of_training_are_counted_and_more_rays_are_visible() {
     assert!(guided > 1.5 * mis, "visible: {guided} of guided rays, {mis} of mis");
 }
 
+/// Grey diffuse surfaces respond by reflectance / π · cosine whatever the light's colour is, and no ray by
+/// more than at normal incidence. Most surfaces that point up are the floor, where the cosine is that of
+/// the region; the rest are the sphere's.
+#[test]
+fn visible_rays_teach_how_surfaces_respond() {
+    let _alone = alone();
+    let scene = scenes::room(vec![scenes::diffuse(Vec3::splat(0.6))]);
+    let units = 0.6 / std::f64::consts::PI * f64::from(GUIDE_RESPONSE_UNITS);
+    for candidates in [1, 4] {
+        let mut renderer = Renderer::new(support::device(), &scene, guided(candidates)).unwrap();
+        renderer.render_pass(16).unwrap();
+        let state = renderer.guide_state().unwrap().unwrap();
+        let partition =
+            Partition::new(&scene.environment, 16).with_rectangles(&state.rectangles).unwrap();
+        let regions = partition.regions.len();
+        let (mut found, mut expected) = (0.0, 0.0);
+        for (cell, key) in state.keys.iter().enumerate().skip(FACE_COUNT) {
+            let counts = &state.counts[cell * regions..][..regions];
+            for ([_, hits, response], region) in counts.iter().zip(&partition.regions) {
+                let hits = f64::from(*hits) / PARTS_PER_RAY as f64;
+                let response = f64::from(*response);
+                // Counts that were split over new regions are rounded.
+                assert!(response <= (units + 0.5) * hits + units, "{response} of {hits} rays");
+                if face_normal(CellKey(*key).face()) == Vec3::Y {
+                    found += response;
+                    expected += units * hits * region.direction.y.max(0.0);
+                }
+            }
+        }
+        assert!(expected > 300.0 * units, "{expected}");
+        assert!((0.9..1.2).contains(&(found / expected)), "{candidates}: {found} {expected}");
+    }
+    support::assert_silent();
+}
+
 #[test]
 fn visible_rays_teach_the_share_of_the_brdf() {
     let _alone = alone();
@@ -423,7 +459,7 @@ fn visible_rays_teach_the_share_of_the_brdf() {
     };
     // The last sample came after a rebuild: each of its visible rays is in both counts.
     let state = state_after(1);
-    let visible: u64 = state.pending.iter().map(|[_, hits]| u64::from(*hits)).sum();
+    let visible: u64 = state.pending.iter().map(|[_, hits, _]| u64::from(*hits)).sum();
     let pairs = || state.pending_shares.chunks_exact(2);
     let rays: u64 = pairs().map(|pair| u64::from(pair[0])).sum();
     let from_brdf: u64 = pairs().map(|pair| u64::from(pair[1])).sum();

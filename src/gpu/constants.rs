@@ -72,7 +72,9 @@ pub const BINDING_GUIDE_COUNTS: u32 = 10;
 /// SRBF set: keys of the cells that a pass missed.
 pub const BINDING_GUIDE_WANTED: u32 = 11;
 /// SRBF set: two words per shadow ray: index into the counts, or `NOTHING_TO_LEARN`; octave of its
-/// light + 256 · c p_B / q in 256ths (see `guide::ShareEvidence`), or `NO_SHARE_TO_LEARN`.
+/// light, from bit `LEARN_FROM_BRDF_SHIFT` on c p_B / q in 256ths (see `guide::ShareEvidence`) or
+/// `NO_SHARE_TO_LEARN`, from bit `LEARN_RESPONSE_SHIFT` on its response in units of 1 /
+/// `GUIDE_RESPONSE_UNITS`.
 pub const BINDING_LEARN_TARGETS: u32 = 12;
 /// SRBF set: the likeliest regions of each cell, texels of four words (see
 /// `guide::LikelyRegion`).
@@ -251,8 +253,19 @@ pub const GUIDE_NO_KEY: u32 = 0xffff_ffff;
 /// Learning target of a shadow ray that teaches nothing.
 pub const NOTHING_TO_LEARN: u32 = 0xffff_ffff;
 
-/// Second learning target of a shadow ray that was not drawn from one of two techniques.
-pub const NO_SHARE_TO_LEARN: u32 = 0xffff_ffff;
+/// What a shadow ray that was not drawn from one of two techniques teaches about the share of the BRDF.
+pub const NO_SHARE_TO_LEARN: u32 = 0x1ff;
+/// First bit of what a shadow ray teaches about the share of the BRDF, 9 bits.
+pub const LEARN_FROM_BRDF_SHIFT: u32 = 8;
+/// First bit of the response of a shadow ray, 15 bits.
+pub const LEARN_RESPONSE_SHIFT: u32 = 17;
+/// A response of 1, in the whole numbers that are summed.
+pub const GUIDE_RESPONSE_UNITS: u32 = 65_536;
+/// Greatest response of one ray in those units, a half: what is reflected more strongly than that is the
+/// peak of a lobe, which the BRDF's own sampling finds, and few cells have one for all of their surfaces.
+pub const GUIDE_RESPONSE_MOST: u32 = 32_767;
+/// Words of a cell per region that are counted: trials, hits and the responses of the hits.
+pub const GUIDE_COUNT_WORDS: u32 = 3;
 
 /// [`Hit::material`](super::layout::Hit::material) of a ray that left the scene or was not traced.
 pub const NO_MATERIAL: u32 = 0xffff_ffff;
@@ -433,6 +446,11 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("GUIDE_SHARE_OCTAVES", GUIDE_SHARE_OCTAVES),
     ("GUIDE_SHARE_SHIFT", GUIDE_SHARE_SHIFT),
     ("NO_SHARE_TO_LEARN", NO_SHARE_TO_LEARN),
+    ("LEARN_FROM_BRDF_SHIFT", LEARN_FROM_BRDF_SHIFT),
+    ("LEARN_RESPONSE_SHIFT", LEARN_RESPONSE_SHIFT),
+    ("GUIDE_RESPONSE_UNITS", GUIDE_RESPONSE_UNITS),
+    ("GUIDE_RESPONSE_MOST", GUIDE_RESPONSE_MOST),
+    ("GUIDE_COUNT_WORDS", GUIDE_COUNT_WORDS),
     ("GUIDE_NO_KEY", GUIDE_NO_KEY),
     ("NOTHING_TO_LEARN", NOTHING_TO_LEARN),
 ];

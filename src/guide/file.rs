@@ -1,24 +1,26 @@
 //! What was learned, in a file: `--save-guide`, `--load-guide`, and beside a checkpoint.
 //!
 //! One line of JSON, then 32-bit words in little-endian order: the rectangles that are the regions, the
-//! keys of the cells, trials and hits per cell and region in sixteenths of rays, what visible rays say about
-//! the share of the BRDF, what passes counted of both since the last rebuild, and the keys they missed. The
-//! header has the SHA-256 of the words.
+//! keys of the cells, the [`Count`] of each cell and region, what visible rays say about the share of the
+//! BRDF, what passes counted of both since the last rebuild, and the keys they missed. The header has the
+//! SHA-256 of the words.
 
 use std::{fs, io::Write, path::Path};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::share::SHARE_WORDS;
+use super::{estimate::CountWords, share::SHARE_WORDS};
 use crate::{
     error::{Error, Result},
     film::write_atomically,
+    gpu::constants::GUIDE_COUNT_WORDS,
     sampler::GUIDED_CANDIDATES,
 };
 
+const COUNT_WORDS: usize = GUIDE_COUNT_WORDS as usize;
 const FORMAT: &str = "fenestra-guide";
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 
 /// Everything a renderer needs to go on learning where another stopped.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -37,13 +39,14 @@ pub struct GuideState {
     pub rectangles: Vec<[u32; 5]>,
     /// Key of every cell, the faces first.
     pub keys: Vec<u32>,
-    /// Trials and hits per cell and region up to the last rebuild, in sixteenths of rays.
-    pub counts: Vec<[u32; 2]>,
+    /// Per cell and region up to the last rebuild: trials and hits, in sixteenths of rays, and the sum of
+    /// the responses of the hits.
+    pub counts: Vec<CountWords>,
     /// Visible rays and their c p_B / q per cell and octave of light up to then, see
     /// [`ShareEvidence`](super::ShareEvidence).
     pub shares: Vec<u32>,
-    /// Trials and hits per cell and region since then; empty where there are none.
-    pub pending: Vec<[u32; 2]>,
+    /// The same since then, trials and hits in rays; empty where there are none.
+    pub pending: Vec<CountWords>,
     /// Of the shares since then; empty where there are none.
     pub pending_shares: Vec<u32>,
     /// Keys that were missed since then.
@@ -160,10 +163,10 @@ impl GuideState {
         }
         let counts = header.cells.checked_mul(header.origin.regions as usize);
         let length = counts.and_then(|counts| {
-            let pairs = counts.checked_add(header.pending)?.checked_mul(2)?;
+            let counts = counts.checked_add(header.pending)?.checked_mul(COUNT_WORDS)?;
             let fives = (header.origin.regions as usize).checked_mul(5)?;
             let shares = header.cells.checked_mul(SHARE_WORDS)?;
-            pairs
+            counts
                 .checked_add(fives)?
                 .checked_add(shares)?
                 .checked_add(header.pending_shares)?
@@ -182,8 +185,9 @@ impl GuideState {
             .chunks_exact(4)
             .map(|word| word.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte)));
         let mut take = |count: usize| words.by_ref().take(count).collect::<Vec<u32>>();
-        let pairs =
-            |words: Vec<u32>| words.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
+        let counted = |words: Vec<u32>| -> Vec<CountWords> {
+            words.chunks_exact(COUNT_WORDS).map(|count| [count[0], count[1], count[2]]).collect()
+        };
         let regions = header.origin.regions as usize;
         Ok(Self {
             origin: header.origin,
@@ -196,9 +200,9 @@ impl GuideState {
                 .map(|words| [words[0], words[1], words[2], words[3], words[4]])
                 .collect(),
             keys: take(header.cells),
-            counts: pairs(take(2 * counts)),
+            counts: counted(take(COUNT_WORDS * counts)),
             shares: take(shares),
-            pending: pairs(take(2 * header.pending)),
+            pending: counted(take(COUNT_WORDS * header.pending)),
             pending_shares: take(header.pending_shares),
             wanted: take(header.wanted),
         })
@@ -221,9 +225,16 @@ mod tests {
             candidates: Some(8),
             rectangles: vec![[0, 0, 5, 9, 0], [5, 0, 3, 9, 1]],
             keys: vec![u32::MAX, 7, 8],
-            counts: vec![[1, 0], [2, 1], [3, 3], [0, 0], [1 << 24, 5], [9, 9]],
+            counts: vec![
+                [1, 0, 0],
+                [2, 1, 7],
+                [3, 3, 1 << 31],
+                [0, 0, 0],
+                [1 << 24, 5, 6],
+                [9, 9, 9],
+            ],
             shares: (0..3 * SHARE_WORDS as u32).collect(),
-            pending: vec![[4, 4]],
+            pending: vec![[4, 4, 5]],
             pending_shares: vec![1, 2, 3],
             wanted: vec![0x1234_5678],
         }

@@ -5,15 +5,15 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::{
-    estimate::{Count, EstimateOptions, Estimates, PARTS_PER_RAY, decode_entry},
+    estimate::{Count, CountWords, EstimateOptions, Estimates, PARTS_PER_RAY, decode_entry},
     key::{CellKey, FACE_COUNT, face_normal},
     partition::Partition,
     share::{SHARE_WORDS, ShareEvidence, share_in_256ths},
 };
 use crate::gpu::constants::{GUIDE_PROBES, GUIDE_SHARE_SHIFT};
 
-/// Trials of one region and cell above which both counts are halved.
-const LARGEST_COUNT: u64 = (1 << 24) * PARTS_PER_RAY;
+/// Trials of one region and cell above which what was counted is halved; then the responses fit a word.
+const LARGEST_COUNT: u64 = (1 << 16) * PARTS_PER_RAY;
 
 /// Cells and counts. The first [`FACE_COUNT`] cells are the faces: rays from places that have no
 /// cell of their own count there.
@@ -61,7 +61,7 @@ impl Learned {
         }
     }
 
-    /// As [`Self::new`], with the keys, counts (trials, hits, in sixteenths of rays) and shares that an
+    /// As [`Self::new`], with the keys, counts (trials and hits in sixteenths of rays) and shares that an
     /// earlier one had; what finds no room is left out. With `forget`, every count is divided by that
     /// number.
     ///
@@ -73,7 +73,7 @@ impl Learned {
         capacity: usize,
         slots: usize,
         keys: &[u32],
-        counts: &[[u32; 2]],
+        counts: &[CountWords],
         shares: &[u32],
         forget: u32,
     ) -> Self {
@@ -88,9 +88,10 @@ impl Learned {
         let count = learned.keys.len() * region_count;
         learned.counts = counts[..count]
             .iter()
-            .map(|[trials, hits]| Count {
+            .map(|[trials, hits, response]| Count {
                 hits: u64::from(hits.min(trials) / forget),
                 trials: u64::from(trials / forget),
+                response: u64::from(response / forget),
             })
             .collect();
         let count = learned.keys.len() * SHARE_WORDS;
@@ -98,11 +99,14 @@ impl Learned {
         learned
     }
 
-    /// Trials and hits of all cells, as [`Self::resume`] takes them.
-    pub fn trials_and_hits(&self) -> Vec<[u32; 2]> {
+    /// What all cells counted, as [`Self::resume`] takes it.
+    pub fn count_words(&self) -> Vec<CountWords> {
         // Counts stay below LARGEST_COUNT and what one stretch of passes adds.
         let word = |count: u64| u32::try_from(count).unwrap_or(u32::MAX);
-        self.counts.iter().map(|count| [word(count.trials), word(count.hits)]).collect()
+        self.counts
+            .iter()
+            .map(|count| [word(count.trials), word(count.hits), word(count.response)])
+            .collect()
     }
 
     /// What visible rays say about the share of the BRDF, as [`Self::resume`] takes it.
@@ -135,19 +139,21 @@ impl Learned {
         self.refused
     }
 
-    /// Adds what one stretch of passes counted, trials and hits per cell and region in the order of
-    /// the cells as they were.
+    /// Adds what one stretch of passes counted per cell and region, in the order of the cells as they
+    /// were, trials and hits in rays.
     ///
     /// # Panics
     /// If there are more counts than cells.
-    pub fn add(&mut self, counted: &[[u32; 2]]) {
+    pub fn add(&mut self, counted: &[CountWords]) {
         assert!(counted.len() <= self.counts.len(), "counts of cells that are there");
-        for (count, [trials, hits]) in self.counts.iter_mut().zip(counted) {
+        for (count, [trials, hits, response]) in self.counts.iter_mut().zip(counted) {
             count.trials += PARTS_PER_RAY * u64::from(*trials);
             count.hits += PARTS_PER_RAY * u64::from(*hits.min(trials));
-            if count.trials > LARGEST_COUNT {
+            count.response += u64::from(*response);
+            while count.trials > LARGEST_COUNT {
                 count.trials /= 2;
                 count.hits /= 2;
+                count.response /= 2;
             }
         }
     }
@@ -245,51 +251,60 @@ impl Learned {
         let mut faces = vec![Count::default(); FACE_COUNT * regions];
         let add = |sums: &mut [Count], to: usize, counts: &[Count]| {
             for (sum, count) in sums[to * regions..][..regions].iter_mut().zip(counts) {
-                sum.hits += count.hits;
-                sum.trials += count.trials;
+                sum.add(*count);
             }
         };
         for (index, key) in self.keys.iter().enumerate() {
             let counts = self.counts(index);
             for count in counts {
-                scene.hits += count.hits;
-                scene.trials += count.trials;
+                scene.add(*count);
             }
             if index < FACE_COUNT {
                 add(&mut faces, index, counts);
                 continue;
             }
             add(&mut faces, key.face(), counts);
-            if !key.is_coarse()
-                && let Some(&coarse) = self.index_of.get(&key.coarse())
-            {
+            if let Some(coarse) = self.coarse_of(*key) {
                 add(&mut sums, coarse, counts);
             }
         }
-        let faces: Vec<Estimates> =
-            faces.chunks(regions).map(|counts| Estimates::of_face(counts, scene)).collect();
-        let flat = Estimates::of_face(&vec![Count::default(); regions], scene);
-        let coarse_of = |key: CellKey| {
-            let prior = if options.hierarchy { &faces[key.face()] } else { &flat };
-            match self.index_of.get(&key.coarse()) {
-                Some(&index) if options.hierarchy => {
-                    Estimates::of_coarse(&sums[index * regions..][..regions], prior)
-                }
-                _ => prior.clone(),
-            }
+        let face = |face: usize, counts: &[Count]| {
+            Estimates::of_face(counts, scene, face_normal(face), partition)
+        };
+        let faces: Vec<Estimates> = (0..FACE_COUNT)
+            .map(|index| face(index, &faces[index * regions..][..regions]))
+            .collect();
+        let nothing = vec![Count::default(); regions];
+        let flat: Vec<Estimates> = (0..FACE_COUNT).map(|index| face(index, &nothing)).collect();
+        let priors = if options.hierarchy { &faces } else { &flat };
+        // Of coarse cells, where they are not those of their face.
+        let coarse: Vec<Option<Estimates>> = self
+            .keys
+            .par_iter()
+            .zip(sums.par_chunks(regions))
+            .enumerate()
+            .map(|(index, (key, sums))| {
+                (index >= FACE_COUNT && key.is_coarse() && options.hierarchy)
+                    .then(|| Estimates::of_coarse(sums, &priors[key.face()]))
+            })
+            .collect();
+        let coarse_or_face = |index: Option<usize>, face: usize| {
+            index.and_then(|index| coarse[index].as_ref()).unwrap_or(&priors[face])
         };
         let mut entries = vec![[0; 2]; self.keys.len() * regions];
         entries.par_chunks_mut(regions).enumerate().for_each(|(index, entries)| {
             let key = self.keys[index];
-            let (face, estimates) = if index < FACE_COUNT {
-                (index, faces[index].clone())
+            let face = if index < FACE_COUNT { index } else { key.face() };
+            let normal = face_normal(face);
+            let of = |estimates: &Estimates| estimates.entries(normal, partition, options);
+            entries.copy_from_slice(&if index < FACE_COUNT {
+                of(&faces[face])
             } else if key.is_coarse() {
-                (key.face(), coarse_of(key))
+                of(coarse_or_face(Some(index), face))
             } else {
-                let coarse = coarse_of(key);
-                (key.face(), Estimates::of_fine(self.counts(index), &coarse, partition))
-            };
-            entries.copy_from_slice(&estimates.entries(face_normal(face), partition));
+                let coarse = coarse_or_face(self.coarse_of(key), face);
+                of(&Estimates::of_fine(self.counts(index), coarse, partition))
+            });
         });
         let shares = if options.learned_share {
             self.shares_in_256ths(options.hierarchy)
@@ -297,6 +312,11 @@ impl Learned {
             vec![0; self.keys.len()]
         };
         Snapshot { table: self.table(&shares), entries }
+    }
+
+    /// The coarse cell above a fine one.
+    fn coarse_of(&self, key: CellKey) -> Option<usize> {
+        if key.is_coarse() { None } else { self.index_of.get(&key.coarse()).copied() }
     }
 
     /// Share of the BRDF of every cell, 256ths, 0 where it is left to the material. A cell leans on
@@ -311,8 +331,7 @@ impl Learned {
             scene.add(*evidence);
             faces[if index < FACE_COUNT { index } else { key.face() }].add(*evidence);
             if index >= FACE_COUNT
-                && !key.is_coarse()
-                && let Some(&coarse) = self.index_of.get(&key.coarse())
+                && let Some(coarse) = self.coarse_of(*key)
             {
                 sums[coarse].add(*evidence);
             }
@@ -324,8 +343,7 @@ impl Learned {
             if !hierarchy {
                 around = scene;
             } else if index >= FACE_COUNT
-                && !key.is_coarse()
-                && let Some(&coarse) = self.index_of.get(&key.coarse())
+                && let Some(coarse) = self.coarse_of(*key)
             {
                 around = sums[coarse].share(around);
             }

@@ -2,8 +2,8 @@
 //!
 //! The environment is split into up to 1024 rectangles of its sampling cells
 //! ([`Partition`]); within a rectangle directions are drawn exactly in proportion to the map. What
-//! is learned is how often each rectangle is visible from each cell of the scene: passes count, and
-//! between passes [`Estimates`] turns the counts into the probabilities that the next passes read.
+//! is learned is how often each rectangle is visible from each cell of the scene and how its surfaces
+//! reflect it: passes count, and between passes [`Estimates`] turns the counts into the probabilities that the next passes read.
 //! Now and then the environment is split anew, finely where the scene sees it, and into more of them.
 //! A pass reads only what earlier passes learned, so that its samples are independent of what they
 //! read and every estimate stays unbiased (Vévoda et al. 2018 learn light sources in this way).
@@ -22,7 +22,8 @@ mod split;
 
 pub use alias::{AliasEntry, alias_table, probabilities};
 pub use estimate::{
-    EstimateOptions, Estimates, VISIBILITY_LEVELS, decode_entry, decode_visibility,
+    Count, CountWords, EstimateOptions, Estimates, PARTS_PER_RAY, VISIBILITY_LEVELS, decode_entry,
+    decode_visibility,
 };
 pub use file::{GuideState, Origin};
 pub use key::{CellKey, FACE_COUNT, face_normal};

@@ -14,13 +14,13 @@ use crate::{
             BINDING_GUIDE_ALIASES, BINDING_GUIDE_COUNTS, BINDING_GUIDE_ENTRIES,
             BINDING_GUIDE_LIKELY, BINDING_GUIDE_PARAMETERS, BINDING_GUIDE_REGION_OF_CELL,
             BINDING_GUIDE_REGIONS, BINDING_GUIDE_SHARES, BINDING_GUIDE_TABLE, BINDING_GUIDE_WANTED,
-            BINDING_LEARN_TARGETS, GUIDE_LIKELY_REGIONS, GUIDE_NO_KEY, SET_SRBF,
+            BINDING_LEARN_TARGETS, GUIDE_COUNT_WORDS, GUIDE_LIKELY_REGIONS, GUIDE_NO_KEY, SET_SRBF,
         },
         layout::GuideParameters,
     },
     guide::{
-        CellKey, EstimateOptions, FACE_COUNT, GuideState, Learned, LikelyRegion, Origin, Partition,
-        SHARE_WORDS, Snapshot, decode_entry, decode_visibility, likely_regions,
+        CellKey, CountWords, EstimateOptions, FACE_COUNT, GuideState, Learned, LikelyRegion,
+        Origin, Partition, SHARE_WORDS, Snapshot, decode_entry, decode_visibility, likely_regions,
     },
     sampler::{Parameters, Weights},
     scene::{self, Scene},
@@ -32,8 +32,10 @@ const CELL_PIXELS: f32 = 24.0;
 const CELLS_PER_SCENE: f32 = 20.0;
 /// Levels of size below the largest cell.
 const LEVELS: i32 = 12;
-/// Bytes of a cell per region: an entry to read and two counts to write.
-const BYTES_PER_REGION: u64 = 16;
+/// Bytes of what a cell counts per region.
+const COUNT_BYTES: u64 = 4 * GUIDE_COUNT_WORDS as u64;
+/// Bytes of a cell per region: an entry to read and a count to write.
+const BYTES_PER_REGION: u64 = 8 + COUNT_BYTES;
 /// What counts are divided by where the geometry is another.
 const FORGETTING: u32 = 8;
 /// Fewest cells there is room for, memory permitting.
@@ -130,19 +132,23 @@ impl GuideBuffers {
         pixels: u32,
         rays: u64,
     ) -> Result<Self> {
-        let (hierarchy, weights) = (parameters.hierarchy, parameters.weights);
-        let learned_share = parameters.learned_share;
+        let options = EstimateOptions {
+            hierarchy: parameters.hierarchy,
+            learned_share: parameters.learned_share,
+            // Product weights know the BRDF of every hit.
+            learned_response: parameters.learned_response && parameters.weights == Weights::Cell,
+        };
         let most_regions = parameters.regions as usize;
         let partition = Partition::new(&scene.environment, most_regions.min(FIRST_REGIONS));
         let region_count = partition.regions.len();
-        let uses_likely = weights == Weights::Product;
+        let uses_likely = parameters.weights == Weights::Product;
         let likely_bytes = 16 * u64::from(GUIDE_LIKELY_REGIONS);
         let useful_cells = FEW_CELLS.max(u64::from(pixels) / PIXELS_PER_CELL) as usize;
         // What cells take besides is most per region where these are fewest.
         let besides = 4 * SHARE_WORDS as u64 + if uses_likely { likely_bytes } else { 0 };
         let by_memory =
             parameters.guide_memory / (BYTES_PER_REGION + besides.div_ceil(region_count as u64));
-        let by_range = device.capabilities().max_storage_buffer_range / (BYTES_PER_REGION / 2);
+        let by_range = device.capabilities().max_storage_buffer_range / COUNT_BYTES;
         let room = Room {
             counts: (by_memory.min(by_range) as usize)
                 .min(useful_cells * most_regions)
@@ -157,7 +163,7 @@ impl GuideBuffers {
 
         let (mut regions, aliases) = region_tables(&partition);
         regions.resize(most_regions.max(region_count), [0; 4]);
-        let cells = 8 * room.counts;
+        let (entry_bytes, count_bytes) = (8 * room.counts as u64, COUNT_BYTES * room.counts as u64);
         let guide = guide_parameters(scene, region_count, slots, wanted_slots);
         let origin = Origin {
             environment: scene::environment_hash(scene),
@@ -168,12 +174,12 @@ impl GuideBuffers {
         };
         let parameters = Buffer::from_slice(device, "guide parameters", &[guide])?;
         let table = Buffer::new(device, "guide table", 8 * slots as u64)?;
-        let entries = Buffer::new(device, "guide entries", cells as u64)?;
+        let entries = Buffer::new(device, "guide entries", entry_bytes)?;
         let regions = Buffer::texels_from_slice(device, "guide regions", &regions)?;
         let aliases = Buffer::texels_from_slice(device, "guide aliases", &aliases)?;
         let region_of_cell =
             Buffer::texels_from_slice(device, "guide region of cell", &partition.region_of_cell)?;
-        let counts = Buffer::new(device, "guide counts", cells as u64)?;
+        let counts = Buffer::new(device, "guide counts", count_bytes)?;
         let shares = Buffer::new(device, "guide shares", 4 * (capacity * SHARE_WORDS) as u64)?;
         let wanted = Buffer::new(device, "guide wanted", 4 * wanted_slots as u64)?;
         let targets = Buffer::new(device, "learn targets", 8 * rays)?;
@@ -201,7 +207,7 @@ impl GuideBuffers {
             set,
             partition,
             is_split: false,
-            options: EstimateOptions { hierarchy, learned_share },
+            options,
             learned,
             room,
             origin,
@@ -261,7 +267,7 @@ impl GuideBuffers {
     pub fn rebuild(&mut self, splits: bool) -> Result<()> {
         let start = Instant::now();
         let counted = self.learned.cell_count() * self.partition.regions.len();
-        self.learned.add(&self.counts.download::<[u32; 2]>(counted)?);
+        self.learned.add(&self.counts.download::<CountWords>(counted)?);
         let words = self.learned.cell_count() * SHARE_WORDS;
         self.learned.add_shares(&self.shares.download::<u32>(words)?);
         self.learned.want(&self.wanted.download::<u32>(self.wanted_slots)?);
@@ -344,7 +350,7 @@ impl GuideBuffers {
             candidates: None,
             rectangles: self.partition.rectangles(),
             keys: self.learned.keys().iter().map(|key| key.0).collect(),
-            counts: self.learned.trials_and_hits(),
+            counts: self.learned.count_words(),
             shares: self.learned.shares().to_vec(),
             pending: self.counts.download(counted)?,
             pending_shares: self.shares.download(self.learned.cell_count() * SHARE_WORDS)?,
@@ -430,7 +436,7 @@ impl GuideBuffers {
         let mut commands = Commands::begin(&self.device)?;
         // What lies behind belongs to no cell.
         let used = self.learned.cell_count() * self.partition.regions.len();
-        commands.fill_start(&self.counts, 8 * used as u64, 0);
+        commands.fill_start(&self.counts, COUNT_BYTES * used as u64, 0);
         let used = self.learned.cell_count() * SHARE_WORDS;
         commands.fill_start(&self.shares, 4 * used as u64, 0);
         commands.fill(&self.wanted, GUIDE_NO_KEY);
