@@ -11,7 +11,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use fenestra::{
     film::Sums,
-    gpu::constants::GUIDE_RESPONSE_UNITS,
+    gpu::constants::{GUIDE_COUNT_WORDS, GUIDE_RESPONSE_UNITS},
     guide::{CellKey, FACE_COUNT, PARTS_PER_RAY, Partition, SHARE_WORDS, face_normal},
     renderer::{Renderer, Settings},
     sampler::{Parameters, Sampler, Weights},
@@ -185,11 +185,13 @@ fn places_that_share_a_key_are_unbiased() {
     let mut teacher = Renderer::new(support::device(), &scene, guided(1)).unwrap();
     teacher.render_pass(4).unwrap();
     let taught = teacher.guide_state().unwrap().unwrap();
+    // Two words to read and those that are counted, for each of 256 regions, and the shares.
+    let cell_bytes = 256 * (8 + 4 * u64::from(GUIDE_COUNT_WORDS)) + 4 * SHARE_WORDS as u64;
     for (name, edge, memory, candidates, samples) in [
         ("huge cells", 1e3, 1 << 27, 1, 32),
         ("huge cells", 1e3, 1 << 27, 4, 32),
         ("repeating cells", 1e-3, 1 << 27, 4, 32),
-        ("repeating cells, little room", 1e-3, 40 * (16 * 256 + 4 * SHARE_WORDS as u64), 1, 32),
+        ("repeating cells, little room", 1e-3, 40 * cell_bytes, 1, 32),
         ("faces only", 0.22, 1, 1, 32),
         // Six cells mislead four candidates: some of the light is in one sample of a hundred.
         ("faces only", 0.22, 1, 4, 512),
