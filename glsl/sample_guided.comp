@@ -44,8 +44,8 @@ uint brdf_share(Material material) {
 // Writes a ray that brings integrand * factor, and what it will teach. `from_brdf` is the part of its
 // density that is the BRDF's, in 256ths, of the one-sample model. There, at what the camera sees, a
 // direction that brings nothing, mostly since it is below the horizon, is not traced and counts as
-// blocked; candidates are not known to be so one by one, and at later vertices, which see less of their
-// cell alike, the rays in its place were not worth their time (docs/guided.md).
+// blocked; candidates are not known to be so one by one, and at later vertices the rays in its place were
+// not worth their time (docs/guided.md).
 void finish(uint index, uint first, Guided guided, float factor, uint from_brdf) {
     vec3 contribution = guided.considered.integrand * factor;
     write_ray(index, guided.considered.direction, contribution);

@@ -257,13 +257,14 @@ pub const NOTHING_TO_LEARN: u32 = 0xffff_ffff;
 pub const NO_SHARE_TO_LEARN: u32 = 0x1ff;
 /// First bit of what a shadow ray teaches about the share of the BRDF, 9 bits.
 pub const LEARN_FROM_BRDF_SHIFT: u32 = 8;
-/// First bit of the response of a shadow ray, 15 bits.
+/// First bit of the response of a shadow ray.
 pub const LEARN_RESPONSE_SHIFT: u32 = 17;
-/// A response of 1, in the whole numbers that are summed.
-pub const GUIDE_RESPONSE_UNITS: u32 = 65_536;
+/// A response of 1, in the whole numbers that are summed: two million rays of the greatest response fit a
+/// word between two rebuilds.
+pub const GUIDE_RESPONSE_UNITS: u32 = 4096;
 /// Greatest response of one ray in those units, a half: what is reflected more strongly than that is the
 /// peak of a lobe, which the BRDF's own sampling finds, and few cells have one for all of their surfaces.
-pub const GUIDE_RESPONSE_MOST: u32 = 32_767;
+pub const GUIDE_RESPONSE_MOST: u32 = 2048;
 /// Words of a cell per region that are counted: trials, hits and the responses of the hits.
 pub const GUIDE_COUNT_WORDS: u32 = 3;
 
