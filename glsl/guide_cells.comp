@@ -40,12 +40,12 @@ void main() {
         }
         index.sample_index = wave.first_sample + i;
         uint face = guide_face(hit.geometric_normal);
-        uint key = guide_key(hit.position, face, guide_cell_bits(index, vertex_dimension()));
-        bool is_fine = guide_find(key) != GUIDE_NO_KEY;
-        bool is_coarse = !is_fine && guide_find(guide_coarse_key(key)) != GUIDE_NO_KEY;
-        uint found = is_fine ? key : (is_coarse ? guide_coarse_key(key) : FACE_KEY | face);
-        colour += colour_of(found);
-        level += vec3(!is_fine && !is_coarse, is_coarse, is_fine);
+        uint key =
+            guide_cell(hit.position, face, guide_cell_bits(index, vertex_dimension())).key;
+        bool is_face = key == GUIDE_NO_KEY;
+        bool is_coarse = !is_face && (key & GUIDE_COARSE) != 0u;
+        colour += colour_of(is_face ? FACE_KEY | face : key);
+        level += vec3(is_face, is_coarse, !is_face && !is_coarse);
     }
     film_guide_cell[index.film_index] = colour;
     film_guide_level[index.film_index] = level;

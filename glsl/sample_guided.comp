@@ -123,9 +123,9 @@ void main() {
         return;
     }
     Vertex vertex = load_vertex(path, hit);
-    uint found = guide_cell(vertex, guide_cell_bits(vertex.index, vertex.dimension));
+    GuideCell found = guide_cell_of(vertex);
     uint cell = guide_cell_index(found);
-    uint learned_share = found >> GUIDE_SHARE_SHIFT;
+    uint learned_share = found.found >> GUIDE_SHARE_SHIFT;
     uint first = cell * guide.region_count;
     if (PRODUCT_WEIGHTS != 0u) {
         guide_weight_by_brdf(vertex, cell);

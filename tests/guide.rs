@@ -6,11 +6,12 @@ mod support;
 
 use fenestra::{
     gpu::constants::{
-        BINDING_GUIDE_COUNTS, BINDING_GUIDE_SHARES, GUIDE_NO_KEY, GUIDE_RESPONSE_UNITS, SET_SRBF,
+        BINDING_GUIDE_COUNTS, BINDING_GUIDE_SHARES, GUIDE_NO_KEY, GUIDE_REFINED,
+        GUIDE_RESPONSE_UNITS, SET_SRBF,
     },
     guide::{
-        CellKey, EstimateOptions, FACE_COUNT, Learned, PARENT_COUNT, Partition, decode_entry,
-        likely_regions,
+        CellKey, EstimateOptions, FACE_COUNT, GuideState, Learned, PARENT_COUNT, Partition,
+        decode_entry, decode_visibility, likely_regions,
     },
     random::{hash_4d, random_independent_2d},
     scene::environment::{EnvironmentMap, EnvironmentTables},
@@ -397,7 +398,7 @@ fn taught(partition: &Partition, capacity: usize, slots: usize) -> Learned {
             }
         }
     }
-    learned.add(&counted);
+    learned.add(0, &counted);
     learned
 }
 
@@ -464,7 +465,7 @@ fn cells_learn_what_their_surfaces_reflect() {
         let hits = if response > 0 { RAYS } else { 0 };
         counted[place * regions + index] = [RAYS, hits, response];
     }
-    learned.add(&counted);
+    learned.add(0, &counted);
     let ratio = |key: CellKey, options: &EstimateOptions| {
         let snapshot = learned.snapshot(&partition, options);
         let slot = snapshot.table.iter().find(|entry| entry[0] == key.0).unwrap();
@@ -483,14 +484,109 @@ fn cells_learn_what_their_surfaces_reflect() {
     let cosine = EstimateOptions { learned_response: false, ..learns };
     assert!((0.3..3.0).contains(&ratio(cell, &cosine)), "{}", ratio(cell, &cosine));
     // What was counted survives a file to the bit, also where a count was halved.
-    learned.add(&counted.iter().map(|count| count.map(|word| 16 * word)).collect::<Vec<_>>());
-    learned.add(&counted.iter().map(|count| count.map(|word| 16 * word)).collect::<Vec<_>>());
-    let keys: Vec<u32> = learned.keys().iter().map(|key| key.0).collect();
-    let words = learned.count_words();
-    let again = Learned::resume(regions, 1 << 12, 1 << 14, &keys, &words, learned.shares(), 1);
-    assert_eq!(again.count_words(), words);
+    let many: Vec<_> = counted.iter().map(|count| count.map(|word| 16 * word)).collect();
+    learned.add(0, &many);
+    learned.add(0, &many);
+    let again = Learned::resume(regions, 1 << 12, 1 << 14, &state_of(&learned), 1);
+    assert_eq!(again.count_words(), learned.count_words());
     assert_eq!(again.snapshot(&partition, &learns), learned.snapshot(&partition, &learns));
     assert!(learned.counts(place)[strong].trials_in_rays() <= 65_536.0);
+}
+
+/// What a file keeps of cells.
+fn state_of(learned: &Learned) -> GuideState {
+    GuideState {
+        keys: learned.keys().iter().map(|key| key.0).collect(),
+        refined: learned.refined(),
+        counts: learned.count_words(),
+        shares: learned.shares().to_vec(),
+        ..GuideState::default()
+    }
+}
+
+/// Four cells: in every region of one half of the rays are blocked; of another all, in half of the
+/// regions; the third is the first with few rays; in the fourth a quarter are visible everywhere.
+#[test]
+fn cells_are_refined_whose_rays_disagree() {
+    const RAYS: u32 = 40;
+    let map = sunny();
+    let partition = Partition::new(&map, 64);
+    let regions = partition.regions.len();
+    let keys: Vec<CellKey> =
+        [3, 40, 80, 120].iter().map(|&x| CellKey::fine([x, 4, 5], 6, 2)).collect();
+    let [doubtful, certain, unknown, other] = keys[..] else { panic!("four cells") };
+    let learn = |capacity: usize| {
+        let mut learned = Learned::new(regions, capacity, 1 << 14);
+        learned.want(&keys.iter().map(|key| key.0).collect::<Vec<u32>>());
+        let mut counted = vec![[0_u32; 3]; learned.cell_count() * regions];
+        for (key, counts) in learned.keys().iter().zip(counted.chunks_mut(regions)) {
+            for (region, count) in counts.iter_mut().enumerate() {
+                *count = match *key {
+                    key if key == doubtful => [RAYS, RAYS / 2, RAYS],
+                    key if key == other => [RAYS, RAYS / 4, RAYS],
+                    key if key == certain && region % 2 == 0 => [RAYS, RAYS, RAYS],
+                    key if key == certain => [RAYS, 0, 0],
+                    key if key == unknown => [2, 1, 1],
+                    _ => [0; 3],
+                };
+            }
+        }
+        learned.add(0, &counted);
+        learned.refine();
+        learned
+    };
+    let refined = |learned: &Learned| -> Vec<CellKey> {
+        learned.refined().iter().map(|&cell| learned.keys()[cell as usize]).collect()
+    };
+    let mut learned = learn(1 << 12);
+    assert_eq!(refined(&learned), [doubtful, other], "the greatest doubt first");
+    learned.refine();
+    assert_eq!(learned.refined().len(), 2, "once only");
+    // Room for four more cells, an eighth of all being left for what was not seen yet.
+    let cells = learned.cell_count();
+    assert_eq!(refined(&learn((cells + 4) * 8 / 7 + 1)), [doubtful]);
+    assert!(refined(&learn(cells)).is_empty());
+
+    // Parts become cells without coarse cells of their own, and lean on what they are parts of.
+    let part = |x: i32| CellKey::fine([x, 9, 10], 5, 2);
+    let (here, there) = (part(6), part(81));
+    learned.want(&[here.0, there.0]);
+    assert_eq!(learned.cell_count(), cells + 3);
+    let is_cell = |key: CellKey| learned.keys().contains(&key);
+    assert!(is_cell(here) && is_cell(there) && is_cell(there.coarse()) && !is_cell(here.coarse()));
+    let slot = |learned: &Learned, key: CellKey| {
+        let snapshot = learned.snapshot(&partition, &EstimateOptions::default());
+        let slot = *snapshot.table.iter().find(|entry| entry[0] == key.0).unwrap();
+        let cell = (slot[1] & (GUIDE_REFINED - 1)) as usize;
+        (slot[1], snapshot.entries[cell * regions..][..regions].to_vec())
+    };
+    assert_ne!(slot(&learned, doubtful).0 & GUIDE_REFINED, 0);
+    assert_eq!(slot(&learned, certain).0 & GUIDE_REFINED, 0);
+    assert_eq!(slot(&learned, here).0 & GUIDE_REFINED, 0);
+    let visibility = |learned: &Learned, key: CellKey, region: usize| {
+        decode_visibility(slot(learned, key).1[region])
+    };
+    let shining = (0..regions).filter(|&region| partition.regions[region].share > 0.0);
+    for region in shining.clone() {
+        let (whole, part) =
+            (visibility(&learned, doubtful, region), visibility(&learned, here, region));
+        assert!((part / whole - 1.0).abs() < 0.3, "{part} instead of {whole}");
+    }
+    // What the part counts is its own and that of the whole.
+    let before = visibility(&learned, doubtful, 7);
+    let mut counted = vec![[0_u32; 3]; learned.cell_count() * regions];
+    let cell = learned.keys().iter().position(|key| *key == here).unwrap();
+    counted[cell * regions..][..regions].fill([RAYS, 0, 0]);
+    learned.add(0, &counted);
+    for region in shining {
+        assert!(visibility(&learned, here, region) < 0.1);
+    }
+    assert!(visibility(&learned, doubtful, 7) < 0.8 * before);
+
+    let again = Learned::resume(regions, 1 << 12, 1 << 14, &state_of(&learned), 1);
+    let options = EstimateOptions::default();
+    assert_eq!(again.refined(), learned.refined());
+    assert_eq!(again.snapshot(&partition, &options), learned.snapshot(&partition, &options));
 }
 
 #[test]

@@ -47,17 +47,20 @@ uint guide_face(vec3 normal) {
     return 2u * axis + (along < 0.0 ? 1u : 0u);
 }
 
-// Key of the fine cell around a place: the edge is a power of two times the finest, from the
+// Level of size of the cell for a place: its edge is the finest times two to this power, from the
 // distance to the camera; `bits` blurs the levels.
-uint guide_key(vec3 position, uint face, uint bits) {
+uint guide_level(vec3 position, uint bits) {
     float wanted = min(
         guide.largest_edge,
         guide.edge_per_distance * distance(position, parameters.camera_position));
     float blurred = wanted / guide.finest_edge * (1.0 + unit_float(bits));
-    uint level = uint(clamp(int(floatBitsToUint(blurred) >> 23u) - 127, 0, 15));
+    return uint(clamp(int(floatBitsToUint(blurred) >> 23u) - 127, 0, 15));
+}
+
+// Key of the fine cell of a level around a place. Cells of one level are nested in those of the next.
+uint guide_key(vec3 position, uint face, uint level) {
     float edge = guide.finest_edge * uintBitsToFloat((level + 127u) << 23u);
-    // Off the corner of the scene, since walls at its sides should not lie between two cells.
-    ivec3 place = ivec3(floor((position - guide.grid_origin) / edge + 0.38)) & 255;
+    ivec3 place = ivec3(floor((position - guide.grid_origin) / edge)) & 255;
     return uint(place.x) | (uint(place.y) << 8u) | (uint(place.z) << 16u) | (level << 24u)
         | (face << 28u);
 }
@@ -109,26 +112,57 @@ void guide_want(uint key) {
     }
 }
 
-// The cell of a vertex: the fine one, else the coarse one around it, else that of its face; with its
-// share of the BRDF, 256ths, from bit GUIDE_SHARE_SHIFT on, 0 where it has none.
-uint guide_cell(Vertex vertex, uint bits) {
-    uint face = guide_face(vertex.hit.geometric_normal);
-    uint key = guide_key(vertex.hit.position, face, bits);
-    uint cell = guide_find(key);
+// A cell that was found.
+struct GuideCell {
+    // Its key, or GUIDE_NO_KEY for the cell of a face.
+    uint key;
+    // Its index; from bit GUIDE_SHARE_SHIFT on its share of the BRDF, 256ths, 0 where it has none;
+    // below, GUIDE_REFINED if parts of it may be cells.
+    uint found;
+};
+
+// The cell for a place: the fine one, and of that the smallest part there is; else the coarse one
+// around it, else that of its face.
+GuideCell guide_cell(vec3 position, uint face, uint bits) {
+    uint level = guide_level(position, bits);
+    uint key = guide_key(position, face, level);
+    GuideCell cell = GuideCell(key, guide_find(key));
     // Loops, since branches cost their body everywhere on some devices.
-    bool is_missing = cell == GUIDE_NO_KEY;
+    bool is_missing = cell.found == GUIDE_NO_KEY;
     while (is_missing) {
         guide_want(key);
-        cell = guide_find(guide_coarse_key(key));
-        cell = cell == GUIDE_NO_KEY ? face : cell;
+        cell.key = guide_coarse_key(key);
+        cell.found = guide_find(cell.key);
+        if (cell.found == GUIDE_NO_KEY) {
+            cell = GuideCell(GUIDE_NO_KEY, face);
+        }
         is_missing = false;
+    }
+    bool has_parts = (cell.found & GUIDE_REFINED) != 0u;
+    while (has_parts && level > 0u) {
+        level--;
+        key = guide_key(position, face, level);
+        uint found = guide_find(key);
+        has_parts = found != GUIDE_NO_KEY && (found & GUIDE_REFINED) != 0u;
+        if (found == GUIDE_NO_KEY) {
+            guide_want(key);
+        } else {
+            cell = GuideCell(key, found);
+        }
     }
     return cell;
 }
 
+// The cell of a vertex.
+GuideCell guide_cell_of(Vertex vertex) {
+    return guide_cell(
+        vertex.hit.position, guide_face(vertex.hit.geometric_normal),
+        guide_cell_bits(vertex.index, vertex.dimension));
+}
+
 // Index of the cell that guide_cell found.
-uint guide_cell_index(uint found) {
-    return found & ((1u << GUIDE_SHARE_SHIFT) - 1u);
+uint guide_cell_index(GuideCell cell) {
+    return cell.found & (GUIDE_REFINED - 1u);
 }
 
 // bits * count / 2^32.

@@ -45,8 +45,7 @@ void main() {
     }
     CandidateQuery query = queries[index];
     Vertex vertex = load_vertex(0u, load_hit(0u));
-    uint cell = guide_cell_index(
-        guide_cell(vertex, guide_cell_bits(vertex.index, vertex.dimension)));
+    uint cell = guide_cell_index(guide_cell_of(vertex));
     uint first = cell * guide.region_count;
     if (PRODUCT_WEIGHTS != 0u) {
         guide_weight_by_brdf(vertex, cell);

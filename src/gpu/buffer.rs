@@ -196,34 +196,42 @@ impl Buffer {
     /// # Panics
     /// If the buffer is shorter: a mistake of the caller.
     pub fn download<T: Pod>(&self, length: usize) -> Result<Vec<T>> {
-        let mut result: Vec<T> = vec![T::zeroed(); length];
-        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut result);
-        assert!(bytes.len() as u64 <= self.size, "download from {} is too long", self.name);
-        if bytes.is_empty() {
-            return Ok(result);
+        let mut result = Vec::with_capacity(length);
+        self.download_pieces(length, |piece| result.extend_from_slice(piece))?;
+        Ok(result)
+    }
+
+    /// Hands the first `length` elements to `take`, piece by piece in their order.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if a call fails.
+    ///
+    /// # Panics
+    /// If the buffer is shorter: a mistake of the caller.
+    pub fn download_pieces<T: Pod>(&self, length: usize, mut take: impl FnMut(&[T])) -> Result<()> {
+        let bytes = length * size_of::<T>();
+        assert!(bytes as u64 <= self.size, "download from {} is too long", self.name);
+        if bytes == 0 {
+            return Ok(());
         }
+        let longest = STAGING_BYTES / size_of::<T>() * size_of::<T>();
         let mut staging = Self::with_location(
             &self.device,
             "staging (download)",
-            bytes.len().min(STAGING_BYTES) as u64,
+            bytes.min(longest) as u64,
             MemoryLocation::GpuToCpu,
             vk::BufferUsageFlags::TRANSFER_DST,
         )?;
-        for (index, piece) in bytes.chunks_mut(STAGING_BYTES).enumerate() {
+        for first in (0..bytes).step_by(longest) {
+            let piece = longest.min(bytes - first);
             let mut commands = Commands::begin(&self.device)?;
-            commands.copy(
-                self,
-                (index * STAGING_BYTES) as u64,
-                &staging,
-                0,
-                piece.len().next_multiple_of(4) as u64,
-            );
+            let copied = piece.next_multiple_of(4) as u64;
+            commands.copy(self, first as u64, &staging, 0, copied);
             commands.make_visible_to_host();
             commands.submit_and_wait()?;
-            let length = piece.len();
-            piece.copy_from_slice(&staging.mapped()?[..length]);
+            take(bytemuck::cast_slice(&staging.mapped()?[..piece]));
         }
-        Ok(result)
+        Ok(())
     }
 
     fn mapped(&mut self) -> Result<&mut [u8]> {

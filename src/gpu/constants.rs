@@ -246,8 +246,10 @@ pub const GUIDE_LIKELY_REGIONS: u32 = 16;
 pub const GUIDE_VISIBILITY_LEVELS: u32 = 64;
 /// Octaves of light by which rays are counted for the share of the BRDF, from 2^-32 on.
 pub const GUIDE_SHARE_OCTAVES: u32 = 64;
-/// First bit of a cell's share of the BRDF in the hash table, 256ths; below it is the cell's index.
+/// First bit of a cell's share of the BRDF in the hash table, 256ths.
 pub const GUIDE_SHARE_SHIFT: u32 = 24;
+/// Bit in the hash table of a cell whose parts may be cells; below it is the cell's index.
+pub const GUIDE_REFINED: u32 = 1 << 23;
 /// Key of no cell.
 pub const GUIDE_NO_KEY: u32 = 0xffff_ffff;
 /// Learning target of a shadow ray that teaches nothing.
@@ -446,6 +448,7 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("GUIDE_VISIBILITY_LEVELS", GUIDE_VISIBILITY_LEVELS),
     ("GUIDE_SHARE_OCTAVES", GUIDE_SHARE_OCTAVES),
     ("GUIDE_SHARE_SHIFT", GUIDE_SHARE_SHIFT),
+    ("GUIDE_REFINED", GUIDE_REFINED),
     ("NO_SHARE_TO_LEARN", NO_SHARE_TO_LEARN),
     ("LEARN_FROM_BRDF_SHIFT", LEARN_FROM_BRDF_SHIFT),
     ("LEARN_RESPONSE_SHIFT", LEARN_RESPONSE_SHIFT),

@@ -1,7 +1,7 @@
 //! What was learned, in a file: `--save-guide`, `--load-guide`, and beside a checkpoint.
 //!
 //! One line of JSON, then 32-bit words in little-endian order: the rectangles that are the regions, the
-//! keys of the cells, the [`Count`] of each cell and region, what visible rays say about the share of the
+//! keys of the cells, which of them are refined, the [`Count`] of each cell and region, what visible rays say about the share of the
 //! BRDF, what passes counted of both since the last rebuild, and the keys they missed. The header has the
 //! SHA-256 of the words.
 
@@ -20,7 +20,7 @@ use crate::{
 
 const COUNT_WORDS: usize = GUIDE_COUNT_WORDS as usize;
 const FORMAT: &str = "fenestra-guide";
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 
 /// Everything a renderer needs to go on learning where another stopped.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -39,6 +39,8 @@ pub struct GuideState {
     pub rectangles: Vec<[u32; 5]>,
     /// Key of every cell, the faces first.
     pub keys: Vec<u32>,
+    /// Indices of the cells whose parts may be cells.
+    pub refined: Vec<u32>,
     /// Per cell and region up to the last rebuild: trials and hits, in sixteenths of rays, and the sum of
     /// the responses of the hits.
     pub counts: Vec<CountWords>,
@@ -79,6 +81,7 @@ struct Header {
     is_open: bool,
     candidates: Option<u32>,
     cells: usize,
+    refined: usize,
     pending: usize,
     pending_shares: usize,
     wanted: usize,
@@ -100,6 +103,7 @@ impl GuideState {
             .as_flattened()
             .iter()
             .chain(&self.keys)
+            .chain(&self.refined)
             .chain(self.counts.as_flattened())
             .chain(&self.shares)
             .chain(self.pending.as_flattened())
@@ -116,6 +120,7 @@ impl GuideState {
             is_open: self.is_open,
             candidates: self.candidates,
             cells: self.keys.len(),
+            refined: self.refined.len(),
             pending: self.pending.len(),
             pending_shares: self.pending_shares.len(),
             wanted: self.wanted.len(),
@@ -171,6 +176,7 @@ impl GuideState {
                 .checked_add(shares)?
                 .checked_add(header.pending_shares)?
                 .checked_add(header.cells)?
+                .checked_add(header.refined)?
                 .checked_add(header.wanted)?
                 .checked_mul(4)
         });
@@ -200,6 +206,7 @@ impl GuideState {
                 .map(|words| [words[0], words[1], words[2], words[3], words[4]])
                 .collect(),
             keys: take(header.cells),
+            refined: take(header.refined),
             counts: counted(take(COUNT_WORDS * counts)),
             shares: take(shares),
             pending: counted(take(COUNT_WORDS * header.pending)),
@@ -225,6 +232,7 @@ mod tests {
             candidates: Some(8),
             rectangles: vec![[0, 0, 5, 9, 0], [5, 0, 3, 9, 1]],
             keys: vec![u32::MAX, 7, 8],
+            refined: vec![1],
             counts: vec![
                 [1, 0, 0],
                 [2, 1, 7],

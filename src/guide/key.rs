@@ -3,7 +3,8 @@
 //! A cell is a cube of an infinite grid whose edge follows from the distance to the camera, together
 //! with the face of the cube that the surface's normal points at most. The grid coordinates are kept
 //! modulo 256: two places share a name only if they are at least 256 edges apart at the same edge,
-//! which costs precision and no correctness. Twin of `guide_key` in `glsl/include/guide.glsl`.
+//! which costs precision and no correctness. The grids are nested: a cell consists of eight of half its
+//! edge. Twin of `guide_key` in `glsl/include/guide.glsl`.
 
 use glam::Vec3;
 
@@ -42,6 +43,18 @@ impl CellKey {
             return self;
         }
         Self((self.0 >> 2 & 0x003f_3f3f) | (self.0 & 0x7f00_0000) | Self::COARSE)
+    }
+
+    /// What the keys of the parts of a fine cell share, cells of half its edge; `None` where there are
+    /// no smaller ones. Cells that are 128 edges apart have parts of the same names.
+    pub fn parts(self) -> Option<u32> {
+        let level = self.0 >> 24 & 15;
+        (!self.is_coarse() && level > 0).then(|| (self.0 & 0x707f_7f7f) | (level - 1) << 24)
+    }
+
+    /// [`Self::parts`] of the cell that a fine one is a part of.
+    pub fn siblings(self) -> u32 {
+        (self.0 >> 1 & 0x007f_7f7f) | (self.0 & 0x7f00_0000)
     }
 
     /// Whether this is a coarse cell.
@@ -84,5 +97,20 @@ mod tests {
         assert!(key.coarse().is_coarse() && key.coarse().coarse() == key.coarse());
         assert_eq!((key.face(), key.coarse().face()), (5, 5));
         assert!(key.is_valid_fine() && !CellKey::NONE.is_valid_fine());
+    }
+
+    #[test]
+    fn parts_halve_the_edge() {
+        let whole = CellKey::fine([7, -1, 300], 9, 5);
+        for part in 0..8 {
+            let offset = |position: i32, axis: i32| 2 * position + (part >> axis & 1);
+            let part = CellKey::fine([offset(7, 0), offset(-1, 1), offset(300, 2)], 8, 5);
+            assert_eq!(Some(part.siblings()), whole.parts());
+        }
+        for other in [([8, -1, 300], 9, 5), ([7, -1, 300], 8, 5), ([7, -1, 300], 9, 4)] {
+            assert_ne!(CellKey::fine(other.0, other.1, other.2).parts(), whole.parts());
+        }
+        assert_eq!(CellKey::fine([7, 1, 3], 0, 2).parts(), None);
+        assert_eq!(whole.coarse().parts(), None);
     }
 }

@@ -5,15 +5,29 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::{
-    estimate::{Count, CountWords, EstimateOptions, Estimates, PARTS_PER_RAY, decode_entry},
-    key::{CellKey, FACE_COUNT, face_normal},
+    estimate::{
+        Count, CountWords, EstimateOptions, Estimates, Lookup, PARTS_PER_RAY, Scratch, Tally,
+        decode_entry,
+    },
+    file::GuideState,
+    key::{CellKey, FACE_COUNT},
     partition::Partition,
     share::{SHARE_WORDS, ShareEvidence, share_in_256ths},
 };
-use crate::gpu::constants::{GUIDE_PROBES, GUIDE_SHARE_SHIFT};
+use crate::gpu::constants::{GUIDE_PROBES, GUIDE_REFINED, GUIDE_SHARE_SHIFT};
 
 /// Trials of one region and cell above which what was counted is halved; then the responses fit a word.
-const LARGEST_COUNT: u64 = (1 << 16) * PARTS_PER_RAY;
+const LARGEST_COUNT: u64 = (1 << 16) * PARTS_PER_RAY as u64;
+
+/// Most cells, faces included: their index lies below [`GUIDE_REFINED`].
+pub const MOST_CELLS: usize = 1 << 22;
+
+/// Trials in one cell and region that let it be refined, if all regions had as many.
+const RAYS_TO_REFINE: u64 = 8;
+/// Least share of a cell's rays that went to directions of which it cannot say whether they are blocked.
+const LEAST_DOUBT: f64 = 0.01;
+/// Parts that a refined cell is expected to have: surfaces cross half of its eight.
+const EXPECTED_PARTS: usize = 4;
 
 /// Cells and counts. The first [`FACE_COUNT`] cells are the faces: rays from places that have no
 /// cell of their own count there.
@@ -23,6 +37,10 @@ pub struct Learned {
     slots: usize,
     keys: Vec<CellKey>,
     index_of: HashMap<CellKey, usize>,
+    /// Fine cells whose parts may be cells.
+    refined: Vec<usize>,
+    /// Those by [`CellKey::parts`].
+    refined_by_parts: HashMap<u32, usize>,
     /// Rays that were counted in the cell itself, cell by cell and region by region.
     counts: Vec<Count>,
     region_count: usize,
@@ -32,13 +50,33 @@ pub struct Learned {
 }
 
 /// What the next pass reads, as it lies on the device.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Snapshot {
-    /// Hash table: key of a cell, [`CellKey::NONE`] where empty; its index and, from bit
-    /// [`GUIDE_SHARE_SHIFT`] on, its share of the BRDF in 256ths, 0 where that goes by the material.
+    /// Hash table: key of a cell, [`CellKey::NONE`] where empty; its index, [`GUIDE_REFINED`] where its
+    /// parts may be cells and, from bit [`GUIDE_SHARE_SHIFT`] on, its share of the BRDF in 256ths, 0
+    /// where that goes by the material.
     pub table: Vec<[u32; 2]>,
     /// Entries of every cell, region by region.
     pub entries: Vec<[u32; 2]>,
+}
+
+/// What a cell leans on: what is known of its parent, else of a face `alone`.
+fn around<'a>(
+    parent: Option<usize>,
+    whole: &'a [Option<Estimates>],
+    alone: &'a Estimates,
+) -> &'a Estimates {
+    parent.and_then(|parent| whole[parent].as_ref()).unwrap_or(alone)
+}
+
+/// Which cells are parts of which.
+struct Tree {
+    /// Of every cell the one that it is a part of; faces are parts of themselves.
+    parents: Vec<usize>,
+    /// The parts of every cell.
+    parts: Vec<Vec<usize>>,
+    /// The faces, those of their parts that have parts or may have, those of these, and so on.
+    generations: Vec<Vec<usize>>,
 }
 
 impl Learned {
@@ -48,12 +86,15 @@ impl Learned {
     /// # Panics
     /// If there is no room for the faces or `slots` is not a power of two.
     pub fn new(region_count: usize, capacity: usize, slots: usize) -> Self {
-        assert!(capacity >= FACE_COUNT && slots.is_power_of_two(), "{capacity} cells, {slots}");
+        let is_possible = (FACE_COUNT..=MOST_CELLS).contains(&capacity) && slots.is_power_of_two();
+        assert!(is_possible, "{capacity} cells, {slots} slots");
         Self {
             capacity,
             slots,
             keys: vec![CellKey::NONE; FACE_COUNT],
             index_of: HashMap::new(),
+            refined: Vec::new(),
+            refined_by_parts: HashMap::new(),
             counts: vec![Count::default(); FACE_COUNT * region_count],
             region_count,
             shares: vec![0; FACE_COUNT * SHARE_WORDS],
@@ -61,8 +102,8 @@ impl Learned {
         }
     }
 
-    /// As [`Self::new`], with the keys, counts (trials and hits in sixteenths of rays) and shares that an
-    /// earlier one had; what finds no room is left out. With `forget`, every count is divided by that
+    /// As [`Self::new`], with the keys, the refined cells, counts (trials and hits in sixteenths of rays)
+    /// and shares that an earlier one had; what finds no room is left out. With `forget`, every count is divided by that
     /// number.
     ///
     /// # Panics
@@ -72,11 +113,10 @@ impl Learned {
         region_count: usize,
         capacity: usize,
         slots: usize,
-        keys: &[u32],
-        counts: &[CountWords],
-        shares: &[u32],
+        state: &GuideState,
         forget: u32,
     ) -> Self {
+        let GuideState { keys, refined, counts, shares, .. } = state;
         assert!(keys.len() >= FACE_COUNT && counts.len() == keys.len() * region_count, "lengths");
         assert_eq!(shares.len(), keys.len() * SHARE_WORDS, "lengths");
         let mut learned = Self::new(region_count, capacity, slots);
@@ -85,13 +125,16 @@ impl Learned {
             learned.index_of.insert(key, learned.keys.len());
             learned.keys.push(key);
         }
+        for &cell in refined {
+            learned.let_be_refined(cell as usize);
+        }
         let count = learned.keys.len() * region_count;
         learned.counts = counts[..count]
             .iter()
             .map(|[trials, hits, response]| Count {
-                hits: u64::from(hits.min(trials) / forget),
-                trials: u64::from(trials / forget),
-                response: u64::from(response / forget),
+                hits: hits.min(trials) / forget,
+                trials: trials / forget,
+                response: response / forget,
             })
             .collect();
         let count = learned.keys.len() * SHARE_WORDS;
@@ -99,14 +142,58 @@ impl Learned {
         learned
     }
 
+    /// Indices of the cells that are refined, as [`Self::resume`] takes them.
+    pub fn refined(&self) -> Vec<u32> {
+        self.refined.iter().map(|&cell| cell as u32).collect()
+    }
+
+    fn let_be_refined(&mut self, cell: usize) {
+        if cell >= FACE_COUNT
+            && let Some(parts) = self.keys.get(cell).and_then(|key| key.parts())
+        {
+            self.refined.push(cell);
+            self.refined_by_parts.insert(parts, cell);
+        }
+    }
+
+    /// Lets parts of fine cells be cells where there have been rays enough to tell them apart and these
+    /// disagree on what is blocked: those first of which most rays do, as long as there is room.
+    pub fn refine(&mut self) {
+        let enough = RAYS_TO_REFINE * u64::from(PARTS_PER_RAY) * self.region_count as u64;
+        let is_refined = |cell: usize| {
+            let parts = self.keys[cell].parts();
+            parts.is_none_or(|parts| self.refined_by_parts.contains_key(&parts))
+        };
+        let doubt = |cell: usize| {
+            if is_refined(cell) {
+                return None;
+            }
+            let counts = self.counts(cell);
+            let trials: u64 = counts.iter().map(|count| u64::from(count.trials)).sum();
+            if trials < enough {
+                return None;
+            }
+            // Variance of as many rays, each of which is blocked or not.
+            let doubt = |count: &Count| {
+                let (hits, trials) = (count.hits as f32, count.trials as f32);
+                f64::from(hits * (trials - hits) / trials.max(1.0))
+            };
+            let doubt: f64 = counts.iter().map(doubt).sum();
+            (doubt >= LEAST_DOUBT * trials as f64).then_some((doubt, cell))
+        };
+        let mut doubtful: Vec<(f64, usize)> =
+            (FACE_COUNT..self.keys.len()).into_par_iter().filter_map(doubt).collect();
+        doubtful.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        // An eighth is left for cells that were not seen yet.
+        let room = (self.capacity - self.capacity / 8).saturating_sub(self.keys.len());
+        for (_, cell) in doubtful.into_iter().take(room / EXPECTED_PARTS) {
+            self.let_be_refined(cell);
+        }
+    }
+
     /// What all cells counted, as [`Self::resume`] takes it.
     pub fn count_words(&self) -> Vec<CountWords> {
-        // Counts stay below LARGEST_COUNT and what one stretch of passes adds.
-        let word = |count: u64| u32::try_from(count).unwrap_or(u32::MAX);
-        self.counts
-            .iter()
-            .map(|count| [word(count.trials), word(count.hits), word(count.response)])
-            .collect()
+        self.counts.iter().map(|count| [count.trials, count.hits, count.response]).collect()
     }
 
     /// What visible rays say about the share of the BRDF, as [`Self::resume`] takes it.
@@ -131,7 +218,8 @@ impl Learned {
 
     /// Rays that were counted in all cells together.
     pub fn rays(&self) -> u64 {
-        self.counts.iter().map(|count| count.trials).sum::<u64>() / PARTS_PER_RAY
+        let trials = |count: &Count| u64::from(count.trials);
+        self.counts.par_iter().map(trials).sum::<u64>() / u64::from(PARTS_PER_RAY)
     }
 
     /// Cells that found no room, counted again at every rebuild.
@@ -140,22 +228,26 @@ impl Learned {
     }
 
     /// Adds what one stretch of passes counted per cell and region, in the order of the cells as they
-    /// were, trials and hits in rays.
+    /// were, trials and hits in rays; `counted` starts with pair `first` of cell and region.
     ///
     /// # Panics
     /// If there are more counts than cells.
-    pub fn add(&mut self, counted: &[CountWords]) {
-        assert!(counted.len() <= self.counts.len(), "counts of cells that are there");
-        for (count, [trials, hits, response]) in self.counts.iter_mut().zip(counted) {
-            count.trials += PARTS_PER_RAY * u64::from(*trials);
-            count.hits += PARTS_PER_RAY * u64::from(*hits.min(trials));
-            count.response += u64::from(*response);
-            while count.trials > LARGEST_COUNT {
-                count.trials /= 2;
-                count.hits /= 2;
-                count.response /= 2;
-            }
-        }
+    pub fn add(&mut self, first: usize, counted: &[CountWords]) {
+        let counts = &mut self.counts[first..][..counted.len()];
+        let parts = u64::from(PARTS_PER_RAY);
+        let add = |(count, [trials, hits, response]): (&mut Count, &CountWords)| {
+            let all = u64::from(count.trials) + parts * u64::from(*trials);
+            let halvings = (all / (LARGEST_COUNT + 1)).checked_ilog2().map_or(0, |log| log + 1);
+            let halved = |count: u32, more: u64| {
+                u32::try_from((u64::from(count) + more) >> halvings).unwrap_or(u32::MAX)
+            };
+            count.hits = halved(count.hits, parts * u64::from(*hits.min(trials)));
+            count.response = halved(count.response, u64::from(*response));
+            count.trials = halved(count.trials, parts * u64::from(*trials));
+        };
+        let longest = 16 * self.region_count;
+        let pieces = counts.par_chunks_mut(longest).zip(counted.par_chunks(longest));
+        pieces.for_each(|(counts, counted)| counts.iter_mut().zip(counted).for_each(add));
     }
 
     /// Adds what one stretch of passes found about the share of the BRDF, [`SHARE_WORDS`] words per
@@ -170,8 +262,8 @@ impl Learned {
         }
     }
 
-    /// Makes room for the fine cells `wanted`, in any order and repeated at will: first for their
-    /// coarse cells, then for themselves, as long as there is room.
+    /// Makes room for the fine cells `wanted`, in any order and repeated at will: first for the coarse
+    /// cells of those that are no parts of others, then for themselves, as long as there is room.
     pub fn want(&mut self, wanted: &[u32]) {
         let mut keys: Vec<CellKey> =
             wanted.iter().map(|&word| CellKey(word)).filter(|key| key.is_valid_fine()).collect();
@@ -180,7 +272,9 @@ impl Learned {
         // Neighbours in the order of a hash are nowhere near each other: what finds no room is
         // scattered over the scene.
         keys.sort_by_key(|key| (key.slot(u32::MAX), key.0));
-        let coarse: Vec<CellKey> = keys.iter().map(|key| key.coarse()).collect();
+        let is_part = |key: &&CellKey| self.refined_by_parts.contains_key(&key.siblings());
+        let coarse: Vec<CellKey> =
+            keys.iter().filter(|key| !is_part(key)).map(|key| key.coarse()).collect();
         for key in coarse.into_iter().chain(keys) {
             if self.index_of.contains_key(&key) {
                 continue;
@@ -231,7 +325,8 @@ impl Learned {
         let mut counts = vec![Count::default(); self.keys.len() * count];
         counts.par_chunks_mut(count).zip(self.counts.par_chunks(self.region_count)).for_each(
             |(new, old)| {
-                for (old, shares) in old.iter().zip(&shares) {
+                let counted = old.iter().zip(&shares).filter(|(old, _)| old.trials > 0);
+                for (old, shares) in counted {
                     for (region, share) in shares {
                         new[*region].add_share(*old, *share);
                     }
@@ -244,112 +339,162 @@ impl Learned {
 
     /// The tables for the next pass.
     pub fn snapshot(&self, partition: &Partition, options: &EstimateOptions) -> Snapshot {
+        let mut snapshot = Snapshot::default();
+        self.write_snapshot(partition, options, &mut snapshot);
+        snapshot
+    }
+
+    /// The tables for the next pass, in the memory of older ones.
+    pub fn write_snapshot(
+        &self,
+        partition: &Partition,
+        options: &EstimateOptions,
+        snapshot: &mut Snapshot,
+    ) {
         let regions = self.region_count;
-        // Every count also belongs to the coarse cell and the face above it.
-        let mut sums = self.counts.clone();
-        let mut scene = Count::default();
-        let mut faces = vec![Count::default(); FACE_COUNT * regions];
-        let add = |sums: &mut [Count], to: usize, counts: &[Count]| {
-            for (sum, count) in sums[to * regions..][..regions].iter_mut().zip(counts) {
-                sum.add(*count);
-            }
-        };
-        for (index, key) in self.keys.iter().enumerate() {
-            let counts = self.counts(index);
-            for count in counts {
-                scene.add(*count);
-            }
-            if index < FACE_COUNT {
-                add(&mut faces, index, counts);
-                continue;
-            }
-            add(&mut faces, key.face(), counts);
-            if let Some(coarse) = self.coarse_of(*key) {
-                add(&mut sums, coarse, counts);
+        let lookup = Lookup::new(partition, options);
+        let tree = self.tree();
+        let tallies = self.tallies(&tree);
+        let mut scene = Tally::default();
+        for tally in tallies[..FACE_COUNT].iter().flatten() {
+            scene.add(*tally);
+        }
+        let nothing = vec![Tally::default(); regions];
+        // What is believed where no cell has counted anything.
+        let alone: Vec<Estimates> = (0..FACE_COUNT)
+            .map(|face| Estimates::of_face(face, &nothing, scene, &lookup))
+            .collect();
+        let parent = |cell: usize| options.hierarchy.then_some(tree.parents[cell]);
+        // Of what others are parts of, from the faces down.
+        let mut whole: Vec<Option<Estimates>> = vec![None; self.keys.len()];
+        for generation in &tree.generations {
+            let estimate = |&cell: &usize| {
+                let tallies = &tallies[cell];
+                if cell < FACE_COUNT {
+                    return Estimates::of_face(cell, tallies, scene, &lookup);
+                }
+                let around = around(parent(cell), &whole, &alone[self.face(cell)]);
+                if self.keys[cell].is_coarse() {
+                    Estimates::of_coarse(tallies, around)
+                } else {
+                    Estimates::of_part(tallies, around, &lookup)
+                }
+            };
+            let estimates: Vec<Estimates> = generation.par_iter().map(estimate).collect();
+            for (cell, estimates) in generation.iter().zip(estimates) {
+                whole[*cell] = Some(estimates);
             }
         }
-        let face = |face: usize, counts: &[Count]| {
-            Estimates::of_face(counts, scene, face_normal(face), partition)
-        };
-        let faces: Vec<Estimates> = (0..FACE_COUNT)
-            .map(|index| face(index, &faces[index * regions..][..regions]))
-            .collect();
-        let nothing = vec![Count::default(); regions];
-        let flat: Vec<Estimates> = (0..FACE_COUNT).map(|index| face(index, &nothing)).collect();
-        let priors = if options.hierarchy { &faces } else { &flat };
-        // Of coarse cells, where they are not those of their face.
-        let coarse: Vec<Option<Estimates>> = self
-            .keys
-            .par_iter()
-            .zip(sums.par_chunks(regions))
-            .enumerate()
-            .map(|(index, (key, sums))| {
-                (index >= FACE_COUNT && key.is_coarse() && options.hierarchy)
-                    .then(|| Estimates::of_coarse(sums, &priors[key.face()]))
-            })
-            .collect();
-        let coarse_or_face = |index: Option<usize>, face: usize| {
-            index.and_then(|index| coarse[index].as_ref()).unwrap_or(&priors[face])
-        };
-        let mut entries = vec![[0; 2]; self.keys.len() * regions];
-        entries.par_chunks_mut(regions).enumerate().for_each(|(index, entries)| {
-            let key = self.keys[index];
-            let face = if index < FACE_COUNT { index } else { key.face() };
-            let normal = face_normal(face);
-            let of = |estimates: &Estimates| estimates.entries(normal, partition, options);
-            entries.copy_from_slice(&if index < FACE_COUNT {
-                of(&faces[face])
-            } else if key.is_coarse() {
-                of(coarse_or_face(Some(index), face))
-            } else {
-                let coarse = coarse_or_face(self.coarse_of(key), face);
-                of(&Estimates::of_fine(self.counts(index), coarse, partition))
-            });
-        });
+        let entries = &mut snapshot.entries;
+        entries.resize(self.keys.len() * regions, [0; 2]);
+        entries.par_chunks_mut(regions).enumerate().for_each_init(
+            Scratch::default,
+            |scratch, (cell, entries)| {
+                let of_part;
+                let estimates = if let Some(estimates) = &whole[cell] {
+                    estimates
+                } else {
+                    let around = around(parent(cell), &whole, &alone[self.face(cell)]);
+                    of_part = Estimates::of_part(self.counts(cell), around, &lookup);
+                    &of_part
+                };
+                estimates.write_entries(self.face(cell), &lookup, scratch, entries);
+            },
+        );
         let shares = if options.learned_share {
-            self.shares_in_256ths(options.hierarchy)
+            self.shares_in_256ths(&tree, options.hierarchy)
         } else {
             vec![0; self.keys.len()]
         };
-        Snapshot { table: self.table(&shares), entries }
+        snapshot.table = self.table(&shares);
     }
 
-    /// The coarse cell above a fine one.
-    fn coarse_of(&self, key: CellKey) -> Option<usize> {
-        if key.is_coarse() { None } else { self.index_of.get(&key.coarse()).copied() }
+    fn face(&self, cell: usize) -> usize {
+        if cell < FACE_COUNT { cell } else { self.keys[cell].face() }
+    }
+
+    /// The cell that another is a part of: a refined one, else its coarse cell, of that its face.
+    fn parent(&self, cell: usize) -> usize {
+        let key = self.keys[cell];
+        if key.is_coarse() {
+            return key.face();
+        }
+        let refined = self.refined_by_parts.get(&key.siblings());
+        refined.or_else(|| self.index_of.get(&key.coarse())).copied().unwrap_or(key.face())
+    }
+
+    fn tree(&self) -> Tree {
+        let parents: Vec<usize> = (0..FACE_COUNT)
+            .chain((FACE_COUNT..self.keys.len()).map(|cell| self.parent(cell)))
+            .collect();
+        let mut parts = vec![Vec::new(); parents.len()];
+        for (cell, parent) in parents.iter().enumerate().skip(FACE_COUNT) {
+            parts[*parent].push(cell);
+        }
+        let mut generations = vec![(0..FACE_COUNT).collect::<Vec<usize>>()];
+        while let Some(last) = generations.last().filter(|last| !last.is_empty()) {
+            let next = last.iter().flat_map(|&cell| parts[cell].iter().copied());
+            let is_whole = |cell: &usize| !parts[*cell].is_empty() || self.keys[*cell].is_coarse();
+            generations.push(next.filter(is_whole).collect());
+        }
+        Tree { parents, parts, generations }
+    }
+
+    /// What was counted in every cell that has parts and in these; nothing for the others.
+    fn tallies(&self, tree: &Tree) -> Vec<Vec<Tally>> {
+        let mut tallies = vec![Vec::new(); self.keys.len()];
+        for generation in tree.generations.iter().rev() {
+            let sum = |&cell: &usize| -> Vec<Tally> {
+                let mut sum: Vec<Tally> = self.counts(cell).iter().map(Tally::from).collect();
+                for &part in &tree.parts[cell] {
+                    if tallies[part].is_empty() {
+                        let counts = self.counts(part);
+                        sum.iter_mut().zip(counts).for_each(|(sum, count)| sum.add(count.into()));
+                    } else {
+                        let tallies = &tallies[part];
+                        sum.iter_mut().zip(tallies).for_each(|(sum, tally)| sum.add(*tally));
+                    }
+                }
+                sum
+            };
+            let sums: Vec<Vec<Tally>> = generation.par_iter().map(sum).collect();
+            for (cell, sum) in generation.iter().zip(sums) {
+                tallies[*cell] = sum;
+            }
+        }
+        tallies
     }
 
     /// Share of the BRDF of every cell, 256ths, 0 where it is left to the material. A cell leans on
-    /// its coarse cell, that on its face, that on the scene.
-    fn shares_in_256ths(&self, hierarchy: bool) -> Vec<u32> {
-        let own: Vec<ShareEvidence> =
+    /// what it is a part of, a face on the scene.
+    fn shares_in_256ths(&self, tree: &Tree, hierarchy: bool) -> Vec<u32> {
+        let mut sums: Vec<ShareEvidence> =
             self.shares.par_chunks(SHARE_WORDS).map(ShareEvidence::of).collect();
-        let mut sums = own.clone();
         let mut scene = ShareEvidence::default();
-        let mut faces = [ShareEvidence::default(); FACE_COUNT];
-        for (index, (key, evidence)) in self.keys.iter().zip(&own).enumerate() {
+        for evidence in &sums {
             scene.add(*evidence);
-            faces[if index < FACE_COUNT { index } else { key.face() }].add(*evidence);
-            if index >= FACE_COUNT
-                && let Some(coarse) = self.coarse_of(*key)
-            {
-                sums[coarse].add(*evidence);
+        }
+        for generation in tree.generations.iter().rev() {
+            for &cell in generation {
+                for &part in &tree.parts[cell] {
+                    let evidence = sums[part];
+                    sums[cell].add(evidence);
+                }
             }
         }
         let scene = scene.share(None);
-        let share = |(index, key): (usize, &CellKey)| {
-            let face = if index < FACE_COUNT { index } else { key.face() };
-            let mut around = faces[face].share(scene);
-            if !hierarchy {
-                around = scene;
-            } else if index >= FACE_COUNT
-                && let Some(coarse) = self.coarse_of(*key)
-            {
-                around = sums[coarse].share(around);
+        let mut shares: Vec<Option<f64>> =
+            sums[..FACE_COUNT].iter().map(|sum| sum.share(scene)).collect();
+        shares.resize(self.keys.len(), None);
+        for generation in &tree.generations {
+            for &cell in generation {
+                let around = if hierarchy { shares[cell] } else { scene };
+                for &part in &tree.parts[cell] {
+                    shares[part] = sums[part].share(around);
+                }
             }
-            share_in_256ths(sums[index].share(around))
-        };
-        self.keys.iter().enumerate().map(share).collect()
+        }
+        shares.into_iter().map(share_in_256ths).collect()
     }
 
     /// The hash table, with `shares` of the BRDF by cell; what finds no slot within [`GUIDE_PROBES`] is left out, and its place falls
@@ -357,11 +502,15 @@ impl Learned {
     fn table(&self, shares: &[u32]) -> Vec<[u32; 2]> {
         let mut table = vec![[CellKey::NONE.0, 0]; self.slots];
         let mask = (self.slots - 1) as u32;
+        let mut values: Vec<u32> = shares.iter().map(|share| share << GUIDE_SHARE_SHIFT).collect();
+        for &cell in &self.refined {
+            values[cell] |= GUIDE_REFINED;
+        }
         for (index, key) in self.keys.iter().enumerate().skip(FACE_COUNT) {
             let first = key.slot(mask);
             let slots = (0..GUIDE_PROBES).map(|probe| ((first + probe) & mask) as usize);
             if let Some(slot) = slots.into_iter().find(|&slot| table[slot][0] == CellKey::NONE.0) {
-                table[slot] = [key.0, index as u32 | shares[index] << GUIDE_SHARE_SHIFT];
+                table[slot] = [key.0, index as u32 | values[index]];
             }
         }
         table

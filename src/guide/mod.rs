@@ -27,7 +27,7 @@ pub use estimate::{
 };
 pub use file::{GuideState, Origin};
 pub use key::{CellKey, FACE_COUNT, face_normal};
-pub use learned::{Learned, Snapshot};
+pub use learned::{Learned, MOST_CELLS, Snapshot};
 pub use likely::{LikelyRegion, likely_regions};
 pub use partition::{MOST_REGIONS, PARENT_COUNT, Partition, Region};
 pub use share::{SHARE_WORDS, ShareEvidence, share_in_256ths};

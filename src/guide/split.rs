@@ -24,6 +24,8 @@ pub struct Cells {
     pub energy: Vec<f64>,
     /// Solid angle of one cell by row, as a share of the sphere.
     pub row_angle: Vec<f64>,
+    /// Sine and cosine of the azimuth of the middle of every column.
+    azimuth: Vec<(f64, f64)>,
     /// Rotation of the map about +y, radians.
     rotation_rad: f64,
 }
@@ -52,7 +54,9 @@ impl Cells {
         for angle in &mut row_angle {
             *angle /= whole;
         }
-        Self { width, rows, energy, row_angle, rotation_rad: f64::from(map.rotation_rad) }
+        let turn = 2.0 * std::f64::consts::PI / width as f64;
+        let azimuth = (1..=width).map(|column| (column as f64 * turn).sin_cos()).collect();
+        Self { width, rows, energy, row_angle, azimuth, rotation_rad: f64::from(map.rotation_rad) }
     }
 
     /// Unit mean of the directions in the world, weighted by energy, or by solid angle where there is
@@ -66,11 +70,11 @@ impl Cells {
             let theta = pi * row as f64 / (self.rows - 1) as f64;
             let (sin_theta, cos_theta) = theta.sin_cos();
             for column in rectangle.first[0]..rectangle.first[0] + rectangle.size[0] {
-                let azimuth = 2.0 * pi * (column as f64 + 1.0) / self.width as f64;
+                let (sin_azimuth, cos_azimuth) = self.azimuth[column];
                 let weight =
                     if dark { self.row_angle[row] } else { self.energy[row * self.width + column] };
                 let direction =
-                    DVec3::new(-sin_theta * azimuth.sin(), cos_theta, sin_theta * azimuth.cos());
+                    DVec3::new(-sin_theta * sin_azimuth, cos_theta, sin_theta * cos_azimuth);
                 sum += weight * direction;
             }
         }

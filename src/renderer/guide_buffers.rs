@@ -20,7 +20,8 @@ use crate::{
     },
     guide::{
         CellKey, CountWords, EstimateOptions, FACE_COUNT, GuideState, Learned, LikelyRegion,
-        Origin, Partition, SHARE_WORDS, Snapshot, decode_entry, decode_visibility, likely_regions,
+        MOST_CELLS, Origin, Partition, SHARE_WORDS, Snapshot, decode_entry, decode_visibility,
+        likely_regions,
     },
     sampler::{Parameters, Weights},
     scene::{self, Scene},
@@ -52,11 +53,11 @@ const FIRST_REGIONS: usize = 256;
 const RAYS_PER_REGION: u64 = 2;
 
 /// The first number of samples, not below `samples`, after which the guide is rebuilt: 1, 2, 3, 4, 6,
-/// 8, 12, 16, 24, …
+/// 8, 12, 16, 32, 64, …
 pub fn guide_schedule(samples: u32) -> u32 {
     let power = samples.next_power_of_two();
     let middle = power / 4 * 3;
-    if middle >= samples { middle } else { power }
+    if middle >= samples && power <= SPLIT_AFTER { middle } else { power }
 }
 
 /// How much can be learned.
@@ -100,6 +101,8 @@ pub struct GuideBuffers {
     is_split: bool,
     options: EstimateOptions,
     learned: Learned,
+    /// What passes read now.
+    snapshot: Snapshot,
     room: Room,
     origin: Origin,
     layout: GuideParameters,
@@ -144,6 +147,7 @@ impl GuideBuffers {
         let uses_likely = parameters.weights == Weights::Product;
         let likely_bytes = 16 * u64::from(GUIDE_LIKELY_REGIONS);
         let useful_cells = FEW_CELLS.max(u64::from(pixels) / PIXELS_PER_CELL) as usize;
+        let useful_cells = useful_cells.min(MOST_CELLS);
         // What cells take besides is most per region where these are fewest.
         let besides = 4 * SHARE_WORDS as u64 + if uses_likely { likely_bytes } else { 0 };
         let by_memory =
@@ -209,6 +213,7 @@ impl GuideBuffers {
             is_split: false,
             options,
             learned,
+            snapshot: Snapshot::default(),
             room,
             origin,
             layout: guide,
@@ -267,15 +272,22 @@ impl GuideBuffers {
     pub fn rebuild(&mut self, splits: bool) -> Result<()> {
         let start = Instant::now();
         let counted = self.learned.cell_count() * self.partition.regions.len();
-        self.learned.add(&self.counts.download::<CountWords>(counted)?);
+        let mut first = 0;
+        self.counts.download_pieces::<CountWords>(counted, |piece| {
+            self.learned.add(first, piece);
+            first += piece.len();
+        })?;
         let words = self.learned.cell_count() * SHARE_WORDS;
         self.learned.add_shares(&self.shares.download::<u32>(words)?);
         self.learned.want(&self.wanted.download::<u32>(self.wanted_slots)?);
         let now = self.partition.regions.len();
-        let count = self.room.regions(now, self.learned.cell_count(), self.learned.rays());
+        let rays = if now < self.room.most_regions { self.learned.rays() } else { 0 };
+        let count = self.room.regions(now, self.learned.cell_count(), rays);
+        if count == self.room.most_regions {
+            self.learned.refine();
+        }
         if splits || count > now {
-            let snapshot = self.learned.snapshot(&self.partition, &self.options);
-            let interest = self.learned.interest(&snapshot);
+            let interest = self.learned.interest(&self.snapshot);
             if let Some(partition) = self.partition.split_by(&interest, count) {
                 let capacity = self.room.cells(partition.regions.len());
                 self.learned.carry_over(&self.partition, &partition, capacity);
@@ -323,8 +335,8 @@ impl GuideBuffers {
             (false, false) => CellLevel::Fine(key),
         };
         let count = self.partition.regions.len();
-        let entries: Vec<[u32; 2]> = self.entries.download((index + 1) * count)?;
-        let known = entries[index * count..].iter().zip(&self.partition.regions);
+        let known =
+            self.snapshot.entries[index * count..][..count].iter().zip(&self.partition.regions);
         let regions =
             known.zip(self.learned.counts(index)).map(|((entry, region), count)| RecordedRegion {
                 trials: count.trials_in_rays(),
@@ -350,6 +362,7 @@ impl GuideBuffers {
             candidates: None,
             rectangles: self.partition.rectangles(),
             keys: self.learned.keys().iter().map(|key| key.0).collect(),
+            refined: self.learned.refined(),
             counts: self.learned.count_words(),
             shares: self.learned.shares().to_vec(),
             pending: self.counts.download(counted)?,
@@ -391,9 +404,7 @@ impl GuideBuffers {
             self.partition.regions.len(),
             self.room.cells(self.partition.regions.len()),
             self.table.size() as usize / 8,
-            &state.keys,
-            &state.counts,
-            &state.shares,
+            state,
             forget,
         );
         self.origin.grid_origin = there.grid_origin;
@@ -444,9 +455,10 @@ impl GuideBuffers {
         Ok(())
     }
 
-    fn upload(&self) -> Result<()> {
-        let Snapshot { table, entries } = self.learned.snapshot(&self.partition, &self.options);
-        self.table.upload(bytemuck::cast_slice(&table))?;
+    fn upload(&mut self) -> Result<()> {
+        self.learned.write_snapshot(&self.partition, &self.options, &mut self.snapshot);
+        let Snapshot { table, entries } = &self.snapshot;
+        self.table.upload(bytemuck::cast_slice(table))?;
         if self.uses_likely {
             let likely: Vec<LikelyRegion> = entries
                 .par_chunks(self.partition.regions.len())
@@ -454,7 +466,7 @@ impl GuideBuffers {
                 .collect();
             self.likely.upload(bytemuck::cast_slice(&likely))?;
         }
-        self.entries.upload(bytemuck::cast_slice(&entries))
+        self.entries.upload(bytemuck::cast_slice(entries))
     }
 
     /// Bytes by buffer name.
@@ -511,7 +523,9 @@ fn guide_parameters(
         / scene.film.height.max(1) as f32;
     let largest_edge = size / CELLS_PER_SCENE;
     GuideParameters {
-        grid_origin: if low.is_finite() { low.into() } else { [0.0; 3] },
+        // A third of an edge of every level away from the corner of the scene, since walls at its sides
+        // should not lie between two cells.
+        grid_origin: if low.is_finite() { (low - largest_edge / 3.0).into() } else { [0.0; 3] },
         finest_edge: largest_edge * 0.5_f32.powi(LEVELS),
         edge_per_distance: CELL_PIXELS * pixel_angle,
         largest_edge,
