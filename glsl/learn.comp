@@ -1,12 +1,14 @@
 // Counts every shadow ray that teaches, and whether it reached the environment, into the cell and
 // region that sample_guided.comp noted, and of those that did, their response and what they say about
-// the share of the BRDF. The counts are read between passes only.
+// the share of the BRDF. The counts are read between passes only. Long after a rebuild every fourth
+// sample is enough.
 #version 460
 
 #define NEEDS_WAVE
 #define NEEDS_VISIBILITY
 #define NEEDS_GUIDE_COUNTS
 #define NEEDS_LEARN_TARGETS
+#include "divide.glsl"
 #include "layout.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
@@ -14,6 +16,11 @@ layout(local_size_x = WORKGROUP_SIZE) in;
 void main() {
     uint ray = gl_GlobalInvocationID.x;
     if (ray >= wave.pixel_count * wave.sample_count * wave.shadow_ray_count) {
+        return;
+    }
+    uint sample_of_wave = divide(divide(ray, wave.pixel_count).x, wave.sample_count).y;
+    uint since_rebuild = wave.first_sample + sample_of_wave - wave.epoch_start;
+    if (since_rebuild >= GUIDE_SAMPLES_THAT_ALL_TEACH && since_rebuild % GUIDE_TEACHING_STEP != 0u) {
         return;
     }
     uvec2 target = learn_targets[ray];

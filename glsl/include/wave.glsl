@@ -4,6 +4,7 @@
 #ifndef WAVE_GLSL
 #define WAVE_GLSL
 
+#include "divide.glsl"
 #include "layout.glsl"
 #include "random.glsl"
 
@@ -44,21 +45,6 @@ struct PathIndex {
     // Whether the pixel lies in the crop window; blocks at its edges reach beyond it.
     bool inside;
 };
-
-// Quotient and remainder, where the quotient is below 2^22: by floats, corrected by one, since
-// software devices divide integers lane by lane.
-uvec2 divide(uint dividend, uint divisor) {
-    uint quotient = uint(float(dividend) / float(divisor));
-    uint remainder = dividend - quotient * divisor;
-    if (remainder >= 0x80000000u) {
-        quotient -= 1u;
-        remainder += divisor;
-    } else if (remainder >= divisor) {
-        quotient += 1u;
-        remainder -= divisor;
-    }
-    return uvec2(quotient, remainder);
-}
 
 uint wave_path_count() {
     return wave.pixel_count * wave.sample_count;

@@ -267,6 +267,10 @@ pub const GUIDE_RESPONSE_UNITS: u32 = 4096;
 /// Greatest response of one ray in those units, a half: what is reflected more strongly than that is the
 /// peak of a lobe, which the BRDF's own sampling finds, and few cells have one for all of their surfaces.
 pub const GUIDE_RESPONSE_MOST: u32 = 2048;
+/// Samples after a rebuild whose rays are all counted.
+pub const GUIDE_SAMPLES_THAT_ALL_TEACH: u32 = 16;
+/// Of the samples after those, one in as many is counted.
+pub const GUIDE_TEACHING_STEP: u32 = 4;
 /// Words of a cell per region that are counted: trials, hits and the responses of the hits.
 pub const GUIDE_COUNT_WORDS: u32 = 3;
 
@@ -455,6 +459,8 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("GUIDE_RESPONSE_UNITS", GUIDE_RESPONSE_UNITS),
     ("GUIDE_RESPONSE_MOST", GUIDE_RESPONSE_MOST),
     ("GUIDE_COUNT_WORDS", GUIDE_COUNT_WORDS),
+    ("GUIDE_SAMPLES_THAT_ALL_TEACH", GUIDE_SAMPLES_THAT_ALL_TEACH),
+    ("GUIDE_TEACHING_STEP", GUIDE_TEACHING_STEP),
     ("GUIDE_NO_KEY", GUIDE_NO_KEY),
     ("NOTHING_TO_LEARN", NOTHING_TO_LEARN),
 ];

@@ -9,7 +9,7 @@ use crate::{
         Commands, DescriptorSet, Device, Pipeline,
         constants::{
             CONSTANT_BRDF_CANDIDATES, CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS,
-            CONSTANT_PRODUCT_WEIGHTS,
+            CONSTANT_PRODUCT_WEIGHTS, GUIDE_SAMPLES_THAT_ALL_TEACH, GUIDE_TEACHING_STEP,
         },
         layout::Wave,
         shaders,
@@ -89,8 +89,18 @@ impl Guided {
         commands.dispatch(pipeline, sets, bytemuck::bytes_of(wave), paths.max(1));
     }
 
-    /// Records the counting of every shadow ray of `wave`; `sets` are guide and wave.
+    /// Records the counting of the shadow rays of `wave`, if any of its samples teaches; `sets` are guide
+    /// and wave.
     pub fn record_learn(&self, commands: &mut Commands, sets: &[&DescriptorSet], wave: &Wave) {
+        let first = wave.first_sample.wrapping_sub(wave.epoch_start);
+        let next = if first < GUIDE_SAMPLES_THAT_ALL_TEACH {
+            first
+        } else {
+            first.next_multiple_of(GUIDE_TEACHING_STEP)
+        };
+        if next - first >= wave.sample_count.max(1) {
+            return;
+        }
         let rays = wave.pixel_count * wave.sample_count * wave.shadow_ray_count;
         commands.dispatch(&self.learn, sets, bytemuck::bytes_of(wave), rays.max(1));
     }
