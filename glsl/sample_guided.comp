@@ -41,6 +41,10 @@ uint brdf_share(Material material) {
     return share;
 }
 
+// Least share at vertices that the camera does not see, 256ths: their cells hold few rays, and what is
+// bright to the BRDF and blocked to the guide weighs as much as the path does.
+const uint LEAST_LATER_SHARE = 40u;
+
 // Writes a ray that brings integrand * factor, and what it will teach. `from_brdf` is the part of its
 // density that is the BRDF's, in 256ths, of the one-sample model. There, at what the camera sees, a
 // direction that brings nothing, mostly since it is below the horizon, is not traced and counts as
@@ -140,6 +144,7 @@ void main() {
         // The start is shared by a block of 8x8 pixels, and each technique has its own loop: devices
         // that run both sides of a branch then run one technique per ray.
         uint share = learned_share > 0u ? learned_share : brdf_share(vertex.material);
+        share = wave.vertex > 0u ? max(share, LEAST_LATER_SHARE) : share;
         uvec2 block = uvec2(
             vertex.index.pixel % parameters.film_width, vertex.index.pixel / parameters.film_width)
             / FILM_BLOCK;
