@@ -313,6 +313,68 @@ fn passes_may_be_grouped_at_will() {
     }
 }
 
+/// Rays that were counted since the last rebuild.
+fn pending_rays(renderer: &Renderer) -> f64 {
+    let pending = renderer.guide_state().unwrap().unwrap().pending;
+    pending.iter().map(|[trials, ..]| f64::from(*trials)).sum()
+}
+
+#[test]
+fn late_samples_teach_by_one_in_four() {
+    let _alone = alone();
+    let scene = room();
+    let mut renderer = Renderer::new(support::device(), &scene, guided(1)).unwrap();
+    // The last rebuild is after 64 samples.
+    renderer.render_pass(80).unwrap();
+    let first = pending_rays(&renderer);
+    renderer.render_pass(3).unwrap();
+    let one_more = pending_rays(&renderer);
+    renderer.render_pass(13).unwrap();
+    let four_more = pending_rays(&renderer);
+    assert!(first > 16.0 * 1000.0, "{first} rays");
+    assert!((16.0 * one_more / first - 17.0).abs() < 0.1, "{first} → {one_more}");
+    assert!((16.0 * four_more / first - 20.0).abs() < 0.2, "{first} → {four_more}");
+    // Which ones does not depend on the grouping.
+    let mut other = Renderer::new(support::device(), &scene, guided(1)).unwrap();
+    for samples in [65, 16, 1, 14] {
+        other.render_pass(samples).unwrap();
+    }
+    assert_eq!(pending_rays(&other), four_more);
+    assert!(other.sums().unwrap() == renderer.sums().unwrap());
+    support::assert_silent();
+}
+
+/// With few regions a short render refines cells, and their parts are found: unbiased by the mode "few
+/// regions" above.
+#[test]
+fn parts_of_refined_cells_are_found() {
+    let _alone = alone();
+    let mut settings = guided(1);
+    settings.parameters.regions = 16;
+    let mut renderer = Renderer::new(support::device(), &room(), settings).unwrap();
+    renderer.render_pass(64).unwrap();
+    support::assert_silent();
+    let state = renderer.guide_state().unwrap().unwrap();
+    assert!(!state.refined.is_empty());
+    let parts: Vec<u32> = state
+        .refined
+        .iter()
+        .filter_map(|&cell| CellKey(state.keys[cell as usize]).parts())
+        .collect();
+    // Rays that the parts counted themselves.
+    let regions = state.origin.regions as usize;
+    let rays = |cell: usize| -> u32 {
+        state.counts[cell * regions..][..regions].iter().map(|[trials, ..]| trials).sum()
+    };
+    let found = (FACE_COUNT..state.keys.len())
+        .filter(|&cell| {
+            let key = CellKey(state.keys[cell]);
+            !key.is_coarse() && parts.contains(&key.siblings()) && rays(cell) > 0
+        })
+        .count();
+    assert!(found >= state.refined.len(), "{found} parts of {} cells", state.refined.len());
+}
+
 #[test]
 fn a_renderer_goes_on_where_another_stopped() {
     let _alone = alone();
