@@ -436,6 +436,15 @@ fn a_guide_of_another_scene_is_refused_or_mostly_forgotten() {
     let mut pupil = Renderer::new(support::device(), &room, guided(1)).unwrap();
     let error = pupil.restore_guide(&damaged).unwrap_err().to_string();
     assert!(error.contains("do not fill the map"), "{error}");
+    // Cells of faces that a cube does not have, and counts that no render has.
+    let mut damaged = state.clone();
+    damaged.keys[FACE_COUNT] |= 7 << 28;
+    let error = pupil.restore_guide(&damaged).unwrap_err().to_string();
+    assert!(error.contains("holds no cells"), "{error}");
+    let mut damaged = state.clone();
+    damaged.counts.fill([u32::MAX; 3]);
+    pupil.restore_guide(&damaged).unwrap();
+    pupil.render_pass(1).unwrap();
     let mut darker = room.clone();
     darker.environment.texels[7] *= 0.5;
     let mut pupil = Renderer::new(support::device(), &darker, guided(1)).unwrap();

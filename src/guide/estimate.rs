@@ -29,7 +29,7 @@ const LARGEST_RATIO: f32 = 8.0;
 /// one number and the visibility of a cell is the same chance everywhere in it, and for 1 where hits of
 /// a cell that see a region see all of it.
 const VISIBILITY_EXPONENT: f32 = 0.75;
-/// Least visibility that is told from none: 10⁻⁴ raised to that power.
+/// Least visibility that is told from none.
 const LEAST_VISIBILITY: f32 = 1e-5;
 /// Share of the regions' probability that does not look at what was learned.
 const DEFENSIVE_SHARE: f64 = 0.05;
@@ -75,6 +75,9 @@ pub type CountWords = [u32; GUIDE_COUNT_WORDS as usize];
 /// A ray, as it is counted: regions that are split anew share what was counted.
 pub const PARTS_PER_RAY: u32 = 16;
 
+/// No word of a [`Count`] is larger, whatever a file says and however regions are merged.
+pub const LARGEST_WORD: u32 = 1 << 30;
+
 /// What was counted of one region in one cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Count {
@@ -99,10 +102,12 @@ impl Count {
 
     /// Adds `share` of another count, to the nearest whole part.
     pub fn add_share(&mut self, other: Self, share: f64) {
-        let part = |count: u32| (f64::from(count) * share + 0.5) as u32;
-        self.hits = self.hits.saturating_add(part(other.hits));
-        self.trials = self.trials.saturating_add(part(other.trials));
-        self.response = self.response.saturating_add(part(other.response));
+        let sum = |count: u32, other: u32| {
+            (count + (f64::from(other) * share + 0.5) as u32).min(LARGEST_WORD)
+        };
+        self.hits = sum(self.hits, other.hits);
+        self.trials = sum(self.trials, other.trials);
+        self.response = sum(self.response, other.response);
     }
 }
 
@@ -117,7 +122,7 @@ pub struct Tally {
 impl From<&Count> for Tally {
     fn from(count: &Count) -> Self {
         let rays = 1.0 / PARTS_PER_RAY as f32;
-        // Counts are far below 2³¹, and signed integers become floats more quickly.
+        // Counts are below 2³¹, and signed integers become floats more quickly.
         let float = |count: u32| count as i32 as f32;
         Self {
             hits: float(count.hits) * rays,

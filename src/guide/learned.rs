@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use super::{
     estimate::{
-        Count, CountWords, EstimateOptions, Estimates, Lookup, PARTS_PER_RAY, Scratch, Tally,
-        decode_entry,
+        Count, CountWords, EstimateOptions, Estimates, LARGEST_WORD, Lookup, PARTS_PER_RAY,
+        Scratch, Tally, decode_entry,
     },
     file::GuideState,
     key::{CellKey, FACE_COUNT},
@@ -131,11 +131,8 @@ impl Learned {
         let count = learned.keys.len() * region_count;
         learned.counts = counts[..count]
             .iter()
-            .map(|[trials, hits, response]| Count {
-                hits: hits.min(trials) / forget,
-                trials: trials / forget,
-                response: response / forget,
-            })
+            .map(|counted| counted.map(|count| count.min(LARGEST_WORD) / forget))
+            .map(|[trials, hits, response]| Count { hits: hits.min(trials), trials, response })
             .collect();
         let count = learned.keys.len() * SHARE_WORDS;
         learned.shares = shares[..count].iter().map(|count| count / forget).collect();

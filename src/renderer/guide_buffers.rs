@@ -391,6 +391,8 @@ impl GuideBuffers {
         let edge = there.largest_edge;
         let is_sane =
             edge.is_finite() && edge > 0.0 && there.grid_origin.iter().all(|x| x.is_finite());
+        let has_face = |key: &u32| CellKey(*key).face() < FACE_COUNT;
+        let is_sane = is_sane && state.keys.iter().skip(FACE_COUNT).all(has_face);
         if state.keys.len() < FACE_COUNT || !is_sane {
             return Err(Error::usage("the guide holds no cells, or none that could be found"));
         }
