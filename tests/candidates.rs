@@ -6,8 +6,6 @@
 mod command;
 mod support;
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
 use command::Folder;
 use fenestra::{
     film::{Attribute, Image, Statistics, Sums},
@@ -18,13 +16,6 @@ use fenestra::{
 };
 use glam::Vec3;
 use support::scenes;
-
-/// One test at a time: the validation layers were seen to crash when several threads made and dropped
-/// renderers at once.
-fn alone() -> MutexGuard<'static, ()> {
-    static LOCK: Mutex<()> = Mutex::new(());
-    LOCK.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 fn guided(candidates: Option<u32>) -> Settings {
     let parameters = Parameters { candidates, ..Parameters::default() };
@@ -50,7 +41,7 @@ fn assert_same(a: &Sums, b: &Sums) {
 
 #[test]
 fn the_choice_is_measured_and_changes_nothing_else() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = room();
     let mut auto = renderer(&scene, guided(None));
     assert_eq!((auto.candidates(), auto.candidate_costs().len()), (None, 0));
@@ -83,7 +74,7 @@ fn the_choice_is_measured_and_changes_nothing_else() {
 
 #[test]
 fn whoever_goes_on_takes_the_recorded_choice() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = room();
     let mut first = renderer(&scene, guided(None));
     first.render_pass(5).unwrap();
@@ -122,7 +113,7 @@ fn whoever_goes_on_takes_the_recorded_choice() {
 
 #[test]
 fn nothing_is_measured_where_there_is_nothing_to_choose() {
-    let _alone = alone();
+    let _alone = support::alone();
     let open = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5))]);
     let mut auto = renderer(&open, guided(None));
     auto.render_pass(2).unwrap();
@@ -140,7 +131,7 @@ fn nothing_is_measured_where_there_is_nothing_to_choose() {
 
 #[test]
 fn files_and_figures_tell_the_choice() {
-    let _alone = alone();
+    let _alone = support::alone();
     let folder = Folder::new();
     let scene = format!("{}/scenes/meeting_room.toml", env!("CARGO_MANIFEST_DIR"));
     let render = |output: &str, options: &[&str]| {

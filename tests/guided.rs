@@ -7,8 +7,6 @@
 
 mod support;
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
 use fenestra::{
     film::Sums,
     gpu::constants::{GUIDE_COUNT_WORDS, GUIDE_RESPONSE_UNITS},
@@ -19,13 +17,6 @@ use fenestra::{
 };
 use glam::Vec3;
 use support::scenes;
-
-/// One test at a time: the validation layers were seen to crash when several threads made and dropped
-/// renderers at once.
-fn alone() -> MutexGuard<'static, ()> {
-    static LOCK: Mutex<()> = Mutex::new(());
-    LOCK.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 const REPLICATES: u32 = 8;
 const BLOCK: u32 = 8;
@@ -126,7 +117,7 @@ fn agree(scene: &Scene, depth: u32, samples: u32, modes: &[(&str, Settings)]) {
 
 #[test]
 fn every_mode_is_unbiased_in_a_room() {
-    let _alone = alone();
+    let _alone = support::alone();
     let with = |candidates: u32, change: &dyn Fn(&mut Settings)| {
         let mut settings = guided(candidates);
         change(&mut settings);
@@ -177,7 +168,7 @@ fn every_mode_is_unbiased_in_a_room() {
 /// and for none but the faces.
 #[test]
 fn places_that_share_a_key_are_unbiased() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = room();
     let mis = Settings { shadow_rays: 16, ..Settings::default() };
     let reference = replicates(&scene, &mis, 128);
@@ -236,7 +227,7 @@ fn places_that_share_a_key_are_unbiased() {
 /// 36 values, |t| > 6 with 47 degrees of freedom: a false alarm in about 10⁵ runs.
 #[test]
 fn the_first_pass_after_training_is_unbiased() {
-    let _alone = alone();
+    let _alone = support::alone();
     const SEEDS: u32 = 48;
     let scene = room();
     let rows = |settings: Settings| -> Vec<Vec<f64>> {
@@ -273,7 +264,7 @@ fn the_first_pass_after_training_is_unbiased() {
 
 #[test]
 fn every_vertex_of_a_path_is_unbiased() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = scenes::room(vec![
         scenes::diffuse(Vec3::splat(0.8)),
         scenes::copper(0.4),
@@ -284,7 +275,7 @@ fn every_vertex_of_a_path_is_unbiased() {
 
 #[test]
 fn in_the_open_it_is_unbiased_too() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = scenes::open(vec![
         scenes::diffuse(Vec3::new(0.5, 0.4, 0.3)),
         scenes::plastic(0.05),
@@ -295,7 +286,7 @@ fn in_the_open_it_is_unbiased_too() {
 
 #[test]
 fn passes_may_be_grouped_at_will() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = room();
     let render = |passes: &[u32]| {
         let mut renderer = Renderer::new(support::device(), &scene, guided(4)).unwrap();
@@ -321,7 +312,7 @@ fn pending_rays(renderer: &Renderer) -> f64 {
 
 #[test]
 fn late_samples_teach_by_one_in_four() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = room();
     let mut renderer = Renderer::new(support::device(), &scene, guided(1)).unwrap();
     // The last rebuild is after 64 samples.
@@ -348,7 +339,7 @@ fn late_samples_teach_by_one_in_four() {
 /// regions" above.
 #[test]
 fn parts_of_refined_cells_are_found() {
-    let _alone = alone();
+    let _alone = support::alone();
     let mut settings = guided(1);
     settings.parameters.regions = 16;
     let mut renderer = Renderer::new(support::device(), &room(), settings).unwrap();
@@ -377,7 +368,7 @@ fn parts_of_refined_cells_are_found() {
 
 #[test]
 fn a_renderer_goes_on_where_another_stopped() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = room();
     let renderer = || Renderer::new(support::device(), &scene, guided(4)).unwrap();
     let mut whole = renderer();
@@ -403,7 +394,7 @@ fn a_renderer_goes_on_where_another_stopped() {
 
 #[test]
 fn a_restart_forgets_the_regions_too() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = room();
     let mut renderer = Renderer::new(support::device(), &scene, guided(1)).unwrap();
     renderer.render_pass(18).unwrap();
@@ -418,7 +409,7 @@ fn a_restart_forgets_the_regions_too() {
 
 #[test]
 fn a_guide_of_another_scene_is_refused_or_mostly_forgotten() {
-    let _alone = alone();
+    let _alone = support::alone();
     let room = room();
     let mut teacher = Renderer::new(support::device(), &room, guided(1)).unwrap();
     teacher.render_pass(4).unwrap();
@@ -456,7 +447,7 @@ fn a_guide_of_another_scene_is_refused_or_mostly_forgotten() {
 
 #[test]
 fn in_the_open_it_samples_as_mis_does() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5)), scenes::plastic(0.2)]);
     let render = |settings: Settings| {
         let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
@@ -473,7 +464,7 @@ fn in_the_open_it_samples_as_mis_does() {
 
 #[test]
 fn rays_of_training_are_counted_and_more_rays_are_visible() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = room();
     let share = |settings: Settings| {
         let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
@@ -492,7 +483,7 @@ fn rays_of_training_are_counted_and_more_rays_are_visible() {
 /// the region; the rest are the sphere's.
 #[test]
 fn visible_rays_teach_how_surfaces_respond() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = scenes::room(vec![scenes::diffuse(Vec3::splat(0.6))]);
     let units = 0.6 / std::f64::consts::PI * f64::from(GUIDE_RESPONSE_UNITS);
     for candidates in [1, 4] {
@@ -524,7 +515,7 @@ fn visible_rays_teach_how_surfaces_respond() {
 
 #[test]
 fn visible_rays_teach_the_share_of_the_brdf() {
-    let _alone = alone();
+    let _alone = support::alone();
     let state_after = |candidates: u32| {
         let mut renderer = Renderer::new(support::device(), &room(), guided(candidates)).unwrap();
         renderer.render_pass(7).unwrap();

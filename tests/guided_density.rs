@@ -12,10 +12,7 @@
 mod materials;
 mod support;
 
-use std::{
-    f64::consts::PI,
-    sync::{Mutex, MutexGuard, PoisonError},
-};
+use std::f64::consts::PI;
 
 use fenestra::{
     brdf::{self, MaterialTables},
@@ -26,13 +23,6 @@ use fenestra::{
 };
 use glam::{Vec3, vec3};
 use support::{scenes, statistics};
-
-/// One test at a time: the validation layers were seen to crash when several threads made and dropped
-/// renderers at once.
-fn alone() -> MutexGuard<'static, ()> {
-    static LOCK: Mutex<()> = Mutex::new(());
-    LOCK.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// Rays per surface and state, and how many of them a hit has.
 const RAYS: u32 = 1 << 15;
@@ -252,7 +242,7 @@ fn record(renderer: &Renderer, surface: &Surface) -> RecordedGuide {
 
 #[test]
 fn directions_follow_the_density_that_they_are_divided_by() {
-    let _alone = alone();
+    let _alone = support::alone();
     for surface in &surfaces() {
         let mut renderer = renderer(surface, 1, Weights::Cell);
         let mut untrained: Option<(f64, [Vec<f64>; 2])> = None;
@@ -292,7 +282,7 @@ fn part_of(bin: usize) -> usize {
 /// Estimates of what the unoccluded map brings, in all and in every part, against the quadrature.
 #[test]
 fn every_part_of_the_sky_has_its_weight() {
-    let _alone = alone();
+    let _alone = support::alone();
     for surface in &surfaces() {
         for (candidates, weights) in [1, 4, 8]
             .into_iter()

@@ -4,10 +4,7 @@
 
 mod support;
 
-use std::{
-    collections::BTreeMap,
-    sync::{Mutex, MutexGuard, PoisonError},
-};
+use std::collections::BTreeMap;
 
 use fenestra::{
     film::{Aov, Sums},
@@ -18,13 +15,6 @@ use fenestra::{
 };
 use glam::Vec3;
 use support::scenes;
-
-/// One test at a time: the validation layers were seen to crash when several threads made and dropped
-/// renderers at once.
-fn alone() -> MutexGuard<'static, ()> {
-    static LOCK: Mutex<()> = Mutex::new(());
-    LOCK.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// The sampler `visibility` with few lobes, `assignments` and the layer of its caches.
 fn visibility(assignments: &[&str]) -> Settings {
@@ -73,7 +63,7 @@ fn total(counts: &[[u32; 2]]) -> [u64; 2] {
 
 #[test]
 fn cache_entries_are_those_of_the_statistics() {
-    let _alone = alone();
+    let _alone = support::alone();
     for depth in [1, 3] {
         let settings = Settings { depth, ..visibility(&[]) };
         let (sums, totals) = render(&room(), settings, 5);
@@ -90,7 +80,7 @@ fn cache_entries_are_those_of_the_statistics() {
 
 #[test]
 fn where_nothing_is_blocked_caches_are_empty() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = scenes::plane(Vec3::splat(0.5), scenes::sky());
     let (sums, _) = render(&scene, visibility(&[]), 3);
     assert!(sums.cache_entries.iter().all(|pair| *pair == [0, 3]), "the plane fills the image");
@@ -103,7 +93,7 @@ fn where_nothing_is_blocked_caches_are_empty() {
 
 #[test]
 fn a_cache_holds_no_more_than_it_has_room_for() {
-    let _alone = alone();
+    let _alone = support::alone();
     // A box around the camera: every direction from every hit is blocked.
     let mut scene = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5))]);
     scenes::add_box(&mut scene.geometry, Vec3::new(0.0, 1.0, 0.0), Vec3::splat(9.0), 0);
@@ -119,7 +109,7 @@ fn a_cache_holds_no_more_than_it_has_room_for() {
 
 #[test]
 fn entries_are_kept_by_checkpoints_and_add_up() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = room();
     let (whole, _) = render(&scene, visibility(&[]), 7);
     let (first, _) = render(&scene, visibility(&[]), 3);
@@ -170,7 +160,7 @@ fn keys_by_colour(keys: &[u32]) -> BTreeMap<[u32; 3], Vec<CellKey>> {
 
 #[test]
 fn a_sample_shows_the_cell_it_found() {
-    let _alone = alone();
+    let _alone = support::alone();
     // Room for 9 cells besides the faces; for all coarse and some fine ones; for all.
     for memory in [15 * 16 * 256, 150 * 16 * 256, 1 << 27] {
         let mut settings = guided();
@@ -211,7 +201,7 @@ fn a_sample_shows_the_cell_it_found() {
 
 #[test]
 fn where_nothing_is_learned_no_cell_is_shown() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5)), scenes::plastic(0.2)]);
     let (sums, _) = render(&scene, guided(), 2);
     assert!(sums.guide_level.iter().chain(&sums.guide_cell).all(|sum| *sum == [0.0; 3]));
@@ -220,7 +210,7 @@ fn where_nothing_is_learned_no_cell_is_shown() {
 
 #[test]
 fn cells_are_kept_by_checkpoints() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = room();
     let (whole, _) = render(&scene, guided(), 6);
     let mut first = renderer(&scene, guided());

@@ -7,8 +7,6 @@
 
 mod support;
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
 use fenestra::{
     film::Sums,
     renderer::{Renderer, Settings, Totals},
@@ -17,13 +15,6 @@ use fenestra::{
 };
 use glam::Vec3;
 use support::scenes;
-
-/// One test at a time: the validation layers were seen to crash when several threads made and dropped
-/// renderers at once.
-fn alone() -> MutexGuard<'static, ()> {
-    static LOCK: Mutex<()> = Mutex::new(());
-    LOCK.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 const REPLICATES: u32 = 8;
 const BLOCK: u32 = 8;
@@ -116,7 +107,7 @@ fn agree(scene: &Scene, samples: u32, cases: &[(Sampler, &[&str])]) {
 
 #[test]
 fn parameters_change_no_image_in_a_room() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = scenes::room(vec![
         scenes::diffuse(Vec3::splat(0.6)),
         scenes::copper(0.2),
@@ -139,7 +130,7 @@ fn parameters_change_no_image_in_a_room() {
 
 #[test]
 fn parameters_change_no_image_of_glossy_things_in_the_open() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = scenes::open(vec![
         scenes::diffuse(Vec3::new(0.5, 0.4, 0.3)),
         scenes::plastic(0.05),
@@ -167,7 +158,7 @@ const PIXELS: u64 = 32 * 24;
 
 #[test]
 fn where_everything_is_blocked_all_rays_but_the_last_are_learned_from() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = closed_box();
     for (cache, recorded) in [("cache=hit", 4), ("cache=pixel", 5)] {
         let (sums, totals) = render(&scene, settings(Sampler::Visibility, &[cache]), 3);
@@ -194,7 +185,7 @@ fn where_everything_is_blocked_all_rays_but_the_last_are_learned_from() {
 
 #[test]
 fn where_nothing_is_blocked_nothing_is_learned() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = scenes::plane(Vec3::splat(0.5), scenes::sky());
     let pixels = u64::from(scene.film.width * scene.film.height);
     let (guided, totals) = render(&scene, settings(Sampler::Visibility, &[]), 4);
@@ -222,7 +213,7 @@ fn where_nothing_is_blocked_nothing_is_learned() {
 
 #[test]
 fn darkness_is_black_and_a_black_surface_too() {
-    let _alone = alone();
+    let _alone = support::alone();
     let mut dark = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5)), scenes::plastic(0.2)]);
     dark.environment = scenes::environment(16, |_| Vec3::ZERO);
     let mut black = scenes::open(vec![scenes::diffuse(Vec3::ZERO)]);
@@ -247,7 +238,7 @@ fn darkness_is_black_and_a_black_surface_too() {
 
 #[test]
 fn without_shadow_rays_there_is_what_the_camera_sees() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5))]);
     let none = |sampler| Settings { shadow_rays: 0, ..settings(sampler, &[]) };
     let (expected, _) = render(&scene, none(Sampler::Mis), 2);
@@ -262,7 +253,7 @@ fn without_shadow_rays_there_is_what_the_camera_sees() {
 
 #[test]
 fn one_ray_teaches_nothing_but_the_pixel() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = closed_box();
     let one = |assignments: &[&str]| {
         let settings = Settings { shadow_rays: 1, ..settings(Sampler::Visibility, assignments) };
@@ -277,7 +268,7 @@ fn one_ray_teaches_nothing_but_the_pixel() {
 
 #[test]
 fn grouping_of_passes_changes_nothing_where_pixels_keep_caches() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = scenes::room(vec![scenes::diffuse(Vec3::splat(0.6)), scenes::copper(0.3)]);
     let render = |passes: &[u32]| {
         let settings = settings(Sampler::Visibility, &["cache=pixel"]);
@@ -301,7 +292,7 @@ fn grouping_of_passes_changes_nothing_where_pixels_keep_caches() {
 
 #[test]
 fn sums_taught_by_caches_that_are_gone_are_not_continued() {
-    let _alone = alone();
+    let _alone = support::alone();
     let scene = scenes::plane(Vec3::splat(0.5), scenes::sky());
     let settings = |cache| settings(Sampler::Visibility, &[cache]);
     let new = |cache| Renderer::new(support::device(), &scene, settings(cache)).unwrap();

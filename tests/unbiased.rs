@@ -134,6 +134,7 @@ fn measured() -> Material {
 
 #[test]
 fn in_the_open() {
+    let _alone = support::alone();
     let scene = scenes::open(vec![
         scenes::diffuse(Vec3::new(0.5, 0.4, 0.3)),
         scenes::plastic(0.3),
@@ -145,6 +146,7 @@ fn in_the_open() {
 
 #[test]
 fn in_a_closed_room() {
+    let _alone = support::alone();
     let scene =
         scenes::room(vec![scenes::diffuse(Vec3::splat(0.6)), measured(), scenes::plastic(0.3)]);
     samplers_agree(&scene, 1, 128, &ALL_AGAINST_COSINE);
@@ -152,6 +154,7 @@ fn in_a_closed_room() {
 
 #[test]
 fn in_a_closed_room_with_bounces() {
+    let _alone = support::alone();
     let scene = scenes::room(vec![
         scenes::diffuse(Vec3::splat(0.8)),
         scenes::copper(0.4),
@@ -164,6 +167,7 @@ fn in_a_closed_room_with_bounces() {
 /// 3 comparisons of 4 scenes with 72 values each, once in about 400 runs a false alarm.
 #[test]
 fn in_the_scenes_of_the_thesis() {
+    let _alone = support::alone();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
     for name in ["buddha_and_car", "bathroom", "meeting_room", "restroom"] {
         let path = folder.join(name).join("scene.toml");

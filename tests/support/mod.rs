@@ -7,13 +7,20 @@ pub mod statistics;
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, OnceLock},
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
 };
 
 use fenestra::gpu::{
     Buffer, Commands, DescriptorSet, Device, Pipeline,
     constants::{SET_FILM, WORKGROUP_SIZE},
 };
+
+/// One test at a time: the validation layers were seen to crash when several threads made and dropped
+/// renderers at once.
+pub fn alone() -> MutexGuard<'static, ()> {
+    static LOCK: Mutex<()> = Mutex::new(());
+    LOCK.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// The device all tests of one binary share, with validation and synchronization validation on.
 ///
