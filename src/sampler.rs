@@ -113,6 +113,9 @@ pub struct Parameters {
     /// `hierarchy`: whether cells of `guided` that have seen little lean on larger ones; off for
     /// experiments.
     pub hierarchy: bool,
+    /// `later-rays`: most shadow rays of `guided` at each vertex that the camera does not see; `None` is
+    /// `auto`, half of `--shadow-rays`.
+    pub later_rays: Option<u32>,
     /// `learned-response`: whether `guided` with `weights=cell` learns how the surfaces of a cell
     /// reflect each region; off for experiments.
     pub learned_response: bool,
@@ -133,6 +136,7 @@ impl Default for Parameters {
             candidates: None,
             guide_memory: 128 << 20,
             hierarchy: true,
+            later_rays: None,
             learned_response: true,
             learned_share: true,
             regions: 1024,
@@ -143,10 +147,11 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    const KEYS: [&'static str; 7] = [
+    const KEYS: [&'static str; 8] = [
         "candidates",
         "guide-memory",
         "hierarchy",
+        "later-rays",
         "learned-response",
         "learned-share",
         "regions",
@@ -186,6 +191,18 @@ impl Parameters {
                     })?;
             }
             "hierarchy" => self.hierarchy = parse_switch(key, value)?,
+            "later-rays" => {
+                self.later_rays = if value == "auto" {
+                    None
+                } else {
+                    let count = value.parse().ok().filter(|count| (1..=4096).contains(count));
+                    Some(count.ok_or_else(|| {
+                        Error::usage(format!(
+                            "--set later-rays={value}: expected auto, or 1 to 4096"
+                        ))
+                    })?)
+                };
+            }
             "learned-response" => self.learned_response = parse_switch(key, value)?,
             "learned-share" => self.learned_share = parse_switch(key, value)?,
             "regions" => {
@@ -239,6 +256,12 @@ impl Parameters {
         )))
     }
 
+    /// Of `shadow_rays` at what the camera sees, how many `guided` traces at each later vertex, where less
+    /// of the error comes from and every ray costs as much (docs/guided.md).
+    pub fn later_rays_of(&self, shadow_rays: u32) -> u32 {
+        self.later_rays.unwrap_or((shadow_rays / 2).max(1)).min(shadow_rays)
+    }
+
     /// The parameters that matter to `sampler`, by name, for metadata and statistics.
     pub fn describe(&self, sampler: Sampler) -> BTreeMap<String, String> {
         match sampler {
@@ -250,6 +273,8 @@ impl Parameters {
                     named.insert("regions".to_owned(), self.regions.to_string());
                     let switch = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
                     named.insert("hierarchy".to_owned(), switch(self.hierarchy));
+                    let later = self.later_rays.map_or("auto".to_owned(), |rays| rays.to_string());
+                    named.insert("later-rays".to_owned(), later);
                     named.insert("learned-response".to_owned(), switch(self.learned_response));
                     named.insert("learned-share".to_owned(), switch(self.learned_share));
                     let weights = if self.weights == Weights::Cell { "cell" } else { "product" };
@@ -324,10 +349,23 @@ mod tests {
             "guide-memory=4TB",
             "regions=2000",
             "hierarchy=1",
+            "later-rays=0",
+            "later-rays=x",
             "weights=brdf",
         ] {
             assert!(parameters.set(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn later_vertices_have_half_of_the_rays_unless_told_otherwise() {
+        let mut parameters = Parameters::default();
+        assert_eq!([0, 1, 2, 5, 16].map(|rays| parameters.later_rays_of(rays)), [0, 1, 1, 2, 8]);
+        parameters.set("later-rays=3").unwrap();
+        assert_eq!([0, 2, 5].map(|rays| parameters.later_rays_of(rays)), [0, 2, 3]);
+        assert_eq!(parameters.describe(Sampler::Guided)["later-rays"], "3");
+        parameters.set("later-rays=auto").unwrap();
+        assert_eq!(parameters.later_rays_of(5), 2);
     }
 
     #[test]

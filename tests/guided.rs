@@ -270,7 +270,33 @@ fn every_vertex_of_a_path_is_unbiased() {
         scenes::copper(0.4),
         scenes::plastic(0.3),
     ]);
-    agree(&scene, 4, 32, &[("one-sample, depth 4", guided(1)), ("4, depth 4", guided(4))]);
+    let mut every_ray = guided(1);
+    every_ray.parameters.later_rays = Some(5);
+    let modes = [
+        ("one-sample, depth 4", guided(1)),
+        ("4, depth 4", guided(4)),
+        ("one-sample, depth 4, no fewer rays", every_ray),
+    ];
+    agree(&scene, 4, 32, &modes);
+}
+
+#[test]
+fn later_vertices_have_the_rays_they_are_given() {
+    let _alone = support::alone();
+    let rays = |depth: u32, later_rays: Option<u32>| {
+        let mut settings = Settings { depth, ..guided(1) };
+        settings.parameters.later_rays = later_rays;
+        let mut renderer = Renderer::new(support::device(), &room(), settings).unwrap();
+        renderer.render_pass(1).unwrap();
+        f64::from(renderer.totals().shadow_rays_traced as u32)
+    };
+    let first = rays(1, None);
+    let [one, two, five] = [Some(1), None, Some(5)].map(|later| rays(2, later) - first);
+    assert!(one > 0.1 * first, "{one} of {first}");
+    // Directions below the horizon, which depend on what was learned, are not traced.
+    assert!((two / one - 2.0).abs() < 0.2, "{one} → {two}");
+    assert!((five / one - 5.0).abs() < 0.5, "{one} → {five}");
+    support::assert_silent();
 }
 
 #[test]

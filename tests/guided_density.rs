@@ -82,6 +82,10 @@ fn surfaces() -> [Surface; 4] {
 }
 
 fn renderer(surface: &Surface, candidates: u32, weights: Weights) -> Renderer {
+    renderer_at_depth(surface, candidates, weights, 1)
+}
+
+fn renderer_at_depth(surface: &Surface, candidates: u32, weights: Weights, depth: u32) -> Renderer {
     let [x, y] = surface.pixel;
     let parameters = Parameters {
         candidates: Some(candidates),
@@ -94,6 +98,7 @@ fn renderer(surface: &Surface, candidates: u32, weights: Weights) -> Renderer {
         sampler: Sampler::Guided,
         parameters,
         shadow_rays: SHADOW_RAYS,
+        depth,
         window: Some(Window { x, y, width: 1, height: 1 }),
         ..Settings::default()
     };
@@ -238,6 +243,18 @@ fn record(renderer: &Renderer, surface: &Surface) -> RecordedGuide {
     support::assert_silent();
     assert_eq!(recorded.rays.len(), RAYS as usize);
     recorded
+}
+
+#[test]
+fn paths_of_many_vertices_are_recorded_at_their_first() {
+    let _alone = support::alone();
+    let [floor, ..] = surfaces();
+    let [short, long] =
+        [1, 3].map(|depth| record(&renderer_at_depth(&floor, 1, Weights::Cell, depth), &floor));
+    assert_eq!(short.position, long.position);
+    for (short, long) in short.rays.iter().zip(&long.rays) {
+        assert_eq!(short.ray.direction, long.ray.direction);
+    }
 }
 
 #[test]

@@ -197,13 +197,29 @@ impl Passes {
         4 + self.settings.depth * (5 + 5 * groups)
     }
 
+    /// Shadow rays at a vertex, `is_guided` where learned visibility chooses them.
+    fn shadow_rays_at(&self, vertex: u32, is_guided: bool) -> u32 {
+        let most = self.settings.shadow_rays;
+        if is_guided && vertex > 0 { self.settings.parameters.later_rays_of(most) } else { most }
+    }
+
     /// Records all passes of one wave.
     pub fn record(&self, commands: &mut Commands, sets: &Sets<'_>, wave: Wave) {
+        self.record_vertices(commands, sets, wave, self.settings.depth);
+    }
+
+    /// Records the passes of one wave for the first `vertices` vertices of its paths.
+    pub fn record_vertices(
+        &self,
+        commands: &mut Commands,
+        sets: &Sets<'_>,
+        wave: Wave,
+        vertices: u32,
+    ) {
         let Sets { scene, wave: wave_set, film, guide, fits } = *sets;
         let lobes = self.lobes.as_ref().zip(fits.map(|fits| [scene, fits, wave_set, film]));
         let paths = wave.pixel_count * wave.sample_count;
         let mut wave = Wave { aovs: self.settings.aovs, ..wave };
-        wave.total_shadow_rays = self.settings.shadow_rays;
 
         let dispatch = |commands: &mut Commands,
                         pipeline: &Pipeline,
@@ -213,21 +229,21 @@ impl Passes {
             commands.dispatch(pipeline, sets, bytemuck::bytes_of(wave), invocations);
         };
         dispatch(commands, &self.camera, &[scene, wave_set], &wave, paths);
-        for vertex in 0..self.settings.depth {
+        for vertex in 0..vertices {
             wave.vertex = vertex;
+            wave.total_shadow_rays = self.shadow_rays_at(vertex, guide.is_some());
             let trace = if vertex == 0 { &self.trace } else { &self.trace_bounce };
             trace.record(commands, &[scene, wave_set, film], &wave);
             let mut first = 0;
             if let Some((lobes, sets)) = &lobes
-                && self.settings.shadow_rays > 0
+                && wave.total_shadow_rays > 0
             {
                 wave.first_shadow_ray = 0;
                 lobes.record_product(commands, sets, &wave);
             }
             loop {
                 wave.first_shadow_ray = first;
-                wave.shadow_ray_count =
-                    (self.settings.shadow_rays - first).min(self.rays_per_group());
+                wave.shadow_ray_count = (wave.total_shadow_rays - first).min(self.rays_per_group());
                 if wave.shadow_ray_count > 0 {
                     if let (Some(guided), Some(guide)) = (&self.guided, guide) {
                         guided.record_sample(commands, &[scene, guide, wave_set], &wave);
@@ -246,12 +262,12 @@ impl Passes {
                 }
                 dispatch(commands, &self.gather, &[scene, wave_set], &wave, paths);
                 first += wave.shadow_ray_count;
-                if first >= self.settings.shadow_rays {
+                if first >= wave.total_shadow_rays {
                     break;
                 }
             }
             if let Some((lobes, sets)) = &lobes
-                && self.settings.shadow_rays > 0
+                && wave.total_shadow_rays > 0
                 && wave.aovs & AOV_CACHE_ENTRIES != 0
             {
                 lobes.record_entries(commands, sets, &wave);
@@ -272,7 +288,7 @@ impl Passes {
                     wave.pixel_count,
                 );
             }
-            if vertex + 1 < self.settings.depth {
+            if vertex + 1 < vertices {
                 dispatch(commands, &self.bounce, &[scene, wave_set], &wave, paths);
             }
         }

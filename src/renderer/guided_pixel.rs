@@ -116,7 +116,7 @@ impl Renderer {
         let epoch = self.settings.first_sample.wrapping_add(self.rebuilt_at);
         let wave = Wave { is_training: 1, ..with_epoch(wave, epoch) };
         let mut commands = Commands::begin(&self.device)?;
-        self.passes.record(&mut commands, &self.sets(), wave);
+        self.passes.record_vertices(&mut commands, &self.sets(), wave, 1);
         commands.submit_and_wait()?;
         self.film.take_counters()?;
 

@@ -38,7 +38,8 @@ pub struct Arguments {
     /// biased.
     #[arg(long, value_name = "E")]
     pub error: Option<f64>,
-    /// Directions traced at every vertex of every camera path.
+    /// Directions traced at every vertex of every camera path; `guided` traces half as many at the later
+    /// ones (`--set later-rays=N`).
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
     pub shadow_rays: u32,
     /// Path vertices at which environment light is gathered; 1 is direct light.
