@@ -22,14 +22,6 @@ fn guided(candidates: Option<u32>) -> Settings {
     Settings { sampler: Sampler::Guided, parameters, ..Settings::default() }
 }
 
-fn room() -> Scene {
-    scenes::room(vec![
-        scenes::diffuse(Vec3::splat(0.6)),
-        scenes::copper(0.15),
-        scenes::plastic(0.3),
-    ])
-}
-
 fn renderer(scene: &Scene, settings: Settings) -> Renderer {
     Renderer::new(support::device(), scene, settings).unwrap()
 }
@@ -42,7 +34,7 @@ fn assert_same(a: &Sums, b: &Sums) {
 #[test]
 fn the_choice_is_measured_and_changes_nothing_else() {
     let _alone = support::alone();
-    let scene = room();
+    let scene = scenes::mixed_room();
     let mut auto = renderer(&scene, guided(None));
     assert_eq!((auto.candidates(), auto.candidate_costs().len()), (None, 0));
     auto.render_pass(5).unwrap();
@@ -75,7 +67,7 @@ fn the_choice_is_measured_and_changes_nothing_else() {
 #[test]
 fn whoever_goes_on_takes_the_recorded_choice() {
     let _alone = support::alone();
-    let scene = room();
+    let scene = scenes::mixed_room();
     let mut first = renderer(&scene, guided(None));
     first.render_pass(5).unwrap();
     let (sums, state) = (first.sums().unwrap(), first.guide_state().unwrap().unwrap());
@@ -120,7 +112,7 @@ fn nothing_is_measured_where_there_is_nothing_to_choose() {
     let state = auto.guide_state().unwrap().unwrap();
     assert!(state.is_open);
     assert_eq!((auto.candidates(), state.candidates), (None, None));
-    let mut dark = renderer(&room(), Settings { shadow_rays: 0, ..guided(None) });
+    let mut dark = renderer(&scenes::mixed_room(), Settings { shadow_rays: 0, ..guided(None) });
     dark.render_pass(2).unwrap();
     assert_eq!((dark.candidates(), dark.candidate_costs().len()), (Some(1), 0));
     let mut mis = renderer(&open, Settings::default());

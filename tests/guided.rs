@@ -27,14 +27,6 @@ fn guided(candidates: u32) -> Settings {
     Settings { sampler: Sampler::Guided, parameters, ..Settings::default() }
 }
 
-fn room() -> Scene {
-    scenes::room(vec![
-        scenes::diffuse(Vec3::splat(0.6)),
-        scenes::copper(0.15),
-        scenes::plastic(0.3),
-    ])
-}
-
 /// Means per block and channel of one film.
 fn block_means(sums: &Sums) -> Vec<f64> {
     let blocks_per_row = sums.width / BLOCK;
@@ -125,7 +117,7 @@ fn every_mode_is_unbiased_in_a_room() {
     };
     let unchanged = |_: &mut Settings| {};
     agree(
-        &room(),
+        &scenes::mixed_room(),
         1,
         64,
         &[
@@ -169,7 +161,7 @@ fn every_mode_is_unbiased_in_a_room() {
 #[test]
 fn places_that_share_a_key_are_unbiased() {
     let _alone = support::alone();
-    let scene = room();
+    let scene = scenes::mixed_room();
     let mis = Settings { shadow_rays: 16, ..Settings::default() };
     let reference = replicates(&scene, &mis, 128);
     let expected: f64 = reference.iter().map(|value| value.0).sum();
@@ -229,7 +221,7 @@ fn places_that_share_a_key_are_unbiased() {
 fn the_first_pass_after_training_is_unbiased() {
     let _alone = support::alone();
     const SEEDS: u32 = 48;
-    let scene = room();
+    let scene = scenes::mixed_room();
     let rows = |settings: Settings| -> Vec<Vec<f64>> {
         let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
         (0..SEEDS)
@@ -286,7 +278,8 @@ fn later_vertices_have_the_rays_they_are_given() {
     let rays = |depth: u32, later_rays: Option<u32>| {
         let mut settings = Settings { depth, ..guided(1) };
         settings.parameters.later_rays = later_rays;
-        let mut renderer = Renderer::new(support::device(), &room(), settings).unwrap();
+        let mut renderer =
+            Renderer::new(support::device(), &scenes::mixed_room(), settings).unwrap();
         renderer.render_pass(1).unwrap();
         f64::from(renderer.totals().shadow_rays_traced as u32)
     };
@@ -313,7 +306,7 @@ fn in_the_open_it_is_unbiased_too() {
 #[test]
 fn passes_may_be_grouped_at_will() {
     let _alone = support::alone();
-    let scene = room();
+    let scene = scenes::mixed_room();
     let render = |passes: &[u32]| {
         let mut renderer = Renderer::new(support::device(), &scene, guided(4)).unwrap();
         for samples in passes {
@@ -339,7 +332,7 @@ fn pending_rays(renderer: &Renderer) -> f64 {
 #[test]
 fn late_samples_teach_by_one_in_four() {
     let _alone = support::alone();
-    let scene = room();
+    let scene = scenes::mixed_room();
     let mut renderer = Renderer::new(support::device(), &scene, guided(1)).unwrap();
     // The last rebuild is after 64 samples.
     renderer.render_pass(80).unwrap();
@@ -368,7 +361,7 @@ fn parts_of_refined_cells_are_found() {
     let _alone = support::alone();
     let mut settings = guided(1);
     settings.parameters.regions = 16;
-    let mut renderer = Renderer::new(support::device(), &room(), settings).unwrap();
+    let mut renderer = Renderer::new(support::device(), &scenes::mixed_room(), settings).unwrap();
     renderer.render_pass(64).unwrap();
     support::assert_silent();
     let state = renderer.guide_state().unwrap().unwrap();
@@ -395,7 +388,7 @@ fn parts_of_refined_cells_are_found() {
 #[test]
 fn a_renderer_goes_on_where_another_stopped() {
     let _alone = support::alone();
-    let scene = room();
+    let scene = scenes::mixed_room();
     let renderer = || Renderer::new(support::device(), &scene, guided(4)).unwrap();
     let mut whole = renderer();
     whole.render_pass(21).unwrap();
@@ -421,7 +414,7 @@ fn a_renderer_goes_on_where_another_stopped() {
 #[test]
 fn a_restart_forgets_the_regions_too() {
     let _alone = support::alone();
-    let scene = room();
+    let scene = scenes::mixed_room();
     let mut renderer = Renderer::new(support::device(), &scene, guided(1)).unwrap();
     renderer.render_pass(18).unwrap();
     let first = renderer.guide_state().unwrap().unwrap();
@@ -436,7 +429,7 @@ fn a_restart_forgets_the_regions_too() {
 #[test]
 fn a_guide_of_another_scene_is_refused_or_mostly_forgotten() {
     let _alone = support::alone();
-    let room = room();
+    let room = scenes::mixed_room();
     let mut teacher = Renderer::new(support::device(), &room, guided(1)).unwrap();
     teacher.render_pass(4).unwrap();
     let state = teacher.guide_state().unwrap().unwrap();
@@ -491,7 +484,7 @@ fn in_the_open_it_samples_as_mis_does() {
 #[test]
 fn rays_of_training_are_counted_and_more_rays_are_visible() {
     let _alone = support::alone();
-    let scene = room();
+    let scene = scenes::mixed_room();
     let share = |settings: Settings| {
         let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
         renderer.render_pass(16).unwrap();
@@ -543,7 +536,8 @@ fn visible_rays_teach_how_surfaces_respond() {
 fn visible_rays_teach_the_share_of_the_brdf() {
     let _alone = support::alone();
     let state_after = |candidates: u32| {
-        let mut renderer = Renderer::new(support::device(), &room(), guided(candidates)).unwrap();
+        let mut renderer =
+            Renderer::new(support::device(), &scenes::mixed_room(), guided(candidates)).unwrap();
         renderer.render_pass(7).unwrap();
         renderer.guide_state().unwrap().unwrap()
     };

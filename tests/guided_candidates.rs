@@ -48,16 +48,6 @@ const OTHER_BRDF_PART: f64 = 26.0 / 256.0;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-struct PathInput {
-    normal: [f32; 3],
-    material: u32,
-    outgoing: [f32; 3],
-    shadow_direction: [f32; 3],
-    is_visible: u32,
-}
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
 struct CandidateQuery {
     draws: u32,
     ray: u32,
@@ -170,7 +160,7 @@ impl Paths {
 
     /// Writes the ray and the hit of the path.
     fn put(&self, surface: &Surface) {
-        let input = PathInput {
+        let input = support::PathInput {
             normal: surface.normal.as_vec3().into(),
             material: surface.material,
             outgoing: surface.to_world(surface.theta.cos(), 0.4).as_vec3().into(),

@@ -48,16 +48,6 @@ const Z_LIMIT: f64 = 4.5;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-struct PathInput {
-    normal: [f32; 3],
-    material: u32,
-    outgoing: [f32; 3],
-    shadow_direction: [f32; 3],
-    is_visible: u32,
-}
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
 struct MixtureQuery {
     path: u32,
     draws: u32,
@@ -242,11 +232,11 @@ impl Paths {
 
     /// Writes rays, hits, and a shadow ray with its outcome for every path.
     fn put(&self, outcomes: &[(DVec3, bool)]) {
-        let inputs: Vec<PathInput> = self
+        let inputs: Vec<support::PathInput> = self
             .surfaces
             .iter()
             .zip(outcomes)
-            .map(|(surface, (direction, is_visible))| PathInput {
+            .map(|(surface, (direction, is_visible))| support::PathInput {
                 normal: surface.normal.as_vec3().into(),
                 material: surface.material,
                 outgoing: surface.to_world(surface.theta, 0.4).as_vec3().into(),

@@ -10,6 +10,7 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
 };
 
+use bytemuck::{Pod, Zeroable};
 use fenestra::gpu::{
     Buffer, Commands, DescriptorSet, Device, Pipeline,
     constants::{SET_FILM, WORKGROUP_SIZE},
@@ -20,6 +21,18 @@ use fenestra::gpu::{
 pub fn alone() -> MutexGuard<'static, ()> {
     static LOCK: Mutex<()> = Mutex::new(());
     LOCK.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What the probe `product_state` makes a path of: a surface seen along a direction, and a shadow ray with
+/// its outcome.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub struct PathInput {
+    pub normal: [f32; 3],
+    pub material: u32,
+    pub outgoing: [f32; 3],
+    pub shadow_direction: [f32; 3],
+    pub is_visible: u32,
 }
 
 /// The device all tests of one binary share, with validation and synchronization validation on.

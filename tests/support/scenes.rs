@@ -196,6 +196,11 @@ pub fn open(materials: Vec<Material>) -> Scene {
     )
 }
 
+/// [`room`] with a diffuse, a glossy and a coated material.
+pub fn mixed_room() -> Scene {
+    room(vec![diffuse(Vec3::splat(0.6)), copper(0.15), plastic(0.3)])
+}
+
 /// A closed room with one window to the west, a box and a sphere in it, `materials` in turn.
 pub fn room(materials: Vec<Material>) -> Scene {
     let mut geometry = Geometry::default();
