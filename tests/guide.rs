@@ -526,7 +526,7 @@ fn cells_are_refined_whose_rays_disagree() {
                     key if key == other => [RAYS, RAYS / 4, RAYS],
                     key if key == certain && region % 2 == 0 => [RAYS, RAYS, RAYS],
                     key if key == certain => [RAYS, 0, 0],
-                    key if key == unknown => [2, 1, 1],
+                    key if key == unknown && region % 2 == 0 => [2, 1, 1],
                     _ => [0; 3],
                 };
             }

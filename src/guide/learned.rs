@@ -23,7 +23,7 @@ const LARGEST_COUNT: u64 = (1 << 16) * PARTS_PER_RAY as u64;
 pub const MOST_CELLS: usize = 1 << 22;
 
 /// Trials in one cell and region that let it be refined, if all regions had as many.
-const RAYS_TO_REFINE: u64 = 8;
+const RAYS_TO_REFINE: u64 = 2;
 /// Least share of a cell's rays that went to directions of which it cannot say whether they are blocked.
 const LEAST_DOUBT: f64 = 0.01;
 /// Parts that a refined cell is expected to have: surfaces cross half of its eight.
