@@ -18,6 +18,8 @@
 #define NEEDS_GUIDE
 #define NEEDS_LEARN_TARGETS
 #define WRITES_LEARN_TARGETS
+#define NEEDS_PATH_CELLS
+#define WRITES_PATH_CELLS
 #include "candidates.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
@@ -124,11 +126,14 @@ void main() {
         for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
             learn_targets[i * path_count + path] = uvec2(NOTHING_TO_LEARN);
         }
+        path_cells[path].cell = NOTHING_TO_LEARN;
         return;
     }
     Vertex vertex = load_vertex(path, hit);
     GuideCell found = guide_cell_of(vertex);
     uint cell = guide_cell_index(found);
+    // For the bounce that arrived here and the one that leaves.
+    path_cells[path].cell = cell;
     uint learned_share = found.found >> GUIDE_SHARE_SHIFT;
     uint first = cell * guide.region_count;
     if (PRODUCT_WEIGHTS != 0u) {

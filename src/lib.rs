@@ -11,8 +11,8 @@
 //! | triangles → wide BVH | [`accel`] | `include/bvh.glsl` |
 //! | frames, random numbers, samplers | [`frame`], [`random`], [`sampler`] | `include/frame.glsl`, `include/random.glsl`, `include/wave.glsl` |
 //! | scene → device buffers | [`gpu`], [`renderer`] | `include/layout.glsl` |
-//! | learned visibility | [`guide`] | `include/guide.glsl` |
-//! | progressive passes | [`pass`], [`renderer`] | `camera`, `trace`, `sample` or `sample_guided`, `shadow`, `learn`, `gather`, `features`, `bounce`, `accumulate` |
+//! | learned visibility | [`guide`] | `include/guide.glsl`, `include/arriving.glsl` |
+//! | progressive passes | [`pass`], [`renderer`] | `camera`, `trace`, `sample` or `sample_guided`, `shadow`, `learn`, `gather`, `features`, `bounce` or `bounce_guided`, `learn_arrivals`, `accumulate` |
 //! | sums → image files | [`film`] | |
 //! | comparisons, ray rates | [`study`], [`benchmark`] | |
 //!
@@ -89,6 +89,8 @@
 //!   SIGGRAPH.
 //! - \[Vegdahl 2021\] "Building a Better LK Hash",
 //!   <https://psychopath.io/post/2021_01_30_building_a_better_lk_hash>.
+//! - \[Vorba et al. 2014\] "On-line Learning of Parametric Mixture Models for Light Transport
+//!   Simulation", ACM Transactions on Graphics 33(4).
 //! - \[Wächter & Binder 2019\] "A Fast and Robust Method for Avoiding Self-Intersection", Ray
 //!   Tracing Gems, chapter 6.
 //! - \[Vose 1991\] "A Linear Algorithm for Generating Random Numbers with a Given

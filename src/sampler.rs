@@ -104,6 +104,9 @@ pub enum Weights {
 /// Parameters of the samplers, set by `--set key=value`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
+    /// `bounce-candidates`: directions from the BRDF that each bounce of `guided` is chosen from by the light
+    /// that cells have learned to arrive from there, 1 to 16; 1 learns and chooses nothing.
+    pub bounce_candidates: u32,
     /// `candidates`: directions that each shadow ray is chosen from; `None` is `auto`. `ris` takes 2,
     /// 4, 6 or 8 (auto 4), half from the BRDF and half from the environment; `guided` takes 1, 4 or 8
     /// (auto by measured cost), a quarter from the BRDF.
@@ -133,6 +136,7 @@ pub struct Parameters {
 impl Default for Parameters {
     fn default() -> Self {
         Self {
+            bounce_candidates: 4,
             candidates: None,
             guide_memory: 128 << 20,
             hierarchy: true,
@@ -147,7 +151,8 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    const KEYS: [&'static str; 8] = [
+    const KEYS: [&'static str; 9] = [
+        "bounce-candidates",
         "candidates",
         "guide-memory",
         "hierarchy",
@@ -167,6 +172,12 @@ impl Parameters {
             Error::usage(format!("--set {assignment}: expected key=value, found no '='"))
         })?;
         match key {
+            "bounce-candidates" => {
+                let count = value.parse().ok().filter(|count| (1..=16).contains(count));
+                self.bounce_candidates = count.ok_or_else(|| {
+                    Error::usage(format!("--set bounce-candidates={value}: expected 1 to 16"))
+                })?;
+            }
             "candidates" => {
                 self.candidates = if value == "auto" {
                     None
@@ -262,6 +273,11 @@ impl Parameters {
         self.later_rays.unwrap_or((shadow_rays / 2).max(1)).min(shadow_rays)
     }
 
+    /// Whether `guided` guides the bounces of paths of `depth` vertices.
+    pub fn guides_bounces(&self, depth: u32) -> bool {
+        depth > 1 && self.bounce_candidates > 1
+    }
+
     /// The parameters that matter to `sampler`, by name, for metadata and statistics.
     pub fn describe(&self, sampler: Sampler) -> BTreeMap<String, String> {
         match sampler {
@@ -270,6 +286,8 @@ impl Parameters {
                 let count = self.candidates.map_or(auto.to_owned(), |count| count.to_string());
                 let mut named = BTreeMap::from([("candidates".to_owned(), count)]);
                 if sampler == Sampler::Guided {
+                    let bounce = self.bounce_candidates.to_string();
+                    named.insert("bounce-candidates".to_owned(), bounce);
                     named.insert("regions".to_owned(), self.regions.to_string());
                     let switch = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
                     named.insert("hierarchy".to_owned(), switch(self.hierarchy));
@@ -322,7 +340,10 @@ mod tests {
     #[test]
     fn an_unknown_key_lists_the_known_ones() {
         let error = Parameters::default().set("candidate=4").unwrap_err().to_string();
-        assert!(error.contains("candidate:") && error.contains("known: candidates"), "{error}");
+        assert!(
+            error.contains("candidate:") && error.contains("known: bounce-candidates"),
+            "{error}"
+        );
     }
 
     #[test]
@@ -349,6 +370,8 @@ mod tests {
             "guide-memory=4TB",
             "regions=2000",
             "hierarchy=1",
+            "bounce-candidates=0",
+            "bounce-candidates=17",
             "later-rays=0",
             "later-rays=x",
             "weights=brdf",
@@ -366,6 +389,10 @@ mod tests {
         assert_eq!(parameters.describe(Sampler::Guided)["later-rays"], "3");
         parameters.set("later-rays=auto").unwrap();
         assert_eq!(parameters.later_rays_of(5), 2);
+        assert!(parameters.guides_bounces(2) && !parameters.guides_bounces(1));
+        parameters.set("bounce-candidates=1").unwrap();
+        assert!(!parameters.guides_bounces(2));
+        assert_eq!(parameters.describe(Sampler::Guided)["bounce-candidates"], "1");
     }
 
     #[test]

@@ -6,12 +6,12 @@ mod support;
 
 use fenestra::{
     gpu::constants::{
-        BINDING_GUIDE_COUNTS, BINDING_GUIDE_SHARES, GUIDE_NO_KEY, GUIDE_REFINED,
-        GUIDE_RESPONSE_UNITS, SET_SRBF,
+        BINDING_GUIDE_ARRIVALS, BINDING_GUIDE_COUNTS, BINDING_GUIDE_SHARES, GUIDE_NO_KEY,
+        GUIDE_REFINED, GUIDE_RESPONSE_UNITS, SET_SRBF,
     },
     guide::{
-        CellKey, EstimateOptions, FACE_COUNT, GuideState, Learned, PARENT_COUNT, Partition,
-        decode_entry, decode_visibility, likely_regions,
+        ARRIVAL_DIRECTIONS, CellKey, EstimateOptions, FACE_COUNT, GuideState, Learned,
+        PARENT_COUNT, Partition, decode_entry, decode_visibility, likely_regions,
     },
     random::{hash_4d, random_independent_2d},
     scene::environment::{EnvironmentMap, EnvironmentTables},
@@ -728,16 +728,74 @@ fn feedback_inside_a_pass_would_be_caught() {
     assert!((snapshot - TOY.truth()).abs() < 1e-12, "{snapshot}");
     assert!((feedback - TOY.truth()).abs() > 0.2, "{feedback}");
     // The shaders cannot do so: the one that samples has no access to the counts.
-    let (_, spirv) = fenestra::gpu::shaders::PASSES
-        .iter()
-        .find(|(name, _)| *name == "sample_guided")
-        .expect("the pass exists");
-    assert!(!binds(spirv, SET_SRBF, BINDING_GUIDE_COUNTS));
-    assert!(!binds(spirv, SET_SRBF, BINDING_GUIDE_SHARES));
-    let (_, spirv) =
-        fenestra::gpu::shaders::PASSES.iter().find(|(name, _)| *name == "learn").unwrap();
-    assert!(binds(spirv, SET_SRBF, BINDING_GUIDE_COUNTS));
-    assert!(binds(spirv, SET_SRBF, BINDING_GUIDE_SHARES));
+    let counted = [BINDING_GUIDE_COUNTS, BINDING_GUIDE_SHARES, BINDING_GUIDE_ARRIVALS];
+    for (name, expected) in [
+        ("sample_guided", [false; 3]),
+        ("bounce_guided", [false; 3]),
+        ("learn", [true, true, false]),
+        ("learn_arrivals", [false, false, true]),
+    ] {
+        let spirv = fenestra::gpu::shaders::pass(name);
+        assert_eq!(counted.map(|binding| binds(spirv, SET_SRBF, binding)), expected, "{name}");
+    }
+}
+
+/// Light that bounces found is believed where they were, and where cells know less, by what these are parts
+/// of; what a cell reflects is of the sky it sees and of the light that arrives.
+#[test]
+fn cells_learn_where_light_arrives_from() {
+    let map = sunny();
+    let partition = Partition::new(&map, 64);
+    let key = |place: [u32; 3]| place[0] | place[1] << 8 | place[2] << 16 | 3 << 24;
+    // Two of one coarse cell, one elsewhere.
+    let [bright, beside, far] = [key([1, 1, 1]), key([2, 1, 1]), key([90, 90, 90])];
+    let mut learned = Learned::new(64, 100, 256).with_bounces(&[], 1);
+    learned.want(&[bright, beside, far]);
+    let index = |key: u32| learned.keys().iter().position(|found| *found == CellKey(key)).unwrap();
+    let [bright, beside, far] = [bright, beside, far].map(index);
+    let cells = learned.cell_count();
+    // The sky is visible from the far cell only.
+    let mut counts = vec![[20, 0, 0]; cells * 64];
+    counts[far * 64..][..64].fill([20, 20, 20 * 1000]);
+    learned.add(0, &counts);
+    let options = EstimateOptions::default();
+    let before = learned.snapshot(&partition, &options);
+    assert!(before.arriving.iter().all(|light| *light == 1.0), "nothing is known");
+    let reflected = |snapshot: &fenestra::guide::Snapshot, cell: usize| {
+        snapshot.reflected.units[cell] as f32 * snapshot.reflected.unit
+    };
+    assert!(reflected(&before, far) > 20.0 * reflected(&before, bright));
+
+    let mut found = vec![[10, 0]; cells * ARRIVAL_DIRECTIONS];
+    found[far * ARRIVAL_DIRECTIONS..][..ARRIVAL_DIRECTIONS].fill([0, 0]);
+    found[beside * ARRIVAL_DIRECTIONS..][..ARRIVAL_DIRECTIONS].fill([1, 0]);
+    let from = 17;
+    found[bright * ARRIVAL_DIRECTIONS + from] = [40, 4000];
+    learned.add_arrivals(&found, &before.reflected);
+    let snapshot = learned.snapshot(&partition, &options);
+    let light = |cell: usize, direction: usize| {
+        snapshot.arriving[cell * ARRIVAL_DIRECTIONS..][..ARRIVAL_DIRECTIONS][direction]
+    };
+    for cell in 0..cells {
+        let mean = (0..ARRIVAL_DIRECTIONS).map(|direction| light(cell, direction)).sum::<f32>()
+            / ARRIVAL_DIRECTIONS as f32;
+        assert!((mean - 1.0).abs() < 1e-3, "cell {cell}: {mean}");
+    }
+    assert!(light(bright, from) > 50.0 && light(bright, from + 1) < 0.5);
+    assert!(light(beside, from) > 20.0, "leans on its coarse cell: {}", light(beside, from));
+    assert!(light(far, from) > 5.0, "and the far one on the face: {}", light(far, from));
+    assert!(reflected(&snapshot, bright) > reflected(&before, bright));
+    let alone = EstimateOptions { hierarchy: false, ..options };
+    let snapshot = learned.snapshot(&partition, &alone);
+    let light = snapshot.arriving[far * ARRIVAL_DIRECTIONS + from];
+    assert!((light - 1.0).abs() < 1e-5, "nothing to lean on: {light}");
+
+    // What was learned is brought back, and halves.
+    let words = learned.arrivals();
+    let again = Learned::new(64, 100, 256).with_bounces(&words[..6 * ARRIVAL_DIRECTIONS], 1);
+    assert_eq!(again.arrivals(), words[..6 * ARRIVAL_DIRECTIONS]);
+    learned.add_arrivals(&[], &before.reflected);
+    assert_eq!(learned.arrivals(), words, "nothing was counted");
 }
 
 /// Whether a shader declares a variable at a set and binding (SPIR-V decorations 33 and 34).

@@ -264,10 +264,13 @@ fn every_vertex_of_a_path_is_unbiased() {
     ]);
     let mut every_ray = guided(1);
     every_ray.parameters.later_rays = Some(5);
+    let mut unguided = guided(1);
+    unguided.parameters.bounce_candidates = 1;
     let modes = [
         ("one-sample, depth 4", guided(1)),
         ("4, depth 4", guided(4)),
         ("one-sample, depth 4, no fewer rays", every_ray),
+        ("one-sample, depth 4, bounces by the BRDF", unguided),
     ];
     agree(&scene, 4, 32, &modes);
 }

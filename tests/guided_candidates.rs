@@ -25,7 +25,7 @@ use fenestra::{
         layout::Wave,
     },
     guide::GuideState,
-    renderer::{GuideBuffers, Renderer, SceneBuffers, Settings, WaveBuffers, window_of},
+    renderer::{GuideBuffers, GuideSize, Renderer, SceneBuffers, Settings, WaveBuffers, window_of},
     sampler::{Parameters, Sampler, Weights},
     scene::{Material, Scene, material::MaterialKind},
 };
@@ -138,6 +138,8 @@ fn trained(scene: &Scene) -> GuideState {
     renderer.guide_state().unwrap().unwrap()
 }
 
+const SIZE: GuideSize = GuideSize { pixels: 64, paths: 64, shadow_rays: 1, has_bounces: false };
+
 /// Buffers around one path.
 struct Paths {
     scene: SceneBuffers,
@@ -152,7 +154,7 @@ impl Paths {
         let window = window_of(&Settings::default(), scene);
         Self {
             scene: SceneBuffers::new(device, scene, window).unwrap(),
-            guide: GuideBuffers::new(device, scene, &parameters(weights), 64, 64).unwrap(),
+            guide: GuideBuffers::new(device, scene, &parameters(weights), SIZE).unwrap(),
             waves: WaveBuffers::new(device, 64, 1, None).unwrap(),
             weights,
         }

@@ -80,6 +80,7 @@ fn host_structs() -> Vec<HostStruct> {
             first_shadow_ray, total_shadow_rays, aovs, pixel_stride, is_training,
             epoch_seed, epoch_start,
         }
+        PathCell { cell, teaches }
         GuideParameters {
             grid_origin, finest_edge, edge_per_distance, largest_edge, region_count, table_mask,
             wanted_mask,

@@ -510,7 +510,7 @@ fn wrong_options_exit_with_2() {
         folder.run(&with(&["study", "yard.toml"], options)).assert(2, &[message]);
     };
     refuse(&["--samplers=mis,best"], "--samplers: there is no sampler \"best\"; known: uniform");
-    refuse(&["--samplers=ris:colour=1"], "known: candidates");
+    refuse(&["--samplers=ris:colour=1"], "known: bounce-candidates");
     refuse(&["--samplers=mis,mis"], "sampler \"mis\" is listed twice");
     refuse(&["--reference-sampler=best"], "there is no sampler \"best\"");
     refuse(&["--baseline=best"], "there is no sampler \"best\"");

@@ -113,6 +113,11 @@ struct GuideParameters {
     uint wanted_mask;
 };
 
+struct PathCell {
+    uint cell;
+    uint teaches;
+};
+
 #ifdef NEEDS_PARAMETERS
 layout(scalar, set = SET_SCENE, binding = BINDING_PARAMETERS) readonly buffer ParametersBuffer {
     SceneParameters parameters;
@@ -206,6 +211,29 @@ layout(scalar, set = SET_SRBF, binding = BINDING_GUIDE_SHARES) buffer GuideShare
 layout(scalar, set = SET_SRBF, binding = BINDING_LEARN_TARGETS)
     ACCESS_LEARN_TARGETS buffer LearnTargetsBuffer {
     uvec2 learn_targets[];
+};
+#endif
+
+#ifdef NEEDS_ARRIVING
+layout(set = SET_SRBF, binding = BINDING_GUIDE_ARRIVING) uniform samplerBuffer guide_arriving;
+#endif
+
+#ifdef NEEDS_ARRIVALS
+layout(set = SET_SRBF, binding = BINDING_GUIDE_REFLECTED) uniform usamplerBuffer guide_reflected;
+layout(scalar, set = SET_SRBF, binding = BINDING_GUIDE_ARRIVALS) buffer GuideArrivalsBuffer {
+    uint guide_arrivals[];
+};
+#endif
+
+#ifdef NEEDS_PATH_CELLS
+#ifdef WRITES_PATH_CELLS
+#define ACCESS_PATH_CELLS
+#else
+#define ACCESS_PATH_CELLS readonly
+#endif
+layout(scalar, set = SET_SRBF, binding = BINDING_GUIDE_PATH_CELLS)
+    ACCESS_PATH_CELLS buffer PathCellsBuffer {
+    PathCell path_cells[];
 };
 #endif
 

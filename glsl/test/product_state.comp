@@ -1,5 +1,6 @@
 // Puts paths into the state that the passes of product sampling find: a ray, the hit it made, and a
-// shadow ray with its outcome. For tests/product.rs and tests/guided_candidates.rs.
+// shadow ray with its outcome. For tests/product.rs, tests/guided_candidates.rs and
+// tests/guided_bounces.rs.
 #version 460
 
 #define NEEDS_RAYS

@@ -79,6 +79,16 @@ pub const BINDING_LEARN_TARGETS: u32 = 12;
 /// SRBF set: the likeliest regions of each cell, texels of four words (see
 /// `guide::LikelyRegion`).
 pub const BINDING_GUIDE_LIKELY: u32 = 13;
+/// SRBF set: [`PathCell`](super::layout::PathCell) per path.
+pub const BINDING_GUIDE_PATH_CELLS: u32 = 14;
+/// SRBF set: per cell and direction the light that is believed to arrive by way of surfaces, relative to
+/// the mean of the cell's directions, texels of one float.
+pub const BINDING_GUIDE_ARRIVING: u32 = 15;
+/// SRBF set: per cell the light that it reflects of what it learned, in whole units, texels of one word.
+pub const BINDING_GUIDE_REFLECTED: u32 = 16;
+/// SRBF set: per cell and direction, bounce rays and the sum of the light where they arrived, since the
+/// last rebuild.
+pub const BINDING_GUIDE_ARRIVALS: u32 = 17;
 
 /// Wave set: [`Ray`](super::layout::Ray) per path, the next one to trace.
 pub const BINDING_RAYS: u32 = 0;
@@ -161,7 +171,9 @@ pub const CONSTANT_BRDF_CANDIDATES: u32 = 24;
 /// Specialization constant of `sample_guided`: 1 weights the likeliest regions of a cell with the BRDF
 /// at every hit.
 pub const CONSTANT_PRODUCT_WEIGHTS: u32 = 25;
-/// Specialization constant of `bounce`: first vertex at which russian roulette may end a path.
+/// Specialization constant of `bounce_guided`: directions from the BRDF that one is chosen from.
+pub const CONSTANT_BOUNCE_CANDIDATES: u32 = 26;
+/// Specialization constant of `bounce` and `bounce_guided`: first vertex at which russian roulette may end a path.
 pub const CONSTANT_ROULETTE_VERTEX: u32 = 18;
 /// Specialization constant of the passes that evaluate materials: bit `1 << kind` for every kind that
 /// the scene has. Devices that run both sides of a branch save the kinds that it has not.
@@ -271,6 +283,8 @@ pub const GUIDE_RESPONSE_MOST: u32 = 2048;
 pub const GUIDE_SAMPLES_THAT_ALL_TEACH: u32 = 16;
 /// Of the samples after those, one in as many is counted.
 pub const GUIDE_TEACHING_STEP: u32 = 4;
+/// Directions along each side of the square of those that cells tell apart for arriving light.
+pub const GUIDE_ARRIVAL_SIDE: u32 = 12;
 /// Words of a cell per region that are counted: trials, hits and the responses of the hits.
 pub const GUIDE_COUNT_WORDS: u32 = 3;
 
@@ -444,6 +458,11 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("BINDING_GUIDE_WANTED", BINDING_GUIDE_WANTED),
     ("BINDING_LEARN_TARGETS", BINDING_LEARN_TARGETS),
     ("BINDING_GUIDE_LIKELY", BINDING_GUIDE_LIKELY),
+    ("BINDING_GUIDE_PATH_CELLS", BINDING_GUIDE_PATH_CELLS),
+    ("BINDING_GUIDE_ARRIVING", BINDING_GUIDE_ARRIVING),
+    ("BINDING_GUIDE_REFLECTED", BINDING_GUIDE_REFLECTED),
+    ("BINDING_GUIDE_ARRIVALS", BINDING_GUIDE_ARRIVALS),
+    ("CONSTANT_BOUNCE_CANDIDATES", CONSTANT_BOUNCE_CANDIDATES),
     ("BINDING_GUIDE_SHARES", BINDING_GUIDE_SHARES),
     ("CONSTANT_BRDF_CANDIDATES", CONSTANT_BRDF_CANDIDATES),
     ("CONSTANT_PRODUCT_WEIGHTS", CONSTANT_PRODUCT_WEIGHTS),
@@ -459,6 +478,7 @@ pub const SHADER_MACROS: &[(&str, u32)] = &[
     ("GUIDE_RESPONSE_UNITS", GUIDE_RESPONSE_UNITS),
     ("GUIDE_RESPONSE_MOST", GUIDE_RESPONSE_MOST),
     ("GUIDE_COUNT_WORDS", GUIDE_COUNT_WORDS),
+    ("GUIDE_ARRIVAL_SIDE", GUIDE_ARRIVAL_SIDE),
     ("GUIDE_SAMPLES_THAT_ALL_TEACH", GUIDE_SAMPLES_THAT_ALL_TEACH),
     ("GUIDE_TEACHING_STEP", GUIDE_TEACHING_STEP),
     ("GUIDE_NO_KEY", GUIDE_NO_KEY),

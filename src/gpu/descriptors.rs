@@ -13,7 +13,7 @@ use super::{buffer::Buffer, constants as c, device::Device, labels, vulkan_error
 use crate::error::{Error, Result};
 
 /// Bindings of the four sets.
-pub const SET_BINDING_COUNTS: [u32; 4] = [14, 14, 16, 11];
+pub const SET_BINDING_COUNTS: [u32; 4] = [14, 18, 16, 11];
 
 /// Format and bytes of the texels of a binding that is a uniform texel buffer.
 pub(super) fn texel_format(set: u32, binding: u32) -> Option<(vk::Format, u64)> {
@@ -47,6 +47,8 @@ pub(super) fn texel_format(set: u32, binding: u32) -> Option<(vk::Format, u64)> 
             c::SET_SRBF,
             c::BINDING_GUIDE_TABLE | c::BINDING_GUIDE_ENTRIES | c::BINDING_GUIDE_ALIASES,
         ) => Some((vk::Format::R32G32_UINT, 8)),
+        (c::SET_SRBF, c::BINDING_GUIDE_ARRIVING) => Some((vk::Format::R32_SFLOAT, 4)),
+        (c::SET_SRBF, c::BINDING_GUIDE_REFLECTED) => Some((vk::Format::R32_UINT, 4)),
         (c::SET_SRBF, c::BINDING_GUIDE_REGION_OF_CELL) => Some((vk::Format::R16_UINT, 2)),
         (c::SET_WAVE, c::BINDING_SHADOW_RAY_TEXELS) => Some((vk::Format::R32G32_UINT, 8)),
         _ => None,

@@ -196,6 +196,16 @@ pub struct Wave {
     pub epoch_start: u32,
 }
 
+/// What a path tells the guide about its bounces.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PathCell {
+    /// Cell of the vertex it is at, or `NOTHING_TO_LEARN` where it left the scene.
+    pub cell: u32,
+    /// Cell and direction that its last bounce ray teaches, or `NOTHING_TO_LEARN`.
+    pub teaches: u32,
+}
+
 /// How the cells of the guide follow from places in the scene.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

@@ -303,6 +303,15 @@ impl Estimates {
         Self::new(counted.map(estimate).collect())
     }
 
+    /// Light of the environment that surfaces of the cell reflect, as the sum over regions of share of
+    /// energy · V̂ · response.
+    pub fn reflected(&self, lookup: &Lookup) -> f32 {
+        let reflected = |(estimate, share): (&Estimate, &f64)| {
+            *share as f32 * estimate.visibility * estimate.response
+        };
+        self.regions.iter().zip(&lookup.shares).map(reflected).sum()
+    }
+
     /// Writes the entries of the device for a cell of a face: cumulative probabilities of the regions
     /// with, for each, its probability divided by its share of the energy and the visibility that weights
     /// candidates. See [`decode_entry`].

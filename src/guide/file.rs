@@ -2,15 +2,19 @@
 //!
 //! One line of JSON, then 32-bit words in little-endian order: the rectangles that are the regions, the
 //! keys of the cells, which of them are refined, the [`Count`] of each cell and region, what visible rays say about the share of the
-//! BRDF, what passes counted of both since the last rebuild, and the keys they missed. The header has the
-//! SHA-256 of the words.
+//! BRDF, what passes counted of both since the last rebuild, the keys they missed, and where bounces teach,
+//! what they taught up to the last rebuild and since. The header has the SHA-256 of the words.
 
 use std::{fs, io::Write, path::Path};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::{estimate::CountWords, share::SHARE_WORDS};
+use super::{
+    arriving::{ARRIVAL_DIRECTIONS, ArrivalWords},
+    estimate::CountWords,
+    share::SHARE_WORDS,
+};
 use crate::{
     error::{Error, Result},
     film::write_atomically,
@@ -20,7 +24,7 @@ use crate::{
 
 const COUNT_WORDS: usize = GUIDE_COUNT_WORDS as usize;
 const FORMAT: &str = "fenestra-guide";
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 
 /// Everything a renderer needs to go on learning where another stopped.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -53,6 +57,11 @@ pub struct GuideState {
     pub pending_shares: Vec<u32>,
     /// Keys that were missed since then.
     pub wanted: Vec<u32>,
+    /// Bounce rays and the bits of the sum of their light per cell and direction up to the last rebuild;
+    /// empty where bounces do not teach.
+    pub arrivals: Vec<ArrivalWords>,
+    /// The same since then, rays and units of light; empty where there are none.
+    pub pending_arrivals: Vec<ArrivalWords>,
 }
 
 /// The scene that a guide was learned in, as far as it matters.
@@ -85,6 +94,8 @@ struct Header {
     pending: usize,
     pending_shares: usize,
     wanted: usize,
+    arrivals: usize,
+    pending_arrivals: usize,
 }
 
 fn checksum(words: &[u8]) -> String {
@@ -108,7 +119,9 @@ impl GuideState {
             .chain(&self.shares)
             .chain(self.pending.as_flattened())
             .chain(&self.pending_shares)
-            .chain(&self.wanted);
+            .chain(&self.wanted)
+            .chain(self.arrivals.as_flattened())
+            .chain(self.pending_arrivals.as_flattened());
         words.extend(all.flat_map(|word| word.to_le_bytes()));
         let header = Header {
             format: FORMAT.to_owned(),
@@ -124,6 +137,8 @@ impl GuideState {
             pending: self.pending.len(),
             pending_shares: self.pending_shares.len(),
             wanted: self.wanted.len(),
+            arrivals: self.arrivals.len(),
+            pending_arrivals: self.pending_arrivals.len(),
         };
         let header =
             serde_json::to_vec(&header).map_err(|error| Error::io(path, "write", error.into()))?;
@@ -171,6 +186,7 @@ impl GuideState {
             let counts = counts.checked_add(header.pending)?.checked_mul(COUNT_WORDS)?;
             let fives = (header.origin.regions as usize).checked_mul(5)?;
             let shares = header.cells.checked_mul(SHARE_WORDS)?;
+            let arrivals = header.arrivals.checked_add(header.pending_arrivals)?.checked_mul(2)?;
             counts
                 .checked_add(fives)?
                 .checked_add(shares)?
@@ -178,6 +194,7 @@ impl GuideState {
                 .checked_add(header.cells)?
                 .checked_add(header.refined)?
                 .checked_add(header.wanted)?
+                .checked_add(arrivals)?
                 .checked_mul(4)
         });
         let (Some(counts), Some(length)) = (counts, length) else {
@@ -187,12 +204,18 @@ impl GuideState {
         if length != words.len() || header.pending > counts || header.pending_shares > shares {
             return Err(damaged(&format!("{length} bytes expected, {} found", words.len())));
         }
+        if header.arrivals.max(header.pending_arrivals) > header.cells * ARRIVAL_DIRECTIONS {
+            return Err(damaged("its bounces belong to more cells than it has"));
+        }
         let mut words = words
             .chunks_exact(4)
             .map(|word| word.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte)));
         let mut take = |count: usize| words.by_ref().take(count).collect::<Vec<u32>>();
         let counted = |words: Vec<u32>| -> Vec<CountWords> {
             words.chunks_exact(COUNT_WORDS).map(|count| [count[0], count[1], count[2]]).collect()
+        };
+        let pairs = |words: Vec<u32>| -> Vec<ArrivalWords> {
+            words.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
         };
         let regions = header.origin.regions as usize;
         Ok(Self {
@@ -212,6 +235,8 @@ impl GuideState {
             pending: counted(take(COUNT_WORDS * header.pending)),
             pending_shares: take(header.pending_shares),
             wanted: take(header.wanted),
+            arrivals: pairs(take(2 * header.arrivals)),
+            pending_arrivals: pairs(take(2 * header.pending_arrivals)),
         })
     }
 }
@@ -245,6 +270,8 @@ mod tests {
             pending: vec![[4, 4, 5]],
             pending_shares: vec![1, 2, 3],
             wanted: vec![0x1234_5678],
+            arrivals: vec![[3.0_f32.to_bits(), 0.25_f32.to_bits()], [0, 0]],
+            pending_arrivals: vec![[5, 77]],
         }
     }
 
@@ -283,5 +310,9 @@ mod tests {
         let mut other = good;
         other[place] = b'3';
         assert!(message(&other).contains("impossible number of candidates"));
+        let arrivals = vec![[0; 2]; 3 * ARRIVAL_DIRECTIONS + 1];
+        GuideState { arrivals, ..state() }.write(&path).unwrap();
+        let error = GuideState::read(&path).unwrap_err().to_string();
+        assert!(error.contains("more cells than it has"), "{error}");
     }
 }

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::{
+    arriving::{ArrivalWords, ArrivingLight, Reflected},
     estimate::{
         Count, CountWords, EstimateOptions, Estimates, LARGEST_WORD, Lookup, PARTS_PER_RAY,
         Scratch, Tally, decode_entry,
@@ -46,11 +47,13 @@ pub struct Learned {
     region_count: usize,
     /// What visible rays say about the share of the BRDF, [`SHARE_WORDS`] words per cell.
     shares: Vec<u32>,
+    /// Light that arrives by way of surfaces, if bounces teach.
+    arriving: Option<ArrivingLight>,
     refused: u64,
 }
 
 /// What the next pass reads, as it lies on the device.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Snapshot {
     /// Hash table: key of a cell, [`CellKey::NONE`] where empty; its index, [`GUIDE_REFINED`] where its
     /// parts may be cells and, from bit [`GUIDE_SHARE_SHIFT`] on, its share of the BRDF in 256ths, 0
@@ -58,6 +61,11 @@ pub struct Snapshot {
     pub table: Vec<[u32; 2]>,
     /// Entries of every cell, region by region.
     pub entries: Vec<[u32; 2]>,
+    /// Of every cell and direction, the light that is believed to arrive by way of surfaces, relative to
+    /// the mean over the cell's directions; empty where bounces do not teach.
+    pub arriving: Vec<f32>,
+    /// Light that the cells reflect; empty where bounces do not teach.
+    pub reflected: Reflected,
 }
 
 /// What a cell leans on: what is known of its parent, else of a face `alone`.
@@ -70,13 +78,13 @@ fn around<'a>(
 }
 
 /// Which cells are parts of which.
-struct Tree {
+pub(super) struct Tree {
     /// Of every cell the one that it is a part of; faces are parts of themselves.
     parents: Vec<usize>,
     /// The parts of every cell.
-    parts: Vec<Vec<usize>>,
+    pub(super) parts: Vec<Vec<usize>>,
     /// The faces, those of their parts that have parts or may have, those of these, and so on.
-    generations: Vec<Vec<usize>>,
+    pub(super) generations: Vec<Vec<usize>>,
 }
 
 impl Learned {
@@ -98,8 +106,17 @@ impl Learned {
             counts: vec![Count::default(); FACE_COUNT * region_count],
             region_count,
             shares: vec![0; FACE_COUNT * SHARE_WORDS],
+            arriving: None,
             refused: 0,
         }
+    }
+
+    /// The same, and bounces teach too. What they taught an earlier one, `words` in the order of its cells,
+    /// is divided by `forget`.
+    #[must_use]
+    pub fn with_bounces(mut self, words: &[ArrivalWords], forget: u32) -> Self {
+        self.arriving = Some(ArrivingLight::new(self.keys.len(), words, forget));
+        self
     }
 
     /// As [`Self::new`], with the keys, the refined cells, counts (trials and hits in sixteenths of rays)
@@ -259,6 +276,19 @@ impl Learned {
         }
     }
 
+    /// Adds what bounce rays of one stretch of passes found, cell by cell and direction by direction; light
+    /// in the units of `reflected`, which they read.
+    pub fn add_arrivals(&mut self, found: &[ArrivalWords], reflected: &Reflected) {
+        if let Some(arriving) = &mut self.arriving {
+            arriving.add(found, reflected.unit);
+        }
+    }
+
+    /// What bounces taught, as [`Self::with_bounces`] takes it.
+    pub fn arrivals(&self) -> Vec<ArrivalWords> {
+        self.arriving.as_ref().map(ArrivingLight::words).unwrap_or_default()
+    }
+
     /// Makes room for the fine cells `wanted`, in any order and repeated at will: first for the coarse
     /// cells of those that are no parts of others, then for themselves, as long as there is room.
     pub fn want(&mut self, wanted: &[u32]) {
@@ -284,6 +314,9 @@ impl Learned {
             self.keys.push(key);
             self.counts.resize(self.counts.len() + self.region_count, Count::default());
             self.shares.resize(self.shares.len() + SHARE_WORDS, 0);
+        }
+        if let Some(arriving) = &mut self.arriving {
+            arriving.resize(self.keys.len());
         }
     }
 
@@ -384,9 +417,10 @@ impl Learned {
         }
         let entries = &mut snapshot.entries;
         entries.resize(self.keys.len() * regions, [0; 2]);
-        entries.par_chunks_mut(regions).enumerate().for_each_init(
+        let mut reflected = vec![0.0; self.keys.len()];
+        entries.par_chunks_mut(regions).zip(&mut reflected).enumerate().for_each_init(
             Scratch::default,
-            |scratch, (cell, entries)| {
+            |scratch, (cell, (entries, reflected))| {
                 let of_part;
                 let estimates = if let Some(estimates) = &whole[cell] {
                     estimates
@@ -396,8 +430,15 @@ impl Learned {
                     &of_part
                 };
                 estimates.write_entries(self.face(cell), &lookup, scratch, entries);
+                if self.arriving.is_some() {
+                    *reflected = estimates.reflected(&lookup);
+                }
             },
         );
+        if let Some(arriving) = &self.arriving {
+            (snapshot.arriving, snapshot.reflected) =
+                arriving.estimate(&tree, options.hierarchy, &reflected);
+        }
         let shares = if options.learned_share {
             self.shares_in_256ths(&tree, options.hierarchy)
         } else {

@@ -4,7 +4,8 @@
 //! Per wave of paths: `camera`; then per vertex `trace`, and per group of shadow rays `sample`,
 //! `shadow`, `gather`, with `product` before the first group and `cache` and `cdf` after each for the
 //! samplers that need them; `cache_entries` after every vertex, `guide_cells` and `features` after the
-//! first one, where their layers are asked for; `bounce` between vertices; at last `accumulate`.
+//! first one, where their layers are asked for; `bounce` or `bounce_guided` between vertices; at last
+//! `accumulate`.
 
 pub mod geometry;
 pub mod guided;
@@ -130,14 +131,7 @@ impl Passes {
                 ],
             )?,
             guided: (settings.sampler == Sampler::Guided)
-                .then(|| {
-                    Guided::new(
-                        device,
-                        candidates,
-                        settings.parameters.weights,
-                        settings.material_kinds,
-                    )
-                })
+                .then(|| Guided::new(device, candidates, &settings))
                 .transpose()?,
             lobes: settings
                 .fit_sizes
@@ -194,7 +188,7 @@ impl Passes {
     /// Number of dispatches of one wave.
     pub fn dispatches_per_wave(&self) -> u32 {
         let groups = self.settings.shadow_rays.div_ceil(self.rays_per_group()).max(1);
-        4 + self.settings.depth * (5 + 5 * groups)
+        4 + self.settings.depth * (6 + 5 * groups)
     }
 
     /// Shadow rays at a vertex, `is_guided` where learned visibility chooses them.
@@ -247,6 +241,9 @@ impl Passes {
                 if wave.shadow_ray_count > 0 {
                     if let (Some(guided), Some(guide)) = (&self.guided, guide) {
                         guided.record_sample(commands, &[scene, guide, wave_set], &wave);
+                        if vertex > 0 && first == 0 {
+                            guided.record_arrivals(commands, guide, &wave);
+                        }
                     } else if let Some((lobes, sets)) = &lobes {
                         lobes.record_sample(commands, sets, &wave);
                     } else {
@@ -289,7 +286,15 @@ impl Passes {
                 );
             }
             if vertex + 1 < vertices {
-                dispatch(commands, &self.bounce, &[scene, wave_set], &wave, paths);
+                let is_recorded = match (&self.guided, guide) {
+                    (Some(guided), Some(guide)) if wave.total_shadow_rays > 0 => {
+                        guided.record_bounce(commands, &[scene, guide, wave_set], &wave)
+                    }
+                    _ => false,
+                };
+                if !is_recorded {
+                    dispatch(commands, &self.bounce, &[scene, wave_set], &wave, paths);
+                }
             }
         }
         dispatch(commands, &self.accumulate, &[scene, wave_set, film], &wave, wave.pixel_count);
@@ -324,6 +329,14 @@ impl Passes {
                 run("learn", &|commands| {
                     guided.record_learn(commands, &[guide, wave], &nothing);
                 })?;
+                if self.settings.parameters.guides_bounces(self.settings.depth) {
+                    run("bounce_guided", &|commands| {
+                        guided.record_bounce(commands, &[scene, guide, wave], &nothing);
+                    })?;
+                    run("learn_arrivals", &|commands| {
+                        guided.record_arrivals(commands, guide, &nothing);
+                    })?;
+                }
                 if self.settings.aovs & AOV_GUIDE_CELL != 0 {
                     run("guide_cells", &|commands| {
                         guided.record_cells(commands, &[scene, guide, wave, film], &nothing);

@@ -5,23 +5,27 @@ use std::{collections::BTreeMap, sync::Arc, time::Instant};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::guided_pixel::{CellLevel, RecordedCell, RecordedRegion};
+use super::{
+    arrival_buffers::{self, ArrivalBuffers},
+    guided_pixel::{CellLevel, RecordedCell, RecordedRegion},
+};
 use crate::{
     error::{Error, Result},
     gpu::{
         Buffer, Commands, DescriptorSet, Device,
         constants::{
             BINDING_GUIDE_ALIASES, BINDING_GUIDE_COUNTS, BINDING_GUIDE_ENTRIES,
-            BINDING_GUIDE_LIKELY, BINDING_GUIDE_PARAMETERS, BINDING_GUIDE_REGION_OF_CELL,
-            BINDING_GUIDE_REGIONS, BINDING_GUIDE_SHARES, BINDING_GUIDE_TABLE, BINDING_GUIDE_WANTED,
-            BINDING_LEARN_TARGETS, GUIDE_COUNT_WORDS, GUIDE_LIKELY_REGIONS, GUIDE_NO_KEY, SET_SRBF,
+            BINDING_GUIDE_LIKELY, BINDING_GUIDE_PARAMETERS, BINDING_GUIDE_PATH_CELLS,
+            BINDING_GUIDE_REGION_OF_CELL, BINDING_GUIDE_REGIONS, BINDING_GUIDE_SHARES,
+            BINDING_GUIDE_TABLE, BINDING_GUIDE_WANTED, BINDING_LEARN_TARGETS, GUIDE_COUNT_WORDS,
+            GUIDE_LIKELY_REGIONS, GUIDE_NO_KEY, SET_SRBF,
         },
-        layout::GuideParameters,
+        layout::{GuideParameters, PathCell},
     },
     guide::{
-        CellKey, CountWords, EstimateOptions, FACE_COUNT, GuideState, Learned, LikelyRegion,
-        MOST_CELLS, Origin, Partition, SHARE_WORDS, Snapshot, decode_entry, decode_visibility,
-        likely_regions,
+        ARRIVAL_DIRECTIONS, ArrivalWords, CellKey, CountWords, EstimateOptions, FACE_COUNT,
+        GuideState, Learned, LikelyRegion, MOST_CELLS, Origin, Partition, SHARE_WORDS, Snapshot,
+        decode_entry, decode_visibility, likely_regions,
     },
     sampler::{Parameters, Weights},
     scene::{self, Scene},
@@ -92,6 +96,19 @@ impl Room {
     }
 }
 
+/// What the buffers of a guide are sized by.
+#[derive(Clone, Copy, Debug)]
+pub struct GuideSize {
+    /// Pixels of the film.
+    pub pixels: u32,
+    /// Paths of a wave.
+    pub paths: u32,
+    /// Shadow rays of a path in one group.
+    pub shadow_rays: u32,
+    /// Whether bounces are guided.
+    pub has_bounces: bool,
+}
+
 /// Everything of one render that learns.
 pub struct GuideBuffers {
     device: Arc<Device>,
@@ -119,12 +136,15 @@ pub struct GuideBuffers {
     /// Likeliest regions of every cell; of one cell where they are not used.
     likely: Buffer,
     uses_likely: bool,
+    path_cells: Buffer,
+    /// Where bounces are guided.
+    arrivals: Option<ArrivalBuffers>,
     wanted_slots: usize,
     rebuild_ms: f64,
 }
 
 impl GuideBuffers {
-    /// Splits the environment and makes room for `pixels` of film and waves of `rays` shadow rays.
+    /// Splits the environment and makes room.
     ///
     /// # Errors
     /// A limit of the device or a failing device.
@@ -132,8 +152,7 @@ impl GuideBuffers {
         device: &Arc<Device>,
         scene: &Scene,
         parameters: &Parameters,
-        pixels: u32,
-        rays: u64,
+        size: GuideSize,
     ) -> Result<Self> {
         let options = EstimateOptions {
             hierarchy: parameters.hierarchy,
@@ -146,10 +165,12 @@ impl GuideBuffers {
         let region_count = partition.regions.len();
         let uses_likely = parameters.weights == Weights::Product;
         let likely_bytes = 16 * u64::from(GUIDE_LIKELY_REGIONS);
-        let useful_cells = FEW_CELLS.max(u64::from(pixels) / PIXELS_PER_CELL) as usize;
+        let useful_cells = FEW_CELLS.max(u64::from(size.pixels) / PIXELS_PER_CELL) as usize;
         let useful_cells = useful_cells.min(MOST_CELLS);
         // What cells take besides is most per region where these are fewest.
-        let besides = 4 * SHARE_WORDS as u64 + if uses_likely { likely_bytes } else { 0 };
+        let besides = 4 * SHARE_WORDS as u64
+            + if uses_likely { likely_bytes } else { 0 }
+            + if size.has_bounces { arrival_buffers::BYTES_PER_CELL } else { 0 };
         let by_memory =
             parameters.guide_memory / (BYTES_PER_REGION + besides.div_ceil(region_count as u64));
         let by_range = device.capabilities().max_storage_buffer_range / COUNT_BYTES;
@@ -186,26 +207,30 @@ impl GuideBuffers {
         let counts = Buffer::new(device, "guide counts", count_bytes)?;
         let shares = Buffer::new(device, "guide shares", 4 * (capacity * SHARE_WORDS) as u64)?;
         let wanted = Buffer::new(device, "guide wanted", 4 * wanted_slots as u64)?;
+        let rays = u64::from(size.paths) * u64::from(size.shadow_rays);
         let targets = Buffer::new(device, "learn targets", 8 * rays)?;
         let lists = if uses_likely { capacity as u64 } else { 1 };
         let likely = Buffer::new(device, "guide likely", lists * likely_bytes)?;
-        let set = DescriptorSet::new(
-            device,
-            SET_SRBF,
-            &[
-                (BINDING_GUIDE_PARAMETERS, &parameters),
-                (BINDING_GUIDE_TABLE, &table),
-                (BINDING_GUIDE_ENTRIES, &entries),
-                (BINDING_GUIDE_REGIONS, &regions),
-                (BINDING_GUIDE_ALIASES, &aliases),
-                (BINDING_GUIDE_REGION_OF_CELL, &region_of_cell),
-                (BINDING_GUIDE_COUNTS, &counts),
-                (BINDING_GUIDE_SHARES, &shares),
-                (BINDING_GUIDE_WANTED, &wanted),
-                (BINDING_LEARN_TARGETS, &targets),
-                (BINDING_GUIDE_LIKELY, &likely),
-            ],
-        )?;
+        let path_bytes = u64::from(size.paths) * size_of::<PathCell>() as u64;
+        let path_cells = Buffer::new(device, "path cells", path_bytes)?;
+        let arrivals =
+            size.has_bounces.then(|| ArrivalBuffers::new(device, capacity)).transpose()?;
+        let mut bound = vec![
+            (BINDING_GUIDE_PARAMETERS, &parameters),
+            (BINDING_GUIDE_TABLE, &table),
+            (BINDING_GUIDE_ENTRIES, &entries),
+            (BINDING_GUIDE_REGIONS, &regions),
+            (BINDING_GUIDE_ALIASES, &aliases),
+            (BINDING_GUIDE_REGION_OF_CELL, &region_of_cell),
+            (BINDING_GUIDE_COUNTS, &counts),
+            (BINDING_GUIDE_SHARES, &shares),
+            (BINDING_GUIDE_WANTED, &wanted),
+            (BINDING_LEARN_TARGETS, &targets),
+            (BINDING_GUIDE_LIKELY, &likely),
+            (BINDING_GUIDE_PATH_CELLS, &path_cells),
+        ];
+        bound.extend(arrivals.iter().flat_map(ArrivalBuffers::bindings));
+        let set = DescriptorSet::new(device, SET_SRBF, &bound)?;
         let mut buffers = Self {
             device: Arc::clone(device),
             set,
@@ -229,6 +254,8 @@ impl GuideBuffers {
             targets,
             likely,
             uses_likely,
+            path_cells,
+            arrivals,
             wanted_slots,
             rebuild_ms: 0.0,
         };
@@ -254,14 +281,20 @@ impl GuideBuffers {
             }
             self.is_split = false;
         }
-        self.learned = Learned::new(
+        let learned = Learned::new(
             self.partition.regions.len(),
             self.room.cells(self.partition.regions.len()),
             self.table.size() as usize / 8,
         );
+        self.learned = self.with_bounces(learned, &[], 1);
         self.rebuild_ms = 0.0;
         self.clear_counts()?;
         self.upload()
+    }
+
+    /// `learned` with what bounces taught, where they are guided.
+    fn with_bounces(&self, learned: Learned, words: &[ArrivalWords], forget: u32) -> Learned {
+        if self.arrivals.is_some() { learned.with_bounces(words, forget) } else { learned }
     }
 
     /// Turns what passes counted into what the next ones read; splits the map anew where it is time
@@ -279,6 +312,10 @@ impl GuideBuffers {
         })?;
         let words = self.learned.cell_count() * SHARE_WORDS;
         self.learned.add_shares(&self.shares.download::<u32>(words)?);
+        if let Some(arrivals) = &self.arrivals {
+            let counted = arrivals.counted(self.learned.cell_count())?;
+            self.learned.add_arrivals(&counted, &self.snapshot.reflected);
+        }
         self.learned.want(&self.wanted.download::<u32>(self.wanted_slots)?);
         let now = self.partition.regions.len();
         let rays = if now < self.room.most_regions { self.learned.rays() } else { 0 };
@@ -354,6 +391,9 @@ impl GuideBuffers {
     pub fn state(&self) -> Result<GuideState> {
         let counted = self.learned.cell_count() * self.partition.regions.len();
         let wanted = self.wanted.download::<u32>(self.wanted_slots)?;
+        let arrivals = self.arrivals.as_ref();
+        let pending_arrivals =
+            arrivals.map(|arrivals| arrivals.counted(self.learned.cell_count())).transpose()?;
         Ok(GuideState {
             origin: self.origin.clone(),
             samples: 0,
@@ -368,6 +408,8 @@ impl GuideBuffers {
             pending: self.counts.download(counted)?,
             pending_shares: self.shares.download(self.learned.cell_count() * SHARE_WORDS)?,
             wanted: wanted.into_iter().filter(|key| *key != CellKey::NONE.0).collect(),
+            arrivals: self.learned.arrivals(),
+            pending_arrivals: pending_arrivals.unwrap_or_default(),
         })
     }
 
@@ -402,13 +444,14 @@ impl GuideBuffers {
         let has_moved = here.geometry != there.geometry;
         let forget = if has_moved { FORGETTING } else { 1 };
         self.take_regions(partition)?;
-        self.learned = Learned::resume(
+        let learned = Learned::resume(
             self.partition.regions.len(),
             self.room.cells(self.partition.regions.len()),
             self.table.size() as usize / 8,
             state,
             forget,
         );
+        self.learned = self.with_bounces(learned, &state.arrivals, forget);
         self.origin.grid_origin = there.grid_origin;
         self.origin.largest_edge = edge;
         self.layout.grid_origin = there.grid_origin;
@@ -422,6 +465,12 @@ impl GuideBuffers {
         let room = self.learned.cell_count() * SHARE_WORDS;
         let shares = &state.pending_shares[..state.pending_shares.len().min(room)];
         self.shares.upload(bytemuck::cast_slice(shares))?;
+        if let Some(arrivals) = &self.arrivals {
+            let room = self.learned.cell_count() * ARRIVAL_DIRECTIONS;
+            arrivals.upload_counted(
+                &state.pending_arrivals[..state.pending_arrivals.len().min(room)],
+            )?;
+        }
         let wanted = &state.wanted[..state.wanted.len().min(self.wanted_slots)];
         self.wanted.upload(bytemuck::cast_slice(wanted))?;
         self.upload()?;
@@ -452,6 +501,9 @@ impl GuideBuffers {
         commands.fill_start(&self.counts, COUNT_BYTES * used as u64, 0);
         let used = self.learned.cell_count() * SHARE_WORDS;
         commands.fill_start(&self.shares, 4 * used as u64, 0);
+        if let Some(arrivals) = &self.arrivals {
+            arrivals.record_clear(&mut commands, self.learned.cell_count());
+        }
         commands.fill(&self.wanted, GUIDE_NO_KEY);
         commands.submit_and_wait()?;
         Ok(())
@@ -459,7 +511,10 @@ impl GuideBuffers {
 
     fn upload(&mut self) -> Result<()> {
         self.learned.write_snapshot(&self.partition, &self.options, &mut self.snapshot);
-        let Snapshot { table, entries } = &self.snapshot;
+        if let Some(arrivals) = &self.arrivals {
+            arrivals.upload(&self.snapshot)?;
+        }
+        let Snapshot { table, entries, .. } = &self.snapshot;
         self.table.upload(bytemuck::cast_slice(table))?;
         if self.uses_likely {
             let likely: Vec<LikelyRegion> = entries
@@ -485,8 +540,10 @@ impl GuideBuffers {
             &self.wanted,
             &self.targets,
             &self.likely,
+            &self.path_cells,
         ]
         .into_iter()
+        .chain(self.arrivals.iter().flat_map(ArrivalBuffers::buffers))
         .map(|buffer| (buffer.name().to_owned(), buffer.size()))
         .collect()
     }

@@ -1,5 +1,6 @@
 //! Progressive rendering of a scene on a device: scene → buffers → waves of paths → film sums.
 
+mod arrival_buffers;
 mod candidates;
 mod film_buffers;
 mod guide_buffers;
@@ -25,7 +26,7 @@ use crate::{
 };
 use candidates::Choice;
 use film_buffers::FilmBuffers;
-pub use guide_buffers::GuideBuffers;
+pub use guide_buffers::{GuideBuffers, GuideSize};
 use guide_buffers::{SPLIT_AFTER, guide_schedule};
 pub use guided_pixel::{CellLevel, GuidedRay, RecordedCell, RecordedGuide, RecordedRegion};
 pub use lobe_buffers::LobeBuffers;
@@ -143,8 +144,13 @@ impl Renderer {
             WaveBuffers::new(device, film.padded_pixels(), rays, lobe_room(&settings, window))?;
         let guide = (settings.sampler == Sampler::Guided)
             .then(|| {
-                let rays = u64::from(waves.capacity()) * u64::from(rays);
-                GuideBuffers::new(device, scene, &settings.parameters, film.padded_pixels(), rays)
+                let size = GuideSize {
+                    pixels: film.padded_pixels(),
+                    paths: waves.capacity(),
+                    shadow_rays: rays,
+                    has_bounces: settings.parameters.guides_bounces(settings.depth),
+                };
+                GuideBuffers::new(device, scene, &settings.parameters, size)
             })
             .transpose()?;
         let mut renderer = Self {

@@ -1,0 +1,55 @@
+// A next direction of a path: what bounce.comp and bounce_guided.comp have in common. Needs
+// NEEDS_PARAMETERS, NEEDS_WAVE, NEEDS_RAYS, WRITES_RAYS, NEEDS_HITS, NEEDS_PATHS, WRITES_PATHS,
+// NEEDS_MATERIAL_TEXELS and NEEDS_GEOMETRY.
+
+#ifndef BOUNCE_GLSL
+#define BOUNCE_GLSL
+
+#include "layout.glsl"
+#include "frame.glsl"
+#include "random.glsl"
+#include "wave.glsl"
+#include "brdf.glsl"
+#include "bvh.glsl"
+
+// First vertex at which a path may be ended by russian roulette.
+layout(constant_id = CONSTANT_ROULETTE_VERTEX) const uint ROULETTE_VERTEX = 8u;
+
+// What the throughput is multiplied by if a path goes on in a direction from the BRDF's own sampling:
+// BRDF * cosine / density; 0 below the shading or the geometric horizon.
+vec3 bounce_factor(
+    Hit hit, Material material, vec3 outgoing_local, vec3 incident_local, vec3 direction) {
+    vec3 factor = vec3(0.0);
+    if (incident_local.z > 0.0 && dot(direction, hit.geometric_normal) > 0.0) {
+        vec3 value;
+        float pdf;
+        brdf_evaluate_and_pdf(material, outgoing_local, incident_local, value, pdf);
+        factor = pdf > 0.0 ? value * (incident_local.z / pdf) : vec3(0.0);
+    }
+    return factor;
+}
+
+// Sends a path on, or ends it where it would bring nothing or roulette says so. Returns whether it
+// goes on.
+bool follow_bounce(uint path, PathIndex index, Hit hit, vec3 direction, vec3 factor) {
+    PathState state = paths[path];
+    vec3 throughput = state.throughput * factor;
+    float strongest = max(throughput.r, max(throughput.g, throughput.b));
+    if (wave.vertex + 1u >= ROULETTE_VERTEX && strongest > 0.0) {
+        float survival = min(1.0, strongest);
+        float u_roulette = random_1d(
+            index.pixel, index.sample_index, vertex_dimension() + DIMENSION_ROULETTE, wave.seed);
+        throughput = u_roulette < survival ? throughput / survival : vec3(0.0);
+        strongest = u_roulette < survival ? strongest : 0.0;
+    }
+    bool alive = strongest > 0.0;
+    state.throughput = throughput;
+    state.rays_traced += alive ? 1u : 0u;
+    paths[path] = state;
+    rays[path] = Ray(
+        offset_ray_origin(hit.position, hit.geometric_normal, direction), alive ? 1u : 0u,
+        direction, 0u);
+    return alive;
+}
+
+#endif

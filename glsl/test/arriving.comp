@@ -1,0 +1,22 @@
+// Probe of arriving.glsl: a direction in, its index out.
+#version 460
+
+#include "arriving.glsl"
+
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+layout(scalar, set = SET_FILM, binding = 0) readonly buffer Inputs {
+    vec3 inputs[];
+};
+layout(scalar, set = SET_FILM, binding = 1) writeonly buffer Outputs {
+    uint outputs[];
+};
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index < uint(inputs.length())) {
+        outputs[index] = arrival_direction(inputs[index]);
+    }
+}

@@ -1,0 +1,405 @@
+//! Bounces of the sampler `guided`: what they are drawn by, that they bring what the BRDF reflects whatever
+//! the cells believe, and what they teach.
+//!
+//! Seeds are fixed; another would raise a false alarm once in some hundred runs.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+#[path = "support/materials.rs"]
+mod materials;
+mod support;
+
+use fenestra::{
+    brdf::{self, MaterialTables},
+    film::Sums,
+    frame::frame_from_normal,
+    gpu::{
+        Buffer, Commands, DescriptorSet, Pipeline,
+        constants::{CONSTANT_BOUNCE_CANDIDATES, CONSTANT_MATERIAL_KINDS, SET_FILM},
+        layout::{PathState, Ray, Wave},
+        shaders,
+    },
+    guide::{ARRIVAL_DIRECTIONS, FACE_COUNT, GuideState, Learned, arrival_direction},
+    random::{hash_4d, random_2d, random_independent_2d},
+    renderer::{GuideBuffers, GuideSize, Renderer, SceneBuffers, Settings, WaveBuffers, window_of},
+    sampler::{Parameters, Sampler},
+    scene::{Material, Scene, material::MaterialKind},
+};
+use glam::{Vec3, vec3};
+use support::{scenes, statistics};
+
+const ARRIVING_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/arriving.spv"));
+
+/// Pixels and samples of the paths before one surface.
+const PIXELS: u32 = 1024;
+const SAMPLES: u32 = 32;
+
+fn guided(depth: u32) -> Settings {
+    let parameters = Parameters { candidates: Some(1), ..Parameters::default() };
+    Settings { sampler: Sampler::Guided, depth, parameters, ..Settings::default() }
+}
+
+#[test]
+fn the_shader_tells_directions_apart_as_the_host_does() {
+    let mut directions: Vec<Vec3> = (0..20_000)
+        .map(|number| uniform_direction(random_independent_2d(number, 0, 0, 1)))
+        .collect();
+    directions.extend([Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z]);
+    let input: Vec<[f32; 3]> = directions.iter().map(|direction| direction.to_array()).collect();
+    let count = directions.len();
+    let output = support::run_probe(
+        ARRIVING_PROBE,
+        &[(SET_FILM, 0, bytemuck::cast_slice(&input))],
+        4 * count,
+        count as u32,
+    );
+    let output: &[u32] = bytemuck::cast_slice(&output);
+    let mut seen = [0_u32; ARRIVAL_DIRECTIONS];
+    let mut differing = 0;
+    for (direction, shader) in directions.iter().zip(output) {
+        let host = arrival_direction(*direction);
+        seen[host] += 1;
+        differing += u32::from(host != *shader as usize);
+    }
+    // Where two of them meet, rounding decides.
+    assert!(differing <= 4, "{differing} of {count} differ");
+    let mean = count as u32 / ARRIVAL_DIRECTIONS as u32;
+    assert!(seen.iter().all(|seen| (mean / 4..3 * mean).contains(seen)), "{seen:?}");
+}
+
+/// A floor with one material, and paths before it.
+struct Floor {
+    scene: Scene,
+    normal: Vec3,
+    outgoing: Vec3,
+}
+
+fn floors() -> Vec<(&'static str, Floor)> {
+    let table = materials::synthetic_table(vec3(0.3, 0.2, 0.1), 0.3);
+    let measured = Material {
+        name: "measured".into(),
+        kind: MaterialKind::Measured { path: "synthetic".into(), table },
+    };
+    let floor = |material, normal: Vec3, outgoing: Vec3| Floor {
+        scene: scenes::room(vec![material]),
+        normal: normal.normalize(),
+        outgoing: outgoing.normalize(),
+    };
+    vec![
+        ("diffuse", floor(scenes::diffuse(vec3(0.7, 0.5, 0.3)), Vec3::Y, vec3(0.3, 0.8, 0.1))),
+        ("plastic", floor(scenes::plastic(0.3), vec3(0.1, 1.0, -0.2), vec3(0.9, 0.5, 0.1))),
+        ("copper", floor(scenes::copper(0.4), vec3(0.0, 1.0, 0.1), vec3(-0.3, 0.8, 0.4))),
+        ("measured", floor(measured, Vec3::Y, vec3(0.2, 0.7, -0.5))),
+    ]
+}
+
+/// Light by direction as a guide may believe it: a few directions bring a lot, most next to nothing.
+fn belief(direction: usize) -> f32 {
+    let [x, ..] = hash_4d([direction as u32, 5, 6, 7]);
+    if x % 8 == 0 { 1.0 } else { 0.001 * (x >> 16) as f32 / 65536.0 }
+}
+
+/// What passes read of beliefs like these in every cell.
+fn arriving() -> (GuideState, Vec<f32>) {
+    let words = |cell_direction: usize| {
+        let light = 1e6 * belief(cell_direction % ARRIVAL_DIRECTIONS);
+        [1e6_f32.to_bits(), light.to_bits()]
+    };
+    let words: Vec<[u32; 2]> = (0..FACE_COUNT * ARRIVAL_DIRECTIONS).map(words).collect();
+    let scene = scenes::room(vec![scenes::diffuse(Vec3::splat(0.5))]);
+    let partition = fenestra::guide::Partition::new(&scene.environment, 256);
+    let learned = Learned::new(256, FACE_COUNT, 8).with_bounces(&words, 1);
+    let snapshot = learned.snapshot(&partition, &fenestra::guide::EstimateOptions::default());
+    let read = snapshot.arriving[2 * ARRIVAL_DIRECTIONS..][..ARRIVAL_DIRECTIONS].to_vec();
+    (GuideState { arrivals: words, ..GuideState::default() }, read)
+}
+
+/// Direction and throughput of the paths after a bounce off the floor with these beliefs.
+fn bounce(floor: &Floor, candidates: u32, beliefs: &GuideState) -> Vec<(Vec3, Vec3)> {
+    let device = support::device();
+    let scene = &floor.scene;
+    let buffers = SceneBuffers::new(device, scene, window_of(&Settings::default(), scene)).unwrap();
+    let paths = PIXELS * SAMPLES;
+    // Room for the cells of faces only.
+    let parameters = Parameters { guide_memory: 1, ..Parameters::default() };
+    let size = GuideSize { pixels: PIXELS, paths, shadow_rays: 1, has_bounces: true };
+    let mut guide = GuideBuffers::new(device, scene, &parameters, size).unwrap();
+    let state = guide.state().unwrap();
+    guide.restore(&GuideState { arrivals: beliefs.arrivals.clone(), ..state }).unwrap();
+    let waves = WaveBuffers::new(device, PIXELS, 1, None).unwrap();
+    assert!(waves.capacity() >= paths);
+    let input = support::PathInput {
+        normal: floor.normal.into(),
+        material: 0,
+        outgoing: floor.outgoing.into(),
+        shadow_direction: [0.0, 1.0, 0.0],
+        is_visible: 1,
+    };
+    let input = Buffer::from_slice(device, "paths", &vec![input; paths as usize]).unwrap();
+    let film = DescriptorSet::new(device, SET_FILM, &[(0, &input)]).unwrap();
+    let states = vec![PathState { throughput: [1.0; 3], ..PathState::default() }; paths as usize];
+    waves.buffer("paths").unwrap().upload(bytemuck::cast_slice(&states)).unwrap();
+
+    let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_state.spv"));
+    let put = Pipeline::new(device, "product_state", spirv, &[]).unwrap();
+    let kinds = (CONSTANT_MATERIAL_KINDS, buffers.material_kinds());
+    let create = |name: &str, constants: &[(u32, u32)]| {
+        Pipeline::new(device, name, shaders::pass(name), constants).unwrap()
+    };
+    let sample = create("sample_guided", &[kinds]);
+    let bounce = create("bounce_guided", &[kinds, (CONSTANT_BOUNCE_CANDIDATES, candidates)]);
+    let wave = Wave {
+        pixel_count: PIXELS,
+        sample_count: SAMPLES,
+        shadow_ray_count: 1,
+        total_shadow_rays: 1,
+        epoch_seed: 0xb0c + candidates,
+        ..Wave::default()
+    };
+    let sets = [buffers.set(), guide.set(), waves.set()];
+    let push = bytemuck::bytes_of(&wave);
+    let mut commands = Commands::begin(device).unwrap();
+    commands.dispatch(&put, &[waves.set(), &film], &[], paths);
+    // Finds the cell.
+    commands.dispatch(&sample, &sets, push, paths);
+    commands.dispatch(&bounce, &sets, push, paths);
+    commands.submit_and_wait().unwrap();
+    let rays: Vec<Ray> = waves.buffer("rays").unwrap().download(paths as usize).unwrap();
+    let states: Vec<PathState> = waves.buffer("paths").unwrap().download(paths as usize).unwrap();
+    support::assert_silent();
+    rays.iter()
+        .zip(&states)
+        .map(|(ray, state)| (Vec3::from(ray.direction), Vec3::from(state.throughput)))
+        .collect()
+}
+
+/// Chance of every direction to be the one that is kept, by the host: over all random numbers, the chance
+/// of each candidate. One more for candidates below the horizon, where paths end.
+fn chances(floor: &Floor, candidates: u32, light: &[f32]) -> Vec<f64> {
+    let tables = MaterialTables::new(&floor.scene.materials).unwrap();
+    let frame = frame_from_normal(floor.normal);
+    let outgoing_local = frame.to_local(floor.outgoing);
+    let rotation = vec3(1.0 / candidates as f32, 0.618_034, 0.754_878);
+    let mut chances = vec![0.0; ARRIVAL_DIRECTIONS + 1];
+    let count = 1 << 17;
+    for number in 0..count {
+        let [x, y] = random_2d(0, number, 0, 9);
+        let [z, _] = random_2d(0, number, 1, 9);
+        let mut u = vec3(x, y, z);
+        let mut drawn = Vec::new();
+        for _ in 0..candidates {
+            let incident_local = brdf::sample(&tables, 0, outgoing_local, u);
+            let direction = arrival_direction(frame.to_world(incident_local));
+            let is_above = incident_local.z > 0.0;
+            let bin = if is_above { direction } else { ARRIVAL_DIRECTIONS };
+            drawn.push((bin, f64::from(light[direction])));
+            u = (u + rotation).fract();
+        }
+        let sum: f64 = drawn.iter().map(|(_, light)| light).sum();
+        for (bin, light) in drawn {
+            chances[bin] += light / sum / f64::from(count);
+        }
+    }
+    chances
+}
+
+/// BRDF · cosine over every direction, red.
+fn reflected(floor: &Floor) -> Vec<f64> {
+    let tables = MaterialTables::new(&floor.scene.materials).unwrap();
+    let frame = frame_from_normal(floor.normal);
+    let outgoing_local = frame.to_local(floor.outgoing);
+    let mut reflected = vec![0.0; ARRIVAL_DIRECTIONS];
+    let count = 1 << 20;
+    for number in 0..count {
+        let direction = uniform_direction(random_2d(1, number, 0, 9));
+        let incident_local = frame.to_local(direction);
+        if incident_local.z > 0.0 {
+            let (value, _) = brdf::evaluate_and_pdf(&tables, 0, outgoing_local, incident_local);
+            reflected[arrival_direction(direction)] +=
+                f64::from(value.x * incident_local.z) * 4.0 * std::f64::consts::PI
+                    / f64::from(count);
+        }
+    }
+    reflected
+}
+
+/// Uniform over the sphere, from two numbers in [0, 1).
+fn uniform_direction([x, y]: [f32; 2]) -> Vec3 {
+    let height = 1.0 - 2.0 * y;
+    let (sin, cos) = (2.0 * std::f32::consts::PI * x).sin_cos();
+    let radius = (1.0 - height * height).max(0.0).sqrt();
+    vec3(radius * cos, height, radius * sin)
+}
+
+/// The directions that are kept have the chances that the host computes, and bring in the mean what the
+/// BRDF reflects, direction by direction, although seven in eight directions are believed dark.
+#[test]
+fn bounces_bring_what_the_brdf_reflects() {
+    let _alone = support::alone();
+    let (beliefs, light) = arriving();
+    for (name, floor) in floors() {
+        let expected = reflected(&floor);
+        for candidates in [2, 4, 8] {
+            let bounces = bounce(&floor, candidates, &beliefs);
+            let mut counts = vec![0.0; ARRIVAL_DIRECTIONS + 1];
+            let mut sums = vec![[0.0; 2]; ARRIVAL_DIRECTIONS];
+            for (direction, throughput) in &bounces {
+                let red = f64::from(throughput.x);
+                let is_above = direction.dot(floor.normal) > 0.0;
+                let direction = arrival_direction(*direction);
+                counts[if is_above { direction } else { ARRIVAL_DIRECTIONS }] += 1.0;
+                sums[direction][0] += red;
+                sums[direction][1] += red * red;
+            }
+            let p = statistics::chi_square_p_value(&counts, &chances(&floor, candidates, &light));
+            let alike = vec![1.0; ARRIVAL_DIRECTIONS];
+            let unguided = chances(&floor, candidates, &alike);
+            let wrong = statistics::chi_square_p_value(&counts, &unguided);
+            let count = bounces.len() as f64;
+            let mut worst = 0.0_f64;
+            let mut biased = 0.0_f64;
+            for (bin, (sum, expected)) in sums.iter().zip(&expected).enumerate() {
+                if *expected < 1e-3 {
+                    continue;
+                }
+                let mean = sum[0] / count;
+                let error = ((sum[1] / count - mean * mean) / count).sqrt();
+                worst = worst.max((mean - expected).abs() / error.max(1e-3 * expected));
+                // What would come out if the choice were not divided by its chance.
+                let wrong = counts[bin] / count * expected / unguided[bin].max(1e-9);
+                biased = biased.max((wrong - expected).abs() / error.max(1e-3 * expected));
+            }
+            eprintln!("{name}, {candidates}: p {p:.3}, {wrong:.1e}; |z| {worst:.2}, {biased:.1}");
+            assert!(p > 1e-4 && wrong < 1e-9, "{name}, {candidates}: p = {p}, unguided {wrong}");
+            assert!(worst < 5.5 && biased > 10.0, "{name}, {candidates}: {worst}, {biased}");
+        }
+    }
+}
+
+fn block_means(sums: &Sums) -> Vec<f64> {
+    let blocks_per_row = sums.width / 8;
+    let mut means = vec![0.0; (blocks_per_row * (sums.height / 8)) as usize];
+    for pixel in 0..sums.pixel_count() {
+        let (x, y) = (pixel as u32 % sums.width, pixel as u32 / sums.width);
+        let block = (y / 8 * blocks_per_row + x / 8) as usize;
+        means[block] += sums.mean(pixel).iter().sum::<f64>() / 192.0;
+    }
+    means
+}
+
+/// Images agree with those of unguided bounces where the cells believe anything at all, from nothing
+/// learned on, and with as many candidates as there may be.
+#[test]
+fn images_are_those_of_unguided_bounces() {
+    let _alone = support::alone();
+    let scene = scenes::mixed_room();
+    let replicates = |candidates: u32, beliefs: Option<&GuideState>, samples: u32| {
+        let mut settings = guided(4);
+        settings.parameters.bounce_candidates = candidates;
+        let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
+        let rows: Vec<Vec<f64>> = (0..16)
+            .map(|seed| {
+                renderer.restart(500 + seed).unwrap();
+                if let Some(beliefs) = beliefs {
+                    renderer.restore_guide(beliefs).unwrap();
+                }
+                renderer.render_pass(samples).unwrap();
+                block_means(&renderer.sums().unwrap())
+            })
+            .collect();
+        support::assert_silent();
+        (0..rows[0].len()).map(|block| rows.iter().map(|row| row[block]).collect()).collect()
+    };
+    let reference: Vec<Vec<f64>> = replicates(1, None, 64);
+    let mut taught = Renderer::new(support::device(), &scene, guided(4)).unwrap();
+    taught.render_pass(4).unwrap();
+    let mut beliefs = taught.guide_state().unwrap().unwrap();
+    for (index, words) in beliefs.arrivals.iter_mut().enumerate() {
+        // Another belief in every cell.
+        *words = [1e4_f32.to_bits(), (1e4 * belief(index)).to_bits()];
+    }
+    for (name, candidates, beliefs) in
+        [("4", 4, None), ("16", 16, None), ("4, misled", 4, Some(&beliefs))]
+    {
+        let values: Vec<Vec<f64>> = replicates(candidates, beliefs, 32);
+        let mut worst = 0.0_f64;
+        for (values, reference) in values.iter().zip(&reference) {
+            let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+            let variance = |values: &[f64]| {
+                let mean = mean(values);
+                let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+                squares / (values.len() * (values.len() - 1)) as f64
+            };
+            let error = (variance(values) + variance(reference)).sqrt();
+            worst = worst.max((mean(values) - mean(reference)).abs() / error);
+        }
+        eprintln!("{name}: |t| {worst:.2}");
+        assert!(worst < 6.0, "{name}: |t| = {worst}");
+    }
+}
+
+/// Every bounce ray teaches the cell it left, and what it finds is what the cell there reflects.
+#[test]
+fn every_bounce_teaches() {
+    let _alone = support::alone();
+    let scene = scenes::mixed_room();
+    let mut renderer = Renderer::new(support::device(), &scene, guided(3)).unwrap();
+    renderer.render_pass(2).unwrap();
+    let before = renderer.totals().bounce_rays;
+    // After a rebuild.
+    renderer.render_pass(1).unwrap();
+    let rays = renderer.totals().bounce_rays - before;
+    let state = renderer.guide_state().unwrap().unwrap();
+    let counted = |words: &[[u32; 2]]| -> [u64; 2] {
+        words.iter().fold([0; 2], |sum, [rays, light]| {
+            [sum[0] + u64::from(*rays), sum[1] + u64::from(*light)]
+        })
+    };
+    let [found, light] = counted(&state.pending_arrivals);
+    assert!(rays > 500, "{rays}");
+    assert_eq!(found, rays);
+    // In units of which the cells of this room reflect 64 in the mean.
+    assert!((4.0..400.0).contains(&(light as f64 / found as f64)), "{light} of {found} rays");
+    // Where bounces are not guided nothing is kept.
+    for (depth, candidates) in [(1, 4), (3, 1)] {
+        let mut settings = guided(depth);
+        settings.parameters.bounce_candidates = candidates;
+        let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
+        renderer.render_pass(3).unwrap();
+        let state = renderer.guide_state().unwrap().unwrap();
+        assert!(state.arrivals.is_empty() && state.pending_arrivals.is_empty());
+    }
+    support::assert_silent();
+}
+
+/// What was taught goes on with a render that another continues, to the bit, and into another depth.
+#[test]
+fn what_bounces_taught_is_kept() {
+    let _alone = support::alone();
+    let scene = scenes::mixed_room();
+    let renderer = |depth| Renderer::new(support::device(), &scene, guided(depth)).unwrap();
+    let mut whole = renderer(3);
+    whole.render_pass(21).unwrap();
+    for stop in [3, 19] {
+        let mut first = renderer(3);
+        first.render_pass(stop).unwrap();
+        let (sums, state) = (first.sums().unwrap(), first.guide_state().unwrap().unwrap());
+        assert!(state.arrivals.iter().any(|words| *words != [0; 2]));
+        let mut second = renderer(3);
+        second.restore(&sums).unwrap();
+        second.restore_guide(&state).unwrap();
+        second.render_pass(21 - stop).unwrap();
+        assert!(second.sums().unwrap() == whole.sums().unwrap(), "after {stop}");
+        let mut direct = renderer(1);
+        direct.restore_guide(&state).unwrap();
+        direct.render_pass(1).unwrap();
+    }
+    // A guide of direct light knows nothing of bounces.
+    let mut direct = renderer(1);
+    direct.render_pass(4).unwrap();
+    let state = direct.guide_state().unwrap().unwrap();
+    let mut deep = renderer(3);
+    deep.restore_guide(&state).unwrap();
+    deep.render_pass(2).unwrap();
+    assert!(!deep.guide_state().unwrap().unwrap().pending_arrivals.is_empty());
+    support::assert_silent();
+}
