@@ -237,10 +237,13 @@ impl Measured {
 fn costs_of(measured: &BTreeMap<u32, Measured>, pixels: u32) -> Vec<CandidateCost> {
     let spreads: Vec<&Spread> = measured.values().map(|measured| &measured.spread).collect();
     let variances = relative_variances(&spreads).unwrap_or_default();
-    let cost = |((candidates, measured), variance): ((&u32, &Measured), f64)| CandidateCost {
-        candidates: *candidates,
-        ms_per_sample: measured.ms_per_path.unwrap_or(f64::NAN) * f64::from(pixels),
-        relative_variance: variance,
+    let cost = |((candidates, measured), (variance, error)): ((&u32, &Measured), (f64, f64))| {
+        CandidateCost {
+            candidates: *candidates,
+            ms_per_sample: measured.ms_per_path.unwrap_or(f64::NAN) * f64::from(pixels),
+            relative_variance: variance,
+            log_variance_error: error,
+        }
     };
     measured.iter().zip(variances).map(cost).collect()
 }

@@ -14,9 +14,12 @@ use crate::error::Result;
 /// Numbers of candidates that `guided` can choose a shadow ray from.
 pub const GUIDED_CANDIDATES: [u32; 3] = [1, 4, 8];
 
-/// More candidates must lower variance × time to this share of what fewer have, so that the choice
-/// does not turn on the noise of the measurement.
+/// More candidates must lower variance × time to this share of what fewer have to be worth a change, and
+/// that by so many standard errors of the logarithm: few samples of pixels with rare bright ones say little.
 const CLEAR_GAIN: f64 = 0.9;
+const CONFIDENCE: f64 = 2.0;
+/// Standard error where nothing is known of it: no gain is clear. Finite, since files cannot hold infinities.
+const UNKNOWN_ERROR: f64 = 1e3;
 /// At this multiple they are not worth another look.
 const CLEAR_LOSS: f64 = 1.4;
 
@@ -30,14 +33,19 @@ pub struct CandidateCost {
     /// Variance of a pixel's samples relative to the squared mean around it, geometric mean over
     /// blocks of pixels.
     pub relative_variance: f64,
+    /// Standard error, by the spread over the blocks, of the logarithm of that over the variance of the fewest
+    /// candidates that were measured; 0 for these, 1000 where there is only one block.
+    pub log_variance_error: f64,
 }
 
 impl fmt::Display for CandidateCost {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { candidates, ms_per_sample, relative_variance } = self;
+        let Self { candidates, ms_per_sample, relative_variance, log_variance_error } = self;
+        let percent = 100.0 * log_variance_error;
         write!(
             formatter,
-            "{candidates}: {ms_per_sample:.2} ms a sample, relative variance {relative_variance:.3}"
+            "{candidates}: {ms_per_sample:.2} ms a sample, relative variance {relative_variance:.3} \
+             (±{percent:.0}%)"
         )
     }
 }
@@ -58,7 +66,8 @@ pub fn choose(costs: &[CandidateCost]) -> u32 {
     assert!(!costs.is_empty(), "something was measured");
     let mut chosen = &costs[0];
     for more in &costs[1..] {
-        if more.variance_time() < CLEAR_GAIN * chosen.variance_time() {
+        let at_most = more.variance_time() * (CONFIDENCE * more.log_variance_error).exp();
+        if at_most < CLEAR_GAIN * chosen.variance_time() {
             chosen = more;
         }
     }
@@ -146,12 +155,12 @@ impl Spread {
 }
 
 /// Relative variance of each of the spreads over the same pixels: geometric mean over the blocks
-/// where all of them vary, each relative to the mean over all of them. Blocks without a shadow ray
+/// where all of them vary, each relative to the mean over all of them; with it the standard error of its
+/// logarithm against the first, 1000 where there is only one block. Blocks without a shadow ray
 /// have none, since no choice of directions changes them; `None` where no block is left.
-pub fn relative_variances(spreads: &[&Spread]) -> Option<Vec<f64>> {
+pub fn relative_variances(spreads: &[&Spread]) -> Option<Vec<(f64, f64)>> {
     let block_count = spreads.iter().map(|spread| spread.blocks.len()).min().unwrap_or(0);
-    let mut logarithms = vec![0.0; spreads.len()];
-    let mut used = 0.0;
+    let mut logarithms = vec![Vec::new(); spreads.len()];
     for index in 0..block_count {
         let blocks = || spreads.iter().map(|spread| &spread.blocks[index]);
         let count: f64 = blocks().map(|block| block.count).sum();
@@ -162,13 +171,25 @@ pub fn relative_variances(spreads: &[&Spread]) -> Option<Vec<f64>> {
         {
             continue;
         }
-        used += 1.0;
-        for (logarithm, block) in logarithms.iter_mut().zip(blocks()) {
+        for (logarithms, block) in logarithms.iter_mut().zip(blocks()) {
             let variance = block.squared_deviations / block.degrees_of_freedom;
-            *logarithm += (variance / (mean * mean)).ln();
+            logarithms.push((variance / (mean * mean)).ln());
         }
     }
-    (used > 0.0).then(|| logarithms.into_iter().map(|sum| (sum / used).exp()).collect())
+    let first = logarithms.first().filter(|first| !first.is_empty())?;
+    let count = first.len() as f64;
+    let of_spread = |logarithms: &Vec<f64>| {
+        let mean = logarithms.iter().sum::<f64>() / count;
+        let differences = || logarithms.iter().zip(first).map(|(more, fewer)| more - fewer);
+        let difference = differences().sum::<f64>() / count;
+        let squares: f64 = differences().map(|value| (value - difference).powi(2)).sum();
+        let error =
+            if count > 1.0 { (squares / (count - 1.0) / count).sqrt() } else { UNKNOWN_ERROR };
+        (mean.exp(), error)
+    };
+    let mut variances: Vec<(f64, f64)> = logarithms.iter().map(of_spread).collect();
+    variances[0].1 = 0.0;
+    Some(variances)
 }
 
 #[cfg(test)]
@@ -178,11 +199,11 @@ mod tests {
     use super::*;
 
     fn cost(candidates: u32, ms_per_sample: f64, relative_variance: f64) -> CandidateCost {
-        CandidateCost { candidates, ms_per_sample, relative_variance }
+        CandidateCost { candidates, ms_per_sample, relative_variance, log_variance_error: 0.0 }
     }
 
     fn variances(spreads: &[&Spread]) -> Vec<f64> {
-        relative_variances(spreads).unwrap()
+        relative_variances(spreads).unwrap().into_iter().map(|(variance, _)| variance).collect()
     }
 
     #[test]
@@ -199,6 +220,41 @@ mod tests {
         assert_eq!(choose(&[four[0], four[1], cost(8, 2.6, 1.8)]), 4);
         assert_eq!(choose(&[four[0], four[1], cost(8, 2.4, 1.5)]), 8);
         assert_eq!(choose(&four[..1]), 1);
+    }
+
+    #[test]
+    fn a_gain_within_the_noise_is_none() {
+        let choice = |error: f64| {
+            let four = CandidateCost { log_variance_error: error, ..cost(4, 2.2, 2.0) };
+            choose(&[cost(1, 2.0, 3.0), four])
+        };
+        // ln(0.9 · 6 / 4.4) is 0.205.
+        assert_eq!((choice(0.10), choice(0.11)), (4, 1));
+        assert_eq!(choice(UNKNOWN_ERROR), 1);
+        assert_eq!(choice(f64::NAN), 1);
+    }
+
+    #[test]
+    fn the_error_is_that_of_the_difference_by_blocks() {
+        let (mut one, mut four) = (Spread::default(), Spread::default());
+        let pair = |deviation: f64| [1.0 - deviation, 1.0 + deviation];
+        // Variances of 1, 4 and 16 against the same, half and a quarter of it.
+        for (block, (deviation, root)) in
+            [(0.1, 1.0), (0.2, 0.5_f64.sqrt()), (0.4, 0.5)].into_iter().enumerate()
+        {
+            one.add(block, &pair(deviation), true);
+            four.add(block, &pair(deviation * root), true);
+            if block == 0 {
+                let lone = relative_variances(&[&one, &four]).unwrap();
+                assert_eq!((lone[0].1, lone[1].1), (0.0, UNKNOWN_ERROR), "one block says nothing");
+            }
+        }
+        let both = relative_variances(&[&one, &four]).unwrap();
+        assert_eq!(both[0].1, 0.0);
+        // Logarithms differ by 0, ln 2 and 2 ln 2: a deviation of ln 2.
+        let expected = 2.0_f64.ln() / 3.0_f64.sqrt();
+        assert!((both[1].1 / expected - 1.0).abs() < 1e-9, "{both:?}");
+        assert!((both[0].0 / both[1].0 - 2.0).abs() < 1e-9, "{both:?}");
     }
 
     #[test]
@@ -286,6 +342,7 @@ mod tests {
         one.add(3, &[1.0, 3.0], true);
         four.add(3, &[1.5, 2.5], true);
         let both = variances(&[&one, &four]);
-        assert!((both[0] - 0.5).abs() < 1e-12 && (both[1] - 0.125).abs() < 1e-12, "{both:?}");
+        let [one, four] = [both[0], both[1]];
+        assert!((one - 0.5).abs() < 1e-12 && (four - 0.125).abs() < 1e-12, "{both:?}");
     }
 }
