@@ -107,10 +107,10 @@ impl ArrivingLight {
     /// Adds what one stretch of passes counted by light in units of `unit`; what was found before counts
     /// half from now on, since it was learned from cells that knew less.
     pub fn add(&mut self, found: &[ArrivalWords], unit: f32) {
-        for (arrivals, [rays, units]) in self.arrivals.iter_mut().zip(found) {
+        self.arrivals.par_iter_mut().zip(found).for_each(|(arrivals, [rays, units])| {
             arrivals.rays = 0.5 * arrivals.rays + *rays as f32;
             arrivals.light = 0.5 * arrivals.light + *units as f32 * unit;
-        }
+        });
     }
 
     /// Light by cell and direction, relative to the mean over the directions of the cell, and what the
@@ -122,45 +122,56 @@ impl ArrivingLight {
         hierarchy: bool,
         of_environment: &[f32],
     ) -> (Vec<f32>, Reflected) {
-        let directions = |cell: usize| cell * ARRIVAL_DIRECTIONS..(cell + 1) * ARRIVAL_DIRECTIONS;
-        let mut sums = self.arrivals.clone();
+        let own = |cell: usize| &self.arrivals[cell * ARRIVAL_DIRECTIONS..][..ARRIVAL_DIRECTIONS];
+        // Of the cells that others are parts of: what was found in both, and the mean light.
+        let mut sums: Vec<Vec<Arrivals>> = vec![Vec::new(); tree.parents.len()];
         for generation in tree.generations.iter().rev() {
-            for &cell in generation {
+            let sum = |&cell: &usize| {
+                let mut sum = own(cell).to_vec();
                 for &part in &tree.parts[cell] {
-                    for (of_cell, of_part) in directions(cell).zip(directions(part)) {
-                        let found = sums[of_part];
-                        sums[of_cell].add(found);
-                    }
+                    let of_part = if sums[part].is_empty() { own(part) } else { &sums[part] };
+                    sum.iter_mut().zip(of_part).for_each(|(sum, found)| sum.add(*found));
                 }
+                sum
+            };
+            let found: Vec<Vec<Arrivals>> = generation.par_iter().map(sum).collect();
+            for (cell, found) in generation.iter().zip(found) {
+                sums[*cell] = found;
             }
         }
         let mut scene = Arrivals::default();
-        for sum in &sums[..FACE_COUNT * ARRIVAL_DIRECTIONS] {
+        for sum in sums[..FACE_COUNT].iter().flatten() {
             scene.add(*sum);
         }
-        let scene = scene.light / scene.rays.max(1.0);
-        let mut light: Vec<f32> = sums.iter().map(|sum| sum.mean(scene)).collect();
-        for generation in tree.generations.iter().filter(|_| hierarchy) {
-            for &cell in generation {
-                for &part in &tree.parts[cell] {
-                    for (of_cell, of_part) in directions(cell).zip(directions(part)) {
-                        light[of_part] = sums[of_part].mean(light[of_cell]);
-                    }
-                }
+        let scene = [scene.light / scene.rays.max(1.0); ARRIVAL_DIRECTIONS];
+        let mut whole: Vec<Vec<f32>> = vec![Vec::new(); tree.parents.len()];
+        // What a cell leans on.
+        let around = |cell: usize| (hierarchy && cell >= FACE_COUNT).then(|| tree.parents[cell]);
+        for generation in &tree.generations {
+            let mean = |&cell: &usize| -> Vec<f32> {
+                let around = around(cell).map_or(&scene[..], |parent| &whole[parent]);
+                sums[cell].iter().zip(around).map(|(sum, prior)| sum.mean(*prior)).collect()
+            };
+            let means: Vec<Vec<f32>> = generation.par_iter().map(mean).collect();
+            for (cell, means) in generation.iter().zip(means) {
+                whole[*cell] = means;
             }
         }
-        let by_cell = light.par_chunks_mut(ARRIVAL_DIRECTIONS);
-        let by_cell = by_cell.zip(sums.par_chunks(ARRIVAL_DIRECTIONS)).zip(of_environment);
-        let reflected: Vec<f32> = by_cell
-            .map(|((light, sums), of_environment)| {
-                let rays: f32 = sums.iter().map(|sum| sum.rays).sum();
-                let arriving: f32 =
-                    sums.iter().zip(&*light).map(|(sum, mean)| sum.rays * mean).sum();
-                let arriving = if rays > 0.0 { arriving / rays } else { scene };
-                make_relative(light);
-                of_environment + REFLECTED_AGAIN * arriving
-            })
-            .collect();
+        let mut light = vec![0.0; self.arrivals.len()];
+        let mut reflected = of_environment.to_vec();
+        let by_cell = light.par_chunks_mut(ARRIVAL_DIRECTIONS).zip(&mut reflected).enumerate();
+        by_cell.for_each(|(cell, (light, reflected))| {
+            let sums = if sums[cell].is_empty() { own(cell) } else { &sums[cell] };
+            let around = around(cell).map_or(&scene[..], |parent| &whole[parent]);
+            let mut found = Arrivals::default();
+            for ((light, sum), prior) in light.iter_mut().zip(sums).zip(around) {
+                *light = sum.mean(*prior);
+                found.add(Arrivals { rays: sum.rays, light: sum.rays * *light });
+            }
+            let arriving = if found.rays > 0.0 { found.light / found.rays } else { scene[0] };
+            *reflected += REFLECTED_AGAIN * arriving;
+            make_relative(light);
+        });
         let mean = reflected.iter().sum::<f32>() / reflected.len() as f32;
         let unit = mean / MEAN_UNITS;
         let units = |light: &f32| (light / unit.max(f32::MIN_POSITIVE)).min(MOST_UNITS) as u32;

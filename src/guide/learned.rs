@@ -80,7 +80,7 @@ fn around<'a>(
 /// Which cells are parts of which.
 pub(super) struct Tree {
     /// Of every cell the one that it is a part of; faces are parts of themselves.
-    parents: Vec<usize>,
+    pub(super) parents: Vec<usize>,
     /// The parts of every cell.
     pub(super) parts: Vec<Vec<usize>>,
     /// The faces, those of their parts that have parts or may have, those of these, and so on.
