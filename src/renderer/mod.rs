@@ -4,6 +4,7 @@ mod arrival_buffers;
 mod candidates;
 mod film_buffers;
 mod guide_buffers;
+mod guide_room;
 mod guided_pixel;
 mod lobe_buffers;
 mod pixel;
