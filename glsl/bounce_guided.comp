@@ -1,7 +1,7 @@
 // Continues every path of the wave where light is known to arrive from: several directions are drawn
-// from the BRDF and one of them is kept, in proportion to what it reflects of the light that the cell
-// has learned for it (resampled importance sampling, Talbot et al. 2005). The others cost no ray. It
-// notes which cell and direction the ray will teach, for learn_arrivals.comp.
+// from the BRDF and one of them is kept, in proportion to the light that the cell has learned to arrive
+// from there (resampled importance sampling, Talbot et al. 2005). The others cost no ray and no
+// evaluation of the BRDF. It notes which cell and direction the ray will teach, for learn_arrivals.comp.
 #version 460
 
 #define NEEDS_PARAMETERS
