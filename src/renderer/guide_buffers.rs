@@ -54,6 +54,7 @@ pub const SPLIT_AFTER: u32 = 16;
 
 /// Regions that a render starts with.
 const FIRST_REGIONS: usize = 256;
+
 /// The first number of samples, not below `samples`, after which the guide is rebuilt: 1, 2, 3, 4, 6,
 /// 8, 12, 16, 32, 64, …
 pub fn guide_schedule(samples: u32) -> u32 {
