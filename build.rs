@@ -1,6 +1,6 @@
 //! Compiles `glsl/*.comp` and `glsl/test/*.comp` to SPIR-V and writes the table of shaders.
 
-#[path = "src/gpu/constants.rs"]
+#[path = "src/shader/constants.rs"]
 mod constants;
 
 use std::{
@@ -11,7 +11,7 @@ use std::{
 
 fn main() -> ExitCode {
     println!("cargo::rerun-if-changed=build.rs");
-    println!("cargo::rerun-if-changed=src/gpu/constants.rs");
+    println!("cargo::rerun-if-changed=src/shader/constants.rs");
     println!("cargo::rerun-if-changed=glsl");
     match compile_all() {
         Ok(()) => ExitCode::SUCCESS,

@@ -110,23 +110,21 @@
 //!   Conference on Geometric and Physical Modeling.
 
 pub mod accel;
-pub mod benchmark;
+pub mod bench;
 pub mod brdf;
-pub mod cache;
 pub mod cli;
 pub mod command;
 pub mod error;
+pub mod files;
 pub mod film;
 pub mod fit;
-pub mod frame;
 pub mod gpu;
-pub mod guide;
+pub mod math;
 pub mod pass;
-pub mod random;
-mod refinement;
 pub mod renderer;
 pub mod sampler;
 pub mod scene;
+pub mod shader;
 pub mod srbf;
 pub mod study;
 

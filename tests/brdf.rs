@@ -331,7 +331,7 @@ fn materials_that_share_a_table_share_its_words() {
 fn tables_beyond_one_buffer_are_refused_by_name() {
     use std::sync::Arc;
 
-    use fenestra::scene::material::MaterialKind;
+    use fenestra::brdf::material::MaterialKind;
     let original = &cases()[9].material;
     let materials: Vec<_> = (0..12)
         .map(|index| {

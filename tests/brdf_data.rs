@@ -9,10 +9,8 @@ use std::{
     sync::Arc,
 };
 
-use fenestra::{
-    brdf::{self, MaterialTables, MeasuredTable, table::LUMINANCE},
-    scene::{Material, material::MaterialKind},
-};
+use fenestra::brdf::{self, Material, MaterialTables, MeasuredTable, material::MaterialKind};
+use fenestra::math::colour::luminance;
 use glam::{DVec3, Vec3, dvec3};
 use rayon::prelude::*;
 
@@ -127,7 +125,7 @@ fn measured_materials_are_sampled_well() {
             let outgoing = direction(angle_deg.to_radians(), 0.3);
             let moments = integrate(outgoing, |incident| {
                 let (value, pdf) = brdf::evaluate_and_pdf(&tables, 0, outgoing, incident);
-                let reflected = f64::from(value.dot(LUMINANCE) * incident.z);
+                let reflected = f64::from(luminance(value) * incident.z);
                 let second =
                     if reflected > 0.0 { reflected * reflected / f64::from(pdf) } else { 0.0 };
                 dvec3(reflected, second, f64::from(pdf))

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     brdf,
-    gpu::constants::{
+    shader::constants::{
         BINDING_BRDF_CELLS, BINDING_BRDF_TABLE, BINDING_MATERIALS, MATERIAL_MEASURED, SET_FILM,
         SET_SCENE,
     },

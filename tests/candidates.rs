@@ -9,9 +9,8 @@ mod support;
 use command::Folder;
 use fenestra::{
     film::{Attribute, Image, Statistics, Sums},
-    guide::GuideState,
     renderer::{Renderer, Settings},
-    sampler::{GUIDED_CANDIDATES, Parameters, Sampler, choose},
+    sampler::{GUIDED_CANDIDATES, Parameters, Sampler, choose, guided::GuideState},
     scene::Scene,
 };
 use glam::Vec3;

@@ -4,8 +4,8 @@
 mod support;
 
 use fenestra::{
-    film::{Aov, Sums},
-    renderer::{Renderer, Settings, Window},
+    film::{Aov, Sums, Window},
+    renderer::{Renderer, Settings},
     sampler::{Parameters, Sampler},
     scene::Scene,
 };

@@ -6,16 +6,19 @@ mod support;
 use std::f64::consts::PI;
 
 use fenestra::{
-    frame::{direction_from_lat_long, lat_long_from_direction},
-    gpu::{
+    math::{
+        colour::luminance,
+        frame::{direction_from_lat_long, lat_long_from_direction},
+        random::{random_2d, random_independent_1d, random_independent_2d},
+    },
+    scene::environment::{EnvironmentMap, EnvironmentTables},
+    shader::{
         constants::{
             BINDING_ENVIRONMENT_CELLS, BINDING_ENVIRONMENT_ROWS, BINDING_ENVIRONMENT_TEXELS,
             BINDING_PARAMETERS, SET_FILM, SET_SCENE,
         },
-        layout::SceneParameters,
+        structs::SceneParameters,
     },
-    random::{random_2d, random_independent_1d, random_independent_2d},
-    scene::environment::{EnvironmentMap, EnvironmentTables, luminance},
 };
 use glam::{Vec2, Vec3};
 use support::statistics::chi_square_p_value;

@@ -10,10 +10,8 @@ use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage,
 };
 use fenestra::{
-    frame::direction_from_lat_long,
-    scene::environment::{
-        CourtParameters, EnvironmentMap, EnvironmentTables, SkyParameters, luminance,
-    },
+    math::{colour::luminance, frame::direction_from_lat_long},
+    scene::environment::{CourtParameters, EnvironmentMap, EnvironmentTables, SkyParameters},
 };
 use glam::{Vec2, Vec3};
 use tempfile::TempDir;

@@ -6,11 +6,14 @@
 use std::{collections::BTreeMap, fs, io, path::Path};
 
 use clap::ValueEnum;
-use fenestra::film::{
-    Aov, Attribute, Checkpoint, Image, Metadata, RgbImage, SampleRange, Sums,
-    checkpoint::checkpoint_path,
-    merge::{Part, merge_checkpoints, merge_images},
-    png, write_atomically,
+use fenestra::{
+    files::write_atomically,
+    film::{
+        Aov, Attribute, Checkpoint, Image, Metadata, RgbImage, SampleRange, Sums,
+        checkpoint::checkpoint_path,
+        merge::{Part, merge_checkpoints, merge_images},
+        png,
+    },
 };
 use io::Write;
 

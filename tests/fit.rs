@@ -6,16 +6,16 @@
 use std::{f32::consts::PI, fs, path::Path, sync::Arc};
 
 use fenestra::{
-    brdf::{MaterialTables, MeasuredTable},
+    brdf::{
+        Material, MaterialTables, MeasuredTable,
+        material::{ConductorFresnel, MaterialKind},
+    },
     fit::{
         BrdfFit, BrdfOptions, Cache, EnvironmentFit, EnvironmentOptions, Fit, Method, brdf_lobes,
         config, describe, environment_lobes, read_fit, write_fit,
     },
-    frame::direction_from_lat_long,
-    scene::{
-        EnvironmentMap, Material,
-        material::{ConductorFresnel, MaterialKind},
-    },
+    math::frame::direction_from_lat_long,
+    scene::EnvironmentMap,
     srbf::{Lobe, Mixture, lobe_integral},
 };
 use glam::{Vec2, Vec3};
@@ -140,7 +140,7 @@ fn errors_are_those_of_the_lobes() {
     let target = sunny(512);
     let fit = fit_map(&target, 20, Method::Em);
     let mixture = Mixture { lobes: fit.lobes.iter().map(|lobe| lobe.lobe()).collect() };
-    let luminance = fenestra::scene::environment::luminance;
+    let luminance = fenestra::math::colour::luminance;
     // Twice as fine as the map, bilinear as the renderer looks it up.
     let (width, height) = (2048_u32, 1024_u32);
     let (mut energy, mut square, mut divergence) = (0.0_f64, 0.0_f64, 0.0_f64);

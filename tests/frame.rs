@@ -4,9 +4,11 @@
 mod support;
 
 use fenestra::{
-    frame::{direction_from_lat_long, frame_from_normal, lat_long_from_direction, sin_cos_pi},
-    gpu::constants::SET_FILM,
-    random::random_independent_2d,
+    math::{
+        frame::{direction_from_lat_long, frame_from_normal, lat_long_from_direction, sin_cos_pi},
+        random::random_independent_2d,
+    },
+    shader::constants::SET_FILM,
 };
 use glam::{Vec2, Vec3};
 

@@ -5,16 +5,16 @@
 mod support;
 
 use fenestra::{
-    gpu::constants::{
-        BINDING_GUIDE_ARRIVALS, BINDING_GUIDE_COUNTS, BINDING_GUIDE_SHARES, GUIDE_NO_KEY,
-        GUIDE_REFINED, GUIDE_RESPONSE_UNITS, SET_SRBF,
-    },
-    guide::{
+    math::random::{hash_4d, random_independent_2d},
+    sampler::guided::{
         ARRIVAL_DIRECTIONS, CellKey, EstimateOptions, FACE_COUNT, GuideState, Learned,
         PARENT_COUNT, Partition, decode_entry, decode_visibility, likely_regions,
     },
-    random::{hash_4d, random_independent_2d},
     scene::environment::{EnvironmentMap, EnvironmentTables},
+    shader::constants::{
+        BINDING_GUIDE_ARRIVALS, BINDING_GUIDE_COUNTS, BINDING_GUIDE_SHARES, GUIDE_NO_KEY,
+        GUIDE_REFINED, GUIDE_RESPONSE_UNITS, SET_SRBF,
+    },
 };
 use glam::Vec3;
 use support::{scenes, statistics::chi_square_p_value};
@@ -54,7 +54,7 @@ fn regions_are_nested_rectangles_that_fill_the_map() {
         }
     }
     assert!(covered.iter().all(|count| *count == 1), "every cell lies in one region");
-    let sum = |value: &dyn Fn(&fenestra::guide::Region) -> f64| -> f64 {
+    let sum = |value: &dyn Fn(&fenestra::sampler::guided::Region) -> f64| -> f64 {
         fine.regions.iter().map(value).sum()
     };
     assert!((sum(&|region| region.share) - 1.0).abs() < 1e-12);
@@ -735,7 +735,7 @@ fn feedback_inside_a_pass_would_be_caught() {
         ("learn", [true, true, false]),
         ("learn_arrivals", [false, false, true]),
     ] {
-        let spirv = fenestra::gpu::shaders::pass(name);
+        let spirv = fenestra::shader::spirv::pass(name);
         assert_eq!(counted.map(|binding| binds(spirv, SET_SRBF, binding)), expected, "{name}");
     }
 }
@@ -761,7 +761,7 @@ fn cells_learn_where_light_arrives_from() {
     let options = EstimateOptions::default();
     let before = learned.snapshot(&partition, &options);
     assert!(before.arriving.iter().all(|light| *light == 1.0), "nothing is known");
-    let reflected = |snapshot: &fenestra::guide::Snapshot, cell: usize| {
+    let reflected = |snapshot: &fenestra::sampler::guided::Snapshot, cell: usize| {
         snapshot.reflected.units[cell] as f32 * snapshot.reflected.unit
     };
     assert!(reflected(&before, far) > 20.0 * reflected(&before, bright));

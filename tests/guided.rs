@@ -9,11 +9,13 @@ mod support;
 
 use fenestra::{
     film::Sums,
-    gpu::constants::{GUIDE_COUNT_WORDS, GUIDE_RESPONSE_UNITS},
-    guide::{CellKey, FACE_COUNT, PARTS_PER_RAY, Partition, SHARE_WORDS, face_normal},
     renderer::{Renderer, Settings},
-    sampler::{Parameters, Sampler, Weights},
+    sampler::{
+        Parameters, Sampler, Weights,
+        guided::{CellKey, FACE_COUNT, PARTS_PER_RAY, Partition, SHARE_WORDS, face_normal},
+    },
     scene::Scene,
+    shader::constants::{GUIDE_COUNT_WORDS, GUIDE_RESPONSE_UNITS},
 };
 use glam::Vec3;
 use support::scenes;

@@ -9,20 +9,24 @@ mod materials;
 mod support;
 
 use fenestra::{
-    brdf::{self, MaterialTables},
+    brdf::{self, Material, MaterialTables, material::MaterialKind},
     film::Sums,
-    frame::frame_from_normal,
-    gpu::{
-        Buffer, Commands, DescriptorSet, Pipeline,
-        constants::{CONSTANT_BOUNCE_CANDIDATES, CONSTANT_MATERIAL_KINDS, SET_FILM},
-        layout::{PathState, Ray, Wave},
-        shaders,
+    gpu::{Buffer, Commands, DescriptorSet, Pipeline},
+    math::{
+        frame::frame_from_normal,
+        random::{hash_4d, random_2d, random_independent_2d},
     },
-    guide::{ARRIVAL_DIRECTIONS, FACE_COUNT, GuideState, Learned, arrival_direction},
-    random::{hash_4d, random_2d, random_independent_2d},
     renderer::{GuideBuffers, GuideSize, Renderer, SceneBuffers, Settings, WaveBuffers, window_of},
-    sampler::{Parameters, Sampler},
-    scene::{Material, Scene, material::MaterialKind},
+    sampler::{
+        Parameters, Sampler,
+        guided::{ARRIVAL_DIRECTIONS, FACE_COUNT, GuideState, Learned, arrival_direction},
+    },
+    scene::Scene,
+    shader::{
+        constants::{CONSTANT_BOUNCE_CANDIDATES, CONSTANT_MATERIAL_KINDS, SET_FILM},
+        spirv,
+        structs::{PathState, Ray, Wave},
+    },
 };
 use glam::{Vec3, vec3};
 use support::{scenes, statistics};
@@ -106,9 +110,10 @@ fn arriving() -> (GuideState, Vec<f32>) {
     };
     let words: Vec<[u32; 2]> = (0..FACE_COUNT * ARRIVAL_DIRECTIONS).map(words).collect();
     let scene = scenes::room(vec![scenes::diffuse(Vec3::splat(0.5))]);
-    let partition = fenestra::guide::Partition::new(&scene.environment, 256);
+    let partition = fenestra::sampler::guided::Partition::new(&scene.environment, 256);
     let learned = Learned::new(256, FACE_COUNT, 8).with_bounces(&words, 1);
-    let snapshot = learned.snapshot(&partition, &fenestra::guide::EstimateOptions::default());
+    let snapshot =
+        learned.snapshot(&partition, &fenestra::sampler::guided::EstimateOptions::default());
     let read = snapshot.arriving[2 * ARRIVAL_DIRECTIONS..][..ARRIVAL_DIRECTIONS].to_vec();
     (GuideState { arrivals: words, ..GuideState::default() }, read)
 }
@@ -143,7 +148,7 @@ fn bounce(floor: &Floor, candidates: u32, beliefs: &GuideState) -> Vec<(Vec3, Ve
     let put = Pipeline::new(device, "product_state", spirv, &[]).unwrap();
     let kinds = (CONSTANT_MATERIAL_KINDS, buffers.material_kinds());
     let create = |name: &str, constants: &[(u32, u32)]| {
-        Pipeline::new(device, name, shaders::pass(name), constants).unwrap()
+        Pipeline::new(device, name, spirv::pass(name), constants).unwrap()
     };
     let sample = create("sample_guided", &[kinds]);
     let bounce = create("bounce_guided", &[kinds, (CONSTANT_BOUNCE_CANDIDATES, candidates)]);

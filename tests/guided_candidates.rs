@@ -16,18 +16,18 @@ use std::f64::consts::PI;
 
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
-    gpu::{
-        Buffer, Commands, DescriptorSet, Pipeline,
+    brdf::{Material, material::MaterialKind},
+    gpu::{Buffer, Commands, DescriptorSet, Pipeline},
+    renderer::{GuideBuffers, GuideSize, Renderer, SceneBuffers, Settings, WaveBuffers, window_of},
+    sampler::{Parameters, Sampler, Weights, guided::GuideState},
+    scene::Scene,
+    shader::{
         constants::{
             CONSTANT_BRDF_CANDIDATES, CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS,
             CONSTANT_PRODUCT_WEIGHTS, SET_FILM,
         },
-        layout::Wave,
+        structs::Wave,
     },
-    guide::GuideState,
-    renderer::{GuideBuffers, GuideSize, Renderer, SceneBuffers, Settings, WaveBuffers, window_of},
-    sampler::{Parameters, Sampler, Weights},
-    scene::{Material, Scene, material::MaterialKind},
 };
 use glam::{DVec3, Vec3, dvec3, vec3};
 use support::{scenes, statistics};

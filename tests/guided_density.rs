@@ -15,11 +15,12 @@ mod support;
 use std::f64::consts::PI;
 
 use fenestra::{
-    brdf::{self, MaterialTables},
-    frame::{Frame, frame_from_normal},
-    renderer::{GuidedRay, RecordedCell, RecordedGuide, Renderer, Settings, Window},
+    brdf::{self, Material, MaterialTables, material::MaterialKind},
+    film::Window,
+    math::frame::{Frame, frame_from_normal},
+    renderer::{GuidedRay, RecordedCell, RecordedGuide, Renderer, Settings},
     sampler::{Parameters, Sampler, Weights},
-    scene::{Material, Scene, environment::EnvironmentTables, material::MaterialKind},
+    scene::{Scene, environment::EnvironmentTables},
 };
 use glam::{Vec3, vec3};
 use support::{scenes, statistics};

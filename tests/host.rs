@@ -3,10 +3,12 @@
 
 mod support;
 
-use fenestra::gpu::{
-    Buffer, Commands, DescriptorSet, Pipeline,
-    constants::SET_FILM,
-    device::{Capabilities, choose},
+use fenestra::{
+    gpu::{
+        Buffer, Commands, DescriptorSet, Pipeline,
+        device::{Capabilities, choose},
+    },
+    shader::constants::SET_FILM,
 };
 
 const PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/probe.spv"));

@@ -8,9 +8,11 @@ use std::collections::BTreeMap;
 
 use fenestra::{
     film::{Aov, Sums},
-    guide::{CellKey, FACE_COUNT, face_normal},
     renderer::{Renderer, Settings, Totals},
-    sampler::{Parameters, Sampler},
+    sampler::{
+        Parameters, Sampler,
+        guided::{CellKey, FACE_COUNT, face_normal},
+    },
     scene::Scene,
 };
 use glam::Vec3;

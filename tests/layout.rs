@@ -1,5 +1,5 @@
 //! Host and shaders agree on every struct and binding they share: what `build.rs` compiled is read
-//! back, and each struct of `src/gpu/layout.rs` compared with it member for member.
+//! back, and each struct of `src/shader/structs.rs` compared with it member for member.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
@@ -12,11 +12,13 @@ use std::{
 };
 
 use bytemuck::Zeroable;
-use fenestra::gpu::{
-    constants::{self, SET_FILM},
-    descriptors::SET_BINDING_COUNTS,
-    layout,
-    shaders::PASSES,
+use fenestra::{
+    gpu::descriptors::SET_BINDING_COUNTS,
+    shader::{
+        constants::{self, SET_FILM},
+        spirv::PASSES,
+        structs,
+    },
 };
 
 /// One member on either side; `kind` is the name of the Rust type.
@@ -27,7 +29,7 @@ struct Member {
     kind: String,
 }
 
-/// A struct of `src/gpu/layout.rs`.
+/// A struct of `src/shader/structs.rs`.
 struct HostStruct {
     name: &'static str,
     size: usize,
@@ -39,14 +41,14 @@ struct HostStruct {
 macro_rules! host_structs {
     ($($name:ident { $($member:ident),* $(,)? })*) => {
         vec![$({
-            let value = layout::$name::zeroed();
-            let layout::$name { $($member: _),* } = value;
+            let value = structs::$name::zeroed();
+            let structs::$name { $($member: _),* } = value;
             HostStruct {
                 name: stringify!($name),
-                size: size_of::<layout::$name>(),
+                size: size_of::<structs::$name>(),
                 members: vec![$(Member {
                     name: stringify!($member).into(),
-                    offset: offset_of!(layout::$name, $member),
+                    offset: offset_of!(structs::$name, $member),
                     kind: type_name_of_val(&value.$member).into(),
                 }),*],
             }
@@ -199,7 +201,7 @@ impl Module {
                     self.member_offsets[&(id, index as u32)] as usize + self.rust_type(*kind).1
                 };
                 let size = members.iter().enumerate().map(end).max().unwrap_or(0);
-                (format!("fenestra::gpu::layout::{}", self.name(id)), size)
+                (format!("fenestra::shader::structs::{}", self.name(id)), size)
             }
             _ => (format!("no type that can be shared (id {id})"), 0),
         }
@@ -280,7 +282,7 @@ fn drifts(module: &Module, is_pass: bool, used: &mut BTreeSet<&'static str>) -> 
                 drifts.push(format!("{name}: host {} bytes, shader {size}", host.size));
             }
         } else if is_pass {
-            drifts.push(format!("{name}: not in src/gpu/layout.rs"));
+            drifts.push(format!("{name}: not in src/shader/structs.rs"));
         }
     }
     for (array, stride) in &module.array_strides {
@@ -323,13 +325,13 @@ fn shaders() -> Vec<(String, bool, Vec<u32>)> {
 
 #[test]
 fn every_struct_of_the_host_is_listed() {
-    let source = include_str!("../src/gpu/layout.rs");
+    let source = include_str!("../src/shader/structs.rs");
     let declared: BTreeSet<&str> = source
         .lines()
         .filter_map(|line| line.strip_prefix("pub struct ")?.split([' ', '<', '(', '{']).next())
         .collect();
     let listed: BTreeSet<&str> = host_structs().iter().map(|host| host.name).collect();
-    assert_eq!(declared, listed, "the list in tests/layout.rs and src/gpu/layout.rs differ");
+    assert_eq!(declared, listed, "the list in tests/layout.rs and src/shader/structs.rs differ");
 }
 
 #[test]
@@ -395,7 +397,7 @@ fn a_planted_drift_is_found() {
     let stride = words.windows(4).position(|w| w[0] == (4 << 16 | 71) && w[2] == 6 && w[3] == 48);
     let mut strided = words.clone();
     strided[stride.expect("hits lie in an array") + 3] = 64;
-    let kind = "fenestra::gpu::layout::Hit";
+    let kind = "fenestra::shader::structs::Hit";
     assert_eq!(drifts_of(&strided), [format!("array of {kind}: host stride 48, shader 64")]);
 }
 

@@ -16,19 +16,20 @@ use std::f64::consts::PI;
 
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
-    gpu::{
-        Buffer, Commands, DescriptorSet, Pipeline,
+    brdf::{Material, material::MaterialKind},
+    gpu::{Buffer, Commands, DescriptorSet, Pipeline},
+    pass::Lobes,
+    renderer::{LobeBuffers, LobeRoom, SceneBuffers, Settings, WaveBuffers, window_of},
+    sampler::{LobeOrder, LobeParameters, Sampler, Threshold},
+    scene::Scene,
+    shader::{
         constants::{
             BINDING_COUNTERS, CONSTANT_BRDF_SHARE, CONSTANT_CACHE_CAPACITY, CONSTANT_COUNT_VISIBLE,
             CONSTANT_ENVIRONMENT_SHARE, CONSTANT_FIXED_THRESHOLD, CONSTANT_KEPT_LOBES,
             CONSTANT_THRESHOLD_SCALE, CONSTANT_VISIBILITY_EXPONENT, SET_FILM,
         },
-        layout::{Counters, Wave},
+        structs::{Counters, Wave},
     },
-    pass::Lobes,
-    renderer::{LobeBuffers, LobeRoom, SceneBuffers, Settings, WaveBuffers, window_of},
-    sampler::{LobeOrder, LobeParameters, Sampler, Threshold},
-    scene::{Material, Scene, material::MaterialKind},
     srbf::kernel_deviation,
 };
 use glam::{DVec3, Vec3, dvec3, vec3};

@@ -3,8 +3,8 @@
 mod support;
 
 use fenestra::{
-    gpu::constants::SET_FILM,
-    random::{random_1d, random_2d, random_independent_1d, random_independent_2d},
+    math::random::{random_1d, random_2d, random_independent_1d, random_independent_2d},
+    shader::constants::SET_FILM,
 };
 use support::statistics::{chi_square_p_value, z_p_value};
 
@@ -184,7 +184,7 @@ const RANDOM_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/rando
 fn the_shader_draws_the_same_numbers_bit_for_bit() {
     let mut keys: Vec<[u32; 4]> = Vec::new();
     for i in 0..20_000_u32 {
-        keys.push(fenestra::random::hash_4d([i, 1, 2, 3]));
+        keys.push(fenestra::math::random::hash_4d([i, 1, 2, 3]));
         keys.push([i % 640, i, i % 37, 1]);
     }
     keys.push([u32::MAX; 4]);

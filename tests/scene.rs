@@ -6,11 +6,8 @@ use std::path::{Path, PathBuf};
 
 use fenestra::{
     Error,
-    scene::{
-        Scene,
-        material::{ConductorFresnel, MaterialKind},
-        mesh::Mesh,
-    },
+    brdf::material::{ConductorFresnel, MaterialKind},
+    scene::{Scene, mesh::Mesh},
 };
 use glam::Vec3;
 use tempfile::TempDir;

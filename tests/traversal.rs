@@ -8,12 +8,12 @@ mod support;
 
 use fenestra::{
     accel::Accel,
-    gpu::{
-        constants::NO_MATERIAL,
-        layout::{Hit, Ray, ShadowRay},
-    },
     pass::geometry::Schedule,
     scene::Geometry,
+    shader::{
+        constants::NO_MATERIAL,
+        structs::{Hit, Ray, ShadowRay},
+    },
 };
 use glam::{DVec3, Quat, Vec3};
 use obvhs::{

@@ -11,10 +11,10 @@ mod support;
 use std::{path::Path, sync::Arc};
 
 use fenestra::{
-    brdf::MeasuredTable,
+    brdf::{Material, MeasuredTable, material::MaterialKind},
     renderer::{Renderer, Settings},
     sampler::Sampler,
-    scene::{Material, Scene, material::MaterialKind},
+    scene::Scene,
 };
 use glam::Vec3;
 use support::scenes;

@@ -10,7 +10,6 @@
 //! twin of the shader's traversal over the very same arrays.
 
 mod binary;
-pub mod normal;
 pub mod traverse;
 
 use bytemuck::{Pod, Zeroable};
@@ -20,17 +19,16 @@ use obvhs::{
     cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh, node::CwBvhNode},
 };
 
+use crate::math::octahedron;
+use crate::scene::geometry::MAX_COORDINATE;
 use crate::{
     error::{Error, Result},
-    gpu::constants::{BVH_STACK_ENTRIES, FLAT_NORMAL},
     scene::Geometry,
+    shader::constants::{BVH_STACK_ENTRIES, FLAT_NORMAL},
 };
 
 /// Pages (buffers) the triangles may be spread over, bindings `BINDING_TRIANGLES_0` to `_3`.
 pub const MAX_TRIANGLE_PAGES: usize = 4;
-
-/// Largest magnitude of a coordinate, metres; products of four coordinates stay finite in `f32`.
-pub const MAX_COORDINATE: f32 = 1e9;
 
 /// A node as the shader reads it: five `uvec4`.
 pub type Node = [u32; 20];
@@ -41,7 +39,7 @@ pub type Node = [u32; 20];
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct TriangleRecord {
-    /// Position, metres, and normal ([`normal::pack`]; [`FLAT_NORMAL`] for a flat triangle).
+    /// Position, metres, and normal ([`octahedron::pack`]; [`FLAT_NORMAL`] for a flat triangle).
     pub vertices: [VertexRecord; 3],
 }
 
@@ -263,7 +261,7 @@ fn record(geometry: &Geometry, triangle: u32) -> TriangleRecord {
     let flat = !normals.iter().all(|normal| normal.length_squared() > 0.25);
     let vertices = [0, 1, 2].map(|corner| VertexRecord {
         position: geometry.positions[indices[corner] as usize],
-        normal: if flat { FLAT_NORMAL } else { normal::pack(normals[corner]) },
+        normal: if flat { FLAT_NORMAL } else { octahedron::pack(normals[corner]) },
     });
     TriangleRecord { vertices }
 }

@@ -4,10 +4,11 @@
 
 use glam::{UVec2, Vec3};
 
-use super::{Accel, Node, TriangleRecord, VertexRecord, normal};
+use super::{Accel, Node, TriangleRecord, VertexRecord};
+use crate::math::octahedron;
 use crate::{
-    frame::{Frame, frame_from_normal},
-    gpu::constants::{BVH_STACK_ENTRIES, FLAT_NORMAL},
+    math::frame::{Frame, frame_from_normal},
+    shader::constants::{BVH_STACK_ENTRIES, FLAT_NORMAL},
 };
 
 /// What a ray meets first.
@@ -89,7 +90,7 @@ impl Accel {
         let geometric_normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
         let mut shading_normal = geometric_normal;
         if vertices[0].normal != FLAT_NORMAL {
-            let [a, b, c] = vertices.map(|vertex: VertexRecord| normal::unpack(vertex.normal));
+            let [a, b, c] = vertices.map(|vertex: VertexRecord| octahedron::unpack(vertex.normal));
             let interpolated = weights.x * a + weights.y * b + weights.z * c;
             if interpolated.length_squared() > 1e-12 {
                 let unit = interpolated.normalize();

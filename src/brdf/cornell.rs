@@ -27,7 +27,7 @@ use crate::{
         twin,
     },
     error::{Error, Result},
-    gpu::constants::*,
+    shader::constants::*,
 };
 
 /// Largest count of wavelengths that is believed.

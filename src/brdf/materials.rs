@@ -5,14 +5,15 @@ use std::{collections::HashMap, sync::Arc};
 use glam::{Vec3, vec2, vec3};
 use rayon::prelude::*;
 
+use crate::math::colour::luminance;
 use crate::{
-    brdf::{table::LUMINANCE, twin},
-    error::{Error, Result},
-    gpu::{constants::*, layout},
-    scene::{
+    brdf::{
         Material,
         material::{ConductorFresnel, MaterialKind},
+        twin,
     },
+    error::{Error, Result},
+    shader::{constants::*, structs},
 };
 
 /// Smallest GGX width: below it, single-precision directions cannot resolve the lobe.
@@ -25,7 +26,7 @@ pub const LARGEST_TABLE_BYTES: usize = 128 << 20;
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialTables {
     /// One per material of the scene, in its order.
-    pub materials: Vec<layout::Material>,
+    pub materials: Vec<structs::Material>,
     /// Words of the tables at the offsets that the materials hold; never empty.
     pub words: Vec<u32>,
 }
@@ -39,7 +40,7 @@ impl MaterialTables {
         let mut tables = Self { materials: Vec::with_capacity(materials.len()), words: vec![0] };
         let mut measured_offsets = HashMap::new();
         for material in materials {
-            let mut converted = layout::Material::default();
+            let mut converted = structs::Material::default();
             let mut words = Vec::new();
             match &material.kind {
                 MaterialKind::Diffuse { reflectance } => {
@@ -184,7 +185,7 @@ fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
     let normalisation = (1.0 / (1.0 - mean).max(1e-6).sqrt()) as f32;
     let albedo = coat.iter().map(|&e| Vec3::splat(e) + diffuse * (1.0 - e));
     let specular_share = coat.iter().map(|&e| {
-        let base = diffuse.dot(LUMINANCE) * (1.0 - e);
+        let base = luminance(diffuse) * (1.0 - e);
         if e + base > 0.0 { e / (e + base) } else { 0.5 }
     });
     albedo
@@ -196,7 +197,7 @@ fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
 }
 
 /// Words of a conductor: directional albedo.
-fn conductor_words(material: &layout::Material) -> Vec<u32> {
+fn conductor_words(material: &structs::Material) -> Vec<u32> {
     let fresnel = |cosine: f32| {
         if material.ior > 0.0 {
             twin::fresnel_conductor(cosine, material.eta.into(), material.k.into())

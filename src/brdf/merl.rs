@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::{
     brdf::table::{CELL_COUNT, MeasuredTable},
     error::{Error, Result},
-    gpu::constants::*,
+    shader::constants::*,
 };
 
 /// Bytes before the values: three little-endian 32-bit counts.

@@ -25,6 +25,7 @@
 //! for Physically-based Rendering".
 
 pub mod cornell;
+pub mod material;
 pub mod materials;
 pub mod merl;
 pub mod sanity;
@@ -35,6 +36,7 @@ pub mod twin;
 
 use glam::Vec3;
 
+pub use material::Material;
 pub use materials::MaterialTables;
 pub use table::MeasuredTable;
 

@@ -3,7 +3,7 @@
 //!
 //! Layout of the words: directional albedo, cosine shares, cumulative probabilities and densities
 //! of the sampling table, grid cells of two words; the offsets are `MEASURED_…_OFFSET` of
-//! [`constants`](crate::gpu::constants).
+//! [`constants`](crate::shader::constants).
 
 use std::{
     f32::consts::{FRAC_PI_2, PI},
@@ -23,7 +23,7 @@ use crate::{
         twin,
     },
     error::{Error, Result},
-    gpu::constants::*,
+    shader::constants::*,
 };
 
 /// Bins of θ_h as an index.
@@ -34,9 +34,6 @@ const THETA_DIFFERENCE: usize = MEASURED_THETA_DIFFERENCE_BINS as usize;
 const PHI_DIFFERENCE: usize = MEASURED_PHI_DIFFERENCE_BINS as usize;
 /// Cells of the grid.
 pub const CELL_COUNT: usize = THETA_HALF * THETA_DIFFERENCE * PHI_DIFFERENCE;
-
-/// Weights of linear Rec.709 in luminance.
-pub const LUMINANCE: Vec3 = vec3(0.2126, 0.7152, 0.0722);
 
 /// Isotropic measured BRDF on a grid of θ_h × θ_d × φ_d with its sampling table.
 #[derive(Clone, PartialEq)]

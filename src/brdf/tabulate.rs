@@ -6,10 +6,8 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use glam::{Vec3, vec3};
 use rayon::prelude::*;
 
-use crate::{
-    brdf::{table::LUMINANCE, twin},
-    gpu::constants::*,
-};
+use crate::math::colour::luminance;
+use crate::{brdf::twin, shader::constants::*};
 
 /// Sampling table of one bin of outgoing elevation.
 pub struct SamplingRow {
@@ -145,7 +143,7 @@ impl SamplingRow {
             let mut value = 0.0;
             if cosine_difference > 0.0 && incident.z > 0.0 {
                 let angles = twin::half_difference_angles(outgoing, incident);
-                value = twin::measured_value(words, 0, angles).dot(LUMINANCE) * incident.z;
+                value = luminance(twin::measured_value(words, 0, angles)) * incident.z;
             }
             points.push(QuadraturePoint {
                 value: f64::from(value),

@@ -7,7 +7,7 @@ use std::f32::consts::PI;
 use glam::{Vec2, Vec3, vec2, vec3};
 use half::f16;
 
-use crate::gpu::{constants::*, layout::Material};
+use crate::shader::{constants::*, structs::Material};
 
 /// Word of the BRDF table as a float.
 fn table_value(brdf_table: &[u32], index: u32) -> f32 {

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::{options::parse_size, print_line};
 use crate::{
     accel::Accel,
-    benchmark::{Plan, RayRate, Spread, measure},
+    bench::{Plan, RayRate, Spread, measure},
     error::{Error, Result},
     gpu::{Device, PassTimes},
     pass::geometry::triangle_page_bytes,

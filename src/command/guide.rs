@@ -4,9 +4,8 @@ use std::path::{Path, PathBuf};
 
 use crate::{
     error::{Error, Result},
-    guide::GuideState,
     renderer::Renderer,
-    sampler::Sampler,
+    sampler::{Sampler, guided::GuideState},
 };
 
 /// `image.checkpoint.exr` → `image.checkpoint.guide`.

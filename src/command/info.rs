@@ -10,13 +10,14 @@ use serde_json::{Value, json};
 use crate::{
     brdf::{
         MeasuredTable,
+        material::MaterialKind,
         sanity::{ELEVATIONS_DEG, Sanity},
     },
-    cache,
     error::{Error, Result},
+    files,
     film::{Attribute, Checkpoint, Image, summary::ChannelSummary},
     fit,
-    scene::{EnvironmentMap, Scene, material::MaterialKind},
+    scene::{EnvironmentMap, Scene},
 };
 
 /// Arguments of `info`.
@@ -94,7 +95,7 @@ fn installation() -> Report {
     let mut lines = vec![format!("Fenestra {}", env!("CARGO_PKG_VERSION"))];
     let mut caches = serde_json::Map::new();
     for kind in ["fits", "pipelines"] {
-        let Some(folder) = cache::folder(kind) else {
+        let Some(folder) = files::cache_folder(kind) else {
             lines.push(format!("cache of {kind}: none (neither XDG_CACHE_HOME nor HOME is set)"));
             continue;
         };

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::renderer::Window;
+use crate::film::Window;
 
 /// Parses `500ms`, `30s`, `5m`, `1h`, or plain seconds.
 ///

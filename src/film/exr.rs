@@ -26,8 +26,8 @@ use exr::{
     },
 };
 
-use super::write_atomically;
 use crate::error::{Error, Result};
+use crate::files::write_atomically;
 
 /// Primaries and white point of ITU-R BT.709 (red, green, blue, white; CIE x, y).
 const REC_709: Chromaticities = Chromaticities {

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
-use super::{exr::RgbImage, write_atomically};
+use super::exr::RgbImage;
 use crate::error::Result;
+use crate::files::write_atomically;
 
 /// sRGB transfer function (IEC 61966-2-1): linear 0…1 → display 0…1.
 pub fn srgb_from_linear(value: f32) -> f32 {

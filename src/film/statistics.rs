@@ -2,7 +2,8 @@
 
 use std::{collections::BTreeMap, io::Write, path::Path};
 
-use super::{metadata::SampleRange, write_atomically};
+use super::metadata::SampleRange;
+use crate::files::write_atomically;
 use crate::{error::Result, sampler::CandidateCost};
 
 /// Numbers of one render. Times are of this run only, also where it continued a checkpoint.

@@ -27,7 +27,7 @@ use super::{
 use crate::{
     brdf::{self, MaterialTables},
     error::{Error, Result},
-    scene::environment::luminance,
+    math::colour::luminance,
     srbf::Lobe,
 };
 

@@ -16,7 +16,7 @@ use sha2::{Digest, Sha256};
 use super::{brdf::BrdfFit, config, environment::EnvironmentFit};
 use crate::{
     error::{Error, Result},
-    film::write_atomically,
+    files::write_atomically,
 };
 
 /// Extension of fit files.
@@ -117,7 +117,7 @@ pub struct Cache {
 impl Cache {
     /// The user's cache, `fenestra/fits` in `$XDG_CACHE_HOME` or `~/.cache`; none where neither is set.
     pub fn user() -> Option<Self> {
-        crate::cache::folder("fits").map(Self::at)
+        crate::files::cache_folder("fits").map(Self::at)
     }
 
     /// A cache in a folder, which may not exist yet.

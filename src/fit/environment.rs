@@ -21,7 +21,8 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    scene::{EnvironmentMap, environment::luminance},
+    math::colour::luminance,
+    scene::EnvironmentMap,
     srbf::Lobe,
 };
 

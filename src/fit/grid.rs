@@ -7,9 +7,8 @@ use glam::{DVec3, Vec2, Vec3};
 
 use super::{config, points::Patch};
 use crate::{
-    frame::direction_from_lat_long,
-    refinement::Queued,
-    scene::{EnvironmentMap, environment::luminance},
+    math::{colour::luminance, frame::direction_from_lat_long, refinement::Queued},
+    scene::EnvironmentMap,
 };
 
 /// Narrowest grid: coarser maps are resampled, so that their bilinear slopes are seen.

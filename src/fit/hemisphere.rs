@@ -6,7 +6,7 @@ use std::{collections::BinaryHeap, f64::consts::PI};
 use glam::{DVec2, DVec3};
 
 use super::{config, points::Patch};
-use crate::refinement::Queued;
+use crate::math::refinement::Queued;
 
 /// Cells along each side of the square at the start.
 const FIRST_CELLS: u32 = 24;

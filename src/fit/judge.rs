@@ -14,7 +14,7 @@ use super::{
     grid::{Grid, STEEP_PARTS},
     hemisphere::HemisphereTarget,
 };
-use crate::{scene::environment::luminance, srbf::Lobe};
+use crate::{math::colour::luminance, srbf::Lobe};
 
 /// Error figures of a fit. With the target density p, the fit's density f (both per steradian, with
 /// the integral 1) and the target's values L against the fit's values F:

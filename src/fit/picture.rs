@@ -15,7 +15,8 @@ use crate::{
     brdf::{self, MaterialTables},
     error::Result,
     film::png::{display_from_linear, write_rgb8},
-    scene::{EnvironmentMap, environment::luminance},
+    math::colour::luminance,
+    scene::EnvironmentMap,
     srbf::{Mixture, kernel_value},
 };
 

@@ -5,10 +5,11 @@ use std::{collections::BTreeMap, sync::Arc, time::Duration};
 use ash::vk;
 
 use super::{
-    buffer::Buffer, constants::WORKGROUP_SIZE, descriptors::DescriptorSet, device::Device, labels,
-    pipeline::Pipeline, timestamps::Timestamps, vulkan_error,
+    buffer::Buffer, descriptors::DescriptorSet, device::Device, labels, pipeline::Pipeline,
+    timestamps::Timestamps, vulkan_error,
 };
 use crate::error::{Error, Result};
+use crate::shader::constants::WORKGROUP_SIZE;
 
 /// Longest wait for one submission; dispatches are sized to a tenth of a second.
 const SUBMISSION_TIMEOUT: Duration = Duration::from_secs(120);

@@ -9,8 +9,9 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::{buffer::Buffer, constants as c, device::Device, labels, vulkan_error};
+use super::{buffer::Buffer, device::Device, labels, vulkan_error};
 use crate::error::{Error, Result};
+use crate::shader::constants as c;
 
 /// Bindings of the four sets.
 pub const SET_BINDING_COUNTS: [u32; 4] = [14, 18, 16, 11];

@@ -4,14 +4,11 @@
 
 pub mod buffer;
 pub mod commands;
-pub mod constants;
 pub mod descriptors;
 pub mod device;
 pub mod instance;
 pub(crate) mod labels;
-pub mod layout;
 pub mod pipeline;
-pub mod shaders;
 pub(crate) mod timestamps;
 
 pub use buffer::Buffer;

@@ -6,11 +6,10 @@ use ash::vk;
 
 use super::{
     device::{Capabilities, Device},
-    labels,
-    shaders::used_sets,
-    vulkan_error,
+    labels, vulkan_error,
 };
-use crate::{cache, error::Result, film};
+use crate::shader::spirv::used_sets;
+use crate::{error::Result, files};
 
 /// A compute pipeline.
 pub struct Pipeline {
@@ -159,7 +158,7 @@ impl PipelineCache {
         };
         // SAFETY: the cache is alive.
         let data = unsafe { device.get_pipeline_cache_data(self.raw) }.unwrap_or_default();
-        let write = film::write_atomically(&path, |file| std::io::Write::write_all(file, &data));
+        let write = files::write_atomically(&path, |file| std::io::Write::write_all(file, &data));
         if let Err(error) = write {
             log::debug!("pipeline cache not written: {error}");
         }
@@ -176,5 +175,5 @@ impl PipelineCache {
 fn file(capabilities: &Capabilities) -> Option<PathBuf> {
     let identity: String =
         capabilities.pipeline_cache_uuid.iter().map(|byte| format!("{byte:02x}")).collect();
-    Some(cache::folder("pipelines")?.join(format!("{identity}.bin")))
+    Some(files::cache_folder("pipelines")?.join(format!("{identity}.bin")))
 }

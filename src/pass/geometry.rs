@@ -5,13 +5,11 @@ use std::sync::Arc;
 use crate::{
     accel::{Accel, MAX_TRIANGLE_PAGES, TriangleRecord},
     error::Result,
-    gpu::{
-        Buffer, Capabilities, Device,
-        constants::{
-            BINDING_BVH_NODES, BINDING_TRIANGLE_MATERIALS, BINDING_TRIANGLES_0,
-            CONSTANT_RAYS_PER_INVOCATION, CONSTANT_REFILL_LANES, CONSTANT_TRIANGLE_PAGE_SHIFT,
-            CONSTANT_TRIANGLE_PAGES, WORKGROUP_SIZE,
-        },
+    gpu::{Buffer, Capabilities, Device},
+    shader::constants::{
+        BINDING_BVH_NODES, BINDING_TRIANGLE_MATERIALS, BINDING_TRIANGLES_0,
+        CONSTANT_RAYS_PER_INVOCATION, CONSTANT_REFILL_LANES, CONSTANT_TRIANGLE_PAGE_SHIFT,
+        CONSTANT_TRIANGLE_PAGES, WORKGROUP_SIZE,
     },
 };
 

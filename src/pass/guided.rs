@@ -7,17 +7,17 @@ use std::{collections::BTreeMap, sync::Arc};
 use super::PassSettings;
 use crate::{
     error::Result,
-    gpu::{
-        Commands, DescriptorSet, Device, Pipeline,
+    gpu::{Commands, DescriptorSet, Device, Pipeline},
+    sampler::Weights,
+    shader::{
         constants::{
             CONSTANT_BOUNCE_CANDIDATES, CONSTANT_BRDF_CANDIDATES, CONSTANT_CANDIDATES,
             CONSTANT_MATERIAL_KINDS, CONSTANT_PRODUCT_WEIGHTS, CONSTANT_ROULETTE_VERTEX,
             GUIDE_SAMPLES_THAT_ALL_TEACH, GUIDE_TEACHING_STEP,
         },
-        layout::Wave,
-        shaders,
+        spirv,
+        structs::Wave,
     },
-    sampler::Weights,
 };
 
 /// The pipelines.
@@ -49,7 +49,7 @@ impl Guided {
     pub fn new(device: &Arc<Device>, candidates: u32, settings: &PassSettings) -> Result<Self> {
         let PassSettings { parameters, material_kinds, roulette_vertex, .. } = *settings;
         let create = |name: &str, constants: &[(u32, u32)]| {
-            Pipeline::new(device, name, shaders::pass(name), constants)
+            Pipeline::new(device, name, spirv::pass(name), constants)
         };
         let bounces = || -> Result<Bounces> {
             let constants = [
@@ -91,7 +91,7 @@ impl Guided {
                 (CONSTANT_PRODUCT_WEIGHTS, u32::from(self.weights == Weights::Product)),
             ];
             let name = "sample_guided";
-            let pipeline = Pipeline::new(&self.device, name, shaders::pass(name), &constants)?;
+            let pipeline = Pipeline::new(&self.device, name, spirv::pass(name), &constants)?;
             self.sample.insert(candidates, pipeline);
         }
         self.candidates = candidates;

@@ -6,8 +6,9 @@ use std::sync::Arc;
 
 use crate::{
     error::Result,
-    gpu::{
-        Commands, DescriptorSet, Device, Pipeline,
+    gpu::{Commands, DescriptorSet, Device, Pipeline},
+    sampler::{CacheScope, Elevation, LobeOrder, LobeParameters, Sampler, Threshold},
+    shader::{
         constants::{
             CONSTANT_BRDF_LOBES, CONSTANT_BRDF_SHARE, CONSTANT_CACHE_CAPACITY,
             CONSTANT_CACHE_OF_PIXEL, CONSTANT_COUNT_VISIBLE, CONSTANT_ENVIRONMENT_LOBES,
@@ -16,10 +17,9 @@ use crate::{
             CONSTANT_SAMPLER, CONSTANT_STRONGEST_ENVIRONMENT_LOBE, CONSTANT_THRESHOLD_SCALE,
             CONSTANT_VIEWS, CONSTANT_VISIBILITY_EXPONENT,
         },
-        layout::Wave,
-        shaders,
+        spirv,
+        structs::Wave,
     },
-    sampler::{CacheScope, Elevation, LobeOrder, LobeParameters, Sampler, Threshold},
 };
 
 /// Sizes of the fits on the device.
@@ -78,7 +78,7 @@ impl Lobes {
         ];
         let create = |name: &str, constants: &[(u32, u32)]| {
             let all: Vec<_> = shared_constants.iter().chain(constants).copied().collect();
-            Pipeline::new(device, name, shaders::pass(name), &all)
+            Pipeline::new(device, name, spirv::pass(name), &all)
         };
         let product = create(
             "product",

@@ -17,17 +17,17 @@ use std::{sync::Arc, time::Instant};
 
 use crate::{
     error::Result,
-    gpu::{
-        Commands, DescriptorSet, Device, PassTimes, Pipeline,
+    gpu::{Commands, DescriptorSet, Device, PassTimes, Pipeline},
+    sampler::{Parameters, Sampler},
+    shader::{
         constants::{
             AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, AOV_NORMAL, AOV_POSITION,
             CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS, CONSTANT_ROULETTE_VERTEX,
             CONSTANT_SAMPLER,
         },
-        layout::Wave,
-        shaders,
+        spirv,
+        structs::Wave,
     },
-    sampler::{Parameters, Sampler},
 };
 pub use geometry::{GeometryBuffers, Schedule};
 use guided::Guided;
@@ -110,7 +110,7 @@ impl Passes {
     ) -> Result<Self> {
         let incoherent = Schedule::incoherent(device.capabilities());
         let create = |name: &str, constants: &[(u32, u32)]| {
-            Pipeline::new(device, name, shaders::pass(name), constants)
+            Pipeline::new(device, name, spirv::pass(name), constants)
         };
         let candidates = settings.parameters.candidates_of(settings.sampler)?;
         let basic = match settings.sampler {

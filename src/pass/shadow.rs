@@ -5,7 +5,8 @@ use std::sync::Arc;
 use super::geometry::{GeometryBuffers, Schedule};
 use crate::{
     error::Result,
-    gpu::{Commands, DescriptorSet, Device, Pipeline, layout::Wave, shaders},
+    gpu::{Commands, DescriptorSet, Device, Pipeline},
+    shader::{spirv, structs::Wave},
 };
 
 /// The pass.
@@ -25,7 +26,7 @@ impl Shadow {
         schedule: Schedule,
     ) -> Result<Self> {
         let constants = geometry.constants(schedule);
-        let pipeline = Pipeline::new(device, "shadow", shaders::pass("shadow"), &constants)?;
+        let pipeline = Pipeline::new(device, "shadow", spirv::pass("shadow"), &constants)?;
         Ok(Self { pipeline, schedule })
     }
 

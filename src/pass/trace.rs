@@ -5,7 +5,8 @@ use std::sync::Arc;
 use super::geometry::{GeometryBuffers, Schedule};
 use crate::{
     error::Result,
-    gpu::{Commands, DescriptorSet, Device, Pipeline, layout::Wave, shaders},
+    gpu::{Commands, DescriptorSet, Device, Pipeline},
+    shader::{spirv, structs::Wave},
 };
 
 /// The pass.
@@ -26,7 +27,7 @@ impl Trace {
         schedule: Schedule,
     ) -> Result<Self> {
         let constants = geometry.constants(schedule);
-        let pipeline = Pipeline::new(device, "trace", shaders::pass("trace"), &constants)?;
+        let pipeline = Pipeline::new(device, "trace", spirv::pass("trace"), &constants)?;
         Ok(Self { pipeline, schedule })
     }
 

@@ -4,11 +4,9 @@ use std::sync::Arc;
 
 use crate::{
     error::Result,
-    gpu::{
-        Buffer, Commands, Device,
-        constants::{BINDING_GUIDE_ARRIVALS, BINDING_GUIDE_ARRIVING, BINDING_GUIDE_REFLECTED},
-    },
-    guide::{ARRIVAL_DIRECTIONS, ArrivalWords, Snapshot},
+    gpu::{Buffer, Commands, Device},
+    sampler::guided::{ARRIVAL_DIRECTIONS, ArrivalWords, Snapshot},
+    shader::constants::{BINDING_GUIDE_ARRIVALS, BINDING_GUIDE_ARRIVING, BINDING_GUIDE_REFLECTED},
 };
 
 /// Bytes of a cell: by direction the light and two words that are counted, and what it reflects.

@@ -10,15 +10,13 @@ use std::{collections::BTreeMap, time::Instant};
 use super::{Renderer, TRAINING_SEED, with_epoch};
 use crate::{
     error::Result,
-    gpu::{
-        Commands,
-        layout::{PathState, Wave},
-    },
+    gpu::Commands,
+    math::colour::luminance,
     sampler::{
         CandidateCost, GUIDED_CANDIDATES, Spread, climb, is_most_a_clear_loss, relative_variances,
         upper_median,
     },
-    scene::environment::luminance,
+    shader::structs::{PathState, Wave},
 };
 
 /// Tells the random numbers of measurements from those of the training and of the picture.

@@ -4,12 +4,13 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use bytemuck::Zeroable;
 
-use super::{BLOCK_PIXELS, Window};
+use super::BLOCK_PIXELS;
+use crate::film::Window;
 use crate::{
     error::Result,
     film::{Aov, Sums},
-    gpu::{
-        Buffer, Commands, DescriptorSet, Device,
+    gpu::{Buffer, Commands, DescriptorSet, Device},
+    shader::{
         constants::{
             AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, AOV_NORMAL, AOV_POSITION, AOV_VISIBLE,
             BINDING_COUNTERS, BINDING_FILM_ALBEDO, BINDING_FILM_CACHE_ENTRIES,
@@ -17,7 +18,7 @@ use crate::{
             BINDING_FILM_NORMAL, BINDING_FILM_POSITION, BINDING_FILM_SQUARES, BINDING_FILM_SUM,
             BINDING_FILM_VISIBLE, SET_FILM,
         },
-        layout::Counters,
+        structs::Counters,
     },
 };
 

@@ -12,8 +12,17 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    gpu::{
-        Buffer, Commands, DescriptorSet, Device,
+    gpu::{Buffer, Commands, DescriptorSet, Device},
+    sampler::{
+        Parameters, Weights,
+        guided::{
+            ARRIVAL_DIRECTIONS, ArrivalWords, CellKey, CountWords, EstimateOptions, FACE_COUNT,
+            GuideState, Learned, LikelyRegion, MOST_CELLS, Origin, Partition, SHARE_WORDS,
+            Snapshot, decode_entry, decode_visibility, likely_regions,
+        },
+    },
+    scene::{self, Scene},
+    shader::{
         constants::{
             BINDING_GUIDE_ALIASES, BINDING_GUIDE_COUNTS, BINDING_GUIDE_ENTRIES,
             BINDING_GUIDE_LIKELY, BINDING_GUIDE_PARAMETERS, BINDING_GUIDE_PATH_CELLS,
@@ -21,15 +30,8 @@ use crate::{
             BINDING_GUIDE_TABLE, BINDING_GUIDE_WANTED, BINDING_LEARN_TARGETS, GUIDE_COUNT_WORDS,
             GUIDE_LIKELY_REGIONS, GUIDE_NO_KEY, SET_SRBF,
         },
-        layout::{GuideParameters, PathCell},
+        structs::{GuideParameters, PathCell},
     },
-    guide::{
-        ARRIVAL_DIRECTIONS, ArrivalWords, CellKey, CountWords, EstimateOptions, FACE_COUNT,
-        GuideState, Learned, LikelyRegion, MOST_CELLS, Origin, Partition, SHARE_WORDS, Snapshot,
-        decode_entry, decode_visibility, likely_regions,
-    },
-    sampler::{Parameters, Weights},
-    scene::{self, Scene},
 };
 
 /// Edge of a cell in pixels, where it is not limited by the scene.

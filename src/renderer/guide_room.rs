@@ -1,6 +1,6 @@
 //! How many cells and regions the memory of a guide and the rays that were counted allow.
 
-use crate::guide::FACE_COUNT;
+use crate::sampler::guided::FACE_COUNT;
 
 /// Rays per cell and region that twice as many regions would have, for there to be as many.
 const RAYS_PER_REGION: u64 = 2;

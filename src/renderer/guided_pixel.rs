@@ -8,12 +8,12 @@ use glam::Vec3;
 use super::{Renderer, film_buffers, pixel::RecordedRay, with_epoch};
 use crate::{
     error::Result,
-    gpu::{
-        Commands,
+    gpu::Commands,
+    sampler::guided::{CellKey, Partition},
+    shader::{
         constants::{NO_MATERIAL, NOTHING_TO_LEARN},
-        layout::{Hit, ShadowRay, Wave},
+        structs::{Hit, ShadowRay, Wave},
     },
-    guide::{CellKey, Partition},
 };
 
 /// How closely a cell belongs to the place that found it.

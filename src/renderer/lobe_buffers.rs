@@ -9,15 +9,13 @@ use crate::{
         self, BrdfFit, BrdfOptions, EnvironmentLobe, EnvironmentOptions, Method, brdf_lobes,
         environment_lobes,
     },
-    gpu::{
-        Buffer, DescriptorSet, Device,
-        constants::{
-            BINDING_BRDF_LOBES, BINDING_ENVIRONMENT_LOBES, BINDING_MATERIAL_LOBES, SET_SRBF,
-        },
-    },
+    gpu::{Buffer, DescriptorSet, Device},
     pass::FitSizes,
     sampler::{LobeOrder, LobeParameters},
     scene::Scene,
+    shader::constants::{
+        BINDING_BRDF_LOBES, BINDING_ENVIRONMENT_LOBES, BINDING_MATERIAL_LOBES, SET_SRBF,
+    },
 };
 
 /// The SRBF tables of a scene.

@@ -18,12 +18,13 @@ use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
 use crate::{
     error::Result,
-    film::Sums,
-    gpu::{Commands, Device, PassTimes, layout::Wave},
+    film::{Sums, Window},
+    gpu::{Commands, Device, PassTimes},
+    math::random::hash_4d,
     pass::{PassSettings, Passes, SHADOW_RAYS_PER_GROUP, Sets},
-    random::hash_4d,
     sampler::{CacheScope, Elevation, Sampler},
     scene::Scene,
+    shader::structs::Wave,
 };
 use candidates::Choice;
 use film_buffers::FilmBuffers;
@@ -34,7 +35,7 @@ pub use lobe_buffers::LobeBuffers;
 pub use pixel::{CachedDirection, RecordedLobe, RecordedPixel, RecordedRay};
 pub use scene_buffers::SceneBuffers;
 use settings::check;
-pub use settings::{Settings, Window, window_of};
+pub use settings::{Settings, window_of};
 pub use totals::Totals;
 pub use wave_buffers::{LobeRoom, WaveBuffers};
 

@@ -9,11 +9,11 @@ use glam::Vec3;
 use super::{BLOCK_PIXELS, Renderer};
 use crate::{
     error::{Error, Result},
-    gpu::{
-        constants::NO_MATERIAL,
-        layout::{Hit, ShadowRay},
-    },
     sampler::Sampler,
+    shader::{
+        constants::NO_MATERIAL,
+        structs::{Hit, ShadowRay},
+    },
 };
 
 /// A shadow ray of a [`RecordedPixel`].

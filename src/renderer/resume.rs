@@ -4,7 +4,7 @@ use super::{GuideBuffers, Renderer};
 use crate::{
     error::{Error, Result},
     film::Sums,
-    guide::GuideState,
+    sampler::guided::GuideState,
 };
 
 impl Renderer {

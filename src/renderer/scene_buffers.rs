@@ -4,22 +4,22 @@ use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
 use glam::Vec3;
 
-use super::Window;
+use crate::film::Window;
 use crate::{
     accel::Accel,
     brdf::MaterialTables,
     error::Result,
-    gpu::{
-        Buffer, DescriptorSet, Device,
+    gpu::{Buffer, DescriptorSet, Device},
+    pass::{GeometryBuffers, geometry::triangle_page_bytes},
+    scene::{EnvironmentMap, Filter, Scene, environment::EnvironmentTables},
+    shader::{
         constants::{
             BINDING_BRDF_CELLS, BINDING_BRDF_TABLE, BINDING_ENVIRONMENT_CELLS,
             BINDING_ENVIRONMENT_ROWS, BINDING_ENVIRONMENT_TEXELS, BINDING_MATERIAL_TEXELS,
             BINDING_MATERIALS, BINDING_PARAMETERS, SET_SCENE,
         },
-        layout::SceneParameters,
+        structs::SceneParameters,
     },
-    pass::{GeometryBuffers, geometry::triangle_page_bytes},
-    scene::{EnvironmentMap, Filter, Scene, environment::EnvironmentTables},
 };
 
 /// A scene on a device: geometry, materials, environment and camera.

@@ -1,24 +1,12 @@
 //! What a render does with a scene, and what of it cannot be done.
 
+use crate::film::Window;
 use crate::{
     error::{Error, Result},
     film::Aov,
     sampler::{Parameters, Sampler},
     scene::Scene,
 };
-
-/// Part of the film that is rendered, in pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Window {
-    /// Left edge.
-    pub x: u32,
-    /// Upper edge.
-    pub y: u32,
-    /// Width, at least 1.
-    pub width: u32,
-    /// Height, at least 1.
-    pub height: u32,
-}
 
 /// What a render does with a scene.
 #[derive(Clone, Debug, PartialEq)]

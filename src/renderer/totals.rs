@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::gpu::{PassTimes, layout::Counters};
+use crate::{gpu::PassTimes, shader::structs::Counters};
 
 /// Totals since the start of a renderer.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -4,8 +4,8 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use crate::{
     error::Result,
-    gpu::{
-        Buffer, Commands, DescriptorSet, Device,
+    gpu::{Buffer, Commands, DescriptorSet, Device},
+    shader::{
         constants::{
             BINDING_CACHE, BINDING_CLOSE_LOBE_TEXELS, BINDING_CLOSE_LOBES, BINDING_HIT_TEXELS,
             BINDING_HITS, BINDING_LOBE_COUNTS, BINDING_LOBE_SUM_TEXELS, BINDING_LOBE_SUMS,
@@ -13,7 +13,7 @@ use crate::{
             BINDING_SHADOW_RAY_TEXELS, BINDING_SHADOW_RAYS, BINDING_VISIBILITY, LOBES_PER_SUM,
             SET_WAVE, WORKGROUP_SIZE,
         },
-        layout::{Hit, PathState, Ray, ShadowRay},
+        structs::{Hit, PathState, Ray, ShadowRay},
     },
 };
 

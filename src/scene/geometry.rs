@@ -2,6 +2,9 @@
 
 use super::{mesh::Mesh, transform::Transform};
 
+/// Largest magnitude of a coordinate, metres; products of four coordinates stay finite in `f32`.
+pub const MAX_COORDINATE: f32 = 1e9;
+
 /// Every triangle of the scene in world space; one mesh used many times is repeated here.
 #[derive(Clone, Debug, Default)]
 pub struct Geometry {

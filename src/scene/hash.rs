@@ -5,10 +5,8 @@ use std::fmt::Write;
 use glam::Vec3;
 use sha2::{Digest, Sha256};
 
-use super::{
-    Filter, Scene,
-    material::{ConductorFresnel, MaterialKind},
-};
+use super::{Filter, Scene};
+use crate::brdf::material::{ConductorFresnel, MaterialKind};
 
 /// Lower-case hexadecimal digest of camera, film, environment, materials and geometry.
 ///

@@ -6,7 +6,6 @@ pub mod file;
 pub mod geometry;
 mod hash;
 pub mod load;
-pub mod material;
 pub mod mesh;
 pub mod shapes;
 pub mod transform;
@@ -14,11 +13,11 @@ pub mod triangulate;
 
 use std::path::PathBuf;
 
+use crate::brdf::Material;
 pub use camera::Camera;
 pub use environment::EnvironmentMap;
 pub use geometry::Geometry;
 pub use hash::{environment_hash, geometry_hash};
-pub use material::Material;
 
 /// Reconstruction filter of the film, importance sampled so that every sample belongs to one pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

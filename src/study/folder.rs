@@ -22,7 +22,7 @@ use serde::{Serialize, de::DeserializeOwned};
 
 use crate::{
     error::{Error, Result},
-    film::{check_writable, write_atomically},
+    files::{check_writable, write_atomically},
 };
 
 /// The file that marks a report folder.

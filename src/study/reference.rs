@@ -27,8 +27,8 @@ use crate::{
         Aov, Attribute, Checkpoint, Image, Metadata, RgbImage, SampleRange,
         checkpoint::checkpoint_path,
     },
-    guide::GuideState,
     renderer::Renderer,
+    sampler::guided::GuideState,
     scene::Scene,
 };
 

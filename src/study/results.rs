@@ -16,7 +16,7 @@ use super::{
     record::{Measurement, Round, Rule, Run, SceneRecord},
     summary::{Curve, Summary, curves, rules, summaries},
 };
-use crate::{error::Result, film::write_atomically, gpu::Device};
+use crate::{error::Result, files::write_atomically, gpu::Device};
 
 /// What a study was made on and how it was asked for.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]

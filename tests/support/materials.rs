@@ -9,12 +9,11 @@ use std::{
 };
 
 use fenestra::{
-    brdf::{self, MaterialTables, MeasuredTable},
-    random::hash_4d,
-    scene::{
-        Material,
+    brdf::{
+        self, Material, MaterialTables, MeasuredTable,
         material::{ConductorFresnel, MaterialKind},
     },
+    math::random::hash_4d,
 };
 use glam::{Vec3, vec3};
 

@@ -11,9 +11,9 @@ use std::{
 };
 
 use bytemuck::{Pod, Zeroable};
-use fenestra::gpu::{
-    Buffer, Commands, DescriptorSet, Device, Pipeline,
-    constants::{SET_FILM, WORKGROUP_SIZE},
+use fenestra::{
+    gpu::{Buffer, Commands, DescriptorSet, Device, Pipeline},
+    shader::constants::{SET_FILM, WORKGROUP_SIZE},
 };
 
 /// One test at a time: the validation layers were seen to crash when several threads made and dropped

@@ -4,20 +4,20 @@
 
 use fenestra::{
     accel::Accel,
-    gpu::{
-        Buffer, Commands, DescriptorSet,
-        constants::{
-            BINDING_COUNTERS, BINDING_HIT_TEXELS, BINDING_HITS, BINDING_RAY_TEXELS,
-            BINDING_SHADOW_RAY_TEXELS, BINDING_VISIBILITY, SET_FILM, SET_SCENE, SET_WAVE,
-        },
-        layout::{Counters, Hit, Ray, ShadowRay, Wave},
-    },
+    gpu::{Buffer, Commands, DescriptorSet},
     pass::{
         geometry::{GeometryBuffers, Schedule},
         shadow::Shadow,
         trace::Trace,
     },
     scene::Geometry,
+    shader::{
+        constants::{
+            BINDING_COUNTERS, BINDING_HIT_TEXELS, BINDING_HITS, BINDING_RAY_TEXELS,
+            BINDING_SHADOW_RAY_TEXELS, BINDING_VISIBILITY, SET_FILM, SET_SCENE, SET_WAVE,
+        },
+        structs::{Counters, Hit, Ray, ShadowRay, Wave},
+    },
 };
 use glam::{Quat, Vec3};
 

@@ -3,9 +3,12 @@
 
 use std::path::PathBuf;
 
-use fenestra::scene::{
-    Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Material, Scene,
-    material::{ConductorFresnel, MaterialKind},
+use fenestra::{
+    brdf::{
+        Material,
+        material::{ConductorFresnel, MaterialKind},
+    },
+    scene::{Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Scene},
 };
 use glam::Vec3;
 

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use crate::{
-    brdf::{MaterialTables, MeasuredTable},
+    brdf::{Material, MaterialTables, MeasuredTable, material::MaterialKind},
     error::{Error, Result},
-    scene::{EnvironmentMap, Material, Scene, material::MaterialKind},
+    scene::{EnvironmentMap, Scene},
 };
 
 /// Extensions of measured BRDFs.

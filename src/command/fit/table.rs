@@ -9,7 +9,7 @@ use std::{
 use super::{source, with_progress};
 use crate::{
     error::Result,
-    film::write_atomically,
+    files::write_atomically,
     fit::{
         BrdfOptions, EnvironmentOptions, Method, brdf_lobes, config, environment_lobes, picture,
     },

@@ -11,8 +11,9 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    film::{Aov, is_special_file},
-    renderer::{Settings, Window},
+    files::is_special_file,
+    film::{Aov, Window},
+    renderer::Settings,
     sampler::{Parameters, Sampler},
     scene::FilmSettings,
 };

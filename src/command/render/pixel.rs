@@ -22,15 +22,16 @@ use serde_json::json;
 
 use crate::{
     error::{Error, Result},
+    files::write_atomically,
     film::{
+        Window,
         png::{display_from_linear, write_rgb8},
-        write_atomically,
     },
-    frame::{direction_from_lat_long, lat_long_from_direction},
     gpu::Device,
+    math::frame::{direction_from_lat_long, lat_long_from_direction},
     renderer::{
         CellLevel, GuidedRay, RecordedCell, RecordedGuide, RecordedLobe, RecordedPixel,
-        RecordedRay, Renderer, Settings, Window, window_of,
+        RecordedRay, Renderer, Settings, window_of,
     },
     scene::Scene,
     srbf::kernel_value,
@@ -80,7 +81,7 @@ pub fn check(settings: &Settings, scene: &Scene, output: &Path, pixel: [u32; 2])
             u64::from(window.y) + u64::from(window.height)
         )));
     }
-    crate::film::check_writable(&picture_path(output, pixel))
+    crate::files::check_writable(&picture_path(output, pixel))
 }
 
 /// Renders the first sample of `pixel` once more, and writes the picture and, beside it, the numbers

@@ -8,7 +8,7 @@ use super::{
     load::check_placement,
     procedural::{check_radiance, check_range, check_width, render},
 };
-use crate::random::random_independent_1d;
+use crate::math::random::random_independent_1d;
 
 /// A narrow courtyard under a bright strip of sky: plastered facades with rows of windows, some of
 /// which glint, an arcade at the ground and paving.

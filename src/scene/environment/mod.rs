@@ -19,7 +19,7 @@ pub use sky::SkyParameters;
 pub(crate) use table::mean_sine;
 pub use table::{EnvironmentSample, EnvironmentTables};
 
-use crate::frame::lat_long_from_direction;
+use crate::math::frame::lat_long_from_direction;
 
 /// Largest radiance a texel may have after scaling; more is treated as infinite, because squares of
 /// it summed over a million samples would leave single precision.
@@ -40,11 +40,6 @@ pub struct EnvironmentMap {
     pub rotation_rad: f32,
     /// Where the map came from, for messages and metadata: a path, or `constant`, `court`, `sky`.
     pub source: String,
-}
-
-/// Luminance of linear Rec.709, in the units of `radiance`.
-pub fn luminance(radiance: Vec3) -> f32 {
-    radiance.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
 /// A cell between four texel centres, with the position inside it.

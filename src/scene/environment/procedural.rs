@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::{EnvironmentMap, MAX_RADIANCE};
-use crate::frame::direction_from_lat_long;
+use crate::math::frame::direction_from_lat_long;
 
 impl EnvironmentMap {
     /// The map named `source` from its texels before scaling.

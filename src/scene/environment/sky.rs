@@ -9,7 +9,7 @@ use super::{
     load::check_placement,
     procedural::{check_radiance, check_range, check_width, render, texel_direction},
 };
-use crate::frame::{lat_long_from_direction, sin_cos_pi};
+use crate::math::frame::{lat_long_from_direction, sin_cos_pi};
 
 /// A clear sky with a sun disc above a uniform ground.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]

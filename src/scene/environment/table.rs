@@ -21,8 +21,9 @@ use std::f64::consts::PI;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::{EnvironmentMap, luminance};
-use crate::frame::sin_cos_pi;
+use super::EnvironmentMap;
+use crate::math::colour::luminance;
+use crate::math::frame::sin_cos_pi;
 
 /// Densities are evaluated no closer to a pole than this, so that they stay finite.
 const MIN_SIN_THETA: f32 = 1e-7;

@@ -6,12 +6,12 @@ use glam::Vec3;
 
 use super::Loader;
 use crate::{
-    accel::MAX_COORDINATE,
+    brdf::{Material, material::MaterialKind},
     error::Result,
     scene::{
-        Geometry, Material,
+        Geometry,
         file::{ObjectEntry, ObjectSource},
-        material::MaterialKind,
+        geometry::MAX_COORDINATE,
         mesh::Mesh,
         transform::Transform,
     },

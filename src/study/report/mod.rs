@@ -19,7 +19,7 @@ use super::{
     results::Report,
     summary::{Curve, Point, rules},
 };
-use crate::{error::Result, film::write_atomically};
+use crate::{error::Result, files::write_atomically};
 use html::{escape, number};
 use pictures::{Picture, ScenePictures};
 use plot::{STYLE_COUNT, Series};

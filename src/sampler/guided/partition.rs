@@ -16,11 +16,11 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{
-    alias::{AliasEntry, alias_table},
-    split::{Cells, Rectangle, Sums, grow},
-};
 use crate::scene::environment::EnvironmentMap;
+use crate::{
+    math::alias::{AliasEntry, alias_table},
+    sampler::guided::split::{Cells, Rectangle, Sums, grow},
+};
 
 /// Number of regions that are the angular parents of all others.
 pub const PARENT_COUNT: usize = 64;

@@ -1,20 +1,20 @@
 //! The samplers by name, their parameters, and how `--set key=value` reaches them.
 
-mod candidates;
-mod lobes;
+pub mod guided;
+pub mod product;
 
 use std::collections::BTreeMap;
 
 use crate::{
     error::{Error, Result},
-    gpu::constants,
+    shader::constants,
 };
 
-pub use candidates::{
+pub use guided::cost::{
     CandidateCost, GUIDED_CANDIDATES, Spread, choose, climb, is_most_a_clear_loss,
     relative_variances, upper_median,
 };
-pub use lobes::{CacheScope, Elevation, LobeOrder, LobeParameters, Threshold};
+pub use product::parameters::{CacheScope, Elevation, LobeOrder, LobeParameters, Threshold};
 
 /// How directions are chosen at a hit. All are unbiased, but for [`Elevation::Metropolis`], and trace
 /// one shadow ray per direction.

@@ -13,7 +13,7 @@ pub const SET_WAVE: u32 = 2;
 /// Descriptor set of the film.
 pub const SET_FILM: u32 = 3;
 
-/// Scene set: [`SceneParameters`](super::layout::SceneParameters), one element.
+/// Scene set: [`SceneParameters`](super::structs::SceneParameters), one element.
 pub const BINDING_PARAMETERS: u32 = 0;
 /// Scene set: CWBVH nodes, texels of four words, five to a node.
 pub const BINDING_BVH_NODES: u32 = 1;
@@ -28,7 +28,7 @@ pub const BINDING_TRIANGLES_2: u32 = 4;
 pub const BINDING_TRIANGLES_3: u32 = 5;
 /// Scene set: material index per triangle in BVH order.
 pub const BINDING_TRIANGLE_MATERIALS: u32 = 7;
-/// Scene set: [`Material`](super::layout::Material) per material.
+/// Scene set: [`Material`](super::structs::Material) per material.
 pub const BINDING_MATERIALS: u32 = 8;
 /// Scene set: the materials again, texels of four words, four to a material.
 pub const BINDING_MATERIAL_TEXELS: u32 = 13;
@@ -54,7 +54,7 @@ pub const BINDING_MATERIAL_LOBES: u32 = 2;
 /// SRBF set: per cell and octave of light, visible rays and their c p_B / q in 256ths, since the last
 /// rebuild.
 pub const BINDING_GUIDE_SHARES: u32 = 3;
-/// SRBF set: [`GuideParameters`](super::layout::GuideParameters), one element.
+/// SRBF set: [`GuideParameters`](super::structs::GuideParameters), one element.
 pub const BINDING_GUIDE_PARAMETERS: u32 = 4;
 /// SRBF set: hash table from keys to cells of the scene, texels of two words: key, index of the cell.
 pub const BINDING_GUIDE_TABLE: u32 = 5;
@@ -79,7 +79,7 @@ pub const BINDING_LEARN_TARGETS: u32 = 12;
 /// SRBF set: the likeliest regions of each cell, texels of four words (see
 /// `guide::LikelyRegion`).
 pub const BINDING_GUIDE_LIKELY: u32 = 13;
-/// SRBF set: [`PathCell`](super::layout::PathCell) per path.
+/// SRBF set: [`PathCell`](super::structs::PathCell) per path.
 pub const BINDING_GUIDE_PATH_CELLS: u32 = 14;
 /// SRBF set: per cell and direction the light that is believed to arrive by way of surfaces, relative to
 /// the mean of the cell's directions, texels of one float.
@@ -90,15 +90,15 @@ pub const BINDING_GUIDE_REFLECTED: u32 = 16;
 /// last rebuild.
 pub const BINDING_GUIDE_ARRIVALS: u32 = 17;
 
-/// Wave set: [`Ray`](super::layout::Ray) per path, the next one to trace.
+/// Wave set: [`Ray`](super::structs::Ray) per path, the next one to trace.
 pub const BINDING_RAYS: u32 = 0;
-/// Wave set: [`Hit`](super::layout::Hit) per path.
+/// Wave set: [`Hit`](super::structs::Hit) per path.
 pub const BINDING_HITS: u32 = 1;
-/// Wave set: [`ShadowRay`](super::layout::ShadowRay) per path and direction.
+/// Wave set: [`ShadowRay`](super::structs::ShadowRay) per path and direction.
 pub const BINDING_SHADOW_RAYS: u32 = 2;
 /// Wave set: 1 where the shadow ray reaches the environment, 0 where it is blocked.
 pub const BINDING_VISIBILITY: u32 = 3;
-/// Wave set: [`PathState`](super::layout::PathState) per path.
+/// Wave set: [`PathState`](super::structs::PathState) per path.
 pub const BINDING_PATHS: u32 = 4;
 
 /// Wave set: the rays again, texels of four words, two to a ray.
@@ -137,7 +137,7 @@ pub const BINDING_FILM_SUM: u32 = 0;
 pub const BINDING_FILM_COMPENSATION: u32 = 1;
 /// Film set: Σ radiance² per pixel.
 pub const BINDING_FILM_SQUARES: u32 = 2;
-/// Film set: [`Counters`](super::layout::Counters), one element.
+/// Film set: [`Counters`](super::structs::Counters), one element.
 pub const BINDING_COUNTERS: u32 = 3;
 /// Film set: Σ albedo at the first hit.
 pub const BINDING_FILM_ALBEDO: u32 = 4;
@@ -217,7 +217,7 @@ pub const TRAVERSAL_STEP_LIMIT: u32 = 30_000;
 /// Packed normal of the vertices of a flat triangle, which no unit vector packs to.
 pub const FLAT_NORMAL: u32 = 0x8000_8000;
 
-/// Bit of [`Wave::aovs`](super::layout::Wave::aovs): write albedo.
+/// Bit of [`Wave::aovs`](super::structs::Wave::aovs): write albedo.
 pub const AOV_ALBEDO: u32 = 1;
 /// Bit of `Wave::aovs`: write the shading normal.
 pub const AOV_NORMAL: u32 = 2;
@@ -288,10 +288,10 @@ pub const GUIDE_ARRIVAL_SIDE: u32 = 12;
 /// Words of a cell per region that are counted: trials, hits and the responses of the hits.
 pub const GUIDE_COUNT_WORDS: u32 = 3;
 
-/// [`Hit::material`](super::layout::Hit::material) of a ray that left the scene or was not traced.
+/// [`Hit::material`](super::structs::Hit::material) of a ray that left the scene or was not traced.
 pub const NO_MATERIAL: u32 = 0xffff_ffff;
 
-/// [`Material::kind`](super::layout::Material::kind): Lambertian.
+/// [`Material::kind`](super::structs::Material::kind): Lambertian.
 pub const MATERIAL_DIFFUSE: u32 = 0;
 /// Dielectric coat over a diffuse base.
 pub const MATERIAL_PLASTIC: u32 = 1;

@@ -43,7 +43,7 @@ mod tests {
             let phi = i as f32 * 2.399_963;
             let r = (1.0 - z * z).sqrt();
             let n = Vec3::new(r * phi.cos(), r * phi.sin(), z);
-            assert_ne!(pack(n), crate::gpu::constants::FLAT_NORMAL);
+            assert_ne!(pack(n), crate::shader::constants::FLAT_NORMAL);
             assert!(unpack(pack(n)).distance(n) < 1e-4, "{n}");
         }
         for n in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z] {

@@ -10,16 +10,16 @@ use std::{fs, io::Write, path::Path};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::{
+use crate::sampler::guided::{
     arriving::{ARRIVAL_DIRECTIONS, ArrivalWords},
     estimate::CountWords,
     share::SHARE_WORDS,
 };
 use crate::{
     error::{Error, Result},
-    film::write_atomically,
-    gpu::constants::GUIDE_COUNT_WORDS,
+    files::write_atomically,
     sampler::GUIDED_CANDIDATES,
+    shader::constants::GUIDE_COUNT_WORDS,
 };
 
 const COUNT_WORDS: usize = GUIDE_COUNT_WORDS as usize;

@@ -7,10 +7,10 @@ use std::{collections::BinaryHeap, ops::Range};
 
 use glam::DVec3;
 
-use super::partition::PARENT_COUNT;
+use crate::sampler::guided::partition::PARENT_COUNT;
 use crate::{
-    refinement::Queued,
-    scene::environment::{EnvironmentMap, luminance, mean_sine},
+    math::{colour::luminance, refinement::Queued},
+    scene::environment::{EnvironmentMap, mean_sine},
 };
 
 /// Energy and solid angle of every cell, unnormalised.

@@ -9,8 +9,8 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::{key::FACE_COUNT, learned::Tree};
-use crate::gpu::constants::GUIDE_ARRIVAL_SIDE;
+use crate::sampler::guided::{key::FACE_COUNT, learned::Tree};
+use crate::shader::constants::GUIDE_ARRIVAL_SIDE;
 
 /// Directions that a cell tells apart.
 pub const ARRIVAL_DIRECTIONS: usize = (GUIDE_ARRIVAL_SIDE * GUIDE_ARRIVAL_SIDE) as usize;

@@ -12,26 +12,25 @@
 //! Rectangles, counts → `guide_regions`, `guide_entries`, `guide_arriving` on the device; shaders
 //! `sample_guided` and `bounce_guided`.
 
-mod alias;
 mod arriving;
+pub mod cost;
 mod estimate;
-mod file;
 mod key;
 mod learned;
 mod likely;
 mod partition;
 mod share;
 mod split;
+mod state;
 
-pub use alias::{AliasEntry, alias_table, probabilities};
 pub use arriving::{ARRIVAL_DIRECTIONS, ArrivalWords, ArrivingLight, Reflected, arrival_direction};
 pub use estimate::{
     Count, CountWords, EstimateOptions, Estimates, PARTS_PER_RAY, VISIBILITY_LEVELS, decode_entry,
     decode_visibility,
 };
-pub use file::{GuideState, Origin};
 pub use key::{CellKey, FACE_COUNT, face_normal};
 pub use learned::{Learned, MOST_CELLS, Snapshot};
 pub use likely::{LikelyRegion, likely_regions};
 pub use partition::{MOST_REGIONS, PARENT_COUNT, Partition, Region};
 pub use share::{SHARE_WORDS, ShareEvidence, share_in_256ths};
+pub use state::{GuideState, Origin};

@@ -23,19 +23,19 @@ use serde::Serialize;
 use crate::{
     accel::Accel,
     error::Result,
-    gpu::{
-        Buffer, Commands, DescriptorSet, Device, Pipeline,
+    gpu::{Buffer, Commands, DescriptorSet, Device, Pipeline},
+    pass::{Schedule, shadow::Shadow, trace::Trace},
+    renderer::SceneBuffers,
+    sampler::Sampler,
+    shader::{
         constants::{
             BINDING_COUNTERS, BINDING_HIT_TEXELS, BINDING_HITS, BINDING_PATHS, BINDING_RAY_TEXELS,
             BINDING_RAYS, BINDING_SHADOW_RAY_TEXELS, BINDING_SHADOW_RAYS, BINDING_VISIBILITY,
             CONSTANT_SAMPLER, NO_MATERIAL, SET_FILM, SET_WAVE,
         },
-        layout::{Counters, Hit, PathState, Ray, ShadowRay, Wave},
-        shaders,
+        spirv,
+        structs::{Counters, Hit, PathState, Ray, ShadowRay, Wave},
     },
-    pass::{Schedule, shadow::Shadow, trace::Trace},
-    renderer::SceneBuffers,
-    sampler::Sampler,
 };
 
 /// Rays that a thread of the CPU takes at a time.
@@ -240,7 +240,7 @@ impl<'a> Bench<'a> {
 
     /// Runs a pass of one invocation per path.
     fn run_per_path(&self, name: &str, constants: &[(u32, u32)]) -> Result<()> {
-        let pipeline = Pipeline::new(self.device, name, shaders::pass(name), constants)?;
+        let pipeline = Pipeline::new(self.device, name, spirv::pass(name), constants)?;
         self.run(|commands| {
             let push = bytemuck::bytes_of(&self.wave);
             commands.dispatch(&pipeline, &self.sets()[..2], push, self.wave.pixel_count);

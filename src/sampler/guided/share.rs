@@ -14,7 +14,7 @@
 //!
 //! Per visible ray the octave of its light and c p_B / q → [`ShareCounts`] → share in 256ths.
 
-use crate::gpu::constants::GUIDE_SHARE_OCTAVES;
+use crate::shader::constants::GUIDE_SHARE_OCTAVES;
 
 /// Words of the counts of one cell: for every octave of X from 2⁻³² on the number of visible rays and
 /// the sum of their c p_B / q in 256ths.

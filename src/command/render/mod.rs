@@ -21,12 +21,13 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
+    files::check_writable,
     film::{
-        Checkpoint, Metadata, SampleRange, Sums, check_writable, checkpoint::checkpoint_path,
+        Checkpoint, Metadata, SampleRange, Sums, Window, checkpoint::checkpoint_path,
         display::DisplayServer, png::write_preview,
     },
     gpu::Device,
-    renderer::{Renderer, Settings, Window},
+    renderer::{Renderer, Settings},
     sampler::Sampler,
     scene::Scene,
 };

@@ -4,18 +4,18 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::{
+use crate::sampler::guided::{
     arriving::{ArrivalWords, ArrivingLight, Reflected},
     estimate::{
         Count, CountWords, EstimateOptions, Estimates, LARGEST_WORD, Lookup, PARTS_PER_RAY,
         Scratch, Tally, decode_entry,
     },
-    file::GuideState,
     key::{CellKey, FACE_COUNT},
     partition::Partition,
     share::{SHARE_WORDS, ShareEvidence, share_in_256ths},
+    state::GuideState,
 };
-use crate::gpu::constants::{GUIDE_PROBES, GUIDE_REFINED, GUIDE_SHARE_SHIFT};
+use crate::shader::constants::{GUIDE_PROBES, GUIDE_REFINED, GUIDE_SHARE_SHIFT};
 
 /// Trials of one region and cell above which what was counted is halved; then the responses fit a word.
 const LARGEST_COUNT: u64 = (1 << 16) * PARTS_PER_RAY as u64;

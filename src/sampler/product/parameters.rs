@@ -131,7 +131,7 @@ impl LobeParameters {
     ///
     /// # Errors
     /// [`Error::Usage`] for a value out of range.
-    pub(super) fn set(&mut self, key: &str, value: &str) -> Result<bool> {
+    pub fn set(&mut self, key: &str, value: &str) -> Result<bool> {
         match key {
             "preset" => match choice(key, value, &[("default", false), ("strict", true)])? {
                 false => *self = Self::default(),
@@ -222,7 +222,7 @@ impl LobeParameters {
     }
 
     /// The parameters by name; those of the visibility cache where `with_cache`.
-    pub(super) fn describe(&self, with_cache: bool) -> BTreeMap<String, String> {
+    pub fn describe(&self, with_cache: bool) -> BTreeMap<String, String> {
         let mut named: BTreeMap<String, String> = [
             ("environment_lobes", self.environment_lobes.to_string()),
             ("brdf_lobes", self.brdf_lobes.to_string()),

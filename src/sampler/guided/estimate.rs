@@ -13,11 +13,11 @@
 
 use glam::Vec3;
 
-use super::{
+use crate::sampler::guided::{
     key::{FACE_COUNT, face_normal},
     partition::{PARENT_COUNT, Partition, Region},
 };
-use crate::gpu::constants::GUIDE_COUNT_WORDS;
+use crate::shader::constants::GUIDE_COUNT_WORDS;
 
 /// Weight of the prior, in rays.
 const PRIOR: f32 = 4.0;
@@ -65,7 +65,7 @@ impl Default for EstimateOptions {
 pub struct Estimate {
     /// V̂, the share of rays that reach the environment.
     pub visibility: f32,
-    /// Mean response of those, in units of 1 / [`GUIDE_RESPONSE_UNITS`](crate::gpu::constants::GUIDE_RESPONSE_UNITS).
+    /// Mean response of those, in units of 1 / [`GUIDE_RESPONSE_UNITS`](crate::shader::constants::GUIDE_RESPONSE_UNITS).
     pub response: f32,
 }
 

@@ -15,11 +15,14 @@ use std::{
 use glam::Vec3;
 
 use super::{
-    Camera, EnvironmentMap, FilmSettings, Filter, Material, Scene,
+    Camera, EnvironmentMap, FilmSettings, Filter, Scene,
     file::{
         CameraEntry, ConductorEntry, EnvironmentEntry, FilmEntry, FilterEntry, MaterialEntry,
         MaterialKindEntry, SceneFile,
     },
+};
+use crate::brdf::{
+    Material,
     material::{ConductorFresnel, MaterialKind},
 };
 use crate::{

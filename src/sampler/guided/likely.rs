@@ -6,8 +6,8 @@
 //! proportion to probability × BRDF × cosine toward the region's mean direction (after Tsai et al.
 //! 2008, who take the product with lobes, in the place of a table).
 
-use super::{estimate::decode_entry, partition::Partition};
-use crate::gpu::constants::GUIDE_LIKELY_REGIONS;
+use crate::sampler::guided::{estimate::decode_entry, partition::Partition};
+use crate::shader::constants::GUIDE_LIKELY_REGIONS;
 
 /// One of the likeliest regions of a cell, as it lies on the device: its mean direction, three
 /// floats; its index, 10 bits, and above them its probability in 65,536ths.

@@ -1,0 +1,93 @@
+//! Atomic writes, and the user's cache folder.
+
+use std::{
+    env,
+    fs::{self, File, OpenOptions},
+    io::{BufWriter, Write},
+    path::{Path, PathBuf},
+};
+
+use crate::error::{Error, Result};
+
+/// Folder `fenestra/<kind>` in the user's cache folder (`$XDG_CACHE_HOME`, else `~/.cache`), or
+/// `None` where neither is set. The folder may not exist yet.
+pub fn cache_folder(kind: &str) -> Option<PathBuf> {
+    let set = |name| env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let base = set("XDG_CACHE_HOME").or_else(|| Some(set("HOME")?.join(".cache")))?;
+    Some(base.join("fenestra").join(kind))
+}
+
+/// Folder of a file to write.
+fn parent_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// Whether `path` exists and is neither a file nor a folder (`/dev/null`, a pipe).
+pub fn is_special_file(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
+}
+
+/// Finds out before long work whether [`write_atomically`] may write `path`: creates the parent
+/// folders and a temporary file beside it, which is removed again.
+///
+/// # Errors
+/// [`Error::Io`] with `path` and the cause.
+pub fn check_writable(path: &Path) -> Result<()> {
+    if is_special_file(path) {
+        return Ok(());
+    }
+    let parent = parent_of(path);
+    fs::create_dir_all(parent).map_err(|source| Error::io(parent, "create folder", source))?;
+    let attempt = || {
+        if path.is_dir() {
+            return Err(std::io::ErrorKind::IsADirectory.into());
+        }
+        tempfile::tempfile_in(parent).map(drop)
+    };
+    attempt().map_err(|source| Error::io(path, "write", source))
+}
+
+/// Writes a file so that it appears complete or not at all.
+///
+/// Parent folders are created, `write` fills a file of a temporary name in the same folder, and that
+/// file is renamed to `path`, which replaces an older one. On any failure the temporary file is
+/// removed and an older file at `path` is as it was. A `path` that exists and is neither a file nor
+/// a folder (`/dev/stdout`, a pipe) is written directly.
+///
+/// # Errors
+/// [`Error::Io`] with `path` and the cause (no permission, full disk, …).
+pub fn write_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+) -> Result<()> {
+    let parent = parent_of(path);
+    let fill = |file: File| -> std::io::Result<File> {
+        let mut writer = BufWriter::with_capacity(1 << 16, file);
+        write(&mut writer)?;
+        writer.flush()?;
+        writer.into_inner().map_err(std::io::IntoInnerError::into_error)
+    };
+    if is_special_file(path) {
+        return OpenOptions::new()
+            .write(true)
+            .open(path)
+            .and_then(fill)
+            .map(drop)
+            .map_err(|source| Error::io(path, "write", source));
+    }
+    fs::create_dir_all(parent).map_err(|source| Error::io(parent, "create folder", source))?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".fenestra-").suffix(".tmp");
+    // A temporary file is private by default; the result has the permissions of any new file.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let attempt = || -> std::io::Result<()> {
+        let (file, temporary) = builder.tempfile_in(parent)?.into_parts();
+        fill(file)?.sync_all()?;
+        temporary.persist(path).map_err(|error| error.error)
+    };
+    attempt().map_err(|source| Error::io(path, "write", source))
+}

@@ -1,0 +1,3 @@
+//! Sampling the product of environment and BRDF.
+
+pub mod parameters;
