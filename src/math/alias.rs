@@ -1,21 +1,21 @@
-//! Alias tables: an index by its probability from two numbers, without a search.
+//! Alias tables: draw an index by its probability from two numbers, without a search.
 
 /// One column of an alias table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AliasEntry {
-    /// The column's own index is kept where a uniform number in `0..scale` is below this.
+    /// The column keeps its own index if a uniform number in `0..scale` is below this.
     pub threshold: u64,
-    /// The index taken otherwise; the column's own where the column holds no other.
+    /// Index drawn otherwise; the column's own if it holds no other.
     pub alias: u32,
 }
 
-/// Alias table of `weights` with thresholds in `0..scale` (Walker 1977; Vose 1991).
+/// Builds the alias table of `weights`, with thresholds in `0..=scale` (Walker 1977; Vose 1991).
 ///
-/// Thresholds are rounded, so that the probabilities are those of [`probabilities`] and not exactly
-/// those of the weights; an index of weight 0 is never drawn. `None` where all weights are 0.
+/// Thresholds are rounded: the table draws with [`probabilities`], not exactly in proportion to the
+/// weights. It never draws an index of weight 0. `None` if the weights sum to 0 or a subnormal.
 ///
 /// # Panics
-/// If a weight is negative or not finite: a mistake of the caller.
+/// Panics if a weight is negative or not finite: a mistake of the caller.
 pub fn alias_table(weights: &[f64], scale: u64) -> Option<Vec<AliasEntry>> {
     assert!(
         weights.iter().all(|weight| weight.is_finite() && *weight >= 0.0),
@@ -35,7 +35,7 @@ pub fn alias_table(weights: &[f64], scale: u64) -> Option<Vec<AliasEntry>> {
         small.pop();
         let mut threshold = (left[poor] * scale as f64).round() as u64;
         if weights[poor] > 0.0 {
-            // What has weight keeps a share, however small: the sampler stays unbiased.
+            // A positive weight keeps a share, however small: the sampler stays unbiased.
             threshold = threshold.max(1);
         }
         table[poor] = AliasEntry { threshold, alias: rich as u32 };
@@ -45,7 +45,7 @@ pub fn alias_table(weights: &[f64], scale: u64) -> Option<Vec<AliasEntry>> {
             small.push(rich);
         }
     }
-    // Columns that rounding left over: full, unless they have no weight at all.
+    // Rounding leaves these columns over: keep them full, unless their weight is 0.
     if let Some(heaviest) = (0..weights.len()).max_by(|&a, &b| weights[a].total_cmp(&weights[b])) {
         for index in small {
             if weights[index] <= 0.0 {
@@ -56,7 +56,7 @@ pub fn alias_table(weights: &[f64], scale: u64) -> Option<Vec<AliasEntry>> {
     Some(table)
 }
 
-/// The probabilities with which `table` is drawn, to the last bit but for the final division.
+/// Returns the probability with which `table` draws each index, exact but for the final division.
 pub fn probabilities(table: &[AliasEntry], scale: u64) -> Vec<f64> {
     let mut parts = vec![0_u64; table.len()];
     for (index, entry) in table.iter().enumerate() {

@@ -1,7 +1,7 @@
-//! Orthonormal frames and the lat-long mapping: twin of `glsl/include/frame.glsl`.
+//! Orthonormal frames and the lat-long mapping; twin of `glsl/include/frame.glsl`.
 //!
-//! Local frames have the normal as z axis; names of vectors in them end in `_local`. The lat-long
-//! mapping takes unit directions to the unit square; its Jacobian dω/(du dv) is 2π² sin θ, with θ
+//! The z axis of a local frame is the normal; names of vectors in it end in `_local`. The lat-long
+//! mapping takes unit directions to the unit square. Its Jacobian dω/(du dv) is 2π² sin θ, with θ
 //! measured from +Y.
 
 use std::f32::consts::PI;
@@ -19,7 +19,7 @@ pub struct Frame {
     pub normal: Vec3,
 }
 
-/// Right-handed orthonormal basis around a unit normal, without branches or a singularity.
+/// Builds a right-handed orthonormal basis around a unit normal, without branches or singularity.
 ///
 /// Duff et al. 2017, "Building an Orthonormal Basis, Revisited", JCGT 6(1), listing 3.
 pub fn frame_from_normal(normal: Vec3) -> Frame {
@@ -38,7 +38,7 @@ pub fn frame_from_normal(normal: Vec3) -> Frame {
 }
 
 impl Frame {
-    /// Coordinates of a world direction in this frame.
+    /// Transforms a world direction into this frame.
     pub fn to_local(&self, direction: Vec3) -> Vec3 {
         Vec3::new(
             self.tangent.dot(direction),
@@ -47,7 +47,7 @@ impl Frame {
         )
     }
 
-    /// World direction of coordinates in this frame.
+    /// Transforms a direction in this frame to the world.
     pub fn to_world(&self, direction_local: Vec3) -> Vec3 {
         self.tangent * direction_local.x
             + self.bitangent * direction_local.y
@@ -55,8 +55,8 @@ impl Frame {
     }
 }
 
-/// (sin πx, cos πx) for 0 ≤ x ≤ 2 with small *relative* error near the zeros, which a shader's
-/// built-in functions do not promise: densities over the sphere divide by the sine near the poles.
+/// (sin πx, cos πx) for 0 ≤ x ≤ 2 with small *relative* error near the zeros. Shader built-ins do
+/// not promise that, and densities over the sphere divide by the sine near the poles.
 ///
 /// Polynomials of Cephes' `sinf` and `cosf` (Moshier 1992) on arguments up to π/4.
 #[expect(clippy::excessive_precision, reason = "coefficients as published")]
@@ -82,8 +82,7 @@ pub fn lat_long_from_direction(direction: Vec3) -> Vec2 {
     Vec2::new(0.5 + azimuth / (2.0 * PI), sin_theta.atan2(direction.y) / PI)
 }
 
-/// Unit direction at lat-long coordinates in the unit square; inverse of
-/// [`lat_long_from_direction`].
+/// Inverse of [`lat_long_from_direction`]: unit direction at a point of the unit square.
 pub fn direction_from_lat_long(uv: Vec2) -> Vec3 {
     let azimuth = sin_cos_pi(2.0 * uv.x);
     let theta = sin_cos_pi(uv.y);

@@ -1,5 +1,5 @@
-//! Mathematics without a subject of its own: frames, random numbers, colour, packed directions, alias
-//! tables.
+//! Mathematics that several stages share: frames, random numbers, colour, packed directions, alias
+//! tables and the order of refinement.
 
 pub mod alias;
 pub mod colour;

@@ -1,12 +1,11 @@
-//! Unit vectors in 32 bits: octahedral map, 16 bits per coordinate. Twin: `unpack_normal` in
-//! `bvh.glsl`.
+//! Unit vectors in 32 bits: octahedral map, 16 bits per coordinate. Twin: `unpack_normal` in `bvh.glsl`.
 //!
 //! Z. H. Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors", JCGT
 //! 3(2), 2014.
 
 use glam::{Vec2, Vec3};
 
-/// Largest magnitude of a coordinate.
+/// Largest magnitude of a quantised coordinate.
 const SCALE: f32 = 32767.0;
 
 /// Folds the lower half of the octahedron over the upper, and back.
@@ -15,7 +14,7 @@ fn fold(p: Vec2) -> Vec2 {
     (Vec2::ONE - Vec2::new(p.y, p.x).abs()) * sign
 }
 
-/// Packs a unit vector; x in the low half.
+/// Packs a unit vector, x in the low half.
 pub fn pack(normal: Vec3) -> u32 {
     let n = normal / (normal.x.abs() + normal.y.abs() + normal.z.abs());
     let p = if n.z < 0.0 { fold(n.truncate()) } else { n.truncate() };
@@ -23,7 +22,7 @@ pub fn pack(normal: Vec3) -> u32 {
     quantise(p.x) | (quantise(p.y) << 16)
 }
 
-/// Unpacks a unit vector; within 1e-4 rad of what was packed.
+/// Unpacks a unit vector, within 1e-4 rad of the packed one.
 pub fn unpack(packed: u32) -> Vec3 {
     let p = Vec2::new((packed & 0xffff) as u16 as i16 as f32, (packed >> 16) as u16 as i16 as f32)
         / SCALE;

@@ -1,22 +1,21 @@
 //! Counter-based random numbers: (pixel, sample, dimension, seed) → numbers in [0, 1), without state.
 //!
-//! Twin of `glsl/include/random.glsl`, equal bit for bit. A *dimension* names a pair of numbers; all
-//! results are multiples of 2⁻²⁴, never 1.
+//! Bit-for-bit twin of `glsl/include/random.glsl`. A *dimension* names a pair of numbers. Every
+//! result is a multiple of 2⁻²⁴, never 1.
 //!
-//! [`random_2d`] gives padded Owen-scrambled Sobol points: within a pixel and dimension, every
-//! aligned run of 2ᵏ samples is a (0, k, 2)-net in base 2, and different dimensions, pixels and seeds
-//! are scrambled and shuffled by independent keys. Such samples depend on each other. Where the
-//! outcome of earlier samples decides how later numbers are used, [`random_independent_2d`] has to
-//! be taken, or the result is biased.
+//! [`random_2d`] returns padded Owen-scrambled Sobol points. Within a pixel and dimension, every
+//! aligned run of 2ᵏ samples is a (0, k, 2)-net in base 2; independent keys scramble and shuffle
+//! different dimensions, pixels and seeds. Such samples depend on each other: where the outcome of
+//! earlier samples decides how later numbers are used, only [`random_independent_2d`] is unbiased.
 //!
 //! Sources: Burley 2020, "Practical Hash-based Owen Scrambling", JCGT 9(4); Laine & Karras 2011,
 //! "Stratified Sampling for Stochastic Transparency"; Vegdahl 2021, "Building a Better LK Hash";
 //! Jarzynski & Olano 2020, "Hash Functions for GPU Rendering", JCGT 9(3).
 
-/// Stands in the sample's place when the keys of [`random_2d`] are hashed.
+/// Takes the place of the sample index when [`random_2d`] hashes its keys.
 const RANDOM_KEY_TAG: u32 = 0x9e37_79b9;
 
-/// PCG4D: four well-mixed words from four words. Jarzynski & Olano 2020.
+/// PCG4D: hashes four words into four well-mixed words. Jarzynski & Olano 2020.
 pub fn hash_4d(v: [u32; 4]) -> [u32; 4] {
     let [mut x, mut y, mut z, mut w] =
         v.map(|word| word.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
@@ -32,8 +31,8 @@ pub fn hash_4d(v: [u32; 4]) -> [u32; 4] {
     [x, y, z, w]
 }
 
-/// Laine–Karras permutation: every bit is flipped depending on the key and the bits below it, which
-/// is Owen scrambling of a bit-reversed number. Constants: Vegdahl 2021.
+/// Laine–Karras permutation: flips every bit depending on the key and the bits below it, which is
+/// Owen scrambling of a bit-reversed number. Constants: Vegdahl 2021.
 fn laine_karras_permutation(mut x: u32, key: u32) -> u32 {
     x ^= x.wrapping_mul(0x3d20_adea);
     x = x.wrapping_add(key);
@@ -43,10 +42,10 @@ fn laine_karras_permutation(mut x: u32, key: u32) -> u32 {
     x
 }
 
-/// Bit-reversed second coordinate of the Sobol sequence.
+/// Second coordinate of the Sobol sequence, bit-reversed.
 ///
-/// The direction numbers of the polynomial x + 1 form Pascal's triangle modulo 2, a Kronecker power
-/// of a 2×2 matrix; it factors into one step per bit of the bit index.
+/// The direction numbers of the polynomial x + 1 form Pascal's triangle modulo 2. That is a Kronecker
+/// power of a 2×2 matrix and factors into one step per bit of the bit index.
 fn reversed_sobol_1(mut index: u32) -> u32 {
     index ^= (index >> 1) & 0x5555_5555;
     index ^= (index >> 2) & 0x3333_3333;
@@ -56,17 +55,17 @@ fn reversed_sobol_1(mut index: u32) -> u32 {
     index
 }
 
-/// Integer to a multiple of 2⁻²⁴ in [0, 1).
+/// Maps an integer to a multiple of 2⁻²⁴ in [0, 1).
 fn unit_float(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// Keys of one pixel and dimension: of the shuffled index and of the two coordinates.
+/// Keys of one pixel and dimension, for the shuffled index and the two coordinates.
 fn random_keys(pixel: u32, dimension: u32, seed: u32) -> [u32; 4] {
     hash_4d([pixel, RANDOM_KEY_TAG, dimension, seed])
 }
 
-/// Sample `sample_index` of the shuffled, Owen-scrambled Sobol (0,2)-sequence of this pixel and
+/// Point `sample_index` of the shuffled, Owen-scrambled Sobol (0,2)-sequence of this pixel and
 /// dimension. Burley 2020.
 pub fn random_2d(pixel: u32, sample_index: u32, dimension: u32, seed: u32) -> [f32; 2] {
     let keys = random_keys(pixel, dimension, seed);
@@ -81,7 +80,7 @@ pub fn random_1d(pixel: u32, sample_index: u32, dimension: u32, seed: u32) -> f3
     random_2d(pixel, sample_index, dimension, seed)[0]
 }
 
-/// Numbers without any relation between samples, pixels or dimensions.
+/// Pair of numbers independent across samples, pixels and dimensions.
 pub fn random_independent_2d(pixel: u32, sample_index: u32, dimension: u32, seed: u32) -> [f32; 2] {
     let bits = hash_4d([pixel, sample_index, dimension, seed]);
     [unit_float(bits[0]), unit_float(bits[1])]

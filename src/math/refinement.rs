@@ -1,12 +1,12 @@
-//! The order in which adaptive partitions are refined, those of fits and that of the guide.
+//! Order in which fits and the guide refine their adaptive partitions.
 
 use std::cmp::Ordering;
 
-/// A part that waits to be split: the largest priority is next, the older one where two are equal.
+/// Part that waits to be split: the largest priority is next, the older part on a tie.
 pub struct Queued {
-    /// How much a split is worth.
+    /// Worth of a split.
     pub priority: f64,
-    /// Which part.
+    /// Index of the part.
     pub index: usize,
 }
 

@@ -2,19 +2,19 @@
 
 use glam::Vec3;
 
-/// Perspective camera; right-handed, looks from `position` to `look_at`.
+/// Right-handed perspective camera that looks from `position` to `look_at`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Centre of projection, metres.
     pub position: Vec3,
-    /// Point in the middle of the image, metres.
+    /// Point at the centre of the image, metres.
     pub look_at: Vec3,
     /// Direction that points up in the image; need not be orthogonal to the view.
     pub up: Vec3,
-    /// Angle between the lower and the upper edge of the image, degrees.
+    /// Angle between the bottom and top edges of the image, degrees.
     pub vertical_fov_deg: f32,
-    /// Radius of the thin lens, metres; 0 is a pinhole.
+    /// Radius of the thin lens, metres; 0 for a pinhole.
     pub aperture_radius: f32,
-    /// Distance from the lens to the plane in focus along the view axis, metres.
+    /// Distance along the view axis from the lens to the plane of focus, metres.
     pub focus_distance: f32,
 }

@@ -5,13 +5,13 @@ use super::{mesh::Mesh, transform::Transform};
 /// Largest magnitude of a coordinate, metres; products of four coordinates stay finite in `f32`.
 pub const MAX_COORDINATE: f32 = 1e9;
 
-/// Every triangle of the scene in world space; one mesh used many times is repeated here.
+/// All triangles of the scene in world space; a mesh that is used many times is repeated.
 #[derive(Clone, Debug, Default)]
 pub struct Geometry {
     /// Vertex positions, metres.
     pub positions: Vec<[f32; 3]>,
-    /// Unit vertex normals, for shading only; as long as `positions`. A zero vector marks a vertex of
-    /// a mesh without normals: its triangles are flat-shaded.
+    /// Unit vertex normals, for shading only; as long as `positions`. A zero vector marks a vertex
+    /// without a normal: its triangles are flat-shaded.
     pub normals: Vec<[f32; 3]>,
     /// Three vertex indices per triangle, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
@@ -19,26 +19,26 @@ pub struct Geometry {
     pub materials: Vec<u32>,
 }
 
-/// What was left out of a mesh when it was placed.
+/// Counts of what [`Geometry::append`] leaves out of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {
-    /// Triangles without area, or too small for the direction of their normal to be computed.
+    /// Triangles without area, or too small to compute the direction of their normal.
     pub degenerate: usize,
     /// Triangles with an infinite or NaN corner.
     pub non_finite: usize,
-    /// Vertex normals that were infinite or NaN; their triangles are flat-shaded.
+    /// Infinite or NaN vertex normals; their triangles are flat-shaded.
     pub normals: usize,
 }
 
 impl Geometry {
-    /// Places a mesh in the world; `material_of` gives the material of a triangle of the mesh.
+    /// Places a mesh in the world; `material_of` gives the material of each triangle of the mesh.
     ///
-    /// Keeps every vertex, so that indices stay as they are; one with a position that is not finite is
-    /// put where the object's origin is, and no triangle uses it.
+    /// Keeps every vertex, so that indices stay valid. A vertex whose position is not finite moves
+    /// to the object's origin, and no triangle uses it.
     ///
     /// # Panics
-    ///
-    /// Panics where the vertices would be more than 32-bit indices can tell apart.
+    /// Panics if 32-bit indices cannot address all vertices, or if a mesh has normals but not one
+    /// per vertex.
     pub fn append(
         &mut self,
         mesh: &Mesh,
@@ -87,7 +87,7 @@ fn is_finite(vector: [f32; 3]) -> bool {
     vector.iter().all(|component| component.is_finite())
 }
 
-/// Whether single precision can tell the direction of a triangle's normal.
+/// Tests whether single precision resolves the direction of a triangle's normal.
 fn has_normal(corners: [[f32; 3]; 3]) -> bool {
     let [a, b, c] = corners.map(glam::Vec3::from_array);
     let squared = (b - a).cross(c - a).length_squared();

@@ -8,10 +8,10 @@ use sha2::{Digest, Sha256};
 use super::{Filter, Scene};
 use crate::brdf::material::{ConductorFresnel, MaterialKind};
 
-/// Lower-case hexadecimal digest of camera, film, environment, materials and geometry.
+/// Hashes camera, film, environment, materials and geometry; lower-case hexadecimal.
 ///
-/// Names, paths and the order of the text do not enter. Every array is preceded by its length, every
-/// variant by a tag, so that no two scenes give the same bytes.
+/// Names, paths and the order of the text do not enter. A length precedes every array and a tag
+/// every variant, so that no two scenes give the same bytes.
 pub fn hash(scene: &Scene) -> String {
     let mut hasher = Hasher(Sha256::new());
     let camera = &scene.camera;
@@ -35,14 +35,14 @@ pub fn hash(scene: &Scene) -> String {
     hasher.finish()
 }
 
-/// Lower-case hexadecimal digest of the environment alone.
+/// Hashes the environment alone; lower-case hexadecimal.
 pub fn environment_hash(scene: &Scene) -> String {
     let mut hasher = Hasher(Sha256::new());
     hasher.environment(scene);
     hasher.finish()
 }
 
-/// Lower-case hexadecimal digest of what can be in the way of light: positions and triangles.
+/// Hashes positions and triangles, all that can block light; lower-case hexadecimal.
 pub fn geometry_hash(scene: &Scene) -> String {
     let mut hasher = Hasher(Sha256::new());
     hasher.array(bytemuck::cast_slice(&scene.geometry.positions));

@@ -1,4 +1,4 @@
-//! What the user wrote, turned into a validated [`Scene`]. No GPU types.
+//! Scene file and the files it names → validated [`Scene`]. No GPU types.
 
 pub mod camera;
 pub mod environment;
@@ -19,12 +19,12 @@ pub use environment::EnvironmentMap;
 pub use geometry::Geometry;
 pub use hash::{environment_hash, geometry_hash};
 
-/// Reconstruction filter of the film, importance sampled so that every sample belongs to one pixel.
+/// Reconstruction filter, importance-sampled so that every sample belongs to one pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Filter {
-    /// One pixel wide box.
+    /// Box one pixel wide.
     Box,
-    /// Gaussian of standard deviation ½ pixel, cut off at 1.5 pixels.
+    /// Gaussian with a standard deviation of ½ pixel, cut off at 1.5 pixels.
     Gaussian,
 }
 
@@ -39,12 +39,12 @@ pub struct FilmSettings {
     pub filter: Filter,
 }
 
-/// A validated scene in world space.
+/// Validated scene in world space.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// Name: the file's stem, or its folder's name where the file is called `scene`.
+    /// Stem of the file, or the name of its folder if the stem is `scene`.
     pub name: String,
-    /// The scene file.
+    /// Path of the scene file.
     pub path: PathBuf,
     /// Viewer.
     pub camera: Camera,
@@ -54,9 +54,9 @@ pub struct Scene {
     pub environment: EnvironmentMap,
     /// Materials; [`Geometry::materials`] indexes them. Never empty.
     pub materials: Vec<Material>,
-    /// Every triangle, in world space.
+    /// All triangles, in world space.
     pub geometry: Geometry,
-    /// What was repaired on the way, for the log.
+    /// Warnings from loading, repairs among them, for the log.
     pub warnings: Vec<String>,
     /// SHA-256 of everything that changes the picture: camera, film, environment texels, materials
     /// with their tables, geometry. Lower-case hexadecimal.

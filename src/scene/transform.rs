@@ -1,4 +1,4 @@
-//! Placement of an object: scale, then turns about X, Y, Z, then a shift.
+//! Placement of an object: scale, then rotations about X, Y and Z, then a translation.
 
 use glam::{DMat3, DVec3, Mat3, Vec3};
 
@@ -7,16 +7,16 @@ use glam::{DMat3, DVec3, Mat3, Vec3};
 pub struct Transform {
     /// Linear part.
     pub linear: Mat3,
-    /// Shift, metres.
+    /// Translation, metres.
     pub translate: Vec3,
-    /// Inverse transpose of the linear part: takes normals, up to their length.
+    /// Inverse transpose of the linear part, up to a positive factor; transforms normals.
     pub normal: Mat3,
-    /// The linear part mirrors: triangles must be wound the other way.
+    /// True if the linear part mirrors: triangles must reverse their winding.
     pub mirrors: bool,
 }
 
 impl Transform {
-    /// From the numbers of a scene file; no component of `scale` may be 0.
+    /// Builds the transform from the numbers of a scene file; no component of `scale` may be 0.
     pub fn new(scale: [f32; 3], rotate_deg: [f32; 3], translate: [f32; 3]) -> Self {
         let [x, y, z] = rotate_deg.map(sine_cosine_deg);
         let rotate_x =
@@ -31,19 +31,19 @@ impl Transform {
         Self {
             linear: (rotation * DMat3::from_diagonal(scale)).as_mat3(),
             translate: Vec3::from_array(translate),
-            // Scaled back to the size of the numbers in `rotation`, so that it neither over- nor
-            // underflows in single precision.
+            // Scale back to the size of the numbers in `rotation`, so that single precision neither
+            // overflows nor underflows.
             normal: (rotation * DMat3::from_diagonal(scale.abs().min_element() / scale)).as_mat3(),
             mirrors: scale.x * scale.y * scale.z < 0.0,
         }
     }
 
-    /// Object space to world space.
+    /// Transforms a position from object space to world space.
     pub fn position(&self, position: [f32; 3]) -> [f32; 3] {
         (self.linear * Vec3::from_array(position) + self.translate).to_array()
     }
 
-    /// Unit normal in world space; zero where the normal has no direction.
+    /// Transforms a normal to a unit normal in world space; zero if it has no direction.
     pub fn normal(&self, normal: [f32; 3]) -> [f32; 3] {
         let normal = self.normal * Vec3::from_array(normal).normalize_or_zero();
         normal.normalize_or_zero().to_array()

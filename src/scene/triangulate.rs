@@ -1,19 +1,19 @@
 //! Simple polygon → triangles, by ear clipping.
 //!
 //! Meisters, "Polygons have ears", 1975: every simple polygon with more than three corners has two
-//! ears, triangles of three consecutive corners that hold no other corner. Cutting them off one by one
-//! leaves n − 2 triangles. Choosing the best ear every time costs O(n³), so long outlines take the first
-//! ear, and polygons beyond [`MAX_CLIPPED_CORNERS`] become fans: no input takes longer than a second.
+//! ears, triangles of three consecutive corners that contain no other corner. Clipping them one by
+//! one leaves n − 2 triangles. Choosing the best each time costs O(n³), so long outlines take the first
+//! ear and polygons beyond [`MAX_CLIPPED_CORNERS`] become fans: no input takes longer than a second.
 
 use glam::{DVec2, DVec3};
 
-/// Most corners of a polygon that is cut into ears; a longer one becomes a fan, right where convex.
+/// Most corners of a polygon that is clipped; a longer one becomes a fan, correct where convex.
 pub const MAX_CLIPPED_CORNERS: usize = 1024;
 
-/// Most remaining corners among which the best ear is looked for.
+/// Most remaining corners among which the best ear is searched for.
 const MAX_BEST_CORNERS: usize = 64;
 
-/// Triangles of a polygon in space, cut in the plane of its Newell normal; indices into `positions`.
+/// Triangulates a polygon in space in the plane of its Newell normal; indices into `positions`.
 pub fn triangulate_in_space(positions: &[[f32; 3]]) -> Vec<[usize; 3]> {
     let positions: Vec<_> =
         positions.iter().map(|position| DVec3::from_array(position.map(f64::from))).collect();
@@ -21,7 +21,7 @@ pub fn triangulate_in_space(positions: &[[f32; 3]]) -> Vec<[usize; 3]> {
     let next = positions.iter().cycle().skip(1);
     let normal: DVec3 =
         positions.iter().zip(next).map(|(from, to)| (from - origin).cross(to - origin)).sum();
-    // A polygon without area keeps some plane; whoever uses its triangles drops them.
+    // A polygon without area gets an arbitrary plane; whoever uses its triangles drops them.
     let (x_axis, y_axis) = normal.try_normalize().unwrap_or(DVec3::Z).any_orthonormal_pair();
     let outline: Vec<_> = positions
         .iter()
@@ -32,10 +32,10 @@ pub fn triangulate_in_space(positions: &[[f32; 3]]) -> Vec<[usize; 3]> {
     triangulate(&outline)
 }
 
-/// Triangles of a simple polygon as indices into `outline`, wound as the outline is.
+/// Triangulates a simple polygon; indices into `outline`, wound as the outline is.
 ///
-/// Where the outline crosses or touches itself no ear may be left; the rest is then closed with a fan,
-/// so that there are always n − 2 triangles.
+/// An outline that crosses or touches itself may run out of ears. A fan then closes the rest, so
+/// that there are always n − 2 triangles.
 pub fn triangulate(outline: &[DVec2]) -> Vec<[usize; 3]> {
     let turn = signed_area(outline).signum();
     let mut remaining: Vec<usize> = (0..outline.len()).collect();
@@ -52,13 +52,13 @@ pub fn triangulate(outline: &[DVec2]) -> Vec<[usize; 3]> {
     triangles
 }
 
-/// Area of a polygon, positive where it is counter-clockwise.
+/// Area of a polygon, positive if counter-clockwise.
 pub fn signed_area(outline: &[DVec2]) -> f64 {
     let next = outline.iter().cycle().skip(1);
     0.5 * outline.iter().zip(next).map(|(from, to)| from.perp_dot(*to)).sum::<f64>()
 }
 
-/// Whether no two sides of the closed outline cross and no corner lies on another side.
+/// Tests that no two sides of the closed outline cross and no corner lies on another side.
 pub fn is_simple(outline: &[DVec2]) -> bool {
     let count = outline.len();
     let side = |index: usize| (outline[index], outline[(index + 1) % count]);
@@ -67,7 +67,7 @@ pub fn is_simple(outline: &[DVec2]) -> bool {
             let adjacent = second == first + 1 || (first == 0 && second == count - 1);
             let ((a, b), (c, d)) = (side(first), side(second));
             if adjacent {
-                // Neighbours share a corner; they must not fold back onto each other.
+                // Neighbouring sides share a corner; they must not fold back onto each other.
                 let (corner, before, after) =
                     if second == first + 1 { (b, a, d) } else { (a, c, b) };
                 let (back, on) = (before - corner, after - corner);
@@ -98,7 +98,7 @@ fn neighbours(remaining: &[usize], index: usize) -> (usize, usize) {
     (remaining[(index + count - 1) % count], remaining[(index + 1) % count])
 }
 
-/// The ear with the most area for its longest side, so that slivers are left for last; the first ear
+/// Finds the ear with the most area for its longest side, so that slivers come last; the first ear
 /// where many corners remain.
 fn best_ear(outline: &[DVec2], remaining: &[usize], turn: f64) -> Option<usize> {
     let mut best = None;
@@ -110,7 +110,7 @@ fn best_ear(outline: &[DVec2], remaining: &[usize], turn: f64) -> Option<usize> 
         let area = turn * (b - a).perp_dot(c - a);
         let longest = (b - a).length_squared().max((c - b).length_squared());
         let quality = area / longest.max((a - c).length_squared());
-        // NaN compares false and so is no ear.
+        // NaN compares false, so it is never an ear.
         if quality > best_quality
             && !remaining.iter().any(|&other| {
                 let point = outline[other];

@@ -10,8 +10,8 @@ use super::{
 };
 use crate::math::random::random_independent_1d;
 
-/// A narrow courtyard under a bright strip of sky: plastered facades with rows of windows, some of
-/// which glint, an arcade at the ground and paving.
+/// Narrow courtyard under a bright strip of sky: plastered facades with rows of windows, some of
+/// them glinting, an arcade at the ground and paving.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CourtParameters {
@@ -31,11 +31,11 @@ pub struct CourtParameters {
     pub window_spacing: f32,
     /// Share of the windows that mirror bright sky, 0…1.
     pub glint_share: f32,
-    /// Radiance of such a window.
+    /// Radiance of a glinting window.
     pub glint: [f32; 3],
-    /// Radiance of the sky straight up; it is brighter toward −Z.
+    /// Radiance of the sky at the zenith; it brightens toward −Z.
     pub sky: [f32; 3],
-    /// Reflectance of the facades, 0…1; a sooty stone is about 0.15.
+    /// Reflectance of the facades, 0…1; sooty stone is about 0.15.
     pub facade: [f32; 3],
     /// Chooses which windows glint and the irregularities of plaster and paving.
     pub seed: u32,
@@ -61,10 +61,10 @@ impl Default for CourtParameters {
 }
 
 impl EnvironmentMap {
-    /// The map of [`CourtParameters`], its radiance times `scale`, turned by `rotation_deg`.
+    /// Renders the map of `parameters`, radiance times `scale`, rotated by `rotation_deg`.
     ///
     /// # Errors
-    /// A message that names the parameter, its value and what is allowed.
+    /// Returns a message that names the parameter, its value and the allowed range.
     pub fn court(
         parameters: &CourtParameters,
         scale: f32,
@@ -89,12 +89,12 @@ impl EnvironmentMap {
     }
 }
 
-/// A number in [0, 1) for a place, as irregularity.
+/// Random number in [0, 1) per place, for irregularities.
 fn irregularity(parameters: &CourtParameters, kind: u32, x: i32, y: i32) -> f32 {
     random_independent_1d(x as u32, y as u32, kind, parameters.seed)
 }
 
-/// What the middle of the court sees: the nearest of paving, facades and sky.
+/// Radiance at the middle of the court: the nearest of paving, facades and sky.
 fn court_radiance(parameters: &CourtParameters, direction: Vec3) -> Vec3 {
     let (half_width, half_length) = (0.5 * parameters.court_width, 0.5 * parameters.court_length);
     let to_long_facade = half_width / direction.x.abs();
@@ -122,25 +122,25 @@ fn court_radiance(parameters: &CourtParameters, direction: Vec3) -> Vec3 {
     facade_radiance(parameters, side, along, height)
 }
 
-/// Whether a point lies under a round arch that stands on the ground around `along` = 0.
+/// Tests whether a point lies under a round arch that stands on the ground around `along` = 0.
 fn inside_arch(along: f32, height: f32, half_width: f32, arch_height: f32) -> bool {
     let spring = (arch_height - half_width).max(0.0);
     let rise = (height - spring).max(0.0) * half_width / (arch_height - spring);
     along * along + rise * rise < half_width * half_width
 }
 
-/// Radiance of reflected sky for a surface that gets the share `sky_share` of an open sky's
-/// irradiance, with a little light from the opposite walls.
+/// Radiance that a surface reflects when it receives the share `sky_share` of an open sky's
+/// irradiance and a little light from the opposite walls.
 fn lit(parameters: &CourtParameters, sky_share: f32) -> Vec3 {
     Vec3::from(parameters.facade) * Vec3::from(parameters.sky) * (0.85 * sky_share + 0.05)
 }
 
-/// Slabs with joints, lit by the strip of sky between the long facades.
+/// Radiance of slabs with joints, lit by the strip of sky between the long facades.
 fn paving_radiance(parameters: &CourtParameters, x: f32, z: f32) -> Vec3 {
     let half_width = 0.5 * parameters.court_width;
     let to_edge = |distance: f32| distance / distance.hypot(parameters.facade_height);
     let sky_share = 0.5 * (to_edge(half_width - x) + to_edge(half_width + x));
-    // Half a course off, so that no joint runs through the point below the viewer.
+    // Shift by half a course, so that no joint runs through the point below the viewer.
     let z = z + 0.35;
     let course = (z / 0.7).floor();
     let offset = irregularity(parameters, 0, course as i32, 0);
@@ -150,9 +150,9 @@ fn paving_radiance(parameters: &CourtParameters, x: f32, z: f32) -> Vec3 {
     lit(parameters, sky_share) * shade * if joint { 0.55 } else { 0.8 }
 }
 
-/// Arcade, storeys of windows between cornices, eaves.
+/// Radiance of a facade: arcade, storeys of windows between cornices, eaves.
 fn facade_radiance(parameters: &CourtParameters, side: i32, along: f32, height: f32) -> Vec3 {
-    // Sky above the opposite roof, for an infinitely long court.
+    // Share of the sky above the opposite roof, for an infinitely long court.
     let depth = parameters.facade_height - height;
     let sky_share = 0.5 * (1.0 - depth / depth.hypot(parameters.court_width));
     let plaster = lit(parameters, sky_share);
@@ -180,7 +180,7 @@ fn facade_radiance(parameters: &CourtParameters, side: i32, along: f32, height: 
     if in_storey > 0.96 {
         return plaster * 0.6;
     }
-    // Windows: a light surround, two by three panes, the lintel above.
+    // Windows: a light surround, two by three panes, a lintel above.
     let across = from_axis.abs() / parameters.window_spacing;
     let up = (in_storey - 0.25) / 0.5;
     if across < 0.15 && (0.0..1.0).contains(&up) {

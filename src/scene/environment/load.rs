@@ -1,4 +1,4 @@
-//! Environment maps from files: radiance `.hdr`, OpenEXR, PFM.
+//! Environment maps from files: Radiance `.hdr`, OpenEXR, PFM.
 
 use std::{fs, io::Cursor, path::Path};
 
@@ -13,10 +13,10 @@ use rayon::prelude::*;
 use super::{EnvironmentMap, MAX_RADIANCE};
 use crate::error::{Error, Result};
 
-/// Most texels a map may have: 16384×8192.
+/// Most texels of a map: 16384×8192.
 const MAX_TEXELS: u64 = 1 << 27;
 
-/// Radiance as the file has it, the first row at the top.
+/// Radiance as stored in the file, top row first.
 struct Image {
     width: u32,
     height: u32,
@@ -24,15 +24,15 @@ struct Image {
 }
 
 impl EnvironmentMap {
-    /// Reads a lat-long map; the format follows from the extension: `.hdr`, `.exr` or `.pfm`.
+    /// Reads a lat-long map in the format of its extension: `.hdr`, `.exr` or `.pfm`.
     ///
-    /// Radiance is multiplied by `scale`; the map is turned by `rotation_deg` about +Y,
-    /// counter-clockwise seen from above. Texels with a negative, infinite or NaN component become 0
-    /// with a warning that counts them; a ratio other than 2:1 and an all-black map are warnings.
+    /// Multiplies radiance by `scale` and rotates the map by `rotation_deg` about +Y,
+    /// counter-clockwise seen from above. Sets texels with a negative, infinite or NaN component to
+    /// 0 and counts them in a warning. Warns of a ratio other than 2:1 and of an all-black map.
     ///
     /// # Errors
-    /// [`Error::Io`] where the file cannot be read, [`Error::Format`] where it is truncated, of
-    /// another format, of an absurd size or without the channels R, G, B or Y.
+    /// [`Error::Io`] if the file cannot be read, [`Error::Format`] if it is truncated, of another
+    /// format, of an absurd size or without the channels R, G, B or Y.
     pub fn load(
         path: &Path,
         scale: f32,
@@ -76,7 +76,7 @@ impl EnvironmentMap {
         Ok(map)
     }
 
-    /// Applies `scale`, sets texels that are not radiance to 0 and warns of them and of a black map.
+    /// Applies `scale`, sets texels that are not radiance to 0, and warns of them and of a black map.
     fn clean(&mut self, scale: f32, warnings: &mut Vec<String>) {
         let invalid = self
             .texels
@@ -104,7 +104,7 @@ impl EnvironmentMap {
     }
 }
 
-/// Refuses a scale that is negative or not finite and a rotation that is not finite.
+/// Rejects a scale that is negative or not finite and a rotation that is not finite.
 pub(super) fn check_placement(scale: f32, rotation_deg: f32) -> Result<(), String> {
     if !(scale.is_finite() && scale >= 0.0) {
         return Err(format!("scale = {scale}; expected a finite number, 0 or more"));
@@ -134,7 +134,7 @@ fn read_hdr(bytes: &[u8]) -> Result<Image, String> {
     Ok(Image { width, height, texels: bytemuck::cast_vec(components) })
 }
 
-/// The first layer with the channels R, G, B, else the first with Y.
+/// Reads the first layer with the channels R, G, B, else the first with Y.
 fn read_exr(bytes: &[u8]) -> Result<Image, String> {
     let message = |error: exr::error::Error| format!("not a readable OpenEXR file: {error}");
     let meta =
@@ -160,7 +160,7 @@ fn read_exr(bytes: &[u8]) -> Result<Image, String> {
             }
         }
     }
-    // Zeroed by the system on first use: a damaged header may claim what the file does not hold.
+    // Let the system zero pages on first use: a damaged header may claim more than the file holds.
     let size = |size: Vec2<usize>| (size.width(), bytemuck::zeroed_vec::<Vec3>(size.area()));
     let channels = exr::prelude::read().no_deep_data().largest_resolution_level();
     let read = Cursor::new(bytes);
@@ -205,8 +205,8 @@ fn read_exr(bytes: &[u8]) -> Result<Image, String> {
     Ok(Image { width: width as u32, height: height as u32, texels })
 }
 
-/// Portable float map: `PF` or `Pf`, width, height, scale (negative for little-endian), then rows of
-/// floats from the bottom up. The magnitude of the scale is ignored, as most readers do.
+/// Reads a portable float map: `PF` or `Pf`, width, height, scale (negative for little-endian),
+/// then rows of floats from the bottom up. Ignores the magnitude of the scale, as most readers do.
 fn read_pfm(bytes: &[u8]) -> Result<Image, String> {
     let mut position = 0;
     let mut token = |what: &str| -> Result<&str, String> {

@@ -1,9 +1,9 @@
-//! Lat-long environment map: its orientation, its lookup and where it comes from.
+//! Lat-long environment map: orientation, lookup and sources.
 //!
 //! File or parameters → [`EnvironmentMap`] → [`EnvironmentTables`] → device buffers. Row 0 of the
 //! image is +Y, its centre looks along −Z, right of the centre is toward +X:
 //! u = 0.5 + atan2(x, −z)/2π, v = atan2(√(x² + z²), y)/π (`docs/environment_convention.svg`).
-//! Radiance between texel centres is bilinear, wrapping in u and clamped in v; camera, shading and
+//! Radiance is bilinear between texel centres, wrapping in u and clamped in v; camera, shading and
 //! sampling all see that one function.
 
 mod court;
@@ -21,11 +21,11 @@ pub use table::{EnvironmentSample, EnvironmentTables};
 
 use crate::math::frame::lat_long_from_direction;
 
-/// Largest radiance a texel may have after scaling; more is treated as infinite, because squares of
-/// it summed over a million samples would leave single precision.
+/// Largest radiance of a texel after scaling. Larger values count as infinite, because their
+/// squares summed over a million samples would leave single precision.
 pub const MAX_RADIANCE: f32 = 1e16;
 
-/// Lat-long radiance image after cleaning, scaling and before rotation.
+/// Lat-long radiance image, cleaned and scaled but not rotated.
 ///
 /// Row 0 is +Y; the image centre looks along −Z; right of the centre is toward +X.
 #[derive(Clone, Debug)]
@@ -34,18 +34,18 @@ pub struct EnvironmentMap {
     pub width: u32,
     /// Height in texels.
     pub height: u32,
-    /// Radiance, row by row, `width * height` texels; finite and not negative, `scale` applied.
+    /// Radiance row by row, `width * height` texels; finite, not negative, `scale` applied.
     pub texels: Vec<Vec3>,
-    /// Turn of the map about +Y, radians, counter-clockwise seen from above.
+    /// Rotation of the map about +Y, radians, counter-clockwise seen from above.
     pub rotation_rad: f32,
-    /// Where the map came from, for messages and metadata: a path, or `constant`, `court`, `sky`.
+    /// Source of the map, for messages and metadata: a path, or `constant`, `court`, `sky`.
     pub source: String,
 }
 
-/// A cell between four texel centres, with the position inside it.
+/// Radiance at the four texel centres around a cell.
 ///
-/// Row `j` of cells lies between texel rows `j - 1` and `j`, so that the first and the last row are
-/// half cells; column `i` lies between texel columns `i` and `i + 1`, wrapping.
+/// Row `j` of cells lies between texel rows `j - 1` and `j`, so that the first and last rows are
+/// half cells. Column `i` lies between texel columns `i` and `i + 1`, wrapping.
 struct Cell {
     c00: Vec3,
     c10: Vec3,
@@ -61,10 +61,10 @@ impl Cell {
 }
 
 impl EnvironmentMap {
-    /// `radiance` times `scale` from everywhere.
+    /// Map of `radiance` times `scale` in every direction.
     ///
     /// # Errors
-    /// A message where the product is negative, infinite (above [`MAX_RADIANCE`]) or NaN.
+    /// Returns a message if the product is negative, infinite (above [`MAX_RADIANCE`]) or NaN.
     pub fn constant(radiance: Vec3, scale: f32) -> Result<Self, String> {
         let texel = radiance * scale;
         if !texel.to_array().iter().all(|value| (0.0..=MAX_RADIANCE).contains(value)) {
@@ -73,8 +73,8 @@ impl EnvironmentMap {
                  {MAX_RADIANCE:e}"
             ));
         }
-        // Rows of cells low enough that the sampling density, which follows sin θ from row to row
-        // only, is nearly uniform.
+        // Use rows so low that the sampling density, which follows sin θ only from row to row, is
+        // nearly uniform.
         let (width, height) = (64, 32);
         Ok(Self {
             width,
@@ -85,13 +85,13 @@ impl EnvironmentMap {
         })
     }
 
-    /// Turns a direction from the world into the frame of the map.
+    /// Rotates a direction from the world into the frame of the map.
     fn map_from_world(&self, direction: Vec3) -> Vec3 {
         let (s, c) = self.rotation_rad.sin_cos();
         Vec3::new(c * direction.x - s * direction.z, direction.y, s * direction.x + c * direction.z)
     }
 
-    /// Turns a direction from the frame of the map into the world.
+    /// Rotates a direction from the frame of the map into the world.
     fn world_from_map(&self, direction: Vec3) -> Vec3 {
         let (s, c) = self.rotation_rad.sin_cos();
         Vec3::new(c * direction.x + s * direction.z, direction.y, c * direction.z - s * direction.x)
@@ -112,8 +112,8 @@ impl EnvironmentMap {
         }
     }
 
-    /// Column and row of the cell between texel centres that a unit direction lies in, and where in it.
-    /// Twin of `environment_locate`.
+    /// Finds the cell that contains a unit direction: its column, its row, and the position inside
+    /// it. Twin of `environment_locate`.
     pub fn locate(&self, direction: Vec3) -> (u32, u32, Vec2) {
         let uv = lat_long_from_direction(self.map_from_world(direction));
         let x = uv.x * self.width as f32 - 0.5;

@@ -1,4 +1,4 @@
-//! What the procedural maps share: checks of parameters and antialiased rendering of directions.
+//! Parameter checks and antialiased rendering that the procedural maps share.
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -7,7 +7,7 @@ use super::{EnvironmentMap, MAX_RADIANCE};
 use crate::math::frame::direction_from_lat_long;
 
 impl EnvironmentMap {
-    /// The map named `source` from its texels before scaling.
+    /// Builds the map named `source` from its texels before scaling.
     pub(super) fn procedural(
         source: &str,
         width: u32,
@@ -26,7 +26,7 @@ impl EnvironmentMap {
     }
 }
 
-/// Refuses an impossible width of a procedural map.
+/// Rejects an impossible width of a procedural map.
 pub(super) fn check_width(width: u32) -> Result<(), String> {
     if !(16..=16384).contains(&width) || width % 2 == 1 {
         return Err(format!("width = {width}; expected an even number of texels, 16…16384"));
@@ -34,7 +34,7 @@ pub(super) fn check_width(width: u32) -> Result<(), String> {
     Ok(())
 }
 
-/// Refuses a parameter outside `least`…`most`.
+/// Rejects a parameter outside `least`…`most`.
 pub(super) fn check_range(name: &str, value: f32, least: f32, most: f32) -> Result<(), String> {
     if !(least..=most).contains(&value) {
         return Err(format!("{name} = {value}; expected {least}…{most}"));
@@ -42,9 +42,9 @@ pub(super) fn check_range(name: &str, value: f32, least: f32, most: f32) -> Resu
     Ok(())
 }
 
-/// Refuses a radiance that is negative, NaN, or too large after scaling.
+/// Rejects a radiance that is negative, NaN, or too large after scaling.
 pub(super) fn check_radiance(name: &str, radiance: [f32; 3], scale: f32) -> Result<(), String> {
-    // Room for the factors by which the formulas brighten parts of the map.
+    // Leave room for the factors by which the formulas brighten parts of the map.
     let most = 0.01 * MAX_RADIANCE;
     if radiance
         .iter()
@@ -62,7 +62,7 @@ pub(super) fn texel_direction(width: u32, column: f32, row: f32) -> Vec3 {
     direction_from_lat_long(Vec2::new(column / width as f32, row / (width / 2) as f32))
 }
 
-/// Means of `radiance` over `grid`² directions per texel.
+/// Averages `radiance` over `grid`² directions per texel.
 pub(super) fn render(width: u32, grid: usize, radiance: impl Fn(Vec3) -> Vec3 + Sync) -> Vec<Vec3> {
     let mut texels = vec![Vec3::ZERO; (width * (width / 2)) as usize];
     texels.par_chunks_mut(width as usize).enumerate().for_each(|(row, texels)| {

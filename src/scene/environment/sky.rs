@@ -11,22 +11,21 @@ use super::{
 };
 use crate::math::frame::{lat_long_from_direction, sin_cos_pi};
 
-/// A clear sky with a sun disc above a uniform ground.
+/// Clear sky with a sun disc above a uniform ground.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SkyParameters {
     /// Width of the map in texels, even, 16…16384; the height is half of it.
     pub width: u32,
-    /// Radiance straight up.
+    /// Radiance at the zenith.
     pub zenith: [f32; 3],
     /// Radiance at the horizon.
     pub horizon: [f32; 3],
-    /// Radiance of the ground straight down; it fades into `horizon` in the last 2° below it.
+    /// Radiance of the ground; fades into `horizon` over the 2° just below the horizon.
     pub ground: [f32; 3],
     /// Height of the sun's centre above the horizon, degrees, 0…90.
     pub sun_elevation_deg: f32,
-    /// Direction of the sun, degrees clockwise seen from above, from −Z (the middle of the map)
-    /// toward +X.
+    /// Azimuth of the sun, degrees from −Z (the map's middle) toward +X, clockwise seen from above.
     pub sun_azimuth_deg: f32,
     /// Angular radius of the sun disc, degrees, above 0 and at most 45.
     pub sun_radius_deg: f32,
@@ -49,17 +48,17 @@ impl Default for SkyParameters {
     }
 }
 
-/// Points along each side of a texel at which the sun disc is tested.
+/// Points along each side of a texel that are tested against the sun disc.
 const SUN_GRID: usize = 16;
 
 impl EnvironmentMap {
-    /// The map of [`SkyParameters`], its radiance times `scale`, turned by `rotation_deg`.
+    /// Renders the map of `parameters`, radiance times `scale`, rotated by `rotation_deg`.
     ///
-    /// The sun's texels hold the power of its disc whatever the resolution: where the disc is smaller
-    /// than a texel, the texel is darker than `sun_radiance`.
+    /// The sun's texels hold the power of its disc at any resolution: a texel larger than the disc
+    /// is darker than `sun_radiance`.
     ///
     /// # Errors
-    /// A message that names the parameter, its value and what is allowed.
+    /// Returns a message that names the parameter, its value and the allowed range.
     pub fn sky(parameters: &SkyParameters, scale: f32, rotation_deg: f32) -> Result<Self, String> {
         check_placement(scale, rotation_deg)?;
         let SkyParameters { sun_elevation_deg, sun_azimuth_deg, sun_radius_deg, .. } = *parameters;
@@ -79,8 +78,8 @@ impl EnvironmentMap {
             Vec3::new(cos_elevation * sin_azimuth, sin_elevation, -cos_elevation * cos_azimuth);
         let mut texels = render(width, 1, |direction| sky_radiance(parameters, sun, direction));
 
-        // Share of every texel that the disc covers, then the share of the disc's solid angle that
-        // the texels got.
+        // Find the share of each texel that the disc covers, then the ratio of the disc's solid
+        // angle to the solid angle drawn.
         let radius = sun_radius_deg.to_radians();
         let cos_reach = (radius + 4.0 * std::f32::consts::PI / width as f32).cos();
         let chord_squared = 4.0 * (0.5 * radius).sin().powi(2);
@@ -124,7 +123,7 @@ impl EnvironmentMap {
     }
 }
 
-/// Sky and ground of [`SkyParameters`] without the sun disc.
+/// Radiance of sky and ground without the sun disc.
 fn sky_radiance(parameters: &SkyParameters, sun: Vec3, direction: Vec3) -> Vec3 {
     let horizon = Vec3::from(parameters.horizon);
     if direction.y < 0.0 {

@@ -4,17 +4,17 @@
 //! `environment_rows` and `environment_cells`. Twin of `environment_pdf` and `environment_sample`
 //! in `glsl/include/environment.glsl`.
 //!
-//! The atoms are the cells between four texel centres: `height + 1` rows of `width` cells, the first
-//! and the last row half as high, since v is clamped there. A cell is chosen with probability
-//! P = s(row) · ∬ lum L du dv / total over the cell, where s(row) is the mean of sin θ over the v of
-//! that row and total makes the sum 1; inside the cell (u, v) is drawn from the bilinear patch
-//! exactly. Hence, per steradian,
+//! Sampling chooses a cell between four texel centres, then a point inside it. There are
+//! `height + 1` rows of `width` cells; the first and last rows are half as high, since v is clamped
+//! there. A cell has probability P = s(row) · ∬ lum L du dv / total, where s(row) is the mean of
+//! sin θ over the v of its row and total makes the sum 1. Inside, (u, v) is drawn exactly from the
+//! bilinear patch. Hence, per steradian,
 //!
 //! pdf(ω) = lum L(ω) · s(row) / (total · 2π² sin θ),
 //!
-//! which needs no table per cell, and in which L/pdf varies only with sin θ within one row.
-//! Cumulative probabilities are single precision, so a cell's real probability within its row is off
-//! by up to 2⁻²⁴, with errors of opposite sign in its neighbours.
+//! and no table per cell is needed. Within a row, L/pdf varies only with sin θ. Cumulative
+//! probabilities are single precision, so a cell's probability within its row is off by up to 2⁻²⁴,
+//! with errors of opposite sign in its neighbours.
 
 use std::f64::consts::PI;
 
@@ -25,7 +25,7 @@ use super::EnvironmentMap;
 use crate::math::colour::luminance;
 use crate::math::frame::sin_cos_pi;
 
-/// Densities are evaluated no closer to a pole than this, so that they stay finite.
+/// Smallest sin θ at which densities are evaluated; keeps them finite at the poles.
 const MIN_SIN_THETA: f32 = 1e-7;
 
 /// Largest number below 1.
@@ -35,26 +35,25 @@ const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 #[derive(Clone, Debug)]
 pub struct EnvironmentTables {
     /// `2 * (height + 1)` numbers: the cumulative probability up to and including each row of cells
-    /// (1 from the last row that is not black on), then the mean of sin θ over each row; after them
-    /// the guide of the first (see `guide_size`).
+    /// (1 from the last row that is not black on), then the mean of sin θ over each row. Then the
+    /// guide of the former (see `guide_size`).
     pub rows: Vec<f32>,
-    /// For each of the `height + 1` rows `width` numbers, the cumulative probability, within the row,
-    /// up to and including each cell (1 from the last cell that is not black on; all 1 in a row that
-    /// is black), then their guide.
+    /// For each of the `height + 1` rows: `width` cumulative probabilities within the row, up to
+    /// and including each cell (1 from the last cell that is not black on; all 1 in a black row),
+    /// then their guide.
     pub cells: Vec<f32>,
-    /// Σ s(row) · ∬ lum L du dv over all cells; 0 for a black map, where [`Self::sample`] returns
-    /// the pdf 0.
+    /// Σ s(row) · ∬ lum L du dv over all cells; 0 for a black map, whose samples have pdf 0.
     pub total: f32,
 }
 
-/// A sampled direction.
+/// Sampled direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnvironmentSample {
     /// Unit direction in the world.
     pub direction: Vec3,
-    /// Radiance from there.
+    /// Radiance from that direction.
     pub radiance: Vec3,
-    /// Density per steradian; 0 where the map is black and nothing can be sampled.
+    /// Density per steradian; 0 if the map is black and nothing can be sampled.
     pub pdf: f32,
 }
 
@@ -70,7 +69,7 @@ pub(crate) fn mean_sine(row: u32, height: u32) -> f64 {
     }
 }
 
-/// Position in [0, 1) with density proportional to the linear interpolation from `a` to `b`.
+/// Draws a position in [0, 1) with density proportional to the line from `a` to `b`.
 fn sample_linear(a: f32, b: f32, u: f32) -> f32 {
     let sum = a + b;
     let start = if sum > 0.0 { a / sum } else { 0.5 };
@@ -83,8 +82,8 @@ fn lerp(a: f32, b: f32, t: f32) -> f32 {
     a * (1.0 - t) + b * t
 }
 
-/// Writes the cumulative distribution of `weights` as single precision: non-decreasing, equal to the
-/// previous entry where the weight is 0, 1 from the last positive weight on. Returns the sum.
+/// Writes the cumulative distribution of `weights` in single precision and returns their sum.
+/// Entries never decrease, repeat where a weight is 0, and are 1 from the last positive weight on.
 fn write_cumulative(weights: impl Iterator<Item = f64> + Clone, cumulative: &mut [f32]) -> f64 {
     let sum: f64 = weights.clone().sum();
     let last = weights.clone().enumerate().filter(|(_, weight)| *weight > 0.0).last();
@@ -97,12 +96,12 @@ fn write_cumulative(weights: impl Iterator<Item = f64> + Clone, cumulative: &mut
     sum
 }
 
-/// Intervals of the guide of a cumulative distribution of `count` entries: a power of two, so that
-/// u · size is exact, and at least half of `count`.
+/// Number of intervals in the guide of a cumulative distribution of `count` entries: a power of
+/// two, so that u · size is exact, and at least half of `count`.
 ///
-/// Entry k of the guide is the first index whose cumulative probability exceeds k / size, and the
-/// last entry the last index: u in interval k is found between entries k and k + 1. Chen & Asau 1974,
-/// "On Generating Random Variates from an Empirical Distribution".
+/// Entry k of the guide is the first index whose cumulative probability exceeds k / size; the last
+/// entry is the last index. A u in interval k is found between entries k and k + 1. Chen & Asau
+/// 1974, "On Generating Random Variates from an Empirical Distribution".
 pub fn guide_size(count: usize) -> usize {
     if count > 2 { 1 << (count - 1).ilog2() } else { 1 }
 }
@@ -120,7 +119,7 @@ fn write_guide(cumulative: &[f32], guide: &mut [f32]) {
     }
 }
 
-/// First index in `cumulative` whose entry exceeds `u`, with the probabilities before and up to it.
+/// Finds the first entry above `u`; returns its index, the entry before it and the entry.
 fn search(cumulative: &[f32], guide: &[f32], u: f32) -> (usize, f32, f32) {
     let interval = (u * (guide.len() - 1) as f32) as usize;
     let (mut first, mut last) = (guide[interval] as usize, guide[interval + 1] as usize);
@@ -137,7 +136,7 @@ fn search(cumulative: &[f32], guide: &[f32], u: f32) -> (usize, f32, f32) {
 }
 
 impl EnvironmentTables {
-    /// Tables of `map`; O(texels), in parallel over rows, summed in double precision.
+    /// Builds the tables of `map` in O(texels), in parallel over rows, summed in double precision.
     pub fn new(map: &EnvironmentMap) -> Self {
         let (width, height) = (map.width as usize, map.height);
         let row_count = height as usize + 1;
@@ -193,7 +192,7 @@ impl EnvironmentTables {
         self.cells[row * stride..][..stride].split_at(width)
     }
 
-    /// Density per steradian of [`Self::sample`] at a direction whose radiance is
+    /// Density of [`Self::sample`] per steradian at a direction whose radiance is
     /// `map.radiance(direction)`. Twin of `environment_pdf`.
     pub fn pdf(&self, map: &EnvironmentMap, direction: Vec3, radiance: Vec3) -> f32 {
         if self.total <= 0.0 {
@@ -212,7 +211,7 @@ impl EnvironmentTables {
             / (self.total * 2.0 * pi * pi * sin_theta.max(MIN_SIN_THETA))
     }
 
-    /// Direction with the density [`Self::pdf`], from two numbers in [0, 1). Twin of
+    /// Samples a direction with the density [`Self::pdf`] from two numbers in [0, 1). Twin of
     /// `environment_sample`.
     pub fn sample(&self, map: &EnvironmentMap, u: [f32; 2]) -> EnvironmentSample {
         if self.total <= 0.0 {
@@ -228,9 +227,9 @@ impl EnvironmentTables {
         self.sample_cell(map, [column as u32, row as u32], [column_remainder, row_remainder])
     }
 
-    /// Direction within the cell `[column, row]` with density proportional to the luminance there in
-    /// (u, v), from two numbers in [0, 1); the pdf of the sample is that of [`Self::sample`], over
-    /// the whole map. Twin of `environment_sample_cell`.
+    /// Samples a direction within the cell `[column, row]` from two numbers in [0, 1), with density
+    /// proportional to luminance in (u, v). The sample's pdf is that of [`Self::sample`], over the
+    /// whole map. Twin of `environment_sample_cell`.
     pub fn sample_cell(
         &self,
         map: &EnvironmentMap,
@@ -238,15 +237,15 @@ impl EnvironmentTables {
         u: [f32; 2],
     ) -> EnvironmentSample {
         let (width, height) = (map.width, map.height);
-        // The bilinear patch: its marginal along v, then the row of the patch at that v.
+        // Sample the bilinear patch: its marginal along v, then its row at that v.
         let cell = map.cell(column, row);
         let [l00, l10, l01, l11] = [cell.c00, cell.c10, cell.c01, cell.c11].map(luminance);
         let y = sample_linear(l00 + l10, l01 + l11, u[1]);
         let x = sample_linear(lerp(l00, l01, y), lerp(l10, l11, y), u[0]);
         let radiance = cell.interpolate(Vec2::new(x, y));
 
-        // Polar angle from the nearer pole, in rows, so that it keeps its relative accuracy; the
-        // first and the last row are half cells.
+        // Measure the polar angle from the nearer pole, in rows, so that it keeps its relative
+        // accuracy; the first and last rows are half cells.
         let northern = 2 * row <= height;
         let from_pole = if row == 0 {
             0.5 * y

@@ -1,6 +1,6 @@
-//! Scene text → entries: the TOML of a scene file with its defaults, before any meaning is checked.
+//! Scene text → entries: the TOML of a scene file with its defaults, before its values are checked.
 //!
-//! Every table refuses unknown keys; errors carry the line and the column of the key or value.
+//! Every table rejects unknown keys; errors carry the line and column of the key or value.
 
 mod read;
 
@@ -17,7 +17,7 @@ use super::{
 };
 use crate::error::Result;
 
-/// A scene file as it stands.
+/// Scene file as written.
 #[derive(Clone, Debug)]
 pub struct SceneFile {
     /// `[camera]`.
@@ -38,17 +38,17 @@ pub struct SceneFile {
 pub struct CameraEntry {
     /// Centre of projection, metres.
     pub position: [f32; 3],
-    /// Point in the middle of the image, metres.
+    /// Point at the centre of the image, metres.
     pub look_at: [f32; 3],
     /// Direction that points up in the image.
     #[serde(default = "default_up")]
     pub up: [f32; 3],
-    /// Angle between the lower and the upper edge of the image, degrees.
+    /// Angle between the bottom and top edges of the image, degrees.
     pub vertical_fov_deg: f32,
-    /// Radius of the thin lens, metres; 0 is a pinhole.
+    /// Radius of the thin lens, metres; 0 for a pinhole.
     #[serde(default)]
     pub aperture_radius: f32,
-    /// Distance to the plane in focus, metres; required where there is an aperture.
+    /// Distance to the plane of focus, metres; required with an aperture.
     pub focus_distance: Option<f32>,
 }
 
@@ -89,9 +89,9 @@ fn default_height() -> u32 {
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FilterEntry {
-    /// One pixel.
+    /// Box one pixel wide.
     Box,
-    /// Standard deviation ½ pixel, cut off at 1.5 pixels.
+    /// Gaussian with a standard deviation of ½ pixel, cut off at 1.5 pixels.
     #[default]
     Gaussian,
 }
@@ -102,16 +102,16 @@ pub enum FilterEntry {
 pub struct EnvironmentEntry {
     /// Lat-long image file, relative to the scene file.
     pub map: Option<PathBuf>,
-    /// One radiance in every direction.
+    /// Radiance that is the same in every direction.
     pub constant: Option<[f32; 3]>,
     /// Procedural courtyard.
     pub court: Option<CourtParameters>,
     /// Procedural sky.
     pub sky: Option<SkyParameters>,
-    /// Factor on every radiance.
+    /// Factor applied to every radiance.
     #[serde(default = "default_environment_scale")]
     pub scale: f32,
-    /// Turn about +Y, degrees, counter-clockwise seen from above.
+    /// Rotation about +Y, degrees, counter-clockwise seen from above.
     #[serde(default)]
     pub rotation_deg: f32,
 }
@@ -131,7 +131,7 @@ pub struct MaterialEntry {
     pub kind: MaterialKindEntry,
 }
 
-/// The keys of a `[[material]]` that depend on its `type`.
+/// Keys of a `[[material]]` that depend on its `type`.
 #[derive(Clone, Debug)]
 pub enum MaterialKindEntry {
     /// `diffuse`.
@@ -160,7 +160,7 @@ pub struct PlasticEntry {
     pub diffuse: [f32; 3],
     /// GGX width.
     pub alpha: Option<f32>,
-    /// √α, instead of `alpha`.
+    /// √α, an alternative to `alpha`.
     pub roughness: Option<f32>,
     /// Refractive index of the coat.
     #[serde(default = "default_ior")]
@@ -177,7 +177,7 @@ fn default_ior() -> f32 {
 pub struct ConductorEntry {
     /// GGX width.
     pub alpha: Option<f32>,
-    /// √α, instead of `alpha`.
+    /// √α, an alternative to `alpha`.
     pub roughness: Option<f32>,
     /// Reflectance at normal incidence, 0…1 (Schlick).
     pub reflectance: Option<[f32; 3]>,
@@ -200,21 +200,21 @@ pub struct MeasuredEntry {
 pub struct ObjectEntry {
     /// Line of the entry, from 1.
     pub line: usize,
-    /// Name for messages.
+    /// Name, for messages.
     pub name: Option<String>,
-    /// Material; may be left out where the mesh file brings its own colours.
+    /// Material; optional where the mesh file brings its own colours.
     pub material: Option<String>,
     /// Factor along each axis, applied first.
     pub scale: [f32; 3],
-    /// Turns about X, then Y, then Z, degrees.
+    /// Rotations about X, then Y, then Z, degrees.
     pub rotate_deg: [f32; 3],
-    /// Shift, metres, applied last.
+    /// Translation, metres, applied last.
     pub translate: [f32; 3],
-    /// What it is made of.
+    /// Source of its triangles.
     pub source: ObjectSource,
 }
 
-/// Where the triangles of an object come from.
+/// Source of an object's triangles.
 #[derive(Clone, Debug)]
 pub enum ObjectSource {
     /// A mesh file, relative to the scene file.
@@ -266,10 +266,9 @@ impl<'de> Deserialize<'de> for NumberOrVector {
 }
 
 impl SceneFile {
-    /// Reads the text of a scene file; `path` is for messages only.
+    /// Parses the text of a scene file; `path` is for messages only.
     ///
     /// # Errors
-    ///
     /// [`crate::Error::Parse`] with line and column.
     pub fn parse(path: &Path, text: &str) -> Result<Self> {
         read::read_root(text).map_err(|failure| failure.locate(path, text))

@@ -1,7 +1,7 @@
 //! TOML tables → entries.
 //!
-//! Materials and objects are tagged by `type` and `shape`: their tables are split into the keys all
-//! of them share and the keys of that one kind, so that a key of another kind is refused too.
+//! Materials and objects are tagged by `type` and `shape`. Their tables are split into the keys
+//! that all kinds share and the keys of one kind, so that a key of another kind is rejected too.
 
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,7 @@ use crate::{
     scene::shapes::Shape,
 };
 
-/// The keys every `[[object]]` has.
+/// Keys of every `[[object]]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ObjectKeys {
@@ -40,7 +40,7 @@ struct ObjectKeys {
     translate: [f32; 3],
 }
 
-/// The keys every `[[material]]` has.
+/// Keys of every `[[material]]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MaterialKeys {
@@ -48,7 +48,7 @@ struct MaterialKeys {
     r#type: Spanned<String>,
 }
 
-/// The tables that have no kinds.
+/// Tables that have no kinds.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RootKeys {
@@ -58,7 +58,7 @@ struct RootKeys {
     environment: EnvironmentEntry,
 }
 
-/// A message with the byte range of the text it is about.
+/// Message with the byte range of the text it concerns.
 pub(super) struct Failure {
     span: std::ops::Range<usize>,
     message: String,
@@ -77,14 +77,14 @@ impl From<TomlError> for Failure {
     }
 }
 
-/// Line and column, both from 1, of a byte offset; columns count characters.
+/// Line and column of a byte offset, both from 1; columns count characters.
 fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
     let before = text.get(..offset).unwrap_or(text);
     let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
     (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
 }
 
-/// A whole scene file.
+/// Reads a whole scene file.
 pub(super) fn read_root(text: &str) -> Result<SceneFile, Failure> {
     let root = DeTable::parse(text)?;
     let span = root.span();
@@ -109,7 +109,7 @@ pub(super) fn read_root(text: &str) -> Result<SceneFile, Failure> {
     })
 }
 
-/// Takes the array of tables `key` out of `table`; empty where there is none.
+/// Removes the array of tables `key` from `table`; empty if there is none.
 fn take_array<'i>(
     table: &mut DeTable<'i>,
     key: &str,
@@ -221,7 +221,7 @@ fn read_shape(
     })
 }
 
-/// A table cut into the keys that all kinds share and the rest.
+/// Table split into the keys that all kinds share and the rest.
 struct SplitTable<'i> {
     shared: DeTable<'i>,
     rest: DeTable<'i>,
@@ -229,7 +229,7 @@ struct SplitTable<'i> {
 }
 
 impl<'i> SplitTable<'i> {
-    /// Cuts `entry` by the fields of `T`; `header` is for the message where it is no table.
+    /// Splits `entry` by the fields of `T`; `header` names it in messages if it is not a table.
     fn new<T: DeserializeOwned>(
         entry: Spanned<DeValue<'i>>,
         header: &str,
@@ -247,7 +247,7 @@ impl<'i> SplitTable<'i> {
     }
 }
 
-/// The keys of one kind of material or shape, with what messages need.
+/// Keys of one kind of material or shape, with the context that messages need.
 struct KindTable<'i> {
     table: DeTable<'i>,
     span: std::ops::Range<usize>,
@@ -297,7 +297,7 @@ fn refuse_unknown_keys(table: &DeTable, known: &[&str], owner: &str) -> Result<(
     Ok(())
 }
 
-/// Names of the keys of a struct, as its own `Deserialize` states them.
+/// Names of the keys of a struct, as its `Deserialize` declares them.
 fn struct_fields<T: DeserializeOwned>() -> &'static [&'static str] {
     struct FieldProbe<'a>(&'a mut &'static [&'static str]);
 
@@ -326,7 +326,7 @@ fn struct_fields<T: DeserializeOwned>() -> &'static [&'static str] {
     }
 
     let mut fields: &'static [&'static str] = &[];
-    // The probe always answers with an error; what it wrote on the way is the result.
+    // The probe always returns an error; its result is the list it writes on the way.
     let _ = T::deserialize(FieldProbe(&mut fields));
     fields
 }

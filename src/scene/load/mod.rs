@@ -1,4 +1,4 @@
-//! Scene file → validated [`Scene`]: everything the numbers of the file must satisfy.
+//! Scene file → validated [`Scene`]: checks everything the numbers of the file must satisfy.
 //!
 //! Messages name the object or material and the line of its entry.
 
@@ -33,17 +33,16 @@ use crate::{
 /// Largest width and height of the film, pixels.
 pub const MAX_FILM_SIDE: u32 = 16_384;
 
-/// Smallest GGX width: below it the highlight is a mirror image that single precision cannot sample.
+/// Smallest GGX width; single precision cannot sample the near-mirror highlight of a smaller one.
 pub const MIN_ALPHA: f32 = 1e-3;
 
 impl Scene {
-    /// Reads a scene file and everything it refers to, relative to the scene file.
+    /// Reads a scene file and everything it refers to by paths relative to it.
     ///
     /// # Errors
-    ///
     /// [`Error::Io`] for a file that cannot be read, [`Error::Parse`] with line and column for text
-    /// that is no scene, [`Error::Scene`] with the name of the object or material for numbers that
-    /// cannot be rendered, and the errors of the mesh, map and BRDF readers.
+    /// that is not a scene, [`Error::Scene`] with the name of the object or material for numbers
+    /// that cannot be rendered, and the errors of the mesh, map and BRDF readers.
     pub fn load(path: &Path) -> Result<Self> {
         refuse_other_formats(path)?;
         let bytes = fs::read(path).map_err(|source| Error::io(path, "read", source))?;
@@ -54,10 +53,9 @@ impl Scene {
         Self::parse(path, &text)
     }
 
-    /// Makes a scene of its text; `path` is for messages, and its folder is that of relative paths.
+    /// Builds a scene from its text; `path` serves messages, its folder is that of relative paths.
     ///
     /// # Errors
-    ///
     /// As [`Scene::load`].
     pub fn parse(path: &Path, text: &str) -> Result<Self> {
         let file = SceneFile::parse(path, text)?;
@@ -87,7 +85,7 @@ impl Scene {
     }
 }
 
-/// The stem of the file, or the name of its folder where the stem is `scene`.
+/// Stem of the file, or the name of its folder if the stem is `scene`.
 fn scene_name(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default();
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
@@ -113,7 +111,7 @@ fn refuse_other_formats(path: &Path) -> Result<()> {
     ))
 }
 
-/// What surfaces are made of where the scene has nothing but an environment.
+/// Material of a scene that has nothing but an environment.
 fn default_material() -> Material {
     Material {
         name: "default".to_owned(),
@@ -135,7 +133,7 @@ impl Loader<'_> {
         if holds { Ok(()) } else { Err(self.error(message())) }
     }
 
-    /// All of `values` from `low` to `high`, both included; NaN is not.
+    /// Checks that all of `values` lie from `low` to `high`, both included; NaN does not.
     fn check_range(&self, what: &str, values: &[f32], (low, high): (f32, f32)) -> Result<()> {
         match values.iter().find(|value| !(low..=high).contains(*value)) {
             None => Ok(()),

@@ -39,7 +39,7 @@ impl Loader<'_> {
             self.check_material(&label, object, materials)?;
             *uses.entry(self.mesh_key(object)).or_default() += 1;
         }
-        // All meshes are read before any is placed, so that the arrays are allocated once.
+        // Read all meshes before placing any, so that the arrays are allocated once.
         let mut meshes = HashMap::new();
         let (mut vertices, mut triangles) = (0, 0);
         for (index, object) in objects.iter().enumerate() {
@@ -70,7 +70,7 @@ impl Loader<'_> {
         for (index, object) in objects.iter().enumerate() {
             let key = self.mesh_key(object);
             self.place(index, object, &meshes[&key], &mut geometry, materials, warnings)?;
-            // A mesh is let go with its last use, so that a large one is not held twice for long.
+            // Drop a mesh after its last use, so that a large one is not held twice for long.
             let left = uses.get_mut(&key).map_or(0, |left| {
                 *left -= 1;
                 *left
@@ -82,7 +82,7 @@ impl Loader<'_> {
         Ok(geometry)
     }
 
-    /// What tells meshes apart: the path of a mesh file, the parameters of a shape.
+    /// Key that tells meshes apart: the path of a mesh file or the parameters of a shape.
     fn mesh_key(&self, object: &ObjectEntry) -> PathBuf {
         match &object.source {
             ObjectSource::Mesh(mesh) => self.folder.join(mesh),
@@ -121,7 +121,7 @@ impl Loader<'_> {
         }
     }
 
-    /// Refuses an object that lies too far out for traversal.
+    /// Rejects an object that lies too far out for traversal.
     fn check_extent(&self, label: &str, positions: &[[f32; 3]]) -> Result<()> {
         let distances = positions.iter().flatten().map(|coordinate| coordinate.abs());
         let farthest = distances.fold(0.0, f32::max);
@@ -133,7 +133,7 @@ impl Loader<'_> {
         })
     }
 
-    /// Appends one object to the geometry, and the materials of its mesh file where it names none.
+    /// Appends an object to the geometry, with the materials of its mesh file if it names none.
     fn place(
         &self,
         index: usize,
@@ -189,7 +189,7 @@ impl Loader<'_> {
     }
 }
 
-/// The object in messages: its name, or its number and what it is made of.
+/// Label of an object in messages: name or number, source and line.
 fn object_label(index: usize, object: &ObjectEntry) -> String {
     let source = match &object.source {
         ObjectSource::Mesh(mesh) => mesh.display().to_string(),

@@ -1,8 +1,8 @@
 //! glTF 2.0 (`.gltf` with buffers beside it or inline, `.glb`): meshes with the transforms of their
 //! nodes, and base colours.
 //!
-//! Cameras, lights, textures, skins and morph targets are left aside; extensions the file requires and
-//! sparse accessors are refused by name. The accessors are read here, with every range checked.
+//! Ignores cameras, lights, textures, skins and morph targets. Rejects required extensions and
+//! sparse accessors by name. Reads the accessors itself and checks every range.
 
 use std::{fs, path::Path};
 
@@ -17,12 +17,11 @@ use gltf::{
 use super::{Mesh, MeshMaterial};
 use crate::error::{Error, Result};
 
-/// Reads a glTF file and its buffers; primitives that are no triangles are counted in `warnings`.
+/// Reads a glTF file and its buffers; `warnings` counts primitives that are not triangles.
 ///
 /// # Errors
-///
-/// [`Error::Io`] for a file that cannot be read, [`Error::Parse`] for bad JSON, [`Error::Format`] for
-/// everything else that does not hold.
+/// [`Error::Io`] for a file that cannot be read, [`Error::Parse`] for bad JSON, [`Error::Format`]
+/// for any other fault.
 pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
     let bytes = fs::read(path).map_err(|source| Error::io(path, "read", source))?;
     if let (Some(b"glTF"), Some(&[a, b, c, d])) = (bytes.get(..4), bytes.get(8..12)) {
@@ -63,7 +62,7 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
     let Some(scene) = scene else {
         return Err(Error::format(path, "expected a scene with nodes, found none"));
     };
-    // A stack and not recursion: nodes may be nested deeper than the call stack is.
+    // Use a stack, not recursion: nodes may nest deeper than the call stack.
     let mut stack: Vec<(Node, Mat4)> = scene.nodes().map(|node| (node, Mat4::IDENTITY)).collect();
     stack.reverse();
     while let Some((node, world_from_parent)) = stack.pop() {
@@ -135,7 +134,7 @@ fn read_beside(path: &Path, uri: &str) -> Result<Vec<u8>> {
     fs::read(&buffer_path).map_err(|source| Error::io(&buffer_path, "read", source))
 }
 
-/// Undoes the percent encoding of a relative URI.
+/// Decodes the percent encoding of a relative URI.
 fn decode_percent(uri: &str) -> Option<String> {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();
@@ -152,7 +151,7 @@ fn decode_percent(uri: &str) -> Option<String> {
     String::from_utf8(bytes).ok()
 }
 
-/// Standard base64 (RFC 4648 section 4), with or without padding.
+/// Decodes standard base64 (RFC 4648 section 4), with or without padding.
 fn decode_base64(text: &str) -> Option<Vec<u8>> {
     let digits = text.trim_end_matches('=').as_bytes();
     let mut bytes = Vec::with_capacity(digits.len() * 3 / 4);
@@ -219,7 +218,7 @@ impl GltfReader<'_> {
                     normals.len()
                 )));
             }
-            // A node scaled to nothing has no inverse; its normals come out as zero.
+            // A node scaled to nothing has no inverse; its normals become zero.
             let turn = linear.inverse().transpose();
             let to_world = |normal: &[f32; 3]| {
                 (turn * Vec3::from_array(*normal)).normalize_or_zero().to_array()
@@ -302,7 +301,7 @@ impl GltfReader<'_> {
         }
     }
 
-    /// The elements of an accessor, each from its `accessor.size()` bytes.
+    /// Reads the elements of an accessor, each from its `accessor.size()` bytes.
     fn elements<T>(&self, accessor: &Accessor, element: impl Fn(&[u8]) -> T) -> Result<Vec<T>> {
         let index = accessor.index();
         if accessor.sparse().is_some() {

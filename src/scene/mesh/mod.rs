@@ -1,7 +1,7 @@
-//! Mesh file → indexed triangles in object space, with normals where the file has them.
+//! Mesh file → indexed triangles in object space, with normals if the file has them.
 //!
-//! PLY, OBJ and glTF are told apart by the file's extension. Each reader streams the file, keeps single
-//! precision, and leaves nothing but the arrays of [`Mesh`] behind.
+//! The extension tells PLY, OBJ and glTF apart. PLY and OBJ are streamed, glTF is read whole. All
+//! keep single precision and leave nothing but the arrays of [`Mesh`] behind.
 
 pub mod gltf;
 pub mod obj;
@@ -16,28 +16,27 @@ use crate::error::{Error, Result};
 pub struct Mesh {
     /// Vertex positions, metres before the object's scale.
     pub positions: Vec<[f32; 3]>,
-    /// Vertex normals, of any length, a zero vector where there is none; as long as `positions`, or
-    /// empty where the mesh has no normals at all.
+    /// Vertex normals of any length, zero where there is none; as long as `positions`, or empty if
+    /// the mesh has no normals at all.
     pub normals: Vec<[f32; 3]>,
     /// Three vertex indices per triangle, counter-clockwise seen from outside; all in range.
     pub triangles: Vec<[u32; 3]>,
-    /// Runs of triangles by the material the file gives them, in order, from triangle 0 on; empty
-    /// where the file knows no materials.
+    /// Runs of triangles of one material, in order from triangle 0; empty if the file has no materials.
     pub runs: Vec<MaterialRun>,
     /// Materials of the file.
     pub materials: Vec<MeshMaterial>,
 }
 
-/// Where a run of triangles of one material begins; it ends where the next begins.
+/// Start of a run of triangles of one material; it ends where the next begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MaterialRun {
     /// First triangle of the run.
     pub first_triangle: usize,
-    /// Index into [`Mesh::materials`]; none where the file gives these triangles no material.
+    /// Index into [`Mesh::materials`]; none if the file gives these triangles no material.
     pub material: Option<usize>,
 }
 
-/// What a mesh file says about a material, as far as it is used.
+/// Material of a mesh file, as far as it is used.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshMaterial {
     /// Name in the file; may be empty.
@@ -47,12 +46,11 @@ pub struct MeshMaterial {
 }
 
 impl Mesh {
-    /// Reads a mesh file; what was left out is added to `warnings`.
+    /// Reads a mesh file; adds what it leaves out to `warnings`.
     ///
     /// # Errors
-    ///
-    /// [`Error::Io`] where the file cannot be read, [`Error::Format`] or [`Error::Parse`] where it
-    /// does not hold what it should: unknown format, truncation, an index out of range.
+    /// [`Error::Io`] if the file cannot be read, [`Error::Format`] or [`Error::Parse`] if its
+    /// content is invalid: unknown format, truncation, an index out of range.
     pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
         let extension = path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
         match extension.as_deref() {
@@ -69,7 +67,7 @@ impl Mesh {
         }
     }
 
-    /// Begins a run of triangles of `material` at the next triangle.
+    /// Starts a run of triangles of `material` at the next triangle.
     fn start_run(&mut self, material: Option<usize>) {
         let first_triangle = self.triangles.len();
         match self.runs.last_mut() {

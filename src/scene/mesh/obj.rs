@@ -1,8 +1,7 @@
-//! Wavefront OBJ: positions, normals, faces of every group, and the diffuse colours of its MTL
-//! library.
+//! Wavefront OBJ: positions, normals, faces of every group, and the diffuse colours of its MTL library.
 //!
-//! Deviation: read here and not through a crate, so that every message names the line and the index,
-//! and so that a large file needs no more memory than its mesh.
+//! Deviation: parsed here and not by a crate, so that every message names the line and the index, and a
+//! large file needs no more memory than its mesh.
 
 use std::{
     fs::File,
@@ -19,10 +18,9 @@ use crate::{
 /// Ends a chain of vertices; also the normal of a corner that has none.
 const NONE: u32 = u32::MAX;
 
-/// Reads an OBJ file and the material libraries beside it; a library that is missing is a warning.
+/// Reads an OBJ file and the material libraries beside it; a missing library is a warning.
 ///
 /// # Errors
-///
 /// [`Error::Io`], or [`Error::Parse`] with the line.
 pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
     let file = File::open(path).map_err(|source| Error::io(path, "read", source))?;
@@ -43,7 +41,7 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
     Ok(reader.finish())
 }
 
-/// Hands out every line with its number from 1; a line that ends in a backslash goes on in the next.
+/// Passes every line with its number from 1 to `use_line`; a trailing backslash continues the line.
 fn for_each_line(
     path: &Path,
     mut reader: impl BufRead,
@@ -76,7 +74,7 @@ fn for_each_line(
     }
 }
 
-/// A pair of position and normal that some face uses, and the next of the same position.
+/// Pair of position and normal that a face uses, linked to the next pair of the same position.
 #[derive(Clone, Copy)]
 struct Vertex {
     normal: u32,
@@ -90,7 +88,7 @@ struct ObjReader<'a> {
     normals: Vec<[f32; 3]>,
     /// As long as `mesh.positions`.
     vertices: Vec<Vertex>,
-    /// First of `vertices` with a position; as long as `positions`.
+    /// Head of the chain of `vertices` at each position; as long as `positions`.
     chains: Vec<u32>,
     mesh: Mesh,
     library_colors: Vec<MeshMaterial>,
@@ -125,8 +123,8 @@ impl ObjReader<'_> {
                 self.mesh.start_run(Some(material));
             }
             "mtllib" => self.read_library(rest.trim(), warnings)?,
-            // Texture coordinates, names of groups and objects, smoothing groups, points, lines and
-            // free-form surfaces change nothing here.
+            // Ignore texture coordinates, names of groups and objects, smoothing groups, points,
+            // lines and free-form surfaces.
             _ => {}
         }
         Ok(())
@@ -177,7 +175,7 @@ impl ObjReader<'_> {
         Ok(())
     }
 
-    /// Vertex of `position`, `position/uv`, `position/uv/normal` or `position//normal`.
+    /// Vertex of `position`, `position/uv`, `position/uv/normal` or `position//normal`, added if new.
     fn corner(&mut self, word: &str) -> Result<u32> {
         let mut parts = word.split('/');
         let position = parts.next().unwrap_or_default();
@@ -206,7 +204,7 @@ impl ObjReader<'_> {
         Ok(vertex)
     }
 
-    /// Index from 0; the file counts from 1, or backwards from −1, the last one so far.
+    /// Converts to an index from 0; the file counts from 1, or backwards from −1, the latest.
     fn index(&self, word: &str, count: usize, what: &str) -> Result<u32> {
         let stated: i64 = word
             .parse()
@@ -226,7 +224,7 @@ impl ObjReader<'_> {
         }
     }
 
-    /// Material of the file by name; one that no library has described is white.
+    /// Finds or adds a material by name; one that no library describes is white.
     fn material_index(&mut self, name: &str) -> usize {
         if let Some(index) = self.mesh.materials.iter().position(|found| found.name == name) {
             return index;
@@ -237,7 +235,7 @@ impl ObjReader<'_> {
         self.mesh.materials.len() - 1
     }
 
-    /// Reads the colours (`Kd`) of an MTL library; one line may name several files.
+    /// Reads the colours (`Kd`) of MTL libraries; one line may name several files.
     fn read_library(&mut self, names: &str, warnings: &mut Vec<String>) -> Result<()> {
         let folder = self.path.parent().unwrap_or(Path::new(""));
         let whole = folder.join(names);

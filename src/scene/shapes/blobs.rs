@@ -1,9 +1,9 @@
 //! `blobs`: balls, ellipsoids and rounded cones melted into one surface.
 //!
-//! The shapes are signed distances (Quilez, "Distance functions", 2008; ellipsoids by his bound), joined
-//! by −b·ln Σ exp(−dᵢ/b), which does not depend on their order. The level 0 becomes a surface net
-//! (Gibson, "Constrained elastic surface nets", 1998): a vertex in every cell of a grid that the surface
-//! passes, moved onto the surface along the gradient, and a quad around every edge it crosses.
+//! The shapes are signed distances (Quilez, "Distance functions", 2008; ellipsoids by his bound),
+//! joined by −b·ln Σ exp(−dᵢ/b), which does not depend on their order. Level 0 becomes a surface net
+//! (Gibson, "Constrained elastic surface nets", 1998): a vertex in every grid cell that the surface
+//! crosses, moved onto the surface along the gradient, and a quad around every crossed edge.
 
 use glam::{DVec3, USizeVec3, Vec3};
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use serde::Deserialize;
 use super::{Builder, Mesh, count, finite, from_zero_to, positive};
 use crate::scene::file::NumberOrVector;
 
-/// `blobs`: where its points put it.
+/// `blobs`: placed by its points.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Blobs {
@@ -21,24 +21,24 @@ pub struct Blobs {
     /// Width of the zone in which parts melt together, metres; 0 leaves creases.
     #[serde(default)]
     pub blend: f32,
-    /// Cells of the grid along its longest side.
+    /// Grid cells along the longest side.
     #[serde(default = "default_cells")]
     pub cells: usize,
 }
 
-/// A part of [`Blobs`].
+/// Part of [`Blobs`].
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Blob {
     /// Centre, or the first end of a rounded cone, metres.
     pub at: [f32; 3],
-    /// Radius, or the three of an ellipsoid, metres.
+    /// Radius, or the three radii of an ellipsoid, metres.
     pub radius: NumberOrVector,
-    /// Second end: makes the part a rounded cone.
+    /// Second end; makes the part a rounded cone.
     pub to: Option<[f32; 3]>,
-    /// Radius at the second end; as at the first where left out.
+    /// Radius at the second end; defaults to that at the first.
     pub to_radius: Option<f32>,
-    /// Taken away from the other parts instead of added.
+    /// Subtracts the part from the others instead of adding it.
     #[serde(default)]
     pub carve: bool,
 }
@@ -92,7 +92,7 @@ impl Part {
         }
     }
 
-    /// Corners of the box around the part.
+    /// Corners of the part's bounding box.
     fn bounds(self) -> [DVec3; 2] {
         match self {
             Self::Ellipsoid { center, radii } => [center - radii, center + radii],
@@ -103,14 +103,14 @@ impl Part {
     }
 }
 
-/// Cells along the side of a block, within which only the parts near it are looked at.
+/// Cells along the side of a block; inside a block, only the parts near it are evaluated.
 const BLOCK_CELLS: usize = 4;
 
-/// Most by which a distance changes over a unit of length; 1 for true distances, more where the bound
-/// for ellipsoids is loose.
+/// Largest change of a distance per unit of length: 1 for true distances, more where the bound for
+/// ellipsoids is loose.
 const STEEPEST: f64 = 1.5;
 
-/// The joined distance: negative inside.
+/// Joined distance, negative inside.
 #[derive(Clone, Debug)]
 struct Field {
     added: Vec<Part>,
@@ -124,7 +124,7 @@ impl Field {
         if self.carved.is_empty() {
             return added;
         }
-        // What is left of the added parts is what is in them and not in the carved.
+        // Subtract the carved parts: the softened maximum of `added` and −`carved`.
         let carved = self.join(&self.carved, point);
         -soft_minimum([-added, carved].into_iter(), self.blend)
     }
@@ -133,8 +133,8 @@ impl Field {
         soft_minimum(parts.iter().map(|part| part.distance(point)), self.blend)
     }
 
-    /// The field with those parts alone that matter within `reach` of `point`; each of the others adds
-    /// less than exp(−18) to the sum.
+    /// Keeps only the parts that matter within `reach` of `point`; each of the others adds less
+    /// than exp(−18) to the sum.
     fn near(&self, point: DVec3, reach: f64) -> Self {
         let keep = |parts: &[Part]| -> Vec<Part> {
             let distances: Vec<f64> = parts.iter().map(|part| part.distance(point)).collect();
@@ -167,7 +167,7 @@ impl Field {
     }
 }
 
-/// −blend·ln Σ exp(−distance / blend), the minimum where blend is 0.
+/// −blend·ln Σ exp(−distance / blend); the minimum if blend is 0.
 fn soft_minimum(distances: impl Iterator<Item = f64> + Clone, blend: f64) -> f64 {
     let least = distances.clone().fold(f64::INFINITY, f64::min);
     if blend == 0.0 {
@@ -176,7 +176,7 @@ fn soft_minimum(distances: impl Iterator<Item = f64> + Clone, blend: f64) -> f64
     least - blend * distances.map(|distance| ((least - distance) / blend).exp()).sum::<f64>().ln()
 }
 
-/// [`soft_minimum`] of distances with their gradients.
+/// [`soft_minimum`] of distances, with its gradient.
 fn soft_minimum_gradient(
     distances: impl Iterator<Item = (f64, DVec3)> + Clone,
     blend: f64,
@@ -198,11 +198,10 @@ fn soft_minimum_gradient(
 }
 
 impl Blobs {
-    /// Closed mesh.
+    /// Builds the closed mesh.
     ///
     /// # Errors
-    ///
-    /// A message about the parameter at fault.
+    /// Returns a message about the parameter at fault.
     pub fn mesh(&self) -> Result<Mesh, String> {
         count("number of balls", self.balls.len(), 1..=512)?;
         let cells = count("cells", self.cells, 4..=256)?;
@@ -219,7 +218,7 @@ impl Blobs {
         for [part_low, part_high] in field.added.iter().map(|part| part.bounds()) {
             (low, high) = (low.min(part_low), high.max(part_high));
         }
-        // Joined parts swell by no more than this; two cells more keep the surface off the border.
+        // Joined parts swell by no more than this; two more cells keep the surface off the border.
         let swell = blend * (field.added.len() as f64).ln();
         let cell = (high - low + 2.0 * swell).max_element() / cells as f64;
         let margin = swell + 2.0 * cell;
@@ -252,7 +251,7 @@ impl Blob {
     }
 }
 
-/// A grid of distances, and the fields that are enough in each of its blocks.
+/// Grid of distances, with the field that suffices in each of its blocks.
 struct Lattice {
     low: DVec3,
     cell: f64,
@@ -260,7 +259,7 @@ struct Lattice {
     counts: USizeVec3,
     distances: Vec<f32>,
     block_counts: USizeVec3,
-    /// None where the surface is far.
+    /// None far from the surface.
     blocks: Vec<Option<Field>>,
 }
 
@@ -268,7 +267,7 @@ impl Lattice {
     fn new(field: &Field, low: DVec3, cell: f64, counts: USizeVec3) -> Self {
         let corners = counts + 1;
         let block_counts = (corners + BLOCK_CELLS - 1) / BLOCK_CELLS;
-        // From the centre of a block to where its farthest vertex may lie, a cell beyond its corners.
+        // Distance from a block's centre to its farthest vertex, up to a cell beyond its corners.
         let reach = 0.5 * 3.0_f64.sqrt() * (BLOCK_CELLS + 1) as f64 * cell;
         let sampled: Vec<(f64, Option<Field>, Vec<f32>)> = (0..block_counts.element_product())
             .into_par_iter()
@@ -311,7 +310,7 @@ impl Lattice {
         self.distance(corner) < 0.0
     }
 
-    /// The vertex of a cell and its normal, where the surface passes the cell.
+    /// Vertex of a cell and its normal, if the surface crosses the cell.
     fn vertex(&self, field: &Field, first: USizeVec3) -> Option<(DVec3, DVec3)> {
         let mut sum = DVec3::ZERO;
         let mut crossings = 0;
@@ -333,7 +332,7 @@ impl Lattice {
         let field = self.blocks[block].as_ref().unwrap_or(field);
         let (cell_low, cell_high) = (first.as_dvec3(), (first + 1).as_dvec3());
         let mut position = self.low + self.cell * sum / f64::from(crossings);
-        // Newton's method, kept to the cell so that the net does not fold.
+        // Take Newton steps, clamped to the cell so that the net does not fold.
         for _ in 0..2 {
             let gradient = field.gradient(position);
             let squared = gradient.length_squared();
@@ -357,13 +356,13 @@ fn grid_position(index: usize, counts: USizeVec3) -> USizeVec3 {
     USizeVec3::new(index % counts.x, index / counts.x % counts.y, index / (counts.x * counts.y))
 }
 
-/// Steps along an axis and the two after it.
+/// Unit steps along an axis and the two after it.
 fn axes_from(axis: usize) -> [USizeVec3; 3] {
     let axes = [USizeVec3::X, USizeVec3::Y, USizeVec3::Z];
     [axes[axis], axes[(axis + 1) % 3], axes[(axis + 2) % 3]]
 }
 
-/// Surface of level 0 within `counts` cells of side `cell` from the corner `low`.
+/// Extracts the surface of level 0 within `counts` cells of side `cell` from the corner `low`.
 fn surface_net(field: &Field, low: DVec3, cell: f64, counts: USizeVec3) -> Mesh {
     let lattice = Lattice::new(field, low, cell, counts);
     let found: Vec<_> = (0..counts.element_product())
@@ -383,7 +382,7 @@ fn surface_net(field: &Field, low: DVec3, cell: f64, counts: USizeVec3) -> Mesh 
         for axis in 0..3 {
             let [along, u, v] = axes_from(axis);
             let to = from + along;
-            // The surface keeps off the border, so the four cells around the edge exist.
+            // The surface stays off the border, so the four cells around the edge exist.
             if to[axis] > counts[axis] || lattice.is_inside(from) == lattice.is_inside(to) {
                 continue;
             }
@@ -398,7 +397,7 @@ fn surface_net(field: &Field, low: DVec3, cell: f64, counts: USizeVec3) -> Mesh 
                     .map(|index| Vec3::from_array(builder.mesh.positions[index as usize]));
                 from.distance_squared(to)
             };
-            // The shorter diagonal.
+            // Split the quad along its shorter diagonal.
             if length(a, c) <= length(b, d) {
                 builder.triangle([a, b, c]);
                 builder.triangle([a, c, d]);
@@ -435,7 +434,7 @@ mod tests {
         }
     }
 
-    /// Blocks look at the parts near them only; that must not be seen.
+    /// Blocks evaluate only the parts near them; the distances must not show it.
     #[test]
     fn distances_by_blocks_are_those_of_all_parts() {
         let ring = (0..40).map(|index| {

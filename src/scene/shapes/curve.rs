@@ -2,12 +2,12 @@
 
 use glam::{DVec2, DVec4};
 
-/// Points of the curve through `points`, `per_span` pieces between two of them.
+/// Points of the curve through `points`, with `per_span` pieces between neighbours.
 ///
 /// Centripetal Catmull-Rom splines (Yuksel, Schaefer and Keyser, "On the parameterization of
-/// Catmull-Rom curves", 2009), which neither loop nor overshoot within a span. One piece per span is the
-/// polyline itself. A point given twice is a corner, where the curve may turn sharply; in a closed curve
-/// the last point leads to the first.
+/// Catmull-Rom curves", 2009) neither loop nor overshoot within a span. One piece per span gives
+/// the polyline itself. A point given twice is a corner, where the curve may turn sharply. The last
+/// point of a closed curve leads to the first.
 pub fn smooth(points: &[DVec4], per_span: usize, closed: bool) -> Vec<DVec4> {
     let is_corner = |index: usize| index > 0 && points[index] == points[index - 1];
     let corner = (1..points.len()).find(|&index| is_corner(index));
@@ -18,7 +18,7 @@ pub fn smooth(points: &[DVec4], per_span: usize, closed: bool) -> Vec<DVec4> {
     }
     if closed {
         match corner {
-            // From corner to corner the closed curve is an open one.
+            // Cut the closed curve open at the corner.
             Some(corner) => {
                 control.rotate_left(corner);
                 control.push(control[0]);
@@ -40,7 +40,7 @@ pub fn smooth(points: &[DVec4], per_span: usize, closed: bool) -> Vec<DVec4> {
     }
     let mut curve = Vec::new();
     for run in control.chunk_by(|a, b| a != b) {
-        // A corner's second point begins the next run where the first has ended.
+        // A run may begin at the point where the previous one ended; keep it once.
         let start = usize::from(curve.last() == run.first());
         curve.extend(smooth_run(run, per_span).into_iter().skip(start));
     }
@@ -50,7 +50,7 @@ pub fn smooth(points: &[DVec4], per_span: usize, closed: bool) -> Vec<DVec4> {
     curve
 }
 
-/// An open spline, ends included; between two points alone it is straight.
+/// Open spline, ends included; straight if it has only two points.
 fn smooth_run(run: &[DVec4], per_span: usize) -> Vec<DVec4> {
     let [first, .., last] = run else { return run.to_vec() };
     if run.len() == 2 {
@@ -75,7 +75,7 @@ fn smooth_run(run: &[DVec4], per_span: usize) -> Vec<DVec4> {
 /// Point of the span from the second to the third of four points, by Barry and Goldman's pyramid.
 fn span_point(points: [DVec4; 4], parameter: f64) -> DVec4 {
     let [a, b, c, d] = points;
-    // The distance is that of the first three components; the fourth carries a radius.
+    // Measure distance in the first three components; the fourth carries a radius.
     let step = |from: DVec4, to: DVec4| (to - from).truncate().length().sqrt().max(1e-9);
     let knots = [0.0, step(a, b), step(a, b) + step(b, c), step(a, b) + step(b, c) + step(c, d)];
     let t = knots[1] + parameter * (knots[2] - knots[1]);
@@ -86,13 +86,13 @@ fn span_point(points: [DVec4; 4], parameter: f64) -> DVec4 {
     mix(mix(ab, bc, 0, 2), mix(bc, cd, 1, 3), 1, 2)
 }
 
-/// A stretch of an outline without sharp corners: its points with the unit normal at each.
+/// Stretch of an outline without sharp corners: its point indices, with the unit normal at each.
 pub type Chain = Vec<(usize, DVec2)>;
 
 /// Cuts a polyline at corners sharper than `crease_deg` into chains of point index and normal.
 ///
-/// Normals point to the right of the direction of travel and are averaged at soft corners. `ends` are
-/// the normals that lie beyond the first and the last segment, where there are such.
+/// Normals point to the right of the direction of travel and are averaged at soft corners. `ends`
+/// holds the normals beyond the first and the last segment, if any.
 pub fn chains(
     points: &[DVec2],
     closed: bool,
@@ -107,7 +107,7 @@ pub fn chains(
     };
     let soft = |a: DVec2, b: DVec2| a.dot(b) >= crease_deg.to_radians().cos() - 1e-12;
     let mean = |a: DVec2, b: DVec2| (a + b).normalize_or_zero();
-    // A closed outline begins at a sharp corner, so that no chain goes over its end.
+    // Begin a closed outline at a sharp corner, so that no chain runs across its end.
     let sharp = |corner: usize| !soft(normal(corner + count - 1), normal(corner));
     let first = if closed { (0..count).find(|&corner| sharp(corner)).unwrap_or(0) } else { 0 };
     let mut chains = Vec::new();

@@ -1,4 +1,4 @@
-//! `extrude`: an outline drawn out along z, with rounded rims where it has a bevel.
+//! `extrude`: an outline swept along z, with rounded rims if it has a bevel.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -12,21 +12,21 @@ use crate::scene::triangulate::{is_simple, signed_area, triangulate};
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Extrude {
-    /// Corners [x, y] of a simple polygon in either turn, metres; the last leads to the first.
+    /// Corners [x, y] of a simple polygon, wound either way, metres; the last leads to the first.
     pub outline: Vec<[f32; 2]>,
     /// Length along z, metres.
     pub depth: f32,
     /// Radius of the rounded rims, metres; 0 is sharp.
     #[serde(default)]
     pub bevel: f32,
-    /// Pieces of a rounded rim.
+    /// Segments of a rounded rim.
     #[serde(default = "default_bevel_segments")]
     pub bevel_segments: usize,
-    /// Pieces of a spline between two points of the outline; 1 is straight. A point given twice is a
+    /// Spline segments between two points of the outline; 1 is straight. A point given twice is a
     /// corner of the spline.
     #[serde(default = "default_smooth")]
     pub smooth: usize,
-    /// Corners of the outline that turn by more than this are sharp, degrees.
+    /// Angle above which a corner of the outline is sharp, degrees.
     #[serde(default = "default_crease_deg")]
     pub crease_deg: f32,
 }
@@ -44,11 +44,10 @@ fn default_crease_deg() -> f32 {
 }
 
 impl Extrude {
-    /// Closed mesh.
+    /// Builds the closed mesh.
     ///
     /// # Errors
-    ///
-    /// A message about the parameter at fault.
+    /// Returns a message about the parameter at fault.
     pub fn mesh(&self) -> Result<Mesh, String> {
         count("number of points in outline", self.outline.len(), 3..=MAX_POINTS)?;
         finite("outline", self.outline.as_flattened())?;
@@ -77,7 +76,7 @@ impl Extrude {
         if bevel > 0.0 && !(is_simple(&rim) && signed_area(&rim) > 0.0) {
             return Err(format!("bevel: {bevel} is too large for the narrow parts of the outline"));
         }
-        // Rings from back to front: how far in, how deep, and the slope of the normal.
+        // Rings from back to front: inset outline, depth, and tilt of the normal.
         let mut rings: Vec<(Vec<DVec2>, f64, f64)> = Vec::new();
         let steps = if bevel > 0.0 { bevel_segments } else { 0 };
         for step in (0..=steps).rev() {
@@ -109,7 +108,7 @@ impl Extrude {
     }
 }
 
-/// For each corner of a counter-clockwise outline the shift that moves both of its sides inward by 1.
+/// Offset of each corner of a counter-clockwise outline that moves both of its sides inward by 1.
 fn mitres(outline: &[DVec2]) -> Vec<DVec2> {
     let count = outline.len();
     let inward = |side: usize| {
@@ -118,7 +117,7 @@ fn mitres(outline: &[DVec2]) -> Vec<DVec2> {
     (0..count)
         .map(|corner| {
             let (before, after) = (inward(corner + count - 1), inward(corner));
-            // Very sharp corners are held back to four times the inset.
+            // Limit very sharp corners to four times the inset.
             (before + after) / (1.0 + before.dot(after)).max(0.125)
         })
         .collect()

@@ -17,27 +17,27 @@ pub struct Grid {
     /// Cells along x and z.
     #[serde(default = "default_cells")]
     pub cells: [usize; 2],
-    /// Heights at points spread evenly over the sheet, metres: rows from −z to +z, in each from −x to
-    /// +x; between them a cubic spline. Flat where there are none.
+    /// Heights at points spread evenly over the sheet, metres, joined by a cubic spline: rows from
+    /// −z to +z, each from −x to +x. Flat if empty.
     #[serde(default)]
     pub heights: Vec<Vec<f32>>,
-    /// Added to the heights.
+    /// Waves added to the heights.
     #[serde(default)]
     pub waves: Vec<Wave>,
 }
 
-/// A sine wave of a [`Grid`].
+/// Sine wave of a [`Grid`].
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Wave {
-    /// Half of the height between trough and crest, metres.
+    /// Half the height from trough to crest, metres.
     pub amplitude: f32,
-    /// From crest to crest, metres.
+    /// Distance from crest to crest, metres.
     pub wavelength: f32,
-    /// Where the crests move to, degrees from +x toward +z.
+    /// Direction of the wave vector, degrees from +x toward +z.
     #[serde(default)]
     pub direction_deg: f32,
-    /// Shift of the crests, degrees of a full turn.
+    /// Phase, degrees.
     #[serde(default)]
     pub phase_deg: f32,
 }
@@ -51,11 +51,10 @@ fn default_cells() -> [usize; 2] {
 }
 
 impl Grid {
-    /// Closed mesh.
+    /// Builds the closed mesh.
     ///
     /// # Errors
-    ///
-    /// A message about the parameter at fault.
+    /// Returns a message about the parameter at fault.
     pub fn mesh(&self) -> Result<Mesh, String> {
         let size = DVec2::new(positive("size", self.size[0])?, positive("size", self.size[1])?);
         let half_thickness = 0.5 * positive("thickness", self.thickness)?;
@@ -97,10 +96,10 @@ impl Grid {
             (position + side * half_thickness * normal, side * normal)
         };
         let mut builder = Builder::default();
-        // From +z to −z, so that x × rows points up.
+        // Run rows from +z to −z, so that x × rows points up.
         builder.patch(rows, columns, |row, column| side(rows - 1 - row, column, 1.0));
         builder.patch(rows, columns, |row, column| side(row, column, -1.0));
-        // The rim, each side from below to above, walked so that columns × rows points outward.
+        // Close the rim from bottom to top, walked so that columns × rows points outward.
         let sign = |row: usize| 2.0 * row as f64 - 1.0;
         let rim = |row: usize, column: usize, level: usize, normal: DVec3| {
             (side(row, column, sign(level)).0, normal)
@@ -112,7 +111,7 @@ impl Grid {
         Ok(builder.finish())
     }
 
-    /// Height at a point from (0, 0) to (1, 1) of the sheet.
+    /// Height at a point of the sheet, from (0, 0) to (1, 1).
     fn height(&self, size: DVec2, at: DVec2) -> f64 {
         let from_waves = self.waves.iter().map(|wave| {
             let direction = DVec2::from_angle(f64::from(wave.direction_deg).to_radians());
@@ -134,7 +133,7 @@ impl Grid {
     }
 }
 
-/// Uniform Catmull-Rom spline through `count` values spread over 0…1.
+/// Uniform Catmull-Rom spline through `count` values spread evenly over 0…1.
 fn spline(at: f64, count: usize, value: impl Fn(usize) -> f64) -> f64 {
     let position = at * (count - 1) as f64;
     let span = (position.floor().max(0.0) as usize).min(count - 2);

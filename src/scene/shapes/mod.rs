@@ -1,18 +1,17 @@
-//! Procedural shapes: parameters of a scene file → a closed mesh, wound and with normals outward.
+//! Procedural shapes: parameters of a scene file → a closed mesh with outward winding and normals.
 //!
 //! Every shape is in metres in its own space, +Y up:
 //!
-//! | shape | where it stands |
+//! | shape | position |
 //! |---|---|
 //! | `box`, `sphere`, `torus` | centre at the origin |
 //! | `cylinder`, `cone` | base on y = 0, axis +Y |
-//! | `lathe` | turned about +Y, where its profile puts it |
+//! | `lathe` | revolved about +Y, placed by its profile |
 //! | `extrude` | outline in the x-y plane, from z = −depth / 2 to depth / 2 |
-//! | `tube`, `blobs` | where their points put them |
+//! | `tube`, `blobs` | placed by their points |
 //! | `grid` | centred on the origin in x and z, heights along +Y |
 //!
-//! Lengths of lists and counts are bounded, so that no scene text asks for more memory than a machine
-//! has.
+//! Counts and list lengths are bounded, so that no scene text asks for more memory than a machine has.
 
 mod blobs;
 mod curve;
@@ -36,13 +35,13 @@ pub use tube::Tube;
 
 use super::mesh::Mesh;
 
-/// Counts of segments a shape may be cut into.
+/// Allowed numbers of segments.
 const SEGMENT_RANGE: RangeInclusive<usize> = 3..=4096;
 
 /// Most points of a profile, outline or path.
 const MAX_POINTS: usize = 1024;
 
-/// A procedural shape with its parameters.
+/// Procedural shape with its parameters.
 #[derive(Clone, Debug)]
 pub enum Shape {
     /// `box`.
@@ -84,11 +83,10 @@ impl Shape {
         }
     }
 
-    /// The shape as a closed mesh.
+    /// Builds the closed mesh of the shape.
     ///
     /// # Errors
-    ///
-    /// A message that names the parameter, what is expected and what was found.
+    /// Returns a message that names the parameter, what is expected and what was found.
     pub fn mesh(&self) -> Result<Mesh, String> {
         match self {
             Self::Box(shape) => shape.mesh(),
@@ -105,7 +103,7 @@ impl Shape {
     }
 }
 
-/// A length that must be more than nothing.
+/// Checks that a length is finite and above 0.
 fn positive(key: &str, length: f32) -> Result<f64, String> {
     if length > 0.0 && length.is_finite() {
         Ok(f64::from(length))
@@ -114,7 +112,7 @@ fn positive(key: &str, length: f32) -> Result<f64, String> {
     }
 }
 
-/// A length that may be nothing, up to `limit`.
+/// Checks that a length lies from 0 to `limit`.
 fn from_zero_to(key: &str, length: f32, limit: f64) -> Result<f64, String> {
     let length = f64::from(length);
     if (0.0..=limit).contains(&length) {
@@ -139,7 +137,7 @@ fn count(key: &str, count: usize, range: RangeInclusive<usize>) -> Result<usize,
     }
 }
 
-/// Puts a surface together from patches.
+/// Assembles a surface from patches.
 #[derive(Debug, Default)]
 struct Builder {
     mesh: Mesh,
@@ -152,7 +150,7 @@ impl Builder {
         (self.mesh.positions.len() - 1) as u32
     }
 
-    /// A triangle, unless two of its corners fall together, as at a pole.
+    /// Adds a triangle, unless two of its corners coincide, as at a pole.
     fn triangle(&mut self, corners: [u32; 3]) {
         let [a, b, c] = corners.map(|corner| self.mesh.positions[corner as usize]);
         if a != b && b != c && c != a {
@@ -160,7 +158,7 @@ impl Builder {
         }
     }
 
-    /// A patch of `rows` × `columns` vertices; columns × rows (cross product) points outward.
+    /// Adds a patch of `rows` × `columns` vertices; columns × rows (cross product) points outward.
     fn patch(
         &mut self,
         rows: usize,
@@ -185,7 +183,7 @@ impl Builder {
         }
     }
 
-    /// A flat face with its triangles, given as indices into `positions`.
+    /// Adds a flat face with its triangles, given as indices into `positions`.
     fn face(&mut self, positions: &[DVec3], normal: DVec3, triangles: &[[usize; 3]]) {
         let first = self.mesh.positions.len() as u32;
         for &position in positions {
@@ -196,7 +194,7 @@ impl Builder {
         }
     }
 
-    /// The mesh, turned inside out where its outside was within (a profile given from top to bottom).
+    /// Returns the mesh, turned inside out if wound inward (a profile given from top to bottom).
     fn finish(self) -> Mesh {
         let mut mesh = self.mesh;
         if volume(&mesh) < 0.0 {
@@ -207,7 +205,7 @@ impl Builder {
     }
 }
 
-/// Volume inside a closed mesh, by the divergence theorem; negative where it is wound inward.
+/// Volume inside a closed mesh, by the divergence theorem; negative if it is wound inward.
 fn volume(mesh: &Mesh) -> f64 {
     mesh.triangles
         .iter()

@@ -9,7 +9,7 @@ use super::{
     Builder, MAX_POINTS, Mesh, SEGMENT_RANGE, count, curve, finite, from_zero_to, positive,
 };
 
-/// Corners sharper than this are creases in shapes that do not say.
+/// Angle above which a corner is a crease, for shapes that do not set it.
 const DEFAULT_CREASE_DEG: f64 = 40.0;
 
 /// `sphere`: centre at the origin.
@@ -18,7 +18,7 @@ const DEFAULT_CREASE_DEG: f64 = 40.0;
 pub struct Sphere {
     /// Radius, metres.
     pub radius: f32,
-    /// Pieces of the equator; half as many from pole to pole.
+    /// Segments around the equator; half as many from pole to pole.
     #[serde(default = "default_segments")]
     pub segments: usize,
 }
@@ -34,7 +34,7 @@ pub struct Cylinder {
     /// Radius of the rounded rims, metres; 0 is sharp.
     #[serde(default)]
     pub bevel: f32,
-    /// Pieces around.
+    /// Segments around the axis.
     #[serde(default = "default_segments")]
     pub segments: usize,
 }
@@ -50,7 +50,7 @@ pub struct Cone {
     pub top_radius: f32,
     /// Height, metres.
     pub height: f32,
-    /// Pieces around.
+    /// Segments around the axis.
     #[serde(default = "default_segments")]
     pub segments: usize,
 }
@@ -59,35 +59,35 @@ pub struct Cone {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Torus {
-    /// From the centre to the middle of the tube, metres.
+    /// Distance from the centre to the middle of the tube, metres.
     pub radius: f32,
     /// Radius of the tube, metres; less than `radius`.
     pub tube_radius: f32,
-    /// Pieces around the axis.
+    /// Segments around the axis.
     #[serde(default = "default_segments")]
     pub segments: usize,
-    /// Pieces around the tube.
+    /// Segments around the tube.
     #[serde(default = "default_tube_segments")]
     pub tube_segments: usize,
 }
 
-/// `lathe`: a profile turned about +Y.
+/// `lathe`: a profile revolved about +Y.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Lathe {
-    /// Points [radius, y], metres. An open profile is closed by flat disks at its ends.
+    /// Points [radius, y], metres. Flat disks close the ends of an open profile.
     pub profile: Vec<[f32; 2]>,
-    /// The profile's last point leads to its first: a ring.
+    /// Joins the profile's last point to its first: a ring.
     #[serde(default)]
     pub closed: bool,
-    /// Pieces of a spline between two points of the profile; 1 is straight. A point given twice is a
+    /// Spline segments between two points of the profile; 1 is straight. A point given twice is a
     /// corner of the spline.
     #[serde(default = "default_smooth")]
     pub smooth: usize,
-    /// Corners that turn by more than this are sharp, degrees.
+    /// Angle above which a corner is sharp, degrees.
     #[serde(default = "default_crease_deg")]
     pub crease_deg: f32,
-    /// Pieces around.
+    /// Segments around the axis.
     #[serde(default = "default_segments")]
     pub segments: usize,
 }
@@ -109,11 +109,10 @@ fn default_crease_deg() -> f32 {
 }
 
 impl Sphere {
-    /// Closed mesh.
+    /// Builds the closed mesh.
     ///
     /// # Errors
-    ///
-    /// A message about the parameter at fault.
+    /// Returns a message about the parameter at fault.
     pub fn mesh(&self) -> Result<Mesh, String> {
         let radius = positive("radius", self.radius)?;
         let segments = count("segments", self.segments, SEGMENT_RANGE)?;
@@ -130,11 +129,10 @@ impl Sphere {
 }
 
 impl Cylinder {
-    /// Closed mesh.
+    /// Builds the closed mesh.
     ///
     /// # Errors
-    ///
-    /// A message about the parameter at fault.
+    /// Returns a message about the parameter at fault.
     pub fn mesh(&self) -> Result<Mesh, String> {
         let radius = positive("radius", self.radius)?;
         let height = positive("height", self.height)?;
@@ -154,7 +152,7 @@ impl Cylinder {
             profile.extend([DVec2::new(radius, 0.0), DVec2::new(radius, height)]);
         }
         profile.push(DVec2::new(0.0, height));
-        // Where the bevel takes all of the radius or height, arcs meet up to rounding.
+        // Arcs meet up to rounding where the bevel takes all of the radius or height.
         profile.dedup_by(|next, kept| next.distance(*kept) < 1e-9 * radius);
         let last = profile.len() - 1;
         profile[last].x = 0.0;
@@ -163,11 +161,10 @@ impl Cylinder {
 }
 
 impl Cone {
-    /// Closed mesh.
+    /// Builds the closed mesh.
     ///
     /// # Errors
-    ///
-    /// A message about the parameter at fault.
+    /// Returns a message about the parameter at fault.
     pub fn mesh(&self) -> Result<Mesh, String> {
         let radius = positive("radius", self.radius)?;
         let top_radius = from_zero_to("top_radius", self.top_radius, f64::from(f32::MAX))?;
@@ -185,11 +182,10 @@ impl Cone {
 }
 
 impl Torus {
-    /// Closed mesh.
+    /// Builds the closed mesh.
     ///
     /// # Errors
-    ///
-    /// A message about the parameter at fault.
+    /// Returns a message about the parameter at fault.
     pub fn mesh(&self) -> Result<Mesh, String> {
         let radius = positive("radius", self.radius)?;
         let tube_radius = positive("tube_radius", self.tube_radius)?;
@@ -211,11 +207,10 @@ impl Torus {
 }
 
 impl Lathe {
-    /// Closed mesh.
+    /// Builds the closed mesh.
     ///
     /// # Errors
-    ///
-    /// A message about the parameter at fault.
+    /// Returns a message about the parameter at fault.
     pub fn mesh(&self) -> Result<Mesh, String> {
         let needed = if self.closed { 3 } else { 2 };
         count("number of points in profile", self.profile.len(), needed..=MAX_POINTS)?;
@@ -254,11 +249,11 @@ impl Lathe {
     }
 }
 
-/// Turns a profile of (radius, y), from bottom to top with the outside to the right, about +Y.
+/// Revolves a profile of (radius, y), from bottom to top with the outside to the right, about +Y.
 fn revolve(profile: &[DVec2], closed: bool, crease_deg: f64, segments: usize) -> Mesh {
     let mirrored = |from: DVec2, to: DVec2| {
         let along = to - from;
-        // Across the axis the profile goes on as its mirror image.
+        // Across the axis, the profile continues as its mirror image.
         let normal = DVec2::new(along.y, -along.x).normalize_or_zero();
         Some(DVec2::new(-normal.x, normal.y))
     };
@@ -266,7 +261,7 @@ fn revolve(profile: &[DVec2], closed: bool, crease_deg: f64, segments: usize) ->
     let ends = [mirrored(profile[0], profile[1]), mirrored(profile[count - 2], profile[count - 1])];
     let turns: Vec<_> = (0..=segments)
         .map(|segment| {
-            // The last column repeats the first to the bit.
+            // Repeat the first column bit for bit in the last.
             let angle = TAU * (segment % segments) as f64 / segments as f64;
             DVec3::new(angle.cos(), 0.0, -angle.sin())
         })

@@ -1,4 +1,4 @@
-//! `box`: a cuboid, with rounded edges where it has a bevel.
+//! `box`: a cuboid, with rounded edges if it has a bevel.
 
 use std::f64::consts::FRAC_PI_4;
 
@@ -16,7 +16,7 @@ pub struct RoundedBox {
     /// Radius of the rounded edges, metres; 0 is sharp. At most half the shortest length.
     #[serde(default)]
     pub bevel: f32,
-    /// Pieces of half a rounded edge, that is 45°.
+    /// Segments of half a rounded edge, that is 45°.
     #[serde(default = "default_bevel_segments")]
     pub bevel_segments: usize,
 }
@@ -26,11 +26,10 @@ fn default_bevel_segments() -> usize {
 }
 
 impl RoundedBox {
-    /// Closed mesh: 12 triangles where there is no bevel.
+    /// Builds the closed mesh, 12 triangles without a bevel.
     ///
     /// # Errors
-    ///
-    /// A message about the parameter at fault.
+    /// Returns a message about the parameter at fault.
     pub fn mesh(&self) -> Result<Mesh, String> {
         let [x, y, z] = self.size;
         let half =
@@ -38,8 +37,8 @@ impl RoundedBox {
         let bevel = from_zero_to("bevel", self.bevel, half.min_element())?;
         let segments = count("bevel_segments", self.bevel_segments, 1..=64)?;
         let inner = half - bevel;
-        // Along each axis: the rounded edge up to 45°, the flat part, the other edge; as the corner of
-        // the inner box and the offset from it in units of the bevel before normalisation.
+        // Along each axis, the rounded edge up to 45°, the flat part, the other edge: the corner of
+        // the inner box and the offset from it, in units of the bevel before normalisation.
         let lines: Vec<(f64, f64)> = if bevel > 0.0 {
             let tangent = |step: usize| (FRAC_PI_4 * step as f64 / segments as f64).tan();
             let low = (0..=segments).rev().map(|step| (-1.0, -tangent(step)));

@@ -6,12 +6,12 @@ use glam::{DVec2, Vec3};
 
 use super::*;
 
-/// A shape from the keys of its table.
+/// Parses a shape from the keys of its table.
 fn shape<T: serde::de::DeserializeOwned>(keys: &str) -> T {
     toml::from_str(keys).unwrap()
 }
 
-/// Asserts that every edge is walked as often one way as the other, that normals and winding agree and
+/// Asserts that every edge is walked equally often both ways, that normals and winding agree and
 /// nothing is degenerate; returns the volume and the Euler characteristic.
 fn check_closed(mesh: &Mesh) -> (f64, i64) {
     let mut ids = HashMap::new();
@@ -137,7 +137,7 @@ fn lathe_splines_are_smooth_but_for_their_corners() {
     let mesh = shape::<Lathe>(vase).mesh().unwrap();
     assert_eq!(check_closed(&mesh).1, 2);
     assert!(mesh.positions.contains(&[0.5, 0.0, 0.0]), "control points are on the curve");
-    // Straight wall: every spline point keeps its radius.
+    // On a straight wall, every spline point keeps its radius.
     let wall = "smooth = 8\nprofile = [[0.5, 0.0], [0.5, 0.7], [0.5, 1.0]]";
     let (found, _) = check_closed(&shape::<Lathe>(wall).mesh().unwrap());
     assert_close(found, PI * 0.25, 2e-3);
@@ -180,7 +180,7 @@ fn tubes_have_the_volume_of_their_path() {
     assert_close(check_closed(&capsule).0, PI * 0.01 * 2.0 + 4.0 / 3.0 * PI * 0.001, 5e-3);
     let tapered = "radius = [0.1, 0.2]\nsegments = 128\npath = [[0,0,0],[1,0,0]]";
     assert_close(check_closed(&shape::<Tube>(tapered).mesh().unwrap()).0, PI * 0.07 / 3.0, 1e-3);
-    // A ring out of its plane: the frame has to close.
+    // A ring that leaves its plane: the frame has to close.
     let ring = "radius = 0.1\nclosed = true\nsmooth = 24\n\
         path = [[1,0.2,0],[0,-0.2,1],[-1,0.2,0],[0,-0.2,-1]]";
     let (_, characteristic) = check_closed(&shape::<Tube>(ring).mesh().unwrap());

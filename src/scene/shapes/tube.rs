@@ -7,25 +7,25 @@ use serde::Deserialize;
 
 use super::{Builder, MAX_POINTS, Mesh, SEGMENT_RANGE, count, curve, finite, positive};
 
-/// `tube`: where its path leads.
+/// `tube`: placed by its path.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tube {
-    /// Points of the middle line, metres.
+    /// Points of the centre line, metres.
     pub path: Vec<[f32; 3]>,
     /// Radius, metres: one, or one per point of the path.
     pub radius: Radius,
-    /// The path's last point leads to its first: a ring.
+    /// Joins the path's last point to its first: a ring.
     #[serde(default)]
     pub closed: bool,
-    /// Hemispheres at the ends instead of flat disks.
+    /// Ends in hemispheres instead of flat disks.
     #[serde(default)]
     pub round: bool,
-    /// Pieces of a spline between two points of the path; 1 is straight. A point given twice is a corner
-    /// of the spline.
+    /// Spline segments between two points of the path; 1 is straight. A point given twice is a
+    /// corner of the spline.
     #[serde(default = "default_smooth")]
     pub smooth: usize,
-    /// Pieces around.
+    /// Segments around the tube.
     #[serde(default = "default_segments")]
     pub segments: usize,
 }
@@ -34,9 +34,9 @@ pub struct Tube {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(untagged, expecting = "expected a number or an array of numbers")]
 pub enum Radius {
-    /// Everywhere the same.
+    /// Same everywhere.
     Constant(f32),
-    /// Per point.
+    /// One per point.
     PerPoint(Vec<f32>),
 }
 
@@ -48,24 +48,23 @@ fn default_segments() -> usize {
     24
 }
 
-/// A circle of the tube.
+/// Circle of the tube.
 #[derive(Clone, Copy, Debug)]
 struct Ring {
     center: DVec3,
     tangent: DVec3,
-    /// At right angles to the tangent; where the circle begins.
+    /// Direction to the first point of the circle, at right angles to the tangent.
     start: DVec3,
     radius: f64,
-    /// Angle between the normal of the surface and the plane of the circle, toward the tangent.
+    /// Angle from the plane of the circle to the surface normal, toward the tangent, radians.
     tilt: f64,
 }
 
 impl Tube {
-    /// Closed mesh.
+    /// Builds the closed mesh.
     ///
     /// # Errors
-    ///
-    /// A message about the parameter at fault.
+    /// Returns a message about the parameter at fault.
     pub fn mesh(&self) -> Result<Mesh, String> {
         let needed = if self.closed { 3 } else { 2 };
         count("number of points in path", self.path.len(), needed..=MAX_POINTS)?;
@@ -105,7 +104,7 @@ impl Tube {
     }
 }
 
-/// Frames that do not turn about the path, by double reflection (Wang, Jüttler, Zheng and Liu,
+/// Rotation-minimising frames along the path, by double reflection (Wang, Jüttler, Zheng and Liu,
 /// "Computation of rotation minimizing frames", 2008).
 fn rings(points: &[DVec4], closed: bool) -> Vec<Ring> {
     let count = points.len();
@@ -117,7 +116,7 @@ fn rings(points: &[DVec4], closed: bool) -> Vec<Ring> {
                 if index > 0 || closed { along(index + count - 1, index) } else { DVec3::ZERO };
             let after =
                 if index + 1 < count || closed { along(index, index + 1) } else { DVec3::ZERO };
-            // Where the path turns straight back there is no mean direction.
+            // A path that turns straight back has no mean direction.
             (before + after).try_normalize().unwrap_or(before.any_orthonormal_vector())
         })
         .collect();
@@ -151,7 +150,7 @@ fn rings(points: &[DVec4], closed: bool) -> Vec<Ring> {
         });
     }
     if closed {
-        // What the frame has turned about the path once around is taken back bit by bit.
+        // Undo the frame's total turn about the closed path, spread evenly over the rings.
         let first = rings[0].start;
         let cross = first.cross(rings[0].tangent);
         let turned = f64::atan2(-rings[count].start.dot(cross), rings[count].start.dot(first));

@@ -5,7 +5,7 @@ use std::io::{BufRead, Read};
 use super::Source;
 use crate::error::{Error, Result};
 
-/// A header longer than this is taken for another kind of file.
+/// Most bytes read of a header line; a longer one belongs to another kind of file.
 const MAX_HEADER_LINE_BYTES: u64 = 65_536;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,7 +71,7 @@ impl Scalar {
 pub(super) struct Property {
     pub(super) name: String,
     pub(super) value: Scalar,
-    /// Type of the count where the property is a list.
+    /// Type of the count if the property is a list.
     pub(super) list_count: Option<Scalar>,
 }
 
@@ -83,7 +83,7 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// Bytes the element needs at least, in the shortest form of each property.
+    /// Fewest bytes the element can take, with each property in its shortest form.
     pub(super) fn least_bytes(&self, encoding: Encoding) -> u64 {
         let of_property = |property: &Property| match encoding {
             Encoding::Ascii => 2,
@@ -108,7 +108,7 @@ impl<R: BufRead> Source<'_, R> {
         Ok(String::from_utf8_lossy(&bytes).trim().to_owned())
     }
 
-    /// Reads up to and with `end_header`; the encoding is set from then on.
+    /// Reads up to and including `end_header`, and sets the encoding.
     pub(super) fn read_header(&mut self) -> Result<Vec<Element>> {
         let magic = self.header_line()?;
         if magic != "ply" {

@@ -1,8 +1,8 @@
 //! PLY (Turk, "The PLY polygon file format", 1994): ascii and binary in both byte orders.
 //!
-//! The header may name elements and properties in any order and of any type; used are `x y z` and
-//! `nx ny nz` of `vertex` and the list `vertex_indices` (or `vertex_index`) of `face`. Polygons with
-//! more than three corners are triangulated in the plane of their Newell normal.
+//! The header may name elements and properties in any order and of any type. The reader uses
+//! `x y z` and `nx ny nz` of `vertex` and the list `vertex_indices` (or `vertex_index`) of `face`. It
+//! triangulates polygons with more than three corners in the plane of their Newell normal.
 
 mod header;
 
@@ -23,7 +23,6 @@ use crate::{
 /// Reads a PLY file.
 ///
 /// # Errors
-///
 /// [`Error::Io`], or [`Error::Format`] that names the element and what was expected and found.
 pub fn read(path: &Path) -> Result<Mesh> {
     let file = File::open(path).map_err(|source| Error::io(path, "read", source))?;
@@ -39,7 +38,7 @@ fn read_from<R: BufRead>(path: &Path, reader: R, file_bytes: u64) -> Result<Mesh
     let body_bytes = file_bytes.saturating_sub(source.bytes_read);
     for element in &elements {
         let least = element.least_bytes(source.encoding);
-        // One byte less is right where an ascii file ends without a new line.
+        // An ascii file without a final newline is one byte shorter.
         if least > body_bytes + 1 {
             return Err(Error::format(
                 path,
@@ -84,7 +83,7 @@ fn vertex_count(path: &Path, elements: &[Element]) -> Result<u32> {
     })
 }
 
-/// Corners of the faces with more than three, until all positions are known.
+/// Corners of the faces with more than three, kept until all positions are known.
 #[derive(Debug, Default)]
 struct Polygons {
     corners: Vec<u32>,
@@ -106,7 +105,7 @@ impl Polygons {
     }
 }
 
-/// The file from where it has been read to.
+/// Reader with its position in the file.
 struct Source<'a, R> {
     path: &'a Path,
     reader: R,
@@ -276,7 +275,7 @@ impl<R: BufRead> Source<'_, R> {
     }
 
     fn ascii_scalar(&mut self, place: Place) -> Result<f64> {
-        // The longest number a double needs has 24 characters; more digits are cut off by the limit.
+        // A double needs at most 24 characters; a word longer than this array is refused.
         let mut word = [0_u8; 64];
         let mut length = 0;
         loop {
@@ -306,7 +305,7 @@ impl<R: BufRead> Source<'_, R> {
     }
 }
 
-/// An element of the file, for messages.
+/// Element of the file, for messages.
 #[derive(Clone, Copy)]
 struct Place<'a> {
     element: &'a Element,
