@@ -8,8 +8,7 @@ use rayon::prelude::*;
 use crate::math::colour::luminance;
 use crate::{
     brdf::{
-        Material,
-        material::{ConductorFresnel, MaterialKind},
+        material::{ConductorFresnel, Material, MaterialKind},
         twin,
     },
     error::{Error, Result},

@@ -25,6 +25,7 @@
 //! for Physically-based Rendering".
 
 pub mod cornell;
+mod load;
 pub mod material;
 pub mod materials;
 pub mod merl;

@@ -7,9 +7,7 @@
 
 use std::{
     f32::consts::{FRAC_PI_2, PI},
-    fmt, fs,
-    io::Read,
-    path::Path,
+    fmt,
 };
 
 use glam::{Vec3, vec3};
@@ -18,11 +16,9 @@ use rayon::prelude::*;
 
 use crate::{
     brdf::{
-        cornell, merl,
         tabulate::{EnergyLimit, SamplingRow, directional_albedo},
         twin,
     },
-    error::{Error, Result},
     shader::constants::*,
 };
 
@@ -86,18 +82,6 @@ fn is_valid(cell: Vec3) -> bool {
 }
 
 impl MeasuredTable {
-    /// Reads a measured BRDF: MERL `.binary` where the name or the first 12 bytes say so, else the
-    /// text format of Cornell and pbrt-v2.
-    pub fn load(path: &Path) -> Result<Self> {
-        let mut head = [0; merl::HEADER_BYTES];
-        let read = fs::File::open(path)
-            .and_then(|file| file.take(head.len() as u64).read(&mut head))
-            .map_err(|source| Error::io(path, "read", source))?;
-        let is_merl = path.extension().is_some_and(|extension| extension == "binary")
-            || (read == head.len() && merl::dimensions(head) == merl::EXPECTED_DIMENSIONS);
-        if is_merl { merl::load(path) } else { cornell::load(path) }
-    }
-
     /// The table of a function of (outgoing, incident) directions in 1/sr, taken at the centres of
     /// the bins that have both directions above the surface.
     pub fn tabulate(value: impl Fn(Vec3, Vec3) -> Vec3 + Sync) -> Result<Self, String> {

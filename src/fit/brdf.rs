@@ -5,24 +5,23 @@
 //! lobes of its neighbour, turned with the mirror direction as far as they are narrow, so that
 //! [`BrdfFit::lobes_at`] may interpolate between views.
 
-use std::{f64::consts::FRAC_PI_2, f64::consts::PI, time::Instant};
+use std::{f64::consts::FRAC_PI_2, time::Instant};
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::{
-    cache::{self, Cache, Fit},
-    component::{Component, kernel_integral},
+    cache::{self, Cache},
+    component::Component,
     config,
     expectation::maximize,
+    fitted::{BrdfFit, BrdfSummary, BrdfView, Fit, view_theta},
     growth::grow,
     hemisphere::{HemisphereTarget, sample_hemisphere},
-    judge::{FitErrors, judge_hemisphere},
+    judge::judge_hemisphere,
     options::{Method, check_lobes, check_views},
     points::PointSet,
-    solver,
-    squared_error::SquaredError,
+    squared_error::minimize_squared_error,
 };
 use crate::{
     brdf::{self, MaterialTables},
@@ -40,92 +39,6 @@ pub struct BrdfOptions {
     pub views: usize,
     /// Objective.
     pub method: Method,
-}
-
-/// The fit for one view.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct BrdfView {
-    /// Angle between normal and view, radians.
-    pub theta: f32,
-    /// Lobes of BRDF × cosine (luminance, 1/sr) in the local frame, the view toward +x; as many as in
-    /// every other view, those without use with an amplitude of 0.
-    pub lobes: Vec<Lobe>,
-    /// Integral of BRDF × cosine over the hemisphere: the albedo for this view.
-    pub albedo: f32,
-    /// How good it is.
-    pub errors: FitErrors,
-}
-
-/// A fitted BRDF.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct BrdfFit {
-    /// Name of the material or path of the file.
-    pub source: String,
-    /// Objective.
-    pub method: Method,
-    /// Lobes asked for per view.
-    pub requested_lobes: usize,
-    /// The views, from the normal to the horizon.
-    pub views: Vec<BrdfView>,
-    /// Figures of the views up to [`config::SUMMARY_ANGLE_DEG`].
-    pub summary: BrdfSummary,
-    /// What the fit did besides what was asked.
-    pub notes: Vec<String>,
-    /// Seconds the fit took; of a fit from the cache, that reading it took.
-    #[serde(skip)]
-    pub seconds: f64,
-    /// Whether the fit comes from the cache.
-    #[serde(skip)]
-    pub is_cached: bool,
-}
-
-/// Figures over the views up to [`config::SUMMARY_ANGLE_DEG`] from the normal.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct BrdfSummary {
-    /// Means over the views.
-    pub mean: FitErrors,
-    /// Largest χ² of a view.
-    pub largest_chi_squared: f64,
-    /// Largest χ² halfway between two views, of the interpolated lobes.
-    pub largest_chi_squared_between: f64,
-}
-
-/// Angle between normal and view of a view's index, radians.
-pub fn view_theta(view: usize, views: usize) -> f64 {
-    (view as f64 + 0.5) / views as f64 * FRAC_PI_2
-}
-
-impl BrdfFit {
-    /// Lobes for any view in the plane of +x, by interpolation between the lobes of two views: axes
-    /// and logarithms of the bandwidths, and the integrals.
-    pub fn lobes_at(&self, theta: f32) -> Vec<Lobe> {
-        let count = self.views.len();
-        let position = f64::from(theta) / FRAC_PI_2 * count as f64 - 0.5;
-        let lower = (position.max(0.0) as usize).min(count.saturating_sub(1));
-        let upper = (lower + 1).min(count.saturating_sub(1));
-        let t = (position - lower as f64).clamp(0.0, 1.0);
-        let pairs = self.views[lower].lobes.iter().zip(&self.views[upper].lobes);
-        pairs.map(|(a, b)| interpolate(a, b, t)).collect()
-    }
-}
-
-fn interpolate(a: &Lobe, b: &Lobe, t: f64) -> Lobe {
-    // A lobe that holds nothing at one end has its shape from the other.
-    let t_shape = if a.amplitude <= 0.0 {
-        1.0
-    } else if b.amplitude <= 0.0 {
-        0.0
-    } else {
-        t
-    };
-    let (from, to) = (Component::from_lobe(a, 1.0), Component::from_lobe(b, 1.0));
-    let bandwidth = (from.bandwidth.ln() * (1.0 - t_shape) + to.bandwidth.ln() * t_shape).exp();
-    let shape = Component {
-        axis: from.axis.lerp(to.axis, t_shape).normalize_or(from.axis),
-        bandwidth,
-        share: (1.0 - t) * from.share + t * to.share,
-    };
-    shape.lobe(1.0)
 }
 
 /// Fits a material, or reads the fit from the cache. `name` is for messages. `progress` is called with
@@ -172,11 +85,7 @@ pub fn brdf_lobes(
 }
 
 /// BRDF × cosine, luminance, for a view at `theta` from the normal.
-pub(super) fn sample_view(
-    tables: &MaterialTables,
-    material_index: usize,
-    theta: f64,
-) -> HemisphereTarget {
+fn sample_view(tables: &MaterialTables, material_index: usize, theta: f64) -> HemisphereTarget {
     let outgoing_local = Vec3::new(theta.sin() as f32, 0.0, theta.cos() as f32);
     let value = |direction: DVec3| {
         let incident_local = direction.as_vec3();
@@ -304,16 +213,8 @@ fn minimize_view(target: &HemisphereTarget, components: &[Component]) -> Vec<Com
     if square <= 0.0 {
         return components.to_vec();
     }
-    let (objective, mut unknowns) = SquaredError::new(&target.patches, square, components);
-    solver::minimize(
-        |unknowns| objective.evaluate(unknowns),
-        &objective.bounds(),
-        &mut unknowns,
-        config::L2_STEPS,
-        config::L2_TOLERANCE,
-        &mut |_| (),
-    );
-    let (mut components, energy) = objective.components(&unknowns);
+    let (mut components, energy) =
+        minimize_squared_error(&target.patches, square, components, &mut |_| ());
     for component in &mut components {
         component.share *= energy;
     }
@@ -346,12 +247,4 @@ fn summarize(fit: &BrdfFit, targets: &[HemisphereTarget]) -> BrdfSummary {
         }
     }
     summary
-}
-
-/// Solid angle of the domain that BRDF fits are judged on.
-pub(super) const HEMISPHERE: f64 = 2.0 * PI;
-
-/// Integral of a lobe in 64 bits.
-pub(super) fn lobe_energy(lobe: &Lobe) -> f64 {
-    f64::from(lobe.amplitude) * kernel_integral(lobe.bandwidth.into())
 }

@@ -13,7 +13,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::{brdf::BrdfFit, config, environment::EnvironmentFit};
+use super::{config, fitted::Fit};
 use crate::{
     error::{Error, Result},
     files::write_atomically,
@@ -23,16 +23,6 @@ use crate::{
 pub const EXTENSION: &str = "fit";
 /// Name of the format in the header.
 const FORMAT: &str = "fenestra-fit";
-
-/// What a fit file holds.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "lowercase")]
-pub enum Fit {
-    /// Environment map.
-    Environment(EnvironmentFit),
-    /// BRDF.
-    Brdf(BrdfFit),
-}
 
 #[derive(Serialize, Deserialize)]
 struct Header {

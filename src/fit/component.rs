@@ -38,7 +38,7 @@ impl Component {
         Self {
             axis: lobe.axis.as_dvec3().normalize(),
             bandwidth,
-            share: f64::from(lobe.amplitude) * kernel_integral(bandwidth) / energy,
+            share: lobe_energy(lobe) / energy,
         }
     }
 }
@@ -49,6 +49,11 @@ pub fn kernel_integral(bandwidth: f64) -> f64 {
         return 4.0 * PI;
     }
     -2.0 * PI * (-2.0 * bandwidth).exp_m1() / bandwidth
+}
+
+/// Integral of a lobe in 64 bits.
+pub fn lobe_energy(lobe: &Lobe) -> f64 {
+    f64::from(lobe.amplitude) * kernel_integral(lobe.bandwidth.into())
 }
 
 /// `1 − A(λ)` with the mean resultant length `A(λ) = coth λ − 1/λ`, without cancellation.

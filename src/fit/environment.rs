@@ -2,56 +2,25 @@
 
 use std::time::Instant;
 
-use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
-use serde::{Deserialize, Serialize};
 
 use super::{
-    cache::{self, Cache, Fit},
+    cache::{self, Cache},
     colour::{divergence_colours, least_squares_colours},
     component::{Component, kernel_integral},
-    config,
+    fitted::{EnvironmentFit, EnvironmentLobe, Fit},
     grid::{ColouredPatch, Grid, patch_count},
     growth::grow,
-    judge::{ColouredComponent, FitErrors, judge_environment},
+    judge::{FitErrors, judge_environment},
     options::{Method, check_lobes},
     points::{Patch, PointSet},
-    solver,
-    squared_error::SquaredError,
+    squared_error::minimize_squared_error,
 };
 use crate::{
     error::{Error, Result},
     math::colour::luminance,
     scene::EnvironmentMap,
-    srbf::Lobe,
 };
-
-/// A lobe of an environment map, ready for upload: scalar layout, 32 bytes.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
-pub struct EnvironmentLobe {
-    /// Unit axis in the frame of the map.
-    pub axis: [f32; 3],
-    /// Bandwidth λ.
-    pub bandwidth: f32,
-    /// Radiance at the axis per colour channel, not negative: for pictures and weights.
-    pub colour: [f32; 3],
-    /// Luminance at the axis, not negative: what is sampled.
-    pub amplitude: f32,
-}
-
-const _: () = assert!(size_of::<EnvironmentLobe>() == 32);
-
-impl EnvironmentLobe {
-    /// The luminance lobe.
-    pub fn lobe(&self) -> Lobe {
-        Lobe {
-            axis: Vec3::from_array(self.axis),
-            bandwidth: self.bandwidth,
-            amplitude: self.amplitude,
-        }
-    }
-}
 
 /// How a map is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,54 +29,6 @@ pub struct EnvironmentOptions {
     pub lobes: usize,
     /// Objective.
     pub method: Method,
-}
-
-/// A fitted environment map.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct EnvironmentFit {
-    /// Where the map came from.
-    pub source: String,
-    /// Objective.
-    pub method: Method,
-    /// Lobes asked for; there are fewer where the map has less to fit.
-    pub requested_lobes: usize,
-    /// The lobes in the frame of the map, largest luminance integral first.
-    pub lobes: Vec<EnvironmentLobe>,
-    /// How good it is.
-    pub errors: FitErrors,
-    /// What the fit did besides what was asked.
-    pub notes: Vec<String>,
-    /// Seconds the fit took; of a fit from the cache, that reading it took.
-    #[serde(skip)]
-    pub seconds: f64,
-    /// Whether the fit comes from the cache.
-    #[serde(skip)]
-    pub is_cached: bool,
-}
-
-impl EnvironmentFit {
-    /// The lobes in the world, for a map that is turned about +Y.
-    pub fn world_lobes(&self, rotation_rad: f32) -> Vec<EnvironmentLobe> {
-        let (s, c) = rotation_rad.sin_cos();
-        let turn = |lobe: &EnvironmentLobe| {
-            let [x, y, z] = lobe.axis;
-            EnvironmentLobe { axis: [c * x + s * z, y, c * z - s * x], ..*lobe }
-        };
-        self.lobes.iter().map(turn).collect()
-    }
-
-    /// The luminance lobes as components of their sum, with colours.
-    pub(super) fn components(&self) -> Vec<ColouredComponent> {
-        let energy_of = |lobe: &EnvironmentLobe| {
-            f64::from(lobe.amplitude) * kernel_integral(lobe.bandwidth.into())
-        };
-        let energy: f64 = self.lobes.iter().map(energy_of).sum();
-        let coloured = |lobe: &EnvironmentLobe| ColouredComponent {
-            component: Component::from_lobe(&lobe.lobe(), energy),
-            colour: Vec3::from_array(lobe.colour).as_dvec3(),
-        };
-        self.lobes.iter().map(coloured).collect()
-    }
 }
 
 /// Fits a map, or reads the fit from the cache. The rotation of the map does not matter; see
@@ -179,16 +100,9 @@ fn fit_map(
     let components = grow(&points, options.lobes, &mut |share| progress(em_part * share));
     let (components, fitted_energy) = if l2 {
         let square = squared_integral(&grid);
-        let (objective, mut unknowns) = SquaredError::new(&luminance_patches, square, &components);
-        solver::minimize(
-            |unknowns| objective.evaluate(unknowns),
-            &objective.bounds(),
-            &mut unknowns,
-            config::L2_STEPS,
-            config::L2_TOLERANCE,
-            &mut |step| progress(0.3 + 0.6 * step as f64 / config::L2_STEPS as f64),
-        );
-        objective.components(&unknowns)
+        minimize_squared_error(&luminance_patches, square, &components, &mut |share| {
+            progress(0.3 + 0.6 * share);
+        })
     } else {
         (components, energy)
     };

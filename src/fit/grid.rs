@@ -152,28 +152,22 @@ impl Grid {
             let extent = 1.0 - (across * across + along * along) / 24.0;
             let mut row = [0.0; CHANNELS];
             for x in 0..self.width {
-                if self.is_steep(x, y) {
-                    let above = table[y * stride + x + 1];
-                    let cell = self.parts(x, y).iter().fold([0.0; CHANNELS], |sum, part| {
+                let cell: [f64; CHANNELS] = if self.is_steep(x, y) {
+                    self.parts(x, y).iter().fold([0.0; CHANNELS], |sum, part| {
                         let values = channels(part);
                         std::array::from_fn(|c| sum[c] + values[c])
-                    });
-                    let entry = &mut table[(y + 1) * stride + x + 1];
-                    for c in 0..CHANNELS {
-                        row[c] += cell[c];
-                        entry[c] = above[c] + row[c];
-                    }
-                    continue;
-                }
-                let texel = self.radiance[y * self.width + x];
-                let energy = f64::from(luminance(texel)) * solid_angle;
-                let [r, g, b] = texel.to_array().map(|value| f64::from(value) * solid_angle);
-                let mean = [
-                    extent * sine * azimuths[x].0,
-                    extent * cosine,
-                    -extent * sine * azimuths[x].1,
-                ];
-                let cell = [energy, r, g, b, energy * mean[0], energy * mean[1], energy * mean[2]];
+                    })
+                } else {
+                    let texel = self.cell(x, y);
+                    let energy = f64::from(luminance(texel)) * solid_angle;
+                    let [r, g, b] = texel.to_array().map(|value| f64::from(value) * solid_angle);
+                    let mean = [
+                        extent * sine * azimuths[x].0,
+                        extent * cosine,
+                        -extent * sine * azimuths[x].1,
+                    ];
+                    [energy, r, g, b, energy * mean[0], energy * mean[1], energy * mean[2]]
+                };
                 let above = table[y * stride + x + 1];
                 let entry = &mut table[(y + 1) * stride + x + 1];
                 for c in 0..CHANNELS {

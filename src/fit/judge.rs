@@ -7,8 +7,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    brdf::{HEMISPHERE, lobe_energy},
-    component::{Component, kernel_integral},
+    component::{Component, kernel_integral, lobe_energy},
     config,
     expectation::fast_exp,
     grid::{Grid, STEEP_PARTS},
@@ -28,6 +27,19 @@ pub struct FitErrors {
     pub kullback_leibler: f64,
     /// `∫F dω / ∫L dω`, luminance.
     pub energy_captured: f64,
+}
+
+impl FitErrors {
+    /// The figures from integrals of (L − F)², L², p²/q, p ln(p/f) and F, and that of L, `energy`.
+    fn from_sums(sums: [f64; 5], energy: f64) -> Self {
+        let [difference, square, second_moment, divergence, fitted] = sums;
+        Self {
+            relative_l2: (difference / square).sqrt(),
+            chi_squared: second_moment - 1.0,
+            kullback_leibler: divergence,
+            energy_captured: fitted / energy,
+        }
+    }
 }
 
 /// Cells of a tile are compared with the lobes that matter there.
@@ -155,12 +167,7 @@ pub fn judge_environment(grid: &Grid, energy: f64, lobes: &[ColouredComponent]) 
             *sum += value;
         }
     }
-    FitErrors {
-        relative_l2: (sums[0] / sums[1]).sqrt(),
-        chi_squared: sums[2] - 1.0,
-        kullback_leibler: sums[3],
-        energy_captured: sums[4] / energy,
-    }
+    FitErrors::from_sums(sums, energy)
 }
 
 /// Error figures of a fit of BRDF × cosine for one view. The uniform part of q is on the hemisphere;
@@ -181,7 +188,7 @@ pub fn judge_hemisphere(target: &HemisphereTarget, lobes: &[Lobe]) -> FitErrors 
         };
         let value: f64 = components.iter().map(kernel).sum();
         let (f, p) = (value / lobe_sum, sample.value / energy);
-        let q = (1.0 - config::DEFENSIVE_SHARE) * f + config::DEFENSIVE_SHARE / HEMISPHERE;
+        let q = (1.0 - config::DEFENSIVE_SHARE) * f + config::DEFENSIVE_SHARE / (2.0 * PI);
         sums[0] += sample.solid_angle * (sample.value - value).powi(2);
         sums[1] += sample.solid_angle * sample.value.powi(2);
         sums[2] += sample.solid_angle * p * p / q;
@@ -190,10 +197,5 @@ pub fn judge_hemisphere(target: &HemisphereTarget, lobes: &[Lobe]) -> FitErrors 
         }
         sums[4] += sample.solid_angle * value;
     }
-    FitErrors {
-        relative_l2: (sums[0] / sums[1]).sqrt(),
-        chi_squared: sums[2] - 1.0,
-        kullback_leibler: sums[3],
-        energy_captured: sums[4] / energy,
-    }
+    FitErrors::from_sums(sums, energy)
 }

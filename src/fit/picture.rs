@@ -10,7 +10,10 @@ use std::path::Path;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{brdf::BrdfFit, environment::EnvironmentFit, grid::Grid};
+use super::{
+    fitted::{BrdfFit, EnvironmentFit, EnvironmentLobe},
+    grid::Grid,
+};
 use crate::{
     brdf::{self, MaterialTables},
     error::Result,
@@ -110,7 +113,7 @@ pub fn write_environment(path: &Path, map: &EnvironmentMap, fit: &EnvironmentFit
             .sum::<Vec3>()
             / 4.0;
         let direction = grid.direction(x, y).as_vec3();
-        let value = |lobe: &super::EnvironmentLobe| {
+        let value = |lobe: &EnvironmentLobe| {
             let kernel = kernel_value(Vec3::from_array(lobe.axis), lobe.bandwidth, direction);
             Vec3::from_array(lobe.colour) * kernel
         };

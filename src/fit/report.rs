@@ -5,9 +5,11 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::{
-    BrdfFit, EnvironmentFit, FitErrors, Method,
-    cache::{Fit, read_fit},
+    cache::read_fit,
     config,
+    fitted::{BrdfFit, EnvironmentFit, Fit},
+    judge::FitErrors,
+    options::Method,
 };
 use crate::error::Result;
 

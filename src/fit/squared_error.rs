@@ -11,8 +11,9 @@ use super::{
     component::{
         Component, MAX_BANDWIDTH, MIN_BANDWIDTH, convolution, kernel_integral, mean_shortfall,
     },
+    config,
     points::{Patch, blurred},
-    solver::Bounds,
+    solver::{self, Bounds},
 };
 
 /// Unknowns per lobe.
@@ -142,6 +143,27 @@ impl SquaredError {
         let value = 1.0 + rows.iter().map(|row| row.0).sum::<f64>();
         (value, rows.into_iter().flat_map(|row| row.1).collect())
     }
+}
+
+/// Lowers the squared error from `components` on, by L-BFGS: shares of the energy of `patches` in,
+/// shares of the returned energy out. `square` is the integral of the target's square; `progress` is
+/// called with the share of the steps that are done.
+pub fn minimize_squared_error(
+    patches: &[Patch],
+    square: f64,
+    components: &[Component],
+    progress: &mut dyn FnMut(f64),
+) -> (Vec<Component>, f64) {
+    let (objective, mut unknowns) = SquaredError::new(patches, square, components);
+    solver::minimize(
+        |unknowns| objective.evaluate(unknowns),
+        &objective.bounds(),
+        &mut unknowns,
+        config::L2_STEPS,
+        config::L2_TOLERANCE,
+        &mut |step| progress(step as f64 / config::L2_STEPS as f64),
+    );
+    objective.components(&unknowns)
 }
 
 #[cfg(test)]

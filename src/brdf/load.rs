@@ -1,0 +1,22 @@
+//! Files of measured BRDFs, either format → [`MeasuredTable`].
+
+use std::{fs, io::Read, path::Path};
+
+use crate::{
+    brdf::{cornell, merl, table::MeasuredTable},
+    error::{Error, Result},
+};
+
+impl MeasuredTable {
+    /// Reads a measured BRDF: MERL `.binary` where the name or the first 12 bytes say so, else the
+    /// text format of Cornell and pbrt-v2.
+    pub fn load(path: &Path) -> Result<Self> {
+        let mut head = [0; merl::HEADER_BYTES];
+        let read = fs::File::open(path)
+            .and_then(|file| file.take(head.len() as u64).read(&mut head))
+            .map_err(|source| Error::io(path, "read", source))?;
+        let is_merl = path.extension().is_some_and(|extension| extension == "binary")
+            || (read == head.len() && merl::dimensions(head) == merl::EXPECTED_DIMENSIONS);
+        if is_merl { merl::load(path) } else { cornell::load(path) }
+    }
+}
