@@ -1,9 +1,9 @@
-//! BRDF × cosine → mixtures of lobes, one per elevation of the view, in the local frame.
+//! BRDF × cosine → mixtures of lobes in the local frame, one per view elevation.
 //!
-//! The view `v` of n stands at `θ = (v + ½)/n · 90°` from the normal, toward +x; an isotropic BRDF needs
-//! no azimuth. Lobes of equal index belong together from view to view: each view starts from the
-//! lobes of its neighbour, turned with the mirror direction as far as they are narrow, so that
-//! [`BrdfFit::lobes_at`] may interpolate between views.
+//! View `v` of n stands at `θ = (v + ½)/n · 90°` from the normal, toward +x; an isotropic BRDF
+//! needs no azimuth. Lobes of equal index correspond between views: each view starts from its
+//! neighbour's lobes, turned with the mirror direction as far as they are narrow, so that
+//! [`BrdfFit::lobes_at`] can interpolate.
 
 use std::{f64::consts::FRAC_PI_2, time::Instant};
 
@@ -30,7 +30,7 @@ use crate::{
     srbf::Lobe,
 };
 
-/// How a BRDF is fitted.
+/// Parameters of a BRDF fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BrdfOptions {
     /// Lobes per view, 1 to [`config::MAX_LOBES`].
@@ -41,12 +41,12 @@ pub struct BrdfOptions {
     pub method: Method,
 }
 
-/// Fits a material, or reads the fit from the cache. `name` is for messages. `progress` is called with
-/// the share of the work that is done.
+/// Fits a material, or reads the fit from the cache. `name` appears in messages; `progress`
+/// receives the share of the work that is done.
 ///
 /// # Errors
-/// A material that reflects nothing in any view; lobes or views out of range. A cache that cannot be
-/// read or written is a warning in the log.
+/// The material reflects nothing in any view; lobes or views are out of range. A cache that cannot
+/// be read or written only logs a warning.
 ///
 /// # Panics
 /// `material_index` is out of range.
@@ -62,12 +62,12 @@ pub fn brdf_lobes(
     check_lobes(options.lobes)?;
     check_views(options.views)?;
     let view = |theta: f64| sample_view(tables, material_index, theta);
-    // The views themselves and those halfway between, which judge the interpolation.
+    // Sample the views and the elevations halfway between, which judge the interpolation.
     let targets: Vec<HemisphereTarget> = (0..2 * options.views - 1)
         .into_par_iter()
         .map(|index| view((index as f64 + 1.0) / (2 * options.views) as f64 * FRAC_PI_2))
         .collect();
-    // What was sampled decides the fit, so it names the cache file.
+    // The samples determine the fit, so they name the cache file.
     let header = format!("brdf {} {} {:?}", options.lobes, options.views, options.method);
     let values: Vec<f64> =
         targets.iter().flat_map(|target| target.samples.iter().map(|s| s.value)).collect();
@@ -84,7 +84,7 @@ pub fn brdf_lobes(
     Ok(fit)
 }
 
-/// BRDF × cosine, luminance, for a view at `theta` from the normal.
+/// Samples the luminance of BRDF × cosine for a view at `theta` from the normal.
 fn sample_view(tables: &MaterialTables, material_index: usize, theta: f64) -> HemisphereTarget {
     let outgoing_local = Vec3::new(theta.sin() as f32, 0.0, theta.cos() as f32);
     let value = |direction: DVec3| {
@@ -134,7 +134,7 @@ fn fit_views(
         notes.push(format!("{} lobes asked for, {count} used at most", options.lobes));
     }
     let view = |(index, components): (usize, &Vec<Component>)| {
-        // Shares hold integrals here.
+        // Shares are integrals here.
         let mut lobes: Vec<Lobe> = components.iter().map(|component| component.lobe(1.0)).collect();
         lobes.resize(count, Lobe { axis: Vec3::Z, bandwidth: 1.0, amplitude: 0.0 });
         let target = &targets[2 * index];
@@ -160,7 +160,7 @@ fn fit_views(
     Ok(fit)
 }
 
-/// Mixtures for all views, lobes of equal index belonging together; shares of the view's energy.
+/// Fits all views, lobes of equal index corresponding; shares are relative to the view's energy.
 fn chain(
     points: &[PointSet],
     options: BrdfOptions,
@@ -196,18 +196,18 @@ fn chain(
     fitted
 }
 
-/// Turns a lobe with the mirror direction when the view turns by `turn` radians away from the normal:
-/// wide lobes stay.
+/// Turns a lobe with the mirror direction as the view turns `turn` radians away from the normal.
+/// Wide lobes stay.
 fn follow(component: &mut Component, turn: f64) {
     let part = component.bandwidth / (component.bandwidth + config::FOLLOWING_BANDWIDTH);
     let (s, c) = (-turn * part).sin_cos();
     let DVec3 { x, y, z } = component.axis;
     component.axis = DVec3::new(c * x + s * z, y, c * z - s * x);
-    // A lobe without energy may earn some here.
+    // Give a lobe without energy the chance to gain some here.
     component.share = component.share.max(1e-4);
 }
 
-/// Lowers the squared error of a view; shares of the result hold integrals.
+/// Lowers the squared error of a view. Shares of the result are integrals.
 fn minimize_view(target: &HemisphereTarget, components: &[Component]) -> Vec<Component> {
     let square: f64 = target.samples.iter().map(|s| s.solid_angle * s.value * s.value).sum();
     if square <= 0.0 {

@@ -1,8 +1,8 @@
-//! Fit files and the cache of fits, whose files are named by the content they were fitted to.
+//! Fit files, and a cache that names them by the content they were fitted to.
 //!
-//! A fit file is two lines of JSON: a header with format, version and the SHA-256 of the second line,
-//! and the fit. Writing is atomic, and what is written depends on the name only, so that two
-//! processes that fit the same at once do each other no harm.
+//! A fit file is two lines of JSON: a header with format, version and the SHA-256 of the second
+//! line, then the fit. Writing is atomic and the name determines the content, so two processes that
+//! make the same fit at once do no harm.
 
 use std::{
     fs,
@@ -31,7 +31,7 @@ struct Header {
     checksum: String,
 }
 
-/// Lower-case hexadecimal SHA-256 of the parts, each with its length before it.
+/// Lower-case hexadecimal SHA-256 of the parts, each preceded by its length.
 fn digest(parts: &[&[u8]]) -> String {
     let mut hasher = Sha256::new();
     for part in parts {
@@ -41,7 +41,7 @@ fn digest(parts: &[&[u8]]) -> String {
     hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Name of a fit in the cache: everything it depends on, with the version of the procedure.
+/// Name of a fit in the cache, from everything it depends on and the version of the procedure.
 pub fn key(parts: &[&[u8]]) -> String {
     let version = config::VERSION.to_le_bytes();
     let mut all: Vec<&[u8]> = vec![FORMAT.as_bytes(), &version];
@@ -73,8 +73,8 @@ pub fn write_fit(path: &Path, fit: &Fit) -> Result<()> {
 /// Reads a fit file.
 ///
 /// # Errors
-/// [`Error::Io`] where it cannot be read; [`Error::Format`] where it is no fit file, of another
-/// version, or damaged.
+/// [`Error::Io`] if it cannot be read; [`Error::Format`] if it is no fit file, of another version
+/// or damaged.
 pub fn read_fit(path: &Path) -> Result<Fit> {
     let bytes = fs::read(path).map_err(|source| Error::io(path, "read", source))?;
     let fail = |message: String| Error::format(path, message);
@@ -105,12 +105,13 @@ pub struct Cache {
 }
 
 impl Cache {
-    /// The user's cache, `fenestra/fits` in `$XDG_CACHE_HOME` or `~/.cache`; none where neither is set.
+    /// The user's cache, `fenestra/fits` in `$XDG_CACHE_HOME` or `~/.cache`; none if neither is
+    /// set.
     pub fn user() -> Option<Self> {
         crate::files::cache_folder("fits").map(Self::at)
     }
 
-    /// A cache in a folder, which may not exist yet.
+    /// A cache in a folder that need not exist yet.
     pub fn at(folder: PathBuf) -> Self {
         Self { folder }
     }
@@ -120,7 +121,7 @@ impl Cache {
         self.folder.join(format!("{key}.{EXTENSION}"))
     }
 
-    /// The fit of that name, if it is there and sound; one that is not sound is a warning in the log.
+    /// Loads the fit named `key` if present. Logs a warning if the file is unsound.
     pub fn load(&self, key: &str) -> Option<Fit> {
         match read_fit(&self.path(key)) {
             Ok(fit) => Some(fit),
@@ -132,7 +133,7 @@ impl Cache {
         }
     }
 
-    /// Keeps a fit; a cache that cannot be written is a warning in the log.
+    /// Stores a fit. Logs a warning if the cache cannot be written.
     pub fn store(&self, key: &str, fit: &Fit) {
         if let Err(error) = write_fit(&self.path(key), fit) {
             log::warn!("{error}; the fit is not kept");

@@ -1,10 +1,10 @@
-//! Colour amplitudes of lobes whose shapes are given, by the objective of the fit.
+//! Colour amplitudes of lobes of given shapes, by the objective of the fit.
 //!
-//! Under the divergence each channel's shares come from expectation maximization with fixed shapes:
-//! no channel loses energy, and a sun spoils nothing. Under the squared error they minimize
-//! `∫(L − Σ a_l G_l)² dω` over a ≥ 0: closest to the map where it is bright, at the cost of what is
-//! near a sun. The Gram matrix `∫G_iG_j` is in closed form (\[Wu & Shih 2009\] Eq. 7), so that lobes
-//! narrower than a patch are not mistaken for nothing; only `∫L·G_i` is summed over patches.
+//! Under the divergence, expectation maximization with fixed shapes finds each channel's shares: no
+//! channel loses energy, and a sun spoils nothing. Under the squared error, amplitudes a ≥ 0
+//! minimize `∫(L − Σ a_l G_l)² dω`: closest to the map where it is bright, at the cost of the
+//! surroundings of a sun. The Gram matrix `∫G_iG_j` has a closed form (\[Wu & Shih 2009\] Eq. 7),
+//! which preserves lobes narrower than a patch; only `∫L·G_i` is summed over patches.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -17,14 +17,14 @@ use super::{
     points::{PointSet, blurred},
 };
 
-/// Coordinate updates per fit at most; bounds the time of large fits.
+/// Most coordinate updates per fit; bounds the time of large fits.
 const MAX_UPDATES: usize = 400_000_000;
-/// Sweeps at most.
+/// Most sweeps.
 const MAX_SWEEPS: usize = 400;
-/// Largest change of a sweep, relative to the largest amplitude, at which it ends.
+/// Largest change in a sweep, relative to the largest amplitude, at which sweeps end.
 const TOLERANCE: f64 = 1e-5;
 
-/// Amplitudes per lobe and channel that lower the divergence of each channel.
+/// Finds amplitudes per lobe and channel that lower each channel's divergence.
 pub fn divergence_colours(patches: &[ColouredPatch], components: &[Component]) -> Vec<DVec3> {
     let channel = |index: usize| -> Vec<f64> {
         let points =
@@ -42,7 +42,7 @@ pub fn divergence_colours(patches: &[ColouredPatch], components: &[Component]) -
     (0..components.len()).map(|k| DVec3::new(red[k], green[k], blue[k])).collect()
 }
 
-/// Amplitudes per lobe and channel of the smallest squared error. `start` holds the first guess.
+/// Finds the amplitudes per lobe and channel of the smallest squared error, from the guess `start`.
 pub fn least_squares_colours(
     patches: &[ColouredPatch],
     components: &[Component],
@@ -66,7 +66,7 @@ pub fn least_squares_colours(
         })
         .collect();
     let mut amplitudes = start.to_vec();
-    // What is left of the target: ∫(L − F)·G_i.
+    // Residual of the target: ∫(L − F)·G_i.
     let mut residual: Vec<DVec3> = (0..count)
         .map(|i| target[i] - (0..count).map(|j| gram[i][j] * amplitudes[j]).sum::<DVec3>())
         .collect();

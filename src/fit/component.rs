@@ -1,4 +1,4 @@
-//! A lobe as the fits see it: a von Mises-Fisher density with its share of the energy, in 64 bits.
+//! Lobe as fits see it: a von Mises-Fisher density with its share of the energy, in 64 bits.
 
 use std::f64::consts::PI;
 
@@ -6,9 +6,9 @@ use glam::DVec3;
 
 use crate::srbf::Lobe;
 
-/// Smallest bandwidth of a fit: wider is a constant for every purpose.
+/// Smallest bandwidth of a fit; a wider lobe is a constant for every purpose.
 pub const MIN_BANDWIDTH: f64 = 1e-3;
-/// Largest bandwidth of a fit, a lobe of 0.4° at half its height: a sun of one texel in a map of 1024.
+/// Largest bandwidth of a fit: 0.4° wide at half height, a sun of one texel in a map of 1024.
 pub const MAX_BANDWIDTH: f64 = 1e5;
 
 /// `share · exp(λ(ω·ξ − 1)) / I(λ)`.
@@ -23,7 +23,7 @@ pub struct Component {
 }
 
 impl Component {
-    /// The component as a lobe of a function with the integral `energy`.
+    /// The component as a lobe of a function with integral `energy`.
     pub fn lobe(&self, energy: f64) -> Lobe {
         Lobe {
             axis: self.axis.as_vec3(),
@@ -32,7 +32,7 @@ impl Component {
         }
     }
 
-    /// The component of a lobe in a function with the integral `energy`.
+    /// The component that a lobe is in a function with integral `energy`.
     pub fn from_lobe(lobe: &Lobe, energy: f64) -> Self {
         let bandwidth = f64::from(lobe.bandwidth);
         Self {
@@ -64,9 +64,9 @@ pub fn mean_shortfall(bandwidth: f64) -> f64 {
     1.0 / bandwidth - 2.0 / (2.0 * bandwidth).exp_m1()
 }
 
-/// Bandwidth whose mean resultant length falls short of 1 by `shortfall`, clamped to
-/// [`MIN_BANDWIDTH`]…[`MAX_BANDWIDTH`]: `λ = r̄(3 − r̄²)/(1 − r̄²)` of \[Banerjee et al. 2005\], made
-/// exact by Newton's method so that expectation maximization never gets worse.
+/// Bandwidth whose mean resultant length is 1 − `shortfall`, clamped to
+/// [`MIN_BANDWIDTH`]…[`MAX_BANDWIDTH`]: `λ = r̄(3 − r̄²)/(1 − r̄²)` of \[Banerjee et al. 2005\],
+/// refined by Newton's method to be exact, so that expectation maximization never gets worse.
 pub fn bandwidth_from_shortfall(shortfall: f64) -> f64 {
     let mean = 1.0 - shortfall;
     if mean <= MIN_BANDWIDTH / 3.0 {
@@ -91,7 +91,7 @@ pub fn bandwidth_from_shortfall(shortfall: f64) -> f64 {
     bandwidth.clamp(MIN_BANDWIDTH, MAX_BANDWIDTH)
 }
 
-/// Integral over the sphere of the product of two kernels in 64 bits, \[Wu & Shih 2009\] Eq. 7.
+/// Integral over the sphere of the product of two kernels, in 64 bits. \[Wu & Shih 2009\] Eq. 7.
 pub fn convolution(a: &Component, b: &Component) -> f64 {
     let length = (a.bandwidth * a.axis + b.bandwidth * b.axis).length();
     let d = a.axis - b.axis;

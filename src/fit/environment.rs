@@ -22,21 +22,21 @@ use crate::{
     scene::EnvironmentMap,
 };
 
-/// How a map is fitted.
+/// Parameters of an environment fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EnvironmentOptions {
-    /// Lobes, 1 to [`config::MAX_LOBES`].
+    /// Lobes, 1 to [`MAX_LOBES`](super::config::MAX_LOBES).
     pub lobes: usize,
     /// Objective.
     pub method: Method,
 }
 
-/// Fits a map, or reads the fit from the cache. The rotation of the map does not matter; see
-/// [`EnvironmentFit::world_lobes`]. `progress` is called with the share of the work that is done.
+/// Fits a map, or reads the fit from the cache. The map's rotation does not matter, see
+/// [`EnvironmentFit::world_lobes`]. `progress` receives the share of the work that is done.
 ///
 /// # Errors
-/// A map that is black or holds numbers that are not finite or negative; lobes out of range. A cache
-/// that cannot be read or written is a warning in the log.
+/// The map is black or holds values that are negative or not finite; lobes are out of range. A
+/// cache that cannot be read or written only logs a warning.
 pub fn environment_lobes(
     map: &EnvironmentMap,
     options: EnvironmentOptions,
@@ -58,7 +58,7 @@ pub fn environment_lobes(
     Ok(fit)
 }
 
-/// Everything the fit depends on, as the name of its cache file.
+/// Name of the cache file, from everything the fit depends on.
 fn key(map: &EnvironmentMap, options: EnvironmentOptions) -> String {
     let header =
         format!("environment {} {:?} {} {}", options.lobes, options.method, map.width, map.height);
@@ -142,7 +142,7 @@ fn squared_integral(grid: &Grid) -> f64 {
     (0..grid.height).map(row).sum()
 }
 
-/// Lobes with colours by the method of the fit.
+/// Gives lobes their colours by the method of the fit.
 fn coloured_lobes(
     patches: &[ColouredPatch],
     components: &[Component],

@@ -1,8 +1,9 @@
-//! Weighted expectation maximization for mixtures of von Mises-Fisher lobes. \[Banerjee et al. 2005\].
+//! Weighted expectation maximization for mixtures of von Mises-Fisher lobes. \[Banerjee et al.
+//! 2005\].
 //!
-//! Target points and lobes in, better lobes out. Each step lowers the Kullback-Leibler divergence
-//! from the target to the mixture. Sums run over fixed chunks in a fixed order, so that a fit does
-//! not depend on the number of threads.
+//! Takes target points and lobes, and improves the lobes. Each step lowers the Kullback-Leibler
+//! divergence from the target to the mixture. Sums run over fixed chunks in a fixed order, so the
+//! number of threads does not affect a fit.
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -12,19 +13,19 @@ use super::{
     points::PointSet,
 };
 
-/// Points of a chunk, the unit of parallel work; 32-bit sums stay this short.
+/// Points per chunk, the unit of parallel work; keeps 32-bit sums short.
 const CHUNK: usize = 128;
-/// Lanes of the inner loops; lobes are padded to a multiple.
+/// Lanes of the inner loops; lobes are padded to a multiple of it.
 const LANES: usize = 8;
-/// Chunks of a group; fixed, so that the order of the sums is too.
+/// Chunks per group; fixed, to fix the order of sums.
 const GROUP: usize = 8;
-/// Logarithm of nothing.
+/// Stands for the logarithm of 0.
 const NOTHING: f32 = -1e30;
 
-/// One number for each of eight lobes: what vector instructions work on.
+/// One number for each of eight lobes, the operand of a vector instruction.
 type Lanes = [f32; LANES];
 
-/// Eight lobes in single precision; the last block is padded with lobes that nothing belongs to.
+/// Eight lobes in single precision. The last block is padded with lobes that own no points.
 #[derive(Clone, Copy)]
 struct Block {
     x: Lanes,
@@ -34,7 +35,7 @@ struct Block {
     log_scale: Lanes,
 }
 
-/// The lobes, block by block.
+/// Packs the lobes into blocks.
 fn pack(components: &[Component]) -> Vec<Block> {
     let log_scale = |c: &Component| {
         if c.share > 0.0 { (c.share / kernel_integral(c.bandwidth)).ln() as f32 } else { NOTHING }
@@ -54,7 +55,7 @@ fn pack(components: &[Component]) -> Vec<Block> {
     components.chunks(LANES).map(block).collect()
 }
 
-/// A point as the inner loops read it.
+/// Point in the form the inner loops read.
 #[derive(Clone, Copy)]
 struct Point {
     x: f32,
@@ -63,7 +64,7 @@ struct Point {
     slack: f32,
 }
 
-/// Fills `row` with each lobe's responsibility for a point and returns the logarithm of the mixture's
+/// Fills `row` with each lobe's responsibility for a point. Returns the logarithm of the mixture's
 /// density there.
 fn responsibilities(blocks: &[Block], point: Point, row: &mut [Lanes]) -> f32 {
     let mut largest = [f32::MIN; LANES];
@@ -95,9 +96,10 @@ fn responsibilities(blocks: &[Block], point: Point, row: &mut [Lanes]) -> f32 {
     largest + sum.ln()
 }
 
-/// `exp(x)` for −40 ≤ x ≤ 80 to a few 1e-7, in a form that compilers turn into vector instructions: 2ⁿ by the
-/// exponent bits, the rest by a polynomial. Above 80 it stays at e⁸⁰, below −40 at e⁻⁴⁰: small enough to mean nothing,
-/// and products with it are no denormal numbers, which are a hundred times slower.
+/// Computes `exp(x)` for −40 ≤ x ≤ 80 with a relative error of a few 1e-7, in a form that compilers
+/// vectorize: 2ⁿ from the exponent bits, the rest from a polynomial. Above 80 it stays at e⁸⁰,
+/// below −40 at e⁻⁴⁰: negligible, yet products with it avoid denormal numbers, which are a hundred
+/// times slower.
 #[inline]
 pub fn fast_exp(x: f32) -> f32 {
     /// 1.5·2²³: adding it rounds to an integer in the lowest bits.
@@ -114,9 +116,9 @@ pub fn fast_exp(x: f32) -> f32 {
     f32::from_bits(polynomial.to_bits().wrapping_add(rounded.to_bits() << 23))
 }
 
-/// Sums over the points of `WIDTH` numbers per lobe, and of one number per point. For every point,
-/// `accumulate` is called once per block of lobes with their responsibilities (times the point's
-/// weight), their distances to the point along x, y and z and the sums to add to.
+/// Sums `WIDTH` numbers per lobe, and the divergence, over the points. Calls `accumulate` for each
+/// point and block of lobes with the lobes' responsibilities (times the point's weight), the x, y
+/// and z distances to the point, the point's excess and the sums to add to.
 fn sum_over_points<const WIDTH: usize>(
     points: &PointSet,
     components: &[Component],
@@ -177,9 +179,9 @@ fn sum_over_points<const WIDTH: usize>(
     (totals, divergence)
 }
 
-/// One step: responsibilities of the lobes for the points, then axis, bandwidth and share of every
-/// lobe from the points it is responsible for. Lobes that have lost every point keep axis and
-/// bandwidth with a share of 0. Returns the divergence (nats) *before* the step.
+/// Performs one step: computes the lobes' responsibilities for the points, then each lobe's axis,
+/// bandwidth and share from its points. A lobe that has lost every point keeps axis and bandwidth
+/// with share 0. Returns the divergence (nats) *before* the step.
 pub fn step(points: &PointSet, components: &mut [Component]) -> f64 {
     let (sums, divergence) =
         sum_over_points::<4>(points, components, |share, [dx, dy, dz], _, sums| {
@@ -198,8 +200,8 @@ pub fn step(points: &PointSet, components: &mut [Component]) -> f64 {
             component.share = 0.0;
             continue;
         }
-        // The mean direction as the old axis (as the sums saw it) plus a drift: 1 − |mean| keeps its
-        // digits.
+        // Express the mean direction as the old axis (as the sums saw it) plus a drift, so that 1 −
+        // |mean| keeps its digits.
         let axis = component.axis.as_vec3().as_dvec3();
         let drift = DVec3::new(drift_x, drift_y, drift_z) / share;
         let mean = axis + drift;
@@ -213,7 +215,7 @@ pub fn step(points: &PointSet, components: &mut [Component]) -> f64 {
     divergence
 }
 
-/// One step that changes the shares only: axes and bandwidths stay.
+/// Performs one step that changes only the shares.
 pub fn reweigh(points: &PointSet, components: &mut [Component]) {
     let (sums, _) = sum_over_points::<1>(points, components, |share, _, _, sums| {
         for k in 0..LANES {
@@ -226,7 +228,7 @@ pub fn reweigh(points: &PointSet, components: &mut [Component]) {
     }
 }
 
-/// Steps until the divergence falls by less than `tolerance` in a step, at most `steps` times.
+/// Performs at most `steps` steps, until one lowers the divergence by less than `tolerance`.
 /// Returns the divergence before the last step.
 pub fn maximize(
     points: &PointSet,
@@ -245,16 +247,16 @@ pub fn maximize(
     last
 }
 
-/// What a lobe holds, for the decision which lobes to split and how.
+/// Statistics of a lobe that decide which lobes to split, and how.
 #[derive(Clone, Copy, Debug)]
 pub struct Holding {
-    /// The lobe's part of the divergence, nats: `Σ γ w ln(p/q)`.
+    /// The lobe's contribution to the divergence, nats: `Σ γ w ln(p/q)`.
     pub divergence: f64,
     /// Covariance of the points about the axis, weighted by responsibility.
     pub covariance: DMat3,
 }
 
-/// Divergence and covariance per lobe.
+/// Computes divergence and covariance per lobe.
 pub fn holdings(points: &PointSet, components: &[Component]) -> Vec<Holding> {
     let (sums, _) =
         sum_over_points::<8>(points, components, |share, [dx, dy, dz], excess, sums| {
@@ -290,7 +292,7 @@ mod tests {
             let x = -0.01 * i as f32;
             let exact = f64::from(x).exp();
             let error = (f64::from(fast_exp(x)) / exact - 1.0).abs();
-            // The argument's own rounding to a multiple of ln 2 counts too.
+            // Allow for rounding the argument to a multiple of ln 2.
             assert!(error < 4e-7 + 1e-7 * f64::from(-x), "{x}: {error}");
         }
         assert!(fast_exp(-1e30) < 5e-18);

@@ -1,4 +1,4 @@
-//! Fitted maps and BRDFs: what fits return, fit files hold and samplers read.
+//! Fitted maps and BRDFs, as fits return them, fit files hold them and samplers read them.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -13,7 +13,7 @@ use super::{
 };
 use crate::srbf::Lobe;
 
-/// What a fit file holds.
+/// Content of a fit file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 pub enum Fit {
@@ -31,9 +31,9 @@ pub struct EnvironmentLobe {
     pub axis: [f32; 3],
     /// Bandwidth λ.
     pub bandwidth: f32,
-    /// Radiance at the axis per colour channel, not negative: for pictures and weights.
+    /// Radiance at the axis per colour channel, not negative; used for pictures and weights.
     pub colour: [f32; 3],
-    /// Luminance at the axis, not negative: what is sampled.
+    /// Luminance at the axis, not negative; used for sampling.
     pub amplitude: f32,
 }
 
@@ -53,28 +53,28 @@ impl EnvironmentLobe {
 /// A fitted environment map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EnvironmentFit {
-    /// Where the map came from.
+    /// Origin of the map.
     pub source: String,
     /// Objective.
     pub method: Method,
-    /// Lobes asked for; there are fewer where the map has less to fit.
+    /// Lobes asked for; a map with less to fit has fewer.
     pub requested_lobes: usize,
     /// The lobes in the frame of the map, largest luminance integral first.
     pub lobes: Vec<EnvironmentLobe>,
-    /// How good it is.
+    /// Error figures.
     pub errors: FitErrors,
-    /// What the fit did besides what was asked.
+    /// Notes on departures from what was asked.
     pub notes: Vec<String>,
-    /// Seconds the fit took; of a fit from the cache, that reading it took.
+    /// Seconds spent making the fit, or reading it from the cache.
     #[serde(skip)]
     pub seconds: f64,
-    /// Whether the fit comes from the cache.
+    /// True if the fit comes from the cache.
     #[serde(skip)]
     pub is_cached: bool,
 }
 
 impl EnvironmentFit {
-    /// The lobes in the world, for a map that is turned about +Y.
+    /// The lobes in the world, for a map turned by `rotation_rad` about +Y.
     pub fn world_lobes(&self, rotation_rad: f32) -> Vec<EnvironmentLobe> {
         let (s, c) = rotation_rad.sin_cos();
         let turn = |lobe: &EnvironmentLobe| {
@@ -95,17 +95,17 @@ impl EnvironmentFit {
     }
 }
 
-/// The fit for one view.
+/// Fit for one view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BrdfView {
     /// Angle between normal and view, radians.
     pub theta: f32,
-    /// Lobes of BRDF × cosine (luminance, 1/sr) in the local frame, the view toward +x; as many as in
-    /// every other view, those without use with an amplitude of 0.
+    /// Lobes of BRDF × cosine (luminance, 1/sr) in the local frame, the view toward +x. All views
+    /// have the same number; unused lobes have amplitude 0.
     pub lobes: Vec<Lobe>,
-    /// Integral of BRDF × cosine over the hemisphere: the albedo for this view.
+    /// Albedo for this view: integral of BRDF × cosine over the hemisphere.
     pub albedo: f32,
-    /// How good it is.
+    /// Error figures.
     pub errors: FitErrors,
 }
 
@@ -120,37 +120,38 @@ pub struct BrdfFit {
     pub requested_lobes: usize,
     /// The views, from the normal to the horizon.
     pub views: Vec<BrdfView>,
-    /// Figures of the views up to [`config::SUMMARY_ANGLE_DEG`].
+    /// Figures of the views up to [`SUMMARY_ANGLE_DEG`](super::config::SUMMARY_ANGLE_DEG).
     pub summary: BrdfSummary,
-    /// What the fit did besides what was asked.
+    /// Notes on departures from what was asked.
     pub notes: Vec<String>,
-    /// Seconds the fit took; of a fit from the cache, that reading it took.
+    /// Seconds spent making the fit, or reading it from the cache.
     #[serde(skip)]
     pub seconds: f64,
-    /// Whether the fit comes from the cache.
+    /// True if the fit comes from the cache.
     #[serde(skip)]
     pub is_cached: bool,
 }
 
-/// Figures over the views up to [`config::SUMMARY_ANGLE_DEG`] from the normal.
+/// Figures over the views up to [`SUMMARY_ANGLE_DEG`](super::config::SUMMARY_ANGLE_DEG) from the
+/// normal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BrdfSummary {
     /// Means over the views.
     pub mean: FitErrors,
     /// Largest χ² of a view.
     pub largest_chi_squared: f64,
-    /// Largest χ² halfway between two views, of the interpolated lobes.
+    /// Largest χ² of the interpolated lobes halfway between two views.
     pub largest_chi_squared_between: f64,
 }
 
-/// Angle between normal and view of a view's index, radians.
+/// Angle between the normal and view `view` of `views`, radians.
 pub fn view_theta(view: usize, views: usize) -> f64 {
     (view as f64 + 0.5) / views as f64 * FRAC_PI_2
 }
 
 impl BrdfFit {
-    /// Lobes for any view in the plane of +x, by interpolation between the lobes of two views: axes
-    /// and logarithms of the bandwidths, and the integrals.
+    /// Lobes for any view in the plane of +x. Interpolates the axes, the logarithms of the
+    /// bandwidths and the integrals of the lobes of two views.
     pub fn lobes_at(&self, theta: f32) -> Vec<Lobe> {
         let count = self.views.len();
         let position = f64::from(theta) / FRAC_PI_2 * count as f64 - 0.5;
@@ -163,7 +164,7 @@ impl BrdfFit {
 }
 
 fn interpolate(a: &Lobe, b: &Lobe, t: f64) -> Lobe {
-    // A lobe that holds nothing at one end has its shape from the other.
+    // A lobe without energy at one end takes its shape from the other.
     let t_shape = if a.amplitude <= 0.0 {
         1.0
     } else if b.amplitude <= 0.0 {

@@ -1,5 +1,5 @@
-//! An environment map as a fit sees it: radiance per cell of a lat-long grid in the frame of the map,
-//! cut into patches, and compared with a mixture.
+//! Environment map as a fit sees it: radiance per cell of a lat-long grid in the frame of the map,
+//! cut into patches and compared with a mixture.
 
 use std::{collections::BinaryHeap, f64::consts::PI};
 
@@ -11,17 +11,17 @@ use crate::{
     scene::EnvironmentMap,
 };
 
-/// Narrowest grid: coarser maps are resampled, so that their bilinear slopes are seen.
+/// Smallest grid width. Coarser maps are resampled to resolve their bilinear slopes.
 const MIN_WIDTH: usize = 512;
 /// Sums kept per cell: luminance, red, green, blue, first moments of luminance.
 const CHANNELS: usize = 7;
 
-/// Parts along each side of a cell where the map is steep.
+/// Parts along each side of a steep cell.
 pub const STEEP_PARTS: usize = 4;
-/// Share of the energy from which on a steep cell is cut into its parts.
+/// Share of the energy above which a steep cell is cut into its parts.
 const HEAVY_SHARE: f64 = 1e-4;
 
-/// The sums of a patch.
+/// Sums of a patch.
 fn channels(patch: &ColouredPatch) -> [f64; CHANNELS] {
     let (colour, moment) = (patch.colour, patch.patch.moment);
     [patch.patch.energy, colour.x, colour.y, colour.z, moment.x, moment.y, moment.z]
@@ -34,7 +34,7 @@ pub struct Grid {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Radiance in the middle of each cell.
+    /// Radiance at the centre of each cell.
     pub radiance: Vec<Vec3>,
 }
 
@@ -47,7 +47,7 @@ struct Rectangle {
     y1: usize,
 }
 
-/// A patch of a map with its colour.
+/// Patch of a map with its colour.
 #[derive(Clone, Copy, Debug)]
 pub struct ColouredPatch {
     /// Luminance.
@@ -57,7 +57,7 @@ pub struct ColouredPatch {
 }
 
 impl Grid {
-    /// The map without its rotation, at its own resolution or at a multiple of it.
+    /// The map without its rotation, at its own resolution or a multiple of it.
     pub fn new(map: &EnvironmentMap) -> Self {
         let (width, height) = (map.width as usize, map.height as usize);
         let factor = MIN_WIDTH.div_ceil(width.max(1));
@@ -74,14 +74,14 @@ impl Grid {
         Self { width, height, radiance: (0..width * height).map(cell).collect() }
     }
 
-    /// Direction of a point in cell coordinates; cell (x, y) has its middle at (x + ½, y + ½).
+    /// Direction of a point in cell coordinates; the centre of cell (x, y) is (x + ½, y + ½).
     pub fn direction(&self, x: f64, y: f64) -> DVec3 {
         let azimuth = 2.0 * PI * (x / self.width as f64 - 0.5);
         let theta = PI * y / self.height as f64;
         DVec3::new(theta.sin() * azimuth.sin(), theta.cos(), -theta.sin() * azimuth.cos())
     }
 
-    /// Solid angle of a cell of a row, steradians; exact.
+    /// Exact solid angle of a cell in row `y`, steradians.
     pub fn cell_solid_angle(&self, y: usize) -> f64 {
         let half = 0.5 * PI / self.height as f64;
         let theta = PI * (y as f64 + 0.5) / self.height as f64;
@@ -93,8 +93,8 @@ impl Grid {
         self.radiance[y * self.width + x]
     }
 
-    /// Radiance at a point in cell coordinates, bilinear between the middles of the cells, as the map
-    /// is looked up.
+    /// Radiance at a point in cell coordinates, bilinear between cell centres as in the renderer's
+    /// lookup.
     pub fn lookup(&self, x: f64, y: f64) -> Vec3 {
         let (left, top) = ((x - 0.5).floor(), (y - 0.5).floor());
         let (u, v) = ((x - 0.5 - left) as f32, (y - 0.5 - top) as f32);
@@ -104,8 +104,8 @@ impl Grid {
         upper.lerp(self.cell(column(0), row(1)).lerp(self.cell(column(1), row(1)), u), v)
     }
 
-    /// Whether the brightest of a cell and its eight neighbours is several times the darkest, so that
-    /// the middle of the cell does not speak for it.
+    /// True if the brightest of a cell and its eight neighbours is over four times the darkest, so
+    /// that the centre does not represent the cell.
     pub fn is_steep(&self, x: usize, y: usize) -> bool {
         let (mut darkest, mut brightest) = (f32::MAX, 0.0_f32);
         for row in y.saturating_sub(1)..=(y + 1).min(self.height - 1) {
@@ -117,12 +117,11 @@ impl Grid {
         brightest > 4.0 * darkest
     }
 
-    /// A cell in [`STEEP_PARTS`]² parts, with the map between the middles of the cells as it is looked
-    /// up.
+    /// Cuts a cell into [`STEEP_PARTS`]² parts, with bilinear radiance as in the renderer's lookup.
     fn parts(&self, x: usize, y: usize) -> Vec<ColouredPatch> {
         let count = STEEP_PARTS * STEEP_PARTS;
         let solid_angle = self.cell_solid_angle(y) / count as f64;
-        // Variance of a part along both its sides, about solid angle / 12 each.
+        // The variance of a part is about solid angle / 12 along each of its sides.
         let extent = 1.0 - solid_angle / 12.0;
         let part = |index: usize| {
             let inside = |part: usize| (part as f64 + 0.5) / STEEP_PARTS as f64;
@@ -179,8 +178,8 @@ impl Grid {
         table
     }
 
-    /// Cuts the sphere into about `count` patches, small where energy and solid angle are large: the
-    /// rectangle with the largest √(energy · solid angle) is halved, until there are enough.
+    /// Cuts the sphere into about `count` patches, small where energy and solid angle are large.
+    /// Halves the rectangle with the largest √(energy · solid angle) until there are enough.
     pub fn patches(&self, count: usize) -> Vec<ColouredPatch> {
         let table = self.summed_area();
         let stride = self.width + 1;
@@ -191,7 +190,7 @@ impl Grid {
             let (c, d) = (corner(r.x0, r.y1), corner(r.x1, r.y1));
             let sum = |channel: usize| {
                 let value = d[channel] - b[channel] - c[channel] + a[channel];
-                // What is left of a black rectangle next to a sun.
+                // Drop the rounding residue of a black rectangle next to a sun.
                 if value.abs() < 1e-15 * d[channel].abs() { 0.0 } else { value }
             };
             let width = 2.0 * PI * (r.x1 - r.x0) as f64 / self.width as f64;
@@ -220,7 +219,7 @@ impl Grid {
             }
             let parent = rectangles[index];
             let Rectangle { x0, y0, x1, y1 } = parent;
-            // Across the longer side, as it is on the sphere.
+            // Halve the longer side, as measured on the sphere.
             let theta = PI * (y0 + y1) as f64 / (2 * self.height) as f64;
             let width = 2.0 * (x1 - x0) as f64 / self.width as f64 * theta.sin();
             let height = (y1 - y0) as f64 / self.height as f64;
@@ -243,7 +242,7 @@ impl Grid {
                 queue.push(Queued { priority: priority(half, &patch), index: slot });
             }
         }
-        // A sun of a few texels is the case where what lies within a cell matters.
+        // Resolve heavy cells: for a sun of a few texels, radiance within a cell matters.
         let total: f64 = measured.iter().map(|patch| patch.patch.energy).sum();
         for (index, r) in rectangles.iter().enumerate() {
             let is_cell = r.x1 - r.x0 == 1 && r.y1 - r.y0 == 1;

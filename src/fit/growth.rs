@@ -1,8 +1,8 @@
-//! From points to a mixture of any size: k-means++ for the first lobes, then splits.
+//! Points → mixture of any size: k-means++ for the first lobes, then splits.
 //!
-//! A mixture grows by splitting the lobes that hold the most divergence, a quarter of them at a time,
-//! with a few steps of expectation maximization between; so the mixture of 2n lobes starts where
-//! that of n lobes ended and cannot be worse.
+//! Growth splits the lobes with the most divergence, a quarter of the mixture at a time, with a few
+//! steps of expectation maximization between. A mixture of 2n lobes thus starts where that of n
+//! lobes ended and cannot be worse.
 
 use glam::{DMat3, DVec3};
 
@@ -13,7 +13,7 @@ use super::{
     points::PointSet,
 };
 
-/// Reproducible numbers in [0, 1): splitmix64 \[Steele et al. 2014\] with the seed of every fit.
+/// Reproducible numbers in [0, 1): splitmix64 \[Steele et al. 2014\], seeded alike for every fit.
 struct Random(u64);
 
 impl Random {
@@ -40,8 +40,8 @@ fn choose(weights: &[f64], target: f64) -> usize {
     last
 }
 
-/// Lobes at points chosen with a probability that grows with energy and with the squared distance to
-/// the lobes there are. \[Arthur & Vassilvitskii 2007\]. At most `count`, and at most one per point.
+/// Places at most `count` lobes, at most one per point, with probability proportional to a point's
+/// energy and squared distance to the lobes so far. \[Arthur & Vassilvitskii 2007\].
 fn k_means_plus_plus(points: &PointSet, count: usize, seed: u64) -> Vec<Component> {
     let mut random = Random(seed);
     let mut distances = vec![1.0_f64; points.len()];
@@ -84,8 +84,8 @@ fn k_means_plus_plus(points: &PointSet, count: usize, seed: u64) -> Vec<Componen
     (0..axes.len()).map(component).collect()
 }
 
-/// Largest eigenvalue and its vector of a covariance within the plane across `axis`, and the
-/// smaller one.
+/// Eigenvalues of a covariance in the plane across `axis`: the larger, its eigenvector, the
+/// smaller.
 fn principal(covariance: DMat3, axis: DVec3) -> (f64, DVec3, f64) {
     let (tangent, bitangent) = axis.any_orthonormal_pair();
     let a = tangent.dot(covariance * tangent);
@@ -97,8 +97,8 @@ fn principal(covariance: DMat3, axis: DVec3) -> (f64, DVec3, f64) {
     (middle + radius, angle.cos() * tangent + angle.sin() * bitangent, (middle - radius).max(0.0))
 }
 
-/// Splits the `count` lobes that hold the most divergence along their longest extent; lobes without
-/// energy are replaced first. The new lobes stand at the end.
+/// Splits the `count` lobes with the most divergence along their longest extent. Appends the second
+/// halves.
 fn split(points: &PointSet, components: &mut Vec<Component>, count: usize) {
     let held = holdings(points, components);
     let mut order: Vec<usize> = (0..components.len()).collect();
@@ -108,7 +108,7 @@ fn split(points: &PointSet, components: &mut Vec<Component>, count: usize) {
         let Component { axis, share, bandwidth } = components[parent];
         let (long, direction, short) = principal(held[parent].covariance, axis);
         let offset = (config::SPLIT_OFFSET * long.sqrt()).clamp(1e-4, 1.0);
-        // Half the variance left along the split, averaged with that across it.
+        // Average the variance left along the split with that across it.
         let rest = long * (1.0 - config::SPLIT_OFFSET * config::SPLIT_OFFSET).max(0.0);
         let variance = 0.5 * (rest + short);
         let bandwidth = (1.0 / variance.max(1e-9)).max(bandwidth);
@@ -123,8 +123,8 @@ fn split(points: &PointSet, components: &mut Vec<Component>, count: usize) {
     }
 }
 
-/// The best of several starts: one may leave two lobes in one place and none in another, which
-/// expectation maximization does not undo.
+/// Returns the best of several starts. One start may place two lobes together and none elsewhere,
+/// which expectation maximization does not undo.
 fn start(points: &PointSet, count: usize) -> Vec<Component> {
     let attempt = |attempt: u64| {
         let mut components = k_means_plus_plus(points, count, config::SEED + attempt);
@@ -139,8 +139,8 @@ fn start(points: &PointSet, count: usize) -> Vec<Component> {
         .unwrap_or_default()
 }
 
-/// A mixture of `count` lobes for the points, or of as many as there are points. `progress` is called
-/// with the share of the work that is done.
+/// Grows a mixture of `count` lobes, or of as many as there are points. `progress` receives the
+/// share of the work that is done.
 pub fn grow(points: &PointSet, count: usize, progress: &mut dyn FnMut(f64)) -> Vec<Component> {
     let count = count.min(points.len());
     let mut components = start(points, count.min(config::FIRST_LOBES));

@@ -1,5 +1,5 @@
-//! A BRDF × cosine for one view as a fit sees it: samples on an equal-area grid of the hemisphere that
-//! is finest where the energy is.
+//! BRDF × cosine for one view as a fit sees it: samples on an equal-area grid of the hemisphere,
+//! finest where the energy is.
 
 use std::{collections::BinaryHeap, f64::consts::PI};
 
@@ -8,9 +8,9 @@ use glam::{DVec2, DVec3};
 use super::{config, points::Patch};
 use crate::math::refinement::Queued;
 
-/// Cells along each side of the square at the start.
+/// Initial cells along each side of the square.
 const FIRST_CELLS: u32 = 24;
-/// Deepest subdivision: a cell of 1e-4 radians, far below the narrowest lobe.
+/// Deepest subdivision: cells of 1e-4 radians, far smaller than the narrowest lobe.
 const MAX_DEPTH: u32 = 9;
 
 /// Direction and value in a quarter of a cell.
@@ -40,8 +40,7 @@ impl HemisphereTarget {
     }
 }
 
-/// Direction of a point of the unit square; equal areas of the square are equal solid angles.
-/// \[Shirley & Chiu 1997\].
+/// Maps the unit square to the hemisphere, equal areas to equal solid angles. \[Shirley & Chiu 1997\].
 pub fn direction_from_square(point: DVec2) -> DVec3 {
     let centred = 2.0 * point - DVec2::ONE;
     if centred == DVec2::ZERO {
@@ -52,12 +51,12 @@ pub fn direction_from_square(point: DVec2) -> DVec3 {
     } else {
         (centred.y, PI / 2.0 - PI / 4.0 * (centred.x / centred.y))
     };
-    // z = 1 − r² makes the disk's area the hemisphere's.
+    // z = 1 − r² maps the disk to the hemisphere with equal areas.
     let sine = radius * (2.0 - radius * radius).max(0.0).sqrt();
     DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), 1.0 - radius * radius)
 }
 
-/// A square cell of the grid with its four samples.
+/// Square cell of the grid with its four samples.
 #[derive(Clone, Copy)]
 struct Cell {
     depth: u32,
@@ -104,8 +103,8 @@ impl Cell {
     }
 }
 
-/// Samples `function`, a radiance per direction that is not negative (anything else counts as 0).
-/// Cells toward `peak` are refined in any case, so that a highlight narrower than a cell is found.
+/// Samples a non-negative function of direction; any other value counts as 0. Always refines the
+/// cells toward `peak`, to find a highlight narrower than a cell.
 pub fn sample_hemisphere(function: &dyn Fn(DVec3) -> f64, peak: DVec3) -> HemisphereTarget {
     let mut cells: Vec<Cell> = Vec::new();
     let mut queue = BinaryHeap::new();
@@ -164,7 +163,7 @@ mod tests {
         assert!((target.energy() - 1.0).abs() < 1e-3, "{}", target.energy());
         let total: f64 = target.samples.iter().map(|sample| sample.solid_angle).sum();
         assert!((total - 2.0 * PI).abs() < 1e-9);
-        // A highlight of a sixth of a degree, found through the hint.
+        // A highlight of a sixth of a degree is found through the hint.
         let peak = DVec3::new(-0.6, 0.0, 0.8);
         let narrow = |direction: DVec3| {
             (-5e4 * (direction - peak).length_squared()).exp() * 1e5 / (2.0 * PI)

@@ -1,4 +1,4 @@
-//! How good a fit is: the error figures, over every cell of the target.
+//! Error figures of a fit, over every cell of the target.
 
 use std::f64::consts::PI;
 
@@ -15,13 +15,13 @@ use super::{
 };
 use crate::{math::colour::luminance, srbf::Lobe};
 
-/// Error figures of a fit. With the target density p, the fit's density f (both per steradian, with
-/// the integral 1) and the target's values L against the fit's values F:
+/// Error figures of a fit. The target has density p and values L, the fit has density f and values
+/// F; densities are per steradian and integrate to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FitErrors {
     /// `‖L − F‖ / ‖L‖` over the sphere (all colour channels together).
     pub relative_l2: f64,
-    /// `∫p²/q dω − 1` for `q = 0.9·f + 0.1·uniform`: the variance of an estimator that samples q.
+    /// `∫p²/q dω − 1` for `q = 0.9·f + 0.1·uniform`: variance of an estimator that samples q.
     pub chi_squared: f64,
     /// Kullback-Leibler divergence `∫p ln(p/f) dω`, nats.
     pub kullback_leibler: f64,
@@ -30,7 +30,8 @@ pub struct FitErrors {
 }
 
 impl FitErrors {
-    /// The figures from integrals of (L − F)², L², p²/q, p ln(p/f) and F, and that of L, `energy`.
+    /// Computes the figures from integrals of (L − F)², L², p²/q, p ln(p/f) and F, and `energy`,
+    /// that of L.
     fn from_sums(sums: [f64; 5], energy: f64) -> Self {
         let [difference, square, second_moment, divergence, fitted] = sums;
         Self {
@@ -42,12 +43,12 @@ impl FitErrors {
     }
 }
 
-/// Cells of a tile are compared with the lobes that matter there.
+/// Side of a tile, in cells. Each tile is compared only with the lobes that matter in it.
 const TILE: usize = 16;
-/// Exponent below the largest at which a lobe of a tile no longer matters.
+/// Difference in exponent from the largest beyond which a lobe does not matter in a tile.
 const CULL: f64 = 18.0;
 
-/// A lobe with its colour: the luminance density from `component`, the value from `colour`.
+/// Lobe with its colour: `component` gives the luminance density, `colour` the value.
 #[derive(Clone, Copy, Debug)]
 pub struct ColouredComponent {
     /// Shape and share of the sampling density.
@@ -56,17 +57,17 @@ pub struct ColouredComponent {
     pub colour: DVec3,
 }
 
-/// Lobes that matter in a tile.
+/// The lobes that matter in a tile.
 #[derive(Default)]
 struct Selection {
-    /// Axis, bandwidth, logarithm of the density at the axis, value at the axis.
+    /// Axis, bandwidth, logarithm of the density at the axis, and value at the axis.
     lobes: Vec<[f32; 8]>,
-    /// Logarithm of each lobe's part of the density at a point.
+    /// Logarithm of each lobe's contribution to the density at a point.
     exponents: Vec<f32>,
 }
 
 impl Selection {
-    /// Takes the lobes whose part of the density, or of the value, is not negligible within `radius`
+    /// Selects the lobes whose contribution to density or value is not negligible within `radius`
     /// radians of `centre`.
     fn choose(&mut self, lobes: &[ColouredComponent], centre: DVec3, radius: f64) {
         struct Bounds {
@@ -104,7 +105,7 @@ impl Selection {
         self.exponents.resize(self.lobes.len(), 0.0);
     }
 
-    /// Logarithm of the density, and the value.
+    /// Returns the logarithm of the density, and the value.
     fn evaluate(&mut self, direction: Vec3) -> (f64, Vec3) {
         let (mut largest, mut value) = (f32::MIN, Vec3::ZERO);
         for (lobe, slot) in self.lobes.iter().zip(&mut self.exponents) {
@@ -170,8 +171,8 @@ pub fn judge_environment(grid: &Grid, energy: f64, lobes: &[ColouredComponent]) 
     FitErrors::from_sums(sums, energy)
 }
 
-/// Error figures of a fit of BRDF × cosine for one view. The uniform part of q is on the hemisphere;
-/// what the lobes hold below the horizon is lost, in f, in F's energy and in q.
+/// Error figures of a fit of BRDF × cosine for one view. The uniform part of q covers the
+/// hemisphere; energy of lobes below the horizon is lost to f, to the energy of F and to q.
 pub fn judge_hemisphere(target: &HemisphereTarget, lobes: &[Lobe]) -> FitErrors {
     let energy = target.energy();
     let lobe_sum: f64 = lobes.iter().map(lobe_energy).sum();

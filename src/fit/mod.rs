@@ -2,15 +2,14 @@
 //! \[Wu & Shih 2009\], after \[Tsai et al. 2008\].
 //!
 //! Environment map → [`environment_lobes`] → [`EnvironmentFit`]; BRDF × cosine for a row of view
-//! elevations → [`brdf_lobes`] → [`BrdfFit`]. The target is cut into patches ([`points`]), a mixture
-//! grows on them ([`growth`]) by expectation maximization ([`expectation`]), colours are added
-//! ([`colour`]), every cell of the target judges the result ([`judge`]), and the fit is
-//! kept under the hash of what it was made from ([`cache`]). The squared error by L-BFGS
-//! ([`squared_error`], [`solver`]) is the second method.
+//! elevations → [`brdf_lobes`] → [`BrdfFit`]. Both cut the target into patches ([`points`]), grow a
+//! mixture on them ([`growth`]) by expectation maximization ([`expectation`]) and judge it on every
+//! cell of the target ([`judge`]). Lobes of maps get colours ([`colour`]). Fits are kept under the
+//! hash of their input ([`cache`]). The second method minimizes the squared error by L-BFGS
+//! ([`squared_error`], [`solver`]).
 //!
-//! Deviation: \[Tsai et al. 2008\] minimize the squared error. A sampling density wants the
-//! Kullback-Leibler divergence small, and expectation maximization keeps amplitudes from turning
-//! negative by itself.
+//! Deviation: \[Tsai et al. 2008\] minimize the squared error. A sampling density needs a small
+//! Kullback-Leibler divergence, and expectation maximization cannot produce negative amplitudes.
 
 pub mod brdf;
 pub mod cache;

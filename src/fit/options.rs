@@ -1,18 +1,19 @@
-//! Choices that environment and BRDF fits share.
+//! Options that environment and BRDF fits share.
 
 use serde::{Deserialize, Serialize};
 
 use super::config;
 use crate::error::{Error, Result};
 
-/// What a fit minimizes.
+/// Objective of a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
-    /// Kullback-Leibler divergence, by expectation maximization: what a sampling density wants.
+    /// Kullback-Leibler divergence, by expectation maximization: suits a sampling density.
     #[default]
     Em,
-    /// Squared error, by projected L-BFGS from the result of `em`: the fits of \[Tsai et al. 2008\].
+    /// Squared error, by projected L-BFGS from the result of `em`: the fits of \[Tsai et al.
+    /// 2008\].
     L2,
 }
 
@@ -25,7 +26,7 @@ impl std::fmt::Display for Method {
     }
 }
 
-/// Refuses a number of lobes that no fit can have.
+/// Checks that the number of lobes is within limits.
 ///
 /// # Errors
 /// [`Error::Usage`] with the limits.
@@ -37,7 +38,7 @@ pub fn check_lobes(lobes: usize) -> Result<()> {
     Err(Error::usage(format!("{lobes} lobes asked for; expected 1 to {most}")))
 }
 
-/// Refuses a number of view elevations that no fit can have.
+/// Checks that the number of view elevations is within limits.
 ///
 /// # Errors
 /// [`Error::Usage`] with the limits.

@@ -1,9 +1,9 @@
 //! Pictures of fits: data, fit and difference side by side.
 //!
-//! Maps are lat-long. BRDFs are disks of the hemisphere seen from above (orthographic: the centre is
-//! the normal, the rim the horizon, the view lies toward the right), one row per view. Data and fit
-//! share one exposure; the difference fit − data runs from blue (too little) over white to red (too
-//! much).
+//! Maps are lat-long. BRDFs are disks, one row per view: the hemisphere seen from above in
+//! orthographic projection, the normal at the centre, the horizon at the rim, the view toward the
+//! right. Data and fit share one exposure; the difference fit − data runs from blue (too little)
+//! over white to red (too much).
 
 use std::path::Path;
 
@@ -31,10 +31,10 @@ const DISK: usize = 192;
 const MAX_ROWS: usize = 6;
 /// White line between panels, pixels.
 const GAP: usize = 4;
-/// Share of the pixels that may be over-exposed.
+/// Share of pixels that may be over-exposed.
 const CLIPPED: f32 = 0.01;
 
-/// A panel of linear colours; none is background.
+/// Panels of linear colours; `None` is background.
 struct Panels {
     width: usize,
     height: usize,
@@ -43,7 +43,7 @@ struct Panels {
 }
 
 impl Panels {
-    /// Radiance that is shown white: all but the brightest pixels of the data are below it.
+    /// Radiance shown as white: all but the brightest pixels of the data are below it.
     fn white(&self) -> f32 {
         let mut values: Vec<f32> =
             self.data.iter().flatten().map(|value| value.max_element()).collect();
@@ -54,7 +54,7 @@ impl Panels {
         if white > 0.0 { white } else { largest.max(1e-30) }
     }
 
-    /// Rows of display values: data, fit, difference.
+    /// Rows of display values: data, fit and difference.
     fn rows(&self) -> Vec<Vec<[u8; 3]>> {
         let white = self.white();
         let show = |value: Option<Vec3>| {
@@ -104,7 +104,7 @@ pub fn write_environment(path: &Path, map: &EnvironmentMap, fit: &EnvironmentFit
     let pixel = |index: usize| {
         let x = ((index % width) as f64 + 0.5) * grid.width as f64 / width as f64;
         let y = ((index / width) as f64 + 0.5) * grid.height as f64 / height as f64;
-        // Mean of a few lookups: panels are smaller than most maps.
+        // Average a few lookups, since panels are smaller than most maps.
         let (step_x, step_y) =
             (0.25 * grid.width as f64 / width as f64, 0.25 * grid.height as f64 / height as f64);
         let data = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]

@@ -1,15 +1,15 @@
-//! The target of a fit as weighted points: a spherical function cut into patches.
+//! Target of a fit as weighted points: a spherical function cut into patches.
 
 use glam::DVec3;
 
-/// A patch of the sphere with what the target holds there.
+/// Patch of the sphere with the moments of the target over it.
 #[derive(Clone, Copy, Debug)]
 pub struct Patch {
     /// Integral of the target (luminance) over the patch.
     pub energy: f64,
-    /// Integral of target × direction; its length is below `energy` by the patch's extent.
+    /// Integral of target × direction; shorter than `energy` by the patch's extent.
     pub moment: DVec3,
-    /// Steradians.
+    /// Solid angle, steradians.
     pub solid_angle: f64,
 }
 
@@ -22,18 +22,18 @@ impl Patch {
     }
 }
 
-/// The mean of a kernel over a patch of the given variance, as that of a Gaussian over a Gaussian: its
-/// bandwidth and the factor before it. The kernel at the patch's mean would be too large where the
-/// lobe is narrower than the patch.
+/// Averages a kernel over a patch of the given variance, as a Gaussian over a Gaussian. Returns the
+/// bandwidth and the factor in front. The kernel at the patch's mean would be too large for a lobe
+/// narrower than the patch.
 pub fn blurred(bandwidth: f64, variance: f64) -> (f64, f64) {
     let factor = 1.0 / (1.0 + bandwidth * variance);
     (bandwidth * factor, factor)
 }
 
-/// Patches in the form expectation maximization reads, structure of arrays.
+/// Patches in the form that expectation maximization reads, as a structure of arrays.
 ///
 /// The log-kernel averaged over a patch is `λ(m·ξ − 1) = −½λ|m − ξ|² − λ·slack`, with m the patch's
-/// mean direction (inside the unit sphere) and `slack = ½(1 − |m|²)`: exact, so that a large patch
+/// mean direction (inside the unit sphere) and `slack = ½(1 − |m|²)`. It is exact, so a large patch
 /// cannot pass for a point.
 #[derive(Clone, Debug, Default)]
 pub struct PointSet {
@@ -54,12 +54,12 @@ pub struct PointSet {
 }
 
 impl PointSet {
-    /// The patches that hold energy, in their order.
+    /// Keeps the patches that hold energy, in their order.
     pub fn new(patches: &[Patch]) -> Self {
         Self::weighted(patches.iter().map(|patch| (patch, patch.energy)))
     }
 
-    /// Patches with an energy in place of their own, of a colour channel for instance.
+    /// Replaces the patches' energies, for example with those of a colour channel.
     pub fn weighted<'a>(patches: impl Iterator<Item = (&'a Patch, f64)> + Clone) -> Self {
         let energy: f64 = patches.clone().map(|(_, energy)| energy).sum();
         let mut points = Self { energy, ..Self::default() };
@@ -69,7 +69,7 @@ impl PointSet {
             }
             let mean = patch.moment / patch.energy;
             let weight = patch_energy / energy;
-            // Next to nothing, and slow: its products would be denormal numbers.
+            // Skip negligible points: their products would be slow denormal numbers.
             if weight < 1e-14 {
                 continue;
             }
@@ -88,7 +88,7 @@ impl PointSet {
         self.weight.len()
     }
 
-    /// Whether the target holds no energy.
+    /// True if the target holds no energy.
     pub fn is_empty(&self) -> bool {
         self.weight.is_empty()
     }

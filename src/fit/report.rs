@@ -1,4 +1,4 @@
-//! What a fit is, in words and in JSON.
+//! Descriptions of fits, in words and in JSON.
 
 use std::path::Path;
 
@@ -13,14 +13,14 @@ use super::{
 };
 use crate::error::Result;
 
-/// A fit described, once for machines and once for people.
+/// Description of a fit, for machines and for people.
 #[derive(Clone, Debug)]
 pub struct Description {
     /// For machines.
     pub value: Value,
     /// For people.
     pub lines: Vec<String>,
-    /// What the fit did besides what was asked.
+    /// Notes on departures from what was asked.
     pub warnings: Vec<String>,
 }
 

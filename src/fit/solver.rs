@@ -1,19 +1,19 @@
-//! Projected L-BFGS: minimizes a smooth function within a box. \[Nocedal & Wright 2006\], algorithm 7.4
-//! on the variables that no bound holds, with Armijo's rule along the projected path.
+//! Projected L-BFGS: minimizes a smooth function within a box. \[Nocedal & Wright 2006\], algorithm
+//! 7.4 on the variables that no bound holds, with Armijo's rule along the projected path.
 
 use std::collections::VecDeque;
 
-/// Pairs of steps and gradient changes that are remembered.
+/// Number of remembered pairs of step and gradient change.
 const MEMORY: usize = 8;
 /// Sufficient decrease, relative to the slope.
 const ARMIJO: f64 = 1e-4;
-/// Halvings of a step before the search is given up.
+/// Halvings of a step before the search gives up.
 const MAX_HALVINGS: usize = 30;
 
-/// Lower and upper limit per unknown.
+/// Limits of the unknowns.
 #[derive(Clone, Debug)]
 pub struct Bounds {
-    /// Lower and upper limit.
+    /// Lower and upper limit per unknown.
     pub limits: Vec<(f64, f64)>,
 }
 
@@ -24,19 +24,19 @@ impl Bounds {
         }
     }
 
-    /// Whether a bound holds the unknown against the descent.
+    /// True if a bound holds the unknown against the descent.
     fn holds(&self, index: usize, value: f64, gradient: f64) -> bool {
         let (lower, upper) = self.limits[index];
         (value <= lower && gradient > 0.0) || (value >= upper && gradient < 0.0)
     }
 }
 
-/// Why a minimization ended.
+/// Reason why a minimization ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
-    /// The value fell by less than the tolerance in ten steps.
+    /// Ten steps lowered the value by less than the tolerance.
     Converged,
-    /// The number of steps is used up.
+    /// All steps were used.
     Steps,
     /// No step along the direction lowers the value.
     Stuck,
@@ -46,8 +46,8 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Lowers `function` (value and gradient) from `unknowns`, in place. Ends when ten steps gain less than
-/// `tolerance` relative to the value. `progress` is called after every step with its number.
+/// Lowers `function` (value and gradient) from `unknowns`, in place. Ends when ten steps gain less
+/// than `tolerance` relative to the value. Calls `progress` with the number of each finished step.
 pub fn minimize(
     function: impl Fn(&[f64]) -> (f64, Vec<f64>),
     bounds: &Bounds,
@@ -95,7 +95,7 @@ pub fn minimize(
         }
         mask(&mut direction);
         if dot(&direction, &gradient) <= 0.0 {
-            // No descent: forget what was learned.
+            // Not a descent direction: forget the pairs.
             memory.clear();
             direction = steepest.iter().map(|value| value * scale).collect();
         }

@@ -1,8 +1,8 @@
-//! The squared error of a mixture and its gradient: the objective of the fits of \[Tsai et al. 2008\].
+//! Squared error of a mixture and its gradient: the objective of the fits of \[Tsai et al. 2008\].
 //!
-//! `J = ∫(L − F)² / ∫L²` with `F = Σ a_l G_l`. `∫F²` is in closed form, `∫L·F` is a sum over patches,
-//! `∫L²` is given. Five unknowns per lobe: axis (any length), logarithm of the bandwidth, amplitude
-//! relative to that at the start.
+//! `J = ∫(L − F)² / ∫L²` with `F = Σ a_l G_l`. `∫F²` has a closed form, `∫L·F` is summed over
+//! patches, `∫L²` is given. A lobe has five unknowns: axis (of any length), logarithm of the
+//! bandwidth, and amplitude relative to its start.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -25,7 +25,7 @@ pub struct SquaredError {
     patches: Vec<(f64, DVec3, f64)>,
     /// `∫L²`.
     square: f64,
-    /// Amplitudes at the start; unknowns are relative to them.
+    /// Initial amplitudes; unknowns are relative to them.
     scales: Vec<f64>,
 }
 
@@ -37,8 +37,8 @@ struct Scaled {
 }
 
 impl SquaredError {
-    /// Objective for a target whose square has the integral `square`, and the unknowns that stand for
-    /// `components` (shares of the energy of `patches`).
+    /// Returns the objective for a target whose square has the integral `square`, and the unknowns
+    /// of `components` (shares of the energy of `patches`).
     pub fn new(patches: &[Patch], square: f64, components: &[Component]) -> (Self, Vec<f64>) {
         let energy: f64 = patches.iter().map(|patch| patch.energy).sum();
         let mut unknowns = Vec::with_capacity(UNKNOWNS * components.len());
@@ -79,7 +79,7 @@ impl SquaredError {
         unknowns.chunks_exact(UNKNOWNS).zip(&self.scales).map(lobe).collect()
     }
 
-    /// The lobes of the unknowns, shares relative to their own sum, and their energy.
+    /// Returns the lobes of the unknowns, with shares of their own sum, and their energy.
     pub fn components(&self, unknowns: &[f64]) -> (Vec<Component>, f64) {
         let lobes = self.lobes(unknowns);
         let energy_of = |lobe: &Scaled| lobe.amplitude * kernel_integral(lobe.shape.bandwidth);
@@ -91,7 +91,7 @@ impl SquaredError {
         (lobes.iter().map(component).collect(), energy)
     }
 
-    /// Value and gradient.
+    /// Evaluates value and gradient.
     pub fn evaluate(&self, unknowns: &[f64]) -> (f64, Vec<f64>) {
         let lobes = self.lobes(unknowns);
         let row = |index: usize| {
@@ -108,7 +108,7 @@ impl SquaredError {
                 let slope = 1.0 - mean_shortfall(length);
                 value += overlap;
                 by_axis += overlap * slope * a.bandwidth / length * u;
-                // slope·ξ·u/|u| − 1, both near 1 for narrow lobes; 64 bits bear it.
+                // slope·ξ·u/|u| and 1 nearly cancel for narrow lobes; 64 bits suffice.
                 by_bandwidth += overlap * (slope * a.axis.dot(u) / length - 1.0);
             }
             let quadratic = amplitude * value;
@@ -125,7 +125,7 @@ impl SquaredError {
                 by_bandwidth -= kernel * (cosine * factor * factor - variance * factor);
             }
             let scale = 2.0 / self.square;
-            // Through the normalization of the axis: only the tangential part counts.
+            // The unknown axis is normalized, so only the tangential part counts.
             let raw = &unknowns[UNKNOWNS * index..];
             let stretch = DVec3::new(raw[0], raw[1], raw[2]).length().max(1e-12);
             let tangential = (by_axis - by_axis.dot(a.axis) * a.axis) / stretch;
@@ -145,9 +145,9 @@ impl SquaredError {
     }
 }
 
-/// Lowers the squared error from `components` on, by L-BFGS: shares of the energy of `patches` in,
-/// shares of the returned energy out. `square` is the integral of the target's square; `progress` is
-/// called with the share of the steps that are done.
+/// Lowers the squared error of `components` by L-BFGS. Takes shares of the energy of `patches` and
+/// returns shares of the returned energy. `square` is the integral of the target's square;
+/// `progress` receives the share of the steps that are done.
 pub fn minimize_squared_error(
     patches: &[Patch],
     square: f64,
