@@ -1,8 +1,8 @@
-// Reflection models: evaluate, pdf, sample and directional albedo of every material; twin of
+// Reflection models: evaluate, pdf, sample and directional albedo of every material. Twin of
 // src/brdf/twin.rs, same names, same order.
 //
 // Directions are unit vectors in the shading frame (z is the normal) and point away from the
-// surface. Values are per steradian and hold no cosine; pdfs are per steradian of incident
+// surface. Values are per steradian without the cosine; pdfs are per steradian of incident
 // directions. Both are 0 unless both directions are above the surface.
 //
 // The includer defines NEEDS_MATERIALS or NEEDS_MATERIAL_TEXELS and includes layout.glsl first.
@@ -12,11 +12,11 @@
 
 #include "frame.glsl"
 
-// Bits of the kinds of material that the scene has.
+// One bit per kind of material in the scene.
 layout(constant_id = CONSTANT_MATERIAL_KINDS) const uint MATERIAL_KINDS = 0xffffffffu;
 
-// Whether a material is of a kind; known when the pipeline is made where the scene has no such
-// material, or none but such.
+// Tests the kind of a material. Folds to a constant in the pipeline if the scene has no material of
+// the kind, or only such.
 bool is_kind(Material material, uint kind) {
     uint bit = 1u << kind;
     return MATERIAL_KINDS == bit || ((MATERIAL_KINDS & bit) != 0u && material.kind == kind);
@@ -27,7 +27,7 @@ float table_value(uint index) {
     return texelFetch(brdf_table, int(index)).x;
 }
 
-// Linear interpolation between equally spaced nodes over the cosine 0…1, `stride` words apart.
+// Interpolates linearly between equally spaced nodes over the cosine 0…1, `stride` words apart.
 float cosine_table(uint offset, uint stride, float cosine) {
     float position = clamp(cosine, 0.0, 1.0) * float(BRDF_COSINE_INTERVALS);
     uint node = min(uint(position), BRDF_COSINE_INTERVALS - 1u);
@@ -35,7 +35,7 @@ float cosine_table(uint offset, uint stride, float cosine) {
     return mix(table_value(index), table_value(index + stride), position - float(node));
 }
 
-// Direction with density cosθ/π.
+// Samples a direction with density cosθ/π.
 vec3 sample_cosine_hemisphere(vec2 u) {
     float radius = sqrt(u.x);
     float azimuth = 2.0 * PI * u.y;
@@ -68,15 +68,15 @@ vec3 fresnel_conductor(float cosine, vec3 eta, vec3 k) {
     return 0.5 * (perpendicular + parallel);
 }
 
-// Reflectance of a conductor from that at normal incidence. Schlick 1994.
+// Reflectance of a conductor from that at normal incidence. [Schlick 1994].
 vec3 fresnel_schlick(float cosine, vec3 reflectance) {
     float complement = 1.0 - cosine;
     float square = complement * complement;
     return reflectance + (vec3(1.0) - reflectance) * (square * square * complement);
 }
 
-// Density of GGX normals, per steradian, for a half vector of any length. Walter et al. 2007,
-// eq. 33, written without the cancellation in 1 − cos²θ, which matters for α below 0.01.
+// Density of GGX normals, per steradian, for a half vector of any length. [Walter et al. 2007] Eq.
+// 33, without the cancellation in 1 − cos²θ, which matters for α below 0.01.
 float ggx_normal_density(vec3 half_vector, float alpha) {
     float tangential = dot(half_vector.xy, half_vector.xy);
     float normal = half_vector.z * half_vector.z;
@@ -84,12 +84,12 @@ float ggx_normal_density(vec3 half_vector, float alpha) {
     return alpha * alpha * ratio * ratio / PI;
 }
 
-// Length of the direction after the surface is stretched to α = 1: √(cos²θ + α² sin²θ).
+// Length of the direction after stretching the surface to α = 1: √(cos²θ + α² sin²θ).
 float ggx_stretched_length(vec3 direction, float alpha) {
     return length(vec3(alpha * direction.xy, direction.z));
 }
 
-// Lower end of the spherical cap of bounded sampling, as a factor: Eto & Tokuyoshi 2023, eq. 5.
+// Lower end of the spherical cap of bounded sampling, as a factor. [Eto & Tokuyoshi 2023] Eq. 5.
 float ggx_cap_factor(vec3 outgoing_local, float alpha) {
     float bounded_alpha = min(alpha, 1.0);
     float alpha_squared = bounded_alpha * bounded_alpha;
@@ -99,28 +99,28 @@ float ggx_cap_factor(vec3 outgoing_local, float alpha) {
         / (s_squared + alpha_squared * outgoing_local.z * outgoing_local.z);
 }
 
-// Microfacet reflection of unit reflectance, per steradian: D·G₂/(4 cosθ_o cosθ_i), with the
-// height-correlated masking of Heitz 2014, eq. 99.
+// Microfacet reflection at unit reflectance, per steradian: D·G₂/(4 cosθ_o cosθ_i) with the
+// height-correlated masking of [Heitz 2014] Eq. 99.
 float ggx_reflection(vec3 half_vector, vec3 outgoing_local, vec3 incident_local, float alpha) {
     float masking = incident_local.z * ggx_stretched_length(outgoing_local, alpha)
         + outgoing_local.z * ggx_stretched_length(incident_local, alpha);
     return 0.5 * ggx_normal_density(half_vector, alpha) / masking;
 }
 
-// Density of ggx_sample: Eto & Tokuyoshi 2023, eq. 8, with the Jacobian of the reflection.
+// Density of ggx_sample. [Eto & Tokuyoshi 2023] Eq. 8 with the Jacobian of the reflection.
 float ggx_pdf(vec3 half_vector, vec3 outgoing_local, float alpha) {
     float cap = ggx_cap_factor(outgoing_local, alpha) * outgoing_local.z
         + ggx_stretched_length(outgoing_local, alpha);
     return 0.5 * ggx_normal_density(half_vector, alpha) / cap;
 }
 
-// Incident direction by the visible normals of GGX, on the spherical cap that leaves out most
-// reflections below the surface: Dupuy & Benyoub 2023, Eto & Tokuyoshi 2023. What still falls
-// below has z ≤ 0: no sample.
+// Samples an incident direction by the visible normals of GGX, on the spherical cap that omits most
+// reflections below the surface. Those that remain have z ≤ 0: no sample. [Dupuy & Benyoub 2023],
+// [Eto & Tokuyoshi 2023].
 vec3 ggx_sample(vec3 outgoing_local, float alpha, vec2 u) {
     vec3 stretched = normalize(vec3(alpha * outgoing_local.xy, outgoing_local.z));
     float cap = ggx_cap_factor(outgoing_local, alpha) * stretched.z;
-    // 1 − z and not z: the root below then holds near the pole.
+    // 1 − z rather than z keeps the root below accurate near the pole.
     float below_pole = u.x * (1.0 + cap);
     float sine = sqrt(max(0.0, below_pole * (2.0 - below_pole)));
     float azimuth = 2.0 * PI * u.y;
@@ -129,8 +129,8 @@ vec3 ggx_sample(vec3 outgoing_local, float alpha, vec2 u) {
     return 2.0 * dot(outgoing_local, normal) * normal - outgoing_local;
 }
 
-// (θ_h, θ_d, φ_d) of two directions, φ_d in 0…π: the half/difference angles of
-// Rusinkiewicz 1998 with the two directions interchangeable, to the last bit.
+// (θ_h, θ_d, φ_d) of two directions, φ_d in 0…π: the half/difference angles of [Rusinkiewicz 1998],
+// symmetric in the two directions to the last bit.
 vec3 half_difference_angles(vec3 outgoing_local, vec3 incident_local) {
     vec3 half_vector = outgoing_local + incident_local;
     vec3 difference = incident_local - outgoing_local;
@@ -142,7 +142,7 @@ vec3 half_difference_angles(vec3 outgoing_local, vec3 incident_local) {
         y = -y;
         x = -x;
     }
-    // At the poles the angle means nothing, and the grid is constant over it.
+    // The angle is undefined at the poles, and the grid is constant over it.
     float phi_difference = (x == 0.0 && y == 0.0) ? 0.0 : atan(y, x);
     return vec3(
         atan(sqrt(tangential), half_vector.z),
@@ -201,7 +201,7 @@ uint measured_elevation_bin(vec3 outgoing_local) {
         MEASURED_ELEVATION_BINS - 1u);
 }
 
-// Unit azimuthal direction from which the sampling table counts φ_h.
+// Unit azimuthal direction that is φ_h = 0 in the sampling table.
 vec2 measured_azimuth_axis(vec3 outgoing_local) {
     float sine = length(outgoing_local.xy);
     return sine > 0.0 ? outgoing_local.xy / sine : vec2(1.0, 0.0);
@@ -228,14 +228,15 @@ float measured_pdf(uint table_offset, vec3 outgoing_local, vec3 incident_local, 
         + (1.0 - cosine_share) * density / (2.0 * length(half_vector));
 }
 
-// Incident direction from the cosine lobe or the tabulated half vectors; z ≤ 0 is no sample.
+// Samples an incident direction from the cosine lobe or the tabulated half vectors; z ≤ 0 means no
+// sample.
 vec3 measured_sample(uint table_offset, vec3 outgoing_local, vec3 u) {
     uint elevation = measured_elevation_bin(outgoing_local);
     float cosine_share = table_value(table_offset + MEASURED_COSINE_SHARE_OFFSET + elevation);
     if (u.x < cosine_share) {
         return sample_cosine_hemisphere(u.yz);
     }
-    // The first cell whose cumulative probability exceeds u.y.
+    // Find the first cell whose cumulative probability exceeds u.y.
     uint cumulative =
         table_offset + MEASURED_CUMULATIVE_OFFSET + elevation * MEASURED_SAMPLING_CELLS;
     uint cell = 0u;
@@ -247,7 +248,7 @@ vec3 measured_sample(uint table_offset, vec3 outgoing_local, vec3 u) {
     float lower = cell > 0u ? table_value(cumulative + cell - 1u) : 0.0;
     float fraction = (u.y - lower) / (table_value(cumulative + cell) - lower);
     uint polar = cell / MEASURED_AZIMUTH_BINS;
-    // 1 − cosθ_h is uniform within the cell; the cell's edges as 2 sin²(θ/2).
+    // 1 − cosθ_h is uniform within the cell; compute its edges as 2 sin²(θ/2).
     float edge_0 = float(polar) / float(MEASURED_POLAR_BINS);
     float edge_1 = float(polar + 1u) / float(MEASURED_POLAR_BINS);
     float sine_0 = sin(0.25 * PI * edge_0 * edge_0);
@@ -256,7 +257,7 @@ vec3 measured_sample(uint table_offset, vec3 outgoing_local, vec3 u) {
     float sine = sqrt(max(0.0, below_pole * (2.0 - below_pole)));
     float phi = PI * (float(cell % MEASURED_AZIMUTH_BINS) + fraction)
         / float(MEASURED_AZIMUTH_BINS);
-    // The table holds |φ_h|; either sign is as likely.
+    // The table holds |φ_h|; both signs are equally likely.
     if (u.x - cosine_share < 0.5 * (1.0 - cosine_share)) {
         phi = -phi;
     }
@@ -314,8 +315,8 @@ vec3 brdf_evaluate(Material material, vec3 outgoing_local, vec3 incident_local) 
     return value;
 }
 
-// Density of brdf_sample per steradian. Its integral over the hemisphere is 1 less the share of
-// samples that fall below the surface.
+// Density of brdf_sample per steradian. Integrates over the hemisphere to 1 less the share of
+// samples below the surface.
 float brdf_pdf(Material material, vec3 outgoing_local, vec3 incident_local) {
     vec3 value;
     float pdf;
@@ -323,8 +324,8 @@ float brdf_pdf(Material material, vec3 outgoing_local, vec3 incident_local) {
     return pdf;
 }
 
-// Incident direction from three numbers in [0, 1); z ≤ 0 means no sample, which counts as one
-// with contribution 0.
+// Samples an incident direction with three numbers in [0, 1); z ≤ 0 means no sample, which counts
+// as one with contribution 0.
 vec3 brdf_sample(Material material, vec3 outgoing_local, vec3 u) {
     if (outgoing_local.z <= 0.0) {
         return vec3(0.0, 0.0, -1.0);
@@ -343,8 +344,8 @@ vec3 brdf_sample(Material material, vec3 outgoing_local, vec3 u) {
     return sample_cosine_hemisphere(u.yz);
 }
 
-// Share of light from a uniform white hemisphere that is reflected toward the outgoing direction,
-// 0…1, for the albedo image.
+// Share of light from a uniform white hemisphere reflected toward the outgoing direction, 0…1, for
+// the albedo image.
 vec3 brdf_albedo(Material material, vec3 outgoing_local) {
     if (is_kind(material, MATERIAL_DIFFUSE)) {
         return material.reflectance;

@@ -1,16 +1,14 @@
-// Traversal of the compressed wide BVH: one step at a time, so that a pass may keep several rays in
+// Traversal of the compressed wide BVH, one step at a time, so that a pass may keep several rays in
 // flight per invocation. Twin: src/accel/traverse.rs.
 //
-// H. Ylitie, T. Karras, S. Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed
-// Wide BVHs", HPG 2017. Node layout as in obvhs (planes of x, y, z; low bytes first):
+// [Ylitie et al. 2017]. Node layout as in obvhs (planes of x, y, z; low bytes first):
 //   texel 0: corner.xyz, exponents x, y, z and the mask of inner children (one byte each)
 //   texel 1: first child node, first triangle, meta bytes of children 0-3 and 4-7
 //   texel 2: lower x planes of children 0-3 and 4-7, upper x planes of both; 3: y; 4: z
 //
-// Deviation: two groups of triangles may wait while nodes are traversed ("speculative traversal";
-// T. Aila, S. Laine, "Understanding the Efficiency of Ray Traversal on GPUs", HPG 2009): a step
-// tests one node and one triangle, so that lanes of a subgroup that are at different places do both
-// kinds of work together.
+// Deviation: two groups of triangles may wait while nodes are traversed ("speculative traversal",
+// [Aila & Laine 2009]). A step tests one node and one triangle, so that lanes of a subgroup in
+// different places do both kinds of work together.
 //
 // Define NEEDS_GEOMETRY before including this file.
 
@@ -20,7 +18,7 @@
 #include "frame.glsl"
 #include "layout.glsl"
 
-// Triangles per page are 1 << TRIANGLE_PAGE_SHIFT; with one page the choice folds away.
+// A page holds 1 << TRIANGLE_PAGE_SHIFT triangles; with one page the choice folds away.
 layout(constant_id = CONSTANT_TRIANGLE_PAGES) const uint TRIANGLE_PAGES = 1u;
 layout(constant_id = CONSTANT_TRIANGLE_PAGE_SHIFT) const uint TRIANGLE_PAGE_SHIFT = 30u;
 
@@ -30,31 +28,31 @@ const float FAR_AWAY = 3.0e38;
 // State of the ray in flight.
 vec3 bvh_origin;
 vec3 bvh_direction;
-// Frame around the direction: the z coordinate of a point in it is its distance along the ray.
+// Frame around the direction: z in it is the distance along the ray.
 Frame bvh_frame;
 vec3 bvh_inverse_direction;
-// Octant in each byte: children are visited in the order of slot ^ octant, greatest first.
+// Octant in each byte. Children are visited in descending order of slot ^ octant.
 uint bvh_octant4;
-// Distance of the nearest hit so far, and its triangle.
+// Nearest hit so far: distance and triangle.
 float bvh_distance;
 uint bvh_triangle;
 // Group of nodes: first child; bits 24-31 hits in visiting order, bits 0-7 mask of inner children.
 uvec2 bvh_nodes_waiting;
-// Groups of triangles: first triangle; one bit for each one to test.
+// Groups of triangles: first triangle; one bit per triangle to test.
 uvec2 bvh_triangles_waiting;
 uvec2 bvh_triangles_next;
-// Groups of nodes left for later, one per level of the tree; the host checks the depth.
+// Deferred groups of nodes, one per level of the tree; the host checks the depth.
 uvec2 bvh_stack[BVH_STACK_ENTRIES];
 uint bvh_stack_size;
 
-// 1 / x, finite also for a zero component: the product with a distance in a scene stays finite.
+// 1 / x, finite even for x = 0: its product with a distance in a scene stays finite.
 float bvh_inverse(float x) {
     return abs(x) > 1.0e-18 ? 1.0 / x : (x < 0.0 ? -1.0e18 : 1.0e18);
 }
 
-// Starts the traversal of a ray; `direction` is a unit vector. The nearest children are visited first
-// for the closest hit, the farthest for any hit: what closes a room off is large and behind most
-// other things, and finding it ends the ray (13 to 28% faster in rooms, docs/traversal.md).
+// Starts the traversal of a ray; `direction` is a unit vector. The closest hit visits the nearest
+// children first, any hit the farthest: the walls of a room are large and behind most other things,
+// and hitting one ends the ray (13 to 28% faster in rooms, docs/traversal.md).
 void bvh_start(vec3 origin, vec3 direction, bool any_hit) {
     bvh_origin = origin;
     bvh_direction = direction;
@@ -93,13 +91,13 @@ uvec4 triangle_texel(uint triangle, uint corner) {
     return texelFetch(triangles_3, texel);
 }
 
-// Twice the signed areas of the three sub-triangles around the ray, given the vertices in its frame:
-// barycentric coordinates before division by their sum. All of one sign where the ray passes inside.
+// Twice the signed areas of the three sub-triangles around the ray, given the vertices in its
+// frame: barycentric coordinates before division by their sum. All have one sign if the ray passes
+// inside.
 //
-// S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013: every vertex
-// is projected in one way whatever triangle it belongs to, and an edge taken the other way round only
-// changes the sign, so that no ray slips through between triangles that share vertices. Deviation:
-// projected along the ray by an orthonormal frame, without choosing axes for a shear.
+// [Woop et al. 2013]: every vertex is projected alike for all its triangles, and reversing an edge
+// only changes the sign, so that no ray slips between triangles that share vertices. Deviation:
+// projects along the ray by an orthonormal frame, without choosing axes for a shear.
 vec3 edge_functions(vec3 a, vec3 b, vec3 c) {
     precise vec3 areas = vec3(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
     return areas;
@@ -109,11 +107,11 @@ uint bvh_byte(uint word, int index) {
     return index == 3 ? word >> 24 : (word >> (8 * index)) & 0xffu;
 }
 
-// Hit bits of four children: triangles in bits 0 to 23, nodes in bits 24 to 31. `near` and `far` are
-// the planes where the ray enters and leaves, one byte per child; t = plane · scale + bias.
+// Hit bits of four children: triangles in bits 0 to 23, nodes in bits 24 to 31. `near` and `far`
+// are the planes where the ray enters and leaves, one byte per child; t = plane · scale + bias.
 //
-// Distances are compared as signed integers: that is the order of floats as long as one of them is
-// not negative, and no case with NaN has to be told apart. All of them are finite.
+// Compares distances as signed integers. Their order is that of floats if at least one is not
+// negative; all are finite, so NaN needs no special case.
 uint bvh_children(
     uint meta4, uint near_x, uint far_x, uint near_y, uint far_y, uint near_z, uint far_z, vec3 scale,
     vec3 bias
@@ -157,7 +155,7 @@ void bvh_visit_node() {
     uvec4 y = texelFetch(bvh_nodes, texel + 3);
     uvec4 z = texelFetch(bvh_nodes, texel + 4);
 
-    // A plane q lies at corner + q·2^exponent; the ray meets it at q·scale + bias.
+    // Plane q lies at corner + q·2^exponent; the ray meets it at q·scale + bias.
     vec3 spacing = vec3(
         uintBitsToFloat((frame.w & 0xffu) << 23), uintBitsToFloat((frame.w & 0xff00u) << 15),
         uintBitsToFloat((frame.w & 0xff0000u) << 7));
@@ -188,7 +186,7 @@ void bvh_test_triangle(bool any_hit) {
     vec3 c = to_local(bvh_frame, uintBitsToFloat(triangle_texel(triangle, 2u).xyz) - bvh_origin);
     vec3 areas = edge_functions(a, b, c);
     float area = areas.x + areas.y + areas.z;
-    // A weighted mean of the vertices' distances: within the triangle however badly conditioned.
+    // A weighted mean of the vertices' distances lies within the triangle, however badly conditioned.
     float distance = (areas.x * a.z + areas.y * b.z + areas.z * c.z) / area;
     bool inside = min(areas.x, min(areas.y, areas.z)) >= 0.0
         || max(areas.x, max(areas.y, areas.z)) <= 0.0;
@@ -204,8 +202,8 @@ void bvh_test_triangle(bool any_hit) {
     }
 }
 
-// Does at most one node and one triangle; false when the ray is finished. With `any_hit` the first
-// hit found ends it.
+// Visits at most one node and one triangle. Returns false when the ray is finished; with `any_hit`,
+// the first hit ends it.
 bool bvh_step(bool any_hit) {
     if (bvh_nodes_waiting.y <= 0x00ffffffu && bvh_stack_size > 0u) {
         bvh_stack_size--;
@@ -224,9 +222,9 @@ bool bvh_step(bool any_hit) {
     return (bvh_triangles_waiting.y | (bvh_nodes_waiting.y & 0xff000000u) | bvh_stack_size) != 0u;
 }
 
-// Turns a shading normal, in the plane that it spans with `outgoing_direction`, until its cosine with
-// that direction is `least` if it is less: what is seen is lit as if seen at grazing angle, and the
-// change is continuous where the cosine falls below `least`.
+// Turns a shading normal toward `outgoing_direction`, in the plane of the two, until their cosine is
+// at least `least`. A visible surface is thus lit as if seen at grazing angle, and the change is
+// continuous where the cosine falls below `least`.
 vec3 consistent_normal(vec3 shading_normal, vec3 outgoing_direction, float least) {
     float cosine = dot(shading_normal, outgoing_direction);
     vec3 tangential = shading_normal - cosine * outgoing_direction;
@@ -240,7 +238,7 @@ vec3 consistent_normal(vec3 shading_normal, vec3 outgoing_direction, float least
 // Cosine with the outgoing direction below which shading normals are turned.
 const float LEAST_SHADING_COSINE = 0.01;
 
-// The surface that a ray meets on `triangle`, which traversal has found.
+// Computes the surface that a ray meets on `triangle`.
 Hit surface_at(uint triangle, vec3 origin, vec3 direction) {
     uvec4 texel_a = triangle_texel(triangle, 0u);
     uvec4 texel_b = triangle_texel(triangle, 1u);
@@ -262,7 +260,7 @@ Hit surface_at(uint triangle, vec3 origin, vec3 direction) {
     hit.triangle = triangle;
     hit.material = triangle_materials[triangle];
     vec3 normal = cross(b - a, c - a);
-    // Scaled first: the squares of a small triangle's components would underflow.
+    // Scale first: the squares of a small triangle's components would underflow.
     vec3 size = abs(normal);
     normal = normalize(normal / max(size.x, max(size.y, size.z)));
     hit.geometric_normal = dot(normal, direction) > 0.0 ? -normal : normal;
@@ -283,18 +281,17 @@ Hit surface_at(uint triangle, vec3 origin, vec3 direction) {
     return hit;
 }
 
-// What a ray that met nothing, or was not traced, leaves behind.
+// Result of a ray that met nothing or was not traced.
 Hit no_surface() {
     return Hit(vec3(0.0), NO_MATERIAL, vec3(0.0), -1.0, vec3(0.0), NO_TRIANGLE);
 }
 
-// How far a ray's origin is moved off its surface, as a share of the scene's size: 64 units of
-// roundoff. docs/traversal.md has the error bound and the measured margin.
+// Offset of ray origins from their surface, as a share of the scene's size: 64 units of roundoff.
+// docs/traversal.md has the error bound and the measured margin.
 const float RAY_OFFSET_SHARE = 3.814697265625e-6;
 
-// Distance by which ray origins are moved off their surface, metres. It is a fixed share of the
-// scene's size, read from the root node, so that a scene in millimetres and one in kilometres are
-// the same scene to every bit if their scales differ by a power of two.
+// Offset of ray origins from their surface, metres: a fixed share of the scene's size, read from the
+// root node. Scaling a scene by a power of two therefore changes no bit of the result.
 float ray_offset() {
     uvec4 root = texelFetch(bvh_nodes, 0);
     vec3 corner = uintBitsToFloat(root.xyz);
@@ -305,17 +302,16 @@ float ray_offset() {
     return RAY_OFFSET_SHARE * max(size.x, max(size.y, size.z));
 }
 
-// `position` moved by `offset` to the side of the surface that `direction` leads to.
+// Moves `position` by `offset` to the side of the surface that `direction` leads to.
 vec3 moved_off_surface(vec3 position, vec3 geometric_normal, vec3 direction, float offset) {
     return position + (dot(geometric_normal, direction) < 0.0 ? -offset : offset) * geometric_normal;
 }
 
-// Origin of a ray that leaves a surface: off it by more than the error of positions and of the
+// Origin of a ray that leaves a surface, offset by more than the error of positions and of the
 // triangle test, so that the ray does not meet that surface again.
 //
-// Deviation: C. Wächter, N. Binder, "A Fast and Robust Method for Avoiding Self-Intersection", Ray
-// Tracing Gems, 2019, ch. 6, moves by a count of floats, with a fixed distance near the coordinate
-// origin that is too much for a scene in millimetres.
+// Deviation: [Wächter & Binder 2019] move by a number of floats, and by a fixed distance near the
+// coordinate origin, which is too much for a scene in millimetres.
 vec3 offset_ray_origin(vec3 position, vec3 geometric_normal, vec3 direction) {
     return moved_off_surface(position, geometric_normal, direction, ray_offset());
 }

@@ -1,10 +1,10 @@
-// Whole numbers divided by way of floats.
+// Division of whole numbers by way of floats.
 
 #ifndef DIVIDE_GLSL
 #define DIVIDE_GLSL
 
-// Quotient and remainder, where the quotient is below 2^22: by floats, corrected by one, since
-// software devices divide integers lane by lane.
+// Returns quotient and remainder for a quotient below 2^22. Divides floats and corrects by one,
+// since software devices divide integers lane by lane.
 uvec2 divide(uint dividend, uint divisor) {
     uint quotient = uint(float(dividend) / float(divisor));
     uint remainder = dividend - quotient * divisor;

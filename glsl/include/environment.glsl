@@ -1,10 +1,9 @@
-// The environment map: bilinear lookup and its exact sampling density. Twin of
-// src/scene/environment. Needs NEEDS_PARAMETERS and NEEDS_ENVIRONMENT; densities per steradian.
+// The environment map: bilinear lookup and its exact sampling density per steradian. Twin of
+// src/scene/environment. Needs NEEDS_PARAMETERS and NEEDS_ENVIRONMENT.
 //
-// environment_rows: cumulative probability over height + 1 rows of cells, then the mean sine of the
-// polar angle of each of them, then a guide to the former. environment_cells: cumulative probability
-// over the width cells of each row, then a guide to them. src/scene/environment/table.rs describes
-// both.
+// environment_rows: cumulative probability over height + 1 rows of cells, the mean sine of each
+// row's polar angle, then a guide to the probabilities. environment_cells: cumulative probability
+// over the width cells of each row, then a guide. src/scene/environment/table.rs describes both.
 
 #ifndef ENVIRONMENT_GLSL
 #define ENVIRONMENT_GLSL
@@ -12,17 +11,17 @@
 #include "frame.glsl"
 #include "layout.glsl"
 
-// Densities are evaluated no closer to a pole than this, so that they stay finite.
+// Smallest sine of the polar angle in densities, to keep them finite near a pole.
 const float ENVIRONMENT_MIN_SIN_THETA = 1e-7;
 
 struct EnvironmentSample {
     vec3 direction;
     vec3 radiance;
-    // Per steradian; 0 where the map is black and nothing can be sampled.
+    // Per steradian; 0 if the map is black and cannot be sampled.
     float pdf;
 };
 
-// A cell with its four texels: c_ij at column offset i, row offset j.
+// Cell with its four texels: c_ij at column offset i, row offset j.
 struct EnvironmentCell {
     vec3 c00;
     vec3 c10;
@@ -56,7 +55,7 @@ float environment_cell_value(uint index) {
     return texelFetch(environment_cells, int(index)).x;
 }
 
-// Intervals of the guide of a cumulative distribution: a power of two, at least half of its entries.
+// Intervals of the guide to a cumulative distribution: a power of two, at least half its entries.
 uint guide_size(uint count) {
     return count > 2u ? 1u << uint(findMSB(count - 1u)) : 1u;
 }
@@ -78,7 +77,7 @@ vec3 environment_interpolate(EnvironmentCell cell, vec2 position) {
         mix(cell.c00, cell.c10, position.x), mix(cell.c01, cell.c11, position.x), position.y);
 }
 
-// Where a direction meets the map: the cell between four texel centres, and the position in it.
+// Place of a direction in the map: the cell between four texel centres, and the position in it.
 struct EnvironmentLocation {
     uint column;
     uint row;
@@ -120,7 +119,7 @@ float environment_pdf(vec3 direction, vec3 radiance) {
         / (total * 2.0 * PI * PI * max(sin_theta, ENVIRONMENT_MIN_SIN_THETA));
 }
 
-// Position in [0, 1) with density proportional to mix(a, b, position).
+// Samples a position in [0, 1) with density proportional to mix(a, b, position).
 float environment_sample_linear(float a, float b, float u) {
     float sum = a + b;
     float start = sum > 0.0 ? a / sum : 0.5;
@@ -129,12 +128,12 @@ float environment_sample_linear(float a, float b, float u) {
     return divisor > 0.0 ? min(u / divisor, 0.99999994) : 0.0;
 }
 
-// Direction within one cell with density proportional to the luminance there in (u, v), from two
-// numbers in [0, 1); its pdf is that of environment_sample, over the whole map.
+// Samples a direction within a cell with two numbers in [0, 1); the density in (u, v) is
+// proportional to luminance. The pdf is that of environment_sample, over the whole map.
 EnvironmentSample environment_sample_cell(uint column, uint row, vec2 u) {
     uint width = parameters.environment_width;
     uint height = parameters.environment_height;
-    // The bilinear patch: its marginal along v, then the row of the patch at that v.
+    // Sample the bilinear patch: its marginal along v, then its row at that v.
     EnvironmentCell cell = environment_cell(column, row);
     float l00 = luminance(cell.c00);
     float l10 = luminance(cell.c10);
@@ -146,8 +145,8 @@ EnvironmentSample environment_sample_cell(uint column, uint row, vec2 u) {
         mix(l00, l01, position.y), mix(l10, l11, position.y), u.x);
     vec3 radiance = environment_interpolate(cell, position);
 
-    // Polar angle from the nearer pole, in rows, so that it keeps its relative accuracy; the first
-    // and the last row are half cells.
+    // Measure the polar angle from the nearer pole, in rows, for relative accuracy; the first and
+    // the last row are half cells.
     bool northern = 2u * row <= height;
     float from_pole = northern ? float(row) - 0.5 + position.y
                                : float(height - row) + 0.5 - position.y;
@@ -170,7 +169,7 @@ EnvironmentSample environment_sample_cell(uint column, uint row, vec2 u) {
     return EnvironmentSample(environment_world_from_map(direction), radiance, pdf);
 }
 
-// Direction with the density environment_pdf, from two numbers in [0, 1).
+// Samples a direction with density environment_pdf, from two numbers in [0, 1).
 EnvironmentSample environment_sample(vec2 u) {
     if (parameters.environment_total <= 0.0) {
         return EnvironmentSample(vec3(0.0, 1.0, 0.0), vec3(0.0), 0.0);
@@ -178,8 +177,8 @@ EnvironmentSample environment_sample(vec2 u) {
     uint width = parameters.environment_width;
     uint height = parameters.environment_height;
 
-    // First row, then first cell, whose cumulative probability exceeds u: never an empty one. The
-    // guides say between which two to search.
+    // Find the first row, then the first cell, whose cumulative probability exceeds u: never an
+    // empty one. The guides bound the search.
     uint row_guide = 2u * (height + 1u);
     uint interval = uint(u.y * float(guide_size(height + 1u)));
     uint row = uint(environment_row(row_guide + interval));

@@ -1,7 +1,8 @@
-// Orthonormal frames and the lat-long mapping: twin of src/frame.rs.
+// Orthonormal frames, the octahedral map of normals and the lat-long mapping: twin of
+// src/math/frame.rs and src/math/octahedron.rs.
 //
 // Local frames have the normal as z axis; names of vectors in them end in _local. The lat-long
-// mapping is from unit directions to the unit square; its Jacobian is 2 pi^2 sin(theta), theta
+// mapping takes unit directions to the unit square; its Jacobian is 2 pi^2 sin(theta), with theta
 // measured from +Y.
 
 #ifndef FRAME_GLSL
@@ -15,8 +16,8 @@ struct Frame {
     vec3 normal;
 };
 
-// Right-handed orthonormal basis around a unit normal, without branches or a singularity.
-// Duff et al. 2017, "Building an Orthonormal Basis, Revisited", listing 3.
+// Right-handed orthonormal basis around a unit normal, without branches or a singularity. [Duff et
+// al. 2017] listing 3.
 Frame frame_from_normal(vec3 normal) {
     float handedness = normal.z >= 0.0 ? 1.0 : -1.0;
     float a = -1.0 / (handedness + normal.z);
@@ -37,7 +38,7 @@ vec3 to_world(Frame frame, vec3 direction_local) {
         + frame.normal * direction_local.z;
 }
 
-// Unit vector to the octahedral map, 16 bits a coordinate, twin of accel::normal::pack.
+// Packs a unit vector by the octahedral map, 16 bits a coordinate; twin of octahedron::pack.
 uint pack_normal(vec3 normal) {
     vec2 p = normal.xy / (abs(normal.x) + abs(normal.y) + abs(normal.z));
     if (normal.z < 0.0) {
@@ -48,7 +49,7 @@ uint pack_normal(vec3 normal) {
     return (uint(quantised.x) & 0xffffu) | (uint(quantised.y) << 16u);
 }
 
-// Unit vector from the octahedral map, twin of accel::normal::unpack.
+// Unpacks a unit vector from the octahedral map; twin of octahedron::unpack.
 vec3 unpack_normal(uint packed_normal) {
     ivec2 quantised = ivec2(int(packed_normal << 16) >> 16, int(packed_normal) >> 16);
     vec2 p = vec2(quantised) / 32767.0;
@@ -60,9 +61,9 @@ vec3 unpack_normal(uint packed_normal) {
     return normalize(vec3(p, z));
 }
 
-// (sin(pi x), cos(pi x)) for 0 <= x <= 2 with small *relative* error near the zeros, which the
-// built-in functions do not promise: densities over the sphere divide by the sine near the poles.
-// Polynomials of Cephes' sinf and cosf (Moshier 1992), |argument| <= pi/4.
+// (sin(pi x), cos(pi x)) for 0 <= x <= 2 with small *relative* error near the zeros, which built-in
+// functions do not promise: densities over the sphere divide by the sine near the poles.
+// Polynomials of sinf and cosf in [Moshier 1992], |argument| <= pi/4.
 vec2 sin_cos_pi(float x) {
     float quarter_turns = floor(2.0 * x + 0.5);
     float angle = PI * (x - 0.5 * quarter_turns);
@@ -75,8 +76,8 @@ vec2 sin_cos_pi(float x) {
     return (quadrant & 2u) == 0u ? turned : -turned;
 }
 
-// Lat-long coordinates of a unit direction: u = 0.5 + atan2(x, -z) / 2 pi, v = theta / pi; the
-// direction need not be exactly unit. u is 0.5 at the poles.
+// Lat-long coordinates of a direction: u = 0.5 + atan2(x, -z) / 2 pi, 0.5 at the poles; v = theta /
+// pi. The direction need not be exactly unit.
 vec2 lat_long_from_direction(vec3 direction) {
     float sin_theta = sqrt(direction.x * direction.x + direction.z * direction.z);
     bool pole = sin_theta == 0.0;

@@ -1,14 +1,14 @@
-// Counter-based random numbers for (pixel, sample, dimension, seed): twin of src/random.rs, equal
-// bit for bit. All numbers are multiples of 2^-24 in [0, 1).
+// Counter-based random numbers for (pixel, sample, dimension, seed): twin of src/math/random.rs,
+// equal bit for bit. All numbers are multiples of 2^-24 in [0, 1).
 //
 // A dimension names a pair of numbers. random_2d is stratified over the samples of a pixel: use it
-// where nothing depends on the outcome of earlier samples. random_independent_2d is not: use it
-// wherever past outcomes enter.
+// where nothing depends on earlier samples. random_independent_2d is not: use it where past
+// outcomes enter.
 
 #ifndef RANDOM_GLSL
 #define RANDOM_GLSL
 
-// PCG4D, Jarzynski & Olano 2020, "Hash Functions for GPU Rendering".
+// PCG4D. [Jarzynski & Olano 2020].
 uvec4 hash_4d(uvec4 v) {
     v = v * 1664525u + 1013904223u;
     v.x += v.y * v.w;
@@ -23,8 +23,8 @@ uvec4 hash_4d(uvec4 v) {
     return v;
 }
 
-// Laine-Karras permutation: every bit is flipped depending on the key and the bits below it. Owen
-// scrambling of a bit-reversed number. Constants: Vegdahl 2021, "Building a Better LK Hash".
+// Laine-Karras permutation: flips every bit depending on the key and the bits below it, which is
+// Owen scrambling of a bit-reversed number. [Laine & Karras 2011]; constants of [Vegdahl 2021].
 uint laine_karras_permutation(uint x, uint key) {
     x ^= x * 0x3d20adeau;
     x += key;
@@ -34,8 +34,8 @@ uint laine_karras_permutation(uint x, uint key) {
     return x;
 }
 
-// Bit-reversed second coordinate of the Sobol sequence: the direction numbers of x + 1 form Pascal's
-// triangle modulo 2, which factors into one step per bit of the bit index.
+// Bit-reversed second coordinate of the Sobol sequence. The direction numbers of x + 1 form
+// Pascal's triangle modulo 2, which factors into one step per bit of the bit index.
 uint reversed_sobol_1(uint index) {
     index ^= (index >> 1u) & 0x55555555u;
     index ^= (index >> 2u) & 0x33333333u;
@@ -45,20 +45,20 @@ uint reversed_sobol_1(uint index) {
     return index;
 }
 
-// Integer to a multiple of 2^-24 in [0, 1).
+// Converts an integer to a multiple of 2^-24 in [0, 1).
 float unit_float(uint bits) {
     return float(bits >> 8u) * (1.0 / 16777216.0);
 }
 
 const uint RANDOM_KEY_TAG = 0x9e3779b9u;
 
-// Keys of one pixel and dimension: of the shuffled index and of the two coordinates.
+// Keys of a pixel and dimension: of the shuffled index and of the two coordinates.
 uvec4 random_keys(uint pixel, uint dimension, uint seed) {
     return hash_4d(uvec4(pixel, RANDOM_KEY_TAG, dimension, seed));
 }
 
-// Sample `sample_index` of a shuffled, Owen-scrambled Sobol (0,2)-sequence that belongs to this
-// pixel and dimension alone, in 2^-32. Burley 2020, "Practical Hash-based Owen Scrambling".
+// Sample `sample_index` of a shuffled, Owen-scrambled Sobol (0,2)-sequence for this pixel and
+// dimension alone, in 2^-32. [Burley 2020].
 uvec2 random_bits_2d(uint pixel, uint sample_index, uint dimension, uint seed) {
     uvec4 keys = random_keys(pixel, dimension, seed);
     uint shuffled =
@@ -82,7 +82,7 @@ float random_1d(uint pixel, uint sample_index, uint dimension, uint seed) {
     return unit_float(bitfieldReverse(laine_karras_permutation(shuffled, keys.y)));
 }
 
-// Numbers without any relation between samples, pixels or dimensions.
+// Numbers unrelated between samples, pixels and dimensions.
 vec2 random_independent_2d(uint pixel, uint sample_index, uint dimension, uint seed) {
     uvec4 bits = hash_4d(uvec4(pixel, sample_index, dimension, seed));
     return vec2(unit_float(bits.x), unit_float(bits.y));

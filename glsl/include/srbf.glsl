@@ -1,13 +1,13 @@
-// Gaussian spherical radial basis functions: the twin of src/srbf, same names, same order. All
-// densities and integrals are over the whole sphere in solid angle. The forms hold in 32-bit floats
-// for bandwidths from 1e-3 to 1e5; src/srbf states why each is as it is.
+// Gaussian spherical radial basis functions: the twin of src/srbf, same names, same order.
+// Densities and integrals cover the whole sphere, in solid angle. The forms hold in 32-bit floats
+// for bandwidths from 1e-3 to 1e5; src/srbf gives the reason for each.
 
 #ifndef SRBF_GLSL
 #define SRBF_GLSL
 
 const float SRBF_PI = 3.14159265358979;
 
-// exp(x) - 1 with a small relative error: Taylor's series below 1/2.
+// exp(x) - 1 with a small relative error: Taylor series below 1/2.
 float expm1(float x) {
     if (abs(x) > 0.5) {
         return exp(x) - 1.0;
@@ -23,7 +23,7 @@ float expm1(float x) {
     return x * tail;
 }
 
-// ln(1 + x) for x > -1 with a small relative error: 2 atanh(x / (2 + x)) as a series below 1/2.
+// ln(1 + x) for x > -1 with a small relative error: series of 2 atanh(x / (2 + x)) below 1/2.
 float log1p(float x) {
     if (abs(x) > 0.5) {
         return log(1.0 + x);
@@ -40,7 +40,7 @@ float log1p(float x) {
     return 2.0 * s * (1.0 + s2 * tail);
 }
 
-// Error function: Maclaurin's series for |x| <= 1, beyond it form 7.1.26 of [Abramowitz & Stegun 1964].
+// Error function: Maclaurin series for |x| <= 1, beyond it 7.1.26 of [Abramowitz & Stegun 1964].
 float erf(float x) {
     float x2 = x * x;
     if (x2 <= 1.0) {
@@ -72,7 +72,7 @@ struct Lobe {
     float amplitude;
 };
 
-// Kernel, in the form exp(-bandwidth |direction - axis|^2 / 2).
+// Kernel, computed as exp(-bandwidth |direction - axis|^2 / 2).
 float kernel_value(vec3 axis, float bandwidth, vec3 direction) {
     vec3 d = direction - axis;
     return exp(-0.5 * bandwidth * dot(d, d));
@@ -108,7 +108,7 @@ float kernel_deviation(float bandwidth) {
     return sqrt(second_moment / (1.0 - e));
 }
 
-// Steepness of the error function in the share of a kernel's integral above a plane. [Tokuyoshi].
+// Steepness of the error function that gives a kernel's share above a plane. [Tokuyoshi].
 float kernel_steepness(float bandwidth) {
     return bandwidth
         * sqrt((0.5 * bandwidth + 0.651733) / ((bandwidth + 1.341828) * bandwidth + 7.221669));
@@ -138,7 +138,7 @@ float lobe_integral(Lobe lobe) {
     return lobe.amplitude * kernel_integral(lobe.bandwidth);
 }
 
-// Product of two lobes, a lobe again. [Tsai & Shih 2006].
+// Product of two lobes, again a lobe. [Tsai & Shih 2006].
 Lobe lobe_product(Lobe a, Lobe b) {
     vec3 d = a.axis - b.axis;
     vec3 u = a.bandwidth * a.axis + b.bandwidth * b.axis;
@@ -155,7 +155,7 @@ float lobe_convolution(Lobe a, Lobe b) {
     return product.amplitude * kernel_integral(product.bandwidth);
 }
 
-// Two unit vectors that make a right-handed frame with the axis. [Duff et al. 2017].
+// Two unit vectors that complete the axis to a right-handed frame. [Duff et al. 2017].
 void lobe_frame(vec3 axis, out vec3 tangent, out vec3 bitangent) {
     float s = axis.z < 0.0 ? -1.0 : 1.0;
     float a = -1.0 / (s + axis.z);
@@ -164,7 +164,7 @@ void lobe_frame(vec3 axis, out vec3 tangent, out vec3 bitangent) {
     bitangent = vec3(b, s + axis.y * axis.y * a, -axis.y);
 }
 
-// Distance x = 1 - dot(direction, axis) in 0...2 for a uniform number u in 0...1.
+// Maps a uniform number u in 0...1 to a distance x = 1 - dot(direction, axis) in 0...2.
 float kernel_sample_distance(float bandwidth, float u) {
     float x;
     if (bandwidth < 1e-4) {
@@ -177,7 +177,7 @@ float kernel_sample_distance(float bandwidth, float u) {
     return clamp(x, 0.0, 2.0);
 }
 
-// Direction distributed as the kernel; u uniform in the unit square.
+// Samples a direction with the density of the kernel; u is uniform in the unit square.
 vec3 kernel_sample(vec3 axis, float bandwidth, vec2 u) {
     float x = kernel_sample_distance(bandwidth, u.x);
     float sine = sqrt(x * (2.0 - x));
@@ -193,7 +193,7 @@ float kernel_pdf(vec3 axis, float bandwidth, vec3 direction) {
     return kernel_value(axis, bandwidth, direction) / kernel_integral(bandwidth);
 }
 
-// The point of the unit square that kernel_sample maps to the direction.
+// Point of the unit square that kernel_sample maps to the direction.
 vec2 kernel_inverse(vec3 axis, float bandwidth, vec3 direction) {
     vec3 d = direction - axis;
     float x = 0.5 * dot(d, d);

@@ -1,8 +1,8 @@
-//! Boxes → binary BVH, fast and of bounded depth whatever the boxes.
+//! Boxes → binary BVH, built quickly and with bounded depth for any input.
 //!
-//! Clustering and reinsertion (obvhs) make the better tree, but where many boxes have one centre they
-//! chain them: 40,000 coincident triangles take minutes and give a tree thousands of levels deep.
-//! Such crowds enter the clustering as one box each and get a median-split tree of their own.
+//! Clustering and reinsertion (obvhs) give the better tree, but chain boxes that share a centre:
+//! 40,000 coincident triangles take minutes and give thousands of levels. Such crowds enter the
+//! clustering as one box each and get a median-split tree of their own.
 
 use glam::Vec3A;
 use obvhs::{
@@ -11,16 +11,16 @@ use obvhs::{
     ploc::{PlocBuilder, PlocSearchDistance, SortPrecision},
 };
 
-/// Cells per axis in which centres count as one; the grid of 20 bits that the clustering sorts by.
+/// Cells per axis. Centres in one cell count as equal; clustering sorts by the same 20-bit grid.
 const CELLS: f32 = 1_048_576.0;
 
-/// Boxes with centres in one cell that are still clustered one by one.
+/// Most boxes with centres in one cell that are still clustered individually.
 const LARGEST_CROWD: usize = 16;
 
-/// Binary levels above which the tree is built by median splits throughout.
+/// Depth of the binary tree beyond which median splits build all of it.
 const DEEPEST: usize = 160;
 
-/// Builds a binary BVH with one box per leaf over `boxes`, which is not needed afterwards.
+/// Builds a binary BVH over `boxes`, one box per leaf. Consumes the boxes to free their memory early.
 pub(super) fn build(boxes: Vec<Aabb>) -> Bvh2 {
     let (mut singles, crowds) = crowds(&boxes);
     if crowds.is_empty() {
@@ -43,7 +43,7 @@ pub(super) fn build(boxes: Vec<Aabb>) -> Bvh2 {
     }
     let mut binary = reinsert(binary);
 
-    // The leaf of a crowd becomes the root of its tree; leaves then refer to boxes directly.
+    // Replace the leaf of each crowd by its tree, and let leaves refer to boxes directly.
     let single_count = singles.len();
     let primitive_of_item = std::mem::take(&mut binary.primitive_indices);
     let mut crowds: Vec<_> = crowds.into_iter().map(Some).collect();
@@ -66,7 +66,7 @@ pub(super) fn build(boxes: Vec<Aabb>) -> Bvh2 {
     binary
 }
 
-/// Indices of the boxes that stand alone, and the groups of boxes that crowd in one cell.
+/// Returns the indices of boxes that stand alone, and the groups of boxes that crowd in one cell.
 fn crowds(boxes: &[Aabb]) -> (Vec<u32>, Vec<Vec<u32>>) {
     let bounds = boxes.iter().fold(Aabb::empty(), |bounds, aabb| bounds.union(aabb));
     let cells = Vec3A::splat(CELLS) / bounds.diagonal().max(Vec3A::splat(f32::MIN_POSITIVE));
@@ -112,7 +112,7 @@ fn reinsert(mut binary: Bvh2) -> Bvh2 {
     binary
 }
 
-/// The whole tree by median splits: 1 + log₂ n levels.
+/// Builds the whole tree by median splits: 1 + log₂ n levels.
 fn by_median_splits(boxes: &[Aabb]) -> Bvh2 {
     let mut indices: Vec<u32> = (0..boxes.len() as u32).collect();
     let mut nodes = vec![Bvh2Node::default()];
@@ -120,8 +120,8 @@ fn by_median_splits(boxes: &[Aabb]) -> Bvh2 {
     Bvh2 { nodes, primitive_indices: indices, ..Bvh2::default() }
 }
 
-/// Fills `node` with the tree over the boxes `indices`, which it sorts; the first of them will be
-/// primitive `first`. Halves are split at the median centre along the longest axis of centres.
+/// Fills `node` with the tree over the boxes `indices`, sorting them; the first one becomes
+/// primitive `first`. Splits at the median centre along the longest axis of the centres.
 fn split_median(
     nodes: &mut Vec<Bvh2Node>,
     node: usize,
@@ -158,7 +158,7 @@ mod tests {
         centers.into_iter().map(|center| Aabb::new(center - half, center + half)).collect()
     }
 
-    /// Every box is in one leaf, within the boxes of all nodes above it; gives the depth.
+    /// Checks that every box is in one leaf and within all nodes above it. Returns the depth.
     fn check(binary: &Bvh2, boxes: &[Aabb]) -> usize {
         let mut seen = vec![false; boxes.len()];
         let mut deepest = 0;

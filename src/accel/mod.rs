@@ -1,13 +1,11 @@
 //! Triangles in world space → compressed wide BVH → flat arrays for the GPU.
 //!
-//! The tree is obvhs's CWBVH: eight children per node whose boxes are quantised to 8 bits per plane,
-//! 80 bytes a node. H. Ylitie, T. Karras, S. Laine, "Efficient Incoherent Ray Traversal on GPUs
-//! Through Compressed Wide BVHs", HPG 2017; binary tree by D. Meister, J. Bittner, "Parallel
-//! Locally-Ordered Clustering for Bounding Volume Hierarchy Construction", TVCG 2018, and "Parallel
-//! Reinsertion for Bounding Volume Hierarchy Optimization", CGF 2018.
+//! The tree is obvhs's CWBVH: eight children per node, their boxes quantised to 8 bits per plane,
+//! 80 bytes a node. \[Ylitie et al. 2017\]; binary tree by clustering and reinsertion, \[Meister &
+//! Bittner 2018\].
 //!
-//! [`Accel`] holds exactly what the shaders read (`glsl/include/bvh.glsl`); [`traverse`] is the Rust
-//! twin of the shader's traversal over the very same arrays.
+//! [`Accel`] holds exactly what the shaders read (`glsl/include/bvh.glsl`); [`traverse`] is the
+//! Rust twin of the shader's traversal over the same arrays.
 
 mod binary;
 pub mod traverse;
@@ -27,7 +25,7 @@ use crate::{
     shader::constants::{BVH_STACK_ENTRIES, FLAT_NORMAL},
 };
 
-/// Pages (buffers) the triangles may be spread over, bindings `BINDING_TRIANGLES_0` to `_3`.
+/// Most pages (buffers) for the triangles, bindings `BINDING_TRIANGLES_0` to `_3`.
 pub const MAX_TRIANGLE_PAGES: usize = 4;
 
 /// A node as the shader reads it: five `uvec4`.
@@ -35,11 +33,11 @@ pub type Node = [u32; 20];
 
 /// Three vertices of a triangle, each with its packed shading normal: three `uvec4` in the shader.
 ///
-/// Vertices and not edges, so that both triangles at a shared edge see the same two end points.
+/// Vertices rather than edges, so that both triangles at a shared edge see the same end points.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct TriangleRecord {
-    /// Position, metres, and normal ([`octahedron::pack`]; [`FLAT_NORMAL`] for a flat triangle).
+    /// Positions, metres, and normals ([`octahedron::pack`]; [`FLAT_NORMAL`] for a flat triangle).
     pub vertices: [VertexRecord; 3],
 }
 
@@ -58,24 +56,24 @@ pub struct VertexRecord {
 pub struct Accel {
     /// CWBVH nodes, the root first; never empty.
     pub nodes: Vec<Node>,
-    /// Triangles in BVH order; every page but the last holds `1 << page_shift` triangles. One page
-    /// at least, none of them empty.
+    /// Triangles in BVH order; every page but the last holds `1 << page_shift` triangles. At least
+    /// one page, none empty.
     pub triangle_pages: Vec<Vec<TriangleRecord>>,
     /// Base-2 logarithm of the triangles per page.
     pub page_shift: u32,
     /// Material index per triangle in BVH order.
     pub triangle_materials: Vec<u32>,
-    /// Triangle of the scene per triangle in BVH order.
+    /// Index in the scene per triangle in BVH order.
     pub scene_triangles: Vec<u32>,
-    /// Levels of nodes below the root, checked against [`BVH_STACK_ENTRIES`].
+    /// Levels of nodes below the root, less than [`BVH_STACK_ENTRIES`].
     pub depth: usize,
 }
 
 impl Accel {
-    /// Builds the tree over `geometry`; pages of triangles take at most `page_bytes` each.
+    /// Builds the tree over `geometry` with at most `page_bytes` per page of triangles.
     ///
-    /// Triangles without area are left out: no ray hits them. Without any triangle left the tree is
-    /// one node without children, which every ray leaves.
+    /// Omits triangles without area, which no ray hits. If no triangle is left, the tree is one
+    /// node without children.
     ///
     /// # Errors
     /// More triangles than [`MAX_TRIANGLE_PAGES`] pages hold, a vertex index out of range, a
@@ -128,7 +126,7 @@ fn corners(geometry: &Geometry, triangle: u32) -> [Vec3; 3] {
         .map(|vertex| Vec3::from_array(geometry.positions[vertex as usize]))
 }
 
-/// Indices of the triangles with an area, after every check of the input.
+/// Checks the input and returns the indices of the triangles with an area.
 fn checked_triangles(geometry: &Geometry) -> Result<Vec<u32>> {
     let usable = |value: f32| value.abs() <= MAX_COORDINATE;
     if let Some((index, position)) = geometry
@@ -176,7 +174,7 @@ fn too_many(count: usize, limit: u64) -> Error {
     ))
 }
 
-/// Logarithm of the triangles per page such that `count` triangles fit.
+/// Logarithm of the triangles per page of `page_bytes`. Fails if `count` triangles do not fit.
 fn page_shift(count: usize, page_bytes: u64) -> Result<u32> {
     let per_page = page_bytes / size_of::<TriangleRecord>() as u64;
     let shift = per_page.checked_ilog2().ok_or_else(|| {
@@ -187,7 +185,7 @@ fn page_shift(count: usize, page_bytes: u64) -> Result<u32> {
     if count as u64 > limit { Err(too_many(count, limit)) } else { Ok(shift) }
 }
 
-/// Stack of the thread that builds the tree: the conversion recurses once per level of the binary
+/// Stack of the thread that builds the tree. The conversion recurses once per level of the binary
 /// tree, which coincident triangles can make very deep.
 const BUILD_STACK_BYTES: usize = 1 << 30;
 
@@ -209,12 +207,12 @@ fn build_tree_here(geometry: &Geometry, kept: &[u32]) -> CwBvh {
     bvh2_to_cwbvh(&binary, 3, true, false)
 }
 
-/// Boxes of the triangles, grown by a few units in the last place of the largest coordinate: the
-/// slab test of `bvh.glsl` rounds, and a ray through the edge of a flat box must not be lost.
+/// Boxes of the triangles, padded by a few units in the last place of the largest coordinate: the
+/// slab test of `bvh.glsl` rounds, but must not lose a ray through the edge of a flat box.
 ///
-/// The slab test computes (q·2^e)/d + (p − o)/d; its error, as a distance along the axis, is at most
-/// 3 units of roundoff (2⁻²⁴) of |p − o| + 255·2^e, hence below 2⁻²⁰ of the scene's size for rays
-/// that start within twice that size.
+/// The slab test computes (q·2^e)/d + (p − o)/d. Its error, as a distance along the axis, is at
+/// most 3 units of roundoff (2⁻²⁴) of |p − o| + 255·2^e, hence below 2⁻²⁰ of the scene's size for
+/// rays that start within twice that size.
 fn padded_boxes(geometry: &Geometry, kept: &[u32]) -> Vec<Aabb> {
     let mut bounds = Aabb::empty();
     let mut boxes: Vec<Aabb> = kept
@@ -254,7 +252,7 @@ fn depth(nodes: &[CwBvhNode]) -> Result<usize> {
     Ok(deepest)
 }
 
-/// Positions and packed normals of a triangle; flat where one of its vertices has no normal.
+/// Positions and packed normals of a triangle; flat if one of its vertices has no normal.
 fn record(geometry: &Geometry, triangle: u32) -> TriangleRecord {
     let indices = geometry.triangles[triangle as usize];
     let normals = indices.map(|vertex| Vec3::from_array(geometry.normals[vertex as usize]));

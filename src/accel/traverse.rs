@@ -1,6 +1,6 @@
-//! Traversal on the host over the arrays of [`Accel`]: the Rust twin of `bvh.glsl`, same names, same
-//! order of operations, so that on a device that does not fuse multiplications and additions both
-//! find the same triangle at the same distance to the bit.
+//! Traversal on the host over the arrays of [`Accel`]: the Rust twin of `bvh.glsl`, with the same
+//! names and order of operations. On a device that does not fuse multiplications and additions,
+//! both find the same triangle at the same distance to the bit.
 
 use glam::{UVec2, Vec3};
 
@@ -11,7 +11,7 @@ use crate::{
     shader::constants::{BVH_STACK_ENTRIES, FLAT_NORMAL},
 };
 
-/// What a ray meets first.
+/// Closest hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intersection {
     /// Triangle in BVH order.
@@ -20,7 +20,7 @@ pub struct Intersection {
     pub distance: f32,
 }
 
-/// The surface where a ray meets a triangle; twin of the shader's `Hit`.
+/// Surface where a ray meets a triangle; twin of the shader's `Hit`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
     /// Point on the triangle, metres.
@@ -33,7 +33,7 @@ pub struct Surface {
     pub shading_normal: Vec3,
 }
 
-/// Work that one ray took.
+/// Work done for one ray.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
     /// Calls of the step function.
@@ -44,36 +44,36 @@ pub struct Work {
     pub triangles: u32,
 }
 
-/// Distance of a ray that has met nothing yet.
+/// Initial distance, before a ray has met anything.
 const FAR_AWAY: f32 = 3.0e38;
 
-/// Share of the scene's size by which ray origins are moved off their surface.
+/// Offset of ray origins from their surface, as a share of the scene's size.
 const RAY_OFFSET_SHARE: f32 = 3.814_697_3e-6;
 
 /// Cosine with the outgoing direction below which shading normals are turned.
 const LEAST_SHADING_COSINE: f32 = 0.01;
 
 impl Accel {
-    /// First triangle that the ray meets; `direction` is a unit vector.
+    /// Finds the first triangle that the ray meets; `direction` is a unit vector.
     pub fn closest(&self, origin: Vec3, direction: Vec3) -> Option<Intersection> {
         self.closest_with_work(origin, direction).0
     }
 
-    /// As [`Accel::closest`], with the work it took.
+    /// As [`Accel::closest`], and returns the work done.
     pub fn closest_with_work(&self, origin: Vec3, direction: Vec3) -> (Option<Intersection>, Work) {
         let mut ray = Traversal::start(origin, direction, false);
         while ray.step(self, false) {}
         (ray.hit(), ray.work)
     }
 
-    /// Whether the ray meets any triangle; `direction` is a unit vector.
+    /// True if the ray meets any triangle; `direction` is a unit vector.
     pub fn is_occluded(&self, origin: Vec3, direction: Vec3) -> bool {
         let mut ray = Traversal::start(origin, direction, true);
         while ray.step(self, true) {}
         ray.hit().is_some()
     }
 
-    /// The surface that a ray meets on `triangle`.
+    /// Computes the surface that a ray meets on `triangle`.
     ///
     /// # Panics
     /// `triangle` is out of range.
@@ -110,7 +110,7 @@ impl Accel {
         }
     }
 
-    /// Distance by which ray origins are moved off their surface, metres.
+    /// Offset of ray origins from their surface, metres.
     pub fn ray_offset(&self) -> f32 {
         let root = &self.nodes[0];
         let corner = node_corner(root);
@@ -118,7 +118,7 @@ impl Accel {
         RAY_OFFSET_SHARE * size.max_element()
     }
 
-    /// Origin of a ray that leaves a surface: off it by more than the error of positions and of the
+    /// Origin of a ray that leaves a surface, offset by more than the error of positions and of the
     /// triangle test.
     pub fn offset_ray_origin(
         &self,
@@ -133,8 +133,7 @@ impl Accel {
     }
 }
 
-/// Turns a shading normal toward `outgoing_direction` until its cosine with it is `least`, if it is
-/// less.
+/// Turns a shading normal toward `outgoing_direction` until their cosine is at least `least`.
 fn consistent_normal(shading_normal: Vec3, outgoing_direction: Vec3, least: f32) -> Vec3 {
     let cosine = shading_normal.dot(outgoing_direction);
     let tangential = shading_normal - cosine * outgoing_direction;
@@ -146,13 +145,12 @@ fn consistent_normal(shading_normal: Vec3, outgoing_direction: Vec3, least: f32)
 }
 
 /// Twice the signed areas of the three sub-triangles around a ray, given the vertices in its frame.
-/// S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, with an
-/// orthonormal frame for the shear.
+/// \[Woop et al. 2013\], with an orthonormal frame for the shear.
 fn edge_functions([a, b, c]: [Vec3; 3]) -> Vec3 {
     Vec3::new(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x)
 }
 
-/// Mean of the vertices' distances along the ray, weighted by `areas`.
+/// Sum of the vertices' distances along the ray, weighted by `areas`.
 fn depth(areas: Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
     areas.x * a.z + areas.y * b.z + areas.z * c.z
 }
@@ -171,7 +169,7 @@ fn node_spacing(node: &Node) -> Vec3 {
     )
 }
 
-/// 1 / x, finite also for a zero component.
+/// 1 / x, finite even for x = 0.
 fn inverse(x: f32) -> f32 {
     if x.abs() > 1e-18 {
         1.0 / x
@@ -200,7 +198,7 @@ struct Traversal {
 }
 
 impl Traversal {
-    /// Nearest children first for the closest hit, farthest first for any hit.
+    /// Starts a ray. The closest hit visits the nearest children first, any hit the farthest.
     fn start(origin: Vec3, direction: Vec3, any_hit: bool) -> Self {
         let octant = |x: f32, bits| if (x < 0.0) == any_hit { bits } else { 0 };
         Self {
@@ -230,7 +228,7 @@ impl Traversal {
         self.triangle.map(|triangle| Intersection { triangle, distance: self.distance })
     }
 
-    /// At most one node and one triangle; false when the ray is finished.
+    /// Visits at most one node and one triangle. Returns false when the ray is finished.
     fn step(&mut self, accel: &Accel, any_hit: bool) -> bool {
         self.work.steps += 1;
         if self.nodes_waiting.y <= 0x00ff_ffff && self.stack_size > 0 {

@@ -1,19 +1,18 @@
 //! Cornell / pbrt-v2 `.brdf` text: scattered isotropic samples with spectra → [`MeasuredTable`].
 //!
-//! The format: `#` starts a comment; numbers separated by white space. The count N of wavelengths,
-//! N wavelengths in nm, then records of θ_i φ_i θ_o φ_o (radians) and N values in 1/sr.
+//! Format: numbers separated by white space; `#` starts a comment. A count N of wavelengths, N
+//! wavelengths in nm, then records of θ_i φ_i θ_o φ_o (radians) and N values in 1/sr.
 //!
-//! The samples are interpolated by a mean with weights that decay with the distance, as in pbrt-v2
-//! (Pharr & Humphreys, Physically Based Rendering, second edition, section 8.6.2), and the result
-//! is baked on the half/difference grid.
+//! A mean with weights that decay with distance interpolates the samples, as in pbrt-v2 (\[Pharr &
+//! Humphreys 2010\], section 8.6.2); the result is baked on the half/difference grid.
 //!
-//! Deviation: pbrt-v2 measures distances between the points (sinθ_i·sinθ_o, |Δφ|/π, cosθ_i·cosθ_o).
-//! There a pair near the mirror direction is as close to pairs along the plane of incidence as to
-//! other mirror pairs, so that the single sample in the highlight of a coated paint shows as a row
-//! of bright patches, one in eight directions, and the one at 80° makes grazing light come back
-//! fivefold; and at normal incidence, where Δφ means nothing, the value jumps. Here the points are
-//! (2·√(θ_h/90°), θ_d/90°, ½|cosθ_i − cosθ_o|): continuous in the directions, the same for the two
-//! interchanged, fine in the highlight, and coarse along it, where the BRDF changes slowly.
+//! Deviation: pbrt-v2 measures distances between points (sinθ_i·sinθ_o, |Δφ|/π, cosθ_i·cosθ_o).
+//! These put a pair near the mirror direction as close to pairs along the plane of incidence as to
+//! other mirror pairs. The single sample in the highlight of a coated paint then shows as a row of
+//! bright patches, one in eight directions, the one at 80° makes grazing light come back fivefold,
+//! and the value jumps at normal incidence, where Δφ is undefined. The points used here,
+//! (2·√(θ_h/90°), θ_d/90°, ½|cosθ_i − cosθ_o|), are continuous in the directions, symmetric in the
+//! two, fine in the highlight, and coarse along it, where the BRDF changes slowly.
 
 use std::{f32::consts::FRAC_PI_2, fs, path::Path};
 
@@ -30,17 +29,17 @@ use crate::{
     shader::constants::*,
 };
 
-/// Largest count of wavelengths that is believed.
+/// Largest plausible count of wavelengths.
 const LARGEST_WAVELENGTH_COUNT: f64 = 10_000.0;
-/// Least squared radius of the mean.
+/// Smallest squared radius of the mean.
 const LEAST_SQUARED_RADIUS: f32 = 0.001;
-/// Squared radius in which the nearest samples are looked for first.
+/// Squared radius of the first search for the nearest samples.
 const FIRST_SQUARED_SEARCH: f32 = 0.008;
-/// Beyond this squared radius the search stops widening: no two points are farther apart.
+/// Squared radius beyond which the search stops widening: no two points are farther apart.
 const LARGEST_SQUARED_SEARCH: f32 = 6.0;
-/// Samples that the mean takes in everywhere.
+/// Least number of samples in a mean.
 const NEAREST_SAMPLES: usize = 4;
-/// Squared radius of the mean in units of the squared distance of the farthest of these.
+/// Squared radius of the mean, relative to the squared distance of the farthest of these samples.
 const RADIUS_MARGIN: f32 = 1.5;
 /// Decay of the weights exp(−100·d²).
 const WEIGHT_DECAY: f32 = 100.0;
@@ -54,7 +53,7 @@ struct Sample {
     value: Vec3,
 }
 
-/// A number of the file with its place.
+/// Number in the file, with its place.
 struct Number {
     value: f64,
     line: usize,
@@ -63,8 +62,8 @@ struct Number {
 
 /// Reads a `.brdf` file and bakes it on the half/difference grid.
 ///
-/// Records with values that are not finite or with a direction below the surface are left out and
-/// counted in the table's warnings.
+/// Omits records with values that are not finite or with a direction below the surface, and counts
+/// them in the table's warnings.
 pub fn load(path: &Path) -> Result<MeasuredTable> {
     let bytes = fs::read(path).map_err(|source| Error::io(path, "read", source))?;
     let text = String::from_utf8(bytes).map_err(|error| {
@@ -95,8 +94,8 @@ pub fn load(path: &Path) -> Result<MeasuredTable> {
     Ok(table)
 }
 
-/// The samples interpolated at the centres of the grid's bins. The coordinates of the interpolation
-/// are the same at φ_d and π − φ_d, so that half of the grid is enough.
+/// Interpolates the samples at the bin centres of the grid. The coordinates of the interpolation
+/// agree at φ_d and π − φ_d, so half of the grid suffices.
 fn bake(samples: &SampleSet) -> Vec<Vec3> {
     const THETA_DIFFERENCE: usize = MEASURED_THETA_DIFFERENCE_BINS as usize;
     const PHI_DIFFERENCE: usize = MEASURED_PHI_DIFFERENCE_BINS as usize;
@@ -115,7 +114,7 @@ fn bake(samples: &SampleSet) -> Vec<Vec3> {
     cells
 }
 
-/// The samples of a file, and how many records were left out.
+/// Returns the samples of a file and the number of omitted records.
 fn parse(path: &Path, text: &str) -> Result<(Vec<Sample>, usize)> {
     let numbers = numbers(path, text)?;
     let error = |place: &Number, message: String| Error::Parse {
@@ -187,7 +186,7 @@ fn parse(path: &Path, text: &str) -> Result<(Vec<Sample>, usize)> {
     Ok((samples, left_out))
 }
 
-/// The numbers of the text without its comments.
+/// Numbers of the text without its comments.
 fn numbers(path: &Path, text: &str) -> Result<Vec<Number>> {
     let mut numbers = Vec::new();
     for (line_index, line) in text.lines().enumerate() {
@@ -225,7 +224,7 @@ fn mapped_point(outgoing: Vec3, incident: Vec3) -> Vec3 {
     )
 }
 
-/// Samples in the order of their first coordinate, so that a search looks at a slab only.
+/// Samples sorted by their first coordinate, so that a search visits only a slab.
 struct SampleSet {
     samples: Vec<Sample>,
 }
@@ -236,11 +235,11 @@ impl SampleSet {
         Self { samples }
     }
 
-    /// Mean of the samples near a point, negative channels set to 0.
+    /// Mean of the samples near a point, with negative channels set to 0.
     ///
-    /// Weights are exp(−100·d²)·(1 − d²/r²)² within a radius r that takes in the four nearest
-    /// samples. Deviation: pbrt-v2 starts at r² = 0.001, doubles it until more than two samples are
-    /// found and has no second factor, so that the mean jumps wherever a sample enters or the radius
+    /// Weights are exp(−100·d²)·(1 − d²/r²)² within a radius r that includes the four nearest
+    /// samples. Deviation: pbrt-v2 starts at r² = 0.001, doubles it until it finds more than two
+    /// samples and has no second factor, so the mean jumps where a sample enters or the radius
     /// changes. Here both are continuous in the point.
     fn interpolate(&self, point: Vec3) -> Vec3 {
         let nearest = self.nearest(point);
@@ -251,7 +250,7 @@ impl SampleSet {
             let squared_distance = sample.point.distance_squared(point);
             if squared_distance < squared_radius {
                 let window = 1.0 - squared_distance / squared_radius;
-                // Counted from the nearest, so that far from all samples no weight underflows.
+                // Measure from the nearest sample, so that no weight underflows far from all samples.
                 let decay = (-WEIGHT_DECAY * (squared_distance - nearest[0])).exp();
                 let weight = decay * window * window;
                 sum += weight * sample.value;
@@ -261,7 +260,7 @@ impl SampleSet {
         (sum / weight_sum).max(Vec3::ZERO)
     }
 
-    /// Squared distances of the nearest samples in rising order; infinite where there are fewer.
+    /// Squared distances of the nearest samples, ascending; infinite for missing samples.
     fn nearest(&self, point: Vec3) -> [f32; NEAREST_SAMPLES] {
         let mut searched = FIRST_SQUARED_SEARCH;
         loop {
@@ -281,7 +280,7 @@ impl SampleSet {
         }
     }
 
-    /// The samples whose first coordinate differs by at most `radius` from that of the point.
+    /// Samples whose first coordinate differs by at most `radius` from that of the point.
     fn slab(&self, point: Vec3, radius: f32) -> impl Iterator<Item = &Sample> {
         let first = self.samples.partition_point(|sample| sample.point.x < point.x - radius);
         self.samples[first..].iter().take_while(move |sample| sample.point.x <= point.x + radius)

@@ -1,4 +1,4 @@
-//! Files of measured BRDFs, either format → [`MeasuredTable`].
+//! Files of measured BRDFs in either format → [`MeasuredTable`].
 
 use std::{fs, io::Read, path::Path};
 
@@ -8,7 +8,7 @@ use crate::{
 };
 
 impl MeasuredTable {
-    /// Reads a measured BRDF: MERL `.binary` where the name or the first 12 bytes say so, else the
+    /// Reads a measured BRDF: MERL `.binary` if the name or the first 12 bytes say so, else the
     /// text format of Cornell and pbrt-v2.
     pub fn load(path: &Path) -> Result<Self> {
         let mut head = [0; merl::HEADER_BYTES];

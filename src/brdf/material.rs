@@ -1,4 +1,4 @@
-//! Materials as the scene states them, validated.
+//! Validated materials of a scene.
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use crate::brdf::table::MeasuredTable;
 
-/// A named surface material; all are two-sided and opaque.
+/// Named surface material; all are two-sided and opaque.
 #[derive(Clone, Debug)]
 pub struct Material {
     /// Name in the scene file.
@@ -18,7 +18,7 @@ pub struct Material {
 /// Fresnel reflectance of a conductor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ConductorFresnel {
-    /// Reflectance at normal incidence, Schlick's approximation.
+    /// Schlick's approximation.
     Schlick {
         /// Reflectance at normal incidence.
         reflectance: Vec3,
@@ -60,7 +60,7 @@ pub enum MaterialKind {
     Measured {
         /// The file.
         path: PathBuf,
-        /// Its table on the half/difference grid; materials that name one file share it.
+        /// Its table on the half/difference grid, shared by materials that name the same file.
         table: Arc<MeasuredTable>,
     },
 }

@@ -15,25 +15,25 @@ use crate::{
     shader::{constants::*, structs},
 };
 
-/// Smallest GGX width: below it, single-precision directions cannot resolve the lobe.
+/// Smallest GGX width: single-precision directions cannot resolve a narrower lobe.
 pub const SMALLEST_ALPHA: f32 = 1e-3;
 
-/// Largest size of the BRDF table buffer: what Vulkan promises for one storage buffer.
+/// Largest size of the BRDF table buffer: Vulkan guarantees it for one storage buffer.
 pub const LARGEST_TABLE_BYTES: usize = 128 << 20;
 
 /// Contents of the material and BRDF table buffers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialTables {
-    /// One per material of the scene, in its order.
+    /// Materials in the order of the scene.
     pub materials: Vec<structs::Material>,
-    /// Words of the tables at the offsets that the materials hold; never empty.
+    /// Words of the tables, at the offsets that the materials hold; never empty.
     pub words: Vec<u32>,
 }
 
 impl MaterialTables {
-    /// Lays out the tables. Materials that share one measured table share its words.
+    /// Lays out the tables. Materials with the same measured table share its words.
     ///
-    /// Fails where the tables together exceed [`LARGEST_TABLE_BYTES`], naming materials and sizes.
+    /// Fails if the tables together exceed [`LARGEST_TABLE_BYTES`]; names materials and sizes.
     pub fn new(materials: &[Material]) -> Result<Self> {
         check_size(materials)?;
         let mut tables = Self { materials: Vec::with_capacity(materials.len()), words: vec![0] };
@@ -72,7 +72,7 @@ impl MaterialTables {
                     converted.kind = MATERIAL_MEASURED;
                     converted.table_offset =
                         *measured_offsets.entry(Arc::as_ptr(table)).or_insert_with(|| {
-                            // The cells of the grid are read in pairs of words.
+                            // Align to pairs of words, the unit in which cells are read.
                             if (tables.words.len() + MEASURED_GRID_OFFSET as usize) % 2 == 1 {
                                 tables.words.push(0);
                             }
@@ -92,14 +92,14 @@ impl MaterialTables {
     }
 }
 
-/// Fails where the measured tables do not fit into one buffer.
+/// Fails if the measured tables do not fit into one buffer.
 fn check_size(materials: &[Material]) -> Result<()> {
     let mut bytes = 0;
     let mut seen = Vec::new();
     let mut names = Vec::new();
     for material in materials {
         let MaterialKind::Measured { table, .. } = &material.kind else {
-            // At most five tables over the cosine, and the word that is always there.
+            // Count at most five tables over the cosine, and the word that is always there.
             bytes += (5 * BRDF_COSINE_NODES as usize + 1) * 4;
             continue;
         };
@@ -124,16 +124,16 @@ fn check_size(materials: &[Material]) -> Result<()> {
     })
 }
 
-/// A direction of that cosine. At the horizon, where nothing is reflected by a rough surface, the
-/// limit is taken from just above it.
+/// Direction of a given cosine. Stays just above the horizon, where a rough surface reflects nothing,
+/// to give the limit there.
 fn direction_of_cosine(cosine: f32) -> Vec3 {
     let cosine = cosine.max(1e-4);
     vec3((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine)
 }
 
-/// Directional albedo of a GGX surface whose Fresnel reflectance is `fresnel` of the cosine between
-/// direction and half vector, by the midpoints of a grid of visible-normal samples: each weight is
-/// at most about 1, so that 64 × 64 points hold to 1e-4.
+/// Directional albedo of a GGX surface; `fresnel` maps the cosine between direction and half vector
+/// to reflectance. Sums visible-normal samples at the midpoints of a grid: each weight is at most
+/// about 1, so 64 × 64 points are accurate to 1e-4.
 fn ggx_albedo(outgoing: Vec3, alpha: f32, fresnel: impl Fn(f32) -> Vec3) -> Vec3 {
     const POINTS: u32 = 64;
     let mut sum = glam::DVec3::ZERO;
@@ -160,7 +160,7 @@ fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
         .into_par_iter()
         .map(|node| coat_albedo(direction_of_cosine(node as f32 / BRDF_COSINE_INTERVALS as f32)))
         .collect();
-    // Next to the horizon E falls steeply where the cosine is about α. The node there takes the
+    // Next to the horizon, E falls steeply where the cosine is about α. Give the node there the
     // least value that keeps the line to the next node above E, so that coat and base together
     // never reflect more than they receive.
     let horizon = [0.02, 0.06, 0.12, 0.25, 0.5, 0.75].into_iter().map(|fraction| {
@@ -168,8 +168,8 @@ fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
         (e - fraction * coat[1]) / (1.0 - fraction)
     });
     coat[0] = horizon.fold(coat[0], f32::max).min(1.0);
-    // Ē = 2∫E(μ)μ dμ of the piecewise linear E, exactly, so that the base is energy conserving as
-    // interpolated: per interval of width w, ∫ = w·(μ₀(2E₀+E₁)+μ₁(E₀+2E₁))/6.
+    // Integrate Ē = 2∫E(μ)μ dμ of the piecewise linear E exactly, so that the interpolated base
+    // conserves energy: per interval of width w, ∫ = w·(μ₀(2E₀+E₁)+μ₁(E₀+2E₁))/6.
     let width = 1.0 / f64::from(BRDF_COSINE_INTERVALS);
     let mean: f64 = coat
         .windows(2)

@@ -1,5 +1,5 @@
 //! MERL `.binary` files: header, half/difference angle indexing, the three RGB scales →
-//! [`MeasuredTable`]. Matusik et al. 2003, "A Data-Driven Reflectance Model".
+//! [`MeasuredTable`]. \[Matusik et al. 2003\].
 
 use std::{fs, io::Read, path::Path};
 
@@ -15,7 +15,7 @@ use crate::{
 /// Bytes before the values: three little-endian 32-bit counts.
 pub const HEADER_BYTES: usize = 12;
 
-/// Bins in θ_h, θ_d and φ_d of every file of the database.
+/// Bins in θ_h, θ_d and φ_d, the same for every file of the database.
 pub const EXPECTED_DIMENSIONS: [i32; 3] = [
     MEASURED_THETA_HALF_BINS as i32,
     MEASURED_THETA_DIFFERENCE_BINS as i32,
@@ -25,7 +25,7 @@ pub const EXPECTED_DIMENSIONS: [i32; 3] = [
 /// Size of a whole file: 34,992,012 bytes.
 pub const FILE_BYTES: usize = HEADER_BYTES + 3 * CELL_COUNT * size_of::<f64>();
 
-/// What a stored value is multiplied by to give 1/sr, by channel.
+/// Factors from stored values to 1/sr, per channel.
 pub const SCALES: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 
 /// The three counts of a header.
@@ -39,8 +39,8 @@ pub fn dimensions(header: [u8; HEADER_BYTES]) -> [i32; 3] {
 
 /// Reads a MERL file.
 ///
-/// A cell with a negative channel is invalid, as the format has it; one that is not finite is
-/// treated the same and counted in the table's warnings.
+/// A cell with a negative channel is invalid, as the format defines. A cell that is not finite is
+/// also invalid and counted in the table's warnings.
 pub fn load(path: &Path) -> Result<MeasuredTable> {
     let io_error = |source| Error::io(path, "read", source);
     let mut file = fs::File::open(path).map_err(io_error)?;
@@ -69,7 +69,7 @@ pub fn load(path: &Path) -> Result<MeasuredTable> {
     bytes.try_reserve_exact(FILE_BYTES - HEADER_BYTES).map_err(|_| {
         Error::format(path, format!("not enough memory for the {FILE_BYTES} bytes of the file"))
     })?;
-    // One byte more than expected, in case the file grows meanwhile.
+    // Allow one byte more than expected, in case the file grows meanwhile.
     file.take((FILE_BYTES - HEADER_BYTES) as u64).read_to_end(&mut bytes).map_err(io_error)?;
     if bytes.len() != FILE_BYTES - HEADER_BYTES {
         return Err(wrong_size(path, (HEADER_BYTES + bytes.len()) as u64));
@@ -95,7 +95,7 @@ pub fn load(path: &Path) -> Result<MeasuredTable> {
     Ok(table)
 }
 
-/// The file ends early or holds more than the table.
+/// Error for a file that ends early or holds more than the table.
 fn wrong_size(path: &Path, found_bytes: u64) -> Error {
     let word = if found_bytes < FILE_BYTES as u64 { "truncated" } else { "too long" };
     Error::format(

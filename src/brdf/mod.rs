@@ -2,7 +2,7 @@
 //! `glsl/include/brdf.glsl` that reads them: evaluate, pdf, sample and directional albedo.
 //!
 //! Directions are unit vectors in the shading frame (z is the normal) and point away from the
-//! surface. Values are per steradian and hold no cosine; pdfs are per steradian of incident
+//! surface. Values are per steradian without the cosine; pdfs are per steradian of incident
 //! directions. Both are 0 unless both directions are above the surface.
 //!
 //! | kind | value | samples |
@@ -12,17 +12,12 @@
 //! | conductor | GGX, exact conductor Fresnel or Schlick's | visible normals |
 //! | measured | trilinear on the half/difference grid | tabulated half vectors or cosine |
 //!
-//! E(θ) is the directional albedo of the coat and Ē its cosine-weighted mean, so that coat and
-//! base together reflect exactly E + ρ(1 − E): reciprocal, and a white base loses nothing (Kelemen &
-//! Szirmay-Kalos 2001).
+//! E(θ) is the directional albedo of the coat and Ē its cosine-weighted mean. Coat and base
+//! together reflect exactly E + ρ(1 − E): reciprocal, and lossless for a white base (\[Kelemen &
+//! Szirmay-Kalos 2001\]).
 //!
-//! References: Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces".
-//! Heitz 2014, "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", JCGT 3(2).
-//! Dupuy & Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps". Eto & Tokuyoshi 2023,
-//! "Bounded VNDF Sampling for Smith–GGX Reflections". Kelemen & Szirmay-Kalos 2001, "A Microfacet
-//! Based Coupled Specular-Matte BRDF Model with Importance Sampling". Rusinkiewicz 1998, "A New
-//! Change of Variables for Efficient BRDF Representation". Schlick 1994, "An Inexpensive BRDF Model
-//! for Physically-based Rendering".
+//! References: \[Walter et al. 2007\], \[Heitz 2014\], \[Dupuy & Benyoub 2023\], \[Eto & Tokuyoshi
+//! 2023\], \[Rusinkiewicz 1998\], \[Schlick 1994\].
 
 pub mod cornell;
 mod load;
@@ -62,7 +57,7 @@ pub fn evaluate(
     evaluate_and_pdf(tables, material_index, outgoing_local, incident_local).0
 }
 
-/// Density of [`sample`] per steradian; integrates to 1 less the share of samples below the surface.
+/// Density of [`sample`] per steradian. Integrates to 1 less the share of samples below the surface.
 pub fn pdf(
     tables: &MaterialTables,
     material_index: usize,
@@ -72,7 +67,7 @@ pub fn pdf(
     evaluate_and_pdf(tables, material_index, outgoing_local, incident_local).1
 }
 
-/// Incident direction from three numbers in [0, 1); z ≤ 0 means no sample.
+/// Samples an incident direction with three numbers in [0, 1); z ≤ 0 means no sample.
 pub fn sample(
     tables: &MaterialTables,
     material_index: usize,
@@ -82,7 +77,7 @@ pub fn sample(
     twin::brdf_sample(&tables.words, &tables.materials[material_index], outgoing_local, u)
 }
 
-/// Share of light from a uniform white hemisphere that is reflected toward the outgoing direction.
+/// Share of light from a uniform white hemisphere reflected toward the outgoing direction.
 pub fn albedo(tables: &MaterialTables, material_index: usize, outgoing_local: Vec3) -> Vec3 {
     twin::brdf_albedo(&tables.words, &tables.materials[material_index], outgoing_local)
 }

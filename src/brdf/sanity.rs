@@ -1,5 +1,4 @@
-//! Whether a measured BRDF is physically plausible: how much it reflects, and whether it stays the
-//! same when the two directions are interchanged.
+//! Physical plausibility of a measured BRDF: how much it reflects, and whether it is reciprocal.
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -8,33 +7,33 @@ use rayon::prelude::*;
 
 use crate::brdf::table::MeasuredTable;
 
-/// Elevations at which the albedo is reported, degrees from the normal.
+/// Elevations of the reported albedo, degrees from the normal.
 pub const ELEVATIONS_DEG: [f32; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
 
-/// Angle between the directions that are tried in pairs, degrees.
+/// Angle between the directions tried in pairs, degrees.
 const STEP_DEG: usize = 15;
 
-/// Steps of the quadrature over the incident direction's elevation and azimuth: a quarter and half
-/// a degree, finer than measured highlights.
+/// Quadrature steps over the elevation and azimuth of the incident direction: a quarter and half a
+/// degree, finer than measured highlights.
 const QUADRATURE_STEPS: [usize; 2] = [360, 720];
 
-/// What a measured BRDF does to light.
+/// Figures on the plausibility of a measured BRDF.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Sanity {
-    /// Linear Rec.709 share of light from a uniform hemisphere that is reflected, at each of
-    /// [`ELEVATIONS_DEG`]: ∫ value · cosine dω by the midpoint rule. Unlike the albedo that
-    /// rendering uses, it is not clamped.
+    /// Reflected share of light from a uniform hemisphere, linear Rec.709, at each of
+    /// [`ELEVATIONS_DEG`]: ∫ value · cosine dω by the midpoint rule. Unlike the albedo used for
+    /// rendering, it is not clamped.
     pub albedo: Vec<[f32; 3]>,
     /// Largest of these.
     pub largest_albedo: f32,
     /// Largest value among the pairs of directions tried, 1/sr.
     pub largest_value: f32,
-    /// Largest difference when the directions of a pair are interchanged, relative to the value.
+    /// Largest change when the directions of a pair are interchanged, relative to the value.
     pub largest_reciprocity_error: f32,
 }
 
 impl Sanity {
-    /// Looks at a table.
+    /// Examines a table.
     pub fn of(table: &MeasuredTable) -> Self {
         let albedo: Vec<[f32; 3]> =
             ELEVATIONS_DEG.iter().map(|&elevation_deg| albedo(table, elevation_deg)).collect();
@@ -47,7 +46,7 @@ impl Sanity {
         }
     }
 
-    /// What a user should know before rendering with it.
+    /// Warnings for a user who renders with it.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         if self.largest_albedo > 1.0 {
@@ -69,7 +68,7 @@ impl Sanity {
     }
 }
 
-/// Unit vector at an angle from the normal and an azimuth, radians.
+/// Unit vector at polar angle `elevation` from the normal and at `azimuth`, radians.
 fn direction(elevation: f32, azimuth: f32) -> Vec3 {
     let ((sine, cosine), (sine_azimuth, cosine_azimuth)) = (elevation.sin_cos(), azimuth.sin_cos());
     vec3(sine * cosine_azimuth, sine * sine_azimuth, cosine)
@@ -88,7 +87,7 @@ fn albedo(table: &MeasuredTable, elevation_deg: f32) -> [f32; 3] {
             .sum();
         sum * f64::from(elevation.sin() * elevation.cos())
     };
-    // Collected in order, so that the sum does not depend on the threads.
+    // Collect in order, so that the sum does not depend on the threads.
     let sums: Vec<DVec3> = (0..rings).into_par_iter().map(ring).collect();
     let total: DVec3 = sums.into_iter().sum();
     (total * f64::from(ring_width * sector_width)).as_vec3().to_array()

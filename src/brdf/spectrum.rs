@@ -4,11 +4,11 @@ use glam::{DMat3, DVec3, dvec3};
 
 /// First wavelength of [`COLOUR_MATCHING`], nm.
 const FIRST_NM: f64 = 380.0;
-/// Distance of its rows, nm.
+/// Spacing of its rows, nm.
 const STEP_NM: f64 = 10.0;
 
 /// Colour matching functions x̄, ȳ, z̄ of the CIE 1931 standard observer (2°), 380 to 780 nm by 10:
-/// CIE 015:2018, "Colorimetry", table of the 1931 observer.
+/// \[CIE 015:2018\], table of the 1931 observer.
 const COLOUR_MATCHING: [[f64; 3]; 41] = [
     [0.001368, 0.000039, 0.006450],
     [0.004243, 0.000120, 0.020050],
@@ -53,8 +53,8 @@ const COLOUR_MATCHING: [[f64; 3]; 41] = [
     [0.000042, 0.000015, 0.000000],
 ];
 
-/// Relative spectral power of the CIE standard illuminant D65, 380 to 780 nm by 10:
-/// ISO/CIE 11664-2:2022.
+/// Relative spectral power of the CIE standard illuminant D65, 380 to 780 nm by 10: \[ISO/CIE
+/// 11664-2:2022\].
 const ILLUMINANT_D65: [f64; 41] = [
     49.9755, 54.6482, 82.7549, 91.4860, 93.4318, 86.6823, 104.8650, 117.0080, 117.8120, 114.8610,
     115.9230, 108.8110, 109.3540, 107.8020, 104.7900, 107.6890, 104.4050, 104.0460, 100.0000,
@@ -63,14 +63,14 @@ const ILLUMINANT_D65: [f64; 41] = [
     66.8054, 63.3828,
 ];
 
-/// Linear sRGB from XYZ: IEC 61966-2-1:1999, rows of the inverse of its matrix, by columns.
+/// Linear sRGB from XYZ, by columns: the inverse matrix of \[IEC 61966-2-1:1999\].
 const SRGB_FROM_XYZ: DMat3 = DMat3::from_cols(
     dvec3(3.2406, -0.9689, 0.0557),
     dvec3(-1.5372, 1.8758, -0.2040),
     dvec3(-0.4986, 0.0415, 1.0570),
 );
 
-/// x̄, ȳ, z̄ times the illuminant at a wavelength in nm, linear between the rows and 0 outside them.
+/// x̄, ȳ, z̄ times the illuminant at a wavelength in nm: linear between rows, 0 outside them.
 fn weighted_colour_matching(wavelength_nm: f64) -> DVec3 {
     let position = (wavelength_nm - FIRST_NM) / STEP_NM;
     let last = COLOUR_MATCHING.len() - 1;
@@ -83,12 +83,12 @@ fn weighted_colour_matching(wavelength_nm: f64) -> DVec3 {
 }
 
 /// Weights w such that Σ w_j·s(λ_j) is the linear sRGB colour of a reflectance spectrum s sampled
-/// at increasing wavelengths: ∫ s·D65·(x̄, ȳ, z̄) dλ / ∫ D65·ȳ dλ by the trapezoid rule, turned
-/// into sRGB. `None` where the wavelengths see no light.
+/// at increasing wavelengths: ∫ s·D65·(x̄, ȳ, z̄) dλ / ∫ D65·ȳ dλ by the trapezoid rule, converted
+/// to sRGB. `None` if no wavelength is visible.
 ///
-/// Deviation: pbrt-v2 integrates without an illuminant, which turns a grey reflectance into
-/// (1.20, 0.95, 0.91) of its value. The light of a scene is given in colours whose white is D65, so
-/// a grey surface must keep it.
+/// Deviation: pbrt-v2 integrates without an illuminant, which turns a grey reflectance into (1.20,
+/// 0.95, 0.91) of its value. Scene lights are colours whose white is D65, so a grey surface must
+/// stay grey.
 pub fn srgb_weights(wavelengths_nm: &[f64]) -> Option<Vec<DVec3>> {
     let count = wavelengths_nm.len();
     let weighted: Vec<DVec3> = (0..count)
@@ -110,7 +110,7 @@ mod tests {
 
     use super::*;
 
-    /// The white of sRGB is D65: a grey reflectance is grey, to the digits of the matrix.
+    /// The white of sRGB is D65: a grey reflectance stays grey, to the digits of the matrix.
     #[test]
     fn constant_spectrum_is_white() {
         let wavelengths: Vec<f64> = (0..41).map(|index| 380.0 + 10.0 * f64::from(index)).collect();
@@ -118,7 +118,7 @@ mod tests {
         assert!((colour - DVec3::ONE).abs().max_element() < 2e-3, "{colour}");
     }
 
-    /// A spectrum given twice as finely has the same colour.
+    /// A spectrum sampled twice as finely has the same colour.
     #[test]
     fn colour_does_not_depend_on_the_spacing() {
         let spectrum = |nm: f64| 0.2 + 0.1 * ((nm - 400.0) / 60.0).sin();

@@ -1,8 +1,8 @@
-//! Measured BRDFs on the half/difference grid of the MERL files: cells, some of them without a
-//! value → the words that `measured_value`, `measured_pdf` and `measured_sample` of `brdf.glsl` read.
+//! Measured BRDFs on the half/difference grid of MERL: cells, some without a value → the words that
+//! `measured_value`, `measured_pdf` and `measured_sample` of `brdf.glsl` read.
 //!
 //! Layout of the words: directional albedo, cosine shares, cumulative probabilities and densities
-//! of the sampling table, grid cells of two words; the offsets are `MEASURED_…_OFFSET` of
+//! of the sampling table, grid cells of two words; offsets are `MEASURED_…_OFFSET` of
 //! [`constants`](crate::shader::constants).
 
 use std::{
@@ -31,14 +31,14 @@ const PHI_DIFFERENCE: usize = MEASURED_PHI_DIFFERENCE_BINS as usize;
 /// Cells of the grid.
 pub const CELL_COUNT: usize = THETA_HALF * THETA_DIFFERENCE * PHI_DIFFERENCE;
 
-/// Isotropic measured BRDF on a grid of θ_h × θ_d × φ_d with its sampling table.
+/// Isotropic measured BRDF on a grid of θ_h × θ_d × φ_d, with its sampling table.
 #[derive(Clone, PartialEq)]
 pub struct MeasuredTable {
     words: Vec<u32>,
-    /// Cells without a measured value, which took that of a neighbour. About a quarter of the grid
-    /// has a direction below the surface and is counted here.
+    /// Cells without a measurement, filled from a neighbour. They include about a quarter of the
+    /// grid, where a direction is below the surface.
     pub invalid_cell_count: usize,
-    /// What was repaired while reading, for the log.
+    /// Repairs made while reading, for the log.
     pub warnings: Vec<String>,
 }
 
@@ -53,9 +53,9 @@ impl fmt::Debug for MeasuredTable {
     }
 }
 
-/// Directions (outgoing, incident) of the centre of a bin, in the local frame, with the half vector
-/// in the plane y = 0. The centre in θ_h is that of the square-root spacing, where the interpolation
-/// takes the cell's value unmixed.
+/// Directions (outgoing, incident) of a bin's centre in the local frame, with the half vector in
+/// the plane y = 0. The centre in θ_h follows the square-root spacing, so that interpolation there
+/// returns the cell's value unmixed.
 pub fn bin_directions(theta_half: usize, theta_difference: usize, phi: usize) -> (Vec3, Vec3) {
     let root = (theta_half as f32 + 0.5) / THETA_HALF as f32;
     let theta_half = root * root * FRAC_PI_2;
@@ -76,14 +76,14 @@ pub fn cell_index(theta_half: usize, theta_difference: usize, phi: usize) -> usi
     phi + PHI_DIFFERENCE * (theta_difference + THETA_DIFFERENCE * theta_half)
 }
 
-/// Whether a cell holds a measurement: finite and not negative.
+/// True if a cell holds a measurement: finite and not negative.
 fn is_valid(cell: Vec3) -> bool {
     cell.is_finite() && cell.min_element() >= 0.0
 }
 
 impl MeasuredTable {
-    /// The table of a function of (outgoing, incident) directions in 1/sr, taken at the centres of
-    /// the bins that have both directions above the surface.
+    /// Tabulates a function of (outgoing, incident) directions in 1/sr at the centres of the bins
+    /// with both directions above the surface.
     pub fn tabulate(value: impl Fn(Vec3, Vec3) -> Vec3 + Sync) -> Result<Self, String> {
         let mut cells = vec![Vec3::NAN; CELL_COUNT];
         cells.par_chunks_mut(PHI_DIFFERENCE).enumerate().for_each(|(row, cells)| {
@@ -98,16 +98,15 @@ impl MeasuredTable {
         Self::from_cells(cells)
     }
 
-    /// The table of `CELL_COUNT` cells in 1/sr in the order of [`cell_index`]; a cell with a
-    /// negative or non-finite component is invalid and takes the value of the nearest valid one, so
-    /// that interpolation needs no case of its own. Fails where no cell is valid.
+    /// Builds the table from `CELL_COUNT` cells in 1/sr in the order of [`cell_index`]. A cell with
+    /// a negative or non-finite component is invalid and takes the value of the nearest valid one,
+    /// so that interpolation needs no special case. Fails if no cell is valid.
     ///
-    /// A table whose directional albedo exceeds 1 somewhere, as extrapolated measurements do at
-    /// grazing angles, is scaled by a product of factors of the two polar angles until it does not.
+    /// Extrapolated measurements may have a directional albedo above 1 at grazing angles. Such a
+    /// table is scaled by a product of factors of the two polar angles until none exceeds 1.
     ///
-    /// The bins at θ_h = 0 and θ_d = 0, of which 0.01° and 1° are the widths, are replaced by their
-    /// mean over φ_d: the angle means nothing at a pole, and a value that turns with it there would
-    /// make the BRDF discontinuous.
+    /// The bins at θ_h = 0 and θ_d = 0, which are 0.01° and 1° wide, take their mean over φ_d: the
+    /// angle is undefined at a pole, and a value that varied with it would make the BRDF discontinuous.
     pub fn from_cells(mut cells: Vec<Vec3>) -> Result<Self, String> {
         assert_eq!(cells.len(), CELL_COUNT, "a measured table has 90·90·180 cells");
         let invalid_cell_count = cells.par_iter().filter(|cell| !is_valid(**cell)).count();
@@ -163,7 +162,7 @@ impl MeasuredTable {
         Ok(Self { words, invalid_cell_count, warnings })
     }
 
-    /// The words the shader reads, `MEASURED_GRID_OFFSET` + 2 per cell.
+    /// Words for the shader: `MEASURED_GRID_OFFSET`, then 2 per cell.
     pub fn words(&self) -> &[u32] {
         &self.words
     }
@@ -178,7 +177,7 @@ impl MeasuredTable {
     }
 }
 
-/// Makes the bins at the poles θ_h = 0 and θ_d = 0 constant over φ_d, the mean of the valid ones.
+/// Replaces the bins at the poles θ_h = 0 and θ_d = 0 by the mean of the valid ones over φ_d.
 fn average_poles(cells: &mut [Vec3]) {
     let rows = (0..THETA_DIFFERENCE)
         .map(|theta_difference| cell_index(0, theta_difference, 0))
@@ -192,9 +191,9 @@ fn average_poles(cells: &mut [Vec3]) {
     }
 }
 
-/// Gives every invalid cell the value of a valid one: the nearest in θ_d, toward smaller angles
-/// first since the horizon lies at larger ones; where a column has none, the nearest in φ_d; where
-/// a slice has none, the nearest in θ_h.
+/// Gives every invalid cell the value of a valid one: the nearest in θ_d, smaller angles first
+/// since the horizon lies at larger ones; in a column without any, the nearest in φ_d; in a slice
+/// without any, the nearest in θ_h.
 fn fill_invalid(cells: &mut [Vec3]) {
     let slice = THETA_DIFFERENCE * PHI_DIFFERENCE;
     cells.par_chunks_mut(slice).for_each(|cells| {
@@ -210,7 +209,7 @@ fn fill_invalid(cells: &mut [Vec3]) {
     }
 }
 
-/// Fills the invalid cells of one line of the grid from the valid one before, else the one after.
+/// Fills the invalid cells of a line of the grid from the previous valid one, else from the next.
 fn fill_line(cells: &mut [Vec3], first: usize, stride: usize, count: usize) {
     let index = |position: usize| first + position * stride;
     let Some(start) = (0..count).find(|&position| is_valid(cells[index(position)])) else {
@@ -226,7 +225,7 @@ fn fill_line(cells: &mut [Vec3], first: usize, stride: usize, count: usize) {
     }
 }
 
-/// Writes the cells as halves into the grid's words.
+/// Packs the cells as halves into the grid's words.
 fn pack(cells: &[Vec3], words: &mut [u32]) {
     let grid = &mut words[MEASURED_GRID_OFFSET as usize..];
     grid.par_chunks_exact_mut(2).zip(cells).for_each(|(words, cell)| {
@@ -236,8 +235,8 @@ fn pack(cells: &[Vec3], words: &mut [u32]) {
     });
 }
 
-/// Applies the factors of both directions to every cell; those below the surface, which are read
-/// only as neighbours, take the factor of the horizon.
+/// Scales every cell by the factors of both directions. Cells below the surface, read only as
+/// neighbours, take the factor of the horizon.
 fn scale(cells: &mut [Vec3], limit: &EnergyLimit) {
     cells.par_chunks_mut(PHI_DIFFERENCE).enumerate().for_each(|(row, cells)| {
         for (phi, cell) in cells.iter_mut().enumerate() {

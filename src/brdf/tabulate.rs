@@ -1,5 +1,5 @@
-//! What a measured material's shader needs beside the grid: the sampling table, the directional
-//! albedo, and the limit that keeps the grid from reflecting more light than it receives.
+//! Tables of a measured material besides the grid: the sampling table, the directional albedo, and
+//! the limit that keeps the grid from reflecting more light than it receives.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -30,20 +30,20 @@ struct QuadraturePoint {
 }
 
 impl SamplingRow {
-    /// Shares of the cosine lobe among which the one of least variance is taken. None is 0, since
-    /// the tabulated density may vanish where the BRDF does not.
+    /// Candidate shares of the cosine lobe; the one of least variance is used. None is 0, since the
+    /// tabulated density may vanish where the BRDF does not.
     const COSINE_SHARES: [f64; 7] = [0.05, 0.1, 0.15, 0.25, 0.4, 0.6, 0.8];
     /// Points per cell and dimension: outgoing elevation, θ_h, φ_h.
     const POINTS: u32 = 3;
 
-    /// Tabulates BRDF × cosine of one elevation bin over half vectors, by the grid in `words`.
+    /// Tabulates BRDF × cosine of an elevation bin over half vectors, from the grid in `words`.
     pub fn new(words: &[u32], elevation: u32) -> Self {
         let cells: Vec<Vec<QuadraturePoint>> = (0..MEASURED_SAMPLING_CELLS)
             .map(|cell| Self::quadrature(words, elevation, cell))
             .collect();
         let solid_angle = |cell: u32| {
             let (lower, upper) = Self::edges(cell);
-            // Both signs of φ_h.
+            // Count both signs of φ_h.
             2.0 * (upper - lower) * std::f64::consts::PI / f64::from(MEASURED_AZIMUTH_BINS)
         };
         let mut masses: Vec<f64> = cells
@@ -56,7 +56,7 @@ impl SamplingRow {
             .collect();
         let mut total: f64 = masses.iter().sum();
         if total <= 0.0 {
-            // A black material: any density serves.
+            // The material is black: any density serves.
             masses = (0..MEASURED_SAMPLING_CELLS).map(solid_angle).collect();
             total = masses.iter().sum();
         }
@@ -68,11 +68,11 @@ impl SamplingRow {
                 (sum / total) as f32
             })
             .collect();
-        // Rounding must leave no probability behind the last cell that has any.
+        // Leave no probability to rounding behind the last cell that has any.
         if let Some(last) = masses.iter().rposition(|mass| *mass > 0.0) {
             cumulative[last..].fill(1.0);
         }
-        // The density is that of the rounded probabilities: exactly what is sampled.
+        // Derive the density from the rounded probabilities, to match the samples exactly.
         let mut before = 0.0;
         let density: Vec<f32> = cumulative
             .iter()
@@ -155,13 +155,13 @@ impl SamplingRow {
     }
 }
 
-/// ∫ BRDF·cosθ_i dω_i by 1024 samples of the material's own density at the points of an additive
-/// lattice of irrational steps; within about 1%, for images only.
+/// ∫ BRDF·cosθ_i dω_i from 1024 samples of the material's own density, at the points of an additive
+/// lattice of irrational steps. Accurate to about 1%, for images only.
 pub fn directional_albedo(words: &[u32], cosine: f32) -> Vec3 {
     const SAMPLES: u32 = 1024;
     let cosine = cosine.max(0.5 / BRDF_COSINE_INTERVALS as f32 / 8.0);
     let outgoing = vec3((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine);
-    // Steps of the three-dimensional golden ratio: powers of the root of x⁴ = x + 1, inverted.
+    // Step by the three-dimensional golden ratio: powers of the inverted root of x⁴ = x + 1.
     let step = [0.819_172_513_396_164_4_f64, 0.671_043_606_703_789_2, 0.549_700_477_901_970_5];
     let mut sum = Vec3::ZERO;
     for index in 0..SAMPLES {
@@ -180,26 +180,26 @@ pub fn directional_albedo(words: &[u32], cosine: f32) -> Vec3 {
     (sum / SAMPLES as f32).clamp(Vec3::ZERO, Vec3::ONE)
 }
 
-/// Bins of the polar angle of a direction when energy is balanced.
+/// Bins of the polar angle for balancing energy.
 const POLAR_BINS: usize = 90;
-/// Albedo that limited materials keep below: the rest of 1 is the error of the quadrature.
+/// Bound on the albedo of limited materials; the rest to 1 covers the error of the quadrature.
 const LARGEST_ALBEDO: f32 = 0.97;
 /// Points over the azimuth between two directions, 0…π.
 const AZIMUTH_POINTS: usize = 90;
 
-/// Factors by polar angle of a direction which, applied for both directions, keep a BRDF from
-/// reflecting more light than it receives.
+/// Factors by polar angle, applied for both directions, that keep a BRDF from reflecting more light
+/// than it receives.
 pub struct EnergyLimit {
-    /// Largest directional albedo of any channel before.
+    /// Largest directional albedo of any channel before scaling.
     pub largest_albedo: f32,
-    /// Factor at the middle of each bin of the polar angle.
+    /// Factor at the centre of each polar bin.
     factors: Vec<f32>,
 }
 
 impl EnergyLimit {
-    /// Measures the albedo of the grid in `words` at every polar angle; where one exceeds 1, finds
-    /// s(θ) ≤ 1 such that s(θ_o)·∫ f·s(θ_i)·cosθ_i dω_i stays below 1 everywhere. The product form keeps the
-    /// BRDF reciprocal. `None` where nothing exceeds 1.
+    /// Measures the albedo of the grid in `words` at every polar angle. If one exceeds 1, finds
+    /// s(θ) ≤ 1 such that s(θ_o)·∫ f·s(θ_i)·cosθ_i dω_i stays below 1 everywhere; the product form
+    /// keeps the BRDF reciprocal. `None` if none exceeds 1.
     pub fn new(words: &[u32]) -> Option<Self> {
         let theta = |bin: usize| (bin as f32 + 0.5) / POLAR_BINS as f32 * FRAC_PI_2;
         // ∫ f dφ · cosθ_i sinθ_i dθ_i by bins of outgoing and incident polar angle.
@@ -212,7 +212,7 @@ impl EnergyLimit {
                     let (sine, cosine) = theta(incident_bin).sin_cos();
                     let sum: Vec3 = (0..AZIMUTH_POINTS)
                         .map(|point| {
-                            // Denser around the mirror direction, φ = π.
+                            // Sample more densely around the mirror direction, φ = π.
                             let x = (point as f32 + 0.5) / AZIMUTH_POINTS as f32;
                             let phi = PI * (1.0 - x * x);
                             let incident = vec3(sine * phi.cos(), sine * phi.sin(), cosine);
@@ -238,7 +238,7 @@ impl EnergyLimit {
         if largest_albedo <= 1.0 {
             return None;
         }
-        // The square root damps the step, as both directions' factors move at once.
+        // The square root damps the step, since the factors of both directions move at once.
         for _ in 0..200 {
             let steps: Vec<f32> = (0..POLAR_BINS)
                 .map(|bin| (albedo(&factors, bin) / LARGEST_ALBEDO).max(1.0).sqrt().recip())
@@ -251,7 +251,7 @@ impl EnergyLimit {
         Some(Self { largest_albedo, factors })
     }
 
-    /// s(θ) of a direction above the surface, linear between the bins' middles.
+    /// s(θ) of a direction above the surface, linear between bin centres.
     pub fn factor(&self, direction_local: Vec3) -> f32 {
         let theta = direction_local.truncate().length().atan2(direction_local.z);
         let last = POLAR_BINS - 1;

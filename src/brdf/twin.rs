@@ -1,6 +1,6 @@
-//! Twin of `glsl/include/brdf.glsl`: same names, same order, same f32 arithmetic, so that it reads
-//! line by line against the shader. `brdf_table` is the word buffer of
-//! [`MaterialTables`](super::MaterialTables), which the shader has as a binding.
+//! Twin of `glsl/include/brdf.glsl`: same names, same order, same f32 arithmetic, to be read line
+//! by line against the shader. `brdf_table` is the word buffer of
+//! [`MaterialTables`](super::MaterialTables), a binding in the shader.
 
 use std::f32::consts::PI;
 
@@ -14,7 +14,7 @@ fn table_value(brdf_table: &[u32], index: u32) -> f32 {
     f32::from_bits(brdf_table[index as usize])
 }
 
-/// Linear interpolation between equally spaced nodes over the cosine 0…1, `stride` words apart.
+/// Interpolates linearly between equally spaced nodes over the cosine 0…1, `stride` words apart.
 pub fn cosine_table(brdf_table: &[u32], offset: u32, stride: u32, cosine: f32) -> f32 {
     let position = cosine.clamp(0.0, 1.0) * BRDF_COSINE_INTERVALS as f32;
     let node = (position as u32).min(BRDF_COSINE_INTERVALS - 1);
@@ -31,7 +31,7 @@ fn mix(a: f32, b: f32, fraction: f32) -> f32 {
     a * (1.0 - fraction) + b * fraction
 }
 
-/// Direction with density cosθ/π.
+/// Samples a direction with density cosθ/π.
 pub fn sample_cosine_hemisphere(u: Vec2) -> Vec3 {
     let radius = u.x.sqrt();
     let azimuth = 2.0 * PI * u.y;
@@ -69,15 +69,15 @@ fn square_root(v: Vec3) -> Vec3 {
     vec3(v.x.sqrt(), v.y.sqrt(), v.z.sqrt())
 }
 
-/// Reflectance of a conductor from that at normal incidence. Schlick 1994.
+/// Reflectance of a conductor from that at normal incidence. \[Schlick 1994\].
 pub fn fresnel_schlick(cosine: f32, reflectance: Vec3) -> Vec3 {
     let complement = 1.0 - cosine;
     let square = complement * complement;
     reflectance + (Vec3::ONE - reflectance) * (square * square * complement)
 }
 
-/// Density of GGX normals, per steradian, for a half vector of any length. Walter et al. 2007,
-/// eq. 33, written without the cancellation in 1 − cos²θ, which matters for α below 0.01.
+/// Density of GGX normals, per steradian, for a half vector of any length. \[Walter et al. 2007\]
+/// Eq. 33, without the cancellation in 1 − cos²θ, which matters for α below 0.01.
 pub fn ggx_normal_density(half_vector: Vec3, alpha: f32) -> f32 {
     let tangential = half_vector.truncate().dot(half_vector.truncate());
     let normal = half_vector.z * half_vector.z;
@@ -85,12 +85,12 @@ pub fn ggx_normal_density(half_vector: Vec3, alpha: f32) -> f32 {
     alpha * alpha * ratio * ratio / PI
 }
 
-/// Length of the direction after the surface is stretched to α = 1: √(cos²θ + α² sin²θ).
+/// Length of the direction after stretching the surface to α = 1: √(cos²θ + α² sin²θ).
 fn ggx_stretched_length(direction: Vec3, alpha: f32) -> f32 {
     (alpha * direction.truncate()).extend(direction.z).length()
 }
 
-/// Lower end of the spherical cap of bounded sampling, as a factor: Eto & Tokuyoshi 2023, eq. 5.
+/// Lower end of the spherical cap of bounded sampling, as a factor. \[Eto & Tokuyoshi 2023\] Eq. 5.
 fn ggx_cap_factor(outgoing_local: Vec3, alpha: f32) -> f32 {
     let bounded_alpha = alpha.min(1.0);
     let alpha_squared = bounded_alpha * bounded_alpha;
@@ -100,8 +100,8 @@ fn ggx_cap_factor(outgoing_local: Vec3, alpha: f32) -> f32 {
         / (s_squared + alpha_squared * outgoing_local.z * outgoing_local.z)
 }
 
-/// Microfacet reflection of unit reflectance, per steradian: D·G₂/(4 cosθ_o cosθ_i), with the
-/// height-correlated masking of Heitz 2014, eq. 99.
+/// Microfacet reflection at unit reflectance, per steradian: D·G₂/(4 cosθ_o cosθ_i) with the
+/// height-correlated masking of \[Heitz 2014\] Eq. 99.
 pub fn ggx_reflection(
     half_vector: Vec3,
     outgoing_local: Vec3,
@@ -113,20 +113,20 @@ pub fn ggx_reflection(
     0.5 * ggx_normal_density(half_vector, alpha) / masking
 }
 
-/// Density of [`ggx_sample`]: Eto & Tokuyoshi 2023, eq. 8, with the Jacobian of the reflection.
+/// Density of [`ggx_sample`]. \[Eto & Tokuyoshi 2023\] Eq. 8 with the Jacobian of the reflection.
 pub fn ggx_pdf(half_vector: Vec3, outgoing_local: Vec3, alpha: f32) -> f32 {
     let cap = ggx_cap_factor(outgoing_local, alpha) * outgoing_local.z
         + ggx_stretched_length(outgoing_local, alpha);
     0.5 * ggx_normal_density(half_vector, alpha) / cap
 }
 
-/// Incident direction by the visible normals of GGX, on the spherical cap that leaves out most
-/// reflections below the surface: Dupuy & Benyoub 2023, Eto & Tokuyoshi 2023. What still falls
-/// below has z ≤ 0: no sample.
+/// Samples an incident direction by the visible normals of GGX, on the spherical cap that omits
+/// most reflections below the surface. Those that remain have z ≤ 0: no sample. \[Dupuy & Benyoub
+/// 2023\], \[Eto & Tokuyoshi 2023\].
 pub fn ggx_sample(outgoing_local: Vec3, alpha: f32, u: Vec2) -> Vec3 {
     let stretched = (alpha * outgoing_local.truncate()).extend(outgoing_local.z).normalize();
     let cap = ggx_cap_factor(outgoing_local, alpha) * stretched.z;
-    // 1 − z and not z: the root below then holds near the pole.
+    // 1 − z rather than z keeps the root below accurate near the pole.
     let below_pole = u.x * (1.0 + cap);
     let sine = (below_pole * (2.0 - below_pole)).max(0.0).sqrt();
     let azimuth = 2.0 * PI * u.y;
@@ -135,8 +135,8 @@ pub fn ggx_sample(outgoing_local: Vec3, alpha: f32, u: Vec2) -> Vec3 {
     2.0 * outgoing_local.dot(normal) * normal - outgoing_local
 }
 
-/// (θ_h, θ_d, φ_d) of two directions, φ_d in 0…π: the half/difference angles of Rusinkiewicz 1998
-/// with the two directions interchangeable, to the last bit.
+/// (θ_h, θ_d, φ_d) of two directions, φ_d in 0…π: the half/difference angles of \[Rusinkiewicz
+/// 1998\], symmetric in the two directions to the last bit.
 pub fn half_difference_angles(outgoing_local: Vec3, incident_local: Vec3) -> Vec3 {
     let half_vector = outgoing_local + incident_local;
     let difference = incident_local - outgoing_local;
@@ -149,7 +149,7 @@ pub fn half_difference_angles(outgoing_local: Vec3, incident_local: Vec3) -> Vec
         y = -y;
         x = -x;
     }
-    // At the poles the angle means nothing, and the grid is constant over it.
+    // The angle is undefined at the poles, and the grid is constant over it.
     let phi_difference = if x == 0.0 && y == 0.0 { 0.0 } else { y.atan2(x) };
     vec3(
         tangential.sqrt().atan2(half_vector.z),
@@ -208,7 +208,7 @@ fn measured_elevation_bin(outgoing_local: Vec3) -> u32 {
     ((theta * (2.0 / PI) * MEASURED_ELEVATION_BINS as f32) as u32).min(MEASURED_ELEVATION_BINS - 1)
 }
 
-/// Unit azimuthal direction from which the sampling table counts φ_h.
+/// Unit azimuthal direction that is φ_h = 0 in the sampling table.
 fn measured_azimuth_axis(outgoing_local: Vec3) -> Vec2 {
     let sine = outgoing_local.truncate().length();
     if sine > 0.0 { outgoing_local.truncate() / sine } else { vec2(1.0, 0.0) }
@@ -246,7 +246,8 @@ pub fn measured_pdf(
         + (1.0 - cosine_share) * density / (2.0 * half_vector.length())
 }
 
-/// Incident direction from the cosine lobe or the tabulated half vectors; z ≤ 0 is no sample.
+/// Samples an incident direction from the cosine lobe or the tabulated half vectors; z ≤ 0 means no
+/// sample.
 pub fn measured_sample(
     brdf_table: &[u32],
     table_offset: u32,
@@ -259,7 +260,7 @@ pub fn measured_sample(
     if u.x < cosine_share {
         return sample_cosine_hemisphere(vec2(u.y, u.z));
     }
-    // The first cell whose cumulative probability exceeds u.y.
+    // Find the first cell whose cumulative probability exceeds u.y.
     let cumulative =
         table_offset + MEASURED_CUMULATIVE_OFFSET + elevation * MEASURED_SAMPLING_CELLS;
     let mut cell = 0;
@@ -273,7 +274,7 @@ pub fn measured_sample(
     let lower = if cell > 0 { table_value(brdf_table, cumulative + cell - 1) } else { 0.0 };
     let fraction = (u.y - lower) / (table_value(brdf_table, cumulative + cell) - lower);
     let polar = cell / MEASURED_AZIMUTH_BINS;
-    // 1 − cosθ_h is uniform within the cell; the cell's edges as 2 sin²(θ/2).
+    // 1 − cosθ_h is uniform within the cell; compute its edges as 2 sin²(θ/2).
     let edge_0 = polar as f32 / MEASURED_POLAR_BINS as f32;
     let edge_1 = (polar + 1) as f32 / MEASURED_POLAR_BINS as f32;
     let sine_0 = (0.25 * PI * edge_0 * edge_0).sin();
@@ -282,7 +283,7 @@ pub fn measured_sample(
     let sine = (below_pole * (2.0 - below_pole)).max(0.0).sqrt();
     let mut phi =
         PI * ((cell % MEASURED_AZIMUTH_BINS) as f32 + fraction) / MEASURED_AZIMUTH_BINS as f32;
-    // The table holds |φ_h|; either sign is as likely.
+    // The table holds |φ_h|; both signs are equally likely.
     if u.x - cosine_share < 0.5 * (1.0 - cosine_share) {
         phi = -phi;
     }
@@ -340,8 +341,8 @@ pub fn brdf_evaluate_and_pdf(
     }
 }
 
-/// Incident direction from three numbers in [0, 1); z ≤ 0 means no sample, which counts as one
-/// with contribution 0.
+/// Samples an incident direction with three numbers in [0, 1); z ≤ 0 means no sample, which counts
+/// as one with contribution 0.
 pub fn brdf_sample(brdf_table: &[u32], material: &Material, outgoing_local: Vec3, u: Vec3) -> Vec3 {
     if outgoing_local.z <= 0.0 {
         return vec3(0.0, 0.0, -1.0);
@@ -364,8 +365,8 @@ pub fn brdf_sample(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
     sample_cosine_hemisphere(vec2(u.y, u.z))
 }
 
-/// Share of light from a uniform white hemisphere that is reflected toward the outgoing direction,
-/// 0…1, for the albedo image.
+/// Share of light from a uniform white hemisphere reflected toward the outgoing direction, 0…1, for
+/// the albedo image.
 pub fn brdf_albedo(brdf_table: &[u32], material: &Material, outgoing_local: Vec3) -> Vec3 {
     if material.kind == MATERIAL_DIFFUSE {
         return Vec3::from(material.reflectance);

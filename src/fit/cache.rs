@@ -105,8 +105,7 @@ pub struct Cache {
 }
 
 impl Cache {
-    /// The user's cache, `fenestra/fits` in `$XDG_CACHE_HOME` or `~/.cache`; none if neither is
-    /// set.
+    /// The user's cache, `fenestra/fits` in `$XDG_CACHE_HOME` or `~/.cache`; none if neither is set.
     pub fn user() -> Option<Self> {
         crate::files::cache_folder("fits").map(Self::at)
     }

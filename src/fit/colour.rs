@@ -4,7 +4,7 @@
 //! channel loses energy, and a sun spoils nothing. Under the squared error, amplitudes a ≥ 0
 //! minimize `∫(L − Σ a_l G_l)² dω`: closest to the map where it is bright, at the cost of the
 //! surroundings of a sun. The Gram matrix `∫G_iG_j` has a closed form (\[Wu & Shih 2009\] Eq. 7),
-//! which preserves lobes narrower than a patch; only `∫L·G_i` is summed over patches.
+//! so lobes narrower than a patch still count; only `∫L·G_i` is summed over patches.
 
 use glam::DVec3;
 use rayon::prelude::*;

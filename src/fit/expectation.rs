@@ -1,5 +1,4 @@
-//! Weighted expectation maximization for mixtures of von Mises-Fisher lobes. \[Banerjee et al.
-//! 2005\].
+//! Weighted expectation maximization for mixtures of von Mises-Fisher lobes. \[Banerjee et al. 2005\].
 //!
 //! Takes target points and lobes, and improves the lobes. Each step lowers the Kullback-Leibler
 //! divergence from the target to the mixture. Sums run over fixed chunks in a fixed order, so the

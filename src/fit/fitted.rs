@@ -132,8 +132,7 @@ pub struct BrdfFit {
     pub is_cached: bool,
 }
 
-/// Figures over the views up to [`SUMMARY_ANGLE_DEG`](super::config::SUMMARY_ANGLE_DEG) from the
-/// normal.
+/// Figures over the views up to [`SUMMARY_ANGLE_DEG`](super::config::SUMMARY_ANGLE_DEG) from the normal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BrdfSummary {
     /// Means over the views.

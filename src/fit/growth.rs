@@ -84,8 +84,7 @@ fn k_means_plus_plus(points: &PointSet, count: usize, seed: u64) -> Vec<Componen
     (0..axes.len()).map(component).collect()
 }
 
-/// Eigenvalues of a covariance in the plane across `axis`: the larger, its eigenvector, the
-/// smaller.
+/// Eigenvalues of a covariance in the plane across `axis`: the larger, its eigenvector, the smaller.
 fn principal(covariance: DMat3, axis: DVec3) -> (f64, DVec3, f64) {
     let (tangent, bitangent) = axis.any_orthonormal_pair();
     let a = tangent.dot(covariance * tangent);

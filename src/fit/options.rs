@@ -12,8 +12,7 @@ pub enum Method {
     /// Kullback-Leibler divergence, by expectation maximization: suits a sampling density.
     #[default]
     Em,
-    /// Squared error, by projected L-BFGS from the result of `em`: the fits of \[Tsai et al.
-    /// 2008\].
+    /// Squared error, by projected L-BFGS from the result of `em`: the fits of \[Tsai et al. 2008\].
     L2,
 }
 

@@ -59,7 +59,7 @@ impl PointSet {
         Self::weighted(patches.iter().map(|patch| (patch, patch.energy)))
     }
 
-    /// Replaces the patches' energies, for example with those of a colour channel.
+    /// Takes patches with energies in place of their own, such as those of a colour channel.
     pub fn weighted<'a>(patches: impl Iterator<Item = (&'a Patch, f64)> + Clone) -> Self {
         let energy: f64 = patches.clone().map(|(_, energy)| energy).sum();
         let mut points = Self { energy, ..Self::default() };

@@ -17,7 +17,7 @@ pub struct Lobe {
     pub axis: Vec3,
     /// Bandwidth λ, not negative; 0 is a constant.
     pub bandwidth: f32,
-    /// Value at the axis, in the unit of the function that is represented.
+    /// Value at the axis, in the unit of the represented function.
     pub amplitude: f32,
 }
 
@@ -36,13 +36,13 @@ impl From<Lobe> for [f32; 5] {
     }
 }
 
-/// Kernel `exp(λ(ω·ξ − 1))`, in the form `exp(−½λ|ω − ξ|²)`: `λ·dot − λ` is off by 1e-2 at λ = 1e5.
+/// Kernel `exp(λ(ω·ξ − 1))`, computed as `exp(−½λ|ω − ξ|²)`: `λ·dot − λ` errs by 1e-2 at λ = 1e5.
 pub fn kernel_value(axis: Vec3, bandwidth: f32, direction: Vec3) -> f32 {
     let d = direction - axis;
     (-0.5 * bandwidth * d.dot(d)).exp()
 }
 
-/// Integral of the kernel over the sphere, `2π(1 − e^{−2λ})/λ`; the first terms of its series below 1e-3.
+/// Integral of the kernel over the sphere, `2π(1 − e^{−2λ})/λ`; below 1e-3, the start of its series.
 pub fn kernel_integral(bandwidth: f32) -> f32 {
     if bandwidth < 1e-3 {
         return 4.0 * PI * (1.0 - bandwidth);
@@ -53,8 +53,8 @@ pub fn kernel_integral(bandwidth: f32) -> f32 {
 /// Root mean square of `x = 1 − ω·ξ` under the kernel: σ of Eq. 9 and 10 of \[Wu & Shih 2009\] in
 /// closed form, √2/λ for λ ≳ 5. A direction is close to the lobe where `½|ω − ξ|² < τσ`.
 ///
-/// Deviation: the thesis calls x the cosine of the angle; its formula is that of 1 − cosine. Below
-/// λ = ½ the closed form cancels, and `∫₀²x²e^{−λx}dx` is summed as a series.
+/// Deviation: the thesis calls x the cosine of the angle, but its formula is that of 1 − cosine.
+/// Below λ = ½ the closed form cancels; a series for `∫₀²x²e^{−λx}dx` replaces it.
 pub fn kernel_deviation(bandwidth: f32) -> f32 {
     if bandwidth < 0.5 {
         // ∫₀²x²e^{−λx}dx = Σ_n (−λ)ⁿ·2ⁿ⁺³/(n!·(n + 3)), ∫₀²e^{−λx}dx = I(λ)/2π
@@ -73,12 +73,12 @@ pub fn kernel_deviation(bandwidth: f32) -> f32 {
     }
     let b = 1.0 / bandwidth;
     let e = (-2.0 * bandwidth).exp();
-    // Multiplied by λ throughout, so that nothing underflows at λ = 1e5.
+    // Multiply by λ throughout, so that nothing underflows at λ = 1e5.
     let second_moment = 2.0 * b * b - e * (4.0 + 4.0 * b + 2.0 * b * b);
     (second_moment / (1.0 - e)).sqrt()
 }
 
-/// Share of the kernel's integral on the side of a plane where `ω·n > 0`; `cosine` is `ξ·n`.
+/// Share of the kernel's integral above a plane, where `ω·n > 0`; `cosine` is `ξ·n`.
 /// \[Tokuyoshi\]'s fit by an error function; largest error 0.005, at λ = 8.
 pub fn kernel_hemisphere_part(bandwidth: f32, cosine: f32) -> f32 {
     let steepness = bandwidth

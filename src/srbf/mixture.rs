@@ -8,7 +8,7 @@ use super::{
     sample::{kernel_pdf, kernel_sample},
 };
 
-/// `Σ_l a_l·G(ω; ξ_l, λ_l)` with amplitudes that are not negative, so that it is a density up to scale.
+/// `Σ_l a_l·G(ω; ξ_l, λ_l)` with non-negative amplitudes, so that it is a density up to scale.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mixture {
     /// The lobes.
@@ -26,8 +26,8 @@ impl Mixture {
         self.lobes.iter().map(lobe_integral).sum()
     }
 
-    /// Density of [`Mixture::sample`] per steradian, `Σ_l P_l·G_l/I_l` with `P_l` the lobe's share of
-    /// the integral; 0 for a mixture without energy.
+    /// Density of [`Mixture::sample`] per steradian, `Σ_l P_l·G_l/I_l` with `P_l` the lobe's share
+    /// of the integral. A mixture without energy has density 0.
     pub fn pdf(&self, direction: Vec3) -> f32 {
         let integral = self.integral();
         if integral <= 0.0 {
@@ -39,8 +39,9 @@ impl Mixture {
         self.lobes.iter().map(weighted).sum()
     }
 
-    /// Direction distributed as the mixture, `u` uniform in the unit square: a lobe is chosen by its
-    /// integral with `u.x`, what is left of `u.x` serves again. None for a mixture without energy.
+    /// Samples a direction with the density of the mixture; `u` is uniform in the unit square.
+    /// Chooses a lobe by its integral with `u.x` and reuses the rest of `u.x`. None for a mixture
+    /// without energy.
     pub fn sample(&self, u: Vec2) -> Option<Vec3> {
         let integral = self.integral();
         let mut rest = u.x * integral;
@@ -56,7 +57,7 @@ impl Mixture {
         chosen.map(|(lobe, x)| kernel_sample(lobe.axis, lobe.bandwidth, Vec2::new(x, u.y)))
     }
 
-    /// All products of a lobe of `self` with a lobe of `other`. \[Wu & Shih 2009\] Eq. 8.
+    /// Products of every lobe of `self` with every lobe of `other`. \[Wu & Shih 2009\] Eq. 8.
     pub fn product(&self, other: &Self) -> Self {
         let lobes = self
             .lobes

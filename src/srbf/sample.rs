@@ -1,9 +1,9 @@
-//! Directions distributed as the kernel: sample, density, inverse.
+//! Sampling of the kernel: sample, density, inverse.
 //!
-//! `x = 1 − ω·ξ` has the density `λe^{−λx}/(1 − e^{−2λ})` on 0…2, the azimuth is uniform.
+//! `x = 1 − ω·ξ` has density `λe^{−λx}/(1 − e^{−2λ})` on 0…2; the azimuth is uniform.
 //!
-//! Deviation: \[Wu & Shih 2009\] draw the elevation by a Metropolis walk, whose samples are correlated
-//! and whose density is only reached in the limit; the distribution inverts in closed form.
+//! Deviation: \[Wu & Shih 2009\] draw the elevation by a Metropolis walk, whose samples are
+//! correlated and whose density holds only in the limit. The distribution inverts in closed form.
 
 use std::f32::consts::PI;
 
@@ -14,7 +14,7 @@ use super::{
     special::{expm1, log1p},
 };
 
-/// Two unit vectors that make a right-handed frame with `axis`. \[Duff et al. 2017\].
+/// Two unit vectors that complete `axis` to a right-handed frame. \[Duff et al. 2017\].
 pub fn lobe_frame(axis: Vec3) -> (Vec3, Vec3) {
     let sign = if axis.z < 0.0 { -1.0 } else { 1.0 };
     let a = -1.0 / (sign + axis.z);
@@ -25,12 +25,12 @@ pub fn lobe_frame(axis: Vec3) -> (Vec3, Vec3) {
     )
 }
 
-/// Distance `x = 1 − ω·ξ` in 0…2 for a uniform number `u` in 0…1.
+/// Maps a uniform number `u` in 0…1 to a distance `x = 1 − ω·ξ` in 0…2.
 pub fn kernel_sample_distance(bandwidth: f32, u: f32) -> f32 {
     let x = if bandwidth < 1e-4 {
         2.0 * u
     } else if bandwidth > 10.0 {
-        // 1 − e^{−2λ} is 1 in 32 bits; the guard keeps u = 1 out of the logarithm.
+        // 1 − e^{−2λ} is 1 in 32 bits; the guard keeps the logarithm finite at u = 1.
         -log1p(-u.min(0.999_999_94)) / bandwidth
     } else {
         -log1p(u * expm1(-2.0 * bandwidth)) / bandwidth
@@ -38,7 +38,7 @@ pub fn kernel_sample_distance(bandwidth: f32, u: f32) -> f32 {
     x.clamp(0.0, 2.0)
 }
 
-/// Direction distributed as the kernel; `u` uniform in the unit square.
+/// Samples a direction with the density of the kernel; `u` is uniform in the unit square.
 pub fn kernel_sample(axis: Vec3, bandwidth: f32, u: Vec2) -> Vec3 {
     let x = kernel_sample_distance(bandwidth, u.x);
     let sine = (x * (2.0 - x)).sqrt();
@@ -52,7 +52,7 @@ pub fn kernel_pdf(axis: Vec3, bandwidth: f32, direction: Vec3) -> f32 {
     kernel_value(axis, bandwidth, direction) / kernel_integral(bandwidth)
 }
 
-/// The point of the unit square that [`kernel_sample`] maps to `direction`.
+/// Point of the unit square that [`kernel_sample`] maps to `direction`.
 pub fn kernel_inverse(axis: Vec3, bandwidth: f32, direction: Vec3) -> Vec2 {
     let d = direction - axis;
     let x = 0.5 * d.dot(d);

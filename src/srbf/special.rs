@@ -1,9 +1,9 @@
-//! Elementary functions that hold near zero, in the arithmetic that the shaders share: GLSL has no
-//! `expm1`, `log1p` or `erf`, and its `log` loses relative accuracy near 1.
+//! Elementary functions accurate near zero, in arithmetic shared with the shaders: GLSL lacks
+//! `expm1`, `log1p` and `erf`, and its `log` loses relative accuracy near 1.
 
 use std::f32::consts::FRAC_2_SQRT_PI;
 
-/// `exp(x) − 1` with a small relative error for every x: Taylor's series below ½.
+/// `exp(x) − 1` with a small relative error for every x: Taylor series below ½.
 pub fn expm1(x: f32) -> f32 {
     if x.abs() > 0.5 {
         return x.exp() - 1.0;
@@ -19,7 +19,7 @@ pub fn expm1(x: f32) -> f32 {
     x * tail
 }
 
-/// `ln(1 + x)` for x > −1 with a small relative error: `2·atanh(x / (2 + x))` as a series below ½.
+/// `ln(1 + x)` for x > −1 with a small relative error: series of `2·atanh(x / (2 + x))` below ½.
 pub fn log1p(x: f32) -> f32 {
     if x.abs() > 0.5 {
         return (1.0 + x).ln();
@@ -36,7 +36,7 @@ pub fn log1p(x: f32) -> f32 {
     2.0 * s * (1.0 + s2 * tail)
 }
 
-/// Error function, relative error below 1e-6: Maclaurin's series for |x| ≤ 1, beyond it the rational
+/// Error function, relative error below 1e-6: Maclaurin series for |x| ≤ 1, beyond it the rational
 /// form 7.1.26 of \[Abramowitz & Stegun 1964\] (absolute error 1.5e-7).
 #[expect(clippy::excessive_precision, reason = "the coefficients stand as in the source")]
 pub fn erf(x: f32) -> f32 {
