@@ -149,13 +149,13 @@ fn pooled_variance(samples: &[Samples<'_>], total: f64, pixel: usize) -> f64 {
 }
 
 /// Origin, width, height and film size of a part.
-type Window = ([i64; 2], u32, u32, [u32; 2]);
+type Placement = ([i64; 2], u32, u32, [u32; 2]);
 
-fn check_window(first_path: &Path, first: Window, path: &Path, part: Window) -> Result<()> {
+fn check_window(first_path: &Path, first: Placement, path: &Path, part: Placement) -> Result<()> {
     if first == part {
         return Ok(());
     }
-    let describe = |([x, y], width, height, [film_width, film_height]): Window| {
+    let describe = |([x, y], width, height, [film_width, film_height]): Placement| {
         format!("{width}x{height} pixels at {x},{y} of {film_width}x{film_height}")
     };
     Err(Error::format(

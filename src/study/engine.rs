@@ -6,12 +6,14 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use super::{
     contender::Contender,
+    finished::FinishedRuns,
     folder::Folder,
-    job::{Job, exposure, image_of},
-    overhead,
+    job::{RunJob, exposure, image_of},
+    overhead::OverheadJob,
     plan::{Plan, ReferencePlan},
-    record::{Round, Rule, Run, SceneRecord},
+    record::{Round, Run, SceneRecord},
     reference::{self, Reference},
+    rule::Rule,
     watch::{Observer, Watch},
 };
 use crate::{
@@ -48,9 +50,10 @@ pub fn run(
     observer: &mut dyn Observer,
     redo: bool,
 ) -> Result<(Results, Option<Error>)> {
-    let mut study = Study { plan, folder, device, watch: Watch::new(observer) };
+    let finished = FinishedRuns { plan, folder, device };
+    let mut study = Study { plan, folder, device, finished, watch: Watch::new(observer) };
     let scenes = study.load_scenes()?;
-    study.check_finished_runs(&scenes, redo)?;
+    study.finished.check(&scenes, redo)?;
     let mut results = Results::default();
     for scene in &scenes {
         study.expect(scene);
@@ -64,10 +67,11 @@ pub fn run(
 }
 
 /// A study under way.
-pub(super) struct Study<'a> {
-    pub(super) plan: &'a Plan,
-    pub(super) folder: &'a Folder,
-    pub(super) device: &'a Arc<Device>,
+struct Study<'a> {
+    plan: &'a Plan,
+    folder: &'a Folder,
+    device: &'a Arc<Device>,
+    finished: FinishedRuns<'a>,
     watch: Watch<'a>,
 }
 
@@ -104,7 +108,7 @@ impl Study<'_> {
         {
             self.watch.expect(2.0 * pixels * f64::from(*half_spp), 0.0);
         }
-        for (rule, ..) in tasks(self.plan) {
+        for (rule, ..) in self.plan.tasks() {
             expect_run(&mut self.watch, rule, pixels, 1.0);
         }
         if let Some(overhead) = &self.plan.overhead {
@@ -133,10 +137,10 @@ impl Study<'_> {
         }
         if let Some(overhead) = &self.plan.overhead {
             let finished: Vec<Option<Round>> = (1..=overhead.repetitions)
-                .map(|repetition| self.finished_round(scene, repetition))
+                .map(|repetition| self.finished.round(scene, repetition))
                 .collect::<Result<_>>()?;
-            let conditions = self.conditions(scene, None)?;
-            let job = overhead::Job { plan: overhead, scene, conditions, folder: self.folder };
+            let conditions = self.finished.conditions(scene, None)?;
+            let job = OverheadJob { plan: overhead, scene, conditions, folder: self.folder };
             let all = std::iter::once(&overhead.baseline).chain(&overhead.contenders);
             let settings: Vec<Settings> = all.map(|contender| self.settings(contender)).collect();
             let make = &mut |index: usize| buffers.renderer(settings[index].clone());
@@ -214,9 +218,9 @@ impl Study<'_> {
     ) -> Result<()> {
         let exposure = exposure(&reference.mean());
         let mut renderers: BTreeMap<String, Renderer> = BTreeMap::new();
-        for task in tasks(self.plan) {
+        for task in self.plan.tasks() {
             let (rule, seed, contender) = task;
-            if let Some(run) = self.finished_run(scene, task)? {
+            if let Some(run) = self.finished.run(scene, task)? {
                 expect_run(&mut self.watch, rule, pixels(scene), -1.0);
                 results.runs.push(run);
                 continue;
@@ -227,7 +231,7 @@ impl Study<'_> {
                 renderers.insert(contender.label.clone(), renderer);
             }
             let Some(renderer) = renderers.get_mut(&contender.label) else { continue };
-            let job = Job {
+            let job = RunJob {
                 scene,
                 reference,
                 exposure,
@@ -235,12 +239,12 @@ impl Study<'_> {
                 rule,
                 seed,
                 levels: &self.plan.spp,
-                conditions: self.conditions(scene, Some(contender))?,
+                conditions: self.finished.conditions(scene, Some(contender))?,
                 metadata: self.metadata(scene, contender),
                 folder: self.folder,
             };
             let run = job.execute(renderer, &mut self.watch)?;
-            self.folder.write_json(&self.run_record(scene, task), &run)?;
+            self.folder.write_json(&self.finished.run_record(scene, task), &run)?;
             if let Some(last) = run.last() {
                 self.watch.note(&format!(
                     "{}: {}, {}, seed {seed}: {} spp in {:.2} s, RMSE {:.4e}",
@@ -256,24 +260,6 @@ impl Study<'_> {
         }
         Ok(())
     }
-}
-
-/// Every run of a scene in the order of the work, by rule (the largest number of samples, and the
-/// time), seed and sampler; the order of the samplers turns by one from seed to seed, so that none is
-/// always the first.
-pub(super) fn tasks(plan: &Plan) -> Vec<(Rule, u32, &Contender)> {
-    let samples = plan.spp.last().copied().map(Rule::Spp);
-    let contenders = &plan.contenders;
-    let mut tasks = Vec::new();
-    for rule in samples.into_iter().chain(plan.time.map(Rule::time)) {
-        for seed in 1..=plan.seeds {
-            for index in 0..contenders.len() {
-                let turned = (index + seed as usize - 1) % contenders.len();
-                tasks.push((rule, seed, &contenders[turned]));
-            }
-        }
-    }
-    tasks
 }
 
 /// Pixels of a scene's film.

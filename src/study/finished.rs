@@ -1,21 +1,31 @@
 //! Finished runs that an earlier study of the same folder left: which of them a plan takes up, and which
 //! were made under other conditions.
 
-use std::{collections::BTreeMap, fs, path::PathBuf};
+use std::{collections::BTreeMap, fs, path::PathBuf, sync::Arc};
 
 use super::{
     contender::Contender,
-    engine::{Study, tasks},
+    folder::Folder,
     overhead,
-    record::{Conditions, Round, Rule, Run, run_stem},
+    plan::Plan,
+    record::{Conditions, Round, Run, run_stem},
     reference,
+    rule::Rule,
 };
 use crate::{
     error::{Error, Result},
+    gpu::Device,
     scene::Scene,
 };
 
-impl Study<'_> {
+/// The runs of `plan` that `folder` holds already.
+pub(super) struct FinishedRuns<'a> {
+    pub(super) plan: &'a Plan,
+    pub(super) folder: &'a Folder,
+    pub(super) device: &'a Arc<Device>,
+}
+
+impl FinishedRuns<'_> {
     /// Conditions of the runs of one contender; `None` for overhead rounds, which have no reference
     /// and several contenders.
     pub(super) fn conditions(
@@ -55,16 +65,12 @@ impl Study<'_> {
     }
 
     /// Where the record of an overhead round lies.
-    pub(super) fn round_record(&self, scene: &Scene, repetition: u32) -> PathBuf {
+    fn round_record(&self, scene: &Scene, repetition: u32) -> PathBuf {
         self.folder.record(&scene.name, &format!("overhead-{repetition}"))
     }
 
     /// The record of a run that is finished with everything this plan asks of it.
-    pub(super) fn finished_run(
-        &self,
-        scene: &Scene,
-        task: (Rule, u32, &Contender),
-    ) -> Result<Option<Run>> {
+    pub(super) fn run(&self, scene: &Scene, task: (Rule, u32, &Contender)) -> Result<Option<Run>> {
         let path = self.run_record(scene, task);
         Ok(self.folder.read_json::<Run>(&path)?.filter(|run| {
             let has_image = |level: &Rule| {
@@ -76,28 +82,28 @@ impl Study<'_> {
     }
 
     /// The record of a finished overhead round.
-    pub(super) fn finished_round(&self, scene: &Scene, repetition: u32) -> Result<Option<Round>> {
+    pub(super) fn round(&self, scene: &Scene, repetition: u32) -> Result<Option<Round>> {
         let round = self.folder.read_json::<Round>(&self.round_record(scene, repetition))?;
         Ok(round.filter(|round| Some(round.spp) == self.plan.overhead.as_ref().map(|o| o.spp)))
     }
 
     /// Refuses finished runs that were made under other conditions, or removes them.
-    pub(super) fn check_finished_runs(&self, scenes: &[Scene], redo: bool) -> Result<()> {
+    pub(super) fn check(&self, scenes: &[Scene], redo: bool) -> Result<()> {
         let mut stale: Vec<(PathBuf, String)> = Vec::new();
         let mut compare = |path: PathBuf, found: &Conditions, asked: &Conditions| {
             let difference = found.differences(asked).into_iter().next();
             stale.extend(difference.map(|difference| (path, difference)));
         };
         for scene in scenes {
-            for task in tasks(self.plan) {
-                if let Some(run) = self.finished_run(scene, task)? {
+            for task in self.plan.tasks() {
+                if let Some(run) = self.run(scene, task)? {
                     let asked = self.conditions(scene, Some(task.2))?;
                     compare(self.run_record(scene, task), &run.conditions, &asked);
                 }
             }
             let rounds = self.plan.overhead.as_ref().map_or(0, |overhead| overhead.repetitions);
             for repetition in 1..=rounds {
-                if let Some(round) = self.finished_round(scene, repetition)? {
+                if let Some(round) = self.round(scene, repetition)? {
                     let asked = self.conditions(scene, None)?;
                     compare(self.round_record(scene, repetition), &round.conditions, &asked);
                 }

@@ -3,8 +3,9 @@
 use super::{
     contender::Contender,
     folder::Folder,
-    record::{Conditions, Figures, Measurement, Rule, Run, run_stem},
+    record::{Conditions, Figures, Measurement, Run, run_stem},
     reference::Reference,
+    rule::Rule,
     watch::{Pace, Watch},
 };
 use crate::{
@@ -18,7 +19,7 @@ use crate::{
 pub const SHOWN_SEED: u32 = 1;
 
 /// A run to do.
-pub(super) struct Job<'a> {
+pub(super) struct RunJob<'a> {
     pub(super) scene: &'a Scene,
     pub(super) reference: &'a Reference,
     /// Of previews, stops.
@@ -34,7 +35,7 @@ pub(super) struct Job<'a> {
     pub(super) folder: &'a Folder,
 }
 
-impl Job<'_> {
+impl RunJob<'_> {
     /// Renders and measures. The film is compared at powers of two of samples and at the levels;
     /// reading and comparing it does not count as time of the passes.
     pub(super) fn execute(self, renderer: &mut Renderer, watch: &mut Watch<'_>) -> Result<Run> {

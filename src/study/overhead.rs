@@ -18,14 +18,14 @@ use super::{
 use crate::{error::Result, renderer::Renderer, scene::Scene};
 
 /// The measurements of one scene to do.
-pub(super) struct Job<'a> {
+pub(super) struct OverheadJob<'a> {
     pub(super) plan: &'a OverheadPlan,
     pub(super) scene: &'a Scene,
     pub(super) conditions: Conditions,
     pub(super) folder: &'a Folder,
 }
 
-impl Job<'_> {
+impl OverheadJob<'_> {
     /// Measures the rounds that are not among `finished` and adds all to `rounds`; `make` makes the
     /// renderer of a sampler by its index, the baseline being 0.
     pub(super) fn execute(

@@ -8,7 +8,7 @@ use std::{path::PathBuf, time::Duration};
 
 use serde::Serialize;
 
-use super::contender::Contender;
+use super::{contender::Contender, rule::Rule};
 use crate::{
     error::{Error, Result},
     sampler::{Parameters, Sampler},
@@ -285,6 +285,24 @@ impl Plan {
     /// Whether errors are compared, for which a reference is needed.
     pub fn compares(&self) -> bool {
         !self.spp.is_empty() || self.time.is_some()
+    }
+
+    /// Every run of a scene in the order of the work, by rule (the largest number of samples, and the
+    /// time), seed and sampler; the order of the samplers turns by one from seed to seed, so that none is
+    /// always the first.
+    pub fn tasks(&self) -> Vec<(Rule, u32, &Contender)> {
+        let samples = self.spp.last().copied().map(Rule::Spp);
+        let contenders = &self.contenders;
+        let mut tasks = Vec::new();
+        for rule in samples.into_iter().chain(self.time.map(Rule::time)) {
+            for seed in 1..=self.seeds {
+                for index in 0..contenders.len() {
+                    let turned = (index + seed as usize - 1) % contenders.len();
+                    tasks.push((rule, seed, &contenders[turned]));
+                }
+            }
+        }
+        tasks
     }
 }
 

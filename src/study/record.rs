@@ -1,19 +1,22 @@
 //! What a study keeps of every run: the records of `runs/` and of `results.json`.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{contender::Contender, reference::Reference};
+use super::{
+    contender::Contender,
+    metrics::Metrics,
+    own_errors::{OwnErrors, is_judged},
+    reference::Reference,
+    rule::Rule,
+    statistics::mean_standard_error,
+};
 use crate::{
     error::Result,
     film::RgbImage,
     renderer::{Renderer, Totals},
-    study::metrics::Metrics,
 };
-
-/// A run is judged where its mean squared error is at least this many times the reference's own.
-pub const JUDGED_FROM: f64 = 4.0;
 
 /// What [`Renderer::host_ms`] calls the rebuilds of the guide.
 const GUIDE_REBUILDS: &str = "guide rebuilds";
@@ -77,36 +80,6 @@ fn join(parameters: &BTreeMap<String, String>) -> String {
     let pairs: Vec<String> =
         parameters.iter().map(|(name, value)| format!("{name}={value}")).collect();
     pairs.join(" ")
-}
-
-/// What ends a run.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Rule {
-    /// Samples per pixel.
-    Spp(u32),
-    /// Wall time of the passes, seconds.
-    Seconds(f64),
-}
-
-impl Rule {
-    /// Rule of a duration.
-    pub fn time(time: Duration) -> Self {
-        Self::Seconds(time.as_secs_f64())
-    }
-
-    /// "400 spp" or "30 s".
-    pub fn describe(self) -> String {
-        match self {
-            Self::Spp(spp) => format!("{spp} spp"),
-            Self::Seconds(seconds) => format!("{seconds} s"),
-        }
-    }
-
-    /// "400spp" or "30s", for file names.
-    pub fn file_stem(self) -> String {
-        self.describe().replace(' ', "")
-    }
 }
 
 /// A film after some samples, against the reference.
@@ -191,24 +164,6 @@ impl Measurement {
         };
         Ok((measurement, picture))
     }
-}
-
-/// Whether an error is well above the reference's own. Where that is unknown, every error that is
-/// positive is taken.
-pub fn is_judged(error: f64, own: Option<f64>) -> bool {
-    error > 0.0 && own.is_none_or(|own| error >= JUDGED_FROM * own)
-}
-
-/// Standard error of the mean over pixels and channels, from the standard errors of the pixels;
-/// channels are taken as fully correlated, pixels as independent.
-pub fn mean_standard_error(errors: impl Iterator<Item = [f64; 3]>) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0_f64);
-    for error in errors {
-        let mean = (error[0] + error[1] + error[2]) / 3.0;
-        sum += mean * mean;
-        count += 1.0;
-    }
-    sum.sqrt() / count.max(1.0)
 }
 
 /// One finished run.
@@ -363,7 +318,7 @@ pub struct SceneRecord {
     /// Triangles.
     pub triangles: u64,
     /// The reference, where errors were compared.
-    pub reference: Option<super::reference::OwnErrors>,
+    pub reference: Option<OwnErrors>,
 }
 
 /// The part of a file's name that says which run it belongs to.
@@ -374,19 +329,6 @@ pub fn run_stem(contender: &Contender, rule: Rule, seed: u32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn judged_is_what_stands_out_of_the_references_noise() {
-        assert!(is_judged(4.0, Some(1.0)) && !is_judged(3.9, Some(1.0)));
-        assert!(is_judged(1e-9, None) && !is_judged(0.0, None) && !is_judged(-1.0, None));
-        assert!(!is_judged(f64::NAN, Some(1.0)));
-    }
-
-    #[test]
-    fn the_means_error_shrinks_with_the_pixels() {
-        let four = mean_standard_error([[2.0, 2.0, 2.0]; 4].into_iter());
-        assert!((four - 1.0).abs() < 1e-12);
-    }
 
     #[test]
     fn the_share_of_rebuilds_is_of_the_wall_time() {
@@ -420,11 +362,5 @@ mod tests {
                 "parameters: default there, candidates=8 asked for"
             ]
         );
-    }
-
-    #[test]
-    fn rules_name_files() {
-        assert_eq!(Rule::Spp(400).file_stem(), "400spp");
-        assert_eq!(Rule::time(Duration::from_millis(500)).describe(), "0.5 s");
     }
 }

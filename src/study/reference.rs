@@ -2,7 +2,7 @@
 //!
 //! Errors are estimated by (x − r₁)(x − r₂), which is free of the reference's own noise on average.
 //! The reference's own error, that of the mean of the halves, is ¼·mean (r₁ − r₂)², and a sampler
-//! whose error is not well above it is not judged ([`super::record::is_judged`]).
+//! whose error is not well above it is not judged ([`is_judged`](super::own_errors::is_judged)).
 
 use std::{
     fs,
@@ -10,15 +10,15 @@ use std::{
     time::{Duration, Instant},
 };
 
-use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::{
     contender::Contender,
     folder::Folder,
     metrics::Metrics,
+    own_errors::OwnErrors,
     plan::ReferencePlan,
-    record::mean_standard_error,
+    statistics::mean_standard_error,
     watch::{Pace, Watch},
 };
 use crate::{
@@ -46,27 +46,6 @@ pub struct Reference {
     pub second: RgbImage,
     /// How sure it is.
     pub own: OwnErrors,
-}
-
-/// What is known of a reference's own error.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct OwnErrors {
-    /// Where it comes from.
-    pub description: String,
-    /// Samples per pixel of both halves, where known.
-    pub spp: Option<u64>,
-    /// Wall time of the passes of both halves, seconds, where known.
-    pub seconds: Option<f64>,
-    /// Mean squared error of the mean of the halves; absent for one image without variances.
-    pub mse: Option<f64>,
-    /// Mean relative squared error of the same.
-    pub relmse: Option<f64>,
-    /// The same without the worst 0.1% of the pixels.
-    pub relmse_trimmed: Option<f64>,
-    /// Mean over pixels and channels.
-    pub mean: f64,
-    /// Standard error of that mean, an upper estimate; absent where the files have no variances.
-    pub mean_standard_error: Option<f64>,
 }
 
 /// What tells references apart in the records of runs.

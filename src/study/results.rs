@@ -13,7 +13,8 @@ use super::{
     folder::Folder,
     overhead::{Overhead, overheads},
     plan::{Plan, PublishedErrors, PublishedOverhead},
-    record::{Measurement, Round, Rule, Run, SceneRecord},
+    record::{Measurement, Round, Run, SceneRecord},
+    rule::Rule,
     summary::{Curve, Summary, curves, rules, summaries},
 };
 use crate::{error::Result, files::write_atomically, gpu::Device};

@@ -94,6 +94,18 @@ pub fn slope(points: &[[f64; 2]]) -> Option<f64> {
     (square > 0.0).then(|| product / square)
 }
 
+/// Standard error of the mean over pixels and channels, from the standard errors of the pixels;
+/// channels are taken as fully correlated, pixels as independent.
+pub fn mean_standard_error(errors: impl Iterator<Item = [f64; 3]>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0_f64);
+    for error in errors {
+        let mean = (error[0] + error[1] + error[2]) / 3.0;
+        sum += mean * mean;
+        count += 1.0;
+    }
+    sum.sqrt() / count.max(1.0)
+}
+
 #[cfg(test)]
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests may panic")]
@@ -146,5 +158,11 @@ mod tests {
         assert!((slope(&points).unwrap() + 0.5).abs() < 1e-12);
         assert_eq!(slope(&[[1.0, 2.0]]), None);
         assert_eq!(slope(&[[1.0, 2.0], [1.0, 3.0]]), None);
+    }
+
+    #[test]
+    fn the_means_error_shrinks_with_the_pixels() {
+        let four = mean_standard_error([[2.0, 2.0, 2.0]; 4].into_iter());
+        assert!((four - 1.0).abs() < 1e-12);
     }
 }

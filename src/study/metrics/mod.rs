@@ -143,17 +143,17 @@ impl Metrics {
 }
 
 /// Reference with 64-bit channels, so that the mean of two halves is exact.
-struct Reference {
+struct MeanReference {
     width: usize,
     height: usize,
     pixels: Vec<[f64; 3]>,
 }
 
-fn mean_picture(first: &RgbImage, second: &RgbImage) -> Reference {
+fn mean_picture(first: &RgbImage, second: &RgbImage) -> MeanReference {
     let mean = |(a, b): (&[f32; 3], &[f32; 3])| {
         std::array::from_fn(|channel| 0.5 * (f64::from(a[channel]) + f64::from(b[channel])))
     };
-    Reference {
+    MeanReference {
         width: first.width as usize,
         height: first.height as usize,
         pixels: first.pixels.iter().zip(&second.pixels).map(mean).collect(),
@@ -191,7 +191,7 @@ pub fn relative_squared_errors(
 }
 
 /// A black reference makes the denominator 0: no error stays 0, any other becomes infinite.
-fn relative_errors(squared: &[f64], reference: &Reference) -> Vec<f64> {
+fn relative_errors(squared: &[f64], reference: &MeanReference) -> Vec<f64> {
     let grey: Vec<f64> =
         reference.pixels.iter().map(|pixel| pixel.iter().sum::<f64>() / 3.0).collect();
     let image_mean = grey.iter().sum::<f64>() / grey.len() as f64;

@@ -14,10 +14,12 @@ use std::{fmt::Write as _, io::Write as _};
 use super::{
     falsecolour::Scale,
     folder::Folder,
+    own_errors::JUDGED_FROM,
     plan::Plan,
-    record::{JUDGED_FROM, Rule, SceneRecord},
+    record::SceneRecord,
     results::Report,
-    summary::{Curve, Point, rules},
+    rule::Rule,
+    summary::{Curve, CurvePoint, rules},
 };
 use crate::{error::Result, files::write_atomically};
 use html::{escape, number};
@@ -322,7 +324,7 @@ fn plots(report: &Report, scene: &SceneRecord) -> String {
     if curves.is_empty() {
         return String::new();
     }
-    let series = |x: &dyn Fn(&Point) -> f64| -> Vec<Series> {
+    let series = |x: &dyn Fn(&CurvePoint) -> f64| -> Vec<Series> {
         curves
             .iter()
             .map(|(style, curve)| Series {

@@ -13,8 +13,9 @@ use crate::{
         folder::Folder,
         job::exposure,
         metrics::squared_errors,
-        record::{Rule, Run, SceneRecord},
+        record::{Run, SceneRecord},
         reference::half_stems,
+        rule::Rule,
     },
 };
 

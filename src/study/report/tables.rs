@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 use super::html::{Table, count, escape, interval, number, percent, percent_more};
 use crate::study::{
     overhead::Overhead,
-    record::Rule,
     results::Report,
+    rule::Rule,
     statistics::Interval,
     summary::{SUSPICIOUS_DEVIATION, Summary},
 };

@@ -6,8 +6,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use super::{
+    own_errors::is_judged,
     plan::Plan,
-    record::{JUDGED_FROM, Measurement, Rule, Run, SceneRecord},
+    record::{Measurement, Run, SceneRecord},
+    rule::Rule,
     statistics::{Interval, geometric_interval, mean_interval, slope},
 };
 
@@ -43,7 +45,7 @@ pub struct Summary {
     pub relmse_p999: f64,
     /// Mean of the largest.
     pub relmse_max: f64,
-    /// Whether `mse` is at least [`JUDGED_FROM`] times the reference's own.
+    /// Whether `mse` is at least [`JUDGED_FROM`](super::own_errors::JUDGED_FROM) times the reference's own.
     pub mse_judged: bool,
     /// Whether the relative errors are.
     pub relmse_judged: bool,
@@ -131,8 +133,6 @@ fn summary(
 ) -> Summary {
     let average = |value: &dyn Fn(&Measurement) -> f64| mean(own.iter().map(|(_, m)| value(m)));
     let reference = scene.reference.clone().unwrap_or_default();
-    let is_judged =
-        |mean: f64, own: Option<f64>| mean > 0.0 && own.is_none_or(|own| mean >= JUDGED_FROM * own);
     let mse = average(&|m| m.mse);
     let (relmse, relmse_trimmed) = (average(&|m| m.relmse), average(&|m| m.relmse_trimmed));
     let mse_judged = is_judged(mse, reference.mse);
@@ -211,7 +211,7 @@ fn summary(
 
 /// A film on its way, over all seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Point {
+pub struct CurvePoint {
     /// Samples per pixel.
     pub spp: u32,
     /// Mean wall time of the passes, seconds.
@@ -229,7 +229,7 @@ pub struct Curve {
     /// Contender's label.
     pub sampler: String,
     /// Ascending in samples, judged points only.
-    pub points: Vec<Point>,
+    pub points: Vec<CurvePoint>,
     /// Slope of log RMSE against log samples: −½ for independent samples.
     pub slope_spp: Option<f64>,
     /// Slope of log RMSE against log seconds.
@@ -263,7 +263,7 @@ fn curve(scene: &SceneRecord, sampler: &str, runs: &[&Run]) -> Curve {
     let own = scene.reference.as_ref().and_then(|reference| reference.mse);
     let counts: BTreeSet<u32> =
         runs.iter().flat_map(|run| run.measurements.iter().map(|m| m.spp)).collect();
-    let points: Vec<Point> = counts
+    let points: Vec<CurvePoint> = counts
         .into_iter()
         .filter_map(|spp| {
             let at: Option<Vec<&Measurement>> = runs
@@ -272,19 +272,18 @@ fn curve(scene: &SceneRecord, sampler: &str, runs: &[&Run]) -> Curve {
                 .collect();
             let at = at?;
             let mse = mean(at.iter().map(|measurement| measurement.mse));
-            let is_judged = mse > 0.0 && own.is_none_or(|own| mse >= JUDGED_FROM * own);
             let single: Vec<f64> = at.iter().map(|m| m.mse.max(0.0).sqrt()).collect();
-            let around = geometric_interval(&single).filter(|_| is_judged)?;
+            let around = geometric_interval(&single).filter(|_| is_judged(mse, own))?;
             let middle = mse.sqrt();
             let scale = middle / around.middle;
-            Some(Point {
+            Some(CurvePoint {
                 spp,
                 seconds: mean(at.iter().map(|measurement| measurement.seconds)),
                 rmse: Interval { middle, low: around.low * scale, high: around.high * scale },
             })
         })
         .collect();
-    let line = |x: &dyn Fn(&Point) -> f64| {
+    let line = |x: &dyn Fn(&CurvePoint) -> f64| {
         let logarithms: Vec<[f64; 2]> =
             points.iter().map(|point| [x(point).ln(), point.rmse.middle.ln()]).collect();
         slope(&logarithms).filter(|slope| slope.is_finite())

@@ -3,9 +3,9 @@
 
 use super::*;
 use crate::study::{
+    own_errors::OwnErrors,
     plan::{Description, Options},
     record::Conditions,
-    reference::OwnErrors,
 };
 
 fn scene(own_mse: f64) -> SceneRecord {
@@ -119,7 +119,7 @@ fn independent_samples_have_a_slope_of_minus_one_half() {
         assert_eq!(curve.points.iter().map(|point| point.spp).collect::<Vec<_>>(), [1, 2, 4]);
         assert!((curve.slope_spp.unwrap() + 0.5).abs() < 1e-9);
         assert!((curve.slope_seconds.unwrap() + 0.5).abs() < 1e-9);
-        for Point { rmse, .. } in &curve.points {
+        for CurvePoint { rmse, .. } in &curve.points {
             assert!(rmse.low < rmse.middle && rmse.middle < rmse.high);
         }
     }

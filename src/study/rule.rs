@@ -1,0 +1,46 @@
+//! Stopping rules: what ends a run, by samples or by time.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+/// What ends a run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Rule {
+    /// Samples per pixel.
+    Spp(u32),
+    /// Wall time of the passes, seconds.
+    Seconds(f64),
+}
+
+impl Rule {
+    /// Rule of a duration.
+    pub fn time(time: Duration) -> Self {
+        Self::Seconds(time.as_secs_f64())
+    }
+
+    /// "400 spp" or "30 s".
+    pub fn describe(self) -> String {
+        match self {
+            Self::Spp(spp) => format!("{spp} spp"),
+            Self::Seconds(seconds) => format!("{seconds} s"),
+        }
+    }
+
+    /// "400spp" or "30s", for file names.
+    pub fn file_stem(self) -> String {
+        self.describe().replace(' ', "")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rules_name_files() {
+        assert_eq!(Rule::Spp(400).file_stem(), "400spp");
+        assert_eq!(Rule::time(Duration::from_millis(500)).describe(), "0.5 s");
+    }
+}
