@@ -1,8 +1,9 @@
-//! Checkpoints: the film's sums with what they were rendered with, as an OpenEXR file.
+//! Checkpoints: the film's sums and the metadata of their render, as an OpenEXR file.
 //!
-//! The channels are the sums themselves (`Sum.R/G/B`, `SumCompensation.R/G/B`, `Squares.R/G/B`,
-//! `AlbedoSum.R/G/B`, `NSum.X/Y/Z`, `PSum.X/Y/Z`, `GuideCellSum.R/G/B`, `GuideLevelSum.R/G/B`, and the
-//! counts of shadow rays and cache entries as pairs of floats whose sum is the integer), bit by bit, beside the picture `R`, `G`, `B` that lets any viewer open them.
+//! The channels hold the sums bit for bit: `Sum.R/G/B`, `SumCompensation.R/G/B`, `Squares.R/G/B`,
+//! `AlbedoSum.R/G/B`, `NSum.X/Y/Z`, `PSum.X/Y/Z`, `GuideCellSum.R/G/B`, `GuideLevelSum.R/G/B`, and
+//! each count of shadow rays and cache entries as a pair of floats that add up to the integer.
+//! Beside them, the picture `R`, `G`, `B` lets any viewer open the file.
 
 use std::path::{Path, PathBuf};
 
@@ -32,7 +33,7 @@ const SHADOW_RAYS: [&str; 4] = [
     "ShadowRays.Traced",
     "ShadowRays.TracedCompensation",
 ];
-/// Entries of visibility caches and hits that have one, in the same way.
+/// Entries of visibility caches and hits that have a cache, in the same way.
 const CACHE_ENTRIES: [&str; 4] = [
     "CacheEntries.Entries",
     "CacheEntries.EntriesCompensation",
@@ -45,7 +46,7 @@ const CACHE_ENTRIES: [&str; 4] = [
 pub struct Checkpoint {
     /// The film.
     pub sums: Sums,
-    /// What it was rendered with.
+    /// Metadata of its render.
     pub metadata: Metadata,
 }
 
@@ -54,19 +55,19 @@ pub fn checkpoint_path(image: &Path) -> PathBuf {
     image.with_extension("checkpoint.exr")
 }
 
-/// Whether `path` has the name of a checkpoint.
+/// Tests whether `path` is named like a checkpoint.
 pub fn is_checkpoint_path(path: &Path) -> bool {
     path.file_name()
         .is_some_and(|name| name.to_string_lossy().to_lowercase().ends_with(".checkpoint.exr"))
 }
 
 impl Checkpoint {
-    /// Whether an image file holds a checkpoint.
+    /// Tests whether an image file holds a checkpoint.
     pub fn is_checkpoint(image: &Image) -> bool {
         image.attributes.contains_key(FORMAT_ATTRIBUTE)
     }
 
-    /// The file's content.
+    /// Converts the checkpoint to the image that its file stores.
     fn to_image(&self) -> Image {
         let sums = &self.sums;
         let mut image = sums.to_image(&[]);
@@ -100,16 +101,15 @@ impl Checkpoint {
         self.to_image().write_exr_uncompressed(path)
     }
 
-    /// Reads a checkpoint, bit by bit as it was written.
+    /// Reads a checkpoint, bit for bit as it was written.
     ///
     /// # Errors
-    /// [`Error::Io`], or [`Error::Format`] where the file is no checkpoint, is incomplete, or counts
-    /// its samples in two ways that disagree.
+    /// [`Error::Io`], or [`Error::Format`] if the file is no complete checkpoint of finite sums.
     pub fn read(path: &Path) -> Result<Self> {
         Self::from_image(&Image::read_exr(path)?, path)
     }
 
-    /// The checkpoint that an image file holds; `path` serves the messages only.
+    /// Extracts the checkpoint from an image file; `path` only serves error messages.
     ///
     /// # Errors
     /// As [`Checkpoint::read`].
@@ -175,13 +175,13 @@ impl Checkpoint {
         Ok(Self { sums, metadata })
     }
 
-    /// Whether a render of `expected` over the window of `window` can continue from here: the same
-    /// scene, sampler with its parameters, shadow rays, depth and window, and the samples
-    /// `first …` of `seed`, in one range. `window` holds no samples yet; where it has layers
-    /// (albedo, …), the checkpoint must have them too.
+    /// Checks that a render described by `expected` can continue from this checkpoint. It needs the
+    /// same scene, sampler with its parameters, shadow rays, depth and window, and a single range
+    /// of samples, `first …` of `seed`. `window` holds no samples yet; every layer that it has
+    /// (albedo, …) must be in the checkpoint too.
     ///
     /// # Errors
-    /// [`Error::Format`] that lists every difference and the remedy.
+    /// [`Error::Format`] lists every difference and the remedy.
     pub fn check_resume(
         &self,
         path: &Path,
@@ -246,8 +246,8 @@ impl Checkpoint {
     }
 }
 
-/// Four channels from pairs of counts: leading part and rest of the first, then of the second; none
-/// without pairs.
+/// Inserts four channels for pairs of counts: leading part and rest of the first count, then of the
+/// second. Inserts nothing without pairs.
 fn insert_counts(image: &mut Image, names: [&str; 4], counts: &[[u32; 2]]) {
     if counts.is_empty() {
         return;
@@ -261,7 +261,7 @@ fn insert_counts(image: &mut Image, names: [&str; 4], counts: &[[u32; 2]]) {
     }
 }
 
-/// Twin of [`insert_counts`]; empty where a channel is missing.
+/// Inverse of [`insert_counts`]; empty if a channel is missing.
 fn counts(image: &Image, names: [&str; 4]) -> Vec<[u32; 2]> {
     let [Some(first), Some(first_rest), Some(second), Some(second_rest)] =
         names.map(|name| image.channels.get(name))

@@ -12,25 +12,25 @@ use std::{
 
 use crate::error::{Error, Result};
 
-/// Port on which tev listens where none is named.
+/// Port that tev listens on by default.
 pub const DEFAULT_PORT: u16 = 14158;
 
 /// Operation that opens an image by name, replacing one of the same name.
 const CREATE_IMAGE: u8 = 4;
-/// Operation that replaces a rectangle of an image; channels lie anywhere in one run of floats.
+/// Operation that replaces a rectangle of an image; offset and stride locate each channel's floats.
 const UPDATE_IMAGE_V3: u8 = 6;
 
 /// Names of the channels sent.
 const CHANNELS: [&str; 3] = ["R", "G", "B"];
 
-/// Longest wait for a connection, and for the viewer to take one packet, before it is given up.
+/// Time limit for a connection, and for the viewer to take one packet.
 const TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Most pixels in one packet: 3 MiB.
+/// Largest number of pixels in one packet: 3 MiB.
 const PACKET_PIXELS: usize = 1 << 18;
 
-/// One image shown by a display server. A server that is absent, or goes away, costs one warning in
-/// the log and nothing else: rendering goes on.
+/// Image shown by a display server. A server that is absent or goes away costs one warning in the
+/// log; rendering continues.
 #[derive(Debug)]
 pub struct DisplayServer {
     stream: Option<TcpStream>,
@@ -41,12 +41,11 @@ pub struct DisplayServer {
 }
 
 impl DisplayServer {
-    /// Connects to the server at `address` (`host:port`; [`DEFAULT_PORT`] where only the host is
-    /// named) and opens an image of the given name and size there.
+    /// Connects to the server at `address` (`host:port`, or `host` for [`DEFAULT_PORT`]) and opens
+    /// an image of the given name and size there.
     ///
     /// # Errors
-    /// [`Error::Usage`] where `address` has no host or an impossible port. An unreachable server is
-    /// no error.
+    /// [`Error::Usage`] if `address` lacks a host or has an impossible port, not if none answers.
     pub fn connect(address: &str, image_name: &str, width: u32, height: u32) -> Result<Self> {
         let address = complete_address(address)?;
         let mut server = Self {
@@ -75,15 +74,15 @@ impl DisplayServer {
         Ok(server)
     }
 
-    /// Whether the server is still there; an image need not be prepared for [`Self::update`] if not.
+    /// Tests whether the server is still connected; only then do images need preparing.
     pub fn is_connected(&self) -> bool {
         self.stream.is_some()
     }
 
-    /// Shows `pixels`: linear Rec.709, row by row from the top, `width * height` of them.
+    /// Shows `pixels`: linear Rec.709, row by row from the top.
     ///
     /// # Panics
-    /// Where the number of pixels is another.
+    /// `pixels` is not `width * height` long.
     pub fn update(&mut self, pixels: &[[f32; 3]]) {
         assert_eq!(
             pixels.len(),
@@ -116,7 +115,7 @@ impl DisplayServer {
         }
     }
 
-    /// Sends a packet; on failure the connection is closed with a warning.
+    /// Sends a packet; on failure, warns and closes the connection.
     fn send(&mut self, packet: Packet) {
         let Some(stream) = &mut self.stream else { return };
         if let Err(error) = write_in_time(stream, &packet.finish()) {
@@ -126,14 +125,14 @@ impl DisplayServer {
     }
 }
 
-/// `host:port` with the default port where there is none.
+/// Completes `address` to `host:port`, with the default port if it names none.
 fn complete_address(address: &str) -> Result<String> {
     let refuse = || {
         Error::usage(format!(
             "display server {address:?}: expected host or host:port, as in 127.0.0.1:{DEFAULT_PORT}"
         ))
     };
-    // The last colon parts the port, unless it is within the brackets of an IPv6 address.
+    // The last colon separates the port, unless it lies within the brackets of an IPv6 address.
     let (host, port) = match address.rsplit_once(':') {
         Some((host, port)) if !port.contains(']') => (host, Some(port)),
         _ => (address, None),
@@ -145,7 +144,7 @@ fn complete_address(address: &str) -> Result<String> {
     Ok(format!("{host}:{port}"))
 }
 
-/// Connects to the first address that answers, with time limits on everything.
+/// Connects to the first address that answers, with time limits on connecting and writing.
 fn open(address: &str) -> std::io::Result<TcpStream> {
     let mut failure = std::io::Error::other("the host has no address");
     for address in address.to_socket_addrs()? {
@@ -160,8 +159,8 @@ fn open(address: &str) -> std::io::Result<TcpStream> {
     Err(failure)
 }
 
-/// Writes all of `bytes` within [`TIMEOUT`], or little more: a stalled reader still lets the system
-/// take a few bytes now and then, so that the limit of a single write is not enough.
+/// Writes all of `bytes` within about [`TIMEOUT`]. The limit on a single write is not enough: with
+/// a stalled reader, the system still takes a few bytes now and then.
 fn write_in_time(stream: &mut TcpStream, bytes: &[u8]) -> std::io::Result<()> {
     let start = Instant::now();
     let mut rest = bytes;
@@ -185,7 +184,7 @@ impl Packet {
         Self { bytes: vec![0, 0, 0, 0, operation] }
     }
 
-    /// Whether the viewer brings the image to the front.
+    /// Appends the flag that makes the viewer bring the image to the front.
     fn grab_focus(&mut self, grab: bool) {
         self.bytes.push(u8::from(grab));
     }

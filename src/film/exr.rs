@@ -1,8 +1,8 @@
-//! OpenEXR files: an [`Image`] of named float channels and attributes, written and read.
+//! OpenEXR files: reads and writes an [`Image`] of named float channels and attributes.
 //!
 //! Files have one part. The picture is `R`, `G`, `B`, linear with Rec.709 primaries; other layers
 //! have dotted names (`Albedo.R`, `N.X`), which viewers group by prefix. OpenEXR stores channels
-//! sorted by name, so that readers look them up by name.
+//! sorted by name, so readers look them up by name.
 
 use std::{
     collections::BTreeMap,
@@ -37,8 +37,8 @@ const REC_709: Chromaticities = Chromaticities {
     white: Vec2(0.3127, 0.3290),
 };
 
-/// No lossless compression of OpenEXR shrinks real pixels further than this; a header that promises
-/// more than this times the file's size is corrupt, and believing it would exhaust memory.
+/// Largest compression of real pixels by OpenEXR's lossless methods; a header that promises more
+/// than this times the file's size is corrupt, and trusting it would exhaust memory.
 const LARGEST_COMPRESSION_RATIO: u64 = 4096;
 
 /// Value of a file attribute.
@@ -67,11 +67,11 @@ pub struct Image {
     pub film_size: [u32; 2],
     /// Samples by channel name, each `width * height` long.
     pub channels: BTreeMap<String, Vec<f32>>,
-    /// Attributes by name, without those of the format itself.
+    /// Attributes by name, except those of the format itself.
     pub attributes: BTreeMap<String, Attribute>,
 }
 
-/// Linear Rec.709 picture without anything else; what error metrics and previews work on.
+/// Linear Rec.709 picture alone, the input of error metrics and previews.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RgbImage {
     /// Width in pixels.
@@ -83,7 +83,7 @@ pub struct RgbImage {
 }
 
 impl Image {
-    /// Image without channels whose window is the whole film.
+    /// Creates an image without channels whose window is the whole film.
     pub fn new(width: u32, height: u32) -> Self {
         Self {
             width,
@@ -100,7 +100,7 @@ impl Image {
         self.width as usize * self.height as usize
     }
 
-    /// Adds three channels, `names` in the order of the components of `values`.
+    /// Adds the three components of `values` as the channels `names`.
     ///
     /// # Panics
     /// `values` is not `width * height` long.
@@ -112,17 +112,17 @@ impl Image {
         }
     }
 
-    /// Three channels as vectors; `None` where one is missing.
+    /// Returns three channels as vectors, or `None` if one is missing.
     pub fn triple(&self, names: [&str; 3]) -> Option<Vec<[f32; 3]>> {
         let [x, y, z] = names.map(|name| self.channels.get(name));
         let (x, y, z) = (x?, y?, z?);
         Some(x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z]).collect())
     }
 
-    /// The picture `R`, `G`, `B`, or a single channel `Y` as grey. `path` serves the message only.
+    /// Returns `R`, `G`, `B`, or a lone `Y` as grey; `path` only serves the error message.
     ///
     /// # Errors
-    /// [`Error::Format`] that lists the channels there are.
+    /// [`Error::Format`] lists the channels found.
     pub fn rgb(&self, path: &Path) -> Result<RgbImage> {
         let pixels = self
             .triple(["R", "G", "B"])
@@ -149,7 +149,7 @@ impl Image {
         self.write_exr_compressed(path, Compression::ZIP16)
     }
 
-    /// Writes the image without compression: sums have no regularity that would be worth the time.
+    /// Writes the image without compression: sums are too irregular for it to be worth the time.
     ///
     /// # Errors
     /// As [`Image::write_exr`].
@@ -210,8 +210,8 @@ impl Image {
     /// Reads the first flat layer of an OpenEXR file; half and integer channels become floats.
     ///
     /// # Errors
-    /// [`Error::Io`] where the file cannot be read, [`Error::Format`] where it is no OpenEXR file,
-    /// is truncated or corrupt, or holds deep data only.
+    /// [`Error::Io`] if the file cannot be read, [`Error::Format`] if it is no OpenEXR file, is
+    /// truncated or corrupt, or holds only deep data.
     pub fn read_exr(path: &Path) -> Result<Self> {
         let open = || File::open(path).map_err(|source| Error::io(path, "read", source));
         let malformed = |error: exr::error::Error| match error {
@@ -310,10 +310,10 @@ impl Image {
     }
 }
 
-/// Samples of a channel, written from where they are: large films are not copied.
+/// Samples of a channel, borrowed so that large films are not copied.
 struct BorrowedSamples<'a>(&'a [f32]);
 
-/// Hands rows of [`BorrowedSamples`] to the encoder.
+/// Passes rows of [`BorrowedSamples`] to the encoder.
 struct BorrowedWriter<'a> {
     samples: &'a [f32],
     width: usize,
@@ -344,12 +344,12 @@ impl SamplesWriter for BorrowedWriter<'_> {
     }
 }
 
-/// OpenEXR text of the UTF-8 bytes of `value`.
+/// Encodes `value` as OpenEXR text in UTF-8.
 fn text(value: &str) -> Text {
     Text::from_slice_unchecked(value.as_bytes())
 }
 
-/// Text of an OpenEXR file, which should be UTF-8.
+/// Decodes OpenEXR text, which should be UTF-8; invalid bytes are replaced.
 fn string(value: &Text) -> String {
     String::from_utf8_lossy(value.as_slice()).into_owned()
 }

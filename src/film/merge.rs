@@ -1,7 +1,7 @@
 //! Combines renders of one scene made with different seeds or sample ranges into one.
 //!
-//! Checkpoints are merged exactly, by adding their sums; images by their means weighted with their
-//! sample counts, which equals one run up to rounding.
+//! Checkpoints merge exactly, by adding their sums. Images merge by averaging their means, weighted
+//! by sample count, which equals one run up to rounding.
 
 use std::{collections::BTreeSet, path::Path};
 
@@ -15,15 +15,15 @@ pub struct Part<'a> {
     pub path: &'a Path,
     /// Its channels.
     pub image: &'a Image,
-    /// What it was rendered with.
+    /// Metadata of its render.
     pub metadata: &'a Metadata,
 }
 
 /// Adds the sums of checkpoints of one render.
 ///
 /// # Errors
-/// [`Error::Format`] naming the two files: another scene, sampler, window, …; samples that both
-/// hold. [`Error::Usage`] without parts.
+/// [`Error::Format`] names two files that differ in scene, sampler, window, …, or that share
+/// samples. [`Error::Usage`] without parts.
 pub fn merge_checkpoints(parts: &[(&Path, &Checkpoint)]) -> Result<Checkpoint> {
     let Some(((first_path, first), others)) = parts.split_first() else {
         return Err(Error::usage("nothing to merge"));
@@ -45,8 +45,8 @@ pub fn merge_checkpoints(parts: &[(&Path, &Checkpoint)]) -> Result<Checkpoint> {
     Ok(merged)
 }
 
-/// Means of images of one render, weighted with their sample counts; the variance of the pixel mean
-/// is that of all samples pooled. Channels that not every part has are left out.
+/// Averages images of one render, weighted by sample count, and pools the variance of the pixel
+/// mean over all samples. Drops channels that some part lacks.
 ///
 /// # Errors
 /// As [`merge_checkpoints`].
@@ -83,12 +83,12 @@ pub fn merge_images(parts: &[Part<'_>]) -> Result<(Image, Metadata)> {
     Ok((merged, metadata))
 }
 
-/// One channel of one part with the channel that weights or explains it.
+/// One channel of one part, with the channel that merging it requires.
 struct Samples<'a> {
     /// Samples per pixel of the part.
     count: f64,
     own: &'a [f32],
-    /// The mean of a variance, the traced shadow rays of a visible share, the hits of cache entries.
+    /// Mean for a variance, traced shadow rays for a visible share, hits for cache entries.
     companion: &'a [f32],
 }
 
@@ -124,16 +124,16 @@ fn merge_channel(name: &str, parts: &[Part<'_>]) -> Vec<f32> {
     (0..parts[0].image.pixel_count()).map(|pixel| merge_pixel(pixel) as f32).collect()
 }
 
-/// Share of all rays from the shares of the parts, weighted with their rays; likewise entries per
-/// hit.
+/// Pools the parts' visible shares, weighted by traced rays; likewise cache entries per hit.
 fn pooled_share(samples: &[Samples<'_>], pixel: usize) -> f64 {
     let traced = |part: &Samples<'_>| f64::from(part.companion[pixel]);
     let visible: f64 = samples.iter().map(|part| traced(part) * f64::from(part.own[pixel])).sum();
     visible / samples.iter().map(traced).sum::<f64>().max(1.0)
 }
 
-/// Variance of the mean of all samples: turns each part's mean and its variance back into Σx and
-/// Σx², adds those, and estimates as [`Sums::variance_of_mean`](super::Sums::variance_of_mean).
+/// Variance of the mean of all samples, estimated from Σx and Σx² as
+/// [`Sums::variance_of_mean`](super::sums::Sums::variance_of_mean) does; each part's mean and
+/// variance give its share.
 fn pooled_variance(samples: &[Samples<'_>], total: f64, pixel: usize) -> f64 {
     if total < 2.0 {
         return 0.0;
@@ -207,7 +207,7 @@ fn add_metadata(merged: &mut Metadata, part: &Metadata) {
     merged.driver = joined(&merged.driver, &part.driver);
 }
 
-/// Both names, without repetition.
+/// Joins both lists of names, without repetition.
 fn joined(ours: &str, theirs: &str) -> String {
     let names: BTreeSet<&str> = ours.split(" + ").chain(theirs.split(" + ")).collect();
     names.into_iter().collect::<Vec<_>>().join(" + ")

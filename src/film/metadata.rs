@@ -1,8 +1,8 @@
-//! What an image was rendered with, as attributes of its file.
+//! Metadata of a render, stored as attributes of its image file.
 //!
 //! `samplesPerPixel` and `renderTimeSeconds` are pbrt's names, `generatedBy` is Mitsuba's; the rest
-//! is under `fenestra.`. [`Metadata::sample_ranges`] make `merge` and `--resume` safe: no sample is
-//! counted twice.
+//! is under `fenestra.`. [`Metadata::sample_ranges`] keep `merge` and `--resume` from counting a
+//! sample twice.
 
 use std::{collections::BTreeMap, fmt, path::Path, str::FromStr};
 
@@ -21,7 +21,7 @@ pub struct SampleRange {
 }
 
 impl SampleRange {
-    /// Whether both hold a sample of the same seed and index.
+    /// Tests whether both hold a sample of the same seed and index.
     pub fn overlaps(&self, other: &Self) -> bool {
         let end = |range: &Self| u64::from(range.first) + u64::from(range.count);
         self.seed == other.seed
@@ -41,7 +41,7 @@ impl fmt::Display for SampleRange {
 impl FromStr for SampleRange {
     type Err = String;
 
-    /// Reads `seed:first+count`.
+    /// Parses `seed:first+count`.
     fn from_str(text: &str) -> Result<Self, String> {
         let parse = || {
             let (seed, range) = text.split_once(':')?;
@@ -56,7 +56,7 @@ impl FromStr for SampleRange {
     }
 }
 
-/// What an image was rendered with.
+/// Settings, samples, times and device of a render.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Metadata {
     /// Fenestra's version.
@@ -71,14 +71,14 @@ pub struct Metadata {
     pub sampler: String,
     /// Sampler's parameters as text, by name.
     pub sampler_parameters: BTreeMap<String, String>,
-    /// Candidates that `guided` chose each shadow ray from, where they are known and the same in all
-    /// parts; the parameter of that name is what was asked for.
+    /// Number of candidates from which `guided` chose each shadow ray; absent if it is unknown or
+    /// differs between parts. The sampler parameter of this name holds the value asked for.
     pub candidates: Option<u32>,
     /// Directions traced at every vertex of every camera path.
     pub shadow_rays: u32,
     /// Path vertices at which environment light is gathered.
     pub depth: u32,
-    /// Which samples of every pixel the image holds.
+    /// Samples of every pixel that the image holds.
     pub sample_ranges: Vec<SampleRange>,
     /// Wall time of the passes, seconds.
     pub seconds: f64,
@@ -96,7 +96,7 @@ impl Metadata {
         self.sample_ranges.iter().map(|range| u64::from(range.count)).sum()
     }
 
-    /// Writes everything into the attributes of `image`.
+    /// Stores everything as attributes of `image`.
     pub fn store(&self, image: &mut Image) {
         let mut put = |name: &str, value: Attribute| {
             image.attributes.insert(name.to_owned(), value);
@@ -134,10 +134,10 @@ impl Metadata {
         }
     }
 
-    /// Reads the attributes of `image` back; `path` serves the messages only.
+    /// Reads the metadata back from the attributes of `image`; `path` only serves error messages.
     ///
     /// # Errors
-    /// [`Error::Format`] that names the attribute which is missing or malformed.
+    /// [`Error::Format`] names the attribute that is missing or malformed.
     pub fn load(image: &Image, path: &Path) -> Result<Self> {
         let text = |name: &str| match image.attributes.get(name) {
             Some(Attribute::Text(value)) => Ok(value.clone()),
@@ -203,8 +203,8 @@ impl Metadata {
         })
     }
 
-    /// What keeps two renders from being parts of one image, as "what: ours, theirs" lines; empty
-    /// where nothing does. Seeds, sample ranges, devices and times may differ.
+    /// Lists the settings that keep two renders from being parts of one image, as "name: ours
+    /// against theirs". Seeds, sample ranges, devices and times may differ.
     pub fn differences(&self, other: &Self) -> Vec<String> {
         let mut found = Vec::new();
         let mut compare = |what: &str, ours: String, theirs: String| {

@@ -1,8 +1,8 @@
 //! The film: sums of samples on their way to files.
 //!
-//! The device accumulates [`Sums`] over `n` samples of every pixel; from them come the image file
-//! ([`Sums::to_image`] → [`Image::write_exr`]), the preview ([`png`]), and the [`Checkpoint`] from
-//! which a render continues to the bit. [`Metadata`] says in every file what it was rendered with.
+//! The device accumulates [`Sums`] over `n` samples of every pixel. They become the image file
+//! ([`Sums::to_image`] → [`Image::write_exr`]), the preview ([`png`]) and the [`Checkpoint`], from
+//! which a render continues bit for bit. Every file carries the [`Metadata`] of its render.
 
 pub mod checkpoint;
 pub mod display;

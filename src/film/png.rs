@@ -1,4 +1,4 @@
-//! Tone-mapped previews.
+//! PNG previews: linear picture → sRGB bytes.
 
 use std::path::Path;
 
@@ -13,14 +13,14 @@ pub fn srgb_from_linear(value: f32) -> f32 {
     if value <= 0.003_130_8 { 12.92 * value } else { 1.055 * value.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// Eight-bit display value of a linear one: clamped to 0…1, sRGB curve, rounded. NaN becomes 0.
+/// Converts a linear value to a byte: clamps to 0…1, applies the sRGB curve, rounds. NaN becomes 0.
 pub fn display_from_linear(value: f32) -> u8 {
     // `as` saturates and turns NaN into 0.
     (srgb_from_linear(value.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8
 }
 
-/// Writes the picture times 2^`exposure` (in stops), clamped, with the sRGB curve: no tone curve
-/// beyond that, so that two previews of one exposure can be compared.
+/// Writes the picture scaled by 2^`exposure` (in stops), clamped, with the sRGB curve. No other
+/// tone curve applies, so two previews of one exposure can be compared.
 ///
 /// # Errors
 /// [`crate::Error::Io`] with the cause.
@@ -34,7 +34,7 @@ pub fn write_preview(path: &Path, picture: &RgbImage, exposure: f32) -> Result<(
     write_rgb8(path, picture.width, picture.height, &bytes)
 }
 
-/// Writes display values as they are.
+/// Writes display values unchanged.
 ///
 /// # Errors
 /// [`crate::Error::Io`] with the cause.

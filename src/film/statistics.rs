@@ -1,4 +1,4 @@
-//! Statistics of a render as JSON: what `render --stats` writes and `bench` and `study` reuse.
+//! Statistics of a render as JSON, which `render --stats` writes.
 
 use std::{collections::BTreeMap, io::Write, path::Path};
 
@@ -6,7 +6,7 @@ use super::metadata::SampleRange;
 use crate::files::write_atomically;
 use crate::{error::Result, sampler::CandidateCost};
 
-/// Numbers of one render. Times are of this run only, also where it continued a checkpoint.
+/// Figures of one render. Times cover this run only, even if it continued a checkpoint.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Statistics {
@@ -30,20 +30,20 @@ pub struct Statistics {
     pub sampler: String,
     /// Sampler's parameters as text, by name.
     pub sampler_parameters: BTreeMap<String, String>,
-    /// Candidates that `guided` chose each shadow ray from, asked for or measured; absent for other
-    /// samplers and in open scenes.
+    /// Number of candidates from which `guided` chose each shadow ray, asked for or measured;
+    /// absent for other samplers and in open scenes.
     pub candidates: Option<u32>,
-    /// What was measured to choose them in this run; empty where nothing was.
+    /// Costs measured in this run to choose that number; empty if none were.
     pub candidate_costs: Vec<CandidateCost>,
     /// Directions traced at every vertex.
     pub shadow_rays_per_vertex: u32,
     /// Path vertices at which environment light is gathered.
     pub depth: u32,
-    /// Which samples of every pixel the image holds.
+    /// Samples of every pixel that the image holds.
     pub sample_ranges: Vec<SampleRange>,
     /// Camera paths per pixel, over all ranges.
     pub samples_per_pixel: u32,
-    /// Which rule ended the run: `spp`, `time`, `error`, `interrupt`.
+    /// Rule that ended the run: `spp`, `time`, `error`, `interrupt`.
     pub stop_reason: String,
     /// Mean relative standard error of the pixels (`Sums::relative_standard_error`); absent below
     /// two samples.
@@ -52,13 +52,13 @@ pub struct Statistics {
     pub seconds: f64,
     /// Rays traced by kind: `camera`, `shadow`, `bounce`.
     pub rays: BTreeMap<String, u64>,
-    /// Share of shadow rays that reached the environment; absent where none was traced.
+    /// Share of shadow rays that reached the environment; absent if none was traced.
     pub visible_share: Option<f64>,
     /// Mean entries in the visibility cache per hit, for samplers that have one.
     pub cache_entries_per_hit: Option<f64>,
-    /// Mean lobes kept of the product per hit, for samplers that have one.
+    /// Mean product lobes kept per hit, for samplers with a product.
     pub lobes_per_hit: Option<f64>,
-    /// Mean share of the product's energy that the kept lobes hold, for samplers that have one.
+    /// Mean share of the product's energy in the kept lobes, for samplers with a product.
     pub energy_kept: Option<f64>,
     /// Mean rebuilds of the lobe probabilities per hit, for samplers that have them.
     pub cdf_rebuilds_per_hit: Option<f64>,

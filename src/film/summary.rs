@@ -1,24 +1,24 @@
-//! What the samples of one channel are like, for people who ask whether a file is sane.
+//! Range, mean and oddities of a channel's samples, to judge whether a file is sane.
 
-/// Range, mean and oddities of a channel.
+/// Summary of the samples of a channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct ChannelSummary {
-    /// Smallest finite sample; absent where there is none.
+    /// Smallest finite sample; absent if there is none.
     pub minimum: Option<f32>,
-    /// Largest finite sample; absent where there is none.
+    /// Largest finite sample; absent if there is none.
     pub maximum: Option<f32>,
-    /// Mean of the finite samples; absent where there is none.
+    /// Mean of the finite samples; absent if there is none.
     pub mean: Option<f64>,
     /// Samples that are not a number.
     pub nan: usize,
     /// Infinite samples.
     pub infinite: usize,
-    /// Samples below 0, among them −∞.
+    /// Samples below 0, including −∞.
     pub negative: usize,
 }
 
 impl ChannelSummary {
-    /// Looks at every sample.
+    /// Summarises `samples`.
     pub fn of(samples: impl IntoIterator<Item = f32>) -> Self {
         let mut summary = Self::default();
         let (mut sum, mut count) = (0.0_f64, 0_usize);

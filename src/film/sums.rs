@@ -1,9 +1,9 @@
-//! What the device's film holds after `n` samples of every pixel, and what follows from it.
+//! Sums that the device's film holds after `n` samples of every pixel, and the image they give.
 
 use super::exr::Image;
 
-/// Extra layers of an image file; names and meaning as pbrt's where pbrt has them. On the command line
-/// the layer's name in the file serves as well.
+/// Extra layers of an image file, with pbrt's names and meaning where pbrt has them. The command
+/// line also accepts a layer's name in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, clap::ValueEnum)]
 pub enum Aov {
     /// `Variance.R/G/B`: variance of the pixel mean.
@@ -25,13 +25,13 @@ pub enum Aov {
     /// were traced for the pixel.
     #[value(aliases = ["Visible"])]
     Visible,
-    /// Sampler `visibility`: `CacheEntries.Y`: directions in the visibility cache after the last ray
-    /// of a hit, mean over the pixel's hits, and `Hits.Y`: how many hits those are.
+    /// Sampler `visibility`: `CacheEntries.Y`: directions in the visibility cache after the last
+    /// ray of a hit, mean over the pixel's hits, and `Hits.Y`: how many hits those are.
     #[value(aliases = ["CacheEntries"])]
     CacheEntries,
-    /// Sampler `guided`, first hits: `GuideCell.R/G/B`: colour of the cell of learned visibility, one
-    /// for each; `GuideLevel.R/G/B`: share of samples that found only the cell of their face (R), a
-    /// coarse cell (G), a fine one (B).
+    /// Sampler `guided`, first hits: `GuideCell.R/G/B`: colour of the cell of learned visibility,
+    /// one for each; `GuideLevel.R/G/B`: share of samples that found only the cell of their face
+    /// (R), a coarse cell (G), a fine one (B).
     #[value(aliases = ["GuideCell"])]
     GuideCell,
 }
@@ -58,28 +58,26 @@ pub struct Sums {
     pub compensation: Vec<[f32; 3]>,
     /// Σ radiance², per sample.
     pub squares: Vec<[f32; 3]>,
-    /// Σ albedo at the first hit, 0 where there is none; empty where not asked for.
+    /// Σ albedo at the first hit, 0 without one; empty if not asked for.
     pub albedo: Vec<[f32; 3]>,
-    /// Σ shading normal at the first hit, 0 where there is none; empty where not asked for.
+    /// Σ shading normal at the first hit, 0 without one; empty if not asked for.
     pub normal: Vec<[f32; 3]>,
-    /// Σ position of the first hit, 0 where there is none; empty where not asked for.
+    /// Σ position of the first hit, 0 without one; empty if not asked for.
     pub position: Vec<[f32; 3]>,
-    /// Shadow rays that reached the environment, and all that were traced; empty where not asked
-    /// for.
+    /// Shadow rays that reached the environment, and all that were traced; empty if not asked for.
     pub visible: Vec<[u32; 2]>,
-    /// Directions in the visibility caches after the last ray of every hit, and these hits; empty where
-    /// not asked for.
+    /// Directions in the visibility caches after the last ray of every hit, and the number of those
+    /// hits; empty if not asked for.
     pub cache_entries: Vec<[u32; 2]>,
-    /// Σ colour of the guide's cell at the first hit, 0 where there is none; empty where not asked
-    /// for.
+    /// Σ colour of the guide's cell at the first hit, 0 without one; empty if not asked for.
     pub guide_cell: Vec<[f32; 3]>,
-    /// Number of first hits whose cell was that of its face, a coarse one, a fine one; empty where
+    /// Numbers of first hits whose cell was that of their face, a coarse one, a fine one; empty if
     /// not asked for.
     pub guide_level: Vec<[f32; 3]>,
 }
 
 impl Sums {
-    /// Sums of no samples, without extra layers.
+    /// Creates sums of no samples, without extra layers.
     pub fn new(origin: [u32; 2], width: u32, height: u32, film_size: [u32; 2]) -> Self {
         let zeros = vec![[0.0; 3]; width as usize * height as usize];
         Self {
@@ -113,8 +111,8 @@ impl Sums {
 
     /// Unbiased estimate of the variance of the pixel's mean, (Σx² − (Σx)²/n) / (n (n − 1)).
     ///
-    /// The estimate takes samples as independent; under stratified samples the true variance is
-    /// lower, so that this is an upper estimate. 0 below two samples, as pbrt does.
+    /// The estimate treats samples as independent. Stratification lowers the true variance, so this
+    /// is an upper estimate. It is 0 below two samples, as in pbrt.
     pub fn variance_of_mean(&self, pixel: usize) -> [f64; 3] {
         if self.sample_count < 2 {
             return [0.0; 3];
@@ -129,12 +127,12 @@ impl Sums {
     }
 
     /// Mean over the pixels of s / √(m² + 0.01·M²): m the mean over RGB of the pixel's mean
-    /// radiance, s that of its standard errors (an upper bound of the standard error of m, reached
-    /// where the channels' noise is one and the same), M the mean of m over the image.
+    /// radiance, M the mean of m over the image, s the mean over RGB of the pixel's standard errors
+    /// (an upper bound on the standard error of m, reached if all channels share one noise).
     ///
-    /// The denominator is that of relMSE (`study::metrics`), so that the square of this figure is
-    /// comparable with it. Infinite below two samples, 0 for a black image. A pixel that no sample
-    /// has lit yet counts as free of error, so that rare bright events make this too low.
+    /// The denominator is that of relMSE (`study::metrics`), so the square of this figure compares
+    /// with it. Infinite below two samples, 0 for a black image. A pixel that no sample has lit yet
+    /// counts as free of error, so rare bright events make the figure too low.
     pub fn relative_standard_error(&self) -> f64 {
         if self.sample_count < 2 || self.pixel_count() == 0 {
             return f64::INFINITY;
@@ -152,7 +150,7 @@ impl Sums {
         (0..pixel_count).map(relative).sum::<f64>() / pixel_count as f64
     }
 
-    /// Pixels with a sum that is not finite. Passes drop such samples, so that anything but 0 is a
+    /// Counts pixels with a non-finite sum. Passes drop such samples, so anything but 0 is a
     /// defect.
     pub fn non_finite_count(&self) -> usize {
         let is_bad = |value: &[f32; 3]| value.iter().any(|component| !component.is_finite());
@@ -163,11 +161,11 @@ impl Sums {
             .count()
     }
 
-    /// The picture: `R`, `G`, `B` and those of `aovs` whose sums are there.
+    /// Converts to an image of `R`, `G`, `B` and those of `aovs` whose sums exist.
     ///
-    /// Albedo, normal and position are means over all samples of the pixel; a sample that leaves the
-    /// scene counts as 0. Deviation: pbrt divides by the weight of the samples that hit something,
-    /// which could not be merged from image files exactly.
+    /// Albedo, normal and position are means over all samples of the pixel; a sample that leaves
+    /// the scene counts as 0. Deviation: pbrt divides by the weight of the samples that hit
+    /// something, which could not be merged exactly from image files.
     pub fn to_image(&self, aovs: &[Aov]) -> Image {
         let mut image = Image::new(self.width, self.height);
         image.origin = self.origin.map(|value| i32::try_from(value).unwrap_or(i32::MAX));
@@ -218,7 +216,7 @@ impl Sums {
 
     /// Adds the samples of `other`, which must show the same window of the same film.
     ///
-    /// Sums are added in 64-bit floats and split again. A layer that one side lacks is dropped.
+    /// Adds sums in 64-bit floats and splits them again. Drops a layer that one side lacks.
     ///
     /// # Panics
     /// The windows differ.
@@ -266,8 +264,7 @@ impl Sums {
     }
 }
 
-/// Two channels from pairs of counts: the first by the second, and the second;
-/// none without pairs.
+/// Inserts two channels for pairs of counts: first over second, and second; nothing without pairs.
 fn insert_ratio(image: &mut Image, [ratio, whole]: [&str; 2], counts: &[[u32; 2]]) {
     if !counts.is_empty() {
         let quotient =
@@ -278,7 +275,7 @@ fn insert_ratio(image: &mut Image, [ratio, whole]: [&str; 2], counts: &[[u32; 2]
     }
 }
 
-/// The two floats whose sum is nearest to `value`: its rounding and the rest.
+/// Splits `value` into the two floats whose sum is nearest to it: its rounding and the rest.
 pub fn split(value: f64) -> (f32, f32) {
     let leading = value as f32;
     (leading, (value - f64::from(leading)) as f32)

@@ -1,4 +1,4 @@
-//! The part of the film that is rendered.
+//! Crop window of a render.
 
 /// Part of the film that is rendered, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! What a study compares: a sampler with its parameters.
+//! Contenders of a study: samplers with their parameters.
 
 use std::collections::BTreeMap;
 
@@ -11,19 +11,19 @@ use crate::{
 /// colons).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contender {
-    /// The text it was read from: its name in tables and files.
+    /// Text it was parsed from; names it in tables and files.
     pub label: String,
-    /// How directions are chosen.
+    /// Sampler that chooses directions.
     pub sampler: Sampler,
     /// Its parameters.
     pub parameters: Parameters,
 }
 
 impl Contender {
-    /// Reads `name` or `name:key=value:…`; the parameters start from `defaults`.
+    /// Parses `name` or `name:key=value:…`; the parameters start from `defaults`.
     ///
     /// # Errors
-    /// [`Error::Usage`] that lists the samplers or the parameters there are.
+    /// [`Error::Usage`] lists the known samplers or parameters.
     pub fn parse(text: &str, defaults: Parameters) -> Result<Self> {
         let label = text.trim();
         let mut parts = label.split(':');
@@ -41,10 +41,10 @@ impl Contender {
         Ok(Self { label: label.to_owned(), sampler, parameters })
     }
 
-    /// Reads a list; every label may occur once.
+    /// Parses a list without repeated labels.
     ///
     /// # Errors
-    /// As [`Contender::parse`], and for labels that occur twice or would share their files' names.
+    /// As [`Contender::parse`], and for labels that occur twice or would share file names.
     pub fn parse_all<'a>(
         texts: impl IntoIterator<Item = &'a str>,
         defaults: Parameters,
@@ -60,13 +60,13 @@ impl Contender {
         Ok(contenders)
     }
 
-    /// Name in file names: what is neither letter, digit nor underscore becomes a hyphen.
+    /// Returns the label for file names; hyphens replace all but letters, digits and underscores.
     pub fn file_stem(&self) -> String {
         let keep = |character: char| character.is_ascii_alphanumeric() || character == '_';
         self.label.chars().map(|c| if keep(c) { c } else { '-' }).collect()
     }
 
-    /// The parameters that matter to the sampler, by name.
+    /// Returns the parameters that the sampler uses, by name.
     pub fn describe_parameters(&self) -> BTreeMap<String, String> {
         self.parameters.describe(self.sampler)
     }

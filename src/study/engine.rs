@@ -1,6 +1,5 @@
-//! Runs a plan: scenes one after the other, in each the reference, the runs interleaved over seeds
-//! and samplers, and the overhead rounds. Every finished run is written at once, and runs that an
-//! earlier study of the same folder finished are taken up.
+//! Runs a plan: in each scene the reference, the runs, interleaved over seeds and samplers, and the
+//! overhead rounds. Finished runs are written at once, and those of an earlier study reused.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -37,11 +36,11 @@ pub struct Results {
 
 /// Carries out `plan` in `folder`.
 ///
-/// `redo` removes finished runs that were made under other conditions; without it they are an error.
-/// The second value is what ended the study early; what was finished until then is in the results.
+/// `redo` removes finished runs made under other conditions; without it they are an error. The
+/// second value is the error that ended the study early; the results hold what was finished.
 ///
 /// # Errors
-/// Whatever keeps the study from starting: a scene or reference that cannot be used, runs made under
+/// Anything that keeps the study from starting: an unusable scene or reference, runs made under
 /// other conditions.
 pub fn run(
     plan: &Plan,
@@ -100,7 +99,7 @@ impl Study<'_> {
         Ok(scenes)
     }
 
-    /// Tells the forecast about a scene's work.
+    /// Adds a scene's work to the forecast.
     fn expect(&mut self, scene: &Scene) {
         let pixels = pixels(scene);
         if let (true, ReferencePlan::Render { half_spp, .. }) =
@@ -160,7 +159,7 @@ impl Study<'_> {
         }
     }
 
-    /// What the files of a contender's renders say, without samples and times.
+    /// Metadata of a contender's renders, without samples and times.
     fn metadata(&self, scene: &Scene, contender: &Contender) -> Metadata {
         let capabilities = self.device.capabilities();
         Metadata {
@@ -198,7 +197,7 @@ impl Study<'_> {
         Ok(reference)
     }
 
-    /// Copies halves that were read into the folder, so that it holds all that the page needs.
+    /// Copies halves that were read into the folder, so that it holds everything the page needs.
     fn keep_halves(&self, scene: &Scene, reference: &Reference) -> Result<()> {
         for (stem, half) in
             reference::half_stems().into_iter().zip([&reference.first, &reference.second])
@@ -208,7 +207,7 @@ impl Study<'_> {
         Ok(())
     }
 
-    /// Every run against the reference.
+    /// Renders every run and compares it with the reference.
     fn compare(
         &mut self,
         scene: &Scene,
@@ -267,7 +266,7 @@ fn pixels(scene: &Scene) -> f64 {
     f64::from(scene.film.width) * f64::from(scene.film.height)
 }
 
-/// Tells the forecast about `count` runs ended by `rule`.
+/// Adds `count` runs ended by `rule` to the forecast.
 fn expect_run(watch: &mut Watch<'_>, rule: Rule, pixels: f64, count: f64) {
     match rule {
         Rule::Spp(spp) => watch.expect(count * pixels * f64::from(spp), 0.0),
@@ -275,7 +274,7 @@ fn expect_run(watch: &mut Watch<'_>, rule: Rule, pixels: f64, count: f64) {
     }
 }
 
-/// The device buffers of a scene, made when the first renderer needs them.
+/// Device buffers of a scene, created when the first renderer needs them.
 struct SharedBuffers<'a> {
     device: &'a Arc<Device>,
     scene: &'a Scene,

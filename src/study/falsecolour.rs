@@ -1,13 +1,12 @@
 //! False-colour pictures of scalar maps: blue low, red high, with a legend.
 //!
-//! Colours are Google's Turbo map ([`colorous::TURBO`]), which runs from dark blue over green to
-//! dark red with rising hue.
+//! Colours are Google's Turbo map ([`colorous::TURBO`]), from dark blue through green to dark red.
 
 use std::path::Path;
 
 use crate::{error::Result, film::png};
 
-/// Values at the two ends of the colours; what lies outside takes the colour of the end.
+/// Values at the two ends of the colour map; values outside take the colour of the end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
     /// Value shown blue.
@@ -17,8 +16,8 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// From 0 to the value that 99% of `values` do not exceed, so that a few outliers do not turn
-    /// the rest blue; 1 where that is not positive.
+    /// Spans 0 to the 99th percentile of `values`, so that a few outliers do not turn the rest
+    /// blue; 0 to 1 if that is not positive.
     pub fn of(values: &[f64]) -> Self {
         let mut sorted: Vec<f64> =
             values.iter().copied().filter(|value| value.is_finite()).collect();
@@ -28,7 +27,7 @@ impl Scale {
         Self { low: 0.0, high }
     }
 
-    /// Display colour of a value; NaN is magenta, which the map does not contain.
+    /// Returns the display colour of a value; NaN is magenta, which the map does not contain.
     pub fn colour(&self, value: f64) -> [u8; 3] {
         if value.is_nan() {
             return [255, 0, 255];
@@ -58,14 +57,14 @@ const BAR_HEIGHT: usize = 10;
 const TICK_HEIGHT: usize = 3;
 /// Numbers under the bar: at its ends and in the middle.
 const TICK_COUNT: usize = 3;
-/// The legend's three numbers need this much.
+/// Least width of a picture: that of the legend's three numbers.
 const LEAST_WIDTH: usize = 168;
-/// Digits are drawn with pixels of this size.
+/// Side of a digit's pixels in pixels of the picture.
 const DIGIT_SCALE: usize = 2;
-/// Columns of a digit with the gap to the next.
+/// Columns of a digit and the gap to the next.
 const DIGIT_ADVANCE: usize = 4 * DIGIT_SCALE;
 
-/// Rows of a 3×5 glyph from the top, bit 2 the left column.
+/// Returns the rows of a 3×5 glyph from the top; bit 2 is the left column.
 fn glyph(character: char) -> [u8; 5] {
     match character {
         '0' => [7, 5, 5, 5, 7],
@@ -124,7 +123,7 @@ impl Canvas {
     }
 }
 
-/// `values` in false colour above a legend with the numbers at both ends and in the middle. A map
+/// Draws `values` in false colour above a legend with numbers at both ends and in the middle. A map
 /// narrower than the legend is centred on white.
 ///
 /// # Panics
@@ -158,7 +157,7 @@ pub fn picture(values: &[f64], width: usize, scale: Scale) -> Canvas {
     canvas
 }
 
-/// At most six characters: "0", "0.25", "12.5", "3.0e-5".
+/// Formats a number in few characters: "0", "0.250", "12.50", "3.0e-5".
 fn number(value: f64) -> String {
     let magnitude = value.abs();
     if value == 0.0 {

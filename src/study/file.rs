@@ -39,7 +39,7 @@ use crate::{
     sampler::Parameters,
 };
 
-/// A study file as it stands.
+/// Parsed study file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StudyFile {
     /// Scene files, resolved against the study file's folder.
@@ -52,7 +52,7 @@ pub struct StudyFile {
     pub quick: Options,
 }
 
-/// How the values of options are read, which the command line does as well.
+/// Parsers of option values, shared with the command line.
 #[derive(Clone, Copy)]
 pub struct ValueParsers {
     /// `30s`.
@@ -120,7 +120,7 @@ struct OverheadEntry {
     high: f64,
 }
 
-/// A message with the byte range of the text it is about.
+/// Message with the byte range of the text that it is about.
 struct Failure {
     span: Range<usize>,
     message: String,
@@ -145,7 +145,7 @@ impl Failure {
     }
 }
 
-/// Whether `path` is a study file: TOML with the key `study`. A scene has a `[camera]` instead.
+/// Tests whether `path` is a study file: TOML with a key `study`, where a scene has `[camera]`.
 ///
 /// # Errors
 /// The file cannot be read, is no TOML, or has neither key.
@@ -226,7 +226,7 @@ impl StudyFile {
     }
 }
 
-/// Reads a value where there is one; a failure has the place of the value.
+/// Parses a value, if there is one; a failure carries the value's location.
 fn read<T, V>(
     entry: Option<Spanned<V>>,
     parse: impl FnOnce(&V) -> Result<T, String>,

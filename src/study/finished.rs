@@ -1,5 +1,4 @@
-//! Finished runs that an earlier study of the same folder left: which of them a plan takes up, and which
-//! were made under other conditions.
+//! Finds the finished runs that a plan can reuse and those made under other conditions.
 
 use std::{collections::BTreeMap, fs, path::PathBuf, sync::Arc};
 
@@ -18,7 +17,7 @@ use crate::{
     scene::Scene,
 };
 
-/// The runs of `plan` that `folder` holds already.
+/// Runs of `plan` that `folder` already holds.
 pub(super) struct FinishedRuns<'a> {
     pub(super) plan: &'a Plan,
     pub(super) folder: &'a Folder,
@@ -26,8 +25,8 @@ pub(super) struct FinishedRuns<'a> {
 }
 
 impl FinishedRuns<'_> {
-    /// Conditions of the runs of one contender; `None` for overhead rounds, which have no reference
-    /// and several contenders.
+    /// Returns the conditions of a contender's runs, or with `None` those of overhead rounds, which
+    /// have no reference and several contenders.
     pub(super) fn conditions(
         &self,
         scene: &Scene,
@@ -55,7 +54,7 @@ impl FinishedRuns<'_> {
         })
     }
 
-    /// Where the record of a run lies.
+    /// Path of a run's record.
     pub(super) fn run_record(
         &self,
         scene: &Scene,
@@ -64,12 +63,12 @@ impl FinishedRuns<'_> {
         self.folder.record(&scene.name, &run_stem(contender, rule, seed))
     }
 
-    /// Where the record of an overhead round lies.
+    /// Path of an overhead round's record.
     fn round_record(&self, scene: &Scene, repetition: u32) -> PathBuf {
         self.folder.record(&scene.name, &format!("overhead-{repetition}"))
     }
 
-    /// The record of a run that is finished with everything this plan asks of it.
+    /// Reads the record of a run that is finished and holds everything the plan asks for.
     pub(super) fn run(&self, scene: &Scene, task: (Rule, u32, &Contender)) -> Result<Option<Run>> {
         let path = self.run_record(scene, task);
         Ok(self.folder.read_json::<Run>(&path)?.filter(|run| {
@@ -81,13 +80,13 @@ impl FinishedRuns<'_> {
         }))
     }
 
-    /// The record of a finished overhead round.
+    /// Reads the record of a finished overhead round with the plan's number of samples.
     pub(super) fn round(&self, scene: &Scene, repetition: u32) -> Result<Option<Round>> {
         let round = self.folder.read_json::<Round>(&self.round_record(scene, repetition))?;
         Ok(round.filter(|round| Some(round.spp) == self.plan.overhead.as_ref().map(|o| o.spp)))
     }
 
-    /// Refuses finished runs that were made under other conditions, or removes them.
+    /// Refuses finished runs that were made under other conditions, or removes them with `redo`.
     pub(super) fn check(&self, scenes: &[Scene], redo: bool) -> Result<()> {
         let mut stale: Vec<(PathBuf, String)> = Vec::new();
         let mut compare = |path: PathBuf, found: &Conditions, asked: &Conditions| {

@@ -1,4 +1,4 @@
-//! The report folder: what lies where, and how a study finds its finished runs again.
+//! The report folder: layout of its files, and records that are written and read back.
 //!
 //! ```text
 //! study.json                       marks the folder
@@ -25,16 +25,16 @@ use crate::{
     files::{check_writable, write_atomically},
 };
 
-/// The file that marks a report folder.
+/// File that marks a report folder.
 const MARK: &str = "study.json";
-/// What it says.
+/// Text of its `format`.
 const FORMAT: &str = "fenestra study 2";
 
 /// A report folder.
 #[derive(Clone, Debug)]
 pub struct Folder {
     path: PathBuf,
-    /// The mark, locked while a study writes here; the system lets go of it when the program ends.
+    /// The mark, locked while a study writes here; the system unlocks it when the program ends.
     _lock: Option<Arc<File>>,
 }
 
@@ -44,12 +44,12 @@ struct Mark {
 }
 
 impl Folder {
-    /// Opens a report folder, or makes one out of a folder that is absent or empty, and keeps other
-    /// studies out of it.
+    /// Opens a report folder, creating one where the folder is absent or empty, and locks it
+    /// against other studies.
     ///
     /// # Errors
-    /// [`Error::Format`] where `path` holds something else; [`Error::Io`] where it cannot be written;
-    /// [`Error::Usage`] where another study is at work in it.
+    /// [`Error::Format`] if `path` holds something else; [`Error::Io`] if it cannot be written;
+    /// [`Error::Usage`] if another study is at work in it.
     pub fn open(path: &Path) -> Result<Self> {
         let folder = Self { path: path.to_path_buf(), _lock: None };
         let mark = path.join(MARK);
@@ -109,10 +109,10 @@ impl Folder {
         }
     }
 
-    /// The folder of another study, to read only.
+    /// Opens the folder of another study for reading.
     ///
     /// # Errors
-    /// [`Error::Format`] where it is none.
+    /// [`Error::Format`] if it is no report folder.
     pub fn existing(path: &Path) -> Result<Self> {
         if path.join(MARK).exists() {
             Ok(Self { path: path.to_path_buf(), _lock: None })
@@ -121,30 +121,30 @@ impl Folder {
         }
     }
 
-    /// The folder itself.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Record of a run or round.
+    /// Path of the record of a run or round.
     pub fn record(&self, scene: &str, stem: &str) -> PathBuf {
         self.path.join("runs").join(scene).join(format!("{stem}.json"))
     }
 
-    /// Picture of a run or reference, as the path inside this folder.
+    /// Path of the picture of a run or reference inside this folder.
     pub fn image_name(scene: &str, stem: &str) -> String {
         format!("images/{scene}/{stem}.exr")
     }
 
-    /// Picture of a run or reference.
+    /// Path of the picture of a run or reference.
     pub fn image(&self, scene: &str, stem: &str) -> PathBuf {
         self.path.join(Self::image_name(scene, stem))
     }
 
-    /// Reads a record; `None` where there is no such file.
+    /// Reads a record, or `None` if there is no such file.
     ///
     /// # Errors
-    /// [`Error::Io`], or [`Error::Format`] where the file does not hold what it should.
+    /// [`Error::Io`], or [`Error::Format`] if the file holds something else.
     pub fn read_json<T: DeserializeOwned>(&self, path: &Path) -> Result<Option<T>> {
         let text = match fs::read_to_string(path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),

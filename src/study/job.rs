@@ -1,4 +1,4 @@
-//! One run: a sampler with one seed, rendered to its end and compared with the reference on the way.
+//! One run: a sampler with one seed, rendered to its end and compared with the reference.
 
 use super::{
     contender::Contender,
@@ -15,29 +15,29 @@ use crate::{
     scene::Scene,
 };
 
-/// The seed whose pictures are also written as PNG.
+/// Seed whose pictures are also written as PNG.
 pub const SHOWN_SEED: u32 = 1;
 
-/// A run to do.
+/// A run to render and measure.
 pub(super) struct RunJob<'a> {
     pub(super) scene: &'a Scene,
     pub(super) reference: &'a Reference,
-    /// Of previews, stops.
+    /// Exposure of previews, stops.
     pub(super) exposure: f32,
     pub(super) contender: &'a Contender,
     pub(super) rule: Rule,
     pub(super) seed: u32,
-    /// Samples at which pictures are kept, where the run ends by samples; ascending.
+    /// Samples at which a run that ends by samples keeps its picture; ascending.
     pub(super) levels: &'a [u32],
     pub(super) conditions: Conditions,
-    /// What the pictures' files say, without samples and times.
+    /// Metadata of the pictures, without samples and times.
     pub(super) metadata: Metadata,
     pub(super) folder: &'a Folder,
 }
 
 impl RunJob<'_> {
-    /// Renders and measures. The film is compared at powers of two of samples and at the levels;
-    /// reading and comparing it does not count as time of the passes.
+    /// Renders the run and compares the film at powers of two of samples and at the levels. Reading
+    /// and comparing it does not count as time of the passes.
     pub(super) fn execute(self, renderer: &mut Renderer, watch: &mut Watch<'_>) -> Result<Run> {
         renderer.restart(self.seed)?;
         let pixels = f64::from(self.scene.film.width) * f64::from(self.scene.film.height);
@@ -85,7 +85,7 @@ impl RunJob<'_> {
         })
     }
 
-    /// Samples at which the film is compared next: the next power of two or level.
+    /// Samples at the next comparison: the next power of two or level.
     fn next_stop(&self, samples: u32) -> u32 {
         let power = samples.checked_add(1).and_then(u32::checked_next_power_of_two);
         let power = power.unwrap_or(u32::MAX);
@@ -98,7 +98,7 @@ impl RunJob<'_> {
         }
     }
 
-    /// Writes the picture; its name inside the report folder.
+    /// Writes the picture; returns its path inside the report folder.
     fn keep(
         &self,
         picture: &RgbImage,
@@ -126,7 +126,7 @@ impl RunJob<'_> {
     }
 }
 
-/// A picture as an image of three channels.
+/// Converts a picture to an image of three channels.
 pub(super) fn image_of(picture: &RgbImage) -> Image {
     let mut image = Image::new(picture.width, picture.height);
     image.insert_triple(["R", "G", "B"], &picture.pixels);

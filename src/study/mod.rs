@@ -1,9 +1,10 @@
 //! Comparisons of samplers as experiments.
 //!
-//! A study file and the command line ([`mod@file`], [`plan`], [`contender`]) → runs against a reference in
-//! two halves ([`engine`], [`job`], [`mod@reference`], [`overhead`]), each kept as a [`record`] in the
-//! report [`folder`] → figures over the seeds ([`summary`], [`statistics`]) → `results.json`,
-//! `results.csv` ([`results`]) and the page ([`report`]). Errors are defined in [`metrics`].
+//! A study file and the command line ([`mod@file`], [`plan`], [`contender`]) → runs against a
+//! reference in two halves ([`engine`], [`job`], [`rule`], [`mod@reference`], [`own_errors`],
+//! [`overhead`]), each kept as a [`record`] in the report [`folder`] → figures over the seeds
+//! ([`summary`], [`statistics`]) → `results.json`, `results.csv` ([`results`]) and the page
+//! ([`report`]). [`metrics`] defines the errors.
 
 pub mod contender;
 pub mod engine;

@@ -1,8 +1,8 @@
 //! Overhead: how much more device time a sampler takes per sample than a baseline, pass by pass.
 //!
-//! Samplers take turns in rounds, in an order that turns by one from round to round, so that a
-//! machine that slows down or speeds up does so for all. Each round gives one ratio per pass; what is
-//! reported is their median with the interval that holds it with 95% confidence.
+//! Samplers take turns in rounds, rotating by one from round to round, so that a machine that slows
+//! down or speeds up affects all alike. Each round gives one ratio per pass; the result is their
+//! median with its 95% confidence interval.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{error::Result, renderer::Renderer, scene::Scene};
 
-/// The measurements of one scene to do.
+/// Overhead measurements of one scene.
 pub(super) struct OverheadJob<'a> {
     pub(super) plan: &'a OverheadPlan,
     pub(super) scene: &'a Scene,
@@ -26,8 +26,8 @@ pub(super) struct OverheadJob<'a> {
 }
 
 impl OverheadJob<'_> {
-    /// Measures the rounds that are not among `finished` and adds all to `rounds`; `make` makes the
-    /// renderer of a sampler by its index, the baseline being 0.
+    /// Measures the rounds that `finished` lacks and appends all to `rounds`; `make` creates the
+    /// renderer of a sampler by its index, 0 being the baseline.
     pub(super) fn execute(
         self,
         finished: Vec<Option<Round>>,
@@ -49,7 +49,7 @@ impl OverheadJob<'_> {
             if renderers.is_empty() {
                 for index in 0..samplers.len() {
                     let mut renderer = make(index)?;
-                    // Until the size of the waves has settled.
+                    // Render until the size of the waves has settled.
                     Pace::new(pixels, false).advance(&mut renderer, *spp, None, watch)?;
                     renderers.push(renderer);
                 }
@@ -89,7 +89,7 @@ impl OverheadJob<'_> {
     }
 }
 
-/// Samplers and their parameters, by label; the baseline is marked.
+/// Describes the samplers' parameters, by label, and marks the baseline.
 pub(super) fn describe_parameters(plan: &OverheadPlan) -> BTreeMap<String, String> {
     let text = |parameters: BTreeMap<String, String>| {
         let pairs: Vec<String> =
@@ -115,9 +115,9 @@ pub struct Overhead {
     pub sampler: String,
     /// The baseline's label.
     pub baseline: String,
-    /// Share of the baseline's shadow rays that are blocked; absent where none was traced.
+    /// Share of the baseline's shadow rays that are blocked; absent if none was traced.
     pub blocked_share: Option<f64>,
-    /// The same of this sampler's.
+    /// The same for this sampler.
     pub own_blocked_share: Option<f64>,
     /// Device time of all passes over that of the baseline.
     pub total: Interval,
@@ -125,7 +125,7 @@ pub struct Overhead {
     pub wall: Interval,
     /// Median device milliseconds per sample: of the baseline, and of this sampler.
     pub total_ms: [f64; 2],
-    /// By pass.
+    /// Overhead of each pass.
     pub passes: Vec<PassOverhead>,
     /// Median of the sampler's other figures, by name.
     pub statistics: BTreeMap<String, f64>,
@@ -138,16 +138,15 @@ pub struct Overhead {
 pub struct PassOverhead {
     /// Name of the pass.
     pub pass: String,
-    /// Median device milliseconds per sample: of the baseline, and of this sampler; 0 where the
-    /// sampler has no such pass.
+    /// Median device milliseconds per sample: of the baseline, and of this sampler; 0 if absent.
     pub ms: [f64; 2],
-    /// Ratio of the two; absent where one side has no such pass.
+    /// Ratio of the two; absent if one side has no such pass.
     pub ratio: Option<Interval>,
-    /// What the pass adds, as a share of the baseline's whole time.
+    /// Time that the pass adds, as a share of the baseline's whole time.
     pub added_share: Interval,
 }
 
-/// Overheads of every scene and sampler, in the order of the first round.
+/// Computes the overhead of every sampler in every scene, in the order of the first round.
 pub fn overheads(rounds: &[Round], baseline: &str) -> Vec<Overhead> {
     let mut scenes: Vec<&str> = Vec::new();
     for round in rounds {
@@ -174,7 +173,7 @@ fn find<'a>(round: &'a Round, sampler: &str) -> Option<&'a Timing> {
     round.timings.iter().find(|timing| timing.sampler == sampler)
 }
 
-/// One sampler from its pairs of timings, the baseline's first.
+/// Computes one sampler's overhead from pairs of timings, the baseline's first.
 fn overhead(scene: &str, baseline: &str, sampler: &str, pairs: &[[&Timing; 2]]) -> Overhead {
     let each =
         |value: &dyn Fn(&[&Timing; 2]) -> f64| median_interval(pairs.iter().map(value).collect());
@@ -242,7 +241,7 @@ mod tests {
     }
 
     fn rounds() -> Vec<Round> {
-        // The machine slows down by a third per round; the ratios do not.
+        // The machine slows down from round to round; the ratios stay.
         (1..=9)
             .map(|repetition| {
                 let slow = 1.0 + f64::from(repetition) / 3.0;

@@ -1,18 +1,18 @@
-//! Errors of a reference itself, and which errors measured against it are well above them.
+//! A reference's own errors, and the test whether an error stands out from them.
 
 use serde::{Deserialize, Serialize};
 
-/// A run is judged where its mean squared error is at least this many times the reference's own.
+/// A run is judged if its mean squared error is at least this many times the reference's own.
 pub const JUDGED_FROM: f64 = 4.0;
 
-/// What is known of a reference's own error.
+/// A reference's own errors, as far as they are known.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct OwnErrors {
-    /// Where it comes from.
+    /// Origin of the reference.
     pub description: String,
-    /// Samples per pixel of both halves, where known.
+    /// Samples per pixel of both halves, if known.
     pub spp: Option<u64>,
-    /// Wall time of the passes of both halves, seconds, where known.
+    /// Wall time of the passes of both halves, seconds, if known.
     pub seconds: Option<f64>,
     /// Mean squared error of the mean of the halves; absent for one image without variances.
     pub mse: Option<f64>,
@@ -22,12 +22,11 @@ pub struct OwnErrors {
     pub relmse_trimmed: Option<f64>,
     /// Mean over pixels and channels.
     pub mean: f64,
-    /// Standard error of that mean, an upper estimate; absent where the files have no variances.
+    /// Standard error of that mean, an upper estimate; absent if the files have no variances.
     pub mean_standard_error: Option<f64>,
 }
 
-/// Whether an error is well above the reference's own. Where that is unknown, every error that is
-/// positive is taken.
+/// Tests whether an error is well above the reference's own, or positive if that is unknown.
 pub fn is_judged(error: f64, own: Option<f64>) -> bool {
     error > 0.0 && own.is_none_or(|own| error >= JUDGED_FROM * own)
 }

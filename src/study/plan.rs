@@ -1,8 +1,7 @@
-//! What a study does: options in layers → a complete plan.
+//! Plan of a study: layers of options → a complete plan.
 //!
-//! Options come from the study file's `[settings]`, its `[quick]` table and the command line; a later
-//! layer replaces what an earlier one said. [`Plan::new`] fills in defaults and refuses what cannot
-//! be done.
+//! Options come from the study file's `[settings]`, its `[quick]` table and the command line; later
+//! layers override earlier ones. [`Plan::new`] fills in defaults and rejects impossible plans.
 
 use std::{path::PathBuf, time::Duration};
 
@@ -14,19 +13,19 @@ use crate::{
     sampler::{Parameters, Sampler},
 };
 
-/// Samples per pixel where neither samples nor time are given.
+/// Samples per pixel if neither samples nor time are given.
 const DEFAULT_SPP: u32 = 64;
-/// Samples of the reference over the largest number of samples compared.
+/// Ratio of the reference's samples to the largest number of samples compared.
 const REFERENCE_FACTOR: u32 = 16;
 /// Least samples of a reference by default.
 const LEAST_REFERENCE_SPP: u32 = 1024;
-/// The study's own name where none is given.
+/// Title of a study without one.
 const DEFAULT_TITLE: &str = "Comparison of samplers";
 
-/// Options of one layer; what is absent is left to the layers below.
+/// Options of one layer; absent ones are left to the layers below.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
-    /// What is compared; the first is the one that ratios are taken to.
+    /// Contenders compared; ratios are to the first.
     pub samplers: Option<Vec<Contender>>,
     /// Samples per pixel at which the samplers are compared; empty for none.
     pub spp: Option<Vec<u32>>,
@@ -44,9 +43,9 @@ pub struct Options {
     pub reference_sampler: Option<Contender>,
     /// Samples per pixel of the reference, both halves together.
     pub reference_spp: Option<u32>,
-    /// Whether overhead is measured.
+    /// True to measure overhead.
     pub overhead: Option<bool>,
-    /// The sampler whose time overhead is measured against.
+    /// Sampler that overhead is measured against.
     pub overhead_baseline: Option<Contender>,
     /// Samples per pixel of one overhead measurement.
     pub overhead_spp: Option<u32>,
@@ -55,7 +54,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// These options, and those of `below` where there are none.
+    /// Returns these options, with those of `below` where one is absent.
     #[must_use]
     pub fn over(self, below: Self) -> Self {
         Self {
@@ -81,7 +80,7 @@ impl Options {
 pub struct PublishedErrors {
     /// Scene by name.
     pub scene: String,
-    /// Where the figures stand, such as "Table 6.1".
+    /// Place of the figures, such as "Table 6.1".
     pub source: String,
     /// Samples per pixel.
     pub spp: u32,
@@ -92,7 +91,7 @@ pub struct PublishedErrors {
 /// A ratio of times that a publication reports.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PublishedOverhead {
-    /// What it is about.
+    /// Subject of the ratio.
     pub label: String,
     /// Least ratio.
     pub low: f64,
@@ -100,7 +99,7 @@ pub struct PublishedOverhead {
     pub high: f64,
 }
 
-/// What the study file says beyond options.
+/// Texts and published figures of a study file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Description {
     /// Heading of the report.
@@ -113,20 +112,20 @@ pub struct Description {
     pub published_overheads: Vec<PublishedOverhead>,
 }
 
-/// How overhead is measured.
+/// Plan of the overhead measurements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OverheadPlan {
-    /// The sampler in the denominator.
+    /// Sampler in the denominator.
     pub baseline: Contender,
-    /// The samplers in the numerator; without the baseline.
+    /// Samplers in the numerator, without the baseline.
     pub contenders: Vec<Contender>,
     /// Samples per pixel of one measurement.
     pub spp: u32,
-    /// Rounds of measurements; in each, every sampler is measured once.
+    /// Rounds; each measures every sampler once.
     pub repetitions: u32,
 }
 
-/// Where the reference comes from.
+/// Source of the reference.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ReferencePlan {
     /// Rendered in two halves.
@@ -147,13 +146,13 @@ pub enum ReferencePlan {
 pub struct Plan {
     /// Heading of the report.
     pub title: String,
-    /// The rest of the study file.
+    /// Texts and published figures of the study file.
     pub description: Description,
     /// Scene files.
     pub scenes: Vec<PathBuf>,
     /// Film size instead of the scenes' own.
     pub size: Option<[u32; 2]>,
-    /// What is compared.
+    /// Contenders compared.
     pub contenders: Vec<Contender>,
     /// Samples per pixel at which the samplers are compared, ascending; may be empty.
     pub spp: Vec<u32>,
@@ -165,9 +164,9 @@ pub struct Plan {
     pub shadow_rays: u32,
     /// Path vertices at which environment light is gathered.
     pub depth: u32,
-    /// Where the reference comes from.
+    /// Source of the reference.
     pub reference: ReferencePlan,
-    /// How overhead is measured, if it is.
+    /// Overhead measurements, if any.
     pub overhead: Option<OverheadPlan>,
 }
 
@@ -175,7 +174,7 @@ impl Plan {
     /// Completes `options`; `references` are images, or the folder of another study.
     ///
     /// # Errors
-    /// [`Error::Usage`] with the option, what was expected and what was found.
+    /// [`Error::Usage`] names the option, what was expected and what was found.
     pub fn new(
         scenes: Vec<PathBuf>,
         description: Description,
@@ -282,14 +281,14 @@ impl Plan {
         })
     }
 
-    /// Whether errors are compared, for which a reference is needed.
+    /// True if errors are compared, which needs a reference.
     pub fn compares(&self) -> bool {
         !self.spp.is_empty() || self.time.is_some()
     }
 
-    /// Every run of a scene in the order of the work, by rule (the largest number of samples, and the
-    /// time), seed and sampler; the order of the samplers turns by one from seed to seed, so that none is
-    /// always the first.
+    /// Lists every run of a scene in order of execution: by rule (the largest number of samples,
+    /// then the time), seed and sampler. The samplers rotate by one from seed to seed, so that none
+    /// is always first.
     pub fn tasks(&self) -> Vec<(Rule, u32, &Contender)> {
         let samples = self.spp.last().copied().map(Rule::Spp);
         let contenders = &self.contenders;
@@ -306,7 +305,7 @@ impl Plan {
     }
 }
 
-/// A sampler with its default parameters.
+/// Returns `sampler` with default parameters.
 fn plain(sampler: Sampler) -> Contender {
     Contender { label: sampler.name().to_owned(), sampler, parameters: Parameters::default() }
 }

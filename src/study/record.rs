@@ -1,4 +1,4 @@
-//! What a study keeps of every run: the records of `runs/` and of `results.json`.
+//! Records of runs, stored in `runs/` and in `results.json`.
 
 use std::collections::BTreeMap;
 
@@ -18,11 +18,10 @@ use crate::{
     renderer::{Renderer, Totals},
 };
 
-/// What [`Renderer::host_ms`] calls the rebuilds of the guide.
+/// Name of the guide's rebuilds in [`Renderer::host_ms`].
 const GUIDE_REBUILDS: &str = "guide rebuilds";
 
-/// What a run was made under, besides its sampler, rule and seed. A run is taken up again only where
-/// all of it is the same.
+/// Conditions of a run besides its sampler, rule and seed; a run is reused only if all agree.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Conditions {
     /// Fenestra's version.
@@ -39,14 +38,14 @@ pub struct Conditions {
     pub shadow_rays: u32,
     /// Path vertices at which environment light is gathered.
     pub depth: u32,
-    /// What the errors were measured against.
+    /// Reference that the errors were measured against.
     pub reference: String,
-    /// Parameters of the samplers, as text, by sampler's label and name.
+    /// Parameters as text, by name; those of overhead rounds by sampler's label.
     pub parameters: BTreeMap<String, String>,
 }
 
 impl Conditions {
-    /// What differs, as "what: there against here".
+    /// Lists differing conditions as "name: ours there, theirs asked for".
     pub fn differences(&self, asked: &Self) -> Vec<String> {
         let mut found = Vec::new();
         let mut compare = |what: &str, ours: String, theirs: String| {
@@ -68,7 +67,7 @@ impl Conditions {
     }
 }
 
-/// The first digits of a hash, which tell scenes apart.
+/// Returns the first digits of a hash, which tell scenes apart.
 fn short(hash: &str) -> String {
     hash.chars().take(12).collect()
 }
@@ -82,7 +81,7 @@ fn join(parameters: &BTreeMap<String, String>) -> String {
     pairs.join(" ")
 }
 
-/// A film after some samples, against the reference.
+/// Errors of a film after some samples.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
     /// Samples per pixel.
@@ -95,7 +94,7 @@ pub struct Measurement {
     pub rays: u64,
     /// Mean squared error; may be negative, see [`super::metrics`].
     pub mse: f64,
-    /// Its root, 0 where it is negative.
+    /// Its root, 0 if it is negative.
     pub rmse: f64,
     /// Mean relative squared error.
     pub relmse: f64,
@@ -107,19 +106,19 @@ pub struct Measurement {
     pub relmse_max: f64,
     /// Mean of the picture over that of the reference.
     pub mean_ratio: f64,
-    /// Difference of the two means in its standard errors; absent where the reference does not say
-    /// how sure its mean is, or below two samples.
+    /// Difference of the two means in its standard errors; absent below two samples, or if the
+    /// standard error of the reference's mean is unknown.
     pub mean_deviation: Option<f64>,
-    /// Whether `mse` is well above the reference's own.
+    /// True if `mse` is well above the reference's own.
     pub mse_judged: bool,
-    /// Whether both relative errors are well above the reference's own.
+    /// True if both relative errors are well above the reference's own.
     pub relmse_judged: bool,
-    /// Picture in the report folder, for those that are kept.
+    /// Path in the report folder, if the picture is kept.
     pub image: Option<String>,
 }
 
 impl Measurement {
-    /// Compares the film of `renderer` after `seconds` of passes.
+    /// Compares the film of `renderer` after `seconds` of passes with `reference`.
     ///
     /// # Errors
     /// The device fails, or a pixel is not finite.
@@ -173,31 +172,31 @@ pub struct Run {
     pub scene: String,
     /// Contender's label.
     pub sampler: String,
-    /// What ended it.
+    /// Rule that ended it.
     pub rule: Rule,
     /// Seed of the random numbers.
     pub seed: u32,
-    /// What it was made under.
+    /// Conditions it was made under.
     pub conditions: Conditions,
-    /// The film on its way, ascending in samples; the last is the finished film.
+    /// Measurements by ascending samples; the last is of the finished film.
     pub measurements: Vec<Measurement>,
     /// Device milliseconds per sample of every pixel, by pass.
     pub gpu_ms_per_sample: BTreeMap<String, f64>,
     /// Rays traced by kind.
     pub rays: BTreeMap<String, u64>,
-    /// Share of shadow rays that reached the environment; absent where none was traced.
+    /// Share of shadow rays that reached the environment; absent if none was traced.
     pub visible_share: Option<f64>,
     /// Other figures of the sampler, by name.
     pub statistics: BTreeMap<String, f64>,
 }
 
 impl Run {
-    /// The finished film's measurement.
+    /// Returns the finished film's measurement.
     pub fn last(&self) -> Option<&Measurement> {
         self.measurements.last()
     }
 
-    /// The measurement of a rule: at so many samples, or the last of a run by time.
+    /// Returns the measurement at the rule's number of samples, or the last of a run by time.
     pub fn at(&self, rule: Rule) -> Option<&Measurement> {
         match (rule, self.rule) {
             (Rule::Spp(spp), Rule::Spp(_)) => {
@@ -221,7 +220,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// What a renderer has counted since its last restart, in `seconds` of passes.
+    /// Collects a renderer's figures since its last restart, over `seconds` of passes.
     pub fn of(renderer: &Renderer, seconds: f64) -> Self {
         let totals = renderer.totals();
         let samples = f64::from(renderer.sample_count().max(1));
@@ -246,7 +245,7 @@ impl Figures {
     }
 }
 
-/// Figures of the totals that only some samplers or some runs have; 0 is left out.
+/// Figures that only some samplers or some runs have; dropped samples and overruns only if not 0.
 fn statistics(totals: &Totals) -> impl Iterator<Item = (String, f64)> {
     [
         ("dropped_samples", totals.dropped_samples as f64),
@@ -258,8 +257,7 @@ fn statistics(totals: &Totals) -> impl Iterator<Item = (String, f64)> {
     .chain(totals.sampler_statistics())
 }
 
-/// Share of the wall time of the passes that the host took to rebuild the guide; none for samplers that
-/// have no guide.
+/// Share of the passes' wall time that the host spent on rebuilding the guide, if there is one.
 fn guide_rebuild_share(host_ms: &BTreeMap<String, f64>, seconds: f64) -> Option<(String, f64)> {
     let ms = host_ms.get(GUIDE_REBUILDS)?;
     (seconds > 0.0).then(|| ("guide_rebuild_share".to_owned(), 1e-3 * ms / seconds))
@@ -274,7 +272,7 @@ pub struct Timing {
     pub wall_ms_per_sample: f64,
     /// Device milliseconds per sample, by pass.
     pub gpu_ms_per_sample: BTreeMap<String, f64>,
-    /// Share of shadow rays that reached the environment.
+    /// Share of shadow rays that reached the environment; absent if none was traced.
     pub visible_share: Option<f64>,
     /// Other figures of the sampler, by name.
     pub statistics: BTreeMap<String, f64>,
@@ -292,13 +290,13 @@ impl Timing {
 pub struct Round {
     /// Scene's name.
     pub scene: String,
-    /// Number of the round from 1, which is also the seed.
+    /// Number of the round from 1, also the seed.
     pub repetition: u32,
     /// Samples per pixel of each measurement.
     pub spp: u32,
-    /// What it was made under.
+    /// Conditions it was made under.
     pub conditions: Conditions,
-    /// In the order they were made; that order turns by one from round to round.
+    /// In the order of measurement, which rotates by one from round to round.
     pub timings: Vec<Timing>,
 }
 
@@ -317,11 +315,11 @@ pub struct SceneRecord {
     pub height: u32,
     /// Triangles.
     pub triangles: u64,
-    /// The reference, where errors were compared.
+    /// The reference's own errors, if errors were compared.
     pub reference: Option<OwnErrors>,
 }
 
-/// The part of a file's name that says which run it belongs to.
+/// Returns the part of a file name that identifies its run.
 pub fn run_stem(contender: &Contender, rule: Rule, seed: u32) -> String {
     format!("{}-{}-seed{seed}", contender.file_stem(), rule.file_stem())
 }

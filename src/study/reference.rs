@@ -34,7 +34,7 @@ use crate::{
 
 /// Seeds of the halves; those of runs count up from 1.
 pub const SEEDS: [u32; 2] = [u32::MAX - 1, u32::MAX];
-/// An interrupted half loses at most the passes of this time, even where the program is killed.
+/// Time between checkpoints of a half: even a killed program loses only the passes since the last.
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
 
 /// A reference with its own errors.
@@ -42,13 +42,13 @@ const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
 pub struct Reference {
     /// First half.
     pub first: RgbImage,
-    /// Second half; the first again where there is only one image.
+    /// Second half; the first again if there is only one image.
     pub second: RgbImage,
-    /// How sure it is.
+    /// Its own errors.
     pub own: OwnErrors,
 }
 
-/// What tells references apart in the records of runs.
+/// Describes a reference for the records of runs, so that different ones can be told apart.
 ///
 /// # Errors
 /// [`Error::Io`] for a reference file that cannot be read.
@@ -77,7 +77,7 @@ pub fn identity(plan: &ReferencePlan, scene: &str) -> Result<String> {
     }
 }
 
-/// The files of a reference that is not rendered here.
+/// Lists the files of a reference that is not rendered here.
 fn given_files(plan: &ReferencePlan, scene: &str) -> Result<Vec<PathBuf>> {
     match plan {
         ReferencePlan::Render { .. } => Ok(Vec::new()),
@@ -95,7 +95,7 @@ pub fn half_stems() -> [&'static str; 2] {
 }
 
 impl Reference {
-    /// Reads images that were given: one, or two independent halves.
+    /// Reads given images: one, or two independent halves.
     ///
     /// # Errors
     /// Files that cannot be read; [`Error::Comparison`] for another size or scene, values that are
@@ -133,11 +133,11 @@ impl Reference {
         Self::from_images(&images, format!("read from {}", names.join(" and ")))
     }
 
-    /// Renders what is missing of the two halves in `folder` and reads both. A half that was
-    /// interrupted is continued from its checkpoint.
+    /// Renders what `folder` lacks of the two halves and reads both. An interrupted half continues
+    /// from its checkpoint.
     ///
-    /// `metadata` describes the render without its samples; `make_renderer` is called where there is
-    /// something to render.
+    /// `metadata` describes the render without its samples; `make_renderer` is called only if there
+    /// is something to render.
     ///
     /// # Errors
     /// [`Error::Interrupted`] after the checkpoint has been written; a failing device or disk.
@@ -239,7 +239,7 @@ impl Reference {
         Ok(Self { first, second, own })
     }
 
-    /// Mean of the halves.
+    /// Averages the halves.
     pub fn mean(&self) -> RgbImage {
         let mean = |(a, b): (&[f32; 3], &[f32; 3])| {
             std::array::from_fn(|channel| 0.5 * (a[channel] + b[channel]))
@@ -252,7 +252,7 @@ impl Reference {
     }
 }
 
-/// Whether `path` holds the render that `metadata` describes.
+/// Tests whether `path` holds the render that `metadata` describes.
 fn is_finished(path: &Path, metadata: &Metadata) -> Result<bool> {
     if !path.exists() {
         return Ok(false);
@@ -280,7 +280,7 @@ fn render_half(
     let mut pace = Pace::new(pixels, false);
     let mut last_checkpoint = Instant::now();
     while renderer.sample_count() < count {
-        // As many samples as look about a checkpoint's interval long, in whole passes.
+        // Render whole passes until the samples double or the next checkpoint is due.
         let step = renderer.sample_count().max(1).saturating_mul(2).min(count);
         let limit = (last_checkpoint + CHECKPOINT_INTERVAL)
             .saturating_duration_since(Instant::now())
@@ -316,13 +316,13 @@ fn render_half(
     Ok(())
 }
 
-/// What was learned up to a checkpoint, beside it.
+/// Path of the guide learned up to a checkpoint, beside it.
 fn guide_path(checkpoint: &Path) -> PathBuf {
     checkpoint.with_extension("guide")
 }
 
-/// Takes up the checkpoint of a half where there is one of the same render, with what was learned if
-/// the sampler learns; else the half starts from its first sample. Seconds that the passes took before.
+/// Restores a half from a checkpoint of the same render, with the guide if the sampler learns, and
+/// returns the seconds of its passes. Without one, the half starts from its first sample.
 fn resume(renderer: &mut Renderer, path: &Path, metadata: &Metadata) -> Result<f64> {
     let SampleRange { seed, count, .. } = metadata.sample_ranges[0];
     if !path.exists() {
@@ -336,8 +336,8 @@ fn resume(renderer: &mut Renderer, path: &Path, metadata: &Metadata) -> Result<f
     }
     let mut guide = None;
     if renderer.guide_state()?.is_some() {
-        // The two files are written one after the other; a study that was killed in between has two
-        // that do not belong together.
+        // The two files are written one after the other; a study killed in between leaves two that
+        // do not belong together.
         let state = GuideState::read(&guide_path(path)).ok();
         let Some(state) = state.filter(|state| state.samples == samples) else { return Ok(0.0) };
         guide = Some(state);

@@ -1,4 +1,4 @@
-//! `results.json` and `results.csv`: every run of a study with what it was made on.
+//! `results.json` and `results.csv`: every run of a study and its circumstances.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{error::Result, files::write_atomically, gpu::Device};
 
-/// What a study was made on and how it was asked for.
+/// Machine, version and command of a study.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Circumstances {
     /// Fenestra's version.
@@ -28,7 +28,7 @@ pub struct Circumstances {
     pub date: String,
     /// The command line.
     pub command: String,
-    /// The processor and how many of it the program may use.
+    /// Processor, cores that the program may use, operating system.
     pub machine: String,
     /// Vulkan device.
     pub device: String,
@@ -37,7 +37,7 @@ pub struct Circumstances {
 }
 
 impl Circumstances {
-    /// As of now, for the command line of this process.
+    /// Describes this process and device, now.
     pub fn new(device: &Device) -> Self {
         let capabilities = device.capabilities();
         let arguments: Vec<String> = std::env::args_os()
@@ -59,7 +59,7 @@ impl Circumstances {
     }
 }
 
-/// Name of the processor where the system tells it, and the number of cores.
+/// Name of the processor, if the system tells it, number of cores and operating system.
 fn machine() -> String {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let information = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
@@ -70,8 +70,8 @@ fn machine() -> String {
     format!("{name}, {cores} cores, {}", std::env::consts::OS)
 }
 
-/// "2026-11-21 05:40 UTC". The day follows from the days since 1 March 2000, after which every block
-/// of 400, 100, 4 and 1 years has its leap day at its end.
+/// Formats a time as "2026-11-21 05:40 UTC". Days count from 1 March 2000, so that every block of
+/// 400, 100, 4 and 1 years has its leap day at its end.
 fn date(now: SystemTime) -> String {
     let seconds = now.duration_since(UNIX_EPOCH).map_or(0, |elapsed| elapsed.as_secs());
     const DAYS_TO_MARCH_2000: i64 = 11_017;
@@ -83,7 +83,7 @@ fn date(now: SystemTime) -> String {
     let years = (rest / 365).min(3);
     let day_of_year = rest - years * 365;
     let year = 2000 + 400 * blocks + 100 * centuries + 4 * leaps + years;
-    // Months from March have 31, 30, 31, 30, 31 days, twice, and then January and February.
+    // Months from March have 31, 30, 31, 30, 31 days, twice, followed by January and February.
     let month = (5 * day_of_year + 2) / 153;
     let day = day_of_year - (153 * month + 2) / 5 + 1;
     let (year, month) = if month < 10 { (year, month + 3) } else { (year + 1, month - 9) };
@@ -98,9 +98,9 @@ pub struct Report {
     pub title: String,
     /// Paragraphs under the heading.
     pub notes: Vec<String>,
-    /// Whether the study was interrupted before its end.
+    /// True unless the study was interrupted before its end.
     pub is_complete: bool,
-    /// What it was made on.
+    /// Machine, version and command.
     pub circumstances: Circumstances,
     /// Directions traced at every vertex.
     pub shadow_rays: u32,
@@ -108,7 +108,7 @@ pub struct Report {
     pub depth: u32,
     /// Runs of each sampler.
     pub seeds: u32,
-    /// Samplers' parameters by label, where they are not all at their defaults' names.
+    /// Parameters of each sampler, by label.
     pub samplers: BTreeMap<String, BTreeMap<String, String>>,
     /// Samplers in the order of the plan.
     pub order: Vec<String>,
@@ -116,7 +116,7 @@ pub struct Report {
     pub scenes: Vec<SceneRecord>,
     /// Figures over the seeds.
     pub summaries: Vec<Summary>,
-    /// Errors on the way.
+    /// Errors against samples and time.
     pub curves: Vec<Curve>,
     /// Overheads.
     pub overheads: Vec<Overhead>,
@@ -131,7 +131,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// Puts results in order.
+    /// Computes the figures of `results`.
     pub fn new(
         plan: &Plan,
         results: Results,
@@ -177,8 +177,7 @@ impl Report {
         })
     }
 
-    /// One row for every run and rule, a column for every figure; a figure that a run does not have
-    /// is empty.
+    /// Formats a row for every run and rule; columns of figures that a run lacks are empty.
     fn csv(&self, rules: &[Rule]) -> String {
         let names = |of: &dyn Fn(&Run) -> Vec<String>| -> BTreeSet<String> {
             self.runs.iter().flat_map(of).collect()
@@ -221,7 +220,7 @@ impl Report {
     }
 }
 
-/// The columns that every run has.
+/// Returns the columns that every run has.
 fn row(run: &Run, rule: Rule, measurement: &Measurement, kinds: &BTreeSet<String>) -> Vec<String> {
     let parameters: Vec<String> =
         run.conditions.parameters.iter().map(|(name, value)| format!("{name}={value}")).collect();
@@ -259,7 +258,7 @@ fn row(run: &Run, rule: Rule, measurement: &Measurement, kinds: &BTreeSet<String
     row
 }
 
-/// A field, in quotation marks where it needs them (RFC 4180).
+/// Quotes a field that needs it (RFC 4180).
 fn quoted(field: &str) -> String {
     if field.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", field.replace('"', "\"\""))

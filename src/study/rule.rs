@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-/// What ends a run.
+/// Rule that ends a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Rule {
@@ -15,12 +15,12 @@ pub enum Rule {
 }
 
 impl Rule {
-    /// Rule of a duration.
+    /// Rule of a wall time.
     pub fn time(time: Duration) -> Self {
         Self::Seconds(time.as_secs_f64())
     }
 
-    /// "400 spp" or "30 s".
+    /// Returns "400 spp" or "30 s".
     pub fn describe(self) -> String {
         match self {
             Self::Spp(spp) => format!("{spp} spp"),
@@ -28,7 +28,7 @@ impl Rule {
         }
     }
 
-    /// "400spp" or "30s", for file names.
+    /// Returns "400spp" or "30s", for file names.
     pub fn file_stem(self) -> String {
         self.describe().replace(' ', "")
     }

@@ -1,8 +1,8 @@
-//! Intervals and slopes over the runs of a study.
+//! Intervals, standard errors and slopes over the runs of a study.
 
 use serde::Serialize;
 
-/// A value with the interval that holds it with 95% confidence.
+/// A value with its 95% confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Interval {
     /// The estimate.
@@ -30,8 +30,7 @@ fn t_quantile(degrees_of_freedom: usize) -> f64 {
     })
 }
 
-/// Mean of values that are taken as normally distributed; the interval of a single value is the value.
-/// `None` for no values.
+/// Mean of normally distributed values; a single value is its own interval. `None` for no values.
 pub fn mean_interval(values: &[f64]) -> Option<Interval> {
     let count = values.len();
     let mean = values.iter().sum::<f64>() / count as f64;
@@ -47,8 +46,7 @@ pub fn mean_interval(values: &[f64]) -> Option<Interval> {
     }
 }
 
-/// Geometric mean of positive values whose logarithms are taken as normally distributed. `None` for
-/// no values or where one is not positive.
+/// Geometric mean of log-normally distributed values. `None` for no values or one not positive.
 pub fn geometric_interval(values: &[f64]) -> Option<Interval> {
     if values.iter().any(|value| value.is_nan() || *value <= 0.0) {
         return None;
@@ -62,8 +60,8 @@ pub fn geometric_interval(values: &[f64]) -> Option<Interval> {
 }
 
 /// Median with the narrowest pair of order statistics that holds the true median with at least 95%
-/// confidence, whatever the distribution; the whole range below six values, where no pair does. Zeros
-/// for no values.
+/// confidence, whatever the distribution; below six values, where no pair does, the whole range.
+/// Zeros for no values.
 pub fn median_interval(mut values: Vec<f64>) -> Interval {
     values.sort_by(f64::total_cmp);
     let count = values.len();
@@ -94,8 +92,8 @@ pub fn slope(points: &[[f64; 2]]) -> Option<f64> {
     (square > 0.0).then(|| product / square)
 }
 
-/// Standard error of the mean over pixels and channels, from the standard errors of the pixels;
-/// channels are taken as fully correlated, pixels as independent.
+/// Standard error of the mean over pixels and channels, from the pixels' standard errors; takes
+/// channels as fully correlated and pixels as independent.
 pub fn mean_standard_error(errors: impl Iterator<Item = [f64; 3]>) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0_f64);
     for error in errors {

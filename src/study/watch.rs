@@ -1,5 +1,4 @@
-//! Rendering under watch: passes short enough to be interrupted between, and a forecast of the time
-//! that is left.
+//! Interruptible rendering: short passes, and a forecast of the time left.
 
 use std::time::{Duration, Instant};
 
@@ -8,18 +7,18 @@ use crate::{
     renderer::Renderer,
 };
 
-/// Passes are grouped so that Ctrl-C is noticed about this often.
+/// Duration aimed at for a pass, and so the delay until Ctrl-C is noticed.
 const LOOK_AROUND: Duration = Duration::from_millis(250);
-/// Seconds per camera path before any was measured.
+/// Seconds per camera path until some are measured.
 const FIRST_GUESS: f64 = 2e-6;
 
-/// Who follows a study.
+/// Follower of a study's progress.
 pub trait Observer {
-    /// Whether the study shall end as soon as it can without losing a finished run.
+    /// True if the study should end as soon as it can without losing a finished run.
     fn is_interrupted(&self) -> bool;
-    /// Shows the share done, 0…1, by time.
+    /// Shows the fraction done, 0…1, by time.
     fn update(&mut self, fraction: f64, rays_per_second: f64);
-    /// Shows a line that stays.
+    /// Shows a permanent line.
     fn note(&mut self, line: &str);
 }
 
@@ -48,18 +47,18 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Adds work ahead; negative values take it back.
+    /// Adds expected work; negative values take it back.
     pub fn expect(&mut self, paths: f64, seconds: f64) {
         self.paths_left += paths;
         self.seconds_left += seconds;
     }
 
-    /// Shows a line that stays.
+    /// Shows a permanent line.
     pub fn note(&mut self, line: &str) {
         self.observer.note(line);
     }
 
-    /// Ends the study if the observer wants it.
+    /// Fails if the observer interrupts the study.
     ///
     /// # Errors
     /// [`Error::Interrupted`].
@@ -67,7 +66,7 @@ impl<'a> Watch<'a> {
         if self.observer.is_interrupted() { Err(Error::Interrupted) } else { Ok(()) }
     }
 
-    /// Takes account of a pass.
+    /// Accounts for a pass.
     fn count(&mut self, paths: f64, seconds: f64, by_time: bool, rays_per_second: f64) {
         self.measured_paths += paths;
         self.measured_seconds += seconds;
@@ -95,7 +94,7 @@ impl<'a> Watch<'a> {
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
     pixels: f64,
-    /// Whether the forecast counts the run in seconds; else in camera paths.
+    /// True if the forecast counts the run in seconds, not in camera paths.
     by_time: bool,
     pass_samples: u32,
     /// Wall time of the passes so far, seconds.
@@ -103,14 +102,14 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// Before the first pass over a film of so many pixels; `by_time` says whether the forecast
-    /// counts the run in seconds or in camera paths.
+    /// Starts before the first pass over a film of `pixels`; `by_time` makes the forecast count the
+    /// run in seconds instead of camera paths.
     pub fn new(pixels: f64, by_time: bool) -> Self {
         Self { pixels, by_time, pass_samples: 1, seconds: 0.0 }
     }
 
-    /// Renders until the film has `target` samples, or until the passes of this run have taken
-    /// `limit` seconds. Of a limited run, at least one sample is rendered.
+    /// Renders until the film has `target` samples or the passes of this run have taken `limit`
+    /// seconds. A limited run renders at least one sample.
     ///
     /// # Errors
     /// [`Error::Interrupted`], or the device fails.
@@ -138,14 +137,14 @@ impl Pace {
         Ok(())
     }
 
-    /// Whether the time is over.
+    /// True if the run has reached its time limit.
     pub fn is_over(&self, limit: Option<f64>, renderer: &Renderer) -> bool {
         renderer.sample_count() > 0 && limit.is_some_and(|limit| self.seconds >= limit)
     }
 }
 
-/// Samples of the next pass: at most twice as many, about [`LOOK_AROUND`] long, not beyond `left`
-/// seconds.
+/// Samples of the next pass: at most twice as many, to take about [`LOOK_AROUND`] and to end within
+/// `left` seconds.
 fn next_pass_samples(samples: u32, took: f64, left: f64) -> u32 {
     let per_sample = took.max(1e-6) / f64::from(samples);
     let wanted = left.clamp(0.0, LOOK_AROUND.as_secs_f64());

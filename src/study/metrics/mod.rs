@@ -1,8 +1,8 @@
 //! Error metrics of a picture against a reference, in linear radiance and unclamped.
 //!
 //! For pixel `p` and colour channel `c` let `d = x − r`, `e(p)` the mean of `d²` over the three
-//! channels, `L(p)` the reference's mean over RGB box-filtered over the 5×5 pixels around `p` (those
-//! inside the image), and `L̄` the mean of the reference over pixels and channels.
+//! channels, `L(p)` the reference's mean over RGB box-filtered over the 5×5 pixels around `p`
+//! (those inside the image), and `L̄` the mean of the reference over pixels and channels.
 //!
 //! | metric | definition |
 //! |---|---|
@@ -11,35 +11,34 @@
 //! | `mae` | mean of abs `d` over pixels and channels |
 //! | `relmse` | mean over the pixels of `e / (L² + 0.01·L̄²)` |
 //! | `relmse_trimmed` | the same without the worst 0.1% of the pixels |
-//! | `relmse_p999` | 99.9th percentile of `e / (L² + 0.01·L̄²)`: the largest that `relmse_trimmed` keeps |
+//! | `relmse_p999` | 99.9th percentile of that quotient: the largest that `relmse_trimmed` keeps |
 //! | `relmse_max` | the largest of all pixels |
 //! | `mean_ratio` | mean of `x` / mean of `r` |
 //! | `psnr` | 10·log₁₀(peak² / mse), peak the reference's largest channel value, decibels |
 //! | `max_error` | largest abs `d` |
 //!
-//! With the reference in two independent halves, `d²` is replaced by `(x − r₁)(x − r₂)`, whose
-//! expectation is free of the reference's own noise; `r` elsewhere is the mean of the halves. The
-//! estimates of `mse` and `relmse` can then be negative, which says that the reference is too noisy
-//! to judge the picture.
+//! With the reference in two independent halves, `(x − r₁)(x − r₂)` replaces `d²`; its expectation
+//! is free of the reference's own noise. Elsewhere `r` is the mean of the halves. The estimates of
+//! `mse` and `relmse` can then be negative: the reference is too noisy to judge the picture.
 
 use crate::{
     error::{Error, Result},
     film::RgbImage,
 };
 
-/// Side of the box filter of relMSE's denominator is `2·RADIUS + 1`.
+/// Radius of relMSE's box filter, whose side is `2·RADIUS + 1`.
 const RADIUS: usize = 2;
 /// Share of L̄² that keeps relMSE's denominator from vanishing.
 const RELATIVE_FLOOR: f64 = 0.01;
 /// Pixels left out of `relmse_trimmed`: one in this many, rounded down.
 const TRIMMED_ONE_IN: usize = 1000;
 
-/// Error of a picture against a reference; definitions in the [module](self)'s text.
+/// Errors of a picture against a reference, as the [module](self) defines them.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Metrics {
     /// Mean squared error.
     pub mse: f64,
-    /// Root of the mean squared error; 0 where a two-halves estimate of it is negative.
+    /// Root of the mean squared error; 0 if a two-halves estimate of it is negative.
     pub rmse: f64,
     /// Mean absolute error.
     pub mae: f64,
@@ -47,11 +46,11 @@ pub struct Metrics {
     pub relmse: f64,
     /// Mean relative squared error without the worst 0.1% of the pixels.
     pub relmse_trimmed: f64,
-    /// 99.9th percentile of the pixels' relative squared errors: the largest without the worst 0.1%.
+    /// 99.9th percentile of the pixels' relative squared errors: the trimmed mean's largest.
     pub relmse_p999: f64,
     /// Largest relative squared error of a pixel.
     pub relmse_max: f64,
-    /// Mean of the picture over that of the reference; 1 where both are black.
+    /// Mean of the picture over that of the reference; 1 if both are black.
     pub mean_ratio: f64,
     /// Peak signal-to-noise ratio, decibels; infinite for equal pictures.
     pub psnr: f64,
@@ -74,7 +73,7 @@ impl Metrics {
         "max_error",
     ];
 
-    /// Every metric, in the order of [`Metrics::NAMES`].
+    /// Returns every metric, in the order of [`Metrics::NAMES`].
     pub fn values(&self) -> [f64; 10] {
         [
             self.mse,
@@ -90,7 +89,7 @@ impl Metrics {
         ]
     }
 
-    /// Metric by name.
+    /// Looks up a metric by name.
     pub fn get(&self, name: &str) -> Option<f64> {
         Self::NAMES.iter().position(|&known| known == name).map(|index| self.values()[index])
     }
@@ -142,7 +141,7 @@ impl Metrics {
     }
 }
 
-/// Reference with 64-bit channels, so that the mean of two halves is exact.
+/// Mean of the reference's halves, exact in 64-bit channels.
 struct MeanReference {
     width: usize,
     height: usize,
@@ -160,8 +159,8 @@ fn mean_picture(first: &RgbImage, second: &RgbImage) -> MeanReference {
     }
 }
 
-/// `e(p)` of every pixel: the mean over RGB of `(x − r₁)(x − r₂)`. Pass one reference twice for the
-/// plain squared error.
+/// Computes `e(p)` of every pixel: the mean over RGB of `(x − r₁)(x − r₂)`. Pass one reference
+/// twice for the plain squared error.
 ///
 /// # Errors
 /// [`Error::Comparison`]: no pixels, different sizes, values that are not finite.
@@ -177,7 +176,7 @@ pub fn squared_errors(picture: &RgbImage, first: &RgbImage, second: &RgbImage) -
     Ok(picture.pixels.iter().zip(&first.pixels).zip(&second.pixels).map(error).collect())
 }
 
-/// `e / (L² + 0.01·L̄²)` of every pixel, from [`squared_errors`] against the same reference.
+/// Computes `e / (L² + 0.01·L̄²)` of every pixel.
 ///
 /// # Errors
 /// As [`squared_errors`].
@@ -190,7 +189,8 @@ pub fn relative_squared_errors(
     Ok(relative_errors(&squared, &mean_picture(first, second)))
 }
 
-/// A black reference makes the denominator 0: no error stays 0, any other becomes infinite.
+/// Divides errors by `L² + 0.01·L̄²`. If a black reference makes that 0, an error of 0 stays 0 and
+/// any other becomes infinite.
 fn relative_errors(squared: &[f64], reference: &MeanReference) -> Vec<f64> {
     let grey: Vec<f64> =
         reference.pixels.iter().map(|pixel| pixel.iter().sum::<f64>() / 3.0).collect();
@@ -203,7 +203,7 @@ fn relative_errors(squared: &[f64], reference: &MeanReference) -> Vec<f64> {
     squared.iter().zip(filtered).map(relative).collect()
 }
 
-/// Mean over the 5×5 pixels around each, of those inside the image.
+/// Averages, for every pixel, those of the 5×5 pixels around it that are inside the image.
 fn box_filter(values: &[f64], width: usize, height: usize) -> Vec<f64> {
     let around =
         |centre: usize, end: usize| centre.saturating_sub(RADIUS)..(centre + RADIUS + 1).min(end);
@@ -217,18 +217,18 @@ fn box_filter(values: &[f64], width: usize, height: usize) -> Vec<f64> {
     (0..values.len()).map(mean_at).collect()
 }
 
-/// What is told of the relative squared errors of all pixels.
+/// Statistics of the relative squared errors of all pixels.
 struct RelativeErrors {
     mean: f64,
-    /// Mean without the largest [`TRIMMED_ONE_IN`]-th.
+    /// Mean without the largest one in [`TRIMMED_ONE_IN`].
     trimmed: f64,
-    /// The largest without the largest [`TRIMMED_ONE_IN`]-th.
+    /// Largest value in the trimmed mean.
     p999: f64,
     max: f64,
 }
 
 impl RelativeErrors {
-    /// Of at least one value.
+    /// Computes the statistics of at least one value.
     fn of(mut values: Vec<f64>) -> Self {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let kept = values.len() - values.len() / TRIMMED_ONE_IN;

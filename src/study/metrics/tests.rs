@@ -63,7 +63,7 @@ fn psnr_takes_the_peak_of_the_reference() {
 #[test]
 fn relmse_divides_by_the_filtered_reference() {
     let (x, r) = example();
-    // Both pixels see both: L = 2 = L̄, so that the denominator is 4 + 0.04.
+    // Both windows hold both pixels: L = 2 = L̄, and the denominator is 4 + 0.04.
     let expected = (2.0 / 3.0 + 4.0 / 3.0) / 2.0 / 4.04;
     assert!((Metrics::of(&x, &r).unwrap().relmse - expected).abs() < 1e-15);
     let relative = relative_squared_errors(&x, &r, &r).unwrap();
@@ -72,8 +72,8 @@ fn relmse_divides_by_the_filtered_reference() {
 
 #[test]
 fn relmse_filter_is_five_pixels_wide_and_ends_at_the_border() {
-    // A row of seven with one bright pixel of grey 15 at index 3: L̄ = 15/7. Windows of index 0 to 6
-    // hold 3, 4, 5, 5, 5, 4, 3 pixels, and those of 0 and 6 miss the bright one.
+    // A row of seven with one bright pixel of grey 15 at index 3: L̄ = 15/7. Windows of index 0 to
+    // 6 hold 3, 4, 5, 5, 5, 4, 3 pixels, and those of 0 and 6 miss the bright one.
     let mut pixels = [[0.0; 3]; 7];
     pixels[3] = [15.0; 3];
     let reference = picture(7, &pixels);
@@ -86,7 +86,7 @@ fn relmse_filter_is_five_pixels_wide_and_ends_at_the_border() {
         let expected = 1.0 / (local * local + floor);
         assert!((found / expected - 1.0).abs() < 1e-14, "{found} against {expected}");
     }
-    // The same as a column.
+    // The same picture as a column.
     let column = |pixels: &[[f32; 3]]| picture(1, pixels);
     let turned =
         relative_squared_errors(&column(&shifted), &column(&pixels), &column(&pixels)).unwrap();
@@ -102,8 +102,8 @@ fn relmse_of_a_black_reference_is_infinite_unless_the_picture_is_black() {
 
 #[test]
 fn trimming_drops_one_pixel_in_a_thousand() {
-    // 2000 pixels of reference 1 and error 1, three of them with error 10, 20 and 30: the two worst
-    // go, 1997·1 + 100 over 1998 remain, over the denominator 1.01.
+    // 2000 pixels of reference 1 and error 1, but 10, 20 and 30 in three of them: without the two
+    // worst, 1997·1 + 100 over 1998 remain, over the denominator 1.01.
     let reference = picture(50, &[[1.0; 3]; 2000]);
     let mut pixels = [[2.0; 3]; 2000];
     pixels[1234] = [11.0; 3];
@@ -113,7 +113,7 @@ fn trimming_drops_one_pixel_in_a_thousand() {
     assert!((metrics.relmse_trimmed - (1997.0 + 100.0) / 1998.0 / 1.01).abs() < 1e-12);
     let all = (1997.0 + 100.0 + 400.0 + 900.0) / 2000.0 / 1.01;
     assert!((metrics.relmse - all).abs() < 1e-12);
-    // The third of 2000 is the largest that at least 99.9% do not exceed.
+    // The third largest of 2000 is the least value that 99.9% do not exceed.
     assert!((metrics.relmse_p999 - 100.0 / 1.01).abs() < 1e-12);
     assert!((metrics.relmse_max - 900.0 / 1.01).abs() < 1e-12);
     // Below a thousand pixels nothing is dropped.
@@ -125,7 +125,7 @@ fn trimming_drops_one_pixel_in_a_thousand() {
 
 #[test]
 fn the_percentile_is_the_nearest_rank() {
-    // 999 errors 1, 2, … 999 over 1.01: none is dropped; with a thousandth, the one before the last.
+    // Errors 1, 2, … over 1.01: of 999 none is dropped, of 1000 the largest is.
     let percentile = |count: u16| {
         let values = (1..=count).map(|value| [f32::from(value).sqrt() + 1.0; 3]);
         let pixels: Vec<[f32; 3]> = values.collect();

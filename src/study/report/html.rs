@@ -1,10 +1,10 @@
-//! Small pieces of HTML: escaped text, numbers as people read them, tables.
+//! HTML building blocks: escaped text, readable numbers, tables.
 
 use std::fmt::Write;
 
 use crate::study::statistics::Interval;
 
-/// Text with the characters that mean something in HTML replaced; fit for content and attributes.
+/// Escapes the special characters of HTML, for content and attributes.
 pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
@@ -14,7 +14,7 @@ pub fn escape(text: &str) -> String {
             '>' => escaped.push_str("&gt;"),
             '"' => escaped.push_str("&quot;"),
             '\'' => escaped.push_str("&#39;"),
-            // Two of them mark the places of the templates.
+            // Two of them mark the placeholders of the templates.
             '{' => escaped.push_str("&#123;"),
             other => escaped.push(other),
         }
@@ -22,7 +22,7 @@ pub fn escape(text: &str) -> String {
     escaped
 }
 
-/// A number with `digits` significant digits: 0.0213, 14.5, 2.1e-5.
+/// Formats a number with `digits` significant digits: 0.0213, 14.5, 2.1e−5.
 pub fn number(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value == 0.0 { "0".to_owned() } else { "–".to_owned() };
@@ -38,7 +38,7 @@ pub fn number(value: f64, digits: usize) -> String {
     }
 }
 
-/// "0.54 (0.50–0.58)".
+/// Formats an interval: "0.54 (0.50–0.58)".
 pub fn interval(interval: &Interval, digits: usize) -> String {
     let [middle, low, high] =
         [interval.middle, interval.low, interval.high].map(|value| number(value, digits));
@@ -48,25 +48,24 @@ pub fn interval(interval: &Interval, digits: usize) -> String {
     format!("{middle} <span class=\"interval\">({low}–{high})</span>")
 }
 
-/// A ratio of times as a percentage more or less: "+12.3% (+11.9–+12.8)".
+/// Formats a ratio of times as a percentage more or less: "+12.3% (+11.9 to +12.8)".
 pub fn percent_more(ratio: &Interval) -> String {
     let percent = |value: f64| format!("{:+.1}", 100.0 * (value - 1.0)).replace('-', "−");
     let [middle, low, high] = [ratio.middle, ratio.low, ratio.high].map(percent);
     format!("{middle}% <span class=\"interval\">({low} to {high})</span>")
 }
 
-/// A number of samples, whole or a mean.
+/// Formats a number of samples, whole or a mean.
 pub fn count(value: f64) -> String {
     if value.fract() == 0.0 { format!("{value:.0}") } else { format!("{value:.1}") }
 }
 
-/// A share as a percentage.
+/// Formats a share as a percentage.
 pub fn percent(share: f64) -> String {
     format!("{}%", number(100.0 * share, 3))
 }
 
-/// A table with a caption in plain, escaped text; the first column is its rows' headings. Cells are
-/// HTML.
+/// A table: escaped caption, row headings in the first column, cells in HTML.
 pub struct Table {
     caption: String,
     head: Vec<String>,
@@ -74,7 +73,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table without rows.
+    /// Creates a table without rows.
     pub fn new(caption: impl Into<String>, head: &[&str]) -> Self {
         Self {
             caption: caption.into(),
@@ -93,12 +92,12 @@ impl Table {
         self.rows.push((starts_group, cells));
     }
 
-    /// Whether there are rows.
+    /// True if there are no rows.
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
-    /// The table, in a frame that scrolls sideways where it is too wide for the page.
+    /// Renders the table in a frame that scrolls sideways if it is too wide for the page.
     pub fn html(&self) -> String {
         let mut html = format!(
             "<p class=\"caption\">{0}</p><div class=\"table\" role=\"region\" tabindex=\"0\" \

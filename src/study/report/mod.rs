@@ -1,8 +1,8 @@
 //! The page of a study, `index.html`: one file that needs no network.
 //!
-//! Text, tables and plots are written here and stand without JavaScript; `page.js` adds the viewer
-//! (two pictures over each other, one zoom and pan for all pictures of a scene). Colours follow the
-//! reader's choice of light or dark (`page.css`).
+//! Text, tables and plots work without JavaScript; `page.js` adds the viewer (two overlaid
+//! pictures, one zoom and pan for all pictures of a scene). Colours follow the reader's choice of
+//! light or dark (`page.css`).
 
 pub mod html;
 pub mod pictures;
@@ -26,10 +26,10 @@ use html::{escape, number};
 use pictures::{Picture, ScenePictures};
 use plot::{STYLE_COUNT, Series};
 
-/// Up to so many samplers, pictures of every rule are shown; of more, only those of the largest
+/// Largest number of samplers that show pictures of every rule; more show only those of the largest
 /// number of samples and of the time.
 const FEW_SAMPLERS: usize = 3;
-/// Colours of the false-colour legend.
+/// Steps of the false-colour legend.
 const RAMP_STEPS: u32 = 16;
 
 /// Writes `index.html`.
@@ -84,7 +84,7 @@ pub fn write(report: &Report, plan: &Plan, folder: &Folder) -> Result<()> {
     write_atomically(&folder.path().join("index.html"), |file| file.write_all(page.as_bytes()))
 }
 
-/// Title, notes, links.
+/// Header: title, notes, links.
 fn start(report: &Report) -> String {
     let facts = &report.circumstances;
     let mut html = format!(
@@ -136,7 +136,7 @@ fn picture_style(scene: usize, number: usize, picture: &Picture) -> String {
     rule(false, &picture.colour) + &rule(true, &picture.error)
 }
 
-/// "visibility, 400 spp", or "reference".
+/// Names a picture: "visibility, 400 spp" or "reference".
 fn picture_name(picture: &Picture) -> String {
     match picture.rule {
         Some(rule) => format!("{}, {}", escape(&picture.sampler), rule.describe()),
@@ -261,7 +261,7 @@ fn picture_group(index: usize, scene: &SceneRecord, scene_pictures: &ScenePictur
          </figure>",
         picture_class(index, 0, false)
     );
-    // Magnified, the largest number of samples shows best; without one, whatever there is.
+    // Magnify the largest number of samples, or all pictures if no rule is by samples.
     let last = pictures
         .iter()
         .filter_map(|picture| picture.rule)
@@ -272,7 +272,7 @@ fn picture_group(index: usize, scene: &SceneRecord, scene_pictures: &ScenePictur
     for (crop, name) in crops.iter().zip(["A", "B", "C"]) {
         for (number, picture) in pictures.iter().enumerate().filter(|item| is_magnified(&item)) {
             let caption = format!("{name}: {}", picture_name(picture));
-            // Positions of backgrounds count in shares of what is left over.
+            // Background positions are shares of the space left over.
             let position = |start: f64| 100.0 * start / (1.0 - crop.size).max(1e-6);
             let _ = write!(
                 html,
@@ -376,7 +376,7 @@ fn plots(report: &Report, scene: &SceneRecord) -> String {
     )
 }
 
-/// Marker and text; `text` is HTML.
+/// Legend entry of marker and text; `text` is HTML.
 fn legend_entry(style: usize, text: &str) -> String {
     format!(
         "<li class=\"s{}\"><svg viewBox=\"-6 -6 12 12\" aria-hidden=\"true\"><g class=\"mark\">{}\
@@ -453,7 +453,7 @@ fn overhead_section(report: &Report) -> String {
     )
 }
 
-/// Definitions and what the study was made on.
+/// Definitions, and circumstances of the study.
 fn end(report: &Report) -> String {
     let facts = &report.circumstances;
     let mut rows = String::new();
@@ -531,7 +531,7 @@ mod tests {
         for place in ["title", "style", "script", "pictures", "body"] {
             assert!(page.contains(&format!("{{{{{place}}}}}")), "{place}");
         }
-        // Nothing is fetched from anywhere.
+        // The page fetches nothing.
         for text in [page, include_str!("page.css"), include_str!("page.js")] {
             assert!(
                 !text.contains("http:") && !text.contains("https:") && !text.contains("@import")

@@ -1,5 +1,5 @@
 "use strict";
-// Pictures of a scene: one zoom and pan for all, and two of them over each other.
+// Viewer: one zoom and pan for all pictures of a scene, two of them overlaid.
 document.body.classList.remove("without-script");
 
 const LARGEST_ZOOM = 32;

@@ -1,5 +1,4 @@
-//! Pictures of the page: display PNGs as data URIs, error maps in false colour, and which parts are
-//! worth a magnified look.
+//! Pictures of the page: PNGs as data URIs, error maps in false colour, parts worth magnifying.
 
 use std::path::PathBuf;
 
@@ -19,12 +18,12 @@ use crate::{
     },
 };
 
-/// A picture that the page shows, once in its style sheet and wherever its class is used.
+/// A picture of the page, stored once in its style sheet and shown wherever its class is used.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Contender's label; empty for the reference.
     pub sampler: String,
-    /// What ended the run; absent for the reference.
+    /// Rule that ended the run; absent for the reference.
     pub rule: Option<Rule>,
     /// Display picture as a data URI.
     pub colour: String,
@@ -48,7 +47,7 @@ pub struct Crop {
 pub struct ScenePictures {
     /// All of one size.
     pub pictures: Vec<Picture>,
-    /// Of every error map of the scene.
+    /// Scale of every error map of the scene.
     pub scale: Scale,
     /// Parts with the largest errors.
     pub crops: Vec<Crop>,
@@ -58,9 +57,8 @@ pub struct ScenePictures {
 const CROP_SIZE: f64 = 0.2;
 const CROP_COUNT: usize = 2;
 
-/// Reads the pictures of a scene from the report folder; those of the first seed are shown, errors are
-/// root mean squares over all seeds. The error maps are written beside the pictures as well, with
-/// their legend.
+/// Reads the pictures of a scene: those shown are of the first seed, errors are root mean squares
+/// over all seeds. Also writes the error maps, with a legend, beside the pictures in the folder.
 ///
 /// # Errors
 /// A picture cannot be read, or an error map cannot be written.
@@ -160,7 +158,7 @@ fn data_uri(width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<String> {
     Ok(format!("data:image/png;base64,{}", base64(&png)))
 }
 
-/// Base 64 with padding (RFC 4648).
+/// Encodes in base 64 with padding (RFC 4648).
 fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
@@ -175,7 +173,7 @@ fn base64(bytes: &[u8]) -> String {
     text
 }
 
-/// The parts with the largest mean error that do not overlap.
+/// Chooses the parts with the largest mean error that do not overlap.
 fn choose_crops(errors: &[f64], width: usize, height: usize) -> Vec<Crop> {
     let side = |length: usize| ((length as f64 * CROP_SIZE).round() as usize).clamp(1, length);
     let (crop_width, crop_height) = (side(width), side(height));

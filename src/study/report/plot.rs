@@ -10,7 +10,7 @@ const LEFT: f64 = 58.0;
 const RIGHT: f64 = 12.0;
 const TOP: f64 = 10.0;
 const BOTTOM: f64 = 46.0;
-/// Colours and markers of the page.
+/// Number of colours and markers of the page.
 pub const STYLE_COUNT: usize = 8;
 
 /// A point with its band or error bar.
@@ -33,13 +33,13 @@ pub struct Point {
 pub struct Series {
     /// Index of colour and marker.
     pub style: usize,
-    /// What it is, for the tooltip.
+    /// Name in the tooltip.
     pub name: String,
-    /// In the order in which they are joined.
+    /// Points in the order in which they are joined.
     pub points: Vec<Point>,
 }
 
-/// One axis: from values to a share of its length.
+/// Axis: maps values to shares of its length.
 struct Axis {
     low: f64,
     high: f64,
@@ -48,7 +48,7 @@ struct Axis {
 }
 
 impl Axis {
-    /// Logarithmic with ticks at 1, 2 and 5 of every decade, or at the decades where there are many.
+    /// Logarithmic, with ticks at 1, 2 and 5 of every decade, or only at 1 over three decades.
     fn logarithmic(values: impl Iterator<Item = f64>) -> Self {
         let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
         for value in values.filter(|value| *value > 0.0 && value.is_finite()) {
@@ -167,7 +167,7 @@ impl Frame {
     }
 }
 
-/// A marker centred on the origin, of a shape of its own for each style.
+/// Marker of a style, centred on the origin.
 pub fn marker(style: usize) -> &'static str {
     match style % STYLE_COUNT {
         0 => "<circle r=\"4\"/>",
@@ -186,12 +186,12 @@ fn tooltip(series: &Series, point: &Point) -> String {
     format!("<title>{}: {}, {}</title>", escape(&series.name), number(point.x), number(point.y))
 }
 
-/// Lines with bands on two logarithmic axes, and a faint line of slope −½ through the middle.
+/// Draws lines with bands on two logarithmic axes, and a faint line of slope −½.
 pub fn log_log(title: &str, x_title: &str, y_title: &str, series: &[Series]) -> String {
     let all = || series.iter().flat_map(|series| &series.points);
     let frame = Frame {
         x: Axis::logarithmic(all().map(|point| point.x)),
-        // Of bands that are much wider than the curves are apart, only a part is shown.
+        // Fit the ordinates to bands of at most a factor of 3, so that curves are not squashed.
         y: Axis::logarithmic(all().flat_map(|point| {
             [point.y, point.low.max(point.y / 3.0), point.high.min(point.y * 3.0)]
         })),
@@ -199,7 +199,7 @@ pub fn log_log(title: &str, x_title: &str, y_title: &str, series: &[Series]) -> 
     let mut svg = frame.start(title, x_title, y_title);
     let [x0, x1] = [frame.x.low, frame.x.high];
     let middle = (frame.y.low * frame.y.high).sqrt() * (x0 * x1).powf(0.25);
-    // The part of the guide that lies in the frame.
+    // Clip the guide to the frame.
     let inside = |x: f64| x.clamp((middle / frame.y.high).powi(2), (middle / frame.y.low).powi(2));
     let [x0, x1] = [inside(x0), inside(x1)];
     let _ = write!(
@@ -243,7 +243,7 @@ pub fn log_log(title: &str, x_title: &str, y_title: &str, series: &[Series]) -> 
 /// A published range, drawn as a band over the whole width.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Range {
-    /// What it is.
+    /// Text of the band.
     pub label: String,
     /// Lower ordinate.
     pub low: f64,
@@ -251,7 +251,7 @@ pub struct Range {
     pub high: f64,
 }
 
-/// Points with error bars over 0…100% on linear axes; ordinates in percent.
+/// Draws points with error bars over 0…100% on linear axes; ordinates in percent.
 pub fn scatter(
     title: &str,
     x_title: &str,
@@ -305,8 +305,8 @@ pub fn scatter(
     svg + &labels(&frame, series) + "</svg>"
 }
 
-/// Texts of the points of a scatter plot: right of points on the left, and in a column left of those on
-/// the right, where scenes crowd; pushed apart, with a line to the point.
+/// Labels the points of a scatter plot: points on the left beside them; those on the right, where
+/// scenes crowd, in an evenly spaced column to their left, with a line to each point.
 fn labels(frame: &Frame, series: &[Series]) -> String {
     const CROWDED_FROM: f64 = 60.0;
     const SPACING: f64 = 15.0;
@@ -325,7 +325,7 @@ fn labels(frame: &Frame, series: &[Series]) -> String {
     }
     crowded.sort_by(|a, b| frame.y(a.y).total_cmp(&frame.y(b.y)));
     let column = crowded.iter().map(|point| frame.x(point.x)).fold(WIDTH, f64::min) - 26.0;
-    // Centred on the points as a block, but inside the frame.
+    // Centre the block on the points, but inside the frame.
     let count = crowded.len() as f64;
     let centre = crowded.iter().map(|point| frame.y(point.y)).sum::<f64>() / count.max(1.0);
     let height = SPACING * (count - 1.0).max(0.0);

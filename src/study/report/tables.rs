@@ -14,7 +14,7 @@ use crate::study::{
 
 const NOT_JUDGED: &str = "<span class=\"refused\">not judged</span>";
 
-/// A ratio that is marked where the whole interval is below 1, or why there is none.
+/// Formats a ratio, marked if it is better, or says that it is not judged.
 fn ratio_cell(ratio: Option<&Interval>, is_better: bool) -> String {
     match ratio {
         Some(ratio) if is_better => format!("<span class=\"best\">{}</span>", interval(ratio, 3)),
@@ -29,7 +29,7 @@ fn find<'a>(report: &'a Report, scene: &str, sampler: &str, rule: Rule) -> Optio
     })
 }
 
-/// What the tables at a glance show of a summary.
+/// A figure of the tables at a glance.
 struct Glance {
     caption: &'static str,
     value: fn(&Summary) -> Option<&Interval>,
@@ -65,7 +65,7 @@ pub fn at_a_glance(report: &Report, rules: &[Rule]) -> String {
     let mut html = "<p>Geometric means over pairs of the same seed with their 95% intervals; bold \
                     where the whole interval is better than 1.</p>"
         .to_owned();
-    // Of many samplers the tables are too wide to stand side by side.
+    // The tables of many samplers are too wide to stand side by side.
     html += if others.len() <= 2 { "<div class=\"side\">" } else { "<div>" };
     for glance in &GLANCES {
         html += &format!("<div>{}</div>", glance_table(report, rules, (first, others), glance));
@@ -107,7 +107,7 @@ fn glance_table(
     table.html()
 }
 
-/// One table for each source and scene that the study has figures of its own for.
+/// Tables of published figures beside the study's own, one for each source and scene.
 pub fn published(report: &Report) -> String {
     let mut sources: Vec<(&str, &str)> = Vec::new();
     for entry in &report.published_errors {

@@ -13,7 +13,7 @@ use super::{
     statistics::{Interval, geometric_interval, mean_interval, slope},
 };
 
-/// Where the mean differs by more than so many standard errors, it is pointed out.
+/// Standard errors between the means beyond which the report points the deviation out.
 pub const SUSPICIOUS_DEVIATION: f64 = 4.0;
 
 /// One sampler in one scene under one rule, over all seeds.
@@ -23,7 +23,7 @@ pub struct Summary {
     pub scene: String,
     /// Contender's label.
     pub sampler: String,
-    /// What ended the runs, or the number of samples on the way.
+    /// Rule that ended the runs, or a number of samples on the way.
     pub rule: Rule,
     /// Runs.
     pub runs: usize,
@@ -43,19 +43,18 @@ pub struct Summary {
     pub relmse_trimmed: f64,
     /// Mean of the 99.9th percentiles of the pixels' relative squared errors.
     pub relmse_p999: f64,
-    /// Mean of the largest.
+    /// Mean of the pixels' largest relative squared errors.
     pub relmse_max: f64,
-    /// Whether `mse` is at least [`JUDGED_FROM`](super::own_errors::JUDGED_FROM) times the reference's own.
+    /// True if `mse` passes [`is_judged`].
     pub mse_judged: bool,
-    /// Whether the relative errors are.
+    /// True if both relative errors pass it.
     pub relmse_judged: bool,
-    /// RMSE over that of the first sampler, from pairs of the same seed; absent where one of them is
-    /// not judged.
+    /// RMSE over that of the first sampler, by pairs of one seed; absent if one is not judged.
     pub rmse_ratio: Option<Interval>,
     /// Root of trimmed relMSE over that of the first sampler, likewise.
     pub relative_ratio: Option<Interval>,
     /// MSE · seconds of the first sampler over that of this one: how many times as fast this one
-    /// reaches the same error. Absent where one of them is not judged.
+    /// reaches the same error. Absent if one is not judged.
     pub efficiency: Option<Interval>,
     /// Mean over the seeds of the picture's mean over the reference's.
     pub mean_ratio: Interval,
@@ -70,7 +69,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Whether the mean is further from the reference's than noise explains.
+    /// True if the mean deviates from the reference's by more than noise explains.
     pub fn is_suspicious(&self) -> bool {
         self.mean_deviation.is_some_and(|deviation| deviation.abs() > SUSPICIOUS_DEVIATION)
     }
@@ -81,13 +80,13 @@ impl Summary {
     }
 }
 
-/// Every rule of a plan that summaries are made for.
+/// Lists the rules of a plan that summaries are made for.
 pub fn rules(plan: &Plan) -> Vec<Rule> {
     plan.spp.iter().copied().map(Rule::Spp).chain(plan.time.map(Rule::time)).collect()
 }
 
-/// Summaries in the plan's order of scenes, rules and samplers; those without a finished run are left
-/// out.
+/// Summarises runs in the plan's order of scenes, rules and samplers; leaves out samplers without a
+/// finished run.
 pub fn summaries(plan: &Plan, scenes: &[SceneRecord], runs: &[Run]) -> Vec<Summary> {
     let mut all = Vec::new();
     for scene in scenes {
@@ -106,7 +105,7 @@ pub fn summaries(plan: &Plan, scenes: &[SceneRecord], runs: &[Run]) -> Vec<Summa
     all
 }
 
-/// The runs of a scene and sampler with their measurement under `rule`.
+/// Pairs the runs of a scene and sampler with their measurement under `rule`.
 fn pairs<'a>(
     runs: &'a [Run],
     scene: &str,
@@ -209,19 +208,19 @@ fn summary(
     }
 }
 
-/// A film on its way, over all seeds.
+/// Error after some samples, over all seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CurvePoint {
     /// Samples per pixel.
     pub spp: u32,
     /// Mean wall time of the passes, seconds.
     pub seconds: f64,
-    /// Root of the mean over the seeds of the mean squared errors, with the interval of the single
-    /// runs' geometric mean around it.
+    /// Root of the seeds' mean squared error, with the interval of the single runs' geometric mean
+    /// scaled around it.
     pub rmse: Interval,
 }
 
-/// Error of one sampler in one scene on its way.
+/// Error of one sampler in one scene against samples and time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Curve {
     /// Scene's name.
@@ -236,8 +235,8 @@ pub struct Curve {
     pub slope_seconds: Option<f64>,
 }
 
-/// Curves in the plan's order. Runs by samples are taken where there are some, else those by time, of
-/// which only numbers of samples that every run has reached.
+/// Computes curves in the plan's order, from runs by samples if there are some, else from runs by
+/// time. Points are at numbers of samples that every run has reached.
 pub fn curves(plan: &Plan, scenes: &[SceneRecord], runs: &[Run]) -> Vec<Curve> {
     let mut all = Vec::new();
     for scene in scenes {
