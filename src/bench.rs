@@ -43,7 +43,7 @@ const CHUNK: usize = 4096;
 
 /// What to measure.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plan {
+pub struct RayPlan {
     /// How the directions of shadow rays are chosen; not `ris`.
     pub sampler: Sampler,
     /// Shadow rays per hit.
@@ -58,7 +58,7 @@ pub struct Plan {
 
 /// Median of repeated measurements with the extremes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Spread {
+pub struct RateSpread {
     /// Middle value.
     pub median: f64,
     /// Least value.
@@ -67,7 +67,7 @@ pub struct Spread {
     pub most: f64,
 }
 
-impl Spread {
+impl RateSpread {
     /// Median and extremes of `values`; zeros if there are none.
     pub fn of(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
@@ -88,11 +88,11 @@ pub struct RayRate {
     /// Share of them that met a surface.
     pub hit_share: f64,
     /// Million rays a second on the device, by timestamps.
-    pub device_mrays: Spread,
+    pub device_mrays: RateSpread,
     /// Million rays a second of obvhs's traversal on the CPU.
-    pub obvhs_mrays: Spread,
+    pub obvhs_mrays: RateSpread,
     /// Ratios of neighbouring measurements, device to obvhs.
-    pub ratio: Spread,
+    pub ratio: RateSpread,
     /// Rays for which the two disagree whether a surface is met.
     pub disagreements: usize,
 }
@@ -180,7 +180,7 @@ struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    fn new(device: &'a Arc<Device>, scene: &'a SceneBuffers, plan: &Plan) -> Result<Self> {
+    fn new(device: &'a Arc<Device>, scene: &'a SceneBuffers, plan: &RayPlan) -> Result<Self> {
         let paths = u64::from(plan.paths);
         let make = |name, count: u64, size: usize| Buffer::new(device, name, count * size as u64);
         let rays = make("rays", paths, size_of::<Ray>())?;
@@ -297,7 +297,7 @@ pub fn measure(
     device: &Arc<Device>,
     scene: &SceneBuffers,
     accel: &Accel,
-    plan: &Plan,
+    plan: &RayPlan,
 ) -> Result<Vec<RayRate>> {
     let bench = Bench::new(device, scene, plan)?;
     let yardstick = Yardstick::new(accel, plan.threads);
@@ -369,9 +369,9 @@ fn compare(
         kind,
         rays: rays.len(),
         hit_share: hits as f64 / rays.len().max(1) as f64,
-        device_mrays: Spread::of(device),
-        obvhs_mrays: Spread::of(cpu),
-        ratio: Spread::of(ratio),
+        device_mrays: RateSpread::of(device),
+        obvhs_mrays: RateSpread::of(cpu),
+        ratio: RateSpread::of(ratio),
         disagreements: 0,
     };
     Ok((rate, met))
@@ -383,8 +383,14 @@ mod tests {
 
     #[test]
     fn spreads_have_the_middle_value() {
-        assert_eq!(Spread::of(vec![3.0, 1.0, 2.0]), Spread { median: 2.0, least: 1.0, most: 3.0 });
-        assert_eq!(Spread::of(vec![4.0, 1.0]), Spread { median: 2.5, least: 1.0, most: 4.0 });
-        assert_eq!(Spread::of(vec![]), Spread { median: 0.0, least: 0.0, most: 0.0 });
+        assert_eq!(
+            RateSpread::of(vec![3.0, 1.0, 2.0]),
+            RateSpread { median: 2.0, least: 1.0, most: 3.0 }
+        );
+        assert_eq!(
+            RateSpread::of(vec![4.0, 1.0]),
+            RateSpread { median: 2.5, least: 1.0, most: 4.0 }
+        );
+        assert_eq!(RateSpread::of(vec![]), RateSpread { median: 0.0, least: 0.0, most: 0.0 });
     }
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::{options::parse_size, print_line};
 use crate::{
     accel::Accel,
-    bench::{Plan, RayRate, Spread, measure},
+    bench::{RateSpread, RayPlan, RayRate, measure},
     error::{Error, Result},
     gpu::{Device, PassTimes},
     pass::geometry::triangle_page_bytes,
@@ -66,9 +66,9 @@ struct Report {
     yardstick: String,
     rays: Vec<RayRate>,
     /// Shadow rays a second of whole passes of direct light, in millions.
-    direct_light_mrays: Spread,
+    direct_light_mrays: RateSpread,
     /// The same over the rate of the shadow pass alone in the same passes.
-    direct_light_share: Spread,
+    direct_light_share: RateSpread,
     /// Device milliseconds per pass, for one sample per pixel of direct light.
     pass_ms: PassTimes,
     /// Milliseconds of the first use of each pass, which is when drivers compile, and of the
@@ -113,7 +113,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let window = window_of(&settings, &scene);
     let buffers = Arc::new(SceneBuffers::from_accel(&device, &scene, window, &accel)?);
 
-    let plan = Plan {
+    let plan = RayPlan {
         sampler: arguments.sampler,
         shadow_rays: arguments.shadow_rays,
         paths: padded_pixels(film),
@@ -161,8 +161,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             plan.threads
         ),
         rays,
-        direct_light_mrays: Spread::of(mrays),
-        direct_light_share: Spread::of(shares),
+        direct_light_mrays: RateSpread::of(mrays),
+        direct_light_share: RateSpread::of(shares),
         pass_ms,
         compile_ms: renderer.compile_ms().clone(),
         host_ms,
@@ -212,7 +212,7 @@ fn text(report: &Report) -> String {
         String::new(),
         "rays         traced   hits   device Mrays/s          obvhs Mrays/s           ratio".into(),
     ];
-    let spread = |spread: &Spread| {
+    let spread = |spread: &RateSpread| {
         format!("{:6.2} ({:.2}..{:.2})", spread.median, spread.least, spread.most)
     };
     for rate in &report.rays {

@@ -98,7 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let capabilities = device.capabilities();
         eprintln!("device: {} ({})", capabilities.name, capabilities.driver);
     }
-    let mut job = Job::new(arguments, &settings, &scene, &device, output);
+    let mut job = RenderJob::new(arguments, &settings, &scene, &device, output);
     let mut renderer = Renderer::new(&device, &scene, settings.clone())?;
     if let Some(path) = &arguments.load_guide {
         guide::load(&mut renderer, path)?;
@@ -150,7 +150,7 @@ pub(super) fn listen_for_interrupt() -> Arc<AtomicBool> {
 }
 
 /// One render from its first pass to its files.
-struct Job<'a> {
+struct RenderJob<'a> {
     arguments: &'a Arguments,
     scene: &'a Scene,
     output: PathBuf,
@@ -162,7 +162,7 @@ struct Job<'a> {
     relative_error: Option<f64>,
 }
 
-impl<'a> Job<'a> {
+impl<'a> RenderJob<'a> {
     fn new(
         arguments: &'a Arguments,
         settings: &Settings,

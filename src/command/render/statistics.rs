@@ -1,12 +1,12 @@
 //! The numbers of a render, for `--stats`.
 
-use super::{Job, StopReason};
+use super::{RenderJob, StopReason};
 use crate::{
     film::{Metadata, Statistics},
     renderer::Renderer,
 };
 
-impl Job<'_> {
+impl RenderJob<'_> {
     /// The statistics as of now.
     pub(super) fn statistics(
         &self,
