@@ -12,7 +12,7 @@ use gpu_allocator::{
 use super::{commands::Commands, device::Device, labels, vulkan_error};
 use crate::error::{Error, Result};
 
-/// Largest piece copied at once between host and device, bytes.
+/// Maximum size of one staging copy between host and device, bytes.
 const STAGING_BYTES: usize = 16 << 20;
 
 /// A named storage buffer in device memory.
@@ -28,8 +28,8 @@ impl Buffer {
     /// Creates a storage buffer of `size` bytes (at least 16) with undefined content.
     ///
     /// # Errors
-    /// [`Error::Device`] if `size` is over the device's range for a storage buffer, [`Error::Vulkan`]
-    /// if memory runs out.
+    /// [`Error::Device`] if `size` exceeds the device's range of a storage buffer;
+    /// [`Error::Vulkan`] if memory runs out.
     pub fn new(device: &Arc<Device>, name: &str, size: u64) -> Result<Self> {
         let allowed = device.capabilities().max_storage_buffer_range;
         if size > allowed {
@@ -54,8 +54,8 @@ impl Buffer {
         )
     }
 
-    /// Creates a buffer that holds `data` and is read as a uniform texel buffer only, so that it may
-    /// be larger than a storage buffer; the descriptor set checks the number of texels.
+    /// Creates a buffer that holds `data` and is read only as a uniform texel buffer, so the limit
+    /// on storage buffers does not apply. The descriptor set checks the number of texels.
     ///
     /// # Errors
     /// [`Error::Vulkan`] if memory runs out.
@@ -145,7 +145,7 @@ impl Buffer {
         self.size
     }
 
-    /// Name, as debug tools and memory reports show it.
+    /// Name shown by debug tools and memory reports.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -160,7 +160,7 @@ impl Buffer {
     /// [`Error::Vulkan`] if a call fails.
     ///
     /// # Panics
-    /// If `bytes` does not fit: a mistake of the caller.
+    /// If `bytes` does not fit, which is a bug in the caller.
     pub fn upload(&self, bytes: &[u8]) -> Result<()> {
         assert!(bytes.len() as u64 <= self.size, "upload into {} is too long", self.name);
         if bytes.is_empty() {
@@ -188,26 +188,26 @@ impl Buffer {
         Ok(())
     }
 
-    /// Copies the first `length` elements out of the buffer.
+    /// Downloads the first `length` elements.
     ///
     /// # Errors
     /// [`Error::Vulkan`] if a call fails.
     ///
     /// # Panics
-    /// If the buffer is shorter: a mistake of the caller.
+    /// If the buffer is shorter, which is a bug in the caller.
     pub fn download<T: Pod>(&self, length: usize) -> Result<Vec<T>> {
         let mut result = Vec::with_capacity(length);
         self.download_pieces(length, |piece| result.extend_from_slice(piece))?;
         Ok(result)
     }
 
-    /// Hands the first `length` elements to `take`, piece by piece in their order.
+    /// Downloads the first `length` elements and passes them to `take` in order, piece by piece.
     ///
     /// # Errors
     /// [`Error::Vulkan`] if a call fails.
     ///
     /// # Panics
-    /// If the buffer is shorter: a mistake of the caller.
+    /// If the buffer is shorter, which is a bug in the caller.
     pub fn download_pieces<T: Pod>(&self, length: usize, mut take: impl FnMut(&[T])) -> Result<()> {
         let bytes = length * size_of::<T>();
         assert!(bytes as u64 <= self.size, "download from {} is too long", self.name);
@@ -246,7 +246,7 @@ impl Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
-        // SAFETY: every submission is waited for, so the device does not use the buffer any more.
+        // SAFETY: every submission has been waited for, so the device no longer uses the buffer.
         unsafe { self.device.raw().destroy_buffer(self.raw, None) };
         if let (Some(allocator), Some(allocation)) =
             (self.device.allocator().as_mut(), self.allocation.take())

@@ -11,13 +11,13 @@ use super::{
 use crate::error::{Error, Result};
 use crate::shader::constants::WORKGROUP_SIZE;
 
-/// Longest wait for one submission; dispatches are sized to a tenth of a second.
+/// Timeout of one submission; dispatches are sized to take about a tenth of a second.
 const SUBMISSION_TIMEOUT: Duration = Duration::from_secs(120);
 
-/// Device milliseconds by pass name.
+/// Device time by pass name, milliseconds.
 pub type PassTimes = BTreeMap<String, f64>;
 
-/// A command buffer being recorded; submitted once, then dropped.
+/// A command buffer that is recorded, submitted once and dropped.
 pub struct Commands {
     pool: vk::CommandPool,
     raw: vk::CommandBuffer,
@@ -55,7 +55,7 @@ impl Commands {
             .command_buffer_count(1);
         let begin = vk::CommandBufferBeginInfo::default()
             .flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-        // SAFETY: the pool was just created and nobody else uses it.
+        // SAFETY: the pool was just created and nothing else uses it.
         unsafe {
             commands.raw = raw_device
                 .allocate_command_buffers(&allocate)
@@ -80,15 +80,15 @@ impl Commands {
         Ok(commands)
     }
 
-    /// Records one pass: a compute dispatch of at least `invocations` invocations, labelled with the
-    /// pipeline's name and, in a timed command buffer, bracketed by timestamps. Everything that
-    /// earlier passes wrote is visible to it.
+    /// Records one pass: a compute dispatch of at least `invocations` invocations that sees all
+    /// writes of earlier passes. It is labelled with the pipeline's name and, in a timed command
+    /// buffer, bracketed by timestamps.
     ///
     /// `sets` are bound at their own set numbers; `push_constants` may be empty.
     ///
     /// # Panics
-    /// If a dispatch would exceed the device's workgroup count or the push constants exceed 128
-    /// bytes: callers size their waves by [`Capabilities`](super::device::Capabilities).
+    /// If the dispatch exceeds the device's workgroup count or the push constants exceed 128 bytes.
+    /// Callers size their waves by [`Capabilities`](super::device::Capabilities).
     pub fn dispatch(
         &mut self,
         pipeline: &Pipeline,
@@ -151,8 +151,8 @@ impl Commands {
         self.fill_start(buffer, vk::WHOLE_SIZE, word);
     }
 
-    /// Records filling the first `bytes` of a buffer, a multiple of 4 and not 0, with a repeated word,
-    /// after all earlier use of it.
+    /// Fills the first `bytes` of a buffer with a repeated 32-bit word, after all earlier use of
+    /// it. `bytes` is a positive multiple of 4.
     pub fn fill_start(&mut self, buffer: &Buffer, bytes: u64, word: u32) {
         self.barrier(
             vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER,
@@ -224,7 +224,8 @@ impl Commands {
     /// Submits, waits, and returns the device time per pass (empty if not timed).
     ///
     /// # Errors
-    /// [`Error::Vulkan`]; a lost device names the last pass of the submission.
+    /// [`Error::Vulkan`] if a call fails; for a lost device it names the last pass of the
+    /// submission.
     pub fn submit_and_wait(self) -> Result<PassTimes> {
         let raw = self.device.raw();
         let failed = |call: &str, result| {
@@ -232,8 +233,8 @@ impl Commands {
         };
         // Held until the work is done: see `Device::queue`.
         let queue = self.device.queue();
-        // SAFETY: recording ends here; the queue is locked, and the wait keeps every object that the
-        // commands use alive in the callers.
+        // SAFETY: recording ends here, the queue is locked, and the callers keep every object that
+        // the commands use alive until the wait ends.
         unsafe {
             raw.end_command_buffer(self.raw)
                 .map_err(|result| failed("vkEndCommandBuffer", result))?;
@@ -245,8 +246,8 @@ impl Commands {
             match raw.wait_for_fences(&[self.fence], true, timeout) {
                 Ok(()) => {}
                 Err(vk::Result::TIMEOUT) => {
-                    // The commands still use the callers' objects, so returning is not safe before
-                    // the device is idle.
+                    // The commands may still use the callers' objects, so the device must be idle
+                    // before this returns.
                     raw.device_wait_idle().map_err(|result| failed("vkDeviceWaitIdle", result))?;
                     return Err(Error::Vulkan {
                         call: format!("pass {}", self.last_pass),

@@ -1,9 +1,9 @@
-//! Descriptor sets by rate of change: 0 scene, 1 SRBF tables, 2 wave, 3 film.
+//! Descriptor sets, by rate of change: 0 scene, 1 SRBF and guide tables, 2 wave, 3 film.
 //!
-//! Every binding is a storage buffer, but for those that `texel_format` names: traversal reads
-//! geometry and rays through uniform texel buffers, which lavapipe loads several times as fast. A
-//! pipeline sees only the sets that its shader uses, and a set may leave bindings unwritten that the
-//! shader does not use.
+//! A binding is a storage buffer unless `texel_format` lists it: traversal reads geometry and rays
+//! through uniform texel buffers, which lavapipe loads several times as fast. A pipeline layout
+//! holds only the sets that its shader uses. Bindings that the shader does not use may stay
+//! unwritten.
 
 use std::sync::Arc;
 
@@ -13,10 +13,11 @@ use super::{buffer::Buffer, device::Device, labels, vulkan_error};
 use crate::error::{Error, Result};
 use crate::shader::constants as c;
 
-/// Bindings of the four sets.
+/// Number of bindings in each of the four sets.
 pub const SET_BINDING_COUNTS: [u32; 4] = [14, 18, 16, 11];
 
-/// Format and bytes of the texels of a binding that is a uniform texel buffer.
+/// Returns the format and the bytes per texel of a uniform texel binding, `None` for other
+/// bindings.
 pub(super) fn texel_format(set: u32, binding: u32) -> Option<(vk::Format, u64)> {
     match (set, binding) {
         (
@@ -64,7 +65,7 @@ fn descriptor_type(set: u32, binding: u32) -> vk::DescriptorType {
     }
 }
 
-/// The layouts of the four sets and an empty one for the sets that a shader does not use.
+/// Layouts of the four sets, and an empty one for sets that a shader does not use.
 pub(super) struct SetLayouts {
     sets: [vk::DescriptorSetLayout; 4],
     empty: vk::DescriptorSetLayout,
@@ -117,7 +118,7 @@ fn create_layout(device: &ash::Device, set: u32, count: u32) -> Result<vk::Descr
         .map_err(|result| vulkan_error("vkCreateDescriptorSetLayout", result))
 }
 
-/// One descriptor set with its own pool.
+/// A descriptor set with its own pool.
 pub struct DescriptorSet {
     pool: vk::DescriptorPool,
     raw: vk::DescriptorSet,
@@ -127,8 +128,8 @@ pub struct DescriptorSet {
 }
 
 impl DescriptorSet {
-    /// A set for set number `index` with `buffers` at their bindings. The buffers must outlive
-    /// every submission that uses the set.
+    /// Creates the set with number `index` and `buffers` at their bindings. The buffers must
+    /// outlive every submission that uses the set.
     ///
     /// # Errors
     /// [`Error::Vulkan`] if a call fails, [`Error::Device`] if a texel buffer has more texels than
@@ -181,7 +182,7 @@ impl DescriptorSet {
         Ok(set)
     }
 
-    /// Makes a view of `buffer` that lives as long as the set.
+    /// Creates a view of `buffer` that lives as long as the set.
     fn add_view(
         &mut self,
         buffer: &Buffer,
@@ -227,8 +228,8 @@ impl DescriptorSet {
 
 impl Drop for DescriptorSet {
     fn drop(&mut self) {
-        // SAFETY: every submission is waited for; destroying the pool frees the set, and the views
-        // belong to the set alone.
+        // SAFETY: every submission has been waited for; destroying the pool frees the set, and
+        // nothing else uses the views.
         unsafe {
             self.device.raw().destroy_descriptor_pool(self.pool, None);
             for view in &self.views {

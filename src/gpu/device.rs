@@ -17,53 +17,53 @@ use super::{
 };
 use crate::error::{Error, Result};
 
-/// What a Vulkan device is and can do, as far as Fenestra cares.
+/// Identity, limits and features of a Vulkan device, as far as Fenestra needs them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Capabilities {
     /// Position in the loader's list.
     pub index: usize,
-    /// Name that the driver gives.
+    /// Name reported by the driver.
     pub name: String,
     /// "discrete", "integrated", "virtual", "software" or "other".
     pub kind: &'static str,
-    /// Driver name and version text.
+    /// Driver name and version.
     pub driver: String,
     /// Vulkan version as (major, minor, patch).
     pub api_version: (u32, u32, u32),
     /// Largest range of one storage-buffer binding, bytes.
     pub max_storage_buffer_range: u64,
-    /// Most texels of a texel buffer.
+    /// Maximum number of texels in a texel buffer.
     pub max_texel_buffer_elements: u64,
-    /// Storage buffers that one pipeline may see.
+    /// Maximum number of storage buffers that one pipeline may see.
     pub max_storage_buffers: u32,
-    /// Push constants, bytes.
+    /// Maximum size of the push constants, bytes.
     pub max_push_constants_size: u32,
-    /// Workgroups of one dispatch along x.
+    /// Maximum number of workgroups in a dispatch along x.
     pub max_workgroup_count: u32,
-    /// Invocations of one workgroup.
+    /// Maximum number of invocations in a workgroup.
     pub max_workgroup_invocations: u32,
-    /// Shared memory of one workgroup, bytes.
+    /// Maximum shared memory of a workgroup, bytes.
     pub max_shared_memory: u32,
-    /// Invocations of a subgroup.
+    /// Number of invocations in a subgroup.
     pub subgroup_size: u32,
-    /// Whether compute shaders may ballot within a subgroup.
+    /// True if compute shaders support subgroup ballots.
     pub subgroup_ballot: bool,
-    /// Memory heaps that are local to the device, bytes in all.
+    /// Total size of the device-local memory heaps, bytes.
     pub device_memory: u64,
-    /// Whether structs may have `scalar` layout.
+    /// True if structs may have `scalar` layout.
     pub scalar_block_layout: bool,
-    /// Queue family with compute and timestamps, if there is one.
+    /// Queue family with compute and timestamps, if any.
     pub queue_family: Option<u32>,
-    /// Valid bits of that family's timestamps.
+    /// Number of valid bits in that family's timestamps.
     pub timestamp_valid_bits: u32,
     /// Nanoseconds per timestamp tick.
     pub timestamp_period: f32,
-    /// Driver's identity, for the pipeline cache's name.
+    /// Driver's pipeline-cache UUID, which names the cache file.
     pub pipeline_cache_uuid: [u8; 16],
 }
 
 impl Capabilities {
-    /// What Fenestra needs and this device lacks; empty if it can be used.
+    /// Lists the requirements that this device does not meet; empty if it can be used.
     pub fn missing(&self) -> Vec<String> {
         let mut missing = Vec::new();
         let mut need = |what: &str, needed: u64, found: u64| {
@@ -96,7 +96,7 @@ impl Capabilities {
         missing
     }
 
-    /// Rank for the choice of a device; the smallest wins.
+    /// Rank by which devices are chosen; the smallest wins.
     fn rank(&self) -> u32 {
         match self.kind {
             "discrete" => 0,
@@ -108,8 +108,8 @@ impl Capabilities {
     }
 }
 
-/// Storage buffers of the pipeline that sees most: scene, wave and the larger of the other two sets.
-/// Texel buffers do not count.
+/// Counts the storage buffers of the pipeline that sees most: scene, wave and the larger of the
+/// other two sets. Texel buffers do not count.
 fn most_bindings() -> u32 {
     let [scene, srbf, wave, film] = std::array::from_fn(|set| {
         let bindings = 0..SET_BINDING_COUNTS[set];
@@ -159,7 +159,7 @@ fn capabilities(instance: &Instance, index: usize, physical: vk::PhysicalDevice)
     };
     let properties = properties.properties;
     let limits = properties.limits;
-    // A family that also has graphics is preferred: capture tools want one.
+    // Prefer a family that also has graphics: capture tools want one.
     let queue_family = families
         .iter()
         .enumerate()
@@ -226,8 +226,8 @@ fn capabilities(instance: &Instance, index: usize, physical: vk::PhysicalDevice)
     }
 }
 
-/// Chooses among devices: the one that `wanted` names by index or by part of its name, else a
-/// discrete GPU before an integrated one before a software device.
+/// Chooses the device that `wanted` names by index or by part of its name. Without `wanted`,
+/// prefers a discrete GPU to an integrated one, and that to a software device.
 ///
 /// # Errors
 /// [`Error::Device`] if none fits; the message lists the devices and what each lacks.
@@ -287,7 +287,7 @@ pub struct Device {
     capabilities: Capabilities,
     set_layouts: SetLayouts,
     pipeline_cache: PipelineCache,
-    // Emptied in `drop`, before the device goes.
+    // Emptied in `drop`, before the device is destroyed.
     allocator: Mutex<Option<Allocator>>,
     // Last: the instance must outlive the device.
     instance: Arc<Instance>,
@@ -297,7 +297,7 @@ impl Device {
     /// Opens the device that [`choose`] picks.
     ///
     /// # Errors
-    /// No loader, no device, a device that lacks something, or a failing driver.
+    /// No loader, no suitable device, or a failing driver.
     pub fn open(wanted: Option<&str>, validate: bool) -> Result<Arc<Self>> {
         let instance = Arc::new(Instance::new(validate)?);
         let devices = enumerate(&instance)?;
@@ -355,12 +355,12 @@ impl Device {
         }))
     }
 
-    /// What this device is and can do.
+    /// Identity, limits and features of this device.
     pub fn capabilities(&self) -> &Capabilities {
         &self.capabilities
     }
 
-    /// What the validation layers have said so far; empty without validation.
+    /// Messages of the validation layers so far; empty without validation.
     pub fn validation_messages(&self) -> Vec<String> {
         self.instance.validation_messages()
     }
@@ -378,9 +378,9 @@ impl Device {
         self.debug_names.as_ref()
     }
 
-    /// The queue, for one thread at a time. Pipelines are created and destroyed under the same lock:
-    /// software drivers compile a pipeline when a dispatch first uses it, on the queue's own thread,
-    /// and with tests in several threads Mesa 22.3 was seen to crash.
+    /// Locks the queue for one thread. Pipelines are created and destroyed under the same lock:
+    /// software drivers compile a pipeline on the queue's own thread when a dispatch first uses it,
+    /// and Mesa 22.3 was seen to crash there when tests ran in several threads.
     pub(super) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -404,8 +404,9 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
-        // SAFETY: every object made from the device holds it in an `Arc`, so none is left but those
-        // destroyed here, before the device itself; the queue is idle since every submission waits.
+        // SAFETY: every object made from the device holds it in an `Arc`, so only those destroyed
+        // here are left, and they go before the device; the queue is idle, since every submission
+        // is waited for.
         unsafe {
             drop(self.allocator().take());
             self.set_layouts.destroy(&self.raw);

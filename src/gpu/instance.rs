@@ -1,4 +1,4 @@
-//! Vulkan loader, instance, validation layers and the messages they send.
+//! Vulkan loader, instance, and validation layers with their messages.
 
 use std::{
     ffi::{CStr, c_void},
@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// What to do when there is no usable Vulkan at all.
+/// Advice for a system without any usable Vulkan.
 pub const NO_VULKAN_HELP: &str =
     "run ./setup, which installs the Vulkan loader and the software device lavapipe";
 
@@ -35,11 +35,11 @@ struct DebugMessenger {
 }
 
 impl Instance {
-    /// Loads Vulkan and creates an instance; with `validate` the Khronos validation layer runs, with
-    /// synchronization validation.
+    /// Loads Vulkan and creates an instance. `validate` enables the Khronos validation layer,
+    /// including synchronization validation.
     ///
     /// # Errors
-    /// [`Error::Device`] without a Vulkan loader or without the layer that was asked for.
+    /// [`Error::Device`] if the Vulkan loader or the requested layer is missing.
     pub fn new(validate: bool) -> Result<Self> {
         // SAFETY: loading the Vulkan loader runs its initialisers; it is the system's own library.
         let entry = unsafe { ash::Entry::load() }.map_err(|error| Error::Device {
@@ -131,12 +131,12 @@ impl Instance {
         &self.raw
     }
 
-    /// Whether objects and passes can carry names.
+    /// True if objects and passes can be named.
     pub(super) fn has_debug_utils(&self) -> bool {
         self.has_debug_utils
     }
 
-    /// What the validation layers have said so far; empty without validation.
+    /// Messages of the validation layers so far; empty without validation.
     pub fn validation_messages(&self) -> Vec<String> {
         self.messages.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -154,7 +154,7 @@ impl Drop for Instance {
     }
 }
 
-/// The error of a system with a loader but without any driver.
+/// Returns the error for a system with a loader but no driver.
 pub(super) fn no_driver() -> Error {
     Error::Device {
         reason: "the Vulkan loader finds no driver: expected at least one Vulkan 1.2 device, \
@@ -167,10 +167,10 @@ pub(super) fn no_driver() -> Error {
     }
 }
 
-/// Collects one message of the validation layers.
+/// Records one message of the validation layers.
 ///
 /// # Safety
-/// Called by the Vulkan loader with a valid `data` and the `user_data` given at creation.
+/// Called by the Vulkan loader with valid `data` and the `user_data` given at creation.
 unsafe extern "system" fn record_message(
     _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
     _kind: vk::DebugUtilsMessageTypeFlagsEXT,

@@ -1,4 +1,4 @@
-//! Debug names of objects and labels around passes; free where no tool listens.
+//! Debug names for objects and labels around passes; free unless a tool listens.
 
 use std::{ffi::CString, sync::Arc};
 
@@ -6,7 +6,7 @@ use ash::vk;
 
 use super::device::Device;
 
-/// Gives `object` a name that validation messages and capture tools show.
+/// Gives `object` the name shown by validation messages and capture tools.
 pub(super) fn name_object<T: vk::Handle>(device: &Arc<Device>, object: T, name: &str) {
     let (Some(functions), Ok(name)) = (device.debug_names(), CString::new(name)) else { return };
     let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);

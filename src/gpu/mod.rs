@@ -1,4 +1,4 @@
-//! The Vulkan host; the only module with `unsafe` code. One Vulkan concept per file.
+//! Vulkan on the host: one concept per file, and the only module with `unsafe` code.
 
 #![expect(unsafe_code, reason = "raw Vulkan calls are unsafe; each block states why it is sound")]
 
@@ -19,7 +19,7 @@ pub use pipeline::Pipeline;
 
 use crate::error::Error;
 
-/// An [`Error::Vulkan`] for a failed call.
+/// Returns the [`Error::Vulkan`] for a failed call.
 fn vulkan_error(call: &str, result: ash::vk::Result) -> Error {
     Error::Vulkan { call: call.to_owned(), result: result.to_string() }
 }

@@ -20,7 +20,8 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
-    /// Compiles `spirv` with its specialization constants given as (`constant_id`, 32-bit value).
+    /// Creates a pipeline from `spirv`, with specialization constants as (`constant_id`, 32-bit
+    /// value).
     ///
     /// # Errors
     /// [`Error::Vulkan`](crate::Error::Vulkan) if a call fails.
@@ -119,7 +120,7 @@ impl Pipeline {
 impl Drop for Pipeline {
     fn drop(&mut self) {
         let _queue = self.device.queue();
-        // SAFETY: every submission is waited for; destroying null handles is allowed.
+        // SAFETY: every submission has been waited for; destroying null handles is allowed.
         unsafe {
             self.device.raw().destroy_pipeline(self.raw, None);
             self.device.raw().destroy_pipeline_layout(self.layout, None);
@@ -127,21 +128,21 @@ impl Drop for Pipeline {
     }
 }
 
-/// The driver's pipeline cache, kept in the user's cache folder per device and driver.
+/// The driver's pipeline cache, kept per device and driver in the user's cache folder.
 pub(super) struct PipelineCache {
     raw: vk::PipelineCache,
 }
 
 impl PipelineCache {
-    /// Reads the cache of this device; anything unreadable or foreign is an empty cache.
+    /// Loads this device's cache, or an empty one if the file is unreadable or foreign.
     pub(super) fn load(device: &ash::Device, capabilities: &Capabilities) -> Self {
         let data = file(capabilities).and_then(|path| fs::read(path).ok()).unwrap_or_default();
-        // Header: length, version, vendor, device, then the driver's identity.
+        // The header holds length, version, vendor and device, then the driver's UUID.
         let is_ours = data.get(16..32) == Some(&capabilities.pipeline_cache_uuid[..]);
         let info =
             vk::PipelineCacheCreateInfo::default().initial_data(if is_ours { &data } else { &[] });
-        // SAFETY: drivers validate the header of the initial data; the identity was compared.
-        // Without a cache everything still works, so a failure gives none.
+        // SAFETY: drivers validate the header of the initial data, and its UUID was compared.
+        // Failure leaves a null cache, without which everything still works.
         let raw = unsafe { device.create_pipeline_cache(&info, None) }.unwrap_or_default();
         Self { raw }
     }
@@ -150,7 +151,7 @@ impl PipelineCache {
         self.raw
     }
 
-    /// Writes the cache; a failure costs compile time in the next run and nothing else.
+    /// Writes the cache. Failure only costs compile time in the next run.
     pub(super) fn save(&self, device: &ash::Device, capabilities: &Capabilities) {
         let (Some(path), false) = (file(capabilities), self.raw == vk::PipelineCache::null())
         else {

@@ -1,4 +1,4 @@
-//! Device time per pass from timestamp queries.
+//! Device time per pass, from timestamp queries.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ pub(super) struct Timestamps {
 }
 
 impl Timestamps {
-    /// Room for `capacity` passes of `commands`, which is in the recording state.
+    /// Creates queries for `capacity` passes of `commands`, which is in the recording state.
     pub(super) fn new(
         device: &Arc<Device>,
         commands: vk::CommandBuffer,
@@ -34,14 +34,14 @@ impl Timestamps {
         Ok(Self { pool, commands, names: Vec::new(), capacity, device: Arc::clone(device) })
     }
 
-    /// Time of everything before the pass `name`.
+    /// Records the time at which all work before the pass `name` is complete.
     pub(super) fn start(&mut self, name: &str) {
         assert!(self.names.len() < self.capacity as usize, "too many timed passes");
         self.write(2 * self.names.len());
         self.names.push(name.to_owned());
     }
 
-    /// Time when the last started pass is complete.
+    /// Records the time at which the last started pass is complete.
     pub(super) fn stop(&mut self) {
         self.write(2 * self.names.len() - 1);
     }
@@ -59,7 +59,7 @@ impl Timestamps {
         }
     }
 
-    /// Milliseconds per pass name, passes of one name added up. Call after the fence.
+    /// Reads milliseconds per pass name, summed over passes of one name. Call after the fence.
     pub(super) fn read(&self) -> Result<PassTimes> {
         let mut ticks = vec![0_u64; 2 * self.names.len()];
         if !ticks.is_empty() {
