@@ -1,9 +1,9 @@
-//! How fast rays are traced: the passes of a render on its own rays, beside obvhs's CPU traversal of
-//! the same tree and the same rays.
+//! Ray rates: times the passes of a render, and obvhs's CPU traversal of the same tree with the
+//! same rays.
 //!
-//! One wave over the whole film goes through the passes of a render: `camera`, `trace`, `sample`,
-//! `shadow`, `bounce`, `trace`. The rays are read back and given to obvhs on every core. Device and
-//! CPU take turns, so that both see the same state of the machine.
+//! One wave over the whole film goes through `camera`, `trace`, `sample`, `shadow`, `bounce` and
+//! `trace`. The rays are read back and given to obvhs on every core. Device and CPU take turns, so
+//! that both see the same state of the machine.
 
 use std::{
     sync::{
@@ -38,30 +38,30 @@ use crate::{
     },
 };
 
-/// Rays that a thread of the CPU takes at a time.
+/// Number of rays that a CPU thread takes at a time.
 const CHUNK: usize = 4096;
 
-/// What to measure.
+/// Parameters of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayPlan {
-    /// How the directions of shadow rays are chosen; not `ris`.
+    /// Sampler that chooses the directions of shadow rays; not `ris`.
     pub sampler: Sampler,
     /// Shadow rays per hit.
     pub shadow_rays: u32,
-    /// Paths of the wave: pixels of the film in film order.
+    /// Number of paths in the wave: pixels of the film in film order.
     pub paths: u32,
-    /// Measurements of each kind of ray.
+    /// Number of measurements of each kind of ray.
     pub repetitions: usize,
-    /// Threads of the CPU traversal.
+    /// Number of threads of the CPU traversal.
     pub threads: usize,
 }
 
-/// Median of repeated measurements with the extremes.
+/// Median and extremes of repeated measurements.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RateSpread {
-    /// Middle value.
+    /// Median.
     pub median: f64,
-    /// Least value.
+    /// Smallest value.
     pub least: f64,
     /// Largest value.
     pub most: f64,
@@ -83,17 +83,17 @@ impl RateSpread {
 pub struct RayRate {
     /// `camera`, `shadow` or `bounce`.
     pub kind: &'static str,
-    /// Rays traced in one measurement; those that need no tracing are not counted.
+    /// Number of rays traced in one measurement, without those that need no tracing.
     pub rays: usize,
     /// Share of them that met a surface.
     pub hit_share: f64,
-    /// Million rays a second on the device, by timestamps.
+    /// Million rays per second on the device, from timestamps.
     pub device_mrays: RateSpread,
-    /// Million rays a second of obvhs's traversal on the CPU.
+    /// Million rays per second of obvhs's traversal on the CPU.
     pub obvhs_mrays: RateSpread,
-    /// Ratios of neighbouring measurements, device to obvhs.
+    /// Ratio of device to obvhs in neighbouring measurements.
     pub ratio: RateSpread,
-    /// Rays for which the two disagree whether a surface is met.
+    /// Number of rays for which the two disagree on whether a surface is met.
     pub disagreements: usize,
 }
 
@@ -134,7 +134,7 @@ impl Yardstick {
         }
     }
 
-    /// Traces all rays; seconds of wall time and whether each meets a surface.
+    /// Traces all rays. Returns wall time in seconds, and for each ray whether it meets a surface.
     fn trace(&self, rays: &[CpuRay], any_hit: bool) -> (f64, Vec<bool>) {
         let mut met = vec![false; rays.len()];
         let start = Instant::now();
@@ -152,7 +152,7 @@ impl Yardstick {
                 }
             };
             let threads: Vec<_> = (0..self.threads.max(1)).map(|_| scope.spawn(work)).collect();
-            // A panic in a thread is passed on by the scope.
+            // The scope passes on a panic in a thread.
             threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
         });
         let seconds = start.elapsed().as_secs_f64();
@@ -173,7 +173,7 @@ struct Bench<'a> {
     hits: Buffer,
     shadow_rays: Buffer,
     visibility: Buffer,
-    // Bound by the sets.
+    // Kept alive for the sets.
     _paths: Buffer,
     _counters: Buffer,
     wave: Wave,
@@ -231,14 +231,14 @@ impl<'a> Bench<'a> {
         [self.scene.set(), &self.wave_set, &self.film_set]
     }
 
-    /// Runs one pass; device seconds.
+    /// Runs one pass and returns its device time in seconds.
     fn run(&self, record: impl FnOnce(&mut Commands)) -> Result<f64> {
         let mut commands = Commands::begin_timed(self.device, 1)?;
         record(&mut commands);
         Ok(commands.submit_and_wait()?.values().sum::<f64>() * 1e-3)
     }
 
-    /// Runs a pass of one invocation per path.
+    /// Runs a pass with one invocation per path.
     fn run_per_path(&self, name: &str, constants: &[(u32, u32)]) -> Result<()> {
         let pipeline = Pipeline::new(self.device, name, spirv::pass(name), constants)?;
         self.run(|commands| {
@@ -248,7 +248,7 @@ impl<'a> Bench<'a> {
         Ok(())
     }
 
-    /// The rays that `trace` would follow.
+    /// Downloads the rays that `trace` would follow.
     fn active_rays(&self) -> Result<Vec<Option<CpuRay>>> {
         let rays: Vec<Ray> = self.rays.download(self.wave.pixel_count as usize)?;
         Ok(rays
@@ -260,7 +260,7 @@ impl<'a> Bench<'a> {
             .collect())
     }
 
-    /// The rays that `shadow` would follow.
+    /// Downloads the rays that `shadow` would follow.
     fn active_shadow_rays(&self, accel: &Accel) -> Result<Vec<Option<CpuRay>>> {
         let paths = self.wave.pixel_count as usize;
         let hits: Vec<Hit> = self.hits.download(paths)?;
@@ -282,17 +282,17 @@ impl<'a> Bench<'a> {
             .collect())
     }
 
-    /// Whether each ray met a surface, after `trace`.
+    /// Tests for each ray whether it met a surface, after `trace`.
     fn hits_met(&self) -> Result<Vec<bool>> {
         let hits: Vec<Hit> = self.hits.download(self.wave.pixel_count as usize)?;
         Ok(hits.iter().map(|hit| hit.material != NO_MATERIAL).collect())
     }
 }
 
-/// Measures camera, shadow and bounce rays; `accel` is what `scene` was made from.
+/// Measures camera, shadow and bounce rays. `scene` must have been made from `accel`.
 ///
 /// # Errors
-/// [`crate::Error::Vulkan`] or [`crate::Error::Device`] if the device fails or memory is not enough.
+/// [`crate::Error::Vulkan`] or [`crate::Error::Device`] if the device fails or memory runs out.
 pub fn measure(
     device: &Arc<Device>,
     scene: &SceneBuffers,
@@ -342,7 +342,7 @@ pub fn measure(
     Ok(rates)
 }
 
-/// Device and CPU by turns over the same rays; `run` gives device seconds.
+/// Measures device and CPU in turns on the same rays; `run` returns device seconds.
 fn compare(
     kind: &'static str,
     yardstick: &Yardstick,
@@ -352,7 +352,7 @@ fn compare(
     run: &dyn Fn() -> Result<f64>,
 ) -> Result<(RayRate, Vec<bool>)> {
     let rays: Vec<CpuRay> = rays.iter().flatten().copied().collect();
-    // Drivers that compile late compile now.
+    // Warm up: some drivers compile at first use.
     run()?;
     let (_, met) = yardstick.trace(&rays, any_hit);
     let (mut device, mut cpu, mut ratio) = (Vec::new(), Vec::new(), Vec::new());

@@ -1,4 +1,4 @@
-//! The command line: clap types and the way from arguments to an exit status.
+//! The command line: clap types, dispatch to the commands, exit status.
 
 use std::process::ExitCode;
 
@@ -10,7 +10,7 @@ use crate::{command, error::Error};
 #[derive(Debug, Parser)]
 #[command(name = "fenestra", version, about, propagate_version = true)]
 pub struct Cli {
-    /// What to do.
+    /// Command to run.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -20,19 +20,19 @@ pub struct Cli {
 pub enum Command {
     /// Render a scene to an image.
     Render(Box<command::render::Arguments>),
-    /// Compare samplers against a reference over scenes and seeds, as a report to read in a browser.
+    /// Compare samplers with a reference over scenes and seeds, in a report for the browser.
     Study(Box<command::study::Arguments>),
-    /// Error metrics of an image against a reference, with thresholds for scripts.
+    /// Measure the error of an image against a reference, with thresholds for scripts.
     Compare(command::compare::Arguments),
     /// Combine renders of one scene made with different seeds or sample ranges.
     Merge(command::merge::Arguments),
     /// Measure how fast a scene's rays are traced, and where time and memory go.
     Bench(command::bench::Arguments),
-    /// Say what a scene, image, environment map or BRDF file holds and whether it is sane.
+    /// Describe and check a scene, image, environment map, BRDF or fit.
     Info(command::info::Arguments),
-    /// Fit environment maps and BRDFs into spherical radial basis functions.
+    /// Fit environment maps and BRDFs with spherical radial basis functions.
     Fit(command::fit::Arguments),
-    /// List Vulkan devices with the limits that matter here, and which one would be chosen.
+    /// List the Vulkan devices with their relevant limits, and which one would be chosen.
     Devices(command::devices::Arguments),
 }
 
@@ -41,7 +41,7 @@ pub fn run() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
-            // A closed output pipe is no reason to fail.
+            // A closed output pipe is not an error.
             let _ = error.print();
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
@@ -69,11 +69,11 @@ pub fn run() -> ExitCode {
     }
 }
 
-/// Prints an error, its causes and, where one is known, the remedy.
+/// Prints an error, its causes and, if known, the remedy.
 fn report(error: &Error) {
     eprintln!("error: {error}");
     let mut source = std::error::Error::source(error);
-    // `Io` prints its source in its own line already.
+    // `Io` already prints its source in its own line.
     while let Some(cause) = source.filter(|_| !matches!(error, Error::Io { .. })) {
         eprintln!("  caused by: {cause}");
         source = cause.source();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 /// Result with Fenestra's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Everything that can go wrong, each with what, where, expected and found.
+/// Everything that can go wrong. Messages say where, what was expected and what was found.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The operating system refused to read or write a file.
@@ -13,7 +13,7 @@ pub enum Error {
     Io {
         /// File or folder concerned.
         path: PathBuf,
-        /// What was attempted: "read", "write", …
+        /// Attempted action: "read", "write", …
         action: &'static str,
         /// The system's own error.
         source: std::io::Error,
@@ -54,12 +54,12 @@ pub enum Error {
         /// The result code, or the allocator's message.
         result: String,
     },
-    /// No device, or one that cannot do what is needed.
+    /// No device, or none that meets the requirements.
     #[error("{reason}")]
     Device {
-        /// Needed against found.
+        /// Required and found.
         reason: String,
-        /// What the user can do about it.
+        /// Advice to the user.
         help: String,
     },
     /// Options that contradict each other or are out of range.
@@ -68,7 +68,7 @@ pub enum Error {
         /// Option, value, allowed values.
         message: String,
     },
-    /// A fit into spherical radial basis functions cannot be made.
+    /// A fit with spherical radial basis functions cannot be made.
     #[error("fit of {what}: {message}")]
     Fit {
         /// The map or material.
@@ -82,39 +82,40 @@ pub enum Error {
         /// Expected and found.
         message: String,
     },
-    /// A comparison is over its threshold.
+    /// A metric is beyond its threshold.
     #[error("{message}")]
     Threshold {
         /// Metric, value and threshold.
         message: String,
     },
-    /// The user interrupted the command; what there is has been written.
+    /// The user interrupted the command; partial results have been written.
     #[error("interrupted")]
     Interrupted,
 }
 
 impl Error {
-    /// An [`Error::Io`] for `path`.
+    /// Creates an [`Error::Io`] for `path`.
     pub fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
         Self::Io { path: path.to_path_buf(), action, source }
     }
 
-    /// An [`Error::Format`] for `path`.
+    /// Creates an [`Error::Format`] for `path`.
     pub fn format(path: &Path, message: impl Into<String>) -> Self {
         Self::Format { path: path.to_path_buf(), message: message.into() }
     }
 
-    /// An [`Error::Scene`] for `path`.
+    /// Creates an [`Error::Scene`] for `path`.
     pub fn scene(path: &Path, message: impl Into<String>) -> Self {
         Self::Scene { path: path.to_path_buf(), message: message.into() }
     }
 
-    /// An [`Error::Usage`].
+    /// Creates an [`Error::Usage`].
     pub fn usage(message: impl Into<String>) -> Self {
         Self::Usage { message: message.into() }
     }
 
-    /// Exit status: 2 wrong usage, 3 comparison over its threshold, 130 interrupted, else 1.
+    /// Returns the exit status: 2 for wrong usage, 3 for a metric beyond its threshold, 130 after
+    /// an interrupt, else 1.
     pub fn exit_status(&self) -> u8 {
         match self {
             Self::Usage { .. } => 2,

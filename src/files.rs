@@ -9,15 +9,15 @@ use std::{
 
 use crate::error::{Error, Result};
 
-/// Folder `fenestra/<kind>` in the user's cache folder (`$XDG_CACHE_HOME`, else `~/.cache`), or
-/// `None` where neither is set. The folder may not exist yet.
+/// Returns `fenestra/<kind>` in the user's cache folder (`$XDG_CACHE_HOME`, else `~/.cache`), or
+/// `None` if neither is set. The folder may not exist yet.
 pub fn cache_folder(kind: &str) -> Option<PathBuf> {
     let set = |name| env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     let base = set("XDG_CACHE_HOME").or_else(|| Some(set("HOME")?.join(".cache")))?;
     Some(base.join("fenestra").join(kind))
 }
 
-/// Folder of a file to write.
+/// Returns the folder that holds `path`.
 fn parent_of(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -25,13 +25,13 @@ fn parent_of(path: &Path) -> &Path {
     }
 }
 
-/// Whether `path` exists and is neither a file nor a folder (`/dev/null`, a pipe).
+/// Tests whether `path` exists and is neither a file nor a folder (`/dev/null`, a pipe).
 pub fn is_special_file(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
 }
 
-/// Finds out before long work whether [`write_atomically`] may write `path`: creates the parent
-/// folders and a temporary file beside it, which is removed again.
+/// Checks, before long work, that [`write_atomically`] can write `path`: creates the parent
+/// folders, and creates and removes a temporary file beside it.
 ///
 /// # Errors
 /// [`Error::Io`] with `path` and the cause.
@@ -52,10 +52,9 @@ pub fn check_writable(path: &Path) -> Result<()> {
 
 /// Writes a file so that it appears complete or not at all.
 ///
-/// Parent folders are created, `write` fills a file of a temporary name in the same folder, and that
-/// file is renamed to `path`, which replaces an older one. On any failure the temporary file is
-/// removed and an older file at `path` is as it was. A `path` that exists and is neither a file nor
-/// a folder (`/dev/stdout`, a pipe) is written directly.
+/// Creates the parent folders, lets `write` fill a temporary file in the same folder, and renames
+/// it to `path`, replacing an older file. On failure the temporary file is removed and the older
+/// file is untouched. A special file (`/dev/stdout`, a pipe) is written directly.
 ///
 /// # Errors
 /// [`Error::Io`] with `path` and the cause (no permission, full disk, …).
@@ -81,7 +80,7 @@ pub fn write_atomically(
     fs::create_dir_all(parent).map_err(|source| Error::io(parent, "create folder", source))?;
     let mut builder = tempfile::Builder::new();
     builder.prefix(".fenestra-").suffix(".tmp");
-    // A temporary file is private by default; the result has the permissions of any new file.
+    // Temporary files are private by default; give the result the permissions of any new file.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let attempt = || -> std::io::Result<()> {

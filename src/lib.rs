@@ -23,7 +23,7 @@
 //!
 //! # Bibliography
 //!
-//! Comments cite by authors and year, in the code and in `glsl`.
+//! Comments in Rust and GLSL cite these by authors and year.
 //!
 //! - \[Abramowitz & Stegun 1964\] *Handbook of Mathematical Functions*, National Bureau of
 //!   Standards.
@@ -83,18 +83,18 @@
 //! - \[Tsai et al. 2008\] "Importance Sampling of Products from Illumination and BRDF Using
 //!   Spherical Radial Basis Functions", The Visual Computer 24.
 //! - \[Turk 1994\] "The PLY Polygon File Format", Stanford University.
-//! - \[Vévoda et al. 2018\] "Bayesian Online Regression for Adaptive Direct Illumination
-//!   Sampling", ACM Transactions on Graphics 37(4).
 //! - \[Veach & Guibas 1995\] "Optimally Combining Sampling Techniques for Monte Carlo Rendering",
 //!   SIGGRAPH.
 //! - \[Vegdahl 2021\] "Building a Better LK Hash",
 //!   <https://psychopath.io/post/2021_01_30_building_a_better_lk_hash>.
+//! - \[Vévoda et al. 2018\] "Bayesian Online Regression for Adaptive Direct Illumination
+//!   Sampling", ACM Transactions on Graphics 37(4).
 //! - \[Vorba et al. 2014\] "On-line Learning of Parametric Mixture Models for Light Transport
 //!   Simulation", ACM Transactions on Graphics 33(4).
-//! - \[Wächter & Binder 2019\] "A Fast and Robust Method for Avoiding Self-Intersection", Ray
-//!   Tracing Gems, chapter 6.
 //! - \[Vose 1991\] "A Linear Algorithm for Generating Random Numbers with a Given
 //!   Distribution", IEEE Transactions on Software Engineering 17(9).
+//! - \[Wächter & Binder 2019\] "A Fast and Robust Method for Avoiding Self-Intersection", Ray
+//!   Tracing Gems, chapter 6.
 //! - \[Walker 1977\] "An Efficient Method for Generating Discrete Random Variables with General
 //!   Distributions", ACM Transactions on Mathematical Software 3(3).
 //! - \[Walter et al. 2007\] "Microfacet Models for Refraction through Rough Surfaces",

@@ -1,5 +1,4 @@
-//! `fenestra bench`: how fast a scene's rays are traced, and where the time and memory of a render
-//! go.
+//! `fenestra bench`: measures ray rates, and the time and memory of a render's passes and buffers.
 
 use std::{collections::BTreeMap, path::PathBuf, sync::Arc, time::Instant};
 
@@ -17,9 +16,9 @@ use crate::{
     scene::Scene,
 };
 
-/// Most paths of a measurement; a larger film is measured at a smaller size.
+/// Maximum number of paths in a measurement; larger films are scaled down.
 const MOST_PATHS: u32 = 1 << 19;
-/// Edge of the blocks of the film order, pixels.
+/// Edge length of the blocks in film order, pixels.
 const BLOCK_EDGE: u32 = 8;
 
 /// Arguments of `bench`.
@@ -27,19 +26,19 @@ const BLOCK_EDGE: u32 = 8;
 pub struct Arguments {
     /// Scene file (.toml).
     pub scene: PathBuf,
-    /// How the directions of shadow rays are chosen; all but `ris`.
+    /// Sampler that chooses the directions of shadow rays; any but `ris`.
     #[arg(long, value_enum, default_value = "mis")]
     pub sampler: Sampler,
-    /// Directions traced at every hit.
+    /// Shadow rays traced at every hit.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=8))]
     pub shadow_rays: u32,
-    /// Film size in pixels instead of the scene's.
+    /// Film size in pixels, overriding the scene's.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<[u32; 2]>,
-    /// Measurements of each kind of ray; the median counts.
+    /// Measurements of each kind of ray; the median is reported.
     #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repetitions: u32,
-    /// Threads of the CPU traversal that is the yardstick; all cores if absent.
+    /// Threads of the CPU traversal that serves as the yardstick. Default: all cores.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub threads: Option<u32>,
     /// Device to use, by index or part of its name; see `fenestra devices`.
@@ -50,7 +49,7 @@ pub struct Arguments {
     pub json: bool,
 }
 
-/// What `bench --json` prints.
+/// Output of `bench --json`.
 #[derive(Debug, Serialize)]
 struct Report {
     version: &'static str,
@@ -62,17 +61,16 @@ struct Report {
     driver: String,
     sampler: &'static str,
     shadow_rays_per_hit: u32,
-    /// What the device is compared with.
+    /// CPU traversal that the device is compared with.
     yardstick: String,
     rays: Vec<RayRate>,
-    /// Shadow rays a second of whole passes of direct light, in millions.
+    /// Million shadow rays per second of device time, over all passes of direct light.
     direct_light_mrays: RateSpread,
-    /// The same over the rate of the shadow pass alone in the same passes.
+    /// That rate relative to the shadow pass's own, which is its share of the device time.
     direct_light_share: RateSpread,
     /// Device milliseconds per pass, for one sample per pixel of direct light.
     pass_ms: PassTimes,
-    /// Milliseconds of the first use of each pass, which is when drivers compile, and of the
-    /// creation of all pipelines.
+    /// Milliseconds of each pass's first use, when drivers compile, and of creating all pipelines.
     compile_ms: PassTimes,
     /// Host milliseconds by stage.
     host_ms: BTreeMap<String, f64>,
@@ -127,7 +125,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
     let mut renderer = Renderer::with_scene_buffers(&device, buffers, &scene, settings)?;
     let (mut mrays, mut shares, mut pass_ms) = (Vec::new(), Vec::new(), PassTimes::new());
-    // Until the size of the waves has settled, and the measurements.
+    // Warm up until the wave size has settled and candidates have been measured.
     renderer.render_pass(2)?;
     for repetition in 0..arguments.repetitions {
         renderer.restart(repetition)?;
@@ -175,7 +173,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
 }
 
-/// The film's size, scaled down where it has more pixels than are measured.
+/// Returns the film size, scaled down to at most [`MOST_PATHS`] pixels.
 fn bounded([width, height]: [u32; 2]) -> [u32; 2] {
     if padded_pixels([width, height]) <= MOST_PATHS {
         return [width, height];
@@ -184,17 +182,17 @@ fn bounded([width, height]: [u32; 2]) -> [u32; 2] {
     let scale = (0.95 * f64::from(MOST_PATHS) / pixels).sqrt();
     let shrunk = |side: u32| ((f64::from(side) * scale) as u32 / BLOCK_EDGE * BLOCK_EDGE).max(1);
     let [width, height] = [shrunk(width), shrunk(height)];
-    // A strip: rounding up to blocks outweighs the scale.
+    // In a thin strip, rounding up to blocks outweighs the scale.
     let longest = MOST_PATHS / BLOCK_EDGE;
     [width.min(longest), height.min(longest)]
 }
 
-/// Pixels of the film with the blocks at its edges counted whole.
+/// Counts the pixels of the film, with blocks at its edges counted whole.
 fn padded_pixels([width, height]: [u32; 2]) -> u32 {
     width.next_multiple_of(BLOCK_EDGE).saturating_mul(height.next_multiple_of(BLOCK_EDGE))
 }
 
-/// The report for people.
+/// Formats the report as text.
 fn text(report: &Report) -> String {
     let mut lines = vec![
         format!(

@@ -14,33 +14,33 @@ use crate::{
 /// Arguments of `compare`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Image to judge (EXR).
+    /// Image to evaluate (EXR).
     pub image: PathBuf,
     /// Reference (EXR).
     pub reference: PathBuf,
-    /// Second, independent half of the reference: squared errors become (x − r₁)(x − r₂), which is
-    /// free of the reference's own noise.
+    /// Second, independent half of the reference: squared errors become (x − r₁)(x − r₂), free of
+    /// the reference's own noise.
     #[arg(long, value_name = "EXR")]
     pub second_reference: Option<PathBuf>,
-    /// Write the error of every pixel (root of the mean over RGB of the squared error) in false
-    /// colour, blue low, red high, with its scale.
+    /// Write the error of every pixel (RMS over RGB) in false colour with its scale, from blue
+    /// (low) to red (high).
     #[arg(long, value_name = "PNG")]
     pub heatmap: Option<PathBuf>,
-    /// Error shown red in the heatmap; default: what 99% of the pixels stay below.
+    /// Error shown red in the heatmap. Default: the 99th percentile.
     #[arg(long, value_name = "ERROR", requires = "heatmap")]
     pub heatmap_high: Option<f64>,
-    /// Exit with status 3 if a metric is above a value, as in relmse=0.01. May be repeated.
+    /// Exit with status 3 if a metric is above a value, such as relmse=0.01. May be repeated.
     #[arg(long, value_name = "METRIC=VALUE", value_parser = parse_threshold)]
     pub fail_above: Vec<(String, f64)>,
-    /// Exit with status 3 if a metric is below a value, as in mean_ratio=0.99. May be repeated.
+    /// Exit with status 3 if a metric is below a value, such as mean_ratio=0.99. May be repeated.
     #[arg(long, value_name = "METRIC=VALUE", value_parser = parse_threshold)]
     pub fail_below: Vec<(String, f64)>,
-    /// Print JSON to standard output; a value that is not finite is null.
+    /// Print JSON to standard output; non-finite values are null.
     #[arg(long)]
     pub json: bool,
 }
 
-/// Reads `metric=value`.
+/// Parses `metric=value`.
 fn parse_threshold(text: &str) -> Result<(String, f64), String> {
     let known = || format!("known metrics: {}", Metrics::NAMES.join(", "));
     let (name, value) = text
@@ -58,8 +58,8 @@ fn parse_threshold(text: &str) -> Result<(String, f64), String> {
 /// Compares two images.
 ///
 /// # Errors
-/// Files that cannot be read or compared; [`Error::Usage`] for a heatmap scale that is not positive;
-/// [`Error::Threshold`] where a metric is over its threshold.
+/// Files that cannot be read or compared; [`Error::Usage`] if the heatmap scale is not positive;
+/// [`Error::Threshold`] if a metric is beyond its threshold.
 pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(high) = arguments.heatmap_high.filter(|high| !(high.is_finite() && *high > 0.0)) {
         return Err(Error::usage(format!("--heatmap-high {high}: expected a positive number")));
@@ -91,7 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     check_thresholds(arguments, &metrics)
 }
 
-/// Refuses other parts of the film; warns where the files say that they show different scenes.
+/// Rejects different parts of the film; warns if the metadata belong to different scenes.
 fn check_same_picture(image: &Image, path: &Path, reference: &Image, other: &Path) -> Result<()> {
     let window = |image: &Image| {
         let [x, y] = image.origin;
@@ -150,7 +150,7 @@ fn check_thresholds(arguments: &Arguments, metrics: &Metrics) -> Result<()> {
     let value = |name: &str| metrics.get(name).unwrap_or(f64::NAN);
     let above = arguments.fail_above.iter().filter_map(|(name, threshold)| {
         let value = value(name);
-        // A NaN is over every threshold.
+        // NaN fails every threshold.
         let within = value <= *threshold;
         (!within).then(|| format!("{name} is {value:.6e}, above the threshold {threshold}"))
     });

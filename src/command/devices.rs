@@ -1,4 +1,4 @@
-//! `fenestra devices`: the Vulkan devices with the limits that matter here, and the choice.
+//! `fenestra devices`: lists the Vulkan devices with their relevant limits, and the one chosen.
 
 use crate::{
     error::Result,
@@ -11,7 +11,7 @@ use crate::{
 /// Arguments of `devices`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Show which device this option of the other commands would choose: index or part of a name.
+    /// Show which device the other commands' --device would choose: index or part of a name.
     #[arg(long, value_name = "INDEX|NAME")]
     pub device: Option<String>,
     /// Print JSON to standard output.
@@ -22,7 +22,7 @@ pub struct Arguments {
 /// Lists the Vulkan devices.
 ///
 /// # Errors
-/// No Vulkan loader, no device, or none that fits.
+/// No Vulkan loader, no device, or no suitable one.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let instance = Instance::new(false)?;
     let devices = list(&instance)?;

@@ -1,4 +1,4 @@
-//! What `guided` has learned, between `render` and files.
+//! Guide files: saves and restores the state that the sampler `guided` has learned.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ pub fn guide_path(checkpoint: &Path) -> PathBuf {
     checkpoint.with_extension("guide")
 }
 
-/// Refuses options that no other sampler can follow.
+/// Rejects guide options for samplers that do not learn.
 ///
 /// # Errors
 /// [`Error::Usage`].
@@ -32,13 +32,13 @@ pub fn check(sampler: Sampler, save: Option<&Path>, load: Option<&Path>) -> Resu
     Ok(())
 }
 
-/// Starts from what an earlier render learned, perhaps in another frame of an animation.
+/// Starts from the guide of an earlier render, such as another frame of an animation.
 ///
 /// # Errors
 /// A file that cannot be read or belongs to another environment; a failing device.
 pub fn load(renderer: &mut Renderer, path: &Path) -> Result<()> {
     let state = GuideState::read(path)?;
-    // Taken up as something learned before the first sample, whatever film it came from.
+    // Treat it as learned before the first sample, whatever film it came from.
     let state = GuideState { samples: u32::MAX, ..state };
     if renderer.restore_guide(&state)? {
         log::warn!("{} was learned in another geometry: most of it counts no more", path.display());
@@ -46,7 +46,7 @@ pub fn load(renderer: &mut Renderer, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Continues a checkpoint exactly.
+/// Restores a checkpoint's guide, so that the render continues exactly.
 ///
 /// # Errors
 /// A file that is missing, cannot be read or belongs to another checkpoint; a failing device.
@@ -71,7 +71,7 @@ pub fn resume(renderer: &mut Renderer, checkpoint: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Writes what was learned, if the sampler learns.
+/// Writes the guide, if the sampler learns one.
 ///
 /// # Errors
 /// A failing device or disk.

@@ -1,4 +1,4 @@
-//! `fenestra info`: what a file holds and whether it is sane; without a file, what is installed.
+//! `fenestra info`: describes and checks a file, or without one, the installation.
 
 use std::{
     fs,
@@ -34,7 +34,7 @@ pub struct Arguments {
     pub json: bool,
 }
 
-/// What is known of a file, once for machines and once for people.
+/// Report on a file, as JSON and as lines of text.
 struct Report {
     value: Value,
     lines: Vec<String>,
@@ -74,7 +74,7 @@ fn file(path: &Path, is_map: bool) -> Result<Report> {
             Ok(Report { value, lines, warnings })
         }
         _ => {
-            // A missing file of unknown kind is a missing file first.
+            // Report a missing file before an unknown kind.
             fs::metadata(path).map_err(|source| Error::io(path, "read", source))?;
             Err(Error::format(
                 path,
@@ -84,7 +84,7 @@ fn file(path: &Path, is_map: bool) -> Result<Report> {
     }
 }
 
-/// Bytes and number of the files in a folder; 0 where there is none.
+/// Returns total bytes and number of the files in a folder; zeros if there is none.
 fn folder_size(folder: &Path) -> (u64, u64) {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let files = entries.filter_map(|entry| entry.metadata().ok()).filter(fs::Metadata::is_file);

@@ -1,4 +1,4 @@
-//! `fenestra merge`: one image from renders of one scene.
+//! `fenestra merge`: combines renders of one scene.
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ pub struct Arguments {
     /// Images or checkpoints of one scene, rendered with different seeds or disjoint sample ranges.
     #[arg(required = true, value_name = "PART.exr")]
     pub parts: Vec<PathBuf>,
-    /// Merged image; a checkpoint where the name ends in .checkpoint.exr and every part is one.
+    /// Merged image, or a checkpoint if the name ends in .checkpoint.exr and every part is one.
     #[arg(short, long, value_name = "OUT.exr")]
     pub output: PathBuf,
     /// Print no summary.
@@ -33,8 +33,7 @@ pub struct Arguments {
 /// Merges the parts and writes the result.
 ///
 /// # Errors
-/// Files that cannot be read, parts of different renders, samples that two parts hold, an output
-/// that cannot be written.
+/// Unreadable files, parts of different renders, samples held by two parts, an unwritable output.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let mut images = Vec::new();
     for path in &arguments.parts {
@@ -83,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     summarize(arguments, &metadata)
 }
 
-/// An image as it is, a checkpoint as the image it would give.
+/// Takes an image as it is, and a checkpoint as the image it gives.
 fn load_part(path: &Path, image: Image) -> Result<(&Path, Image, Metadata)> {
     if Checkpoint::is_checkpoint(&image) {
         let checkpoint = Checkpoint::from_image(&image, path)?;

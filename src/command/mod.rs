@@ -1,4 +1,4 @@
-//! One file per subcommand: orchestration only, no mathematics, no Vulkan.
+//! Subcommands, one per file: orchestration only, no mathematics, no Vulkan.
 
 pub mod bench;
 pub mod compare;
@@ -16,8 +16,7 @@ use std::io::Write;
 
 use crate::error::{Error, Result};
 
-/// Writes `text` and a line break to standard output. A reader that has gone away (`| head`) is no
-/// failure.
+/// Writes `text` and a line break to standard output. A closed pipe (`| head`) is not an error.
 ///
 /// # Errors
 /// Standard output cannot be written.

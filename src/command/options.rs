@@ -1,4 +1,4 @@
-//! Values of options that several commands share.
+//! Parsers of option values that several commands share.
 
 use std::time::Duration;
 

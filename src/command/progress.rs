@@ -7,28 +7,28 @@ use std::{
 
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// Steps of the bar; only its resolution.
+/// Resolution of the bar, steps.
 const STEPS: u64 = 10_000;
 /// First interval between plain lines; it doubles up to [`LONGEST_INTERVAL`].
 const FIRST_INTERVAL: Duration = Duration::from_secs(1);
 /// Longest interval between plain lines.
 const LONGEST_INTERVAL: Duration = Duration::from_secs(60);
 
-/// Where a run stands.
+/// State of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Standing {
-    /// Share done, 0…1, by the stop rule that is nearest to its end.
+    /// Fraction done, 0…1, by the stop rule that is nearest to being met.
     pub fraction: f64,
     /// Camera paths per pixel so far.
     pub samples: u32,
-    /// Rays a second so far; 0 where unknown.
+    /// Rays per second so far; 0 if unknown.
     pub rays_per_second: f64,
-    /// Mean relative standard error; absent where unknown.
+    /// Mean relative standard error, if known.
     pub relative_error: Option<f64>,
 }
 
 impl Standing {
-    /// "64 spp, 3.21 Mrays/s, error 4.2%", without what is 0 or unknown.
+    /// Formats "64 spp, 3.21 Mrays/s, error 4.2%", leaving out zeros and unknowns.
     fn describe(&self) -> String {
         let mut parts = Vec::new();
         if self.samples > 0 {
@@ -77,7 +77,7 @@ impl Progress {
         Self { label, start: Instant::now(), output }
     }
 
-    /// Shows where the run stands; call it as often as convenient.
+    /// Updates the display; call it as often as convenient.
     pub fn update(&mut self, standing: &Standing) {
         let elapsed = self.start.elapsed();
         let message = || {
@@ -104,7 +104,7 @@ impl Progress {
         }
     }
 
-    /// Prints a line that stays (a warning, a file written), above the bar.
+    /// Prints a permanent line above the bar (a warning, a file written).
     pub fn print(&self, line: &str) {
         match &self.output {
             Output::Bar(bar) => bar.suspend(|| eprintln!("{line}")),
@@ -113,7 +113,7 @@ impl Progress {
         }
     }
 
-    /// Removes the bar and prints the last line: where the run ended and why.
+    /// Removes the bar and prints a last line: the final state and why the run ended.
     pub fn finish(self, standing: &Standing, reason: &str) {
         if let Output::Bar(bar) = &self.output {
             bar.finish_and_clear();
@@ -127,7 +127,7 @@ impl Progress {
     }
 }
 
-/// Time left at the rate so far; absent at the start and where the end is unknown.
+/// Estimates the time left from the rate so far; `None` at the start and if the end is unknown.
 fn remaining(elapsed: Duration, fraction: f64) -> Option<Duration> {
     if !(0.001..1.0).contains(&fraction) {
         return None;

@@ -1,4 +1,4 @@
-//! `fenestra study`: samplers against each other and against a reference, as a report.
+//! `fenestra study`: compares samplers with a reference and with each other in a report.
 
 use std::{
     path::PathBuf,
@@ -27,7 +27,7 @@ use crate::{
     },
 };
 
-/// `--quick` without a study file.
+/// Settings of `--quick` without a study file.
 const QUICK_SPP: u32 = 16;
 const QUICK_TIME: Duration = Duration::from_secs(2);
 const QUICK_SIZE: [u32; 2] = [80, 60];
@@ -36,61 +36,62 @@ const QUICK_REFERENCE_SPP: u32 = 512;
 /// Arguments of `study`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Scene files, or a study file (.toml with a line `study = "title"`); scenes beside a study file
-    /// take the place of its own.
+    /// Scene files, or a study file (.toml with a line `study = "title"`); scenes given with a
+    /// study file replace its own.
     #[arg(required = true, value_name = "SCENE|STUDY")]
     pub inputs: Vec<PathBuf>,
-    /// Folder of the report; a study that was interrupted continues where it was.
+    /// Report folder; an interrupted study continues there.
     #[arg(short, long, value_name = "FOLDER", default_value = "report")]
     pub output: PathBuf,
-    /// Samplers to compare; ratios are taken to the first. Parameters follow colons:
+    /// Samplers to compare; ratios are relative to the first. Parameters follow colons:
     /// mis,ris:candidates=8.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub samplers: Option<Vec<String>>,
     /// Compare at these numbers of samples per pixel.
     #[arg(long, value_name = "N,…", value_delimiter = ',')]
     pub spp: Option<Vec<u32>>,
-    /// Compare after this much wall time of passes: 500ms, 30s, 5m.
+    /// Compare after rendering for this much wall time: 500ms, 30s, 5m.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
     pub time: Option<Duration>,
-    /// Runs of each sampler, with seeds 1, 2, … (default 3).
+    /// Runs per sampler, with seeds 1, 2, … (default 3).
     #[arg(long, value_name = "N")]
     pub seeds: Option<u32>,
-    /// Film size in pixels instead of the scenes'.
+    /// Film size in pixels, overriding the scenes'.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<[u32; 2]>,
-    /// Directions traced at every vertex of every camera path (default 5).
+    /// Shadow rays traced at every vertex of a camera path (default 5).
     #[arg(long, value_name = "N")]
     pub shadow_rays: Option<u32>,
-    /// Path vertices at which environment light is gathered (default 1, direct light).
+    /// Number of path vertices lit by the environment (default 1, direct light).
     #[arg(long, value_name = "D")]
     pub depth: Option<u32>,
-    /// Sampler of the reference (default mis).
+    /// Sampler that renders the reference (default mis).
     #[arg(long, value_name = "NAME")]
     pub reference_sampler: Option<String>,
     /// Samples per pixel of the reference, both halves together (default 16 times the largest --spp).
     #[arg(long, value_name = "N")]
     pub reference_spp: Option<u32>,
-    /// Reference to read instead: an image or, given twice, two independent halves of one scene; or
-    /// the report folder of another study.
+    /// Reference to read instead of rendering one: an image, two independent halves (give it
+    /// twice), or the report folder of another study.
     #[arg(long, value_name = "EXR|FOLDER")]
     pub reference: Vec<PathBuf>,
-    /// Measure how much more time the samplers take per sample than the first, pass by pass.
+    /// Measure the extra time per sample over that of the first sampler, pass by pass.
     #[arg(long)]
     pub overhead: bool,
-    /// The sampler whose time overhead is measured against (default the first).
+    /// Sampler against which overhead is measured (default the first).
     #[arg(long, value_name = "NAME")]
     pub baseline: Option<String>,
-    /// Interleaved overhead measurements of each sampler (default 15).
+    /// Interleaved overhead measurements per sampler (default 15).
     #[arg(long, value_name = "N")]
     pub repetitions: Option<u32>,
-    /// Sampler parameter for all samplers, may be repeated.
+    /// Parameter for all samplers. May be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// A small, fast version: the study file's quick settings, or a film of 80x60 and few samples.
+    /// Run a small, fast version: the study file's quick settings, or an 80x60 film and few
+    /// samples.
     #[arg(long)]
     pub quick: bool,
-    /// Remove finished runs in the folder that were made under other conditions.
+    /// Discard finished runs in the folder that were made under other conditions.
     #[arg(long)]
     pub redo: bool,
     /// Device to use, by index or part of its name; see `fenestra devices`.
@@ -99,10 +100,10 @@ pub struct Arguments {
     /// Run with the Vulkan validation layers; any message fails the command.
     #[arg(long)]
     pub validate: bool,
-    /// Print the results as JSON to standard output as well.
+    /// Also print the results as JSON to standard output.
     #[arg(long)]
     pub json: bool,
-    /// No progress and no messages but errors.
+    /// Print errors only.
     #[arg(short, long)]
     pub quiet: bool,
 }
@@ -110,9 +111,9 @@ pub struct Arguments {
 /// Runs a study.
 ///
 /// # Errors
-/// Wrong options, an unusable scene, study file or reference, a folder that holds something else, no
-/// device, a failing device or disk; [`Error::Interrupted`] after Ctrl-C. Finished runs are kept in
-/// every case.
+/// Wrong options, an unusable scene, study file or reference, a folder that holds something else,
+/// no device, a failing device or disk; [`Error::Interrupted`] after Ctrl-C. Finished runs are
+/// always kept.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let interrupted = listen_for_interrupt();
     let plan = plan(arguments)?;
@@ -140,7 +141,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         report::write(&report, &plan, &folder)
     };
     let written = if finished > 0 { write() } else { Ok(()) };
-    // What ended the study matters more than that its report could not be written.
+    // Report why the study ended rather than why its report could not be written.
     if let Some(error) = end {
         return Err(error);
     }
@@ -160,7 +161,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Study file, quick settings and options, in layers.
+/// Layers the options over the quick settings over the study file.
 fn plan(arguments: &Arguments) -> Result<Plan> {
     let mut defaults = Parameters::default();
     for assignment in &arguments.set {
@@ -221,8 +222,8 @@ fn plan(arguments: &Arguments) -> Result<Plan> {
     Plan::new(scenes, description, options.over(below), arguments.reference.clone())
 }
 
-/// What `--quick` means without a study file. Samples and time are shortened only where they would be
-/// chosen at all.
+/// Settings of `--quick` without a study file. Samples and time are set only if neither `--time`
+/// nor `--overhead` is given.
 fn quick_options(arguments: &Arguments) -> Options {
     let nothing_asked = arguments.time.is_none() && !arguments.overhead;
     Options {
@@ -237,7 +238,7 @@ fn quick_options(arguments: &Arguments) -> Options {
     }
 }
 
-/// Progress and interrupt flag as the engine sees them.
+/// Progress and interrupt flag, as seen by the engine.
 struct Display<'a> {
     progress: Progress,
     interrupted: &'a AtomicBool,

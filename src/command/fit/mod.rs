@@ -1,4 +1,4 @@
-//! `fenestra fit`: environment maps and BRDFs into spherical radial basis functions.
+//! `fenestra fit`: fits environment maps and BRDFs with spherical radial basis functions.
 
 mod source;
 mod table;
@@ -21,39 +21,39 @@ use crate::{
 /// Arguments of `fit`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// What to fit.
+    /// Kind of source.
     #[command(subcommand)]
     pub target: Target,
 }
 
-/// What can be fitted.
+/// Kinds of source.
 #[derive(Debug, Subcommand)]
 pub enum Target {
     /// Fit an environment map.
     Env(EnvironmentArguments),
-    /// Fit BRDF × cosine for a row of view elevations.
+    /// Fit BRDF × cosine at a series of view elevations.
     Brdf(BrdfArguments),
-    /// Fit many maps and BRDFs and print a table of errors and seconds in Markdown.
+    /// Fit many maps and BRDFs and write a Markdown table of errors and times.
     Table(table::Arguments),
 }
 
-/// Options that both kinds of fit share.
+/// Options shared by both kinds of fit.
 #[derive(Debug, clap::Args)]
 pub struct Shared {
-    /// What the fit minimizes.
+    /// Objective that the fit minimizes.
     #[arg(long, value_enum, default_value_t)]
     pub method: Method,
-    /// Fit file to write; the picture goes beside it. Default: named after the source, in the
-    /// working folder.
+    /// Fit file to write, with a picture beside it. Default: the source's name in the working
+    /// folder.
     #[arg(short, long, value_name = "FIT")]
     pub output: Option<PathBuf>,
-    /// Neither read nor write the cache of fits.
+    /// Neither read nor write the fit cache.
     #[arg(long)]
     pub no_cache: bool,
     /// Print JSON to standard output.
     #[arg(long)]
     pub json: bool,
-    /// No progress.
+    /// Hide progress.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -61,9 +61,9 @@ pub struct Shared {
 /// Arguments of `fit env`.
 #[derive(Debug, clap::Args)]
 pub struct EnvironmentArguments {
-    /// Environment map (.hdr, .exr, .pfm), or a scene whose environment is taken.
+    /// Environment map (.hdr, .exr, .pfm), or a scene whose environment is fitted.
     pub map: PathBuf,
-    /// Lobes of the mixture.
+    /// Number of lobes.
     #[arg(long, default_value_t = 100)]
     pub lobes: usize,
     /// Shared options.
@@ -74,14 +74,14 @@ pub struct EnvironmentArguments {
 /// Arguments of `fit brdf`.
 #[derive(Debug, clap::Args)]
 pub struct BrdfArguments {
-    /// Measured BRDF (.binary, .brdf), material of a scene (SCENE.toml#name), or a material in
-    /// words: TYPE:key=value,… with the keys of a scene's material, as in
-    /// plastic:diffuse=0.5,alpha=0.1 or conductor:reflectance=[0.9,0.6,0.3],alpha=0.05.
+    /// Measured BRDF (.binary, .brdf), material of a scene (SCENE.toml#name), or TYPE:key=value,…
+    /// with the keys of a scene's material, such as plastic:diffuse=0.5,alpha=0.1 or
+    /// conductor:reflectance=[0.9,0.6,0.3],alpha=0.05.
     pub material: String,
-    /// Lobes per view.
+    /// Number of lobes per view.
     #[arg(long, default_value_t = 20)]
     pub lobes: usize,
-    /// Elevations of the view between normal and horizon.
+    /// Number of view elevations between normal and horizon.
     #[arg(long, default_value_t = 32)]
     pub views: usize,
     /// Shared options.
@@ -89,7 +89,7 @@ pub struct BrdfArguments {
     pub shared: Shared,
 }
 
-/// Fits.
+/// Runs `fit`.
 ///
 /// # Errors
 /// A source that cannot be read or fitted, options out of range, a file that cannot be written.
@@ -120,12 +120,12 @@ fn cache(shared: &Shared) -> Option<Cache> {
     if shared.no_cache { None } else { Cache::user() }
 }
 
-/// Output file: as asked, or the source's name with the extension `fit`.
+/// Returns the output path: `--output`, or the source's name with extension `fit`.
 fn output(shared: &Shared, name: &str) -> PathBuf {
     shared.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.fit")))
 }
 
-/// Prints what was made and where it is.
+/// Prints the figures of a fit and the files written.
 fn report(
     mut description: Description,
     shared: &Shared,

@@ -1,4 +1,4 @@
-//! What the user names → a map or a material.
+//! Source of a fit: the user's text → map or material.
 
 use std::path::Path;
 
@@ -10,27 +10,27 @@ use crate::{
 
 /// Extensions of measured BRDFs.
 const MEASURED: [&str; 2] = ["binary", "brdf"];
-/// Types of materials that can be given in words.
+/// Material types that can be given inline.
 const TYPES: [&str; 4] = ["diffuse", "plastic", "conductor", "measured"];
-/// A scene around a material in words.
+/// Minimal scene around an inline material.
 const SCENE: &str = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n\
     vertical_fov_deg = 45\n[film]\nwidth = 1\nheight = 1\n[environment]\nconstant = [1, 1, 1]\n\
     [[object]]\nshape = \"sphere\"\nradius = 1\nmaterial = \"material\"\n";
 
 /// A material with its tables and a name for files.
 pub struct Source {
-    /// Stem of the files that are written.
+    /// Stem of the output files.
     pub name: String,
-    /// Tables with the one material.
+    /// Tables of this one material.
     pub tables: MaterialTables,
 }
 
-/// Extension in lower case.
+/// Returns the extension in lower case.
 pub fn extension(path: &Path) -> String {
     path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
 
-/// Whether the extension is that of a measured BRDF.
+/// Tests for the extension of a measured BRDF.
 pub fn is_measured(path: &Path) -> bool {
     MEASURED.contains(&extension(path).as_str())
 }
@@ -45,7 +45,7 @@ fn warn(warnings: &[String]) {
     }
 }
 
-/// A map, or the environment of a scene, and a name for files.
+/// Loads a map, or the environment of a scene, and derives a name for files.
 ///
 /// # Errors
 /// Those of the readers.
@@ -61,10 +61,10 @@ pub fn environment(path: &Path) -> Result<(EnvironmentMap, String)> {
     Ok((map, stem(path)))
 }
 
-/// A measured file, `SCENE#name`, or `TYPE:key=value,…`.
+/// Loads a material from a measured file, `SCENE#name` or `TYPE:key=value,…`.
 ///
 /// # Errors
-/// Those of the readers; a text that is none of the three.
+/// Those of the readers, or a text that is none of the three.
 pub fn material(text: &str) -> Result<Source> {
     let path = Path::new(text);
     if let Some((kind, keys)) = text.split_once(':')
@@ -134,7 +134,7 @@ fn in_words(text: &str, kind: &str, keys: &str) -> Result<Source> {
         };
         scene += &format!("{key} = {value}\n");
     }
-    // Lines of the text above mean nothing to the user.
+    // Line numbers of the generated text mean nothing to the user.
     let scene = Scene::parse(Path::new(text), &scene).map_err(|error| match error {
         Error::Parse { message, .. } | Error::Scene { message, .. } => {
             Error::usage(format!("`{text}`: {message}"))
@@ -143,7 +143,7 @@ fn in_words(text: &str, kind: &str, keys: &str) -> Result<Source> {
     })?;
     let name: String =
         text.chars().map(|c| if c.is_ascii_alphanumeric() || c == '.' { c } else { '_' }).collect();
-    // A dot would pass for an extension.
+    // A dot would be taken for an extension.
     Ok(Source { name: name.replace('.', "p"), tables: MaterialTables::new(&scene.materials)? })
 }
 

@@ -1,4 +1,4 @@
-//! `fenestra fit table`: the errors and seconds of many fits.
+//! `fenestra fit table`: tabulates errors and times of many fits.
 
 use std::{
     fmt::Write,
@@ -22,16 +22,16 @@ pub struct Arguments {
     /// Maps, measured BRDFs and materials, as `fit env` and `fit brdf` take them.
     #[arg(required = true)]
     pub sources: Vec<String>,
-    /// Lobes of the fits of maps.
+    /// Lobe counts for maps.
     #[arg(long, value_delimiter = ',', default_value = "25,50,100,200,400")]
     pub environment_lobes: Vec<usize>,
-    /// Lobes of the fits of BRDFs.
+    /// Lobe counts for BRDFs.
     #[arg(long, value_delimiter = ',', default_value = "8,20")]
     pub brdf_lobes: Vec<usize>,
-    /// Elevations of the view of the fits of BRDFs.
+    /// Number of view elevations for BRDFs.
     #[arg(long, default_value_t = 32)]
     pub views: usize,
-    /// What the fits minimize.
+    /// Objective that the fits minimize.
     #[arg(long, value_enum, default_value_t)]
     pub method: Method,
     /// Markdown file to write; default: standard output.
@@ -40,12 +40,12 @@ pub struct Arguments {
     /// Folder for a picture of every fit.
     #[arg(long, value_name = "FOLDER")]
     pub pictures: Option<PathBuf>,
-    /// No progress.
+    /// Hide progress.
     #[arg(long)]
     pub quiet: bool,
 }
 
-/// Fits everything, without the cache, and writes the table.
+/// Fits every source, bypassing the cache, and writes the table.
 ///
 /// # Errors
 /// A source that cannot be read or fitted, options out of range, a file that cannot be written.

@@ -23,48 +23,48 @@ use crate::{
 pub struct Arguments {
     /// Scene file (.toml).
     pub scene: PathBuf,
-    /// Image to write; named after the scene in the working folder if absent.
+    /// Image to write. Default: the scene's name in the working folder.
     #[arg(short, long, value_name = "FILE.exr", visible_alias = "outfile")]
     pub output: Option<PathBuf>,
-    /// How directions are chosen at a hit.
+    /// Sampler that chooses directions at a hit.
     #[arg(long, value_enum, default_value = "mis")]
     pub sampler: Sampler,
     /// Stop after this many camera paths per pixel (64 if no stop rule is given).
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
-    /// Stop after this much wall time of passes: 500ms, 30s, 5m, 1h.
+    /// Stop after rendering for this much wall time: 500ms, 30s, 5m, 1h.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
     pub time: Option<Duration>,
-    /// Stop when the mean relative standard error is below this; stopping by the data is slightly
-    /// biased.
+    /// Stop when the mean relative standard error falls below this. Slightly biased, since the data
+    /// decide when to stop.
     #[arg(long, value_name = "E")]
     pub error: Option<f64>,
-    /// Directions traced at every vertex of every camera path; `guided` traces half as many at the later
-    /// ones (`--set later-rays=N`).
+    /// Shadow rays traced at every vertex of a camera path; `guided` traces half as many at later
+    /// vertices (`--set later-rays=N`).
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
     pub shadow_rays: u32,
-    /// Path vertices at which environment light is gathered; 1 is direct light.
+    /// Number of path vertices lit by the environment; 1 is direct light.
     #[arg(long, value_name = "D", default_value_t = 1)]
     pub depth: u32,
-    /// Path vertex from which russian roulette may end a path.
+    /// First path vertex at which Russian roulette may end a path.
     #[arg(long, value_name = "D", default_value_t = 8)]
     pub roulette_depth: u32,
-    /// Film size in pixels instead of the scene's.
+    /// Film size in pixels, overriding the scene's.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<[u32; 2]>,
     /// Render only pixels x0 ≤ x < x1, y0 ≤ y < y1.
     #[arg(long, value_name = "x0,y0,x1,y1", value_parser = parse_crop)]
     pub crop: Option<Window>,
-    /// Seed of the random numbers.
+    /// Random seed.
     #[arg(long, default_value_t = 0)]
     pub seed: u32,
-    /// Index of the first sample of every pixel, to render disjoint parts for `merge`.
+    /// Index of each pixel's first sample, to render disjoint parts for `merge`.
     #[arg(long, value_name = "K", default_value_t = 0)]
     pub sample_offset: u32,
-    /// Continue from the checkpoint of the output, if there is one.
+    /// Continue from the output's checkpoint, if there is one.
     #[arg(long)]
     pub resume: bool,
-    /// Write a checkpoint this often and at the end.
+    /// Write a checkpoint at this interval and at the end.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
     pub checkpoint_interval: Option<Duration>,
     /// Device to use, by index or part of its name; see `fenestra devices`.
@@ -76,44 +76,44 @@ pub struct Arguments {
     /// Write statistics as JSON.
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,
-    /// Write a PNG preview beside the image.
+    /// Also write a PNG preview beside the image.
     #[arg(long)]
     pub png: bool,
-    /// Exposure of the preview, stops.
+    /// Exposure of the preview, in stops.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
     pub exposure: f32,
-    /// Show the image as it is rendered in the viewer tev, which listens at this address.
+    /// Show the image as it renders in the viewer tev, listening at this address.
     #[arg(long, value_name = "HOST:PORT")]
     pub display_server: Option<String>,
-    /// Write pictures that explain how the sampler saw the first hit of this pixel.
+    /// Write a picture that explains what the sampler did at this pixel's first hit.
     #[arg(long, value_name = "X,Y", value_parser = parse_pixel)]
     pub pixel: Option<[u32; 2]>,
-    /// Extra layers of the image.
+    /// Extra layers to store in the image.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     pub aov: Vec<Aov>,
-    /// Sampler parameter, may be repeated: candidates=4, lobes=64, cache=pixel, … (elevation=metropolis
-    /// is biased).
+    /// Sampler parameter, such as candidates=4, lobes=64 or cache=pixel. May be repeated.
+    /// (elevation=metropolis is biased.)
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// Write what the sampler `guided` has learned.
+    /// Save the guide that the sampler `guided` has learned.
     #[arg(long, value_name = "FILE.guide")]
     pub save_guide: Option<PathBuf>,
-    /// Start from what an earlier render under the same environment learned, instead of training.
+    /// Start from a guide saved under the same environment, instead of training.
     #[arg(long, value_name = "FILE.guide")]
     pub load_guide: Option<PathBuf>,
-    /// A small, fast version: film at most 240 pixels wide, 16 samples.
+    /// Render a small, fast version: at most 240 pixels wide, 16 samples.
     #[arg(long)]
     pub quick: bool,
-    /// No progress and no messages but errors.
+    /// Print errors only.
     #[arg(short, long)]
     pub quiet: bool,
 }
 
-/// Film width of `--quick`, pixels.
+/// Maximum film width of `--quick`, pixels.
 const QUICK_WIDTH: u32 = 240;
 
 impl Arguments {
-    /// The film as `--size` or `--quick` want it.
+    /// Applies `--size` or `--quick` to the film.
     pub(super) fn resize(&self, film: &mut FilmSettings) {
         if let Some([width, height]) = self.size {
             (film.width, film.height) = (width, height);
@@ -124,7 +124,7 @@ impl Arguments {
         }
     }
 
-    /// What the renderer is told.
+    /// Translates the options into renderer settings.
     ///
     /// # Errors
     /// [`Error::Usage`] for options that contradict each other or are out of range.

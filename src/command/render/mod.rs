@@ -1,4 +1,4 @@
-//! `fenestra render`: a scene file to a finished image.
+//! `fenestra render`: scene file → finished image.
 
 mod arguments;
 mod pixel;
@@ -32,16 +32,16 @@ use crate::{
     scene::Scene,
 };
 
-/// Samples per pixel where no stop rule is given.
+/// Samples per pixel if no stop rule is given.
 const DEFAULT_SPP: u32 = 64;
-/// Passes are grouped so that the loop looks around about this often.
+/// Target duration of a batch of samples, after which the loop checks its stop rules.
 const LOOK_AROUND: Duration = Duration::from_millis(250);
-/// How often the error is estimated and the picture shown, which needs the film on the host.
+/// Interval of error estimates and display updates, which need the film on the host.
 const LOOK_INTERVAL: Duration = Duration::from_secs(1);
-/// Samples of `--quick`.
+/// Samples per pixel of `--quick`.
 const QUICK_SPP: u32 = 16;
 
-/// Which rule ended a render.
+/// Rule that ended a render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum StopReason {
     Spp,
@@ -74,7 +74,7 @@ impl StopReason {
 ///
 /// # Errors
 /// Wrong options, an unusable scene, no device, a failing device or disk; [`Error::Interrupted`]
-/// after Ctrl-C, when what there is has been written.
+/// after Ctrl-C, once the partial result has been written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let interrupted = listen_for_interrupt();
     let settings = arguments.settings()?;
@@ -87,7 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     arguments.resize(&mut scene.film);
     let output =
         arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.exr", scene.name)));
-    // Before the work, not after it.
+    // Fail before the work, not after it.
     check_writable(&output)?;
     if let Some(at) = arguments.pixel {
         pixel::check(&settings, &scene, &output, at)?;
@@ -134,7 +134,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if reason == StopReason::Interrupt { Err(Error::Interrupted) } else { Ok(()) }
 }
 
-/// A flag that Ctrl-C raises; a second Ctrl-C ends the process at once.
+/// Returns a flag that Ctrl-C raises; a second Ctrl-C ends the process at once.
 pub(super) fn listen_for_interrupt() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&flag);
@@ -149,15 +149,15 @@ pub(super) fn listen_for_interrupt() -> Arc<AtomicBool> {
     flag
 }
 
-/// One render from its first pass to its files.
+/// One render, from its first pass to its files.
 struct RenderJob<'a> {
     arguments: &'a Arguments,
     scene: &'a Scene,
     output: PathBuf,
     metadata: Metadata,
-    /// Wall time of the passes of earlier runs, seconds.
+    /// Wall time that earlier runs spent in passes, seconds.
     earlier_seconds: f64,
-    /// Wall time of the passes of this run.
+    /// Wall time that this run has spent in passes.
     elapsed: Duration,
     relative_error: Option<f64>,
 }
@@ -199,7 +199,7 @@ impl<'a> RenderJob<'a> {
         }
     }
 
-    /// Takes up the checkpoint of the output where `--resume` asks for it and there is one.
+    /// Restores the output's checkpoint under `--resume`, if there is one.
     fn resume(&mut self, renderer: &mut Renderer) -> Result<()> {
         let path = checkpoint_path(&self.output);
         if !self.arguments.resume {
@@ -230,14 +230,14 @@ impl<'a> RenderJob<'a> {
         self.earlier_seconds + self.elapsed.as_secs_f64()
     }
 
-    /// Target of `--spp`, or the default where no rule at all is given.
+    /// Returns the target of `--spp`, or the default if no stop rule is given.
     fn target_spp(&self) -> Option<u32> {
         let none = self.arguments.time.is_none() && self.arguments.error.is_none();
         let default = if self.arguments.quick { QUICK_SPP } else { DEFAULT_SPP };
         self.arguments.spp.or_else(|| none.then_some(default))
     }
 
-    /// Renders passes until a rule ends it.
+    /// Renders passes until a stop rule is met.
     fn render(&mut self, renderer: &mut Renderer, interrupted: &AtomicBool) -> Result<StopReason> {
         let mut progress = Progress::new(self.scene.name.clone(), self.arguments.quiet);
         let mut display = self.open_display()?;
@@ -268,7 +268,7 @@ impl<'a> RenderJob<'a> {
                         .collect();
                     display.update(&pixels);
                 }
-                // Looking at a large film takes time that belongs to the passes.
+                // Reading back a large film takes time from the passes.
                 next_look = Instant::now() + LOOK_INTERVAL.max(20 * start.elapsed());
             }
             if let Some(interval) = self.arguments.checkpoint_interval
@@ -285,7 +285,7 @@ impl<'a> RenderJob<'a> {
         Ok(reason)
     }
 
-    /// The viewer that `--display-server` names.
+    /// Connects to the viewer named by `--display-server`.
     fn open_display(&self) -> Result<Option<DisplayServer>> {
         let window = self.window();
         self.arguments
@@ -297,7 +297,7 @@ impl<'a> RenderJob<'a> {
             .transpose()
     }
 
-    /// The part of the film that is rendered.
+    /// Returns the part of the film that is rendered.
     fn window(&self) -> Window {
         self.arguments.crop.unwrap_or(Window {
             x: 0,
@@ -349,7 +349,7 @@ impl<'a> RenderJob<'a> {
         }
     }
 
-    /// The metadata as of now.
+    /// Returns the metadata for the samples so far.
     fn metadata(&self, renderer: &Renderer) -> Metadata {
         Metadata {
             sample_ranges: vec![SampleRange {
@@ -376,7 +376,7 @@ impl<'a> RenderJob<'a> {
         checkpoint.write(&path)
     }
 
-    /// Writes every file.
+    /// Writes the image and all other files asked for.
     fn finish(&self, renderer: &Renderer, reason: StopReason, load_ms: f64) -> Result<()> {
         let sums = renderer.sums()?;
         let totals = renderer.totals();
@@ -426,7 +426,8 @@ fn display(path: &Path) -> String {
     path.display().to_string()
 }
 
-/// Samples of the next pass: about [`LOOK_AROUND`] long, and not beyond the time that is left.
+/// Chooses the samples of the next pass to last about [`LOOK_AROUND`], but no longer than
+/// `time_left`, in seconds.
 fn next_pass_samples(samples: u32, took: Duration, time_left: Option<f64>) -> u32 {
     let per_sample = took.as_secs_f64().max(1e-6) / f64::from(samples);
     let wanted = time_left

@@ -1,15 +1,15 @@
-//! `--pixel x,y`: the picture that explains how the sampler saw one hit.
+//! `--pixel x,y`: a picture that explains what the sampler did at one hit.
 //!
-//! Lat-long panels, −Z in the middle, +Y on top, darkened below the horizon of the hit (blue): the
-//! environment with the samples taken (green reached it, red were blocked, grey brought nothing and
-//! were not traced); the density of the product's lobes for the first ray; the same for the last ray,
-//! in the same exposure, with the directions in the visibility cache (red blocked, green visible).
-//! The story of figures 4.3 to 4.8 of Wu & Shih 2009. `product` has the first two panels, samplers
-//! without lobes the first.
+//! Panels are lat-long, −Z in the middle and +Y on top, darkened below the hit's horizon (blue).
+//! They show the environment with the samples taken (green reached it, red were blocked, grey
+//! brought nothing and were not traced); the density of the product's lobes for the first ray; and
+//! that density for the last ray, at the same exposure, with the directions in the visibility cache
+//! (red blocked, green visible), as in figures 4.3 to 4.8 of Wu & Shih 2009. `product` has the
+//! first two panels, samplers without lobes only the first.
 //!
-//! `guided` has, below the environment with the next samples of the pixel, what the cell of the hit
-//! knows: V̂ of every region, white where all is visible, blue where only its surroundings have
-//! counted; and the probability of the regions per steradian.
+//! `guided` shows the environment with the pixel's next samples, then the state of the hit's cell:
+//! V̂ of every region, white where all is visible and blue where only its surroundings have
+//! counted, and the probability of the regions per steradian.
 
 use std::{
     io::Write,
@@ -37,25 +37,25 @@ use crate::{
     srbf::kernel_value,
 };
 
-/// Rays in the picture of `guided`, as far as whole samples give.
+/// Rays in the picture of `guided`, rounded up to whole samples.
 const GUIDED_RAYS: u32 = 64;
 /// Size of a panel, pixels.
 const WIDTH: usize = 512;
 const HEIGHT: usize = WIDTH / 2;
-/// White line between panels, pixels.
+/// Height of the white line between panels, pixels.
 const GAP: usize = 4;
 /// Share of a panel's pixels that may be over-exposed.
 const CLIPPED: f32 = 0.005;
-/// What is left of a colour below the horizon.
+/// Factor that darkens colours below the horizon.
 const BELOW: f32 = 0.25;
 
 const VISIBLE: [u8; 3] = [40, 220, 70];
 const BLOCKED: [u8; 3] = [235, 40, 40];
 const UNTRACED: [u8; 3] = [150, 150, 150];
 const HORIZON: [u8; 3] = [90, 160, 255];
-/// Names of the faces of a cube, in the order of the guide.
+/// Names of a cube's faces, in the guide's order.
 const FACES: [&str; 6] = ["+x", "-x", "+y", "-y", "+z", "-z"];
-/// Tint of what a cell has not counted itself, linear.
+/// Tint of regions that a cell has not counted itself, linear.
 const UNCOUNTED: Vec3 = Vec3::new(0.35, 0.6, 1.0);
 
 /// `out.exr` → `out.pixel_x_y.png`.
@@ -63,10 +63,10 @@ pub fn picture_path(output: &Path, [x, y]: [u32; 2]) -> PathBuf {
     output.with_extension(format!("pixel_{x}_{y}.png"))
 }
 
-/// Refuses what cannot have a picture, before any work.
+/// Checks that the picture can be made, before any work.
 ///
 /// # Errors
-/// [`Error::Usage`] for a pixel outside of the window; [`Error::Io`] where nothing can be written.
+/// [`Error::Usage`] for a pixel outside the window; [`Error::Io`] if the picture cannot be written.
 pub fn check(settings: &Settings, scene: &Scene, output: &Path, pixel: [u32; 2]) -> Result<()> {
     let [x, y] = pixel;
     let window = window_of(settings, scene);
@@ -84,8 +84,8 @@ pub fn check(settings: &Settings, scene: &Scene, output: &Path, pixel: [u32; 2])
     crate::files::check_writable(&picture_path(output, pixel))
 }
 
-/// Renders the first sample of `pixel` once more, and writes the picture and, beside it, the numbers
-/// as JSON. Returns the files written; none, with a warning, where the pixel sees the environment.
+/// Renders the first sample of `pixel` again, and writes the picture with its numbers as JSON
+/// beside it. Returns the files written. Warns and writes none if the pixel sees the environment.
 ///
 /// # Errors
 /// A failing device or disk.
@@ -107,7 +107,7 @@ pub fn write(
     write_files(&picture_path(output, pixel), &draw(scene, &recorded), &numbers_of(&recorded))
 }
 
-/// As [`write`] for the sampler `guided`, from the renderer that made the picture and goes no further.
+/// As [`write`], for the sampler `guided` and the renderer that has made the image.
 ///
 /// # Errors
 /// A failing device or disk.
@@ -216,7 +216,7 @@ fn guided_numbers_of(recorded: &RecordedGuide) -> serde_json::Value {
     })
 }
 
-/// The environment with rays: green reached it, red were blocked, grey brought nothing.
+/// Draws the environment with rays: green reached it, red were blocked, grey brought nothing.
 fn draw_rays<'a>(
     scene: &Scene,
     normal: Vec3,
@@ -235,7 +235,7 @@ fn draw_rays<'a>(
     panel
 }
 
-/// The panels of `guided` from top to bottom: one where nothing was learned, else three.
+/// Draws the panels of `guided`, top to bottom: three, or one if nothing was learned.
 fn draw_guided(scene: &Scene, recorded: &RecordedGuide) -> Vec<Panel> {
     let normal = recorded.normal;
     let mut panels = vec![draw_rays(scene, normal, recorded.rays.iter().map(|ray| &ray.ray))];
@@ -256,7 +256,7 @@ fn draw_guided(scene: &Scene, recorded: &RecordedGuide) -> Vec<Panel> {
     panels
 }
 
-/// The panels from top to bottom.
+/// Draws the panels, top to bottom.
 fn draw(scene: &Scene, recorded: &RecordedPixel) -> Vec<Panel> {
     let normal = recorded.normal;
     let mut panels = vec![draw_rays(scene, normal, recorded.rays.iter())];
@@ -286,7 +286,7 @@ fn draw(scene: &Scene, recorded: &RecordedPixel) -> Vec<Panel> {
     panels
 }
 
-/// What all but [`CLIPPED`] of a function of the direction are below.
+/// Returns the value that a share [`CLIPPED`] of the pixels of a function of direction exceeds.
 fn white_of(value: impl Fn(Vec3) -> Vec3) -> f32 {
     let mut sorted: Vec<f32> =
         (0..WIDTH * HEIGHT).map(|i| value(direction_of(i)).max_element()).collect();
@@ -300,7 +300,7 @@ fn white_of(value: impl Fn(Vec3) -> Vec3) -> f32 {
 struct Panel(Vec<[u8; 3]>);
 
 impl Panel {
-    /// A function of the direction, with `white` shown as white.
+    /// Draws a function of direction, with `white` shown as white.
     fn new(normal: Vec3, white: f32, value: impl Fn(Vec3) -> Vec3) -> Self {
         let values: Vec<Vec3> = (0..WIDTH * HEIGHT).map(|i| value(direction_of(i))).collect();
         let show = |(index, value): (usize, &Vec3)| {
@@ -314,7 +314,7 @@ impl Panel {
         Self(values.iter().enumerate().map(show).collect())
     }
 
-    /// A dot with a black rim.
+    /// Draws a dot with a black rim.
     fn mark(&mut self, direction: Vec3, colour: [u8; 3]) {
         let uv = lat_long_from_direction(direction);
         let centre = [(uv.x * WIDTH as f32) as i32, (uv.y * HEIGHT as f32) as i32];

@@ -1,4 +1,4 @@
-//! The numbers of a render, for `--stats`.
+//! Statistics of a render, for `--stats`.
 
 use super::{RenderJob, StopReason};
 use crate::{
@@ -7,7 +7,7 @@ use crate::{
 };
 
 impl RenderJob<'_> {
-    /// The statistics as of now.
+    /// Collects the statistics of the render so far.
     pub(super) fn statistics(
         &self,
         renderer: &Renderer,
