@@ -41,6 +41,9 @@
 //! - \[CIE 015:2018\] *Colorimetry*, fourth edition.
 //! - \[Cigolle et al. 2014\] "A Survey of Efficient Representations for Independent Unit Vectors",
 //!   JCGT 3(2).
+//! - \[Douc et al. 2007\] "Convergence of Adaptive Mixtures of Importance Sampling Schemes", Annals
+//!   of Statistics 35(1); "Minimum Variance Importance Sampling via Population Monte Carlo", ESAIM:
+//!   Probability and Statistics 11.
 //! - \[Duff et al. 2017\] "Building an Orthonormal Basis, Revisited", JCGT 6(1).
 //! - \[Dupuy & Benyoub 2023\] "Sampling Visible GGX Normals with Spherical Caps", Computer
 //!   Graphics Forum 42(8).
@@ -101,6 +104,7 @@
 //!   Eurographics Symposium on Rendering.
 //! - \[Wang et al. 2008\] "Computation of Rotation Minimizing Frames", ACM Transactions on
 //!   Graphics 27(1).
+//! - \[Winitzki 2008\] "A Handy Approximation for the Error Function and its Inverse".
 //! - \[Woop et al. 2013\] "Watertight Ray/Triangle Intersection", JCGT 2(1).
 //! - \[Wu & Shih 2009\] Y.-T. Wu, advised by Z.-C. Shih, "Visibility-Guided Importance Sampling",
 //!   master's thesis, National Chiao Tung University; "the thesis" in comments.
