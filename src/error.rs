@@ -114,8 +114,8 @@ impl Error {
         Self::Usage { message: message.into() }
     }
 
-    /// Returns the exit status: 2 for wrong usage, 3 for a metric beyond its threshold, 130 after
-    /// an interrupt, else 1.
+    /// Exit status: 2 for wrong usage, 3 for a metric beyond its threshold, 130 interrupted, else
+    /// 1.
     pub fn exit_status(&self) -> u8 {
         match self {
             Self::Usage { .. } => 2,

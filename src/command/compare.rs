@@ -18,8 +18,8 @@ pub struct Arguments {
     pub image: PathBuf,
     /// Reference (EXR).
     pub reference: PathBuf,
-    /// Second, independent half of the reference: squared errors become (x − r₁)(x − r₂), free of
-    /// the reference's own noise.
+    /// Second, independent half of the reference, which keeps its noise out of the squared errors:
+    /// they become (x − r₁)(x − r₂).
     #[arg(long, value_name = "EXR")]
     pub second_reference: Option<PathBuf>,
     /// Write the error of every pixel (RMS over RGB) in false colour with its scale, from blue

@@ -151,8 +151,7 @@ impl Commands {
         self.fill_start(buffer, vk::WHOLE_SIZE, word);
     }
 
-    /// Fills the first `bytes` of a buffer with a repeated 32-bit word, after all earlier use of
-    /// it. `bytes` is a positive multiple of 4.
+    /// Fills the first `bytes`, a positive multiple of 4, with a repeated word, after earlier use.
     pub fn fill_start(&mut self, buffer: &Buffer, bytes: u64, word: u32) {
         self.barrier(
             vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER,

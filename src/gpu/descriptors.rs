@@ -128,8 +128,7 @@ pub struct DescriptorSet {
 }
 
 impl DescriptorSet {
-    /// Creates the set with number `index` and `buffers` at their bindings. The buffers must
-    /// outlive every submission that uses the set.
+    /// Creates set number `index` with `buffers`, which must outlive every submission that uses it.
     ///
     /// # Errors
     /// [`Error::Vulkan`] if a call fails, [`Error::Device`] if a texel buffer has more texels than

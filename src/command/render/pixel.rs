@@ -286,7 +286,7 @@ fn draw(scene: &Scene, recorded: &RecordedPixel) -> Vec<Panel> {
     panels
 }
 
-/// Returns the value that a share [`CLIPPED`] of the pixels of a function of direction exceeds.
+/// Returns the value that a share [`CLIPPED`] of a function's pixels exceeds.
 fn white_of(value: impl Fn(Vec3) -> Vec3) -> f32 {
     let mut sorted: Vec<f32> =
         (0..WIDTH * HEIGHT).map(|i| value(direction_of(i)).max_element()).collect();
