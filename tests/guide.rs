@@ -7,8 +7,8 @@ mod support;
 use fenestra::{
     math::random::{hash_4d, random_independent_2d},
     sampler::guided::{
-        ARRIVAL_DIRECTIONS, CellKey, EstimateOptions, FACE_COUNT, GuideState, Learned,
-        PARENT_COUNT, Partition, decode_entry, decode_visibility, likely_regions,
+        ARRIVAL_DIRECTIONS, CellKey, FACE_COUNT, GuideState, Learned, PARENT_COUNT, Partition,
+        decode_entry, decode_visibility,
     },
     scene::environment::{EnvironmentMap, EnvironmentTables},
     shader::constants::{
@@ -266,7 +266,7 @@ fn entries_hold_the_probabilities_they_are_drawn_with() {
     let map = sunny();
     let partition = Partition::new(&map, 64);
     let learned = taught(&partition, 1 << 12, 1 << 14);
-    let snapshot = learned.snapshot(&partition, &EstimateOptions::default());
+    let snapshot = learned.snapshot(&partition);
     let regions = partition.regions.len();
     for cell in [0, FACE_COUNT, learned.cell_count() - 1] {
         let entries = &snapshot.entries[cell * regions..][..regions];
@@ -308,80 +308,6 @@ fn choose_region(entries: &[[u32; 2]], bits: u32) -> usize {
     low
 }
 
-/// Draws regions as the shader does with `weights=product` (`guide_redraw`) and compares with the
-/// probabilities it divides by (`guide_product_factor`), for reflections from none at all to a
-/// narrow lobe.
-#[test]
-fn the_likeliest_regions_are_drawn_with_the_probabilities_divided_by() {
-    const PRODUCT_PART: f64 = 0.7;
-    let map = sunny();
-    let partition = Partition::new(&map, 64);
-    let snapshot =
-        taught(&partition, 1 << 12, 1 << 14).snapshot(&partition, &EstimateOptions::default());
-    let entries = &snapshot.entries[FACE_COUNT * 64..][..64];
-    let probability: Vec<f64> = entries
-        .iter()
-        .zip(&partition.regions)
-        .map(|(entry, region)| f64::from(decode_entry(*entry).0) * region.share)
-        .collect();
-    let likely = likely_regions(entries, &partition);
-    let index = |word: u32| (word & 0x3ff) as usize;
-    assert!(likely.windows(2).all(|pair| index(pair[0][3]) < index(pair[1][3])));
-    let least = likely.iter().map(|l| l[3] >> 10).min().unwrap();
-    for (region, probability) in probability.iter().enumerate() {
-        let listed = likely.iter().find(|likely| index(likely[3]) == region);
-        let part = (probability * 65_536.0).round() as u32;
-        assert!(listed.map_or(part <= least, |listed| listed[3] >> 10 == part));
-    }
-    let lobe = |slot: usize| if slot == 5 { 1.0 } else { 0.0 };
-    let uneven = |slot: usize| (slot * 7 % 5) as f64;
-    for (seed, reflected) in
-        [lobe as fn(usize) -> f64, uneven, |_| 0.0, |slot| f64::from(u32::from(slot == 15))]
-            .into_iter()
-            .enumerate()
-    {
-        let part = |slot: usize| f64::from(likely[slot][3] >> 10) / 65_536.0;
-        let listed: f64 = (0..likely.len()).map(part).sum();
-        let mut sum = 0.0;
-        let cumulative: Vec<f64> = (0..likely.len())
-            .map(|slot| {
-                sum += part(slot) * reflected(slot);
-                sum
-            })
-            .collect();
-        let expected: Vec<f64> = (0..64)
-            .map(|region| {
-                let slot = likely.iter().position(|likely| index(likely[3]) == region);
-                let factor = slot.filter(|_| sum > 0.0).map_or(1.0, |slot| {
-                    1.0 - PRODUCT_PART + PRODUCT_PART * listed * reflected(slot) / sum
-                });
-                probability[region] * factor
-            })
-            .collect();
-        assert!((expected.iter().sum::<f64>() - 1.0).abs() < 1e-6, "the density is normalised");
-        let mut observed = vec![0.0; 64];
-        for sample in 0..200_000 {
-            let bits = hash_4d([sample, seed as u32, 7, 9]);
-            let mut region = choose_region(entries, bits[0]);
-            let u = f64::from(bits[1]) / 4_294_967_296.0;
-            let wanted = u / PRODUCT_PART * sum;
-            if u < PRODUCT_PART
-                && wanted < sum
-                && likely.iter().any(|likely| index(likely[3]) == region)
-            {
-                let slot = cumulative.partition_point(|&up_to| up_to <= wanted);
-                region = index(likely[slot][3]);
-            }
-            observed[region] += 1.0;
-        }
-        let p = chi_square_p_value(&observed, &expected);
-        assert!(p > 1e-5, "reflection {seed}: p = {p}");
-    }
-    // A map of few regions fills the list with nothing.
-    let few = likely_regions(&entries[..5], &partition);
-    assert!(few.len() == likely.len() && few[5..].iter().all(|likely| likely[3] == 0x3ff));
-}
-
 /// A guide that was taught: eastern regions visible from one fine cell, nothing from another.
 fn taught(partition: &Partition, capacity: usize, slots: usize) -> Learned {
     let mut learned = Learned::new(partition.regions.len(), capacity, slots);
@@ -411,7 +337,7 @@ fn cells_learn_and_lean_on_their_surroundings() {
     let neighbour = CellKey::fine([2, 4, 5], 6, 2);
     let stranger = CellKey::fine([3, 4, 5], 6, 3);
     learned.want(&[neighbour.0, stranger.0]);
-    let snapshot = learned.snapshot(&partition, &EstimateOptions::default());
+    let snapshot = learned.snapshot(&partition);
     let regions = partition.regions.len();
     let share_east = |key: CellKey| -> f64 {
         let slot = snapshot.table.iter().find(|entry| entry[0] == key.0).unwrap();
@@ -466,30 +392,23 @@ fn cells_learn_what_their_surfaces_reflect() {
         counted[place * regions + index] = [RAYS, hits, response];
     }
     learned.add(0, &counted);
-    let ratio = |key: CellKey, options: &EstimateOptions| {
-        let snapshot = learned.snapshot(&partition, options);
+    let ratio = |key: CellKey| {
+        let snapshot = learned.snapshot(&partition);
         let slot = snapshot.table.iter().find(|entry| entry[0] == key.0).unwrap();
         let entries = &snapshot.entries[slot[1] as usize * regions..][..regions];
         let density = |index: usize| f64::from(decode_entry(entries[index]).0);
         density(strong) / density(weak)
     };
-    let learns = EstimateOptions::default();
     // The defensive share, which does not look at what was learned, takes a little off.
-    assert!((8.0..10.5).contains(&ratio(cell, &learns)), "{}", ratio(cell, &learns));
-    assert!(
-        ratio(neighbour, &learns) > 5.0,
-        "through the coarse cell: {}",
-        ratio(neighbour, &learns)
-    );
-    let cosine = EstimateOptions { learned_response: false, ..learns };
-    assert!((0.3..3.0).contains(&ratio(cell, &cosine)), "{}", ratio(cell, &cosine));
+    assert!((8.0..10.5).contains(&ratio(cell)), "{}", ratio(cell));
+    assert!(ratio(neighbour) > 5.0, "through the coarse cell: {}", ratio(neighbour));
     // What was counted survives a file to the bit, also where a count was halved.
     let many: Vec<_> = counted.iter().map(|count| count.map(|word| 16 * word)).collect();
     learned.add(0, &many);
     learned.add(0, &many);
     let again = Learned::resume(regions, 1 << 12, 1 << 14, &state_of(&learned), 1);
     assert_eq!(again.count_words(), learned.count_words());
-    assert_eq!(again.snapshot(&partition, &learns), learned.snapshot(&partition, &learns));
+    assert_eq!(again.snapshot(&partition), learned.snapshot(&partition));
     assert!(learned.counts(place)[strong].trials_in_rays() <= 65_536.0);
 }
 
@@ -555,7 +474,7 @@ fn cells_are_refined_whose_rays_disagree() {
     let is_cell = |key: CellKey| learned.keys().contains(&key);
     assert!(is_cell(here) && is_cell(there) && is_cell(there.coarse()) && !is_cell(here.coarse()));
     let slot = |learned: &Learned, key: CellKey| {
-        let snapshot = learned.snapshot(&partition, &EstimateOptions::default());
+        let snapshot = learned.snapshot(&partition);
         let slot = *snapshot.table.iter().find(|entry| entry[0] == key.0).unwrap();
         let cell = (slot[1] & (GUIDE_REFINED - 1)) as usize;
         (slot[1], snapshot.entries[cell * regions..][..regions].to_vec())
@@ -584,9 +503,8 @@ fn cells_are_refined_whose_rays_disagree() {
     assert!(visibility(&learned, doubtful, 7) < 0.8 * before);
 
     let again = Learned::resume(regions, 1 << 12, 1 << 14, &state_of(&learned), 1);
-    let options = EstimateOptions::default();
     assert_eq!(again.refined(), learned.refined());
-    assert_eq!(again.snapshot(&partition, &options), learned.snapshot(&partition, &options));
+    assert_eq!(again.snapshot(&partition), learned.snapshot(&partition));
 }
 
 #[test]
@@ -603,13 +521,13 @@ fn overflow_and_collisions_fall_back() {
     assert!(learned.refused() > 0);
     let coarse = learned.keys()[FACE_COUNT..].iter().filter(|key| key.is_coarse()).count();
     assert_eq!(coarse, 13 * 3, "coarse cells come first");
-    let snapshot = learned.snapshot(&partition, &EstimateOptions::default());
+    let snapshot = learned.snapshot(&partition);
     let entered = snapshot.table.iter().filter(|entry| entry[0] != GUIDE_NO_KEY).count();
     assert!(entered <= 58, "{entered}");
     // A table far too small: what has no slot is left out, and nothing breaks.
     let mut crowded = Learned::new(partition.regions.len(), 400, 16);
     crowded.want(&wanted);
-    let snapshot = crowded.snapshot(&partition, &EstimateOptions::default());
+    let snapshot = crowded.snapshot(&partition);
     assert!(snapshot.table.iter().all(|entry| entry[0] != GUIDE_NO_KEY), "16 slots are full");
     assert_eq!(snapshot.entries.len(), crowded.cell_count() * partition.regions.len());
 }
@@ -625,7 +543,7 @@ fn the_order_in_which_cells_are_found_does_not_matter() {
     let snapshot = |wanted: &[u32]| {
         let mut learned = Learned::new(partition.regions.len(), 128, 512);
         learned.want(wanted);
-        learned.snapshot(&partition, &EstimateOptions::default())
+        learned.snapshot(&partition)
     };
     assert_eq!(snapshot(&wanted), snapshot(&repeated));
 }
@@ -758,8 +676,7 @@ fn cells_learn_where_light_arrives_from() {
     let mut counts = vec![[20, 0, 0]; cells * 64];
     counts[far * 64..][..64].fill([20, 20, 20 * 1000]);
     learned.add(0, &counts);
-    let options = EstimateOptions::default();
-    let before = learned.snapshot(&partition, &options);
+    let before = learned.snapshot(&partition);
     assert!(before.arriving.iter().all(|light| *light == 1.0), "nothing is known");
     let reflected = |snapshot: &fenestra::sampler::guided::Snapshot, cell: usize| {
         snapshot.reflected.units[cell] as f32 * snapshot.reflected.unit
@@ -772,7 +689,7 @@ fn cells_learn_where_light_arrives_from() {
     let from = 17;
     found[bright * ARRIVAL_DIRECTIONS + from] = [40, 4000];
     learned.add_arrivals(&found, &before.reflected);
-    let snapshot = learned.snapshot(&partition, &options);
+    let snapshot = learned.snapshot(&partition);
     let light = |cell: usize, direction: usize| {
         snapshot.arriving[cell * ARRIVAL_DIRECTIONS..][..ARRIVAL_DIRECTIONS][direction]
     };
@@ -785,10 +702,6 @@ fn cells_learn_where_light_arrives_from() {
     assert!(light(beside, from) > 20.0, "leans on its coarse cell: {}", light(beside, from));
     assert!(light(far, from) > 5.0, "and the far one on the face: {}", light(far, from));
     assert!(reflected(&snapshot, bright) > reflected(&before, bright));
-    let alone = EstimateOptions { hierarchy: false, ..options };
-    let snapshot = learned.snapshot(&partition, &alone);
-    let light = snapshot.arriving[far * ARRIVAL_DIRECTIONS + from];
-    assert!((light - 1.0).abs() < 1e-5, "nothing to lean on: {light}");
 
     // What was learned is brought back, and halves.
     let words = learned.arrivals();

@@ -114,14 +114,9 @@ impl ArrivingLight {
     }
 
     /// Light by cell and direction, relative to the mean over the directions of the cell, and what the
-    /// cells reflect, which of the environment is `of_environment`. With `hierarchy` a cell leans on what it
-    /// is a part of, a face on the scene, else all on the scene.
-    pub(super) fn estimate(
-        &self,
-        tree: &Tree,
-        hierarchy: bool,
-        of_environment: &[f32],
-    ) -> (Vec<f32>, Reflected) {
+    /// cells reflect, which of the environment is `of_environment`. A cell leans on what it is a part of,
+    /// a face on the scene.
+    pub(super) fn estimate(&self, tree: &Tree, of_environment: &[f32]) -> (Vec<f32>, Reflected) {
         let own = |cell: usize| &self.arrivals[cell * ARRIVAL_DIRECTIONS..][..ARRIVAL_DIRECTIONS];
         // Of the cells that others are parts of: what was found in both, and the mean light.
         let mut sums: Vec<Vec<Arrivals>> = vec![Vec::new(); tree.parents.len()];
@@ -146,7 +141,7 @@ impl ArrivingLight {
         let scene = [scene.light / scene.rays.max(1.0); ARRIVAL_DIRECTIONS];
         let mut whole: Vec<Vec<f32>> = vec![Vec::new(); tree.parents.len()];
         // What a cell leans on.
-        let around = |cell: usize| (hierarchy && cell >= FACE_COUNT).then(|| tree.parents[cell]);
+        let around = |cell: usize| (cell >= FACE_COUNT).then(|| tree.parents[cell]);
         for generation in &tree.generations {
             let mean = |&cell: &usize| -> Vec<f32> {
                 let around = around(cell).map_or(&scene[..], |parent| &whole[parent]);

@@ -43,23 +43,6 @@ const TARGET_EXPONENT: f32 = 0.7;
 /// Binary orders of magnitude that the levels cover.
 const TARGET_RANGE: f32 = 10.5;
 
-/// What experiments turn off.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct EstimateOptions {
-    /// Whether cells lean on coarser ones; else on the rate of the whole scene.
-    pub hierarchy: bool,
-    /// Whether the share of rays from the BRDF is learned; else it goes by the material.
-    pub learned_share: bool,
-    /// Whether the response is learned; else it is the cosine toward the normal of the face.
-    pub learned_response: bool,
-}
-
-impl Default for EstimateOptions {
-    fn default() -> Self {
-        Self { hierarchy: true, learned_share: true, learned_response: true }
-    }
-}
-
 /// What is believed of one region.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimate {
@@ -176,7 +159,6 @@ impl Ratio {
 
 /// What estimates look up: the regions, and powers of V̂.
 pub struct Lookup {
-    options: EstimateOptions,
     /// Share of the energy of every region.
     shares: Vec<f64>,
     /// Parent of every region.
@@ -198,7 +180,7 @@ fn power_index(visibility: f32) -> usize {
 
 impl Lookup {
     /// For the regions of `partition`.
-    pub fn new(partition: &Partition, options: &EstimateOptions) -> Self {
+    pub fn new(partition: &Partition) -> Self {
         let facing_of = |face| {
             let normal = face_normal(face);
             partition.regions.iter().map(|region| facing(normal, region) as f32).collect()
@@ -217,7 +199,6 @@ impl Lookup {
             ((-VISIBILITY_EXPONENT * octaves).exp2(), level as u32)
         };
         Self {
-            options: *options,
             shares: partition.regions.iter().map(|region| region.share).collect(),
             parents: partition.regions.iter().map(|region| region.parent as u8).collect(),
             facing: (0..FACE_COUNT).map(facing_of).collect(),
@@ -228,7 +209,7 @@ impl Lookup {
 }
 
 /// Estimates of every region.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Estimates {
     regions: Vec<Estimate>,
     mean_response: f32,
@@ -238,6 +219,11 @@ impl Estimates {
     fn new(regions: Vec<Estimate>) -> Self {
         let sum: f32 = regions.iter().map(|estimate| estimate.response).sum();
         Self { mean_response: sum / regions.len().max(1) as f32, regions }
+    }
+
+    /// True for the default, which estimates no region.
+    pub fn is_empty(&self) -> bool {
+        self.regions.is_empty()
     }
 
     /// Of all cells of a face, against the whole `scene`.
@@ -312,29 +298,18 @@ impl Estimates {
         self.regions.iter().zip(&lookup.shares).map(reflected).sum()
     }
 
-    /// Writes the entries of the device for a cell of a face: cumulative probabilities of the regions
+    /// Writes the entries of the device for a cell: cumulative probabilities of the regions
     /// with, for each, its probability divided by its share of the energy and the visibility that weights
     /// candidates. See [`decode_entry`].
-    pub fn write_entries(
-        &self,
-        face: usize,
-        lookup: &Lookup,
-        scratch: &mut Scratch,
-        entries: &mut [[u32; 2]],
-    ) {
+    pub fn write_entries(&self, lookup: &Lookup, scratch: &mut Scratch, entries: &mut [[u32; 2]]) {
         let Scratch { weights, levels, parts, starts } = scratch;
         weights.clear();
         levels.clear();
-        let responses = &lookup.facing[face];
-        weights.extend(self.regions.iter().zip(&lookup.shares).zip(responses).map(
-            |((estimate, share), facing)| {
-                let learned = lookup.options.learned_response;
-                let response = if learned { estimate.response } else { *facing };
-                let (power, level) = lookup.powers[power_index(estimate.visibility)];
-                levels.push(level);
-                share * f64::from(response * power)
-            },
-        ));
+        weights.extend(self.regions.iter().zip(&lookup.shares).map(|(estimate, share)| {
+            let (power, level) = lookup.powers[power_index(estimate.visibility)];
+            levels.push(level);
+            share * f64::from(estimate.response * power)
+        }));
         let scale = (1.0 - DEFENSIVE_SHARE) / weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         for (weight, share) in weights.iter_mut().zip(&lookup.shares) {
             *weight = scale * *weight + DEFENSIVE_SHARE * share;

@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use crate::sampler::guided::{
     arriving::{ArrivalWords, ArrivingLight, Reflected},
     estimate::{
-        Count, CountWords, EstimateOptions, Estimates, LARGEST_WORD, Lookup, PARTS_PER_RAY,
-        Scratch, Tally, decode_entry,
+        Count, CountWords, Estimates, LARGEST_WORD, Lookup, PARTS_PER_RAY, Scratch, Tally,
+        decode_entry,
     },
     key::{CellKey, FACE_COUNT},
     partition::Partition,
@@ -66,15 +66,6 @@ pub struct Snapshot {
     pub arriving: Vec<f32>,
     /// Light that the cells reflect; empty where bounces do not teach.
     pub reflected: Reflected,
-}
-
-/// What a cell leans on: what is known of its parent, else of a face `alone`.
-fn around<'a>(
-    parent: Option<usize>,
-    whole: &'a [Option<Estimates>],
-    alone: &'a Estimates,
-) -> &'a Estimates {
-    parent.and_then(|parent| whole[parent].as_ref()).unwrap_or(alone)
 }
 
 /// Which cells are parts of which.
@@ -368,51 +359,40 @@ impl Learned {
     }
 
     /// The tables for the next pass.
-    pub fn snapshot(&self, partition: &Partition, options: &EstimateOptions) -> Snapshot {
+    pub fn snapshot(&self, partition: &Partition) -> Snapshot {
         let mut snapshot = Snapshot::default();
-        self.write_snapshot(partition, options, &mut snapshot);
+        self.write_snapshot(partition, &mut snapshot);
         snapshot
     }
 
     /// The tables for the next pass, in the memory of older ones.
-    pub fn write_snapshot(
-        &self,
-        partition: &Partition,
-        options: &EstimateOptions,
-        snapshot: &mut Snapshot,
-    ) {
+    pub fn write_snapshot(&self, partition: &Partition, snapshot: &mut Snapshot) {
         let regions = self.region_count;
-        let lookup = Lookup::new(partition, options);
+        let lookup = Lookup::new(partition);
         let tree = self.tree();
         let tallies = self.tallies(&tree);
         let mut scene = Tally::default();
         for tally in tallies[..FACE_COUNT].iter().flatten() {
             scene.add(*tally);
         }
-        let nothing = vec![Tally::default(); regions];
-        // What is believed where no cell has counted anything.
-        let alone: Vec<Estimates> = (0..FACE_COUNT)
-            .map(|face| Estimates::of_face(face, &nothing, scene, &lookup))
-            .collect();
-        let parent = |cell: usize| options.hierarchy.then_some(tree.parents[cell]);
-        // Of what others are parts of, from the faces down.
-        let mut whole: Vec<Option<Estimates>> = vec![None; self.keys.len()];
+        // Estimate the cells that others are parts of, from the faces down. The others stay empty.
+        let mut whole = vec![Estimates::default(); self.keys.len()];
         for generation in &tree.generations {
             let estimate = |&cell: &usize| {
                 let tallies = &tallies[cell];
                 if cell < FACE_COUNT {
                     return Estimates::of_face(cell, tallies, scene, &lookup);
                 }
-                let around = around(parent(cell), &whole, &alone[self.face(cell)]);
+                let parent = &whole[tree.parents[cell]];
                 if self.keys[cell].is_coarse() {
-                    Estimates::of_coarse(tallies, around)
+                    Estimates::of_coarse(tallies, parent)
                 } else {
-                    Estimates::of_part(tallies, around, &lookup)
+                    Estimates::of_part(tallies, parent, &lookup)
                 }
             };
             let estimates: Vec<Estimates> = generation.par_iter().map(estimate).collect();
             for (cell, estimates) in generation.iter().zip(estimates) {
-                whole[*cell] = Some(estimates);
+                whole[*cell] = estimates;
             }
         }
         let entries = &mut snapshot.entries;
@@ -422,33 +402,23 @@ impl Learned {
             Scratch::default,
             |scratch, (cell, (entries, reflected))| {
                 let of_part;
-                let estimates = if let Some(estimates) = &whole[cell] {
-                    estimates
-                } else {
-                    let around = around(parent(cell), &whole, &alone[self.face(cell)]);
-                    of_part = Estimates::of_part(self.counts(cell), around, &lookup);
+                let estimates = if whole[cell].is_empty() {
+                    let parent = &whole[tree.parents[cell]];
+                    of_part = Estimates::of_part(self.counts(cell), parent, &lookup);
                     &of_part
+                } else {
+                    &whole[cell]
                 };
-                estimates.write_entries(self.face(cell), &lookup, scratch, entries);
+                estimates.write_entries(&lookup, scratch, entries);
                 if self.arriving.is_some() {
                     *reflected = estimates.reflected(&lookup);
                 }
             },
         );
         if let Some(arriving) = &self.arriving {
-            (snapshot.arriving, snapshot.reflected) =
-                arriving.estimate(&tree, options.hierarchy, &reflected);
+            (snapshot.arriving, snapshot.reflected) = arriving.estimate(&tree, &reflected);
         }
-        let shares = if options.learned_share {
-            self.shares_in_256ths(&tree, options.hierarchy)
-        } else {
-            vec![0; self.keys.len()]
-        };
-        snapshot.table = self.table(&shares);
-    }
-
-    fn face(&self, cell: usize) -> usize {
-        if cell < FACE_COUNT { cell } else { self.keys[cell].face() }
+        snapshot.table = self.table(&self.shares_in_256ths(&tree));
     }
 
     /// The cell that another is a part of: a refined one, else its coarse cell, of that its face.
@@ -505,7 +475,7 @@ impl Learned {
 
     /// Share of the BRDF of every cell, 256ths, 0 where it is left to the material. A cell leans on
     /// what it is a part of, a face on the scene.
-    fn shares_in_256ths(&self, tree: &Tree, hierarchy: bool) -> Vec<u32> {
+    fn shares_in_256ths(&self, tree: &Tree) -> Vec<u32> {
         let mut sums: Vec<ShareEvidence> =
             self.shares.par_chunks(SHARE_WORDS).map(ShareEvidence::of).collect();
         let mut scene = ShareEvidence::default();
@@ -526,9 +496,8 @@ impl Learned {
         shares.resize(self.keys.len(), None);
         for generation in &tree.generations {
             for &cell in generation {
-                let around = if hierarchy { shares[cell] } else { scene };
                 for &part in &tree.parts[cell] {
-                    shares[part] = sums[part].share(around);
+                    shares[part] = sums[part].share(shares[cell]);
                 }
             }
         }

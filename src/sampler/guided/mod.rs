@@ -17,7 +17,6 @@ pub mod cost;
 mod estimate;
 mod key;
 mod learned;
-mod likely;
 mod partition;
 mod share;
 mod split;
@@ -25,12 +24,10 @@ mod state;
 
 pub use arriving::{ARRIVAL_DIRECTIONS, ArrivalWords, ArrivingLight, Reflected, arrival_direction};
 pub use estimate::{
-    Count, CountWords, EstimateOptions, Estimates, PARTS_PER_RAY, VISIBILITY_LEVELS, decode_entry,
-    decode_visibility,
+    Count, CountWords, Estimates, PARTS_PER_RAY, VISIBILITY_LEVELS, decode_entry, decode_visibility,
 };
 pub use key::{CellKey, FACE_COUNT, face_normal};
 pub use learned::{Learned, MOST_CELLS, Snapshot};
-pub use likely::{LikelyRegion, likely_regions};
 pub use partition::{MOST_REGIONS, PARENT_COUNT, Partition, Region};
 pub use share::{SHARE_WORDS, ShareEvidence, share_in_256ths};
 pub use state::{GuideState, Origin};
