@@ -1,15 +1,16 @@
-//! The environment as nested rectangles of its sampling cells, each with an exact table of its own.
+//! Splits the environment into rectangles of its sampling cells, each with an exact table of its
+//! own: [`EnvironmentMap`] → [`Partition`].
 //!
-//! [`EnvironmentMap`] → [`Partition`]. The atoms are those of
-//! [`EnvironmentTables`](crate::scene::environment::EnvironmentTables): `height + 1` rows of `width`
-//! cells between texel centres, a cell's share of the whole density being P_cell. Greedy splits of
-//! the rectangle with the largest E^¼ · Ω^¾ (E its share of the energy, Ω its solid angle) give
-//! rectangles that are small where the map is bright without leaving the dark parts coarse. Once it
-//! is known which regions the scene sees, the map is split anew with both weighted by that.
+//! The cells are those of [`EnvironmentTables`](crate::scene::environment::EnvironmentTables):
+//! `height + 1` rows of `width` cells between texel centres, each with its share P_cell of the
+//! whole density. Greedy splits of the rectangle with the largest E^¼ · Ω^¾ (E its share of the
+//! energy, Ω its solid angle) give rectangles that are small where the map is bright without
+//! leaving the dark parts coarse. Later splits weight both by how much the scene sees of each
+//! region.
 //!
-//! A region r is chosen first, then one of its cells by an alias table with P_cell / P_region, then
-//! a direction in the cell's bilinear patch. Hence p(ω|r) = pdf(ω) / P_region with the pdf of the
-//! whole map: one table per region and no residual of any fit.
+//! Sampling chooses a region r, then one of its cells by an alias table with P_cell / P_region,
+//! then a direction in the bilinear patch of the cell. Hence p(ω|r) = pdf(ω) / P_region with the
+//! pdf of the whole map: one table per region and no residual of any fit.
 
 use std::sync::Arc;
 
@@ -19,16 +20,13 @@ use rayon::prelude::*;
 use crate::scene::environment::EnvironmentMap;
 use crate::{
     math::alias::{AliasEntry, alias_table},
-    sampler::guided::split::{Cells, Rectangle, Sums, grow},
+    sampler::guided::split::{MapCells, PARENT_COUNT, Rectangle, SummedAreas, split_greedily},
 };
 
-/// Number of regions that are the angular parents of all others.
-pub const PARENT_COUNT: usize = 64;
+/// Upper bound of the number of regions: their index has ten bits on the device.
+pub const MAX_REGIONS: usize = 1024;
 
-/// Most regions that a map is split into: their index has ten bits on the device.
-pub const MOST_REGIONS: usize = 1024;
-
-/// Scale of the thresholds of the cells' alias tables.
+/// Scale of the thresholds of the alias tables.
 pub const CELL_SCALE: u64 = 1 << 32;
 
 /// A rectangle of cells.
@@ -38,9 +36,9 @@ pub struct Region {
     pub first: [u32; 2],
     /// Columns and rows of cells.
     pub size: [u32; 2],
-    /// Share of the map's energy ∫ lum L dω: P_region.
+    /// P_region, the share of the map's energy ∫ lum L dω.
     pub share: f64,
-    /// Solid angle as a share of the sphere.
+    /// Solid angle as a fraction of the sphere.
     pub solid_angle: f64,
     /// Unit mean direction in the world, weighted by energy.
     pub direction: DVec3,
@@ -53,11 +51,11 @@ pub struct Region {
 /// A map split into regions.
 #[derive(Clone, Debug)]
 pub struct Partition {
-    /// The regions; none overlap, together they are the map.
+    /// Regions, which cover the map without overlap.
     pub regions: Vec<Region>,
     /// Number of parents: [`PARENT_COUNT`] unless the map has fewer cells or regions.
     pub parent_count: usize,
-    /// Alias tables over the cells of each region, row by row.
+    /// Alias tables over the cells of each region, row by row, one region after another.
     pub entries: Vec<AliasEntry>,
     /// Region of every cell, `height + 1` rows of `width`.
     pub region_of_cell: Vec<u16>,
@@ -65,37 +63,37 @@ pub struct Partition {
     pub width: u32,
     /// Rows of cells, one more than the map has.
     pub rows: u32,
-    cells: Arc<Cells>,
+    cells: Arc<MapCells>,
 }
 
 impl Partition {
-    /// Splits `map` into `region_count` regions, or as many as it has cells that can be split.
+    /// Splits `map` into `region_count` regions, or fewer if it runs out of cells to split.
     ///
     /// # Panics
     /// If `region_count` is not from 1 to 1024.
     pub fn new(map: &EnvironmentMap, region_count: usize) -> Self {
-        assert!((1..=MOST_REGIONS).contains(&region_count), "1 to 1024 regions");
-        let cells = Arc::new(Cells::new(map));
-        let rectangles = grow(&Sums::new(&cells, |_| 1.0), region_count);
+        assert!((1..=MAX_REGIONS).contains(&region_count), "1 to 1024 regions");
+        let cells = Arc::new(MapCells::new(map));
+        let rectangles = split_greedily(&SummedAreas::new(&cells, |_| 1.0), region_count);
         Self::assemble(cells, &rectangles)
     }
 
-    /// Splits the same map anew into `region_count` regions, or as many as can be had, where a cell
-    /// counts by the `interest` of the region that it lies in now. `None` where that would be fewer
-    /// than asked for and than now.
+    /// Splits the same map again into `region_count` regions or fewer, weighting each cell by the
+    /// `importance` of its present region. `None` if the result has fewer regions than asked for
+    /// and than now.
     ///
     /// # Panics
-    /// If there are not as many interests as regions or more than 1024 are asked for.
-    pub fn split_by(&self, interest: &[f64], region_count: usize) -> Option<Self> {
-        assert_eq!(interest.len(), self.regions.len(), "an interest for every region");
-        assert!(region_count <= MOST_REGIONS, "at most 1024 regions");
-        let weight = |cell: usize| interest[usize::from(self.region_of_cell[cell])];
-        let rectangles = grow(&Sums::new(&self.cells, weight), region_count);
+    /// If there are not as many importances as regions or more than 1024 regions are asked for.
+    pub fn split_by(&self, importance: &[f64], region_count: usize) -> Option<Self> {
+        assert_eq!(importance.len(), self.regions.len(), "an importance for every region");
+        assert!(region_count <= MAX_REGIONS, "at most 1024 regions");
+        let weight = |cell: usize| importance[usize::from(self.region_of_cell[cell])];
+        let rectangles = split_greedily(&SummedAreas::new(&self.cells, weight), region_count);
         (rectangles.len() >= region_count.min(self.regions.len()))
             .then(|| Self::assemble(Arc::clone(&self.cells), &rectangles))
     }
 
-    /// First column and row, columns, rows and parent of every region, for a file.
+    /// Returns first column and row, columns, rows and parent of every region, for a file.
     pub fn rectangles(&self) -> Vec<[u32; 5]> {
         let of = |region: &Region| {
             let ([column, row], [columns, rows]) = (region.first, region.size);
@@ -104,8 +102,8 @@ impl Partition {
         self.regions.iter().map(of).collect()
     }
 
-    /// The same map in the regions that [`Self::rectangles`] gave. `None` unless they fill the
-    /// map without overlap and are no more than [`MOST_REGIONS`].
+    /// Splits the same map into regions that [`Self::rectangles`] returned. `None` unless they
+    /// cover the map without overlap and are no more than [`MAX_REGIONS`].
     pub fn with_rectangles(&self, rectangles: &[[u32; 5]]) -> Option<Self> {
         let (width, rows) = (self.width, self.rows);
         let mut is_covered = vec![false; self.region_of_cell.len()];
@@ -133,12 +131,12 @@ impl Partition {
             }
             found.push(rectangle);
         }
-        let is_whole = found.len() <= MOST_REGIONS && is_covered.iter().all(|&cell| cell);
+        let is_whole = found.len() <= MAX_REGIONS && is_covered.iter().all(|&cell| cell);
         is_whole.then(|| Self::assemble(Arc::clone(&self.cells), &found))
     }
 
-    /// For every region of this partition the regions of `other`, of the same map, that it lies in,
-    /// with the share of its energy there.
+    /// Finds, for every region of this partition, the regions of `other`, of the same map, that it
+    /// overlaps, with the share of its energy in each.
     pub fn shares_in(&self, other: &Self) -> Vec<Vec<(usize, f64)>> {
         let count = other.regions.len();
         let mut energy = vec![0.0; self.regions.len() * count];
@@ -155,7 +153,7 @@ impl Partition {
         energy.chunks(count).map(shares).collect()
     }
 
-    fn assemble(cells: Arc<Cells>, rectangles: &[Rectangle]) -> Self {
+    fn assemble(cells: Arc<MapCells>, rectangles: &[Rectangle]) -> Self {
         let energy: f64 = cells.energy.iter().sum();
         let mut region_of_cell = vec![0; cells.energy.len()];
         for (index, rectangle) in rectangles.iter().enumerate() {
@@ -171,10 +169,10 @@ impl Partition {
                     weights.extend_from_slice(&cells.energy[rectangle.cells(row, cells.width)]);
                 }
                 let table = alias_table(&weights, CELL_SCALE).unwrap_or_else(|| {
-                    // A black region is never chosen.
+                    // Nothing draws from a black region.
                     vec![AliasEntry { threshold: CELL_SCALE, alias: 0 }; weights.len()]
                 });
-                // Summed again: differences of large sums would lose what is dim.
+                // Sum anew: differences of large sums would lose dim regions.
                 (weights.iter().sum(), cells.direction_of(*rectangle), table)
             })
             .collect();
@@ -204,14 +202,14 @@ impl Partition {
         }
     }
 
-    /// Index of the region of `map` that a unit direction lies in.
+    /// Index of the region of `map` that holds a unit direction.
     pub fn region_of(&self, map: &EnvironmentMap, direction: Vec3) -> usize {
         let (column, row, _) = map.locate(direction);
         usize::from(self.region_of_cell[(row * self.width + column) as usize])
     }
 
-    /// Column and row of the cell that `bits` choose in region `index`, as the shader does: the
-    /// first word the column of the alias table, the second keeps it or takes the alias.
+    /// Draws the column and row of a cell of region `index`, as the shader does: the first word of
+    /// `bits` chooses a column of the alias table, the second keeps it or takes its alias.
     pub fn choose_cell(&self, index: usize, bits: [u32; 2]) -> [u32; 2] {
         let region = &self.regions[index];
         let count = region.size[0] * region.size[1];

@@ -1,37 +1,38 @@
-//! Greedy splits of the map's cells into rectangles.
-//!
-//! Energy of every cell, and how much each cell matters → rectangles with little E^¼ · Ω^¾, E being
-//! their energy and Ω their solid angle, both weighted.
+//! Splits the cells of the map greedily into rectangles: energy and weight of every cell →
+//! rectangles with little E^¼ · Ω^¾, where E is the weighted energy and Ω the weighted solid angle.
 
 use std::{collections::BinaryHeap, ops::Range};
 
 use glam::DVec3;
 
-use crate::sampler::guided::partition::PARENT_COUNT;
 use crate::{
     math::{colour::luminance, refinement::Queued},
     scene::environment::{EnvironmentMap, mean_sine},
 };
 
-/// Energy and solid angle of every cell, unnormalised.
+/// Number of rectangles that are the parents of all later ones.
+pub const PARENT_COUNT: usize = 64;
+
+/// Energy and solid angle of every cell of a map, unnormalised.
 #[derive(Debug)]
-pub struct Cells {
+pub struct MapCells {
     /// Columns.
     pub width: usize,
     /// Rows, one more than the map has.
     pub rows: usize,
     /// Energy per cell.
     pub energy: Vec<f64>,
-    /// Solid angle of one cell by row, as a share of the sphere.
+    /// Solid angle of one cell by row, as a fraction of the sphere.
     pub row_angle: Vec<f64>,
-    /// Sine and cosine of the azimuth of the middle of every column.
+    /// Sine and cosine of the azimuth at the centre of every column.
     azimuth: Vec<(f64, f64)>,
     /// Rotation of the map about +y, radians.
     rotation_rad: f64,
 }
 
-impl Cells {
-    /// Of a map: luminance × sine, summed over the four corners of every cell.
+impl MapCells {
+    /// Cells of `map`, each with the mean luminance of its four corners × its solid angle as
+    /// energy.
     pub fn new(map: &EnvironmentMap) -> Self {
         let (width, rows) = (map.width as usize, map.height as usize + 1);
         let texel = |column: usize, row: usize| {
@@ -59,8 +60,8 @@ impl Cells {
         Self { width, rows, energy, row_angle, azimuth, rotation_rad: f64::from(map.rotation_rad) }
     }
 
-    /// Unit mean of the directions in the world, weighted by energy, or by solid angle where there is
-    /// none.
+    /// Unit mean direction of a rectangle in the world, weighted by energy, or by solid angle if it
+    /// is black.
     pub fn direction_of(&self, rectangle: Rectangle) -> DVec3 {
         let pi = std::f64::consts::PI;
         let energies = rectangle.rows().map(|row| &self.energy[rectangle.cells(row, self.width)]);
@@ -84,16 +85,16 @@ impl Cells {
     }
 }
 
-/// Energy and solid angle of rectangles, each cell weighted by how much it matters.
-pub struct Sums<'a> {
-    cells: &'a Cells,
-    /// Sums over all cells above and to the left: energy, solid angle.
+/// Summed-area tables of weighted energy and solid angle (Crow 1984).
+pub struct SummedAreas<'a> {
+    cells: &'a MapCells,
+    /// Energy and solid angle summed over all cells above and to the left.
     sums: Vec<[f64; 2]>,
 }
 
-impl<'a> Sums<'a> {
-    /// `weight` is how much a cell matters, by its index.
-    pub fn new(cells: &'a Cells, weight: impl Fn(usize) -> f64) -> Self {
+impl<'a> SummedAreas<'a> {
+    /// Sums over `cells`, each multiplied by the `weight` of its index.
+    pub fn new(cells: &'a MapCells, weight: impl Fn(usize) -> f64) -> Self {
         let (width, rows) = (cells.width, cells.rows);
         let mut sums = vec![[0.0; 2]; (width + 1) * (rows + 1)];
         for row in 0..rows {
@@ -110,7 +111,7 @@ impl<'a> Sums<'a> {
         Self { cells, sums }
     }
 
-    /// What the greedy splits make small: E^¼ Ω^¾.
+    /// Cost of a rectangle, E^¼ Ω^¾.
     fn cost(&self, rectangle: Rectangle) -> f64 {
         let [c0, r0] = rectangle.first;
         let [c1, r1] = [c0 + rectangle.size[0], r0 + rectangle.size[1]];
@@ -121,7 +122,8 @@ impl<'a> Sums<'a> {
         of(0).powf(0.25) * of(1).powf(0.75)
     }
 
-    /// Splits across the longer side where the two costs are nearest to each other.
+    /// Splits a rectangle across its longer side where the costs of the halves are most alike;
+    /// `None` for a single cell.
     fn split(&self, rectangle: Rectangle) -> Option<[Rectangle; 2]> {
         let [columns, rows] = rectangle.size;
         let middle = rectangle.first[1] + rows / 2;
@@ -141,7 +143,7 @@ impl<'a> Sums<'a> {
             high.size[axis] = length - at;
             [low, high]
         };
-        // The difference grows with the position: bisect.
+        // Bisect: the difference of the costs grows with the position.
         let (mut first, mut last) = (1, length - 1);
         while first < last {
             let at = usize::midpoint(first, last);
@@ -159,16 +161,16 @@ impl<'a> Sums<'a> {
 /// A rectangle of cells.
 #[derive(Clone, Copy, Debug)]
 pub struct Rectangle {
-    /// First column and row.
+    /// First column and row of cells.
     pub first: [usize; 2],
-    /// Columns and rows.
+    /// Number of columns and rows.
     pub size: [usize; 2],
-    /// Index of its parent.
+    /// Index of the parent region.
     pub parent: usize,
 }
 
 impl Rectangle {
-    /// Its rows.
+    /// Range of its rows.
     pub fn rows(&self) -> Range<usize> {
         self.first[1]..self.first[1] + self.size[1]
     }
@@ -179,22 +181,23 @@ impl Rectangle {
     }
 }
 
-/// Indices from 0 on, each followed by `next` of it.
-fn in_order(next: &[usize]) -> Vec<usize> {
+/// Walks the linked list `next` from index 0.
+fn list_order(next: &[usize]) -> Vec<usize> {
     std::iter::successors(Some(0), |&index| Some(next[index]).filter(|&next| next != usize::MAX))
         .collect()
 }
 
-/// Splits the whole map into `region_count` rectangles, or as many as it has cells that can be split,
-/// in the order of the tree, so that neighbours in that order are mostly neighbours in the map.
-pub fn grow(sums: &Sums, region_count: usize) -> Vec<Rectangle> {
+/// Splits the whole map into `region_count` rectangles, or fewer if it runs out of cells to split.
+/// Returns them in the order of the tree, so that neighbours in that order are mostly neighbours in
+/// the map.
+pub fn split_greedily(sums: &SummedAreas, region_count: usize) -> Vec<Rectangle> {
     let whole = Rectangle { first: [0, 0], size: [sums.cells.width, sums.cells.rows], parent: 0 };
     let mut rectangles = vec![whole];
     let mut queue = BinaryHeap::from([Queued { priority: sums.cost(whole), index: 0 }]);
-    // What comes after each rectangle in the order of the tree.
+    // Next rectangle in the order of the tree
     let mut next = vec![usize::MAX];
     while rectangles.len() < region_count {
-        // What is black need not be told apart.
+        // Stop at black rectangles, which need no split.
         let Some(Queued { index, priority }) = queue.pop() else { break };
         if priority <= 0.0 {
             break;
@@ -208,11 +211,11 @@ pub fn grow(sums: &Sums, region_count: usize) -> Vec<Rectangle> {
             queue.push(Queued { priority: sums.cost(rectangles[index]), index });
         }
         if rectangles.len() <= PARENT_COUNT {
-            // From here on, halves inherit what is the last to be set.
-            for (rank, index) in in_order(&next).into_iter().enumerate() {
+            // Later halves inherit the parent that is set last.
+            for (rank, index) in list_order(&next).into_iter().enumerate() {
                 rectangles[index].parent = rank;
             }
         }
     }
-    in_order(&next).into_iter().map(|index| rectangles[index]).collect()
+    list_order(&next).into_iter().map(|index| rectangles[index]).collect()
 }

@@ -1,0 +1,199 @@
+//! The cells of the scene: which exist, which are refined, their hierarchy and their hash table.
+
+use std::collections::HashMap;
+
+use crate::sampler::guided::key::{CellKey, FACE_COUNT};
+use crate::shader::constants::{GUIDE_PROBES, GUIDE_REFINED, GUIDE_SHARE_SHIFT};
+
+/// Upper bound of the number of cells, faces included: their index lies below [`GUIDE_REFINED`].
+pub const MAX_CELLS: usize = 1 << 22;
+
+/// Cells in the order in which they were added. The first [`FACE_COUNT`] are the faces, which stand
+/// in for places without a cell of their own.
+#[derive(Clone, Debug)]
+pub struct Cells {
+    capacity: usize,
+    slots: usize,
+    keys: Vec<CellKey>,
+    index_of: HashMap<CellKey, usize>,
+    /// Fine cells whose children may be cells.
+    refined: Vec<usize>,
+    /// The same by [`CellKey::child_group`].
+    refined_by_children: HashMap<u32, usize>,
+    refused: u64,
+}
+
+/// Hierarchy of the cells: faces, coarse cells, fine cells, children of refined cells, and so on.
+pub(super) struct Tree {
+    /// Parent of every cell; faces are their own.
+    pub(super) parents: Vec<usize>,
+    /// Children of every cell.
+    pub(super) children: Vec<Vec<usize>>,
+    /// The faces, then all other cells with children and all coarse cells, level by level.
+    pub(super) generations: Vec<Vec<usize>>,
+}
+
+impl Cells {
+    /// The faces, with room for `capacity` cells and a hash table of `slots`, a power of two.
+    ///
+    /// # Panics
+    /// If there is no room for the faces or `slots` is not a power of two.
+    pub fn new(capacity: usize, slots: usize) -> Self {
+        let is_possible = (FACE_COUNT..=MAX_CELLS).contains(&capacity) && slots.is_power_of_two();
+        assert!(is_possible, "{capacity} cells, {slots} slots");
+        Self {
+            capacity,
+            slots,
+            keys: vec![CellKey::NONE; FACE_COUNT],
+            index_of: HashMap::new(),
+            refined: Vec::new(),
+            refined_by_children: HashMap::new(),
+            refused: 0,
+        }
+    }
+
+    /// As [`Self::new`], with the `keys`, faces first, and `refined` cells of an earlier guide.
+    /// Drops the keys that find no room.
+    ///
+    /// # Panics
+    /// As [`Self::new`]; if there are fewer keys than faces.
+    pub fn resume(capacity: usize, slots: usize, keys: &[u32], refined: &[u32]) -> Self {
+        let mut cells = Self::new(capacity, slots);
+        for &key in keys[FACE_COUNT..].iter().take(capacity - FACE_COUNT) {
+            cells.push(CellKey(key));
+        }
+        for &cell in refined {
+            if (FACE_COUNT..cells.len()).contains(&(cell as usize)) {
+                cells.refine(cell as usize);
+            }
+        }
+        cells
+    }
+
+    fn push(&mut self, key: CellKey) {
+        self.index_of.insert(key, self.keys.len());
+        self.keys.push(key);
+    }
+
+    /// Adds the fine cells among `missing`, in any order and with repetitions, as long as there is
+    /// room. Coarse cells come first; children of refined cells need none.
+    pub fn add(&mut self, missing: &[u32]) {
+        let mut keys: Vec<CellKey> =
+            missing.iter().map(|&word| CellKey(word)).filter(|key| key.is_valid_fine()).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        // Neighbours in the order of a hash are nowhere near each other: the cells that find no
+        // room are scattered over the scene.
+        keys.sort_by_key(|key| (key.slot(u32::MAX), key.0));
+        let has_refined_parent =
+            |key: &&CellKey| self.refined_by_children.contains_key(&key.sibling_group());
+        let coarse: Vec<CellKey> =
+            keys.iter().filter(|key| !has_refined_parent(key)).map(|key| key.coarse()).collect();
+        for key in coarse.into_iter().chain(keys) {
+            if self.index_of.contains_key(&key) {
+                continue;
+            }
+            if self.keys.len() == self.capacity {
+                self.refused += 1;
+                continue;
+            }
+            self.push(key);
+        }
+    }
+
+    /// Lets the children of a cell be cells, where it can have any.
+    pub fn refine(&mut self, cell: usize) {
+        if let Some(children) = self.keys[cell].child_group() {
+            self.refined.push(cell);
+            self.refined_by_children.insert(children, cell);
+        }
+    }
+
+    /// True if a cell can be refined and is not yet.
+    pub fn is_refinable(&self, cell: usize) -> bool {
+        let children = self.keys[cell].child_group();
+        children.is_some_and(|children| !self.refined_by_children.contains_key(&children))
+    }
+
+    /// Number of cells, faces included.
+    pub fn len(&self) -> usize {
+        self.keys.len()
+    }
+
+    /// Number of cells there is room for.
+    pub fn capacity(&self) -> usize {
+        self.capacity
+    }
+
+    /// Changes the number of cells there is room for.
+    ///
+    /// # Panics
+    /// If there are more cells than that.
+    pub fn set_capacity(&mut self, capacity: usize) {
+        assert!(self.keys.len() <= capacity, "{} cells, room for {capacity}", self.keys.len());
+        self.capacity = capacity;
+    }
+
+    /// Keys of all cells; those of the faces are [`CellKey::NONE`].
+    pub fn keys(&self) -> &[CellKey] {
+        &self.keys
+    }
+
+    /// Indices of the refined cells.
+    pub fn refined(&self) -> &[usize] {
+        &self.refined
+    }
+
+    /// Number of times that a cell found no room, the same cell again at every attempt.
+    pub fn refused(&self) -> u64 {
+        self.refused
+    }
+
+    /// Parent of a cell: a refined cell, else its coarse cell; of a coarse cell its face.
+    fn parent(&self, cell: usize) -> usize {
+        let key = self.keys[cell];
+        if key.is_coarse() {
+            return key.face();
+        }
+        let refined = self.refined_by_children.get(&key.sibling_group());
+        refined.or_else(|| self.index_of.get(&key.coarse())).copied().unwrap_or(key.face())
+    }
+
+    /// Links every cell to its parent and its children.
+    pub(super) fn tree(&self) -> Tree {
+        let parents: Vec<usize> = (0..FACE_COUNT)
+            .chain((FACE_COUNT..self.keys.len()).map(|cell| self.parent(cell)))
+            .collect();
+        let mut children = vec![Vec::new(); parents.len()];
+        for (cell, parent) in parents.iter().enumerate().skip(FACE_COUNT) {
+            children[*parent].push(cell);
+        }
+        let mut generations = vec![(0..FACE_COUNT).collect::<Vec<usize>>()];
+        while let Some(last) = generations.last().filter(|last| !last.is_empty()) {
+            let next = last.iter().flat_map(|&cell| children[cell].iter().copied());
+            let is_inner =
+                |cell: &usize| !children[*cell].is_empty() || self.keys[*cell].is_coarse();
+            generations.push(next.filter(is_inner).collect());
+        }
+        Tree { parents, children, generations }
+    }
+
+    /// Hash table of the cells with their `shares` of the BRDF, 256ths. A cell that finds no slot
+    /// within [`GUIDE_PROBES`] is left out; lookups fall back on its coarse cell or its face.
+    pub fn table(&self, shares: &[u32]) -> Vec<[u32; 2]> {
+        let mut table = vec![[CellKey::NONE.0, 0]; self.slots];
+        let mask = (self.slots - 1) as u32;
+        let mut values: Vec<u32> = shares.iter().map(|share| share << GUIDE_SHARE_SHIFT).collect();
+        for &cell in &self.refined {
+            values[cell] |= GUIDE_REFINED;
+        }
+        for (index, key) in self.keys.iter().enumerate().skip(FACE_COUNT) {
+            let first = key.slot(mask);
+            let slots = (0..GUIDE_PROBES).map(|probe| ((first + probe) & mask) as usize);
+            if let Some(slot) = slots.into_iter().find(|&slot| table[slot][0] == CellKey::NONE.0) {
+                table[slot] = [key.0, index as u32 | values[index]];
+            }
+        }
+        table
+    }
+}

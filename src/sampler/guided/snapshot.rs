@@ -1,0 +1,182 @@
+//! Guide → the tables that the next passes read.
+
+use rayon::prelude::*;
+
+use crate::sampler::guided::{
+    arriving::Reflected,
+    cells::Tree,
+    counts::Tally,
+    entries::{EntryTables, EntryWriter, decode_entry},
+    estimate::{Estimates, RegionTables},
+    guide::Guide,
+    key::FACE_COUNT,
+    partition::Partition,
+    share::{SHARE_WORDS, ShareEvidence, share_in_256ths},
+};
+
+/// Tables that the next passes read, as they lie on the device.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Snapshot {
+    /// Hash table: the key of a cell, [`CellKey::NONE`](super::CellKey::NONE) where empty; its
+    /// index, [`GUIDE_REFINED`](crate::shader::constants::GUIDE_REFINED) where its children may be
+    /// cells and, from bit [`GUIDE_SHARE_SHIFT`](crate::shader::constants::GUIDE_SHARE_SHIFT) on,
+    /// its share of the BRDF in 256ths, 0 where the material decides.
+    pub table: Vec<[u32; 2]>,
+    /// Entries of every cell, region by region.
+    pub entries: Vec<[u32; 2]>,
+    /// Estimated light from surfaces by cell and direction, relative to the mean over the
+    /// directions of the cell; empty where bounces do not teach.
+    pub arriving: Vec<f32>,
+    /// Light that the cells reflect; empty where bounces do not teach.
+    pub reflected: Reflected,
+}
+
+impl Guide {
+    /// Tables for the next passes.
+    pub fn snapshot(&self, partition: &Partition) -> Snapshot {
+        let mut snapshot = Snapshot::default();
+        self.write_snapshot(partition, &mut snapshot);
+        snapshot
+    }
+
+    /// Writes the tables for the next passes into the memory of older ones.
+    pub fn write_snapshot(&self, partition: &Partition, snapshot: &mut Snapshot) {
+        let tree = self.cells.tree();
+        let region_tables = RegionTables::new(partition);
+        let entry_tables = EntryTables::new(partition);
+        let inner = self.estimate_inner_cells(&tree, &region_tables);
+
+        // Estimate the leaves and write the entries of every cell
+        let entries = &mut snapshot.entries;
+        entries.resize(self.cell_count() * self.region_count, [0; 2]);
+        let mut reflected = vec![0.0; self.cell_count()];
+        entries.par_chunks_mut(self.region_count).zip(&mut reflected).enumerate().for_each_init(
+            || EntryWriter::new(&entry_tables),
+            |writer, (cell, (entries, reflected))| {
+                let leaf;
+                let estimates = if inner[cell].is_empty() {
+                    let parent = &inner[tree.parents[cell]];
+                    leaf = Estimates::of_fine(self.counts(cell), parent, &region_tables);
+                    &leaf
+                } else {
+                    &inner[cell]
+                };
+                writer.write(estimates, entries);
+                if self.arriving.is_some() {
+                    *reflected = estimates.reflected(&region_tables);
+                }
+            },
+        );
+        if let Some(arriving) = &self.arriving {
+            (snapshot.arriving, snapshot.reflected) = arriving.estimate(&tree, &reflected);
+        }
+        snapshot.table = self.cells.table(&self.brdf_shares(&tree));
+    }
+
+    /// Estimates for faces, coarse cells and cells with children, parents first; empty for the
+    /// leaves.
+    fn estimate_inner_cells(&self, tree: &Tree, tables: &RegionTables) -> Vec<Estimates> {
+        let tallies = self.tallies(tree);
+        let mut scene = Tally::default();
+        for tally in tallies[..FACE_COUNT].iter().flatten() {
+            scene.add(*tally);
+        }
+        let mut inner = vec![Estimates::default(); self.cell_count()];
+        for generation in &tree.generations {
+            let estimate = |&cell: &usize| {
+                let tallies = &tallies[cell];
+                let parent = &inner[tree.parents[cell]];
+                if cell < FACE_COUNT {
+                    Estimates::of_face(cell, tallies, scene, tables)
+                } else if self.keys()[cell].is_coarse() {
+                    Estimates::of_coarse(tallies, parent)
+                } else {
+                    Estimates::of_fine(tallies, parent, tables)
+                }
+            };
+            let estimates: Vec<Estimates> = generation.par_iter().map(estimate).collect();
+            for (cell, estimates) in generation.iter().zip(estimates) {
+                inner[*cell] = estimates;
+            }
+        }
+        inner
+    }
+
+    /// Sums the counts of every inner cell and its descendants; empty for the leaves.
+    fn tallies(&self, tree: &Tree) -> Vec<Vec<Tally>> {
+        let mut tallies = vec![Vec::new(); self.cell_count()];
+        for generation in tree.generations.iter().rev() {
+            let sum = |&cell: &usize| -> Vec<Tally> {
+                let mut sum: Vec<Tally> = self.counts(cell).iter().map(Tally::from).collect();
+                for &child in &tree.children[cell] {
+                    if tallies[child].is_empty() {
+                        let counts = self.counts(child);
+                        sum.iter_mut().zip(counts).for_each(|(sum, count)| sum.add(count.into()));
+                    } else {
+                        let tallies = &tallies[child];
+                        sum.iter_mut().zip(tallies).for_each(|(sum, tally)| sum.add(*tally));
+                    }
+                }
+                sum
+            };
+            let sums: Vec<Vec<Tally>> = generation.par_iter().map(sum).collect();
+            for (cell, sum) in generation.iter().zip(sums) {
+                tallies[*cell] = sum;
+            }
+        }
+        tallies
+    }
+
+    /// Share of the BRDF of every cell, 256ths, 0 where the material decides. The prior of a cell
+    /// is its parent, that of a face the scene.
+    fn brdf_shares(&self, tree: &Tree) -> Vec<u32> {
+        let mut sums: Vec<ShareEvidence> =
+            self.shares().par_chunks(SHARE_WORDS).map(ShareEvidence::from_counts).collect();
+        let mut scene = ShareEvidence::default();
+        for evidence in &sums {
+            scene.add(*evidence);
+        }
+        for generation in tree.generations.iter().rev() {
+            for &cell in generation {
+                for &child in &tree.children[cell] {
+                    let evidence = sums[child];
+                    sums[cell].add(evidence);
+                }
+            }
+        }
+        let scene = scene.share(None);
+        let mut shares: Vec<Option<f64>> =
+            sums[..FACE_COUNT].iter().map(|sum| sum.share(scene)).collect();
+        shares.resize(self.cell_count(), None);
+        for generation in &tree.generations {
+            for &cell in generation {
+                for &child in &tree.children[cell] {
+                    shares[child] = sums[child].share(shares[cell]);
+                }
+            }
+        }
+        shares.into_iter().map(share_in_256ths).collect()
+    }
+
+    /// Importance of every region to the scene under `snapshot`: the root of the mean over all fine
+    /// cells of its probability divided by its share of the energy.
+    pub fn region_importance(&self, snapshot: &Snapshot) -> Vec<f64> {
+        let mut sums = vec![0.0; self.region_count];
+        let mut cells = 0_u32;
+        for (key, entries) in
+            self.keys().iter().zip(snapshot.entries.chunks(self.region_count)).skip(FACE_COUNT)
+        {
+            if key.is_coarse() {
+                continue;
+            }
+            cells += 1;
+            for (sum, entry) in sums.iter_mut().zip(entries) {
+                *sum += f64::from(decode_entry(*entry).0);
+            }
+        }
+        if cells == 0 {
+            return vec![1.0; self.region_count];
+        }
+        sums.into_iter().map(|sum| (sum / f64::from(cells)).sqrt()).collect()
+    }
+}
