@@ -1,5 +1,5 @@
-//! Learned visibility on the host: the partition of the environment, what cells estimate, and the
-//! estimators by exact enumeration.
+//! The sampler `guided` on the host: the partition of the environment, the estimates of cells, and
+//! the estimators by exact enumeration.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 mod support;
@@ -7,7 +7,7 @@ mod support;
 use fenestra::{
     math::random::{hash_4d, random_independent_2d},
     sampler::guided::{
-        ARRIVAL_DIRECTIONS, CellKey, FACE_COUNT, GuideState, Learned, PARENT_COUNT, Partition,
+        ARRIVAL_DIRECTIONS, CellKey, FACE_COUNT, Guide, GuideState, PARENT_COUNT, Partition,
         decode_entry, decode_visibility,
     },
     scene::environment::{EnvironmentMap, EnvironmentTables},
@@ -76,18 +76,18 @@ fn small_and_black_maps_have_fewer_regions() {
     assert_eq!(black.regions[0].share, 0.0);
 }
 
-/// The second partition of the sunny map, by an interest in its eastern half only.
+/// Splits the sunny map again, with importance in its eastern half only.
 fn eastern(partition: &Partition) -> Partition {
-    let interest: Vec<f64> = partition
+    let importance: Vec<f64> = partition
         .regions
         .iter()
         .map(|region| if region.direction.x > 0.0 { 1.0 } else { 0.01 })
         .collect();
-    partition.split_by(&interest, partition.regions.len()).expect("the map has enough cells")
+    partition.split_by(&importance, partition.regions.len()).expect("the map has enough cells")
 }
 
 #[test]
-fn regions_are_split_anew_where_the_scene_looks() {
+fn regions_are_split_again_where_they_matter() {
     let map = sunny();
     let before = Partition::new(&map, 256);
     let after = eastern(&before);
@@ -99,10 +99,10 @@ fn regions_are_split_anew_where_the_scene_looks() {
     let sum: f64 = after.regions.iter().map(|region| region.share).sum();
     assert!((sum - 1.0).abs() < 1e-12);
     assert!(after.regions.iter().all(|region| region.parent < PARENT_COUNT));
-    // Interest that is the same everywhere gives the first regions, to the bit.
+    // Uniform importance restores the first regions, to the bit.
     let again = after.split_by(&[1.0; 256], 256).unwrap();
     assert_eq!((&again.regions, &again.entries), (&before.regions, &before.entries));
-    // More of them, and fewer again.
+    // Split into more regions, and into fewer again.
     let more = after.split_by(&[1.0; 256], 1024).unwrap();
     assert_eq!(more.regions.len(), 1024);
     let sum: f64 = more.regions.iter().map(|region| region.share).sum();
@@ -112,7 +112,7 @@ fn regions_are_split_anew_where_the_scene_looks() {
 }
 
 #[test]
-fn rectangles_bring_back_the_regions_unless_they_are_damaged() {
+fn rectangles_restore_the_regions_unless_they_are_damaged() {
     let map = sunny();
     let partition = Partition::new(&map, 256);
     let other = eastern(&partition);
@@ -140,23 +140,23 @@ fn counts_follow_the_regions() {
     let map = sunny();
     let before = Partition::new(&map, 64);
     let after = eastern(&before);
-    let mut learned = taught(&before, 1 << 12, 1 << 14);
-    // What shines: nothing is drawn in black regions.
-    let sums = |learned: &Learned, cell: usize, partition: &Partition| {
-        let counts = learned.counts(cell).iter().zip(&partition.regions);
+    let mut guide = guide_of(&before, 1 << 12, 1 << 14);
+    // Sum over regions with energy: black ones receive no counts.
+    let sums = |guide: &Guide, cell: usize, partition: &Partition| {
+        let counts = guide.counts(cell).iter().zip(&partition.regions);
         counts
             .filter(|(_, region)| region.share > 0.0)
             .fold((0, 0), |sum, (count, _)| (sum.0 + count.hits, sum.1 + count.trials))
     };
-    let seeing = learned.keys().iter().position(|key| *key == CellKey::fine([3, 4, 5], 6, 2));
+    let seeing = guide.keys().iter().position(|key| *key == CellKey::fine([3, 4, 5], 6, 2));
     let cell = seeing.unwrap();
-    let old = sums(&learned, cell, &before);
-    learned.carry_over(&before, &after, 64);
-    let new = sums(&learned, cell, &after);
+    let old = sums(&guide, cell, &before);
+    guide.carry_over(&before, &after, 64);
+    let new = sums(&guide, cell, &after);
     // Each share is rounded to a sixteenth of a ray.
     assert!(new.1.abs_diff(old.1) < 64 && new.0.abs_diff(old.0) < 64, "{old:?} → {new:?}");
-    // Regions keep the rate of where they lie.
-    for (region, count) in after.regions.iter().zip(learned.counts(cell)) {
+    // Regions keep the visibility of their part of the sky.
+    for (region, count) in after.regions.iter().zip(guide.counts(cell)) {
         if region.direction.x.abs() > 0.4 && count.trials >= 16 {
             let rate = count.hits as f64 / count.trials as f64;
             let expected = if region.direction.x > 0.0 { 1.0 } else { 0.0 };
@@ -170,15 +170,15 @@ fn counts_follow_the_regions() {
     }
 }
 
-/// Probability of the cell of every sample point of a fine grid in (u, v), from the density.
+/// Integrates the density over the cells of every region by quadrature.
 #[test]
 fn the_density_integrates_to_one_over_every_region() {
     let map = sunny();
     let tables = EnvironmentTables::new(&map);
     let partition = Partition::new(&map, 64);
     let mut integrals = vec![0.0; partition.regions.len()];
-    // Points in every cell; a Gauss-Legendre rule of two points is exact for the bilinear patch but
-    // for the variation of the sine, which the density divides by.
+    // Gauss-Legendre points in every cell: two are exact for the bilinear patch, except for the
+    // variation of the sine, which the density divides by.
     let offsets = [0.5 - 0.5 / 3.0_f64.sqrt(), 0.5 + 0.5 / 3.0_f64.sqrt()];
     let (width, height) = (f64::from(map.width), f64::from(map.height));
     for row in 0..partition.rows {
@@ -229,7 +229,7 @@ fn samples_of_a_region_have_its_density() {
             continue;
         }
         let energy = |cell: [u32; 2]| -> f64 {
-            // P_cell from a quadrature of the density over the cell, by its table's own rows.
+            // P_cell from the cumulative tables of the map
             let column = tables.cell_cumulative(&map, cell[1] as usize);
             let before = if cell[0] > 0 { column[cell[0] as usize - 1] } else { 0.0 };
             let row = tables.row_cumulative(&map);
@@ -265,10 +265,10 @@ fn samples_of_a_region_have_its_density() {
 fn entries_hold_the_probabilities_they_are_drawn_with() {
     let map = sunny();
     let partition = Partition::new(&map, 64);
-    let learned = taught(&partition, 1 << 12, 1 << 14);
-    let snapshot = learned.snapshot(&partition);
+    let guide = guide_of(&partition, 1 << 12, 1 << 14);
+    let snapshot = guide.snapshot(&partition);
     let regions = partition.regions.len();
-    for cell in [0, FACE_COUNT, learned.cell_count() - 1] {
+    for cell in [0, FACE_COUNT, guide.cell_count() - 1] {
         let entries = &snapshot.entries[cell * regions..][..regions];
         let expected: Vec<f64> = entries
             .iter()
@@ -285,13 +285,13 @@ fn entries_hold_the_probabilities_they_are_drawn_with() {
         assert!(p > 1e-5, "cell {cell}: p = {p}");
         for (entry, region) in entries.iter().zip(&partition.regions) {
             let (ratio, .., weight) = decode_entry(*entry);
-            assert_eq!(ratio > 0.0, region.share > 0.0, "whatever shines can be drawn");
+            assert_eq!(ratio > 0.0, region.share > 0.0, "every region with energy can be drawn");
             assert!((7e-4..=1.0).contains(&weight));
         }
     }
 }
 
-/// The region that `bits` choose among the entries of a cell; twin of `draw_guided`.
+/// Region that `bits` choose among the entries of a cell; twin of `draw_guided`.
 fn choose_region(entries: &[[u32; 2]], bits: u32) -> usize {
     let start = |interval: usize| decode_entry(entries[interval]).2 as usize;
     let interval = ((u64::from(bits) * entries.len() as u64) >> 32) as usize;
@@ -308,14 +308,14 @@ fn choose_region(entries: &[[u32; 2]], bits: u32) -> usize {
     low
 }
 
-/// A guide that was taught: eastern regions visible from one fine cell, nothing from another.
-fn taught(partition: &Partition, capacity: usize, slots: usize) -> Learned {
-    let mut learned = Learned::new(partition.regions.len(), capacity, slots);
+/// A guide with counts: one fine cell sees the eastern regions, another sees nothing.
+fn guide_of(partition: &Partition, capacity: usize, slots: usize) -> Guide {
+    let mut guide = Guide::new(partition.regions.len(), capacity, slots);
     let keys = [CellKey::fine([3, 4, 5], 6, 2), CellKey::fine([40, 4, 5], 6, 2)];
-    learned.want(&keys.map(|key| key.0));
+    guide.add_cells(&keys.map(|key| key.0));
     let regions = partition.regions.len();
-    let mut counted = vec![[0_u32; 3]; learned.cell_count() * regions];
-    for (cell, key) in learned.keys().iter().enumerate() {
+    let mut counted = vec![[0_u32; 3]; guide.cell_count() * regions];
+    for (cell, key) in guide.keys().iter().enumerate() {
         for (region, count) in partition.regions.iter().zip(&mut counted[cell * regions..]) {
             let sees = *key == keys[0] && region.direction.x > 0.0;
             if !key.is_coarse() && cell >= FACE_COUNT {
@@ -324,20 +324,20 @@ fn taught(partition: &Partition, capacity: usize, slots: usize) -> Learned {
             }
         }
     }
-    learned.add(0, &counted);
-    learned
+    guide.add(0, &counted);
+    guide
 }
 
 #[test]
-fn cells_learn_and_lean_on_their_surroundings() {
+fn cells_learn_and_fall_back_on_their_surroundings() {
     let map = sunny();
     let partition = Partition::new(&map, 64);
-    let mut learned = taught(&partition, 1 << 12, 1 << 14);
-    // A neighbour of the first cell that has seen nothing, and a stranger on another face.
+    let mut guide = guide_of(&partition, 1 << 12, 1 << 14);
+    // Add a neighbour of the first cell without rays, and a stranger on another face.
     let neighbour = CellKey::fine([2, 4, 5], 6, 2);
     let stranger = CellKey::fine([3, 4, 5], 6, 3);
-    learned.want(&[neighbour.0, stranger.0]);
-    let snapshot = learned.snapshot(&partition);
+    guide.add_cells(&[neighbour.0, stranger.0]);
+    let snapshot = guide.snapshot(&partition);
     let regions = partition.regions.len();
     let share_east = |key: CellKey| -> f64 {
         let slot = snapshot.table.iter().find(|entry| entry[0] == key.0).unwrap();
@@ -363,8 +363,8 @@ fn cells_learn_and_lean_on_their_surroundings() {
     assert!(blind < seen, "{blind}");
 }
 
-/// Two regions are seen alike and one is reflected ten times as much: what is believed of them, in the cell
-/// that found it and in its neighbour.
+/// Two regions are equally visible and one is reflected ten times as strongly: compares their
+/// probabilities in the cell that counted it and in its neighbour.
 #[test]
 fn cells_learn_what_their_surfaces_reflect() {
     const RAYS: u32 = 4000;
@@ -373,15 +373,15 @@ fn cells_learn_what_their_surfaces_reflect() {
     let regions = partition.regions.len();
     let cell = CellKey::fine([3, 4, 5], 6, 2);
     let neighbour = CellKey::fine([2, 4, 5], 6, 2);
-    let mut learned = Learned::new(regions, 1 << 12, 1 << 14);
-    learned.want(&[cell.0, neighbour.0]);
-    // The two regions with most energy above the horizon of the face, whose normal is up.
+    let mut guide = Guide::new(regions, 1 << 12, 1 << 14);
+    guide.add_cells(&[cell.0, neighbour.0]);
+    // The two regions of most energy above the horizon of the face, whose normal points up
     let mut bright: Vec<usize> =
         (0..regions).filter(|&index| partition.regions[index].direction.y > 0.2).collect();
     bright.sort_by(|a, b| partition.regions[*b].share.total_cmp(&partition.regions[*a].share));
     let [strong, weak] = [bright[0], bright[1]];
-    let place = learned.keys().iter().position(|key| *key == cell).unwrap();
-    let mut counted = vec![[0_u32; 3]; learned.cell_count() * regions];
+    let place = guide.keys().iter().position(|key| *key == cell).unwrap();
+    let mut counted = vec![[0_u32; 3]; guide.cell_count() * regions];
     for index in 0..regions {
         let response = match index {
             _ if index == strong => RAYS * GUIDE_RESPONSE_UNITS / 2,
@@ -391,40 +391,41 @@ fn cells_learn_what_their_surfaces_reflect() {
         let hits = if response > 0 { RAYS } else { 0 };
         counted[place * regions + index] = [RAYS, hits, response];
     }
-    learned.add(0, &counted);
+    guide.add(0, &counted);
     let ratio = |key: CellKey| {
-        let snapshot = learned.snapshot(&partition);
+        let snapshot = guide.snapshot(&partition);
         let slot = snapshot.table.iter().find(|entry| entry[0] == key.0).unwrap();
         let entries = &snapshot.entries[slot[1] as usize * regions..][..regions];
         let density = |index: usize| f64::from(decode_entry(entries[index]).0);
         density(strong) / density(weak)
     };
-    // The defensive share, which does not look at what was learned, takes a little off.
+    // The defensive share ignores the counts and lowers the ratio a little.
     assert!((8.0..10.5).contains(&ratio(cell)), "{}", ratio(cell));
     assert!(ratio(neighbour) > 5.0, "through the coarse cell: {}", ratio(neighbour));
-    // What was counted survives a file to the bit, also where a count was halved.
+    // Counts survive a file to the bit, also where they were halved.
     let many: Vec<_> = counted.iter().map(|count| count.map(|word| 16 * word)).collect();
-    learned.add(0, &many);
-    learned.add(0, &many);
-    let again = Learned::resume(regions, 1 << 12, 1 << 14, &state_of(&learned), 1);
-    assert_eq!(again.count_words(), learned.count_words());
-    assert_eq!(again.snapshot(&partition), learned.snapshot(&partition));
-    assert!(learned.counts(place)[strong].trials_in_rays() <= 65_536.0);
+    guide.add(0, &many);
+    guide.add(0, &many);
+    let again = Guide::resume(regions, 1 << 12, 1 << 14, &state_of(&guide), 1);
+    assert_eq!(again.count_words(), guide.count_words());
+    assert_eq!(again.snapshot(&partition), guide.snapshot(&partition));
+    assert!(guide.counts(place)[strong].trials_in_rays() <= 65_536.0);
 }
 
-/// What a file keeps of cells.
-fn state_of(learned: &Learned) -> GuideState {
+/// State with the cells and counts of a guide.
+fn state_of(guide: &Guide) -> GuideState {
     GuideState {
-        keys: learned.keys().iter().map(|key| key.0).collect(),
-        refined: learned.refined(),
-        counts: learned.count_words(),
-        shares: learned.shares().to_vec(),
+        keys: guide.keys().iter().map(|key| key.0).collect(),
+        refined: guide.refined(),
+        counts: guide.count_words(),
+        shares: guide.shares().to_vec(),
         ..GuideState::default()
     }
 }
 
-/// Four cells: in every region of one half of the rays are blocked; of another all, in half of the
-/// regions; the third is the first with few rays; in the fourth a quarter are visible everywhere.
+/// Four cells: the first sees half of the rays of every region; the second all rays of half of the
+/// regions; the third is the first with few rays; the fourth sees a quarter of the rays of every
+/// region.
 #[test]
 fn cells_are_refined_whose_rays_disagree() {
     const RAYS: u32 = 40;
@@ -433,15 +434,15 @@ fn cells_are_refined_whose_rays_disagree() {
     let regions = partition.regions.len();
     let keys: Vec<CellKey> =
         [3, 40, 80, 120].iter().map(|&x| CellKey::fine([x, 4, 5], 6, 2)).collect();
-    let [doubtful, certain, unknown, other] = keys[..] else { panic!("four cells") };
+    let [mixed, certain, unknown, other] = keys[..] else { panic!("four cells") };
     let learn = |capacity: usize| {
-        let mut learned = Learned::new(regions, capacity, 1 << 14);
-        learned.want(&keys.iter().map(|key| key.0).collect::<Vec<u32>>());
-        let mut counted = vec![[0_u32; 3]; learned.cell_count() * regions];
-        for (key, counts) in learned.keys().iter().zip(counted.chunks_mut(regions)) {
+        let mut guide = Guide::new(regions, capacity, 1 << 14);
+        guide.add_cells(&keys.iter().map(|key| key.0).collect::<Vec<u32>>());
+        let mut counted = vec![[0_u32; 3]; guide.cell_count() * regions];
+        for (key, counts) in guide.keys().iter().zip(counted.chunks_mut(regions)) {
             for (region, count) in counts.iter_mut().enumerate() {
                 *count = match *key {
-                    key if key == doubtful => [RAYS, RAYS / 2, RAYS],
+                    key if key == mixed => [RAYS, RAYS / 2, RAYS],
                     key if key == other => [RAYS, RAYS / 4, RAYS],
                     key if key == certain && region % 2 == 0 => [RAYS, RAYS, RAYS],
                     key if key == certain => [RAYS, 0, 0],
@@ -450,83 +451,81 @@ fn cells_are_refined_whose_rays_disagree() {
                 };
             }
         }
-        learned.add(0, &counted);
-        learned.refine();
-        learned
+        guide.add(0, &counted);
+        guide.refine();
+        guide
     };
-    let refined = |learned: &Learned| -> Vec<CellKey> {
-        learned.refined().iter().map(|&cell| learned.keys()[cell as usize]).collect()
+    let refined = |guide: &Guide| -> Vec<CellKey> {
+        guide.refined().iter().map(|&cell| guide.keys()[cell as usize]).collect()
     };
-    let mut learned = learn(1 << 12);
-    assert_eq!(refined(&learned), [doubtful, other], "the greatest doubt first");
-    learned.refine();
-    assert_eq!(learned.refined().len(), 2, "once only");
-    // Room for four more cells, an eighth of all being left for what was not seen yet.
-    let cells = learned.cell_count();
-    assert_eq!(refined(&learn((cells + 4) * 8 / 7 + 1)), [doubtful]);
+    let mut guide = learn(1 << 12);
+    assert_eq!(refined(&guide), [mixed, other], "the greatest variance first");
+    guide.refine();
+    assert_eq!(guide.refined().len(), 2, "once only");
+    // Leave room for four more cells, besides the eighth that stays free for cells not seen yet.
+    let cells = guide.cell_count();
+    assert_eq!(refined(&learn((cells + 4) * 8 / 7 + 1)), [mixed]);
     assert!(refined(&learn(cells)).is_empty());
 
-    // Parts become cells without coarse cells of their own, and lean on what they are parts of.
-    let part = |x: i32| CellKey::fine([x, 9, 10], 5, 2);
-    let (here, there) = (part(6), part(81));
-    learned.want(&[here.0, there.0]);
-    assert_eq!(learned.cell_count(), cells + 3);
-    let is_cell = |key: CellKey| learned.keys().contains(&key);
+    // Children become cells without coarse cells of their own; their prior is their parent.
+    let child = |x: i32| CellKey::fine([x, 9, 10], 5, 2);
+    let (here, there) = (child(6), child(81));
+    guide.add_cells(&[here.0, there.0]);
+    assert_eq!(guide.cell_count(), cells + 3);
+    let is_cell = |key: CellKey| guide.keys().contains(&key);
     assert!(is_cell(here) && is_cell(there) && is_cell(there.coarse()) && !is_cell(here.coarse()));
-    let slot = |learned: &Learned, key: CellKey| {
-        let snapshot = learned.snapshot(&partition);
+    let slot = |guide: &Guide, key: CellKey| {
+        let snapshot = guide.snapshot(&partition);
         let slot = *snapshot.table.iter().find(|entry| entry[0] == key.0).unwrap();
         let cell = (slot[1] & (GUIDE_REFINED - 1)) as usize;
         (slot[1], snapshot.entries[cell * regions..][..regions].to_vec())
     };
-    assert_ne!(slot(&learned, doubtful).0 & GUIDE_REFINED, 0);
-    assert_eq!(slot(&learned, certain).0 & GUIDE_REFINED, 0);
-    assert_eq!(slot(&learned, here).0 & GUIDE_REFINED, 0);
-    let visibility = |learned: &Learned, key: CellKey, region: usize| {
-        decode_visibility(slot(learned, key).1[region])
-    };
+    assert_ne!(slot(&guide, mixed).0 & GUIDE_REFINED, 0);
+    assert_eq!(slot(&guide, certain).0 & GUIDE_REFINED, 0);
+    assert_eq!(slot(&guide, here).0 & GUIDE_REFINED, 0);
+    let visibility =
+        |guide: &Guide, key: CellKey, region: usize| decode_visibility(slot(guide, key).1[region]);
     let shining = (0..regions).filter(|&region| partition.regions[region].share > 0.0);
     for region in shining.clone() {
-        let (whole, part) =
-            (visibility(&learned, doubtful, region), visibility(&learned, here, region));
-        assert!((part / whole - 1.0).abs() < 0.3, "{part} instead of {whole}");
+        let (parent, child) = (visibility(&guide, mixed, region), visibility(&guide, here, region));
+        assert!((child / parent - 1.0).abs() < 0.3, "{child} instead of {parent}");
     }
-    // What the part counts is its own and that of the whole.
-    let before = visibility(&learned, doubtful, 7);
-    let mut counted = vec![[0_u32; 3]; learned.cell_count() * regions];
-    let cell = learned.keys().iter().position(|key| *key == here).unwrap();
+    // Counts of the child are also those of its parent.
+    let before = visibility(&guide, mixed, 7);
+    let mut counted = vec![[0_u32; 3]; guide.cell_count() * regions];
+    let cell = guide.keys().iter().position(|key| *key == here).unwrap();
     counted[cell * regions..][..regions].fill([RAYS, 0, 0]);
-    learned.add(0, &counted);
+    guide.add(0, &counted);
     for region in shining {
-        assert!(visibility(&learned, here, region) < 0.1);
+        assert!(visibility(&guide, here, region) < 0.1);
     }
-    assert!(visibility(&learned, doubtful, 7) < 0.8 * before);
+    assert!(visibility(&guide, mixed, 7) < 0.8 * before);
 
-    let again = Learned::resume(regions, 1 << 12, 1 << 14, &state_of(&learned), 1);
-    assert_eq!(again.refined(), learned.refined());
-    assert_eq!(again.snapshot(&partition), learned.snapshot(&partition));
+    let again = Guide::resume(regions, 1 << 12, 1 << 14, &state_of(&guide), 1);
+    assert_eq!(again.refined(), guide.refined());
+    assert_eq!(again.snapshot(&partition), guide.snapshot(&partition));
 }
 
 #[test]
 fn overflow_and_collisions_fall_back() {
     let map = sunny();
     let partition = Partition::new(&map, 16);
-    let wanted: Vec<u32> = (0..500)
+    let missing: Vec<u32> = (0..500)
         .map(|index| CellKey::fine([index % 50, index / 50, 0], 3, 2).0)
         .chain([GUIDE_NO_KEY, 0xf000_0000, CellKey::fine([0; 3], 0, 0).coarse().0])
         .collect();
-    let mut learned = Learned::new(partition.regions.len(), 64, 64);
-    learned.want(&wanted);
-    assert_eq!(learned.cell_count(), 64, "no more than there is room for");
-    assert!(learned.refused() > 0);
-    let coarse = learned.keys()[FACE_COUNT..].iter().filter(|key| key.is_coarse()).count();
+    let mut guide = Guide::new(partition.regions.len(), 64, 64);
+    guide.add_cells(&missing);
+    assert_eq!(guide.cell_count(), 64, "no more than there is room for");
+    assert!(guide.refused() > 0);
+    let coarse = guide.keys()[FACE_COUNT..].iter().filter(|key| key.is_coarse()).count();
     assert_eq!(coarse, 13 * 3, "coarse cells come first");
-    let snapshot = learned.snapshot(&partition);
+    let snapshot = guide.snapshot(&partition);
     let entered = snapshot.table.iter().filter(|entry| entry[0] != GUIDE_NO_KEY).count();
     assert!(entered <= 58, "{entered}");
-    // A table far too small: what has no slot is left out, and nothing breaks.
-    let mut crowded = Learned::new(partition.regions.len(), 400, 16);
-    crowded.want(&wanted);
+    // A table far too small leaves cells out, and nothing breaks.
+    let mut crowded = Guide::new(partition.regions.len(), 400, 16);
+    crowded.add_cells(&missing);
     let snapshot = crowded.snapshot(&partition);
     assert!(snapshot.table.iter().all(|entry| entry[0] != GUIDE_NO_KEY), "16 slots are full");
     assert_eq!(snapshot.entries.len(), crowded.cell_count() * partition.regions.len());
@@ -536,20 +535,20 @@ fn overflow_and_collisions_fall_back() {
 fn the_order_in_which_cells_are_found_does_not_matter() {
     let map = sunny();
     let partition = Partition::new(&map, 32);
-    let wanted: Vec<u32> =
+    let missing: Vec<u32> =
         (0..300).map(|index| CellKey::fine([index, 7, index / 3], 4, 1).0).collect();
-    let mut repeated: Vec<u32> = wanted.iter().rev().copied().collect();
-    repeated.extend(&wanted[20..90]);
-    let snapshot = |wanted: &[u32]| {
-        let mut learned = Learned::new(partition.regions.len(), 128, 512);
-        learned.want(wanted);
-        learned.snapshot(&partition)
+    let mut repeated: Vec<u32> = missing.iter().rev().copied().collect();
+    repeated.extend(&missing[20..90]);
+    let snapshot = |missing: &[u32]| {
+        let mut guide = Guide::new(partition.regions.len(), 128, 512);
+        guide.add_cells(missing);
+        guide.snapshot(&partition)
     };
-    assert_eq!(snapshot(&wanted), snapshot(&repeated));
+    assert_eq!(snapshot(&missing), snapshot(&repeated));
 }
 
-/// A toy environment of four directions: what each brings if visible, whether it is, two densities,
-/// and a guess of the visibility.
+/// A toy environment of four directions: light if visible, visibility, two densities, and an
+/// estimate of the visibility.
 struct Toy {
     integrand: [f64; 4],
     visible: [f64; 4],
@@ -572,7 +571,8 @@ impl Toy {
     }
 
     /// Expectation of the resampled estimate with `from_brdf` and `from_guide` candidates, over
-    /// every tuple of candidates and every choice; `brdf_part` is the weight of the BRDF's density.
+    /// every tuple of candidates and every choice; `brdf_part` is the weight of the density of the
+    /// BRDF.
     fn resampled(&self, from_brdf: u32, from_guide: u32, brdf_part: f64) -> f64 {
         let count = from_brdf + from_guide;
         let pdf = |y: usize| brdf_part * self.brdf[y] + (1.0 - brdf_part) * self.guided[y];
@@ -612,17 +612,17 @@ fn the_resampled_estimator_is_exact_with_unequal_counts() {
         let found = TOY.resampled(from_brdf, from_guide, part);
         assert!((found - TOY.truth()).abs() < 1e-10, "{from_brdf} + {from_guide}: {found}");
     }
-    // The density of the one-sample model in its place is wrong, and the enumeration says so.
+    // The enumeration detects a wrong density, that of the one-sample model.
     let wrong = TOY.resampled(1, 3, 0.1);
     assert!((wrong - TOY.truth()).abs() > 0.05, "{wrong}");
 }
 
-/// Two rays in turn; what the first sees changes the density of the second. Divided by the density
-/// in force when it was drawn, the second is exact; by what was known afterwards, it is not.
+/// Traces two rays in turn; the result of the first changes the density of the second. Dividing by
+/// the density that a ray was drawn with is exact; dividing by the density known afterwards is not.
 #[test]
 fn feedback_inside_a_pass_would_be_caught() {
     let after = |seen: usize| -> [f64; 4] {
-        // What is known after one ray: its direction is chosen more often if it was visible.
+        // After one ray, its direction is drawn more often if it was visible.
         let mut weights = TOY.guided;
         weights[seen] *= if TOY.visible[seen] > 0.0 { 3.0 } else { 0.2 };
         let sum: f64 = weights.iter().sum();
@@ -637,15 +637,15 @@ fn feedback_inside_a_pass_would_be_caught() {
             snapshot += probability
                 * 0.5
                 * (value(first) / TOY.guided[first] + value(second) / later[second]);
-            // A pass that reads what it writes: the first ray divided by the table as it is when
-            // the pass ends.
+            // A pass that reads the table it writes divides the first ray by the table at the end
+            // of the pass.
             feedback +=
                 probability * 0.5 * (value(first) / later[first] + value(second) / later[second]);
         }
     }
     assert!((snapshot - TOY.truth()).abs() < 1e-12, "{snapshot}");
     assert!((feedback - TOY.truth()).abs() > 0.2, "{feedback}");
-    // The shaders cannot do so: the one that samples has no access to the counts.
+    // Shaders cannot do so: those that sample have no access to the counts.
     let counted = [BINDING_GUIDE_COUNTS, BINDING_GUIDE_SHARES, BINDING_GUIDE_ARRIVALS];
     for (name, expected) in [
         ("sample_guided", [false; 3]),
@@ -658,25 +658,25 @@ fn feedback_inside_a_pass_would_be_caught() {
     }
 }
 
-/// Light that bounces found is believed where they were, and where cells know less, by what these are parts
-/// of; what a cell reflects is of the sky it sees and of the light that arrives.
+/// Cells learn the light that bounces found, and cells with few rays fall back on their parents; a
+/// cell reflects the sky it sees and the light that arrives.
 #[test]
 fn cells_learn_where_light_arrives_from() {
     let map = sunny();
     let partition = Partition::new(&map, 64);
     let key = |place: [u32; 3]| place[0] | place[1] << 8 | place[2] << 16 | 3 << 24;
-    // Two of one coarse cell, one elsewhere.
+    // Two cells of one coarse cell, one elsewhere
     let [bright, beside, far] = [key([1, 1, 1]), key([2, 1, 1]), key([90, 90, 90])];
-    let mut learned = Learned::new(64, 100, 256).with_bounces(&[], 1);
-    learned.want(&[bright, beside, far]);
-    let index = |key: u32| learned.keys().iter().position(|found| *found == CellKey(key)).unwrap();
+    let mut guide = Guide::new(64, 100, 256).with_bounces(&[], 1);
+    guide.add_cells(&[bright, beside, far]);
+    let index = |key: u32| guide.keys().iter().position(|found| *found == CellKey(key)).unwrap();
     let [bright, beside, far] = [bright, beside, far].map(index);
-    let cells = learned.cell_count();
+    let cells = guide.cell_count();
     // The sky is visible from the far cell only.
     let mut counts = vec![[20, 0, 0]; cells * 64];
     counts[far * 64..][..64].fill([20, 20, 20 * 1000]);
-    learned.add(0, &counts);
-    let before = learned.snapshot(&partition);
+    guide.add(0, &counts);
+    let before = guide.snapshot(&partition);
     assert!(before.arriving.iter().all(|light| *light == 1.0), "nothing is known");
     let reflected = |snapshot: &fenestra::sampler::guided::Snapshot, cell: usize| {
         snapshot.reflected.units[cell] as f32 * snapshot.reflected.unit
@@ -688,8 +688,8 @@ fn cells_learn_where_light_arrives_from() {
     found[beside * ARRIVAL_DIRECTIONS..][..ARRIVAL_DIRECTIONS].fill([1, 0]);
     let from = 17;
     found[bright * ARRIVAL_DIRECTIONS + from] = [40, 4000];
-    learned.add_arrivals(&found, &before.reflected);
-    let snapshot = learned.snapshot(&partition);
+    guide.add_arrivals(&found, &before.reflected);
+    let snapshot = guide.snapshot(&partition);
     let light = |cell: usize, direction: usize| {
         snapshot.arriving[cell * ARRIVAL_DIRECTIONS..][..ARRIVAL_DIRECTIONS][direction]
     };
@@ -699,19 +699,19 @@ fn cells_learn_where_light_arrives_from() {
         assert!((mean - 1.0).abs() < 1e-3, "cell {cell}: {mean}");
     }
     assert!(light(bright, from) > 50.0 && light(bright, from + 1) < 0.5);
-    assert!(light(beside, from) > 20.0, "leans on its coarse cell: {}", light(beside, from));
+    assert!(light(beside, from) > 20.0, "falls back on its coarse cell: {}", light(beside, from));
     assert!(light(far, from) > 5.0, "and the far one on the face: {}", light(far, from));
     assert!(reflected(&snapshot, bright) > reflected(&before, bright));
 
-    // What was learned is brought back, and halves.
-    let words = learned.arrivals();
-    let again = Learned::new(64, 100, 256).with_bounces(&words[..6 * ARRIVAL_DIRECTIONS], 1);
+    // Words restore the light, and an update without counts leaves it as it is.
+    let words = guide.arrivals();
+    let again = Guide::new(64, 100, 256).with_bounces(&words[..6 * ARRIVAL_DIRECTIONS], 1);
     assert_eq!(again.arrivals(), words[..6 * ARRIVAL_DIRECTIONS]);
-    learned.add_arrivals(&[], &before.reflected);
-    assert_eq!(learned.arrivals(), words, "nothing was counted");
+    guide.add_arrivals(&[], &before.reflected);
+    assert_eq!(guide.arrivals(), words, "nothing was counted");
 }
 
-/// Whether a shader declares a variable at a set and binding (SPIR-V decorations 33 and 34).
+/// True if a shader declares a variable at a set and binding (SPIR-V decorations 33 and 34).
 fn binds(spirv: &[u8], set: u32, binding: u32) -> bool {
     let words: Vec<u32> =
         spirv.chunks_exact(4).map(|bytes| u32::from_le_bytes(bytes.try_into().unwrap())).collect();

@@ -1,9 +1,9 @@
-//! From how many candidates `guided` chooses a shadow ray under `auto`: samples of a few pixels and
-//! the time they took → what a sample costs → a number.
+//! Chooses the number of candidates per shadow ray under `auto`: samples of a few pixels, time per
+//! sample → variance × time → number of candidates.
 //!
-//! The error at equal time is variance × time. The variance is that of a pixel's samples, relative to
-//! the squared mean of the block of pixels around it, so that dark regions count as bright ones do; the
-//! geometric mean over the blocks keeps a few fireflies from deciding.
+//! The error at equal time is variance × time. The variance of a pixel's samples is taken relative
+//! to the squared mean of its block of pixels, so that dark regions count as much as bright ones;
+//! the geometric mean over the blocks keeps a few fireflies from deciding.
 
 use std::fmt;
 
@@ -14,27 +14,29 @@ use crate::error::Result;
 /// Numbers of candidates that `guided` can choose a shadow ray from.
 pub const GUIDED_CANDIDATES: [u32; 3] = [1, 4, 8];
 
-/// More candidates must lower variance × time to this share of what fewer have to be worth a change, and
-/// that by so many standard errors of the logarithm: few samples of pixels with rare bright ones say little.
+/// Ratio of variance × time below which more candidates are chosen over fewer.
 const CLEAR_GAIN: f64 = 0.9;
+/// Standard errors of the logarithm by which the ratio must be below [`CLEAR_GAIN`]: few samples of
+/// pixels with rare bright ones say little.
 const CONFIDENCE: f64 = 2.0;
-/// Standard error where nothing is known of it: no gain is clear. Finite, since files cannot hold infinities.
+/// Standard error where it is unknown, so that no gain is clear. Finite, since files cannot hold
+/// infinities.
 const UNKNOWN_ERROR: f64 = 1e3;
-/// At this multiple they are not worth another look.
+/// Ratio of variance × time above which more candidates are not measured again.
 const CLEAR_LOSS: f64 = 1.4;
 
-/// What was measured of a number of candidates.
+/// Measured cost of a number of candidates.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CandidateCost {
     /// Candidates per shadow ray.
     pub candidates: u32,
     /// Device milliseconds of all passes for one sample of every pixel.
     pub ms_per_sample: f64,
-    /// Variance of a pixel's samples relative to the squared mean around it, geometric mean over
-    /// blocks of pixels.
+    /// Variance of a pixel's samples relative to the squared mean of its block, geometric mean over
+    /// the blocks.
     pub relative_variance: f64,
-    /// Standard error, by the spread over the blocks, of the logarithm of that over the variance of the fewest
-    /// candidates that were measured; 0 for these, 1000 where there is only one block.
+    /// Standard error over the blocks of the logarithm of the variance relative to that of the
+    /// fewest candidates measured; 0 for these, 1000 if there is only one block.
     pub log_variance_error: f64,
 }
 
@@ -51,18 +53,18 @@ impl fmt::Display for CandidateCost {
 }
 
 impl CandidateCost {
-    /// Relative variance after a millisecond.
+    /// Relative variance after a millisecond of samples.
     fn variance_time(&self) -> f64 {
         self.relative_variance * self.ms_per_sample
     }
 }
 
-/// The number of candidates to take: the fewest, unless more are clearly better. `costs` are in
-/// ascending order.
+/// Chooses a number of candidates: the fewest, unless more are clearly better. `costs` are in
+/// ascending order of candidates.
 ///
 /// # Panics
 /// If there are no costs.
-pub fn choose(costs: &[CandidateCost]) -> u32 {
+pub fn choose_candidates(costs: &[CandidateCost]) -> u32 {
     assert!(!costs.is_empty(), "something was measured");
     let mut chosen = &costs[0];
     for more in &costs[1..] {
@@ -74,20 +76,20 @@ pub fn choose(costs: &[CandidateCost]) -> u32 {
     chosen.candidates
 }
 
-/// Whether the largest number of candidates has so much more variance × time than a smaller one that
-/// measuring on would not change the choice.
-pub fn is_most_a_clear_loss(costs: &[CandidateCost]) -> bool {
-    let Some((most, fewer)) = costs.split_last() else { return false };
-    fewer.iter().any(|cost| most.variance_time() > CLEAR_LOSS * cost.variance_time())
+/// Returns true if the largest number of candidates has so much more variance × time than a smaller
+/// one that more measurements would not change the choice.
+pub fn is_largest_clearly_worse(costs: &[CandidateCost]) -> bool {
+    let Some((largest, fewer)) = costs.split_last() else { return false };
+    fewer.iter().any(|cost| largest.variance_time() > CLEAR_LOSS * cost.variance_time())
 }
 
-/// Chooses from the fewest candidates up, as long as more are worth it. `compare` measures two numbers
-/// and returns the costs of all that were measured so far, in ascending order; none where nothing can
-/// be measured. Returns the choice and the last costs.
+/// Compares numbers of candidates pair by pair, from the fewest up, until more do not pay.
+/// `compare` measures two numbers and returns the costs of all numbers measured so far, in
+/// ascending order, or none if nothing can be measured. Returns the choice and the last costs.
 ///
 /// # Errors
 /// Those of `compare`.
-pub fn climb(
+pub fn choose_by_comparison(
     mut compare: impl FnMut(u32, u32) -> Result<Vec<CandidateCost>>,
 ) -> Result<(u32, Vec<CandidateCost>)> {
     let mut chosen = GUIDED_CANDIDATES[0];
@@ -97,7 +99,7 @@ pub fn climb(
         if costs.is_empty() {
             break;
         }
-        chosen = choose(&costs);
+        chosen = choose_candidates(&costs);
         if chosen != more {
             break;
         }
@@ -105,8 +107,8 @@ pub fn climb(
     Ok((chosen, costs))
 }
 
-/// The middle value, the upper one of two: with it, half of the ratios of a machine that is busy with
-/// other work may be too small by chance, but no more.
+/// Median, the upper one of two middle values: up to half of the timings may be too small by chance
+/// on a machine that is busy with other work.
 ///
 /// # Panics
 /// If there are no values.
@@ -117,7 +119,7 @@ pub fn upper_median(values: &[f64]) -> f64 {
     sorted[sorted.len() / 2]
 }
 
-/// Samples of pixels in one block.
+/// Moments of the samples of the pixels in one block.
 #[derive(Clone, Copy, Debug, Default)]
 struct Block {
     count: f64,
@@ -127,14 +129,14 @@ struct Block {
     has_rays: bool,
 }
 
-/// Spread of the samples of some pixels, by block of pixels.
+/// Spread of the samples around the mean of their pixel, by block of pixels.
 #[derive(Clone, Debug, Default)]
-pub struct Spread {
+pub struct PixelSpread {
     blocks: Vec<Block>,
 }
 
-impl Spread {
-    /// Adds the samples of a pixel; `has_rays` tells whether any of them traced a shadow ray.
+impl PixelSpread {
+    /// Adds the samples of a pixel; `has_rays` is true if any of them traced a shadow ray.
     pub fn add(&mut self, block: usize, samples: &[f64], has_rays: bool) {
         if self.blocks.len() <= block {
             self.blocks.resize(block + 1, Block::default());
@@ -154,11 +156,13 @@ impl Spread {
     }
 }
 
-/// Relative variance of each of the spreads over the same pixels: geometric mean over the blocks
-/// where all of them vary, each relative to the mean over all of them; with it the standard error of its
-/// logarithm against the first, 1000 where there is only one block. Blocks without a shadow ray
-/// have none, since no choice of directions changes them; `None` where no block is left.
-pub fn relative_variances(spreads: &[&Spread]) -> Option<Vec<(f64, f64)>> {
+/// Relative variance of each of several spreads of the same pixels, and standard error of the
+/// logarithm of its ratio to the first, 1000 if there is only one block.
+///
+/// The relative variance is the geometric mean over the blocks where all spreads vary, each
+/// relative to the squared mean over all spreads. Blocks without a shadow ray are left out, since
+/// no choice of directions changes them; `None` if no block is left.
+pub fn relative_variances(spreads: &[&PixelSpread]) -> Option<Vec<(f64, f64)>> {
     let block_count = spreads.iter().map(|spread| spread.blocks.len()).min().unwrap_or(0);
     let mut logarithms = vec![Vec::new(); spreads.len()];
     for index in 0..block_count {
@@ -202,31 +206,32 @@ mod tests {
         CandidateCost { candidates, ms_per_sample, relative_variance, log_variance_error: 0.0 }
     }
 
-    fn variances(spreads: &[&Spread]) -> Vec<f64> {
+    fn variances(spreads: &[&PixelSpread]) -> Vec<f64> {
         relative_variances(spreads).unwrap().into_iter().map(|(variance, _)| variance).collect()
     }
 
     #[test]
-    fn the_least_variance_by_time_is_chosen_and_fewer_where_it_is_not_clear() {
-        let choice = |four: (f64, f64)| choose(&[cost(1, 2.0, 3.0), cost(4, four.0, four.1)]);
+    fn the_least_variance_by_time_is_chosen_if_it_is_clearly_less() {
+        let choice =
+            |four: (f64, f64)| choose_candidates(&[cost(1, 2.0, 3.0), cost(4, four.0, four.1)]);
         assert_eq!(choice((4.0, 2.0)), 1, "a third less variance in twice the time");
         assert_eq!(choice((2.4, 2.0)), 4, "in a fifth more time");
         assert_eq!(choice((2.0, 2.75)), 1, "a twelfth less is not clear");
         assert_eq!(choice((2.0, 2.65)), 4, "an eighth less is");
         assert_eq!(choice((f64::NAN, 1.0)), 1);
         assert_eq!(choice((1.0, f64::NAN)), 1);
-        assert_eq!(choose(&[cost(1, f64::NAN, f64::NAN), cost(4, 1.0, 1.0)]), 1);
+        assert_eq!(choose_candidates(&[cost(1, f64::NAN, f64::NAN), cost(4, 1.0, 1.0)]), 1);
         let four = [cost(1, 2.0, 3.0), cost(4, 2.2, 2.0)];
-        assert_eq!(choose(&[four[0], four[1], cost(8, 2.6, 1.8)]), 4);
-        assert_eq!(choose(&[four[0], four[1], cost(8, 2.4, 1.5)]), 8);
-        assert_eq!(choose(&four[..1]), 1);
+        assert_eq!(choose_candidates(&[four[0], four[1], cost(8, 2.6, 1.8)]), 4);
+        assert_eq!(choose_candidates(&[four[0], four[1], cost(8, 2.4, 1.5)]), 8);
+        assert_eq!(choose_candidates(&four[..1]), 1);
     }
 
     #[test]
-    fn a_gain_within_the_noise_is_none() {
+    fn a_gain_within_the_noise_is_not_clear() {
         let choice = |error: f64| {
             let four = CandidateCost { log_variance_error: error, ..cost(4, 2.2, 2.0) };
-            choose(&[cost(1, 2.0, 3.0), four])
+            choose_candidates(&[cost(1, 2.0, 3.0), four])
         };
         // ln(0.9 · 6 / 4.4) is 0.205.
         assert_eq!((choice(0.10), choice(0.11)), (4, 1));
@@ -235,8 +240,8 @@ mod tests {
     }
 
     #[test]
-    fn the_error_is_that_of_the_difference_by_blocks() {
-        let (mut one, mut four) = (Spread::default(), Spread::default());
+    fn the_error_is_that_of_the_difference_over_blocks() {
+        let (mut one, mut four) = (PixelSpread::default(), PixelSpread::default());
         let pair = |deviation: f64| [1.0 - deviation, 1.0 + deviation];
         // Variances of 1, 4 and 16 against the same, half and a quarter of it.
         for (block, (deviation, root)) in
@@ -258,11 +263,11 @@ mod tests {
     }
 
     #[test]
-    fn more_are_tried_as_long_as_they_are_worth_it() {
+    fn more_candidates_are_tried_as_long_as_they_pay() {
         let all = [cost(1, 1.0, 8.0), cost(4, 2.0, 2.0), cost(8, 3.0, 1.0)];
         let try_all = |all: [CandidateCost; 3]| {
             let mut compared = Vec::new();
-            let result = climb(|chosen, more| {
+            let result = choose_by_comparison(|chosen, more| {
                 compared.push((chosen, more));
                 Ok(all.iter().filter(|cost| cost.candidates <= more).copied().collect())
             });
@@ -270,9 +275,10 @@ mod tests {
         };
         assert_eq!(try_all(all), (8, vec![(1, 4), (4, 8)]));
         assert_eq!(try_all([all[0], all[1], cost(8, 4.0, 1.0)]), (4, vec![(1, 4), (4, 8)]));
-        // 8 would be best of all, but one looks no further than where it stops to pay.
+        // 8 would be best of all, but the search stops at the first number that does not pay.
         assert_eq!(try_all([all[0], cost(4, 4.0, 2.0), all[2]]), (1, vec![(1, 4)]));
-        assert_eq!(climb(|_, _| Ok(Vec::new())).unwrap(), (1, Vec::new()));
+        let nothing = choose_by_comparison(|_, _| Ok(Vec::new()));
+        assert_eq!(nothing.unwrap(), (1, Vec::new()));
     }
 
     #[test]
@@ -285,22 +291,24 @@ mod tests {
 
     #[test]
     fn only_losses_are_clear_early() {
-        let is_loss = |four: f64| is_most_a_clear_loss(&[cost(1, 2.0, 3.0), cost(4, four, 3.0)]);
+        let is_loss =
+            |four: f64| is_largest_clearly_worse(&[cost(1, 2.0, 3.0), cost(4, four, 3.0)]);
         assert!(is_loss(2.9) && !is_loss(2.7) && !is_loss(0.1));
-        assert!(!is_most_a_clear_loss(&[cost(1, 2.0, 3.0)]) && !is_most_a_clear_loss(&[]));
+        assert!(!is_largest_clearly_worse(&[cost(1, 2.0, 3.0)]) && !is_largest_clearly_worse(&[]));
         let best = [cost(1, 4.0, 1.0), cost(4, 2.0, 1.0), cost(8, 3.0, 1.0)];
-        assert!(is_most_a_clear_loss(&best), "against the best of the fewer");
+        assert!(is_largest_clearly_worse(&best), "against the best of the fewer");
     }
 
     #[test]
     fn evenly_spaced_samples_have_their_variance() {
         // 0 … n − 1 have the sample variance n (n + 1) / 12 and the mean (n − 1) / 2.
         let samples = |count: u32| (0..count).map(f64::from).collect::<Vec<_>>();
-        let mut spread = Spread::default();
+        let mut spread = PixelSpread::default();
         spread.add(0, &samples(7), true);
         let expected = 7.0 * 8.0 / 12.0 / 9.0;
         assert!((variances(&[&spread])[0] / expected - 1.0).abs() < 1e-12);
-        // A second pixel of the block, far brighter: means are of the block, deviations of the pixel.
+        // A second pixel of the block, far brighter: the mean is that of the block, deviations are
+        // from the mean of the pixel.
         let shifted: Vec<f64> = samples(5).iter().map(|value| value + 100.0).collect();
         spread.add(0, &shifted, true);
         let (variance, mean) = ((28.0 + 10.0) / 10.0, (7.0 * 3.0 + 5.0 * 102.0) / 12.0);
@@ -312,14 +320,15 @@ mod tests {
     fn every_block_counts_alike_however_bright() {
         // Two pixels of samples ±d around m have the relative variance 2 d² / m².
         let pair = |mean: f64, deviation: f64| [mean - deviation, mean + deviation];
-        let (mut one, mut four) = (Spread::default(), Spread::default());
+        let (mut one, mut four) = (PixelSpread::default(), PixelSpread::default());
         for (block, brightness) in [1.0, 1e4, 1e-4].into_iter().enumerate() {
             one.add(block, &pair(brightness, 0.4 * brightness), true);
             four.add(block, &pair(brightness, 0.2 * brightness), true);
         }
         let both = variances(&[&one, &four]);
         assert!((both[0] - 0.32).abs() < 1e-12 && (both[1] - 0.08).abs() < 1e-12, "{both:?}");
-        // One firefly in one of them multiplies the result by the cube root of what it does there.
+        // A firefly in one of three blocks multiplies the result by the cube root of its factor
+        // there.
         four.add(0, &pair(0.0, 0.0), true);
         let lone = variances(&[&four])[0];
         four.blocks[0].squared_deviations *= 1000.0;
@@ -328,12 +337,12 @@ mod tests {
 
     #[test]
     fn blocks_that_say_nothing_are_left_out() {
-        let (mut one, mut four) = (Spread::default(), Spread::default());
+        let (mut one, mut four) = (PixelSpread::default(), PixelSpread::default());
         assert_eq!(relative_variances(&[&one, &four]), None);
-        // The environment itself: samples differ, but not by the choice of directions.
+        // The environment itself: samples differ, but no choice of directions changes them.
         one.add(0, &[1.0, 2.0], false);
         four.add(0, &[1.0, 2.0], false);
-        // Dark, or the same in every sample, for one of them.
+        // A block that is dark, or the same in every sample, for one of the two.
         one.add(1, &[0.0, 0.0], true);
         four.add(1, &[0.0, 1.0], true);
         one.add(2, &[1.0, f64::NAN], true);

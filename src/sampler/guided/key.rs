@@ -1,10 +1,10 @@
-//! Names of cells of the scene: where, how large, facing where, in 32 bits.
+//! Keys of cells of the scene: place, size and orientation in 32 bits.
 //!
-//! A cell is a cube of an infinite grid whose edge follows from the distance to the camera, together
-//! with the face of the cube that the surface's normal points at most. The grid coordinates are kept
-//! modulo 256: two places share a name only if they are at least 256 edges apart at the same edge,
-//! which costs precision and no correctness. The grids are nested: a cell consists of eight of half its
-//! edge. Twin of `guide_key` in `glsl/include/guide.glsl`.
+//! A cell is a cube of an infinite grid, with an edge that follows from the distance to the camera,
+//! together with the face of the cube that is nearest to the normal of the surface. Keys hold the
+//! grid coordinates modulo 256: two places share a key only if they are at least 256 edges apart at
+//! the same edge, which costs precision but no correctness. The grids are nested: a cell consists
+//! of eight of half its edge. Twin of `guide_key` in `glsl/include/guide.glsl`.
 
 use glam::Vec3;
 
@@ -16,18 +16,18 @@ pub fn face_normal(face: usize) -> Vec3 {
     [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z][face % FACE_COUNT]
 }
 
-/// Name of a cell: x, y, z in 8 bits each, the level of size in 4, the face in 3; the highest bit
-/// marks coarse cells, four times as long, which belong to 64 fine ones.
+/// Key of a cell: x, y, z in 8 bits each, the level of size in 4, the face in 3. The highest bit
+/// marks coarse cells, four times as long, which hold 64 fine ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct CellKey(pub u32);
 
 impl CellKey {
-    /// No cell.
+    /// Key of no cell.
     pub const NONE: Self = Self(u32::MAX);
 
     const COARSE: u32 = 1 << 31;
 
-    /// The fine cell at grid coordinates `position` (taken modulo 256).
+    /// Key of the fine cell at grid coordinates `position`, taken modulo 256.
     ///
     /// # Panics
     /// If the level is above 15 or the face above 5: a mistake of the caller.
@@ -37,7 +37,7 @@ impl CellKey {
         Self(x | y << 8 | z << 16 | level << 24 | (face as u32) << 28)
     }
 
-    /// The coarse cell that a fine one belongs to; a coarse one is its own.
+    /// Key of the coarse cell that holds a fine one; a coarse cell is its own.
     pub fn coarse(self) -> Self {
         if self.is_coarse() {
             return self;
@@ -45,29 +45,29 @@ impl CellKey {
         Self((self.0 >> 2 & 0x003f_3f3f) | (self.0 & 0x7f00_0000) | Self::COARSE)
     }
 
-    /// What the keys of the parts of a fine cell share, cells of half its edge; `None` where there are
-    /// no smaller ones. Cells that are 128 edges apart have parts of the same names.
-    pub fn parts(self) -> Option<u32> {
+    /// [`Self::sibling_group`] of the children of a fine cell, which have half its edge; `None`
+    /// where there are none. Cells that are 128 edges apart have children of the same keys.
+    pub fn child_group(self) -> Option<u32> {
         let level = self.0 >> 24 & 15;
         (!self.is_coarse() && level > 0).then(|| (self.0 & 0x707f_7f7f) | (level - 1) << 24)
     }
 
-    /// [`Self::parts`] of the cell that a fine one is a part of.
-    pub fn siblings(self) -> u32 {
+    /// Number that the eight children of a cell have in common, from the key of any of them.
+    pub fn sibling_group(self) -> u32 {
         (self.0 >> 1 & 0x007f_7f7f) | (self.0 & 0x7f00_0000)
     }
 
-    /// Whether this is a coarse cell.
+    /// True if this is a coarse cell.
     pub fn is_coarse(self) -> bool {
         self.0 & Self::COARSE != 0
     }
 
-    /// The face that surfaces in the cell point at.
+    /// Face that surfaces in the cell point at.
     pub fn face(self) -> usize {
         (self.0 >> 28 & 7) as usize
     }
 
-    /// Whether a word read back from the device names a fine cell at all.
+    /// True if a word read back from the device is the key of a fine cell.
     pub fn is_valid_fine(self) -> bool {
         !self.is_coarse() && self.face() < FACE_COUNT
     }
@@ -100,17 +100,20 @@ mod tests {
     }
 
     #[test]
-    fn parts_halve_the_edge() {
-        let whole = CellKey::fine([7, -1, 300], 9, 5);
-        for part in 0..8 {
-            let offset = |position: i32, axis: i32| 2 * position + (part >> axis & 1);
-            let part = CellKey::fine([offset(7, 0), offset(-1, 1), offset(300, 2)], 8, 5);
-            assert_eq!(Some(part.siblings()), whole.parts());
+    fn children_have_half_the_edge() {
+        let parent = CellKey::fine([7, -1, 300], 9, 5);
+        for child in 0..8 {
+            let offset = |position: i32, axis: i32| 2 * position + (child >> axis & 1);
+            let child = CellKey::fine([offset(7, 0), offset(-1, 1), offset(300, 2)], 8, 5);
+            assert_eq!(Some(child.sibling_group()), parent.child_group());
         }
         for other in [([8, -1, 300], 9, 5), ([7, -1, 300], 8, 5), ([7, -1, 300], 9, 4)] {
-            assert_ne!(CellKey::fine(other.0, other.1, other.2).parts(), whole.parts());
+            assert_ne!(
+                CellKey::fine(other.0, other.1, other.2).child_group(),
+                parent.child_group()
+            );
         }
-        assert_eq!(CellKey::fine([7, 1, 3], 0, 2).parts(), None);
-        assert_eq!(whole.coarse().parts(), None);
+        assert_eq!(CellKey::fine([7, 1, 3], 0, 2).child_group(), None);
+        assert_eq!(parent.coarse().child_group(), None);
     }
 }

@@ -1,9 +1,7 @@
-//! What was learned, in a file: `--save-guide`, `--load-guide`, and beside a checkpoint.
+//! The guide in a file: `--save-guide`, `--load-guide`, and beside a checkpoint.
 //!
-//! One line of JSON, then 32-bit words in little-endian order: the rectangles that are the regions, the
-//! keys of the cells, which of them are refined, the [`Count`] of each cell and region, what visible rays say about the share of the
-//! BRDF, what passes counted of both since the last rebuild, the keys they missed, and where bounces teach,
-//! what they taught up to the last rebuild and since. The header has the SHA-256 of the words.
+//! A file is one line of JSON, then 32-bit words in little-endian order: the arrays of
+//! [`GuideState`] from `rectangles` on, in their order. The header holds the SHA-256 of the words.
 
 use std::{fs, io::Write, path::Path};
 
@@ -12,13 +10,13 @@ use sha2::{Digest, Sha256};
 
 use crate::sampler::guided::{
     arriving::{ARRIVAL_DIRECTIONS, ArrivalWords},
-    estimate::CountWords,
+    cost::GUIDED_CANDIDATES,
+    counts::CountWords,
     share::SHARE_WORDS,
 };
 use crate::{
     error::{Error, Result},
     files::write_atomically,
-    sampler::GUIDED_CANDIDATES,
     shader::constants::GUIDE_COUNT_WORDS,
 };
 
@@ -26,56 +24,56 @@ const COUNT_WORDS: usize = GUIDE_COUNT_WORDS as usize;
 const FORMAT: &str = "fenestra-guide";
 const VERSION: u32 = 8;
 
-/// Everything a renderer needs to go on learning where another stopped.
+/// State that lets a renderer go on learning where another stopped.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GuideState {
-    /// What it was learned in.
+    /// Scene that the guide was learned in.
     pub origin: Origin,
-    /// Samples per pixel of the film when this was taken; 0 where it belongs to no film.
+    /// Samples per pixel of the film when the state was taken; 0 where it belongs to no film.
     pub samples: u32,
     /// Samples per pixel at the last rebuild.
     pub rebuilt_at: u32,
-    /// Whether the scene was found open, so that nothing more is learned.
+    /// True if the scene was found open, so that the renderer learns nothing more.
     pub is_open: bool,
-    /// Candidates per shadow ray, one of [`GUIDED_CANDIDATES`]; absent where that is not decided.
+    /// Candidates per shadow ray, one of [`GUIDED_CANDIDATES`]; `None` where not decided.
     pub candidates: Option<u32>,
-    /// First column and row, columns, rows and parent of every region.
+    /// First column and row, number of columns and rows, and parent of every region.
     pub rectangles: Vec<[u32; 5]>,
     /// Key of every cell, the faces first.
     pub keys: Vec<u32>,
-    /// Indices of the cells whose parts may be cells.
+    /// Indices of the cells whose children may be cells.
     pub refined: Vec<u32>,
-    /// Per cell and region up to the last rebuild: trials and hits, in sixteenths of rays, and the sum of
-    /// the responses of the hits.
+    /// Counts per cell and region up to the last rebuild: trials and hits, in sixteenths of rays,
+    /// and the sum of the responses of the hits.
     pub counts: Vec<CountWords>,
-    /// Visible rays and their c p_B / q per cell and octave of light up to then, see
+    /// Visible rays and their c p_B / q per cell and octave of light up to the last rebuild, see
     /// [`ShareEvidence`](super::ShareEvidence).
     pub shares: Vec<u32>,
-    /// The same since then, trials and hits in rays; empty where there are none.
+    /// Counts since the last rebuild, trials and hits in rays; empty where there are none.
     pub pending: Vec<CountWords>,
-    /// Of the shares since then; empty where there are none.
+    /// Shares since the last rebuild; empty where there are none.
     pub pending_shares: Vec<u32>,
-    /// Keys that were missed since then.
-    pub wanted: Vec<u32>,
-    /// Bounce rays and the bits of the sum of their light per cell and direction up to the last rebuild;
+    /// Keys that passes looked up and did not find since the last rebuild.
+    pub missing: Vec<u32>,
+    /// Bounce rays and light per cell and direction up to the last rebuild, as bits of floats;
     /// empty where bounces do not teach.
     pub arrivals: Vec<ArrivalWords>,
-    /// The same since then, rays and units of light; empty where there are none.
+    /// Bounce rays and units of light since the last rebuild; empty where there are none.
     pub pending_arrivals: Vec<ArrivalWords>,
 }
 
-/// The scene that a guide was learned in, as far as it matters.
+/// Properties of the scene that a guide was learned in.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Origin {
-    /// SHA-256 of the environment map: regions mean nothing under another.
+    /// SHA-256 of the environment map: regions are meaningless under another.
     pub environment: String,
-    /// SHA-256 of the geometry: under another, what was learned is worth less.
+    /// SHA-256 of the geometry: counts are worth less under another.
     pub geometry: String,
     /// Number of regions.
     pub regions: u32,
     /// Corner of the grids, metres.
     pub grid_origin: [f32; 3],
-    /// Largest edge of a cell, metres; the others are powers of two below it.
+    /// Largest edge of a cell, metres; all others are this over a power of two.
     pub largest_edge: f32,
 }
 
@@ -93,7 +91,8 @@ struct Header {
     refined: usize,
     pending: usize,
     pending_shares: usize,
-    wanted: usize,
+    #[serde(rename = "wanted")]
+    missing: usize,
     arrivals: usize,
     pending_arrivals: usize,
 }
@@ -103,10 +102,10 @@ fn checksum(words: &[u8]) -> String {
 }
 
 impl GuideState {
-    /// Writes the file.
+    /// Writes the state to a file.
     ///
     /// # Errors
-    /// [`Error::Io`] where it cannot be written.
+    /// [`Error::Io`] if the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         let mut words: Vec<u8> = Vec::new();
         let all = self
@@ -119,7 +118,7 @@ impl GuideState {
             .chain(&self.shares)
             .chain(self.pending.as_flattened())
             .chain(&self.pending_shares)
-            .chain(&self.wanted)
+            .chain(&self.missing)
             .chain(self.arrivals.as_flattened())
             .chain(self.pending_arrivals.as_flattened());
         words.extend(all.flat_map(|word| word.to_le_bytes()));
@@ -136,7 +135,7 @@ impl GuideState {
             refined: self.refined.len(),
             pending: self.pending.len(),
             pending_shares: self.pending_shares.len(),
-            wanted: self.wanted.len(),
+            missing: self.missing.len(),
             arrivals: self.arrivals.len(),
             pending_arrivals: self.pending_arrivals.len(),
         };
@@ -149,10 +148,10 @@ impl GuideState {
         })
     }
 
-    /// Reads a file.
+    /// Reads a state from a file.
     ///
     /// # Errors
-    /// [`Error::Io`] where it cannot be read; [`Error::Format`] where it is no guide, of another
+    /// [`Error::Io`] if the file cannot be read; [`Error::Format`] if it is not a guide, of another
     /// version, or damaged.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = fs::read(path).map_err(|source| Error::io(path, "read", source))?;
@@ -193,7 +192,7 @@ impl GuideState {
                 .checked_add(header.pending_shares)?
                 .checked_add(header.cells)?
                 .checked_add(header.refined)?
-                .checked_add(header.wanted)?
+                .checked_add(header.missing)?
                 .checked_add(arrivals)?
                 .checked_mul(4)
         });
@@ -234,7 +233,7 @@ impl GuideState {
             shares: take(shares),
             pending: counted(take(COUNT_WORDS * header.pending)),
             pending_shares: take(header.pending_shares),
-            wanted: take(header.wanted),
+            missing: take(header.missing),
             arrivals: pairs(take(2 * header.arrivals)),
             pending_arrivals: pairs(take(2 * header.pending_arrivals)),
         })
@@ -269,14 +268,14 @@ mod tests {
             shares: (0..3 * SHARE_WORDS as u32).collect(),
             pending: vec![[4, 4, 5]],
             pending_shares: vec![1, 2, 3],
-            wanted: vec![0x1234_5678],
+            missing: vec![0x1234_5678],
             arrivals: vec![[3.0_f32.to_bits(), 0.25_f32.to_bits()], [0, 0]],
             pending_arrivals: vec![[5, 77]],
         }
     }
 
     #[test]
-    fn a_file_brings_back_what_was_written() {
+    fn a_state_survives_a_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("new/room.guide");
         state().write(&path).unwrap();
@@ -284,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn files_that_are_damaged_are_refused() {
+    fn damaged_files_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("room.guide");
         let message = |bytes: &[u8]| {
