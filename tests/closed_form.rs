@@ -10,7 +10,10 @@ use fenestra::{
     scene::Scene,
 };
 use glam::{DVec3, Vec3};
-use support::scenes::{self, diffuse};
+use support::{
+    scenes::{self, diffuse},
+    statistics::{Estimate, estimates},
+};
 
 fn render(scene: &Scene, settings: Settings, samples: u32) -> Sums {
     let mut renderer = Renderer::new(support::device(), scene, settings).unwrap();
@@ -28,18 +31,17 @@ fn image_mean(sums: &Sums) -> DVec3 {
 /// Mean over `seeds` independent renders and its standard error, per channel.
 fn mean_and_error(scene: &Scene, settings: &Settings, samples: u32, seeds: u32) -> [DVec3; 2] {
     let mut renderer = Renderer::new(support::device(), scene, settings.clone()).unwrap();
-    let means: Vec<DVec3> = (0..seeds)
+    let means: Vec<Vec<f64>> = (0..seeds)
         .map(|seed| {
             renderer.restart(seed).unwrap();
             renderer.render_pass(samples).unwrap();
-            image_mean(&renderer.sums().unwrap())
+            image_mean(&renderer.sums().unwrap()).to_array().to_vec()
         })
         .collect();
     support::assert_silent();
-    let mean = means.iter().sum::<DVec3>() / f64::from(seeds);
-    let variance = means.iter().map(|m| (m - mean) * (m - mean)).sum::<DVec3>()
-        / f64::from(seeds * (seeds - 1));
-    [mean, DVec3::new(variance.x.sqrt(), variance.y.sqrt(), variance.z.sqrt())]
+    let channels = estimates(&means);
+    [|channel: &Estimate| channel.mean, Estimate::error]
+        .map(|part| DVec3::from_array([0, 1, 2].map(|index| part(&channels[index]))))
 }
 
 #[test]

@@ -17,16 +17,10 @@ use fenestra::{
 };
 use io::Write;
 
-/// Uniform numbers in 0…1 from a linear congruential generator.
-struct Numbers(u64);
+#[path = "support/random.rs"]
+mod random;
 
-impl Numbers {
-    fn next(&mut self) -> f32 {
-        self.0 =
-            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f32 / (1_u64 << 24) as f32
-    }
-}
+use random::Random;
 
 fn names_in(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(folder)
@@ -70,7 +64,7 @@ fn add_two_float(sum: &mut f32, rest: &mut f32, value: f32) {
 }
 
 /// Accumulates as the device does: two-float sums of radiance in 0…1 times `scale`.
-fn accumulate(numbers: &mut Numbers, sample_count: u32, scale: f32) -> (Sums, Vec<Vec<f64>>) {
+fn accumulate(numbers: &mut Random, sample_count: u32, scale: f32) -> (Sums, Vec<Vec<f64>>) {
     let mut sums = Sums::new([3, 1], 4, 2, [10, 6]);
     let mut drawn = vec![Vec::new(); 8];
     sums.albedo = vec![[0.0; 3]; 8];
@@ -83,7 +77,7 @@ fn accumulate(numbers: &mut Numbers, sample_count: u32, scale: f32) -> (Sums, Ve
     for _ in 0..sample_count {
         for (pixel, drawn) in drawn.iter_mut().enumerate() {
             for channel in 0..3 {
-                let value = scale * numbers.next();
+                let value = scale * numbers.uniform_f32();
                 if channel == 0 {
                     drawn.push(f64::from(value));
                 }
@@ -91,8 +85,8 @@ fn accumulate(numbers: &mut Numbers, sample_count: u32, scale: f32) -> (Sums, Ve
                 add_two_float(&mut sum[channel], &mut rest[channel], value);
                 sums.squares[pixel][channel] += value * value;
                 sums.albedo[pixel][channel] += 0.5;
-                sums.normal[pixel][channel] -= numbers.next();
-                sums.position[pixel][channel] += 100.0 * numbers.next();
+                sums.normal[pixel][channel] -= numbers.uniform_f32();
+                sums.position[pixel][channel] += 100.0 * numbers.uniform_f32();
                 sums.guide_cell[pixel][channel] += 0.25;
             }
             sums.guide_level[pixel][2] += 1.0;
@@ -183,7 +177,7 @@ fn two_float_sums_stay_exact_where_floats_stagnate() {
 #[test]
 fn mean_and_variance_agree_with_64_bit_sums() {
     for (sample_count, scale) in [(2, 1.0), (64, 1e-3), (1000, 1e4), (5000, 1.0)] {
-        let (sums, drawn) = accumulate(&mut Numbers(7), sample_count, scale);
+        let (sums, drawn) = accumulate(&mut Random(7), sample_count, scale);
         for (pixel, values) in drawn.iter().enumerate() {
             let n = f64::from(sample_count);
             let mean = values.iter().sum::<f64>() / n;
@@ -215,14 +209,14 @@ fn relative_error_of_a_picture_worked_by_hand() {
 
 #[test]
 fn relative_error_falls_as_one_over_root_n() {
-    let error = |count| accumulate(&mut Numbers(3), count, 1.0).0.relative_standard_error();
+    let error = |count| accumulate(&mut Random(3), count, 1.0).0.relative_standard_error();
     let ratio = error(100) / error(6400);
     assert!((ratio / 8.0 - 1.0).abs() < 0.1, "{ratio}");
 }
 
 #[test]
 fn image_layers_have_pbrts_names_and_the_means() {
-    let (sums, _) = accumulate(&mut Numbers(1), 10, 1.0);
+    let (sums, _) = accumulate(&mut Random(1), 10, 1.0);
     let image = sums.to_image(Aov::value_variants());
     let names: Vec<&str> = image.channels.keys().map(String::as_str).collect();
     let expected = "Albedo.B Albedo.G Albedo.R B CacheEntries.Y G GuideCell.B GuideCell.G \
@@ -280,7 +274,7 @@ fn metadata_survives_the_attributes() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("out.exr");
     let written = metadata(&[range(u32::MAX, 0, 64), range(9, 5, 6)]);
-    let mut image = accumulate(&mut Numbers(1), 2, 1.0).0.to_image(&[]);
+    let mut image = accumulate(&mut Random(1), 2, 1.0).0.to_image(&[]);
     written.store(&mut image);
     image.write_exr(&path).unwrap();
     let image = Image::read_exr(&path).unwrap();
@@ -317,7 +311,7 @@ fn checkpoints_come_back_to_the_bit() {
     let folder = tempfile::tempdir().unwrap();
     let path = checkpoint_path(&folder.path().join("room.exr"));
     assert!(path.ends_with("room.checkpoint.exr"));
-    let (mut sums, _) = accumulate(&mut Numbers(5), 1000, 1e3);
+    let (mut sums, _) = accumulate(&mut Random(5), 1000, 1e3);
     sums.sum[0] = [-0.0, f32::MIN_POSITIVE / 8.0, f32::MAX];
     sums.visible[0] = [u32::MAX - 1, u32::MAX];
     sums.cache_entries[1] = [u32::MAX - 3, 16_777_217];
@@ -338,7 +332,7 @@ fn checkpoints_come_back_to_the_bit() {
 fn a_checkpoint_without_its_sums_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("room.checkpoint.exr");
-    let (sums, _) = accumulate(&mut Numbers(5), 4, 1.0);
+    let (sums, _) = accumulate(&mut Random(5), 4, 1.0);
     let checkpoint = Checkpoint { sums, metadata: metadata(&[range(4, 0, 4)]) };
     checkpoint.write(&path).unwrap();
     let image = Image::read_exr(&path).unwrap();
@@ -363,7 +357,7 @@ fn a_checkpoint_without_its_sums_is_refused() {
 
 #[test]
 fn a_checkpoint_of_another_render_is_refused_with_every_difference() {
-    let (sums, _) = accumulate(&mut Numbers(5), 4, 1.0);
+    let (sums, _) = accumulate(&mut Random(5), 4, 1.0);
     let window = Sums::new(sums.origin, 4, 2, sums.film_size);
     let checkpoint = Checkpoint { sums, metadata: metadata(&[range(4, 8, 4)]) };
     let path = Path::new("room.checkpoint.exr");
@@ -417,8 +411,8 @@ fn whole_and_parts() -> (Checkpoint, Checkpoint, Checkpoint) {
         let count = sums.sample_count;
         Checkpoint { sums, metadata: metadata(&[range(1, first, count)]) }
     };
-    let whole = accumulate(&mut Numbers(11), 30, 10.0).0;
-    let mut numbers = Numbers(11);
+    let whole = accumulate(&mut Random(11), 30, 10.0).0;
+    let mut numbers = Random(11);
     let first = accumulate(&mut numbers, 10, 10.0).0;
     let second = accumulate(&mut numbers, 20, 10.0).0;
     (checkpoint(whole, 0), checkpoint(first, 0), checkpoint(second, 10))

@@ -8,7 +8,6 @@
 mod support;
 
 use fenestra::{
-    film::Sums,
     renderer::{Renderer, Settings},
     sampler::{
         Parameters, Sampler, Weights,
@@ -18,91 +17,32 @@ use fenestra::{
     shader::constants::{GUIDE_COUNT_WORDS, GUIDE_RESPONSE_UNITS},
 };
 use glam::Vec3;
-use support::scenes;
+use support::{
+    replicates::{LIMIT, REPLICATES, replicates, rows},
+    scenes,
+    statistics::{Comparison, estimates, z_of_mean},
+};
 
-const REPLICATES: u32 = 8;
-const BLOCK: u32 = 8;
-const LIMIT: f64 = 7.5;
+const FIRST_SEED: u32 = 7000;
 
 fn guided(candidates: u32) -> Settings {
     let parameters = Parameters { candidates: Some(candidates), ..Parameters::default() };
     Settings { sampler: Sampler::Guided, parameters, ..Settings::default() }
 }
 
-/// Means per block and channel of one film.
-fn block_means(sums: &Sums) -> Vec<f64> {
-    let blocks_per_row = sums.width / BLOCK;
-    let mut means = vec![0.0; 3 * (blocks_per_row * (sums.height / BLOCK)) as usize];
-    for pixel in 0..sums.pixel_count() {
-        let (x, y) = (pixel as u32 % sums.width, pixel as u32 / sums.width);
-        let block = (y / BLOCK * blocks_per_row + x / BLOCK) as usize;
-        for (channel, value) in sums.mean(pixel).into_iter().enumerate() {
-            means[3 * block + channel] += value / f64::from(BLOCK * BLOCK);
-        }
-    }
-    means
-}
-
-/// Mean and squared standard error of every block mean over the replicates.
-fn replicates(scene: &Scene, settings: &Settings, samples: u32) -> Vec<(f64, f64)> {
-    replicates_after(scene, settings, samples, |_| {})
-}
-
-/// As [`replicates`], where something is done to the renderer before each.
-fn replicates_after(
-    scene: &Scene,
-    settings: &Settings,
-    samples: u32,
-    prepare: impl Fn(&mut Renderer),
-) -> Vec<(f64, f64)> {
-    let mut renderer = Renderer::new(support::device(), scene, settings.clone()).unwrap();
-    let rows: Vec<Vec<f64>> = (0..REPLICATES)
-        .map(|replicate| {
-            renderer.restart(7000 + replicate).unwrap();
-            prepare(&mut renderer);
-            renderer.render_pass(samples).unwrap();
-            assert_eq!(renderer.totals().dropped_samples, 0);
-            block_means(&renderer.sums().unwrap())
-        })
-        .collect();
-    support::assert_silent();
-    let count = f64::from(REPLICATES);
-    (0..rows[0].len())
-        .map(|index| {
-            let mean = rows.iter().map(|row| row[index]).sum::<f64>() / count;
-            let squares = rows.iter().map(|row| (row[index] - mean).powi(2)).sum::<f64>();
-            (mean, squares / (count * (count - 1.0)))
-        })
-        .collect()
-}
-
-fn largest_deviation(a: &[(f64, f64)], b: &[(f64, f64)]) -> f64 {
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| (a.0 - b.0).abs() / (a.1 + b.1).sqrt().max(1e-12))
-        .fold(0.0, f64::max)
-}
-
 /// Compares modes with `cosine` at the same depth.
 fn agree(scene: &Scene, depth: u32, samples: u32, modes: &[(&str, Settings)]) {
     let cosine = Settings { sampler: Sampler::Cosine, depth, ..Settings::default() };
-    let reference = replicates(scene, &cosine, 8 * samples);
+    let reference = replicates(scene, &cosine, FIRST_SEED, 8 * samples);
     for (name, settings) in modes {
-        let values = replicates(scene, &Settings { depth, ..settings.clone() }, samples);
-        let deviation = largest_deviation(&values, &reference);
-        let (mean, expected) = (
-            values.iter().map(|value| value.0).sum::<f64>(),
-            reference.iter().map(|value| value.0).sum::<f64>(),
-        );
-        eprintln!(
-            "{} {name}: largest |t| {deviation:.2}, ratio {:.4}",
-            scene.name,
-            mean / expected
-        );
-        assert!(deviation < LIMIT, "{} {name}: |t| = {deviation}", scene.name);
-        let wrong: Vec<_> = values.iter().map(|(mean, v)| (1.1 * mean, 1.21 * v)).collect();
+        let settings = Settings { depth, ..settings.clone() };
+        let values = replicates(scene, &settings, FIRST_SEED, samples);
+        let Comparison { largest_t, ratio, largest_t_with_bias } =
+            Comparison::new(&values, &reference);
+        eprintln!("{} {name}: largest |t| {largest_t:.2}, ratio {ratio:.4}", scene.name);
+        assert!(largest_t < LIMIT, "{} {name}: |t| = {largest_t}", scene.name);
         assert!(
-            largest_deviation(&wrong, &reference) > LIMIT || (mean / expected - 1.0).abs() < 0.02,
+            largest_t_with_bias > LIMIT || (ratio - 1.0).abs() < 0.02,
             "{} {name}: too noisy to judge",
             scene.name
         );
@@ -165,8 +105,7 @@ fn places_that_share_a_key_are_unbiased() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
     let mis = Settings { shadow_rays: 16, ..Settings::default() };
-    let reference = replicates(&scene, &mis, 128);
-    let expected: f64 = reference.iter().map(|value| value.0).sum();
+    let reference = replicates(&scene, &mis, FIRST_SEED, 128);
     let mut teacher = Renderer::new(support::device(), &scene, guided(1)).unwrap();
     teacher.render_pass(4).unwrap();
     let taught = teacher.guide_state().unwrap().unwrap();
@@ -190,11 +129,11 @@ fn places_that_share_a_key_are_unbiased() {
         let prepare = |renderer: &mut Renderer| {
             renderer.restore_guide(&state).unwrap();
         };
-        let values = replicates_after(&scene, &settings, samples, prepare);
-        let deviation = largest_deviation(&values, &reference);
-        let ratio = values.iter().map(|value| value.0).sum::<f64>() / expected;
-        eprintln!("{name}, {candidates}: largest |t| {deviation:.2}, ratio {ratio:.4}");
-        assert!(deviation < LIMIT, "{name}, {candidates} candidates: |t| = {deviation}");
+        let seeds = FIRST_SEED..FIRST_SEED + REPLICATES;
+        let values = estimates(&rows(&scene, &settings, seeds, samples, prepare));
+        let Comparison { largest_t, ratio, .. } = Comparison::new(&values, &reference);
+        eprintln!("{name}, {candidates}: largest |t| {largest_t:.2}, ratio {ratio:.4}");
+        assert!(largest_t < LIMIT, "{name}, {candidates} candidates: |t| = {largest_t}");
         assert!((ratio - 1.0).abs() < 0.05, "{name}, {candidates} candidates: {ratio}");
 
         // That keys are shared, or not, as the name says.
@@ -224,16 +163,7 @@ fn the_first_pass_after_training_is_unbiased() {
     let _alone = support::alone();
     const SEEDS: u32 = 48;
     let scene = scenes::mixed_room();
-    let rows = |settings: Settings| -> Vec<Vec<f64>> {
-        let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
-        (0..SEEDS)
-            .map(|seed| {
-                renderer.restart(seed).unwrap();
-                renderer.render_pass(1).unwrap();
-                block_means(&renderer.sums().unwrap())
-            })
-            .collect()
-    };
+    let rows = |settings: Settings| rows(&scene, &settings, 0..SEEDS, 1, |_| {});
     let reference = rows(Settings { shadow_rays: 256, ..Settings::default() });
     let values = rows(guided(4));
     let mean = |rows: &[Vec<f64>], index: usize| {
@@ -250,7 +180,7 @@ fn the_first_pass_after_training_is_unbiased() {
         compared += 1;
         let differences: Vec<f64> =
             values.iter().zip(&reference).map(|(a, b)| a[index] - b[index]).collect();
-        let t = support::statistics::z_of_mean(&differences, 0.0);
+        let t = z_of_mean(&differences, 0.0);
         assert!(t.abs() < 6.0, "value {index} of {}: t = {t}", mean(&reference, index));
     }
     assert!(compared > count / 2, "{compared} of {count} values compared");

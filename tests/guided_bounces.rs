@@ -10,7 +10,6 @@ mod support;
 
 use fenestra::{
     brdf::{self, Material, MaterialTables, material::MaterialKind},
-    film::Sums,
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
     math::{
         frame::frame_from_normal,
@@ -29,7 +28,10 @@ use fenestra::{
     },
 };
 use glam::{Vec3, vec3};
-use support::{scenes, statistics};
+use support::{
+    replicates, scenes,
+    statistics::{self, estimates, largest_t},
+};
 
 const ARRIVING_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/arriving.spv"));
 
@@ -280,41 +282,26 @@ fn bounces_bring_what_the_brdf_reflects() {
     }
 }
 
-fn block_means(sums: &Sums) -> Vec<f64> {
-    let blocks_per_row = sums.width / 8;
-    let mut means = vec![0.0; (blocks_per_row * (sums.height / 8)) as usize];
-    for pixel in 0..sums.pixel_count() {
-        let (x, y) = (pixel as u32 % sums.width, pixel as u32 / sums.width);
-        let block = (y / 8 * blocks_per_row + x / 8) as usize;
-        means[block] += sums.mean(pixel).iter().sum::<f64>() / 192.0;
-    }
-    means
-}
-
 /// Images agree with those of unguided bounces where the cells believe anything at all, from nothing
 /// learned on, and with as many candidates as there may be.
 #[test]
 fn images_are_those_of_unguided_bounces() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
+    // Means over blocks and channels.
     let replicates = |candidates: u32, beliefs: Option<&GuideState>, samples: u32| {
         let mut settings = guided(4);
         settings.parameters.bounce_candidates = candidates;
-        let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
-        let rows: Vec<Vec<f64>> = (0..16)
-            .map(|seed| {
-                renderer.restart(500 + seed).unwrap();
-                if let Some(beliefs) = beliefs {
-                    renderer.restore_guide(beliefs).unwrap();
-                }
-                renderer.render_pass(samples).unwrap();
-                block_means(&renderer.sums().unwrap())
-            })
-            .collect();
-        support::assert_silent();
-        (0..rows[0].len()).map(|block| rows.iter().map(|row| row[block]).collect()).collect()
+        let rows = replicates::rows(&scene, &settings, 500..516, samples, |renderer| {
+            if let Some(beliefs) = beliefs {
+                renderer.restore_guide(beliefs).unwrap();
+            }
+        });
+        let grey =
+            |row: &Vec<f64>| row.chunks(3).map(|rgb| rgb.iter().sum::<f64>() / 3.0).collect();
+        estimates(&rows.iter().map(grey).collect::<Vec<_>>())
     };
-    let reference: Vec<Vec<f64>> = replicates(1, None, 64);
+    let reference = replicates(1, None, 64);
     let mut taught = Renderer::new(support::device(), &scene, guided(4)).unwrap();
     taught.render_pass(4).unwrap();
     let mut beliefs = taught.guide_state().unwrap().unwrap();
@@ -325,18 +312,7 @@ fn images_are_those_of_unguided_bounces() {
     for (name, candidates, beliefs) in
         [("4", 4, None), ("16", 16, None), ("4, misled", 4, Some(&beliefs))]
     {
-        let values: Vec<Vec<f64>> = replicates(candidates, beliefs, 32);
-        let mut worst = 0.0_f64;
-        for (values, reference) in values.iter().zip(&reference) {
-            let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-            let variance = |values: &[f64]| {
-                let mean = mean(values);
-                let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-                squares / (values.len() * (values.len() - 1)) as f64
-            };
-            let error = (variance(values) + variance(reference)).sqrt();
-            worst = worst.max((mean(values) - mean(reference)).abs() / error);
-        }
+        let worst = largest_t(&replicates(candidates, beliefs, 32), &reference);
         eprintln!("{name}: |t| {worst:.2}");
         assert!(worst < 6.0, "{name}: |t| = {worst}");
     }

@@ -14,11 +14,11 @@ use fenestra::{
     scene::Scene,
 };
 use glam::Vec3;
-use support::scenes;
-
-const REPLICATES: u32 = 8;
-const BLOCK: u32 = 8;
-const LIMIT: f64 = 7.5;
+use support::{
+    replicates::{self, LIMIT},
+    scenes,
+    statistics::{Comparison, Estimate},
+};
 
 /// Parameters by `--set` assignments, on top of few lobes.
 fn parameters(assignments: &[&str]) -> Parameters {
@@ -45,61 +45,24 @@ fn render(scene: &Scene, settings: Settings, samples: u32) -> (Sums, Totals) {
     (sums, renderer.totals().clone())
 }
 
-/// Mean and squared standard error of every block mean over the replicates.
-fn replicates(scene: &Scene, settings: Settings, samples: u32) -> Vec<(f64, f64)> {
-    let first_seed = 500 * settings.sampler.tag();
-    let mut renderer = Renderer::new(support::device(), scene, settings).unwrap();
-    let rows: Vec<Vec<f64>> = (0..REPLICATES)
-        .map(|replicate| {
-            renderer.restart(first_seed + replicate).unwrap();
-            renderer.render_pass(samples).unwrap();
-            assert_eq!(renderer.totals().dropped_samples, 0);
-            let sums = renderer.sums().unwrap();
-            let blocks_per_row = sums.width / BLOCK;
-            let mut means = vec![0.0; 3 * (blocks_per_row * (sums.height / BLOCK)) as usize];
-            for pixel in 0..sums.pixel_count() {
-                let (x, y) = (pixel as u32 % sums.width, pixel as u32 / sums.width);
-                let block = (y / BLOCK * blocks_per_row + x / BLOCK) as usize;
-                for (channel, value) in sums.mean(pixel).into_iter().enumerate() {
-                    means[3 * block + channel] += value / f64::from(BLOCK * BLOCK);
-                }
-            }
-            means
-        })
-        .collect();
-    support::assert_silent();
-    let count = f64::from(REPLICATES);
-    (0..rows[0].len())
-        .map(|index| {
-            let mean = rows.iter().map(|row| row[index]).sum::<f64>() / count;
-            let squares = rows.iter().map(|row| (row[index] - mean).powi(2)).sum::<f64>();
-            (mean, squares / (count * (count - 1.0)))
-        })
-        .collect()
-}
-
-fn largest_deviation(a: &[(f64, f64)], b: &[(f64, f64)]) -> f64 {
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| (a.0 - b.0).abs() / (a.1 + b.1).sqrt().max(1e-12))
-        .fold(0.0, f64::max)
+/// Replicates whose seeds are the sampler's own.
+fn replicates(scene: &Scene, settings: &Settings, samples: u32) -> Vec<Estimate> {
+    replicates::replicates(scene, settings, 500 * settings.sampler.tag(), samples)
 }
 
 /// Compares the sampler with every list of assignments with `mis`.
 fn agree(scene: &Scene, samples: u32, cases: &[(Sampler, &[&str])]) {
     let mis = Settings { shadow_rays: 16, ..Settings::default() };
-    let reference = replicates(scene, mis, 4 * samples);
-    let expected: f64 = reference.iter().map(|value| value.0).sum();
+    let reference = replicates(scene, &mis, 4 * samples);
     for (sampler, assignments) in cases {
-        let values = replicates(scene, settings(*sampler, assignments), samples);
-        let deviation = largest_deviation(&values, &reference);
-        let ratio = values.iter().map(|value| value.0).sum::<f64>() / expected;
+        let values = replicates(scene, &settings(*sampler, assignments), samples);
+        let Comparison { largest_t, ratio, largest_t_with_bias } =
+            Comparison::new(&values, &reference);
         let name = format!("{} {} {assignments:?}", scene.name, sampler.name());
-        eprintln!("{name}: largest |t| {deviation:.2}, ratio {ratio:.4}");
-        assert!(deviation < LIMIT, "{name}: |t| = {deviation}");
-        let wrong: Vec<_> = values.iter().map(|(mean, v)| (1.1 * mean, 1.21 * v)).collect();
+        eprintln!("{name}: largest |t| {largest_t:.2}, ratio {ratio:.4}");
+        assert!(largest_t < LIMIT, "{name}: |t| = {largest_t}");
         assert!(
-            largest_deviation(&wrong, &reference) > LIMIT || (ratio - 1.0).abs() < 0.03,
+            largest_t_with_bias > LIMIT || (ratio - 1.0).abs() < 0.03,
             "{name}: too noisy to judge"
         );
     }

@@ -7,35 +7,15 @@ use std::f64::consts::PI;
 use fenestra::srbf::{self, Lobe, Mixture, special};
 use glam::{DVec3, Vec2, Vec3};
 
-/// Bandwidths of the tests, from wider than the sphere to a sixth of a degree.
-const BANDWIDTHS: [f32; 17] = [
-    1e-3, 3e-3, 0.01, 0.05, 0.099, 0.101, 0.3, 0.499, 0.501, 1.0, 3.0, 8.0, 30.0, 300.0, 3e3, 3e4,
-    1e5,
-];
+#[path = "support/lobes.rs"]
+mod lobes;
+#[path = "support/random.rs"]
+mod random;
+#[path = "support/statistics.rs"]
+mod statistics;
 
-/// Reproducible numbers in 0…1 (splitmix64).
-struct Random(u64);
-
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn direction(&mut self) -> Vec3 {
-        let z = 2.0 * self.uniform() - 1.0;
-        let azimuth = 2.0 * PI * self.uniform();
-        let radius = (1.0 - z * z).sqrt();
-        DVec3::new(radius * azimuth.cos(), radius * azimuth.sin(), z).as_vec3().normalize()
-    }
-
-    fn bandwidth(&mut self) -> f32 {
-        10_f64.powf(-3.0 + 8.0 * self.uniform()) as f32
-    }
-}
+use lobes::{BANDWIDTHS, random_bandwidth};
+use random::Random;
 
 /// Composite Gauss-Legendre quadrature, 5 points on each of `count` intervals.
 fn integrate(from: f64, to: f64, count: usize, function: impl Fn(f64) -> f64) -> f64 {
@@ -152,7 +132,7 @@ fn products_are_pointwise_products_and_convolutions_their_integrals() {
     let mut random = Random(1);
     for _ in 0..20_000 {
         let axis = random.direction();
-        let a = Lobe { axis, bandwidth: random.bandwidth(), amplitude: 2.0 };
+        let a = Lobe { axis, bandwidth: random_bandwidth(&mut random), amplitude: 2.0 };
         // Half of the partners are near by, where the product is not negligible.
         let near = srbf::kernel_sample(
             axis,
@@ -160,7 +140,7 @@ fn products_are_pointwise_products_and_convolutions_their_integrals() {
             Vec2::new(random.uniform() as f32, random.uniform() as f32),
         );
         let other = if random.uniform() < 0.5 { near.normalize() } else { random.direction() };
-        let b = Lobe { axis: other, bandwidth: random.bandwidth(), amplitude: 3.0 };
+        let b = Lobe { axis: other, bandwidth: random_bandwidth(&mut random), amplitude: 3.0 };
         let (bandwidth, log_amplitude, exact_axis) = exact_product(&a, &b);
         let product = srbf::lobe_product(&a, &b);
         let what = format!("{a:?} × {b:?}");
@@ -305,32 +285,23 @@ fn mixtures_sample_their_density() {
         let column = (turn * columns as f64) as usize;
         observed[row.min(rows - 1) * columns + column.min(columns - 1)] += 1.0;
     }
-    let (mut chi_squared, mut bins, mut rest) = (0.0, 0, (0.0, 0.0));
-    for (index, found) in observed.iter().enumerate() {
-        let z0 = -1.0 + 2.0 * (index / columns) as f64 / rows as f64;
-        let azimuth0 = (2.0 * (index % columns) as f64 / columns as f64 - 1.0) * PI;
-        let expected = count as f64
-            * integrate(z0, z0 + 2.0 / rows as f64, 12, |z| {
+    let expected: Vec<f64> = (0..observed.len())
+        .map(|index| {
+            let z0 = -1.0 + 2.0 * (index / columns) as f64 / rows as f64;
+            let azimuth0 = (2.0 * (index % columns) as f64 / columns as f64 - 1.0) * PI;
+            integrate(z0, z0 + 2.0 / rows as f64, 12, |z| {
                 integrate(azimuth0, azimuth0 + 2.0 * PI / columns as f64, 12, |azimuth| {
                     let radius = (1.0 - z * z).sqrt();
                     let at = DVec3::new(radius * azimuth.cos(), radius * azimuth.sin(), z);
                     f64::from(mixture.pdf(at.as_vec3()))
                 })
-            });
-        if expected < 5.0 {
-            rest = (rest.0 + found, rest.1 + expected);
-        } else {
-            chi_squared += (found - expected).powi(2) / expected;
-            bins += 1;
-        }
-    }
-    if rest.1 > 5.0 {
-        chi_squared += (rest.0 - rest.1).powi(2) / rest.1;
-        bins += 1;
-    }
-    // Normal approximation of the χ² distribution; 4.5 deviations are a chance of 3e-6.
-    let freedom = f64::from(bins - 1);
-    assert!(chi_squared < freedom + 4.5 * (2.0 * freedom).sqrt(), "{chi_squared} of {freedom}");
+            })
+        })
+        .collect();
+    let whole: f64 = expected.iter().sum();
+    assert!((whole - 1.0).abs() < 1e-3, "the density integrates to {whole}");
+    let p = statistics::chi_square_p_value(&observed, &expected);
+    assert!(p > 3e-6, "p = {p:e}");
     assert_eq!(Mixture::default().sample(Vec2::splat(0.5)), None);
     assert_eq!(Mixture::default().pdf(Vec3::Z), 0.0);
 }
@@ -342,7 +313,7 @@ fn mixture_products_are_pointwise_products() {
         lobes: (0..5)
             .map(|_| Lobe {
                 axis: random.direction(),
-                bandwidth: random.bandwidth().min(40.0),
+                bandwidth: random_bandwidth(&mut random).min(40.0),
                 amplitude: random.uniform() as f32,
             })
             .collect(),

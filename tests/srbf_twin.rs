@@ -2,43 +2,18 @@
 
 #![expect(clippy::expect_used, reason = "tests may panic")]
 
-use std::f64::consts::PI;
-
 use bytemuck::{Pod, Zeroable};
 use fenestra::srbf::{self, Lobe, special};
-use glam::{DVec3, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
+#[path = "support/lobes.rs"]
+mod lobes;
+#[path = "support/random.rs"]
+mod random;
 mod support;
 
-/// Bandwidths of the tests, from wider than the sphere to a sixth of a degree.
-const BANDWIDTHS: [f32; 17] = [
-    1e-3, 3e-3, 0.01, 0.05, 0.099, 0.101, 0.3, 0.499, 0.501, 1.0, 3.0, 8.0, 30.0, 300.0, 3e3, 3e4,
-    1e5,
-];
-
-/// Reproducible numbers in 0…1 (splitmix64).
-struct Random(u64);
-
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn direction(&mut self) -> Vec3 {
-        let z = 2.0 * self.uniform() - 1.0;
-        let azimuth = 2.0 * PI * self.uniform();
-        let radius = (1.0 - z * z).sqrt();
-        DVec3::new(radius * azimuth.cos(), radius * azimuth.sin(), z).as_vec3().normalize()
-    }
-
-    fn bandwidth(&mut self) -> f32 {
-        10_f64.powf(-3.0 + 8.0 * self.uniform()) as f32
-    }
-}
+use lobes::{BANDWIDTHS, random_bandwidth};
+use random::Random;
 
 /// Twin of `Input` in `glsl/test/srbf.comp`.
 #[repr(C)]
@@ -81,14 +56,15 @@ fn shader_twin_agrees_over_the_whole_range() {
     let inputs: Vec<ProbeInput> = (0..10_000)
         .map(|i| {
             let axis = random.direction();
-            let bandwidth = BANDWIDTHS.get(i).copied().unwrap_or_else(|| random.bandwidth());
+            let bandwidth =
+                BANDWIDTHS.get(i).copied().unwrap_or_else(|| random_bandwidth(&mut random));
             let u = Vec2::new(random.uniform() as f32, random.uniform() as f32);
             let near = srbf::kernel_sample(axis, bandwidth, u).normalize();
             let other = if i % 2 == 0 { near } else { random.direction() };
-            let magnitude = 10_f64.powf(-7.0 + 8.0 * random.uniform()) as f32;
+            let magnitude = random.power_of_ten(-7.0, 1.0);
             ProbeInput {
                 a: Lobe { axis, bandwidth, amplitude: 1.0 + random.uniform() as f32 },
-                b: Lobe { axis: other, bandwidth: random.bandwidth(), amplitude: 1.0 },
+                b: Lobe { axis: other, bandwidth: random_bandwidth(&mut random), amplitude: 1.0 },
                 direction: near,
                 u: Vec2::new(random.uniform() as f32, random.uniform() as f32),
                 x: if i % 2 == 0 { magnitude } else { -magnitude },

@@ -2,6 +2,8 @@
 //! watertight edges, self-intersection at every scale, pages, bounds.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
+#[path = "support/random.rs"]
+mod random;
 #[path = "support/rays.rs"]
 mod rays;
 mod support;
@@ -21,7 +23,8 @@ use obvhs::{
     ray::RayHit,
     rt_triangle::RtTriangle,
 };
-use rays::{ONE_PAGE, OnDevice, REFILLING, Random, push, push_box, ray, scaled, soup, sphere};
+use random::Random;
+use rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, scaled, soup, sphere};
 use support::device;
 
 /// Distance of the nearest triangle by testing all of them in double precision, and the smallest
@@ -108,7 +111,7 @@ fn check(name: &str, geometry: &Geometry, rays: &[Ray]) -> f64 {
 
 fn random_rays(count: usize, seed: u64, scale: f32) -> Vec<Ray> {
     let mut random = Random(seed);
-    (0..count).map(|_| ray(1.5 * scale * random.point(), random.direction())).collect()
+    (0..count).map(|_| ray(1.5 * scale * random.point(), random.direction_from_point())).collect()
 }
 
 #[test]
@@ -193,7 +196,7 @@ fn axis_aligned_boxes_and_rays() {
                 // In the planes of faces, along edges and through corners.
                 let on_plane = (origin * 4.0).round() / 4.0;
                 rays.push(ray(on_plane, sign * axis));
-                let slanted = (random.direction() * (Vec3::ONE - axis)).normalize();
+                let slanted = (random.direction_from_point() * (Vec3::ONE - axis)).normalize();
                 rays.push(ray(on_plane, slanted));
                 rays.push(ray(origin, slanted));
             }
@@ -255,14 +258,14 @@ fn closed_meshes_do_not_leak() {
         let mut random = Random(51);
         let mut rays = Vec::new();
         while rays.len() < 40_000 {
-            let pick = (random.next() * geometry.triangles.len() as f32) as usize;
+            let pick = (random.uniform_f32() * geometry.triangles.len() as f32) as usize;
             let corners = geometry.triangles[pick.min(geometry.triangles.len() - 1)];
             let [a, b, _] = corners.map(|v| Vec3::from(geometry.positions[v as usize]));
             let origin = centre + 0.3 * random.point();
             let target = match rays.len() % 3 {
                 0 => a,
                 1 => a.lerp(b, 0.5),
-                _ => a.lerp(b, random.next()),
+                _ => a.lerp(b, random.uniform_f32()),
             };
             rays.push(ray(origin, (target - origin).normalize()));
         }
@@ -280,10 +283,10 @@ fn leaving_rays(geometry: &Geometry, scale: f32, count: usize) -> (Vec<Hit>, Vec
     let mut hits = Vec::new();
     let mut shadow_rays = Vec::new();
     for _ in 0..count {
-        let pick = (random.next() * geometry.triangles.len() as f32) as usize;
+        let pick = (random.uniform_f32() * geometry.triangles.len() as f32) as usize;
         let corners = geometry.triangles[pick.min(geometry.triangles.len() - 1)];
         let [a, b, c] = corners.map(|v| Vec3::from(geometry.positions[v as usize]));
-        let (u, v) = (random.next(), random.next());
+        let (u, v) = (random.uniform_f32(), random.uniform_f32());
         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
         // Not on an edge: there the surface beyond it would have to be left as well.
         let (u, v) = (0.002 + 0.994 * u, 0.002 + 0.994 * v);
@@ -294,8 +297,9 @@ fn leaving_rays(geometry: &Geometry, scale: f32, count: usize) -> (Vec<Hit>, Vec
             ..Hit::default()
         });
         // Half of them at grazing angles, but not so that rounding decides which side they go to.
-        let along = random.direction();
-        let cosine = random.next().max(1e-3) * if random.next() < 0.5 { 1.0 } else { 1e-2 };
+        let along = random.direction_from_point();
+        let cosine =
+            random.uniform_f32().max(1e-3) * if random.uniform_f32() < 0.5 { 1.0 } else { 1e-2 };
         let outward = (along - along.dot(normal) * normal).normalize()
             * (1.0 - cosine * cosine).sqrt()
             + cosine * normal;
@@ -419,7 +423,10 @@ fn shadow_rays_agree_with_closest_hits() {
         .collect();
     let mut random = Random(103);
     let shadow_rays: Vec<ShadowRay> = (0..4 * hits.len())
-        .map(|_| ShadowRay { direction: random.direction().into(), contribution: [1.0; 3] })
+        .map(|_| ShadowRay {
+            direction: random.direction_from_point().into(),
+            contribution: [1.0; 3],
+        })
         .collect();
     let single = on_device.shadow(&hits, &shadow_rays, Schedule::SINGLE);
     let refilled = on_device.shadow(&hits, &shadow_rays, REFILLING);

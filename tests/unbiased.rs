@@ -12,16 +12,16 @@ use std::{path::Path, sync::Arc};
 
 use fenestra::{
     brdf::{Material, MeasuredTable, material::MaterialKind},
-    renderer::{Renderer, Settings},
+    renderer::Settings,
     sampler::Sampler,
     scene::Scene,
 };
 use glam::Vec3;
-use support::scenes;
-
-const REPLICATES: u32 = 8;
-const BLOCK: u32 = 8;
-const LIMIT: f64 = 7.5;
+use support::{
+    replicates::{self, LIMIT},
+    scenes,
+    statistics::{Comparison, Estimate},
+};
 
 const ALL_AGAINST_COSINE: [Sampler; 8] = [
     Sampler::Cosine,
@@ -34,61 +34,18 @@ const ALL_AGAINST_COSINE: [Sampler; 8] = [
     Sampler::Visibility,
 ];
 
-/// Mean radiance per block and channel, one row per replicate.
-fn replicates(scene: &Scene, settings: &Settings, samples: u32) -> Vec<Vec<f64>> {
-    let mut renderer = Renderer::new(support::device(), scene, settings.clone()).unwrap();
-    let rows = (0..REPLICATES)
-        .map(|replicate| {
-            renderer.restart(1000 * settings.sampler.tag() + replicate).unwrap();
-            renderer.render_pass(samples).unwrap();
-            assert_eq!(renderer.totals().dropped_samples, 0);
-            let sums = renderer.sums().unwrap();
-            let blocks_per_row = sums.width / BLOCK;
-            let block_count = blocks_per_row * (sums.height / BLOCK);
-            let mut means = vec![0.0; 3 * block_count as usize];
-            for pixel in 0..sums.pixel_count() {
-                let (x, y) = (pixel as u32 % sums.width, pixel as u32 / sums.width);
-                let block = (y / BLOCK * blocks_per_row + x / BLOCK) as usize;
-                for (channel, value) in sums.mean(pixel).into_iter().enumerate() {
-                    means[3 * block + channel] += value / f64::from(BLOCK * BLOCK);
-                }
-            }
-            means
-        })
-        .collect();
-    support::assert_silent();
-    rows
+/// Replicates whose seeds are the sampler's own.
+fn replicates(scene: &Scene, settings: &Settings, samples: u32) -> Vec<Estimate> {
+    replicates::replicates(scene, settings, 1000 * settings.sampler.tag(), samples)
 }
 
-/// Mean and squared standard error over the replicates, per value.
-fn mean_and_variance(rows: &[Vec<f64>]) -> Vec<(f64, f64)> {
-    let count = rows.len() as f64;
-    (0..rows[0].len())
-        .map(|index| {
-            let mean = rows.iter().map(|row| row[index]).sum::<f64>() / count;
-            let squares = rows.iter().map(|row| (row[index] - mean).powi(2)).sum::<f64>();
-            (mean, squares / (count * (count - 1.0)))
-        })
-        .collect()
-}
-
-/// Largest |t| between two sets of replicates.
-fn largest_deviation(a: &[(f64, f64)], b: &[(f64, f64)]) -> f64 {
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| {
-            let error = (a.1 + b.1).sqrt();
-            if error > 0.0 { (a.0 - b.0).abs() / error } else { f64::from(u8::from(a.0 != b.0)) }
-        })
-        .fold(0.0, f64::max)
-}
-
-fn total(values: &[(f64, f64)]) -> (f64, f64) {
+/// Sum of the means and its standard error.
+fn total(values: &[Estimate]) -> (f64, f64) {
+    let mean = values.iter().map(|value| value.mean).sum::<f64>();
     // The blocks are independent but for their channels: add the errors of one block's channels.
-    let mean = values.iter().map(|value| value.0).sum::<f64>();
     let error = values
         .chunks(3)
-        .map(|block| block.iter().map(|value| value.1.sqrt()).sum::<f64>().powi(2))
+        .map(|block| block.iter().map(|value| value.error()).sum::<f64>().powi(2))
         .sum::<f64>()
         .sqrt();
     (mean, error)
@@ -97,24 +54,23 @@ fn total(values: &[(f64, f64)]) -> (f64, f64) {
 /// Compares every one of `samplers` with the reference, the first of them.
 fn samplers_agree(scene: &Scene, depth: u32, samples: u32, samplers: &[Sampler]) {
     let settings = |sampler| Settings { sampler, depth, ..Settings::default() };
-    let reference = mean_and_variance(&replicates(scene, &settings(samplers[0]), 4 * samples));
+    let reference = replicates(scene, &settings(samplers[0]), 4 * samples);
     let (reference_total, _) = total(&reference);
     for &sampler in &samplers[1..] {
-        let values = mean_and_variance(&replicates(scene, &settings(sampler), samples));
-        let deviation = largest_deviation(&values, &reference);
+        let values = replicates(scene, &settings(sampler), samples);
+        let Comparison { largest_t, ratio, largest_t_with_bias } =
+            Comparison::new(&values, &reference);
         let (mean, error) = total(&values);
         eprintln!(
-            "{} depth {depth} {}: largest |t| {deviation:.2}, mean ratio {:.4} ± {:.4}",
+            "{} depth {depth} {}: largest |t| {largest_t:.2}, mean ratio {ratio:.4} ± {:.4}",
             scene.name,
             sampler.name(),
-            mean / reference_total,
             error / reference_total
         );
-        assert!(deviation < LIMIT, "{} {}: |t| = {deviation}", scene.name, sampler.name());
+        assert!(largest_t < LIMIT, "{} {}: |t| = {largest_t}", scene.name, sampler.name());
         // The test has teeth: a wrong factor of a tenth would not pass.
-        let wrong: Vec<_> = values.iter().map(|(m, v)| (1.1 * m, 1.21 * v)).collect();
-        let detected = largest_deviation(&wrong, &reference) > LIMIT
-            || (1.1 * mean - reference_total).abs() > 3.0 * error;
+        let detected =
+            largest_t_with_bias > LIMIT || (1.1 * mean - reference_total).abs() > 3.0 * error;
         assert!(detected, "{} {}: too noisy to judge", scene.name, sampler.name());
     }
 }

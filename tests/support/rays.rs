@@ -21,37 +21,13 @@ use fenestra::{
 };
 use glam::{Quat, Vec3};
 
+use crate::random::Random;
+
 /// A page that holds every test scene.
 pub const ONE_PAGE: u64 = 128 << 20;
 
 /// Schedule that refills the lanes of a subgroup of eight.
 pub const REFILLING: Schedule = Schedule { rays_per_invocation: 16, refill_lanes: 3 };
-
-/// SplitMix64 numbers in [0, 1).
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f32 / 16_777_216.0
-    }
-
-    pub fn point(&mut self) -> Vec3 {
-        Vec3::new(self.next(), self.next(), self.next()) * 2.0 - 1.0
-    }
-
-    pub fn direction(&mut self) -> Vec3 {
-        loop {
-            let p = self.point();
-            if (0.01..1.0).contains(&p.length_squared()) {
-                return p.normalize();
-            }
-        }
-    }
-}
 
 /// Adds a flat triangle.
 pub fn push(geometry: &mut Geometry, corners: [Vec3; 3]) {
@@ -68,7 +44,7 @@ pub fn soup(count: usize, seed: u64) -> Geometry {
     let mut geometry = Geometry::default();
     for _ in 0..count {
         let centre = random.point();
-        let size = 0.01 * 50.0_f32.powf(random.next());
+        let size = 0.01 * 50.0_f32.powf(random.uniform_f32());
         push(&mut geometry, [0; 3].map(|_| centre + size * random.point()));
     }
     geometry

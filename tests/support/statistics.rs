@@ -56,11 +56,72 @@ pub fn z_p_value(z: f64) -> f64 {
 /// z of the mean of independent `replicates` against `truth`, with the standard error estimated from
 /// their spread. Uses Student's distribution nowhere: take 30 replicates or more.
 pub fn z_of_mean(replicates: &[f64], truth: f64) -> f64 {
-    let count = replicates.len() as f64;
-    let mean = replicates.iter().sum::<f64>() / count;
-    let variance =
-        replicates.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    (mean - truth) / (variance / count).sqrt()
+    let estimate = Estimate::of(replicates.iter().copied());
+    (estimate.mean - truth) / estimate.error()
+}
+
+/// Mean over independent replicates.
+#[derive(Clone, Copy, Debug)]
+pub struct Estimate {
+    pub mean: f64,
+    /// Square of the mean's standard error, from the spread of the replicates.
+    pub squared_error: f64,
+}
+
+impl Estimate {
+    fn of(replicates: impl Iterator<Item = f64> + Clone) -> Self {
+        let count = replicates.clone().count() as f64;
+        let mean = replicates.clone().sum::<f64>() / count;
+        let squares = replicates.map(|value| (value - mean).powi(2)).sum::<f64>();
+        Self { mean, squared_error: squares / (count * (count - 1.0)) }
+    }
+
+    /// Standard error of the mean.
+    pub fn error(&self) -> f64 {
+        self.squared_error.sqrt()
+    }
+
+    /// Estimate of `factor` times the value.
+    fn times(self, factor: f64) -> Self {
+        Self { mean: factor * self.mean, squared_error: factor * factor * self.squared_error }
+    }
+}
+
+/// Estimates of several values from `rows` of them, one row a replicate.
+pub fn estimates(rows: &[Vec<f64>]) -> Vec<Estimate> {
+    (0..rows[0].len()).map(|index| Estimate::of(rows.iter().map(|row| row[index]))).collect()
+}
+
+/// Largest |t| between two lists of estimates of the same values.
+pub fn largest_t(a: &[Estimate], b: &[Estimate]) -> f64 {
+    assert_eq!(a.len(), b.len(), "estimates of the same values");
+    let t = |(a, b): (&Estimate, &Estimate)| {
+        (a.mean - b.mean).abs() / (a.squared_error + b.squared_error).sqrt().max(1e-12)
+    };
+    a.iter().zip(b).map(t).fold(0.0, f64::max)
+}
+
+/// Result of comparing estimates with a reference.
+#[derive(Clone, Copy, Debug)]
+pub struct Comparison {
+    /// Largest |t| of all values.
+    pub largest_t: f64,
+    /// Sum of the means over that of the reference.
+    pub ratio: f64,
+    /// Largest |t| if the estimates were a tenth too high: small where they are too noisy to judge.
+    pub largest_t_with_bias: f64,
+}
+
+impl Comparison {
+    pub fn new(values: &[Estimate], reference: &[Estimate]) -> Self {
+        let total = |values: &[Estimate]| values.iter().map(|value| value.mean).sum::<f64>();
+        let biased: Vec<Estimate> = values.iter().map(|value| value.times(1.1)).collect();
+        Self {
+            largest_t: largest_t(values, reference),
+            ratio: total(values) / total(reference),
+            largest_t_with_bias: largest_t(&biased, reference),
+        }
+    }
 }
 
 /// Regularised upper incomplete gamma function Q(a, x): series below a + 1, Lentz's continued

@@ -1,0 +1,59 @@
+//! Reproducible random numbers for the tests.
+
+#![allow(dead_code, reason = "every test binary uses its own part")]
+
+use std::f64::consts::PI;
+
+use glam::{DVec3, Vec3};
+
+/// SplitMix64 generator, started from a seed. [Steele et al. 2014].
+pub struct Random(pub u64);
+
+impl Random {
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// Number in [0, 1) with 53 random bits.
+    pub fn uniform(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Number in [0, 1) with 24 random bits.
+    pub fn uniform_f32(&mut self) -> f32 {
+        (self.bits() >> 40) as f32 / (1_u64 << 24) as f32
+    }
+
+    /// Number between two powers of ten, its logarithm uniform.
+    pub fn power_of_ten(&mut self, from: f64, to: f64) -> f32 {
+        10_f64.powf(from + (to - from) * self.uniform()) as f32
+    }
+
+    /// Unit vector, uniform over the sphere.
+    pub fn direction(&mut self) -> Vec3 {
+        let z = 2.0 * self.uniform() - 1.0;
+        let azimuth = 2.0 * PI * self.uniform();
+        let radius = (1.0 - z * z).sqrt();
+        DVec3::new(radius * azimuth.cos(), radius * azimuth.sin(), z).as_vec3().normalize()
+    }
+
+    /// Point in the cube −1…1.
+    pub fn point(&mut self) -> Vec3 {
+        Vec3::new(self.uniform_f32(), self.uniform_f32(), self.uniform_f32()) * 2.0 - 1.0
+    }
+
+    /// Unit vector from a point in the unit ball. Keeps the sequence that the limits of the
+    /// traversal tests belong to; elsewhere use [`Random::direction`].
+    pub fn direction_from_point(&mut self) -> Vec3 {
+        loop {
+            let point = self.point();
+            if (0.01..1.0).contains(&point.length_squared()) {
+                return point.normalize();
+            }
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! Images as block means of independent replicates, which `statistics` compares.
+
+use std::ops::Range;
+
+use fenestra::{
+    film::Sums,
+    renderer::{Renderer, Settings},
+    scene::Scene,
+};
+
+use super::statistics::{Estimate, estimates};
+
+/// Replicates on either side of a comparison.
+pub const REPLICATES: u32 = 8;
+
+/// Side of a block in pixels.
+pub const BLOCK: u32 = 8;
+
+/// Largest |t| allowed: of 8 + 8 replicates a value exceeds it with a chance of 3e-6.
+pub const LIMIT: f64 = 7.5;
+
+/// Mean radiance of every block and channel, channels innermost.
+fn block_means(sums: &Sums) -> Vec<f64> {
+    let blocks_per_row = sums.width / BLOCK;
+    let mut means = vec![0.0; 3 * (blocks_per_row * (sums.height / BLOCK)) as usize];
+    for pixel in 0..sums.pixel_count() {
+        let (x, y) = (pixel as u32 % sums.width, pixel as u32 / sums.width);
+        let block = (y / BLOCK * blocks_per_row + x / BLOCK) as usize;
+        for (channel, value) in sums.mean(pixel).into_iter().enumerate() {
+            means[3 * block + channel] += value / f64::from(BLOCK * BLOCK);
+        }
+    }
+    means
+}
+
+/// Block means of one picture per seed, each rendered from nothing learned but what `prepare` gives
+/// the renderer.
+pub fn rows(
+    scene: &Scene,
+    settings: &Settings,
+    seeds: Range<u32>,
+    samples: u32,
+    prepare: impl Fn(&mut Renderer),
+) -> Vec<Vec<f64>> {
+    let mut renderer = Renderer::new(super::device(), scene, settings.clone()).unwrap();
+    let rows = seeds
+        .map(|seed| {
+            renderer.restart(seed).unwrap();
+            prepare(&mut renderer);
+            renderer.render_pass(samples).unwrap();
+            assert_eq!(renderer.totals().dropped_samples, 0);
+            block_means(&renderer.sums().unwrap())
+        })
+        .collect();
+    super::assert_silent();
+    rows
+}
+
+/// Estimates of the block means from [`REPLICATES`] pictures with the seeds from `first_seed` on.
+pub fn replicates(
+    scene: &Scene,
+    settings: &Settings,
+    first_seed: u32,
+    samples: u32,
+) -> Vec<Estimate> {
+    let seeds = first_seed..first_seed + REPLICATES;
+    estimates(&rows(scene, settings, seeds, samples, |_| {}))
+}
