@@ -7,15 +7,9 @@
 #[path = "support/command.rs"]
 mod command;
 
-use std::{
-    fs,
-    io::{BufRead, BufReader, Read},
-    process::{Command, Stdio},
-    thread,
-    time::{Duration, Instant},
-};
+use std::{fs, process::Command};
 
-use command::{Folder, Run, program};
+use command::{Folder, Run, Running, program};
 use fenestra::film::{Attribute, Image};
 
 /// A scene of one quad, `quad.ply`, under a constant environment; cases change a part of it.
@@ -379,42 +373,11 @@ fn an_output_that_cannot_be_written_is_named() {
 
 #[test]
 fn an_interrupt_writes_what_there_is() {
-    const LONGEST: Duration = Duration::from_secs(120);
     let folder = scene("", "");
-    let mut child = program(folder.path())
-        .args(["render", "scene.toml", "--spp=100000000", "-o", "out.exr"])
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let options = ["render", "scene.toml", "--spp=100000000", "-o", "out.exr"];
     // The device is named once the program listens for interrupts.
-    let mut messages = BufReader::new(child.stderr.take().unwrap());
-    let mut line = String::new();
-    while !line.contains("device: ") {
-        line.clear();
-        assert_ne!(messages.read_line(&mut line).unwrap(), 0, "the program ended early");
-    }
-    let rest = thread::spawn(move || {
-        let mut text = String::new();
-        messages.read_to_string(&mut text).map(|_| text)
-    });
-    // The shell's own `kill`: the program of that name is not on every system.
-    let interrupt = format!("kill -INT {}", child.id());
-    let signal = Command::new("sh").args(["-c", &interrupt]).status().unwrap();
-    assert!(signal.success());
-    let start = Instant::now();
-    let status = loop {
-        if let Some(status) = child.try_wait().unwrap() {
-            break status;
-        }
-        if start.elapsed() > LONGEST {
-            child.kill().unwrap();
-        }
-        thread::sleep(Duration::from_millis(20));
-    };
-    let messages = rest.join().unwrap().unwrap();
-    assert_eq!(status.code(), Some(130), "messages:\n{messages}");
-    assert!(messages.contains("interrupted"), "{messages}");
+    let run = Running::start(folder.path(), &options, "device: ").interrupt();
+    run.assert(130, &["interrupted"]);
     let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
     let samples = &image.attributes["samplesPerPixel"];
     assert!(matches!(samples, Attribute::Integer(1..100_000_000)), "{samples:?}");

@@ -9,20 +9,15 @@ mod support;
 use command::Folder;
 use fenestra::{
     film::{Attribute, Image, Statistics, Sums},
-    renderer::{Renderer, Settings},
+    renderer::Settings,
     sampler::{GUIDED_CANDIDATES, Parameters, Sampler, choose, guided::GuideState},
-    scene::Scene,
 };
 use glam::Vec3;
-use support::scenes;
+use support::{renderer, scenes};
 
 fn guided(candidates: Option<u32>) -> Settings {
     let parameters = Parameters { candidates, ..Parameters::default() };
     Settings { sampler: Sampler::Guided, parameters, ..Settings::default() }
-}
-
-fn renderer(scene: &Scene, settings: Settings) -> Renderer {
-    Renderer::new(support::device(), scene, settings).unwrap()
 }
 
 fn assert_same(a: &Sums, b: &Sums) {

@@ -3,12 +3,7 @@
 
 mod support;
 
-use fenestra::{
-    film::Sums,
-    renderer::{Renderer, Settings},
-    sampler::Sampler,
-    scene::Scene,
-};
+use fenestra::{film::Sums, renderer::Settings, sampler::Sampler, scene::Scene};
 use glam::{DVec3, Vec3};
 use support::{
     scenes::{self, diffuse},
@@ -16,11 +11,9 @@ use support::{
 };
 
 fn render(scene: &Scene, settings: Settings, samples: u32) -> Sums {
-    let mut renderer = Renderer::new(support::device(), scene, settings).unwrap();
-    renderer.render_pass(samples).unwrap();
-    assert_eq!(renderer.totals().dropped_samples, 0);
-    support::assert_silent();
-    renderer.sums().unwrap()
+    let (sums, totals) = support::render(scene, settings, samples);
+    assert_eq!(totals.dropped_samples, 0);
+    sums
 }
 
 fn image_mean(sums: &Sums) -> DVec3 {
@@ -30,7 +23,7 @@ fn image_mean(sums: &Sums) -> DVec3 {
 
 /// Mean over `seeds` independent renders and its standard error, per channel.
 fn mean_and_error(scene: &Scene, settings: &Settings, samples: u32, seeds: u32) -> [DVec3; 2] {
-    let mut renderer = Renderer::new(support::device(), scene, settings.clone()).unwrap();
+    let mut renderer = support::renderer(scene, settings.clone());
     let means: Vec<Vec<f64>> = (0..seeds)
         .map(|seed| {
             renderer.restart(seed).unwrap();

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use fenestra::{
     film::RgbImage,
-    renderer::{Renderer, Settings},
+    renderer::Settings,
     sampler::{Parameters, Sampler},
     scene::Scene,
     study::{metrics, record::Figures},
@@ -21,7 +21,7 @@ const REPLICATES: u32 = 12;
 fn pictures(scene: &Scene, sampler: Sampler, candidates: u32) -> (Vec<RgbImage>, f64) {
     let parameters = Parameters { candidates: Some(candidates), ..Parameters::default() };
     let settings = Settings { sampler, parameters, ..Settings::default() };
-    let mut renderer = Renderer::new(support::device(), scene, settings).unwrap();
+    let mut renderer = support::renderer(scene, settings);
     let mut rays = 0;
     let pictures = (0..REPLICATES)
         .map(|seed| {

@@ -5,12 +5,12 @@ mod support;
 
 use fenestra::{
     film::{Aov, Sums, Window},
-    renderer::{Renderer, Settings},
+    renderer::Settings,
     sampler::{Parameters, Sampler},
     scene::Scene,
 };
 use glam::Vec3;
-use support::scenes;
+use support::{renderer, scenes};
 
 fn scene() -> Scene {
     scenes::room(vec![scenes::diffuse(Vec3::splat(0.7)), scenes::plastic(0.1), scenes::copper(0.2)])
@@ -30,7 +30,7 @@ fn settings(sampler: Sampler) -> Settings {
 }
 
 fn render(settings: Settings, passes: &[u32]) -> Sums {
-    let mut renderer = Renderer::new(support::device(), &scene(), settings).unwrap();
+    let mut renderer = renderer(&scene(), settings);
     for samples in passes {
         renderer.render_pass(*samples).unwrap();
     }
@@ -59,7 +59,7 @@ fn another_seed_gives_another_picture() {
 fn a_resumed_render_equals_an_uninterrupted_one() {
     let uninterrupted = render(settings(Sampler::Ris), &[16]);
     let half = render(settings(Sampler::Ris), &[7]);
-    let mut renderer = Renderer::new(support::device(), &scene(), settings(Sampler::Ris)).unwrap();
+    let mut renderer = renderer(&scene(), settings(Sampler::Ris));
     renderer.restore(&half).unwrap();
     renderer.render_pass(9).unwrap();
     assert!(renderer.sums().unwrap() == uninterrupted);
@@ -69,7 +69,7 @@ fn a_resumed_render_equals_an_uninterrupted_one() {
 fn sums_of_another_window_are_refused() {
     let mut sums = render(settings(Sampler::Mis), &[1]);
     sums.origin = [1, 0];
-    let mut renderer = Renderer::new(support::device(), &scene(), settings(Sampler::Mis)).unwrap();
+    let mut renderer = renderer(&scene(), settings(Sampler::Mis));
     let error = renderer.restore(&sums).unwrap_err().to_string();
     assert!(error.contains("[1, 0]"), "{error}");
 }

@@ -9,7 +9,7 @@ mod materials;
 mod support;
 
 use fenestra::{
-    brdf::{self, Material, MaterialTables, material::MaterialKind},
+    brdf::{self, MaterialTables},
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
     math::{
         frame::frame_from_normal,
@@ -80,11 +80,7 @@ struct Floor {
 }
 
 fn floors() -> Vec<(&'static str, Floor)> {
-    let table = materials::synthetic_table(vec3(0.3, 0.2, 0.1), 0.3);
-    let measured = Material {
-        name: "measured".into(),
-        kind: MaterialKind::Measured { path: "synthetic".into(), table },
-    };
+    let measured = materials::measured_plastic();
     let floor = |material, normal: Vec3, outgoing: Vec3| Floor {
         scene: scenes::room(vec![material]),
         normal: normal.normalize(),

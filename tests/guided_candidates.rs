@@ -16,7 +16,6 @@ use std::f64::consts::PI;
 
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
-    brdf::{Material, material::MaterialKind},
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
     renderer::{GuideBuffers, GuideSize, Renderer, SceneBuffers, Settings, WaveBuffers, window_of},
     sampler::{Parameters, Sampler, Weights, guided::GuideState},
@@ -112,15 +111,11 @@ fn surfaces() -> [Surface; 4] {
 }
 
 fn scene() -> Scene {
-    let table = materials::synthetic_table(vec3(0.3, 0.2, 0.1), 0.3);
     scenes::room(vec![
         scenes::diffuse(vec3(0.6, 0.5, 0.4)),
         scenes::plastic(0.25),
         scenes::copper(0.3),
-        Material {
-            name: "measured".into(),
-            kind: MaterialKind::Measured { path: "synthetic".into(), table },
-        },
+        materials::measured_plastic(),
     ])
 }
 

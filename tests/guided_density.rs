@@ -15,7 +15,7 @@ mod support;
 use std::f64::consts::PI;
 
 use fenestra::{
-    brdf::{self, Material, MaterialTables, material::MaterialKind},
+    brdf::{self, Material, MaterialTables},
     film::Window,
     math::frame::{Frame, frame_from_normal},
     renderer::{GuidedRay, RecordedCell, RecordedGuide, Renderer, Settings},
@@ -67,11 +67,7 @@ fn surface(name: &'static str, materials: [Material; 2], material: usize, point:
 
 /// Every kind of material: on the floor, and on top of the box. Both see the window.
 fn surfaces() -> [Surface; 4] {
-    let table = materials::synthetic_table(vec3(0.3, 0.2, 0.1), 0.3);
-    let measured = Material {
-        name: "measured".into(),
-        kind: MaterialKind::Measured { path: "synthetic".into(), table },
-    };
+    let measured = materials::measured_plastic();
     let dull = || scenes::diffuse(vec3(0.6, 0.5, 0.4));
     let (floor, top) = (vec3(-0.1, 0.0, -0.9), vec3(0.5, 1.0, -0.7));
     [

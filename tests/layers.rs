@@ -7,8 +7,8 @@ mod support;
 use std::collections::BTreeMap;
 
 use fenestra::{
-    film::{Aov, Sums},
-    renderer::{Renderer, Settings, Totals},
+    film::Aov,
+    renderer::{Renderer, Settings},
     sampler::{
         Parameters, Sampler,
         guided::{CellKey, FACE_COUNT, face_normal},
@@ -16,7 +16,7 @@ use fenestra::{
     scene::Scene,
 };
 use glam::Vec3;
-use support::scenes;
+use support::{render, renderer, scenes};
 
 /// The sampler `visibility` with few lobes, `assignments` and the layer of its caches.
 fn visibility(assignments: &[&str]) -> Settings {
@@ -45,17 +45,6 @@ fn guided() -> Settings {
 
 fn room() -> Scene {
     scenes::room(vec![scenes::diffuse(Vec3::splat(0.6)), scenes::copper(0.3)])
-}
-
-fn renderer(scene: &Scene, settings: Settings) -> Renderer {
-    Renderer::new(support::device(), scene, settings).unwrap()
-}
-
-fn render(scene: &Scene, settings: Settings, samples: u32) -> (Sums, Totals) {
-    let mut renderer = renderer(scene, settings);
-    renderer.render_pass(samples).unwrap();
-    support::assert_silent();
-    (renderer.sums().unwrap(), renderer.totals().clone())
 }
 
 /// Sums of the two counts over all pixels.

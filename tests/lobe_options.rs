@@ -11,41 +11,9 @@ use fenestra::film::{Image, Statistics};
 /// A floor and a ball under an even sky.
 fn scene(radiance: &str, reflectance: &str) -> Folder {
     let folder = Folder::new();
-    folder.write(
-        "scene.toml",
-        format!(
-            r#"
-[camera]
-position = [0.0, 1.0, 3.0]
-look_at = [0.0, 0.3, 0.0]
-vertical_fov_deg = 45.0
-
-[film]
-width = 24
-height = 16
-
-[environment]
-constant = {radiance}
-
-[[material]]
-name = "clay"
-type = "diffuse"
-reflectance = {reflectance}
-
-[[object]]
-shape = "box"
-size = [4.0, 0.2, 4.0]
-material = "clay"
-translate = [0.0, -0.1, 0.0]
-
-[[object]]
-shape = "sphere"
-radius = 0.5
-material = "clay"
-translate = [0.0, 0.5, 0.0]
-"#
-        ),
-    );
+    let environment = format!("constant = {radiance}");
+    let clay = format!("type = \"diffuse\"\nreflectance = {reflectance}");
+    folder.write("scene.toml", command::yard([24, 16], &environment, &clay, command::BALL));
     folder
 }
 

@@ -8,13 +8,13 @@
 mod support;
 
 use fenestra::{
-    film::Sums,
-    renderer::{Renderer, Settings, Totals},
+    renderer::Settings,
     sampler::{CacheScope, LobeOrder, LobeParameters, Parameters, Sampler, Threshold},
     scene::Scene,
 };
 use glam::Vec3;
 use support::{
+    render, renderer,
     replicates::{self, LIMIT},
     scenes,
     statistics::{Comparison, Estimate},
@@ -35,14 +35,6 @@ fn parameters(assignments: &[&str]) -> Parameters {
 
 fn settings(sampler: Sampler, assignments: &[&str]) -> Settings {
     Settings { sampler, parameters: parameters(assignments), ..Settings::default() }
-}
-
-fn render(scene: &Scene, settings: Settings, samples: u32) -> (Sums, Totals) {
-    let mut renderer = Renderer::new(support::device(), scene, settings).unwrap();
-    renderer.render_pass(samples).unwrap();
-    let sums = renderer.sums().unwrap();
-    support::assert_silent();
-    (sums, renderer.totals().clone())
 }
 
 /// Replicates whose seeds are the sampler's own.
@@ -235,7 +227,7 @@ fn grouping_of_passes_changes_nothing_where_pixels_keep_caches() {
     let scene = scenes::room(vec![scenes::diffuse(Vec3::splat(0.6)), scenes::copper(0.3)]);
     let render = |passes: &[u32]| {
         let settings = settings(Sampler::Visibility, &["cache=pixel"]);
-        let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
+        let mut renderer = renderer(&scene, settings);
         for samples in passes {
             renderer.render_pass(*samples).unwrap();
         }
@@ -258,7 +250,7 @@ fn sums_taught_by_caches_that_are_gone_are_not_continued() {
     let _alone = support::alone();
     let scene = scenes::plane(Vec3::splat(0.5), scenes::sky());
     let settings = |cache| settings(Sampler::Visibility, &[cache]);
-    let new = |cache| Renderer::new(support::device(), &scene, settings(cache)).unwrap();
+    let new = |cache| renderer(&scene, settings(cache));
     let mut first = new("cache=pixel");
     let empty = first.sums().unwrap();
     first.render_pass(3).unwrap();

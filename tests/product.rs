@@ -16,7 +16,6 @@ use std::f64::consts::PI;
 
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
-    brdf::{Material, material::MaterialKind},
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
     pass::Lobes,
     renderer::{LobeBuffers, LobeRoom, SceneBuffers, Settings, WaveBuffers, window_of},
@@ -32,7 +31,7 @@ use fenestra::{
     },
     srbf::kernel_deviation,
 };
-use glam::{DVec3, Vec3, dvec3, vec3};
+use glam::{DVec3, Vec3, dvec3};
 use support::{scenes, statistics};
 
 /// Samples per path and state of the cache.
@@ -147,15 +146,11 @@ fn surfaces() -> Vec<Surface> {
 }
 
 fn scene() -> Scene {
-    let table = materials::synthetic_table(vec3(0.3, 0.2, 0.1), 0.3);
     scenes::open(vec![
         scenes::diffuse(Vec3::new(0.5, 0.4, 0.3)),
         scenes::plastic(0.25),
         scenes::copper(0.3),
-        Material {
-            name: "measured".into(),
-            kind: MaterialKind::Measured { path: "synthetic".into(), table },
-        },
+        materials::measured_plastic(),
     ])
 }
 

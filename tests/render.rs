@@ -7,37 +7,6 @@ mod command;
 use command::Folder;
 use fenestra::film::{Attribute, Image, Statistics};
 
-const SCENE: &str = r#"
-[camera]
-position = [0.0, 1.0, 3.0]
-look_at = [0.0, 0.3, 0.0]
-vertical_fov_deg = 45.0
-
-[film]
-width = 40
-height = 24
-
-[environment]
-sky = {}
-
-[[material]]
-name = "clay"
-type = "diffuse"
-reflectance = [0.6, 0.4, 0.3]
-
-[[object]]
-shape = "box"
-size = [4.0, 0.2, 4.0]
-material = "clay"
-translate = [0.0, -0.1, 0.0]
-
-[[object]]
-shape = "sphere"
-radius = 0.5
-material = "clay"
-translate = [0.0, 0.5, 0.0]
-"#;
-
 /// Renders with the options given and returns image and statistics.
 fn render(folder: &Folder, output: &str, options: &[&str]) -> (Image, Statistics) {
     let mut arguments = vec!["render", "scene.toml", "-o", output, "--stats", "stats.json"];
@@ -50,7 +19,8 @@ fn render(folder: &Folder, output: &str, options: &[&str]) -> (Image, Statistics
 
 fn folder() -> Folder {
     let folder = Folder::new();
-    folder.write("scene.toml", SCENE);
+    let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
+    folder.write("scene.toml", command::yard([40, 24], "sky = {}", clay, command::BALL));
     folder
 }
 

@@ -5,14 +5,9 @@
 #[path = "support/command.rs"]
 mod command;
 
-use std::{
-    fs,
-    io::{BufRead, BufReader},
-    path::Path,
-    process::{Command, Stdio},
-};
+use std::{fs, path::Path, process::Command};
 
-use command::{Folder, Run, program};
+use command::{Folder, Run, Running};
 use fenestra::{
     command::options::{parse_duration, parse_size},
     film::{Attribute, Checkpoint, Image, Metadata},
@@ -24,39 +19,6 @@ use fenestra::{
     },
 };
 use serde_json::Value;
-
-/// A box on a floor under the sky.
-const SCENE: &str = r#"
-[camera]
-position = [0.0, 1.0, 3.0]
-look_at = [0.0, 0.3, 0.0]
-vertical_fov_deg = 45.0
-
-[film]
-width = 24
-height = 16
-
-[environment]
-sky = {}
-
-[[material]]
-name = "clay"
-type = "plastic"
-diffuse = [0.6, 0.4, 0.3]
-alpha = 0.2
-
-[[object]]
-shape = "box"
-size = [4.0, 0.2, 4.0]
-material = "clay"
-translate = [0.0, -0.1, 0.0]
-
-[[object]]
-shape = "box"
-size = [0.6, 0.6, 0.6]
-material = "clay"
-translate = [0.0, 0.3, 0.0]
-"#;
 
 const SMALL: [&str; 10] = [
     "study",
@@ -71,9 +33,16 @@ const SMALL: [&str; 10] = [
     "--quiet",
 ];
 
+/// A box on a floor under the sky.
+fn yard(diffuse: &str) -> String {
+    let clay = format!("type = \"plastic\"\ndiffuse = {diffuse}\nalpha = 0.2");
+    let object = "shape = \"box\"\nsize = [0.6, 0.6, 0.6]\ntranslate = [0.0, 0.3, 0.0]";
+    command::yard([24, 16], "sky = {}", &clay, object)
+}
+
 fn folder() -> Folder {
     let folder = Folder::new();
-    folder.write("yard.toml", SCENE);
+    folder.write("yard.toml", yard("[0.6, 0.4, 0.3]"));
     folder
 }
 
@@ -254,7 +223,7 @@ fn runs_made_under_other_conditions_are_not_mixed_in() {
     assert_eq!(changed(&folder, record), before);
     folder.run(&with(&other, &["--redo"])).assert(0, &[]);
     assert_eq!(json(&folder, record)["conditions"]["shadow_rays"], 3);
-    folder.write("yard.toml", SCENE.replace("0.6, 0.4", "0.5, 0.4"));
+    folder.write("yard.toml", yard("[0.5, 0.4, 0.3]"));
     folder.run(&other).assert(1, &["scene hash: ", "--redo"]);
 }
 
@@ -302,36 +271,15 @@ fn overhead_is_measured_in_rounds() {
     assert_eq!(changed(&folder, record), before);
 }
 
-/// A study that takes long, started in `folder`; returns when its first run is finished.
-fn start_long_study(
-    folder: &Folder,
-) -> (std::process::Child, BufReader<std::process::ChildStderr>) {
-    let mut child = program(folder.path())
-        .args(["study", "yard.toml", "--samplers=mis,ris", "--spp=4", "--time=60s", "--seeds=1"])
-        .args(["--reference-spp=16", "-o", "report"])
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut messages = BufReader::new(child.stderr.take().unwrap());
-    let mut line = String::new();
-    while !line.starts_with("yard: ris, 4 spp") {
-        line.clear();
-        assert!(messages.read_line(&mut line).unwrap() > 0, "the first runs end");
-    }
-    (child, messages)
-}
-
 #[test]
 #[cfg(unix)]
 fn an_interrupted_study_keeps_its_runs_and_continues() {
     let folder = folder();
-    let (mut child, mut messages) = start_long_study(&folder);
-    let kill = format!("kill -INT {}", child.id());
-    assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
-    let mut rest = String::new();
-    std::io::Read::read_to_string(&mut messages, &mut rest).unwrap();
-    assert_eq!(child.wait().unwrap().code(), Some(130), "{rest}");
-    assert!(rest.contains("interrupted"), "{rest}");
+    let few = ["study", "yard.toml", "--samplers=mis,ris", "--spp=4", "--seeds=1"];
+    let few = with(&few, &["--reference-spp=16", "-o", "report"]);
+    let long = with(&few, &["--time=60s"]);
+    let run = Running::start(folder.path(), &long, "yard: ris, 4 spp").interrupt();
+    run.assert(130, &["interrupted"]);
     let results = json(&folder, "results.json");
     assert_eq!(results["runs"].as_array().unwrap().len(), 2);
     assert_eq!(results["is_complete"], false);
@@ -340,17 +288,7 @@ fn an_interrupted_study_keeps_its_runs_and_continues() {
 
     let record = "runs/yard/ris-4spp-seed1.json";
     let before = changed(&folder, record);
-    let run = folder.run(&[
-        "study",
-        "yard.toml",
-        "--samplers=mis,ris",
-        "--spp=4",
-        "--seeds=1",
-        "--reference-spp=16",
-        "-o",
-        "report",
-    ]);
-    run.assert(0, &["study: in", "(finished)"]);
+    folder.run(&few).assert(0, &["study: in", "(finished)"]);
     assert_eq!(changed(&folder, record), before);
     assert_eq!(json(&folder, "results.json")["is_complete"], true);
 }
@@ -372,19 +310,9 @@ fn interrupt_reference(sampler: &str) {
         "-o",
         "report",
     ];
-    let mut child = program(folder.path()).args(options).stderr(Stdio::piped()).spawn().unwrap();
-    let mut messages = BufReader::new(child.stderr.take().unwrap());
-    let mut line = String::new();
-    while !line.starts_with("yard: reference 1 of 2") {
-        line.clear();
-        assert!(messages.read_line(&mut line).unwrap() > 0, "the reference begins");
-    }
+    let running = Running::start(folder.path(), &options, "yard: reference 1 of 2");
     std::thread::sleep(std::time::Duration::from_millis(300));
-    let kill = format!("kill -INT {}", child.id());
-    assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
-    let mut rest = String::new();
-    std::io::Read::read_to_string(&mut messages, &mut rest).unwrap();
-    assert_eq!(child.wait().unwrap().code(), Some(130), "{rest}");
+    running.interrupt().assert(130, &[]);
     let images = folder.path().join("report/images/yard");
     let checkpoint = ["reference_1", "reference_2"]
         .map(|half| images.join(format!("{half}.checkpoint.exr")))
@@ -436,7 +364,7 @@ fn a_study_file_gives_scenes_and_settings() {
          [[published.errors]]\nscene = \"yard\"\nsource = \"Table 7\"\nspp = 2\n\
          values = { mis = 0.5, ris = 0.25 }\n",
     );
-    folder.write("other.toml", SCENE);
+    folder.write("other.toml", yard("[0.6, 0.4, 0.3]"));
     let options = ["study", "study.toml", "--quick", "--size=12x8", "-o", "report", "--quiet"];
     folder.run(&options).assert(0, &[]);
     let results = json(&folder, "results.json");

@@ -5,8 +5,11 @@
 use std::{
     ffi::OsStr,
     fs,
+    io::{BufRead, BufReader, Read},
     path::{Path, PathBuf},
-    process::{Command, Output},
+    process::{Child, ChildStderr, Command, Output, Stdio},
+    thread,
+    time::{Duration, Instant},
 };
 
 use tempfile::TempDir;
@@ -51,6 +54,93 @@ impl Run {
         assert!(!messages.contains("panicked"), "bad input is no reason to panic:\n{messages}");
     }
 }
+
+/// A run that is under way.
+pub struct Running {
+    child: Child,
+    messages: BufReader<ChildStderr>,
+}
+
+impl Running {
+    /// Starts the program in `folder` and waits for a message with this text.
+    pub fn start(folder: &Path, arguments: &[&str], text: &str) -> Self {
+        let mut child = program(folder)
+            .args(arguments)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut messages = BufReader::new(child.stderr.take().unwrap());
+        let mut line = String::new();
+        while !line.contains(text) {
+            line.clear();
+            assert_ne!(messages.read_line(&mut line).unwrap(), 0, "ended before {text:?}");
+        }
+        Self { child, messages }
+    }
+
+    /// Interrupts the run as Ctrl-C does and waits for its end, two minutes at most.
+    pub fn interrupt(self) -> Run {
+        const LONGEST: Duration = Duration::from_secs(120);
+        let Self { mut child, mut messages } = self;
+        let rest = thread::spawn(move || {
+            let mut text = String::new();
+            messages.read_to_string(&mut text).map(|_| text)
+        });
+        // The shell's own `kill`: the program of that name is not on every system.
+        let kill = format!("kill -INT {}", child.id());
+        assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
+        let start = Instant::now();
+        let status = loop {
+            if let Some(status) = child.try_wait().unwrap() {
+                break status;
+            }
+            if start.elapsed() > LONGEST {
+                child.kill().unwrap();
+            }
+            thread::sleep(Duration::from_millis(20));
+        };
+        let messages = rest.join().unwrap().unwrap();
+        Run { status: status.code(), output: String::new(), messages }
+    }
+}
+
+/// Text of a scene file: `object` stands on a floor, both of the material `clay`, and a camera 3 m
+/// away looks at them. `clay` and `object` are keys of their tables, `environment` is one key.
+pub fn yard([width, height]: [u32; 2], environment: &str, clay: &str, object: &str) -> String {
+    format!(
+        r#"
+[camera]
+position = [0.0, 1.0, 3.0]
+look_at = [0.0, 0.3, 0.0]
+vertical_fov_deg = 45.0
+
+[film]
+width = {width}
+height = {height}
+
+[environment]
+{environment}
+
+[[material]]
+name = "clay"
+{clay}
+
+[[object]]
+shape = "box"
+size = [4.0, 0.2, 4.0]
+material = "clay"
+translate = [0.0, -0.1, 0.0]
+
+[[object]]
+{object}
+material = "clay"
+"#
+    )
+}
+
+/// Object of a [`yard`]: a ball of 1 m on the floor.
+pub const BALL: &str = "shape = \"sphere\"\nradius = 0.5\ntranslate = [0.0, 0.5, 0.0]";
 
 /// A folder of its own for one test.
 pub struct Folder(TempDir);

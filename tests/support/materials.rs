@@ -36,7 +36,7 @@ const GOLD: ConductorFresnel =
     ConductorFresnel::Exact { eta: vec3(0.18, 0.42, 1.37), k: vec3(3.42, 2.35, 1.77) };
 
 /// A measured table made from a plastic, with energy, reciprocity and every cell known.
-pub fn synthetic_table(diffuse: Vec3, alpha: f32) -> Arc<MeasuredTable> {
+fn synthetic_table(diffuse: Vec3, alpha: f32) -> Arc<MeasuredTable> {
     let model = MaterialTables::new(&[case("model", alpha, plastic(diffuse, alpha, 1.5)).material])
         .unwrap();
     let table =
@@ -49,6 +49,11 @@ fn measured(diffuse: Vec3, alpha: f32) -> MaterialKind {
         path: PathBuf::from("synthetic"),
         table: synthetic_table(diffuse, alpha),
     }
+}
+
+/// A rough measured material whose table comes from a plastic.
+pub fn measured_plastic() -> Material {
+    case("measured", 0.3, measured(vec3(0.3, 0.2, 0.1), 0.3)).material
 }
 
 /// Every kind over its range of parameters.

@@ -13,7 +13,10 @@ use std::{
 
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
+    film::Sums,
     gpu::{Buffer, Commands, DescriptorSet, Device, Pipeline},
+    renderer::{Renderer, Settings, Totals},
+    scene::Scene,
     shader::constants::{SET_FILM, WORKGROUP_SIZE},
 };
 
@@ -51,6 +54,19 @@ pub fn device() -> &'static Arc<Device> {
             panic!("GPU tests need a Vulkan device and validation layers, run ./setup: {error}")
         }
     })
+}
+
+/// A renderer of `scene` on the shared device.
+pub fn renderer(scene: &Scene, settings: Settings) -> Renderer {
+    Renderer::new(device(), scene, settings).unwrap()
+}
+
+/// Sums and totals after `samples` samples per pixel.
+pub fn render(scene: &Scene, settings: Settings, samples: u32) -> (Sums, Totals) {
+    let mut renderer = renderer(scene, settings);
+    renderer.render_pass(samples).unwrap();
+    assert_silent();
+    (renderer.sums().unwrap(), renderer.totals().clone())
 }
 
 /// Fails if the validation layers have said anything since the device was opened.

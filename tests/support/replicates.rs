@@ -42,7 +42,7 @@ pub fn rows(
     samples: u32,
     prepare: impl Fn(&mut Renderer),
 ) -> Vec<Vec<f64>> {
-    let mut renderer = Renderer::new(super::device(), scene, settings.clone()).unwrap();
+    let mut renderer = super::renderer(scene, settings.clone());
     let rows = seeds
         .map(|seed| {
             renderer.restart(seed).unwrap();
