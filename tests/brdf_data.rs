@@ -14,14 +14,15 @@ use fenestra::math::colour::luminance;
 use glam::{DVec3, Vec3, dvec3};
 use rayon::prelude::*;
 
+#[path = "support/materials.rs"]
+mod materials;
+
+use materials::direction;
+
 /// The file of that name, or `None` where there is no shared folder.
 fn shared(name: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes/brdf").join(name);
     path.exists().then_some(path)
-}
-
-fn direction(theta: f64, phi: f64) -> Vec3 {
-    dvec3(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()).as_vec3()
 }
 
 /// ∫ f(incident) dω over the hemisphere by the midpoint rule over half vectors, dense in θ_h near 0:

@@ -8,6 +8,8 @@
 //! `tests/guided_density.rs`. Seeds are fixed; another would raise a false alarm once in some hundred runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
+#[path = "support/hemisphere.rs"]
+mod hemisphere;
 #[path = "support/materials.rs"]
 mod materials;
 mod support;
@@ -28,18 +30,14 @@ use fenestra::{
         structs::Wave,
     },
 };
-use glam::{DVec3, Vec3, dvec3, vec3};
+use glam::{DMat3, DVec3, Vec3, dvec3, vec3};
+use hemisphere::BINS;
 use support::{scenes, statistics};
 
 /// Candidates per surface and state.
 const DRAWN: u32 = 1 << 15;
-/// Points of the quadrature over the sphere about the normal, in polar angle and azimuth.
+/// Rows of the quadrature over the sphere about the normal.
 const ROWS: usize = 384;
-const COLUMNS: usize = 768;
-/// Bins in polar angle above the horizon and in azimuth; one more holds what is below.
-const BIN_ROWS: usize = 12;
-const BIN_COLUMNS: usize = 24;
-const BINS: usize = BIN_ROWS * BIN_COLUMNS + 1;
 /// Part of the candidates that samples the BRDF.
 const BRDF_PART: f64 = 0.25;
 /// That of the one-sample model on a diffuse surface: not what these candidates are divided by.
@@ -72,26 +70,20 @@ struct Surface {
 }
 
 impl Surface {
-    /// Direction at a height over the surface and an azimuth about its normal.
-    fn to_world(&self, height: f64, phi: f64) -> DVec3 {
+    fn world_from_local(&self) -> DMat3 {
         let tangent = self.normal.cross(dvec3(0.31, -0.7, 0.64)).normalize();
-        let bitangent = self.normal.cross(tangent);
-        let radius = (1.0 - height * height).max(0.0).sqrt();
-        radius * (phi.cos() * tangent + phi.sin() * bitangent) + height * self.normal
+        DMat3::from_cols(tangent, self.normal.cross(tangent), self.normal)
+    }
+
+    fn outgoing(&self) -> Vec3 {
+        let (sine, cosine) = self.theta.sin_cos();
+        let local = dvec3(sine * 0.4_f64.cos(), sine * 0.4_f64.sin(), cosine);
+        (self.world_from_local() * local).as_vec3()
     }
 
     fn bin(&self, direction: [f32; 3]) -> usize {
         let direction = Vec3::from(direction).as_dvec3();
-        let height = direction.dot(self.normal);
-        if height <= 0.0 {
-            return BINS - 1;
-        }
-        let (x, y) = (self.to_world(0.0, 0.0), self.to_world(0.0, 0.5 * PI));
-        let (x, y) = (direction.dot(x), direction.dot(y));
-        let (theta, phi) = (x.hypot(y).atan2(height), y.atan2(x).rem_euclid(2.0 * PI));
-        let row = ((theta / (0.5 * PI) * BIN_ROWS as f64) as usize).min(BIN_ROWS - 1);
-        let column = ((phi / (2.0 * PI) * BIN_COLUMNS as f64) as usize).min(BIN_COLUMNS - 1);
-        row * BIN_COLUMNS + column
+        hemisphere::bin(self.world_from_local().transpose() * direction)
     }
 }
 
@@ -160,7 +152,7 @@ impl Paths {
         let input = support::PathInput {
             normal: surface.normal.as_vec3().into(),
             material: surface.material,
-            outgoing: surface.to_world(surface.theta.cos(), 0.4).as_vec3().into(),
+            outgoing: surface.outgoing().into(),
             shadow_direction: [0.0, 1.0, 0.0],
             is_visible: 1,
         };
@@ -222,17 +214,14 @@ impl Paths {
 
     /// The integrals over every bin of the candidates' density, and of those of BRDF and guide.
     fn integrals(&self, surface: &Surface, candidates: u32) -> [Vec<f64>; 3] {
-        // One at random in each cell, so that edges of regions do no harm.
-        let query = |cell: usize| {
-            let u = materials::uniform(cell as u32, 31).as_dvec3();
-            let height = 1.0 - 2.0 * ((cell / COLUMNS) as f64 + u.x) / ROWS as f64;
-            let phi = ((cell % COLUMNS) as f64 + u.y) * 2.0 * PI / COLUMNS as f64;
-            let direction = surface.to_world(height, phi).as_vec3().into();
+        let world_from_local = surface.world_from_local();
+        let query = |local: DVec3| {
+            let direction = (world_from_local * local).as_vec3().into();
             CandidateQuery { draws: 0, ray: 0, candidate: 0, direction }
         };
-        let solid_angle = 4.0 * PI / (ROWS * COLUMNS) as f64;
+        let queries: Vec<CandidateQuery> = hemisphere::quadrature(ROWS).map(query).collect();
+        let solid_angle = 4.0 * PI / queries.len() as f64;
         let mut integrals = [(); 3].map(|()| vec![0.0; BINS]);
-        let queries: Vec<CandidateQuery> = (0..ROWS * COLUMNS).map(query).collect();
         for (query, answer) in queries.iter().zip(self.probe(candidates, &queries)) {
             let bin = surface.bin(query.direction);
             let densities = [answer.pdf, answer.brdf_pdf, answer.guided_pdf];

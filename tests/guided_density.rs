@@ -8,6 +8,8 @@
 //! a false alarm once in some hundred runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
+#[path = "support/hemisphere.rs"]
+mod hemisphere;
 #[path = "support/materials.rs"]
 mod materials;
 mod support;
@@ -23,18 +25,14 @@ use fenestra::{
     scene::{Scene, environment::EnvironmentTables},
 };
 use glam::{Vec3, vec3};
+use hemisphere::{BIN_COLUMNS, BINS};
 use support::{scenes, statistics};
 
 /// Rays per surface and state, and how many of them a hit has.
 const RAYS: u32 = 1 << 15;
 const SHADOW_RAYS: u32 = 8;
-/// Points of the quadrature over the sphere about the normal, in polar angle and azimuth.
+/// Rows of the quadrature over the sphere about the normal.
 const ROWS: usize = 512;
-const COLUMNS: usize = 1024;
-/// Bins in polar angle above the horizon and in azimuth; one more holds what is below.
-const BIN_ROWS: usize = 12;
-const BIN_COLUMNS: usize = 24;
-const BINS: usize = BIN_ROWS * BIN_COLUMNS + 1;
 /// Parts of the sky in which estimates are compared, three in polar angle and eight in azimuth.
 const PARTS: usize = 25;
 /// |z| beyond this has a chance of 6e-7; there are about 1,200 of them.
@@ -109,7 +107,6 @@ struct Host<'a> {
     brdf: MaterialTables,
     material: usize,
     frame: Frame,
-    normal: Vec3,
     outgoing_local: Vec3,
 }
 
@@ -132,7 +129,6 @@ impl<'a> Host<'a> {
             brdf: MaterialTables::new(&surface.scene.materials).unwrap(),
             material: surface.material,
             frame,
-            normal: recorded.normal,
             outgoing_local: frame.to_local(outgoing),
         }
     }
@@ -151,28 +147,14 @@ impl<'a> Host<'a> {
     }
 
     fn bin(&self, direction: Vec3) -> usize {
-        let local = self.frame.to_local(direction).as_dvec3();
-        if direction.dot(self.normal) <= 0.0 {
-            return BINS - 1;
-        }
-        let theta = local.x.hypot(local.y).atan2(local.z);
-        let phi = local.y.atan2(local.x).rem_euclid(2.0 * PI);
-        let row = ((theta / (0.5 * PI) * BIN_ROWS as f64) as usize).min(BIN_ROWS - 1);
-        let column = ((phi / (2.0 * PI) * BIN_COLUMNS as f64) as usize).min(BIN_COLUMNS - 1);
-        row * BIN_COLUMNS + column
+        hemisphere::bin(self.frame.to_local(direction).as_dvec3())
     }
 
-    /// Directions of the quadrature with their solid angles: one at random in each cell, so that edges
-    /// of regions do no harm.
+    /// Directions of the quadrature with their solid angles.
     fn directions(&self) -> impl Iterator<Item = (Vec3, f64)> + '_ {
-        (0..ROWS * COLUMNS).map(|cell| {
-            let u = materials::uniform(cell as u32, 31).as_dvec3();
-            let cosine = 1.0 - 2.0 * ((cell / COLUMNS) as f64 + u.x) / ROWS as f64;
-            let phi = ((cell % COLUMNS) as f64 + u.y) * 2.0 * PI / COLUMNS as f64;
-            let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
-            let local = glam::dvec3(sine * phi.cos(), sine * phi.sin(), cosine).as_vec3();
-            (self.frame.to_world(local), 4.0 * PI / (ROWS * COLUMNS) as f64)
-        })
+        let locals = hemisphere::quadrature(ROWS);
+        let solid_angle = 4.0 * PI / locals.len() as f64;
+        locals.map(move |local| (self.frame.to_world(local.as_vec3()), solid_angle))
     }
 }
 

@@ -1,9 +1,21 @@
 //! The statistical helpers against tabulated values and against themselves.
 
+use std::f64::consts::PI;
+
+#[path = "support/hemisphere.rs"]
+mod hemisphere;
+#[path = "support/materials.rs"]
+mod materials;
+#[path = "support/random.rs"]
+mod random;
 #[path = "support/statistics.rs"]
 mod statistics;
 
-use statistics::{chi_square_p_value, upper_incomplete_gamma, z_of_mean, z_p_value};
+use random::Random;
+use statistics::{
+    Comparison, chi_square_p_value, estimates, largest_t, upper_incomplete_gamma, z_of_mean,
+    z_p_value,
+};
 
 fn close(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-12 + 1e-10 * b.abs()
@@ -48,4 +60,86 @@ fn z_of_mean_measures_in_standard_errors() {
     // Mean 0, variance 100/99, standard error √(1/99).
     let replicates: Vec<f64> = (0..100).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
     assert!(close(z_of_mean(&replicates, -1.0), 99.0_f64.sqrt()));
+}
+
+#[test]
+fn estimates_have_the_mean_and_its_error() {
+    // Column by column: the values 1 and 3, and twice 10.
+    let values = estimates(&[vec![1.0, 10.0], vec![3.0, 10.0]]);
+    assert_eq!(values.len(), 2);
+    assert_eq!((values[0].mean, values[0].error()), (2.0, 1.0));
+    assert_eq!((values[1].mean, values[1].error()), (10.0, 0.0));
+    let others = estimates(&[vec![2.0, 10.0], vec![10.0, 10.0]]);
+    // (6 − 2)/√(1 + 16); values without an error differ by nothing, or by far too much.
+    assert!(close(largest_t(&values, &others), 4.0 / 17.0_f64.sqrt()));
+    assert_eq!(largest_t(&values[1..], &others[1..]), 0.0);
+    assert!(largest_t(&values[1..], &estimates(&[vec![11.0], vec![11.0]])) > 1e6);
+}
+
+#[test]
+fn a_comparison_finds_a_bias_unless_noise_hides_it() {
+    let mut random = Random(1);
+    let mut replicates = |noise: f64| -> Vec<Vec<f64>> {
+        let mut value = || 1.0 + noise * (random.uniform() - 0.5);
+        (0..8).map(|_| (0..36).map(|_| value()).collect()).collect()
+    };
+    for (noise, is_found) in [(0.05, true), (2.0, false)] {
+        let [values, reference] = [replicates(noise), replicates(noise)].map(|r| estimates(&r));
+        let comparison = Comparison::new(&values, &reference);
+        assert!(comparison.largest_t < 7.5, "{comparison:?}");
+        assert!((comparison.ratio - 1.0).abs() < 0.1, "{comparison:?}");
+        assert_eq!(comparison.largest_t_with_bias > 7.5, is_found, "{comparison:?}");
+    }
+}
+
+#[test]
+fn random_numbers_are_those_of_splitmix64() {
+    // First outputs for the seed 1234567, from the generator's reference implementation.
+    let (mut random, mut single) = (Random(1_234_567), Random(1_234_567));
+    for bits in [6_457_827_717_110_365_317_u64, 3_203_168_211_198_807_973] {
+        assert_eq!(random.uniform(), (bits >> 11) as f64 / 2_f64.powi(53));
+        assert_eq!(single.uniform_f32(), (bits >> 40) as f32 / 2_f32.powi(24));
+    }
+    let mut decades = vec![0.0; 8];
+    for _ in 0..10_000 {
+        decades[(f64::from(random.power_of_ten(-3.0, 5.0)).log10() + 3.0) as usize] += 1.0;
+    }
+    let p = chi_square_p_value(&decades, &[1.0; 8]);
+    assert!(p > 1e-6, "p = {p:e}");
+}
+
+#[test]
+fn random_directions_are_uniform() {
+    for kind in [Random::direction, Random::direction_from_point] {
+        let mut random = Random(2);
+        let mut counts = vec![0.0; 10 * 20];
+        for _ in 0..100_000 {
+            let direction = kind(&mut random);
+            assert!(direction.is_normalized(), "{direction}");
+            let turn = f64::from(direction.y).atan2(f64::from(direction.x)) / (2.0 * PI) + 0.5;
+            let row = ((f64::from(direction.z) + 1.0) * 5.0) as usize;
+            counts[row.min(9) * 20 + ((turn * 20.0) as usize).min(19)] += 1.0;
+        }
+        let p = chi_square_p_value(&counts, &[1.0; 10 * 20]);
+        assert!(p > 1e-6, "p = {p:e}");
+    }
+}
+
+#[test]
+fn bins_of_the_hemisphere_hold_their_solid_angle() {
+    let rows = 384;
+    let mut shares = vec![0.0; hemisphere::BINS];
+    for local in hemisphere::quadrature(rows) {
+        assert!((local.length() - 1.0).abs() < 1e-12, "{local}");
+        shares[hemisphere::bin(local)] += 1.0 / (2 * rows * rows) as f64;
+    }
+    let below = shares.pop().unwrap_or_default();
+    assert!((below - 0.5).abs() < 1e-3, "{below}");
+    let bin_rows = shares.len() / hemisphere::BIN_COLUMNS;
+    for (bin, share) in shares.iter().enumerate() {
+        let edge = |row: usize| (0.5 * PI * row as f64 / bin_rows as f64).cos();
+        let row = bin / hemisphere::BIN_COLUMNS;
+        let expected = 0.5 * (edge(row) - edge(row + 1)) / hemisphere::BIN_COLUMNS as f64;
+        assert!((share / expected - 1.0).abs() < 0.1, "bin {bin}: {share}, not {expected}");
+    }
 }
