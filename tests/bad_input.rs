@@ -1,6 +1,5 @@
-//! Bad input given to `render`: each case ends with its exit status and a message that names the
-//! file and what is wrong with it, or, where a part can be left out, with a warning that counts it
-//! and a finite image.
+//! Bad input to `render`. Each case either fails with its exit status and a message that names the
+//! file and the mistake, or drops the bad part, warns with a count and renders a finite image.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
@@ -12,7 +11,7 @@ use std::{fs, process::Command};
 use command::{Folder, Run, Running, program};
 use fenestra::film::{Attribute, Image};
 
-/// A scene of one quad, `quad.ply`, under a constant environment; cases change a part of it.
+/// One quad, `quad.ply`, under a constant environment. Each case changes a part of it.
 const SCENE: &str = r#"[camera]
 position = [0.0, 0.0, 3.0]
 look_at = [0.0, 0.0, 0.0]
@@ -36,7 +35,7 @@ mesh = "quad.ply"
 material = "grey"
 "#;
 
-/// Text of a PLY mesh.
+/// Formats an ASCII PLY mesh.
 fn ply(vertices: &[&str], faces: &[&str]) -> String {
     format!(
         "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
@@ -52,14 +51,14 @@ fn ply(vertices: &[&str], faces: &[&str]) -> String {
 const QUAD_VERTICES: [&str; 4] = ["-1 -1 0", "1 -1 0", "1 1 0", "-1 1 0"];
 const QUAD_FACES: [&str; 2] = ["3 0 1 2", "3 0 2 3"];
 
-/// A PFM map of 4×2 texels, all of `value`.
+/// Encodes a PFM map of 4×2 texels, all of `value`.
 fn pfm(value: f32) -> Vec<u8> {
     let mut bytes = b"PF\n4 2\n-1.0\n".to_vec();
     bytes.extend([value; 24].iter().flat_map(|component| component.to_le_bytes()));
     bytes
 }
 
-/// A folder with `scene.toml`, in which `old` is replaced by `new`, and `quad.ply`.
+/// Writes `quad.ply` and `scene.toml`, in which `new` replaces `old`, into a new folder.
 fn scene(old: &str, new: &str) -> Folder {
     assert!(old.is_empty() || SCENE.contains(old), "{old:?} is in the scene");
     let folder = Folder::new();
@@ -71,7 +70,7 @@ fn scene(old: &str, new: &str) -> Folder {
 
 const RENDER: [&str; 5] = ["render", "scene.toml", "--spp=2", "-o", "out.exr"];
 
-/// Renders and checks that it fails with status 1, with these messages, and writes nothing.
+/// Checks that rendering fails with status 1 and these messages and writes nothing.
 #[track_caller]
 fn assert_refused(folder: &Folder, parts: &[&str]) {
     let before = folder.files();
@@ -79,7 +78,7 @@ fn assert_refused(folder: &Folder, parts: &[&str]) {
     assert_eq!(folder.files(), before, "a failed render leaves no file behind");
 }
 
-/// Renders and checks that it succeeds with these warnings and that every pixel is finite.
+/// Checks that rendering succeeds with these warnings and that every pixel is finite.
 #[track_caller]
 fn assert_renders(folder: &Folder, warnings: &[&str]) -> Image {
     folder.run(&RENDER).assert(0, warnings);
@@ -213,7 +212,7 @@ fn an_index_out_of_range_is_named() {
 fn triangles_that_cannot_be_hit_are_dropped_with_a_warning() {
     let folder = scene("", "");
     let vertices = ["-1 -1 0", "1 -1 0", "1 1 0", "-1 1 0", "nan 0 1", "inf 0 1"];
-    // Two good ones, one point, one line, one with a NaN corner, one with an infinite corner.
+    // Two good triangles, a point, a line, one with a NaN corner, one with an infinite corner.
     let faces = ["3 0 1 2", "3 0 2 3", "3 0 0 0", "3 0 1 1", "3 0 1 4", "3 2 3 5"];
     folder.write("quad.ply", ply(&vertices, &faces));
     let warnings = [
@@ -272,7 +271,7 @@ fn texels_that_are_not_radiance_never_reach_the_film() {
     assert_renders(&folder, &["sky.pfm: 3 of 8 texels are negative, infinite", "were set to 0"]);
 }
 
-/// The scene with a measured material in place of the diffuse one.
+/// Replaces the scene's diffuse material by a measured one.
 fn measured(file: &str) -> Folder {
     scene(
         "type = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]",
@@ -339,11 +338,11 @@ fn a_full_disk_is_reported_and_the_older_image_kept() {
     let folder = scene("", "");
     folder.write("out.exr", "older image");
     let before = folder.files();
-    // Every write to this device fails for want of space.
+    // Every write to this device fails for lack of space.
     let run = folder.run(&["render", "scene.toml", "--spp=2", "--output=/dev/full"]);
     run.assert(1, &["error: /dev/full: cannot write: No space left on device"]);
-    // A limit on the size of files stands in for a full disk: writes past it fail, once the signal
-    // that would end the process is ignored. The caches do without their files.
+    // Emulate a full disk by a limit on file size. Writes beyond it fail once the signal that would
+    // end the process is ignored. The caches do without their files.
     let mut shell = Command::new("sh");
     shell.args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$@\"", "sh"]);
     let rendering = program(folder.path());
@@ -375,7 +374,7 @@ fn an_output_that_cannot_be_written_is_named() {
 fn an_interrupt_writes_what_there_is() {
     let folder = scene("", "");
     let options = ["render", "scene.toml", "--spp=100000000", "-o", "out.exr"];
-    // The device is named once the program listens for interrupts.
+    // The program names the device once it listens for interrupts.
     let run = Running::start(folder.path(), &options, "device: ").interrupt();
     run.assert(130, &["interrupted"]);
     let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();

@@ -1,5 +1,4 @@
-//! The reflection models against what they must obey: reciprocity, energy, densities that are what
-//! is sampled.
+//! Reflection models: reciprocity, conservation of energy, and samples that follow their density.
 
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
@@ -16,15 +15,15 @@ mod statistics;
 
 use materials::{cases, direction, hemisphere, tables, uniform};
 
-/// Polar angles of the outgoing direction, degrees.
+/// Polar angles of the outgoing direction, in degrees.
 const ANGLES_DEG: [f64; 6] = [0.0, 20.0, 50.0, 75.0, 85.0, 89.5];
 
-/// Outgoing direction of a test, away from the axes.
+/// Returns an outgoing direction of this polar angle, away from the axes.
 fn outgoing(angle_deg: f64) -> Vec3 {
     direction(angle_deg.to_radians(), 0.7)
 }
 
-/// Every case with every angle.
+/// Iterates over all pairs of case and angle.
 fn case_angles() -> impl ParallelIterator<Item = (usize, f64)> {
     (0..cases().len() * ANGLES_DEG.len())
         .into_par_iter()
@@ -36,7 +35,7 @@ fn values_are_reciprocal() {
     for (material, case) in cases().iter().enumerate() {
         for index in 0..20_000 {
             let a = hemisphere(index, 1);
-            // Half of the pairs near the mirror direction, where lobes are.
+            // Sample half of the pairs from the BRDF to hit its lobes.
             let b = if index % 2 == 0 {
                 hemisphere(index, 2)
             } else {
@@ -71,7 +70,7 @@ fn nothing_is_reflected_below_the_surface() {
     }
 }
 
-/// Mean and standard error of BRDF·cosine/pdf, the directional albedo, by `count` samples.
+/// Estimates the directional albedo, the mean of BRDF·cosine/pdf, and its standard error.
 fn sampled_albedo(material: usize, outgoing: Vec3, count: u32) -> (DVec3, DVec3) {
     let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
     for index in 0..count {
@@ -94,8 +93,8 @@ fn sampled_albedo(material: usize, outgoing: Vec3, count: u32) -> (DVec3, DVec3)
     (mean, DVec3::new(error.x.sqrt(), error.y.sqrt(), error.z.sqrt()))
 }
 
-/// White furnace: no material reflects more light than it receives, and the albedo image shows what
-/// is reflected.
+/// White furnace: no material reflects more light than it receives, and the albedo shown in the
+/// image is the reflected share.
 #[test]
 fn no_material_creates_energy() {
     case_angles().for_each(|(material, angle)| {
@@ -134,7 +133,7 @@ fn white_plastic_loses_nothing() {
     }
 }
 
-/// A lossless mirror-like conductor reflects everything but what the masking hides.
+/// A lossless mirror-like conductor loses only what masking hides.
 #[test]
 fn smooth_white_conductor_loses_nothing() {
     let material = cases().iter().position(|case| case.material.name.ends_with("-like conductor"));
@@ -144,16 +143,16 @@ fn smooth_white_conductor_loses_nothing() {
     }
 }
 
-/// Cells over half vectors, logarithmic in θ_h from a tenth of the lobe's width, and the mass of the
-/// density in them.
+/// Bins over half vectors, logarithmic in θ_h from a tenth of the lobe's width, and the mass of the
+/// density in each.
 struct HalfVectorBins {
-    /// Edges of θ_h.
+    /// Edges in θ_h.
     edges: Vec<f64>,
-    /// ∫ pdf dω_i of each cell, θ_h outermost.
+    /// ∫ pdf dω_i of each bin, θ_h outermost.
     masses: Vec<f64>,
 }
 
-/// Cells around the azimuth.
+/// Bins in azimuth.
 const AZIMUTH_BINS: usize = 12;
 
 impl HalfVectorBins {
@@ -201,8 +200,8 @@ impl HalfVectorBins {
     }
 }
 
-/// χ² of the sampled directions against the density, for every material from straight above to
-/// grazing; the mass that the density lacks is the share of samples below the surface.
+/// Tests samples against their density by χ², for every material from normal to grazing incidence.
+/// The mass that the density lacks is the share of samples below the surface.
 #[test]
 fn samples_follow_their_density() {
     const SAMPLES: u32 = 100_000;
@@ -227,8 +226,8 @@ fn samples_follow_their_density() {
             (mass + lost - 1.0).abs() < 0.01,
             "{name} at {angle}°: the density integrates to {mass}, {lost} fall below the surface"
         );
-        // Cells that lie almost wholly below the surface may have no point of the quadrature above
-        // it: all that expect less than a count are one.
+        // Merge all bins that expect less than one count: a bin almost wholly below the surface may
+        // have no point of the quadrature above it.
         let is_small = |mass: f64| mass * f64::from(SAMPLES) < 1.0;
         let mut expected = vec![0.0];
         let mut counts = vec![0.0];
@@ -253,7 +252,7 @@ fn samples_follow_their_density() {
     });
 }
 
-/// The bounded cap wastes few samples even where the surface is rough and seen at a grazing angle.
+/// The bounded cap wastes few samples, even on rough surfaces at grazing angles.
 #[test]
 fn few_samples_fall_below_the_surface() {
     case_angles().for_each(|(material, angle)| {
@@ -266,13 +265,13 @@ fn few_samples_fall_below_the_surface() {
     });
 }
 
-/// Fresnel reflectance against closed forms: normal incidence, Brewster's angle, grazing.
+/// Compares Fresnel reflectance with its closed forms: normal, Brewster's angle, grazing.
 #[test]
 fn fresnel_has_its_closed_forms() {
     for ior in [1.0_f32, 1.33, 1.5, 2.4] {
         let normal = ((ior - 1.0) / (ior + 1.0)).powi(2);
         assert!((twin::fresnel_dielectric(1.0, ior) - normal).abs() < 1e-6, "{ior}");
-        // At tanθ = n only the perpendicular part is left: ½((n² − 1)/(n² + 1))².
+        // At tanθ = n only the perpendicular part remains: ½((n² − 1)/(n² + 1))².
         let brewster = 0.5 * ((ior * ior - 1.0) / (ior * ior + 1.0)).powi(2);
         let cosine = 1.0 / (1.0 + ior * ior).sqrt();
         assert!((twin::fresnel_dielectric(cosine, ior) - brewster).abs() < 1e-6, "{ior}");
@@ -292,7 +291,7 @@ fn fresnel_has_its_closed_forms() {
     assert!((found - normal).abs() < 1e-5, "{found} against {normal}");
 }
 
-/// The density of normals projects to 1: ∫ D cosθ dω = 1, down to the narrowest lobe.
+/// The distribution of normals projects to 1, ∫ D cosθ dω = 1, down to the narrowest lobe.
 #[test]
 fn ggx_normals_project_to_one() {
     for alpha in [1e-3_f32, 0.01, 0.1, 0.5, 1.0] {
@@ -304,7 +303,7 @@ fn ggx_normals_project_to_one() {
                 let alpha = f64::from(alpha);
                 let theta = (alpha * (t / (1.0 - t)).sqrt()).atan();
                 let normal = direction(theta, 0.3);
-                // dθ/dt by tanθ = α√(t/(1−t)).
+                // dθ/dt from tanθ = α√(t/(1−t)).
                 let tangent = theta.tan();
                 let slope = alpha * alpha
                     / (2.0 * tangent * (1.0 - t) * (1.0 - t))

@@ -1,5 +1,5 @@
-//! The measured materials of the shared folder, where it is present beside the repository: albedos
-//! against known figures, time to load, and how well they are sampled.
+//! Measured materials of the shared folder, where it lies beside the repository: their albedos
+//! against known figures, and the variance of their samples.
 
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
@@ -19,14 +19,14 @@ mod materials;
 
 use materials::direction;
 
-/// The file of that name, or `None` where there is no shared folder.
+/// Returns the path of a file, or `None` where there is no shared folder.
 fn shared(name: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes/brdf").join(name);
     path.exists().then_some(path)
 }
 
-/// ∫ f(incident) dω over the hemisphere by the midpoint rule over half vectors, dense in θ_h near 0:
-/// dω_i = 4 ω_o·h dω_h.
+/// Integrates f(incident) dω over the hemisphere by the midpoint rule over half vectors, dense in
+/// θ_h near 0, with dω_i = 4 ω_o·h dω_h.
 fn integrate(outgoing: Vec3, f: impl Fn(Vec3) -> DVec3 + Sync) -> DVec3 {
     const POLAR: u32 = 400;
     const AZIMUTH: u32 = 240;
@@ -58,10 +58,10 @@ fn tables(path: &Path) -> MaterialTables {
     MaterialTables::new(&[Material { name: "measured".to_string(), kind }]).unwrap()
 }
 
-/// Cosine-weighted albedo at 15° and, for the Cornell files, 60°, against those of pbrt-v2's
-/// interpolation of the same samples. At 60° the two coated paints get a third of theirs from one
-/// sample in the highlight, which pbrt-v2 spreads over ten degrees and we do not: they may be darker
-/// by that, and not brighter.
+/// Compares cosine-weighted albedos at 15° and, for the Cornell files, 60° with those of pbrt-v2's
+/// interpolation of the same samples. At 60° the two coated paints get a third of their albedo from
+/// one sample in the highlight. pbrt-v2 spreads it over ten degrees and we do not, so ours may be
+/// darker by that much, but not brighter.
 #[test]
 fn albedos_are_as_known() {
     let known = [
@@ -104,8 +104,8 @@ fn albedos_are_as_known() {
     }
 }
 
-/// Relative variance of f·cos/pdf, in luminance: below 1 from straight above to grazing, where
-/// cosine sampling of the same materials has up to 50,000; 0.1 for the smooth tables.
+/// Limits the relative variance of f·cos/pdf, in luminance, to 1 from normal to grazing incidence
+/// and to 0.1 for the smooth tables. Cosine sampling of the same materials reaches 50,000.
 #[test]
 fn measured_materials_are_sampled_well() {
     for name in [

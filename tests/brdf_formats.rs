@@ -1,4 +1,4 @@
-//! MERL and Cornell files: what is read, and what is refused with which message.
+//! MERL and Cornell files: the values read from them, and the messages that refuse bad ones.
 
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
@@ -16,14 +16,14 @@ use fenestra::brdf::{
 use glam::Vec3;
 use tempfile::TempDir;
 
-/// A file in a folder of its own.
+/// Writes a file into `folder`.
 fn file(folder: &TempDir, name: &str, content: &[u8]) -> PathBuf {
     let path = folder.path().join(name);
     fs::write(&path, content).unwrap();
     path
 }
 
-/// Message of the error that reading a file of this content gives.
+/// Returns the error message for a file of this content.
 fn message(name: &str, content: &[u8]) -> String {
     let folder = TempDir::new().unwrap();
     MeasuredTable::load(&file(&folder, name, content)).unwrap_err().to_string()
@@ -35,7 +35,7 @@ fn assert_contains(message: &str, parts: &[&str]) {
     }
 }
 
-/// Bytes of a MERL file of the given stored values (before the scales) by channel and cell.
+/// Encodes a MERL file from its stored values, before the scales, by channel and cell.
 fn merl_bytes(dimensions: [i32; 3], stored: impl Fn(usize, usize) -> f64) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(FILE_BYTES);
     dimensions.iter().for_each(|count| bytes.extend(count.to_le_bytes()));
@@ -45,7 +45,7 @@ fn merl_bytes(dimensions: [i32; 3], stored: impl Fn(usize, usize) -> f64) -> Vec
     bytes
 }
 
-/// Value in 1/sr that names a cell by its indices, small enough to reflect less than it receives.
+/// Names a cell by a value in 1/sr, small enough to reflect less light than it receives.
 fn cell_name(theta_half: usize, theta_difference: usize, phi: usize) -> Vec3 {
     Vec3::new(
         0.05 + 0.001 * theta_half as f32,
@@ -54,8 +54,8 @@ fn cell_name(theta_half: usize, theta_difference: usize, phi: usize) -> Vec3 {
     )
 }
 
-/// The value at a bin's centre is the stored one times its channel's scale: index order, angles and
-/// scales at once.
+/// The value at a bin's centre is the stored one times its channel's scale. Tests index order,
+/// angles and scales at once.
 #[test]
 fn merl_cells_lie_where_the_format_says() {
     let bytes = merl_bytes([90, 90, 180], |channel, cell| {
@@ -87,7 +87,7 @@ fn merl_cells_lie_where_the_format_says() {
     assert!(checked > 5_000, "{checked}");
 }
 
-/// The first indices by hand: θ_h = 45° and θ_d = 30° with φ_d = 60° lie in bins 63, 30 and 60.
+/// Checks indices worked by hand: θ_h = 45°, θ_d = 30° and φ_d = 60° lie in bins 63, 30 and 60.
 #[test]
 fn merl_index_has_its_closed_form() {
     let bin_45 = (90.0 * (0.5_f64).sqrt()).floor() as usize;
@@ -104,7 +104,7 @@ fn merl_index_has_its_closed_form() {
 /// Invalid cells take a neighbour's value, are counted, and never reach the shader.
 #[test]
 fn merl_invalid_cells_are_filled_from_their_neighbours() {
-    // The second of these cells is among the negative ones.
+    // The second of these cells is also among the negative ones.
     let is_nan = |cell: usize| cell.is_multiple_of(1_000_003);
     let bytes = merl_bytes([90, 90, 180], |channel, cell| {
         if is_nan(cell) {
@@ -154,13 +154,13 @@ fn merl_sizes_are_checked_before_reading() {
         &message("a.binary", &with_header([90, 90, 180], HEADER_BYTES + 800)),
         &["truncated", &size, "found 812"],
     );
-    // The header is recognised whatever the name.
+    // The header decides, whatever the name.
     assert_contains(&message("a.data", &with_header([90, 90, 180], 5000)), &["truncated", "5000"]);
     let too_long = with_header([90, 90, 180], FILE_BYTES + 1);
     assert_contains(&message("a.binary", &too_long), &["too long", "found 34992013"]);
 }
 
-/// A Cornell file of three wavelengths and the records of a Lambertian surface.
+/// Formats a Cornell file of three wavelengths with the records of a Lambertian surface.
 fn cornell_text(value: f64) -> String {
     let mut text = String::from("# a comment\n3 # wavelengths\n450 550\n650\n");
     for theta_incident in [0.3_f64, 0.8, 1.3] {
@@ -186,7 +186,7 @@ fn cornell_constant_samples_give_a_constant_grid() {
         let (outgoing, incident) = bin_directions(theta_half, theta_difference, phi);
         assert!(outgoing.z > 0.0 && incident.z > 0.0);
         values.push(table.evaluate(outgoing, incident));
-        // Three wavelengths are a coarse spectrum, yet of the right luminance.
+        // Three wavelengths make a coarse spectrum, but of the right luminance.
         let luminance = values[0].dot(Vec3::new(0.2126, 0.7152, 0.0722));
         assert!((luminance - 0.1).abs() < 2e-3, "{luminance}");
         let difference = (values[0] - values[values.len() - 1]).abs().max_element();
@@ -234,8 +234,7 @@ fn a_missing_file_is_named() {
     assert_contains(&message, &["no/such.brdf", "cannot read"]);
 }
 
-/// Grid values that would reflect more light than they receive are scaled until they do not, and
-/// stay reciprocal.
+/// Grid values that would reflect more light than they receive are scaled down and stay reciprocal.
 #[test]
 fn energy_is_limited() {
     let table = MeasuredTable::tabulate(|outgoing, incident| {
@@ -263,11 +262,11 @@ fn energy_is_limited() {
     }
 }
 
-/// The interpolation has no seam where φ_d wraps around, nor at the poles of θ_h and θ_d, where it
+/// The interpolation has no seam where φ_d wraps around, or at the poles of θ_h and θ_d, where it
 /// turns quickly.
 #[test]
 fn interpolation_is_continuous() {
-    // Every cell different, as noise would be.
+    // Make all cells differ, as noise would.
     let mut cells = vec![Vec3::ZERO; CELL_COUNT];
     for (index, cell) in cells.iter_mut().enumerate() {
         *cell = Vec3::splat(0.05 + 0.1 * ((index * 7919) % 1000) as f32 / 1000.0);
@@ -282,7 +281,7 @@ fn interpolation_is_continuous() {
     for index in 0..200_u32 {
         let theta = 0.1 + 1.2 * index as f32 / 200.0;
         let outgoing = Vec3::new(theta.sin() * 0.6, theta.sin() * 0.8, theta.cos());
-        // Half vector at the normal; directions equal; both in one plane with the normal.
+        // Half vector along the normal, equal directions, and both in one plane with the normal.
         let in_plane =
             Vec3::new((0.5 * theta).sin() * 0.6, (0.5 * theta).sin() * 0.8, (0.5 * theta).cos());
         for incident in [mirror(outgoing), outgoing, in_plane, mirror(in_plane)] {

@@ -36,7 +36,7 @@ struct BrdfAnswer {
     albedo: Vec3,
 }
 
-/// Pairs over the hemisphere, in lobes, in retro-reflection, below the surface and at grazing angles.
+/// Takes directions over the hemisphere, in lobes, retro-reflected, below the surface and grazing.
 fn query(index: u32) -> BrdfQuery {
     let material = index % cases().len() as u32;
     let u = uniform(index, 7);
@@ -54,7 +54,7 @@ fn query(index: u32) -> BrdfQuery {
     BrdfQuery { outgoing_local, incident_local, u: uniform(index, 10), material }
 }
 
-/// Largest difference of two vectors relative to the second, with an absolute part.
+/// Returns the largest difference of two vectors, relative to the second plus an absolute part.
 fn difference(found: Vec3, expected: Vec3, absolute: f32) -> f32 {
     (found - expected).abs().max_element() / (expected.abs().max_element() + absolute)
 }
@@ -75,8 +75,8 @@ fn shader_agrees_with_its_twin() {
     );
     let answers: Vec<BrdfAnswer> = bytemuck::pod_collect_to_vec(&bytes);
 
-    // A direction whose rounding puts it into the next bin of a sampling table has another density
-    // there; that may happen, rarely.
+    // In rare cases, rounding moves a direction into the next bin of a sampling table, where the
+    // density is another.
     let mut other_bins = 0;
     for (query, answer) in queries.iter().zip(&answers) {
         let material = query.material as usize;

@@ -1,5 +1,5 @@
-//! `candidates=auto` of the sampler `guided`: measured, recorded, kept by whoever goes on, and of no
-//! other influence on the picture.
+//! `candidates=auto` of the sampler `guided`: the choice is measured, recorded and kept by renders
+//! that go on, and has no other influence on the picture.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 #[path = "support/command.rs"]
@@ -40,13 +40,14 @@ fn the_choice_is_measured_and_changes_nothing_else() {
     assert_eq!(tried, GUIDED_CANDIDATES[..tried.len()]);
     assert!(tried.len() == 3 || chosen == 1, "8 are tried where 4 are worth it");
     assert!(costs.iter().all(|cost| cost.ms_per_sample > 0.0));
-    // Samples as few as these say little, but they are those of estimates of the same picture.
+    // So few samples say little, but both variances are those of the same picture.
     let gain = costs[0].relative_variance / costs[1].relative_variance;
     assert!((0.2..5.0).contains(&gain), "{gain}");
     assert_eq!(auto.guide_state().unwrap().unwrap().candidates, Some(chosen));
     assert!(auto.host_ms()["choice of candidates"] > 0.0);
 
-    // The training draws by one candidate, so this is the picture of `candidates=1`, to the bit.
+    // Training draws with one candidate, so that a choice of 1 gives the picture of `candidates=1`
+    // to the bit.
     let mut one = renderer(&scene, guided(Some(1)));
     one.render_pass(5).unwrap();
     assert_eq!((one.candidates(), one.candidate_costs().len()), (Some(1), 0));
@@ -77,7 +78,7 @@ fn whoever_goes_on_takes_the_recorded_choice() {
     assert!(second.candidate_costs().is_empty(), "nothing was measured");
     first.render_pass(4).unwrap();
     assert_same(&first.sums().unwrap(), &second.sums().unwrap());
-    // Whatever was recorded is taken, and 1 and 8 are not the same picture.
+    // The recorded number is taken, and 1 and 8 give different pictures.
     let other = GuideState { candidates: Some(8), ..state.clone() };
     let mut eight = go_on(guided(None), &other);
     assert_eq!(eight.candidates(), Some(8));
@@ -86,10 +87,10 @@ fn whoever_goes_on_takes_the_recorded_choice() {
     let one = go_on(guided(Some(1)), &other);
     assert_eq!(one.candidates(), Some(1), "what is asked for is not overruled");
     assert!(one.sums().unwrap() != eight.sums().unwrap());
-    // Without a record it is measured.
+    // Without a record, the choice is measured.
     let none = go_on(guided(None), &GuideState { candidates: None, ..state });
     assert!(none.candidates().is_some() && none.candidate_costs().len() >= 2);
-    // Another run starts from nothing.
+    // A restart forgets the choice.
     eight.restart(0).unwrap();
     assert_eq!(eight.candidates(), None);
     eight.render_pass(1).unwrap();
@@ -145,7 +146,7 @@ fn files_and_figures_tell_the_choice() {
         info.output
     );
 
-    // A checkpoint and a guide by another number, as another machine may have chosen it.
+    // Record another number, as another machine may have chosen it.
     let other = if chosen == 4 { 8 } else { 4 };
     for name in ["a.checkpoint.guide", "room.guide"] {
         let path = folder.path().join(name);

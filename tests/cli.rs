@@ -10,14 +10,14 @@ use std::process::Stdio;
 use command::{Folder, Run, program};
 use fenestra::film::Image;
 
-/// An image of one colour.
+/// Makes an image of one colour.
 fn image(width: u32, height: u32, value: f32) -> Image {
     let mut image = Image::new(width, height);
     image.insert_triple(["R", "G", "B"], &vec![[value; 3]; (width * height) as usize]);
     image
 }
 
-/// A folder with the images `a.exr` and `b.exr` of values 1 and 1.1, and `wide.exr` of another size.
+/// Makes a folder with `a.exr` and `b.exr` of values 1 and 1.1, and `wide.exr` of another size.
 fn images() -> Folder {
     let folder = Folder::new();
     image(8, 8, 1.0).write_exr(&folder.path().join("a.exr")).unwrap();
@@ -26,13 +26,13 @@ fn images() -> Folder {
     folder
 }
 
-/// The commands that `--help` lists.
+/// Returns the commands that `--help` lists.
 fn commands(folder: &Folder) -> Vec<String> {
     let help = folder.run(&["--help"]).output;
     let (_, list) = help.split_once("Commands:\n").expect("help lists the commands");
     list.lines()
         .take_while(|line| !line.is_empty())
-        // Continuation lines of a description are indented further.
+        // Skip continuation lines of descriptions, which are indented further.
         .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
         .filter_map(|line| line.split_whitespace().next())
         .map(str::to_owned)
@@ -139,7 +139,7 @@ fn a_heatmap_is_written_into_a_new_folder() {
 
 #[test]
 fn a_full_disk_is_reported() {
-    // Every write to this device fails for want of space.
+    // Every write to this device fails for lack of space.
     let run = images().run(&["compare", "b.exr", "a.exr", "--heatmap", "/dev/full"]);
     run.assert(1, &["error: /dev/full: cannot write: No space left on device"]);
 }
@@ -186,7 +186,7 @@ fn no_driver_is_explained() {
 #[test]
 fn a_missing_loader_is_explained() {
     let folder = Folder::new();
-    // The search ends at the first file of that name, and this one is no library.
+    // The search ends at the first file of this name, which is no library.
     folder.write("libvulkan.so.1", "");
     folder.write("libvulkan.so", "");
     let mut command = program(folder.path());

@@ -1,4 +1,4 @@
-//! Scenes whose picture is known in closed form, through every sampler.
+//! Scenes whose picture is known in closed form, rendered with every sampler.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 mod support;
@@ -21,7 +21,7 @@ fn image_mean(sums: &Sums) -> DVec3 {
         / sums.pixel_count() as f64
 }
 
-/// Mean over `seeds` independent renders and its standard error, per channel.
+/// Estimates the image's mean and its standard error, per channel, from independent renders.
 fn mean_and_error(scene: &Scene, settings: &Settings, samples: u32, seeds: u32) -> [DVec3; 2] {
     let mut renderer = support::renderer(scene, settings.clone());
     let means: Vec<Vec<f64>> = (0..seeds)
@@ -51,7 +51,7 @@ fn a_convex_diffuse_body_in_a_furnace_is_its_reflectance() {
     let reflectance = Vec3::new(0.2, 0.5, 1.0);
     let radiance = Vec3::new(3.0, 2.0, 1.0);
     let scene = scenes::convex_furnace(diffuse(reflectance), radiance);
-    // Samplers proportional to the cosine have no variance here, at any pixel and any seed.
+    // Samplers proportional to the cosine have no variance here, in any pixel with any seed.
     for sampler in [Sampler::Cosine, Sampler::Brdf] {
         let sums = render(&scene, Settings { sampler, ..Settings::default() }, 2);
         let expected = (reflectance * radiance).as_dvec3();
@@ -59,7 +59,7 @@ fn a_convex_diffuse_body_in_a_furnace_is_its_reflectance() {
             let mean = DVec3::from(sums.mean(pixel));
             let is_background = (mean - radiance.as_dvec3()).abs().max_element() < 1e-4;
             let is_body = (mean - expected).abs().max_element() < 1e-4;
-            // Pixels at the silhouette mix both; a box filter over two samples gives their mean.
+            // A pixel on the silhouette is the mean of both, by a box filter over two samples.
             let is_edge =
                 (mean - 0.5 * (expected + radiance.as_dvec3())).abs().max_element() < 1e-4;
             assert!(is_background || is_body || is_edge, "{} {pixel}: {mean}", sampler.name());
@@ -70,7 +70,7 @@ fn a_convex_diffuse_body_in_a_furnace_is_its_reflectance() {
 
 #[test]
 fn irradiance_of_a_plane_is_the_integral_of_the_map() {
-    // f64 quadrature of the very map, bilinear as the renderer sees it.
+    // Integrate the map itself in f64, bilinear as the renderer sees it.
     let reflectance = Vec3::new(0.3, 0.6, 0.9);
     let scene = scenes::plane(reflectance, scenes::sky());
     let steps = 1024;
@@ -90,7 +90,7 @@ fn irradiance_of_a_plane_is_the_integral_of_the_map() {
         let settings = Settings { sampler, ..Settings::default() };
         let [mean, error] = mean_and_error(&scene, &settings, 16, 12);
         let z = (mean - expected) / error;
-        // 18 comparisons with 11 degrees of freedom: |t| > 7 has a chance of 4e-4 in all. The
+        // 27 comparisons with 11 degrees of freedom: |t| > 7 has a chance of 6e-4 in all. The
         // quadrature is good to 1e-4.
         let close = (mean / expected - 1.0).abs().max_element() < 2e-4;
         assert!(
@@ -110,14 +110,14 @@ fn a_concave_white_body_vanishes_in_the_furnace() {
     for sampler in [Sampler::Cosine, Sampler::Mis, Sampler::Ris] {
         let sums = render(&scene, Settings { sampler, ..settings.clone() }, 64);
         let mean = image_mean(&sums);
-        // The crevice between sphere and box keeps a little beyond 24 vertices.
+        // The crevice between sphere and box holds a little light beyond 24 vertices.
         assert!((mean - 1.0).abs().max_element() < 4e-3, "{}: {mean}", sampler.name());
         for pixel in 0..sums.pixel_count() {
             let value = sums.mean(pixel)[1];
             assert!((0.7..1.3).contains(&value), "{} pixel {pixel}: {value}", sampler.name());
         }
     }
-    // With direct light alone the crevice is dark: the test above needs its bounces.
+    // With direct light alone the crevice is dark, so the test above depends on bounces.
     let direct = image_mean(&render(&scene, Settings::default(), 64));
     assert!(direct.x < 0.99, "{direct}");
 }

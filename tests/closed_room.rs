@@ -1,5 +1,5 @@
-//! A nearly closed room, where few rays see the light: the pixels that `guided` gets most wrong are not
-//! clearly worse than those of `mis`, and the picture is better.
+//! A nearly closed room, where few rays see the light: the worst pixels of `guided` are not clearly
+//! worse than those of `mis`, and its picture is better.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 mod support;
@@ -17,7 +17,7 @@ use fenestra::{
 const SAMPLES: u32 = 64;
 const REPLICATES: u32 = 12;
 
-/// Pictures with seeds of their own, which learn from nothing each, and their rays traced.
+/// Renders pictures with seeds of their own, each learned from nothing, and counts the rays traced.
 fn pictures(scene: &Scene, sampler: Sampler, candidates: u32) -> (Vec<RgbImage>, f64) {
     let parameters = Parameters { candidates: Some(candidates), ..Parameters::default() };
     let settings = Settings { sampler, parameters, ..Settings::default() };
@@ -53,7 +53,7 @@ fn mean(pictures: &[&[RgbImage]]) -> RgbImage {
     RgbImage { width: all[0].width, height: all[0].height, pixels }
 }
 
-/// Relative squared errors of the pixels of all pictures, ascending.
+/// Returns the relative squared errors of all pictures' pixels in ascending order.
 fn errors(pictures: &[RgbImage], reference: &RgbImage) -> Vec<f64> {
     let mut all: Vec<f64> = pictures
         .iter()
@@ -85,7 +85,7 @@ fn fireflies_are_no_worse_than_those_of_mis() {
     for (pictures, rays) in [(&one, one_rays), (&four, four_rays)] {
         let (ours, our_p999, our_max) = figures(pictures);
         eprintln!("guided: {ours:.4}, {our_p999:.2}, {our_max:.1}, {rays} rays");
-        // The mean with all fireflies in it.
+        // This mean includes all fireflies.
         assert!(ours < relmse, "relMSE {ours} against {relmse}");
         assert!(our_p999 < 2.0 * p999, "99.9% {our_p999} against {p999}");
         assert!(rays < 1.5 * mis_rays, "{rays} against {mis_rays} rays");

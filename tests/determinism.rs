@@ -16,7 +16,7 @@ fn scene() -> Scene {
     scenes::room(vec![scenes::diffuse(Vec3::splat(0.7)), scenes::plastic(0.1), scenes::copper(0.2)])
 }
 
-/// `candidates` are given, since `auto` is measured and may differ from run to run.
+/// Fixes `candidates`, since `auto` is measured and may differ from run to run.
 fn settings(sampler: Sampler) -> Settings {
     let mut aovs = vec![Aov::Albedo, Aov::Normal, Aov::Position, Aov::Visible];
     match sampler {

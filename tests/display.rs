@@ -1,4 +1,4 @@
-//! The client of the display server, against a listener that reads tev's protocol.
+//! The display server's client, against a listener that reads tev's protocol.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 use std::{
@@ -46,7 +46,7 @@ impl Packet {
     }
 }
 
-/// What a server shows in the end: name, size, pixels.
+/// Accepts one client and returns the name, size and pixels shown in the end.
 fn serve(listener: &TcpListener) -> (String, [i32; 2], Vec<[f32; 3]>) {
     let (mut stream, _) = listener.accept().unwrap();
     let mut packet = Packet::receive(&mut stream).expect("a first packet");
@@ -110,7 +110,7 @@ fn the_server_shows_the_last_update() {
 
 #[test]
 fn a_missing_server_is_no_error() {
-    // A port that was free a moment ago.
+    // This port was free a moment ago.
     let address = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
     let mut display = DisplayServer::connect(&address, "image", 2, 2).unwrap();
     assert!(!display.is_connected());

@@ -1,4 +1,4 @@
-//! The environment map: orientation, lookup, and the density its tables sample; the shader twin.
+//! The environment map: orientation, lookup, the density its tables sample, and the shader twin.
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
 mod support;
@@ -25,7 +25,7 @@ use support::statistics::chi_square_p_value;
 
 const ENVIRONMENT_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/environment.spv"));
 
-/// Every test here that can fail by chance fails for less than one seed in a million.
+/// Chance of a false alarm: a test fails by chance for less than one seed in a million.
 const FALSE_ALARM: f64 = 1e-6;
 
 fn map(width: u32, height: u32, texel: impl Fn(u32, u32) -> Vec3) -> EnvironmentMap {
@@ -38,12 +38,12 @@ fn map(width: u32, height: u32, texel: impl Fn(u32, u32) -> Vec3) -> Environment
     }
 }
 
-/// A map whose only texel that is not black is (column, row).
+/// Makes a map whose only texel that is not black is (column, row).
 fn one_texel(width: u32, height: u32, column: u32, row: u32) -> EnvironmentMap {
     map(width, height, |i, j| if (i, j) == (column, row) { Vec3::ONE } else { Vec3::ZERO })
 }
 
-/// Random texels, a third of them black.
+/// Makes a map of random texels, a third of them black.
 fn random_map(width: u32, height: u32) -> EnvironmentMap {
     map(width, height, |i, j| {
         let channel = |channel| random_independent_1d(i, j, channel, 4);
@@ -52,7 +52,7 @@ fn random_map(width: u32, height: u32) -> EnvironmentMap {
     })
 }
 
-/// Maps on which the density is tested.
+/// Returns the maps for tests of the density.
 fn maps() -> Vec<(&'static str, EnvironmentMap)> {
     let mut turned = random_map(12, 6);
     turned.rotation_rad = 2.1;
@@ -73,8 +73,8 @@ fn maps() -> Vec<(&'static str, EnvironmentMap)> {
 
 #[test]
 fn a_single_bright_texel_shows_the_orientation() {
-    // 64×32 texels; the four texels around the looked-up direction share it, so it sees a quarter of
-    // a bright one. Column 32 starts at the centre, −Z; column 48 at three quarters, +X; row 0 is +Y.
+    // Each lookup falls between four of the 64×32 texels and sees a quarter of a bright one. Column
+    // 32 starts at the centre, −Z; column 48 at three quarters, +X; row 0 is +Y.
     let brightest = |map: &EnvironmentMap| {
         let axes = [
             ("+X", Vec3::X),
@@ -97,7 +97,7 @@ fn a_single_bright_texel_shows_the_orientation() {
     assert_eq!(brightest(&one_texel(64, 32, 16, 16)), "-X");
     assert_eq!(brightest(&one_texel(64, 32, 32, 0)), "+Y");
     assert_eq!(brightest(&one_texel(64, 32, 32, 31)), "-Y");
-    // Turned by 90 degrees, the centre looks along −X and the right of it along −Z.
+    // Turned by 90 degrees, the centre looks along −X and the column right of it along −Z.
     let turned = |column| {
         let mut map = one_texel(64, 32, column, 16);
         map.rotation_rad = 90_f32.to_radians();
@@ -120,24 +120,24 @@ fn lookup_is_bilinear_between_texel_centres_wrapping_in_u_and_clamped_in_v() {
     let upper = texel(5, 3) * 0.25 + texel(6, 3) * 0.75;
     let lower = texel(5, 4) * 0.25 + texel(6, 4) * 0.75;
     assert!(between.distance(upper * 0.75 + lower * 0.25) < 1e-5);
-    // The seam is half a texel away from either neighbour.
+    // The seam lies half a texel from either neighbour.
     for x in [0.0, 16.0] {
         assert!(at(x, 2.5).distance(0.5 * (texel(0, 2) + texel(15, 2))) < 1e-5);
     }
-    // Above the centres of the first row v no longer matters.
+    // Beyond the centres of the first and last rows, v no longer matters.
     assert!(at(3.5, 0.1).distance(texel(3, 0)) < 1e-5);
     assert!(at(3.5, 7.9).distance(texel(3, 7)) < 1e-5);
 }
 
-/// Probability of each of `split`² equal parts of every cell, rows of cells first, by two-point Gauss
-/// quadrature of the density in (u, v), which is exact for a bilinear density.
+/// Integrates the density over `split`² equal parts of every cell, row by row, by two-point Gauss
+/// quadrature in (u, v), which is exact for a bilinear density.
 fn cell_probabilities(map: &EnvironmentMap, tables: &EnvironmentTables, split: u32) -> Vec<f64> {
     let (width, height) = (map.width * split, (map.height + 1) * split);
     let turn = f64::from(map.rotation_rad) / (2.0 * PI);
     let mut probabilities = vec![0.0; (width * height) as usize];
     for (index, probability) in probabilities.iter_mut().enumerate() {
         let (i, j) = (index as u32 % width, index as u32 / width);
-        // Clipped to the half cells at the poles.
+        // Clip to the half cells at the poles.
         let edge = |j: u32| {
             (f64::from(j) / f64::from(split) - 0.5).clamp(0.0, f64::from(map.height))
                 / f64::from(map.height)
@@ -190,7 +190,7 @@ fn the_tables_hold_the_probabilities_of_the_density() {
     }
 }
 
-/// Bin of a direction among the parts of `cell_probabilities`.
+/// Returns the index of a direction's part in [`cell_probabilities`].
 fn bin(map: &EnvironmentMap, direction: Vec3, split: u32) -> usize {
     let uv = lat_long_from_direction(direction);
     let u = (uv.x + map.rotation_rad / (2.0 * PI as f32)).rem_euclid(1.0);
@@ -212,7 +212,7 @@ fn samples_have_the_density() {
             assert!(sample.direction.is_normalized() && sample.pdf >= 0.0, "{name}");
             observed[bin(&map, sample.direction, split)] += 1.0;
         }
-        // Rounding at the edge of a bin must not look like an impossible count.
+        // Do not take rounding at the edge of a bin for an impossible count.
         for (observed, expected) in observed.iter_mut().zip(&expected) {
             if *expected < 1e-9 && *observed < 3.0 {
                 *observed = 0.0;
@@ -235,7 +235,7 @@ fn a_sample_carries_its_own_radiance_and_density() {
             let tolerance = 1e-5 * brightest;
             assert!(radiance.distance(sample.radiance) < 8.0 * tolerance, "{name}: {sample:?}");
             let pdf = tables.pdf(&map, sample.direction, sample.radiance);
-            // The density jumps from row to row; rounding may put a direction into the next one.
+            // The density jumps from row to row, and rounding may move a direction into the next one.
             if (pdf - sample.pdf).abs() > 2e-5 * sample.pdf + 1e-12 {
                 different_rows += 1;
             }
@@ -258,8 +258,8 @@ fn only_cells_that_are_not_black_are_drawn_whatever_the_numbers() {
             assert!(sample.pdf.is_finite() && sample.radiance.is_finite());
         }
     }
-    // Black rows, and black cells in rows that are not black, hold the same entries as the cell
-    // before them, so that no number falls between.
+    // Black rows, and black cells in other rows, repeat the entry before them, so that no number
+    // falls between.
     for row in 0..33 {
         let black = !(9..=10).contains(&row);
         let before = if row == 0 { 0.0 } else { tables.rows[row - 1] };
@@ -282,7 +282,7 @@ fn a_black_map_has_no_samples() {
 fn a_constant_map_is_sampled_nearly_uniformly() {
     let map = EnvironmentMap::constant(Vec3::ONE, 2.0).unwrap();
     let tables = EnvironmentTables::new(&map);
-    // Within the cells at the poles L / pdf goes with the sine; elsewhere by half a row of 5.6°.
+    // L / pdf follows the sine in the cells at the poles; elsewhere it varies by half a row of 5.6°.
     for i in 0..1000 {
         let [u, v] = random_independent_2d(i, 0, 0, 5);
         let direction = direction_from_lat_long(Vec2::new(u, 0.1 + 0.8 * v));
@@ -291,15 +291,15 @@ fn a_constant_map_is_sampled_nearly_uniformly() {
     }
 }
 
-/// Means of f·L/pdf over the map's own samples must be ∫ f·L dω, whatever the map.
+/// The mean of f·L/pdf over the map's own samples is ∫ f·L dω, whatever the map.
 #[test]
 fn estimates_of_reflected_light_are_unbiased() {
-    // A smooth function without the symmetries of a cell.
+    // Smooth, and without the symmetries of a cell.
     let reflectance =
         |direction: Vec3| (1.0 + 0.9 * direction.x) * (1.0 + 0.5 * direction.y - 0.4 * direction.z);
     for (name, map) in maps() {
         let tables = EnvironmentTables::new(&map);
-        // ∫ f·L dω by the midpoint rule, 128 points per cell or more.
+        // Integrate f·L dω by the midpoint rule with at least 128 points per cell.
         let mut truth = 0.0;
         let parts = (256 / map.width.min(2 * map.height)).max(8);
         let (width, height) = (map.width * parts, (2 * map.height) * parts);

@@ -1,4 +1,4 @@
-//! Environment maps from files and from parameters: what is read, repaired, warned of and refused.
+//! Environment maps from files and from parameters: values, repairs, warnings and refusals.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 use std::{
@@ -16,7 +16,7 @@ use fenestra::{
 use glam::{Vec2, Vec3};
 use tempfile::TempDir;
 
-/// 8×4 texels that RGBE and half floats hold exactly, all different.
+/// Texel of an 8×4 map. All differ, and RGBE and half floats hold them exactly.
 fn texel(index: usize) -> Vec3 {
     Vec3::new(1.0 + index as f32, 0.5, 2.0 * index as f32)
 }
@@ -31,14 +31,14 @@ fn write(folder: &TempDir, name: &str, bytes: &[u8]) -> PathBuf {
     path
 }
 
-/// The map and its warnings.
+/// Loads a map with its warnings.
 fn load(path: &Path) -> (EnvironmentMap, Vec<String>) {
     let mut warnings = Vec::new();
     let map = EnvironmentMap::load(path, 1.0, 0.0, &mut warnings).unwrap();
     (map, warnings)
 }
 
-/// The message of a failed load, which must name the file.
+/// Returns the message of a failed load and checks that it names the file.
 fn refusal(path: &Path) -> String {
     let mut warnings = Vec::new();
     let message =
@@ -96,7 +96,7 @@ fn every_format_gives_the_same_map_with_the_first_row_on_top() {
     let component = |c: usize| texels().iter().map(move |texel| texel[c]).collect::<Vec<f32>>();
     let half = |c: usize| component(c).into_iter().map(half::f16::from_f32).collect::<Vec<_>>();
     let path = folder.path().join("mixed.exr");
-    // Channels of several types, with others between them.
+    // Mix channels of several types with others between them.
     write_exr(
         &path,
         vec![
@@ -238,7 +238,7 @@ fn a_file_with_flipped_bytes_never_panics() {
             let mut damaged = bytes.clone();
             damaged[position] ^= 0xff;
             let path = write(&folder, name, &damaged);
-            // Either outcome is fine; what is read must be radiance.
+            // Either outcome is fine, but a map that loads must hold radiance.
             if let Ok(map) = EnvironmentMap::load(&path, 1.0, 0.0, &mut Vec::new()) {
                 assert!(map.texels.iter().all(|t| t.is_finite() && t.min_element() >= 0.0));
             }
@@ -260,7 +260,7 @@ fn the_uffizi_map_loads_where_it_is_present() {
     assert!(luminance(map.radiance(Vec3::Y)) > 10.0 * luminance(map.radiance(-Vec3::Y)));
 }
 
-/// ∫ lum L dω over directions that satisfy `condition`, midpoint rule over the texels.
+/// Integrates lum L dω over directions that satisfy `condition`, by the midpoint rule over texels.
 fn flux(map: &EnvironmentMap, condition: impl Fn(Vec3) -> bool) -> f64 {
     let (width, height) = (map.width, map.height);
     let mut sum = 0.0;

@@ -1,4 +1,4 @@
-//! OpenEXR files: round trips, what other programs write, and files that are broken.
+//! OpenEXR files: round trips, files of other programs, and broken files.
 
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
@@ -54,7 +54,7 @@ fn images_come_back_as_they_were() {
 fn every_bit_survives_compression() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bits.exr");
-    // All exponents and both signs, some mantissas, infinities; 64 rows make several ZIP blocks.
+    // Cover all exponents, both signs, some mantissas and infinities; 64 rows fill several ZIP blocks.
     let bits: Vec<u32> = (0..64 * 64_u32).map(|index| index.wrapping_mul(0x0010_0801)).collect();
     let samples = bits.iter().map(|&bits| f32::from_bits(bits)).collect();
     let mut image = Image::new(64, 64);
@@ -178,7 +178,7 @@ fn a_file_with_any_byte_wrong_neither_panics_nor_exhausts_memory() {
             let mut broken = whole.clone();
             broken[index] ^= flip;
             fs::write(&path, &broken).unwrap();
-            // A changed sample is as good as another; a changed header must not crash.
+            // A changed sample is as good as another, but a changed header must not crash.
             if let Ok(read) = Image::read_exr(&path) {
                 let pixel_count = read.pixel_count();
                 assert!(read.channels.values().all(|samples| samples.len() == pixel_count));

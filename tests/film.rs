@@ -1,5 +1,4 @@
-//! The film: files written whole or not at all, sums and their estimates, checkpoints to the bit,
-//! merging.
+//! The film: files written whole or not at all, sums and estimates, exact checkpoints, merging.
 
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
@@ -55,7 +54,7 @@ fn range(seed: u32, first: u32, count: u32) -> SampleRange {
     SampleRange { seed, first, count }
 }
 
-/// Adds without loss: Knuth's two-sum, its error gathered in `rest`.
+/// Adds without loss by Knuth's two-sum, whose error gathers in `rest`.
 fn add_two_float(sum: &mut f32, rest: &mut f32, value: f32) {
     let before = *sum;
     *sum = before + value;
@@ -63,7 +62,7 @@ fn add_two_float(sum: &mut f32, rest: &mut f32, value: f32) {
     *rest += (before - (*sum - added)) + (value - added);
 }
 
-/// Accumulates as the device does: two-float sums of radiance in 0…1 times `scale`.
+/// Accumulates radiance in 0…1 times `scale` in two-float sums, as the device does.
 fn accumulate(numbers: &mut Random, sample_count: u32, scale: f32) -> (Sums, Vec<Vec<f64>>) {
     let mut sums = Sums::new([3, 1], 4, 2, [10, 6]);
     let mut drawn = vec![Vec::new(); 8];
@@ -162,7 +161,7 @@ fn a_folder_in_the_way_or_a_file_for_a_folder_is_reported() {
 
 #[test]
 fn two_float_sums_stay_exact_where_floats_stagnate() {
-    // 2²⁵ ones cannot be counted in floats, which stop at 2²⁴; start high to keep the test short.
+    // Floats stop counting ones at 2²⁴. Start there to keep the test short.
     let mut sums = Sums::new([0, 0], 1, 1, [1, 1]);
     sums.sum[0] = [16_777_216.0; 3];
     let (mut sum, mut rest) = (16_777_216.0_f32, 0.0_f32);
@@ -192,8 +191,8 @@ fn mean_and_variance_agree_with_64_bit_sums() {
 
 #[test]
 fn relative_error_of_a_picture_worked_by_hand() {
-    // Two pixels, two samples each: 0 and 2 in every channel, and 3 and 3. Means 1 and 3, variance
-    // of the mean 1 and 0, image mean 2: the average of 1/√(1 + 0.04) and 0.
+    // Two pixels have two samples each: 0 and 2 in every channel, and 3 and 3. With means 1 and 3,
+    // variances of the mean 1 and 0, and image mean 2, expect the average of 1/√(1 + 0.04) and 0.
     let mut sums = Sums::new([0, 0], 2, 1, [2, 1]);
     assert_eq!(sums.relative_standard_error(), f64::INFINITY);
     sums.sum = vec![[2.0; 3], [6.0; 3]];
@@ -405,7 +404,7 @@ fn a_checkpoint_of_another_render_is_refused_with_every_difference() {
     }
 }
 
-/// One accumulation of 30 samples, and the same samples in parts of 10 and 20.
+/// Returns one accumulation of 30 samples, and the same samples in parts of 10 and 20.
 fn whole_and_parts() -> (Checkpoint, Checkpoint, Checkpoint) {
     let checkpoint = |sums: Sums, first: u32| {
         let count = sums.sample_count;
@@ -445,7 +444,7 @@ fn merged_checkpoints_equal_one_run() {
         for channel in 0..3 {
             let (found, expected) =
                 (merged.sums.total(pixel)[channel], whole.sums.total(pixel)[channel]);
-            // Both add the same floats; each two-float sum keeps 48 bits.
+            // Both add the same floats, and each two-float sum keeps 48 bits.
             assert!((found / expected - 1.0).abs() < 1e-12, "{found} against {expected}");
         }
     }
@@ -454,7 +453,7 @@ fn merged_checkpoints_equal_one_run() {
     // Order does not matter.
     let other = merge_checkpoints(&[(a, &first), (b, &second)]).unwrap();
     assert_eq!(other.sums, merged.sums);
-    // Parts may have been drawn from other numbers of candidates, which a measurement chose.
+    // Parts may have drawn from different numbers of candidates, each chosen by a measurement.
     assert_eq!(other.metadata.candidates, Some(4));
     let mut second = second.clone();
     second.metadata.candidates = Some(1);
@@ -465,7 +464,7 @@ fn merged_checkpoints_equal_one_run() {
 #[test]
 fn merged_images_equal_one_run_up_to_rounding() {
     let (whole, mut first, second) = whole_and_parts();
-    // Different shares of visible rays must be weighted with the rays.
+    // Shares of visible rays are weighted by the number of rays.
     first.sums.visible[2] = [1, 7];
     first.sums.cache_entries[3] = [9, 2];
     let all = Aov::value_variants();

@@ -1,5 +1,5 @@
-//! Fits: planted mixtures are found, more lobes are better, the same input gives the same bytes, the
-//! cache survives damage, and bad input is refused or answered honestly.
+//! Fits: planted mixtures are recovered, more lobes fit better, the same input gives the same bytes,
+//! the cache survives damage, and bad input is refused or answered honestly.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
@@ -20,7 +20,7 @@ use fenestra::{
 };
 use glam::{Vec2, Vec3};
 
-/// A map of `function` over directions.
+/// Tabulates a function of the direction as a map.
 fn map(width: u32, function: impl Fn(Vec3) -> Vec3) -> EnvironmentMap {
     let height = width / 2;
     let texel = |index: u32| {
@@ -42,7 +42,7 @@ fn fit_map(map: &EnvironmentMap, lobes: usize, method: Method) -> EnvironmentFit
     environment_lobes(map, EnvironmentOptions { lobes, method }, None, &mut |_| ()).unwrap()
 }
 
-/// A sky with a gradient, two windows and a sun of one texel that holds a tenth of the light.
+/// Makes a sky with a gradient, a window and a sun of one texel that holds a tenth of the light.
 fn sunny(width: u32) -> EnvironmentMap {
     let sun = Vec3::new(0.5, 0.6, -0.62).normalize();
     let radius = PI / width as f32;
@@ -68,7 +68,7 @@ fn fit_brdf(tables: &MaterialTables, lobes: usize, views: usize) -> BrdfFit {
     brdf_lobes(tables, 0, "test", options, None, &mut |_| ()).unwrap()
 }
 
-/// Files of `folder` beside the checkout with one of the extensions; none where it is not there.
+/// Lists the files of `folder` beside the checkout with one of the extensions, if it is there.
 fn shared(folder: &str, extensions: &[&str]) -> Vec<std::path::PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(folder);
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
@@ -136,12 +136,12 @@ fn squared_error_is_lower_by_its_own_method() {
 
 #[test]
 fn errors_are_those_of_the_lobes() {
-    // χ² and divergence again, from the lobes alone, by brute force.
+    // Compute χ² and divergence again from the lobes alone, by brute force.
     let target = sunny(512);
     let fit = fit_map(&target, 20, Method::Em);
     let mixture = Mixture { lobes: fit.lobes.iter().map(|lobe| lobe.lobe()).collect() };
     let luminance = fenestra::math::colour::luminance;
-    // Twice as fine as the map, bilinear as the renderer looks it up.
+    // Four times as fine as the map, bilinear as the renderer looks it up.
     let (width, height) = (2048_u32, 1024_u32);
     let (mut energy, mut square, mut divergence) = (0.0_f64, 0.0_f64, 0.0_f64);
     for y in 0..height {
@@ -195,7 +195,7 @@ fn files_hold_what_was_fitted() {
     let description = describe(&path).unwrap();
     assert!(description.lines.iter().any(|line| line.contains("9 of 9")), "{description:?}");
 
-    // Any damage is noticed, wherever it is.
+    // Damage is noticed wherever it is.
     let bytes = fs::read(&path).unwrap();
     for position in (0..bytes.len()).step_by(bytes.len() / 40) {
         let mut damaged = bytes.clone();
@@ -226,7 +226,7 @@ fn the_cache_is_used_and_survives_damage() {
     assert!(second.is_cached);
     assert_eq!(first.lobes, second.lobes);
 
-    // The name of the map and its rotation do not matter, its content and the options do.
+    // The map's name and rotation do not matter; its content and the options do.
     let renamed = EnvironmentMap { source: "other".into(), rotation_rad: 1.0, ..target.clone() };
     let third = fit(&renamed, 8);
     assert!(third.is_cached && third.source == "other");
@@ -276,7 +276,7 @@ fn two_at_once_share_a_cache() {
 fn turned_maps_turn_their_lobes() {
     let target = EnvironmentMap { rotation_rad: 0.7, ..sunny(128) };
     let fit = fit_map(&target, 10, Method::Em);
-    // The window is at +X of the map; the world sees it where the map itself is looked up.
+    // At its turned axis, a lobe meets the radiance that it meets in the unturned map.
     for lobe in fit.world_lobes(target.rotation_rad) {
         let axis = Vec3::from(lobe.axis);
         let unturned = EnvironmentMap { rotation_rad: 0.0, ..target.clone() };
@@ -367,7 +367,7 @@ fn narrow_highlights_move_with_the_view() {
     let largest =
         lobes.iter().max_by(|a, b| lobe_integral(a).total_cmp(&lobe_integral(b))).unwrap();
     assert!(largest.axis.distance(mirror) < 0.02, "{largest:?}");
-    // Beyond the first and last view their lobes stay.
+    // Beyond the first and last views, their lobes apply.
     assert_eq!(fit.lobes_at(0.0).len(), 8);
     assert_eq!(fit.lobes_at(PI / 2.0).len(), 8);
 }

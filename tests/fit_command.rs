@@ -1,4 +1,4 @@
-//! `fenestra fit` and `fenestra info` on what it writes.
+//! `fenestra fit`, and `fenestra info` on the files it writes.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
@@ -10,7 +10,7 @@ use std::fs;
 use command::{Folder, Run, program};
 use serde_json::Value;
 
-/// A grey map of 16 × 8 texels with one bright one, as PFM.
+/// Encodes a grey PFM map of 16 × 8 texels, one of them bright.
 fn pfm() -> Vec<u8> {
     let mut bytes = b"PF\n16 8\n-1.0\n".to_vec();
     for texel in 0..16 * 8 {

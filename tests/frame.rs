@@ -14,7 +14,7 @@ use glam::{Vec2, Vec3};
 
 const FRAME_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/frame.spv"));
 
-/// Axes, both sides of z = 0, near the poles of either axis, and random directions.
+/// Returns axes, directions on both sides of z = 0 and near the poles of either axis, and random ones.
 fn directions() -> Vec<Vec3> {
     let mut directions = vec![
         Vec3::X,
@@ -59,7 +59,7 @@ fn sine_and_cosine_keep_relative_accuracy_near_their_zeros() {
         let [s, c] = sin_cos_pi(x).to_array();
         assert!((f64::from(s) - exact.sin()).abs() < 1.5e-7, "sin π·{x}");
         assert!((f64::from(c) - exact.cos()).abs() < 1.5e-7, "cos π·{x}");
-        // Distance of x from the zeros of the sine is exact in single precision below ¼.
+        // Below ¼, the distance of x from the zeros of the sine is exact in single precision.
         let tiny = x * 1e-6;
         let exact = (std::f64::consts::PI * f64::from(tiny)).sin();
         assert!((f64::from(sin_cos_pi(tiny).x) - exact).abs() <= 2e-7 * exact, "sin π·{tiny}");
@@ -115,14 +115,14 @@ fn the_shader_agrees() {
         host.extend(lat_long_from_direction(direction).to_array());
         host.extend(direction_from_lat_long(uv).to_array());
         host.extend(sin_cos_pi(2.0 * uv.x).to_array());
-        // u has a seam where 0 and 1 are the same.
+        // u has a seam where 0 and 1 coincide.
         let seam = (shader[12] - host[12]).abs() > 0.9;
         for (slot, (a, b)) in host.iter().zip(shader).enumerate() {
             let difference = (a - b).abs();
             worst[slot] = worst[slot].max(if slot == 12 && seam { 0.0 } else { difference });
         }
     }
-    // The arc tangent of the implementation is the weak point: 1.05e-6 with lavapipe.
+    // The implementation's arc tangent is the weak point: 1.05e-6 with lavapipe.
     for (slot, worst) in worst.iter().enumerate() {
         let tolerance = if (12..14).contains(&slot) { 3e-6 } else { 5e-7 };
         assert!(*worst < tolerance, "output {slot} differs by {worst:e}");

@@ -1,8 +1,8 @@
 //! The sampler `guided` on the device: unbiased in every mode, deterministic, and worth its name.
 //!
-//! Each mode is compared with `cosine` by 12 block means × 3 channels from 8 + 8 replicates that
-//! learn from nothing each; |t| > 7.5 has a chance of 3e-6, so that the whole file raises a false
-//! alarm once in about 1,000 runs.
+//! Each mode is compared with `cosine` by 12 block means × 3 channels of 8 + 8 replicates, each
+//! learned from nothing. |t| > 7.5 has a chance of 3e-6, so the 25 comparisons of the file raise a
+//! false alarm once in about 400 runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 mod support;
@@ -67,10 +67,10 @@ fn every_mode_is_unbiased_in_a_room() {
             ("one-sample", with(1, &unchanged)),
             ("4 candidates", with(4, &unchanged)),
             ("8 candidates", with(8, &unchanged)),
-            // Training sweeps and one pass by their snapshot: nothing is learned from the picture.
+            // Training sweeps and one pass by their snapshot: the picture teaches nothing.
             ("1 shadow ray", with(4, &|settings| settings.shadow_rays = 1)),
             ("two groups of shadow rays", with(1, &|settings| settings.shadow_rays = 9)),
-            // Room for nine cells besides the faces: nearly every place falls back.
+            // Nine cells fit besides the faces: nearly every place falls back.
             ("overflow", with(4, &|settings| settings.parameters.guide_memory = 15 * 16 * 256)),
             (
                 "overflow, one-sample",
@@ -97,9 +97,9 @@ fn every_mode_is_unbiased_in_a_room() {
     );
 }
 
-/// Keys are forced to collide: by cells so large that all walls share a few, and by cells so small that
-/// their coordinates, kept modulo 256, repeat every 26 cm or less. With room for all of them, for few,
-/// and for none but the faces.
+/// Forces keys to collide: by cells so large that all walls share a few, and by cells so small that
+/// their coordinates, kept modulo 256, repeat every 26 cm or less. There is room for all of them,
+/// for few, or for none but the faces.
 #[test]
 fn places_that_share_a_key_are_unbiased() {
     let _alone = support::alone();
@@ -109,7 +109,7 @@ fn places_that_share_a_key_are_unbiased() {
     let mut teacher = Renderer::new(support::device(), &scene, guided(1)).unwrap();
     teacher.render_pass(4).unwrap();
     let taught = teacher.guide_state().unwrap().unwrap();
-    // Two words to read and those that are counted, for each of 256 regions, and the shares.
+    // Each of 256 regions takes two words to read and those to count; the shares come on top.
     let cell_bytes = 256 * (8 + 4 * u64::from(GUIDE_COUNT_WORDS)) + 4 * SHARE_WORDS as u64;
     for (name, edge, memory, candidates, samples) in [
         ("huge cells", 1e3, 1 << 27, 1, 32),
@@ -117,12 +117,12 @@ fn places_that_share_a_key_are_unbiased() {
         ("repeating cells", 1e-3, 1 << 27, 4, 32),
         ("repeating cells, little room", 1e-3, 40 * cell_bytes, 1, 32),
         ("faces only", 0.22, 1, 1, 32),
-        // Six cells mislead four candidates: some of the light is in one sample of a hundred.
+        // Six cells mislead four candidates: one sample in a hundred carries some of the light.
         ("faces only", 0.22, 1, 4, 512),
     ] {
         let mut settings = guided(candidates);
         settings.parameters.guide_memory = memory;
-        // What was learned stays with its keys, which now name other places.
+        // The learned counts keep their keys, which now name other places.
         let mut state = taught.clone();
         state.origin.largest_edge = edge;
         state.samples = u32::MAX;
@@ -136,7 +136,7 @@ fn places_that_share_a_key_are_unbiased() {
         assert!(largest_t < LIMIT, "{name}, {candidates} candidates: |t| = {largest_t}");
         assert!((ratio - 1.0).abs() < 0.05, "{name}, {candidates} candidates: {ratio}");
 
-        // That keys are shared, or not, as the name says.
+        // Check that keys are shared, or not, as the name says.
         let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
         state.keys.truncate(6);
         state.counts.truncate(6 * state.origin.regions as usize);
@@ -155,9 +155,9 @@ fn places_that_share_a_key_are_unbiased() {
     }
 }
 
-/// Many replicates of one sample, which reads the training and nothing else, against `mis` with the
-/// same seeds: the camera's numbers are the same, so that the differences come from shadow rays only.
-/// 36 values, |t| > 6 with 47 degrees of freedom: a false alarm in about 10⁵ runs.
+/// Compares many replicates of one sample, which reads only the training, with `mis` at the same
+/// seeds: the camera's numbers are the same, so the differences come from shadow rays alone. 36
+/// values, |t| > 6 with 47 degrees of freedom: a false alarm in about 10⁵ runs.
 #[test]
 fn the_first_pass_after_training_is_unbiased() {
     let _alone = support::alone();
@@ -173,7 +173,7 @@ fn the_first_pass_after_training_is_unbiased() {
     let average = (0..count).map(|index| mean(&reference, index)).sum::<f64>() / count as f64;
     let mut compared = 0;
     for index in 0..count {
-        // The spread of so few samples says nothing about blocks that see hardly any light.
+        // So few samples say nothing about the spread of blocks that see hardly any light.
         if mean(&reference, index) < 0.02 * average {
             continue;
         }
@@ -221,7 +221,7 @@ fn later_vertices_have_the_rays_they_are_given() {
     let first = rays(1, None);
     let [one, two, five] = [Some(1), None, Some(5)].map(|later| rays(2, later) - first);
     assert!(one > 0.1 * first, "{one} of {first}");
-    // Directions below the horizon, which depend on what was learned, are not traced.
+    // Directions below the horizon are not traced; their number depends on the training.
     assert!((two / one - 2.0).abs() < 0.2, "{one} → {two}");
     assert!((five / one - 5.0).abs() < 0.5, "{one} → {five}");
     support::assert_silent();
@@ -249,7 +249,7 @@ fn passes_may_be_grouped_at_will() {
         }
         (renderer.sums().unwrap(), renderer.totals().shadow_rays_traced)
     };
-    // The regions are split anew after 16.
+    // The regions are split anew after 16 samples.
     let (whole, rays) = render(&[21]);
     let (parts, rays_of_parts) = render(&[1, 5, 1, 8, 2, 4]);
     assert_eq!(rays, rays_of_parts);
@@ -258,7 +258,7 @@ fn passes_may_be_grouped_at_will() {
     }
 }
 
-/// Rays that were counted since the last rebuild.
+/// Returns the number of rays counted since the last rebuild.
 fn pending_rays(renderer: &Renderer) -> f64 {
     let pending = renderer.guide_state().unwrap().unwrap().pending;
     pending.iter().map(|[trials, ..]| f64::from(*trials)).sum()
@@ -269,7 +269,7 @@ fn late_samples_teach_by_one_in_four() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
     let mut renderer = Renderer::new(support::device(), &scene, guided(1)).unwrap();
-    // The last rebuild is after 64 samples.
+    // The last rebuild comes after 64 samples.
     renderer.render_pass(80).unwrap();
     let first = pending_rays(&renderer);
     renderer.render_pass(3).unwrap();
@@ -279,7 +279,7 @@ fn late_samples_teach_by_one_in_four() {
     assert!(first > 16.0 * 1000.0, "{first} rays");
     assert!((16.0 * one_more / first - 17.0).abs() < 0.1, "{first} → {one_more}");
     assert!((16.0 * four_more / first - 20.0).abs() < 0.2, "{first} → {four_more}");
-    // Which ones does not depend on the grouping.
+    // The samples that teach do not depend on the grouping.
     let mut other = Renderer::new(support::device(), &scene, guided(1)).unwrap();
     for samples in [65, 16, 1, 14] {
         other.render_pass(samples).unwrap();
@@ -289,8 +289,8 @@ fn late_samples_teach_by_one_in_four() {
     support::assert_silent();
 }
 
-/// With few regions a short render refines cells, and their parts are found: unbiased by the mode "few
-/// regions" above.
+/// With few regions a short render refines cells, and their parts are found. The mode "few regions"
+/// above shows that they are unbiased.
 #[test]
 fn parts_of_refined_cells_are_found() {
     let _alone = support::alone();
@@ -306,7 +306,7 @@ fn parts_of_refined_cells_are_found() {
         .iter()
         .filter_map(|&cell| CellKey(state.keys[cell as usize]).parts())
         .collect();
-    // Rays that the parts counted themselves.
+    // Rays that a part counted itself.
     let regions = state.origin.regions as usize;
     let rays = |cell: usize| -> u32 {
         state.counts[cell * regions..][..regions].iter().map(|[trials, ..]| trials).sum()
@@ -328,7 +328,7 @@ fn a_renderer_goes_on_where_another_stopped() {
     let mut whole = renderer();
     whole.render_pass(21).unwrap();
     let whole = whole.sums().unwrap();
-    // Before and after the regions are split anew.
+    // Stop before and after the regions are split anew.
     for (stop, rebuilt_at) in [(5, 4), (16, 12), (19, 16)] {
         let mut first = renderer();
         first.render_pass(stop).unwrap();
@@ -381,7 +381,7 @@ fn a_guide_of_another_scene_is_refused_or_mostly_forgotten() {
     let mut pupil = Renderer::new(support::device(), &room, guided(1)).unwrap();
     let error = pupil.restore_guide(&damaged).unwrap_err().to_string();
     assert!(error.contains("do not fill the map"), "{error}");
-    // Cells of faces that a cube does not have, and counts that no render has.
+    // Refuse cells of a face that no cube has, and survive counts that no render has.
     let mut damaged = state.clone();
     damaged.keys[FACE_COUNT] |= 7 << 28;
     let error = pupil.restore_guide(&damaged).unwrap_err().to_string();
@@ -432,9 +432,9 @@ fn rays_of_training_are_counted_and_more_rays_are_visible() {
     assert!(guided > 1.5 * mis, "visible: {guided} of guided rays, {mis} of mis");
 }
 
-/// Grey diffuse surfaces respond by reflectance / π · cosine whatever the light's colour is, and no ray by
-/// more than at normal incidence. Most surfaces that point up are the floor, where the cosine is that of
-/// the region; the rest are the sphere's.
+/// Grey diffuse surfaces respond by reflectance / π · cosine whatever the light's colour, and to no
+/// ray by more than at normal incidence. Most surfaces that point up belong to the floor, where the
+/// cosine is that of the region; the rest belong to the sphere.
 #[test]
 fn visible_rays_teach_how_surfaces_respond() {
     let _alone = support::alone();
@@ -453,7 +453,7 @@ fn visible_rays_teach_how_surfaces_respond() {
             for ([_, hits, response], region) in counts.iter().zip(&partition.regions) {
                 let hits = f64::from(*hits) / PARTS_PER_RAY as f64;
                 let response = f64::from(*response);
-                // Counts that were split over new regions are rounded.
+                // Splitting counts over new regions rounds them.
                 assert!(response <= (units + 0.5) * hits + units, "{response} of {hits} rays");
                 if face_normal(CellKey(*key).face()) == Vec3::Y {
                     found += response;
@@ -476,7 +476,7 @@ fn visible_rays_teach_the_share_of_the_brdf() {
         renderer.render_pass(7).unwrap();
         renderer.guide_state().unwrap().unwrap()
     };
-    // The last sample came after a rebuild: each of its visible rays is in both counts.
+    // The last sample came after a rebuild, so each of its visible rays is in both counts.
     let state = state_after(1);
     let visible: u64 = state.pending.iter().map(|[_, hits, _]| u64::from(*hits)).sum();
     let pairs = || state.pending_shares.chunks_exact(2);
@@ -486,7 +486,7 @@ fn visible_rays_teach_the_share_of_the_brdf() {
     assert_eq!(rays, visible);
     assert!((1..256 * rays).contains(&from_brdf), "{from_brdf} of {rays}");
     assert!(state.shares.chunks_exact(2).any(|pair| pair[0] > 0));
-    // Resampling has no share.
+    // Resampling learns no share.
     let state = state_after(4);
     assert!(state.shares.iter().chain(&state.pending_shares).all(|word| *word == 0));
     support::assert_silent();

@@ -1,7 +1,7 @@
-//! Bounces of the sampler `guided`: what they are drawn by, that they bring what the BRDF reflects whatever
-//! the cells believe, and what they teach.
+//! Bounces of the sampler `guided`: they follow the cells' beliefs, bring what the BRDF reflects
+//! whatever these are, and teach the cells.
 //!
-//! Seeds are fixed; another would raise a false alarm once in some hundred runs.
+//! Seeds are fixed; others would raise a false alarm once in some hundred runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 #[path = "support/materials.rs"]
@@ -35,7 +35,7 @@ use support::{
 
 const ARRIVING_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/arriving.spv"));
 
-/// Pixels and samples of the paths before one surface.
+/// Pixels, and samples per pixel, of the paths before one surface.
 const PIXELS: u32 = 1024;
 const SAMPLES: u32 = 32;
 
@@ -66,13 +66,13 @@ fn the_shader_tells_directions_apart_as_the_host_does() {
         seen[host] += 1;
         differing += u32::from(host != *shader as usize);
     }
-    // Where two of them meet, rounding decides.
+    // Rounding decides where two of them meet.
     assert!(differing <= 4, "{differing} of {count} differ");
     let mean = count as u32 / ARRIVAL_DIRECTIONS as u32;
     assert!(seen.iter().all(|seen| (mean / 4..3 * mean).contains(seen)), "{seen:?}");
 }
 
-/// A floor with one material, and paths before it.
+/// A floor of one material, and the direction from it to the camera.
 struct Floor {
     scene: Scene,
     normal: Vec3,
@@ -94,13 +94,13 @@ fn floors() -> Vec<(&'static str, Floor)> {
     ]
 }
 
-/// Light by direction as a guide may believe it: a few directions bring a lot, most next to nothing.
+/// Light that a guide may believe in: a lot from a few directions, next to nothing from most.
 fn belief(direction: usize) -> f32 {
     let [x, ..] = hash_4d([direction as u32, 5, 6, 7]);
     if x % 8 == 0 { 1.0 } else { 0.001 * (x >> 16) as f32 / 65536.0 }
 }
 
-/// What passes read of beliefs like these in every cell.
+/// Returns such beliefs in every cell, and the light by direction that passes read of a cell.
 fn arriving() -> (GuideState, Vec<f32>) {
     let words = |cell_direction: usize| {
         let light = 1e6 * belief(cell_direction % ARRIVAL_DIRECTIONS);
@@ -116,13 +116,13 @@ fn arriving() -> (GuideState, Vec<f32>) {
     (GuideState { arrivals: words, ..GuideState::default() }, read)
 }
 
-/// Direction and throughput of the paths after a bounce off the floor with these beliefs.
+/// Returns direction and throughput of the paths after a bounce off the floor with these beliefs.
 fn bounce(floor: &Floor, candidates: u32, beliefs: &GuideState) -> Vec<(Vec3, Vec3)> {
     let device = support::device();
     let scene = &floor.scene;
     let buffers = SceneBuffers::new(device, scene, window_of(&Settings::default(), scene)).unwrap();
     let paths = PIXELS * SAMPLES;
-    // Room for the cells of faces only.
+    // Leave room for the cells of faces only.
     let parameters = Parameters { guide_memory: 1, ..Parameters::default() };
     let size = GuideSize { pixels: PIXELS, paths, shadow_rays: 1, has_bounces: true };
     let mut guide = GuideBuffers::new(device, scene, &parameters, size).unwrap();
@@ -162,7 +162,7 @@ fn bounce(floor: &Floor, candidates: u32, beliefs: &GuideState) -> Vec<(Vec3, Ve
     let push = bytemuck::bytes_of(&wave);
     let mut commands = Commands::begin(device).unwrap();
     commands.dispatch(&put, &[waves.set(), &film], &[], paths);
-    // Finds the cell.
+    // Find the cell.
     commands.dispatch(&sample, &sets, push, paths);
     commands.dispatch(&bounce, &sets, push, paths);
     commands.submit_and_wait().unwrap();
@@ -175,8 +175,8 @@ fn bounce(floor: &Floor, candidates: u32, beliefs: &GuideState) -> Vec<(Vec3, Ve
         .collect()
 }
 
-/// Chance of every direction to be the one that is kept, by the host: over all random numbers, the chance
-/// of each candidate. One more for candidates below the horizon, where paths end.
+/// Computes on the host the chance of every direction to be kept: the mean chance of its candidates
+/// over random numbers. The last entry is for candidates below the horizon, where paths end.
 fn chances(floor: &Floor, candidates: u32, light: &[f32]) -> Vec<f64> {
     let tables = MaterialTables::new(&floor.scene.materials).unwrap();
     let frame = frame_from_normal(floor.normal);
@@ -205,7 +205,7 @@ fn chances(floor: &Floor, candidates: u32, light: &[f32]) -> Vec<f64> {
     chances
 }
 
-/// BRDF · cosine over every direction, red.
+/// Integrates the red of BRDF · cosine over every direction's solid angle.
 fn reflected(floor: &Floor) -> Vec<f64> {
     let tables = MaterialTables::new(&floor.scene.materials).unwrap();
     let frame = frame_from_normal(floor.normal);
@@ -225,7 +225,7 @@ fn reflected(floor: &Floor) -> Vec<f64> {
     reflected
 }
 
-/// Uniform over the sphere, from two numbers in [0, 1).
+/// Maps two numbers in [0, 1) to a direction, uniform over the sphere.
 fn uniform_direction([x, y]: [f32; 2]) -> Vec3 {
     let height = 1.0 - 2.0 * y;
     let (sin, cos) = (2.0 * std::f32::consts::PI * x).sin_cos();
@@ -233,8 +233,8 @@ fn uniform_direction([x, y]: [f32; 2]) -> Vec3 {
     vec3(radius * cos, height, radius * sin)
 }
 
-/// The directions that are kept have the chances that the host computes, and bring in the mean what the
-/// BRDF reflects, direction by direction, although seven in eight directions are believed dark.
+/// Directions are kept with the chances that the host computes, and bring on average what the BRDF
+/// reflects, direction by direction, although seven in eight directions are believed dark.
 #[test]
 fn bounces_bring_what_the_brdf_reflects() {
     let _alone = support::alone();
@@ -267,7 +267,7 @@ fn bounces_bring_what_the_brdf_reflects() {
                 let mean = sum[0] / count;
                 let error = ((sum[1] / count - mean * mean) / count).sqrt();
                 worst = worst.max((mean - expected).abs() / error.max(1e-3 * expected));
-                // What would come out if the choice were not divided by its chance.
+                // The result if the choice were not divided by its chance.
                 let wrong = counts[bin] / count * expected / unguided[bin].max(1e-9);
                 biased = biased.max((wrong - expected).abs() / error.max(1e-3 * expected));
             }
@@ -278,13 +278,13 @@ fn bounces_bring_what_the_brdf_reflects() {
     }
 }
 
-/// Images agree with those of unguided bounces where the cells believe anything at all, from nothing
-/// learned on, and with as many candidates as there may be.
+/// Images agree with those of unguided bounces whatever the cells believe, from nothing learned on,
+/// and with as many candidates as there may be.
 #[test]
 fn images_are_those_of_unguided_bounces() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
-    // Means over blocks and channels.
+    // Estimate the means over blocks and channels.
     let replicates = |candidates: u32, beliefs: Option<&GuideState>, samples: u32| {
         let mut settings = guided(4);
         settings.parameters.bounce_candidates = candidates;
@@ -302,7 +302,7 @@ fn images_are_those_of_unguided_bounces() {
     taught.render_pass(4).unwrap();
     let mut beliefs = taught.guide_state().unwrap().unwrap();
     for (index, words) in beliefs.arrivals.iter_mut().enumerate() {
-        // Another belief in every cell.
+        // Give every cell another belief.
         *words = [1e4_f32.to_bits(), (1e4 * belief(index)).to_bits()];
     }
     for (name, candidates, beliefs) in
@@ -314,7 +314,7 @@ fn images_are_those_of_unguided_bounces() {
     }
 }
 
-/// Every bounce ray teaches the cell it left, and what it finds is what the cell there reflects.
+/// Every bounce ray teaches the cell it left, by the light that the cell at its hit reflects.
 #[test]
 fn every_bounce_teaches() {
     let _alone = support::alone();
@@ -322,7 +322,7 @@ fn every_bounce_teaches() {
     let mut renderer = Renderer::new(support::device(), &scene, guided(3)).unwrap();
     renderer.render_pass(2).unwrap();
     let before = renderer.totals().bounce_rays;
-    // After a rebuild.
+    // Render a sample after a rebuild.
     renderer.render_pass(1).unwrap();
     let rays = renderer.totals().bounce_rays - before;
     let state = renderer.guide_state().unwrap().unwrap();
@@ -334,9 +334,9 @@ fn every_bounce_teaches() {
     let [found, light] = counted(&state.pending_arrivals);
     assert!(rays > 500, "{rays}");
     assert_eq!(found, rays);
-    // In units of which the cells of this room reflect 64 in the mean.
+    // The cells of this room reflect 64 units on average.
     assert!((4.0..400.0).contains(&(light as f64 / found as f64)), "{light} of {found} rays");
-    // Where bounces are not guided nothing is kept.
+    // Unguided bounces keep nothing.
     for (depth, candidates) in [(1, 4), (3, 1)] {
         let mut settings = guided(depth);
         settings.parameters.bounce_candidates = candidates;
@@ -348,7 +348,7 @@ fn every_bounce_teaches() {
     support::assert_silent();
 }
 
-/// What was taught goes on with a render that another continues, to the bit, and into another depth.
+/// A render that continues another goes on with what bounces taught, to the bit; so may another depth.
 #[test]
 fn what_bounces_taught_is_kept() {
     let _alone = support::alone();

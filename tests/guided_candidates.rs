@@ -1,11 +1,11 @@
-//! The candidates that `guided` resamples are distributed as the density that they are divided by, and
-//! that density integrates to one: for 4 and 8 candidates, weights by the cell and by the product, a
-//! table that knows nothing and one that was trained, and every kind of material.
+//! The candidates that `guided` resamples follow the density that they are divided by, and that
+//! density integrates to one: for 4 and 8 candidates, weights by the cell and by the product,
+//! untrained and trained tables, and every kind of material.
 //!
-//! A path is put in front of a surface by a probe; another draws the candidates of many shadow rays, with
-//! the functions of the sampling pass, and evaluates the density in directions of a quadrature. There is
-//! room for the cells of faces only. What becomes of the candidates is tested in
-//! `tests/guided_density.rs`. Seeds are fixed; another would raise a false alarm once in some hundred runs.
+//! One probe puts a path in front of a surface. Another draws the candidates of many shadow rays with
+//! the functions of the sampling pass, and evaluates the density at the points of a quadrature. There
+//! is room for the cells of faces only. `tests/guided_density.rs` tests what becomes of the
+//! candidates. Seeds are fixed; others would raise a false alarm once in some hundred runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 #[path = "support/hemisphere.rs"]
@@ -38,9 +38,9 @@ use support::{scenes, statistics};
 const DRAWN: u32 = 1 << 15;
 /// Rows of the quadrature over the sphere about the normal.
 const ROWS: usize = 384;
-/// Part of the candidates that samples the BRDF.
+/// Part of the candidates that sample the BRDF.
 const BRDF_PART: f64 = 0.25;
-/// That of the one-sample model on a diffuse surface: not what these candidates are divided by.
+/// Part of the one-sample model on a diffuse surface, by which these candidates are not divided.
 const OTHER_BRDF_PART: f64 = 26.0 / 256.0;
 
 #[repr(C)]
@@ -61,7 +61,8 @@ struct CandidateAnswer {
     guided_pdf: f32,
 }
 
-/// A surface before the camera that points at a face which the room's picture sees, with the angle between normal and outgoing direction.
+/// A surface before the camera that points at a face which the room's picture sees. `theta` is the
+/// angle between normal and outgoing direction.
 struct Surface {
     name: &'static str,
     material: u32,
@@ -112,11 +113,11 @@ fn scene() -> Scene {
 }
 
 fn parameters(weights: Weights) -> Parameters {
-    // No room for any cell but those of the faces.
+    // Leave room for the cells of faces only.
     Parameters { weights, guide_memory: 1, candidates: Some(4), ..Parameters::default() }
 }
 
-/// What a render has learned.
+/// Renders and returns what was learned.
 fn trained(scene: &Scene) -> GuideState {
     let parameters = parameters(Weights::Cell);
     let settings = Settings { sampler: Sampler::Guided, parameters, ..Settings::default() };
@@ -197,7 +198,7 @@ impl Paths {
         answers
     }
 
-    /// How many of the candidates of many rays are in every bin.
+    /// Draws the candidates of many rays and counts them by bin.
     fn observed(&self, surface: &Surface, candidates: u32) -> Vec<f64> {
         let query = |index: u32| CandidateQuery {
             draws: 1,
@@ -212,7 +213,7 @@ impl Paths {
         counts
     }
 
-    /// The integrals over every bin of the candidates' density, and of those of BRDF and guide.
+    /// Integrates the candidates' density, and those of BRDF and guide, over every bin.
     fn integrals(&self, surface: &Surface, candidates: u32) -> [Vec<f64>; 3] {
         let world_from_local = surface.world_from_local();
         let query = |local: DVec3| {
@@ -239,7 +240,7 @@ fn candidates_follow_the_density_that_they_are_divided_by() {
     let state = trained(&scene);
     for weights in [Weights::Cell, Weights::Product] {
         let mut paths = Paths::new(&scene, weights);
-        // By surface and number of candidates.
+        // Expectations by surface and number of candidates.
         let mut untrained: Vec<Vec<f64>> = Vec::new();
         for is_trained in [false, true] {
             if is_trained {
@@ -259,7 +260,7 @@ fn candidates_follow_the_density_that_they_are_divided_by() {
                         [&expected, &brdf, &guided].map(|integral| integral.iter().sum::<f64>());
                     assert!((of_guide - 1.0).abs() < 3e-3, "{name}: guided {of_guide}");
                     assert!((0.5..1.003).contains(&of_brdf), "{name}: BRDF {of_brdf}");
-                    // Samples of the BRDF that its density leaves out are below the horizon.
+                    // BRDF samples that its density leaves out are below the horizon.
                     let lost = BRDF_PART * (1.0 - of_brdf);
                     assert!((whole + lost - 1.0).abs() < 3e-3, "{name}: {whole} and {lost} lost");
                     expected[BINS - 1] += lost.max(0.0);
@@ -268,7 +269,7 @@ fn candidates_follow_the_density_that_they_are_divided_by() {
                     eprintln!("{name}: integral {whole:.5}, {lost:.5} lost, p {p:.3}");
                     assert!(p > 1e-4, "{name}: p = {p}");
 
-                    // The density of another share of the BRDF, and what is not learned, are found out.
+                    // The test rejects another share of the BRDF, and the untrained density.
                     let mut other: Vec<f64> = brdf
                         .iter()
                         .zip(&guided)

@@ -1,11 +1,11 @@
-//! What the sampler `guided` draws on the device is distributed as the density that it divides by, that
-//! density integrates to one, and its estimates are right in every part of the sky; with a table that
-//! knows nothing and one that was trained, on every kind of material.
+//! Directions that the sampler `guided` draws on the device follow the density that it divides by,
+//! that density integrates to one, and estimates are right in every part of the sky: with untrained
+//! and trained tables, on every kind of material.
 //!
-//! The film is so large that a pixel shows one point from one direction, and there is room for the cells
-//! of faces only, so that all samples of a pixel read the same cell. Densities come from the host: BRDF
-//! and map by their twins, regions by what the renderer reads back. Seeds are fixed; another would raise
-//! a false alarm once in some hundred runs.
+//! The film is so large that a pixel shows one point from one direction, and there is room for the
+//! cells of faces only, so that all samples of a pixel read the same cell. The host computes the
+//! densities: BRDF and map by their twins, regions from what the renderer reads back. Seeds are
+//! fixed; others would raise a false alarm once in some hundred runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 #[path = "support/hemisphere.rs"]
@@ -28,17 +28,17 @@ use glam::{Vec3, vec3};
 use hemisphere::{BIN_COLUMNS, BINS};
 use support::{scenes, statistics};
 
-/// Rays per surface and state, and how many of them a hit has.
+/// Rays per surface and state, and per hit.
 const RAYS: u32 = 1 << 15;
 const SHADOW_RAYS: u32 = 8;
 /// Rows of the quadrature over the sphere about the normal.
 const ROWS: usize = 512;
-/// Parts of the sky in which estimates are compared, three in polar angle and eight in azimuth.
+/// Parts of the sky in which estimates are compared: 3 in polar angle × 8 in azimuth, and the rest.
 const PARTS: usize = 25;
-/// |z| beyond this has a chance of 6e-7; there are about 1,200 of them.
+/// Limit of |z|, exceeded with a chance of 6e-7; about 1,200 are tested.
 const Z_LIMIT: f64 = 5.0;
 
-/// A point of a scene that the camera sees.
+/// A point of a scene, seen by the camera.
 struct Surface {
     name: &'static str,
     scene: Scene,
@@ -47,7 +47,7 @@ struct Surface {
     material: usize,
 }
 
-/// `point` of a room with the two materials, as a pixel of a film 1,024 times as large as usual.
+/// Shows `point` of a room of two materials in a pixel of a film 1,024 times as large as usual.
 fn surface(name: &'static str, materials: [Material; 2], material: usize, point: Vec3) -> Surface {
     let mut scene = scenes::room(materials.into());
     (scene.film.width, scene.film.height) = (32 << 10, 24 << 10);
@@ -63,7 +63,7 @@ fn surface(name: &'static str, materials: [Material; 2], material: usize, point:
     Surface { name, scene, pixel: [x as u32, y as u32], point, material }
 }
 
-/// Every kind of material: on the floor, and on top of the box. Both see the window.
+/// Returns every kind of material on the floor and on top of the box, which both see the window.
 fn surfaces() -> [Surface; 4] {
     let measured = materials::measured_plastic();
     let dull = || scenes::diffuse(vec3(0.6, 0.5, 0.4));
@@ -85,7 +85,7 @@ fn renderer_at_depth(surface: &Surface, candidates: u32, weights: Weights, depth
     let parameters = Parameters {
         candidates: Some(candidates),
         weights,
-        // No room for any cell but those of the faces.
+        // Leave room for the cells of faces only.
         guide_memory: 1,
         ..Parameters::default()
     };
@@ -100,7 +100,7 @@ fn renderer_at_depth(surface: &Surface, candidates: u32, weights: Weights, depth
     Renderer::new(support::device(), &surface.scene, settings).unwrap()
 }
 
-/// What the host knows about one surface.
+/// The host's tables and frame for one surface.
 struct Host<'a> {
     scene: &'a Scene,
     map: EnvironmentTables,
@@ -110,7 +110,7 @@ struct Host<'a> {
     outgoing_local: Vec3,
 }
 
-/// A direction with what it brings if nothing is in the way, and its densities.
+/// Unoccluded integrand in a direction, and its densities.
 #[derive(Clone, Copy)]
 struct Considered {
     integrand: f64,
@@ -158,7 +158,7 @@ impl<'a> Host<'a> {
     }
 }
 
-/// Density of guided directions of a cell over that of the map, by region.
+/// Returns the density of a cell's guided directions over that of the map, by region.
 fn ratios(recorded: &RecordedGuide, cell: &RecordedCell) -> Vec<f64> {
     let regions = cell.regions.iter().zip(&recorded.partition.regions);
     // A black region is never drawn.
@@ -166,8 +166,8 @@ fn ratios(recorded: &RecordedGuide, cell: &RecordedCell) -> Vec<f64> {
     regions.map(|(known, region)| ratio(region.share, known.probability)).collect()
 }
 
-/// Share of the BRDF in the density of the one-sample model, from what the rays were divided by. Fails
-/// unless one share explains them all.
+/// Finds the BRDF's share in the density of the one-sample model from what the rays were divided by.
+/// Fails unless one share explains them all.
 fn brdf_share(name: &str, host: &Host<'_>, rays: &[GuidedRay], ratios: &[f64]) -> f64 {
     let mut explained = Vec::new();
     for traced in rays.iter().filter(|traced| traced.region.is_some()) {
@@ -194,7 +194,7 @@ fn brdf_share(name: &str, host: &Host<'_>, rays: &[GuidedRay], ratios: &[f64]) -
     share
 }
 
-/// The parts of the mixture in every bin; what is lost of the BRDF's samples is in the last one.
+/// Integrates both parts of the mixture over every bin. The last bin holds the lost BRDF samples.
 fn expected_shares(name: &str, host: &Host<'_>, recorded: &RecordedGuide) -> [Vec<f64>; 2] {
     let ratios = ratios(recorded, recorded.cell.as_ref().unwrap());
     let (mut from_brdf, mut guided) = (vec![0.0; BINS], vec![0.0; BINS]);
@@ -259,7 +259,7 @@ fn directions_follow_the_density_that_they_are_divided_by() {
             eprintln!("{name}: {trials} rays counted, BRDF share {share:.4}, p {p:.3}");
             assert!(p > 1e-4, "{name}: p = {p}");
             if let Some((share, parts)) = &untrained {
-                // Drawn by what was learned, but not divided by it.
+                // Directions drawn by what was learned do not follow the untrained density.
                 let p = statistics::chi_square_p_value(&observed, &mixed(*share, parts));
                 assert!(p < 1e-6, "{name}: as if untrained, p = {p}");
             }
@@ -270,12 +270,12 @@ fn directions_follow_the_density_that_they_are_divided_by() {
     }
 }
 
-/// Which of 24 parts of the sky a bin lies in; the last is below the horizon.
+/// Returns the part of the sky in which a bin lies; the last part is below the horizon.
 fn part_of(bin: usize) -> usize {
     if bin == BINS - 1 { PARTS - 1 } else { bin / BIN_COLUMNS / 4 * 8 + bin % BIN_COLUMNS / 3 }
 }
 
-/// Estimates of what the unoccluded map brings, in all and in every part, against the quadrature.
+/// Compares estimates of the unoccluded map's light, in all and in every part, with the quadrature.
 #[test]
 fn every_part_of_the_sky_has_its_weight() {
     let _alone = support::alone();
@@ -304,7 +304,7 @@ fn every_part_of_the_sky_has_its_weight() {
                         (part_of(host.bin(traced.ray.direction)), brought)
                     })
                     .collect();
-                // Rays are stratified, so that this takes the error as too large.
+                // Rays are stratified, so this overestimates the error.
                 let all: Vec<f64> = values.iter().map(|(_, value)| *value).collect();
                 let z = statistics::z_of_mean(&all, whole);
                 let wrong = statistics::z_of_mean(&all, 1.05 * whole);
@@ -315,7 +315,7 @@ fn every_part_of_the_sky_has_its_weight() {
                         .iter()
                         .map(|(other, value)| if *other == part { *value } else { 0.0 })
                         .collect();
-                    // The spread of a few rays says nothing.
+                    // A few rays say nothing about the spread.
                     if here.iter().filter(|value| **value > 0.0).count() < 100 {
                         continue;
                     }

@@ -1,4 +1,4 @@
-//! The Vulkan host itself: uploads, dispatches, timestamps, device choice, limits.
+//! The Vulkan host: uploads, dispatches, timestamps, device choice, limits.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 mod support;
@@ -47,7 +47,7 @@ fn every_timed_pass_has_its_row() {
     let times = commands.submit_and_wait().unwrap();
     assert_eq!(times.keys().collect::<Vec<_>>(), ["probe"]);
     assert!(times["probe"] > 0.0);
-    // Each dispatch sees what the one before wrote.
+    // Each dispatch sees the writes of the one before.
     assert!(input.download::<u32>(1 << 20).unwrap().iter().all(|word| *word == 4));
     support::assert_silent();
 }
@@ -94,14 +94,14 @@ fn a_device_without_a_needed_limit_is_refused_with_needed_and_found() {
     for part in ["Weak", "scalarBlockLayout", "found 4", "needed 1.2, found 1.1.0"] {
         assert!(error.contains(part), "{part} is missing from: {error}");
     }
-    // It is passed over where another device can do it.
+    // The choice passes over it where another device will do.
     let list = [weak, capabilities(1, "llvmpipe", "software")];
     assert_eq!(choose(&list, None).unwrap().index, 1);
 }
 
 #[test]
 fn a_mistake_is_heard_by_the_validation_layers() {
-    // On a device of its own, so that the shared one stays silent.
+    // Use a device of its own, so that the shared one stays silent.
     let device = fenestra::gpu::Device::open(None, true).unwrap();
     let buffer = Buffer::zeroed(&device, "buffer", 64).unwrap();
     let set = DescriptorSet::new(&device, SET_FILM, &[(0, &buffer), (1, &buffer)]).unwrap();

@@ -9,7 +9,7 @@ use command::Folder;
 use fenestra::film::{Checkpoint, Image, Metadata, SampleRange, Sums};
 use serde_json::Value;
 
-/// A checkpoint of 4×2 pixels all of whose samples are `value`.
+/// Makes a checkpoint of 4×2 pixels whose samples are all `value`.
 fn checkpoint(seed: u32, count: u32, value: f32) -> Checkpoint {
     let mut sums = Sums::new([0, 0], 4, 2, [4, 2]);
     sums.sample_count = count;
@@ -28,7 +28,7 @@ fn checkpoint(seed: u32, count: u32, value: f32) -> Checkpoint {
     Checkpoint { sums, metadata }
 }
 
-/// `NAME.exr` and `NAME.checkpoint.exr` of the same render.
+/// Writes `NAME.exr` and `NAME.checkpoint.exr` of one render.
 fn write(folder: &Folder, name: &str, checkpoint: &Checkpoint) {
     let mut image = checkpoint.sums.to_image(&[]);
     checkpoint.metadata.store(&mut image);
@@ -85,7 +85,7 @@ fn checkpoints_are_merged_into_a_checkpoint_or_an_image() {
     assert_eq!(image.channels["SampleCount.Y"], [40.0; 8]);
     // Σx² − (Σx)²/n = 130 − 122.5, over n(n − 1) = 1560.
     assert!((image.channels["Variance.B"][5] - 7.5 / 1560.0).abs() < 1e-9);
-    // An image and a checkpoint give an image, but no checkpoint.
+    // An image and a checkpoint merge into an image, but not into a checkpoint.
     folder.run(&["merge", "a.exr", "b.checkpoint.exr", "-o", "mixed.exr"]).assert(0, &[]);
     let mixed = Image::read_exr(&folder.path().join("mixed.exr")).unwrap();
     assert_eq!(mixed.channels["R"], [1.75; 8]);
@@ -161,7 +161,7 @@ fn info_reads_environment_maps() {
 
 #[test]
 fn info_judges_measured_brdfs() {
-    // A Lambertian of albedo 0.5 at every wavelength.
+    // A Lambertian surface of albedo 0.5 at every wavelength.
     let folder = Folder::new();
     let wavelengths: Vec<String> = (0..31).map(|step| (400 + 10 * step).to_string()).collect();
     let mut text = format!("# grey in many directions\n31 {}\n", wavelengths.join(" "));
@@ -184,7 +184,7 @@ fn info_judges_measured_brdfs() {
     let run = folder.run(&["info", "grey.brdf", "--json"]);
     run.assert(0, &[]);
     let report = json(&run.output);
-    // Equal energy is not quite the white of Rec.709, but its luminance is that of white.
+    // Equal energy is not quite the white of Rec.709, but has its luminance.
     let albedo = |channel: usize| report["sanity"]["albedo"][1][channel].as_f64().unwrap();
     let luminance = 0.2126 * albedo(0) + 0.7152 * albedo(1) + 0.0722 * albedo(2);
     assert!((luminance - 0.5).abs() < 0.02, "{luminance}");

@@ -1,5 +1,5 @@
-//! Layers of the image that show what samplers learned: how full visibility caches are, and which cells
-//! of learned visibility were found.
+//! Image layers that show what samplers learned: the fill of visibility caches, and the cells of
+//! learned visibility that were found.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 mod support;
@@ -18,7 +18,7 @@ use fenestra::{
 use glam::Vec3;
 use support::{render, renderer, scenes};
 
-/// The sampler `visibility` with few lobes, `assignments` and the layer of its caches.
+/// Returns settings of `visibility` with few lobes, `assignments` and the layer of its caches.
 fn visibility(assignments: &[&str]) -> Settings {
     let mut parameters = Parameters::default();
     let few = ["environment_lobes=24", "brdf_lobes=4", "views=8", "lobes=24"];
@@ -47,7 +47,7 @@ fn room() -> Scene {
     scenes::room(vec![scenes::diffuse(Vec3::splat(0.6)), scenes::copper(0.3)])
 }
 
-/// Sums of the two counts over all pixels.
+/// Sums both counts over all pixels.
 fn total(counts: &[[u32; 2]]) -> [u64; 2] {
     counts.iter().fold([0; 2], |sum, pair| [0, 1].map(|i| sum[i] + u64::from(pair[i])))
 }
@@ -92,7 +92,7 @@ fn a_cache_holds_no_more_than_it_has_room_for() {
     let [entries, hits] = total(&sums.cache_entries);
     assert_eq!(hits, totals.product_hits);
     assert!(sums.cache_entries.iter().all(|pair| pair[0] <= 7 * 6));
-    // About 4 of 5 rays bring something and are recorded: a cache is full after two samples.
+    // About 4 of 5 rays bring light and are recorded, so a cache is full after two samples.
     let mean = entries as f64 / hits as f64;
     assert!((6.0..6.9).contains(&mean), "{mean} directions");
     assert!(totals.cache_entries > 2 * entries / 3, "the oldest were forgotten");
@@ -128,18 +128,18 @@ fn layers_of_other_samplers_are_refused() {
     }
 }
 
-/// Three bytes of the key's hash; twin of `guide_cells.comp`.
+/// Returns three bytes of the key's hash. Twin of `guide_cells.comp`.
 fn colour_of(key: CellKey) -> [u32; 3] {
     let hash = key.slot(u32::MAX);
     [hash & 255, hash >> 8 & 255, hash >> 16 & 255]
 }
 
-/// What stands for the cell of a face.
+/// Returns the key that stands for the cell of a face.
 fn face_key(face: u32) -> CellKey {
     CellKey(0xf000_0000 | face)
 }
 
-/// The keys that colours belong to.
+/// Groups keys by their colour.
 fn keys_by_colour(keys: &[u32]) -> BTreeMap<[u32; 3], Vec<CellKey>> {
     let faces = (0..FACE_COUNT as u32).map(face_key);
     let mut by_colour: BTreeMap<[u32; 3], Vec<CellKey>> = BTreeMap::new();
@@ -152,7 +152,7 @@ fn keys_by_colour(keys: &[u32]) -> BTreeMap<[u32; 3], Vec<CellKey>> {
 #[test]
 fn a_sample_shows_the_cell_it_found() {
     let _alone = support::alone();
-    // Room for 9 cells besides the faces; for all coarse and some fine ones; for all.
+    // Leave room for 9 cells besides the faces, for all coarse and some fine ones, and for all.
     for memory in [15 * 16 * 256, 150 * 16 * 256, 1 << 27] {
         let mut settings = guided();
         settings.parameters.guide_memory = memory;

@@ -1,5 +1,5 @@
-//! `product` and `visibility` on the command line: what cannot be done is refused with its remedy, what
-//! cannot be fitted is done without, and what is biased says so.
+//! `product` and `visibility` on the command line: impossible options are refused with a remedy,
+//! sampling does without lobes that cannot be fitted, and biased options say so.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
 #[path = "support/command.rs"]
@@ -8,7 +8,7 @@ mod command;
 use command::Folder;
 use fenestra::film::{Image, Statistics};
 
-/// A floor and a ball under an even sky.
+/// Writes a scene of a floor and a ball under an even sky.
 fn scene(radiance: &str, reflectance: &str) -> Folder {
     let folder = Folder::new();
     let environment = format!("constant = {radiance}");
@@ -21,7 +21,7 @@ fn clay() -> Folder {
     scene("[1.0, 0.9, 0.8]", "[0.6, 0.4, 0.3]")
 }
 
-/// Two samples with few lobes to out.exr, with the options given.
+/// Renders two samples with few lobes and these options to out.exr.
 fn run(folder: &Folder, options: &[&str]) -> command::Run {
     run_to(folder, "out.exr", "2", options)
 }
@@ -94,7 +94,7 @@ fn a_render_with_lobes_continued_from_its_checkpoint_has_the_same_bits() {
         assert_eq!(statistics(&folder).samples_per_pixel, 5);
         let channels = |name| Image::read_exr(&folder.path().join(name)).unwrap().channels;
         assert_eq!(channels("out.exr"), channels("whole.exr"), "{sampler}");
-        // Other lobes are another render.
+        // Other lobes make another render.
         let others = [&resume[..], &["--set", "environment_lobes=9"]].concat();
         run_to(&folder, "out.exr", "6", &others).assert(1, &["environment_lobes: 8 against 9"]);
     }

@@ -1,8 +1,8 @@
-//! `product` and `visibility` with parameters that are not their defaults: images are those of `mis`,
-//! counters are those that scenes call for, and what cannot be rendered is refused.
+//! `product` and `visibility` with parameters other than their defaults: images are those of `mis`,
+//! counters are those that scenes call for, and impossible parameters are refused.
 //!
-//! Images are compared by 12 block means × 3 channels of 8 + 8 replicates, as in `unbiased.rs`; a value
-//! raises a false alarm, |t| > 7.5, with a chance of 3e-6, so the 10 comparisons once in 900 runs.
+//! Images are compared by 12 block means × 3 channels of 8 + 8 replicates, as in `unbiased.rs`. |t| >
+//! 7.5 has a chance of 3e-6, so the 10 comparisons raise a false alarm once in 900 runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 mod support;
@@ -20,10 +20,10 @@ use support::{
     statistics::{Comparison, Estimate},
 };
 
-/// Parameters by `--set` assignments, on top of few lobes.
+/// Applies `--set` assignments on top of few lobes.
 fn parameters(assignments: &[&str]) -> Parameters {
     let mut parameters = Parameters::default();
-    // A preset replaces all: it comes first, and the numbers of lobes after it.
+    // A preset replaces all parameters, so it comes first and the numbers of lobes after it.
     let (presets, others): (Vec<&str>, Vec<&str>) =
         assignments.iter().partition(|assignment| assignment.starts_with("preset="));
     let few = ["environment_lobes=40", "brdf_lobes=8", "views=16", "lobes=32"];
@@ -37,12 +37,12 @@ fn settings(sampler: Sampler, assignments: &[&str]) -> Settings {
     Settings { sampler, parameters: parameters(assignments), ..Settings::default() }
 }
 
-/// Replicates whose seeds are the sampler's own.
+/// Renders replicates with the sampler's own seeds.
 fn replicates(scene: &Scene, settings: &Settings, samples: u32) -> Vec<Estimate> {
     replicates::replicates(scene, settings, 500 * settings.sampler.tag(), samples)
 }
 
-/// Compares the sampler with every list of assignments with `mis`.
+/// Compares each sampler and its list of assignments with `mis`.
 fn agree(scene: &Scene, samples: u32, cases: &[(Sampler, &[&str])]) {
     let mis = Settings { shadow_rays: 16, ..Settings::default() };
     let reference = replicates(scene, &mis, 4 * samples);
@@ -102,7 +102,7 @@ fn parameters_change_no_image_of_glossy_things_in_the_open() {
     );
 }
 
-/// A box around the camera: every direction from every hit is blocked.
+/// Puts a box around the camera, which blocks every direction from every hit.
 fn closed_box() -> Scene {
     let mut scene = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5))]);
     scenes::add_box(&mut scene.geometry, Vec3::new(0.0, 1.0, 0.0), Vec3::splat(9.0), 0);
@@ -120,8 +120,8 @@ fn where_everything_is_blocked_all_rays_but_the_last_are_learned_from() {
         assert!((0..sums.pixel_count()).all(|pixel| sums.mean(pixel) == [0.0; 3]));
         assert_eq!(totals.product_hits, 3 * PIXELS);
         assert_eq!(totals.shadow_rays_visible, 0);
-        // Directions below the horizon are drawn too; they bring nothing and are not traced. What the
-        // last ray of a hit finds is of use to the next sample of its pixel only.
+        // Directions below the horizon are drawn too, but bring nothing and are not traced. The last
+        // ray of a hit is of use only to the next sample of its pixel.
         let traced = totals.shadow_rays_traced as f64 / (15 * PIXELS) as f64;
         let entries = totals.cache_entries as f64 / totals.shadow_rays_traced as f64;
         assert!((0.7..=1.0).contains(&traced), "{cache}: {traced} traced");
@@ -147,17 +147,17 @@ fn where_nothing_is_blocked_nothing_is_learned() {
     assert_eq!(totals.product_hits, 4 * pixels, "the plane fills the image");
     assert_eq!((totals.cache_entries, totals.cdf_rebuilds), (0, 0));
     assert_eq!(totals.shadow_rays_visible, totals.shadow_rays_traced);
-    // k counts for nothing then.
+    // Then k has no effect.
     let (same, _) = render(&scene, settings(Sampler::Visibility, &["k=7", "tau=3"]), 4);
     for pixel in 0..guided.pixel_count() {
         assert_eq!(guided.mean(pixel), same.mean(pixel), "pixel {pixel}");
     }
-    // Visible directions, where they are recorded, are those of all rays but the last.
+    // Recorded visible directions are those of all rays but the last.
     let (_, totals) = render(&scene, settings(Sampler::Visibility, &["count_visible=yes"]), 4);
     let share = totals.cache_entries as f64 / totals.shadow_rays_traced as f64;
     assert!((share - 0.8).abs() < 0.01, "{share} of the visible rays recorded");
     assert_eq!(totals.cdf_rebuilds, totals.cache_entries);
-    // Pixels that see no surface have no product.
+    // Pixels without a surface have no product.
     let scene = scenes::convex_furnace(scenes::diffuse(Vec3::splat(0.5)), Vec3::ONE);
     let (sums, totals) = render(&scene, settings(Sampler::Product, &[]), 2);
     let empty = (0..sums.pixel_count()).filter(|pixel| sums.mean(*pixel) == [1.0; 3]).count();
@@ -185,7 +185,7 @@ fn darkness_is_black_and_a_black_surface_too() {
         }
         assert_eq!(sums.mean(sums.pixel_count() - 1), [0.0; 3], "the ground is black");
     }
-    // A black surface beside others leaves them their lobes.
+    // Surfaces beside a black one keep their lobes.
     let mixed = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5)), scenes::diffuse(Vec3::ZERO)]);
     let (_, totals) = render(&mixed, settings(Sampler::Visibility, &[]), 2);
     assert!(totals.product_hits > 0 && totals.product_hits < 2 * PIXELS);
@@ -232,7 +232,7 @@ fn grouping_of_passes_changes_nothing_where_pixels_keep_caches() {
             renderer.render_pass(*samples).unwrap();
         }
         let first = renderer.sums().unwrap();
-        // Another picture by the same renderer starts from empty caches.
+        // After a restart, the renderer begins with empty caches.
         renderer.restart(0).unwrap();
         renderer.render_pass(passes.iter().sum()).unwrap();
         (first, renderer.sums().unwrap())

@@ -7,7 +7,7 @@ mod command;
 use command::Folder;
 use serde_json::Value;
 
-/// A clay ball in the open, or in a closed box; the camera sees sky above the ball in the open.
+/// Writes a scene of a clay ball in the open, with sky above it in the picture, or in a closed box.
 fn scene(is_closed: bool) -> Folder {
     let folder = Folder::new();
     let roof = if is_closed {
@@ -90,7 +90,7 @@ fn lobes_near_blocked_directions_lose_weight() {
     assert_eq!(rays.len(), 12);
     assert!(rays.iter().all(|ray| ray["visible"] == false));
     let cached = numbers["cached"].as_array().unwrap();
-    // What was traced before the last ray, in that order.
+    // Take the rays traced before the last one, in their order.
     let traced: Vec<_> =
         rays[..11].iter().filter(|ray| vector(&ray["contribution"]) != [0.0; 3]).collect();
     assert!(traced.len() > 3, "{} rays were traced", traced.len());
@@ -102,7 +102,7 @@ fn lobes_near_blocked_directions_lose_weight() {
 
     assert!((sum(&numbers, "before") - 1.0).abs() < 1e-6);
     assert!((sum(&numbers, "after") - 1.0).abs() < 1e-6);
-    // V = (1 / (1 + Num))²: lobes with many cached directions close to them fall against the others.
+    // V = (1 / (1 + Num))²: lobes with many cached directions close to them fall behind the others.
     let mut ratios: Vec<(usize, f64)> = numbers["lobes"]
         .as_array()
         .unwrap()
@@ -147,7 +147,7 @@ fn each_kind_of_sampler_has_its_panels() {
     assert_eq!(sum(&numbers, "before"), sum(&numbers, "after"));
 }
 
-/// The ball in a room that is open to the front, where the camera is.
+/// Puts the ball in a room that is open to the front, where the camera is.
 fn room() -> Folder {
     let folder = scene(false);
     let mut text = std::fs::read_to_string(folder.path().join("scene.toml")).unwrap();
@@ -190,8 +190,8 @@ fn guided_shows_what_the_cell_of_the_hit_knows() {
     let along = vector(&numbers["normal"])[axis];
     assert!((if face.starts_with('-') { -along } else { along }) > 0.5, "{face} {along}");
 
-    // Sky is seen to the front only, past the edges of the room, and that is where rays go. What lies
-    // below the horizon has not been looked at.
+    // Sky shows only to the front, past the edges of the room, so rays go there. Regions below the
+    // horizon have not been looked at.
     let mean = |front: bool, key: &str| {
         let is_chosen = |region: &&Value| {
             let z = vector(&region["direction"])[2];
@@ -237,7 +237,7 @@ fn what_has_no_picture_says_so() {
     run(&folder, &["--pixel", "24,8"]).assert(2, &["--pixel 24,8"]);
     run(&folder, &["--pixel", "1"]).assert(2, &["x,y"]);
     assert!(!folder.path().join("out.exr").exists());
-    // The sky: the image is written, and a warning says why there is no picture.
+    // For the sky, the image is written, and a warning says why there is no picture.
     run(&folder, &["--pixel", "0,0"]).assert(0, &["the pixel sees the environment"]);
     assert!(folder.path().join("out.exr").exists());
     assert!(!folder.path().join("out.pixel_0_0.png").exists());

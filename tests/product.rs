@@ -1,11 +1,11 @@
-//! The mixtures that `product` and `visibility` draw from, on the device: what is drawn is distributed
-//! as its density says, the density integrates to one, the weights are those of the thesis, and a
-//! wrong density is found out.
+//! The mixtures that `product` and `visibility` draw from, on the device: samples follow the density,
+//! the density integrates to one, the weights are those of the thesis, and a wrong density is found
+//! out.
 //!
-//! Paths are put in front of surfaces of every kind by a probe; the product, the visibility cache and
-//! the weights in force are then made by the passes of a render, and a probe draws from them with the
-//! functions that the sampling pass uses. Seeds are fixed; limits are such that another seed would
-//! raise a false alarm once in some hundred runs.
+//! A probe puts paths in front of surfaces of every kind. The passes of a render then make the
+//! product, the visibility cache and the weights in force, and a probe draws from them with the
+//! functions of the sampling pass. Seeds are fixed; others would raise a false alarm once in some
+//! hundred runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 #[path = "support/materials.rs"]
@@ -36,14 +36,14 @@ use support::{scenes, statistics};
 
 /// Samples per path and state of the cache.
 const SAMPLES: usize = 20_000;
-/// Rays per hit, more than teach the caches anything here.
+/// Rays per hit, more than the tests teach the caches.
 const SHADOW_RAYS: u32 = 64;
 /// Cells of the quadrature in polar angle and azimuth about the normal.
 const ROWS: usize = 180;
 const COLUMNS: usize = 360;
-/// Cells of the quadrature along either side of a bin.
+/// Cells of the quadrature along each side of a bin.
 const CELLS_PER_BIN: usize = 10;
-/// |z| beyond this has a chance of 7e-6; there are 36 of them.
+/// Limit of |z|, exceeded with a chance of 7e-6; 36 are tested.
 const Z_LIMIT: f64 = 4.5;
 
 #[repr(C)]
@@ -102,7 +102,7 @@ struct Surface {
 }
 
 impl Surface {
-    /// Tangent and bitangent.
+    /// Returns tangent and bitangent.
     fn frame(&self) -> (DVec3, DVec3) {
         let tangent = self.normal.cross(dvec3(0.31, -0.7, 0.64)).normalize();
         (tangent, self.normal.cross(tangent))
@@ -113,7 +113,7 @@ impl Surface {
         theta.sin() * (phi.cos() * tangent + phi.sin() * bitangent) + theta.cos() * self.normal
     }
 
-    /// Index of the bin of a direction.
+    /// Returns the bin of a direction.
     fn bin(&self, direction: DVec3) -> usize {
         let (tangent, bitangent) = self.frame();
         let height = direction.dot(self.normal);
@@ -131,7 +131,7 @@ fn bin_of(row: usize, column: usize) -> usize {
     row / CELLS_PER_BIN * (COLUMNS / CELLS_PER_BIN) + column / CELLS_PER_BIN
 }
 
-/// Diffuse, plastic, conductor and measured surfaces, seen from different angles.
+/// Returns diffuse, plastic, conductor and measured surfaces, seen from different angles.
 fn surfaces() -> Vec<Surface> {
     let surface =
         |material, normal: DVec3, theta| Surface { material, normal: normal.normalize(), theta };
@@ -177,7 +177,7 @@ struct Paths {
 }
 
 impl Paths {
-    /// Paths with their product and an empty cache.
+    /// Makes paths with their product and an empty cache.
     fn new(parameters: LobeParameters) -> Self {
         let device = support::device();
         let (scene, surfaces) = (scene(), surfaces());
@@ -198,7 +198,7 @@ impl Paths {
             pixel_count: surfaces.len() as u32,
             sample_count: 1,
             shadow_ray_count: 1,
-            // As many as the caches are taught here.
+            // As many rays as the caches are taught here.
             first_shadow_ray: SHADOW_RAYS / 2,
             total_shadow_rays: SHADOW_RAYS,
             ..Wave::default()
@@ -211,7 +211,7 @@ impl Paths {
         paths
     }
 
-    /// A film set for passes: the counters, and what a probe reads and writes.
+    /// Makes a film set of the counters and the buffers that a probe reads and writes.
     fn film(&self, buffers: &[(u32, &Buffer)]) -> DescriptorSet {
         let bound: Vec<_> =
             buffers.iter().copied().chain([(BINDING_COUNTERS, &self.counters)]).collect();
@@ -226,7 +226,7 @@ impl Paths {
         commands.submit_and_wait().unwrap();
     }
 
-    /// Writes rays, hits, and a shadow ray with its outcome for every path.
+    /// Writes ray, hit, and a shadow ray with its outcome for every path.
     fn put(&self, outcomes: &[(DVec3, bool)]) {
         let inputs: Vec<support::PathInput> = self
             .surfaces
@@ -250,7 +250,7 @@ impl Paths {
         commands.submit_and_wait().unwrap();
     }
 
-    /// Teaches the caches what became of one shadow ray per path.
+    /// Teaches the caches the outcome of one shadow ray per path.
     fn learn(&self, outcomes: &[(DVec3, bool)]) {
         self.put(outcomes);
         let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_note.spv"));
@@ -286,7 +286,7 @@ impl Paths {
         answers
     }
 
-    /// What the passes are specialized by, for the probes.
+    /// Returns the passes' specialization constants, for the probes.
     fn constants(&self) -> [(u32, u32); 8] {
         let parameters = &self.parameters;
         [
@@ -306,7 +306,7 @@ impl Paths {
         self.probe(spirv, true, &self.constants(), queries)
     }
 
-    /// `count` directions of every path, path by path, from numbers of the given stream.
+    /// Draws `count` directions of every path, path by path, with numbers of the given stream.
     fn samples(&self, count: usize, stream: u32) -> (Vec<MixtureQuery>, Vec<MixtureAnswer>) {
         let query = |path: usize, index: usize| {
             let a = materials::uniform(index as u32, 2 * stream);
@@ -328,7 +328,7 @@ impl Paths {
         (queries, answers)
     }
 
-    /// The mixtures at the centres of all cells of the quadrature, path by path.
+    /// Evaluates the mixtures at the centres of all cells of the quadrature, path by path.
     fn grid(&self) -> Vec<MixtureAnswer> {
         let mut queries = Vec::with_capacity(self.surfaces.len() * ROWS * COLUMNS);
         for (path, surface) in self.surfaces.iter().enumerate() {
@@ -347,7 +347,7 @@ impl Paths {
         self.mixture(&queries)
     }
 
-    /// All lobes of every path.
+    /// Returns all lobes of every path.
     fn lobes(&self) -> Vec<Vec<LobeAnswer>> {
         let kept = self.parameters.kept_lobes;
         let queries: Vec<[u32; 2]> = (0..self.surfaces.len() as u32)
@@ -361,7 +361,7 @@ impl Paths {
             .collect()
     }
 
-    /// One direction per path from its lobes alone.
+    /// Draws one direction per path from its lobes alone.
     fn draw_lobes(&self, index: u32) -> Vec<DVec3> {
         let queries: Vec<_> = (0..self.surfaces.len() as u32)
             .map(|path| {
@@ -380,7 +380,7 @@ impl Paths {
     }
 }
 
-/// Polar angle and azimuth of the centre of a cell.
+/// Returns polar angle and azimuth of a cell's centre.
 fn centre(cell: usize) -> (f64, f64) {
     let theta = ((cell / COLUMNS) as f64 + 0.5) * PI / ROWS as f64;
     (theta, ((cell % COLUMNS) as f64 + 0.5) * 2.0 * PI / COLUMNS as f64)
@@ -394,7 +394,7 @@ fn integral(grid: &[MixtureAnswer], value: impl Fn(&MixtureAnswer) -> f64) -> f6
     grid.iter().enumerate().map(|(cell, answer)| solid_angle(cell) * value(answer)).sum()
 }
 
-/// Samples of one path against the densities on its grid.
+/// Tests the samples of one path against the densities on its grid.
 fn samples_follow_their_density(
     name: &str,
     surface: &Surface,
@@ -411,7 +411,7 @@ fn samples_follow_their_density(
     ] {
         assert!((value - 1.0).abs() < tolerance, "{name}: the {part} integrate to {value}");
     }
-    // Directions of the BRDF's sampling below the horizon are lost: they have no density.
+    // BRDF samples below the horizon are lost: they have no density.
     let is_lost = |query: &MixtureQuery, answer: &MixtureAnswer| {
         query.technique >= shares.lobe_share + shares.environment_share
             && answer.direction().dot(surface.normal) <= 0.0
@@ -443,7 +443,7 @@ fn samples_follow_their_density(
     assert!(p > 1e-4, "{name}: p = {p}");
 }
 
-/// Mean of integrand over density against the quadrature, as a z.
+/// Returns z of the mean of integrand over density against the quadrature.
 fn z_of(samples: &[MixtureAnswer], truth: f64, pdf: impl Fn(&MixtureAnswer) -> f64) -> f64 {
     let values: Vec<f64> = samples
         .iter()
@@ -455,7 +455,7 @@ fn z_of(samples: &[MixtureAnswer], truth: f64, pdf: impl Fn(&MixtureAnswer) -> f
     statistics::z_of_mean(&values, truth)
 }
 
-/// 1 − cos below which a direction is close to a lobe.
+/// Returns the 1 − cos below which a direction is close to a lobe.
 fn closeness(lobe: &LobeAnswer, parameters: &LobeParameters) -> f64 {
     let deviation = match parameters.threshold {
         Threshold::Sigma => f64::from(kernel_deviation(lobe.bandwidth)),
@@ -464,7 +464,7 @@ fn closeness(lobe: &LobeAnswer, parameters: &LobeParameters) -> f64 {
     f64::from(parameters.threshold_scale) * deviation
 }
 
-/// Weight of a lobe after `cached` outcomes: the thesis's visibility weight, in its own words.
+/// Computes the weight of a lobe after `cached` outcomes as the thesis words its visibility weight.
 fn guided_weight(lobe: &LobeAnswer, cached: &[(DVec3, bool)], parameters: &LobeParameters) -> f64 {
     let axis = Vec3::from(lobe.axis).as_dvec3();
     let close: Vec<bool> = cached
@@ -477,7 +477,7 @@ fn guided_weight(lobe: &LobeAnswer, cached: &[(DVec3, bool)], parameters: &LobeP
     f64::from(lobe.weight) * ratio.powf(f64::from(parameters.exponent))
 }
 
-/// Whether a cached direction is so near the bound that rounding decides.
+/// Returns true if a cached direction is so near the bound that rounding decides.
 fn is_doubtful(lobe: &LobeAnswer, cached: &[(DVec3, bool)], parameters: &LobeParameters) -> bool {
     let axis = Vec3::from(lobe.axis).as_dvec3();
     cached.iter().any(|(direction, _)| {
@@ -517,17 +517,17 @@ fn weights_are_those_of_the_thesis(paths: &Paths, history: &[Vec<(DVec3, bool)>]
     assert!(compared > 20 * paths.surfaces.len(), "{compared} weights compared");
 }
 
-/// How often densities that the samples were not drawn with were found out.
+/// Counts the rejections of densities that the samples were not drawn with.
 #[derive(Default)]
 struct Found {
-    /// Those that ignore what the cache knows.
+    /// Densities that ignore what the cache knows.
     unguided: usize,
-    /// Those that ignore the shares of BRDF and environment.
+    /// Densities that ignore the shares of BRDF and environment.
     undefended: usize,
 }
 
-/// Feeds the caches of all paths with as many outcomes as `feeds` says, one state after the other,
-/// and checks weights, densities, samples and the estimate of a known integral in each state.
+/// Feeds the caches of all paths with as many outcomes as `feeds` says, state by state, and checks
+/// weights, densities, samples and the estimate of a known integral in each state.
 fn every_state_of_the_cache(paths: &Paths, feeds: &[u32], outcome: impl Fn(u32) -> bool) -> Found {
     let mut history: Vec<Vec<(DVec3, bool)>> = Vec::new();
     let mut found = Found::default();
@@ -552,7 +552,7 @@ fn every_state_of_the_cache(paths: &Paths, feeds: &[u32], outcome: impl Fn(u32) 
 
             let truth = integral(grid, MixtureAnswer::integrand);
             let z = z_of(samples, truth, |answer| f64::from(answer.pdf));
-            // The same samples divided by densities that they were not drawn with.
+            // Divide the same samples by densities that they were not drawn with.
             let unguided = z_of(samples, truth, |answer| {
                 let surplus = answer.unguided_lobe_density - answer.lobe_density;
                 f64::from(answer.pdf + answer.lobe_share * surplus)
@@ -571,18 +571,18 @@ fn every_state_of_the_cache(paths: &Paths, feeds: &[u32], outcome: impl Fn(u32) 
     found
 }
 
-/// With the cache empty, half full, full, and full with its oldest entries forgotten.
+/// Tests the cache empty, half full, full, and full with its oldest entries forgotten.
 #[test]
 fn samples_follow_the_density_whatever_is_cached() {
     let paths = Paths::new(few_lobes());
     let found = every_state_of_the_cache(&paths, &[0, 8, 8, 5], |_| false);
     let count = paths.surfaces.len();
-    // A wrong density fails the test that the right one passes, in many of 18 and of 24 cases.
+    // In many of 18 and of 24 cases, a wrong density fails the test that the right one passes.
     assert!(found.unguided >= count, "weights ignored: found {} times", found.unguided);
     assert!(found.undefended >= 2 * count, "shares ignored: found {} times", found.undefended);
 }
 
-/// The parameters of the thesis and the others that are not the default: visible directions count,
+/// Tests the parameters of the thesis and others that are not the default: visible directions count,
 /// one closeness, a cache that overflows, no share for the environment.
 #[test]
 fn samples_follow_the_density_with_other_parameters() {

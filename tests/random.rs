@@ -1,4 +1,4 @@
-//! Random numbers: stratification, uniformity, independence; the shader twin bit for bit.
+//! Random numbers: stratification, uniformity, independence, and the shader twin bit for bit.
 
 mod support;
 
@@ -8,7 +8,7 @@ use fenestra::{
 };
 use support::statistics::{chi_square_p_value, z_p_value};
 
-/// Every test here that can fail by chance fails for less than one seed in a million.
+/// Chance of a false alarm: a test fails by chance for less than one seed in a million.
 const FALSE_ALARM: f64 = 1e-6;
 
 #[test]
@@ -57,7 +57,7 @@ fn numbers_are_below_one_and_on_the_grid() {
     }
 }
 
-/// χ² of points on a 16×16 grid.
+/// Returns the p-value of χ² for points on a 16×16 grid.
 fn grid_p_value(points: impl Iterator<Item = [f32; 2]>) -> f64 {
     let mut counts = vec![0.0; 256];
     for [x, y] in points {
@@ -68,8 +68,8 @@ fn grid_p_value(points: impl Iterator<Item = [f32; 2]>) -> f64 {
 
 #[test]
 fn one_sample_of_many_pixels_dimensions_or_seeds_is_uniform() {
-    // Any one sample index, over what the scramble is keyed by, must be uniform: that alone makes an
-    // estimate unbiased.
+    // Any one sample index must be uniform over each key of the scramble: that alone makes an estimate
+    // unbiased.
     for sample in [0, 1, 2, 63, 1000, u32::MAX] {
         for kind in [random_2d, random_independent_2d] {
             for p in [
@@ -85,8 +85,8 @@ fn one_sample_of_many_pixels_dimensions_or_seeds_is_uniform() {
     assert!(p > FALSE_ALARM, "independent samples of one pixel: p = {p:e}");
 }
 
-/// p-value of the correlation of `pairs`, whose members should be independent and uniform: their
-/// centred product has mean 0 and variance 1/144.
+/// Returns the p-value of the correlation of `pairs`. If their members are independent and uniform,
+/// the centred product has mean 0 and variance 1/144.
 fn correlation_p_value(pairs: impl Iterator<Item = (f32, f32)>) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for (a, b) in pairs {
@@ -101,7 +101,7 @@ fn neighbouring_pixels_dimensions_seeds_and_samples_are_uncorrelated() {
     let count = 100_000;
     for kind in [random_2d, random_independent_2d] {
         for bit in 0..16 {
-            // Keys that differ in one bit.
+            // Compare keys that differ in one bit.
             let step = 1 << bit;
             let cases: [(&str, [u32; 4]); 3] = [
                 ("pixels", [step, 0, 0, 0]),
@@ -135,8 +135,8 @@ fn neighbouring_pixels_dimensions_seeds_and_samples_are_uncorrelated() {
 
 #[test]
 fn dimensions_of_one_pixel_pair_up_as_independent_points_do() {
-    // (first number of one dimension, first number of another) over the samples of single pixels:
-    // padded sequences must fill the square, not a diagonal.
+    // Pair the first numbers of two dimensions over the samples of single pixels: padded sequences
+    // must fill the square, not a diagonal.
     for (a, b) in [(0, 1), (1, 2), (0, 8), (3, 250)] {
         let mut points = Vec::new();
         for pixel in 0..256 {
@@ -152,7 +152,7 @@ fn dimensions_of_one_pixel_pair_up_as_independent_points_do() {
 
 #[test]
 fn the_mean_over_scrambles_is_unbiased_and_converges_faster_than_independent_numbers() {
-    // Indicator of a disc: replicates by seed, 64 samples each.
+    // Integrate the indicator of a disc, one replicate of 64 samples per seed.
     let truth = std::f64::consts::FRAC_PI_4;
     let replicates = |kind: fn(u32, u32, u32, u32) -> [f32; 2]| -> Vec<f64> {
         (0..4000)

@@ -7,7 +7,7 @@ mod command;
 use command::Folder;
 use fenestra::film::{Attribute, Image, Statistics};
 
-/// Renders with the options given and returns image and statistics.
+/// Renders with these options and returns image and statistics.
 fn render(folder: &Folder, output: &str, options: &[&str]) -> (Image, Statistics) {
     let mut arguments = vec!["render", "scene.toml", "-o", output, "--stats", "stats.json"];
     arguments.extend(options);
@@ -113,7 +113,7 @@ fn what_guided_learned_is_kept_with_the_checkpoint_and_in_files() {
     let resume = [&options("9")[..], &["--resume"]].concat();
     let (part, _) = render(&folder, "part.exr", &resume);
     assert_eq!(part.channels, whole.channels);
-    // A checkpoint without what was learned, or with that of another moment, is refused.
+    // A checkpoint without its guide, or with the guide of another moment, is refused.
     std::fs::remove_file(&guide).unwrap();
     let refuse = |texts: &[&str]| {
         let arguments = ["render", "scene.toml", "-o", "part.exr", "--sampler", "guided"];

@@ -1,4 +1,4 @@
-//! Scene files, meshes and their messages, read as a user reads them.
+//! Scene files and meshes, and the messages that a user reads.
 
 #![expect(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
@@ -45,7 +45,7 @@ impl Folder {
         Scene::load(&self.write("room.toml", text))
     }
 
-    /// The message without the folder.
+    /// Returns the message without the folder.
     fn message(&self, text: &str) -> String {
         self.strip(&self.load(text).expect_err("the scene must be refused"))
     }
@@ -402,7 +402,7 @@ fn the_hash_follows_the_picture_and_not_the_text() {
 
 // Meshes
 
-/// Four vertices, the given faces.
+/// Formats an ASCII PLY of four vertices and these faces.
 fn ascii_ply(faces: &str) -> String {
     format!(
         "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
@@ -412,7 +412,7 @@ fn ascii_ply(faces: &str) -> String {
     )
 }
 
-/// A quad and a triangle with normals, foreign properties and an element in between.
+/// Encodes a quad and a triangle with normals, foreign properties and an element in between.
 fn binary_ply(big_endian: bool) -> Vec<u8> {
     let name = if big_endian { "binary_big_endian" } else { "binary_little_endian" };
     let mut bytes = format!(
@@ -557,7 +557,7 @@ fn obj_reads_groups_polygons_normals_and_colors() {
     assert!(corners(3).iter().all(|&corner| mesh.normals[corner] == [0.0; 3]));
     assert_eq!(corners(2).map(|corner| mesh.positions[corner][0]), [0.0, 1.0, 1.0]);
 
-    // Without a material of the scene the colours of the file are used.
+    // Without a material of the scene, the colours of the mesh file apply.
     let scene =
         folder.load(&format!("{HEAD}[[object]]\nname = \"o\"\nmesh = \"shapes.obj\"\n")).unwrap();
     let names: Vec<_> = scene.materials.iter().map(|material| material.name.as_str()).collect();
@@ -601,7 +601,7 @@ fn broken_obj_files_are_refused_with_their_line() {
     assert!(warnings[0].contains("lost.obj:1: cannot read the material library"), "{warnings:?}");
 }
 
-/// A triangle under a node that shifts and one that mirrors, as JSON; `uri` names the buffer.
+/// Formats a triangle under a node that shifts and one that mirrors. `uri` names the buffer.
 fn gltf_json(uri: &str) -> String {
     let uri = if uri.is_empty() { String::new() } else { format!("\"uri\": \"{uri}\",") };
     format!(
@@ -646,7 +646,7 @@ fn glb(json: &str, buffer: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// 80 bytes of [`gltf_buffer`] in base64.
+/// Encodes bytes in base64.
 fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     bytes
@@ -778,7 +778,7 @@ fn the_four_test_scenes_have_their_triangles() {
     }
     for (name, triangles) in [
         ("buddha_and_car", 163_983),
-        // 236 slivers of the radiator have no area any more where it stands: 96,168 as a file.
+        // 236 slivers of the radiator lose their area where it stands: the file has 96,168.
         ("bathroom", 95_932),
         ("meeting_room", 125_842),
         ("restroom", 63_113),

@@ -17,7 +17,7 @@ mod statistics;
 use lobes::{BANDWIDTHS, random_bandwidth};
 use random::Random;
 
-/// Composite Gauss-Legendre quadrature, 5 points on each of `count` intervals.
+/// Integrates by composite Gauss-Legendre quadrature, 5 points on each of `count` intervals.
 fn integrate(from: f64, to: f64, count: usize, function: impl Fn(f64) -> f64) -> f64 {
     const NODES: [(f64, f64); 5] = [
         (0.0, 0.568_888_888_888_888_9),
@@ -34,7 +34,7 @@ fn integrate(from: f64, to: f64, count: usize, function: impl Fn(f64) -> f64) ->
     (0..count).map(interval).sum()
 }
 
-/// Moment `∫₀² xⁿ e^{−λx} dx`; the integrand is resolved where it lives.
+/// Computes the moment `∫₀² xⁿ e^{−λx} dx` with all points where the integrand matters.
 fn moment(bandwidth: f64, power: i32) -> f64 {
     let end = (60.0 / bandwidth).min(2.0);
     integrate(0.0, end, 200, |x| x.powi(power) * (-bandwidth * x).exp())
@@ -94,9 +94,9 @@ fn hemisphere_part_is_within_its_published_error() {
     let mut largest = 0.0_f64;
     for bandwidth in BANDWIDTHS {
         for step in -20..=20 {
-            let tilt = PI * f64::from(step) / 40.0; // of the axis above the horizon
+            let tilt = PI * f64::from(step) / 40.0; // elevation of the axis
             let (sine, cosine) = (tilt.sin(), tilt.cos());
-            // Over x = 1 − ω·ξ: the share of the circle around the axis that is above the horizon.
+            // At x = 1 − ω·ξ, weight the kernel by the part of its circle above the horizon.
             let exact = f64::from(bandwidth);
             let above = |x: f64| {
                 let height = sine * (1.0 - x);
@@ -119,7 +119,7 @@ fn hemisphere_part_is_within_its_published_error() {
     assert_close(srbf::kernel_hemisphere_part(0.0, 0.3), 0.5, 1e-6, "constant kernel");
 }
 
-/// `λ₃`, `ln(a₃)` and `ξ₃` of a product of unit lobes in 64 bits.
+/// Computes `λ₃`, `ln(a₃)` and `ξ₃` of a product of unit lobes in 64 bits.
 fn exact_product(a: &Lobe, b: &Lobe) -> (f64, f64, DVec3) {
     let (axis_a, axis_b) = (a.axis.as_dvec3().normalize(), b.axis.as_dvec3().normalize());
     let (lambda_a, lambda_b) = (f64::from(a.bandwidth), f64::from(b.bandwidth));
@@ -133,7 +133,7 @@ fn products_are_pointwise_products_and_convolutions_their_integrals() {
     for _ in 0..20_000 {
         let axis = random.direction();
         let a = Lobe { axis, bandwidth: random_bandwidth(&mut random), amplitude: 2.0 };
-        // Half of the partners are near by, where the product is not negligible.
+        // Place half of the partners near by, where the product is not negligible.
         let near = srbf::kernel_sample(
             axis,
             a.bandwidth,
@@ -149,7 +149,7 @@ fn products_are_pointwise_products_and_convolutions_their_integrals() {
         if bandwidth > 1e-3 * larger {
             assert!(product.axis.as_dvec3().distance(exact_axis) < 1e-3, "{what}");
         }
-        // An axis is rounded to 6e-8, so an exponent e carries about 1e-7·√(λe) of error besides.
+        // Rounding axes to 6e-8 adds an error of about 1e-7·√(λe) to an exponent e.
         let tolerance = 2e-5 + 4e-7 * (-log_amplitude * larger).sqrt() + 3e-7 * -log_amplitude;
         if log_amplitude > -80.0 {
             assert_close(product.amplitude, 6.0 * log_amplitude.exp(), tolerance, &what);
@@ -227,7 +227,7 @@ fn samples_invert_and_their_distances_are_exact() {
             let direction = srbf::kernel_sample(axis, bandwidth, u);
             assert!((direction.length() - 1.0).abs() < 1e-6);
             let inverse = srbf::kernel_inverse(axis, bandwidth, direction);
-            // Directions are rounded to 6e-8, at λ = 1e5 a few 1e-5 of the lobe's width.
+            // Directions are rounded to 6e-8, which at λ = 1e5 is a few 1e-5 of the lobe's width.
             assert!((inverse.x - u.x).abs() < 3e-4, "{bandwidth}: {u} → {inverse}");
             let turn = (inverse.y - u.y).abs();
             let sine = (found * (2.0 - found)).sqrt();
@@ -247,7 +247,7 @@ fn densities_integrate_to_one() {
     let axis = Vec3::new(0.36, 0.48, 0.8);
     let (tangent, _) = srbf::lobe_frame(axis);
     for bandwidth in BANDWIDTHS {
-        // The density depends on the distance only; the circles are 2π dx.
+        // The density depends on the distance alone, and its circles measure 2π dx.
         let end = (60.0 / f64::from(bandwidth)).min(2.0);
         let integral = 2.0
             * PI
@@ -273,7 +273,7 @@ fn mixtures_sample_their_density() {
     let ratio = mixture.value(direction) / mixture.integral();
     assert_close(mixture.pdf(direction), f64::from(ratio), 1e-5, "pdf");
 
-    // Pearson's χ² on bins of z × azimuth, the expectation by quadrature of the density.
+    // Count in bins of z × azimuth, and integrate the density over each.
     let (rows, columns, count) = (15_usize, 11_usize, 100_000_usize);
     let mut random = Random(3);
     let mut observed = vec![0.0_f64; rows * columns];

@@ -45,7 +45,7 @@ struct ProbeOutput {
     inverse: Vec2,
 }
 
-/// Relative difference, or absolute where both are tiny.
+/// Returns the relative difference, or an absolute one where both are tiny.
 fn difference(a: f32, b: f32) -> f32 {
     (a - b).abs() / a.abs().max(b.abs()).max(1e-30)
 }
@@ -96,7 +96,7 @@ fn shader_twin_agrees_over_the_whole_range() {
         check("deviation", shader.deviation, srbf::kernel_deviation(a.bandwidth), 1e-5);
         let part = srbf::kernel_hemisphere_part(a.bandwidth, a.axis.dot(input.direction));
         check("hemisphere part", shader.hemisphere_part, part, 1e-5);
-        // The exponent is reproduced to a few units in its last place.
+        // The shader reproduces the exponent to a few units in its last place.
         let d = input.direction - a.axis;
         let exponent = 0.5 * a.bandwidth * d.dot(d);
         let value = srbf::lobe_value(a, input.direction);

@@ -51,7 +51,7 @@ fn p_values_equal_tabulated_quantiles() {
 #[test]
 fn impossible_and_rare_bins_are_treated_as_documented() {
     assert_eq!(chi_square_p_value(&[50.0, 50.0, 1.0], &[0.5, 0.5, 0.0]), 0.0);
-    // A rare bin is pooled: one count where 0.01 is expected is no scandal on its own.
+    // A rare bin is pooled: one count where 0.01 is expected raises no alarm on its own.
     assert!(chi_square_p_value(&[50.0, 49.0, 1.0], &[50.0, 50.0, 0.01]) > 0.5);
 }
 
@@ -64,13 +64,13 @@ fn z_of_mean_measures_in_standard_errors() {
 
 #[test]
 fn estimates_have_the_mean_and_its_error() {
-    // Column by column: the values 1 and 3, and twice 10.
+    // The columns hold 1 and 3, and twice 10.
     let values = estimates(&[vec![1.0, 10.0], vec![3.0, 10.0]]);
     assert_eq!(values.len(), 2);
     assert_eq!((values[0].mean, values[0].error()), (2.0, 1.0));
     assert_eq!((values[1].mean, values[1].error()), (10.0, 0.0));
     let others = estimates(&[vec![2.0, 10.0], vec![10.0, 10.0]]);
-    // (6 − 2)/√(1 + 16); values without an error differ by nothing, or by far too much.
+    // (6 − 2)/√(1 + 16). Values without an error agree or differ by far too much.
     assert!(close(largest_t(&values, &others), 4.0 / 17.0_f64.sqrt()));
     assert_eq!(largest_t(&values[1..], &others[1..]), 0.0);
     assert!(largest_t(&values[1..], &estimates(&[vec![11.0], vec![11.0]])) > 1e6);

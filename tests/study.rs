@@ -1,5 +1,5 @@
-//! The study command from its options to its report: runs, figures, what is taken up again, and the
-//! messages of bad input.
+//! The study command from its options to its report: runs, figures, continuation, and the messages
+//! for bad input.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
 #[path = "support/command.rs"]
@@ -33,7 +33,7 @@ const SMALL: [&str; 10] = [
     "--quiet",
 ];
 
-/// A box on a floor under the sky.
+/// Formats a scene file of a box on a floor under the sky.
 fn yard(diffuse: &str) -> String {
     let clay = format!("type = \"plastic\"\ndiffuse = {diffuse}\nalpha = 0.2");
     let object = "shape = \"box\"\nsize = [0.6, 0.6, 0.6]\ntranslate = [0.0, 0.3, 0.0]";
@@ -55,7 +55,7 @@ fn json(folder: &Folder, name: &str) -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
-/// A page is whole, closes what it opens, and fetches nothing.
+/// Checks that a page is whole, closes what it opens, and fetches nothing.
 #[track_caller]
 fn check_page(page: &str) {
     assert!(page.starts_with("<!DOCTYPE html>") && page.trim_end().ends_with("</html>"));
@@ -69,7 +69,7 @@ fn check_page(page: &str) {
     }
 }
 
-/// Time of the last change of a run's record, which tells whether it was made again.
+/// Returns the time of a run record's last change, which tells if it was made again.
 fn changed(folder: &Folder, name: &str) -> std::time::SystemTime {
     fs::metadata(folder.path().join("report").join(name)).unwrap().modified().unwrap()
 }
@@ -105,7 +105,7 @@ fn a_study_has_every_figure() {
             assert!(last["seconds"].as_f64().unwrap() >= 0.1);
         }
     }
-    // Two levels of samples and the time, for two samplers.
+    // Two levels of samples and one time, for two samplers.
     assert_eq!(results["summaries"].as_array().unwrap().len(), 6);
     assert_eq!(results["curves"].as_array().unwrap().len(), 2);
     let reference = &results["scenes"][0]["reference"];
@@ -137,7 +137,7 @@ fn a_study_has_every_figure() {
         assert!(columns.contains(&column), "{column}: {columns:?}");
     }
     let rows: Vec<&str> = lines.collect();
-    // Eight at numbers of samples, four at a time.
+    // Eight rows by samples, four by time.
     assert_eq!(rows.len(), 12);
     for row in rows {
         assert_eq!(row.split(',').count(), columns.len(), "{row}");
@@ -160,7 +160,7 @@ fn a_study_has_every_figure() {
     ] {
         assert!(page.contains(part), "{part}");
     }
-    // Reference, two samplers at three rules with their errors.
+    // One reference, and two samplers at three rules with their errors.
     assert_eq!(page.matches("{background-image:url(data:image/png;base64,").count(), 1 + 2 * 6);
 
     for name in ["mis-4spp-seed1", "mis-6spp-seed2", "ris-0.1s-seed1", "reference_1"] {
@@ -293,8 +293,8 @@ fn an_interrupted_study_keeps_its_runs_and_continues() {
     assert_eq!(json(&folder, "results.json")["is_complete"], true);
 }
 
-/// Interrupts a study within its reference, continues it, and compares the first half with a render
-/// that was not interrupted.
+/// Interrupts a study within its reference, continues it, and compares the first half with an
+/// uninterrupted render.
 #[cfg(unix)]
 fn interrupt_reference(sampler: &str) {
     let reference_sampler = format!("--reference-sampler={sampler}");
@@ -350,7 +350,7 @@ fn an_interrupted_reference_continues_to_the_bit() {
 #[test]
 #[cfg(unix)]
 fn an_interrupted_reference_by_guided_continues_to_the_bit() {
-    // The yard is open, so no number of candidates is measured, which could differ.
+    // The yard is open, so no number of candidates is measured that could differ.
     interrupt_reference("guided");
 }
 
@@ -487,7 +487,7 @@ fn references_can_be_given() {
     assert_eq!(own["spp"], 128);
     assert!(own["mse"].as_f64().unwrap() > 0.0 && own["relmse"].as_f64().unwrap() > 0.0);
 
-    // One image: its own error is that of its variances.
+    // The error of a single image comes from its variances.
     let one = ["study", "yard.toml", "--samplers=mis", "--spp=2", "--reference=a.exr", "-o", "one"];
     folder.run(&one).assert(0, &[]);
     let text = fs::read_to_string(folder.path().join("one/results.json")).unwrap();
@@ -496,7 +496,7 @@ fn references_can_be_given() {
     assert!(single["mse"].as_f64().unwrap() > own["mse"].as_f64().unwrap());
     assert!(single["relmse"].is_null());
 
-    // Those of another study.
+    // Take the references of another study.
     folder
         .run(&[
             "study",
@@ -569,7 +569,7 @@ fn a_sampler_below_the_references_noise_is_not_judged() {
     assert!(page.contains("not judged") && page.contains("--reference-spp"));
 }
 
-/// A limit on the size of files stands in for a disk without space.
+/// Emulates a full disk by a limit on file size.
 #[test]
 #[cfg(unix)]
 fn no_space_is_an_error_and_finished_runs_stay() {
@@ -577,7 +577,7 @@ fn no_space_is_an_error_and_finished_runs_stay() {
     folder.run(&SMALL).assert(0, &[]);
     let record = "runs/yard/mis-6spp-seed1.json";
     let before = changed(&folder, record);
-    // Files of at most 512 bytes, and an error in place of the signal.
+    // Limit files to 512 bytes, with an error in place of the signal.
     let script = "trap '' XFSZ; ulimit -f 1; exec \"$0\" \"$@\"";
     let output = Command::new("sh")
         .args(["-c", script, env!("CARGO_BIN_EXE_fenestra")])

@@ -1,5 +1,5 @@
-//! Traversal: device against Rust twin against brute force against obvhs's own, degenerate input,
-//! watertight edges, self-intersection at every scale, pages, bounds.
+//! Traversal: the device against its Rust twin, brute force and obvhs; degenerate input, watertight
+//! edges, self-intersection at every scale, pages, bounds.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 #[path = "support/random.rs"]
@@ -27,8 +27,8 @@ use random::Random;
 use rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, scaled, soup, sphere};
 use support::device;
 
-/// Distance of the nearest triangle by testing all of them in double precision, and the smallest
-/// barycentric coordinate there; a second result for the nearest one whose edges are only touched.
+/// Finds the distance of the nearest triangle by testing all of them in double precision. The second
+/// result is true if an edge is touched so closely that rounding may decide.
 fn brute_force(geometry: &Geometry, ray: &Ray) -> (Option<f64>, bool) {
     let origin = Vec3::from(ray.origin).as_dvec3();
     let direction = Vec3::from(ray.direction).as_dvec3();
@@ -42,7 +42,7 @@ fn brute_force(geometry: &Geometry, ray: &Ray) -> (Option<f64>, bool) {
             continue;
         }
         if along.abs() < 1e-5 * normal.length() {
-            // Seen edge on: whether it is hit is a matter of rounding.
+            // Seen edge on: rounding decides if it is hit.
             let closest = (a - origin).dot(normal).abs() < 1e-5 * normal.length();
             doubtful |= closest;
             continue;
@@ -65,8 +65,8 @@ fn brute_force(geometry: &Geometry, ray: &Ray) -> (Option<f64>, bool) {
     (nearest, doubtful)
 }
 
-/// Checks the device, under both schedules, and the twin against brute force; returns the share of
-/// rays that brute force could not decide.
+/// Checks the device, under both schedules, and the twin against brute force. Returns the share of
+/// rays that brute force cannot decide.
 fn check(name: &str, geometry: &Geometry, rays: &[Ray]) -> f64 {
     let accel = Accel::build(geometry, ONE_PAGE).unwrap();
     let on_device = OnDevice::new(&accel);
@@ -231,11 +231,11 @@ fn obvhs_finds_the_same() {
         different +=
             usize::from(ours != nearest.t && (ours - nearest.t).abs() > 1e-6 + 1e-5 * ours);
     }
-    // Rays through edges are decided by rounding.
+    // Rounding decides on rays through edges.
     assert!(different <= 2, "{different} of 20,000 rays differ");
 }
 
-/// Rays from inside at the vertices and edges of closed meshes: none may get out.
+/// No ray from inside at the vertices and edges of closed meshes gets out.
 #[test]
 fn closed_meshes_do_not_leak() {
     let mut turned = Geometry::default();
@@ -277,7 +277,7 @@ fn closed_meshes_do_not_leak() {
     }
 }
 
-/// Hits inside and outside closed meshes of slivers, and rays that leave them to either side.
+/// Draws hits on closed meshes of slivers, and rays that leave them to the outside.
 fn leaving_rays(geometry: &Geometry, scale: f32, count: usize) -> (Vec<Hit>, Vec<ShadowRay>) {
     let mut random = Random(61);
     let mut hits = Vec::new();
@@ -288,7 +288,7 @@ fn leaving_rays(geometry: &Geometry, scale: f32, count: usize) -> (Vec<Hit>, Vec
         let [a, b, c] = corners.map(|v| Vec3::from(geometry.positions[v as usize]));
         let (u, v) = (random.uniform_f32(), random.uniform_f32());
         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
-        // Not on an edge: there the surface beyond it would have to be left as well.
+        // Keep off the edges, where a ray would have to leave the surface beyond as well.
         let (u, v) = (0.002 + 0.994 * u, 0.002 + 0.994 * v);
         let normal = ((b - a) / scale).cross((c - a) / scale).normalize();
         hits.push(Hit {
@@ -296,7 +296,7 @@ fn leaving_rays(geometry: &Geometry, scale: f32, count: usize) -> (Vec<Hit>, Vec
             geometric_normal: normal.into(),
             ..Hit::default()
         });
-        // Half of them at grazing angles, but not so that rounding decides which side they go to.
+        // Make half of them graze, but not so much that rounding decides on their side.
         let along = random.direction_from_point();
         let cosine =
             random.uniform_f32().max(1e-3) * if random.uniform_f32() < 0.5 { 1.0 } else { 1e-2 };
@@ -310,7 +310,7 @@ fn leaving_rays(geometry: &Geometry, scale: f32, count: usize) -> (Vec<Hit>, Vec
 
 #[test]
 fn rays_leave_their_surface_at_every_scale() {
-    // A convex body seen from outside: whatever leaves it must not meet it again.
+    // A ray that leaves a convex body must not meet it again.
     for rotation in [Quat::IDENTITY, Quat::from_euler(glam::EulerRot::XYZ, 0.3, 0.7, 1.1)] {
         for half in
             [Vec3::new(3.0, 1.5, 4.0), Vec3::new(3.0, 0.01, 4.0), Vec3::new(4.0, 0.02, 0.02)]
@@ -365,7 +365,7 @@ fn pages_of_triangles_make_no_difference() {
     let rays = random_rays(2000, 82, 1.0);
     let whole = Accel::build(&geometry, ONE_PAGE).unwrap();
     let reference = OnDevice::new(&whole).trace(&rays, REFILLING);
-    // 256, 512 and 1,024 triangles a page: four, two and one page.
+    // 256, 512 and 1,024 triangles per page make four, two and one page.
     for (page_bytes, pages) in [(48 * 256 + 47, 4), (48 * 512, 2), (48 * 1024, 1)] {
         let accel = Accel::build(&geometry, page_bytes).unwrap();
         assert_eq!(accel.triangle_pages.len(), pages);
@@ -449,7 +449,7 @@ fn shadow_rays_agree_with_closest_hits() {
 fn surfaces_are_consistent() {
     let geometry = sphere(4, 1.0);
     let accel = Accel::build(&geometry, ONE_PAGE).unwrap();
-    // From inside and from outside, many at grazing angles to the coarse sphere.
+    // Rays come from inside and outside, many at grazing angles to the coarse sphere.
     let rays = random_rays(20_000, 111, 1.0);
     let mut turned = 0;
     for (ray, hit) in rays.iter().zip(OnDevice::new(&accel).trace(&rays, REFILLING)) {
@@ -469,7 +469,7 @@ fn surfaces_are_consistent() {
         assert!(twin.position.distance(position) < 1e-6, "{hit:?} {twin:?}");
         assert!(twin.geometric_normal.distance(geometric) < 1e-5, "{hit:?} {twin:?}");
         assert!(twin.shading_normal.distance(shading) < 1e-4, "{hit:?} {twin:?}");
-        // The interpolated normal of a sphere is its radius.
+        // The interpolated normal of a sphere points along its radius.
         let side = if geometric.dot(position) > 0.0 { 1.0 } else { -1.0 };
         if side * position.normalize().dot(direction) < -0.02 {
             assert!(shading.distance(side * position.normalize()) < 0.1, "{hit:?}");
@@ -480,7 +480,7 @@ fn surfaces_are_consistent() {
     assert!(turned > 20, "only {turned} grazing hits");
 }
 
-/// More triangles at one place than the steps of an invocation: counted, and still a hit.
+/// Rays that meet more triangles in one place than an invocation has steps are counted and still hit.
 #[test]
 fn rays_that_take_too_long_are_counted() {
     let mut geometry = Geometry::default();

@@ -1,9 +1,9 @@
-//! Every sampler ends at the same image: z-tests of block means from independent replicates.
+//! Every sampler converges to the same image: z-tests of block means of independent replicates.
 //!
-//! The reference is `cosine`, which knows neither BRDF nor environment. The seven comparisons of a
-//! scene have 36 values each (12 blocks × 3 channels); with 8 + 8 replicates |t| > 7.5 has a chance of
-//! 3e-6, so that a scene raises a false alarm once in about 2,000 runs, the three scenes once in 600.
-//! Seeds are fixed: a run that passed passes again on the same device.
+//! The reference is `cosine`, which knows neither BRDF nor environment. A scene has seven comparisons
+//! of 36 values (12 blocks × 3 channels). With 8 + 8 replicates, |t| > 7.5 has a chance of 3e-6, so a
+//! scene raises a false alarm once in about 1,400 runs, the three scenes once in 450. Seeds are fixed:
+//! a run that passed passes again on the same device.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 mod support;
@@ -34,15 +34,15 @@ const ALL_AGAINST_COSINE: [Sampler; 8] = [
     Sampler::Visibility,
 ];
 
-/// Replicates whose seeds are the sampler's own.
+/// Renders replicates with the sampler's own seeds.
 fn replicates(scene: &Scene, settings: &Settings, samples: u32) -> Vec<Estimate> {
     replicates::replicates(scene, settings, 1000 * settings.sampler.tag(), samples)
 }
 
-/// Sum of the means and its standard error.
+/// Returns the sum of the means and its standard error.
 fn total(values: &[Estimate]) -> (f64, f64) {
     let mean = values.iter().map(|value| value.mean).sum::<f64>();
-    // The blocks are independent but for their channels: add the errors of one block's channels.
+    // Blocks are independent, but their channels are not: add the errors of one block's channels.
     let error = values
         .chunks(3)
         .map(|block| block.iter().map(|value| value.error()).sum::<f64>().powi(2))
@@ -51,7 +51,7 @@ fn total(values: &[Estimate]) -> (f64, f64) {
     (mean, error)
 }
 
-/// Compares every one of `samplers` with the reference, the first of them.
+/// Compares the `samplers` with the first of them, the reference.
 fn samplers_agree(scene: &Scene, depth: u32, samples: u32, samplers: &[Sampler]) {
     let settings = |sampler| Settings { sampler, depth, ..Settings::default() };
     let reference = replicates(scene, &settings(samplers[0]), 4 * samples);
@@ -68,14 +68,14 @@ fn samplers_agree(scene: &Scene, depth: u32, samples: u32, samplers: &[Sampler])
             error / reference_total
         );
         assert!(largest_t < LIMIT, "{} {}: |t| = {largest_t}", scene.name, sampler.name());
-        // The test has teeth: a wrong factor of a tenth would not pass.
+        // The test has teeth: an error of a tenth would not pass.
         let detected =
             largest_t_with_bias > LIMIT || (1.1 * mean - reference_total).abs() > 3.0 * error;
         assert!(detected, "{} {}: too noisy to judge", scene.name, sampler.name());
     }
 }
 
-/// A smooth measured table: a broad red lobe around the mirror direction over a diffuse base.
+/// Makes a smooth measured table: a broad red lobe around the mirror direction over a diffuse base.
 fn measured() -> Material {
     let table = MeasuredTable::tabulate(|outgoing, incident| {
         let half = (outgoing + incident).normalize_or(Vec3::Z);
@@ -119,8 +119,8 @@ fn in_a_closed_room_with_bounces() {
     samplers_agree(&scene, 4, 64, &ALL_AGAINST_COSINE);
 }
 
-/// The thesis's scenes from real meshes, measured BRDFs and the Uffizi map, where they are at hand:
-/// 3 comparisons of 4 scenes with 72 values each, once in about 400 runs a false alarm.
+/// Tests the thesis's scenes of real meshes, measured BRDFs and the Uffizi map, where they are at
+/// hand: 5 comparisons in 4 scenes with 72 values each raise a false alarm once in about 240 runs.
 #[test]
 fn in_the_scenes_of_the_thesis() {
     let _alone = support::alone();

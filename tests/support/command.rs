@@ -1,4 +1,4 @@
-//! Running the program itself: its exit status and what it prints.
+//! Runs the program itself, for its exit status and output.
 #![allow(dead_code, reason = "every test binary uses a part of this")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
@@ -14,8 +14,8 @@ use std::{
 
 use tempfile::TempDir;
 
-/// The program, to run in `folder`. Its caches lie in the build folder, so that pipelines are
-/// compiled once and the user's own caches are not touched.
+/// Prepares the program to run in `folder`. Its caches lie in the build folder, so that pipelines
+/// are compiled once and the user's own caches stay untouched.
 pub fn program(folder: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_fenestra"));
     command.current_dir(folder).env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
@@ -23,7 +23,7 @@ pub fn program(folder: &Path) -> Command {
     command
 }
 
-/// What a run of the program left behind.
+/// Result of a run of the program.
 pub struct Run {
     /// Exit status, absent after a signal.
     pub status: Option<i32>,
@@ -43,7 +43,7 @@ impl Run {
         }
     }
 
-    /// Fails unless the exit status is `status` and every part of `parts` is among the messages.
+    /// Fails unless the exit status is `status` and the messages contain every part of `parts`.
     #[track_caller]
     pub fn assert(&self, status: i32, parts: &[&str]) {
         let messages = &self.messages;
@@ -105,8 +105,8 @@ impl Running {
     }
 }
 
-/// Text of a scene file: `object` stands on a floor, both of the material `clay`, and a camera 3 m
-/// away looks at them. `clay` and `object` are keys of their tables, `environment` is one key.
+/// Formats a scene file: `object` stands on a floor, both of the material `clay`, before a camera
+/// 3 m away. `clay`, `object` and `environment` are the keys of their tables.
 pub fn yard([width, height]: [u32; 2], environment: &str, clay: &str, object: &str) -> String {
     format!(
         r#"
@@ -142,7 +142,7 @@ material = "clay"
 /// Object of a [`yard`]: a ball of 1 m on the floor.
 pub const BALL: &str = "shape = \"sphere\"\nradius = 0.5\ntranslate = [0.0, 0.5, 0.0]";
 
-/// A folder of its own for one test.
+/// A temporary folder for one test.
 pub struct Folder(TempDir);
 
 impl Folder {
@@ -165,7 +165,7 @@ impl Folder {
         Run::of(&program(self.path()).args(arguments).output().expect("the program starts"))
     }
 
-    /// Names of the files in this folder, sorted.
+    /// Returns the sorted names of the files in this folder.
     pub fn files(&self) -> Vec<String> {
         let mut names: Vec<String> = fs::read_dir(self.path())
             .expect("the temporary folder can be read")

@@ -13,7 +13,7 @@ pub const BIN_COLUMNS: usize = 24;
 /// All bins; the last one holds the directions below the horizon.
 pub const BINS: usize = BIN_ROWS * BIN_COLUMNS + 1;
 
-/// Bin of a direction in the local frame.
+/// Returns the bin of a direction in the local frame.
 pub fn bin(local: DVec3) -> usize {
     if local.z <= 0.0 {
         return BINS - 1;
@@ -25,8 +25,8 @@ pub fn bin(local: DVec3) -> usize {
     row * BIN_COLUMNS + column
 }
 
-/// Local directions of a quadrature with `rows` × 2 `rows` cells of equal solid angle: one point
-/// drawn in each cell, so that edges of regions do no harm.
+/// Returns local directions of a quadrature with `rows` × 2 `rows` cells of equal solid angle, one
+/// drawn at random in each cell so that edges of regions do no harm.
 pub fn quadrature(rows: usize) -> impl ExactSizeIterator<Item = DVec3> {
     let columns = 2 * rows;
     (0..rows * columns).map(move |cell| {

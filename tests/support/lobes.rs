@@ -8,7 +8,7 @@ pub const BANDWIDTHS: [f32; 17] = [
     1e5,
 ];
 
-/// Bandwidth in the range of [`BANDWIDTHS`], its logarithm uniform.
+/// Draws a bandwidth in the range of [`BANDWIDTHS`], its logarithm uniform.
 pub fn random_bandwidth(random: &mut Random) -> f32 {
     random.power_of_ten(-3.0, 5.0)
 }

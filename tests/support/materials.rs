@@ -1,4 +1,4 @@
-//! Materials of every kind for the tests of the reflection models, and directions to try them in.
+//! Materials of every kind, and directions, for the tests of the reflection models.
 
 #![allow(dead_code, reason = "every test binary uses its own part")]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
@@ -17,7 +17,7 @@ use fenestra::{
 };
 use glam::{Vec3, vec3};
 
-/// A material of the tests and the angular scale of its narrowest lobe.
+/// A test material and the angular scale of its narrowest lobe.
 pub struct Case {
     pub material: Material,
     pub lobe_width: f32,
@@ -35,7 +35,7 @@ fn plastic(diffuse: Vec3, alpha: f32, ior: f32) -> MaterialKind {
 const GOLD: ConductorFresnel =
     ConductorFresnel::Exact { eta: vec3(0.18, 0.42, 1.37), k: vec3(3.42, 2.35, 1.77) };
 
-/// A measured table made from a plastic, with energy, reciprocity and every cell known.
+/// Tabulates a plastic, so that energy, reciprocity and every cell are known.
 fn synthetic_table(diffuse: Vec3, alpha: f32) -> Arc<MeasuredTable> {
     let model = MaterialTables::new(&[case("model", alpha, plastic(diffuse, alpha, 1.5)).material])
         .unwrap();
@@ -51,12 +51,12 @@ fn measured(diffuse: Vec3, alpha: f32) -> MaterialKind {
     }
 }
 
-/// A rough measured material whose table comes from a plastic.
+/// Makes a rough measured material from a plastic.
 pub fn measured_plastic() -> Material {
     case("measured", 0.3, measured(vec3(0.3, 0.2, 0.1), 0.3)).material
 }
 
-/// Every kind over its range of parameters.
+/// Returns every kind over its range of parameters.
 pub fn cases() -> &'static [Case] {
     static CASES: OnceLock<Vec<Case>> = OnceLock::new();
     CASES.get_or_init(|| {
@@ -82,7 +82,7 @@ pub fn cases() -> &'static [Case] {
     })
 }
 
-/// The device tables of [`cases`].
+/// Returns the device tables of [`cases`].
 pub fn tables() -> &'static MaterialTables {
     static TABLES: OnceLock<MaterialTables> = OnceLock::new();
     TABLES.get_or_init(|| {
@@ -91,19 +91,19 @@ pub fn tables() -> &'static MaterialTables {
     })
 }
 
-/// Three reproducible numbers in [0, 1).
+/// Returns three reproducible numbers in [0, 1).
 pub fn uniform(index: u32, stream: u32) -> Vec3 {
     let [x, y, z, _] = hash_4d([index, stream, 17, 4711]);
     let unit = |bits: u32| (bits >> 8) as f32 / 16_777_216.0;
     vec3(unit(x), unit(y), unit(z))
 }
 
-/// Unit vector of polar angle θ and azimuth φ, radians.
+/// Returns the unit vector of polar angle θ and azimuth φ, in radians.
 pub fn direction(theta: f64, phi: f64) -> Vec3 {
     glam::dvec3(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()).as_vec3()
 }
 
-/// A direction above the surface, uniform over the hemisphere.
+/// Returns a direction above the surface, uniform over the hemisphere.
 pub fn hemisphere(index: u32, stream: u32) -> Vec3 {
     let u = uniform(index, stream);
     direction(f64::from(1.0 - u.x).acos(), f64::from(u.y) * std::f64::consts::TAU)

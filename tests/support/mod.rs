@@ -1,4 +1,4 @@
-//! What the integration tests share: the Vulkan device and probes of single shader functions.
+//! Shared by the integration tests: the Vulkan device, renderers, and probes of shader functions.
 #![allow(dead_code, reason = "every test binary uses a part of this")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
@@ -20,15 +20,15 @@ use fenestra::{
     shader::constants::{SET_FILM, WORKGROUP_SIZE},
 };
 
-/// One test at a time: the validation layers were seen to crash when several threads made and dropped
-/// renderers at once.
+/// Lets one test run at a time: the validation layers were seen to crash when several threads made
+/// and dropped renderers at once.
 pub fn alone() -> MutexGuard<'static, ()> {
     static LOCK: Mutex<()> = Mutex::new(());
     LOCK.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What the probe `product_state` makes a path of: a surface seen along a direction, and a shadow ray with
-/// its outcome.
+/// Input of the probe `product_state` for one path: a surface seen along a direction, and a shadow
+/// ray with its outcome.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub struct PathInput {
@@ -39,7 +39,8 @@ pub struct PathInput {
     pub is_visible: u32,
 }
 
-/// The device all tests of one binary share, with validation and synchronization validation on.
+/// Returns the device that all tests of one binary share, with validation and synchronization
+/// validation on.
 ///
 /// # Panics
 /// Without a Vulkan device or the validation layers: run `./setup`.
@@ -56,12 +57,12 @@ pub fn device() -> &'static Arc<Device> {
     })
 }
 
-/// A renderer of `scene` on the shared device.
+/// Makes a renderer of `scene` on the shared device.
 pub fn renderer(scene: &Scene, settings: Settings) -> Renderer {
     Renderer::new(device(), scene, settings).unwrap()
 }
 
-/// Sums and totals after `samples` samples per pixel.
+/// Renders `samples` samples per pixel and returns sums and totals.
 pub fn render(scene: &Scene, settings: Settings, samples: u32) -> (Sums, Totals) {
     let mut renderer = renderer(scene, settings);
     renderer.render_pass(samples).unwrap();
@@ -75,9 +76,8 @@ pub fn assert_silent() {
     assert!(messages.is_empty(), "validation messages:\n{}", messages.join("\n"));
 }
 
-/// Runs a probe shader once over `invocations` invocations and returns what it wrote to binding 1
-/// of the film set; `buffers` are (set, binding, content), the probe's input being binding 0 of the
-/// film set.
+/// Runs a probe shader over `invocations` invocations and returns its output, binding 1 of the film
+/// set. `buffers` are (set, binding, content); binding 0 of the film set is the probe's input.
 pub fn run_probe(
     spirv: &[u8],
     buffers: &[(u32, u32, &[u8])],

@@ -1,4 +1,4 @@
-//! Geometry and rays for tests of traversal, and traversal on the device through the passes.
+//! Geometry and rays for the traversal tests, and traversal on the device through the passes.
 #![allow(dead_code, reason = "every test binary uses a part of this")]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
@@ -23,7 +23,7 @@ use glam::{Quat, Vec3};
 
 use crate::random::Random;
 
-/// A page that holds every test scene.
+/// Size of a page that holds every test scene.
 pub const ONE_PAGE: u64 = 128 << 20;
 
 /// Schedule that refills the lanes of a subgroup of eight.
@@ -38,7 +38,7 @@ pub fn push(geometry: &mut Geometry, corners: [Vec3; 3]) {
     geometry.materials.push(geometry.materials.len() as u32 % 7);
 }
 
-/// Triangles of mixed sizes in the cube −1…1.
+/// Makes triangles of mixed sizes in the cube −1…1.
 pub fn soup(count: usize, seed: u64) -> Geometry {
     let mut random = Random(seed);
     let mut geometry = Geometry::default();
@@ -50,7 +50,7 @@ pub fn soup(count: usize, seed: u64) -> Geometry {
     geometry
 }
 
-/// The twelve triangles of a box with shared vertices, turned by `rotation`, added to `geometry`.
+/// Adds the twelve triangles of a box with shared vertices, turned by `rotation`.
 pub fn push_box(geometry: &mut Geometry, centre: Vec3, half: Vec3, rotation: Quat) {
     let first = geometry.positions.len() as u32;
     for corner in 0..8_u32 {
@@ -72,7 +72,7 @@ pub fn push_box(geometry: &mut Geometry, centre: Vec3, half: Vec3, rotation: Qua
     }
 }
 
-/// A closed sphere of `rows`·2·`rows` quads about the origin with smooth normals.
+/// Makes a closed sphere of `rows`·2·`rows` quads about the origin with smooth normals.
 pub fn sphere(rows: u32, radius: f32) -> Geometry {
     let columns = 2 * rows;
     let mut geometry = Geometry::default();
@@ -105,7 +105,7 @@ pub fn sphere(rows: u32, radius: f32) -> Geometry {
     geometry
 }
 
-/// The same geometry, every coordinate multiplied by `scale`.
+/// Multiplies every coordinate by `scale`.
 pub fn scaled(geometry: &Geometry, scale: f32) -> Geometry {
     let positions = geometry.positions.iter().map(|position| position.map(|x| x * scale)).collect();
     Geometry { positions, ..geometry.clone() }
@@ -137,12 +137,12 @@ impl OnDevice {
         Self { geometry, scene, counters, film }
     }
 
-    /// Rays given up so far.
+    /// Returns the number of rays given up so far.
     pub fn overruns(&self) -> u32 {
         self.counters.download::<Counters>(1).unwrap()[0].traversal_overruns
     }
 
-    /// Hits of `rays` by the pass.
+    /// Traces `rays` by the pass and returns their hits.
     pub fn trace(&self, rays: &[Ray], schedule: Schedule) -> Vec<Hit> {
         let device = crate::support::device();
         let ray_buffer = Buffer::from_slice(device, "rays", rays).unwrap();
@@ -161,7 +161,7 @@ impl OnDevice {
         hits.download(rays.len()).unwrap()
     }
 
-    /// Visibility of `shadow_rays`, a multiple of the number of hits, by the pass.
+    /// Traces `shadow_rays`, a multiple of the number of hits, by the pass and returns their visibility.
     pub fn shadow(&self, hits: &[Hit], shadow_rays: &[ShadowRay], schedule: Schedule) -> Vec<u32> {
         let device = crate::support::device();
         let hit_buffer = Buffer::from_slice(device, "hits", hits).unwrap();

@@ -1,4 +1,4 @@
-//! Images as block means of independent replicates, which `statistics` compares.
+//! Block means of an image's independent replicates, for the z-tests of `statistics`.
 
 use std::ops::Range;
 
@@ -16,10 +16,10 @@ pub const REPLICATES: u32 = 8;
 /// Side of a block in pixels.
 pub const BLOCK: u32 = 8;
 
-/// Largest |t| allowed: of 8 + 8 replicates a value exceeds it with a chance of 3e-6.
+/// Largest |t| allowed. A value of 8 + 8 replicates exceeds it with a chance of 3e-6.
 pub const LIMIT: f64 = 7.5;
 
-/// Mean radiance of every block and channel, channels innermost.
+/// Averages radiance over every block, channels innermost.
 fn block_means(sums: &Sums) -> Vec<f64> {
     let blocks_per_row = sums.width / BLOCK;
     let mut means = vec![0.0; 3 * (blocks_per_row * (sums.height / BLOCK)) as usize];
@@ -33,8 +33,8 @@ fn block_means(sums: &Sums) -> Vec<f64> {
     means
 }
 
-/// Block means of one picture per seed, each rendered from nothing learned but what `prepare` gives
-/// the renderer.
+/// Renders a picture per seed, each from nothing learned but what `prepare` gives the renderer, and
+/// returns their block means.
 pub fn rows(
     scene: &Scene,
     settings: &Settings,
@@ -56,7 +56,7 @@ pub fn rows(
     rows
 }
 
-/// Estimates of the block means from [`REPLICATES`] pictures with the seeds from `first_seed` on.
+/// Estimates the block means from [`REPLICATES`] pictures with the seeds from `first_seed` on.
 pub fn replicates(
     scene: &Scene,
     settings: &Settings,

@@ -1,4 +1,4 @@
-//! Small scenes made of boxes and one sphere, for tests of the renderer.
+//! Small scenes made of boxes and spheres, for tests of the renderer.
 #![allow(dead_code, reason = "every test binary uses a part of this")]
 
 use std::path::PathBuf;
@@ -12,18 +12,18 @@ use fenestra::{
 };
 use glam::Vec3;
 
-/// A material of reflectance `reflectance`.
+/// Makes a diffuse material.
 pub fn diffuse(reflectance: Vec3) -> Material {
     Material { name: "diffuse".into(), kind: MaterialKind::Diffuse { reflectance } }
 }
 
-/// A glossy coat over a blue base.
+/// Makes a glossy coat over a blue base.
 pub fn plastic(alpha: f32) -> Material {
     let diffuse = Vec3::new(0.2, 0.3, 0.6);
     Material { name: "plastic".into(), kind: MaterialKind::Plastic { diffuse, alpha, ior: 1.5 } }
 }
 
-/// Copper (Johnson & Christy 1972, refractive index near 630, 532 and 465 nm).
+/// Makes copper (Johnson & Christy 1972, refractive index near 630, 532 and 465 nm).
 pub fn copper(alpha: f32) -> Material {
     let fresnel = ConductorFresnel::Exact {
         eta: Vec3::new(0.27, 1.03, 1.17),
@@ -32,7 +32,7 @@ pub fn copper(alpha: f32) -> Material {
     Material { name: "copper".into(), kind: MaterialKind::Conductor { alpha, fresnel } }
 }
 
-/// A camera for `film` that looks from `position` to `look_at`.
+/// Makes a camera that looks from `position` to `look_at`.
 fn camera(position: Vec3, look_at: Vec3) -> Camera {
     Camera {
         position,
@@ -109,7 +109,7 @@ pub fn add_sphere(geometry: &mut Geometry, centre: Vec3, radius: f32, rings: u32
     }
 }
 
-/// An environment from a function of the direction, `width` × `width / 2` texels.
+/// Tabulates a function of the direction in a map of `width` × `width / 2` texels.
 pub fn environment(width: u32, radiance: impl Fn(Vec3) -> Vec3) -> EnvironmentMap {
     let height = width / 2;
     let texels = (0..height)
@@ -128,7 +128,7 @@ pub fn environment(width: u32, radiance: impl Fn(Vec3) -> Vec3) -> EnvironmentMa
     EnvironmentMap { width, height, texels, rotation_rad: 0.3, source: "test".into() }
 }
 
-/// A sky with a bright patch low in the west, a blue zenith and a dim ground.
+/// Makes a sky with a bright patch low in the west, a blue zenith and a dim ground.
 pub fn sky() -> EnvironmentMap {
     let sun = Vec3::new(-0.8, 0.45, 0.3).normalize();
     environment(64, move |direction| {
@@ -141,7 +141,7 @@ pub fn sky() -> EnvironmentMap {
     })
 }
 
-/// A convex box under a constant environment: every pixel sees reflectance × radiance, or radiance.
+/// Makes a convex box under a constant environment: pixels see reflectance × radiance, or radiance.
 pub fn convex_furnace(material: Material, radiance: Vec3) -> Scene {
     let mut geometry = Geometry::default();
     add_box(&mut geometry, Vec3::ZERO, Vec3::new(1.0, 1.0, 1.0), 0);
@@ -155,7 +155,7 @@ pub fn convex_furnace(material: Material, radiance: Vec3) -> Scene {
     )
 }
 
-/// A white sphere with a white box beside it under a constant environment of 1: with enough
+/// Makes a white sphere with a white box beside it under a constant environment of 1: with enough
 /// vertices every pixel is 1.
 pub fn concave_furnace() -> Scene {
     let mut geometry = Geometry::default();
@@ -171,7 +171,7 @@ pub fn concave_furnace() -> Scene {
     )
 }
 
-/// A horizontal plane of reflectance ρ that fills the image, under `environment`.
+/// Makes a horizontal plane that fills the image, under `environment`.
 pub fn plane(reflectance: Vec3, environment: EnvironmentMap) -> Scene {
     let mut geometry = Geometry::default();
     add_box(&mut geometry, Vec3::new(0.0, -0.5, 0.0), Vec3::new(100.0, 1.0, 100.0), 0);
@@ -180,7 +180,7 @@ pub fn plane(reflectance: Vec3, environment: EnvironmentMap) -> Scene {
     scene("plane", camera, [16, 8], environment, vec![diffuse(reflectance)], geometry)
 }
 
-/// Spheres and a box on the ground under the sky, `materials` in turn.
+/// Makes three spheres on the ground under the sky, with `materials` in turn.
 pub fn open(materials: Vec<Material>) -> Scene {
     let mut geometry = Geometry::default();
     add_box(&mut geometry, Vec3::new(0.0, -0.5, 0.0), Vec3::new(20.0, 1.0, 20.0), 0);
@@ -199,12 +199,12 @@ pub fn open(materials: Vec<Material>) -> Scene {
     )
 }
 
-/// [`room`] with a diffuse, a glossy and a coated material.
+/// Makes a [`room`] with a diffuse, a glossy and a coated material.
 pub fn mixed_room() -> Scene {
     room(vec![diffuse(Vec3::splat(0.6)), copper(0.15), plastic(0.3)])
 }
 
-/// A closed room with one window to the west, a box and a sphere in it, `materials` in turn.
+/// Makes a room with one window to the west, a box and a sphere, with `materials` in turn.
 pub fn room(materials: Vec<Material>) -> Scene {
     let mut geometry = Geometry::default();
     let count = u32::try_from(materials.len()).unwrap_or(1);

@@ -2,18 +2,18 @@
 
 #![allow(dead_code, reason = "every test binary uses its own part")]
 
-/// Bins with a smaller expected count are pooled with their neighbours.
+/// Bins that expect fewer counts are pooled with their neighbours.
 const MIN_EXPECTED: f64 = 5.0;
 
-/// Probability that counts drawn from `expected` differ from it at least as much as `observed` does:
-/// Pearson's χ², one degree of freedom less than there are bins.
+/// Returns the probability that counts drawn from `expected` differ from it at least as much as
+/// `observed` does, by Pearson's χ² with one degree of freedom less than there are bins.
 ///
-/// `expected` is scaled to the sum of `observed`, so that densities or probabilities will do. Bins
-/// are visited in order of their expectation and pooled until each pool expects five counts or more.
-/// A count in a bin of expectation 0 gives 0.
+/// `expected` is scaled to the sum of `observed`, so densities or probabilities will do. Bins are
+/// visited in order of their expectation and pooled until each pool expects five counts or more. A
+/// count in a bin of expectation 0 gives 0.
 ///
 /// # Panics
-/// Where the lengths differ, a value is negative or not finite, or fewer than two pools remain.
+/// If the lengths differ, a value is negative or not finite, or fewer than two pools remain.
 pub fn chi_square_p_value(observed: &[f64], expected: &[f64]) -> f64 {
     assert_eq!(observed.len(), expected.len(), "one expected count per observed count");
     let valid = |values: &[f64]| values.iter().all(|value| value.is_finite() && *value >= 0.0);
@@ -48,13 +48,13 @@ pub fn chi_square_p_value(observed: &[f64], expected: &[f64]) -> f64 {
     upper_incomplete_gamma(0.5 * (pools.len() - 1) as f64, 0.5 * statistic)
 }
 
-/// Two-sided p-value of a standard normal `z`.
+/// Returns the two-sided p-value of a standard normal `z`.
 pub fn z_p_value(z: f64) -> f64 {
     upper_incomplete_gamma(0.5, 0.5 * z * z)
 }
 
-/// z of the mean of independent `replicates` against `truth`, with the standard error estimated from
-/// their spread. Uses Student's distribution nowhere: take 30 replicates or more.
+/// Returns z of the mean of independent `replicates` against `truth`, with the standard error from
+/// their spread. Ignores Student's distribution: take 30 replicates or more.
 pub fn z_of_mean(replicates: &[f64], truth: f64) -> f64 {
     let estimate = Estimate::of(replicates.iter().copied());
     (estimate.mean - truth) / estimate.error()
@@ -76,23 +76,23 @@ impl Estimate {
         Self { mean, squared_error: squares / (count * (count - 1.0)) }
     }
 
-    /// Standard error of the mean.
+    /// Returns the standard error of the mean.
     pub fn error(&self) -> f64 {
         self.squared_error.sqrt()
     }
 
-    /// Estimate of `factor` times the value.
+    /// Scales the value by `factor`.
     fn times(self, factor: f64) -> Self {
         Self { mean: factor * self.mean, squared_error: factor * factor * self.squared_error }
     }
 }
 
-/// Estimates of several values from `rows` of them, one row a replicate.
+/// Estimates several values from `rows` of them, one row a replicate.
 pub fn estimates(rows: &[Vec<f64>]) -> Vec<Estimate> {
     (0..rows[0].len()).map(|index| Estimate::of(rows.iter().map(|row| row[index]))).collect()
 }
 
-/// Largest |t| between two lists of estimates of the same values.
+/// Returns the largest |t| between two lists of estimates of the same values.
 pub fn largest_t(a: &[Estimate], b: &[Estimate]) -> f64 {
     assert_eq!(a.len(), b.len(), "estimates of the same values");
     let t = |(a, b): (&Estimate, &Estimate)| {
@@ -108,7 +108,7 @@ pub struct Comparison {
     pub largest_t: f64,
     /// Sum of the means over that of the reference.
     pub ratio: f64,
-    /// Largest |t| if the estimates were a tenth too high: small where they are too noisy to judge.
+    /// Largest |t| if the estimates were a tenth too high; small where they are too noisy to judge.
     pub largest_t_with_bias: f64,
 }
 
@@ -124,8 +124,8 @@ impl Comparison {
     }
 }
 
-/// Regularised upper incomplete gamma function Q(a, x): series below a + 1, Lentz's continued
-/// fraction above. Numerical Recipes, section 6.2.
+/// Computes the regularised upper incomplete gamma function Q(a, x) by a series below a + 1 and
+/// Lentz's continued fraction above. Numerical Recipes, section 6.2.
 pub fn upper_incomplete_gamma(a: f64, x: f64) -> f64 {
     assert!(a > 0.0 && x >= 0.0, "Q(a, x) needs a > 0 and x ≥ 0, found a = {a}, x = {x}");
     if x == 0.0 {
@@ -163,7 +163,7 @@ pub fn upper_incomplete_gamma(a: f64, x: f64) -> f64 {
     front * fraction
 }
 
-/// Logarithm of Γ(x) for x > 0: Stirling's series after shifting x above 10, relative error < 1e-13.
+/// Computes ln Γ(x) for x > 0 by Stirling's series after shifting x above 10, relative error < 1e-13.
 fn ln_gamma(x: f64) -> f64 {
     let mut shift = 0.0;
     let mut x = x;
