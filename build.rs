@@ -1,18 +1,36 @@
-//! Compiles `glsl/*.comp` and `glsl/test/*.comp` to SPIR-V and writes the table of shaders.
+//! Compiles `glsl/**/*.comp` to SPIR-V against the declarations of `src/shader`, and writes the table of
+//! shaders.
 
+#[path = "src/shader/bindings.rs"]
+#[expect(dead_code, reason = "the crate uses the rest")]
+mod bindings;
 #[path = "src/shader/constants.rs"]
 mod constants;
+#[path = "src/shader/structs.rs"]
+#[expect(dead_code, reason = "the crate uses the rest")]
+mod structs;
 
 use std::{
-    env, fs,
+    env,
+    fmt::Write,
+    fs,
     path::{Path, PathBuf},
     process::ExitCode,
 };
 
+use bindings::{Binding, Kind, TABLES};
+
+/// Folders of entry points: the common passes and one room for each technique.
+const PASS_FOLDERS: [&str; 4] = ["glsl", "glsl/product", "glsl/visibility", "glsl/guided"];
+/// Folder of the probe kernels, which only tests run.
+const PROBE_FOLDER: &str = "glsl/test";
+/// Name by which shaders include the declarations of `src/shader`.
+const INTERFACE: &str = "interface.glsl";
+
 fn main() -> ExitCode {
-    println!("cargo::rerun-if-changed=build.rs");
-    println!("cargo::rerun-if-changed=src/shader/constants.rs");
-    println!("cargo::rerun-if-changed=glsl");
+    for input in ["build.rs", "src/shader", "glsl"] {
+        println!("cargo::rerun-if-changed={input}");
+    }
     match compile_all() {
         Ok(()) => ExitCode::SUCCESS,
         Err(message) => {
@@ -24,9 +42,9 @@ fn main() -> ExitCode {
     }
 }
 
-/// Sorted `.comp` files of `folder`.
-fn entry_points(folder: &Path) -> Result<Vec<PathBuf>, String> {
-    let entries = fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+/// Sorted `.comp` files of `folder`, not of the folders in it.
+fn entry_points(folder: &str) -> Result<Vec<PathBuf>, String> {
+    let entries = fs::read_dir(folder).map_err(|error| format!("{folder}: {error}"))?;
     let mut files: Vec<PathBuf> = entries
         .filter_map(|entry| entry.ok().map(|entry| entry.path()))
         .filter(|path| path.extension().is_some_and(|extension| extension == "comp"))
@@ -35,52 +53,103 @@ fn entry_points(folder: &Path) -> Result<Vec<PathBuf>, String> {
     Ok(files)
 }
 
+/// GLSL of every struct, and a macro for every buffer.
+fn interface() -> String {
+    let mut text = String::new();
+    for shared in structs::STRUCTS {
+        let members = shared.members.iter().fold(String::new(), |mut members, member| {
+            let _ = write!(members, "{} {}; ", member.kind, member.name);
+            members
+        });
+        let _ = writeln!(text, "struct {} {{ {members}}};", shared.name);
+    }
+    for binding in TABLES.iter().flat_map(|table| table.bindings) {
+        let Binding { set, number, kind, .. } = *binding;
+        let name = binding.glsl_name();
+        let buffer = |element: &str, brackets: &str| {
+            format!(
+                "BUFFER_{name}(access) layout(scalar, set = {set}, binding = {number}) access buffer \
+                 {name}_buffer {{ {element} {name}{brackets}; }};"
+            )
+        };
+        let declaration = match kind {
+            Kind::One(element) => buffer(element, ""),
+            Kind::Array(element) => buffer(element, "[]"),
+            Kind::Texels(format) => format!(
+                "TEXELS_{name} layout(set = {set}, binding = {number}) uniform {} {name};",
+                format.sampler()
+            ),
+        };
+        let _ = writeln!(text, "#define {declaration}");
+    }
+    text
+}
+
 fn compile_all() -> Result<(), String> {
     let out = PathBuf::from(env::var_os("OUT_DIR").ok_or("OUT_DIR is not set")?);
     let compiler = shaderc::Compiler::new().map_err(|error| format!("shaderc: {error}"))?;
     let mut options =
         shaderc::CompileOptions::new().map_err(|error| format!("shaderc: {error}"))?;
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);
-    // Optimised and with debug information: `-O` alone strips the names the layout test reads.
+    // Optimised and with debug information: `-O` alone strips the names that tests read.
     options.set_optimization_level(shaderc::OptimizationLevel::Performance);
     options.set_generate_debug_info();
     options.set_warnings_as_errors();
-    for (name, value) in constants::SHADER_MACROS {
+    for (name, value) in constants::CONSTANTS {
         options.add_macro_definition(name, Some(&format!("{value}u")));
     }
-    options.set_include_callback(|requested, _, _, _| {
-        let path = Path::new("glsl/include").join(requested);
-        let content =
-            fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+    for table in TABLES {
+        let name = format!("SET_{}", table.name.to_uppercase());
+        options.add_macro_definition(&name, Some(&table.set.to_string()));
+    }
+    let interface = interface();
+    options.set_include_callback(move |requested, _, _, _| {
+        // Includes of a room are named with its folder.
+        let folder = if requested.contains('/') { "glsl" } else { "glsl/include" };
+        let path = Path::new(folder).join(requested);
+        let content = if requested == INTERFACE {
+            interface.clone()
+        } else {
+            fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?
+        };
         Ok(shaderc::ResolvedInclude { resolved_name: path.display().to_string(), content })
     });
 
+    let compile = |path: &Path, target: &Path| -> Result<(String, PathBuf), String> {
+        let source =
+            fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let name = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default().to_owned();
+        let spirv = compiler
+            .compile_into_spirv(
+                &source,
+                shaderc::ShaderKind::Compute,
+                &path.display().to_string(),
+                "main",
+                Some(&options),
+            )
+            .map_err(|error| error.to_string())?;
+        let file = target.join(format!("{name}.spv"));
+        fs::write(&file, spirv.as_binary_u8())
+            .map_err(|error| format!("{}: {error}", file.display()))?;
+        Ok((name, file))
+    };
+    let probes = out.join("test");
+    fs::create_dir_all(&probes).map_err(|error| format!("{}: {error}", probes.display()))?;
+    for path in entry_points(PROBE_FOLDER)? {
+        compile(&path, &probes)?;
+    }
+    let mut passes = Vec::new();
+    for folder in PASS_FOLDERS {
+        for path in entry_points(folder)? {
+            passes.push(compile(&path, &out)?);
+        }
+    }
+    passes.sort();
     let mut table = String::from(
         "/// SPIR-V of every pass, by name, sorted.\npub const PASSES: &[(&str, &[u8])] = &[\n",
     );
-    for (folder, is_pass) in [("glsl", true), ("glsl/test", false)] {
-        let target = if is_pass { out.clone() } else { out.join("test") };
-        fs::create_dir_all(&target).map_err(|error| format!("{}: {error}", target.display()))?;
-        for path in entry_points(Path::new(folder))? {
-            let source = fs::read_to_string(&path)
-                .map_err(|error| format!("{}: {error}", path.display()))?;
-            let name = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
-            let spirv = compiler
-                .compile_into_spirv(
-                    &source,
-                    shaderc::ShaderKind::Compute,
-                    &path.display().to_string(),
-                    "main",
-                    Some(&options),
-                )
-                .map_err(|error| error.to_string())?;
-            let file = target.join(format!("{name}.spv"));
-            fs::write(&file, spirv.as_binary_u8())
-                .map_err(|error| format!("{}: {error}", file.display()))?;
-            if is_pass {
-                table += &format!("    ({name:?}, include_bytes!({:?})),\n", file.display());
-            }
-        }
+    for (name, file) in passes {
+        let _ = writeln!(table, "    ({name:?}, include_bytes!({:?})),", file.display());
     }
     table += "];\n";
     fs::write(out.join("shaders.rs"), table).map_err(|error| format!("shaders.rs: {error}"))

@@ -2,13 +2,14 @@
 // that the sums do not depend on how samples are grouped into waves.
 #version 460
 
-#define NEEDS_PARAMETERS
-#define NEEDS_WAVE
-#define NEEDS_PATHS
-#define NEEDS_FILM
-#define NEEDS_FILM_AOVS
-#include "layout.glsl"
 #include "wave.glsl"
+
+READS(paths)
+UPDATES(film_sum)
+UPDATES(film_compensation)
+UPDATES(film_squares)
+UPDATES(film_visible)
+UPDATES(counters)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 

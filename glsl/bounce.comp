@@ -1,15 +1,6 @@
 // Continues every path of the wave by sampling the BRDF: the next ray and the throughput.
 #version 460
 
-#define NEEDS_PARAMETERS
-#define NEEDS_WAVE
-#define NEEDS_RAYS
-#define WRITES_RAYS
-#define NEEDS_HITS
-#define NEEDS_PATHS
-#define WRITES_PATHS
-#define NEEDS_MATERIAL_TEXELS
-#define NEEDS_GEOMETRY
 #include "bounce.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;

@@ -2,16 +2,12 @@
 // and, for a thin lens, over the lens.
 #version 460
 
-#define NEEDS_PARAMETERS
-#define NEEDS_WAVE
-#define NEEDS_RAYS
-#define WRITES_RAYS
-#define NEEDS_PATHS
-#define WRITES_PATHS
-#include "layout.glsl"
 #include "frame.glsl"
 #include "random.glsl"
 #include "wave.glsl"
+
+WRITES(rays)
+WRITES(paths)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 

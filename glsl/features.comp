@@ -1,16 +1,16 @@
 // Adds albedo, shading normal and position of the camera rays' hits to the film, where asked for.
 #version 460
 
-#define NEEDS_PARAMETERS
-#define NEEDS_WAVE
-#define NEEDS_RAYS
-#define NEEDS_HITS
-#define NEEDS_MATERIALS
-#define NEEDS_FILM_AOVS
-#include "layout.glsl"
+#include "brdf.glsl"
 #include "frame.glsl"
 #include "wave.glsl"
-#include "brdf.glsl"
+
+READS(rays)
+READS(hits)
+READS(materials)
+UPDATES(film_albedo)
+UPDATES(film_normal)
+UPDATES(film_position)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 

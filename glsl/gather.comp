@@ -2,18 +2,12 @@
 // environment that the camera sees directly.
 #version 460
 
-#define NEEDS_PARAMETERS
-#define NEEDS_WAVE
-#define NEEDS_RAY_TEXELS
-#define NEEDS_HIT_TEXELS
-#define NEEDS_SHADOW_RAY_TEXELS
-#define NEEDS_VISIBILITY
-#define NEEDS_PATHS
-#define WRITES_PATHS
-#define NEEDS_ENVIRONMENT
-#include "layout.glsl"
-#include "wave.glsl"
 #include "environment.glsl"
+#include "load.glsl"
+#include "wave.glsl"
+
+READS(visibility)
+UPDATES(paths)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 

@@ -2,14 +2,6 @@
 // brings if nothing is in the way: BRDF * radiance * cosine / pdf. Densities per steradian.
 #version 460
 
-#define NEEDS_PARAMETERS
-#define NEEDS_WAVE
-#define NEEDS_RAY_TEXELS
-#define NEEDS_HIT_TEXELS
-#define NEEDS_SHADOW_RAYS
-#define WRITES_SHADOW_RAYS
-#define NEEDS_MATERIAL_TEXELS
-#define NEEDS_ENVIRONMENT
 #include "vertex.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
@@ -20,14 +12,14 @@ layout(constant_id = CONSTANT_CANDIDATES) const uint CANDIDATES = 1u;
 
 // Density of the whole technique or mixture that SAMPLER draws from, where that is neither uniform
 // nor the cosine.
-float density(Considered considered) {
+float density(DirectionSample sampled) {
     if (SAMPLER == SAMPLER_MIS || SAMPLER == SAMPLER_RIS) {
-        return 0.5 * (considered.brdf_pdf + considered.environment_pdf);
+        return 0.5 * (sampled.brdf_pdf + sampled.environment_pdf);
     }
-    return SAMPLER == SAMPLER_ENV ? considered.environment_pdf : considered.brdf_pdf;
+    return SAMPLER == SAMPLER_ENV ? sampled.environment_pdf : sampled.brdf_pdf;
 }
 
-Considered draw_environment_candidate(Vertex vertex, uint sequence_index, uint candidate) {
+DirectionSample draw_environment_candidate(Vertex vertex, uint sequence_index, uint candidate) {
     return draw_from_environment(
         vertex,
         random_2d(
@@ -41,7 +33,7 @@ vec2 surface_numbers(Vertex vertex, uint sequence_index, uint candidate) {
         wave.seed);
 }
 
-Considered draw_brdf_candidate(Vertex vertex, uint sequence_index, uint candidate) {
+DirectionSample draw_brdf_candidate(Vertex vertex, uint sequence_index, uint candidate) {
     float lobe = random_1d(
         vertex.index.pixel, sequence_index, vertex.dimension + DIMENSION_BRDF_LOBE + candidate,
         wave.seed);
@@ -50,14 +42,14 @@ Considered draw_brdf_candidate(Vertex vertex, uint sequence_index, uint candidat
 
 // One of the candidates seen so far, chosen in proportion to target / pdf.
 struct Reservoir {
-    Considered chosen;
+    DirectionSample chosen;
     float chosen_target;
     float weight_sum;
     // Stretched after each choice to be used again.
     float u;
 };
 
-void add_to(inout Reservoir reservoir, Considered candidate) {
+void add_to(inout Reservoir reservoir, DirectionSample candidate) {
     float target = luminance(candidate.integrand);
     float pdf = density(candidate);
     float weight = pdf > 0.0 ? target / pdf : 0.0;
@@ -91,7 +83,7 @@ void main() {
     if (SAMPLER == SAMPLER_RIS) {
         for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
             Reservoir reservoir;
-            reservoir.chosen = Considered(vec3(0.0), vec3(0.0), 0.0, 0.0);
+            reservoir.chosen = DirectionSample(vec3(0.0), vec3(0.0), 0.0, 0.0);
             reservoir.chosen_target = 0.0;
             reservoir.weight_sum = 0.0;
             reservoir.u = random_1d(
@@ -116,37 +108,37 @@ void main() {
         uint coin = block_random_bits(vertex.index, DIMENSION_TECHNIQUE).x & 1u;
         uint turn = (first_ray + coin) & 1u;
         for (uint i = turn; i < wave.shadow_ray_count; i += 2u) {
-            Considered considered =
+            DirectionSample sampled =
                 draw_environment_candidate(vertex, (first_ray + i + coin) >> 1u, 0u);
-            write_considered(i * path_count + path, considered, density(considered));
+            write_sample(i * path_count + path, sampled, density(sampled));
         }
         for (uint i = 1u - turn; i < wave.shadow_ray_count; i += 2u) {
-            Considered considered = draw_brdf_candidate(vertex, (first_ray + i + coin) >> 1u, 0u);
-            write_considered(i * path_count + path, considered, density(considered));
+            DirectionSample sampled = draw_brdf_candidate(vertex, (first_ray + i + coin) >> 1u, 0u);
+            write_sample(i * path_count + path, sampled, density(sampled));
         }
     } else {
         for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
-            Considered considered;
+            DirectionSample sampled;
             float pdf;
             if (SAMPLER == SAMPLER_UNIFORM) {
                 vec2 u = surface_numbers(vertex, first_ray + i, 0u);
                 vec2 azimuth = sin_cos_pi(2.0 * u.y);
-                considered = consider_local(
+                sampled = evaluate_local(
                     vertex, vec3(sqrt(u.x * (2.0 - u.x)) * azimuth.yx, 1.0 - u.x));
                 pdf = 0.5 / PI;
             } else if (SAMPLER == SAMPLER_COSINE) {
                 vec3 incident_local =
                     sample_cosine_hemisphere(surface_numbers(vertex, first_ray + i, 0u));
-                considered = consider_local(vertex, incident_local);
+                sampled = evaluate_local(vertex, incident_local);
                 pdf = incident_local.z / PI;
             } else if (SAMPLER == SAMPLER_ENV) {
-                considered = draw_environment_candidate(vertex, first_ray + i, 0u);
-                pdf = density(considered);
+                sampled = draw_environment_candidate(vertex, first_ray + i, 0u);
+                pdf = density(sampled);
             } else {
-                considered = draw_brdf_candidate(vertex, first_ray + i, 0u);
-                pdf = density(considered);
+                sampled = draw_brdf_candidate(vertex, first_ray + i, 0u);
+                pdf = density(sampled);
             }
-            write_considered(i * path_count + path, considered, pdf);
+            write_sample(i * path_count + path, sampled, pdf);
         }
     }
 }

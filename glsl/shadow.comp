@@ -6,14 +6,12 @@
 #version 460
 #extension GL_KHR_shader_subgroup_ballot : require
 
-#define NEEDS_WAVE
-#define NEEDS_GEOMETRY
-#define NEEDS_HIT_TEXELS
-#define NEEDS_SHADOW_RAY_TEXELS
-#define NEEDS_VISIBILITY
-#define WRITES_VISIBILITY
-#define NEEDS_COUNTERS
 #include "bvh.glsl"
+#include "load.glsl"
+#include "wave.glsl"
+
+WRITES(visibility)
+UPDATES(counters)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 

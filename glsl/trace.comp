@@ -6,13 +6,12 @@
 #version 460
 #extension GL_KHR_shader_subgroup_ballot : require
 
-#define NEEDS_WAVE
-#define NEEDS_GEOMETRY
-#define NEEDS_RAY_TEXELS
-#define NEEDS_HITS
-#define WRITES_HITS
-#define NEEDS_COUNTERS
 #include "bvh.glsl"
+#include "load.glsl"
+#include "wave.glsl"
+
+WRITES(hits)
+UPDATES(counters)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 

@@ -23,17 +23,12 @@ use serde::Serialize;
 use crate::{
     accel::Accel,
     error::Result,
-    gpu::{Buffer, Commands, DescriptorSet, Device, Pipeline},
-    pass::{Schedule, shadow::Shadow, trace::Trace},
-    renderer::SceneBuffers,
-    sampler::Sampler,
+    gpu::{Buffer, Commands, DescriptorSet, Device},
+    pass::{Domain, Kernel, Pass, SceneBuffers, Schedule, Steps},
+    sampler::{Parameters, basic::Basic},
     shader::{
-        constants::{
-            BINDING_COUNTERS, BINDING_HIT_TEXELS, BINDING_HITS, BINDING_PATHS, BINDING_RAY_TEXELS,
-            BINDING_RAYS, BINDING_SHADOW_RAY_TEXELS, BINDING_SHADOW_RAYS, BINDING_VISIBILITY,
-            CONSTANT_SAMPLER, NO_MATERIAL, SET_FILM, SET_WAVE,
-        },
-        spirv,
+        bindings::{FILM, WAVE, film, wave as bindings},
+        constants::NO_MATERIAL,
         structs::{Counters, Hit, PathState, Ray, ShadowRay, Wave},
     },
 };
@@ -45,7 +40,7 @@ const CHUNK: usize = 4096;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayPlan {
     /// Sampler that chooses the directions of shadow rays; not `ris`.
-    pub sampler: Sampler,
+    pub sampler: Basic,
     /// Shadow rays per hit.
     pub shadow_rays: u32,
     /// Number of paths in the wave: pixels of the film in film order.
@@ -190,21 +185,18 @@ impl<'a> Bench<'a> {
         let visibility = make("visibility", shadow_ray_count, size_of::<u32>())?;
         let path_states = make("paths", paths, size_of::<PathState>())?;
         let counters = Buffer::zeroed(device, "counters", size_of::<Counters>() as u64)?;
-        let wave_set = DescriptorSet::new(
-            device,
-            SET_WAVE,
-            &[
-                (BINDING_RAYS, &rays),
-                (BINDING_RAY_TEXELS, &rays),
-                (BINDING_HITS, &hits),
-                (BINDING_HIT_TEXELS, &hits),
-                (BINDING_SHADOW_RAYS, &shadow_rays),
-                (BINDING_SHADOW_RAY_TEXELS, &shadow_rays),
-                (BINDING_VISIBILITY, &visibility),
-                (BINDING_PATHS, &path_states),
-            ],
-        )?;
-        let film_set = DescriptorSet::new(device, SET_FILM, &[(BINDING_COUNTERS, &counters)])?;
+        let bound = [
+            (bindings::RAYS, &rays),
+            (bindings::RAY_TEXELS, &rays),
+            (bindings::HITS, &hits),
+            (bindings::HIT_TEXELS, &hits),
+            (bindings::SHADOW_RAYS, &shadow_rays),
+            (bindings::SHADOW_RAY_TEXELS, &shadow_rays),
+            (bindings::VISIBILITY, &visibility),
+            (bindings::PATHS, &path_states),
+        ];
+        let wave_set = DescriptorSet::new(device, &WAVE, &bound)?;
+        let film_set = DescriptorSet::new(device, &FILM, &[(film::COUNTERS, &counters)])?;
         let wave = Wave {
             pixel_count: plan.paths,
             sample_count: 1,
@@ -231,21 +223,16 @@ impl<'a> Bench<'a> {
         [self.scene.set(), &self.wave_set, &self.film_set]
     }
 
-    /// Runs one pass and returns its device time in seconds.
-    fn run(&self, record: impl FnOnce(&mut Commands)) -> Result<f64> {
+    /// Runs one pass; device seconds.
+    fn run(&self, pass: &Pass) -> Result<f64> {
         let mut commands = Commands::begin_timed(self.device, 1)?;
-        record(&mut commands);
+        pass.record(&mut commands, &self.sets(), &self.wave);
         Ok(commands.submit_and_wait()?.values().sum::<f64>() * 1e-3)
     }
 
-    /// Runs a pass with one invocation per path.
-    fn run_per_path(&self, name: &str, constants: &[(u32, u32)]) -> Result<()> {
-        let pipeline = Pipeline::new(self.device, name, spirv::pass(name), constants)?;
-        self.run(|commands| {
-            let push = bytemuck::bytes_of(&self.wave);
-            commands.dispatch(&pipeline, &self.sets()[..2], push, self.wave.pixel_count);
-        })?;
-        Ok(())
+    /// Compiles a kernel and runs it once.
+    fn run_once(&self, kernel: Kernel) -> Result<()> {
+        self.run(&Pass::new(self.device, kernel)?).map(drop)
     }
 
     /// Downloads the rays that `trace` would follow.
@@ -302,9 +289,9 @@ pub fn measure(
     let bench = Bench::new(device, scene, plan)?;
     let yardstick = Yardstick::new(accel, plan.threads);
     let incoherent = Schedule::incoherent(device.capabilities());
-    let trace = Trace::new(device, scene.geometry(), Schedule::SINGLE)?;
-    let trace_bounce = Trace::new(device, scene.geometry(), incoherent)?;
-    let shadow = Shadow::new(device, scene.geometry(), incoherent)?;
+    let trace = Pass::new(device, scene.geometry().traversal().trace(Schedule::SINGLE))?;
+    let trace_bounce = Pass::new(device, scene.geometry().traversal().trace(incoherent))?;
+    let shadow = Pass::new(device, scene.geometry().traversal().shadow(incoherent))?;
     let compare = |kind, rays: &[Option<CpuRay>], any_hit, run: &dyn Fn() -> Result<f64>| {
         compare(kind, &yardstick, rays, any_hit, plan.repetitions, run)
     };
@@ -314,29 +301,26 @@ pub fn measure(
         device.zip(cpu).filter(|(device, cpu)| device != cpu).count()
     };
 
-    bench.run_per_path("camera", &[])?;
+    bench.run_once(Kernel::new("camera", Domain::Paths, &[]))?;
     let rays = bench.active_rays()?;
-    let (mut rate, met) = compare("camera", &rays, false, &|| {
-        bench.run(|commands| trace.record(commands, &bench.sets(), &bench.wave))
-    })?;
+    let (mut rate, met) = compare("camera", &rays, false, &|| bench.run(&trace))?;
     rate.disagreements = disagreements(&rays, &bench.hits_met()?, &met);
     rates.push(rate);
 
-    bench.run_per_path("sample", &[(CONSTANT_SAMPLER, plan.sampler.tag())])?;
+    let steps = plan.sampler.steps(&Parameters::default(), scene.material_kinds())?;
+    for kernel in steps.sample(&bench.wave) {
+        bench.run_once(kernel)?;
+    }
     let rays = bench.active_shadow_rays(accel)?;
-    let (mut rate, met) = compare("shadow", &rays, true, &|| {
-        bench.run(|commands| shadow.record(commands, &bench.sets(), &bench.wave))
-    })?;
+    let (mut rate, met) = compare("shadow", &rays, true, &|| bench.run(&shadow))?;
     let visibility: Vec<u32> = bench.visibility.download(rays.len())?;
     let blocked: Vec<bool> = visibility.iter().map(|visible| *visible == 0).collect();
     rate.disagreements = disagreements(&rays, &blocked, &met);
     rates.push(rate);
 
-    bench.run_per_path("bounce", &[])?;
+    bench.run_once(Kernel::new("bounce", Domain::Paths, &[]))?;
     let rays = bench.active_rays()?;
-    let (mut rate, met) = compare("bounce", &rays, false, &|| {
-        bench.run(|commands| trace_bounce.record(commands, &bench.sets(), &bench.wave))
-    })?;
+    let (mut rate, met) = compare("bounce", &rays, false, &|| bench.run(&trace_bounce))?;
     rate.disagreements = disagreements(&rays, &bench.hits_met()?, &met);
     rates.push(rate);
     Ok(rates)

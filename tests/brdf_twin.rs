@@ -3,9 +3,9 @@
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     brdf,
-    shader::constants::{
-        BINDING_BRDF_CELLS, BINDING_BRDF_TABLE, BINDING_MATERIALS, MATERIAL_MEASURED, SET_FILM,
-        SET_SCENE,
+    shader::{
+        bindings::{probe, scene},
+        constants::MATERIAL_MEASURED,
     },
 };
 use glam::Vec3;
@@ -65,10 +65,10 @@ fn shader_agrees_with_its_twin() {
     let bytes = support::run_probe(
         include_bytes!(concat!(env!("OUT_DIR"), "/test/brdf.spv")),
         &[
-            (SET_FILM, 0, bytemuck::cast_slice(&queries)),
-            (SET_SCENE, BINDING_MATERIALS, bytemuck::cast_slice(&tables().materials)),
-            (SET_SCENE, BINDING_BRDF_TABLE, bytemuck::cast_slice(&tables().words)),
-            (SET_SCENE, BINDING_BRDF_CELLS, bytemuck::cast_slice(&tables().words)),
+            (probe::PROBE_INPUT, bytemuck::cast_slice(&queries)),
+            (scene::MATERIALS, bytemuck::cast_slice(&tables().materials)),
+            (scene::BRDF_TABLE, bytemuck::cast_slice(&tables().words)),
+            (scene::BRDF_CELLS, bytemuck::cast_slice(&tables().words)),
         ],
         size_of::<BrdfAnswer>() * queries.len(),
         queries.len() as u32,

@@ -10,7 +10,13 @@ use command::Folder;
 use fenestra::{
     film::{Attribute, Image, Statistics, Sums},
     renderer::Settings,
-    sampler::{GUIDED_CANDIDATES, Parameters, Sampler, choose, guided::GuideState},
+    sampler::{
+        Parameters, Sampler,
+        guided::{
+            GuideState,
+            cost::{GUIDED_CANDIDATES, choose_candidates},
+        },
+    },
 };
 use glam::Vec3;
 use support::{renderer, scenes};
@@ -30,12 +36,12 @@ fn the_choice_is_measured_and_changes_nothing_else() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
     let mut auto = renderer(&scene, guided(None));
-    assert_eq!((auto.candidates(), auto.candidate_costs().len()), (None, 0));
+    assert_eq!((auto.report().candidates, auto.report().candidate_costs.len()), (None, 0));
     auto.render_pass(5).unwrap();
-    let chosen = auto.candidates().unwrap();
-    let costs = auto.candidate_costs().to_vec();
+    let chosen = auto.report().candidates.unwrap();
+    let costs = auto.report().candidate_costs.to_vec();
     eprintln!("{chosen} of {costs:?}");
-    assert_eq!(chosen, choose(&costs));
+    assert_eq!(chosen, choose_candidates(&costs));
     let tried: Vec<u32> = costs.iter().map(|cost| cost.candidates).collect();
     assert_eq!(tried, GUIDED_CANDIDATES[..tried.len()]);
     assert!(tried.len() == 3 || chosen == 1, "8 are tried where 4 are worth it");
@@ -50,7 +56,7 @@ fn the_choice_is_measured_and_changes_nothing_else() {
     // to the bit.
     let mut one = renderer(&scene, guided(Some(1)));
     one.render_pass(5).unwrap();
-    assert_eq!((one.candidates(), one.candidate_costs().len()), (Some(1), 0));
+    assert_eq!((one.report().candidates, one.report().candidate_costs.len()), (Some(1), 0));
     if chosen == 1 {
         assert_same(&one.sums().unwrap(), &auto.sums().unwrap());
         assert!(one.guide_state().unwrap() == auto.guide_state().unwrap(), "the same was learned");
@@ -74,27 +80,27 @@ fn whoever_goes_on_takes_the_recorded_choice() {
         second
     };
     let second = go_on(guided(None), &state);
-    assert_eq!(second.candidates(), first.candidates());
-    assert!(second.candidate_costs().is_empty(), "nothing was measured");
+    assert_eq!(second.report().candidates, first.report().candidates);
+    assert!(second.report().candidate_costs.is_empty(), "nothing was measured");
     first.render_pass(4).unwrap();
     assert_same(&first.sums().unwrap(), &second.sums().unwrap());
     // The recorded number is taken, and 1 and 8 give different pictures.
     let other = GuideState { candidates: Some(8), ..state.clone() };
     let mut eight = go_on(guided(None), &other);
-    assert_eq!(eight.candidates(), Some(8));
+    assert_eq!(eight.report().candidates, Some(8));
     let pinned = go_on(guided(Some(8)), &state);
     assert_same(&eight.sums().unwrap(), &pinned.sums().unwrap());
     let one = go_on(guided(Some(1)), &other);
-    assert_eq!(one.candidates(), Some(1), "what is asked for is not overruled");
+    assert_eq!(one.report().candidates, Some(1), "what is asked for is not overruled");
     assert!(one.sums().unwrap() != eight.sums().unwrap());
     // Without a record, the choice is measured.
     let none = go_on(guided(None), &GuideState { candidates: None, ..state });
-    assert!(none.candidates().is_some() && none.candidate_costs().len() >= 2);
+    assert!(none.report().candidates.is_some() && none.report().candidate_costs.len() >= 2);
     // A restart forgets the choice.
     eight.restart(0).unwrap();
-    assert_eq!(eight.candidates(), None);
+    assert_eq!(eight.report().candidates, None);
     eight.render_pass(1).unwrap();
-    assert!(eight.candidates().is_some() && eight.candidate_costs().len() >= 2);
+    assert!(eight.report().candidates.is_some() && eight.report().candidate_costs.len() >= 2);
     support::assert_silent();
 }
 
@@ -106,13 +112,13 @@ fn nothing_is_measured_where_there_is_nothing_to_choose() {
     auto.render_pass(2).unwrap();
     let state = auto.guide_state().unwrap().unwrap();
     assert!(state.is_open);
-    assert_eq!((auto.candidates(), state.candidates), (None, None));
+    assert_eq!((auto.report().candidates, state.candidates), (None, None));
     let mut dark = renderer(&scenes::mixed_room(), Settings { shadow_rays: 0, ..guided(None) });
     dark.render_pass(2).unwrap();
-    assert_eq!((dark.candidates(), dark.candidate_costs().len()), (Some(1), 0));
+    assert_eq!((dark.report().candidates, dark.report().candidate_costs.len()), (Some(1), 0));
     let mut mis = renderer(&open, Settings::default());
     mis.render_pass(1).unwrap();
-    assert_eq!(mis.candidates(), None);
+    assert_eq!(mis.report().candidates, None);
     support::assert_silent();
 }
 
@@ -132,7 +138,7 @@ fn files_and_figures_tell_the_choice() {
     let keep = ["--spp", "3", "--checkpoint-interval", "1h", "--save-guide", "room.guide"];
     let (image, statistics) = render("a.exr", &keep);
     let chosen = statistics.candidates.unwrap();
-    assert_eq!(chosen, choose(&statistics.candidate_costs));
+    assert_eq!(chosen, choose_candidates(&statistics.candidate_costs));
     let text = |image: &Image, name: &str| match &image.attributes[name] {
         Attribute::Text(text) => text.clone(),
         other => panic!("{other:?}"),

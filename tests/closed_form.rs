@@ -86,7 +86,7 @@ fn irradiance_of_a_plane_is_the_integral_of_the_map() {
     }
     irradiance *= std::f64::consts::PI / f64::from(steps * steps);
     let expected = reflectance.as_dvec3() * irradiance / std::f64::consts::PI;
-    for sampler in Sampler::ALL {
+    for &sampler in Sampler::ALL {
         let settings = Settings { sampler, ..Settings::default() };
         let [mean, error] = mean_and_error(&scene, &settings, 16, 12);
         let z = (mean - expected) / error;

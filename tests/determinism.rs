@@ -40,7 +40,7 @@ fn render(settings: Settings, passes: &[u32]) -> Sums {
 
 #[test]
 fn one_pass_of_64_equals_64_passes_of_one() {
-    for sampler in Sampler::ALL {
+    for &sampler in Sampler::ALL {
         let together = render(settings(sampler), &[64]);
         let apart = render(settings(sampler), &[1; 64]);
         assert!(together == apart, "{} differs", sampler.name());

@@ -13,10 +13,7 @@ use fenestra::{
     },
     scene::environment::{EnvironmentMap, EnvironmentTables},
     shader::{
-        constants::{
-            BINDING_ENVIRONMENT_CELLS, BINDING_ENVIRONMENT_ROWS, BINDING_ENVIRONMENT_TEXELS,
-            BINDING_PARAMETERS, SET_FILM, SET_SCENE,
-        },
+        bindings::{probe, scene},
         structs::SceneParameters,
     },
 };
@@ -364,11 +361,11 @@ fn the_shader_agrees() {
         let output = support::run_probe(
             ENVIRONMENT_PROBE,
             &[
-                (SET_FILM, 0, bytemuck::cast_slice(&inputs)),
-                (SET_SCENE, BINDING_PARAMETERS, bytemuck::bytes_of(&parameters)),
-                (SET_SCENE, BINDING_ENVIRONMENT_TEXELS, bytemuck::cast_slice(&texels)),
-                (SET_SCENE, BINDING_ENVIRONMENT_ROWS, bytemuck::cast_slice(&tables.rows)),
-                (SET_SCENE, BINDING_ENVIRONMENT_CELLS, bytemuck::cast_slice(&tables.cells)),
+                (probe::PROBE_INPUT, bytemuck::cast_slice(&inputs)),
+                (scene::PARAMETERS, bytemuck::bytes_of(&parameters)),
+                (scene::ENVIRONMENT_TEXELS, bytemuck::cast_slice(&texels)),
+                (scene::ENVIRONMENT_ROWS, bytemuck::cast_slice(&tables.rows)),
+                (scene::ENVIRONMENT_CELLS, bytemuck::cast_slice(&tables.cells)),
             ],
             inputs.len() * 11 * 4,
             inputs.len() as u32,

@@ -8,7 +8,7 @@ use fenestra::{
         frame::{direction_from_lat_long, frame_from_normal, lat_long_from_direction, sin_cos_pi},
         random::random_independent_2d,
     },
-    shader::constants::SET_FILM,
+    shader::bindings::probe,
 };
 use glam::{Vec2, Vec3};
 
@@ -95,7 +95,7 @@ fn the_shader_agrees() {
         .collect();
     let output = support::run_probe(
         FRAME_PROBE,
-        &[(SET_FILM, 0, bytemuck::cast_slice(&inputs))],
+        &[(probe::PROBE_INPUT, bytemuck::cast_slice(&inputs))],
         inputs.len() * 19 * 4,
         inputs.len() as u32,
     );

@@ -11,9 +11,10 @@ use fenestra::{
         decode_entry, decode_visibility,
     },
     scene::environment::{EnvironmentMap, EnvironmentTables},
-    shader::constants::{
-        BINDING_GUIDE_ARRIVALS, BINDING_GUIDE_COUNTS, BINDING_GUIDE_SHARES, GUIDE_NO_KEY,
-        GUIDE_REFINED, GUIDE_RESPONSE_UNITS, SET_SRBF,
+    shader::{
+        bindings::guided,
+        constants::{GUIDE_NO_KEY, GUIDE_REFINED, GUIDE_RESPONSE_UNITS},
+        spirv::used_bindings,
     },
 };
 use glam::Vec3;
@@ -646,7 +647,7 @@ fn feedback_inside_a_pass_would_be_caught() {
     assert!((snapshot - TOY.truth()).abs() < 1e-12, "{snapshot}");
     assert!((feedback - TOY.truth()).abs() > 0.2, "{feedback}");
     // Shaders cannot do so: those that sample have no access to the counts.
-    let counted = [BINDING_GUIDE_COUNTS, BINDING_GUIDE_SHARES, BINDING_GUIDE_ARRIVALS];
+    let counted = [guided::GUIDE_COUNTS, guided::GUIDE_SHARES, guided::GUIDE_ARRIVALS];
     for (name, expected) in [
         ("sample_guided", [false; 3]),
         ("bounce_guided", [false; 3]),
@@ -654,7 +655,9 @@ fn feedback_inside_a_pass_would_be_caught() {
         ("learn_arrivals", [false, false, true]),
     ] {
         let spirv = fenestra::shader::spirv::pass(name);
-        assert_eq!(counted.map(|binding| binds(spirv, SET_SRBF, binding)), expected, "{name}");
+        let used = used_bindings(&bytemuck::pod_collect_to_vec(spirv));
+        let found = counted.map(|binding| used.contains(&(binding.set, binding.number)));
+        assert_eq!(found, expected, "{name}");
     }
 }
 
@@ -709,19 +712,4 @@ fn cells_learn_where_light_arrives_from() {
     assert_eq!(again.arrivals(), words[..6 * ARRIVAL_DIRECTIONS]);
     guide.add_arrivals(&[], &before.reflected);
     assert_eq!(guide.arrivals(), words, "nothing was counted");
-}
-
-/// True if a shader declares a variable at a set and binding (SPIR-V decorations 33 and 34).
-fn binds(spirv: &[u8], set: u32, binding: u32) -> bool {
-    let words: Vec<u32> =
-        spirv.chunks_exact(4).map(|bytes| u32::from_le_bytes(bytes.try_into().unwrap())).collect();
-    let decorated = |decoration: u32, value: u32| -> Vec<u32> {
-        words
-            .windows(4)
-            .filter(|w| w[0] == (4 << 16 | 71) && w[2] == decoration && w[3] == value)
-            .map(|w| w[1])
-            .collect()
-    };
-    let sets = decorated(34, set);
-    decorated(33, binding).iter().any(|id| sets.contains(id))
 }

@@ -10,7 +10,7 @@ mod support;
 use fenestra::{
     renderer::{Renderer, Settings},
     sampler::{
-        Parameters, Sampler, Weights,
+        Parameters, Sampler,
         guided::{CellKey, FACE_COUNT, PARTS_PER_RAY, Partition, SHARE_WORDS, face_normal},
     },
     scene::Scene,
@@ -71,28 +71,25 @@ fn every_mode_is_unbiased_in_a_room() {
             ("1 shadow ray", with(4, &|settings| settings.shadow_rays = 1)),
             ("two groups of shadow rays", with(1, &|settings| settings.shadow_rays = 9)),
             // Nine cells fit besides the faces: nearly every place falls back.
-            ("overflow", with(4, &|settings| settings.parameters.guide_memory = 15 * 16 * 256)),
+            (
+                "overflow",
+                with(4, &|settings| settings.parameters.guided.guide_memory = 15 * 16 * 256),
+            ),
             (
                 "overflow, one-sample",
                 with(1, &|settings| {
-                    settings.parameters.guide_memory = 15 * 16 * 256;
+                    settings.parameters.guided.guide_memory = 15 * 16 * 256;
                 }),
             ),
-            ("product", with(1, &|settings| settings.parameters.weights = Weights::Product)),
             (
-                "product, 4 candidates",
-                with(4, &|settings| settings.parameters.weights = Weights::Product),
-            ),
-            (
-                "product, overflow, few regions",
+                "overflow, few regions",
                 with(1, &|settings| {
-                    settings.parameters.weights = Weights::Product;
-                    settings.parameters.guide_memory = 15 * 16 * 256;
-                    settings.parameters.regions = 16;
+                    settings.parameters.guided.guide_memory = 15 * 16 * 256;
+                    settings.parameters.guided.regions = 16;
                 }),
             ),
-            ("few regions", with(4, &|settings| settings.parameters.regions = 16)),
-            ("many regions", with(1, &|settings| settings.parameters.regions = 1024)),
+            ("few regions", with(4, &|settings| settings.parameters.guided.regions = 16)),
+            ("many regions", with(1, &|settings| settings.parameters.guided.regions = 1024)),
         ],
     );
 }
@@ -121,7 +118,7 @@ fn places_that_share_a_key_are_unbiased() {
         ("faces only", 0.22, 1, 4, 512),
     ] {
         let mut settings = guided(candidates);
-        settings.parameters.guide_memory = memory;
+        settings.parameters.guided.guide_memory = memory;
         // The learned counts keep their keys, which now name other places.
         let mut state = taught.clone();
         state.origin.largest_edge = edge;
@@ -142,7 +139,7 @@ fn places_that_share_a_key_are_unbiased() {
         state.counts.truncate(6 * state.origin.regions as usize);
         state.shares.truncate(6 * SHARE_WORDS);
         (state.pending, state.pending_shares) = (Vec::new(), Vec::new());
-        state.wanted.clear();
+        state.missing.clear();
         renderer.restore_guide(&state).unwrap();
         renderer.render_pass(8).unwrap();
         let cells = renderer.guide_state().unwrap().unwrap().keys.len();
@@ -195,9 +192,9 @@ fn every_vertex_of_a_path_is_unbiased() {
         scenes::plastic(0.3),
     ]);
     let mut every_ray = guided(1);
-    every_ray.parameters.later_rays = Some(5);
+    every_ray.parameters.guided.later_rays = Some(5);
     let mut unguided = guided(1);
-    unguided.parameters.bounce_candidates = 1;
+    unguided.parameters.guided.bounce_candidates = 1;
     let modes = [
         ("one-sample, depth 4", guided(1)),
         ("4, depth 4", guided(4)),
@@ -212,7 +209,7 @@ fn later_vertices_have_the_rays_they_are_given() {
     let _alone = support::alone();
     let rays = |depth: u32, later_rays: Option<u32>| {
         let mut settings = Settings { depth, ..guided(1) };
-        settings.parameters.later_rays = later_rays;
+        settings.parameters.guided.later_rays = later_rays;
         let mut renderer =
             Renderer::new(support::device(), &scenes::mixed_room(), settings).unwrap();
         renderer.render_pass(1).unwrap();
@@ -295,7 +292,7 @@ fn late_samples_teach_by_one_in_four() {
 fn parts_of_refined_cells_are_found() {
     let _alone = support::alone();
     let mut settings = guided(1);
-    settings.parameters.regions = 16;
+    settings.parameters.guided.regions = 16;
     let mut renderer = Renderer::new(support::device(), &scenes::mixed_room(), settings).unwrap();
     renderer.render_pass(64).unwrap();
     support::assert_silent();
@@ -304,7 +301,7 @@ fn parts_of_refined_cells_are_found() {
     let parts: Vec<u32> = state
         .refined
         .iter()
-        .filter_map(|&cell| CellKey(state.keys[cell as usize]).parts())
+        .filter_map(|&cell| CellKey(state.keys[cell as usize]).child_group())
         .collect();
     // Rays that a part counted itself.
     let regions = state.origin.regions as usize;
@@ -314,7 +311,7 @@ fn parts_of_refined_cells_are_found() {
     let found = (FACE_COUNT..state.keys.len())
         .filter(|&cell| {
             let key = CellKey(state.keys[cell]);
-            !key.is_coarse() && parts.contains(&key.siblings()) && rays(cell) > 0
+            !key.is_coarse() && parts.contains(&key.sibling_group()) && rays(cell) > 0
         })
         .count();
     assert!(found >= state.refined.len(), "{found} parts of {} cells", state.refined.len());

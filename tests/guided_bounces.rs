@@ -15,14 +15,19 @@ use fenestra::{
         frame::frame_from_normal,
         random::{hash_4d, random_2d, random_independent_2d},
     },
-    renderer::{GuideBuffers, GuideSize, Renderer, SceneBuffers, Settings, WaveBuffers, window_of},
+    pass::{PathDemand, SceneBuffers, WaveBuffers},
+    renderer::{Renderer, Settings, window_of},
     sampler::{
         Parameters, Sampler,
-        guided::{ARRIVAL_DIRECTIONS, FACE_COUNT, GuideState, Learned, arrival_direction},
+        guided::{
+            ARRIVAL_DIRECTIONS, FACE_COUNT, Guide, GuideBuffers, GuideSize, GuideState,
+            GuidedParameters, arrival_direction,
+        },
     },
     scene::Scene,
     shader::{
-        constants::{CONSTANT_BOUNCE_CANDIDATES, CONSTANT_MATERIAL_KINDS, SET_FILM},
+        bindings::{PROBE, probe},
+        constants::{CONSTANT_BOUNCE_CANDIDATES, CONSTANT_MATERIAL_KINDS},
         spirv,
         structs::{PathState, Ray, Wave},
     },
@@ -54,7 +59,7 @@ fn the_shader_tells_directions_apart_as_the_host_does() {
     let count = directions.len();
     let output = support::run_probe(
         ARRIVING_PROBE,
-        &[(SET_FILM, 0, bytemuck::cast_slice(&input))],
+        &[(probe::PROBE_INPUT, bytemuck::cast_slice(&input))],
         4 * count,
         count as u32,
     );
@@ -109,9 +114,8 @@ fn arriving() -> (GuideState, Vec<f32>) {
     let words: Vec<[u32; 2]> = (0..FACE_COUNT * ARRIVAL_DIRECTIONS).map(words).collect();
     let scene = scenes::room(vec![scenes::diffuse(Vec3::splat(0.5))]);
     let partition = fenestra::sampler::guided::Partition::new(&scene.environment, 256);
-    let learned = Learned::new(256, FACE_COUNT, 8).with_bounces(&words, 1);
-    let snapshot =
-        learned.snapshot(&partition, &fenestra::sampler::guided::EstimateOptions::default());
+    let learned = Guide::new(256, FACE_COUNT, 8).with_bounces(&words, 1);
+    let snapshot = learned.snapshot(&partition);
     let read = snapshot.arriving[2 * ARRIVAL_DIRECTIONS..][..ARRIVAL_DIRECTIONS].to_vec();
     (GuideState { arrivals: words, ..GuideState::default() }, read)
 }
@@ -123,12 +127,12 @@ fn bounce(floor: &Floor, candidates: u32, beliefs: &GuideState) -> Vec<(Vec3, Ve
     let buffers = SceneBuffers::new(device, scene, window_of(&Settings::default(), scene)).unwrap();
     let paths = PIXELS * SAMPLES;
     // Leave room for the cells of faces only.
-    let parameters = Parameters { guide_memory: 1, ..Parameters::default() };
+    let parameters = GuidedParameters { guide_memory: 1, ..GuidedParameters::default() };
     let size = GuideSize { pixels: PIXELS, paths, shadow_rays: 1, has_bounces: true };
     let mut guide = GuideBuffers::new(device, scene, &parameters, size).unwrap();
     let state = guide.state().unwrap();
     guide.restore(&GuideState { arrivals: beliefs.arrivals.clone(), ..state }).unwrap();
-    let waves = WaveBuffers::new(device, PIXELS, 1, None).unwrap();
+    let waves = WaveBuffers::new(device, PIXELS, 1, PathDemand::default()).unwrap();
     assert!(waves.capacity() >= paths);
     let input = support::PathInput {
         normal: floor.normal.into(),
@@ -138,9 +142,9 @@ fn bounce(floor: &Floor, candidates: u32, beliefs: &GuideState) -> Vec<(Vec3, Ve
         is_visible: 1,
     };
     let input = Buffer::from_slice(device, "paths", &vec![input; paths as usize]).unwrap();
-    let film = DescriptorSet::new(device, SET_FILM, &[(0, &input)]).unwrap();
+    let film = DescriptorSet::new(device, &PROBE, &[(probe::PROBE_INPUT, &input)]).unwrap();
     let states = vec![PathState { throughput: [1.0; 3], ..PathState::default() }; paths as usize];
-    waves.buffer("paths").unwrap().upload(bytemuck::cast_slice(&states)).unwrap();
+    waves.paths().upload(bytemuck::cast_slice(&states)).unwrap();
 
     let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_state.spv"));
     let put = Pipeline::new(device, "product_state", spirv, &[]).unwrap();
@@ -166,8 +170,8 @@ fn bounce(floor: &Floor, candidates: u32, beliefs: &GuideState) -> Vec<(Vec3, Ve
     commands.dispatch(&sample, &sets, push, paths);
     commands.dispatch(&bounce, &sets, push, paths);
     commands.submit_and_wait().unwrap();
-    let rays: Vec<Ray> = waves.buffer("rays").unwrap().download(paths as usize).unwrap();
-    let states: Vec<PathState> = waves.buffer("paths").unwrap().download(paths as usize).unwrap();
+    let rays: Vec<Ray> = waves.rays().download(paths as usize).unwrap();
+    let states: Vec<PathState> = waves.paths().download(paths as usize).unwrap();
     support::assert_silent();
     rays.iter()
         .zip(&states)
@@ -287,7 +291,7 @@ fn images_are_those_of_unguided_bounces() {
     // Estimate the means over blocks and channels.
     let replicates = |candidates: u32, beliefs: Option<&GuideState>, samples: u32| {
         let mut settings = guided(4);
-        settings.parameters.bounce_candidates = candidates;
+        settings.parameters.guided.bounce_candidates = candidates;
         let rows = replicates::rows(&scene, &settings, 500..516, samples, |renderer| {
             if let Some(beliefs) = beliefs {
                 renderer.restore_guide(beliefs).unwrap();
@@ -339,7 +343,7 @@ fn every_bounce_teaches() {
     // Unguided bounces keep nothing.
     for (depth, candidates) in [(1, 4), (3, 1)] {
         let mut settings = guided(depth);
-        settings.parameters.bounce_candidates = candidates;
+        settings.parameters.guided.bounce_candidates = candidates;
         let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
         renderer.render_pass(3).unwrap();
         let state = renderer.guide_state().unwrap().unwrap();

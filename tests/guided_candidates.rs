@@ -1,6 +1,5 @@
 //! The candidates that `guided` resamples follow the density that they are divided by, and that
-//! density integrates to one: for 4 and 8 candidates, weights by the cell and by the product,
-//! untrained and trained tables, and every kind of material.
+//! density integrates to one: for 4 and 8 candidates, untrained and trained tables, and every kind of material.
 //!
 //! One probe puts a path in front of a surface. Another draws the candidates of many shadow rays with
 //! the functions of the sampling pass, and evaluates the density at the points of a quadrature. There
@@ -19,14 +18,16 @@ use std::f64::consts::PI;
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
-    renderer::{GuideBuffers, GuideSize, Renderer, SceneBuffers, Settings, WaveBuffers, window_of},
-    sampler::{Parameters, Sampler, Weights, guided::GuideState},
+    pass::{PathDemand, SceneBuffers, WaveBuffers},
+    renderer::{Renderer, Settings, window_of},
+    sampler::{
+        Parameters, Sampler,
+        guided::{GuideBuffers, GuideSize, GuideState, GuidedParameters},
+    },
     scene::Scene,
     shader::{
-        constants::{
-            CONSTANT_BRDF_CANDIDATES, CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS,
-            CONSTANT_PRODUCT_WEIGHTS, SET_FILM,
-        },
+        bindings::{PROBE, probe},
+        constants::{CONSTANT_BRDF_CANDIDATES, CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS},
         structs::Wave,
     },
 };
@@ -112,14 +113,15 @@ fn scene() -> Scene {
     ])
 }
 
-fn parameters(weights: Weights) -> Parameters {
+fn parameters() -> Parameters {
     // Leave room for the cells of faces only.
-    Parameters { weights, guide_memory: 1, candidates: Some(4), ..Parameters::default() }
+    let guided = GuidedParameters { guide_memory: 1, ..GuidedParameters::default() };
+    Parameters { guided, candidates: Some(4), ..Parameters::default() }
 }
 
 /// Renders and returns what was learned.
 fn trained(scene: &Scene) -> GuideState {
-    let parameters = parameters(Weights::Cell);
+    let parameters = parameters();
     let settings = Settings { sampler: Sampler::Guided, parameters, ..Settings::default() };
     let mut renderer = Renderer::new(support::device(), scene, settings).unwrap();
     renderer.render_pass(64).unwrap();
@@ -133,18 +135,16 @@ struct Paths {
     scene: SceneBuffers,
     guide: GuideBuffers,
     waves: WaveBuffers,
-    weights: Weights,
 }
 
 impl Paths {
-    fn new(scene: &Scene, weights: Weights) -> Self {
+    fn new(scene: &Scene) -> Self {
         let device = support::device();
         let window = window_of(&Settings::default(), scene);
         Self {
             scene: SceneBuffers::new(device, scene, window).unwrap(),
-            guide: GuideBuffers::new(device, scene, &parameters(weights), SIZE).unwrap(),
-            waves: WaveBuffers::new(device, 64, 1, None).unwrap(),
-            weights,
+            guide: GuideBuffers::new(device, scene, &parameters().guided, SIZE).unwrap(),
+            waves: WaveBuffers::new(device, 64, 1, PathDemand::default()).unwrap(),
         }
     }
 
@@ -161,7 +161,7 @@ impl Paths {
         let input = Buffer::from_slice(device, "paths", &[input]).unwrap();
         let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_state.spv"));
         let pipeline = Pipeline::new(device, "product_state", spirv, &[]).unwrap();
-        let film = DescriptorSet::new(device, SET_FILM, &[(0, &input)]).unwrap();
+        let film = DescriptorSet::new(device, &PROBE, &[(probe::PROBE_INPUT, &input)]).unwrap();
         let mut commands = Commands::begin(device).unwrap();
         commands.dispatch(&pipeline, &[self.waves.set(), &film], &[], 1);
         commands.submit_and_wait().unwrap();
@@ -173,14 +173,14 @@ impl Paths {
             (CONSTANT_CANDIDATES, candidates),
             (CONSTANT_BRDF_CANDIDATES, candidates / 4),
             (CONSTANT_MATERIAL_KINDS, self.scene.material_kinds()),
-            (CONSTANT_PRODUCT_WEIGHTS, u32::from(self.weights == Weights::Product)),
         ];
         let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/guided_candidates.spv"));
         let pipeline = Pipeline::new(device, "guided_candidates", spirv, &constants).unwrap();
         let input = Buffer::from_slice(device, "queries", queries).unwrap();
         let bytes = (queries.len() * size_of::<CandidateAnswer>()) as u64;
         let output = Buffer::zeroed(device, "answers", bytes).unwrap();
-        let film = DescriptorSet::new(device, SET_FILM, &[(0, &input), (1, &output)]).unwrap();
+        let bound = [(probe::PROBE_INPUT, &input), (probe::PROBE_OUTPUT, &output)];
+        let film = DescriptorSet::new(device, &PROBE, &bound).unwrap();
         let wave = Wave {
             pixel_count: 1,
             sample_count: 1,
@@ -238,54 +238,50 @@ impl Paths {
 fn candidates_follow_the_density_that_they_are_divided_by() {
     let scene = scene();
     let state = trained(&scene);
-    for weights in [Weights::Cell, Weights::Product] {
-        let mut paths = Paths::new(&scene, weights);
-        // Expectations by surface and number of candidates.
-        let mut untrained: Vec<Vec<f64>> = Vec::new();
-        for is_trained in [false, true] {
-            if is_trained {
-                assert!(!paths.guide.restore(&state).unwrap(), "the same scene");
-            }
-            let mut known = untrained.into_iter();
-            let mut now = Vec::new();
-            for surface in &surfaces() {
-                paths.put(surface);
-                for candidates in [4, 8] {
-                    let name = format!(
-                        "{}, {candidates} candidates, {weights:?}, trained: {is_trained}",
-                        surface.name
-                    );
-                    let [mut expected, brdf, guided] = paths.integrals(surface, candidates);
-                    let [whole, of_brdf, of_guide] =
-                        [&expected, &brdf, &guided].map(|integral| integral.iter().sum::<f64>());
-                    assert!((of_guide - 1.0).abs() < 3e-3, "{name}: guided {of_guide}");
-                    assert!((0.5..1.003).contains(&of_brdf), "{name}: BRDF {of_brdf}");
-                    // BRDF samples that its density leaves out are below the horizon.
-                    let lost = BRDF_PART * (1.0 - of_brdf);
-                    assert!((whole + lost - 1.0).abs() < 3e-3, "{name}: {whole} and {lost} lost");
-                    expected[BINS - 1] += lost.max(0.0);
-                    let observed = paths.observed(surface, candidates);
-                    let p = statistics::chi_square_p_value(&observed, &expected);
-                    eprintln!("{name}: integral {whole:.5}, {lost:.5} lost, p {p:.3}");
-                    assert!(p > 1e-4, "{name}: p = {p}");
-
-                    // The test rejects another share of the BRDF, and the untrained density.
-                    let mut other: Vec<f64> = brdf
-                        .iter()
-                        .zip(&guided)
-                        .map(|(a, b)| OTHER_BRDF_PART * a + (1.0 - OTHER_BRDF_PART) * b)
-                        .collect();
-                    other[BINS - 1] += OTHER_BRDF_PART * (1.0 - of_brdf).max(0.0);
-                    let p = statistics::chi_square_p_value(&observed, &other);
-                    assert!(p < 1e-6, "{name}: by another share, p = {p}");
-                    if let Some(before) = known.next() {
-                        let p = statistics::chi_square_p_value(&observed, &before);
-                        assert!(p < 1e-6, "{name}: as if untrained, p = {p}");
-                    }
-                    now.push(expected);
-                }
-            }
-            untrained = now;
+    let mut paths = Paths::new(&scene);
+    // Expectations by surface and number of candidates.
+    let mut untrained: Vec<Vec<f64>> = Vec::new();
+    for is_trained in [false, true] {
+        if is_trained {
+            assert!(!paths.guide.restore(&state).unwrap(), "the same scene");
         }
+        let mut known = untrained.into_iter();
+        let mut now = Vec::new();
+        for surface in &surfaces() {
+            paths.put(surface);
+            for candidates in [4, 8] {
+                let name =
+                    format!("{}, {candidates} candidates, trained: {is_trained}", surface.name);
+                let [mut expected, brdf, guided] = paths.integrals(surface, candidates);
+                let [whole, of_brdf, of_guide] =
+                    [&expected, &brdf, &guided].map(|integral| integral.iter().sum::<f64>());
+                assert!((of_guide - 1.0).abs() < 3e-3, "{name}: guided {of_guide}");
+                assert!((0.5..1.003).contains(&of_brdf), "{name}: BRDF {of_brdf}");
+                // BRDF samples that its density leaves out are below the horizon.
+                let lost = BRDF_PART * (1.0 - of_brdf);
+                assert!((whole + lost - 1.0).abs() < 3e-3, "{name}: {whole} and {lost} lost");
+                expected[BINS - 1] += lost.max(0.0);
+                let observed = paths.observed(surface, candidates);
+                let p = statistics::chi_square_p_value(&observed, &expected);
+                eprintln!("{name}: integral {whole:.5}, {lost:.5} lost, p {p:.3}");
+                assert!(p > 1e-4, "{name}: p = {p}");
+
+                // The test rejects another share of the BRDF, and the untrained density.
+                let mut other: Vec<f64> = brdf
+                    .iter()
+                    .zip(&guided)
+                    .map(|(a, b)| OTHER_BRDF_PART * a + (1.0 - OTHER_BRDF_PART) * b)
+                    .collect();
+                other[BINS - 1] += OTHER_BRDF_PART * (1.0 - of_brdf).max(0.0);
+                let p = statistics::chi_square_p_value(&observed, &other);
+                assert!(p < 1e-6, "{name}: by another share, p = {p}");
+                if let Some(before) = known.next() {
+                    let p = statistics::chi_square_p_value(&observed, &before);
+                    assert!(p < 1e-6, "{name}: as if untrained, p = {p}");
+                }
+                now.push(expected);
+            }
+        }
+        untrained = now;
     }
 }

@@ -20,8 +20,11 @@ use fenestra::{
     brdf::{self, Material, MaterialTables},
     film::Window,
     math::frame::{Frame, frame_from_normal},
-    renderer::{GuidedRay, RecordedCell, RecordedGuide, Renderer, Settings},
-    sampler::{Parameters, Sampler, Weights},
+    renderer::{Renderer, Settings},
+    sampler::{
+        Parameters, Sampler,
+        guided::{GuidedParameters, GuidedRay, RecordedCell, RecordedGuide},
+    },
     scene::{Scene, environment::EnvironmentTables},
 };
 use glam::{Vec3, vec3};
@@ -76,17 +79,16 @@ fn surfaces() -> [Surface; 4] {
     ]
 }
 
-fn renderer(surface: &Surface, candidates: u32, weights: Weights) -> Renderer {
-    renderer_at_depth(surface, candidates, weights, 1)
+fn renderer(surface: &Surface, candidates: u32) -> Renderer {
+    renderer_at_depth(surface, candidates, 1)
 }
 
-fn renderer_at_depth(surface: &Surface, candidates: u32, weights: Weights, depth: u32) -> Renderer {
+fn renderer_at_depth(surface: &Surface, candidates: u32, depth: u32) -> Renderer {
     let [x, y] = surface.pixel;
     let parameters = Parameters {
         candidates: Some(candidates),
-        weights,
         // Leave room for the cells of faces only.
-        guide_memory: 1,
+        guided: GuidedParameters { guide_memory: 1, ..GuidedParameters::default() },
         ..Parameters::default()
     };
     let settings = Settings {
@@ -112,7 +114,7 @@ struct Host<'a> {
 
 /// Unoccluded integrand in a direction, and its densities.
 #[derive(Clone, Copy)]
-struct Considered {
+struct DirectionSample {
     integrand: f64,
     brdf_pdf: f64,
     map_pdf: f64,
@@ -133,13 +135,13 @@ impl<'a> Host<'a> {
         }
     }
 
-    fn consider(&self, direction: Vec3) -> Considered {
+    fn evaluate_direction(&self, direction: Vec3) -> DirectionSample {
         let incident_local = self.frame.to_local(direction);
         let radiance = self.scene.environment.radiance(direction);
         let (value, brdf_pdf) =
             brdf::evaluate_and_pdf(&self.brdf, self.material, self.outgoing_local, incident_local);
         let brought = value * radiance * incident_local.z.max(0.0);
-        Considered {
+        DirectionSample {
             integrand: f64::from(brought.element_sum()),
             brdf_pdf: f64::from(brdf_pdf),
             map_pdf: f64::from(self.map.pdf(&self.scene.environment, direction, radiance)),
@@ -171,10 +173,10 @@ fn ratios(recorded: &RecordedGuide, cell: &RecordedCell) -> Vec<f64> {
 fn brdf_share(name: &str, host: &Host<'_>, rays: &[GuidedRay], ratios: &[f64]) -> f64 {
     let mut explained = Vec::new();
     for traced in rays.iter().filter(|traced| traced.region.is_some()) {
-        let considered = host.consider(traced.ray.direction);
-        let pdf = considered.integrand / f64::from(traced.ray.contribution.element_sum());
-        let guided = ratios[traced.region.unwrap()] * considered.map_pdf;
-        explained.push((pdf, considered.brdf_pdf, guided));
+        let sampled = host.evaluate_direction(traced.ray.direction);
+        let pdf = sampled.integrand / f64::from(traced.ray.contribution.element_sum());
+        let guided = ratios[traced.region.unwrap()] * sampled.map_pdf;
+        explained.push((pdf, sampled.brdf_pdf, guided));
     }
     assert!(explained.len() > rays.len() / 4, "{name}: {} rays brought anything", explained.len());
     let mut shares: Vec<f64> = explained
@@ -199,11 +201,11 @@ fn expected_shares(name: &str, host: &Host<'_>, recorded: &RecordedGuide) -> [Ve
     let ratios = ratios(recorded, recorded.cell.as_ref().unwrap());
     let (mut from_brdf, mut guided) = (vec![0.0; BINS], vec![0.0; BINS]);
     for (direction, solid_angle) in host.directions() {
-        let considered = host.consider(direction);
+        let sampled = host.evaluate_direction(direction);
         let region = recorded.partition.region_of(&host.scene.environment, direction);
         let bin = host.bin(direction);
-        from_brdf[bin] += solid_angle * considered.brdf_pdf;
-        guided[bin] += solid_angle * ratios[region] * considered.map_pdf;
+        from_brdf[bin] += solid_angle * sampled.brdf_pdf;
+        guided[bin] += solid_angle * ratios[region] * sampled.map_pdf;
     }
     let whole: f64 = guided.iter().sum();
     assert!((whole - 1.0).abs() < 3e-3, "{name}: guided directions integrate to {whole}");
@@ -217,7 +219,7 @@ fn mixed(share: f64, [from_brdf, guided]: &[Vec<f64>; 2]) -> Vec<f64> {
     from_brdf.iter().zip(guided).map(|(a, b)| share * a + (1.0 - share) * b).collect()
 }
 
-fn record(renderer: &Renderer, surface: &Surface) -> RecordedGuide {
+fn record(renderer: &mut Renderer, surface: &Surface) -> RecordedGuide {
     let recorded = renderer.record_guided_pixel(surface.pixel, RAYS).unwrap().unwrap();
     support::assert_silent();
     assert_eq!(recorded.rays.len(), RAYS as usize);
@@ -229,7 +231,7 @@ fn paths_of_many_vertices_are_recorded_at_their_first() {
     let _alone = support::alone();
     let [floor, ..] = surfaces();
     let [short, long] =
-        [1, 3].map(|depth| record(&renderer_at_depth(&floor, 1, Weights::Cell, depth), &floor));
+        [1, 3].map(|depth| record(&mut renderer_at_depth(&floor, 1, depth), &floor));
     assert_eq!(short.position, long.position);
     for (short, long) in short.rays.iter().zip(&long.rays) {
         assert_eq!(short.ray.direction, long.ray.direction);
@@ -240,11 +242,11 @@ fn paths_of_many_vertices_are_recorded_at_their_first() {
 fn directions_follow_the_density_that_they_are_divided_by() {
     let _alone = support::alone();
     for surface in &surfaces() {
-        let mut renderer = renderer(surface, 1, Weights::Cell);
+        let mut renderer = renderer(surface, 1);
         let mut untrained: Option<(f64, [Vec<f64>; 2])> = None;
         for state in ["untrained", "trained"] {
             let name = format!("{}, {state}", surface.name);
-            let recorded = record(&renderer, surface);
+            let recorded = record(&mut renderer, surface);
             let host = Host::new(surface, &recorded);
             let cell = recorded.cell.as_ref().unwrap();
             let trials: f64 = cell.regions.iter().map(|region| region.trials).sum();
@@ -280,20 +282,16 @@ fn part_of(bin: usize) -> usize {
 fn every_part_of_the_sky_has_its_weight() {
     let _alone = support::alone();
     for surface in &surfaces() {
-        for (candidates, weights) in [1, 4, 8]
-            .into_iter()
-            .flat_map(|count| [(count, Weights::Cell), (count, Weights::Product)])
-        {
-            let mut renderer = renderer(surface, candidates, weights);
+        for candidates in [1, 4, 8] {
+            let mut renderer = renderer(surface, candidates);
             for state in ["untrained", "trained"] {
-                let name =
-                    format!("{}, {candidates} candidates, {weights:?}, {state}", surface.name);
-                let recorded = record(&renderer, surface);
+                let name = format!("{}, {candidates} candidates, {state}", surface.name);
+                let recorded = record(&mut renderer, surface);
                 let host = Host::new(surface, &recorded);
                 let mut truth = [0.0; PARTS];
                 for (direction, solid_angle) in host.directions() {
                     let part = part_of(host.bin(direction));
-                    truth[part] += solid_angle * host.consider(direction).integrand;
+                    truth[part] += solid_angle * host.evaluate_direction(direction).integrand;
                 }
                 let whole: f64 = truth.iter().sum();
                 let values: Vec<(usize, f64)> = recorded

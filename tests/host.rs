@@ -8,7 +8,7 @@ use fenestra::{
         Buffer, Commands, DescriptorSet, Pipeline,
         device::{Capabilities, choose},
     },
-    shader::constants::SET_FILM,
+    shader::bindings::{PROBE as PROBE_TABLE, probe},
 };
 
 const PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/probe.spv"));
@@ -16,8 +16,12 @@ const PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/probe.spv"))
 #[test]
 fn a_probe_sees_its_input_and_returns_its_output() {
     let input: Vec<u32> = (0..1000).map(|i| i * i).collect();
-    let output =
-        support::run_probe(PROBE, &[(SET_FILM, 0, bytemuck::cast_slice(&input))], 4000, 1000);
+    let output = support::run_probe(
+        PROBE,
+        &[(probe::PROBE_INPUT, bytemuck::cast_slice(&input))],
+        4000,
+        1000,
+    );
     let output: &[u32] = bytemuck::cast_slice(&output);
     assert!(input.iter().zip(output).all(|(input, output)| input + 1 == *output));
 }
@@ -36,8 +40,18 @@ fn every_timed_pass_has_its_row() {
     let device = support::device();
     let input = Buffer::zeroed(device, "input", 4 << 20).unwrap();
     let output = Buffer::zeroed(device, "output", 4 << 20).unwrap();
-    let forth = DescriptorSet::new(device, SET_FILM, &[(0, &input), (1, &output)]).unwrap();
-    let back = DescriptorSet::new(device, SET_FILM, &[(0, &output), (1, &input)]).unwrap();
+    let forth = DescriptorSet::new(
+        device,
+        &PROBE_TABLE,
+        &[(probe::PROBE_INPUT, &input), (probe::PROBE_OUTPUT, &output)],
+    )
+    .unwrap();
+    let back = DescriptorSet::new(
+        device,
+        &PROBE_TABLE,
+        &[(probe::PROBE_INPUT, &output), (probe::PROBE_OUTPUT, &input)],
+    )
+    .unwrap();
     let pipeline = Pipeline::new(device, "probe", PROBE, &[]).unwrap();
     let mut commands = Commands::begin_timed(device, 4).unwrap();
     for _ in 0..2 {
@@ -104,7 +118,12 @@ fn a_mistake_is_heard_by_the_validation_layers() {
     // Use a device of its own, so that the shared one stays silent.
     let device = fenestra::gpu::Device::open(None, true).unwrap();
     let buffer = Buffer::zeroed(&device, "buffer", 64).unwrap();
-    let set = DescriptorSet::new(&device, SET_FILM, &[(0, &buffer), (1, &buffer)]).unwrap();
+    let set = DescriptorSet::new(
+        &device,
+        &PROBE_TABLE,
+        &[(probe::PROBE_INPUT, &buffer), (probe::PROBE_OUTPUT, &buffer)],
+    )
+    .unwrap();
     let pipeline = Pipeline::new(&device, "probe", PROBE, &[]).unwrap();
     let mut commands = Commands::begin(&device).unwrap();
     // Push constants come in multiples of four bytes.

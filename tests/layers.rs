@@ -21,7 +21,7 @@ use support::{render, renderer, scenes};
 /// Returns settings of `visibility` with few lobes, `assignments` and the layer of its caches.
 fn visibility(assignments: &[&str]) -> Settings {
     let mut parameters = Parameters::default();
-    let few = ["environment_lobes=24", "brdf_lobes=4", "views=8", "lobes=24"];
+    let few = ["environment-lobes=24", "brdf-lobes=4", "views=8", "lobes=24"];
     for assignment in few.iter().chain(assignments) {
         parameters.set(assignment).unwrap();
     }
@@ -88,7 +88,7 @@ fn a_cache_holds_no_more_than_it_has_room_for() {
     // A box around the camera: every direction from every hit is blocked.
     let mut scene = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5))]);
     scenes::add_box(&mut scene.geometry, Vec3::new(0.0, 1.0, 0.0), Vec3::splat(9.0), 0);
-    let (sums, totals) = render(&scene, visibility(&["cache=pixel", "cache_capacity=7"]), 6);
+    let (sums, totals) = render(&scene, visibility(&["cache=pixel", "cache-capacity=7"]), 6);
     let [entries, hits] = total(&sums.cache_entries);
     assert_eq!(hits, totals.product_hits);
     assert!(sums.cache_entries.iter().all(|pair| pair[0] <= 7 * 6));
@@ -155,7 +155,7 @@ fn a_sample_shows_the_cell_it_found() {
     // Leave room for 9 cells besides the faces, for all coarse and some fine ones, and for all.
     for memory in [15 * 16 * 256, 150 * 16 * 256, 1 << 27] {
         let mut settings = guided();
-        settings.parameters.guide_memory = memory;
+        settings.parameters.guided.guide_memory = memory;
         let mut renderer = renderer(&room(), settings);
         renderer.render_pass(1).unwrap();
         support::assert_silent();

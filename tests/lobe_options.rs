@@ -27,7 +27,7 @@ fn run(folder: &Folder, options: &[&str]) -> command::Run {
 }
 
 fn run_to(folder: &Folder, output: &str, spp: &str, options: &[&str]) -> command::Run {
-    let few = ["environment_lobes=8", "brdf_lobes=4", "views=4", "lobes=8"];
+    let few = ["environment-lobes=8", "brdf-lobes=4", "views=4", "lobes=8"];
     let mut arguments = vec!["render", "scene.toml", "-o", output, "--spp", spp];
     arguments.extend(["--stats", "stats.json", "--validate"]);
     arguments.extend(few.iter().flat_map(|assignment| ["--set", assignment]));
@@ -49,11 +49,11 @@ fn what_cannot_be_rendered_is_refused_with_its_remedy() {
             &["cache=pixel", "--depth 2", "use --depth 1 or cache=hit"][..],
         ),
         (
-            &["--set", "brdf_share=0.7", "--set", "environment_share=0.7"],
-            &["brdf_share=0.7 and environment_share=0.7", "at most 1"],
+            &["--set", "brdf-share=0.7", "--set", "environment-share=0.7"],
+            &["brdf-share=0.7 and environment-share=0.7", "at most 1"],
         ),
         (
-            &["--set", "environment_lobes=1000", "--set", "brdf_lobes=64"],
+            &["--set", "environment-lobes=1000", "--set", "brdf-lobes=64"],
             &["64000 products", "at most 25000"],
         ),
         (&["--set", "tau=wide"], &["--set tau=wide: expected 0 to 100"]),
@@ -95,7 +95,7 @@ fn a_render_with_lobes_continued_from_its_checkpoint_has_the_same_bits() {
         let channels = |name| Image::read_exr(&folder.path().join(name)).unwrap().channels;
         assert_eq!(channels("out.exr"), channels("whole.exr"), "{sampler}");
         // Other lobes make another render.
-        let others = [&resume[..], &["--set", "environment_lobes=9"]].concat();
+        let others = [&resume[..], &["--set", "environment-lobes=9"]].concat();
         run_to(&folder, "out.exr", "6", &others).assert(1, &["environment_lobes: 8 against 9"]);
     }
 }

@@ -47,7 +47,7 @@ translate = [0.0, 0.5, 0.0]
 }
 
 fn run(folder: &Folder, options: &[&str]) -> command::Run {
-    let few = ["environment_lobes=24", "brdf_lobes=4", "views=4", "lobes=32"];
+    let few = ["environment-lobes=24", "brdf-lobes=4", "views=4", "lobes=32"];
     let mut arguments = vec!["render", "scene.toml", "-o", "out.exr", "--validate"];
     if !options.contains(&"--spp") {
         arguments.extend(["--spp", "1"]);

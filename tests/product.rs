@@ -17,15 +17,20 @@ use std::f64::consts::PI;
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
-    pass::Lobes,
-    renderer::{LobeBuffers, LobeRoom, SceneBuffers, Settings, WaveBuffers, window_of},
-    sampler::{LobeOrder, LobeParameters, Sampler, Threshold},
+    pass::{Kernel, Pass, SceneBuffers, Steps, WaveBuffers},
+    renderer::{Settings, window_of},
+    sampler::{
+        Parameters,
+        product::{Fits, LobeBuffers, LobeOrder, LobeSize, ProductParameters},
+        visibility::{Threshold, VisibilityParameters, VisibilitySteps},
+    },
     scene::Scene,
     shader::{
+        bindings::{FILM, PROBE, film, probe},
         constants::{
-            BINDING_COUNTERS, CONSTANT_BRDF_SHARE, CONSTANT_CACHE_CAPACITY, CONSTANT_COUNT_VISIBLE,
-            CONSTANT_ENVIRONMENT_SHARE, CONSTANT_FIXED_THRESHOLD, CONSTANT_KEPT_LOBES,
-            CONSTANT_THRESHOLD_SCALE, CONSTANT_VISIBILITY_EXPONENT, SET_FILM,
+            CONSTANT_BRDF_SHARE, CONSTANT_CACHE_CAPACITY, CONSTANT_ENVIRONMENT_SHARE,
+            CONSTANT_FIXED_THRESHOLD, CONSTANT_KEPT_LOBES, CONSTANT_THRESHOLD_SCALE,
+            CONSTANT_VISIBILITY_EXPONENT,
         },
         structs::{Counters, Wave},
     },
@@ -154,46 +159,46 @@ fn scene() -> Scene {
     ])
 }
 
-fn few_lobes() -> LobeParameters {
-    LobeParameters {
+fn few_lobes() -> ProductParameters {
+    ProductParameters {
         environment_lobes: 32,
         brdf_lobes: 6,
         views: 16,
         kept_lobes: 48,
-        ..LobeParameters::default()
+        ..ProductParameters::default()
     }
 }
 
 /// Passes and buffers around one wave of paths, one per surface.
 struct Paths {
     surfaces: Vec<Surface>,
-    parameters: LobeParameters,
+    parameters: Parameters,
     scene: SceneBuffers,
-    fits: LobeBuffers,
+    lobes: LobeBuffers,
     waves: WaveBuffers,
-    lobes: Lobes,
+    steps: VisibilitySteps,
     counters: Buffer,
     wave: Wave,
 }
 
 impl Paths {
     /// Makes paths with their product and an empty cache.
-    fn new(parameters: LobeParameters) -> Self {
+    fn new(product: ProductParameters, visibility: VisibilityParameters) -> Self {
+        let parameters = Parameters { product, visibility, ..Parameters::default() };
         let device = support::device();
         let (scene, surfaces) = (scene(), surfaces());
         let window = window_of(&Settings::default(), &scene);
         let buffers = SceneBuffers::new(device, &scene, window).unwrap();
-        let fits = LobeBuffers::new(device, &scene, &parameters).unwrap();
-        let room = LobeRoom {
-            kept_lobes: parameters.kept_lobes,
-            cache_capacity: parameters.cache_places(SHADOW_RAYS),
-            film_pixels: None,
+        let fits = Fits::new(device, &scene, &product).unwrap();
+        let size = LobeSize {
+            kept_lobes: product.kept_lobes,
+            cache_capacity: visibility.cache_places(SHADOW_RAYS),
+            cached_pixels: None,
         };
-        let waves = WaveBuffers::new(device, 64, 1, Some(room)).unwrap();
+        let waves = WaveBuffers::new(device, 64, 1, size.demand()).unwrap();
         let kinds = buffers.material_kinds();
-        let sizes = fits.sizes();
-        let lobes = Lobes::new(device, Sampler::Visibility, &parameters, SHADOW_RAYS, sizes, kinds)
-            .unwrap();
+        let steps = VisibilitySteps::new(visibility, product, fits.sizes(), kinds, SHADOW_RAYS);
+        let lobes = LobeBuffers::new(device, fits, size, waves.capacity()).unwrap();
         let wave = Wave {
             pixel_count: surfaces.len() as u32,
             sample_count: 1,
@@ -205,25 +210,23 @@ impl Paths {
         };
         let counters = Buffer::zeroed(device, "counters", size_of::<Counters>() as u64).unwrap();
         let paths =
-            Self { surfaces, parameters, scene: buffers, fits, waves, lobes, counters, wave };
+            Self { surfaces, parameters, scene: buffers, lobes, waves, steps, counters, wave };
         paths.put(&vec![(DVec3::Y, true); paths.surfaces.len()]);
-        paths.record(|lobes, commands, sets, wave| lobes.record_product(commands, sets, wave));
+        paths.run(paths.steps.prepare(&paths.wave));
         paths
     }
 
-    /// Makes a film set of the counters and the buffers that a probe reads and writes.
-    fn film(&self, buffers: &[(u32, &Buffer)]) -> DescriptorSet {
-        let bound: Vec<_> =
-            buffers.iter().copied().chain([(BINDING_COUNTERS, &self.counters)]).collect();
-        DescriptorSet::new(support::device(), SET_FILM, &bound).unwrap()
-    }
-
-    fn record(&self, record: impl Fn(&Lobes, &mut Commands, &[&DescriptorSet; 4], &Wave)) {
-        let film = self.film(&[]);
-        let sets = [self.scene.set(), self.fits.set(), self.waves.set(), &film];
-        let mut commands = Commands::begin(support::device()).unwrap();
-        record(&self.lobes, &mut commands, &sets, &self.wave);
-        commands.submit_and_wait().unwrap();
+    /// Runs passes over the paths.
+    fn run(&self, kernels: Vec<Kernel>) {
+        let device = support::device();
+        let film = DescriptorSet::new(device, &FILM, &[(film::COUNTERS, &self.counters)]).unwrap();
+        let sets = [self.scene.set(), self.lobes.set(), self.waves.set(), &film];
+        for kernel in kernels {
+            let pass = Pass::new(device, kernel).unwrap();
+            let mut commands = Commands::begin(device).unwrap();
+            pass.record(&mut commands, &sets, &self.wave);
+            commands.submit_and_wait().unwrap();
+        }
     }
 
     /// Writes ray, hit, and a shadow ray with its outcome for every path.
@@ -244,7 +247,7 @@ impl Paths {
         let input = Buffer::from_slice(device, "paths", &inputs).unwrap();
         let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_state.spv"));
         let pipeline = Pipeline::new(device, "product_state", spirv, &[]).unwrap();
-        let film = self.film(&[(0, &input)]);
+        let film = DescriptorSet::new(device, &PROBE, &[(probe::PROBE_INPUT, &input)]).unwrap();
         let mut commands = Commands::begin(device).unwrap();
         commands.dispatch(&pipeline, &[self.waves.set(), &film], &[], inputs.len() as u32);
         commands.submit_and_wait().unwrap();
@@ -257,7 +260,7 @@ impl Paths {
         let densities: Vec<f32> =
             self.probe(spirv, false, &self.constants(), &vec![0_u32; self.surfaces.len()]);
         assert!(densities.iter().all(|density| *density > 0.0), "{densities:?}");
-        self.record(|lobes, commands, sets, wave| lobes.record_learn(commands, sets, wave));
+        self.run(self.steps.after_shadow_rays(&self.wave));
     }
 
     fn probe<Q: Pod, A: Pod>(
@@ -272,8 +275,9 @@ impl Paths {
         let bytes = (queries.len() * size_of::<A>()) as u64;
         let output = Buffer::zeroed(device, "answers", bytes).unwrap();
         let pipeline = Pipeline::new(device, "probe", spirv, constants).unwrap();
-        let film = self.film(&[(0, &input), (1, &output)]);
-        let mut sets = vec![self.waves.set(), &film];
+        let bound = [(probe::PROBE_INPUT, &input), (probe::PROBE_OUTPUT, &output)];
+        let film = DescriptorSet::new(device, &PROBE, &bound).unwrap();
+        let mut sets = vec![self.waves.set(), self.lobes.set(), &film];
         if with_scene {
             sets.push(self.scene.set());
         }
@@ -287,17 +291,16 @@ impl Paths {
     }
 
     /// Returns the passes' specialization constants, for the probes.
-    fn constants(&self) -> [(u32, u32); 8] {
-        let parameters = &self.parameters;
+    fn constants(&self) -> [(u32, u32); 7] {
+        let Parameters { product, visibility, .. } = &self.parameters;
         [
-            (CONSTANT_BRDF_SHARE, parameters.brdf_share.to_bits()),
-            (CONSTANT_ENVIRONMENT_SHARE, parameters.environment_share.to_bits()),
-            (CONSTANT_KEPT_LOBES, parameters.kept_lobes),
-            (CONSTANT_THRESHOLD_SCALE, parameters.threshold_scale.to_bits()),
-            (CONSTANT_FIXED_THRESHOLD, u32::from(parameters.threshold == Threshold::Fixed)),
-            (CONSTANT_CACHE_CAPACITY, parameters.cache_places(SHADOW_RAYS)),
-            (CONSTANT_COUNT_VISIBLE, u32::from(parameters.count_visible)),
-            (CONSTANT_VISIBILITY_EXPONENT, parameters.exponent.to_bits()),
+            (CONSTANT_BRDF_SHARE, product.brdf_share.to_bits()),
+            (CONSTANT_ENVIRONMENT_SHARE, product.environment_share.to_bits()),
+            (CONSTANT_KEPT_LOBES, product.kept_lobes),
+            (CONSTANT_THRESHOLD_SCALE, visibility.threshold_scale.to_bits()),
+            (CONSTANT_FIXED_THRESHOLD, u32::from(visibility.threshold == Threshold::Fixed)),
+            (CONSTANT_CACHE_CAPACITY, visibility.cache_places(SHADOW_RAYS)),
+            (CONSTANT_VISIBILITY_EXPONENT, visibility.exponent.to_bits()),
         ]
     }
 
@@ -349,7 +352,7 @@ impl Paths {
 
     /// Returns all lobes of every path.
     fn lobes(&self) -> Vec<Vec<LobeAnswer>> {
-        let kept = self.parameters.kept_lobes;
+        let kept = self.parameters.product.kept_lobes;
         let queries: Vec<[u32; 2]> = (0..self.surfaces.len() as u32)
             .flat_map(|path| (0..kept).map(move |lobe| [path, lobe]))
             .collect();
@@ -456,7 +459,7 @@ fn z_of(samples: &[MixtureAnswer], truth: f64, pdf: impl Fn(&MixtureAnswer) -> f
 }
 
 /// Returns the 1 − cos below which a direction is close to a lobe.
-fn closeness(lobe: &LobeAnswer, parameters: &LobeParameters) -> f64 {
+fn closeness(lobe: &LobeAnswer, parameters: &VisibilityParameters) -> f64 {
     let deviation = match parameters.threshold {
         Threshold::Sigma => f64::from(kernel_deviation(lobe.bandwidth)),
         Threshold::Fixed => 0.0707,
@@ -465,20 +468,23 @@ fn closeness(lobe: &LobeAnswer, parameters: &LobeParameters) -> f64 {
 }
 
 /// Computes the weight of a lobe after `cached` outcomes as the thesis words its visibility weight.
-fn guided_weight(lobe: &LobeAnswer, cached: &[(DVec3, bool)], parameters: &LobeParameters) -> f64 {
+fn guided_weight(
+    lobe: &LobeAnswer,
+    cached: &[(DVec3, bool)],
+    parameters: &VisibilityParameters,
+) -> f64 {
     let axis = Vec3::from(lobe.axis).as_dvec3();
-    let close: Vec<bool> = cached
-        .iter()
-        .filter(|(direction, _)| 1.0 - axis.dot(*direction) < closeness(lobe, parameters))
-        .map(|(_, is_visible)| *is_visible)
-        .collect();
-    let visible = close.iter().filter(|is_visible| **is_visible).count() as f64;
-    let ratio = (1.0 + visible) / (1.0 + close.len() as f64);
+    let is_close = |(direction, _): &&_| 1.0 - axis.dot(*direction) < closeness(lobe, parameters);
+    let ratio = 1.0 / (1.0 + cached.iter().filter(is_close).count() as f64);
     f64::from(lobe.weight) * ratio.powf(f64::from(parameters.exponent))
 }
 
 /// Returns true if a cached direction is so near the bound that rounding decides.
-fn is_doubtful(lobe: &LobeAnswer, cached: &[(DVec3, bool)], parameters: &LobeParameters) -> bool {
+fn is_doubtful(
+    lobe: &LobeAnswer,
+    cached: &[(DVec3, bool)],
+    parameters: &VisibilityParameters,
+) -> bool {
     let axis = Vec3::from(lobe.axis).as_dvec3();
     cached.iter().any(|(direction, _)| {
         let distance = 1.0 - axis.dot(*direction);
@@ -487,14 +493,14 @@ fn is_doubtful(lobe: &LobeAnswer, cached: &[(DVec3, bool)], parameters: &LobePar
 }
 
 fn weights_are_those_of_the_thesis(paths: &Paths, history: &[Vec<(DVec3, bool)>]) {
-    let capacity = paths.parameters.cache_capacity as usize;
+    let capacity = paths.parameters.visibility.cache_capacity as usize;
     let mut compared = 0;
     for (path, lobes) in paths.lobes().iter().enumerate() {
         assert!(lobes.len() > 8, "path {path} has {} lobes", lobes.len());
         let cached: Vec<_> = history
             .iter()
             .map(|outcomes| outcomes[path])
-            .filter(|(_, is_visible)| paths.parameters.count_visible || !is_visible)
+            .filter(|(_, is_visible)| !is_visible)
             .collect();
         let cached = &cached[cached.len().saturating_sub(capacity)..];
         let total = f64::from(lobes[0].total);
@@ -502,11 +508,11 @@ fn weights_are_those_of_the_thesis(paths: &Paths, history: &[Vec<(DVec3, bool)>]
         assert!((sum / total - 1.0).abs() < 1e-5, "path {path}: weights {sum}, total {total}");
         for (index, lobe) in lobes.iter().enumerate() {
             let weight = f64::from(lobe.weight_in_force);
-            if is_doubtful(lobe, cached, &paths.parameters) {
+            if is_doubtful(lobe, cached, &paths.parameters.visibility) {
                 continue;
             }
             compared += 1;
-            let expected = guided_weight(lobe, cached, &paths.parameters);
+            let expected = guided_weight(lobe, cached, &paths.parameters.visibility);
             assert!(
                 (weight - expected).abs() < 1e-3 * expected + 1e-6 * total,
                 "path {path}, lobe {index}, {} cached: weight {weight}, expected {expected}",
@@ -574,7 +580,7 @@ fn every_state_of_the_cache(paths: &Paths, feeds: &[u32], outcome: impl Fn(u32) 
 /// Tests the cache empty, half full, full, and full with its oldest entries forgotten.
 #[test]
 fn samples_follow_the_density_whatever_is_cached() {
-    let paths = Paths::new(few_lobes());
+    let paths = Paths::new(few_lobes(), VisibilityParameters::default());
     let found = every_state_of_the_cache(&paths, &[0, 8, 8, 5], |_| false);
     let count = paths.surfaces.len();
     // In many of 18 and of 24 cases, a wrong density fails the test that the right one passes.
@@ -582,20 +588,22 @@ fn samples_follow_the_density_whatever_is_cached() {
     assert!(found.undefended >= 2 * count, "shares ignored: found {} times", found.undefended);
 }
 
-/// Tests the parameters of the thesis and others that are not the default: visible directions count,
-/// one closeness, a cache that overflows, no share for the environment.
+/// Tests the parameters of the thesis and others that are not the default: one closeness, a cache that overflows, no share for the environment.
 #[test]
 fn samples_follow_the_density_with_other_parameters() {
-    let paths = Paths::new(LobeParameters {
+    let product = ProductParameters {
         order: LobeOrder::Coefficient,
+        brdf_share: 0.05,
+        environment_share: 0.0,
+        ..few_lobes()
+    };
+    let visibility = VisibilityParameters {
         threshold: Threshold::Fixed,
         threshold_scale: 2.0,
         exponent: 4.0,
         cache_capacity: 3,
-        count_visible: true,
-        brdf_share: 0.05,
-        environment_share: 0.0,
-        ..few_lobes()
-    });
+        ..VisibilityParameters::default()
+    };
+    let paths = Paths::new(product, visibility);
     every_state_of_the_cache(&paths, &[2, 3], |index| index % 2 == 1);
 }

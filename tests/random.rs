@@ -4,7 +4,7 @@ mod support;
 
 use fenestra::{
     math::random::{random_1d, random_2d, random_independent_1d, random_independent_2d},
-    shader::constants::SET_FILM,
+    shader::bindings::probe,
 };
 use support::statistics::{chi_square_p_value, z_p_value};
 
@@ -192,7 +192,7 @@ fn the_shader_draws_the_same_numbers_bit_for_bit() {
     let words = 6;
     let output = support::run_probe(
         RANDOM_PROBE,
-        &[(SET_FILM, 0, bytemuck::cast_slice(&keys))],
+        &[(probe::PROBE_INPUT, bytemuck::cast_slice(&keys))],
         keys.len() * words * 4,
         keys.len() as u32,
     );

@@ -136,7 +136,7 @@ fn a_render_makes_the_fits_it_needs_and_keeps_them() {
     let folder = folder();
     let cache = folder.path().join("cache");
     let render = |name: &str| {
-        let options = ["--sampler", "visibility", "--spp", "1", "--set", "environment_lobes=8"];
+        let options = ["--sampler", "visibility", "--spp", "1", "--set", "environment-lobes=8"];
         let mut command = command::program(folder.path());
         command.env("XDG_CACHE_HOME", &cache).args(["render", "scene.toml", "-o", name]);
         let run = command::Run::of(&command.args(options).output().unwrap());

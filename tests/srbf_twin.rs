@@ -3,7 +3,10 @@
 #![expect(clippy::expect_used, reason = "tests may panic")]
 
 use bytemuck::{Pod, Zeroable};
-use fenestra::srbf::{self, Lobe, special};
+use fenestra::{
+    shader::bindings::probe,
+    srbf::{self, Lobe, special},
+};
 use glam::{Vec2, Vec3};
 
 #[path = "support/lobes.rs"]
@@ -74,7 +77,7 @@ fn shader_twin_agrees_over_the_whole_range() {
     let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/srbf.spv"));
     let bytes = support::run_probe(
         spirv,
-        &[(3, 0, bytemuck::cast_slice(&inputs))],
+        &[(probe::PROBE_INPUT, bytemuck::cast_slice(&inputs))],
         inputs.len() * size_of::<ProbeOutput>(),
         u32::try_from(inputs.len()).expect("ten thousand fit"),
     );

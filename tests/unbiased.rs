@@ -36,7 +36,7 @@ const ALL_AGAINST_COSINE: [Sampler; 8] = [
 
 /// Renders replicates with the sampler's own seeds.
 fn replicates(scene: &Scene, settings: &Settings, samples: u32) -> Vec<Estimate> {
-    replicates::replicates(scene, settings, 1000 * settings.sampler.tag(), samples)
+    replicates::replicates(scene, settings, 1000 * settings.sampler as u32, samples)
 }
 
 /// Returns the sum of the means and its standard error.

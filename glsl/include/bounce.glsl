@@ -1,16 +1,18 @@
-// A next direction of a path: what bounce.comp and bounce_guided.comp have in common. Needs
-// NEEDS_PARAMETERS, NEEDS_WAVE, NEEDS_RAYS, WRITES_RAYS, NEEDS_HITS, NEEDS_PATHS, WRITES_PATHS,
-// NEEDS_MATERIAL_TEXELS and NEEDS_GEOMETRY.
+// A next direction of a path: what bounce.comp and bounce_guided.comp have in common.
 
 #ifndef BOUNCE_GLSL
 #define BOUNCE_GLSL
 
-#include "layout.glsl"
 #include "frame.glsl"
+#include "load.glsl"
 #include "random.glsl"
 #include "wave.glsl"
 #include "brdf.glsl"
 #include "bvh.glsl"
+
+UPDATES(rays)
+READS(hits)
+UPDATES(paths)
 
 // First vertex at which a path may be ended by russian roulette.
 layout(constant_id = CONSTANT_ROULETTE_VERTEX) const uint ROULETTE_VERTEX = 8u;

@@ -5,12 +5,16 @@
 // surface. Values are per steradian without the cosine; pdfs are per steradian of incident
 // directions. Both are 0 unless both directions are above the surface.
 //
-// The includer defines NEEDS_MATERIALS or NEEDS_MATERIAL_TEXELS and includes layout.glsl first.
 
 #ifndef BRDF_GLSL
 #define BRDF_GLSL
 
 #include "frame.glsl"
+#include "layout.glsl"
+
+// One buffer, seen as floats and as cells of four halves.
+TEXELS(brdf_table)
+TEXELS(brdf_cells)
 
 // One bit per kind of material in the scene.
 layout(constant_id = CONSTANT_MATERIAL_KINDS) const uint MATERIAL_KINDS = 0xffffffffu;

@@ -9,14 +9,19 @@
 // Deviation: two groups of triangles may wait while nodes are traversed ("speculative traversal",
 // [Aila & Laine 2009]). A step tests one node and one triangle, so that lanes of a subgroup in
 // different places do both kinds of work together.
-//
-// Define NEEDS_GEOMETRY before including this file.
 
 #ifndef BVH_GLSL
 #define BVH_GLSL
 
 #include "frame.glsl"
 #include "layout.glsl"
+
+TEXELS(bvh_nodes)
+TEXELS(triangles_0)
+TEXELS(triangles_1)
+TEXELS(triangles_2)
+TEXELS(triangles_3)
+READS(triangle_materials)
 
 // A page holds 1 << TRIANGLE_PAGE_SHIFT triangles; with one page the choice folds away.
 layout(constant_id = CONSTANT_TRIANGLE_PAGES) const uint TRIANGLE_PAGES = 1u;

@@ -1,5 +1,5 @@
 // The environment map: bilinear lookup and its exact sampling density per steradian. Twin of
-// src/scene/environment. Needs NEEDS_PARAMETERS and NEEDS_ENVIRONMENT.
+// src/scene/environment.
 //
 // environment_rows: cumulative probability over height + 1 rows of cells, the mean sine of each
 // row's polar angle, then a guide to the probabilities. environment_cells: cumulative probability
@@ -10,6 +10,11 @@
 
 #include "frame.glsl"
 #include "layout.glsl"
+#include "parameters.glsl"
+
+TEXELS(environment_texels)
+TEXELS(environment_rows)
+TEXELS(environment_cells)
 
 // Smallest sine of the polar angle in densities, to keep them finite near a pole.
 const float ENVIRONMENT_MIN_SIN_THETA = 1e-7;

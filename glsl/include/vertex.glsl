@@ -1,17 +1,18 @@
 // One vertex of a path as the sampling passes see it: the surface, what a direction brings there, and
 // how densely the two basic techniques, the BRDF's own sampling and the environment's, draw it. All
-// densities per steradian. Needs NEEDS_PARAMETERS, NEEDS_WAVE, NEEDS_RAY_TEXELS, NEEDS_HIT_TEXELS,
-// NEEDS_SHADOW_RAYS, WRITES_SHADOW_RAYS, NEEDS_MATERIAL_TEXELS and NEEDS_ENVIRONMENT.
+// densities per steradian.
 
 #ifndef VERTEX_GLSL
 #define VERTEX_GLSL
 
-#include "layout.glsl"
 #include "frame.glsl"
+#include "load.glsl"
 #include "random.glsl"
 #include "wave.glsl"
 #include "brdf.glsl"
 #include "environment.glsl"
+
+WRITES(shadow_rays)
 
 // What does not change from ray to ray at one hit.
 struct Vertex {
@@ -24,8 +25,8 @@ struct Vertex {
     uint dimension;
 };
 
-// A direction considered at a vertex.
-struct Considered {
+// A direction at a vertex.
+struct DirectionSample {
     vec3 direction;
     // BRDF * radiance * cosine, radiance as if unoccluded.
     vec3 integrand;
@@ -45,46 +46,46 @@ Vertex load_vertex(uint path, Hit hit) {
     return vertex;
 }
 
-Considered consider(
+DirectionSample evaluate_direction(
     Vertex vertex, vec3 direction, vec3 incident_local, vec3 radiance, float environment_density) {
-    Considered considered = Considered(direction, vec3(0.0), 0.0, environment_density);
+    DirectionSample sampled = DirectionSample(direction, vec3(0.0), 0.0, environment_density);
     vec3 value;
     brdf_evaluate_and_pdf(
-        vertex.material, vertex.outgoing_local, incident_local, value, considered.brdf_pdf);
+        vertex.material, vertex.outgoing_local, incident_local, value, sampled.brdf_pdf);
     // Below the shading or the geometric horizon there is nothing to see.
     if (incident_local.z > 0.0 && dot(direction, vertex.hit.geometric_normal) > 0.0) {
-        considered.integrand = value * radiance * incident_local.z;
+        sampled.integrand = value * radiance * incident_local.z;
     }
-    return considered;
+    return sampled;
 }
 
 // Any direction in the world.
-Considered consider_world(Vertex vertex, vec3 direction) {
+DirectionSample evaluate_world(Vertex vertex, vec3 direction) {
     vec3 radiance = environment_radiance(direction);
-    return consider(
+    return evaluate_direction(
         vertex, direction, to_local(vertex.frame, direction), radiance,
         environment_pdf(direction, radiance));
 }
 
 // Any direction given in the frame of the vertex.
-Considered consider_local(Vertex vertex, vec3 incident_local) {
+DirectionSample evaluate_local(Vertex vertex, vec3 incident_local) {
     vec3 direction = to_world(vertex.frame, incident_local);
     vec3 radiance = environment_radiance(direction);
-    return consider(
+    return evaluate_direction(
         vertex, direction, incident_local, radiance, environment_pdf(direction, radiance));
 }
 
 // A direction proportional to the environment's luminance, from two numbers in [0, 1).
-Considered draw_from_environment(Vertex vertex, vec2 u) {
+DirectionSample draw_from_environment(Vertex vertex, vec2 u) {
     EnvironmentSample light = environment_sample(u);
-    return consider(
+    return evaluate_direction(
         vertex, light.direction, to_local(vertex.frame, light.direction), light.radiance,
         light.pdf);
 }
 
 // A direction from the BRDF's own sampling, from three numbers in [0, 1).
-Considered draw_from_brdf(Vertex vertex, vec3 u) {
-    return consider_local(vertex, brdf_sample(vertex.material, vertex.outgoing_local, u));
+DirectionSample draw_from_brdf(Vertex vertex, vec3 u) {
+    return evaluate_local(vertex, brdf_sample(vertex.material, vertex.outgoing_local, u));
 }
 
 void write_ray(uint index, vec3 direction, vec3 contribution) {
@@ -92,8 +93,8 @@ void write_ray(uint index, vec3 direction, vec3 contribution) {
 }
 
 // Writes a direction that was drawn with density `pdf`, 0 where nothing was drawn.
-void write_considered(uint index, Considered considered, float pdf) {
-    write_ray(index, considered.direction, pdf > 0.0 ? considered.integrand / pdf : vec3(0.0));
+void write_sample(uint index, DirectionSample sampled, float pdf) {
+    write_ray(index, sampled.direction, pdf > 0.0 ? sampled.integrand / pdf : vec3(0.0));
 }
 
 #endif

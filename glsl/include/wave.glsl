@@ -1,12 +1,16 @@
-// Which pixel and sample a path of the wave belongs to, and the dimensions of its random numbers.
-// Needs NEEDS_WAVE and NEEDS_PARAMETERS.
+// Pixel and sample of a path of the wave, and the dimensions of its random numbers.
 
 #ifndef WAVE_GLSL
 #define WAVE_GLSL
 
 #include "divide.glsl"
 #include "layout.glsl"
+#include "parameters.glsl"
 #include "random.glsl"
+
+layout(scalar, push_constant) uniform WaveConstants {
+    Wave wave;
+};
 
 // Dimensions of random_2d and random_1d along a path: two for the camera, then per vertex.
 const uint DIMENSION_FILTER = 0u;

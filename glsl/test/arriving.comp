@@ -1,16 +1,16 @@
 // Probe of arriving.glsl: a direction in, its index out.
 #version 460
 
-#include "arriving.glsl"
+#include "guided/arriving.glsl"
 
 #extension GL_EXT_scalar_block_layout : require
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
-layout(scalar, set = SET_FILM, binding = 0) readonly buffer Inputs {
+layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Inputs {
     vec3 inputs[];
 };
-layout(scalar, set = SET_FILM, binding = 1) writeonly buffer Outputs {
+layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Outputs {
     uint outputs[];
 };
 

@@ -2,9 +2,9 @@
 
 // Probe of brdf.glsl for tests/brdf.rs: value, density, sample and albedo of given materials.
 
-#define NEEDS_MATERIALS
-#include "layout.glsl"
 #include "brdf.glsl"
+
+READS(materials)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
@@ -22,10 +22,10 @@ struct BrdfAnswer {
     vec3 albedo;
 };
 
-layout(scalar, set = SET_FILM, binding = 0) readonly buffer QueriesBuffer {
+layout(scalar, set = SET_PROBE, binding = 32) readonly buffer QueriesBuffer {
     BrdfQuery queries[];
 };
-layout(scalar, set = SET_FILM, binding = 1) writeonly buffer AnswersBuffer {
+layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer AnswersBuffer {
     BrdfAnswer answers[];
 };
 

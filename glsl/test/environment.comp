@@ -1,8 +1,6 @@
 // Probe of environment.glsl: a direction and two random numbers in, lookup and sample out.
 #version 460
 
-#define NEEDS_PARAMETERS
-#define NEEDS_ENVIRONMENT
 #include "environment.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
@@ -20,10 +18,10 @@ struct ProbeOutput {
     float sampled_pdf;
 };
 
-layout(scalar, set = SET_FILM, binding = 0) readonly buffer Inputs {
+layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Inputs {
     ProbeInput inputs[];
 };
-layout(scalar, set = SET_FILM, binding = 1) writeonly buffer Outputs {
+layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Outputs {
     ProbeOutput outputs[];
 };
 

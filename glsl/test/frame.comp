@@ -23,10 +23,10 @@ struct ProbeOutput {
     vec2 sin_cos;
 };
 
-layout(scalar, set = SET_FILM, binding = 0) readonly buffer Inputs {
+layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Inputs {
     ProbeInput inputs[];
 };
-layout(scalar, set = SET_FILM, binding = 1) writeonly buffer Outputs {
+layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Outputs {
     ProbeOutput outputs[];
 };
 

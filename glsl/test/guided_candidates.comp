@@ -2,16 +2,7 @@
 // the densities there. For tests/guided_candidates.rs.
 #version 460
 
-#define NEEDS_PARAMETERS
-#define NEEDS_WAVE
-#define NEEDS_RAY_TEXELS
-#define NEEDS_HIT_TEXELS
-#define NEEDS_SHADOW_RAYS
-#define WRITES_SHADOW_RAYS
-#define NEEDS_MATERIAL_TEXELS
-#define NEEDS_ENVIRONMENT
-#define NEEDS_GUIDE
-#include "candidates.glsl"
+#include "guided/candidates.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
@@ -31,10 +22,10 @@ struct CandidateAnswer {
     float guided_pdf;
 };
 
-layout(scalar, set = SET_FILM, binding = 0) readonly buffer Queries {
+layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Queries {
     CandidateQuery queries[];
 };
-layout(scalar, set = SET_FILM, binding = 1) writeonly buffer Answers {
+layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {
     CandidateAnswer answers[];
 };
 
@@ -47,12 +38,9 @@ void main() {
     Vertex vertex = load_vertex(0u, load_hit(0u));
     uint cell = guide_cell_index(guide_cell_of(vertex));
     uint first = cell * guide.region_count;
-    if (PRODUCT_WEIGHTS != 0u) {
-        guide_weight_by_brdf(vertex, cell);
-    }
     Guided guided;
     if (query.draws == 0u) {
-        guided = locate_guided(first, consider_world(vertex, query.direction));
+        guided = locate_guided(first, evaluate_world(vertex, query.direction));
     } else if (query.candidate < BRDF_CANDIDATES) {
         uint number = query.ray * BRDF_CANDIDATES + query.candidate;
         guided = draw_brdf_candidate(vertex, first, number);
@@ -62,6 +50,6 @@ void main() {
         guided = draw_candidate(vertex, first, number);
     }
     answers[index] = CandidateAnswer(
-        guided.considered.direction, candidates_pdf(guided), guided.considered.brdf_pdf,
+        guided.sampled.direction, candidates_pdf(guided), guided.sampled.brdf_pdf,
         guided_pdf(guided));
 }

@@ -5,10 +5,10 @@
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
-layout(scalar, set = SET_FILM, binding = 0) readonly buffer Input {
+layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Input {
     uint probe_input[];
 };
-layout(scalar, set = SET_FILM, binding = 1) writeonly buffer Output {
+layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Output {
     uint probe_output[];
 };
 

@@ -1,13 +1,11 @@
 // Reads the lobes of paths and their weights in force back. For tests/product.rs.
 #version 460
 
-#define NEEDS_WAVE
-#define NEEDS_LOBE_TEXELS
-#define NEEDS_LOBE_COUNTS
-#define NEEDS_LOBE_SUM_TEXELS
-#define NEEDS_CACHE
-#define NEEDS_CLOSE_LOBE_TEXELS
-#include "weights.glsl"
+#include "layout.glsl"
+
+READS(visibility_cache)
+
+#include "visibility/weights.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
@@ -22,11 +20,11 @@ struct LobeAnswer {
     float total;
 };
 
-layout(scalar, set = SET_FILM, binding = 0) readonly buffer Queries {
+layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Queries {
     // Path and lobe.
     uvec2 queries[];
 };
-layout(scalar, set = SET_FILM, binding = 1) writeonly buffer Answers {
+layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {
     LobeAnswer answers[];
 };
 

@@ -2,22 +2,11 @@
 // its densities there. For tests/product.rs.
 #version 460
 
-#define NEEDS_PARAMETERS
-#define NEEDS_WAVE
-#define NEEDS_RAY_TEXELS
-#define NEEDS_HIT_TEXELS
-#define NEEDS_SHADOW_RAYS
-#define WRITES_SHADOW_RAYS
-#define NEEDS_MATERIAL_TEXELS
-#define NEEDS_ENVIRONMENT
-#define NEEDS_LOBE_TEXELS
-#define NEEDS_LOBE_COUNTS
-#define NEEDS_LOBE_SUM_TEXELS
-#define NEEDS_CACHE
-#define NEEDS_CLOSE_LOBES
-#define WRITES_CLOSE_LOBES
-#define NEEDS_CLOSE_LOBE_TEXELS
-#include "mixture.glsl"
+#include "layout.glsl"
+
+READS(visibility_cache)
+
+#include "product/mixture.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
@@ -45,10 +34,10 @@ struct MixtureAnswer {
     vec3 integrand;
 };
 
-layout(scalar, set = SET_FILM, binding = 0) readonly buffer Queries {
+layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Queries {
     MixtureQuery queries[];
 };
-layout(scalar, set = SET_FILM, binding = 1) writeonly buffer Answers {
+layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {
     MixtureAnswer answers[];
 };
 
@@ -74,17 +63,17 @@ void main() {
         unguided += lobe.weight / kernel_integral(lobe.bandwidth)
             * kernel_value(lobe.axis, lobe.bandwidth, direction);
     }
-    Considered considered = consider_world(vertex, direction);
+    DirectionSample sampled = evaluate_world(vertex, direction);
     MixtureAnswer answer;
     answer.direction = direction;
     answer.lobe_density = mixture_lobe_density(mixture, direction, false);
-    answer.pdf = mixture_pdf(mixture, considered, answer.lobe_density);
+    answer.pdf = mixture_pdf(mixture, sampled, answer.lobe_density);
     answer.unguided_lobe_density = sum > 0.0 ? unguided / sum : 0.0;
-    answer.environment_pdf = considered.environment_pdf;
-    answer.brdf_pdf = considered.brdf_pdf;
+    answer.environment_pdf = sampled.environment_pdf;
+    answer.brdf_pdf = sampled.brdf_pdf;
     answer.lobe_share = mixture.lobe_share;
     answer.environment_share = mixture.environment_share;
     answer.brdf_share = mixture.brdf_share;
-    answer.integrand = considered.integrand;
+    answer.integrand = sampled.integrand;
     answers[index] = answer;
 }

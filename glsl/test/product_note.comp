@@ -2,27 +2,15 @@
 // draws. For tests/product.rs.
 #version 460
 
-#define NEEDS_PARAMETERS
-#define NEEDS_WAVE
-#define NEEDS_RAY_TEXELS
-#define NEEDS_HIT_TEXELS
-#define NEEDS_SHADOW_RAYS
-#define WRITES_SHADOW_RAYS
-#define NEEDS_SHADOW_RAY_TEXELS
-#define NEEDS_MATERIAL_TEXELS
-#define NEEDS_ENVIRONMENT
-#define NEEDS_LOBE_TEXELS
-#define NEEDS_LOBE_COUNTS
-#define NEEDS_LOBE_SUM_TEXELS
-#define NEEDS_CACHE
-#define NEEDS_CLOSE_LOBES
-#define WRITES_CLOSE_LOBES
-#define NEEDS_CLOSE_LOBE_TEXELS
-#include "mixture.glsl"
+#include "layout.glsl"
+
+READS(visibility_cache)
+
+#include "product/mixture.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
-layout(scalar, set = SET_FILM, binding = 1) writeonly buffer Answers {
+layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {
     float densities[];
 };
 

@@ -3,15 +3,12 @@
 // tests/guided_bounces.rs.
 #version 460
 
-#define NEEDS_RAYS
-#define WRITES_RAYS
-#define NEEDS_HITS
-#define WRITES_HITS
-#define NEEDS_SHADOW_RAYS
-#define WRITES_SHADOW_RAYS
-#define NEEDS_VISIBILITY
-#define WRITES_VISIBILITY
 #include "layout.glsl"
+
+WRITES(rays)
+WRITES(hits)
+WRITES(shadow_rays)
+WRITES(visibility)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
@@ -23,7 +20,7 @@ struct PathInput {
     uint is_visible;
 };
 
-layout(scalar, set = SET_FILM, binding = 0) readonly buffer Inputs {
+layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Inputs {
     PathInput inputs[];
 };
 

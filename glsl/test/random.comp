@@ -14,10 +14,10 @@ struct ProbeOutput {
     float independent_1d;
 };
 
-layout(scalar, set = SET_FILM, binding = 0) readonly buffer Inputs {
+layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Inputs {
     uvec4 inputs[];
 };
-layout(scalar, set = SET_FILM, binding = 1) writeonly buffer Outputs {
+layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Outputs {
     ProbeOutput outputs[];
 };
 

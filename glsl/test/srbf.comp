@@ -29,10 +29,10 @@ struct Output {
     vec2 inverse;
 };
 
-layout(scalar, set = SET_FILM, binding = 0) readonly buffer Inputs {
+layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Inputs {
     Input inputs[];
 };
-layout(scalar, set = SET_FILM, binding = 1) writeonly buffer Outputs {
+layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Outputs {
     Output outputs[];
 };
 

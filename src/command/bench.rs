@@ -10,9 +10,9 @@ use crate::{
     bench::{RateSpread, RayPlan, RayRate, measure},
     error::{Error, Result},
     gpu::{Device, PassTimes},
-    pass::geometry::triangle_page_bytes,
-    renderer::{Renderer, SceneBuffers, Settings, window_of},
-    sampler::Sampler,
+    pass::{SceneBuffers, geometry::triangle_page_bytes},
+    renderer::{Renderer, Settings, window_of},
+    sampler::{Sampler, basic},
     scene::Scene,
 };
 
@@ -112,7 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let buffers = Arc::new(SceneBuffers::from_accel(&device, &scene, window, &accel)?);
 
     let plan = RayPlan {
-        sampler: arguments.sampler,
+        sampler: arguments.sampler.basic().unwrap_or(basic::MIS),
         shadow_rays: arguments.shadow_rays,
         paths: padded_pixels(film),
         repetitions: arguments.repetitions as usize,

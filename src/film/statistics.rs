@@ -1,13 +1,14 @@
 //! Statistics of a render as JSON, which `render --stats` writes.
 
-use std::{collections::BTreeMap, io::Write, path::Path};
+use std::{collections::BTreeMap, fmt, io::Write, path::Path};
+
+use serde::{Deserialize, Serialize};
 
 use super::metadata::SampleRange;
-use crate::files::write_atomically;
-use crate::{error::Result, sampler::CandidateCost};
+use crate::{error::Result, files::write_atomically};
 
 /// Figures of one render. Times cover this run only, even if it continued a checkpoint.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Statistics {
     /// Fenestra's version.
@@ -84,5 +85,32 @@ impl Statistics {
             serde_json::to_writer_pretty(&mut *file, self)?;
             file.write_all(b"\n")
         })
+    }
+}
+
+/// Measured cost of a number of candidates.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CandidateCost {
+    /// Candidates per shadow ray.
+    pub candidates: u32,
+    /// Device milliseconds of all passes for one sample of every pixel.
+    pub ms_per_sample: f64,
+    /// Variance of a pixel's samples relative to the squared mean of its block, geometric mean over
+    /// the blocks.
+    pub relative_variance: f64,
+    /// Standard error over the blocks of the logarithm of the variance relative to that of the
+    /// fewest candidates measured; 0 for these, 1000 if there is only one block.
+    pub log_variance_error: f64,
+}
+
+impl fmt::Display for CandidateCost {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { candidates, ms_per_sample, relative_variance, log_variance_error } = self;
+        let percent = 100.0 * log_variance_error;
+        write!(
+            formatter,
+            "{candidates}: {ms_per_sample:.2} ms a sample, relative variance {relative_variance:.3} \
+             (±{percent:.0}%)"
+        )
     }
 }

@@ -84,7 +84,7 @@ impl Commands {
     /// writes of earlier passes. It is labelled with the pipeline's name and, in a timed command
     /// buffer, bracketed by timestamps.
     ///
-    /// `sets` are bound at their own set numbers; `push_constants` may be empty.
+    /// Of `sets` those are bound that the shader uses; `push_constants` may be empty.
     ///
     /// # Panics
     /// If the dispatch exceeds the device's workgroup count or the push constants exceed 128 bytes.
@@ -118,7 +118,7 @@ impl Commands {
         // and the caller keeps them alive until the submission has been waited for.
         unsafe {
             raw.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
-            for set in sets {
+            for set in sets.iter().filter(|set| pipeline.uses_set(set.index())) {
                 raw.cmd_bind_descriptor_sets(
                     self.raw,
                     vk::PipelineBindPoint::COMPUTE,

@@ -10,12 +10,15 @@ use gpu_allocator::{
 use serde::Serialize;
 
 use super::{
-    descriptors::{SET_BINDING_COUNTS, SetLayouts, texel_format},
+    descriptors::SetLayouts,
     instance::{Instance, no_driver},
     pipeline::PipelineCache,
     vulkan_error,
 };
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    shader::bindings::{Kind, TABLES},
+};
 
 /// Identity, limits and features of a Vulkan device, as far as Fenestra needs them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -108,14 +111,18 @@ impl Capabilities {
     }
 }
 
-/// Counts the storage buffers of the pipeline that sees most: scene, wave and the larger of the
-/// other two sets. Texel buffers do not count.
+/// Counts the storage buffers of the pipeline that sees most: for each set those of its largest table,
+/// but of the sampler and the film the larger one. Texel buffers do not count.
 fn most_bindings() -> u32 {
-    let [scene, srbf, wave, film] = std::array::from_fn(|set| {
-        let bindings = 0..SET_BINDING_COUNTS[set];
-        bindings.filter(|binding| texel_format(set as u32, *binding).is_none()).count() as u32
+    let [scene, sampler, wave, film] = [0, 1, 2, 3].map(|set| {
+        let tables = TABLES.iter().filter(|table| table.set == set);
+        let storage_buffers = tables.map(|table| {
+            let is_storage = |kind| !matches!(kind, Kind::Texels(_));
+            table.bindings.iter().filter(|binding| is_storage(binding.kind)).count() as u32
+        });
+        storage_buffers.max().unwrap_or(0)
     });
-    scene + wave + srbf.max(film)
+    scene + wave + sampler.max(film)
 }
 
 /// Lists the devices of an instance.

@@ -8,14 +8,15 @@ use super::{
     device::{Capabilities, Device},
     labels, vulkan_error,
 };
-use crate::shader::spirv::used_sets;
-use crate::{error::Result, files};
+use crate::{error::Result, files, shader::spirv::used_bindings};
 
 /// A compute pipeline.
 pub struct Pipeline {
     raw: vk::Pipeline,
     layout: vk::PipelineLayout,
     name: String,
+    /// Tells for each descriptor set whether the shader uses it.
+    uses_set: [bool; 4],
     device: Arc<Device>,
 }
 
@@ -32,16 +33,12 @@ impl Pipeline {
         constants: &[(u32, u32)],
     ) -> Result<Self> {
         let words: Vec<u32> = bytemuck::pod_collect_to_vec(spirv);
-        let used = used_sets(&words);
-        let layouts: Vec<_> = (0..4_u32)
-            .map(|set| {
-                if used[set as usize] {
-                    device.set_layouts().get(set)
-                } else {
-                    device.set_layouts().empty()
-                }
-            })
-            .collect();
+        let used = used_bindings(&words);
+        let first_used = [0, 1, 2, 3].map(|set| used.iter().find(|(other, _)| *other == set));
+        let layouts = first_used.map(|used| match used {
+            Some((set, number)) => device.set_layouts().with_buffer(*set, *number),
+            None => device.set_layouts().empty(),
+        });
         let push_constants =
             [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(128)];
         let layout_info = vk::PipelineLayoutCreateInfo::default()
@@ -56,6 +53,7 @@ impl Pipeline {
             raw: vk::Pipeline::null(),
             layout,
             name: name.to_owned(),
+            uses_set: first_used.map(|used| used.is_some()),
             device: Arc::clone(device),
         };
 
@@ -106,6 +104,11 @@ impl Pipeline {
     /// Name of the pass.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Returns true if the shader uses the descriptor set with this number.
+    pub fn uses_set(&self, set: u32) -> bool {
+        self.uses_set[set as usize]
     }
 
     pub(super) fn raw(&self) -> vk::Pipeline {

@@ -2,16 +2,23 @@
 
 use std::sync::Arc;
 
+use super::kernel::{Domain, Kernel};
 use crate::{
     accel::{Accel, MAX_TRIANGLE_PAGES, TriangleRecord},
     error::Result,
     gpu::{Buffer, Capabilities, Device},
-    shader::constants::{
-        BINDING_BVH_NODES, BINDING_TRIANGLE_MATERIALS, BINDING_TRIANGLES_0,
-        CONSTANT_RAYS_PER_INVOCATION, CONSTANT_REFILL_LANES, CONSTANT_TRIANGLE_PAGE_SHIFT,
-        CONSTANT_TRIANGLE_PAGES, WORKGROUP_SIZE,
+    shader::{
+        bindings::{Binding, scene},
+        constants::{
+            CONSTANT_RAYS_PER_INVOCATION, CONSTANT_REFILL_LANES, CONSTANT_TRIANGLE_PAGE_SHIFT,
+            CONSTANT_TRIANGLE_PAGES,
+        },
     },
 };
+
+/// Bindings of the pages of triangles.
+const PAGES: [Binding; MAX_TRIANGLE_PAGES] =
+    [scene::TRIANGLES_0, scene::TRIANGLES_1, scene::TRIANGLES_2, scene::TRIANGLES_3];
 
 /// Tree and triangles on the device.
 pub struct GeometryBuffers {
@@ -49,12 +56,11 @@ impl GeometryBuffers {
     }
 
     /// Buffers with their bindings in the scene set. Pages that do not exist are bound to the first.
-    pub fn bindings(&self) -> Vec<(u32, &Buffer)> {
+    pub fn bindings(&self) -> Vec<(Binding, &Buffer)> {
+        let page = |(index, binding)| (binding, self.pages.get(index).unwrap_or(&self.pages[0]));
         let mut bindings =
-            vec![(BINDING_BVH_NODES, &self.nodes), (BINDING_TRIANGLE_MATERIALS, &self.materials)];
-        bindings.extend((0..MAX_TRIANGLE_PAGES).map(|page| {
-            (BINDING_TRIANGLES_0 + page as u32, self.pages.get(page).unwrap_or(&self.pages[0]))
-        }));
+            vec![(scene::BVH_NODES, &self.nodes), (scene::TRIANGLE_MATERIALS, &self.materials)];
+        bindings.extend(PAGES.into_iter().enumerate().map(page));
         bindings
     }
 
@@ -63,14 +69,42 @@ impl GeometryBuffers {
         [&self.nodes, &self.materials].into_iter().chain(&self.pages)
     }
 
-    /// Specialization constants of a pass that traverses this geometry.
-    pub(super) fn constants(&self, schedule: Schedule) -> [(u32, u32); 4] {
-        [
-            (CONSTANT_TRIANGLE_PAGES, self.pages.len() as u32),
+    /// Specialization of the passes that traverse this geometry.
+    pub fn traversal(&self) -> Traversal {
+        Traversal { page_count: self.pages.len() as u32, page_shift: self.page_shift }
+    }
+}
+
+/// Specialization of the passes that traverse a geometry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Traversal {
+    /// Pages of triangles.
+    pub page_count: u32,
+    /// Base-2 logarithm of the triangles per page.
+    pub page_shift: u32,
+}
+
+impl Traversal {
+    fn kernel(self, shader: &'static str, domain: Domain, schedule: Schedule) -> Kernel {
+        let constants = [
+            (CONSTANT_TRIANGLE_PAGES, self.page_count),
             (CONSTANT_TRIANGLE_PAGE_SHIFT, self.page_shift),
             (CONSTANT_RAYS_PER_INVOCATION, schedule.rays_per_invocation),
             (CONSTANT_REFILL_LANES, schedule.refill_lanes),
-        ]
+        ];
+        let per_invocation = schedule.rays_per_invocation;
+        Kernel { per_invocation, ..Kernel::new(shader, domain, &constants) }
+    }
+
+    /// The pass that finds the closest hit of every ray: `ray_texels` → `hits`.
+    pub fn trace(self, schedule: Schedule) -> Kernel {
+        self.kernel("trace", Domain::Paths, schedule)
+    }
+
+    /// The pass that tests every shadow ray for any hit: `shadow_ray_texels`, `hit_texels` →
+    /// `visibility`. Ray `direction_index · path_count + path_index` starts at hit `path_index`.
+    pub fn shadow(self, schedule: Schedule) -> Kernel {
+        self.kernel("shadow", Domain::ShadowRays, schedule)
     }
 }
 
@@ -96,10 +130,5 @@ impl Schedule {
         } else {
             Self::SINGLE
         }
-    }
-
-    /// Invocations to dispatch for `rays` rays.
-    pub(super) fn invocations(self, rays: u32) -> u32 {
-        rays.div_ceil(WORKGROUP_SIZE * self.rays_per_invocation).max(1) * WORKGROUP_SIZE
     }
 }

@@ -57,48 +57,38 @@ pub fn window_of(settings: &Settings, scene: &Scene) -> Window {
     })
 }
 
-/// Refuses settings that cannot be rendered, before anything is allocated.
-pub(super) fn check(settings: &Settings, window: Window, film_size: [u32; 2]) -> Result<()> {
-    let end = |start: u32, length: u32| u64::from(start) + u64::from(length);
-    if window.width == 0
-        || window.height == 0
-        || end(window.x, window.width) > u64::from(film_size[0])
-        || end(window.y, window.height) > u64::from(film_size[1])
-    {
-        return Err(Error::usage(format!(
-            "crop window {},{},{},{} does not lie in the film of {}x{} pixels",
-            window.x,
-            window.y,
-            end(window.x, window.width),
-            end(window.y, window.height),
-            film_size[0],
-            film_size[1]
-        )));
-    }
-    if settings.shadow_rays > 4096 {
-        return Err(Error::usage(format!(
-            "--shadow-rays {}: expected at most 4096; use more samples per pixel",
-            settings.shadow_rays
-        )));
-    }
-    settings.parameters.candidates_of(settings.sampler)?;
-    for (aov, layer, only) in [
-        (Aov::CacheEntries, "cache-entries", Sampler::Visibility),
-        (Aov::GuideCell, "guide-cell", Sampler::Guided),
-    ] {
-        if settings.aovs.contains(&aov) && settings.sampler != only {
+impl Settings {
+    /// Refuses settings that cannot be rendered, before anything is allocated.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn check(&self, film_size: [u32; 2]) -> Result<()> {
+        let end = |start: u32, length: u32| u64::from(start) + u64::from(length);
+        if let Some(window) = self.window
+            && (window.width == 0
+                || window.height == 0
+                || end(window.x, window.width) > u64::from(film_size[0])
+                || end(window.y, window.height) > u64::from(film_size[1]))
+        {
             return Err(Error::usage(format!(
-                "--aov {layer}: the sampler {} has no such layer; expected --sampler {}",
-                settings.sampler.name(),
-                only.name()
+                "crop window {},{},{},{} does not lie in the film of {}x{} pixels",
+                window.x,
+                window.y,
+                end(window.x, window.width),
+                end(window.y, window.height),
+                film_size[0],
+                film_size[1]
             )));
         }
+        if self.shadow_rays > 4096 {
+            return Err(Error::usage(format!(
+                "--shadow-rays {}: expected at most 4096; use more samples per pixel",
+                self.shadow_rays
+            )));
+        }
+        if !(1..=64).contains(&self.depth) {
+            return Err(Error::usage(format!("--depth {}: expected 1 to 64", self.depth)));
+        }
+        self.sampler.check(&self.parameters, self.depth, &self.aovs)
     }
-    if settings.sampler.uses_lobes() {
-        settings.parameters.lobes.check(settings.depth)?;
-    }
-    if !(1..=64).contains(&settings.depth) {
-        return Err(Error::usage(format!("--depth {}: expected 1 to 64", settings.depth)));
-    }
-    Ok(())
 }

@@ -29,15 +29,18 @@ impl Contender {
         let mut parts = label.split(':');
         let name = parts.next().unwrap_or_default();
         let sampler =
-            Sampler::ALL.into_iter().find(|sampler| sampler.name() == name).ok_or_else(|| {
-                let known = Sampler::ALL.map(Sampler::name).join(", ");
-                Error::usage(format!("there is no sampler {name:?}; known: {known}"))
-            })?;
+            Sampler::ALL.iter().copied().find(|sampler| sampler.name() == name).ok_or_else(
+                || {
+                    let known: Vec<_> = Sampler::ALL.iter().map(|sampler| sampler.name()).collect();
+                    let known = known.join(", ");
+                    Error::usage(format!("there is no sampler {name:?}; known: {known}"))
+                },
+            )?;
         let mut parameters = defaults;
         for assignment in parts {
             parameters.set(assignment)?;
         }
-        parameters.candidates_of(sampler)?;
+        sampler.check_parameters(&parameters)?;
         Ok(Self { label: label.to_owned(), sampler, parameters })
     }
 
@@ -68,7 +71,7 @@ impl Contender {
 
     /// Returns the parameters that the sampler uses, by name.
     pub fn describe_parameters(&self) -> BTreeMap<String, String> {
-        self.parameters.describe(self.sampler)
+        self.sampler.describe(&self.parameters)
     }
 }
 

@@ -19,7 +19,8 @@ use crate::{
     error::{Error, Result},
     film::{Metadata, png::write_preview},
     gpu::Device,
-    renderer::{Renderer, SceneBuffers, Settings, window_of},
+    pass::SceneBuffers,
+    renderer::{Renderer, Settings, window_of},
     scene::Scene,
 };
 

@@ -110,7 +110,7 @@ impl RunJob<'_> {
         let gpu_ms = &renderer.totals().gpu_ms;
         let metadata = Metadata {
             sample_ranges: vec![SampleRange { seed: self.seed, first: 0, count: measurement.spp }],
-            candidates: renderer.candidates(),
+            candidates: renderer.report().candidates,
             seconds: measurement.seconds,
             gpu_seconds: gpu_ms.iter().map(|(pass, ms)| (pass.clone(), ms * 1e-3)).collect(),
             ..self.metadata.clone()

@@ -313,7 +313,8 @@ fn plain(sampler: Sampler) -> Contender {
 /// Every sampler that combines BRDF and environment.
 fn default_contenders() -> Vec<Contender> {
     let single = [Sampler::Uniform, Sampler::Cosine, Sampler::Brdf, Sampler::Env];
-    Sampler::ALL.into_iter().filter(|sampler| !single.contains(sampler)).map(plain).collect()
+    let others = Sampler::ALL.iter().filter(|sampler| !single.contains(sampler));
+    others.copied().map(plain).collect()
 }
 
 #[cfg(test)]

@@ -12,11 +12,7 @@ use super::{
     rule::Rule,
     statistics::mean_standard_error,
 };
-use crate::{
-    error::Result,
-    film::RgbImage,
-    renderer::{Renderer, Totals},
-};
+use crate::{error::Result, film::RgbImage, pass::Totals, renderer::Renderer};
 
 /// Name of the guide's rebuilds in [`Renderer::host_ms`].
 const GUIDE_REBUILDS: &str = "guide rebuilds";
@@ -238,7 +234,10 @@ impl Figures {
             statistics: statistics(totals)
                 .chain(guide_rebuild_share(&renderer.host_ms(), seconds))
                 .chain(
-                    renderer.candidates().map(|count| ("candidates".to_owned(), f64::from(count))),
+                    renderer
+                        .report()
+                        .candidates
+                        .map(|count| ("candidates".to_owned(), f64::from(count))),
                 )
                 .collect(),
         }

@@ -294,7 +294,7 @@ fn render_half(
             && renderer.sample_count() > 0
         {
             let range = SampleRange { seed, first: 0, count: renderer.sample_count() };
-            let candidates = renderer.candidates();
+            let candidates = renderer.report().candidates;
             let metadata = Metadata { sample_ranges: vec![range], candidates, ..metadata.clone() };
             if let Some(state) = renderer.guide_state()? {
                 state.write(&guide_path(&checkpoint_path))?;
@@ -304,7 +304,7 @@ fn render_half(
         }
         result?;
     }
-    metadata.candidates = renderer.candidates();
+    metadata.candidates = renderer.report().candidates;
     let mut image = renderer.sums()?.to_image(&[Aov::Variance]);
     metadata.store(&mut image);
     image.write_exr(path)?;

@@ -6,18 +6,19 @@ pub mod replicates;
 pub mod scenes;
 pub mod statistics;
 
-use std::{
-    collections::BTreeMap,
-    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
-};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     film::Sums,
     gpu::{Buffer, Commands, DescriptorSet, Device, Pipeline},
-    renderer::{Renderer, Settings, Totals},
+    pass::Totals,
+    renderer::{Renderer, Settings},
     scene::Scene,
-    shader::constants::{SET_FILM, WORKGROUP_SIZE},
+    shader::{
+        bindings::{Binding, TABLES, probe},
+        constants::WORKGROUP_SIZE,
+    },
 };
 
 /// Lets one test run at a time: the validation layers were seen to crash when several threads made
@@ -76,31 +77,28 @@ pub fn assert_silent() {
     assert!(messages.is_empty(), "validation messages:\n{}", messages.join("\n"));
 }
 
-/// Runs a probe shader over `invocations` invocations and returns its output, binding 1 of the film
-/// set. `buffers` are (set, binding, content); binding 0 of the film set is the probe's input.
+/// Runs a probe shader over `invocations` invocations and returns its output.
 pub fn run_probe(
     spirv: &[u8],
-    buffers: &[(u32, u32, &[u8])],
+    buffers: &[(Binding, &[u8])],
     output_bytes: usize,
     invocations: u32,
 ) -> Vec<u8> {
     let device = device();
-    let uploaded: Vec<(u32, u32, Buffer)> = buffers
-        .iter()
-        .map(|(set, binding, bytes)| {
-            let name = format!("probe {set}.{binding}");
-            (*set, *binding, Buffer::from_slice(device, &name, bytes).unwrap())
-        })
-        .collect();
+    let upload = |(binding, bytes): &(Binding, &[u8])| {
+        (*binding, Buffer::from_slice(device, binding.name, bytes).unwrap())
+    };
+    let uploaded: Vec<(Binding, Buffer)> = buffers.iter().map(upload).collect();
     let output = Buffer::zeroed(device, "probe output", output_bytes as u64).unwrap();
-    let mut by_set: BTreeMap<u32, Vec<(u32, &Buffer)>> = BTreeMap::new();
-    for (set, binding, buffer) in &uploaded {
-        by_set.entry(*set).or_default().push((*binding, buffer));
-    }
-    by_set.entry(SET_FILM).or_default().push((1, &output));
-    let sets: Vec<DescriptorSet> = by_set
+    let mut bound: Vec<_> = uploaded.iter().map(|(binding, buffer)| (*binding, buffer)).collect();
+    bound.push((probe::PROBE_OUTPUT, &output));
+    let sets: Vec<DescriptorSet> = TABLES
         .iter()
-        .map(|(set, buffers)| DescriptorSet::new(device, *set, buffers).unwrap())
+        .filter_map(|table| {
+            let is_in_table = |(binding, _): &&(Binding, _)| table.bindings.contains(binding);
+            let buffers: Vec<_> = bound.iter().filter(is_in_table).copied().collect();
+            (!buffers.is_empty()).then(|| DescriptorSet::new(device, table, &buffers).unwrap())
+        })
         .collect();
     let pipeline = Pipeline::new(device, "probe", spirv, &[]).unwrap();
     let mut commands = Commands::begin(device).unwrap();

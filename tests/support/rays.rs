@@ -5,17 +5,10 @@
 use fenestra::{
     accel::Accel,
     gpu::{Buffer, Commands, DescriptorSet},
-    pass::{
-        geometry::{GeometryBuffers, Schedule},
-        shadow::Shadow,
-        trace::Trace,
-    },
+    pass::{GeometryBuffers, Pass, Schedule},
     scene::Geometry,
     shader::{
-        constants::{
-            BINDING_COUNTERS, BINDING_HIT_TEXELS, BINDING_HITS, BINDING_RAY_TEXELS,
-            BINDING_SHADOW_RAY_TEXELS, BINDING_VISIBILITY, SET_FILM, SET_SCENE, SET_WAVE,
-        },
+        bindings::{FILM, SCENE, WAVE, film, wave as bindings},
         structs::{Counters, Hit, Ray, ShadowRay, Wave},
     },
 };
@@ -131,9 +124,9 @@ impl OnDevice {
     pub fn new(accel: &Accel) -> Self {
         let device = crate::support::device();
         let geometry = GeometryBuffers::new(device, accel).unwrap();
-        let scene = DescriptorSet::new(device, SET_SCENE, &geometry.bindings()).unwrap();
+        let scene = DescriptorSet::new(device, &SCENE, &geometry.bindings()).unwrap();
         let counters = Buffer::zeroed(device, "counters", size_of::<Counters>() as u64).unwrap();
-        let film = DescriptorSet::new(device, SET_FILM, &[(BINDING_COUNTERS, &counters)]).unwrap();
+        let film = DescriptorSet::new(device, &FILM, &[(film::COUNTERS, &counters)]).unwrap();
         Self { geometry, scene, counters, film }
     }
 
@@ -149,11 +142,11 @@ impl OnDevice {
         let hits = Buffer::zeroed(device, "hits", (size_of::<Hit>() * rays.len()) as u64).unwrap();
         let wave_set = DescriptorSet::new(
             device,
-            SET_WAVE,
-            &[(BINDING_RAY_TEXELS, &ray_buffer), (BINDING_HITS, &hits)],
+            &WAVE,
+            &[(bindings::RAY_TEXELS, &ray_buffer), (bindings::HITS, &hits)],
         )
         .unwrap();
-        let pass = Trace::new(device, &self.geometry, schedule).unwrap();
+        let pass = Pass::new(device, self.geometry.traversal().trace(schedule)).unwrap();
         let mut commands = Commands::begin(device).unwrap();
         pass.record(&mut commands, &[&self.scene, &wave_set, &self.film], &wave(rays.len(), 0));
         commands.submit_and_wait().unwrap();
@@ -171,15 +164,15 @@ impl OnDevice {
                 .unwrap();
         let wave_set = DescriptorSet::new(
             device,
-            SET_WAVE,
+            &WAVE,
             &[
-                (BINDING_HIT_TEXELS, &hit_buffer),
-                (BINDING_SHADOW_RAY_TEXELS, &ray_buffer),
-                (BINDING_VISIBILITY, &visibility),
+                (bindings::HIT_TEXELS, &hit_buffer),
+                (bindings::SHADOW_RAY_TEXELS, &ray_buffer),
+                (bindings::VISIBILITY, &visibility),
             ],
         )
         .unwrap();
-        let pass = Shadow::new(device, &self.geometry, schedule).unwrap();
+        let pass = Pass::new(device, self.geometry.traversal().shadow(schedule)).unwrap();
         let mut commands = Commands::begin(device).unwrap();
         let directions = (shadow_rays.len() / hits.len()) as u32;
         let wave = wave(hits.len(), directions);

@@ -103,7 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.load_guide {
         guide::load(&mut renderer, path)?;
     }
-    job.metadata.fit_hashes = renderer.fit_hashes();
+    job.metadata.fit_hashes = renderer.report().fit_hashes;
     job.resume(&mut renderer)?;
 
     let reason = job.render(&mut renderer, &interrupted)?;
@@ -111,7 +111,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     job.finish(&renderer, reason, load_ms)?;
     if let Some(at) = arguments.pixel {
         let written = if settings.sampler == Sampler::Guided {
-            pixel::write_guided(&renderer, &scene, &job.output, at)?
+            pixel::write_guided(&mut renderer, &scene, &job.output, at)?
         } else {
             drop(renderer);
             pixel::write(&device, &scene, &settings, &job.output, at)?
@@ -171,7 +171,7 @@ impl<'a> RenderJob<'a> {
         output: PathBuf,
     ) -> Self {
         let capabilities = device.capabilities();
-        let mut parameters = settings.parameters.describe(settings.sampler);
+        let mut parameters = settings.sampler.describe(&settings.parameters);
         if settings.depth > settings.roulette_vertex {
             let vertex = settings.roulette_vertex.to_string();
             parameters.insert("roulette_depth".to_owned(), vertex);
@@ -357,7 +357,7 @@ impl<'a> RenderJob<'a> {
                 first: self.arguments.sample_offset,
                 count: renderer.sample_count(),
             }],
-            candidates: renderer.candidates(),
+            candidates: renderer.report().candidates,
             seconds: self.seconds(),
             gpu_seconds: renderer
                 .totals()

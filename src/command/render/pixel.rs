@@ -3,8 +3,8 @@
 //! Panels are lat-long, −Z in the middle and +Y on top, darkened below the hit's horizon (blue).
 //! They show the environment with the samples taken (green reached it, red were blocked, grey
 //! brought nothing and were not traced); the density of the product's lobes for the first ray; and
-//! that density for the last ray, at the same exposure, with the directions in the visibility cache
-//! (red blocked, green visible), as in figures 4.3 to 4.8 of Wu & Shih 2009. `product` has the
+//! that density for the last ray, at the same exposure, with the blocked directions in the visibility
+//! cache (red), as in figures 4.3 to 4.8 of Wu & Shih 2009. `product` has the
 //! first two panels, samplers without lobes only the first.
 //!
 //! `guided` shows the environment with the pixel's next samples, then the state of the hit's cell:
@@ -29,9 +29,10 @@ use crate::{
     },
     gpu::Device,
     math::frame::{direction_from_lat_long, lat_long_from_direction},
-    renderer::{
-        CellLevel, GuidedRay, RecordedCell, RecordedGuide, RecordedLobe, RecordedPixel,
-        RecordedRay, Renderer, Settings, window_of,
+    renderer::{RecordedPixel, Renderer, Settings, window_of},
+    sampler::{
+        guided::{CellLevel, GuidedRay, RecordedCell, RecordedGuide, RecordedRay},
+        product::record::RecordedLobe,
     },
     scene::Scene,
     srbf::kernel_value,
@@ -112,7 +113,7 @@ pub fn write(
 /// # Errors
 /// A failing device or disk.
 pub fn write_guided(
-    renderer: &Renderer,
+    renderer: &mut Renderer,
     scene: &Scene,
     output: &Path,
     pixel: [u32; 2],
@@ -155,9 +156,8 @@ fn numbers_of(recorded: &RecordedPixel) -> serde_json::Value {
             "before": lobe.before,
             "after": lobe.after,
         })).collect::<Vec<_>>(),
-        "cached": recorded.cached.iter().flatten().map(|entry| json!({
-            "direction": entry.direction.to_array(),
-            "visible": entry.is_visible,
+        "cached": recorded.cached.iter().flatten().map(|direction| json!({
+            "direction": direction.to_array(),
         })).collect::<Vec<_>>(),
     })
 }
@@ -278,8 +278,8 @@ fn draw(scene: &Scene, recorded: &RecordedPixel) -> Vec<Panel> {
     panels.push(Panel::new(normal, white, before));
     if let Some(cached) = &recorded.cached {
         let mut after = Panel::new(normal, white, density(|lobe| lobe.after));
-        for entry in cached {
-            after.mark(entry.direction, if entry.is_visible { VISIBLE } else { BLOCKED });
+        for direction in cached {
+            after.mark(*direction, BLOCKED);
         }
         panels.push(after);
     }

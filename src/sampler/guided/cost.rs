@@ -5,11 +5,7 @@
 //! to the squared mean of its block of pixels, so that dark regions count as much as bright ones;
 //! the geometric mean over the blocks keeps a few fireflies from deciding.
 
-use std::fmt;
-
-use serde::{Deserialize, Serialize};
-
-use crate::error::Result;
+use crate::{error::Result, film::statistics::CandidateCost};
 
 /// Numbers of candidates that `guided` can choose a shadow ray from.
 pub const GUIDED_CANDIDATES: [u32; 3] = [1, 4, 8];
@@ -25,38 +21,9 @@ const UNKNOWN_ERROR: f64 = 1e3;
 /// Ratio of variance × time above which more candidates are not measured again.
 const CLEAR_LOSS: f64 = 1.4;
 
-/// Measured cost of a number of candidates.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CandidateCost {
-    /// Candidates per shadow ray.
-    pub candidates: u32,
-    /// Device milliseconds of all passes for one sample of every pixel.
-    pub ms_per_sample: f64,
-    /// Variance of a pixel's samples relative to the squared mean of its block, geometric mean over
-    /// the blocks.
-    pub relative_variance: f64,
-    /// Standard error over the blocks of the logarithm of the variance relative to that of the
-    /// fewest candidates measured; 0 for these, 1000 if there is only one block.
-    pub log_variance_error: f64,
-}
-
-impl fmt::Display for CandidateCost {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { candidates, ms_per_sample, relative_variance, log_variance_error } = self;
-        let percent = 100.0 * log_variance_error;
-        write!(
-            formatter,
-            "{candidates}: {ms_per_sample:.2} ms a sample, relative variance {relative_variance:.3} \
-             (±{percent:.0}%)"
-        )
-    }
-}
-
-impl CandidateCost {
-    /// Relative variance after a millisecond of samples.
-    fn variance_time(&self) -> f64 {
-        self.relative_variance * self.ms_per_sample
-    }
+/// Relative variance after a millisecond of samples.
+fn variance_time(cost: &CandidateCost) -> f64 {
+    cost.relative_variance * cost.ms_per_sample
 }
 
 /// Chooses a number of candidates: the fewest, unless more are clearly better. `costs` are in
@@ -68,8 +35,8 @@ pub fn choose_candidates(costs: &[CandidateCost]) -> u32 {
     assert!(!costs.is_empty(), "something was measured");
     let mut chosen = &costs[0];
     for more in &costs[1..] {
-        let at_most = more.variance_time() * (CONFIDENCE * more.log_variance_error).exp();
-        if at_most < CLEAR_GAIN * chosen.variance_time() {
+        let at_most = variance_time(more) * (CONFIDENCE * more.log_variance_error).exp();
+        if at_most < CLEAR_GAIN * variance_time(chosen) {
             chosen = more;
         }
     }
@@ -80,7 +47,7 @@ pub fn choose_candidates(costs: &[CandidateCost]) -> u32 {
 /// one that more measurements would not change the choice.
 pub fn is_largest_clearly_worse(costs: &[CandidateCost]) -> bool {
     let Some((largest, fewer)) = costs.split_last() else { return false };
-    fewer.iter().any(|cost| largest.variance_time() > CLEAR_LOSS * cost.variance_time())
+    fewer.iter().any(|cost| variance_time(largest) > CLEAR_LOSS * variance_time(cost))
 }
 
 /// Compares numbers of candidates pair by pair, from the fewest up, until more do not pay.

@@ -15,29 +15,43 @@
 //! Rectangles, counts → `guide_regions`, `guide_entries`, `guide_arriving` on the device; shaders
 //! `sample_guided` and `bounce_guided`.
 
+mod arrival_buffers;
 mod arriving;
+mod budget;
+mod buffers;
 mod cells;
+mod choice;
 pub mod cost;
 mod counts;
 mod entries;
 mod estimate;
 mod guide;
 mod key;
+mod parameters;
 mod partition;
+mod record;
 mod share;
 mod snapshot;
 mod split;
 mod state;
+mod steps;
+mod technique;
 
 pub use arriving::{ARRIVAL_DIRECTIONS, ArrivalWords, ArrivingLight, Reflected, arrival_direction};
+pub use buffers::{GuideBuffers, GuideSize};
 pub use cells::MAX_CELLS;
 pub use counts::{Count, CountWords, PARTS_PER_RAY};
 pub use entries::{decode_entry, decode_visibility};
 pub use estimate::Estimates;
 pub use guide::Guide;
 pub use key::{CellKey, FACE_COUNT, face_normal};
+pub use parameters::GuidedParameters;
 pub use partition::{MAX_REGIONS, Partition, Region};
+pub use record::{CellLevel, GuidedRay, RecordedCell, RecordedGuide, RecordedRay, RecordedRegion};
 pub use share::{SHARE_WORDS, ShareEvidence, share_in_256ths};
 pub use snapshot::Snapshot;
 pub use split::PARENT_COUNT;
 pub use state::{GuideState, Origin};
+pub use steps::GuidedSteps;
+pub use technique::Guided;
+pub(super) use technique::GuidedRoom;

@@ -1,3 +1,94 @@
-//! Sampling the product of environment and BRDF.
+//! Product sampling: directions from the lobes of environment × BRDF. \[Tsai et al. 2008\].
+//!
+//! [`Fits`] of the environment and of every material → [`LobeBuffers`] → per hit the product's
+//! strongest lobes (`glsl/product/multiply_lobes.comp`) → directions from their mixture with shares of
+//! the BRDF's and the environment's own sampling (`glsl/product/sample_lobes.comp`).
 
-pub mod parameters;
+mod fits;
+mod lobes;
+mod parameters;
+pub mod record;
+mod steps;
+
+use std::collections::BTreeMap;
+
+pub use fits::{FitSizes, Fits};
+pub use lobes::{LobeBuffers, LobeSize};
+pub use parameters::{Elevation, LobeOrder, ProductParameters};
+pub use steps::ProductSteps;
+
+use super::{Context, Parameters, Room, knob};
+use crate::{
+    error::Result,
+    gpu::DescriptorSet,
+    pass::{PathDemand, Report, Steps, Technique},
+};
+
+/// The room of `product`.
+pub(super) struct ProductRoom;
+
+/// Size of the lobes without a visibility cache.
+fn size(parameters: &ProductParameters) -> LobeSize {
+    LobeSize { kept_lobes: parameters.kept_lobes, cache_capacity: 0, cached_pixels: None }
+}
+
+impl Room for ProductRoom {
+    fn check(&self, parameters: &Parameters, _depth: u32) -> Result<()> {
+        parameters.product.check()
+    }
+
+    fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
+        knob::describe(ProductParameters::KNOBS, &parameters.product)
+    }
+
+    fn demand(&self, parameters: &Parameters, _shadow_rays: u32) -> PathDemand {
+        size(&parameters.product).demand()
+    }
+
+    fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
+        let Context { scene, parameters, runner } = context;
+        let parameters = parameters.product;
+        let fits = Fits::new(runner.device(), scene, &parameters)?;
+        let steps = ProductSteps::new(parameters, fits.sizes(), runner.settings().material_kinds);
+        let paths = runner.waves().capacity();
+        let lobes = LobeBuffers::new(runner.device(), fits, size(&parameters), paths)?;
+        Ok(Box::new(Product { steps, lobes }))
+    }
+}
+
+/// `product` in one render.
+pub struct Product {
+    steps: ProductSteps,
+    lobes: LobeBuffers,
+}
+
+impl Product {
+    /// Lobes and fits on the device.
+    pub fn lobes(&self) -> &LobeBuffers {
+        &self.lobes
+    }
+}
+
+impl Technique for Product {
+    fn steps(&self) -> &dyn Steps {
+        &self.steps
+    }
+
+    fn set(&self) -> Option<&DescriptorSet> {
+        Some(self.lobes.set())
+    }
+
+    fn report(&self) -> Report {
+        report(&self.lobes)
+    }
+}
+
+/// Figures of samplers with lobes.
+pub(super) fn report(lobes: &LobeBuffers) -> Report {
+    Report {
+        host_ms: [("fits".to_owned(), lobes.fits().fit_ms())].into(),
+        buffer_bytes: lobes.buffer_bytes(),
+        fit_hashes: lobes.fits().hashes().clone(),
+        ..Report::default()
+    }
+}

@@ -1,0 +1,67 @@
+// Continues every path of the wave where light is known to arrive from: several directions are drawn
+// from the BRDF and one of them is kept, in proportion to the light that the cell has learned to arrive
+// from there (resampled importance sampling, Talbot et al. 2005). The others cost no ray and no
+// evaluation of the BRDF. It notes which cell and direction the ray will teach, for learn_arrivals.comp.
+#version 460
+
+#include "guided/arriving.glsl"
+#include "bounce.glsl"
+
+TEXELS(guide_arriving)
+UPDATES(path_cells)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+layout(constant_id = CONSTANT_BOUNCE_CANDIDATES) const uint BOUNCE_CANDIDATES = 4u;
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    if (path >= wave_path_count()) {
+        return;
+    }
+    Hit hit = hits[path];
+    if (hit.material == NO_MATERIAL) {
+        rays[path].is_active = 0u;
+        path_cells[path].teaches = NOTHING_TO_LEARN;
+        return;
+    }
+    PathIndex index = wave_path(path);
+    Material material = load_material(hit.material);
+    Frame frame = frame_from_normal(hit.shading_normal);
+    vec3 outgoing_local = to_local(frame, -rays[path].direction);
+    uint dimension = vertex_dimension();
+    // What the cells hold depends on earlier samples: the numbers are those since the last rebuild.
+    uint number = index.sample_index - wave.epoch_start;
+    vec3 u = vec3(
+        random_2d(index.pixel, number, dimension + DIMENSION_BOUNCE, wave.epoch_seed),
+        random_1d(index.pixel, number, dimension + DIMENSION_BOUNCE_LOBE, wave.epoch_seed));
+    float u_choice =
+        random_1d(index.pixel, number, dimension + DIMENSION_RESAMPLING, wave.epoch_seed);
+    // From one candidate to the next: each is stratified over the samples as the first is, and a few
+    // of them are spread over the BRDF.
+    vec3 rotation = vec3(1.0 / float(BOUNCE_CANDIDATES), 0.618034, 0.754878);
+    uint first = path_cells[path].cell * GUIDE_ARRIVAL_SIDE * GUIDE_ARRIVAL_SIDE;
+    vec3 chosen = vec3(0.0, 0.0, 1.0);
+    uint chosen_direction = 0u;
+    float chosen_light = 0.0;
+    float sum = 0.0;
+    for (uint c = 0u; c < BOUNCE_CANDIDATES; ++c) {
+        vec3 incident_local = brdf_sample(material, outgoing_local, u);
+        uint direction = arrival_direction(to_world(frame, incident_local));
+        float light = texelFetch(guide_arriving, int(first + direction)).x;
+        sum += light;
+        float probability = light / sum;
+        bool is_chosen = u_choice < probability;
+        u_choice = is_chosen ? u_choice / probability
+                             : (u_choice - probability) / max(1.0 - probability, 1e-7);
+        chosen = is_chosen ? incident_local : chosen;
+        chosen_direction = is_chosen ? direction : chosen_direction;
+        chosen_light = is_chosen ? light : chosen_light;
+        u = fract(u + rotation);
+    }
+    vec3 direction = to_world(frame, chosen);
+    vec3 factor = bounce_factor(hit, material, outgoing_local, chosen, direction)
+        * (sum / (float(BOUNCE_CANDIDATES) * chosen_light));
+    bool alive = follow_bounce(path, index, hit, direction, factor);
+    path_cells[path].teaches = alive ? first + chosen_direction : NOTHING_TO_LEARN;
+}

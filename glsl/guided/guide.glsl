@@ -1,0 +1,258 @@
+// Learned visibility: cells of the scene, regions of the environment, and directions drawn by them.
+// Twin of src/sampler/guided. Densities per steradian.
+//
+// A pass reads what earlier passes learned and nothing else, so every density here is fixed while
+// the pass runs.
+
+#ifndef GUIDE_GLSL
+#define GUIDE_GLSL
+
+#include "vertex.glsl"
+
+READS(guide)
+TEXELS(guide_table)
+TEXELS(guide_entries)
+TEXELS(guide_regions)
+TEXELS(guide_aliases)
+TEXELS(guide_region_of_cell)
+UPDATES(guide_missing)
+
+// First cells: one for each face of the cube, for places that have no cell of their own.
+const uint GUIDE_COARSE = 0x80000000u;
+
+// Offset from the first dimension of a vertex, for the choice of its cell.
+const uint DIMENSION_GUIDE_CELL = 5u;
+
+struct GuideEntry {
+    // Probability of the region divided by its share of the map's energy: the density of a guided
+    // direction is this times the density of the whole map.
+    float ratio;
+    // Cumulative probability of the regions before this one, of 65,536.
+    uint before;
+    // First region that the interval with this index, of as many equal ones, reaches into; at index
+    // 0 the last region that can be drawn.
+    uint start;
+    // Weight of a candidate by the region's visibility.
+    float visibility;
+};
+
+GuideEntry guide_entry(uint index) {
+    uvec2 words = texelFetch(guide_entries, int(index)).xy;
+    float level = float(words.y >> 26u);
+    return GuideEntry(
+        uintBitsToFloat(words.x), words.y & 0xffffu, (words.y >> 16u) & 0x3ffu,
+        exp2(-level * (10.5 / float(GUIDE_VISIBILITY_LEVELS - 1u))));
+}
+
+// Index 0 to 5 of the face of a cube that a normal points at most: +x, -x, +y, -y, +z, -z.
+uint guide_face(vec3 normal) {
+    vec3 size = abs(normal);
+    uint axis = size.x >= size.y && size.x >= size.z ? 0u : (size.y >= size.z ? 1u : 2u);
+    float along = axis == 0u ? normal.x : (axis == 1u ? normal.y : normal.z);
+    return 2u * axis + (along < 0.0 ? 1u : 0u);
+}
+
+// Level of size of the cell for a place: its edge is the finest times two to this power, from the
+// distance to the camera; `bits` blurs the levels.
+uint guide_level(vec3 position, uint bits) {
+    float wanted = min(
+        guide.largest_edge,
+        guide.edge_per_distance * distance(position, parameters.camera_position));
+    float blurred = wanted / guide.finest_edge * (1.0 + unit_float(bits));
+    return uint(clamp(int(floatBitsToUint(blurred) >> 23u) - 127, 0, 15));
+}
+
+// Key of the fine cell of a level around a place. Cells of one level are nested in those of the next.
+uint guide_key(vec3 position, uint face, uint level) {
+    float edge = guide.finest_edge * uintBitsToFloat((level + 127u) << 23u);
+    ivec3 place = ivec3(floor((position - guide.grid_origin) / edge)) & 255;
+    return uint(place.x) | (uint(place.y) << 8u) | (uint(place.z) << 16u) | (level << 24u)
+        | (face << 28u);
+}
+
+uint guide_coarse_key(uint key) {
+    return ((key >> 2u) & 0x003f3f3fu) | (key & 0x7f000000u) | GUIDE_COARSE;
+}
+
+// Finalizer of MurmurHash3 (Appleby 2011).
+uint guide_hash(uint key) {
+    key ^= key >> 16u;
+    key *= 0x85ebca6bu;
+    key ^= key >> 13u;
+    key *= 0xc2b2ae35u;
+    return key ^ (key >> 16u);
+}
+
+// Bits that choose between the two cell sizes that fit best, for one vertex of a path.
+uint guide_cell_bits(PathIndex index, uint dimension) {
+    return hash_4d(uvec4(
+        index.pixel, index.sample_index, dimension + DIMENSION_GUIDE_CELL, wave.epoch_seed)).w;
+}
+
+// Index of the cell with a key, or GUIDE_NO_KEY.
+uint guide_find(uint key) {
+    uint slot = guide_hash(key);
+    uint found = GUIDE_NO_KEY;
+    for (uint probe = 0u; probe < GUIDE_PROBES; ++probe) {
+        uvec2 words = texelFetch(guide_table, int((slot + probe) & guide.table_mask)).xy;
+        if (words.x == key) {
+            found = words.y;
+        }
+        if (words.x == key || words.x == GUIDE_NO_KEY) {
+            break;
+        }
+    }
+    return found;
+}
+
+// Notes that a cell is missing. What finds no slot is noted another time.
+void guide_note_missing(uint key) {
+    uint slot = guide_hash(key);
+    for (uint probe = 0u; probe < GUIDE_PROBES; ++probe) {
+        uint before =
+            atomicCompSwap(guide_missing[(slot + probe) & guide.missing_mask], GUIDE_NO_KEY, key);
+        if (before == GUIDE_NO_KEY || before == key) {
+            break;
+        }
+    }
+}
+
+// A cell that was found.
+struct GuideCell {
+    // Its key, or GUIDE_NO_KEY for the cell of a face.
+    uint key;
+    // Its index; from bit GUIDE_SHARE_SHIFT on its share of the BRDF, 256ths, 0 where it has none;
+    // below, GUIDE_REFINED if parts of it may be cells.
+    uint found;
+};
+
+// The cell for a place: the fine one, and of that the smallest part there is; else the coarse one
+// around it, else that of its face.
+GuideCell guide_cell(vec3 position, uint face, uint bits) {
+    uint level = guide_level(position, bits);
+    uint key = guide_key(position, face, level);
+    GuideCell cell = GuideCell(key, guide_find(key));
+    // Loops, since branches cost their body everywhere on some devices.
+    bool is_missing = cell.found == GUIDE_NO_KEY;
+    while (is_missing) {
+        guide_note_missing(key);
+        cell.key = guide_coarse_key(key);
+        cell.found = guide_find(cell.key);
+        if (cell.found == GUIDE_NO_KEY) {
+            cell = GuideCell(GUIDE_NO_KEY, face);
+        }
+        is_missing = false;
+    }
+    bool has_parts = (cell.found & GUIDE_REFINED) != 0u;
+    while (has_parts && level > 0u) {
+        level--;
+        key = guide_key(position, face, level);
+        uint found = guide_find(key);
+        has_parts = found != GUIDE_NO_KEY && (found & GUIDE_REFINED) != 0u;
+        if (found == GUIDE_NO_KEY) {
+            guide_note_missing(key);
+        } else {
+            cell = GuideCell(key, found);
+        }
+    }
+    return cell;
+}
+
+// The cell of a vertex.
+GuideCell guide_cell_of(Vertex vertex) {
+    return guide_cell(
+        vertex.hit.position, guide_face(vertex.hit.geometric_normal),
+        guide_cell_bits(vertex.index, vertex.dimension));
+}
+
+// Index of the cell that guide_cell found.
+uint guide_cell_index(GuideCell cell) {
+    return cell.found & (GUIDE_REFINED - 1u);
+}
+
+// bits * count / 2^32.
+uint scaled(uint bits, uint count) {
+    uint high;
+    uint low;
+    umulExtended(bits, count, high, low);
+    return high;
+}
+
+// A direction with its region and what the cell knows of that.
+struct Guided {
+    DirectionSample sampled;
+    uint region;
+    GuideEntry entry;
+};
+
+uint guide_word(uint index) {
+    return texelFetch(guide_entries, int(index)).y;
+}
+
+// Region by the cell's cumulative probabilities from bits.x, cell of the map by the region's alias
+// table from bits.y, direction by the bilinear patch. `first` is the index of the first entry of the
+// cell. Regions that are neighbours in the map are mostly neighbours in their order, so that
+// stratified bits give stratified directions.
+Guided draw_guided(Vertex vertex, uint first, uvec2 bits, uvec4 more_bits) {
+    Guided guided;
+    uint interval = scaled(bits.x, guide.region_count);
+    uint next = interval + 1u < guide.region_count ? interval + 1u : 0u;
+    uint low = interval > 0u ? (guide_word(first + interval) >> 16u) & 0x3ffu : 0u;
+    uint high = (guide_word(first + next) >> 16u) & 0x3ffu;
+    // The last region whose probabilities before are not above the number.
+    while (low < high) {
+        uint middle = (low + high + 1u) >> 1u;
+        if ((guide_word(first + middle) & 0xffffu) <= bits.x >> 16u) {
+            low = middle;
+        } else {
+            high = middle - 1u;
+        }
+    }
+    guided.region = low;
+    guided.entry = guide_entry(first + guided.region);
+
+    uvec4 region = texelFetch(guide_regions, int(guided.region));
+    uint count = region.y * region.z;
+    uint chosen = scaled(bits.y, count);
+    uvec2 alias = texelFetch(guide_aliases, int(region.x + chosen)).xy;
+    chosen = more_bits.z < alias.x ? chosen : alias.y;
+    // chosen / columns without an integer division.
+    uint row = uint(float(chosen) / float(region.y));
+    int column = int(chosen) - int(row * region.y);
+    row = column < 0 ? row - 1u : (column >= int(region.y) ? row + 1u : row);
+    column += column < 0 ? int(region.y) : (column >= int(region.y) ? -int(region.y) : 0);
+
+    EnvironmentSample light = environment_sample_cell(
+        (region.w & 0xffffu) + uint(column), (region.w >> 16u) + row,
+        vec2(unit_float(more_bits.x), unit_float(more_bits.y)));
+    // A black map has a density of 0 over 0.
+    light.pdf = parameters.environment_total > 0.0 ? light.pdf : 0.0;
+    guided.sampled = evaluate_direction(
+        vertex, light.direction, to_local(vertex.frame, light.direction), light.radiance,
+        light.pdf);
+    return guided;
+}
+
+// A direction, and where it meets the partition.
+Guided locate_guided(uint first, DirectionSample sampled) {
+    Guided guided;
+    guided.sampled = sampled;
+    EnvironmentLocation location = environment_locate(guided.sampled.direction);
+    guided.region = texelFetch(
+        guide_region_of_cell,
+        int(location.row * parameters.environment_width + location.column)).x;
+    guided.entry = guide_entry(first + guided.region);
+    return guided;
+}
+
+// A direction from the BRDF.
+Guided draw_brdf_guided(Vertex vertex, uint first, vec3 u) {
+    return locate_guided(first, draw_from_brdf(vertex, u));
+}
+
+// Density of guided directions.
+float guided_pdf(Guided guided) {
+    return guided.entry.ratio * guided.sampled.environment_pdf;
+}
+
+#endif

@@ -1,0 +1,45 @@
+// Counts every shadow ray that teaches, and whether it reached the environment, into the cell and
+// region that sample_guided.comp noted, and of those that did, their response and what they say about
+// the share of the BRDF. The counts are read between passes only. Long after a rebuild every fourth
+// sample is enough.
+#version 460
+
+#include "divide.glsl"
+#include "wave.glsl"
+
+READS(visibility)
+READS(guide)
+READS(learn_targets)
+UPDATES(guide_counts)
+UPDATES(guide_shares)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+void main() {
+    uint ray = gl_GlobalInvocationID.x;
+    if (ray >= wave.pixel_count * wave.sample_count * wave.shadow_ray_count) {
+        return;
+    }
+    uint sample_of_wave = divide(divide(ray, wave.pixel_count).x, wave.sample_count).y;
+    uint since_rebuild = wave.first_sample + sample_of_wave - wave.epoch_start;
+    if (since_rebuild >= GUIDE_SAMPLES_THAT_ALL_TEACH && since_rebuild % GUIDE_TEACHING_STEP != 0u) {
+        return;
+    }
+    uvec2 target = learn_targets[ray];
+    if (target.x != NOTHING_TO_LEARN) {
+        uint count = GUIDE_COUNT_WORDS * target.x;
+        atomicAdd(guide_counts[count], 1u);
+        if (visibility[ray] != 0u) {
+            atomicAdd(guide_counts[count + 1u], 1u);
+            atomicAdd(guide_counts[count + 2u], target.y >> LEARN_RESPONSE_SHIFT);
+            uint from_brdf = (target.y >> LEARN_FROM_BRDF_SHIFT) & NO_SHARE_TO_LEARN;
+            if (from_brdf != NO_SHARE_TO_LEARN) {
+                uint cell = target.x / guide.region_count;
+                uint octave = cell * GUIDE_SHARE_OCTAVES
+                    + (target.y & ((1u << LEARN_FROM_BRDF_SHIFT) - 1u));
+                atomicAdd(guide_shares[2u * octave], 1u);
+                atomicAdd(guide_shares[2u * octave + 1u], from_brdf);
+            }
+        }
+    }
+}

@@ -1,0 +1,33 @@
+// Counts every bounce ray into the cell that it left and its direction, with the light that the cell
+// where it arrived reflects of what it learned; none where it left the scene. Samples teach as in
+// learn.comp.
+#version 460
+
+#include "divide.glsl"
+#include "wave.glsl"
+
+READS(path_cells)
+TEXELS(guide_reflected)
+UPDATES(guide_arrivals)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    if (path >= wave.pixel_count * wave.sample_count) {
+        return;
+    }
+    uint since_rebuild =
+        wave.first_sample + divide(path, wave.pixel_count).x - wave.epoch_start;
+    if (since_rebuild >= GUIDE_SAMPLES_THAT_ALL_TEACH && since_rebuild % GUIDE_TEACHING_STEP != 0u) {
+        return;
+    }
+    PathCell found = path_cells[path];
+    if (found.teaches != NOTHING_TO_LEARN) {
+        atomicAdd(guide_arrivals[2u * found.teaches], 1u);
+        if (found.cell != NOTHING_TO_LEARN) {
+            uint light = texelFetch(guide_reflected, int(found.cell)).x;
+            atomicAdd(guide_arrivals[2u * found.teaches + 1u], light);
+        }
+    }
+}

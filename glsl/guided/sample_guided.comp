@@ -1,0 +1,202 @@
+// Chooses directions at every hit of the wave by learned visibility: as sample.comp, it writes one
+// shadow ray for each with what it brings if nothing is in the way. It also says which count each
+// ray belongs to, for learn.comp, and which cells are missing.
+//
+// What the cells hold depends on earlier samples of the same pixels, so a sequence must not continue
+// across a rebuild: it starts anew, with another scramble, after each. Samples between two rebuilds
+// read the same cells, which makes it legal to stratify them.
+#version 460
+
+#include "guided/candidates.glsl"
+
+WRITES(learn_targets)
+UPDATES(path_cells)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+// Offsets of dimensions from the first of a vertex, for independent numbers.
+const uint DIMENSION_GUIDE_TECHNIQUE = 6u;
+const uint DIMENSION_GUIDE_RESAMPLING = 7u;
+
+// Share of candidates chosen without regard to visibility.
+const float UNGUIDED_CHOICE = 0.1;
+
+// Share of the rays that sample the BRDF in the one-sample model where the cell has learned none, in
+// 256ths.
+uint brdf_share(Material material) {
+    uint share = 77u;
+    if (is_kind(material, MATERIAL_DIFFUSE)) {
+        share = 26u;
+    } else if (!is_kind(material, MATERIAL_MEASURED)) {
+        share = material.alpha > 0.3 ? 26u : (material.alpha > 0.1 ? 77u : 128u);
+    }
+    return share;
+}
+
+// Least share at vertices that the camera does not see, 256ths: their cells hold few rays, and what is
+// bright to the BRDF and blocked to the guide weighs as much as the path does.
+const uint LEAST_LATER_SHARE = 40u;
+
+// Writes a ray that brings integrand * factor, and what it will teach. `from_brdf` is the part of its
+// density that is the BRDF's, in 256ths, of the one-sample model. There, at what the camera sees, a
+// direction that brings nothing, mostly since it is below the horizon, is not traced and counts as
+// blocked; candidates are not known to be so one by one, and at later vertices the rays in its place were
+// not worth their time (docs/guided.md).
+void finish(uint index, uint first, Guided guided, float factor, uint from_brdf) {
+    vec3 contribution = guided.sampled.integrand * factor;
+    write_ray(index, guided.sampled.direction, contribution);
+    int exponent = int(floatBitsToUint(luminance(contribution)) >> 23u) - 127;
+    uint octave = uint(clamp(
+        exponent + int(GUIDE_SHARE_OCTAVES / 2u), 0, int(GUIDE_SHARE_OCTAVES) - 1));
+    // BRDF * cosine, weighed by the colours of the light: luminance is that of the map's density but for
+    // how sin(theta) varies within a row.
+    float light = guided.sampled.environment_pdf * parameters.environment_total * 2.0 * PI * PI;
+    float response = light > 0.0 ? luminance(guided.sampled.integrand) / light : 0.0;
+    uint response_units = uint(clamp(
+        response * float(GUIDE_RESPONSE_UNITS) + 0.5, 1.0, float(GUIDE_RESPONSE_MOST)));
+    bool teaches =
+        contribution != vec3(0.0) || (CANDIDATES == 1u && wave.vertex == 0u);
+    learn_targets[index] = uvec2(
+        teaches ? first + guided.region : NOTHING_TO_LEARN,
+        octave | (CANDIDATES == 1u ? from_brdf : NO_SHARE_TO_LEARN) << LEARN_FROM_BRDF_SHIFT
+            | response_units << LEARN_RESPONSE_SHIFT);
+}
+
+// A ray of the one-sample model: balance heuristic over BRDF and guide.
+void finish_one(uint index, uint first, Guided guided, float share) {
+    float pdf = share * guided.sampled.brdf_pdf + (1.0 - share) * guided_pdf(guided);
+    float factor = pdf > 0.0 ? 1.0 / pdf : 0.0;
+    uint from_brdf = uint(256.0 * min(share * guided.sampled.brdf_pdf * factor, 1.0) + 0.5);
+    finish(index, first, guided, factor, from_brdf);
+}
+
+// One of the candidates seen so far. It is chosen with the probability
+// 0.9 guided / guided_sum + 0.1 unguided / unguided_sum: bounded estimates where the guide is wrong.
+struct Reservoir {
+    Guided chosen;
+    float chosen_pdf;
+    float chosen_guided;
+    float chosen_unguided;
+    float guided_sum;
+    float unguided_sum;
+    bool is_unguided;
+    float u;
+};
+
+void add_to(inout Reservoir reservoir, Guided candidate) {
+    float pdf = candidates_pdf(candidate);
+    float unguided = pdf > 0.0 ? luminance(candidate.sampled.integrand) / pdf : 0.0;
+    float guided = unguided * candidate.entry.visibility;
+    reservoir.guided_sum += guided;
+    reservoir.unguided_sum += unguided;
+    float weight = reservoir.is_unguided ? unguided : guided;
+    float sum = reservoir.is_unguided ? reservoir.unguided_sum : reservoir.guided_sum;
+    if (weight > 0.0) {
+        float probability = weight / sum;
+        if (reservoir.u < probability) {
+            reservoir.u /= probability;
+            reservoir.chosen = candidate;
+            reservoir.chosen_pdf = pdf;
+            reservoir.chosen_guided = guided;
+            reservoir.chosen_unguided = unguided;
+        } else {
+            reservoir.u = (reservoir.u - probability) / (1.0 - probability);
+        }
+    }
+}
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    uint path_count = wave_path_count();
+    if (path >= path_count) {
+        return;
+    }
+    Hit hit = load_hit(path);
+    if (hit.material == NO_MATERIAL) {
+        for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
+            learn_targets[i * path_count + path] = uvec2(NOTHING_TO_LEARN);
+        }
+        path_cells[path].cell = NOTHING_TO_LEARN;
+        return;
+    }
+    Vertex vertex = load_vertex(path, hit);
+    GuideCell found = guide_cell_of(vertex);
+    uint cell = guide_cell_index(found);
+    // For the bounce that arrived here and the one that leaves.
+    path_cells[path].cell = cell;
+    uint learned_share = found.found >> GUIDE_SHARE_SHIFT;
+    uint first = cell * guide.region_count;
+    // Rays are numbered through all samples since the rebuild, since they share one sequence.
+    uint first_ray = (vertex.index.sample_index - wave.epoch_start) * wave.total_shadow_rays
+        + wave.first_shadow_ray;
+
+    if (CANDIDATES == 1u) {
+        // The techniques take turns in proportion to their shares, from a random start, so that ray k
+        // is from the BRDF with exactly that probability and both sequences are used without gaps.
+        // The start is shared by a block of 8x8 pixels, and each technique has its own loop: devices
+        // that run both sides of a branch then run one technique per ray.
+        uint share = learned_share > 0u ? learned_share : brdf_share(vertex.material);
+        share = wave.vertex > 0u ? max(share, LEAST_LATER_SHARE) : share;
+        uvec2 block = uvec2(
+            vertex.index.pixel % parameters.film_width, vertex.index.pixel / parameters.film_width)
+            / FILM_BLOCK;
+        uint start = hash_4d(uvec4(
+            block, vertex.dimension + DIMENSION_GUIDE_TECHNIQUE, wave.epoch_seed)).x & 255u;
+        uint before = (first_ray * share + start) >> 8u;
+        uint from_brdf = 0u;
+        for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
+            uint sum = ((first_ray + i) * share + start) & 255u;
+            from_brdf |= sum + share >= 256u ? 1u << i : 0u;
+        }
+        float probability = float(share) * (1.0 / 256.0);
+        uint index = before;
+        uint left = from_brdf;
+        while (left != 0u) {
+            uint i = uint(findLSB(left));
+            left &= left - 1u;
+            Guided guided = draw_brdf_candidate(vertex, first, index);
+            index++;
+            finish_one(i * path_count + path, first, guided, probability);
+        }
+        index = first_ray - before;
+        left = ~from_brdf & ((1u << wave.shadow_ray_count) - 1u);
+        while (left != 0u) {
+            uint i = uint(findLSB(left));
+            left &= left - 1u;
+            Guided guided = draw_candidate(vertex, first, index);
+            index++;
+            finish_one(i * path_count + path, first, guided, probability);
+        }
+    } else {
+        for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
+            uvec2 bits = epoch_bits(vertex, first_ray + i, DIMENSION_GUIDE_RESAMPLING);
+            Reservoir reservoir;
+            reservoir.chosen.sampled = DirectionSample(vec3(0.0), vec3(0.0), 0.0, 0.0);
+            reservoir.chosen.region = 0u;
+            reservoir.chosen.entry = GuideEntry(0.0, 0u, 0u, 0.0);
+            reservoir.chosen_pdf = 0.0;
+            reservoir.chosen_guided = 0.0;
+            reservoir.chosen_unguided = 0.0;
+            reservoir.guided_sum = 0.0;
+            reservoir.unguided_sum = 0.0;
+            reservoir.is_unguided = unit_float(bits.x) < UNGUIDED_CHOICE;
+            reservoir.u = unit_float(bits.y);
+            for (uint c = 0u; c < BRDF_CANDIDATES; ++c) {
+                uint index = (first_ray + i) * BRDF_CANDIDATES + c;
+                add_to(reservoir, draw_brdf_candidate(vertex, first, index));
+            }
+            for (uint c = 0u; c < CANDIDATES - BRDF_CANDIDATES; ++c) {
+                uint index = (first_ray + i) * (CANDIDATES - BRDF_CANDIDATES) + c;
+                add_to(reservoir, draw_candidate(vertex, first, index));
+            }
+            float factor = 0.0;
+            if (reservoir.chosen_unguided > 0.0 && reservoir.guided_sum > 0.0) {
+                float chance =
+                    (1.0 - UNGUIDED_CHOICE) * reservoir.chosen_guided / reservoir.guided_sum
+                    + UNGUIDED_CHOICE * reservoir.chosen_unguided / reservoir.unguided_sum;
+                factor = 1.0 / (float(CANDIDATES) * reservoir.chosen_pdf * chance);
+            }
+            finish(i * path_count + path, first, reservoir.chosen, factor, 0u);
+        }
+    }
+}

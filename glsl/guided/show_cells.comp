@@ -1,0 +1,45 @@
+// Adds to the film which cells of learned visibility the first hits of the wave's paths find, where
+// asked for: a colour for each cell, and whether it was that of its face, a coarse or a fine one.
+#version 460
+
+#include "guided/guide.glsl"
+
+UPDATES(film_guide_cell)
+UPDATES(film_guide_level)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+// Stands for the cell of a face, which has no key: cells have a lower number for their face.
+const uint FACE_KEY = 0xf0000000u;
+
+// Three bytes of the key's hash, in 256ths, whose sums are exact.
+vec3 colour_of(uint key) {
+    uint hash = guide_hash(key);
+    return vec3(uvec3(hash, hash >> 8u, hash >> 16u) & 255u) * (1.0 / 256.0);
+}
+
+void main() {
+    uint pixel = gl_GlobalInvocationID.x;
+    PathIndex index = wave_pixel(wave_film_position(pixel));
+    if (pixel >= wave.pixel_count || !index.inside) {
+        return;
+    }
+    vec3 colour = film_guide_cell[index.film_index];
+    vec3 level = film_guide_level[index.film_index];
+    for (uint i = 0u; i < wave.sample_count; ++i) {
+        HitOrigin hit = load_hit_origin(i * wave.pixel_count + pixel);
+        if (hit.material == NO_MATERIAL) {
+            continue;
+        }
+        index.sample_index = wave.first_sample + i;
+        uint face = guide_face(hit.geometric_normal);
+        uint key =
+            guide_cell(hit.position, face, guide_cell_bits(index, vertex_dimension())).key;
+        bool is_face = key == GUIDE_NO_KEY;
+        bool is_coarse = !is_face && (key & GUIDE_COARSE) != 0u;
+        colour += colour_of(is_face ? FACE_KEY | face : key);
+        level += vec3(is_face, is_coarse, !is_face && !is_coarse);
+    }
+    film_guide_cell[index.film_index] = colour;
+    film_guide_level[index.film_index] = level;
+}

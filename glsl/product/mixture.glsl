@@ -1,0 +1,142 @@
+// The mixture that `product` and `visibility` draw directions from at one vertex: the lobes of the
+// product by their weights in force, the environment's own sampling and the BRDF's. Algorithm 5.1 of
+// [Wu & Shih 2009]. All densities per steradian. The entry point declares visibility_cache.
+//
+// Deviation: elevations by inversion of the closed form; the Metropolis walk of the thesis is an
+// option, and biased.
+
+#ifndef MIXTURE_GLSL
+#define MIXTURE_GLSL
+
+#include "vertex.glsl"
+#include "visibility/weights.glsl"
+
+WRITES(close_lobes)
+
+layout(constant_id = CONSTANT_BRDF_SHARE) const float BRDF_SHARE = 0.25;
+layout(constant_id = CONSTANT_ENVIRONMENT_SHARE) const float ENVIRONMENT_SHARE = 0.25;
+layout(constant_id = CONSTANT_METROPOLIS) const uint METROPOLIS = 0u;
+
+const uint WALK_STEPS = 16u;
+
+// The weights in force at one vertex.
+struct Mixture {
+    Lobes lobes;
+    // Sum of the weights of the lobes.
+    float total;
+    // Probabilities of the three techniques.
+    float lobe_share;
+    float environment_share;
+    float brdf_share;
+};
+
+// What one direction is drawn with, each in [0, 1).
+struct MixtureNumbers {
+    float technique;
+    vec2 direction;
+    float lobe;
+};
+
+// The mixture at a path; `film_index` matters where caches belong to pixels.
+Mixture load_mixture(uint path, uint path_count, uint film_index) {
+    Mixture mixture = Mixture(load_lobes(path, path_count, film_index), 0.0, 0.0, 0.0, 0.0);
+    mixture.total = mixture.lobes.count > 0u
+        ? sum_of_stretch(mixture.lobes, (mixture.lobes.count - 1u) / LOBES_PER_SUM)
+        : 0.0;
+    // Without lobes or in the dark the BRDF's own sampling is left.
+    float lobe_share = mixture.total > 0.0 ? 1.0 - BRDF_SHARE - ENVIRONMENT_SHARE : 0.0;
+    float environment_share = parameters.environment_total > 0.0 ? ENVIRONMENT_SHARE : 0.0;
+    float brdf_share = lobe_share + environment_share + BRDF_SHARE > 0.0 ? BRDF_SHARE : 1.0;
+    float shares = lobe_share + environment_share + brdf_share;
+    mixture.lobe_share = lobe_share / shares;
+    mixture.environment_share = environment_share / shares;
+    mixture.brdf_share = brdf_share / shares;
+    return mixture;
+}
+
+// 1 - cos of the elevation by a random walk, as in the thesis; biased, since the walk is short.
+float walk(Vertex vertex, uint ray, float bandwidth) {
+    float x = min(1.0 / max(bandwidth, 1e-3), 1.0);
+    float stride = min(3.0 / max(bandwidth, 1e-3), 2.0);
+    uint dimension = DIMENSION_WALK + (wave.vertex * 4096u + ray) * WALK_STEPS;
+    for (uint step = 0u; step < WALK_STEPS; ++step) {
+        vec2 u = random_independent_2d(
+            vertex.index.pixel, vertex.index.sample_index, dimension + step, wave.seed);
+        float proposed = abs(x + stride * (2.0 * u.x - 1.0));
+        proposed = proposed > 2.0 ? 4.0 - proposed : proposed;
+        x = u.y < exp(bandwidth * (x - proposed)) ? proposed : x;
+    }
+    return clamp(x, 0.0, 2.0);
+}
+
+vec3 draw_from_lobe(Vertex vertex, uint ray, ProductLobe lobe, vec2 u) {
+    if (METROPOLIS == 0u) {
+        return kernel_sample(lobe.axis, lobe.bandwidth, u);
+    }
+    float x = walk(vertex, ray, lobe.bandwidth);
+    vec2 azimuth = sin_cos_pi(2.0 * u.y) * sqrt(x * (2.0 - x));
+    vec3 tangent;
+    vec3 bitangent;
+    lobe_frame(lobe.axis, tangent, bitangent);
+    return (1.0 - x) * lobe.axis + azimuth.y * tangent + azimuth.x * bitangent;
+}
+
+// Direction of one ray of the vertex, in the world. Directions below the horizon bring nothing.
+vec3 mixture_sample(Vertex vertex, Mixture mixture, uint ray, MixtureNumbers numbers) {
+    bool from_lobe = numbers.technique < mixture.lobe_share;
+    bool from_environment =
+        !from_lobe && numbers.technique < mixture.lobe_share + mixture.environment_share;
+    vec3 direction = vertex.frame.normal;
+    // Loops of one round instead of branches: devices that run both sides of a branch skip them.
+    for (uint once = from_lobe ? 1u : 0u; once > 0u; --once) {
+        uint l = find_lobe(mixture.lobes, numbers.lobe * mixture.total);
+        ProductLobe lobe = unpack_lobe(lobe_words(mixture.lobes, l));
+        direction = draw_from_lobe(vertex, ray, lobe, numbers.direction);
+    }
+    for (uint once = from_environment ? 1u : 0u; once > 0u; --once) {
+        direction = environment_sample(numbers.direction).direction;
+    }
+    for (uint once = from_lobe || from_environment ? 0u : 1u; once > 0u; --once) {
+        direction = to_world(
+            vertex.frame,
+            brdf_sample(
+                vertex.material, vertex.outgoing_local, vec3(numbers.direction, numbers.lobe)));
+    }
+    return direction;
+}
+
+// Density of the lobes alone, with the weights in force; 0 without lobes. Where `is_noted`, notes which
+// lobes the direction is close to, for the case that it is recorded.
+float mixture_lobe_density(Mixture mixture, vec3 direction, bool is_noted) {
+    Lobes lobes = mixture.lobes;
+    float density = 0.0;
+    for (uint word = 0u; 32u * word < lobes.count; ++word) {
+        load_counts(lobes, word);
+        uint mask = 0u;
+        uint end = min(lobes.count - 32u * word, 32u);
+        for (uint bit = 0u; bit < end; ++bit) {
+            ProductLobe lobe = unpack_lobe(lobe_words(lobes, 32u * word + bit));
+            float distance = distance_from_axis(lobe.axis, direction);
+            float tail = exp(-2.0 * lobe.bandwidth);
+            density += lobe.weight * counted_weight(bit) * lobe.bandwidth / (1.0 - tail)
+                * exp(-lobe.bandwidth * distance);
+            if (CACHE_CAPACITY > 0u) {
+                mask |= is_close(lobe.bandwidth, tail, distance) ? 1u << bit : 0u;
+            }
+        }
+        if (CACHE_CAPACITY > 0u && is_noted) {
+            close_lobes[close_lobes_index(lobes.path, lobes.path_count, lobes.recorded, word)] =
+                mask;
+        }
+    }
+    return mixture.total > 0.0 ? density / (2.0 * SRBF_PI * mixture.total) : 0.0;
+}
+
+// Density of the whole mixture at a direction for which the lobes alone have `lobe_density`.
+float mixture_pdf(Mixture mixture, DirectionSample sampled, float lobe_density) {
+    return mixture.lobe_share * lobe_density
+        + mixture.environment_share * sampled.environment_pdf
+        + mixture.brdf_share * sampled.brdf_pdf;
+}
+
+#endif

@@ -1,0 +1,30 @@
+// Adds to the film how many directions the visibility cache of every hit holds after the last of its
+// rays, where asked for: visibility_cache -> film_cache_entries.
+#version 460
+
+#include "load.glsl"
+#include "visibility/cache.glsl"
+#include "wave.glsl"
+
+READS(visibility_cache)
+UPDATES(film_cache_entries)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+void main() {
+    uint pixel = gl_GlobalInvocationID.x;
+    PathIndex index = wave_pixel(wave_film_position(pixel));
+    if (pixel >= wave.pixel_count || !index.inside) {
+        return;
+    }
+    uvec2 entries_and_hits = film_cache_entries[index.film_index];
+    for (uint i = 0u; i < wave.sample_count; ++i) {
+        uint path = i * wave.pixel_count + pixel;
+        if (load_hit_origin(path).material == NO_MATERIAL) {
+            continue;
+        }
+        uint recorded = visibility_cache[cache_head(path, index.film_index)] & ~CACHE_GROWN;
+        entries_and_hits += uvec2(min(recorded, CACHE_CAPACITY), 1u);
+    }
+    film_cache_entries[index.film_index] = entries_and_hits;
+}

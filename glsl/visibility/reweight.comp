@@ -1,0 +1,109 @@
+// Adds up the weights of the lobes at every hit whose visibility cache has grown: lobes,
+// visibility_cache, close_lobes -> lobe_sums. [Wu & Shih 2009], section 4.2. Weights themselves are
+// worked out where lobes are chosen, see weights.glsl.
+//
+// The first ray of a sample finds in the cache of its pixel what earlier samples recorded: it is then
+// worked out which lobes each entry is close to.
+#version 460
+
+#include "layout.glsl"
+
+WRITES(lobe_sums)
+UPDATES(visibility_cache)
+WRITES(close_lobes)
+UPDATES(counters)
+
+#include "visibility/weights.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+// No array without elements in the passes of a sampler without a cache.
+const uint PLACES = CACHE_CAPACITY > 0u ? CACHE_CAPACITY : 1u;
+
+void write_sum(Lobes lobes, uint l, float sum) {
+    for (uint once = is_sum_kept(l, lobes.count) ? 1u : 0u; once > 0u; --once) {
+        lobe_sums[l / LOBES_PER_SUM * lobes.path_count + lobes.path] = sum;
+    }
+}
+
+// Adds up the weights in force, in the order in which lobes are chosen.
+void sum_weights(Lobes lobes) {
+    float sum = 0.0;
+    for (uint word = 0u; 32u * word < lobes.count; ++word) {
+        load_counts(lobes, word);
+        uint end = min(lobes.count - 32u * word, 32u);
+        for (uint bit = 0u; bit < end; ++bit) {
+            sum += weight_of_words(lobe_words(lobes, 32u * word + bit)) * counted_weight(bit);
+            write_sum(lobes, 32u * word + bit, sum);
+        }
+    }
+}
+
+// Adds up the weights with all entries tested against all lobes; notes which are close.
+void sum_with_all_entries(Lobes lobes) {
+    uint entries = min(lobes.recorded, CACHE_CAPACITY);
+    vec3 directions[PLACES];
+    uint masks[PLACES];
+    for (uint i = 0u; i < CACHE_CAPACITY; ++i) {
+        uint entry = lobes.recorded - 1u - min(i, lobes.recorded - 1u);
+        directions[i] =
+            unpack_normal(visibility_cache[lobes.head + 1u + entry % CACHE_CAPACITY]);
+    }
+    float sum = 0.0;
+    for (uint word = 0u; 32u * word < lobes.count; ++word) {
+        for (uint i = 0u; i < CACHE_CAPACITY; ++i) {
+            masks[i] = 0u;
+        }
+        uint end = min(lobes.count - 32u * word, 32u);
+        for (uint bit = 0u; bit < end; ++bit) {
+            ProductLobe lobe = unpack_lobe(lobe_words(lobes, 32u * word + bit));
+            float tail = exp(-2.0 * lobe.bandwidth);
+            float close_count = 0.0;
+            for (uint i = 0u; i < CACHE_CAPACITY; ++i) {
+                bool close = i < entries
+                    && is_close(
+                        lobe.bandwidth, tail, distance_from_axis(lobe.axis, directions[i]));
+                masks[i] |= close ? 1u << bit : 0u;
+                close_count += close ? 1.0 : 0.0;
+            }
+            sum += lobe.weight * visibility_weight(close_count);
+            write_sum(lobes, 32u * word + bit, sum);
+        }
+        for (uint i = 0u; i < entries; ++i) {
+            close_lobes[close_lobes_index(
+                lobes.path, lobes.path_count, lobes.recorded - 1u - i, word)] = masks[i];
+        }
+    }
+}
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    uint path_count = wave_path_count();
+    if (path >= path_count) {
+        return;
+    }
+    uint film_index = 0u;
+    if (CACHE_OF_PIXEL != 0u) {
+        PathIndex index = wave_path(path);
+        if (!index.inside) {
+            return;
+        }
+        film_index = index.film_index;
+    }
+    Lobes lobes = load_lobes(path, path_count, film_index);
+    if (lobes.count == 0u || lobes.recorded == 0u) {
+        return;
+    }
+    bool is_new = CACHE_OF_PIXEL != 0u && wave.first_shadow_ray == 0u;
+    bool has_grown = (visibility_cache[lobes.head] & CACHE_GROWN) != 0u;
+    if (!has_grown && !is_new) {
+        return;
+    }
+    if (is_new) {
+        sum_with_all_entries(lobes);
+    } else {
+        sum_weights(lobes);
+    }
+    visibility_cache[lobes.head] = lobes.recorded;
+    atomicAdd(counters.cdf_rebuilds, 1u);
+}

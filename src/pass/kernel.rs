@@ -1,0 +1,86 @@
+//! A pass as data: which shader runs, specialized how, over what.
+
+use std::sync::Arc;
+
+use crate::{
+    error::Result,
+    gpu::{Commands, DescriptorSet, Device, Pipeline},
+    shader::{constants::WORKGROUP_SIZE, spirv, structs::Wave},
+};
+
+/// What the invocations of a pass run over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Domain {
+    /// Paths of the wave.
+    Paths,
+    /// Pixels of the wave.
+    Pixels,
+    /// Shadow rays of one group.
+    ShadowRays,
+}
+
+/// A compute shader with its specialization. Its shader names the pass in debug tools and timings.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Kernel {
+    /// Name of the `.comp` file.
+    pub shader: &'static str,
+    /// Specialization constants: identifier and 32-bit value.
+    pub constants: Vec<(u32, u32)>,
+    /// What the invocations run over.
+    pub domain: Domain,
+    /// Elements of the domain that one invocation takes, 1 to 32.
+    pub per_invocation: u32,
+}
+
+impl Kernel {
+    /// A kernel with one invocation per element of `domain`.
+    pub fn new(shader: &'static str, domain: Domain, constants: &[(u32, u32)]) -> Self {
+        Self { shader, constants: constants.to_vec(), domain, per_invocation: 1 }
+    }
+
+    /// Number of invocations for a wave, at least one: an empty wave still makes the driver compile.
+    pub fn invocations(&self, wave: &Wave) -> u32 {
+        let elements = match self.domain {
+            Domain::Paths => wave.pixel_count * wave.sample_count,
+            Domain::Pixels => wave.pixel_count,
+            Domain::ShadowRays => wave.pixel_count * wave.sample_count * wave.shadow_ray_count,
+        };
+        if self.per_invocation == 1 {
+            return elements.max(1);
+        }
+        elements.div_ceil(WORKGROUP_SIZE * self.per_invocation).max(1) * WORKGROUP_SIZE
+    }
+}
+
+/// A kernel and the push constants it runs with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dispatch {
+    /// Shader and specialization.
+    pub kernel: Kernel,
+    /// Push constants.
+    pub wave: Wave,
+}
+
+/// A kernel compiled for a device.
+pub struct Pass {
+    kernel: Kernel,
+    pipeline: Pipeline,
+}
+
+impl Pass {
+    /// Compiles `kernel`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Vulkan`] if the driver refuses it.
+    pub fn new(device: &Arc<Device>, kernel: Kernel) -> Result<Self> {
+        let spirv = spirv::pass(kernel.shader);
+        let pipeline = Pipeline::new(device, kernel.shader, spirv, &kernel.constants)?;
+        Ok(Self { kernel, pipeline })
+    }
+
+    /// Records the pass over `wave`, with those of `sets` that its shader uses.
+    pub fn record(&self, commands: &mut Commands, sets: &[&DescriptorSet], wave: &Wave) {
+        let invocations = self.kernel.invocations(wave);
+        commands.dispatch(&self.pipeline, sets, bytemuck::bytes_of(wave), invocations);
+    }
+}

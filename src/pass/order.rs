@@ -1,0 +1,102 @@
+//! The order of the passes of one wave, as data.
+
+use super::{
+    geometry::{Schedule, Traversal},
+    kernel::{Dispatch, Domain, Kernel},
+    technique::Steps,
+};
+use crate::shader::{
+    constants::{
+        AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, CONSTANT_MATERIAL_KINDS, CONSTANT_ROULETTE_VERTEX,
+    },
+    structs::Wave,
+};
+
+/// Bits of [`Wave::aovs`] that the pass `features` writes.
+const FEATURES: u32 = AOV_ALBEDO | AOV_NORMAL | AOV_POSITION;
+
+/// What shapes the passes of a render, apart from its technique.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PassSettings {
+    /// Shadow rays per hit; 0 renders the environment that the camera sees and nothing else.
+    pub shadow_rays: u32,
+    /// Path vertices at which environment light is gathered.
+    pub depth: u32,
+    /// Bits `AOV_…`.
+    pub aovs: u32,
+    /// First vertex at which russian roulette may end a path.
+    pub roulette_vertex: u32,
+    /// Bit `1 << kind` for every kind of material in the scene.
+    pub material_kinds: u32,
+    /// Specialization of the passes that traverse.
+    pub traversal: Traversal,
+    /// How rays that part soon are shared out.
+    pub incoherent: Schedule,
+}
+
+/// Returns the dispatches of one wave for the first `vertices` vertices of its paths.
+pub fn wave_order(
+    settings: &PassSettings,
+    steps: &dyn Steps,
+    wave: Wave,
+    vertices: u32,
+) -> Vec<Dispatch> {
+    let PassSettings { roulette_vertex, material_kinds, traversal, incoherent, .. } = *settings;
+    let mut order = Vec::new();
+    let mut add = |kernel: Kernel, wave: &Wave| order.push(Dispatch { kernel, wave: *wave });
+    let mut wave = Wave { aovs: settings.aovs, ..wave };
+
+    add(Kernel::new("camera", Domain::Paths, &[]), &wave);
+    for vertex in 0..vertices {
+        wave.vertex = vertex;
+        wave.total_shadow_rays = steps.shadow_rays_at(vertex, settings.shadow_rays);
+        // Camera rays stay together, bounce rays part at once.
+        let schedule = if vertex == 0 { Schedule::SINGLE } else { incoherent };
+        add(traversal.trace(schedule), &wave);
+
+        wave.first_shadow_ray = 0;
+        if wave.total_shadow_rays > 0 {
+            for kernel in steps.prepare(&wave) {
+                add(kernel, &wave);
+            }
+        }
+        loop {
+            let left = wave.total_shadow_rays - wave.first_shadow_ray;
+            wave.shadow_ray_count = left.min(steps.rays_per_group());
+            if wave.shadow_ray_count > 0 {
+                for kernel in steps.sample(&wave) {
+                    add(kernel, &wave);
+                }
+                add(traversal.shadow(incoherent), &wave);
+                for kernel in steps.after_shadow_rays(&wave) {
+                    add(kernel, &wave);
+                }
+            }
+            add(Kernel::new("gather", Domain::Paths, &[]), &wave);
+            if wave.first_shadow_ray + wave.shadow_ray_count >= wave.total_shadow_rays {
+                break;
+            }
+            wave.first_shadow_ray += wave.shadow_ray_count;
+        }
+        for kernel in steps.finish(&wave) {
+            add(kernel, &wave);
+        }
+        if vertex == 0 && wave.aovs & FEATURES != 0 && wave.is_training == 0 {
+            let constants = [(CONSTANT_MATERIAL_KINDS, material_kinds)];
+            add(Kernel::new("features", Domain::Pixels, &constants), &wave);
+        }
+        if vertex + 1 < vertices {
+            let guided = if wave.total_shadow_rays > 0 { steps.bounce(&wave) } else { None };
+            let bounce = guided.unwrap_or_else(|| {
+                let constants = [
+                    (CONSTANT_ROULETTE_VERTEX, roulette_vertex),
+                    (CONSTANT_MATERIAL_KINDS, material_kinds),
+                ];
+                Kernel::new("bounce", Domain::Paths, &constants)
+            });
+            add(bounce, &wave);
+        }
+    }
+    add(Kernel::new("accumulate", Domain::Pixels, &[]), &wave);
+    order
+}

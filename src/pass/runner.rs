@@ -1,0 +1,267 @@
+//! Runs waves of paths over the film: records their passes, times them, and sizes the next wave.
+
+use std::{
+    collections::{BTreeMap, btree_map::Entry},
+    sync::Arc,
+    time::Instant,
+};
+
+use super::{
+    film_buffers::{BLOCK_PIXELS, FilmBuffers},
+    kernel::{Dispatch, Kernel, Pass},
+    order::{PassSettings, wave_order},
+    scene_buffers::SceneBuffers,
+    technique::{PathDemand, SHADOW_RAYS_PER_GROUP, Steps, Technique},
+    totals::Totals,
+    wave_buffers::WaveBuffers,
+};
+use crate::{
+    error::Result,
+    film::Sums,
+    gpu::{Commands, DescriptorSet, Device, PassTimes},
+    shader::structs::Wave,
+};
+
+/// Dispatches are steered between these, milliseconds: short enough for the watchdog of a desktop
+/// GPU, long enough for the submission not to count.
+const SHORT_DISPATCH_MS: f64 = 50.0;
+const LONG_DISPATCH_MS: f64 = 100.0;
+
+/// A scene, a film and the paths in flight on a device. Knows no sampler.
+pub struct Runner {
+    device: Arc<Device>,
+    scene: Arc<SceneBuffers>,
+    waves: WaveBuffers,
+    film: FilmBuffers,
+    settings: PassSettings,
+    passes: BTreeMap<Kernel, Pass>,
+    /// Shadow rays per hit that the buffers have room for.
+    most_shadow_rays: u32,
+    /// Paths of the next wave.
+    wave_paths: u32,
+    totals: Totals,
+    compile_ms: PassTimes,
+}
+
+impl Runner {
+    /// Makes room for the film of `scene` and for waves over it.
+    ///
+    /// # Errors
+    /// A limit of the device or a failing device.
+    pub fn new(
+        device: &Arc<Device>,
+        scene: Arc<SceneBuffers>,
+        settings: PassSettings,
+        demand: PathDemand,
+    ) -> Result<Self> {
+        let film = FilmBuffers::new(device, scene.window(), settings.aovs)?;
+        let rays = settings.shadow_rays.clamp(1, SHADOW_RAYS_PER_GROUP);
+        let waves = WaveBuffers::new(device, film.padded_pixels(), rays, demand)?;
+        Ok(Self {
+            device: Arc::clone(device),
+            scene,
+            wave_paths: waves.first_wave_paths(),
+            waves,
+            film,
+            most_shadow_rays: settings.shadow_rays,
+            settings,
+            passes: BTreeMap::new(),
+            totals: Totals::default(),
+            compile_ms: PassTimes::new(),
+        })
+    }
+
+    /// Compiles every pass that `technique` may use and runs it once over nothing, which makes drivers
+    /// that compile late compile now.
+    ///
+    /// # Errors
+    /// [`crate::Error::Vulkan`] if a call fails.
+    pub fn warm_up(&mut self, technique: &dyn Technique) -> Result<()> {
+        let others = technique.other_steps();
+        let all = [technique.steps()].into_iter().chain(others.iter().map(Box::as_ref));
+        for steps in all {
+            let order = wave_order(&self.settings, steps, Wave::default(), self.settings.depth);
+            for Dispatch { kernel, wave } in order {
+                let start = Instant::now();
+                let name = kernel.shader.to_owned();
+                let Entry::Vacant(vacant) = self.passes.entry(kernel) else { continue };
+                let pass = Pass::new(&self.device, vacant.key().clone())?;
+                let pass = vacant.insert(pass);
+                let mut commands = Commands::begin(&self.device)?;
+                let sets = sets(&self.scene, technique, &self.waves, &self.film);
+                pass.record(&mut commands, &sets, &wave);
+                commands.submit_and_wait()?;
+                let ms = start.elapsed().as_secs_f64() * 1e3;
+                *self.compile_ms.entry(name).or_default() += ms;
+            }
+        }
+        Ok(())
+    }
+
+    /// Runs waves like `wave` until `pixels` are done, the first of them at the first pixel of `wave`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Vulkan`] if the device fails.
+    pub fn sweep(&mut self, technique: &dyn Technique, wave: Wave, pixels: u32) -> Result<()> {
+        let mut done = 0;
+        while done < pixels {
+            let together =
+                (self.wave_paths / wave.sample_count / BLOCK_PIXELS).max(1) * BLOCK_PIXELS;
+            let wave = Wave {
+                first_pixel: wave.first_pixel + done * wave.pixel_stride,
+                pixel_count: together.min(pixels - done),
+                ..wave
+            };
+            let times = self.run(technique, wave, self.settings.depth)?;
+            self.steer(&times, wave);
+            done += wave.pixel_count;
+        }
+        Ok(())
+    }
+
+    /// Runs one wave for the first `vertices` vertices of its paths. Returns device milliseconds by pass.
+    ///
+    /// # Errors
+    /// [`crate::Error::Vulkan`] if the device fails.
+    pub fn run(
+        &mut self,
+        technique: &dyn Technique,
+        wave: Wave,
+        vertices: u32,
+    ) -> Result<PassTimes> {
+        let order = wave_order(&self.settings, technique.steps(), wave, vertices);
+        let mut commands = Commands::begin_timed(&self.device, order.len() as u32)?;
+        let sets = sets(&self.scene, technique, &self.waves, &self.film);
+        for Dispatch { kernel, wave } in order {
+            let pass = match self.passes.entry(kernel) {
+                Entry::Occupied(occupied) => occupied.into_mut(),
+                Entry::Vacant(vacant) => {
+                    let pass = Pass::new(&self.device, vacant.key().clone())?;
+                    vacant.insert(pass)
+                }
+            };
+            pass.record(&mut commands, &sets, &wave);
+        }
+        let times = commands.submit_and_wait()?;
+        for (pass, ms) in &times {
+            *self.totals.gpu_ms.entry(pass.clone()).or_default() += ms;
+        }
+        Ok(times)
+    }
+
+    /// Sizes the next wave so that its longest pass stays between the two bounds. Times are per
+    /// pass name, summed over the vertices and groups of the wave, so this errs on the short side.
+    fn steer(&mut self, times: &PassTimes, wave: Wave) {
+        let longest = times.values().copied().fold(0.0, f64::max);
+        let paths = wave.pixel_count * wave.sample_count;
+        if longest > LONG_DISPATCH_MS {
+            let shrink = 0.75 * LONG_DISPATCH_MS / longest;
+            self.wave_paths = ((f64::from(paths) * shrink) as u32).max(BLOCK_PIXELS);
+        } else if longest < SHORT_DISPATCH_MS && paths >= self.wave_paths / 2 {
+            self.wave_paths = self.wave_paths.saturating_mul(2).min(self.waves.capacity());
+        }
+    }
+
+    /// Samples of all pixels that fit into the next wave.
+    pub fn samples_per_wave(&self) -> u32 {
+        self.wave_paths / self.film.padded_pixels()
+    }
+
+    /// Traces fewer shadow rays per hit from now on.
+    ///
+    /// # Panics
+    /// If there are more than the buffers were made for.
+    pub fn limit_shadow_rays(&mut self, shadow_rays: u32) {
+        assert!(shadow_rays <= self.most_shadow_rays, "buffers have room for {shadow_rays}");
+        self.settings.shadow_rays = shadow_rays;
+    }
+
+    /// Shadow rays per hit in the last group at the first vertex, the one that the wave buffers hold.
+    pub fn last_group_rays(&self, steps: &dyn Steps) -> u32 {
+        match self.settings.shadow_rays {
+            0 => 0,
+            rays => (rays - 1) % steps.rays_per_group() + 1,
+        }
+    }
+
+    /// Adds what the device counted to the totals.
+    ///
+    /// # Errors
+    /// [`crate::Error::Vulkan`] if the device fails.
+    pub fn take_counters(&mut self) -> Result<()> {
+        self.totals.add(&self.film.take_counters()?);
+        Ok(())
+    }
+
+    /// Empties the film and the totals.
+    ///
+    /// # Errors
+    /// [`crate::Error::Vulkan`] if the device fails.
+    pub fn restart(&mut self) -> Result<()> {
+        self.film.clear(&self.device)?;
+        self.totals = Totals::default();
+        Ok(())
+    }
+
+    /// Reads the film; its size and sample count are the renderer's to state.
+    ///
+    /// # Errors
+    /// [`crate::Error::Vulkan`] if the device fails.
+    pub fn sums(&self) -> Result<Sums> {
+        self.film.download()
+    }
+
+    /// The device.
+    pub fn device(&self) -> &Arc<Device> {
+        &self.device
+    }
+
+    /// The scene on the device.
+    pub fn scene(&self) -> &SceneBuffers {
+        &self.scene
+    }
+
+    /// Buffers of the wave.
+    pub fn waves(&self) -> &WaveBuffers {
+        &self.waves
+    }
+
+    /// The film on the device.
+    pub fn film(&self) -> &FilmBuffers {
+        &self.film
+    }
+
+    /// Settings of the passes.
+    pub fn settings(&self) -> &PassSettings {
+        &self.settings
+    }
+
+    /// Counts and device times so far.
+    pub fn totals(&self) -> &Totals {
+        &self.totals
+    }
+
+    /// Milliseconds that compiling each pass and its first use took.
+    pub fn compile_ms(&self) -> &PassTimes {
+        &self.compile_ms
+    }
+
+    /// Device memory by buffer, bytes.
+    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+        let mut bytes = self.scene.buffer_bytes();
+        bytes.extend(self.waves.buffer_bytes());
+        bytes.extend(self.film.buffer_bytes());
+        bytes
+    }
+}
+
+/// All descriptor sets of a render.
+fn sets<'a>(
+    scene: &'a SceneBuffers,
+    technique: &'a dyn Technique,
+    waves: &'a WaveBuffers,
+    film: &'a FilmBuffers,
+) -> Vec<&'a DescriptorSet> {
+    let common = [scene.set(), waves.set(), film.set()];
+    common.into_iter().chain(technique.set()).collect()
+}

@@ -1,0 +1,186 @@
+//! What is constant during a render, on the device.
+
+use std::{collections::BTreeMap, sync::Arc, time::Instant};
+
+use glam::Vec3;
+
+use super::geometry::{GeometryBuffers, triangle_page_bytes};
+use crate::{
+    accel::Accel,
+    brdf::MaterialTables,
+    error::Result,
+    film::Window,
+    gpu::{Buffer, DescriptorSet, Device},
+    scene::{EnvironmentMap, Filter, Scene, environment::EnvironmentTables},
+    shader::{
+        bindings::{Binding, SCENE, scene as bindings},
+        structs::SceneParameters,
+    },
+};
+
+/// A scene on a device: geometry, materials, environment and camera.
+pub struct SceneBuffers {
+    set: DescriptorSet,
+    geometry: GeometryBuffers,
+    buffers: Vec<Buffer>,
+    material_kinds: u32,
+    window: Window,
+    host_ms: BTreeMap<String, f64>,
+}
+
+impl SceneBuffers {
+    /// Builds the acceleration structure and the tables, and uploads everything.
+    ///
+    /// # Errors
+    /// A limit of the device, a scene that cannot be traced, or a failing device.
+    pub fn new(device: &Arc<Device>, scene: &Scene, window: Window) -> Result<Self> {
+        // Each stage frees its host copy before the next one starts: large scenes need the memory.
+        let start = Instant::now();
+        let accel = Accel::build(&scene.geometry, triangle_page_bytes(device.capabilities()))?;
+        let bvh_ms = start.elapsed().as_secs_f64() * 1e3;
+        let start = Instant::now();
+        let geometry = GeometryBuffers::new(device, &accel)?;
+        drop(accel);
+        let mut scene_buffers = Self::with_geometry(device, scene, window, geometry, start)?;
+        scene_buffers.host_ms.insert("bvh".to_owned(), bvh_ms);
+        Ok(scene_buffers)
+    }
+
+    /// As [`SceneBuffers::new`], with an acceleration structure that the caller keeps.
+    ///
+    /// # Errors
+    /// A limit of the device or a failing device.
+    pub fn from_accel(
+        device: &Arc<Device>,
+        scene: &Scene,
+        window: Window,
+        accel: &Accel,
+    ) -> Result<Self> {
+        let start = Instant::now();
+        let geometry = GeometryBuffers::new(device, accel)?;
+        Self::with_geometry(device, scene, window, geometry, start)
+    }
+
+    fn with_geometry(
+        device: &Arc<Device>,
+        scene: &Scene,
+        window: Window,
+        geometry: GeometryBuffers,
+        start: Instant,
+    ) -> Result<Self> {
+        let mut host_ms = BTreeMap::new();
+        let mut buffers = Vec::new();
+        let mut places = Vec::new();
+        let mut add = |binding: Binding, buffer: Buffer| {
+            places.push(binding);
+            buffers.push(buffer);
+        };
+
+        let tables = MaterialTables::new(&scene.materials)?;
+        let material_kinds =
+            tables.materials.iter().fold(0, |bits, material| bits | 1 << material.kind);
+        let materials = Buffer::from_slice(device, "materials", &tables.materials)?;
+        let brdf_table = Buffer::texels_from_slice(device, "BRDF tables", &tables.words)?;
+        drop(tables);
+
+        let tables = EnvironmentTables::new(&scene.environment);
+        let parameters = parameters(scene, &scene.environment, tables.total, window);
+        add(bindings::PARAMETERS, Buffer::from_slice(device, "parameters", &[parameters])?);
+        let map = &scene.environment;
+        let texels: Vec<[f32; 4]> =
+            map.texels.iter().map(|texel| texel.extend(0.0).to_array()).collect();
+        add(
+            bindings::ENVIRONMENT_TEXELS,
+            Buffer::texels_from_slice(device, "environment texels", &texels)?,
+        );
+        add(
+            bindings::ENVIRONMENT_ROWS,
+            Buffer::texels_from_slice(device, "environment rows", &tables.rows)?,
+        );
+        add(
+            bindings::ENVIRONMENT_CELLS,
+            Buffer::texels_from_slice(device, "environment cells", &tables.cells)?,
+        );
+        let mut bound: Vec<_> =
+            places.into_iter().zip(&buffers).chain(geometry.bindings()).collect();
+        bound.push((bindings::MATERIALS, &materials));
+        bound.push((bindings::MATERIAL_TEXELS, &materials));
+        bound.push((bindings::BRDF_TABLE, &brdf_table));
+        bound.push((bindings::BRDF_CELLS, &brdf_table));
+        let set = DescriptorSet::new(device, &SCENE, &bound)?;
+        buffers.extend([materials, brdf_table]);
+        host_ms.insert("upload".to_owned(), start.elapsed().as_secs_f64() * 1e3);
+        Ok(Self { set, geometry, buffers, material_kinds, window, host_ms })
+    }
+
+    /// The scene set.
+    pub fn set(&self) -> &DescriptorSet {
+        &self.set
+    }
+
+    /// Tree and triangles.
+    pub fn geometry(&self) -> &GeometryBuffers {
+        &self.geometry
+    }
+
+    /// Bit `1 << kind` for every kind of material.
+    pub fn material_kinds(&self) -> u32 {
+        self.material_kinds
+    }
+
+    /// The part of the film that the parameters describe.
+    pub fn window(&self) -> Window {
+        self.window
+    }
+
+    /// Host milliseconds by stage: `bvh`, `upload`.
+    pub fn host_ms(&self) -> &BTreeMap<String, f64> {
+        &self.host_ms
+    }
+
+    /// Bytes by buffer name.
+    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+        self.buffers
+            .iter()
+            .chain(self.geometry.buffers())
+            .map(|buffer| (buffer.name().to_owned(), buffer.size()))
+            .collect()
+    }
+}
+
+/// The camera's frame and everything else the passes look up by name.
+fn parameters(
+    scene: &Scene,
+    map: &EnvironmentMap,
+    environment_total: f32,
+    window: Window,
+) -> SceneParameters {
+    let camera = &scene.camera;
+    let forward = (camera.look_at - camera.position).normalize_or(Vec3::NEG_Z);
+    let right = forward.cross(camera.up).normalize_or(Vec3::X);
+    let up = right.cross(forward);
+    SceneParameters {
+        camera_position: camera.position.into(),
+        camera_aperture_radius: camera.aperture_radius,
+        camera_right: right.into(),
+        camera_focus_distance: camera.focus_distance,
+        camera_up: up.into(),
+        camera_tan_half_fov: (0.5 * camera.vertical_fov_deg).to_radians().tan(),
+        camera_forward: forward.into(),
+        film_width: scene.film.width,
+        film_height: scene.film.height,
+        crop_x: window.x,
+        crop_y: window.y,
+        crop_width: window.width,
+        crop_height: window.height,
+        film_filter: match scene.film.filter {
+            Filter::Box => 0,
+            Filter::Gaussian => 1,
+        },
+        environment_width: map.width,
+        environment_height: map.height,
+        environment_cos_rotation: map.rotation_rad.cos(),
+        environment_sin_rotation: map.rotation_rad.sin(),
+        environment_total,
+    }
+}

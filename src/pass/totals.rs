@@ -1,0 +1,67 @@
+//! What a renderer has done so far: counts of the device, summed over its waves.
+
+use std::collections::BTreeMap;
+
+use crate::{gpu::PassTimes, shader::structs::Counters};
+
+/// Totals since the start of a renderer.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Totals {
+    /// Camera rays.
+    pub camera_rays: u64,
+    /// Bounce rays.
+    pub bounce_rays: u64,
+    /// Shadow rays traced.
+    pub shadow_rays_traced: u64,
+    /// Shadow rays that reached the environment.
+    pub shadow_rays_visible: u64,
+    /// Samples left out because their radiance was not finite.
+    pub dropped_samples: u64,
+    /// Rays given up after too many steps of traversal.
+    pub traversal_overruns: u64,
+    /// Hits with lobes of a product.
+    pub product_hits: u64,
+    /// Lobes kept at these hits.
+    pub lobes_kept: u64,
+    /// Share of the product's energy that was kept, summed over these hits, in 256ths.
+    pub energy_kept: u64,
+    /// Directions recorded in visibility caches.
+    pub cache_entries: u64,
+    /// Times that the weights of a hit's lobes were added up anew, since the cache had grown.
+    pub cdf_rebuilds: u64,
+    /// Device milliseconds by pass.
+    pub gpu_ms: PassTimes,
+}
+
+impl Totals {
+    /// Adds what the device counted.
+    pub fn add(&mut self, counters: &Counters) {
+        self.camera_rays += u64::from(counters.camera_rays);
+        self.bounce_rays += u64::from(counters.bounce_rays);
+        self.shadow_rays_traced += u64::from(counters.shadow_rays_traced);
+        self.shadow_rays_visible += u64::from(counters.shadow_rays_visible);
+        self.dropped_samples += u64::from(counters.dropped_samples);
+        self.traversal_overruns += u64::from(counters.traversal_overruns);
+        self.product_hits += u64::from(counters.product_hits);
+        self.lobes_kept += u64::from(counters.lobes_kept);
+        self.energy_kept += u64::from(counters.energy_kept);
+        self.cache_entries += u64::from(counters.cache_entries);
+        self.cdf_rebuilds += u64::from(counters.cdf_rebuilds);
+    }
+
+    /// Means per hit that tell what the sampler did, by name; empty for samplers without lobes.
+    pub fn sampler_statistics(&self) -> BTreeMap<String, f64> {
+        if self.product_hits == 0 {
+            return BTreeMap::new();
+        }
+        let per_hit = |count: u64| count as f64 / self.product_hits as f64;
+        [
+            ("lobes_per_hit", per_hit(self.lobes_kept)),
+            ("energy_kept", per_hit(self.energy_kept) / 256.0),
+            ("cache_entries_per_hit", per_hit(self.cache_entries)),
+            ("cdf_rebuilds_per_hit", per_hit(self.cdf_rebuilds)),
+        ]
+        .map(|(name, value)| (name.to_owned(), value))
+        .into()
+    }
+}

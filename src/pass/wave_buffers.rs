@@ -1,0 +1,131 @@
+//! Buffers for the paths in flight.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use super::technique::PathDemand;
+use crate::{
+    error::Result,
+    gpu::{Buffer, DescriptorSet, Device},
+    shader::{
+        bindings::{WAVE, wave},
+        constants::WORKGROUP_SIZE,
+        structs::{Hit, PathState, Ray, ShadowRay},
+    },
+};
+
+/// Most paths in flight on a software device; more would only fall out of its caches.
+const SOFTWARE_PATHS: u32 = 1 << 17;
+/// Most paths in flight on a GPU.
+const GPU_PATHS: u32 = 1 << 21;
+/// Paths of the very first wave, before any timing is known.
+const FIRST_PATHS: u32 = 1 << 14;
+
+/// Rays, hits, shadow rays and path states of one wave.
+pub struct WaveBuffers {
+    set: DescriptorSet,
+    capacity: u32,
+    rays: Buffer,
+    hits: Buffer,
+    shadow_rays: Buffer,
+    visibility: Buffer,
+    paths: Buffer,
+}
+
+impl WaveBuffers {
+    /// Makes room for waves of a film of `padded_pixels` with up to `shadow_rays` rays per hit at a
+    /// time, and no more paths than the buffers of a technique allow.
+    ///
+    /// # Errors
+    /// A limit of the device or a failing device.
+    pub fn new(
+        device: &Arc<Device>,
+        padded_pixels: u32,
+        shadow_rays: u32,
+        demand: PathDemand,
+    ) -> Result<Self> {
+        let capabilities = device.capabilities();
+        let most = if capabilities.kind == "software" { SOFTWARE_PATHS } else { GPU_PATHS };
+        let widest =
+            (size_of::<Hit>() as u64).max(u64::from(shadow_rays) * size_of::<ShadowRay>() as u64);
+        let widest = widest.max(demand.bytes);
+        let by_binding = capabilities.max_storage_buffer_range / widest;
+        let by_texels = capabilities.max_texel_buffer_elements / demand.texels.max(1);
+        let by_groups = u64::from(capabilities.max_workgroup_count) * u64::from(WORKGROUP_SIZE)
+            / u64::from(shadow_rays);
+        let by_memory = capabilities.device_memory / 8 / (widest * 3);
+        let limit = by_binding.min(by_texels).min(by_groups).min(by_memory).min(u64::from(most));
+        // A small film needs no more than a handful of its samples in flight.
+        let useful = u64::from(padded_pixels) * 64;
+        let capacity = u32::try_from(limit.min(useful)).unwrap_or(most).max(WORKGROUP_SIZE)
+            / WORKGROUP_SIZE
+            * WORKGROUP_SIZE;
+
+        let paths = u64::from(capacity);
+        let shadow_ray_count = paths * u64::from(shadow_rays);
+        let make = |name, count: u64, size: usize| Buffer::new(device, name, count * size as u64);
+        let rays = make("rays", paths, size_of::<Ray>())?;
+        let hits = make("hits", paths, size_of::<Hit>())?;
+        let shadow_rays = make("shadow rays", shadow_ray_count, size_of::<ShadowRay>())?;
+        let visibility = make("visibility", shadow_ray_count, size_of::<u32>())?;
+        let paths = make("paths", paths, size_of::<PathState>())?;
+        let bound = [
+            (wave::RAYS, &rays),
+            (wave::RAY_TEXELS, &rays),
+            (wave::HITS, &hits),
+            (wave::HIT_TEXELS, &hits),
+            (wave::SHADOW_RAYS, &shadow_rays),
+            (wave::SHADOW_RAY_TEXELS, &shadow_rays),
+            (wave::VISIBILITY, &visibility),
+            (wave::PATHS, &paths),
+        ];
+        let set = DescriptorSet::new(device, &WAVE, &bound)?;
+        Ok(Self { set, capacity, rays, hits, shadow_rays, visibility, paths })
+    }
+
+    /// The wave set.
+    pub fn set(&self) -> &DescriptorSet {
+        &self.set
+    }
+
+    /// Most paths of a wave.
+    pub fn capacity(&self) -> u32 {
+        self.capacity
+    }
+
+    /// Paths of the first wave.
+    pub fn first_wave_paths(&self) -> u32 {
+        FIRST_PATHS.min(self.capacity)
+    }
+
+    /// [`Ray`] of every path.
+    pub fn rays(&self) -> &Buffer {
+        &self.rays
+    }
+
+    /// [`Hit`] of every path.
+    pub fn hits(&self) -> &Buffer {
+        &self.hits
+    }
+
+    /// [`ShadowRay`]s of the last group: direction `k` of path `i` at `k · path_count + i`.
+    pub fn shadow_rays(&self) -> &Buffer {
+        &self.shadow_rays
+    }
+
+    /// Words in the order of the shadow rays: one where a ray reaches the environment, else zero.
+    pub fn visibility(&self) -> &Buffer {
+        &self.visibility
+    }
+
+    /// [`PathState`] of every path.
+    pub fn paths(&self) -> &Buffer {
+        &self.paths
+    }
+
+    /// Bytes by buffer name.
+    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+        [&self.rays, &self.hits, &self.shadow_rays, &self.visibility, &self.paths]
+            .map(|buffer| (buffer.name().to_owned(), buffer.size()))
+            .into()
+    }
+}

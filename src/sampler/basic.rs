@@ -1,0 +1,110 @@
+//! Samplers that learn nothing and need no tables: the pass `sample` with a tag.
+
+use std::collections::BTreeMap;
+
+use super::{Context, Parameters, Room, knob};
+use crate::{
+    error::Result,
+    pass::{Domain, Kernel, Steps, Technique},
+    shader::{
+        constants::{
+            CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS, CONSTANT_SAMPLER, SAMPLER_BRDF,
+            SAMPLER_COSINE, SAMPLER_ENV, SAMPLER_MIS, SAMPLER_RIS, SAMPLER_UNIFORM,
+        },
+        structs::Wave,
+    },
+};
+
+/// A sampler of `sample.comp`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Basic {
+    tag: u32,
+}
+
+/// Uniform over the hemisphere.
+pub const UNIFORM: Basic = Basic { tag: SAMPLER_UNIFORM };
+/// Proportional to the cosine.
+pub const COSINE: Basic = Basic { tag: SAMPLER_COSINE };
+/// The BRDF's own sampling.
+pub const BRDF: Basic = Basic { tag: SAMPLER_BRDF };
+/// Proportional to the luminance of the environment map.
+pub const ENV: Basic = Basic { tag: SAMPLER_ENV };
+/// `brdf` and `env` by turns with the one-sample balance heuristic.
+pub const MIS: Basic = Basic { tag: SAMPLER_MIS };
+/// Resampling over candidates of `mis`.
+pub const RIS: Basic = Basic { tag: SAMPLER_RIS };
+
+/// Numbers of candidates that `ris` can take, half from the BRDF and half from the environment.
+const RIS_CANDIDATES: [u32; 4] = [2, 4, 6, 8];
+/// Number of candidates under `auto`.
+const AUTO_RIS_CANDIDATES: u32 = 4;
+
+impl Basic {
+    fn candidates(self, parameters: &Parameters) -> Result<u32> {
+        if self.tag == SAMPLER_RIS {
+            parameters.candidates_among("ris", &RIS_CANDIDATES, AUTO_RIS_CANDIDATES)
+        } else {
+            Ok(1)
+        }
+    }
+
+    /// The steps of the sampler in a scene with these kinds of material.
+    ///
+    /// # Errors
+    /// [`crate::Error::Usage`] for a number of candidates that it cannot take.
+    pub fn steps(self, parameters: &Parameters, material_kinds: u32) -> Result<BasicSteps> {
+        Ok(BasicSteps { tag: self.tag, candidates: self.candidates(parameters)?, material_kinds })
+    }
+}
+
+impl Room for Basic {
+    fn check(&self, parameters: &Parameters, _depth: u32) -> Result<()> {
+        self.candidates(parameters).map(drop)
+    }
+
+    fn basic(&self) -> Option<Self> {
+        Some(*self)
+    }
+
+    fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
+        if self.tag != SAMPLER_RIS {
+            return BTreeMap::new();
+        }
+        let candidates = parameters.candidates.unwrap_or(AUTO_RIS_CANDIDATES);
+        [("candidates".to_owned(), knob::text_or_auto(Some(candidates)))].into()
+    }
+
+    fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
+        let material_kinds = context.runner.settings().material_kinds;
+        Ok(Box::new(BasicTechnique { steps: self.steps(context.parameters, material_kinds)? }))
+    }
+}
+
+/// The pass `sample`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BasicSteps {
+    tag: u32,
+    candidates: u32,
+    material_kinds: u32,
+}
+
+impl Steps for BasicSteps {
+    fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
+        let constants = [
+            (CONSTANT_SAMPLER, self.tag),
+            (CONSTANT_CANDIDATES, self.candidates),
+            (CONSTANT_MATERIAL_KINDS, self.material_kinds),
+        ];
+        vec![Kernel::new("sample", Domain::Paths, &constants)]
+    }
+}
+
+struct BasicTechnique {
+    steps: BasicSteps,
+}
+
+impl Technique for BasicTechnique {
+    fn steps(&self) -> &dyn Steps {
+        &self.steps
+    }
+}

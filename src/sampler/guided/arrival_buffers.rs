@@ -1,0 +1,70 @@
+//! Light that arrives by way of surfaces on the device: what `bounce_guided` reads, and what its rays teach.
+
+use std::sync::Arc;
+
+use super::{ARRIVAL_DIRECTIONS, ArrivalWords, Snapshot};
+use crate::{
+    error::Result,
+    gpu::{Buffer, Commands, Device},
+    shader::bindings::{Binding, guided},
+};
+
+/// Bytes of a cell: by direction the light and two words that are counted, and what it reflects.
+pub const BYTES_PER_CELL: u64 =
+    (4 + size_of::<ArrivalWords>() as u64) * ARRIVAL_DIRECTIONS as u64 + 4;
+
+/// The buffers.
+pub struct ArrivalBuffers {
+    arriving: Buffer,
+    reflected: Buffer,
+    arrivals: Buffer,
+}
+
+impl ArrivalBuffers {
+    /// Room for `cells` cells.
+    pub fn new(device: &Arc<Device>, cells: usize) -> Result<Self> {
+        let directions = (cells * ARRIVAL_DIRECTIONS) as u64;
+        let counted = size_of::<ArrivalWords>() as u64;
+        Ok(Self {
+            arriving: Buffer::new(device, "guide arriving", 4 * directions)?,
+            reflected: Buffer::new(device, "guide reflected", 4 * cells as u64)?,
+            arrivals: Buffer::new(device, "guide arrivals", counted * directions)?,
+        })
+    }
+
+    /// Buffers with their bindings in the SRBF set.
+    pub fn bindings(&self) -> [(Binding, &Buffer); 3] {
+        [
+            (guided::GUIDE_ARRIVING, &self.arriving),
+            (guided::GUIDE_REFLECTED, &self.reflected),
+            (guided::GUIDE_ARRIVALS, &self.arrivals),
+        ]
+    }
+
+    /// What passes counted for the first `cells` cells.
+    pub fn counted(&self, cells: usize) -> Result<Vec<ArrivalWords>> {
+        self.arrivals.download(cells * ARRIVAL_DIRECTIONS)
+    }
+
+    /// Goes on from what passes of an earlier render counted.
+    pub fn upload_counted(&self, counted: &[ArrivalWords]) -> Result<()> {
+        self.arrivals.upload(bytemuck::cast_slice(counted))
+    }
+
+    /// Records that what was counted for the first `cells` cells is forgotten.
+    pub fn record_clear(&self, commands: &mut Commands, cells: usize) {
+        let bytes = size_of::<ArrivalWords>() * cells * ARRIVAL_DIRECTIONS;
+        commands.fill_start(&self.arrivals, bytes as u64, 0);
+    }
+
+    /// What the next passes read.
+    pub fn upload(&self, snapshot: &Snapshot) -> Result<()> {
+        self.arriving.upload(bytemuck::cast_slice(&snapshot.arriving))?;
+        self.reflected.upload(bytemuck::cast_slice(&snapshot.reflected.units))
+    }
+
+    /// Every buffer.
+    pub fn buffers(&self) -> [&Buffer; 3] {
+        [&self.arriving, &self.reflected, &self.arrivals]
+    }
+}

@@ -1,0 +1,528 @@
+//! Learned visibility on the device: what passes read, what they count, and the rebuild in between.
+
+use std::{collections::BTreeMap, sync::Arc, time::Instant};
+
+use glam::Vec3;
+
+use super::{
+    ARRIVAL_DIRECTIONS, ArrivalWords, CellKey, CountWords, FACE_COUNT, Guide, GuideState,
+    MAX_CELLS, Origin, Partition, SHARE_WORDS, Snapshot,
+    arrival_buffers::{self, ArrivalBuffers},
+    budget::GuideBudget,
+    decode_entry, decode_visibility,
+    parameters::GuidedParameters,
+    record::{CellLevel, RecordedCell, RecordedRegion},
+};
+use crate::{
+    error::{Error, Result},
+    gpu::{Buffer, Commands, DescriptorSet, Device},
+    scene::{self, Scene},
+    shader::{
+        bindings::{GUIDED, guided},
+        constants::{GUIDE_COUNT_WORDS, GUIDE_NO_KEY},
+        structs::{GuideParameters, PathCell},
+    },
+};
+
+/// Edge of a cell in pixels, where it is not limited by the scene.
+const CELL_PIXELS: f32 = 24.0;
+/// Cells along the longest side of the scene, at least.
+const CELLS_PER_SCENE: f32 = 20.0;
+/// Levels of size below the largest cell.
+const LEVELS: i32 = 12;
+/// Bytes of what a cell counts per region.
+const COUNT_BYTES: u64 = 4 * GUIDE_COUNT_WORDS as u64;
+/// Bytes of a cell per region: an entry to read and a count to write.
+const BYTES_PER_REGION: u64 = 8 + COUNT_BYTES;
+/// What counts are divided by where the geometry is another.
+const FORGETTING: u32 = 8;
+/// Fewest cells there is room for, memory permitting.
+const FEW_CELLS: u64 = 4096;
+/// Pixels per cell beyond those: no film can fill more.
+const PIXELS_PER_CELL: u64 = 4;
+
+/// Samples per pixel after which the map is split a second time; the first is after the training.
+pub const SPLIT_AFTER: u32 = 16;
+
+/// Regions that a render starts with.
+const FIRST_REGIONS: usize = 256;
+
+/// The first number of samples, not below `samples`, after which the guide is rebuilt: 1, 2, 3, 4, 6,
+/// 8, 12, 16, 32, 64, …
+pub fn guide_schedule(samples: u32) -> u32 {
+    let power = samples.next_power_of_two();
+    let middle = power / 4 * 3;
+    if middle >= samples && power <= SPLIT_AFTER { middle } else { power }
+}
+
+/// What the buffers of a guide are sized by.
+#[derive(Clone, Copy, Debug)]
+pub struct GuideSize {
+    /// Pixels of the film.
+    pub pixels: u32,
+    /// Paths of a wave.
+    pub paths: u32,
+    /// Shadow rays of a path in one group.
+    pub shadow_rays: u32,
+    /// Whether bounces are guided.
+    pub has_bounces: bool,
+}
+
+/// Everything of one render that learns.
+pub struct GuideBuffers {
+    device: Arc<Device>,
+    set: DescriptorSet,
+    partition: Partition,
+    /// Whether the regions are others than those of the start.
+    is_split: bool,
+    learned: Guide,
+    /// What passes read now.
+    snapshot: Snapshot,
+    budget: GuideBudget,
+    origin: Origin,
+    layout: GuideParameters,
+    parameters: Buffer,
+    table: Buffer,
+    entries: Buffer,
+    regions: Buffer,
+    aliases: Buffer,
+    region_of_cell: Buffer,
+    counts: Buffer,
+    shares: Buffer,
+    missing: Buffer,
+    targets: Buffer,
+    path_cells: Buffer,
+    /// Where bounces are guided.
+    arrivals: Option<ArrivalBuffers>,
+    missing_slots: usize,
+    rebuild_ms: f64,
+}
+
+impl GuideBuffers {
+    /// Splits the environment and makes room.
+    ///
+    /// # Errors
+    /// A limit of the device or a failing device.
+    pub fn new(
+        device: &Arc<Device>,
+        scene: &Scene,
+        parameters: &GuidedParameters,
+        size: GuideSize,
+    ) -> Result<Self> {
+        let most_regions = parameters.regions as usize;
+        let partition = Partition::new(&scene.environment, most_regions.min(FIRST_REGIONS));
+        let region_count = partition.regions.len();
+        let useful_cells = FEW_CELLS.max(u64::from(size.pixels) / PIXELS_PER_CELL) as usize;
+        let useful_cells = useful_cells.min(MAX_CELLS);
+        // What cells take besides is most per region where these are fewest.
+        let besides = 4 * SHARE_WORDS as u64
+            + if size.has_bounces { arrival_buffers::BYTES_PER_CELL } else { 0 };
+        let by_memory =
+            parameters.guide_memory / (BYTES_PER_REGION + besides.div_ceil(region_count as u64));
+        let by_range = device.capabilities().max_storage_buffer_range / COUNT_BYTES;
+        let budget = GuideBudget {
+            counts: (by_memory.min(by_range) as usize)
+                .min(useful_cells * most_regions)
+                .max(FACE_COUNT * region_count),
+            useful_cells,
+            max_regions: most_regions,
+        };
+        let capacity = budget.cells(region_count);
+        let slots = (4 * capacity).next_power_of_two();
+        let missing_slots = (2 * capacity).next_power_of_two();
+        let learned = Guide::new(region_count, capacity, slots);
+
+        let (mut regions, aliases) = region_tables(&partition);
+        regions.resize(most_regions.max(region_count), [0; 4]);
+        let (entry_bytes, count_bytes) =
+            (8 * budget.counts as u64, COUNT_BYTES * budget.counts as u64);
+        let guide = guide_parameters(scene, region_count, slots, missing_slots);
+        let origin = Origin {
+            environment: scene::environment_hash(scene),
+            geometry: scene::geometry_hash(scene),
+            regions: region_count as u32,
+            grid_origin: guide.grid_origin,
+            largest_edge: guide.largest_edge,
+        };
+        let parameters = Buffer::from_slice(device, "guide parameters", &[guide])?;
+        let table = Buffer::new(device, "guide table", 8 * slots as u64)?;
+        let entries = Buffer::new(device, "guide entries", entry_bytes)?;
+        let regions = Buffer::texels_from_slice(device, "guide regions", &regions)?;
+        let aliases = Buffer::texels_from_slice(device, "guide aliases", &aliases)?;
+        let region_of_cell =
+            Buffer::texels_from_slice(device, "guide region of cell", &partition.region_of_cell)?;
+        let counts = Buffer::new(device, "guide counts", count_bytes)?;
+        let shares = Buffer::new(device, "guide shares", 4 * (capacity * SHARE_WORDS) as u64)?;
+        let missing = Buffer::new(device, "guide missing", 4 * missing_slots as u64)?;
+        let rays = u64::from(size.paths) * u64::from(size.shadow_rays);
+        let targets = Buffer::new(device, "learn targets", 8 * rays)?;
+        let path_bytes = u64::from(size.paths) * size_of::<PathCell>() as u64;
+        let path_cells = Buffer::new(device, "path cells", path_bytes)?;
+        let arrivals =
+            size.has_bounces.then(|| ArrivalBuffers::new(device, capacity)).transpose()?;
+        let mut bound = vec![
+            (guided::GUIDE, &parameters),
+            (guided::GUIDE_TABLE, &table),
+            (guided::GUIDE_ENTRIES, &entries),
+            (guided::GUIDE_REGIONS, &regions),
+            (guided::GUIDE_ALIASES, &aliases),
+            (guided::GUIDE_REGION_OF_CELL, &region_of_cell),
+            (guided::GUIDE_COUNTS, &counts),
+            (guided::GUIDE_SHARES, &shares),
+            (guided::GUIDE_MISSING, &missing),
+            (guided::LEARN_TARGETS, &targets),
+            (guided::PATH_CELLS, &path_cells),
+        ];
+        bound.extend(arrivals.iter().flat_map(ArrivalBuffers::bindings));
+        let set = DescriptorSet::new(device, &GUIDED, &bound)?;
+        let mut buffers = Self {
+            device: Arc::clone(device),
+            set,
+            partition,
+            is_split: false,
+            learned,
+            snapshot: Snapshot::default(),
+            budget,
+            origin,
+            layout: guide,
+            parameters,
+            table,
+            entries,
+            regions,
+            aliases,
+            region_of_cell,
+            counts,
+            shares,
+            missing,
+            targets,
+            path_cells,
+            arrivals,
+            missing_slots,
+            rebuild_ms: 0.0,
+        };
+        buffers.forget()?;
+        Ok(buffers)
+    }
+
+    /// The SRBF set, as `sample_guided` and `learn` see it.
+    pub fn set(&self) -> &DescriptorSet {
+        &self.set
+    }
+
+    /// Starts from nothing.
+    ///
+    /// # Errors
+    /// A failing device.
+    pub fn forget(&mut self) -> Result<()> {
+        if self.is_split {
+            let alike = vec![1.0; self.partition.regions.len()];
+            if let Some(partition) = self.partition.split_by(&alike, FIRST_REGIONS.min(alike.len()))
+            {
+                self.take_regions(partition)?;
+            }
+            self.is_split = false;
+        }
+        let learned = Guide::new(
+            self.partition.regions.len(),
+            self.budget.cells(self.partition.regions.len()),
+            self.table.size() as usize / 8,
+        );
+        self.learned = self.with_bounces(learned, &[], 1);
+        self.rebuild_ms = 0.0;
+        self.clear_counts()?;
+        self.upload()
+    }
+
+    /// `learned` with what bounces taught, where they are guided.
+    fn with_bounces(&self, learned: Guide, words: &[ArrivalWords], forget: u32) -> Guide {
+        if self.arrivals.is_some() { learned.with_bounces(words, forget) } else { learned }
+    }
+
+    /// Turns what passes counted into what the next ones read; splits the map anew where it is time
+    /// (`splits`) and where there is enough to tell more regions apart.
+    ///
+    /// # Errors
+    /// A failing device.
+    pub fn rebuild(&mut self, splits: bool) -> Result<()> {
+        let start = Instant::now();
+        let counted = self.learned.cell_count() * self.partition.regions.len();
+        let mut first = 0;
+        self.counts.download_pieces::<CountWords>(counted, |piece| {
+            self.learned.add(first, piece);
+            first += piece.len();
+        })?;
+        let words = self.learned.cell_count() * SHARE_WORDS;
+        self.learned.add_shares(&self.shares.download::<u32>(words)?);
+        if let Some(arrivals) = &self.arrivals {
+            let counted = arrivals.counted(self.learned.cell_count())?;
+            self.learned.add_arrivals(&counted, &self.snapshot.reflected);
+        }
+        self.learned.add_cells(&self.missing.download::<u32>(self.missing_slots)?);
+        let now = self.partition.regions.len();
+        let rays = if now < self.budget.max_regions { self.learned.rays() } else { 0 };
+        let count = self.budget.regions(now, self.learned.cell_count(), rays);
+        if count == self.budget.max_regions {
+            self.learned.refine();
+        }
+        if splits || count > now {
+            let importance = self.learned.region_importance(&self.snapshot);
+            if let Some(partition) = self.partition.split_by(&importance, count) {
+                let capacity = self.budget.cells(partition.regions.len());
+                self.learned.carry_over(&self.partition, &partition, capacity);
+                self.take_regions(partition)?;
+            }
+        }
+        self.clear_counts()?;
+        self.upload()?;
+        self.rebuild_ms += start.elapsed().as_secs_f64() * 1e3;
+        Ok(())
+    }
+
+    /// Host milliseconds of all rebuilds since the start.
+    pub fn rebuild_ms(&self) -> f64 {
+        self.rebuild_ms
+    }
+
+    /// The regions of the environment.
+    pub fn partition(&self) -> &Partition {
+        &self.partition
+    }
+
+    /// For the first `count` shadow rays of the last group: region + number of regions · cell, or
+    /// `NOTHING_TO_LEARN`.
+    ///
+    /// # Errors
+    /// A failing device.
+    pub fn targets(&self, count: usize) -> Result<Vec<u32>> {
+        let words: Vec<[u32; 2]> = self.targets.download(count)?;
+        Ok(words.into_iter().map(|[target, _]| target).collect())
+    }
+
+    /// What a cell knows, as passes read it.
+    ///
+    /// # Errors
+    /// A failing device.
+    ///
+    /// # Panics
+    /// If there is no such cell.
+    pub fn cell(&self, index: usize) -> Result<RecordedCell> {
+        let key = self.learned.keys()[index];
+        let level = match (index < FACE_COUNT, key.is_coarse()) {
+            (true, _) => CellLevel::Face(index),
+            (false, true) => CellLevel::Coarse(key),
+            (false, false) => CellLevel::Fine(key),
+        };
+        let count = self.partition.regions.len();
+        let known =
+            self.snapshot.entries[index * count..][..count].iter().zip(&self.partition.regions);
+        let regions =
+            known.zip(self.learned.counts(index)).map(|((entry, region), count)| RecordedRegion {
+                trials: count.trials_in_rays(),
+                hits: count.hits_in_rays(),
+                visibility: decode_visibility(*entry),
+                probability: f64::from(decode_entry(*entry).0) * region.share,
+            });
+        Ok(RecordedCell { level, regions: regions.collect() })
+    }
+
+    /// What was learned, with what was counted since the last rebuild.
+    ///
+    /// # Errors
+    /// A failing device.
+    pub fn state(&self) -> Result<GuideState> {
+        let counted = self.learned.cell_count() * self.partition.regions.len();
+        let missing = self.missing.download::<u32>(self.missing_slots)?;
+        let arrivals = self.arrivals.as_ref();
+        let pending_arrivals =
+            arrivals.map(|arrivals| arrivals.counted(self.learned.cell_count())).transpose()?;
+        Ok(GuideState {
+            origin: self.origin.clone(),
+            samples: 0,
+            rebuilt_at: 0,
+            is_open: false,
+            candidates: None,
+            rectangles: self.partition.rectangles(),
+            keys: self.learned.keys().iter().map(|key| key.0).collect(),
+            refined: self.learned.refined(),
+            counts: self.learned.count_words(),
+            shares: self.learned.shares().to_vec(),
+            pending: self.counts.download(counted)?,
+            pending_shares: self.shares.download(self.learned.cell_count() * SHARE_WORDS)?,
+            missing: missing.into_iter().filter(|key| *key != CellKey::NONE.0).collect(),
+            arrivals: self.learned.arrivals(),
+            pending_arrivals: pending_arrivals.unwrap_or_default(),
+        })
+    }
+
+    /// Continues from a state, in the grids of that one. Under another geometry most of what was
+    /// counted is forgotten. Returns whether that was so.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for another environment or number of regions; a failing device.
+    pub fn restore(&mut self, state: &GuideState) -> Result<bool> {
+        let (here, there) = (&self.origin, &state.origin);
+        if here.environment != there.environment || there.regions > self.budget.max_regions as u32 {
+            return Err(Error::usage(format!(
+                "the guide belongs to another environment: map {} in {} regions, expected {} in at most \
+                 {}; learn it again under this map, with the same --set regions",
+                &there.environment[..there.environment.len().min(12)],
+                there.regions,
+                &here.environment[..12],
+                self.budget.max_regions
+            )));
+        }
+        let edge = there.largest_edge;
+        let is_sane =
+            edge.is_finite() && edge > 0.0 && there.grid_origin.iter().all(|x| x.is_finite());
+        let has_face = |key: &u32| CellKey(*key).face() < FACE_COUNT;
+        let is_sane = is_sane && state.keys.iter().skip(FACE_COUNT).all(has_face);
+        if state.keys.len() < FACE_COUNT || !is_sane {
+            return Err(Error::usage("the guide holds no cells, or none that could be found"));
+        }
+        let partition = self.partition.with_rectangles(&state.rectangles).ok_or_else(|| {
+            Error::usage("the regions of the guide do not fill the map; learn it again")
+        })?;
+        let has_moved = here.geometry != there.geometry;
+        let forget = if has_moved { FORGETTING } else { 1 };
+        self.take_regions(partition)?;
+        let learned = Guide::resume(
+            self.partition.regions.len(),
+            self.budget.cells(self.partition.regions.len()),
+            self.table.size() as usize / 8,
+            state,
+            forget,
+        );
+        self.learned = self.with_bounces(learned, &state.arrivals, forget);
+        self.origin.grid_origin = there.grid_origin;
+        self.origin.largest_edge = edge;
+        self.layout.grid_origin = there.grid_origin;
+        self.layout.largest_edge = edge;
+        self.layout.finest_edge = edge * 0.5_f32.powi(LEVELS);
+        self.parameters.upload(bytemuck::bytes_of(&self.layout))?;
+        self.clear_counts()?;
+        let room = self.learned.cell_count() * self.partition.regions.len();
+        self.counts
+            .upload(bytemuck::cast_slice(&state.pending[..state.pending.len().min(room)]))?;
+        let room = self.learned.cell_count() * SHARE_WORDS;
+        let shares = &state.pending_shares[..state.pending_shares.len().min(room)];
+        self.shares.upload(bytemuck::cast_slice(shares))?;
+        if let Some(arrivals) = &self.arrivals {
+            let room = self.learned.cell_count() * ARRIVAL_DIRECTIONS;
+            arrivals.upload_counted(
+                &state.pending_arrivals[..state.pending_arrivals.len().min(room)],
+            )?;
+        }
+        let missing = &state.missing[..state.missing.len().min(self.missing_slots)];
+        self.missing.upload(bytemuck::cast_slice(missing))?;
+        self.upload()?;
+        Ok(has_moved)
+    }
+
+    fn take_regions(&mut self, partition: Partition) -> Result<()> {
+        let (regions, aliases) = region_tables(&partition);
+        self.regions.upload(bytemuck::cast_slice(&regions))?;
+        self.aliases.upload(bytemuck::cast_slice(&aliases))?;
+        self.region_of_cell.upload(bytemuck::cast_slice(&partition.region_of_cell))?;
+        self.layout.region_count = partition.regions.len() as u32;
+        self.parameters.upload(bytemuck::bytes_of(&self.layout))?;
+        self.origin.regions = self.layout.region_count;
+        self.partition = partition;
+        self.is_split = true;
+        Ok(())
+    }
+
+    /// Forgets what passes counted since the last rebuild.
+    ///
+    /// # Errors
+    /// A failing device.
+    pub fn clear_counts(&self) -> Result<()> {
+        let mut commands = Commands::begin(&self.device)?;
+        // What lies behind belongs to no cell.
+        let used = self.learned.cell_count() * self.partition.regions.len();
+        commands.fill_start(&self.counts, COUNT_BYTES * used as u64, 0);
+        let used = self.learned.cell_count() * SHARE_WORDS;
+        commands.fill_start(&self.shares, 4 * used as u64, 0);
+        if let Some(arrivals) = &self.arrivals {
+            arrivals.record_clear(&mut commands, self.learned.cell_count());
+        }
+        commands.fill(&self.missing, GUIDE_NO_KEY);
+        commands.submit_and_wait()?;
+        Ok(())
+    }
+
+    fn upload(&mut self) -> Result<()> {
+        self.learned.write_snapshot(&self.partition, &mut self.snapshot);
+        if let Some(arrivals) = &self.arrivals {
+            arrivals.upload(&self.snapshot)?;
+        }
+        let Snapshot { table, entries, .. } = &self.snapshot;
+        self.table.upload(bytemuck::cast_slice(table))?;
+        self.entries.upload(bytemuck::cast_slice(entries))
+    }
+
+    /// Bytes by buffer name.
+    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+        [
+            &self.parameters,
+            &self.table,
+            &self.entries,
+            &self.regions,
+            &self.aliases,
+            &self.region_of_cell,
+            &self.counts,
+            &self.shares,
+            &self.missing,
+            &self.targets,
+            &self.path_cells,
+        ]
+        .into_iter()
+        .chain(self.arrivals.iter().flat_map(ArrivalBuffers::buffers))
+        .map(|buffer| (buffer.name().to_owned(), buffer.size()))
+        .collect()
+    }
+}
+
+/// First alias entry, columns, rows, first column and row of every region, and all alias entries, as
+/// they lie on the device.
+fn region_tables(partition: &Partition) -> (Vec<[u32; 4]>, Vec<[u32; 2]>) {
+    let regions = partition.regions.iter().map(|region| {
+        let first = region.first[0] | region.first[1] << 16;
+        [region.first_entry as u32, region.size[0], region.size[1], first]
+    });
+    let aliases = partition
+        .entries
+        .iter()
+        .map(|entry| [u32::try_from(entry.threshold).unwrap_or(u32::MAX), entry.alias]);
+    (regions.collect(), aliases.collect())
+}
+
+/// Cells about [`CELL_PIXELS`] wide in the picture, at most a twentieth of the scene.
+fn guide_parameters(
+    scene: &Scene,
+    region_count: usize,
+    slots: usize,
+    missing_slots: usize,
+) -> GuideParameters {
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for corner in scene.geometry.triangles.iter().flatten() {
+        let position = Vec3::from(scene.geometry.positions[*corner as usize]);
+        low = low.min(position);
+        high = high.max(position);
+    }
+    let size = (high - low).max_element();
+    let size = if size.is_finite() && size > 0.0 { size } else { 1.0 };
+    let pixel_angle = 2.0 * (0.5 * scene.camera.vertical_fov_deg).to_radians().tan()
+        / scene.film.height.max(1) as f32;
+    let largest_edge = size / CELLS_PER_SCENE;
+    GuideParameters {
+        // A third of an edge of every level away from the corner of the scene, since walls at its sides
+        // should not lie between two cells.
+        grid_origin: if low.is_finite() { (low - largest_edge / 3.0).into() } else { [0.0; 3] },
+        finest_edge: largest_edge * 0.5_f32.powi(LEVELS),
+        edge_per_distance: CELL_PIXELS * pixel_angle,
+        largest_edge,
+        region_count: region_count as u32,
+        table_mask: (slots - 1) as u32,
+        missing_mask: (missing_slots - 1) as u32,
+    }
+}

@@ -1,0 +1,102 @@
+//! Parameters of the sampler `guided`.
+
+use crate::sampler::knob::{self, Knob};
+
+/// Parameters of `guided`, beside the number of candidates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GuidedParameters {
+    /// `bounce-candidates`: directions from the BRDF that each bounce is chosen from by the light that
+    /// cells have learned to arrive from there, 1 to 16; 1 learns and chooses nothing.
+    pub bounce_candidates: u32,
+    /// `guide-memory`: most bytes for the cells.
+    pub guide_memory: u64,
+    /// `later-rays`: most shadow rays at each vertex that the camera does not see; `None` is `auto`,
+    /// half of `--shadow-rays`.
+    pub later_rays: Option<u32>,
+    /// `regions`: most regions of the environment, 16 to 1024; a render starts with 256.
+    pub regions: u32,
+}
+
+impl Default for GuidedParameters {
+    fn default() -> Self {
+        Self { bounce_candidates: 4, guide_memory: 128 << 20, later_rays: None, regions: 1024 }
+    }
+}
+
+impl GuidedParameters {
+    /// Keys of `--set`.
+    pub(in crate::sampler) const KNOBS: &'static [Knob<Self>] = &[
+        Knob {
+            key: "bounce-candidates",
+            set: |own, value| knob::number(&mut own.bounce_candidates, value, 1..=16),
+            get: |own| own.bounce_candidates.to_string(),
+        },
+        Knob {
+            key: "guide-memory",
+            set: |own, value| {
+                let bytes = parse_bytes(value).filter(|bytes| (1 << 20..=1 << 40).contains(bytes));
+                own.guide_memory = bytes.ok_or("1MiB or more, as in 128MiB")?;
+                Ok(())
+            },
+            get: |own| own.guide_memory.to_string(),
+        },
+        Knob {
+            key: "later-rays",
+            set: |own, value| knob::number_or_auto(&mut own.later_rays, value, 1..=4096),
+            get: |own| knob::text_or_auto(own.later_rays),
+        },
+        Knob {
+            key: "regions",
+            set: |own, value| knob::number(&mut own.regions, value, 16..=1024),
+            get: |own| own.regions.to_string(),
+        },
+    ];
+
+    /// Shadow rays at each later vertex of `shadow_rays` at the first: less of the error comes from
+    /// there, and every ray costs as much (`docs/experiments/later_rays.md`).
+    pub fn later_rays_of(&self, shadow_rays: u32) -> u32 {
+        self.later_rays.unwrap_or((shadow_rays / 2).max(1)).min(shadow_rays)
+    }
+
+    /// Returns true if the bounces of paths of `depth` vertices are guided.
+    pub fn guides_bounces(&self, depth: u32) -> bool {
+        depth > 1 && self.bounce_candidates > 1
+    }
+}
+
+/// Bytes from a number with an optional unit: B, KiB, MiB, GiB.
+fn parse_bytes(text: &str) -> Option<u64> {
+    let digits = text.len() - text.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+    let number: u64 = text[..digits].parse().ok()?;
+    let shift = match &text[digits..] {
+        "" | "B" => 0,
+        "KiB" => 10,
+        "MiB" => 20,
+        "GiB" => 30,
+        _ => return None,
+    };
+    number.checked_mul(1 << shift)
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+    use crate::sampler::{Parameters, Sampler};
+
+    #[test]
+    fn later_vertices_have_half_of_the_rays_unless_told_otherwise() {
+        let mut all = Parameters::default();
+        let later = |all: &Parameters, rays: u32| all.guided.later_rays_of(rays);
+        assert_eq!([0, 1, 2, 5, 16].map(|rays| later(&all, rays)), [0, 1, 1, 2, 8]);
+        all.set("later-rays=3").unwrap();
+        assert_eq!([0, 2, 5].map(|rays| later(&all, rays)), [0, 2, 3]);
+        assert_eq!(Sampler::Guided.describe(&all)["later-rays"], "3");
+        all.set("later-rays=auto").unwrap();
+        assert_eq!(later(&all, 5), 2);
+        assert!(all.guided.guides_bounces(2) && !all.guided.guides_bounces(1));
+        all.set("bounce-candidates=1").unwrap();
+        assert!(!all.guided.guides_bounces(2));
+        assert_eq!(Sampler::Guided.describe(&all)["bounce-candidates"], "1");
+    }
+}

@@ -1,0 +1,177 @@
+//! What the sampler `guided` knows and does at one pixel, read back from the device.
+//!
+//! Its choices rest on what the whole picture taught it, so the renderer of that picture traces the next
+//! samples of one pixel with its tables as they stand. The light they gather is not kept.
+
+use glam::Vec3;
+
+use super::{
+    key::CellKey,
+    partition::Partition,
+    technique::{Guided, with_epoch},
+};
+use crate::{
+    error::Result,
+    pass::{Progress, Runner, Technique, film_buffers::position_in_film_order},
+    shader::{
+        constants::{NO_MATERIAL, NOTHING_TO_LEARN},
+        structs::{Hit, ShadowRay, Wave},
+    },
+};
+
+/// A shadow ray and its outcome.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RecordedRay {
+    /// Unit direction, world space.
+    pub direction: Vec3,
+    /// BRDF · radiance · cosine / pdf; a zero vector was not traced.
+    pub contribution: Vec3,
+    /// True if it reached the environment.
+    pub is_visible: bool,
+}
+
+/// How closely a cell belongs to the place that found it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CellLevel {
+    /// All places whose surface points at this face of the cube.
+    Face(usize),
+    /// Four fine cells along each axis.
+    Coarse(CellKey),
+    /// The place itself.
+    Fine(CellKey),
+}
+
+/// What a cell knows about one region of the environment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RecordedRegion {
+    /// Rays that were counted in the cell itself when its estimates were made, with one candidate also
+    /// directions that brought nothing; shares of rays where the
+    /// regions were split since they were counted.
+    pub trials: f64,
+    /// Those of them that reached the environment.
+    pub hits: f64,
+    /// V̂: estimated share of rays that reach it, by the hierarchy; in the steps of the tables.
+    pub visibility: f64,
+    /// P: probability that a guided direction lies in it.
+    pub probability: f64,
+}
+
+/// A cell of learned visibility.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedCell {
+    /// Which it is.
+    pub level: CellLevel,
+    /// What it knows, region by region of [`RecordedGuide::partition`].
+    pub regions: Vec<RecordedRegion>,
+}
+
+/// A shadow ray with what it belongs to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GuidedRay {
+    /// The ray.
+    pub ray: RecordedRay,
+    /// Index of its sample.
+    pub sample: u32,
+    /// Region of the environment; absent for rays that brought nothing.
+    pub region: Option<usize>,
+}
+
+/// One pixel as the sampler `guided` saw it.
+#[derive(Clone, Debug)]
+pub struct RecordedGuide {
+    /// First hit of the first of the samples, metres.
+    pub position: Vec3,
+    /// Unit shading normal there.
+    pub normal: Vec3,
+    /// Rays of all samples whose camera ray hit something, sample after sample; of more than eight rays
+    /// a hit, the last group.
+    pub rays: Vec<GuidedRay>,
+    /// The cell that the first of the samples with a ray to trace found; absent where the scene is
+    /// open or no ray brought anything.
+    pub cell: Option<RecordedCell>,
+    /// The regions of the environment.
+    pub partition: Partition,
+}
+
+impl Guided {
+    /// Traces `rays` shadow rays of the pixel at `x`, `y` of the film, in whole samples that follow those
+    /// in the film and as far as a wave has room; `None` where no camera ray hit anything. The rays are
+    /// counted among those to learn from, so the render had better not go on.
+    ///
+    /// # Errors
+    /// [`crate::Error::Vulkan`] if the device fails.
+    ///
+    /// # Panics
+    /// If the pixel is not in the window.
+    pub fn record_pixel(
+        &self,
+        runner: &mut Runner,
+        progress: &Progress,
+        [x, y]: [u32; 2],
+        rays: u32,
+    ) -> Result<Option<RecordedGuide>> {
+        let window = runner.scene().window();
+        let (column, row) = (x.wrapping_sub(window.x), y.wrapping_sub(window.y));
+        assert!(column < window.width && row < window.height, "a pixel of the window");
+        let per_group = runner.last_group_rays(self.steps());
+        let samples = rays.div_ceil(per_group.max(1)).clamp(1, runner.waves().capacity());
+        let first_sample = progress.next_sample();
+        let wave = Wave {
+            first_pixel: position_in_film_order(window, column, row),
+            pixel_count: 1,
+            first_sample,
+            sample_count: samples,
+            seed: progress.seed,
+            pixel_stride: 1,
+            ..Wave::default()
+        };
+        let epoch = progress.first_sample.wrapping_add(self.rebuilt_at);
+        let wave = Wave { is_training: 1, ..with_epoch(wave, epoch) };
+        runner.run(self, wave, 1)?;
+        runner.film().take_counters()?;
+
+        let waves = runner.waves();
+        let hits: Vec<Hit> = waves.hits().download(samples as usize)?;
+        let is_hit = |hit: &&Hit| hit.material != NO_MATERIAL;
+        let Some(first_hit) = hits.iter().find(is_hit) else { return Ok(None) };
+        let count = (samples * per_group) as usize;
+        let shadow_rays: Vec<ShadowRay> = waves.shadow_rays().download(count)?;
+        let visible: Vec<u32> = waves.visibility().download(count)?;
+        let targets = if self.is_open {
+            vec![NOTHING_TO_LEARN; count]
+        } else {
+            self.buffers.targets(count)?
+        };
+        let partition = self.buffers.partition();
+        let region_count = partition.regions.len() as u32;
+        let mut rays = Vec::new();
+        let mut cell = None;
+        for (sample, _) in (0..samples).zip(&hits).filter(|(_, hit)| is_hit(hit)) {
+            for ray in 0..per_group {
+                let index = (ray * samples + sample) as usize;
+                let contribution = Vec3::from(shadow_rays[index].contribution);
+                let is_counted = targets[index] != NOTHING_TO_LEARN;
+                if is_counted && cell.is_none() {
+                    cell = Some(self.buffers.cell((targets[index] / region_count) as usize)?);
+                }
+                rays.push(GuidedRay {
+                    ray: RecordedRay {
+                        direction: shadow_rays[index].direction.into(),
+                        contribution,
+                        is_visible: visible[index] != 0,
+                    },
+                    sample: first_sample.wrapping_add(sample),
+                    region: (is_counted && contribution != Vec3::ZERO)
+                        .then_some((targets[index] % region_count) as usize),
+                });
+            }
+        }
+        Ok(Some(RecordedGuide {
+            position: first_hit.position.into(),
+            normal: first_hit.shading_normal.into(),
+            rays,
+            cell,
+            partition: partition.clone(),
+        }))
+    }
+}

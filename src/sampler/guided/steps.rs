@@ -1,0 +1,94 @@
+//! The passes of learned visibility: `sample_guided` in the place of `sample`, `learn` after the shadow
+//! rays; `bounce_guided` in the place of `bounce`, and `learn_arrivals` where its rays arrived.
+
+use super::parameters::GuidedParameters;
+use crate::{
+    pass::{Domain, Kernel, PassSettings, Steps},
+    shader::{
+        constants::{
+            AOV_GUIDE_CELL, CONSTANT_BOUNCE_CANDIDATES, CONSTANT_BRDF_CANDIDATES,
+            CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS, CONSTANT_ROULETTE_VERTEX,
+            GUIDE_SAMPLES_THAT_ALL_TEACH, GUIDE_TEACHING_STEP,
+        },
+        structs::Wave,
+    },
+};
+
+/// The steps of the sampler `guided`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GuidedSteps {
+    /// Candidates per shadow ray, a quarter of them from the BRDF; 1 is the one-sample model.
+    pub candidates: u32,
+    parameters: GuidedParameters,
+    guides_bounces: bool,
+    material_kinds: u32,
+    roulette_vertex: u32,
+}
+
+impl GuidedSteps {
+    /// The steps of a render.
+    pub fn new(candidates: u32, parameters: GuidedParameters, settings: &PassSettings) -> Self {
+        Self {
+            candidates,
+            parameters,
+            guides_bounces: parameters.guides_bounces(settings.depth),
+            material_kinds: settings.material_kinds,
+            roulette_vertex: settings.roulette_vertex,
+        }
+    }
+
+    /// The same steps with another number of candidates.
+    pub fn with_candidates(self, candidates: u32) -> Self {
+        Self { candidates, ..self }
+    }
+}
+
+impl Steps for GuidedSteps {
+    fn shadow_rays_at(&self, vertex: u32, most: u32) -> u32 {
+        if vertex == 0 { most } else { self.parameters.later_rays_of(most) }
+    }
+
+    fn sample(&self, wave: &Wave) -> Vec<Kernel> {
+        let constants = [
+            (CONSTANT_CANDIDATES, self.candidates),
+            (CONSTANT_BRDF_CANDIDATES, (self.candidates / 4).max(1)),
+            (CONSTANT_MATERIAL_KINDS, self.material_kinds),
+        ];
+        let mut kernels = vec![Kernel::new("sample_guided", Domain::Paths, &constants)];
+        let has_arrived = wave.vertex > 0 && wave.first_shadow_ray == 0;
+        if self.guides_bounces && has_arrived && teaches(wave) {
+            kernels.push(Kernel::new("learn_arrivals", Domain::Paths, &[]));
+        }
+        kernels
+    }
+
+    fn after_shadow_rays(&self, wave: &Wave) -> Vec<Kernel> {
+        let learn = teaches(wave).then(|| Kernel::new("learn", Domain::ShadowRays, &[]));
+        learn.into_iter().collect()
+    }
+
+    fn finish(&self, wave: &Wave) -> Vec<Kernel> {
+        let is_shown = wave.vertex == 0 && wave.aovs & AOV_GUIDE_CELL != 0 && wave.is_training == 0;
+        is_shown.then(|| Kernel::new("show_cells", Domain::Pixels, &[])).into_iter().collect()
+    }
+
+    fn bounce(&self, _wave: &Wave) -> Option<Kernel> {
+        let constants = [
+            (CONSTANT_BOUNCE_CANDIDATES, self.parameters.bounce_candidates),
+            (CONSTANT_ROULETTE_VERTEX, self.roulette_vertex),
+            (CONSTANT_MATERIAL_KINDS, self.material_kinds),
+        ];
+        self.guides_bounces.then(|| Kernel::new("bounce_guided", Domain::Paths, &constants))
+    }
+}
+
+/// Returns true if any sample of `wave` teaches.
+fn teaches(wave: &Wave) -> bool {
+    let first = wave.first_sample.wrapping_sub(wave.epoch_start);
+    let next = if first < GUIDE_SAMPLES_THAT_ALL_TEACH {
+        first
+    } else {
+        first.next_multiple_of(GUIDE_TEACHING_STEP)
+    };
+    next - first < wave.sample_count.max(1)
+}

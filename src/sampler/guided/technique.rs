@@ -1,0 +1,262 @@
+//! `guided` in one render: when it trains, rebuilds and chooses, and what it hands on.
+
+use super::{
+    buffers::{GuideBuffers, GuideSize, SPLIT_AFTER, guide_schedule},
+    choice::Choice,
+    cost::GUIDED_CANDIDATES,
+    parameters::GuidedParameters,
+    state::GuideState,
+    steps::GuidedSteps,
+};
+use crate::{
+    error::Result,
+    film::Aov,
+    gpu::DescriptorSet,
+    math::random::hash_4d,
+    pass::{Progress, Report, Runner, SHADOW_RAYS_PER_GROUP, Steps, Technique},
+    sampler::{
+        Context, Parameters, Room,
+        basic::{self, BasicSteps},
+        knob,
+    },
+    shader::structs::Wave,
+};
+use std::collections::BTreeMap;
+
+/// Sweeps that teach the guide before the first sample, each over one pixel in as many.
+const TRAINING_SWEEPS: u32 = 8;
+/// Share of visible rays above which a scene is rendered as by `mis`: little is blocked, and learning
+/// costs more than it brings.
+const OPEN_SHARE: f64 = 0.5;
+/// Tells the seeds of epochs from other hashes.
+const EPOCH_TAG: u32 = 0x6b43_a9b5;
+/// Tells the random numbers of training from those of the picture.
+pub(super) const TRAINING_SEED: u32 = 0x7e11_ab1e;
+
+/// The room of `guided`.
+pub(in crate::sampler) struct GuidedRoom;
+
+impl Room for GuidedRoom {
+    fn check(&self, parameters: &Parameters, _depth: u32) -> Result<()> {
+        first_candidates(parameters).map(drop)
+    }
+
+    fn aovs(&self) -> &[Aov] {
+        &[Aov::GuideCell]
+    }
+
+    fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
+        let mut named = knob::describe(GuidedParameters::KNOBS, &parameters.guided);
+        named.insert("candidates".to_owned(), knob::text_or_auto(parameters.candidates));
+        named
+    }
+
+    fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
+        let Context { scene, parameters, runner } = context;
+        let settings = runner.settings();
+        let own = parameters.guided;
+        let size = GuideSize {
+            pixels: runner.film().padded_pixels(),
+            paths: runner.waves().capacity(),
+            shadow_rays: settings.shadow_rays.clamp(1, SHADOW_RAYS_PER_GROUP),
+            has_bounces: own.guides_bounces(settings.depth),
+        };
+        let mut guided = Guided {
+            buffers: GuideBuffers::new(runner.device(), scene, &own, size)?,
+            steps: GuidedSteps::new(first_candidates(parameters)?, own, settings),
+            open_steps: basic::MIS.steps(parameters, settings.material_kinds)?,
+            given_candidates: parameters.candidates,
+            choice: Choice::default(),
+            is_trained: false,
+            is_open: false,
+            rebuilt_at: 0,
+        };
+        guided.forget_choice();
+        Ok(Box::new(guided))
+    }
+}
+
+/// Candidates per shadow ray until the choice is made.
+fn first_candidates(parameters: &Parameters) -> Result<u32> {
+    parameters.candidates_among("guided", &GUIDED_CANDIDATES, GUIDED_CANDIDATES[0])
+}
+
+/// `guided` in one render.
+pub struct Guided {
+    pub(super) buffers: GuideBuffers,
+    pub(super) steps: GuidedSteps,
+    /// Those of `mis`, for scenes where nothing is blocked.
+    open_steps: BasicSteps,
+    /// Candidates that were asked for; none under `auto`.
+    pub(super) given_candidates: Option<u32>,
+    pub(super) choice: Choice,
+    /// True once the training sweeps are behind.
+    is_trained: bool,
+    /// True if so little is blocked that there is nothing to learn.
+    pub(super) is_open: bool,
+    /// Samples per pixel at the last rebuild of the guide.
+    pub(super) rebuilt_at: u32,
+}
+
+impl Guided {
+    /// What was learned so far, in a film of `samples` samples per pixel.
+    ///
+    /// # Errors
+    /// [`crate::Error::Vulkan`] if the device fails.
+    pub fn state(&self, samples: u32) -> Result<GuideState> {
+        Ok(GuideState {
+            samples,
+            rebuilt_at: self.rebuilt_at,
+            is_open: self.is_open,
+            candidates: self.candidates(),
+            ..self.buffers.state()?
+        })
+    }
+
+    /// Goes on from what an earlier render learned, without training. With as many samples in the film
+    /// as the state was taken at, this continues that render to the bit. Under `candidates=auto` the
+    /// number that one chose is taken too. Returns true if the geometry is another, so that most was
+    /// forgotten.
+    ///
+    /// # Errors
+    /// [`crate::Error::Usage`] if the environment or the regions differ; [`crate::Error::Vulkan`] if
+    /// the device fails.
+    pub fn restore(
+        &mut self,
+        runner: &mut Runner,
+        progress: &Progress,
+        state: &GuideState,
+    ) -> Result<bool> {
+        let samples = progress.sample_count;
+        let has_moved = self.buffers.restore(state)?;
+        self.is_open = state.is_open && !has_moved;
+        if state.samples == samples {
+            self.rebuilt_at = state.rebuilt_at;
+        } else {
+            self.buffers.rebuild(false)?;
+            self.rebuilt_at = samples;
+        }
+        self.is_trained = true;
+        if let Some(candidates) = state.candidates {
+            self.take_choice(candidates);
+            runner.warm_up(self)?;
+        }
+        Ok(has_moved)
+    }
+
+    /// Candidates that each shadow ray is chosen from; none where `auto` has not been decided yet, and
+    /// in open scenes.
+    fn candidates(&self) -> Option<u32> {
+        self.choice.candidates.filter(|_| !self.is_open)
+    }
+
+    fn rebuild(&mut self, splits: bool, samples: u32) -> Result<()> {
+        self.rebuilt_at = samples;
+        self.buffers.rebuild(splits)
+    }
+
+    /// Sweeps over parts of the film to learn from. Finds out whether the scene is open.
+    fn train(&mut self, runner: &mut Runner, progress: &Progress) -> Result<()> {
+        for sweep in 0..TRAINING_SWEEPS {
+            let wave = Wave {
+                first_pixel: sweep,
+                first_sample: progress.next_sample(),
+                sample_count: 1,
+                seed: progress.seed ^ TRAINING_SEED,
+                pixel_stride: TRAINING_SWEEPS,
+                is_training: 1,
+                ..Wave::default()
+            };
+            let wave = with_epoch(wave, wave.first_sample);
+            let before = runner.totals().clone();
+            runner.sweep(self, wave, runner.film().padded_pixels() / TRAINING_SWEEPS)?;
+            runner.take_counters()?;
+            // The first sweep draws by environment and BRDF alone: nothing is known yet. It is
+            // not in the picture, so the picture does not depend on its own samples here.
+            let visible = runner.totals().shadow_rays_visible - before.shadow_rays_visible;
+            let traced = runner.totals().shadow_rays_traced - before.shadow_rays_traced;
+            if sweep == 0 && visible as f64 > OPEN_SHARE * traced as f64 {
+                log::info!("{visible} of {traced} rays of the first sweep are visible: as mis");
+                self.is_open = true;
+                return Ok(());
+            }
+            // Every rebuild costs time: after 1, 2, 4 and 8 sweeps.
+            if (sweep + 1).is_power_of_two() {
+                self.rebuild(sweep + 1 == TRAINING_SWEEPS, progress.sample_count)?;
+            }
+        }
+        self.is_trained = true;
+        Ok(())
+    }
+}
+
+impl Technique for Guided {
+    fn steps(&self) -> &dyn Steps {
+        if self.is_open { &self.open_steps } else { &self.steps }
+    }
+
+    fn other_steps(&self) -> Vec<Box<dyn Steps>> {
+        let mut others: Vec<Box<dyn Steps>> = vec![Box::new(self.open_steps)];
+        if self.given_candidates.is_none() {
+            for candidates in &GUIDED_CANDIDATES[..2] {
+                others.push(Box::new(self.steps.with_candidates(*candidates)));
+            }
+        }
+        others
+    }
+
+    fn set(&self) -> Option<&DescriptorSet> {
+        Some(self.buffers.set())
+    }
+
+    fn complete(&self, wave: Wave, progress: &Progress) -> Wave {
+        with_epoch(wave, progress.first_sample.wrapping_add(self.rebuilt_at))
+    }
+
+    fn learn(&mut self, runner: &mut Runner, progress: &Progress) -> Result<u32> {
+        let samples = progress.sample_count;
+        if !self.is_trained && !self.is_open {
+            self.train(runner, progress)?;
+        } else if self.rebuilt_at != samples && guide_schedule(samples) == samples && !self.is_open
+        {
+            self.rebuild(samples == SPLIT_AFTER, samples)?;
+        }
+        if self.is_open {
+            return Ok(u32::MAX);
+        }
+        if self.choice.candidates.is_none() {
+            self.choose_candidates(runner, progress)?;
+        }
+        Ok(guide_schedule(samples + 1) - samples)
+    }
+
+    fn restart(&mut self, _runner: &mut Runner) -> Result<()> {
+        self.buffers.forget()?;
+        self.is_trained = false;
+        self.is_open = false;
+        self.rebuilt_at = 0;
+        self.forget_choice();
+        Ok(())
+    }
+
+    fn report(&self) -> Report {
+        Report {
+            host_ms: [
+                ("guide rebuilds".to_owned(), self.buffers.rebuild_ms()),
+                ("choice of candidates".to_owned(), self.choice.ms),
+            ]
+            .into(),
+            buffer_bytes: self.buffers.buffer_bytes(),
+            candidates: self.candidates(),
+            candidate_costs: self.choice.costs.clone(),
+            ..Report::default()
+        }
+    }
+}
+
+/// `wave` with numbers of its own for the epoch that begins at `sample`: those of `guided` start anew
+/// after every rebuild.
+pub(super) fn with_epoch(wave: Wave, sample: u32) -> Wave {
+    let [epoch_seed, ..] = hash_4d([wave.seed, sample, EPOCH_TAG, wave.is_training]);
+    Wave { epoch_seed, epoch_start: sample, ..wave }
+}

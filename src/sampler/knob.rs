@@ -1,0 +1,77 @@
+//! Parameters that `--set key=value` reaches: one row of a table for each.
+
+use std::{collections::BTreeMap, fmt::Display, ops::RangeInclusive, str::FromStr};
+
+use crate::error::{Error, Result};
+
+/// A parameter of `P`.
+pub struct Knob<P> {
+    /// Key of `--set`, also in metadata and statistics.
+    pub key: &'static str,
+    /// Takes a value, or fails with what it expects.
+    pub set: fn(&mut P, &str) -> Result<(), String>,
+    /// The value as text.
+    pub get: fn(&P) -> String,
+}
+
+/// Sets the parameter `key`; returns false if the table has none.
+///
+/// # Errors
+/// [`Error::Usage`] for a value out of range.
+pub fn set<P>(knobs: &[Knob<P>], parameters: &mut P, key: &str, value: &str) -> Result<bool> {
+    let Some(knob) = knobs.iter().find(|knob| knob.key == key) else { return Ok(false) };
+    (knob.set)(parameters, value)
+        .map_err(|expected| Error::usage(format!("--set {key}={value}: expected {expected}")))?;
+    Ok(true)
+}
+
+/// The parameters of a table by key.
+pub fn describe<P>(knobs: &[Knob<P>], parameters: &P) -> BTreeMap<String, String> {
+    knobs.iter().map(|knob| (knob.key.to_owned(), (knob.get)(parameters))).collect()
+}
+
+/// Takes a number of a range.
+pub fn number<T: FromStr + PartialOrd + Display>(
+    target: &mut T,
+    value: &str,
+    range: RangeInclusive<T>,
+) -> Result<(), String> {
+    let parsed = value.parse().ok().filter(|number| range.contains(number));
+    *target = parsed.ok_or_else(|| format!("{} to {}", range.start(), range.end()))?;
+    Ok(())
+}
+
+/// Takes `auto` as none, or a number of a range.
+pub fn number_or_auto(
+    target: &mut Option<u32>,
+    value: &str,
+    range: RangeInclusive<u32>,
+) -> Result<(), String> {
+    if value == "auto" {
+        *target = None;
+        return Ok(());
+    }
+    let mut count = 0;
+    number(&mut count, value, range).map_err(|expected| format!("auto, or {expected}"))?;
+    *target = Some(count);
+    Ok(())
+}
+
+/// `auto` for none, else the number.
+pub fn text_or_auto(value: Option<u32>) -> String {
+    value.map_or("auto".to_owned(), |number| number.to_string())
+}
+
+/// Takes one of the named values.
+pub fn choice<T: Copy>(target: &mut T, value: &str, names: &[(&str, T)]) -> Result<(), String> {
+    let found = names.iter().find(|(name, _)| *name == value);
+    let known = || names.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(" or ");
+    *target = found.map(|(_, choice)| *choice).ok_or_else(known)?;
+    Ok(())
+}
+
+/// The name of a value.
+pub fn name_of<T: PartialEq>(value: &T, names: &[(&str, T)]) -> String {
+    let found = names.iter().find(|(_, choice)| choice == value);
+    found.map_or_else(String::new, |(name, _)| (*name).to_owned())
+}

@@ -1,0 +1,182 @@
+//! Parameters of all samplers, set by `--set key=value`.
+
+use super::{
+    guided::GuidedParameters,
+    knob::{self, Knob},
+    product::ProductParameters,
+    visibility::VisibilityParameters,
+};
+use crate::error::{Error, Result};
+
+/// Parameters of the samplers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Parameters {
+    /// `candidates`: directions that each shadow ray of `ris` or `guided` is chosen from; `None` is
+    /// `auto`.
+    pub candidates: Option<u32>,
+    /// Those of `product`, also within `visibility`.
+    pub product: ProductParameters,
+    /// Those of `visibility`.
+    pub visibility: VisibilityParameters,
+    /// Those of `guided`.
+    pub guided: GuidedParameters,
+}
+
+/// Parameters that no room has to itself.
+const KNOBS: &[Knob<Parameters>] = &[
+    Knob {
+        key: "candidates",
+        set: |parameters, value| {
+            let expected = "auto, 2, 4, 6 or 8 for ris, auto, 1, 4 or 8 for guided";
+            let is_known = |count: &Option<u32>| matches!(count, None | Some(1 | 2 | 4 | 6 | 8));
+            let mut candidates = None;
+            knob::number_or_auto(&mut candidates, value, 1..=8).map_err(|_| expected)?;
+            parameters.candidates = Some(candidates).filter(is_known).ok_or(expected)?;
+            Ok(())
+        },
+        get: |parameters| knob::text_or_auto(parameters.candidates),
+    },
+    Knob {
+        key: "preset",
+        set: |parameters, value| {
+            let mut product = ProductParameters::default();
+            let presets = [
+                ("default", ProductParameters::default()),
+                ("strict", ProductParameters::strict()),
+            ];
+            knob::choice(&mut product, value, &presets)?;
+            parameters.product = product;
+            parameters.visibility = VisibilityParameters::default();
+            Ok(())
+        },
+        get: |_| String::new(),
+    },
+];
+
+impl Parameters {
+    /// Sets one parameter from `key=value`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for an unknown key, which lists the known ones, or a value out of range.
+    pub fn set(&mut self, assignment: &str) -> Result<()> {
+        let (key, value) = assignment.split_once('=').ok_or_else(|| {
+            Error::usage(format!("--set {assignment}: expected key=value, found no '='"))
+        })?;
+        let is_known = knob::set(KNOBS, self, key, value)?
+            || knob::set(ProductParameters::KNOBS, &mut self.product, key, value)?
+            || knob::set(VisibilityParameters::KNOBS, &mut self.visibility, key, value)?
+            || knob::set(GuidedParameters::KNOBS, &mut self.guided, key, value)?;
+        if is_known {
+            return Ok(());
+        }
+        Err(Error::usage(format!(
+            "--set {key}: unknown parameter; known: {}",
+            Self::keys().join(", ")
+        )))
+    }
+
+    /// Every key.
+    pub fn keys() -> Vec<&'static str> {
+        let mut keys: Vec<_> = KNOBS
+            .iter()
+            .map(|knob| knob.key)
+            .chain(ProductParameters::KNOBS.iter().map(|knob| knob.key))
+            .chain(VisibilityParameters::KNOBS.iter().map(|knob| knob.key))
+            .chain(GuidedParameters::KNOBS.iter().map(|knob| knob.key))
+            .collect();
+        keys.sort_unstable();
+        keys
+    }
+
+    /// The number of candidates for a sampler that can take those of `allowed`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where another number was asked for.
+    pub fn candidates_among(&self, sampler: &str, allowed: &[u32], auto: u32) -> Result<u32> {
+        let count = self.candidates.unwrap_or(auto);
+        if allowed.contains(&count) {
+            return Ok(count);
+        }
+        Err(Error::usage(format!(
+            "--set candidates={count}: {sampler} takes auto or one of {allowed:?}"
+        )))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+    use super::*;
+    use crate::sampler::Sampler;
+
+    #[test]
+    fn an_unknown_key_lists_the_known_ones() {
+        let error = Parameters::default().set("candidate=4").unwrap_err().to_string();
+        assert!(
+            error.contains("candidate:") && error.contains("known: bounce-candidates"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn keys_have_one_spelling() {
+        let keys = Parameters::keys();
+        assert!(keys.windows(2).all(|pair| pair[0] < pair[1]), "{keys:?}");
+        assert!(keys.iter().all(|key| !key.contains('_')), "{keys:?}");
+    }
+
+    #[test]
+    fn values_out_of_range_are_refused() {
+        for value in ["candidates=0", "candidates=3", "candidates=10", "candidates=x", "candidates"]
+        {
+            assert!(Parameters::default().set(value).is_err(), "{value}");
+        }
+        let mut parameters = Parameters::default();
+        parameters.set("candidates=8").unwrap();
+        assert_eq!(parameters.candidates, Some(8));
+        assert_eq!(Sampler::Ris.describe(&parameters)["candidates"], "8");
+        Sampler::Ris.check(&parameters, 1, &[]).unwrap();
+        Sampler::Mis.check(&parameters, 1, &[]).unwrap();
+        parameters.set("candidates=1").unwrap();
+        let error = Sampler::Ris.check(&parameters, 1, &[]).unwrap_err().to_string();
+        assert!(error.contains("[2, 4, 6, 8]"), "{error}");
+        parameters.set("candidates=auto").unwrap();
+        assert_eq!(parameters.candidates_among("guided", &[1, 4], 1).unwrap(), 1);
+        parameters.set("guide-memory=16MiB").unwrap();
+        assert_eq!(parameters.guided.guide_memory, 16 << 20);
+        for wrong in [
+            "guide-memory=1",
+            "guide-memory=x",
+            "guide-memory=4TB",
+            "regions=2000",
+            "bounce-candidates=0",
+            "bounce-candidates=17",
+            "later-rays=0",
+            "later-rays=x",
+            "lobes=0",
+            "lobes=513",
+            "k=NaN",
+            "brdf-share=0",
+            "cache=scene",
+            "preset=loose",
+        ] {
+            let error = parameters.set(wrong).unwrap_err().to_string();
+            assert!(error.contains(&format!("--set {wrong}: expected")), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_preset_replaces_all() {
+        let mut parameters = Parameters::default();
+        for assignment in ["order=coefficient", "k=1", "cache=pixel"] {
+            parameters.set(assignment).unwrap();
+        }
+        assert_ne!(parameters, Parameters::default());
+        parameters.set("preset=strict").unwrap();
+        assert_eq!(parameters.product, ProductParameters::strict());
+        assert_eq!(parameters.visibility, VisibilityParameters::default());
+        parameters.set("preset=default").unwrap();
+        assert_eq!(parameters, Parameters::default());
+    }
+}

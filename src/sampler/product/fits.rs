@@ -1,0 +1,174 @@
+//! The fits of environment and materials on the device, for `product` and `visibility`.
+
+use std::{collections::BTreeMap, sync::Arc, time::Instant};
+
+use super::parameters::{Elevation, LobeOrder, ProductParameters};
+use crate::{
+    brdf::MaterialTables,
+    error::{Error, Result},
+    fit::{
+        self, BrdfFit, BrdfOptions, EnvironmentLobe, EnvironmentOptions, Method, brdf_lobes,
+        environment_lobes,
+    },
+    gpu::{Buffer, Device},
+    scene::Scene,
+    shader::bindings::{Binding, product},
+};
+
+/// Sizes of the fits on the device.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitSizes {
+    /// Lobes of the environment; 0 where nothing could be fitted.
+    pub environment_lobes: u32,
+    /// Logarithm of the largest integral of an environment lobe over 2π, in the form of
+    /// `multiply_lobes.comp`; of the largest amplitude where lobes are ordered by coefficient.
+    pub strongest_environment_lobe: f32,
+    /// Most lobes of a material in one view.
+    pub brdf_lobes: u32,
+    /// View elevations.
+    pub views: u32,
+}
+
+/// The SRBF tables of a scene.
+pub struct Fits {
+    buffers: [Buffer; 3],
+    sizes: FitSizes,
+    hashes: BTreeMap<String, String>,
+    fit_ms: f64,
+}
+
+impl Fits {
+    /// Fits the environment and every material, or takes the fits from the user's cache, and uploads
+    /// them. What cannot be fitted, as a black map or material, has no lobes and a warning.
+    ///
+    /// # Errors
+    /// Numbers of lobes or views out of range; a failing device.
+    pub fn new(
+        device: &Arc<Device>,
+        scene: &Scene,
+        parameters: &ProductParameters,
+    ) -> Result<Self> {
+        if parameters.elevation == Elevation::Metropolis {
+            log::warn!("--set elevation=metropolis: a short random walk, so the image is biased");
+        }
+        let start = Instant::now();
+        let cache = fit::Cache::user();
+        let mut hashes = BTreeMap::new();
+
+        log::info!("fitting the environment of {}", scene.name);
+        let options = EnvironmentOptions {
+            lobes: parameters.environment_lobes as usize,
+            method: Method::default(),
+        };
+        let fitted = environment_lobes(&scene.environment, options, cache.as_ref(), &mut |_| ());
+        let environment: Vec<EnvironmentLobe> = or_warn(fitted)?
+            .map(|fit| fit.world_lobes(scene.environment.rotation_rad))
+            .unwrap_or_default();
+        hashes.insert(
+            "environment".to_owned(),
+            fit::cache::key(&[bytemuck::cast_slice(&environment)]),
+        );
+
+        let tables = MaterialTables::new(&scene.materials)?;
+        let options = BrdfOptions {
+            lobes: parameters.brdf_lobes as usize,
+            views: parameters.views as usize,
+            method: Method::default(),
+        };
+        let mut lobes: Vec<[f32; 4]> = Vec::new();
+        let mut materials: Vec<[u32; 2]> = Vec::new();
+        for (index, material) in scene.materials.iter().enumerate() {
+            log::info!("fitting the material {}", material.name);
+            let fitted =
+                brdf_lobes(&tables, index, &material.name, options, cache.as_ref(), &mut |_| ());
+            let first = lobes.len();
+            let per_view = or_warn(fitted)?.map_or(0, |fit| append(&mut lobes, &fit));
+            materials.push([first as u32, per_view]);
+            hashes.insert(
+                format!("material {}", material.name),
+                fit::cache::key(&[bytemuck::cast_slice(&lobes[first..])]),
+            );
+        }
+        let strength = |lobe: &EnvironmentLobe| match parameters.order {
+            LobeOrder::Integral => lobe.amplitude.ln() - lobe.bandwidth.hypot(0.5).ln(),
+            LobeOrder::Coefficient => lobe.amplitude.ln(),
+        };
+        let sizes = FitSizes {
+            strongest_environment_lobe: environment.iter().map(strength).fold(f32::MIN, f32::max),
+            environment_lobes: environment.len() as u32,
+            brdf_lobes: materials.iter().map(|material| material[1]).max().unwrap_or(0),
+            views: parameters.views,
+        };
+        let fit_ms = start.elapsed().as_secs_f64() * 1e3;
+
+        let environment: Vec<[f32; 4]> = environment
+            .iter()
+            .map(|lobe| exponents(lobe.axis, lobe.bandwidth, lobe.amplitude))
+            .collect();
+        let buffers = [
+            Buffer::texels_from_slice(device, "environment lobes", &environment)?,
+            Buffer::texels_from_slice(device, "BRDF lobes", &lobes)?,
+            Buffer::texels_from_slice(device, "material lobes", &materials)?,
+        ];
+        Ok(Self { buffers, sizes, hashes, fit_ms })
+    }
+
+    /// The tables with their bindings.
+    pub fn bindings(&self) -> Vec<(Binding, &Buffer)> {
+        [product::ENVIRONMENT_LOBES, product::BRDF_LOBES, product::MATERIAL_LOBES]
+            .into_iter()
+            .zip(&self.buffers)
+            .collect()
+    }
+
+    /// Numbers of lobes and views.
+    pub fn sizes(&self) -> FitSizes {
+        self.sizes
+    }
+
+    /// Hash of each fit by what was fitted.
+    pub fn hashes(&self) -> &BTreeMap<String, String> {
+        &self.hashes
+    }
+
+    /// Milliseconds for all fits, or for finding them in the cache.
+    pub fn fit_ms(&self) -> f64 {
+        self.fit_ms
+    }
+
+    /// Every table.
+    pub fn buffers(&self) -> &[Buffer] {
+        &self.buffers
+    }
+}
+
+/// A fit, or a warning where there is nothing to fit.
+fn or_warn<T>(fitted: Result<T>) -> Result<Option<T>> {
+    match fitted {
+        Ok(fit) => Ok(Some(fit)),
+        Err(error @ Error::Fit { .. }) => {
+            log::warn!("{error}; sampling does without its lobes");
+            Ok(None)
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// The texel of a lobe: what adds up where lobes are multiplied, see `ENVIRONMENT_LOBES`.
+fn exponents(axis: [f32; 3], bandwidth: f32, amplitude: f32) -> [f32; 4] {
+    let [x, y, z] = axis.map(|component| bandwidth * component);
+    // A lobe of no amplitude is weaker than all others.
+    let logarithm = if amplitude > 0.0 { amplitude.ln() } else { -1e30 };
+    [x, y, z, logarithm - bandwidth]
+}
+
+/// Appends the lobes of all views; returns how many each view has.
+fn append(lobes: &mut Vec<[f32; 4]>, fit: &BrdfFit) -> u32 {
+    lobes.extend(
+        fit.views
+            .iter()
+            .flat_map(|view| &view.lobes)
+            .map(|lobe| exponents(lobe.axis.to_array(), lobe.bandwidth, lobe.amplitude)),
+    );
+    fit.views.first().map_or(0, |view| view.lobes.len() as u32)
+}

@@ -1,0 +1,120 @@
+//! Lobes of the product at every hit of a wave, on the device, with the fits they are made from.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use super::fits::Fits;
+use crate::{
+    error::Result,
+    gpu::{Buffer, DescriptorSet, Device},
+    pass::PathDemand,
+    shader::{
+        bindings::{PRODUCT, product},
+        constants::LOBES_PER_SUM,
+    },
+};
+
+/// Size of everything that is kept for the lobes of a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LobeSize {
+    /// Lobes kept per path.
+    pub kept_lobes: u32,
+    /// Directions in a visibility cache; 0 without one.
+    pub cache_capacity: u32,
+    /// Pixels of the window, where caches belong to pixels; none where they belong to paths.
+    pub cached_pixels: Option<u64>,
+}
+
+impl LobeSize {
+    /// Words per path that tell which lobes cached directions are close to: `MASK_WORDS` of
+    /// `cache.glsl` for every place of the cache and for the direction under way.
+    fn mask_words(self) -> u64 {
+        u64::from(self.kept_lobes.div_ceil(32)) * (u64::from(self.cache_capacity) + 1)
+    }
+
+    /// Memory per path in flight.
+    pub fn demand(self) -> PathDemand {
+        let lobes = u64::from(self.kept_lobes);
+        let masks = self.mask_words();
+        PathDemand { bytes: (8 * lobes).max(4 * masks), texels: lobes.max(masks) }
+    }
+}
+
+/// Descriptor set 1 of `product` and `visibility`.
+pub struct LobeBuffers {
+    set: DescriptorSet,
+    /// Lobes, their number, sums of weights, close lobes, visibility caches.
+    buffers: [Buffer; 5],
+    fits: Fits,
+}
+
+impl LobeBuffers {
+    /// Makes room for the lobes of `paths` paths.
+    ///
+    /// # Errors
+    /// A limit of the device or a failing device.
+    pub fn new(device: &Arc<Device>, fits: Fits, size: LobeSize, paths: u32) -> Result<Self> {
+        let paths = u64::from(paths);
+        let lobes = u64::from(size.kept_lobes);
+        let make = |name, count: u64, bytes: u64| Buffer::new(device, name, count * bytes);
+        let caches = size.cached_pixels.unwrap_or(paths);
+        let cache_words =
+            if size.cache_capacity > 0 { 1 + u64::from(size.cache_capacity) } else { 0 };
+        let buffers = [
+            make("product lobes", paths * lobes, 8)?,
+            make("lobe counts", paths, 4)?,
+            make("lobe sums", paths * lobes.div_ceil(u64::from(LOBES_PER_SUM)), 4)?,
+            make("close lobes", paths * size.mask_words(), 4)?,
+            Buffer::zeroed(device, "visibility caches", 4 * caches * cache_words)?,
+        ];
+        let [lobes, counts, sums, close, caches] = &buffers;
+        let mut bound = fits.bindings();
+        bound.extend([
+            (product::LOBES, lobes),
+            (product::LOBE_TEXELS, lobes),
+            (product::LOBE_COUNTS, counts),
+            (product::LOBE_SUMS, sums),
+            (product::LOBE_SUM_TEXELS, sums),
+            (product::CLOSE_LOBES, close),
+            (product::CLOSE_LOBE_TEXELS, close),
+            (product::VISIBILITY_CACHE, caches),
+        ]);
+        let set = DescriptorSet::new(device, &PRODUCT, &bound)?;
+        Ok(Self { set, buffers, fits })
+    }
+
+    /// The set of the sampler.
+    pub fn set(&self) -> &DescriptorSet {
+        &self.set
+    }
+
+    /// The fits.
+    pub fn fits(&self) -> &Fits {
+        &self.fits
+    }
+
+    /// Two words per lobe and path (`lobes.glsl`).
+    pub fn lobes(&self) -> &Buffer {
+        &self.buffers[0]
+    }
+
+    /// Number of lobes of each path.
+    pub fn counts(&self) -> &Buffer {
+        &self.buffers[1]
+    }
+
+    /// Masks of the lobes that cached directions are close to (`cache.glsl`).
+    pub fn close_lobes(&self) -> &Buffer {
+        &self.buffers[3]
+    }
+
+    /// Visibility caches: a head and directions each.
+    pub fn caches(&self) -> &Buffer {
+        &self.buffers[4]
+    }
+
+    /// Bytes by buffer name.
+    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+        let all = self.buffers.iter().chain(self.fits.buffers());
+        all.map(|buffer| (buffer.name().to_owned(), buffer.size())).collect()
+    }
+}

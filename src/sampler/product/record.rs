@@ -1,0 +1,65 @@
+//! The lobes at one hit, read back from the device.
+
+use glam::Vec3;
+
+use super::lobes::LobeBuffers;
+use crate::{error::Result, math::octahedron, pass::BLOCK_PIXELS};
+
+/// A lobe of the product at a hit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RecordedLobe {
+    /// Unit axis, world space.
+    pub axis: Vec3,
+    /// Bandwidth of the SRBF.
+    pub bandwidth: f32,
+    /// Probability among the lobes for the first ray.
+    pub before: f64,
+    /// Probability among the lobes for the last ray.
+    pub after: f64,
+}
+
+/// Number of lobes of the first path of the last wave.
+///
+/// # Errors
+/// [`crate::Error::Vulkan`] if the device fails.
+pub fn lobe_count(buffers: &LobeBuffers) -> Result<usize> {
+    Ok(buffers.counts().download::<u32>(1)?.first().map_or(0, |count| *count as usize))
+}
+
+/// Reads the lobes of the first path of a wave of one block: fills `lobes` on the first call, and their
+/// last probabilities on every one. `factors` are the visibility weights V.
+///
+/// # Errors
+/// [`crate::Error::Vulkan`] if the device fails.
+pub fn read_lobes(
+    buffers: &LobeBuffers,
+    factors: &[f64],
+    lobes: &mut Vec<RecordedLobe>,
+) -> Result<()> {
+    let count = factors.len();
+    if count == 0 {
+        return Ok(());
+    }
+    let stride = BLOCK_PIXELS as usize;
+    let words: Vec<[u32; 2]> = buffers.lobes().download((count - 1) * stride + 1)?;
+    let weight = |lobe: usize| f64::from(half(words[lobe * stride][1] >> 16)) * factors[lobe];
+    let total: f64 = (0..count).map(weight).sum();
+    let probability = |lobe: usize| if total > 0.0 { weight(lobe) / total } else { 0.0 };
+    if lobes.is_empty() {
+        lobes.extend((0..count).map(|lobe| RecordedLobe {
+            axis: octahedron::unpack(words[lobe * stride][0]),
+            bandwidth: half(words[lobe * stride][1]),
+            before: probability(lobe),
+            after: 0.0,
+        }));
+    }
+    for (index, lobe) in lobes.iter_mut().enumerate() {
+        lobe.after = probability(index);
+    }
+    Ok(())
+}
+
+/// The half in the lower 16 bits.
+fn half(word: u32) -> f32 {
+    half::f16::from_bits(word as u16).to_f32()
+}

@@ -1,0 +1,81 @@
+//! The passes of product sampling: `multiply_lobes` once per hit, `sample_lobes` per group of rays.
+
+use super::{
+    fits::FitSizes,
+    parameters::{Elevation, LobeOrder, ProductParameters},
+};
+use crate::{
+    pass::{Domain, Kernel, Steps},
+    shader::{
+        constants::{
+            CONSTANT_BRDF_LOBES, CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_LOBES,
+            CONSTANT_ENVIRONMENT_SHARE, CONSTANT_KEPT_LOBES, CONSTANT_MATERIAL_KINDS,
+            CONSTANT_METROPOLIS, CONSTANT_ORDER_BY_COEFFICIENT, CONSTANT_SAMPLER,
+            CONSTANT_STRONGEST_ENVIRONMENT_LOBE, CONSTANT_VIEWS, SAMPLER_PRODUCT,
+        },
+        structs::Wave,
+    },
+};
+
+/// The steps of `product`, and those of `visibility` that it has in common with it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProductSteps {
+    /// Parameters of product sampling.
+    pub parameters: ProductParameters,
+    /// Sizes of the fits.
+    pub fits: FitSizes,
+    /// Bit `1 << kind` for every kind of material in the scene.
+    pub material_kinds: u32,
+    /// Tag of the sampler, `SAMPLER_…`.
+    pub sampler: u32,
+    /// Specialization of the visibility cache; empty without one.
+    pub cache: Vec<(u32, u32)>,
+}
+
+impl ProductSteps {
+    /// The steps of the sampler `product`.
+    pub fn new(parameters: ProductParameters, fits: FitSizes, material_kinds: u32) -> Self {
+        Self { parameters, fits, material_kinds, sampler: SAMPLER_PRODUCT, cache: Vec::new() }
+    }
+
+    /// A pass over paths that knows lobes and cache.
+    pub fn kernel(&self, shader: &'static str, constants: &[(u32, u32)]) -> Kernel {
+        let mut all = vec![(CONSTANT_KEPT_LOBES, self.parameters.kept_lobes)];
+        all.extend(&self.cache);
+        all.extend(constants);
+        Kernel::new(shader, Domain::Paths, &all)
+    }
+}
+
+impl Steps for ProductSteps {
+    fn prepare(&self, _wave: &Wave) -> Vec<Kernel> {
+        let by_coefficient = self.parameters.order == LobeOrder::Coefficient;
+        vec![self.kernel(
+            "multiply_lobes",
+            &[
+                (CONSTANT_ENVIRONMENT_LOBES, self.fits.environment_lobes),
+                (
+                    CONSTANT_STRONGEST_ENVIRONMENT_LOBE,
+                    self.fits.strongest_environment_lobe.to_bits(),
+                ),
+                (CONSTANT_BRDF_LOBES, self.fits.brdf_lobes.max(1)),
+                (CONSTANT_VIEWS, self.fits.views),
+                (CONSTANT_ORDER_BY_COEFFICIENT, u32::from(by_coefficient)),
+            ],
+        )]
+    }
+
+    fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
+        let walks = self.parameters.elevation == Elevation::Metropolis;
+        vec![self.kernel(
+            "sample_lobes",
+            &[
+                (CONSTANT_SAMPLER, self.sampler),
+                (CONSTANT_BRDF_SHARE, self.parameters.brdf_share.to_bits()),
+                (CONSTANT_ENVIRONMENT_SHARE, self.parameters.environment_share.to_bits()),
+                (CONSTANT_METROPOLIS, u32::from(walks)),
+                (CONSTANT_MATERIAL_KINDS, self.material_kinds),
+            ],
+        )]
+    }
+}

@@ -1,0 +1,89 @@
+//! The passes of visibility guidance: one shadow ray at a time, and after each `record_blocked` and
+//! `reweight`.
+
+use super::parameters::{CacheScope, Threshold, VisibilityParameters};
+use crate::{
+    pass::{Domain, Kernel, Steps},
+    sampler::product::{FitSizes, ProductParameters, ProductSteps},
+    shader::{
+        constants::{
+            AOV_CACHE_ENTRIES, CONSTANT_CACHE_CAPACITY, CONSTANT_CACHE_OF_PIXEL,
+            CONSTANT_FIXED_THRESHOLD, CONSTANT_THRESHOLD_SCALE, CONSTANT_VISIBILITY_EXPONENT,
+            SAMPLER_VISIBILITY,
+        },
+        structs::Wave,
+    },
+};
+
+/// The steps of the sampler `visibility`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VisibilitySteps {
+    product: ProductSteps,
+    scope: CacheScope,
+}
+
+impl VisibilitySteps {
+    /// The steps at `shadow_rays` rays per hit.
+    pub fn new(
+        parameters: VisibilityParameters,
+        product: ProductParameters,
+        fits: FitSizes,
+        material_kinds: u32,
+        shadow_rays: u32,
+    ) -> Self {
+        let VisibilityParameters { exponent, threshold_scale, threshold, cache, .. } = parameters;
+        let constants = vec![
+            (CONSTANT_THRESHOLD_SCALE, threshold_scale.to_bits()),
+            (CONSTANT_FIXED_THRESHOLD, u32::from(threshold == Threshold::Fixed)),
+            (CONSTANT_CACHE_CAPACITY, parameters.cache_places(shadow_rays)),
+            (CONSTANT_CACHE_OF_PIXEL, u32::from(cache == CacheScope::Pixel)),
+            (CONSTANT_VISIBILITY_EXPONENT, exponent.to_bits()),
+        ];
+        let product = ProductSteps {
+            sampler: SAMPLER_VISIBILITY,
+            cache: constants,
+            ..ProductSteps::new(product, fits, material_kinds)
+        };
+        Self { product, scope: cache }
+    }
+}
+
+impl Steps for VisibilitySteps {
+    /// The outcome of a shadow ray matters to the next one.
+    fn rays_per_group(&self) -> u32 {
+        1
+    }
+
+    fn prepare(&self, wave: &Wave) -> Vec<Kernel> {
+        let mut kernels = self.product.prepare(wave);
+        if self.scope == CacheScope::Pixel {
+            kernels.push(self.product.kernel("reweight", &[]));
+        }
+        kernels
+    }
+
+    fn sample(&self, wave: &Wave) -> Vec<Kernel> {
+        self.product.sample(wave)
+    }
+
+    fn after_shadow_rays(&self, wave: &Wave) -> Vec<Kernel> {
+        let is_last = wave.first_shadow_ray + wave.shadow_ray_count >= wave.total_shadow_rays;
+        let mut kernels = Vec::new();
+        // The last ray of a hit serves nobody but the pixel's next sample.
+        if !is_last || self.scope == CacheScope::Pixel {
+            kernels.push(self.product.kernel("record_blocked", &[]));
+        }
+        if !is_last {
+            kernels.push(self.product.kernel("reweight", &[]));
+        }
+        kernels
+    }
+
+    fn finish(&self, wave: &Wave) -> Vec<Kernel> {
+        if wave.aovs & AOV_CACHE_ENTRIES == 0 || wave.total_shadow_rays == 0 {
+            return Vec::new();
+        }
+        let kernel = self.product.kernel("count_entries", &[]);
+        vec![Kernel { domain: Domain::Pixels, ..kernel }]
+    }
+}

@@ -1,0 +1,281 @@
+//! Buffers that shaders see, by descriptor set: one declaration for Rust, GLSL and
+//! `docs/architecture.md`.
+//!
+//! Sets go by rate of change: 0 the scene, 1 the sampler, 2 the wave, 3 the film. Set 1 has a table
+//! for each family of samplers; their binding numbers are disjoint, so that a shader tells by its
+//! bindings which table it belongs to. In GLSL a buffer has its name in lower case, and an entry
+//! point or include says `READS(hits)`, `WRITES(rays)`, `UPDATES(paths)` or `TEXELS(hit_texels)`.
+
+/// A descriptor set: its number and its buffers.
+#[derive(Clone, Copy, Debug)]
+pub struct BindingTable {
+    /// Name in debug tools.
+    pub name: &'static str,
+    /// Number of the descriptor set.
+    pub set: u32,
+    /// Buffers in ascending order of their numbers.
+    pub bindings: &'static [Binding],
+}
+
+/// A buffer of a descriptor set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Binding {
+    /// Number of the descriptor set.
+    pub set: u32,
+    /// Number within the set.
+    pub number: u32,
+    /// Name in upper case, as in Rust.
+    pub name: &'static str,
+    /// Type of its elements.
+    pub kind: Kind,
+    /// One sentence for the documentation.
+    pub about: &'static str,
+}
+
+impl Binding {
+    /// Name in GLSL.
+    pub fn glsl_name(&self) -> String {
+        self.name.to_lowercase()
+    }
+}
+
+/// Type of a buffer's elements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Storage buffer with a single element of this GLSL type.
+    One(&'static str),
+    /// Storage buffer with an array of elements of this GLSL type.
+    Array(&'static str),
+    /// Uniform texel buffer, which lavapipe loads several times as fast as a storage buffer.
+    Texels(TexelFormat),
+}
+
+/// Format of a uniform texel buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TexelFormat {
+    /// One word of 16 bits.
+    R16Uint,
+    /// One word.
+    R32Uint,
+    /// Two words.
+    Rg32Uint,
+    /// Four words.
+    Rgba32Uint,
+    /// One float.
+    R32Float,
+    /// Four floats.
+    Rgba32Float,
+    /// Four halves.
+    Rgba16Float,
+}
+
+impl TexelFormat {
+    /// Bytes of a texel.
+    pub fn bytes(self) -> u64 {
+        match self {
+            Self::R16Uint => 2,
+            Self::R32Uint | Self::R32Float => 4,
+            Self::Rg32Uint | Self::Rgba16Float => 8,
+            Self::Rgba32Uint | Self::Rgba32Float => 16,
+        }
+    }
+
+    /// GLSL type of the buffer.
+    pub fn sampler(self) -> &'static str {
+        match self {
+            Self::R16Uint | Self::R32Uint | Self::Rg32Uint | Self::Rgba32Uint => "usamplerBuffer",
+            Self::R32Float | Self::Rgba32Float | Self::Rgba16Float => "samplerBuffer",
+        }
+    }
+}
+
+/// Declares the tables.
+macro_rules! binding_tables {
+    ($($(#[$table_doc:meta])* $table:ident = $module:ident: $set:literal {
+        $($(#[doc = $doc:literal])* $number:literal $name:ident: $kind:ident $of:ident;)*
+    })*) => {
+        $(
+            $(#[$table_doc])*
+            pub mod $module {
+                use super::*;
+
+                $($(#[doc = $doc])* pub const $name: Binding = Binding {
+                    set: $set,
+                    number: $number,
+                    name: stringify!($name),
+                    kind: binding_tables!(@kind $kind $of),
+                    about: concat!($($doc),*),
+                };)*
+            }
+
+            $(#[$table_doc])*
+            pub const $table: BindingTable = BindingTable {
+                name: stringify!($module),
+                set: $set,
+                bindings: &[$($module::$name),*],
+            };
+        )*
+
+        /// Every table.
+        pub const TABLES: &[&BindingTable] = &[$(&$table),*];
+    };
+    (@kind one $of:ident) => { Kind::One(stringify!($of)) };
+    (@kind array $of:ident) => { Kind::Array(stringify!($of)) };
+    (@kind texels $of:ident) => { Kind::Texels(TexelFormat::$of) };
+}
+
+binding_tables! {
+    /// Set 0: the scene, constant during a render.
+    SCENE = scene: 0 {
+        /// Camera, film, crop window and environment.
+        0 PARAMETERS: one SceneParameters;
+        /// Nodes of the wide BVH, five texels a node.
+        1 BVH_NODES: texels Rgba32Uint;
+        /// First page of triangles in BVH order, three texels a triangle.
+        2 TRIANGLES_0: texels Rgba32Uint;
+        /// Second page; a page that does not exist repeats the first.
+        3 TRIANGLES_1: texels Rgba32Uint;
+        /// Third page.
+        4 TRIANGLES_2: texels Rgba32Uint;
+        /// Fourth page.
+        5 TRIANGLES_3: texels Rgba32Uint;
+        /// Cells of four halves of the BRDF tables: `brdf_table` again.
+        6 BRDF_CELLS: texels Rgba16Float;
+        /// Material index of each triangle in BVH order.
+        7 TRIANGLE_MATERIALS: array uint;
+        /// Materials.
+        8 MATERIALS: array Material;
+        /// Words of the BRDF tables, into which materials hold offsets.
+        9 BRDF_TABLE: texels R32Float;
+        /// Radiance of each texel of the environment map; the fourth component is unused.
+        10 ENVIRONMENT_TEXELS: texels Rgba32Float;
+        /// Cumulative probability over the rows of cells of the environment map.
+        11 ENVIRONMENT_ROWS: texels R32Float;
+        /// Cumulative probability over the cells of each row.
+        12 ENVIRONMENT_CELLS: texels R32Float;
+        /// Materials again, four texels each.
+        13 MATERIAL_TEXELS: texels Rgba32Uint;
+    }
+
+    /// Set 1 of the samplers `product` and `visibility`.
+    PRODUCT = product: 1 {
+        /// Lobes of the environment in the world, largest integral first: bandwidth · axis and
+        /// ln(amplitude) − bandwidth.
+        0 ENVIRONMENT_LOBES: texels Rgba32Float;
+        /// Lobes of BRDF · cosine by material and view, in the same form, in the frame of view and
+        /// normal.
+        1 BRDF_LOBES: texels Rgba32Float;
+        /// First lobe of each material and its lobes per view.
+        2 MATERIAL_LOBES: texels Rg32Uint;
+        /// Lobes of the product: lobe `l` of path `i` at `l · path_count + i`.
+        3 LOBES: array uvec2;
+        /// Lobes of the product again.
+        4 LOBE_TEXELS: texels Rg32Uint;
+        /// Number of lobes of each path.
+        5 LOBE_COUNTS: array uint;
+        /// Sums of the weights in force, up to every [`LOBES_PER_SUM`](super::super::constants::LOBES_PER_SUM)th
+        /// lobe of a path and to the last: sum `s` of path `i` at `s · path_count + i`.
+        6 LOBE_SUMS: array float;
+        /// Sums of weights again.
+        7 LOBE_SUM_TEXELS: texels R32Float;
+        /// Bit for every lobe that a cached direction is close to (`close_lobes_index`).
+        8 CLOSE_LOBES: array uint;
+        /// Bits of close lobes again.
+        9 CLOSE_LOBE_TEXELS: texels R32Uint;
+        /// Visibility caches, by path or by pixel of the film: a head and `CACHE_CAPACITY`
+        /// directions each.
+        10 VISIBILITY_CACHE: array uint;
+    }
+
+    /// Set 1 of the sampler `guided`.
+    GUIDED = guided: 1 {
+        /// Grids of the cells, number of regions, masks of the tables.
+        16 GUIDE: one GuideParameters;
+        /// Hash table of the cells: key; index, whether it is refined, its share of the BRDF.
+        17 GUIDE_TABLE: texels Rg32Uint;
+        /// Density and visibility of each region in each cell (`decode_entry`).
+        18 GUIDE_ENTRIES: texels Rg32Uint;
+        /// Regions of the environment: first entry of the alias table, columns, rows, first column
+        /// and 65,536 · first row.
+        19 GUIDE_REGIONS: texels Rgba32Uint;
+        /// Alias tables over the environment's cells in each region: threshold, alias.
+        20 GUIDE_ALIASES: texels Rg32Uint;
+        /// Region of every cell of the environment.
+        21 GUIDE_REGION_OF_CELL: texels R16Uint;
+        /// Rays traced, rays visible and their responses by cell and region since the last rebuild.
+        22 GUIDE_COUNTS: array uint;
+        /// Visible rays and their c p_B / q in 256ths by cell and octave of light since the last
+        /// rebuild.
+        23 GUIDE_SHARES: array uint;
+        /// Keys of the cells that passes looked for in vain.
+        24 GUIDE_MISSING: array uint;
+        /// Count that each shadow ray belongs to, or `NOTHING_TO_LEARN`; octave of its light, from bit
+        /// `LEARN_FROM_BRDF_SHIFT` its c p_B / q in 256ths, from bit `LEARN_RESPONSE_SHIFT` its
+        /// response.
+        25 LEARN_TARGETS: array uvec2;
+        /// Cell that each path is at, and the cell and direction that its bounce ray teaches.
+        26 PATH_CELLS: array PathCell;
+        /// Light believed to arrive by way of surfaces, by cell and direction, relative to the cell's
+        /// mean.
+        27 GUIDE_ARRIVING: texels R32Float;
+        /// Light that each cell reflects of what it learned, in whole units.
+        28 GUIDE_REFLECTED: texels R32Uint;
+        /// Bounce rays and the light where they arrived, by cell and direction, since the last
+        /// rebuild.
+        29 GUIDE_ARRIVALS: array uint;
+    }
+
+    /// Set 2: the wave in flight, rewritten by every pass.
+    WAVE = wave: 2 {
+        /// Next ray of each path.
+        0 RAYS: array Ray;
+        /// Hit of each path.
+        1 HITS: array Hit;
+        /// Shadow rays: direction `k` of path `i` at `k · path_count + i`.
+        2 SHADOW_RAYS: array ShadowRay;
+        /// One where a shadow ray reaches the environment, else zero.
+        3 VISIBILITY: array uint;
+        /// State of each path.
+        4 PATHS: array PathState;
+        /// Rays again, two texels each.
+        5 RAY_TEXELS: texels Rgba32Uint;
+        /// Hits again, three texels each.
+        6 HIT_TEXELS: texels Rgba32Uint;
+        /// Shadow rays again, three texels each.
+        7 SHADOW_RAY_TEXELS: texels Rg32Uint;
+    }
+
+    /// Set 3: the film, which grows by every wave.
+    FILM = film: 3 {
+        /// Leading part of the sum of radiance.
+        0 FILM_SUM: array vec3;
+        /// Rest of that sum.
+        1 FILM_COMPENSATION: array vec3;
+        /// Sum of squared radiance.
+        2 FILM_SQUARES: array vec3;
+        /// Totals over all pixels.
+        3 COUNTERS: one Counters;
+        /// Sum of the albedo at first hits.
+        4 FILM_ALBEDO: array vec3;
+        /// Sum of the shading normal at first hits.
+        5 FILM_NORMAL: array vec3;
+        /// Sum of the position of first hits.
+        6 FILM_POSITION: array vec3;
+        /// Visible and traced shadow rays.
+        7 FILM_VISIBLE: array uvec2;
+        /// Entries of visibility caches and hits that have one.
+        8 FILM_CACHE_ENTRIES: array uvec2;
+        /// Sum of the colours of the guide's cells at first hits.
+        9 FILM_GUIDE_CELL: array vec3;
+        /// First hits whose cell is that of a face, a coarse one, a fine one.
+        10 FILM_GUIDE_LEVEL: array vec3;
+    }
+
+    /// Set 3 of the probe kernels in `glsl/test`, which read and write elements of their own types.
+    PROBE = probe: 3 {
+        /// Queries of a test.
+        32 PROBE_INPUT: array uint;
+        /// Answers of the kernel.
+        33 PROBE_OUTPUT: array uint;
+    }
+}
