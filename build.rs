@@ -103,6 +103,9 @@ fn compile_all() -> Result<(), String> {
     for (name, value) in constants::CONSTANTS {
         options.add_macro_definition(name, Some(&format!("{value}u")));
     }
+    let [red, green, blue] = constants::LUMINANCE_WEIGHTS;
+    let weights = format!("vec3({red}, {green}, {blue})");
+    options.add_macro_definition("LUMINANCE_WEIGHTS", Some(&weights));
     for table in TABLES {
         let name = format!("SET_{}", table.name.to_uppercase());
         options.add_macro_definition(&name, Some(&table.set.to_string()));
