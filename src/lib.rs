@@ -78,6 +78,7 @@
 //!   Graphics Forum 13(3).
 //! - \[Shirley & Chiu 1997\] "A Low Distortion Map Between Disk and Square", Journal of Graphics
 //!   Tools 2(3).
+//! - \[Shun & Blelloch 2014\] "Phase-Concurrent Hash Tables for Determinism", SPAA.
 //! - \[Steele et al. 2014\] "Fast Splittable Pseudorandom Number Generators", OOPSLA.
 //! - \[Talbot et al. 2005\] "Importance Resampling for Global Illumination", Eurographics
 //!   Symposium on Rendering.

@@ -105,14 +105,22 @@ uint guide_find(uint key) {
     return found;
 }
 
-// Notes that a cell is missing. What finds no slot is noted another time.
+// Notes that a cell is missing. A smaller key takes the slot of a larger one, which moves on to the next
+// slot, as long as that is one of its own: the noted keys do not depend on the order of threads
+// (Shun & Blelloch 2014). Keys that find no slot are noted after another pass.
 void guide_note_missing(uint key) {
-    uint slot = guide_hash(key);
-    for (uint probe = 0u; probe < GUIDE_PROBES; ++probe) {
-        uint before =
-            atomicCompSwap(guide_missing[(slot + probe) & guide.missing_mask], GUIDE_NO_KEY, key);
+    uint home = guide_hash(key);
+    for (uint slot = home; slot - home < GUIDE_PROBES;) {
+        uint before = atomicMin(guide_missing[slot & guide.missing_mask], key);
         if (before == GUIDE_NO_KEY || before == key) {
             break;
+        }
+        slot++;
+        if (before > key) {
+            // The displaced key goes on from here. Slots count up from its own home.
+            key = before;
+            home = guide_hash(key);
+            slot = home + ((slot - home) & guide.missing_mask);
         }
     }
 }
