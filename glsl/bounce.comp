@@ -26,5 +26,5 @@ void main() {
     vec3 incident_local = brdf_sample(material, outgoing_local, vec3(u, lobe));
     vec3 direction = to_world(frame, incident_local);
     vec3 factor = bounce_factor(hit, material, outgoing_local, incident_local, direction);
-    follow_bounce(path, index, hit, direction, factor);
+    follow_bounce(path, index, hit, direction, factor, index.sample_index, wave.seed);
 }

@@ -62,6 +62,8 @@ void main() {
     vec3 direction = to_world(frame, chosen);
     vec3 factor = bounce_factor(hit, material, outgoing_local, chosen, direction)
         * (sum / (float(BOUNCE_CANDIDATES) * chosen_light));
-    bool alive = follow_bounce(path, index, hit, direction, factor);
+    // The throughput depends on the tables, and so roulette takes the numbers since their rebuild too.
+    bool alive =
+        follow_bounce(path, index, hit, direction, factor, number, wave.epoch_seed);
     path_cells[path].teaches = alive ? first + chosen_direction : NOTHING_TO_LEARN;
 }

@@ -31,16 +31,17 @@ vec3 bounce_factor(
     return factor;
 }
 
-// Sends a path on, or ends it where it would bring nothing or roulette says so. Returns whether it
-// goes on.
-bool follow_bounce(uint path, PathIndex index, Hit hit, vec3 direction, vec3 factor) {
+// Sends a path on, or ends it where it would bring nothing or roulette says so, by the number in
+// [0, 1) that is drawn with `number` and `seed`. Returns true if it goes on.
+bool follow_bounce(
+    uint path, PathIndex index, Hit hit, vec3 direction, vec3 factor, uint number, uint seed) {
     PathState state = paths[path];
     vec3 throughput = state.throughput * factor;
     float strongest = max(throughput.r, max(throughput.g, throughput.b));
     if (wave.vertex + 1u >= ROULETTE_VERTEX && strongest > 0.0) {
         float survival = min(1.0, strongest);
         float u_roulette = random_1d(
-            index.pixel, index.sample_index, vertex_dimension() + DIMENSION_ROULETTE, wave.seed);
+            index.pixel, number, vertex_dimension() + DIMENSION_ROULETTE, seed);
         throughput = u_roulette < survival ? throughput / survival : vec3(0.0);
         strongest = u_roulette < survival ? strongest : 0.0;
     }

@@ -12,7 +12,7 @@ use super::{
         GUIDED_CANDIDATES, PixelSpread, choose_by_comparison, is_largest_clearly_worse,
         relative_variances, upper_median,
     },
-    technique::{Guided, TRAINING_SEED, with_epoch},
+    technique::{Guided, TRAINING_SEED},
 };
 use crate::{
     error::Result,
@@ -171,7 +171,7 @@ impl Guided {
         self.steps.candidates = candidates;
         runner.warm_up(self)?;
         let depth = runner.settings().depth;
-        let times = runner.run(self, with_epoch(wave, first_sample), depth)?;
+        let times = runner.run(self, self.with_epoch(wave, first_sample), depth)?;
         let paths = runner.waves().paths().download((pixel_count * samples) as usize)?;
         Ok((times.values().sum(), paths))
     }

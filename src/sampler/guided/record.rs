@@ -5,11 +5,7 @@
 
 use glam::Vec3;
 
-use super::{
-    key::CellKey,
-    partition::Partition,
-    technique::{Guided, with_epoch},
-};
+use super::{key::CellKey, partition::Partition, technique::Guided};
 use crate::{
     error::Result,
     pass::{Progress, Runner, Technique, film_buffers::position_in_film_order},
@@ -126,7 +122,7 @@ impl Guided {
             ..Wave::default()
         };
         let epoch = progress.first_sample.wrapping_add(self.rebuilt_at);
-        let wave = Wave { is_training: 1, ..with_epoch(wave, epoch) };
+        let wave = Wave { is_training: 1, ..self.with_epoch(wave, epoch) };
         runner.run(self, wave, 1)?;
         runner.film().take_counters()?;
 

@@ -37,6 +37,8 @@ pub struct GuideState {
     pub is_open: bool,
     /// Candidates per shadow ray, one of [`GUIDED_CANDIDATES`]; `None` where not decided.
     pub candidates: Option<u32>,
+    /// Tag of the guides that this one went on from, see [`GuideState::epoch_tag`]; 0 for none.
+    pub tag: u32,
     /// First column and row, number of columns and rows, and parent of every region.
     pub rectangles: Vec<[u32; 5]>,
     /// Key of every cell, the faces first.
@@ -87,6 +89,8 @@ struct Header {
     rebuilt_at: u32,
     is_open: bool,
     candidates: Option<u32>,
+    #[serde(default)]
+    tag: u32,
     cells: usize,
     refined: usize,
     pending: usize,
@@ -102,12 +106,8 @@ fn checksum(words: &[u8]) -> String {
 }
 
 impl GuideState {
-    /// Writes the state to a file.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if the file cannot be written.
-    pub fn write(&self, path: &Path) -> Result<()> {
-        let mut words: Vec<u8> = Vec::new();
+    /// The arrays from `rectangles` on, as bytes.
+    fn words(&self) -> Vec<u8> {
         let all = self
             .rectangles
             .as_flattened()
@@ -121,7 +121,23 @@ impl GuideState {
             .chain(&self.missing)
             .chain(self.arrivals.as_flattened())
             .chain(self.pending_arrivals.as_flattened());
-        words.extend(all.flat_map(|word| word.to_le_bytes()));
+        all.flat_map(|word| word.to_le_bytes()).collect()
+    }
+
+    /// Tells the random numbers of renders that start from this guide from those that taught it: a
+    /// density shaped by the outcomes of some numbers must not be sampled with the same numbers.
+    pub fn epoch_tag(&self) -> u32 {
+        let digest = Sha256::new().chain_update(self.tag.to_le_bytes()).chain_update(self.words());
+        let digest: [u8; 32] = digest.finalize().into();
+        u32::from_le_bytes([digest[0], digest[1], digest[2], digest[3]])
+    }
+
+    /// Writes the state to a file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let words = self.words();
         let header = Header {
             format: FORMAT.to_owned(),
             version: VERSION,
@@ -131,6 +147,7 @@ impl GuideState {
             rebuilt_at: self.rebuilt_at,
             is_open: self.is_open,
             candidates: self.candidates,
+            tag: self.tag,
             cells: self.keys.len(),
             refined: self.refined.len(),
             pending: self.pending.len(),
@@ -223,6 +240,7 @@ impl GuideState {
             rebuilt_at: header.rebuilt_at,
             is_open: header.is_open,
             candidates: header.candidates,
+            tag: header.tag,
             rectangles: take(5 * regions)
                 .chunks_exact(5)
                 .map(|words| [words[0], words[1], words[2], words[3], words[4]])

@@ -70,6 +70,7 @@ impl Room for GuidedRoom {
             is_trained: false,
             is_open: false,
             rebuilt_at: 0,
+            tag: 0,
         };
         guided.forget_choice();
         Ok(Box::new(guided))
@@ -96,6 +97,8 @@ pub struct Guided {
     pub(super) is_open: bool,
     /// Samples per pixel at the last rebuild of the guide.
     pub(super) rebuilt_at: u32,
+    /// Tag of the guides that this one went on from; 0 for none.
+    tag: u32,
 }
 
 impl Guided {
@@ -109,6 +112,7 @@ impl Guided {
             rebuilt_at: self.rebuilt_at,
             is_open: self.is_open,
             candidates: self.candidates(),
+            tag: self.tag,
             ..self.buffers.state()?
         })
     }
@@ -132,9 +136,11 @@ impl Guided {
         self.is_open = state.is_open && !has_moved;
         if state.samples == samples {
             self.rebuilt_at = state.rebuilt_at;
+            self.tag = state.tag;
         } else {
             self.buffers.rebuild(false)?;
             self.rebuilt_at = samples;
+            self.tag = state.epoch_tag();
         }
         self.is_trained = true;
         if let Some(candidates) = state.candidates {
@@ -148,6 +154,13 @@ impl Guided {
     /// in open scenes.
     fn candidates(&self) -> Option<u32> {
         self.choice.candidates.filter(|_| !self.is_open)
+    }
+
+    /// `wave` with numbers of its own for the epoch that begins at `sample`: those of `guided` start anew
+    /// after every rebuild, and differ from those that taught a loaded guide.
+    pub(super) fn with_epoch(&self, wave: Wave, sample: u32) -> Wave {
+        let [epoch_seed, ..] = hash_4d([wave.seed, sample, EPOCH_TAG ^ self.tag, wave.is_training]);
+        Wave { epoch_seed, epoch_start: sample, ..wave }
     }
 
     fn rebuild(&mut self, splits: bool, samples: u32) -> Result<()> {
@@ -167,7 +180,7 @@ impl Guided {
                 is_training: 1,
                 ..Wave::default()
             };
-            let wave = with_epoch(wave, wave.first_sample);
+            let wave = self.with_epoch(wave, wave.first_sample);
             let before = runner.totals().clone();
             runner.sweep(self, wave, runner.film().padded_pixels() / TRAINING_SWEEPS)?;
             runner.take_counters()?;
@@ -210,7 +223,7 @@ impl Technique for Guided {
     }
 
     fn complete(&self, wave: Wave, progress: &Progress) -> Wave {
-        with_epoch(wave, progress.first_sample.wrapping_add(self.rebuilt_at))
+        self.with_epoch(wave, progress.first_sample.wrapping_add(self.rebuilt_at))
     }
 
     fn learn(&mut self, runner: &mut Runner, progress: &Progress) -> Result<u32> {
@@ -235,6 +248,7 @@ impl Technique for Guided {
         self.is_trained = false;
         self.is_open = false;
         self.rebuilt_at = 0;
+        self.tag = 0;
         self.forget_choice();
         Ok(())
     }
@@ -252,11 +266,4 @@ impl Technique for Guided {
             ..Report::default()
         }
     }
-}
-
-/// `wave` with numbers of its own for the epoch that begins at `sample`: those of `guided` start anew
-/// after every rebuild.
-pub(super) fn with_epoch(wave: Wave, sample: u32) -> Wave {
-    let [epoch_seed, ..] = hash_4d([wave.seed, sample, EPOCH_TAG, wave.is_training]);
-    Wave { epoch_seed, epoch_start: sample, ..wave }
 }
