@@ -20,8 +20,8 @@ use std::{
 
 use bindings::{Binding, Kind, TABLES};
 
-/// Folders of entry points: the common passes and one room for each technique.
-const PASS_FOLDERS: [&str; 4] = ["glsl", "glsl/product", "glsl/visibility", "glsl/guided"];
+/// Folder of the common passes; one folder in it for the passes of each technique.
+const SHADER_FOLDER: &str = "glsl";
 /// Folder of the probe kernels, which only tests run.
 const PROBE_FOLDER: &str = "glsl/test";
 /// Name by which shaders include the declarations of `src/shader`.
@@ -42,15 +42,20 @@ fn main() -> ExitCode {
     }
 }
 
+/// Sorted paths in `folder`.
+fn entries(folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let entries = fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    let mut paths: Vec<PathBuf> =
+        entries.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
+    paths.sort();
+    Ok(paths)
+}
+
 /// Sorted `.comp` files of `folder`, not of the folders in it.
-fn entry_points(folder: &str) -> Result<Vec<PathBuf>, String> {
-    let entries = fs::read_dir(folder).map_err(|error| format!("{folder}: {error}"))?;
-    let mut files: Vec<PathBuf> = entries
-        .filter_map(|entry| entry.ok().map(|entry| entry.path()))
-        .filter(|path| path.extension().is_some_and(|extension| extension == "comp"))
-        .collect();
-    files.sort();
-    Ok(files)
+fn entry_points(folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let is_entry_point =
+        |path: &PathBuf| path.extension().is_some_and(|extension| extension == "comp");
+    Ok(entries(folder)?.into_iter().filter(is_entry_point).collect())
 }
 
 /// GLSL of every struct, and a macro for every buffer.
@@ -98,6 +103,9 @@ fn compile_all() -> Result<(), String> {
     for (name, value) in constants::CONSTANTS {
         options.add_macro_definition(name, Some(&format!("{value}u")));
     }
+    let [red, green, blue] = constants::LUMINANCE_WEIGHTS;
+    let weights = format!("vec3({red}, {green}, {blue})");
+    options.add_macro_definition("LUMINANCE_WEIGHTS", Some(&weights));
     for table in TABLES {
         let name = format!("SET_{}", table.name.to_uppercase());
         options.add_macro_definition(&name, Some(&table.set.to_string()));
@@ -105,8 +113,8 @@ fn compile_all() -> Result<(), String> {
     let interface = interface();
     options.set_include_callback(move |requested, _, _, _| {
         // Includes of a room are named with its folder.
-        let folder = if requested.contains('/') { "glsl" } else { "glsl/include" };
-        let path = Path::new(folder).join(requested);
+        let folder = if requested.contains('/') { "" } else { "include" };
+        let path = Path::new(SHADER_FOLDER).join(folder).join(requested);
         let content = if requested == INTERFACE {
             interface.clone()
         } else {
@@ -135,13 +143,18 @@ fn compile_all() -> Result<(), String> {
     };
     let probes = out.join("test");
     fs::create_dir_all(&probes).map_err(|error| format!("{}: {error}", probes.display()))?;
-    for path in entry_points(PROBE_FOLDER)? {
+    let probe_folder = Path::new(PROBE_FOLDER);
+    for path in entry_points(probe_folder)? {
         compile(&path, &probes)?;
     }
+    let shader_folder = Path::new(SHADER_FOLDER);
+    let rooms = entries(shader_folder)?.into_iter().filter(|path| path.is_dir());
     let mut passes = Vec::new();
-    for folder in PASS_FOLDERS {
-        for path in entry_points(folder)? {
-            passes.push(compile(&path, &out)?);
+    for folder in [shader_folder.to_owned()].into_iter().chain(rooms) {
+        if folder != probe_folder {
+            for path in entry_points(&folder)? {
+                passes.push(compile(&path, &out)?);
+            }
         }
     }
     passes.sort();

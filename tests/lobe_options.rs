@@ -57,7 +57,7 @@ fn what_cannot_be_rendered_is_refused_with_its_remedy() {
             &["64000 products", "at most 25000"],
         ),
         (&["--set", "tau=wide"], &["--set tau=wide: expected 0 to 100"]),
-        (&["--set", "lobe=3"], &["--set lobe: unknown parameter", "cache_capacity"]),
+        (&["--set", "lobe=3"], &["--set lobe: unknown parameter", "cache-capacity"]),
         (&["--set", "cache"], &["--set cache: expected key=value"]),
         (&["--shadow-rays", "0"], &["--shadow-rays"]),
         (&["--shadow-rays", "4097"], &["--shadow-rays 4097: expected at most 4096"]),
@@ -96,7 +96,7 @@ fn a_render_with_lobes_continued_from_its_checkpoint_has_the_same_bits() {
         assert_eq!(channels("out.exr"), channels("whole.exr"), "{sampler}");
         // Other lobes make another render.
         let others = [&resume[..], &["--set", "environment-lobes=9"]].concat();
-        run_to(&folder, "out.exr", "6", &others).assert(1, &["environment_lobes: 8 against 9"]);
+        run_to(&folder, "out.exr", "6", &others).assert(1, &["environment-lobes: 8 against 9"]);
     }
 }
 

@@ -36,7 +36,7 @@ struct EnvironmentCell {
 
 // Luminance of linear Rec.709.
 float luminance(vec3 radiance) {
-    return dot(radiance, vec3(0.2126, 0.7152, 0.0722));
+    return dot(radiance, LUMINANCE_WEIGHTS);
 }
 
 // Turns a direction from the world into the frame of the map.

@@ -82,17 +82,22 @@ impl Runner {
         for steps in all {
             let order = wave_order(&self.settings, steps, Wave::default(), self.settings.depth);
             for Dispatch { kernel, wave } in order {
-                let start = Instant::now();
-                let name = kernel.shader.to_owned();
+                let mut add_ms = |name: &str, start: Instant| {
+                    let ms = start.elapsed().as_secs_f64() * 1e3;
+                    *self.compile_ms.entry(name.to_owned()).or_default() += ms;
+                };
+                let shader = kernel.shader;
                 let Entry::Vacant(vacant) = self.passes.entry(kernel) else { continue };
+                let start = Instant::now();
                 let pass = Pass::new(&self.device, vacant.key().clone())?;
+                add_ms("pipelines", start);
                 let pass = vacant.insert(pass);
+                let start = Instant::now();
                 let mut commands = Commands::begin(&self.device)?;
                 let sets = sets(&self.scene, technique, &self.waves, &self.film);
                 pass.record(&mut commands, &sets, &wave);
                 commands.submit_and_wait()?;
-                let ms = start.elapsed().as_secs_f64() * 1e3;
-                *self.compile_ms.entry(name).or_default() += ms;
+                add_ms(shader, start);
             }
         }
         Ok(())
@@ -236,7 +241,7 @@ impl Runner {
         &self.totals
     }
 
-    /// Milliseconds that compiling each pass and its first use took.
+    /// Milliseconds that the first use of each pass took, and the creation of all as `pipelines`.
     pub fn compile_ms(&self) -> &PassTimes {
         &self.compile_ms
     }

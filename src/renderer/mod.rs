@@ -180,7 +180,7 @@ impl Renderer {
         self.runner.totals()
     }
 
-    /// Milliseconds that compiling each pass and its first use took.
+    /// Milliseconds that the first use of each pass took, and the creation of all as `pipelines`.
     pub fn compile_ms(&self) -> &PassTimes {
         self.runner.compile_ms()
     }

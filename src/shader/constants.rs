@@ -1,6 +1,9 @@
 //! Numbers with one owner: `build.rs` hands each of these to the GLSL compiler as a macro of the same
 //! name, so that host and shaders cannot differ.
 
+/// Weights of linear Rec.709 in luminance; a `vec3` of the same name in GLSL.
+pub const LUMINANCE_WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
+
 /// Declares constants for Rust, and lists them for the GLSL compiler.
 macro_rules! constants {
     ($($(#[$doc:meta])* $name:ident = $value:expr;)*) => {

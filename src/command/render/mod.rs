@@ -174,7 +174,7 @@ impl<'a> RenderJob<'a> {
         let mut parameters = settings.sampler.describe(&settings.parameters);
         if settings.depth > settings.roulette_vertex {
             let vertex = settings.roulette_vertex.to_string();
-            parameters.insert("roulette_depth".to_owned(), vertex);
+            parameters.insert("roulette-depth".to_owned(), vertex);
         }
         let metadata = Metadata {
             version: env!("CARGO_PKG_VERSION").to_owned(),

@@ -1,0 +1,192 @@
+//! The order of the passes of a wave, for every technique: a list that needs no device.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+#[path = "support/page.rs"]
+mod page;
+
+use std::{collections::BTreeMap, fmt::Write};
+
+use fenestra::{
+    pass::{Dispatch, PassSettings, Schedule, Steps, geometry::Traversal, wave_order},
+    sampler::{
+        Parameters, basic,
+        guided::{GuidedParameters, GuidedSteps},
+        product::{FitSizes, ProductParameters, ProductSteps},
+        visibility::{CacheScope, VisibilityParameters, VisibilitySteps},
+    },
+    shader::{
+        constants::{AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL},
+        spirv::PASSES,
+        structs::Wave,
+    },
+};
+
+const FITS: FitSizes =
+    FitSizes { environment_lobes: 100, strongest_environment_lobe: 0.0, brdf_lobes: 20, views: 32 };
+
+/// Settings of a render with all layers.
+fn settings(shadow_rays: u32, depth: u32) -> PassSettings {
+    PassSettings {
+        shadow_rays,
+        depth,
+        aovs: AOV_ALBEDO | AOV_CACHE_ENTRIES | AOV_GUIDE_CELL,
+        roulette_vertex: 8,
+        material_kinds: 1,
+        traversal: Traversal { page_count: 1, page_shift: 20 },
+        incoherent: Schedule { rays_per_invocation: 16, refill_lanes: 3 },
+    }
+}
+
+/// A wave of `sample_count` samples of ten pixels, `first_sample` samples after the last rebuild.
+fn wave(first_sample: u32, sample_count: u32) -> Wave {
+    Wave { pixel_count: 10, first_sample, sample_count, pixel_stride: 1, ..Wave::default() }
+}
+
+fn mis() -> impl Steps {
+    basic::MIS.steps(&Parameters::default(), 1).unwrap()
+}
+
+fn product() -> impl Steps {
+    ProductSteps::new(ProductParameters::default(), FITS, 1)
+}
+
+fn visibility(cache: CacheScope, shadow_rays: u32) -> impl Steps {
+    let parameters = VisibilityParameters { cache, ..VisibilityParameters::default() };
+    VisibilitySteps::new(parameters, ProductParameters::default(), FITS, 1, shadow_rays)
+}
+
+fn guided(settings: &PassSettings) -> impl Steps {
+    GuidedSteps::new(4, GuidedParameters::default(), settings)
+}
+
+fn order(settings: &PassSettings, steps: &dyn Steps, wave: Wave) -> Vec<Dispatch> {
+    wave_order(settings, steps, wave, settings.depth)
+}
+
+/// Names of the passes in their order, separated by spaces.
+fn names(order: &[Dispatch]) -> String {
+    order.iter().map(|dispatch| dispatch.kernel.shader).collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn simple_samplers_trace_groups_of_eight_rays() {
+    let direct = settings(9, 1);
+    let listed = order(&direct, &mis(), wave(0, 2));
+    assert_eq!(
+        names(&listed),
+        "camera trace sample shadow gather sample shadow gather features accumulate"
+    );
+    let counts: Vec<_> = listed.iter().map(|dispatch| dispatch.wave.shadow_ray_count).collect();
+    assert_eq!(counts, [0, 0, 8, 8, 8, 1, 1, 1, 1, 1]);
+    assert!(listed[2..].iter().all(|dispatch| dispatch.wave.total_shadow_rays == 9));
+    // A path, a pixel or a shadow ray for each invocation; rays that part share invocations.
+    let invocations = |pass: usize| listed[pass].kernel.invocations(&listed[pass].wave);
+    assert_eq!((invocations(0), invocations(2), invocations(8)), (20, 20, 10));
+    assert_eq!(invocations(3), 64, "160 shadow rays, 16 for each invocation");
+}
+
+#[test]
+fn without_shadow_rays_the_camera_still_gathers() {
+    for steps in [&mis() as &dyn Steps, &product(), &visibility(CacheScope::Hit, 0)] {
+        let listed = order(&settings(0, 2), steps, wave(0, 1));
+        assert_eq!(names(&listed), "camera trace gather features bounce trace gather accumulate");
+    }
+}
+
+#[test]
+fn product_multiplies_lobes_once_per_vertex() {
+    assert_eq!(
+        names(&order(&settings(9, 2), &product(), wave(0, 1))),
+        "camera trace multiply_lobes sample_lobes shadow gather sample_lobes shadow gather features \
+         bounce trace multiply_lobes sample_lobes shadow gather sample_lobes shadow gather accumulate"
+    );
+}
+
+#[test]
+fn visibility_learns_from_every_ray_but_the_last() {
+    assert_eq!(
+        names(&order(&settings(3, 1), &visibility(CacheScope::Hit, 3), wave(0, 1))),
+        "camera trace multiply_lobes sample_lobes shadow record_blocked reweight gather sample_lobes \
+         shadow record_blocked reweight gather sample_lobes shadow gather count_entries features \
+         accumulate"
+    );
+    // The last ray of a hit serves the pixel's next sample.
+    assert_eq!(
+        names(&order(&settings(2, 1), &visibility(CacheScope::Pixel, 2), wave(0, 1))),
+        "camera trace multiply_lobes reweight sample_lobes shadow record_blocked reweight gather \
+         sample_lobes shadow record_blocked gather count_entries features accumulate"
+    );
+}
+
+#[test]
+fn guided_counts_rays_and_bounces_where_samples_teach() {
+    let deep = settings(5, 2);
+    let listed = order(&deep, &guided(&deep), wave(0, 1));
+    assert_eq!(
+        names(&listed),
+        "camera trace sample_guided shadow learn gather show_cells features bounce_guided trace \
+         sample_guided learn_arrivals shadow learn gather accumulate"
+    );
+    let rays: Vec<_> = [2, 10].map(|pass| listed[pass].wave.total_shadow_rays).into();
+    assert_eq!(rays, [5, 2], "half of the rays at later vertices");
+    // Of late samples every fourth teaches.
+    let learns =
+        |first, count| names(&order(&deep, &guided(&deep), wave(first, count))).contains("learn");
+    assert!(learns(15, 1) && learns(16, 1) && !learns(17, 3) && learns(17, 4) && learns(20, 1));
+    // Training shows no cells and writes no layers.
+    let training = Wave { is_training: 1, ..wave(0, 1) };
+    let listed = names(&order(&deep, &guided(&deep), training));
+    assert!(!listed.contains("show_cells") && !listed.contains("features"), "{listed}");
+    let direct = settings(5, 1);
+    assert!(!names(&order(&direct, &guided(&direct), wave(0, 1))).contains("arrivals"));
+}
+
+/// Every technique as the page shows it.
+fn shown() -> Vec<(&'static str, Vec<Dispatch>)> {
+    let deep = settings(2, 2);
+    vec![
+        ("uniform … ris", order(&deep, &mis(), wave(0, 1))),
+        ("product", order(&deep, &product(), wave(0, 1))),
+        ("visibility", order(&deep, &visibility(CacheScope::Hit, 2), wave(0, 1))),
+        ("guided", order(&deep, &guided(&deep), wave(0, 1))),
+    ]
+}
+
+#[test]
+fn every_pass_is_in_an_order() {
+    let orders = shown();
+    for (pass, _) in PASSES {
+        let is_used = |(_, order): &(_, Vec<Dispatch>)| {
+            order.iter().any(|dispatch: &Dispatch| dispatch.kernel.shader == *pass)
+        };
+        assert!(orders.iter().any(is_used), "{pass}: no technique runs it");
+    }
+}
+
+#[test]
+fn the_page_lists_every_pass() {
+    let mut domains = BTreeMap::new();
+    let mut text = String::from("```text\n");
+    for (name, order) in shown() {
+        let (mut line, mut indent) = (format!("{name}:"), 0);
+        for Dispatch { kernel, .. } in &order {
+            domains.entry(kernel.shader).or_insert((kernel.domain, Vec::new())).1.push(name);
+            if indent + line.len() + kernel.shader.len() > 92 {
+                writeln!(text, "{}{line}", " ".repeat(indent)).unwrap();
+                (line, indent) = (String::new(), 4);
+            }
+            let space = if line.is_empty() { "" } else { " " };
+            write!(line, "{space}{}", kernel.shader).unwrap();
+        }
+        writeln!(text, "{}{line}", " ".repeat(indent)).unwrap();
+    }
+    text += "```\n\n| pass | an invocation is one of the | runs for |\n|---|---|---|\n";
+    for (pass, (domain, mut users)) in domains {
+        users.dedup();
+        let all = shown().len();
+        let users = if users.len() == all { "all".to_owned() } else { users.join(", ") };
+        let domain = format!("{domain:?}").replace("ShadowRays", "shadow rays").to_lowercase();
+        writeln!(text, "| `{pass}` | {domain} | {users} |").unwrap();
+    }
+    page::check("architecture.md", "passes", &text);
+}
