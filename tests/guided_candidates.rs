@@ -1,5 +1,6 @@
 //! The candidates that `guided` resamples follow the density that they are divided by, and that
-//! density integrates to one: for 4 and 8 candidates, untrained and trained tables, and every kind of material.
+//! density integrates to one: for 4 and 8 candidates, untrained and trained tables, and every kind
+//! of material.
 //!
 //! One probe puts a path in front of a surface. Another draws the candidates of many shadow rays with
 //! the functions of the sampling pass, and evaluates the density at the points of a quadrature. There

@@ -6,7 +6,7 @@ mod support;
 use fenestra::{
     gpu::{
         Buffer, Commands, DescriptorSet, Pipeline,
-        device::{Capabilities, choose},
+        capabilities::{Capabilities, choose},
     },
     shader::bindings::{PROBE as PROBE_TABLE, probe},
 };

@@ -588,7 +588,8 @@ fn samples_follow_the_density_whatever_is_cached() {
     assert!(found.undefended >= 2 * count, "shares ignored: found {} times", found.undefended);
 }
 
-/// Tests the parameters of the thesis and others that are not the default: one closeness, a cache that overflows, no share for the environment.
+/// Tests the parameters of the thesis and others that are not the default: one closeness, a cache
+/// that overflows, no share for the environment.
 #[test]
 fn samples_follow_the_density_with_other_parameters() {
     let product = ProductParameters {

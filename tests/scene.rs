@@ -169,11 +169,13 @@ fn text_that_is_no_scene_is_refused_with_line_and_column() {
     case("[camera\n", "room.toml:1:8: ");
     case(
         &format!("{HEAD}[lamp]\n"),
-        "room.toml:14:2: unknown key `lamp` in the scene, expected one of `camera`, `film`, `environment`, `material`, `object`",
+        "room.toml:14:2: unknown key `lamp` in the scene, expected one of `camera`, `film`, \
+         `environment`, `material`, `object`",
     );
     case(
         &HEAD.replace("look_at", "lookat"),
-        "room.toml:4:1: unknown field `lookat`, expected one of `position`, `look_at`, `up`, `vertical_fov_deg`, `aperture_radius`, `focus_distance`",
+        "room.toml:4:1: unknown field `lookat`, expected one of `position`, `look_at`, `up`, \
+         `vertical_fov_deg`, `aperture_radius`, `focus_distance`",
     );
     case(
         &HEAD.replace("vertical_fov_deg = 40", ""),
@@ -189,11 +191,13 @@ fn text_that_is_no_scene_is_refused_with_line_and_column() {
     );
     case(
         &HEAD.replace("\"diffuse\"", "\"metal\""),
-        "room.toml:12:8: unknown material type `metal`, expected one of `diffuse`, `plastic`, `conductor`, `measured`",
+        "room.toml:12:8: unknown material type `metal`, expected one of `diffuse`, `plastic`, \
+         `conductor`, `measured`",
     );
     case(
         &HEAD.replace("reflectance", "color"),
-        "room.toml:13:1: unknown key `color` in material `grey` of type `diffuse`, expected one of `name`, `type`, `reflectance`",
+        "room.toml:13:1: unknown key `color` in material `grey` of type `diffuse`, expected one \
+         of `name`, `type`, `reflectance`",
     );
     case(
         &HEAD.replace("reflectance = [0.5, 0.5, 0.5]", ""),
@@ -209,7 +213,9 @@ fn text_that_is_no_scene_is_refused_with_line_and_column() {
     );
     case(
         &with_box("radius = 2"),
-        "room.toml:18:1: unknown key `radius` in object of shape `box`, expected one of `name`, `mesh`, `shape`, `material`, `scale`, `rotate_deg`, `translate`, `size`, `bevel`, `bevel_segments`",
+        "room.toml:18:1: unknown key `radius` in object of shape `box`, expected one of `name`, \
+         `mesh`, `shape`, `material`, `scale`, `rotate_deg`, `translate`, `size`, `bevel`, \
+         `bevel_segments`",
     );
     case(
         &with_box("").replace("\"box\"", "\"cube\""),
@@ -497,7 +503,8 @@ fn broken_ply_files_are_refused_with_their_place() {
     case(b"ply\nformat ascii 1.0\n", "truncated: the file ends before `end_header`");
     case(
         &set("ascii", "EBCDIC"),
-        "broken.ply:2:1: expected format ascii, binary_little_endian or binary_big_endian, found `EBCDIC 1.0`",
+        "broken.ply:2:1: expected format ascii, binary_little_endian or binary_big_endian, found \
+         `EBCDIC 1.0`",
     );
     case(&set("format ascii 1.0\n", ""), "the header has no line `format`");
     case(
@@ -581,7 +588,8 @@ fn broken_obj_files_are_refused_with_their_line() {
     case(
         "f 1 2 3",
         "f 1 2 4",
-        "broken.obj:4:1: face after 0 triangles: position index 4 is out of range, there are 3 positions so far",
+        "broken.obj:4:1: face after 0 triangles: position index 4 is out of range, there are 3 \
+         positions so far",
     );
     case("f 1 2 3", "f 0 1 2", "position index 0 is out of range");
     case("f 1 2 3", "f -4 1 2", "position index -4 is out of range");

@@ -359,7 +359,8 @@ fn a_study_file_gives_scenes_and_settings() {
     let folder = folder();
     folder.write(
         "study.toml",
-        "study = \"Yards <&>\"\nnotes = [\"A <b>note</b>.\"]\nscenes = [\"yard.toml\"]\n[settings]\nsamplers = [\"mis\", \"ris\"]\n\
+        "study = \"Yards <&>\"\nnotes = [\"A <b>note</b>.\"]\nscenes = [\"yard.toml\"]\n[settings]\n\
+         samplers = [\"mis\", \"ris\"]\n\
          spp = [64]\nseeds = 5\nreference_spp = 128\n[quick]\nspp = [2]\nseeds = 1\n\
          [[published.errors]]\nscene = \"yard\"\nsource = \"Table 7\"\nspp = 2\n\
          values = { mis = 0.5, ris = 0.25 }\n",

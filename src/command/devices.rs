@@ -3,7 +3,7 @@
 use crate::{
     error::Result,
     gpu::{
-        device::{Capabilities, choose, list},
+        capabilities::{Capabilities, choose, list},
         instance::Instance,
     },
 };

@@ -1,19 +1,15 @@
-//! Storage buffers, uploads and downloads.
+//! Storage buffers.
 
 use std::sync::Arc;
 
 use ash::vk;
-use bytemuck::Pod;
 use gpu_allocator::{
     MemoryLocation,
     vulkan::{Allocation, AllocationCreateDesc, AllocationScheme},
 };
 
-use super::{commands::Commands, device::Device, labels, vulkan_error};
+use super::{device::Device, labels, vulkan_error};
 use crate::error::{Error, Result};
-
-/// Maximum size of one staging copy between host and device, bytes.
-const STAGING_BYTES: usize = 16 << 20;
 
 /// A named storage buffer in device memory.
 pub struct Buffer {
@@ -21,7 +17,7 @@ pub struct Buffer {
     size: u64,
     name: String,
     allocation: Option<Allocation>,
-    device: Arc<Device>,
+    pub(super) device: Arc<Device>,
 }
 
 impl Buffer {
@@ -54,50 +50,8 @@ impl Buffer {
         )
     }
 
-    /// Creates a buffer that holds `data` and is read only as a uniform texel buffer, so the limit
-    /// on storage buffers does not apply. The descriptor set checks the number of texels.
-    ///
-    /// # Errors
-    /// [`Error::Vulkan`] if memory runs out.
-    pub fn texels_from_slice<T: Pod>(device: &Arc<Device>, name: &str, data: &[T]) -> Result<Self> {
-        let bytes: &[u8] = bytemuck::cast_slice(data);
-        let buffer = Self::with_location(
-            device,
-            name,
-            bytes.len() as u64,
-            MemoryLocation::GpuOnly,
-            vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
-                | vk::BufferUsageFlags::TRANSFER_SRC
-                | vk::BufferUsageFlags::TRANSFER_DST,
-        )?;
-        buffer.upload(bytes)?;
-        Ok(buffer)
-    }
-
-    /// Creates a storage buffer that holds `data`.
-    ///
-    /// # Errors
-    /// As [`Buffer::new`].
-    pub fn from_slice<T: Pod>(device: &Arc<Device>, name: &str, data: &[T]) -> Result<Self> {
-        let bytes: &[u8] = bytemuck::cast_slice(data);
-        let buffer = Self::new(device, name, bytes.len() as u64)?;
-        buffer.upload(bytes)?;
-        Ok(buffer)
-    }
-
-    /// Creates a storage buffer filled with zeros.
-    ///
-    /// # Errors
-    /// As [`Buffer::new`].
-    pub fn zeroed(device: &Arc<Device>, name: &str, size: u64) -> Result<Self> {
-        let buffer = Self::new(device, name, size)?;
-        let mut commands = Commands::begin(device)?;
-        commands.fill(&buffer, 0);
-        commands.submit_and_wait()?;
-        Ok(buffer)
-    }
-
-    fn with_location(
+    /// Creates a buffer of `size` bytes, at least 16 and a multiple of 4, bound to memory of its own.
+    pub(super) fn with_location(
         device: &Arc<Device>,
         name: &str,
         size: u64,
@@ -154,87 +108,8 @@ impl Buffer {
         self.raw
     }
 
-    /// Copies `bytes` into the buffer, from its start.
-    ///
-    /// # Errors
-    /// [`Error::Vulkan`] if a call fails.
-    ///
-    /// # Panics
-    /// If `bytes` does not fit, which is a bug in the caller.
-    pub fn upload(&self, bytes: &[u8]) -> Result<()> {
-        assert!(bytes.len() as u64 <= self.size, "upload into {} is too long", self.name);
-        if bytes.is_empty() {
-            return Ok(());
-        }
-        let mut staging = Self::with_location(
-            &self.device,
-            "staging (upload)",
-            bytes.len().min(STAGING_BYTES) as u64,
-            MemoryLocation::CpuToGpu,
-            vk::BufferUsageFlags::TRANSFER_SRC,
-        )?;
-        for (index, piece) in bytes.chunks(STAGING_BYTES).enumerate() {
-            staging.mapped()?[..piece.len()].copy_from_slice(piece);
-            let mut commands = Commands::begin(&self.device)?;
-            commands.copy(
-                &staging,
-                0,
-                self,
-                (index * STAGING_BYTES) as u64,
-                piece.len().next_multiple_of(4) as u64,
-            );
-            commands.submit_and_wait()?;
-        }
-        Ok(())
-    }
-
-    /// Downloads the first `length` elements.
-    ///
-    /// # Errors
-    /// [`Error::Vulkan`] if a call fails.
-    ///
-    /// # Panics
-    /// If the buffer is shorter, which is a bug in the caller.
-    pub fn download<T: Pod>(&self, length: usize) -> Result<Vec<T>> {
-        let mut result = Vec::with_capacity(length);
-        self.download_pieces(length, |piece| result.extend_from_slice(piece))?;
-        Ok(result)
-    }
-
-    /// Downloads the first `length` elements and passes them to `take` in order, piece by piece.
-    ///
-    /// # Errors
-    /// [`Error::Vulkan`] if a call fails.
-    ///
-    /// # Panics
-    /// If the buffer is shorter, which is a bug in the caller.
-    pub fn download_pieces<T: Pod>(&self, length: usize, mut take: impl FnMut(&[T])) -> Result<()> {
-        let bytes = length * size_of::<T>();
-        assert!(bytes as u64 <= self.size, "download from {} is too long", self.name);
-        if bytes == 0 {
-            return Ok(());
-        }
-        let longest = STAGING_BYTES / size_of::<T>() * size_of::<T>();
-        let mut staging = Self::with_location(
-            &self.device,
-            "staging (download)",
-            bytes.min(longest) as u64,
-            MemoryLocation::GpuToCpu,
-            vk::BufferUsageFlags::TRANSFER_DST,
-        )?;
-        for first in (0..bytes).step_by(longest) {
-            let piece = longest.min(bytes - first);
-            let mut commands = Commands::begin(&self.device)?;
-            let copied = piece.next_multiple_of(4) as u64;
-            commands.copy(self, first as u64, &staging, 0, copied);
-            commands.make_visible_to_host();
-            commands.submit_and_wait()?;
-            take(bytemuck::cast_slice(&staging.mapped()?[..piece]));
-        }
-        Ok(())
-    }
-
-    fn mapped(&mut self) -> Result<&mut [u8]> {
+    /// Returns the memory of a buffer that the host sees.
+    pub(super) fn mapped(&mut self) -> Result<&mut [u8]> {
         self.allocation.as_mut().and_then(Allocation::mapped_slice_mut).ok_or_else(|| {
             Error::Vulkan {
                 call: format!("mapping of {}", self.name),

@@ -1,21 +1,23 @@
 //! Recording and submission of command buffers.
 
-use std::{collections::BTreeMap, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use ash::vk;
 
 use super::{
-    buffer::Buffer, descriptors::DescriptorSet, device::Device, labels, pipeline::Pipeline,
-    timestamps::Timestamps, vulkan_error,
+    buffer::Buffer,
+    descriptors::DescriptorSet,
+    device::Device,
+    labels,
+    pipeline::Pipeline,
+    timestamps::{PassTimes, Timestamps},
+    vulkan_error,
 };
 use crate::error::{Error, Result};
 use crate::shader::constants::WORKGROUP_SIZE;
 
 /// Timeout of one submission; dispatches are sized to take about a tenth of a second.
 const SUBMISSION_TIMEOUT: Duration = Duration::from_secs(120);
-
-/// Device time by pass name, milliseconds.
-pub type PassTimes = BTreeMap<String, f64>;
 
 /// A command buffer that is recorded, submitted once and dropped.
 pub struct Commands {
@@ -84,11 +86,11 @@ impl Commands {
     /// writes of earlier passes. It is labelled with the pipeline's name and, in a timed command
     /// buffer, bracketed by timestamps.
     ///
-    /// Of `sets` those are bound that the shader uses; `push_constants` may be empty.
+    /// Binds those of `sets` that the shader uses; `push_constants` may be empty.
     ///
     /// # Panics
     /// If the dispatch exceeds the device's workgroup count or the push constants exceed 128 bytes.
-    /// Callers size their waves by [`Capabilities`](super::device::Capabilities).
+    /// Callers size their waves by [`Capabilities`](super::Capabilities).
     pub fn dispatch(
         &mut self,
         pipeline: &Pipeline,

@@ -3,19 +3,25 @@
 #![expect(unsafe_code, reason = "raw Vulkan calls are unsafe; each block states why it is sound")]
 
 pub mod buffer;
+pub mod capabilities;
 pub mod commands;
 pub mod descriptors;
 pub mod device;
 pub mod instance;
 pub(crate) mod labels;
 pub mod pipeline;
+mod pipeline_cache;
+mod set_layouts;
 pub(crate) mod timestamps;
+mod transfer;
 
 pub use buffer::Buffer;
-pub use commands::{Commands, PassTimes};
+pub use capabilities::Capabilities;
+pub use commands::Commands;
 pub use descriptors::DescriptorSet;
-pub use device::{Capabilities, Device};
+pub use device::Device;
 pub use pipeline::Pipeline;
+pub use timestamps::PassTimes;
 
 use crate::error::Error;
 

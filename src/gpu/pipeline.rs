@@ -1,14 +1,11 @@
-//! Compute pipelines with specialization constants, and their cache on disk.
+//! Compute pipelines with specialization constants.
 
-use std::{ffi::CStr, fs, path::PathBuf, sync::Arc};
+use std::{ffi::CStr, sync::Arc};
 
 use ash::vk;
 
-use super::{
-    device::{Capabilities, Device},
-    labels, vulkan_error,
-};
-use crate::{error::Result, files, shader::spirv::used_bindings};
+use super::{device::Device, labels, vulkan_error};
+use crate::{error::Result, shader::spirv::used_bindings};
 
 /// A compute pipeline.
 pub struct Pipeline {
@@ -129,55 +126,4 @@ impl Drop for Pipeline {
             self.device.raw().destroy_pipeline_layout(self.layout, None);
         }
     }
-}
-
-/// The driver's pipeline cache, kept per device and driver in the user's cache folder.
-pub(super) struct PipelineCache {
-    raw: vk::PipelineCache,
-}
-
-impl PipelineCache {
-    /// Loads this device's cache, or an empty one if the file is unreadable or foreign.
-    pub(super) fn load(device: &ash::Device, capabilities: &Capabilities) -> Self {
-        let data = file(capabilities).and_then(|path| fs::read(path).ok()).unwrap_or_default();
-        // The header holds length, version, vendor and device, then the driver's UUID.
-        let is_ours = data.get(16..32) == Some(&capabilities.pipeline_cache_uuid[..]);
-        let info =
-            vk::PipelineCacheCreateInfo::default().initial_data(if is_ours { &data } else { &[] });
-        // SAFETY: drivers validate the header of the initial data, and its UUID was compared.
-        // Failure leaves a null cache, without which everything still works.
-        let raw = unsafe { device.create_pipeline_cache(&info, None) }.unwrap_or_default();
-        Self { raw }
-    }
-
-    pub(super) fn raw(&self) -> vk::PipelineCache {
-        self.raw
-    }
-
-    /// Writes the cache. Failure only costs compile time in the next run.
-    pub(super) fn save(&self, device: &ash::Device, capabilities: &Capabilities) {
-        let (Some(path), false) = (file(capabilities), self.raw == vk::PipelineCache::null())
-        else {
-            return;
-        };
-        // SAFETY: the cache is alive.
-        let data = unsafe { device.get_pipeline_cache_data(self.raw) }.unwrap_or_default();
-        let write = files::write_atomically(&path, |file| std::io::Write::write_all(file, &data));
-        if let Err(error) = write {
-            log::debug!("pipeline cache not written: {error}");
-        }
-    }
-
-    /// # Safety
-    /// The device must be alive and no pipeline creation in progress.
-    pub(super) unsafe fn destroy(&self, device: &ash::Device) {
-        // SAFETY: promised by the caller; destroying a null handle is allowed.
-        unsafe { device.destroy_pipeline_cache(self.raw, None) };
-    }
-}
-
-fn file(capabilities: &Capabilities) -> Option<PathBuf> {
-    let identity: String =
-        capabilities.pipeline_cache_uuid.iter().map(|byte| format!("{byte:02x}")).collect();
-    Some(files::cache_folder("pipelines")?.join(format!("{identity}.bin")))
 }

@@ -1,11 +1,14 @@
 //! Device time per pass, from timestamp queries.
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use ash::vk;
 
-use super::{commands::PassTimes, device::Device, vulkan_error};
+use super::{device::Device, vulkan_error};
 use crate::error::Result;
+
+/// Device time by pass name, milliseconds.
+pub type PassTimes = BTreeMap<String, f64>;
 
 /// Two queries per timed pass of one command buffer.
 pub(super) struct Timestamps {

@@ -3,7 +3,7 @@
 use super::{
     geometry::{Schedule, Traversal},
     kernel::{Dispatch, Domain, Kernel},
-    technique::Steps,
+    steps::Steps,
 };
 use crate::shader::{
     constants::{

@@ -11,7 +11,7 @@ use super::{
     kernel::{Dispatch, Kernel, Pass},
     order::{PassSettings, wave_order},
     scene_buffers::SceneBuffers,
-    technique::{PathDemand, SHADOW_RAYS_PER_GROUP, Steps, Technique},
+    steps::{Passes, PathDemand, SHADOW_RAYS_PER_GROUP, Steps},
     totals::Totals,
     wave_buffers::WaveBuffers,
 };
@@ -76,7 +76,7 @@ impl Runner {
     ///
     /// # Errors
     /// [`crate::Error::Vulkan`] if a call fails.
-    pub fn warm_up(&mut self, technique: &dyn Technique) -> Result<()> {
+    pub fn warm_up(&mut self, technique: &dyn Passes) -> Result<()> {
         let others = technique.other_steps();
         let all = [technique.steps()].into_iter().chain(others.iter().map(Box::as_ref));
         for steps in all {
@@ -107,7 +107,7 @@ impl Runner {
     ///
     /// # Errors
     /// [`crate::Error::Vulkan`] if the device fails.
-    pub fn sweep(&mut self, technique: &dyn Technique, wave: Wave, pixels: u32) -> Result<()> {
+    pub fn sweep(&mut self, technique: &dyn Passes, wave: Wave, pixels: u32) -> Result<()> {
         let mut done = 0;
         while done < pixels {
             let together =
@@ -128,12 +128,7 @@ impl Runner {
     ///
     /// # Errors
     /// [`crate::Error::Vulkan`] if the device fails.
-    pub fn run(
-        &mut self,
-        technique: &dyn Technique,
-        wave: Wave,
-        vertices: u32,
-    ) -> Result<PassTimes> {
+    pub fn run(&mut self, technique: &dyn Passes, wave: Wave, vertices: u32) -> Result<PassTimes> {
         let order = wave_order(&self.settings, technique.steps(), wave, vertices);
         let mut commands = Commands::begin_timed(&self.device, order.len() as u32)?;
         let sets = sets(&self.scene, technique, &self.waves, &self.film);
@@ -263,7 +258,7 @@ impl Runner {
 /// All descriptor sets of a render.
 fn sets<'a>(
     scene: &'a SceneBuffers,
-    technique: &'a dyn Technique,
+    technique: &'a dyn Passes,
     waves: &'a WaveBuffers,
     film: &'a FilmBuffers,
 ) -> Vec<&'a DescriptorSet> {

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use super::technique::PathDemand;
+use super::steps::PathDemand;
 use crate::{
     error::Result,
     gpu::{Buffer, DescriptorSet, Device},

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{Context, Parameters, Room, knob};
 use crate::{
     error::Result,
-    pass::{Domain, Kernel, Steps, Technique},
+    pass::{Domain, Kernel, Passes, Steps, Technique},
     shader::{
         constants::{
             CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS, CONSTANT_SAMPLER, SAMPLER_BRDF,
@@ -103,8 +103,10 @@ struct BasicTechnique {
     steps: BasicSteps,
 }
 
-impl Technique for BasicTechnique {
+impl Passes for BasicTechnique {
     fn steps(&self) -> &dyn Steps {
         &self.steps
     }
 }
+
+impl Technique for BasicTechnique {}

@@ -135,7 +135,8 @@ fn brdf(arguments: &Arguments, text: &str, table: &mut String) -> Result<()> {
         let largest = fit.views.iter().map(|view| view.errors.chi_squared).fold(0.0, f64::max);
         let _ = writeln!(
             table,
-            "| {name} | {lobes} × {} | {:.3} | {:.3} | {:.3} | {largest:.3} | {:.4} | {:.3} | {:.3} | {:.2} |",
+            "| {name} | {lobes} × {} | {:.3} | {:.3} | {:.3} | {largest:.3} | {:.4} | {:.3} | \
+             {:.3} | {:.2} |",
             fit.views.len(),
             mean.chi_squared,
             summary.largest_chi_squared,

@@ -11,7 +11,7 @@ use super::{
     budget::GuideBudget,
     decode_entry, decode_visibility,
     parameters::GuidedParameters,
-    record::{CellLevel, RecordedCell, RecordedRegion},
+    recorded_cell::{CellLevel, RecordedCell, RecordedRegion},
 };
 use crate::{
     error::{Error, Result},

@@ -8,17 +8,20 @@
 use std::{collections::BTreeMap, time::Instant};
 
 use super::{
+    buffers::GuideBuffers,
     cost::{
-        GUIDED_CANDIDATES, PixelSpread, choose_by_comparison, is_largest_clearly_worse,
-        relative_variances, upper_median,
+        PixelSpread, choose_by_comparison, is_largest_clearly_worse, relative_variances,
+        upper_median,
     },
-    technique::{Guided, TRAINING_SEED},
+    epoch::{TRAINING_SEED, with_epoch},
+    steps::GuidedSteps,
 };
 use crate::{
     error::Result,
     film::statistics::CandidateCost,
+    gpu::DescriptorSet,
     math::colour::luminance,
-    pass::{Progress, Runner},
+    pass::{Passes, Progress, Runner, Steps},
     shader::structs::{PathState, Wave},
 };
 
@@ -62,27 +65,27 @@ struct Measured {
     spread: PixelSpread,
 }
 
-impl Guided {
-    /// Undoes the choice, if there is one to make.
-    pub(super) fn forget_choice(&mut self) {
-        self.choice = Choice { candidates: self.given_candidates, ..Choice::default() };
-        self.steps.candidates = self.given_candidates.unwrap_or(GUIDED_CANDIDATES[0]);
+/// The passes of `guided`, with the number of candidates under trial.
+pub(super) struct Trial<'a> {
+    pub(super) buffers: &'a GuideBuffers,
+    pub(super) steps: GuidedSteps,
+    /// Tag of the guides that this one went on from.
+    pub(super) tag: u32,
+}
+
+impl Passes for Trial<'_> {
+    fn steps(&self) -> &dyn Steps {
+        &self.steps
     }
 
-    /// Takes `candidates` that an earlier render chose, if there is a choice to make.
-    pub(super) fn take_choice(&mut self, candidates: u32) {
-        if self.given_candidates.is_none() {
-            self.choice = Choice { candidates: Some(candidates), ..Choice::default() };
-            self.steps.candidates = candidates;
-        }
+    fn set(&self) -> Option<&DescriptorSet> {
+        Some(self.buffers.set())
     }
+}
 
+impl Trial<'_> {
     /// Measures and chooses. The counts since the last rebuild are forgotten.
-    pub(super) fn choose_candidates(
-        &mut self,
-        runner: &mut Runner,
-        progress: &Progress,
-    ) -> Result<()> {
+    pub(super) fn choose(mut self, runner: &mut Runner, progress: &Progress) -> Result<Choice> {
         let start = Instant::now();
         let mut measured = BTreeMap::new();
         let mut round = 0;
@@ -121,12 +124,10 @@ impl Guided {
         })?;
         self.buffers.clear_counts()?;
         runner.take_counters()?;
-        self.take_choice(chosen);
         let ms = start.elapsed().as_secs_f64() * 1e3;
         let figures: Vec<String> = costs.iter().map(ToString::to_string).collect();
         log::info!("candidates={chosen} by measurement in {ms:.0} ms: {}", figures.join("; "));
-        self.choice = Choice { candidates: Some(chosen), costs, ms };
-        Ok(())
+        Ok(Choice { candidates: Some(chosen), costs, ms })
     }
 
     /// Samples of each pixel for a wave of at least [`LEAST_MS`], if there is room. What is traced to
@@ -171,7 +172,7 @@ impl Guided {
         self.steps.candidates = candidates;
         runner.warm_up(self)?;
         let depth = runner.settings().depth;
-        let times = runner.run(self, self.with_epoch(wave, first_sample), depth)?;
+        let times = runner.run(self, with_epoch(wave, first_sample, self.tag), depth)?;
         let paths = runner.waves().paths().download((pixel_count * samples) as usize)?;
         Ok((times.values().sum(), paths))
     }

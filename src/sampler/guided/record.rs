@@ -5,10 +5,12 @@
 
 use glam::Vec3;
 
-use super::{key::CellKey, partition::Partition, technique::Guided};
+use super::{
+    epoch::with_epoch, partition::Partition, recorded_cell::RecordedCell, technique::Guided,
+};
 use crate::{
     error::Result,
-    pass::{Progress, Runner, Technique, film_buffers::position_in_film_order},
+    pass::{Passes, Progress, Runner, film_buffers::position_in_film_order},
     shader::{
         constants::{NO_MATERIAL, NOTHING_TO_LEARN},
         structs::{Hit, ShadowRay, Wave},
@@ -24,41 +26,6 @@ pub struct RecordedRay {
     pub contribution: Vec3,
     /// True if it reached the environment.
     pub is_visible: bool,
-}
-
-/// How closely a cell belongs to the place that found it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CellLevel {
-    /// All places whose surface points at this face of the cube.
-    Face(usize),
-    /// Four fine cells along each axis.
-    Coarse(CellKey),
-    /// The place itself.
-    Fine(CellKey),
-}
-
-/// What a cell knows about one region of the environment.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RecordedRegion {
-    /// Rays that were counted in the cell itself when its estimates were made, with one candidate also
-    /// directions that brought nothing; shares of rays where the
-    /// regions were split since they were counted.
-    pub trials: f64,
-    /// Those of them that reached the environment.
-    pub hits: f64,
-    /// V̂: estimated share of rays that reach it, by the hierarchy; in the steps of the tables.
-    pub visibility: f64,
-    /// P: probability that a guided direction lies in it.
-    pub probability: f64,
-}
-
-/// A cell of learned visibility.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RecordedCell {
-    /// Which it is.
-    pub level: CellLevel,
-    /// What it knows, region by region of [`RecordedGuide::partition`].
-    pub regions: Vec<RecordedRegion>,
 }
 
 /// A shadow ray with what it belongs to.
@@ -122,7 +89,7 @@ impl Guided {
             ..Wave::default()
         };
         let epoch = progress.first_sample.wrapping_add(self.rebuilt_at);
-        let wave = Wave { is_training: 1, ..self.with_epoch(wave, epoch) };
+        let wave = Wave { is_training: 1, ..with_epoch(wave, epoch, self.tag) };
         runner.run(self, wave, 1)?;
         runner.film().take_counters()?;
 

@@ -272,6 +272,7 @@ mod tests {
             rebuilt_at: 4,
             is_open: true,
             candidates: Some(8),
+            tag: 5,
             rectangles: vec![[0, 0, 5, 9, 0], [5, 0, 3, 9, 1]],
             keys: vec![u32::MAX, 7, 8],
             refined: vec![1],

@@ -2,8 +2,9 @@
 
 use super::{
     buffers::{GuideBuffers, GuideSize, SPLIT_AFTER, guide_schedule},
-    choice::Choice,
+    choice::{Choice, Trial},
     cost::GUIDED_CANDIDATES,
+    epoch::{TRAINING_SEED, with_epoch},
     parameters::GuidedParameters,
     state::GuideState,
     steps::GuidedSteps,
@@ -12,8 +13,7 @@ use crate::{
     error::Result,
     film::Aov,
     gpu::DescriptorSet,
-    math::random::hash_4d,
-    pass::{Progress, Report, Runner, SHADOW_RAYS_PER_GROUP, Steps, Technique},
+    pass::{Passes, Progress, Report, Runner, SHADOW_RAYS_PER_GROUP, Steps, Technique},
     sampler::{
         Context, Parameters, Room,
         basic::{self, BasicSteps},
@@ -28,10 +28,6 @@ const TRAINING_SWEEPS: u32 = 8;
 /// Share of visible rays above which a scene is rendered as by `mis`: little is blocked, and learning
 /// costs more than it brings.
 const OPEN_SHARE: f64 = 0.5;
-/// Tells the seeds of epochs from other hashes.
-const EPOCH_TAG: u32 = 0x6b43_a9b5;
-/// Tells the random numbers of training from those of the picture.
-pub(super) const TRAINING_SEED: u32 = 0x7e11_ab1e;
 
 /// The room of `guided`.
 pub(in crate::sampler) struct GuidedRoom;
@@ -85,12 +81,12 @@ fn first_candidates(parameters: &Parameters) -> Result<u32> {
 /// `guided` in one render.
 pub struct Guided {
     pub(super) buffers: GuideBuffers,
-    pub(super) steps: GuidedSteps,
+    steps: GuidedSteps,
     /// Those of `mis`, for scenes where nothing is blocked.
     open_steps: BasicSteps,
     /// Candidates that were asked for; none under `auto`.
-    pub(super) given_candidates: Option<u32>,
-    pub(super) choice: Choice,
+    given_candidates: Option<u32>,
+    choice: Choice,
     /// True once the training sweeps are behind.
     is_trained: bool,
     /// True if so little is blocked that there is nothing to learn.
@@ -98,7 +94,7 @@ pub struct Guided {
     /// Samples per pixel at the last rebuild of the guide.
     pub(super) rebuilt_at: u32,
     /// Tag of the guides that this one went on from; 0 for none.
-    tag: u32,
+    pub(super) tag: u32,
 }
 
 impl Guided {
@@ -144,23 +140,30 @@ impl Guided {
         }
         self.is_trained = true;
         if let Some(candidates) = state.candidates {
-            self.take_choice(candidates);
+            self.take_choice(Choice { candidates: Some(candidates), ..Choice::default() });
             runner.warm_up(self)?;
         }
         Ok(has_moved)
+    }
+
+    /// Undoes the choice, if there is one to make.
+    fn forget_choice(&mut self) {
+        self.choice = Choice { candidates: self.given_candidates, ..Choice::default() };
+        self.steps.candidates = self.given_candidates.unwrap_or(GUIDED_CANDIDATES[0]);
+    }
+
+    /// Takes a choice that was measured, here or by an earlier render, if there is one to make.
+    fn take_choice(&mut self, choice: Choice) {
+        if self.given_candidates.is_none() {
+            self.steps.candidates = choice.candidates.unwrap_or(self.steps.candidates);
+            self.choice = choice;
+        }
     }
 
     /// Candidates that each shadow ray is chosen from; none where `auto` has not been decided yet, and
     /// in open scenes.
     fn candidates(&self) -> Option<u32> {
         self.choice.candidates.filter(|_| !self.is_open)
-    }
-
-    /// `wave` with numbers of its own for the epoch that begins at `sample`: those of `guided` start anew
-    /// after every rebuild, and differ from those that taught a loaded guide.
-    pub(super) fn with_epoch(&self, wave: Wave, sample: u32) -> Wave {
-        let [epoch_seed, ..] = hash_4d([wave.seed, sample, EPOCH_TAG ^ self.tag, wave.is_training]);
-        Wave { epoch_seed, epoch_start: sample, ..wave }
     }
 
     fn rebuild(&mut self, splits: bool, samples: u32) -> Result<()> {
@@ -180,7 +183,7 @@ impl Guided {
                 is_training: 1,
                 ..Wave::default()
             };
-            let wave = self.with_epoch(wave, wave.first_sample);
+            let wave = with_epoch(wave, wave.first_sample, self.tag);
             let before = runner.totals().clone();
             runner.sweep(self, wave, runner.film().padded_pixels() / TRAINING_SWEEPS)?;
             runner.take_counters()?;
@@ -203,7 +206,7 @@ impl Guided {
     }
 }
 
-impl Technique for Guided {
+impl Passes for Guided {
     fn steps(&self) -> &dyn Steps {
         if self.is_open { &self.open_steps } else { &self.steps }
     }
@@ -221,9 +224,11 @@ impl Technique for Guided {
     fn set(&self) -> Option<&DescriptorSet> {
         Some(self.buffers.set())
     }
+}
 
+impl Technique for Guided {
     fn complete(&self, wave: Wave, progress: &Progress) -> Wave {
-        self.with_epoch(wave, progress.first_sample.wrapping_add(self.rebuilt_at))
+        with_epoch(wave, progress.first_sample.wrapping_add(self.rebuilt_at), self.tag)
     }
 
     fn learn(&mut self, runner: &mut Runner, progress: &Progress) -> Result<u32> {
@@ -238,7 +243,8 @@ impl Technique for Guided {
             return Ok(u32::MAX);
         }
         if self.choice.candidates.is_none() {
-            self.choose_candidates(runner, progress)?;
+            let trial = Trial { buffers: &self.buffers, steps: self.steps, tag: self.tag };
+            self.take_choice(trial.choose(runner, progress)?);
         }
         Ok(guide_schedule(samples + 1) - samples)
     }

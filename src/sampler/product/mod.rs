@@ -21,7 +21,7 @@ use super::{Context, Parameters, Room, knob};
 use crate::{
     error::Result,
     gpu::DescriptorSet,
-    pass::{PathDemand, Report, Steps, Technique},
+    pass::{Passes, PathDemand, Report, Steps, Technique},
 };
 
 /// The room of `product`.
@@ -69,7 +69,7 @@ impl Product {
     }
 }
 
-impl Technique for Product {
+impl Passes for Product {
     fn steps(&self) -> &dyn Steps {
         &self.steps
     }
@@ -77,7 +77,9 @@ impl Technique for Product {
     fn set(&self) -> Option<&DescriptorSet> {
         Some(self.lobes.set())
     }
+}
 
+impl Technique for Product {
     fn report(&self) -> Report {
         report(&self.lobes)
     }

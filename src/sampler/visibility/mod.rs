@@ -21,7 +21,7 @@ use crate::{
     error::{Error, Result},
     film::Aov,
     gpu::{Commands, DescriptorSet},
-    pass::{PathDemand, Progress, Report, Runner, Steps, Technique},
+    pass::{Passes, PathDemand, Progress, Report, Runner, Steps, Technique},
 };
 
 /// The room of `visibility`.
@@ -103,7 +103,7 @@ impl Visibility {
     }
 }
 
-impl Technique for Visibility {
+impl Passes for Visibility {
     fn steps(&self) -> &dyn Steps {
         &self.steps
     }
@@ -111,7 +111,9 @@ impl Technique for Visibility {
     fn set(&self) -> Option<&DescriptorSet> {
         Some(self.lobes.set())
     }
+}
 
+impl Technique for Visibility {
     /// With caches of pixels a sample learns from the samples before it.
     fn learn(&mut self, _runner: &mut Runner, _progress: &Progress) -> Result<u32> {
         Ok(if self.keeps_caches() { 1 } else { u32::MAX })
