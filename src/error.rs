@@ -1,6 +1,9 @@
 //! The one error type of the library.
 
-use std::path::{Path, PathBuf};
+use std::{
+    ops::Range,
+    path::{Path, PathBuf},
+};
 
 /// Result with Fenestra's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -99,6 +102,11 @@ impl Error {
         Self::Io { path: path.to_path_buf(), action, source }
     }
 
+    /// Creates an [`Error::Parse`] for `path`.
+    pub fn parse(path: &Path, line: usize, column: usize, message: impl Into<String>) -> Self {
+        Self::Parse { path: path.to_path_buf(), line, column, message: message.into() }
+    }
+
     /// Creates an [`Error::Format`] for `path`.
     pub fn format(path: &Path, message: impl Into<String>) -> Self {
         Self::Format { path: path.to_path_buf(), message: message.into() }
@@ -114,6 +122,11 @@ impl Error {
         Self::Usage { message: message.into() }
     }
 
+    /// Creates an [`Error::Comparison`].
+    pub fn comparison(message: impl Into<String>) -> Self {
+        Self::Comparison { message: message.into() }
+    }
+
     /// Exit status: 2 for wrong usage, 3 for a metric beyond its threshold, 130 interrupted, else
     /// 1.
     pub fn exit_status(&self) -> u8 {
@@ -124,4 +137,32 @@ impl Error {
             _ => 1,
         }
     }
+}
+
+/// Message about a range of a text's bytes, before its file is known.
+#[derive(Debug)]
+pub(crate) struct TextError {
+    pub(crate) span: Range<usize>,
+    pub(crate) message: String,
+}
+
+impl TextError {
+    /// Converts to an [`Error::Parse`] of the file `path`, which holds `text`.
+    pub(crate) fn locate(self, path: &Path, text: &str) -> Error {
+        let (line, column) = line_and_column(text, self.span.start);
+        Error::parse(path, line, column, self.message)
+    }
+}
+
+impl From<toml::de::Error> for TextError {
+    fn from(error: toml::de::Error) -> Self {
+        Self { span: error.span().unwrap_or(0..0), message: error.message().to_owned() }
+    }
+}
+
+/// Line and column of a byte offset, both from 1; columns count characters.
+pub(crate) fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
+    let before = text.get(..offset).unwrap_or(text);
+    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+    (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
 }

@@ -1,4 +1,4 @@
-//! Atomic writes, and the user's cache folder.
+//! Reading and atomic writing of files, and the user's cache folder.
 
 use std::{
     env,
@@ -6,6 +6,8 @@ use std::{
     io::{BufWriter, Write},
     path::{Path, PathBuf},
 };
+
+use serde::Serialize;
 
 use crate::error::{Error, Result};
 
@@ -15,6 +17,29 @@ pub fn cache_folder(kind: &str) -> Option<PathBuf> {
     let set = |name| env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     let base = set("XDG_CACHE_HOME").or_else(|| Some(set("HOME")?.join(".cache")))?;
     Some(base.join("fenestra").join(kind))
+}
+
+/// Returns the extension of `path` in lower case; empty if it has none.
+pub fn extension(path: &Path) -> String {
+    path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default()
+}
+
+/// Formats bytes, such as those of a hash, in lower-case hexadecimal.
+pub fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Reads a whole file.
+pub fn read(path: &Path) -> Result<Vec<u8>> {
+    fs::read(path).map_err(|source| Error::io(path, "read", source))
+}
+
+/// Reads a file of UTF-8 text; an error names the first byte that is not.
+pub fn read_text(path: &Path) -> Result<String> {
+    String::from_utf8(read(path)?).map_err(|error| {
+        let offset = error.utf8_error().valid_up_to();
+        Error::format(path, format!("not a text file: byte {offset} is not UTF-8"))
+    })
 }
 
 /// Returns the folder that holds `path`.
@@ -89,4 +114,17 @@ pub fn write_atomically(
         temporary.persist(path).map_err(|error| error.error)
     };
     attempt().map_err(|source| Error::io(path, "write", source))
+}
+
+/// Writes a text file as [`write_atomically`] does.
+pub fn write_text(path: &Path, text: &str) -> Result<()> {
+    write_atomically(path, |file| file.write_all(text.as_bytes()))
+}
+
+/// Writes a value as indented JSON, as [`write_atomically`] does.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    write_atomically(path, |file| {
+        serde_json::to_writer_pretty(&mut *file, value)?;
+        file.write_all(b"\n")
+    })
 }

@@ -14,7 +14,7 @@
 //! (2·√(θ_h/90°), θ_d/90°, ½|cosθ_i − cosθ_o|), are continuous in the directions, symmetric in the
 //! two, fine in the highlight, and coarse along it, where the BRDF changes slowly.
 
-use std::{f32::consts::FRAC_PI_2, fs, path::Path};
+use std::{f32::consts::FRAC_PI_2, path::Path};
 
 use glam::{DVec3, Vec3, vec3};
 use rayon::prelude::*;
@@ -26,6 +26,7 @@ use crate::{
         twin,
     },
     error::{Error, Result},
+    files,
     shader::constants::*,
 };
 
@@ -65,8 +66,7 @@ struct Number {
 /// Omits records with values that are not finite or with a direction below the surface, and counts
 /// them in the table's warnings.
 pub fn load(path: &Path) -> Result<MeasuredTable> {
-    let bytes = fs::read(path).map_err(|source| Error::io(path, "read", source))?;
-    let text = String::from_utf8(bytes).map_err(|error| {
+    let text = String::from_utf8(files::read(path)?).map_err(|error| {
         Error::format(
             path,
             format!(
@@ -117,12 +117,8 @@ fn bake(samples: &SampleSet) -> Vec<Vec3> {
 /// Returns the samples of a file and the number of omitted records.
 fn parse(path: &Path, text: &str) -> Result<(Vec<Sample>, usize)> {
     let numbers = numbers(path, text)?;
-    let error = |place: &Number, message: String| Error::Parse {
-        path: path.to_path_buf(),
-        line: place.line,
-        column: place.column,
-        message,
-    };
+    let error =
+        |place: &Number, message: String| Error::parse(path, place.line, place.column, message);
     let Some((first, rest)) = numbers.split_first() else {
         return Err(Error::format(path, "empty: expected the count of wavelengths"));
     };
@@ -194,16 +190,12 @@ fn numbers(path: &Path, text: &str) -> Result<Vec<Number>> {
         for word in content.split_whitespace() {
             let place = word.as_ptr() as usize - line.as_ptr() as usize;
             let column = line[..place].chars().count() + 1;
+            let line = line_index + 1;
             let value = word.parse().map_err(|_| {
                 let shown: String = word.chars().take(40).collect();
-                Error::Parse {
-                    path: path.to_path_buf(),
-                    line: line_index + 1,
-                    column,
-                    message: format!("expected a number, found {shown:?}"),
-                }
+                Error::parse(path, line, column, format!("expected a number, found {shown:?}"))
             })?;
-            numbers.push(Number { value, line: line_index + 1, column });
+            numbers.push(Number { value, line, column });
         }
     }
     Ok(numbers)

@@ -59,11 +59,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 fn file(path: &Path, is_map: bool) -> Result<Report> {
-    let extension = path
-        .extension()
-        .map(|extension| extension.to_string_lossy().to_lowercase())
-        .unwrap_or_default();
-    match extension.as_str() {
+    match files::extension(path).as_str() {
         "toml" | "gltf" | "glb" | "pbrt" => scene(path),
         "hdr" | "pfm" => environment_map(path),
         "exr" if is_map => environment_map(path),

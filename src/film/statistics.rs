@@ -1,11 +1,11 @@
 //! Statistics of a render as JSON, which `render --stats` writes.
 
-use std::{collections::BTreeMap, fmt, io::Write, path::Path};
+use std::{collections::BTreeMap, fmt, path::Path};
 
 use serde::{Deserialize, Serialize};
 
 use super::metadata::SampleRange;
-use crate::{error::Result, files::write_atomically};
+use crate::{error::Result, files::write_json};
 
 /// Figures of one render. Times cover this run only, even if it continued a checkpoint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -81,10 +81,7 @@ impl Statistics {
     /// # Errors
     /// [`crate::Error::Io`] with the cause.
     pub fn write(&self, path: &Path) -> Result<()> {
-        write_atomically(path, |file| {
-            serde_json::to_writer_pretty(&mut *file, self)?;
-            file.write_all(b"\n")
-        })
+        write_json(path, self)
     }
 }
 

@@ -5,7 +5,6 @@
 //! make the same fit at once do no harm.
 
 use std::{
-    fs,
     io::Write,
     path::{Path, PathBuf},
 };
@@ -16,7 +15,7 @@ use sha2::{Digest, Sha256};
 use super::{config, fitted::Fit};
 use crate::{
     error::{Error, Result},
-    files::write_atomically,
+    files::{self, hexadecimal, write_atomically},
 };
 
 /// Extension of fit files.
@@ -38,7 +37,7 @@ fn digest(parts: &[&[u8]]) -> String {
         hasher.update((part.len() as u64).to_le_bytes());
         hasher.update(part);
     }
-    hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    hexadecimal(&hasher.finalize())
 }
 
 /// Name of a fit in the cache, from everything it depends on and the version of the procedure.
@@ -76,7 +75,7 @@ pub fn write_fit(path: &Path, fit: &Fit) -> Result<()> {
 /// [`Error::Io`] if it cannot be read; [`Error::Format`] if it is no fit file, of another version
 /// or damaged.
 pub fn read_fit(path: &Path) -> Result<Fit> {
-    let bytes = fs::read(path).map_err(|source| Error::io(path, "read", source))?;
+    let bytes = files::read(path)?;
     let fail = |message: String| Error::format(path, message);
     let no_fit = || fail("not a fit file; expected one written by `fenestra fit`".into());
     let split = bytes.iter().position(|byte| *byte == b'\n').ok_or_else(no_fit)?;
@@ -107,7 +106,7 @@ pub struct Cache {
 impl Cache {
     /// The user's cache, `fenestra/fits` in `$XDG_CACHE_HOME` or `~/.cache`; none if neither is set.
     pub fn user() -> Option<Self> {
-        crate::files::cache_folder("fits").map(Self::at)
+        files::cache_folder("fits").map(Self::at)
     }
 
     /// A cache in a folder that need not exist yet.

@@ -1,12 +1,13 @@
 //! SHA-256 of everything that changes the picture.
 
-use std::fmt::Write;
-
 use glam::Vec3;
 use sha2::{Digest, Sha256};
 
 use super::{Filter, Scene};
-use crate::brdf::material::{ConductorFresnel, MaterialKind};
+use crate::{
+    brdf::material::{ConductorFresnel, MaterialKind},
+    files::hexadecimal,
+};
 
 /// Hashes camera, film, environment, materials and geometry; lower-case hexadecimal.
 ///
@@ -54,12 +55,7 @@ struct Hasher(Sha256);
 
 impl Hasher {
     fn finish(self) -> String {
-        let mut hexadecimal = String::with_capacity(64);
-        for byte in self.0.finalize() {
-            // Writing into a string cannot fail.
-            let _ = write!(hexadecimal, "{byte:02x}");
-        }
-        hexadecimal
+        hexadecimal(&self.0.finalize())
     }
 
     fn environment(&mut self, scene: &Scene) {

@@ -17,6 +17,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
+    files::write_json,
     film::{Metadata, png::write_preview},
     gpu::Device,
     pass::SceneBuffers,
@@ -244,7 +245,7 @@ impl Study<'_> {
                 folder: self.folder,
             };
             let run = job.execute(renderer, &mut self.watch)?;
-            self.folder.write_json(&self.finished.run_record(scene, task), &run)?;
+            write_json(&self.finished.run_record(scene, task), &run)?;
             if let Some(last) = run.last() {
                 self.watch.note(&format!(
                     "{}: {}, {}, seed {seed}: {} spp in {:.2} s, RMSE {:.4e}",

@@ -21,8 +21,6 @@
 //! ```
 
 use std::{
-    collections::BTreeMap,
-    ops::Range,
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -35,7 +33,8 @@ use super::{
     plan::{Description, Options, PublishedErrors, PublishedOverhead},
 };
 use crate::{
-    error::{Error, Result},
+    error::{Error, Result, TextError},
+    files::{extension, read_text},
     sampler::Parameters,
 };
 
@@ -98,51 +97,9 @@ struct Entries {
 #[serde(deny_unknown_fields)]
 struct Published {
     #[serde(default)]
-    errors: Vec<ErrorsEntry>,
+    errors: Vec<PublishedErrors>,
     #[serde(default)]
-    overheads: Vec<OverheadEntry>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ErrorsEntry {
-    scene: String,
-    source: String,
-    spp: u32,
-    values: BTreeMap<String, f64>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct OverheadEntry {
-    label: String,
-    low: f64,
-    high: f64,
-}
-
-/// Message with the byte range of the text that it is about.
-struct Failure {
-    span: Range<usize>,
-    message: String,
-}
-
-impl From<toml::de::Error> for Failure {
-    fn from(error: toml::de::Error) -> Self {
-        Self { span: error.span().unwrap_or(0..0), message: error.message().to_owned() }
-    }
-}
-
-impl Failure {
-    fn locate(self, path: &Path, text: &str) -> Error {
-        let before = text.get(..self.span.start).unwrap_or(text);
-        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        Error::Parse {
-            path: path.to_path_buf(),
-            line: before.matches('\n').count() + 1,
-            column: before[line_start..].chars().count() + 1,
-            message: self.message,
-        }
-    }
+    overheads: Vec<PublishedOverhead>,
 }
 
 /// Tests whether `path` is a study file: TOML with a key `study`, where a scene has `[camera]`.
@@ -150,11 +107,12 @@ impl Failure {
 /// # Errors
 /// The file cannot be read, is no TOML, or has neither key.
 pub fn is_study(path: &Path) -> Result<bool> {
-    if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("toml")) {
+    if extension(path) != "toml" {
         return Ok(false);
     }
     let text = read_text(path)?;
-    let table = DeTable::parse(&text).map_err(|error| Failure::from(error).locate(path, &text))?;
+    let table =
+        DeTable::parse(&text).map_err(|error| TextError::from(error).locate(path, &text))?;
     let has = |key: &str| table.get_ref().contains_key(key);
     match (has("study"), has("camera")) {
         (true, _) => Ok(true),
@@ -165,14 +123,6 @@ pub fn is_study(path: &Path) -> Result<bool> {
              found neither",
         )),
     }
-}
-
-fn read_text(path: &Path) -> Result<String> {
-    let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read", source))?;
-    String::from_utf8(bytes).map_err(|error| {
-        let offset = error.utf8_error().valid_up_to();
-        Error::format(path, format!("not a text file: byte {offset} is not UTF-8"))
-    })
 }
 
 impl StudyFile {
@@ -192,33 +142,15 @@ impl StudyFile {
         folder: &Path,
         defaults: Parameters,
         parsers: ValueParsers,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self, TextError> {
         let root: Root = toml::from_str(text)?;
-        let published = root.published;
         Ok(Self {
             scenes: root.scenes.into_inner().iter().map(|scene| folder.join(scene)).collect(),
             description: Description {
                 title: Some(root.study),
                 notes: root.notes,
-                published_errors: published
-                    .errors
-                    .into_iter()
-                    .map(|entry| PublishedErrors {
-                        scene: entry.scene,
-                        source: entry.source,
-                        spp: entry.spp,
-                        values: entry.values,
-                    })
-                    .collect(),
-                published_overheads: published
-                    .overheads
-                    .into_iter()
-                    .map(|entry| PublishedOverhead {
-                        label: entry.label,
-                        low: entry.low,
-                        high: entry.high,
-                    })
-                    .collect(),
+                published_errors: root.published.errors,
+                published_overheads: root.published.overheads,
             },
             settings: root.settings.into_options(defaults, parsers)?,
             quick: root.quick.into_options(defaults, parsers)?,
@@ -230,17 +162,21 @@ impl StudyFile {
 fn read<T, V>(
     entry: Option<Spanned<V>>,
     parse: impl FnOnce(&V) -> Result<T, String>,
-) -> Result<Option<T>, Failure> {
+) -> Result<Option<T>, TextError> {
     entry
         .map(|entry| {
             let span = entry.span();
-            parse(entry.get_ref()).map_err(|message| Failure { span, message })
+            parse(entry.get_ref()).map_err(|message| TextError { span, message })
         })
         .transpose()
 }
 
 impl Entries {
-    fn into_options(self, defaults: Parameters, parsers: ValueParsers) -> Result<Options, Failure> {
+    fn into_options(
+        self,
+        defaults: Parameters,
+        parsers: ValueParsers,
+    ) -> Result<Options, TextError> {
         let contender =
             |text: &String| Contender::parse(text, defaults).map_err(|error| error.to_string());
         Ok(Options {

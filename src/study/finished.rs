@@ -63,11 +63,6 @@ impl FinishedRuns<'_> {
         self.folder.record(&scene.name, &run_stem(contender, rule, seed))
     }
 
-    /// Path of an overhead round's record.
-    fn round_record(&self, scene: &Scene, repetition: u32) -> PathBuf {
-        self.folder.record(&scene.name, &format!("overhead-{repetition}"))
-    }
-
     /// Reads the record of a run that is finished and holds everything the plan asks for.
     pub(super) fn run(&self, scene: &Scene, task: (Rule, u32, &Contender)) -> Result<Option<Run>> {
         let path = self.run_record(scene, task);
@@ -82,7 +77,7 @@ impl FinishedRuns<'_> {
 
     /// Reads the record of a finished overhead round with the plan's number of samples.
     pub(super) fn round(&self, scene: &Scene, repetition: u32) -> Result<Option<Round>> {
-        let round = self.folder.read_json::<Round>(&self.round_record(scene, repetition))?;
+        let round = self.folder.read_json::<Round>(&self.folder.round(&scene.name, repetition))?;
         Ok(round.filter(|round| Some(round.spp) == self.plan.overhead.as_ref().map(|o| o.spp)))
     }
 
@@ -104,7 +99,7 @@ impl FinishedRuns<'_> {
             for repetition in 1..=rounds {
                 if let Some(round) = self.round(scene, repetition)? {
                     let asked = self.conditions(scene, None)?;
-                    compare(self.round_record(scene, repetition), &round.conditions, &asked);
+                    compare(self.folder.round(&scene.name, repetition), &round.conditions, &asked);
                 }
             }
         }

@@ -13,7 +13,6 @@
 
 use std::{
     fs::{self, File, TryLockError},
-    io::Write,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -22,7 +21,7 @@ use serde::{Serialize, de::DeserializeOwned};
 
 use crate::{
     error::{Error, Result},
-    files::{check_writable, write_atomically},
+    files::{check_writable, write_json},
 };
 
 /// File that marks a report folder.
@@ -85,7 +84,7 @@ impl Folder {
                 ));
             }
         }
-        folder.write_json(&mark, &Mark { format: FORMAT.to_owned() })?;
+        write_json(&mark, &Mark { format: FORMAT.to_owned() })?;
         folder.locked()
     }
 
@@ -126,9 +125,14 @@ impl Folder {
         &self.path
     }
 
-    /// Path of the record of a run or round.
+    /// Path of the record of a run.
     pub fn record(&self, scene: &str, stem: &str) -> PathBuf {
         self.path.join("runs").join(scene).join(format!("{stem}.json"))
+    }
+
+    /// Path of the record of an overhead round.
+    pub fn round(&self, scene: &str, repetition: u32) -> PathBuf {
+        self.record(scene, &format!("overhead-{repetition}"))
     }
 
     /// Path of the picture of a run or reference inside this folder.
@@ -157,17 +161,6 @@ impl Folder {
             )
         })
     }
-
-    /// Writes a record, atomically.
-    ///
-    /// # Errors
-    /// [`Error::Io`] with the cause.
-    pub fn write_json(&self, path: &Path, record: &impl Serialize) -> Result<()> {
-        write_atomically(path, |file| {
-            serde_json::to_writer_pretty(&mut *file, record)?;
-            file.write_all(b"\n")
-        })
-    }
 }
 
 #[cfg(test)]
@@ -192,7 +185,7 @@ mod tests {
         let folder = Folder::open(&parent.path().join("report")).unwrap();
         let path = folder.record("room", "mis-4spp-seed1");
         assert_eq!(folder.read_json::<Vec<u32>>(&path).unwrap(), None);
-        folder.write_json(&path, &[1, 2, 3]).unwrap();
+        write_json(&path, &[1, 2, 3]).unwrap();
         let other = Folder::open(folder.path()).unwrap_err().to_string();
         assert!(other.contains("another study is at work"), "{other}");
         let folder_path = folder.path().to_path_buf();

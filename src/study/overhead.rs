@@ -15,7 +15,7 @@ use super::{
     statistics::{Interval, median_interval},
     watch::{Pace, Watch},
 };
-use crate::{error::Result, renderer::Renderer, scene::Scene};
+use crate::{error::Result, files::write_json, renderer::Renderer, scene::Scene};
 
 /// Overhead measurements of one scene.
 pub(super) struct OverheadJob<'a> {
@@ -77,8 +77,7 @@ impl OverheadJob<'_> {
                 conditions: self.conditions.clone(),
                 timings,
             };
-            let path = self.folder.record(&self.scene.name, &format!("overhead-{repetition}"));
-            self.folder.write_json(&path, &round)?;
+            write_json(&self.folder.round(&self.scene.name, repetition), &round)?;
             rounds.push(round);
         }
         watch.note(&format!(

@@ -3,9 +3,9 @@
 //! Options come from the study file's `[settings]`, its `[quick]` table and the command line; later
 //! layers override earlier ones. [`Plan::new`] fills in defaults and rejects impossible plans.
 
-use std::{path::PathBuf, time::Duration};
+use std::{collections::BTreeMap, path::PathBuf, time::Duration};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{contender::Contender, rule::Rule};
 use crate::{
@@ -76,7 +76,8 @@ impl Options {
 }
 
 /// Errors that a publication reports for one scene and one number of samples.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PublishedErrors {
     /// Scene by name.
     pub scene: String,
@@ -85,11 +86,12 @@ pub struct PublishedErrors {
     /// Samples per pixel.
     pub spp: u32,
     /// Figure by sampler, in the publication's own units.
-    pub values: std::collections::BTreeMap<String, f64>,
+    pub values: BTreeMap<String, f64>,
 }
 
 /// A ratio of times that a publication reports.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PublishedOverhead {
     /// Subject of the ratio.
     pub label: String,

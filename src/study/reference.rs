@@ -23,6 +23,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
+    files,
     film::{
         Aov, Attribute, Checkpoint, Image, Metadata, RgbImage, SampleRange,
         checkpoint::checkpoint_path,
@@ -66,13 +67,11 @@ pub fn identity(plan: &ReferencePlan, scene: &str) -> Result<String> {
         ReferencePlan::Files(_) | ReferencePlan::Study(_) => {
             let mut hasher = Sha256::new();
             for path in given_files(plan, scene)? {
-                let bytes = fs::read(&path).map_err(|source| Error::io(&path, "read", source))?;
+                let bytes = files::read(&path)?;
                 hasher.update((bytes.len() as u64).to_le_bytes());
                 hasher.update(bytes);
             }
-            let digits: String =
-                hasher.finalize().iter().take(6).map(|byte| format!("{byte:02x}")).collect();
-            Ok(format!("given images {digits}"))
+            Ok(format!("given images {}", files::hexadecimal(&hasher.finalize()[..6])))
         }
     }
 }

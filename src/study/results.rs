@@ -2,7 +2,6 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    io::Write,
     time::{SystemTime, UNIX_EPOCH},
 };
 
@@ -17,7 +16,11 @@ use super::{
     rule::Rule,
     summary::{Curve, Summary, curves, rules, summaries},
 };
-use crate::{error::Result, files::write_atomically, gpu::Device};
+use crate::{
+    error::Result,
+    files::{write_json, write_text},
+    gpu::Device,
+};
 
 /// Machine, version and command of a study.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -170,11 +173,8 @@ impl Report {
     /// # Errors
     /// [`crate::Error::Io`] with the cause.
     pub fn write(&self, plan: &Plan, folder: &Folder) -> Result<()> {
-        folder.write_json(&folder.path().join("results.json"), self)?;
-        let table = self.csv(&rules(plan));
-        write_atomically(&folder.path().join("results.csv"), |file| {
-            file.write_all(table.as_bytes())
-        })
+        write_json(&folder.path().join("results.json"), self)?;
+        write_text(&folder.path().join("results.csv"), &self.csv(&rules(plan)))
     }
 
     /// Formats a row for every run and rule; columns of figures that a run lacks are empty.

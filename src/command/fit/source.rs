@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::{
     brdf::{Material, MaterialTables, MeasuredTable, material::MaterialKind},
     error::{Error, Result},
+    files::extension,
     scene::{EnvironmentMap, Scene},
 };
 
@@ -23,11 +24,6 @@ pub struct Source {
     pub name: String,
     /// Tables of this one material.
     pub tables: MaterialTables,
-}
-
-/// Returns the extension in lower case.
-pub fn extension(path: &Path) -> String {
-    path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
 
 /// Tests for the extension of a measured BRDF.

@@ -2,14 +2,13 @@
 
 use std::{
     fmt::Write,
-    io::Write as _,
     path::{Path, PathBuf},
 };
 
 use super::{source, with_progress};
 use crate::{
     error::Result,
-    files::write_atomically,
+    files::{extension, write_text},
     fit::{
         BrdfOptions, EnvironmentOptions, Method, brdf_lobes, config, environment_lobes, picture,
     },
@@ -53,7 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let (mut maps, mut brdfs) = (String::new(), String::new());
     for text in &arguments.sources {
         let path = Path::new(text);
-        if ["hdr", "exr", "pfm", "toml"].contains(&source::extension(path).as_str()) {
+        if ["hdr", "exr", "pfm", "toml"].contains(&extension(path).as_str()) {
             let (map, name) = source::environment(path)?;
             environment(arguments, &map, &name, &mut maps)?;
         } else {
@@ -78,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let text = tables.join("\n");
     match &arguments.output {
-        Some(path) => write_atomically(path, |file| file.write_all(text.as_bytes())),
+        Some(path) => write_text(path, &text),
         None => crate::command::print_line(text.trim_end()),
     }
 }

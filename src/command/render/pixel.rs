@@ -12,7 +12,6 @@
 //! counted, and the probability of the regions per steradian.
 
 use std::{
-    io::Write,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -22,7 +21,7 @@ use serde_json::json;
 
 use crate::{
     error::{Error, Result},
-    files::write_atomically,
+    files::{check_writable, write_text},
     film::{
         Window,
         png::{display_from_linear, write_rgb8},
@@ -82,7 +81,7 @@ pub fn check(settings: &Settings, scene: &Scene, output: &Path, pixel: [u32; 2])
             u64::from(window.y) + u64::from(window.height)
         )));
     }
-    crate::files::check_writable(&picture_path(output, pixel))
+    check_writable(&picture_path(output, pixel))
 }
 
 /// Renders the first sample of `pixel` again, and writes the picture with its numbers as JSON
@@ -140,8 +139,7 @@ fn write_files(path: &Path, panels: &[Panel], numbers: &serde_json::Value) -> Re
     }
     write_rgb8(path, WIDTH as u32, (rows.len() / WIDTH) as u32, &rows)?;
     let numbers_path = path.with_extension("json");
-    let text = numbers.to_string();
-    write_atomically(&numbers_path, |file| file.write_all(text.as_bytes()))?;
+    write_text(&numbers_path, &numbers.to_string())?;
     Ok(vec![path.to_owned(), numbers_path])
 }
 

@@ -1,6 +1,6 @@
 //! Environment maps from files: Radiance `.hdr`, OpenEXR, PFM.
 
-use std::{fs, io::Cursor, path::Path};
+use std::{io::Cursor, path::Path};
 
 use exr::{
     math::Vec2,
@@ -11,7 +11,10 @@ use image::{ImageDecoder, codecs::hdr::HdrDecoder};
 use rayon::prelude::*;
 
 use super::{EnvironmentMap, MAX_RADIANCE};
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    files,
+};
 
 /// Most texels of a map: 16384×8192.
 const MAX_TEXELS: u64 = 1 << 27;
@@ -40,12 +43,10 @@ impl EnvironmentMap {
         warnings: &mut Vec<String>,
     ) -> Result<Self> {
         check_placement(scale, rotation_deg).map_err(|message| Error::format(path, message))?;
-        let extension =
-            path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
-        let read = match extension.as_deref() {
-            Some("hdr") => read_hdr,
-            Some("exr") => read_exr,
-            Some("pfm") => read_pfm,
+        let read = match files::extension(path).as_str() {
+            "hdr" => read_hdr,
+            "exr" => read_exr,
+            "pfm" => read_pfm,
             _ => {
                 return Err(Error::format(
                     path,
@@ -53,9 +54,7 @@ impl EnvironmentMap {
                 ));
             }
         };
-        let bytes = fs::read(path).map_err(|error| Error::io(path, "read", error))?;
-        let image = read(&bytes).map_err(|message| Error::format(path, message))?;
-        drop(bytes);
+        let image = read(&files::read(path)?).map_err(|message| Error::format(path, message))?;
         if image.width != 2 * image.height {
             warnings.push(format!(
                 "{}: {}×{} texels; a lat-long map is expected to be twice as wide as high and is \

@@ -3,7 +3,7 @@
 //! Materials and objects are tagged by `type` and `shape`. Their tables are split into the keys
 //! that all kinds share and the keys of one kind, so that a key of another kind is rejected too.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde::{
     Deserialize, Deserializer,
@@ -12,7 +12,7 @@ use serde::{
 };
 use toml::{
     Spanned,
-    de::{DeTable, DeValue, Error as TomlError, ValueDeserializer},
+    de::{DeTable, DeValue, ValueDeserializer},
 };
 
 use super::{
@@ -20,7 +20,7 @@ use super::{
     ObjectEntry, ObjectSource, SceneFile,
 };
 use crate::{
-    error::{Error, Result},
+    error::{Result, TextError, line_and_column},
     scene::shapes::Shape,
 };
 
@@ -58,34 +58,8 @@ struct RootKeys {
     environment: EnvironmentEntry,
 }
 
-/// Message with the byte range of the text it concerns.
-pub(super) struct Failure {
-    span: std::ops::Range<usize>,
-    message: String,
-}
-
-impl Failure {
-    pub(super) fn locate(self, path: &Path, text: &str) -> Error {
-        let (line, column) = line_and_column(text, self.span.start);
-        Error::Parse { path: path.to_path_buf(), line, column, message: self.message }
-    }
-}
-
-impl From<TomlError> for Failure {
-    fn from(error: TomlError) -> Self {
-        Self { span: error.span().unwrap_or(0..0), message: error.message().to_owned() }
-    }
-}
-
-/// Line and column of a byte offset, both from 1; columns count characters.
-fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
-    let before = text.get(..offset).unwrap_or(text);
-    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-    (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
-}
-
 /// Reads a whole scene file.
-pub(super) fn read_root(text: &str) -> Result<SceneFile, Failure> {
+pub(super) fn read_root(text: &str) -> Result<SceneFile, TextError> {
     let root = DeTable::parse(text)?;
     let span = root.span();
     let mut table = root.into_inner();
@@ -113,16 +87,16 @@ pub(super) fn read_root(text: &str) -> Result<SceneFile, Failure> {
 fn take_array<'i>(
     table: &mut DeTable<'i>,
     key: &str,
-) -> Result<Vec<Spanned<DeValue<'i>>>, Failure> {
+) -> Result<Vec<Spanned<DeValue<'i>>>, TextError> {
     let Some(entries) = table.remove(key) else { return Ok(Vec::new()) };
     let span = entries.span();
     match entries.into_inner() {
         DeValue::Array(array) => Ok(array.into_iter().collect()),
-        _ => Err(Failure { span, message: format!("expected an array of tables, `[[{key}]]`") }),
+        _ => Err(TextError { span, message: format!("expected an array of tables, `[[{key}]]`") }),
     }
 }
 
-fn read_material(entry: Spanned<DeValue>, text: &str) -> Result<MaterialEntry, Failure> {
+fn read_material(entry: Spanned<DeValue>, text: &str) -> Result<MaterialEntry, TextError> {
     let line = line_and_column(text, entry.span().start).0;
     let split = SplitTable::new::<MaterialKeys>(entry, "[[material]]")?;
     let keys: MaterialKeys = read_table(split.shared, split.span.clone())?;
@@ -140,7 +114,7 @@ fn read_material(entry: Spanned<DeValue>, text: &str) -> Result<MaterialEntry, F
         "conductor" => MaterialKindEntry::Conductor(rest.read()?),
         "measured" => MaterialKindEntry::Measured(rest.read()?),
         unknown => {
-            return Err(Failure {
+            return Err(TextError {
                 span: type_span,
                 message: format!(
                     "unknown material type `{unknown}`, expected one of `diffuse`, `plastic`, \
@@ -152,7 +126,7 @@ fn read_material(entry: Spanned<DeValue>, text: &str) -> Result<MaterialEntry, F
     Ok(MaterialEntry { line, name: keys.name, kind })
 }
 
-fn read_object(entry: Spanned<DeValue>, text: &str) -> Result<ObjectEntry, Failure> {
+fn read_object(entry: Spanned<DeValue>, text: &str) -> Result<ObjectEntry, TextError> {
     let line = line_and_column(text, entry.span().start).0;
     let split = SplitTable::new::<ObjectKeys>(entry, "[[object]]")?;
     let keys: ObjectKeys = read_table(split.shared, split.span.clone())?;
@@ -176,7 +150,7 @@ fn read_object(entry: Spanned<DeValue>, text: &str) -> Result<ObjectEntry, Failu
         }
         (found_mesh, _) => {
             let found = if found_mesh.is_some() { "both" } else { "neither" };
-            return Err(Failure {
+            return Err(TextError {
                 span: split.span,
                 message: format!("{label} needs exactly one of `mesh` and `shape`, found {found}"),
             });
@@ -197,7 +171,7 @@ fn read_shape(
     name: &str,
     name_span: std::ops::Range<usize>,
     rest: KindTable,
-) -> Result<Shape, Failure> {
+) -> Result<Shape, TextError> {
     Ok(match name {
         "box" => Shape::Box(rest.read()?),
         "sphere" => Shape::Sphere(rest.read()?),
@@ -210,7 +184,7 @@ fn read_shape(
         "blobs" => Shape::Blobs(rest.read()?),
         "grid" => Shape::Grid(rest.read()?),
         unknown => {
-            return Err(Failure {
+            return Err(TextError {
                 span: name_span,
                 message: format!(
                     "unknown shape `{unknown}`, expected one of `box`, `sphere`, `cylinder`, \
@@ -233,10 +207,10 @@ impl<'i> SplitTable<'i> {
     fn new<T: DeserializeOwned>(
         entry: Spanned<DeValue<'i>>,
         header: &str,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self, TextError> {
         let span = entry.span();
         let DeValue::Table(table) = entry.into_inner() else {
-            return Err(Failure { span, message: format!("expected a table, `{header}`") });
+            return Err(TextError { span, message: format!("expected a table, `{header}`") });
         };
         let (mut shared, mut rest) = (DeTable::new(), DeTable::new());
         for (key, value) in table {
@@ -256,10 +230,10 @@ struct KindTable<'i> {
 }
 
 impl KindTable<'_> {
-    fn read<T: DeserializeOwned>(self) -> Result<T, Failure> {
+    fn read<T: DeserializeOwned>(self) -> Result<T, TextError> {
         let known = [self.shared_keys, struct_fields::<T>()].concat();
         refuse_unknown_keys(&self.table, &known, &self.owner)?;
-        read_table(self.table, self.span).map_err(|failure| Failure {
+        read_table(self.table, self.span).map_err(|failure| TextError {
             span: failure.span,
             message: format!("{}: {}", self.owner, failure.message),
         })
@@ -269,10 +243,10 @@ impl KindTable<'_> {
 fn read_table<T: DeserializeOwned>(
     table: DeTable,
     span: std::ops::Range<usize>,
-) -> Result<T, Failure> {
+) -> Result<T, TextError> {
     let deserializer = ValueDeserializer::from(Spanned::new(span.clone(), DeValue::Table(table)));
     T::deserialize(deserializer).map_err(|error| {
-        let mut failure = Failure::from(error.clone());
+        let mut failure = TextError::from(error.clone());
         if error.span().is_none() {
             failure.span = span;
         }
@@ -280,11 +254,11 @@ fn read_table<T: DeserializeOwned>(
     })
 }
 
-fn refuse_unknown_keys(table: &DeTable, known: &[&str], owner: &str) -> Result<(), Failure> {
+fn refuse_unknown_keys(table: &DeTable, known: &[&str], owner: &str) -> Result<(), TextError> {
     for key in table.keys() {
         if !known.contains(&key.get_ref().as_ref()) {
             let known: Vec<_> = known.iter().map(|key| format!("`{key}`")).collect();
-            return Err(Failure {
+            return Err(TextError {
                 span: key.span(),
                 message: format!(
                     "unknown key `{}` in {owner}, expected one of {}",

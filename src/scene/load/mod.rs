@@ -6,8 +6,6 @@ mod objects;
 
 use std::{
     collections::{BTreeMap, HashMap},
-    ffi::OsStr,
-    fs,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -28,6 +26,7 @@ use crate::brdf::{
 use crate::{
     brdf::table::MeasuredTable,
     error::{Error, Result},
+    files,
 };
 
 /// Largest width and height of the film, pixels.
@@ -45,12 +44,7 @@ impl Scene {
     /// that cannot be rendered, and the errors of the mesh, map and BRDF readers.
     pub fn load(path: &Path) -> Result<Self> {
         refuse_other_formats(path)?;
-        let bytes = fs::read(path).map_err(|source| Error::io(path, "read", source))?;
-        let text = String::from_utf8(bytes).map_err(|error| {
-            let valid_bytes = error.utf8_error().valid_up_to();
-            Error::format(path, format!("not a text file: byte {valid_bytes} is not UTF-8"))
-        })?;
-        Self::parse(path, &text)
+        Self::parse(path, &files::read_text(path)?)
     }
 
     /// Builds a scene from its text; `path` serves messages, its folder is that of relative paths.
@@ -95,12 +89,11 @@ fn scene_name(path: &Path) -> String {
 }
 
 fn refuse_other_formats(path: &Path) -> Result<()> {
-    let extension = path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
-    let (format, remedy) = match extension.as_deref() {
-        Some("gltf" | "glb") => {
+    let (format, remedy) = match files::extension(path).as_str() {
+        "gltf" | "glb" => {
             ("a glTF file", "; write a .toml scene with an [[object]] whose `mesh` is this file")
         }
-        Some("pbrt") => ("a pbrt file", ""),
+        "pbrt" => ("a pbrt file", ""),
         _ => return Ok(()),
     };
     Err(Error::format(

@@ -4,7 +4,7 @@
 //! Ignores cameras, lights, textures, skins and morph targets. Rejects required extensions and
 //! sparse accessors by name. Reads the accessors itself and checks every range.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
 use glam::{Mat3, Mat4, Vec3};
 use gltf::{
@@ -15,7 +15,10 @@ use gltf::{
 };
 
 use super::{Mesh, MeshMaterial};
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    files,
+};
 
 /// Reads a glTF file and its buffers; `warnings` counts primitives that are not triangles.
 ///
@@ -23,7 +26,7 @@ use crate::error::{Error, Result};
 /// [`Error::Io`] for a file that cannot be read, [`Error::Parse`] for bad JSON, [`Error::Format`]
 /// for any other fault.
 pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
-    let bytes = fs::read(path).map_err(|source| Error::io(path, "read", source))?;
+    let bytes = files::read(path)?;
     if let (Some(b"glTF"), Some(&[a, b, c, d])) = (bytes.get(..4), bytes.get(8..12)) {
         let stated = u32::from_le_bytes([a, b, c, d]) as usize;
         if stated > bytes.len() {
@@ -32,14 +35,14 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
             return Err(Error::format(path, message));
         }
     }
-    let Gltf { document, blob } = Gltf::from_slice(&bytes).map_err(|error| match error {
-        gltf::Error::Deserialize(error) => Error::Parse {
-            path: path.to_path_buf(),
-            line: error.line(),
-            column: error.column(),
-            message: format!("not a glTF document: {error}"),
-        },
-        error => Error::format(path, format!("not a glTF document: {error}")),
+    let Gltf { document, blob } = Gltf::from_slice(&bytes).map_err(|error| {
+        let message = format!("not a glTF document: {error}");
+        match error {
+            gltf::Error::Deserialize(error) => {
+                Error::parse(path, error.line(), error.column(), message)
+            }
+            _ => Error::format(path, message),
+        }
     })?;
     drop(bytes);
     if let Some(extension) = document.extensions_required().next() {
@@ -130,8 +133,7 @@ fn read_beside(path: &Path, uri: &str) -> Result<Vec<u8>> {
     let name = decode_percent(uri).ok_or_else(|| {
         Error::format(path, format!("cannot read the name of the buffer file `{uri}`"))
     })?;
-    let buffer_path = path.parent().unwrap_or(Path::new("")).join(name);
-    fs::read(&buffer_path).map_err(|source| Error::io(&buffer_path, "read", source))
+    files::read(&path.parent().unwrap_or(Path::new("")).join(name))
 }
 
 /// Decodes the percent encoding of a relative URI.

@@ -7,9 +7,12 @@ pub mod gltf;
 pub mod obj;
 pub mod ply;
 
-use std::{ffi::OsStr, path::Path};
+use std::path::Path;
 
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    files,
+};
 
 /// Triangles in object space.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -52,18 +55,16 @@ impl Mesh {
     /// [`Error::Io`] if the file cannot be read, [`Error::Format`] or [`Error::Parse`] if its
     /// content is invalid: unknown format, truncation, an index out of range.
     pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
-        let extension = path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
-        match extension.as_deref() {
-            Some("ply") => ply::read(path),
-            Some("obj") => obj::read(path, warnings),
-            Some("gltf" | "glb") => gltf::read(path, warnings),
-            found => Err(Error::format(
-                path,
-                format!(
-                    "expected a mesh in .ply, .obj, .gltf or .glb, found {}",
-                    found.map_or("no extension".to_owned(), |found| format!(".{found}"))
-                ),
-            )),
+        match files::extension(path).as_str() {
+            "ply" => ply::read(path),
+            "obj" => obj::read(path, warnings),
+            "gltf" | "glb" => gltf::read(path, warnings),
+            found => {
+                let found =
+                    if found.is_empty() { "no extension".into() } else { format!(".{found}") };
+                let expected = "expected a mesh in .ply, .obj, .gltf or .glb";
+                Err(Error::format(path, format!("{expected}, found {found}")))
+            }
         }
     }
 

@@ -96,12 +96,7 @@ struct ObjReader<'a> {
 
 impl ObjReader<'_> {
     fn error(&self, message: impl Into<String>) -> Error {
-        Error::Parse {
-            path: self.path.to_path_buf(),
-            line: self.line,
-            column: 1,
-            message: message.into(),
-        }
+        Error::parse(self.path, self.line, 1, message)
     }
 
     fn read_line(&mut self, text: &str, warnings: &mut Vec<String>) -> Result<()> {
@@ -270,15 +265,11 @@ impl ObjReader<'_> {
                             _ => [f32::NAN; 3],
                         };
                         if !color.iter().all(|channel| (0.0..=1.0).contains(channel)) {
-                            return Err(Error::Parse {
-                                path: path.clone(),
-                                line,
-                                column: 1,
-                                message: format!(
-                                    "expected `Kd` with three numbers from 0 to 1, found `{}`",
-                                    text.trim()
-                                ),
-                            });
+                            let found = text.trim();
+                            let message = format!(
+                                "expected `Kd` with three numbers from 0 to 1, found `{found}`"
+                            );
+                            return Err(Error::parse(&path, line, 1, message));
                         }
                         if let Some(material) = colors.last_mut() {
                             material.base_color = color;

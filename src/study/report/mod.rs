@@ -9,7 +9,7 @@ pub mod pictures;
 pub mod plot;
 pub mod tables;
 
-use std::{fmt::Write as _, io::Write as _};
+use std::fmt::Write;
 
 use super::{
     falsecolour::Scale,
@@ -21,7 +21,7 @@ use super::{
     rule::Rule,
     summary::{Curve, CurvePoint, rules},
 };
-use crate::{error::Result, files::write_atomically};
+use crate::{error::Result, files::write_text};
 use html::{escape, number};
 use pictures::{Picture, ScenePictures};
 use plot::{STYLE_COUNT, Series};
@@ -81,7 +81,7 @@ pub fn write(report: &Report, plan: &Plan, folder: &Folder) -> Result<()> {
         .replace("{{script}}", include_str!("page.js"))
         .replace("{{pictures}}", &style)
         .replace("{{body}}", &body);
-    write_atomically(&folder.path().join("index.html"), |file| file.write_all(page.as_bytes()))
+    write_text(&folder.path().join("index.html"), &page)
 }
 
 /// Header: title, notes, links.

@@ -118,12 +118,7 @@ struct Source<'a, R> {
 impl<R: BufRead> Source<'_, R> {
     fn error(&self, message: impl Into<String>) -> Error {
         match self.encoding {
-            Encoding::Ascii => Error::Parse {
-                path: self.path.to_path_buf(),
-                line: self.line,
-                column: 1,
-                message: message.into(),
-            },
+            Encoding::Ascii => Error::parse(self.path, self.line, 1, message),
             _ => Error::format(self.path, message),
         }
     }
