@@ -35,8 +35,8 @@ fn members_of(shared: &SharedStruct) -> Vec<Member> {
     shared.members.iter().map(member).collect()
 }
 
-/// What is read of a SPIR-V module (SPIR-V specification 1.5, sections 2.3 and 3.32): types, names
-/// and the decorations that place things in memory.
+/// Types and names of a SPIR-V module, and the decorations that place things in memory (SPIR-V
+/// specification 1.5, sections 2.3 and 3.32).
 #[derive(Default)]
 struct Module {
     names: HashMap<u32, String>,

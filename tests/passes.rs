@@ -129,7 +129,7 @@ fn guided_counts_rays_and_bounces_where_samples_teach() {
     );
     let rays: Vec<_> = [2, 10].map(|pass| listed[pass].wave.total_shadow_rays).into();
     assert_eq!(rays, [5, 2], "half of the rays at later vertices");
-    // Of late samples every fourth teaches.
+    // Every fourth of the late samples teaches.
     let learns =
         |first, count| names(&order(&deep, &guided(&deep), wave(first, count))).contains("learn");
     assert!(learns(15, 1) && learns(16, 1) && !learns(17, 3) && learns(17, 4) && learns(20, 1));
