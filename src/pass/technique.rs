@@ -1,4 +1,4 @@
-//! What a sampler brings to a render: its passes as data, its descriptor set, and what it learns.
+//! Contribution of a sampler to a render: its passes as data, its descriptor set, and its learning.
 
 use std::{any::Any, collections::BTreeMap};
 
@@ -10,15 +10,15 @@ use crate::{
 /// Shadow rays per hit in one group: bounds the work of an invocation and the size of the buffers.
 pub const SHADOW_RAYS_PER_GROUP: u32 = 8;
 
-/// The passes that a technique adds to a wave. Holds no device object, so that tests read the order of
-/// passes without a GPU. Every `wave` states vertex and shadow rays of the place in the order.
+/// Passes that a technique adds to a wave. Holds no device objects, so that tests read the order of
+/// passes without a GPU. Each `wave` states the vertex and the shadow rays at its place in the order.
 pub trait Steps {
     /// Shadow rays per hit in one group of dispatches.
     fn rays_per_group(&self) -> u32 {
         SHADOW_RAYS_PER_GROUP
     }
 
-    /// Shadow rays at a vertex, of `most` at the first one.
+    /// Shadow rays at a vertex, given `most` at the first one.
     fn shadow_rays_at(&self, _vertex: u32, most: u32) -> u32 {
         most
     }
@@ -41,13 +41,13 @@ pub trait Steps {
         Vec::new()
     }
 
-    /// The pass that continues the paths, where that is not the BRDF's own sampling.
+    /// The pass that continues the paths, unless the BRDF's own sampling does.
     fn bounce(&self, _wave: &Wave) -> Option<Kernel> {
         None
     }
 }
 
-/// How far a progressive render has come.
+/// Progress of a progressive render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     /// Index of the first sample of every pixel.
@@ -74,32 +74,32 @@ pub struct Report {
     pub buffer_bytes: BTreeMap<String, u64>,
     /// Hash of each fit by what was fitted.
     pub fit_hashes: BTreeMap<String, String>,
-    /// Candidates that each shadow ray is chosen from, where that is a choice.
+    /// Candidates per shadow ray, for techniques that choose their number.
     pub candidates: Option<u32>,
-    /// Measurements that led to this choice.
+    /// Measurements behind this choice.
     pub candidate_costs: Vec<CandidateCost>,
 }
 
-/// Memory that a technique takes for every path in flight; limits the size of a wave.
+/// Memory per path in flight; limits the size of a wave.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PathDemand {
     /// Bytes of the widest buffer.
     pub bytes: u64,
-    /// Texels of the texel buffer with most of them.
+    /// Texels of the largest texel buffer.
     pub texels: u64,
 }
 
 /// A sampler at work in one render.
 pub trait Technique: Any {
-    /// The passes it adds to a wave now.
+    /// Passes that it adds to a wave now.
     fn steps(&self) -> &dyn Steps;
 
-    /// What [`Technique::steps`] may yet become, for warming up.
+    /// Steps that [`Technique::steps`] may turn into, for warming up.
     fn other_steps(&self) -> Vec<Box<dyn Steps>> {
         Vec::new()
     }
 
-    /// Its buffers: descriptor set 1.
+    /// Descriptor set 1.
     fn set(&self) -> Option<&DescriptorSet> {
         None
     }
@@ -109,32 +109,23 @@ pub trait Technique: Any {
         wave
     }
 
-    /// Learns before the next sample what is due. Returns how many samples may follow until there is
-    /// more to learn, which depends on their number alone and not on how they are grouped.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if the device fails.
+    /// Learns what is due before the next sample. Returns how many samples may follow before it has to
+    /// learn again, which depends on their number, not on their grouping. Fails if the device does.
     fn learn(&mut self, _runner: &mut Runner, _progress: &Progress) -> Result<u32> {
         Ok(u32::MAX)
     }
 
-    /// Forgets everything learned.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if the device fails.
+    /// Forgets everything learned. Fails if the device does.
     fn restart(&mut self, _runner: &mut Runner) -> Result<()> {
         Ok(())
     }
 
-    /// Refuses to continue a film of `samples` samples per pixel, if sums alone do not allow it.
-    ///
-    /// # Errors
-    /// [`crate::Error::Usage`].
+    /// Returns [`crate::Error::Usage`] if sums alone cannot continue a film of so many `samples`.
     fn check_resume(&self, _samples: u32, _progress: &Progress) -> Result<()> {
         Ok(())
     }
 
-    /// Figures for statistics and metadata.
+    /// Returns figures for statistics and metadata.
     fn report(&self) -> Report {
         Report::default()
     }

@@ -1,4 +1,4 @@
-//! `guided` in one render: when it trains, rebuilds and chooses, and what it hands on.
+//! `guided` in one render: its training, rebuilds, choice of candidates, and reports.
 
 use super::{
     buffers::{GuideBuffers, GuideSize, SPLIT_AFTER, guide_schedule},
@@ -23,17 +23,15 @@ use crate::{
 };
 use std::collections::BTreeMap;
 
-/// Sweeps that teach the guide before the first sample, each over one pixel in as many.
+/// Training sweeps before the first sample; each covers one pixel in this many.
 const TRAINING_SWEEPS: u32 = 8;
-/// Share of visible rays above which a scene is rendered as by `mis`: little is blocked, and learning
-/// costs more than it brings.
+/// Share of visible rays above which a scene is open and rendered as by `mis`: learning would not pay.
 const OPEN_SHARE: f64 = 0.5;
-/// Tells the seeds of epochs from other hashes.
+/// Separates the seeds of epochs from other hashes.
 const EPOCH_TAG: u32 = 0x6b43_a9b5;
-/// Tells the random numbers of training from those of the picture.
+/// Separates the random numbers of training from those of the picture.
 pub(super) const TRAINING_SEED: u32 = 0x7e11_ab1e;
 
-/// The room of `guided`.
 pub(in crate::sampler) struct GuidedRoom;
 
 impl Room for GuidedRoom {
@@ -76,7 +74,7 @@ impl Room for GuidedRoom {
     }
 }
 
-/// Candidates per shadow ray until the choice is made.
+/// Returns the candidates per shadow ray until the choice is made.
 fn first_candidates(parameters: &Parameters) -> Result<u32> {
     parameters.candidates_among("guided", &GUIDED_CANDIDATES, GUIDED_CANDIDATES[0])
 }
@@ -85,24 +83,20 @@ fn first_candidates(parameters: &Parameters) -> Result<u32> {
 pub struct Guided {
     pub(super) buffers: GuideBuffers,
     pub(super) steps: GuidedSteps,
-    /// Those of `mis`, for scenes where nothing is blocked.
+    /// Steps of `mis`, for open scenes.
     open_steps: BasicSteps,
-    /// Candidates that were asked for; none under `auto`.
+    /// Number of candidates that the user asked for; `None` for `auto`.
     pub(super) given_candidates: Option<u32>,
     pub(super) choice: Choice,
-    /// True once the training sweeps are behind.
     is_trained: bool,
-    /// True if so little is blocked that there is nothing to learn.
+    /// True if too little is blocked to learn anything.
     pub(super) is_open: bool,
     /// Samples per pixel at the last rebuild of the guide.
     pub(super) rebuilt_at: u32,
 }
 
 impl Guided {
-    /// What was learned so far, in a film of `samples` samples per pixel.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if the device fails.
+    /// Returns what was learned in a film of `samples` samples per pixel. Fails if the device does.
     pub fn state(&self, samples: u32) -> Result<GuideState> {
         Ok(GuideState {
             samples,
@@ -113,14 +107,13 @@ impl Guided {
         })
     }
 
-    /// Goes on from what an earlier render learned, without training. With as many samples in the film
-    /// as the state was taken at, this continues that render to the bit. Under `candidates=auto` the
-    /// number that one chose is taken too. Returns true if the geometry is another, so that most was
-    /// forgotten.
+    /// Continues from what an earlier render learned, without training: bit for bit, if the film
+    /// holds as many samples as it did when the state was taken. Under `candidates=auto` takes its
+    /// choice too. Returns true if the geometry differs, so that most was forgotten.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] if the environment or the regions differ; [`crate::Error::Vulkan`] if
-    /// the device fails.
+    /// [`crate::Error::Usage`] if environment or regions differ; [`crate::Error::Vulkan`] if the
+    /// device fails.
     pub fn restore(
         &mut self,
         runner: &mut Runner,
@@ -144,8 +137,7 @@ impl Guided {
         Ok(has_moved)
     }
 
-    /// Candidates that each shadow ray is chosen from; none where `auto` has not been decided yet, and
-    /// in open scenes.
+    /// Returns the candidates per shadow ray; `None` while `auto` is undecided, and in open scenes.
     fn candidates(&self) -> Option<u32> {
         self.choice.candidates.filter(|_| !self.is_open)
     }
@@ -155,7 +147,7 @@ impl Guided {
         self.buffers.rebuild(splits)
     }
 
-    /// Sweeps over parts of the film to learn from. Finds out whether the scene is open.
+    /// Trains on sweeps over parts of the film and finds out whether the scene is open.
     fn train(&mut self, runner: &mut Runner, progress: &Progress) -> Result<()> {
         for sweep in 0..TRAINING_SWEEPS {
             let wave = Wave {
@@ -171,8 +163,8 @@ impl Guided {
             let before = runner.totals().clone();
             runner.sweep(self, wave, runner.film().padded_pixels() / TRAINING_SWEEPS)?;
             runner.take_counters()?;
-            // The first sweep draws by environment and BRDF alone: nothing is known yet. It is
-            // not in the picture, so the picture does not depend on its own samples here.
+            // The first sweep samples only environment and BRDF: nothing is known yet. It is not in
+            // the picture, so the picture does not depend on its own samples here.
             let visible = runner.totals().shadow_rays_visible - before.shadow_rays_visible;
             let traced = runner.totals().shadow_rays_traced - before.shadow_rays_traced;
             if sweep == 0 && visible as f64 > OPEN_SHARE * traced as f64 {
@@ -180,7 +172,7 @@ impl Guided {
                 self.is_open = true;
                 return Ok(());
             }
-            // Every rebuild costs time: after 1, 2, 4 and 8 sweeps.
+            // Rebuild only after 1, 2, 4 and 8 sweeps: every rebuild costs time.
             if (sweep + 1).is_power_of_two() {
                 self.rebuild(sweep + 1 == TRAINING_SWEEPS, progress.sample_count)?;
             }
@@ -254,8 +246,7 @@ impl Technique for Guided {
     }
 }
 
-/// `wave` with numbers of its own for the epoch that begins at `sample`: those of `guided` start anew
-/// after every rebuild.
+/// Gives `wave` the random numbers of the epoch that begins at `sample`: each rebuild starts anew.
 pub(super) fn with_epoch(wave: Wave, sample: u32) -> Wave {
     let [epoch_seed, ..] = hash_4d([wave.seed, sample, EPOCH_TAG, wave.is_training]);
     Wave { epoch_seed, epoch_start: sample, ..wave }
