@@ -14,6 +14,7 @@ macro_rules! constants {
 constants! {
     /// Invocations of a workgroup along x; every pass is one-dimensional.
     WORKGROUP_SIZE = 64;
+
     // Specialization constants of `trace` and `shadow`.
     /// Number of triangle pages in use.
     CONSTANT_TRIANGLE_PAGES = 0;
@@ -23,6 +24,7 @@ constants! {
     CONSTANT_RAYS_PER_INVOCATION = 2;
     /// Finished lanes of a subgroup at which they take their next rays.
     CONSTANT_REFILL_LANES = 3;
+
     // Specialization constants of the sampling and bounce passes.
     /// Sampler of `sample` or `sample_lobes`, `SAMPLER_…`.
     CONSTANT_SAMPLER = 16;
@@ -37,6 +39,7 @@ constants! {
     /// Bit `1 << kind` for every kind of material in the scene; saves devices that run both sides of a
     /// branch the others.
     CONSTANT_MATERIAL_KINDS = 19;
+
     // Specialization constants of `multiply_lobes`.
     /// Lobes of the environment.
     CONSTANT_ENVIRONMENT_LOBES = 32;
@@ -50,6 +53,7 @@ constants! {
     CONSTANT_ORDER_BY_COEFFICIENT = 36;
     /// Logarithm of an environment lobe's largest integral over 2π or largest amplitude, bits of a float.
     CONSTANT_STRONGEST_ENVIRONMENT_LOBE = 46;
+
     // Specialization constants of `sample_lobes`.
     /// Share of directions from the BRDF, bits of a float.
     CONSTANT_BRDF_SHARE = 39;
@@ -57,6 +61,7 @@ constants! {
     CONSTANT_ENVIRONMENT_SHARE = 40;
     /// 1 draws elevations by a random walk, which is biased.
     CONSTANT_METROPOLIS = 41;
+
     // Specialization constants of the passes over visibility caches.
     /// τ, closeness in deviations of a lobe, bits of a float.
     CONSTANT_THRESHOLD_SCALE = 37;
@@ -68,6 +73,7 @@ constants! {
     CONSTANT_CACHE_OF_PIXEL = 43;
     /// k of V = (1 / (1 + Num))^k, bits of a float.
     CONSTANT_VISIBILITY_EXPONENT = 45;
+
     // Values of CONSTANT_SAMPLER.
     /// Uniform over the hemisphere.
     SAMPLER_UNIFORM = 0;
@@ -87,6 +93,7 @@ constants! {
     SAMPLER_VISIBILITY = 7;
     /// Learned visibility; a shader of its own.
     SAMPLER_GUIDED = 8;
+
     // Bits of `Wave::aovs`: film layers to write.
     /// Albedo.
     AOV_ALBEDO = 1;
@@ -100,6 +107,7 @@ constants! {
     AOV_CACHE_ENTRIES = 16;
     /// Cells of the guide.
     AOV_GUIDE_CELL = 32;
+
     // Traversal.
     /// Entries of the traversal stack, one group of nodes per level of the tree.
     BVH_STACK_ENTRIES = 32;
@@ -110,6 +118,7 @@ constants! {
     FLAT_NORMAL = 0x8000_8000;
     /// [`Hit::material`](super::structs::Hit::material) of a ray that left the scene or was not traced.
     NO_MATERIAL = 0xffff_ffff;
+
     // Values of `Material::kind`.
     /// Lambertian.
     MATERIAL_DIFFUSE = 0;
@@ -119,6 +128,7 @@ constants! {
     MATERIAL_CONDUCTOR = 2;
     /// Tabulated measurement.
     MATERIAL_MEASURED = 3;
+
     // Tables of materials; offsets are in words from `Material::table_offset`.
     /// Intervals of the tables over the cosine 0…1 of a direction with the normal; one more node.
     BRDF_COSINE_INTERVALS = 64;
@@ -150,6 +160,7 @@ constants! {
     MEASURED_DENSITY_OFFSET = MEASURED_CUMULATIVE_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
     /// Grid cells, two words each: halves red and green, half blue.
     MEASURED_GRID_OFFSET = MEASURED_DENSITY_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
+
     // Lobes and learned visibility.
     /// Lobes between two sums of their weights; a power of two up to 32.
     LOBES_PER_SUM = 16;
