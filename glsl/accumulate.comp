@@ -1,5 +1,4 @@
-// Adds the finished paths of the wave to the film, one invocation per pixel, sample after sample, so
-// that the sums do not depend on how samples are grouped into waves.
+// Adds the finished paths to the film, pixel by pixel and in sample order: grouping never changes a sum.
 #version 460
 
 #include "wave.glsl"
@@ -30,12 +29,12 @@ void main() {
         bounce_rays += state.rays_traced - 1u;
         shadow_rays += uvec2(state.shadow_rays_visible, state.shadow_rays_traced);
         vec3 radiance = state.radiance;
-        // A value that is not finite would spoil its pixel for good.
+        // One value that is not finite would spoil the pixel for good.
         if (any(isnan(radiance)) || any(isinf(radiance))) {
             dropped += 1u;
             continue;
         }
-        // Knuth's two-sum: `rest` is exactly what the rounding of `total` lost.
+        // Two-sum (Knuth): `rest` is exactly what rounding `total` lost.
         precise vec3 total = sum + radiance;
         precise vec3 added = total - sum;
         precise vec3 rest = (sum - (total - added)) + (radiance - added);
@@ -44,7 +43,7 @@ void main() {
         compensation = next_compensation;
         squares += radiance * radiance;
     }
-    // Training counts its rays, but what it gathers is not in the picture.
+    // Training rays are counted, but their light stays out of the picture.
     if (wave.is_training == 0u) {
         film_sum[index.film_index] = sum;
         film_compensation[index.film_index] = compensation;

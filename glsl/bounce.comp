@@ -1,4 +1,4 @@
-// Continues every path of the wave by sampling the BRDF: the next ray and the throughput.
+// Samples the BRDF to continue every path of the wave: next ray and throughput.
 #version 460
 
 #include "bounce.glsl"

@@ -1,5 +1,4 @@
-// Starts the paths of a wave: one camera ray each, with filter importance sampling over the pixel
-// and, for a thin lens, over the lens.
+// Starts the paths of a wave with one camera ray each, sampling the pixel filter and the thin lens.
 #version 460
 
 #include "frame.glsl"
@@ -12,11 +11,11 @@ WRITES(paths)
 layout(local_size_x = WORKGROUP_SIZE) in;
 
 const uint FILTER_GAUSSIAN = 1u;
-// Gaussian of standard deviation half a pixel, cut off at one and a half.
+// Gaussian with a standard deviation of half a pixel, cut off at one and a half.
 const float FILTER_SIGMA = 0.5;
 const float FILTER_RADIUS = 1.5;
 
-// Offset from the pixel's centre, in pixels, with the density of the reconstruction filter.
+// Samples an offset from the pixel centre, in pixels, with the density of the filter.
 vec2 sample_filter(vec2 u) {
     if (parameters.film_filter != FILTER_GAUSSIAN) {
         return u - 0.5;
@@ -48,7 +47,7 @@ void main() {
         vec2 azimuth = sin_cos_pi(2.0 * u.y);
         vec2 lens = parameters.camera_aperture_radius * sqrt(u.x) * azimuth.yx;
         vec3 shift = lens.x * parameters.camera_right + lens.y * parameters.camera_up;
-        // Every lens point sees the same point of the plane in focus.
+        // Aim every lens point at the same point in the plane of focus.
         direction = parameters.camera_focus_distance * direction - shift;
         origin += shift;
     }

@@ -1,4 +1,4 @@
-// Adds albedo, shading normal and position of the camera rays' hits to the film, where asked for.
+// Adds the albedo, shading normal and position of camera-ray hits to the film, where requested.
 #version 460
 
 #include "brdf.glsl"
@@ -20,8 +20,7 @@ void main() {
     if (pixel >= wave.pixel_count || !index.inside) {
         return;
     }
-    // Sample after sample onto the film's sums, so that these do not depend on the grouping into
-    // waves.
+    // Add sample by sample: the sums must not depend on how samples are grouped into waves.
     bool wants_albedo = (wave.aovs & AOV_ALBEDO) != 0u;
     bool wants_normal = (wave.aovs & AOV_NORMAL) != 0u;
     bool wants_position = (wave.aovs & AOV_POSITION) != 0u;

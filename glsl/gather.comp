@@ -1,5 +1,4 @@
-// Adds what the visible shadow rays bring to every path of the wave; at the first vertex also the
-// environment that the camera sees directly.
+// Adds visible shadow rays to every path; at the first vertex also the environment seen directly.
 #version 460
 
 #include "environment.glsl"
@@ -18,8 +17,7 @@ void main() {
         return;
     }
     if (load_hit_origin(path).material == NO_MATERIAL) {
-        // Later vertices sample the environment already where they are; a bounce ray that escapes
-        // would count it twice.
+        // Each vertex already samples the environment: escaped bounce rays would count it twice.
         Ray ray = load_ray(path);
         if (wave.vertex == 0u && wave.first_shadow_ray == 0u && ray.is_active != 0u) {
             paths[path].radiance += environment_radiance(ray.direction);
@@ -32,7 +30,7 @@ void main() {
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
         uint ray = i * path_count + path;
         vec3 contribution = load_shadow_ray(ray).contribution;
-        // The same test as in shadow.comp: what brings nothing is not traced.
+        // Same test as in shadow.comp: rays without a contribution are not traced.
         bool is_traced = any(notEqual(contribution, vec3(0.0)));
         traced += is_traced ? 1u : 0u;
         if (is_traced && visibility[ray] != 0u) {

@@ -1,5 +1,5 @@
-// Chooses directions at every hit of the wave and writes one shadow ray for each, with what it
-// brings if nothing is in the way: BRDF * radiance * cosine / pdf. Densities per steradian.
+// Chooses directions at every hit of the wave and writes one shadow ray for each with its
+// unoccluded contribution, BRDF * radiance * cosine / pdf. Densities are in solid angle measure.
 #version 460
 
 #include "vertex.glsl"
@@ -7,11 +7,10 @@
 layout(local_size_x = WORKGROUP_SIZE) in;
 
 layout(constant_id = CONSTANT_SAMPLER) const uint SAMPLER = SAMPLER_MIS;
-// Candidates per shadow ray of `ris`, half from the BRDF and half from the environment; 1 otherwise.
+// Candidates per shadow ray of `ris`, half from the BRDF and half from the environment; otherwise 1.
 layout(constant_id = CONSTANT_CANDIDATES) const uint CANDIDATES = 1u;
 
-// Density of the whole technique or mixture that SAMPLER draws from, where that is neither uniform
-// nor the cosine.
+// Density of the technique or mixture of SAMPLER, if neither uniform nor the cosine.
 float density(DirectionSample sampled) {
     if (SAMPLER == SAMPLER_MIS || SAMPLER == SAMPLER_RIS) {
         return 0.5 * (sampled.brdf_pdf + sampled.environment_pdf);
@@ -40,12 +39,12 @@ DirectionSample draw_brdf_candidate(Vertex vertex, uint sequence_index, uint can
     return draw_from_brdf(vertex, vec3(surface_numbers(vertex, sequence_index, candidate), lobe));
 }
 
-// One of the candidates seen so far, chosen in proportion to target / pdf.
+// Candidate chosen in proportion to target / pdf.
 struct Reservoir {
     DirectionSample chosen;
     float chosen_target;
     float weight_sum;
-    // Stretched after each choice to be used again.
+    // Random number, rescaled after each choice for the next.
     float u;
 };
 
@@ -77,7 +76,7 @@ void main() {
         return;
     }
     Vertex vertex = load_vertex(path, hit);
-    // Rays are numbered through all samples, since they share one sequence.
+    // Number the rays through all samples: they share one sequence.
     uint first_ray = vertex.index.sample_index * wave.total_shadow_rays + wave.first_shadow_ray;
 
     if (SAMPLER == SAMPLER_RIS) {
@@ -102,9 +101,8 @@ void main() {
                 reservoir.chosen.integrand * factor);
         }
     } else if (SAMPLER == SAMPLER_MIS) {
-        // The two techniques take turns from a random start, so that each ray's technique is a fair
-        // coin. The coin is shared by a block of 8x8 pixels, and each technique has its own loop:
-        // devices that run both sides of a branch then run one technique per ray.
+        // Alternate the techniques from a random start: each ray's technique is a fair coin, shared
+        // by 8x8 pixels. A loop each: devices that run both sides of a branch then run one per ray.
         uint coin = block_random_bits(vertex.index, DIMENSION_TECHNIQUE).x & 1u;
         uint turn = (first_ray + coin) & 1u;
         for (uint i = turn; i < wave.shadow_ray_count; i += 2u) {

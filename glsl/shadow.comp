@@ -1,8 +1,6 @@
-// Whether the environment is visible along every shadow ray of the wave: shadow_rays, hits ->
-// visibility. Ray direction_index · path_count + path_index starts at the hit of path path_index, so
-// that neighbouring invocations work at neighbouring paths.
-//
-// As in trace.comp, an invocation takes several rays in one traversal loop.
+// Tests the environment's visibility along every shadow ray of the wave: shadow_rays, hits ->
+// visibility. Ray direction_index · path_count + path_index starts at hit path_index: neighbouring
+// invocations work on neighbouring paths. As in trace.comp, one traversal loop takes several rays.
 #version 460
 #extension GL_KHR_shader_subgroup_ballot : require
 
@@ -19,7 +17,7 @@ layout(local_size_x = WORKGROUP_SIZE) in;
 layout(constant_id = CONSTANT_RAYS_PER_INVOCATION) const uint RAYS_PER_INVOCATION = 1u;
 layout(constant_id = CONSTANT_REFILL_LANES) const uint REFILL_LANES = 0xffffffffu;
 
-// Path of a ray: index % path_count without an integer division, which is slow in software.
+// index % path_count without an integer division, which is slow in software.
 uint path_of(uint index, uint path_count) {
     uint quotient = uint(float(index) / float(path_count));
     int remainder = int(index - quotient * path_count);
@@ -28,7 +26,7 @@ uint path_of(uint index, uint path_count) {
     return uint(remainder);
 }
 
-// Starts the ray `index`; one that brings nothing is finished at once. Returns whether it is traced.
+// Starts a ray, or finishes one without a contribution. Returns true if it is traced.
 bool start_ray(uint index, uint path_count, float offset) {
     uint path = path_of(index, path_count);
     HitOrigin hit = load_hit_origin(path);
@@ -57,7 +55,7 @@ void main() {
     }
     while (has_ray) {
         bool running = true;
-        // One ballot a step, since software devices take turns over the lanes for each.
+        // One ballot per step: software devices loop over the lanes for each.
         uint refill = min(REFILL_LANES, subgroupBallotBitCount(subgroupBallot(true)));
         do {
             if (running) {

@@ -1,8 +1,7 @@
-// Closest hit of every ray of the wave: rays -> hits.
+// Finds the closest hit of every ray of the wave: rays -> hits.
 //
-// An invocation takes RAYS_PER_INVOCATION rays, one after the other, in one traversal loop: when
-// enough lanes of the subgroup have finished theirs, all of these take their next one. The surfaces
-// are worked out afterwards, with all lanes in step.
+// One traversal loop takes RAYS_PER_INVOCATION rays: once enough lanes of the subgroup have finished,
+// all of those take their next ray. Surfaces are evaluated afterwards, with all lanes in step.
 #version 460
 #extension GL_KHR_shader_subgroup_ballot : require
 
@@ -33,7 +32,7 @@ void main() {
     }
     while (has_ray) {
         bool running = true;
-        // One ballot a step, since software devices take turns over the lanes for each.
+        // One ballot per step: software devices loop over the lanes for each.
         uint refill = min(REFILL_LANES, subgroupBallotBitCount(subgroupBallot(true)));
         do {
             if (running) {

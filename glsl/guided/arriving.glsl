@@ -1,6 +1,5 @@
-// Directions that cells tell apart when they learn where light arrives from by way of surfaces: a grid
-// over the octahedron. Twin of src/guide/arriving.rs. Cigolle et al. 2014, "A Survey of Efficient
-// Representations for Independent Unit Vectors".
+// Directional bins of arriving light: a grid over the octahedral map [Cigolle et al. 2014, A Survey
+// of Efficient Representations for Independent Unit Vectors]. Twin of src/sampler/guided/arriving.rs.
 
 #ifndef ARRIVING_GLSL
 #define ARRIVING_GLSL

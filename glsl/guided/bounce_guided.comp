@@ -1,7 +1,6 @@
-// Continues every path of the wave where light is known to arrive from: several directions are drawn
-// from the BRDF and one of them is kept, in proportion to the light that the cell has learned to arrive
-// from there (resampled importance sampling, Talbot et al. 2005). The others cost no ray and no
-// evaluation of the BRDF. It notes which cell and direction the ray will teach, for learn_arrivals.comp.
+// Continues every path of the wave toward light that its cell has learned: draws candidates from
+// the BRDF and keeps one in proportion to that light (resampled importance sampling, Talbot et al.
+// 2005). The others cost no ray and no BRDF evaluation. Notes the target of learn_arrivals.comp.
 #version 460
 
 #include "guided/arriving.glsl"
@@ -30,15 +29,14 @@ void main() {
     Frame frame = frame_from_normal(hit.shading_normal);
     vec3 outgoing_local = to_local(frame, -rays[path].direction);
     uint dimension = vertex_dimension();
-    // What the cells hold depends on earlier samples: the numbers are those since the last rebuild.
+    // Start the sequences anew at each rebuild: the cells depend on earlier samples.
     uint number = index.sample_index - wave.epoch_start;
     vec3 u = vec3(
         random_2d(index.pixel, number, dimension + DIMENSION_BOUNCE, wave.epoch_seed),
         random_1d(index.pixel, number, dimension + DIMENSION_BOUNCE_LOBE, wave.epoch_seed));
     float u_choice =
         random_1d(index.pixel, number, dimension + DIMENSION_RESAMPLING, wave.epoch_seed);
-    // From one candidate to the next: each is stratified over the samples as the first is, and a few
-    // of them are spread over the BRDF.
+    // Rotate from candidate to candidate: each stays stratified over samples, all cover the BRDF.
     vec3 rotation = vec3(1.0 / float(BOUNCE_CANDIDATES), 0.618034, 0.754878);
     uint first = path_cells[path].cell * GUIDE_ARRIVAL_SIDE * GUIDE_ARRIVAL_SIDE;
     vec3 chosen = vec3(0.0, 0.0, 1.0);

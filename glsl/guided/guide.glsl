@@ -1,8 +1,7 @@
-// Learned visibility: cells of the scene, regions of the environment, and directions drawn by them.
-// Twin of src/sampler/guided. Densities per steradian.
+// Learned visibility: cells of the scene, regions of the environment, and directions drawn from
+// them. Densities in solid angle measure. Twin of src/sampler/guided.
 //
-// A pass reads what earlier passes learned and nothing else, so every density here is fixed while
-// the pass runs.
+// A pass reads only tables from earlier passes, so no density changes while it runs.
 
 #ifndef GUIDE_GLSL
 #define GUIDE_GLSL
@@ -17,22 +16,21 @@ TEXELS(guide_aliases)
 TEXELS(guide_region_of_cell)
 UPDATES(guide_missing)
 
-// First cells: one for each face of the cube, for places that have no cell of their own.
+// Key bit of coarse cells. Cells 0 to 5 are those of the cube faces, for places without their own.
 const uint GUIDE_COARSE = 0x80000000u;
 
 // Offset from the first dimension of a vertex, for the choice of its cell.
 const uint DIMENSION_GUIDE_CELL = 5u;
 
 struct GuideEntry {
-    // Probability of the region divided by its share of the map's energy: the density of a guided
-    // direction is this times the density of the whole map.
+    // Probability of the region over its share of the map's energy: density relative to the whole map.
     float ratio;
-    // Cumulative probability of the regions before this one, of 65,536.
+    // Cumulative probability of the regions before this one, in 65,536ths.
     uint before;
-    // First region that the interval with this index, of as many equal ones, reaches into; at index
-    // 0 the last region that can be drawn.
+    // First region reaching into interval `index` of region_count equal ones; at 0 the last region
+    // to draw.
     uint start;
-    // Weight of a candidate by the region's visibility.
+    // Factor on the weight of a candidate in this region, by its visibility.
     float visibility;
 };
 
@@ -44,7 +42,7 @@ GuideEntry guide_entry(uint index) {
         exp2(-level * (10.5 / float(GUIDE_VISIBILITY_LEVELS - 1u))));
 }
 
-// Index 0 to 5 of the face of a cube that a normal points at most: +x, -x, +y, -y, +z, -z.
+// Returns the cube face that a normal points at most: +x, -x, +y, -y, +z, -z.
 uint guide_face(vec3 normal) {
     vec3 size = abs(normal);
     uint axis = size.x >= size.y && size.x >= size.z ? 0u : (size.y >= size.z ? 1u : 2u);
@@ -52,8 +50,8 @@ uint guide_face(vec3 normal) {
     return 2u * axis + (along < 0.0 ? 1u : 0u);
 }
 
-// Level of size of the cell for a place: its edge is the finest times two to this power, from the
-// distance to the camera; `bits` blurs the levels.
+// Returns the level of a place by its distance to the camera: its edge is the finest one times
+// 2^level. `bits` blurs the levels.
 uint guide_level(vec3 position, uint bits) {
     float wanted = min(
         guide.largest_edge,
@@ -62,7 +60,7 @@ uint guide_level(vec3 position, uint bits) {
     return uint(clamp(int(floatBitsToUint(blurred) >> 23u) - 127, 0, 15));
 }
 
-// Key of the fine cell of a level around a place. Cells of one level are nested in those of the next.
+// Returns the key of the fine cell around a place. Cells nest in those of the next level.
 uint guide_key(vec3 position, uint face, uint level) {
     float edge = guide.finest_edge * uintBitsToFloat((level + 127u) << 23u);
     ivec3 place = ivec3(floor((position - guide.grid_origin) / edge)) & 255;
@@ -83,13 +81,12 @@ uint guide_hash(uint key) {
     return key ^ (key >> 16u);
 }
 
-// Bits that choose between the two cell sizes that fit best, for one vertex of a path.
 uint guide_cell_bits(PathIndex index, uint dimension) {
     return hash_4d(uvec4(
         index.pixel, index.sample_index, dimension + DIMENSION_GUIDE_CELL, wave.epoch_seed)).w;
 }
 
-// Index of the cell with a key, or GUIDE_NO_KEY.
+// Returns the index of the cell with a key, or GUIDE_NO_KEY.
 uint guide_find(uint key) {
     uint slot = guide_hash(key);
     uint found = GUIDE_NO_KEY;
@@ -125,22 +122,20 @@ void guide_note_missing(uint key) {
     }
 }
 
-// A cell that was found.
 struct GuideCell {
-    // Its key, or GUIDE_NO_KEY for the cell of a face.
+    // Key of the cell, or GUIDE_NO_KEY for that of a face.
     uint key;
-    // Its index; from bit GUIDE_SHARE_SHIFT on its share of the BRDF, 256ths, 0 where it has none;
-    // below, GUIDE_REFINED if parts of it may be cells.
+    // Index of the cell; GUIDE_REFINED if its parts may be cells; from bit GUIDE_SHARE_SHIFT on the
+    // share of the BRDF in 256ths, 0 if none was learned.
     uint found;
 };
 
-// The cell for a place: the fine one, and of that the smallest part there is; else the coarse one
-// around it, else that of its face.
+// Finds the cell for a place: the smallest part of the fine one, else the coarse one, else the face's.
 GuideCell guide_cell(vec3 position, uint face, uint bits) {
     uint level = guide_level(position, bits);
     uint key = guide_key(position, face, level);
     GuideCell cell = GuideCell(key, guide_find(key));
-    // Loops, since branches cost their body everywhere on some devices.
+    // Loop instead of branching: some devices pay for the body of a branch everywhere.
     bool is_missing = cell.found == GUIDE_NO_KEY;
     while (is_missing) {
         guide_note_missing(key);
@@ -166,19 +161,17 @@ GuideCell guide_cell(vec3 position, uint face, uint bits) {
     return cell;
 }
 
-// The cell of a vertex.
 GuideCell guide_cell_of(Vertex vertex) {
     return guide_cell(
         vertex.hit.position, guide_face(vertex.hit.geometric_normal),
         guide_cell_bits(vertex.index, vertex.dimension));
 }
 
-// Index of the cell that guide_cell found.
 uint guide_cell_index(GuideCell cell) {
     return cell.found & (GUIDE_REFINED - 1u);
 }
 
-// bits * count / 2^32.
+// bits * count / 2^32
 uint scaled(uint bits, uint count) {
     uint high;
     uint low;
@@ -186,7 +179,7 @@ uint scaled(uint bits, uint count) {
     return high;
 }
 
-// A direction with its region and what the cell knows of that.
+// Direction with its region and that region's entry in the cell.
 struct Guided {
     DirectionSample sampled;
     uint region;
@@ -197,17 +190,16 @@ uint guide_word(uint index) {
     return texelFetch(guide_entries, int(index)).y;
 }
 
-// Region by the cell's cumulative probabilities from bits.x, cell of the map by the region's alias
-// table from bits.y, direction by the bilinear patch. `first` is the index of the first entry of the
-// cell. Regions that are neighbours in the map are mostly neighbours in their order, so that
-// stratified bits give stratified directions.
+// Draws a region from the cell's cumulative probabilities by bits.x, a texel cell from the region's
+// alias table by bits.y, and a direction from the bilinear patch. The guide cell's entries begin at
+// `first`. Regions close in the map are mostly close in order, which keeps the strata.
 Guided draw_guided(Vertex vertex, uint first, uvec2 bits, uvec4 more_bits) {
     Guided guided;
     uint interval = scaled(bits.x, guide.region_count);
     uint next = interval + 1u < guide.region_count ? interval + 1u : 0u;
     uint low = interval > 0u ? (guide_word(first + interval) >> 16u) & 0x3ffu : 0u;
     uint high = (guide_word(first + next) >> 16u) & 0x3ffu;
-    // The last region whose probabilities before are not above the number.
+    // Find the last region whose preceding probability does not exceed the number.
     while (low < high) {
         uint middle = (low + high + 1u) >> 1u;
         if ((guide_word(first + middle) & 0xffffu) <= bits.x >> 16u) {
@@ -224,7 +216,7 @@ Guided draw_guided(Vertex vertex, uint first, uvec2 bits, uvec4 more_bits) {
     uint chosen = scaled(bits.y, count);
     uvec2 alias = texelFetch(guide_aliases, int(region.x + chosen)).xy;
     chosen = more_bits.z < alias.x ? chosen : alias.y;
-    // chosen / columns without an integer division.
+    // Divide chosen by columns without an integer division.
     uint row = uint(float(chosen) / float(region.y));
     int column = int(chosen) - int(row * region.y);
     row = column < 0 ? row - 1u : (column >= int(region.y) ? row + 1u : row);
@@ -233,7 +225,7 @@ Guided draw_guided(Vertex vertex, uint first, uvec2 bits, uvec4 more_bits) {
     EnvironmentSample light = environment_sample_cell(
         (region.w & 0xffffu) + uint(column), (region.w >> 16u) + row,
         vec2(unit_float(more_bits.x), unit_float(more_bits.y)));
-    // A black map has a density of 0 over 0.
+    // The density of a black map is 0 / 0.
     light.pdf = parameters.environment_total > 0.0 ? light.pdf : 0.0;
     guided.sampled = evaluate_direction(
         vertex, light.direction, to_local(vertex.frame, light.direction), light.radiance,
@@ -241,7 +233,6 @@ Guided draw_guided(Vertex vertex, uint first, uvec2 bits, uvec4 more_bits) {
     return guided;
 }
 
-// A direction, and where it meets the partition.
 Guided locate_guided(uint first, DirectionSample sampled) {
     Guided guided;
     guided.sampled = sampled;
@@ -253,12 +244,10 @@ Guided locate_guided(uint first, DirectionSample sampled) {
     return guided;
 }
 
-// A direction from the BRDF.
 Guided draw_brdf_guided(Vertex vertex, uint first, vec3 u) {
     return locate_guided(first, draw_from_brdf(vertex, u));
 }
 
-// Density of guided directions.
 float guided_pdf(Guided guided) {
     return guided.entry.ratio * guided.sampled.environment_pdf;
 }

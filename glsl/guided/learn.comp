@@ -1,7 +1,6 @@
-// Counts every shadow ray that teaches, and whether it reached the environment, into the cell and
-// region that sample_guided.comp noted, and of those that did, their response and what they say about
-// the share of the BRDF. The counts are read between passes only. Long after a rebuild every fourth
-// sample is enough.
+// Counts each teaching shadow ray in the cell and region that sample_guided.comp noted, and of
+// visible rays their response and evidence for the BRDF share. Counts are read only between passes.
+// Long after a rebuild every fourth sample is enough.
 #version 460
 
 #include "divide.glsl"

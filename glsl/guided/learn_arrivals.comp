@@ -1,6 +1,5 @@
-// Counts every bounce ray into the cell that it left and its direction, with the light that the cell
-// where it arrived reflects of what it learned; none where it left the scene. Samples teach as in
-// learn.comp.
+// Counts each bounce ray in the cell it left and the bin of its direction, with the learned light that
+// the cell it arrived at reflects; no light if it left the scene. Samples teach as in learn.comp.
 #version 460
 
 #include "divide.glsl"

@@ -1,10 +1,8 @@
-// Chooses directions at every hit of the wave by learned visibility: as sample.comp, it writes one
-// shadow ray for each with what it brings if nothing is in the way. It also says which count each
-// ray belongs to, for learn.comp, and which cells are missing.
+// Chooses directions at every hit of the wave by learned visibility. Writes one shadow ray for each
+// with its unoccluded contribution, its count for learn.comp, and the keys of missing cells.
 //
-// What the cells hold depends on earlier samples of the same pixels, so a sequence must not continue
-// across a rebuild: it starts anew, with another scramble, after each. Samples between two rebuilds
-// read the same cells, which makes it legal to stratify them.
+// The cells depend on earlier samples of the same pixels, so each rebuild starts a new sequence
+// with its own scramble. Samples between two rebuilds read the same cells and may be stratified.
 #version 460
 
 #include "guided/candidates.glsl"
@@ -14,15 +12,14 @@ UPDATES(path_cells)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
-// Offsets of dimensions from the first of a vertex, for independent numbers.
+// Offsets from the first dimension of a vertex, for independent numbers.
 const uint DIMENSION_GUIDE_TECHNIQUE = 6u;
 const uint DIMENSION_GUIDE_RESAMPLING = 7u;
 
 // Share of candidates chosen without regard to visibility.
 const float UNGUIDED_CHOICE = 0.1;
 
-// Share of the rays that sample the BRDF in the one-sample model where the cell has learned none, in
-// 256ths.
+// Share of rays from the BRDF in the one-sample model, in 256ths, if the cell has learned none.
 uint brdf_share(Material material) {
     uint share = 77u;
     if (is_kind(material, MATERIAL_DIFFUSE)) {
@@ -33,23 +30,23 @@ uint brdf_share(Material material) {
     return share;
 }
 
-// Least share at vertices that the camera does not see, 256ths: their cells hold few rays, and what is
-// bright to the BRDF and blocked to the guide weighs as much as the path does.
+// Least BRDF share at vertices that the camera does not see, in 256ths. Few rays reach their cells,
+// and light that the BRDF favours and the guide believes blocked weighs as much as the path does.
 const uint LEAST_LATER_SHARE = 40u;
 
-// Writes a ray that brings integrand * factor, and what it will teach. `from_brdf` is the part of its
-// density that is the BRDF's, in 256ths, of the one-sample model. There, at what the camera sees, a
-// direction that brings nothing, mostly since it is below the horizon, is not traced and counts as
-// blocked; candidates are not known to be so one by one, and at later vertices the rays in its place were
-// not worth their time (docs/guided.md).
+// Writes a ray that contributes integrand * factor, and what it teaches. `from_brdf` is the BRDF's
+// part of its density in the one-sample model, in 256ths. There, at vertices that the camera sees,
+// untraced directions without a contribution (mostly below the horizon) count as blocked. Resampled
+// candidates are not known one by one; at later vertices such rays did not pay
+// (docs/experiments/directions_that_bring_nothing.md).
 void finish(uint index, uint first, Guided guided, float factor, uint from_brdf) {
     vec3 contribution = guided.sampled.integrand * factor;
     write_ray(index, guided.sampled.direction, contribution);
     int exponent = int(floatBitsToUint(luminance(contribution)) >> 23u) - 127;
     uint octave = uint(clamp(
         exponent + int(GUIDE_SHARE_OCTAVES / 2u), 0, int(GUIDE_SHARE_OCTAVES) - 1));
-    // BRDF * cosine, weighed by the colours of the light: luminance is that of the map's density but for
-    // how sin(theta) varies within a row.
+    // BRDF * cosine, weighted by the light's colours: luminance and map density agree but for the
+    // change of sin(theta) within a row.
     float light = guided.sampled.environment_pdf * parameters.environment_total * 2.0 * PI * PI;
     float response = light > 0.0 ? luminance(guided.sampled.integrand) / light : 0.0;
     uint response_units = uint(clamp(
@@ -62,7 +59,7 @@ void finish(uint index, uint first, Guided guided, float factor, uint from_brdf)
             | response_units << LEARN_RESPONSE_SHIFT);
 }
 
-// A ray of the one-sample model: balance heuristic over BRDF and guide.
+// Writes a ray of the one-sample model: balance heuristic over BRDF and guide.
 void finish_one(uint index, uint first, Guided guided, float share) {
     float pdf = share * guided.sampled.brdf_pdf + (1.0 - share) * guided_pdf(guided);
     float factor = pdf > 0.0 ? 1.0 / pdf : 0.0;
@@ -70,8 +67,8 @@ void finish_one(uint index, uint first, Guided guided, float share) {
     finish(index, first, guided, factor, from_brdf);
 }
 
-// One of the candidates seen so far. It is chosen with the probability
-// 0.9 guided / guided_sum + 0.1 unguided / unguided_sum: bounded estimates where the guide is wrong.
+// Candidate chosen with probability 0.9 guided / guided_sum + 0.1 unguided / unguided_sum, which
+// bounds the estimate where the guide is wrong.
 struct Reservoir {
     Guided chosen;
     float chosen_pdf;
@@ -122,19 +119,18 @@ void main() {
     Vertex vertex = load_vertex(path, hit);
     GuideCell found = guide_cell_of(vertex);
     uint cell = guide_cell_index(found);
-    // For the bounce that arrived here and the one that leaves.
+    // Note the cell for the bounce that arrived here and the one that leaves.
     path_cells[path].cell = cell;
     uint learned_share = found.found >> GUIDE_SHARE_SHIFT;
     uint first = cell * guide.region_count;
-    // Rays are numbered through all samples since the rebuild, since they share one sequence.
+    // Number the rays through all samples since the rebuild: they share one sequence.
     uint first_ray = (vertex.index.sample_index - wave.epoch_start) * wave.total_shadow_rays
         + wave.first_shadow_ray;
 
     if (CANDIDATES == 1u) {
-        // The techniques take turns in proportion to their shares, from a random start, so that ray k
-        // is from the BRDF with exactly that probability and both sequences are used without gaps.
-        // The start is shared by a block of 8x8 pixels, and each technique has its own loop: devices
-        // that run both sides of a branch then run one technique per ray.
+        // Alternate the techniques by their shares from a random start: ray k is from the BRDF with
+        // exactly that probability, and neither sequence has gaps. 8x8 pixels share the start, and each
+        // technique has its own loop: devices that run both sides of a branch then run one per ray.
         uint share = learned_share > 0u ? learned_share : brdf_share(vertex.material);
         share = wave.vertex > 0u ? max(share, LEAST_LATER_SHARE) : share;
         uvec2 block = uvec2(

@@ -1,5 +1,4 @@
-// Adds to the film which cells of learned visibility the first hits of the wave's paths find, where
-// asked for: a colour for each cell, and whether it was that of its face, a coarse or a fine one.
+// Adds to the film the colour and kind (face, coarse, fine) of the guide cells at first hits.
 #version 460
 
 #include "guided/guide.glsl"
@@ -9,10 +8,10 @@ UPDATES(film_guide_level)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
-// Stands for the cell of a face, which has no key: cells have a lower number for their face.
+// Stands for the missing key of a face's cell: the face bits of other cells are lower.
 const uint FACE_KEY = 0xf0000000u;
 
-// Three bytes of the key's hash, in 256ths, whose sums are exact.
+// Returns three bytes of the key's hash in 256ths, whose sums are exact.
 vec3 colour_of(uint key) {
     uint hash = guide_hash(key);
     return vec3(uvec3(hash, hash >> 8u, hash >> 16u) & 255u) * (1.0 / 256.0);

@@ -1,4 +1,4 @@
-// A next direction of a path: what bounce.comp and bounce_guided.comp have in common.
+// Next direction of a path, for bounce.comp and bounce_guided.comp. Densities in solid angle measure.
 
 #ifndef BOUNCE_GLSL
 #define BOUNCE_GLSL
@@ -14,11 +14,10 @@ UPDATES(rays)
 READS(hits)
 UPDATES(paths)
 
-// First vertex at which a path may be ended by russian roulette.
+// First vertex at which russian roulette may end a path.
 layout(constant_id = CONSTANT_ROULETTE_VERTEX) const uint ROULETTE_VERTEX = 8u;
 
-// What the throughput is multiplied by if a path goes on in a direction from the BRDF's own sampling:
-// BRDF * cosine / density; 0 below the shading or the geometric horizon.
+// Returns BRDF * cosine / density of a direction drawn from the BRDF; 0 below either horizon.
 vec3 bounce_factor(
     Hit hit, Material material, vec3 outgoing_local, vec3 incident_local, vec3 direction) {
     vec3 factor = vec3(0.0);
@@ -31,8 +30,8 @@ vec3 bounce_factor(
     return factor;
 }
 
-// Sends a path on, or ends it where it would bring nothing or roulette says so, by the number in
-// [0, 1) that is drawn with `number` and `seed`. Returns true if it goes on.
+// Sends a path on unless it carries nothing or loses at roulette, which draws with `number` and `seed`.
+// Returns true if it goes on.
 bool follow_bounce(
     uint path, PathIndex index, Hit hit, vec3 direction, vec3 factor, uint number, uint seed) {
     PathState state = paths[path];

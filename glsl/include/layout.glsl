@@ -7,7 +7,7 @@
 
 #include "interface.glsl"
 
-// Declare a buffer with the access that a pass has, which synchronization validation relies on.
+// Declare a buffer with the access of the pass; synchronization validation relies on it.
 #define READS(name) BUFFER_##name(readonly)
 #define WRITES(name) BUFFER_##name(writeonly)
 #define UPDATES(name) BUFFER_##name(READ_WRITE)

@@ -1,5 +1,5 @@
-// Rays, hits, shadow rays and materials through texel buffers: on lavapipe a texel of four words costs
-// a fraction of four loads from a storage buffer (docs/traversal.md).
+// Loads rays, hits, shadow rays and materials through texel buffers: on lavapipe a texel of four
+// words costs a fraction of four loads from a storage buffer (docs/traversal.md).
 
 #ifndef LOAD_GLSL
 #define LOAD_GLSL
@@ -17,7 +17,7 @@ Ray load_ray(uint index) {
     return Ray(uintBitsToFloat(first.xyz), first.w, uintBitsToFloat(second.xyz), second.w);
 }
 
-// The part of a hit that a ray from there needs.
+// Part of a hit that a ray leaving it needs.
 struct HitOrigin {
     vec3 position;
     uint material;

@@ -1,6 +1,5 @@
-// One vertex of a path as the sampling passes see it: the surface, what a direction brings there, and
-// how densely the two basic techniques, the BRDF's own sampling and the environment's, draw it. All
-// densities per steradian.
+// Path vertex as the sampling passes see it: surface, integrand in a direction, and the densities
+// of sampling BRDF and environment. Densities in solid angle measure.
 
 #ifndef VERTEX_GLSL
 #define VERTEX_GLSL
@@ -14,27 +13,25 @@
 
 WRITES(shadow_rays)
 
-// What does not change from ray to ray at one hit.
+// Data common to all rays at one hit.
 struct Vertex {
     Hit hit;
     Frame frame;
     Material material;
     vec3 outgoing_local;
     PathIndex index;
-    // First dimension of the random numbers.
     uint dimension;
 };
 
-// A direction at a vertex.
 struct DirectionSample {
     vec3 direction;
-    // BRDF * radiance * cosine, radiance as if unoccluded.
+    // BRDF * radiance * cosine, without occlusion.
     vec3 integrand;
     float brdf_pdf;
     float environment_pdf;
 };
 
-// The vertex of a path whose hit is on a surface.
+// Loads the vertex of a path whose hit is on a surface.
 Vertex load_vertex(uint path, Hit hit) {
     Vertex vertex;
     vertex.hit = hit;
@@ -52,14 +49,14 @@ DirectionSample evaluate_direction(
     vec3 value;
     brdf_evaluate_and_pdf(
         vertex.material, vertex.outgoing_local, incident_local, value, sampled.brdf_pdf);
-    // Below the shading or the geometric horizon there is nothing to see.
+    // Nothing contributes below the shading or the geometric horizon.
     if (incident_local.z > 0.0 && dot(direction, vertex.hit.geometric_normal) > 0.0) {
         sampled.integrand = value * radiance * incident_local.z;
     }
     return sampled;
 }
 
-// Any direction in the world.
+// Evaluates a direction in world space.
 DirectionSample evaluate_world(Vertex vertex, vec3 direction) {
     vec3 radiance = environment_radiance(direction);
     return evaluate_direction(
@@ -67,7 +64,7 @@ DirectionSample evaluate_world(Vertex vertex, vec3 direction) {
         environment_pdf(direction, radiance));
 }
 
-// Any direction given in the frame of the vertex.
+// Evaluates a direction in the frame of the vertex.
 DirectionSample evaluate_local(Vertex vertex, vec3 incident_local) {
     vec3 direction = to_world(vertex.frame, incident_local);
     vec3 radiance = environment_radiance(direction);
@@ -75,7 +72,7 @@ DirectionSample evaluate_local(Vertex vertex, vec3 incident_local) {
         vertex, direction, incident_local, radiance, environment_pdf(direction, radiance));
 }
 
-// A direction proportional to the environment's luminance, from two numbers in [0, 1).
+// Samples a direction in proportion to the environment's luminance; u in [0, 1)^2.
 DirectionSample draw_from_environment(Vertex vertex, vec2 u) {
     EnvironmentSample light = environment_sample(u);
     return evaluate_direction(
@@ -83,7 +80,7 @@ DirectionSample draw_from_environment(Vertex vertex, vec2 u) {
         light.pdf);
 }
 
-// A direction from the BRDF's own sampling, from three numbers in [0, 1).
+// Samples a direction from the BRDF; u in [0, 1)^3.
 DirectionSample draw_from_brdf(Vertex vertex, vec3 u) {
     return evaluate_local(vertex, brdf_sample(vertex.material, vertex.outgoing_local, u));
 }
@@ -92,7 +89,7 @@ void write_ray(uint index, vec3 direction, vec3 contribution) {
     shadow_rays[index] = ShadowRay(direction, contribution);
 }
 
-// Writes a direction that was drawn with density `pdf`, 0 where nothing was drawn.
+// Writes a direction drawn with density `pdf`; 0 if none was drawn.
 void write_sample(uint index, DirectionSample sampled, float pdf) {
     write_ray(index, sampled.direction, pdf > 0.0 ? sampled.integrand / pdf : vec3(0.0));
 }

@@ -1,4 +1,4 @@
-// Pixel and sample of a path of the wave, and the dimensions of its random numbers.
+// Pixel and sample of each path of the wave, and the dimensions of its random numbers.
 
 #ifndef WAVE_GLSL
 #define WAVE_GLSL
@@ -16,8 +16,7 @@ layout(scalar, push_constant) uniform WaveConstants {
 const uint DIMENSION_FILTER = 0u;
 const uint DIMENSION_LENS = 1u;
 const uint DIMENSION_VERTEX = 2u;
-// Offsets from the first dimension of a vertex. The directions of resampling's candidates take one
-// dimension per candidate.
+// Offsets from a vertex's first dimension. Directions of resampling candidates take one each.
 const uint DIMENSION_TECHNIQUE = 0u;
 const uint DIMENSION_RESAMPLING = 1u;
 const uint DIMENSION_BOUNCE = 2u;
@@ -27,26 +26,23 @@ const uint DIMENSION_BRDF_LOBE = 8u;
 const uint DIMENSION_BRDF_DIRECTION = 16u;
 const uint DIMENSION_ENVIRONMENT_DIRECTION = 24u;
 const uint DIMENSIONS_PER_VERTEX = 32u;
-// First dimension of the rays of adaptive samplers, which each have their own: technique, direction
-// and lobe. At most 4096 rays a vertex.
+// First dimension of the rays of adaptive samplers, which each have three; at most 4096 rays a vertex.
 const uint DIMENSION_ADAPTIVE = 0x10000u;
 const uint DIMENSIONS_PER_ADAPTIVE_RAY = 3u;
 // First dimension of random walks.
 const uint DIMENSION_WALK = 0x8000000u;
 
-// Film order walks through blocks of 8x8 pixels, so that neighbouring invocations trace
-// neighbouring rays.
+// Film order goes block by block, so that neighbouring invocations trace neighbouring rays.
 const uint FILM_BLOCK = 8u;
 
 struct PathIndex {
-    // Pixel in the crop window.
     uvec2 crop_pixel;
-    // Index of the pixel in the buffers of the film.
+    // Index into the buffers of the film.
     uint film_index;
-    // Index of the pixel in the whole film: random numbers do not depend on the crop window.
+    // Index in the whole film: random numbers do not depend on the crop window.
     uint pixel;
     uint sample_index;
-    // Whether the pixel lies in the crop window; blocks at its edges reach beyond it.
+    // False where a block reaches beyond the crop window.
     bool inside;
 };
 
@@ -54,12 +50,10 @@ uint wave_path_count() {
     return wave.pixel_count * wave.sample_count;
 }
 
-// Position in film order of pixel `index` of the wave.
 uint wave_film_position(uint index) {
     return wave.first_pixel + index * max(wave.pixel_stride, 1u);
 }
 
-// The pixel at a position in film order.
 PathIndex wave_pixel(uint film_position) {
     PathIndex index;
     uint blocks_per_row = (parameters.crop_width + FILM_BLOCK - 1u) / FILM_BLOCK;
@@ -77,7 +71,6 @@ PathIndex wave_pixel(uint film_position) {
     return index;
 }
 
-// The pixel and sample of a path of the wave.
 PathIndex wave_path(uint path) {
     uvec2 sample_and_pixel = divide(path, wave.pixel_count);
     PathIndex index = wave_pixel(wave_film_position(sample_and_pixel.y));
@@ -85,13 +78,12 @@ PathIndex wave_path(uint path) {
     return index;
 }
 
-// First dimension of the vertex this dispatch works at.
 uint vertex_dimension() {
     return DIMENSION_VERTEX + wave.vertex * DIMENSIONS_PER_VERTEX;
 }
 
-// Random bits that the paths of a block of 8x8 pixels share, for choices that neighbouring
-// invocations had better make alike. `dimension` counts from the first one of the vertex.
+// Returns bits shared by 8x8 pixels, for choices that neighbouring invocations should make alike.
+// `dimension` counts from the first of the vertex.
 uvec4 block_random_bits(PathIndex index, uint dimension) {
     uvec2 block = divide(index.pixel, parameters.film_width).yx / FILM_BLOCK;
     return hash_4d(uvec4(block, vertex_dimension() + dimension, wave.seed));

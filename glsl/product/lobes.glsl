@@ -1,8 +1,7 @@
-// Lobes of the product of environment and BRDF at one hit, as passes hand them on.
-// [Wu & Shih 2009], section 4.
+// Product lobes at one hit. [Wu & Shih 2009], section 4. Integrals over solid angle.
 //
-// A lobe is two words: axis in the octahedral map; bandwidth and weight as halves. Weights are relative
-// to the strongest lobe of the guess at their hit.
+// A lobe is two words: axis in the octahedral map; bandwidth and weight as halves. Weights are
+// relative to the strongest lobe of the guess at the hit.
 
 #ifndef LOBES_GLSL
 #define LOBES_GLSL
@@ -13,7 +12,7 @@
 
 layout(constant_id = CONSTANT_KEPT_LOBES) const uint KEPT_LOBES = 64u;
 
-// Lobes are drawn with bandwidths between these, where halves can hold them and the forms are exact.
+// Range of bandwidths for drawing, where halves can hold them and the closed forms are exact.
 const float SMALLEST_BANDWIDTH = 0.05;
 const float LARGEST_BANDWIDTH = 6e4;
 
@@ -32,7 +31,7 @@ ProductLobe unpack_lobe(uvec2 words) {
     return ProductLobe(unpack_normal(words.x), halves.x, halves.y);
 }
 
-// Whether the sum of the weights up to lobe `l` of `count` is kept.
+// Returns true if the sum of the weights up to lobe `l` of `count` is stored.
 bool is_sum_kept(uint l, uint count) {
     return (l + 1u) % LOBES_PER_SUM == 0u || l + 1u == count;
 }

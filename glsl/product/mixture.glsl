@@ -1,9 +1,8 @@
-// The mixture that `product` and `visibility` draw directions from at one vertex: the lobes of the
-// product by their weights in force, the environment's own sampling and the BRDF's. Algorithm 5.1 of
-// [Wu & Shih 2009]. All densities per steradian. The entry point declares visibility_cache.
+// Mixture that `product` and `visibility` draw from at one vertex: lobes by their current weights,
+// environment and BRDF. [Wu & Shih 2009], algorithm 5.1. Densities in solid angle measure. Entry
+// points declare visibility_cache.
 //
-// Deviation: elevations by inversion of the closed form; the Metropolis walk of the thesis is an
-// option, and biased.
+// Deviation: elevations by inversion; the thesis's Metropolis walk is optional, and biased.
 
 #ifndef MIXTURE_GLSL
 #define MIXTURE_GLSL
@@ -19,10 +18,8 @@ layout(constant_id = CONSTANT_METROPOLIS) const uint METROPOLIS = 0u;
 
 const uint WALK_STEPS = 16u;
 
-// The weights in force at one vertex.
 struct Mixture {
     Lobes lobes;
-    // Sum of the weights of the lobes.
     float total;
     // Probabilities of the three techniques.
     float lobe_share;
@@ -30,20 +27,20 @@ struct Mixture {
     float brdf_share;
 };
 
-// What one direction is drawn with, each in [0, 1).
+// Random numbers for one direction, each in [0, 1).
 struct MixtureNumbers {
     float technique;
     vec2 direction;
     float lobe;
 };
 
-// The mixture at a path; `film_index` matters where caches belong to pixels.
+// Loads the mixture at a path; `film_index` matters only for caches of pixels.
 Mixture load_mixture(uint path, uint path_count, uint film_index) {
     Mixture mixture = Mixture(load_lobes(path, path_count, film_index), 0.0, 0.0, 0.0, 0.0);
     mixture.total = mixture.lobes.count > 0u
         ? sum_of_stretch(mixture.lobes, (mixture.lobes.count - 1u) / LOBES_PER_SUM)
         : 0.0;
-    // Without lobes or in the dark the BRDF's own sampling is left.
+    // Fall back on the BRDF without lobes or in the dark.
     float lobe_share = mixture.total > 0.0 ? 1.0 - BRDF_SHARE - ENVIRONMENT_SHARE : 0.0;
     float environment_share = parameters.environment_total > 0.0 ? ENVIRONMENT_SHARE : 0.0;
     float brdf_share = lobe_share + environment_share + BRDF_SHARE > 0.0 ? BRDF_SHARE : 1.0;
@@ -54,7 +51,7 @@ Mixture load_mixture(uint path, uint path_count, uint film_index) {
     return mixture;
 }
 
-// 1 - cos of the elevation by a random walk, as in the thesis; biased, since the walk is short.
+// Samples 1 - cos of the elevation by a random walk, as in the thesis; biased because it is short.
 float walk(Vertex vertex, uint ray, float bandwidth) {
     float x = min(1.0 / max(bandwidth, 1e-3), 1.0);
     float stride = min(3.0 / max(bandwidth, 1e-3), 2.0);
@@ -81,13 +78,13 @@ vec3 draw_from_lobe(Vertex vertex, uint ray, ProductLobe lobe, vec2 u) {
     return (1.0 - x) * lobe.axis + azimuth.y * tangent + azimuth.x * bitangent;
 }
 
-// Direction of one ray of the vertex, in the world. Directions below the horizon bring nothing.
+// Samples the world direction of one ray. Directions below the horizon contribute nothing.
 vec3 mixture_sample(Vertex vertex, Mixture mixture, uint ray, MixtureNumbers numbers) {
     bool from_lobe = numbers.technique < mixture.lobe_share;
     bool from_environment =
         !from_lobe && numbers.technique < mixture.lobe_share + mixture.environment_share;
     vec3 direction = vertex.frame.normal;
-    // Loops of one round instead of branches: devices that run both sides of a branch skip them.
+    // Loops of at most one round instead of branches: devices that run both sides of a branch skip them.
     for (uint once = from_lobe ? 1u : 0u; once > 0u; --once) {
         uint l = find_lobe(mixture.lobes, numbers.lobe * mixture.total);
         ProductLobe lobe = unpack_lobe(lobe_words(mixture.lobes, l));
@@ -105,8 +102,8 @@ vec3 mixture_sample(Vertex vertex, Mixture mixture, uint ray, MixtureNumbers num
     return direction;
 }
 
-// Density of the lobes alone, with the weights in force; 0 without lobes. Where `is_noted`, notes which
-// lobes the direction is close to, for the case that it is recorded.
+// Returns the density of the lobes with their current weights; 0 without lobes. If `is_noted`,
+// notes the lobes close to the direction, in case it is recorded.
 float mixture_lobe_density(Mixture mixture, vec3 direction, bool is_noted) {
     Lobes lobes = mixture.lobes;
     float density = 0.0;
@@ -132,7 +129,7 @@ float mixture_lobe_density(Mixture mixture, vec3 direction, bool is_noted) {
     return mixture.total > 0.0 ? density / (2.0 * SRBF_PI * mixture.total) : 0.0;
 }
 
-// Density of the whole mixture at a direction for which the lobes alone have `lobe_density`.
+// Returns the density of the whole mixture where that of the lobes is `lobe_density`.
 float mixture_pdf(Mixture mixture, DirectionSample sampled, float lobe_density) {
     return mixture.lobe_share * lobe_density
         + mixture.environment_share * sampled.environment_pdf

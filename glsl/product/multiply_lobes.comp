@@ -1,14 +1,13 @@
-// The product of environment and BRDF at every hit: hits, SRBF tables -> the strongest lobes and sums
-// of their weights. [Tsai et al. 2008]; [Wu & Shih 2009], Eq. 8.
+// Multiplies environment and BRDF at every hit: hits, SRBF tables -> strongest lobes and sums of
+// their weights. [Tsai et al. 2008]; [Wu & Shih 2009], Eq. 8.
 //
-// What matters of a pair is whether it is stronger than the n-th strongest. That strength is guessed
-// from every eighth pair, and corrected by rounds over all of them, each of which notes the stronger
-// ones as bits. Strengths are logarithms; where lobes are ordered by integral, a pair costs another
-// logarithm. Environment lobes below the horizon are skipped: a loop of no rounds, since devices that
-// run both sides of a branch end loops early.
+// Selects pairs stronger than about the n-th strongest. Guesses that threshold from every eighth
+// pair and corrects it in rounds over all pairs, noting the stronger ones as bits. Strengths are
+// logarithms; ordering by integral costs another one per pair. Loops of no rounds skip environment
+// lobes below the horizon: they end early on devices that run both sides of a branch.
 //
-// Deviation: the weight of a lobe is the part of its integral above the horizon [Tokuyoshi], not the
-// whole integral, since what is drawn below the horizon is lost.
+// Deviation: a lobe's weight is its integral above the horizon [Tokuyoshi], not over the sphere,
+// since directions drawn below are lost.
 #version 460
 
 #include "load.glsl"
@@ -35,60 +34,56 @@ layout(constant_id = CONSTANT_ORDER_BY_COEFFICIENT) const uint ORDER_BY_COEFFICI
 layout(constant_id = CONSTANT_STRONGEST_ENVIRONMENT_LOBE)
     const float STRONGEST_ENVIRONMENT_LOBE = 0.0;
 
-// Bins of strength of the guess, each a factor of two wide.
+// Bins of strength in the guess, each a factor of two wide.
 const uint BINS = 24u;
 const float BINS_PER_E_FOLD = 1.0 / 0.69314718;
-// Every so many pairs enter the guess.
+// One pair in this many enters the guess.
 const uint GUESS_STRIDE = 8u;
-// Pairs over the wanted number with which a round is near enough; those of the strongest environment
-// lobes are kept. And most rounds.
+// Surplus of pairs at which a round is near enough; pairs of the strongest environment lobes are kept.
 const uint SLACK = (KEPT_LOBES + 1u) / 2u;
 const uint ROUNDS = 8u;
-// BRDF lobes that are held in registers at a time, and how many times.
+// BRDF lobes held in registers at a time, and the number of such groups.
 const uint GROUP = BRDF_LOBES < 20u ? BRDF_LOBES : 20u;
 const uint GROUPS = (BRDF_LOBES + GROUP - 1u) / GROUP;
-// An environment lobe whose value is everywhere above the horizon below exp(-7) of its top is skipped.
+// An environment lobe is skipped if it stays below exp(-7) of its peak above the horizon.
 const float BELOW_HORIZON = 7.0;
-// Strength of what is nothing.
+// Strength of a product of zero.
 const float NO_STRENGTH = -1e30;
 
 uint histogram[BINS];
 vec4 brdf[GROUP];
-// A bit for each BRDF lobe of a group whose product with an environment lobe is kept.
+// Bits of the BRDF lobes in a group whose product with an environment lobe is kept.
 uint stronger[GROUPS * (ENVIRONMENT_LOBES > 0u ? ENVIRONMENT_LOBES : 1u)];
-// BRDF lobe and environment lobe of what is kept, 16 bits each.
+// BRDF lobe and environment lobe of each kept product, 16 bits each.
 uint selected[KEPT_LOBES];
 
-// The surface at a hit as the fits see it: their views lie in the plane of +x.
+// Surface at a hit as the fits see it: views lie in the plane of +x.
 struct View {
     vec3 tangent;
     vec3 bitangent;
     vec3 normal;
-    // First lobe of the view, and how many it has.
     uint first_lobe;
     uint lobe_count;
 };
 
-// bandwidth * axis and ln(amplitude) - bandwidth of a BRDF lobe: what a product is made of. Those of the
-// factors add up.
+// Returns bandwidth * axis and ln(amplitude) - bandwidth of a BRDF lobe. To multiply lobes, add these.
 vec4 brdf_exponents(View view, uint index) {
     vec4 local = texelFetch(brdf_lobes, int(view.first_lobe + index));
     vec3 axis = view.tangent * local.x + view.bitangent * local.y + view.normal * local.z;
     return vec4(axis, index < view.lobe_count ? local.w : NO_STRENGTH);
 }
 
-// The same of an environment lobe.
 vec4 environment_exponents(uint index) {
     return texelFetch(environment_lobes, int(index));
 }
 
-// ln(x) to within 0.06: the bits of a float are a logarithm by straight pieces.
+// ln(x) to within 0.06: the bits of a float are a piecewise linear logarithm.
 float coarse_logarithm(float x) {
     return 0.69314718 * (float(floatBitsToInt(x)) * 1.1920929e-7 - 126.957);
 }
 
-// Strength of a product: logarithm of its coefficient, or of its integral over 2 pi, which is the
-// coefficient times (1 - exp(-2 bandwidth)) / bandwidth, here the inverse root of bandwidth^2 + 1/4.
+// Strength of a product: logarithm of its coefficient, or of its integral over 2 pi. The integral
+// is the coefficient times (1 - exp(-2 bandwidth)) / bandwidth, here 1 / sqrt(bandwidth^2 + 1/4).
 float strength_of(vec4 environment, vec4 brdf) {
     vec3 sum = environment.xyz + brdf.xyz;
     float square = dot(sum, sum);
@@ -106,8 +101,7 @@ float coarse_erf(float x) {
     return sign(x) * sqrt(1.0 - exp(exponent));
 }
 
-// Share of a kernel's integral above the horizon, for a weight: kernel_hemisphere_part with a coarse
-// error function.
+// Share of a kernel's integral above the horizon: kernel_hemisphere_part with a coarse erf.
 float part_above_horizon(float bandwidth, float cosine) {
     float steepness = kernel_steepness(bandwidth);
     float ratio = steepness < 1e-2
@@ -116,7 +110,7 @@ float part_above_horizon(float bandwidth, float cosine) {
     return kernel_part_of_ratio(bandwidth, ratio);
 }
 
-// 1 for an environment lobe with a part above the horizon, else 0.
+// Returns 1 for an environment lobe with a part above the horizon, else 0.
 uint is_above_horizon(vec4 environment, vec3 normal) {
     float bandwidth = length(environment.xyz);
     float cosine = dot(environment.xyz, normal);
@@ -130,11 +124,10 @@ void load_group(View view, uint group) {
     }
 }
 
-// Strengths of products as a guess sees them.
 struct Guess {
-    // About as many pairs as are wanted are stronger.
+    // Strength that about KEPT_LOBES pairs exceed.
     float threshold;
-    // Largest strength among the pairs that were looked at.
+    // Largest strength among the pairs tested.
     float strongest;
     // Sum of the exponentials of all strengths, relative to the bound.
     float energy;
@@ -161,7 +154,7 @@ Guess guess(View view, float bound) {
             }
         }
     }
-    // The last bin holds what is too weak to tell apart, products of zero among it.
+    // The last bin holds pairs too weak to tell apart, among them products of zero.
     float energy = 0.0;
     float wanted = float(KEPT_LOBES + SLACK / 2u) / float(GUESS_STRIDE);
     float bins = 0.0;
@@ -175,8 +168,7 @@ Guess guess(View view, float bound) {
     return Guess(threshold, max(strongest, threshold), float(GUESS_STRIDE) * energy);
 }
 
-// Whether the strength of a product exceeds a threshold, of which the environment's part is already
-// subtracted; strength_of without the root.
+// Tests strength_of against a threshold, less the environment's part, without the root.
 bool is_stronger(vec3 environment, vec4 brdf, float threshold) {
     vec3 sum = environment + brdf.xyz;
     float square = dot(sum, sum);
@@ -187,7 +179,6 @@ bool is_stronger(vec3 environment, vec4 brdf, float threshold) {
     return square > root * abs(root);
 }
 
-// Notes the pairs that are stronger than a threshold, and returns their number.
 uint note_stronger(View view, float threshold) {
     uint count = 0u;
     for (uint group = 0u; group < GROUPS; ++group) {
@@ -242,8 +233,7 @@ void main() {
     view.lobe_count = min(material.y, BRDF_LOBES);
     view.first_lobe = material.x + nearest * material.y;
 
-    // No product is stronger than the strongest amplitude times the largest integral, or, for
-    // coefficients, than the product of the amplitudes.
+    // Bound the strength: strongest amplitude times largest integral or, by coefficient, amplitude.
     float strongest_brdf_lobe = NO_STRENGTH;
     for (uint i = 0u; i < view.lobe_count; ++i) {
         vec4 lobe = brdf_exponents(view, i);
@@ -254,8 +244,8 @@ void main() {
         load_group(view, 0u);
     }
 
-    // From the guess by steps that take the number of stronger pairs to fall as fast as strength grows,
-    // within what earlier rounds have shown; what is weaker than the last bin is nothing.
+    // Correct the guess, assuming that the number of stronger pairs falls as fast as strength grows,
+    // within the bounds that earlier rounds found. Pairs below the last bin count as nothing.
     Guess guessed = guess(view, bound);
     float threshold = guessed.threshold;
     float too_weak = bound - float(BINS) / BINS_PER_E_FOLD;
@@ -275,7 +265,7 @@ void main() {
         threshold += log(float(pair_count + 1u) / float(KEPT_LOBES + SLACK / 2u + 1u));
         bool is_between = threshold > too_weak && threshold < too_strong;
         threshold = is_between ? threshold : 0.5 * (too_weak + too_strong);
-        // The last round takes what is known to be enough.
+        // The last round takes a threshold known to be low enough.
         threshold = round + 1u < ROUNDS && too_strong - too_weak > 0.01 ? threshold : too_weak;
         pair_count = note_stronger(view, threshold);
     }
@@ -292,7 +282,7 @@ void main() {
         }
     }
 
-    // Weights are relative to the strongest of the guess, so that halves can hold them.
+    // Scale weights by the strongest of the guess, so that halves can hold them.
     float sum = 0.0;
     float kept = 0.0;
     for (uint l = 0u; l < count; ++l) {

@@ -1,6 +1,5 @@
-// Chooses directions at every hit of the wave from the lobes of the product, with shares of the BRDF's
-// and the environment's own sampling, and writes one shadow ray for each: Algorithm 5.1 of
-// [Wu & Shih 2009]. The density is that of the whole mixture with the weights in force.
+// Chooses directions at every hit of the wave from lobes of the product, BRDF and environment. Writes
+// one shadow ray for each, by the density of the whole mixture: algorithm 5.1 of [Wu & Shih 2009].
 #version 460
 
 #include "layout.glsl"
@@ -13,8 +12,8 @@ layout(local_size_x = WORKGROUP_SIZE) in;
 
 layout(constant_id = CONSTANT_SAMPLER) const uint SAMPLER = SAMPLER_PRODUCT;
 
-// Numbers of one ray; pixels of a block share the technique. Where rays learn from the rays before
-// them, each has dimensions of its own; where samples learn from samples, numbers without any relation.
+// Draws the numbers of one ray; pixels of a block share the technique. Rays that learn from earlier
+// rays have dimensions of their own; samples that learn from samples have independent numbers.
 MixtureNumbers draw_numbers(Vertex vertex, uint ray) {
     PathIndex index = vertex.index;
     MixtureNumbers numbers;
@@ -34,7 +33,7 @@ MixtureNumbers draw_numbers(Vertex vertex, uint ray) {
             numbers.lobe = random_1d(index.pixel, index.sample_index, dimension + 2u, wave.seed);
         }
     } else {
-        // Techniques follow each other by the golden ratio from a random start.
+        // Step through the techniques by the golden ratio from a random start.
         uint number = index.sample_index * wave.total_shadow_rays + ray;
         uint turn = block_random_bits(index, DIMENSION_TECHNIQUE).x + number * 0x9e3779b9u;
         numbers.technique = unit_float(turn);
@@ -58,7 +57,7 @@ void main() {
     }
     Vertex vertex = load_vertex(path, hit);
     Mixture mixture = load_mixture(path, path_count, vertex.index.film_index);
-    // What the last ray of a hit is close to is of no use: the next sample has other lobes.
+    // Skip the last ray of a hit: the next sample has other lobes.
     bool is_noted = wave.first_shadow_ray + wave.shadow_ray_count < wave.total_shadow_rays;
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
         uint ray = wave.first_shadow_ray + i;

@@ -1,5 +1,4 @@
-// Draws one candidate of a shadow ray of the first path, or takes a direction as given, and evaluates
-// the densities there. For tests/guided_candidates.rs.
+// Densities (solid angle) of a candidate or a given direction. For tests/guided_candidates.rs.
 #version 460
 
 #include "guided/candidates.glsl"
@@ -10,7 +9,7 @@ struct CandidateQuery {
     // 1 draws a candidate, 0 takes the direction.
     uint draws;
     uint ray;
-    // Number of the candidate among those of the ray.
+    // Number of the candidate within its ray.
     uint candidate;
     vec3 direction;
 };

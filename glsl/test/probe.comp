@@ -1,4 +1,4 @@
-// Adds one to every word: tests the host itself.
+// Adds one to every word, to test the host itself.
 #version 460
 
 #extension GL_EXT_scalar_block_layout : require

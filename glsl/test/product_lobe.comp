@@ -1,4 +1,4 @@
-// Reads the lobes of paths and their weights in force back. For tests/product.rs.
+// Reads back the lobes of paths and their current weights. For tests/product.rs.
 #version 460
 
 #include "layout.glsl"
@@ -13,15 +13,14 @@ struct LobeAnswer {
     vec3 axis;
     float bandwidth;
     float weight;
-    // With what the cache knows.
+    // Weight lowered by what the cache knows.
     float weight_in_force;
     uint lobe_count;
-    // Sum of the weights in force of all lobes of the path.
+    // Sum over all lobes of the path.
     float total;
 };
 
 layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Queries {
-    // Path and lobe.
     uvec2 queries[];
 };
 layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {

@@ -1,5 +1,4 @@
-// Draws from the mixture of product sampling at a path, or takes a direction as given, and evaluates
-// its densities there. For tests/product.rs.
+// Densities (solid angle) of a draw from the mixture or a given direction. For tests/product.rs.
 #version 460
 
 #include "layout.glsl"
@@ -12,7 +11,7 @@ layout(local_size_x = WORKGROUP_SIZE) in;
 
 struct MixtureQuery {
     uint path;
-    // 1 draws a direction by the numbers, 0 takes the one given.
+    // 1 draws a direction from the numbers, 0 takes the given one.
     uint draws;
     vec3 direction;
     float technique;
@@ -24,7 +23,7 @@ struct MixtureAnswer {
     vec3 direction;
     float pdf;
     float lobe_density;
-    // The lobes by the weights of the product alone, whatever is known to be blocked.
+    // Density of the lobes weighted by the product alone.
     float unguided_lobe_density;
     float environment_pdf;
     float brdf_pdf;

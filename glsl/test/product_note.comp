@@ -1,5 +1,4 @@
-// Notes which lobes of every path its shadow ray is close to, as the sampling pass does for the rays it
-// draws. For tests/product.rs.
+// Notes the lobes close to every path's shadow ray, as sample_lobes.comp does. For tests/product.rs.
 #version 460
 
 #include "layout.glsl"

@@ -1,6 +1,4 @@
-// Puts paths into the state that the passes of product sampling find: a ray, the hit it made, and a
-// shadow ray with its outcome. For tests/product.rs, tests/guided_candidates.rs and
-// tests/guided_bounces.rs.
+// Writes the state that sampling passes expect, for tests/{product,guided_candidates,guided_bounces}.rs.
 #version 460
 
 #include "layout.glsl"

@@ -1,4 +1,4 @@
-// Probe of random.glsl: (pixel, sample, dimension, seed) in, all kinds of numbers out.
+// Probe of random.glsl: (pixel, sample, dimension, seed) in, numbers of each kind out.
 #version 460
 
 #include "random.glsl"

@@ -1,4 +1,4 @@
-// Probe of include/srbf.glsl: one row of inputs in, every function's result out.
+// Probe of srbf.glsl: one row of inputs in, the result of every function out.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #include "srbf.glsl"

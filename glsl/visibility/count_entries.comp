@@ -1,5 +1,4 @@
-// Adds to the film how many directions the visibility cache of every hit holds after the last of its
-// rays, where asked for: visibility_cache -> film_cache_entries.
+// Counts the directions in each hit's cache after its last ray: visibility_cache -> film_cache_entries.
 #version 460
 
 #include "load.glsl"

@@ -1,5 +1,5 @@
-// Records in the visibility cache of every hit the directions that turned out blocked: shadow_rays,
-// visibility -> visibility_cache. [Wu & Shih 2009], section 4.2. A full cache forgets its oldest entry.
+// Records blocked directions in the visibility cache of every hit: shadow_rays, visibility ->
+// visibility_cache. [Wu & Shih 2009], section 4.2. A full cache forgets its oldest entry.
 #version 460
 
 #include "load.glsl"
@@ -30,7 +30,7 @@ void main() {
     uint recorded = 0u;
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
         ShadowRay ray = load_shadow_ray(i * path_count + path);
-        // What brings nothing was not traced.
+        // Rays without a contribution were not traced.
         if (ray.contribution != vec3(0.0) && visibility[i * path_count + path] == 0u) {
             uint count = visibility_cache[head] & ~CACHE_GROWN;
             visibility_cache[head + 1u + count % CACHE_CAPACITY] = pack_normal(ray.direction);

@@ -1,9 +1,7 @@
-// Adds up the weights of the lobes at every hit whose visibility cache has grown: lobes,
-// visibility_cache, close_lobes -> lobe_sums. [Wu & Shih 2009], section 4.2. Weights themselves are
-// worked out where lobes are chosen, see weights.glsl.
+// Sums the weights of the lobes at every hit whose visibility cache has grown: lobes, visibility_cache,
+// close_lobes -> lobe_sums. [Wu & Shih 2009], section 4.2. See weights.glsl for the weights.
 //
-// The first ray of a sample finds in the cache of its pixel what earlier samples recorded: it is then
-// worked out which lobes each entry is close to.
+// Before a sample's first ray, finds the lobes close to its pixel's cached directions.
 #version 460
 
 #include "layout.glsl"
@@ -17,7 +15,7 @@ UPDATES(counters)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
-// No array without elements in the passes of a sampler without a cache.
+// Not 0: arrays need an element even in samplers without a cache.
 const uint PLACES = CACHE_CAPACITY > 0u ? CACHE_CAPACITY : 1u;
 
 void write_sum(Lobes lobes, uint l, float sum) {
@@ -26,7 +24,7 @@ void write_sum(Lobes lobes, uint l, float sum) {
     }
 }
 
-// Adds up the weights in force, in the order in which lobes are chosen.
+// Sums the current weights in the order in which lobes are chosen.
 void sum_weights(Lobes lobes) {
     float sum = 0.0;
     for (uint word = 0u; 32u * word < lobes.count; ++word) {
@@ -39,7 +37,7 @@ void sum_weights(Lobes lobes) {
     }
 }
 
-// Adds up the weights with all entries tested against all lobes; notes which are close.
+// Sums the weights, testing all entries against all lobes, and notes the close ones.
 void sum_with_all_entries(Lobes lobes) {
     uint entries = min(lobes.recorded, CACHE_CAPACITY);
     vec3 directions[PLACES];

@@ -1,12 +1,10 @@
-// Weights of the lobes at one hit with what its visibility cache knows. [Wu & Shih 2009], section 4.2:
-// Num(l) counts the cached directions close to lobe l, V(l) lowers its weight. The entry point declares
-// visibility_cache with the access it needs.
+// Weights of the lobes at one hit, given its visibility cache. [Wu & Shih 2009], section 4.2: Num(l)
+// counts the cached directions close to lobe l, V(l) lowers its weight. Entry points declare the cache.
 //
-// Counts are held bit by bit over 32 lobes at a time: word p of a count has bit p of the count of each
-// lobe, and masks are added with a few operations for all 32.
+// Counts are bit-sliced over 32 lobes: word p of a count holds bit p of each lobe's count, so that
+// a few operations add a mask for all 32.
 //
-// Deviation: V = (1 / (1 + Num))^k instead of (1 / Num)^k, which is infinite for lobes that no cached
-// direction is close to.
+// Deviation: V = (1 / (1 + Num))^k, not (1 / Num)^k, infinite for lobes without close directions.
 
 #ifndef WEIGHTS_GLSL
 #define WEIGHTS_GLSL
@@ -21,7 +19,6 @@ TEXELS(close_lobe_texels)
 
 layout(constant_id = CONSTANT_VISIBILITY_EXPONENT) const float VISIBILITY_EXPONENT = 2.0;
 
-// Bits of a count.
 const uint COUNT_BITS = CACHE_CAPACITY < 2u ? 1u
     : CACHE_CAPACITY < 4u ? 2u
     : CACHE_CAPACITY < 8u ? 3u
@@ -30,21 +27,21 @@ const uint COUNT_BITS = CACHE_CAPACITY < 2u ? 1u
     : CACHE_CAPACITY < 64u ? 6u
     : 7u;
 
-// Where the lobes of a path are, and what is known of them.
+// Location of the lobes of a path, and the state of their cache.
 struct Lobes {
     uint path;
     // Lobe `l` of a path is at `l * path_count + path`.
     uint path_count;
     uint count;
-    // Head of the visibility cache, and how many directions were ever recorded in it.
+    // Head of the visibility cache, and the number of directions ever recorded in it.
     uint head;
     uint recorded;
 };
 
-// Recorded directions close to each of 32 lobes.
+// Bit-sliced counts of cached directions close to each of 32 lobes.
 uint close_bits[COUNT_BITS];
 
-// The lobes of a path; `film_index` matters where caches belong to pixels.
+// Loads the lobes of a path; `film_index` matters only for caches of pixels.
 Lobes load_lobes(uint path, uint path_count, uint film_index) {
     Lobes lobes = Lobes(path, path_count, lobe_counts[path], 0u, 0u);
     if (CACHE_CAPACITY > 0u) {
@@ -54,7 +51,7 @@ Lobes load_lobes(uint path, uint path_count, uint film_index) {
     return lobes;
 }
 
-// Counts for lobes 32 * word to 32 * word + 31.
+// Loads the counts for lobes 32 * word to 32 * word + 31.
 void load_counts(Lobes lobes, uint word) {
     for (uint p = 0u; p < COUNT_BITS; ++p) {
         close_bits[p] = 0u;
@@ -76,7 +73,7 @@ void load_counts(Lobes lobes, uint word) {
     }
 }
 
-// V of a lobe with so many close directions.
+// V of a lobe with `close` close directions.
 float visibility_weight(float close) {
     float ratio = 1.0 / (1.0 + close);
     return VISIBILITY_EXPONENT == 2.0 ? ratio * ratio : pow(ratio, VISIBILITY_EXPONENT);
@@ -98,17 +95,16 @@ uvec2 lobe_words(Lobes lobes, uint l) {
     return texelFetch(lobe_texels, int(l * lobes.path_count + lobes.path)).xy;
 }
 
-// Weight of a lobe by its words, as the product found it.
 float weight_of_words(uvec2 words) {
     return unpackHalf2x16(words.y).y;
 }
 
-// Sum of the weights in force up to the end of a stretch of LOBES_PER_SUM lobes.
+// Returns the sum of the current weights up to the end of a stretch of LOBES_PER_SUM lobes.
 float sum_of_stretch(Lobes lobes, uint stretch) {
     return texelFetch(lobe_sum_texels, int(stretch * lobes.path_count + lobes.path)).x;
 }
 
-// The first lobe with which the sum of the weights exceeds the target, which is below the total.
+// Finds the first lobe at which the sum of the weights exceeds the target, which is below the total.
 uint find_lobe(Lobes lobes, float target) {
     uint last_stretch = (lobes.count - 1u) / LOBES_PER_SUM;
     uint stretch = 0u;

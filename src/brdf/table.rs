@@ -86,13 +86,9 @@ impl MeasuredTable {
     /// with both directions above the surface.
     pub fn tabulate(value: impl Fn(Vec3, Vec3) -> Vec3 + Sync) -> Result<Self, String> {
         let mut cells = vec![Vec3::NAN; CELL_COUNT];
-        cells.par_chunks_mut(PHI_DIFFERENCE).enumerate().for_each(|(row, cells)| {
-            for (phi, cell) in cells.iter_mut().enumerate() {
-                let (outgoing, incident) =
-                    bin_directions(row / THETA_DIFFERENCE, row % THETA_DIFFERENCE, phi);
-                if outgoing.z > 0.0 && incident.z > 0.0 {
-                    *cell = value(outgoing, incident);
-                }
+        for_each_cell(&mut cells, |cell, outgoing, incident| {
+            if outgoing.z > 0.0 && incident.z > 0.0 {
+                *cell = value(outgoing, incident);
             }
         });
         Self::from_cells(cells)
@@ -125,7 +121,10 @@ impl MeasuredTable {
         let mut words = vec![0; MEASURED_GRID_OFFSET as usize + 2 * CELL_COUNT];
         pack(&cells, &mut words);
         if let Some(limit) = EnergyLimit::new(&words) {
-            scale(&mut cells, &limit);
+            // Cells below the surface, read only as neighbours, take the factor of the horizon.
+            for_each_cell(&mut cells, |cell, outgoing, incident| {
+                *cell *= limit.factor(outgoing) * limit.factor(incident);
+            });
             average_poles(&mut cells);
             pack(&cells, &mut words);
             warnings.push(format!(
@@ -235,14 +234,13 @@ fn pack(cells: &[Vec3], words: &mut [u32]) {
     });
 }
 
-/// Scales every cell by the factors of both directions. Cells below the surface, read only as
-/// neighbours, take the factor of the horizon.
-fn scale(cells: &mut [Vec3], limit: &EnergyLimit) {
+/// Calls `change` with every cell and the directions (outgoing, incident) of its bin's centre.
+fn for_each_cell(cells: &mut [Vec3], change: impl Fn(&mut Vec3, Vec3, Vec3) + Sync) {
     cells.par_chunks_mut(PHI_DIFFERENCE).enumerate().for_each(|(row, cells)| {
         for (phi, cell) in cells.iter_mut().enumerate() {
             let (outgoing, incident) =
                 bin_directions(row / THETA_DIFFERENCE, row % THETA_DIFFERENCE, phi);
-            *cell *= limit.factor(outgoing) * limit.factor(incident);
+            change(cell, outgoing, incident);
         }
     });
 }

@@ -42,11 +42,12 @@ pub struct Arguments {
 
 /// Parses `metric=value`.
 fn parse_threshold(text: &str) -> Result<(String, f64), String> {
-    let known = || format!("known metrics: {}", Metrics::NAMES.join(", "));
+    let names = Metrics::default().named().map(|(name, _)| name);
+    let known = || format!("known metrics: {}", names.join(", "));
     let (name, value) = text
         .split_once('=')
         .ok_or_else(|| format!("expected METRIC=VALUE, as in relmse=0.01; {}", known()))?;
-    if !Metrics::NAMES.contains(&name) {
+    if !names.contains(&name) {
         return Err(format!("no metric {name:?}; {}", known()));
     }
     match value.parse::<f64>() {
@@ -98,15 +99,13 @@ fn check_same_picture(image: &Image, path: &Path, reference: &Image, other: &Pat
         format!("{}x{} pixels at {x},{y}", image.width, image.height)
     };
     if window(image) != window(reference) {
-        return Err(Error::Comparison {
-            message: format!(
-                "{} shows {}, {} shows {}; render both with one --size and --crop",
-                path.display(),
-                window(image),
-                other.display(),
-                window(reference)
-            ),
-        });
+        return Err(Error::comparison(format!(
+            "{} shows {}, {} shows {}; render both with one --size and --crop",
+            path.display(),
+            window(image),
+            other.display(),
+            window(reference)
+        )));
     }
     let hash = |image: &Image| match image.attributes.get("fenestra.scene_hash") {
         Some(Attribute::Text(hash)) => Some(hash.clone()),
@@ -132,16 +131,12 @@ fn print(arguments: &Arguments, picture: &crate::film::RgbImage, metrics: &Metri
             "width": picture.width,
             "height": picture.height,
         });
-        for (name, value) in Metrics::NAMES.into_iter().zip(metrics.values()) {
+        for (name, value) in metrics.named() {
             result[name] = serde_json::json!(value);
         }
         super::print_line(&format!("{result:#}"))
     } else {
-        let lines: Vec<String> = Metrics::NAMES
-            .into_iter()
-            .zip(metrics.values())
-            .map(|(name, value)| format!("{name:<15} {value:.6e}"))
-            .collect();
+        let lines = metrics.named().map(|(name, value)| format!("{name:<15} {value:.6e}"));
         super::print_line(&lines.join("\n"))
     }
 }

@@ -1,17 +1,13 @@
 //! Guide files: saves and restores the state that the sampler `guided` has learned.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::{
     error::{Error, Result},
+    film::checkpoint::guide_path,
     renderer::Renderer,
     sampler::{Sampler, guided::GuideState},
 };
-
-/// `image.checkpoint.exr` → `image.checkpoint.guide`.
-pub fn guide_path(checkpoint: &Path) -> PathBuf {
-    checkpoint.with_extension("guide")
-}
 
 /// Rejects guide options for samplers that do not learn.
 ///

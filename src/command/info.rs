@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::{
     brdf::{
@@ -16,7 +16,7 @@ use crate::{
     error::{Error, Result},
     files,
     film::{Attribute, Checkpoint, Image, summary::ChannelSummary},
-    fit,
+    fit::{self, report::Description},
     scene::{EnvironmentMap, Scene},
 };
 
@@ -32,13 +32,6 @@ pub struct Arguments {
     /// Print JSON to standard output.
     #[arg(long)]
     pub json: bool,
-}
-
-/// Report on a file, as JSON and as lines of text.
-struct Report {
-    value: Value,
-    lines: Vec<String>,
-    warnings: Vec<String>,
 }
 
 /// Reports on a file or on the installation.
@@ -58,17 +51,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     super::print_line(&report.lines.join("\n"))
 }
 
-fn file(path: &Path, is_map: bool) -> Result<Report> {
+fn file(path: &Path, is_map: bool) -> Result<Description> {
     match files::extension(path).as_str() {
         "toml" | "gltf" | "glb" | "pbrt" => scene(path),
         "hdr" | "pfm" => environment_map(path),
         "exr" if is_map => environment_map(path),
         "exr" => image(path),
         "binary" | "brdf" => measured_brdf(path),
-        fit::cache::EXTENSION => {
-            let fit::report::Description { value, lines, warnings } = fit::describe(path)?;
-            Ok(Report { value, lines, warnings })
-        }
+        fit::cache::EXTENSION => fit::describe(path),
         _ => {
             // Report a missing file before an unknown kind.
             fs::metadata(path).map_err(|source| Error::io(path, "read", source))?;
@@ -87,7 +77,7 @@ fn folder_size(folder: &Path) -> (u64, u64) {
     files.fold((0, 0), |(bytes, count), file| (bytes + file.len(), count + 1))
 }
 
-fn installation() -> Report {
+fn installation() -> Description {
     let mut lines = vec![format!("Fenestra {}", env!("CARGO_PKG_VERSION"))];
     let mut caches = serde_json::Map::new();
     for kind in ["fits", "pipelines"] {
@@ -106,10 +96,10 @@ fn installation() -> Report {
     }
     lines.push("devices: run `fenestra devices`".to_owned());
     let value = json!({ "version": env!("CARGO_PKG_VERSION"), "caches": caches });
-    Report { value, lines, warnings: Vec::new() }
+    Description { value, lines, warnings: Vec::new() }
 }
 
-fn scene(path: &Path) -> Result<Report> {
+fn scene(path: &Path) -> Result<Description> {
     let scene = Scene::load(path)?;
     let kind = |kind: &MaterialKind| match kind {
         MaterialKind::Diffuse { .. } => "diffuse",
@@ -147,10 +137,10 @@ fn scene(path: &Path) -> Result<Report> {
         "materials": materials,
         "hash": scene.hash,
     });
-    Ok(Report { value, lines, warnings: scene.warnings })
+    Ok(Description { value, lines, warnings: scene.warnings })
 }
 
-fn image(path: &Path) -> Result<Report> {
+fn image(path: &Path) -> Result<Description> {
     let image = Image::read_exr(path)?;
     let is_checkpoint = Checkpoint::is_checkpoint(&image);
     let kind = if is_checkpoint { "checkpoint" } else { "image" };
@@ -195,7 +185,7 @@ fn image(path: &Path) -> Result<Report> {
         "channels": channels,
         "attributes": attributes,
     });
-    Ok(Report { value, lines, warnings })
+    Ok(Description { value, lines, warnings })
 }
 
 fn describe(summary: &ChannelSummary) -> String {
@@ -215,7 +205,7 @@ fn describe(summary: &ChannelSummary) -> String {
     text
 }
 
-fn environment_map(path: &Path) -> Result<Report> {
+fn environment_map(path: &Path) -> Result<Description> {
     let mut warnings = Vec::new();
     let map = EnvironmentMap::load(path, 1.0, 0.0, &mut warnings)?;
     let mut lines = vec![format!("environment map of {}x{} texels", map.width, map.height)];
@@ -231,10 +221,10 @@ fn environment_map(path: &Path) -> Result<Report> {
         "height": map.height,
         "channels": channels,
     });
-    Ok(Report { value, lines, warnings })
+    Ok(Description { value, lines, warnings })
 }
 
-fn measured_brdf(path: &Path) -> Result<Report> {
+fn measured_brdf(path: &Path) -> Result<Description> {
     let table = MeasuredTable::load(path)?;
     let sanity = Sanity::of(&table);
     let mut warnings = table.warnings.clone();
@@ -254,5 +244,5 @@ fn measured_brdf(path: &Path) -> Result<Report> {
         "elevations_deg": ELEVATIONS_DEG,
         "sanity": sanity,
     });
-    Ok(Report { value, lines, warnings })
+    Ok(Description { value, lines, warnings })
 }

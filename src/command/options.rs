@@ -5,9 +5,6 @@ use std::time::Duration;
 use crate::film::Window;
 
 /// Parses `500ms`, `30s`, `5m`, `1h`, or plain seconds.
-///
-/// # Errors
-/// A message with the expected form.
 pub fn parse_duration(text: &str) -> Result<Duration, String> {
     let split = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
     let (number, unit) = text.split_at(split);
@@ -33,9 +30,6 @@ pub fn parse_duration(text: &str) -> Result<Duration, String> {
 }
 
 /// Parses `640x480`; each side 1 to 16384.
-///
-/// # Errors
-/// A message with the expected form.
 pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let side = |side: &str| side.parse().ok().filter(|side| (1..=16384).contains(side));
     text.split_once(['x', 'X'])
@@ -44,9 +38,6 @@ pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
 }
 
 /// Parses `x0,y0,x1,y1` in pixels, upper bounds excluded.
-///
-/// # Errors
-/// A message with the expected form.
 pub fn parse_crop(text: &str) -> Result<Window, String> {
     let numbers: Option<Vec<u32>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
     match numbers.as_deref() {
@@ -60,9 +51,6 @@ pub fn parse_crop(text: &str) -> Result<Window, String> {
 }
 
 /// Parses `x,y` in pixels.
-///
-/// # Errors
-/// A message with the expected form.
 pub fn parse_pixel(text: &str) -> Result<[u32; 2], String> {
     text.split_once(',')
         .and_then(|(x, y)| Some([x.trim().parse().ok()?, y.trim().parse().ok()?]))

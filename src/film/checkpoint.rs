@@ -55,6 +55,11 @@ pub fn checkpoint_path(image: &Path) -> PathBuf {
     image.with_extension("checkpoint.exr")
 }
 
+/// Path of the guide learned up to a checkpoint: `image.checkpoint.exr` → `image.checkpoint.guide`.
+pub fn guide_path(checkpoint: &Path) -> PathBuf {
+    checkpoint.with_extension("guide")
+}
+
 /// Tests whether `path` is named like a checkpoint.
 pub fn is_checkpoint_path(path: &Path) -> bool {
     path.file_name()

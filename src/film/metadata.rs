@@ -4,7 +4,12 @@
 //! is under `fenestra.`. [`Metadata::sample_ranges`] keep `merge` and `--resume` from counting a
 //! sample twice.
 
-use std::{collections::BTreeMap, fmt, path::Path, str::FromStr};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt,
+    path::Path,
+    str::FromStr,
+};
 
 use super::exr::{Attribute, Image};
 use crate::error::{Error, Result};
@@ -88,6 +93,11 @@ pub struct Metadata {
     pub device: String,
     /// Its driver.
     pub driver: String,
+}
+
+/// Converts times by pass from milliseconds to seconds.
+pub fn seconds_of(ms: &BTreeMap<String, f64>) -> BTreeMap<String, f64> {
+    ms.iter().map(|(pass, ms)| (pass.clone(), ms * 1e-3)).collect()
 }
 
 impl Metadata {
@@ -216,19 +226,16 @@ impl Metadata {
         compare("sampler", self.sampler.clone(), other.sampler.clone());
         compare("shadow rays", self.shadow_rays.to_string(), other.shadow_rays.to_string());
         compare("depth", self.depth.to_string(), other.depth.to_string());
-        let names = self.sampler_parameters.keys().chain(other.sampler_parameters.keys());
-        for name in names.collect::<std::collections::BTreeSet<_>>() {
-            let value = |metadata: &Self| {
-                metadata.sampler_parameters.get(name).map_or("default".to_owned(), Clone::clone)
-            };
-            compare(&format!("sampler parameter {name}"), value(self), value(other));
-        }
-        let names = self.fit_hashes.keys().chain(other.fit_hashes.keys());
-        for name in names.collect::<std::collections::BTreeSet<_>>() {
-            let value = |metadata: &Self| {
-                metadata.fit_hashes.get(name).map_or("none".to_owned(), Clone::clone)
-            };
-            compare(&format!("fit of {name}"), value(self), value(other));
+        for (what, missing, ours, theirs) in [
+            ("sampler parameter", "default", &self.sampler_parameters, &other.sampler_parameters),
+            ("fit of", "none", &self.fit_hashes, &other.fit_hashes),
+        ] {
+            for name in ours.keys().chain(theirs.keys()).collect::<BTreeSet<_>>() {
+                let value = |values: &BTreeMap<String, String>| {
+                    values.get(name).map_or(missing.to_owned(), Clone::clone)
+                };
+                compare(&format!("{what} {name}"), value(ours), value(theirs));
+            }
         }
         found
     }

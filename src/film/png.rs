@@ -1,6 +1,6 @@
 //! PNG previews: linear picture → sRGB bytes.
 
-use std::path::Path;
+use std::{io::Write, path::Path};
 
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
@@ -25,13 +25,14 @@ pub fn display_from_linear(value: f32) -> u8 {
 /// # Errors
 /// [`crate::Error::Io`] with the cause.
 pub fn write_preview(path: &Path, picture: &RgbImage, exposure: f32) -> Result<()> {
+    write_rgb8(path, picture.width, picture.height, &preview(picture, exposure))
+}
+
+/// Display values of a preview, as [`write_preview`] writes them.
+pub fn preview(picture: &RgbImage, exposure: f32) -> Vec<[u8; 3]> {
     let scale = exposure.exp2();
-    let bytes: Vec<[u8; 3]> = picture
-        .pixels
-        .iter()
-        .map(|pixel| pixel.map(|value| display_from_linear(value * scale)))
-        .collect();
-    write_rgb8(path, picture.width, picture.height, &bytes)
+    let display = |pixel: &[f32; 3]| pixel.map(|value| display_from_linear(value * scale));
+    picture.pixels.iter().map(display).collect()
 }
 
 /// Writes display values unchanged.
@@ -43,12 +44,20 @@ pub fn write_preview(path: &Path, picture: &RgbImage, exposure: f32) -> Result<(
 /// `pixels` is not `width * height` long.
 pub fn write_rgb8(path: &Path, width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<()> {
     assert_eq!(pixels.len(), width as usize * height as usize, "one value per pixel");
-    write_atomically(path, |file| {
-        PngEncoder::new(file)
-            .write_image(pixels.as_flattened(), width, height, ExtendedColorType::Rgb8)
-            .map_err(|error| match error {
-                image::ImageError::IoError(source) => source,
-                other => std::io::Error::other(other.to_string()),
-            })
-    })
+    write_atomically(path, |file| encode_rgb8(file, width, height, pixels))
+}
+
+/// Encodes display values as PNG.
+pub fn encode_rgb8(
+    writer: impl Write,
+    width: u32,
+    height: u32,
+    pixels: &[[u8; 3]],
+) -> std::io::Result<()> {
+    PngEncoder::new(writer)
+        .write_image(pixels.as_flattened(), width, height, ExtendedColorType::Rgb8)
+        .map_err(|error| match error {
+            image::ImageError::IoError(source) => source,
+            other => std::io::Error::other(other.to_string()),
+        })
 }

@@ -18,7 +18,7 @@ use super::{
     fitted::{BrdfFit, BrdfSummary, BrdfView, Fit, view_theta},
     growth::grow,
     hemisphere::{HemisphereTarget, sample_hemisphere},
-    judge::judge_hemisphere,
+    judge::{FitErrors, judge_hemisphere},
     options::{Method, check_lobes, check_views},
     points::PointSet,
     squared_error::minimize_squared_error,
@@ -111,12 +111,8 @@ fn fit_views(
     }
     let mut fitted = chain(&points, options, progress);
     if options.method == Method::L2 {
-        let minimized: Vec<Vec<Component>> = fitted
-            .par_iter()
-            .zip(targets.par_iter().step_by(2))
-            .map(|(components, target)| minimize_view(target, components))
-            .collect();
-        fitted = minimized;
+        let views = fitted.par_iter().zip(targets.par_iter().step_by(2));
+        fitted = views.map(|(components, target)| minimize_view(target, components)).collect();
     } else {
         for (components, points) in fitted.iter_mut().zip(&points) {
             for component in components {
@@ -223,28 +219,25 @@ fn minimize_view(target: &HemisphereTarget, components: &[Component]) -> Vec<Com
 
 fn summarize(fit: &BrdfFit, targets: &[HemisphereTarget]) -> BrdfSummary {
     let limit = config::SUMMARY_ANGLE_DEG.to_radians() as f32;
-    let mut summary = BrdfSummary::default();
-    let mut count = 0.0;
-    let first = fit.views.iter().take(1);
-    for view in first.chain(fit.views.iter().skip(1).filter(|view| view.theta <= limit)) {
-        count += 1.0;
-        summary.mean.relative_l2 += view.errors.relative_l2;
-        summary.mean.chi_squared += view.errors.chi_squared;
-        summary.mean.kullback_leibler += view.errors.kullback_leibler;
-        summary.mean.energy_captured += view.errors.energy_captured;
-        summary.largest_chi_squared = summary.largest_chi_squared.max(view.errors.chi_squared);
-    }
-    summary.mean.relative_l2 /= count;
-    summary.mean.chi_squared /= count;
-    summary.mean.kullback_leibler /= count;
-    summary.mean.energy_captured /= count;
-    for (pair, target) in fit.views.windows(2).zip(targets.iter().skip(1).step_by(2)) {
+    let is_counted = |(index, view): &(usize, &BrdfView)| *index == 0 || view.theta <= limit;
+    let counted = fit.views.iter().enumerate().filter(is_counted);
+    let errors: Vec<&FitErrors> = counted.map(|(_, view)| &view.errors).collect();
+    let mean = |figure: fn(&FitErrors) -> f64| {
+        errors.iter().map(|errors| figure(errors)).sum::<f64>() / errors.len() as f64
+    };
+    let between = fit.views.windows(2).zip(targets.iter().skip(1).step_by(2));
+    let chi_squared_between = between.filter_map(|(pair, target)| {
         let theta = 0.5 * (pair[0].theta + pair[1].theta);
-        if theta <= limit {
-            let errors = judge_hemisphere(target, &fit.lobes_at(theta));
-            summary.largest_chi_squared_between =
-                summary.largest_chi_squared_between.max(errors.chi_squared);
-        }
+        (theta <= limit).then(|| judge_hemisphere(target, &fit.lobes_at(theta)).chi_squared)
+    });
+    BrdfSummary {
+        mean: FitErrors {
+            relative_l2: mean(|errors| errors.relative_l2),
+            chi_squared: mean(|errors| errors.chi_squared),
+            kullback_leibler: mean(|errors| errors.kullback_leibler),
+            energy_captured: mean(|errors| errors.energy_captured),
+        },
+        largest_chi_squared: errors.iter().map(|errors| errors.chi_squared).fold(0.0, f64::max),
+        largest_chi_squared_between: chi_squared_between.fold(0.0, f64::max),
     }
-    summary
 }

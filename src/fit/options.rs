@@ -26,25 +26,18 @@ impl std::fmt::Display for Method {
 }
 
 /// Checks that the number of lobes is within limits.
-///
-/// # Errors
-/// [`Error::Usage`] with the limits.
 pub fn check_lobes(lobes: usize) -> Result<()> {
-    if (1..=config::MAX_LOBES).contains(&lobes) {
-        return Ok(());
-    }
-    let most = config::MAX_LOBES;
-    Err(Error::usage(format!("{lobes} lobes asked for; expected 1 to {most}")))
+    check_count(lobes, "lobes", config::MAX_LOBES)
 }
 
 /// Checks that the number of view elevations is within limits.
-///
-/// # Errors
-/// [`Error::Usage`] with the limits.
 pub fn check_views(views: usize) -> Result<()> {
-    if (1..=config::MAX_VIEWS).contains(&views) {
+    check_count(views, "view elevations", config::MAX_VIEWS)
+}
+
+fn check_count(count: usize, what: &str, most: usize) -> Result<()> {
+    if (1..=most).contains(&count) {
         return Ok(());
     }
-    let most = config::MAX_VIEWS;
-    Err(Error::usage(format!("{views} view elevations asked for; expected 1 to {most}")))
+    Err(Error::usage(format!("{count} {what} asked for; expected 1 to {most}")))
 }

@@ -13,14 +13,14 @@ use super::{
 };
 use crate::error::Result;
 
-/// Description of a fit, for machines and for people.
+/// Description of a file, for machines and for people.
 #[derive(Clone, Debug)]
 pub struct Description {
     /// For machines.
     pub value: Value,
     /// For people.
     pub lines: Vec<String>,
-    /// Notes on departures from what was asked.
+    /// Warnings, among them notes on departures from what was asked.
     pub warnings: Vec<String>,
 }
 
@@ -29,11 +29,10 @@ pub struct Description {
 /// # Errors
 /// As [`read_fit`].
 pub fn describe(path: &Path) -> Result<Description> {
-    let description = match read_fit(path)? {
+    Ok(match read_fit(path)? {
         Fit::Environment(fit) => describe_environment(&fit),
         Fit::Brdf(fit) => describe_brdf(&fit),
-    };
-    Ok(description)
+    })
 }
 
 fn method(method: Method) -> &'static str {

@@ -31,23 +31,13 @@ impl Bounds {
     }
 }
 
-/// Reason why a minimization ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stop {
-    /// Ten steps lowered the value by less than the tolerance.
-    Converged,
-    /// All steps were used.
-    Steps,
-    /// No step along the direction lowers the value.
-    Stuck,
-}
-
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Lowers `function` (value and gradient) from `unknowns`, in place. Ends when ten steps gain less
-/// than `tolerance` relative to the value. Calls `progress` with the number of each finished step.
+/// than `tolerance` relative to the value, when no step along the direction lowers it, or after
+/// `steps`. Calls `progress` with the number of each finished step.
 pub fn minimize(
     function: impl Fn(&[f64]) -> (f64, Vec<f64>),
     bounds: &Bounds,
@@ -55,7 +45,7 @@ pub fn minimize(
     steps: usize,
     tolerance: f64,
     progress: &mut dyn FnMut(usize),
-) -> (f64, Stop) {
+) {
     bounds.project(unknowns);
     let (mut value, mut gradient) = function(unknowns);
     let mut memory: VecDeque<(Vec<f64>, Vec<f64>)> = VecDeque::new();
@@ -116,7 +106,7 @@ pub fn minimize(
         }
         let Some((next, next_value, next_gradient)) = accepted else {
             if memory.is_empty() {
-                return (value, Stop::Stuck);
+                return;
             }
             memory.clear();
             continue;
@@ -135,11 +125,10 @@ pub fn minimize(
         if history.len() > 10 {
             let before = history[history.len() - 11];
             if before - value <= tolerance * before.abs() {
-                return (value, Stop::Converged);
+                return;
             }
         }
     }
-    (value, Stop::Steps)
 }
 
 #[cfg(test)]

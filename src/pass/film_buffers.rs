@@ -17,18 +17,18 @@ use crate::{
     },
 };
 
-/// Pixels of a block of the film order; waves hold whole blocks.
+/// Pixels of a block in film order; waves hold whole blocks.
 pub const BLOCK_PIXELS: u32 = 64;
-/// Edge of a block of the film order, pixels.
+/// Edge of a block, pixels.
 const BLOCK_EDGE: u32 = 8;
 
-/// Position in film order of a pixel of the window; twin of `wave_pixel` in `glsl/include/wave.glsl`.
+/// Returns a pixel's position in film order; twin of `wave_pixel` in `glsl/include/wave.glsl`.
 pub fn position_in_film_order(window: Window, column: u32, row: u32) -> u32 {
     let block = row / BLOCK_EDGE * window.width.div_ceil(BLOCK_EDGE) + column / BLOCK_EDGE;
     block * BLOCK_PIXELS + row % BLOCK_EDGE * BLOCK_EDGE + column % BLOCK_EDGE
 }
 
-/// Bits `AOV_…` of the layers that passes write.
+/// Returns the bits `AOV_…` of the layers that passes write.
 pub fn aov_bits(aovs: &[Aov]) -> u32 {
     let bit = |aov: &Aov| match aov {
         Aov::Albedo => AOV_ALBEDO,
@@ -61,7 +61,7 @@ pub struct FilmBuffers {
 }
 
 impl FilmBuffers {
-    /// An empty film of the window, with the extra layers whose bits are in `aovs`.
+    /// Makes an empty film of the window, with the extra layers in the bits `aovs`.
     pub fn new(device: &Arc<Device>, window: Window, aovs: u32) -> Result<Self> {
         let pixels = u64::from(window.width) * u64::from(window.height);
         let triple = |name: &str, wanted: bool| {
@@ -113,12 +113,12 @@ impl FilmBuffers {
         })
     }
 
-    /// The film set.
+    /// Descriptor set 3.
     pub fn set(&self) -> &DescriptorSet {
         &self.set
     }
 
-    /// Pixels in film order, blocks that reach beyond the window counted whole.
+    /// Number of pixels in film order, counting whole blocks where they reach beyond the window.
     pub fn padded_pixels(&self) -> u32 {
         let blocks =
             self.window.width.div_ceil(BLOCK_EDGE) * self.window.height.div_ceil(BLOCK_EDGE);
@@ -142,7 +142,7 @@ impl FilmBuffers {
         Ok(counters.first().copied().unwrap_or_default())
     }
 
-    /// Everything but the sample count and the film's size, which the renderer knows.
+    /// Reads everything but the sample count and the film's size, which the renderer knows.
     pub fn download(&self) -> Result<Sums> {
         let pixels = self.window.width as usize * self.window.height as usize;
         let layer = |buffer: &Buffer, bit: u32| {
@@ -169,7 +169,7 @@ impl FilmBuffers {
         })
     }
 
-    /// Replaces the film's content by sums of the same window.
+    /// Replaces the content of the film by sums of the same window.
     pub fn upload(&self, sums: &Sums) -> Result<()> {
         self.sum.upload(bytemuck::cast_slice(&sums.sum))?;
         self.compensation.upload(bytemuck::cast_slice(&sums.compensation))?;

@@ -1,4 +1,4 @@
-//! The arrays of [`Accel`] on the device, and how the passes that traverse them go through rays.
+//! Geometry on the device: the arrays of [`Accel`], and how passes schedule rays through them.
 
 use std::sync::Arc;
 
@@ -16,7 +16,6 @@ use crate::{
     },
 };
 
-/// Bindings of the pages of triangles.
 const PAGES: [Binding; MAX_TRIANGLE_PAGES] =
     [scene::TRIANGLES_0, scene::TRIANGLES_1, scene::TRIANGLES_2, scene::TRIANGLES_3];
 
@@ -28,16 +27,14 @@ pub struct GeometryBuffers {
     page_shift: u32,
 }
 
-/// Bytes that one page of triangles may take on a device.
+/// Largest number of bytes in one page of triangles on a device.
 pub fn triangle_page_bytes(capabilities: &Capabilities) -> u64 {
     capabilities.max_texel_buffer_elements.saturating_mul(16)
 }
 
 impl GeometryBuffers {
-    /// Copies the arrays to the device; `accel` is not needed by the shaders afterwards.
-    ///
-    /// # Errors
-    /// Memory or a limit of the device is not enough.
+    /// Copies `accel` to the device; shaders no longer need the original. Fails if memory or a
+    /// limit does not suffice.
     pub fn new(device: &Arc<Device>, accel: &Accel) -> Result<Self> {
         let pages = accel
             .triangle_pages
@@ -55,7 +52,7 @@ impl GeometryBuffers {
         })
     }
 
-    /// Buffers with their bindings in the scene set. Pages that do not exist are bound to the first.
+    /// Returns the buffers with their bindings in the scene set. Missing pages repeat the first.
     pub fn bindings(&self) -> Vec<(Binding, &Buffer)> {
         let page = |(index, binding)| (binding, self.pages.get(index).unwrap_or(&self.pages[0]));
         let mut bindings =
@@ -64,12 +61,12 @@ impl GeometryBuffers {
         bindings
     }
 
-    /// Every buffer once, for reports of memory.
+    /// Returns every buffer once, for memory reports.
     pub fn buffers(&self) -> impl Iterator<Item = &Buffer> {
         [&self.nodes, &self.materials].into_iter().chain(&self.pages)
     }
 
-    /// Specialization of the passes that traverse this geometry.
+    /// Returns the specialization of the passes that traverse this geometry.
     pub fn traversal(&self) -> Traversal {
         Traversal { page_count: self.pages.len() as u32, page_shift: self.page_shift }
     }
@@ -78,7 +75,7 @@ impl GeometryBuffers {
 /// Specialization of the passes that traverse a geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Traversal {
-    /// Pages of triangles.
+    /// Number of triangle pages.
     pub page_count: u32,
     /// Base-2 logarithm of the triangles per page.
     pub page_shift: u32,
@@ -96,34 +93,33 @@ impl Traversal {
         Kernel { per_invocation, ..Kernel::new(shader, domain, &constants) }
     }
 
-    /// The pass that finds the closest hit of every ray: `ray_texels` → `hits`.
+    /// Finds the closest hit of every ray: `ray_texels` → `hits`.
     pub fn trace(self, schedule: Schedule) -> Kernel {
         self.kernel("trace", Domain::Paths, schedule)
     }
 
-    /// The pass that tests every shadow ray for any hit: `shadow_ray_texels`, `hit_texels` →
-    /// `visibility`. Ray `direction_index · path_count + path_index` starts at hit `path_index`.
+    /// Tests shadow rays for any hit: `shadow_ray_texels`, `hit_texels` → `visibility`. Ray
+    /// `direction_index · path_count + path_index` starts at hit `path_index`.
     pub fn shadow(self, schedule: Schedule) -> Kernel {
         self.kernel("shadow", Domain::ShadowRays, schedule)
     }
 }
 
-/// How invocations share out rays.
+/// Distribution of rays over invocations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Schedule {
-    /// Rays that one invocation traces, 1 to 32.
+    /// Rays per invocation, 1 to 32.
     pub rays_per_invocation: u32,
-    /// Lanes of a subgroup that have finished when they take their next rays.
+    /// Number of finished lanes in a subgroup at which they take their next rays.
     pub refill_lanes: u32,
 }
 
 impl Schedule {
-    /// One ray per invocation: for rays that stay together, and for GPUs, which hide waiting lanes
-    /// by other subgroups.
+    /// One ray per invocation: for coherent rays, and for GPUs, which hide waiting lanes behind
+    /// other subgroups.
     pub const SINGLE: Self = Self { rays_per_invocation: 1, refill_lanes: u32::MAX };
 
-    /// For rays that part soon. A software device gains by refilling lanes; measured in
-    /// `docs/traversal.md`.
+    /// For incoherent rays. Software devices gain by refilling lanes (`docs/traversal.md`).
     pub fn incoherent(capabilities: &Capabilities) -> Self {
         if capabilities.kind == "software" {
             Self { rays_per_invocation: 16, refill_lanes: capabilities.subgroup_size.div_ceil(3) }

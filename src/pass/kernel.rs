@@ -1,4 +1,4 @@
-//! A pass as data: which shader runs, specialized how, over what.
+//! A pass as data: shader, specialization and domain.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use crate::{
     shader::{constants::WORKGROUP_SIZE, spirv, structs::Wave},
 };
 
-/// What the invocations of a pass run over.
+/// Elements that the invocations of a pass run over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Domain {
     /// Paths of the wave.
@@ -19,26 +19,26 @@ pub enum Domain {
     ShadowRays,
 }
 
-/// A compute shader with its specialization. Its shader names the pass in debug tools and timings.
+/// A compute shader with its specialization. The shader names the pass in debug tools and timings.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Kernel {
     /// Name of the `.comp` file.
     pub shader: &'static str,
     /// Specialization constants: identifier and 32-bit value.
     pub constants: Vec<(u32, u32)>,
-    /// What the invocations run over.
+    /// Elements that the invocations run over.
     pub domain: Domain,
-    /// Elements of the domain that one invocation takes, 1 to 32.
+    /// Elements per invocation, 1 to 32.
     pub per_invocation: u32,
 }
 
 impl Kernel {
-    /// A kernel with one invocation per element of `domain`.
+    /// Makes a kernel with one invocation per element of `domain`.
     pub fn new(shader: &'static str, domain: Domain, constants: &[(u32, u32)]) -> Self {
         Self { shader, constants: constants.to_vec(), domain, per_invocation: 1 }
     }
 
-    /// Number of invocations for a wave, at least one: an empty wave still makes the driver compile.
+    /// Number of invocations for a wave; at least one, so that an empty wave makes drivers compile.
     pub fn invocations(&self, wave: &Wave) -> u32 {
         let elements = match self.domain {
             Domain::Paths => wave.pixel_count * wave.sample_count,
@@ -68,17 +68,14 @@ pub struct Pass {
 }
 
 impl Pass {
-    /// Compiles `kernel`.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if the driver refuses it.
+    /// Compiles `kernel`; [`crate::Error::Vulkan`] if the driver refuses it.
     pub fn new(device: &Arc<Device>, kernel: Kernel) -> Result<Self> {
         let spirv = spirv::pass(kernel.shader);
         let pipeline = Pipeline::new(device, kernel.shader, spirv, &kernel.constants)?;
         Ok(Self { kernel, pipeline })
     }
 
-    /// Records the pass over `wave`, with those of `sets` that its shader uses.
+    /// Records the pass over `wave`, binding those of `sets` that its shader uses.
     pub fn record(&self, commands: &mut Commands, sets: &[&DescriptorSet], wave: &Wave) {
         let invocations = self.kernel.invocations(wave);
         commands.dispatch(&self.pipeline, sets, bytemuck::bytes_of(wave), invocations);

@@ -1,7 +1,6 @@
-//! Passes of the path tracer: kernels and their order as data, the runner that records them, and the
-//! buffers that all samplers share.
+//! Passes of the path tracer: kernels, their order, the runner that records them, and shared buffers.
 //!
-//! A pass is one dispatch: its name is that of its `.comp` file, its debug label and its row in the
+//! A pass is one dispatch; the name of its `.comp` file is also its debug label and its row in the
 //! timings. [`order::wave_order`] lists the passes of a wave; a [`Technique`] adds those of a sampler.
 
 pub mod film_buffers;

@@ -1,4 +1,4 @@
-//! The order of the passes of one wave, as data.
+//! Order of the passes in one wave, as data.
 
 use super::{
     geometry::{Schedule, Traversal},
@@ -15,10 +15,10 @@ use crate::shader::{
 /// Bits of [`Wave::aovs`] that the pass `features` writes.
 const FEATURES: u32 = AOV_ALBEDO | AOV_NORMAL | AOV_POSITION;
 
-/// What shapes the passes of a render, apart from its technique.
+/// Settings of a render that shape its passes, apart from the technique.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PassSettings {
-    /// Shadow rays per hit; 0 renders the environment that the camera sees and nothing else.
+    /// Shadow rays per hit; 0 renders only the environment that the camera sees.
     pub shadow_rays: u32,
     /// Path vertices at which environment light is gathered.
     pub depth: u32,
@@ -30,7 +30,7 @@ pub struct PassSettings {
     pub material_kinds: u32,
     /// Specialization of the passes that traverse.
     pub traversal: Traversal,
-    /// How rays that part soon are shared out.
+    /// Schedule of incoherent rays.
     pub incoherent: Schedule,
 }
 
@@ -50,7 +50,7 @@ pub fn wave_order(
     for vertex in 0..vertices {
         wave.vertex = vertex;
         wave.total_shadow_rays = steps.shadow_rays_at(vertex, settings.shadow_rays);
-        // Camera rays stay together, bounce rays part at once.
+        // Camera rays stay coherent, bounce rays do not.
         let schedule = if vertex == 0 { Schedule::SINGLE } else { incoherent };
         add(traversal.trace(schedule), &wave);
 

@@ -22,8 +22,8 @@ use crate::{
     shader::structs::Wave,
 };
 
-/// Dispatches are steered between these, milliseconds: short enough for the watchdog of a desktop
-/// GPU, long enough for the submission not to count.
+/// Target range of a dispatch, milliseconds: safe from a desktop GPU's watchdog, yet long against
+/// the cost of a submission.
 const SHORT_DISPATCH_MS: f64 = 50.0;
 const LONG_DISPATCH_MS: f64 = 100.0;
 
@@ -35,19 +35,16 @@ pub struct Runner {
     film: FilmBuffers,
     settings: PassSettings,
     passes: BTreeMap<Kernel, Pass>,
-    /// Shadow rays per hit that the buffers have room for.
+    /// Shadow rays per hit that fit the buffers.
     most_shadow_rays: u32,
-    /// Paths of the next wave.
     wave_paths: u32,
     totals: Totals,
     compile_ms: PassTimes,
 }
 
 impl Runner {
-    /// Makes room for the film of `scene` and for waves over it.
-    ///
-    /// # Errors
-    /// A limit of the device or a failing device.
+    /// Allocates the film of `scene` and waves over it. Fails if the device does or its limits are
+    /// exceeded.
     pub fn new(
         device: &Arc<Device>,
         scene: Arc<SceneBuffers>,
@@ -71,11 +68,8 @@ impl Runner {
         })
     }
 
-    /// Compiles every pass that `technique` may use and runs it once over nothing, which makes drivers
-    /// that compile late compile now.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if a call fails.
+    /// Compiles every pass that `technique` may use and runs it once over nothing, so that drivers
+    /// that compile lazily compile now. Fails if the device does.
     pub fn warm_up(&mut self, technique: &dyn Passes) -> Result<()> {
         let others = technique.other_steps();
         let all = [technique.steps()].into_iter().chain(others.iter().map(Box::as_ref));
@@ -103,10 +97,7 @@ impl Runner {
         Ok(())
     }
 
-    /// Runs waves like `wave` until `pixels` are done, the first of them at the first pixel of `wave`.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if the device fails.
+    /// Runs waves like `wave` over `pixels` pixels, starting at its first. Fails if the device does.
     pub fn sweep(&mut self, technique: &dyn Passes, wave: Wave, pixels: u32) -> Result<()> {
         let mut done = 0;
         while done < pixels {
@@ -124,10 +115,7 @@ impl Runner {
         Ok(())
     }
 
-    /// Runs one wave for the first `vertices` vertices of its paths. Returns device milliseconds by pass.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if the device fails.
+    /// Runs one wave for `vertices` vertices; returns device ms by pass. Fails if the device does.
     pub fn run(&mut self, technique: &dyn Passes, wave: Wave, vertices: u32) -> Result<PassTimes> {
         let order = wave_order(&self.settings, technique.steps(), wave, vertices);
         let mut commands = Commands::begin_timed(&self.device, order.len() as u32)?;
@@ -149,8 +137,8 @@ impl Runner {
         Ok(times)
     }
 
-    /// Sizes the next wave so that its longest pass stays between the two bounds. Times are per
-    /// pass name, summed over the vertices and groups of the wave, so this errs on the short side.
+    /// Sizes the next wave so that its longest pass stays within the target range. Times are sums
+    /// by pass name over the vertices and groups of the wave, so this errs on the short side.
     fn steer(&mut self, times: &PassTimes, wave: Wave) {
         let longest = times.values().copied().fold(0.0, f64::max);
         let paths = wave.pixel_count * wave.sample_count;
@@ -162,21 +150,18 @@ impl Runner {
         }
     }
 
-    /// Samples of all pixels that fit into the next wave.
+    /// Number of samples of all pixels that fit into the next wave.
     pub fn samples_per_wave(&self) -> u32 {
         self.wave_paths / self.film.padded_pixels()
     }
 
-    /// Traces fewer shadow rays per hit from now on.
-    ///
-    /// # Panics
-    /// If there are more than the buffers were made for.
+    /// Sets the number of shadow rays per hit. Panics if there are more than the buffers can hold.
     pub fn limit_shadow_rays(&mut self, shadow_rays: u32) {
         assert!(shadow_rays <= self.most_shadow_rays, "buffers have room for {shadow_rays}");
         self.settings.shadow_rays = shadow_rays;
     }
 
-    /// Shadow rays per hit in the last group at the first vertex, the one that the wave buffers hold.
+    /// Shadow rays per hit in the last group at the first vertex, the one left in the wave buffers.
     pub fn last_group_rays(&self, steps: &dyn Steps) -> u32 {
         match self.settings.shadow_rays {
             0 => 0,
@@ -184,29 +169,20 @@ impl Runner {
         }
     }
 
-    /// Adds what the device counted to the totals.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if the device fails.
+    /// Adds the device's counts to the totals. Fails if the device does.
     pub fn take_counters(&mut self) -> Result<()> {
         self.totals.add(&self.film.take_counters()?);
         Ok(())
     }
 
-    /// Empties the film and the totals.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if the device fails.
+    /// Empties the film and the totals. Fails if the device does.
     pub fn restart(&mut self) -> Result<()> {
         self.film.clear(&self.device)?;
         self.totals = Totals::default();
         Ok(())
     }
 
-    /// Reads the film; its size and sample count are the renderer's to state.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if the device fails.
+    /// Reads the film without its size and sample count. Fails if the device does.
     pub fn sums(&self) -> Result<Sums> {
         self.film.download()
     }
@@ -255,7 +231,6 @@ impl Runner {
     }
 }
 
-/// All descriptor sets of a render.
 fn sets<'a>(
     scene: &'a SceneBuffers,
     technique: &'a dyn Passes,

@@ -1,4 +1,4 @@
-//! What is constant during a render, on the device.
+//! Data on the device that stays constant during a render.
 
 use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
@@ -29,12 +29,10 @@ pub struct SceneBuffers {
 }
 
 impl SceneBuffers {
-    /// Builds the acceleration structure and the tables, and uploads everything.
-    ///
-    /// # Errors
-    /// A limit of the device, a scene that cannot be traced, or a failing device.
+    /// Builds acceleration structure and tables, and uploads everything. Fails if a limit of the
+    /// device is exceeded, the scene cannot be traced, or the device fails.
     pub fn new(device: &Arc<Device>, scene: &Scene, window: Window) -> Result<Self> {
-        // Each stage frees its host copy before the next one starts: large scenes need the memory.
+        // Free the host copy of each stage before the next one: large scenes need the memory.
         let start = Instant::now();
         let accel = Accel::build(&scene.geometry, triangle_page_bytes(device.capabilities()))?;
         let bvh_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -47,9 +45,6 @@ impl SceneBuffers {
     }
 
     /// As [`SceneBuffers::new`], with an acceleration structure that the caller keeps.
-    ///
-    /// # Errors
-    /// A limit of the device or a failing device.
     pub fn from_accel(
         device: &Arc<Device>,
         scene: &Scene,
@@ -113,7 +108,7 @@ impl SceneBuffers {
         Ok(Self { set, geometry, buffers, material_kinds, window, host_ms })
     }
 
-    /// The scene set.
+    /// Descriptor set 0.
     pub fn set(&self) -> &DescriptorSet {
         &self.set
     }
@@ -128,7 +123,7 @@ impl SceneBuffers {
         self.material_kinds
     }
 
-    /// The part of the film that the parameters describe.
+    /// Part of the film that the parameters describe.
     pub fn window(&self) -> Window {
         self.window
     }
@@ -148,7 +143,6 @@ impl SceneBuffers {
     }
 }
 
-/// The camera's frame and everything else the passes look up by name.
 fn parameters(
     scene: &Scene,
     map: &EnvironmentMap,

@@ -5,7 +5,7 @@ use std::{any::Any, collections::BTreeMap};
 use super::{runner::Runner, steps::Passes};
 use crate::{error::Result, film::statistics::CandidateCost, shader::structs::Wave};
 
-/// How far a progressive render has come.
+/// Progress of a progressive render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     /// Index of the first sample of every pixel.
@@ -32,9 +32,9 @@ pub struct Report {
     pub buffer_bytes: BTreeMap<String, u64>,
     /// Hash of each fit by what was fitted.
     pub fit_hashes: BTreeMap<String, String>,
-    /// Candidates that each shadow ray is chosen from, where that is a choice.
+    /// Candidates per shadow ray, for techniques that choose their number.
     pub candidates: Option<u32>,
-    /// Measurements that led to this choice.
+    /// Measurements behind this choice.
     pub candidate_costs: Vec<CandidateCost>,
 }
 
@@ -45,32 +45,23 @@ pub trait Technique: Passes + Any {
         wave
     }
 
-    /// Learns before the next sample what is due. Returns how many samples may follow until there is
-    /// more to learn, which depends on their number alone and not on how they are grouped.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if the device fails.
+    /// Learns what is due before the next sample. Returns how many samples may follow before it has to
+    /// learn again, which depends on their number, not on their grouping. Fails if the device does.
     fn learn(&mut self, _runner: &mut Runner, _progress: &Progress) -> Result<u32> {
         Ok(u32::MAX)
     }
 
-    /// Forgets everything learned.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if the device fails.
+    /// Forgets everything learned. Fails if the device does.
     fn restart(&mut self, _runner: &mut Runner) -> Result<()> {
         Ok(())
     }
 
-    /// Refuses to continue a film of `samples` samples per pixel, if sums alone do not allow it.
-    ///
-    /// # Errors
-    /// [`crate::Error::Usage`].
+    /// Returns [`crate::Error::Usage`] if sums alone cannot continue a film of so many `samples`.
     fn check_resume(&self, _samples: u32, _progress: &Progress) -> Result<()> {
         Ok(())
     }
 
-    /// Figures for statistics and metadata.
+    /// Returns figures for statistics and metadata.
     fn report(&self) -> Report {
         Report::default()
     }

@@ -1,4 +1,4 @@
-//! What a renderer has done so far: counts of the device, summed over its waves.
+//! Totals of a renderer: counts of the device, summed over its waves.
 
 use std::collections::BTreeMap;
 
@@ -17,24 +17,24 @@ pub struct Totals {
     pub shadow_rays_visible: u64,
     /// Samples left out because their radiance was not finite.
     pub dropped_samples: u64,
-    /// Rays given up after too many steps of traversal.
+    /// Rays abandoned after too many traversal steps.
     pub traversal_overruns: u64,
-    /// Hits with lobes of a product.
+    /// Hits with product lobes.
     pub product_hits: u64,
     /// Lobes kept at these hits.
     pub lobes_kept: u64,
-    /// Share of the product's energy that was kept, summed over these hits, in 256ths.
+    /// Share of the product's energy kept, summed over these hits, in 256ths.
     pub energy_kept: u64,
     /// Directions recorded in visibility caches.
     pub cache_entries: u64,
-    /// Times that the weights of a hit's lobes were added up anew, since the cache had grown.
+    /// Times that the weights of a hit's lobes were summed again because its cache had grown.
     pub cdf_rebuilds: u64,
     /// Device milliseconds by pass.
     pub gpu_ms: PassTimes,
 }
 
 impl Totals {
-    /// Adds what the device counted.
+    /// Adds the counts of the device.
     pub fn add(&mut self, counters: &Counters) {
         self.camera_rays += u64::from(counters.camera_rays);
         self.bounce_rays += u64::from(counters.bounce_rays);
@@ -49,7 +49,7 @@ impl Totals {
         self.cdf_rebuilds += u64::from(counters.cdf_rebuilds);
     }
 
-    /// Means per hit that tell what the sampler did, by name; empty for samplers without lobes.
+    /// Returns sampler statistics as means per hit, by name; empty for samplers without lobes.
     pub fn sampler_statistics(&self) -> BTreeMap<String, f64> {
         if self.product_hits == 0 {
             return BTreeMap::new();

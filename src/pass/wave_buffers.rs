@@ -17,7 +17,7 @@ use crate::{
 const SOFTWARE_PATHS: u32 = 1 << 17;
 /// Most paths in flight on a GPU.
 const GPU_PATHS: u32 = 1 << 21;
-/// Paths of the very first wave, before any timing is known.
+/// Paths of the first wave, before any timing is known.
 const FIRST_PATHS: u32 = 1 << 14;
 
 /// Rays, hits, shadow rays and path states of one wave.
@@ -32,11 +32,8 @@ pub struct WaveBuffers {
 }
 
 impl WaveBuffers {
-    /// Makes room for waves of a film of `padded_pixels` with up to `shadow_rays` rays per hit at a
-    /// time, and no more paths than the buffers of a technique allow.
-    ///
-    /// # Errors
-    /// A limit of the device or a failing device.
+    /// Allocates waves over a film of `padded_pixels` with up to `shadow_rays` rays per hit at a time,
+    /// and no more paths than `demand` allows. Fails if the device does or its limits are exceeded.
     pub fn new(
         device: &Arc<Device>,
         padded_pixels: u32,
@@ -54,7 +51,7 @@ impl WaveBuffers {
             / u64::from(shadow_rays);
         let by_memory = capabilities.device_memory / 8 / (widest * 3);
         let limit = by_binding.min(by_texels).min(by_groups).min(by_memory).min(u64::from(most));
-        // A small film needs no more than a handful of its samples in flight.
+        // A small film needs only a handful of samples in flight.
         let useful = u64::from(padded_pixels) * 64;
         let capacity = u32::try_from(limit.min(useful)).unwrap_or(most).max(WORKGROUP_SIZE)
             / WORKGROUP_SIZE
@@ -82,17 +79,17 @@ impl WaveBuffers {
         Ok(Self { set, capacity, rays, hits, shadow_rays, visibility, paths })
     }
 
-    /// The wave set.
+    /// Descriptor set 2.
     pub fn set(&self) -> &DescriptorSet {
         &self.set
     }
 
-    /// Most paths of a wave.
+    /// Largest number of paths in a wave.
     pub fn capacity(&self) -> u32 {
         self.capacity
     }
 
-    /// Paths of the first wave.
+    /// Number of paths in the first wave.
     pub fn first_wave_paths(&self) -> u32 {
         FIRST_PATHS.min(self.capacity)
     }
@@ -112,7 +109,7 @@ impl WaveBuffers {
         &self.shadow_rays
     }
 
-    /// Words in the order of the shadow rays: one where a ray reaches the environment, else zero.
+    /// One word per shadow ray, in their order: 1 if it reaches the environment, else 0.
     pub fn visibility(&self) -> &Buffer {
         &self.visibility
     }

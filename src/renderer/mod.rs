@@ -1,4 +1,4 @@
-//! Progressive rendering of a scene on a device: a runner, a technique, and how far they have come.
+//! Progressive rendering of a scene on a device.
 
 mod pixel;
 mod resume;
@@ -32,10 +32,8 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// Uploads `scene` and prepares to render it.
-    ///
-    /// # Errors
-    /// A limit of the device, memory, or options out of range.
+    /// Uploads `scene` and prepares to render it. Fails for options out of range, and for too
+    /// little memory or exceeded limits of the device.
     pub fn new(device: &Arc<Device>, scene: &Scene, settings: Settings) -> Result<Self> {
         let window = window_of(&settings, scene);
         settings.check([scene.film.width, scene.film.height])?;
@@ -43,10 +41,7 @@ impl Renderer {
         Self::with_scene_buffers(device, buffers, scene, settings)
     }
 
-    /// As [`Renderer::new`], sharing buffers that were made from the same scene and window.
-    ///
-    /// # Errors
-    /// As [`Renderer::new`].
+    /// As [`Renderer::new`], sharing buffers of the same scene and window.
     ///
     /// # Panics
     /// If the buffers were made for another window.
@@ -85,10 +80,7 @@ impl Renderer {
         }
     }
 
-    /// Adds `samples` samples to every pixel.
-    ///
-    /// # Errors
-    /// [`Error::Vulkan`] if the device fails.
+    /// Adds `samples` samples to every pixel. Fails if the device does.
     pub fn render_pass(&mut self, samples: u32) -> Result<()> {
         let mut left = samples;
         while left > 0 {
@@ -112,11 +104,8 @@ impl Renderer {
         Ok(())
     }
 
-    /// Empties the film to render the same settings with another seed, from nothing: a technique
-    /// forgets what it learned, since every run has to pay for it.
-    ///
-    /// # Errors
-    /// [`Error::Vulkan`] if the device fails.
+    /// Empties the film to render with another seed. The technique forgets what it learned: every
+    /// run pays for its own learning. Fails if the device does.
     pub fn restart(&mut self, seed: u32) -> Result<()> {
         self.runner.restart()?;
         self.technique.restart(&mut self.runner)?;
@@ -125,11 +114,11 @@ impl Renderer {
         Ok(())
     }
 
-    /// Continues from sums that an earlier renderer with the same settings left.
+    /// Continues from the sums of an earlier renderer with the same settings.
     ///
     /// # Errors
-    /// [`Error::Usage`] if the window or the layers differ, or if sums do not hold everything that the
-    /// next sample depends on; [`Error::Vulkan`] if the device fails.
+    /// [`Error::Usage`] if window or layers differ, or if the next sample depends on more than the
+    /// sums; [`Error::Vulkan`] if the device fails.
     pub fn restore(&mut self, sums: &Sums) -> Result<()> {
         self.technique.check_resume(sums.sample_count, &self.progress())?;
         let window = self.runner.scene().window();
@@ -155,12 +144,12 @@ impl Renderer {
         Ok(())
     }
 
-    /// The technique, if it is a `T`.
+    /// Returns the technique if it is a `T`.
     pub fn technique<T: Technique>(&self) -> Option<&T> {
         (self.technique.as_ref() as &dyn Any).downcast_ref()
     }
 
-    /// Calls `work` with the technique, if it is a `T`, the runner and the progress.
+    /// Calls `work` with technique, runner and progress if the technique is a `T`.
     fn with_technique<T: Technique, R>(
         &mut self,
         work: impl FnOnce(&mut T, &mut Runner, &Progress) -> R,
@@ -190,7 +179,7 @@ impl Renderer {
         self.technique.report()
     }
 
-    /// Host milliseconds by stage of the preparation and of the technique.
+    /// Host milliseconds by stage, including those of the technique.
     pub fn host_ms(&self) -> BTreeMap<String, f64> {
         let mut host_ms = self.runner.scene().host_ms().clone();
         host_ms.extend(self.report().host_ms);
@@ -204,10 +193,7 @@ impl Renderer {
         bytes
     }
 
-    /// Reads the film.
-    ///
-    /// # Errors
-    /// [`Error::Vulkan`] if the device fails.
+    /// Reads the film. Fails if the device does.
     pub fn sums(&self) -> Result<Sums> {
         let sums = self.runner.sums()?;
         Ok(Sums { film_size: self.film_size, sample_count: self.sample_count, ..sums })

@@ -1,8 +1,8 @@
-//! Everything that happened at the first hit of one pixel, read back from the device.
+//! Records everything that happens at the first hit of one pixel, read back from the device.
 //!
-//! Buffers of a wave hold the last group of shadow rays only, and lobe weights as they were at the
-//! end. So the pixel is rendered with one ray, then with two, and so on: the random numbers of a ray
-//! do not depend on how many follow it, so each round repeats the one before and adds a ray.
+//! Wave buffers hold only the last group of shadow rays and the final lobe weights. The pixel is
+//! therefore rendered with one ray, then two, and so on: the random numbers of a ray do not depend
+//! on how many follow, so each round repeats the one before and adds a ray.
 
 use bytemuck::Pod;
 use glam::Vec3;
@@ -27,28 +27,27 @@ use crate::{
     },
 };
 
-/// The first hit of a pixel's first sample with all its shadow rays.
+/// First hit of a pixel's first sample, with all its shadow rays.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedPixel {
-    /// Position of the hit, metres.
+    /// Position, metres.
     pub position: Vec3,
     /// Unit shading normal.
     pub normal: Vec3,
-    /// Shadow rays in the order they were traced.
+    /// Shadow rays in the order of tracing.
     pub rays: Vec<RecordedRay>,
-    /// Lobes of the product; empty for samplers without.
+    /// Lobes of the product; empty for samplers without lobes.
     pub lobes: Vec<RecordedLobe>,
-    /// Unit directions in the visibility cache when the last ray was drawn, the oldest first; `None`
-    /// for samplers without.
+    /// Unit directions in the cache when the last ray was drawn, oldest first; `None` without a cache.
     pub cached: Option<Vec<Vec3>>,
 }
 
 impl Renderer {
-    /// Renders one sample of a renderer's only pixel and reads back what happened; `None` where the
-    /// camera ray left the scene. The film is emptied.
+    /// Renders one sample of a renderer's only pixel and reads it back; `None` if the camera ray
+    /// leaves the scene. Empties the film.
     ///
     /// # Errors
-    /// [`Error::Usage`] for the sampler `guided`, whose choices rest on the whole picture: see
+    /// [`Error::Usage`] for `guided`, whose choices depend on the whole picture: see
     /// [`Renderer::record_guided_pixel`]; [`Error::Vulkan`] if the device fails.
     ///
     /// # Panics
@@ -108,15 +107,12 @@ impl Renderer {
 }
 
 impl Renderer {
-    /// Traces `rays` shadow rays of the pixel at `x`, `y` of the film with what `guided` has learned, in
-    /// whole samples that follow those in the film; `None` where no camera ray hit anything, or for
-    /// other samplers. The renderer had better not go on.
-    ///
-    /// # Errors
-    /// [`Error::Vulkan`] if the device fails.
+    /// Traces `rays` shadow rays of film pixel `at` with what `guided` has learned, in whole
+    /// samples after those in the film; `None` if no camera ray hits anything, or for other
+    /// samplers. The renderer should not continue afterwards. Fails if the device does.
     ///
     /// # Panics
-    /// If the pixel is not in the window.
+    /// If the pixel is outside the window.
     pub fn record_guided_pixel(
         &mut self,
         at: [u32; 2],
@@ -129,7 +125,6 @@ impl Renderer {
     }
 }
 
-/// Element `index` of a buffer.
 fn element<T: Pod>(buffer: &Buffer, index: usize) -> Result<T> {
     let values: Vec<T> = buffer.download(index + 1)?;
     Ok(values[index])

@@ -1,4 +1,4 @@
-//! Goes on from what a technique learned in an earlier render.
+//! Resumes from what a technique learned in an earlier render.
 
 use super::Renderer;
 use crate::{
@@ -7,21 +7,18 @@ use crate::{
 };
 
 impl Renderer {
-    /// What the sampler `guided` has learned; `None` for the others.
-    ///
-    /// # Errors
-    /// [`Error::Vulkan`] if the device fails.
+    /// Returns what `guided` has learned, or `None` for other samplers. Fails if the device does.
     pub fn guide_state(&self) -> Result<Option<GuideState>> {
         self.technique::<Guided>().map(|guided| guided.state(self.sample_count)).transpose()
     }
 
-    /// Goes on from what an earlier renderer learned, without training. With as many samples in the
-    /// film as the state was taken at, this continues that renderer to the bit. Returns true if the
-    /// geometry is another, so that most was forgotten.
+    /// Continues from what an earlier renderer learned, without training: bit for bit, if the film
+    /// holds as many samples as it did when the state was taken. Returns true if the geometry
+    /// differs, so that most was forgotten.
     ///
     /// # Errors
-    /// [`Error::Usage`] if the environment or the regions differ, or if this sampler learns nothing;
-    /// [`Error::Vulkan`] if the device fails.
+    /// [`Error::Usage`] if the environment or the regions differ, or if this sampler learns
+    /// nothing; [`Error::Vulkan`] if the device fails.
     pub fn restore_guide(&mut self, state: &GuideState) -> Result<bool> {
         let restore = |guided: &mut Guided, runner: &mut _, progress: &_| {
             guided.restore(runner, progress, state)

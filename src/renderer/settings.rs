@@ -1,4 +1,4 @@
-//! What a render does with a scene, and what of it cannot be done.
+//! Settings of a render, and checks that they can be rendered.
 
 use crate::film::Window;
 use crate::{
@@ -8,10 +8,10 @@ use crate::{
     scene::Scene,
 };
 
-/// What a render does with a scene.
+/// Settings of a render, apart from its scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// How directions are chosen.
+    /// Sampler that chooses directions.
     pub sampler: Sampler,
     /// Parameters of the sampler.
     pub parameters: Parameters,
@@ -27,7 +27,7 @@ pub struct Settings {
     pub window: Option<Window>,
     /// Extra layers.
     pub aovs: Vec<Aov>,
-    /// First vertex at which russian roulette may end a path, where `depth` reaches it.
+    /// First vertex at which russian roulette may end a path, if `depth` reaches it.
     pub roulette_vertex: u32,
 }
 
@@ -47,7 +47,7 @@ impl Default for Settings {
     }
 }
 
-/// The window of `settings`, or the whole film.
+/// Returns the window of `settings`, or the whole film.
 pub fn window_of(settings: &Settings, scene: &Scene) -> Window {
     settings.window.unwrap_or(Window {
         x: 0,
@@ -58,10 +58,7 @@ pub fn window_of(settings: &Settings, scene: &Scene) -> Window {
 }
 
 impl Settings {
-    /// Refuses settings that cannot be rendered, before anything is allocated.
-    ///
-    /// # Errors
-    /// [`Error::Usage`].
+    /// Returns [`Error::Usage`] for settings that cannot be rendered, before anything is allocated.
     pub fn check(&self, film_size: [u32; 2]) -> Result<()> {
         let end = |start: u32, length: u32| u64::from(start) + u64::from(length);
         if let Some(window) = self.window

@@ -1,4 +1,4 @@
-//! Samplers that learn nothing and need no tables: the pass `sample` with a tag.
+//! Samplers without learning or tables: the pass `sample` with a tag.
 
 use std::collections::BTreeMap;
 
@@ -29,14 +29,13 @@ pub const COSINE: Basic = Basic { tag: SAMPLER_COSINE };
 pub const BRDF: Basic = Basic { tag: SAMPLER_BRDF };
 /// Proportional to the luminance of the environment map.
 pub const ENV: Basic = Basic { tag: SAMPLER_ENV };
-/// `brdf` and `env` by turns with the one-sample balance heuristic.
+/// `brdf` and `env` in turns with the one-sample balance heuristic.
 pub const MIS: Basic = Basic { tag: SAMPLER_MIS };
 /// Resampling over candidates of `mis`.
 pub const RIS: Basic = Basic { tag: SAMPLER_RIS };
 
-/// Numbers of candidates that `ris` can take, half from the BRDF and half from the environment.
+/// Numbers of candidates that `ris` supports, half from the BRDF and half from the environment.
 const RIS_CANDIDATES: [u32; 4] = [2, 4, 6, 8];
-/// Number of candidates under `auto`.
 const AUTO_RIS_CANDIDATES: u32 = 4;
 
 impl Basic {
@@ -48,10 +47,7 @@ impl Basic {
         }
     }
 
-    /// The steps of the sampler in a scene with these kinds of material.
-    ///
-    /// # Errors
-    /// [`crate::Error::Usage`] for a number of candidates that it cannot take.
+    /// Returns the passes, or [`crate::Error::Usage`] for an unsupported number of candidates.
     pub fn steps(self, parameters: &Parameters, material_kinds: u32) -> Result<BasicSteps> {
         Ok(BasicSteps { tag: self.tag, candidates: self.candidates(parameters)?, material_kinds })
     }

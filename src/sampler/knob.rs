@@ -1,4 +1,4 @@
-//! Parameters that `--set key=value` reaches: one row of a table for each.
+//! Parameters that `--set key=value` reaches, one table row each.
 
 use std::{collections::BTreeMap, fmt::Display, ops::RangeInclusive, str::FromStr};
 
@@ -8,16 +8,13 @@ use crate::error::{Error, Result};
 pub struct Knob<P> {
     /// Key of `--set`, also in metadata and statistics.
     pub key: &'static str,
-    /// Takes a value, or fails with what it expects.
+    /// Sets the value, or fails with a description of the expected one.
     pub set: fn(&mut P, &str) -> Result<(), String>,
-    /// The value as text.
+    /// Returns the value as text.
     pub get: fn(&P) -> String,
 }
 
-/// Sets the parameter `key`; returns false if the table has none.
-///
-/// # Errors
-/// [`Error::Usage`] for a value out of range.
+/// Sets a parameter; returns false for an unknown key, [`Error::Usage`] for a value out of range.
 pub fn set<P>(knobs: &[Knob<P>], parameters: &mut P, key: &str, value: &str) -> Result<bool> {
     let Some(knob) = knobs.iter().find(|knob| knob.key == key) else { return Ok(false) };
     (knob.set)(parameters, value)
@@ -25,12 +22,12 @@ pub fn set<P>(knobs: &[Knob<P>], parameters: &mut P, key: &str, value: &str) -> 
     Ok(true)
 }
 
-/// The parameters of a table by key.
+/// Returns the parameters of a table by key.
 pub fn describe<P>(knobs: &[Knob<P>], parameters: &P) -> BTreeMap<String, String> {
     knobs.iter().map(|knob| (knob.key.to_owned(), (knob.get)(parameters))).collect()
 }
 
-/// Takes a number of a range.
+/// Parses a number within a range.
 pub fn number<T: FromStr + PartialOrd + Display>(
     target: &mut T,
     value: &str,
@@ -41,7 +38,7 @@ pub fn number<T: FromStr + PartialOrd + Display>(
     Ok(())
 }
 
-/// Takes `auto` as none, or a number of a range.
+/// Parses `auto` as `None`, or a number within a range.
 pub fn number_or_auto(
     target: &mut Option<u32>,
     value: &str,
@@ -57,12 +54,12 @@ pub fn number_or_auto(
     Ok(())
 }
 
-/// `auto` for none, else the number.
+/// Returns `auto` for `None`, else the number.
 pub fn text_or_auto(value: Option<u32>) -> String {
     value.map_or("auto".to_owned(), |number| number.to_string())
 }
 
-/// Takes one of the named values.
+/// Parses one of the named values.
 pub fn choice<T: Copy>(target: &mut T, value: &str, names: &[(&str, T)]) -> Result<(), String> {
     let found = names.iter().find(|(name, _)| *name == value);
     let known = || names.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(" or ");
@@ -70,7 +67,7 @@ pub fn choice<T: Copy>(target: &mut T, value: &str, names: &[(&str, T)]) -> Resu
     Ok(())
 }
 
-/// The name of a value.
+/// Returns the name of a value.
 pub fn name_of<T: PartialEq>(value: &T, names: &[(&str, T)]) -> String {
     let found = names.iter().find(|(_, choice)| choice == value);
     found.map_or_else(String::new, |(name, _)| (*name).to_owned())

@@ -1,6 +1,6 @@
 //! The samplers: one room for each technique, and the register of their names.
 //!
-//! A room has parameters, tables, buffers, passes, learning and figures of one technique. Adding a
+//! A room holds parameters, tables, buffers, passes, learning and figures of one technique. A new
 //! sampler takes a room and a line in [`Sampler`].
 
 pub mod basic;
@@ -22,7 +22,7 @@ use crate::{
     scene::Scene,
 };
 
-/// What a technique is made from.
+/// Input for creating a technique.
 pub struct Context<'a> {
     /// The scene.
     pub scene: &'a Scene,
@@ -32,48 +32,42 @@ pub struct Context<'a> {
     pub runner: &'a Runner,
 }
 
-/// The door to a sampler's code.
+/// Entry point to the code of a sampler.
 pub trait Room: Sync {
-    /// Refuses parameters that cannot be rendered, before anything is allocated.
-    ///
-    /// # Errors
-    /// [`Error::Usage`].
+    /// Returns [`Error::Usage`] for parameters that cannot be rendered, before anything is allocated.
     fn check(&self, _parameters: &Parameters, _depth: u32) -> Result<()> {
         Ok(())
     }
 
-    /// The sampler itself, if it is one of [`basic`].
+    /// Returns the sampler itself if it is one of [`basic`].
     fn basic(&self) -> Option<basic::Basic> {
         None
     }
 
-    /// Layers of the film that no other sampler has.
+    /// Film layers that no other sampler has.
     fn aovs(&self) -> &[Aov] {
         &[]
     }
 
-    /// The parameters that matter to the sampler, by key, for metadata and statistics.
+    /// Returns the parameters relevant to the sampler by key, for metadata and statistics.
     fn describe(&self, _parameters: &Parameters) -> BTreeMap<String, String> {
         BTreeMap::new()
     }
 
-    /// Memory that it takes for every path in flight.
+    /// Memory per path in flight.
     fn demand(&self, _parameters: &Parameters, _shadow_rays: u32) -> PathDemand {
         PathDemand::default()
     }
 
-    /// Makes tables, buffers and passes for one render.
-    ///
-    /// # Errors
-    /// A limit of the device or a failing device.
+    /// Creates tables, buffers and passes for one render. Fails if the device does or its limits
+    /// are exceeded.
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>>;
 }
 
-/// Declares the samplers with their names and rooms.
 macro_rules! samplers {
     ($($(#[$doc:meta])* $sampler:ident $name:literal: $room:expr;)*) => {
-        /// How directions are chosen at a hit. All trace one shadow ray per direction, and all are
-        /// unbiased but for [`Elevation::Metropolis`](product::Elevation::Metropolis).
+        /// Samplers of directions at a hit. All trace one shadow ray per direction, and all are
+        /// unbiased except with [`Elevation::Metropolis`](product::Elevation::Metropolis).
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum)]
         pub enum Sampler {
             $($(#[$doc])* #[value(name = $name)] $sampler,)*
@@ -108,25 +102,20 @@ samplers! {
     Brdf "brdf": basic::BRDF;
     /// Proportional to the luminance of the environment map.
     Env "env": basic::ENV;
-    /// `brdf` and `env` by turns with the one-sample balance heuristic (Veach & Guibas 1995).
+    /// `brdf` and `env` in turns with the one-sample balance heuristic (Veach & Guibas 1995).
     Mis "mis": basic::MIS;
-    /// Resampled importance sampling over candidates of `mis` (Burke et al. 2005; Talbot et al.
-    /// 2005).
+    /// Resampled importance sampling over candidates of `mis` (Burke et al. 2005; Talbot et al. 2005).
     Ris "ris": basic::RIS;
     /// Lobes of the product of environment and BRDF (Tsai et al. 2008).
     Product "product": product::ProductRoom;
-    /// `product`, with less weight on lobes near directions that turned out blocked (Wu & Shih 2009).
+    /// `product`, with less weight on lobes near blocked directions (Wu & Shih 2009).
     Visibility "visibility": visibility::VisibilityRoom;
-    /// Regions of the environment by visibility that was learned in cells of the scene, across
-    /// pixels and passes.
+    /// Regions of the environment by visibility learned in cells of the scene, across pixels and passes.
     Guided "guided": guided::GuidedRoom;
 }
 
 impl Sampler {
-    /// Refuses parameters and layers that cannot be rendered, before anything is allocated.
-    ///
-    /// # Errors
-    /// [`Error::Usage`].
+    /// Returns [`Error::Usage`] for parameters and layers that cannot be rendered.
     pub fn check(self, parameters: &Parameters, depth: u32, aovs: &[Aov]) -> Result<()> {
         for other in Self::ALL.iter().filter(|other| **other != self) {
             if let Some(layer) = other.room().aovs().iter().find(|layer| aovs.contains(layer)) {
@@ -142,33 +131,27 @@ impl Sampler {
         self.room().check(parameters, depth)
     }
 
-    /// Refuses parameters that cannot be rendered in direct light.
-    ///
-    /// # Errors
-    /// [`Error::Usage`].
+    /// Returns [`Error::Usage`] for parameters that cannot be rendered in direct light.
     pub fn check_parameters(self, parameters: &Parameters) -> Result<()> {
         self.room().check(parameters, 1)
     }
 
-    /// The sampler's simple form, if it is one of [`basic`].
+    /// Returns the simple form of the sampler if it is one of [`basic`].
     pub fn basic(self) -> Option<basic::Basic> {
         self.room().basic()
     }
 
-    /// The parameters that matter to the sampler, by key, for metadata and statistics.
+    /// Returns the parameters relevant to the sampler by key, for metadata and statistics.
     pub fn describe(self, parameters: &Parameters) -> BTreeMap<String, String> {
         self.room().describe(parameters)
     }
 
-    /// Memory that it takes for every path in flight.
+    /// Memory per path in flight.
     pub fn demand(self, parameters: &Parameters, shadow_rays: u32) -> PathDemand {
         self.room().demand(parameters, shadow_rays)
     }
 
-    /// Makes the technique of one render.
-    ///
-    /// # Errors
-    /// A limit of the device or a failing device.
+    /// Creates the technique of one render. Fails if the device does or its limits are exceeded.
     pub fn technique(self, context: Context<'_>) -> Result<Box<dyn Technique>> {
         self.room().create(context)
     }

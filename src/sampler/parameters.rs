@@ -11,18 +11,17 @@ use crate::error::{Error, Result};
 /// Parameters of the samplers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Parameters {
-    /// `candidates`: directions that each shadow ray of `ris` or `guided` is chosen from; `None` is
-    /// `auto`.
+    /// `candidates`: directions to choose each shadow ray of `ris` or `guided` from; `None` is `auto`.
     pub candidates: Option<u32>,
-    /// Those of `product`, also within `visibility`.
+    /// Parameters of `product`, also within `visibility`.
     pub product: ProductParameters,
-    /// Those of `visibility`.
+    /// Parameters of `visibility`.
     pub visibility: VisibilityParameters,
-    /// Those of `guided`.
+    /// Parameters of `guided`.
     pub guided: GuidedParameters,
 }
 
-/// Parameters that no room has to itself.
+/// Parameters shared by several rooms.
 const KNOBS: &[Knob<Parameters>] = &[
     Knob {
         key: "candidates",
@@ -54,10 +53,8 @@ const KNOBS: &[Knob<Parameters>] = &[
 ];
 
 impl Parameters {
-    /// Sets one parameter from `key=value`.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for an unknown key, which lists the known ones, or a value out of range.
+    /// Sets one parameter from `key=value`. Returns [`Error::Usage`] for a value out of range, or
+    /// for an unknown key, listing the known ones.
     pub fn set(&mut self, assignment: &str) -> Result<()> {
         let (key, value) = assignment.split_once('=').ok_or_else(|| {
             Error::usage(format!("--set {assignment}: expected key=value, found no '='"))
@@ -88,10 +85,7 @@ impl Parameters {
         keys
     }
 
-    /// The number of candidates for a sampler that can take those of `allowed`.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] where another number was asked for.
+    /// Returns the number of candidates; [`Error::Usage`] if one outside `allowed` was requested.
     pub fn candidates_among(&self, sampler: &str, allowed: &[u32], auto: u32) -> Result<u32> {
         let count = self.candidates.unwrap_or(auto);
         if allowed.contains(&count) {

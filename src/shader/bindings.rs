@@ -1,10 +1,8 @@
-//! Buffers that shaders see, by descriptor set: one declaration for Rust, GLSL and
-//! `docs/architecture.md`.
+//! Buffers of the shaders by descriptor set: one declaration for Rust, GLSL and `docs/architecture.md`.
 //!
 //! Sets go by rate of change: 0 the scene, 1 the sampler, 2 the wave, 3 the film. Set 1 has a table
-//! for each family of samplers; their binding numbers are disjoint, so that a shader tells by its
-//! bindings which table it belongs to. In GLSL a buffer has its name in lower case, and an entry
-//! point or include says `READS(hits)`, `WRITES(rays)`, `UPDATES(paths)` or `TEXELS(hit_texels)`.
+//! per family of samplers; disjoint binding numbers tell the table of a shader. GLSL names are in
+//! lower case; shaders say `READS(hits)`, `WRITES(rays)`, `UPDATES(paths)` or `TEXELS(hit_texels)`.
 
 /// A descriptor set: its number and its buffers.
 #[derive(Clone, Copy, Debug)]
@@ -13,7 +11,7 @@ pub struct BindingTable {
     pub name: &'static str,
     /// Number of the descriptor set.
     pub set: u32,
-    /// Buffers in ascending order of their numbers.
+    /// Buffers in ascending order of number.
     pub bindings: &'static [Binding],
 }
 
@@ -89,7 +87,6 @@ impl TexelFormat {
     }
 }
 
-/// Declares the tables.
 macro_rules! binding_tables {
     ($($(#[$table_doc:meta])* $table:ident = $module:ident: $set:literal {
         $($(#[doc = $doc:literal])* $number:literal $name:ident: $kind:ident $of:ident;)*
@@ -133,11 +130,11 @@ binding_tables! {
         1 BVH_NODES: texels Rgba32Uint;
         /// First page of triangles in BVH order, three texels a triangle.
         2 TRIANGLES_0: texels Rgba32Uint;
-        /// Second page; a page that does not exist repeats the first.
+        /// Second page of triangles; a missing page repeats the first.
         3 TRIANGLES_1: texels Rgba32Uint;
-        /// Third page.
+        /// Third page of triangles.
         4 TRIANGLES_2: texels Rgba32Uint;
-        /// Fourth page.
+        /// Fourth page of triangles.
         5 TRIANGLES_3: texels Rgba32Uint;
         /// Cells of four halves of the BRDF tables: `brdf_table` again.
         6 BRDF_CELLS: texels Rgba16Float;
@@ -145,7 +142,7 @@ binding_tables! {
         7 TRIANGLE_MATERIALS: array uint;
         /// Materials.
         8 MATERIALS: array Material;
-        /// Words of the BRDF tables, into which materials hold offsets.
+        /// Words of the BRDF tables, addressed by offsets in the materials.
         9 BRDF_TABLE: texels R32Float;
         /// Radiance of each texel of the environment map; the fourth component is unused.
         10 ENVIRONMENT_TEXELS: texels Rgba32Float;
@@ -159,13 +156,11 @@ binding_tables! {
 
     /// Set 1 of the samplers `product` and `visibility`.
     PRODUCT = product: 1 {
-        /// Lobes of the environment in the world, largest integral first: bandwidth · axis and
-        /// ln(amplitude) − bandwidth.
+        /// Environment lobes in world space, by integral: bandwidth · axis, ln(amplitude) − bandwidth.
         0 ENVIRONMENT_LOBES: texels Rgba32Float;
-        /// Lobes of BRDF · cosine by material and view, in the same form, in the frame of view and
-        /// normal.
+        /// Lobes of BRDF · cosine by material and view, likewise, in the frame of view and normal.
         1 BRDF_LOBES: texels Rgba32Float;
-        /// First lobe of each material and its lobes per view.
+        /// First lobe of each material, and its lobes per view.
         2 MATERIAL_LOBES: texels Rg32Uint;
         /// Lobes of the product: lobe `l` of path `i` at `l · path_count + i`.
         3 LOBES: array uvec2;
@@ -173,55 +168,49 @@ binding_tables! {
         4 LOBE_TEXELS: texels Rg32Uint;
         /// Number of lobes of each path.
         5 LOBE_COUNTS: array uint;
-        /// Sums of the weights in force, up to every [`LOBES_PER_SUM`](super::super::constants::LOBES_PER_SUM)th
-        /// lobe of a path and to the last: sum `s` of path `i` at `s · path_count + i`.
+        /// Sums of the current weights up to every `LOBES_PER_SUM`th lobe of a path and to the
+        /// last: sum `s` of path `i` at `s · path_count + i`.
         6 LOBE_SUMS: array float;
         /// Sums of weights again.
         7 LOBE_SUM_TEXELS: texels R32Float;
-        /// Bit for every lobe that a cached direction is close to (`close_lobes_index`).
+        /// Bits of the lobes close to each cached direction (`close_lobes_index`).
         8 CLOSE_LOBES: array uint;
         /// Bits of close lobes again.
         9 CLOSE_LOBE_TEXELS: texels R32Uint;
-        /// Visibility caches, by path or by pixel of the film: a head and `CACHE_CAPACITY`
-        /// directions each.
+        /// Visibility caches by path or by film pixel: a head and `CACHE_CAPACITY` directions each.
         10 VISIBILITY_CACHE: array uint;
     }
 
     /// Set 1 of the sampler `guided`.
     GUIDED = guided: 1 {
-        /// Grids of the cells, number of regions, masks of the tables.
+        /// Grids of the cells, number of regions, and masks of the hash tables.
         16 GUIDE: one GuideParameters;
-        /// Hash table of the cells: key; index, whether it is refined, its share of the BRDF.
+        /// Hash table of the cells: key; index, refined or not, and share of the BRDF.
         17 GUIDE_TABLE: texels Rg32Uint;
         /// Density and visibility of each region in each cell (`decode_entry`).
         18 GUIDE_ENTRIES: texels Rg32Uint;
-        /// Regions of the environment: first entry of the alias table, columns, rows, first column
-        /// and 65,536 · first row.
+        /// Regions: first alias entry, columns, rows, first row · 65,536 + first column.
         19 GUIDE_REGIONS: texels Rgba32Uint;
         /// Alias tables over the environment's cells in each region: threshold, alias.
         20 GUIDE_ALIASES: texels Rg32Uint;
         /// Region of every cell of the environment.
         21 GUIDE_REGION_OF_CELL: texels R16Uint;
-        /// Rays traced, rays visible and their responses by cell and region since the last rebuild.
+        /// Rays traced, rays visible and their responses, by cell and region, since the last rebuild.
         22 GUIDE_COUNTS: array uint;
-        /// Visible rays and their c p_B / q in 256ths by cell and octave of light since the last
-        /// rebuild.
+        /// Visible rays and their c p_B / q in 256ths, by cell and octave, since the last rebuild.
         23 GUIDE_SHARES: array uint;
-        /// Keys of the cells that passes looked for in vain.
+        /// Keys of missing cells that passes looked for.
         24 GUIDE_MISSING: array uint;
-        /// Count that each shadow ray belongs to, or `NOTHING_TO_LEARN`; octave of its light, from bit
-        /// `LEARN_FROM_BRDF_SHIFT` its c p_B / q in 256ths, from bit `LEARN_RESPONSE_SHIFT` its
-        /// response.
+        /// Count of each shadow ray, or `NOTHING_TO_LEARN`; octave of light, c p_B / q in 256ths
+        /// (from bit `LEARN_FROM_BRDF_SHIFT`), response (from bit `LEARN_RESPONSE_SHIFT`).
         25 LEARN_TARGETS: array uvec2;
-        /// Cell that each path is at, and the cell and direction that its bounce ray teaches.
+        /// Current cell of each path, and the cell and direction that its bounce ray teaches.
         26 PATH_CELLS: array PathCell;
-        /// Light believed to arrive by way of surfaces, by cell and direction, relative to the cell's
-        /// mean.
+        /// Learned light from other surfaces by cell and direction, relative to the cell's mean.
         27 GUIDE_ARRIVING: texels R32Float;
-        /// Light that each cell reflects of what it learned, in whole units.
+        /// Learned light that each cell reflects, in whole units.
         28 GUIDE_REFLECTED: texels R32Uint;
-        /// Bounce rays and the light where they arrived, by cell and direction, since the last
-        /// rebuild.
+        /// Bounce rays and the light where they arrived, by cell and direction, since the last rebuild.
         29 GUIDE_ARRIVALS: array uint;
     }
 
@@ -263,15 +252,15 @@ binding_tables! {
         6 FILM_POSITION: array vec3;
         /// Visible and traced shadow rays.
         7 FILM_VISIBLE: array uvec2;
-        /// Entries of visibility caches and hits that have one.
+        /// Entries of visibility caches, and hits that have one.
         8 FILM_CACHE_ENTRIES: array uvec2;
         /// Sum of the colours of the guide's cells at first hits.
         9 FILM_GUIDE_CELL: array vec3;
-        /// First hits whose cell is that of a face, a coarse one, a fine one.
+        /// First hits by the kind of their cell: of a face, coarse, fine.
         10 FILM_GUIDE_LEVEL: array vec3;
     }
 
-    /// Set 3 of the probe kernels in `glsl/test`, which read and write elements of their own types.
+    /// Set 3 of the probe kernels in `glsl/test`, which declare their own element types.
     PROBE = probe: 3 {
         /// Queries of a test.
         32 PROBE_INPUT: array uint;

@@ -1,5 +1,4 @@
-//! Everything that Rust and GLSL share, declared once: numbers, structs, buffers, and the SPIR-V that
-//! `build.rs` compiles against them.
+//! Shared by Rust and GLSL: constants, structs, buffers, and the SPIR-V that `build.rs` compiles.
 
 pub mod bindings;
 pub mod constants;

@@ -4,10 +4,7 @@ use std::collections::BTreeSet;
 
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
-/// SPIR-V of a pass: `name` is that of its file, `glsl/<name>.comp` or `glsl/<room>/<name>.comp`.
-///
-/// # Panics
-/// If there is no such file: a mistake of the caller.
+/// Returns the SPIR-V of `glsl/<name>.comp` or `glsl/<room>/<name>.comp`. Panics without such a file.
 pub fn pass(name: &str) -> &'static [u8] {
     match PASSES.binary_search_by(|(pass, _)| (*pass).cmp(name)) {
         Ok(index) => PASSES[index].1,
@@ -15,7 +12,7 @@ pub fn pass(name: &str) -> &'static [u8] {
     }
 }
 
-/// Descriptor set and binding number of every buffer that a module uses.
+/// Returns the descriptor set and binding number of every buffer that a module uses.
 pub fn used_bindings(spirv: &[u32]) -> BTreeSet<(u32, u32)> {
     const HEADER_WORDS: usize = 5;
     const OP_DECORATE: u32 = 71;

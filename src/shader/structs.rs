@@ -1,5 +1,4 @@
 //! Structs in buffers and push constants, in `scalar` layout: one declaration for Rust and GLSL.
-//!
 //! `tests/interface.rs` compares every member with the offsets in the compiled SPIR-V.
 
 use std::mem::{offset_of, size_of};
@@ -16,7 +15,7 @@ pub type uint = u32;
 #[expect(non_camel_case_types, reason = "GLSL's name")]
 pub type float = f32;
 
-/// A struct as both sides see it.
+/// Description of a struct for both sides.
 #[derive(Clone, Copy, Debug)]
 pub struct SharedStruct {
     /// Name in Rust and GLSL.
@@ -66,7 +65,7 @@ macro_rules! structs {
 }
 
 structs! {
-    /// What is constant during a render: camera, environment and film.
+    /// Constants of a render: camera, environment and film.
     struct SceneParameters {
         /// Centre of projection, metres.
         camera_position: vec3,
@@ -104,7 +103,7 @@ structs! {
         environment_cos_rotation: float,
         /// Sine of the map's rotation about +Y.
         environment_sin_rotation: float,
-        /// Normalisation of the environment's density: see `environment_pdf`.
+        /// Normalisation of the environment's density, see `environment_pdf`.
         environment_total: float,
     }
 
@@ -116,19 +115,19 @@ structs! {
         is_active: uint,
         /// Unit direction.
         direction: vec3,
-        /// Unused by traversal; keeps rays at 32 bytes.
+        /// Unused by traversal; pads rays to 32 bytes.
         reserved: uint,
     }
 
-    /// Where a ray met a surface, both normals on the side the ray came from.
+    /// Intersection of a ray with a surface; both normals are on the side of the ray's origin.
     struct Hit {
         /// Point on the triangle, metres, from barycentric coordinates.
         position: vec3,
-        /// Material index, or `NO_MATERIAL` where nothing was hit.
+        /// Material index, or `NO_MATERIAL` without a hit.
         material: uint,
         /// Unit normal of the triangle, turned toward the ray's origin.
         geometric_normal: vec3,
-        /// Distance along the ray, metres; −1 where nothing was hit.
+        /// Distance along the ray, metres; −1 without a hit.
         distance: float,
         /// Unit interpolated normal, turned toward the ray's origin, with a positive cosine to it.
         shading_normal: vec3,
@@ -136,7 +135,7 @@ structs! {
         triangle: uint,
     }
 
-    /// One sampled direction at a hit with what it brings if the environment is visible there.
+    /// Direction sampled at a hit, with its contribution if the environment is visible there.
     struct ShadowRay {
         /// Unit direction.
         direction: vec3,
@@ -144,13 +143,13 @@ structs! {
         contribution: vec3,
     }
 
-    /// What a path carries from vertex to vertex.
+    /// State that a path carries from vertex to vertex.
     struct PathState {
         /// Product of BRDF · cosine / pdf along the path.
         throughput: vec3,
         /// Radiance gathered so far.
         radiance: vec3,
-        /// Shadow rays of this path that were traced; directions that bring nothing are not.
+        /// Traced shadow rays of this path; directions without a contribution are not traced.
         shadow_rays_traced: uint,
         /// Shadow rays of this path that reached the environment.
         shadow_rays_visible: uint,
@@ -158,7 +157,7 @@ structs! {
         rays_traced: uint,
     }
 
-    /// Totals over the film since the host last set them to zero.
+    /// Totals over the film since the host last cleared them.
     struct Counters {
         /// Camera rays.
         camera_rays: uint,
@@ -170,22 +169,21 @@ structs! {
         shadow_rays_visible: uint,
         /// Samples left out of the film because their radiance was not finite.
         dropped_samples: uint,
-        /// Rays given up after `TRAVERSAL_STEP_LIMIT` steps, counted as blocked or by the nearest hit so
-        /// far.
+        /// Rays abandoned after `TRAVERSAL_STEP_LIMIT` steps: blocked, or with the nearest hit so far.
         traversal_overruns: uint,
-        /// Hits with lobes of a product.
+        /// Hits with product lobes.
         product_hits: uint,
         /// Lobes kept at these hits.
         lobes_kept: uint,
-        /// Share of the product's energy that was kept, summed over these hits, in 256ths.
+        /// Share of the product's energy kept, summed over these hits, in 256ths.
         energy_kept: uint,
         /// Directions recorded in visibility caches.
         cache_entries: uint,
-        /// Rebuilds of a cumulative distribution because a cache had grown.
+        /// Times that a hit's lobe weights were summed again because its cache had grown.
         cdf_rebuilds: uint,
     }
 
-    /// A material; which members mean something depends on `kind`.
+    /// Material; the meaning of its members depends on `kind`.
     struct Material {
         /// `MATERIAL_…`.
         kind: uint,
@@ -193,7 +191,7 @@ structs! {
         table_offset: uint,
         /// GGX width α.
         alpha: float,
-        /// Refractive index of a dielectric coat; for conductors 1 chooses exact Fresnel, 0 Schlick.
+        /// Refractive index of a dielectric coat; for conductors 1 selects exact Fresnel, 0 Schlick.
         ior: float,
         /// Diffuse albedo, or reflectance at normal incidence of a Schlick conductor.
         reflectance: vec3,
@@ -201,14 +199,12 @@ structs! {
         eta: vec3,
         /// Extinction coefficient of a conductor.
         k: vec3,
-        /// Zero; fills up the last of four texels of four words.
+        /// Zero; pads the last of four texels of four words.
         reserved: vec3,
     }
 
-    /// Push constants of the passes that work on a wave of paths.
-    ///
-    /// Path `i` of the wave belongs to pixel `first_pixel + (i % pixel_count) · pixel_stride` in film order and to sample
-    /// `first_sample + i / pixel_count`.
+    /// Push constants of the passes over a wave of paths. Path `i` belongs to sample `first_sample + i
+    /// / pixel_count` of the pixel at `first_pixel + (i % pixel_count) · pixel_stride` in film order.
     struct Wave {
         /// First pixel of the wave, in film order.
         first_pixel: uint,
@@ -224,31 +220,31 @@ structs! {
         vertex: uint,
         /// Shadow rays per hit in this dispatch.
         shadow_ray_count: uint,
-        /// Index of the first of them among all shadow rays of the hit.
+        /// Index of the first of these among all shadow rays of the hit.
         first_shadow_ray: uint,
         /// Shadow rays per hit over all dispatches.
         total_shadow_rays: uint,
         /// Bits `AOV_…`: which extra film buffers are written.
         aovs: uint,
-        /// Pixels in film order from one pixel of the wave to the next; 0 counts as 1.
+        /// Step in film order from one pixel of the wave to the next; 0 counts as 1.
         pixel_stride: uint,
-        /// 1 where the paths only teach the guide: their rays are counted, their light is not.
+        /// 1 if the paths only teach the guide: their rays are counted, their light is not.
         is_training: uint,
-        /// Seed of the numbers of `guided`, another one after every rebuild.
+        /// Seed of the numbers of `guided`; changes with every rebuild.
         epoch_seed: uint,
         /// First sample after the last rebuild.
         epoch_start: uint,
     }
 
-    /// What a path tells the guide about its bounces.
+    /// Cells that a path's bounces teach.
     struct PathCell {
-        /// Cell of the vertex it is at, or `NOTHING_TO_LEARN` where it left the scene.
+        /// Cell of its current vertex, or `NOTHING_TO_LEARN` if it left the scene.
         cell: uint,
         /// Cell and direction that its last bounce ray teaches, or `NOTHING_TO_LEARN`.
         teaches: uint,
     }
 
-    /// How the cells of the guide follow from places in the scene.
+    /// Mapping from places in the scene to cells of the guide.
     struct GuideParameters {
         /// Corner of the grids, metres.
         grid_origin: vec3,
@@ -260,9 +256,9 @@ structs! {
         largest_edge: float,
         /// Regions of the environment.
         region_count: uint,
-        /// Slots of the hash table less one.
+        /// Slots of the hash table minus one.
         table_mask: uint,
-        /// Slots for missed keys less one.
+        /// Slots for missing keys minus one.
         missing_mask: uint,
     }
 }

@@ -11,7 +11,7 @@ use super::{
     overhead::OverheadJob,
     plan::{Plan, ReferencePlan},
     record::{Round, Run, SceneRecord},
-    reference::{self, Reference},
+    reference::{HALF_STEMS, Reference},
     rule::Rule,
     watch::{Observer, Watch},
 };
@@ -189,7 +189,10 @@ impl Study<'_> {
             }
             plan => {
                 let reference = Reference::read(plan, scene)?;
-                self.keep_halves(scene, &reference)?;
+                // Copy the halves into the folder, so that it holds everything the page needs.
+                for (stem, half) in HALF_STEMS.iter().zip([&reference.first, &reference.second]) {
+                    image_of(half).write_exr(&self.folder.image(&scene.name, stem))?;
+                }
                 reference
             }
         };
@@ -197,16 +200,6 @@ impl Study<'_> {
         let mean = reference.mean();
         write_preview(&path.with_extension("png"), &mean, exposure(&mean))?;
         Ok(reference)
-    }
-
-    /// Copies halves that were read into the folder, so that it holds everything the page needs.
-    fn keep_halves(&self, scene: &Scene, reference: &Reference) -> Result<()> {
-        for (stem, half) in
-            reference::half_stems().into_iter().zip([&reference.first, &reference.second])
-        {
-            image_of(half).write_exr(&self.folder.image(&scene.name, stem))?;
-        }
-        Ok(())
     }
 
     /// Renders every run and compares it with the reference.

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    film::{Image, Metadata, RgbImage, SampleRange, png::write_preview},
+    film::{Image, Metadata, RgbImage, SampleRange, metadata::seconds_of, png::write_preview},
     renderer::Renderer,
     scene::Scene,
 };
@@ -70,7 +70,6 @@ impl RunJob<'_> {
                 break;
             }
         }
-        let figures = Figures::of(renderer, pace.seconds);
         Ok(Run {
             scene: self.scene.name.clone(),
             sampler: self.contender.label.clone(),
@@ -78,10 +77,7 @@ impl RunJob<'_> {
             seed: self.seed,
             conditions: self.conditions,
             measurements,
-            gpu_ms_per_sample: figures.gpu_ms_per_sample,
-            rays: figures.rays,
-            visible_share: figures.visible_share,
-            statistics: figures.statistics,
+            figures: Figures::of(renderer, pace.seconds),
         })
     }
 
@@ -107,12 +103,11 @@ impl RunJob<'_> {
         level: Rule,
     ) -> Result<String> {
         let mut image = image_of(picture);
-        let gpu_ms = &renderer.totals().gpu_ms;
         let metadata = Metadata {
             sample_ranges: vec![SampleRange { seed: self.seed, first: 0, count: measurement.spp }],
             candidates: renderer.report().candidates,
             seconds: measurement.seconds,
-            gpu_seconds: gpu_ms.iter().map(|(pass, ms)| (pass.clone(), ms * 1e-3)).collect(),
+            gpu_seconds: seconds_of(&renderer.totals().gpu_ms),
             ..self.metadata.clone()
         };
         metadata.store(&mut image);

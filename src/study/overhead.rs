@@ -9,9 +9,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use super::{
+    contender::Contender,
     folder::Folder,
     plan::OverheadPlan,
-    record::{Conditions, Figures, Round, Timing},
+    record::{Conditions, Figures, Round, Timing, assignments},
     statistics::{Interval, median_interval},
     watch::{Pace, Watch},
 };
@@ -90,17 +91,10 @@ impl OverheadJob<'_> {
 
 /// Describes the samplers' parameters, by label, and marks the baseline.
 pub(super) fn describe_parameters(plan: &OverheadPlan) -> BTreeMap<String, String> {
-    let text = |parameters: BTreeMap<String, String>| {
-        let pairs: Vec<String> =
-            parameters.iter().map(|(name, value)| format!("{name}={value}")).collect();
-        pairs.join(",")
-    };
-    let mut all: BTreeMap<String, String> = plan
-        .contenders
-        .iter()
-        .map(|contender| (contender.label.clone(), text(contender.describe_parameters())))
-        .collect();
-    let baseline = format!("baseline,{}", text(plan.baseline.describe_parameters()));
+    let text = |contender: &Contender| assignments(&contender.describe_parameters(), ",");
+    let mut all: BTreeMap<String, String> =
+        plan.contenders.iter().map(|other| (other.label.clone(), text(other))).collect();
+    let baseline = format!("baseline,{}", text(&plan.baseline));
     all.insert(plan.baseline.label.clone(), baseline);
     all
 }
@@ -248,17 +242,7 @@ mod tests {
                     scene: "room".into(),
                     repetition,
                     spp: 4,
-                    conditions: Conditions {
-                        version: String::new(),
-                        scene_hash: String::new(),
-                        film: [1, 1],
-                        device: String::new(),
-                        driver: String::new(),
-                        shadow_rays: 5,
-                        depth: 1,
-                        reference: String::new(),
-                        parameters: BTreeMap::new(),
-                    },
+                    conditions: Conditions::default(),
                     timings: vec![
                         timing("product", &[("sample", slow), ("shadow", slow)], 0.2),
                         timing(

@@ -18,7 +18,7 @@ use crate::{error::Result, film::RgbImage, pass::Totals, renderer::Renderer};
 const GUIDE_REBUILDS: &str = "guide rebuilds";
 
 /// Conditions of a run besides its sampler, rule and seed; a run is reused only if all agree.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Conditions {
     /// Fenestra's version.
     pub version: String,
@@ -58,7 +58,11 @@ impl Conditions {
         compare("shadow rays", self.shadow_rays.to_string(), asked.shadow_rays.to_string());
         compare("depth", self.depth.to_string(), asked.depth.to_string());
         compare("reference", self.reference.clone(), asked.reference.clone());
-        compare("parameters", join(&self.parameters), join(&asked.parameters));
+        let parameters = |of: &Self| match of.parameters.is_empty() {
+            true => "default".to_owned(),
+            false => assignments(&of.parameters, " "),
+        };
+        compare("parameters", parameters(self), parameters(asked));
         found
     }
 }
@@ -68,13 +72,11 @@ fn short(hash: &str) -> String {
     hash.chars().take(12).collect()
 }
 
-fn join(parameters: &BTreeMap<String, String>) -> String {
-    if parameters.is_empty() {
-        return "default".to_owned();
-    }
+/// Joins parameters, written `name=value`.
+pub(super) fn assignments(parameters: &BTreeMap<String, String>, separator: &str) -> String {
     let pairs: Vec<String> =
         parameters.iter().map(|(name, value)| format!("{name}={value}")).collect();
-    pairs.join(" ")
+    pairs.join(separator)
 }
 
 /// Errors of a film after some samples.
@@ -176,14 +178,9 @@ pub struct Run {
     pub conditions: Conditions,
     /// Measurements by ascending samples; the last is of the finished film.
     pub measurements: Vec<Measurement>,
-    /// Device milliseconds per sample of every pixel, by pass.
-    pub gpu_ms_per_sample: BTreeMap<String, f64>,
-    /// Rays traced by kind.
-    pub rays: BTreeMap<String, u64>,
-    /// Share of shadow rays that reached the environment; absent if none was traced.
-    pub visible_share: Option<f64>,
-    /// Other figures of the sampler, by name.
-    pub statistics: BTreeMap<String, f64>,
+    /// Figures of the whole run.
+    #[serde(flatten)]
+    pub figures: Figures,
 }
 
 impl Run {
@@ -203,15 +200,16 @@ impl Run {
     }
 }
 
-/// Device milliseconds per sample, rays by kind, visible share and other figures of a renderer.
+/// Figures of a renderer besides its picture.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
-    /// See [`Run::gpu_ms_per_sample`].
+    /// Device milliseconds per sample of every pixel, by pass.
     pub gpu_ms_per_sample: BTreeMap<String, f64>,
-    /// See [`Run::rays`].
+    /// Rays traced by kind.
     pub rays: BTreeMap<String, u64>,
-    /// See [`Run::visible_share`].
+    /// Share of shadow rays that reached the environment; absent if none was traced.
     pub visible_share: Option<f64>,
-    /// See [`Run::statistics`].
+    /// Other figures of the sampler, by name.
     pub statistics: BTreeMap<String, f64>,
 }
 
@@ -339,15 +337,9 @@ mod tests {
     #[test]
     fn differing_conditions_are_listed() {
         let there = Conditions {
-            version: "1".into(),
             scene_hash: "0123456789abcdef".into(),
-            film: [4, 3],
-            device: "d".into(),
-            driver: "e".into(),
             shadow_rays: 5,
-            depth: 1,
-            reference: "mis".into(),
-            parameters: BTreeMap::new(),
+            ..Conditions::default()
         };
         assert!(there.differences(&there.clone()).is_empty());
         let parameters = BTreeMap::from([("candidates".to_owned(), "8".to_owned())]);

@@ -26,13 +26,16 @@ use crate::{
     files,
     film::{
         Aov, Attribute, Checkpoint, Image, Metadata, RgbImage, SampleRange,
-        checkpoint::checkpoint_path,
+        checkpoint::{checkpoint_path, guide_path},
+        metadata::seconds_of,
     },
     renderer::Renderer,
     sampler::guided::GuideState,
     scene::Scene,
 };
 
+/// File stems of the halves.
+pub const HALF_STEMS: [&str; 2] = ["reference_1", "reference_2"];
 /// Seeds of the halves; those of runs count up from 1.
 pub const SEEDS: [u32; 2] = [u32::MAX - 1, u32::MAX];
 /// Time between checkpoints of a half: even a killed program loses only the passes since the last.
@@ -56,13 +59,11 @@ pub struct Reference {
 pub fn identity(plan: &ReferencePlan, scene: &str) -> Result<String> {
     match plan {
         ReferencePlan::Render { contender, half_spp } => {
-            let parameters: Vec<String> = contender
-                .describe_parameters()
-                .iter()
-                .map(|(name, value)| format!(" {name}={value}"))
-                .collect();
-            let name = contender.sampler.name();
-            Ok(format!("{name}{}, 2 x {half_spp} spp", parameters.concat()))
+            let mut name = contender.sampler.name().to_owned();
+            for (key, value) in contender.describe_parameters() {
+                name += &format!(" {key}={value}");
+            }
+            Ok(format!("{name}, 2 x {half_spp} spp"))
         }
         ReferencePlan::Files(_) | ReferencePlan::Study(_) => {
             let mut hasher = Sha256::new();
@@ -83,14 +84,28 @@ fn given_files(plan: &ReferencePlan, scene: &str) -> Result<Vec<PathBuf>> {
         ReferencePlan::Files(files) => Ok(files.clone()),
         ReferencePlan::Study(folder) => {
             let folder = Folder::existing(folder)?;
-            Ok(half_stems().map(|stem| folder.image(scene, stem)).to_vec())
+            Ok(HALF_STEMS.map(|stem| folder.image(scene, stem)).to_vec())
         }
     }
 }
 
-/// File stems of the halves.
-pub fn half_stems() -> [&'static str; 2] {
-    ["reference_1", "reference_2"]
+/// Reads the images of a reference and checks that they show the scene.
+fn read_images(paths: Vec<PathBuf>, scene: &Scene) -> Result<Vec<(PathBuf, Image)>> {
+    let read = |path: PathBuf| {
+        let image = Image::read_exr(&path)?;
+        check(&image, &path, scene)?;
+        Ok((path, image))
+    };
+    paths.into_iter().map(read).collect()
+}
+
+/// Averages two halves.
+pub fn mean(first: &RgbImage, second: &RgbImage) -> RgbImage {
+    let mean = |(a, b): (&[f32; 3], &[f32; 3])| {
+        std::array::from_fn(|channel| 0.5 * (a[channel] + b[channel]))
+    };
+    let pixels = first.pixels.iter().zip(&second.pixels).map(mean).collect();
+    RgbImage { width: first.width, height: first.height, pixels }
 }
 
 impl Reference {
@@ -100,15 +115,7 @@ impl Reference {
     /// Files that cannot be read; [`Error::Comparison`] for another size or scene, values that are
     /// not finite, a black picture, or halves that share samples.
     pub fn read(plan: &ReferencePlan, scene: &Scene) -> Result<Self> {
-        let paths = given_files(plan, &scene.name)?;
-        let images: Vec<(PathBuf, Image)> = paths
-            .into_iter()
-            .map(|path| {
-                let image = Image::read_exr(&path)?;
-                check(&image, &path, scene)?;
-                Ok((path, image))
-            })
-            .collect::<Result<_>>()?;
+        let images = read_images(given_files(plan, &scene.name)?, scene)?;
         if let [(first_path, first), (second_path, second)] = &images[..] {
             let metadata = (Metadata::load(first, first_path), Metadata::load(second, second_path));
             if let (Ok(ours), Ok(theirs)) = metadata
@@ -117,14 +124,12 @@ impl Reference {
                     .iter()
                     .find(|range| theirs.sample_ranges.iter().any(|other| range.overlaps(other)))
             {
-                return Err(Error::Comparison {
-                    message: format!(
-                        "{} and {} share samples ({range}); a reference's halves must be \
-                         independent: render them with different seeds",
-                        first_path.display(),
-                        second_path.display()
-                    ),
-                });
+                return Err(Error::comparison(format!(
+                    "{} and {} share samples ({range}); a reference's halves must be \
+                     independent: render them with different seeds",
+                    first_path.display(),
+                    second_path.display()
+                )));
             }
         }
         let names: Vec<String> =
@@ -150,11 +155,11 @@ impl Reference {
     ) -> Result<Self> {
         let pixels = f64::from(scene.film.width) * f64::from(scene.film.height);
         let mut renderer = None;
-        for (stem, seed) in half_stems().into_iter().zip(SEEDS) {
-            let path = folder.image(&scene.name, stem);
+        let paths = HALF_STEMS.map(|stem| folder.image(&scene.name, stem));
+        for (path, seed) in paths.iter().zip(SEEDS) {
             let range = SampleRange { seed, first: 0, count: half_spp };
             let metadata = Metadata { sample_ranges: vec![range], ..metadata.clone() };
-            if is_finished(&path, &metadata)? {
+            if is_finished(path, &metadata)? {
                 watch.expect(-pixels * f64::from(half_spp), 0.0);
                 continue;
             }
@@ -168,17 +173,9 @@ impl Reference {
                 seed - SEEDS[0] + 1,
                 contender.label
             ));
-            render_half(renderer, &path, metadata, pixels, watch)?;
+            render_half(renderer, path, metadata, pixels, watch)?;
         }
-        let images: Vec<(PathBuf, Image)> = half_stems()
-            .into_iter()
-            .map(|stem| {
-                let path = folder.image(&scene.name, stem);
-                let image = Image::read_exr(&path)?;
-                check(&image, &path, scene)?;
-                Ok((path, image))
-            })
-            .collect::<Result<_>>()?;
+        let images = read_images(paths.to_vec(), scene)?;
         Self::from_images(&images, format!("{}, two halves of {half_spp} spp", contender.label))
     }
 
@@ -195,12 +192,10 @@ impl Reference {
         };
         let mean = 0.5 * (average(&first) + average(&second));
         if mean <= 0.0 {
-            return Err(Error::Comparison {
-                message: format!(
-                    "the reference {} is black: no error can be put in relation to it",
-                    images[0].0.display()
-                ),
-            });
+            return Err(Error::comparison(format!(
+                "the reference {} is black: no error can be put in relation to it",
+                images[0].0.display()
+            )));
         }
         let metadata: Vec<Metadata> =
             images.iter().filter_map(|(path, image)| Metadata::load(image, path).ok()).collect();
@@ -240,14 +235,7 @@ impl Reference {
 
     /// Averages the halves.
     pub fn mean(&self) -> RgbImage {
-        let mean = |(a, b): (&[f32; 3], &[f32; 3])| {
-            std::array::from_fn(|channel| 0.5 * (a[channel] + b[channel]))
-        };
-        RgbImage {
-            width: self.first.width,
-            height: self.first.height,
-            pixels: self.first.pixels.iter().zip(&self.second.pixels).map(mean).collect(),
-        }
+        mean(&self.first, &self.second)
     }
 }
 
@@ -286,8 +274,7 @@ fn render_half(
             .as_secs_f64();
         let result = pace.advance(renderer, step, Some(pace.seconds + limit), watch);
         metadata.seconds = earlier_seconds + pace.seconds;
-        metadata.gpu_seconds =
-            renderer.totals().gpu_ms.iter().map(|(pass, ms)| (pass.clone(), ms * 1e-3)).collect();
+        metadata.gpu_seconds = seconds_of(&renderer.totals().gpu_ms);
         let interrupted = matches!(result, Err(Error::Interrupted));
         if (interrupted || last_checkpoint.elapsed() >= CHECKPOINT_INTERVAL)
             && renderer.sample_count() > 0
@@ -313,11 +300,6 @@ fn render_half(
         }
     }
     Ok(())
-}
-
-/// Path of the guide learned up to a checkpoint, beside it.
-fn guide_path(checkpoint: &Path) -> PathBuf {
-    checkpoint.with_extension("guide")
 }
 
 /// Restores a half from a checkpoint of the same render, with the guide if the sampler learns, and
@@ -350,7 +332,7 @@ fn resume(renderer: &mut Renderer, path: &Path, metadata: &Metadata) -> Result<f
 
 /// Refuses a picture of another size or scene or with values that are not finite.
 fn check(image: &Image, path: &Path, scene: &Scene) -> Result<()> {
-    let refuse = |message: String| Err(Error::Comparison { message });
+    let refuse = |message: String| Err(Error::comparison(message));
     let (width, height) = (scene.film.width, scene.film.height);
     if (image.width, image.height) != (width, height) || image.origin != [0, 0] {
         return refuse(format!(

@@ -12,7 +12,7 @@ use super::{
     folder::Folder,
     overhead::{Overhead, overheads},
     plan::{Plan, PublishedErrors, PublishedOverhead},
-    record::{Measurement, Round, Run, SceneRecord},
+    record::{Figures, Measurement, Round, Run, SceneRecord, assignments},
     rule::Rule,
     summary::{Curve, Summary, curves, rules, summaries},
 };
@@ -179,40 +179,15 @@ impl Report {
 
     /// Formats a row for every run and rule; columns of figures that a run lacks are empty.
     fn csv(&self, rules: &[Rule]) -> String {
-        let names = |of: &dyn Fn(&Run) -> Vec<String>| -> BTreeSet<String> {
-            self.runs.iter().flat_map(of).collect()
-        };
-        let passes = names(&|run| run.gpu_ms_per_sample.keys().cloned().collect());
-        let kinds = names(&|run| run.rays.keys().cloned().collect());
-        let statistics = names(&|run| run.statistics.keys().cloned().collect());
-        let mut columns: Vec<String> =
-            ["scene", "sampler", "parameters", "rule", "seed", "shadow_rays", "depth", "spp"]
-                .map(str::to_owned)
-                .to_vec();
-        columns.extend(["seconds", "gpu_seconds", "rays"].map(str::to_owned));
-        columns.extend(kinds.iter().map(|kind| format!("rays_{kind}_of_run")));
-        columns.push("visible_share".to_owned());
-        columns.extend(
-            ["rmse", "mse", "relmse", "relmse_trimmed", "relmse_p999", "relmse_max"]
-                .map(str::to_owned),
-        );
-        columns.extend(
-            ["mean_ratio", "mean_deviation", "mse_judged", "relmse_judged"].map(str::to_owned),
-        );
-        columns.extend(passes.iter().map(|pass| format!("gpu_ms_per_sample_{pass}")));
-        columns.extend(statistics.iter().cloned());
-        let mut text = columns.join(",") + "\n";
+        let columns = columns(&self.runs);
+        let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+        let mut text = names.join(",") + "\n";
         for run in &self.runs {
             for rule in rules {
                 if let Some(measurement) = run.at(*rule) {
-                    let mut row = row(run, *rule, measurement, &kinds);
-                    let number = |of: &BTreeMap<String, f64>, name: &String| {
-                        of.get(name).map(f64::to_string).unwrap_or_default()
-                    };
-                    row.extend(passes.iter().map(|pass| number(&run.gpu_ms_per_sample, pass)));
-                    row.extend(statistics.iter().map(|name| number(&run.statistics, name)));
-                    let fields: Vec<String> = row.iter().map(|field| quoted(field)).collect();
-                    text += &(fields.join(",") + "\n");
+                    let fields = columns.iter().map(|(_, field)| field(run, *rule, measurement));
+                    let row: Vec<String> = fields.map(|field| quoted(&field)).collect();
+                    text += &(row.join(",") + "\n");
                 }
             }
         }
@@ -220,42 +195,64 @@ impl Report {
     }
 }
 
-/// Returns the columns that every run has.
-fn row(run: &Run, rule: Rule, measurement: &Measurement, kinds: &BTreeSet<String>) -> Vec<String> {
-    let parameters: Vec<String> =
-        run.conditions.parameters.iter().map(|(name, value)| format!("{name}={value}")).collect();
-    let optional = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
-    let mut row = vec![
-        run.scene.clone(),
-        run.sampler.clone(),
-        parameters.join(" "),
-        rule.describe(),
-        run.seed.to_string(),
-        run.conditions.shadow_rays.to_string(),
-        run.conditions.depth.to_string(),
-        measurement.spp.to_string(),
-        measurement.seconds.to_string(),
-        measurement.gpu_seconds.to_string(),
-        measurement.rays.to_string(),
+/// Column of `results.csv`: its name, and the field of a run under a rule.
+type Column = (String, Box<dyn Fn(&Run, Rule, &Measurement) -> String>);
+
+fn column(
+    name: impl Into<String>,
+    field: impl Fn(&Run, Rule, &Measurement) -> String + 'static,
+) -> Column {
+    (name.into(), Box::new(field))
+}
+
+/// Lists the columns: those of every run, and one for each figure that some run has.
+fn columns(runs: &[Run]) -> Vec<Column> {
+    fn names<V>(runs: &[Run], figures: fn(&Figures) -> &BTreeMap<String, V>) -> BTreeSet<String> {
+        runs.iter().flat_map(|run| figures(&run.figures).keys().cloned()).collect()
+    }
+    fn optional(value: Option<impl ToString>) -> String {
+        value.map(|value| value.to_string()).unwrap_or_default()
+    }
+    let mut columns = vec![
+        column("scene", |run, _, _| run.scene.clone()),
+        column("sampler", |run, _, _| run.sampler.clone()),
+        column("parameters", |run, _, _| assignments(&run.conditions.parameters, " ")),
+        column("rule", |_, rule, _| rule.describe()),
+        column("seed", |run, _, _| run.seed.to_string()),
+        column("shadow_rays", |run, _, _| run.conditions.shadow_rays.to_string()),
+        column("depth", |run, _, _| run.conditions.depth.to_string()),
+        column("spp", |_, _, m| m.spp.to_string()),
+        column("seconds", |_, _, m| m.seconds.to_string()),
+        column("gpu_seconds", |_, _, m| m.gpu_seconds.to_string()),
+        column("rays", |_, _, m| m.rays.to_string()),
     ];
-    let count = |kind: &String| run.rays.get(kind).map(u64::to_string).unwrap_or_default();
-    row.extend(kinds.iter().map(count));
-    row.push(optional(run.visible_share));
-    row.extend(
-        [
-            measurement.rmse,
-            measurement.mse,
-            measurement.relmse,
-            measurement.relmse_trimmed,
-            measurement.relmse_p999,
-            measurement.relmse_max,
-            measurement.mean_ratio,
-        ]
-        .map(|value| value.to_string()),
-    );
-    row.push(optional(measurement.mean_deviation));
-    row.extend([measurement.mse_judged, measurement.relmse_judged].map(|is| is.to_string()));
-    row
+    columns.extend(names(runs, |figures| &figures.rays).into_iter().map(|kind| {
+        column(format!("rays_{kind}_of_run"), move |run, _, _| {
+            optional(run.figures.rays.get(&kind))
+        })
+    }));
+    columns.extend([
+        column("visible_share", |run, _, _| optional(run.figures.visible_share)),
+        column("rmse", |_, _, m| m.rmse.to_string()),
+        column("mse", |_, _, m| m.mse.to_string()),
+        column("relmse", |_, _, m| m.relmse.to_string()),
+        column("relmse_trimmed", |_, _, m| m.relmse_trimmed.to_string()),
+        column("relmse_p999", |_, _, m| m.relmse_p999.to_string()),
+        column("relmse_max", |_, _, m| m.relmse_max.to_string()),
+        column("mean_ratio", |_, _, m| m.mean_ratio.to_string()),
+        column("mean_deviation", |_, _, m| optional(m.mean_deviation)),
+        column("mse_judged", |_, _, m| m.mse_judged.to_string()),
+        column("relmse_judged", |_, _, m| m.relmse_judged.to_string()),
+    ]);
+    columns.extend(names(runs, |figures| &figures.gpu_ms_per_sample).into_iter().map(|pass| {
+        column(format!("gpu_ms_per_sample_{pass}"), move |run, _, _| {
+            optional(run.figures.gpu_ms_per_sample.get(&pass))
+        })
+    }));
+    columns.extend(names(runs, |figures| &figures.statistics).into_iter().map(|name| {
+        column(name.clone(), move |run, _, _| optional(run.figures.statistics.get(&name)))
+    }));
+    columns
 }
 
 /// Quotes a field that needs it (RFC 4180).

@@ -13,6 +13,15 @@ pub struct Interval {
     pub high: f64,
 }
 
+impl Interval {
+    /// Applies an increasing function to the estimate and both ends.
+    #[must_use]
+    pub fn map(&self, function: impl Fn(f64) -> f64) -> Self {
+        let [middle, low, high] = [self.middle, self.low, self.high].map(function);
+        Self { middle, low, high }
+    }
+}
+
 /// 97.5% quantiles of Student's t distribution for 1, 2, … degrees of freedom.
 const T_QUANTILES: [f64; 30] = [
     12.7062, 4.3027, 3.1824, 2.7764, 2.5706, 2.4469, 2.3646, 2.3060, 2.2622, 2.2281, 2.2010,
@@ -52,11 +61,7 @@ pub fn geometric_interval(values: &[f64]) -> Option<Interval> {
         return None;
     }
     let logarithms: Vec<f64> = values.iter().map(|value| value.ln()).collect();
-    mean_interval(&logarithms).map(|Interval { middle, low, high }| Interval {
-        middle: middle.exp(),
-        low: low.exp(),
-        high: high.exp(),
-    })
+    mean_interval(&logarithms).map(|interval| interval.map(f64::exp))
 }
 
 /// Median with the narrowest pair of order statistics that holds the true median with at least 95%

@@ -7,7 +7,7 @@ use crate::{
     renderer::Renderer,
 };
 
-/// Duration aimed at for a pass, and so the delay until Ctrl-C is noticed.
+/// Duration aimed at for a pass, and so the delay until stop rules and Ctrl-C are noticed.
 const LOOK_AROUND: Duration = Duration::from_millis(250);
 /// Seconds per camera path until some are measured.
 const FIRST_GUESS: f64 = 2e-6;
@@ -143,9 +143,9 @@ impl Pace {
     }
 }
 
-/// Samples of the next pass: at most twice as many, to take about [`LOOK_AROUND`] and to end within
-/// `left` seconds.
-fn next_pass_samples(samples: u32, took: f64, left: f64) -> u32 {
+/// Samples of the next pass after one of `samples` that took `took` seconds: at most twice as many,
+/// to take about a quarter of a second and to end within `left` seconds.
+pub fn next_pass_samples(samples: u32, took: f64, left: f64) -> u32 {
     let per_sample = took.max(1e-6) / f64::from(samples);
     let wanted = left.clamp(0.0, LOOK_AROUND.as_secs_f64());
     // At least 1, so that the cast is exact.

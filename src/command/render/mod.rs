@@ -23,19 +23,21 @@ use crate::{
     error::{Error, Result},
     files::check_writable,
     film::{
-        Checkpoint, Metadata, SampleRange, Sums, Window, checkpoint::checkpoint_path,
-        display::DisplayServer, png::write_preview,
+        Checkpoint, Metadata, SampleRange, Sums, Window,
+        checkpoint::{checkpoint_path, guide_path},
+        display::DisplayServer,
+        metadata::seconds_of,
+        png::write_preview,
     },
     gpu::Device,
     renderer::{Renderer, Settings},
     sampler::Sampler,
     scene::Scene,
+    study::watch::next_pass_samples,
 };
 
 /// Samples per pixel if no stop rule is given.
 const DEFAULT_SPP: u32 = 64;
-/// Target duration of a batch of samples, after which the loop checks its stop rules.
-const LOOK_AROUND: Duration = Duration::from_millis(250);
 /// Interval of error estimates and display updates, which need the film on the host.
 const LOOK_INTERVAL: Duration = Duration::from_secs(1);
 /// Samples per pixel of `--quick`.
@@ -256,7 +258,8 @@ impl<'a> RenderJob<'a> {
             renderer.render_pass(samples)?;
             let took = start.elapsed();
             self.elapsed += took;
-            pass_samples = next_pass_samples(samples, took, self.time_left());
+            let left = self.time_left().unwrap_or(f64::INFINITY);
+            pass_samples = next_pass_samples(samples, took.as_secs_f64(), left);
 
             if Instant::now() >= next_look || self.arguments.error.is_some() {
                 let start = Instant::now();
@@ -359,12 +362,7 @@ impl<'a> RenderJob<'a> {
             }],
             candidates: renderer.report().candidates,
             seconds: self.seconds(),
-            gpu_seconds: renderer
-                .totals()
-                .gpu_ms
-                .iter()
-                .map(|(pass, ms)| (pass.clone(), ms * 1e-3))
-                .collect(),
+            gpu_seconds: seconds_of(&renderer.totals().gpu_ms),
             ..self.metadata.clone()
         }
     }
@@ -372,7 +370,7 @@ impl<'a> RenderJob<'a> {
     fn write_checkpoint(&self, renderer: &Renderer, sums: Sums) -> Result<()> {
         let checkpoint = Checkpoint { sums, metadata: self.metadata(renderer) };
         let path = checkpoint_path(&self.output);
-        guide::save(renderer, &guide::guide_path(&path))?;
+        guide::save(renderer, &guide_path(&path))?;
         checkpoint.write(&path)
     }
 
@@ -424,15 +422,4 @@ impl<'a> RenderJob<'a> {
 
 fn display(path: &Path) -> String {
     path.display().to_string()
-}
-
-/// Chooses the samples of the next pass to last about [`LOOK_AROUND`], but no longer than
-/// `time_left`, in seconds.
-fn next_pass_samples(samples: u32, took: Duration, time_left: Option<f64>) -> u32 {
-    let per_sample = took.as_secs_f64().max(1e-6) / f64::from(samples);
-    let wanted = time_left
-        .map_or(LOOK_AROUND.as_secs_f64(), |left| left.clamp(0.0, LOOK_AROUND.as_secs_f64()));
-    let next = (wanted / per_sample).floor().clamp(1.0, f64::from(samples) * 2.0);
-    // Clamped to a small positive number above.
-    next as u32
 }

@@ -4,6 +4,7 @@ use super::{RenderJob, StopReason};
 use crate::{
     film::{Metadata, Statistics},
     renderer::Renderer,
+    study::record::Figures,
 };
 
 impl RenderJob<'_> {
@@ -19,8 +20,8 @@ impl RenderJob<'_> {
         let window = self.window();
         let mut host_ms = renderer.host_ms();
         host_ms.insert("load".into(), load_ms);
-        let sampler_statistics = totals.sampler_statistics();
-        let figure = |name: &str| sampler_statistics.get(name).copied();
+        let figures = Figures::of(renderer, self.seconds());
+        let figure = |name: &str| figures.statistics.get(name).copied();
         Statistics {
             version: metadata.version.clone(),
             scene: metadata.scene.clone(),
@@ -41,18 +42,12 @@ impl RenderJob<'_> {
             stop_reason: reason.name().to_owned(),
             relative_standard_error: self.relative_error.filter(|error| error.is_finite()),
             seconds: self.seconds(),
-            rays: [
-                ("camera".to_owned(), totals.camera_rays),
-                ("shadow".to_owned(), totals.shadow_rays_traced),
-                ("bounce".to_owned(), totals.bounce_rays),
-            ]
-            .into(),
-            visible_share: (totals.shadow_rays_traced > 0)
-                .then(|| totals.shadow_rays_visible as f64 / totals.shadow_rays_traced as f64),
+            visible_share: figures.visible_share,
             cache_entries_per_hit: figure("cache_entries_per_hit"),
             lobes_per_hit: figure("lobes_per_hit"),
             energy_kept: figure("energy_kept"),
             cdf_rebuilds_per_hit: figure("cdf_rebuilds_per_hit"),
+            rays: figures.rays,
             dropped_samples: totals.dropped_samples,
             gpu_ms: totals.gpu_ms.clone(),
             host_ms,

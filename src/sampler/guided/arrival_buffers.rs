@@ -1,4 +1,4 @@
-//! Light that arrives by way of surfaces on the device: what `bounce_guided` reads, and what its rays teach.
+//! Device buffers for light arriving from surfaces: tables for `bounce_guided`, and counts of its rays.
 
 use std::sync::Arc;
 
@@ -9,11 +9,11 @@ use crate::{
     shader::bindings::{Binding, guided},
 };
 
-/// Bytes of a cell: by direction the light and two words that are counted, and what it reflects.
+/// Bytes of a cell: by direction the light and two counted words, and its reflected light.
 pub const BYTES_PER_CELL: u64 =
     (4 + size_of::<ArrivalWords>() as u64) * ARRIVAL_DIRECTIONS as u64 + 4;
 
-/// The buffers.
+/// Tables and counts of arriving light.
 pub struct ArrivalBuffers {
     arriving: Buffer,
     reflected: Buffer,
@@ -21,7 +21,7 @@ pub struct ArrivalBuffers {
 }
 
 impl ArrivalBuffers {
-    /// Room for `cells` cells.
+    /// Allocates `cells` cells.
     pub fn new(device: &Arc<Device>, cells: usize) -> Result<Self> {
         let directions = (cells * ARRIVAL_DIRECTIONS) as u64;
         let counted = size_of::<ArrivalWords>() as u64;
@@ -32,7 +32,7 @@ impl ArrivalBuffers {
         })
     }
 
-    /// Buffers with their bindings in the SRBF set.
+    /// Returns the buffers with their bindings in descriptor set 1.
     pub fn bindings(&self) -> [(Binding, &Buffer); 3] {
         [
             (guided::GUIDE_ARRIVING, &self.arriving),
@@ -41,29 +41,28 @@ impl ArrivalBuffers {
         ]
     }
 
-    /// What passes counted for the first `cells` cells.
+    /// Reads the counts of the first `cells` cells.
     pub fn counted(&self, cells: usize) -> Result<Vec<ArrivalWords>> {
         self.arrivals.download(cells * ARRIVAL_DIRECTIONS)
     }
 
-    /// Goes on from what passes of an earlier render counted.
+    /// Continues from the counts of an earlier render.
     pub fn upload_counted(&self, counted: &[ArrivalWords]) -> Result<()> {
         self.arrivals.upload(bytemuck::cast_slice(counted))
     }
 
-    /// Records that what was counted for the first `cells` cells is forgotten.
+    /// Records the clearing of the counts of the first `cells` cells.
     pub fn record_clear(&self, commands: &mut Commands, cells: usize) {
         let bytes = size_of::<ArrivalWords>() * cells * ARRIVAL_DIRECTIONS;
         commands.fill_start(&self.arrivals, bytes as u64, 0);
     }
 
-    /// What the next passes read.
+    /// Uploads the tables for the next passes.
     pub fn upload(&self, snapshot: &Snapshot) -> Result<()> {
         self.arriving.upload(bytemuck::cast_slice(&snapshot.arriving))?;
         self.reflected.upload(bytemuck::cast_slice(&snapshot.reflected.units))
     }
 
-    /// Every buffer.
     pub fn buffers(&self) -> [&Buffer; 3] {
         [&self.arriving, &self.reflected, &self.arrivals]
     }

@@ -1,30 +1,27 @@
-//! Divides the memory of the guide between cells and regions: memory, counted rays → number of
-//! cells and regions.
+//! Divides the memory of the guide: memory, counted rays → number of cells and regions.
 
 use super::FACE_COUNT;
 
 /// Rays per cell and region required after the number of regions doubles.
 const RAYS_PER_REGION: u64 = 2;
 
-/// Memory budget of the guide.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GuideBudget {
-    /// Number of pairs of cell and region that the buffers hold.
+    /// Number of cell-region pairs that the buffers hold.
     pub counts: usize,
     /// Number of cells that the film can fill.
     pub useful_cells: usize,
-    /// Largest number of regions.
     pub max_regions: usize,
 }
 
 impl GuideBudget {
-    /// Number of cells there is room for with `region_count` regions each.
+    /// Number of cells that fit with `region_count` regions each.
     pub fn cells(&self, region_count: usize) -> usize {
         (self.counts / region_count).min(self.useful_cells).max(FACE_COUNT)
     }
 
-    /// Number of regions that should follow `now` ones: doubled as long as the `rays` counted in
-    /// `cells` cells suffice to tell them apart, and a fifth of the room for cells remains free.
+    /// Doubles the number of regions as long as the `rays` counted in `cells` cells suffice to tell
+    /// them apart and a fifth of the room for cells remains free.
     pub fn regions(&self, now: usize, cells: usize, rays: u64) -> usize {
         let mut count = now;
         loop {

@@ -1,4 +1,4 @@
-//! Learned visibility on the device: what passes read, what they count, and the rebuild in between.
+//! Device buffers of learned visibility, and the rebuild: counts of the passes → tables they read.
 
 use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
@@ -24,38 +24,36 @@ use crate::{
     },
 };
 
-/// Edge of a cell in pixels, where it is not limited by the scene.
+/// Pixels along the edge of a cell, unless the scene limits it.
 const CELL_PIXELS: f32 = 24.0;
-/// Cells along the longest side of the scene, at least.
+/// Smallest number of cells along the longest side of the scene.
 const CELLS_PER_SCENE: f32 = 20.0;
-/// Levels of size below the largest cell.
+/// Number of levels below the largest cell.
 const LEVELS: i32 = 12;
-/// Bytes of what a cell counts per region.
 const COUNT_BYTES: u64 = 4 * GUIDE_COUNT_WORDS as u64;
-/// Bytes of a cell per region: an entry to read and a count to write.
+/// Bytes of a cell per region: an entry to read and counts to write.
 const BYTES_PER_REGION: u64 = 8 + COUNT_BYTES;
-/// What counts are divided by where the geometry is another.
+/// Divisor of the counts when the geometry has changed.
 const FORGETTING: u32 = 8;
-/// Fewest cells there is room for, memory permitting.
+/// Number of cells that fit at least, memory permitting.
 const FEW_CELLS: u64 = 4096;
 /// Pixels per cell beyond those: no film can fill more.
 const PIXELS_PER_CELL: u64 = 4;
 
-/// Samples per pixel after which the map is split a second time; the first is after the training.
+/// Samples per pixel after which the map is split a second time; the first is after training.
 pub const SPLIT_AFTER: u32 = 16;
 
-/// Regions that a render starts with.
+/// Number of regions at the start of a render.
 const FIRST_REGIONS: usize = 256;
 
-/// The first number of samples, not below `samples`, after which the guide is rebuilt: 1, 2, 3, 4, 6,
-/// 8, 12, 16, 32, 64, …
+/// Returns the first rebuild at or after `samples` samples: 1, 2, 3, 4, 6, 8, 12, 16, 32, 64, …
 pub fn guide_schedule(samples: u32) -> u32 {
     let power = samples.next_power_of_two();
     let middle = power / 4 * 3;
     if middle >= samples && power <= SPLIT_AFTER { middle } else { power }
 }
 
-/// What the buffers of a guide are sized by.
+/// Quantities that determine the size of a guide's buffers.
 #[derive(Clone, Copy, Debug)]
 pub struct GuideSize {
     /// Pixels of the film.
@@ -64,19 +62,18 @@ pub struct GuideSize {
     pub paths: u32,
     /// Shadow rays of a path in one group.
     pub shadow_rays: u32,
-    /// Whether bounces are guided.
+    /// True if bounces are guided.
     pub has_bounces: bool,
 }
 
-/// Everything of one render that learns.
+/// Everything that learns in one render.
 pub struct GuideBuffers {
     device: Arc<Device>,
     set: DescriptorSet,
     partition: Partition,
-    /// Whether the regions are others than those of the start.
+    /// True if the regions differ from those at the start.
     is_split: bool,
     learned: Guide,
-    /// What passes read now.
     snapshot: Snapshot,
     budget: GuideBudget,
     origin: Origin,
@@ -92,17 +89,14 @@ pub struct GuideBuffers {
     missing: Buffer,
     targets: Buffer,
     path_cells: Buffer,
-    /// Where bounces are guided.
     arrivals: Option<ArrivalBuffers>,
     missing_slots: usize,
     rebuild_ms: f64,
 }
 
 impl GuideBuffers {
-    /// Splits the environment and makes room.
-    ///
-    /// # Errors
-    /// A limit of the device or a failing device.
+    /// Splits the environment and allocates the buffers. Fails if the device does or its limits are
+    /// exceeded.
     pub fn new(
         device: &Arc<Device>,
         scene: &Scene,
@@ -114,7 +108,7 @@ impl GuideBuffers {
         let region_count = partition.regions.len();
         let useful_cells = FEW_CELLS.max(u64::from(size.pixels) / PIXELS_PER_CELL) as usize;
         let useful_cells = useful_cells.min(MAX_CELLS);
-        // What cells take besides is most per region where these are fewest.
+        // The other memory of cells weighs most per region with the fewest regions.
         let besides = 4 * SHARE_WORDS as u64
             + if size.has_bounces { arrival_buffers::BYTES_PER_CELL } else { 0 };
         let by_memory =
@@ -204,15 +198,12 @@ impl GuideBuffers {
         Ok(buffers)
     }
 
-    /// The SRBF set, as `sample_guided` and `learn` see it.
+    /// Descriptor set 1.
     pub fn set(&self) -> &DescriptorSet {
         &self.set
     }
 
-    /// Starts from nothing.
-    ///
-    /// # Errors
-    /// A failing device.
+    /// Starts from nothing. Fails if the device does.
     pub fn forget(&mut self) -> Result<()> {
         if self.is_split {
             let alike = vec![1.0; self.partition.regions.len()];
@@ -233,16 +224,12 @@ impl GuideBuffers {
         self.upload()
     }
 
-    /// `learned` with what bounces taught, where they are guided.
     fn with_bounces(&self, learned: Guide, words: &[ArrivalWords], forget: u32) -> Guide {
         if self.arrivals.is_some() { learned.with_bounces(words, forget) } else { learned }
     }
 
-    /// Turns what passes counted into what the next ones read; splits the map anew where it is time
-    /// (`splits`) and where there is enough to tell more regions apart.
-    ///
-    /// # Errors
-    /// A failing device.
+    /// Turns the counts of passes into tables for the next ones. Splits the map again if `splits`,
+    /// or if the counts suffice to tell more regions apart. Fails if the device does.
     pub fn rebuild(&mut self, splits: bool) -> Result<()> {
         let start = Instant::now();
         let counted = self.learned.cell_count() * self.partition.regions.len();
@@ -278,7 +265,7 @@ impl GuideBuffers {
         Ok(())
     }
 
-    /// Host milliseconds of all rebuilds since the start.
+    /// Host milliseconds spent on rebuilds since the start.
     pub fn rebuild_ms(&self) -> f64 {
         self.rebuild_ms
     }
@@ -288,23 +275,14 @@ impl GuideBuffers {
         &self.partition
     }
 
-    /// For the first `count` shadow rays of the last group: region + number of regions · cell, or
-    /// `NOTHING_TO_LEARN`.
-    ///
-    /// # Errors
-    /// A failing device.
+    /// Reads the targets of the first `count` shadow rays of the last group: region + number of
+    /// regions · cell, or `NOTHING_TO_LEARN`. Fails if the device does.
     pub fn targets(&self, count: usize) -> Result<Vec<u32>> {
         let words: Vec<[u32; 2]> = self.targets.download(count)?;
         Ok(words.into_iter().map(|[target, _]| target).collect())
     }
 
-    /// What a cell knows, as passes read it.
-    ///
-    /// # Errors
-    /// A failing device.
-    ///
-    /// # Panics
-    /// If there is no such cell.
+    /// Returns a cell as passes read it. Fails if the device does, panics if there is no such cell.
     pub fn cell(&self, index: usize) -> Result<RecordedCell> {
         let key = self.learned.keys()[index];
         let level = match (index < FACE_COUNT, key.is_coarse()) {
@@ -325,10 +303,7 @@ impl GuideBuffers {
         Ok(RecordedCell { level, regions: regions.collect() })
     }
 
-    /// What was learned, with what was counted since the last rebuild.
-    ///
-    /// # Errors
-    /// A failing device.
+    /// Returns what was learned, and the counts since the last rebuild. Fails if the device does.
     pub fn state(&self) -> Result<GuideState> {
         let counted = self.learned.cell_count() * self.partition.regions.len();
         let missing = self.missing.download::<u32>(self.missing_slots)?;
@@ -355,11 +330,9 @@ impl GuideBuffers {
         })
     }
 
-    /// Continues from a state, in the grids of that one. Under another geometry most of what was
-    /// counted is forgotten. Returns whether that was so.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for another environment or number of regions; a failing device.
+    /// Continues from a state, in its grids. Returns true if the geometry differs, so that most
+    /// counts were forgotten. [`Error::Usage`] for another environment or number of regions. Fails
+    /// if the device does.
     pub fn restore(&mut self, state: &GuideState) -> Result<bool> {
         let (here, there) = (&self.origin, &state.origin);
         if here.environment != there.environment || there.regions > self.budget.max_regions as u32 {
@@ -432,13 +405,10 @@ impl GuideBuffers {
         Ok(())
     }
 
-    /// Forgets what passes counted since the last rebuild.
-    ///
-    /// # Errors
-    /// A failing device.
+    /// Forgets the counts since the last rebuild. Fails if the device does.
     pub fn clear_counts(&self) -> Result<()> {
         let mut commands = Commands::begin(&self.device)?;
-        // What lies behind belongs to no cell.
+        // The rest belongs to no cell.
         let used = self.learned.cell_count() * self.partition.regions.len();
         commands.fill_start(&self.counts, COUNT_BYTES * used as u64, 0);
         let used = self.learned.cell_count() * SHARE_WORDS;
@@ -483,8 +453,7 @@ impl GuideBuffers {
     }
 }
 
-/// First alias entry, columns, rows, first column and row of every region, and all alias entries, as
-/// they lie on the device.
+/// Returns first alias entry, columns, rows and first place of every region, and all alias entries.
 fn region_tables(partition: &Partition) -> (Vec<[u32; 4]>, Vec<[u32; 2]>) {
     let regions = partition.regions.iter().map(|region| {
         let first = region.first[0] | region.first[1] << 16;
@@ -497,7 +466,7 @@ fn region_tables(partition: &Partition) -> (Vec<[u32; 4]>, Vec<[u32; 2]>) {
     (regions.collect(), aliases.collect())
 }
 
-/// Cells about [`CELL_PIXELS`] wide in the picture, at most a twentieth of the scene.
+/// Makes cells about [`CELL_PIXELS`] wide in the picture, at most a twentieth of the scene.
 fn guide_parameters(
     scene: &Scene,
     region_count: usize,
@@ -516,8 +485,8 @@ fn guide_parameters(
         / scene.film.height.max(1) as f32;
     let largest_edge = size / CELLS_PER_SCENE;
     GuideParameters {
-        // A third of an edge of every level away from the corner of the scene, since walls at its sides
-        // should not lie between two cells.
+        // Shift the grid by a third of the largest edge from the corner of the scene, since walls
+        // at its sides should not lie between two cells.
         grid_origin: if low.is_finite() { (low - largest_edge / 3.0).into() } else { [0.0; 3] },
         finest_edge: largest_edge * 0.5_f32.powi(LEVELS),
         edge_per_distance: CELL_PIXELS * pixel_angle,

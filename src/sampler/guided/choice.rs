@@ -1,9 +1,8 @@
-//! Measures what candidates per shadow ray cost and bring, for `guided` with `candidates=auto`.
+//! Measures cost and gain of candidates per shadow ray, for `guided` with `candidates=auto`.
 //!
-//! The same pixels are rendered by 1 and by 4 candidates in turns, with the guide as the first sample
-//! of the picture will find it; where 4 are worth it, by 4 and by 8. These rays are counted as rays
-//! and as time. Nothing of them is in the picture, and nothing is learned from them, so that the
-//! picture depends on what was measured by the number that is chosen and by nothing else.
+//! Renders the same pixels with 1 and with 4 candidates in turns, with the guide as the first sample
+//! of the picture will find it, and with 4 and 8 if 4 pay off. These rays count as rays and as time,
+//! but add nothing to the picture and teach nothing: only the chosen number depends on them.
 
 use std::{collections::BTreeMap, time::Instant};
 
@@ -25,42 +24,40 @@ use crate::{
     shader::structs::{PathState, Wave},
 };
 
-/// Tells the random numbers of measurements from those of the training and of the picture.
+/// Separates the random numbers of measurements from those of the training and of the picture.
 const MEASURING_SEED: u32 = 0x2c1b_3c6d;
-/// Most waves of each number of candidates in a comparison, in turns and over other pixels. The
-/// comparison ends early where more candidates lose clearly, since not to take them is never wrong by
-/// much.
+/// Largest number of waves per number of candidates in a comparison, in turns and over other pixels.
+/// The comparison ends early if more candidates clearly lose: declining them is never wrong by much.
 const MOST_ROUNDS: u32 = 4;
-/// Pixels from one to the next in film order, at least: one row or column of each of its blocks.
+/// Least step between pixels in film order: one row or column of each of its blocks.
 const STRIDE: u32 = 8;
 /// Most pixels in a wave; a larger film needs no more to tell which number is better.
 const MEASURED_PIXELS: u32 = 4096;
-/// Measured pixels in a row that are a block of [`PixelSpread`]: enough that the logarithm of a block's
-/// variance does not mistake a distribution with few large values for a narrow one.
+/// Consecutive measured pixels in a block of [`PixelSpread`]: enough that the logarithm of a
+/// block's variance does not mistake a distribution with few large values for a narrow one.
 const PIXELS_PER_BLOCK: usize = 32;
 /// Samples of each pixel in a wave, to see how they differ.
 const FEWEST_SAMPLES: u32 = 4;
-/// More where they take less than [`LEAST_MS`].
+/// Limit on the samples if fewer take less than [`LEAST_MS`].
 const MOST_SAMPLES: u32 = 64;
-/// Device milliseconds of a wave below which it is too short to be timed, or to fill the device.
+/// Device milliseconds below which a wave is too short to be timed or to fill the device.
 const LEAST_MS: f64 = 10.0;
 
-/// From how many candidates `guided` chooses, and why.
+/// Number of candidates that `guided` chose, and why.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Choice {
-    /// The number; absent where it is not decided, and for other samplers.
+    /// The number; `None` while undecided.
     pub(super) candidates: Option<u32>,
-    /// What was measured for it; empty where it was not.
+    /// Measurements behind it; empty if there were none.
     pub(super) costs: Vec<CandidateCost>,
-    /// Wall milliseconds that the measurement took.
     pub(super) ms: f64,
 }
 
-/// Waves of one number of candidates.
+/// Measurements for one number of candidates.
 #[derive(Default)]
 struct Measured {
-    /// Of the first wave for the fewest candidates. For more it is that of fewer times a ratio of
-    /// waves that followed each other, since other work may slow all of them down.
+    /// For the fewest candidates from their first wave. For more, that of fewer times a ratio of
+    /// consecutive waves, since other work may slow all of them down.
     ms_per_path: Option<f64>,
     spread: PixelSpread,
 }
@@ -84,7 +81,7 @@ impl Passes for Trial<'_> {
 }
 
 impl Trial<'_> {
-    /// Measures and chooses. The counts since the last rebuild are forgotten.
+    /// Measures and chooses. Forgets the counts since the last rebuild.
     pub(super) fn choose(mut self, runner: &mut Runner, progress: &Progress) -> Result<Choice> {
         let start = Instant::now();
         let mut measured = BTreeMap::new();
@@ -130,8 +127,8 @@ impl Trial<'_> {
         Ok(Choice { candidates: Some(chosen), costs, ms })
     }
 
-    /// Samples of each pixel for a wave of at least [`LEAST_MS`], if there is room. What is traced to
-    /// find this out also wakes the device and is not used.
+    /// Finds the samples per pixel for a wave of at least [`LEAST_MS`], if there is room. The rays
+    /// traced to find them also wake the device and are not used.
     fn samples_to_measure(
         &mut self,
         runner: &mut Runner,
@@ -148,7 +145,7 @@ impl Trial<'_> {
         Ok(samples.max(FEWEST_SAMPLES))
     }
 
-    /// Renders a wave and reads it back: device milliseconds and the paths, sample after sample.
+    /// Renders a wave and returns device milliseconds and the paths, sample after sample.
     fn measure(
         &mut self,
         runner: &mut Runner,
@@ -178,7 +175,7 @@ impl Trial<'_> {
     }
 }
 
-/// Pixels from one to the next, and their number.
+/// Returns the step between measured pixels, and their number.
 fn measured_pixels(runner: &Runner) -> (u32, u32) {
     let pixels = runner.film().padded_pixels();
     let most = MEASURED_PIXELS.min(runner.waves().capacity() / FEWEST_SAMPLES);
@@ -193,7 +190,7 @@ impl Measured {
         let pixel_count = paths.len() / samples as usize;
         for pixel in 0..pixel_count {
             let of_pixel = || paths[pixel..].iter().step_by(pixel_count);
-            // Blocks of the film reach beyond its edge.
+            // Skip pixels in blocks beyond the edge of the film.
             if of_pixel().any(|path| path.rays_traced == 0) {
                 continue;
             }
@@ -205,8 +202,7 @@ impl Measured {
     }
 }
 
-/// What samples of a film of so many pixels cost, in ascending order; empty where no variance could
-/// be measured.
+/// Returns the cost of a sample of `pixels` pixels by candidates; empty without any variance.
 fn costs_of(measured: &BTreeMap<u32, Measured>, pixels: u32) -> Vec<CandidateCost> {
     let spreads: Vec<&PixelSpread> = measured.values().map(|measured| &measured.spread).collect();
     let variances = relative_variances(&spreads).unwrap_or_default();

@@ -1,19 +1,17 @@
 //! Sampler `guided`: learns visibility and reflection between passes.
 //!
-//! The environment is split into up to 1024 rectangles of its sampling cells ([`Partition`]);
-//! within a rectangle, directions are drawn exactly in proportion to the map. The [`Guide`] learns
-//! how often each rectangle is visible from each cell of the scene and how strongly the surfaces
-//! there reflect it: passes count rays, and between passes [`Estimates`] turns the counts into the
-//! probabilities that the next passes read. It learns from bounce rays where light arrives from
-//! other surfaces ([`ArrivingLight`]). Now and then the environment is split again, into more
-//! rectangles and finely where the scene sees it.
+//! Splits the environment into up to 1024 rectangles of its sampling cells ([`Partition`]) and draws
+//! directions within a rectangle exactly in proportion to the map. The [`Guide`] learns how often each
+//! rectangle is visible from each cell of the scene, and how strongly the surfaces there reflect it:
+//! passes count rays, and between passes [`Estimates`] turns the counts into probabilities for the
+//! next ones. From bounce rays it learns where light arrives from other surfaces ([`ArrivingLight`]).
+//! Now and then it splits the environment again, into more rectangles, finely where the scene sees it.
 //!
 //! A pass reads only tables learned by earlier passes ([`Snapshot`]). Its samples are therefore
-//! independent of the tables, and every estimate stays unbiased (Vévoda et al. 2018 learn light
-//! sources in this way).
+//! independent of them and every estimate stays unbiased, as in Vévoda et al. 2018 for light sources.
 //!
-//! Rectangles, counts → `guide_regions`, `guide_entries`, `guide_arriving` on the device; shaders
-//! `sample_guided` and `bounce_guided`.
+//! Rectangles, counts → `guide_regions`, `guide_entries`, `guide_arriving`, read by `sample_guided`
+//! and `bounce_guided`.
 
 mod arrival_buffers;
 mod arriving;

@@ -2,16 +2,16 @@
 
 use crate::sampler::knob::{self, Knob};
 
-/// Parameters of `guided`, beside the number of candidates.
+/// Parameters of `guided`, apart from the number of candidates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuidedParameters {
-    /// `bounce-candidates`: directions from the BRDF that each bounce is chosen from by the light that
-    /// cells have learned to arrive from there, 1 to 16; 1 learns and chooses nothing.
+    /// `bounce-candidates`: BRDF directions to choose each bounce from by learned arriving light, 1
+    /// to 16; 1 turns learning and choosing off.
     pub bounce_candidates: u32,
     /// `guide-memory`: most bytes for the cells.
     pub guide_memory: u64,
-    /// `later-rays`: most shadow rays at each vertex that the camera does not see; `None` is `auto`,
-    /// half of `--shadow-rays`.
+    /// `later-rays`: most shadow rays at each vertex after the first; `None` is `auto`, half of
+    /// `--shadow-rays`.
     pub later_rays: Option<u32>,
     /// `regions`: most regions of the environment, 16 to 1024; a render starts with 256.
     pub regions: u32,
@@ -24,7 +24,6 @@ impl Default for GuidedParameters {
 }
 
 impl GuidedParameters {
-    /// Keys of `--set`.
     pub(in crate::sampler) const KNOBS: &'static [Knob<Self>] = &[
         Knob {
             key: "bounce-candidates",
@@ -52,19 +51,19 @@ impl GuidedParameters {
         },
     ];
 
-    /// Shadow rays at each later vertex of `shadow_rays` at the first: less of the error comes from
-    /// there, and every ray costs as much (`docs/experiments/later_rays.md`).
+    /// Returns the shadow rays at each later vertex, given `shadow_rays` at the first: later
+    /// vertices cause less of the error at the same cost per ray (`docs/experiments/later_rays.md`).
     pub fn later_rays_of(&self, shadow_rays: u32) -> u32 {
         self.later_rays.unwrap_or((shadow_rays / 2).max(1)).min(shadow_rays)
     }
 
-    /// Returns true if the bounces of paths of `depth` vertices are guided.
+    /// Returns true if paths of `depth` vertices have guided bounces.
     pub fn guides_bounces(&self, depth: u32) -> bool {
         depth > 1 && self.bounce_candidates > 1
     }
 }
 
-/// Bytes from a number with an optional unit: B, KiB, MiB, GiB.
+/// Parses a number of bytes with an optional unit: B, KiB, MiB, GiB.
 fn parse_bytes(text: &str) -> Option<u64> {
     let digits = text.len() - text.trim_start_matches(|c: char| c.is_ascii_digit()).len();
     let number: u64 = text[..digits].parse().ok()?;

@@ -1,7 +1,7 @@
-//! What the sampler `guided` knows and does at one pixel, read back from the device.
+//! Knowledge and choices of the sampler `guided` at one pixel, read back from the device.
 //!
-//! Its choices rest on what the whole picture taught it, so the renderer of that picture traces the next
-//! samples of one pixel with its tables as they stand. The light they gather is not kept.
+//! Its choices depend on what the whole picture taught it. The renderer of that picture therefore
+//! traces the next samples of one pixel with its current tables and discards their light.
 
 use glam::Vec3;
 
@@ -28,14 +28,14 @@ pub struct RecordedRay {
     pub is_visible: bool,
 }
 
-/// A shadow ray with what it belongs to.
+/// A shadow ray with its sample and region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuidedRay {
     /// The ray.
     pub ray: RecordedRay,
     /// Index of its sample.
     pub sample: u32,
-    /// Region of the environment; absent for rays that brought nothing.
+    /// Region of the environment; `None` for rays without a contribution.
     pub region: Option<usize>,
 }
 
@@ -46,26 +46,21 @@ pub struct RecordedGuide {
     pub position: Vec3,
     /// Unit shading normal there.
     pub normal: Vec3,
-    /// Rays of all samples whose camera ray hit something, sample after sample; of more than eight rays
-    /// a hit, the last group.
+    /// Rays of all samples with a hit, in sample order; of more than eight rays a hit, the last group.
     pub rays: Vec<GuidedRay>,
-    /// The cell that the first of the samples with a ray to trace found; absent where the scene is
-    /// open or no ray brought anything.
+    /// Cell of the first sample with a ray to trace; `None` if the scene is open or no ray contributed.
     pub cell: Option<RecordedCell>,
     /// The regions of the environment.
     pub partition: Partition,
 }
 
 impl Guided {
-    /// Traces `rays` shadow rays of the pixel at `x`, `y` of the film, in whole samples that follow those
-    /// in the film and as far as a wave has room; `None` where no camera ray hit anything. The rays are
-    /// counted among those to learn from, so the render had better not go on.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if the device fails.
+    /// Traces `rays` shadow rays of film pixel `x`, `y`, in whole samples after those in the film
+    /// and as far as a wave has room; `None` if no camera ray hits anything. Counts the rays for
+    /// learning, so the render should not continue. Fails if the device does.
     ///
     /// # Panics
-    /// If the pixel is not in the window.
+    /// If the pixel is outside the window.
     pub fn record_pixel(
         &self,
         runner: &mut Runner,

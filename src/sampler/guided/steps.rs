@@ -1,5 +1,5 @@
-//! The passes of learned visibility: `sample_guided` in the place of `sample`, `learn` after the shadow
-//! rays; `bounce_guided` in the place of `bounce`, and `learn_arrivals` where its rays arrived.
+//! Passes of learned visibility: `sample_guided` replaces `sample`, then `learn` after the shadow
+//! rays; `bounce_guided` replaces `bounce`, then `learn_arrivals` at the next vertex.
 
 use super::parameters::GuidedParameters;
 use crate::{
@@ -14,7 +14,7 @@ use crate::{
     },
 };
 
-/// The steps of the sampler `guided`.
+/// Steps of `guided`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuidedSteps {
     /// Candidates per shadow ray, a quarter of them from the BRDF; 1 is the one-sample model.
@@ -26,7 +26,7 @@ pub struct GuidedSteps {
 }
 
 impl GuidedSteps {
-    /// The steps of a render.
+    /// Returns the steps of a render.
     pub fn new(candidates: u32, parameters: GuidedParameters, settings: &PassSettings) -> Self {
         Self {
             candidates,
@@ -37,7 +37,7 @@ impl GuidedSteps {
         }
     }
 
-    /// The same steps with another number of candidates.
+    /// Returns the same steps with another number of candidates.
     pub fn with_candidates(self, candidates: u32) -> Self {
         Self { candidates, ..self }
     }

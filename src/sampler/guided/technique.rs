@@ -1,4 +1,4 @@
-//! `guided` in one render: when it trains, rebuilds and chooses, and what it hands on.
+//! `guided` in one render: its training, rebuilds, choice of candidates, and reports.
 
 use super::{
     buffers::{GuideBuffers, GuideSize, SPLIT_AFTER, guide_schedule},
@@ -23,13 +23,11 @@ use crate::{
 };
 use std::collections::BTreeMap;
 
-/// Sweeps that teach the guide before the first sample, each over one pixel in as many.
+/// Training sweeps before the first sample; each covers one pixel in this many.
 const TRAINING_SWEEPS: u32 = 8;
-/// Share of visible rays above which a scene is rendered as by `mis`: little is blocked, and learning
-/// costs more than it brings.
+/// Share of visible rays above which a scene is open and rendered as by `mis`: learning would not pay.
 const OPEN_SHARE: f64 = 0.5;
 
-/// The room of `guided`.
 pub(in crate::sampler) struct GuidedRoom;
 
 impl Room for GuidedRoom {
@@ -73,7 +71,7 @@ impl Room for GuidedRoom {
     }
 }
 
-/// Candidates per shadow ray until the choice is made.
+/// Returns the candidates per shadow ray until the choice is made.
 fn first_candidates(parameters: &Parameters) -> Result<u32> {
     parameters.candidates_among("guided", &GUIDED_CANDIDATES, GUIDED_CANDIDATES[0])
 }
@@ -82,14 +80,13 @@ fn first_candidates(parameters: &Parameters) -> Result<u32> {
 pub struct Guided {
     pub(super) buffers: GuideBuffers,
     steps: GuidedSteps,
-    /// Those of `mis`, for scenes where nothing is blocked.
+    /// Steps of `mis`, for open scenes.
     open_steps: BasicSteps,
-    /// Candidates that were asked for; none under `auto`.
+    /// Number of candidates that the user asked for; `None` for `auto`.
     given_candidates: Option<u32>,
     choice: Choice,
-    /// True once the training sweeps are behind.
     is_trained: bool,
-    /// True if so little is blocked that there is nothing to learn.
+    /// True if too little is blocked to learn anything.
     pub(super) is_open: bool,
     /// Samples per pixel at the last rebuild of the guide.
     pub(super) rebuilt_at: u32,
@@ -98,10 +95,7 @@ pub struct Guided {
 }
 
 impl Guided {
-    /// What was learned so far, in a film of `samples` samples per pixel.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if the device fails.
+    /// Returns what was learned in a film of `samples` samples per pixel. Fails if the device does.
     pub fn state(&self, samples: u32) -> Result<GuideState> {
         Ok(GuideState {
             samples,
@@ -113,14 +107,13 @@ impl Guided {
         })
     }
 
-    /// Goes on from what an earlier render learned, without training. With as many samples in the film
-    /// as the state was taken at, this continues that render to the bit. Under `candidates=auto` the
-    /// number that one chose is taken too. Returns true if the geometry is another, so that most was
-    /// forgotten.
+    /// Continues from what an earlier render learned, without training: bit for bit, if the film
+    /// holds as many samples as it did when the state was taken. Under `candidates=auto` takes its
+    /// choice too. Returns true if the geometry differs, so that most was forgotten.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] if the environment or the regions differ; [`crate::Error::Vulkan`] if
-    /// the device fails.
+    /// [`crate::Error::Usage`] if environment or regions differ; [`crate::Error::Vulkan`] if the
+    /// device fails.
     pub fn restore(
         &mut self,
         runner: &mut Runner,
@@ -146,13 +139,13 @@ impl Guided {
         Ok(has_moved)
     }
 
-    /// Undoes the choice, if there is one to make.
+    /// Undoes the choice, unless the user made it.
     fn forget_choice(&mut self) {
         self.choice = Choice { candidates: self.given_candidates, ..Choice::default() };
         self.steps.candidates = self.given_candidates.unwrap_or(GUIDED_CANDIDATES[0]);
     }
 
-    /// Takes a choice that was measured, here or by an earlier render, if there is one to make.
+    /// Takes a choice measured here or by an earlier render, unless the user made it.
     fn take_choice(&mut self, choice: Choice) {
         if self.given_candidates.is_none() {
             self.steps.candidates = choice.candidates.unwrap_or(self.steps.candidates);
@@ -160,8 +153,7 @@ impl Guided {
         }
     }
 
-    /// Candidates that each shadow ray is chosen from; none where `auto` has not been decided yet, and
-    /// in open scenes.
+    /// Returns the candidates per shadow ray; `None` while `auto` is undecided, and in open scenes.
     fn candidates(&self) -> Option<u32> {
         self.choice.candidates.filter(|_| !self.is_open)
     }
@@ -171,7 +163,7 @@ impl Guided {
         self.buffers.rebuild(splits)
     }
 
-    /// Sweeps over parts of the film to learn from. Finds out whether the scene is open.
+    /// Trains on sweeps over parts of the film and finds out whether the scene is open.
     fn train(&mut self, runner: &mut Runner, progress: &Progress) -> Result<()> {
         for sweep in 0..TRAINING_SWEEPS {
             let wave = Wave {
@@ -187,8 +179,8 @@ impl Guided {
             let before = runner.totals().clone();
             runner.sweep(self, wave, runner.film().padded_pixels() / TRAINING_SWEEPS)?;
             runner.take_counters()?;
-            // The first sweep draws by environment and BRDF alone: nothing is known yet. It is
-            // not in the picture, so the picture does not depend on its own samples here.
+            // The first sweep samples only environment and BRDF: nothing is known yet. It is not in
+            // the picture, so the picture does not depend on its own samples here.
             let visible = runner.totals().shadow_rays_visible - before.shadow_rays_visible;
             let traced = runner.totals().shadow_rays_traced - before.shadow_rays_traced;
             if sweep == 0 && visible as f64 > OPEN_SHARE * traced as f64 {
@@ -196,7 +188,7 @@ impl Guided {
                 self.is_open = true;
                 return Ok(());
             }
-            // Every rebuild costs time: after 1, 2, 4 and 8 sweeps.
+            // Rebuild only after 1, 2, 4 and 8 sweeps: every rebuild costs time.
             if (sweep + 1).is_power_of_two() {
                 self.rebuild(sweep + 1 == TRAINING_SWEEPS, progress.sample_count)?;
             }

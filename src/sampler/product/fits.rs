@@ -1,4 +1,4 @@
-//! The fits of environment and materials on the device, for `product` and `visibility`.
+//! Fits of environment and materials on the device, for `product` and `visibility`.
 
 use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
@@ -18,18 +18,18 @@ use crate::{
 /// Sizes of the fits on the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitSizes {
-    /// Lobes of the environment; 0 where nothing could be fitted.
+    /// Lobes of the environment; 0 if nothing could be fitted.
     pub environment_lobes: u32,
     /// Logarithm of the largest integral of an environment lobe over 2π, in the form of
-    /// `multiply_lobes.comp`; of the largest amplitude where lobes are ordered by coefficient.
+    /// `multiply_lobes.comp`, or of the largest amplitude if lobes are ordered by coefficient.
     pub strongest_environment_lobe: f32,
-    /// Most lobes of a material in one view.
+    /// Largest number of lobes of a material in one view.
     pub brdf_lobes: u32,
-    /// View elevations.
+    /// Number of view elevations.
     pub views: u32,
 }
 
-/// The SRBF tables of a scene.
+/// SRBF tables of a scene.
 pub struct Fits {
     buffers: [Buffer; 3],
     sizes: FitSizes,
@@ -38,11 +38,9 @@ pub struct Fits {
 }
 
 impl Fits {
-    /// Fits the environment and every material, or takes the fits from the user's cache, and uploads
-    /// them. What cannot be fitted, as a black map or material, has no lobes and a warning.
-    ///
-    /// # Errors
-    /// Numbers of lobes or views out of range; a failing device.
+    /// Fits the environment and every material, or takes the fits from the user's cache, and
+    /// uploads them. A black map or material, which cannot be fitted, gets no lobes and a warning.
+    /// Fails if numbers of lobes or views are out of range, or if the device fails.
     pub fn new(
         device: &Arc<Device>,
         scene: &Scene,
@@ -113,7 +111,7 @@ impl Fits {
         Ok(Self { buffers, sizes, hashes, fit_ms })
     }
 
-    /// The tables with their bindings.
+    /// Returns the tables with their bindings.
     pub fn bindings(&self) -> Vec<(Binding, &Buffer)> {
         [product::ENVIRONMENT_LOBES, product::BRDF_LOBES, product::MATERIAL_LOBES]
             .into_iter()
@@ -126,12 +124,12 @@ impl Fits {
         self.sizes
     }
 
-    /// Hash of each fit by what was fitted.
+    /// Hash of each fit, by the name of its input.
     pub fn hashes(&self) -> &BTreeMap<String, String> {
         &self.hashes
     }
 
-    /// Milliseconds for all fits, or for finding them in the cache.
+    /// Milliseconds spent on all fits, or on finding them in the cache.
     pub fn fit_ms(&self) -> f64 {
         self.fit_ms
     }
@@ -142,7 +140,6 @@ impl Fits {
     }
 }
 
-/// A fit, or a warning where there is nothing to fit.
 fn or_warn<T>(fitted: Result<T>) -> Result<Option<T>> {
     match fitted {
         Ok(fit) => Ok(Some(fit)),
@@ -154,15 +151,15 @@ fn or_warn<T>(fitted: Result<T>) -> Result<Option<T>> {
     }
 }
 
-/// The texel of a lobe: what adds up where lobes are multiplied, see `ENVIRONMENT_LOBES`.
+/// Returns the texel of a lobe: exponents that add up in products, see `ENVIRONMENT_LOBES`.
 fn exponents(axis: [f32; 3], bandwidth: f32, amplitude: f32) -> [f32; 4] {
     let [x, y, z] = axis.map(|component| bandwidth * component);
-    // A lobe of no amplitude is weaker than all others.
+    // A lobe without amplitude is weaker than all others.
     let logarithm = if amplitude > 0.0 { amplitude.ln() } else { -1e30 };
     [x, y, z, logarithm - bandwidth]
 }
 
-/// Appends the lobes of all views; returns how many each view has.
+/// Appends the lobes of all views; returns the number per view.
 fn append(lobes: &mut Vec<[f32; 4]>, fit: &BrdfFit) -> u32 {
     lobes.extend(
         fit.views

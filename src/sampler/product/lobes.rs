@@ -1,4 +1,4 @@
-//! Lobes of the product at every hit of a wave, on the device, with the fits they are made from.
+//! Product lobes of all hits of a wave on the device, with the fits they are made from.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -13,20 +13,20 @@ use crate::{
     },
 };
 
-/// Size of everything that is kept for the lobes of a path.
+/// Storage for the lobes of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LobeSize {
     /// Lobes kept per path.
     pub kept_lobes: u32,
     /// Directions in a visibility cache; 0 without one.
     pub cache_capacity: u32,
-    /// Pixels of the window, where caches belong to pixels; none where they belong to paths.
+    /// Pixels of the window if caches belong to pixels; `None` if they belong to paths.
     pub cached_pixels: Option<u64>,
 }
 
 impl LobeSize {
-    /// Words per path that tell which lobes cached directions are close to: `MASK_WORDS` of
-    /// `cache.glsl` for every place of the cache and for the direction under way.
+    /// Words per path for the lobes close to cached directions: `MASK_WORDS` of `cache.glsl` for
+    /// every place of the cache and for the direction under way.
     fn mask_words(self) -> u64 {
         u64::from(self.kept_lobes.div_ceil(32)) * (u64::from(self.cache_capacity) + 1)
     }
@@ -48,10 +48,7 @@ pub struct LobeBuffers {
 }
 
 impl LobeBuffers {
-    /// Makes room for the lobes of `paths` paths.
-    ///
-    /// # Errors
-    /// A limit of the device or a failing device.
+    /// Allocates the lobes of `paths` paths. Fails if the device does or its limits are exceeded.
     pub fn new(device: &Arc<Device>, fits: Fits, size: LobeSize, paths: u32) -> Result<Self> {
         let paths = u64::from(paths);
         let lobes = u64::from(size.kept_lobes);
@@ -82,7 +79,7 @@ impl LobeBuffers {
         Ok(Self { set, buffers, fits })
     }
 
-    /// The set of the sampler.
+    /// Descriptor set 1.
     pub fn set(&self) -> &DescriptorSet {
         &self.set
     }
@@ -102,12 +99,12 @@ impl LobeBuffers {
         &self.buffers[1]
     }
 
-    /// Masks of the lobes that cached directions are close to (`cache.glsl`).
+    /// Masks of the lobes close to cached directions (`cache.glsl`).
     pub fn close_lobes(&self) -> &Buffer {
         &self.buffers[3]
     }
 
-    /// Visibility caches: a head and directions each.
+    /// Visibility caches: a head and its directions each.
     pub fn caches(&self) -> &Buffer {
         &self.buffers[4]
     }

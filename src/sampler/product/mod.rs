@@ -1,8 +1,8 @@
 //! Product sampling: directions from the lobes of environment × BRDF. \[Tsai et al. 2008\].
 //!
-//! [`Fits`] of the environment and of every material → [`LobeBuffers`] → per hit the product's
-//! strongest lobes (`glsl/product/multiply_lobes.comp`) → directions from their mixture with shares of
-//! the BRDF's and the environment's own sampling (`glsl/product/sample_lobes.comp`).
+//! [`Fits`] of the environment and of every material → [`LobeBuffers`] → strongest lobes of the
+//! product at each hit (`glsl/product/multiply_lobes.comp`) → directions from the mixture of lobes,
+//! BRDF and environment (`glsl/product/sample_lobes.comp`).
 
 mod fits;
 mod lobes;
@@ -24,10 +24,8 @@ use crate::{
     pass::{Passes, PathDemand, Report, Steps, Technique},
 };
 
-/// The room of `product`.
 pub(super) struct ProductRoom;
 
-/// Size of the lobes without a visibility cache.
 fn size(parameters: &ProductParameters) -> LobeSize {
     LobeSize { kept_lobes: parameters.kept_lobes, cache_capacity: 0, cached_pixels: None }
 }
@@ -85,7 +83,6 @@ impl Technique for Product {
     }
 }
 
-/// Figures of samplers with lobes.
 pub(super) fn report(lobes: &LobeBuffers) -> Report {
     Report {
         host_ms: [("fits".to_owned(), lobes.fits().fit_ms())].into(),

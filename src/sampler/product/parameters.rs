@@ -5,19 +5,19 @@ use crate::{
     sampler::knob::{self, Knob},
 };
 
-/// By what the lobes of a product are ordered before the weakest are dropped.
+/// Order of the lobes of a product for dropping the weakest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LobeOrder {
-    /// Their integral over the sphere.
+    /// By integral over the sphere.
     Integral,
-    /// Their coefficient, as in the thesis.
+    /// By coefficient, as in the thesis.
     Coefficient,
 }
 
 const ORDERS: &[(&str, LobeOrder)] =
     &[("integral", LobeOrder::Integral), ("coefficient", LobeOrder::Coefficient)];
 
-/// How the elevation of a direction within its lobe is drawn.
+/// Method of sampling the elevation of a direction within its lobe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Elevation {
     /// By inversion of the closed form.
@@ -38,7 +38,7 @@ pub struct ProductParameters {
     pub brdf_lobes: u32,
     /// `views`: view elevations at which a material is fitted; a hit takes the nearest.
     pub views: u32,
-    /// `lobes`: lobes of the product that are kept at a hit.
+    /// `lobes`: product lobes kept at a hit.
     pub kept_lobes: u32,
     /// `order`: `integral` or `coefficient`.
     pub order: LobeOrder,
@@ -65,12 +65,11 @@ impl Default for ProductParameters {
     }
 }
 
-/// Most products at a hit. Mesa 22.3 ends the loops of an invocation after 65,535 rounds in all; the
-/// pass `multiply_lobes` makes up to 17 for every environment lobe and 20 BRDF lobes.
+/// Largest number of products at a hit. Mesa 22.3 ends the loops of an invocation after 65,535
+/// rounds in all; `multiply_lobes` makes up to 17 for every environment lobe and 20 BRDF lobes.
 const MOST_PAIRS: u32 = 25_000;
 
 impl ProductParameters {
-    /// Keys of `--set`.
     pub(in crate::sampler) const KNOBS: &'static [Knob<Self>] = &[
         Knob {
             key: "environment-lobes",
@@ -117,8 +116,8 @@ impl ProductParameters {
         },
     ];
 
-    /// The thesis to the letter where the letter is sound: lobes by coefficient, and of the shares
-    /// that it does not have only as much as keeps the sampler unbiased.
+    /// Follows the thesis to the letter where it is sound: lobes by coefficient, and of the shares
+    /// that it lacks only as much as keeps the sampler unbiased.
     pub fn strict() -> Self {
         Self {
             order: LobeOrder::Coefficient,
@@ -128,10 +127,7 @@ impl ProductParameters {
         }
     }
 
-    /// Refuses combinations that cannot be rendered.
-    ///
-    /// # Errors
-    /// [`Error::Usage`].
+    /// Returns [`Error::Usage`] for combinations that cannot be rendered.
     pub fn check(&self) -> Result<()> {
         if self.brdf_share + self.environment_share > 1.0 {
             return Err(Error::usage(format!(

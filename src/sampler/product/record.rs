@@ -1,4 +1,4 @@
-//! The lobes at one hit, read back from the device.
+//! Product lobes at one hit, read back from the device.
 
 use glam::Vec3;
 
@@ -18,19 +18,13 @@ pub struct RecordedLobe {
     pub after: f64,
 }
 
-/// Number of lobes of the first path of the last wave.
-///
-/// # Errors
-/// [`crate::Error::Vulkan`] if the device fails.
+/// Number of lobes of the first path of the last wave. Fails if the device does.
 pub fn lobe_count(buffers: &LobeBuffers) -> Result<usize> {
     Ok(buffers.counts().download::<u32>(1)?.first().map_or(0, |count| *count as usize))
 }
 
-/// Reads the lobes of the first path of a wave of one block: fills `lobes` on the first call, and their
-/// last probabilities on every one. `factors` are the visibility weights V.
-///
-/// # Errors
-/// [`crate::Error::Vulkan`] if the device fails.
+/// Reads the lobes of the first path in a wave of one block: fills `lobes` on the first call, updates
+/// their last probabilities on every call. `factors` are the weights V. Fails if the device does.
 pub fn read_lobes(
     buffers: &LobeBuffers,
     factors: &[f64],
@@ -59,7 +53,6 @@ pub fn read_lobes(
     Ok(())
 }
 
-/// The half in the lower 16 bits.
 fn half(word: u32) -> f32 {
     half::f16::from_bits(word as u16).to_f32()
 }

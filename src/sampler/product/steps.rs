@@ -1,4 +1,4 @@
-//! The passes of product sampling: `multiply_lobes` once per hit, `sample_lobes` per group of rays.
+//! Passes of product sampling: `multiply_lobes` once per hit, `sample_lobes` per group of rays.
 
 use super::{
     fits::FitSizes,
@@ -17,7 +17,7 @@ use crate::{
     },
 };
 
-/// The steps of `product`, and those of `visibility` that it has in common with it.
+/// Steps of `product`, also used by `visibility`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProductSteps {
     /// Parameters of product sampling.
@@ -33,12 +33,12 @@ pub struct ProductSteps {
 }
 
 impl ProductSteps {
-    /// The steps of the sampler `product`.
+    /// Returns the steps of `product`.
     pub fn new(parameters: ProductParameters, fits: FitSizes, material_kinds: u32) -> Self {
         Self { parameters, fits, material_kinds, sampler: SAMPLER_PRODUCT, cache: Vec::new() }
     }
 
-    /// A pass over paths that knows lobes and cache.
+    /// Makes a kernel over paths that knows lobes and cache.
     pub fn kernel(&self, shader: &'static str, constants: &[(u32, u32)]) -> Kernel {
         let mut all = vec![(CONSTANT_KEPT_LOBES, self.parameters.kept_lobes)];
         all.extend(&self.cache);

@@ -1,8 +1,7 @@
-//! Visibility guidance: product sampling with less weight on lobes near directions that turned out
-//! blocked. \[Wu & Shih 2009\], the thesis.
+//! Visibility guidance: product sampling with less weight on lobes near blocked directions.
 //!
-//! After each shadow ray `glsl/visibility/record_blocked.comp` writes a blocked direction to the
-//! visibility cache of the hit, and `reweight.comp` adds up the weights of the lobes anew.
+//! After each shadow ray `record_blocked.comp` records a blocked direction in the visibility cache of
+//! the hit, and `reweight.comp` sums the weights of the lobes anew. \[Wu & Shih 2009\], the thesis.
 
 mod parameters;
 mod record;
@@ -24,10 +23,9 @@ use crate::{
     pass::{Passes, PathDemand, Progress, Report, Runner, Steps, Technique},
 };
 
-/// The room of `visibility`.
 pub(super) struct VisibilityRoom;
 
-/// Size of lobes and caches, without the pixels of the film.
+/// Size of lobes and caches, without caches of pixels.
 fn size(parameters: &Parameters, shadow_rays: u32) -> LobeSize {
     LobeSize {
         kept_lobes: parameters.product.kept_lobes,

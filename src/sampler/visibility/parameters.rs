@@ -5,19 +5,19 @@ use crate::{
     sampler::knob::{self, Knob},
 };
 
-/// When a direction counts as close to a lobe.
+/// Criterion for a direction close to a lobe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Threshold {
     /// `1 − ξ·d < τσ` with the deviation σ of the lobe (Wu & Shih 2009, Eq. 9 and 10).
     Sigma,
-    /// The same for all lobes: σ of the bandwidth 20.
+    /// The same for all lobes: σ of bandwidth 20.
     Fixed,
 }
 
 const THRESHOLDS: &[(&str, Threshold)] =
     &[("sigma", Threshold::Sigma), ("fixed", Threshold::Fixed)];
 
-/// How long a visibility cache lives.
+/// Lifetime of a visibility cache.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CacheScope {
     /// One hit, as in the thesis.
@@ -39,7 +39,7 @@ pub struct VisibilityParameters {
     pub threshold: Threshold,
     /// `cache`: `hit` or `pixel`.
     pub cache: CacheScope,
-    /// `cache-capacity`: directions that a cache holds.
+    /// `cache-capacity`: directions in a cache.
     pub cache_capacity: u32,
 }
 
@@ -56,7 +56,6 @@ impl Default for VisibilityParameters {
 }
 
 impl VisibilityParameters {
-    /// Keys of `--set`.
     pub(in crate::sampler) const KNOBS: &'static [Knob<Self>] = &[
         Knob {
             key: "k",
@@ -85,10 +84,7 @@ impl VisibilityParameters {
         },
     ];
 
-    /// Refuses combinations that cannot be rendered.
-    ///
-    /// # Errors
-    /// [`Error::Usage`].
+    /// Returns [`Error::Usage`] for combinations that cannot be rendered.
     pub fn check(&self, depth: u32) -> Result<()> {
         if self.cache == CacheScope::Pixel && depth > 1 {
             return Err(Error::usage(format!(
@@ -99,7 +95,7 @@ impl VisibilityParameters {
         Ok(())
     }
 
-    /// Places of a visibility cache at `shadow_rays` rays per hit: a cache that is cleared at every hit
+    /// Returns the places of a cache at `shadow_rays` rays per hit: a cache cleared at every hit
     /// holds no more than the rays before the last.
     pub fn cache_places(&self, shadow_rays: u32) -> u32 {
         match self.cache {

@@ -1,23 +1,20 @@
-//! The visibility cache at one hit, read back from the device.
+//! Visibility cache at one hit, read back from the device.
 
 use glam::Vec3;
 
 use super::Visibility;
 use crate::{error::Result, math::octahedron, pass::BLOCK_PIXELS};
 
-/// Bit of the head of a cache that has grown since weights were last added up: `CACHE_GROWN`.
+/// Head bit of a cache that has grown since weights were last summed; twin of `cache.glsl`.
 const CACHE_GROWN: u32 = 1 << 31;
 
 impl Visibility {
-    /// V of every lobe of the first path of a wave of one block, for its last ray; twin of
-    /// `weights.glsl`.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if the device fails.
+    /// V of the first path's lobes for its last ray, in a wave of one block; twin of
+    /// `weights.glsl`. Fails if the device does.
     pub fn visibility_weights(&self, lobe_count: usize) -> Result<Vec<f64>> {
         let places = self.cache_places as usize;
         let cache: Vec<u32> = self.lobes.caches().download(1 + places)?;
-        // What the last ray taught is not in force yet.
+        // Weights do not yet include what the last ray taught.
         let recorded =
             (cache[0] & !CACHE_GROWN) as usize - usize::from(cache[0] & CACHE_GROWN != 0);
         let stride = BLOCK_PIXELS as usize;
@@ -35,10 +32,7 @@ impl Visibility {
         Ok((0..lobe_count).map(weight).collect())
     }
 
-    /// Unit directions in the cache of the first path, world space, the oldest first.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if the device fails.
+    /// Reads the first path's cached directions in world space, oldest first. Fails if the device does.
     pub fn cached_directions(&self) -> Result<Vec<Vec3>> {
         let places = self.cache_places as usize;
         let words: Vec<u32> = self.lobes.caches().download(1 + places)?;

@@ -1,5 +1,4 @@
-//! The passes of visibility guidance: one shadow ray at a time, and after each `record_blocked` and
-//! `reweight`.
+//! Passes of visibility guidance: `record_blocked` and `reweight` after each single shadow ray.
 
 use super::parameters::{CacheScope, Threshold, VisibilityParameters};
 use crate::{
@@ -15,7 +14,7 @@ use crate::{
     },
 };
 
-/// The steps of the sampler `visibility`.
+/// Steps of `visibility`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VisibilitySteps {
     product: ProductSteps,
@@ -23,7 +22,7 @@ pub struct VisibilitySteps {
 }
 
 impl VisibilitySteps {
-    /// The steps at `shadow_rays` rays per hit.
+    /// Returns the steps at `shadow_rays` rays per hit.
     pub fn new(
         parameters: VisibilityParameters,
         product: ProductParameters,
@@ -49,7 +48,7 @@ impl VisibilitySteps {
 }
 
 impl Steps for VisibilitySteps {
-    /// The outcome of a shadow ray matters to the next one.
+    /// The outcome of each shadow ray affects the next.
     fn rays_per_group(&self) -> u32 {
         1
     }
@@ -69,7 +68,7 @@ impl Steps for VisibilitySteps {
     fn after_shadow_rays(&self, wave: &Wave) -> Vec<Kernel> {
         let is_last = wave.first_shadow_ray + wave.shadow_ray_count >= wave.total_shadow_rays;
         let mut kernels = Vec::new();
-        // The last ray of a hit serves nobody but the pixel's next sample.
+        // Only the pixel's next sample can use the last ray of a hit.
         if !is_last || self.scope == CacheScope::Pixel {
             kernels.push(self.product.kernel("record_blocked", &[]));
         }

@@ -34,7 +34,7 @@ const RELATIVE_FLOOR: f64 = 0.01;
 const TRIMMED_ONE_IN: usize = 1000;
 
 /// Errors of a picture against a reference, as the [module](self) defines them.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Metrics {
     /// Mean squared error.
     pub mse: f64,
@@ -59,39 +59,25 @@ pub struct Metrics {
 }
 
 impl Metrics {
-    /// Names of the metrics in the order of [`Metrics::values`].
-    pub const NAMES: [&'static str; 10] = [
-        "mse",
-        "rmse",
-        "mae",
-        "relmse",
-        "relmse_trimmed",
-        "relmse_p999",
-        "relmse_max",
-        "mean_ratio",
-        "psnr",
-        "max_error",
-    ];
-
-    /// Returns every metric, in the order of [`Metrics::NAMES`].
-    pub fn values(&self) -> [f64; 10] {
+    /// Returns every metric with its name.
+    pub fn named(&self) -> [(&'static str, f64); 10] {
         [
-            self.mse,
-            self.rmse,
-            self.mae,
-            self.relmse,
-            self.relmse_trimmed,
-            self.relmse_p999,
-            self.relmse_max,
-            self.mean_ratio,
-            self.psnr,
-            self.max_error,
+            ("mse", self.mse),
+            ("rmse", self.rmse),
+            ("mae", self.mae),
+            ("relmse", self.relmse),
+            ("relmse_trimmed", self.relmse_trimmed),
+            ("relmse_p999", self.relmse_p999),
+            ("relmse_max", self.relmse_max),
+            ("mean_ratio", self.mean_ratio),
+            ("psnr", self.psnr),
+            ("max_error", self.max_error),
         ]
     }
 
     /// Looks up a metric by name.
     pub fn get(&self, name: &str) -> Option<f64> {
-        Self::NAMES.iter().position(|&known| known == name).map(|index| self.values()[index])
+        self.named().into_iter().find(|(known, _)| *known == name).map(|(_, value)| value)
     }
 
     /// Compares a picture with a reference taken as exact.
@@ -246,7 +232,7 @@ impl RelativeErrors {
 }
 
 fn check(picture: &RgbImage, first: &RgbImage, second: &RgbImage) -> Result<()> {
-    let comparison = |message: String| Err(Error::Comparison { message });
+    let comparison = |message: String| Err(Error::comparison(message));
     let size = |image: &RgbImage| format!("{}x{}", image.width, image.height);
     if picture.pixels.is_empty() {
         return comparison("the picture has no pixels".to_owned());

@@ -185,7 +185,7 @@ fn names_find_their_values() {
     assert_eq!(metrics.get("psnr"), Some(metrics.psnr));
     assert_eq!(metrics.get("ssim"), None);
     let json = serde_json::to_value(metrics).unwrap();
-    for (name, value) in Metrics::NAMES.into_iter().zip(metrics.values()) {
+    for (name, value) in metrics.named() {
         assert_eq!(json[name].as_f64(), Some(value), "{name}");
     }
 }

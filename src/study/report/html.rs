@@ -6,20 +6,13 @@ use crate::study::statistics::Interval;
 
 /// Escapes the special characters of HTML, for content and attributes.
 pub fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\'' => escaped.push_str("&#39;"),
-            // Two of them mark the placeholders of the templates.
-            '{' => escaped.push_str("&#123;"),
-            other => escaped.push(other),
-        }
-    }
-    escaped
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+        .replace('\'', "&#39;")
+        // Two of them mark the placeholders of the templates.
+        .replace('{', "&#123;")
 }
 
 /// Formats a number with `digits` significant digits: 0.0213, 14.5, 2.1e−5.
@@ -50,8 +43,13 @@ pub fn interval(interval: &Interval, digits: usize) -> String {
 
 /// Formats a ratio of times as a percentage more or less: "+12.3% (+11.9 to +12.8)".
 pub fn percent_more(ratio: &Interval) -> String {
-    let percent = |value: f64| format!("{:+.1}", 100.0 * (value - 1.0)).replace('-', "−");
-    let [middle, low, high] = [ratio.middle, ratio.low, ratio.high].map(percent);
+    percent_added(&ratio.map(|ratio| ratio - 1.0))
+}
+
+/// Formats an added share as a percentage, as [`percent_more`] does.
+pub fn percent_added(share: &Interval) -> String {
+    let percent = |value: f64| format!("{:+.1}", 100.0 * value).replace('-', "−");
+    let [middle, low, high] = [share.middle, share.low, share.high].map(percent);
     format!("{middle}% <span class=\"interval\">({low} to {high})</span>")
 }
 

@@ -2,18 +2,16 @@
 
 use std::path::PathBuf;
 
-use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
-
 use crate::{
     error::{Error, Result},
-    film::{Image, RgbImage, png::display_from_linear},
+    film::{Image, RgbImage, png},
     study::{
         falsecolour::{self, Scale},
         folder::Folder,
         job::exposure,
         metrics::squared_errors,
         record::{Run, SceneRecord},
-        reference::half_stems,
+        reference::{HALF_STEMS, mean},
         rule::Rule,
     },
 };
@@ -73,17 +71,8 @@ pub fn load(
         let path = folder.image(&scene.name, stem);
         Image::read_exr(&path)?.rgb(&path)
     };
-    let [first, second] = half_stems();
-    let (first, second) = (read(first)?, read(second)?);
-    let mean = RgbImage {
-        pixels: first
-            .pixels
-            .iter()
-            .zip(&second.pixels)
-            .map(|(a, b)| std::array::from_fn(|channel| 0.5 * (a[channel] + b[channel])))
-            .collect(),
-        ..first
-    };
+    let (first, second) = (read(HALF_STEMS[0])?, read(HALF_STEMS[1])?);
+    let mean = mean(&first, &second);
     let stops = exposure(&mean);
     let mut pictures = vec![Picture {
         sampler: String::new(),
@@ -139,23 +128,14 @@ pub fn load(
 }
 
 fn display_uri(picture: &RgbImage, stops: f32) -> Result<String> {
-    let scale = stops.exp2();
-    let bytes: Vec<[u8; 3]> = picture
-        .pixels
-        .iter()
-        .map(|pixel| pixel.map(|value| display_from_linear(value * scale)))
-        .collect();
-    data_uri(picture.width, picture.height, &bytes)
+    data_uri(picture.width, picture.height, &png::preview(picture, stops))
 }
 
 fn data_uri(width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<String> {
-    let mut png = Vec::new();
-    PngEncoder::new(&mut png)
-        .write_image(pixels.as_flattened(), width, height, ExtendedColorType::Rgb8)
-        .map_err(|error| Error::Comparison {
-            message: format!("a picture of the page: {error}"),
-        })?;
-    Ok(format!("data:image/png;base64,{}", base64(&png)))
+    let mut bytes = Vec::new();
+    png::encode_rgb8(&mut bytes, width, height, pixels)
+        .map_err(|error| Error::comparison(format!("a picture of the page: {error}")))?;
+    Ok(format!("data:image/png;base64,{}", base64(&bytes)))
 }
 
 /// Encodes in base 64 with padding (RFC 4648).

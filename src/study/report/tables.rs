@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use super::html::{Table, count, escape, interval, number, percent, percent_more};
+use super::html::{Table, count, escape, interval, number, percent, percent_added, percent_more};
 use crate::study::{
     overhead::Overhead,
     results::Report,
@@ -294,8 +294,6 @@ pub fn overheads(overheads: &[Overhead]) -> String {
             table.column(head);
         }
         for pass in &overhead.passes {
-            let added = &pass.added_share;
-            let percent = |value: f64| format!("{:+.1}", 100.0 * value).replace('-', "−");
             table.row(
                 false,
                 vec![
@@ -303,12 +301,7 @@ pub fn overheads(overheads: &[Overhead]) -> String {
                     number(pass.ms[0], 3),
                     number(pass.ms[1], 3),
                     pass.ratio.map_or_else(|| "–".to_owned(), |ratio| interval(&ratio, 3)),
-                    format!(
-                        "{}% <span class=\"interval\">({} to {})</span>",
-                        percent(added.middle),
-                        percent(added.low),
-                        percent(added.high)
-                    ),
+                    percent_added(&pass.added_share),
                 ],
             );
         }

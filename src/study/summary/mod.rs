@@ -123,6 +123,17 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     sum / f64::max(count, 1.0)
 }
 
+/// Mean of figures over the runs, by name; a figure that a run lacks counts as 0.
+fn means(
+    own: &[(&Run, &Measurement)],
+    figures: fn(&Run) -> &BTreeMap<String, f64>,
+) -> BTreeMap<String, f64> {
+    let names: BTreeSet<&String> = own.iter().flat_map(|(run, _)| figures(run).keys()).collect();
+    let value = |run: &Run, name: &String| figures(run).get(name).copied().unwrap_or(0.0);
+    let mean_of = |name: &String| mean(own.iter().map(|(run, _)| value(run, name)));
+    names.into_iter().map(|name| (name.clone(), mean_of(name))).collect()
+}
+
 fn summary(
     scene: &SceneRecord,
     sampler: &str,
@@ -155,9 +166,6 @@ fn summary(
             .collect();
         geometric_interval(&ratios)
     };
-    let names: BTreeSet<&String> = own.iter().flat_map(|(run, _)| run.statistics.keys()).collect();
-    let passes: BTreeSet<&String> =
-        own.iter().flat_map(|(run, _)| run.gpu_ms_per_sample.keys()).collect();
     let ratios: Vec<f64> = own.iter().map(|(_, m)| m.mean_ratio).collect();
     let largest = |a: f64, b: f64| if b.abs() > a.abs() { b } else { a };
     Summary {
@@ -188,23 +196,12 @@ fn summary(
         mean_ratio: mean_interval(&ratios).unwrap_or(Interval { middle: 1.0, low: 1.0, high: 1.0 }),
         mean_deviation: own.iter().filter_map(|(_, m)| m.mean_deviation).reduce(largest),
         visible_share: {
-            let shares: Option<Vec<f64>> = own.iter().map(|(run, _)| run.visible_share).collect();
+            let shares: Option<Vec<f64>> =
+                own.iter().map(|(run, _)| run.figures.visible_share).collect();
             shares.map(|shares| mean(shares.into_iter()))
         },
-        gpu_ms_per_sample: passes
-            .into_iter()
-            .map(|pass| {
-                let ms = |run: &Run| run.gpu_ms_per_sample.get(pass).copied().unwrap_or(0.0);
-                (pass.clone(), mean(own.iter().map(|(run, _)| ms(run))))
-            })
-            .collect(),
-        statistics: names
-            .into_iter()
-            .map(|name| {
-                let value = |run: &Run| run.statistics.get(name).copied().unwrap_or(0.0);
-                (name.clone(), mean(own.iter().map(|(run, _)| value(run))))
-            })
-            .collect(),
+        gpu_ms_per_sample: means(own, |run| &run.figures.gpu_ms_per_sample),
+        statistics: means(own, |run| &run.figures.statistics),
     }
 }
 

@@ -5,7 +5,7 @@ use super::*;
 use crate::study::{
     own_errors::OwnErrors,
     plan::{Description, Options},
-    record::Conditions,
+    record::{Conditions, Figures},
 };
 
 fn scene(own_mse: f64) -> SceneRecord {
@@ -51,22 +51,14 @@ fn run(sampler: &str, seed: u32, variance: f64) -> Run {
         sampler: sampler.into(),
         rule: Rule::Spp(4),
         seed,
-        conditions: Conditions {
-            version: String::new(),
-            scene_hash: String::new(),
-            film: [4, 3],
-            device: String::new(),
-            driver: String::new(),
-            shadow_rays: 5,
-            depth: 1,
-            reference: String::new(),
-            parameters: BTreeMap::new(),
-        },
+        conditions: Conditions::default(),
         measurements: [1, 2, 4].map(measurement).to_vec(),
-        gpu_ms_per_sample: BTreeMap::from([("sample".into(), 3.0)]),
-        rays: BTreeMap::new(),
-        visible_share: Some(0.1 * f64::from(seed)),
-        statistics: BTreeMap::from([("rebuilds".into(), f64::from(seed))]),
+        figures: Figures {
+            gpu_ms_per_sample: BTreeMap::from([("sample".into(), 3.0)]),
+            rays: BTreeMap::new(),
+            visible_share: Some(0.1 * f64::from(seed)),
+            statistics: BTreeMap::from([("rebuilds".into(), f64::from(seed))]),
+        },
     }
 }
 
