@@ -13,6 +13,8 @@ pub mod triangulate;
 
 use std::path::PathBuf;
 
+use serde::Deserialize;
+
 use crate::brdf::Material;
 pub use camera::Camera;
 pub use environment::EnvironmentMap;
@@ -20,7 +22,8 @@ pub use geometry::Geometry;
 pub use hash::{environment_hash, geometry_hash};
 
 /// Reconstruction filter, importance-sampled so that every sample belongs to one pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Filter {
     /// Box one pixel wide.
     Box,
@@ -28,8 +31,9 @@ pub enum Filter {
     Gaussian,
 }
 
-/// Image plane.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Image plane: `[film]` of a scene file.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct FilmSettings {
     /// Width in pixels.
     pub width: u32,
@@ -37,6 +41,12 @@ pub struct FilmSettings {
     pub height: u32,
     /// Reconstruction filter.
     pub filter: Filter,
+}
+
+impl Default for FilmSettings {
+    fn default() -> Self {
+        Self { width: 640, height: 480, filter: Filter::Gaussian }
+    }
 }
 
 /// Validated scene in world space.

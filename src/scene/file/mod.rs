@@ -12,18 +12,19 @@ use serde::{
 };
 
 use super::{
+    FilmSettings,
     environment::{CourtParameters, SkyParameters},
     shapes::Shape,
 };
 use crate::error::Result;
 
 /// Scene file as written.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct SceneFile {
     /// `[camera]`.
     pub camera: CameraEntry,
     /// `[film]`.
-    pub film: FilmEntry,
+    pub film: FilmSettings,
     /// `[environment]`.
     pub environment: EnvironmentEntry,
     /// Every `[[material]]`, in file order.
@@ -54,46 +55,6 @@ pub struct CameraEntry {
 
 fn default_up() -> [f32; 3] {
     [0.0, 1.0, 0.0]
-}
-
-/// `[film]`.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FilmEntry {
-    /// Width in pixels.
-    #[serde(default = "default_width")]
-    pub width: u32,
-    /// Height in pixels.
-    #[serde(default = "default_height")]
-    pub height: u32,
-    /// Reconstruction filter.
-    #[serde(default)]
-    pub filter: FilterEntry,
-}
-
-impl Default for FilmEntry {
-    fn default() -> Self {
-        Self { width: default_width(), height: default_height(), filter: FilterEntry::default() }
-    }
-}
-
-fn default_width() -> u32 {
-    640
-}
-
-fn default_height() -> u32 {
-    480
-}
-
-/// `film.filter`.
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum FilterEntry {
-    /// Box one pixel wide.
-    Box,
-    /// Gaussian with a standard deviation of ½ pixel, cut off at 1.5 pixels.
-    #[default]
-    Gaussian,
 }
 
 /// `[environment]`; exactly one of `map`, `constant`, `court` and `sky`.
@@ -196,7 +157,7 @@ pub struct MeasuredEntry {
 }
 
 /// One `[[object]]`.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct ObjectEntry {
     /// Line of the entry, from 1.
     pub line: usize,
@@ -215,12 +176,17 @@ pub struct ObjectEntry {
 }
 
 /// Source of an object's triangles.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub enum ObjectSource {
     /// A mesh file, relative to the scene file.
     Mesh(PathBuf),
     /// A procedural shape.
-    Shape(Shape),
+    Shape {
+        /// Name in the file.
+        name: String,
+        /// Its parameters.
+        shape: Box<dyn Shape>,
+    },
 }
 
 /// One number for all axes, or one per axis.

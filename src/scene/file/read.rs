@@ -16,12 +16,15 @@ use toml::{
 };
 
 use super::{
-    CameraEntry, EnvironmentEntry, FilmEntry, MaterialEntry, MaterialKindEntry, NumberOrVector,
-    ObjectEntry, ObjectSource, SceneFile,
+    CameraEntry, EnvironmentEntry, MaterialEntry, MaterialKindEntry, NumberOrVector, ObjectEntry,
+    ObjectSource, SceneFile,
 };
 use crate::{
     error::{Result, TextError, line_and_column},
-    scene::shapes::Shape,
+    scene::{
+        FilmSettings,
+        shapes::{self, Shape},
+    },
 };
 
 /// Keys of every `[[object]]`.
@@ -54,7 +57,7 @@ struct MaterialKeys {
 struct RootKeys {
     camera: CameraEntry,
     #[serde(default)]
-    film: FilmEntry,
+    film: FilmSettings,
     environment: EnvironmentEntry,
 }
 
@@ -146,7 +149,8 @@ fn read_object(entry: Spanned<DeValue>, text: &str) -> Result<ObjectEntry, TextE
                 shared_keys: struct_fields::<ObjectKeys>(),
                 owner: format!("{label} of shape `{shape_name}`"),
             };
-            ObjectSource::Shape(read_shape(&shape_name, shape_span, rest)?)
+            let shape = read_shape(&shape_name, shape_span, rest)?;
+            ObjectSource::Shape { name: shape_name, shape }
         }
         (found_mesh, _) => {
             let found = if found_mesh.is_some() { "both" } else { "neither" };
@@ -171,18 +175,18 @@ fn read_shape(
     name: &str,
     name_span: std::ops::Range<usize>,
     rest: KindTable,
-) -> Result<Shape, TextError> {
+) -> Result<Box<dyn Shape>, TextError> {
     Ok(match name {
-        "box" => Shape::Box(rest.read()?),
-        "sphere" => Shape::Sphere(rest.read()?),
-        "cylinder" => Shape::Cylinder(rest.read()?),
-        "cone" => Shape::Cone(rest.read()?),
-        "torus" => Shape::Torus(rest.read()?),
-        "lathe" => Shape::Lathe(rest.read()?),
-        "extrude" => Shape::Extrude(rest.read()?),
-        "tube" => Shape::Tube(rest.read()?),
-        "blobs" => Shape::Blobs(rest.read()?),
-        "grid" => Shape::Grid(rest.read()?),
+        "box" => Box::new(rest.read::<shapes::RoundedBox>()?),
+        "sphere" => Box::new(rest.read::<shapes::Sphere>()?),
+        "cylinder" => Box::new(rest.read::<shapes::Cylinder>()?),
+        "cone" => Box::new(rest.read::<shapes::Cone>()?),
+        "torus" => Box::new(rest.read::<shapes::Torus>()?),
+        "lathe" => Box::new(rest.read::<shapes::Lathe>()?),
+        "extrude" => Box::new(rest.read::<shapes::Extrude>()?),
+        "tube" => Box::new(rest.read::<shapes::Tube>()?),
+        "blobs" => Box::new(rest.read::<shapes::Blobs>()?),
+        "grid" => Box::new(rest.read::<shapes::Grid>()?),
         unknown => {
             return Err(TextError {
                 span: name_span,

@@ -13,10 +13,9 @@ use std::{
 use glam::Vec3;
 
 use super::{
-    Camera, EnvironmentMap, FilmSettings, Filter, Scene,
+    Camera, EnvironmentMap, FilmSettings, Scene,
     file::{
-        CameraEntry, ConductorEntry, EnvironmentEntry, FilmEntry, FilterEntry, MaterialEntry,
-        MaterialKindEntry, SceneFile,
+        CameraEntry, ConductorEntry, EnvironmentEntry, MaterialEntry, MaterialKindEntry, SceneFile,
     },
 };
 use crate::brdf::{
@@ -56,7 +55,7 @@ impl Scene {
         let loader = Loader { path, folder: path.parent().unwrap_or(Path::new("")) };
         let mut warnings = Vec::new();
         let camera = loader.camera(&file.camera)?;
-        let film = loader.film(&file.film)?;
+        loader.check_film(&file.film)?;
         let mut materials = loader.materials(&file.materials, &mut warnings)?;
         let geometry = loader.geometry(&file.objects, &mut materials, &mut warnings)?;
         if materials.is_empty() {
@@ -67,7 +66,7 @@ impl Scene {
             name: scene_name(path),
             path: path.to_path_buf(),
             camera,
-            film,
+            film: file.film,
             environment,
             materials,
             geometry,
@@ -177,17 +176,13 @@ impl Loader<'_> {
         })
     }
 
-    fn film(&self, entry: &FilmEntry) -> Result<FilmSettings> {
-        for (name, side) in [("width", entry.width), ("height", entry.height)] {
+    fn check_film(&self, film: &FilmSettings) -> Result<()> {
+        for (name, side) in [("width", film.width), ("height", film.height)] {
             self.check((1..=MAX_FILM_SIDE).contains(&side), || {
                 format!("film.{name}: expected 1 to {MAX_FILM_SIDE} pixels, found {side}")
             })?;
         }
-        let filter = match entry.filter {
-            FilterEntry::Box => Filter::Box,
-            FilterEntry::Gaussian => Filter::Gaussian,
-        };
-        Ok(FilmSettings { width: entry.width, height: entry.height, filter })
+        Ok(())
     }
 
     fn environment(

@@ -47,7 +47,7 @@ impl Loader<'_> {
             if !meshes.contains_key(&key) {
                 let mesh = match &object.source {
                     ObjectSource::Mesh(_) => Mesh::read(&key, warnings)?,
-                    ObjectSource::Shape(shape) => shape.mesh().map_err(|message| {
+                    ObjectSource::Shape { shape, .. } => shape.mesh().map_err(|message| {
                         self.error(format!("{}: {message}", object_label(index, object)))
                     })?,
                 };
@@ -86,7 +86,7 @@ impl Loader<'_> {
     fn mesh_key(&self, object: &ObjectEntry) -> PathBuf {
         match &object.source {
             ObjectSource::Mesh(mesh) => self.folder.join(mesh),
-            ObjectSource::Shape(shape) => PathBuf::from(format!("{shape:?}")),
+            ObjectSource::Shape { shape, .. } => PathBuf::from(format!("{shape:?}")),
         }
     }
 
@@ -193,7 +193,7 @@ impl Loader<'_> {
 fn object_label(index: usize, object: &ObjectEntry) -> String {
     let source = match &object.source {
         ObjectSource::Mesh(mesh) => mesh.display().to_string(),
-        ObjectSource::Shape(shape) => shape.name().to_owned(),
+        ObjectSource::Shape { name, .. } => name.clone(),
     };
     match &object.name {
         Some(name) => format!("object `{name}` ({source}, line {})", object.line),

@@ -9,7 +9,7 @@ use glam::{DVec3, USizeVec3, Vec3};
 use rayon::prelude::*;
 use serde::Deserialize;
 
-use super::{Builder, Mesh, count, finite, from_zero_to, positive};
+use super::{Builder, Mesh, Shape, count, default_count, finite, from_zero_to, positive};
 use crate::scene::file::NumberOrVector;
 
 /// `blobs`: placed by its points.
@@ -22,7 +22,7 @@ pub struct Blobs {
     #[serde(default)]
     pub blend: f32,
     /// Grid cells along the longest side.
-    #[serde(default = "default_cells")]
+    #[serde(default = "default_count::<64>")]
     pub cells: usize,
 }
 
@@ -41,10 +41,6 @@ pub struct Blob {
     /// Subtracts the part from the others instead of adding it.
     #[serde(default)]
     pub carve: bool,
-}
-
-fn default_cells() -> usize {
-    64
 }
 
 /// Signed distance to one part.
@@ -197,12 +193,8 @@ fn soft_minimum_gradient(
     (least - blend * sum.ln(), gradients / sum)
 }
 
-impl Blobs {
-    /// Builds the closed mesh.
-    ///
-    /// # Errors
-    /// Returns a message about the parameter at fault.
-    pub fn mesh(&self) -> Result<Mesh, String> {
+impl Shape for Blobs {
+    fn mesh(&self) -> Result<Mesh, String> {
         count("number of balls", self.balls.len(), 1..=512)?;
         let cells = count("cells", self.cells, 4..=256)?;
         let blend = from_zero_to("blend", self.blend, f64::from(f32::MAX))?;

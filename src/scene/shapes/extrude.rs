@@ -5,7 +5,10 @@ use std::f64::consts::FRAC_PI_2;
 use glam::{DVec2, DVec3, DVec4};
 use serde::Deserialize;
 
-use super::{Builder, MAX_POINTS, Mesh, count, curve, finite, from_zero_to, positive};
+use super::{
+    Builder, MAX_POINTS, Mesh, Shape, count, curve, default_count, default_crease_deg, finite,
+    from_zero_to, positive,
+};
 use crate::scene::triangulate::{is_simple, signed_area, triangulate};
 
 /// `extrude`: outline in the x-y plane, from z = −depth / 2 to depth / 2.
@@ -20,35 +23,19 @@ pub struct Extrude {
     #[serde(default)]
     pub bevel: f32,
     /// Segments of a rounded rim.
-    #[serde(default = "default_bevel_segments")]
+    #[serde(default = "default_count::<4>")]
     pub bevel_segments: usize,
     /// Spline segments between two points of the outline; 1 is straight. A point given twice is a
     /// corner of the spline.
-    #[serde(default = "default_smooth")]
+    #[serde(default = "default_count::<1>")]
     pub smooth: usize,
     /// Angle above which a corner of the outline is sharp, degrees.
     #[serde(default = "default_crease_deg")]
     pub crease_deg: f32,
 }
 
-fn default_bevel_segments() -> usize {
-    4
-}
-
-fn default_smooth() -> usize {
-    1
-}
-
-fn default_crease_deg() -> f32 {
-    40.0
-}
-
-impl Extrude {
-    /// Builds the closed mesh.
-    ///
-    /// # Errors
-    /// Returns a message about the parameter at fault.
-    pub fn mesh(&self) -> Result<Mesh, String> {
+impl Shape for Extrude {
+    fn mesh(&self) -> Result<Mesh, String> {
         count("number of points in outline", self.outline.len(), 3..=MAX_POINTS)?;
         finite("outline", self.outline.as_flattened())?;
         let half_depth = 0.5 * positive("depth", self.depth)?;

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use serde::Deserialize;
 
-use super::{Builder, Mesh, count, finite, positive};
+use super::{Builder, Mesh, Shape, count, finite, positive};
 
 /// `grid`: centred on the origin in x and z.
 #[derive(Clone, Debug, Deserialize)]
@@ -50,12 +50,8 @@ fn default_cells() -> [usize; 2] {
     [64, 64]
 }
 
-impl Grid {
-    /// Builds the closed mesh.
-    ///
-    /// # Errors
-    /// Returns a message about the parameter at fault.
-    pub fn mesh(&self) -> Result<Mesh, String> {
+impl Shape for Grid {
+    fn mesh(&self) -> Result<Mesh, String> {
         let size = DVec2::new(positive("size", self.size[0])?, positive("size", self.size[1])?);
         let half_thickness = 0.5 * positive("thickness", self.thickness)?;
         let columns = count("cells", self.cells[0], 1..=2048)? + 1;
@@ -110,7 +106,9 @@ impl Grid {
         builder.patch(2, rows, |level, step| rim(step, 0, level, DVec3::NEG_X));
         Ok(builder.finish())
     }
+}
 
+impl Grid {
     /// Height at a point of the sheet, from (0, 0) to (1, 1).
     fn height(&self, size: DVec2, at: DVec2) -> f64 {
         let from_waves = self.waves.iter().map(|wave| {

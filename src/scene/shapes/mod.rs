@@ -23,7 +23,7 @@ mod rounded_box;
 mod tests;
 mod tube;
 
-use std::ops::RangeInclusive;
+use std::{fmt::Debug, ops::RangeInclusive};
 
 pub use blobs::{Blob, Blobs};
 pub use extrude::Extrude;
@@ -41,66 +41,25 @@ const SEGMENT_RANGE: RangeInclusive<usize> = 3..=4096;
 /// Most points of a profile, outline or path.
 const MAX_POINTS: usize = 1024;
 
-/// Procedural shape with its parameters.
-#[derive(Clone, Debug)]
-pub enum Shape {
-    /// `box`.
-    Box(RoundedBox),
-    /// `sphere`.
-    Sphere(Sphere),
-    /// `cylinder`.
-    Cylinder(Cylinder),
-    /// `cone`.
-    Cone(Cone),
-    /// `torus`.
-    Torus(Torus),
-    /// `lathe`.
-    Lathe(Lathe),
-    /// `extrude`.
-    Extrude(Extrude),
-    /// `tube`.
-    Tube(Tube),
-    /// `blobs`.
-    Blobs(Blobs),
-    /// `grid`.
-    Grid(Grid),
+/// Angle above which a corner is a crease, degrees, for shapes that do not set it.
+const DEFAULT_CREASE_DEG: f64 = 40.0;
+
+fn default_crease_deg() -> f32 {
+    DEFAULT_CREASE_DEG as f32
 }
 
-impl Shape {
-    /// Name in the scene file.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Box(_) => "box",
-            Self::Sphere(_) => "sphere",
-            Self::Cylinder(_) => "cylinder",
-            Self::Cone(_) => "cone",
-            Self::Torus(_) => "torus",
-            Self::Lathe(_) => "lathe",
-            Self::Extrude(_) => "extrude",
-            Self::Tube(_) => "tube",
-            Self::Blobs(_) => "blobs",
-            Self::Grid(_) => "grid",
-        }
-    }
+/// Default of a key that counts segments or cells.
+fn default_count<const COUNT: usize>() -> usize {
+    COUNT
+}
 
-    /// Builds the closed mesh of the shape.
+/// Parameters of a procedural shape.
+pub trait Shape: Debug {
+    /// Builds the closed mesh.
     ///
     /// # Errors
     /// Returns a message that names the parameter, what is expected and what was found.
-    pub fn mesh(&self) -> Result<Mesh, String> {
-        match self {
-            Self::Box(shape) => shape.mesh(),
-            Self::Sphere(shape) => shape.mesh(),
-            Self::Cylinder(shape) => shape.mesh(),
-            Self::Cone(shape) => shape.mesh(),
-            Self::Torus(shape) => shape.mesh(),
-            Self::Lathe(shape) => shape.mesh(),
-            Self::Extrude(shape) => shape.mesh(),
-            Self::Tube(shape) => shape.mesh(),
-            Self::Blobs(shape) => shape.mesh(),
-            Self::Grid(shape) => shape.mesh(),
-        }
-    }
+    fn mesh(&self) -> Result<Mesh, String>;
 }
 
 /// Checks that a length is finite and above 0.

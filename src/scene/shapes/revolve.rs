@@ -6,11 +6,9 @@ use glam::{DVec2, DVec3, DVec4};
 use serde::Deserialize;
 
 use super::{
-    Builder, MAX_POINTS, Mesh, SEGMENT_RANGE, count, curve, finite, from_zero_to, positive,
+    Builder, DEFAULT_CREASE_DEG, MAX_POINTS, Mesh, SEGMENT_RANGE, Shape, count, curve,
+    default_count, default_crease_deg, finite, from_zero_to, positive,
 };
-
-/// Angle above which a corner is a crease, for shapes that do not set it.
-const DEFAULT_CREASE_DEG: f64 = 40.0;
 
 /// `sphere`: centre at the origin.
 #[derive(Clone, Debug, Deserialize)]
@@ -19,7 +17,7 @@ pub struct Sphere {
     /// Radius, metres.
     pub radius: f32,
     /// Segments around the equator; half as many from pole to pole.
-    #[serde(default = "default_segments")]
+    #[serde(default = "default_count::<64>")]
     pub segments: usize,
 }
 
@@ -35,7 +33,7 @@ pub struct Cylinder {
     #[serde(default)]
     pub bevel: f32,
     /// Segments around the axis.
-    #[serde(default = "default_segments")]
+    #[serde(default = "default_count::<64>")]
     pub segments: usize,
 }
 
@@ -51,7 +49,7 @@ pub struct Cone {
     /// Height, metres.
     pub height: f32,
     /// Segments around the axis.
-    #[serde(default = "default_segments")]
+    #[serde(default = "default_count::<64>")]
     pub segments: usize,
 }
 
@@ -64,10 +62,10 @@ pub struct Torus {
     /// Radius of the tube, metres; less than `radius`.
     pub tube_radius: f32,
     /// Segments around the axis.
-    #[serde(default = "default_segments")]
+    #[serde(default = "default_count::<64>")]
     pub segments: usize,
     /// Segments around the tube.
-    #[serde(default = "default_tube_segments")]
+    #[serde(default = "default_count::<32>")]
     pub tube_segments: usize,
 }
 
@@ -82,38 +80,18 @@ pub struct Lathe {
     pub closed: bool,
     /// Spline segments between two points of the profile; 1 is straight. A point given twice is a
     /// corner of the spline.
-    #[serde(default = "default_smooth")]
+    #[serde(default = "default_count::<1>")]
     pub smooth: usize,
     /// Angle above which a corner is sharp, degrees.
     #[serde(default = "default_crease_deg")]
     pub crease_deg: f32,
     /// Segments around the axis.
-    #[serde(default = "default_segments")]
+    #[serde(default = "default_count::<64>")]
     pub segments: usize,
 }
 
-fn default_segments() -> usize {
-    64
-}
-
-fn default_tube_segments() -> usize {
-    32
-}
-
-fn default_smooth() -> usize {
-    1
-}
-
-fn default_crease_deg() -> f32 {
-    DEFAULT_CREASE_DEG as f32
-}
-
-impl Sphere {
-    /// Builds the closed mesh.
-    ///
-    /// # Errors
-    /// Returns a message about the parameter at fault.
-    pub fn mesh(&self) -> Result<Mesh, String> {
+impl Shape for Sphere {
+    fn mesh(&self) -> Result<Mesh, String> {
         let radius = positive("radius", self.radius)?;
         let segments = count("segments", self.segments, SEGMENT_RANGE)?;
         let rings = (segments / 2).max(2);
@@ -128,12 +106,8 @@ impl Sphere {
     }
 }
 
-impl Cylinder {
-    /// Builds the closed mesh.
-    ///
-    /// # Errors
-    /// Returns a message about the parameter at fault.
-    pub fn mesh(&self) -> Result<Mesh, String> {
+impl Shape for Cylinder {
+    fn mesh(&self) -> Result<Mesh, String> {
         let radius = positive("radius", self.radius)?;
         let height = positive("height", self.height)?;
         let bevel = from_zero_to("bevel", self.bevel, radius.min(0.5 * height))?;
@@ -160,12 +134,8 @@ impl Cylinder {
     }
 }
 
-impl Cone {
-    /// Builds the closed mesh.
-    ///
-    /// # Errors
-    /// Returns a message about the parameter at fault.
-    pub fn mesh(&self) -> Result<Mesh, String> {
+impl Shape for Cone {
+    fn mesh(&self) -> Result<Mesh, String> {
         let radius = positive("radius", self.radius)?;
         let top_radius = from_zero_to("top_radius", self.top_radius, f64::from(f32::MAX))?;
         let height = positive("height", self.height)?;
@@ -181,12 +151,8 @@ impl Cone {
     }
 }
 
-impl Torus {
-    /// Builds the closed mesh.
-    ///
-    /// # Errors
-    /// Returns a message about the parameter at fault.
-    pub fn mesh(&self) -> Result<Mesh, String> {
+impl Shape for Torus {
+    fn mesh(&self) -> Result<Mesh, String> {
         let radius = positive("radius", self.radius)?;
         let tube_radius = positive("tube_radius", self.tube_radius)?;
         if tube_radius >= radius {
@@ -206,12 +172,8 @@ impl Torus {
     }
 }
 
-impl Lathe {
-    /// Builds the closed mesh.
-    ///
-    /// # Errors
-    /// Returns a message about the parameter at fault.
-    pub fn mesh(&self) -> Result<Mesh, String> {
+impl Shape for Lathe {
+    fn mesh(&self) -> Result<Mesh, String> {
         let needed = if self.closed { 3 } else { 2 };
         count("number of points in profile", self.profile.len(), needed..=MAX_POINTS)?;
         for point in &self.profile {

@@ -5,9 +5,9 @@ use std::f64::consts::FRAC_PI_4;
 use glam::DVec3;
 use serde::Deserialize;
 
-use super::{Builder, Mesh, count, from_zero_to, positive};
+use super::{Builder, Mesh, Shape, count, default_count, from_zero_to, positive};
 
-/// `box`: centre at the origin.
+/// `box`: centre at the origin, 12 triangles without a bevel.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RoundedBox {
@@ -17,20 +17,12 @@ pub struct RoundedBox {
     #[serde(default)]
     pub bevel: f32,
     /// Segments of half a rounded edge, that is 45°.
-    #[serde(default = "default_bevel_segments")]
+    #[serde(default = "default_count::<3>")]
     pub bevel_segments: usize,
 }
 
-fn default_bevel_segments() -> usize {
-    3
-}
-
-impl RoundedBox {
-    /// Builds the closed mesh, 12 triangles without a bevel.
-    ///
-    /// # Errors
-    /// Returns a message about the parameter at fault.
-    pub fn mesh(&self) -> Result<Mesh, String> {
+impl Shape for RoundedBox {
+    fn mesh(&self) -> Result<Mesh, String> {
         let [x, y, z] = self.size;
         let half =
             0.5 * DVec3::new(positive("size", x)?, positive("size", y)?, positive("size", z)?);

@@ -5,7 +5,9 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use glam::{DVec3, DVec4};
 use serde::Deserialize;
 
-use super::{Builder, MAX_POINTS, Mesh, SEGMENT_RANGE, count, curve, finite, positive};
+use super::{
+    Builder, MAX_POINTS, Mesh, SEGMENT_RANGE, Shape, count, curve, default_count, finite, positive,
+};
 
 /// `tube`: placed by its path.
 #[derive(Clone, Debug, Deserialize)]
@@ -23,10 +25,10 @@ pub struct Tube {
     pub round: bool,
     /// Spline segments between two points of the path; 1 is straight. A point given twice is a
     /// corner of the spline.
-    #[serde(default = "default_smooth")]
+    #[serde(default = "default_count::<8>")]
     pub smooth: usize,
     /// Segments around the tube.
-    #[serde(default = "default_segments")]
+    #[serde(default = "default_count::<24>")]
     pub segments: usize,
 }
 
@@ -38,14 +40,6 @@ pub enum Radius {
     Constant(f32),
     /// One per point.
     PerPoint(Vec<f32>),
-}
-
-fn default_smooth() -> usize {
-    8
-}
-
-fn default_segments() -> usize {
-    24
 }
 
 /// Circle of the tube.
@@ -60,12 +54,8 @@ struct Ring {
     tilt: f64,
 }
 
-impl Tube {
-    /// Builds the closed mesh.
-    ///
-    /// # Errors
-    /// Returns a message about the parameter at fault.
-    pub fn mesh(&self) -> Result<Mesh, String> {
+impl Shape for Tube {
+    fn mesh(&self) -> Result<Mesh, String> {
         let needed = if self.closed { 3 } else { 2 };
         count("number of points in path", self.path.len(), needed..=MAX_POINTS)?;
         finite("path", self.path.as_flattened())?;
