@@ -30,11 +30,7 @@ pub const SCALES: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 
 /// The three counts of a header.
 pub fn dimensions(header: [u8; HEADER_BYTES]) -> [i32; 3] {
-    std::array::from_fn(|index| {
-        let mut bytes = [0; 4];
-        bytes.copy_from_slice(&header[4 * index..4 * index + 4]);
-        i32::from_le_bytes(bytes)
-    })
+    std::array::from_fn(|index| i32::from_le_bytes(header.as_chunks().0[index]))
 }
 
 /// Reads a MERL file.
@@ -75,11 +71,9 @@ pub fn load(path: &Path) -> Result<MeasuredTable> {
         return Err(wrong_size(path, (HEADER_BYTES + bytes.len()) as u64));
     }
 
+    let stored = bytes.as_chunks().0;
     let value = |channel: usize, cell: usize| {
-        let first = size_of::<f64>() * (channel * CELL_COUNT + cell);
-        let mut stored = [0; size_of::<f64>()];
-        stored.copy_from_slice(&bytes[first..first + size_of::<f64>()]);
-        (f64::from_le_bytes(stored) * SCALES[channel]) as f32
+        (f64::from_le_bytes(stored[channel * CELL_COUNT + cell]) * SCALES[channel]) as f32
     };
     let cells: Vec<Vec3> = (0..CELL_COUNT)
         .into_par_iter()

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::{
     component::{Component, bandwidth_from_shortfall, kernel_integral},
-    points::PointSet,
+    points::{Point, PointSet},
 };
 
 /// Points per chunk, the unit of parallel work; keeps 32-bit sums short.
@@ -54,23 +54,15 @@ fn pack(components: &[Component]) -> Vec<Block> {
     components.chunks(LANES).map(block).collect()
 }
 
-/// Point in the form the inner loops read.
-#[derive(Clone, Copy)]
-struct Point {
-    x: f32,
-    y: f32,
-    z: f32,
-    slack: f32,
-}
-
 /// Fills `row` with each lobe's responsibility for a point. Returns the logarithm of the mixture's
 /// density there.
 fn responsibilities(blocks: &[Block], point: Point, row: &mut [Lanes]) -> f32 {
+    let Point { mean, slack } = point;
     let mut largest = [f32::MIN; LANES];
     for (block, values) in blocks.iter().zip(row.iter_mut()) {
         for k in 0..LANES {
-            let (dx, dy, dz) = (point.x - block.x[k], point.y - block.y[k], point.z - block.z[k]);
-            let distance = 0.5 * (dx * dx + dy * dy + dz * dz) + point.slack;
+            let (dx, dy, dz) = (mean.x - block.x[k], mean.y - block.y[k], mean.z - block.z[k]);
+            let distance = 0.5 * (dx * dx + dy * dy + dz * dz) + slack;
             let value = block.log_scale[k] - block.bandwidth[k] * distance;
             values[k] = value;
             largest[k] = if value > largest[k] { value } else { largest[k] };
@@ -133,12 +125,7 @@ fn sum_over_points<const WIDTH: usize>(
         for start in (group * GROUP * CHUNK..end).step_by(CHUNK) {
             sums.fill([[0.0; LANES]; WIDTH]);
             for index in start..(start + CHUNK).min(end) {
-                let point = Point {
-                    x: points.x[index],
-                    y: points.y[index],
-                    z: points.z[index],
-                    slack: points.slack[index],
-                };
+                let point = points.places[index];
                 let log_density = responsibilities(&blocks, point, &mut row);
                 let excess = points.log_density[index] - log_density;
                 let weight = points.weight[index];
@@ -148,9 +135,9 @@ fn sum_over_points<const WIDTH: usize>(
                     let (mut dx, mut dy, mut dz) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
                     for k in 0..LANES {
                         share[k] = weight * values[k];
-                        dx[k] = point.x - block.x[k];
-                        dy[k] = point.y - block.y[k];
-                        dz[k] = point.z - block.z[k];
+                        dx[k] = point.mean.x - block.x[k];
+                        dy[k] = point.mean.y - block.y[k];
+                        dz[k] = point.mean.z - block.z[k];
                     }
                     accumulate(&share, [&dx, &dy, &dz], excess, sums);
                 }

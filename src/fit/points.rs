@@ -1,6 +1,6 @@
 //! Target of a fit as weighted points: a spherical function cut into patches.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// Patch of the sphere with the moments of the target over it.
 #[derive(Clone, Copy, Debug)]
@@ -30,21 +30,23 @@ pub fn blurred(bandwidth: f64, variance: f64) -> (f64, f64) {
     (bandwidth * factor, factor)
 }
 
-/// Patches in the form that expectation maximization reads, as a structure of arrays.
+/// Place of a patch in the form that expectation maximization reads.
 ///
 /// The log-kernel averaged over a patch is `λ(m·ξ − 1) = −½λ|m − ξ|² − λ·slack`, with m the patch's
-/// mean direction (inside the unit sphere) and `slack = ½(1 − |m|²)`. It is exact, so a large patch
-/// cannot pass for a point.
+/// mean direction (inside the unit sphere). It is exact, so a large patch cannot pass for a point.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    /// Mean direction m.
+    pub mean: Vec3,
+    /// `½(1 − |m|²)`.
+    pub slack: f32,
+}
+
+/// Patches in the form that expectation maximization reads.
 #[derive(Clone, Debug, Default)]
 pub struct PointSet {
-    /// x of the mean direction.
-    pub x: Vec<f32>,
-    /// y of the mean direction.
-    pub y: Vec<f32>,
-    /// z of the mean direction.
-    pub z: Vec<f32>,
-    /// `½(1 − |m|²)`.
-    pub slack: Vec<f32>,
+    /// Where the patches lie.
+    pub places: Vec<Point>,
     /// Share of the target's energy; sums to 1.
     pub weight: Vec<f32>,
     /// Logarithm of the target density (1/sr), averaged over the patch.
@@ -73,10 +75,8 @@ impl PointSet {
             if weight < 1e-14 {
                 continue;
             }
-            points.x.push(mean.x as f32);
-            points.y.push(mean.y as f32);
-            points.z.push(mean.z as f32);
-            points.slack.push((0.5 * (1.0 - mean.length_squared())).max(0.0) as f32);
+            let slack = (0.5 * (1.0 - mean.length_squared())).max(0.0) as f32;
+            points.places.push(Point { mean: mean.as_vec3(), slack });
             points.weight.push(weight as f32);
             points.log_density.push((weight / patch.solid_angle).ln() as f32);
         }
@@ -95,6 +95,6 @@ impl PointSet {
 
     /// Mean direction of a point.
     pub fn mean(&self, index: usize) -> DVec3 {
-        DVec3::new(self.x[index].into(), self.y[index].into(), self.z[index].into())
+        self.places[index].mean.as_dvec3()
     }
 }

@@ -67,11 +67,9 @@ impl FinishedRuns<'_> {
     pub(super) fn run(&self, scene: &Scene, task: (Rule, u32, &Contender)) -> Result<Option<Run>> {
         let path = self.run_record(scene, task);
         Ok(self.folder.read_json::<Run>(&path)?.filter(|run| {
-            let has_image = |level: &Rule| {
-                run.at(*level).is_some_and(|measurement| measurement.image.is_some())
-            };
-            matches!(task.0, Rule::Seconds(_))
-                || self.plan.spp.iter().map(|spp| Rule::Spp(*spp)).all(|level| has_image(&level))
+            let has_image =
+                |spp: &u32| run.at(Rule::Spp(*spp)).is_some_and(|level| level.image.is_some());
+            matches!(task.0, Rule::Seconds(_)) || self.plan.spp.iter().all(has_image)
         }))
     }
 

@@ -219,6 +219,7 @@ impl Figures {
         let totals = renderer.totals();
         let samples = f64::from(renderer.sample_count().max(1));
         let gpu_ms = totals.gpu_ms.iter();
+        let candidates = renderer.report().candidates;
         Self {
             gpu_ms_per_sample: gpu_ms.map(|(pass, ms)| (pass.clone(), ms / samples)).collect(),
             rays: [
@@ -231,12 +232,7 @@ impl Figures {
                 .then(|| totals.shadow_rays_visible as f64 / totals.shadow_rays_traced as f64),
             statistics: statistics(totals)
                 .chain(guide_rebuild_share(&renderer.host_ms(), seconds))
-                .chain(
-                    renderer
-                        .report()
-                        .candidates
-                        .map(|count| ("candidates".to_owned(), f64::from(count))),
-                )
+                .chain(candidates.map(|count| ("candidates".to_owned(), f64::from(count))))
                 .collect(),
         }
     }

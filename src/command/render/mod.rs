@@ -30,7 +30,7 @@ use crate::{
         png::write_preview,
     },
     gpu::Device,
-    renderer::{Renderer, Settings},
+    renderer::{Renderer, Settings, window_of},
     sampler::Sampler,
     scene::Scene,
     study::watch::next_pass_samples,
@@ -155,6 +155,8 @@ pub(super) fn listen_for_interrupt() -> Arc<AtomicBool> {
 struct RenderJob<'a> {
     arguments: &'a Arguments,
     scene: &'a Scene,
+    /// Part of the film that is rendered.
+    window: Window,
     output: PathBuf,
     metadata: Metadata,
     /// Wall time that earlier runs spent in passes, seconds.
@@ -193,6 +195,7 @@ impl<'a> RenderJob<'a> {
         Self {
             arguments,
             scene,
+            window: window_of(settings, scene),
             output,
             metadata,
             earlier_seconds: 0.0,
@@ -290,24 +293,11 @@ impl<'a> RenderJob<'a> {
 
     /// Connects to the viewer named by `--display-server`.
     fn open_display(&self) -> Result<Option<DisplayServer>> {
-        let window = self.window();
-        self.arguments
-            .display_server
-            .as_deref()
-            .map(|address| {
-                DisplayServer::connect(address, &self.scene.name, window.width, window.height)
-            })
-            .transpose()
-    }
-
-    /// Returns the part of the film that is rendered.
-    fn window(&self) -> Window {
-        self.arguments.crop.unwrap_or(Window {
-            x: 0,
-            y: 0,
-            width: self.scene.film.width,
-            height: self.scene.film.height,
-        })
+        let connect = |address: &String| {
+            let Window { width, height, .. } = self.window;
+            DisplayServer::connect(address, &self.scene.name, width, height)
+        };
+        self.arguments.display_server.as_ref().map(connect).transpose()
     }
 
     fn time_left(&self) -> Option<f64> {

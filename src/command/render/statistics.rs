@@ -17,7 +17,6 @@ impl RenderJob<'_> {
         load_ms: f64,
     ) -> Statistics {
         let totals = renderer.totals();
-        let window = self.window();
         let mut host_ms = renderer.host_ms();
         host_ms.insert("load".into(), load_ms);
         let figures = Figures::of(renderer, self.seconds());
@@ -27,8 +26,8 @@ impl RenderJob<'_> {
             scene: metadata.scene.clone(),
             scene_hash: metadata.scene_hash.clone(),
             triangles: self.scene.geometry.triangles.len() as u64,
-            width: window.width,
-            height: window.height,
+            width: self.window.width,
+            height: self.window.height,
             device: metadata.device.clone(),
             driver: metadata.driver.clone(),
             sampler: metadata.sampler.clone(),

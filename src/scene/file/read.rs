@@ -3,7 +3,7 @@
 //! Materials and objects are tagged by `type` and `shape`. Their tables are split into the keys
 //! that all kinds share and the keys of one kind, so that a key of another kind is rejected too.
 
-use std::path::PathBuf;
+use std::{ops::Range, path::PathBuf};
 
 use serde::{
     Deserialize, Deserializer,
@@ -101,24 +101,17 @@ fn take_array<'i>(
 
 fn read_material(entry: Spanned<DeValue>, text: &str) -> Result<MaterialEntry, TextError> {
     let line = line_and_column(text, entry.span().start).0;
-    let split = SplitTable::new::<MaterialKeys>(entry, "[[material]]")?;
-    let keys: MaterialKeys = read_table(split.shared, split.span.clone())?;
-    let type_span = keys.r#type.span();
-    let type_name = keys.r#type.into_inner();
-    let rest = KindTable {
-        table: split.rest,
-        span: split.span,
-        shared_keys: struct_fields::<MaterialKeys>(),
-        owner: format!("material `{}` of type `{type_name}`", keys.name),
-    };
+    let (keys, rest): (MaterialKeys, _) = KindTable::split(entry, "[[material]]")?;
+    let type_name = keys.r#type.get_ref();
+    let owner = format!("material `{}` of type `{type_name}`", keys.name);
     let kind = match type_name.as_str() {
-        "diffuse" => MaterialKindEntry::Diffuse(rest.read()?),
-        "plastic" => MaterialKindEntry::Plastic(rest.read()?),
-        "conductor" => MaterialKindEntry::Conductor(rest.read()?),
-        "measured" => MaterialKindEntry::Measured(rest.read()?),
+        "diffuse" => MaterialKindEntry::Diffuse(rest.read(&owner)?),
+        "plastic" => MaterialKindEntry::Plastic(rest.read(&owner)?),
+        "conductor" => MaterialKindEntry::Conductor(rest.read(&owner)?),
+        "measured" => MaterialKindEntry::Measured(rest.read(&owner)?),
         unknown => {
             return Err(TextError {
-                span: type_span,
+                span: keys.r#type.span(),
                 message: format!(
                     "unknown material type `{unknown}`, expected one of `diffuse`, `plastic`, \
                      `conductor`, `measured`"
@@ -131,31 +124,21 @@ fn read_material(entry: Spanned<DeValue>, text: &str) -> Result<MaterialEntry, T
 
 fn read_object(entry: Spanned<DeValue>, text: &str) -> Result<ObjectEntry, TextError> {
     let line = line_and_column(text, entry.span().start).0;
-    let split = SplitTable::new::<ObjectKeys>(entry, "[[object]]")?;
-    let keys: ObjectKeys = read_table(split.shared, split.span.clone())?;
+    let (keys, rest): (ObjectKeys, _) = KindTable::split(entry, "[[object]]")?;
     let label = keys.name.as_ref().map_or("object".to_owned(), |name| format!("object `{name}`"));
     let source = match (keys.mesh, keys.shape) {
         (Some(mesh), None) => {
-            let known = struct_fields::<ObjectKeys>();
-            refuse_unknown_keys(&split.rest, known, &format!("{label} with a mesh"))?;
+            refuse_unknown_keys(&rest.table, rest.shared_keys, &format!("{label} with a mesh"))?;
             ObjectSource::Mesh(mesh)
         }
         (None, Some(shape)) => {
-            let shape_span = shape.span();
-            let shape_name = shape.into_inner();
-            let rest = KindTable {
-                table: split.rest,
-                span: split.span,
-                shared_keys: struct_fields::<ObjectKeys>(),
-                owner: format!("{label} of shape `{shape_name}`"),
-            };
-            let shape = read_shape(&shape_name, shape_span, rest)?;
-            ObjectSource::Shape { name: shape_name, shape }
+            let parameters = read_shape(&shape, rest, &label)?;
+            ObjectSource::Shape { name: shape.into_inner(), shape: parameters }
         }
         (found_mesh, _) => {
             let found = if found_mesh.is_some() { "both" } else { "neither" };
             return Err(TextError {
-                span: split.span,
+                span: rest.span,
                 message: format!("{label} needs exactly one of `mesh` and `shape`, found {found}"),
             });
         }
@@ -172,24 +155,25 @@ fn read_object(entry: Spanned<DeValue>, text: &str) -> Result<ObjectEntry, TextE
 }
 
 fn read_shape(
-    name: &str,
-    name_span: std::ops::Range<usize>,
+    name: &Spanned<String>,
     rest: KindTable,
+    label: &str,
 ) -> Result<Box<dyn Shape>, TextError> {
-    Ok(match name {
-        "box" => Box::new(rest.read::<shapes::RoundedBox>()?),
-        "sphere" => Box::new(rest.read::<shapes::Sphere>()?),
-        "cylinder" => Box::new(rest.read::<shapes::Cylinder>()?),
-        "cone" => Box::new(rest.read::<shapes::Cone>()?),
-        "torus" => Box::new(rest.read::<shapes::Torus>()?),
-        "lathe" => Box::new(rest.read::<shapes::Lathe>()?),
-        "extrude" => Box::new(rest.read::<shapes::Extrude>()?),
-        "tube" => Box::new(rest.read::<shapes::Tube>()?),
-        "blobs" => Box::new(rest.read::<shapes::Blobs>()?),
-        "grid" => Box::new(rest.read::<shapes::Grid>()?),
+    let owner = format!("{label} of shape `{}`", name.get_ref());
+    Ok(match name.get_ref().as_str() {
+        "box" => Box::new(rest.read::<shapes::RoundedBox>(&owner)?),
+        "sphere" => Box::new(rest.read::<shapes::Sphere>(&owner)?),
+        "cylinder" => Box::new(rest.read::<shapes::Cylinder>(&owner)?),
+        "cone" => Box::new(rest.read::<shapes::Cone>(&owner)?),
+        "torus" => Box::new(rest.read::<shapes::Torus>(&owner)?),
+        "lathe" => Box::new(rest.read::<shapes::Lathe>(&owner)?),
+        "extrude" => Box::new(rest.read::<shapes::Extrude>(&owner)?),
+        "tube" => Box::new(rest.read::<shapes::Tube>(&owner)?),
+        "blobs" => Box::new(rest.read::<shapes::Blobs>(&owner)?),
+        "grid" => Box::new(rest.read::<shapes::Grid>(&owner)?),
         unknown => {
             return Err(TextError {
-                span: name_span,
+                span: name.span(),
                 message: format!(
                     "unknown shape `{unknown}`, expected one of `box`, `sphere`, `cylinder`, \
                      `cone`, `torus`, `lathe`, `extrude`, `tube`, `blobs`, `grid`"
@@ -199,55 +183,45 @@ fn read_shape(
     })
 }
 
-/// Table split into the keys that all kinds share and the rest.
-struct SplitTable<'i> {
-    shared: DeTable<'i>,
-    rest: DeTable<'i>,
-    span: std::ops::Range<usize>,
-}
-
-impl<'i> SplitTable<'i> {
-    /// Splits `entry` by the fields of `T`; `header` names it in messages if it is not a table.
-    fn new<T: DeserializeOwned>(
-        entry: Spanned<DeValue<'i>>,
-        header: &str,
-    ) -> Result<Self, TextError> {
-        let span = entry.span();
-        let DeValue::Table(table) = entry.into_inner() else {
-            return Err(TextError { span, message: format!("expected a table, `{header}`") });
-        };
-        let (mut shared, mut rest) = (DeTable::new(), DeTable::new());
-        for (key, value) in table {
-            let is_shared = struct_fields::<T>().contains(&key.get_ref().as_ref());
-            if is_shared { &mut shared } else { &mut rest }.insert(key, value);
-        }
-        Ok(Self { shared, rest, span })
-    }
-}
-
-/// Keys of one kind of material or shape, with the context that messages need.
+/// Keys of one kind of material or shape, beside those that all kinds share.
 struct KindTable<'i> {
     table: DeTable<'i>,
-    span: std::ops::Range<usize>,
+    span: Range<usize>,
     shared_keys: &'static [&'static str],
-    owner: String,
 }
 
 impl KindTable<'_> {
-    fn read<T: DeserializeOwned>(self) -> Result<T, TextError> {
+    /// Splits the table of `entry` into the keys of `T`, which are read, and those of its kind;
+    /// `header` names it in messages if it is not a table.
+    fn split<'i, T: DeserializeOwned>(
+        entry: Spanned<DeValue<'i>>,
+        header: &str,
+    ) -> Result<(T, KindTable<'i>), TextError> {
+        let span = entry.span();
+        let DeValue::Table(all) = entry.into_inner() else {
+            return Err(TextError { span, message: format!("expected a table, `{header}`") });
+        };
+        let shared_keys = struct_fields::<T>();
+        let (mut shared, mut table) = (DeTable::new(), DeTable::new());
+        for (key, value) in all {
+            let is_shared = shared_keys.contains(&key.get_ref().as_ref());
+            if is_shared { &mut shared } else { &mut table }.insert(key, value);
+        }
+        Ok((read_table(shared, span.clone())?, KindTable { table, span, shared_keys }))
+    }
+
+    /// Reads the keys of the kind `T`; `owner` names it in messages.
+    fn read<T: DeserializeOwned>(self, owner: &str) -> Result<T, TextError> {
         let known = [self.shared_keys, struct_fields::<T>()].concat();
-        refuse_unknown_keys(&self.table, &known, &self.owner)?;
-        read_table(self.table, self.span).map_err(|failure| TextError {
-            span: failure.span,
-            message: format!("{}: {}", self.owner, failure.message),
+        refuse_unknown_keys(&self.table, &known, owner)?;
+        read_table(self.table, self.span).map_err(|error| TextError {
+            span: error.span,
+            message: format!("{owner}: {}", error.message),
         })
     }
 }
 
-fn read_table<T: DeserializeOwned>(
-    table: DeTable,
-    span: std::ops::Range<usize>,
-) -> Result<T, TextError> {
+fn read_table<T: DeserializeOwned>(table: DeTable, span: Range<usize>) -> Result<T, TextError> {
     let deserializer = ValueDeserializer::from(Spanned::new(span.clone(), DeValue::Table(table)));
     T::deserialize(deserializer).map_err(|error| {
         let mut failure = TextError::from(error.clone());

@@ -12,6 +12,7 @@ use std::path::Path;
 use crate::{
     error::{Error, Result},
     files,
+    scene::triangulate::triangulate_in_space,
 };
 
 /// Triangles in object space.
@@ -66,6 +67,14 @@ impl Mesh {
                 Err(Error::format(path, format!("{expected}, found {found}")))
             }
         }
+    }
+
+    /// Adds the triangles of a polygon, in the plane of its Newell normal.
+    fn push_polygon(&mut self, corners: &[u32]) {
+        let positions: Vec<_> =
+            corners.iter().map(|&corner| self.positions[corner as usize]).collect();
+        let triangles = triangulate_in_space(&positions);
+        self.triangles.extend(triangles.iter().map(|triangle| triangle.map(|at| corners[at])));
     }
 
     /// Starts a run of triangles of `material` at the next triangle.

@@ -10,10 +10,7 @@ use std::{
 };
 
 use super::{Mesh, MeshMaterial};
-use crate::{
-    error::{Error, Result},
-    scene::triangulate::triangulate_in_space,
-};
+use crate::error::{Error, Result};
 
 /// Ends a chain of vertices; also the normal of a corner that has none.
 const NONE: u32 = u32::MAX;
@@ -138,35 +135,17 @@ impl ObjReader<'_> {
     }
 
     fn read_face(&mut self, words: &str) -> Result<()> {
-        let mut corners = [NONE; 4];
-        let mut polygon = Vec::new();
-        let mut count = 0;
-        for word in words.split_ascii_whitespace() {
-            let corner = self.corner(word)?;
-            if count < corners.len() {
-                corners[count] = corner;
-            } else {
-                if polygon.is_empty() {
-                    polygon.extend(corners);
-                }
-                polygon.push(corner);
+        let words = words.split_ascii_whitespace();
+        let corners: Vec<u32> = words.map(|word| self.corner(word)).collect::<Result<_>>()?;
+        match corners[..] {
+            [] | [_] | [_, _] => {
+                let count = corners.len();
+                let message = format!("a face needs three corners or more, found {count}");
+                return Err(self.error(message));
             }
-            count += 1;
+            [a, b, c] => self.mesh.triangles.push([a, b, c]),
+            _ => self.mesh.push_polygon(&corners),
         }
-        if count < 3 {
-            return Err(self.error(format!("a face needs three corners or more, found {count}")));
-        }
-        if count == 3 {
-            self.mesh.triangles.push([corners[0], corners[1], corners[2]]);
-            return Ok(());
-        }
-        let corners = if count == 4 { &corners[..] } else { &polygon[..] };
-        let positions: Vec<_> =
-            corners.iter().map(|&corner| self.mesh.positions[corner as usize]).collect();
-        let triangles = triangulate_in_space(&positions);
-        self.mesh
-            .triangles
-            .extend(triangles.iter().map(|triangle| triangle.map(|index| corners[index])));
         Ok(())
     }
 

@@ -15,10 +15,7 @@ use std::{
 use header::{Element, Encoding, Property, Scalar};
 
 use super::Mesh;
-use crate::{
-    error::{Error, Result},
-    scene::triangulate::triangulate_in_space,
-};
+use crate::error::{Error, Result};
 
 /// Reads a PLY file.
 ///
@@ -94,13 +91,8 @@ impl Polygons {
     fn triangulate_into(self, mesh: &mut Mesh) {
         let mut start = 0;
         for end in self.ends {
-            let corners = &self.corners[start..end];
+            mesh.push_polygon(&self.corners[start..end]);
             start = end;
-            let positions: Vec<_> =
-                corners.iter().map(|&corner| mesh.positions[corner as usize]).collect();
-            let triangles = triangulate_in_space(&positions);
-            mesh.triangles
-                .extend(triangles.iter().map(|triangle| triangle.map(|index| corners[index])));
         }
     }
 }
