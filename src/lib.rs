@@ -1,22 +1,51 @@
-//! Fenestra: a physically based renderer for scenes lit by an environment map, in Vulkan compute.
+//! Fenestra: a physically based renderer for scenes lit by an environment map, in Vulkan compute. It
+//! learns which directions are blocked and stops shooting shadow rays there.
 //!
-//! `docs/architecture.md` follows one sample from the scene file to the image. Modules stand in
-//! pipeline order:
+//! ```rust,no_run
+//! use fenestra::{gpu::Device, renderer::{Renderer, Settings}, sampler::Sampler, scene::Scene};
 //!
-//! | stage | module | shader |
+//! # fn main() -> fenestra::Result<()> {
+//! let scene = Scene::load("scenes/meeting_room.toml".as_ref())?;
+//! let device = Device::open(None, false)?;
+//! let settings = Settings { sampler: Sampler::Guided, ..Settings::default() };
+//! let mut renderer = Renderer::new(&device, &scene, settings)?;
+//! renderer.render_pass(16)?;
+//! renderer.sums()?.to_image(&[]).write_exr("meeting_room.exr".as_ref())?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! `docs/examples/render.rs` adds progress and metadata, `docs/examples/study.rs` compares two
+//! samplers. `docs/architecture.md` follows one sample from the scene file to the image.
+//!
+//! # Pipeline
+//!
+//! | stage | module | shader in `glsl/` |
 //! |---|---|---|
-//! | command line, errors, cache folder | [`cli`], [`command`], [`error`], [`cache`] | |
-//! | scene file → validated [`scene::Scene`] | [`scene`], [`brdf`] | `include/environment.glsl`, `include/brdf.glsl` |
-//! | maps and BRDFs → lobes | [`srbf`], [`fit`] | `include/srbf.glsl` |
-//! | triangles → wide BVH | [`accel`] | `include/bvh.glsl` |
-//! | frames, random numbers, samplers | [`frame`], [`random`], [`sampler`] | `include/frame.glsl`, `include/random.glsl`, `include/wave.glsl` |
-//! | scene → device buffers | [`gpu`], [`renderer`] | `include/layout.glsl` |
-//! | learned visibility | [`guide`] | `include/guide.glsl`, `include/arriving.glsl` |
-//! | progressive passes | [`pass`], [`renderer`] | `camera`, `trace`, `sample` or `sample_guided`, `shadow`, `learn`, `gather`, `features`, `bounce` or `bounce_guided`, `learn_arrivals`, `accumulate` |
+//! | scene file → validated [`Scene`](scene::Scene) | [`scene`] | `include/environment` |
+//! | materials → values, densities, samples | [`brdf`] | `include/brdf` |
+//! | lobes: products, integrals, samples | [`srbf`] | `include/srbf` |
+//! | maps and BRDFs → lobes | [`fit`] | |
+//! | triangles → wide BVH | [`accel`] | `include/bvh` |
+//! | frames, random numbers, alias tables | [`math`] | `include/frame`, `include/random` |
+//! | constants, structs, buffers of both languages | [`shader`] | `include/layout` |
+//! | Vulkan | [`gpu`] | |
+//! | passes of a wave, in their order | [`pass`] | `camera`, `trace`, `sample`, `shadow`, `gather`, |
+//! | | | `features`, `bounce`, `accumulate` |
+//! | `product` | [`sampler::product`] | `product/`: `multiply_lobes`, `sample_lobes` |
+//! | `visibility`, on top of it | [`sampler::visibility`] | `visibility/`: `record_blocked`, `reweight`, |
+//! | | | `count_entries` |
+//! | `guided` | [`sampler::guided`] | `guided/`: `sample_guided`, `learn`, `show_cells`, |
+//! | | | `bounce_guided`, `learn_arrivals` |
+//! | scene, settings, device → sums | [`renderer`] | |
 //! | sums → image files | [`film`] | |
-//! | comparisons, ray rates | [`study`], [`benchmark`] | |
+//! | runs of several samplers → report | [`study`] | |
+//! | ray rates beside those of the CPU | [`mod@bench`] | |
+//! | command line | `cli`, `command` | |
 //!
-//! Notation: directions point away from the surface; `outgoing_direction` leads to the viewer,
+//! # Notation
+//!
+//! Directions point away from the surface; `outgoing_direction` leads to the viewer,
 //! `incident_direction` to the light; names that end in `_local` are in the shading frame, whose
 //! z axis is the shading normal. Densities (`pdf`) are per steradian unless named otherwise.
 //! Radiance is linear Rec.709.
@@ -82,6 +111,8 @@
 //! - \[Steele et al. 2014\] "Fast Splittable Pseudorandom Number Generators", OOPSLA.
 //! - \[Talbot et al. 2005\] "Importance Resampling for Global Illumination", Eurographics
 //!   Symposium on Rendering.
+//! - \[Tokuyoshi 2022\] "Accurate Diffuse Lighting from Spherical Gaussian Lights", SIGGRAPH
+//!   Posters.
 //! - \[Tsai & Shih 2006\] "All-Frequency Precomputed Radiance Transfer using Spherical Radial
 //!   Basis Functions and Clustered Tensor Approximation", ACM Transactions on Graphics 25(3).
 //! - \[Tsai et al. 2008\] "Importance Sampling of Products from Illumination and BRDF Using
@@ -114,23 +145,34 @@
 //! - \[Yuksel et al. 2009\] "On the Parameterization of Catmull-Rom Curves", SIAM/ACM Joint
 //!   Conference on Geometric and Physical Modeling.
 
-pub mod accel;
-pub mod bench;
+// Pipeline order; rustfmt sorts within a group.
+pub mod scene;
+
 pub mod brdf;
+pub mod srbf;
+
+pub mod fit;
+
+pub mod accel;
+pub mod math;
+pub mod shader;
+
+pub mod gpu;
+pub mod pass;
+pub mod sampler;
+
+pub mod renderer;
+
+pub mod film;
+pub mod study;
+
+pub mod bench;
+#[doc(hidden)]
 pub mod cli;
+#[doc(hidden)]
 pub mod command;
+
 pub mod error;
 pub mod files;
-pub mod film;
-pub mod fit;
-pub mod gpu;
-pub mod math;
-pub mod pass;
-pub mod renderer;
-pub mod sampler;
-pub mod scene;
-pub mod shader;
-pub mod srbf;
-pub mod study;
 
 pub use error::{Error, Result};
