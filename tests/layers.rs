@@ -128,7 +128,7 @@ fn layers_of_other_samplers_are_refused() {
     }
 }
 
-/// Returns three bytes of the key's hash. Twin of `guide_cells.comp`.
+/// Returns three bytes of the key's hash. Twin of `show_cells.comp`.
 fn colour_of(key: CellKey) -> [u32; 3] {
     let hash = key.slot(u32::MAX);
     [hash & 255, hash >> 8 & 255, hash >> 16 & 255]

@@ -31,8 +31,8 @@ pub struct EnvironmentOptions {
     pub method: Method,
 }
 
-/// Fits a map, or reads the fit from the cache. The map's rotation does not matter, see
-/// [`EnvironmentFit::world_lobes`]. `progress` receives the share of the work that is done.
+/// Fits a map, or reads the fit from the cache. The fit does not depend on the map's rotation, see
+/// [`EnvironmentFit::world_lobes`]. `progress` receives the fraction of the work done so far.
 ///
 /// # Errors
 /// The map is black or holds values that are negative or not finite; lobes are out of range. A

@@ -32,8 +32,8 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// Uploads `scene` and prepares to render it. Fails for options out of range, and for too
-    /// little memory or exceeded limits of the device.
+    /// Uploads `scene` and prepares to render it. Fails if an option is out of range, memory runs
+    /// out or a limit of the device is exceeded.
     pub fn new(device: &Arc<Device>, scene: &Scene, settings: Settings) -> Result<Self> {
         let window = window_of(&settings, scene);
         settings.check([scene.film.width, scene.film.height])?;

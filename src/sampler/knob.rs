@@ -1,4 +1,4 @@
-//! Parameters that `--set key=value` reaches, one table row each.
+//! Parameters that `--set key=value` sets, one table row each; `Parameters` goes through the tables.
 
 use std::{collections::BTreeMap, fmt::Display, ops::RangeInclusive, str::FromStr};
 

@@ -1,7 +1,7 @@
-//! The samplers: one room for each technique, and the register of their names.
+//! The samplers: one room per technique, and the registry of their names.
 //!
 //! A room holds parameters, tables, buffers, passes, learning and figures of one technique. A new
-//! sampler takes a room and a line in [`Sampler`].
+//! sampler takes a room and a line in `samplers!` below.
 
 pub mod basic;
 pub mod guided;

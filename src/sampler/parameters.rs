@@ -1,4 +1,4 @@
-//! Parameters of all samplers, set by `--set key=value`.
+//! Parameters of all samplers, set by `--set key=value`. The table of a new room joins `set` and `keys`.
 
 use super::{
     guided::GuidedParameters,

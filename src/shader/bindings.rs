@@ -1,4 +1,4 @@
-//! Buffers of the shaders by descriptor set: one declaration for Rust, GLSL and `docs/architecture.md`.
+//! Buffers of the shaders by descriptor set: one declaration for Rust, GLSL and `docs/buffers.md`.
 //!
 //! Sets go by rate of change: 0 the scene, 1 the sampler, 2 the wave, 3 the film. Set 1 has a table
 //! per family of samplers; disjoint binding numbers tell the table of a shader. GLSL names are in

@@ -33,7 +33,7 @@ const MAX_SUM: f32 = 1e30;
 pub type ArrivalWords = [u32; 2];
 
 /// Index below [`ARRIVAL_DIRECTIONS`] of the direction of a unit vector, in a grid over the
-/// octahedron (Cigolle et al. 2014). Twin of `glsl/include/arriving.glsl`.
+/// octahedron (Cigolle et al. 2014). Twin of `glsl/guided/arriving.glsl`.
 pub fn arrival_direction(direction: Vec3) -> usize {
     let place = direction.truncate() / (direction.x.abs() + direction.y.abs() + direction.z.abs());
     let sign = |value: f32| if value < 0.0 { -1.0 } else { 1.0 };

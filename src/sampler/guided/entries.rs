@@ -160,7 +160,7 @@ fn interval_starts(parts: &[u32], starts: &mut Vec<u32>) {
 /// Decodes an entry: probability of the region divided by its share of the energy; cumulative
 /// probability of the regions before it, in 65,536ths; region to start the search from in the
 /// interval of this index, at index 0 the last region that can be drawn; weight of a candidate by
-/// visibility. Twin of `guide_entry` in `glsl/include/guide.glsl`.
+/// visibility. Twin of `guide_entry` in `glsl/guided/guide.glsl`.
 pub fn decode_entry(entry: [u32; 2]) -> (f32, u32, u32, f32) {
     let level = (entry[1] >> 26) as f32;
     let weight = (-level * (TARGET_RANGE / (GUIDE_VISIBILITY_LEVELS - 1) as f32)).exp2();

@@ -4,7 +4,7 @@
 //! together with the face of the cube that is nearest to the normal of the surface. Keys hold the
 //! grid coordinates modulo 256: two places share a key only if they are at least 256 edges apart at
 //! the same edge, which costs precision but no correctness. The grids are nested: a cell consists
-//! of eight of half its edge. Twin of `guide_key` in `glsl/include/guide.glsl`.
+//! of eight of half its edge. Twin of `guide_key` in `glsl/guided/guide.glsl`.
 
 use glam::Vec3;
 

@@ -48,7 +48,7 @@ impl VisibilitySteps {
 }
 
 impl Steps for VisibilitySteps {
-    /// The outcome of each shadow ray affects the next.
+    /// One, since each shadow ray teaches the next.
     fn rays_per_group(&self) -> u32 {
         1
     }

@@ -4,10 +4,9 @@ use glam::{DVec2, DVec4};
 
 /// Points of the curve through `points`, with `per_span` pieces between neighbours.
 ///
-/// Centripetal Catmull-Rom splines (Yuksel, Schaefer and Keyser, "On the parameterization of
-/// Catmull-Rom curves", 2009) neither loop nor overshoot within a span. One piece per span gives
-/// the polyline itself. A point given twice is a corner, where the curve may turn sharply. The last
-/// point of a closed curve leads to the first.
+/// Centripetal Catmull-Rom splines \[Yuksel et al. 2009\] neither loop nor overshoot within a span.
+/// One piece per span gives the polyline itself. A point given twice is a corner, where the curve
+/// may turn sharply. The last point of a closed curve leads to the first.
 pub fn smooth(points: &[DVec4], per_span: usize, closed: bool) -> Vec<DVec4> {
     let is_corner = |index: usize| index > 0 && points[index] == points[index - 1];
     let corner = (1..points.len()).find(|&index| is_corner(index));

@@ -1,4 +1,4 @@
-//! PLY (Turk, "The PLY polygon file format", 1994): ascii and binary in both byte orders.
+//! PLY \[Turk 1994\]: ascii and binary in both byte orders.
 //!
 //! The header may name elements and properties in any order and of any type. The reader uses
 //! `x y z` and `nx ny nz` of `vertex` and the list `vertex_indices` (or `vertex_index`) of `face`. It
