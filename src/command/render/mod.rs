@@ -21,7 +21,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    files::check_writable,
+    files::{check_writable, sweep_leftovers},
     film::{
         Checkpoint, Metadata, SampleRange, Sums, Window,
         checkpoint::{checkpoint_path, guide_path},
@@ -91,6 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.exr", scene.name)));
     // Fail before the work, not after it.
     check_writable(&output)?;
+    sweep_leftovers(&output);
     if let Some(at) = arguments.pixel {
         pixel::check(&settings, &scene, &output, at)?;
     }
