@@ -57,6 +57,130 @@ fn checkpoint() -> Checkpoint {
     Checkpoint { sums, metadata }
 }
 
+/// Puts together every state of the folder that a killed process can leave: the guide is written,
+/// then the checkpoint, then the older guide removed.
+#[test]
+fn every_state_that_a_kill_can_leave_resumes_to_the_bit() {
+    let folder = folder();
+    let path = folder.path().join("out.checkpoint.exr");
+    let run = |options: &[&str]| folder.run(&[&GUIDED[..], options].concat()).assert(0, &[]);
+    run(&["--spp=9"]);
+    let whole = channels(&folder, "out.exr");
+    let keep = |spp: &str| {
+        run(&[spp, "--checkpoint-interval=1h"]);
+        let [guide] = guide_paths(&path).unwrap().try_into().unwrap();
+        let contents = (fs::read(&path).unwrap(), fs::read(&guide).unwrap());
+        (contents.0, guide, contents.1)
+    };
+    let (older, older_guide, older_bytes) = keep("--spp=2");
+    let (newer, newer_guide, newer_bytes) = keep("--spp=5");
+    assert!(older_guide != newer_guide && !older_guide.exists());
+    let both = [(&older_guide, &older_bytes), (&newer_guide, &newer_bytes)];
+    for (checkpoint, guides) in
+        [(&older, &both[..1]), (&older, &both[..]), (&newer, &both[..]), (&newer, &both[1..])]
+    {
+        fs::write(&path, checkpoint).unwrap();
+        for path in guide_paths(&path).unwrap() {
+            fs::remove_file(path).unwrap();
+        }
+        for (path, bytes) in guides {
+            fs::write(path, bytes).unwrap();
+        }
+        run(&["--spp=9", "--resume"]);
+        assert!(channels(&folder, "out.exr") == whole, "{} guides", guides.len());
+    }
+}
+
+#[test]
+fn a_killed_render_resumes_to_the_bit() {
+    let folder = folder();
+    let run = |options: &[&str]| folder.run(&[&GUIDED[..], options].concat()).assert(0, &[]);
+    run(&["--spp=40"]);
+    let whole = channels(&folder, "out.exr");
+    let path = folder.path().join("out.checkpoint.exr");
+    let mut kept = 0;
+    for delay in [5, 20, 45, 80, 120, 170] {
+        let mut child = program(folder.path())
+            .args(GUIDED)
+            .args(["--spp=1000000", "--checkpoint-interval=1ms", "--resume"])
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        // Let it render for a while after its first checkpoint.
+        for _ in 0..1000 {
+            if path.exists() {
+                break;
+            }
+            thread::sleep(Duration::from_millis(20));
+        }
+        thread::sleep(Duration::from_millis(delay));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let samples = Checkpoint::read(&path).unwrap().sums.sample_count;
+        if samples < 40 {
+            run(&["--spp=40", "--resume"]);
+            assert!(channels(&folder, "out.exr") == whole, "killed at {samples} samples");
+            kept += 1;
+        } else {
+            Checkpoint::read_with_guide(&path).unwrap().1.unwrap();
+            fs::remove_file(&path).unwrap();
+        }
+    }
+    assert!(kept > 0, "no kill came early enough to be continued");
+}
+
+#[test]
+fn no_flipped_bit_of_a_checkpoint_passes() {
+    let folder = Folder::new();
+    let path = folder.path().join("room.checkpoint.exr");
+    let checkpoint = checkpoint();
+    checkpoint.write(&path).unwrap();
+    let bytes = fs::read(&path).unwrap();
+    let mut refused = 0;
+    for position in 0..bytes.len() {
+        let mut damaged = bytes.clone();
+        damaged[position] ^= 1 << (position % 8);
+        fs::write(&path, &damaged).unwrap();
+        // Bits that the sums do not depend on, such as the chromaticities, may flip.
+        match Checkpoint::read(&path) {
+            Ok(read) => assert!(read == checkpoint, "bit of byte {position}"),
+            Err(_) => refused += 1,
+        }
+    }
+    assert!(refused > bytes.len() / 2, "{refused} of {}", bytes.len());
+    for length in (0..bytes.len()).step_by(97) {
+        fs::write(&path, &bytes[..length]).unwrap();
+        assert!(Checkpoint::read(&path).is_err(), "{length} bytes");
+    }
+}
+
+/// A folder lies where the checkpoint should go.
+#[test]
+fn a_failing_checkpoint_does_not_cost_the_image() {
+    let folder = folder();
+    fs::create_dir(folder.path().join("out.checkpoint.exr")).unwrap();
+    for sampler in ["mis", "guided"] {
+        let sampler = format!("--sampler={sampler}");
+        let options = [
+            "render",
+            "scene.toml",
+            &sampler,
+            "--spp=20",
+            "--checkpoint-interval=1ms",
+            "--png",
+            "--stats=stats.json",
+            "-o",
+            "out.exr",
+        ];
+        let run = folder.run(&options);
+        run.assert(1, &["out.checkpoint.exr: cannot write", "the next checkpoint tries again"]);
+        assert!(run.messages.contains("wrote out.exr, out.png, stats.json"), "{}", run.messages);
+        let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+        assert_eq!(image.attributes["samplesPerPixel"], Attribute::Integer(20));
+        fs::remove_file(folder.path().join("out.exr")).unwrap();
+    }
+}
+
 #[test]
 fn leftovers_of_killed_processes_are_swept() {
     let folder = folder();

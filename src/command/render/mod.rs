@@ -23,11 +23,8 @@ use crate::{
     error::{Error, Result},
     files::{check_writable, sweep_leftovers},
     film::{
-        Checkpoint, Metadata, SampleRange, Sums, Window,
-        checkpoint::{checkpoint_path, guide_path},
-        display::DisplayServer,
-        metadata::seconds_of,
-        png::write_preview,
+        Checkpoint, Metadata, SampleRange, Sums, Window, checkpoint::checkpoint_path,
+        display::DisplayServer, metadata::seconds_of, png::write_preview,
     },
     gpu::Device,
     renderer::{Renderer, Settings},
@@ -212,7 +209,7 @@ impl<'a> RenderJob<'a> {
             log::warn!("--resume: there is no {}; starting from the beginning", path.display());
             return Ok(());
         }
-        let checkpoint = Checkpoint::read(&path)?;
+        let (checkpoint, guide) = Checkpoint::read_with_guide(&path)?;
         let sums = renderer.sums()?;
         checkpoint.check_resume(
             &path,
@@ -223,7 +220,9 @@ impl<'a> RenderJob<'a> {
         )?;
         renderer.restore(&checkpoint.sums)?;
         if self.arguments.sampler == Sampler::Guided {
-            guide::resume(renderer, &path)?;
+            let (guide_path, guide) =
+                guide.ok_or_else(|| Error::format(&path, "the checkpoint has no guide"))?;
+            guide::resume(renderer, &guide_path, &guide)?;
         }
         self.earlier_seconds = checkpoint.metadata.seconds;
         Ok(())
@@ -278,7 +277,10 @@ impl<'a> RenderJob<'a> {
             if let Some(interval) = self.arguments.checkpoint_interval
                 && last_checkpoint.elapsed() >= interval
             {
-                self.write_checkpoint(renderer, renderer.sums()?)?;
+                // A full disk may have room again at the next interval or for the image.
+                if let Err(error) = self.write_checkpoint(renderer, renderer.sums()?)? {
+                    log::warn!("{error}; the next checkpoint tries again");
+                }
                 last_checkpoint = Instant::now();
             }
             progress.update(&self.standing(renderer));
@@ -368,14 +370,20 @@ impl<'a> RenderJob<'a> {
         }
     }
 
-    fn write_checkpoint(&self, renderer: &Renderer, sums: Sums) -> Result<()> {
+    /// Writes a checkpoint. The outer error is the device's, the inner one the disk's.
+    fn write_checkpoint(&self, renderer: &Renderer, sums: Sums) -> Result<Result<()>> {
         let checkpoint = Checkpoint { sums, metadata: self.metadata(renderer) };
         let path = checkpoint_path(&self.output);
-        guide::save(renderer, &guide_path(&path))?;
-        checkpoint.write(&path)
+        let guide = renderer.guide_state()?.map(|state| state.to_bytes()).transpose();
+        Ok(guide
+            .map_err(|source| Error::io(&path, "write", source))
+            .and_then(|guide| checkpoint.write_with_guide(&path, guide.as_deref())))
     }
 
-    /// Writes the image and all other files asked for.
+    /// Writes the image, then all other files asked for, each of them even if another fails.
+    ///
+    /// # Errors
+    /// The first failure; others are logged.
     fn finish(&self, renderer: &Renderer, reason: StopReason, load_ms: f64) -> Result<()> {
         let sums = renderer.sums()?;
         let totals = renderer.totals();
@@ -394,30 +402,34 @@ impl<'a> RenderJob<'a> {
         let metadata = self.metadata(renderer);
         let mut image = sums.to_image(&self.arguments.aov);
         metadata.store(&mut image);
-        image.write_exr(&self.output)?;
-        let mut written = vec![self.output.clone()];
+        let mut written = Vec::new();
+        let mut failure = None;
+        let mut note = |path: &Path, result: Result<()>| match (result, &failure) {
+            (Ok(()), _) => written.push(display(path)),
+            (Err(error), None) => failure = Some(error),
+            (Err(error), Some(_)) => log::error!("{error}"),
+        };
+        note(&self.output, image.write_exr(&self.output));
         if self.arguments.png {
             let path = self.output.with_extension("png");
-            write_preview(&path, &image.rgb(&self.output)?, self.arguments.exposure)?;
-            written.push(path);
+            let preview = |rgb| write_preview(&path, &rgb, self.arguments.exposure);
+            note(&path, image.rgb(&self.output).and_then(preview));
         }
+        drop(image);
         if let Some(path) = &self.arguments.stats {
-            self.statistics(renderer, &metadata, reason, load_ms).write(path)?;
-            written.push(path.clone());
+            note(path, self.statistics(renderer, &metadata, reason, load_ms).write(path));
         }
         if reason == StopReason::Interrupt || self.arguments.checkpoint_interval.is_some() {
-            self.write_checkpoint(renderer, sums)?;
-            written.push(checkpoint_path(&self.output));
+            let path = checkpoint_path(&self.output);
+            note(&path, self.write_checkpoint(renderer, sums).and_then(|written| written));
         }
         if let Some(path) = &self.arguments.save_guide {
-            guide::save(renderer, path)?;
-            written.push(path.clone());
+            note(path, guide::save(renderer, path));
         }
-        if !self.arguments.quiet {
-            let names: Vec<_> = written.iter().map(|path: &PathBuf| display(path)).collect();
-            eprintln!("wrote {}", names.join(", "));
+        if !self.arguments.quiet && !written.is_empty() {
+            eprintln!("wrote {}", written.join(", "));
         }
-        Ok(())
+        failure.map_or(Ok(()), Err)
     }
 }
 
