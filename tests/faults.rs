@@ -154,6 +154,57 @@ fn no_flipped_bit_of_a_checkpoint_passes() {
     }
 }
 
+#[test]
+fn impossible_numbers_are_refused() {
+    let folder = Folder::new();
+    let path = folder.path().join("room.checkpoint.exr");
+    let refuse = |checkpoint: &Checkpoint, text: &str| {
+        checkpoint.write(&path).unwrap();
+        let error = Checkpoint::read(&path).unwrap_err().to_string();
+        assert!(error.contains(text), "{error}");
+    };
+    let good = checkpoint();
+    for seconds in [f64::NAN, f64::INFINITY, -1.0, 1e12] {
+        let metadata = Metadata { seconds, ..good.metadata.clone() };
+        refuse(&Checkpoint { metadata, ..good.clone() }, "fenestra.seconds: expected 0 to");
+    }
+    let with = |sample_ranges: Vec<SampleRange>| {
+        let metadata = Metadata { sample_ranges, ..good.metadata.clone() };
+        Checkpoint { metadata, ..good.clone() }
+    };
+    let range = |first: u32, count: u32| SampleRange { seed: 1, first, count };
+    refuse(&with(vec![range(u32::MAX, 2)]), "1:4294967295+2 passes the last sample of a seed");
+    refuse(&with(vec![range(0, 4), range(3, 3)]), "1:0+4 and 1:3+3 share samples");
+    refuse(&with(vec![]), "0 samples per pixel");
+    for layer in ["compensation", "albedo"] {
+        let mut damaged = good.clone();
+        let sums = &mut damaged.sums;
+        sums.albedo = vec![[0.5; 3]; 8];
+        let values = if layer == "albedo" { &mut sums.albedo } else { &mut sums.compensation };
+        values[3][1] = f32::INFINITY;
+        refuse(&damaged, "1 pixels with sums that are not finite");
+    }
+    good.write(&path).unwrap();
+    let mut image = Image::read_exr(&path).unwrap();
+    image.channels.get_mut("ShadowRays.Traced").unwrap()[2] = -1.0;
+    let error = Checkpoint::from_image(&image, &path).unwrap_err().to_string();
+    assert!(error.contains("expected a count, found -1"), "{error}");
+
+    // All samples of a seed are 2³², one more than a count holds.
+    let half = |first: u32, count: u32| {
+        let mut half = with(vec![range(first, count)]);
+        half.sums.sample_count = count;
+        half
+    };
+    let (first, second) = (half(0, 1 << 31), half(1 << 31, 1 << 31));
+    let parts = [(Path::new("a"), &first), (Path::new("b"), &second)];
+    let error = merge_checkpoints(&parts).unwrap_err().to_string();
+    assert!(error.contains("exceed 4294967295"), "{error}");
+    let mut joined = first.metadata.clone();
+    joined.add_ranges(&second.metadata);
+    assert_eq!(joined.sample_count(), 1 << 32);
+}
+
 /// A folder lies where the checkpoint should go.
 #[test]
 fn a_failing_checkpoint_does_not_cost_the_image() {
