@@ -205,6 +205,20 @@ fn impossible_numbers_are_refused() {
     assert_eq!(joined.sample_count(), 1 << 32);
 }
 
+#[test]
+fn a_guide_may_name_its_environment_in_any_script() {
+    use fenestra::sampler::guided::GuideState;
+    let folder = folder();
+    folder.run(&[&GUIDED[..], &["--spp=1", "--save-guide=a.guide"]].concat()).assert(0, &[]);
+    let path = folder.path().join("a.guide");
+    let mut state = GuideState::read(&path).unwrap();
+    state.origin.environment = "дом с окнами на юг".to_owned();
+    state.write(&path).unwrap();
+    folder
+        .run(&[&GUIDED[..], &["--spp=1", "--load-guide=a.guide"]].concat())
+        .assert(2, &["the guide belongs to another environment: map дом с окнами"]);
+}
+
 /// A folder lies where the checkpoint should go.
 #[test]
 fn a_failing_checkpoint_does_not_cost_the_image() {
