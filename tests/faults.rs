@@ -206,6 +206,18 @@ fn impossible_numbers_are_refused() {
 }
 
 #[test]
+fn a_render_ends_at_the_last_sample_of_its_seed() {
+    let folder = folder();
+    let options = ["render", "scene.toml", "-o", "out.exr", "--time=20s"];
+    folder
+        .run(&[&options[..], &["--sample-offset=4294967230"]].concat())
+        .assert(0, &["stopped at the last sample of the seed"]);
+    let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+    let ranges = Attribute::Text("0:4294967230+65".to_owned());
+    assert_eq!(image.attributes["fenestra.sample_ranges"], ranges);
+}
+
+#[test]
 fn a_guide_may_name_its_environment_in_any_script() {
     use fenestra::sampler::guided::GuideState;
     let folder = folder();

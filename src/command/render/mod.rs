@@ -46,6 +46,8 @@ enum StopReason {
     Spp,
     Time,
     Error,
+    /// The seed has no more samples.
+    LastSample,
     Interrupt,
 }
 
@@ -55,6 +57,7 @@ impl StopReason {
             Self::Spp => "spp",
             Self::Time => "time",
             Self::Error => "error",
+            Self::LastSample => "last-sample",
             Self::Interrupt => "interrupt",
         }
     }
@@ -64,6 +67,7 @@ impl StopReason {
             Self::Spp => "stopped by --spp",
             Self::Time => "stopped by --time",
             Self::Error => "stopped by --error (stopping by the data is slightly biased)",
+            Self::LastSample => "stopped at the last sample of the seed",
             Self::Interrupt => "interrupted",
         }
     }
@@ -239,6 +243,11 @@ impl<'a> RenderJob<'a> {
         self.arguments.spp.or_else(|| none.then_some(default))
     }
 
+    /// Returns the samples per pixel up to the last of the seed, whose index is below 2³².
+    fn most_samples(&self) -> u32 {
+        u32::MAX - self.arguments.sample_offset
+    }
+
     /// Renders passes until a stop rule is met.
     fn render(&mut self, renderer: &mut Renderer, interrupted: &AtomicBool) -> Result<StopReason> {
         let mut progress = Progress::new(self.scene.name.clone(), self.arguments.quiet);
@@ -250,10 +259,8 @@ impl<'a> RenderJob<'a> {
             if let Some(reason) = self.stop_reason(renderer, interrupted) {
                 break reason;
             }
-            let left = self
-                .target_spp()
-                .map_or(u32::MAX, |spp| spp.saturating_sub(renderer.sample_count()));
-            let samples = pass_samples.min(left);
+            let target = self.target_spp().unwrap_or(u32::MAX).min(self.most_samples());
+            let samples = pass_samples.min(target.saturating_sub(renderer.sample_count()));
             let start = Instant::now();
             renderer.render_pass(samples)?;
             let took = start.elapsed();
@@ -324,6 +331,9 @@ impl<'a> RenderJob<'a> {
         }
         if self.target_spp().is_some_and(|spp| samples >= spp) {
             return Some(StopReason::Spp);
+        }
+        if samples >= self.most_samples() {
+            return Some(StopReason::LastSample);
         }
         if samples > 0 && self.time_left().is_some_and(|left| left <= 0.0) {
             return Some(StopReason::Time);
