@@ -218,6 +218,12 @@ fn a_render_ends_at_the_last_sample_of_its_seed() {
 }
 
 #[test]
+fn an_infinite_error_is_refused() {
+    let options = ["render", "scene.toml", "-o", "out.exr", "--error=inf"];
+    folder().run(&options).assert(2, &["--error inf", "expected a finite number"]);
+}
+
+#[test]
 fn a_guide_may_name_its_environment_in_any_script() {
     use fenestra::sampler::guided::GuideState;
     let folder = folder();
