@@ -298,3 +298,47 @@ fn leftovers_of_killed_processes_are_swept() {
     assert!(!files.contains(&swept), "{files:?}");
     assert!(kept.iter().all(|name| files.contains(name)), "{files:?}");
 }
+
+#[test]
+fn hangups_and_terminations_are_interrupts() {
+    for signal in ["HUP", "TERM"] {
+        let folder = folder();
+        let options = ["render", "scene.toml", "--spp=100000000", "-o", "out.exr"];
+        let run = Running::start(folder.path(), &options, "device: ").signal(signal);
+        run.assert(130, &["interrupted", "wrote out.exr, out.checkpoint.exr"]);
+        let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+        assert!(image.channels["R"].iter().all(|sample| sample.is_finite()));
+        Checkpoint::read(&folder.path().join("out.checkpoint.exr")).unwrap();
+    }
+}
+
+/// Runs the program through the shell, after `before`.
+fn run_after(folder: &Folder, before: &str, arguments: &str) -> Run {
+    let program = env!("CARGO_BIN_EXE_fenestra");
+    let line = format!("{before}; exec {program} {arguments}");
+    let mut shell = Command::new("sh");
+    shell.args(["-c", &line]).current_dir(folder.path());
+    shell.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
+    Run::of(&shell.output().unwrap())
+}
+
+#[test]
+fn an_ignored_hangup_stays_ignored() {
+    let folder = folder();
+    // The program's own id is that of the shell.
+    let before = "trap '' HUP; (sleep 1; kill -HUP $$) & true";
+    run_after(&folder, before, "render scene.toml --time 3s -o out.exr").assert(0, &["wrote out"]);
+}
+
+#[test]
+fn a_limit_of_file_sizes_is_an_error_and_no_signal() {
+    let folder = folder();
+    let options = ["render", "scene.toml", "--spp=1", "-o", "out.exr"];
+    folder.run(&options).assert(0, &[]);
+    let before = fs::read(folder.path().join("out.exr")).unwrap();
+    // Blocks of 512 bytes
+    let run = run_after(&folder, "ulimit -f 2", "render scene.toml --spp 2 -o out.exr");
+    run.assert(1, &["out.exr: cannot write: File too large"]);
+    assert_eq!(fs::read(folder.path().join("out.exr")).unwrap(), before);
+    assert!(folder.files().iter().all(|name| !name.ends_with(".tmp")), "{:?}", folder.files());
+}

@@ -141,8 +141,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if reason == StopReason::Interrupt { Err(Error::Interrupted) } else { Ok(()) }
 }
 
-/// Returns a flag that Ctrl-C raises; a second Ctrl-C ends the process at once.
+/// Returns a flag that Ctrl-C raises, and SIGTERM and SIGHUP with it; a second one ends the process
+/// at once.
 pub(super) fn listen_for_interrupt() -> Arc<AtomicBool> {
+    #[cfg(unix)]
+    if let Err(error) = block_signals() {
+        log::warn!("signals cannot be blocked: {error}");
+    }
     let flag = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&flag);
     let listening = ctrlc::set_handler(move || {
@@ -154,6 +159,27 @@ pub(super) fn listen_for_interrupt() -> Arc<AtomicBool> {
         log::warn!("Ctrl-C will end the program without writing the image: {error}");
     }
     flag
+}
+
+/// Blocks signals that would end the process in the wrong way, in this thread and those it starts.
+///
+/// With SIGXFSZ blocked, a write beyond the limit of a file's size (`ulimit -f`) fails with an error
+/// instead. SIGHUP stays ignored where it was when the program started (`nohup`), since the handler
+/// of interrupts would take it.
+#[cfg(unix)]
+fn block_signals() -> nix::Result<()> {
+    use nix::sys::signal::{SigSet, Signal};
+    let mut blocked = SigSet::empty();
+    blocked.add(Signal::SIGXFSZ);
+    // Linux lists the ignored signals as a mask whose lowest bit is signal 1.
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status
+        .lines()
+        .find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
+    if ignored.unwrap_or(0) & 1 << (Signal::SIGHUP as u32 - 1) != 0 {
+        blocked.add(Signal::SIGHUP);
+    }
+    blocked.thread_block()
 }
 
 /// One render, from its first pass to its files.
