@@ -5,11 +5,20 @@ use std::{
     fs::{self, File, OpenOptions},
     io::{BufWriter, Write},
     path::{Path, PathBuf},
+    process,
+    time::Duration,
 };
 
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+
+/// Start of the names of temporary files; the id of the process that writes them follows.
+const TEMPORARY_PREFIX: &str = ".fenestra-";
+const TEMPORARY_SUFFIX: &str = ".tmp";
+/// Age from which a temporary file of a dead process is swept: one of a process on another machine
+/// that shares the folder is younger, since that process still writes it.
+const LEFTOVER_AGE: Duration = Duration::from_secs(60);
 
 /// Returns `fenestra/<kind>` in the user's cache folder (`$XDG_CACHE_HOME`, else `~/.cache`), or
 /// `None` if neither is set. The folder may not exist yet.
@@ -43,7 +52,7 @@ pub fn read_text(path: &Path) -> Result<String> {
 }
 
 /// Returns the folder that holds `path`.
-fn parent_of(path: &Path) -> &Path {
+pub fn parent_of(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -77,9 +86,9 @@ pub fn check_writable(path: &Path) -> Result<()> {
 
 /// Writes a file so that it appears complete or not at all.
 ///
-/// Creates the parent folders, lets `write` fill a temporary file in the same folder, and renames
-/// it to `path`, replacing an older file. On failure the temporary file is removed and the older
-/// file is untouched. A special file (`/dev/stdout`, a pipe) is written directly.
+/// Creates the parent folders, lets `write` fill a temporary file in the same folder, renames it to
+/// `path`, replacing an older file, and waits until both have reached the disk. On failure the
+/// temporary file is removed and the older file is untouched. A special file (`/dev/stdout`, a pipe) is written directly.
 ///
 /// # Errors
 /// [`Error::Io`] with `path` and the cause (no permission, full disk, …).
@@ -104,16 +113,66 @@ pub fn write_atomically(
     }
     fs::create_dir_all(parent).map_err(|source| Error::io(parent, "create folder", source))?;
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".fenestra-").suffix(".tmp");
+    let prefix = format!("{TEMPORARY_PREFIX}{}-", process::id());
+    builder.prefix(&prefix).suffix(TEMPORARY_SUFFIX);
     // Temporary files are private by default; give the result the permissions of any new file.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let attempt = || -> std::io::Result<()> {
         let (file, temporary) = builder.tempfile_in(parent)?.into_parts();
         fill(file)?.sync_all()?;
-        temporary.persist(path).map_err(|error| error.error)
+        temporary.persist(path).map_err(|error| error.error)?;
+        sync_folder(parent)
     };
     attempt().map_err(|source| Error::io(path, "write", source))
+}
+
+/// Waits until the names in a folder have reached the disk. Does nothing where the folder cannot be
+/// opened (no permission to read it, Windows) or its file system does not know how.
+fn sync_folder(folder: &Path) -> std::io::Result<()> {
+    use std::io::ErrorKind::{InvalidInput, Unsupported};
+    let Ok(folder) = File::open(folder) else { return Ok(()) };
+    match folder.sync_all() {
+        Err(error) if !matches!(error.kind(), InvalidInput | Unsupported) => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Removes a file that may be missing and waits until this has reached the disk.
+///
+/// # Errors
+/// [`Error::Io`] with `path` and the cause.
+pub fn remove(path: &Path) -> Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        result => result
+            .and_then(|()| sync_folder(parent_of(path)))
+            .map_err(|source| Error::io(path, "remove", source)),
+    }
+}
+
+/// Removes the temporary files that killed processes left beside `path`, once they are older than
+/// [`LEFTOVER_AGE`]. Needs `/proc` to know which processes live, and does nothing without it.
+pub fn sweep_leftovers(path: &Path) {
+    let Ok(entries) = fs::read_dir(parent_of(path)) else { return };
+    if !Path::new("/proc/self").exists() {
+        return;
+    }
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let process = name
+            .to_str()
+            .and_then(|name| name.strip_prefix(TEMPORARY_PREFIX)?.strip_suffix(TEMPORARY_SUFFIX))
+            .and_then(|name| name.split_once('-')?.0.parse::<u32>().ok());
+        let is_dead = process.is_some_and(|id| !Path::new("/proc").join(id.to_string()).exists());
+        let age = || entry.metadata().ok()?.modified().ok()?.elapsed().ok();
+        if is_dead && age().is_some_and(|age| age > LEFTOVER_AGE) {
+            match fs::remove_file(entry.path()) {
+                Ok(()) => log::info!("removed {} of a killed process", entry.path().display()),
+                Err(error) => log::warn!("{}: cannot remove: {error}", entry.path().display()),
+            }
+        }
+    }
 }
 
 /// Writes a text file as [`write_atomically`] does.

@@ -8,7 +8,7 @@ mod support;
 
 use command::Folder;
 use fenestra::{
-    film::{Attribute, Image, Statistics, Sums},
+    film::{Attribute, Checkpoint, Image, Statistics, Sums},
     renderer::Settings,
     sampler::{
         Parameters, Sampler,
@@ -154,12 +154,17 @@ fn files_and_figures_tell_the_choice() {
 
     // Record another number, as another machine may have chosen it.
     let other = if chosen == 4 { 8 } else { 4 };
-    for name in ["a.checkpoint.guide", "room.guide"] {
-        let path = folder.path().join(name);
-        let state = GuideState::read(&path).unwrap();
+    let with_other = |state: GuideState| {
         assert_eq!(state.candidates, Some(chosen));
-        GuideState { candidates: Some(other), ..state }.write(&path).unwrap();
-    }
+        GuideState { candidates: Some(other), ..state }
+    };
+    let path = folder.path().join("room.guide");
+    with_other(GuideState::read(&path).unwrap()).write(&path).unwrap();
+    let path = folder.path().join("a.checkpoint.exr");
+    let (checkpoint, guide) = Checkpoint::read_with_guide(&path).unwrap();
+    let (guide_path, bytes) = guide.unwrap();
+    let guide = with_other(GuideState::from_bytes(&bytes, &guide_path).unwrap());
+    checkpoint.write_with_guide(&path, Some(&guide.to_bytes().unwrap())).unwrap();
     let (image, statistics) = render("a.exr", &["--spp", "5", "--resume"]);
     assert_eq!((statistics.candidates, statistics.candidate_costs.len()), (Some(other), 0));
     assert_eq!(text(&image, "fenestra.candidates"), other.to_string());

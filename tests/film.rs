@@ -344,8 +344,8 @@ fn a_checkpoint_without_its_sums_is_refused() {
     plain.attributes.remove("fenestra.checkpoint");
     assert!(message(&plain).contains("not a checkpoint"));
     let mut newer = image.clone();
-    newer.attributes.insert("fenestra.checkpoint".to_owned(), Attribute::Integer(2));
-    assert!(message(&newer).contains("another version: expected 1, found Integer(2)"));
+    newer.attributes.insert("fenestra.checkpoint".to_owned(), Attribute::Integer(3));
+    assert!(message(&newer).contains("another version: expected 2, found Integer(3)"));
     let mut outside = image.clone();
     outside.origin = [-1, 0];
     assert!(message(&outside).contains("outside the film"));

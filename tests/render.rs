@@ -5,7 +5,7 @@
 mod command;
 
 use command::Folder;
-use fenestra::film::{Attribute, Image, Statistics};
+use fenestra::film::{Attribute, Image, Statistics, checkpoint::guide_paths};
 
 /// Renders with these options and returns image and statistics.
 fn render(folder: &Folder, output: &str, options: &[&str]) -> (Image, Statistics) {
@@ -108,21 +108,22 @@ fn what_guided_learned_is_kept_with_the_checkpoint_and_in_files() {
     let (whole, _) = render(&folder, "whole.exr", &options("9"));
     let keep = [&options("4")[..], &["--checkpoint-interval", "1h"]].concat();
     render(&folder, "part.exr", &keep);
-    let guide = folder.path().join("part.checkpoint.guide");
-    assert!(guide.exists());
+    let guides = || guide_paths(&folder.path().join("part.checkpoint.exr")).unwrap();
+    let [guide] = guides().try_into().unwrap();
     let resume = [&options("9")[..], &["--resume"]].concat();
     let (part, _) = render(&folder, "part.exr", &resume);
     assert_eq!(part.channels, whole.channels);
+    assert_eq!(guides(), [guide.clone()], "nothing was written beside the image");
     // A checkpoint without its guide, or with the guide of another moment, is refused.
     std::fs::remove_file(&guide).unwrap();
     let refuse = |texts: &[&str]| {
         let arguments = ["render", "scene.toml", "-o", "part.exr", "--sampler", "guided"];
         folder.run(&[&arguments[..], &["--spp", "12", "--resume"]].concat()).assert(1, texts);
     };
-    refuse(&["part.checkpoint.guide", "cannot read"]);
+    refuse(&["part.checkpoint.", ".guide: cannot read"]);
     render(&folder, "other.exr", &[&options("2")[..], &["--save-guide", "other.guide"]].concat());
     std::fs::copy(folder.path().join("other.guide"), &guide).unwrap();
-    refuse(&["belongs to 2 samples per pixel", "holds 4"]);
+    refuse(&["damaged, or not the guide of part.checkpoint.exr"]);
 
     let loaded = [&options("3")[..], &["--load-guide", "other.guide"]].concat();
     let (_, statistics) = render(&folder, "loaded.exr", &loaded);

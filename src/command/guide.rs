@@ -4,7 +4,6 @@ use std::path::Path;
 
 use crate::{
     error::{Error, Result},
-    film::checkpoint::guide_path,
     renderer::Renderer,
     sampler::{Sampler, guided::GuideState},
 };
@@ -42,27 +41,24 @@ pub fn load(renderer: &mut Renderer, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Restores a checkpoint's guide, so that the render continues exactly.
+/// Restores the guide that lies at `path` beside a checkpoint, so that the render continues exactly.
 ///
 /// # Errors
-/// A file that is missing, cannot be read or belongs to another checkpoint; a failing device.
-pub fn resume(renderer: &mut Renderer, checkpoint: &Path) -> Result<()> {
-    let path = guide_path(checkpoint);
-    let state = GuideState::read(&path)?;
+/// Bytes that are no guide or one of another moment; a failing device.
+pub fn resume(renderer: &mut Renderer, path: &Path, bytes: &[u8]) -> Result<()> {
+    let state = GuideState::from_bytes(bytes, path)?;
     if state.samples != renderer.sample_count() {
         return Err(Error::format(
-            &path,
+            path,
             format!(
-                "what was learned belongs to {} samples per pixel, the checkpoint {} holds {}; keep \
-                 the two files together",
+                "what was learned belongs to {} samples per pixel, the checkpoint holds {}",
                 state.samples,
-                checkpoint.display(),
                 renderer.sample_count()
             ),
         ));
     }
     if renderer.restore_guide(&state)? {
-        return Err(Error::format(&path, "it was learned in another geometry".to_owned()));
+        return Err(Error::format(path, "it was learned in another geometry".to_owned()));
     }
     Ok(())
 }

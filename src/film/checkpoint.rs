@@ -3,20 +3,41 @@
 //! The channels hold the sums bit for bit: `Sum.R/G/B`, `SumCompensation.R/G/B`, `Squares.R/G/B`,
 //! `AlbedoSum.R/G/B`, `NSum.X/Y/Z`, `PSum.X/Y/Z`, `GuideCellSum.R/G/B`, `GuideLevelSum.R/G/B`, and
 //! each count of shadow rays and cache entries as a pair of floats that add up to the integer.
-//! Beside them, the picture `R`, `G`, `B` lets any viewer open the file.
+//! Beside them, the picture `R`, `G`, `B` lets any viewer open the file. An attribute holds the
+//! SHA-256 of window, channels and attributes, so that damage does not pass for radiance.
+//!
+//! The guide of a sampler that learns lies in a file of its own, named by its content:
+//! `image.checkpoint.<hash>.guide`. It is written before the checkpoint that holds its hash, and
+//! the guide of the older checkpoint is removed after. The renaming of the checkpoint is the one
+//! moment at which both change, so a killed process leaves the old pair or the new one.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+use sha2::{Digest, Sha256};
 
 use super::{
     exr::{Attribute, Image},
     metadata::{Metadata, SampleRange},
     sums::{Sums, split},
 };
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    files::{self, hexadecimal, write_atomically},
+};
 
 /// Attribute that marks a checkpoint, and the version of its channels.
 const FORMAT_ATTRIBUTE: &str = "fenestra.checkpoint";
-const FORMAT_VERSION: i32 = 1;
+const FORMAT_VERSION: i32 = 2;
+/// SHA-256 of the rest of the file.
+const CHECKSUM_ATTRIBUTE: &str = "fenestra.checksum";
+/// SHA-256 of the guide's file.
+const GUIDE_ATTRIBUTE: &str = "fenestra.guide";
+/// Digits of that hash in the file's name.
+const GUIDE_NAME_DIGITS: usize = 12;
 
 const SUM: [&str; 3] = ["Sum.R", "Sum.G", "Sum.B"];
 const COMPENSATION: [&str; 3] = ["SumCompensation.R", "SumCompensation.G", "SumCompensation.B"];
@@ -41,6 +62,17 @@ const CACHE_ENTRIES: [&str; 4] = [
     "CacheEntries.HitsCompensation",
 ];
 
+/// Steps in which a checkpoint is written, in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    /// The guide appears.
+    Guide,
+    /// The checkpoint takes the place of the older one.
+    Checkpoint,
+    /// The older guide goes.
+    Removal,
+}
+
 /// Everything needed to continue a render as if it had not stopped.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
@@ -55,9 +87,44 @@ pub fn checkpoint_path(image: &Path) -> PathBuf {
     image.with_extension("checkpoint.exr")
 }
 
-/// Path of the guide learned up to a checkpoint: `image.checkpoint.exr` → `image.checkpoint.guide`.
-pub fn guide_path(checkpoint: &Path) -> PathBuf {
-    checkpoint.with_extension("guide")
+/// Path of the guide with this hash: `image.checkpoint.exr` → `image.checkpoint.<hash>.guide`.
+fn guide_path(checkpoint: &Path, hash: &str) -> PathBuf {
+    let digits: String = hash.chars().take(GUIDE_NAME_DIGITS).collect();
+    checkpoint.with_extension(format!("{digits}.guide"))
+}
+
+/// Lists the guides that lie beside a checkpoint.
+///
+/// # Errors
+/// [`Error::Io`] for a folder that cannot be read.
+pub fn guide_paths(checkpoint: &Path) -> Result<Vec<PathBuf>> {
+    let folder = files::parent_of(checkpoint);
+    let stem = checkpoint.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    let prefix = stem.unwrap_or_default() + ".";
+    let is_guide = |path: &PathBuf| {
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
+        let name = name.unwrap_or_default();
+        let hash = name.strip_prefix(&prefix).and_then(|rest| rest.strip_suffix(".guide"));
+        hash.is_some_and(|hash| {
+            hash.len() == GUIDE_NAME_DIGITS
+                && hash.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
+        })
+    };
+    let entries =
+        fs::read_dir(folder).map_err(|source| Error::io(folder, "read folder", source))?;
+    let mut paths: Vec<PathBuf> =
+        entries.flatten().map(|entry| entry.path()).filter(is_guide).collect();
+    paths.sort();
+    Ok(paths)
+}
+
+/// Removes a checkpoint and its guides, where they exist.
+///
+/// # Errors
+/// [`Error::Io`] with the cause.
+pub fn remove_checkpoint(path: &Path) -> Result<()> {
+    files::remove(path)?;
+    guide_paths(path)?.iter().try_for_each(|guide| files::remove(guide))
 }
 
 /// Tests whether `path` is named like a checkpoint.
@@ -98,20 +165,85 @@ impl Checkpoint {
         image
     }
 
-    /// Writes the checkpoint, atomically.
+    /// Writes the checkpoint of a sampler that does not learn, atomically.
     ///
     /// # Errors
     /// [`Error::Io`] with the cause.
     pub fn write(&self, path: &Path) -> Result<()> {
-        self.to_image().write_exr_uncompressed(path)
+        self.write_with_guide(path, None)
+    }
+
+    /// Writes the checkpoint and the file of its guide. Both replace older ones at one moment: at
+    /// every other, and after every failure, the older pair or the newer one is complete.
+    ///
+    /// # Errors
+    /// [`Error::Io`] with the cause.
+    pub fn write_with_guide(&self, path: &Path, guide: Option<&[u8]>) -> Result<()> {
+        self.write_in_steps(path, guide, &mut |_| Ok(()))
+    }
+
+    /// [`Self::write_with_guide`], which asks `before` each step whether to go on.
+    fn write_in_steps(
+        &self,
+        path: &Path,
+        guide: Option<&[u8]>,
+        before: &mut dyn FnMut(Step) -> Result<()>,
+    ) -> Result<()> {
+        let mut image = self.to_image();
+        let mut kept = None;
+        if let Some(guide) = guide {
+            let hash = hexadecimal(&Sha256::digest(guide));
+            let guide_path = guide_path(path, &hash);
+            before(Step::Guide)?;
+            write_atomically(&guide_path, |file| file.write_all(guide))?;
+            image.attributes.insert(GUIDE_ATTRIBUTE.to_owned(), Attribute::Text(hash));
+            kept = guide_path.file_name().map(ToOwned::to_owned);
+        }
+        let checksum = Attribute::Text(checksum(&image));
+        image.attributes.insert(CHECKSUM_ATTRIBUTE.to_owned(), checksum);
+        before(Step::Checkpoint)?;
+        image.write_exr_uncompressed(path)?;
+        before(Step::Removal)?;
+        // The checkpoint is safe: a guide that stays behind does no harm.
+        let remove_others = || {
+            let others = guide_paths(path)?;
+            let others = others.iter().filter(|other| other.file_name() != kept.as_deref());
+            others.into_iter().try_for_each(|other| files::remove(other))
+        };
+        if let Err(error) = remove_others() {
+            log::warn!("{error}");
+        }
+        Ok(())
     }
 
     /// Reads a checkpoint, bit for bit as it was written.
     ///
     /// # Errors
-    /// [`Error::Io`], or [`Error::Format`] if the file is no complete checkpoint of finite sums.
+    /// [`Error::Io`], or [`Error::Format`] if the file is no complete checkpoint of finite sums or
+    /// does not match its checksum.
     pub fn read(path: &Path) -> Result<Self> {
         Self::from_image(&Image::read_exr(path)?, path)
+    }
+
+    /// Reads a checkpoint and the path and bytes of its guide, if it has one.
+    ///
+    /// # Errors
+    /// As [`Checkpoint::read`], for either file.
+    pub fn read_with_guide(path: &Path) -> Result<(Self, Option<(PathBuf, Vec<u8>)>)> {
+        let image = Image::read_exr(path)?;
+        let checkpoint = Self::from_image(&image, path)?;
+        let Some(Attribute::Text(hash)) = image.attributes.get(GUIDE_ATTRIBUTE) else {
+            return Ok((checkpoint, None));
+        };
+        let guide_path = guide_path(path, hash);
+        let guide = files::read(&guide_path)?;
+        if hexadecimal(&Sha256::digest(&guide)) != *hash {
+            return Err(Error::format(
+                &guide_path,
+                format!("damaged, or not the guide of {}", path.display()),
+            ));
+        }
+        Ok((checkpoint, Some((guide_path, guide))))
     }
 
     /// Extracts the checkpoint from an image file; `path` only serves error messages.
@@ -142,9 +274,10 @@ impl Checkpoint {
                 Error::format(path, format!("incomplete checkpoint: no channels {names:?}"))
             })
         };
-        let sample_count = u32::try_from(metadata.sample_count()).map_err(|_| {
-            Error::format(path, format!("{} samples per pixel", metadata.sample_count()))
-        })?;
+        let sample_count =
+            u32::try_from(metadata.sample_count()).ok().filter(|count| *count > 0).ok_or_else(
+                || Error::format(path, format!("{} samples per pixel", metadata.sample_count())),
+            )?;
         let mut origin = [0; 2];
         for (value, stored) in origin.iter_mut().zip(image.origin) {
             *value = u32::try_from(stored).map_err(|_| {
@@ -166,8 +299,8 @@ impl Checkpoint {
             albedo: image.triple(ALBEDO).unwrap_or_default(),
             normal: image.triple(NORMAL).unwrap_or_default(),
             position: image.triple(POSITION).unwrap_or_default(),
-            visible: counts(image, SHADOW_RAYS),
-            cache_entries: counts(image, CACHE_ENTRIES),
+            visible: counts(image, SHADOW_RAYS, path)?,
+            cache_entries: counts(image, CACHE_ENTRIES, path)?,
             guide_cell: image.triple(GUIDE_CELL).unwrap_or_default(),
             guide_level: image.triple(GUIDE_LEVEL).unwrap_or_default(),
         };
@@ -175,6 +308,14 @@ impl Checkpoint {
             return Err(Error::format(
                 path,
                 format!("{} pixels with sums that are not finite", sums.non_finite_count()),
+            ));
+        }
+        let stored = image.attributes.get(CHECKSUM_ATTRIBUTE);
+        if stored != Some(&Attribute::Text(checksum(image))) {
+            return Err(Error::format(
+                path,
+                "damaged checkpoint: its checksum does not match its content; delete it, or leave \
+                 out --resume to start again",
             ));
         }
         Ok(Self { sums, metadata })
@@ -267,16 +408,149 @@ fn insert_counts(image: &mut Image, names: [&str; 4], counts: &[[u32; 2]]) {
 }
 
 /// Inverse of [`insert_counts`]; empty if a channel is missing.
-fn counts(image: &Image, names: [&str; 4]) -> Vec<[u32; 2]> {
+///
+/// # Errors
+/// [`Error::Format`] for a pair that is not a count of 32 bits.
+fn counts(image: &Image, names: [&str; 4], path: &Path) -> Result<Vec<[u32; 2]>> {
     let [Some(first), Some(first_rest), Some(second), Some(second_rest)] =
         names.map(|name| image.channels.get(name))
     else {
-        return Vec::new();
+        return Ok(Vec::new());
     };
-    let count = |leading: f32, rest: f32| (f64::from(leading) + f64::from(rest)) as u32;
+    let count = |leading: f32, rest: f32| {
+        let value = f64::from(leading) + f64::from(rest);
+        if value.fract() != 0.0 || !(0.0..=f64::from(u32::MAX)).contains(&value) {
+            let message = format!("channels {names:?}: expected a count, found {value}");
+            return Err(Error::format(path, message));
+        }
+        Ok(value as u32)
+    };
     (0..image.pixel_count())
         .map(|pixel| {
-            [count(first[pixel], first_rest[pixel]), count(second[pixel], second_rest[pixel])]
+            let first = count(first[pixel], first_rest[pixel])?;
+            Ok([first, count(second[pixel], second_rest[pixel])?])
         })
         .collect()
+}
+
+/// SHA-256 of the window, the channels and all attributes but the checksum itself.
+fn checksum(image: &Image) -> String {
+    let mut hasher = Sha256::new();
+    for value in [image.width, image.height, image.film_size[0], image.film_size[1]] {
+        hasher.update(value.to_le_bytes());
+    }
+    hasher.update(image.origin.map(i32::to_le_bytes).as_flattened());
+    // Lengths keep names and values apart.
+    let mut add = |tag: u8, name: &str, bytes: &[u8]| {
+        hasher.update([tag]);
+        hasher.update((name.len() as u64).to_le_bytes());
+        hasher.update(name);
+        hasher.update((bytes.len() as u64).to_le_bytes());
+        hasher.update(bytes);
+    };
+    for (name, samples) in &image.channels {
+        let bytes: Vec<u8> = samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
+        add(0, name, &bytes);
+    }
+    for (name, value) in &image.attributes {
+        match value {
+            _ if name == CHECKSUM_ATTRIBUTE => {}
+            Attribute::Text(value) => add(1, name, value.as_bytes()),
+            Attribute::Integer(value) => add(2, name, &value.to_le_bytes()),
+            Attribute::Float(value) => add(3, name, &value.to_le_bytes()),
+            Attribute::Double(value) => add(4, name, &value.to_le_bytes()),
+        }
+    }
+    hexadecimal(&hasher.finalize())
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+    use super::*;
+
+    fn checkpoint(samples: u32) -> Checkpoint {
+        let mut sums = Sums::new([0, 0], 2, 1, [2, 1]);
+        sums.sum = vec![[samples as f32; 3]; 2];
+        sums.sample_count = samples;
+        let range = SampleRange { seed: 1, first: 0, count: samples };
+        Checkpoint {
+            sums,
+            metadata: Metadata { sample_ranges: vec![range], ..Metadata::default() },
+        }
+    }
+
+    /// Stops the second writing before each of its steps, as a killed process or a full disk does,
+    /// and within the first two, which leaves a part of a temporary file behind.
+    #[test]
+    fn a_complete_pair_exists_after_every_step() {
+        let pair = |samples: u32| (checkpoint(samples), format!("guide of {samples}").into_bytes());
+        for stop in [Step::Guide, Step::Checkpoint, Step::Removal] {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("room.checkpoint.exr");
+            let write = |samples: u32, before: &mut dyn FnMut(Step) -> Result<()>| {
+                let (checkpoint, guide) = pair(samples);
+                checkpoint.write_in_steps(&path, Some(&guide), before)
+            };
+            let read = || {
+                let (checkpoint, guide) = Checkpoint::read_with_guide(&path).unwrap();
+                (checkpoint, guide.unwrap().1)
+            };
+            write(4, &mut |_| Ok(())).unwrap();
+            assert_eq!(read(), pair(4));
+            fs::write(folder.path().join(".fenestra-1-part.tmp"), "part").unwrap();
+            let stopped = |step| if step == stop { Err(Error::Interrupted) } else { Ok(()) };
+            assert!(write(8, &mut { stopped }).is_err());
+            assert_eq!(read(), pair(if stop == Step::Removal { 8 } else { 4 }), "{stop:?}");
+            // The next writing removes what the stopped one left behind.
+            write(12, &mut |_| Ok(())).unwrap();
+            assert_eq!(read(), pair(12), "{stop:?}");
+            assert_eq!(guide_paths(&path).unwrap().len(), 1, "{stop:?}");
+            remove_checkpoint(&path).unwrap();
+            assert!(!path.exists() && guide_paths(&path).unwrap().is_empty());
+        }
+    }
+
+    #[test]
+    fn obstacles_leave_the_older_pair() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("room.checkpoint.exr");
+        checkpoint(4).write_with_guide(&path, Some(b"older")).unwrap();
+        // A folder where the guide should go
+        let obstacle = guide_path(&path, &hexadecimal(&Sha256::digest(b"newer")));
+        fs::create_dir(&obstacle).unwrap();
+        assert!(checkpoint(8).write_with_guide(&path, Some(b"newer")).is_err());
+        let (read, guide) = Checkpoint::read_with_guide(&path).unwrap();
+        assert_eq!((read, guide.unwrap().1), (checkpoint(4), b"older".to_vec()));
+        // A folder where the checkpoint should go
+        fs::remove_dir(&obstacle).unwrap();
+        let kept = folder.path().join("kept");
+        fs::rename(&path, &kept).unwrap();
+        fs::create_dir(&path).unwrap();
+        assert!(checkpoint(8).write_with_guide(&path, Some(b"newer")).is_err());
+        fs::remove_dir(&path).unwrap();
+        fs::rename(&kept, &path).unwrap();
+        let (read, guide) = Checkpoint::read_with_guide(&path).unwrap();
+        assert_eq!((read, guide.unwrap().1), (checkpoint(4), b"older".to_vec()));
+    }
+
+    #[test]
+    fn a_damaged_or_exchanged_guide_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("room.checkpoint.exr");
+        checkpoint(4).write_with_guide(&path, Some(b"learned")).unwrap();
+        let guide = guide_paths(&path).unwrap().remove(0);
+        fs::write(&guide, b"lEarned").unwrap();
+        let error = Checkpoint::read_with_guide(&path).unwrap_err().to_string();
+        assert!(error.contains("damaged, or not the guide of"), "{error}");
+        fs::remove_file(&guide).unwrap();
+        let error = Checkpoint::read_with_guide(&path).unwrap_err().to_string();
+        assert!(error.contains(".guide: cannot read"), "{error}");
+        // A checkpoint of a sampler that does not learn removes guides of older ones.
+        checkpoint(4).write_with_guide(&path, Some(b"learned")).unwrap();
+        checkpoint(8).write(&path).unwrap();
+        assert_eq!(guide_paths(&path).unwrap(), Vec::<PathBuf>::new());
+        assert!(Checkpoint::read_with_guide(&path).unwrap().1.is_none());
+    }
 }

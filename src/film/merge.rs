@@ -39,6 +39,17 @@ pub fn merge_checkpoints(parts: &[(&Path, &Checkpoint)]) -> Result<Checkpoint> {
         for (earlier_path, earlier) in &parts[..=index] {
             check_overlap(earlier_path, &earlier.metadata, path, &part.metadata)?;
         }
+        if merged.sums.sample_count.checked_add(part.sums.sample_count).is_none() {
+            return Err(Error::format(
+                path,
+                format!(
+                    "its {} samples per pixel and the {} of the parts before exceed {}",
+                    part.sums.sample_count,
+                    merged.sums.sample_count,
+                    u32::MAX
+                ),
+            ));
+        }
         merged.sums.add(&part.sums);
         add_metadata(&mut merged.metadata, &part.metadata);
     }

@@ -95,6 +95,22 @@ pub struct Metadata {
     pub driver: String,
 }
 
+/// Longest render time that is believed, seconds: a century.
+const LONGEST_RENDER: f64 = 100.0 * 365.25 * 86400.0;
+
+/// Refuses ranges that pass the last sample of a seed, 2³² − 1, or that share samples.
+fn check_ranges(ranges: &[SampleRange]) -> Result<(), String> {
+    for (index, range) in ranges.iter().enumerate() {
+        if u64::from(range.first) + u64::from(range.count) > 1 << 32 {
+            return Err(format!("{range} passes the last sample of a seed, {}", u32::MAX));
+        }
+        if let Some(other) = ranges[..index].iter().find(|other| other.overlaps(range)) {
+            return Err(format!("{other} and {range} share samples"));
+        }
+    }
+    Ok(())
+}
+
 /// Converts times by pass from milliseconds to seconds.
 pub fn seconds_of(ms: &BTreeMap<String, f64>) -> BTreeMap<String, f64> {
     ms.iter().map(|(pass, ms)| (pass.clone(), ms * 1e-3)).collect()
@@ -186,10 +202,21 @@ impl Metadata {
         let sample_ranges = text("fenestra.sample_ranges")?
             .split_whitespace()
             .map(SampleRange::from_str)
-            .collect::<Result<_, _>>()
+            .collect::<Result<Vec<_>, _>>()
+            .and_then(|ranges| check_ranges(&ranges).map(|()| ranges))
             .map_err(|message| {
                 Error::format(path, format!("attribute fenestra.sample_ranges: {message}"))
             })?;
+        let seconds = image.attributes.get("fenestra.seconds").and_then(double).unwrap_or(0.0);
+        if !(0.0..=LONGEST_RENDER).contains(&seconds) {
+            return Err(Error::format(
+                path,
+                format!(
+                    "attribute fenestra.seconds: expected 0 to {LONGEST_RENDER} seconds, found \
+                     {seconds}"
+                ),
+            ));
+        }
         Ok(Self {
             version: text("fenestra.version")?,
             scene: text("fenestra.scene")?,
@@ -204,7 +231,7 @@ impl Metadata {
             shadow_rays: number("fenestra.shadow_rays")?,
             depth: number("fenestra.depth")?,
             sample_ranges,
-            seconds: image.attributes.get("fenestra.seconds").and_then(double).unwrap_or(0.0),
+            seconds,
             gpu_seconds: named("fenestra.gpu_seconds.")
                 .filter_map(|(name, value)| Some((name, double(value)?)))
                 .collect(),
@@ -246,14 +273,13 @@ impl Metadata {
         self.sample_ranges.sort_by_key(|range| (range.seed, range.first));
         let mut joined: Vec<SampleRange> = Vec::new();
         for range in self.sample_ranges.drain(..) {
-            match joined.last_mut() {
-                Some(last)
-                    if last.seed == range.seed
-                        && last.first.checked_add(last.count) == Some(range.first) =>
-                {
-                    last.count = last.count.saturating_add(range.count);
-                }
-                _ => joined.push(range),
+            let neighbour = joined.last_mut().filter(|last| {
+                last.seed == range.seed && last.first.checked_add(last.count) == Some(range.first)
+            });
+            // A count of 2³², all samples of a seed, does not fit.
+            match neighbour.and_then(|last| Some((last.count.checked_add(range.count)?, last))) {
+                Some((count, last)) => last.count = count,
+                None => joined.push(range),
             }
         }
         self.sample_ranges = joined;

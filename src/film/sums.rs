@@ -150,15 +150,23 @@ impl Sums {
         (0..pixel_count).map(relative).sum::<f64>() / pixel_count as f64
     }
 
-    /// Counts pixels with a non-finite sum. Passes drop such samples, so anything but 0 is a
-    /// defect.
+    /// Counts pixels with a non-finite sum in any layer. Passes drop such samples, so anything but 0
+    /// is a defect.
     pub fn non_finite_count(&self) -> usize {
+        let layers = [
+            &self.sum,
+            &self.compensation,
+            &self.squares,
+            &self.albedo,
+            &self.normal,
+            &self.position,
+            &self.guide_cell,
+            &self.guide_level,
+        ];
         let is_bad = |value: &[f32; 3]| value.iter().any(|component| !component.is_finite());
-        self.sum
-            .iter()
-            .zip(&self.squares)
-            .filter(|(sum, squares)| is_bad(sum) || is_bad(squares))
-            .count()
+        let has_bad =
+            |pixel: &usize| layers.iter().any(|sums| sums.get(*pixel).is_some_and(is_bad));
+        (0..self.pixel_count()).filter(has_bad).count()
     }
 
     /// Converts to an image of `R`, `G`, `B` and those of `aovs` whose sums exist.

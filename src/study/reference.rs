@@ -5,7 +5,6 @@
 //! whose error is not well above it is not judged ([`is_judged`](super::own_errors::is_judged)).
 
 use std::{
-    fs,
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
@@ -26,7 +25,7 @@ use crate::{
     files,
     film::{
         Aov, Attribute, Checkpoint, Image, Metadata, RgbImage, SampleRange,
-        checkpoint::{checkpoint_path, guide_path},
+        checkpoint::{checkpoint_path, remove_checkpoint},
         metadata::seconds_of,
     },
     renderer::Renderer,
@@ -261,6 +260,7 @@ fn render_half(
 ) -> Result<()> {
     let SampleRange { seed, count, .. } = metadata.sample_ranges[0];
     let checkpoint_path = checkpoint_path(path);
+    files::sweep_leftovers(path);
     renderer.restart(seed)?;
     let earlier_seconds = resume(renderer, &checkpoint_path, &metadata)?;
     watch.expect(-pixels * f64::from(renderer.sample_count()), 0.0);
@@ -282,10 +282,15 @@ fn render_half(
             let range = SampleRange { seed, first: 0, count: renderer.sample_count() };
             let candidates = renderer.report().candidates;
             let metadata = Metadata { sample_ranges: vec![range], candidates, ..metadata.clone() };
-            if let Some(state) = renderer.guide_state()? {
-                state.write(&guide_path(&checkpoint_path))?;
+            let checkpoint = Checkpoint { sums: renderer.sums()?, metadata };
+            let guide = renderer.guide_state()?.map(|state| state.to_bytes()).transpose();
+            let written = guide
+                .map_err(|source| Error::io(&checkpoint_path, "write", source))
+                .and_then(|guide| checkpoint.write_with_guide(&checkpoint_path, guide.as_deref()));
+            // A full disk may have room again at the next checkpoint or for the image.
+            if let Err(error) = written {
+                log::warn!("{error}; the next checkpoint tries again");
             }
-            Checkpoint { sums: renderer.sums()?, metadata }.write(&checkpoint_path)?;
             last_checkpoint = Instant::now();
         }
         result?;
@@ -294,37 +299,36 @@ fn render_half(
     let mut image = renderer.sums()?.to_image(&[Aov::Variance]);
     metadata.store(&mut image);
     image.write_exr(path)?;
-    for path in [guide_path(&checkpoint_path), checkpoint_path] {
-        if path.exists() {
-            fs::remove_file(&path).map_err(|source| Error::io(&path, "remove", source))?;
-        }
-    }
-    Ok(())
+    remove_checkpoint(&checkpoint_path)
 }
 
 /// Restores a half from a checkpoint of the same render, with the guide if the sampler learns, and
-/// returns the seconds of its passes. Without one, the half starts from its first sample.
+/// returns the seconds of its passes. Without one, or with a damaged one, the half starts from its
+/// first sample.
 fn resume(renderer: &mut Renderer, path: &Path, metadata: &Metadata) -> Result<f64> {
     let SampleRange { seed, count, .. } = metadata.sample_ranges[0];
     if !path.exists() {
         return Ok(0.0);
     }
-    let checkpoint = Checkpoint::read(path)?;
+    let (checkpoint, guide) = match Checkpoint::read_with_guide(path) {
+        Ok(pair) => pair,
+        Err(error) => {
+            log::warn!("{error}; starting this half again");
+            return Ok(0.0);
+        }
+    };
     let empty = renderer.sums()?;
     let samples = checkpoint.sums.sample_count;
     if samples > count || checkpoint.check_resume(path, metadata, &empty, seed, 0).is_err() {
         return Ok(0.0);
     }
-    let mut guide = None;
-    if renderer.guide_state()?.is_some() {
-        // The two files are written one after the other; a study killed in between leaves two that
-        // do not belong together.
-        let state = GuideState::read(&guide_path(path)).ok();
-        let Some(state) = state.filter(|state| state.samples == samples) else { return Ok(0.0) };
-        guide = Some(state);
+    let state = guide.and_then(|(path, bytes)| GuideState::from_bytes(&bytes, &path).ok());
+    let learns = renderer.guide_state()?.is_some();
+    if learns && state.as_ref().is_none_or(|state| state.samples != samples) {
+        return Ok(0.0);
     }
     renderer.restore(&checkpoint.sums)?;
-    if let Some(state) = guide {
+    if let Some(state) = state.filter(|_| learns) {
         renderer.restore_guide(&state)?;
     }
     Ok(checkpoint.metadata.seconds)

@@ -81,6 +81,11 @@ impl Running {
 
     /// Interrupts the run as Ctrl-C does and waits for its end, two minutes at most.
     pub fn interrupt(self) -> Run {
+        self.signal("INT")
+    }
+
+    /// Sends a signal and waits for the end of the run, two minutes at most.
+    pub fn signal(self, name: &str) -> Run {
         const LONGEST: Duration = Duration::from_secs(120);
         let Self { mut child, mut messages } = self;
         let rest = thread::spawn(move || {
@@ -88,7 +93,7 @@ impl Running {
             messages.read_to_string(&mut text).map(|_| text)
         });
         // The shell's own `kill`: the program of that name is not on every system.
-        let kill = format!("kill -INT {}", child.id());
+        let kill = format!("kill -{name} {}", child.id());
         assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
         let start = Instant::now();
         let status = loop {

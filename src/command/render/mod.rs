@@ -21,13 +21,10 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    files::check_writable,
+    files::{check_writable, sweep_leftovers},
     film::{
-        Checkpoint, Metadata, SampleRange, Sums, Window,
-        checkpoint::{checkpoint_path, guide_path},
-        display::DisplayServer,
-        metadata::seconds_of,
-        png::write_preview,
+        Checkpoint, Metadata, SampleRange, Sums, Window, checkpoint::checkpoint_path,
+        display::DisplayServer, metadata::seconds_of, png::write_preview,
     },
     gpu::Device,
     renderer::{Renderer, Settings, window_of},
@@ -49,6 +46,8 @@ enum StopReason {
     Spp,
     Time,
     Error,
+    /// The seed has no more samples.
+    LastSample,
     Interrupt,
 }
 
@@ -58,6 +57,7 @@ impl StopReason {
             Self::Spp => "spp",
             Self::Time => "time",
             Self::Error => "error",
+            Self::LastSample => "last-sample",
             Self::Interrupt => "interrupt",
         }
     }
@@ -67,6 +67,7 @@ impl StopReason {
             Self::Spp => "stopped by --spp",
             Self::Time => "stopped by --time",
             Self::Error => "stopped by --error (stopping by the data is slightly biased)",
+            Self::LastSample => "stopped at the last sample of the seed",
             Self::Interrupt => "interrupted",
         }
     }
@@ -80,6 +81,9 @@ impl StopReason {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let interrupted = listen_for_interrupt();
     let settings = arguments.settings()?;
+    if arguments.error.is_some_and(f64::is_infinite) {
+        return Err(Error::usage("--error inf: expected a finite number"));
+    }
     let start = Instant::now();
     let mut scene = Scene::load(&arguments.scene)?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -91,6 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.exr", scene.name)));
     // Fail before the work, not after it.
     check_writable(&output)?;
+    sweep_leftovers(&output);
     if let Some(at) = arguments.pixel {
         pixel::check(&settings, &scene, &output, at)?;
     }
@@ -136,8 +141,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if reason == StopReason::Interrupt { Err(Error::Interrupted) } else { Ok(()) }
 }
 
-/// Returns a flag that Ctrl-C raises; a second Ctrl-C ends the process at once.
+/// Returns a flag that Ctrl-C raises, and SIGTERM and SIGHUP with it; a second one ends the process
+/// at once.
 pub(super) fn listen_for_interrupt() -> Arc<AtomicBool> {
+    #[cfg(unix)]
+    if let Err(error) = block_signals() {
+        log::warn!("signals cannot be blocked: {error}");
+    }
     let flag = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&flag);
     let listening = ctrlc::set_handler(move || {
@@ -149,6 +159,27 @@ pub(super) fn listen_for_interrupt() -> Arc<AtomicBool> {
         log::warn!("Ctrl-C will end the program without writing the image: {error}");
     }
     flag
+}
+
+/// Blocks signals that would end the process in the wrong way, in this thread and those it starts.
+///
+/// With SIGXFSZ blocked, a write beyond the limit of a file's size (`ulimit -f`) fails with an error
+/// instead. SIGHUP stays ignored where it was when the program started (`nohup`), since the handler
+/// of interrupts would take it.
+#[cfg(unix)]
+fn block_signals() -> nix::Result<()> {
+    use nix::sys::signal::{SigSet, Signal};
+    let mut blocked = SigSet::empty();
+    blocked.add(Signal::SIGXFSZ);
+    // Linux lists the ignored signals as a mask whose lowest bit is signal 1.
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status
+        .lines()
+        .find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
+    if ignored.unwrap_or(0) & 1 << (Signal::SIGHUP as u32 - 1) != 0 {
+        blocked.add(Signal::SIGHUP);
+    }
+    blocked.thread_block()
 }
 
 /// One render, from its first pass to its files.
@@ -214,7 +245,7 @@ impl<'a> RenderJob<'a> {
             log::warn!("--resume: there is no {}; starting from the beginning", path.display());
             return Ok(());
         }
-        let checkpoint = Checkpoint::read(&path)?;
+        let (checkpoint, guide) = Checkpoint::read_with_guide(&path)?;
         let sums = renderer.sums()?;
         checkpoint.check_resume(
             &path,
@@ -225,7 +256,9 @@ impl<'a> RenderJob<'a> {
         )?;
         renderer.restore(&checkpoint.sums)?;
         if self.arguments.sampler == Sampler::Guided {
-            guide::resume(renderer, &path)?;
+            let (guide_path, guide) =
+                guide.ok_or_else(|| Error::format(&path, "the checkpoint has no guide"))?;
+            guide::resume(renderer, &guide_path, &guide)?;
         }
         self.earlier_seconds = checkpoint.metadata.seconds;
         Ok(())
@@ -242,6 +275,11 @@ impl<'a> RenderJob<'a> {
         self.arguments.spp.or_else(|| none.then_some(default))
     }
 
+    /// Returns the samples per pixel up to the last of the seed, whose index is below 2³².
+    fn most_samples(&self) -> u32 {
+        u32::MAX - self.arguments.sample_offset
+    }
+
     /// Renders passes until a stop rule is met.
     fn render(&mut self, renderer: &mut Renderer, interrupted: &AtomicBool) -> Result<StopReason> {
         let mut progress = Progress::new(self.scene.name.clone(), self.arguments.quiet);
@@ -253,10 +291,8 @@ impl<'a> RenderJob<'a> {
             if let Some(reason) = self.stop_reason(renderer, interrupted) {
                 break reason;
             }
-            let left = self
-                .target_spp()
-                .map_or(u32::MAX, |spp| spp.saturating_sub(renderer.sample_count()));
-            let samples = pass_samples.min(left);
+            let target = self.target_spp().unwrap_or(u32::MAX).min(self.most_samples());
+            let samples = pass_samples.min(target.saturating_sub(renderer.sample_count()));
             let start = Instant::now();
             renderer.render_pass(samples)?;
             let took = start.elapsed();
@@ -280,7 +316,10 @@ impl<'a> RenderJob<'a> {
             if let Some(interval) = self.arguments.checkpoint_interval
                 && last_checkpoint.elapsed() >= interval
             {
-                self.write_checkpoint(renderer, renderer.sums()?)?;
+                // A full disk may have room again at the next interval or for the image.
+                if let Err(error) = self.write_checkpoint(renderer, renderer.sums()?)? {
+                    log::warn!("{error}; the next checkpoint tries again");
+                }
                 last_checkpoint = Instant::now();
             }
             progress.update(&self.standing(renderer));
@@ -311,6 +350,9 @@ impl<'a> RenderJob<'a> {
         }
         if self.target_spp().is_some_and(|spp| samples >= spp) {
             return Some(StopReason::Spp);
+        }
+        if samples >= self.most_samples() {
+            return Some(StopReason::LastSample);
         }
         if samples > 0 && self.time_left().is_some_and(|left| left <= 0.0) {
             return Some(StopReason::Time);
@@ -357,14 +399,20 @@ impl<'a> RenderJob<'a> {
         }
     }
 
-    fn write_checkpoint(&self, renderer: &Renderer, sums: Sums) -> Result<()> {
+    /// Writes a checkpoint. The outer error is the device's, the inner one the disk's.
+    fn write_checkpoint(&self, renderer: &Renderer, sums: Sums) -> Result<Result<()>> {
         let checkpoint = Checkpoint { sums, metadata: self.metadata(renderer) };
         let path = checkpoint_path(&self.output);
-        guide::save(renderer, &guide_path(&path))?;
-        checkpoint.write(&path)
+        let guide = renderer.guide_state()?.map(|state| state.to_bytes()).transpose();
+        Ok(guide
+            .map_err(|source| Error::io(&path, "write", source))
+            .and_then(|guide| checkpoint.write_with_guide(&path, guide.as_deref())))
     }
 
-    /// Writes the image and all other files asked for.
+    /// Writes the image, then all other files asked for, each of them even if another fails.
+    ///
+    /// # Errors
+    /// The first failure; others are logged.
     fn finish(&self, renderer: &Renderer, reason: StopReason, load_ms: f64) -> Result<()> {
         let sums = renderer.sums()?;
         let totals = renderer.totals();
@@ -383,30 +431,34 @@ impl<'a> RenderJob<'a> {
         let metadata = self.metadata(renderer);
         let mut image = sums.to_image(&self.arguments.aov);
         metadata.store(&mut image);
-        image.write_exr(&self.output)?;
-        let mut written = vec![self.output.clone()];
+        let mut written = Vec::new();
+        let mut failure = None;
+        let mut note = |path: &Path, result: Result<()>| match (result, &failure) {
+            (Ok(()), _) => written.push(display(path)),
+            (Err(error), None) => failure = Some(error),
+            (Err(error), Some(_)) => log::error!("{error}"),
+        };
+        note(&self.output, image.write_exr(&self.output));
         if self.arguments.png {
             let path = self.output.with_extension("png");
-            write_preview(&path, &image.rgb(&self.output)?, self.arguments.exposure)?;
-            written.push(path);
+            let preview = |rgb| write_preview(&path, &rgb, self.arguments.exposure);
+            note(&path, image.rgb(&self.output).and_then(preview));
         }
+        drop(image);
         if let Some(path) = &self.arguments.stats {
-            self.statistics(renderer, &metadata, reason, load_ms).write(path)?;
-            written.push(path.clone());
+            note(path, self.statistics(renderer, &metadata, reason, load_ms).write(path));
         }
         if reason == StopReason::Interrupt || self.arguments.checkpoint_interval.is_some() {
-            self.write_checkpoint(renderer, sums)?;
-            written.push(checkpoint_path(&self.output));
+            let path = checkpoint_path(&self.output);
+            note(&path, self.write_checkpoint(renderer, sums).and_then(|written| written));
         }
         if let Some(path) = &self.arguments.save_guide {
-            guide::save(renderer, path)?;
-            written.push(path.clone());
+            note(path, guide::save(renderer, path));
         }
-        if !self.arguments.quiet {
-            let names: Vec<_> = written.iter().map(|path: &PathBuf| display(path)).collect();
-            eprintln!("wrote {}", names.join(", "));
+        if !self.arguments.quiet && !written.is_empty() {
+            eprintln!("wrote {}", written.join(", "));
         }
-        Ok(())
+        failure.map_or(Ok(()), Err)
     }
 }
 

@@ -336,12 +336,14 @@ impl GuideBuffers {
     pub fn restore(&mut self, state: &GuideState) -> Result<bool> {
         let (here, there) = (&self.origin, &state.origin);
         if here.environment != there.environment || there.regions > self.budget.max_regions as u32 {
+            // A file may hold any text.
+            let short = |hash: &str| hash.chars().take(12).collect::<String>();
             return Err(Error::usage(format!(
                 "the guide belongs to another environment: map {} in {} regions, expected {} in at most \
                  {}; learn it again under this map, with the same --set regions",
-                &there.environment[..there.environment.len().min(12)],
+                short(&there.environment),
                 there.regions,
-                &here.environment[..12],
+                short(&here.environment),
                 self.budget.max_regions
             )));
         }

@@ -1,9 +1,9 @@
 //! The guide in a file: `--save-guide`, `--load-guide`, and beside a checkpoint.
 //!
 //! A file is one line of JSON, then 32-bit words in little-endian order: the arrays of
-//! [`GuideState`] from `rectangles` on, in their order. The header holds the SHA-256 of the words.
+//! [`GuideState`] from `rectangles` on, in their order. The header holds the SHA-256 of both.
 
-use std::{fs, io::Write, path::Path};
+use std::{io::Write, path::Path};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -16,13 +16,17 @@ use crate::sampler::guided::{
 };
 use crate::{
     error::{Error, Result},
-    files::write_atomically,
+    files::{self, hexadecimal, write_atomically},
     shader::constants::GUIDE_COUNT_WORDS,
 };
 
 const COUNT_WORDS: usize = GUIDE_COUNT_WORDS as usize;
 const FORMAT: &str = "fenestra-guide";
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
+/// Upper bound of the rays of one cell and direction: each rebuild halves them and adds a word.
+const MAX_ARRIVAL_RAYS: f32 = 1e10;
+/// Upper bound of their light, such that its product with the rays of all cells stays finite.
+const MAX_ARRIVAL_LIGHT: f32 = 1e20;
 
 /// State that lets a renderer go on learning where another stopped.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -79,7 +83,7 @@ pub struct Origin {
     pub largest_edge: f32,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Serialize, Deserialize)]
 struct Header {
     format: String,
     version: u32,
@@ -101,8 +105,13 @@ struct Header {
     pending_arrivals: usize,
 }
 
-fn checksum(words: &[u8]) -> String {
-    Sha256::digest(words).iter().map(|byte| format!("{byte:02x}")).collect()
+impl Header {
+    /// SHA-256 of the header without its checksum, and of the words.
+    fn checksum_with(&self, words: &[u8]) -> serde_json::Result<String> {
+        let bare = serde_json::to_vec(&Self { checksum: String::new(), ..self.clone() })?;
+        let digest = Sha256::new().chain_update(bare).chain_update(words).finalize();
+        Ok(hexadecimal(&digest))
+    }
 }
 
 impl GuideState {
@@ -137,11 +146,20 @@ impl GuideState {
     /// # Errors
     /// [`Error::Io`] if the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
+        let bytes = self.to_bytes().map_err(|source| Error::io(path, "write", source))?;
+        write_atomically(path, |file| file.write_all(&bytes))
+    }
+
+    /// Returns the content of the state's file.
+    ///
+    /// # Errors
+    /// An error of the encoder.
+    pub fn to_bytes(&self) -> std::io::Result<Vec<u8>> {
         let words = self.words();
-        let header = Header {
+        let mut header = Header {
             format: FORMAT.to_owned(),
             version: VERSION,
-            checksum: checksum(&words),
+            checksum: String::new(),
             origin: self.origin.clone(),
             samples: self.samples,
             rebuilt_at: self.rebuilt_at,
@@ -156,13 +174,11 @@ impl GuideState {
             arrivals: self.arrivals.len(),
             pending_arrivals: self.pending_arrivals.len(),
         };
-        let header =
-            serde_json::to_vec(&header).map_err(|error| Error::io(path, "write", error.into()))?;
-        write_atomically(path, |file| {
-            file.write_all(&header)?;
-            file.write_all(b"\n")?;
-            file.write_all(&words)
-        })
+        header.checksum = header.checksum_with(&words)?;
+        let mut bytes = serde_json::to_vec(&header)?;
+        bytes.push(b'\n');
+        bytes.extend(words);
+        Ok(bytes)
     }
 
     /// Reads a state from a file.
@@ -171,7 +187,14 @@ impl GuideState {
     /// [`Error::Io`] if the file cannot be read; [`Error::Format`] if it is not a guide, of another
     /// version, or damaged.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = fs::read(path).map_err(|source| Error::io(path, "read", source))?;
+        Self::from_bytes(&files::read(path)?, path)
+    }
+
+    /// Reads a state from the content of its file; `path` only serves error messages.
+    ///
+    /// # Errors
+    /// As [`GuideState::read`].
+    pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Self> {
         let no_guide = || {
             Error::format(path, "not a guide; expected a file written by --save-guide".to_owned())
         };
@@ -191,7 +214,7 @@ impl GuideState {
             ));
         }
         let words = &bytes[split + 1..];
-        if checksum(words) != header.checksum {
+        if header.checksum_with(words).ok().as_ref() != Some(&header.checksum) {
             return Err(damaged("its checksum does not match its content"));
         }
         if header.candidates.is_some_and(|count| !GUIDED_CANDIDATES.contains(&count)) {
@@ -234,7 +257,7 @@ impl GuideState {
             words.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
         };
         let regions = header.origin.regions as usize;
-        Ok(Self {
+        let state = Self {
             origin: header.origin,
             samples: header.samples,
             rebuilt_at: header.rebuilt_at,
@@ -254,13 +277,23 @@ impl GuideState {
             missing: take(header.missing),
             arrivals: pairs(take(2 * header.arrivals)),
             pending_arrivals: pairs(take(2 * header.pending_arrivals)),
-        })
+        };
+        let is_possible = |[rays, light]: &ArrivalWords| {
+            (0.0..=MAX_ARRIVAL_RAYS).contains(&f32::from_bits(*rays))
+                && (0.0..=MAX_ARRIVAL_LIGHT).contains(&f32::from_bits(*light))
+        };
+        if !state.arrivals.iter().all(is_possible) {
+            return Err(damaged("its bounces brought impossible amounts of light"));
+        }
+        Ok(state)
     }
 }
 
 #[cfg(test)]
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+    use std::fs;
 
     use super::*;
 
@@ -318,16 +351,36 @@ mod tests {
         let mut other = good.clone();
         let place = good.windows(version.len()).position(|w| w == version).unwrap();
         let place = place + version.len() - 1;
-        other[place] = b'9';
-        assert!(message(&other).contains("version 9"));
-        let place = good.windows(9).position(|w| w == b"\"cells\":3").unwrap() + 8;
-        let mut other = good.clone();
-        other[place] = b'4';
-        assert!(message(&other).contains("bytes expected"));
-        let place = good.windows(14).position(|w| w == b"\"candidates\":8").unwrap() + 13;
-        let mut other = good;
-        other[place] = b'3';
-        assert!(message(&other).contains("impossible number of candidates"));
+        other[place] = b'7';
+        assert!(message(&other).contains("version 7"));
+        // A change of any number in the header, whole as it may be, does not match the checksum.
+        for number in ["\"cells\":3", "\"candidates\":8", "\"tag\":5", "\"largest_edge\":0.3"] {
+            let place = good.windows(number.len()).position(|w| w == number.as_bytes()).unwrap();
+            let mut other = good.clone();
+            other[place + number.len() - 1] = b'4';
+            assert!(message(&other).contains("its checksum does not match"), "{number}");
+        }
+        // Forged numbers with a checksum of their own
+        let forged = |change: &dyn Fn(&mut Header)| {
+            let split = good.iter().position(|byte| *byte == b'\n').unwrap();
+            let mut header: Header = serde_json::from_slice(&good[..split]).unwrap();
+            change(&mut header);
+            header.checksum = header.checksum_with(&good[split + 1..]).unwrap();
+            let mut bytes = serde_json::to_vec(&header).unwrap();
+            bytes.extend(&good[split..]);
+            message(&bytes)
+        };
+        assert!(forged(&|header| header.cells = 4).contains("bytes expected"));
+        assert!(forged(&|header| header.cells = usize::MAX).contains("impossible lengths"));
+        let message = forged(&|header| header.candidates = Some(3));
+        assert!(message.contains("impossible number of candidates"));
+        // Sums that would overflow to infinities, and these to densities that are no numbers
+        for light in [f32::INFINITY, f32::NAN, -1.0, 1e30] {
+            let arrivals = vec![[3.0_f32.to_bits(), light.to_bits()]];
+            GuideState { arrivals, ..state() }.write(&path).unwrap();
+            let error = GuideState::read(&path).unwrap_err().to_string();
+            assert!(error.contains("impossible amounts of light"), "{light}: {error}");
+        }
         let arrivals = vec![[0; 2]; 3 * ARRIVAL_DIRECTIONS + 1];
         GuideState { arrivals, ..state() }.write(&path).unwrap();
         let error = GuideState::read(&path).unwrap_err().to_string();

@@ -1,0 +1,344 @@
+//! Renders that are killed, run out of space or are hung up: what was rendered before is kept,
+//! continues to the bit, and damage to it is noticed.
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
+
+#[path = "support/command.rs"]
+mod command;
+
+use std::{
+    fs::{self, File},
+    path::Path,
+    process::{self, Command, Stdio},
+    thread,
+    time::{Duration, SystemTime},
+};
+
+use command::{Folder, Run, Running, program};
+use fenestra::{
+    files::write_atomically,
+    film::{
+        Attribute, Checkpoint, Image, Metadata, SampleRange, Sums, checkpoint::guide_paths,
+        merge::merge_checkpoints,
+    },
+};
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
+    folder.write("scene.toml", command::yard([24, 16], "sky = {}", clay, command::BALL));
+    folder
+}
+
+const GUIDED: [&str; 6] = ["render", "scene.toml", "-q", "--sampler=guided", "-o", "out.exr"];
+
+fn channels(folder: &Folder, name: &str) -> impl PartialEq + std::fmt::Debug + use<> {
+    Image::read_exr(&folder.path().join(name)).unwrap().channels
+}
+
+fn checkpoint() -> Checkpoint {
+    let mut sums = Sums::new([0, 0], 4, 2, [4, 2]);
+    for (index, value) in sums.sum.as_flattened_mut().iter_mut().enumerate() {
+        *value = 1.0 + index as f32;
+    }
+    sums.squares = sums.sum.clone();
+    sums.visible = vec![[3, 5]; 8];
+    sums.sample_count = 6;
+    let metadata = Metadata {
+        version: "0.1.0".to_owned(),
+        scene: "room".to_owned(),
+        sampler: "mis".to_owned(),
+        shadow_rays: 5,
+        depth: 1,
+        sample_ranges: vec![SampleRange { seed: 1, first: 2, count: 6 }],
+        seconds: 1.5,
+        ..Metadata::default()
+    };
+    Checkpoint { sums, metadata }
+}
+
+/// Puts together every state of the folder that a killed process can leave: the guide is written,
+/// then the checkpoint, then the older guide removed.
+#[test]
+fn every_state_that_a_kill_can_leave_resumes_to_the_bit() {
+    let folder = folder();
+    let path = folder.path().join("out.checkpoint.exr");
+    let run = |options: &[&str]| folder.run(&[&GUIDED[..], options].concat()).assert(0, &[]);
+    run(&["--spp=9"]);
+    let whole = channels(&folder, "out.exr");
+    let keep = |spp: &str| {
+        run(&[spp, "--checkpoint-interval=1h"]);
+        let [guide] = guide_paths(&path).unwrap().try_into().unwrap();
+        let contents = (fs::read(&path).unwrap(), fs::read(&guide).unwrap());
+        (contents.0, guide, contents.1)
+    };
+    let (older, older_guide, older_bytes) = keep("--spp=2");
+    let (newer, newer_guide, newer_bytes) = keep("--spp=5");
+    assert!(older_guide != newer_guide && !older_guide.exists());
+    let both = [(&older_guide, &older_bytes), (&newer_guide, &newer_bytes)];
+    for (checkpoint, guides) in
+        [(&older, &both[..1]), (&older, &both[..]), (&newer, &both[..]), (&newer, &both[1..])]
+    {
+        fs::write(&path, checkpoint).unwrap();
+        for path in guide_paths(&path).unwrap() {
+            fs::remove_file(path).unwrap();
+        }
+        for (path, bytes) in guides {
+            fs::write(path, bytes).unwrap();
+        }
+        run(&["--spp=9", "--resume"]);
+        assert!(channels(&folder, "out.exr") == whole, "{} guides", guides.len());
+    }
+}
+
+#[test]
+fn a_killed_render_resumes_to_the_bit() {
+    let folder = folder();
+    let run = |options: &[&str]| folder.run(&[&GUIDED[..], options].concat()).assert(0, &[]);
+    run(&["--spp=40"]);
+    let whole = channels(&folder, "out.exr");
+    let path = folder.path().join("out.checkpoint.exr");
+    let mut kept = 0;
+    for delay in [5, 20, 45, 80, 120, 170] {
+        let mut child = program(folder.path())
+            .args(GUIDED)
+            .args(["--spp=1000000", "--checkpoint-interval=1ms", "--resume"])
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        // Let it render for a while after its first checkpoint.
+        for _ in 0..1000 {
+            if path.exists() {
+                break;
+            }
+            thread::sleep(Duration::from_millis(20));
+        }
+        thread::sleep(Duration::from_millis(delay));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let samples = Checkpoint::read(&path).unwrap().sums.sample_count;
+        if samples < 40 {
+            run(&["--spp=40", "--resume"]);
+            assert!(channels(&folder, "out.exr") == whole, "killed at {samples} samples");
+            kept += 1;
+        } else {
+            Checkpoint::read_with_guide(&path).unwrap().1.unwrap();
+            fs::remove_file(&path).unwrap();
+        }
+    }
+    assert!(kept > 0, "no kill came early enough to be continued");
+}
+
+#[test]
+fn no_flipped_bit_of_a_checkpoint_passes() {
+    let folder = Folder::new();
+    let path = folder.path().join("room.checkpoint.exr");
+    let checkpoint = checkpoint();
+    checkpoint.write(&path).unwrap();
+    let bytes = fs::read(&path).unwrap();
+    let mut refused = 0;
+    for position in 0..bytes.len() {
+        let mut damaged = bytes.clone();
+        damaged[position] ^= 1 << (position % 8);
+        fs::write(&path, &damaged).unwrap();
+        // Bits that the sums do not depend on, such as the chromaticities, may flip.
+        match Checkpoint::read(&path) {
+            Ok(read) => assert!(read == checkpoint, "bit of byte {position}"),
+            Err(_) => refused += 1,
+        }
+    }
+    assert!(refused > bytes.len() / 2, "{refused} of {}", bytes.len());
+    for length in (0..bytes.len()).step_by(97) {
+        fs::write(&path, &bytes[..length]).unwrap();
+        assert!(Checkpoint::read(&path).is_err(), "{length} bytes");
+    }
+}
+
+#[test]
+fn impossible_numbers_are_refused() {
+    let folder = Folder::new();
+    let path = folder.path().join("room.checkpoint.exr");
+    let refuse = |checkpoint: &Checkpoint, text: &str| {
+        checkpoint.write(&path).unwrap();
+        let error = Checkpoint::read(&path).unwrap_err().to_string();
+        assert!(error.contains(text), "{error}");
+    };
+    let good = checkpoint();
+    for seconds in [f64::NAN, f64::INFINITY, -1.0, 1e12] {
+        let metadata = Metadata { seconds, ..good.metadata.clone() };
+        refuse(&Checkpoint { metadata, ..good.clone() }, "fenestra.seconds: expected 0 to");
+    }
+    let with = |sample_ranges: Vec<SampleRange>| {
+        let metadata = Metadata { sample_ranges, ..good.metadata.clone() };
+        Checkpoint { metadata, ..good.clone() }
+    };
+    let range = |first: u32, count: u32| SampleRange { seed: 1, first, count };
+    refuse(&with(vec![range(u32::MAX, 2)]), "1:4294967295+2 passes the last sample of a seed");
+    refuse(&with(vec![range(0, 4), range(3, 3)]), "1:0+4 and 1:3+3 share samples");
+    refuse(&with(vec![]), "0 samples per pixel");
+    for layer in ["compensation", "albedo"] {
+        let mut damaged = good.clone();
+        let sums = &mut damaged.sums;
+        sums.albedo = vec![[0.5; 3]; 8];
+        let values = if layer == "albedo" { &mut sums.albedo } else { &mut sums.compensation };
+        values[3][1] = f32::INFINITY;
+        refuse(&damaged, "1 pixels with sums that are not finite");
+    }
+    good.write(&path).unwrap();
+    let mut image = Image::read_exr(&path).unwrap();
+    image.channels.get_mut("ShadowRays.Traced").unwrap()[2] = -1.0;
+    let error = Checkpoint::from_image(&image, &path).unwrap_err().to_string();
+    assert!(error.contains("expected a count, found -1"), "{error}");
+
+    // All samples of a seed are 2³², one more than a count holds.
+    let half = |first: u32, count: u32| {
+        let mut half = with(vec![range(first, count)]);
+        half.sums.sample_count = count;
+        half
+    };
+    let (first, second) = (half(0, 1 << 31), half(1 << 31, 1 << 31));
+    let parts = [(Path::new("a"), &first), (Path::new("b"), &second)];
+    let error = merge_checkpoints(&parts).unwrap_err().to_string();
+    assert!(error.contains("exceed 4294967295"), "{error}");
+    let mut joined = first.metadata.clone();
+    joined.add_ranges(&second.metadata);
+    assert_eq!(joined.sample_count(), 1 << 32);
+}
+
+#[test]
+fn a_render_ends_at_the_last_sample_of_its_seed() {
+    let folder = folder();
+    let options = ["render", "scene.toml", "-o", "out.exr", "--time=20s"];
+    folder
+        .run(&[&options[..], &["--sample-offset=4294967230"]].concat())
+        .assert(0, &["stopped at the last sample of the seed"]);
+    let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+    let ranges = Attribute::Text("0:4294967230+65".to_owned());
+    assert_eq!(image.attributes["fenestra.sample_ranges"], ranges);
+}
+
+#[test]
+fn an_infinite_error_is_refused() {
+    let options = ["render", "scene.toml", "-o", "out.exr", "--error=inf"];
+    folder().run(&options).assert(2, &["--error inf", "expected a finite number"]);
+}
+
+#[test]
+fn a_guide_may_name_its_environment_in_any_script() {
+    use fenestra::sampler::guided::GuideState;
+    let folder = folder();
+    folder.run(&[&GUIDED[..], &["--spp=1", "--save-guide=a.guide"]].concat()).assert(0, &[]);
+    let path = folder.path().join("a.guide");
+    let mut state = GuideState::read(&path).unwrap();
+    state.origin.environment = "дом с окнами на юг".to_owned();
+    state.write(&path).unwrap();
+    folder
+        .run(&[&GUIDED[..], &["--spp=1", "--load-guide=a.guide"]].concat())
+        .assert(2, &["the guide belongs to another environment: map дом с окнами"]);
+}
+
+/// A folder lies where the checkpoint should go.
+#[test]
+fn a_failing_checkpoint_does_not_cost_the_image() {
+    let folder = folder();
+    fs::create_dir(folder.path().join("out.checkpoint.exr")).unwrap();
+    for sampler in ["mis", "guided"] {
+        let sampler = format!("--sampler={sampler}");
+        let options = [
+            "render",
+            "scene.toml",
+            &sampler,
+            "--spp=20",
+            "--checkpoint-interval=1ms",
+            "--png",
+            "--stats=stats.json",
+            "-o",
+            "out.exr",
+        ];
+        let run = folder.run(&options);
+        run.assert(1, &["out.checkpoint.exr: cannot write", "the next checkpoint tries again"]);
+        assert!(run.messages.contains("wrote out.exr, out.png, stats.json"), "{}", run.messages);
+        let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+        assert_eq!(image.attributes["samplesPerPixel"], Attribute::Integer(20));
+        fs::remove_file(folder.path().join("out.exr")).unwrap();
+    }
+}
+
+#[test]
+fn leftovers_of_killed_processes_are_swept() {
+    let folder = folder();
+    let mut dead = Command::new("true").spawn().unwrap();
+    dead.wait().unwrap();
+    let hour_ago = SystemTime::now() - Duration::from_secs(3600);
+    let leave = |name: String, is_old: bool| {
+        let file = File::create(folder.path().join(&name)).unwrap();
+        if is_old {
+            file.set_modified(hour_ago).unwrap();
+        }
+        name
+    };
+    let swept = leave(format!(".fenestra-{}-aB3dE6.tmp", dead.id()), true);
+    let kept = [
+        leave(format!(".fenestra-{}-fresh0.tmp", dead.id()), false),
+        leave(format!(".fenestra-{}-living.tmp", process::id()), true),
+        leave(".fenestra-none.tmp".to_owned(), true),
+        leave("fenestra-1-notes.tmp".to_owned(), true),
+    ];
+    // A temporary file carries the id of its process.
+    let mut names = Vec::new();
+    write_atomically(&folder.path().join("text"), |_| {
+        names = folder.files();
+        Ok(())
+    })
+    .unwrap();
+    let own = format!(".fenestra-{}-", process::id());
+    assert_eq!(names.iter().filter(|name| name.starts_with(&own)).count(), 2, "{names:?}");
+    folder.run(&["render", "scene.toml", "--spp=1", "-o", "out.exr"]).assert(0, &[]);
+    let files = folder.files();
+    assert!(!files.contains(&swept), "{files:?}");
+    assert!(kept.iter().all(|name| files.contains(name)), "{files:?}");
+}
+
+#[test]
+fn hangups_and_terminations_are_interrupts() {
+    for signal in ["HUP", "TERM"] {
+        let folder = folder();
+        let options = ["render", "scene.toml", "--spp=100000000", "-o", "out.exr"];
+        let run = Running::start(folder.path(), &options, "device: ").signal(signal);
+        run.assert(130, &["interrupted", "wrote out.exr, out.checkpoint.exr"]);
+        let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+        assert!(image.channels["R"].iter().all(|sample| sample.is_finite()));
+        Checkpoint::read(&folder.path().join("out.checkpoint.exr")).unwrap();
+    }
+}
+
+/// Runs the program through the shell, after `before`.
+fn run_after(folder: &Folder, before: &str, arguments: &str) -> Run {
+    let program = env!("CARGO_BIN_EXE_fenestra");
+    let line = format!("{before}; exec {program} {arguments}");
+    let mut shell = Command::new("sh");
+    shell.args(["-c", &line]).current_dir(folder.path());
+    shell.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
+    Run::of(&shell.output().unwrap())
+}
+
+#[test]
+fn an_ignored_hangup_stays_ignored() {
+    let folder = folder();
+    // The program's own id is that of the shell.
+    let before = "trap '' HUP; (sleep 1; kill -HUP $$) & true";
+    run_after(&folder, before, "render scene.toml --time 3s -o out.exr").assert(0, &["wrote out"]);
+}
+
+#[test]
+fn a_limit_of_file_sizes_is_an_error_and_no_signal() {
+    let folder = folder();
+    let options = ["render", "scene.toml", "--spp=1", "-o", "out.exr"];
+    folder.run(&options).assert(0, &[]);
+    let before = fs::read(folder.path().join("out.exr")).unwrap();
+    // Blocks of 512 bytes
+    let run = run_after(&folder, "ulimit -f 2", "render scene.toml --spp 2 -o out.exr");
+    run.assert(1, &["out.exr: cannot write: File too large"]);
+    assert_eq!(fs::read(folder.path().join("out.exr")).unwrap(), before);
+    assert!(folder.files().iter().all(|name| !name.ends_with(".tmp")), "{:?}", folder.files());
+}
