@@ -81,11 +81,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let interrupted = listen_for_interrupt();
     let settings = arguments.settings()?;
     let start = Instant::now();
-    let mut scene = Scene::load(&arguments.scene)?;
+    let mut scene = arguments.scene_options.load(&arguments.scene)?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
-    for warning in &scene.warnings {
-        log::warn!("{warning}");
-    }
     arguments.resize(&mut scene.film);
     let output =
         arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.exr", scene.name)));
