@@ -88,7 +88,8 @@ pub fn check_writable(path: &Path) -> Result<()> {
 ///
 /// Creates the parent folders, lets `write` fill a temporary file in the same folder, renames it to
 /// `path`, replacing an older file, and waits until both have reached the disk. On failure the
-/// temporary file is removed and the older file is untouched. A special file (`/dev/stdout`, a pipe) is written directly.
+/// temporary file is removed and the older file is untouched. A special file (`/dev/stdout`, a pipe)
+/// is written directly.
 ///
 /// # Errors
 /// [`Error::Io`] with `path` and the cause (no permission, full disk, …).

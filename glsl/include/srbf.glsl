@@ -108,7 +108,7 @@ float kernel_deviation(float bandwidth) {
     return sqrt(second_moment / (1.0 - e));
 }
 
-// Steepness of the error function that gives a kernel's share above a plane. [Tokuyoshi].
+// Steepness of the error function that gives a kernel's share above a plane. [Tokuyoshi 2022].
 float kernel_steepness(float bandwidth) {
     return bandwidth
         * sqrt((0.5 * bandwidth + 0.651733) / ((bandwidth + 1.341828) * bandwidth + 7.221669));
@@ -121,7 +121,7 @@ float kernel_part_of_ratio(float bandwidth, float ratio) {
     return (e + (1.0 - e) * blend) / (1.0 + e);
 }
 
-// Share of the kernel's integral where dot(direction, n) > 0; cosine is dot(axis, n). [Tokuyoshi].
+// Share of the kernel's integral where dot(direction, n) > 0; cosine is dot(axis, n). [Tokuyoshi 2022].
 float kernel_hemisphere_part(float bandwidth, float cosine) {
     float steepness = kernel_steepness(bandwidth);
     float ratio = steepness < 1e-4 ? cosine : erf(steepness * cosine) / erf(steepness);

@@ -6,7 +6,7 @@
 // logarithms; ordering by integral costs another one per pair. Loops of no rounds skip environment
 // lobes below the horizon: they end early on devices that run both sides of a branch.
 //
-// Deviation: a lobe's weight is its integral above the horizon [Tokuyoshi], not over the sphere,
+// Deviation: a lobe's weight is its integral above the horizon [Tokuyoshi 2022], not over the sphere,
 // since directions drawn below are lost.
 #version 460
 

@@ -93,6 +93,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let start = Instant::now();
     let mut scene = Scene::load(&arguments.scene)?;
+    scene.warnings.iter().for_each(|warning| log::warn!("{warning}"));
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
     if let Some([width, height]) = arguments.size {
         (scene.film.width, scene.film.height) = (width, height);

@@ -23,8 +23,8 @@ use crate::{
 /// Arguments of `info`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Scene (.toml), image (.exr), environment map (.hdr, .pfm; .exr with --map), measured BRDF
-    /// (.binary, .brdf) or fit (.fit).
+    /// Scene (.toml, .gltf, .glb, .obj), image (.exr), environment map (.hdr, .pfm; .exr with --map),
+    /// measured BRDF (.binary, .brdf) or fit (.fit).
     pub file: Option<PathBuf>,
     /// Read an .exr file as an environment map.
     #[arg(long, requires = "file")]
@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
 fn file(path: &Path, is_map: bool) -> Result<Description> {
     match files::extension(path).as_str() {
-        "toml" | "gltf" | "glb" | "pbrt" => scene(path),
+        "toml" | "gltf" | "glb" | "obj" | "pbrt" | "xml" => scene(path),
         "hdr" | "pfm" => environment_map(path),
         "exr" if is_map => environment_map(path),
         "exr" => image(path),

@@ -1,8 +1,61 @@
 //! Parsers of option values that several commands share.
 
-use std::time::Duration;
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
-use crate::film::Window;
+use crate::{
+    error::{Error, Result},
+    film::Window,
+    scene::{Scene, load::LoadOptions},
+};
+
+/// Options of what a scene file may leave open.
+#[derive(Debug, clap::Args)]
+pub struct SceneOptions {
+    /// Environment map that lights the scene, instead of its own.
+    #[arg(long, value_name = "MAP")]
+    environment: Option<PathBuf>,
+    /// Turn the environment map about +Y, counter-clockwise seen from above, degrees.
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    rotate_environment: Option<f32>,
+    /// Camera of a glTF file, by name or number from 0. Default: the first with perspective.
+    #[arg(long, value_name = "NAME")]
+    camera: Option<String>,
+    /// Fail if loading the scene gives any warning, such as a part of a file that is left out.
+    #[arg(long)]
+    strict: bool,
+}
+
+impl SceneOptions {
+    /// Loads a scene and logs its warnings.
+    ///
+    /// # Errors
+    /// As [`Scene::load_with`]; [`Error::Scene`] for any warning under `--strict`.
+    pub fn load(&self, path: &Path) -> Result<Scene> {
+        let scene = Scene::load_with(
+            path,
+            &LoadOptions {
+                environment: self.environment.clone(),
+                rotation_deg: self.rotate_environment,
+                camera: self.camera.clone(),
+            },
+        )?;
+        check_strict(self.strict, &scene)?;
+        scene.warnings.iter().for_each(|warning| log::warn!("{warning}"));
+        Ok(scene)
+    }
+}
+
+/// Fails under `--strict` if loading `scene` left anything out; lists the warnings.
+pub fn check_strict(strict: bool, scene: &Scene) -> Result<()> {
+    if !strict || scene.warnings.is_empty() {
+        return Ok(());
+    }
+    let (count, list) = (scene.warnings.len(), scene.warnings.join("\n  "));
+    Err(Error::scene(&scene.path, format!("--strict: {count} warnings:\n  {list}")))
+}
 
 /// Parses `500ms`, `30s`, `5m`, `1h`, or plain seconds.
 pub fn parse_duration(text: &str) -> Result<Duration, String> {

@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::{
-    options::{parse_duration, parse_size},
+    options::{check_strict, parse_duration, parse_size},
     progress::{Progress, Standing},
     render::listen_for_interrupt,
 };
@@ -15,6 +15,7 @@ use crate::{
     error::{Error, Result},
     gpu::Device,
     sampler::Parameters,
+    scene::Scene,
     study::{
         contender::Contender,
         engine,
@@ -56,6 +57,9 @@ pub struct Arguments {
     /// Runs per sampler, with seeds 1, 2, … (default 3).
     #[arg(long, value_name = "N")]
     pub seeds: Option<u32>,
+    /// Fail if loading a scene gives any warning, such as a part of a file that is left out.
+    #[arg(long)]
+    pub strict: bool,
     /// Film size in pixels, overriding the scenes'.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<[u32; 2]>,
@@ -117,6 +121,9 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let interrupted = listen_for_interrupt();
     let plan = plan(arguments)?;
+    for path in plan.scenes.iter().filter(|_| arguments.strict) {
+        check_strict(true, &Scene::load(path)?)?;
+    }
     let folder = Folder::open(&arguments.output)?;
     let device = Device::open(arguments.device.as_deref(), arguments.validate)?;
     if !arguments.quiet {

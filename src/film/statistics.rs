@@ -47,7 +47,7 @@ pub struct Statistics {
     /// Rule that ended the run: `spp`, `time`, `error`, `interrupt`.
     pub stop_reason: String,
     /// Mean relative standard error of the pixels (`Sums::relative_standard_error`); absent below
-    /// two samples.
+    /// two samples and in a black image.
     pub relative_standard_error: Option<f64>,
     /// Wall time of the passes, seconds.
     pub seconds: f64,
@@ -65,6 +65,10 @@ pub struct Statistics {
     pub cdf_rebuilds_per_hit: Option<f64>,
     /// Samples dropped because their radiance was not finite.
     pub dropped_samples: u64,
+    /// True if any sample found light; otherwise the image is black.
+    pub found_light: bool,
+    /// Warnings of loading and rendering, parts of files that were left out among them.
+    pub warnings: Vec<String>,
     /// Device time by pass, milliseconds.
     pub gpu_ms: BTreeMap<String, f64>,
     /// Host time by stage (`load`, `fit`, `bvh`, `upload`, …), milliseconds.

@@ -109,6 +109,11 @@ impl Sums {
         self.total(pixel).map(|total| total / count)
     }
 
+    /// Tests whether any sample found light.
+    pub fn found_light(&self) -> bool {
+        self.sum.iter().flatten().any(|&sum| sum != 0.0)
+    }
+
     /// Unbiased estimate of the variance of the pixel's mean, (Σx² − (Σx)²/n) / (n (n − 1)).
     ///
     /// The estimate treats samples as independent. Stratification lowers the true variance, so this

@@ -30,6 +30,21 @@ pub struct Dropped {
     pub normals: usize,
 }
 
+impl Dropped {
+    /// One warning for each count; `of` is the number of triangles of the mesh.
+    pub fn warnings(&self, label: &str, of: usize) -> Vec<String> {
+        [
+            (self.degenerate, format!("triangles of zero area of {of}")),
+            (self.non_finite, format!("triangles with infinite or NaN corners of {of}")),
+            (self.normals, "infinite or NaN normals (shaded flat there)".to_owned()),
+        ]
+        .into_iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, what)| format!("{label}: dropped {count} {what}"))
+        .collect()
+    }
+}
+
 impl Geometry {
     /// Places a mesh in the world; `material_of` gives the material of each triangle of the mesh.
     ///

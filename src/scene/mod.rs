@@ -2,6 +2,7 @@
 
 pub mod camera;
 pub mod environment;
+pub mod features;
 pub mod file;
 pub mod geometry;
 mod hash;

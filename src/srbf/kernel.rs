@@ -79,7 +79,7 @@ pub fn kernel_deviation(bandwidth: f32) -> f32 {
 }
 
 /// Share of the kernel's integral above a plane, where `ω·n > 0`; `cosine` is `ξ·n`.
-/// \[Tokuyoshi\]'s fit by an error function; largest error 0.005, at λ = 8.
+/// \[Tokuyoshi 2022\]'s fit by an error function; largest error 0.005, at λ = 8.
 pub fn kernel_hemisphere_part(bandwidth: f32, cosine: f32) -> f32 {
     let steepness = bandwidth
         * ((0.5 * bandwidth + 0.651_733) / ((bandwidth + 1.341_828) * bandwidth + 7.221_669))

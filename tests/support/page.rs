@@ -16,7 +16,7 @@ pub fn check(page_name: &str, name: &str, expected: &str) {
     }
     assert_eq!(
         found, expected,
-        "docs/{page_name} differs from the code at {name}: run the tests `interface` and `passes` \
+        "docs/{page_name} differs from the code at {name}: run `interface`, `passes` and `formats` \
          with FENESTRA_WRITE_DOCS=1"
     );
 }

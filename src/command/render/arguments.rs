@@ -5,7 +5,7 @@ use std::{path::PathBuf, time::Duration};
 use super::{
     super::{
         guide,
-        options::{parse_crop, parse_duration, parse_pixel, parse_size},
+        options::{SceneOptions, parse_crop, parse_duration, parse_pixel, parse_size},
     },
     DEFAULT_SPP,
 };
@@ -21,7 +21,7 @@ use crate::{
 /// Arguments of `render`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Scene file (.toml).
+    /// Scene file (.toml, .gltf, .glb, .obj).
     pub scene: PathBuf,
     /// Image to write. Default: the scene's name in the working folder.
     #[arg(short, long, value_name = "FILE.exr", visible_alias = "outfile")]
@@ -49,6 +49,9 @@ pub struct Arguments {
     /// First path vertex at which Russian roulette may end a path.
     #[arg(long, value_name = "D", default_value_t = 8)]
     pub roulette_depth: u32,
+    /// Environment, camera, strictness.
+    #[command(flatten)]
+    pub scene_options: SceneOptions,
     /// Film size in pixels, overriding the scene's.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<[u32; 2]>,

@@ -85,11 +85,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return Err(Error::usage("--error inf: expected a finite number"));
     }
     let start = Instant::now();
-    let mut scene = Scene::load(&arguments.scene)?;
+    let mut scene = arguments.scene_options.load(&arguments.scene)?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
-    for warning in &scene.warnings {
-        log::warn!("{warning}");
-    }
     arguments.resize(&mut scene.film);
     let output =
         arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.exr", scene.name)));
@@ -194,7 +191,11 @@ struct RenderJob<'a> {
     earlier_seconds: f64,
     /// Wall time that this run has spent in passes.
     elapsed: Duration,
+    /// None as long as no sample has found light.
     relative_error: Option<f64>,
+    found_light: bool,
+    /// Warnings of the render itself.
+    warnings: Vec<String>,
 }
 
 impl<'a> RenderJob<'a> {
@@ -232,6 +233,8 @@ impl<'a> RenderJob<'a> {
             earlier_seconds: 0.0,
             elapsed: Duration::ZERO,
             relative_error: None,
+            found_light: false,
+            warnings: Vec::new(),
         }
     }
 
@@ -303,7 +306,10 @@ impl<'a> RenderJob<'a> {
             if Instant::now() >= next_look || self.arguments.error.is_some() {
                 let start = Instant::now();
                 let sums = renderer.sums()?;
-                self.relative_error = Some(sums.relative_standard_error());
+                self.look(&sums);
+                if self.arguments.error.is_some() && renderer.sample_count() >= DEFAULT_SPP {
+                    self.warn_of_darkness(" so far: --error waits for light");
+                }
                 if let Some(display) = display.as_mut().filter(|display| display.is_connected()) {
                     let pixels: Vec<[f32; 3]> = (0..sums.pixel_count())
                         .map(|pixel| sums.mean(pixel).map(|value| value as f32))
@@ -325,9 +331,28 @@ impl<'a> RenderJob<'a> {
             progress.update(&self.standing(renderer));
         };
         let sums = renderer.sums()?;
-        self.relative_error = Some(sums.relative_standard_error());
+        self.look(&sums);
         progress.finish(&self.standing(renderer), reason.explain());
         Ok(reason)
+    }
+
+    /// Takes the error and the presence of light from the film. A black film has no error to speak
+    /// of, so that `--error` never stops on one.
+    fn look(&mut self, sums: &Sums) {
+        self.found_light = sums.found_light();
+        self.relative_error = self.found_light.then(|| sums.relative_standard_error());
+    }
+
+    /// Warns once if no sample has found light.
+    fn warn_of_darkness(&mut self, end: &str) {
+        if !self.found_light && self.warnings.is_empty() {
+            self.warn(format!("no sample has found any light{end}"));
+        }
+    }
+
+    fn warn(&mut self, warning: String) {
+        log::warn!("{warning}");
+        self.warnings.push(warning);
     }
 
     /// Connects to the viewer named by `--display-server`.
@@ -413,20 +438,22 @@ impl<'a> RenderJob<'a> {
     ///
     /// # Errors
     /// The first failure; others are logged.
-    fn finish(&self, renderer: &Renderer, reason: StopReason, load_ms: f64) -> Result<()> {
+    fn finish(&mut self, renderer: &Renderer, reason: StopReason, load_ms: f64) -> Result<()> {
         let sums = renderer.sums()?;
         let totals = renderer.totals();
+        self.warnings.clear();
+        self.warn_of_darkness(": the image is black");
         if totals.dropped_samples > 0 {
-            log::warn!(
+            self.warn(format!(
                 "{} samples were left out because their radiance was not finite",
                 totals.dropped_samples
-            );
+            ));
         }
         if totals.traversal_overruns > 0 {
-            log::warn!(
+            self.warn(format!(
                 "{} rays were given up after too many steps of traversal",
                 totals.traversal_overruns
-            );
+            ));
         }
         let metadata = self.metadata(renderer);
         let mut image = sums.to_image(&self.arguments.aov);

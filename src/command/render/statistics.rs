@@ -47,6 +47,8 @@ impl RenderJob<'_> {
             energy_kept: figure("energy_kept"),
             cdf_rebuilds_per_hit: figure("cdf_rebuilds_per_hit"),
             rays: figures.rays,
+            found_light: self.found_light,
+            warnings: self.scene.warnings.iter().chain(&self.warnings).cloned().collect(),
             dropped_samples: totals.dropped_samples,
             gpu_ms: totals.gpu_ms.clone(),
             host_ms,

@@ -1,8 +1,9 @@
-//! Scene file → validated [`Scene`]: checks everything the numbers of the file must satisfy.
+//! Scene file or mesh file → validated [`Scene`]: checks everything the numbers of the file must satisfy.
 //!
 //! Messages name the object or material and the line of its entry.
 
 mod objects;
+mod whole;
 
 use std::{
     collections::{BTreeMap, HashMap},
@@ -13,7 +14,7 @@ use std::{
 use glam::Vec3;
 
 use super::{
-    Camera, EnvironmentMap, FilmSettings, Scene,
+    Camera, EnvironmentMap, FilmSettings, Geometry, Scene,
     file::{
         CameraEntry, ConductorEntry, EnvironmentEntry, MaterialEntry, MaterialKindEntry, SceneFile,
     },
@@ -34,16 +35,40 @@ pub const MAX_FILM_SIDE: u32 = 16_384;
 /// Smallest GGX width; single precision cannot sample the near-mirror highlight of a smaller one.
 pub const MIN_ALPHA: f32 = 1e-3;
 
+/// Options of the command line that add to a scene file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LoadOptions {
+    /// Environment map, instead of the scene's.
+    pub environment: Option<PathBuf>,
+    /// Rotation of the map about +Y, degrees, counter-clockwise seen from above, instead of the
+    /// scene's.
+    pub rotation_deg: Option<f32>,
+    /// Name of the camera in a glTF file, or its number from 0.
+    pub camera: Option<String>,
+}
+
 impl Scene {
-    /// Reads a scene file and everything it refers to by paths relative to it.
+    /// Reads a scene file and everything it refers to by paths relative to it. The file is a scene
+    /// in TOML, or a glTF or OBJ file as a whole scene.
     ///
     /// # Errors
     /// [`Error::Io`] for a file that cannot be read, [`Error::Parse`] with line and column for text
     /// that is not a scene, [`Error::Scene`] with the name of the object or material for numbers
     /// that cannot be rendered, and the errors of the mesh, map and BRDF readers.
     pub fn load(path: &Path) -> Result<Self> {
+        Self::load_with(path, &LoadOptions::default())
+    }
+
+    /// As [`Scene::load`], with options of the command line.
+    ///
+    /// # Errors
+    /// As [`Scene::load`], and for a camera that the file does not have.
+    pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self> {
         refuse_other_formats(path)?;
-        Self::parse(path, &files::read_text(path)?)
+        if whole::is_whole(path) {
+            return Loader::new(path).whole(options);
+        }
+        Self::parse_with(path, &files::read_text(path)?, options)
     }
 
     /// Builds a scene from its text; `path` serves messages, its folder is that of relative paths.
@@ -51,8 +76,16 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`].
     pub fn parse(path: &Path, text: &str) -> Result<Self> {
+        Self::parse_with(path, text, &LoadOptions::default())
+    }
+
+    fn parse_with(path: &Path, text: &str, options: &LoadOptions) -> Result<Self> {
         let file = SceneFile::parse(path, text)?;
-        let loader = Loader { path, folder: path.parent().unwrap_or(Path::new("")) };
+        let loader = Loader::new(path);
+        if let Some(name) = &options.camera {
+            let message = "a scene in .toml has one camera; the option is for glTF files";
+            return Err(loader.error(format!("--camera {name}: {message}")));
+        }
         let mut warnings = Vec::new();
         let camera = loader.camera(&file.camera)?;
         loader.check_film(&file.film)?;
@@ -61,20 +94,14 @@ impl Scene {
         if materials.is_empty() {
             materials.push(default_material());
         }
-        let environment = loader.environment(&file.environment, &mut warnings)?;
-        let mut scene = Self {
-            name: scene_name(path),
-            path: path.to_path_buf(),
-            camera,
-            film: file.film,
-            environment,
-            materials,
-            geometry,
-            warnings,
-            hash: String::new(),
+        let environment = if let Some(map) = &options.environment {
+            EnvironmentMap::load(map, 1.0, options.rotation_deg.unwrap_or(0.0), &mut warnings)?
+        } else {
+            let mut entry = file.environment;
+            entry.rotation_deg = options.rotation_deg.unwrap_or(entry.rotation_deg);
+            loader.environment(&entry, &mut warnings)?
         };
-        scene.hash = super::hash::hash(&scene);
-        Ok(scene)
+        Ok(loader.scene(camera, file.film, environment, materials, geometry, warnings))
     }
 }
 
@@ -88,17 +115,16 @@ fn scene_name(path: &Path) -> String {
 }
 
 fn refuse_other_formats(path: &Path) -> Result<()> {
-    let (format, remedy) = match files::extension(path).as_str() {
-        "gltf" | "glb" => {
-            ("a glTF file", "; write a .toml scene with an [[object]] whose `mesh` is this file")
-        }
-        "pbrt" => ("a pbrt file", ""),
+    let format = match files::extension(path).as_str() {
+        "pbrt" => "a pbrt file",
+        "xml" => "a Mitsuba file",
         _ => return Ok(()),
     };
     Err(Error::format(
         path,
         format!(
-            "expected a scene in .toml, found {format}, which cannot be rendered as a scene yet{remedy}"
+            "expected a scene in .toml, .gltf, .glb or .obj, found {format}, which cannot be \
+             rendered as a scene yet"
         ),
     ))
 }
@@ -116,7 +142,36 @@ struct Loader<'a> {
     folder: &'a Path,
 }
 
-impl Loader<'_> {
+impl<'a> Loader<'a> {
+    fn new(path: &'a Path) -> Self {
+        Self { path, folder: path.parent().unwrap_or(Path::new("")) }
+    }
+
+    /// Puts the parts together.
+    fn scene(
+        &self,
+        camera: Camera,
+        film: FilmSettings,
+        environment: EnvironmentMap,
+        materials: Vec<Material>,
+        geometry: Geometry,
+        warnings: Vec<String>,
+    ) -> Scene {
+        let mut scene = Scene {
+            name: scene_name(self.path),
+            path: self.path.to_path_buf(),
+            camera,
+            film,
+            environment,
+            materials,
+            geometry,
+            warnings,
+            hash: String::new(),
+        };
+        scene.hash = super::hash::hash(&scene);
+        scene
+    }
+
     fn error(&self, message: impl Into<String>) -> Error {
         Error::scene(self.path, message)
     }

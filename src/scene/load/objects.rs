@@ -1,6 +1,9 @@
 //! Objects of the scene file → triangles in world space.
 
-use std::{collections::HashMap, path::PathBuf};
+use std::{
+    collections::{HashMap, HashSet},
+    path::{Path, PathBuf},
+};
 
 use glam::Vec3;
 
@@ -8,11 +11,13 @@ use super::Loader;
 use crate::{
     brdf::{Material, material::MaterialKind},
     error::Result,
+    files,
     scene::{
         Geometry,
+        features::{self, Ignored},
         file::{ObjectEntry, ObjectSource},
         geometry::MAX_COORDINATE,
-        mesh::Mesh,
+        mesh::{Mesh, MeshSurface},
         transform::Transform,
     },
 };
@@ -39,6 +44,9 @@ impl Loader<'_> {
             self.check_material(&label, object, materials)?;
             *uses.entry(self.mesh_key(object)).or_default() += 1;
         }
+        let lacks_material = |object: &&ObjectEntry| object.material.is_none();
+        let own_materials: HashSet<PathBuf> =
+            objects.iter().filter(lacks_material).map(|object| self.mesh_key(object)).collect();
         // Read all meshes before placing any, so that the arrays are allocated once.
         let mut meshes = HashMap::new();
         let (mut vertices, mut triangles) = (0, 0);
@@ -46,7 +54,12 @@ impl Loader<'_> {
             let key = self.mesh_key(object);
             if !meshes.contains_key(&key) {
                 let mesh = match &object.source {
-                    ObjectSource::Mesh(_) => Mesh::read(&key, warnings)?,
+                    ObjectSource::Mesh(_) => {
+                        let mesh = Mesh::read(&key, warnings)?;
+                        let ignored = ignored_in_object(&mesh, &key, own_materials.contains(&key));
+                        warnings.extend(ignored.warnings(&key));
+                        mesh
+                    }
                     ObjectSource::Shape { shape, .. } => shape.mesh().map_err(|message| {
                         self.error(format!("{}: {message}", object_label(index, object)))
                     })?,
@@ -122,7 +135,7 @@ impl Loader<'_> {
     }
 
     /// Rejects an object that lies too far out for traversal.
-    fn check_extent(&self, label: &str, positions: &[[f32; 3]]) -> Result<()> {
+    pub(super) fn check_extent(&self, label: &str, positions: &[[f32; 3]]) -> Result<()> {
         let distances = positions.iter().flatten().map(|coordinate| coordinate.abs());
         let farthest = distances.fold(0.0, f32::max);
         self.check(farthest <= MAX_COORDINATE, || {
@@ -173,20 +186,33 @@ impl Loader<'_> {
         };
         let of = mesh.triangles.len();
         self.check_extent(&label, &geometry.positions[first_vertex..])?;
-        for (count, what) in [
-            (dropped.degenerate, format!("triangles of zero area of {of}")),
-            (dropped.non_finite, format!("triangles with infinite or NaN corners of {of}")),
-            (dropped.normals, "infinite or NaN normals (shaded flat there)".to_owned()),
-        ] {
-            if count > 0 {
-                warnings.push(format!("{label}: dropped {count} {what}"));
-            }
-        }
+        warnings.extend(dropped.warnings(&label, of));
         if of == 0 {
             warnings.push(format!("{label}: the mesh has no triangles"));
         }
         Ok(())
     }
+}
+
+/// Parts of a mesh file that an object of a scene file leaves out: cameras and, if its own materials
+/// are used, most of these.
+fn ignored_in_object(mesh: &Mesh, path: &Path, own_materials: bool) -> Ignored {
+    let mut ignored = Ignored::default();
+    for (index, camera) in mesh.cameras.iter().enumerate() {
+        ignored.add(features::GLTF_CAMERAS, || camera.label(index));
+    }
+    if own_materials {
+        let is_obj = files::extension(path) == "obj";
+        let feature =
+            if is_obj { features::MTL_OWN_MATERIALS } else { features::GLTF_OWN_MATERIALS };
+        for material in mesh.used_materials() {
+            if material.surface != MeshSurface::Diffuse {
+                ignored.add(feature, || format!("material `{}`", material.name));
+            }
+        }
+        ignored.merge(&mesh.ignored_in_materials());
+    }
+    ignored
 }
 
 /// Label of an object in messages: name or number, source and line.

@@ -4,11 +4,15 @@
 //! keep single precision and leave nothing but the arrays of [`Mesh`] behind.
 
 pub mod gltf;
+mod mtl;
 pub mod obj;
 pub mod ply;
 
 use std::path::Path;
 
+use glam::Mat4;
+
+use super::features::Ignored;
 use crate::{
     error::{Error, Result},
     files,
@@ -29,6 +33,8 @@ pub struct Mesh {
     pub runs: Vec<MaterialRun>,
     /// Materials of the file.
     pub materials: Vec<MeshMaterial>,
+    /// Cameras of the file.
+    pub cameras: Vec<MeshCamera>,
 }
 
 /// Start of a run of triangles of one material; it ends where the next begins.
@@ -40,6 +46,56 @@ pub struct MaterialRun {
     pub material: Option<usize>,
 }
 
+/// Camera of a mesh file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshCamera {
+    /// Names by which it can be called: its own and that of its node.
+    pub names: Vec<String>,
+    /// The camera looks along −Z, with +Y up.
+    pub world_from_camera: Mat4,
+    /// None for an orthographic camera.
+    pub perspective: Option<Perspective>,
+}
+
+impl MeshCamera {
+    /// Name for messages; `index` counts the cameras of the file.
+    pub fn label(&self, index: usize) -> String {
+        self.names.first().map_or_else(|| format!("camera {index}"), |name| format!("`{name}`"))
+    }
+}
+
+/// Lens of a perspective camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Perspective {
+    /// Angle between the bottom and top edges of the image, radians.
+    pub vertical_fov_rad: f32,
+    /// Width of the image over its height, if the file states it.
+    pub aspect_ratio: Option<f32>,
+}
+
+/// Reflection of a material of a mesh file; α as in the file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MeshSurface {
+    /// Diffuse in the base colour.
+    Diffuse,
+    /// Coat over a diffuse base.
+    Plastic {
+        /// Albedo of the base, 0…1.
+        diffuse: [f32; 3],
+        /// GGX width.
+        alpha: f32,
+        /// Refractive index of the coat.
+        ior: f32,
+    },
+    /// Metal.
+    Conductor {
+        /// Reflectance at normal incidence, 0…1.
+        reflectance: [f32; 3],
+        /// GGX width.
+        alpha: f32,
+    },
+}
+
 /// Material of a mesh file, as far as it is used.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshMaterial {
@@ -47,6 +103,10 @@ pub struct MeshMaterial {
     pub name: String,
     /// Linear Rec.709 colour of the diffuse reflection, 0…1.
     pub base_color: [f32; 3],
+    /// Reflection where the file is a whole scene; an object of a scene file is diffuse.
+    pub surface: MeshSurface,
+    /// Parts of the material that are left out.
+    pub ignored: Ignored,
 }
 
 impl Mesh {
@@ -75,6 +135,27 @@ impl Mesh {
             corners.iter().map(|&corner| self.positions[corner as usize]).collect();
         let triangles = triangulate_in_space(&positions);
         self.triangles.extend(triangles.iter().map(|triangle| triangle.map(|at| corners[at])));
+    }
+
+    /// Parts that the materials in use hold and that are left out.
+    pub fn ignored_in_materials(&self) -> Ignored {
+        let mut ignored = Ignored::default();
+        for material in self.used_materials() {
+            ignored.merge(&material.ignored);
+        }
+        ignored
+    }
+
+    /// Materials of at least one triangle.
+    pub fn used_materials(&self) -> impl Iterator<Item = &MeshMaterial> {
+        let mut used = vec![false; self.materials.len()];
+        let ends = self.runs.iter().skip(1).map(|run| run.first_triangle);
+        for (run, end) in self.runs.iter().zip(ends.chain([self.triangles.len()])) {
+            if let Some(material) = run.material.filter(|_| run.first_triangle < end) {
+                used[material] = true;
+            }
+        }
+        self.materials.iter().zip(used).filter_map(|(material, used)| used.then_some(material))
     }
 
     /// Starts a run of triangles of `material` at the next triangle.

@@ -1,4 +1,5 @@
-//! Wavefront OBJ: positions, normals, faces of every group, and the diffuse colours of its MTL library.
+//! Wavefront OBJ: positions, normals, faces of every group, and the materials of its MTL libraries.
+//! Names everything else that the files hold ([`features::OBJ`], [`features::MTL`]) in a warning.
 //!
 //! Deviation: parsed here and not by a crate, so that every message names the line and the index, and a
 //! large file needs no more memory than its mesh.
@@ -9,8 +10,14 @@ use std::{
     path::Path,
 };
 
-use super::{Mesh, MeshMaterial};
-use crate::error::{Error, Result};
+use super::{
+    Mesh, MeshMaterial, MeshSurface,
+    mtl::{self, LibraryMaterial},
+};
+use crate::{
+    error::{Error, Result},
+    scene::features::{self, Ignored},
+};
 
 /// Ends a chain of vertices; also the normal of a corner that has none.
 const NONE: u32 = u32::MAX;
@@ -29,13 +36,17 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
         vertices: Vec::new(),
         chains: Vec::new(),
         mesh: Mesh::default(),
-        library_colors: Vec::new(),
+        library: Vec::new(),
+        ignored: Ignored::default(),
+        first_smoothing: None,
     };
     for_each_line(path, BufReader::with_capacity(1 << 16, file), |line, text| {
         reader.line = line;
         reader.read_line(text, warnings)
     })?;
-    Ok(reader.finish())
+    let (mesh, ignored) = reader.finish();
+    warnings.extend(ignored.warnings(path));
+    Ok(mesh)
 }
 
 /// Passes every line with its number from 1 to `use_line`; a trailing backslash continues the line.
@@ -88,7 +99,10 @@ struct ObjReader<'a> {
     /// Head of the chain of `vertices` at each position; as long as `positions`.
     chains: Vec<u32>,
     mesh: Mesh,
-    library_colors: Vec<MeshMaterial>,
+    library: Vec<LibraryMaterial>,
+    ignored: Ignored,
+    /// Line of the first smoothing group.
+    first_smoothing: Option<usize>,
 }
 
 impl ObjReader<'_> {
@@ -102,6 +116,9 @@ impl ObjReader<'_> {
         match keyword {
             "v" => {
                 let position = self.vector(rest)?;
+                if rest.split_ascii_whitespace().nth(5).is_some() {
+                    self.ignore(features::OBJ_COLOR, features::OBJ_COLOR.name);
+                }
                 self.positions.push(position);
                 self.chains.push(NONE);
             }
@@ -115,11 +132,18 @@ impl ObjReader<'_> {
                 self.mesh.start_run(Some(material));
             }
             "mtllib" => self.read_library(rest.trim(), warnings)?,
-            // Ignore texture coordinates, names of groups and objects, smoothing groups, points,
-            // lines and free-form surfaces.
-            _ => {}
+            // Texture coordinates serve textures only; names of groups and objects change nothing.
+            "" | "vt" | "o" | "g" => {}
+            "s" if matches!(rest.trim(), "off" | "0") => {}
+            "s" => self.first_smoothing = self.first_smoothing.or(Some(self.line)),
+            "p" | "l" => self.ignore(features::OBJ_POINTS, features::OBJ_POINTS.name),
+            _ => self.ignore(features::OBJ_STATEMENT, &format!("`{keyword}`")),
         }
         Ok(())
+    }
+
+    fn ignore(&mut self, feature: features::Feature, name: &str) {
+        self.ignored.add_named(feature, name, || format!("line {}", self.line));
     }
 
     fn vector(&self, words: &str) -> Result<[f32; 3]> {
@@ -203,13 +227,22 @@ impl ObjReader<'_> {
         if let Some(index) = self.mesh.materials.iter().position(|found| found.name == name) {
             return index;
         }
-        let described = self.library_colors.iter().find(|found| found.name == name);
-        let base_color = described.map_or([1.0; 3], |found| found.base_color);
-        self.mesh.materials.push(MeshMaterial { name: name.to_owned(), base_color });
+        let described = self.library.iter().rev().find(|found| found.material.name == name);
+        let material = described.map(LibraryMaterial::finish).unwrap_or_else(|| {
+            let place = || format!("`{name}`, line {}", self.line);
+            self.ignored.add(features::OBJ_UNDESCRIBED, place);
+            MeshMaterial {
+                name: name.to_owned(),
+                base_color: [1.0; 3],
+                surface: MeshSurface::Diffuse,
+                ignored: Ignored::default(),
+            }
+        });
+        self.mesh.materials.push(material);
         self.mesh.materials.len() - 1
     }
 
-    /// Reads the colours (`Kd`) of MTL libraries; one line may name several files.
+    /// Reads MTL libraries; one line may name several files.
     fn read_library(&mut self, names: &str, warnings: &mut Vec<String>) -> Result<()> {
         let folder = self.path.parent().unwrap_or(Path::new(""));
         let whole = folder.join(names);
@@ -228,41 +261,20 @@ impl ObjReader<'_> {
                 ));
                 continue;
             };
-            let colors = &mut self.library_colors;
+            let library = &mut self.library;
             for_each_line(&path, BufReader::new(file), |line, text| {
-                let mut words = text.split_ascii_whitespace();
-                match words.next() {
-                    Some("newmtl") => {
-                        let name = text.trim()["newmtl".len()..].trim().to_owned();
-                        colors.push(MeshMaterial { name, base_color: [1.0; 3] });
-                    }
-                    Some("Kd") => {
-                        let color: Vec<f32> = words.map_while(|word| word.parse().ok()).collect();
-                        let color = match color[..] {
-                            [grey] => [grey; 3],
-                            [red, green, blue, ..] => [red, green, blue],
-                            _ => [f32::NAN; 3],
-                        };
-                        if !color.iter().all(|channel| (0.0..=1.0).contains(channel)) {
-                            let found = text.trim();
-                            let message = format!(
-                                "expected `Kd` with three numbers from 0 to 1, found `{found}`"
-                            );
-                            return Err(Error::parse(&path, line, 1, message));
-                        }
-                        if let Some(material) = colors.last_mut() {
-                            material.base_color = color;
-                        }
-                    }
-                    _ => {}
-                }
-                Ok(())
+                mtl::read_line(library, &path, line, text)
             })?;
         }
         Ok(())
     }
 
-    fn finish(mut self) -> Mesh {
+    fn finish(mut self) -> (Mesh, Ignored) {
+        if let Some(line) = self.first_smoothing
+            && self.vertices.iter().any(|vertex| vertex.normal == NONE)
+        {
+            self.ignored.add(features::OBJ_SMOOTHING, || format!("line {line}"));
+        }
         if self.vertices.iter().any(|vertex| vertex.normal != NONE) {
             let normal_of = |vertex: &Vertex| {
                 self.normals.get(vertex.normal as usize).copied().unwrap_or_default()
@@ -273,6 +285,6 @@ impl ObjReader<'_> {
             let unnamed = super::MaterialRun { first_triangle: 0, material: None };
             self.mesh.runs.insert(0, unnamed);
         }
-        self.mesh
+        (self.mesh, self.ignored)
     }
 }

@@ -1,23 +1,28 @@
 //! glTF 2.0 (`.gltf` with buffers beside it or inline, `.glb`): meshes with the transforms of their
-//! nodes, and base colours.
+//! nodes, materials by their factors, cameras.
 //!
-//! Ignores cameras, lights, textures, skins and morph targets. Rejects required extensions and
-//! sparse accessors by name. Reads the accessors itself and checks every range.
+//! Names everything else that a file holds ([`features::GLTF`]) in a warning, or refuses it. Reads
+//! the accessors itself and checks every range.
+
+mod accessors;
+mod contents;
 
 use std::path::Path;
 
 use glam::{Mat3, Mat4, Vec3};
 use gltf::{
-    Document, Gltf, Node, Primitive,
-    accessor::{Accessor, DataType, Dimensions},
+    Document, Glb, Node, Primitive,
     buffer::Source,
+    json::Root,
     mesh::{Mode, Semantic},
 };
+use serde_json::Value;
 
-use super::{Mesh, MeshMaterial};
+use super::{Mesh, MeshCamera};
 use crate::{
     error::{Error, Result},
     files,
+    scene::features::{self, Ignored, Support},
 };
 
 /// Reads a glTF file and its buffers; `warnings` counts primitives that are not triangles.
@@ -35,32 +40,21 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
             return Err(Error::format(path, message));
         }
     }
-    let Gltf { document, blob } = Gltf::from_slice(&bytes).map_err(|error| {
-        let message = format!("not a glTF document: {error}");
-        match error {
-            gltf::Error::Deserialize(error) => {
-                Error::parse(path, error.line(), error.column(), message)
-            }
-            _ => Error::format(path, message),
-        }
-    })?;
+    let (document, blob, json) = parse(path, &bytes)?;
     drop(bytes);
-    if let Some(extension) = document.extensions_required().next() {
-        let message =
-            format!("the file requires the extension `{extension}`, which is not supported");
-        return Err(Error::format(path, message));
-    }
     let buffers = read_buffers(path, &document, blob)?;
-    let mut reader = GltfReader { path, buffers, mesh: Mesh::default(), skipped: 0 };
-    reader.mesh.materials = document
-        .materials()
-        .map(|material| {
-            let [red, green, blue, _] = material.pbr_metallic_roughness().base_color_factor();
-            let base_color = [red, green, blue].map(|channel| channel.clamp(0.0, 1.0));
-            MeshMaterial { name: material.name().unwrap_or_default().to_owned(), base_color }
-        })
-        .collect();
+    let mut reader = GltfReader {
+        path,
+        buffers,
+        mesh: Mesh::default(),
+        cameras: Vec::new(),
+        ignored: Ignored::default(),
+    };
+    reader.mesh.materials =
+        document.materials().map(|material| contents::material(&material, &json)).collect();
+    reader.ignore_contents(&document, &json);
     let mut visited = vec![false; document.nodes().count()];
+    let mut seen_meshes = vec![false; document.meshes().count()];
     let scene = document.default_scene().or_else(|| document.scenes().next());
     let Some(scene) = scene else {
         return Err(Error::format(path, "expected a scene with nodes, found none"));
@@ -75,23 +69,57 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
         }
         let parent_from_node = Mat4::from_cols_array_2d(&node.transform().matrix());
         let world_from_node = world_from_parent * parent_from_node;
-        for primitive in node.mesh().iter().flat_map(|mesh| mesh.primitives()) {
-            reader.read_primitive(&primitive, world_from_node)?;
+        reader.read_node(&node, world_from_node, &json);
+        if let Some(mesh) = node.mesh() {
+            if !std::mem::replace(&mut seen_meshes[mesh.index()], true) {
+                reader.ignore_in_mesh(&mesh, &json);
+            }
+            for world_from_instance in reader.instances(&document, &node, world_from_node, &json)? {
+                for primitive in mesh.primitives() {
+                    reader.read_primitive(&primitive, world_from_instance)?;
+                }
+            }
         }
         stack.extend(node.children().map(|child| (child, world_from_node)));
     }
-    if reader.skipped > 0 {
-        warnings.push(format!(
-            "{}: left out {} primitives that are points or lines",
-            path.display(),
-            reader.skipped
-        ));
-    }
+    warnings.extend(reader.ignored.warnings(path));
     let mut mesh = reader.mesh;
+    reader.cameras.sort_by_key(|(index, _)| *index);
+    mesh.cameras = reader.cameras.into_iter().map(|(_, camera)| camera).collect();
     if mesh.normals.iter().all(|normal| *normal == [0.0; 3]) {
         mesh.normals = Vec::new();
     }
     Ok(mesh)
+}
+
+/// Parses and checks a document; returns it with its binary chunk and its JSON as a tree, which
+/// holds the extensions.
+fn parse(path: &Path, bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>, Value)> {
+    let not_gltf =
+        |error: gltf::Error| Error::format(path, format!("not a glTF document: {error}"));
+    let not_json = |error: serde_json::Error| {
+        let message = format!("not a glTF document: {error}");
+        Error::parse(path, error.line(), error.column(), message)
+    };
+    let glb = bytes.starts_with(b"glTF").then(|| Glb::from_slice(bytes).map_err(not_gltf));
+    let glb = glb.transpose()?;
+    let text = glb.as_ref().map_or(bytes, |glb| &glb.json);
+    let mut root: Root = serde_json::from_slice(text).map_err(not_json)?;
+    // Parsing checks against the extensions that the crate knows, not those that are known here.
+    for extension in std::mem::take(&mut root.extensions_required) {
+        let name = format!("`{extension}`");
+        let is_known = |feature: &features::Feature| {
+            feature.name == name && feature.support != Support::Refused
+        };
+        if !features::GLTF.iter().any(is_known) {
+            let message =
+                format!("the file requires the extension `{extension}`, which is not supported");
+            return Err(Error::format(path, message));
+        }
+    }
+    let document = Document::from_json(root).map_err(not_gltf)?;
+    let json = serde_json::from_slice(text).map_err(not_json)?;
+    Ok((document, glb.and_then(|glb| glb.bin).map(|bin| bin.into_owned()), json))
 }
 
 fn read_buffers(
@@ -183,7 +211,9 @@ struct GltfReader<'a> {
     path: &'a Path,
     buffers: Vec<Vec<u8>>,
     mesh: Mesh,
-    skipped: usize,
+    /// Cameras of the nodes with their numbers in the file.
+    cameras: Vec<(usize, MeshCamera)>,
+    ignored: Ignored,
 }
 
 impl GltfReader<'_> {
@@ -193,13 +223,12 @@ impl GltfReader<'_> {
 
     fn read_primitive(&mut self, primitive: &Primitive, world_from_node: Mat4) -> Result<()> {
         if !matches!(primitive.mode(), Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
-            self.skipped += 1;
             return Ok(());
         }
         let Some(position_accessor) = primitive.get(&Semantic::Positions) else {
             return Err(self.error(format!("primitive {} has no positions", primitive.index())));
         };
-        let positions = self.vectors(&position_accessor)?;
+        let positions = self.vectors::<3>(&position_accessor)?;
         let linear = Mat3::from_mat4(world_from_node);
         let mirrors = linear.determinant() < 0.0;
         let first_vertex = self.mesh.positions.len();
@@ -211,7 +240,7 @@ impl GltfReader<'_> {
         };
         self.mesh.positions.extend(positions.iter().map(to_world));
         if let Some(accessor) = primitive.get(&Semantic::Normals) {
-            let normals = self.vectors(&accessor)?;
+            let normals = self.vectors::<3>(&accessor)?;
             if normals.len() != positions.len() {
                 return Err(self.error(format!(
                     "primitive {} has {} positions and {} normals",
@@ -256,93 +285,6 @@ impl GltfReader<'_> {
                 .for_each(|corners| push([corners[0], corners[1], corners[2]])),
         }
         Ok(())
-    }
-
-    fn vectors(&self, accessor: &Accessor) -> Result<Vec<[f32; 3]>> {
-        if (accessor.data_type(), accessor.dimensions()) != (DataType::F32, Dimensions::Vec3) {
-            return Err(self.error(format!(
-                "accessor {}: expected vectors of three floats, found {:?} of {:?}",
-                accessor.index(),
-                accessor.dimensions(),
-                accessor.data_type()
-            )));
-        }
-        let component = |bytes: &[u8], at: usize| {
-            f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
-        };
-        self.elements(accessor, |bytes| [0, 4, 8].map(|at| component(bytes, at)))
-    }
-
-    fn indices(&self, accessor: &Accessor, vertex_count: usize) -> Result<Vec<u32>> {
-        let kind = (accessor.data_type(), accessor.dimensions());
-        let indices: Vec<u32> = match kind {
-            (DataType::U8, Dimensions::Scalar) => {
-                self.elements(accessor, |bytes| u32::from(bytes[0]))?
-            }
-            (DataType::U16, Dimensions::Scalar) => self
-                .elements(accessor, |bytes| u32::from(u16::from_le_bytes([bytes[0], bytes[1]])))?,
-            (DataType::U32, Dimensions::Scalar) => self.elements(accessor, |bytes| {
-                u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
-            })?,
-            (data_type, dimensions) => {
-                return Err(self.error(format!(
-                    "accessor {}: expected unsigned indices, found {dimensions:?} of {data_type:?}",
-                    accessor.index()
-                )));
-            }
-        };
-        match indices.iter().position(|&index| index as usize >= vertex_count) {
-            Some(element) => Err(self.error(format!(
-                "accessor {}, element {element} (triangle {}): vertex index {} is out of range, \
-                 the primitive has {vertex_count} vertices",
-                accessor.index(),
-                element / 3,
-                indices[element]
-            ))),
-            None => Ok(indices),
-        }
-    }
-
-    /// Reads the elements of an accessor, each from its `accessor.size()` bytes.
-    fn elements<T>(&self, accessor: &Accessor, element: impl Fn(&[u8]) -> T) -> Result<Vec<T>> {
-        let index = accessor.index();
-        if accessor.sparse().is_some() {
-            return Err(self.error(format!("accessor {index} is sparse, which is not supported")));
-        }
-        let Some(view) = accessor.view() else {
-            return Err(self.error(format!("accessor {index} has no buffer view")));
-        };
-        let (count, size) = (accessor.count(), accessor.size());
-        let stride = view.stride().unwrap_or(size);
-        let needed = count
-            .checked_sub(1)
-            .map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size))
-            .and_then(|bytes| bytes.checked_add(accessor.offset()));
-        let buffer = &self.buffers[view.buffer().index()];
-        let bytes = view
-            .offset()
-            .checked_add(view.length())
-            .and_then(|end| buffer.get(view.offset()..end))
-            .ok_or_else(|| {
-                self.error(format!(
-                    "truncated: buffer view {} needs {} bytes from byte {}, its buffer has {}",
-                    view.index(),
-                    view.length(),
-                    view.offset(),
-                    buffer.len()
-                ))
-            })?;
-        if needed.is_none_or(|needed| needed > bytes.len()) || (stride < size) {
-            return Err(self.error(format!(
-                "accessor {index}: {count} elements of {size} bytes every {stride} from byte {} do \
-                 not fit into the {} bytes of buffer view {}",
-                accessor.offset(),
-                bytes.len(),
-                view.index()
-            )));
-        }
-        let start = |at: usize| accessor.offset() + at * stride;
-        Ok((0..count).map(|at| element(&bytes[start(at)..start(at) + size])).collect())
     }
 }
 

@@ -1,0 +1,292 @@
+//! glTF and OBJ files as whole scenes: materials, cameras, instances, and a warning for every kind of
+//! thing that is left out. `docs/formats.md` follows the declaration of those kinds.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
+
+#[path = "support/command.rs"]
+mod command;
+#[path = "support/page.rs"]
+mod page;
+
+use command::Folder;
+use fenestra::{
+    brdf::material::{ConductorFresnel, MaterialKind},
+    film::Statistics,
+    scene::{
+        Scene,
+        features::{self, Feature, Support},
+        load::LoadOptions,
+    },
+};
+use glam::Vec3;
+
+/// A triangle of one unit in a buffer of 36 bytes, then a shift by (0, 0, 7) and its index 1.
+const BUFFER: &str =
+    "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAOBAAQ==";
+
+/// Formats a document with the triangle as accessor 0 and mesh 0; `rest` adds further members.
+fn gltf(nodes: &str, materials: &str, primitive: &str, rest: &str) -> String {
+    format!(
+        r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [0]}}], "nodes": [{nodes}],
+        "materials": [{materials}],
+        "meshes": [{{"name": "sail", "primitives": [{{"attributes": {{"POSITION": 0}}{primitive}}}]}}],
+        "accessors": [
+          {{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+            "min": [0, 0, 0], "max": [1, 1, 0]}},
+          {{"bufferView": 1, "componentType": 5126, "count": 1, "type": "VEC3"}}],
+        "bufferViews": [{{"buffer": 0, "byteLength": 36}},
+                        {{"buffer": 0, "byteOffset": 36, "byteLength": 12}},
+                        {{"buffer": 0, "byteOffset": 48, "byteLength": 1}}],
+        "buffers": [{{"byteLength": 49, "uri": "{BUFFER}"}}]{rest}}}"#
+    )
+}
+
+/// Warnings without the path that begins each.
+fn warnings(scene: &Scene) -> Vec<String> {
+    let strip = |warning: &String| warning.split_once(": ").unwrap().1.to_owned();
+    scene.warnings.iter().map(strip).collect()
+}
+
+fn load(name: &str, text: &str) -> Scene {
+    let folder = Folder::new();
+    Scene::load(&folder.write(name, text)).unwrap()
+}
+
+#[test]
+fn everything_that_a_gltf_file_loses_is_named_once() {
+    let texture = r#"{"index": 0, "extensions": {"KHR_texture_transform": {}}}"#;
+    let materials = format!(
+        r#"{{"name": "wood", "alphaMode": "MASK", "emissiveFactor": [1, 0, 0],
+            "normalTexture": {{"index": 0}}, "extensions": {{"KHR_materials_unlit": {{}}, "NEW_one": {{}}}},
+            "pbrMetallicRoughness": {{"baseColorTexture": {texture}}}}},
+           {{"name": "not used", "alphaMode": "BLEND"}}"#
+    );
+    let nodes = r#"{"mesh": 0, "children": [1, 2]},
+        {"name": "lamp", "extensions": {"KHR_lights_punctual": {"light": 0}}}, {"mesh": 0}"#;
+    let rest = r#", "extensionsRequired": ["KHR_materials_unlit"],
+        "extensionsUsed": ["KHR_materials_unlit", "KHR_lights_punctual"],
+        "textures": [{}], "animations": [{"name": "swing", "channels": [], "samplers": []}],
+        "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point"}]}}"#;
+    let text = gltf(nodes, &materials, r#", "material": 0"#, rest);
+    let attributes = r#""POSITION": 0, "TEXCOORD_1": 0, "COLOR_0": 0"#;
+    let text = text.replace(r#""POSITION": 0"#, attributes);
+    let scene = load("room.gltf", &text);
+    let found = warnings(&scene);
+    let expected = [
+        "ignored animations (animation `swing`): nodes stand as the file places them",
+        "ignored vertex colours (mesh `sail`)",
+        "ignored further sets of texture coordinates (mesh `sail`)",
+        "ignored `KHR_lights_punctual` (node `lamp`): light comes only from the environment",
+        "ignored base colour texture (material `wood`): the factor alone counts, as for all textures",
+        "ignored normal texture (material `wood`)",
+        "ignored emissive factor (material `wood`): light comes only from the environment",
+        "ignored alpha mode MASK, with its cutoff (material `wood`): surfaces are opaque",
+        "ignored `KHR_materials_unlit` (material `wood`): shaded as any other",
+        "ignored extension `NEW_one` (material `wood`)",
+        "ignored `KHR_texture_transform` (material `wood`)",
+    ];
+    for warning in expected {
+        assert!(found.iter().any(|text| text == warning), "expected {warning:?} in {found:#?}");
+    }
+    assert_eq!(found.len(), expected.len() + 2, "and those on light and camera: {found:#?}");
+    assert_eq!(scene.geometry.triangles.len(), 2);
+
+    // A scene that gives the mesh a material of its own loses none of those of the file.
+    let folder = Folder::new();
+    folder.write("room.gltf", &text);
+    let object = "mesh = \"room.gltf\"";
+    let toml = command::yard(
+        [8, 8],
+        "constant = [1, 1, 1]",
+        "type = \"diffuse\"\nreflectance = [0, 0, 0]",
+        object,
+    );
+    let of_materials = |scene: &Scene| {
+        scene.warnings.iter().filter(|warning| warning.contains("material")).count()
+    };
+    let scene = Scene::load(&folder.write("a.toml", &toml)).unwrap();
+    assert_eq!(of_materials(&scene), 0, "{:?}", scene.warnings);
+    let own = toml.strip_suffix("material = \"clay\"\n").unwrap();
+    let scene = Scene::load(&folder.write("b.toml", own)).unwrap();
+    assert_eq!(of_materials(&scene), 8, "{:#?}", scene.warnings);
+}
+
+#[test]
+fn factors_of_gltf_become_plastic_and_metal() {
+    let gold = r#"{"pbrMetallicRoughness": {"baseColorFactor": [1, 0.7, 0.3, 1], "roughnessFactor": 0.5}}"#;
+    let paint = r#"{"name": "paint", "extensions": {"KHR_materials_ior": {"ior": 1.4}},
+        "pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.4, 0, 1], "metallicFactor": 0.25,
+        "roughnessFactor": 0}}"#;
+    let scene = load("a.gltf", &gltf(r#"{"mesh": 0}"#, &format!("{gold}, {paint}"), "", ""));
+    let MaterialKind::Conductor { alpha, fresnel } = &scene.materials[0].kind else { panic!() };
+    let reflectance = Vec3::new(1.0, 0.7, 0.3);
+    assert_eq!((*alpha, *fresnel), (0.25, ConductorFresnel::Schlick { reflectance }));
+    let MaterialKind::Plastic { diffuse, alpha, ior } = scene.materials[1].kind else { panic!() };
+    assert!(diffuse.abs_diff_eq(Vec3::new(0.6, 0.3, 0.0), 1e-6), "{diffuse}");
+    assert_eq!((alpha, ior), (1e-3, 1.4));
+    // The primitive names no material: it has the default one, a white and rough metal.
+    assert_eq!(scene.geometry.materials, [2]);
+    assert!(matches!(scene.materials[2].kind, MaterialKind::Conductor { alpha: 1.0, .. }));
+}
+
+#[test]
+fn cameras_stand_at_their_nodes() {
+    let nodes = r#"{"mesh": 0, "translation": [0, 0, 5], "children": [1, 2, 3]}, {"camera": 0},
+        {"name": "side", "camera": 1, "rotation": [0, 0.70710678, 0, 0.70710678]}, {"camera": 2}"#;
+    let rest = r#", "cameras": [{"type": "orthographic", "name": "flat",
+        "orthographic": {"xmag": 1, "ymag": 1, "zfar": 9, "znear": 0.1}},
+        {"type": "perspective", "perspective": {"yfov": 0.5, "aspectRatio": 2, "znear": 0.1}},
+        {"type": "perspective", "name": "far", "perspective": {"yfov": 1, "znear": 0.1}}]"#;
+    let folder = Folder::new();
+    let path = folder.write("room.gltf", gltf(nodes, "", "", rest));
+    let with = |name: &str| {
+        Scene::load_with(&path, &LoadOptions { camera: Some(name.into()), ..Default::default() })
+    };
+    let scene = Scene::load(&path).unwrap();
+    let camera = scene.camera;
+    assert_eq!(camera.position, Vec3::new(0.0, 0.0, 5.0));
+    let forward = (camera.look_at - camera.position).normalize();
+    assert!(forward.abs_diff_eq(Vec3::NEG_X, 1e-5), "{forward}");
+    assert!((camera.vertical_fov_deg - 28.6479).abs() < 1e-3);
+    assert_eq!((scene.film.width, scene.film.height), (640, 320));
+    let found = warnings(&scene);
+    assert!(found.iter().any(|text| text.starts_with("ignored orthographic cameras (`flat`)")));
+    assert!(found.iter().any(|text| text.starts_with("ignored cameras that are not used (`far`)")));
+    assert_eq!(with("side").unwrap().hash, scene.hash);
+    assert_eq!(with("far").unwrap().film.height, 480);
+    assert_eq!(with("2").unwrap().hash, with("far").unwrap().hash);
+    let message = with("flat").unwrap_err().to_string();
+    assert!(message.contains("--camera flat: an orthographic camera"), "{message}");
+    let message = with("near").unwrap_err().to_string();
+    assert!(
+        message.contains("there is no such camera, the file has `flat`, `side`, `far`"),
+        "{message}"
+    );
+
+    // Without a camera, all of the bounding box is in view.
+    let scene = load("b.gltf", &gltf(r#"{"mesh": 0}"#, "", "", ""));
+    assert!(warnings(&scene)[0].starts_with("no perspective camera; one at ["), "{scene:?}");
+    let away = scene.camera.look_at - scene.camera.position;
+    for &corner in &scene.geometry.positions {
+        let direction = Vec3::from_array(corner) - scene.camera.position;
+        assert!(direction.angle_between(away).to_degrees() < 22.5);
+    }
+}
+
+#[test]
+fn instances_and_sparse_accessors_are_read() {
+    let nodes = r#"{"mesh": 0, "scale": [2, 2, 2], "extensions": {"EXT_mesh_gpu_instancing":
+        {"attributes": {"TRANSLATION": 1}}}}"#;
+    let text = gltf(nodes, "", "", r#", "extensionsRequired": ["EXT_mesh_gpu_instancing"]"#);
+    let sparse = r#""type": "VEC3", "sparse": {"count": 1,
+        "indices": {"bufferView": 2, "componentType": 5121}, "values": {"bufferView": 1}},
+            "min""#;
+    let text = text.replacen("\"type\": \"VEC3\",\n            \"min\"", sparse, 1);
+    let scene = load("a.gltf", &text);
+    let expected = [[0.0, 0.0, 14.0], [0.0, 0.0, 28.0], [0.0, 2.0, 14.0]];
+    assert_eq!(scene.geometry.positions, expected);
+    let folder = Folder::new();
+    let broken = text.replace("\"count\": 3", "\"count\": 1");
+    let message = Scene::load(&folder.write("b.gltf", broken)).unwrap_err().to_string();
+    assert!(message.contains("accessor 0: sparse index 1 is out of range"), "{message}");
+    let broken = text.replace("\"TRANSLATION\": 1", "\"TRANSLATION\": 9");
+    let message = Scene::load(&folder.write("b.gltf", broken)).unwrap_err().to_string();
+    assert!(message.contains("node 0: EXT_mesh_gpu_instancing has no accessor 9"), "{message}");
+}
+
+#[test]
+fn everything_that_an_obj_file_loses_is_named_once() {
+    let folder = Folder::new();
+    folder.write(
+        "room.mtl",
+        "newmtl leaf\nKd 0.2 0.5 0.1 # green\nKa 0 0 0\nKs 0 0 0\nd 0.5\nmap_Kd leaf.png\nillum 2\n\
+         newmtl paint\nKd 0.5 0.5 0.5\nKs 0.3 0.3 0.3\nNs 98\nNi 1.6\nillum 7\nmap_Kd a.png\nKe 1 1 1\n",
+    );
+    let text = "mtllib room.mtl\nv 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0\nvt 0 0\ng a\ns 1\nf 1 2 3\n\
+        usemtl leaf\nf 1/1 2/1 3/1\nusemtl paint\nf 1 2 3\nusemtl lost\nf 3 2 1\nl 1 2\ncstype bezier\n";
+    let path = folder.write("room.obj", text);
+    let scene = Scene::load(&path).unwrap();
+    let found = warnings(&scene);
+    let expected = [
+        "ignored vertex colours (2, first in line 2)",
+        "ignored materials that no library describes (`lost`, line 13): they are white",
+        "ignored points and lines (line 15): `p`, `l`",
+        "ignored `cstype` (line 16)",
+        "ignored smoothing groups `s` (line 7): where faces have no normals",
+        "ignored `d` (material `leaf`, room.mtl:5)",
+        "ignored `map_Kd` (2, first in material `leaf`, room.mtl:6)",
+        "ignored colour and strength of `Ks` (material `paint`, room.mtl:10): Fresnel's equations \
+         give the gloss of plastic",
+        "ignored `illum 7` (material `paint`, room.mtl:13)",
+        "ignored `Ke` (material `paint`, room.mtl:15): light comes only from the environment",
+        "ignored faces without a material (the first faces): grey, 0.5; in a `.toml` \
+         scene an error",
+    ];
+    assert_eq!(found[..expected.len()], expected);
+    assert_eq!(found.len(), expected.len() + 2, "and those on light and camera: {found:#?}");
+    assert!(matches!(scene.materials[0].kind, MaterialKind::Diffuse { .. }));
+    let MaterialKind::Plastic { diffuse, alpha, ior } = scene.materials[1].kind else { panic!() };
+    assert_eq!((diffuse, ior), (Vec3::splat(0.5), 1.6));
+    assert!((alpha - 0.02_f32.sqrt()).abs() < 1e-6, "{alpha}");
+    assert_eq!(scene.geometry.materials, [3, 0, 1, 2]);
+
+    // The program prints each, and refuses them all under --strict.
+    let run = folder.run(&["render", "room.obj", "--strict", "-o", "room.exr"]);
+    run.assert(1, &["room.obj: --strict: 13 warnings:\n", "`map_Kd` (2, first in material `leaf`"]);
+    folder.run(&["study", "room.obj", "--strict"]).assert(1, &["--strict: 13 warnings:"]);
+    folder.run(&["info", "room.obj"]).assert(0, &[]);
+}
+
+#[test]
+fn a_render_without_light_says_so_and_does_not_count_as_converged() {
+    let folder = Folder::new();
+    let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
+    let dark = command::yard([8, 6], "constant = [0, 0, 0]", clay, command::BALL);
+    folder.write("dark.toml", &dark);
+    folder.write("black.pfm", [b"PF\n2 1\n-1.0\n".as_slice(), &[0; 24]].concat());
+    let statistics = |options: &[&str]| -> Statistics {
+        let options = [&["render", "-o", "a.exr", "--stats", "a.json"][..], options].concat();
+        let run = folder.run(&options);
+        run.assert(0, &[]);
+        let text = std::fs::read_to_string(folder.path().join("a.json")).unwrap();
+        let statistics: Statistics = serde_json::from_str(&text).unwrap();
+        let black = "no sample has found any light: the image is black";
+        assert_eq!(run.messages.contains(black), !statistics.found_light);
+        statistics
+    };
+    let found = statistics(&["dark.toml", "--spp", "80", "--error", "0.5"]);
+    assert_eq!((found.stop_reason.as_str(), found.found_light), ("spp", false));
+    assert_eq!(found.relative_standard_error, None);
+    assert!(found.warnings.iter().any(|warning| warning.contains("the image is black")));
+
+    folder.write("lit.gltf", gltf(r#"{"mesh": 0}"#, "", "", ""));
+    let size = ["lit.gltf", "--spp", "2", "--size", "8x6"];
+    let found = statistics(&size);
+    assert!(found.found_light && found.warnings.len() == 2, "{:?}", found.warnings);
+    let found = statistics(&[&size[..], &["--environment", "black.pfm"]].concat());
+    assert!(!found.found_light && found.warnings.len() == 3, "{:?}", found.warnings);
+    let camera = ["render", "dark.toml", "--camera", "a"];
+    folder.run(&camera).assert(1, &["--camera a: a scene in .toml has one camera"]);
+}
+
+#[test]
+fn the_page_lists_every_feature() {
+    let table = |features: &[Feature]| {
+        let row = |feature: &Feature| {
+            let Feature { name, support, details } = feature;
+            format!("| {name} | {} | {details} |\n", support.name())
+        };
+        let rows: String = features.iter().map(row).collect();
+        format!("| feature | support | details |\n|---|---|---|\n{rows}")
+    };
+    for (name, features) in
+        [("gltf", features::GLTF), ("obj", features::OBJ), ("mtl", features::MTL)]
+    {
+        page::check("formats.md", name, &table(features));
+        for feature in features {
+            let same = |other: &&Feature| other.name == feature.name;
+            assert_eq!(features.iter().filter(same).count(), 1, "{}", feature.name);
+        }
+    }
+    assert!(features::GLTF.iter().any(|feature| feature.support == Support::Refused));
+}
