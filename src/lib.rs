@@ -14,6 +14,7 @@
 //! | learned visibility | [`guide`] | `include/guide.glsl`, `include/arriving.glsl` |
 //! | progressive passes | [`pass`], [`renderer`] | `camera`, `trace`, `sample` or `sample_guided`, `shadow`, `learn`, `gather`, `features`, `bounce` or `bounce_guided`, `learn_arrivals`, `accumulate` |
 //! | sums → image files | [`film`] | |
+//! | scene → files of other renderers | [`export`] | |
 //! | comparisons, ray rates | [`study`], [`benchmark`] | |
 //!
 //! Notation: directions point away from the surface; `outgoing_direction` leads to the viewer,
@@ -120,6 +121,7 @@ pub mod brdf;
 pub mod cli;
 pub mod command;
 pub mod error;
+pub mod export;
 pub mod files;
 pub mod film;
 pub mod fit;

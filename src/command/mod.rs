@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod compare;
 pub mod devices;
+pub mod export;
 pub mod fit;
 mod guide;
 pub mod info;
