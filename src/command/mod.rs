@@ -8,6 +8,7 @@ pub mod fit;
 mod guide;
 pub mod info;
 pub mod merge;
+pub mod new;
 pub mod options;
 pub mod progress;
 pub mod render;
