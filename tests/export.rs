@@ -151,7 +151,7 @@ fn differences_are_named_once_and_refused_by_strict() {
     let (_, xml, messages) = exported("constant = [1, 1, 1]", PLASTIC, &[]);
     assert_parts(&xml, &["roughplastic", "<float name=\"int_ior\" value=\"1.33\"/>"]);
     assert_eq!(messages.matches("material `clay`").count(), 2, "{messages}");
-    assert_eq!(messages.matches("inner reflectance").count(), 1, "{messages}");
+    assert_eq!(messages.matches("loses light").count(), 1, "{messages}");
 
     let folder = Folder::new();
     folder.write("scene.toml", yard([8, 6], "constant = [1, 1, 1]", PLASTIC, BALL));
