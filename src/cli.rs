@@ -32,6 +32,10 @@ pub enum Command {
     Info(command::info::Arguments),
     /// Fit environment maps and BRDFs with spherical radial basis functions.
     Fit(command::fit::Arguments),
+    /// Write a scene for another renderer.
+    Export(command::export::Arguments),
+    /// Write a first scene that renders as it is.
+    New(command::new::Arguments),
     /// List the Vulkan devices with their relevant limits, and which one would be chosen.
     Devices(command::devices::Arguments),
 }
@@ -58,6 +62,8 @@ pub fn run() -> ExitCode {
         Command::Info(arguments) => command::info::run(arguments),
         Command::Merge(arguments) => command::merge::run(arguments),
         Command::Fit(arguments) => command::fit::run(arguments),
+        Command::Export(arguments) => command::export::run(arguments),
+        Command::New(arguments) => command::new::run(arguments),
         Command::Devices(arguments) => command::devices::run(arguments),
     };
     match result {

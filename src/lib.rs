@@ -39,6 +39,7 @@
 //! | | | `bounce_guided`, `learn_arrivals` |
 //! | scene, settings, device → sums | [`renderer`] | |
 //! | sums → image files | [`film`] | |
+//! | scene → files of other renderers | [`export`] | |
 //! | runs of several samplers → report | [`study`] | |
 //! | ray rates beside those of the CPU | [`mod@bench`] | |
 //! | command line | `cli`, `command` | |
@@ -163,6 +164,7 @@ pub mod sampler;
 
 pub mod renderer;
 
+pub mod export;
 pub mod film;
 pub mod study;
 

@@ -3,10 +3,12 @@
 pub mod bench;
 pub mod compare;
 pub mod devices;
+pub mod export;
 pub mod fit;
 mod guide;
 pub mod info;
 pub mod merge;
+pub mod new;
 pub mod options;
 pub mod progress;
 pub mod render;

@@ -1,0 +1,65 @@
+//! `fenestra export`: writes a scene for another renderer.
+
+use std::path::PathBuf;
+
+use crate::{
+    error::{Error, Result},
+    export::mitsuba,
+    files,
+    scene::Scene,
+};
+
+/// Arguments of `export`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Scene file (.toml).
+    pub scene: PathBuf,
+    /// Folder, in which the scene is called `scene`, or file with the format's extension (.xml).
+    /// Meshes and the environment go into a folder of the same name beside it.
+    pub output: PathBuf,
+    /// Renderer to write for.
+    #[arg(long, value_enum)]
+    pub format: Format,
+    /// Number of path vertices lit by the environment; 1 is direct light.
+    #[arg(long, value_name = "D", default_value_t = 1)]
+    pub depth: u32,
+    /// Samples per pixel.
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+    pub spp: u32,
+    /// Write nothing if the format cannot express the scene exactly.
+    #[arg(long)]
+    pub strict: bool,
+}
+
+/// Renderers that scenes can be written for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// Mitsuba 3 XML.
+    Mitsuba,
+}
+
+/// Writes the scene and warns, once for each material concerned, of what the format cannot express.
+///
+/// # Errors
+/// An unusable scene, a failing disk; with `--strict`, the first difference.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let Format::Mitsuba = arguments.format;
+    let scene = Scene::load(&arguments.scene)?;
+    let settings = mitsuba::Settings { depth: arguments.depth, samples: arguments.spp };
+    let export = mitsuba::Export::new(&scene, settings)?;
+    if arguments.strict
+        && let Some(difference) = export.warnings.first()
+    {
+        return Err(Error::scene(&arguments.scene, format!("{difference} (--strict)")));
+    }
+    for warning in scene.warnings.iter().chain(&export.warnings) {
+        log::warn!("{warning}");
+    }
+    let output = if files::extension(&arguments.output) == "xml" {
+        arguments.output.clone()
+    } else {
+        arguments.output.join("scene.xml")
+    };
+    export.write(&output)?;
+    super::print_line(&output.display().to_string())
+}

@@ -1,0 +1,4 @@
+//! Writers of scenes for other renderers: validated [`crate::scene::Scene`] → files.
+
+pub mod mitsuba;
+mod ply;
