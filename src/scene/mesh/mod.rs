@@ -7,7 +7,7 @@ pub mod gltf;
 pub mod obj;
 pub mod ply;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::{
     error::{Error, Result},
@@ -28,6 +28,8 @@ pub struct Mesh {
     pub runs: Vec<MaterialRun>,
     /// Materials of the file.
     pub materials: Vec<MeshMaterial>,
+    /// Files beside the mesh file that were read for it: material libraries, buffers.
+    pub side_files: Vec<PathBuf>,
 }
 
 /// Start of a run of triangles of one material; it ends where the next begins.

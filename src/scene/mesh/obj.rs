@@ -4,7 +4,7 @@
 //! large file needs no more memory than its mesh.
 
 use std::{
-    fs::File,
+    collections::HashMap,
     io::{BufRead, BufReader},
     path::Path,
 };
@@ -12,18 +12,22 @@ use std::{
 use super::{Mesh, MeshMaterial};
 use crate::{
     error::{Error, Result},
+    files,
     scene::triangulate::triangulate_in_space,
 };
 
 /// Ends a chain of vertices; also the normal of a corner that has none.
 const NONE: u32 = u32::MAX;
 
+/// Most vertices of a chain; further vertices of its position are found by hash.
+const LONGEST_CHAIN: usize = 16;
+
 /// Reads an OBJ file and the material libraries beside it; a missing library is a warning.
 ///
 /// # Errors
 /// [`Error::Io`], or [`Error::Parse`] with the line.
 pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
-    let file = File::open(path).map_err(|source| Error::io(path, "read", source))?;
+    let file = files::open_regular(path)?;
     let mut reader = ObjReader {
         path,
         line: 0,
@@ -31,8 +35,11 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
         normals: Vec::new(),
         vertices: Vec::new(),
         chains: Vec::new(),
+        crowded: HashMap::new(),
         mesh: Mesh::default(),
+        material_indices: HashMap::new(),
         library_colors: Vec::new(),
+        library_indices: HashMap::new(),
     };
     for_each_line(path, BufReader::with_capacity(1 << 16, file), |line, text| {
         reader.line = line;
@@ -90,8 +97,14 @@ struct ObjReader<'a> {
     vertices: Vec<Vertex>,
     /// Head of the chain of `vertices` at each position; as long as `positions`.
     chains: Vec<u32>,
+    /// Vertex of a position and normal where the position's chain is full.
+    crowded: HashMap<(u32, u32), u32>,
     mesh: Mesh,
+    /// Index into `mesh.materials` by name.
+    material_indices: HashMap<String, usize>,
     library_colors: Vec<MeshMaterial>,
+    /// Index of the first of `library_colors` with a name.
+    library_indices: HashMap<String, usize>,
 }
 
 impl ObjReader<'_> {
@@ -182,18 +195,29 @@ impl ObjReader<'_> {
             _ => NONE,
         };
         let mut vertex = self.chains[position as usize];
+        let mut chain_length = 0;
         while vertex != NONE {
             let Vertex { normal: found, next } = self.vertices[vertex as usize];
             if found == normal {
                 return Ok(vertex);
             }
             vertex = next;
+            chain_length += 1;
+        }
+        let is_crowded = chain_length == LONGEST_CHAIN;
+        if is_crowded && let Some(&vertex) = self.crowded.get(&(position, normal)) {
+            return Ok(vertex);
         }
         let vertex = u32::try_from(self.vertices.len())
             .ok()
             .filter(|&vertex| vertex != NONE)
             .ok_or_else(|| self.error("more than 4,294,967,294 vertices"))?;
-        let next = std::mem::replace(&mut self.chains[position as usize], vertex);
+        let next = if is_crowded {
+            self.crowded.insert((position, normal), vertex);
+            NONE
+        } else {
+            std::mem::replace(&mut self.chains[position as usize], vertex)
+        };
         self.vertices.push(Vertex { normal, next });
         self.mesh.positions.push(self.positions[position as usize]);
         Ok(vertex)
@@ -221,13 +245,15 @@ impl ObjReader<'_> {
 
     /// Finds or adds a material by name; one that no library describes is white.
     fn material_index(&mut self, name: &str) -> usize {
-        if let Some(index) = self.mesh.materials.iter().position(|found| found.name == name) {
+        if let Some(&index) = self.material_indices.get(name) {
             return index;
         }
-        let described = self.library_colors.iter().find(|found| found.name == name);
+        let described = self.library_indices.get(name).map(|&index| &self.library_colors[index]);
         let base_color = described.map_or([1.0; 3], |found| found.base_color);
+        let index = self.mesh.materials.len();
         self.mesh.materials.push(MeshMaterial { name: name.to_owned(), base_color });
-        self.mesh.materials.len() - 1
+        self.material_indices.insert(name.to_owned(), index);
+        index
     }
 
     /// Reads the colours (`Kd`) of MTL libraries; one line may name several files.
@@ -240,7 +266,10 @@ impl ObjReader<'_> {
             names.split_ascii_whitespace().map(|name| folder.join(name)).collect()
         };
         for path in paths {
-            let Ok(file) = File::open(&path) else {
+            if self.mesh.side_files.contains(&path) {
+                continue;
+            }
+            let Ok(file) = files::open_regular(&path) else {
                 warnings.push(format!(
                     "{}:{}: cannot read the material library {}; its materials are white",
                     self.path.display(),
@@ -249,12 +278,15 @@ impl ObjReader<'_> {
                 ));
                 continue;
             };
+            self.mesh.side_files.push(path.clone());
             let colors = &mut self.library_colors;
+            let indices = &mut self.library_indices;
             for_each_line(&path, BufReader::new(file), |line, text| {
                 let mut words = text.split_ascii_whitespace();
                 match words.next() {
                     Some("newmtl") => {
                         let name = text.trim()["newmtl".len()..].trim().to_owned();
+                        indices.entry(name.clone()).or_insert(colors.len());
                         colors.push(MeshMaterial { name, base_color: [1.0; 3] });
                     }
                     Some("Kd") => {
