@@ -4,13 +4,14 @@
 //! Ignores cameras, lights, textures, skins and morph targets. Rejects required extensions and
 //! sparse accessors by name. Reads the accessors itself and checks every range.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{Mat3, Mat4, Vec3};
 use gltf::{
     Document, Gltf, Node, Primitive,
     accessor::{Accessor, DataType, Dimensions},
     buffer::Source,
+    json::{Root, validation::Checked},
     mesh::{Mode, Semantic},
 };
 
@@ -35,7 +36,7 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
             return Err(Error::format(path, message));
         }
     }
-    let Gltf { document, blob } = Gltf::from_slice(&bytes).map_err(|error| {
+    let malformed = |error| {
         let message = format!("not a glTF document: {error}");
         match error {
             gltf::Error::Deserialize(error) => {
@@ -43,8 +44,12 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
             }
             _ => Error::format(path, message),
         }
-    })?;
+    };
+    let Gltf { document, blob } = Gltf::from_slice_without_validation(&bytes).map_err(malformed)?;
     drop(bytes);
+    let root = document.into_json();
+    check_positions(path, &root)?;
+    let document = Document::from_json(root).map_err(malformed)?;
     if let Some(extension) = document.extensions_required().next() {
         let message =
             format!("the file requires the extension `{extension}`, which is not supported");
@@ -52,6 +57,13 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
     }
     let buffers = read_buffers(path, &document, blob)?;
     let mut reader = GltfReader { path, buffers, mesh: Mesh::default(), skipped: 0 };
+    reader.mesh.side_files = document
+        .buffers()
+        .filter_map(|buffer| match buffer.source() {
+            Source::Uri(uri) if !uri.starts_with("data:") => beside(path, uri).ok(),
+            _ => None,
+        })
+        .collect();
     reader.mesh.materials = document
         .materials()
         .map(|material| {
@@ -113,7 +125,7 @@ fn read_buffers(
                     .ok_or_else(|| {
                         Error::format(path, format!("buffer {index} is not base64 data"))
                     })?,
-                None => read_beside(path, uri)?,
+                None => files::read(&beside(path, uri)?)?,
             },
         };
         if bytes.len() < buffer.length() {
@@ -129,11 +141,33 @@ fn read_buffers(
     Ok(buffers)
 }
 
-fn read_beside(path: &Path, uri: &str) -> Result<Vec<u8>> {
+/// Checks that the accessor of every primitive's positions exists, on which the validation by the
+/// `gltf` crate relies.
+fn check_positions(path: &Path, root: &Root) -> Result<()> {
+    for primitive in root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
+        let position = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+        if let Some(accessor) = position.map(|index| index.value())
+            && accessor >= root.accessors.len()
+        {
+            return Err(Error::format(
+                path,
+                format!(
+                    "not a glTF document: a primitive's POSITION names accessor {accessor}, the \
+                     file has {}",
+                    root.accessors.len()
+                ),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Path of a buffer file that is named by a relative URI.
+fn beside(path: &Path, uri: &str) -> Result<PathBuf> {
     let name = decode_percent(uri).ok_or_else(|| {
         Error::format(path, format!("cannot read the name of the buffer file `{uri}`"))
     })?;
-    files::read(&path.parent().unwrap_or(Path::new("")).join(name))
+    Ok(path.parent().unwrap_or(Path::new("")).join(name))
 }
 
 /// Decodes the percent encoding of a relative URI.
