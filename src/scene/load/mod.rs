@@ -58,7 +58,14 @@ impl Scene {
         let camera = loader.camera(&file.camera)?;
         let film = loader.film(&file.film)?;
         let mut materials = loader.materials(&file.materials, &mut warnings)?;
-        let geometry = loader.geometry(&file.objects, &mut materials, &mut warnings)?;
+        let mut inputs = vec![path.to_path_buf()];
+        let geometry =
+            loader.geometry(&file.objects, &mut materials, &mut inputs, &mut warnings)?;
+        inputs.extend(file.environment.map.iter().map(|map| loader.folder.join(map)));
+        inputs.extend(materials.iter().filter_map(|material| match &material.kind {
+            MaterialKind::Measured { path, .. } => Some(path.clone()),
+            _ => None,
+        }));
         if materials.is_empty() {
             materials.push(default_material());
         }
@@ -71,6 +78,7 @@ impl Scene {
             environment,
             materials,
             geometry,
+            inputs,
             warnings,
             hash: String::new(),
         };

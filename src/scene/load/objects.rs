@@ -13,6 +13,7 @@ use crate::{
         file::{ObjectEntry, ObjectSource},
         geometry::MAX_COORDINATE,
         mesh::Mesh,
+        shapes::check_triangles,
         transform::Transform,
     },
 };
@@ -22,6 +23,7 @@ impl Loader<'_> {
         &self,
         objects: &[ObjectEntry],
         materials: &mut Vec<Material>,
+        inputs: &mut Vec<PathBuf>,
         warnings: &mut Vec<String>,
     ) -> Result<Geometry> {
         let mut named = HashMap::new();
@@ -41,20 +43,32 @@ impl Loader<'_> {
         }
         // Read all meshes before placing any, so that the arrays are allocated once.
         let mut meshes = HashMap::new();
-        let (mut vertices, mut triangles) = (0, 0);
+        let (mut vertices, mut triangles, mut shape_triangles) = (0, 0, 0);
         for (index, object) in objects.iter().enumerate() {
             let key = self.mesh_key(object);
             if !meshes.contains_key(&key) {
                 let mesh = match &object.source {
-                    ObjectSource::Mesh(_) => Mesh::read(&key, warnings)?,
+                    ObjectSource::Mesh(_) => {
+                        let mesh = Mesh::read(&key, warnings)?;
+                        inputs.push(key.clone());
+                        inputs.extend_from_slice(&mesh.side_files);
+                        mesh
+                    }
                     ObjectSource::Shape(shape) => shape.mesh().map_err(|message| {
                         self.error(format!("{}: {message}", object_label(index, object)))
                     })?,
                 };
                 meshes.insert(key.clone(), mesh);
             }
+            let count = meshes[&key].triangles.len();
             vertices += meshes[&key].positions.len();
-            triangles += meshes[&key].triangles.len();
+            triangles += count;
+            if let ObjectSource::Shape(_) = object.source {
+                shape_triangles += count;
+                check_triangles(shape_triangles).map_err(|message| {
+                    self.error(format!("{}: {message}", object_label(index, object)))
+                })?;
+            }
         }
         self.check(u32::try_from(vertices).is_ok() && u32::try_from(triangles).is_ok(), || {
             format!(

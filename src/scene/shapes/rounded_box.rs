@@ -65,6 +65,6 @@ impl RoundedBox {
                 });
             }
         }
-        Ok(builder.finish())
+        builder.finish()
     }
 }
