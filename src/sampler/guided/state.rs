@@ -3,7 +3,7 @@
 //! A file is one line of JSON, then 32-bit words in little-endian order: the arrays of
 //! [`GuideState`] from `rectangles` on, in their order. The header holds the SHA-256 of the words.
 
-use std::{fs, io::Write, path::Path};
+use std::{io::Write, path::Path};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -16,7 +16,7 @@ use crate::sampler::guided::{
 };
 use crate::{
     error::{Error, Result},
-    files::write_atomically,
+    files::{self, write_atomically},
     shader::constants::GUIDE_COUNT_WORDS,
 };
 
@@ -171,7 +171,7 @@ impl GuideState {
     /// [`Error::Io`] if the file cannot be read; [`Error::Format`] if it is not a guide, of another
     /// version, or damaged.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = fs::read(path).map_err(|source| Error::io(path, "read", source))?;
+        let bytes = files::read(path)?;
         let no_guide = || {
             Error::format(path, "not a guide; expected a file written by --save-guide".to_owned())
         };
@@ -261,6 +261,8 @@ impl GuideState {
 #[cfg(test)]
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+    use std::fs;
 
     use super::*;
 

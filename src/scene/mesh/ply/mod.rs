@@ -7,7 +7,6 @@
 mod header;
 
 use std::{
-    fs::File,
     io::{BufRead, BufReader, ErrorKind},
     path::Path,
 };
@@ -17,6 +16,7 @@ use header::{Element, Encoding, Property, Scalar};
 use super::Mesh;
 use crate::{
     error::{Error, Result},
+    files,
     scene::triangulate::triangulate_in_space,
 };
 
@@ -25,7 +25,7 @@ use crate::{
 /// # Errors
 /// [`Error::Io`], or [`Error::Format`] that names the element and what was expected and found.
 pub fn read(path: &Path) -> Result<Mesh> {
-    let file = File::open(path).map_err(|source| Error::io(path, "read", source))?;
+    let file = files::open_regular(path)?;
     let file_bytes = file.metadata().map_err(|source| Error::io(path, "read", source))?.len();
     read_from(path, BufReader::with_capacity(1 << 16, file), file_bytes)
 }
