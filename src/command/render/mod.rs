@@ -21,7 +21,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    files::check_writable,
+    files::is_special_file,
     film::{
         Checkpoint, Metadata, SampleRange, Sums, Window,
         checkpoint::{checkpoint_path, guide_path},
@@ -90,7 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let output =
         arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.exr", scene.name)));
     // Fail before the work, not after it.
-    check_writable(&output)?;
+    arguments.check_outputs(&scene, &output)?;
     if let Some(at) = arguments.pixel {
         pixel::check(&settings, &scene, &output, at)?;
     }
@@ -404,7 +404,8 @@ impl<'a> RenderJob<'a> {
             self.statistics(renderer, &metadata, reason, load_ms).write(path)?;
             written.push(path.clone());
         }
-        if reason == StopReason::Interrupt || self.arguments.checkpoint_interval.is_some() {
+        let is_interrupted = reason == StopReason::Interrupt && !is_special_file(&self.output);
+        if is_interrupted || self.arguments.checkpoint_interval.is_some() {
             self.write_checkpoint(renderer, sums)?;
             written.push(checkpoint_path(&self.output));
         }
