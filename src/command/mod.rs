@@ -14,7 +14,27 @@ pub mod study;
 
 use std::io::Write;
 
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
 use crate::error::{Error, Result};
+
+/// Starts the worker threads. Where the system allows no more threads, returns a pool that makes the
+/// calling thread do all work as long as it lives.
+///
+/// # Errors
+/// A pool of one thread cannot be made either.
+pub fn start_threads() -> Result<Option<ThreadPool>> {
+    let Err(refused) = ThreadPoolBuilder::new().build_global() else {
+        return Ok(None);
+    };
+    log::warn!("the system refuses more threads ({refused}): working with one");
+    ThreadPoolBuilder::new()
+        .num_threads(1)
+        .use_current_thread()
+        .build()
+        .map(Some)
+        .map_err(|error| Error::usage(format!("cannot work with one thread: {error}")))
+}
 
 /// Writes `text` and a line break to standard output. A closed pipe (`| head`) is not an error.
 ///
