@@ -54,7 +54,8 @@ pub fn run() -> ExitCode {
         .format_timestamp(None)
         .format_target(false)
         .init();
-    let result = match &cli.command {
+    // The pool, if any, lives until the command has ended.
+    let result = command::start_threads().and_then(|_pool| match &cli.command {
         Command::Render(arguments) => command::render::run(arguments),
         Command::Study(arguments) => command::study::run(arguments),
         Command::Bench(arguments) => command::bench::run(arguments),
@@ -65,7 +66,7 @@ pub fn run() -> ExitCode {
         Command::Export(arguments) => command::export::run(arguments),
         Command::New(arguments) => command::new::run(arguments),
         Command::Devices(arguments) => command::devices::run(arguments),
-    };
+    });
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -2,8 +2,8 @@
 
 use std::{
     env,
-    fs::{self, File, OpenOptions},
-    io::{BufWriter, Write},
+    fs::{self, File, FileType, OpenOptions},
+    io::{self, BufWriter, Read, Write},
     path::{Path, PathBuf},
     process,
     time::Duration,
@@ -38,9 +38,11 @@ pub fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Reads a whole file.
+/// Reads a whole regular file.
 pub fn read(path: &Path) -> Result<Vec<u8>> {
-    fs::read(path).map_err(|source| Error::io(path, "read", source))
+    let mut bytes = Vec::new();
+    let read = open_regular(path)?.read_to_end(&mut bytes);
+    read.map(|_| bytes).map_err(|source| Error::io(path, "read", source))
 }
 
 /// Reads a file of UTF-8 text; an error names the first byte that is not.
@@ -59,9 +61,11 @@ pub fn parent_of(path: &Path) -> &Path {
     }
 }
 
-/// Tests whether `path` exists and is neither a file nor a folder (`/dev/null`, a pipe).
+/// Tests whether `path` exists and is neither a file nor a folder (`/dev/null`, a pipe), or names an
+/// open standard stream (`/dev/stdout`).
 pub fn is_special_file(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
+        || standard_stream(path).is_some()
 }
 
 /// Checks, before long work, that [`write_atomically`] can write `path`: creates the parent
@@ -71,13 +75,13 @@ pub fn is_special_file(path: &Path) -> bool {
 /// [`Error::Io`] with `path` and the cause.
 pub fn check_writable(path: &Path) -> Result<()> {
     if is_special_file(path) {
-        return Ok(());
+        return open_special(path).map(drop);
     }
     let parent = parent_of(path);
     fs::create_dir_all(parent).map_err(|source| Error::io(parent, "create folder", source))?;
     let attempt = || {
         if path.is_dir() {
-            return Err(std::io::ErrorKind::IsADirectory.into());
+            return Err(io::ErrorKind::IsADirectory.into());
         }
         tempfile::tempfile_in(parent).map(drop)
     };
@@ -88,29 +92,25 @@ pub fn check_writable(path: &Path) -> Result<()> {
 ///
 /// Creates the parent folders, lets `write` fill a temporary file in the same folder, renames it to
 /// `path`, replacing an older file, and waits until both have reached the disk. On failure the
-/// temporary file is removed and the older file is untouched. A special file (`/dev/stdout`, a pipe)
-/// is written directly.
+/// temporary file is removed and the older file is untouched. A device or standard stream
+/// (`/dev/stdout`) is written directly.
 ///
 /// # Errors
 /// [`Error::Io`] with `path` and the cause (no permission, full disk, …).
 pub fn write_atomically(
     path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<()> {
     let parent = parent_of(path);
-    let fill = |file: File| -> std::io::Result<File> {
+    let fill = |file: File| -> io::Result<File> {
         let mut writer = BufWriter::with_capacity(1 << 16, file);
         write(&mut writer)?;
         writer.flush()?;
-        writer.into_inner().map_err(std::io::IntoInnerError::into_error)
+        writer.into_inner().map_err(io::IntoInnerError::into_error)
     };
     if is_special_file(path) {
-        return OpenOptions::new()
-            .write(true)
-            .open(path)
-            .and_then(fill)
-            .map(drop)
-            .map_err(|source| Error::io(path, "write", source));
+        let file = open_special(path)?;
+        return fill(file).map(drop).map_err(|source| Error::io(path, "write", source));
     }
     fs::create_dir_all(parent).map_err(|source| Error::io(parent, "create folder", source))?;
     let mut builder = tempfile::Builder::new();
@@ -119,7 +119,7 @@ pub fn write_atomically(
     // Temporary files are private by default; give the result the permissions of any new file.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let attempt = || -> std::io::Result<()> {
+    let attempt = || -> io::Result<()> {
         let (file, temporary) = builder.tempfile_in(parent)?.into_parts();
         fill(file)?.sync_all()?;
         temporary.persist(path).map_err(|error| error.error)?;
@@ -130,8 +130,8 @@ pub fn write_atomically(
 
 /// Waits until the names in a folder have reached the disk. Does nothing where the folder cannot be
 /// opened (no permission to read it, Windows) or its file system does not know how.
-fn sync_folder(folder: &Path) -> std::io::Result<()> {
-    use std::io::ErrorKind::{InvalidInput, Unsupported};
+fn sync_folder(folder: &Path) -> io::Result<()> {
+    use io::ErrorKind::{InvalidInput, Unsupported};
     let Ok(folder) = File::open(folder) else { return Ok(()) };
     match folder.sync_all() {
         Err(error) if !matches!(error.kind(), InvalidInput | Unsupported) => Err(error),
@@ -145,7 +145,7 @@ fn sync_folder(folder: &Path) -> std::io::Result<()> {
 /// [`Error::Io`] with `path` and the cause.
 pub fn remove(path: &Path) -> Result<()> {
     match fs::remove_file(path) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
         result => result
             .and_then(|()| sync_folder(parent_of(path)))
             .map_err(|source| Error::io(path, "remove", source)),
@@ -187,4 +187,114 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
         serde_json::to_writer_pretty(&mut *file, value)?;
         file.write_all(b"\n")
     })
+}
+
+/// Opens a regular file for reading, without waiting. Reading from a pipe or device could last for
+/// ever.
+///
+/// # Errors
+/// [`Error::Io`] for a folder and a file that cannot be read, [`Error::Format`] for a pipe, socket
+/// or device.
+pub fn open_regular(path: &Path) -> Result<File> {
+    let io_error = |source| Error::io(path, "read", source);
+    // Look before opening, which waits for the writer of a pipe.
+    let kind = fs::metadata(path).map_err(io_error)?.file_type();
+    if kind.is_dir() {
+        return Err(io_error(io::ErrorKind::IsADirectory.into()));
+    }
+    if !kind.is_file() {
+        return Err(Error::format(
+            path,
+            format!("expected a regular file, found {}", name_of(kind)),
+        ));
+    }
+    File::open(path).map_err(io_error)
+}
+
+/// Opens a device or standard stream for writing.
+///
+/// Refuses other pipes, whose opening waits for a reader, except those in `/dev/fd`, which are open
+/// already.
+fn open_special(path: &Path) -> Result<File> {
+    if let Some(stream) = standard_stream(path) {
+        return Ok(stream);
+    }
+    let io_error = |source| Error::io(path, "write", source);
+    let kind = fs::metadata(path).map_err(io_error)?.file_type();
+    if is_pipe_or_socket(kind) && !path.starts_with("/dev/fd") {
+        let found = name_of(kind);
+        let message = format!("expected a file to write, /dev/stdout or a device, found {found}");
+        return Err(Error::format(path, message));
+    }
+    OpenOptions::new().write(true).open(path).map_err(io_error)
+}
+
+/// Duplicates standard output or standard error if `path` leads to it. Opening the path again would
+/// start at the first byte of a file and fail for a socket.
+#[cfg(unix)]
+fn standard_stream(path: &Path) -> Option<File> {
+    use std::os::{fd::AsFd, unix::fs::MetadataExt};
+    let named = fs::metadata(path).ok()?;
+    let duplicates =
+        [io::stdout().as_fd().try_clone_to_owned(), io::stderr().as_fd().try_clone_to_owned()];
+    duplicates.into_iter().flatten().map(File::from).find(|stream| {
+        stream.metadata().is_ok_and(|open| (open.dev(), open.ino()) == (named.dev(), named.ino()))
+    })
+}
+
+#[cfg(not(unix))]
+fn standard_stream(_: &Path) -> Option<File> {
+    None
+}
+
+#[cfg(unix)]
+fn is_pipe_or_socket(kind: FileType) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    kind.is_fifo() || kind.is_socket()
+}
+
+#[cfg(not(unix))]
+fn is_pipe_or_socket(_: FileType) -> bool {
+    false
+}
+
+/// Names a file type that is neither a file nor a folder.
+fn name_of(kind: FileType) -> &'static str {
+    if is_pipe_or_socket(kind) { "a pipe or socket" } else { "a device" }
+}
+
+/// Tests whether two paths lead to the same existing file.
+pub fn is_same_file(one: &Path, other: &Path) -> bool {
+    #[cfg(unix)]
+    let identity = |path: &Path| {
+        use std::os::unix::fs::MetadataExt;
+        fs::metadata(path).ok().map(|metadata| (metadata.dev(), metadata.ino()))
+    };
+    #[cfg(not(unix))]
+    let identity = |path: &Path| path.canonicalize().ok();
+    identity(one).is_some_and(|found| identity(other) == Some(found))
+}
+
+/// Largest compression of real pixels by OpenEXR's lossless methods; a header that promises more
+/// than this times the file's size is corrupt, and trusting it would exhaust memory.
+pub const EXR_LARGEST_RATIO: u64 = 4096;
+
+/// Checks that a file of `file_bytes` bytes can hold the pixels that its header states, before
+/// memory is allocated for them.
+///
+/// `ratio` is the largest compression of the format. Returns the message of an error.
+pub fn check_promise(
+    [width, height]: [u64; 2],
+    bytes_per_pixel: u64,
+    file_bytes: u64,
+    ratio: u64,
+) -> Result<(), String> {
+    let promised = width.saturating_mul(height).saturating_mul(bytes_per_pixel);
+    if promised / ratio > file_bytes {
+        return Err(format!(
+            "its header promises {width}x{height} pixels ({promised} bytes), the file has \
+             {file_bytes} bytes"
+        ));
+    }
+    Ok(())
 }

@@ -6,10 +6,19 @@
 #[path = "support/command.rs"]
 mod command;
 
-use std::{fs, process::Command};
+use std::{
+    fs,
+    process::Command,
+    time::{Duration, Instant},
+};
 
 use command::{Folder, Run, Running, program};
-use fenestra::film::{Attribute, Image};
+use fenestra::{
+    brdf::twin::fresnel_conductor,
+    film::{Attribute, Image},
+    scene::mesh::Mesh,
+};
+use glam::Vec3;
 
 /// One quad, `quad.ply`, under a constant environment. Each case changes a part of it.
 const SCENE: &str = r#"[camera]
@@ -381,4 +390,191 @@ fn an_interrupt_writes_what_there_is() {
     let samples = &image.attributes["samplesPerPixel"];
     assert!(matches!(samples, Attribute::Integer(1..100_000_000)), "{samples:?}");
     assert!(image.channels["R"].iter().all(|sample| sample.is_finite() && *sample > 0.0));
+}
+
+/// Runs the program with a limit of a minute, after which the status is 124.
+#[cfg(unix)]
+fn run_limited(folder: &Folder, arguments: &[&str]) -> Run {
+    let rendering = program(folder.path());
+    let mut limited = Command::new("timeout");
+    limited.arg("60").arg(rendering.get_program()).args(arguments).current_dir(folder.path());
+    for (name, value) in rendering.get_envs() {
+        match value {
+            Some(value) => limited.env(name, value),
+            None => limited.env_remove(name),
+        };
+    }
+    Run::of(&limited.output().unwrap())
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_and_devices_are_no_input() {
+    let refused = "expected a regular file, found a ";
+    let map = |name: &str| scene("constant = [1.0, 1.0, 1.0]", &format!("map = {name:?}"));
+    let mesh = |name: &str| scene("quad.ply", name);
+    let cases = [
+        (scene("", ""), "pipe.toml"),
+        (mesh("pipe.ply"), "pipe.ply"),
+        (mesh("pipe.obj"), "pipe.obj"),
+        (mesh("pipe.glb"), "pipe.glb"),
+        (map("pipe.hdr"), "pipe.hdr"),
+        (map("pipe.exr"), "pipe.exr"),
+        (map("pipe.pfm"), "pipe.pfm"),
+        (measured("pipe.binary"), "pipe.binary"),
+        (measured("pipe.brdf"), "pipe.brdf"),
+    ];
+    for (folder, name) in &cases {
+        let pipe = folder.path().join(name);
+        assert!(Command::new("mkfifo").arg(pipe).status().unwrap().success());
+        let read = if name.ends_with(".toml") { name } else { "scene.toml" };
+        let run = run_limited(folder, &["render", read, "--spp=2", "-o", "out.exr"]);
+        run.assert(1, &[&format!("error: {name}: {refused}pipe")]);
+    }
+    let folder = mesh("quad.obj");
+    folder.write("quad.obj", "mtllib /dev/zero\nv -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n");
+    let run = run_limited(&folder, &RENDER);
+    run.assert(0, &["quad.obj:1: cannot read the material library /dev/zero"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_output_is_a_file_a_device_or_standard_output() {
+    let folder = scene("", "");
+    let pipe = folder.path().join("pipe.exr");
+    assert!(Command::new("mkfifo").arg(pipe).status().unwrap().success());
+    for options in [&["-o", "pipe.exr"][..], &["-o", "out.exr", "--stats", "pipe.exr"]] {
+        let arguments = [&["render", "scene.toml", "--spp=2"], options].concat();
+        let parts = ["error: pipe.exr: expected a file to write, /dev/stdout or a device"];
+        run_limited(&folder, &arguments).assert(1, &parts);
+    }
+    let arguments = ["render", "scene.toml", "--spp=2", "-o", "/dev/stdout"];
+    let output = program(folder.path()).args(arguments).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    folder.write("piped.exr", output.stdout);
+    let image = Image::read_exr(&folder.path().join("piped.exr")).unwrap();
+    assert_eq!([image.width, image.height], [16, 12]);
+    let run = folder.run(&[&arguments[..], &["--png"]].concat());
+    run.assert(2, &["--png needs a file beside --output", "/dev/stdout"]);
+}
+
+#[test]
+fn an_output_never_replaces_an_input() {
+    let folder = scene("constant = [1.0, 1.0, 1.0]", "map = \"m.exr\"");
+    let mut image = Image::new(8, 4);
+    image.insert_triple(["R", "G", "B"], &[[1.0; 3]; 32]);
+    image.write_exr(&folder.path().join("m.exr")).unwrap();
+    folder.write("quad.obj", "mtllib quad.mtl\nv -1 -1 0\nv 1 -1 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
+    folder.write("quad.mtl", "newmtl a\nKd 1 1 1\n");
+    let text = fs::read_to_string(folder.path().join("scene.toml")).unwrap();
+    folder.write("scene.toml", text.replace("quad.ply", "quad.obj"));
+    let before = folder.files();
+    let contents = || before.iter().map(|name| fs::read(folder.path().join(name)).unwrap());
+    let kept: Vec<_> = contents().collect();
+    let guided = ["-o", "out.exr", "--sampler", "guided", "--save-guide", "./quad.obj"];
+    let cases: [(&[&str], &str); 6] = [
+        (&["-o", "m.exr"], "--output m.exr would replace m.exr, which this render reads"),
+        (
+            &["-o", "out.exr", "--stats", "scene.toml"],
+            "--stats scene.toml would replace scene.toml",
+        ),
+        (&["-o", "out.exr", "--stats", "quad.mtl"], "--stats quad.mtl would replace quad.mtl"),
+        (&guided, "--save-guide ./quad.obj would replace quad.obj"),
+        (&["-o", "out.exr", "--stats", "out.exr"], "--stats out.exr would replace the file of"),
+        (&["-o", "out.exr", "--png", "--stats", "out.png"], "--stats out.png would replace"),
+    ];
+    for (options, message) in cases {
+        let arguments = [&["render", "scene.toml", "--spp=2"], options].concat();
+        folder.run(&arguments).assert(2, &[&format!("error: {message}")]);
+    }
+    assert_eq!(folder.files(), before);
+    assert_eq!(contents().collect::<Vec<_>>(), kept);
+}
+
+#[test]
+fn every_output_is_tried_before_the_work() {
+    let folder = scene("", "");
+    folder.write("file", "");
+    fs::create_dir(folder.path().join("out.png")).unwrap();
+    let guided = ["--sampler", "guided", "--save-guide", "file/a.guide"];
+    for options in [&["--stats", "file/s.json"][..], &["--png"], &guided] {
+        let run = folder.run(&[&RENDER[..], options].concat());
+        run.assert(1, &["cannot "]);
+        assert!(!folder.path().join("out.exr").exists(), "{options:?}: found before the work");
+    }
+}
+
+#[test]
+fn shapes_of_too_many_triangles_are_refused() {
+    let mut objects = String::new();
+    for _ in 0..100 {
+        objects +=
+            "[[object]]\nshape = \"sphere\"\nradius = 1.0\nsegments = 4096\nmaterial = \"grey\"\n";
+    }
+    let folder = scene("", "");
+    folder.write("scene.toml", format!("{SCENE}{objects}"));
+    let parts = ["object 3 (sphere, line ", "may have 33554432 triangles together, found "];
+    assert_refused(&folder, &parts);
+}
+
+#[test]
+fn a_gltf_accessor_that_is_not_there_is_named() {
+    let folder = scene("quad.ply", "quad.gltf");
+    folder.write(
+        "quad.gltf",
+        r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 5126}}]}], "accessors": []}"#,
+    );
+    assert_refused(
+        &folder,
+        &["error: quad.gltf: ", "POSITION names accessor 5126, the file has 0"],
+    );
+}
+
+#[test]
+fn an_obj_with_many_normals_and_names_is_read_in_linear_time() {
+    use std::fmt::Write;
+    const NORMALS: usize = 200_000;
+    const NAMES: usize = 60_000;
+    let mut text = String::from("v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+    for normal in 1..=NORMALS {
+        writeln!(text, "vn 0 0 {normal}").unwrap();
+    }
+    // Every normal occurs twice, and shares its vertex.
+    for normal in (1..=NORMALS).chain(1..=NORMALS) {
+        if normal <= NAMES {
+            writeln!(text, "usemtl material_of_number_{normal}").unwrap();
+        }
+        writeln!(text, "f 1//{normal} 2//1 3//1").unwrap();
+    }
+    let folder = Folder::new();
+    folder.write("many.obj", text);
+    let start = Instant::now();
+    let mesh = Mesh::read(&folder.path().join("many.obj"), &mut Vec::new()).unwrap();
+    assert!(start.elapsed() < Duration::from_secs(10), "took {:?}", start.elapsed());
+    assert_eq!((mesh.positions.len(), mesh.materials.len()), (NORMALS + 2, NAMES));
+    for (index, triangle) in mesh.triangles.iter().enumerate() {
+        assert_eq!(mesh.normals[triangle[0] as usize][2], (index % NORMALS + 1) as f32);
+    }
+}
+
+#[test]
+fn a_conductor_that_reflects_nothing_is_never_negative() {
+    for step in 1..=10_000_u16 {
+        let cosine = f32::from(step) / 10_000.0;
+        let found = fresnel_conductor(cosine, Vec3::ONE, Vec3::ZERO);
+        assert!(found.min_element() >= 0.0, "{found} at cosine {cosine}");
+    }
+    let folder = scene(
+        "type = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]",
+        "type = \"conductor\"\neta = [1, 1, 1]\nk = [0, 0, 0]\nalpha = 0.2",
+    );
+    for sampler in ["brdf", "mis", "product", "guided"] {
+        folder.run(&[&RENDER[..], &["--sampler", sampler]].concat()).assert(0, &[]);
+        let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+        for name in ["R", "G", "B"] {
+            let least = image.channels[name].iter().copied().fold(f32::INFINITY, f32::min);
+            assert!(least >= 0.0, "{sampler}: {least} in {name}");
+        }
+    }
 }

@@ -158,6 +158,34 @@ fn a_closed_output_is_no_failure() {
 }
 
 #[test]
+fn a_closed_output_of_devices_is_no_failure() {
+    for options in [&["devices"][..], &["devices", "--json"]] {
+        let mut child = program(Folder::new().path())
+            .current_dir("/")
+            .args(options)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        Run::of(&child.wait_with_output().unwrap()).assert(0, &[]);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_system_that_refuses_threads_leaves_one() {
+    let folder = images();
+    let comparing = program(folder.path());
+    // The stacks of so many threads do not fit into the memory allowed.
+    let mut shell = std::process::Command::new("sh");
+    shell.args(["-c", "ulimit -v 1000000; exec \"$@\"", "sh"]);
+    shell.arg(comparing.get_program()).args(["compare", "b.exr", "a.exr"]);
+    shell.current_dir(folder.path()).env("RAYON_NUM_THREADS", "20000");
+    Run::of(&shell.output().unwrap()).assert(0, &["the system refuses more threads"]);
+}
+
+#[test]
 fn devices_lists_the_choice() {
     let folder = Folder::new();
     let run = folder.run(&["devices"]);

@@ -224,6 +224,27 @@ fn damaged_files_are_refused_with_a_reason() {
 }
 
 #[test]
+fn a_header_that_promises_more_than_the_file_holds_is_refused() {
+    let folder = TempDir::new().unwrap();
+    let header = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8192 +X 16384\n";
+    let message = refusal(&write(&folder, "vast.hdr", header.as_bytes()));
+    assert!(message.contains("its header promises 16384x8192 pixels"), "{message}");
+    let path = folder.path().join("vast.exr");
+    write_exr(&path, vec![("Y", FlatSamples::F32(vec![1.0; 32]))]);
+    let mut bytes = fs::read(&path).unwrap();
+    let window = b"dataWindow\0box2i\0\x10\0\0\0";
+    let place = bytes.windows(window.len()).position(|found| found == window).unwrap();
+    let corner = place + window.len() + 8;
+    bytes[corner..corner + 8].copy_from_slice(&[16383_u32, 8191].map(u32::to_le_bytes).concat());
+    let message = refusal(&write(&folder, "vast.exr", &bytes));
+    assert!(message.contains("its header promises 16384x8192 pixels"), "{message}");
+    // A flat map of the largest size is compressed most, and is still read.
+    let flat = vec![Vec3::ONE; 8192 * 64];
+    let path = write(&folder, "flat.hdr", &hdr_bytes(8192, 64, &flat));
+    assert_eq!(load(&path).0.texels, flat);
+}
+
+#[test]
 fn a_file_with_flipped_bytes_never_panics() {
     let folder = TempDir::new().unwrap();
     let exr_path = folder.path().join("whole.exr");

@@ -35,6 +35,28 @@ fn example() -> Image {
     image
 }
 
+#[test]
+fn a_header_whose_size_overflows_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("vast.exr");
+    let mut image = Image::new(5, 3);
+    for name in ["R", "G", "B", "A"] {
+        image.channels.insert(name.to_owned(), vec![1.0; 15]);
+    }
+    image.write_exr(&path).unwrap();
+    let mut bytes = fs::read(&path).unwrap();
+    let window = b"dataWindow\0box2i\0\x10\0\0\0";
+    let place = bytes.windows(window.len()).position(|found| found == window).unwrap();
+    // 2^30 x 2^30 pixels of 16 bytes are 2^64 bytes.
+    let (low, high) = (-(1_i32 << 29), (1_i32 << 29) - 1);
+    let corners = [low, low, high, high].map(i32::to_le_bytes).concat();
+    let place = place + window.len();
+    bytes[place..place + 16].copy_from_slice(&corners);
+    fs::write(&path, bytes).unwrap();
+    let message = message(&path);
+    assert!(message.contains("its header promises 1073741824x1073741824 pixels"), "{message}");
+}
+
 fn message(path: &Path) -> String {
     Image::read_exr(path).unwrap_err().to_string()
 }

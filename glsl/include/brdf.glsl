@@ -69,7 +69,8 @@ vec3 fresnel_conductor(float cosine, vec3 eta, vec3 k) {
     vec3 parallel_cross = cross_term * sine_squared;
     vec3 parallel = perpendicular * (parallel_sum - parallel_cross)
         / (parallel_sum + parallel_cross);
-    return 0.5 * (perpendicular + parallel);
+    // Rounding may leave `perpendicular` below 0 where nothing is reflected, as at eta = 1, k = 0.
+    return max(vec3(0.0), 0.5 * (perpendicular + parallel));
 }
 
 // Reflectance of a conductor from that at normal incidence. [Schlick 1994].

@@ -1,10 +1,11 @@
 //! Files of measured BRDFs in either format → [`MeasuredTable`].
 
-use std::{fs, io::Read, path::Path};
+use std::{io::Read, path::Path};
 
 use crate::{
     brdf::{cornell, merl, table::MeasuredTable},
     error::{Error, Result},
+    files,
 };
 
 impl MeasuredTable {
@@ -12,8 +13,8 @@ impl MeasuredTable {
     /// text format of Cornell and pbrt-v2.
     pub fn load(path: &Path) -> Result<Self> {
         let mut head = [0; merl::HEADER_BYTES];
-        let read = fs::File::open(path)
-            .and_then(|file| file.take(head.len() as u64).read(&mut head))
+        let read = files::open_regular(path)?
+            .read(&mut head)
             .map_err(|source| Error::io(path, "read", source))?;
         let is_merl = path.extension().is_some_and(|extension| extension == "binary")
             || (read == head.len() && merl::dimensions(head) == merl::EXPECTED_DIMENSIONS);

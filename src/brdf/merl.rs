@@ -1,7 +1,7 @@
 //! MERL `.binary` files: header, half/difference angle indexing, the three RGB scales →
 //! [`MeasuredTable`]. \[Matusik et al. 2003\].
 
-use std::{fs, io::Read, path::Path};
+use std::{io::Read, path::Path};
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use crate::{
     brdf::table::{CELL_COUNT, MeasuredTable},
     error::{Error, Result},
+    files,
     shader::constants::*,
 };
 
@@ -39,7 +40,7 @@ pub fn dimensions(header: [u8; HEADER_BYTES]) -> [i32; 3] {
 /// also invalid and counted in the table's warnings.
 pub fn load(path: &Path) -> Result<MeasuredTable> {
     let io_error = |source| Error::io(path, "read", source);
-    let mut file = fs::File::open(path).map_err(io_error)?;
+    let mut file = files::open_regular(path)?;
     let found_bytes = file.metadata().map_err(io_error)?.len();
     let mut header = [0; HEADER_BYTES];
     if found_bytes < HEADER_BYTES as u64 {

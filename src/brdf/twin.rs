@@ -61,7 +61,8 @@ pub fn fresnel_conductor(cosine: f32, eta: Vec3, k: Vec3) -> Vec3 {
     let parallel_cross = cross_term * sine_squared;
     let parallel =
         perpendicular * (parallel_sum - parallel_cross) / (parallel_sum + parallel_cross);
-    0.5 * (perpendicular + parallel)
+    // Rounding may leave `perpendicular` below 0 where nothing is reflected, as at eta = 1, k = 0.
+    (0.5 * (perpendicular + parallel)).max(Vec3::ZERO)
 }
 
 /// GLSL's `sqrt` of a vector.

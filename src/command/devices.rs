@@ -1,5 +1,6 @@
 //! `fenestra devices`: lists the Vulkan devices with their relevant limits, and the one chosen.
 
+use super::print_line;
 use crate::{
     error::Result,
     gpu::{
@@ -39,34 +40,41 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                 })
             })
             .collect();
-        println!("{:#}", serde_json::Value::Array(list));
+        print_line(&format!("{:#}", serde_json::Value::Array(list)))?;
     } else {
         for device in &devices {
-            print_device(device, Some(device.index) == chosen_index);
+            print_line(&describe(device, Some(device.index) == chosen_index))?;
         }
     }
     chosen.map(|_| ())
 }
 
-fn print_device(device: &Capabilities, is_chosen: bool) {
+/// Lists the limits of a device, one a line.
+fn describe(device: &Capabilities, is_chosen: bool) -> String {
     const MEBI: f64 = (1 << 20) as f64;
     let (major, minor, patch) = device.api_version;
     let mark = if is_chosen { "   <- chosen" } else { "" };
-    println!("[{}] {} ({}){mark}", device.index, device.name, device.kind);
-    println!("    driver               {}", device.driver);
-    println!("    Vulkan               {major}.{minor}.{patch}");
-    println!("    device memory        {:.0} MiB", device.device_memory as f64 / MEBI);
-    println!("    one storage buffer   {:.0} MiB", device.max_storage_buffer_range as f64 / MEBI);
-    println!("    storage buffers      {} per stage", device.max_storage_buffers);
-    println!("    push constants       {} bytes", device.max_push_constants_size);
-    println!("    shared memory        {} KiB", device.max_shared_memory / 1024);
-    println!("    subgroup             {} invocations", device.subgroup_size);
-    println!(
-        "    timestamps           {} bits, {} ns per tick",
-        device.timestamp_valid_bits, device.timestamp_period
-    );
+    let mut lines = vec![
+        format!("[{}] {} ({}){mark}", device.index, device.name, device.kind),
+        format!("    driver               {}", device.driver),
+        format!("    Vulkan               {major}.{minor}.{patch}"),
+        format!("    device memory        {:.0} MiB", device.device_memory as f64 / MEBI),
+        format!(
+            "    one storage buffer   {:.0} MiB",
+            device.max_storage_buffer_range as f64 / MEBI
+        ),
+        format!("    storage buffers      {} per stage", device.max_storage_buffers),
+        format!("    push constants       {} bytes", device.max_push_constants_size),
+        format!("    shared memory        {} KiB", device.max_shared_memory / 1024),
+        format!("    subgroup             {} invocations", device.subgroup_size),
+        format!(
+            "    timestamps           {} bits, {} ns per tick",
+            device.timestamp_valid_bits, device.timestamp_period
+        ),
+    ];
     let missing = device.missing();
     if !missing.is_empty() {
-        println!("    cannot be used       {}", missing.join("; "));
+        lines.push(format!("    cannot be used       {}", missing.join("; ")));
     }
+    lines.join("\n")
 }

@@ -16,7 +16,52 @@ pub mod study;
 
 use std::io::Write;
 
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
 use crate::error::{Error, Result};
+
+/// Blocks signals that would end the process in the wrong way, in this thread and those it starts.
+///
+/// With SIGXFSZ blocked, a write beyond the limit of a file's size (`ulimit -f`) fails with an error
+/// instead. SIGHUP stays ignored where it was when the program started (`nohup`), since the handler
+/// of interrupts would take it.
+#[cfg(unix)]
+fn block_signals() -> nix::Result<()> {
+    use nix::sys::signal::{SigSet, Signal};
+    let mut blocked = SigSet::empty();
+    blocked.add(Signal::SIGXFSZ);
+    // Linux lists the ignored signals as a mask whose lowest bit is signal 1.
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status
+        .lines()
+        .find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
+    if ignored.unwrap_or(0) & 1 << (Signal::SIGHUP as u32 - 1) != 0 {
+        blocked.add(Signal::SIGHUP);
+    }
+    blocked.thread_block()
+}
+
+/// Starts the worker threads, with signals blocked in all of them. Where the system allows no more threads, returns a pool that makes the
+/// calling thread do all work as long as it lives.
+///
+/// # Errors
+/// A pool of one thread cannot be made either.
+pub fn start_threads() -> Result<Option<ThreadPool>> {
+    #[cfg(unix)]
+    if let Err(error) = block_signals() {
+        log::warn!("signals cannot be blocked: {error}");
+    }
+    let Err(refused) = ThreadPoolBuilder::new().build_global() else {
+        return Ok(None);
+    };
+    log::warn!("the system refuses more threads ({refused}): working with one");
+    ThreadPoolBuilder::new()
+        .num_threads(1)
+        .use_current_thread()
+        .build()
+        .map(Some)
+        .map_err(|error| Error::usage(format!("cannot work with one thread: {error}")))
+}
 
 /// Writes `text` and a line break to standard output. A closed pipe (`| head`) is not an error.
 ///

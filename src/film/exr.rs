@@ -7,7 +7,7 @@
 use std::{
     collections::BTreeMap,
     fs::File,
-    io::{BufReader, BufWriter},
+    io::{BufReader, BufWriter, Cursor, Write},
     path::Path,
 };
 
@@ -27,7 +27,9 @@ use exr::{
 };
 
 use crate::error::{Error, Result};
-use crate::files::write_atomically;
+use crate::files::{
+    EXR_LARGEST_RATIO, check_promise, is_special_file, open_regular, write_atomically,
+};
 
 /// Primaries and white point of ITU-R BT.709 (red, green, blue, white; CIE x, y).
 const REC_709: Chromaticities = Chromaticities {
@@ -36,10 +38,6 @@ const REC_709: Chromaticities = Chromaticities {
     blue: Vec2(0.15, 0.06),
     white: Vec2(0.3127, 0.3290),
 };
-
-/// Largest compression of real pixels by OpenEXR's lossless methods; a header that promises more
-/// than this times the file's size is corrupt, and trusting it would exhaust memory.
-const LARGEST_COMPRESSION_RATIO: u64 = 4096;
 
 /// Value of a file attribute.
 #[derive(Clone, Debug, PartialEq)]
@@ -203,7 +201,13 @@ impl Image {
             IntegerBounds::from_dimensions((film_width as usize, film_height as usize));
         image.attributes.chromaticities = Some(REC_709);
         write_atomically(path, |file: &mut BufWriter<File>| {
-            image.write().to_buffered(file).map_err(io_error)
+            if !is_special_file(path) {
+                return image.write().to_buffered(file).map_err(io_error);
+            }
+            // The encoder goes back to fill its tables, which a stream cannot.
+            let mut bytes = Cursor::new(Vec::new());
+            image.write().to_buffered(&mut bytes).map_err(io_error)?;
+            file.write_all(bytes.get_ref())
         })
     }
 
@@ -213,7 +217,7 @@ impl Image {
     /// [`Error::Io`] if the file cannot be read, [`Error::Format`] if it is no OpenEXR file, is
     /// truncated or corrupt, or holds only deep data.
     pub fn read_exr(path: &Path) -> Result<Self> {
-        let open = || File::open(path).map_err(|source| Error::io(path, "read", source));
+        let open = || open_regular(path);
         let malformed = |error: exr::error::Error| match error {
             exr::error::Error::Io(source)
                 if source.kind() != std::io::ErrorKind::UnexpectedEof
@@ -231,18 +235,11 @@ impl Image {
         let meta_data = exr::meta::MetaData::read_from_buffered(BufReader::new(file), false)
             .map_err(malformed)?;
         for header in &meta_data.headers {
-            let promised = header.layer_size.area() as u64 * header.channels.bytes_per_pixel as u64;
-            if promised / LARGEST_COMPRESSION_RATIO > file_bytes {
-                return Err(Error::format(
-                    path,
-                    format!(
-                        "corrupt OpenEXR file: its header promises {}x{} pixels ({promised} \
-                         bytes), the file has {file_bytes} bytes",
-                        header.layer_size.width(),
-                        header.layer_size.height()
-                    ),
-                ));
-            }
+            let size = [header.layer_size.width() as u64, header.layer_size.height() as u64];
+            let pixel_bytes = header.channels.bytes_per_pixel as u64;
+            check_promise(size, pixel_bytes, file_bytes, EXR_LARGEST_RATIO).map_err(|message| {
+                Error::format(path, format!("corrupt OpenEXR file: {message}"))
+            })?;
         }
         let image = exr::prelude::read()
             .no_deep_data()

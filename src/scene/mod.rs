@@ -67,6 +67,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// All triangles, in world space.
     pub geometry: Geometry,
+    /// Files that the scene was read from; empty for a scene made in memory.
+    pub inputs: Vec<PathBuf>,
     /// Warnings from loading, repairs among them, for the log.
     pub warnings: Vec<String>,
     /// SHA-256 of everything that changes the picture: camera, film, environment texels, materials

@@ -60,6 +60,7 @@ fn scene(
         environment,
         materials,
         geometry,
+        inputs: Vec::new(),
         warnings: Vec::new(),
         hash: name.into(),
     }

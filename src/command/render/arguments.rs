@@ -1,6 +1,9 @@
 //! Options of `fenestra render`.
 
-use std::{path::PathBuf, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use super::{
     super::{
@@ -11,11 +14,11 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    files::is_special_file,
-    film::{Aov, Window},
+    files::{check_writable, is_same_file, is_special_file},
+    film::{Aov, Window, checkpoint::checkpoint_path},
     renderer::Settings,
     sampler::{Parameters, Sampler},
-    scene::FilmSettings,
+    scene::{FilmSettings, Scene},
 };
 
 /// Arguments of `render`.
@@ -127,6 +130,48 @@ impl Arguments {
         }
     }
 
+    /// Checks, before the work, that every file asked for can be written and that none replaces a
+    /// file that the scene was read from, or another of them. `--save-guide` may replace the guide
+    /// that it started from.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for an output that is an input, [`Error::Io`] for one that cannot be written.
+    pub(super) fn check_outputs(&self, scene: &Scene, output: &Path) -> Result<()> {
+        let preview = self.png.then(|| output.with_extension("png"));
+        let asked = [
+            ("--output", Some(output)),
+            ("--png", preview.as_deref()),
+            ("--stats", self.stats.as_deref()),
+            ("--save-guide", self.save_guide.as_deref()),
+        ];
+        // An interrupt writes a checkpoint without being asked to.
+        let checkpoint = checkpoint_path(output);
+        let mut seen: Vec<(&str, &Path)> = Vec::new();
+        for (name, path) in asked.into_iter().chain([("the checkpoint", Some(&*checkpoint))]) {
+            let Some(path) = path.filter(|path| !is_special_file(path)) else {
+                continue;
+            };
+            let started_from = self.load_guide.as_deref().filter(|_| name != "--save-guide");
+            let mut inputs = scene.inputs.iter().map(PathBuf::as_path).chain(started_from);
+            if let Some(input) = inputs.find(|input| is_same_file(input, path)) {
+                return Err(Error::usage(format!(
+                    "{name} {} would replace {}, which this render reads",
+                    path.display(),
+                    input.display()
+                )));
+            }
+            let is_same = |(_, other): &&(&str, &Path)| *other == path || is_same_file(other, path);
+            if let Some((other, _)) = seen.iter().find(is_same) {
+                return Err(Error::usage(format!(
+                    "{name} {} would replace the file of {other}",
+                    path.display()
+                )));
+            }
+            seen.push((name, path));
+        }
+        asked.into_iter().filter_map(|(_, path)| path).try_for_each(check_writable)
+    }
+
     /// Translates the options into renderer settings.
     ///
     /// # Errors
@@ -140,6 +185,22 @@ impl Arguments {
                 "--output {}: expected a name that ends in .exr; --png writes a preview beside it",
                 output.display()
             )));
+        }
+        if let Some(output) = &self.output
+            && is_special_file(output)
+        {
+            let beside = [
+                ("--png", self.png),
+                ("--resume", self.resume),
+                ("--checkpoint-interval", self.checkpoint_interval.is_some()),
+                ("--pixel", self.pixel.is_some()),
+            ];
+            if let Some((option, _)) = beside.iter().find(|(_, is_given)| *is_given) {
+                return Err(Error::usage(format!(
+                    "{option} needs a file beside --output, which is no file: {}",
+                    output.display()
+                )));
+            }
         }
         let (save, load) = (self.save_guide.as_deref(), self.load_guide.as_deref());
         guide::check(self.sampler, save, load)?;

@@ -21,7 +21,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    files::{check_writable, sweep_leftovers},
+    files::{is_special_file, sweep_leftovers},
     film::{
         Checkpoint, Metadata, SampleRange, Sums, Window, checkpoint::checkpoint_path,
         display::DisplayServer, metadata::seconds_of, png::write_preview,
@@ -91,7 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let output =
         arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.exr", scene.name)));
     // Fail before the work, not after it.
-    check_writable(&output)?;
+    arguments.check_outputs(&scene, &output)?;
     sweep_leftovers(&output);
     if let Some(at) = arguments.pixel {
         pixel::check(&settings, &scene, &output, at)?;
@@ -141,10 +141,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 /// Returns a flag that Ctrl-C raises, and SIGTERM and SIGHUP with it; a second one ends the process
 /// at once.
 pub(super) fn listen_for_interrupt() -> Arc<AtomicBool> {
-    #[cfg(unix)]
-    if let Err(error) = block_signals() {
-        log::warn!("signals cannot be blocked: {error}");
-    }
     let flag = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&flag);
     let listening = ctrlc::set_handler(move || {
@@ -156,27 +152,6 @@ pub(super) fn listen_for_interrupt() -> Arc<AtomicBool> {
         log::warn!("Ctrl-C will end the program without writing the image: {error}");
     }
     flag
-}
-
-/// Blocks signals that would end the process in the wrong way, in this thread and those it starts.
-///
-/// With SIGXFSZ blocked, a write beyond the limit of a file's size (`ulimit -f`) fails with an error
-/// instead. SIGHUP stays ignored where it was when the program started (`nohup`), since the handler
-/// of interrupts would take it.
-#[cfg(unix)]
-fn block_signals() -> nix::Result<()> {
-    use nix::sys::signal::{SigSet, Signal};
-    let mut blocked = SigSet::empty();
-    blocked.add(Signal::SIGXFSZ);
-    // Linux lists the ignored signals as a mask whose lowest bit is signal 1.
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let ignored = status
-        .lines()
-        .find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
-    if ignored.unwrap_or(0) & 1 << (Signal::SIGHUP as u32 - 1) != 0 {
-        blocked.add(Signal::SIGHUP);
-    }
-    blocked.thread_block()
 }
 
 /// One render, from its first pass to its files.
@@ -475,7 +450,8 @@ impl<'a> RenderJob<'a> {
         if let Some(path) = &self.arguments.stats {
             note(path, self.statistics(renderer, &metadata, reason, load_ms).write(path));
         }
-        if reason == StopReason::Interrupt || self.arguments.checkpoint_interval.is_some() {
+        let is_interrupted = reason == StopReason::Interrupt && !is_special_file(&self.output);
+        if is_interrupted || self.arguments.checkpoint_interval.is_some() {
             let path = checkpoint_path(&self.output);
             note(&path, self.write_checkpoint(renderer, sums).and_then(|written| written));
         }

@@ -19,6 +19,9 @@ use crate::{
 /// Most texels of a map: 16384×8192.
 const MAX_TEXELS: u64 = 1 << 27;
 
+/// Largest compression of a Radiance file: a run of 255 texels of four bytes in four bytes.
+const HDR_LARGEST_RATIO: u64 = 255;
+
 /// Radiance as stored in the file, top row first.
 struct Image {
     width: u32,
@@ -128,6 +131,8 @@ fn read_hdr(bytes: &[u8]) -> Result<Image, String> {
     let decoder = HdrDecoder::new(Cursor::new(bytes)).map_err(message)?;
     let (width, height) = decoder.dimensions();
     check_size(width.into(), height.into())?;
+    files::check_promise([width, height].map(u64::from), 4, bytes.len() as u64, HDR_LARGEST_RATIO)
+        .map_err(|message| format!("not a readable Radiance file: {message}"))?;
     let mut components = vec![0_f32; width as usize * height as usize * 3];
     decoder.read_image(bytemuck::cast_slice_mut(&mut components)).map_err(message)?;
     Ok(Image { width, height, texels: bytemuck::cast_vec(components) })
@@ -152,7 +157,11 @@ fn read_exr(bytes: &[u8]) -> Result<Image, String> {
         return Err(format!("expected the channels R, G, B or Y, found {}", found.join(", ")));
     };
     for header in &meta.headers {
-        check_size(header.layer_size.width() as u64, header.layer_size.height() as u64)?;
+        let size = [header.layer_size.width() as u64, header.layer_size.height() as u64];
+        check_size(size[0], size[1])?;
+        let pixel_bytes = header.channels.bytes_per_pixel as u64;
+        files::check_promise(size, pixel_bytes, bytes.len() as u64, files::EXR_LARGEST_RATIO)
+            .map_err(|message| format!("not a readable OpenEXR file: {message}"))?;
         for channel in &header.channels.list {
             if names.iter().any(|name| channel.name.eq(name)) && channel.sampling != Vec2(1, 1) {
                 return Err(format!("channel {} is subsampled, which is not read", channel.name));

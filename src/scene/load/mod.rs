@@ -90,7 +90,14 @@ impl Scene {
         let camera = loader.camera(&file.camera)?;
         loader.check_film(&file.film)?;
         let mut materials = loader.materials(&file.materials, &mut warnings)?;
-        let geometry = loader.geometry(&file.objects, &mut materials, &mut warnings)?;
+        let mut inputs = Vec::new();
+        let geometry =
+            loader.geometry(&file.objects, &mut materials, &mut inputs, &mut warnings)?;
+        inputs.extend(options.environment.clone());
+        inputs.extend(materials.iter().filter_map(|material| match &material.kind {
+            MaterialKind::Measured { path, .. } => Some(path.clone()),
+            _ => None,
+        }));
         if materials.is_empty() {
             materials.push(default_material());
         }
@@ -98,10 +105,13 @@ impl Scene {
             EnvironmentMap::load(map, 1.0, options.rotation_deg.unwrap_or(0.0), &mut warnings)?
         } else {
             let mut entry = file.environment;
+            inputs.extend(entry.map.iter().map(|map| loader.folder.join(map)));
             entry.rotation_deg = options.rotation_deg.unwrap_or(entry.rotation_deg);
             loader.environment(&entry, &mut warnings)?
         };
-        Ok(loader.scene(camera, file.film, environment, materials, geometry, warnings))
+        let mut scene = loader.scene(camera, file.film, environment, materials, geometry, warnings);
+        scene.inputs.extend(inputs);
+        Ok(scene)
     }
 }
 
@@ -165,6 +175,7 @@ impl<'a> Loader<'a> {
             environment,
             materials,
             geometry,
+            inputs: vec![self.path.to_path_buf()],
             warnings,
             hash: String::new(),
         };

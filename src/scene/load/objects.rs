@@ -18,6 +18,7 @@ use crate::{
         file::{ObjectEntry, ObjectSource},
         geometry::MAX_COORDINATE,
         mesh::{Mesh, MeshSurface},
+        shapes::check_triangles,
         transform::Transform,
     },
 };
@@ -27,6 +28,7 @@ impl Loader<'_> {
         &self,
         objects: &[ObjectEntry],
         materials: &mut Vec<Material>,
+        inputs: &mut Vec<PathBuf>,
         warnings: &mut Vec<String>,
     ) -> Result<Geometry> {
         let mut named = HashMap::new();
@@ -49,13 +51,15 @@ impl Loader<'_> {
             objects.iter().filter(lacks_material).map(|object| self.mesh_key(object)).collect();
         // Read all meshes before placing any, so that the arrays are allocated once.
         let mut meshes = HashMap::new();
-        let (mut vertices, mut triangles) = (0, 0);
+        let (mut vertices, mut triangles, mut shape_triangles) = (0, 0, 0);
         for (index, object) in objects.iter().enumerate() {
             let key = self.mesh_key(object);
             if !meshes.contains_key(&key) {
                 let mesh = match &object.source {
                     ObjectSource::Mesh(_) => {
                         let mesh = Mesh::read(&key, warnings)?;
+                        inputs.push(key.clone());
+                        inputs.extend_from_slice(&mesh.side_files);
                         let ignored = ignored_in_object(&mesh, &key, own_materials.contains(&key));
                         warnings.extend(ignored.warnings(&key));
                         mesh
@@ -66,8 +70,15 @@ impl Loader<'_> {
                 };
                 meshes.insert(key.clone(), mesh);
             }
+            let count = meshes[&key].triangles.len();
             vertices += meshes[&key].positions.len();
-            triangles += meshes[&key].triangles.len();
+            triangles += count;
+            if let ObjectSource::Shape { .. } = object.source {
+                shape_triangles += count;
+                check_triangles(shape_triangles).map_err(|message| {
+                    self.error(format!("{}: {message}", object_label(index, object)))
+                })?;
+            }
         }
         self.check(u32::try_from(vertices).is_ok() && u32::try_from(triangles).is_ok(), || {
             format!(

@@ -63,7 +63,10 @@ impl Loader<'_> {
         };
         let environment = self.whole_environment(options, &mut warnings)?;
         let camera: Camera = self.camera(&entry)?;
-        Ok(self.scene(camera, film, environment, materials, geometry, warnings))
+        let mut scene = self.scene(camera, film, environment, materials, geometry, warnings);
+        scene.inputs.extend(mesh.side_files);
+        scene.inputs.extend(options.environment.clone());
+        Ok(scene)
     }
 
     /// Finds the camera named `name`, else the first with perspective; the others are ignored.

@@ -8,7 +8,7 @@ mod mtl;
 pub mod obj;
 pub mod ply;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::Mat4;
 
@@ -35,6 +35,8 @@ pub struct Mesh {
     pub materials: Vec<MeshMaterial>,
     /// Cameras of the file.
     pub cameras: Vec<MeshCamera>,
+    /// Files beside the mesh file that were read for it: material libraries, buffers.
+    pub side_files: Vec<PathBuf>,
 }
 
 /// Start of a run of triangles of one material; it ends where the next begins.

@@ -5,7 +5,7 @@
 //! large file needs no more memory than its mesh.
 
 use std::{
-    fs::File,
+    collections::HashMap,
     io::{BufRead, BufReader},
     path::Path,
 };
@@ -16,18 +16,22 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
+    files,
     scene::features::{self, Ignored},
 };
 
 /// Ends a chain of vertices; also the normal of a corner that has none.
 const NONE: u32 = u32::MAX;
 
+/// Most vertices of a chain; further vertices of its position are found by hash.
+const LONGEST_CHAIN: usize = 16;
+
 /// Reads an OBJ file and the material libraries beside it; a missing library is a warning.
 ///
 /// # Errors
 /// [`Error::Io`], or [`Error::Parse`] with the line.
 pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
-    let file = File::open(path).map_err(|source| Error::io(path, "read", source))?;
+    let file = files::open_regular(path)?;
     let mut reader = ObjReader {
         path,
         line: 0,
@@ -35,8 +39,11 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
         normals: Vec::new(),
         vertices: Vec::new(),
         chains: Vec::new(),
+        crowded: HashMap::new(),
         mesh: Mesh::default(),
+        material_indices: HashMap::new(),
         library: Vec::new(),
+        library_indices: HashMap::new(),
         ignored: Ignored::default(),
         first_smoothing: None,
     };
@@ -98,8 +105,14 @@ struct ObjReader<'a> {
     vertices: Vec<Vertex>,
     /// Head of the chain of `vertices` at each position; as long as `positions`.
     chains: Vec<u32>,
+    /// Vertex of a position and normal where the position's chain is full.
+    crowded: HashMap<(u32, u32), u32>,
     mesh: Mesh,
+    /// Index into `mesh.materials` by name.
+    material_indices: HashMap<String, usize>,
     library: Vec<LibraryMaterial>,
+    /// Index of the last of `library` with a name.
+    library_indices: HashMap<String, usize>,
     ignored: Ignored,
     /// Line of the first smoothing group.
     first_smoothing: Option<usize>,
@@ -185,18 +198,29 @@ impl ObjReader<'_> {
             _ => NONE,
         };
         let mut vertex = self.chains[position as usize];
+        let mut chain_length = 0;
         while vertex != NONE {
             let Vertex { normal: found, next } = self.vertices[vertex as usize];
             if found == normal {
                 return Ok(vertex);
             }
             vertex = next;
+            chain_length += 1;
+        }
+        let is_crowded = chain_length == LONGEST_CHAIN;
+        if is_crowded && let Some(&vertex) = self.crowded.get(&(position, normal)) {
+            return Ok(vertex);
         }
         let vertex = u32::try_from(self.vertices.len())
             .ok()
             .filter(|&vertex| vertex != NONE)
             .ok_or_else(|| self.error("more than 4,294,967,294 vertices"))?;
-        let next = std::mem::replace(&mut self.chains[position as usize], vertex);
+        let next = if is_crowded {
+            self.crowded.insert((position, normal), vertex);
+            NONE
+        } else {
+            std::mem::replace(&mut self.chains[position as usize], vertex)
+        };
         self.vertices.push(Vertex { normal, next });
         self.mesh.positions.push(self.positions[position as usize]);
         Ok(vertex)
@@ -224,11 +248,11 @@ impl ObjReader<'_> {
 
     /// Finds or adds a material by name; one that no library describes is white.
     fn material_index(&mut self, name: &str) -> usize {
-        if let Some(index) = self.mesh.materials.iter().position(|found| found.name == name) {
+        if let Some(&index) = self.material_indices.get(name) {
             return index;
         }
-        let described = self.library.iter().rev().find(|found| found.material.name == name);
-        let material = described.map(LibraryMaterial::finish).unwrap_or_else(|| {
+        let described = self.library_indices.get(name).map(|&index| self.library[index].finish());
+        let material = described.unwrap_or_else(|| {
             let place = || format!("`{name}`, line {}", self.line);
             self.ignored.add(features::OBJ_UNDESCRIBED, place);
             MeshMaterial {
@@ -238,8 +262,10 @@ impl ObjReader<'_> {
                 ignored: Ignored::default(),
             }
         });
+        let index = self.mesh.materials.len();
         self.mesh.materials.push(material);
-        self.mesh.materials.len() - 1
+        self.material_indices.insert(name.to_owned(), index);
+        index
     }
 
     /// Reads MTL libraries; one line may name several files.
@@ -252,7 +278,10 @@ impl ObjReader<'_> {
             names.split_ascii_whitespace().map(|name| folder.join(name)).collect()
         };
         for path in paths {
-            let Ok(file) = File::open(&path) else {
+            if self.mesh.side_files.contains(&path) {
+                continue;
+            }
+            let Ok(file) = files::open_regular(&path) else {
                 warnings.push(format!(
                     "{}:{}: cannot read the material library {}; its materials are white",
                     self.path.display(),
@@ -261,10 +290,15 @@ impl ObjReader<'_> {
                 ));
                 continue;
             };
+            self.mesh.side_files.push(path.clone());
+            let first = self.library.len();
             let library = &mut self.library;
             for_each_line(&path, BufReader::new(file), |line, text| {
                 mtl::read_line(library, &path, line, text)
             })?;
+            let read = (first..).zip(&self.library[first..]);
+            self.library_indices
+                .extend(read.map(|(index, found)| (found.material.name.clone(), index)));
         }
         Ok(())
     }

@@ -215,7 +215,7 @@ impl Shape for Blobs {
         let cell = (high - low + 2.0 * swell).max_element() / cells as f64;
         let margin = swell + 2.0 * cell;
         let counts = ((high - low + 2.0 * margin) / cell).ceil().as_usizevec3();
-        Ok(surface_net(&field, low - margin, cell, counts))
+        surface_net(&field, low - margin, cell, counts)
     }
 }
 
@@ -355,7 +355,7 @@ fn axes_from(axis: usize) -> [USizeVec3; 3] {
 }
 
 /// Extracts the surface of level 0 within `counts` cells of side `cell` from the corner `low`.
-fn surface_net(field: &Field, low: DVec3, cell: f64, counts: USizeVec3) -> Mesh {
+fn surface_net(field: &Field, low: DVec3, cell: f64, counts: USizeVec3) -> Result<Mesh, String> {
     let lattice = Lattice::new(field, low, cell, counts);
     let found: Vec<_> = (0..counts.element_product())
         .into_par_iter()

@@ -91,7 +91,7 @@ impl Shape for Extrude {
         builder.face(&cap(half_depth), DVec3::Z, &triangles);
         let reversed: Vec<_> = triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
         builder.face(&cap(-half_depth), DVec3::NEG_Z, &reversed);
-        Ok(builder.finish())
+        builder.finish()
     }
 }
 

@@ -104,7 +104,7 @@ impl Shape for Grid {
         builder.patch(2, columns, |level, step| rim(0, columns - 1 - step, level, DVec3::NEG_Z));
         builder.patch(2, rows, |level, step| rim(rows - 1 - step, columns - 1, level, DVec3::X));
         builder.patch(2, rows, |level, step| rim(step, 0, level, DVec3::NEG_X));
-        Ok(builder.finish())
+        builder.finish()
     }
 }
 

@@ -41,6 +41,9 @@ const SEGMENT_RANGE: RangeInclusive<usize> = 3..=4096;
 /// Most points of a profile, outline or path.
 const MAX_POINTS: usize = 1024;
 
+/// Most triangles of all shapes of a scene together, each object counted.
+pub const MAX_TRIANGLES: usize = 1 << 25;
+
 /// Angle above which a corner is a crease, degrees, for shapes that do not set it.
 const DEFAULT_CREASE_DEG: f64 = 40.0;
 
@@ -100,6 +103,8 @@ fn count(key: &str, count: usize, range: RangeInclusive<usize>) -> Result<usize,
 #[derive(Debug, Default)]
 struct Builder {
     mesh: Mesh,
+    /// Triangles of all patches asked for, of which those beyond [`MAX_TRIANGLES`] are not built.
+    asked_triangles: usize,
 }
 
 impl Builder {
@@ -124,6 +129,10 @@ impl Builder {
         columns: usize,
         position_and_normal: impl Fn(usize, usize) -> (DVec3, DVec3),
     ) {
+        self.asked_triangles += 2 * rows.saturating_sub(1) * columns.saturating_sub(1);
+        if self.asked_triangles > MAX_TRIANGLES {
+            return;
+        }
         let first = self.mesh.positions.len() as u32;
         for row in 0..rows {
             for column in 0..columns {
@@ -154,14 +163,32 @@ impl Builder {
     }
 
     /// Returns the mesh, turned inside out if wound inward (a profile given from top to bottom).
-    fn finish(self) -> Mesh {
+    ///
+    /// # Errors
+    /// Returns a message about a shape of more than [`MAX_TRIANGLES`].
+    fn finish(self) -> Result<Mesh, String> {
+        check_triangles(self.asked_triangles)?;
         let mut mesh = self.mesh;
         if volume(&mesh) < 0.0 {
             mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
             mesh.normals.iter_mut().flatten().for_each(|component| *component = -*component);
         }
-        mesh
+        Ok(mesh)
     }
+}
+
+/// Checks the number of triangles of a scene's shapes.
+///
+/// # Errors
+/// Returns a message with both numbers.
+pub fn check_triangles(found: usize) -> Result<(), String> {
+    if found > MAX_TRIANGLES {
+        return Err(format!(
+            "the shapes of a scene may have {MAX_TRIANGLES} triangles together, found {found}: \
+             lower the numbers of segments or objects"
+        ));
+    }
+    Ok(())
 }
 
 /// Volume inside a closed mesh, by the divergence theorem; negative if it is wound inward.

@@ -102,7 +102,7 @@ impl Shape for Sphere {
                 ring => radius * DVec2::from_angle(PI * ring as f64 / rings as f64 - FRAC_PI_2),
             })
             .collect();
-        Ok(revolve(&profile, false, 180.0, segments))
+        revolve(&profile, false, 180.0, segments)
     }
 }
 
@@ -130,7 +130,7 @@ impl Shape for Cylinder {
         profile.dedup_by(|next, kept| next.distance(*kept) < 1e-9 * radius);
         let last = profile.len() - 1;
         profile[last].x = 0.0;
-        Ok(revolve(&profile, false, DEFAULT_CREASE_DEG, segments))
+        revolve(&profile, false, DEFAULT_CREASE_DEG, segments)
     }
 }
 
@@ -147,7 +147,7 @@ impl Shape for Cone {
             DVec2::new(0.0, height),
         ];
         profile.dedup();
-        Ok(revolve(&profile, false, DEFAULT_CREASE_DEG, segments))
+        revolve(&profile, false, DEFAULT_CREASE_DEG, segments)
     }
 }
 
@@ -168,7 +168,7 @@ impl Shape for Torus {
                 DVec2::new(radius, 0.0) + tube_radius * DVec2::from_angle(angle)
             })
             .collect();
-        Ok(revolve(&profile, true, 180.0, segments))
+        revolve(&profile, true, 180.0, segments)
     }
 }
 
@@ -207,12 +207,17 @@ impl Shape for Lathe {
         if profile.iter().all(|point| point.x == 0.0) || profile.len() < 3 {
             return Err("profile: expected points off the axis, found none".to_owned());
         }
-        Ok(revolve(&profile, self.closed, crease_deg, segments))
+        revolve(&profile, self.closed, crease_deg, segments)
     }
 }
 
 /// Revolves a profile of (radius, y), from bottom to top with the outside to the right, about +Y.
-fn revolve(profile: &[DVec2], closed: bool, crease_deg: f64, segments: usize) -> Mesh {
+fn revolve(
+    profile: &[DVec2],
+    closed: bool,
+    crease_deg: f64,
+    segments: usize,
+) -> Result<Mesh, String> {
     let mirrored = |from: DVec2, to: DVec2| {
         let along = to - from;
         // Across the axis, the profile continues as its mirror image.

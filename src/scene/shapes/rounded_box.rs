@@ -57,6 +57,6 @@ impl Shape for RoundedBox {
                 });
             }
         }
-        Ok(builder.finish())
+        builder.finish()
     }
 }

@@ -241,6 +241,15 @@ fn grids_are_sheets_of_their_thickness() {
 }
 
 #[test]
+fn splines_of_too_many_triangles_are_refused_before_they_are_built() {
+    let points: Vec<_> = (0..40).map(|y| format!("[1, {y}]")).collect();
+    let profile = points.join(",");
+    let lathe = format!("profile = [{profile}]\nsmooth = 256\nsegments = 4096");
+    let message = shape::<Lathe>(&lathe).mesh().unwrap_err();
+    assert!(message.contains("may have 33554432 triangles together, found "), "{message}");
+}
+
+#[test]
 fn impossible_parameters_name_the_key_and_the_value() {
     let message = |result: Result<Mesh, String>| result.unwrap_err();
     let negative = shape::<RoundedBox>("size = [1, -2, 1]").mesh();

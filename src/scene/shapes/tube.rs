@@ -90,7 +90,7 @@ impl Shape for Tube {
         // A spline between radii may swing below the smallest.
         let smallest = radii.iter().copied().fold(f32::INFINITY, f32::min);
         points.iter_mut().for_each(|point| point.w = point.w.max(f64::from(smallest)));
-        Ok(sweep(&rings(&points, self.closed), self.closed, self.round, segments))
+        sweep(&rings(&points, self.closed), self.closed, self.round, segments)
     }
 }
 
@@ -154,7 +154,7 @@ fn rings(points: &[DVec4], closed: bool) -> Vec<Ring> {
     rings
 }
 
-fn sweep(rings: &[Ring], closed: bool, round: bool, segments: usize) -> Mesh {
+fn sweep(rings: &[Ring], closed: bool, round: bool, segments: usize) -> Result<Mesh, String> {
     let mut rows: Vec<Ring> = Vec::new();
     const CAP_STEPS: usize = 6;
     let hemisphere = |end: Ring, side: f64, step: usize| {

@@ -7,13 +7,13 @@
 mod accessors;
 mod contents;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{Mat3, Mat4, Vec3};
 use gltf::{
     Document, Glb, Node, Primitive,
     buffer::Source,
-    json::Root,
+    json::{Root, validation::Checked},
     mesh::{Mode, Semantic},
 };
 use serde_json::Value;
@@ -50,6 +50,13 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
         cameras: Vec::new(),
         ignored: Ignored::default(),
     };
+    reader.mesh.side_files = document
+        .buffers()
+        .filter_map(|buffer| match buffer.source() {
+            Source::Uri(uri) if !uri.starts_with("data:") => beside(path, uri).ok(),
+            _ => None,
+        })
+        .collect();
     reader.mesh.materials =
         document.materials().map(|material| contents::material(&material, &json)).collect();
     reader.ignore_contents(&document, &json);
@@ -117,6 +124,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>, Value)
             return Err(Error::format(path, message));
         }
     }
+    check_positions(path, &root)?;
     let document = Document::from_json(root).map_err(not_gltf)?;
     let json = serde_json::from_slice(text).map_err(not_json)?;
     Ok((document, glb.and_then(|glb| glb.bin).map(|bin| bin.into_owned()), json))
@@ -141,7 +149,7 @@ fn read_buffers(
                     .ok_or_else(|| {
                         Error::format(path, format!("buffer {index} is not base64 data"))
                     })?,
-                None => read_beside(path, uri)?,
+                None => files::read(&beside(path, uri)?)?,
             },
         };
         if bytes.len() < buffer.length() {
@@ -157,11 +165,33 @@ fn read_buffers(
     Ok(buffers)
 }
 
-fn read_beside(path: &Path, uri: &str) -> Result<Vec<u8>> {
+/// Checks that the accessor of every primitive's positions exists, on which the validation by the
+/// `gltf` crate relies.
+fn check_positions(path: &Path, root: &Root) -> Result<()> {
+    for primitive in root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
+        let position = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+        if let Some(accessor) = position.map(|index| index.value())
+            && accessor >= root.accessors.len()
+        {
+            return Err(Error::format(
+                path,
+                format!(
+                    "not a glTF document: a primitive's POSITION names accessor {accessor}, the \
+                     file has {}",
+                    root.accessors.len()
+                ),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Path of a buffer file that is named by a relative URI.
+fn beside(path: &Path, uri: &str) -> Result<PathBuf> {
     let name = decode_percent(uri).ok_or_else(|| {
         Error::format(path, format!("cannot read the name of the buffer file `{uri}`"))
     })?;
-    files::read(&path.parent().unwrap_or(Path::new("")).join(name))
+    Ok(path.parent().unwrap_or(Path::new("")).join(name))
 }
 
 /// Decodes the percent encoding of a relative URI.

@@ -7,7 +7,6 @@
 mod header;
 
 use std::{
-    fs::File,
     io::{BufRead, BufReader, ErrorKind},
     path::Path,
 };
@@ -15,14 +14,17 @@ use std::{
 use header::{Element, Encoding, Property, Scalar};
 
 use super::Mesh;
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    files,
+};
 
 /// Reads a PLY file.
 ///
 /// # Errors
 /// [`Error::Io`], or [`Error::Format`] that names the element and what was expected and found.
 pub fn read(path: &Path) -> Result<Mesh> {
-    let file = File::open(path).map_err(|source| Error::io(path, "read", source))?;
+    let file = files::open_regular(path)?;
     let file_bytes = file.metadata().map_err(|source| Error::io(path, "read", source))?.len();
     read_from(path, BufReader::with_capacity(1 << 16, file), file_bytes)
 }
