@@ -153,7 +153,7 @@ pub fn remove(path: &Path) -> Result<()> {
 }
 
 /// Removes the temporary files that killed processes left beside `path`, once they are older than
-/// [`LEFTOVER_AGE`]. Needs `/proc` to know which processes live, and does nothing without it.
+/// a minute. Needs `/proc` to know which processes live, and does nothing without it.
 pub fn sweep_leftovers(path: &Path) {
     let Ok(entries) = fs::read_dir(parent_of(path)) else { return };
     if !Path::new("/proc/self").exists() {

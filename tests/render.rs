@@ -113,7 +113,7 @@ fn what_guided_learned_is_kept_with_the_checkpoint_and_in_files() {
     let resume = [&options("9")[..], &["--resume"]].concat();
     let (part, _) = render(&folder, "part.exr", &resume);
     assert_eq!(part.channels, whole.channels);
-    assert_eq!(guides(), [guide.clone()], "nothing was written beside the image");
+    assert_eq!(guides(), std::slice::from_ref(&guide), "nothing was written beside the image");
     // A checkpoint without its guide, or with the guide of another moment, is refused.
     std::fs::remove_file(&guide).unwrap();
     let refuse = |texts: &[&str]| {

@@ -41,8 +41,8 @@ fn block_signals() -> nix::Result<()> {
     blocked.thread_block()
 }
 
-/// Starts the worker threads, with signals blocked in all of them. Where the system allows no more threads, returns a pool that makes the
-/// calling thread do all work as long as it lives.
+/// Blocks signals, then starts the worker threads. Where the system allows no more threads, returns a
+/// pool that makes the calling thread do all work as long as it lives.
 ///
 /// # Errors
 /// A pool of one thread cannot be made either.

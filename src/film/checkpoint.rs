@@ -133,6 +133,9 @@ pub fn is_checkpoint_path(path: &Path) -> bool {
         .is_some_and(|name| name.to_string_lossy().to_lowercase().ends_with(".checkpoint.exr"))
 }
 
+/// Path and bytes of a guide.
+pub type GuideFile = (PathBuf, Vec<u8>);
+
 impl Checkpoint {
     /// Tests whether an image file holds a checkpoint.
     pub fn is_checkpoint(image: &Image) -> bool {
@@ -229,7 +232,7 @@ impl Checkpoint {
     ///
     /// # Errors
     /// As [`Checkpoint::read`], for either file.
-    pub fn read_with_guide(path: &Path) -> Result<(Self, Option<(PathBuf, Vec<u8>)>)> {
+    pub fn read_with_guide(path: &Path) -> Result<(Self, Option<GuideFile>)> {
         let image = Image::read_exr(path)?;
         let checkpoint = Self::from_image(&image, path)?;
         let Some(Attribute::Text(hash)) = image.attributes.get(GUIDE_ATTRIBUTE) else {

@@ -209,9 +209,10 @@ impl Arguments {
             parameters.set(assignment)?;
         }
         if let Some(error) = self.error
-            && (error.is_nan() || error <= 0.0)
+            && !(error.is_finite() && error > 0.0)
         {
-            return Err(Error::usage(format!("--error {error}: expected a positive number")));
+            let message = format!("--error {error}: expected a finite number above 0");
+            return Err(Error::usage(message));
         }
         let spp = self.spp.unwrap_or(DEFAULT_SPP);
         if self.sample_offset.checked_add(spp).is_none() {

@@ -81,9 +81,6 @@ impl StopReason {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let interrupted = listen_for_interrupt();
     let settings = arguments.settings()?;
-    if arguments.error.is_some_and(f64::is_infinite) {
-        return Err(Error::usage("--error inf: expected a finite number"));
-    }
     let start = Instant::now();
     let mut scene = arguments.scene_options.load(&arguments.scene)?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
