@@ -23,6 +23,7 @@
 //! | stage | module | shader in `glsl/` |
 //! |---|---|---|
 //! | scene file → validated [`Scene`](scene::Scene) | [`scene`] | `include/environment` |
+//! | images on surfaces | [`texture`] | |
 //! | materials → values, densities, samples | [`brdf`] | `include/brdf` |
 //! | lobes: products, integrals, samples | [`srbf`] | `include/srbf` |
 //! | maps and BRDFs → lobes | [`fit`] | |
@@ -151,6 +152,7 @@ pub mod scene;
 
 pub mod brdf;
 pub mod srbf;
+pub mod texture;
 
 pub mod fit;
 

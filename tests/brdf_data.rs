@@ -55,7 +55,7 @@ fn integrate(outgoing: Vec3, f: impl Fn(Vec3) -> DVec3 + Sync) -> DVec3 {
 fn tables(path: &Path) -> MaterialTables {
     let table = Arc::new(MeasuredTable::load(path).unwrap());
     let kind = MaterialKind::Measured { path: path.to_path_buf(), table };
-    MaterialTables::new(&[Material { name: "measured".to_string(), kind }]).unwrap()
+    MaterialTables::new(&[Material::new("measured", kind)]).unwrap()
 }
 
 /// Compares cosine-weighted albedos at 15° and, for the Cornell files, 60° with those of pbrt-v2's

@@ -55,7 +55,7 @@ fn sunny(width: u32) -> EnvironmentMap {
 }
 
 fn material(kind: MaterialKind) -> MaterialTables {
-    MaterialTables::new(&[Material { name: "test".into(), kind }]).unwrap()
+    MaterialTables::new(&[Material::new("test", kind)]).unwrap()
 }
 
 fn conductor(alpha: f32) -> MaterialTables {

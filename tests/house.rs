@@ -11,13 +11,14 @@ use std::collections::BTreeSet;
 use source::{Files, Graph, files_of, tokens, uses};
 
 /// Top-level modules of `src`; each may use those before it.
-const ORDER: [&str; 19] = [
-    "error", "files", "shader", "math", "gpu", "brdf", "srbf", "scene", "accel", "film", "export",
-    "fit", "pass", "sampler", "renderer", "study", "bench", "command", "cli",
+const ORDER: [&str; 20] = [
+    "error", "files", "shader", "math", "gpu", "texture", "brdf", "srbf", "scene", "accel", "film",
+    "export", "fit", "pass", "sampler", "renderer", "study", "bench", "command", "cli",
 ];
 
 /// Modules that compile and test with no Vulkan loader present, although `gpu` stands before them.
-const WITHOUT_GPU: [&str; 7] = ["brdf", "srbf", "scene", "accel", "film", "export", "fit"];
+const WITHOUT_GPU: [&str; 8] =
+    ["texture", "brdf", "srbf", "scene", "accel", "film", "export", "fit"];
 
 /// Uses of one file by another that close a circle and may stay, each with the reason.
 const EXCEPTIONS: [(&str, &str, &str); 0] = [];

@@ -82,10 +82,10 @@ fn measured() -> Material {
         Vec3::new(0.1, 0.12, 0.1) + Vec3::new(0.8, 0.2, 0.2) * half.z.max(0.0).powi(60)
     })
     .unwrap();
-    Material {
-        name: "measured".into(),
-        kind: MaterialKind::Measured { path: "test".into(), table: Arc::new(table) },
-    }
+    Material::new(
+        "measured",
+        MaterialKind::Measured { path: "test".into(), table: Arc::new(table) },
+    )
 }
 
 #[test]

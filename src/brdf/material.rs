@@ -4,15 +4,91 @@ use std::{path::PathBuf, sync::Arc};
 
 use glam::Vec3;
 
-use crate::brdf::table::MeasuredTable;
+use crate::{brdf::table::MeasuredTable, texture::TextureUse};
 
-/// Named surface material; all are two-sided and opaque.
+/// Named surface material.
 #[derive(Clone, Debug)]
 pub struct Material {
     /// Name in the scene file.
     pub name: String,
     /// Reflection model.
     pub kind: MaterialKind,
+    /// Textures, opacity and emission.
+    pub surface: Surface,
+}
+
+impl Material {
+    /// Makes an opaque, two-sided material without textures or emission.
+    pub fn new(name: impl Into<String>, kind: MaterialKind) -> Self {
+        Self { name: name.into(), kind, surface: Surface::default() }
+    }
+}
+
+/// Properties of a material beside its reflection model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surface {
+    /// Factor of the model's colour: reflectance, base colour or the diffuse part of a plastic.
+    pub color: Option<TextureUse>,
+    /// True if the vertex colours of the mesh are a factor of colour and opacity too.
+    pub vertex_color: bool,
+    /// Factor of the roughness √α.
+    pub roughness: Option<TextureUse>,
+    /// Factor of the metallic share of a principled material.
+    pub metallic: Option<TextureUse>,
+    /// Normals in the tangent frame, n = 2 · texel − 1, linear.
+    pub normal: Option<TextureUse>,
+    /// Factor of the tangential components of `normal`.
+    pub normal_scale: f32,
+    /// Share of light that the surface stops.
+    pub opacity: Opacity,
+    /// Light that the surface emits.
+    pub emission: Option<Emission>,
+    /// False if the back reflects nothing and lets nothing through.
+    pub two_sided: bool,
+}
+
+impl Default for Surface {
+    fn default() -> Self {
+        Self {
+            color: None,
+            vertex_color: false,
+            roughness: None,
+            metallic: None,
+            normal: None,
+            normal_scale: 1.0,
+            opacity: Opacity::default(),
+            emission: None,
+            two_sided: true,
+        }
+    }
+}
+
+/// Share of light that a surface stops; the rest goes straight through.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Opacity {
+    /// Opacity, 0…1.
+    pub factor: f32,
+    /// Factor by place.
+    pub texture: Option<TextureUse>,
+    /// Opacity from which the surface is opaque, and below which it is not there; none blends.
+    pub cutoff: Option<f32>,
+}
+
+impl Default for Opacity {
+    fn default() -> Self {
+        Self { factor: 1.0, texture: None, cutoff: None }
+    }
+}
+
+/// Light that a surface emits, the same in all directions of a side.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Emission {
+    /// Radiance, linear Rec.709.
+    pub radiance: Vec3,
+    /// Factor by place.
+    pub texture: Option<TextureUse>,
+    /// True if the back emits too; else only the side from which the triangles are counter-clockwise.
+    pub two_sided: bool,
 }
 
 /// Fresnel reflectance of a conductor.
@@ -55,6 +131,49 @@ pub enum MaterialKind {
         alpha: f32,
         /// Fresnel term.
         fresnel: ConductorFresnel,
+    },
+    /// Metallic-roughness material of glTF 2.0, appendix B, with `KHR_materials_ior` and
+    /// `KHR_materials_specular`.
+    Principled {
+        /// Albedo of the dielectric's base, and reflectance of the metal at normal incidence, 0…1.
+        base_color: Vec3,
+        /// Share of metal, 0…1.
+        metallic: f32,
+        /// Roughness √α, 0…1.
+        roughness: f32,
+        /// Refractive index of the dielectric.
+        ior: f32,
+        /// Factor of the dielectric's specular reflection, 0…1.
+        specular: f32,
+        /// Factor of the dielectric's reflectance at normal incidence.
+        specular_color: Vec3,
+    },
+    /// Perfect mirror.
+    Mirror {
+        /// Reflectance in all directions, 0…1.
+        reflectance: Vec3,
+    },
+    /// Interface to a solid dielectric, which lies behind the side from which the triangles are
+    /// counter-clockwise.
+    Dielectric {
+        /// Refractive index of the inside over that of the outside.
+        ior: f32,
+        /// GGX width α; 0 is smooth.
+        alpha: f32,
+        /// Factor of the reflected light, 0…1.
+        reflectance: Vec3,
+        /// Factor of the transmitted light, 0…1.
+        transmittance: Vec3,
+    },
+    /// Thin pane of a dielectric: reflects as a mirror or lets light straight through, with all
+    /// reflections between its two sides.
+    ThinDielectric {
+        /// Refractive index.
+        ior: f32,
+        /// Factor of the reflected light, 0…1.
+        reflectance: Vec3,
+        /// Factor of the transmitted light, 0…1.
+        transmittance: Vec3,
     },
     /// Tabulated measurement (MERL or Cornell file).
     Measured {

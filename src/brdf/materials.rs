@@ -68,6 +68,42 @@ impl MaterialTables {
                     }
                     words = conductor_words(&converted);
                 }
+                MaterialKind::Principled {
+                    base_color,
+                    metallic,
+                    roughness,
+                    ior,
+                    specular,
+                    specular_color,
+                } => {
+                    let ratio = (ior - 1.0) / (ior + 1.0);
+                    converted.kind = MATERIAL_PRINCIPLED;
+                    converted.reflectance = base_color.to_array();
+                    converted.alpha = (roughness * roughness).max(SMALLEST_ALPHA);
+                    converted.ior = *metallic;
+                    converted.eta = (*specular_color * ratio * ratio)
+                        .min(Vec3::ONE)
+                        .map(|reflectance| reflectance * specular)
+                        .to_array();
+                    converted.k = [*specular; 3];
+                }
+                MaterialKind::Mirror { reflectance } => {
+                    converted.kind = MATERIAL_MIRROR;
+                    converted.reflectance = reflectance.to_array();
+                }
+                MaterialKind::Dielectric { ior, alpha, reflectance, transmittance } => {
+                    converted.kind = MATERIAL_DIELECTRIC;
+                    converted.alpha = *alpha;
+                    converted.ior = *ior;
+                    converted.reflectance = reflectance.to_array();
+                    converted.eta = transmittance.to_array();
+                }
+                MaterialKind::ThinDielectric { ior, reflectance, transmittance } => {
+                    converted.kind = MATERIAL_THIN_DIELECTRIC;
+                    converted.ior = *ior;
+                    converted.reflectance = reflectance.to_array();
+                    converted.eta = transmittance.to_array();
+                }
                 MaterialKind::Measured { table, .. } => {
                     converted.kind = MATERIAL_MEASURED;
                     converted.table_offset =

@@ -105,6 +105,10 @@ fn scene(path: &Path) -> Result<Description> {
         MaterialKind::Diffuse { .. } => "diffuse",
         MaterialKind::Plastic { .. } => "plastic",
         MaterialKind::Conductor { .. } => "conductor",
+        MaterialKind::Principled { .. } => "principled",
+        MaterialKind::Mirror { .. } => "mirror",
+        MaterialKind::Dielectric { .. } => "dielectric",
+        MaterialKind::ThinDielectric { .. } => "thin_dielectric",
         MaterialKind::Measured { .. } => "measured",
     };
     let mut triangle_counts = vec![0_u64; scene.materials.len()];

@@ -270,6 +270,37 @@ fn model(
                 alpha.sqrt()
             )
         }
+        MaterialKind::Principled { base_color, metallic, roughness, .. } => {
+            warn_of_masking(roughness * roughness, "principled");
+            warnings.push(format!(
+                "{label}: Mitsuba's principled differs from glTF's: its diffuse part is Disney's"
+            ));
+            format!(
+                "        <bsdf type=\"principled\">\n{}            \
+                 <float name=\"metallic\" value=\"{metallic}\"/>\n            \
+                 <float name=\"roughness\" value=\"{roughness}\"/>\n        </bsdf>\n",
+                colour("base_color", *base_color)
+            )
+        }
+        MaterialKind::Mirror { reflectance } => {
+            let reflectance = colour("specular_reflectance", *reflectance);
+            format!(
+                "        <bsdf type=\"conductor\">\n            \
+                 <string name=\"material\" value=\"none\"/>\n{reflectance}        </bsdf>\n"
+            )
+        }
+        MaterialKind::Dielectric { ior, alpha, reflectance, transmittance } => {
+            let opening = if *alpha > 0.0 {
+                rough("roughdielectric", *alpha)
+            } else {
+                "        <bsdf type=\"dielectric\">\n".to_owned()
+            };
+            opening + &glass(*ior, *reflectance, *transmittance)
+        }
+        MaterialKind::ThinDielectric { ior, reflectance, transmittance } => {
+            "        <bsdf type=\"thindielectric\">\n".to_owned()
+                + &glass(*ior, *reflectance, *transmittance)
+        }
         MaterialKind::Measured { path, .. } => {
             let share = reflected_share().clamp(Vec3::ZERO, Vec3::ONE);
             warnings.push(format!(
@@ -281,6 +312,16 @@ fn model(
             diffuse(share)
         }
     }
+}
+
+/// Parameters of a dielectric in air, and the end of its element.
+fn glass(ior: f32, reflectance: Vec3, transmittance: Vec3) -> String {
+    format!(
+        "            <float name=\"int_ior\" value=\"{ior}\"/>\n            \
+         <float name=\"ext_ior\" value=\"1\"/>\n{}{}        </bsdf>\n",
+        colour("specular_reflectance", reflectance),
+        colour("specular_transmittance", transmittance)
+    )
 }
 
 fn diffuse(reflectance: Vec3) -> String {

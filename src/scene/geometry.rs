@@ -13,6 +13,14 @@ pub struct Geometry {
     /// Unit vertex normals, for shading only; as long as `positions`. A zero vector marks a vertex
     /// without a normal: its triangles are flat-shaded.
     pub normals: Vec<[f32; 3]>,
+    /// Two sets of texture coordinates; each as long as `positions`, or empty.
+    pub uvs: [Vec<[f32; 2]>; 2],
+    /// Unit tangents along u of the first set, and the sign of the bitangent; as long as
+    /// `positions`, or empty. A zero vector marks a vertex without: the triangle's coordinates give
+    /// its tangent.
+    pub tangents: Vec<[f32; 4]>,
+    /// Linear Rec.709 colours and opacities of vertices, 0…1; as long as `positions`, or empty.
+    pub colors: Vec<[f32; 4]>,
     /// Three vertex indices per triangle, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
     /// Material index per triangle.
@@ -77,6 +85,21 @@ impl Geometry {
                 transform.normal(normal)
             }));
         }
+        let count = self.positions.len();
+        for (uvs, own) in self.uvs.iter_mut().zip(&mesh.uvs) {
+            extend(uvs, own, first_vertex as usize, count, [0.0; 2], |&uv| finite_or(uv, [0.0; 2]));
+        }
+        extend(
+            &mut self.tangents,
+            &mesh.tangents,
+            first_vertex as usize,
+            count,
+            [0.0; 4],
+            |&tangent| transform.tangent(tangent),
+        );
+        extend(&mut self.colors, &mesh.colors, first_vertex as usize, count, [1.0; 4], |&color| {
+            finite_or(color, [1.0; 4]).map(|channel| channel.clamp(0.0, 1.0))
+        });
         for (index, &triangle) in mesh.triangles.iter().enumerate() {
             let [a, b, c] = triangle.map(|corner| first_vertex + corner);
             let corners = [a, b, c].map(|corner| self.positions[corner as usize]);
@@ -96,6 +119,28 @@ impl Geometry {
         }
         dropped
     }
+}
+
+/// Appends an attribute of vertices to an array that stays empty until a mesh has the attribute.
+fn extend<T: Clone>(
+    all: &mut Vec<T>,
+    own: &[T],
+    first_vertex: usize,
+    count: usize,
+    absent: T,
+    place: impl Fn(&T) -> T,
+) {
+    if !own.is_empty() {
+        all.resize(first_vertex, absent.clone());
+        all.extend(own.iter().map(place));
+    }
+    if !all.is_empty() {
+        all.resize(count, absent);
+    }
+}
+
+fn finite_or<const N: usize>(vector: [f32; N], otherwise: [f32; N]) -> [f32; N] {
+    if vector.iter().all(|component| component.is_finite()) { vector } else { otherwise }
 }
 
 fn is_finite(vector: [f32; 3]) -> bool {

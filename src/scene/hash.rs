@@ -5,8 +5,10 @@ use sha2::{Digest, Sha256};
 
 use super::{Filter, Scene};
 use crate::{
-    brdf::material::{ConductorFresnel, MaterialKind},
+    brdf::material::{ConductorFresnel, MaterialKind, Surface},
     files::hexadecimal,
+    scene::lamp::LampKind,
+    texture::{Texels, TextureUse},
 };
 
 /// Hashes camera, film, environment, materials and geometry; lower-case hexadecimal.
@@ -33,6 +35,26 @@ pub fn hash(scene: &Scene) -> String {
     hasher.array(bytemuck::cast_slice(&geometry.normals));
     hasher.array(bytemuck::cast_slice(&geometry.triangles));
     hasher.array(bytemuck::cast_slice(&geometry.materials));
+    // These enter only where they are there, tagged, so that scenes without keep their hashes.
+    for (index, material) in scene.materials.iter().enumerate() {
+        if material.surface != Surface::default() {
+            hasher.length(index);
+            hasher.surface(&material.surface);
+        }
+    }
+    let attributes: [&[u8]; 4] = [
+        bytemuck::cast_slice(&geometry.uvs[0]),
+        bytemuck::cast_slice(&geometry.uvs[1]),
+        bytemuck::cast_slice(&geometry.tangents),
+        bytemuck::cast_slice(&geometry.colors),
+    ];
+    for (tag, bytes) in attributes.into_iter().enumerate().filter(|(_, bytes)| !bytes.is_empty()) {
+        hasher.length(tag);
+        hasher.array(bytes);
+    }
+    for lamp in &scene.lamps {
+        hasher.lamp(&lamp.kind);
+    }
     hasher.finish()
 }
 
@@ -110,9 +132,99 @@ impl Hasher {
                 self.floats(&[*alpha]);
                 self.vectors(&[*eta, *k]);
             }
+            MaterialKind::Principled {
+                base_color,
+                metallic,
+                roughness,
+                ior,
+                specular,
+                specular_color,
+            } => {
+                self.integers(&[5]);
+                self.vectors(&[*base_color, *specular_color]);
+                self.floats(&[*metallic, *roughness, *ior, *specular]);
+            }
+            MaterialKind::Mirror { reflectance } => {
+                self.integers(&[6]);
+                self.vectors(&[*reflectance]);
+            }
+            MaterialKind::Dielectric { ior, alpha, reflectance, transmittance } => {
+                self.integers(&[7]);
+                self.floats(&[*ior, *alpha]);
+                self.vectors(&[*reflectance, *transmittance]);
+            }
+            MaterialKind::ThinDielectric { ior, reflectance, transmittance } => {
+                self.integers(&[8]);
+                self.floats(&[*ior]);
+                self.vectors(&[*reflectance, *transmittance]);
+            }
             MaterialKind::Measured { table, .. } => {
                 self.integers(&[4]);
                 self.integers(table.words());
+            }
+        }
+    }
+
+    fn surface(&mut self, surface: &Surface) {
+        let emission = surface.emission.as_ref();
+        let uses = [
+            &surface.color,
+            &surface.roughness,
+            &surface.metallic,
+            &surface.normal,
+            &surface.opacity.texture,
+            emission.map_or(&None, |emission| &emission.texture),
+        ];
+        for texture in uses {
+            self.texture(texture.as_ref());
+        }
+        let cutoff = surface.opacity.cutoff.unwrap_or(-1.0);
+        self.floats(&[surface.normal_scale, surface.opacity.factor, cutoff]);
+        self.integers(&[u32::from(surface.vertex_color), u32::from(surface.two_sided)]);
+        if let Some(emission) = emission {
+            self.vectors(&[emission.radiance]);
+            self.integers(&[u32::from(emission.two_sided)]);
+        }
+    }
+
+    fn texture(&mut self, texture: Option<&TextureUse>) {
+        let Some(used) = texture else {
+            self.length(0);
+            return;
+        };
+        let image = &used.texture;
+        self.integers(&[image.width, image.height, used.channels as u32, used.encoding as u32]);
+        self.integers(&[used.uv_set, used.wrap[0] as u32, used.wrap[1] as u32]);
+        self.integers(&[used.interpolation as u32]);
+        self.floats(used.image_from_uv.as_flattened());
+        self.floats(&[used.scale, used.bias].concat());
+        match &image.texels {
+            Texels::Bytes(texels) => self.array(texels.as_flattened()),
+            Texels::Halves(texels) => self.array(bytemuck::cast_slice(texels)),
+        }
+    }
+
+    fn lamp(&mut self, lamp: &LampKind) {
+        match *lamp {
+            LampKind::Point { position, intensity } => {
+                self.integers(&[0]);
+                self.vectors(&[position, intensity]);
+            }
+            LampKind::Spot {
+                position,
+                direction,
+                intensity,
+                inner_angle_rad,
+                outer_angle_rad,
+                falloff,
+            } => {
+                self.integers(&[1, falloff as u32]);
+                self.vectors(&[position, direction, intensity]);
+                self.floats(&[inner_angle_rad, outer_angle_rad]);
+            }
+            LampKind::Directional { direction, irradiance } => {
+                self.integers(&[2]);
+                self.vectors(&[direction, irradiance]);
             }
         }
     }

@@ -6,6 +6,7 @@ pub mod features;
 pub mod file;
 pub mod geometry;
 mod hash;
+pub mod lamp;
 pub mod load;
 pub mod mesh;
 pub mod shapes;
@@ -21,6 +22,7 @@ pub use camera::Camera;
 pub use environment::EnvironmentMap;
 pub use geometry::Geometry;
 pub use hash::{environment_hash, geometry_hash};
+pub use lamp::Lamp;
 
 /// Reconstruction filter, importance-sampled so that every sample belongs to one pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -63,6 +65,8 @@ pub struct Scene {
     pub film: FilmSettings,
     /// Light.
     pub environment: EnvironmentMap,
+    /// Lights without a surface.
+    pub lamps: Vec<Lamp>,
     /// Materials; [`Geometry::materials`] indexes them. Never empty.
     pub materials: Vec<Material>,
     /// All triangles, in world space.

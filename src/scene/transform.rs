@@ -1,6 +1,6 @@
 //! Placement of an object: scale, then rotations about X, Y and Z, then a translation.
 
-use glam::{DMat3, DVec3, Mat3, Vec3};
+use glam::{DMat3, DMat4, DVec3, Mat3, Vec3};
 
 /// `world = Rz·Ry·Rx·scale · object + translate`, with the matrix for normals.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +38,23 @@ impl Transform {
         }
     }
 
+    /// Takes an affine matrix; none if it is not finite or flattens objects.
+    pub fn from_matrix(matrix: DMat4) -> Option<Self> {
+        let linear = DMat3::from_mat4(matrix);
+        let determinant = linear.determinant();
+        let inverse = linear.inverse();
+        let size = inverse.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
+        if !matrix.is_finite() || determinant == 0.0 || !size.is_finite() || size == 0.0 {
+            return None;
+        }
+        Some(Self {
+            linear: linear.as_mat3(),
+            translate: matrix.w_axis.truncate().as_vec3(),
+            normal: (inverse.transpose() * size.recip()).as_mat3(),
+            mirrors: determinant < 0.0,
+        })
+    }
+
     /// Transforms a position from object space to world space.
     pub fn position(&self, position: [f32; 3]) -> [f32; 3] {
         (self.linear * Vec3::from_array(position) + self.translate).to_array()
@@ -47,6 +64,13 @@ impl Transform {
     pub fn normal(&self, normal: [f32; 3]) -> [f32; 3] {
         let normal = self.normal * Vec3::from_array(normal).normalize_or_zero();
         normal.normalize_or_zero().to_array()
+    }
+
+    /// Transforms a tangent and the sign of its bitangent; a zero vector if it has no direction.
+    pub fn tangent(&self, [x, y, z, sign]: [f32; 4]) -> [f32; 4] {
+        let tangent = self.linear * Vec3::new(x, y, z).normalize_or_zero();
+        let sign = if self.mirrors { -sign } else { sign };
+        tangent.normalize_or_zero().extend(sign).to_array()
     }
 }
 
@@ -95,6 +119,19 @@ mod tests {
         assert!(world_tangent.normalize().dot(world_normal).abs() < 1e-6);
         assert!((world_normal.length() - 1.0).abs() < 1e-6);
         assert!(transform.mirrors);
+    }
+
+    #[test]
+    fn a_matrix_gives_the_same_transform() {
+        let expected = Transform::new([4.0, 1.0, -0.5], [0.0, 90.0, 180.0], [1.0, 2.0, 3.0]);
+        let columns = expected.linear.as_dmat3();
+        let matrix = DMat4::from_mat3_translation(columns, expected.translate.as_dvec3());
+        let found = Transform::from_matrix(matrix).unwrap();
+        assert_eq!(found.position([1.0, 2.0, 3.0]), expected.position([1.0, 2.0, 3.0]));
+        let normal = [0.2, 0.3, 0.4];
+        assert!(close(found.normal(normal), expected.normal(normal)));
+        assert!(found.mirrors);
+        assert!(Transform::from_matrix(DMat4::ZERO).is_none());
     }
 
     #[test]

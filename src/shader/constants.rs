@@ -131,6 +131,14 @@ constants! {
     MATERIAL_CONDUCTOR = 2;
     /// Tabulated measurement.
     MATERIAL_MEASURED = 3;
+    /// Metallic-roughness material of glTF.
+    MATERIAL_PRINCIPLED = 4;
+    /// Perfect mirror.
+    MATERIAL_MIRROR = 5;
+    /// Interface to a solid dielectric.
+    MATERIAL_DIELECTRIC = 6;
+    /// Thin pane of a dielectric.
+    MATERIAL_THIN_DIELECTRIC = 7;
 
     // Tables of materials; offsets are in words from `Material::table_offset`.
     /// Intervals of the tables over the cosine 0…1 of a direction with the normal; one more node.

@@ -191,13 +191,17 @@ structs! {
         table_offset: uint,
         /// GGX width α.
         alpha: float,
-        /// Refractive index of a dielectric coat; for conductors 1 selects exact Fresnel, 0 Schlick.
+        /// Refractive index of a dielectric; for conductors 1 selects exact Fresnel, 0 Schlick;
+        /// share of metal in a principled material.
         ior: float,
-        /// Diffuse albedo, or reflectance at normal incidence of a Schlick conductor.
+        /// Diffuse albedo, base colour, factor of reflected light, or reflectance at normal incidence
+        /// of a Schlick conductor.
         reflectance: vec3,
-        /// Refractive index of a conductor.
+        /// Refractive index of a conductor, factor of light transmitted by a dielectric, or
+        /// reflectance of a principled dielectric at normal incidence.
         eta: vec3,
-        /// Extinction coefficient of a conductor.
+        /// Extinction coefficient of a conductor, or reflectance of a principled dielectric at
+        /// grazing incidence.
         k: vec3,
         /// Zero; pads the last of four texels of four words.
         reserved: vec3,

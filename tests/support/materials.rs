@@ -24,7 +24,7 @@ pub struct Case {
 }
 
 fn case(name: &str, lobe_width: f32, kind: MaterialKind) -> Case {
-    Case { material: Material { name: name.to_string(), kind }, lobe_width }
+    Case { material: Material::new(name, kind), lobe_width }
 }
 
 fn plastic(diffuse: Vec3, alpha: f32, ior: f32) -> MaterialKind {

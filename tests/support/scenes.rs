@@ -14,13 +14,13 @@ use glam::Vec3;
 
 /// Makes a diffuse material.
 pub fn diffuse(reflectance: Vec3) -> Material {
-    Material { name: "diffuse".into(), kind: MaterialKind::Diffuse { reflectance } }
+    Material::new("diffuse", MaterialKind::Diffuse { reflectance })
 }
 
 /// Makes a glossy coat over a blue base.
 pub fn plastic(alpha: f32) -> Material {
     let diffuse = Vec3::new(0.2, 0.3, 0.6);
-    Material { name: "plastic".into(), kind: MaterialKind::Plastic { diffuse, alpha, ior: 1.5 } }
+    Material::new("plastic", MaterialKind::Plastic { diffuse, alpha, ior: 1.5 })
 }
 
 /// Makes copper (Johnson & Christy 1972, refractive index near 630, 532 and 465 nm).
@@ -29,7 +29,7 @@ pub fn copper(alpha: f32) -> Material {
         eta: Vec3::new(0.27, 1.03, 1.17),
         k: Vec3::new(3.41, 2.58, 2.42),
     };
-    Material { name: "copper".into(), kind: MaterialKind::Conductor { alpha, fresnel } }
+    Material::new("copper", MaterialKind::Conductor { alpha, fresnel })
 }
 
 /// Makes a camera that looks from `position` to `look_at`.
@@ -58,6 +58,7 @@ fn scene(
         camera,
         film: FilmSettings { width: size[0], height: size[1], filter: Filter::Box },
         environment,
+        lamps: Vec::new(),
         materials,
         geometry,
         inputs: Vec::new(),

@@ -85,7 +85,7 @@ pub fn material(text: &str) -> Result<Source> {
         let table = MeasuredTable::load(path)?;
         warn(&table.warnings);
         let kind = MaterialKind::Measured { path: path.to_path_buf(), table: table.into() };
-        let tables = MaterialTables::new(&[Material { name: stem(path), kind }])?;
+        let tables = MaterialTables::new(&[Material::new(stem(path), kind)])?;
         return Ok(Source { name: stem(path), tables });
     }
     Err(Error::usage(format!(

@@ -141,10 +141,7 @@ fn refuse_other_formats(path: &Path) -> Result<()> {
 
 /// Material of a scene that has nothing but an environment.
 fn default_material() -> Material {
-    Material {
-        name: "default".to_owned(),
-        kind: MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) },
-    }
+    Material::new("default", MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) })
 }
 
 struct Loader<'a> {
@@ -173,6 +170,7 @@ impl<'a> Loader<'a> {
             camera,
             film,
             environment,
+            lamps: Vec::new(),
             materials,
             geometry,
             inputs: vec![self.path.to_path_buf()],
@@ -305,7 +303,7 @@ impl<'a> Loader<'a> {
                     .error(format!("{label}: the name is taken by the material of line {first}")));
             }
             let kind = self.material_kind(&label, &entry.kind, &mut tables)?;
-            materials.push(Material { name: entry.name.clone(), kind });
+            materials.push(Material::new(&entry.name, kind));
         }
         for (path, table) in &tables {
             let named = |warning: &String| format!("{}: {warning}", path.display());

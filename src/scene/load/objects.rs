@@ -186,9 +186,12 @@ impl Loader<'_> {
                      to every triangle"
                 )
             })?;
-            materials.extend(mesh.materials.iter().map(|material| Material {
-                name: format!("{}/{}", object.name.as_deref().unwrap_or("mesh"), material.name),
-                kind: MaterialKind::Diffuse { reflectance: Vec3::from_array(material.base_color) },
+            materials.extend(mesh.materials.iter().map(|material| {
+                let reflectance = Vec3::from_array(material.base_color);
+                Material::new(
+                    format!("{}/{}", object.name.as_deref().unwrap_or("mesh"), material.name),
+                    MaterialKind::Diffuse { reflectance },
+                )
             }));
             geometry.append(mesh, &transform, |triangle| {
                 let run = mesh.runs.partition_point(|run| run.first_triangle <= triangle) - 1;

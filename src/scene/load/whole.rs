@@ -125,7 +125,7 @@ impl Loader<'_> {
                 let reflectance = Vec3::ONE;
                 let fresnel = ConductorFresnel::Schlick { reflectance };
                 let kind = MaterialKind::Conductor { alpha: 1.0, fresnel };
-                Material { name: "default".to_owned(), kind }
+                Material::new("default", kind)
             });
         }
         let mut geometry = Geometry::default();
@@ -218,7 +218,7 @@ fn material((index, material): (usize, &MeshMaterial)) -> Material {
         "" => format!("material {index}"),
         name => name.to_owned(),
     };
-    Material { name, kind }
+    Material::new(name, kind)
 }
 
 /// Checks that a mesh file is one that [`Loader::whole`] reads.

@@ -27,6 +27,13 @@ pub struct Mesh {
     /// Vertex normals of any length, zero where there is none; as long as `positions`, or empty if
     /// the mesh has no normals at all.
     pub normals: Vec<[f32; 3]>,
+    /// Two sets of texture coordinates, each as long as `positions` or empty.
+    pub uvs: [Vec<[f32; 2]>; 2],
+    /// Tangents along u of the first set, and the sign of the bitangent; as long as `positions` or
+    /// empty.
+    pub tangents: Vec<[f32; 4]>,
+    /// Linear Rec.709 colours and opacities, 0…1; as long as `positions` or empty.
+    pub colors: Vec<[f32; 4]>,
     /// Three vertex indices per triangle, counter-clockwise seen from outside; all in range.
     pub triangles: Vec<[u32; 3]>,
     /// Runs of triangles of one material, in order from triangle 0; empty if the file has no materials.
