@@ -28,6 +28,18 @@ constants! {
     /// Finished lanes of a subgroup at which they take their next rays.
     CONSTANT_REFILL_LANES = 3;
 
+    // Specialization constants of the passes that read textures.
+    /// Number of pages of texels in use.
+    CONSTANT_TEXTURE_PAGES = 4;
+    /// Base-2 logarithm of the words per page of texels.
+    CONSTANT_TEXTURE_PAGE_SHIFT = 5;
+    /// Number of pages of triangle attributes in use.
+    CONSTANT_ATTRIBUTE_PAGES = 6;
+    /// Base-2 logarithm of the words per page of triangle attributes.
+    CONSTANT_ATTRIBUTE_PAGE_SHIFT = 7;
+    /// Bits `ATTRIBUTE_…` of the attributes that triangles have; 0 if the scene needs none.
+    CONSTANT_ATTRIBUTES = 8;
+
     // Specialization constants of the sampling and bounce passes.
     /// Sampler of `sample` or `sample_lobes`, `SAMPLER_…`.
     CONSTANT_SAMPLER = 16;
@@ -139,6 +151,54 @@ constants! {
     MATERIAL_DIELECTRIC = 6;
     /// Thin pane of a dielectric.
     MATERIAL_THIN_DIELECTRIC = 7;
+
+    // Textures.
+    /// Index of no texture.
+    NO_TEXTURE = 0xffff_ffff;
+    /// Mask of the format in `TextureUse::flags`, `TEXTURE_BYTES` to `TEXTURE_HALVES`.
+    TEXTURE_FORMAT_MASK = 3;
+    /// A word a texel: four numbers of 8 bits, 255 for one.
+    TEXTURE_BYTES = 0;
+    /// Two words a texel: four numbers of 16 bits, 65,535 for one.
+    TEXTURE_SHORTS = 1;
+    /// Two words a texel: four halves.
+    TEXTURE_HALVES = 2;
+    /// Flag of colours that follow IEC 61966-2-1.
+    TEXTURE_SRGB = 4;
+    /// Flag of a texture without interpolation.
+    TEXTURE_NEAREST = 8;
+    /// Flag of a texture on the second set of coordinates.
+    TEXTURE_SECOND_UVS = 16;
+    /// First bit of the continuation along u, two bits: `TEXTURE_REPEAT` to `TEXTURE_CLAMP`.
+    TEXTURE_WRAP_U_SHIFT = 5;
+    /// First bit of the continuation along v.
+    TEXTURE_WRAP_V_SHIFT = 7;
+    /// First bit of the channel, three bits: 0 for all, 1 to 4 for red, green, blue or opacity alone.
+    TEXTURE_CHANNEL_SHIFT = 9;
+    /// Repeats the image.
+    TEXTURE_REPEAT = 0;
+    /// Repeats the image, every second time mirrored.
+    TEXTURE_MIRROR = 1;
+    /// Repeats the texels of the edge.
+    TEXTURE_CLAMP = 2;
+
+    // Bits of `CONSTANT_ATTRIBUTES`, in the order in which a corner has them, two words each.
+    /// First set of texture coordinates: two floats.
+    ATTRIBUTE_FIRST_UVS = 1;
+    /// Second set: two floats.
+    ATTRIBUTE_SECOND_UVS = 2;
+    /// Tangent by the octahedral map, or `FLAT_NORMAL` for none; sign of the bitangent, a float.
+    ATTRIBUTE_TANGENT = 4;
+    /// Colour and opacity: four numbers of 16 bits.
+    ATTRIBUTE_COLOR = 8;
+
+    // Bits of `MaterialSurface::flags`.
+    /// Vertex colours are a factor of colour and opacity.
+    SURFACE_VERTEX_COLOR = 1;
+    /// The back reflects and transmits too.
+    SURFACE_TWO_SIDED = 2;
+    /// The back emits too.
+    SURFACE_EMISSION_TWO_SIDED = 4;
 
     // Tables of materials; offsets are in words from `Material::table_offset`.
     /// Intervals of the tables over the cosine 0…1 of a direction with the normal; one more node.

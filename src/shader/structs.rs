@@ -207,6 +207,55 @@ structs! {
         reserved: vec3,
     }
 
+    /// Texture as a property of a material reads it: value = scale · texel + bias.
+    struct TextureUse {
+        /// First word of its texels among those of all textures.
+        first_word: uint,
+        /// Width in texels.
+        width: uint,
+        /// Height in texels.
+        height: uint,
+        /// `TEXTURE_…`: format, encoding, interpolation, set of coordinates, continuation, channel.
+        flags: uint,
+        /// Image coordinate u, 0 to 1 from left to right, is the scalar product with (u, v, 1).
+        image_u: vec3,
+        /// Image coordinate v, 0 to 1 from top to bottom, likewise.
+        image_v: vec3,
+        /// Factor.
+        scale: vec3,
+        /// Added after the factor.
+        bias: vec3,
+    }
+
+    /// Properties of a material beside its reflection model; textures are indices of uses, or
+    /// `NO_TEXTURE`.
+    struct MaterialSurface {
+        /// Factor of the model's colour.
+        color: uint,
+        /// Factor of the roughness √α.
+        roughness: uint,
+        /// Factor of the metallic share.
+        metallic: uint,
+        /// Normals in the tangent frame.
+        normal: uint,
+        /// Factor of the opacity.
+        opacity: uint,
+        /// Factor of the emitted radiance.
+        emission: uint,
+        /// Factor of the tangential components of `normal`.
+        normal_scale: float,
+        /// Opacity without its texture.
+        opacity_factor: float,
+        /// Opacity from which the surface is opaque, and below which it is not there; −1 blends.
+        opacity_cutoff: float,
+        /// Emitted radiance without its texture, linear Rec.709; 0 without emission.
+        emission_radiance: vec3,
+        /// Bits `SURFACE_…`.
+        flags: uint,
+        /// Zero; pads the last of four texels of four words.
+        reserved: vec3,
+    }
+
     /// Push constants of the passes over a wave of paths. Path `i` belongs to sample `first_sample + i
     /// / pixel_count` of the pixel at `first_pixel + (i % pixel_count) · pixel_stride` in film order.
     struct Wave {
