@@ -4,7 +4,11 @@ use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
 use glam::Vec3;
 
-use super::geometry::{GeometryBuffers, triangle_page_bytes};
+use super::{
+    geometry::{GeometryBuffers, triangle_page_bytes},
+    lamps::LampTables,
+    surfaces::Surfaces,
+};
 use crate::{
     accel::Accel,
     brdf::MaterialTables,
@@ -14,7 +18,7 @@ use crate::{
     scene::{EnvironmentMap, Filter, Scene, environment::EnvironmentTables},
     shader::{
         bindings::{Binding, SCENE, scene as bindings},
-        structs::SceneParameters,
+        structs::{self, SceneParameters},
     },
 };
 
@@ -23,7 +27,7 @@ pub struct SceneBuffers {
     set: DescriptorSet,
     geometry: GeometryBuffers,
     buffers: Vec<Buffer>,
-    material_kinds: u32,
+    surfaces: Surfaces,
     window: Window,
     host_ms: BTreeMap<String, f64>,
 }
@@ -38,8 +42,9 @@ impl SceneBuffers {
         let bvh_ms = start.elapsed().as_secs_f64() * 1e3;
         let start = Instant::now();
         let geometry = GeometryBuffers::new(device, &accel)?;
+        let lamps = LampTables::new(scene, &accel);
         drop(accel);
-        let mut scene_buffers = Self::with_geometry(device, scene, window, geometry, start)?;
+        let mut scene_buffers = Self::with_geometry(device, scene, window, geometry, lamps, start)?;
         scene_buffers.host_ms.insert("bvh".to_owned(), bvh_ms);
         Ok(scene_buffers)
     }
@@ -53,7 +58,8 @@ impl SceneBuffers {
     ) -> Result<Self> {
         let start = Instant::now();
         let geometry = GeometryBuffers::new(device, accel)?;
-        Self::with_geometry(device, scene, window, geometry, start)
+        let lamps = LampTables::new(scene, accel);
+        Self::with_geometry(device, scene, window, geometry, lamps, start)
     }
 
     fn with_geometry(
@@ -61,6 +67,7 @@ impl SceneBuffers {
         scene: &Scene,
         window: Window,
         geometry: GeometryBuffers,
+        lamps: LampTables,
         start: Instant,
     ) -> Result<Self> {
         let mut host_ms = BTreeMap::new();
@@ -74,12 +81,16 @@ impl SceneBuffers {
         let tables = MaterialTables::new(&scene.materials)?;
         let material_kinds =
             tables.materials.iter().fold(0, |bits, material| bits | 1 << material.kind);
+        let surfaces = Surfaces::new(material_kinds, &scene.materials, lamps.choices.len() as u32);
         let materials = Buffer::from_slice(device, "materials", &tables.materials)?;
         let brdf_table = Buffer::texels_from_slice(device, "BRDF tables", &tables.words)?;
         drop(tables);
 
         let tables = EnvironmentTables::new(&scene.environment);
-        let parameters = parameters(scene, &scene.environment, tables.total, window);
+        let parameters = SceneParameters {
+            lamp_count: lamps.choices.len() as u32,
+            ..parameters(scene, &scene.environment, tables.total, window)
+        };
         add(bindings::PARAMETERS, Buffer::from_slice(device, "parameters", &[parameters])?);
         let map = &scene.environment;
         let texels: Vec<[f32; 4]> =
@@ -96,6 +107,13 @@ impl SceneBuffers {
             bindings::ENVIRONMENT_CELLS,
             Buffer::texels_from_slice(device, "environment cells", &tables.cells)?,
         );
+        let mut choices = lamps.choices;
+        let mut point_lamps = lamps.lamps;
+        // A buffer has at least one element.
+        choices.resize(choices.len().max(1), structs::LampChoice::default());
+        point_lamps.resize(point_lamps.len().max(1), structs::Lamp::default());
+        add(bindings::LAMP_CHOICES, Buffer::texels_from_slice(device, "lamp choices", &choices)?);
+        add(bindings::LAMPS, Buffer::from_slice(device, "lamps", &point_lamps)?);
         let mut bound: Vec<_> =
             places.into_iter().zip(&buffers).chain(geometry.bindings()).collect();
         bound.push((bindings::MATERIALS, &materials));
@@ -105,7 +123,7 @@ impl SceneBuffers {
         let set = DescriptorSet::new(device, &SCENE, &bound)?;
         buffers.extend([materials, brdf_table]);
         host_ms.insert("upload".to_owned(), start.elapsed().as_secs_f64() * 1e3);
-        Ok(Self { set, geometry, buffers, material_kinds, window, host_ms })
+        Ok(Self { set, geometry, buffers, surfaces, window, host_ms })
     }
 
     /// Descriptor set 0.
@@ -118,9 +136,9 @@ impl SceneBuffers {
         &self.geometry
     }
 
-    /// Bit `1 << kind` for every kind of material.
-    pub fn material_kinds(&self) -> u32 {
-        self.material_kinds
+    /// Specialization of passes by the surfaces of the scene.
+    pub fn surfaces(&self) -> Surfaces {
+        self.surfaces
     }
 
     /// Part of the film that the parameters describe.
@@ -176,5 +194,6 @@ fn parameters(
         environment_cos_rotation: map.rotation_rad.cos(),
         environment_sin_rotation: map.rotation_rad.sin(),
         environment_total,
+        lamp_count: 0,
     }
 }

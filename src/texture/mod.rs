@@ -1,6 +1,7 @@
 //! Images on surfaces: texels, and how a material reads them.
 
 mod decode;
+mod mean;
 
 use std::sync::Arc;
 
