@@ -11,6 +11,7 @@ pub mod runner;
 pub mod scene_buffers;
 pub mod steps;
 pub mod technique;
+pub mod texture_buffers;
 mod totals;
 pub mod wave_buffers;
 
@@ -22,5 +23,6 @@ pub use runner::Runner;
 pub use scene_buffers::SceneBuffers;
 pub use steps::{Passes, PathDemand, SHADOW_RAYS_PER_GROUP, Steps};
 pub use technique::{Progress, Report, Technique};
+pub use texture_buffers::{TextureAccess, TextureBuffers};
 pub use totals::Totals;
 pub use wave_buffers::WaveBuffers;

@@ -4,10 +4,13 @@ use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
 use glam::Vec3;
 
-use super::geometry::{GeometryBuffers, triangle_page_bytes};
+use super::{
+    geometry::{GeometryBuffers, triangle_page_bytes},
+    texture_buffers::TextureBuffers,
+};
 use crate::{
-    accel::Accel,
-    brdf::MaterialTables,
+    accel::{Accel, attributes::TriangleAttributes},
+    brdf::{MaterialTables, SurfaceTables},
     error::Result,
     film::Window,
     gpu::{Buffer, DescriptorSet, Device},
@@ -22,6 +25,7 @@ use crate::{
 pub struct SceneBuffers {
     set: DescriptorSet,
     geometry: GeometryBuffers,
+    textures: TextureBuffers,
     buffers: Vec<Buffer>,
     material_kinds: u32,
     window: Window,
@@ -37,9 +41,14 @@ impl SceneBuffers {
         let accel = Accel::build(&scene.geometry, triangle_page_bytes(device.capabilities()))?;
         let bvh_ms = start.elapsed().as_secs_f64() * 1e3;
         let start = Instant::now();
+        let surfaces = SurfaceTables::new(&scene.materials);
+        let attributes = TriangleAttributes::new(&scene.geometry, &accel, surfaces.attributes);
         let geometry = GeometryBuffers::new(device, &accel)?;
         drop(accel);
-        let mut scene_buffers = Self::with_geometry(device, scene, window, geometry, start)?;
+        let textures = TextureBuffers::new(device, &surfaces, &attributes)?;
+        drop(attributes);
+        let mut scene_buffers =
+            Self::with_geometry(device, scene, window, geometry, textures, start)?;
         scene_buffers.host_ms.insert("bvh".to_owned(), bvh_ms);
         Ok(scene_buffers)
     }
@@ -52,8 +61,11 @@ impl SceneBuffers {
         accel: &Accel,
     ) -> Result<Self> {
         let start = Instant::now();
+        let surfaces = SurfaceTables::new(&scene.materials);
+        let attributes = TriangleAttributes::new(&scene.geometry, accel, surfaces.attributes);
         let geometry = GeometryBuffers::new(device, accel)?;
-        Self::with_geometry(device, scene, window, geometry, start)
+        let textures = TextureBuffers::new(device, &surfaces, &attributes)?;
+        Self::with_geometry(device, scene, window, geometry, textures, start)
     }
 
     fn with_geometry(
@@ -61,6 +73,7 @@ impl SceneBuffers {
         scene: &Scene,
         window: Window,
         geometry: GeometryBuffers,
+        textures: TextureBuffers,
         start: Instant,
     ) -> Result<Self> {
         let mut host_ms = BTreeMap::new();
@@ -98,6 +111,7 @@ impl SceneBuffers {
         );
         let mut bound: Vec<_> =
             places.into_iter().zip(&buffers).chain(geometry.bindings()).collect();
+        bound.extend(textures.bindings());
         bound.push((bindings::MATERIALS, &materials));
         bound.push((bindings::MATERIAL_TEXELS, &materials));
         bound.push((bindings::BRDF_TABLE, &brdf_table));
@@ -105,7 +119,7 @@ impl SceneBuffers {
         let set = DescriptorSet::new(device, &SCENE, &bound)?;
         buffers.extend([materials, brdf_table]);
         host_ms.insert("upload".to_owned(), start.elapsed().as_secs_f64() * 1e3);
-        Ok(Self { set, geometry, buffers, material_kinds, window, host_ms })
+        Ok(Self { set, geometry, textures, buffers, material_kinds, window, host_ms })
     }
 
     /// Descriptor set 0.
@@ -116,6 +130,11 @@ impl SceneBuffers {
     /// Tree and triangles.
     pub fn geometry(&self) -> &GeometryBuffers {
         &self.geometry
+    }
+
+    /// Textures, surfaces and attributes of triangles.
+    pub fn textures(&self) -> &TextureBuffers {
+        &self.textures
     }
 
     /// Bit `1 << kind` for every kind of material.
@@ -138,6 +157,7 @@ impl SceneBuffers {
         self.buffers
             .iter()
             .chain(self.geometry.buffers())
+            .chain(self.textures.buffers())
             .map(|buffer| (buffer.name().to_owned(), buffer.size()))
             .collect()
     }
