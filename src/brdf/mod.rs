@@ -26,6 +26,7 @@ pub mod materials;
 pub mod merl;
 pub mod sanity;
 pub mod spectrum;
+pub mod surfaces;
 pub mod table;
 mod tabulate;
 pub mod twin;
@@ -34,6 +35,7 @@ use glam::Vec3;
 
 pub use material::Material;
 pub use materials::MaterialTables;
+pub use surfaces::SurfaceTables;
 pub use table::MeasuredTable;
 
 /// Value of a material (1/sr, without the cosine) and density of [`sample`].

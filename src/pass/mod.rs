@@ -13,6 +13,7 @@ pub mod scene_buffers;
 pub mod steps;
 pub mod surfaces;
 pub mod technique;
+pub mod texture_buffers;
 mod totals;
 pub mod wave_buffers;
 
@@ -25,5 +26,6 @@ pub use scene_buffers::SceneBuffers;
 pub use steps::{Passes, PathDemand, SHADOW_RAYS_PER_GROUP, Steps};
 pub use surfaces::Surfaces;
 pub use technique::{Progress, Report, Technique};
+pub use texture_buffers::{TextureAccess, TextureBuffers};
 pub use totals::Totals;
 pub use wave_buffers::WaveBuffers;

@@ -130,7 +130,7 @@ pub fn wave_order(
 
 /// The pass that continues paths by the BRDF's own sampling; `only_specular` ends all others.
 fn bounce(settings: &PassSettings, only_specular: bool) -> Kernel {
-    let mut constants = settings.surfaces.constants().to_vec();
+    let mut constants = settings.surfaces.constants();
     constants.push((CONSTANT_ROULETTE_VERTEX, settings.roulette_vertex));
     constants.push((CONSTANT_ONLY_SPECULAR, u32::from(only_specular)));
     Kernel::new("bounce", Domain::Paths, &constants)

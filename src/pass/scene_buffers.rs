@@ -7,11 +7,12 @@ use glam::Vec3;
 use super::{
     geometry::{GeometryBuffers, triangle_page_bytes},
     lamps::LampTables,
-    surfaces::Surfaces,
+    surfaces::{self, Surfaces},
+    texture_buffers::TextureBuffers,
 };
 use crate::{
-    accel::Accel,
-    brdf::MaterialTables,
+    accel::{Accel, attributes::TriangleAttributes},
+    brdf::{MaterialTables, SurfaceTables},
     error::Result,
     film::Window,
     gpu::{Buffer, DescriptorSet, Device},
@@ -26,6 +27,7 @@ use crate::{
 pub struct SceneBuffers {
     set: DescriptorSet,
     geometry: GeometryBuffers,
+    textures: TextureBuffers,
     buffers: Vec<Buffer>,
     surfaces: Surfaces,
     window: Window,
@@ -41,10 +43,9 @@ impl SceneBuffers {
         let accel = Accel::build(&scene.geometry, triangle_page_bytes(device.capabilities()))?;
         let bvh_ms = start.elapsed().as_secs_f64() * 1e3;
         let start = Instant::now();
-        let geometry = GeometryBuffers::new(device, &accel)?;
-        let lamps = LampTables::new(scene, &accel);
+        let parts = Parts::new(device, scene, &accel)?;
         drop(accel);
-        let mut scene_buffers = Self::with_geometry(device, scene, window, geometry, lamps, start)?;
+        let mut scene_buffers = Self::with_parts(device, scene, window, parts, start)?;
         scene_buffers.host_ms.insert("bvh".to_owned(), bvh_ms);
         Ok(scene_buffers)
     }
@@ -57,19 +58,18 @@ impl SceneBuffers {
         accel: &Accel,
     ) -> Result<Self> {
         let start = Instant::now();
-        let geometry = GeometryBuffers::new(device, accel)?;
-        let lamps = LampTables::new(scene, accel);
-        Self::with_geometry(device, scene, window, geometry, lamps, start)
+        let parts = Parts::new(device, scene, accel)?;
+        Self::with_parts(device, scene, window, parts, start)
     }
 
-    fn with_geometry(
+    fn with_parts(
         device: &Arc<Device>,
         scene: &Scene,
         window: Window,
-        geometry: GeometryBuffers,
-        lamps: LampTables,
+        parts: Parts,
         start: Instant,
     ) -> Result<Self> {
+        let Parts { geometry, textures, lamps } = parts;
         let mut host_ms = BTreeMap::new();
         let mut buffers = Vec::new();
         let mut places = Vec::new();
@@ -81,7 +81,12 @@ impl SceneBuffers {
         let tables = MaterialTables::new(&scene.materials)?;
         let material_kinds =
             tables.materials.iter().fold(0, |bits, material| bits | 1 << material.kind);
-        let surfaces = Surfaces::new(material_kinds, &scene.materials, lamps.choices.len() as u32);
+        let surfaces = Surfaces {
+            material_kinds,
+            features: surfaces::features(&scene.materials),
+            lamp_count: lamps.choices.len() as u32,
+            access: textures.access(),
+        };
         let materials = Buffer::from_slice(device, "materials", &tables.materials)?;
         let brdf_table = Buffer::texels_from_slice(device, "BRDF tables", &tables.words)?;
         drop(tables);
@@ -116,6 +121,7 @@ impl SceneBuffers {
         add(bindings::LAMPS, Buffer::from_slice(device, "lamps", &point_lamps)?);
         let mut bound: Vec<_> =
             places.into_iter().zip(&buffers).chain(geometry.bindings()).collect();
+        bound.extend(textures.bindings());
         bound.push((bindings::MATERIALS, &materials));
         bound.push((bindings::MATERIAL_TEXELS, &materials));
         bound.push((bindings::BRDF_TABLE, &brdf_table));
@@ -123,7 +129,7 @@ impl SceneBuffers {
         let set = DescriptorSet::new(device, &SCENE, &bound)?;
         buffers.extend([materials, brdf_table]);
         host_ms.insert("upload".to_owned(), start.elapsed().as_secs_f64() * 1e3);
-        Ok(Self { set, geometry, buffers, surfaces, window, host_ms })
+        Ok(Self { set, geometry, textures, buffers, surfaces, window, host_ms })
     }
 
     /// Descriptor set 0.
@@ -134,6 +140,11 @@ impl SceneBuffers {
     /// Tree and triangles.
     pub fn geometry(&self) -> &GeometryBuffers {
         &self.geometry
+    }
+
+    /// Textures, surfaces and attributes of triangles.
+    pub fn textures(&self) -> &TextureBuffers {
+        &self.textures
     }
 
     /// Specialization of passes by the surfaces of the scene.
@@ -156,6 +167,7 @@ impl SceneBuffers {
         self.buffers
             .iter()
             .chain(self.geometry.buffers())
+            .chain(self.textures.buffers())
             .map(|buffer| (buffer.name().to_owned(), buffer.size()))
             .collect()
     }
@@ -195,5 +207,25 @@ fn parameters(
         environment_sin_rotation: map.rotation_rad.sin(),
         environment_total,
         lamp_count: 0,
+    }
+}
+
+/// Parts of a scene that need its triangles in BVH order.
+struct Parts {
+    geometry: GeometryBuffers,
+    textures: TextureBuffers,
+    lamps: LampTables,
+}
+
+impl Parts {
+    fn new(device: &Arc<Device>, scene: &Scene, accel: &Accel) -> Result<Self> {
+        let mut surfaces = SurfaceTables::new(&scene.materials);
+        let lamps = LampTables::new(scene, accel);
+        for (surface, density) in surfaces.surfaces.iter_mut().zip(&lamps.emission_densities) {
+            surface.emission_density = *density;
+        }
+        let attributes = TriangleAttributes::new(&scene.geometry, accel, surfaces.attributes);
+        let textures = TextureBuffers::new(device, &surfaces, &attributes)?;
+        Ok(Self { geometry: GeometryBuffers::new(device, accel)?, textures, lamps })
     }
 }

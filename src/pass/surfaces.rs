@@ -1,5 +1,6 @@
 //! Specialization of passes by what the surfaces of a scene need.
 
+use super::texture_buffers::TextureAccess;
 use crate::{
     brdf::{Material, material::MaterialKind},
     shader::constants::{
@@ -17,18 +18,16 @@ pub struct Surfaces {
     pub features: u32,
     /// Columns of the alias table over lamps and emitting triangles.
     pub lamp_count: u32,
+    /// Access to textures and to attributes of triangles.
+    pub access: TextureAccess,
 }
 
 impl Surfaces {
-    /// Collects the features of `materials`; `material_kinds` has a bit for every kind.
-    pub fn new(material_kinds: u32, materials: &[Material], lamp_count: u32) -> Self {
-        let features = materials.iter().fold(0, |bits, material| bits | features(material));
-        Self { material_kinds, features, lamp_count }
-    }
-
     /// Specialization constants of a pass over surfaces.
-    pub fn constants(&self) -> [(u32, u32); 2] {
-        [(CONSTANT_MATERIAL_KINDS, self.material_kinds), (CONSTANT_SURFACES, self.features)]
+    pub fn constants(&self) -> Vec<(u32, u32)> {
+        let own =
+            [(CONSTANT_MATERIAL_KINDS, self.material_kinds), (CONSTANT_SURFACES, self.features)];
+        [&own[..], &self.access.constants()].concat()
     }
 
     /// True if textures or vertex colours vary a material.
@@ -47,7 +46,12 @@ impl Surfaces {
     }
 }
 
-fn features(material: &Material) -> u32 {
+/// Bits `SURFACES_…` of what `materials` need.
+pub fn features(materials: &[Material]) -> u32 {
+    materials.iter().fold(0, |bits, material| bits | features_of(material))
+}
+
+fn features_of(material: &Material) -> u32 {
     let surface = &material.surface;
     let is_pane = matches!(material.kind, MaterialKind::ThinDielectric { .. });
     let is_specular = is_pane

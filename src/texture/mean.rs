@@ -1,7 +1,7 @@
 //! Mean of a texture over its image.
 
-use super::{Channels, Encoding, Texels, TextureUse};
-use crate::math::colour::{luminance, srgb_to_linear};
+use super::{Channels, Encoding, Texels, TextureUse, lookup::srgb_to_linear};
+use crate::math::colour::luminance;
 
 impl TextureUse {
     /// Mean value over the image, by channel. Where a surface shows the image in part or more than
@@ -21,6 +21,16 @@ impl TextureUse {
                 };
                 for &[r, g, b, a] in texels {
                     add([decode(r), decode(g), decode(b), f32::from(a) / 255.0]);
+                }
+                texels.len()
+            }
+            Texels::Shorts(texels) => {
+                let decode = |short: u16| match self.encoding {
+                    Encoding::Srgb => srgb_to_linear(f32::from(short) / 65535.0),
+                    Encoding::Linear => f32::from(short) / 65535.0,
+                };
+                for &[r, g, b, a] in texels {
+                    add([decode(r), decode(g), decode(b), f32::from(a) / 65535.0]);
                 }
                 texels.len()
             }
