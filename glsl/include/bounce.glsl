@@ -78,8 +78,15 @@ bool follow_specular(uint path, PathIndex index, Hit hit, uint number, uint seed
     vec3 u = vec3(
         random_2d(index.pixel, number, dimension + DIMENSION_BOUNCE, seed),
         random_1d(index.pixel, number, dimension + DIMENSION_BOUNCE_LOBE, seed));
-    Scatter scattered =
-        scatter(material, to_local(frame, outgoing), is_back(hit.triangle, -outgoing), u);
+    vec3 outgoing_local = to_local(frame, outgoing);
+    Scatter scattered;
+    if (is_kind(material, MATERIAL_THIN_DIELECTRIC)) {
+        // trace.comp has let the rest through, and weighed the path by what a pane reflects.
+        scattered =
+            Scatter(vec3(-outgoing_local.xy, outgoing_local.z), vec3(1.0), false);
+    } else {
+        scattered = scatter(material, outgoing_local, is_back(hit.triangle, -outgoing), u);
+    }
     vec3 direction = to_world(frame, scattered.direction_local);
     bool is_behind = dot(direction, hit.geometric_normal) < 0.0;
     // A shading normal may send light through an opaque surface, or reflect it from a clear one.

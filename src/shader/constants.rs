@@ -242,10 +242,16 @@ constants! {
     BRDF_COSINE_INTERVALS = 64;
     /// Nodes of such a table.
     BRDF_COSINE_NODES = BRDF_COSINE_INTERVALS + 1;
-    /// Transmission of a plastic; the albedo is at 0.
-    PLASTIC_TRANSMISSION_OFFSET = 3 * BRDF_COSINE_NODES;
+    /// Transmission of a plastic; the albedo of the coat is at 0.
+    PLASTIC_TRANSMISSION_OFFSET = BRDF_COSINE_NODES;
     /// Probability of sampling a plastic's coat.
     PLASTIC_SPECULAR_SHARE_OFFSET = PLASTIC_TRANSMISSION_OFFSET + BRDF_COSINE_NODES;
+    /// Intervals in the roughness √α of the albedo of all GGX surfaces with a Schlick reflectance.
+    GGX_ROUGHNESS_INTERVALS = 16;
+    /// Words of one roughness: factors of the reflectance at normal and at grazing incidence, by cosine.
+    GGX_ROUGHNESS_WORDS = 2 * BRDF_COSINE_NODES;
+    /// Mean rise of Schlick's reflectance over a diffuse base, by cosine; the albedo of GGX is at 0.
+    DIFFUSE_RISE_OFFSET = (GGX_ROUGHNESS_INTERVALS + 1) * GGX_ROUGHNESS_WORDS;
     /// Bins of the measured grid in θ_h; the edge of bin k is at (k/90)²·90°.
     MEASURED_THETA_HALF_BINS = 90;
     /// Bins of the measured grid in θ_d, of equal width.
