@@ -10,7 +10,7 @@
 #include "parameters.glsl"
 #include "random.glsl"
 
-TEXELS(lamp_choices)
+READS(lamp_choices)
 READS(lamps)
 
 struct LampSample {
@@ -86,17 +86,16 @@ LampSample sample_triangle_lamp(uint triangle, float probability, vec3 position,
 LampSample sample_lamp(vec3 position, uvec2 bits, vec2 u) {
     // Rounding of the product favours no column by more than lamp_count / 2^32.
     uint column = scaled(bits.x, parameters.lamp_count);
-    uvec4 choice = texelFetch(lamp_choices, int(column));
-    if (bits.y >= choice.x) {
-        choice = texelFetch(lamp_choices, int(choice.y));
+    LampChoice choice = lamp_choices[column];
+    if (bits.y >= choice.threshold) {
+        choice = lamp_choices[choice.alias];
     }
-    float probability = uintBitsToFloat(choice.w);
     LampSample sampled;
-    if ((choice.z & LAMP_BIT) != 0u) {
-        sampled = sample_point_lamp(lamps[choice.z & ~LAMP_BIT], position);
-        sampled.radiance_over_pdf /= probability;
+    if ((choice.source & LAMP_BIT) != 0u) {
+        sampled = sample_point_lamp(lamps[choice.source & ~LAMP_BIT], position);
+        sampled.radiance_over_pdf /= choice.probability;
     } else {
-        sampled = sample_triangle_lamp(choice.z, probability, position, u);
+        sampled = sample_triangle_lamp(choice.source, choice.probability, position, u);
     }
     return sampled;
 }

@@ -117,7 +117,7 @@ impl SceneBuffers {
         // A buffer has at least one element.
         choices.resize(choices.len().max(1), structs::LampChoice::default());
         point_lamps.resize(point_lamps.len().max(1), structs::Lamp::default());
-        add(bindings::LAMP_CHOICES, Buffer::texels_from_slice(device, "lamp choices", &choices)?);
+        add(bindings::LAMP_CHOICES, Buffer::from_slice(device, "lamp choices", &choices)?);
         add(bindings::LAMPS, Buffer::from_slice(device, "lamps", &point_lamps)?);
         let mut bound: Vec<_> =
             places.into_iter().zip(&buffers).chain(geometry.bindings()).collect();

@@ -152,8 +152,8 @@ binding_tables! {
         12 ENVIRONMENT_CELLS: texels R32Float;
         /// Materials again, four texels each.
         13 MATERIAL_TEXELS: texels Rgba32Uint;
-        /// Alias table over lamps and emitting triangles, a `LampChoice` each.
-        14 LAMP_CHOICES: texels Rgba32Uint;
+        /// Alias table over lamps and emitting triangles.
+        14 LAMP_CHOICES: array LampChoice;
         /// Lights without a surface.
         15 LAMPS: array Lamp;
         /// First page of the texels of all textures: a word a texel of bytes, two words a deeper one.

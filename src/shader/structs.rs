@@ -167,7 +167,7 @@ structs! {
         outer: float,
     }
 
-    /// Column of the alias table over lamps and emitting triangles: one texel.
+    /// Column of the alias table over lamps and emitting triangles.
     struct LampChoice {
         /// The column keeps `source` if a number of 32 bits is below this.
         threshold: uint,
