@@ -1,6 +1,7 @@
 // Tests the visibility of the light along every shadow ray of the wave: shadow_rays, hits ->
-// visibility. Surfaces that are not opaque, and thin panes, dim the ray's contribution. Ray direction_index · path_count + path_index starts at hit path_index: neighbouring
-// invocations work on neighbouring paths. As in trace.comp, one traversal loop takes several rays.
+// visibility. Surfaces that are not opaque, and thin panes, dim the ray's contribution. Ray
+// direction_index · path_count + path_index starts at hit path_index: neighbouring invocations work
+// on neighbouring paths. As in trace.comp, one traversal loop takes several rays.
 #version 460
 #extension GL_KHR_shader_subgroup_ballot : require
 

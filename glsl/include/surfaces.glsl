@@ -1,4 +1,4 @@
-// What the surfaces of the scene need, by specialization, and what a hit tells of its material.
+// Specialization of passes by the kinds and properties of the surfaces in the scene.
 
 #ifndef SURFACES_GLSL
 #define SURFACES_GLSL

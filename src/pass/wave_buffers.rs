@@ -34,7 +34,8 @@ pub struct WaveBuffers {
 
 impl WaveBuffers {
     /// Allocates waves over a film of `padded_pixels` with up to `shadow_rays` rays per hit at a time,
-    /// and no more paths than `demand` allows; surfaces only if `is_textured`. Fails if the device does or its limits are exceeded.
+    /// and no more paths than `demand` allows; surfaces only if `is_textured`. Fails if the device does
+    /// or its limits are exceeded.
     pub fn new(
         device: &Arc<Device>,
         padded_pixels: u32,
