@@ -6,11 +6,11 @@ use half::f16;
 
 use crate::shader::{
     constants::{
-        LUMINANCE_WEIGHTS, NO_TEXTURE, TEXTURE_BYTES, TEXTURE_CHANNEL_SHIFT, TEXTURE_FORMAT_MASK,
-        TEXTURE_MIRROR, TEXTURE_NEAREST, TEXTURE_REPEAT, TEXTURE_SECOND_UVS, TEXTURE_SHORTS,
-        TEXTURE_SRGB, TEXTURE_WRAP_U_SHIFT, TEXTURE_WRAP_V_SHIFT,
+        LUMINANCE_WEIGHTS, NO_TEXTURE, SURFACE_VERTEX_COLOR, TEXTURE_BYTES, TEXTURE_CHANNEL_SHIFT,
+        TEXTURE_FORMAT_MASK, TEXTURE_MIRROR, TEXTURE_NEAREST, TEXTURE_REPEAT, TEXTURE_SECOND_UVS,
+        TEXTURE_SHORTS, TEXTURE_SRGB, TEXTURE_WRAP_U_SHIFT, TEXTURE_WRAP_V_SHIFT,
     },
-    structs::TextureUse,
+    structs::{MaterialSurface, TextureUse},
 };
 
 /// Linear value of a number 0 to 1 in the encoding of \[IEC 61966-2-1:1999\].
@@ -128,6 +128,25 @@ pub fn texture_number(
     uv1: Vec2,
 ) -> f32 {
     texture_value(words, uses, use_index, uv0, uv1).truncate().dot(LUMINANCE_WEIGHTS.into())
+}
+
+/// Share of light that a surface stops at a point, 0 to 1; `alpha` is the vertices' opacity there.
+pub fn surface_opacity(
+    words: &[u32],
+    uses: &[TextureUse],
+    surface: &MaterialSurface,
+    [uv0, uv1]: [Vec2; 2],
+    alpha: f32,
+) -> f32 {
+    let mut opacity =
+        surface.opacity_factor * texture_number(words, uses, surface.opacity, uv0, uv1);
+    if surface.flags & SURFACE_VERTEX_COLOR != 0 {
+        opacity *= alpha;
+    }
+    if surface.opacity_cutoff >= 0.0 {
+        return if opacity >= surface.opacity_cutoff { 1.0 } else { 0.0 };
+    }
+    opacity.clamp(0.0, 1.0)
 }
 
 /// Direction of increasing u of the image along a triangle, at right angles to a unit normal, and the
