@@ -454,7 +454,9 @@ fn binary_ply(big_endian: bool) -> Vec<u8> {
 fn ply_reads_all_three_encodings() {
     let folder = Folder::new();
     let little = read(&folder, "little.ply", binary_ply(false));
-    assert_eq!(little, read(&folder, "big.ply", binary_ply(true)));
+    let big = read(&folder, "big.ply", binary_ply(true));
+    assert_eq!((&little.positions, &little.normals), (&big.positions, &big.normals));
+    assert_eq!(little.triangles, big.triangles);
     assert_eq!(little.positions, [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
     assert_eq!(little.normals, [[0.0, 0.0, 1.0]; 4]);
     assert_eq!(little.triangles.len(), 3);

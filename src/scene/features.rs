@@ -84,6 +84,7 @@ features! {
     GLTF_COLOR Done "vertex colours `COLOR_0`" "";
     GLTF_COLORS Ignored "further sets of vertex colours" "";
     GLTF_UV Ignored "third and further sets of texture coordinates" "";
+    GLTF_ATTRIBUTES Mapped "attributes of applications" "no part of the picture";
     GLTF_MORPH Done "morph targets" "with the weights of the file";
     GLTF_SKIN Ignored "skins" "the mesh is placed by its node";
     GLTF_ANIMATION Ignored "animations" "nodes stand as the file places them";

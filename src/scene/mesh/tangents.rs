@@ -1,7 +1,6 @@
 //! Tangents of vertices that a normal texture needs and the file does not give: MikkTSpace.
 //!
-//! [Mikkelsen 2008], "Simulation of Wrinkled Surfaces Revisited", by the crate `bevy_mikktspace`. glTF
-//! 2.0, section 3.7.2.1, asks for it.
+//! \[Mikkelsen 2008\], by the crate `bevy_mikktspace`; glTF 2.0, section 3.7.2.1, asks for it.
 
 use std::collections::HashMap;
 
@@ -133,7 +132,9 @@ impl Geometry for Surface<'_> {
     }
 
     fn set_tangent(&mut self, space: Option<TangentSpace>, face: usize, corner: usize) {
-        let tangent = space.unwrap_or_default().tangent_encoded();
+        // A face without area has no tangent of its own and may have no neighbour.
+        let Some(space) = space else { return };
+        let tangent = space.tangent_encoded();
         if tangent.iter().all(|component| component.is_finite()) {
             self.tangents[3 * face + corner] = tangent;
         }

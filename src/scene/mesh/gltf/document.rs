@@ -53,6 +53,10 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<(Document, Option<Vec<u
             return Err(Error::format(path, message));
         }
     }
+    // Attributes of applications are no part of the picture, but the crate refuses their names.
+    for primitive in root.meshes.iter_mut().flat_map(|mesh| &mut mesh.primitives) {
+        primitive.attributes.retain(|name, _| matches!(name, Checked::Valid(_)));
+    }
     check_positions(path, &root)?;
     let document = Document::from_json(root).map_err(not_gltf)?;
     Ok((document, glb.and_then(|glb| glb.bin).map(|bin| bin.into_owned()), json))
