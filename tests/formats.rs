@@ -279,9 +279,12 @@ fn the_page_lists_every_feature() {
         let rows: String = features.iter().map(row).collect();
         format!("| feature | support | details |\n|---|---|---|\n{rows}")
     };
-    for (name, features) in
-        [("gltf", features::GLTF), ("obj", features::OBJ), ("mtl", features::MTL)]
-    {
+    for (name, features) in [
+        ("gltf", features::GLTF),
+        ("obj", features::OBJ),
+        ("mtl", features::MTL),
+        ("mitsuba", features::MITSUBA),
+    ] {
         page::check("formats.md", name, &table(features));
         for feature in features {
             let same = |other: &&Feature| other.name == feature.name;

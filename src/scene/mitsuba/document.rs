@@ -9,6 +9,7 @@ use std::{
 
 use roxmltree::ParsingOptions;
 
+use super::text::{self, Lines, snake_case};
 use crate::{
     error::{Error, Result},
     files,
@@ -214,20 +215,20 @@ impl Builder {
             let message = format!("expected at most {MAX_FILE_BYTES} bytes of XML, found {bytes}");
             return Err(Error::format(path, message));
         }
-        let text = files::read_text(path)?;
+        let xml_text = files::read_text(path)?;
         let file = self.document.files.len();
         self.document.files.push(path.to_path_buf());
         self.open.push(path.to_path_buf());
-        check_nesting(path, &text)?;
+        text::check_nesting(path, &xml_text, MAX_DEPTH)?;
         // A document type could define entities, which the format has no use for.
         let options =
             ParsingOptions { nodes_limit: 8 * MAX_ELEMENTS as u32, ..ParsingOptions::default() };
-        let xml = roxmltree::Document::parse_with_options(&text, options).map_err(|error| {
+        let xml = roxmltree::Document::parse_with_options(&xml_text, options).map_err(|error| {
             let at = error.pos();
             Error::parse(path, at.row as usize, at.col as usize, error.to_string())
         })?;
         let root = xml.root_element();
-        let lines = Lines::new(&text);
+        let lines = Lines::new(&xml_text);
         if root.tag_name().name() != "scene" {
             let message = format!(
                 "expected the element `scene` of a Mitsuba file, found `{}`",
@@ -366,73 +367,4 @@ struct Source<'a> {
     path: &'a Path,
     file: usize,
     lines: &'a Lines,
-}
-
-/// Starts of the lines of a text.
-struct Lines(Vec<usize>);
-
-impl Lines {
-    fn new(text: &str) -> Self {
-        Self(text.match_indices('\n').map(|(at, _)| at + 1).collect())
-    }
-
-    /// Line of a byte, from 1.
-    fn line(&self, byte: usize) -> u32 {
-        self.0.partition_point(|start| *start <= byte) as u32 + 1
-    }
-}
-
-/// Refuses text that nests elements so deep that a parser could run out of stack.
-fn check_nesting(path: &Path, text: &str) -> Result<()> {
-    let mut depth = 0_usize;
-    let mut rest = text;
-    while let Some(at) = rest.find('<') {
-        rest = &rest[at..];
-        let skip = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>"), ("<!", ">")];
-        if let Some((_, end)) = skip.iter().find(|(start, _)| rest.starts_with(start)) {
-            let Some(at) = rest.find(end) else { return Ok(()) };
-            rest = &rest[at + end.len()..];
-            continue;
-        }
-        let mut quote = None;
-        let end = rest.char_indices().find(|&(_, c)| match quote {
-            None if c == '>' => true,
-            None if c == '"' || c == '\'' => {
-                quote = Some(c);
-                false
-            }
-            Some(open) if c == open => {
-                quote = None;
-                false
-            }
-            _ => false,
-        });
-        let Some((end, _)) = end else { return Ok(()) };
-        if rest.starts_with("</") {
-            depth = depth.saturating_sub(1);
-        } else if !rest[..end].ends_with('/') {
-            depth += 1;
-        }
-        if depth > 4 * MAX_DEPTH {
-            let line = text[..text.len() - rest.len()].matches('\n').count() + 1;
-            let message = format!("elements are nested deeper than {MAX_DEPTH}");
-            return Err(Error::parse(path, line, 1, message));
-        }
-        rest = &rest[end + 1..];
-    }
-    Ok(())
-}
-
-/// Name of version 3 for one of version 0.6: `toWorld` is `to_world`, `intIOR` `int_ior`.
-fn snake_case(name: &str) -> String {
-    let mut snake = String::with_capacity(name.len() + 2);
-    let mut before = '_';
-    for c in name.chars() {
-        if c.is_ascii_uppercase() && (before.is_ascii_lowercase() || before.is_ascii_digit()) {
-            snake.push('_');
-        }
-        snake.push(c.to_ascii_lowercase());
-        before = c;
-    }
-    snake
 }

@@ -15,12 +15,13 @@ mod sensor;
 mod serialized;
 mod shapes;
 mod spectra;
+mod text;
 mod textures;
 mod transforms;
 mod values;
 
 use std::{
-    collections::HashMap,
+    collections::{HashMap, HashSet},
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -125,7 +126,7 @@ pub fn read(path: &Path, camera: Option<&str>) -> Result<Parts> {
     let mut warnings = reader.warnings;
     warnings.extend(reader.ignored.warnings(path));
     let mut inputs = reader.inputs;
-    let mut seen = std::collections::HashSet::new();
+    let mut seen = HashSet::new();
     inputs.retain(|input| seen.insert(input.clone()));
     Ok(Parts {
         camera,

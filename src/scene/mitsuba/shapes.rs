@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DAffine3, DMat3, DMat4, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
 use super::{Reader, bsdfs::Model, document::Node, parameters::Parameters, serialized};
 use crate::{
@@ -105,13 +105,20 @@ impl Reader<'_> {
             )));
         }
         let flips = shape.flips.always != (shape.flips.mirrored && transform.mirrors);
-        let turned;
-        let mesh = if flips {
-            turned = turned_inside_out(&shape.mesh);
-            &turned
-        } else {
-            &shape.mesh
-        };
+        let mirrors_tangents = transform.mirrors && !shape.mesh.tangents.is_empty();
+        let mut changed = None;
+        if flips || mirrors_tangents {
+            let mut mesh = shape.mesh.clone();
+            if flips {
+                turn_inside_out(&mut mesh);
+            }
+            if mirrors_tangents {
+                // Mitsuba's bitangent is the normal × the tangent in the world.
+                mesh.tangents.iter_mut().for_each(|tangent| tangent[3] = -tangent[3]);
+            }
+            changed = Some(mesh);
+        }
+        let mesh = changed.as_ref().unwrap_or(&shape.mesh);
         let dropped = self.geometry.append(mesh, &transform, |_| shape.material);
         let label = format!("{}: shape of {}", self.document.files[0].display(), node.place());
         self.warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
@@ -175,6 +182,10 @@ impl Reader<'_> {
             }
         }
         shape.material = self.material(&parameters)?;
+        let has_bumps = self.materials[shape.material as usize].surface.normal.is_some();
+        if has_bumps && !shape.mesh.uvs[0].is_empty() {
+            shape.mesh.tangents = tangents(&shape.mesh);
+        }
         for medium in parameters.objects("medium")? {
             self.ignored.add(features::MI_MEDIUM, || medium.place());
         }
@@ -261,12 +272,28 @@ fn frame_along(axis: DVec3) -> Option<DMat3> {
     Some(DMat3::from_cols(x, y, axis))
 }
 
-/// The same mesh seen from the other side.
-fn turned_inside_out(mesh: &Mesh) -> Mesh {
-    let mut mesh = mesh.clone();
+/// Turns the inside of a mesh out.
+fn turn_inside_out(mesh: &mut Mesh) {
     mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
     mesh.normals.iter_mut().flatten().for_each(|component| *component = -*component);
-    mesh
+}
+
+/// Tangents of vertices along u, as the bumps of a normal map need them: the bitangent is the normal ×
+/// the tangent, also where texture coordinates are mirrored.
+fn tangents(mesh: &Mesh) -> Vec<[f32; 4]> {
+    let mut tangents = vec![Vec3::ZERO; mesh.positions.len()];
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|at| Vec3::from_array(mesh.positions[at as usize]));
+        let [u, v, w] = triangle.map(|at| Vec2::from_array(mesh.uvs[0][at as usize]));
+        let (along, across) = (v - u, w - u);
+        let determinant = along.perp_dot(across);
+        let tangent = (b - a) * across.y - (c - a) * along.y;
+        let Some(tangent) = (tangent * determinant.signum()).try_normalize() else { continue };
+        for corner in triangle {
+            tangents[*corner as usize] += tangent;
+        }
+    }
+    tangents.iter().map(|tangent| tangent.normalize_or_zero().extend(1.0).to_array()).collect()
 }
 
 /// Normals of vertices from those of their triangles, by the angle of the corner \[Thürmer & Wüthrich
