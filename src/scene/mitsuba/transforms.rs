@@ -57,6 +57,7 @@ pub fn vector(node: Node<'_>, absent: [f64; 3]) -> Result<DVec3> {
     Ok(DVec3::from_array(vector))
 }
 
+/// Deviation: an axis counts as one of length 1; Mitsuba 3.9.1 takes its length for a distortion.
 fn rotation(node: Node<'_>) -> Result<DMat4> {
     let axis = vector(node, [0.0; 3])?;
     let Some(axis) = axis.try_normalize() else {
