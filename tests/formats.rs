@@ -253,6 +253,7 @@ fn the_page_lists_every_feature() {
         ("obj", features::OBJ),
         ("mtl", features::MTL),
         ("ply", features::PLY),
+        ("mitsuba", features::MITSUBA),
     ] {
         page::check("formats.md", name, &table(features));
         for feature in features {

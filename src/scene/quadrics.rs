@@ -1,0 +1,202 @@
+//! Sphere, disk, cylinder, rectangle and cube as scene formats define them: meshes with the exact
+//! normals and texture coordinates at their vertices.
+//!
+//! Axes and texture coordinates are those of Mitsuba 3, with +Z as the axis of the round ones. Flat
+//! and open shapes face +Z or away from their axis.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec2, DVec3, Vec3};
+
+use super::mesh::Mesh;
+
+/// Segments of a full turn; the chords of a circle are within 0.03% of its radius.
+const SEGMENTS: usize = 128;
+/// Rows of a sphere from pole to pole.
+const SPHERE_ROWS: usize = 64;
+
+/// Sphere about the origin, normals outward: u = φ/2π from +X towards +Y, v = θ/π from +Z.
+pub fn sphere(radius: f32) -> Mesh {
+    let radius = f64::from(radius);
+    grid(SPHERE_ROWS, |u, v| {
+        let (turn, (sine, cosine)) = (turn(u), (PI * v).sin_cos());
+        // Single out the pole, where a sine is not exactly 0.
+        let sine = if v == 1.0 { 0.0 } else { sine };
+        let normal = (turn * sine).extend(cosine);
+        Vertex { position: normal * radius, normal, uv: [u, v] }
+    })
+}
+
+/// Ring about the origin in the plane z = 0, with the normal +Z: u = r/`radius`, v = φ/2π from +X
+/// towards +Y. An `inner_radius` of 0 makes a disk.
+pub fn disk(radius: f32, inner_radius: f32) -> Mesh {
+    let (radius, inner) = (f64::from(radius), f64::from(inner_radius));
+    grid(1, |u, v| {
+        let distance = inner + (radius - inner) * v;
+        let position = (turn(u) * distance).extend(0.0);
+        Vertex { position, normal: DVec3::Z, uv: [distance / radius, u] }
+    })
+}
+
+/// Open cylinder about the z axis, normals outward: u = φ/2π from +X towards +Y, v from 0 at `z_min`
+/// to 1 at `z_max`.
+pub fn cylinder(radius: f32, z_min: f32, z_max: f32) -> Mesh {
+    let (radius, z_min, z_max) = (f64::from(radius), f64::from(z_min), f64::from(z_max));
+    grid(1, |u, v| {
+        // Rows run from the top, so that columns × rows points outward.
+        let normal = turn(u).extend(0.0);
+        let position = (turn(u) * radius).extend(z_max + (z_min - z_max) * v);
+        Vertex { position, normal, uv: [u, 1.0 - v] }
+    })
+}
+
+/// Square from (−1, −1, 0) to (1, 1, 0) with the normal +Z: u along +X, v along +Y.
+pub fn rectangle() -> Mesh {
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    let uvs = corners.map(|corner: [f32; 2]| corner.map(|coordinate| 0.5 * (coordinate + 1.0)));
+    Mesh {
+        positions: corners.map(|[x, y]| [x, y, 0.0]).to_vec(),
+        normals: vec![[0.0, 0.0, 1.0]; 4],
+        uvs: [uvs.to_vec(), Vec::new()],
+        triangles: vec![[0, 1, 2], [2, 3, 0]],
+        ..Mesh::default()
+    }
+}
+
+/// Corners of a cube's faces, counter-clockwise from outside, with the texture coordinates
+/// (0, 1), (1, 1), (1, 0) and (0, 0).
+const CUBE_FACES: [[[f32; 3]; 4]; 6] = [
+    [[1.0, -1.0, -1.0], [1.0, -1.0, 1.0], [-1.0, -1.0, 1.0], [-1.0, -1.0, -1.0]],
+    [[1.0, 1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, 1.0, 1.0], [1.0, 1.0, 1.0]],
+    [[1.0, -1.0, -1.0], [1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [1.0, -1.0, 1.0]],
+    [[1.0, -1.0, 1.0], [1.0, 1.0, 1.0], [-1.0, 1.0, 1.0], [-1.0, -1.0, 1.0]],
+    [[-1.0, -1.0, 1.0], [-1.0, 1.0, 1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, -1.0]],
+    [[1.0, 1.0, -1.0], [1.0, -1.0, -1.0], [-1.0, -1.0, -1.0], [-1.0, 1.0, -1.0]],
+];
+
+/// Cube from (−1, −1, −1) to (1, 1, 1), normals outward, every face with the whole unit square of
+/// texture coordinates.
+pub fn cube() -> Mesh {
+    let mut mesh = Mesh::default();
+    for face in CUBE_FACES {
+        let first = mesh.positions.len() as u32;
+        let [a, b, c] = [face[0], face[1], face[2]].map(Vec3::from_array);
+        let normal = (b - a).cross(c - a).normalize().to_array();
+        mesh.positions.extend(face);
+        mesh.normals.extend([normal; 4]);
+        mesh.uvs[0].extend([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]]);
+        mesh.triangles.extend([[0, 1, 2], [3, 0, 2]].map(|corners| corners.map(|at| first + at)));
+    }
+    mesh
+}
+
+struct Vertex {
+    position: DVec3,
+    normal: DVec3,
+    uv: [f64; 2],
+}
+
+/// Unit vector at the share `u` of a turn from +X towards +Y; 1 is 0 bit for bit.
+fn turn(u: f64) -> DVec2 {
+    DVec2::from_angle(TAU * (u % 1.0))
+}
+
+/// Surface over a grid of a full turn by `rows`; rows × columns (cross product) points outward.
+///
+/// Where a row has no extent, as at a pole, each of its triangles has a vertex of its own in the
+/// middle of the column: all directions meet there, and no one coordinate would do.
+fn grid(rows: usize, vertex: impl Fn(f64, f64) -> Vertex) -> Mesh {
+    let mut mesh = Mesh::default();
+    let share = |row: usize| row as f64 / rows as f64;
+    let is_point =
+        |row: usize| vertex(0.0, share(row)).position == vertex(0.5, share(row)).position;
+    for row in 0..=rows {
+        let shift = if is_point(row) { 0.5 } else { 0.0 };
+        for column in 0..=SEGMENTS {
+            let u = ((column as f64 + shift) / SEGMENTS as f64).min(1.0);
+            let Vertex { position, normal, uv } = vertex(u, share(row));
+            mesh.positions.push(position.as_vec3().to_array());
+            mesh.normals.push(normal.as_vec3().to_array());
+            mesh.uvs[0].push(uv.map(|coordinate| coordinate as f32));
+        }
+    }
+    let at = |row: usize, column: usize| (row * (SEGMENTS + 1) + column) as u32;
+    for row in 0..rows {
+        let (starts_in_point, ends_in_point) = (is_point(row), is_point(row + 1));
+        for column in 0..SEGMENTS {
+            let (a, b) = (at(row, column), at(row, column + 1));
+            let (c, d) = (at(row + 1, column + 1), at(row + 1, column));
+            if !ends_in_point {
+                mesh.triangles.push([a, d, c]);
+            }
+            if !starts_in_point {
+                mesh.triangles.push(if ends_in_point { [a, d, b] } else { [a, c, b] });
+            }
+        }
+    }
+    mesh
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Checks that triangles face their vertex normals, and returns the area of the mesh.
+    fn area(mesh: &Mesh) -> f32 {
+        assert_eq!(mesh.normals.len(), mesh.positions.len());
+        assert_eq!(mesh.uvs[0].len(), mesh.positions.len());
+        let triangles = mesh.triangles.iter().map(|triangle| {
+            let [a, b, c] = triangle.map(|at| Vec3::from_array(mesh.positions[at as usize]));
+            let normal = (b - a).cross(c - a);
+            for corner in triangle {
+                let own = Vec3::from_array(mesh.normals[*corner as usize]);
+                assert!((own.length() - 1.0).abs() < 1e-6);
+                assert!(own.dot(normal.normalize()) > 0.99, "{own} on {normal}");
+            }
+            0.5 * normal.length()
+        });
+        triangles.sum()
+    }
+
+    #[test]
+    fn areas_are_those_of_the_shapes_and_all_faces_look_outward() {
+        let pi = std::f32::consts::PI;
+        for (mesh, expected) in [
+            (sphere(2.0), 16.0 * pi),
+            (disk(3.0, 0.0), 9.0 * pi),
+            (disk(3.0, 1.0), 8.0 * pi),
+            (cylinder(0.5, -1.0, 3.0), 4.0 * pi),
+            (rectangle(), 4.0),
+            (cube(), 24.0),
+        ] {
+            let found = area(&mesh);
+            assert!((found / expected - 1.0).abs() < 1e-3, "{found}, expected {expected}");
+        }
+    }
+
+    /// Coordinates of the vertex nearest to a place.
+    fn uv_at(mesh: &Mesh, place: [f32; 3]) -> [f32; 2] {
+        let place = Vec3::from_array(place);
+        let used = mesh.triangles.iter().flatten().map(|corner| *corner as usize);
+        let distance = |at: &usize| Vec3::from_array(mesh.positions[*at]).distance_squared(place);
+        let nearest = used.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
+        mesh.uvs[0][nearest]
+    }
+
+    #[test]
+    fn texture_coordinates_are_those_of_mitsuba() {
+        // Rays of Mitsuba 3.9.1 met its shapes near these vertices.
+        let close = |[u, v]: [f32; 2], expected: [f32; 2]| {
+            let within = 1.0 / SEGMENTS as f32;
+            assert!((u - expected[0]).abs() < within, "{u}, {v}: {expected:?}");
+            assert!((v - expected[1]).abs() < within, "{u}, {v}: {expected:?}");
+        };
+        close(uv_at(&sphere(1.0), [0.842615, 0.2, 0.5]), [0.0370901, 0.333333]);
+        close(uv_at(&sphere(1.0), [-0.3, 0.812404, -0.5]), [0.3063, 0.666667]);
+        close(uv_at(&disk(0.5, 0.25), [0.3, 0.4, 0.0]), [1.0, 0.147584]);
+        close(uv_at(&disk(1.0, 0.5), [0.3, -0.4, 0.0]), [0.5, 0.852416]);
+        close(uv_at(&cylinder(1.0, 0.0, 1.0), [0.916515, 0.4, 1.0]), [0.0654949, 1.0]);
+        assert_eq!(uv_at(&rectangle(), [1.0, -1.0, 0.0]), [1.0, 0.0]);
+        assert_eq!(cube().uvs[0][0], [0.0, 1.0]);
+    }
+}
