@@ -9,6 +9,7 @@ mod hash;
 pub mod lamp;
 pub mod load;
 pub mod mesh;
+pub mod pbrt;
 pub mod quadrics;
 pub mod shapes;
 pub mod transform;

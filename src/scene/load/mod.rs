@@ -3,6 +3,7 @@
 //! Messages name the object or material and the line of its entry.
 
 mod objects;
+mod pbrt;
 mod whole;
 
 use std::{
@@ -65,6 +66,9 @@ impl Scene {
     /// As [`Scene::load`], and for a camera that the file does not have.
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self> {
         refuse_other_formats(path)?;
+        if super::pbrt::is_pbrt(path) {
+            return Loader::new(path).pbrt(options);
+        }
         if whole::is_whole(path) {
             return Loader::new(path).whole(options);
         }
@@ -126,14 +130,13 @@ fn scene_name(path: &Path) -> String {
 
 fn refuse_other_formats(path: &Path) -> Result<()> {
     let format = match files::extension(path).as_str() {
-        "pbrt" => "a pbrt file",
         "xml" => "a Mitsuba file",
         _ => return Ok(()),
     };
     Err(Error::format(
         path,
         format!(
-            "expected a scene in .toml, .gltf, .glb or .obj, found {format}, which cannot be \
+            "expected a scene in .toml, .gltf, .glb, .obj or .pbrt, found {format}, which cannot be \
              rendered as a scene yet"
         ),
     ))

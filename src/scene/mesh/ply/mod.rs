@@ -11,6 +11,7 @@ use std::{
     path::Path,
 };
 
+use flate2::read::MultiGzDecoder;
 use header::{Element, Encoding, Property, Scalar};
 
 use super::Mesh;
@@ -19,13 +20,20 @@ use crate::{
     files,
 };
 
-/// Reads a PLY file.
+/// Largest compression of gzip, which bounds what a compressed file may promise.
+const GZIP_LARGEST_RATIO: u64 = 1032;
+
+/// Reads a PLY file, or one compressed by gzip if its extension is `gz`.
 ///
 /// # Errors
 /// [`Error::Io`], or [`Error::Format`] that names the element and what was expected and found.
 pub fn read(path: &Path) -> Result<Mesh> {
     let file = files::open_regular(path)?;
     let file_bytes = file.metadata().map_err(|source| Error::io(path, "read", source))?.len();
+    if files::extension(path) == "gz" {
+        let reader = BufReader::with_capacity(1 << 16, MultiGzDecoder::new(file));
+        return read_from(path, reader, file_bytes.saturating_mul(GZIP_LARGEST_RATIO));
+    }
     read_from(path, BufReader::with_capacity(1 << 16, file), file_bytes)
 }
 
