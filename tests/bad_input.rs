@@ -188,10 +188,8 @@ fn wrong_options_exit_with_2() {
 #[test]
 fn other_scene_formats_are_refused_by_name() {
     let folder = Folder::new();
-    for (name, format) in [("room.xml", "a Mitsuba file"), ("room.pbrt", "a pbrt file")] {
-        folder.write(name, "");
-        folder.run(&["render", name]).assert(1, &[&format!("error: {name}: "), format]);
-    }
+    folder.write("room.xml", "");
+    folder.run(&["render", "room.xml"]).assert(1, &["error: room.xml: ", "a Mitsuba file"]);
 }
 
 #[test]

@@ -223,7 +223,8 @@ impl<'a> Reader<'a> {
         match self.source.next_here()? {
             Some(Token::Text) => Ok(self.source.text().to_owned()),
             found => {
-                let found = if found.is_some() { self.source.text() } else { "the end of the file" };
+                let found =
+                    if found.is_some() { self.source.text() } else { "the end of the file" };
                 let message = format!("{directive}: expected a string in quotes, found {found}");
                 Err(self.source.place().error(message))
             }
@@ -277,7 +278,8 @@ impl<'a> Reader<'a> {
             "LookAt" => {
                 let [a, b, c, d, e, f, g, h, i] = self.numbers("LookAt")?;
                 let view = look_at(DVec3::new(a, b, c), DVec3::new(d, e, f), DVec3::new(g, h, i));
-                let message = "LookAt: eye and target must differ, and up must not lie between them";
+                let message =
+                    "LookAt: eye and target must differ, and up must not lie between them";
                 ctm * view.ok_or_else(|| place.error(message))?
             }
             // Files give matrices column by column.
@@ -460,7 +462,8 @@ impl<'a> Reader<'a> {
             "float" => &mut self.description.float_textures,
             "spectrum" => &mut self.description.spectrum_textures,
             _ => {
-                let message = format!("`{name}`: expected values of float or spectrum, found {values}");
+                let message =
+                    format!("`{name}`: expected values of float or spectrum, found {values}");
                 return Err(entity.error(message));
             }
         };

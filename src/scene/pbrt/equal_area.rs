@@ -30,7 +30,12 @@ pub fn square_from_direction(direction: Vec3) -> Vec2 {
 ///
 /// Every texel is the mean of the map over points of it, and a factor for each channel keeps the mean
 /// radiance of the sphere, which in an equal-area map is that of the texels.
-pub fn resample(texels: &[Vec3], side: u32, light_from_world: Mat3, source: String) -> EnvironmentMap {
+pub fn resample(
+    texels: &[Vec3],
+    side: u32,
+    light_from_world: Mat3,
+    source: String,
+) -> EnvironmentMap {
     let (width, height) = (2 * side.max(32), side.max(32));
     let lookup = |direction: Vec3| {
         let uv = square_from_direction((light_from_world * direction).normalize_or(Vec3::Z));

@@ -8,13 +8,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
-use super::{
-    equal_area::{resample, square_from_direction},
-    log::Log,
-    parameters::{Entity, Kind},
-    spectra,
-    textures::Textures,
-};
+use super::{equal_area::resample, log::Log, parameters::Entity, spectra, textures::Textures};
 use crate::{
     error::Result,
     math::colour::luminance,
@@ -88,7 +82,9 @@ pub fn area_light(
     let radiance = color(entity, "L", textures)? * scale as f32 * exposure;
     log.unused(entity);
     if !radiance.is_finite() || radiance.min_element() < 0.0 {
-        return Err(entity.error(format!("expected finite radiance of at least 0, found {radiance}")));
+        return Err(
+            entity.error(format!("expected finite radiance of at least 0, found {radiance}"))
+        );
     }
     Ok(AreaLight { radiance, two_sided })
 }
@@ -120,7 +116,15 @@ impl Lights {
         };
         let kind = match entity.name.as_str() {
             "infinite" => {
-                self.infinite(entity, world_from_light, scale, illuminance, exposure, textures, log)?;
+                self.infinite(
+                    entity,
+                    world_from_light,
+                    scale,
+                    illuminance,
+                    exposure,
+                    textures,
+                    log,
+                )?;
                 log.unused(entity);
                 return Ok(());
             }
@@ -303,6 +307,7 @@ fn upper_illuminance(texels: &[Vec3], side: u32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::pbrt::equal_area::square_from_direction;
 
     #[test]
     fn a_white_map_gives_an_illuminance_of_pi() {

@@ -110,7 +110,8 @@ impl<'a> Materials<'a> {
             "coatedconductor" => {
                 nearest(log);
                 self.layers(entity, log)?;
-                for name in ["interface.roughness", "interface.uroughness", "interface.vroughness"] {
+                for name in ["interface.roughness", "interface.uroughness", "interface.vroughness"]
+                {
                     entity.find(name);
                 }
                 entity.find("interface.eta");
@@ -145,8 +146,15 @@ impl<'a> Materials<'a> {
             "hair" => {
                 nearest(log);
                 for name in [
-                    "sigma_a", "reflectance", "color", "eumelanin", "pheomelanin", "eta", "beta_m",
-                    "beta_n", "alpha",
+                    "sigma_a",
+                    "reflectance",
+                    "color",
+                    "eumelanin",
+                    "pheomelanin",
+                    "eta",
+                    "beta_m",
+                    "beta_n",
+                    "alpha",
                 ] {
                     entity.find(name);
                 }
@@ -248,9 +256,14 @@ impl<'a> Materials<'a> {
             None => {
                 let index = |name: &str| match entity.find_of(&own(name), &spectra::KINDS)? {
                     Some(parameter) => spectra::index(parameter, self.textures.folder()),
-                    None => Ok(named::index(&format!("metal-Cu-{name}")).unwrap_or_default().as_vec3()),
+                    None => {
+                        Ok(named::index(&format!("metal-Cu-{name}")).unwrap_or_default().as_vec3())
+                    }
                 };
-                ConductorFresnel::Exact { eta: index("eta")?.max(Vec3::splat(0.01)), k: index("k")? }
+                ConductorFresnel::Exact {
+                    eta: index("eta")?.max(Vec3::splat(0.01)),
+                    k: index("k")?,
+                }
             }
         };
         Ok(MaterialKind::Conductor { alpha: roughness.alpha, fresnel })
@@ -388,8 +401,14 @@ fn color(value: Value, surface: &mut Surface) -> Vec3 {
 /// Tests whether a material reads texture coordinates.
 pub fn reads_coordinates(surface: &Surface) -> bool {
     let emission = surface.emission.as_ref().and_then(|emission| emission.texture.as_ref());
-    [&surface.color, &surface.roughness, &surface.metallic, &surface.normal, &surface.opacity.texture]
-        .into_iter()
-        .any(Option::is_some)
+    [
+        &surface.color,
+        &surface.roughness,
+        &surface.metallic,
+        &surface.normal,
+        &surface.opacity.texture,
+    ]
+    .into_iter()
+    .any(Option::is_some)
         || emission.is_some()
 }

@@ -159,7 +159,8 @@ fn integrator(description: &Description, log: &mut Log) {
         let name = format!("`maxdepth` {count} of the integrator");
         log.ignore_named(features::PBRT_DEPTH, &name, &depth.place);
     }
-    let is_known = ["path", "volpath", "simplepath", "simplevolpath", "bdpt", "mlt", "sppm", "lightpath"];
+    let is_known =
+        ["path", "volpath", "simplepath", "simplevolpath", "bdpt", "mlt", "sppm", "lightpath"];
     if !is_known.contains(&entity.name.as_str()) {
         let name = format!("Integrator `{}`", entity.name);
         log.ignore_named(features::PBRT_INTEGRATOR, &name, &entity.place);
@@ -233,9 +234,8 @@ impl Builder<'_> {
         };
         let alpha = shape.entity.find("alpha");
         let alpha_key = alpha.map_or(String::new(), |alpha| format!("{:?}", alpha.values));
-        let light_key = light.map(|light| {
-            (light.radiance.to_array().map(f32::to_bits), light.two_sided)
-        });
+        let light_key =
+            light.map(|light| (light.radiance.to_array().map(f32::to_bits), light.two_sided));
         let key = (choice, alpha_key, light_key);
         let kept = match self.kept.by_key.get(&key) {
             Some(kept) => *kept,

@@ -126,7 +126,11 @@ impl Parameter {
 
     /// First string; empty for numbers.
     pub fn text(&self) -> &str {
-        if let Values::Texts(texts) = &self.values { texts.first().map_or("", |text| text) } else { "" }
+        if let Values::Texts(texts) = &self.values {
+            texts.first().map_or("", |text| text)
+        } else {
+            ""
+        }
     }
 
     /// Reads one parameter whose type and name are the last token.
@@ -153,7 +157,8 @@ impl Parameter {
         let values = read_values(source, kind, &name, &place)?;
         let (count, group) = (values.len(), kind.group());
         if count == 0 || count % group != 0 {
-            let message = format!("parameter `{name}`: expected {group} numbers or a multiple of it");
+            let message =
+                format!("parameter `{name}`: expected {group} numbers or a multiple of it");
             return Err(place.error(format!("{message}, found {count}")));
         }
         Ok(Self { kind, name, values, place, used: Cell::new(false) })
@@ -169,7 +174,9 @@ fn read_values(source: &mut Source, kind: Kind, name: &str, place: &Place) -> Re
     let mut in_brackets = false;
     loop {
         let Some(token) = source.next_here()? else {
-            return Err(place.error(format!("parameter `{name}`: the file ends before its values do")));
+            return Err(
+                place.error(format!("parameter `{name}`: the file ends before its values do"))
+            );
         };
         match token {
             Token::Open if !in_brackets => {
@@ -239,7 +246,9 @@ fn push_value(
         _ => "a number",
     };
     let quote = if token == Token::Text { "the string " } else { "" };
-    Err(source.place().error(format!("parameter `{name}`: expected {expected}, found {quote}`{text}`")))
+    Err(source
+        .place()
+        .error(format!("parameter `{name}`: expected {expected}, found {quote}`{text}`")))
 }
 
 /// Directive with a type and parameters: `Shape "sphere" "float radius" 2`.

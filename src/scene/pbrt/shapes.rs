@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use super::{
     log::Log,
     parameters::{Entity, Kind},
-    subdivision::subdivide,
+    subdivision::{MAX_TRIANGLES, subdivide},
 };
 use crate::{
     error::Result,
@@ -21,8 +21,6 @@ use crate::{
 
 /// Columns and rows of a bilinear patch that is not flat, or whose coordinates are not linear.
 const PATCH_CELLS: u32 = 16;
-/// Most triangles that one shape may be cut into.
-pub const MAX_TRIANGLES: usize = 1 << 25;
 
 /// Makes the mesh of a shape; none for a kind that is left out.
 ///
@@ -52,7 +50,8 @@ pub fn mesh(entity: &Entity, folder: &Path, log: &mut Log) -> Result<Option<Mesh
                 log.ignore_named(features::PBRT_PARAMETER, "parameter `scheme`", &scheme.place);
             }
             let levels = entity.number("levels", 3.0)?;
-            subdivide(&positions, triangles, levels as i64).map_err(|message| entity.error(message))?
+            subdivide(&positions, triangles, levels as i64)
+                .map_err(|message| entity.error(message))?
         }
         "bilinearmesh" => bilinear_mesh(entity, log)?,
         "sphere" | "disk" | "cylinder" => quadric(entity, log)?,
@@ -221,7 +220,8 @@ fn push_patch(
     let [p00, p10, p01, p11] = corners;
     // A parallelogram is two triangles, with linear coordinates.
     let size = (p11 - p00).abs().max_element();
-    let cells = if (p00 + p11 - p10 - p01).abs().max_element() <= 1e-6 * size { 1 } else { PATCH_CELLS };
+    let cells =
+        if (p00 + p11 - p10 - p01).abs().max_element() <= 1e-6 * size { 1 } else { PATCH_CELLS };
     let first = mesh.positions.len() as u32;
     for row in 0..=cells {
         for column in 0..=cells {
@@ -308,8 +308,7 @@ pub fn give_coordinates(mesh: &mut Mesh) -> Result<(), String> {
 pub fn give_tangents(mesh: &mut Mesh, mirrors: bool) {
     let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
     for triangle in &mesh.triangles {
-        let [a, b, c] =
-            triangle.map(|at| Vec3::from_array(mesh.positions[at as usize]).as_dvec3());
+        let [a, b, c] = triangle.map(|at| Vec3::from_array(mesh.positions[at as usize]).as_dvec3());
         let [s, t, r] = triangle.map(|at| mesh.uvs[0][at as usize].map(f64::from));
         let (first, second) = ([t[0] - s[0], t[1] - s[1]], [r[0] - s[0], r[1] - s[1]]);
         let determinant = first[0] * second[1] - first[1] * second[0];

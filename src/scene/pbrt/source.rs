@@ -10,10 +10,7 @@ use std::{
 use flate2::read::MultiGzDecoder;
 
 use super::tokens::{Place, Token, Tokens};
-use crate::{
-    error::Result,
-    files,
-};
+use crate::{error::Result, files};
 
 /// Most files that may include one another.
 const MAX_DEPTH: usize = 32;
@@ -161,8 +158,11 @@ fn stays_inside(path: &Path) -> bool {
 
 fn open(path: &Path) -> Result<FileTokens> {
     let file: File = files::open_regular(path)?;
-    let reader: Box<dyn Read> =
-        if files::extension(path) == "gz" { Box::new(MultiGzDecoder::new(file)) } else { Box::new(file) };
+    let reader: Box<dyn Read> = if files::extension(path) == "gz" {
+        Box::new(MultiGzDecoder::new(file))
+    } else {
+        Box::new(file)
+    };
     let reader = BufReader::with_capacity(1 << 16, reader);
     Ok(Tokens::new(Rc::from(path), reader, MAX_BYTES))
 }

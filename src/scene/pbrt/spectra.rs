@@ -53,7 +53,8 @@ impl Samples {
     /// Colour of a reflectance.
     fn color(&self) -> DVec3 {
         let count = (400.0 / STEP_NM) as usize + 1;
-        let wavelengths: Vec<f64> = (0..count).map(|index| 380.0 + index as f64 * STEP_NM).collect();
+        let wavelengths: Vec<f64> =
+            (0..count).map(|index| 380.0 + index as f64 * STEP_NM).collect();
         let weights = srgb_weights(&wavelengths).unwrap_or_default();
         weights.iter().zip(&wavelengths).map(|(weight, &nm)| *weight * self.at(nm)).sum()
     }
@@ -128,9 +129,7 @@ pub fn reflectance(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
 pub fn light(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
     let color = match source(parameter, folder)? {
         Source::Color(color) => color,
-        Source::Samples(samples) => {
-            light_color(|nm| samples.at(nm)).unwrap_or(DVec3::ZERO)
-        }
+        Source::Samples(samples) => light_color(|nm| samples.at(nm)).unwrap_or(DVec3::ZERO),
         Source::Temperature(kelvin) => blackbody(kelvin),
         Source::Name(name) => named::illuminant(name)
             .ok_or_else(|| unknown(parameter, "an illuminant such as stdillum-D65"))?,
@@ -147,8 +146,9 @@ pub fn index(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
         Source::Color(color) => color,
         Source::Samples(samples) => samples.color(),
         Source::Temperature(_) => return Err(unknown(parameter, "a refractive index")),
-        Source::Name(name) => named::index(name)
-            .ok_or_else(|| unknown(parameter, "a metal such as metal-Cu-eta or a glass such as glass-BK7"))?,
+        Source::Name(name) => named::index(name).ok_or_else(|| {
+            unknown(parameter, "a metal such as metal-Cu-eta or a glass such as glass-BK7")
+        })?,
     };
     Ok(color.max(DVec3::ZERO).as_vec3())
 }
@@ -177,9 +177,8 @@ mod tests {
     fn grey_samples_are_grey_and_end_at_their_ends() {
         let grey = Samples::new(&[300.0, 0.4, 900.0, 0.4]).map(|grey| grey.color());
         assert!(grey.is_some_and(|grey| (grey - DVec3::splat(0.4)).abs().max_element() < 2e-3));
-        let samples = Samples::new(&[500.0, 1.0, 600.0, 3.0]).map(|samples| {
-            [499.0, 500.0, 525.0, 600.0, 601.0].map(|nm| samples.at(nm))
-        });
+        let samples = Samples::new(&[500.0, 1.0, 600.0, 3.0])
+            .map(|samples| [499.0, 500.0, 525.0, 600.0, 601.0].map(|nm| samples.at(nm)));
         assert_eq!(samples, Some([0.0, 1.0, 1.5, 3.0, 0.0]));
         assert!(Samples::new(&[500.0, 1.0, 400.0, 1.0]).is_none());
         assert!(Samples::new(&[500.0]).is_none());

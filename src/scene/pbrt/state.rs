@@ -48,10 +48,17 @@ impl Attributes {
     ///
     /// # Errors
     /// With the place for an unknown target.
-    pub fn add(&mut self, target: &str, mut parameters: Vec<Parameter>, place: &Place) -> Result<()> {
+    pub fn add(
+        &mut self,
+        target: &str,
+        mut parameters: Vec<Parameter>,
+        place: &Place,
+    ) -> Result<()> {
         let Some(index) = Self::index(target) else {
             let expected = Self::TARGETS.join(", ");
-            return Err(place.error(format!("Attribute: expected one of {expected}, found `{target}`")));
+            return Err(
+                place.error(format!("Attribute: expected one of {expected}, found `{target}`"))
+            );
         };
         let list = Rc::make_mut(&mut self.lists[index]);
         list.retain(|old| parameters.iter().all(|new| new.name != old.name));

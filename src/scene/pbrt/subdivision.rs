@@ -5,8 +5,10 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 
-use super::shapes::MAX_TRIANGLES;
 use crate::scene::mesh::Mesh;
+
+/// Most triangles that one shape may be cut into.
+pub const MAX_TRIANGLES: usize = 1 << 25;
 
 /// Most levels; each makes four triangles of one.
 const MAX_LEVELS: i64 = 12;

@@ -88,7 +88,12 @@ impl<'a> Textures<'a> {
     ///
     /// # Errors
     /// With the place for unknown names, other types and images that cannot be read.
-    pub fn spectrum(&mut self, entity: &Entity, name: &str, log: &mut Log) -> Result<Option<Value>> {
+    pub fn spectrum(
+        &mut self,
+        entity: &Entity,
+        name: &str,
+        log: &mut Log,
+    ) -> Result<Option<Value>> {
         self.value(entity, name, false, 0, log)
     }
 
@@ -163,7 +168,7 @@ impl<'a> Textures<'a> {
         depth: usize,
         log: &mut Log,
     ) -> Result<Value> {
-        let mut of = |this: &mut Self, name: &str, otherwise: f64, log: &mut Log| {
+        let of = |this: &mut Self, name: &str, otherwise: f64, log: &mut Log| {
             let value = this.value(entity, name, is_number, depth, log)?;
             Ok(value.unwrap_or(Value::number(otherwise)))
         };
@@ -399,7 +404,9 @@ pub fn map_numbers(image: &TextureUse, of: impl Fn(f32) -> f32) -> TextureUse {
             });
             linear.collect()
         }
-        Texels::Halves(texels) => texels.iter().map(|texel| number(texel.map(f16::to_f32))).collect(),
+        Texels::Halves(texels) => {
+            texels.iter().map(|texel| number(texel.map(f16::to_f32))).collect()
+        }
     };
     let texture = Texture { texels: Texels::Halves(texels), ..Texture::clone(&image.texture) };
     TextureUse {
