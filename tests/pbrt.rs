@@ -116,7 +116,8 @@ fn fov_is_that_of_the_shorter_side_and_lenses_scale() {
         (camera.aperture_radius - 0.2).abs() < 1e-6 && (camera.focus_distance - 6.0).abs() < 1e-5
     );
     assert!((camera.position - Vec3::new(0.0, 0.0, 5.0)).length() < 1e-5, "{camera:?}");
-    let window = r#"Camera "perspective" "float fov" 90 "float screenwindow" [-0.8888889 0.8888889 -0.5 0.5]"#;
+    let window = r#"Camera "perspective" "float fov" 90
+        "float screenwindow" [-0.8888889 0.8888889 -0.5 0.5]"#;
     let scene = load(window, "");
     assert!((scene.camera.vertical_fov_deg - 2.0 * 0.5_f32.atan().to_degrees()).abs() < 1e-3);
     assert!(warnings(&scene).is_empty(), "{:?}", scene.warnings);
@@ -205,7 +206,8 @@ fn quadrics_and_patches_face_outward() {
         ("\"disk\" \"float height\" 1 \"float innerradius\" 0.5", 0.75 * std::f32::consts::PI),
         ("\"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 2 0 2 2 0]", 4.0),
         (
-            "\"loopsubdiv\" \"integer levels\" 1 \"point3 P\" [1 0 0 0 1 0 0 0 1] \"integer indices\" [0 1 2]",
+            r#""loopsubdiv" "integer levels" 1 "point3 P" [1 0 0 0 1 0 0 0 1]
+            "integer indices" [0 1 2]"#,
             0.3,
         ),
     ] {
@@ -229,7 +231,8 @@ fn quadrics_and_patches_face_outward() {
     assert_eq!(curved.geometry.triangles.len(), 512);
     // v of a sphere runs from −z to +z.
     let sphere = world(
-        "Texture \"t\" \"spectrum\" \"checkerboard\" Material \"diffuse\" \"texture reflectance\" \"t\" Shape \"sphere\"",
+        r#"Texture "t" "spectrum" "checkerboard"
+        Material "diffuse" "texture reflectance" "t" Shape "sphere""#,
     );
     let top = sphere.geometry.positions.iter().position(|position| position[2] > 0.999).unwrap();
     assert!(sphere.geometry.uvs[0][top][1] > 0.9);

@@ -1,6 +1,8 @@
 //! A scene description of pbrt-v4 as a whole scene.
 
-use super::{LoadOptions, Loader, MIN_ALPHA, default_material};
+use glam::Vec3;
+
+use super::{LoadOptions, Loader, MIN_ALPHA, default_material, light::Light};
 use crate::{
     brdf::material::MaterialKind,
     error::Result,
@@ -37,12 +39,16 @@ impl Loader<'_> {
         if contents.materials.is_empty() {
             contents.materials.push(default_material());
         }
+        let is_dark = environment.texels.iter().all(|texel| *texel == Vec3::ZERO)
+            && contents.lamps.is_empty()
+            && contents.materials.iter().all(|material| material.surface.emission.is_none());
+        if is_dark {
+            warnings.push(format!("{}: no light: nothing is lit", self.path.display()));
+        }
+        let light = Light { environment, lamps: contents.lamps };
         let (film, geometry) = (contents.film, contents.geometry);
-        let mut scene =
-            self.scene(camera, film, environment, contents.materials, geometry, warnings);
+        let mut scene = self.scene(camera, film, light, contents.materials, geometry, warnings);
         scene.inputs = contents.inputs;
-        scene.lamps = contents.lamps;
-        scene.hash = crate::scene::hash::hash(&scene);
         Ok(scene)
     }
 }

@@ -16,7 +16,7 @@ use crate::{
         EnvironmentMap, Lamp, features,
         lamp::{LampKind, SpotFalloff},
     },
-    texture::{Texels, Texture},
+    texture::Texture,
 };
 
 /// Largest side of an equal-area map, texels.
@@ -269,21 +269,9 @@ fn read_map(path: &std::path::Path, log: &mut Log) -> Result<EnvironmentMap> {
     if matches!(crate::files::extension(path).as_str(), "hdr" | "exr" | "pfm") {
         return EnvironmentMap::read(path, 1.0, &mut log.warnings);
     }
-    let image = Texture::load(path)?;
-    let linear = |byte: u8| match f32::from(byte) / 255.0 {
-        value if value <= 0.040_45 => value / 12.92,
-        value => ((value + 0.055) / 1.055).powf(2.4),
-    };
-    let texels = match &image.texels {
-        Texels::Bytes(texels) => texels
-            .iter()
-            .map(|&[red, green, blue, _]| Vec3::new(linear(red), linear(green), linear(blue)))
-            .collect(),
-        Texels::Halves(texels) => texels
-            .iter()
-            .map(|&[red, green, blue, _]| Vec3::new(red.to_f32(), green.to_f32(), blue.to_f32()))
-            .collect(),
-    };
+    let image = Texture::load_with(path, &mut log.warnings)?;
+    let texels = linear_from_srgb(&image);
+    let texels = texels.iter().map(|&[red, green, blue, _]| Vec3::new(red, green, blue)).collect();
     let (width, height) = (image.width, image.height);
     Ok(EnvironmentMap { width, height, texels, rotation_rad: 0.0, source: image.name })
 }

@@ -397,18 +397,3 @@ fn color(value: Value, surface: &mut Surface) -> Vec3 {
         }
     }
 }
-
-/// Tests whether a material reads texture coordinates.
-pub fn reads_coordinates(surface: &Surface) -> bool {
-    let emission = surface.emission.as_ref().and_then(|emission| emission.texture.as_ref());
-    [
-        &surface.color,
-        &surface.roughness,
-        &surface.metallic,
-        &surface.normal,
-        &surface.opacity.texture,
-    ]
-    .into_iter()
-    .any(Option::is_some)
-        || emission.is_some()
-}

@@ -52,7 +52,7 @@ use camera::View;
 use directives::{Description, Reader, Shape};
 use lights::{AreaLight, Lights};
 use log::Log;
-use materials::{Materials, reads_coordinates, set_opacity};
+use materials::{Materials, set_opacity};
 use source::Source;
 use state::MaterialChoice;
 use textures::Textures;
@@ -213,7 +213,7 @@ impl Builder<'_> {
         self.log.unused(&shape.entity);
         let Some(material) = material else { return Ok(None) };
         let surface = &self.kept.materials[material as usize].surface;
-        if reads_coordinates(surface) {
+        if surface.textures().next().is_some() {
             let error = |message: String| shape.entity.error(message);
             shapes::give_coordinates(&mut mesh).map_err(error)?;
         }

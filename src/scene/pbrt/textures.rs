@@ -291,15 +291,14 @@ impl<'a> Textures<'a> {
         if let Some(texture) = self.images.get(&key) {
             return Ok(Arc::clone(texture));
         }
-        let loaded = Texture::load(&path);
+        let loaded = Texture::load_with(&path, &mut log.warnings);
         let mut texture = loaded.map_err(|error| entity.error(error.to_string()))?;
-        if let (Some(gamma), Texels::Bytes(bytes)) = (decoding.gamma, &texture.texels) {
-            let decode = |byte: u8| f16::from_f32((f32::from(byte) / 255.0).powf(gamma));
-            let halves = bytes.iter().map(|&[red, green, blue, alpha]| {
-                let alpha = f16::from_f32(f32::from(alpha) / 255.0);
-                [decode(red), decode(green), decode(blue), alpha]
-            });
-            texture.texels = Texels::Halves(halves.collect());
+        if let (Some(gamma), Texels::Bytes(_) | Texels::Shorts(_)) =
+            (decoding.gamma, &texture.texels)
+        {
+            let texels = linear(&texture.texels, |value| value.powf(gamma));
+            texture.texels =
+                Texels::Halves(texels.iter().map(|texel| texel.map(f16::from_f32)).collect());
         }
         let texture = Arc::new(texture);
         log.inputs.push(path);
@@ -372,8 +371,35 @@ fn checkerboard(first: Vec3, second: Vec3, ([du, u], [dv, v]): Mapping) -> Textu
 fn has_opacity(texture: &Texture) -> bool {
     match &texture.texels {
         Texels::Bytes(texels) => texels.iter().any(|texel| texel[3] != u8::MAX),
+        Texels::Shorts(texels) => texels.iter().any(|texel| texel[3] != u16::MAX),
         Texels::Halves(texels) => texels.iter().any(|texel| texel[3] != f16::ONE),
     }
+}
+
+/// Linear value of one encoded by IEC 61966-2-1.
+fn from_srgb(value: f32) -> f32 {
+    if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Linear texels; `decode` reads colours of 8 and 16 bits.
+fn linear(texels: &Texels, decode: impl Fn(f32) -> f32) -> Vec<[f32; 4]> {
+    let decoded =
+        |[red, green, blue, alpha]: [f32; 4]| [decode(red), decode(green), decode(blue), alpha];
+    match texels {
+        Texels::Bytes(texels) => {
+            texels.iter().map(|texel| decoded(texel.map(|byte| f32::from(byte) / 255.0))).collect()
+        }
+        Texels::Shorts(texels) => {
+            let texels = texels.iter();
+            texels.map(|texel| decoded(texel.map(|short| f32::from(short) / 65_535.0))).collect()
+        }
+        Texels::Halves(texels) => texels.iter().map(|texel| texel.map(f16::to_f32)).collect(),
+    }
+}
+
+/// Linear texels of an image whose colours of 8 and 16 bits are sRGB.
+pub fn linear_from_srgb(texture: &Texture) -> Vec<[f32; 4]> {
+    linear(&texture.texels, from_srgb)
 }
 
 /// Makes a texture of numbers, `of` the numbers of another.
@@ -388,26 +414,11 @@ pub fn map_numbers(image: &TextureUse, of: impl Fn(f32) -> f32) -> TextureUse {
         };
         [f16::from_f32(of(value * image.scale[0] + image.bias[0])); 4]
     };
-    let texels = match &image.texture.texels {
-        Texels::Bytes(texels) => {
-            let decode: [f32; 256] = std::array::from_fn(|byte| {
-                let value = byte as f32 / 255.0;
-                match image.encoding {
-                    Encoding::Linear => value,
-                    Encoding::Srgb if value <= 0.040_45 => value / 12.92,
-                    Encoding::Srgb => ((value + 0.055) / 1.055).powf(2.4),
-                }
-            });
-            let linear = texels.iter().map(|&[red, green, blue, alpha]| {
-                let [red, green, blue] = [red, green, blue].map(|byte| decode[usize::from(byte)]);
-                number([red, green, blue, f32::from(alpha) / 255.0])
-            });
-            linear.collect()
-        }
-        Texels::Halves(texels) => {
-            texels.iter().map(|texel| number(texel.map(f16::to_f32))).collect()
-        }
+    let texels = match image.encoding {
+        Encoding::Srgb => linear_from_srgb(&image.texture),
+        Encoding::Linear => linear(&image.texture.texels, |value| value),
     };
+    let texels = texels.into_iter().map(number).collect();
     let texture = Texture { texels: Texels::Halves(texels), ..Texture::clone(&image.texture) };
     TextureUse {
         texture: Arc::new(texture),
