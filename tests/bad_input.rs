@@ -186,13 +186,6 @@ fn wrong_options_exit_with_2() {
 }
 
 #[test]
-fn other_scene_formats_are_refused_by_name() {
-    let folder = Folder::new();
-    folder.write("room.pbrt", "");
-    folder.run(&["render", "room.pbrt"]).assert(1, &["error: room.pbrt: ", "a pbrt file"]);
-}
-
-#[test]
 fn a_missing_or_truncated_mesh_is_named() {
     let folder = scene("quad.ply", "absent.ply");
     assert_refused(&folder, &["error: absent.ply: cannot read: No such file"]);

@@ -653,10 +653,8 @@ fn an_included_file_is_placed_with_its_materials() {
 
 #[test]
 fn other_kinds_of_scenes_are_refused_by_name() {
-    for (name, expected) in [("a.xml", "a Mitsuba file"), ("a.PBRT", "a pbrt file")] {
-        let message = Scene::load(Path::new(name)).unwrap_err().to_string();
-        assert!(message.contains(expected) && message.contains(".toml"), "{message}");
-    }
+    let message = Scene::load(Path::new("a.XML")).unwrap_err().to_string();
+    assert!(message.contains("a Mitsuba file") && message.contains(".toml"), "{message}");
     let message = Scene::load(Path::new("missing.toml")).unwrap_err().to_string();
     assert!(message.contains("missing.toml: cannot read"), "{message}");
     let folder = Folder::new();

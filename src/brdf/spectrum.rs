@@ -104,6 +104,21 @@ pub fn srgb_weights(wavelengths_nm: &[f64]) -> Option<Vec<DVec3>> {
         .then(|| weighted.into_iter().map(|xyz| SRGB_FROM_XYZ * xyz / luminous).collect())
 }
 
+/// Linear sRGB colour, of luminance 1, of light whose spectral power at a wavelength in nm is `power`,
+/// by sums at every nanometre. `None` if nothing of it is visible.
+pub fn light_color(power: impl Fn(f64) -> f64) -> Option<DVec3> {
+    let last = COLOUR_MATCHING.len() - 1;
+    let xyz: DVec3 = (0..last * STEP_NM as usize)
+        .map(|index| {
+            let position = index as f64 / STEP_NM;
+            let row = position as usize;
+            let [low, high] = [row, row + 1].map(|row| DVec3::from(COLOUR_MATCHING[row]));
+            low.lerp(high, position - row as f64) * power(FIRST_NM + index as f64)
+        })
+        .sum();
+    (xyz.y > 0.0 && xyz.is_finite()).then(|| SRGB_FROM_XYZ * xyz / xyz.y)
+}
+
 #[cfg(test)]
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests may panic")]
@@ -116,6 +131,18 @@ mod tests {
         let wavelengths: Vec<f64> = (0..41).map(|index| 380.0 + 10.0 * f64::from(index)).collect();
         let colour: DVec3 = srgb_weights(&wavelengths).unwrap().iter().sum();
         assert!((colour - DVec3::ONE).abs().max_element() < 2e-3, "{colour}");
+    }
+
+    #[test]
+    fn light_of_the_illuminant_is_white() {
+        let row = |nm: f64| ((nm - FIRST_NM) / STEP_NM) as usize;
+        let color = light_color(|nm| {
+            let position = (nm - FIRST_NM) / STEP_NM;
+            let [low, high] = [row(nm), row(nm) + 1].map(|row| ILLUMINANT_D65[row]);
+            low + (high - low) * position.fract()
+        });
+        assert!((color.unwrap() - DVec3::ONE).abs().max_element() < 2e-3, "{color:?}");
+        assert!(light_color(|_| 0.0).is_none());
     }
 
     /// A spectrum sampled twice as finely has the same colour.

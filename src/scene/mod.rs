@@ -10,6 +10,7 @@ pub mod lamp;
 pub mod load;
 pub mod mesh;
 pub mod mitsuba;
+pub mod pbrt;
 pub mod quadrics;
 pub mod shapes;
 pub mod transform;

@@ -46,6 +46,29 @@ impl EnvironmentMap {
         warnings: &mut Vec<String>,
     ) -> Result<Self> {
         check_placement(scale, rotation_deg).map_err(|message| Error::format(path, message))?;
+        let mut map = Self::read(path, scale, warnings)?;
+        if map.width != 2 * map.height {
+            warnings.push(format!(
+                "{}: {}×{} texels; a lat-long map is expected to be twice as wide as high and is \
+                 stretched to the whole sphere",
+                path.display(),
+                map.width,
+                map.height
+            ));
+        }
+        map.rotation_rad = rotation_deg.rem_euclid(360.0).to_radians();
+        Ok(map)
+    }
+
+    /// As [`EnvironmentMap::load`] without a rotation, for an image of any ratio and mapping.
+    ///
+    /// # Errors
+    /// As [`EnvironmentMap::load`].
+    pub(in crate::scene) fn read(
+        path: &Path,
+        scale: f32,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self> {
         let read = match files::extension(path).as_str() {
             "hdr" => read_hdr,
             "exr" => read_exr,
@@ -58,20 +81,11 @@ impl EnvironmentMap {
             }
         };
         let image = read(&files::read(path)?).map_err(|message| Error::format(path, message))?;
-        if image.width != 2 * image.height {
-            warnings.push(format!(
-                "{}: {}×{} texels; a lat-long map is expected to be twice as wide as high and is \
-                 stretched to the whole sphere",
-                path.display(),
-                image.width,
-                image.height
-            ));
-        }
         let mut map = Self {
             width: image.width,
             height: image.height,
             texels: image.texels,
-            rotation_rad: rotation_deg.rem_euclid(360.0).to_radians(),
+            rotation_rad: 0.0,
             source: path.display().to_string(),
         };
         map.clean(scale, warnings);

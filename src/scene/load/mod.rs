@@ -7,6 +7,7 @@ mod light;
 mod materials;
 mod mitsuba;
 mod objects;
+mod pbrt;
 mod whole;
 
 use std::path::{Path, PathBuf};
@@ -55,9 +56,11 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`], and for a camera that the file does not have.
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self> {
-        refuse_other_formats(path)?;
         if mitsuba::is_mitsuba(path) {
             return Loader::new(path).mitsuba(options);
+        }
+        if super::pbrt::is_pbrt(path) {
+            return Loader::new(path).pbrt(options);
         }
         if whole::is_whole(path) {
             return Loader::new(path).whole(options);
@@ -108,20 +111,6 @@ fn scene_name(path: &Path) -> String {
     let folder = absolute.parent().and_then(Path::file_name);
     let name = if stem == "scene" { folder.unwrap_or(stem) } else { stem };
     name.to_string_lossy().into_owned()
-}
-
-fn refuse_other_formats(path: &Path) -> Result<()> {
-    let format = match files::extension(path).as_str() {
-        "pbrt" => "a pbrt file",
-        _ => return Ok(()),
-    };
-    Err(Error::format(
-        path,
-        format!(
-            "expected a scene in .toml, .gltf, .glb, .obj or .xml, found {format}, which cannot be \
-             rendered as a scene yet"
-        ),
-    ))
 }
 
 /// Material of a scene that has nothing but an environment.

@@ -11,6 +11,7 @@ use std::{
     path::Path,
 };
 
+use flate2::read::MultiGzDecoder;
 use header::{Element, Encoding, Property, Scalar};
 
 use super::Mesh;
@@ -24,13 +25,21 @@ use crate::{
 const UV_NAMES: [[&str; 2]; 4] =
     [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
 
-/// Reads a PLY file; vertex colours, which are left out, are a warning.
+/// Largest compression of gzip, which bounds what a compressed file may promise.
+const GZIP_LARGEST_RATIO: u64 = 1032;
+
+/// Reads a PLY file, or one compressed by gzip if its extension is `gz`. Vertex colours, which are left
+/// out, are a warning.
 ///
 /// # Errors
 /// [`Error::Io`], or [`Error::Format`] that names the element and what was expected and found.
 pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
     let file = files::open_regular(path)?;
     let file_bytes = file.metadata().map_err(|source| Error::io(path, "read", source))?.len();
+    if files::extension(path) == "gz" {
+        let reader = BufReader::with_capacity(1 << 16, MultiGzDecoder::new(file));
+        return read_from(path, reader, file_bytes.saturating_mul(GZIP_LARGEST_RATIO), warnings);
+    }
     read_from(path, BufReader::with_capacity(1 << 16, file), file_bytes, warnings)
 }
 

@@ -1,0 +1,183 @@
+//! Files of a scene description: the main file, those that it includes, plain or compressed by gzip.
+
+use std::{
+    fs::File,
+    io::{BufReader, Read},
+    path::{Component, Path, PathBuf},
+    rc::Rc,
+};
+
+use flate2::read::MultiGzDecoder;
+
+use super::tokens::{Place, Token, Tokens};
+use crate::{error::Result, files};
+
+/// Most files that may include one another.
+const MAX_DEPTH: usize = 32;
+/// Most bytes of a file, after decompression.
+const MAX_BYTES: u64 = 1 << 33;
+
+type FileTokens = Tokens<BufReader<Box<dyn Read>>>;
+
+struct Open {
+    path: PathBuf,
+    tokens: FileTokens,
+    /// True if the graphics state returns to what it was at the end of the file.
+    restores: bool,
+}
+
+/// Tokens of the main file and of the files that it includes.
+pub struct Source {
+    /// Folder of the main file, to which all paths are relative.
+    folder: PathBuf,
+    stack: Vec<Open>,
+    /// Last token, if it is to be read again.
+    held: Option<Token>,
+    /// Files read.
+    pub inputs: Vec<PathBuf>,
+}
+
+/// Next part of a source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Token of a file.
+    Token(Token),
+    /// End of a file that `Import` named.
+    EndOfImport,
+    /// End of the main file.
+    End,
+}
+
+impl Source {
+    /// Opens the main file.
+    ///
+    /// # Errors
+    /// [`Io`](crate::error::Error::Io), and [`Format`](crate::error::Error::Format) for a device.
+    pub fn open(path: &Path) -> Result<Self> {
+        let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        let first = Open { path: path.into(), tokens: open(path)?, restores: false };
+        Ok(Self { folder, stack: vec![first], held: None, inputs: vec![path.into()] })
+    }
+
+    /// Folder to which paths are relative.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Next token, or the end of an imported file or of everything.
+    ///
+    /// # Errors
+    /// Those of the tokeniser.
+    pub fn next(&mut self) -> Result<Part> {
+        if let Some(token) = self.held.take() {
+            return Ok(Part::Token(token));
+        }
+        loop {
+            let Some(open) = self.stack.last_mut() else { return Ok(Part::End) };
+            if let Some(token) = open.tokens.next()? {
+                return Ok(Part::Token(token));
+            }
+            if self.stack.len() == 1 {
+                return Ok(Part::End);
+            }
+            if self.stack.pop().is_some_and(|open| open.restores) {
+                return Ok(Part::EndOfImport);
+            }
+        }
+    }
+
+    /// Next token of the file in hand; none at its end, which stays to be read by `next`.
+    ///
+    /// # Errors
+    /// Those of the tokeniser.
+    pub fn next_here(&mut self) -> Result<Option<Token>> {
+        match (self.held.take(), self.stack.last_mut()) {
+            (None, Some(open)) => open.tokens.next(),
+            (held, _) => Ok(held),
+        }
+    }
+
+    /// Returns the last token to be read again.
+    pub fn hold(&mut self, token: Token) {
+        self.held = Some(token);
+    }
+
+    /// Characters of the last token.
+    pub fn text(&self) -> &str {
+        self.stack.last().map_or("", |open| open.tokens.text())
+    }
+
+    /// Place of the last token.
+    pub fn place(&self) -> Place {
+        match self.stack.last() {
+            Some(open) => open.tokens.place().clone(),
+            None => Place { path: Rc::from(self.folder.as_path()), line: 0, column: 0 },
+        }
+    }
+
+    /// Goes on with another file, until its end. `restores` marks an import.
+    ///
+    /// # Errors
+    /// [`Parse`](crate::error::Error::Parse) with the place of the statement for a file outside the scene's folder, one
+    /// that includes itself, one that cannot be read, and too many files in one another.
+    pub fn include(&mut self, name: &str, restores: bool, place: &Place) -> Result<()> {
+        if !stays_inside(Path::new(name)) {
+            return Err(place.error(format!(
+                "expected a file in the folder of the scene, found `{name}`, which may be \
+                 elsewhere: copy it into the folder"
+            )));
+        }
+        let path = self.folder.join(name);
+        if self.stack.iter().any(|open| files::is_same_file(&open.path, &path)) {
+            return Err(place.error(format!("`{name}` includes itself")));
+        }
+        if self.stack.len() == MAX_DEPTH {
+            let message = format!("more than {MAX_DEPTH} files include one another");
+            return Err(place.error(message));
+        }
+        let tokens = open(&path).map_err(|error| place.error(error.to_string()))?;
+        self.inputs.push(path.clone());
+        self.stack.push(Open { path, tokens, restores });
+        Ok(())
+    }
+}
+
+/// Checks that a relative path never climbs out of the folder it starts in.
+fn stays_inside(path: &Path) -> bool {
+    let mut depth = 0_i64;
+    path.components().all(|component| {
+        match component {
+            Component::Normal(_) => depth += 1,
+            Component::CurDir => {}
+            Component::ParentDir => depth -= 1,
+            Component::RootDir | Component::Prefix(_) => return false,
+        }
+        depth >= 0
+    })
+}
+
+fn open(path: &Path) -> Result<FileTokens> {
+    let file: File = files::open_regular(path)?;
+    let reader: Box<dyn Read> = if files::extension(path) == "gz" {
+        Box::new(MultiGzDecoder::new(file))
+    } else {
+        Box::new(file)
+    };
+    let reader = BufReader::with_capacity(1 << 16, reader);
+    Ok(Tokens::new(Rc::from(path), reader, MAX_BYTES))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_that_climb_out_are_found() {
+        for inside in ["a.pbrt", "a/../b.pbrt", "./a/b.pbrt", "a b.pbrt"] {
+            assert!(stays_inside(Path::new(inside)), "{inside}");
+        }
+        for outside in ["../a.pbrt", "a/../../b.pbrt", "/dev/zero", "a/../../a/b"] {
+            assert!(!stays_inside(Path::new(outside)), "{outside}");
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! Graphics state of a scene description: what the next shape or light takes from the directives
+//! before it.
+
+use std::{collections::HashMap, rc::Rc};
+
+use glam::{DMat4, DVec3};
+
+use super::{
+    parameters::{Entity, Parameter},
+    tokens::Place,
+};
+use crate::error::Result;
+
+/// Most states that may be saved at a time.
+const MAX_SAVED: usize = 1 << 12;
+
+/// Material that shapes take.
+#[derive(Clone, Debug)]
+pub enum MaterialChoice {
+    /// That of pbrt where a file chooses none: diffuse, 0.5.
+    Default,
+    /// From `Material`.
+    Own(Rc<Entity>),
+    /// From `NamedMaterial`.
+    Named(Rc<str>, Place),
+}
+
+/// Directives that `Attribute` gives parameters to.
+#[derive(Clone, Debug, Default)]
+pub struct Attributes {
+    /// Parameters of shapes, lights, materials, media and textures.
+    lists: [Rc<Vec<Parameter>>; 5],
+}
+
+impl Attributes {
+    const TARGETS: [&str; 5] = ["shape", "light", "material", "medium", "texture"];
+
+    fn index(target: &str) -> Option<usize> {
+        Self::TARGETS.iter().position(|name| *name == target)
+    }
+
+    /// Parameters for a target.
+    pub fn of(&self, target: &str) -> &[Parameter] {
+        Self::index(target).map_or(&[], |index| &self.lists[index])
+    }
+
+    /// Adds parameters, which come before older ones of the same name.
+    ///
+    /// # Errors
+    /// With the place for an unknown target.
+    pub fn add(
+        &mut self,
+        target: &str,
+        mut parameters: Vec<Parameter>,
+        place: &Place,
+    ) -> Result<()> {
+        let Some(index) = Self::index(target) else {
+            let expected = Self::TARGETS.join(", ");
+            return Err(
+                place.error(format!("Attribute: expected one of {expected}, found `{target}`"))
+            );
+        };
+        let list = Rc::make_mut(&mut self.lists[index]);
+        list.retain(|old| parameters.iter().all(|new| new.name != old.name));
+        parameters.append(list);
+        *list = parameters;
+        Ok(())
+    }
+}
+
+/// What the next shape or light takes.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// Current transformation matrix: world from object, or camera from world before `Camera`.
+    pub ctm: DMat4,
+    /// True after an odd number of `ReverseOrientation`.
+    pub reverse: bool,
+    /// Material.
+    pub material: MaterialChoice,
+    /// `AreaLightSource` of the shapes.
+    pub area_light: Option<Rc<Entity>>,
+    /// Parameters from `Attribute`.
+    pub attributes: Attributes,
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self {
+            ctm: DMat4::IDENTITY,
+            reverse: false,
+            material: MaterialChoice::Default,
+            area_light: None,
+            attributes: Attributes::default(),
+        }
+    }
+}
+
+/// Directive that saves the state, and that ends at its own counterpart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Saved {
+    /// `AttributeBegin`
+    Attribute,
+    /// `TransformBegin`: restores the matrix alone.
+    Transform,
+    /// `ObjectBegin`
+    Object,
+    /// `Import`
+    Import,
+}
+
+impl Saved {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Attribute => "AttributeBegin",
+            Self::Transform => "TransformBegin",
+            Self::Object => "ObjectBegin",
+            Self::Import => "Import",
+        }
+    }
+}
+
+/// States saved by directives that have not ended yet.
+#[derive(Debug, Default)]
+pub struct States {
+    /// State in force.
+    pub now: State,
+    saved: Vec<(Saved, State, Place)>,
+    /// Matrices that `CoordinateSystem` has named.
+    pub named: HashMap<String, DMat4>,
+}
+
+impl States {
+    /// Saves the state.
+    ///
+    /// # Errors
+    /// With the place if too many are saved.
+    pub fn save(&mut self, why: Saved, place: Place) -> Result<()> {
+        if self.saved.len() == MAX_SAVED {
+            let message = format!("more than {MAX_SAVED} blocks in one another");
+            return Err(place.error(message));
+        }
+        self.saved.push((why, self.now.clone(), place));
+        Ok(())
+    }
+
+    /// Returns to the state saved last.
+    ///
+    /// # Errors
+    /// With the place if it was saved for another reason, or not at all.
+    pub fn restore(&mut self, why: Saved, place: &Place) -> Result<()> {
+        match self.saved.pop() {
+            Some((found, state, _)) if found == why => {
+                if why == Saved::Transform {
+                    self.now.ctm = state.ctm;
+                } else {
+                    self.now = state;
+                }
+                Ok(())
+            }
+            Some((found, _, begin)) => Err(place.error(format!(
+                "an end without its beginning: the block open here is the {} of line {}",
+                found.name(),
+                begin.line
+            ))),
+            None => Err(place.error("an end without its beginning")),
+        }
+    }
+
+    /// Checks that everything has ended.
+    ///
+    /// # Errors
+    /// With the place of the beginning.
+    pub fn check_end(&self) -> Result<()> {
+        match self.saved.last() {
+            Some((why, _, place)) => {
+                Err(place.error(format!("{} without an end in the file", why.name())))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// Rotation about an axis by an angle in degrees, counter-clockwise seen against the axis; none for
+/// an axis without direction.
+pub fn rotation(angle_deg: f64, axis: DVec3) -> Option<DMat4> {
+    Some(DMat4::from_axis_angle(axis.try_normalize()?, angle_deg.to_radians()))
+}
+
+/// Camera from world for a viewer at `eye` that looks to `target`; none if these coincide or `up`
+/// lies along the view. The camera looks along +z with +x to the right and +y up.
+pub fn look_at(eye: DVec3, target: DVec3, up: DVec3) -> Option<DMat4> {
+    let forward = (target - eye).try_normalize()?;
+    let right = up.try_normalize()?.cross(forward).try_normalize()?;
+    let columns = [right, forward.cross(right), forward].map(|axis| axis.extend(0.0));
+    Some(DMat4::from_cols(columns[0], columns[1], columns[2], eye.extend(1.0)).inverse())
+}

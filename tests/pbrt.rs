@@ -1,0 +1,708 @@
+//! Scene descriptions of pbrt-v4: every concept by a small text, errors with their places, and real
+//! scenes where the folder of them is there. `docs/pbrt.md` follows the declaration of features.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
+
+#[path = "support/command.rs"]
+mod command;
+#[path = "support/page.rs"]
+mod page;
+
+use std::{collections::HashSet, path::Path};
+
+use command::Folder;
+use fenestra::{
+    brdf::{
+        Material,
+        material::{ConductorFresnel, MaterialKind},
+    },
+    scene::{
+        Camera, Filter, Scene,
+        features::{self, Feature},
+        lamp::{LampKind, SpotFalloff},
+        load::LoadOptions,
+    },
+    texture::{Channels, Encoding, Interpolation, Texels, Wrap},
+};
+use glam::{Vec2, Vec3};
+
+/// A triangle at the corners of the axes, counter-clockwise seen from (1, 1, 1).
+const TRIANGLE: &str =
+    r#"Shape "trianglemesh" "point3 P" [1 0 0 0 1 0 0 0 1] "integer indices" [0 1 2]"#;
+/// A view of the origin from −z without a mirror.
+const VIEW: &str = r#"LookAt 0 0 -5 0 0 0 0 1 0 Film "rgb" "integer xresolution" 200
+    "integer yresolution" 100 Camera "perspective" "float fov" 60"#;
+/// A view whose camera mirrors, so that the world stays as it is.
+const MIRRORED: &str = r#"Scale -1 1 1 LookAt 0 0 -5 0 0 0 0 1 0 Camera "perspective""#;
+
+fn load(head: &str, world: &str) -> Scene {
+    let folder = Folder::new();
+    let text = format!("{head}\nWorldBegin\n{world}\n");
+    Scene::load(&folder.write("room.pbrt", text)).unwrap_or_else(|error| panic!("{error}\n{world}"))
+}
+
+/// Loads a world seen by a camera that mirrors, so that positions stay as they are.
+fn world(text: &str) -> Scene {
+    load(MIRRORED, text)
+}
+
+/// Message of a world that cannot be read, without the folder.
+fn message(text: &str) -> String {
+    let folder = Folder::new();
+    let path = folder.write("room.pbrt", format!("{MIRRORED}\nWorldBegin\n{text}"));
+    let message = Scene::load(&path).expect_err(text).to_string();
+    message.replace(&format!("{}/", folder.path().display()), "")
+}
+
+/// Warnings without the path that begins each.
+fn warnings(scene: &Scene) -> Vec<String> {
+    let strip = |warning: &String| warning.split_once(": ").unwrap().1.to_owned();
+    scene.warnings.iter().map(strip).collect()
+}
+
+fn material(text: &str) -> Material {
+    world(&format!("Material {text} {TRIANGLE}")).materials[0].clone()
+}
+
+/// Place in the picture, (0, 0) at the lower left corner and (1, 1) at the upper right.
+fn project(camera: &Camera, aspect: f32, point: Vec3) -> Vec2 {
+    let forward = (camera.look_at - camera.position).normalize();
+    let right = forward.cross(camera.up).normalize();
+    let up = right.cross(forward);
+    let ray = point - camera.position;
+    let height = (0.5 * camera.vertical_fov_deg).to_radians().tan() * ray.dot(forward);
+    0.5 * (Vec2::new(ray.dot(right) / (height * aspect), ray.dot(up) / height) + 1.0)
+}
+
+fn positions(scene: &Scene) -> Vec<Vec3> {
+    scene.geometry.positions.iter().map(|&position| Vec3::from_array(position)).collect()
+}
+
+/// Normal of a triangle by its winding.
+fn normal(scene: &Scene, triangle: usize) -> Vec3 {
+    let positions = positions(scene);
+    let [a, b, c] = scene.geometry.triangles[triangle].map(|at| positions[at as usize]);
+    (b - a).cross(c - a).normalize()
+}
+
+#[test]
+fn a_point_is_where_pbrt_shows_it() {
+    // The film is 2:1, so that 60° are from bottom to top: tan 30° = 0.57735.
+    for (mirror, side) in [("", 1.0), ("Scale -1 1 1 ", -1.0)] {
+        let scene = load(&format!("{mirror}{VIEW}"), TRIANGLE);
+        let place = |index: usize| project(&scene.camera, 2.0, positions(&scene)[index]);
+        let expected = Vec2::new(0.5 + side * 0.5 * (0.2 / 0.57735 / 2.0), 0.5);
+        assert!((place(0) - expected).length() < 1e-4, "{} {expected}", place(0));
+        let expected = Vec2::new(0.5, 0.5 + 0.5 * (0.2 / 0.57735));
+        assert!((place(1) - expected).length() < 1e-4, "{} {expected}", place(1));
+        assert!((place(2) - Vec2::splat(0.5)).length() < 1e-4);
+        // The outside is that of the winding, whatever mirrors.
+        let outside = normal(&scene, 0).dot(positions(&scene).iter().sum::<Vec3>());
+        assert!(outside > 0.0, "{mirror}");
+        assert_eq!((scene.film.width, scene.film.height), (200, 100));
+    }
+}
+
+#[test]
+fn fov_is_that_of_the_shorter_side_and_lenses_scale() {
+    let tall = r#"Film "rgb" "integer xresolution" 100 "integer yresolution" 200
+        Scale 0.5 0.5 0.5 Translate 0 0 5
+        Camera "perspective" "float fov" 60 "float lensradius" 0.1 "float focaldistance" 3"#;
+    let camera = load(tall, "").camera;
+    let expected = 2.0 * (2.0 * 30_f32.to_radians().tan()).atan().to_degrees();
+    assert!((camera.vertical_fov_deg - expected).abs() < 1e-3, "{camera:?}");
+    // Camera from world halves, so that world from camera doubles.
+    assert!(
+        (camera.aperture_radius - 0.2).abs() < 1e-6 && (camera.focus_distance - 6.0).abs() < 1e-5
+    );
+    assert!((camera.position - Vec3::new(0.0, 0.0, 5.0)).length() < 1e-5, "{camera:?}");
+    let window = r#"Camera "perspective" "float fov" 90
+        "float screenwindow" [-0.8888889 0.8888889 -0.5 0.5]"#;
+    let scene = load(window, "");
+    assert!((scene.camera.vertical_fov_deg - 2.0 * 0.5_f32.atan().to_degrees()).abs() < 1e-3);
+    assert!(warnings(&scene).is_empty(), "{:?}", scene.warnings);
+}
+
+#[test]
+fn the_film_scales_light_and_chooses_the_filter() {
+    let head = r#"Film "rgb" "float iso" 200 "string filename" "a.exr" PixelFilter "box" "float xradius" 0.5
+        Camera "perspective" "float shutterclose" 0.25"#;
+    let scene = load(head, r#"LightSource "infinite" "rgb L" [1 2 3] "float scale" 2"#);
+    assert_eq!(scene.film.filter, Filter::Box);
+    assert_eq!((scene.film.width, scene.film.height), (1280, 720));
+    assert_eq!(scene.environment.texels[0], Vec3::new(1.0, 2.0, 3.0));
+    let other = load(r#"PixelFilter "mitchell" Camera "perspective""#, "");
+    assert_eq!(other.film.filter, Filter::Gaussian);
+    assert!(warnings(&other)[0].contains("PixelFilter `mitchell`"), "{:?}", other.warnings);
+}
+
+#[test]
+fn transformations_follow_one_another() {
+    let at_origin = |transform: &str| {
+        let scene = world(&format!("{transform} {TRIANGLE}"));
+        positions(&scene)[0]
+    };
+    let cases = [
+        ("Translate 1 2 3 Scale 2 1 1", [3.0, 2.0, 3.0]),
+        ("Scale 2 1 1 Translate 1 2 3", [4.0, 2.0, 3.0]),
+        ("Rotate 90 0 0 1", [0.0, 1.0, 0.0]),
+        ("Translate 9 9 9 Transform [1 0 0 0  0 1 0 0  0 0 1 0  5 6 7 1]", [6.0, 6.0, 7.0]),
+        ("Translate 1 0 0 ConcatTransform [1 0 0 0  0 1 0 0  0 0 1 0  5 6 7 1]", [7.0, 6.0, 7.0]),
+        (
+            "Translate 1 0 0 CoordinateSystem \"a\" Identity CoordSysTransform \"a\"",
+            [2.0, 0.0, 0.0],
+        ),
+        ("AttributeBegin Translate 1 0 0 AttributeEnd", [1.0, 0.0, 0.0]),
+        ("TransformBegin Translate 1 0 0 TransformEnd", [1.0, 0.0, 0.0]),
+        // The camera stands at z = −5 and mirrors x.
+        ("CoordSysTransform \"camera\"", [-1.0, 0.0, -5.0]),
+    ];
+    for (transform, expected) in cases {
+        let found = at_origin(transform);
+        assert!((found - Vec3::from_array(expected)).length() < 1e-5, "{transform}: {found}");
+    }
+}
+
+#[test]
+fn sides_are_those_of_vertex_normals_else_of_the_winding() {
+    let mesh = |normals: &str| {
+        format!(
+            r#"Shape "trianglemesh" "point3 P" [0 0 0 1 0 0 0 1 0] "integer indices" [0 1 2] {normals}"#
+        )
+    };
+    let against = r#""normal N" [0 0 -1 0 0 -1 0 0 -1]"#;
+    let cases = [
+        ("", "", 1.0),
+        ("", against, -1.0),
+        ("ReverseOrientation", "", -1.0),
+        ("ReverseOrientation", against, 1.0),
+        ("ReverseOrientation ReverseOrientation", "", 1.0),
+        ("Scale -1 1 1", "", 1.0),
+        ("Scale 1 1 -1", "", -1.0),
+        ("Scale -1 1 1 ReverseOrientation", "", -1.0),
+    ];
+    for (state, normals, side) in cases {
+        let text = format!("AreaLightSource \"diffuse\" {state} {}", mesh(normals));
+        // In the mirrored world, z is turned, and so is the side.
+        for (head, turn) in [(MIRRORED, 1.0), (VIEW, -1.0)] {
+            let scene = load(head, &text);
+            let found = normal(&scene, 0).z * turn;
+            assert!((found - side).abs() < 1e-6, "{state} {normals}: {found}");
+            if !normals.is_empty() {
+                let shading = Vec3::from_array(scene.geometry.normals[0]);
+                assert!(shading.dot(normal(&scene, 0)) > 0.9, "{state}");
+            }
+            let emission = scene.materials[0].surface.emission.as_ref().unwrap();
+            assert!(!emission.two_sided && emission.radiance == Vec3::ONE);
+        }
+    }
+}
+
+#[test]
+fn quadrics_and_patches_face_outward() {
+    for (shape, area) in [
+        ("\"sphere\" \"float radius\" 2", 16.0 * std::f32::consts::PI),
+        ("\"cylinder\" \"float zmin\" 0 \"float zmax\" 3", 6.0 * std::f32::consts::PI),
+        ("\"disk\" \"float height\" 1 \"float innerradius\" 0.5", 0.75 * std::f32::consts::PI),
+        ("\"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 2 0 2 2 0]", 4.0),
+        (
+            r#""loopsubdiv" "integer levels" 1 "point3 P" [1 0 0 0 1 0 0 0 1]
+            "integer indices" [0 1 2]"#,
+            0.3,
+        ),
+    ] {
+        let scene = world(&format!("Shape {shape}"));
+        let positions = positions(&scene);
+        let mut sum = 0.0;
+        for (index, triangle) in scene.geometry.triangles.iter().enumerate() {
+            let [a, b, c] = triangle.map(|at| positions[at as usize]);
+            sum += 0.5 * (b - a).cross(c - a).length();
+            let centre = (a + b + c) / 3.0;
+            let outward = match shape.contains("disk") || shape.contains("bilinear") {
+                true => Vec3::Z,
+                false if shape.contains("cylinder") => centre.with_z(0.0),
+                false => centre,
+            };
+            assert!(normal(&scene, index).dot(outward) > 0.0, "{shape}");
+        }
+        assert!((sum - area).abs() < 0.02 * area.max(5.0), "{shape}: {sum} {area}");
+    }
+    let curved = world("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 1]");
+    assert_eq!(curved.geometry.triangles.len(), 512);
+    // v of a sphere runs from −z to +z.
+    let sphere = world(
+        r#"Texture "t" "spectrum" "checkerboard"
+        Material "diffuse" "texture reflectance" "t" Shape "sphere""#,
+    );
+    let top = sphere.geometry.positions.iter().position(|position| position[2] > 0.999).unwrap();
+    assert!(sphere.geometry.uvs[0][top][1] > 0.9);
+}
+
+#[test]
+fn objects_are_repeated_where_their_instances_stand() {
+    let text = format!(
+        r#"ObjectBegin "a" Translate 1 0 0 {TRIANGLE} ObjectEnd
+        Translate 0 10 0 ObjectInstance "a" Scale 2 2 2 ObjectInstance "a""#
+    );
+    let scene = world(&text);
+    let found = positions(&scene);
+    assert_eq!(scene.geometry.triangles.len(), 2);
+    assert_eq!(found[0], Vec3::new(2.0, 10.0, 0.0));
+    assert_eq!(found[3], Vec3::new(4.0, 10.0, 0.0));
+    assert!(message("ObjectInstance \"b\"").starts_with("room.pbrt:3:1: there is no object `b`"));
+    assert!(
+        message("ObjectBegin \"a\" ObjectInstance \"a\" ObjectEnd").contains("inside an object")
+    );
+}
+
+#[test]
+fn materials_are_the_nearest() {
+    let close = |found: Vec3, expected: [f32; 3]| {
+        assert!((found - Vec3::from_array(expected)).abs().max_element() < 1e-4, "{found}");
+    };
+    assert!(matches!(material(r#""diffuse""#).kind,
+        MaterialKind::Diffuse { reflectance } if reflectance == Vec3::splat(0.5)));
+    let MaterialKind::Plastic { diffuse, alpha, ior } = material(
+        r#""coateddiffuse" "rgb reflectance" [0.1 0.2 0.3] "float roughness" 0.25 "float eta" 1.3"#,
+    )
+    .kind
+    else {
+        panic!()
+    };
+    close(diffuse, [0.1, 0.2, 0.3]);
+    assert_eq!((alpha, ior), (0.5, 1.3));
+    let MaterialKind::Plastic { alpha, .. } =
+        material(r#""coateddiffuse" "bool remaproughness" false "float roughness" 0.25"#).kind
+    else {
+        panic!()
+    };
+    assert_eq!(alpha, 0.25);
+    let MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } =
+        material(r#""conductor" "rgb eta" [1.6 0.8 0.5] "spectrum k" "metal-Ag-k""#).kind
+    else {
+        panic!()
+    };
+    close(eta, [1.6, 0.8, 0.5]);
+    close(k, [4.049, 3.343, 2.393]);
+    assert_eq!(alpha, 1e-3);
+    // η = 1 and k = 2√r/√(1 − r) reflect r at normal incidence.
+    let MaterialKind::Conductor { fresnel: ConductorFresnel::Exact { eta, k }, .. } =
+        material(r#""conductor" "rgb reflectance" [0.5 0.8 0]"#).kind
+    else {
+        panic!()
+    };
+    close(eta, [1.0; 3]);
+    close(k * k / (k * k + 4.0), [0.5, 0.8, 0.0]);
+    let MaterialKind::Dielectric { ior, alpha, .. } =
+        material(r#""dielectric" "spectrum eta" "glass-BK7""#).kind
+    else {
+        panic!()
+    };
+    assert_eq!((ior, alpha), (1.5168, 0.0));
+    let MaterialKind::Dielectric { ior, alpha, .. } =
+        material(r#""dielectric" "rgb eta" [1.4 1.4 1.4] "float roughness" 0.04"#).kind
+    else {
+        panic!()
+    };
+    assert!((ior - 1.4).abs() < 1e-6 && (alpha - 0.2).abs() < 1e-6);
+    assert!(matches!(
+        material(r#""thindielectric""#).kind,
+        MaterialKind::ThinDielectric { ior: 1.5, .. }
+    ));
+    assert!(
+        message(&format!("Material \"measured\" {TRIANGLE}"))
+            .contains("`measured` cannot be rendered")
+    );
+    assert!(message(&format!("Material \"matte\" {TRIANGLE}")).contains("--upgrade"));
+    assert!(
+        message(&format!("NamedMaterial \"x\" {TRIANGLE}"))
+            .starts_with("room.pbrt:3:1: NamedMaterial")
+    );
+}
+
+#[test]
+fn mixtures_and_surfaces_that_are_not_there() {
+    let text = format!(
+        r#"MakeNamedMaterial "red" "string type" "diffuse" "rgb reflectance" [1 0 0]
+        MakeNamedMaterial "none" "string type" "interface"
+        MakeNamedMaterial "thin" "string type" "mix" "string materials" ["red" "none"] "float amount" 0.75
+        NamedMaterial "thin" {TRIANGLE}
+        NamedMaterial "none" AreaLightSource "diffuse" {TRIANGLE}"#
+    );
+    let scene = world(&text);
+    assert_eq!(scene.geometry.triangles.len(), 1);
+    assert_eq!(scene.materials.len(), 1);
+    assert_eq!(scene.materials[0].surface.opacity.factor, 0.25);
+    assert_eq!(
+        warnings(&scene),
+        ["ignored area lights without a surface (line 7): left out, as in pbrt"]
+    );
+    let alpha = world(&format!("{TRIANGLE} \"float alpha\" 0.5 {TRIANGLE}"));
+    assert_eq!(alpha.materials.len(), 2);
+    assert_eq!(alpha.materials[0].surface.opacity.factor, 0.5);
+    let attribute = world(&format!("Attribute \"shape\" \"float alpha\" 0.5 {TRIANGLE}"));
+    assert_eq!(attribute.materials[0].surface.opacity.factor, 0.5);
+}
+
+/// Writes an image of 2×1 texels: red and half-opaque blue.
+fn image(folder: &Folder) {
+    let bytes = [255, 0, 0, 255, 0, 0, 255, 128];
+    image::save_buffer(folder.path().join("a.png"), &bytes, 2, 1, image::ColorType::Rgba8).unwrap();
+}
+
+fn textured(textures: &str, rest: &str) -> Scene {
+    let folder = Folder::new();
+    image(&folder);
+    let text = format!("{MIRRORED} WorldBegin {textures}\nMaterial {rest} {TRIANGLE}");
+    Scene::load(&folder.write("room.pbrt", text)).unwrap()
+}
+
+#[test]
+fn images_are_scaled_inverted_mixed_and_placed() {
+    let head = r#"Texture "a" "spectrum" "imagemap" "string filename" "a.png""#;
+    let rest = r#""diffuse" "texture reflectance" "t""#;
+    let color = |textures: &str| {
+        let scene = textured(&format!("{head} {textures}"), rest);
+        assert!(matches!(scene.materials[0].kind,
+            MaterialKind::Diffuse { reflectance } if reflectance == Vec3::ONE));
+        scene.materials[0].surface.color.clone().unwrap()
+    };
+    let plain = color(
+        r#"Texture "t" "spectrum" "imagemap" "string filename" "a.png"
+        "float uscale" 2 "float vscale" 3 "float udelta" 0.25 "float vdelta" 0.5
+        "string wrap" "clamp" "string filter" "point" "float scale" 0.5 "bool invert" true"#,
+    );
+    assert_eq!(plain.image_from_uv, [[2.0, 0.0, 0.25], [0.0, -3.0, 0.5]]);
+    assert_eq!(plain.wrap, [Wrap::ClampToEdge; 2]);
+    assert_eq!(plain.interpolation, Interpolation::Nearest);
+    assert_eq!((plain.scale, plain.bias), ([-0.5; 3], [1.0; 3]));
+    assert_eq!((plain.encoding, plain.channels), (Encoding::Srgb, Channels::Color));
+    let scaled = color(r#"Texture "t" "spectrum" "scale" "texture tex" "a" "float scale" 0.25"#);
+    assert_eq!(scaled.scale, [0.25; 3]);
+    let mixed = color(
+        r#"Texture "t" "spectrum" "mix" "texture tex1" "a" "rgb tex2" [1 0 0.5] "float amount" 0.25"#,
+    );
+    assert_eq!((mixed.scale, mixed.bias), ([0.75; 3], [0.25, 0.0, 0.125]));
+    let board = color(
+        r#"Texture "t" "spectrum" "checkerboard" "rgb tex1" [1 0 0] "rgb tex2" [0 1 0] "float uscale" 8"#,
+    );
+    assert_eq!(board.image_from_uv, [[4.0, 0.0, 0.0], [0.0, 0.5, 0.0]]);
+    let Texels::Halves(texels) = &board.texture.texels else { panic!() };
+    assert_eq!(texels[0], texels[3]);
+    assert_eq!(texels[0].map(half::f16::to_f32), [1.0, 0.0, 0.0, 1.0]);
+    assert_eq!(texels[1].map(half::f16::to_f32), [0.0, 1.0, 0.0, 1.0]);
+}
+
+#[test]
+fn numbers_are_opacity_or_colours_and_roughness_is_mapped() {
+    let float = r#"Texture "f" "float" "imagemap" "string filename" "a.png""#;
+    let folder = Folder::new();
+    image(&folder);
+    let text = format!("{MIRRORED} WorldBegin {float} {TRIANGLE} \"texture alpha\" \"f\"");
+    let scene = Scene::load(&folder.write("room.pbrt", text)).unwrap();
+    let opacity = scene.materials[0].surface.opacity.texture.clone().unwrap();
+    assert_eq!(opacity.channels, Channels::Alpha);
+    // Meshes without coordinates have those of pbrt.
+    assert_eq!(scene.geometry.uvs[0], [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
+    assert!(scene.inputs.iter().any(|input| input.ends_with("a.png")));
+    let rough = textured(float, r#""coateddiffuse" "texture roughness" "f""#);
+    let texture = rough.materials[0].surface.roughness.clone().unwrap();
+    let Texels::Halves(texels) = &texture.texture.texels else { panic!() };
+    // √α of α = √roughness.
+    let expected = (128.0_f32 / 255.0).sqrt().sqrt();
+    assert!((texels[1][0].to_f32() - expected).abs() < 1e-3);
+    assert!(matches!(rough.materials[0].kind, MaterialKind::Plastic { alpha: 1.0, .. }));
+    let normal = textured("", r#""diffuse" "string normalmap" "a.png""#);
+    let map = normal.materials[0].surface.normal.clone().unwrap();
+    assert_eq!((map.encoding, map.image_from_uv[1]), (Encoding::Linear, [0.0, -1.0, 1.0]));
+    assert_eq!(normal.geometry.tangents.len(), 3);
+}
+
+#[test]
+fn lamps_have_their_places_and_powers() {
+    let text = r#"Translate 1 0 0
+        LightSource "point" "rgb I" [1 2 3] "float scale" 2 "point3 from" [0 1 0]
+        LightSource "point" "float power" 12.566371
+        LightSource "distant" "point3 from" [0 1 0] "point3 to" [0 0 0] "float illuminance" 3
+        LightSource "spot" "float coneangle" 40 "float conedeltaangle" 10 "point3 to" [1 0 0]
+        LightSource "goniometric" "string filename" "a.exr""#;
+    let scene = world(text);
+    let kinds: Vec<_> = scene.lamps.iter().map(|lamp| lamp.kind).collect();
+    assert_eq!(
+        kinds[0],
+        LampKind::Point { position: Vec3::ONE.with_z(0.0), intensity: Vec3::new(2.0, 4.0, 6.0) }
+    );
+    assert!(
+        matches!(kinds[1], LampKind::Point { intensity, .. } if (intensity - 1.0).length() < 1e-5)
+    );
+    let down = Vec3::NEG_Y;
+    assert_eq!(kinds[2], LampKind::Directional { direction: down, irradiance: Vec3::splat(3.0) });
+    let LampKind::Spot { direction, inner_angle_rad, outer_angle_rad, falloff, .. } = kinds[3]
+    else {
+        panic!()
+    };
+    assert_eq!((direction, falloff), (Vec3::X, SpotFalloff::SmoothCosine));
+    assert!((inner_angle_rad - 30_f32.to_radians()).abs() < 1e-6);
+    assert!((outer_angle_rad - 40_f32.to_radians()).abs() < 1e-6);
+    assert_eq!(warnings(&scene), ["ignored LightSource `goniometric` (line 8)"]);
+    // A plain camera mirrors the world in z.
+    let far = load(VIEW, r#"LightSource "point" "point3 from" [0 0 4]"#);
+    assert!(matches!(far.lamps[0].kind, LampKind::Point { position, .. } if position.z == -4.0));
+    // The disk has the area π, and one side.
+    let area = world(r#"AreaLightSource "diffuse" "float power" 3 Shape "disk""#);
+    let radiance = area.materials[0].surface.emission.as_ref().unwrap().radiance.x;
+    assert!((radiance * std::f32::consts::PI.powi(2) - 3.0).abs() < 0.01, "{radiance}");
+}
+
+#[test]
+fn square_maps_lie_where_pbrt_shows_them() {
+    let folder = Folder::new();
+    // Red where z of the light is above 0: inside the diamond.
+    let side = 32_usize;
+    let mut text = format!("PF\n{side} {side}\n-1\n").into_bytes();
+    for index in 0..side * side {
+        let [u, v] = [index % side, index / side]
+            .map(|at| (2.0 * (at as f32 + 0.5) / side as f32 - 1.0).abs());
+        let red = if u + v < 1.0 { 4.0_f32 } else { 0.0 };
+        text.extend([red, 1.0, 0.0].iter().flat_map(|value| value.to_le_bytes()));
+    }
+    folder.write("sky.pfm", text);
+    for (head, turn) in [(MIRRORED, 1.0), (VIEW, -1.0)] {
+        let world = r#"Rotate 90 1 0 0 LightSource "infinite" "string filename" "sky.pfm" "float scale" 0.5"#;
+        let text = format!("{head} WorldBegin {world}");
+        let scene = Scene::load(&folder.write("room.pbrt", text)).unwrap();
+        // z turns to −y; the mirror in z leaves it.
+        let found = scene.environment.radiance(Vec3::NEG_Y).x;
+        assert!((found - 2.0).abs() < 0.02, "{found}");
+        assert!(scene.environment.radiance(Vec3::Y).x < 1e-3);
+        assert!((scene.environment.radiance(Vec3::X).y - 0.5).abs() < 1e-3);
+        let world = r#"LightSource "infinite" "string filename" "sky.pfm""#;
+        let text = format!("{head} WorldBegin {world}");
+        let scene = Scene::load(&folder.write("room.pbrt", text)).unwrap();
+        assert!((scene.environment.radiance(turn * Vec3::Z).x - 4.0).abs() < 0.04);
+        assert!(scene.environment.radiance(turn * Vec3::NEG_Z).x < 1e-2);
+    }
+}
+
+#[test]
+fn other_files_are_included_plain_and_compressed() {
+    use std::io::Write;
+    let folder = Folder::new();
+    let mut gz = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    gz.write_all(TRIANGLE.as_bytes()).unwrap();
+    folder.write("b.pbrt.gz", gz.finish().unwrap());
+    folder.write("a.pbrt", "Translate 1 0 0\nInclude \"b.pbrt.gz\"");
+    let text =
+        format!("{MIRRORED} WorldBegin Import \"a.pbrt\" {TRIANGLE} Include \"a.pbrt\" {TRIANGLE}");
+    let path = folder.write("room.pbrt", text);
+    let scene = Scene::load(&path).unwrap();
+    let x: Vec<f32> = scene.geometry.positions.iter().step_by(3).map(|p| p[0]).collect();
+    assert_eq!(x, [2.0, 1.0, 2.0, 2.0], "an import leaves the state alone");
+    assert_eq!(scene.inputs.len(), 5);
+    let refused = |name: &str, include: &str| {
+        folder.write("loop.pbrt", "Include \"loop.pbrt\"");
+        let path = folder.write(name, format!("{MIRRORED}\nWorldBegin\n {include}"));
+        let message = Scene::load(&path).unwrap_err().to_string();
+        message.replace(&format!("{}/", folder.path().display()), "")
+    };
+    let found = refused("c.pbrt", "Include \"../x.pbrt\"");
+    assert!(found.starts_with("c.pbrt:3:2: expected a file in the folder"), "{found}");
+    assert!(refused("c.pbrt", "Include \"/dev/zero\"").contains("in the folder of the scene"));
+    assert!(
+        refused("c.pbrt", "Include \"loop.pbrt\"")
+            .starts_with("loop.pbrt:1:1: `loop.pbrt` includes itself")
+    );
+    assert!(refused("c.pbrt", "Include \"c.pbrt\"").contains("includes itself"));
+    assert!(refused("c.pbrt", "Include \"no.pbrt\"").contains("no.pbrt: cannot read"));
+}
+
+#[test]
+fn bad_text_is_one_error_with_file_line_and_column() {
+    for (text, expected) in [
+        (
+            "\n Shape \"sphere\" \"float radius\" \"2\"",
+            "room.pbrt:4:32: parameter `radius`: expected a number, found the string `2`",
+        ),
+        (
+            "Shape \"sphere\" \"rgb radius\" [1 2 3]",
+            "expected the type float or integer, found rgb",
+        ),
+        (
+            "Shape \"sphere\" \"float radius\" [1",
+            "room.pbrt:3:16: parameter `radius`: the file ends",
+        ),
+        ("Shape \"sphere\" \"float radius", "room.pbrt:3:16: expected a closing quote"),
+        ("Shape \"sphere\" \"colour x\" 1", "unknown type `colour`"),
+        ("Shape \"sphere\" \"float x\" 1 \"float x\" 2", "parameter `x` is given twice"),
+        ("Shape \"blob\"", "room.pbrt:3:1: Shape \"blob\": unknown shape `blob`"),
+        (
+            "Shape \"trianglemesh\" \"point3 P\" [0 0]",
+            "expected 3 numbers or a multiple of it, found 2",
+        ),
+        (
+            "Shape \"trianglemesh\" \"point3 P\" [0 0 0] \"integer indices\" [0 1 2]",
+            "index 1 is out of range",
+        ),
+        (
+            "Shape \"trianglemesh\" \"point3 P\" [0 0 0] \"integer indices\" [0 0.5 2]",
+            "expected an integer",
+        ),
+        ("Shape \"plymesh\" \"string filename\" \"no.ply\"", "no.ply: cannot read"),
+        ("Shpe \"sphere\"", "room.pbrt:3:1: unknown directive `Shpe`"),
+        ("[", "expected a directive"),
+        ("Translate 1 2", "expected 3 numbers, found `the end of the file`"),
+        ("Translate 1 x 2", "room.pbrt:3:13: Translate: expected 3 numbers, found `x`"),
+        ("AttributeBegin", "AttributeBegin without an end"),
+        ("AttributeEnd", "an end without its beginning"),
+        ("AttributeBegin TransformEnd", "the AttributeBegin of line 3"),
+        ("WorldBegin", "a second WorldBegin"),
+        ("Camera \"perspective\"", "Camera after WorldBegin"),
+        ("CoordSysTransform \"x\"", "no coordinate system `x`"),
+        ("LightSource \"infinite\" \"blackbody L\" -1", "expected one temperature"),
+        ("LightSource \"infinite\" \"spectrum L\" \"x\"", "unknown spectrum `x`"),
+        ("Shape \"sphere\" \"float radius\" 1e999", "expected a number"),
+    ] {
+        let found = message(text);
+        assert!(found.contains(expected), "{text}: {found}");
+        assert!(found.starts_with("room.pbrt:"), "{found}");
+    }
+    let folder = Folder::new();
+    for (text, expected) in [
+        ("", "the file ends before WorldBegin"),
+        ("WorldBegin", "expected a Camera, found none"),
+        ("Camera \"orthographic\" WorldBegin", "expected a perspective camera"),
+        ("Scale 0 1 1 Camera \"perspective\" WorldBegin", "flattens space"),
+        ("Shape \"sphere\" WorldBegin", "Shape before WorldBegin"),
+    ] {
+        let path = folder.write("room.pbrt", text);
+        let found = Scene::load(&path).unwrap_err().to_string();
+        assert!(found.contains(expected), "{text}: {found}");
+    }
+    let options = LoadOptions { camera: Some("a".into()), ..LoadOptions::default() };
+    let path = folder.write("room.pbrt", format!("{MIRRORED} WorldBegin"));
+    assert!(Scene::load_with(&path, &options).unwrap_err().to_string().contains("one camera"));
+}
+
+#[test]
+fn everything_left_out_is_named_once() {
+    let head = r#"Option "integer seed" 3
+        ColorSpace "rec2020"
+        Integrator "volpath" "integer maxdepth" 7
+        Film "rgb" "string sensor" "canon_eos_100d" "float cropwindow" [0 1 0 0.5]
+        Camera "perspective" "float halffov" 3"#;
+    let world = format!(
+        r#"ActiveTransform StartTime
+        MakeNamedMedium "fog" "string type" "homogeneous"
+        MediumInterface "fog" ""
+        Shape "sphere" "float phimax" 180 "float sharp" 1
+        Shape "sphere" "float phimax" 90 "float sharp" 1
+        Shape "curve" "point3 P" [0 0 0 1 1 1 2 2 2 3 3 3]
+        Material "coateddiffuse" "float uroughness" 0.1 "float vroughness" 0.2 "rgb albedo" [1 0 0]
+        Scale 1 0 1 {TRIANGLE}
+        Material "hair" {TRIANGLE}"#
+    );
+    let scene = load(head, &world);
+    let expected = [
+        "ignored Option `seed` (line 1)",
+        "ignored ColorSpace `rec2020` (line 2)",
+        "ignored `ActiveTransform`, `TransformTimes` (line 7): nothing moves",
+        "ignored `MakeNamedMedium`, `MediumInterface` (2, first in line 8): all space is empty",
+        "ignored `maxdepth` 7 of the integrator (line 3)",
+        "ignored sensor `canon_eos_100d` (line 4)",
+        "ignored `cropwindow` of the film (line 4)",
+        "ignored parameter `halffov` of Camera \"perspective\" (line 5)",
+        "ignored `phimax` of Shape \"sphere\" (2, first in line 10)",
+        "ignored parameter `sharp` of Shape \"sphere\" (2, first in line 10)",
+        "ignored shape `curve` (line 12)",
+        "ignored parameter `P` of Shape \"curve\" (line 12)",
+        "ignored `albedo` of coats (line 13): coats are clear",
+        "ignored `uroughness` other than `vroughness` (line 13): their mean α, or the texture",
+        "ignored shapes whose transformation flattens space (2, first in line 14): left out",
+        "ignored material `hair` (line 15)",
+    ];
+    let found = warnings(&scene);
+    let missing: Vec<_> = expected.iter().filter(|e| !found.iter().any(|f| f == *e)).collect();
+    assert!(missing.is_empty() && found.len() == expected.len(), "{missing:#?}\n{found:#?}");
+}
+
+#[test]
+fn the_page_lists_every_feature() {
+    let row = |feature: &Feature| {
+        let Feature { name, support, details } = feature;
+        format!("| {name} | {} | {details} |\n", support.name())
+    };
+    let rows: String = features::PBRT.iter().map(row).collect();
+    page::check(
+        "pbrt.md",
+        "pbrt",
+        &format!("| feature | support | details |\n|---|---|---|\n{rows}"),
+    );
+    let names: HashSet<_> = features::PBRT.iter().map(|feature| feature.name).collect();
+    assert_eq!(names.len(), features::PBRT.len());
+}
+
+/// Folder of scenes from elsewhere, which the repository does not hold: `FENESTRA_IMPORT`.
+fn real(name: &str) -> Option<Scene> {
+    let folder = std::env::var_os("FENESTRA_IMPORT")?;
+    Some(Scene::load(&Path::new(&folder).join("pbrt").join(name)).unwrap())
+}
+
+fn textures(scene: &Scene) -> usize {
+    scene.materials.iter().filter(|material| material.surface.color.is_some()).count()
+}
+
+fn emitters(scene: &Scene) -> usize {
+    scene.materials.iter().filter(|material| material.surface.emission.is_some()).count()
+}
+
+/// Mean place in the picture of the triangles of a material.
+fn place_of(scene: &Scene, name: &str) -> Vec2 {
+    let material =
+        scene.materials.iter().position(|material| material.name == name).unwrap() as u32;
+    let positions = positions(scene);
+    let owned = scene.geometry.triangles.iter().zip(&scene.geometry.materials);
+    let corners: Vec<Vec3> = owned
+        .filter(|(_, owner)| **owner == material)
+        .flat_map(|(triangle, _)| triangle.map(|at| positions[at as usize]))
+        .collect();
+    let aspect = scene.film.width as f32 / scene.film.height as f32;
+    project(&scene.camera, aspect, corners.iter().sum::<Vec3>() / corners.len() as f32)
+}
+
+#[test]
+fn real_scenes_load_whole() {
+    let Some(room) = real("living-room/living-room_patched.pbrt") else { return };
+    // Less the triangles of no area in the files: 190 of 143 163.
+    assert_eq!(room.geometry.triangles.len(), 142_973);
+    assert_eq!((room.materials.len(), textures(&room), emitters(&room)), (19, 4, 0));
+    assert_eq!(room.camera.vertical_fov_deg, 58.715_508);
+    assert_eq!((room.environment.width, room.environment.height), (1024, 512));
+    // The sofa is on the right of the picture, the painting above it, the mirror on the left.
+    for (name, x, y) in [("Sofa", 0.79, 0.36), ("Painting", 0.87, 0.69), ("Mirror", 0.32, 0.64)] {
+        let found = place_of(&room, name);
+        assert!((found - Vec2::new(x, y)).length() < 0.01, "{name}: {found}");
+    }
+    let expected =
+        ["`maxdepth` 65", "PixelFilter `triangle`", "`diffusetransmission`", "dropped 190"];
+    let found = warnings(&room);
+    assert_eq!(found.len(), expected.len(), "{found:?}");
+    expected.iter().for_each(|part| assert!(found.iter().any(|f| f.contains(part)), "{part}"));
+
+    let stairs = real("staircase2/staircase2_patched.pbrt").unwrap();
+    assert_eq!(stairs.geometry.triangles.len(), 30_911 + 16 + 5 * 128 - 2432);
+    assert_eq!((stairs.materials.len(), textures(&stairs), emitters(&stairs)), (21, 3, 13));
+    assert_eq!(stairs.camera.vertical_fov_deg, 70.0);
+
+    let taxi = real("low-poly-taxi/low-poly-taxi.pbrt").unwrap();
+    assert_eq!(taxi.geometry.triangles.len(), 12_002 + 24 - 24);
+    assert_eq!((taxi.materials.len(), textures(&taxi), emitters(&taxi)), (14, 0, 4));
+    assert_eq!(taxi.lamps.len(), 2);
+
+    let missing = |name: &str| {
+        let folder = std::env::var_os("FENESTRA_IMPORT").unwrap();
+        Scene::load(&Path::new(&folder).join("pbrt").join(name)).unwrap_err().to_string()
+    };
+    let found = missing("living-room/living-room.pbrt");
+    assert!(found.contains("living-room.pbrt:") && found.contains("cannot read"), "{found}");
+    assert!(missing("staircase2/staircase2.pbrt").contains("wood5.tga: cannot read"));
+}
