@@ -7,7 +7,7 @@ mod page;
 use std::{collections::BTreeMap, fmt::Write};
 
 use fenestra::{
-    pass::{Dispatch, PassSettings, Schedule, Steps, geometry::Traversal, wave_order},
+    pass::{Dispatch, PassSettings, Schedule, Steps, Surfaces, geometry::Traversal, wave_order},
     sampler::{
         Parameters, basic,
         guided::{GuidedParameters, GuidedSteps},
@@ -31,7 +31,7 @@ fn settings(shadow_rays: u32, depth: u32) -> PassSettings {
         depth,
         aovs: AOV_ALBEDO | AOV_CACHE_ENTRIES | AOV_GUIDE_CELL,
         roulette_vertex: 8,
-        material_kinds: 1,
+        surfaces: Surfaces::default(),
         traversal: Traversal { page_count: 1, page_shift: 20 },
         incoherent: Schedule { rays_per_invocation: 16, refill_lanes: 3 },
     }
@@ -43,16 +43,22 @@ fn wave(first_sample: u32, sample_count: u32) -> Wave {
 }
 
 fn mis() -> impl Steps {
-    basic::MIS.steps(&Parameters::default(), 1).unwrap()
+    basic::MIS.steps(&Parameters::default(), Surfaces::default()).unwrap()
 }
 
 fn product() -> impl Steps {
-    ProductSteps::new(ProductParameters::default(), FITS, 1)
+    ProductSteps::new(ProductParameters::default(), FITS, Surfaces::default())
 }
 
 fn visibility(cache: CacheScope, shadow_rays: u32) -> impl Steps {
     let parameters = VisibilityParameters { cache, ..VisibilityParameters::default() };
-    VisibilitySteps::new(parameters, ProductParameters::default(), FITS, 1, shadow_rays)
+    VisibilitySteps::new(
+        parameters,
+        ProductParameters::default(),
+        FITS,
+        Surfaces::default(),
+        shadow_rays,
+    )
 }
 
 fn guided(settings: &PassSettings) -> impl Steps {

@@ -13,13 +13,11 @@
 #include "fresnel.glsl"
 #include "ggx.glsl"
 #include "layout.glsl"
+#include "surfaces.glsl"
 
 // One buffer, seen as floats and as cells of four halves.
 TEXELS(brdf_table)
 TEXELS(brdf_cells)
-
-// One bit per kind of material in the scene.
-layout(constant_id = CONSTANT_MATERIAL_KINDS) const uint MATERIAL_KINDS = 0xffffffffu;
 
 // Tests the kind of a material. Folds to a constant in the pipeline if the scene has no material of
 // the kind, or only such.

@@ -33,6 +33,7 @@ pub mod merl;
 pub mod sanity;
 pub mod spectrum;
 pub mod specular;
+pub mod surfaces;
 pub mod table;
 mod tabulate;
 pub mod twin;
@@ -41,6 +42,7 @@ use glam::Vec3;
 
 pub use material::Material;
 pub use materials::MaterialTables;
+pub use surfaces::SurfaceTables;
 pub use table::MeasuredTable;
 
 /// Value of a material (1/sr, without the cosine) and density of [`sample`].

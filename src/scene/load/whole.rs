@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::{LoadOptions, Loader, MAX_FILM_SIDE, MIN_ALPHA, default_material};
+use super::{LoadOptions, Loader, MAX_FILM_SIDE, MIN_ALPHA, default_material, light::Light};
 use crate::{
     brdf::{
         Material,
@@ -63,7 +63,8 @@ impl Loader<'_> {
         };
         let environment = self.whole_environment(options, &mut warnings)?;
         let camera: Camera = self.camera(&entry)?;
-        let mut scene = self.scene(camera, film, environment, materials, geometry, warnings);
+        let light = Light { environment, lamps: Vec::new() };
+        let mut scene = self.scene(camera, film, light, materials, geometry, warnings);
         scene.inputs.extend(mesh.side_files);
         scene.inputs.extend(options.environment.clone());
         Ok(scene)
@@ -106,7 +107,7 @@ impl Loader<'_> {
     }
 
     /// Takes the mesh as it stands, with one material more for triangles without.
-    fn place_whole(
+    pub(super) fn place_whole(
         &self,
         mesh: &Mesh,
         ignored: &mut Ignored,
