@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
-    brdf::{self, fresnel, specular},
+    brdf::{self, fresnel, specular as twin},
     shader::{
         bindings::{probe, scene},
         constants::MATERIAL_MEASURED,
@@ -14,7 +14,7 @@ use glam::Vec3;
 mod materials;
 mod support;
 
-use materials::{cases, direction, hemisphere, scattering, tables, uniform};
+use materials::{cases, direction, hemisphere, specular, tables, uniform};
 
 /// Twin of `BrdfQuery` in `glsl/test/brdf.comp`.
 #[repr(C)]
@@ -141,11 +141,10 @@ struct SpecularAnswer {
 #[test]
 fn scattering_in_the_shader_agrees_with_its_twin() {
     let query = |index: u32| {
-        let material = index % scattering().len() as u32;
+        let material = index % specular().len() as u32;
         let (outgoing_local, u) = (hemisphere(index, 11), uniform(index, 12));
         let is_back = index / 3 % 2;
-        let found =
-            specular::scatter(&scattering()[material as usize], outgoing_local, is_back == 1, u);
+        let found = twin::scatter(&specular()[material as usize], outgoing_local, is_back == 1, u);
         let incident_local = match index % 5 {
             0 => hemisphere(index, 13),
             1 => -hemisphere(index, 13),
@@ -158,7 +157,7 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
         include_bytes!(concat!(env!("OUT_DIR"), "/test/specular.spv")),
         &[
             (probe::PROBE_INPUT, bytemuck::cast_slice(&queries)),
-            (scene::MATERIALS, bytemuck::cast_slice(scattering())),
+            (scene::MATERIALS, bytemuck::cast_slice(specular())),
         ],
         size_of::<SpecularAnswer>() * queries.len(),
         queries.len() as u32,
@@ -169,9 +168,9 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
     // across the horizon.
     let mut other_choices = 0;
     for (query, answer) in queries.iter().zip(&answers) {
-        let material = &scattering()[query.material as usize];
+        let material = &specular()[query.material as usize];
         let is_back = query.is_back == 1;
-        let found = specular::scatter(material, query.outgoing_local, is_back, query.u);
+        let found = twin::scatter(material, query.outgoing_local, is_back, query.u);
         let is_other = found.is_transmitted != (answer.is_transmitted == 1)
             || (found.weight == Vec3::ZERO) != (answer.weight == Vec3::ZERO);
         other_choices += u32::from(is_other);
@@ -185,7 +184,7 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
                 "{answer:?} in the shader, {found:?} in its twin, for {query:?}"
             );
         }
-        let (value, pdf) = specular::dielectric_evaluate_and_pdf(
+        let (value, pdf) = twin::dielectric_evaluate_and_pdf(
             material,
             query.outgoing_local,
             query.incident_local,

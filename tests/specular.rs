@@ -23,19 +23,19 @@ mod materials;
 #[path = "support/statistics.rs"]
 mod statistics;
 
-use materials::{direction, hemisphere, scattering, uniform};
+use materials::{direction, hemisphere, specular, uniform};
 
 /// Polar angles of the outgoing direction, in degrees.
 const ANGLES_DEG: [f64; 5] = [0.0, 30.0, 55.0, 75.0, 87.0];
 
 /// Returns the materials with a density.
 fn rough() -> impl Iterator<Item = &'static Material> {
-    scattering().iter().filter(|material| material.alpha > 0.0)
+    specular().iter().filter(|material| material.alpha > 0.0)
 }
 
 /// Returns the first material of a kind.
 fn first(kind: u32) -> Material {
-    *scattering().iter().find(|material| material.kind == kind).unwrap()
+    *specular().iter().find(|material| material.kind == kind).unwrap()
 }
 
 /// Returns the index beyond the interface over that of the viewer's side.
@@ -99,7 +99,7 @@ fn panes_sum_all_reflections_between_their_sides() {
 /// Samples of smooth materials: Snell's law, and by choice the exact shares of both ways.
 #[test]
 fn smooth_materials_follow_snell_and_fresnel() {
-    for material in scattering().iter().filter(|material| material.alpha == 0.0) {
+    for material in specular().iter().filter(|material| material.alpha == 0.0) {
         for index in 0..500 {
             let outgoing = hemisphere(index, 1);
             for is_back in [false, true] {
@@ -290,7 +290,7 @@ fn samples_follow_their_density() {
 /// as many pass as pass a pane.
 #[test]
 fn a_slab_of_glass_loses_nothing() {
-    let glass = *scattering()
+    let glass = *specular()
         .iter()
         .find(|material| material.kind == MATERIAL_DIELECTRIC && material.alpha == 0.0)
         .unwrap();

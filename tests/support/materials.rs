@@ -122,9 +122,9 @@ pub fn tables() -> &'static MaterialTables {
     })
 }
 
-/// Returns every kind at which paths are scattered, with the relative sides of their lights: tinted
-/// and not, smooth and rough, of indices above and below 1.
-pub fn scattering() -> &'static [structs::Material] {
+/// Returns every kind at which no light is sampled: tinted and not, smooth and rough, of indices above
+/// and below 1.
+pub fn specular() -> &'static [structs::Material] {
     static MATERIALS: OnceLock<Vec<structs::Material>> = OnceLock::new();
     MATERIALS.get_or_init(|| {
         let tint = vec3(0.9, 0.6, 0.3);
@@ -149,7 +149,7 @@ pub fn scattering() -> &'static [structs::Material] {
             },
             MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance: tint },
         ];
-        let materials = kinds.map(|kind| Material::new("scattering", kind));
+        let materials = kinds.map(|kind| Material::new("specular", kind));
         MaterialTables::new(&materials).unwrap().materials
     })
 }

@@ -78,7 +78,7 @@ impl Fits {
         let mut materials: Vec<[u32; 2]> = Vec::new();
         for (index, material) in scene.materials.iter().enumerate() {
             let first = lobes.len();
-            if material.kind.is_scattering() {
+            if material.kind.is_specular() {
                 materials.push([first as u32, 0]);
                 continue;
             }
