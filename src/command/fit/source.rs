@@ -158,6 +158,7 @@ mod tests {
             Some("plastic_diffuse_0p5_alpha_0p1".into())
         );
         assert!(material("conductor:reflectance=[0.9,0.6,0.3],alpha=0.05").is_ok());
+        assert!(material("principled:base_color=0.5,metallic=0.2,roughness=0.4").is_ok());
         for wrong in ["plastic:alpha", "plastic:gloss=1", "diffuse:reflectance=2", "walls", ""] {
             assert!(material(wrong).is_err(), "{wrong}");
         }
