@@ -11,7 +11,7 @@ WRITES(hit_surfaces)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
-// As SMALLEST_ALPHA of src/brdf/materials.rs.
+// As SMALLEST_ALPHA of src/brdf/ggx.rs.
 const float SMALLEST_ALPHA = 1.0e-3;
 
 void main() {

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
-    brdf,
+    brdf::{self, fresnel, specular as twin},
     shader::{
         bindings::{probe, scene},
         constants::MATERIAL_MEASURED,
@@ -14,7 +14,7 @@ use glam::Vec3;
 mod materials;
 mod support;
 
-use materials::{cases, direction, hemisphere, tables, uniform};
+use materials::{cases, direction, hemisphere, specular, tables, uniform};
 
 /// Twin of `BrdfQuery` in `glsl/test/brdf.comp`.
 #[repr(C)]
@@ -112,4 +112,99 @@ fn shader_agrees_with_its_twin() {
     }
     assert!(other_bins < queries.len() / 500, "{other_bins} densities differ");
     assert!(answers.iter().filter(|answer| answer.pdf > 0.0).count() > queries.len() / 2);
+}
+
+/// Twin of `SpecularQuery` in `glsl/test/specular.comp`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct SpecularQuery {
+    outgoing_local: Vec3,
+    incident_local: Vec3,
+    u: Vec3,
+    material: u32,
+    is_back: u32,
+}
+
+/// Twin of `SpecularAnswer` in `glsl/test/specular.comp`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct SpecularAnswer {
+    direction_local: Vec3,
+    is_transmitted: u32,
+    weight: Vec3,
+    value: Vec3,
+    pdf: f32,
+    reflectance: Vec3,
+    transmittance: Vec3,
+}
+
+#[test]
+fn scattering_in_the_shader_agrees_with_its_twin() {
+    let query = |index: u32| {
+        let material = index % specular().len() as u32;
+        let (outgoing_local, u) = (hemisphere(index, 11), uniform(index, 12));
+        let is_back = index / 3 % 2;
+        let found = twin::scatter(&specular()[material as usize], outgoing_local, is_back == 1, u);
+        let incident_local = match index % 5 {
+            0 => hemisphere(index, 13),
+            1 => -hemisphere(index, 13),
+            _ => found.direction_local.normalize(),
+        };
+        SpecularQuery { outgoing_local, incident_local, u, material, is_back }
+    };
+    let queries: Vec<SpecularQuery> = (0..20_000).map(query).collect();
+    let bytes = support::run_probe(
+        include_bytes!(concat!(env!("OUT_DIR"), "/test/specular.spv")),
+        &[
+            (probe::PROBE_INPUT, bytemuck::cast_slice(&queries)),
+            (scene::MATERIALS, bytemuck::cast_slice(specular())),
+        ],
+        size_of::<SpecularAnswer>() * queries.len(),
+        queries.len() as u32,
+    );
+    let answers: Vec<SpecularAnswer> = bytemuck::pod_collect_to_vec(&bytes);
+
+    // In rare cases, rounding moves a number across the probability of reflection, or a direction
+    // across the horizon.
+    let mut other_choices = 0;
+    for (query, answer) in queries.iter().zip(&answers) {
+        let material = &specular()[query.material as usize];
+        let is_back = query.is_back == 1;
+        let found = twin::scatter(material, query.outgoing_local, is_back, query.u);
+        let is_other = found.is_transmitted != (answer.is_transmitted == 1)
+            || (found.weight == Vec3::ZERO) != (answer.weight == Vec3::ZERO);
+        other_choices += u32::from(is_other);
+        if !is_other {
+            assert!(
+                difference(answer.direction_local, found.direction_local, 0.0) < 1e-3,
+                "{answer:?} in the shader, {found:?} in its twin, for {query:?}"
+            );
+            assert!(
+                difference(answer.weight, found.weight, 1e-3) < 5e-3,
+                "{answer:?} in the shader, {found:?} in its twin, for {query:?}"
+            );
+        }
+        let (value, pdf) = twin::dielectric_evaluate_and_pdf(
+            material,
+            query.outgoing_local,
+            query.incident_local,
+            is_back,
+        );
+        assert!(
+            difference(answer.value, value, 1e-3) < 5e-3
+                && difference(Vec3::splat(answer.pdf), Vec3::splat(pdf), 1e-3) < 5e-3,
+            "{answer:?} in the shader, {value} and {pdf} in its twin, for {query:?}"
+        );
+        let cosine = query.outgoing_local.z;
+        let pane = [
+            fresnel::pane_reflectance(material, cosine),
+            fresnel::pane_transmittance(material, cosine),
+        ];
+        // A mirror has no index, and its answers no meaning.
+        if material.ior > 0.0 {
+            assert!(difference(answer.reflectance, pane[0], 0.0) < 1e-3, "{answer:?} {pane:?}");
+            assert!(difference(answer.transmittance, pane[1], 1e-3) < 1e-3, "{answer:?} {pane:?}");
+        }
+    }
+    assert!(other_choices < 20, "{other_choices} choices differ");
 }

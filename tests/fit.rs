@@ -337,7 +337,23 @@ fn analytic_materials_fit_and_interpolate() {
     let diffuse = material(MaterialKind::Diffuse { reflectance: Vec3::splat(0.6) });
     let plastic =
         material(MaterialKind::Plastic { diffuse: Vec3::splat(0.5), alpha: 0.1, ior: 1.5 });
-    for (name, tables) in [("diffuse", diffuse), ("plastic", plastic), ("metal", conductor(0.1))] {
+    let principled = |metallic, roughness| {
+        material(MaterialKind::Principled {
+            base_color: Vec3::splat(0.5),
+            metallic,
+            roughness,
+            ior: 1.5,
+            specular: 1.0,
+            specular_color: Vec3::ONE,
+        })
+    };
+    for (name, tables) in [
+        ("diffuse", diffuse),
+        ("plastic", plastic),
+        ("metal", conductor(0.1)),
+        ("principled", principled(0.0, 0.3)),
+        ("principled metal", principled(1.0, 0.4)),
+    ] {
         let (few, many) = (fit_brdf(&tables, 8, 32), fit_brdf(&tables, 20, 32));
         for fit in [&few, &many] {
             let summary = fit.summary;
@@ -378,6 +394,17 @@ fn hopeless_materials_are_refused() {
     let options = BrdfOptions { lobes: 8, views: 4, method: Method::Em };
     let error = brdf_lobes(&black, 0, "black", options, None, &mut |_| ()).unwrap_err();
     assert!(error.to_string().contains("reflects nothing"), "{error}");
+    // No light is sampled at glass and mirrors, and nothing there is to be fitted.
+    let white = Vec3::ONE;
+    for kind in [
+        MaterialKind::Mirror { reflectance: white },
+        MaterialKind::Dielectric { ior: 1.5, alpha: 0.2, reflectance: white, transmittance: white },
+        MaterialKind::ThinDielectric { ior: 1.5, reflectance: white, transmittance: white },
+    ] {
+        let error =
+            brdf_lobes(&material(kind), 0, "glass", options, None, &mut |_| ()).unwrap_err();
+        assert!(error.to_string().contains("a mirror or glass"), "{error}");
+    }
     let grey = material(MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) });
     for (lobes, views) in [(0, 4), (100_000, 4), (8, 0), (8, 100_000)] {
         let options = BrdfOptions { lobes, views, method: Method::Em };

@@ -24,6 +24,9 @@ uint brdf_share(Material material) {
     uint share = 77u;
     if (is_kind(material, MATERIAL_DIFFUSE)) {
         share = 26u;
+    } else if (is_kind(material, MATERIAL_PRINCIPLED) && material.ior < 0.5) {
+        // Most light of a principled dielectric comes from its diffuse base.
+        share = material.alpha > 0.1 ? 26u : 77u;
     } else if (!is_kind(material, MATERIAL_MEASURED)) {
         share = material.alpha > 0.3 ? 26u : (material.alpha > 0.1 ? 77u : 128u);
     }

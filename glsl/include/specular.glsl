@@ -63,7 +63,7 @@ Scatter dielectric_scatter(Material material, vec3 outgoing_local, bool is_back,
             ggx_masking_ratio(outgoing_local, result.direction_local, material.alpha);
     }
     // A normal may send light to the wrong side of the surface: no sample.
-    if (cosine <= 0.0 || result.direction_local.z < 0.0 != result.is_transmitted) {
+    if (cosine <= 0.0 || (result.direction_local.z < 0.0) != result.is_transmitted) {
         result.weight = vec3(0.0);
     }
     return result;

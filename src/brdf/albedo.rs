@@ -112,12 +112,12 @@ pub const GGX_WORDS: usize = (DIFFUSE_RISE_OFFSET + BRDF_COSINE_NODES) as usize;
 
 /// Albedo of GGX by roughness and cosine as factors of the reflectance at normal and at grazing
 /// incidence, and the mean rise of Schlick's reflectance over a diffuse base; see
-/// `GGX_ROUGHNESS_WORDS` and `DIFFUSE_RISE_OFFSET`. Computed once a process.
+/// `GGX_ROUGHNESS_WORDS` and `DIFFUSE_RISE_OFFSET`. Computed once a process, by one
+/// thread: one that waits for others in here could be given work that waits for it.
 pub fn ggx_words() -> &'static [u32] {
     static WORDS: LazyLock<Vec<u32>> = LazyLock::new(|| {
         let nodes = (GGX_ROUGHNESS_INTERVALS + 1) * BRDF_COSINE_NODES;
         let ggx: Vec<[f32; 2]> = (0..nodes)
-            .into_par_iter()
             .map(|index| {
                 let (row, node) = (index / BRDF_COSINE_NODES, index % BRDF_COSINE_NODES);
                 let roughness = row as f32 / GGX_ROUGHNESS_INTERVALS as f32;

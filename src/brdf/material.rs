@@ -119,6 +119,21 @@ pub enum ConductorFresnel {
     },
 }
 
+impl MaterialKind {
+    /// True if no light is sampled at the material, since all of what it sends on comes from one
+    /// direction or from behind: paths follow it (see [`specular`](super::specular)).
+    pub fn is_specular(&self) -> bool {
+        match self {
+            Self::Mirror { .. } | Self::Dielectric { .. } | Self::ThinDielectric { .. } => true,
+            Self::Diffuse { .. }
+            | Self::Plastic { .. }
+            | Self::Conductor { .. }
+            | Self::Principled { .. }
+            | Self::Measured { .. } => false,
+        }
+    }
+}
+
 /// Reflection model with its parameters.
 #[derive(Clone, Debug)]
 pub enum MaterialKind {

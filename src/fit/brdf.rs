@@ -106,7 +106,9 @@ fn fit_views(
         targets.iter().step_by(2).map(|target| PointSet::new(&target.patches)).collect();
     if points.iter().all(PointSet::is_empty) {
         return Err(fail(
-            "the material reflects nothing in any view; expected a value above 0".into(),
+            "the material reflects nothing in any view that a sampled light could show; expected a \
+             value above 0, so neither black nor a mirror or glass"
+                .into(),
         ));
     }
     let mut fitted = chain(&points, options, progress);

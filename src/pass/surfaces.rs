@@ -54,8 +54,6 @@ pub fn features(materials: &[Material]) -> u32 {
 fn features_of(material: &Material) -> u32 {
     let surface = &material.surface;
     let is_pane = matches!(material.kind, MaterialKind::ThinDielectric { .. });
-    let is_specular = is_pane
-        || matches!(material.kind, MaterialKind::Mirror { .. } | MaterialKind::Dielectric { .. });
     let is_opaque =
         surface.opacity.factor >= 1.0 && surface.opacity.texture.is_none() && !surface.vertex_color;
     let is_textured = surface.vertex_color
@@ -63,7 +61,7 @@ fn features_of(material: &Material) -> u32 {
             .iter()
             .any(|texture| texture.is_some());
     [
-        (SURFACES_SPECULAR, is_specular),
+        (SURFACES_SPECULAR, material.kind.is_specular()),
         (SURFACES_PASSING, is_pane || !is_opaque),
         (SURFACES_ONE_SIDED, !surface.two_sided),
         (SURFACES_TEXTURED, is_textured),

@@ -14,6 +14,7 @@ use fenestra::{
         material::{ConductorFresnel, MaterialKind},
     },
     math::random::hash_4d,
+    shader::structs,
 };
 use glam::{Vec3, vec3};
 
@@ -29,6 +30,18 @@ fn case(name: &str, lobe_width: f32, kind: MaterialKind) -> Case {
 
 fn plastic(diffuse: Vec3, alpha: f32, ior: f32) -> MaterialKind {
     MaterialKind::Plastic { diffuse, alpha, ior }
+}
+
+/// Makes a principled material of index 1.5 without a tint of the specular part.
+fn principled(base_color: Vec3, metallic: f32, roughness: f32) -> MaterialKind {
+    MaterialKind::Principled {
+        base_color,
+        metallic,
+        roughness,
+        ior: 1.5,
+        specular: 1.0,
+        specular_color: Vec3::ONE,
+    }
 }
 
 /// Gold near 600, 550 and 450 nm.
@@ -78,6 +91,24 @@ pub fn cases() -> &'static [Case] {
             case("roughest conductor", 1.0, MaterialKind::Conductor { alpha: 1.0, fresnel: GOLD }),
             case("measured glossy", 0.05, measured(vec3(0.1, 0.2, 0.05), 0.05)),
             case("measured rough", 0.3, measured(vec3(0.6, 0.5, 0.4), 0.3)),
+            case("principled", 0.25, principled(vec3(0.8, 0.4, 0.1), 0.0, 0.5)),
+            case("polished principled", 1e-3, principled(vec3(0.1, 0.3, 0.9), 0.0, 0.0)),
+            case("rough white principled", 1.0, principled(Vec3::ONE, 0.0, 1.0)),
+            case("black principled", 0.09, principled(Vec3::ZERO, 0.0, 0.3)),
+            case("principled metal", 0.09, principled(vec3(1.0, 0.7, 0.3), 1.0, 0.3)),
+            case("half metal", 0.16, principled(vec3(0.9, 0.6, 0.3), 0.5, 0.4)),
+            case(
+                "principled with specular",
+                0.2,
+                MaterialKind::Principled {
+                    base_color: vec3(0.2, 0.5, 0.3),
+                    metallic: 0.2,
+                    roughness: 0.2_f32.sqrt(),
+                    ior: 1.8,
+                    specular: 0.6,
+                    specular_color: vec3(1.0, 2.0, 20.0),
+                },
+            ),
         ]
     })
 }
@@ -88,6 +119,38 @@ pub fn tables() -> &'static MaterialTables {
     TABLES.get_or_init(|| {
         let materials: Vec<Material> = cases().iter().map(|case| case.material.clone()).collect();
         MaterialTables::new(&materials).unwrap()
+    })
+}
+
+/// Returns every kind at which no light is sampled: tinted and not, smooth and rough, of indices above
+/// and below 1.
+pub fn specular() -> &'static [structs::Material] {
+    static MATERIALS: OnceLock<Vec<structs::Material>> = OnceLock::new();
+    MATERIALS.get_or_init(|| {
+        let tint = vec3(0.9, 0.6, 0.3);
+        let dielectric = |ior, alpha| MaterialKind::Dielectric {
+            ior,
+            alpha,
+            reflectance: Vec3::ONE,
+            transmittance: Vec3::ONE,
+        };
+        let kinds = [
+            MaterialKind::Mirror { reflectance: tint },
+            dielectric(1.5, 0.0),
+            dielectric(1.5, 0.2),
+            dielectric(1.33, 0.5),
+            dielectric(2.4, 0.35),
+            dielectric(0.75, 0.3),
+            MaterialKind::Dielectric {
+                ior: 1.5,
+                alpha: 0.3,
+                reflectance: 0.5 * tint,
+                transmittance: tint,
+            },
+            MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance: tint },
+        ];
+        let materials = kinds.map(|kind| Material::new("specular", kind));
+        MaterialTables::new(&materials).unwrap().materials
     })
 }
 

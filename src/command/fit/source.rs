@@ -12,7 +12,7 @@ use crate::{
 /// Extensions of measured BRDFs.
 const MEASURED: [&str; 2] = ["binary", "brdf"];
 /// Material types that can be given inline.
-const TYPES: [&str; 4] = ["diffuse", "plastic", "conductor", "measured"];
+const TYPES: [&str; 5] = ["diffuse", "plastic", "conductor", "principled", "measured"];
 /// Minimal scene around an inline material.
 const SCENE: &str = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n\
     vertical_fov_deg = 45\n[film]\nwidth = 1\nheight = 1\n[environment]\nconstant = [1, 1, 1]\n\
@@ -122,7 +122,9 @@ fn in_words(text: &str, kind: &str, keys: &str) -> Result<Source> {
         let (key, value) = (key.trim(), value.trim());
         // One number for a colour is grey; a file needs no quotes.
         let value = match key {
-            "diffuse" | "reflectance" | "eta" | "k" if !value.starts_with('[') => {
+            "diffuse" | "reflectance" | "eta" | "k" | "base_color" | "specular_color"
+                if !value.starts_with('[') =>
+            {
                 format!("[{value}, {value}, {value}]")
             }
             "file" if !value.starts_with('"') => format!("{value:?}"),
@@ -156,6 +158,7 @@ mod tests {
             Some("plastic_diffuse_0p5_alpha_0p1".into())
         );
         assert!(material("conductor:reflectance=[0.9,0.6,0.3],alpha=0.05").is_ok());
+        assert!(material("principled:base_color=0.5,metallic=0.2,roughness=0.4").is_ok());
         for wrong in ["plastic:alpha", "plastic:gloss=1", "diffuse:reflectance=2", "walls", ""] {
             assert!(material(wrong).is_err(), "{wrong}");
         }

@@ -39,7 +39,8 @@ pub struct Fits {
 
 impl Fits {
     /// Fits the environment and every material, or takes the fits from the user's cache, and
-    /// uploads them. A black map or material, which cannot be fitted, gets no lobes and a warning.
+    /// uploads them. A black map or material, which cannot be fitted, gets no lobes and a warning;
+    /// materials at which no light is sampled get none.
     /// Fails if numbers of lobes or views are out of range, or if the device fails.
     pub fn new(
         device: &Arc<Device>,
@@ -76,10 +77,14 @@ impl Fits {
         let mut lobes: Vec<[f32; 4]> = Vec::new();
         let mut materials: Vec<[u32; 2]> = Vec::new();
         for (index, material) in scene.materials.iter().enumerate() {
+            let first = lobes.len();
+            if material.kind.is_specular() {
+                materials.push([first as u32, 0]);
+                continue;
+            }
             log::info!("fitting the material {}", material.name);
             let fitted =
                 brdf_lobes(&tables, index, &material.name, options, cache.as_ref(), &mut |_| ());
-            let first = lobes.len();
             let per_view = or_warn(fitted)?.map_or(0, |fit| append(&mut lobes, &fit));
             materials.push([first as u32, per_view]);
             hashes.insert(
