@@ -30,7 +30,7 @@ const ATTRIBUTE_PAGES: [Binding; MAX_PAGES] = [
     scene::TRIANGLE_ATTRIBUTES_3,
 ];
 
-/// What shaders read by `glsl/include/texture.glsl`. A scene without textures has buffers of one
+/// Everything that `glsl/include/texture.glsl` reads. A scene without textures has buffers of one
 /// element, which no shader reads.
 pub struct TextureBuffers {
     texture_pages: Vec<Buffer>,
