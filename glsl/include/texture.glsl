@@ -43,11 +43,11 @@ MaterialSurface load_material_surface(uint material) {
     uvec4 first = texelFetch(material_surface_texels, int(4u * material));
     uvec4 second = texelFetch(material_surface_texels, int(4u * material + 1u));
     uvec4 third = texelFetch(material_surface_texels, int(4u * material + 2u));
-    uint flags = texelFetch(material_surface_texels, int(4u * material + 3u)).x;
+    uvec2 fourth = texelFetch(material_surface_texels, int(4u * material + 3u)).xy;
     return MaterialSurface(
         first.x, first.y, first.z, first.w, second.x, second.y, uintBitsToFloat(second.z),
-        uintBitsToFloat(second.w), uintBitsToFloat(third.x), uintBitsToFloat(third.yzw), flags,
-        vec3(0.0));
+        uintBitsToFloat(second.w), uintBitsToFloat(third.x), uintBitsToFloat(third.yzw), fourth.x,
+        uintBitsToFloat(fourth.y), vec2(0.0));
 }
 
 // A word of the texels of all textures; with one page the choice folds away.

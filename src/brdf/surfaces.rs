@@ -60,7 +60,8 @@ impl SurfaceTables {
                     emission.is_some_and(|emission| emission.two_sided),
                     SURFACE_EMISSION_TWO_SIDED,
                 ),
-            reserved: [0.0; 3],
+            emission_density: 0.0,
+            reserved: [0.0; 2],
         };
         self.attributes |= flag(surface.normal.is_some(), ATTRIBUTE_TANGENT)
             | flag(surface.vertex_color, ATTRIBUTE_COLOR);

@@ -30,7 +30,7 @@ const ATTRIBUTE_PAGES: [Binding; MAX_PAGES] = [
     scene::TRIANGLE_ATTRIBUTES_3,
 ];
 
-/// Everything that `glsl/include/texture.glsl` reads. A scene without textures has buffers of one
+/// Buffers that shaders read by `glsl/include/texture.glsl`. A scene without textures has buffers of one
 /// element, which no shader reads.
 pub struct TextureBuffers {
     texture_pages: Vec<Buffer>,
@@ -129,7 +129,7 @@ impl TextureBuffers {
 }
 
 /// Specialization of the passes that include `texture.glsl`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TextureAccess {
     /// Number of pages of texels.
     pub texture_pages: u32,

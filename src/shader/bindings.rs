@@ -152,6 +152,10 @@ binding_tables! {
         12 ENVIRONMENT_CELLS: texels R32Float;
         /// Materials again, four texels each.
         13 MATERIAL_TEXELS: texels Rgba32Uint;
+        /// Alias table over lamps and emitting triangles.
+        14 LAMP_CHOICES: array LampChoice;
+        /// Lights without a surface.
+        15 LAMPS: array Lamp;
         /// First page of the texels of all textures: a word a texel of bytes, two words a deeper one.
         20 TEXTURE_WORDS_0: texels R32Uint;
         /// Second page of texels; a missing page repeats the first.
@@ -257,6 +261,8 @@ binding_tables! {
         6 HIT_TEXELS: texels Rgba32Uint;
         /// Shadow rays again, three texels each.
         7 SHADOW_RAY_TEXELS: texels Rg32Uint;
+        /// Surface at the hit of each path, in scenes with textures.
+        8 HIT_SURFACES: array Surface;
     }
 
     /// Set 3: the film, which grows by every wave.

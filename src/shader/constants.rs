@@ -54,6 +54,12 @@ constants! {
     /// Bit `1 << kind` for every kind of material in the scene; saves devices that run both sides of a
     /// branch the others.
     CONSTANT_MATERIAL_KINDS = 19;
+    /// Bits `SURFACES_…` of what the surfaces of the scene need.
+    CONSTANT_SURFACES = 20;
+    /// 1 lets only paths at specular surfaces go on: the ray after the last vertex.
+    CONSTANT_ONLY_SPECULAR = 21;
+    /// Candidates of `sample_lamps` for its shadow ray.
+    CONSTANT_LAMP_CANDIDATES = 22;
 
     // Specialization constants of `multiply_lobes`.
     /// Lobes of the environment.
@@ -109,6 +115,18 @@ constants! {
     /// Learned visibility; a shader of its own.
     SAMPLER_GUIDED = 8;
 
+    // Bits of CONSTANT_SURFACES.
+    /// Some surfaces reflect or transmit by paths alone: no light is sampled at them.
+    SURFACES_SPECULAR = 1;
+    /// Some surfaces let light straight through.
+    SURFACES_PASSING = 2;
+    /// Some surfaces are black from behind.
+    SURFACES_ONE_SIDED = 4;
+    /// Textures or vertex colours vary some material.
+    SURFACES_TEXTURED = 8;
+    /// Some surfaces emit light.
+    SURFACES_EMITTING = 16;
+
     // Bits of `Wave::aovs`: film layers to write.
     /// Albedo.
     AOV_ALBEDO = 1;
@@ -131,8 +149,11 @@ constants! {
     TRAVERSAL_STEP_LIMIT = 30_000;
     /// Packed normal of the vertices of a flat triangle, which no unit vector packs to.
     FLAT_NORMAL = 0x8000_8000;
-    /// [`Hit::material`](super::structs::Hit::material) of a ray that left the scene or was not traced.
+    /// [`Hit::material`](super::structs::Hit::material) where no light is sampled: the ray left the
+    /// scene, was not traced, or met a specular surface, which `Hit::triangle` tells apart.
     NO_MATERIAL = 0xffff_ffff;
+    /// [`Hit::triangle`](super::structs::Hit::triangle) of a ray that met nothing.
+    NO_TRIANGLE = 0xffff_ffff;
 
     // Values of `Material::kind`.
     /// Lambertian.
@@ -151,6 +172,22 @@ constants! {
     MATERIAL_DIELECTRIC = 6;
     /// Thin pane of a dielectric.
     MATERIAL_THIN_DIELECTRIC = 7;
+    /// Bits `1 << kind` of the specular kinds, at which no light is sampled.
+    SPECULAR_KINDS = 1 << MATERIAL_MIRROR | 1 << MATERIAL_DIELECTRIC | 1 << MATERIAL_THIN_DIELECTRIC;
+
+    // Lamps.
+    /// Marks a lamp without a surface in [`LampChoice::source`](super::structs::LampChoice::source).
+    LAMP_BIT = 1 << 31;
+    /// Shines from a point into all directions.
+    LAMP_POINT = 0;
+    /// Shines from a point into a cone; falls off as t², t linear in the cosine.
+    LAMP_SPOT_SQUARED_COSINE = 1;
+    /// The same, as 3t² − 2t³.
+    LAMP_SPOT_SMOOTH_COSINE = 2;
+    /// The same, linear in the angle.
+    LAMP_SPOT_LINEAR_ANGLE = 3;
+    /// Shines from infinitely far away.
+    LAMP_DIRECTIONAL = 4;
 
     // Textures.
     /// Index of no texture.
@@ -205,10 +242,16 @@ constants! {
     BRDF_COSINE_INTERVALS = 64;
     /// Nodes of such a table.
     BRDF_COSINE_NODES = BRDF_COSINE_INTERVALS + 1;
-    /// Transmission of a plastic; the albedo is at 0.
-    PLASTIC_TRANSMISSION_OFFSET = 3 * BRDF_COSINE_NODES;
+    /// Transmission of a plastic; the albedo of the coat is at 0.
+    PLASTIC_TRANSMISSION_OFFSET = BRDF_COSINE_NODES;
     /// Probability of sampling a plastic's coat.
     PLASTIC_SPECULAR_SHARE_OFFSET = PLASTIC_TRANSMISSION_OFFSET + BRDF_COSINE_NODES;
+    /// Intervals in the roughness √α of the albedo of all GGX surfaces with a Schlick reflectance.
+    GGX_ROUGHNESS_INTERVALS = 16;
+    /// Words of one roughness: factors of the reflectance at normal and at grazing incidence, by cosine.
+    GGX_ROUGHNESS_WORDS = 2 * BRDF_COSINE_NODES;
+    /// Mean rise of Schlick's reflectance over a diffuse base, by cosine; the albedo of GGX is at 0.
+    DIFFUSE_RISE_OFFSET = (GGX_ROUGHNESS_INTERVALS + 1) * GGX_ROUGHNESS_WORDS;
     /// Bins of the measured grid in θ_h; the edge of bin k is at (k/90)²·90°.
     MEASURED_THETA_HALF_BINS = 90;
     /// Bins of the measured grid in θ_d, of equal width.

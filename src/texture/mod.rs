@@ -5,6 +5,7 @@ mod check;
 mod decode;
 mod exr;
 pub mod lookup;
+mod mean;
 pub mod tables;
 
 use std::sync::Arc;
