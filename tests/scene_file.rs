@@ -289,7 +289,8 @@ fn the_first_scene_is_that_of_new_and_renders_as_printed() {
     let page = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/scene_file.md"));
     let page = page.unwrap();
     let folder = Folder::new();
-    folder.write("scene.toml", between(&page, "```toml\n# A first scene", "```").unwrap());
+    let printed = between(&page, "<!-- first scene -->\n```toml\n", "```").unwrap();
+    folder.write("scene.toml", printed);
     let run = folder.run(&["render", "scene.toml", "--size=16x12", "--spp=1", "-o", "a.exr"]);
     run.assert(0, &[]);
     assert!(folder.path().join("a.exr").exists());

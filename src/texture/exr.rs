@@ -10,7 +10,7 @@ use half::f16;
 
 use super::{
     Texels, Texture,
-    decode::{Repairs, check_size},
+    check::{Repairs, check_size},
 };
 use crate::files;
 

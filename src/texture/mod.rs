@@ -1,6 +1,7 @@
 //! Images on surfaces: texels, and how a material reads them.
 
 mod cache;
+mod check;
 mod decode;
 mod exr;
 pub mod lookup;
@@ -10,7 +11,7 @@ pub mod tables;
 use std::sync::Arc;
 
 pub use cache::TextureCache;
-pub use decode::MAX_TEXTURE_SIDE;
+pub use check::MAX_TEXTURE_SIDE;
 pub use tables::TextureTables;
 
 /// Image whose texels vary a property of a material over a surface.

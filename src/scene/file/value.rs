@@ -82,7 +82,7 @@ pub struct TextureEntry {
     /// True for values as they are stored, false for colours in sRGB. Default: false for colours,
     /// true for numbers and normals; HDR and EXR images are always linear.
     pub linear: Option<bool>,
-    /// Factor of the texels: one number, or one for each of red, green and blue.
+    /// Factor of the texels: one number, or one for each of red, green and blue. Default: 1.
     pub factor: Option<NumberOrVector>,
     /// Factor of the slopes of a normal map; in `normal` only, which has no `factor`. Default: 1.
     pub strength: Option<f32>,
