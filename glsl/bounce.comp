@@ -5,18 +5,24 @@
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
+layout(constant_id = CONSTANT_ONLY_SPECULAR) const bool ONLY_SPECULAR = false;
+
 void main() {
     uint path = gl_GlobalInvocationID.x;
     if (path >= wave_path_count()) {
         return;
     }
     Hit hit = hits[path];
+    PathIndex index = wave_path(path);
     if (hit.material == NO_MATERIAL) {
+        follow_specular(path, index, hit, index.sample_index, wave.seed);
+        return;
+    }
+    if (ONLY_SPECULAR) {
         rays[path].is_active = 0u;
         return;
     }
-    PathIndex index = wave_path(path);
-    Material material = load_material(hit.material);
+    Material material = load_surface(path, hit.material);
     Frame frame = frame_from_normal(hit.shading_normal);
     vec3 outgoing_local = to_local(frame, -rays[path].direction);
     uint dimension = vertex_dimension();
@@ -25,6 +31,7 @@ void main() {
         random_1d(index.pixel, index.sample_index, dimension + DIMENSION_BOUNCE_LOBE, wave.seed);
     vec3 incident_local = brdf_sample(material, outgoing_local, vec3(u, lobe));
     vec3 direction = to_world(frame, incident_local);
-    vec3 factor = bounce_factor(hit, material, outgoing_local, incident_local, direction);
-    follow_bounce(path, index, hit, direction, factor, index.sample_index, wave.seed);
+    float pdf;
+    vec3 factor = bounce_factor(hit, material, outgoing_local, incident_local, direction, pdf);
+    follow_bounce(path, index, hit, direction, pdf, factor, index.sample_index, wave.seed);
 }

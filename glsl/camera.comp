@@ -52,6 +52,6 @@ void main() {
         origin += shift;
     }
 
-    rays[path] = Ray(origin, index.inside ? 1u : 0u, normalize(direction), 0u);
+    rays[path] = Ray(origin, index.inside ? 1u : 0u, normalize(direction), 0.0);
     paths[path] = PathState(vec3(1.0), vec3(0.0), 0u, 0u, index.inside ? 1u : 0u);
 }

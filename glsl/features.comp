@@ -3,11 +3,13 @@
 
 #include "brdf.glsl"
 #include "frame.glsl"
+#include "hit_surface.glsl"
+#include "load.glsl"
 #include "wave.glsl"
 
 READS(rays)
 READS(hits)
-READS(materials)
+READS(triangle_materials)
 UPDATES(film_albedo)
 UPDATES(film_normal)
 UPDATES(film_position)
@@ -30,11 +32,14 @@ void main() {
     for (uint i = 0u; i < wave.sample_count; ++i) {
         uint path = i * wave.pixel_count + pixel;
         Hit hit = hits[path];
-        if (hit.material == NO_MATERIAL) {
+        if (hit.triangle == NO_TRIANGLE) {
             continue;
         }
         Frame frame = frame_from_normal(hit.shading_normal);
-        albedo += brdf_albedo(materials[hit.material], to_local(frame, -rays[path].direction));
+        Material material = load_surface(path, triangle_materials[hit.triangle]);
+        albedo += is_specular(material.kind)
+            ? material.reflectance
+            : brdf_albedo(material, to_local(frame, -rays[path].direction));
         normal += hit.shading_normal;
         position += hit.position;
     }

@@ -1,4 +1,5 @@
-// Adds visible shadow rays to every path; at the first vertex also the environment seen directly.
+// Adds visible shadow rays to every path, and the environment where no light was sampled: seen
+// directly, in a mirror or through glass.
 #version 460
 
 #include "environment.glsl"
@@ -17,10 +18,14 @@ void main() {
         return;
     }
     if (load_hit_origin(path).material == NO_MATERIAL) {
-        // Each vertex already samples the environment: escaped bounce rays would count it twice.
+        // Other vertices sample the environment: rays that escape from there would count it twice.
         Ray ray = load_ray(path);
-        if (wave.vertex == 0u && wave.first_shadow_ray == 0u && ray.is_active != 0u) {
-            paths[path].radiance += environment_radiance(ray.direction);
+        bool is_first = wave.first_shadow_ray == 0u && wave.to_lamps == 0u;
+        if (is_first && ray.is_active != 0u && ray.brdf_pdf == 0.0
+            && load_hit(path).triangle == NO_TRIANGLE) {
+            PathState state = paths[path];
+            paths[path].radiance =
+                state.radiance + state.throughput * environment_radiance(ray.direction);
         }
         return;
     }

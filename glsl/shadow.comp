@@ -1,14 +1,16 @@
-// Tests the environment's visibility along every shadow ray of the wave: shadow_rays, hits ->
-// visibility. Ray direction_index · path_count + path_index starts at hit path_index: neighbouring
-// invocations work on neighbouring paths. As in trace.comp, one traversal loop takes several rays.
+// Tests the visibility of the light along every shadow ray of the wave: shadow_rays, hits ->
+// visibility. Surfaces that are not opaque, and thin panes, dim the ray's contribution. Ray
+// direction_index · path_count + path_index starts at hit path_index: neighbouring invocations work
+// on neighbouring paths. As in trace.comp, one traversal loop takes several rays.
 #version 460
 #extension GL_KHR_shader_subgroup_ballot : require
 
-#include "bvh.glsl"
+#include "passage.glsl"
 #include "load.glsl"
 #include "wave.glsl"
 
 WRITES(visibility)
+UPDATES(shadow_rays)
 UPDATES(counters)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
@@ -32,9 +34,14 @@ bool start_ray(uint index, uint path_count, float offset) {
     HitOrigin hit = load_hit_origin(path);
     ShadowRay ray = load_shadow_ray(index);
     bool is_traced = hit.material != NO_MATERIAL && ray.contribution != vec3(0.0);
-    bvh_start(
-        moved_off_surface(hit.position, hit.geometric_normal, ray.direction, offset), ray.direction,
-        true);
+    vec3 origin = moved_off_surface(hit.position, hit.geometric_normal, ray.direction, offset);
+    float farthest = FAR_AWAY;
+    if (wave.to_lamps != 0u) {
+        vec3 to_lamp = ray.direction + (hit.position - origin);
+        farthest = length(to_lamp);
+        ray.direction = to_lamp / max(farthest, 1.0e-20);
+    }
+    bvh_start(origin, ray.direction, farthest, true);
     bvh_nodes_waiting.y = is_traced ? bvh_nodes_waiting.y : 0u;
     return is_traced;
 }
@@ -70,6 +77,9 @@ void main() {
             }
             bool is_visible = is_traced && !running && bvh_triangle == NO_TRIANGLE;
             visible_bits |= is_visible ? 1u << turn : 0u;
+            if (HAS_PASSAGES && is_visible && bvh_transmittance != vec3(1.0)) {
+                shadow_rays[first + turn * WORKGROUP_SIZE].contribution *= bvh_transmittance;
+            }
             turn++;
             has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
             if (has_ray) {

@@ -5,17 +5,58 @@
 #version 460
 #extension GL_KHR_shader_subgroup_ballot : require
 
-#include "bvh.glsl"
+#include "passage.glsl"
 #include "load.glsl"
+#include "surfaces.glsl"
 #include "wave.glsl"
 
 WRITES(hits)
+UPDATES(paths)
 UPDATES(counters)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
 layout(constant_id = CONSTANT_RAYS_PER_INVOCATION) const uint RAYS_PER_INVOCATION = 1u;
 layout(constant_id = CONSTANT_REFILL_LANES) const uint REFILL_LANES = 0xffffffffu;
+
+// Tests whether light is sampled at a surface: not at a specular one, nor at the black back of a
+// one-sided one.
+bool samples_light(uint material, uint triangle, vec3 direction) {
+    if (HAS_SPECULAR && is_specular(load_material(material).kind)) {
+        return false;
+    }
+    return !HAS_BACKS || (load_material_surface(material).flags & SURFACE_TWO_SIDED) != 0u
+        || !is_back(triangle, direction);
+}
+
+// Decides by chance whether the ray of a path goes through the surface that it has met, and weighs the
+// path by the share of light over the probability. Sends the ray on beyond the surface if it does.
+bool goes_through(uint path) {
+    uint triangle = bvh_triangle;
+    vec3 weights = barycentric(triangle, bvh_origin, bvh_direction);
+    vec3 a = uintBitsToFloat(triangle_texel(triangle, 0u).xyz);
+    vec3 b = uintBitsToFloat(triangle_texel(triangle, 1u).xyz);
+    vec3 c = uintBitsToFloat(triangle_texel(triangle, 2u).xyz);
+    Passing shares = passing(triangle, weights, to_local(bvh_frame, cross(b - a, c - a)));
+    float passed = dot(shares.passed, LUMINANCE_WEIGHTS);
+    float stopped = dot(shares.stopped, LUMINANCE_WEIGHTS);
+    if (passed <= 0.0) {
+        return false;
+    }
+    PathIndex index = wave_path(path);
+    uint bits = hash_4d(uvec4(
+        index.pixel, index.sample_index, vertex_dimension() + DIMENSION_PASSAGE,
+        wave.seed ^ hash_4d(uvec4(triangle, 0u, 0u, 0u)).x)).x;
+    float probability = passed / (passed + stopped);
+    bool goes_on = unit_float(bits) < probability;
+    vec3 weight = goes_on ? shares.passed / probability : shares.stopped / (1.0 - probability);
+    paths[path].throughput *= weight;
+    if (goes_on) {
+        bvh_passed_distance = bvh_distance;
+        bvh_restart(FAR_AWAY);
+    }
+    return goes_on;
+}
 
 void main() {
     uint ray_count = wave.pixel_count * wave.sample_count;
@@ -27,7 +68,7 @@ void main() {
     bool has_ray = first < ray_count;
     if (has_ray) {
         Ray ray = load_ray(first);
-        bvh_start(ray.origin, ray.direction, false);
+        bvh_start(ray.origin, ray.direction, FAR_AWAY, false);
         bvh_nodes_waiting.y = ray.is_active != 0u ? bvh_nodes_waiting.y : 0u;
     }
     while (has_ray) {
@@ -45,12 +86,16 @@ void main() {
             if (running) {
                 atomicAdd(counters.traversal_overruns, 1u);
             }
+            if (HAS_PASSAGES && !running && bvh_triangle != NO_TRIANGLE
+                && goes_through(first + turn * WORKGROUP_SIZE)) {
+                continue;
+            }
             found[turn] = bvh_triangle;
             turn++;
             has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
             if (has_ray) {
                 Ray ray = load_ray(first + turn * WORKGROUP_SIZE);
-                bvh_start(ray.origin, ray.direction, false);
+                bvh_start(ray.origin, ray.direction, FAR_AWAY, false);
                 bvh_nodes_waiting.y = ray.is_active != 0u ? bvh_nodes_waiting.y : 0u;
             }
         }
@@ -64,7 +109,11 @@ void main() {
             if (triangle == NO_TRIANGLE) {
                 hits[index] = no_surface();
             } else {
-                hits[index] = surface_at(triangle, ray.origin, ray.direction);
+                Hit hit = surface_at(triangle, ray.origin, ray.direction);
+                hit.material = samples_light(hit.material, triangle, ray.direction)
+                    ? hit.material
+                    : NO_MATERIAL;
+                hits[index] = hit;
             }
         }
     }

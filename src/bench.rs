@@ -289,9 +289,12 @@ pub fn measure(
     let bench = Bench::new(device, scene, plan)?;
     let yardstick = Yardstick::new(accel, plan.threads);
     let incoherent = Schedule::incoherent(device.capabilities());
-    let trace = Pass::new(device, scene.geometry().traversal().trace(Schedule::SINGLE))?;
-    let trace_bounce = Pass::new(device, scene.geometry().traversal().trace(incoherent))?;
-    let shadow = Pass::new(device, scene.geometry().traversal().shadow(incoherent))?;
+    let trace =
+        Pass::new(device, scene.geometry().traversal().trace(Schedule::SINGLE, scene.surfaces()))?;
+    let trace_bounce =
+        Pass::new(device, scene.geometry().traversal().trace(incoherent, scene.surfaces()))?;
+    let shadow =
+        Pass::new(device, scene.geometry().traversal().shadow(incoherent, scene.surfaces()))?;
     let compare = |kind, rays: &[Option<CpuRay>], any_hit, run: &dyn Fn() -> Result<f64>| {
         compare(kind, &yardstick, rays, any_hit, plan.repetitions, run)
     };
@@ -307,7 +310,7 @@ pub fn measure(
     rate.disagreements = disagreements(&rays, &bench.hits_met()?, &met);
     rates.push(rate);
 
-    let steps = plan.sampler.steps(&Parameters::default(), scene.material_kinds())?;
+    let steps = plan.sampler.steps(&Parameters::default(), scene.surfaces())?;
     for kernel in steps.sample(&bench.wave) {
         bench.run_once(kernel)?;
     }

@@ -23,7 +23,7 @@
 //! | stage | module | shader in `glsl/` |
 //! |---|---|---|
 //! | scene file → validated [`Scene`](scene::Scene) | [`scene`] | `include/environment` |
-//! | images on surfaces | [`texture`] | |
+//! | images on surfaces | [`texture`] | `include/texture` |
 //! | materials → values, densities, samples | [`brdf`] | `include/brdf` |
 //! | lobes: products, integrals, samples | [`srbf`] | `include/srbf` |
 //! | maps and BRDFs → lobes | [`fit`] | |

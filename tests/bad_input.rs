@@ -14,7 +14,7 @@ use std::{
 
 use command::{Folder, Run, Running, program};
 use fenestra::{
-    brdf::twin::fresnel_conductor,
+    brdf::fresnel::fresnel_conductor,
     film::{Attribute, Image},
     scene::mesh::Mesh,
 };

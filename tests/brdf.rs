@@ -4,7 +4,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use fenestra::brdf::{self, MaterialTables, twin};
+use fenestra::brdf::{self, MaterialTables, fresnel, ggx};
 use glam::{DVec3, Vec3, vec3};
 use rayon::prelude::*;
 
@@ -270,24 +270,24 @@ fn few_samples_fall_below_the_surface() {
 fn fresnel_has_its_closed_forms() {
     for ior in [1.0_f32, 1.33, 1.5, 2.4] {
         let normal = ((ior - 1.0) / (ior + 1.0)).powi(2);
-        assert!((twin::fresnel_dielectric(1.0, ior) - normal).abs() < 1e-6, "{ior}");
+        assert!((fresnel::fresnel_dielectric(1.0, ior) - normal).abs() < 1e-6, "{ior}");
         // At tanθ = n only the perpendicular part remains: ½((n² − 1)/(n² + 1))².
         let brewster = 0.5 * ((ior * ior - 1.0) / (ior * ior + 1.0)).powi(2);
         let cosine = 1.0 / (1.0 + ior * ior).sqrt();
-        assert!((twin::fresnel_dielectric(cosine, ior) - brewster).abs() < 1e-6, "{ior}");
+        assert!((fresnel::fresnel_dielectric(cosine, ior) - brewster).abs() < 1e-6, "{ior}");
         if ior > 1.0 {
-            assert!((twin::fresnel_dielectric(0.0, ior) - 1.0).abs() < 1e-6, "{ior}");
+            assert!((fresnel::fresnel_dielectric(0.0, ior) - 1.0).abs() < 1e-6, "{ior}");
         }
         // A conductor without extinction is a dielectric.
         for cosine in [0.05, 0.3, 0.7, 0.95] {
-            let conductor = twin::fresnel_conductor(cosine, Vec3::splat(ior), Vec3::ZERO).x;
-            let dielectric = twin::fresnel_dielectric(cosine, ior);
+            let conductor = fresnel::fresnel_conductor(cosine, Vec3::splat(ior), Vec3::ZERO).x;
+            let dielectric = fresnel::fresnel_dielectric(cosine, ior);
             assert!((conductor - dielectric).abs() < 1e-4, "{ior}, {cosine}: {conductor}");
         }
     }
     let (eta, k) = (0.2_f32, 3.9_f32);
     let normal = ((eta - 1.0).powi(2) + k * k) / ((eta + 1.0).powi(2) + k * k);
-    let found = twin::fresnel_conductor(1.0, Vec3::splat(eta), Vec3::splat(k)).x;
+    let found = fresnel::fresnel_conductor(1.0, Vec3::splat(eta), Vec3::splat(k)).x;
     assert!((found - normal).abs() < 1e-5, "{found} against {normal}");
 }
 
@@ -308,7 +308,7 @@ fn ggx_normals_project_to_one() {
                 let slope = alpha * alpha
                     / (2.0 * tangent * (1.0 - t) * (1.0 - t))
                     / (1.0 + tangent * tangent);
-                let density = f64::from(twin::ggx_normal_density(normal, alpha as f32));
+                let density = f64::from(ggx::ggx_normal_density(normal, alpha as f32));
                 density * theta.cos() * theta.sin() * 2.0 * PI * slope
             })
             .sum();

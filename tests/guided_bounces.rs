@@ -132,7 +132,7 @@ fn bounce(floor: &Floor, candidates: u32, beliefs: &GuideState) -> Vec<(Vec3, Ve
     let mut guide = GuideBuffers::new(device, scene, &parameters, size).unwrap();
     let state = guide.state().unwrap();
     guide.restore(&GuideState { arrivals: beliefs.arrivals.clone(), ..state }).unwrap();
-    let waves = WaveBuffers::new(device, PIXELS, 1, PathDemand::default()).unwrap();
+    let waves = WaveBuffers::new(device, PIXELS, 1, PathDemand::default(), false).unwrap();
     assert!(waves.capacity() >= paths);
     let input = support::PathInput {
         normal: floor.normal.into(),
@@ -148,7 +148,7 @@ fn bounce(floor: &Floor, candidates: u32, beliefs: &GuideState) -> Vec<(Vec3, Ve
 
     let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_state.spv"));
     let put = Pipeline::new(device, "product_state", spirv, &[]).unwrap();
-    let kinds = (CONSTANT_MATERIAL_KINDS, buffers.material_kinds());
+    let kinds = (CONSTANT_MATERIAL_KINDS, buffers.surfaces().material_kinds);
     let create = |name: &str, constants: &[(u32, u32)]| {
         Pipeline::new(device, name, spirv::pass(name), constants).unwrap()
     };

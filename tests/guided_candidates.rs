@@ -145,7 +145,7 @@ impl Paths {
         Self {
             scene: SceneBuffers::new(device, scene, window).unwrap(),
             guide: GuideBuffers::new(device, scene, &parameters().guided, SIZE).unwrap(),
-            waves: WaveBuffers::new(device, 64, 1, PathDemand::default()).unwrap(),
+            waves: WaveBuffers::new(device, 64, 1, PathDemand::default(), false).unwrap(),
         }
     }
 
@@ -173,7 +173,7 @@ impl Paths {
         let constants = [
             (CONSTANT_CANDIDATES, candidates),
             (CONSTANT_BRDF_CANDIDATES, candidates / 4),
-            (CONSTANT_MATERIAL_KINDS, self.scene.material_kinds()),
+            (CONSTANT_MATERIAL_KINDS, self.scene.surfaces().material_kinds),
         ];
         let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/guided_candidates.spv"));
         let pipeline = Pipeline::new(device, "guided_candidates", spirv, &constants).unwrap();

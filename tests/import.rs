@@ -30,16 +30,7 @@ struct Expected {
 }
 
 fn textures(scene: &Scene) -> usize {
-    let of = |surface: &fenestra::brdf::material::Surface| {
-        let emission = surface.emission.as_ref().and_then(|emission| emission.texture.as_ref());
-        [&surface.color, &surface.roughness, &surface.metallic, &surface.normal]
-            .into_iter()
-            .flatten()
-            .chain(&surface.opacity.texture)
-            .chain(emission)
-            .count()
-    };
-    scene.materials.iter().map(|material| of(&material.surface)).sum()
+    scene.materials.iter().map(|material| material.surface.textures().count()).sum()
 }
 
 #[test]

@@ -7,7 +7,7 @@ mod page;
 use std::{collections::BTreeMap, fmt::Write};
 
 use fenestra::{
-    pass::{Dispatch, PassSettings, Schedule, Steps, geometry::Traversal, wave_order},
+    pass::{Dispatch, PassSettings, Schedule, Steps, Surfaces, geometry::Traversal, wave_order},
     sampler::{
         Parameters, basic,
         guided::{GuidedParameters, GuidedSteps},
@@ -15,7 +15,10 @@ use fenestra::{
         visibility::{CacheScope, VisibilityParameters, VisibilitySteps},
     },
     shader::{
-        constants::{AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL},
+        constants::{
+            AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, SURFACES_EMITTING, SURFACES_SPECULAR,
+            SURFACES_TEXTURED,
+        },
         spirv::PASSES,
         structs::Wave,
     },
@@ -31,7 +34,7 @@ fn settings(shadow_rays: u32, depth: u32) -> PassSettings {
         depth,
         aovs: AOV_ALBEDO | AOV_CACHE_ENTRIES | AOV_GUIDE_CELL,
         roulette_vertex: 8,
-        material_kinds: 1,
+        surfaces: Surfaces::default(),
         traversal: Traversal { page_count: 1, page_shift: 20 },
         incoherent: Schedule { rays_per_invocation: 16, refill_lanes: 3 },
     }
@@ -43,16 +46,22 @@ fn wave(first_sample: u32, sample_count: u32) -> Wave {
 }
 
 fn mis() -> impl Steps {
-    basic::MIS.steps(&Parameters::default(), 1).unwrap()
+    basic::MIS.steps(&Parameters::default(), Surfaces::default()).unwrap()
 }
 
 fn product() -> impl Steps {
-    ProductSteps::new(ProductParameters::default(), FITS, 1)
+    ProductSteps::new(ProductParameters::default(), FITS, Surfaces::default())
 }
 
 fn visibility(cache: CacheScope, shadow_rays: u32) -> impl Steps {
     let parameters = VisibilityParameters { cache, ..VisibilityParameters::default() };
-    VisibilitySteps::new(parameters, ProductParameters::default(), FITS, 1, shadow_rays)
+    VisibilitySteps::new(
+        parameters,
+        ProductParameters::default(),
+        FITS,
+        Surfaces::default(),
+        shadow_rays,
+    )
 }
 
 fn guided(settings: &PassSettings) -> impl Steps {
@@ -144,12 +153,51 @@ fn guided_counts_rays_and_bounces_where_samples_teach() {
 /// Every technique as the page shows it.
 fn shown() -> Vec<(&'static str, Vec<Dispatch>)> {
     let deep = settings(2, 2);
+    let furnished = PassSettings { surfaces: everything(), ..settings(2, 1) };
     vec![
         ("uniform … ris", order(&deep, &mis(), wave(0, 1))),
         ("product", order(&deep, &product(), wave(0, 1))),
         ("visibility", order(&deep, &visibility(CacheScope::Hit, 2), wave(0, 1))),
         ("guided", order(&deep, &guided(&deep), wave(0, 1))),
+        ("one vertex, textures, lamps", order(&furnished, &mis(), wave(0, 1))),
     ]
+}
+
+/// A scene with textures, glass, an emitting surface and a lamp.
+fn everything() -> Surfaces {
+    let features = SURFACES_TEXTURED | SURFACES_SPECULAR | SURFACES_EMITTING;
+    Surfaces { features, lamp_count: 2, ..Surfaces::default() }
+}
+
+#[test]
+fn paths_end_at_light_that_is_not_sampled() {
+    let direct = |features, lamp_count| PassSettings {
+        surfaces: Surfaces { features, lamp_count, ..Surfaces::default() },
+        ..settings(1, 1)
+    };
+    let listed = |settings: &PassSettings, wave| names(&order(settings, &mis(), wave));
+    let glass = direct(SURFACES_SPECULAR, 0);
+    assert_eq!(
+        listed(&glass, wave(0, 1)),
+        "camera trace sample shadow gather features bounce trace gather accumulate"
+    );
+    let lamp = direct(0, 1);
+    assert_eq!(
+        listed(&lamp, wave(0, 1)),
+        "camera trace sample_lamps shadow gather sample shadow gather features accumulate"
+    );
+    let all = PassSettings { surfaces: everything(), ..settings(1, 1) };
+    assert_eq!(
+        listed(&all, wave(0, 1)),
+        "camera trace texture emit sample_lamps shadow gather sample shadow gather features bounce \
+         trace emit gather accumulate"
+    );
+    let training = Wave { is_training: 1, ..wave(0, 1) };
+    assert_eq!(listed(&all, training), "camera trace texture sample shadow gather accumulate");
+    // The last ray gathers at a vertex of its own, without shadow rays.
+    let order = order(&all, &mis(), wave(0, 1));
+    let last = &order[order.len() - 2].wave;
+    assert_eq!((last.vertex, last.shadow_ray_count, last.to_lamps), (1, 0, 0));
 }
 
 #[test]
@@ -180,7 +228,7 @@ fn the_page_lists_every_pass() {
         }
         writeln!(text, "{}{line}", " ".repeat(indent)).unwrap();
     }
-    text += "```\n\n| pass | an invocation is one of the | runs for |\n|---|---|---|\n";
+    text += "```\n\n| pass | one invocation for each of the | runs for |\n|---|---|---|\n";
     for (pass, (domain, mut users)) in domains {
         users.dedup();
         let all = shown().len();

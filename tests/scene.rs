@@ -1,13 +1,21 @@
 //! Scene files and meshes, and the messages that a user reads.
 
-#![expect(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+#![expect(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use fenestra::{
     Error,
     brdf::material::{ConductorFresnel, MaterialKind},
-    scene::{Scene, mesh::Mesh},
+    scene::{
+        Scene,
+        lamp::{LampKind, SpotFalloff},
+        mesh::Mesh,
+    },
+    texture::{Channels, Encoding, Interpolation, Wrap},
 };
 use glam::Vec3;
 use tempfile::TempDir;
@@ -168,9 +176,9 @@ fn text_that_is_no_scene_is_refused_with_line_and_column() {
     };
     case("[camera\n", "room.toml:1:8: ");
     case(
-        &format!("{HEAD}[lamp]\n"),
-        "room.toml:14:2: unknown key `lamp` in the scene, expected one of `camera`, `film`, \
-         `environment`, `material`, `object`",
+        &format!("{HEAD}[lamps]\n"),
+        "room.toml:14:2: unknown key `lamps` in the scene, expected one of `camera`, `film`, \
+         `environment`, `lamp`, `material`, `object`, `include`",
     );
     case(
         &HEAD.replace("look_at", "lookat"),
@@ -192,12 +200,13 @@ fn text_that_is_no_scene_is_refused_with_line_and_column() {
     case(
         &HEAD.replace("\"diffuse\"", "\"metal\""),
         "room.toml:12:8: unknown material type `metal`, expected one of `diffuse`, `plastic`, \
-         `conductor`, `measured`",
+         `conductor`, `principled`, `mirror`, `dielectric`, `thin_dielectric`, `measured`",
     );
     case(
         &HEAD.replace("reflectance", "color"),
         "room.toml:13:1: unknown key `color` in material `grey` of type `diffuse`, expected one \
-         of `name`, `type`, `reflectance`",
+         of `name`, `type`, `normal`, `opacity`, `opacity_cutoff`, `emission`, \
+         `emission_two_sided`, `two_sided`, `vertex_color`, `reflectance`",
     );
     case(
         &HEAD.replace("reflectance = [0.5, 0.5, 0.5]", ""),
@@ -366,6 +375,280 @@ fn numbers_that_cannot_be_rendered_are_refused_by_name() {
         &format!("{HEAD}[[object]]\nmesh = \"room.toml\"\nmaterial = \"grey\""),
         "expected a mesh in .ply, .obj, .gltf or .glb, found .toml",
     );
+}
+
+/// An image of 2 × 1 texels: dark red with half opacity, and white.
+fn png() -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let image = image::RgbaImage::from_raw(2, 1, vec![128, 0, 0, 128, 255, 255, 255, 255]);
+    image.unwrap().write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    bytes.into_inner()
+}
+
+/// A square in an OBJ file.
+const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+
+#[test]
+fn materials_take_textures_opacity_and_emission() {
+    let folder = Folder::new();
+    folder.write("wood.png", png());
+    let text = format!(
+        "{HEAD}
+        [[material]]
+        name = \"wood\"
+        type = \"principled\"
+        base_color = {{ texture = \"wood.png\", scale = [2, 4], factor = 0.5 }}
+        metallic = {{ texture = \"./wood.png\", channel = \"b\" }}
+        roughness = {{ texture = \"wood.png\", factor = 0.8, wrap = \"mirror\" }}
+        normal = {{ texture = \"wood.png\", strength = 2, interpolation = \"nearest\" }}
+        opacity = {{ texture = \"wood.png\", channel = \"a\" }}
+        opacity_cutoff = 0.5
+        emission = [1, 2, 3]
+        emission_two_sided = true
+        two_sided = false
+        vertex_color = true
+        [[material]]
+        name = \"glass\"
+        type = \"dielectric\"
+        opacity = 0.25
+        [[material]]
+        name = \"frosted\"
+        type = \"dielectric\"
+        ior = 1.33
+        roughness = 0.5
+        transmittance = [0.5, 0.6, 0.7]
+        [[material]]
+        name = \"pane\"
+        type = \"thin_dielectric\"
+        [[material]]
+        name = \"silver\"
+        type = \"mirror\"
+        reflectance = {{ texture = \"wood.png\" }}
+        emission = {{ texture = \"wood.png\", factor = [10, 20, 30] }}"
+    );
+    let scene = folder.load(&text).unwrap();
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let [_, wood, glass, frosted, pane, silver] = &scene.materials[..] else { unreachable!() };
+    let MaterialKind::Principled { base_color, metallic, roughness, ior, specular, .. } = wood.kind
+    else {
+        unreachable!()
+    };
+    assert_eq!(base_color, Vec3::splat(0.5));
+    assert_eq!([metallic, roughness, ior, specular], [1.0, 0.8, 1.5, 1.0]);
+    let surface = &wood.surface;
+    let color = surface.color.as_ref().unwrap();
+    assert_eq!((color.encoding, color.scale), (Encoding::Srgb, [1.0; 3]));
+    // The lower left corner of the surface is that of the image.
+    assert_eq!(color.image_from_uv, [[2.0, 0.0, 0.0], [0.0, -4.0, 1.0]]);
+    let metallic = surface.metallic.as_ref().unwrap();
+    assert_eq!((metallic.encoding, metallic.channels), (Encoding::Linear, Channels::Blue));
+    assert!(Arc::ptr_eq(&metallic.texture, &color.texture), "one file is one texture");
+    assert_eq!(surface.roughness.as_ref().unwrap().wrap, [Wrap::MirroredRepeat; 2]);
+    let normal = surface.normal.as_ref().unwrap();
+    assert_eq!((normal.encoding, normal.interpolation), (Encoding::Linear, Interpolation::Nearest));
+    assert_eq!(surface.normal_scale, 2.0);
+    assert_eq!((surface.opacity.factor, surface.opacity.cutoff), (1.0, Some(0.5)));
+    assert_eq!(surface.opacity.texture.as_ref().unwrap().channels, Channels::Alpha);
+    let emission = surface.emission.as_ref().unwrap();
+    assert_eq!((emission.radiance, emission.two_sided), (Vec3::new(1.0, 2.0, 3.0), true));
+    assert!(surface.vertex_color && !surface.two_sided);
+    assert!(matches!(glass.kind, MaterialKind::Dielectric { ior: 1.5, alpha: 0.0, .. }));
+    assert_eq!(glass.surface.opacity.factor, 0.25);
+    assert!(matches!(frosted.kind, MaterialKind::Dielectric { alpha: 0.25, transmittance, .. }
+        if transmittance == Vec3::new(0.5, 0.6, 0.7)));
+    assert!(matches!(pane.kind, MaterialKind::ThinDielectric { ior: 1.5, .. }));
+    assert!(matches!(silver.kind, MaterialKind::Mirror { reflectance: Vec3::ONE }));
+    let emission = silver.surface.emission.as_ref().unwrap();
+    assert_eq!(emission.radiance, Vec3::new(10.0, 20.0, 30.0));
+    assert_eq!(emission.texture.as_ref().unwrap().encoding, Encoding::Srgb);
+    let wood = folder.0.path().join("wood.png");
+    assert_eq!(scene.inputs.iter().filter(|input| input.ends_with("wood.png")).count(), 1);
+    assert!(scene.inputs.contains(&wood));
+}
+
+#[test]
+fn textures_are_placed_by_offset_turn_and_repetitions() {
+    let folder = Folder::new();
+    folder.write("wood.png", png());
+    let text = HEAD.replace(
+        "[0.5, 0.5, 0.5]",
+        "{ texture = \"wood.png\", scale = 2, offset = [0.25, 0.5], rotate_deg = 90 }",
+    );
+    let scene = folder.load(&text).unwrap();
+    let used = scene.materials[0].surface.color.as_ref().unwrap();
+    let image = |u: f32, v: f32| {
+        used.image_from_uv.map(|row| Vec3::from_array(row).dot(Vec3::new(u, v, 1.0)))
+    };
+    assert_eq!(image(0.25, 0.5), [0.0, 1.0], "lower left corner of the image");
+    // Turned to the left, the image's right edge is above and its upper edge at the left.
+    assert_eq!(image(0.25, 1.0), [1.0, 1.0]);
+    assert_eq!(image(-0.25, 0.5), [0.0, 0.0]);
+}
+
+#[test]
+fn what_textures_cannot_do_is_refused_by_name() {
+    let folder = Folder::new();
+    folder.write("wood.png", png());
+    folder.write("text.png", "no image");
+    let case = |body: &str, expected: &str| {
+        let text = HEAD.replace("type = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]", body);
+        assert_ne!(text, HEAD);
+        let message = folder.message(&text);
+        assert!(message.contains(expected), "expected `{expected}`, found `{message}`");
+    };
+    let wood = "{ texture = \"wood.png\" }";
+    case(
+        &format!("type = \"plastic\"\ndiffuse = [0, 0, 0]\nroughness = {wood}"),
+        "material `grey` (line 10): roughness: expected one number, found a texture; the tables of a \
+         plastic are made for one roughness: use type = \"principled\"",
+    );
+    case(
+        &format!("type = \"dielectric\"\nroughness = {wood}"),
+        "roughness: expected one number, found a texture; the tables of a dielectric",
+    );
+    case(
+        &format!("type = \"measured\"\nfile = \"a.binary\"\nreflectance = {wood}"),
+        "room.toml:14:1: unknown key `reflectance` in material `grey` of type `measured`",
+    );
+    case(
+        "type = \"diffuse\"\nreflectance = 0.5",
+        "room.toml:13:15: material `grey` of type `diffuse`: invalid type: floating point `0.5`, \
+         expected an array of three numbers or a table with `texture`",
+    );
+    case(
+        "type = \"diffuse\"\nreflectance = { file = \"wood.png\" }",
+        "unknown field `file`, expected one of `texture`, `scale`",
+    );
+    case("type = \"diffuse\"\nreflectance = { scale = 2 }", "missing field `texture`");
+    case(
+        "type = \"diffuse\"\nreflectance = { texture = \"wood.png\", wrap = \"tile\" }",
+        "unknown variant `tile`, expected one of `repeat`, `mirror`, `clamp`",
+    );
+    case(
+        "type = \"diffuse\"\nreflectance = { texture = \"wood.png\", factor = 2 }",
+        "material `grey` (line 10): reflectance.factor: expected a number from 0 to 1, found 2",
+    );
+    case(
+        "type = \"diffuse\"\nreflectance = { texture = \"wood.png\", strength = 2 }",
+        "reflectance: strength is for `normal`",
+    );
+    case(
+        "type = \"principled\"\nbase_color = [0, 0, 0]\nroughness = [1, 1, 1]",
+        "invalid type: sequence, expected a number or a table with `texture`",
+    );
+    case("type = \"diffuse\"\nreflectance = { texture = \"none.png\" }", "none.png: cannot read");
+    case(
+        "type = \"diffuse\"\nreflectance = { texture = \"text.png\" }",
+        "text.png: not a readable image",
+    );
+    case("type = \"dielectric\"\nior = 1\nalpha = 0.1", "ior: a rough dielectric of index 1");
+    case(
+        "type = \"diffuse\"\nreflectance = [0, 0, 0]\nopacity = 2",
+        "opacity: expected a number from 0 to 1, found 2",
+    );
+    case(
+        "type = \"diffuse\"\nreflectance = [0, 0, 0]\nemission_two_sided = true",
+        "emission_two_sided needs emission",
+    );
+}
+
+#[test]
+fn a_texture_without_coordinates_is_a_warning_by_name() {
+    let folder = Folder::new();
+    folder.write("wood.png", png());
+    let text = with_box("name = \"cube\"").replace("[0.5, 0.5, 0.5]", "{ texture = \"wood.png\" }");
+    let scene = folder.load(&text).unwrap();
+    let [warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+    assert!(warning.contains("object `cube` (box, line 14): the material `grey` has textures"));
+}
+
+#[test]
+fn lamps_take_every_form_and_a_scene_needs_no_environment() {
+    let folder = Folder::new();
+    let dark = with_box("").replace("[environment]\nconstant = [1, 1, 1]\n", "");
+    let scene = folder.load(&dark).unwrap();
+    assert!(scene.warnings[0].contains("nothing is lit"), "{:?}", scene.warnings);
+    assert!(scene.environment.texels.iter().all(|texel| *texel == Vec3::ZERO));
+    let lamps = "
+        [[lamp]]
+        name = \"bulb\"
+        type = \"point\"
+        position = [1, 2, 3]
+        intensity = [4, 5, 6]
+        [[lamp]]
+        type = \"spot\"
+        position = [0, 3, 0]
+        direction = [0, -2, 0]
+        intensity = [1, 1, 1]
+        inner_angle_deg = 10
+        falloff = \"smooth_cosine\"
+        [[lamp]]
+        type = \"directional\"
+        direction = [0, -1, -1]
+        irradiance = [1, 2, 3]\n";
+    let scene = folder.load(&format!("{dark}{lamps}")).unwrap();
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    assert_eq!(scene.lamps[0].name, "bulb");
+    let position = Vec3::new(1.0, 2.0, 3.0);
+    let intensity = Vec3::new(4.0, 5.0, 6.0);
+    assert_eq!(scene.lamps[0].kind, LampKind::Point { position, intensity });
+    let LampKind::Spot { direction, inner_angle_rad, outer_angle_rad, falloff, .. } =
+        scene.lamps[1].kind
+    else {
+        unreachable!()
+    };
+    assert_eq!((direction, falloff), (Vec3::NEG_Y, SpotFalloff::SmoothCosine));
+    let angles = [10.0_f32, 45.0].map(f32::to_radians);
+    assert_eq!([inner_angle_rad, outer_angle_rad], angles);
+    assert!(matches!(scene.lamps[2].kind, LampKind::Directional { direction, .. }
+        if direction.is_normalized()));
+    let case = |from: &str, to: &str, expected: &str| {
+        let message = folder.message(&format!("{dark}{}", lamps.replace(from, to)));
+        assert!(message.contains(expected), "expected `{expected}`, found `{message}`");
+    };
+    case("\"point\"", "\"area\"", "unknown lamp type `area`, expected one of `point`");
+    case("direction = [0, -2, 0]", "", "lamp of type `spot`: missing field `direction`");
+    case("direction = [0, -2, 0]", "direction = [0, 0, 0]", "expected a vector other than 0");
+    case("inner_angle_deg = 10", "inner_angle_deg = 50", "found 50 and 45");
+    case("[4, 5, 6]", "[4, -5, 6]", "lamp `bulb` (line ");
+    case("irradiance", "intensity", "unknown key `intensity` in lamp of type `directional`");
+    let emission = dark.replace("\"diffuse\"", "\"diffuse\"\nemission = [1, 1, 1]");
+    assert!(folder.load(&emission).unwrap().warnings.is_empty());
+}
+
+#[test]
+fn an_included_file_is_placed_with_its_materials() {
+    let folder = Folder::new();
+    let library = "newmtl wall\nKd 0.1 0.2 0.3\nnewmtl glass\nKd 1 1 1\n";
+    folder.write("parts/room.mtl", library);
+    let square = SQUARE.replace("f 1", "mtllib room.mtl\nusemtl wall\nf 1");
+    folder.write("parts/room.obj", format!("{square}usemtl glass\nf 1 2 3\n"));
+    let include = "
+        [[include]]
+        file = \"parts/room.obj\"
+        scale = 2
+        rotate_deg = [0, 90, 0]
+        translate = [10, 0, 0]
+        materials = { glass = \"grey\" }\n";
+    let scene = folder.load(&format!("{}{include}", with_box(""))).unwrap();
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let names: Vec<_> = scene.materials.iter().map(|material| material.name.as_str()).collect();
+    assert_eq!(names, ["grey", "room/wall"]);
+    let geometry = &scene.geometry;
+    assert_eq!(geometry.triangles.len(), 15);
+    assert_eq!(geometry.materials[12..], [1, 1, 0]);
+    let mut corners = geometry.triangles[12..14].iter().flatten();
+    assert!(corners.any(|&corner| geometry.positions[corner as usize] == [10.0, 2.0, -2.0]));
+    assert!(scene.inputs.iter().any(|input| input.ends_with("parts/room.mtl")));
+    let case = |from: &str, to: &str, expected: &str| {
+        let message = folder.message(&format!("{HEAD}{}", include.replace(from, to)));
+        assert!(message.contains(expected), "expected `{expected}`, found `{message}`");
+    };
+    case("glass =", "ice =", "found `ice`; the file has wall, glass");
+    case("\"grey\"", "\"gray\"", "unknown material `gray`, the scene has grey");
+    case("room.obj", "room.ply", "expected a file in .gltf, .glb or .obj");
+    case("scale = 2", "scale = 0", "include parts/room.obj (line 15): scale must not be 0");
+    case("file", "mesh", "unknown field `mesh`, expected one of `file`, `scale`");
 }
 
 #[test]

@@ -119,6 +119,14 @@ fn in_a_closed_room_with_bounces() {
     samplers_agree(&scene, 4, 64, &ALL_AGAINST_COSINE);
 }
 
+#[test]
+fn in_a_glazed_room_with_lamps() {
+    let _alone = support::alone();
+    let scene = scenes::glazed_room();
+    let samplers = [Sampler::Cosine, Sampler::Mis, Sampler::Visibility, Sampler::Guided];
+    samplers_agree(&scene, 4, 64, &samplers);
+}
+
 /// Tests the thesis's scenes of real meshes, measured BRDFs and the Uffizi map, where they are at
 /// hand: 5 comparisons in 4 scenes with 72 values each raise a false alarm once in about 240 runs.
 #[test]

@@ -19,18 +19,18 @@ void main() {
         return;
     }
     Hit hit = hits[path];
+    PathIndex index = wave_path(path);
+    // Start the sequences anew at each rebuild: the cells depend on earlier samples.
+    uint number = index.sample_index - wave.epoch_start;
     if (hit.material == NO_MATERIAL) {
-        rays[path].is_active = 0u;
+        follow_specular(path, index, hit, number, wave.epoch_seed);
         path_cells[path].teaches = NOTHING_TO_LEARN;
         return;
     }
-    PathIndex index = wave_path(path);
-    Material material = load_material(hit.material);
+    Material material = load_surface(path, hit.material);
     Frame frame = frame_from_normal(hit.shading_normal);
     vec3 outgoing_local = to_local(frame, -rays[path].direction);
     uint dimension = vertex_dimension();
-    // Start the sequences anew at each rebuild: the cells depend on earlier samples.
-    uint number = index.sample_index - wave.epoch_start;
     vec3 u = vec3(
         random_2d(index.pixel, number, dimension + DIMENSION_BOUNCE, wave.epoch_seed),
         random_1d(index.pixel, number, dimension + DIMENSION_BOUNCE_LOBE, wave.epoch_seed));
@@ -58,10 +58,11 @@ void main() {
         u = fract(u + rotation);
     }
     vec3 direction = to_world(frame, chosen);
-    vec3 factor = bounce_factor(hit, material, outgoing_local, chosen, direction)
+    float pdf;
+    vec3 factor = bounce_factor(hit, material, outgoing_local, chosen, direction, pdf)
         * (sum / (float(BOUNCE_CANDIDATES) * chosen_light));
     // The throughput depends on the tables, and so roulette takes the numbers since their rebuild too.
     bool alive =
-        follow_bounce(path, index, hit, direction, factor, number, wave.epoch_seed);
+        follow_bounce(path, index, hit, direction, pdf, factor, number, wave.epoch_seed);
     path_cells[path].teaches = alive ? first + chosen_direction : NOTHING_TO_LEARN;
 }

@@ -171,14 +171,6 @@ uint guide_cell_index(GuideCell cell) {
     return cell.found & (GUIDE_REFINED - 1u);
 }
 
-// bits * count / 2^32
-uint scaled(uint bits, uint count) {
-    uint high;
-    uint low;
-    umulExtended(bits, count, high, low);
-    return high;
-}
-
 // Direction with its region and that region's entry in the cell.
 struct Guided {
     DirectionSample sampled;

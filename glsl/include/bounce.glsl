@@ -4,11 +4,13 @@
 #define BOUNCE_GLSL
 
 #include "frame.glsl"
+#include "hit_surface.glsl"
 #include "load.glsl"
 #include "random.glsl"
 #include "wave.glsl"
 #include "brdf.glsl"
 #include "bvh.glsl"
+#include "specular.glsl"
 
 UPDATES(rays)
 READS(hits)
@@ -17,13 +19,15 @@ UPDATES(paths)
 // First vertex at which russian roulette may end a path.
 layout(constant_id = CONSTANT_ROULETTE_VERTEX) const uint ROULETTE_VERTEX = 8u;
 
-// Returns BRDF * cosine / density of a direction drawn from the BRDF; 0 below either horizon.
+// Returns BRDF * cosine / density of a direction drawn from the BRDF, and that density; 0 below
+// either horizon.
 vec3 bounce_factor(
-    Hit hit, Material material, vec3 outgoing_local, vec3 incident_local, vec3 direction) {
+    Hit hit, Material material, vec3 outgoing_local, vec3 incident_local, vec3 direction,
+    out float pdf) {
     vec3 factor = vec3(0.0);
+    pdf = 0.0;
     if (incident_local.z > 0.0 && dot(direction, hit.geometric_normal) > 0.0) {
         vec3 value;
-        float pdf;
         brdf_evaluate_and_pdf(material, outgoing_local, incident_local, value, pdf);
         factor = pdf > 0.0 ? value * (incident_local.z / pdf) : vec3(0.0);
     }
@@ -31,9 +35,10 @@ vec3 bounce_factor(
 }
 
 // Sends a path on unless it carries nothing or loses at roulette, which draws with `number` and `seed`.
-// Returns true if it goes on.
+// `brdf_pdf` is the ray's. Returns true if it goes on.
 bool follow_bounce(
-    uint path, PathIndex index, Hit hit, vec3 direction, vec3 factor, uint number, uint seed) {
+    uint path, PathIndex index, Hit hit, vec3 direction, float brdf_pdf, vec3 factor, uint number,
+    uint seed) {
     PathState state = paths[path];
     vec3 throughput = state.throughput * factor;
     float strongest = max(throughput.r, max(throughput.g, throughput.b));
@@ -50,8 +55,43 @@ bool follow_bounce(
     paths[path] = state;
     rays[path] = Ray(
         offset_ray_origin(hit.position, hit.geometric_normal, direction), alive ? 1u : 0u,
-        direction, 0u);
+        direction, brdf_pdf);
     return alive;
+}
+
+// Sends a path on from a specular surface, or ends it where no light was sampled for another
+// reason. Returns true if it goes on.
+bool follow_specular(uint path, PathIndex index, Hit hit, uint number, uint seed) {
+    Material material;
+    bool goes_on = HAS_SPECULAR && hit.triangle != NO_TRIANGLE;
+    if (goes_on) {
+        material = load_surface(path, triangle_materials[hit.triangle]);
+        goes_on = is_specular(material.kind);
+    }
+    if (!goes_on) {
+        rays[path].is_active = 0u;
+        return false;
+    }
+    vec3 outgoing = -rays[path].direction;
+    Frame frame = frame_from_normal(hit.shading_normal);
+    uint dimension = vertex_dimension();
+    vec3 u = vec3(
+        random_2d(index.pixel, number, dimension + DIMENSION_BOUNCE, seed),
+        random_1d(index.pixel, number, dimension + DIMENSION_BOUNCE_LOBE, seed));
+    vec3 outgoing_local = to_local(frame, outgoing);
+    Scatter scattered;
+    if (is_kind(material, MATERIAL_THIN_DIELECTRIC)) {
+        // trace.comp has let the rest through, and weighed the path by what a pane reflects.
+        scattered =
+            Scatter(vec3(-outgoing_local.xy, outgoing_local.z), vec3(1.0), false);
+    } else {
+        scattered = scatter(material, outgoing_local, is_back(hit.triangle, -outgoing), u);
+    }
+    vec3 direction = to_world(frame, scattered.direction_local);
+    bool is_behind = dot(direction, hit.geometric_normal) < 0.0;
+    // A shading normal may send light through an opaque surface, or reflect it from a clear one.
+    vec3 factor = is_behind == scattered.is_transmitted ? scattered.weight : vec3(0.0);
+    return follow_bounce(path, index, hit, direction, 0.0, factor, number, seed);
 }
 
 #endif

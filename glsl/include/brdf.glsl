@@ -3,21 +3,21 @@
 //
 // Directions are unit vectors in the shading frame (z is the normal) and point away from the
 // surface. Values are per steradian without the cosine; pdfs are per steradian of incident
-// directions. Both are 0 unless both directions are above the surface.
-//
+// directions. Both are 0 unless both directions are above the surface, and for mirrors, dielectrics and
+// thin panes, at which no light is sampled: see specular.glsl.
 
 #ifndef BRDF_GLSL
 #define BRDF_GLSL
 
 #include "frame.glsl"
+#include "fresnel.glsl"
+#include "ggx.glsl"
 #include "layout.glsl"
+#include "surfaces.glsl"
 
 // One buffer, seen as floats and as cells of four halves.
 TEXELS(brdf_table)
 TEXELS(brdf_cells)
-
-// One bit per kind of material in the scene.
-layout(constant_id = CONSTANT_MATERIAL_KINDS) const uint MATERIAL_KINDS = 0xffffffffu;
 
 // Tests the kind of a material. Folds to a constant in the pipeline if the scene has no material of
 // the kind, or only such.
@@ -46,92 +46,54 @@ vec3 sample_cosine_hemisphere(vec2 u) {
     return vec3(radius * cos(azimuth), radius * sin(azimuth), sqrt(max(0.0, 1.0 - u.x)));
 }
 
-// Reflectance of a dielectric of refractive index `ior` seen from outside; exact Fresnel.
-float fresnel_dielectric(float cosine, float ior) {
-    float g = sqrt(max(0.0, ior * ior - 1.0 + cosine * cosine));
-    float difference = (ior * ior - 1.0) / (g + cosine);
-    float perpendicular = difference / (g + cosine);
-    float ratio = (cosine * (g + cosine) - 1.0) / (cosine * difference + 1.0);
-    return min(1.0, 0.5 * perpendicular * perpendicular * (1.0 + ratio * ratio));
+// Directional albedo of a GGX surface with Schlick's reflectance: factors of the reflectance at normal
+// and at grazing incidence. Linear in roughness and cosine between the nodes of the table that all such
+// materials share.
+vec2 ggx_schlick_albedo(uint table_offset, float alpha, float cosine) {
+    float position = clamp(sqrt(alpha), 0.0, 1.0) * float(GGX_ROUGHNESS_INTERVALS);
+    uint row = min(uint(position), GGX_ROUGHNESS_INTERVALS - 1u);
+    float fraction = position - float(row);
+    uint lower = table_offset + row * GGX_ROUGHNESS_WORDS;
+    uint upper = lower + GGX_ROUGHNESS_WORDS;
+    return vec2(
+        mix(cosine_table(lower, 2u, cosine), cosine_table(upper, 2u, cosine), fraction),
+        mix(cosine_table(lower + 1u, 2u, cosine), cosine_table(upper + 1u, 2u, cosine), fraction));
 }
 
-// Reflectance of a conductor of refractive index eta + i·k; exact Fresnel.
-vec3 fresnel_conductor(float cosine, vec3 eta, vec3 k) {
-    float cosine_squared = cosine * cosine;
-    float sine_squared = max(0.0, 1.0 - cosine_squared);
-    vec3 real = eta * eta - k * k - vec3(sine_squared);
-    vec3 modulus = sqrt(real * real + 4.0 * eta * eta * k * k);
-    vec3 a = sqrt(max(vec3(0.0), 0.5 * (modulus + real)));
-    vec3 sum = modulus + vec3(cosine_squared);
-    vec3 cross_term = 2.0 * cosine * a;
-    vec3 perpendicular = (sum - cross_term) / (sum + cross_term);
-    vec3 parallel_sum = cosine_squared * modulus + vec3(sine_squared * sine_squared);
-    vec3 parallel_cross = cross_term * sine_squared;
-    vec3 parallel = perpendicular * (parallel_sum - parallel_cross)
-        / (parallel_sum + parallel_cross);
-    // Rounding may leave `perpendicular` below 0 where nothing is reflected, as at eta = 1, k = 0.
-    return max(vec3(0.0), 0.5 * (perpendicular + parallel));
+// Light of a uniform white hemisphere that each part of a principled material reflects.
+struct PrincipledAlbedo {
+    vec3 specular;
+    vec3 diffuse;
+};
+
+PrincipledAlbedo principled_albedo(Material material, float cosine) {
+    float metallic = material.ior;
+    vec2 specular = ggx_schlick_albedo(material.table_offset, material.alpha, cosine);
+    float rise = cosine_table(material.table_offset + DIFFUSE_RISE_OFFSET, 1u, cosine);
+    vec3 dielectric = mix(material.eta, material.k, rise);
+    float strongest = max(dielectric.r, max(dielectric.g, dielectric.b));
+    return PrincipledAlbedo(
+        mix(material.eta, material.reflectance, metallic) * specular.x
+            + mix(material.k, vec3(1.0), metallic) * specular.y,
+        (1.0 - metallic) * (1.0 - strongest) * material.reflectance);
 }
 
-// Reflectance of a conductor from that at normal incidence. [Schlick 1994].
-vec3 fresnel_schlick(float cosine, vec3 reflectance) {
-    float complement = 1.0 - cosine;
-    float square = complement * complement;
-    return reflectance + (vec3(1.0) - reflectance) * (square * square * complement);
+// Probability of sampling the specular part of a principled material.
+float principled_specular_share(Material material, float cosine) {
+    PrincipledAlbedo albedo = principled_albedo(material, cosine);
+    float specular = dot(albedo.specular, LUMINANCE_WEIGHTS);
+    float sum = specular + dot(albedo.diffuse, LUMINANCE_WEIGHTS);
+    return sum > 0.0 ? specular / sum : 0.5;
 }
 
-// Density of GGX normals, per steradian, for a half vector of any length. [Walter et al. 2007] Eq.
-// 33, without the cancellation in 1 − cos²θ, which matters for α below 0.01.
-float ggx_normal_density(vec3 half_vector, float alpha) {
-    float tangential = dot(half_vector.xy, half_vector.xy);
-    float normal = half_vector.z * half_vector.z;
-    float ratio = (tangential + normal) / (tangential + alpha * alpha * normal);
-    return alpha * alpha * ratio * ratio / PI;
-}
-
-// Length of the direction after stretching the surface to α = 1: √(cos²θ + α² sin²θ).
-float ggx_stretched_length(vec3 direction, float alpha) {
-    return length(vec3(alpha * direction.xy, direction.z));
-}
-
-// Lower end of the spherical cap of bounded sampling, as a factor. [Eto & Tokuyoshi 2023] Eq. 5.
-float ggx_cap_factor(vec3 outgoing_local, float alpha) {
-    float bounded_alpha = min(alpha, 1.0);
-    float alpha_squared = bounded_alpha * bounded_alpha;
-    float s = 1.0 + length(outgoing_local.xy);
-    float s_squared = s * s;
-    return (1.0 - alpha_squared) * s_squared
-        / (s_squared + alpha_squared * outgoing_local.z * outgoing_local.z);
-}
-
-// Microfacet reflection at unit reflectance, per steradian: D·G₂/(4 cosθ_o cosθ_i) with the
-// height-correlated masking of [Heitz 2014] Eq. 99.
-float ggx_reflection(vec3 half_vector, vec3 outgoing_local, vec3 incident_local, float alpha) {
-    float masking = incident_local.z * ggx_stretched_length(outgoing_local, alpha)
-        + outgoing_local.z * ggx_stretched_length(incident_local, alpha);
-    return 0.5 * ggx_normal_density(half_vector, alpha) / masking;
-}
-
-// Density of ggx_sample. [Eto & Tokuyoshi 2023] Eq. 8 with the Jacobian of the reflection.
-float ggx_pdf(vec3 half_vector, vec3 outgoing_local, float alpha) {
-    float cap = ggx_cap_factor(outgoing_local, alpha) * outgoing_local.z
-        + ggx_stretched_length(outgoing_local, alpha);
-    return 0.5 * ggx_normal_density(half_vector, alpha) / cap;
-}
-
-// Samples an incident direction by the visible normals of GGX, on the spherical cap that omits most
-// reflections below the surface. Those that remain have z ≤ 0: no sample. [Dupuy & Benyoub 2023],
-// [Eto & Tokuyoshi 2023].
-vec3 ggx_sample(vec3 outgoing_local, float alpha, vec2 u) {
-    vec3 stretched = normalize(vec3(alpha * outgoing_local.xy, outgoing_local.z));
-    float cap = ggx_cap_factor(outgoing_local, alpha) * stretched.z;
-    // 1 − z rather than z keeps the root below accurate near the pole.
-    float below_pole = u.x * (1.0 + cap);
-    float sine = sqrt(max(0.0, below_pole * (2.0 - below_pole)));
-    float azimuth = 2.0 * PI * u.y;
-    vec3 normal = stretched + vec3(sine * cos(azimuth), sine * sin(azimuth), 1.0 - below_pole);
-    normal = normalize(vec3(alpha * normal.xy, max(1e-7, normal.z)));
-    return 2.0 * dot(outgoing_local, normal) * normal - outgoing_local;
+// Metal and dielectric in one: `reflection` is that of GGX at unit reflectance. glTF 2.0, appendix B.
+vec3 principled_value(Material material, float reflection, float cosine_difference) {
+    float metallic = material.ior;
+    vec3 metal = fresnel_schlick(cosine_difference, material.reflectance);
+    vec3 dielectric = mix(material.eta, material.k, schlick_rise(cosine_difference));
+    float strongest = max(dielectric.r, max(dielectric.g, dielectric.b));
+    vec3 base = (1.0 - strongest) / PI * material.reflectance;
+    return mix(base + reflection * dielectric, reflection * metal, metallic);
 }
 
 // (θ_h, θ_d, φ_d) of two directions, φ_d in 0…π: the half/difference angles of [Rusinkiewicz 1998],
@@ -305,10 +267,15 @@ void brdf_evaluate_and_pdf(
         value = vec3(reflection * fresnel_dielectric(cosine_difference, material.ior))
             + base * material.reflectance;
         pdf = mix(cosine_pdf, pdf, specular_share);
+    } else if (is_kind(material, MATERIAL_PRINCIPLED)) {
+        value = principled_value(material, reflection, cosine_difference);
+        pdf = mix(cosine_pdf, pdf, principled_specular_share(material, outgoing_local.z));
     } else if (is_kind(material, MATERIAL_CONDUCTOR) && material.ior > 0.0) {
         value = reflection * fresnel_conductor(cosine_difference, material.eta, material.k);
     } else if (is_kind(material, MATERIAL_CONDUCTOR)) {
         value = reflection * fresnel_schlick(cosine_difference, material.reflectance);
+    } else {
+        pdf = 0.0;
     }
 }
 
@@ -332,7 +299,10 @@ float brdf_pdf(Material material, vec3 outgoing_local, vec3 incident_local) {
 // Samples an incident direction with three numbers in [0, 1); z ≤ 0 means no sample, which counts
 // as one with contribution 0.
 vec3 brdf_sample(Material material, vec3 outgoing_local, vec3 u) {
-    if (outgoing_local.z <= 0.0) {
+    bool is_sampled = is_kind(material, MATERIAL_DIFFUSE) || is_kind(material, MATERIAL_PLASTIC)
+        || is_kind(material, MATERIAL_CONDUCTOR) || is_kind(material, MATERIAL_MEASURED)
+        || is_kind(material, MATERIAL_PRINCIPLED);
+    if (outgoing_local.z <= 0.0 || !is_sampled) {
         return vec3(0.0, 0.0, -1.0);
     }
     if (is_kind(material, MATERIAL_MEASURED)) {
@@ -343,6 +313,9 @@ vec3 brdf_sample(Material material, vec3 outgoing_local, vec3 u) {
         specular_share = cosine_table(
             material.table_offset + PLASTIC_SPECULAR_SHARE_OFFSET, 1u, outgoing_local.z);
     }
+    if (is_kind(material, MATERIAL_PRINCIPLED)) {
+        specular_share = principled_specular_share(material, outgoing_local.z);
+    }
     if (u.x < specular_share) {
         return ggx_sample(outgoing_local, material.alpha, u.yz);
     }
@@ -350,12 +323,36 @@ vec3 brdf_sample(Material material, vec3 outgoing_local, vec3 u) {
 }
 
 // Share of light from a uniform white hemisphere reflected toward the outgoing direction, 0…1, for
-// the albedo image.
+// the albedo image. Dielectrics and panes count transmitted light too, seen from outside and as if
+// smooth.
 vec3 brdf_albedo(Material material, vec3 outgoing_local) {
-    if (is_kind(material, MATERIAL_DIFFUSE)) {
+    if (is_kind(material, MATERIAL_DIFFUSE) || is_kind(material, MATERIAL_MIRROR)) {
         return material.reflectance;
     }
     uint offset = material.table_offset;
+    if (is_kind(material, MATERIAL_PLASTIC)) {
+        float coat = cosine_table(offset, 1u, outgoing_local.z);
+        return vec3(coat) + (1.0 - coat) * material.reflectance;
+    }
+    if (is_kind(material, MATERIAL_PRINCIPLED)) {
+        PrincipledAlbedo albedo = principled_albedo(material, outgoing_local.z);
+        return min(albedo.specular + albedo.diffuse, vec3(1.0));
+    }
+    if (is_kind(material, MATERIAL_CONDUCTOR) && material.ior == 0.0) {
+        vec2 shares = ggx_schlick_albedo(offset, material.alpha, outgoing_local.z);
+        return material.reflectance * shares.x + vec3(shares.y);
+    }
+    if (is_kind(material, MATERIAL_DIELECTRIC)) {
+        float fresnel = fresnel_interface(abs(outgoing_local.z), material.ior);
+        return mix(material.eta, material.reflectance, fresnel);
+    }
+    if (is_kind(material, MATERIAL_THIN_DIELECTRIC)) {
+        return pane_reflectance(material, outgoing_local.z)
+            + pane_transmittance(material, outgoing_local.z);
+    }
+    if (!is_kind(material, MATERIAL_CONDUCTOR) && !is_kind(material, MATERIAL_MEASURED)) {
+        return vec3(0.0);
+    }
     return vec3(
         cosine_table(offset, 3u, outgoing_local.z),
         cosine_table(offset + 1u, 3u, outgoing_local.z),

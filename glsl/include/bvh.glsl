@@ -15,6 +15,7 @@
 
 #include "frame.glsl"
 #include "layout.glsl"
+#include "surfaces.glsl"
 
 TEXELS(bvh_nodes)
 TEXELS(triangles_0)
@@ -27,7 +28,6 @@ READS(triangle_materials)
 layout(constant_id = CONSTANT_TRIANGLE_PAGES) const uint TRIANGLE_PAGES = 1u;
 layout(constant_id = CONSTANT_TRIANGLE_PAGE_SHIFT) const uint TRIANGLE_PAGE_SHIFT = 30u;
 
-const uint NO_TRIANGLE = 0xffffffffu;
 const float FAR_AWAY = 3.0e38;
 
 // State of the ray in flight.
@@ -41,6 +41,10 @@ uint bvh_octant4;
 // Nearest hit so far: distance and triangle.
 float bvh_distance;
 uint bvh_triangle;
+// Hits up to this distance do not count: the ray has passed those surfaces.
+float bvh_passed_distance;
+// Share of light that passed the surfaces met by a shadow ray.
+vec3 bvh_transmittance;
 // Group of nodes: first child; bits 24-31 hits in visiting order, bits 0-7 mask of inner children.
 uvec2 bvh_nodes_waiting;
 // Groups of triangles: first triangle; one bit per triangle to test.
@@ -55,10 +59,26 @@ float bvh_inverse(float x) {
     return abs(x) > 1.0e-18 ? 1.0 / x : (x < 0.0 ? -1.0e18 : 1.0e18);
 }
 
+// Goes back to the root, to find a hit up to `farthest`.
+void bvh_restart(float farthest) {
+    bvh_distance = farthest;
+    bvh_triangle = NO_TRIANGLE;
+    bvh_nodes_waiting = uvec2(0u, 0x80000000u);
+    bvh_triangles_waiting = uvec2(0u);
+    bvh_triangles_next = uvec2(0u);
+    bvh_stack_size = 0u;
+}
+
+#ifdef MEETS_PASSAGES
+// Share of light that goes straight through a triangle. `normal` is its normal of any length with the
+// ray along z. Defined in passage.glsl.
+vec3 passage(uint triangle, vec3 weights, vec3 normal);
+#endif
+
 // Starts the traversal of a ray; `direction` is a unit vector. The closest hit visits the nearest
 // children first, any hit the farthest: the walls of a room are large and behind most other things,
 // and hitting one ends the ray (13 to 28% faster in rooms, docs/traversal.md).
-void bvh_start(vec3 origin, vec3 direction, bool any_hit) {
+void bvh_start(vec3 origin, vec3 direction, float farthest, bool any_hit) {
     bvh_origin = origin;
     bvh_direction = direction;
     bvh_frame = frame_from_normal(direction);
@@ -69,12 +89,9 @@ void bvh_start(vec3 origin, vec3 direction, bool any_hit) {
     if (any_hit) {
         bvh_octant4 ^= 0x07070707u;
     }
-    bvh_distance = FAR_AWAY;
-    bvh_triangle = NO_TRIANGLE;
-    bvh_nodes_waiting = uvec2(0u, 0x80000000u);
-    bvh_triangles_waiting = uvec2(0u);
-    bvh_triangles_next = uvec2(0u);
-    bvh_stack_size = 0u;
+    bvh_passed_distance = 0.0;
+    bvh_transmittance = vec3(1.0);
+    bvh_restart(farthest);
 }
 
 // Texel `corner` (0 to 2) of a triangle: position and packed normal of a vertex.
@@ -195,7 +212,16 @@ void bvh_test_triangle(bool any_hit) {
     float distance = (areas.x * a.z + areas.y * b.z + areas.z * c.z) / area;
     bool inside = min(areas.x, min(areas.y, areas.z)) >= 0.0
         || max(areas.x, max(areas.y, areas.z)) <= 0.0;
-    if (inside && area != 0.0 && distance > 0.0 && distance < bvh_distance) {
+    float least = HAS_PASSAGES ? bvh_passed_distance : 0.0;
+    if (inside && area != 0.0 && distance > least && distance < bvh_distance) {
+#ifdef MEETS_PASSAGES
+        if (HAS_PASSAGES && any_hit) {
+            bvh_transmittance *= passage(triangle, areas / area, cross(b - a, c - a));
+            if (bvh_transmittance != vec3(0.0)) {
+                return;
+            }
+        }
+#endif
         bvh_distance = distance;
         bvh_triangle = triangle;
         if (any_hit) {
@@ -243,6 +269,23 @@ vec3 consistent_normal(vec3 shading_normal, vec3 outgoing_direction, float least
 // Cosine with the outgoing direction below which shading normals are turned.
 const float LEAST_SHADING_COSINE = 0.01;
 
+// Turns the shading normal of a surface that a ray along `direction` meets until it can be seen.
+vec3 visible_normal(vec3 shading_normal, vec3 geometric_normal, vec3 direction) {
+    float cosine = -dot(geometric_normal, direction);
+    return consistent_normal(
+        shading_normal, -direction, max(min(LEAST_SHADING_COSINE, cosine), 1.0e-6));
+}
+
+// Barycentric coordinates of the point where a ray meets the plane of `triangle`.
+vec3 barycentric(uint triangle, vec3 origin, vec3 direction) {
+    Frame frame = frame_from_normal(direction);
+    vec3 a = to_local(frame, uintBitsToFloat(triangle_texel(triangle, 0u).xyz) - origin);
+    vec3 b = to_local(frame, uintBitsToFloat(triangle_texel(triangle, 1u).xyz) - origin);
+    vec3 c = to_local(frame, uintBitsToFloat(triangle_texel(triangle, 2u).xyz) - origin);
+    vec3 areas = edge_functions(a, b, c);
+    return areas / (areas.x + areas.y + areas.z);
+}
+
 // Computes the surface that a ray meets on `triangle`.
 Hit surface_at(uint triangle, vec3 origin, vec3 direction) {
     uvec4 texel_a = triangle_texel(triangle, 0u);
@@ -280,10 +323,16 @@ Hit surface_at(uint triangle, vec3 origin, vec3 direction) {
                 dot(interpolated, hit.geometric_normal) < 0.0 ? -interpolated : interpolated;
         }
     }
-    float cosine = -dot(hit.geometric_normal, direction);
-    hit.shading_normal = consistent_normal(
-        shading_normal, -direction, max(min(LEAST_SHADING_COSINE, cosine), 1.0e-6));
+    hit.shading_normal = visible_normal(shading_normal, hit.geometric_normal, direction);
     return hit;
+}
+
+// Tests whether a ray meets the back of a triangle, from which its corners go clockwise.
+bool is_back(uint triangle, vec3 direction) {
+    vec3 a = uintBitsToFloat(triangle_texel(triangle, 0u).xyz);
+    vec3 b = uintBitsToFloat(triangle_texel(triangle, 1u).xyz);
+    vec3 c = uintBitsToFloat(triangle_texel(triangle, 2u).xyz);
+    return dot(cross(b - a, c - a), direction) > 0.0;
 }
 
 // Result of a ray that met nothing or was not traced.

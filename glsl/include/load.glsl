@@ -14,7 +14,9 @@ TEXELS(material_texels)
 Ray load_ray(uint index) {
     uvec4 first = texelFetch(ray_texels, int(2u * index));
     uvec4 second = texelFetch(ray_texels, int(2u * index + 1u));
-    return Ray(uintBitsToFloat(first.xyz), first.w, uintBitsToFloat(second.xyz), second.w);
+    return Ray(
+        uintBitsToFloat(first.xyz), first.w, uintBitsToFloat(second.xyz),
+        uintBitsToFloat(second.w));
 }
 
 // Part of a hit that a ray leaving it needs.

@@ -50,6 +50,14 @@ float unit_float(uint bits) {
     return float(bits >> 8u) * (1.0 / 16777216.0);
 }
 
+// bits * count / 2^32: an index below `count`.
+uint scaled(uint bits, uint count) {
+    uint high;
+    uint low;
+    umulExtended(bits, count, high, low);
+    return high;
+}
+
 const uint RANDOM_KEY_TAG = 0x9e3779b9u;
 
 // Keys of a pixel and dimension: of the shuffled index and of the two coordinates.

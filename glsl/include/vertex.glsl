@@ -5,6 +5,7 @@
 #define VERTEX_GLSL
 
 #include "frame.glsl"
+#include "hit_surface.glsl"
 #include "load.glsl"
 #include "random.glsl"
 #include "wave.glsl"
@@ -37,7 +38,7 @@ Vertex load_vertex(uint path, Hit hit) {
     vertex.hit = hit;
     vertex.index = wave_path(path);
     vertex.frame = frame_from_normal(hit.shading_normal);
-    vertex.material = load_material(hit.material);
+    vertex.material = load_surface(path, hit.material);
     vertex.outgoing_local = to_local(vertex.frame, -load_ray(path).direction);
     vertex.dimension = vertex_dimension();
     return vertex;

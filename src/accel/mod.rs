@@ -7,6 +7,7 @@
 //! [`Accel`] holds exactly what the shaders read (`glsl/include/bvh.glsl`); [`traverse`] is the
 //! Rust twin of the shader's traversal over the same arrays.
 
+pub mod attributes;
 mod binary;
 pub mod traverse;
 

@@ -63,6 +63,17 @@ impl Default for Surface {
     }
 }
 
+impl Surface {
+    /// Every use of a texture.
+    pub fn textures(&self) -> impl Iterator<Item = &TextureUse> {
+        let emission = self.emission.as_ref().and_then(|emission| emission.texture.as_ref());
+        [&self.color, &self.roughness, &self.metallic, &self.normal, &self.opacity.texture]
+            .into_iter()
+            .filter_map(Option::as_ref)
+            .chain(emission)
+    }
+}
+
 /// Share of light that a surface stops; the rest goes straight through.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Opacity {

@@ -2,21 +2,17 @@
 
 use std::{collections::HashMap, sync::Arc};
 
-use glam::{Vec3, vec2, vec3};
-use rayon::prelude::*;
+use glam::Vec3;
 
-use crate::math::colour::luminance;
 use crate::{
     brdf::{
+        albedo::{GGX_WORDS, conductor_words, ggx_words, plastic_words},
+        ggx::SMALLEST_ALPHA,
         material::{ConductorFresnel, Material, MaterialKind},
-        twin,
     },
     error::{Error, Result},
     shader::{constants::*, structs},
 };
-
-/// Smallest GGX width: single-precision directions cannot resolve a narrower lobe.
-pub const SMALLEST_ALPHA: f32 = 1e-3;
 
 /// Largest size of the BRDF table buffer: Vulkan guarantees it for one storage buffer.
 pub const LARGEST_TABLE_BYTES: usize = 128 << 20;
@@ -38,6 +34,7 @@ impl MaterialTables {
         check_size(materials)?;
         let mut tables = Self { materials: Vec::with_capacity(materials.len()), words: vec![0] };
         let mut measured_offsets = HashMap::new();
+        let mut ggx_offset = None;
         for material in materials {
             let mut converted = structs::Material::default();
             let mut words = Vec::new();
@@ -59,14 +56,15 @@ impl MaterialTables {
                     match fresnel {
                         ConductorFresnel::Schlick { reflectance } => {
                             converted.reflectance = reflectance.to_array();
+                            converted.table_offset = ggx_table(&mut tables.words, &mut ggx_offset);
                         }
                         ConductorFresnel::Exact { eta, k } => {
                             converted.ior = 1.0;
                             converted.eta = eta.to_array();
                             converted.k = k.to_array();
+                            words = conductor_words(converted.alpha, *eta, *k);
                         }
                     }
-                    words = conductor_words(&converted);
                 }
                 MaterialKind::Principled {
                     base_color,
@@ -86,6 +84,7 @@ impl MaterialTables {
                         .map(|reflectance| reflectance * specular)
                         .to_array();
                     converted.k = [*specular; 3];
+                    converted.table_offset = ggx_table(&mut tables.words, &mut ggx_offset);
                 }
                 MaterialKind::Mirror { reflectance } => {
                     converted.kind = MATERIAL_MIRROR;
@@ -93,7 +92,7 @@ impl MaterialTables {
                 }
                 MaterialKind::Dielectric { ior, alpha, reflectance, transmittance } => {
                     converted.kind = MATERIAL_DIELECTRIC;
-                    converted.alpha = *alpha;
+                    converted.alpha = if *alpha > 0.0 { alpha.max(SMALLEST_ALPHA) } else { 0.0 };
                     converted.ior = *ior;
                     converted.reflectance = reflectance.to_array();
                     converted.eta = transmittance.to_array();
@@ -128,15 +127,25 @@ impl MaterialTables {
     }
 }
 
+/// Offset of the table that all GGX surfaces with a Schlick reflectance share; appends it on first use.
+fn ggx_table(words: &mut Vec<u32>, offset: &mut Option<u32>) -> u32 {
+    *offset.get_or_insert_with(|| {
+        let first = words.len() as u32;
+        words.extend_from_slice(ggx_words());
+        first
+    })
+}
+
 /// Fails if the measured tables do not fit into one buffer.
 fn check_size(materials: &[Material]) -> Result<()> {
-    let mut bytes = 0;
+    // Count the table that GGX surfaces share, and the word that is always there.
+    let mut bytes = (GGX_WORDS + 1) * 4;
     let mut seen = Vec::new();
     let mut names = Vec::new();
     for material in materials {
         let MaterialKind::Measured { table, .. } = &material.kind else {
-            // Count at most five tables over the cosine, and the word that is always there.
-            bytes += (5 * BRDF_COSINE_NODES as usize + 1) * 4;
+            // Count at most three tables over the cosine.
+            bytes += 3 * BRDF_COSINE_NODES as usize * 4;
             continue;
         };
         if !seen.contains(&Arc::as_ptr(table)) {
@@ -158,99 +167,4 @@ fn check_size(materials: &[Material]) -> Result<()> {
         ),
         help: "name the same file in several materials, or use fewer measured files".to_string(),
     })
-}
-
-/// Direction of a given cosine. Stays just above the horizon, where a rough surface reflects nothing,
-/// to give the limit there.
-fn direction_of_cosine(cosine: f32) -> Vec3 {
-    let cosine = cosine.max(1e-4);
-    vec3((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine)
-}
-
-/// Directional albedo of a GGX surface; `fresnel` maps the cosine between direction and half vector
-/// to reflectance. Sums visible-normal samples at the midpoints of a grid: each weight is at most
-/// about 1, so 64 × 64 points are accurate to 1e-4.
-fn ggx_albedo(outgoing: Vec3, alpha: f32, fresnel: impl Fn(f32) -> Vec3) -> Vec3 {
-    const POINTS: u32 = 64;
-    let mut sum = glam::DVec3::ZERO;
-    for index in 0..POINTS * POINTS {
-        let u = vec2((index % POINTS) as f32 + 0.5, (index / POINTS) as f32 + 0.5) / POINTS as f32;
-        let incident = twin::ggx_sample(outgoing, alpha, u);
-        if incident.z > 0.0 {
-            let half_vector = outgoing + incident;
-            let weight = twin::ggx_reflection(half_vector, outgoing, incident, alpha)
-                / twin::ggx_pdf(half_vector, outgoing, alpha)
-                * incident.z;
-            sum += (weight * fresnel((0.5 * half_vector.length()).min(1.0))).as_dvec3();
-        }
-    }
-    (sum / f64::from(POINTS * POINTS)).as_vec3()
-}
-
-/// Words of a plastic: directional albedo, transmission into and out of the base, probability of
-/// sampling the coat; see `PLASTIC_…_OFFSET`.
-fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
-    let fresnel = |cosine| Vec3::splat(twin::fresnel_dielectric(cosine, ior));
-    let coat_albedo = |direction| ggx_albedo(direction, alpha, fresnel).x.min(1.0);
-    let mut coat: Vec<f32> = (0..BRDF_COSINE_NODES)
-        .into_par_iter()
-        .map(|node| coat_albedo(direction_of_cosine(node as f32 / BRDF_COSINE_INTERVALS as f32)))
-        .collect();
-    // Next to the horizon, E falls steeply where the cosine is about α. Give the node there the
-    // least value that keeps the line to the next node above E, so that coat and base together
-    // never reflect more than they receive.
-    let horizon = [0.02, 0.06, 0.12, 0.25, 0.5, 0.75].into_iter().map(|fraction| {
-        let e = coat_albedo(direction_of_cosine(fraction / BRDF_COSINE_INTERVALS as f32));
-        (e - fraction * coat[1]) / (1.0 - fraction)
-    });
-    coat[0] = horizon.fold(coat[0], f32::max).min(1.0);
-    // Integrate Ē = 2∫E(μ)μ dμ of the piecewise linear E exactly, so that the interpolated base
-    // conserves energy: per interval of width w, ∫ = w·(μ₀(2E₀+E₁)+μ₁(E₀+2E₁))/6.
-    let width = 1.0 / f64::from(BRDF_COSINE_INTERVALS);
-    let mean: f64 = coat
-        .windows(2)
-        .zip(0..)
-        .map(|(pair, interval)| {
-            let (e0, e1) = (f64::from(pair[0]), f64::from(pair[1]));
-            let mu0 = f64::from(interval) * width;
-            let mu1 = mu0 + width;
-            width * (mu0 * (2.0 * e0 + e1) + mu1 * (e0 + 2.0 * e1)) / 3.0
-        })
-        .sum();
-    let normalisation = (1.0 / (1.0 - mean).max(1e-6).sqrt()) as f32;
-    let albedo = coat.iter().map(|&e| Vec3::splat(e) + diffuse * (1.0 - e));
-    let specular_share = coat.iter().map(|&e| {
-        let base = luminance(diffuse) * (1.0 - e);
-        if e + base > 0.0 { e / (e + base) } else { 0.5 }
-    });
-    albedo
-        .flat_map(|value| value.to_array())
-        .chain(coat.iter().map(|&e| (1.0 - e) * normalisation))
-        .chain(specular_share)
-        .map(f32::to_bits)
-        .collect()
-}
-
-/// Words of a conductor: directional albedo.
-fn conductor_words(material: &structs::Material) -> Vec<u32> {
-    let fresnel = |cosine: f32| {
-        if material.ior > 0.0 {
-            twin::fresnel_conductor(cosine, material.eta.into(), material.k.into())
-        } else {
-            twin::fresnel_schlick(cosine, material.reflectance.into())
-        }
-    };
-    (0..BRDF_COSINE_NODES)
-        .into_par_iter()
-        .flat_map_iter(|node| {
-            ggx_albedo(
-                direction_of_cosine(node as f32 / BRDF_COSINE_INTERVALS as f32),
-                material.alpha,
-                fresnel,
-            )
-            .clamp(Vec3::ZERO, Vec3::ONE)
-            .to_array()
-        })
-        .map(f32::to_bits)
-        .collect()
 }

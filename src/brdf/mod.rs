@@ -3,13 +3,16 @@
 //!
 //! Directions are unit vectors in the shading frame (z is the normal) and point away from the
 //! surface. Values are per steradian without the cosine; pdfs are per steradian of incident
-//! directions. Both are 0 unless both directions are above the surface.
+//! directions. Both are 0 unless both directions are above the surface. Mirrors, dielectrics and thin
+//! panes send light where no other sampling finds it: paths follow them by [`specular`], and their
+//! value and pdf here are 0.
 //!
 //! | kind | value | samples |
 //! |---|---|---|
 //! | diffuse | reflectance / π | cosine |
 //! | plastic | GGX coat, exact dielectric Fresnel, over ρ/π·T(θ_o)·T(θ_i), T² = (1−E)²/(1−Ē) | visible normals or cosine, by albedo |
 //! | conductor | GGX, exact conductor Fresnel or Schlick's | visible normals |
+//! | principled | GGX with Schlick's reflectance, over (1−metallic)·(1−F)·ρ/π | visible normals or cosine, by albedo |
 //! | measured | trilinear on the half/difference grid | tabulated half vectors or cosine |
 //!
 //! E(θ) is the directional albedo of the coat and Ē its cosine-weighted mean. Coat and base
@@ -17,15 +20,20 @@
 //! Szirmay-Kalos 2001\]).
 //!
 //! References: \[Walter et al. 2007\], \[Heitz 2014\], \[Dupuy & Benyoub 2023\], \[Eto & Tokuyoshi
-//! 2023\], \[Rusinkiewicz 1998\], \[Schlick 1994\].
+//! 2023\], \[Rusinkiewicz 1998\], \[Schlick 1994\], glTF 2.0 appendix B.
 
+mod albedo;
 pub mod cornell;
+pub mod fresnel;
+pub mod ggx;
 mod load;
 pub mod material;
 pub mod materials;
 pub mod merl;
 pub mod sanity;
 pub mod spectrum;
+pub mod specular;
+pub mod surfaces;
 pub mod table;
 mod tabulate;
 pub mod twin;
@@ -34,6 +42,7 @@ use glam::Vec3;
 
 pub use material::Material;
 pub use materials::MaterialTables;
+pub use surfaces::SurfaceTables;
 pub use table::MeasuredTable;
 
 /// Value of a material (1/sr, without the cosine) and density of [`sample`].

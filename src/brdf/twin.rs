@@ -7,7 +7,11 @@ use std::f32::consts::PI;
 use glam::{Vec2, Vec3, vec2, vec3};
 use half::f16;
 
-use crate::shader::{constants::*, structs::Material};
+use crate::{
+    brdf::{fresnel::*, ggx::*},
+    math::colour::luminance,
+    shader::{constants::*, structs::Material},
+};
 
 /// Word of the BRDF table as a float.
 fn table_value(brdf_table: &[u32], index: u32) -> f32 {
@@ -31,6 +35,11 @@ fn mix(a: f32, b: f32, fraction: f32) -> f32 {
     a * (1.0 - fraction) + b * fraction
 }
 
+/// GLSL's `mix` of vectors.
+fn mix_vec3(a: Vec3, b: Vec3, fraction: f32) -> Vec3 {
+    a * (1.0 - fraction) + b * fraction
+}
+
 /// Samples a direction with density cosθ/π.
 pub fn sample_cosine_hemisphere(u: Vec2) -> Vec3 {
     let radius = u.x.sqrt();
@@ -38,102 +47,62 @@ pub fn sample_cosine_hemisphere(u: Vec2) -> Vec3 {
     vec3(radius * azimuth.cos(), radius * azimuth.sin(), (1.0 - u.x).max(0.0).sqrt())
 }
 
-/// Reflectance of a dielectric of refractive index `ior` ≥ 1 seen from outside; exact Fresnel.
-pub fn fresnel_dielectric(cosine: f32, ior: f32) -> f32 {
-    let g = (ior * ior - 1.0 + cosine * cosine).max(0.0).sqrt();
-    let difference = (ior * ior - 1.0) / (g + cosine);
-    let perpendicular = difference / (g + cosine);
-    let ratio = (cosine * (g + cosine) - 1.0) / (cosine * difference + 1.0);
-    (0.5 * perpendicular * perpendicular * (1.0 + ratio * ratio)).min(1.0)
+/// Directional albedo of a GGX surface with Schlick's reflectance: factors of the reflectance at
+/// normal and at grazing incidence. Linear in roughness and cosine between the nodes of the table that
+/// all such materials share.
+fn ggx_schlick_albedo(brdf_table: &[u32], table_offset: u32, alpha: f32, cosine: f32) -> Vec2 {
+    let position = alpha.sqrt().clamp(0.0, 1.0) * GGX_ROUGHNESS_INTERVALS as f32;
+    let row = (position as u32).min(GGX_ROUGHNESS_INTERVALS - 1);
+    let fraction = position - row as f32;
+    let lower = table_offset + row * GGX_ROUGHNESS_WORDS;
+    let upper = lower + GGX_ROUGHNESS_WORDS;
+    let table = |offset| cosine_table(brdf_table, offset, 2, cosine);
+    vec2(
+        mix(table(lower), table(upper), fraction),
+        mix(table(lower + 1), table(upper + 1), fraction),
+    )
 }
 
-/// Reflectance of a conductor of refractive index eta + i·k; exact Fresnel.
-pub fn fresnel_conductor(cosine: f32, eta: Vec3, k: Vec3) -> Vec3 {
-    let cosine_squared = cosine * cosine;
-    let sine_squared = (1.0 - cosine_squared).max(0.0);
-    let real = eta * eta - k * k - Vec3::splat(sine_squared);
-    let modulus = square_root(real * real + 4.0 * eta * eta * k * k);
-    let a = square_root((0.5 * (modulus + real)).max(Vec3::ZERO));
-    let sum = modulus + Vec3::splat(cosine_squared);
-    let cross_term = 2.0 * cosine * a;
-    let perpendicular = (sum - cross_term) / (sum + cross_term);
-    let parallel_sum = cosine_squared * modulus + Vec3::splat(sine_squared * sine_squared);
-    let parallel_cross = cross_term * sine_squared;
-    let parallel =
-        perpendicular * (parallel_sum - parallel_cross) / (parallel_sum + parallel_cross);
-    // Rounding may leave `perpendicular` below 0 where nothing is reflected, as at eta = 1, k = 0.
-    (0.5 * (perpendicular + parallel)).max(Vec3::ZERO)
+/// Light of a uniform white hemisphere that each part of a principled material reflects.
+struct PrincipledAlbedo {
+    specular: Vec3,
+    diffuse: Vec3,
 }
 
-/// GLSL's `sqrt` of a vector.
-fn square_root(v: Vec3) -> Vec3 {
-    vec3(v.x.sqrt(), v.y.sqrt(), v.z.sqrt())
+fn principled_albedo(brdf_table: &[u32], material: &Material, cosine: f32) -> PrincipledAlbedo {
+    let metallic = material.ior;
+    let (reflectance, k) = (Vec3::from(material.reflectance), Vec3::from(material.k));
+    let eta = Vec3::from(material.eta);
+    let offset = material.table_offset;
+    let specular = ggx_schlick_albedo(brdf_table, offset, material.alpha, cosine);
+    let rise = cosine_table(brdf_table, offset + DIFFUSE_RISE_OFFSET, 1, cosine);
+    let dielectric = mix_vec3(eta, k, rise);
+    let strongest = dielectric.max_element();
+    PrincipledAlbedo {
+        specular: mix_vec3(eta, reflectance, metallic) * specular.x
+            + mix_vec3(k, Vec3::ONE, metallic) * specular.y,
+        diffuse: (1.0 - metallic) * (1.0 - strongest) * reflectance,
+    }
 }
 
-/// Reflectance of a conductor from that at normal incidence. \[Schlick 1994\].
-pub fn fresnel_schlick(cosine: f32, reflectance: Vec3) -> Vec3 {
-    let complement = 1.0 - cosine;
-    let square = complement * complement;
-    reflectance + (Vec3::ONE - reflectance) * (square * square * complement)
+/// Probability of sampling the specular part of a principled material.
+fn principled_specular_share(brdf_table: &[u32], material: &Material, cosine: f32) -> f32 {
+    let albedo = principled_albedo(brdf_table, material, cosine);
+    let specular = luminance(albedo.specular);
+    let sum = specular + luminance(albedo.diffuse);
+    if sum > 0.0 { specular / sum } else { 0.5 }
 }
 
-/// Density of GGX normals, per steradian, for a half vector of any length. \[Walter et al. 2007\]
-/// Eq. 33, without the cancellation in 1 − cos²θ, which matters for α below 0.01.
-pub fn ggx_normal_density(half_vector: Vec3, alpha: f32) -> f32 {
-    let tangential = half_vector.truncate().dot(half_vector.truncate());
-    let normal = half_vector.z * half_vector.z;
-    let ratio = (tangential + normal) / (tangential + alpha * alpha * normal);
-    alpha * alpha * ratio * ratio / PI
-}
-
-/// Length of the direction after stretching the surface to α = 1: √(cos²θ + α² sin²θ).
-fn ggx_stretched_length(direction: Vec3, alpha: f32) -> f32 {
-    (alpha * direction.truncate()).extend(direction.z).length()
-}
-
-/// Lower end of the spherical cap of bounded sampling, as a factor. \[Eto & Tokuyoshi 2023\] Eq. 5.
-fn ggx_cap_factor(outgoing_local: Vec3, alpha: f32) -> f32 {
-    let bounded_alpha = alpha.min(1.0);
-    let alpha_squared = bounded_alpha * bounded_alpha;
-    let s = 1.0 + outgoing_local.truncate().length();
-    let s_squared = s * s;
-    (1.0 - alpha_squared) * s_squared
-        / (s_squared + alpha_squared * outgoing_local.z * outgoing_local.z)
-}
-
-/// Microfacet reflection at unit reflectance, per steradian: D·G₂/(4 cosθ_o cosθ_i) with the
-/// height-correlated masking of \[Heitz 2014\] Eq. 99.
-pub fn ggx_reflection(
-    half_vector: Vec3,
-    outgoing_local: Vec3,
-    incident_local: Vec3,
-    alpha: f32,
-) -> f32 {
-    let masking = incident_local.z * ggx_stretched_length(outgoing_local, alpha)
-        + outgoing_local.z * ggx_stretched_length(incident_local, alpha);
-    0.5 * ggx_normal_density(half_vector, alpha) / masking
-}
-
-/// Density of [`ggx_sample`]. \[Eto & Tokuyoshi 2023\] Eq. 8 with the Jacobian of the reflection.
-pub fn ggx_pdf(half_vector: Vec3, outgoing_local: Vec3, alpha: f32) -> f32 {
-    let cap = ggx_cap_factor(outgoing_local, alpha) * outgoing_local.z
-        + ggx_stretched_length(outgoing_local, alpha);
-    0.5 * ggx_normal_density(half_vector, alpha) / cap
-}
-
-/// Samples an incident direction by the visible normals of GGX, on the spherical cap that omits
-/// most reflections below the surface. Those that remain have z ≤ 0: no sample. \[Dupuy & Benyoub
-/// 2023\], \[Eto & Tokuyoshi 2023\].
-pub fn ggx_sample(outgoing_local: Vec3, alpha: f32, u: Vec2) -> Vec3 {
-    let stretched = (alpha * outgoing_local.truncate()).extend(outgoing_local.z).normalize();
-    let cap = ggx_cap_factor(outgoing_local, alpha) * stretched.z;
-    // 1 − z rather than z keeps the root below accurate near the pole.
-    let below_pole = u.x * (1.0 + cap);
-    let sine = (below_pole * (2.0 - below_pole)).max(0.0).sqrt();
-    let azimuth = 2.0 * PI * u.y;
-    let normal = stretched + vec3(sine * azimuth.cos(), sine * azimuth.sin(), 1.0 - below_pole);
-    let normal = (alpha * normal.truncate()).extend(normal.z.max(1e-7)).normalize();
-    2.0 * outgoing_local.dot(normal) * normal - outgoing_local
+/// Metal and dielectric in one: `reflection` is that of GGX at unit reflectance. glTF 2.0, appendix B.
+fn principled_value(material: &Material, reflection: f32, cosine_difference: f32) -> Vec3 {
+    let metallic = material.ior;
+    let reflectance = Vec3::from(material.reflectance);
+    let metal = fresnel_schlick(cosine_difference, reflectance);
+    let rise = schlick_rise(cosine_difference);
+    let dielectric = mix_vec3(material.eta.into(), material.k.into(), rise);
+    let strongest = dielectric.max_element();
+    let base = (1.0 - strongest) / PI * reflectance;
+    mix_vec3(base + reflection * dielectric, reflection * metal, metallic)
 }
 
 /// (θ_h, θ_d, φ_d) of two directions, φ_d in 0…π: the half/difference angles of \[Rusinkiewicz
@@ -294,7 +263,15 @@ pub fn measured_sample(
     2.0 * outgoing_local.dot(half_vector) * half_vector - outgoing_local
 }
 
+/// Fails on a kind that this file does not know, where the shader returns 0.
+fn unknown_kind(kind: u32) -> ! {
+    panic!("material of the unknown kind {kind}")
+}
+
 /// Value (1/sr, without the cosine) and density of [`brdf_sample`] at one pair of directions.
+///
+/// # Panics
+/// The material is of an unknown kind.
 pub fn brdf_evaluate_and_pdf(
     brdf_table: &[u32],
     material: &Material,
@@ -321,45 +298,63 @@ pub fn brdf_evaluate_and_pdf(
     let cosine_difference = (0.5 * half_vector.length()).min(1.0);
     let reflection = ggx_reflection(half_vector, outgoing_local, incident_local, material.alpha);
     let pdf = ggx_pdf(half_vector, outgoing_local, material.alpha);
-    if material.kind == MATERIAL_PLASTIC {
-        let transmission = material.table_offset + PLASTIC_TRANSMISSION_OFFSET;
-        let specular_share = cosine_table(
-            brdf_table,
-            material.table_offset + PLASTIC_SPECULAR_SHARE_OFFSET,
-            1,
-            outgoing_local.z,
-        );
-        let base = cosine_table(brdf_table, transmission, 1, outgoing_local.z)
-            * cosine_table(brdf_table, transmission, 1, incident_local.z)
-            / PI;
-        let coat = reflection * fresnel_dielectric(cosine_difference, material.ior);
-        (Vec3::splat(coat) + base * reflectance, mix(cosine_pdf, pdf, specular_share))
-    } else if material.ior > 0.0 {
-        let (eta, k) = (Vec3::from(material.eta), Vec3::from(material.k));
-        (reflection * fresnel_conductor(cosine_difference, eta, k), pdf)
-    } else {
-        (reflection * fresnel_schlick(cosine_difference, reflectance), pdf)
+    match material.kind {
+        MATERIAL_PLASTIC => {
+            let transmission = material.table_offset + PLASTIC_TRANSMISSION_OFFSET;
+            let specular_share = cosine_table(
+                brdf_table,
+                material.table_offset + PLASTIC_SPECULAR_SHARE_OFFSET,
+                1,
+                outgoing_local.z,
+            );
+            let base = cosine_table(brdf_table, transmission, 1, outgoing_local.z)
+                * cosine_table(brdf_table, transmission, 1, incident_local.z)
+                / PI;
+            let coat = reflection * fresnel_dielectric(cosine_difference, material.ior);
+            (Vec3::splat(coat) + base * reflectance, mix(cosine_pdf, pdf, specular_share))
+        }
+        MATERIAL_PRINCIPLED => {
+            let share = principled_specular_share(brdf_table, material, outgoing_local.z);
+            let value = principled_value(material, reflection, cosine_difference);
+            (value, mix(cosine_pdf, pdf, share))
+        }
+        MATERIAL_CONDUCTOR if material.ior > 0.0 => {
+            let (eta, k) = (Vec3::from(material.eta), Vec3::from(material.k));
+            (reflection * fresnel_conductor(cosine_difference, eta, k), pdf)
+        }
+        MATERIAL_CONDUCTOR => (reflection * fresnel_schlick(cosine_difference, reflectance), pdf),
+        MATERIAL_MIRROR | MATERIAL_DIELECTRIC | MATERIAL_THIN_DIELECTRIC => (Vec3::ZERO, 0.0),
+        kind => unknown_kind(kind),
     }
 }
 
 /// Samples an incident direction with three numbers in [0, 1); z ≤ 0 means no sample, which counts
 /// as one with contribution 0.
+///
+/// # Panics
+/// The material is of an unknown kind.
 pub fn brdf_sample(brdf_table: &[u32], material: &Material, outgoing_local: Vec3, u: Vec3) -> Vec3 {
     if outgoing_local.z <= 0.0 {
         return vec3(0.0, 0.0, -1.0);
     }
-    if material.kind == MATERIAL_MEASURED {
-        return measured_sample(brdf_table, material.table_offset, outgoing_local, u);
-    }
-    let mut specular_share = if material.kind == MATERIAL_CONDUCTOR { 1.0 } else { 0.0 };
-    if material.kind == MATERIAL_PLASTIC {
-        specular_share = cosine_table(
+    let specular_share = match material.kind {
+        MATERIAL_MEASURED => {
+            return measured_sample(brdf_table, material.table_offset, outgoing_local, u);
+        }
+        MATERIAL_MIRROR | MATERIAL_DIELECTRIC | MATERIAL_THIN_DIELECTRIC => {
+            return vec3(0.0, 0.0, -1.0);
+        }
+        MATERIAL_DIFFUSE => 0.0,
+        MATERIAL_CONDUCTOR => 1.0,
+        MATERIAL_PLASTIC => cosine_table(
             brdf_table,
             material.table_offset + PLASTIC_SPECULAR_SHARE_OFFSET,
             1,
             outgoing_local.z,
-        );
-    }
+        ),
+        MATERIAL_PRINCIPLED => principled_specular_share(brdf_table, material, outgoing_local.z),
+        kind => unknown_kind(kind),
+    };
     if u.x < specular_share {
         return ggx_sample(outgoing_local, material.alpha, vec2(u.y, u.z));
     }
@@ -367,15 +362,41 @@ pub fn brdf_sample(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
 }
 
 /// Share of light from a uniform white hemisphere reflected toward the outgoing direction, 0…1, for
-/// the albedo image.
+/// the albedo image. Dielectrics and panes count transmitted light too, seen from outside and as if
+/// smooth.
+///
+/// # Panics
+/// The material is of an unknown kind.
 pub fn brdf_albedo(brdf_table: &[u32], material: &Material, outgoing_local: Vec3) -> Vec3 {
-    if material.kind == MATERIAL_DIFFUSE {
-        return Vec3::from(material.reflectance);
-    }
+    let reflectance = Vec3::from(material.reflectance);
+    let cosine = outgoing_local.z;
     let offset = material.table_offset;
-    vec3(
-        cosine_table(brdf_table, offset, 3, outgoing_local.z),
-        cosine_table(brdf_table, offset + 1, 3, outgoing_local.z),
-        cosine_table(brdf_table, offset + 2, 3, outgoing_local.z),
-    )
+    match material.kind {
+        MATERIAL_DIFFUSE | MATERIAL_MIRROR => reflectance,
+        MATERIAL_PLASTIC => {
+            let coat = cosine_table(brdf_table, offset, 1, cosine);
+            Vec3::splat(coat) + (1.0 - coat) * reflectance
+        }
+        MATERIAL_PRINCIPLED => {
+            let albedo = principled_albedo(brdf_table, material, cosine);
+            (albedo.specular + albedo.diffuse).min(Vec3::ONE)
+        }
+        MATERIAL_CONDUCTOR if material.ior == 0.0 => {
+            let shares = ggx_schlick_albedo(brdf_table, offset, material.alpha, cosine);
+            reflectance * shares.x + Vec3::splat(shares.y)
+        }
+        MATERIAL_DIELECTRIC => {
+            let fresnel = fresnel_interface(cosine.abs(), material.ior);
+            mix_vec3(material.eta.into(), reflectance, fresnel)
+        }
+        MATERIAL_THIN_DIELECTRIC => {
+            pane_reflectance(material, cosine) + pane_transmittance(material, cosine)
+        }
+        MATERIAL_CONDUCTOR | MATERIAL_MEASURED => vec3(
+            cosine_table(brdf_table, offset, 3, cosine),
+            cosine_table(brdf_table, offset + 1, 3, cosine),
+            cosine_table(brdf_table, offset + 2, 3, cosine),
+        ),
+        kind => unknown_kind(kind),
+    }
 }

@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use super::kernel::{Domain, Kernel};
+use super::{
+    kernel::{Domain, Kernel},
+    surfaces::Surfaces,
+};
 use crate::{
     accel::{Accel, MAX_TRIANGLE_PAGES, TriangleRecord},
     error::Result,
@@ -82,26 +85,33 @@ pub struct Traversal {
 }
 
 impl Traversal {
-    fn kernel(self, shader: &'static str, domain: Domain, schedule: Schedule) -> Kernel {
-        let constants = [
+    fn kernel(
+        self,
+        shader: &'static str,
+        domain: Domain,
+        schedule: Schedule,
+        surfaces: Surfaces,
+    ) -> Kernel {
+        let own = [
             (CONSTANT_TRIANGLE_PAGES, self.page_count),
             (CONSTANT_TRIANGLE_PAGE_SHIFT, self.page_shift),
             (CONSTANT_RAYS_PER_INVOCATION, schedule.rays_per_invocation),
             (CONSTANT_REFILL_LANES, schedule.refill_lanes),
         ];
+        let constants = [&own[..], &surfaces.constants()].concat();
         let per_invocation = schedule.rays_per_invocation;
         Kernel { per_invocation, ..Kernel::new(shader, domain, &constants) }
     }
 
     /// Finds the closest hit of every ray: `ray_texels` → `hits`.
-    pub fn trace(self, schedule: Schedule) -> Kernel {
-        self.kernel("trace", Domain::Paths, schedule)
+    pub fn trace(self, schedule: Schedule, surfaces: Surfaces) -> Kernel {
+        self.kernel("trace", Domain::Paths, schedule, surfaces)
     }
 
     /// Tests shadow rays for any hit: `shadow_ray_texels`, `hit_texels` → `visibility`. Ray
     /// `direction_index · path_count + path_index` starts at hit `path_index`.
-    pub fn shadow(self, schedule: Schedule) -> Kernel {
-        self.kernel("shadow", Domain::ShadowRays, schedule)
+    pub fn shadow(self, schedule: Schedule, surfaces: Surfaces) -> Kernel {
+        self.kernel("shadow", Domain::ShadowRays, schedule, surfaces)
     }
 }
 

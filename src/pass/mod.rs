@@ -6,11 +6,14 @@
 pub mod film_buffers;
 pub mod geometry;
 pub mod kernel;
+pub mod lamps;
 pub mod order;
 pub mod runner;
 pub mod scene_buffers;
 pub mod steps;
+pub mod surfaces;
 pub mod technique;
+pub mod texture_buffers;
 mod totals;
 pub mod wave_buffers;
 
@@ -21,6 +24,8 @@ pub use order::{PassSettings, wave_order};
 pub use runner::Runner;
 pub use scene_buffers::SceneBuffers;
 pub use steps::{Passes, PathDemand, SHADOW_RAYS_PER_GROUP, Steps};
+pub use surfaces::Surfaces;
 pub use technique::{Progress, Report, Technique};
+pub use texture_buffers::{TextureAccess, TextureBuffers};
 pub use totals::Totals;
 pub use wave_buffers::WaveBuffers;

@@ -4,10 +4,11 @@ use super::{
     geometry::{Schedule, Traversal},
     kernel::{Dispatch, Domain, Kernel},
     steps::Steps,
+    surfaces::Surfaces,
 };
 use crate::shader::{
     constants::{
-        AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, CONSTANT_MATERIAL_KINDS, CONSTANT_ROULETTE_VERTEX,
+        AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, CONSTANT_ONLY_SPECULAR, CONSTANT_ROULETTE_VERTEX,
     },
     structs::Wave,
 };
@@ -26,8 +27,8 @@ pub struct PassSettings {
     pub aovs: u32,
     /// First vertex at which russian roulette may end a path.
     pub roulette_vertex: u32,
-    /// Bit `1 << kind` for every kind of material in the scene.
-    pub material_kinds: u32,
+    /// Specialization by the surfaces of the scene.
+    pub surfaces: Surfaces,
     /// Specialization of the passes that traverse.
     pub traversal: Traversal,
     /// Schedule of incoherent rays.
@@ -41,7 +42,10 @@ pub fn wave_order(
     wave: Wave,
     vertices: u32,
 ) -> Vec<Dispatch> {
-    let PassSettings { roulette_vertex, material_kinds, traversal, incoherent, .. } = *settings;
+    let PassSettings { surfaces, traversal, incoherent, .. } = *settings;
+    let constants = surfaces.constants();
+    // Training teaches the visibility of the environment; other light is not needed.
+    let is_lit = wave.is_training == 0;
     let mut order = Vec::new();
     let mut add = |kernel: Kernel, wave: &Wave| order.push(Dispatch { kernel, wave: *wave });
     let mut wave = Wave { aovs: settings.aovs, ..wave };
@@ -52,7 +56,27 @@ pub fn wave_order(
         wave.total_shadow_rays = steps.shadow_rays_at(vertex, settings.shadow_rays);
         // Camera rays stay coherent, bounce rays do not.
         let schedule = if vertex == 0 { Schedule::SINGLE } else { incoherent };
-        add(traversal.trace(schedule), &wave);
+        add(traversal.trace(schedule, surfaces), &wave);
+        if surfaces.is_textured() {
+            add(Kernel::new("texture", Domain::Paths, &constants), &wave);
+        }
+        if is_lit {
+            if surfaces.emits() {
+                add(Kernel::new("emit", Domain::Paths, &constants), &wave);
+            }
+            if surfaces.lamp_count > 0 {
+                let to_lamps = Wave {
+                    shadow_ray_count: 1,
+                    first_shadow_ray: 0,
+                    total_shadow_rays: 1,
+                    to_lamps: 1,
+                    ..wave
+                };
+                add(Kernel::new("sample_lamps", Domain::Paths, &constants), &to_lamps);
+                add(traversal.shadow(incoherent, surfaces), &to_lamps);
+                add(Kernel::new("gather", Domain::Paths, &[]), &to_lamps);
+            }
+        }
 
         wave.first_shadow_ray = 0;
         if wave.total_shadow_rays > 0 {
@@ -67,7 +91,7 @@ pub fn wave_order(
                 for kernel in steps.sample(&wave) {
                     add(kernel, &wave);
                 }
-                add(traversal.shadow(incoherent), &wave);
+                add(traversal.shadow(incoherent, surfaces), &wave);
                 for kernel in steps.after_shadow_rays(&wave) {
                     add(kernel, &wave);
                 }
@@ -82,21 +106,32 @@ pub fn wave_order(
             add(kernel, &wave);
         }
         if vertex == 0 && wave.aovs & FEATURES != 0 && wave.is_training == 0 {
-            let constants = [(CONSTANT_MATERIAL_KINDS, material_kinds)];
             add(Kernel::new("features", Domain::Pixels, &constants), &wave);
         }
         if vertex + 1 < vertices {
             let guided = if wave.total_shadow_rays > 0 { steps.bounce(&wave) } else { None };
-            let bounce = guided.unwrap_or_else(|| {
-                let constants = [
-                    (CONSTANT_ROULETTE_VERTEX, roulette_vertex),
-                    (CONSTANT_MATERIAL_KINDS, material_kinds),
-                ];
-                Kernel::new("bounce", Domain::Paths, &constants)
-            });
-            add(bounce, &wave);
+            add(guided.unwrap_or_else(|| bounce(settings, false)), &wave);
         }
+    }
+    if is_lit && (surfaces.emits() || surfaces.has_specular()) {
+        // Follow the last vertices to light that is not sampled, or not sampled alone.
+        add(bounce(settings, !surfaces.emits()), &wave);
+        wave = Wave { vertex: vertices, shadow_ray_count: 0, total_shadow_rays: 0, ..wave };
+        wave.first_shadow_ray = 0;
+        add(traversal.trace(incoherent, surfaces), &wave);
+        if surfaces.emits() {
+            add(Kernel::new("emit", Domain::Paths, &constants), &wave);
+        }
+        add(Kernel::new("gather", Domain::Paths, &[]), &wave);
     }
     add(Kernel::new("accumulate", Domain::Pixels, &[]), &wave);
     order
+}
+
+/// The pass that continues paths by the BRDF's own sampling; `only_specular` ends all others.
+fn bounce(settings: &PassSettings, only_specular: bool) -> Kernel {
+    let mut constants = settings.surfaces.constants();
+    constants.push((CONSTANT_ROULETTE_VERTEX, settings.roulette_vertex));
+    constants.push((CONSTANT_ONLY_SPECULAR, u32::from(only_specular)));
+    Kernel::new("bounce", Domain::Paths, &constants)
 }

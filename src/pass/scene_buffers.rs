@@ -4,17 +4,22 @@ use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
 use glam::Vec3;
 
-use super::geometry::{GeometryBuffers, triangle_page_bytes};
+use super::{
+    geometry::{GeometryBuffers, triangle_page_bytes},
+    lamps::LampTables,
+    surfaces::{self, Surfaces},
+    texture_buffers::TextureBuffers,
+};
 use crate::{
-    accel::Accel,
-    brdf::MaterialTables,
+    accel::{Accel, attributes::TriangleAttributes},
+    brdf::{MaterialTables, SurfaceTables},
     error::Result,
     film::Window,
     gpu::{Buffer, DescriptorSet, Device},
     scene::{EnvironmentMap, Filter, Scene, environment::EnvironmentTables},
     shader::{
         bindings::{Binding, SCENE, scene as bindings},
-        structs::SceneParameters,
+        structs::{self, SceneParameters},
     },
 };
 
@@ -22,8 +27,9 @@ use crate::{
 pub struct SceneBuffers {
     set: DescriptorSet,
     geometry: GeometryBuffers,
+    textures: TextureBuffers,
     buffers: Vec<Buffer>,
-    material_kinds: u32,
+    surfaces: Surfaces,
     window: Window,
     host_ms: BTreeMap<String, f64>,
 }
@@ -37,9 +43,9 @@ impl SceneBuffers {
         let accel = Accel::build(&scene.geometry, triangle_page_bytes(device.capabilities()))?;
         let bvh_ms = start.elapsed().as_secs_f64() * 1e3;
         let start = Instant::now();
-        let geometry = GeometryBuffers::new(device, &accel)?;
+        let parts = Parts::new(device, scene, &accel)?;
         drop(accel);
-        let mut scene_buffers = Self::with_geometry(device, scene, window, geometry, start)?;
+        let mut scene_buffers = Self::with_parts(device, scene, window, parts, start)?;
         scene_buffers.host_ms.insert("bvh".to_owned(), bvh_ms);
         Ok(scene_buffers)
     }
@@ -52,17 +58,18 @@ impl SceneBuffers {
         accel: &Accel,
     ) -> Result<Self> {
         let start = Instant::now();
-        let geometry = GeometryBuffers::new(device, accel)?;
-        Self::with_geometry(device, scene, window, geometry, start)
+        let parts = Parts::new(device, scene, accel)?;
+        Self::with_parts(device, scene, window, parts, start)
     }
 
-    fn with_geometry(
+    fn with_parts(
         device: &Arc<Device>,
         scene: &Scene,
         window: Window,
-        geometry: GeometryBuffers,
+        parts: Parts,
         start: Instant,
     ) -> Result<Self> {
+        let Parts { geometry, textures, lamps } = parts;
         let mut host_ms = BTreeMap::new();
         let mut buffers = Vec::new();
         let mut places = Vec::new();
@@ -74,12 +81,21 @@ impl SceneBuffers {
         let tables = MaterialTables::new(&scene.materials)?;
         let material_kinds =
             tables.materials.iter().fold(0, |bits, material| bits | 1 << material.kind);
+        let surfaces = Surfaces {
+            material_kinds,
+            features: surfaces::features(&scene.materials),
+            lamp_count: lamps.choices.len() as u32,
+            access: textures.access(),
+        };
         let materials = Buffer::from_slice(device, "materials", &tables.materials)?;
         let brdf_table = Buffer::texels_from_slice(device, "BRDF tables", &tables.words)?;
         drop(tables);
 
         let tables = EnvironmentTables::new(&scene.environment);
-        let parameters = parameters(scene, &scene.environment, tables.total, window);
+        let parameters = SceneParameters {
+            lamp_count: lamps.choices.len() as u32,
+            ..parameters(scene, &scene.environment, tables.total, window)
+        };
         add(bindings::PARAMETERS, Buffer::from_slice(device, "parameters", &[parameters])?);
         let map = &scene.environment;
         let texels: Vec<[f32; 4]> =
@@ -96,8 +112,16 @@ impl SceneBuffers {
             bindings::ENVIRONMENT_CELLS,
             Buffer::texels_from_slice(device, "environment cells", &tables.cells)?,
         );
+        let mut choices = lamps.choices;
+        let mut point_lamps = lamps.lamps;
+        // A buffer has at least one element.
+        choices.resize(choices.len().max(1), structs::LampChoice::default());
+        point_lamps.resize(point_lamps.len().max(1), structs::Lamp::default());
+        add(bindings::LAMP_CHOICES, Buffer::from_slice(device, "lamp choices", &choices)?);
+        add(bindings::LAMPS, Buffer::from_slice(device, "lamps", &point_lamps)?);
         let mut bound: Vec<_> =
             places.into_iter().zip(&buffers).chain(geometry.bindings()).collect();
+        bound.extend(textures.bindings());
         bound.push((bindings::MATERIALS, &materials));
         bound.push((bindings::MATERIAL_TEXELS, &materials));
         bound.push((bindings::BRDF_TABLE, &brdf_table));
@@ -105,7 +129,7 @@ impl SceneBuffers {
         let set = DescriptorSet::new(device, &SCENE, &bound)?;
         buffers.extend([materials, brdf_table]);
         host_ms.insert("upload".to_owned(), start.elapsed().as_secs_f64() * 1e3);
-        Ok(Self { set, geometry, buffers, material_kinds, window, host_ms })
+        Ok(Self { set, geometry, textures, buffers, surfaces, window, host_ms })
     }
 
     /// Descriptor set 0.
@@ -118,9 +142,14 @@ impl SceneBuffers {
         &self.geometry
     }
 
-    /// Bit `1 << kind` for every kind of material.
-    pub fn material_kinds(&self) -> u32 {
-        self.material_kinds
+    /// Textures, surfaces and attributes of triangles.
+    pub fn textures(&self) -> &TextureBuffers {
+        &self.textures
+    }
+
+    /// Specialization of passes by the surfaces of the scene.
+    pub fn surfaces(&self) -> Surfaces {
+        self.surfaces
     }
 
     /// Part of the film that the parameters describe.
@@ -138,6 +167,7 @@ impl SceneBuffers {
         self.buffers
             .iter()
             .chain(self.geometry.buffers())
+            .chain(self.textures.buffers())
             .map(|buffer| (buffer.name().to_owned(), buffer.size()))
             .collect()
     }
@@ -176,5 +206,26 @@ fn parameters(
         environment_cos_rotation: map.rotation_rad.cos(),
         environment_sin_rotation: map.rotation_rad.sin(),
         environment_total,
+        lamp_count: 0,
+    }
+}
+
+/// Parts of a scene that need its triangles in BVH order.
+struct Parts {
+    geometry: GeometryBuffers,
+    textures: TextureBuffers,
+    lamps: LampTables,
+}
+
+impl Parts {
+    fn new(device: &Arc<Device>, scene: &Scene, accel: &Accel) -> Result<Self> {
+        let mut surfaces = SurfaceTables::new(&scene.materials);
+        let lamps = LampTables::new(scene, accel);
+        for (surface, density) in surfaces.surfaces.iter_mut().zip(&lamps.emission_densities) {
+            surface.emission_density = *density;
+        }
+        let attributes = TriangleAttributes::new(&scene.geometry, accel, surfaces.attributes);
+        let textures = TextureBuffers::new(device, &surfaces, &attributes)?;
+        Ok(Self { geometry: GeometryBuffers::new(device, accel)?, textures, lamps })
     }
 }

@@ -9,7 +9,7 @@ use crate::{
     shader::{
         bindings::{WAVE, wave},
         constants::WORKGROUP_SIZE,
-        structs::{Hit, PathState, Ray, ShadowRay},
+        structs::{Hit, PathState, Ray, ShadowRay, Surface},
     },
 };
 
@@ -29,16 +29,19 @@ pub struct WaveBuffers {
     shadow_rays: Buffer,
     visibility: Buffer,
     paths: Buffer,
+    surfaces: Buffer,
 }
 
 impl WaveBuffers {
     /// Allocates waves over a film of `padded_pixels` with up to `shadow_rays` rays per hit at a time,
-    /// and no more paths than `demand` allows. Fails if the device does or its limits are exceeded.
+    /// and no more paths than `demand` allows; surfaces only if `is_textured`. Fails if the device does
+    /// or its limits are exceeded.
     pub fn new(
         device: &Arc<Device>,
         padded_pixels: u32,
         shadow_rays: u32,
         demand: PathDemand,
+        is_textured: bool,
     ) -> Result<Self> {
         let capabilities = device.capabilities();
         let most = if capabilities.kind == "software" { SOFTWARE_PATHS } else { GPU_PATHS };
@@ -64,6 +67,8 @@ impl WaveBuffers {
         let hits = make("hits", paths, size_of::<Hit>())?;
         let shadow_rays = make("shadow rays", shadow_ray_count, size_of::<ShadowRay>())?;
         let visibility = make("visibility", shadow_ray_count, size_of::<u32>())?;
+        let surface_count = if is_textured { paths } else { 1 };
+        let surfaces = make("hit surfaces", surface_count, size_of::<Surface>())?;
         let paths = make("paths", paths, size_of::<PathState>())?;
         let bound = [
             (wave::RAYS, &rays),
@@ -74,9 +79,10 @@ impl WaveBuffers {
             (wave::SHADOW_RAY_TEXELS, &shadow_rays),
             (wave::VISIBILITY, &visibility),
             (wave::PATHS, &paths),
+            (wave::HIT_SURFACES, &surfaces),
         ];
         let set = DescriptorSet::new(device, &WAVE, &bound)?;
-        Ok(Self { set, capacity, rays, hits, shadow_rays, visibility, paths })
+        Ok(Self { set, capacity, rays, hits, shadow_rays, visibility, paths, surfaces })
     }
 
     /// Descriptor set 2.
@@ -121,7 +127,7 @@ impl WaveBuffers {
 
     /// Bytes by buffer name.
     pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
-        [&self.rays, &self.hits, &self.shadow_rays, &self.visibility, &self.paths]
+        [&self.rays, &self.hits, &self.shadow_rays, &self.visibility, &self.paths, &self.surfaces]
             .map(|buffer| (buffer.name().to_owned(), buffer.size()))
             .into()
     }

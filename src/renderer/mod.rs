@@ -60,7 +60,7 @@ impl Renderer {
             depth: settings.depth,
             aovs: aov_bits(&settings.aovs),
             roulette_vertex: settings.roulette_vertex,
-            material_kinds: buffers.material_kinds(),
+            surfaces: buffers.surfaces(),
             traversal: buffers.geometry().traversal(),
             incoherent: Schedule::incoherent(device.capabilities()),
         };

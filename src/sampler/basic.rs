@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use super::{Context, Parameters, Room, knob};
 use crate::{
     error::Result,
-    pass::{Domain, Kernel, Passes, Steps, Technique},
+    pass::{Domain, Kernel, Passes, Steps, Surfaces, Technique},
     shader::{
         constants::{
-            CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS, CONSTANT_SAMPLER, SAMPLER_BRDF,
-            SAMPLER_COSINE, SAMPLER_ENV, SAMPLER_MIS, SAMPLER_RIS, SAMPLER_UNIFORM,
+            CONSTANT_CANDIDATES, CONSTANT_SAMPLER, SAMPLER_BRDF, SAMPLER_COSINE, SAMPLER_ENV,
+            SAMPLER_MIS, SAMPLER_RIS, SAMPLER_UNIFORM,
         },
         structs::Wave,
     },
@@ -48,8 +48,8 @@ impl Basic {
     }
 
     /// Returns the passes, or [`crate::Error::Usage`] for an unsupported number of candidates.
-    pub fn steps(self, parameters: &Parameters, material_kinds: u32) -> Result<BasicSteps> {
-        Ok(BasicSteps { tag: self.tag, candidates: self.candidates(parameters)?, material_kinds })
+    pub fn steps(self, parameters: &Parameters, surfaces: Surfaces) -> Result<BasicSteps> {
+        Ok(BasicSteps { tag: self.tag, candidates: self.candidates(parameters)?, surfaces })
     }
 }
 
@@ -71,8 +71,8 @@ impl Room for Basic {
     }
 
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
-        let material_kinds = context.runner.settings().material_kinds;
-        Ok(Box::new(BasicTechnique { steps: self.steps(context.parameters, material_kinds)? }))
+        let surfaces = context.runner.settings().surfaces;
+        Ok(Box::new(BasicTechnique { steps: self.steps(context.parameters, surfaces)? }))
     }
 }
 
@@ -81,16 +81,13 @@ impl Room for Basic {
 pub struct BasicSteps {
     tag: u32,
     candidates: u32,
-    material_kinds: u32,
+    surfaces: Surfaces,
 }
 
 impl Steps for BasicSteps {
     fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
-        let constants = [
-            (CONSTANT_SAMPLER, self.tag),
-            (CONSTANT_CANDIDATES, self.candidates),
-            (CONSTANT_MATERIAL_KINDS, self.material_kinds),
-        ];
+        let own = [(CONSTANT_SAMPLER, self.tag), (CONSTANT_CANDIDATES, self.candidates)];
+        let constants = [&own[..], &self.surfaces.constants()].concat();
         vec![Kernel::new("sample", Domain::Paths, &constants)]
     }
 }

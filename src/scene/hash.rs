@@ -200,6 +200,10 @@ impl Hasher {
         self.floats(&[used.scale, used.bias].concat());
         match &image.texels {
             Texels::Bytes(texels) => self.array(texels.as_flattened()),
+            Texels::Shorts(texels) => {
+                self.integers(&[1]);
+                self.array(bytemuck::cast_slice(texels));
+            }
             Texels::Halves(texels) => self.array(bytemuck::cast_slice(texels)),
         }
     }

@@ -75,7 +75,7 @@ impl Transform {
 }
 
 /// Sine and cosine of an angle in degrees; exact for quarter turns.
-fn sine_cosine_deg(angle_deg: f32) -> (f64, f64) {
+pub(super) fn sine_cosine_deg(angle_deg: f32) -> (f64, f64) {
     let angle_deg = f64::from(angle_deg).rem_euclid(360.0);
     match angle_deg {
         0.0 => (0.0, 1.0),

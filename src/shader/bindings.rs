@@ -152,6 +152,35 @@ binding_tables! {
         12 ENVIRONMENT_CELLS: texels R32Float;
         /// Materials again, four texels each.
         13 MATERIAL_TEXELS: texels Rgba32Uint;
+        /// Alias table over lamps and emitting triangles.
+        14 LAMP_CHOICES: array LampChoice;
+        /// Lights without a surface.
+        15 LAMPS: array Lamp;
+        /// First page of the texels of all textures: a word a texel of bytes, two words a deeper one.
+        20 TEXTURE_WORDS_0: texels R32Uint;
+        /// Second page of texels; a missing page repeats the first.
+        21 TEXTURE_WORDS_1: texels R32Uint;
+        /// Third page of texels.
+        22 TEXTURE_WORDS_2: texels R32Uint;
+        /// Fourth page of texels.
+        23 TEXTURE_WORDS_3: texels R32Uint;
+        /// Textures as the properties of materials read them.
+        24 TEXTURE_USES: array TextureUse;
+        /// Uses of textures again, four texels each.
+        25 TEXTURE_USE_TEXELS: texels Rgba32Uint;
+        /// Textures, opacity and emission of each material.
+        26 MATERIAL_SURFACES: array MaterialSurface;
+        /// Surfaces of materials again, four texels each.
+        27 MATERIAL_SURFACE_TEXELS: texels Rgba32Uint;
+        /// First page of what `CONSTANT_ATTRIBUTES` names for the three corners of each triangle in BVH
+        /// order.
+        28 TRIANGLE_ATTRIBUTES_0: texels R32Uint;
+        /// Second page of attributes; a missing page repeats the first.
+        29 TRIANGLE_ATTRIBUTES_1: texels R32Uint;
+        /// Third page of attributes.
+        30 TRIANGLE_ATTRIBUTES_2: texels R32Uint;
+        /// Fourth page of attributes.
+        31 TRIANGLE_ATTRIBUTES_3: texels R32Uint;
     }
 
     /// Set 1 of the samplers `product` and `visibility`.
@@ -232,6 +261,8 @@ binding_tables! {
         6 HIT_TEXELS: texels Rgba32Uint;
         /// Shadow rays again, three texels each.
         7 SHADOW_RAY_TEXELS: texels Rg32Uint;
+        /// Surface at the hit of each path, in scenes with textures.
+        8 HIT_SURFACES: array Surface;
     }
 
     /// Set 3: the film, which grows by every wave.

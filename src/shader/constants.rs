@@ -28,6 +28,18 @@ constants! {
     /// Finished lanes of a subgroup at which they take their next rays.
     CONSTANT_REFILL_LANES = 3;
 
+    // Specialization constants of the passes that read textures.
+    /// Number of pages of texels in use.
+    CONSTANT_TEXTURE_PAGES = 4;
+    /// Base-2 logarithm of the words per page of texels.
+    CONSTANT_TEXTURE_PAGE_SHIFT = 5;
+    /// Number of pages of triangle attributes in use.
+    CONSTANT_ATTRIBUTE_PAGES = 6;
+    /// Base-2 logarithm of the words per page of triangle attributes.
+    CONSTANT_ATTRIBUTE_PAGE_SHIFT = 7;
+    /// Bits `ATTRIBUTE_…` of the attributes that triangles have; 0 if the scene needs none.
+    CONSTANT_ATTRIBUTES = 8;
+
     // Specialization constants of the sampling and bounce passes.
     /// Sampler of `sample` or `sample_lobes`, `SAMPLER_…`.
     CONSTANT_SAMPLER = 16;
@@ -42,6 +54,12 @@ constants! {
     /// Bit `1 << kind` for every kind of material in the scene; saves devices that run both sides of a
     /// branch the others.
     CONSTANT_MATERIAL_KINDS = 19;
+    /// Bits `SURFACES_…` of what the surfaces of the scene need.
+    CONSTANT_SURFACES = 20;
+    /// 1 lets only paths at specular surfaces go on: the ray after the last vertex.
+    CONSTANT_ONLY_SPECULAR = 21;
+    /// Candidates of `sample_lamps` for its shadow ray.
+    CONSTANT_LAMP_CANDIDATES = 22;
 
     // Specialization constants of `multiply_lobes`.
     /// Lobes of the environment.
@@ -97,6 +115,18 @@ constants! {
     /// Learned visibility; a shader of its own.
     SAMPLER_GUIDED = 8;
 
+    // Bits of CONSTANT_SURFACES.
+    /// Some surfaces reflect or transmit by paths alone: no light is sampled at them.
+    SURFACES_SPECULAR = 1;
+    /// Some surfaces let light straight through.
+    SURFACES_PASSING = 2;
+    /// Some surfaces are black from behind.
+    SURFACES_ONE_SIDED = 4;
+    /// Textures or vertex colours vary some material.
+    SURFACES_TEXTURED = 8;
+    /// Some surfaces emit light.
+    SURFACES_EMITTING = 16;
+
     // Bits of `Wave::aovs`: film layers to write.
     /// Albedo.
     AOV_ALBEDO = 1;
@@ -119,8 +149,11 @@ constants! {
     TRAVERSAL_STEP_LIMIT = 30_000;
     /// Packed normal of the vertices of a flat triangle, which no unit vector packs to.
     FLAT_NORMAL = 0x8000_8000;
-    /// [`Hit::material`](super::structs::Hit::material) of a ray that left the scene or was not traced.
+    /// [`Hit::material`](super::structs::Hit::material) where no light is sampled: the ray left the
+    /// scene, was not traced, or met a specular surface, which `Hit::triangle` tells apart.
     NO_MATERIAL = 0xffff_ffff;
+    /// [`Hit::triangle`](super::structs::Hit::triangle) of a ray that met nothing.
+    NO_TRIANGLE = 0xffff_ffff;
 
     // Values of `Material::kind`.
     /// Lambertian.
@@ -139,16 +172,86 @@ constants! {
     MATERIAL_DIELECTRIC = 6;
     /// Thin pane of a dielectric.
     MATERIAL_THIN_DIELECTRIC = 7;
+    /// Bits `1 << kind` of the specular kinds, at which no light is sampled.
+    SPECULAR_KINDS = 1 << MATERIAL_MIRROR | 1 << MATERIAL_DIELECTRIC | 1 << MATERIAL_THIN_DIELECTRIC;
+
+    // Lamps.
+    /// Marks a lamp without a surface in [`LampChoice::source`](super::structs::LampChoice::source).
+    LAMP_BIT = 1 << 31;
+    /// Shines from a point into all directions.
+    LAMP_POINT = 0;
+    /// Shines from a point into a cone; falls off as t², t linear in the cosine.
+    LAMP_SPOT_SQUARED_COSINE = 1;
+    /// The same, as 3t² − 2t³.
+    LAMP_SPOT_SMOOTH_COSINE = 2;
+    /// The same, linear in the angle.
+    LAMP_SPOT_LINEAR_ANGLE = 3;
+    /// Shines from infinitely far away.
+    LAMP_DIRECTIONAL = 4;
+
+    // Textures.
+    /// Index of no texture.
+    NO_TEXTURE = 0xffff_ffff;
+    /// Mask of the format in `TextureUse::flags`, `TEXTURE_BYTES` to `TEXTURE_HALVES`.
+    TEXTURE_FORMAT_MASK = 3;
+    /// A word a texel: four numbers of 8 bits, 255 for one.
+    TEXTURE_BYTES = 0;
+    /// Two words a texel: four numbers of 16 bits, 65,535 for one.
+    TEXTURE_SHORTS = 1;
+    /// Two words a texel: four halves.
+    TEXTURE_HALVES = 2;
+    /// Flag of colours that follow IEC 61966-2-1.
+    TEXTURE_SRGB = 4;
+    /// Flag of a texture without interpolation.
+    TEXTURE_NEAREST = 8;
+    /// Flag of a texture on the second set of coordinates.
+    TEXTURE_SECOND_UVS = 16;
+    /// First bit of the continuation along u, two bits: `TEXTURE_REPEAT` to `TEXTURE_CLAMP`.
+    TEXTURE_WRAP_U_SHIFT = 5;
+    /// First bit of the continuation along v.
+    TEXTURE_WRAP_V_SHIFT = 7;
+    /// First bit of the channel, three bits: 0 for all, 1 to 4 for red, green, blue or opacity alone.
+    TEXTURE_CHANNEL_SHIFT = 9;
+    /// Repeats the image.
+    TEXTURE_REPEAT = 0;
+    /// Repeats the image, every second time mirrored.
+    TEXTURE_MIRROR = 1;
+    /// Repeats the texels of the edge.
+    TEXTURE_CLAMP = 2;
+
+    // Bits of `CONSTANT_ATTRIBUTES`, in the order in which a corner has them, two words each.
+    /// First set of texture coordinates: two floats.
+    ATTRIBUTE_FIRST_UVS = 1;
+    /// Second set: two floats.
+    ATTRIBUTE_SECOND_UVS = 2;
+    /// Tangent by the octahedral map, or `FLAT_NORMAL` for none; sign of the bitangent, a float.
+    ATTRIBUTE_TANGENT = 4;
+    /// Colour and opacity: four numbers of 16 bits.
+    ATTRIBUTE_COLOR = 8;
+
+    // Bits of `MaterialSurface::flags`.
+    /// Vertex colours are a factor of colour and opacity.
+    SURFACE_VERTEX_COLOR = 1;
+    /// The back reflects and transmits too.
+    SURFACE_TWO_SIDED = 2;
+    /// The back emits too.
+    SURFACE_EMISSION_TWO_SIDED = 4;
 
     // Tables of materials; offsets are in words from `Material::table_offset`.
     /// Intervals of the tables over the cosine 0…1 of a direction with the normal; one more node.
     BRDF_COSINE_INTERVALS = 64;
     /// Nodes of such a table.
     BRDF_COSINE_NODES = BRDF_COSINE_INTERVALS + 1;
-    /// Transmission of a plastic; the albedo is at 0.
-    PLASTIC_TRANSMISSION_OFFSET = 3 * BRDF_COSINE_NODES;
+    /// Transmission of a plastic; the albedo of the coat is at 0.
+    PLASTIC_TRANSMISSION_OFFSET = BRDF_COSINE_NODES;
     /// Probability of sampling a plastic's coat.
     PLASTIC_SPECULAR_SHARE_OFFSET = PLASTIC_TRANSMISSION_OFFSET + BRDF_COSINE_NODES;
+    /// Intervals in the roughness √α of the albedo of all GGX surfaces with a Schlick reflectance.
+    GGX_ROUGHNESS_INTERVALS = 16;
+    /// Words of one roughness: factors of the reflectance at normal and at grazing incidence, by cosine.
+    GGX_ROUGHNESS_WORDS = 2 * BRDF_COSINE_NODES;
+    /// Mean rise of Schlick's reflectance over a diffuse base, by cosine; the albedo of GGX is at 0.
+    DIFFUSE_RISE_OFFSET = (GGX_ROUGHNESS_INTERVALS + 1) * GGX_ROUGHNESS_WORDS;
     /// Bins of the measured grid in θ_h; the edge of bin k is at (k/90)²·90°.
     MEASURED_THETA_HALF_BINS = 90;
     /// Bins of the measured grid in θ_d, of equal width.

@@ -5,6 +5,9 @@ use std::mem::{offset_of, size_of};
 
 use bytemuck::{Pod, Zeroable};
 
+/// Two floats in scalar layout: 8 bytes.
+#[expect(non_camel_case_types, reason = "GLSL's name")]
+pub type vec2 = [f32; 2];
 /// Three floats in scalar layout: 12 bytes.
 #[expect(non_camel_case_types, reason = "GLSL's name")]
 pub type vec3 = [f32; 3];
@@ -105,6 +108,8 @@ structs! {
         environment_sin_rotation: float,
         /// Normalisation of the environment's density, see `environment_pdf`.
         environment_total: float,
+        /// Columns of the alias table over lamps.
+        lamp_count: uint,
     }
 
     /// A ray to trace for its closest hit.
@@ -115,15 +120,16 @@ structs! {
         is_active: uint,
         /// Unit direction.
         direction: vec3,
-        /// Unused by traversal; pads rays to 32 bytes.
-        reserved: uint,
+        /// Density of the BRDF's sampling in this direction, per steradian; 0 if no other technique
+        /// samples the light that the ray meets: camera rays, and those from specular surfaces.
+        brdf_pdf: float,
     }
 
     /// Intersection of a ray with a surface; both normals are on the side of the ray's origin.
     struct Hit {
         /// Point on the triangle, metres, from barycentric coordinates.
         position: vec3,
-        /// Material index, or `NO_MATERIAL` without a hit.
+        /// Material index, or `NO_MATERIAL` where no light is sampled.
         material: uint,
         /// Unit normal of the triangle, turned toward the ray's origin.
         geometric_normal: vec3,
@@ -131,8 +137,46 @@ structs! {
         distance: float,
         /// Unit interpolated normal, turned toward the ray's origin, with a positive cosine to it.
         shading_normal: vec3,
-        /// Triangle in BVH order.
+        /// Triangle in BVH order, or `NO_TRIANGLE` without a hit.
         triangle: uint,
+    }
+
+    /// Properties of the surface at a hit that textures vary.
+    struct Surface {
+        /// [`Material::reflectance`] there.
+        reflectance: vec3,
+        /// GGX width α there.
+        alpha: float,
+        /// Share of metal there, of a principled material.
+        metallic: float,
+    }
+
+    /// Light without a surface.
+    struct Lamp {
+        /// `LAMP_…`.
+        kind: uint,
+        /// Place, metres.
+        position: vec3,
+        /// Unit direction of the light along the axis.
+        direction: vec3,
+        /// Radiant intensity along the axis; irradiance of a directional lamp.
+        intensity: vec3,
+        /// Cosine of the inner angle; for a falloff linear in the angle, that angle.
+        inner: float,
+        /// Cosine of the outer angle; for a falloff linear in the angle, that angle.
+        outer: float,
+    }
+
+    /// Column of the alias table over lamps and emitting triangles.
+    struct LampChoice {
+        /// The column keeps `source` if a number of 32 bits is below this.
+        threshold: uint,
+        /// Column drawn otherwise.
+        alias: uint,
+        /// Triangle in BVH order, or `LAMP_BIT` and a lamp.
+        source: uint,
+        /// Probability with which the table draws `source`.
+        probability: float,
     }
 
     /// Direction sampled at a hit, with its contribution if the environment is visible there.
@@ -207,6 +251,57 @@ structs! {
         reserved: vec3,
     }
 
+    /// Texture as a property of a material reads it: value = scale · texel + bias.
+    struct TextureUse {
+        /// First word of its texels among those of all textures.
+        first_word: uint,
+        /// Width in texels.
+        width: uint,
+        /// Height in texels.
+        height: uint,
+        /// `TEXTURE_…`: format, encoding, interpolation, set of coordinates, continuation, channel.
+        flags: uint,
+        /// Image coordinate u, 0 to 1 from left to right, is the scalar product with (u, v, 1).
+        image_u: vec3,
+        /// Image coordinate v, 0 to 1 from top to bottom, likewise.
+        image_v: vec3,
+        /// Factor.
+        scale: vec3,
+        /// Added after the factor.
+        bias: vec3,
+    }
+
+    /// Properties of a material beside its reflection model; textures are indices of uses, or
+    /// `NO_TEXTURE`.
+    struct MaterialSurface {
+        /// Factor of the model's colour.
+        color: uint,
+        /// Factor of the roughness √α.
+        roughness: uint,
+        /// Factor of the metallic share.
+        metallic: uint,
+        /// Normals in the tangent frame.
+        normal: uint,
+        /// Factor of the opacity.
+        opacity: uint,
+        /// Factor of the emitted radiance.
+        emission: uint,
+        /// Factor of the tangential components of `normal`.
+        normal_scale: float,
+        /// Opacity without its texture.
+        opacity_factor: float,
+        /// Opacity from which the surface is opaque, and below which it is not there; −1 blends.
+        opacity_cutoff: float,
+        /// Emitted radiance without its texture, linear Rec.709; 0 without emission.
+        emission_radiance: vec3,
+        /// Bits `SURFACE_…`.
+        flags: uint,
+        /// Density of sampling points on its emitting triangles, per square metre.
+        emission_density: float,
+        /// Zero; pads the last of four texels of four words.
+        reserved: vec2,
+    }
+
     /// Push constants of the passes over a wave of paths. Path `i` belongs to sample `first_sample + i
     /// / pixel_count` of the pixel at `first_pixel + (i % pixel_count) · pixel_stride` in film order.
     struct Wave {
@@ -238,6 +333,9 @@ structs! {
         epoch_seed: uint,
         /// First sample after the last rebuild.
         epoch_start: uint,
+        /// 1 if the shadow rays lead to lamps: they end there, and their directions are not unit
+        /// vectors but lead from the surface to the lamp.
+        to_lamps: uint,
     }
 
     /// Cells that a path's bounces teach.

@@ -1,56 +1,200 @@
 //! Image files → [`Texture`]: PNG, JPEG, TGA, Radiance `.hdr` and OpenEXR.
+//!
+//! The uses of a texture say how its colours are encoded. Statements of the file about that, as PNG's
+//! `gAMA`, `cHRM` and `iCCP`, count for nothing, as glTF 2.0 demands (section 3.9.2); an image that is
+//! turned by Exif metadata stays as it is stored.
 
 use std::{io::Cursor, path::Path};
 
 use half::f16;
-use image::{DynamicImage, ImageFormat, ImageReader};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
-use super::{Texels, Texture};
+use super::{Texels, Texture, exr};
 use crate::{
     error::{Error, Result},
     files,
 };
 
+/// Longest side of a texture, texels.
+pub const MAX_TEXTURE_SIDE: u32 = 16_384;
+
+/// Most bytes that a decoder may allocate: the largest image in floats of 32 bits.
+const MAX_DECODER_BYTES: u64 = 16 * (MAX_TEXTURE_SIDE as u64).pow(2);
+
 impl Texture {
-    /// Reads an image file; its content tells the format, and the extension where it does not.
+    /// Reads an image file; its content tells the format, and the extension where it does not. The
+    /// log receives the warnings of [`Texture::load_with`].
     ///
     /// # Errors
-    /// [`Error::Io`] if the file cannot be read, [`Error::Format`] if it is no image.
+    /// As [`Texture::load_with`].
     pub fn load(path: &Path) -> Result<Self> {
+        let mut warnings = Vec::new();
+        let texture = Self::load_with(path, &mut warnings)?;
+        warnings.iter().for_each(|warning| log::warn!("{warning}"));
+        Ok(texture)
+    }
+
+    /// As [`Texture::load`], with a warning if values of an HDR or EXR image are negative or not a
+    /// number, which become 0, or above the largest half, which become that.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the file cannot be read, [`Error::Format`] if it is no image, is damaged, or
+    /// has more than [`MAX_TEXTURE_SIDE`] texels a side.
+    pub fn load_with(path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
         let format = ImageFormat::from_extension(files::extension(path));
-        decode(&path.display().to_string(), &files::read(path)?, format)
+        decode(&path.display().to_string(), &files::read(path)?, format, warnings)
             .map_err(|message| Error::format(path, message))
     }
 
-    /// Decodes an image inside another file; `name` says where it is.
+    /// Decodes an image inside another file; `name` says where it is. The log receives the warnings
+    /// of [`Texture::decode_with`].
     ///
     /// # Errors
-    /// A message for bytes that are no image.
+    /// As [`Texture::decode_with`].
     pub fn decode(name: &str, bytes: &[u8]) -> Result<Self, String> {
-        decode(name, bytes, None)
+        let mut warnings = Vec::new();
+        let texture = Self::decode_with(name, bytes, &mut warnings)?;
+        warnings.iter().for_each(|warning| log::warn!("{warning}"));
+        Ok(texture)
+    }
+
+    /// As [`Texture::load_with`] for an image inside another file; `name` says where it is.
+    ///
+    /// # Errors
+    /// A message for bytes that are no image, or a damaged or too large one.
+    pub fn decode_with(
+        name: &str,
+        bytes: &[u8],
+        warnings: &mut Vec<String>,
+    ) -> Result<Self, String> {
+        decode(name, bytes, None, warnings)
     }
 }
 
-fn decode(name: &str, bytes: &[u8], format: Option<ImageFormat>) -> Result<Texture, String> {
+/// Checks the size that a header states, before memory is allocated for it. `ratio` is the largest
+/// compression of the format.
+pub(super) fn check_size(
+    size: [u64; 2],
+    texel_bytes: u64,
+    file_bytes: usize,
+    ratio: u64,
+) -> Result<(), String> {
+    let [width, height] = size;
+    if !size.iter().all(|side| (1..=u64::from(MAX_TEXTURE_SIDE)).contains(side)) {
+        return Err(format!(
+            "expected an image of 1 to {MAX_TEXTURE_SIDE} texels a side, found {width}×{height}: \
+             make it smaller"
+        ));
+    }
+    files::check_promise(size, texel_bytes, file_bytes as u64, ratio)
+        .map_err(|message| format!("not a readable image: {message}"))
+}
+
+fn decode(
+    name: &str,
+    bytes: &[u8],
+    format: Option<ImageFormat>,
+    warnings: &mut Vec<String>,
+) -> Result<Texture, String> {
     let guessed = image::guess_format(bytes).ok().or(format);
-    let format =
-        guessed.ok_or("expected a PNG, JPEG, TGA, HDR or EXR image, found another file")?;
-    let image = ImageReader::with_format(Cursor::new(bytes), format)
-        .decode()
-        .map_err(|error| format!("not a readable image: {error}"))?;
-    let is_bytes = matches!(
-        image,
-        DynamicImage::ImageLuma8(_)
-            | DynamicImage::ImageLumaA8(_)
-            | DynamicImage::ImageRgb8(_)
-            | DynamicImage::ImageRgba8(_)
-    );
-    let texels = if is_bytes {
-        Texels::Bytes(image.to_rgba8().pixels().map(|pixel| pixel.0).collect())
-    } else {
-        Texels::Halves(
-            image.to_rgba32f().pixels().map(|pixel| pixel.0.map(f16::from_f32)).collect(),
-        )
+    let ratio = match guessed {
+        Some(ImageFormat::OpenExr) => return exr::decode(name, bytes, warnings),
+        // Deflate, times the growth of one bit of a palette to four bytes.
+        Some(ImageFormat::Png) => 1032 * 32,
+        // One bit for a block of 64 texels.
+        Some(ImageFormat::Jpeg) => 64 * 32,
+        // A run of 128 texels of four bytes in two bytes.
+        Some(ImageFormat::Tga) => 256,
+        // A run of 127 texels of four channels in two bytes each, and four bytes for one.
+        Some(ImageFormat::Hdr) => 255 * 4,
+        _ => {
+            return Err(
+                "expected a PNG, JPEG, TGA, HDR or EXR image, found another file".to_owned()
+            );
+        }
     };
-    Ok(Texture { name: name.to_owned(), width: image.width(), height: image.height(), texels })
+    let unreadable = |error: image::ImageError| format!("not a readable image: {error}");
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(MAX_DECODER_BYTES);
+    let mut reader = ImageReader::new(Cursor::new(bytes));
+    reader.limits(limits);
+    if let Some(format) = guessed {
+        reader.set_format(format);
+    }
+    let decoder = reader.into_decoder().map_err(unreadable)?;
+    let (width, height) = decoder.dimensions();
+    let texel_bytes = u64::from(decoder.color_type().bytes_per_pixel());
+    check_size([width, height].map(u64::from), texel_bytes, bytes.len(), ratio)?;
+    let image = DynamicImage::from_decoder(decoder).map_err(unreadable)?;
+    let texels = match image {
+        DynamicImage::ImageLuma8(_)
+        | DynamicImage::ImageLumaA8(_)
+        | DynamicImage::ImageRgb8(_)
+        | DynamicImage::ImageRgba8(_) => Texels::Bytes(fours(image.into_rgba8().into_raw())),
+        DynamicImage::ImageLuma16(_)
+        | DynamicImage::ImageLumaA16(_)
+        | DynamicImage::ImageRgb16(_)
+        | DynamicImage::ImageRgba16(_) => Texels::Shorts(fours(image.into_rgba16().into_raw())),
+        image => {
+            let mut repairs = Repairs::default();
+            let pixels = image.into_rgb32f();
+            let texels = pixels.pixels().map(|pixel| {
+                let [red, green, blue] = pixel.0;
+                repairs.texel([red, green, blue, 1.0])
+            });
+            let texels = Texels::Halves(texels.collect());
+            repairs.warn(name, warnings);
+            texels
+        }
+    };
+    Ok(Texture { name: name.to_owned(), width, height, texels })
+}
+
+/// Groups channels to texels, without a copy where the allocation allows it.
+fn fours<T: bytemuck::Pod>(channels: Vec<T>) -> Vec<[T; 4]>
+where
+    [T; 4]: bytemuck::Pod,
+{
+    bytemuck::allocation::try_cast_vec(channels)
+        .unwrap_or_else(|(_, channels)| channels.as_chunks::<4>().0.to_vec())
+}
+
+/// Counts of values of an image that no half can hold or no surface can have.
+#[derive(Default)]
+pub(super) struct Repairs {
+    invalid: usize,
+    clamped: usize,
+}
+
+impl Repairs {
+    /// Converts a texel: values that are negative or not a number become 0, those above the largest
+    /// half become that, and opacity is brought to 0…1.
+    pub(super) fn texel(&mut self, [red, green, blue, alpha]: [f32; 4]) -> [f16; 4] {
+        let mut value = |value: f32, most: f32| {
+            if value.is_nan() || value < 0.0 {
+                self.invalid += 1;
+                return f16::ZERO;
+            }
+            self.clamped += usize::from(value > most);
+            f16::from_f32(value.min(most))
+        };
+        let most = f16::MAX.to_f32();
+        [value(red, most), value(green, most), value(blue, most), value(alpha, 1.0)]
+    }
+
+    /// One warning for each kind of repair.
+    pub(super) fn warn(&self, name: &str, warnings: &mut Vec<String>) {
+        let Self { invalid, clamped } = self;
+        if *invalid > 0 {
+            warnings.push(format!(
+                "{name}: {invalid} values are negative or not a number and were set to 0"
+            ));
+        }
+        if *clamped > 0 {
+            warnings.push(format!(
+                "{name}: {clamped} values are above {}, or opacities above 1, and were set to that",
+                f16::MAX
+            ));
+        }
+    }
 }

@@ -1,8 +1,17 @@
 //! Images on surfaces: texels, and how a material reads them.
 
+mod cache;
 mod decode;
+mod exr;
+pub mod lookup;
+mod mean;
+pub mod tables;
 
 use std::sync::Arc;
+
+pub use cache::TextureCache;
+pub use decode::MAX_TEXTURE_SIDE;
+pub use tables::TextureTables;
 
 /// Image whose texels vary a property of a material over a surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,11 +31,13 @@ pub struct Texture {
 pub enum Texels {
     /// 8 bits per channel, 255 for one; [`TextureUse::encoding`] tells how to read the colours.
     Bytes(Vec<[u8; 4]>),
+    /// 16 bits per channel, 65,535 for one; [`TextureUse::encoding`] tells how to read the colours.
+    Shorts(Vec<[u16; 4]>),
     /// Linear values in half precision.
     Halves(Vec<[half::f16; 4]>),
 }
 
-/// Meaning of the colours of [`Texels::Bytes`]; opacity is always linear.
+/// Meaning of the colours of [`Texels::Bytes`] and [`Texels::Shorts`]; opacity is always linear.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Encoding {
     /// IEC 61966-2-1.
@@ -81,7 +92,7 @@ pub struct TextureUse {
     pub texture: Arc<Texture>,
     /// Channels to read.
     pub channels: Channels,
-    /// Meaning of 8-bit colours.
+    /// Meaning of colours of 8 or 16 bits.
     pub encoding: Encoding,
     /// Set of texture coordinates, 0 or 1.
     pub uv_set: u32,

@@ -84,6 +84,17 @@ pub fn run_probe(
     output_bytes: usize,
     invocations: u32,
 ) -> Vec<u8> {
+    run_specialized_probe(spirv, &[], buffers, output_bytes, invocations)
+}
+
+/// As [`run_probe`], with specialization constants.
+pub fn run_specialized_probe(
+    spirv: &[u8],
+    constants: &[(u32, u32)],
+    buffers: &[(Binding, &[u8])],
+    output_bytes: usize,
+    invocations: u32,
+) -> Vec<u8> {
     let device = device();
     let upload = |(binding, bytes): &(Binding, &[u8])| {
         (*binding, Buffer::from_slice(device, binding.name, bytes).unwrap())
@@ -100,7 +111,7 @@ pub fn run_probe(
             (!buffers.is_empty()).then(|| DescriptorSet::new(device, table, &buffers).unwrap())
         })
         .collect();
-    let pipeline = Pipeline::new(device, "probe", spirv, &[]).unwrap();
+    let pipeline = Pipeline::new(device, "probe", spirv, constants).unwrap();
     let mut commands = Commands::begin(device).unwrap();
     commands.dispatch(
         &pipeline,

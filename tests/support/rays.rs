@@ -5,10 +5,10 @@
 use fenestra::{
     accel::Accel,
     gpu::{Buffer, Commands, DescriptorSet},
-    pass::{GeometryBuffers, Pass, Schedule},
+    pass::{GeometryBuffers, Pass, Schedule, Surfaces},
     scene::Geometry,
     shader::{
-        bindings::{FILM, SCENE, WAVE, film, wave as bindings},
+        bindings::{Binding, BindingTable, FILM, SCENE, WAVE, film, wave as bindings},
         structs::{Counters, Hit, Ray, ShadowRay, Wave},
     },
 };
@@ -105,16 +105,31 @@ pub fn scaled(geometry: &Geometry, scale: f32) -> Geometry {
 }
 
 pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
-    Ray { origin: origin.into(), is_active: 1, direction: direction.into(), reserved: 0 }
+    Ray { origin: origin.into(), is_active: 1, direction: direction.into(), brdf_pdf: 0.0 }
 }
 
 fn wave(paths: usize, shadow_ray_count: u32) -> Wave {
     Wave { pixel_count: paths as u32, sample_count: 1, shadow_ray_count, ..Wave::default() }
 }
 
+/// Makes a set of `table` with `buffers`, and with `spare` where a pass names a buffer that it does not
+/// touch in these scenes.
+fn set(
+    table: &'static BindingTable,
+    buffers: &[(Binding, &Buffer)],
+    spare: &Buffer,
+) -> DescriptorSet {
+    let is_free =
+        |binding: &&Binding| !buffers.iter().any(|(other, _)| other.number == binding.number);
+    let mut all = buffers.to_vec();
+    all.extend(table.bindings.iter().filter(is_free).map(|binding| (*binding, spare)));
+    DescriptorSet::new(crate::support::device(), table, &all).unwrap()
+}
+
 /// Geometry on the shared device.
 pub struct OnDevice {
     geometry: GeometryBuffers,
+    spare: Buffer,
     scene: DescriptorSet,
     counters: Buffer,
     film: DescriptorSet,
@@ -124,10 +139,11 @@ impl OnDevice {
     pub fn new(accel: &Accel) -> Self {
         let device = crate::support::device();
         let geometry = GeometryBuffers::new(device, accel).unwrap();
-        let scene = DescriptorSet::new(device, &SCENE, &geometry.bindings()).unwrap();
+        let spare = Buffer::zeroed(device, "spare", 256).unwrap();
+        let scene = set(&SCENE, &geometry.bindings(), &spare);
         let counters = Buffer::zeroed(device, "counters", size_of::<Counters>() as u64).unwrap();
         let film = DescriptorSet::new(device, &FILM, &[(film::COUNTERS, &counters)]).unwrap();
-        Self { geometry, scene, counters, film }
+        Self { geometry, spare, scene, counters, film }
     }
 
     /// Returns the number of rays given up so far.
@@ -140,13 +156,11 @@ impl OnDevice {
         let device = crate::support::device();
         let ray_buffer = Buffer::from_slice(device, "rays", rays).unwrap();
         let hits = Buffer::zeroed(device, "hits", (size_of::<Hit>() * rays.len()) as u64).unwrap();
-        let wave_set = DescriptorSet::new(
-            device,
-            &WAVE,
-            &[(bindings::RAY_TEXELS, &ray_buffer), (bindings::HITS, &hits)],
-        )
-        .unwrap();
-        let pass = Pass::new(device, self.geometry.traversal().trace(schedule)).unwrap();
+        let own = [(bindings::RAY_TEXELS, &ray_buffer), (bindings::HITS, &hits)];
+        let wave_set = set(&WAVE, &own, &self.spare);
+        let pass =
+            Pass::new(device, self.geometry.traversal().trace(schedule, Surfaces::default()))
+                .unwrap();
         let mut commands = Commands::begin(device).unwrap();
         pass.record(&mut commands, &[&self.scene, &wave_set, &self.film], &wave(rays.len(), 0));
         commands.submit_and_wait().unwrap();
@@ -162,17 +176,15 @@ impl OnDevice {
         let visibility =
             Buffer::from_slice(device, "visibility", &vec![0xdead_beef_u32; shadow_rays.len()])
                 .unwrap();
-        let wave_set = DescriptorSet::new(
-            device,
-            &WAVE,
-            &[
-                (bindings::HIT_TEXELS, &hit_buffer),
-                (bindings::SHADOW_RAY_TEXELS, &ray_buffer),
-                (bindings::VISIBILITY, &visibility),
-            ],
-        )
-        .unwrap();
-        let pass = Pass::new(device, self.geometry.traversal().shadow(schedule)).unwrap();
+        let own = [
+            (bindings::HIT_TEXELS, &hit_buffer),
+            (bindings::SHADOW_RAY_TEXELS, &ray_buffer),
+            (bindings::VISIBILITY, &visibility),
+        ];
+        let wave_set = set(&WAVE, &own, &self.spare);
+        let pass =
+            Pass::new(device, self.geometry.traversal().shadow(schedule, Surfaces::default()))
+                .unwrap();
         let mut commands = Commands::begin(device).unwrap();
         let directions = (shadow_rays.len() / hits.len()) as u32;
         let wave = wave(hits.len(), directions);

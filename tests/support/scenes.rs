@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use fenestra::{
     brdf::{
         Material,
-        material::{ConductorFresnel, MaterialKind},
+        material::{ConductorFresnel, Emission, MaterialKind},
     },
-    scene::{Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Scene},
+    scene::{Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Lamp, Scene, lamp::LampKind},
 };
 use glam::Vec3;
 
@@ -232,4 +232,42 @@ pub fn room(materials: Vec<Material>) -> Scene {
         materials,
         geometry,
     )
+}
+
+/// Makes a [`room`] whose window has a pane, with a glass sphere, a mirror box, a lamp under the
+/// ceiling, a glowing box and a sheet that is half opaque.
+pub fn glazed_room() -> Scene {
+    let glass = MaterialKind::Dielectric {
+        ior: 1.5,
+        alpha: 0.0,
+        reflectance: Vec3::ONE,
+        transmittance: Vec3::splat(0.9),
+    };
+    let pane = MaterialKind::ThinDielectric {
+        ior: 1.5,
+        reflectance: Vec3::ONE,
+        transmittance: Vec3::new(0.8, 0.9, 0.85),
+    };
+    let mut glowing = diffuse(Vec3::splat(0.5));
+    let radiance = Vec3::new(6.0, 4.0, 2.0);
+    glowing.surface.emission = Some(Emission { radiance, texture: None, two_sided: false });
+    let mut sheet = diffuse(Vec3::new(0.2, 0.6, 0.3));
+    sheet.surface.opacity.factor = 0.5;
+    let mut scene = room(vec![
+        diffuse(Vec3::splat(0.6)),
+        Material::new("mirror", MaterialKind::Mirror { reflectance: Vec3::splat(0.9) }),
+        Material::new("glass", glass),
+        Material::new("pane", pane),
+        glowing,
+        sheet,
+    ]);
+    add_box(&mut scene.geometry, Vec3::new(-2.1, 1.4, 0.0), Vec3::new(0.02, 1.2, 1.2), 3);
+    add_box(&mut scene.geometry, Vec3::new(1.2, 0.2, 0.6), Vec3::splat(0.2), 4);
+    add_box(&mut scene.geometry, Vec3::new(-1.0, 1.0, 0.9), Vec3::new(0.6, 0.6, 0.01), 5);
+    let position = Vec3::new(0.3, 2.3, 0.4);
+    let kind = LampKind::Point { position, intensity: Vec3::splat(1.5) };
+    scene.lamps.push(Lamp { name: "lamp".into(), kind });
+    scene.name = "glazed_room".into();
+    scene.hash = scene.name.clone();
+    scene
 }

@@ -3,12 +3,12 @@
 
 use super::parameters::GuidedParameters;
 use crate::{
-    pass::{Domain, Kernel, PassSettings, Steps},
+    pass::{Domain, Kernel, PassSettings, Steps, Surfaces},
     shader::{
         constants::{
             AOV_GUIDE_CELL, CONSTANT_BOUNCE_CANDIDATES, CONSTANT_BRDF_CANDIDATES,
-            CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS, CONSTANT_ROULETTE_VERTEX,
-            GUIDE_SAMPLES_THAT_ALL_TEACH, GUIDE_TEACHING_STEP,
+            CONSTANT_CANDIDATES, CONSTANT_ROULETTE_VERTEX, GUIDE_SAMPLES_THAT_ALL_TEACH,
+            GUIDE_TEACHING_STEP,
         },
         structs::Wave,
     },
@@ -21,7 +21,7 @@ pub struct GuidedSteps {
     pub candidates: u32,
     parameters: GuidedParameters,
     guides_bounces: bool,
-    material_kinds: u32,
+    surfaces: Surfaces,
     roulette_vertex: u32,
 }
 
@@ -32,7 +32,7 @@ impl GuidedSteps {
             candidates,
             parameters,
             guides_bounces: parameters.guides_bounces(settings.depth),
-            material_kinds: settings.material_kinds,
+            surfaces: settings.surfaces,
             roulette_vertex: settings.roulette_vertex,
         }
     }
@@ -49,11 +49,11 @@ impl Steps for GuidedSteps {
     }
 
     fn sample(&self, wave: &Wave) -> Vec<Kernel> {
-        let constants = [
+        let own = [
             (CONSTANT_CANDIDATES, self.candidates),
             (CONSTANT_BRDF_CANDIDATES, (self.candidates / 4).max(1)),
-            (CONSTANT_MATERIAL_KINDS, self.material_kinds),
         ];
+        let constants = [&own[..], &self.surfaces.constants()].concat();
         let mut kernels = vec![Kernel::new("sample_guided", Domain::Paths, &constants)];
         let has_arrived = wave.vertex > 0 && wave.first_shadow_ray == 0;
         if self.guides_bounces && has_arrived && teaches(wave) {
@@ -73,11 +73,11 @@ impl Steps for GuidedSteps {
     }
 
     fn bounce(&self, _wave: &Wave) -> Option<Kernel> {
-        let constants = [
+        let own = [
             (CONSTANT_BOUNCE_CANDIDATES, self.parameters.bounce_candidates),
             (CONSTANT_ROULETTE_VERTEX, self.roulette_vertex),
-            (CONSTANT_MATERIAL_KINDS, self.material_kinds),
         ];
+        let constants = [&own[..], &self.surfaces.constants()].concat();
         self.guides_bounces.then(|| Kernel::new("bounce_guided", Domain::Paths, &constants))
     }
 }

@@ -58,7 +58,7 @@ impl Room for GuidedRoom {
         let mut guided = Guided {
             buffers: GuideBuffers::new(runner.device(), scene, &own, size)?,
             steps: GuidedSteps::new(first_candidates(parameters)?, own, settings),
-            open_steps: basic::MIS.steps(parameters, settings.material_kinds)?,
+            open_steps: basic::MIS.steps(parameters, settings.surfaces)?,
             given_candidates: parameters.candidates,
             choice: Choice::default(),
             is_trained: false,

@@ -5,13 +5,13 @@ use super::{
     parameters::{Elevation, LobeOrder, ProductParameters},
 };
 use crate::{
-    pass::{Domain, Kernel, Steps},
+    pass::{Domain, Kernel, Steps, Surfaces},
     shader::{
         constants::{
             CONSTANT_BRDF_LOBES, CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_LOBES,
-            CONSTANT_ENVIRONMENT_SHARE, CONSTANT_KEPT_LOBES, CONSTANT_MATERIAL_KINDS,
-            CONSTANT_METROPOLIS, CONSTANT_ORDER_BY_COEFFICIENT, CONSTANT_SAMPLER,
-            CONSTANT_STRONGEST_ENVIRONMENT_LOBE, CONSTANT_VIEWS, SAMPLER_PRODUCT,
+            CONSTANT_ENVIRONMENT_SHARE, CONSTANT_KEPT_LOBES, CONSTANT_METROPOLIS,
+            CONSTANT_ORDER_BY_COEFFICIENT, CONSTANT_SAMPLER, CONSTANT_STRONGEST_ENVIRONMENT_LOBE,
+            CONSTANT_VIEWS, SAMPLER_PRODUCT,
         },
         structs::Wave,
     },
@@ -24,8 +24,8 @@ pub struct ProductSteps {
     pub parameters: ProductParameters,
     /// Sizes of the fits.
     pub fits: FitSizes,
-    /// Bit `1 << kind` for every kind of material in the scene.
-    pub material_kinds: u32,
+    /// Specialization by the surfaces of the scene.
+    pub surfaces: Surfaces,
     /// Tag of the sampler, `SAMPLER_…`.
     pub sampler: u32,
     /// Specialization of the visibility cache; empty without one.
@@ -34,8 +34,8 @@ pub struct ProductSteps {
 
 impl ProductSteps {
     /// Returns the steps of `product`.
-    pub fn new(parameters: ProductParameters, fits: FitSizes, material_kinds: u32) -> Self {
-        Self { parameters, fits, material_kinds, sampler: SAMPLER_PRODUCT, cache: Vec::new() }
+    pub fn new(parameters: ProductParameters, fits: FitSizes, surfaces: Surfaces) -> Self {
+        Self { parameters, fits, surfaces, sampler: SAMPLER_PRODUCT, cache: Vec::new() }
     }
 
     /// Makes a kernel over paths that knows lobes and cache.
@@ -67,15 +67,12 @@ impl Steps for ProductSteps {
 
     fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
         let walks = self.parameters.elevation == Elevation::Metropolis;
-        vec![self.kernel(
-            "sample_lobes",
-            &[
-                (CONSTANT_SAMPLER, self.sampler),
-                (CONSTANT_BRDF_SHARE, self.parameters.brdf_share.to_bits()),
-                (CONSTANT_ENVIRONMENT_SHARE, self.parameters.environment_share.to_bits()),
-                (CONSTANT_METROPOLIS, u32::from(walks)),
-                (CONSTANT_MATERIAL_KINDS, self.material_kinds),
-            ],
-        )]
+        let own = [
+            (CONSTANT_SAMPLER, self.sampler),
+            (CONSTANT_BRDF_SHARE, self.parameters.brdf_share.to_bits()),
+            (CONSTANT_ENVIRONMENT_SHARE, self.parameters.environment_share.to_bits()),
+            (CONSTANT_METROPOLIS, u32::from(walks)),
+        ];
+        vec![self.kernel("sample_lobes", &[&own[..], &self.surfaces.constants()].concat())]
     }
 }

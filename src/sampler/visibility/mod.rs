@@ -62,7 +62,7 @@ impl Room for VisibilityRoom {
             parameters.visibility,
             parameters.product,
             fits.sizes(),
-            settings.material_kinds,
+            settings.surfaces,
             settings.shadow_rays,
         );
         let window = runner.scene().window();

@@ -2,7 +2,7 @@
 
 use super::parameters::{CacheScope, Threshold, VisibilityParameters};
 use crate::{
-    pass::{Domain, Kernel, Steps},
+    pass::{Domain, Kernel, Steps, Surfaces},
     sampler::product::{FitSizes, ProductParameters, ProductSteps},
     shader::{
         constants::{
@@ -27,7 +27,7 @@ impl VisibilitySteps {
         parameters: VisibilityParameters,
         product: ProductParameters,
         fits: FitSizes,
-        material_kinds: u32,
+        surfaces: Surfaces,
         shadow_rays: u32,
     ) -> Self {
         let VisibilityParameters { exponent, threshold_scale, threshold, cache, .. } = parameters;
@@ -41,7 +41,7 @@ impl VisibilitySteps {
         let product = ProductSteps {
             sampler: SAMPLER_VISIBILITY,
             cache: constants,
-            ..ProductSteps::new(product, fits, material_kinds)
+            ..ProductSteps::new(product, fits, surfaces)
         };
         Self { product, scope: cache }
     }

@@ -2,13 +2,27 @@
 //!
 //! Every table rejects unknown keys; errors carry the line and column of the key or value.
 
+mod lamp;
+mod material;
 mod read;
+mod value;
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
-use serde::{
-    Deserialize, Deserializer,
-    de::{Visitor, value},
+use serde::Deserialize;
+
+pub use lamp::{
+    DirectionalEntry, LampEntry, LampKindEntry, PointEntry, SpotEntry, SpotFalloffEntry,
+};
+pub use material::{
+    ConductorEntry, DielectricEntry, DiffuseEntry, MaterialEntry, MaterialKeys, MaterialKindEntry,
+    MeasuredEntry, MirrorEntry, PlasticEntry, PrincipledEntry, ThinDielectricEntry,
+};
+pub use value::{
+    ChannelEntry, InterpolationEntry, NumberOr, NumberOrVector, TextureEntry, Textured, WrapEntry,
 };
 
 use super::{
@@ -25,12 +39,16 @@ pub struct SceneFile {
     pub camera: CameraEntry,
     /// `[film]`.
     pub film: FilmSettings,
-    /// `[environment]`.
-    pub environment: EnvironmentEntry,
+    /// `[environment]`; black without.
+    pub environment: Option<EnvironmentEntry>,
+    /// Every `[[lamp]]`, in file order.
+    pub lamps: Vec<LampEntry>,
     /// Every `[[material]]`, in file order.
     pub materials: Vec<MaterialEntry>,
     /// Every `[[object]]`, in file order.
     pub objects: Vec<ObjectEntry>,
+    /// Every `[[include]]`, in file order.
+    pub includes: Vec<IncludeEntry>,
 }
 
 /// `[camera]`.
@@ -81,81 +99,6 @@ fn default_environment_scale() -> f32 {
     1.0
 }
 
-/// One `[[material]]`.
-#[derive(Clone, Debug)]
-pub struct MaterialEntry {
-    /// Line of the entry, from 1.
-    pub line: usize,
-    /// Name that objects refer to.
-    pub name: String,
-    /// Model and its parameters.
-    pub kind: MaterialKindEntry,
-}
-
-/// Keys of a `[[material]]` that depend on its `type`.
-#[derive(Clone, Debug)]
-pub enum MaterialKindEntry {
-    /// `diffuse`.
-    Diffuse(DiffuseEntry),
-    /// `plastic`.
-    Plastic(PlasticEntry),
-    /// `conductor`.
-    Conductor(ConductorEntry),
-    /// `measured`.
-    Measured(MeasuredEntry),
-}
-
-/// Keys of a `diffuse` material.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DiffuseEntry {
-    /// Albedo, 0…1.
-    pub reflectance: [f32; 3],
-}
-
-/// Keys of a `plastic` material.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PlasticEntry {
-    /// Albedo of the base, 0…1.
-    pub diffuse: [f32; 3],
-    /// GGX width.
-    pub alpha: Option<f32>,
-    /// √α, an alternative to `alpha`.
-    pub roughness: Option<f32>,
-    /// Refractive index of the coat.
-    #[serde(default = "default_ior")]
-    pub ior: f32,
-}
-
-fn default_ior() -> f32 {
-    1.5
-}
-
-/// Keys of a `conductor` material; either `reflectance` or `eta` and `k`.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ConductorEntry {
-    /// GGX width.
-    pub alpha: Option<f32>,
-    /// √α, an alternative to `alpha`.
-    pub roughness: Option<f32>,
-    /// Reflectance at normal incidence, 0…1 (Schlick).
-    pub reflectance: Option<[f32; 3]>,
-    /// Real part of the refractive index (exact Fresnel).
-    pub eta: Option<[f32; 3]>,
-    /// Extinction coefficient (exact Fresnel).
-    pub k: Option<[f32; 3]>,
-}
-
-/// Keys of a `measured` material.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MeasuredEntry {
-    /// MERL or Cornell file, relative to the scene file.
-    pub file: PathBuf,
-}
-
 /// One `[[object]]`.
 #[derive(Debug)]
 pub struct ObjectEntry {
@@ -189,46 +132,33 @@ pub enum ObjectSource {
     },
 }
 
-/// One number for all axes, or one per axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NumberOrVector(pub [f32; 3]);
-
-impl Default for NumberOrVector {
-    fn default() -> Self {
-        Self([1.0; 3])
-    }
+/// One `[[include]]`.
+#[derive(Debug)]
+pub struct IncludeEntry {
+    /// Line of the entry, from 1.
+    pub line: usize,
+    /// Its keys.
+    pub keys: IncludeKeys,
 }
 
-impl<'de> Deserialize<'de> for NumberOrVector {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct NumberOrVectorVisitor;
-
-        impl<'de> Visitor<'de> for NumberOrVectorVisitor {
-            type Value = NumberOrVector;
-
-            fn expecting(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
-                formatter.write_str("a number or an array of three numbers")
-            }
-
-            fn visit_f64<E>(self, number: f64) -> Result<Self::Value, E> {
-                Ok(NumberOrVector([number as f32; 3]))
-            }
-
-            fn visit_i64<E>(self, number: i64) -> Result<Self::Value, E> {
-                Ok(NumberOrVector([number as f32; 3]))
-            }
-
-            fn visit_seq<A: serde::de::SeqAccess<'de>>(
-                self,
-                sequence: A,
-            ) -> Result<Self::Value, A::Error> {
-                <[f32; 3]>::deserialize(value::SeqAccessDeserializer::new(sequence))
-                    .map(NumberOrVector)
-            }
-        }
-
-        deserializer.deserialize_any(NumberOrVectorVisitor)
-    }
+/// Keys of `[[include]]`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct IncludeKeys {
+    /// glTF or OBJ file with everything in it but its cameras, relative to the scene file.
+    pub file: PathBuf,
+    /// Factor along each axis, or one for all; applied first.
+    #[serde(default)]
+    pub scale: NumberOrVector,
+    /// Rotations about X, then Y, then Z, degrees.
+    #[serde(default)]
+    pub rotate_deg: [f32; 3],
+    /// Translation, metres, applied last.
+    #[serde(default)]
+    pub translate: [f32; 3],
+    /// Materials of the scene in place of materials of the file: `{ glass = "pane" }`.
+    #[serde(default)]
+    pub materials: BTreeMap<String, String>,
 }
 
 impl SceneFile {

@@ -16,8 +16,8 @@ use toml::{
 };
 
 use super::{
-    CameraEntry, EnvironmentEntry, MaterialEntry, MaterialKindEntry, NumberOrVector, ObjectEntry,
-    ObjectSource, SceneFile,
+    CameraEntry, EnvironmentEntry, IncludeEntry, LampEntry, LampKindEntry, MaterialEntry,
+    MaterialKeys, MaterialKindEntry, NumberOrVector, ObjectEntry, ObjectSource, SceneFile,
 };
 use crate::{
     error::{Result, TextError, line_and_column},
@@ -31,23 +31,32 @@ use crate::{
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ObjectKeys {
+    /// Name, for messages.
     name: Option<String>,
+    /// PLY, OBJ, glTF or GLB file, relative to the scene file; this or `shape`.
     mesh: Option<PathBuf>,
+    /// Procedural shape; the keys of each are below.
     shape: Option<Spanned<String>>,
+    /// Name of a material; may be absent where the mesh file brings its own.
     material: Option<String>,
+    /// Factor along each axis, or one for all; applied first.
     #[serde(default)]
     scale: NumberOrVector,
+    /// Rotations about X, then Y, then Z, degrees.
     #[serde(default)]
     rotate_deg: [f32; 3],
+    /// Translation, metres, applied last.
     #[serde(default)]
     translate: [f32; 3],
 }
 
-/// Keys of every `[[material]]`.
+/// Keys of every `[[lamp]]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct MaterialKeys {
-    name: String,
+struct LampKeys {
+    /// Name, for messages.
+    name: Option<String>,
+    /// Kind; the keys of each are below.
     r#type: Spanned<String>,
 }
 
@@ -58,7 +67,7 @@ struct RootKeys {
     camera: CameraEntry,
     #[serde(default)]
     film: FilmSettings,
-    environment: EnvironmentEntry,
+    environment: Option<EnvironmentEntry>,
 }
 
 /// Reads a whole scene file.
@@ -66,24 +75,31 @@ pub(super) fn read_root(text: &str) -> Result<SceneFile, TextError> {
     let root = DeTable::parse(text)?;
     let span = root.span();
     let mut table = root.into_inner();
-    let known = ["camera", "film", "environment", "material", "object"];
+    let known = ["camera", "film", "environment", "lamp", "material", "object", "include"];
     refuse_unknown_keys(&table, &known, "the scene")?;
+    let lamps = take_array(&mut table, "lamp")?;
     let materials = take_array(&mut table, "material")?;
     let objects = take_array(&mut table, "object")?;
+    let includes = take_array(&mut table, "include")?;
     let root_keys: RootKeys = read_table(table, span)?;
     Ok(SceneFile {
         camera: root_keys.camera,
         film: root_keys.film,
         environment: root_keys.environment,
-        materials: materials
-            .into_iter()
-            .map(|entry| read_material(entry, text))
-            .collect::<Result<_, _>>()?,
-        objects: objects
-            .into_iter()
-            .map(|entry| read_object(entry, text))
-            .collect::<Result<_, _>>()?,
+        lamps: read_all(lamps, text, read_lamp)?,
+        materials: read_all(materials, text, read_material)?,
+        objects: read_all(objects, text, read_object)?,
+        includes: read_all(includes, text, read_include)?,
     })
+}
+
+/// Reads every entry of an array of tables.
+fn read_all<T>(
+    entries: Vec<Spanned<DeValue>>,
+    text: &str,
+    read: fn(Spanned<DeValue>, &str) -> Result<T, TextError>,
+) -> Result<Vec<T>, TextError> {
+    entries.into_iter().map(|entry| read(entry, text)).collect()
 }
 
 /// Removes the array of tables `key` from `table`; empty if there is none.
@@ -108,18 +124,54 @@ fn read_material(entry: Spanned<DeValue>, text: &str) -> Result<MaterialEntry, T
         "diffuse" => MaterialKindEntry::Diffuse(rest.read(&owner)?),
         "plastic" => MaterialKindEntry::Plastic(rest.read(&owner)?),
         "conductor" => MaterialKindEntry::Conductor(rest.read(&owner)?),
+        "principled" => MaterialKindEntry::Principled(rest.read(&owner)?),
+        "mirror" => MaterialKindEntry::Mirror(rest.read(&owner)?),
+        "dielectric" => MaterialKindEntry::Dielectric(rest.read(&owner)?),
+        "thin_dielectric" => MaterialKindEntry::ThinDielectric(rest.read(&owner)?),
         "measured" => MaterialKindEntry::Measured(rest.read(&owner)?),
         unknown => {
             return Err(TextError {
                 span: keys.r#type.span(),
                 message: format!(
                     "unknown material type `{unknown}`, expected one of `diffuse`, `plastic`, \
-                     `conductor`, `measured`"
+                     `conductor`, `principled`, `mirror`, `dielectric`, `thin_dielectric`, \
+                     `measured`"
                 ),
             });
         }
     };
-    Ok(MaterialEntry { line, name: keys.name, kind })
+    Ok(MaterialEntry { line, keys, kind })
+}
+
+fn read_lamp(entry: Spanned<DeValue>, text: &str) -> Result<LampEntry, TextError> {
+    let line = line_and_column(text, entry.span().start).0;
+    let (keys, rest): (LampKeys, _) = KindTable::split(entry, "[[lamp]]")?;
+    let type_name = keys.r#type.get_ref();
+    let label = keys.name.as_ref().map_or("lamp".to_owned(), |name| format!("lamp `{name}`"));
+    let owner = format!("{label} of type `{type_name}`");
+    let kind = match type_name.as_str() {
+        "point" => LampKindEntry::Point(rest.read(&owner)?),
+        "spot" => LampKindEntry::Spot(rest.read(&owner)?),
+        "directional" => LampKindEntry::Directional(rest.read(&owner)?),
+        unknown => {
+            return Err(TextError {
+                span: keys.r#type.span(),
+                message: format!(
+                    "unknown lamp type `{unknown}`, expected one of `point`, `spot`, `directional`"
+                ),
+            });
+        }
+    };
+    Ok(LampEntry { line, name: keys.name, kind })
+}
+
+fn read_include(entry: Spanned<DeValue>, text: &str) -> Result<IncludeEntry, TextError> {
+    let span = entry.span();
+    let line = line_and_column(text, span.start).0;
+    let DeValue::Table(table) = entry.into_inner() else {
+        return Err(TextError { span, message: "expected a table, `[[include]]`".to_owned() });
+    };
+    Ok(IncludeEntry { line, keys: read_table(table, span)? })
 }
 
 fn read_object(entry: Spanned<DeValue>, text: &str) -> Result<ObjectEntry, TextError> {

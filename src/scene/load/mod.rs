@@ -2,32 +2,26 @@
 //!
 //! Messages name the object or material and the line of its entry.
 
+mod include;
+mod light;
+mod materials;
 mod objects;
 mod whole;
 
-use std::{
-    collections::{BTreeMap, HashMap},
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
 use super::{
-    Camera, EnvironmentMap, FilmSettings, Geometry, Scene,
-    file::{
-        CameraEntry, ConductorEntry, EnvironmentEntry, MaterialEntry, MaterialKindEntry, SceneFile,
-    },
-};
-use crate::brdf::{
-    Material,
-    material::{ConductorFresnel, MaterialKind},
+    Camera, FilmSettings, Geometry, Scene,
+    file::{CameraEntry, SceneFile},
 };
 use crate::{
-    brdf::table::MeasuredTable,
+    brdf::{Material, material::MaterialKind},
     error::{Error, Result},
     files,
 };
+use light::Light;
 
 /// Largest width and height of the film, pixels.
 pub const MAX_FILM_SIDE: u32 = 16_384;
@@ -89,27 +83,19 @@ impl Scene {
         let mut warnings = Vec::new();
         let camera = loader.camera(&file.camera)?;
         loader.check_film(&file.film)?;
-        let mut materials = loader.materials(&file.materials, &mut warnings)?;
         let mut inputs = Vec::new();
-        let geometry =
+        let mut materials = loader.materials(&file.materials, &mut inputs, &mut warnings)?;
+        let mut geometry =
             loader.geometry(&file.objects, &mut materials, &mut inputs, &mut warnings)?;
-        inputs.extend(options.environment.clone());
-        inputs.extend(materials.iter().filter_map(|material| match &material.kind {
-            MaterialKind::Measured { path, .. } => Some(path.clone()),
-            _ => None,
-        }));
+        for entry in &file.includes {
+            loader.include(entry, &mut materials, &mut geometry, &mut inputs, &mut warnings)?;
+        }
         if materials.is_empty() {
             materials.push(default_material());
         }
-        let environment = if let Some(map) = &options.environment {
-            EnvironmentMap::load(map, 1.0, options.rotation_deg.unwrap_or(0.0), &mut warnings)?
-        } else {
-            let mut entry = file.environment;
-            inputs.extend(entry.map.iter().map(|map| loader.folder.join(map)));
-            entry.rotation_deg = options.rotation_deg.unwrap_or(entry.rotation_deg);
-            loader.environment(&entry, &mut warnings)?
-        };
-        let mut scene = loader.scene(camera, file.film, environment, materials, geometry, warnings);
+        let light = loader.light(&file, options, &mut inputs, &mut warnings)?;
+        loader.warn_of_darkness(&file, options, &light, &materials, &mut warnings);
+        let mut scene = loader.scene(camera, file.film, light, materials, geometry, warnings);
         scene.inputs.extend(inputs);
         Ok(scene)
     }
@@ -159,7 +145,7 @@ impl<'a> Loader<'a> {
         &self,
         camera: Camera,
         film: FilmSettings,
-        environment: EnvironmentMap,
+        light: Light,
         materials: Vec<Material>,
         geometry: Geometry,
         warnings: Vec<String>,
@@ -169,8 +155,8 @@ impl<'a> Loader<'a> {
             path: self.path.to_path_buf(),
             camera,
             film,
-            environment,
-            lamps: Vec::new(),
+            environment: light.environment,
+            lamps: light.lamps,
             materials,
             geometry,
             inputs: vec![self.path.to_path_buf()],
@@ -247,147 +233,5 @@ impl<'a> Loader<'a> {
             })?;
         }
         Ok(())
-    }
-
-    fn environment(
-        &self,
-        entry: &EnvironmentEntry,
-        warnings: &mut Vec<String>,
-    ) -> Result<EnvironmentMap> {
-        let (scale, rotation_deg) = (entry.scale, entry.rotation_deg);
-        self.check_range("environment.scale", &[scale], (0.0, f32::MAX))?;
-        self.check_range("environment.rotation_deg", &[rotation_deg], (f32::MIN, f32::MAX))?;
-        match (&entry.map, &entry.constant, &entry.court, &entry.sky) {
-            (Some(map), None, None, None) => {
-                EnvironmentMap::load(&self.folder.join(map), scale, rotation_deg, warnings)
-            }
-            (None, Some(constant), None, None) => {
-                self.check_range("environment.constant", constant, (0.0, f32::MAX))?;
-                EnvironmentMap::constant(Vec3::from_array(*constant), scale)
-                    .map_err(|message| self.error(format!("environment.constant: {message}")))
-            }
-            (None, None, Some(court), None) => EnvironmentMap::court(court, scale, rotation_deg)
-                .map_err(|message| self.error(format!("environment.court: {message}"))),
-            (None, None, None, Some(sky)) => EnvironmentMap::sky(sky, scale, rotation_deg)
-                .map_err(|message| self.error(format!("environment.sky: {message}"))),
-            (map, constant, court, sky) => {
-                let found: Vec<_> = [
-                    ("map", map.is_some()),
-                    ("constant", constant.is_some()),
-                    ("court", court.is_some()),
-                    ("sky", sky.is_some()),
-                ]
-                .into_iter()
-                .filter_map(|(name, is_there)| is_there.then_some(name))
-                .collect();
-                let found = if found.is_empty() { "none".to_owned() } else { found.join(" and ") };
-                Err(self.error(format!(
-                    "environment: expected exactly one of map, constant, court, sky, found {found}"
-                )))
-            }
-        }
-    }
-
-    fn materials(
-        &self,
-        entries: &[MaterialEntry],
-        warnings: &mut Vec<String>,
-    ) -> Result<Vec<Material>> {
-        let mut lines = HashMap::new();
-        let mut tables = BTreeMap::new();
-        let mut materials = Vec::with_capacity(entries.len());
-        for entry in entries {
-            let label = format!("material `{}` (line {})", entry.name, entry.line);
-            if let Some(first) = lines.insert(&entry.name, entry.line) {
-                return Err(self
-                    .error(format!("{label}: the name is taken by the material of line {first}")));
-            }
-            let kind = self.material_kind(&label, &entry.kind, &mut tables)?;
-            materials.push(Material::new(&entry.name, kind));
-        }
-        for (path, table) in &tables {
-            let named = |warning: &String| format!("{}: {warning}", path.display());
-            warnings.extend(table.warnings.iter().map(named));
-        }
-        Ok(materials)
-    }
-
-    fn material_kind(
-        &self,
-        label: &str,
-        kind: &MaterialKindEntry,
-        tables: &mut BTreeMap<PathBuf, Arc<MeasuredTable>>,
-    ) -> Result<MaterialKind> {
-        Ok(match kind {
-            MaterialKindEntry::Diffuse(entry) => MaterialKind::Diffuse {
-                reflectance: self.reflectance(label, "reflectance", entry.reflectance)?,
-            },
-            MaterialKindEntry::Plastic(entry) => {
-                self.check_range(&format!("{label}: ior"), &[entry.ior], (1.01, 4.0))?;
-                MaterialKind::Plastic {
-                    diffuse: self.reflectance(label, "diffuse", entry.diffuse)?,
-                    alpha: self.alpha(label, entry.alpha, entry.roughness)?,
-                    ior: entry.ior,
-                }
-            }
-            MaterialKindEntry::Conductor(entry) => MaterialKind::Conductor {
-                alpha: self.alpha(label, entry.alpha, entry.roughness)?,
-                fresnel: self.fresnel(label, entry)?,
-            },
-            MaterialKindEntry::Measured(entry) => {
-                let path = self.folder.join(&entry.file);
-                let table = match tables.get(&path) {
-                    Some(table) => Arc::clone(table),
-                    None => {
-                        let table = Arc::new(MeasuredTable::load(&path)?);
-                        tables.insert(path.clone(), Arc::clone(&table));
-                        table
-                    }
-                };
-                MaterialKind::Measured { path, table }
-            }
-        })
-    }
-
-    fn reflectance(&self, label: &str, key: &str, reflectance: [f32; 3]) -> Result<Vec3> {
-        self.check_range(&format!("{label}: {key}"), &reflectance, (0.0, 1.0))?;
-        Ok(Vec3::from_array(reflectance))
-    }
-
-    fn alpha(&self, label: &str, alpha: Option<f32>, roughness: Option<f32>) -> Result<f32> {
-        match (alpha, roughness) {
-            (Some(alpha), None) => {
-                self.check_range(&format!("{label}: alpha"), &[alpha], (MIN_ALPHA, 1.0))?;
-                Ok(alpha)
-            }
-            (None, Some(roughness)) => {
-                let range = (MIN_ALPHA.sqrt(), 1.0);
-                self.check_range(&format!("{label}: roughness"), &[roughness], range)?;
-                Ok((roughness * roughness).max(MIN_ALPHA))
-            }
-            (alpha, _) => {
-                let found = if alpha.is_some() { "both" } else { "neither" };
-                Err(self.error(format!(
-                    "{label}: expected exactly one of alpha and roughness, found {found}"
-                )))
-            }
-        }
-    }
-
-    fn fresnel(&self, label: &str, entry: &ConductorEntry) -> Result<ConductorFresnel> {
-        match (entry.reflectance, entry.eta, entry.k) {
-            (Some(reflectance), None, None) => Ok(ConductorFresnel::Schlick {
-                reflectance: self.reflectance(label, "reflectance", reflectance)?,
-            }),
-            (None, Some(eta), Some(k)) => {
-                self.check_range(&format!("{label}: eta"), &eta, (0.01, 100.0))?;
-                self.check_range(&format!("{label}: k"), &k, (0.0, 100.0))?;
-                Ok(ConductorFresnel::Exact { eta: Vec3::from_array(eta), k: Vec3::from_array(k) })
-            }
-            _ => {
-                Err(self
-                    .error(format!("{label}: a conductor needs either reflectance, or eta and k")))
-            }
-        }
     }
 }

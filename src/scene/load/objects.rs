@@ -77,12 +77,7 @@ impl Loader<'_> {
                 })?;
             }
         }
-        self.check(u32::try_from(vertices).is_ok() && u32::try_from(triangles).is_ok(), || {
-            format!(
-                "{vertices} vertices and {triangles} triangles, at most {} can be used",
-                u32::MAX
-            )
-        })?;
+        self.check_counts(vertices, triangles)?;
         let mut geometry = Geometry::default();
         geometry.positions.reserve_exact(vertices);
         geometry.normals.reserve_exact(vertices);
@@ -112,12 +107,32 @@ impl Loader<'_> {
     }
 
     fn check_placement(&self, label: &str, object: &ObjectEntry) -> Result<()> {
+        self.check_transform(label, object.scale, object.rotate_deg, object.translate)
+    }
+
+    pub(super) fn check_transform(
+        &self,
+        label: &str,
+        scale: [f32; 3],
+        rotate_deg: [f32; 3],
+        translate: [f32; 3],
+    ) -> Result<()> {
         let finite = (f32::MIN, f32::MAX);
-        self.check_range(&format!("{label}: translate"), &object.translate, finite)?;
-        self.check_range(&format!("{label}: rotate_deg"), &object.rotate_deg, finite)?;
-        self.check_range(&format!("{label}: scale"), &object.scale, finite)?;
-        self.check(!object.scale.contains(&0.0), || {
-            format!("{label}: scale must not be 0, found {:?}", object.scale)
+        self.check_range(&format!("{label}: translate"), &translate, finite)?;
+        self.check_range(&format!("{label}: rotate_deg"), &rotate_deg, finite)?;
+        self.check_range(&format!("{label}: scale"), &scale, finite)?;
+        self.check(!scale.contains(&0.0), || {
+            format!("{label}: scale must not be 0, found {scale:?}")
+        })
+    }
+
+    /// Checks that 32-bit indices address everything.
+    pub(super) fn check_counts(&self, vertices: usize, triangles: usize) -> Result<()> {
+        self.check(u32::try_from(vertices).is_ok() && u32::try_from(triangles).is_ok(), || {
+            format!(
+                "{vertices} vertices and {triangles} triangles, at most {} can be used",
+                u32::MAX
+            )
         })
     }
 
@@ -128,18 +143,26 @@ impl Loader<'_> {
         materials: &[Material],
     ) -> Result<()> {
         match &object.material {
-            Some(name) => {
-                let is_known = materials.iter().any(|material| material.name == *name);
-                self.check(is_known, || {
-                    let known: Vec<_> = materials.iter().map(|known| known.name.as_str()).collect();
-                    let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
-                    format!("{label}: unknown material `{name}`, the scene has {known}")
-                })
-            }
+            Some(name) => self.material_index(label, name, materials).map(drop),
             None => self.check(matches!(object.source, ObjectSource::Mesh(_)), || {
                 format!("{label}: expected a material, found none")
             }),
         }
+    }
+
+    /// Finds a material of the scene by its name.
+    pub(super) fn material_index(
+        &self,
+        label: &str,
+        name: &str,
+        materials: &[Material],
+    ) -> Result<u32> {
+        let index = materials.iter().position(|material| material.name == name);
+        index.map(|index| index as u32).ok_or_else(|| {
+            let known: Vec<_> = materials.iter().map(|known| known.name.as_str()).collect();
+            let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+            self.error(format!("{label}: unknown material `{name}`, the scene has {known}"))
+        })
     }
 
     /// Rejects an object that lies too far out for traversal.
@@ -171,10 +194,10 @@ impl Loader<'_> {
             .material
             .as_ref()
             .and_then(|name| materials.iter().position(|material| material.name == *name));
+        let first_own = materials.len();
         let dropped = if let Some(material) = named {
             geometry.append(mesh, &transform, |_| material as u32)
         } else {
-            let first = materials.len();
             let colored =
                 !mesh.runs.is_empty() && mesh.runs.iter().all(|run| run.material.is_some());
             self.check(colored, || {
@@ -190,9 +213,11 @@ impl Loader<'_> {
             }));
             geometry.append(mesh, &transform, |triangle| {
                 let run = mesh.runs.partition_point(|run| run.first_triangle <= triangle) - 1;
-                (first + mesh.runs[run].material.unwrap_or(0)) as u32
+                (first_own + mesh.runs[run].material.unwrap_or(0)) as u32
             })
         };
+        let own = named.map_or(&materials[first_own..], |index| &materials[index..=index]);
+        warnings.extend(own.iter().filter_map(|material| lacking_uvs(&label, material, mesh)));
         let of = mesh.triangles.len();
         self.check_extent(&label, &geometry.positions[first_vertex..])?;
         warnings.extend(dropped.warnings(&label, of));
@@ -201,6 +226,17 @@ impl Loader<'_> {
         }
         Ok(())
     }
+}
+
+/// Warning of a material with textures on a mesh without texture coordinates.
+pub(super) fn lacking_uvs(label: &str, material: &Material, mesh: &Mesh) -> Option<String> {
+    let lacks = |set: u32| mesh.uvs[set.min(1) as usize].is_empty();
+    let texture = material.surface.textures().find(|used| lacks(used.uv_set))?;
+    Some(format!(
+        "{label}: the material `{}` has textures, but the mesh has no texture coordinates for {}: the \
+         object has the colour of one texel",
+        material.name, texture.texture.name
+    ))
 }
 
 /// Parts of a mesh file that an object of a scene file leaves out: cameras, lamps and, if its own

@@ -4,7 +4,9 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::{LoadOptions, Loader, MAX_FILM_SIDE, default_material};
+use super::{
+    LoadOptions, Loader, MAX_FILM_SIDE, default_material, light::Light, objects::lacking_uvs,
+};
 use crate::{
     brdf::{Material, material::MaterialKind},
     error::Result,
@@ -13,7 +15,6 @@ use crate::{
         Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Scene,
         features::{self, Ignored},
         file::CameraEntry,
-        hash::hash,
         mesh::{Mesh, MeshCamera, MeshMaterial, Perspective},
         transform::Transform,
     },
@@ -59,11 +60,8 @@ impl Loader<'_> {
         };
         let environment = self.whole_environment(options, &mut warnings)?;
         let camera: Camera = self.camera(&entry)?;
-        let mut scene = self.scene(camera, film, environment, materials, geometry, warnings);
-        if !mesh.lamps.is_empty() {
-            scene.lamps = mesh.lamps;
-            scene.hash = hash(&scene);
-        }
+        let light = Light { environment, lamps: mesh.lamps };
+        let mut scene = self.scene(camera, film, light, materials, geometry, warnings);
         scene.inputs.extend(mesh.side_files);
         scene.inputs.extend(options.environment.clone());
         Ok(scene)
@@ -106,7 +104,7 @@ impl Loader<'_> {
     }
 
     /// Takes the mesh as it stands, with one material more for triangles without.
-    fn place_whole(
+    pub(super) fn place_whole(
         &self,
         mesh: &Mesh,
         ignored: &mut Ignored,
@@ -145,7 +143,9 @@ impl Loader<'_> {
             run.unwrap_or(lacking) as u32
         });
         self.check_extent("the scene", &geometry.positions)?;
-        warnings.extend(dropped.warnings(&self.path.display().to_string(), mesh.triangles.len()));
+        let label = self.path.display().to_string();
+        warnings.extend(materials.iter().filter_map(|own| lacking_uvs(&label, own, mesh)));
+        warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
         Ok((materials, geometry))
     }
 

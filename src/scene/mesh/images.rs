@@ -1,17 +1,18 @@
-//! Images of a mesh file: files are read once, and texels looked at.
+//! Images of a mesh file.
 
 use std::{
-    collections::HashMap,
+    collections::HashSet,
     path::{Path, PathBuf},
     sync::Arc,
 };
 
-use crate::texture::{Texels, Texture};
+use crate::texture::{Texels, Texture, TextureCache};
 
-/// Images that have been read so far.
+/// Image files, each read once.
 #[derive(Debug, Default)]
 pub(super) struct Images {
-    read: HashMap<PathBuf, Option<Arc<Texture>>>,
+    cache: TextureCache,
+    unreadable: HashSet<PathBuf>,
 }
 
 impl Images {
@@ -23,30 +24,22 @@ impl Images {
         place: &str,
         warnings: &mut Vec<String>,
     ) -> Option<Arc<Texture>> {
-        if let Some(found) = self.read.get(path) {
-            return found.clone();
+        if self.unreadable.contains(path) {
+            return None;
         }
-        let texture = match Texture::load(path) {
-            Ok(texture) => Some(Arc::new(texture)),
+        match self.cache.load(path, warnings) {
+            Ok(texture) => Some(texture),
             Err(error) => {
                 warnings.push(format!("{error}; rendered without this texture ({place})"));
+                self.unreadable.insert(path.to_owned());
                 None
             }
-        };
-        self.read.insert(path.to_owned(), texture.clone());
-        texture
+        }
     }
 
     /// Files that have been read.
-    pub(super) fn files(&self) -> Vec<PathBuf> {
-        let mut files: Vec<_> = self
-            .read
-            .iter()
-            .filter(|(_, texture)| texture.is_some())
-            .map(|(path, _)| path.clone())
-            .collect();
-        files.sort();
-        files
+    pub(super) fn files(&self) -> impl Iterator<Item = PathBuf> {
+        self.cache.files().into_iter()
     }
 }
 
@@ -54,19 +47,7 @@ impl Images {
 pub(super) fn has_alpha(texture: &Texture) -> bool {
     match &texture.texels {
         Texels::Bytes(texels) => texels.iter().any(|texel| texel[3] < u8::MAX),
+        Texels::Shorts(texels) => texels.iter().any(|texel| texel[3] < u16::MAX),
         Texels::Halves(texels) => texels.iter().any(|texel| texel[3].to_f32() < 1.0),
     }
-}
-
-/// Mean of a channel over all texels, taken as linear.
-pub(super) fn mean(texture: &Texture, channel: usize) -> f32 {
-    let (sum, count): (f64, usize) = match &texture.texels {
-        Texels::Bytes(texels) => {
-            (texels.iter().map(|texel| f64::from(texel[channel]) / 255.0).sum(), texels.len())
-        }
-        Texels::Halves(texels) => {
-            (texels.iter().map(|texel| texel[channel].to_f64()).sum(), texels.len())
-        }
-    };
-    (sum / count.max(1) as f64) as f32
 }

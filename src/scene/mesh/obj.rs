@@ -340,7 +340,7 @@ impl ObjReader<'_> {
             let unnamed = super::MaterialRun { first_triangle: 0, material: None };
             self.mesh.runs.insert(0, unnamed);
         }
-        self.mesh.side_files.append(&mut self.images.files());
+        self.mesh.side_files.extend(self.images.files());
         self.mesh.complete_tangents(1.0);
         (self.mesh, self.ignored)
     }

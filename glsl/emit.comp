@@ -1,0 +1,38 @@
+// Adds the light that surfaces emit where rays meet them: all of it where no light was sampled at the
+// ray's origin, else the share of the BRDF's sampling in the balance heuristic with sample_lamps.comp.
+#version 460
+
+#include "lamps.glsl"
+#include "load.glsl"
+#include "wave.glsl"
+
+UPDATES(paths)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    if (path >= wave_path_count()) {
+        return;
+    }
+    Hit hit = load_hit(path);
+    if (hit.triangle == NO_TRIANGLE) {
+        return;
+    }
+    MaterialSurface surface = load_material_surface(triangle_materials[hit.triangle]);
+    if (surface.emission_radiance == vec3(0.0)) {
+        return;
+    }
+    Ray ray = load_ray(path);
+    bool is_behind = is_back(hit.triangle, ray.direction);
+    vec3 radiance = emitted_radiance(
+        hit.triangle, barycentric(hit.triangle, ray.origin, ray.direction), is_behind);
+    float weight = 1.0;
+    if (ray.brdf_pdf > 0.0) {
+        float cosine = abs(dot(ray.direction, hit.geometric_normal));
+        weight = ray.brdf_pdf
+            / (ray.brdf_pdf + lamp_pdf(surface.emission_density, hit.distance, cosine));
+    }
+    PathState state = paths[path];
+    paths[path].radiance = state.radiance + state.throughput * radiance * weight;
+}

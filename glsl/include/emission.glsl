@@ -1,0 +1,23 @@
+// Light that triangles emit.
+
+#ifndef EMISSION_GLSL
+#define EMISSION_GLSL
+
+#include "bvh.glsl"
+#include "texture.glsl"
+
+// Radiance that a triangle emits at barycentric coordinates, to its front or its back.
+vec3 emitted_radiance(uint triangle, vec3 weights, bool is_back) {
+    MaterialSurface surface = load_material_surface(triangle_materials[triangle]);
+    vec3 radiance = surface.emission_radiance;
+    if (is_back && (surface.flags & SURFACE_EMISSION_TWO_SIDED) == 0u) {
+        return vec3(0.0);
+    }
+    if (surface.emission != NO_TEXTURE && radiance != vec3(0.0)) {
+        Attributes attributes = triangle_attributes(triangle, weights);
+        radiance *= texture_value(surface.emission, attributes.uv0, attributes.uv1).rgb;
+    }
+    return radiance;
+}
+
+#endif

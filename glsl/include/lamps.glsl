@@ -1,0 +1,103 @@
+// Lamps: emitting triangles, and lights without a surface. Sampled by an alias table in proportion to
+// their power, triangles uniformly over their area. Twin of src/pass/lamps.rs for the densities.
+
+#ifndef LAMPS_GLSL
+#define LAMPS_GLSL
+
+#include "bvh.glsl"
+#include "emission.glsl"
+#include "frame.glsl"
+#include "parameters.glsl"
+#include "random.glsl"
+
+READS(lamp_choices)
+READS(lamps)
+
+struct LampSample {
+    // From the surface to a point on the lamp, metres.
+    vec3 to_lamp;
+    // Unit direction.
+    vec3 direction;
+    // Radiance / density per steradian; irradiance at normal incidence of a lamp without a surface.
+    vec3 radiance_over_pdf;
+    // Density per steradian; 0 if no other technique finds the lamp.
+    float pdf;
+};
+
+// Density per steradian of sampling a point at `distance` on a triangle of area `area`, which
+// `direction` meets at the cosine `cosine`, if points have `area_density` per square metre.
+float lamp_pdf(float area_density, float distance, float cosine) {
+    return area_density * distance * distance / max(cosine, 1.0e-7);
+}
+
+// Light of a spot at an angle to its axis, relative to that along the axis.
+float spot_falloff(Lamp lamp, float cosine) {
+    if (lamp.kind == LAMP_SPOT_LINEAR_ANGLE) {
+        float angle = acos(clamp(cosine, -1.0, 1.0));
+        return clamp((lamp.outer - angle) / max(lamp.outer - lamp.inner, 1.0e-6), 0.0, 1.0);
+    }
+    float t = clamp((cosine - lamp.outer) / max(lamp.inner - lamp.outer, 1.0e-6), 0.0, 1.0);
+    return lamp.kind == LAMP_SPOT_SMOOTH_COSINE ? t * t * (3.0 - 2.0 * t) : t * t;
+}
+
+LampSample sample_point_lamp(Lamp lamp, vec3 position) {
+    if (lamp.kind == LAMP_DIRECTIONAL) {
+        // Beyond any scene, and short enough to have a square.
+        return LampSample(-1.0e18 * lamp.direction, -lamp.direction, lamp.intensity, 0.0);
+    }
+    vec3 to_lamp = lamp.position - position;
+    float distance = length(to_lamp);
+    vec3 direction = to_lamp / max(distance, 1.0e-20);
+    float falloff = 1.0;
+    if (lamp.kind != LAMP_POINT) {
+        falloff = spot_falloff(lamp, -dot(direction, lamp.direction));
+    }
+    vec3 irradiance = lamp.intensity * (falloff / max(distance * distance, 1.0e-20));
+    return LampSample(to_lamp, direction, irradiance, 0.0);
+}
+
+LampSample sample_triangle_lamp(uint triangle, float probability, vec3 position, vec2 u) {
+    vec3 a = uintBitsToFloat(triangle_texel(triangle, 0u).xyz);
+    vec3 b = uintBitsToFloat(triangle_texel(triangle, 1u).xyz);
+    vec3 c = uintBitsToFloat(triangle_texel(triangle, 2u).xyz);
+    // Uniform over the triangle: pbrt-v4, section A.5.1 in the form of a folded square.
+    vec2 folded = u.x + u.y > 1.0 ? 1.0 - u.yx : u;
+    vec3 weights = vec3(1.0 - folded.x - folded.y, folded);
+    vec3 point = weights.x * a + weights.y * b + weights.z * c;
+    vec3 to_lamp = point - position;
+    float distance = length(to_lamp);
+    vec3 direction = to_lamp / max(distance, 1.0e-20);
+    vec3 normal = cross(b - a, c - a);
+    float twice_area = length(normal);
+    float cosine = -dot(direction, normal) / max(twice_area, 1.0e-37);
+    LampSample sampled = LampSample(to_lamp, direction, vec3(0.0), 0.0);
+    if (cosine != 0.0 && distance > 0.0) {
+        sampled.pdf = lamp_pdf(2.0 * probability / twice_area, distance, abs(cosine));
+        sampled.radiance_over_pdf =
+            emitted_radiance(triangle, weights, cosine < 0.0) / sampled.pdf;
+    }
+    // End the ray before the lamp, which would else block it.
+    sampled.to_lamp = point + (cosine < 0.0 ? -ray_offset() : ray_offset()) * (normal / twice_area)
+        - position;
+    return sampled;
+}
+
+// Draws a lamp with bits.x and bits.y, and a point on it with u.
+LampSample sample_lamp(vec3 position, uvec2 bits, vec2 u) {
+    // Rounding of the product favours no column by more than lamp_count / 2^32.
+    uint column = scaled(bits.x, parameters.lamp_count);
+    LampChoice choice = lamp_choices[column];
+    if (bits.y >= choice.threshold) {
+        choice = lamp_choices[choice.alias];
+    }
+    LampSample sampled;
+    if ((choice.source & LAMP_BIT) != 0u) {
+        sampled = sample_point_lamp(lamps[choice.source & ~LAMP_BIT], position);
+        sampled.radiance_over_pdf /= choice.probability;
+    } else {
+        sampled = sample_triangle_lamp(choice.source, choice.probability, position, u);
+    }
+    return sampled;
+}
+
+#endif

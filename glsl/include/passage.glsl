@@ -1,0 +1,38 @@
+// Light that goes straight through surfaces: where they are not opaque, and through thin panes.
+
+#ifndef PASSAGE_GLSL
+#define PASSAGE_GLSL
+
+#define MEETS_PASSAGES
+#include "bvh.glsl"
+#include "load.glsl"
+#include "specular.glsl"
+#include "texture.glsl"
+
+// Light at a point of a surface, by what becomes of it.
+struct Passing {
+    // Share that goes straight through.
+    vec3 passed;
+    // Share that a pane reflects; of other surfaces, the share that meets them.
+    vec3 stopped;
+};
+
+Passing passing(uint triangle, vec3 weights, vec3 normal) {
+    uint index = triangle_materials[triangle];
+    float opacity =
+        surface_opacity(load_material_surface(index), triangle_attributes(triangle, weights));
+    Material material = load_material(index);
+    Passing shares = Passing(vec3(1.0 - opacity), vec3(opacity));
+    if (is_kind(material, MATERIAL_THIN_DIELECTRIC)) {
+        float cosine = abs(normal.z) / max(length(normal), 1.0e-37);
+        shares.passed += opacity * pane_transmittance(material, cosine);
+        shares.stopped = opacity * pane_reflectance(material, cosine);
+    }
+    return shares;
+}
+
+vec3 passage(uint triangle, vec3 weights, vec3 normal) {
+    return passing(triangle, weights, normal).passed;
+}
+
+#endif

@@ -1,0 +1,136 @@
+// Mirrors, dielectrics and thin panes: materials at which paths go on in a sampled direction, and no
+// light is sampled. Twin of src/brdf/specular.rs, same names, same order.
+//
+// Directions are unit vectors in the shading frame, whose z points to the side of the viewer, and point
+// away from the surface: transmitted ones have z < 0. Values are per steradian without the cosine.
+//
+// Values are for radiance on its way to the viewer, as in pbrt and Mitsuba: light that comes through an
+// interface is scaled by (index of the viewer's side / index of the light's side)^2, so that light that
+// goes in and out again has its former radiance. Values of importance would lack this factor.
+
+#ifndef SPECULAR_GLSL
+#define SPECULAR_GLSL
+
+#include "brdf.glsl"
+
+// Continuation of a path; a weight of 0 ends it.
+struct Scatter {
+    vec3 direction_local;
+    // Value * |cosine| / density.
+    vec3 weight;
+    bool is_transmitted;
+};
+
+// Refractive index of the side that the viewer does not see over that of the viewer's.
+float relative_index(Material material, bool is_back) {
+    return is_back ? 1.0 / material.ior : material.ior;
+}
+
+// Probability of reflection: its part of all light by luminance.
+float reflection_probability(Material material, float fresnel) {
+    float reflected = fresnel * dot(material.reflectance, LUMINANCE_WEIGHTS);
+    float sum = reflected + (1.0 - fresnel) * dot(material.eta, LUMINANCE_WEIGHTS);
+    return sum > 0.0 ? reflected / sum : 1.0;
+}
+
+// Refracts at a normal.
+vec3 refracted(vec3 outgoing_local, vec3 normal, float eta) {
+    float cosine = dot(outgoing_local, normal);
+    return (cosine / eta - refracted_cosine(cosine, eta)) * normal - outgoing_local / eta;
+}
+
+// Interface of a dielectric: smooth at alpha = 0, else GGX by visible normals. [Walter et al. 2007].
+Scatter dielectric_scatter(Material material, vec3 outgoing_local, bool is_back, vec3 u) {
+    float eta = relative_index(material, is_back);
+    vec3 normal = vec3(0.0, 0.0, 1.0);
+    if (material.alpha > 0.0) {
+        normal = ggx_normal_sample(outgoing_local, material.alpha, 1.0, u.yz);
+    }
+    float cosine = dot(outgoing_local, normal);
+    float fresnel = fresnel_interface(cosine, eta);
+    float probability = reflection_probability(material, fresnel);
+    Scatter result;
+    result.is_transmitted = u.x >= probability;
+    if (result.is_transmitted) {
+        result.direction_local = refracted(outgoing_local, normal, eta);
+        result.weight = (1.0 - fresnel) / ((1.0 - probability) * eta * eta) * material.eta;
+    } else {
+        result.direction_local = 2.0 * cosine * normal - outgoing_local;
+        result.weight = fresnel / probability * material.reflectance;
+    }
+    if (material.alpha > 0.0) {
+        result.weight *=
+            ggx_masking_ratio(outgoing_local, result.direction_local, material.alpha);
+    }
+    // A normal may send light to the wrong side of the surface: no sample.
+    if (cosine <= 0.0 || result.direction_local.z < 0.0 != result.is_transmitted) {
+        result.weight = vec3(0.0);
+    }
+    return result;
+}
+
+// Value and density of dielectric_scatter at one pair of directions; 0 for a smooth interface.
+void dielectric_evaluate_and_pdf(
+    Material material, vec3 outgoing_local, vec3 incident_local, bool is_back, out vec3 value,
+    out float pdf) {
+    value = vec3(0.0);
+    pdf = 0.0;
+    if (material.alpha == 0.0 || outgoing_local.z <= 0.0 || incident_local.z == 0.0) {
+        return;
+    }
+    float eta = relative_index(material, is_back);
+    bool is_transmitted = incident_local.z < 0.0;
+    vec3 half_vector = outgoing_local + (is_transmitted ? eta : 1.0) * incident_local;
+    vec3 normal = normalize(half_vector.z < 0.0 ? -half_vector : half_vector);
+    float cosine = dot(outgoing_local, normal);
+    float incident_cosine = dot(incident_local, normal);
+    if (cosine <= 0.0 || (incident_cosine < 0.0) != is_transmitted) {
+        return;
+    }
+    float fresnel = fresnel_interface(cosine, eta);
+    float probability = reflection_probability(material, fresnel);
+    float density = ggx_visible_density(normal, outgoing_local, material.alpha);
+    // G2 * D / (cos o * cos i), by the density of visible normals.
+    float ratio = ggx_masking_ratio(outgoing_local, incident_local, material.alpha)
+        * density / abs(incident_local.z);
+    if (is_transmitted) {
+        float jacobian = cosine * abs(incident_cosine) / dot(half_vector, half_vector);
+        value = (1.0 - fresnel) * ratio * jacobian * material.eta;
+        pdf = (1.0 - probability) * density * jacobian * eta * eta;
+    } else {
+        value = 0.25 * fresnel * ratio * material.reflectance;
+        pdf = 0.25 * probability * density;
+    }
+}
+
+// Pane: reflects as a mirror or lets light straight through.
+Scatter pane_scatter(Material material, vec3 outgoing_local, vec3 u) {
+    vec3 reflectance = pane_reflectance(material, outgoing_local.z);
+    vec3 transmittance = pane_transmittance(material, outgoing_local.z);
+    float reflected = dot(reflectance, LUMINANCE_WEIGHTS);
+    float sum = reflected + dot(transmittance, LUMINANCE_WEIGHTS);
+    float probability = sum > 0.0 ? reflected / sum : 1.0;
+    if (u.x < probability) {
+        return Scatter(
+            vec3(-outgoing_local.xy, outgoing_local.z), reflectance / probability, false);
+    }
+    return Scatter(-outgoing_local, transmittance / (1.0 - probability), true);
+}
+
+// Samples the next direction of a path with three numbers in [0, 1). `is_back` tells that the viewer
+// sees the back of the triangles, where the inside of a dielectric is.
+Scatter scatter(Material material, vec3 outgoing_local, bool is_back, vec3 u) {
+    if (outgoing_local.z > 0.0 && is_kind(material, MATERIAL_MIRROR)) {
+        return Scatter(
+            vec3(-outgoing_local.xy, outgoing_local.z), material.reflectance, false);
+    }
+    if (outgoing_local.z > 0.0 && is_kind(material, MATERIAL_DIELECTRIC)) {
+        return dielectric_scatter(material, outgoing_local, is_back, u);
+    }
+    if (outgoing_local.z > 0.0 && is_kind(material, MATERIAL_THIN_DIELECTRIC)) {
+        return pane_scatter(material, outgoing_local, u);
+    }
+    return Scatter(vec3(0.0, 0.0, 1.0), vec3(0.0), false);
+}
+
+#endif

@@ -1,0 +1,23 @@
+// Specialization of passes by the kinds and properties of the surfaces in the scene.
+
+#ifndef SURFACES_GLSL
+#define SURFACES_GLSL
+
+#include "layout.glsl"
+
+// One bit per kind of material in the scene.
+layout(constant_id = CONSTANT_MATERIAL_KINDS) const uint MATERIAL_KINDS = 0xffffffffu;
+// Bits SURFACES_….
+layout(constant_id = CONSTANT_SURFACES) const uint SURFACES = 0u;
+
+const bool HAS_SPECULAR = (SURFACES & SURFACES_SPECULAR) != 0u;
+const bool HAS_PASSAGES = (SURFACES & SURFACES_PASSING) != 0u;
+const bool HAS_BACKS = (SURFACES & SURFACES_ONE_SIDED) != 0u;
+const bool IS_TEXTURED = (SURFACES & SURFACES_TEXTURED) != 0u;
+
+// Tests whether a kind of material is specular: no light is sampled at it.
+bool is_specular(uint kind) {
+    return HAS_SPECULAR && ((1u << kind) & SPECULAR_KINDS) != 0u;
+}
+
+#endif

@@ -1,0 +1,329 @@
+// Textures, attributes of triangles and normal maps. Twins: src/texture/lookup.rs and
+// src/accel/attributes.rs.
+//
+// Lookups read the full resolution. A mip level would average texels over an area that the pixel
+// filter averages anyway once samples add up, and so blur the picture: a bias that no number of
+// samples removes.
+
+#ifndef TEXTURE_GLSL
+#define TEXTURE_GLSL
+
+#include "bvh.glsl"
+#include "layout.glsl"
+
+TEXELS(texture_words_0)
+TEXELS(texture_words_1)
+TEXELS(texture_words_2)
+TEXELS(texture_words_3)
+TEXELS(texture_use_texels)
+TEXELS(material_surface_texels)
+TEXELS(triangle_attributes_0)
+TEXELS(triangle_attributes_1)
+TEXELS(triangle_attributes_2)
+TEXELS(triangle_attributes_3)
+
+layout(constant_id = CONSTANT_TEXTURE_PAGES) const uint TEXTURE_PAGES = 1u;
+layout(constant_id = CONSTANT_TEXTURE_PAGE_SHIFT) const uint TEXTURE_PAGE_SHIFT = 27u;
+layout(constant_id = CONSTANT_ATTRIBUTE_PAGES) const uint ATTRIBUTE_PAGES = 1u;
+layout(constant_id = CONSTANT_ATTRIBUTE_PAGE_SHIFT) const uint ATTRIBUTE_PAGE_SHIFT = 27u;
+layout(constant_id = CONSTANT_ATTRIBUTES) const uint ATTRIBUTES = 0u;
+
+TextureUse load_texture_use(uint index) {
+    uvec4 first = texelFetch(texture_use_texels, int(4u * index));
+    uvec4 second = texelFetch(texture_use_texels, int(4u * index + 1u));
+    uvec4 third = texelFetch(texture_use_texels, int(4u * index + 2u));
+    uvec4 fourth = texelFetch(texture_use_texels, int(4u * index + 3u));
+    return TextureUse(
+        first.x, first.y, first.z, first.w, uintBitsToFloat(second.xyz),
+        uintBitsToFloat(uvec3(second.w, third.xy)), uintBitsToFloat(uvec3(third.zw, fourth.x)),
+        uintBitsToFloat(fourth.yzw));
+}
+
+MaterialSurface load_material_surface(uint material) {
+    uvec4 first = texelFetch(material_surface_texels, int(4u * material));
+    uvec4 second = texelFetch(material_surface_texels, int(4u * material + 1u));
+    uvec4 third = texelFetch(material_surface_texels, int(4u * material + 2u));
+    uvec2 fourth = texelFetch(material_surface_texels, int(4u * material + 3u)).xy;
+    return MaterialSurface(
+        first.x, first.y, first.z, first.w, second.x, second.y, uintBitsToFloat(second.z),
+        uintBitsToFloat(second.w), uintBitsToFloat(third.x), uintBitsToFloat(third.yzw), fourth.x,
+        uintBitsToFloat(fourth.y), vec2(0.0));
+}
+
+// A word of the texels of all textures; with one page the choice folds away.
+uint texture_word(uint index) {
+    if (TEXTURE_PAGES == 1u) {
+        return texelFetch(texture_words_0, int(index)).x;
+    }
+    uint page = index >> TEXTURE_PAGE_SHIFT;
+    int word = int(index - (page << TEXTURE_PAGE_SHIFT));
+    if (page == 0u) {
+        return texelFetch(texture_words_0, word).x;
+    }
+    if (page == 1u) {
+        return texelFetch(texture_words_1, word).x;
+    }
+    if (page == 2u) {
+        return texelFetch(texture_words_2, word).x;
+    }
+    return texelFetch(texture_words_3, word).x;
+}
+
+// Linear value of a number 0 to 1 in the encoding of [IEC 61966-2-1:1999].
+float srgb_to_linear(float encoded) {
+    return encoded <= 0.04045 ? encoded / 12.92 : pow((encoded + 0.055) / 1.055, 2.4);
+}
+
+// Linear colour and opacity of a texel.
+vec4 texture_texel(TextureUse used, ivec2 place) {
+    uint index = uint(place.y) * used.width + uint(place.x);
+    uint format = used.flags & TEXTURE_FORMAT_MASK;
+    vec4 texel;
+    if (format == TEXTURE_BYTES) {
+        texel = unpackUnorm4x8(texture_word(used.first_word + index));
+    } else {
+        uint low = texture_word(used.first_word + 2u * index);
+        uint high = texture_word(used.first_word + 2u * index + 1u);
+        texel = format == TEXTURE_SHORTS ? vec4(unpackUnorm2x16(low), unpackUnorm2x16(high))
+                                         : vec4(unpackHalf2x16(low), unpackHalf2x16(high));
+    }
+    if ((used.flags & TEXTURE_SRGB) != 0u) {
+        texel.rgb = vec3(srgb_to_linear(texel.r), srgb_to_linear(texel.g), srgb_to_linear(texel.b));
+    }
+    return texel;
+}
+
+// Place along an axis of `size` texels, in texels, brought near the image so that texels next to it
+// are in reach of wrapped_texel. Coordinates too large to have a fraction, and NaN, count as 0.
+float texture_place(float coordinate, uint wrap, uint size) {
+    coordinate = abs(coordinate) < 1.0e9 ? coordinate : 0.0;
+    if (wrap == TEXTURE_REPEAT) {
+        coordinate -= floor(coordinate);
+    } else if (wrap == TEXTURE_MIRROR) {
+        coordinate -= 2.0 * floor(0.5 * coordinate);
+    } else {
+        coordinate = clamp(coordinate, -1.0, 2.0);
+    }
+    return coordinate * float(size);
+}
+
+// Texel of the image that stands for the one at `place`.
+int wrapped_texel(int place, uint wrap, uint size) {
+    int last = int(size) - 1;
+    if (wrap == TEXTURE_REPEAT) {
+        return place < 0 ? place + int(size) : (place > last ? place - int(size) : place);
+    }
+    if (wrap == TEXTURE_MIRROR) {
+        place = place < 0 ? -1 - place : place;
+        place = place > last ? 2 * last + 1 - place : place;
+        return place < 0 ? -1 - place : place;
+    }
+    return clamp(place, 0, last);
+}
+
+// Linear colour and opacity of an image at image coordinates. Centres of texels lie at +0.5.
+vec4 texture_lookup(TextureUse used, vec2 image) {
+    uint wrap_u = (used.flags >> TEXTURE_WRAP_U_SHIFT) & 3u;
+    uint wrap_v = (used.flags >> TEXTURE_WRAP_V_SHIFT) & 3u;
+    vec2 place = vec2(
+        texture_place(image.x, wrap_u, used.width), texture_place(image.y, wrap_v, used.height));
+    bool is_nearest = (used.flags & TEXTURE_NEAREST) != 0u;
+    place -= is_nearest ? 0.0 : 0.5;
+    ivec2 low = ivec2(floor(place));
+    int left = wrapped_texel(low.x, wrap_u, used.width);
+    int top = wrapped_texel(low.y, wrap_v, used.height);
+    vec4 upper_left = texture_texel(used, ivec2(left, top));
+    if (is_nearest) {
+        return upper_left;
+    }
+    int right = wrapped_texel(low.x + 1, wrap_u, used.width);
+    int bottom = wrapped_texel(low.y + 1, wrap_v, used.height);
+    vec2 share = place - floor(place);
+    vec4 upper = mix(upper_left, texture_texel(used, ivec2(right, top)), share.x);
+    vec4 lower = mix(
+        texture_texel(used, ivec2(left, bottom)), texture_texel(used, ivec2(right, bottom)), share.x);
+    return mix(upper, lower, share.y);
+}
+
+// Image coordinates of a point of the surface.
+vec2 image_coordinates(TextureUse used, vec2 uv0, vec2 uv1) {
+    vec3 uv = vec3((used.flags & TEXTURE_SECOND_UVS) != 0u ? uv1 : uv0, 1.0);
+    return vec2(dot(used.image_u, uv), dot(used.image_v, uv));
+}
+
+// Factor that a texture gives a property: scaled colour, and opacity as it is in the image. One
+// without a texture.
+vec4 texture_value(uint use_index, vec2 uv0, vec2 uv1) {
+    if (use_index == NO_TEXTURE) {
+        return vec4(1.0);
+    }
+    TextureUse used = load_texture_use(use_index);
+    vec4 texel = texture_lookup(used, image_coordinates(used, uv0, uv1));
+    uint channel = used.flags >> TEXTURE_CHANNEL_SHIFT;
+    vec3 color = channel == 0u ? texel.rgb : vec3(texel[channel - 1u]);
+    return vec4(color * used.scale + used.bias, texel.a);
+}
+
+// The same for a property that is one number: the luminance.
+float texture_number(uint use_index, vec2 uv0, vec2 uv1) {
+    return dot(texture_value(use_index, uv0, uv1).rgb, LUMINANCE_WEIGHTS);
+}
+
+// Attributes of a point of a triangle.
+struct Attributes {
+    // Texture coordinates, 0 where there are none.
+    vec2 uv0;
+    vec2 uv1;
+    // Tangent of any length along u of the first set, and sign of the bitangent; 0 for none.
+    vec4 tangent;
+    // Linear colour and opacity, 1 where there is none.
+    vec4 color;
+};
+
+uint attribute_word(uint index) {
+    if (ATTRIBUTE_PAGES == 1u) {
+        return texelFetch(triangle_attributes_0, int(index)).x;
+    }
+    uint page = index >> ATTRIBUTE_PAGE_SHIFT;
+    int word = int(index - (page << ATTRIBUTE_PAGE_SHIFT));
+    if (page == 0u) {
+        return texelFetch(triangle_attributes_0, word).x;
+    }
+    if (page == 1u) {
+        return texelFetch(triangle_attributes_1, word).x;
+    }
+    if (page == 2u) {
+        return texelFetch(triangle_attributes_2, word).x;
+    }
+    return texelFetch(triangle_attributes_3, word).x;
+}
+
+// Two words of attribute `bit` at a corner (0 to 2) of a triangle that has it.
+uvec2 corner_attribute(uint triangle, uint corner, uint bit) {
+    uint place = 2u * uint(bitCount(ATTRIBUTES & (bit - 1u)));
+    uint stride = 2u * uint(bitCount(ATTRIBUTES));
+    uint word = (3u * triangle + corner) * stride + place;
+    return uvec2(attribute_word(word), attribute_word(word + 1u));
+}
+
+// Texture coordinates at a corner; 0 where there are none.
+vec2 corner_uv(uint triangle, uint corner, uint bit) {
+    bool is_there = (ATTRIBUTES & bit) != 0u;
+    return is_there ? uintBitsToFloat(corner_attribute(triangle, corner, bit)) : vec2(0.0);
+}
+
+vec2 interpolated_uv(uint triangle, vec3 weights, uint bit) {
+    return weights.x * corner_uv(triangle, 0u, bit) + weights.y * corner_uv(triangle, 1u, bit)
+        + weights.z * corner_uv(triangle, 2u, bit);
+}
+
+vec4 corner_color(uint triangle, uint corner) {
+    uvec2 words = corner_attribute(triangle, corner, ATTRIBUTE_COLOR);
+    return vec4(unpackUnorm2x16(words.x), unpackUnorm2x16(words.y));
+}
+
+// Attributes at the point of a triangle in BVH order with these barycentric coordinates.
+Attributes triangle_attributes(uint triangle, vec3 weights) {
+    Attributes attributes = Attributes(
+        interpolated_uv(triangle, weights, ATTRIBUTE_FIRST_UVS),
+        interpolated_uv(triangle, weights, ATTRIBUTE_SECOND_UVS), vec4(0.0), vec4(1.0));
+    if ((ATTRIBUTES & ATTRIBUTE_TANGENT) != 0u) {
+        uvec2 a = corner_attribute(triangle, 0u, ATTRIBUTE_TANGENT);
+        uvec2 b = corner_attribute(triangle, 1u, ATTRIBUTE_TANGENT);
+        uvec2 c = corner_attribute(triangle, 2u, ATTRIBUTE_TANGENT);
+        if (a.x != FLAT_NORMAL && b.x != FLAT_NORMAL && c.x != FLAT_NORMAL) {
+            vec3 tangent = weights.x * unpack_normal(a.x) + weights.y * unpack_normal(b.x)
+                + weights.z * unpack_normal(c.x);
+            attributes.tangent = vec4(tangent, uintBitsToFloat(a.y));
+        }
+    }
+    if ((ATTRIBUTES & ATTRIBUTE_COLOR) != 0u) {
+        attributes.color = weights.x * corner_color(triangle, 0u)
+            + weights.y * corner_color(triangle, 1u) + weights.z * corner_color(triangle, 2u);
+    }
+    return attributes;
+}
+
+// Share of light that the surface stops at a point, 0 to 1.
+float surface_opacity(MaterialSurface surface, Attributes attributes) {
+    float opacity =
+        surface.opacity_factor * texture_number(surface.opacity, attributes.uv0, attributes.uv1);
+    if ((surface.flags & SURFACE_VERTEX_COLOR) != 0u) {
+        opacity *= attributes.color.a;
+    }
+    if (surface.opacity_cutoff >= 0.0) {
+        return opacity >= surface.opacity_cutoff ? 1.0 : 0.0;
+    }
+    return clamp(opacity, 0.0, 1.0);
+}
+
+// Direction of increasing u of the image along a triangle, at right angles to a unit normal, and the
+// sign of the bitangent, which points up in the image; 0 if the coordinates do not span the triangle.
+// The edges are those from the first corner, in the world and in the image.
+vec4 gradient_tangent(vec3 edge_1, vec3 edge_2, vec2 image_1, vec2 image_2, vec3 normal) {
+    float area = image_1.x * image_2.y - image_2.x * image_1.y;
+    // The sign alone matters: tangents are scaled to unit length below.
+    float turn = area < 0.0 ? -1.0 : 1.0;
+    vec3 along_u = turn * (image_2.y * edge_1 - image_1.y * edge_2);
+    vec3 along_v = turn * (image_1.x * edge_2 - image_2.x * edge_1);
+    vec3 tangent = along_u - dot(along_u, normal) * normal;
+    vec3 size = abs(tangent);
+    float largest = max(size.x, max(size.y, size.z));
+    if (area == 0.0 || !(largest > 0.0)) {
+        return vec4(0.0);
+    }
+    tangent = normalize(tangent / largest);
+    return vec4(tangent, dot(cross(normal, tangent), along_v) > 0.0 ? -1.0 : 1.0);
+}
+
+// Unit tangent of a normal map at a point, at right angles to `normal`, and the sign of the
+// bitangent: the stored one, else from the coordinates of the triangle. `normal` is the unit shading
+// normal on the front, from where the triangle is counter-clockwise. 0 if there is no tangent.
+vec4 surface_tangent(uint use_index, uint triangle, Attributes attributes, vec3 normal) {
+    vec3 stored = attributes.tangent.xyz - dot(attributes.tangent.xyz, normal) * normal;
+    float squared = dot(stored, stored);
+    if (squared > 1.0e-8) {
+        return vec4(stored * inversesqrt(squared), attributes.tangent.w < 0.0 ? -1.0 : 1.0);
+    }
+    TextureUse used = load_texture_use(use_index);
+    vec2 image[3];
+    for (uint corner = 0u; corner < 3u; corner++) {
+        image[corner] = image_coordinates(
+            used, corner_uv(triangle, corner, ATTRIBUTE_FIRST_UVS),
+            corner_uv(triangle, corner, ATTRIBUTE_SECOND_UVS));
+    }
+    vec3 a = uintBitsToFloat(triangle_texel(triangle, 0u).xyz);
+    vec3 b = uintBitsToFloat(triangle_texel(triangle, 1u).xyz);
+    vec3 c = uintBitsToFloat(triangle_texel(triangle, 2u).xyz);
+    return gradient_tangent(b - a, c - a, image[1] - image[0], image[2] - image[0], normal);
+}
+
+// 1 if `direction` leads to the front of a triangle, from where it is counter-clockwise, else -1.
+float triangle_side(uint triangle, vec3 direction) {
+    vec3 a = uintBitsToFloat(triangle_texel(triangle, 0u).xyz);
+    vec3 b = uintBitsToFloat(triangle_texel(triangle, 1u).xyz);
+    vec3 c = uintBitsToFloat(triangle_texel(triangle, 2u).xyz);
+    return dot(cross(b - a, c - a), direction) < 0.0 ? -1.0 : 1.0;
+}
+
+// Unit shading normal after a normal map. `shading_normal` and the result are on the same side of
+// the surface: the front for a `side` of 1, the back for -1, where the map's normals are turned
+// round. The caller still has to turn the result toward the viewer with consistent_normal.
+vec3 mapped_normal(
+    uint use_index, float normal_scale, uint triangle, Attributes attributes, vec3 shading_normal,
+    float side
+) {
+    vec3 normal = side * shading_normal;
+    vec4 tangent = surface_tangent(use_index, triangle, attributes, normal);
+    if (tangent.w == 0.0) {
+        return shading_normal;
+    }
+    vec3 local = 2.0 * texture_value(use_index, attributes.uv0, attributes.uv1).rgb - 1.0;
+    vec3 bitangent = tangent.w * cross(normal, tangent.xyz);
+    vec3 mapped = normal_scale * local.x * tangent.xyz + normal_scale * local.y * bitangent
+        + local.z * normal;
+    float squared = dot(mapped, mapped);
+    return squared > 1.0e-12 ? side * mapped * inversesqrt(squared) : shading_normal;
+}
+
+#endif

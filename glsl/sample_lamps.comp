@@ -1,0 +1,65 @@
+// Chooses one point on the lamps at every hit of the wave and writes a shadow ray to it, with its
+// unoccluded contribution. Draws candidates by the power of the lamps and keeps one in proportion to
+// what it brings: resampled importance sampling [Talbot et al. 2005]. Where a bounce ray may find the
+// lamp too, the balance heuristic weighs both by the density of one candidate and of the BRDF.
+#version 460
+
+#include "lamps.glsl"
+#include "vertex.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+layout(constant_id = CONSTANT_LAMP_CANDIDATES) const uint LAMP_CANDIDATES = 4u;
+
+// First dimension of lamps: each vertex has two for each candidate, and one for the choice.
+const uint DIMENSION_LAMP = 0x8000u;
+const uint DIMENSIONS_PER_LAMP_VERTEX = 32u;
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    if (path >= wave_path_count()) {
+        return;
+    }
+    Hit hit = load_hit(path);
+    if (hit.material == NO_MATERIAL) {
+        return;
+    }
+    Vertex vertex = load_vertex(path, hit);
+    uint dimension = DIMENSION_LAMP + wave.vertex * DIMENSIONS_PER_LAMP_VERTEX;
+    uint number = vertex.index.sample_index;
+    float u_choice = random_1d(vertex.index.pixel, number, dimension, wave.seed);
+    vec3 chosen_to_lamp = vec3(0.0);
+    vec3 chosen_contribution = vec3(0.0);
+    float chosen_target = 0.0;
+    float sum = 0.0;
+    for (uint c = 0u; c < LAMP_CANDIDATES; ++c) {
+        uint own = dimension + 1u + 2u * c;
+        LampSample lamp = sample_lamp(
+            hit.position, random_bits_2d(vertex.index.pixel, number, own, wave.seed),
+            random_2d(vertex.index.pixel, number, own + 1u, wave.seed));
+        vec3 incident_local = to_local(vertex.frame, lamp.direction);
+        vec3 value;
+        float brdf_pdf;
+        brdf_evaluate_and_pdf(
+            vertex.material, vertex.outgoing_local, incident_local, value, brdf_pdf);
+        bool is_above =
+            incident_local.z > 0.0 && dot(lamp.direction, hit.geometric_normal) > 0.0;
+        float weight = lamp.pdf > 0.0 ? lamp.pdf / (lamp.pdf + brdf_pdf) : 1.0;
+        vec3 contribution = is_above
+            ? value * lamp.radiance_over_pdf * (incident_local.z * weight)
+            : vec3(0.0);
+        float target = luminance(contribution);
+        sum += target;
+        if (target > 0.0) {
+            float probability = target / sum;
+            bool is_chosen = u_choice < probability;
+            u_choice = is_chosen ? u_choice / probability
+                                 : (u_choice - probability) / max(1.0 - probability, 1e-7);
+            chosen_to_lamp = is_chosen ? lamp.to_lamp : chosen_to_lamp;
+            chosen_contribution = is_chosen ? contribution : chosen_contribution;
+            chosen_target = is_chosen ? target : chosen_target;
+        }
+    }
+    float factor = chosen_target > 0.0 ? sum / (float(LAMP_CANDIDATES) * chosen_target) : 0.0;
+    write_ray(path, chosen_to_lamp, chosen_contribution * factor);
+}

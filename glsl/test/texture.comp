@@ -1,0 +1,61 @@
+// Probe of texture.glsl: a use and coordinates, and a point of a triangle, in; values out.
+#version 460
+
+#include "texture.glsl"
+
+READS(texture_uses)
+READS(material_surfaces)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+struct TextureQuery {
+    uint use_index;
+    uint material;
+    uint triangle;
+    float side;
+    vec2 uv0;
+    vec2 uv1;
+    vec3 weights;
+    vec3 shading_normal;
+};
+
+struct TextureAnswer {
+    vec4 value;
+    float number;
+    // Words that differ between the two ways to load a use or a surface.
+    uint differences;
+    vec2 uv0;
+    vec2 uv1;
+    vec4 tangent;
+    vec4 color;
+    float opacity;
+    vec3 mapped;
+};
+
+layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Inputs {
+    TextureQuery inputs[];
+};
+layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Outputs {
+    TextureAnswer outputs[];
+};
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= uint(inputs.length())) {
+        return;
+    }
+    TextureQuery query = inputs[index];
+    MaterialSurface surface = load_material_surface(query.material);
+    TextureUse used = load_texture_use(query.use_index);
+    uint differences = uint(used != texture_uses[query.use_index])
+        + uint(surface != material_surfaces[query.material]);
+    Attributes attributes = triangle_attributes(query.triangle, query.weights);
+    vec3 mapped = mapped_normal(
+        query.use_index, surface.normal_scale, query.triangle, attributes, query.shading_normal,
+        query.side);
+    outputs[index] = TextureAnswer(
+        texture_value(query.use_index, query.uv0, query.uv1),
+        texture_number(query.use_index, query.uv0, query.uv1), differences, attributes.uv0,
+        attributes.uv1, attributes.tangent, attributes.color, surface_opacity(surface, attributes),
+        mapped);
+}

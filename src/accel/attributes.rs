@@ -1,0 +1,134 @@
+//! Texture coordinates, tangents and colours of triangles in BVH order, as the shaders read them: twin
+//! of `triangle_attributes` in `glsl/include/texture.glsl`.
+
+use glam::{Vec2, Vec3, Vec4};
+use rayon::prelude::*;
+
+use super::Accel;
+use crate::{
+    math::octahedron,
+    scene::Geometry,
+    shader::constants::{
+        ATTRIBUTE_COLOR, ATTRIBUTE_FIRST_UVS, ATTRIBUTE_SECOND_UVS, ATTRIBUTE_TANGENT, FLAT_NORMAL,
+    },
+};
+
+/// Bits `ATTRIBUTE_…` of what the vertices of a geometry have.
+pub fn attributes_of(geometry: &Geometry) -> u32 {
+    let bit = |is_empty: bool, bit: u32| if is_empty { 0 } else { bit };
+    bit(geometry.uvs[0].is_empty(), ATTRIBUTE_FIRST_UVS)
+        | bit(geometry.uvs[1].is_empty(), ATTRIBUTE_SECOND_UVS)
+        | bit(geometry.tangents.is_empty(), ATTRIBUTE_TANGENT)
+        | bit(geometry.colors.is_empty(), ATTRIBUTE_COLOR)
+}
+
+/// Attributes of a point of a triangle, as in the shader.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attributes {
+    /// First set of texture coordinates; 0 where there is none.
+    pub uv0: Vec2,
+    /// Second set.
+    pub uv1: Vec2,
+    /// Tangent of any length along u of the first set, and sign of the bitangent; 0 for none.
+    pub tangent: Vec4,
+    /// Linear colour and opacity; 1 where there is none.
+    pub color: Vec4,
+}
+
+/// Words of the attributes of all triangles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TriangleAttributes {
+    /// Bits `ATTRIBUTE_…` of the attributes.
+    pub bits: u32,
+    /// Two words for each attribute of each corner of each triangle.
+    pub words: Vec<u32>,
+}
+
+impl TriangleAttributes {
+    /// Lays out those of the attributes `wanted` that the geometry has.
+    pub fn new(geometry: &Geometry, accel: &Accel, wanted: u32) -> Self {
+        let bits = wanted & attributes_of(geometry);
+        let stride = 6 * bits.count_ones() as usize;
+        let mut words = vec![0; accel.triangle_count() * stride];
+        if stride > 0 {
+            words.par_chunks_exact_mut(stride).zip(&accel.scene_triangles).for_each(
+                |(words, &triangle)| {
+                    let corners = geometry.triangles[triangle as usize];
+                    let places = words.chunks_exact_mut(stride / 3);
+                    for (corner, words) in corners.into_iter().zip(places) {
+                        write_corner(words, geometry, bits, corner as usize);
+                    }
+                },
+            );
+        }
+        Self { bits, words }
+    }
+
+    fn corner_attribute(&self, triangle: u32, corner: u32, bit: u32) -> [u32; 2] {
+        let place = 2 * (self.bits & (bit - 1)).count_ones();
+        let stride = 2 * self.bits.count_ones();
+        let word = ((3 * triangle + corner) * stride + place) as usize;
+        [self.words[word], self.words[word + 1]]
+    }
+
+    /// Texture coordinates `ATTRIBUTE_FIRST_UVS` or `ATTRIBUTE_SECOND_UVS` at a corner (0 to 2).
+    pub fn corner_uv(&self, triangle: u32, corner: u32, bit: u32) -> Vec2 {
+        if self.bits & bit == 0 {
+            return Vec2::ZERO;
+        }
+        self.corner_attribute(triangle, corner, bit).map(f32::from_bits).into()
+    }
+
+    /// Attributes at the point of a triangle in BVH order with these barycentric coordinates.
+    pub fn triangle_attributes(&self, triangle: u32, weights: Vec3) -> Attributes {
+        let uv = |bit| {
+            let [a, b, c] = [0, 1, 2].map(|corner| self.corner_uv(triangle, corner, bit));
+            weights.x * a + weights.y * b + weights.z * c
+        };
+        let (uv0, uv1) = (uv(ATTRIBUTE_FIRST_UVS), uv(ATTRIBUTE_SECOND_UVS));
+        let mut attributes = Attributes { uv0, uv1, tangent: Vec4::ZERO, color: Vec4::ONE };
+        if self.bits & ATTRIBUTE_TANGENT != 0 {
+            let [a, b, c] =
+                [0, 1, 2].map(|corner| self.corner_attribute(triangle, corner, ATTRIBUTE_TANGENT));
+            if ![a[0], b[0], c[0]].contains(&FLAT_NORMAL) {
+                let tangent = weights.x * octahedron::unpack(a[0])
+                    + weights.y * octahedron::unpack(b[0])
+                    + weights.z * octahedron::unpack(c[0]);
+                attributes.tangent = tangent.extend(f32::from_bits(a[1]));
+            }
+        }
+        if self.bits & ATTRIBUTE_COLOR != 0 {
+            let color = |corner| {
+                let [low, high] = self.corner_attribute(triangle, corner, ATTRIBUTE_COLOR);
+                let shorts = [low, low >> 16, high, high >> 16].map(|word| word as u16);
+                Vec4::from(shorts.map(f32::from)) / 65_535.0
+            };
+            attributes.color = weights.x * color(0) + weights.y * color(1) + weights.z * color(2);
+        }
+        attributes
+    }
+}
+
+fn write_corner(words: &mut [u32], geometry: &Geometry, bits: u32, vertex: usize) {
+    let mut pairs = words.chunks_exact_mut(2);
+    let mut write = |bit: u32, pair: &dyn Fn() -> [u32; 2]| {
+        if bits & bit != 0
+            && let Some(words) = pairs.next()
+        {
+            words.copy_from_slice(&pair());
+        }
+    };
+    write(ATTRIBUTE_FIRST_UVS, &|| geometry.uvs[0][vertex].map(f32::to_bits));
+    write(ATTRIBUTE_SECOND_UVS, &|| geometry.uvs[1][vertex].map(f32::to_bits));
+    write(ATTRIBUTE_TANGENT, &|| {
+        let [x, y, z, sign] = geometry.tangents[vertex];
+        let tangent = Vec3::new(x, y, z);
+        let is_there = tangent.length_squared() > 0.25;
+        [if is_there { octahedron::pack(tangent) } else { FLAT_NORMAL }, sign.to_bits()]
+    });
+    write(ATTRIBUTE_COLOR, &|| {
+        let quantise = |x: f32| (x.clamp(0.0, 1.0) * 65_535.0).round() as u32;
+        let [red, green, blue, alpha] = geometry.colors[vertex].map(quantise);
+        [red | green << 16, blue | alpha << 16]
+    });
+}

@@ -1,0 +1,151 @@
+//! Tables over the cosine between a direction and the normal: directional albedos of GGX surfaces, and
+//! what the sampling of plastics and principled materials derives from them.
+
+use std::sync::LazyLock;
+
+use glam::{Vec2, Vec3, vec2, vec3};
+use rayon::prelude::*;
+
+use crate::{
+    brdf::{fresnel::*, ggx::*, twin::sample_cosine_hemisphere},
+    math::colour::luminance,
+    shader::constants::*,
+};
+
+/// Points per dimension of the quadrature for one material.
+const FINE_POINTS: u32 = 64;
+/// Points per dimension of the quadrature for the table that materials share.
+const COARSE_POINTS: u32 = 32;
+
+/// Direction of a given cosine. Stays just above the horizon, where a rough surface reflects nothing,
+/// to give the limit there.
+fn direction_of_cosine(cosine: f32) -> Vec3 {
+    let cosine = cosine.max(1e-4);
+    vec3((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine)
+}
+
+/// Midpoints of a grid of `points`² cells over the unit square.
+fn grid(points: u32) -> impl Iterator<Item = Vec2> {
+    (0..points * points).map(move |index| {
+        vec2((index % points) as f32 + 0.5, (index / points) as f32 + 0.5) / points as f32
+    })
+}
+
+/// Directional albedo of a GGX surface; `fresnel` maps the cosine between direction and half vector
+/// to reflectance. Sums visible-normal samples at the midpoints of a grid: each weight is at most
+/// about 1, so 64² points are accurate to 1e-4.
+fn ggx_albedo(outgoing: Vec3, alpha: f32, points: u32, fresnel: impl Fn(f32) -> Vec3) -> Vec3 {
+    let mut sum = glam::DVec3::ZERO;
+    for u in grid(points) {
+        let incident = ggx_sample(outgoing, alpha, u);
+        if incident.z > 0.0 {
+            let half_vector = outgoing + incident;
+            let weight = ggx_reflection(half_vector, outgoing, incident, alpha)
+                / ggx_pdf(half_vector, outgoing, alpha)
+                * incident.z;
+            sum += (weight * fresnel((0.5 * half_vector.length()).min(1.0))).as_dvec3();
+        }
+    }
+    (sum / f64::from(points * points)).as_vec3()
+}
+
+/// Words of a plastic: directional albedo of the coat, transmission into and out of the base,
+/// probability of sampling the coat; see `PLASTIC_…_OFFSET`.
+pub fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
+    let fresnel = |cosine| Vec3::splat(fresnel_dielectric(cosine, ior));
+    let coat_albedo = |direction| ggx_albedo(direction, alpha, FINE_POINTS, fresnel).x.min(1.0);
+    let mut coat: Vec<f32> = (0..BRDF_COSINE_NODES)
+        .into_par_iter()
+        .map(|node| coat_albedo(direction_of_cosine(node as f32 / BRDF_COSINE_INTERVALS as f32)))
+        .collect();
+    // Next to the horizon, E falls steeply where the cosine is about α. Give the node there the
+    // least value that keeps the line to the next node above E, so that coat and base together
+    // never reflect more than they receive.
+    let horizon = [0.02, 0.06, 0.12, 0.25, 0.5, 0.75].into_iter().map(|fraction| {
+        let e = coat_albedo(direction_of_cosine(fraction / BRDF_COSINE_INTERVALS as f32));
+        (e - fraction * coat[1]) / (1.0 - fraction)
+    });
+    coat[0] = horizon.fold(coat[0], f32::max).min(1.0);
+    // Integrate Ē = 2∫E(μ)μ dμ of the piecewise linear E exactly, so that the interpolated base
+    // conserves energy: per interval of width w, ∫ = w·(μ₀(2E₀+E₁)+μ₁(E₀+2E₁))/6.
+    let width = 1.0 / f64::from(BRDF_COSINE_INTERVALS);
+    let mean: f64 = coat
+        .windows(2)
+        .zip(0..)
+        .map(|(pair, interval)| {
+            let (e0, e1) = (f64::from(pair[0]), f64::from(pair[1]));
+            let mu0 = f64::from(interval) * width;
+            let mu1 = mu0 + width;
+            width * (mu0 * (2.0 * e0 + e1) + mu1 * (e0 + 2.0 * e1)) / 3.0
+        })
+        .sum();
+    let normalisation = (1.0 / (1.0 - mean).max(1e-6).sqrt()) as f32;
+    let specular_share = coat.iter().map(|&e| {
+        let base = luminance(diffuse) * (1.0 - e);
+        if e + base > 0.0 { e / (e + base) } else { 0.5 }
+    });
+    coat.iter()
+        .copied()
+        .chain(coat.iter().map(|&e| (1.0 - e) * normalisation))
+        .chain(specular_share)
+        .map(f32::to_bits)
+        .collect()
+}
+
+/// Words of a conductor with exact Fresnel: directional albedo.
+pub fn conductor_words(alpha: f32, eta: Vec3, k: Vec3) -> Vec<u32> {
+    let fresnel = |cosine: f32| fresnel_conductor(cosine, eta, k);
+    (0..BRDF_COSINE_NODES)
+        .into_par_iter()
+        .flat_map_iter(|node| {
+            let direction = direction_of_cosine(node as f32 / BRDF_COSINE_INTERVALS as f32);
+            ggx_albedo(direction, alpha, FINE_POINTS, fresnel)
+                .clamp(Vec3::ZERO, Vec3::ONE)
+                .to_array()
+        })
+        .map(f32::to_bits)
+        .collect()
+}
+
+/// Words of the table that all GGX surfaces with a Schlick reflectance share.
+pub const GGX_WORDS: usize = (DIFFUSE_RISE_OFFSET + BRDF_COSINE_NODES) as usize;
+
+/// Albedo of GGX by roughness and cosine as factors of the reflectance at normal and at grazing
+/// incidence, and the mean rise of Schlick's reflectance over a diffuse base; see
+/// `GGX_ROUGHNESS_WORDS` and `DIFFUSE_RISE_OFFSET`. Computed once a process.
+pub fn ggx_words() -> &'static [u32] {
+    static WORDS: LazyLock<Vec<u32>> = LazyLock::new(|| {
+        let nodes = (GGX_ROUGHNESS_INTERVALS + 1) * BRDF_COSINE_NODES;
+        let ggx: Vec<[f32; 2]> = (0..nodes)
+            .into_par_iter()
+            .map(|index| {
+                let (row, node) = (index / BRDF_COSINE_NODES, index % BRDF_COSINE_NODES);
+                let roughness = row as f32 / GGX_ROUGHNESS_INTERVALS as f32;
+                let alpha = (roughness * roughness).max(SMALLEST_ALPHA);
+                let direction = direction_of_cosine(node as f32 / BRDF_COSINE_INTERVALS as f32);
+                let fresnel = |cosine: f32| {
+                    let rise = schlick_rise(cosine);
+                    vec3(1.0 - rise, rise, 0.0)
+                };
+                let factors = ggx_albedo(direction, alpha, COARSE_POINTS, fresnel);
+                [factors.x, factors.y]
+            })
+            .collect();
+        let rise = (0..BRDF_COSINE_NODES).map(|node| {
+            diffuse_rise(direction_of_cosine(node as f32 / BRDF_COSINE_INTERVALS as f32))
+        });
+        ggx.into_iter().flatten().chain(rise).map(f32::to_bits).collect()
+    });
+    &WORDS
+}
+
+/// Mean of Schlick's rise over incident directions in proportion to their cosine.
+fn diffuse_rise(outgoing: Vec3) -> f32 {
+    let sum: f64 = grid(COARSE_POINTS)
+        .map(|u| {
+            let half_vector = outgoing + sample_cosine_hemisphere(u);
+            f64::from(schlick_rise((0.5 * half_vector.length()).min(1.0)))
+        })
+        .sum();
+    (sum / f64::from(COARSE_POINTS * COARSE_POINTS)) as f32
+}

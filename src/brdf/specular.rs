@@ -1,0 +1,160 @@
+//! Twin of `glsl/include/specular.glsl`: same names, same order. Mirrors, dielectrics and thin panes:
+//! materials at which paths go on in a sampled direction, and no light is sampled.
+//!
+//! Directions are unit vectors in the shading frame, whose z points to the side of the viewer, and
+//! point away from the surface: transmitted ones have z < 0. Values are per steradian without the
+//! cosine.
+//!
+//! Values are for radiance on its way to the viewer, as in pbrt and Mitsuba: light that comes through
+//! an interface is scaled by (index of the viewer's side / index of the light's side)², so that light
+//! that goes in and out again has its former radiance. Values of importance would lack this factor.
+
+use glam::{Vec3, vec2, vec3};
+
+use crate::{
+    brdf::{fresnel::*, ggx::*},
+    math::colour::luminance,
+    shader::{constants::*, structs::Material},
+};
+
+/// Continuation of a path; a weight of 0 ends it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scatter {
+    /// Next direction.
+    pub direction_local: Vec3,
+    /// Value · |cosine| / density.
+    pub weight: Vec3,
+    /// True if the direction is on the other side.
+    pub is_transmitted: bool,
+}
+
+/// Refractive index of the side that the viewer does not see over that of the viewer's.
+fn relative_index(material: &Material, is_back: bool) -> f32 {
+    if is_back { 1.0 / material.ior } else { material.ior }
+}
+
+/// Probability of reflection: its part of all light by luminance.
+fn reflection_probability(material: &Material, fresnel: f32) -> f32 {
+    let reflected = fresnel * luminance(material.reflectance.into());
+    let sum = reflected + (1.0 - fresnel) * luminance(material.eta.into());
+    if sum > 0.0 { reflected / sum } else { 1.0 }
+}
+
+/// Refracts at a normal.
+fn refracted(outgoing_local: Vec3, normal: Vec3, eta: f32) -> Vec3 {
+    let cosine = outgoing_local.dot(normal);
+    (cosine / eta - refracted_cosine(cosine, eta)) * normal - outgoing_local / eta
+}
+
+/// Interface of a dielectric: smooth at alpha = 0, else GGX by visible normals. \[Walter et al. 2007\].
+fn dielectric_scatter(
+    material: &Material,
+    outgoing_local: Vec3,
+    is_back: bool,
+    u: Vec3,
+) -> Scatter {
+    let eta = relative_index(material, is_back);
+    let mut normal = Vec3::Z;
+    if material.alpha > 0.0 {
+        normal = ggx_normal_sample(outgoing_local, material.alpha, 1.0, vec2(u.y, u.z));
+    }
+    let cosine = outgoing_local.dot(normal);
+    let fresnel = fresnel_interface(cosine, eta);
+    let probability = reflection_probability(material, fresnel);
+    let is_transmitted = u.x >= probability;
+    let (direction_local, mut weight) = if is_transmitted {
+        (
+            refracted(outgoing_local, normal, eta),
+            (1.0 - fresnel) / ((1.0 - probability) * eta * eta) * Vec3::from(material.eta),
+        )
+    } else {
+        (
+            2.0 * cosine * normal - outgoing_local,
+            fresnel / probability * Vec3::from(material.reflectance),
+        )
+    };
+    if material.alpha > 0.0 {
+        weight *= ggx_masking_ratio(outgoing_local, direction_local, material.alpha);
+    }
+    // A normal may send light to the wrong side of the surface: no sample.
+    if cosine <= 0.0 || (direction_local.z < 0.0) != is_transmitted {
+        weight = Vec3::ZERO;
+    }
+    Scatter { direction_local, weight, is_transmitted }
+}
+
+/// Value and density of [`scatter`] at a dielectric for one pair of directions; 0 for a smooth one.
+pub fn dielectric_evaluate_and_pdf(
+    material: &Material,
+    outgoing_local: Vec3,
+    incident_local: Vec3,
+    is_back: bool,
+) -> (Vec3, f32) {
+    if material.alpha == 0.0 || outgoing_local.z <= 0.0 || incident_local.z == 0.0 {
+        return (Vec3::ZERO, 0.0);
+    }
+    let eta = relative_index(material, is_back);
+    let is_transmitted = incident_local.z < 0.0;
+    let half_vector = outgoing_local + (if is_transmitted { eta } else { 1.0 }) * incident_local;
+    let normal = (if half_vector.z < 0.0 { -half_vector } else { half_vector }).normalize();
+    let cosine = outgoing_local.dot(normal);
+    let incident_cosine = incident_local.dot(normal);
+    if cosine <= 0.0 || (incident_cosine < 0.0) != is_transmitted {
+        return (Vec3::ZERO, 0.0);
+    }
+    let fresnel = fresnel_interface(cosine, eta);
+    let probability = reflection_probability(material, fresnel);
+    let density = ggx_visible_density(normal, outgoing_local, material.alpha);
+    // G₂·D / (cos o · cos i), by the density of visible normals.
+    let ratio = ggx_masking_ratio(outgoing_local, incident_local, material.alpha) * density
+        / incident_local.z.abs();
+    if is_transmitted {
+        let jacobian = cosine * incident_cosine.abs() / half_vector.dot(half_vector);
+        let value = (1.0 - fresnel) * ratio * jacobian * Vec3::from(material.eta);
+        (value, (1.0 - probability) * density * jacobian * eta * eta)
+    } else {
+        let value = 0.25 * fresnel * ratio * Vec3::from(material.reflectance);
+        (value, 0.25 * probability * density)
+    }
+}
+
+/// Pane: reflects as a mirror or lets light straight through.
+fn pane_scatter(material: &Material, outgoing_local: Vec3, u: Vec3) -> Scatter {
+    let reflectance = pane_reflectance(material, outgoing_local.z);
+    let transmittance = pane_transmittance(material, outgoing_local.z);
+    let reflected = luminance(reflectance);
+    let sum = reflected + luminance(transmittance);
+    let probability = if sum > 0.0 { reflected / sum } else { 1.0 };
+    if u.x < probability {
+        return Scatter {
+            direction_local: vec3(-outgoing_local.x, -outgoing_local.y, outgoing_local.z),
+            weight: reflectance / probability,
+            is_transmitted: false,
+        };
+    }
+    Scatter {
+        direction_local: -outgoing_local,
+        weight: transmittance / (1.0 - probability),
+        is_transmitted: true,
+    }
+}
+
+/// Samples the next direction of a path with three numbers in [0, 1). `is_back` tells that the viewer
+/// sees the back of the triangles, where the inside of a dielectric is. Materials of other kinds end
+/// the path.
+pub fn scatter(material: &Material, outgoing_local: Vec3, is_back: bool, u: Vec3) -> Scatter {
+    if outgoing_local.z > 0.0 && material.kind == MATERIAL_MIRROR {
+        return Scatter {
+            direction_local: vec3(-outgoing_local.x, -outgoing_local.y, outgoing_local.z),
+            weight: material.reflectance.into(),
+            is_transmitted: false,
+        };
+    }
+    if outgoing_local.z > 0.0 && material.kind == MATERIAL_DIELECTRIC {
+        return dielectric_scatter(material, outgoing_local, is_back, u);
+    }
+    if outgoing_local.z > 0.0 && material.kind == MATERIAL_THIN_DIELECTRIC {
+        return pane_scatter(material, outgoing_local, u);
+    }
+    Scatter { direction_local: Vec3::Z, weight: Vec3::ZERO, is_transmitted: false }
+}

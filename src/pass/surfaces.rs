@@ -1,0 +1,74 @@
+//! Specialization of passes by what the surfaces of a scene need.
+
+use super::texture_buffers::TextureAccess;
+use crate::{
+    brdf::{Material, material::MaterialKind},
+    shader::constants::{
+        CONSTANT_MATERIAL_KINDS, CONSTANT_SURFACES, SURFACES_EMITTING, SURFACES_ONE_SIDED,
+        SURFACES_PASSING, SURFACES_SPECULAR, SURFACES_TEXTURED,
+    },
+};
+
+/// Kinds and properties that occur in a scene. Passes leave out the code of all others.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Surfaces {
+    /// Bit `1 << kind` for every kind of material.
+    pub material_kinds: u32,
+    /// Bits `SURFACES_…`.
+    pub features: u32,
+    /// Columns of the alias table over lamps and emitting triangles.
+    pub lamp_count: u32,
+    /// Access to textures and to attributes of triangles.
+    pub access: TextureAccess,
+}
+
+impl Surfaces {
+    /// Specialization constants of a pass over surfaces.
+    pub fn constants(&self) -> Vec<(u32, u32)> {
+        let own =
+            [(CONSTANT_MATERIAL_KINDS, self.material_kinds), (CONSTANT_SURFACES, self.features)];
+        [&own[..], &self.access.constants()].concat()
+    }
+
+    /// True if textures or vertex colours vary a material.
+    pub fn is_textured(&self) -> bool {
+        self.features & SURFACES_TEXTURED != 0
+    }
+
+    /// True if some material emits light.
+    pub fn emits(&self) -> bool {
+        self.features & SURFACES_EMITTING != 0
+    }
+
+    /// True if paths meet surfaces at which no light is sampled.
+    pub fn has_specular(&self) -> bool {
+        self.features & SURFACES_SPECULAR != 0
+    }
+}
+
+/// Bits `SURFACES_…` of what `materials` need.
+pub fn features(materials: &[Material]) -> u32 {
+    materials.iter().fold(0, |bits, material| bits | features_of(material))
+}
+
+fn features_of(material: &Material) -> u32 {
+    let surface = &material.surface;
+    let is_pane = matches!(material.kind, MaterialKind::ThinDielectric { .. });
+    let is_specular = is_pane
+        || matches!(material.kind, MaterialKind::Mirror { .. } | MaterialKind::Dielectric { .. });
+    let is_opaque =
+        surface.opacity.factor >= 1.0 && surface.opacity.texture.is_none() && !surface.vertex_color;
+    let is_textured = surface.vertex_color
+        || [&surface.color, &surface.roughness, &surface.metallic, &surface.normal]
+            .iter()
+            .any(|texture| texture.is_some());
+    [
+        (SURFACES_SPECULAR, is_specular),
+        (SURFACES_PASSING, is_pane || !is_opaque),
+        (SURFACES_ONE_SIDED, !surface.two_sided),
+        (SURFACES_TEXTURED, is_textured),
+        (SURFACES_EMITTING, surface.emission.is_some()),
+    ]
+    .into_iter()
+    .fold(0, |bits, (bit, is_needed)| if is_needed { bits | bit } else { bits })
+}

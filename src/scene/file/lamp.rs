@@ -1,0 +1,83 @@
+//! `[[lamp]]`.
+
+use serde::Deserialize;
+
+/// One `[[lamp]]`.
+#[derive(Clone, Debug)]
+pub struct LampEntry {
+    /// Line of the entry, from 1.
+    pub line: usize,
+    /// Name, for messages.
+    pub name: Option<String>,
+    /// Kind and its numbers.
+    pub kind: LampKindEntry,
+}
+
+/// Keys of a `[[lamp]]` that depend on its `type`.
+#[derive(Clone, Debug)]
+pub enum LampKindEntry {
+    /// `point`.
+    Point(PointEntry),
+    /// `spot`.
+    Spot(SpotEntry),
+    /// `directional`.
+    Directional(DirectionalEntry),
+}
+
+/// Keys of a `point` lamp.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PointEntry {
+    /// Place, metres.
+    pub position: [f32; 3],
+    /// Radiant intensity per steradian.
+    pub intensity: [f32; 3],
+}
+
+/// Keys of a `spot` lamp.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpotEntry {
+    /// Place, metres.
+    pub position: [f32; 3],
+    /// Axis of the cone, away from the lamp, of any length.
+    pub direction: [f32; 3],
+    /// Radiant intensity along the axis, per steradian.
+    pub intensity: [f32; 3],
+    /// Angle to the axis where the light begins to fall off, degrees.
+    #[serde(default)]
+    pub inner_angle_deg: f32,
+    /// Angle to the axis from which there is no light, degrees, above the inner one, at most 180.
+    #[serde(default = "default_outer_angle_deg")]
+    pub outer_angle_deg: f32,
+    /// Course of the light between these angles.
+    #[serde(default)]
+    pub falloff: SpotFalloffEntry,
+}
+
+fn default_outer_angle_deg() -> f32 {
+    45.0
+}
+
+/// `falloff` of a spot.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SpotFalloffEntry {
+    /// As in glTF.
+    #[default]
+    SquaredCosine,
+    /// As in pbrt.
+    SmoothCosine,
+    /// As in Mitsuba.
+    LinearAngle,
+}
+
+/// Keys of a `directional` lamp.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DirectionalEntry {
+    /// Direction in which the light travels, of any length.
+    pub direction: [f32; 3],
+    /// Irradiance on a surface that faces the light.
+    pub irradiance: [f32; 3],
+}

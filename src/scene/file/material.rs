@@ -1,0 +1,226 @@
+//! `[[material]]`.
+
+use std::path::PathBuf;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::value::{TextureEntry, Textured};
+
+/// One `[[material]]`.
+#[derive(Clone, Debug)]
+pub struct MaterialEntry {
+    /// Line of the entry, from 1.
+    pub line: usize,
+    /// Keys of all types.
+    pub keys: MaterialKeys,
+    /// Model and its parameters.
+    pub kind: MaterialKindEntry,
+}
+
+/// Keys of every `[[material]]`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MaterialKeys {
+    /// Name that objects refer to.
+    pub name: String,
+    /// Model; the keys of each are below.
+    pub r#type: Spanned<String>,
+    /// Normal map: a texture whose red, green and blue are 0…1 for −1…1 along u, v and the normal.
+    pub normal: Option<TextureEntry>,
+    /// Share of light that the surface stops, 0…1; the rest goes straight through. Default: 1.
+    pub opacity: Option<Textured<f32>>,
+    /// Opacity from which the surface is opaque, and below which it is not there. Default: none,
+    /// so that a surface may be half there.
+    pub opacity_cutoff: Option<f32>,
+    /// Radiance that the surface emits on the side from which its triangles are counter-clockwise.
+    pub emission: Option<Textured<[f32; 3]>>,
+    /// Emits on both sides.
+    #[serde(default)]
+    pub emission_two_sided: bool,
+    /// Without, the back of the surface is black.
+    #[serde(default = "default_two_sided")]
+    pub two_sided: bool,
+    /// Multiplies colour and opacity by the vertex colours of the mesh.
+    #[serde(default)]
+    pub vertex_color: bool,
+}
+
+fn default_two_sided() -> bool {
+    true
+}
+
+/// Keys of a `[[material]]` that depend on its `type`.
+#[derive(Clone, Debug)]
+pub enum MaterialKindEntry {
+    /// `diffuse`.
+    Diffuse(DiffuseEntry),
+    /// `plastic`.
+    Plastic(PlasticEntry),
+    /// `conductor`.
+    Conductor(ConductorEntry),
+    /// `principled`.
+    Principled(PrincipledEntry),
+    /// `mirror`.
+    Mirror(MirrorEntry),
+    /// `dielectric`.
+    Dielectric(DielectricEntry),
+    /// `thin_dielectric`.
+    ThinDielectric(ThinDielectricEntry),
+    /// `measured`.
+    Measured(MeasuredEntry),
+}
+
+/// Keys of a `diffuse` material.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DiffuseEntry {
+    /// Albedo, 0…1.
+    pub reflectance: Textured<[f32; 3]>,
+}
+
+/// Keys of a `plastic` material.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlasticEntry {
+    /// Albedo of the base, 0…1.
+    pub diffuse: Textured<[f32; 3]>,
+    /// GGX width α, 0.001…1; this or `roughness`.
+    pub alpha: Option<f32>,
+    /// √α, one number.
+    pub roughness: Option<Textured<f32>>,
+    /// Refractive index of the coat, 1.01…4.
+    #[serde(default = "default_ior")]
+    pub ior: f32,
+}
+
+fn default_ior() -> f32 {
+    1.5
+}
+
+/// Keys of a `conductor` material; either `reflectance` or `eta` and `k`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConductorEntry {
+    /// GGX width α, 0.001…1; this or `roughness`.
+    pub alpha: Option<f32>,
+    /// √α.
+    pub roughness: Option<Textured<f32>>,
+    /// Reflectance at normal incidence, 0…1 (Schlick); this, or `eta` and `k`.
+    pub reflectance: Option<Textured<[f32; 3]>>,
+    /// Real part of the refractive index (exact Fresnel).
+    pub eta: Option<[f32; 3]>,
+    /// Extinction coefficient (exact Fresnel).
+    pub k: Option<[f32; 3]>,
+}
+
+/// Keys of a `principled` material.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PrincipledEntry {
+    /// Albedo of the dielectric's base, and reflectance of the metal at normal incidence, 0…1.
+    pub base_color: Textured<[f32; 3]>,
+    /// Share of metal, 0…1.
+    #[serde(default = "default_metallic")]
+    pub metallic: Textured<f32>,
+    /// √α, 0…1.
+    pub roughness: Textured<f32>,
+    /// Refractive index of the dielectric, 1…4.
+    #[serde(default = "default_ior")]
+    pub ior: f32,
+    /// Factor of the dielectric's specular reflection, 0…1.
+    #[serde(default = "default_specular")]
+    pub specular: f32,
+    /// Factor of the dielectric's reflectance at normal incidence.
+    #[serde(default = "default_factor")]
+    pub specular_color: [f32; 3],
+}
+
+fn default_metallic() -> Textured<f32> {
+    Textured::Uniform(0.0)
+}
+
+fn default_specular() -> f32 {
+    1.0
+}
+
+fn default_factor() -> [f32; 3] {
+    [1.0, 1.0, 1.0]
+}
+
+/// Keys of a `mirror`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MirrorEntry {
+    /// Reflectance in all directions, 0…1.
+    pub reflectance: Textured<[f32; 3]>,
+}
+
+/// Keys of a `dielectric` material.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DielectricEntry {
+    /// Refractive index of the inside over that of the outside, 0.2…5.
+    #[serde(default = "default_ior")]
+    pub ior: f32,
+    /// GGX width α, 0.001…1, or 0 for a smooth surface; this or `roughness`. Default: 0.
+    pub alpha: Option<f32>,
+    /// √α, one number.
+    pub roughness: Option<Textured<f32>>,
+    /// Factor of the reflected light, 0…1.
+    #[serde(default = "default_factor")]
+    pub reflectance: [f32; 3],
+    /// Factor of the transmitted light, 0…1.
+    #[serde(default = "default_factor")]
+    pub transmittance: [f32; 3],
+}
+
+/// Keys of a `thin_dielectric` material.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ThinDielectricEntry {
+    /// Refractive index, 1…4.
+    #[serde(default = "default_ior")]
+    pub ior: f32,
+    /// Factor of the reflected light, 0…1.
+    #[serde(default = "default_factor")]
+    pub reflectance: [f32; 3],
+    /// Factor of the transmitted light, 0…1.
+    #[serde(default = "default_factor")]
+    pub transmittance: [f32; 3],
+}
+
+/// Keys of a `measured` material.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeasuredEntry {
+    /// MERL or Cornell file, relative to the scene file.
+    pub file: PathBuf,
+}
+
+impl MaterialEntry {
+    /// Every texture that the entry names.
+    pub fn textures(&self) -> impl Iterator<Item = &TextureEntry> {
+        let keys = &self.keys;
+        let (color, roughness, metallic) = match &self.kind {
+            MaterialKindEntry::Diffuse(entry) => (entry.reflectance.texture(), None, None),
+            MaterialKindEntry::Plastic(entry) => (entry.diffuse.texture(), None, None),
+            MaterialKindEntry::Conductor(entry) => (
+                entry.reflectance.as_ref().and_then(Textured::texture),
+                entry.roughness.as_ref().and_then(Textured::texture),
+                None,
+            ),
+            MaterialKindEntry::Principled(entry) => {
+                (entry.base_color.texture(), entry.roughness.texture(), entry.metallic.texture())
+            }
+            MaterialKindEntry::Mirror(entry) => (entry.reflectance.texture(), None, None),
+            MaterialKindEntry::Dielectric(_)
+            | MaterialKindEntry::ThinDielectric(_)
+            | MaterialKindEntry::Measured(_) => (None, None, None),
+        };
+        let opacity = keys.opacity.as_ref().and_then(Textured::texture);
+        let emission = keys.emission.as_ref().and_then(Textured::texture);
+        let all = [color, roughness, metallic, keys.normal.as_ref(), opacity, emission];
+        all.into_iter().flatten()
+    }
+}

@@ -1,0 +1,90 @@
+//! `[[include]]`: everything in a glTF or OBJ file, placed in the scene.
+
+use std::path::PathBuf;
+
+use super::{Loader, whole};
+use crate::{
+    brdf::Material,
+    error::Result,
+    scene::{
+        Geometry, features,
+        file::{IncludeEntry, IncludeKeys},
+        mesh::Mesh,
+        transform::Transform,
+    },
+};
+
+impl Loader<'_> {
+    /// Appends the triangles of a file to the geometry, and its materials, apart from those that the
+    /// entry replaces.
+    pub(super) fn include(
+        &self,
+        entry: &IncludeEntry,
+        materials: &mut Vec<Material>,
+        geometry: &mut Geometry,
+        inputs: &mut Vec<PathBuf>,
+        warnings: &mut Vec<String>,
+    ) -> Result<()> {
+        let IncludeKeys { file, scale, rotate_deg, translate, materials: replaced } = &entry.keys;
+        let label = format!("include {} (line {})", file.display(), entry.line);
+        self.check_transform(&label, scale.0, *rotate_deg, *translate)?;
+        let path = self.folder.join(file);
+        self.check(whole::is_whole(&path), || {
+            format!("{label}: expected a file in .gltf, .glb or .obj; other meshes are objects")
+        })?;
+        let mesh = Mesh::read(&path, warnings)?;
+        inputs.push(path.clone());
+        inputs.extend_from_slice(&mesh.side_files);
+        let mut ignored = mesh.ignored_in_materials();
+        for (index, camera) in mesh.cameras.iter().enumerate() {
+            ignored.add(features::GLTF_CAMERAS, || camera.label(index));
+        }
+        for lamp in &mesh.lamps {
+            ignored.add(features::GLTF_OBJECT_LIGHTS, || format!("light `{}`", lamp.name));
+        }
+        // The file by itself, so that it becomes the same as a whole scene and as a part of one.
+        let (own_materials, placed) =
+            Loader::new(&path).place_whole(&mesh, &mut ignored, warnings)?;
+        drop(mesh);
+        warnings.extend(ignored.warnings(&path));
+        for name in replaced.keys() {
+            let is_there = own_materials.iter().any(|material| material.name == *name);
+            self.check(is_there, || {
+                let names: Vec<_> = own_materials.iter().map(|own| own.name.as_str()).collect();
+                format!(
+                    "{label}: materials: expected names of the file's materials, found `{name}`; \
+                     the file has {}",
+                    names.join(", ")
+                )
+            })?;
+        }
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let mut places = Vec::with_capacity(own_materials.len());
+        for own in own_materials {
+            places.push(match replaced.get(&own.name) {
+                Some(name) => self.material_index(&label, name, materials)?,
+                None => {
+                    let name = format!("{stem}/{}", own.name);
+                    materials.push(Material { name, ..own });
+                    materials.len() as u32 - 1
+                }
+            });
+        }
+        let vertices = geometry.positions.len() + placed.positions.len();
+        let triangles = geometry.triangles.len() + placed.triangles.len();
+        self.check_counts(vertices, triangles)?;
+        let transform = Transform::new(scale.0, *rotate_deg, *translate);
+        let first_vertex = geometry.positions.len();
+        let Geometry { positions, normals, uvs, tangents, colors, triangles, materials: of } =
+            placed;
+        let count = triangles.len();
+        let mesh = Mesh { positions, normals, uvs, tangents, colors, triangles, ..Mesh::default() };
+        let dropped = geometry.append(&mesh, &transform, |index| places[of[index] as usize]);
+        self.check_extent(&label, &geometry.positions[first_vertex..])?;
+        warnings.extend(dropped.warnings(&label, count));
+        if count == 0 {
+            warnings.push(format!("{label}: the file has no triangles"));
+        }
+        Ok(())
+    }
+}
