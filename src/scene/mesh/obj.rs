@@ -1,5 +1,6 @@
 //! Wavefront OBJ: positions, texture coordinates, normals, faces of every group, and the materials of
-//! its MTL libraries. Names everything else that the files hold ([`features::OBJ`], [`features::MTL`]) in a warning.
+//! its MTL libraries. Names everything else that the files hold ([`features::OBJ`],
+//! [`features::MTL`]) in a warning.
 //!
 //! Deviation: parsed here and not by a crate, so that every message names the line and the index, and a
 //! large file needs no more memory than its mesh.
