@@ -423,9 +423,14 @@ fn pipes_and_devices_are_no_input() {
         run.assert(1, &[&format!("error: {name}: {refused}pipe")]);
     }
     let folder = mesh("quad.obj");
-    folder.write("quad.obj", "mtllib /dev/zero\nv -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n");
+    let obj = "mtllib pipe.mtl\nv -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n";
+    folder.write("quad.obj", obj);
+    assert!(Command::new("mkfifo").arg(folder.path().join("pipe.mtl")).status().unwrap().success());
     let run = run_limited(&folder, &RENDER);
-    run.assert(0, &["quad.obj:1: cannot read the material library /dev/zero"]);
+    run.assert(0, &["quad.obj:1: cannot read the material library pipe.mtl"]);
+    folder.write("quad.obj", obj.replace("pipe.mtl", "/dev/zero"));
+    let run = run_limited(&folder, &RENDER);
+    run.assert(1, &["quad.obj:1:1: the file name `/dev/zero` is absolute"]);
 }
 
 #[cfg(unix)]

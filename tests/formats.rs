@@ -91,7 +91,7 @@ fn everything_that_a_gltf_file_loses_is_named_once() {
     let own = toml.strip_suffix("material = \"clay\"\n").unwrap();
     let scene = Scene::load(&folder.write("b.toml", own)).unwrap();
     assert_eq!(of_materials(&scene), 4, "{:#?}", scene.warnings);
-    assert!(scene.warnings.iter().any(|text| text.contains("lights of a mesh in a `.toml` scene")));
+    assert!(scene.warnings.iter().any(|text| text.contains("lights of a file in a `.toml` scene")));
 }
 
 #[test]

@@ -93,7 +93,7 @@ features! {
     GLTF_LIGHTS Done "`KHR_lights_punctual`"
         "candela and lux count as W/sr and W/m² of each colour channel";
     GLTF_LIGHT_RANGE Ignored "range of lights" "light falls off with the squared distance alone";
-    GLTF_OBJECT_LIGHTS Ignored "lights of a mesh in a `.toml` scene" "";
+    GLTF_OBJECT_LIGHTS Ignored "lights of a file in a `.toml` scene" "";
     GLTF_UNLIT Mapped "`KHR_materials_unlit`"
         "emits its base colour on both sides and reflects nothing, so that it also lights others";
     GLTF_UNLIT_COLOR Ignored "vertex colours of unlit materials" "";

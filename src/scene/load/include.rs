@@ -39,6 +39,9 @@ impl Loader<'_> {
         for (index, camera) in mesh.cameras.iter().enumerate() {
             ignored.add(features::GLTF_CAMERAS, || camera.label(index));
         }
+        for lamp in &mesh.lamps {
+            ignored.add(features::GLTF_OBJECT_LIGHTS, || format!("light `{}`", lamp.name));
+        }
         // The file by itself, so that it becomes the same as a whole scene and as a part of one.
         let (own_materials, placed) =
             Loader::new(&path).place_whole(&mesh, &mut ignored, warnings)?;

@@ -229,7 +229,7 @@ impl Loader<'_> {
 }
 
 /// Warning of a material with textures on a mesh without texture coordinates.
-fn lacking_uvs(label: &str, material: &Material, mesh: &Mesh) -> Option<String> {
+pub(super) fn lacking_uvs(label: &str, material: &Material, mesh: &Mesh) -> Option<String> {
     let lacks = |set: u32| mesh.uvs[set.min(1) as usize].is_empty();
     let texture = material.surface.textures().find(|used| lacks(used.uv_set))?;
     Some(format!(

@@ -4,7 +4,9 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::{LoadOptions, Loader, MAX_FILM_SIDE, default_material, light::Light};
+use super::{
+    LoadOptions, Loader, MAX_FILM_SIDE, default_material, light::Light, objects::lacking_uvs,
+};
 use crate::{
     brdf::{Material, material::MaterialKind},
     error::Result,
@@ -141,7 +143,9 @@ impl Loader<'_> {
             run.unwrap_or(lacking) as u32
         });
         self.check_extent("the scene", &geometry.positions)?;
-        warnings.extend(dropped.warnings(&self.path.display().to_string(), mesh.triangles.len()));
+        let label = self.path.display().to_string();
+        warnings.extend(materials.iter().filter_map(|own| lacking_uvs(&label, own, mesh)));
+        warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
         Ok((materials, geometry))
     }
 

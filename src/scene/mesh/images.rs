@@ -1,17 +1,18 @@
-//! Images of a mesh file: files are read once, and texels looked at.
+//! Images of a mesh file.
 
 use std::{
-    collections::HashMap,
+    collections::HashSet,
     path::{Path, PathBuf},
     sync::Arc,
 };
 
-use crate::texture::{Channels, Encoding, Texels, Texture, TextureUse};
+use crate::texture::{Texels, Texture, TextureCache};
 
-/// Images that have been read so far.
+/// Image files, each read once.
 #[derive(Debug, Default)]
 pub(super) struct Images {
-    read: HashMap<PathBuf, Option<Arc<Texture>>>,
+    cache: TextureCache,
+    unreadable: HashSet<PathBuf>,
 }
 
 impl Images {
@@ -23,30 +24,22 @@ impl Images {
         place: &str,
         warnings: &mut Vec<String>,
     ) -> Option<Arc<Texture>> {
-        if let Some(found) = self.read.get(path) {
-            return found.clone();
+        if self.unreadable.contains(path) {
+            return None;
         }
-        let texture = match Texture::load(path) {
-            Ok(texture) => Some(Arc::new(texture)),
+        match self.cache.load(path, warnings) {
+            Ok(texture) => Some(texture),
             Err(error) => {
                 warnings.push(format!("{error}; rendered without this texture ({place})"));
+                self.unreadable.insert(path.to_owned());
                 None
             }
-        };
-        self.read.insert(path.to_owned(), texture.clone());
-        texture
+        }
     }
 
     /// Files that have been read.
-    pub(super) fn files(&self) -> Vec<PathBuf> {
-        let mut files: Vec<_> = self
-            .read
-            .iter()
-            .filter(|(_, texture)| texture.is_some())
-            .map(|(path, _)| path.clone())
-            .collect();
-        files.sort();
-        files
+    pub(super) fn files(&self) -> impl Iterator<Item = PathBuf> {
+        self.cache.files().into_iter()
     }
 }
 
@@ -57,11 +50,4 @@ pub(super) fn has_alpha(texture: &Texture) -> bool {
         Texels::Shorts(texels) => texels.iter().any(|texel| texel[3] < u16::MAX),
         Texels::Halves(texels) => texels.iter().any(|texel| texel[3].to_f32() < 1.0),
     }
-}
-
-/// Mean of a channel over all texels, taken as linear.
-pub(super) fn mean(texture: &Arc<Texture>, channel: usize) -> f32 {
-    let channels = [Channels::Red, Channels::Green, Channels::Blue, Channels::Alpha][channel];
-    let used = TextureUse::new(Arc::clone(texture));
-    TextureUse { channels, encoding: Encoding::Linear, ..used }.mean()[0]
 }

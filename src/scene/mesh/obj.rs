@@ -1,5 +1,6 @@
 //! Wavefront OBJ: positions, texture coordinates, normals, faces of every group, and the materials of
-//! its MTL libraries. Names everything else that the files hold ([`features::OBJ`], [`features::MTL`]) in a warning.
+//! its MTL libraries. Names everything else that the files hold ([`features::OBJ`],
+//! [`features::MTL`]) in a warning.
 //!
 //! Deviation: parsed here and not by a crate, so that every message names the line and the index, and a
 //! large file needs no more memory than its mesh.
@@ -340,7 +341,7 @@ impl ObjReader<'_> {
             let unnamed = super::MaterialRun { first_triangle: 0, material: None };
             self.mesh.runs.insert(0, unnamed);
         }
-        self.mesh.side_files.append(&mut self.images.files());
+        self.mesh.side_files.extend(self.images.files());
         self.mesh.complete_tangents(1.0);
         (self.mesh, self.ignored)
     }

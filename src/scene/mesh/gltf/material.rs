@@ -237,13 +237,12 @@ impl GltfReader<'_> {
         let &MaterialKind::Principled { metallic, roughness, ior, .. } = &found.kind else {
             return Ok(());
         };
-        let mean = |texture: &Option<TextureUse>, channel| {
-            texture.as_ref().map_or(1.0, |used| images::mean(&used.texture, channel))
-        };
+        let mean =
+            |texture: &Option<TextureUse>| texture.as_ref().map_or(1.0, |used| used.mean()[0]);
         let texture = self.use_texture(&transmission["transmissionTexture"], RED, reading)?;
         let transmitted = share(transmission, "transmissionFactor", 0.0)
-            * mean(&texture, 0)
-            * (1.0 - metallic * mean(&found.surface.metallic, 2));
+            * mean(&texture)
+            * (1.0 - metallic * mean(&found.surface.metallic));
         if transmitted < GLASS {
             reading.ignore_if(transmitted > 0.0, features::GLTF_LOW_TRANSMISSION);
             return Ok(());
@@ -265,7 +264,7 @@ impl GltfReader<'_> {
                 transmittance,
             }
         } else {
-            let rough = roughness * mean(&found.surface.roughness, 1);
+            let rough = roughness * mean(&found.surface.roughness);
             reading.ignore_if(rough > VISIBLE_ROUGHNESS, features::GLTF_THIN_ROUGHNESS);
             found.surface.roughness = None;
             MaterialKind::ThinDielectric { ior, reflectance, transmittance }

@@ -63,7 +63,7 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
     reader.mesh.side_files = buffer_files.collect();
     reader.read_scene()?;
     let mut mesh = reader.mesh;
-    mesh.side_files.append(&mut reader.images.files());
+    mesh.side_files.extend(reader.images.files());
     reader.cameras.sort_by_key(|(index, _)| *index);
     mesh.cameras = reader.cameras.into_iter().map(|(_, camera)| camera).collect();
     let ignored = reader.ignored.warnings(path);

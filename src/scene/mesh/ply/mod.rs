@@ -1,8 +1,9 @@
 //! PLY \[Turk 1994\]: ascii and binary in both byte orders.
 //!
 //! The header may name elements and properties in any order and of any type. The reader uses
-//! `x y z`, `nx ny nz` and texture coordinates of `vertex` and the list `vertex_indices` (or `vertex_index`) of `face`. It
-//! triangulates polygons with more than three corners in the plane of their Newell normal.
+//! `x y z`, `nx ny nz` and texture coordinates of `vertex` and the list `vertex_indices` (or
+//! `vertex_index`) of `face`. It triangulates polygons with more than three corners in the plane of
+//! their Newell normal.
 
 mod header;
 
