@@ -8,7 +8,13 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
-use super::{equal_area::resample, log::Log, parameters::Entity, spectra, textures::Textures};
+use super::{
+    equal_area::resample,
+    log::Log,
+    parameters::Entity,
+    spectra,
+    textures::{Textures, linear_from_srgb},
+};
 use crate::{
     error::Result,
     math::colour::luminance,
