@@ -99,6 +99,8 @@
 //!   Construction", IEEE TVCG 24(3); "Parallel Reinsertion for Bounding Volume Hierarchy
 //!   Optimization", Computer Graphics Forum 37(2).
 //! - \[Meisters 1975\] "Polygons Have Ears", American Mathematical Monthly 82(6).
+//! - \[Mikkelsen 2008\] *Simulation of Wrinkled Surfaces Revisited*, master's thesis, University of
+//!   Copenhagen.
 //! - \[Moshier 1992\] Cephes Mathematical Library.
 //! - \[Nocedal & Wright 2006\] *Numerical Optimization*, second edition, Springer.
 //! - \[Pharr & Humphreys 2010\] *Physically Based Rendering*, second edition, Morgan Kaufmann.

@@ -186,13 +186,6 @@ fn wrong_options_exit_with_2() {
 }
 
 #[test]
-fn other_scene_formats_are_refused_by_name() {
-    let folder = Folder::new();
-    folder.write("room.xml", "");
-    folder.run(&["render", "room.xml"]).assert(1, &["error: room.xml: ", "a Mitsuba file"]);
-}
-
-#[test]
 fn a_missing_or_truncated_mesh_is_named() {
     let folder = scene("quad.ply", "absent.ply");
     assert_refused(&folder, &["error: absent.ply: cannot read: No such file"]);
@@ -536,14 +529,14 @@ fn an_obj_with_many_normals_and_names_is_read_in_linear_time() {
     const NAMES: usize = 60_000;
     let mut text = String::from("v 0 0 0\nv 1 0 0\nv 0 1 0\n");
     for normal in 1..=NORMALS {
-        writeln!(text, "vn 0 0 {normal}").unwrap();
+        writeln!(text, "vn 0 0 {normal}\nvt {normal} 0").unwrap();
     }
-    // Every normal occurs twice, and shares its vertex.
+    // Every pair of normal and texture coordinates occurs twice, and shares its vertex.
     for normal in (1..=NORMALS).chain(1..=NORMALS) {
         if normal <= NAMES {
             writeln!(text, "usemtl material_of_number_{normal}").unwrap();
         }
-        writeln!(text, "f 1//{normal} 2//1 3//1").unwrap();
+        writeln!(text, "f 1/{normal}/{normal} 2//1 3//1").unwrap();
     }
     let folder = Folder::new();
     folder.write("many.obj", text);

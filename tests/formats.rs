@@ -5,12 +5,15 @@
 
 #[path = "support/command.rs"]
 mod command;
+#[path = "support/gltf.rs"]
+mod document;
 #[path = "support/page.rs"]
 mod page;
 
 use command::Folder;
+use document::gltf;
 use fenestra::{
-    brdf::material::{ConductorFresnel, MaterialKind},
+    brdf::material::MaterialKind,
     film::Statistics,
     scene::{
         Scene,
@@ -19,27 +22,6 @@ use fenestra::{
     },
 };
 use glam::Vec3;
-
-/// A triangle of one unit in a buffer of 36 bytes, then a shift by (0, 0, 7) and its index 1.
-const BUFFER: &str =
-    "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAOBAAQ==";
-
-/// Formats a document with the triangle as accessor 0 and mesh 0; `rest` adds further members.
-fn gltf(nodes: &str, materials: &str, primitive: &str, rest: &str) -> String {
-    format!(
-        r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [0]}}], "nodes": [{nodes}],
-        "materials": [{materials}],
-        "meshes": [{{"name": "sail", "primitives": [{{"attributes": {{"POSITION": 0}}{primitive}}}]}}],
-        "accessors": [
-          {{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
-            "min": [0, 0, 0], "max": [1, 1, 0]}},
-          {{"bufferView": 1, "componentType": 5126, "count": 1, "type": "VEC3"}}],
-        "bufferViews": [{{"buffer": 0, "byteLength": 36}},
-                        {{"buffer": 0, "byteOffset": 36, "byteLength": 12}},
-                        {{"buffer": 0, "byteOffset": 48, "byteLength": 1}}],
-        "buffers": [{{"byteLength": 49, "uri": "{BUFFER}"}}]{rest}}}"#
-    )
-}
 
 /// Warnings without the path that begins each.
 fn warnings(scene: &Scene) -> Vec<String> {
@@ -54,36 +36,36 @@ fn load(name: &str, text: &str) -> Scene {
 
 #[test]
 fn everything_that_a_gltf_file_loses_is_named_once() {
-    let texture = r#"{"index": 0, "extensions": {"KHR_texture_transform": {}}}"#;
-    let materials = format!(
-        r#"{{"name": "wood", "alphaMode": "MASK", "emissiveFactor": [1, 0, 0],
-            "normalTexture": {{"index": 0}}, "extensions": {{"KHR_materials_unlit": {{}}, "NEW_one": {{}}}},
-            "pbrMetallicRoughness": {{"baseColorTexture": {texture}}}}},
-           {{"name": "not used", "alphaMode": "BLEND"}}"#
-    );
-    let nodes = r#"{"mesh": 0, "children": [1, 2]},
+    let materials = r#"{"name": "wood", "alphaMode": "MASK", "emissiveFactor": [1, 0, 0],
+            "normalTexture": {"index": 0}, "occlusionTexture": {"index": 0},
+            "extensions": {"KHR_materials_clearcoat": {}, "KHR_materials_transmission":
+                {"transmissionFactor": 0.4}, "NEW_one": {}},
+            "pbrMetallicRoughness": {"metallicFactor": 0, "baseColorTexture": {"index": 0,
+                "extensions": {"KHR_texture_transform": {"texCoord": 2}}}}},
+           {"name": "not used", "extensions": {"KHR_materials_sheen": {}}}"#;
+    let nodes = r#"{"mesh": 0, "children": [1, 2], "skin": 0},
         {"name": "lamp", "extensions": {"KHR_lights_punctual": {"light": 0}}}, {"mesh": 0}"#;
     let rest = r#", "extensionsRequired": ["KHR_materials_unlit"],
         "extensionsUsed": ["KHR_materials_unlit", "KHR_lights_punctual"],
         "textures": [{}], "animations": [{"name": "swing", "channels": [], "samplers": []}],
-        "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point"}]}}"#;
-    let text = gltf(nodes, &materials, r#", "material": 0"#, rest);
-    let attributes = r#""POSITION": 0, "TEXCOORD_1": 0, "COLOR_0": 0"#;
+        "skins": [{"joints": [1]}],
+        "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "range": 2}]}}"#;
+    let text = gltf(nodes, materials, r#", "material": 0"#, rest);
+    let attributes = r#""POSITION": 0, "TEXCOORD_2": 0, "COLOR_1": 0"#;
     let text = text.replace(r#""POSITION": 0"#, attributes);
     let scene = load("room.gltf", &text);
     let found = warnings(&scene);
     let expected = [
         "ignored animations (animation `swing`): nodes stand as the file places them",
-        "ignored vertex colours (mesh `sail`)",
-        "ignored further sets of texture coordinates (mesh `sail`)",
-        "ignored `KHR_lights_punctual` (node `lamp`): light comes only from the environment",
-        "ignored base colour texture (material `wood`): the factor alone counts, as for all textures",
-        "ignored normal texture (material `wood`)",
-        "ignored emissive factor (material `wood`): light comes only from the environment",
-        "ignored alpha mode MASK, with its cutoff (material `wood`): surfaces are opaque",
-        "ignored `KHR_materials_unlit` (material `wood`): shaded as any other",
+        "ignored skins (node 0): the mesh is placed by its node",
+        "ignored further sets of vertex colours (mesh `sail`)",
+        "ignored third and further sets of texture coordinates (mesh `sail`)",
+        "ignored range of lights (node `lamp`): light falls off with the squared distance alone",
+        "ignored textures without an image (2, first in material `wood`): or with none but that \
+         of an extension which is ignored",
+        "ignored `KHR_materials_clearcoat` (material `wood`)",
+        "ignored transmission of less than half the light (material `wood`): the surface is opaque",
         "ignored extension `NEW_one` (material `wood`)",
-        "ignored `KHR_texture_transform` (material `wood`)",
     ];
     for warning in expected {
         assert!(found.iter().any(|text| text == warning), "expected {warning:?} in {found:#?}");
@@ -108,25 +90,8 @@ fn everything_that_a_gltf_file_loses_is_named_once() {
     assert_eq!(of_materials(&scene), 0, "{:?}", scene.warnings);
     let own = toml.strip_suffix("material = \"clay\"\n").unwrap();
     let scene = Scene::load(&folder.write("b.toml", own)).unwrap();
-    assert_eq!(of_materials(&scene), 8, "{:#?}", scene.warnings);
-}
-
-#[test]
-fn factors_of_gltf_become_plastic_and_metal() {
-    let gold = r#"{"pbrMetallicRoughness": {"baseColorFactor": [1, 0.7, 0.3, 1], "roughnessFactor": 0.5}}"#;
-    let paint = r#"{"name": "paint", "extensions": {"KHR_materials_ior": {"ior": 1.4}},
-        "pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.4, 0, 1], "metallicFactor": 0.25,
-        "roughnessFactor": 0}}"#;
-    let scene = load("a.gltf", &gltf(r#"{"mesh": 0}"#, &format!("{gold}, {paint}"), "", ""));
-    let MaterialKind::Conductor { alpha, fresnel } = &scene.materials[0].kind else { panic!() };
-    let reflectance = Vec3::new(1.0, 0.7, 0.3);
-    assert_eq!((*alpha, *fresnel), (0.25, ConductorFresnel::Schlick { reflectance }));
-    let MaterialKind::Plastic { diffuse, alpha, ior } = scene.materials[1].kind else { panic!() };
-    assert!(diffuse.abs_diff_eq(Vec3::new(0.6, 0.3, 0.0), 1e-6), "{diffuse}");
-    assert_eq!((alpha, ior), (1e-3, 1.4));
-    // The primitive names no material: it has the default one, a white and rough metal.
-    assert_eq!(scene.geometry.materials, [2]);
-    assert!(matches!(scene.materials[2].kind, MaterialKind::Conductor { alpha: 1.0, .. }));
+    assert_eq!(of_materials(&scene), 4, "{:#?}", scene.warnings);
+    assert!(scene.warnings.iter().any(|text| text.contains("lights of a mesh in a `.toml` scene")));
 }
 
 #[test]
@@ -199,8 +164,9 @@ fn everything_that_an_obj_file_loses_is_named_once() {
     let folder = Folder::new();
     folder.write(
         "room.mtl",
-        "newmtl leaf\nKd 0.2 0.5 0.1 # green\nKa 0 0 0\nKs 0 0 0\nd 0.5\nmap_Kd leaf.png\nillum 2\n\
-         newmtl paint\nKd 0.5 0.5 0.5\nKs 0.3 0.3 0.3\nNs 98\nNi 1.6\nillum 7\nmap_Kd a.png\nKe 1 1 1\n",
+        "newmtl leaf\nKd 0.2 0.5 0.1 # green\nKa 0 0 0\nKs 0 0 0\nTf 0 1 0\nbump leaf.png\nillum 2\n\
+         newmtl paint\nKd 0.5 0.5 0.5\nKs 0.3 0.3 0.3\nNs 98\nNi 1.6\nillum 10\nmap_Ks a.png\n\
+         map_Kd -blendu on a.png\nKe 1 1 1\n",
     );
     let text = "mtllib room.mtl\nv 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0\nvt 0 0\ng a\ns 1\nf 1 2 3\n\
         usemtl leaf\nf 1/1 2/1 3/1\nusemtl paint\nf 1 2 3\nusemtl lost\nf 3 2 1\nl 1 2\ncstype bezier\n";
@@ -213,17 +179,20 @@ fn everything_that_an_obj_file_loses_is_named_once() {
         "ignored points and lines (line 15): `p`, `l`",
         "ignored `cstype` (line 16)",
         "ignored smoothing groups `s` (line 7): where faces have no normals",
-        "ignored `d` (material `leaf`, room.mtl:5)",
-        "ignored `map_Kd` (2, first in material `leaf`, room.mtl:6)",
-        "ignored colour and strength of `Ks` (material `paint`, room.mtl:10): Fresnel's equations \
-         give the gloss of plastic",
-        "ignored `illum 7` (material `paint`, room.mtl:13)",
-        "ignored `Ke` (material `paint`, room.mtl:15): light comes only from the environment",
+        "ignored `bump`, `map_bump` (material `leaf`, room.mtl:6): height maps",
+        "ignored `Tf` other than white (material `leaf`): of all but thin panes",
+        "ignored `illum 10` (material `paint`, room.mtl:13)",
+        "ignored `map_Ks` (material `paint`, room.mtl:14)",
+        "ignored option `-blendu` (material `paint`, room.mtl:15)",
+        "ignored colour and strength of `Ks` (material `paint`): Fresnel's equations give the \
+         gloss of plastic",
         "ignored faces without a material (the first faces): grey, 0.5; in a `.toml` \
          scene an error",
     ];
-    assert_eq!(found[..expected.len()], expected);
-    assert_eq!(found.len(), expected.len() + 2, "and those on light and camera: {found:#?}");
+    assert!(scene.warnings[0].contains("a.png: "), "{:#?}", scene.warnings);
+    assert!(scene.warnings[0].contains("rendered without this texture (room.mtl:15)"));
+    assert_eq!(found[1..=expected.len()], expected);
+    assert_eq!(found.len(), expected.len() + 3, "and those on light and camera: {found:#?}");
     assert!(matches!(scene.materials[0].kind, MaterialKind::Diffuse { .. }));
     let MaterialKind::Plastic { diffuse, alpha, ior } = scene.materials[1].kind else { panic!() };
     assert_eq!((diffuse, ior), (Vec3::splat(0.5), 1.6));
@@ -232,8 +201,8 @@ fn everything_that_an_obj_file_loses_is_named_once() {
 
     // The program prints each, and refuses them all under --strict.
     let run = folder.run(&["render", "room.obj", "--strict", "-o", "room.exr"]);
-    run.assert(1, &["room.obj: --strict: 13 warnings:\n", "`map_Kd` (2, first in material `leaf`"]);
-    folder.run(&["study", "room.obj", "--strict"]).assert(1, &["--strict: 13 warnings:"]);
+    run.assert(1, &["room.obj: --strict: 15 warnings:\n", "`bump`, `map_bump` (material `leaf`"]);
+    folder.run(&["study", "room.obj", "--strict"]).assert(1, &["--strict: 15 warnings:"]);
     folder.run(&["info", "room.obj"]).assert(0, &[]);
 }
 
@@ -279,9 +248,13 @@ fn the_page_lists_every_feature() {
         let rows: String = features.iter().map(row).collect();
         format!("| feature | support | details |\n|---|---|---|\n{rows}")
     };
-    for (name, features) in
-        [("gltf", features::GLTF), ("obj", features::OBJ), ("mtl", features::MTL)]
-    {
+    for (name, features) in [
+        ("gltf", features::GLTF),
+        ("obj", features::OBJ),
+        ("mtl", features::MTL),
+        ("ply", features::PLY),
+        ("mitsuba", features::MITSUBA),
+    ] {
         page::check("formats.md", name, &table(features));
         for feature in features {
             let same = |other: &&Feature| other.name == feature.name;

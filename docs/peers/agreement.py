@@ -2,10 +2,14 @@
 """Compares Fenestra's pictures with Mitsuba 3's renderings of `fenestra export`.
 
     python3 docs/peers/agreement.py [--fenestra target/release/fenestra] [--table]
+    python3 docs/peers/agreement.py --file scene.xml [--depth 12] [--width 96] [--keep FOLDER]
+
+The second form lets both programs render one Mitsuba file, and compares means and blocks of pixels.
 
 Needs a built `fenestra` and `pip install mitsuba`; prints SKIPPED and exits with 77 where Mitsuba is
 missing. Exits with 1 if means differ by more than 0.5% and four standard errors in a scene where the
-models agree. `--variant llvm_ad_rgb` is several times faster than the default and needs LLVM
+models agree, and with `--file` if means differ by more than `--tolerance` and four standard errors or
+if more than one block in fifty does. `--variant llvm_ad_rgb` is several times faster than the default and needs LLVM
 (DRJIT_LIBLLVM_PATH names the library).
 """
 
@@ -120,6 +124,14 @@ def write_texel_map(path):
         file.write(texels[::-1].astype("<f4").tobytes())
 
 
+def render_ours(mi, np, fenestra, path, output, options):
+    """Renders with Fenestra and returns the pixels."""
+    subprocess.run([fenestra, "render", path, "-o", output, "--quiet", *map(str, options)], check=True)
+    channels = mi.Bitmap(str(output)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32,
+                                              False)
+    return np.array(channels, np.float64)
+
+
 def compare(mi, np, fenestra, folder, case, samples):
     """Renders a scene with both and returns name, ratio of means, its error and two extremes."""
     name, text, depth, _ = case
@@ -131,12 +143,8 @@ def compare(mi, np, fenestra, folder, case, samples):
     ours, theirs = [], []
     peer = mi.load_file(str(folder / "mitsuba.xml"))
     for seed in range(SEEDS):
-        output = folder / f"{seed}.exr"
-        subprocess.run([fenestra, "render", path, "-o", output, "--depth", str(depth), "--seed",
-                        str(seed), "--spp", str(samples), "--quiet"], check=True)
-        channels = mi.Bitmap(str(output)).convert(mi.Bitmap.PixelFormat.RGB,
-                                                  mi.Struct.Type.Float32, False)
-        ours.append(np.array(channels, np.float64))
+        options = ["--depth", depth, "--seed", seed, "--spp", samples]
+        ours.append(render_ours(mi, np, fenestra, path, folder / f"{seed}.exr", options))
         image = mi.render(peer, seed=seed, spp=4 * samples)
         theirs.append(np.array(image, np.float64)[..., :3])
     ours, theirs = np.array(ours), np.array(theirs)
@@ -150,6 +158,67 @@ def compare(mi, np, fenestra, folder, case, samples):
     return ratio, float(np.hypot(error(ours), error(theirs))), ratios.min(), ratios.max()
 
 
+def block_means(pictures):
+    """Means of blocks of pixels; what is left over at the right and lower edges is left out."""
+    seeds, height, width, _ = pictures.shape
+    rows, columns = height // BLOCK, width // BLOCK
+    cut = pictures[:, :rows * BLOCK, :columns * BLOCK].mean(axis=3)
+    return cut.reshape(seeds, rows, BLOCK, columns, BLOCK).mean(axis=(2, 4))
+
+
+def compare_file(mi, np, arguments, folder):
+    """Renders one Mitsuba file with both, prints the comparison, and returns 1 if they differ."""
+    path = arguments.file.resolve()
+    try:
+        peer = mi.load_file(str(path))
+    except RuntimeError as error:
+        print(f"SKIPPED: Mitsuba refuses {path}: {error}", file=sys.stderr)
+        return 77
+    parameters = mi.traverse(peer.sensors()[0])
+    width, height = parameters["film.size"]
+    size = (arguments.width, max(1, round(arguments.width * height / width)))
+    parameters["film.size"] = size
+    parameters.update()
+    # Mitsuba counts the edges of a path, the one to the light included.
+    integrator = mi.load_dict({"type": "path", "max_depth": arguments.depth + 1})
+    seeds = max(arguments.seeds, 2)
+    ours, theirs = [], []
+    for seed in range(seeds):
+        options = ["--depth", arguments.depth, "--seed", seed, "--spp", arguments.samples, "--size",
+                   f"{size[0]}x{size[1]}"]
+        ours.append(render_ours(mi, np, arguments.fenestra, path, folder / f"{seed}.exr", options))
+        image = mi.render(peer, integrator=integrator, seed=seed, spp=4 * arguments.samples)
+        theirs.append(np.array(image, np.float64)[..., :3])
+    ours, theirs = np.array(ours), np.array(theirs)
+    if arguments.keep:
+        arguments.keep.mkdir(parents=True, exist_ok=True)
+        for name, pictures in [("fenestra", ours), ("mitsuba", theirs)]:
+            mean = pictures.mean(axis=0).astype(np.float32)
+            mi.Bitmap(mean).write(str(arguments.keep / f"{path.stem}_{name}.exr"))
+    mean = lambda pictures: pictures.mean(axis=(1, 2, 3))
+    error = lambda pictures: mean(pictures).std(ddof=1) / mean(pictures).mean() / seeds**0.5
+    ratio = mean(ours).mean() / mean(theirs).mean()
+    ratio_error = float(np.hypot(error(ours), error(theirs)))
+    blocks = [block_means(pictures) for pictures in (ours, theirs)]
+    difference = blocks[0].mean(axis=0) - blocks[1].mean(axis=0)
+    # Pool the relative variance of all blocks: few seeds say little about one block.
+    level = 0.5 * (blocks[0].mean(axis=0) + blocks[1].mean(axis=0))
+    floor = 0.01 * level.mean()
+    relative = [block.var(axis=0, ddof=1) / (level + floor) ** 2 for block in blocks]
+    deviation = np.sqrt(sum(np.maximum(one, np.median(one)) for one in relative) / seeds)
+    score = difference / (deviation * (level + floor) + 1e-12)
+    far = (np.abs(score) > 4) & (np.abs(difference) > arguments.tolerance * (level + floor))
+    share = far.mean()
+    failed = abs(ratio - 1) > max(arguments.tolerance, 4 * ratio_error) or share > 0.02
+    print(f"{path}: {size[0]}×{size[1]} pixels, depth {arguments.depth}, {seeds} seeds of "
+          f"{arguments.samples} and {4 * arguments.samples} samples\n"
+          f"ratio of means {ratio:.4f} ± {ratio_error:.4f}\n"
+          f"blocks of {BLOCK}×{BLOCK} pixels: {far.sum()} of {far.size} differ by more than four "
+          f"standard errors and {arguments.tolerance:.0%}; largest z {np.abs(score).max():.1f}"
+          + ("\nFAILED" if failed else ""))
+    return 1 if failed else 0
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     root = pathlib.Path(__file__).resolve().parents[2]
@@ -157,6 +226,12 @@ def main():
     parser.add_argument("--variant", default="scalar_rgb")
     parser.add_argument("--samples", default=128, type=int, help="Fenestra's; Mitsuba takes 4 times as many")
     parser.add_argument("--table", action="store_true", help="write the table into docs/peers.md")
+    parser.add_argument("--file", type=pathlib.Path, help="Mitsuba file to render with both")
+    parser.add_argument("--depth", default=12, type=int, help="path vertices, with --file")
+    parser.add_argument("--width", default=96, type=int, help="width of the film, with --file")
+    parser.add_argument("--seeds", default=SEEDS, type=int, help="renders of each, with --file")
+    parser.add_argument("--tolerance", default=0.02, type=float, help="of means and blocks, with --file")
+    parser.add_argument("--keep", type=pathlib.Path, help="folder for both pictures, with --file")
     arguments = parser.parse_args()
     try:
         import mitsuba as mi
@@ -168,6 +243,9 @@ def main():
     if not arguments.fenestra.is_file():
         sys.exit(f"{arguments.fenestra}: not found; build it with `cargo build --release`")
     mi.set_variant(arguments.variant)
+    if arguments.file:
+        with tempfile.TemporaryDirectory() as name:
+            return compare_file(mi, np, arguments, pathlib.Path(name))
     version = subprocess.run([arguments.fenestra, "--version"], capture_output=True, text=True).stdout
     lines = [
         f"{datetime.date.today()}, {version.strip()}, Mitsuba {mi.__version__} ({arguments.variant}), "

@@ -1,4 +1,4 @@
-//! Parts of glTF, OBJ, MTL and pbrt files and what becomes of them: the one declaration behind the readers'
+//! Parts of foreign files and what becomes of them: the one declaration behind the readers'
 //! warnings and the tables of `docs/formats.md`.
 
 use std::path::Path;
@@ -60,56 +60,74 @@ features! {
     GLTF_TRIANGLES Done "triangles, strips and fans, with or without indices" "";
     GLTF_NORMALS Done "vertex normals" "flat-shaded without";
     GLTF_SPARSE Done "sparse accessors" "";
-    GLTF_INSTANCING Done "`EXT_mesh_gpu_instancing`" "attributes of floats; refused otherwise";
+    GLTF_QUANTIZATION Done "`KHR_mesh_quantization`" "";
+    GLTF_INSTANCING Done "`EXT_mesh_gpu_instancing`" "";
     GLTF_PERSPECTIVE Done "perspective cameras"
         "the first, or that of `--camera`; near and far planes do not clip";
     GLTF_CAMERAS Ignored "cameras that are not used" "";
     GLTF_ORTHOGRAPHIC Ignored "orthographic cameras" "refused if `--camera` names one";
-    GLTF_METAL Mapped "metallic factor"
-        "from 0.5 a conductor with the base colour as reflectance; below, plastic with the base \
-         colour times (1 − metallic)";
-    GLTF_ROUGHNESS Mapped "roughness factor" "α = roughness², at least 0.001";
-    GLTF_IOR Mapped "`KHR_materials_ior`" "index of plastic, 1.01 to 4";
-    GLTF_OWN_MATERIALS Ignored "metallic factor, roughness factor and index of a mesh in a `.toml` scene"
-        "an object without `material` is diffuse in its mesh's base colours";
-    GLTF_SINGLE_SIDED Mapped "single-sided materials" "every surface is two-sided";
-    GLTF_TEXCOORD Mapped "first set of texture coordinates, tangents" "serve textures only";
-    GLTF_BASE_TEXTURE Ignored "base colour texture" "the factor alone counts, as for all textures";
-    GLTF_METAL_TEXTURE Ignored "metallic-roughness texture" "";
-    GLTF_NORMAL_TEXTURE Ignored "normal texture" "";
-    GLTF_OCCLUSION_TEXTURE Ignored "occlusion texture" "";
-    GLTF_EMISSIVE_TEXTURE Ignored "emissive texture" "";
-    GLTF_EMISSIVE Ignored "emissive factor" "light comes only from the environment";
-    GLTF_MASK Ignored "alpha mode MASK, with its cutoff" "surfaces are opaque";
-    GLTF_BLEND Ignored "alpha mode BLEND, with its factor" "surfaces are opaque";
-    GLTF_COLOR Ignored "vertex colours" "";
-    GLTF_UV Ignored "further sets of texture coordinates" "";
-    GLTF_MORPH Ignored "morph targets" "the mesh is taken without them";
+    GLTF_METAL Done "metallic-roughness materials with their textures" "";
+    GLTF_SINGLE_SIDED Mapped "single-sided materials"
+        "every surface is seen from both sides; without `doubleSided` it emits only in front";
+    GLTF_TEXTURE Done "textures: PNG and JPEG beside the file, inline and in buffers"
+        "read by the first two sets of coordinates; one that cannot be read is a warning";
+    GLTF_SAMPLER Done "samplers: wrap modes, magnification filter" "";
+    GLTF_MIP Mapped "minification and mip map filters" "the samples of a pixel average the texels";
+    GLTF_NO_IMAGE Ignored "textures without an image"
+        "or with none but that of an extension which is ignored";
+    GLTF_HIGH_UV Ignored "textures with coordinates of the third or a further set" "";
+    GLTF_NORMAL_TEXTURE Done "normal textures with their scale"
+        "without `TANGENT` by MikkTSpace";
+    GLTF_OCCLUSION_TEXTURE Mapped "occlusion textures" "not read: shadows are traced";
+    GLTF_EMISSIVE Done "emissive factors and textures" "radiance";
+    GLTF_MASK Done "alpha modes OPAQUE, MASK and BLEND" "BLEND lets a share of the rays through";
+    GLTF_COLOR Done "vertex colours `COLOR_0`" "";
+    GLTF_COLORS Ignored "further sets of vertex colours" "";
+    GLTF_UV Ignored "third and further sets of texture coordinates" "";
+    GLTF_ATTRIBUTES Mapped "attributes of applications" "no part of the picture";
+    GLTF_MORPH Done "morph targets" "with the weights of the file";
     GLTF_SKIN Ignored "skins" "the mesh is placed by its node";
     GLTF_ANIMATION Ignored "animations" "nodes stand as the file places them";
     GLTF_POINTS Ignored "points and lines" "";
     GLTF_SCENES Ignored "further scenes" "the default scene is rendered, else the first";
-    GLTF_LIGHTS Ignored "`KHR_lights_punctual`" "light comes only from the environment";
-    GLTF_UNLIT Ignored "`KHR_materials_unlit`" "shaded as any other";
+    GLTF_LIGHTS Done "`KHR_lights_punctual`"
+        "candela and lux count as W/sr and W/m² of each colour channel";
+    GLTF_LIGHT_RANGE Ignored "range of lights" "light falls off with the squared distance alone";
+    GLTF_OBJECT_LIGHTS Ignored "lights of a mesh in a `.toml` scene" "";
+    GLTF_UNLIT Mapped "`KHR_materials_unlit`"
+        "emits its base colour on both sides and reflects nothing, so that it also lights others";
+    GLTF_UNLIT_COLOR Ignored "vertex colours of unlit materials" "";
+    GLTF_STRENGTH Done "`KHR_materials_emissive_strength`" "";
+    GLTF_IOR Done "`KHR_materials_ior`" "1.01 to 4; 0 reflects all";
+    GLTF_SPECULAR Done "`KHR_materials_specular`" "by its factors";
+    GLTF_SPECULAR_TEXTURE Ignored "textures of `KHR_materials_specular`" "";
+    GLTF_TRANSMISSION Mapped "`KHR_materials_transmission`"
+        "glass if at least half the light is transmitted: a thin pane, or with a volume a solid";
+    GLTF_LOW_TRANSMISSION Ignored "transmission of less than half the light"
+        "the surface is opaque";
+    GLTF_TRANSMISSION_TEXTURE Ignored "texture of transmission" "its mean counts";
+    GLTF_GLASS_COLOR Ignored "base colour texture of glass" "the factor alone tints it";
+    GLTF_THIN_ROUGHNESS Ignored "roughness of thin glass" "a pane is smooth";
+    GLTF_VOLUME Mapped "`KHR_materials_volume`" "a thickness above 0 makes glass solid";
+    GLTF_ABSORPTION Ignored "absorption of `KHR_materials_volume`" "";
+    GLTF_GLOSSINESS Mapped "`KHR_materials_pbrSpecularGlossiness`"
+        "a dielectric of the same diffuse colour and reflectance";
+    GLTF_GLOSSINESS_TEXTURE Ignored "specular colour texture of `KHR_materials_pbrSpecularGlossiness`"
+        "the factor alone counts; its glossiness is read";
+    GLTF_TEXTURE_TRANSFORM Done "`KHR_texture_transform`" "";
     GLTF_CLEARCOAT Ignored "`KHR_materials_clearcoat`" "";
     GLTF_SHEEN Ignored "`KHR_materials_sheen`" "";
-    GLTF_SPECULAR Ignored "`KHR_materials_specular`" "";
-    GLTF_TRANSMISSION Ignored "`KHR_materials_transmission`" "";
-    GLTF_VOLUME Ignored "`KHR_materials_volume`" "";
     GLTF_IRIDESCENCE Ignored "`KHR_materials_iridescence`" "";
     GLTF_ANISOTROPY Ignored "`KHR_materials_anisotropy`" "";
     GLTF_DISPERSION Ignored "`KHR_materials_dispersion`" "";
-    GLTF_STRENGTH Ignored "`KHR_materials_emissive_strength`" "";
-    GLTF_GLOSSINESS Ignored "`KHR_materials_pbrSpecularGlossiness`" "";
     GLTF_VARIANTS Ignored "`KHR_materials_variants`" "";
-    GLTF_TEXTURE_TRANSFORM Ignored "`KHR_texture_transform`" "";
-    GLTF_BASISU Ignored "`KHR_texture_basisu`" "";
-    GLTF_WEBP Ignored "`EXT_texture_webp`" "";
+    GLTF_BASISU Ignored "`KHR_texture_basisu`" "the other image of the texture is used";
+    GLTF_WEBP Ignored "`EXT_texture_webp`" "the other image of the texture is used";
     GLTF_EXTENSION Ignored "other extensions, by name" "refused where the file requires them";
     GLTF_DRACO Refused "`KHR_draco_mesh_compression`"
         "where the file requires it, as are the next; else the uncompressed mesh is read";
     GLTF_MESHOPT Refused "`EXT_meshopt_compression`" "";
-    GLTF_QUANTIZATION Refused "`KHR_mesh_quantization`" "";
+    GLTF_NAMES Refused "names of files that are absolute or lead out of the folder of the scene" "";
 }
 
 features! {
@@ -120,7 +138,7 @@ features! {
     OBJ_FACE Done "`f`" "polygons are cut into triangles";
     OBJ_MATERIAL Done "`usemtl`, `mtllib`" "a missing library is a warning";
     OBJ_GROUP Done "`o`, `g`" "names only";
-    OBJ_TEXCOORD Mapped "`vt`" "serves textures only";
+    OBJ_TEXCOORD Done "`vt`" "";
     OBJ_COLOR Ignored "vertex colours" "";
     OBJ_SMOOTHING Ignored "smoothing groups `s`" "where faces have no normals";
     OBJ_POINTS Ignored "points and lines" "`p`, `l`";
@@ -128,6 +146,8 @@ features! {
     OBJ_NO_MATERIAL Ignored "faces without a material"
         "grey, 0.5; in a `.toml` scene an error";
     OBJ_STATEMENT Ignored "other statements, by name" "curves and surfaces among them";
+    OBJ_NAMES Refused "names of files that are absolute or lead out of the folder of the scene"
+        "in MTL files too";
 }
 
 features! {
@@ -141,14 +161,106 @@ features! {
     MTL_NS Mapped "`Ns`" "α = √(2/(Ns + 2)), at least 0.001";
     MTL_NI Mapped "`Ni`" "1.01 to 4; else 1.5";
     MTL_ILLUM Done "`illum` 0 to 2" "below 2 without gloss";
-    MTL_OWN_MATERIALS Ignored "`Ks`, `Ns` and `Ni` of a mesh in a `.toml` scene"
-        "an object without `material` is diffuse in its mesh's colours";
-    MTL_OPACITY Ignored "`d`, `Tr`" "surfaces are opaque";
-    MTL_KE Ignored "`Ke`" "light comes only from the environment";
+    MTL_MIRROR Mapped "`illum` 3 and 5" "a mirror of `Ks` if `Kd` is black; else as 2";
+    MTL_GLASS Mapped "`illum` 4, 6, 7 and 9"
+        "if `d` is below 0.5 a thin pane of index `Ni`, tinted by `Tf`, else by 1 − d (1 − Kd); \
+         else as 2";
+    MTL_ILLUM_MODEL Ignored "other models of `illum`" "as 2";
+    MTL_OPACITY Done "`d`, `Tr`" "share of the light that is stopped; `d` counts before `Tr`";
+    MTL_KE Done "`Ke`, `map_Ke`" "radiance of both sides";
+    MTL_PBR Mapped "`Pr`, `Pm`, `map_Pr`, `map_Pm`"
+        "instead of `Ks`, `Ns` and `illum` a metallic-roughness material as in glTF";
+    MTL_MAP_KD Done "`map_Kd`"
+        "factor of `Kd`, alone where that is black; its alpha is the opacity unless there is `map_d`";
+    MTL_MAP_D Done "`map_d`" "the alpha of the image if it has one, else its luminance";
+    MTL_NORM Done "`norm`" "normal map; tangents by MikkTSpace";
+    MTL_OPTIONS Done "options `-s`, `-o`, `-clamp`, `-mm`, `-imfchan`, and `-bm` of `norm`" "";
+    MTL_OPTION Ignored "other options of images, by name" "";
+    MTL_MISSING Done "images that cannot be read" "a warning; rendered without the texture";
+    MTL_BUMP Ignored "`bump`, `map_bump`" "height maps";
     MTL_KA Ignored "`Ka` other than black" "";
-    MTL_TF Ignored "`Tf` other than white" "";
-    MTL_ILLUM_MODEL Ignored "`illum` 3 to 10" "as 2";
-    MTL_KEY Ignored "other keys, by name" "`map_Kd`, `bump`, `Pr` and `Pm` among them";
+    MTL_TF Ignored "`Tf` other than white" "of all but thin panes";
+    MTL_KEY Ignored "other keys, by name" "`map_Ks`, `refl` and `Pc` among them";
+}
+
+features! {
+    /// Parts of PLY files.
+    PLY;
+    PLY_FORMAT Done "ascii, and binary in both byte orders" "";
+    PLY_POSITION Done "`x y z`, `nx ny nz`" "flat-shaded without normals";
+    PLY_UV Done "`u v`, `s t`, `texture_u texture_v`, `texture_s texture_t`"
+        "from the lower left corner of an image";
+    PLY_FACE Done "`vertex_indices`, `vertex_index`" "polygons are cut into triangles";
+    PLY_COLOR Ignored "vertex colours `red green blue`" "";
+    PLY_OTHER Mapped "other elements and properties" "no part of the surface";
+    PLY_STRIPS Refused "`tristrips`" "";
+}
+
+features! {
+    /// Parts of Mitsuba scene files.
+    MITSUBA;
+    MI_DOCUMENT Done "`default` and `$name`, `ref`, `include`, `alias`, `path`"
+        "files lie in the scene's folder or below";
+    MI_NAMES Done "names of versions 0.5, 0.6, 2 and 3" "`toWorld` is `to_world`, `intIOR` `int_ior`";
+    MI_TRANSFORM Done "`translate`, `rotate`, `scale`, `matrix`, `lookat`" "in their order";
+    MI_COLOR Done "`rgb`, `srgb`, `spectrum`, `blackbody`"
+        "spectra become linear Rec.709; those of reflectance under D65";
+    MI_MESH Done "shapes `obj`, `ply`, `serialized`"
+        "smooth normals where the file has none, unless `face_normals`";
+    MI_QUADRIC Done "shapes `rectangle`, `cube`, `sphere`, `disk`, `cylinder`"
+        "round ones of 128 segments";
+    MI_INSTANCE Done "`shapegroup` and `instance`" "repeated in memory";
+    MI_SIDES Done "`flip_normals`, `twosided`"
+        "without `twosided` a surface that lets nothing through is black from behind";
+    MI_TWO_MODELS Ignored "second model of `twosided`" "the first is on both sides";
+    MI_DIFFUSE Done "`diffuse`" "";
+    MI_PLASTIC Mapped "`plastic`, `roughplastic`"
+        "smooth as α = 0.001; the base loses no light below the coat, as it does in Mitsuba, with \
+         `nonlinear` (more colour) as without";
+    MI_CONDUCTOR Done "`conductor`, `roughconductor`"
+        "by `material`, `eta` and `k`, or `none`; smooth as α = 0.001; by Schlick's approximation \
+         where `specular_reflectance` is not white";
+    MI_DIELECTRIC Done "`dielectric`, `roughdielectric`, `thindielectric`" "indices by number or name";
+    MI_PRINCIPLED Mapped "`principled`"
+        "glTF's metallic-roughness material, whose diffuse part is Lambertian";
+    MI_SPEC_TRANS Ignored "`spec_trans` between 0 and 1"
+        "from ½ a rough dielectric, below none of it; as is a metal";
+    MI_PRINCIPLED_REST Ignored "further parameters of `principled`, by name" "";
+    MI_OPACITY Done "`mask`, `null`, `blendbsdf` with `null`" "";
+    MI_BLEND Ignored "the lesser part of `blendbsdf`" "the other one is the whole surface";
+    MI_NORMAL_MAP Done "`normalmap`" "";
+    MI_BUMP_MAP Ignored "`bumpmap`" "";
+    MI_BECKMANN Ignored "distribution `beckmann`" "`ggx` of the same α";
+    MI_ANISOTROPIC Ignored "`alpha_u` and `alpha_v` that differ" "their mean";
+    MI_ALPHA_TEXTURE Ignored "texture of `alpha`" "0.1";
+    MI_SPECULAR Ignored "`specular_reflectance` of plastic" "white";
+    MI_SPECULAR_TEXTURE Ignored
+        "textures of `specular_reflectance` and `specular_transmittance` of dielectrics" "white";
+    MI_BITMAP Done "`bitmap`"
+        "`filename`, `raw`, `to_uv`, `wrap_mode`, `filter_type`; alpha is not read";
+    MI_CHECKERBOARD Done "`checkerboard`" "of two colours";
+    MI_ATTRIBUTE Done "`mesh_attribute` of `vertex_color`" "";
+    MI_AREA Done "`area` lights" "on the side of the normals; textured ones too";
+    MI_LAMP Done "`point`, `spot`, `directional`" "";
+    MI_SPOT_TEXTURE Ignored "`texture` of a `spot`" "";
+    MI_ENVIRONMENT Done "`envmap`, `constant`"
+        "rows become those of Fenestra; resampled if turned about another axis than +Y";
+    MI_SENSOR Done "`perspective`, `thinlens`"
+        "the first, or that of `--camera` by id or number; near and far planes do not clip";
+    MI_SENSORS Ignored "sensors that are not used" "";
+    MI_MIRRORED Ignored "mirror image of the sensor's `to_world`" "the picture is not mirrored";
+    MI_PRINCIPAL_POINT Ignored "`principal_point_offset_x`, `principal_point_offset_y`" "";
+    MI_FILM Done "film: `width`, `height`, `rfilter` `box` and `gaussian` of ½"
+        "how the film is written is not read";
+    MI_CROP Ignored "crop of the film off its middle" "the whole film; one in the middle is done";
+    MI_FILTER Ignored "other `rfilter`s" "`gaussian` of ½";
+    MI_INTEGRATOR Ignored "`integrator` and `sampler`"
+        "options of the command line and their defaults, as `--depth` and `--spp`";
+    MI_MEDIUM Ignored "`medium`" "";
+    MI_ELEMENT Ignored "other elements, by name" "";
+    MI_PARAMETER Ignored "other parameters, by name" "";
+    MI_PLUGIN Refused "other shapes, models, textures, emitters and sensors, by name"
+        "`sunsky`, `measured`, `hair` among them";
 }
 
 features! {

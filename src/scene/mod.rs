@@ -9,6 +9,7 @@ mod hash;
 pub mod lamp;
 pub mod load;
 pub mod mesh;
+pub mod mitsuba;
 pub mod pbrt;
 pub mod quadrics;
 pub mod shapes;
@@ -25,6 +26,12 @@ pub use environment::EnvironmentMap;
 pub use geometry::Geometry;
 pub use hash::{environment_hash, geometry_hash};
 pub use lamp::Lamp;
+
+/// Largest width and height of the film, pixels.
+pub const MAX_FILM_SIDE: u32 = 16_384;
+
+/// Smallest GGX width; single precision cannot sample the near-mirror highlight of a smaller one.
+pub const MIN_ALPHA: f32 = 1e-3;
 
 /// Reconstruction filter, importance-sampled so that every sample belongs to one pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]

@@ -161,6 +161,7 @@ impl Folder {
 
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
         let path = self.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).expect("the temporary folder can be written");
         fs::write(&path, content).expect("the temporary folder can be written");
         path
     }

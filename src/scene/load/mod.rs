@@ -5,6 +5,7 @@
 mod include;
 mod light;
 mod materials;
+mod mitsuba;
 mod objects;
 mod pbrt;
 mod whole;
@@ -24,11 +25,7 @@ use crate::{
 };
 use light::Light;
 
-/// Largest width and height of the film, pixels.
-pub const MAX_FILM_SIDE: u32 = 16_384;
-
-/// Smallest GGX width; single precision cannot sample the near-mirror highlight of a smaller one.
-pub const MIN_ALPHA: f32 = 1e-3;
+pub use super::{MAX_FILM_SIDE, MIN_ALPHA};
 
 /// Options of the command line that add to a scene file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -44,7 +41,7 @@ pub struct LoadOptions {
 
 impl Scene {
     /// Reads a scene file and everything it refers to by paths relative to it. The file is a scene
-    /// in TOML, or a glTF or OBJ file as a whole scene.
+    /// in TOML, a glTF or OBJ file as a whole scene, or a Mitsuba file.
     ///
     /// # Errors
     /// [`Error::Io`] for a file that cannot be read, [`Error::Parse`] with line and column for text
@@ -59,7 +56,9 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`], and for a camera that the file does not have.
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self> {
-        refuse_other_formats(path)?;
+        if mitsuba::is_mitsuba(path) {
+            return Loader::new(path).mitsuba(options);
+        }
         if super::pbrt::is_pbrt(path) {
             return Loader::new(path).pbrt(options);
         }
@@ -112,20 +111,6 @@ fn scene_name(path: &Path) -> String {
     let folder = absolute.parent().and_then(Path::file_name);
     let name = if stem == "scene" { folder.unwrap_or(stem) } else { stem };
     name.to_string_lossy().into_owned()
-}
-
-fn refuse_other_formats(path: &Path) -> Result<()> {
-    let format = match files::extension(path).as_str() {
-        "xml" => "a Mitsuba file",
-        _ => return Ok(()),
-    };
-    Err(Error::format(
-        path,
-        format!(
-            "expected a scene in .toml, .gltf, .glb, .obj or .pbrt, found {format}, which cannot be \
-             rendered as a scene yet"
-        ),
-    ))
 }
 
 /// Material of a scene that has nothing but an environment.

@@ -2,22 +2,19 @@
 
 use std::{
     collections::{HashMap, HashSet},
-    path::{Path, PathBuf},
+    path::PathBuf,
 };
-
-use glam::Vec3;
 
 use super::Loader;
 use crate::{
-    brdf::{Material, material::MaterialKind},
+    brdf::Material,
     error::Result,
-    files,
     scene::{
         Geometry,
         features::{self, Ignored},
         file::{ObjectEntry, ObjectSource},
         geometry::MAX_COORDINATE,
-        mesh::{Mesh, MeshSurface},
+        mesh::{Mesh, MeshMaterial},
         shapes::check_triangles,
         transform::Transform,
     },
@@ -60,7 +57,7 @@ impl Loader<'_> {
                         let mesh = Mesh::read(&key, warnings)?;
                         inputs.push(key.clone());
                         inputs.extend_from_slice(&mesh.side_files);
-                        let ignored = ignored_in_object(&mesh, &key, own_materials.contains(&key));
+                        let ignored = ignored_in_object(&mesh, own_materials.contains(&key));
                         warnings.extend(ignored.warnings(&key));
                         mesh
                     }
@@ -209,12 +206,10 @@ impl Loader<'_> {
                      to every triangle"
                 )
             })?;
-            materials.extend(mesh.materials.iter().map(|material| {
-                let reflectance = Vec3::from_array(material.base_color);
-                Material::new(
-                    format!("{}/{}", object.name.as_deref().unwrap_or("mesh"), material.name),
-                    MaterialKind::Diffuse { reflectance },
-                )
+            let object = object.name.as_deref().unwrap_or("mesh");
+            materials.extend(mesh.materials.iter().map(|MeshMaterial { material, .. }| {
+                let name = format!("{object}/{}", material.name);
+                Material { name, ..material.clone() }
             }));
             geometry.append(mesh, &transform, |triangle| {
                 let run = mesh.runs.partition_point(|run| run.first_triangle <= triangle) - 1;
@@ -244,22 +239,17 @@ fn lacking_uvs(label: &str, material: &Material, mesh: &Mesh) -> Option<String> 
     ))
 }
 
-/// Parts of a mesh file that an object of a scene file leaves out: cameras and, if its own materials
-/// are used, most of these.
-fn ignored_in_object(mesh: &Mesh, path: &Path, own_materials: bool) -> Ignored {
+/// Parts of a mesh file that an object of a scene file leaves out: cameras, lamps and, if its own
+/// materials are used, parts of these.
+fn ignored_in_object(mesh: &Mesh, own_materials: bool) -> Ignored {
     let mut ignored = Ignored::default();
     for (index, camera) in mesh.cameras.iter().enumerate() {
         ignored.add(features::GLTF_CAMERAS, || camera.label(index));
     }
+    for lamp in &mesh.lamps {
+        ignored.add(features::GLTF_OBJECT_LIGHTS, || format!("light `{}`", lamp.name));
+    }
     if own_materials {
-        let is_obj = files::extension(path) == "obj";
-        let feature =
-            if is_obj { features::MTL_OWN_MATERIALS } else { features::GLTF_OWN_MATERIALS };
-        for material in mesh.used_materials() {
-            if material.surface != MeshSurface::Diffuse {
-                ignored.add(feature, || format!("material `{}`", material.name));
-            }
-        }
         ignored.merge(&mesh.ignored_in_materials());
     }
     ignored

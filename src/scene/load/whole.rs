@@ -1,22 +1,19 @@
-//! A glTF or OBJ file as a whole scene: its meshes, materials and camera, lit by a given environment.
+//! A glTF or OBJ file as a whole scene: its meshes, materials, lamps and camera in a given environment.
 
 use std::path::Path;
 
 use glam::Vec3;
 
-use super::{LoadOptions, Loader, MAX_FILM_SIDE, MIN_ALPHA, default_material, light::Light};
+use super::{LoadOptions, Loader, MAX_FILM_SIDE, default_material, light::Light};
 use crate::{
-    brdf::{
-        Material,
-        material::{ConductorFresnel, MaterialKind},
-    },
+    brdf::{Material, material::MaterialKind},
     error::Result,
     files,
     scene::{
         Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Scene,
         features::{self, Ignored},
         file::CameraEntry,
-        mesh::{Mesh, MeshCamera, MeshMaterial, MeshSurface, Perspective},
+        mesh::{Mesh, MeshCamera, MeshMaterial, Perspective},
         transform::Transform,
     },
 };
@@ -28,8 +25,6 @@ const ASPECT_RATIO: f32 = 4.0 / 3.0;
 /// Direction from the middle of the scene to the camera that frames it, and its field of view.
 const FRAMING_DIRECTION: Vec3 = Vec3::new(0.5, 0.4, 1.0);
 const FRAMING_FOV_DEG: f32 = 45.0;
-/// Refractive indices that a coat may have.
-const IOR_RANGE: (f32, f32) = (1.01, 4.0);
 
 impl Loader<'_> {
     /// Builds a scene from the mesh file at the loader's path.
@@ -63,7 +58,7 @@ impl Loader<'_> {
         };
         let environment = self.whole_environment(options, &mut warnings)?;
         let camera: Camera = self.camera(&entry)?;
-        let light = Light { environment, lamps: Vec::new() };
+        let light = Light { environment, lamps: mesh.lamps };
         let mut scene = self.scene(camera, film, light, materials, geometry, warnings);
         scene.inputs.extend(mesh.side_files);
         scene.inputs.extend(options.environment.clone());
@@ -113,7 +108,11 @@ impl Loader<'_> {
         ignored: &mut Ignored,
         warnings: &mut Vec<String>,
     ) -> Result<(Vec<Material>, Geometry)> {
-        let mut materials: Vec<_> = mesh.materials.iter().enumerate().map(material).collect();
+        let named = |(index, entry): (usize, &MeshMaterial)| match entry.material.name.as_str() {
+            "" => Material { name: format!("material {index}"), ..entry.material.clone() },
+            _ => entry.material.clone(),
+        };
+        let mut materials: Vec<_> = mesh.materials.iter().enumerate().map(named).collect();
         let lacking = materials.len();
         if mesh.runs.is_empty() || mesh.runs.iter().any(|run| run.material.is_none()) {
             // An OBJ file leaves the material open; glTF defines the one that is meant.
@@ -123,9 +122,14 @@ impl Loader<'_> {
                 }
                 default_material()
             } else {
-                let reflectance = Vec3::ONE;
-                let fresnel = ConductorFresnel::Schlick { reflectance };
-                let kind = MaterialKind::Conductor { alpha: 1.0, fresnel };
+                let kind = MaterialKind::Principled {
+                    base_color: Vec3::ONE,
+                    metallic: 1.0,
+                    roughness: 1.0,
+                    ior: 1.5,
+                    specular: 1.0,
+                    specular_color: Vec3::ONE,
+                };
                 Material::new("default", kind)
             });
         }
@@ -198,28 +202,6 @@ fn camera_entry(camera: &MeshCamera, lens: Perspective) -> CameraEntry {
         aperture_radius: 0.0,
         focus_distance: None,
     }
-}
-
-/// Maps a material of the file to one of the renderer.
-fn material((index, material): (usize, &MeshMaterial)) -> Material {
-    let width = |alpha: f32| alpha.clamp(MIN_ALPHA, 1.0);
-    let kind = match material.surface {
-        MeshSurface::Diffuse => MaterialKind::Diffuse { reflectance: material.base_color.into() },
-        MeshSurface::Plastic { diffuse, alpha, ior } => MaterialKind::Plastic {
-            diffuse: diffuse.into(),
-            alpha: width(alpha),
-            ior: ior.clamp(IOR_RANGE.0, IOR_RANGE.1),
-        },
-        MeshSurface::Conductor { reflectance, alpha } => MaterialKind::Conductor {
-            alpha: width(alpha),
-            fresnel: ConductorFresnel::Schlick { reflectance: reflectance.into() },
-        },
-    };
-    let name = match material.name.as_str() {
-        "" => format!("material {index}"),
-        name => name.to_owned(),
-    };
-    Material::new(name, kind)
 }
 
 /// Checks that a mesh file is one that [`Loader::whole`] reads.

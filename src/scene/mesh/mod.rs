@@ -3,24 +3,28 @@
 //! The extension tells PLY, OBJ and glTF apart. PLY and OBJ are streamed, glTF is read whole. All
 //! keep single precision and leave nothing but the arrays of [`Mesh`] behind.
 
+mod beside;
 pub mod gltf;
+mod images;
 mod mtl;
 pub mod obj;
 pub mod ply;
+mod tangents;
 
 use std::path::{Path, PathBuf};
 
 use glam::Mat4;
 
-use super::features::Ignored;
+use super::{features::Ignored, lamp::Lamp};
 use crate::{
+    brdf::Material,
     error::{Error, Result},
     files,
     scene::triangulate::triangulate_in_space,
 };
 
 /// Triangles in object space.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// Vertex positions, metres before the object's scale.
     pub positions: Vec<[f32; 3]>,
@@ -29,8 +33,8 @@ pub struct Mesh {
     pub normals: Vec<[f32; 3]>,
     /// Two sets of texture coordinates, each as long as `positions` or empty.
     pub uvs: [Vec<[f32; 2]>; 2],
-    /// Tangents along u of the first set, and the sign of the bitangent; as long as `positions` or
-    /// empty.
+    /// Tangents along u of the set that the normal texture reads, and the sign of the bitangent,
+    /// which points up in the image; zero where there is none. As long as `positions` or empty.
     pub tangents: Vec<[f32; 4]>,
     /// Linear Rec.709 colours and opacities, 0…1; as long as `positions` or empty.
     pub colors: Vec<[f32; 4]>,
@@ -42,7 +46,9 @@ pub struct Mesh {
     pub materials: Vec<MeshMaterial>,
     /// Cameras of the file.
     pub cameras: Vec<MeshCamera>,
-    /// Files beside the mesh file that were read for it: material libraries, buffers.
+    /// Lamps of the file.
+    pub lamps: Vec<Lamp>,
+    /// Files beside the mesh file that were read for it: material libraries, buffers, images.
     pub side_files: Vec<PathBuf>,
 }
 
@@ -82,38 +88,11 @@ pub struct Perspective {
     pub aspect_ratio: Option<f32>,
 }
 
-/// Reflection of a material of a mesh file; α as in the file.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum MeshSurface {
-    /// Diffuse in the base colour.
-    Diffuse,
-    /// Coat over a diffuse base.
-    Plastic {
-        /// Albedo of the base, 0…1.
-        diffuse: [f32; 3],
-        /// GGX width.
-        alpha: f32,
-        /// Refractive index of the coat.
-        ior: f32,
-    },
-    /// Metal.
-    Conductor {
-        /// Reflectance at normal incidence, 0…1.
-        reflectance: [f32; 3],
-        /// GGX width.
-        alpha: f32,
-    },
-}
-
-/// Material of a mesh file, as far as it is used.
-#[derive(Clone, Debug, PartialEq)]
+/// Material of a mesh file, with the parts of it that are left out.
+#[derive(Clone, Debug)]
 pub struct MeshMaterial {
-    /// Name in the file; may be empty.
-    pub name: String,
-    /// Linear Rec.709 colour of the diffuse reflection, 0…1.
-    pub base_color: [f32; 3],
-    /// Reflection where the file is a whole scene; an object of a scene file is diffuse.
-    pub surface: MeshSurface,
+    /// The material; its name may be empty.
+    pub material: Material,
     /// Parts of the material that are left out.
     pub ignored: Ignored,
 }
@@ -126,7 +105,7 @@ impl Mesh {
     /// content is invalid: unknown format, truncation, an index out of range.
     pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
         match files::extension(path).as_str() {
-            "ply" => ply::read(path),
+            "ply" => ply::read(path, warnings),
             "obj" => obj::read(path, warnings),
             "gltf" | "glb" => gltf::read(path, warnings),
             found => {

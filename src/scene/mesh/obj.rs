@@ -1,5 +1,5 @@
-//! Wavefront OBJ: positions, normals, faces of every group, and the materials of its MTL libraries.
-//! Names everything else that the files hold ([`features::OBJ`], [`features::MTL`]) in a warning.
+//! Wavefront OBJ: positions, texture coordinates, normals, faces of every group, and the materials of
+//! its MTL libraries. Names everything else that the files hold ([`features::OBJ`], [`features::MTL`]) in a warning.
 //!
 //! Deviation: parsed here and not by a crate, so that every message names the line and the index, and a
 //! large file needs no more memory than its mesh.
@@ -11,16 +11,21 @@ use std::{
 };
 
 use super::{
-    Mesh, MeshMaterial, MeshSurface,
-    mtl::{self, LibraryMaterial},
+    Mesh, MeshMaterial,
+    beside::path_beside,
+    images::Images,
+    mtl::{Library, LibraryMaterial},
 };
+use glam::Vec3;
+
 use crate::{
+    brdf::{Material, material::MaterialKind},
     error::{Error, Result},
     files,
     scene::features::{self, Ignored},
 };
 
-/// Ends a chain of vertices; also the normal of a corner that has none.
+/// Ends a chain of vertices; also the normal or texture coordinates of a corner that has none.
 const NONE: u32 = u32::MAX;
 
 /// Most vertices of a chain; further vertices of its position are found by hash.
@@ -36,6 +41,7 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
         path,
         line: 0,
         positions: Vec::new(),
+        uvs: Vec::new(),
         normals: Vec::new(),
         vertices: Vec::new(),
         chains: Vec::new(),
@@ -44,6 +50,7 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
         material_indices: HashMap::new(),
         library: Vec::new(),
         library_indices: HashMap::new(),
+        images: Images::default(),
         ignored: Ignored::default(),
         first_smoothing: None,
     };
@@ -89,9 +96,11 @@ fn for_each_line(
     }
 }
 
-/// Pair of position and normal that a face uses, linked to the next pair of the same position.
+/// Position, texture coordinates and normal that a face uses together, linked to the next of the same
+/// position.
 #[derive(Clone, Copy)]
 struct Vertex {
+    uv: u32,
     normal: u32,
     next: u32,
 }
@@ -100,19 +109,21 @@ struct ObjReader<'a> {
     path: &'a Path,
     line: usize,
     positions: Vec<[f32; 3]>,
+    uvs: Vec<[f32; 2]>,
     normals: Vec<[f32; 3]>,
     /// As long as `mesh.positions`.
     vertices: Vec<Vertex>,
     /// Head of the chain of `vertices` at each position; as long as `positions`.
     chains: Vec<u32>,
-    /// Vertex of a position and normal where the position's chain is full.
-    crowded: HashMap<(u32, u32), u32>,
+    /// Vertex of a position, texture coordinates and normal where the position's chain is full.
+    crowded: HashMap<(u32, u32, u32), u32>,
     mesh: Mesh,
     /// Index into `mesh.materials` by name.
     material_indices: HashMap<String, usize>,
     library: Vec<LibraryMaterial>,
     /// Index of the last of `library` with a name.
     library_indices: HashMap<String, usize>,
+    images: Images,
     ignored: Ignored,
     /// Line of the first smoothing group.
     first_smoothing: Option<usize>,
@@ -128,7 +139,7 @@ impl ObjReader<'_> {
         let (keyword, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
         match keyword {
             "v" => {
-                let position = self.vector(rest)?;
+                let position = self.vector(rest, 3)?;
                 if rest.split_ascii_whitespace().nth(5).is_some() {
                     self.ignore(features::OBJ_COLOR, features::OBJ_COLOR.name);
                 }
@@ -136,17 +147,21 @@ impl ObjReader<'_> {
                 self.chains.push(NONE);
             }
             "vn" => {
-                let normal = self.vector(rest)?;
+                let normal = self.vector(rest, 3)?;
                 self.normals.push(normal);
+            }
+            "vt" => {
+                let [u, v] = self.vector(rest, 1)?;
+                self.uvs.push([u, v]);
             }
             "f" => self.read_face(rest)?,
             "usemtl" => {
-                let material = self.material_index(rest.trim());
+                let material = self.material_index(rest.trim(), warnings);
                 self.mesh.start_run(Some(material));
             }
             "mtllib" => self.read_library(rest.trim(), warnings)?,
-            // Texture coordinates serve textures only; names of groups and objects change nothing.
-            "" | "vt" | "o" | "g" => {}
+            // Names of groups and objects change nothing.
+            "" | "o" | "g" => {}
             "s" if matches!(rest.trim(), "off" | "0") => {}
             "s" => self.first_smoothing = self.first_smoothing.or(Some(self.line)),
             "p" | "l" => self.ignore(features::OBJ_POINTS, features::OBJ_POINTS.name),
@@ -159,14 +174,19 @@ impl ObjReader<'_> {
         self.ignored.add_named(feature, name, || format!("line {}", self.line));
     }
 
-    fn vector(&self, words: &str) -> Result<[f32; 3]> {
+    /// Reads a vector of which at least `least` components must be there; the others are 0.
+    fn vector<const N: usize>(&self, words: &str, least: usize) -> Result<[f32; N]> {
         let mut words = words.split_ascii_whitespace();
-        let mut vector = [0.0; 3];
-        for component in &mut vector {
-            let word = words.next().unwrap_or_default();
+        let mut vector = [0.0; N];
+        for (index, component) in vector.iter_mut().enumerate() {
+            let word = match words.next() {
+                None if index >= least => break,
+                word => word.unwrap_or_default(),
+            };
+            let expected = if least == 3 { "three numbers" } else { "one number or two" };
             *component = word
                 .parse()
-                .map_err(|_| self.error(format!("expected three numbers, found `{word}`")))?;
+                .map_err(|_| self.error(format!("expected {expected}, found `{word}`")))?;
         }
         Ok(vector)
     }
@@ -191,24 +211,24 @@ impl ObjReader<'_> {
         let mut parts = word.split('/');
         let position = parts.next().unwrap_or_default();
         let position = self.index(position, self.positions.len(), "position")?;
-        let normal = match parts.nth(1) {
-            Some(normal) if !normal.is_empty() => {
-                self.index(normal, self.normals.len(), "normal")?
-            }
-            _ => NONE,
+        let mut index = |count, what| match parts.next() {
+            Some(word) if !word.is_empty() => self.index(word, count, what),
+            _ => Ok(NONE),
         };
+        let uv = index(self.uvs.len(), "texture coordinate")?;
+        let normal = index(self.normals.len(), "normal")?;
         let mut vertex = self.chains[position as usize];
         let mut chain_length = 0;
         while vertex != NONE {
-            let Vertex { normal: found, next } = self.vertices[vertex as usize];
-            if found == normal {
+            let found = self.vertices[vertex as usize];
+            if (found.uv, found.normal) == (uv, normal) {
                 return Ok(vertex);
             }
-            vertex = next;
+            vertex = found.next;
             chain_length += 1;
         }
         let is_crowded = chain_length == LONGEST_CHAIN;
-        if is_crowded && let Some(&vertex) = self.crowded.get(&(position, normal)) {
+        if is_crowded && let Some(&vertex) = self.crowded.get(&(position, uv, normal)) {
             return Ok(vertex);
         }
         let vertex = u32::try_from(self.vertices.len())
@@ -216,12 +236,12 @@ impl ObjReader<'_> {
             .filter(|&vertex| vertex != NONE)
             .ok_or_else(|| self.error("more than 4,294,967,294 vertices"))?;
         let next = if is_crowded {
-            self.crowded.insert((position, normal), vertex);
+            self.crowded.insert((position, uv, normal), vertex);
             NONE
         } else {
             std::mem::replace(&mut self.chains[position as usize], vertex)
         };
-        self.vertices.push(Vertex { normal, next });
+        self.vertices.push(Vertex { uv, normal, next });
         self.mesh.positions.push(self.positions[position as usize]);
         Ok(vertex)
     }
@@ -247,21 +267,18 @@ impl ObjReader<'_> {
     }
 
     /// Finds or adds a material by name; one that no library describes is white.
-    fn material_index(&mut self, name: &str) -> usize {
+    fn material_index(&mut self, name: &str, warnings: &mut Vec<String>) -> usize {
         if let Some(&index) = self.material_indices.get(name) {
             return index;
         }
-        let described = self.library_indices.get(name).map(|&index| self.library[index].finish());
-        let material = described.unwrap_or_else(|| {
+        let material = if let Some(&index) = self.library_indices.get(name) {
+            self.library[index].finish(&mut self.images, warnings)
+        } else {
             let place = || format!("`{name}`, line {}", self.line);
             self.ignored.add(features::OBJ_UNDESCRIBED, place);
-            MeshMaterial {
-                name: name.to_owned(),
-                base_color: [1.0; 3],
-                surface: MeshSurface::Diffuse,
-                ignored: Ignored::default(),
-            }
-        });
+            let kind = MaterialKind::Diffuse { reflectance: Vec3::ONE };
+            MeshMaterial { material: Material::new(name, kind), ignored: Ignored::default() }
+        };
         let index = self.mesh.materials.len();
         self.mesh.materials.push(material);
         self.material_indices.insert(name.to_owned(), index);
@@ -271,11 +288,12 @@ impl ObjReader<'_> {
     /// Reads MTL libraries; one line may name several files.
     fn read_library(&mut self, names: &str, warnings: &mut Vec<String>) -> Result<()> {
         let folder = self.path.parent().unwrap_or(Path::new(""));
-        let whole = folder.join(names);
-        let paths = if whole.is_file() {
-            vec![whole]
-        } else {
-            names.split_ascii_whitespace().map(|name| folder.join(name)).collect()
+        let beside = |name: &str| {
+            path_beside(folder, Path::new(""), name).map_err(|message| self.error(message))
+        };
+        let paths = match beside(names) {
+            Ok(whole) if whole.is_file() => vec![whole],
+            _ => names.split_ascii_whitespace().map(beside).collect::<Result<_>>()?,
         };
         for path in paths {
             if self.mesh.side_files.contains(&path) {
@@ -291,14 +309,12 @@ impl ObjReader<'_> {
                 continue;
             };
             self.mesh.side_files.push(path.clone());
+            let mut library = Library::new(folder, &path);
+            for_each_line(&path, BufReader::new(file), |line, text| library.read_line(line, text))?;
             let first = self.library.len();
-            let library = &mut self.library;
-            for_each_line(&path, BufReader::new(file), |line, text| {
-                mtl::read_line(library, &path, line, text)
-            })?;
+            self.library.extend(library.materials);
             let read = (first..).zip(&self.library[first..]);
-            self.library_indices
-                .extend(read.map(|(index, found)| (found.material.name.clone(), index)));
+            self.library_indices.extend(read.map(|(index, found)| (found.name.clone(), index)));
         }
         Ok(())
     }
@@ -308,6 +324,11 @@ impl ObjReader<'_> {
             && self.vertices.iter().any(|vertex| vertex.normal == NONE)
         {
             self.ignored.add(features::OBJ_SMOOTHING, || format!("line {line}"));
+        }
+        if self.vertices.iter().any(|vertex| vertex.uv != NONE) {
+            let uv_of =
+                |vertex: &Vertex| self.uvs.get(vertex.uv as usize).copied().unwrap_or_default();
+            self.mesh.uvs[0] = self.vertices.iter().map(uv_of).collect();
         }
         if self.vertices.iter().any(|vertex| vertex.normal != NONE) {
             let normal_of = |vertex: &Vertex| {
@@ -319,6 +340,8 @@ impl ObjReader<'_> {
             let unnamed = super::MaterialRun { first_triangle: 0, material: None };
             self.mesh.runs.insert(0, unnamed);
         }
+        self.mesh.side_files.append(&mut self.images.files());
+        self.mesh.complete_tangents(1.0);
         (self.mesh, self.ignored)
     }
 }

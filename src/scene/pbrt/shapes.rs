@@ -34,7 +34,8 @@ pub fn mesh(entity: &Entity, folder: &Path, log: &mut Log) -> Result<Option<Mesh
                 return Err(entity.error("expected a `filename`"));
             };
             let path = folder.join(file);
-            let mesh = ply::read(&path).map_err(|error| entity.error(error.to_string()))?;
+            let mesh = ply::read(&path, &mut log.warnings)
+                .map_err(|error| entity.error(error.to_string()))?;
             for name in ["displacement", "displacement.edgelength"] {
                 if let Some(parameter) = entity.find(name) {
                     log.ignore(features::PBRT_DISPLACEMENT, &parameter.place);

@@ -19,22 +19,54 @@ struct Elements {
 }
 
 impl<'a> GltfReader<'a> {
-    /// Reads vectors of `N` floats.
+    /// Reads vectors of `N` numbers: floats, or integers as `KHR_mesh_quantization` has them.
     pub(super) fn vectors<const N: usize>(&self, accessor: &Accessor) -> Result<Vec<[f32; N]>> {
-        let expected = if N == 3 { Dimensions::Vec3 } else { Dimensions::Vec4 };
-        if (accessor.data_type(), accessor.dimensions()) != (DataType::F32, expected) {
+        let (expected, name) = match N {
+            2 => (Dimensions::Vec2, "two"),
+            3 => (Dimensions::Vec3, "three"),
+            _ => (Dimensions::Vec4, "four"),
+        };
+        let data_type = accessor.data_type();
+        if data_type == DataType::U32 || accessor.dimensions() != expected {
             return Err(self.error(format!(
-                "accessor {}: expected vectors of {} floats, found {:?} of {:?}",
+                "accessor {}: expected vectors of {name} floats or short integers, found {:?} of \
+                 {data_type:?}",
                 accessor.index(),
-                if N == 3 { "three" } else { "four" },
                 accessor.dimensions(),
-                accessor.data_type()
             )));
         }
-        let component = |bytes: &[u8], at: usize| {
-            f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+        let scale = match (accessor.normalized(), data_type) {
+            (true, DataType::I8) => 127.0,
+            (true, DataType::U8) => 255.0,
+            (true, DataType::I16) => 32_767.0,
+            (true, DataType::U16) => 65_535.0,
+            _ => 1.0,
         };
-        self.elements(accessor, |bytes| std::array::from_fn(|index| component(bytes, 4 * index)))
+        let size = data_type.size();
+        let component = |bytes: &[u8]| {
+            let value = match *bytes {
+                [a] if data_type == DataType::I8 => f32::from(a as i8),
+                [a] => f32::from(a),
+                [a, b] if data_type == DataType::I16 => f32::from(i16::from_le_bytes([a, b])),
+                [a, b] => f32::from(u16::from_le_bytes([a, b])),
+                [a, b, c, d] => f32::from_le_bytes([a, b, c, d]),
+                _ => 0.0,
+            };
+            // The least of the signed integers is one below −1.
+            if scale == 1.0 { value } else { (value / scale).max(-1.0) }
+        };
+        self.elements(accessor, |bytes| {
+            std::array::from_fn(|index| component(&bytes[index * size..][..size]))
+        })
+    }
+
+    /// Reads colours with or without opacity.
+    pub(super) fn colors_of(&self, accessor: &Accessor) -> Result<Vec<[f32; 4]>> {
+        if accessor.dimensions() == Dimensions::Vec3 {
+            let colors = self.vectors::<3>(accessor)?;
+            return Ok(colors.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect());
+        }
+        self.vectors::<4>(accessor)
     }
 
     /// Reads the corners of triangles, all below `vertex_count`.
@@ -81,7 +113,13 @@ impl<'a> GltfReader<'a> {
             None if accessor.sparse().is_some() && count <= MAX_ZEROS => {
                 (0..count).map(|_| element(&vec![0; size])).collect()
             }
-            None => return Err(self.error(format!("{label} has no buffer view"))),
+            None => {
+                let compressed = "KHR_draco_mesh_compression";
+                let has_draco = self.document.extensions_used().any(|used| used == compressed);
+                let cause =
+                    if has_draco { format!(" (`{compressed}` is refused)") } else { String::new() };
+                return Err(self.error(format!("{label} has no buffer view{cause}")));
+            }
         };
         if let Some(sparse) = accessor.sparse() {
             let (indices, values) = (sparse.indices(), sparse.values());
@@ -115,20 +153,7 @@ impl<'a> GltfReader<'a> {
             .checked_sub(1)
             .map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size))
             .and_then(|bytes| bytes.checked_add(offset));
-        let buffer = &self.buffers[view.buffer().index()];
-        let bytes = view
-            .offset()
-            .checked_add(view.length())
-            .and_then(|end| buffer.get(view.offset()..end))
-            .ok_or_else(|| {
-                self.error(format!(
-                    "truncated: buffer view {} needs {} bytes from byte {}, its buffer has {}",
-                    view.index(),
-                    view.length(),
-                    view.offset(),
-                    buffer.len()
-                ))
-            })?;
+        let bytes = self.view_bytes(view)?;
         if needed.is_none_or(|needed| needed > bytes.len()) || (stride < size) {
             return Err(self.error(format!(
                 "{label}: {count} elements of {size} bytes every {stride} from byte {offset} do \
@@ -141,5 +166,22 @@ impl<'a> GltfReader<'a> {
             let start = offset + index * stride;
             &bytes[start..start + size]
         }))
+    }
+
+    /// Returns the bytes of a buffer view.
+    pub(super) fn view_bytes(&self, view: &View) -> Result<&[u8]> {
+        let buffer = &self.buffers[view.buffer().index()];
+        view.offset()
+            .checked_add(view.length())
+            .and_then(|end| buffer.get(view.offset()..end))
+            .ok_or_else(|| {
+                self.error(format!(
+                    "truncated: buffer view {} needs {} bytes from byte {}, its buffer has {}",
+                    view.index(),
+                    view.length(),
+                    view.offset(),
+                    buffer.len()
+                ))
+            })
     }
 }

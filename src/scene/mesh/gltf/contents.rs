@@ -1,10 +1,9 @@
-//! Materials, cameras and instances of a glTF file, and all that the file holds besides.
+//! Cameras and instances of a glTF file, and all that the file holds besides.
 
 use glam::{Mat4, Quat, Vec3};
 use gltf::{
-    Document, Material, Node,
+    Node,
     camera::Projection,
-    material::AlphaMode,
     mesh::{Mode, Semantic},
 };
 use serde_json::Value;
@@ -14,12 +13,9 @@ use crate::{
     error::Result,
     scene::{
         features::{self, Feature, Ignored, Support},
-        mesh::{MeshCamera, MeshMaterial, MeshSurface, Perspective},
+        mesh::{MeshCamera, Perspective},
     },
 };
-
-/// Factor from which a surface is a metal; Fenestra has no mixture of metal and plastic.
-const METAL: f32 = 0.5;
 
 /// Parts of the document with extensions that belong to no material, node or mesh.
 const OTHER_PARTS: [&str; 10] = [
@@ -36,12 +32,16 @@ const OTHER_PARTS: [&str; 10] = [
 ];
 
 /// Label of a part in warnings.
-fn label(part: &str, index: usize, name: Option<&str>) -> String {
+pub(super) fn label(part: &str, index: usize, name: Option<&str>) -> String {
     name.map_or_else(|| format!("{part} {index}"), |name| format!("{part} `{name}`"))
 }
 
 /// Counts an extension, unless it is done.
-fn ignore_extension(ignored: &mut Ignored, extension: &str, place: impl FnOnce() -> String) {
+pub(super) fn ignore_extension(
+    ignored: &mut Ignored,
+    extension: &str,
+    place: impl FnOnce() -> String,
+) {
     let name = format!("`{extension}`");
     let known: Option<&Feature> = features::GLTF.iter().find(|feature| feature.name == name);
     match known.map(|feature| (feature, feature.support)) {
@@ -52,7 +52,7 @@ fn ignore_extension(ignored: &mut Ignored, extension: &str, place: impl FnOnce()
 }
 
 /// Calls `found` with every extension in a part of the document, at any depth.
-fn for_each_extension(value: &Value, found: &mut impl FnMut(&str)) {
+pub(super) fn for_each_extension(value: &Value, found: &mut impl FnMut(&str)) {
     match value {
         Value::Object(members) => {
             for (key, member) in members {
@@ -72,51 +72,10 @@ fn for_each_extension(value: &Value, found: &mut impl FnMut(&str)) {
     }
 }
 
-/// Maps a material to those that exist, and counts what it holds besides.
-pub(super) fn material(material: &Material, json: &Value) -> MeshMaterial {
-    let index = material.index().unwrap_or_default();
-    let json = &json["materials"][index];
-    let mut ignored = Ignored::default();
-    let place = || label("material", index, material.name());
-    let factors = material.pbr_metallic_roughness();
-    let parts = [
-        (factors.base_color_texture().is_some(), features::GLTF_BASE_TEXTURE),
-        (factors.metallic_roughness_texture().is_some(), features::GLTF_METAL_TEXTURE),
-        (material.normal_texture().is_some(), features::GLTF_NORMAL_TEXTURE),
-        (material.occlusion_texture().is_some(), features::GLTF_OCCLUSION_TEXTURE),
-        (material.emissive_texture().is_some(), features::GLTF_EMISSIVE_TEXTURE),
-        (material.emissive_factor() != [0.0; 3], features::GLTF_EMISSIVE),
-        (material.alpha_mode() == AlphaMode::Mask, features::GLTF_MASK),
-        (material.alpha_mode() == AlphaMode::Blend, features::GLTF_BLEND),
-    ];
-    for (_, feature) in parts.into_iter().filter(|(is_there, _)| *is_there) {
-        ignored.add(feature, place);
-    }
-    for_each_extension(json, &mut |name| ignore_extension(&mut ignored, name, place));
-
-    let [red, green, blue, _] = factors.base_color_factor();
-    let base_color = [red, green, blue].map(|channel| channel.clamp(0.0, 1.0));
-    let (metallic, roughness) = (factors.metallic_factor(), factors.roughness_factor());
-    let alpha = roughness * roughness;
-    let surface = if metallic >= METAL {
-        MeshSurface::Conductor { reflectance: base_color, alpha }
-    } else {
-        let ior = json["extensions"]["KHR_materials_ior"]["ior"].as_f64().unwrap_or(1.5) as f32;
-        let diffuse = base_color.map(|channel| channel * (1.0 - metallic.max(0.0)));
-        MeshSurface::Plastic { diffuse, alpha, ior }
-    };
-    MeshMaterial {
-        name: material.name().unwrap_or_default().to_owned(),
-        base_color,
-        surface,
-        ignored,
-    }
-}
-
 impl GltfReader<'_> {
     /// Counts the parts of the document that belong to no node.
-    pub(super) fn ignore_contents(&mut self, document: &Document, json: &Value) {
-        let ignored = &mut self.ignored;
+    pub(super) fn ignore_contents(&mut self) {
+        let Self { document, json, ignored, .. } = self;
         for animation in document.animations() {
             let place = || label("animation", animation.index(), animation.name());
             ignored.add(features::GLTF_ANIMATION, place);
@@ -139,7 +98,7 @@ impl GltfReader<'_> {
     }
 
     /// Keeps the camera of a node; counts its lights, skin and other extensions.
-    pub(super) fn read_node(&mut self, node: &Node, world_from_node: Mat4, json: &Value) {
+    pub(super) fn read_node(&mut self, node: &Node, world_from_node: Mat4) {
         let place = || label("node", node.index(), node.name());
         if let Some(camera) = node.camera() {
             let names = [camera.name(), node.name()].into_iter().flatten().map(str::to_owned);
@@ -157,12 +116,12 @@ impl GltfReader<'_> {
         if node.skin().is_some() {
             self.ignored.add(features::GLTF_SKIN, place);
         }
-        let json = &json["nodes"][node.index()];
+        let json = &self.json["nodes"][node.index()];
         for_each_extension(json, &mut |name| ignore_extension(&mut self.ignored, name, place));
     }
 
     /// Counts what the primitives of a mesh hold besides triangles.
-    pub(super) fn ignore_in_mesh(&mut self, mesh: &gltf::Mesh, json: &Value) {
+    pub(super) fn ignore_in_mesh(&mut self, mesh: &gltf::Mesh) {
         let place = || label("mesh", mesh.index(), mesh.name());
         let ignored = &mut self.ignored;
         for primitive in mesh.primitives() {
@@ -173,30 +132,21 @@ impl GltfReader<'_> {
                 ignored.add(features::GLTF_POINTS, place);
                 continue;
             }
-            if primitive.morph_targets().next().is_some() {
-                ignored.add(features::GLTF_MORPH, place);
-            }
             for (semantic, _) in primitive.attributes() {
                 match semantic {
-                    Semantic::Colors(_) => ignored.add(features::GLTF_COLOR, place),
-                    Semantic::TexCoords(1..) => ignored.add(features::GLTF_UV, place),
+                    Semantic::Colors(1..) => ignored.add(features::GLTF_COLORS, place),
+                    Semantic::TexCoords(2..) => ignored.add(features::GLTF_UV, place),
                     _ => {}
                 }
             }
         }
-        let json = &json["meshes"][mesh.index()];
+        let json = &self.json["meshes"][mesh.index()];
         for_each_extension(json, &mut |name| ignore_extension(ignored, name, place));
     }
 
     /// Placements of a node's mesh: its own, or those of `EXT_mesh_gpu_instancing`.
-    pub(super) fn instances(
-        &self,
-        document: &Document,
-        node: &Node,
-        world_from_node: Mat4,
-        json: &Value,
-    ) -> Result<Vec<Mat4>> {
-        let instancing = &json["nodes"][node.index()]["extensions"]["EXT_mesh_gpu_instancing"];
+    pub(super) fn instances(&self, node: &Node, world_from_node: Mat4) -> Result<Vec<Mat4>> {
+        let instancing = &self.json["nodes"][node.index()]["extensions"]["EXT_mesh_gpu_instancing"];
         if instancing.is_null() {
             return Ok(vec![world_from_node]);
         }
@@ -204,7 +154,7 @@ impl GltfReader<'_> {
             Value::Null => Ok(None),
             index => index
                 .as_u64()
-                .and_then(|index| document.accessors().nth(usize::try_from(index).ok()?))
+                .and_then(|index| self.document.accessors().nth(usize::try_from(index).ok()?))
                 .map(Some)
                 .ok_or_else(|| {
                     let node = label("node", node.index(), node.name());

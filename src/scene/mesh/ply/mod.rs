@@ -1,7 +1,7 @@
 //! PLY \[Turk 1994\]: ascii and binary in both byte orders.
 //!
 //! The header may name elements and properties in any order and of any type. The reader uses
-//! `x y z` and `nx ny nz` of `vertex` and the list `vertex_indices` (or `vertex_index`) of `face`. It
+//! `x y z`, `nx ny nz` and texture coordinates of `vertex` and the list `vertex_indices` (or `vertex_index`) of `face`. It
 //! triangulates polygons with more than three corners in the plane of their Newell normal.
 
 mod header;
@@ -18,26 +18,37 @@ use super::Mesh;
 use crate::{
     error::{Error, Result},
     files,
+    scene::features::{self, Ignored},
 };
+
+/// Names of texture coordinates; (0, 0) is the lower left corner.
+const UV_NAMES: [[&str; 2]; 4] =
+    [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
 
 /// Largest compression of gzip, which bounds what a compressed file may promise.
 const GZIP_LARGEST_RATIO: u64 = 1032;
 
-/// Reads a PLY file, or one compressed by gzip if its extension is `gz`.
+/// Reads a PLY file, or one compressed by gzip if its extension is `gz`. Vertex colours, which are left
+/// out, are a warning.
 ///
 /// # Errors
 /// [`Error::Io`], or [`Error::Format`] that names the element and what was expected and found.
-pub fn read(path: &Path) -> Result<Mesh> {
+pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
     let file = files::open_regular(path)?;
     let file_bytes = file.metadata().map_err(|source| Error::io(path, "read", source))?.len();
     if files::extension(path) == "gz" {
         let reader = BufReader::with_capacity(1 << 16, MultiGzDecoder::new(file));
-        return read_from(path, reader, file_bytes.saturating_mul(GZIP_LARGEST_RATIO));
+        return read_from(path, reader, file_bytes.saturating_mul(GZIP_LARGEST_RATIO), warnings);
     }
-    read_from(path, BufReader::with_capacity(1 << 16, file), file_bytes)
+    read_from(path, BufReader::with_capacity(1 << 16, file), file_bytes, warnings)
 }
 
-fn read_from<R: BufRead>(path: &Path, reader: R, file_bytes: u64) -> Result<Mesh> {
+fn read_from<R: BufRead>(
+    path: &Path,
+    reader: R,
+    file_bytes: u64,
+    warnings: &mut Vec<String>,
+) -> Result<Mesh> {
     let mut source = Source { path, reader, encoding: Encoding::Ascii, bytes_read: 0, line: 1 };
     let elements = source.read_header()?;
     let mut mesh = Mesh::default();
@@ -57,8 +68,12 @@ fn read_from<R: BufRead>(path: &Path, reader: R, file_bytes: u64) -> Result<Mesh
             ));
         }
     }
+    let mut ignored = Ignored::default();
     let mut polygons = Polygons::default();
     for element in &elements {
+        if element.name == "vertex" && element.properties.iter().any(|p| p.name == "red") {
+            ignored.add(features::PLY_COLOR, || "element `vertex`".to_owned());
+        }
         match element.name.as_str() {
             "vertex" => source.read_vertices(element, &mut mesh)?,
             "face" => source.read_faces(element, vertex_count, &mut mesh, &mut polygons)?,
@@ -73,6 +88,7 @@ fn read_from<R: BufRead>(path: &Path, reader: R, file_bytes: u64) -> Result<Mesh
         }
     }
     polygons.triangulate_into(&mut mesh);
+    warnings.extend(ignored.warnings(path));
     Ok(mesh)
 }
 
@@ -141,9 +157,14 @@ impl<R: BufRead> Source<'_, R> {
         }
         let normals = [column("nx"), column("ny"), column("nz")];
         let has_normals = !normals.contains(&None);
+        let uvs = UV_NAMES.map(|[u, v]| Some([column(u)?, column(v)?]));
+        let uvs = uvs.into_iter().flatten().next();
         mesh.positions.reserve_exact(element.count as usize);
         if has_normals {
             mesh.normals.reserve_exact(element.count as usize);
+        }
+        if uvs.is_some() {
+            mesh.uvs[0].reserve_exact(element.count as usize);
         }
         let mut row = vec![0.0_f64; element.properties.len()];
         for index in 0..element.count {
@@ -161,6 +182,9 @@ impl<R: BufRead> Source<'_, R> {
             mesh.positions.push(vector(positions));
             if has_normals {
                 mesh.normals.push(vector(normals));
+            }
+            if let Some(columns) = uvs {
+                mesh.uvs[0].push(columns.map(|column| row[column] as f32));
             }
         }
         Ok(())

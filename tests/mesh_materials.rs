@@ -1,0 +1,444 @@
+//! Surfaces, lamps and vertex attributes of glTF, OBJ and PLY files.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
+
+#[path = "support/command.rs"]
+mod command;
+#[path = "support/gltf.rs"]
+mod document;
+
+use command::Folder;
+use document::{Attribute, base64, floats, gltf, gltf_of, png};
+use fenestra::{
+    brdf::{Material, material::MaterialKind},
+    scene::{
+        Scene,
+        lamp::{LampKind, SpotFalloff},
+        mesh::Mesh,
+    },
+    texture::{Channels, Encoding, Interpolation, TextureUse, Wrap},
+};
+use glam::Vec3;
+
+/// Positions of a triangle in the plane z = 0, and its texture coordinates, v downwards.
+const CORNERS: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+const COORDINATES: [f32; 6] = [0.0, 1.0, 1.0, 1.0, 0.0, 0.0];
+
+fn positions() -> Attribute<'static> {
+    Attribute("POSITION", 5126, "VEC3", false, floats(&CORNERS))
+}
+
+/// Loads the material of a triangle with texture coordinates from `folder`.
+fn gltf_material(folder: &Folder, material: &str, rest: &str) -> (Material, Vec<String>) {
+    let uvs = Attribute("TEXCOORD_0", 5126, "VEC2", false, floats(&COORDINATES));
+    let text = gltf_of(&[positions(), uvs], 3, material, rest);
+    let mut warnings = Vec::new();
+    let mesh = Mesh::read(&folder.write("a.gltf", text), &mut warnings).unwrap();
+    warnings.extend(mesh.ignored_in_materials().warnings("a.gltf".as_ref()));
+    (mesh.materials[0].material.clone(), warnings)
+}
+
+fn close(found: Vec3, expected: [f32; 3]) -> bool {
+    found.abs_diff_eq(expected.into(), 1e-5)
+}
+
+#[test]
+fn metallic_roughness_materials_come_with_all_their_textures() {
+    let folder = Folder::new();
+    folder.write("a b.png", png([[10, 20, 30, 255], [40, 50, 60, 128]]));
+    let inline = base64(&png([[255, 128, 0, 255]; 2]));
+    let rest = format!(
+        r#", "images": [{{"uri": "a%20b.png"}}, {{"uri": "data:image/png;base64,{inline}"}}],
+        "samplers": [{{"wrapS": 33071, "wrapT": 33648, "magFilter": 9728, "minFilter": 9987}}],
+        "textures": [{{"source": 0, "sampler": 0}}, {{"source": 1}}]"#
+    );
+    let material = r#"{"name": "wood", "alphaMode": "MASK", "alphaCutoff": 0.3, "doubleSided": true,
+        "pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.6, 0.4, 0.9], "metallicFactor": 0.25,
+            "roughnessFactor": 0.5, "baseColorTexture": {"index": 0},
+            "metallicRoughnessTexture": {"index": 1, "texCoord": 1}},
+        "normalTexture": {"index": 1, "scale": 0.5}, "occlusionTexture": {"index": 1},
+        "emissiveFactor": [1, 0.5, 0], "emissiveTexture": {"index": 0},
+        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4},
+            "KHR_materials_ior": {"ior": 1.4}, "KHR_materials_specular":
+                {"specularFactor": 0.5, "specularColorFactor": [2, 1, 1]}}}"#;
+    let (found, warnings) = gltf_material(&folder, material, &rest);
+    assert_eq!(warnings, [""; 0]);
+    let MaterialKind::Principled { base_color, metallic, roughness, ior, specular, specular_color } =
+        found.kind
+    else {
+        panic!("{found:?}")
+    };
+    assert_eq!((base_color, metallic), (Vec3::new(0.8, 0.6, 0.4), 0.25));
+    assert_eq!((roughness, ior, specular), (0.5, 1.4, 0.5));
+    assert_eq!(specular_color, Vec3::new(2.0, 1.0, 1.0));
+    let surface = found.surface;
+    let color = surface.color.unwrap();
+    assert_eq!((color.channels, color.encoding), (Channels::Color, Encoding::Srgb));
+    assert_eq!(color.wrap, [Wrap::ClampToEdge, Wrap::MirroredRepeat]);
+    assert_eq!((color.interpolation, color.uv_set), (Interpolation::Nearest, 0));
+    assert_eq!((color.texture.width, color.texture.height), (2, 1));
+    let of =
+        |used: Option<TextureUse>| used.map(|used| (used.channels, used.encoding, used.uv_set));
+    assert_eq!(of(surface.roughness), Some((Channels::Green, Encoding::Linear, 1)));
+    assert_eq!(of(surface.metallic), Some((Channels::Blue, Encoding::Linear, 1)));
+    assert_eq!(of(surface.normal), Some((Channels::Color, Encoding::Linear, 0)));
+    assert_eq!(surface.normal_scale, 0.5);
+    assert_eq!((surface.opacity.factor, surface.opacity.cutoff), (0.9, Some(0.3)));
+    assert_eq!(of(surface.opacity.texture), Some((Channels::Alpha, Encoding::Linear, 0)));
+    let emission = surface.emission.unwrap();
+    assert!(emission.two_sided && surface.two_sided);
+    assert_eq!(emission.radiance, Vec3::new(4.0, 2.0, 0.0));
+    assert_eq!(of(emission.texture), Some((Channels::Color, Encoding::Srgb, 0)));
+
+    // An opaque material ignores its alpha; a material without numbers is a white, rough metal.
+    let (found, _) = gltf_material(&folder, &material.replace("MASK", "OPAQUE"), &rest);
+    assert_eq!(found.surface.opacity, Default::default());
+    let (found, _) = gltf_material(&folder, &material.replace("MASK", "BLEND"), &rest);
+    assert_eq!((found.surface.opacity.factor, found.surface.opacity.cutoff), (0.9, None));
+    let (found, _) = gltf_material(&folder, "{}", "");
+    assert!(matches!(found.kind, MaterialKind::Principled { metallic: 1.0, roughness: 1.0, .. }));
+    assert!(found.surface.emission.is_none());
+    let one_sided = r#"{"emissiveFactor": [1, 1, 1]}"#;
+    assert!(!gltf_material(&folder, one_sided, "").0.surface.emission.unwrap().two_sided);
+}
+
+#[test]
+fn glass_unlit_and_specular_glossiness_materials_are_mapped() {
+    let folder = Folder::new();
+    let with = |extensions: &str, pbr: &str| {
+        let material =
+            format!(r#"{{"pbrMetallicRoughness": {{{pbr}}}, "extensions": {{{extensions}}}}}"#);
+        gltf_material(&folder, &material, "")
+    };
+    let glass = r#""KHR_materials_transmission": {"transmissionFactor": 1},
+        "KHR_materials_ior": {"ior": 1.3}"#;
+    let smooth = r#""baseColorFactor": [0.9, 1, 1, 1], "metallicFactor": 0, "roughnessFactor": 0"#;
+    let (found, warnings) = with(glass, smooth);
+    let MaterialKind::ThinDielectric { ior, transmittance, .. } = found.kind else { panic!() };
+    assert_eq!((ior, transmittance, warnings.len()), (1.3, Vec3::new(0.9, 1.0, 1.0), 0));
+    let rough = smooth.replace("Factor\": 0", "Factor\": 0.5").replacen("0.5", "0", 1);
+    let (_, warnings) = with(glass, &rough);
+    assert!(warnings[0].contains("ignored roughness of thin glass"), "{warnings:?}");
+    let volume = r#", "KHR_materials_volume": {"thicknessFactor": 0.1, "attenuationDistance": 1,
+        "attenuationColor": [1, 0, 0]}"#;
+    let (found, warnings) = with(&format!("{glass}{volume}"), &rough);
+    assert!(matches!(found.kind, MaterialKind::Dielectric { alpha: 0.25, ior: 1.3, .. }));
+    assert!(warnings[0].contains("ignored absorption"), "{warnings:?}");
+    // A metal transmits nothing, and little transmission stays opaque.
+    let (found, warnings) = with(glass, r#""metallicFactor": 1"#);
+    assert!(matches!(found.kind, MaterialKind::Principled { .. }) && warnings.is_empty());
+    let (found, warnings) = with(&glass.replace("Factor\": 1", "Factor\": 0.4"), smooth);
+    assert!(matches!(found.kind, MaterialKind::Principled { .. }) && warnings.len() == 1);
+
+    let unlit = r#""KHR_materials_unlit": {}"#;
+    let (found, warnings) = with(unlit, r#""baseColorFactor": [0.2, 0.4, 0.6, 1]"#);
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert_eq!(found.surface.emission.unwrap().radiance, Vec3::new(0.2, 0.4, 0.6));
+    let MaterialKind::Diffuse { reflectance: Vec3::ZERO } = found.kind else { panic!() };
+
+    let gloss = r#""KHR_materials_pbrSpecularGlossiness": {"diffuseFactor": [0.5, 0.4, 0.3, 1],
+        "specularFactor": [0.04, 0.08, 1], "glossinessFactor": 0.75}"#;
+    let (found, warnings) = with(gloss, "");
+    assert!(warnings.is_empty(), "{warnings:?}");
+    let MaterialKind::Principled { base_color, metallic, roughness, ior, specular_color, .. } =
+        found.kind
+    else {
+        panic!("{found:?}")
+    };
+    assert!(close(base_color, [0.5, 0.4, 0.3]) && close(specular_color, [1.0, 2.0, 25.0]));
+    assert_eq!((metallic, roughness, ior), (0.0, 0.25, 1.5));
+}
+
+#[test]
+fn images_in_buffers_are_read_and_broken_ones_are_warnings() {
+    let folder = Folder::new();
+    let image = png([[1, 2, 3, 255], [4, 5, 6, 255]]);
+    let attributes = [positions(), Attribute("_IMAGE", 5121, "SCALAR", false, image)];
+    let material =
+        r#"{"name": "wood", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}"#;
+    let load = |images: &str| {
+        let rest = format!(r#", "images": [{images}], "textures": [{{"source": 0}}]"#);
+        let mut warnings = Vec::new();
+        let path = folder.write("a.gltf", gltf_of(&attributes, 3, material, &rest));
+        let mesh = Mesh::read(&path, &mut warnings);
+        mesh.map(|mesh| (mesh.materials[0].material.surface.color.clone(), warnings))
+    };
+    let (color, warnings) = load(r#"{"bufferView": 1, "mimeType": "image/png"}"#).unwrap();
+    assert!(color.is_some() && warnings.is_empty(), "{warnings:?}");
+    for broken in [
+        r#"{"bufferView": 0, "mimeType": "image/png"}"#,
+        r#"{"uri": "data:image/png;base64,AAAA"}"#,
+        r#"{"uri": "lost.png"}"#,
+    ] {
+        let (color, warnings) = load(broken).unwrap();
+        assert!(color.is_none(), "{broken}");
+        let expected = "rendered without this texture (material `wood`)";
+        assert!(warnings.len() == 1 && warnings[0].contains(expected), "{warnings:?}");
+    }
+    let message = load(r#"{"uri": "../secret.png"}"#).unwrap_err().to_string();
+    assert!(message.contains("`../secret.png` leads out of that folder"), "{message}");
+}
+
+#[test]
+fn quantized_attributes_are_numbers() {
+    let words = |words: &[i16]| words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    let attributes = [
+        Attribute("POSITION", 5122, "VEC3", false, words(&[0, 0, 0, 300, 0, 0, 0, -7, 0])),
+        Attribute("NORMAL", 5120, "VEC3", true, vec![0, 0, 127, 0, 0, 127, 0, 128, 0]),
+        Attribute("TEXCOORD_0", 5123, "VEC2", true, words(&[0, -1, -1, 0, 0, 0])),
+        Attribute("COLOR_0", 5121, "VEC4", true, vec![255, 51, 0, 102, 0, 0, 0, 0, 0, 0, 0, 51]),
+    ];
+    let rest = r#", "extensionsRequired": ["KHR_mesh_quantization"]"#;
+    let folder = Folder::new();
+    let load = |material: &str| {
+        let path = folder.write("a.gltf", gltf_of(&attributes, 3, material, rest));
+        Mesh::read(&path, &mut Vec::new()).unwrap()
+    };
+    let mesh = load(r#"{"alphaMode": "BLEND"}"#);
+    assert_eq!(mesh.positions, [[0.0; 3], [300.0, 0.0, 0.0], [0.0, -7.0, 0.0]]);
+    assert_eq!(mesh.normals, [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]);
+    assert_eq!(mesh.uvs[0], [[0.0, 1.0], [1.0, 0.0], [0.0, 0.0]]);
+    assert_eq!(mesh.colors[0], [1.0, 0.2, 0.0, 0.4]);
+    assert!(mesh.materials[0].material.surface.vertex_color);
+    assert_eq!(load("{}").colors[2], [0.0, 0.0, 0.0, 1.0], "opaque materials ignore alpha");
+}
+
+#[test]
+fn morph_targets_move_vertices_by_their_weights() {
+    let target = floats(&[0.0, 0.0, 2.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0]);
+    let attributes = [positions(), Attribute("_TARGET", 5126, "VEC3", false, target)];
+    let text = gltf_of(&attributes, 3, "", "");
+    let text = text.replace("}}]}]", r#"}, "targets": [{"POSITION": 1}]}], "weights": [0.5]}]"#);
+    let folder = Folder::new();
+    let mut warnings = Vec::new();
+    let mesh = Mesh::read(&folder.write("a.gltf", text), &mut warnings).unwrap();
+    assert_eq!(mesh.positions, [[0.0, 0.0, 1.0], [1.0, 0.0, 2.0], [0.0, 1.0, 0.0]]);
+    assert!(warnings.is_empty(), "{warnings:?}");
+}
+
+#[test]
+fn normal_maps_without_tangents_get_them() {
+    let folder = Folder::new();
+    folder.write("n.png", png([[128, 128, 255, 255]; 2]));
+    let rest = r#", "images": [{"uri": "n.png"}], "textures": [{"source": 0}]"#;
+    let uvs = || Attribute("TEXCOORD_0", 5126, "VEC2", false, floats(&COORDINATES));
+    let material = r#"{"normalTexture": {"index": 0}}"#;
+    let read = |attributes: &[Attribute], material: &str| {
+        let path = folder.write("a.gltf", gltf_of(attributes, 3, material, rest));
+        Mesh::read(&path, &mut Vec::new()).unwrap()
+    };
+    // u runs along +X, and up in the image, against v, along +Y = n × t.
+    let mesh = read(&[positions(), uvs()], material);
+    assert_eq!(mesh.tangents, [[1.0, 0.0, 0.0, 1.0]; 3]);
+    // A mirrored image turns tangent and sign.
+    let mirrored: Vec<f32> = COORDINATES
+        .iter()
+        .enumerate()
+        .map(|(i, c)| if i % 2 == 0 { 1.0 - c } else { *c })
+        .collect();
+    let mirrored = Attribute("TEXCOORD_0", 5126, "VEC2", false, floats(&mirrored));
+    let mesh = read(&[positions(), mirrored], material);
+    assert_eq!(mesh.tangents, [[-1.0, 0.0, 0.0, -1.0]; 3]);
+    // Tangents of the file stay, and no normal map needs none.
+    let stored =
+        Attribute("TANGENT", 5126, "VEC4", false, floats(&[0.0, 1.0, 0.0, -1.0].repeat(3)));
+    assert_eq!(read(&[positions(), uvs(), stored], material).tangents[0], [0.0, 1.0, 0.0, -1.0]);
+    assert!(read(&[positions(), uvs()], "{}").tangents.is_empty());
+
+    // An OBJ file counts v from below. Two triangles share an edge with its vertices and mirror the
+    // image there, so that the vertices of the edge are repeated.
+    folder.write("a.mtl", "newmtl bumpy\nnorm -bm 0.5 n.png\n");
+    let text = "mtllib a.mtl\nusemtl bumpy\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv -1 0 0\n\
+        vt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/1\nf 1/1/1 3/3/1 4/2/1\n";
+    let mesh = Mesh::read(&folder.write("a.obj", text), &mut Vec::new()).unwrap();
+    assert_eq!(mesh.positions.len(), 6);
+    let tangents = |face: usize| mesh.triangles[face].map(|corner| mesh.tangents[corner as usize]);
+    assert_eq!(tangents(0), [[1.0, 0.0, 0.0, 1.0]; 3]);
+    assert_eq!(tangents(1), [[-1.0, 0.0, 0.0, -1.0]; 3]);
+    assert_eq!(mesh.uvs[0].len(), 6);
+    assert_eq!(mesh.normals, [[0.0, 0.0, 1.0]; 6]);
+    assert_eq!(mesh.materials[0].material.surface.normal_scale, 0.5);
+}
+
+#[test]
+fn lights_of_nodes_become_lamps() {
+    let light =
+        |node: &str| format!(r#""extensions": {{"KHR_lights_punctual": {{"light": {node}}}}}"#);
+    let nodes = format!(
+        r#"{{"mesh": 0, "translation": [0, 2, 0], "children": [1, 2, 3]}},
+        {{"name": "bulb", {}}}, {{"scale": [3, 3, 3], "rotation": [-0.70710678, 0, 0, 0.70710678], {}}},
+        {{{}}}"#,
+        light("0"),
+        light("1"),
+        light("2")
+    );
+    let rest = r#", "extensionsRequired": ["KHR_lights_punctual"], "extensions":
+        {"KHR_lights_punctual": {"lights": [
+        {"type": "point", "color": [1, 0.5, 0], "intensity": 40},
+        {"type": "spot", "name": "beam", "intensity": 2, "spot": {"innerConeAngle": 0.1}},
+        {"type": "directional", "intensity": 3}]}}"#;
+    let folder = Folder::new();
+    let text = gltf(&nodes, "", "", rest);
+    let scene = Scene::load(&folder.write("a.gltf", &text)).unwrap();
+    assert_eq!(scene.warnings.len(), 2, "those on light and camera: {:?}", scene.warnings);
+    let [sun, beam, bulb] = &scene.lamps[..] else { panic!("{:?}", scene.lamps) };
+    let above = Vec3::new(0.0, 2.0, 0.0);
+    assert_eq!((bulb.name.as_str(), beam.name.as_str()), ("bulb", "beam"));
+    let intensity = Vec3::new(40.0, 20.0, 0.0);
+    assert_eq!(bulb.kind, LampKind::Point { position: above, intensity });
+    let direction = Vec3::NEG_Z;
+    assert_eq!(sun.kind, LampKind::Directional { direction, irradiance: Vec3::splat(3.0) });
+    let LampKind::Spot {
+        position,
+        direction,
+        intensity,
+        inner_angle_rad,
+        outer_angle_rad,
+        falloff,
+    } = beam.kind
+    else {
+        panic!("{beam:?}")
+    };
+    assert!(close(direction, [0.0, -1.0, 0.0]), "{direction}");
+    assert_eq!((position, intensity, inner_angle_rad), (above, Vec3::splat(2.0), 0.1));
+    assert_eq!((outer_angle_rad.to_degrees(), falloff), (45.0, SpotFalloff::SquaredCosine));
+    // The lamps are a part of the picture.
+    let other = text.replace("\"intensity\": 3", "\"intensity\": 4");
+    assert_ne!(Scene::load(&folder.write("b.gltf", other)).unwrap().hash, scene.hash);
+    for (from, to, expected) in [
+        ("\"light\": 2", "\"light\": 3", "node 3: the file has no light 3"),
+        ("Angle\": 0.1", "Angle\": 0.9", "0 ≤ innerConeAngle < outerConeAngle ≤ π/2, found 0.9"),
+        ("\"directional\"", "\"moon\"", "node 3: expected a light of type point"),
+        ("\"intensity\": 2", "\"intensity\": -2", "node 2: expected a light of finite colour"),
+    ] {
+        let path = folder.write("b.gltf", text.replace(from, to));
+        let message = Scene::load(&path).unwrap_err().to_string();
+        assert!(message.contains(expected), "expected {expected:?}, found {message}");
+    }
+}
+
+/// Loads an OBJ triangle with the only material of a library.
+fn mtl_material(folder: &Folder, keys: &str) -> (Material, Vec<String>) {
+    folder.write("a.mtl", format!("newmtl a\n{keys}\n"));
+    let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl a\n\
+        f 1/1 2/2 3/3\n";
+    let mut warnings = Vec::new();
+    let mesh = Mesh::read(&folder.write("a.obj", text), &mut warnings).unwrap();
+    assert_eq!(mesh.uvs[0], [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
+    warnings.extend(mesh.ignored_in_materials().warnings("a.obj".as_ref()));
+    (mesh.materials[0].material.clone(), warnings)
+}
+
+#[test]
+fn mtl_materials_become_surfaces() {
+    let folder = Folder::new();
+    folder.write("maps/leaf green.png", png([[10, 90, 10, 255], [0, 0, 0, 0]]));
+    folder.write("grey.png", png([[128, 128, 128, 255]; 2]));
+    // Transparent texels cut out; a black colour does not blacken its image.
+    let keys = "Kd 0 0 0\nd 0.5\nmap_Kd -s 2 3 -o 0.5 0.25 -clamp on maps\\leaf green.png\n";
+    let (found, warnings) = mtl_material(&folder, keys);
+    assert!(warnings.is_empty(), "{warnings:?}");
+    let MaterialKind::Diffuse { reflectance: Vec3::ONE } = found.kind else { panic!("{found:?}") };
+    let color = found.surface.color.unwrap();
+    assert_eq!(color.image_from_uv, [[2.0, 0.0, 0.5], [0.0, -3.0, 0.75]]);
+    assert_eq!((color.wrap, color.encoding), ([Wrap::ClampToEdge; 2], Encoding::Srgb));
+    let opacity = found.surface.opacity;
+    let texture = opacity.texture.unwrap();
+    assert_eq!((opacity.factor, opacity.cutoff, texture.channels), (0.5, None, Channels::Alpha));
+    assert_eq!(texture.image_from_uv, color.image_from_uv);
+    let keys = "map_Kd maps/leaf green.png\nmap_d -mm 0.2 0.5 -imfchan g grey.png\nTr 0.75\n";
+    let opacity = mtl_material(&folder, keys).0.surface.opacity;
+    let texture = opacity.texture.unwrap();
+    assert_eq!((opacity.factor, texture.channels), (0.25, Channels::Green));
+    assert_eq!((texture.scale, texture.bias), ([0.5; 3], [0.2; 3]));
+
+    let kind = |keys: &str| mtl_material(&folder, keys).0.kind;
+    let pane = kind("Kd 0.5 1 1\nKs 1 1 1\nd 0.2\nNi 1.4\nillum 7");
+    let MaterialKind::ThinDielectric { ior, transmittance, .. } = pane else { panic!("{pane:?}") };
+    assert!(ior == 1.4 && close(transmittance, [0.9, 1.0, 1.0]), "{transmittance}");
+    let reflectance = Vec3::new(0.9, 0.8, 0.7);
+    let mirror = kind("Kd 0 0 0\nKs 0.9 0.8 0.7\nillum 3");
+    assert!(matches!(mirror, MaterialKind::Mirror { reflectance: found } if found == reflectance));
+    for keys in ["Ks 0.5\nillum 3", "Ks 0.5\nillum 7\nd 0.8", "Ks 0.5", "Kd 0\nKs 0.5\nillum 2"] {
+        assert!(matches!(kind(keys), MaterialKind::Plastic { .. }), "{keys}");
+    }
+    let (found, _) = mtl_material(&folder, "Kd 0.5\nPr 0.3\nmap_Pm grey.png\nKs 1\nKe 2 1 0");
+    let MaterialKind::Principled { metallic, roughness, .. } = found.kind else { panic!() };
+    assert_eq!((metallic, roughness), (1.0, 0.3));
+    assert_eq!(found.surface.metallic.unwrap().encoding, Encoding::Linear);
+    let emission = found.surface.emission.unwrap();
+    assert_eq!((emission.radiance, emission.two_sided), (Vec3::new(2.0, 1.0, 0.0), true));
+}
+
+#[test]
+fn names_do_not_leave_the_folder_of_the_scene() {
+    let folder = Folder::new();
+    folder.write("secret.txt", "newmtl a\nKd top secret\n");
+    let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n";
+    let refuse = |name: &str, text: String| {
+        let message =
+            Mesh::read(&folder.write(name, text), &mut Vec::new()).unwrap_err().to_string();
+        assert!(message.contains("expected one in the folder of the scene"), "{message}");
+        assert!(!message.contains("top secret"), "{message}");
+    };
+    let absolute = folder.path().join("secret.txt");
+    for name in ["../secret.txt", absolute.to_str().unwrap(), "x/../../secret.txt"] {
+        refuse("scene/a.obj", format!("mtllib {name}\n{obj}"));
+        folder.write("scene/a.mtl", format!("newmtl a\nmap_Kd {name}\n"));
+        refuse("scene/a.obj", format!("mtllib a.mtl\n{obj}"));
+        let text = gltf(r#"{"mesh": 0}"#, "", "", "");
+        let (before, after) = text.split_once("data:").unwrap();
+        let after = after.split_once('"').unwrap().1;
+        refuse("scene/a.gltf", format!("{before}{name}\"{after}"));
+        let escaped = name.replace('.', "%2e");
+        refuse("scene/a.gltf", format!("{before}{escaped}\"{after}"));
+    }
+    // A library in a folder below may name images elsewhere in the scene.
+    folder.write("scene/maps/a.png", png([[1; 4]; 2]));
+    folder.write("scene/materials/a.mtl", "newmtl a\nmap_Kd ../maps/a.png\n");
+    let path = folder.write("scene/a.obj", format!("mtllib materials/a.mtl\n{obj}"));
+    let mesh = Mesh::read(&path, &mut Vec::new()).unwrap();
+    assert!(mesh.materials[0].material.surface.color.is_some());
+    assert_eq!(mesh.side_files.len(), 2);
+}
+
+#[test]
+fn extras_may_be_anything() {
+    let text = gltf(r#"{"mesh": 0, "extras": "a text"}"#, r#"{"extras": [1, 2]}"#, "", "");
+    let text = text.replace("\"version\"", "\"extras\": 7, \"version\"");
+    let folder = Folder::new();
+    assert_eq!(Scene::load(&folder.write("a.gltf", text)).unwrap().geometry.triangles.len(), 1);
+}
+
+#[test]
+fn ply_coordinates_are_read_and_colours_named() {
+    let names = [("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t")];
+    let folder = Folder::new();
+    for (u, v) in names {
+        let text = format!(
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+             property float z\nproperty float {v}\nproperty float {u}\nproperty uchar red\n\
+             element face 1\nproperty list uchar int vertex_indices\nend_header\n\
+             0 0 0 0.1 0.2 9\n1 0 0 0.3 0.4 9\n0 1 0 0.5 0.6 9\n3 0 1 2\n"
+        );
+        let mut warnings = Vec::new();
+        let mesh = Mesh::read(&folder.write("a.ply", text), &mut warnings).unwrap();
+        assert_eq!(mesh.uvs[0], [[0.2, 0.1], [0.4, 0.3], [0.6, 0.5]]);
+        assert!(warnings[0].contains("ignored vertex colours `red green blue`"), "{warnings:?}");
+    }
+}
+
+#[test]
+fn objects_of_a_scene_take_whole_materials_of_their_mesh() {
+    let folder = Folder::new();
+    let material = r#"{"name": "brass", "emissiveFactor": [1, 0, 0]}"#;
+    folder.write("a.gltf", gltf(r#"{"mesh": 0}"#, material, r#", "material": 0"#, ""));
+    let clay = "type = \"diffuse\"\nreflectance = [0, 0, 0]";
+    let toml = command::yard([8, 8], "constant = [1, 1, 1]", clay, "mesh = \"a.gltf\"");
+    let own = toml.strip_suffix("material = \"clay\"\n").unwrap();
+    let scene = Scene::load(&folder.write("b.toml", own)).unwrap();
+    let found = scene.materials.last().unwrap();
+    assert_eq!(found.name, "mesh/brass");
+    assert!(matches!(found.kind, MaterialKind::Principled { metallic: 1.0, .. }));
+    assert_eq!(found.surface.emission.as_ref().unwrap().radiance, Vec3::X);
+}

@@ -1,0 +1,876 @@
+//! Mitsuba scene files: what each element becomes, what is named, and what is refused.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
+
+#[path = "support/command.rs"]
+mod command;
+
+use std::{f32::consts::PI, io::Write, path::Path};
+
+use command::{BALL, Folder, yard};
+use fenestra::{
+    brdf::{
+        Material,
+        material::{ConductorFresnel, MaterialKind},
+    },
+    export::mitsuba::{Export, Settings},
+    scene::{
+        Filter, Scene,
+        lamp::{LampKind, SpotFalloff},
+        load::LoadOptions,
+    },
+    texture::{Encoding, Interpolation, Wrap},
+};
+use glam::Vec3;
+
+/// Sensor of 40 × 20 pixels that looks from (0, 0, 5) to the origin.
+const SENSOR: &str = r#"<sensor type="perspective"><float name="fov" value="60"/>
+    <transform name="to_world"><lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="40"/><integer name="height" value="20"/></film>
+    </sensor>"#;
+
+fn document(content: &str) -> String {
+    format!("<scene version=\"3.0.0\">\n{content}\n</scene>")
+}
+
+/// Loads a file of a sensor and `content`.
+#[track_caller]
+fn load(content: &str) -> Scene {
+    let folder = Folder::new();
+    let path = folder.write("a.xml", document(&format!("{SENSOR}{content}")));
+    Scene::load(&path).unwrap()
+}
+
+/// Message of the error of a file of a sensor and `content`.
+#[track_caller]
+fn refusal(content: &str) -> String {
+    let folder = Folder::new();
+    let path = folder.write("a.xml", document(&format!("{SENSOR}\n{content}")));
+    Scene::load(&path).expect_err("the file is refused").to_string()
+}
+
+/// Material of a rectangle with the model `bsdf`.
+#[track_caller]
+fn material(bsdf: &str) -> (Material, Vec<String>) {
+    let scene = load(&format!("<shape type=\"rectangle\">{bsdf}</shape>"));
+    (scene.materials[0].clone(), scene.warnings)
+}
+
+#[track_caller]
+fn assert_close(found: Vec3, expected: Vec3) {
+    let within = 1e-5 * expected.abs().max_element().max(1.0);
+    assert!(found.abs_diff_eq(expected, within), "{found}, expected {expected}");
+}
+
+/// Position of the first vertex of a rectangle with a transform; its own is (−1, −1, 0).
+#[track_caller]
+fn first_vertex(transform: &str) -> Vec3 {
+    let text = format!(
+        "<shape type=\"rectangle\"><transform name=\"toWorld\">{transform}</transform></shape>"
+    );
+    load(&text).geometry.positions[0].into()
+}
+
+#[test]
+fn transforms_are_those_of_mitsuba() {
+    let found = first_vertex(
+        r#"<rotate x="0.6" z="0.8" angle="40"/><translate x="1"/><scale value="2"/>
+        <rotate value="0,1,0" angle="90"/>"#,
+    );
+    // Matrix of Mitsuba 3.9.1 for these elements.
+    let x = Vec3::new(0.224597, 1.02846, -1.70054);
+    let y = Vec3::new(0.771345, 1.53209, 1.02846);
+    assert_close(found, -x - y + Vec3::new(0.0, 0.0, -2.0));
+    // Deviation: an axis of any length turns as one of length 1; Mitsuba 3.9.1 distorts.
+    let long = first_vertex(r#"<rotate x="6" z="8" angle="40"/>"#);
+    assert_close(long, first_vertex(r#"<rotate x="0.6" z="0.8" angle="40"/>"#));
+    let found = first_vertex(r#"<lookat origin="1,2,3" target="2,5,-1" up="0.1 1 0"/>"#);
+    let x = Vec3::new(-0.980286, 0.0980286, -0.17155);
+    let y = Vec3::new(-0.0240312, 0.802643, 0.595975);
+    assert_close(found, -x - y + Vec3::new(1.0, 2.0, 3.0));
+    let matrix = "1 2 3e0 0 0 1 5 1e-1 0 0 2 0 0 0 0 1";
+    let found = first_vertex(&format!("<matrix value=\"{matrix}\"/>"));
+    assert_close(found, Vec3::new(-3.0, -0.9, 0.0));
+    assert_close(
+        first_vertex("<matrix value=\"1 2 3 0 1 5 0.1 0 2\"/>"),
+        Vec3::new(-3.0, -1.0, -0.1),
+    );
+    for (transform, expected) in [
+        ("<matrix value=\"1 2\"/>", "expected 16 or 9 numbers, found 2"),
+        ("<rotate angle=\"3\"/>", "expected an axis"),
+        ("<rotate x=\"1\"/>", "expected the attribute `angle`"),
+        ("<scale x=\"0\"/>", "expected a matrix with an inverse"),
+        ("<scale x=\"big\"/>", "expected a finite number, found `big`"),
+        ("<scale value=\"1e300\"/>", "expected a finite number"),
+        ("<turn x=\"1\"/>", "found `turn`"),
+        ("<lookat origin=\"0,0,0\" target=\"0,0,0\"/>", "must differ"),
+    ] {
+        let text = format!("<transform name=\"to_world\">{transform}</transform>");
+        let message = refusal(&format!("<shape type=\"rectangle\">{text}</shape>"));
+        assert!(message.contains(expected) && message.contains("a.xml:6:"), "{message}");
+    }
+}
+
+/// Camera of a sensor's parameters on a film of 200 × 100 pixels or of `film`.
+#[track_caller]
+fn camera(parameters: &str, film: &str) -> Scene {
+    let folder = Folder::new();
+    let film = if film.is_empty() {
+        "<integer name=\"width\" value=\"200\"/><integer name=\"height\" value=\"100\"/>"
+    } else {
+        film
+    };
+    let text = format!(
+        r#"<sensor type="perspective">{parameters}<film type="hdrfilm">{film}</film></sensor>"#
+    );
+    Scene::load(&folder.write("a.xml", document(&text))).unwrap()
+}
+
+#[test]
+fn fields_of_view_are_those_of_mitsuba() {
+    // Half height of the picture at a distance of 1, from rays of Mitsuba 3.9.1.
+    for (axis, tangent) in [
+        ("x", 0.2774 / 0.9608),
+        ("y", 0.5 / 0.866),
+        ("diagonal", 0.25 / 0.9682),
+        ("smaller", 0.5 / 0.866),
+        ("larger", 0.2774 / 0.9608),
+    ] {
+        let text = format!(
+            "<float name=\"fov\" value=\"60\"/><string name=\"fov_axis\" value=\"{axis}\"/>"
+        );
+        let found = (0.5 * camera(&text, "").camera.vertical_fov_deg).to_radians().tan();
+        assert!((found - tangent).abs() < 3e-4, "{axis}: {found}, expected {tangent}");
+    }
+    for text in ["<string name=\"focalLength\" value=\"50mm\"/>", ""] {
+        let found = (0.5 * camera(text, "").camera.vertical_fov_deg).to_radians().tan();
+        assert!((found - 0.19 / 0.9818).abs() < 3e-4, "{found}");
+    }
+}
+
+#[test]
+fn cameras_look_along_z_and_stand_upright() {
+    let scene = load("");
+    let camera = scene.camera;
+    assert_eq!(camera.position, Vec3::new(0.0, 0.0, 5.0));
+    assert_close((camera.look_at - camera.position).normalize(), Vec3::NEG_Z);
+    assert_close(camera.up, Vec3::Y);
+    assert_eq!((scene.film.width, scene.film.height), (40, 20));
+    assert_eq!(scene.film.filter, Filter::Gaussian);
+    assert_eq!(scene.warnings, [""; 0]);
+    assert_eq!(scene.environment.texels[0], Vec3::ZERO, "no light but that of the file");
+    let mirrored = self::camera(
+        r#"<transform name="to_world"><scale x="-1"/></transform>"#,
+        r#"<rfilter type="tent"/>"#,
+    );
+    assert_eq!((mirrored.film.width, mirrored.film.height), (768, 576));
+    assert_eq!(mirrored.warnings.len(), 2, "{:?}", mirrored.warnings);
+    assert!(mirrored.warnings[0].contains("rfilter `tent`"), "{:?}", mirrored.warnings);
+    assert!(mirrored.warnings[1].contains("mirror image"), "{:?}", mirrored.warnings);
+}
+
+#[test]
+fn crops_in_the_middle_are_rendered_and_others_named() {
+    let side = |name: &str, pixels: u32| format!("<integer name=\"{name}\" value=\"{pixels}\"/>");
+    let crop = |x: u32| {
+        side("width", 200)
+            + &side("height", 100)
+            + &side("crop_width", 100)
+            + &side("crop_height", 50)
+            + &side("cropOffsetX", x)
+            + &side("crop_offset_y", 25)
+    };
+    let fov = "<float name=\"fov\" value=\"90\"/><string name=\"fov_axis\" value=\"y\"/>";
+    let scene = camera(fov, &crop(50));
+    assert_eq!((scene.film.width, scene.film.height), (100, 50));
+    let tangent = (0.5 * scene.camera.vertical_fov_deg).to_radians().tan();
+    assert!((tangent - 0.5).abs() < 1e-6, "{tangent}");
+    let scene = camera(fov, &crop(0));
+    assert_eq!((scene.film.width, scene.film.height), (200, 100));
+    assert!(scene.warnings[0].contains("crop of the film"), "{:?}", scene.warnings);
+}
+
+#[test]
+fn sensors_are_chosen_by_id_or_number() {
+    let folder = Folder::new();
+    let thin = r#"<sensor type="thinlens" id="close"><float name="apertureRadius" value="0.1"/>
+        <float name="focus_distance" value="3"/><float name="near_clip" value="1"/></sensor>"#;
+    let path = folder.write("a.xml", document(&format!("{SENSOR}{thin}")));
+    let with = |name: &str| {
+        Scene::load_with(&path, &LoadOptions { camera: Some(name.into()), ..Default::default() })
+    };
+    assert_eq!(Scene::load(&path).unwrap().camera.aperture_radius, 0.0);
+    for name in ["close", "1"] {
+        let scene = with(name).unwrap();
+        assert_eq!((scene.camera.aperture_radius, scene.camera.focus_distance), (0.1, 3.0));
+        assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
+        assert!(scene.warnings[0].contains("sensors that are not used (line 2)"));
+    }
+    let message = with("far").unwrap_err().to_string();
+    assert!(message.contains("--camera far") && message.contains("0, `close`"), "{message}");
+}
+
+#[test]
+fn names_of_all_versions_and_defaults_are_read() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path().join("parts")).unwrap();
+    folder.write("parts/box.xml", document("<shape type=\"cube\"><ref id=\"$kind\"/></shape>"));
+    let text = r#"<default name="red" value="0.5"/><default name="redder" value="0.75"/>
+        <default name="red" value="0.1"/><default name="kind" value="paint"/>
+        <bsdf type="roughplastic" id="coat"><string name="distribution" value="ggx"/>
+          <rgb name="diffuseReflectance" value="$redder $red,0.25"/>
+          <float name="intIOR" value="1.5"/><string name="extIOR" value="vacuum"/>
+          <float name="alpha" value="0.2"/></bsdf>
+        <alias id="coat" as="paint"/><include filename="parts/box.xml"/>"#;
+    let path = folder.write("a.xml", document(&format!("{SENSOR}{text}")));
+    let scene = Scene::load(&path).unwrap();
+    let MaterialKind::Plastic { diffuse, alpha, ior } = scene.materials[0].kind else { panic!() };
+    assert_eq!((diffuse, alpha, ior), (Vec3::new(0.75, 0.5, 0.25), 0.2, 1.5));
+    assert_eq!(scene.materials[0].name, "coat");
+    assert!(!scene.materials[0].surface.two_sided);
+    assert_eq!(scene.geometry.triangles.len(), 12);
+    assert_eq!(scene.warnings, [""; 0]);
+    assert_eq!(scene.inputs.len(), 2);
+}
+
+#[test]
+fn models_become_materials() {
+    let (paint, _) =
+        material(r##"<bsdf type="diffuse"><srgb name="reflectance" value="#ff8000"/></bsdf>"##);
+    let MaterialKind::Diffuse { reflectance } = paint.kind else { panic!() };
+    assert_close(reflectance, Vec3::new(1.0, 0.2158605, 0.0));
+    let (copper, warnings) = material(
+        r#"<bsdf type="twosided"><bsdf type="roughconductor"><string name="material" value="Cu"/>
+        <float name="alphaU" value="0.1"/><float name="alphaV" value="0.3"/></bsdf></bsdf>"#,
+    );
+    let MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } =
+        copper.kind
+    else {
+        panic!()
+    };
+    assert!((alpha - 0.2).abs() < 1e-6 && copper.surface.two_sided);
+    assert_eq!(eta, Vec3::new(0.201005, 0.92375, 1.10222));
+    assert_eq!(k, Vec3::new(3.91326, 2.45305, 2.14209));
+    assert_eq!(warnings.len(), 2, "Beckmann and two widths: {warnings:?}");
+    let (dull, _) = material(
+        r#"<bsdf type="conductor"><rgb name="eta" value="1"/><rgb name="k" value="2"/>
+        <rgb name="specular_reflectance" value="0.5"/></bsdf>"#,
+    );
+    let MaterialKind::Conductor { fresnel: ConductorFresnel::Schlick { reflectance }, .. } =
+        dull.kind
+    else {
+        panic!()
+    };
+    assert_close(reflectance, Vec3::splat(0.25));
+    let (mirror, _) =
+        material(r#"<bsdf type="conductor"><string name="material" value="none"/></bsdf>"#);
+    assert!(matches!(mirror.kind, MaterialKind::Mirror { reflectance: Vec3::ONE }));
+    let (glass, _) = material(
+        r#"<bsdf type="dielectric"><string name="int_ior" value="water"/>
+        <string name="ext_ior" value="BK7"/></bsdf>"#,
+    );
+    let MaterialKind::Dielectric { ior, alpha, .. } = glass.kind else { panic!() };
+    assert!((ior - 1.333 / 1.5046).abs() < 1e-6 && alpha == 0.0 && glass.surface.two_sided);
+    let (pane, _) = material(r#"<bsdf type="thindielectric"/>"#);
+    let MaterialKind::ThinDielectric { ior, .. } = pane.kind else { panic!() };
+    assert!((ior - 1.50418).abs() < 1e-5, "Mitsuba 3.9.1 says 1.50418: {ior}");
+    let (gone, _) = material(
+        r#"<bsdf type="blendbsdf"><float name="weight" value="0.25"/><bsdf type="diffuse"/>
+        <bsdf type="null"/></bsdf>"#,
+    );
+    assert_eq!(gone.surface.opacity.factor, 0.75);
+    let (nothing, _) = material(r#"<bsdf type="null"/>"#);
+    assert_eq!(nothing.surface.opacity.factor, 0.0);
+    let (mixed, warnings) = material(
+        r#"<bsdf type="blendbsdf"><float name="weight" value="0.75"/><bsdf type="diffuse"/>
+        <bsdf type="dielectric"/></bsdf>"#,
+    );
+    assert!(matches!(mixed.kind, MaterialKind::Dielectric { .. }));
+    assert!(warnings[0].contains("lesser part of `blendbsdf`"), "{warnings:?}");
+    let scene = load("<shape type=\"cube\"/>");
+    let MaterialKind::Diffuse { reflectance } = scene.materials[0].kind else { panic!() };
+    assert_eq!((reflectance, scene.materials[0].surface.two_sided), (Vec3::splat(0.5), false));
+}
+
+#[test]
+fn principled_becomes_the_material_of_gltf() {
+    let (found, warnings) = material(
+        r#"<bsdf type="principled"><rgb name="base_color" value="0.9 0.5 0.1"/>
+        <float name="roughness" value="0.3"/><float name="metallic" value="0.75"/>
+        <float name="specular" value="0.5"/><float name="sheen" value="0.5"/>
+        <float name="clearcoat" value="0"/><float name="spec_trans" value="0"/></bsdf>"#,
+    );
+    let MaterialKind::Principled { base_color, metallic, roughness, ior, specular, .. } =
+        found.kind
+    else {
+        panic!()
+    };
+    assert_eq!((base_color, metallic, roughness), (Vec3::new(0.9, 0.5, 0.1), 0.75, 0.3));
+    assert!((ior - 1.5).abs() < 1e-6 && specular == 1.0, "{ior}");
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    assert!(warnings[0].contains("`sheen`"));
+    let (glass, warnings) = material(
+        r#"<bsdf type="principled"><rgb name="base_color" value="0.25"/>
+        <float name="roughness" value="0.5"/><float name="eta" value="1.3"/>
+        <float name="spec_trans" value="1"/></bsdf>"#,
+    );
+    let MaterialKind::Dielectric { ior, alpha, transmittance, .. } = glass.kind else { panic!() };
+    assert_eq!((ior, alpha, transmittance), (1.3, 0.25, Vec3::splat(0.5)));
+    assert_eq!(warnings, [""; 0]);
+}
+
+#[test]
+fn normal_maps_stand_on_the_tangents_of_mitsuba() {
+    let folder = Folder::new();
+    write_image(&folder, "bumps.png");
+    for (scale, tangent) in [("1", [1.0, 0.0, 0.0, 1.0]), ("-1", [-1.0, 0.0, 0.0, 1.0])] {
+        let text = format!(
+            "{SENSOR}<shape type=\"rectangle\"><transform name=\"to_world\"><scale x=\"{scale}\"/>\
+             </transform><bsdf type=\"normalmap\"><texture type=\"bitmap\" name=\"normalmap\">\
+             <boolean name=\"raw\" value=\"true\"/>\
+             <string name=\"filename\" value=\"bumps.png\"/></texture><bsdf type=\"diffuse\"/>\
+             </bsdf></shape>"
+        );
+        let scene = Scene::load(&folder.write("a.xml", document(&text))).unwrap();
+        let normal = scene.materials[0].surface.normal.as_ref().unwrap();
+        assert_eq!(normal.encoding, Encoding::Linear);
+        assert_eq!(scene.geometry.tangents, [tangent; 4]);
+    }
+}
+
+/// An image of 2 × 2 texels: red and green above blue and white.
+fn write_image(folder: &Folder, name: &str) {
+    let texels = vec![255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255];
+    let image = image::RgbImage::from_raw(2, 2, texels).unwrap();
+    image.save(folder.path().join(name)).unwrap();
+}
+
+#[test]
+fn textures_keep_their_coordinates() {
+    let folder = Folder::new();
+    write_image(&folder, "four colours.png");
+    let text = r#"<shape type="rectangle"><bsdf type="mask">
+        <texture type="bitmap" name="opacity"><string name="filename" value="four colours.png"/>
+          <boolean name="raw" value="true"/><string name="wrapMode" value="clamp"/></texture>
+        <bsdf type="diffuse"><texture type="bitmap" name="reflectance">
+          <string name="filename" value="./four colours.png"/>
+          <string name="filter_type" value="nearest"/>
+          <transform name="to_uv"><scale x="2" y="1"/><translate x="0.1" y="0.2"/></transform>
+          </texture></bsdf></bsdf></shape>
+        <shape type="rectangle"><bsdf type="diffuse"><texture type="checkerboard" name="reflectance">
+          <rgb name="color0" value="0.75"/><rgb name="color1" value="0.25 0.5 0.75"/>
+          <float name="uscale" value="2"/><float name="uoffset" value="0.3"/></texture></bsdf></shape>
+        <shape type="rectangle"><bsdf type="diffuse"><texture type="mesh_attribute" name="reflectance">
+          <string name="name" value="vertex_color"/></texture></bsdf></shape>"#;
+    let scene = Scene::load(&folder.write("a.xml", document(&format!("{SENSOR}{text}")))).unwrap();
+    assert_eq!(scene.warnings, [""; 0]);
+    let [leaf, board, vertices] = &scene.materials[..] else { panic!() };
+    let color = leaf.surface.color.as_ref().unwrap();
+    // Mitsuba's (0, 0) is the upper left corner, as that of TextureUse.
+    assert_eq!(color.image_from_uv, [[2.0, 0.0, 0.1], [0.0, 1.0, 0.2]]);
+    assert_eq!((color.encoding, color.interpolation), (Encoding::Srgb, Interpolation::Nearest));
+    assert_eq!(color.wrap, [Wrap::Repeat; 2]);
+    assert!(matches!(leaf.kind, MaterialKind::Diffuse { reflectance: Vec3::ONE }));
+    let opacity = leaf.surface.opacity.texture.as_ref().unwrap();
+    assert_eq!((opacity.encoding, opacity.wrap), (Encoding::Linear, [Wrap::ClampToEdge; 2]));
+    let board = board.surface.color.as_ref().unwrap();
+    assert_eq!((board.bias, board.scale), ([0.75; 3], [-0.5, -0.25, 0.0]));
+    assert_eq!(board.interpolation, Interpolation::Nearest);
+    let [u, _] = board.image_from_uv;
+    assert!(u[0] == 2.0 && (u[2] - 0.6).abs() < 1e-6, "{u:?}");
+    assert!(vertices.surface.vertex_color);
+}
+
+#[test]
+fn spectra_become_the_colours_of_mitsuba() {
+    let intensity = |text: &str| {
+        let scene = load(&format!("<emitter type=\"point\">{text}</emitter>"));
+        let LampKind::Point { intensity, .. } = scene.lamps[0].kind else { panic!() };
+        intensity
+    };
+    // Colours of Mitsuba 3.9.1; its table has steps of 5 nm.
+    let near = |found: Vec3, expected: Vec3| {
+        assert!(found.abs_diff_eq(expected, 5e-3 * expected.max_element()), "{found}: {expected}");
+    };
+    near(
+        intensity(r#"<spectrum name="intensity" value="2"/>"#),
+        Vec3::new(2.40959, 1.89658, 1.81783),
+    );
+    near(
+        intensity(r#"<spectrum name="intensity" value="400:1, 500:3 600:2 700:5"/>"#),
+        Vec3::new(2.88172, 2.47458, 1.79734),
+    );
+    assert_eq!(intensity(r#"<rgb name="intensity" value="1 2 3"/>"#), Vec3::new(1.0, 2.0, 3.0));
+    assert_eq!(intensity(r#"<float name="intensity" value="2"/>"#), Vec3::splat(2.0));
+    let warm = intensity(r#"<blackbody name="intensity" temperature="3000K"/>"#);
+    assert!(warm.x > 1.5 * warm.y && warm.y > 2.0 * warm.z, "{warm}");
+    let (paint, _) = material(
+        r#"<bsdf type="diffuse"><spectrum name="reflectance" value="400:0.1 500:.3 600:.2 700:.5"/>
+        </bsdf>"#,
+    );
+    let MaterialKind::Diffuse { reflectance } = paint.kind else { panic!() };
+    near(reflectance, Vec3::new(0.232248, 0.262201, 0.201645));
+}
+
+#[test]
+fn lamps_shine_where_they_look() {
+    let scene = load(
+        r#"<emitter type="spot" id="desk"><transform name="to_world">
+          <lookat origin="1,2,3" target="1,0,3" up="1,0,0"/></transform>
+          <float name="cutoff_angle" value="40"/></emitter>
+        <emitter type="directional"><vector name="direction" value="0,-2,0"/>
+          <rgb name="irradiance" value="1,2,3"/></emitter>
+        <emitter type="point"><point name="position" x="1" z="2"/></emitter>"#,
+    );
+    assert_eq!(scene.warnings, [""; 0]);
+    let LampKind::Spot { position, direction, inner_angle_rad, outer_angle_rad, falloff, .. } =
+        scene.lamps[0].kind
+    else {
+        panic!()
+    };
+    assert_close(position, Vec3::new(1.0, 2.0, 3.0));
+    assert_close(direction, Vec3::NEG_Y);
+    assert!((inner_angle_rad - PI / 6.0).abs() < 1e-6);
+    assert!((outer_angle_rad - PI / 4.5).abs() < 1e-6);
+    assert_eq!((falloff, scene.lamps[0].name.as_str()), (SpotFalloff::LinearAngle, "desk"));
+    let irradiance = Vec3::new(1.0, 2.0, 3.0);
+    assert_eq!(scene.lamps[1].kind, LampKind::Directional { direction: Vec3::NEG_Y, irradiance });
+    let position = Vec3::new(1.0, 0.0, 2.0);
+    assert_eq!(scene.lamps[2].kind, LampKind::Point { position, intensity: Vec3::ONE });
+}
+
+/// Normal of the winding of the first triangle.
+fn winding(scene: &Scene) -> Vec3 {
+    let [a, b, c] = scene.geometry.triangles[0]
+        .map(|corner| Vec3::from(scene.geometry.positions[corner as usize]));
+    (b - a).cross(c - a).normalize()
+}
+
+#[test]
+fn sides_are_those_of_mitsuba() {
+    let folder = Folder::new();
+    folder.write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    folder.write("smooth.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n");
+    let light = "<emitter type=\"area\"><rgb name=\"radiance\" value=\"3\"/></emitter>";
+    let mirror = "<transform name=\"to_world\"><scale x=\"-1\"/></transform>";
+    let flip = "<boolean name=\"flipNormals\" value=\"true\"/>";
+    let flat = "<boolean name=\"face_normals\" value=\"true\"/>";
+    let file = |name: &str| format!("<string name=\"filename\" value=\"{name}.obj\"/>");
+    // Shading normals of Mitsuba 3.9.1 along z.
+    for (kind, content, up) in [
+        ("rectangle", String::new(), true),
+        ("rectangle", flip.to_owned(), false),
+        ("rectangle", mirror.to_owned(), true),
+        ("disk", mirror.to_owned() + flip, false),
+        ("obj", file("flat"), true),
+        ("obj", file("flat") + mirror, false),
+        ("obj", file("flat") + mirror + flip, true),
+        ("obj", file("smooth") + mirror, true),
+        ("obj", file("smooth") + mirror + flat, false),
+        ("obj", file("smooth") + flip, false),
+    ] {
+        let text = format!("{SENSOR}<shape type=\"{kind}\">{content}{light}</shape>");
+        let scene = Scene::load(&folder.write("a.xml", document(&text))).unwrap();
+        let expected = if up { Vec3::Z } else { Vec3::NEG_Z };
+        assert_close(winding(&scene), expected);
+        let is_flat = content.contains("face_normals");
+        let normal = if is_flat { Vec3::ZERO } else { expected };
+        assert_close(scene.geometry.normals[0].into(), normal);
+        let emission = scene.materials[0].surface.emission.clone().unwrap();
+        assert_eq!((emission.radiance, emission.two_sided), (Vec3::splat(3.0), false));
+    }
+    let sphere = |content: &str| {
+        let scene = load(&format!("<shape type=\"sphere\">{content}</shape>"));
+        let corner = scene.geometry.triangles[0][0] as usize;
+        winding(&scene).dot(Vec3::from(scene.geometry.positions[corner]).normalize()) > 0.0
+    };
+    assert!(sphere("") && !sphere(mirror) && !sphere(flip) && sphere(&(mirror.to_owned() + flip)));
+}
+
+#[test]
+fn round_shapes_stand_where_they_should() {
+    let scene = load(
+        r#"<shape type="sphere"><point name="center" x="1" y="2" z="3"/>
+          <float name="radius" value="2"/>
+          <transform name="to_world"><scale value="2"/></transform></shape>"#,
+    );
+    for position in &scene.geometry.positions {
+        let distance = Vec3::from(*position).distance(Vec3::new(2.0, 4.0, 6.0));
+        assert!((distance - 4.0).abs() < 1e-4, "{distance}");
+    }
+    let scene = load(
+        r#"<shape type="cylinder"><point name="p0" value="1,0,0"/><point name="p1" value="5,0,0"/>
+          <float name="radius" value="2"/></shape>"#,
+    );
+    // A ray of Mitsuba 3.9.1 found these coordinates there.
+    let place = Vec3::new(5.0, 0.5, 1.93649);
+    let distance = |at: &usize| Vec3::from(scene.geometry.positions[*at]).distance(place);
+    let nearest =
+        (0..scene.geometry.positions.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    let nearest = nearest.unwrap();
+    let [u, v] = scene.geometry.uvs[0][nearest];
+    assert!(distance(&nearest) < 0.06 && (u - 0.459785).abs() < 0.01 && v == 1.0, "{u}, {v}");
+}
+
+#[test]
+fn instances_repeat_their_group() {
+    let scene = load(
+        r#"<shape type="shapegroup" id="pair"><shape type="rectangle"/>
+          <shape type="rectangle"><transform name="to_world"><translate z="1"/></transform></shape>
+          </shape>
+        <shape type="instance"><ref id="pair"/>
+          <transform name="to_world"><translate x="10"/></transform></shape>
+        <shape type="instance"><ref id="pair"/></shape>"#,
+    );
+    assert_eq!(scene.warnings, [""; 0]);
+    assert_eq!(scene.geometry.triangles.len(), 8);
+    assert_eq!(scene.geometry.positions[4], [9.0, -1.0, 1.0]);
+    let message = refusal(
+        r#"<shape type="shapegroup" id="loop"><shape type="instance"><ref id="loop"/></shape></shape>
+        <shape type="instance"><ref id="loop"/></shape>"#,
+    );
+    assert!(message.contains("a shapegroup contains itself"), "{message}");
+}
+
+/// A serialized file of one triangle with texture coordinates, in double precision if asked.
+fn serialized(version: u16, double: bool, corner: u32) -> Vec<u8> {
+    let mut content = Vec::new();
+    let flags: u32 = 0x0002 | if double { 0x2000 } else { 0x1000 };
+    content.extend(flags.to_le_bytes());
+    if version == 4 {
+        content.extend(b"sail\0");
+    }
+    content.extend(3_u64.to_le_bytes());
+    content.extend(1_u64.to_le_bytes());
+    let numbers = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.25, 1.0, 0.0, 0.0, 1.0];
+    for number in numbers {
+        if double {
+            content.extend(f64::to_le_bytes(number));
+        } else {
+            content.extend((number as f32).to_le_bytes());
+        }
+    }
+    content.extend([0, 1, corner].into_iter().flat_map(u32::to_le_bytes));
+    let mut file = [0x041C_u16.to_le_bytes(), version.to_le_bytes()].concat();
+    let mut encoder = flate2::write::ZlibEncoder::new(file.split_off(4), Default::default());
+    encoder.write_all(&content).unwrap();
+    file.extend(encoder.finish().unwrap());
+    if version == 4 {
+        file.extend(0_u64.to_le_bytes());
+    } else {
+        file.extend(0_u32.to_le_bytes());
+    }
+    file.extend(1_u32.to_le_bytes());
+    file
+}
+
+#[test]
+fn serialized_meshes_of_both_versions_are_read() {
+    let folder = Folder::new();
+    let shape = |index: u32| {
+        format!(
+            "{SENSOR}<shape type=\"serialized\"><string name=\"filename\" value=\"a.serialized\"/>\
+             <integer name=\"shapeIndex\" value=\"{index}\"/></shape>"
+        )
+    };
+    let path = folder.write("a.xml", document(&shape(0)));
+    for (version, double) in [(3, false), (3, true), (4, false), (4, true)] {
+        folder.write("a.serialized", serialized(version, double, 2));
+        let scene = Scene::load(&path).unwrap();
+        assert_eq!(scene.geometry.positions[1], [1.0, 0.0, 0.0]);
+        assert_eq!(scene.geometry.uvs[0][0], [0.0, 0.25]);
+        assert_eq!(scene.geometry.triangles, [[0, 1, 2]]);
+        assert_eq!(scene.geometry.normals[2], [0.0, 0.0, 1.0], "smooth where none are given");
+    }
+    let whole = serialized(4, false, 2);
+    for length in 0..whole.len() {
+        folder.write("a.serialized", &whole[..length]);
+        assert!(Scene::load(&path).is_err(), "cut off at {length}");
+    }
+    folder.write("a.serialized", serialized(4, false, 3));
+    let message = Scene::load(&path).unwrap_err().to_string();
+    assert!(message.contains("a triangle has the vertex 3, there are 3"), "{message}");
+    folder.write("a.serialized", whole);
+    let message = Scene::load(&folder.write("b.xml", document(&shape(1)))).unwrap_err().to_string();
+    assert!(message.contains("shape_index 1: the file has 1 meshes"), "{message}");
+}
+
+#[test]
+fn what_is_not_understood_is_named_once_with_its_line() {
+    let scene = load(
+        r#"
+        <integrator type="volpath"><integer name="max_depth" value="65"/></integrator>
+        <bsdf type="diffuse" id="paint"><boolean name="shiny" value="true"/></bsdf>
+        <shape type="cube"><ref id="paint"/><float name="mass" value="3"/></shape>
+        <shape type="cube"><ref id="paint"/><float name="mass" value="3"/>
+          <medium type="homogeneous" name="interior"/></shape>
+        <fog/>"#,
+    );
+    let texts: Vec<_> =
+        scene.warnings.iter().map(|text| text.split_once(": ignored ").unwrap().1).collect();
+    assert_eq!(
+        texts,
+        [
+            "integrator `volpath` with `max_depth` 65 (line 6)",
+            "`shiny` of `diffuse` (line 7)",
+            "`mass` of `cube` (2, first in line 8)",
+            "`medium` (line 10)",
+            "`fog` in `scene` (line 11)",
+        ]
+    );
+}
+
+#[test]
+fn bad_files_end_in_one_error_with_file_and_line() {
+    let shape = |content: &str| format!("<shape type=\"rectangle\">{content}</shape>");
+    let bsdf = |content: &str| shape(&format!("<bsdf type=\"diffuse\">{content}</bsdf>"));
+    let image = |name: &str| {
+        bsdf(&format!(
+            "<texture type=\"bitmap\" name=\"reflectance\"><string name=\"filename\" \
+             value=\"{name}\"/></texture>"
+        ))
+    };
+    let deep = "<bsdf type=\"twosided\">".repeat(40) + &"</bsdf>".repeat(40);
+    for (content, expected) in [
+        (shape("<ref id=\"absent\"/>"), "expected the id of an object, found `absent`"),
+        (shape("<bsdf type=\"velvet\"/>"), "the reflection model `velvet` is not rendered"),
+        ("<shape type=\"hair\"/>".to_owned(), "the shape `hair` is not rendered"),
+        ("<emitter type=\"sunsky\"/>".to_owned(), "the emitter `sunsky` is not rendered"),
+        (shape("<emitter type=\"point\"/>"), "cannot stand in a shape"),
+        (bsdf("<string name=\"reflectance\" value=\"red\"/>"), "expected a colour, found `string`"),
+        (bsdf("<rgb name=\"reflectance\" value=\"2 2 2\"/>"), "expected 0 to 1"),
+        (bsdf("<rgb name=\"reflectance\" value=\"$mood\"/>"), "`$mood` has no value"),
+        (shape("<integer name=\"flip_normals\" value=\"1\"/>"), "expected an element boolean"),
+        (image("absent.png"), "the file `absent.png` is not there"),
+        (image("../a.png"), "leaves the folder"),
+        (image("/dev/zero"), "is empty, absolute or leaves the folder"),
+        (image("C:\\a.png"), "is empty, absolute or leaves the folder"),
+        (image("a.xml"), "expected a PNG"),
+        ("<include filename=\"a.xml\"/>".to_owned(), "`a.xml` includes itself"),
+        (shape(&deep), "nested deeper than 32"),
+        (
+            "<bsdf type=\"twosided\" id=\"a\"><ref id=\"a\"/></bsdf>".to_owned()
+                + &shape("<ref id=\"a\"/>"),
+            "a bsdf contains itself",
+        ),
+        ("<bsdf type=\"null\" id=\"a\"/><bsdf type=\"null\" id=\"a\"/>".to_owned(), "is taken by"),
+        ("<emitter type=\"constant\"/><emitter type=\"constant\"/>".to_owned(), "at most one"),
+        (
+            "<emitter type=\"envmap\"><rgb name=\"scale\" value=\"1\"/></emitter>".to_owned(),
+            "`filename`",
+        ),
+        ("<shape".to_owned(), "a.xml:"),
+    ] {
+        let message = refusal(&content);
+        assert!(message.contains(expected), "expected {expected:?} in {message:?}");
+        assert!(message.contains("a.xml:6:") || content == "<shape", "{message}");
+    }
+}
+
+#[test]
+fn text_that_would_exhaust_the_program_is_refused_soon() {
+    let folder = Folder::new();
+    let bomb = "<!DOCTYPE x [<!ENTITY a \"aaaa\"><!ENTITY b \"&a;&a;&a;\">]><scene>&b;</scene>";
+    let message = Scene::load(&folder.write("a.xml", bomb)).unwrap_err().to_string();
+    assert!(message.contains("a.xml:1:"), "{message}");
+    let deep = "<shape>".repeat(1_000_000);
+    let message = Scene::load(&folder.write("a.xml", deep)).unwrap_err().to_string();
+    assert!(message.contains("nested deeper"), "{message}");
+    // Each file includes the next ten times.
+    for level in 0..8 {
+        let include = format!("<include filename=\"{}.xml\"/>", level + 1);
+        folder.write(&format!("{level}.xml"), document(&include.repeat(10)));
+    }
+    folder.write("8.xml", document("<shape type=\"cube\"/>"));
+    let message = Scene::load(&folder.path().join("0.xml")).unwrap_err().to_string();
+    assert!(message.contains("files are included"), "{message}");
+    // Each default doubles the one before it.
+    let mut text = "<default name=\"d0x\" value=\"aaaaaaaa\"/>".to_owned();
+    for level in 1..40 {
+        let before = format!("$d{}x", level - 1);
+        text += &format!("<default name=\"d{level}x\" value=\"{before}{before}\"/>");
+    }
+    let message = Scene::load(&folder.write("a.xml", document(&text))).unwrap_err().to_string();
+    assert!(message.contains("a value of more than 65536 characters"), "{message}");
+    let spheres = "<shape type=\"sphere\"/>".repeat(3000);
+    let message = refusal(&spheres);
+    assert!(message.contains("the shapes of a scene may have"), "{message}");
+}
+
+/// Exports a scene of `environment`, `clay` and a camera with a lens, and reads both.
+fn exported(environment: &str, clay: &str) -> [Scene; 2] {
+    let folder = Folder::new();
+    let lens = "vertical_fov_deg = 45.0\naperture_radius = 0.05\nfocus_distance = 3.0";
+    let text = yard([32, 24], environment, clay, BALL).replace("vertical_fov_deg = 45.0", lens);
+    let scene = Scene::load(&folder.write("scene.toml", text)).unwrap();
+    let path = folder.path().join("out/a.xml");
+    Export::new(&scene, Settings { depth: 3, samples: 4 }).unwrap().write(&path).unwrap();
+    [scene, Scene::load(&path).unwrap()]
+}
+
+#[test]
+fn our_own_export_comes_back_as_it_was() {
+    let sky = "sky = { width = 64, sun_radius_deg = 10.0 }\nrotation_deg = 30.0";
+    for (environment, clay) in [
+        (sky, "type = \"diffuse\"\nreflectance = [0.5, 0.25, 0.125]"),
+        (
+            "constant = [1, 2, 3]",
+            "type = \"plastic\"\ndiffuse = [0.5, 0.2, 0.1]\nalpha = 0.2\nior = 1.33",
+        ),
+        (sky, "type = \"conductor\"\nalpha = 0.3\neta = [0.2, 0.9, 1.1]\nk = [3.9, 2.4, 2.1]"),
+    ] {
+        let [ours, read] = exported(environment, clay);
+        assert_eq!(read.warnings.len(), 2, "integrator and sampler: {:?}", read.warnings);
+        assert_eq!((read.film, read.lamps.len()), (ours.film, 0));
+        let (camera, expected) = (read.camera, ours.camera);
+        assert_close(camera.position, expected.position);
+        let forward = (expected.look_at - expected.position).normalize();
+        assert_close((camera.look_at - camera.position).normalize(), forward);
+        let right = forward.cross(expected.up).normalize();
+        assert_close(forward.cross(camera.up).normalize(), right);
+        assert!((camera.vertical_fov_deg - expected.vertical_fov_deg).abs() < 1e-4);
+        assert_eq!(camera.aperture_radius, expected.aperture_radius);
+        assert_eq!(camera.focus_distance, expected.focus_distance);
+        assert_eq!(read.environment.width, ours.environment.width);
+        assert_eq!(read.environment.height, ours.environment.height);
+        assert_eq!(read.environment.texels, ours.environment.texels);
+        let turn = read.environment.rotation_rad - ours.environment.rotation_rad;
+        assert!(turn.abs() < 1e-5 || (turn.abs() - 2.0 * PI).abs() < 1e-5, "{turn}");
+        // The export has one mesh for each material.
+        let corners = |scene: &Scene| {
+            let mut corners: Vec<_> = scene
+                .geometry
+                .triangles
+                .iter()
+                .map(|triangle| {
+                    triangle.map(|at| {
+                        let at = at as usize;
+                        let bits = |vector: [f32; 3]| vector.map(f32::to_bits);
+                        (bits(scene.geometry.positions[at]), bits(scene.geometry.normals[at]))
+                    })
+                })
+                .collect();
+            corners.sort_unstable();
+            corners
+        };
+        assert_eq!(corners(&read), corners(&ours));
+        assert_eq!(read.materials.len(), 1);
+        let kind = |scene: &Scene| format!("{:?}", scene.materials[0].kind);
+        assert_eq!(kind(&read), kind(&ours));
+        assert_eq!(read.materials[0].surface, ours.materials[0].surface);
+    }
+}
+
+#[test]
+fn environments_turn_as_in_mitsuba() {
+    let [ours, _] = exported(
+        "sky = { width = 64, sun_radius_deg = 10.0 }\nrotation_deg = 30.0",
+        "type = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]",
+    );
+    let folder = Folder::new();
+    // A map that is not of our own export, turned by a matrix and then by the other way of saying it.
+    let mut image = fenestra::film::Image::new(64, 32);
+    let texels: Vec<_> = ours.environment.texels.iter().map(|texel| texel.to_array()).collect();
+    image.insert_triple(["R", "G", "B"], &texels);
+    image.write_exr(&folder.path().join("sky map.exr")).unwrap();
+    let load = |turn: &str| {
+        let text = format!(
+            "{SENSOR}<emitter type=\"envmap\"><string name=\"filename\" value=\"sky map.exr\"/>\
+             <float name=\"scale\" value=\"2\"/><transform name=\"to_world\">{turn}</transform></emitter>"
+        );
+        Scene::load(&folder.write("a.xml", document(&text))).unwrap()
+    };
+    let plain = load("");
+    assert_eq!((plain.environment.width, plain.environment.height), (64, 62));
+    assert!((plain.environment.rotation_rad - PI).abs() < 1e-6);
+    // Mitsuba's +Z is the middle of the image, between two rows and two columns.
+    let middle: f32 = [(15, 31), (15, 32), (16, 31), (16, 32)]
+        .map(|(row, column)| ours.environment.texels[row * 64 + column].x)
+        .iter()
+        .sum();
+    let found = plain.environment.radiance(Vec3::Z).x;
+    assert!((found / (0.5 * middle) - 1.0).abs() < 1e-3, "{found}, {middle}");
+    let quarter =
+        load(r#"<matrix value="-4.37114e-008 0 1 0 0 1 0 0 -1 0 -4.37114e-008 0 0 0 0 1"/>"#);
+    let tilted = load(r#"<rotate x="1" angle="90"/>"#);
+    assert!(tilted.warnings[0].contains("resampled"), "{:?}", tilted.warnings);
+    assert_eq!(quarter.warnings, [""; 0]);
+    for direction in
+        [Vec3::new(0.3, 0.2, 0.9), Vec3::new(-0.5, 0.7, 0.1), Vec3::new(0.1, -0.9, -0.4)]
+    {
+        let direction = direction.normalize();
+        let expected = plain.environment.radiance(direction);
+        // A quarter turn about +Y takes +Z to +X; one about +X takes +Y to +Z.
+        let turned = Vec3::new(direction.z, direction.y, -direction.x);
+        assert!(quarter.environment.radiance(turned).abs_diff_eq(expected, 1e-4));
+        let turned = Vec3::new(direction.x, -direction.z, direction.y);
+        let found = tilted.environment.radiance(turned);
+        assert!(found.abs_diff_eq(expected, 0.1 * expected.max_element()), "{found}, {expected}");
+    }
+}
+
+/// Folder of scenes from elsewhere, which a checkout may lack.
+fn imports() -> Option<std::path::PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/import/mitsuba");
+    folder.is_dir().then_some(folder)
+}
+
+#[test]
+fn real_scenes_load() {
+    let Some(folder) = imports() else {
+        eprintln!("SKIPPED: no folder of real scenes");
+        return;
+    };
+    for name in ["scene.xml", "scene_mi3.xml"] {
+        let scene = Scene::load(&folder.join("living-room").join(name)).unwrap();
+        assert_eq!((scene.film.width, scene.film.height), (1280, 720));
+        assert_eq!(scene.materials.len(), 19);
+        let named = |part: &str| scene.warnings.iter().any(|warning| warning.contains(part));
+        assert!(named("integrator `path` with `max_depth` 65"));
+        assert_eq!(named("`high_quality_edges` of `hdrfilm`"), name == "scene.xml");
+        let leaves = scene.materials.iter().find(|material| material.name == "Leaves").unwrap();
+        assert!(leaves.surface.opacity.texture.is_some() && leaves.surface.color.is_some());
+        assert!(leaves.surface.two_sided);
+        assert!(scene.environment.width > 64 && scene.lamps.is_empty());
+        assert!((scene.environment.rotation_rad - 1.5 * PI).abs() < 1e-5);
+        eprintln!("{name}: {} triangles, {:#?}", scene.geometry.triangles.len(), scene.warnings);
+    }
+    let scene = Scene::load(&folder.join("staircase2/scene.xml")).unwrap();
+    let lights = scene.materials.iter().filter(|material| material.surface.emission.is_some());
+    assert_eq!(lights.count(), 13);
+    eprintln!("staircase2: {} triangles, {:#?}", scene.geometry.triangles.len(), scene.warnings);
+}
+
+#[test]
+fn a_real_environment_has_the_radiance_of_mitsuba() {
+    let Some(imports) = imports() else {
+        eprintln!("SKIPPED: no folder of real scenes");
+        return;
+    };
+    let folder = Folder::new();
+    let sky = imports.join("living-room/textures/Sky 19.exr");
+    std::fs::copy(sky, folder.path().join("Sky 19.exr")).unwrap();
+    let quarter = r#"<matrix value="-4.37114e-008 0 1 0 0 1 0 0 -1 0 -4.37114e-008 0 0 0 0 1"/>"#;
+    // Radiance of Mitsuba 3.9.1 from two directions.
+    for (turn, expected, within) in [
+        ("", [[34.34028, 22.045317, 10.458131], [15.917794, 9.753819, 6.5390625]], 0.02),
+        (quarter, [[21.822693, 17.34849, 9.476674], [2.3509755, 4.396645, 5.3459525]], 0.02),
+        (
+            r#"<rotate x="1" angle="90"/>"#,
+            [[4.646995, 3.9887207, 3.8245702], [29.462254, 18.335894, 6.9594727]],
+            0.1,
+        ),
+    ] {
+        let text = format!(
+            "{SENSOR}<emitter type=\"envmap\"><string name=\"filename\" value=\"Sky 19.exr\"/>\
+             <transform name=\"toWorld\">{turn}</transform></emitter>"
+        );
+        let scene = Scene::load(&folder.write("a.xml", document(&text))).unwrap();
+        let directions = [Vec3::new(0.3, 0.2, 0.9), Vec3::new(-0.5, 0.7, 0.1)];
+        for (direction, expected) in directions.into_iter().zip(expected.map(Vec3::from)) {
+            let found = scene.environment.radiance(direction.normalize());
+            let ratio = found / expected;
+            assert!(ratio.abs_diff_eq(Vec3::ONE, within), "{turn}: {found}, expected {expected}");
+        }
+    }
+}
