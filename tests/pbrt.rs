@@ -32,6 +32,8 @@ const TRIANGLE: &str =
 /// A view of the origin from −z without a mirror.
 const VIEW: &str = r#"LookAt 0 0 -5 0 0 0 0 1 0 Film "rgb" "integer xresolution" 200
     "integer yresolution" 100 Camera "perspective" "float fov" 60"#;
+/// Warning of a scene without light.
+const DARK: &str = "no light: nothing is lit";
 /// A view whose camera mirrors, so that the world stays as it is.
 const MIRRORED: &str = r#"Scale -1 1 1 LookAt 0 0 -5 0 0 0 0 1 0 Camera "perspective""#;
 
@@ -120,7 +122,7 @@ fn fov_is_that_of_the_shorter_side_and_lenses_scale() {
         "float screenwindow" [-0.8888889 0.8888889 -0.5 0.5]"#;
     let scene = load(window, "");
     assert!((scene.camera.vertical_fov_deg - 2.0 * 0.5_f32.atan().to_degrees()).abs() < 1e-3);
-    assert!(warnings(&scene).is_empty(), "{:?}", scene.warnings);
+    assert_eq!(warnings(&scene), [DARK]);
 }
 
 #[test]
@@ -335,7 +337,7 @@ fn mixtures_and_surfaces_that_are_not_there() {
     assert_eq!(scene.materials[0].surface.opacity.factor, 0.25);
     assert_eq!(
         warnings(&scene),
-        ["ignored area lights without a surface (line 7): left out, as in pbrt"]
+        ["ignored area lights without a surface (line 7): left out, as in pbrt", DARK]
     );
     let alpha = world(&format!("{TRIANGLE} \"float alpha\" 0.5 {TRIANGLE}"));
     assert_eq!(alpha.materials.len(), 2);
@@ -619,6 +621,7 @@ fn everything_left_out_is_named_once() {
         "ignored `uroughness` other than `vroughness` (line 13): their mean α, or the texture",
         "ignored shapes whose transformation flattens space (2, first in line 14): left out",
         "ignored material `hair` (line 15)",
+        DARK,
     ];
     let found = warnings(&scene);
     let missing: Vec<_> = expected.iter().filter(|e| !found.iter().any(|f| f == *e)).collect();

@@ -1,4 +1,4 @@
-//! What a reader has to report: parts left out, and files read.
+//! Report of the reader: parts left out, and files read.
 
 use std::path::{Path, PathBuf};
 

@@ -118,8 +118,8 @@ impl Source {
     /// Goes on with another file, until its end. `restores` marks an import.
     ///
     /// # Errors
-    /// [`Parse`](crate::error::Error::Parse) with the place of the statement for a file outside the scene's folder, one
-    /// that includes itself, one that cannot be read, and too many files in one another.
+    /// [`Parse`](crate::error::Error::Parse) with the place of the statement for a file outside the
+    /// scene's folder, one that includes itself, one that cannot be read, and too many files in one another.
     pub fn include(&mut self, name: &str, restores: bool, place: &Place) -> Result<()> {
         if !stays_inside(Path::new(name)) {
             return Err(place.error(format!(

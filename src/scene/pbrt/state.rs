@@ -1,5 +1,5 @@
-//! Graphics state of a scene description: what the next shape or light takes from the directives
-//! before it.
+//! Graphics state of a scene description: the settings that the next shape or light takes from the
+//! directives before it.
 
 use std::{collections::HashMap, rc::Rc};
 
@@ -68,7 +68,7 @@ impl Attributes {
     }
 }
 
-/// What the next shape or light takes.
+/// Settings that the next shape or light takes.
 #[derive(Clone, Debug)]
 pub struct State {
     /// Current transformation matrix: world from object, or camera from world before `Camera`.

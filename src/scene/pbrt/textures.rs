@@ -19,7 +19,10 @@ use super::{
 use crate::{
     error::Result,
     scene::features,
-    texture::{Channels, Encoding, Interpolation, Texels, Texture, TextureUse, Wrap},
+    texture::{
+        Channels, Encoding, Interpolation, Texels, Texture, TextureUse, Wrap,
+        lookup::srgb_to_linear,
+    },
 };
 
 /// Most textures that may refer to one another.
@@ -376,11 +379,6 @@ fn has_opacity(texture: &Texture) -> bool {
     }
 }
 
-/// Linear value of one encoded by IEC 61966-2-1.
-fn from_srgb(value: f32) -> f32 {
-    if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
-}
-
 /// Linear texels; `decode` reads colours of 8 and 16 bits.
 fn linear(texels: &Texels, decode: impl Fn(f32) -> f32) -> Vec<[f32; 4]> {
     let decoded =
@@ -399,7 +397,7 @@ fn linear(texels: &Texels, decode: impl Fn(f32) -> f32) -> Vec<[f32; 4]> {
 
 /// Linear texels of an image whose colours of 8 and 16 bits are sRGB.
 pub fn linear_from_srgb(texture: &Texture) -> Vec<[f32; 4]> {
-    linear(&texture.texels, from_srgb)
+    linear(&texture.texels, srgb_to_linear)
 }
 
 /// Makes a texture of numbers, `of` the numbers of another.
