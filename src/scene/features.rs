@@ -1,5 +1,5 @@
-//! Parts of glTF, OBJ, MTL and Mitsuba files and what becomes of them: the one declaration behind the readers'
-//! warnings and the tables of `docs/formats.md`.
+//! Parts of glTF, OBJ, MTL and Mitsuba files and what becomes of them: the one declaration behind the
+//! warnings of the readers and the tables of `docs/formats.md`.
 
 use std::path::Path;
 
