@@ -115,6 +115,8 @@
 //! - \[Steele et al. 2014\] "Fast Splittable Pseudorandom Number Generators", OOPSLA.
 //! - \[Talbot et al. 2005\] "Importance Resampling for Global Illumination", Eurographics
 //!   Symposium on Rendering.
+//! - \[Thürmer & Wüthrich 1998\] "Computing Vertex Normals from Polygonal Facets", Journal of
+//!   Graphics Tools 3(1).
 //! - \[Tokuyoshi 2022\] "Accurate Diffuse Lighting from Spherical Gaussian Lights", SIGGRAPH
 //!   Posters.
 //! - \[Tsai & Shih 2006\] "All-Frequency Precomputed Radiance Transfer using Spherical Radial

@@ -641,6 +641,10 @@ fn bad_files_end_in_one_error_with_file_and_line() {
         (bsdf("<rgb name=\"reflectance\" value=\"2 2 2\"/>"), "expected 0 to 1"),
         (bsdf("<rgb name=\"reflectance\" value=\"$mood\"/>"), "`$mood` has no value"),
         (shape("<integer name=\"flip_normals\" value=\"1\"/>"), "expected an element boolean"),
+        (
+            "<shape type=\"ply\"><string name=\"filename\" value=\"a.xml\"/></shape>".to_owned(),
+            "ply: expected a file in .ply, found `a.xml`",
+        ),
         (image("absent.png"), "the file `absent.png` is not there"),
         (image("../a.png"), "leaves the folder"),
         (image("/dev/zero"), "is empty, absolute or leaves the folder"),

@@ -179,8 +179,8 @@ mod tests {
         let place = Vec3::from_array(place);
         let used = mesh.triangles.iter().flatten().map(|corner| *corner as usize);
         let distance = |at: &usize| Vec3::from_array(mesh.positions[*at]).distance_squared(place);
-        let nearest = used.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
-        mesh.uvs[0][nearest]
+        let nearest = used.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        nearest.map_or([f32::NAN; 2], |nearest| mesh.uvs[0][nearest])
     }
 
     #[test]

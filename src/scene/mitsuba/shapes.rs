@@ -8,12 +8,9 @@ use super::{Reader, bsdfs::Model, document::Node, parameters::Parameters, serial
 use crate::{
     brdf::Material,
     error::Result,
+    files,
     scene::{
-        features,
-        geometry::MAX_COORDINATE,
-        mesh::{Mesh, obj, ply},
-        quadrics,
-        shapes::check_triangles,
+        features, geometry::MAX_COORDINATE, mesh::Mesh, quadrics, shapes::check_triangles,
         transform::Transform,
     },
 };
@@ -201,22 +198,27 @@ impl Reader<'_> {
         };
         let path = node.file(name)?;
         let mut is_flat = parameters.boolean("face_normals")?.unwrap_or(false);
-        let mut mesh = match node.kind() {
-            // The materials of the file do not count, nor what is wrong with them.
-            "obj" => obj::read(&path, &mut Vec::new())?,
-            "ply" => ply::read(&path, &mut self.warnings)?,
-            _ => {
-                let index = parameters.integer("shape_index")?.unwrap_or(0);
-                let Ok(index) = usize::try_from(index) else {
-                    let message = format!("shape_index: expected 0 or more, found {index}");
-                    return Err(node.error(message));
-                };
-                let (mesh, own_flat) = serialized::read(&path, index)?;
-                is_flat |= own_flat;
-                mesh
-            }
+        let kind = node.kind();
+        if files::extension(&path) != kind {
+            return Err(node.error(format!("{kind}: expected a file in .{kind}, found `{name}`")));
+        }
+        let is_obj = kind == "obj";
+        let mut mesh = if kind == "serialized" {
+            let index = parameters.integer("shape_index")?.unwrap_or(0);
+            let Ok(index) = usize::try_from(index) else {
+                let message = format!("shape_index: expected 0 or more, found {index}");
+                return Err(node.error(message));
+            };
+            let (mesh, own_flat) = serialized::read(&path, index)?;
+            is_flat |= own_flat;
+            mesh
+        } else {
+            let mut warnings = Vec::new();
+            let mesh = Mesh::read(&path, &mut warnings)?;
+            // The materials of an OBJ file do not count, nor what is wrong with them.
+            self.warnings.extend(warnings.into_iter().filter(|_| !is_obj));
+            mesh
         };
-        let is_obj = node.kind() == "obj";
         if parameters.boolean("flip_tex_coords")?.unwrap_or(is_obj) {
             mesh.uvs.iter_mut().flatten().for_each(|uv| uv[1] = 1.0 - uv[1]);
         }
