@@ -448,7 +448,7 @@ struct TextureAnswer {
 }
 
 /// Cuts words into pages for four bindings; missing pages repeat the first.
-fn pages<'a>(words: &'a [u32], shift: u32, names: [Binding; 4]) -> (u32, Vec<(Binding, &'a [u8])>) {
+fn pages(words: &[u32], shift: u32, names: [Binding; 4]) -> (u32, Vec<(Binding, &[u8])>) {
     let pages: Vec<&[u32]> = words.chunks(1 << shift).collect();
     assert!(pages.len() <= 4, "{} pages", pages.len());
     let page = |(index, name)| {

@@ -88,6 +88,8 @@ pub(super) fn sine_cosine_deg(angle_deg: f32) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
     use super::*;
 
     fn close(found: [f32; 3], expected: [f32; 3]) -> bool {

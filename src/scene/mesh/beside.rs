@@ -38,6 +38,8 @@ pub(super) fn path_beside(folder: &Path, within: &Path, name: &str) -> Result<Pa
 
 #[cfg(test)]
 mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
     use super::*;
 
     #[test]

@@ -34,7 +34,7 @@ impl Samples {
     fn new(numbers: &[f64]) -> Option<Self> {
         let pairs: Vec<_> = numbers.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
         let increases = pairs.windows(2).all(|pairs| pairs[0][0] < pairs[1][0]);
-        (numbers.len() % 2 == 0 && !pairs.is_empty() && increases).then_some(Self(pairs))
+        (numbers.len().is_multiple_of(2) && !pairs.is_empty() && increases).then_some(Self(pairs))
     }
 
     /// Value at a wavelength: linear between samples, 0 outside them.

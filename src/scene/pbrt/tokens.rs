@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn bad_text_is_an_error_with_its_place() {
-        let message = |text: &[u8]| loop {
+        let message = |text: &[u8]| {
             let mut tokens = tokens(text);
             loop {
                 match tokens.next() {

@@ -137,7 +137,8 @@ mod tests {
         let tip = |transform: Value, [u, v]: [f32; 2]| {
             image_from_uv(&transform).map(|row| row[0] * u + row[1] * v + row[2])
         };
-        let turned = tip(serde_json::json!({"rotation": 0.392_699_1}), [0.421, 1.016]);
+        let turned =
+            tip(serde_json::json!({"rotation": std::f32::consts::FRAC_PI_8}), [0.421, 1.016]);
         let all = serde_json::json!({"rotation": 0.3, "scale": [1.5, 1.5], "offset": [-0.2, -0.1]});
         for place in [turned, tip(all, [0.43, 0.75])] {
             assert!(place.iter().all(|coordinate| (coordinate - 0.77).abs() < 0.03), "{place:?}");

@@ -105,7 +105,7 @@ impl<'a> Library<'a> {
         let Some(entry) = materials.last_mut().filter(|_| !key.is_empty()) else { return Ok(()) };
         let file = path.file_name().unwrap_or_default().to_string_lossy();
         entry.place = format!("{file}:{line}");
-        let error = |message: String| Error::parse(*path, line, 1, message);
+        let error = |message: String| Error::parse(path, line, 1, message);
         let numbers: Vec<f32> =
             rest.split_ascii_whitespace().map_while(|word| word.parse().ok()).collect();
         let share = numbers.first().filter(|n| n.is_finite()).map(|n| n.clamp(0.0, 1.0));
