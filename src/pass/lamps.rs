@@ -48,8 +48,10 @@ impl LampTables {
             .iter()
             .map(|material| {
                 let Some(emission) = &material.surface.emission else { return 0.0 };
-                let mean =
-                    emission.texture.as_ref().map_or(1.0, |texture| texture.mean_luminance());
+                let mean = emission
+                    .texture
+                    .as_ref()
+                    .map_or(1.0, |texture| luminance(texture.mean().into()));
                 let sides = if emission.two_sided { 2.0 } else { 1.0 };
                 let power = sides * PI * luminance(emission.radiance) * mean;
                 if power.is_finite() { power.max(0.0) } else { 0.0 }

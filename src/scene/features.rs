@@ -215,8 +215,8 @@ features! {
     MI_TWO_MODELS Ignored "second model of `twosided`" "the first is on both sides";
     MI_DIFFUSE Done "`diffuse`" "";
     MI_PLASTIC Mapped "`plastic`, `roughplastic`"
-        "smooth as α = 0.001; the base loses no light below the coat, as it does in Mitsuba, with \
-         `nonlinear` (more colour) as without";
+        "smooth as α = 0.001; the base loses no light below the coat, as it does in Mitsuba; \
+         `nonlinear` deepens its colour";
     MI_CONDUCTOR Done "`conductor`, `roughconductor`"
         "by `material`, `eta` and `k`, or `none`; smooth as α = 0.001; by Schlick's approximation \
          where `specular_reflectance` is not white";

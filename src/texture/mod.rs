@@ -4,8 +4,8 @@ mod cache;
 mod check;
 mod decode;
 mod exr;
+mod linear;
 pub mod lookup;
-mod mean;
 pub mod tables;
 
 use std::sync::Arc;

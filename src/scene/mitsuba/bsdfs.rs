@@ -12,7 +12,10 @@ use super::{
     values,
 };
 use crate::{
-    brdf::material::{ConductorFresnel, MaterialKind, Opacity, Surface},
+    brdf::{
+        coat::albedo_below_coat,
+        material::{ConductorFresnel, MaterialKind, Opacity, Surface},
+    },
     error::Result,
     math::colour::luminance,
     scene::{MIN_ALPHA, features},
@@ -273,11 +276,14 @@ impl Reader<'_> {
         if !matches!(specular, None | Some(Value::Color(Vec3::ONE))) {
             self.ignored.add(features::MI_SPECULAR, || node.place());
         }
-        parameters.boolean("nonlinear")?;
-        let value = value.unwrap_or(Value::Color(Vec3::splat(0.5)));
+        let is_nonlinear = parameters.boolean("nonlinear")?.unwrap_or(false);
+        let mut value = value.unwrap_or(Value::Color(Vec3::splat(0.5)));
         if ior > MAX_COAT_IOR {
             let message = format!("int_ior over ext_ior: expected at most 4, found {ior}");
             return Err(node.error(message));
+        }
+        if is_nonlinear {
+            value = value.mapped(albedo_below_coat(ior));
         }
         Ok(Model::colored(value, |diffuse| {
             if ior < LEAST_COAT_IOR {

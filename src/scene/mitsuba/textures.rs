@@ -40,6 +40,15 @@ impl Value {
         }
     }
 
+    /// Value of which every colour is `of` the former one; colours of vertices take it of the factor.
+    pub fn mapped(self, of: impl Fn(f32) -> f32) -> Self {
+        match self {
+            Self::Color(color) => Self::Color(color.map(of)),
+            Self::Vertices(color) => Self::Vertices(color.map(of)),
+            Self::Texture(texture) => Self::Texture(Box::new(texture.mapped(of))),
+        }
+    }
+
     /// Tests for the colours of vertices.
     pub fn is_of_vertices(&self) -> bool {
         matches!(self, Self::Vertices(_))

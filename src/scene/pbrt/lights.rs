@@ -8,13 +8,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
-use super::{
-    equal_area::resample,
-    log::Log,
-    parameters::Entity,
-    spectra,
-    textures::{Textures, linear_from_srgb},
-};
+use super::{equal_area::resample, log::Log, parameters::Entity, spectra, textures::Textures};
 use crate::{
     error::Result,
     math::colour::luminance,
@@ -22,7 +16,7 @@ use crate::{
         EnvironmentMap, Lamp, features,
         lamp::{LampKind, SpotFalloff},
     },
-    texture::Texture,
+    texture::{Encoding, Texture},
 };
 
 /// Largest side of an equal-area map, texels.
@@ -276,7 +270,7 @@ fn read_map(path: &std::path::Path, log: &mut Log) -> Result<EnvironmentMap> {
         return EnvironmentMap::read(path, 1.0, &mut log.warnings);
     }
     let image = Texture::load_with(path, &mut log.warnings)?;
-    let texels = linear_from_srgb(&image);
+    let texels = image.linear_texels(Encoding::Srgb);
     let texels = texels.iter().map(|&[red, green, blue, _]| Vec3::new(red, green, blue)).collect();
     let (width, height) = (image.width, image.height);
     Ok(EnvironmentMap { width, height, texels, rotation_rad: 0.0, source: image.name })

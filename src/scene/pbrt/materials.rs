@@ -14,6 +14,7 @@ use super::{
 use crate::{
     brdf::{
         Material,
+        coat::albedo_below_coat,
         material::{ConductorFresnel, MaterialKind, Surface},
     },
     error::Result,
@@ -219,10 +220,15 @@ impl<'a> Materials<'a> {
         log: &mut Log,
     ) -> Result<MaterialKind> {
         let value = self.textures.spectrum(entity, "reflectance", log)?;
-        let diffuse = color(value.unwrap_or(Value::number(0.5)), surface);
+        let ior = self.ior(entity, "eta", COAT_IOR)?;
+        let below = albedo_below_coat(ior);
+        let mut diffuse = color(value.unwrap_or(Value::number(0.5)), surface);
+        match &mut surface.color {
+            Some(texture) => *texture = texture.mapped(below),
+            None => diffuse = diffuse.map(below),
+        }
         let roughness = self.roughness(entity, "", log)?;
         surface.roughness = roughness.texture;
-        let ior = self.ior(entity, "eta", COAT_IOR)?;
         Ok(MaterialKind::Plastic { diffuse, alpha: roughness.alpha, ior })
     }
 

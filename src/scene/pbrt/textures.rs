@@ -19,10 +19,7 @@ use super::{
 use crate::{
     error::Result,
     scene::features,
-    texture::{
-        Channels, Encoding, Interpolation, Texels, Texture, TextureUse, Wrap,
-        lookup::srgb_to_linear,
-    },
+    texture::{Channels, Encoding, Interpolation, Texels, Texture, TextureUse, Wrap},
 };
 
 /// Most textures that may refer to one another.
@@ -299,9 +296,12 @@ impl<'a> Textures<'a> {
         if let (Some(gamma), Texels::Bytes(_) | Texels::Shorts(_)) =
             (decoding.gamma, &texture.texels)
         {
-            let texels = linear(&texture.texels, |value| value.powf(gamma));
-            texture.texels =
-                Texels::Halves(texels.iter().map(|texel| texel.map(f16::from_f32)).collect());
+            let decoded = |[red, green, blue, alpha]: [f32; 4]| {
+                let [red, green, blue] = [red, green, blue].map(|value| value.powf(gamma));
+                [red, green, blue, alpha].map(f16::from_f32)
+            };
+            let texels = texture.linear_texels(Encoding::Linear).into_iter().map(decoded);
+            texture.texels = Texels::Halves(texels.collect());
         }
         let texture = Arc::new(texture);
         log.inputs.push(path);
@@ -379,44 +379,15 @@ fn has_opacity(texture: &Texture) -> bool {
     }
 }
 
-/// Linear texels; `decode` reads colours of 8 and 16 bits.
-fn linear(texels: &Texels, decode: impl Fn(f32) -> f32) -> Vec<[f32; 4]> {
-    let decoded =
-        |[red, green, blue, alpha]: [f32; 4]| [decode(red), decode(green), decode(blue), alpha];
-    match texels {
-        Texels::Bytes(texels) => {
-            texels.iter().map(|texel| decoded(texel.map(|byte| f32::from(byte) / 255.0))).collect()
-        }
-        Texels::Shorts(texels) => {
-            let texels = texels.iter();
-            texels.map(|texel| decoded(texel.map(|short| f32::from(short) / 65_535.0))).collect()
-        }
-        Texels::Halves(texels) => texels.iter().map(|texel| texel.map(f16::to_f32)).collect(),
-    }
-}
-
-/// Linear texels of an image whose colours of 8 and 16 bits are sRGB.
-pub fn linear_from_srgb(texture: &Texture) -> Vec<[f32; 4]> {
-    linear(&texture.texels, srgb_to_linear)
-}
-
 /// Makes a texture of numbers, `of` the numbers of another.
 pub fn map_numbers(image: &TextureUse, of: impl Fn(f32) -> f32) -> TextureUse {
-    let number = |[red, green, blue, alpha]: [f32; 4]| {
-        let value = match image.channels {
-            Channels::Color => (red + green + blue) / 3.0,
-            Channels::Red => red,
-            Channels::Green => green,
-            Channels::Blue => blue,
-            Channels::Alpha => alpha,
-        };
-        [f16::from_f32(of(value * image.scale[0] + image.bias[0])); 4]
-    };
-    let texels = match image.encoding {
-        Encoding::Srgb => linear_from_srgb(&image.texture),
-        Encoding::Linear => linear(&image.texture.texels, |value| value),
-    };
-    let texels = texels.into_iter().map(number).collect();
+    let texels = image.values().into_iter();
+    let texels = texels.map(|[red, green, blue, _]| {
+        let number =
+            if image.channels == Channels::Color { (red + green + blue) / 3.0 } else { red };
+        [f16::from_f32(of(number)); 4]
+    });
+    let texels = texels.collect();
     let texture = Texture { texels: Texels::Halves(texels), ..Texture::clone(&image.texture) };
     TextureUse {
         texture: Arc::new(texture),
