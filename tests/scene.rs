@@ -652,6 +652,31 @@ fn an_included_file_is_placed_with_its_materials() {
 }
 
 #[test]
+fn lamps_of_an_included_file_are_placed_with_it() {
+    let folder = Folder::new();
+    let text = r#"{"asset": {"version": "2.0"}, "extensionsUsed": ["KHR_lights_punctual"],
+        "extensions": {"KHR_lights_punctual": {"lights": [
+            {"type": "point", "intensity": 10}, {"type": "directional", "intensity": 10}]}},
+        "nodes": [
+            {"translation": [1, 0, 0], "extensions": {"KHR_lights_punctual": {"light": 0}}},
+            {"extensions": {"KHR_lights_punctual": {"light": 1}}}],
+        "scenes": [{"nodes": [0, 1]}], "scene": 0}"#;
+    let path = folder.write("lamps.gltf", text);
+    let own = Mesh::read(&path, &mut Vec::new()).unwrap().lamps;
+    let LampKind::Point { intensity: own, .. } = own[0].kind else { unreachable!() };
+    let include = "[[include]]\nfile = \"lamps.gltf\"\nscale = 2\nrotate_deg = [0, 90, 0]\n\
+                   translate = [0, 5, 0]\n";
+    let scene = folder.load(&format!("{HEAD}{include}")).unwrap();
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let [point, sun] = &scene.lamps[..] else { unreachable!() };
+    let LampKind::Point { position, intensity } = point.kind else { unreachable!() };
+    assert_eq!(position, Vec3::new(0.0, 5.0, -2.0));
+    assert!(intensity.abs_diff_eq(4.0 * own, 1e-4 * own.x), "{intensity} of {own}");
+    let LampKind::Directional { direction, .. } = sun.kind else { unreachable!() };
+    assert!(direction.abs_diff_eq(Vec3::NEG_X, 1e-6), "along −Z in the file: {direction}");
+}
+
+#[test]
 fn files_that_are_no_scenes_are_refused() {
     let message = Scene::load(Path::new("missing.toml")).unwrap_err().to_string();
     assert!(message.contains("missing.toml: cannot read"), "{message}");

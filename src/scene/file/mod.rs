@@ -147,7 +147,8 @@ pub struct IncludeEntry {
 pub struct IncludeKeys {
     /// glTF or OBJ file with everything in it but its cameras, relative to the scene file.
     pub file: PathBuf,
-    /// Factor along each axis, or one for all; applied first.
+    /// Factor along each axis, or one for all; applied first. Intensities of lamps grow with its
+    /// square.
     #[serde(default)]
     pub scale: NumberOrVector,
     /// Rotations about X, then Y, then Z, degrees.

@@ -2,13 +2,16 @@
 
 use std::path::PathBuf;
 
+use glam::Vec3;
+
 use super::{Loader, whole};
 use crate::{
     brdf::Material,
     error::Result,
     scene::{
-        Geometry, features,
+        Geometry, Lamp, features,
         file::{IncludeEntry, IncludeKeys},
+        lamp::LampKind,
         mesh::Mesh,
         transform::Transform,
     },
@@ -16,7 +19,7 @@ use crate::{
 
 impl Loader<'_> {
     /// Appends the triangles of a file to the geometry, and its materials, apart from those that the
-    /// entry replaces.
+    /// entry replaces; returns its lamps.
     pub(super) fn include(
         &self,
         entry: &IncludeEntry,
@@ -24,7 +27,7 @@ impl Loader<'_> {
         geometry: &mut Geometry,
         inputs: &mut Vec<PathBuf>,
         warnings: &mut Vec<String>,
-    ) -> Result<()> {
+    ) -> Result<Vec<Lamp>> {
         let IncludeKeys { file, scale, rotate_deg, translate, materials: replaced } = &entry.keys;
         let label = format!("include {} (line {})", file.display(), entry.line);
         self.check_transform(&label, scale.0, *rotate_deg, *translate)?;
@@ -32,7 +35,7 @@ impl Loader<'_> {
         self.check(whole::is_whole(&path), || {
             format!("{label}: expected a file in .gltf, .glb or .obj; other meshes are objects")
         })?;
-        let mesh = Mesh::read(&path, warnings)?;
+        let mut mesh = Mesh::read(&path, warnings)?;
         inputs.push(path.clone());
         inputs.extend_from_slice(&mesh.side_files);
         let mut ignored = mesh.ignored_in_materials();
@@ -45,6 +48,7 @@ impl Loader<'_> {
         // The file by itself, so that it becomes the same as a whole scene and as a part of one.
         let (own_materials, placed) =
             Loader::new(&path).place_whole(&mesh, &mut ignored, warnings)?;
+        let lamps = std::mem::take(&mut mesh.lamps);
         drop(mesh);
         warnings.extend(ignored.warnings(&path));
         for name in replaced.keys() {
@@ -82,9 +86,31 @@ impl Loader<'_> {
         let dropped = geometry.append(&mesh, &transform, |index| places[of[index] as usize]);
         self.check_extent(&label, &geometry.positions[first_vertex..])?;
         warnings.extend(dropped.warnings(&label, count));
-        if count == 0 {
-            warnings.push(format!("{label}: the file has no triangles"));
+        if count == 0 && lamps.is_empty() {
+            warnings.push(format!("{label}: the file has no triangles and no lamps"));
         }
-        Ok(())
+        Ok(lamps.into_iter().map(|lamp| place_lamp(lamp, &transform)).collect())
     }
+}
+
+/// Places a lamp of a file. Intensities grow with the square of the scale, so that the lamp lights its
+/// file as before, and as surfaces that emit do.
+fn place_lamp(mut lamp: Lamp, transform: &Transform) -> Lamp {
+    let area = transform.linear.determinant().abs().powf(2.0 / 3.0);
+    let turn = |direction: &mut Vec3| {
+        *direction = (transform.linear * *direction).normalize_or(*direction);
+    };
+    match &mut lamp.kind {
+        LampKind::Point { position, intensity } => {
+            *position = transform.position(position.to_array()).into();
+            *intensity *= area;
+        }
+        LampKind::Spot { position, direction, intensity, .. } => {
+            *position = transform.position(position.to_array()).into();
+            *intensity *= area;
+            turn(direction);
+        }
+        LampKind::Directional { direction, .. } => turn(direction),
+    }
+    lamp
 }

@@ -90,13 +90,17 @@ impl Scene {
         let mut materials = loader.materials(&file.materials, &mut inputs, &mut warnings)?;
         let mut geometry =
             loader.geometry(&file.objects, &mut materials, &mut inputs, &mut warnings)?;
+        let mut lamps = Vec::new();
         for entry in &file.includes {
-            loader.include(entry, &mut materials, &mut geometry, &mut inputs, &mut warnings)?;
+            let inputs = &mut inputs;
+            let warnings = &mut warnings;
+            lamps.extend(loader.include(entry, &mut materials, &mut geometry, inputs, warnings)?);
         }
         if materials.is_empty() {
             materials.push(default_material());
         }
-        let light = loader.light(&file, options, &mut inputs, &mut warnings)?;
+        let mut light = loader.light(&file, options, &mut inputs, &mut warnings)?;
+        light.lamps.extend(lamps);
         loader.warn_of_darkness(&file, options, &light, &materials, &mut warnings);
         let mut scene = loader.scene(camera, file.film, light, materials, geometry, warnings);
         scene.inputs.extend(inputs);
