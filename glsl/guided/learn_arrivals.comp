@@ -22,7 +22,8 @@ void main() {
         return;
     }
     PathCell found = path_cells[path];
-    if (found.teaches != NOTHING_TO_LEARN) {
+    // The light that comes from a specular surface is not known.
+    if (found.teaches != NOTHING_TO_LEARN && found.cell != SPECULAR_CELL) {
         atomicAdd(guide_arrivals[2u * found.teaches], 1u);
         if (found.cell != NOTHING_TO_LEARN) {
             uint light = texelFetch(guide_reflected, int(found.cell)).x;

@@ -116,7 +116,8 @@ void main() {
         for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
             learn_targets[i * path_count + path] = uvec2(NOTHING_TO_LEARN);
         }
-        path_cells[path].cell = NOTHING_TO_LEARN;
+        path_cells[path].cell =
+            hit.triangle == NO_TRIANGLE ? NOTHING_TO_LEARN : SPECULAR_CELL;
         return;
     }
     Vertex vertex = load_vertex(path, hit);

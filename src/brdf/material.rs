@@ -4,7 +4,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use glam::Vec3;
 
-use crate::{brdf::table::MeasuredTable, texture::TextureUse};
+use crate::{brdf::table::MeasuredTable, math::colour::luminance, texture::TextureUse};
 
 /// Named surface material.
 #[derive(Clone, Debug)]
@@ -21,6 +21,41 @@ impl Material {
     /// Makes an opaque, two-sided material without textures or emission.
     pub fn new(name: impl Into<String>, kind: MaterialKind) -> Self {
         Self { name: name.into(), kind, surface: Surface::default() }
+    }
+
+    /// Returns the reflection model with its textures replaced by their means: for fits, which have
+    /// one set of lobes for a material.
+    pub fn mean_kind(&self) -> MaterialKind {
+        let mean = |texture: &Option<TextureUse>| {
+            texture.as_ref().map_or(Vec3::ONE, |texture| texture.mean().into())
+        };
+        let color = mean(&self.surface.color);
+        let rough = luminance(mean(&self.surface.roughness));
+        let metal = luminance(mean(&self.surface.metallic));
+        let mut kind = self.kind.clone();
+        match &mut kind {
+            MaterialKind::Diffuse { reflectance } | MaterialKind::Mirror { reflectance } => {
+                *reflectance = (*reflectance * color).clamp(Vec3::ZERO, Vec3::ONE);
+            }
+            MaterialKind::Plastic { diffuse, .. } => {
+                *diffuse = (*diffuse * color).clamp(Vec3::ZERO, Vec3::ONE);
+            }
+            MaterialKind::Conductor { alpha, fresnel } => {
+                *alpha = (*alpha * rough * rough).clamp(0.0, 1.0);
+                if let ConductorFresnel::Schlick { reflectance } = fresnel {
+                    *reflectance = (*reflectance * color).clamp(Vec3::ZERO, Vec3::ONE);
+                }
+            }
+            MaterialKind::Principled { base_color, metallic, roughness, .. } => {
+                *base_color = (*base_color * color).clamp(Vec3::ZERO, Vec3::ONE);
+                *metallic = (*metallic * metal).clamp(0.0, 1.0);
+                *roughness = (*roughness * rough).clamp(0.0, 1.0);
+            }
+            MaterialKind::Dielectric { .. }
+            | MaterialKind::ThinDielectric { .. }
+            | MaterialKind::Measured { .. } => {}
+        }
+        kind
     }
 }
 

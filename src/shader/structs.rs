@@ -340,7 +340,7 @@ structs! {
 
     /// Cells that a path's bounces teach.
     struct PathCell {
-        /// Cell of its current vertex, or `NOTHING_TO_LEARN` if it left the scene.
+        /// Cell of its current vertex, `SPECULAR_CELL`, or `NOTHING_TO_LEARN` if it left the scene.
         cell: uint,
         /// Cell and direction that its last bounce ray teaches, or `NOTHING_TO_LEARN`.
         teaches: uint,

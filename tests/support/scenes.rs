@@ -1,7 +1,7 @@
 //! Small scenes made of boxes and spheres, for tests of the renderer.
 #![allow(dead_code, reason = "every test binary uses a part of this")]
 
-use std::path::PathBuf;
+use std::{path::PathBuf, sync::Arc};
 
 use fenestra::{
     brdf::{
@@ -9,6 +9,7 @@ use fenestra::{
         material::{ConductorFresnel, Emission, MaterialKind},
     },
     scene::{Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Lamp, Scene, lamp::LampKind},
+    texture::{Texels, Texture, TextureUse},
 };
 use glam::Vec3;
 
@@ -234,8 +235,8 @@ pub fn room(materials: Vec<Material>) -> Scene {
     )
 }
 
-/// Makes a [`room`] whose window has a pane, with a glass sphere, a mirror box, a lamp under the
-/// ceiling, a glowing box and a sheet that is half opaque.
+/// Makes a [`room`] of chequered walls whose window has a pane, with a glass sphere, a mirror box, a
+/// lamp under the ceiling, a glowing box of glossy paint and a sheet that is half opaque.
 pub fn glazed_room() -> Scene {
     let glass = MaterialKind::Dielectric {
         ior: 1.5,
@@ -248,13 +249,26 @@ pub fn glazed_room() -> Scene {
         reflectance: Vec3::ONE,
         transmittance: Vec3::new(0.8, 0.9, 0.85),
     };
-    let mut glowing = diffuse(Vec3::splat(0.5));
+    let paint = MaterialKind::Principled {
+        base_color: Vec3::new(0.7, 0.4, 0.3),
+        metallic: 0.3,
+        roughness: 0.5,
+        ior: 1.5,
+        specular: 1.0,
+        specular_color: Vec3::ONE,
+    };
+    let mut glowing = Material::new("paint", paint);
     let radiance = Vec3::new(6.0, 4.0, 2.0);
     glowing.surface.emission = Some(Emission { radiance, texture: None, two_sided: false });
     let mut sheet = diffuse(Vec3::new(0.2, 0.6, 0.3));
     sheet.surface.opacity.factor = 0.5;
+    let texels = vec![[230, 230, 230, 255], [90, 120, 200, 255], [90, 120, 200, 255], [230; 4]];
+    let texture =
+        Texture { name: "chequers".into(), width: 2, height: 2, texels: Texels::Bytes(texels) };
+    let mut walls = diffuse(Vec3::splat(0.8));
+    walls.surface.color = Some(TextureUse::new(Arc::new(texture)));
     let mut scene = room(vec![
-        diffuse(Vec3::splat(0.6)),
+        walls,
         Material::new("mirror", MaterialKind::Mirror { reflectance: Vec3::splat(0.9) }),
         Material::new("glass", glass),
         Material::new("pane", pane),
@@ -264,6 +278,8 @@ pub fn glazed_room() -> Scene {
     add_box(&mut scene.geometry, Vec3::new(-2.1, 1.4, 0.0), Vec3::new(0.02, 1.2, 1.2), 3);
     add_box(&mut scene.geometry, Vec3::new(1.2, 0.2, 0.6), Vec3::splat(0.2), 4);
     add_box(&mut scene.geometry, Vec3::new(-1.0, 1.0, 0.9), Vec3::new(0.6, 0.6, 0.01), 5);
+    let uvs = scene.geometry.positions.iter().map(|&[x, y, z]| [x + y, z - y]);
+    scene.geometry.uvs[0] = uvs.collect();
     let position = Vec3::new(0.3, 2.3, 0.4);
     let kind = LampKind::Point { position, intensity: Vec3::splat(1.5) };
     scene.lamps.push(Lamp { name: "lamp".into(), kind });

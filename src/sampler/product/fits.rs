@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
 use super::parameters::{Elevation, LobeOrder, ProductParameters};
 use crate::{
-    brdf::MaterialTables,
+    brdf::{Material, MaterialTables},
     error::{Error, Result},
     fit::{
         self, BrdfFit, BrdfOptions, EnvironmentLobe, EnvironmentOptions, Method, brdf_lobes,
@@ -68,7 +68,13 @@ impl Fits {
             fit::cache::key(&[bytemuck::cast_slice(&environment)]),
         );
 
-        let tables = MaterialTables::new(&scene.materials)?;
+        // Lobes serve a whole material, so that textures enter by their means.
+        let means: Vec<_> = scene
+            .materials
+            .iter()
+            .map(|material| Material::new(&material.name, material.mean_kind()))
+            .collect();
+        let tables = MaterialTables::new(&means)?;
         let options = BrdfOptions {
             lobes: parameters.brdf_lobes as usize,
             views: parameters.views as usize,
