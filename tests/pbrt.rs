@@ -14,6 +14,7 @@ use command::Folder;
 use fenestra::{
     brdf::{
         Material,
+        coat::albedo_below_coat,
         material::{ConductorFresnel, MaterialKind},
     },
     scene::{
@@ -271,7 +272,7 @@ fn materials_are_the_nearest() {
     else {
         panic!()
     };
-    close(diffuse, [0.1, 0.2, 0.3]);
+    close(diffuse, [0.1, 0.2, 0.3].map(albedo_below_coat(1.3)));
     assert_eq!((alpha, ior), (0.5, 1.3));
     let MaterialKind::Plastic { alpha, .. } =
         material(r#""coateddiffuse" "bool remaproughness" false "float roughness" 0.25"#).kind

@@ -646,7 +646,7 @@ fn an_included_file_is_placed_with_its_materials() {
     };
     case("glass =", "ice =", "found `ice`; the file has wall, glass");
     case("\"grey\"", "\"gray\"", "unknown material `gray`, the scene has grey");
-    case("room.obj", "room.ply", "expected a file in .gltf, .glb or .obj");
+    case("room.obj", "room.ply", "expected a file in .gltf, .glb, .obj, .pbrt or .xml");
     case("scale = 2", "scale = 0", "include parts/room.obj (line 15): scale must not be 0");
     case("file", "mesh", "unknown field `mesh`, expected one of `file`, `scale`");
 }
@@ -674,6 +674,33 @@ fn lamps_of_an_included_file_are_placed_with_it() {
     assert!(intensity.abs_diff_eq(4.0 * own, 1e-4 * own.x), "{intensity} of {own}");
     let LampKind::Directional { direction, .. } = sun.kind else { unreachable!() };
     assert!(direction.abs_diff_eq(Vec3::NEG_X, 1e-6), "along −Z in the file: {direction}");
+}
+
+#[test]
+fn scenes_of_other_programs_are_included_with_their_lamps() {
+    let folder = Folder::new();
+    folder.write(
+        "lamp.pbrt",
+        "Camera \"perspective\"\nWorldBegin\nLightSource \"infinite\"\n\
+         LightSource \"point\" \"point3 from\" [1 0 0]\nMaterial \"diffuse\"\n\
+         Shape \"sphere\" \"float radius\" 0.5\n",
+    );
+    folder.write(
+        "quad.xml",
+        "<scene version=\"3.0.0\"><sensor type=\"perspective\"/><shape type=\"rectangle\"><bsdf type=\"diffuse\" id=\"wall\"/>\
+         </shape></scene>",
+    );
+    let text = format!(
+        "{HEAD}[[include]]\nfile = \"lamp.pbrt\"\ntranslate = [0, 5, 0]\n\
+         [[include]]\nfile = \"quad.xml\"\nscale = 2\n"
+    );
+    let scene = folder.load(&text).unwrap();
+    let LampKind::Point { position, .. } = scene.lamps[0].kind else { unreachable!() };
+    assert!(position.y == 5.0 && position.x.abs() == 1.0, "{position}");
+    assert!(scene.geometry.positions.iter().any(|position| position[0] == 2.0), "the rectangle");
+    let ignored = "include lamp.pbrt (line";
+    let named = |text: &String| text.contains(ignored) && text.contains("environment");
+    assert!(scene.warnings.iter().any(named), "{:?}", scene.warnings);
 }
 
 #[test]

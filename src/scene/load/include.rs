@@ -1,18 +1,19 @@
-//! `[[include]]`: everything in a glTF or OBJ file, placed in the scene.
+//! `[[include]]`: everything in a file of another format, placed in the scene.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-use super::{Loader, whole};
+use super::{Loader, mitsuba, whole};
 use crate::{
     brdf::Material,
     error::Result,
     scene::{
-        Geometry, Lamp, features,
+        Geometry, Lamp, Scene, features,
         file::{IncludeEntry, IncludeKeys},
         lamp::LampKind,
         mesh::Mesh,
+        pbrt,
         transform::Transform,
     },
 };
@@ -32,25 +33,8 @@ impl Loader<'_> {
         let label = format!("include {} (line {})", file.display(), entry.line);
         self.check_transform(&label, scale.0, *rotate_deg, *translate)?;
         let path = self.folder.join(file);
-        self.check(whole::is_whole(&path), || {
-            format!("{label}: expected a file in .gltf, .glb or .obj; other meshes are objects")
-        })?;
-        let mut mesh = Mesh::read(&path, warnings)?;
-        inputs.push(path.clone());
-        inputs.extend_from_slice(&mesh.side_files);
-        let mut ignored = mesh.ignored_in_materials();
-        for (index, camera) in mesh.cameras.iter().enumerate() {
-            ignored.add(features::GLTF_CAMERAS, || camera.label(index));
-        }
-        for lamp in &mesh.lamps {
-            ignored.add(features::GLTF_OBJECT_LIGHTS, || format!("light `{}`", lamp.name));
-        }
-        // The file by itself, so that it becomes the same as a whole scene and as a part of one.
-        let (own_materials, placed) =
-            Loader::new(&path).place_whole(&mesh, &mut ignored, warnings)?;
-        let lamps = std::mem::take(&mut mesh.lamps);
-        drop(mesh);
-        warnings.extend(ignored.warnings(&path));
+        let Contents { materials: own_materials, geometry: placed, lamps } =
+            self.contents(&label, &path, inputs, warnings)?;
         for name in replaced.keys() {
             let is_there = own_materials.iter().any(|material| material.name == *name);
             self.check(is_there, || {
@@ -90,6 +74,52 @@ impl Loader<'_> {
             warnings.push(format!("{label}: the file has no triangles and no lamps"));
         }
         Ok(lamps.into_iter().map(|lamp| place_lamp(lamp, &transform)).collect())
+    }
+}
+
+/// Materials, triangles and lamps of an included file.
+struct Contents {
+    materials: Vec<Material>,
+    geometry: Geometry,
+    lamps: Vec<Lamp>,
+}
+
+impl Loader<'_> {
+    /// Reads a file to be included: the same as of a whole scene.
+    fn contents(
+        &self,
+        label: &str,
+        path: &Path,
+        inputs: &mut Vec<PathBuf>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Contents> {
+        if mitsuba::is_mitsuba(path) || pbrt::is_pbrt(path) {
+            let scene = Scene::load(path)?;
+            inputs.extend(scene.inputs);
+            warnings.extend(scene.warnings);
+            if scene.environment.texels.iter().any(|texel| *texel != Vec3::ZERO) {
+                warnings.push(format!("{label}: ignored the environment of the file"));
+            }
+            let Scene { materials, geometry, lamps, .. } = scene;
+            return Ok(Contents { materials, geometry, lamps });
+        }
+        self.check(whole::is_whole(path), || {
+            format!(
+                "{label}: expected a file in .gltf, .glb, .obj, .pbrt or .xml; other meshes are \
+                 objects"
+            )
+        })?;
+        let mut mesh = Mesh::read(path, warnings)?;
+        inputs.push(path.to_path_buf());
+        inputs.extend_from_slice(&mesh.side_files);
+        let mut ignored = mesh.ignored_in_materials();
+        for (index, camera) in mesh.cameras.iter().enumerate() {
+            ignored.add(features::GLTF_CAMERAS, || camera.label(index));
+        }
+        let lamps = std::mem::take(&mut mesh.lamps);
+        let (materials, geometry) = Loader::new(path).place_whole(&mesh, &mut ignored, warnings)?;
+        warnings.extend(ignored.warnings(path));
+        Ok(Contents { materials, geometry, lamps })
     }
 }
 
