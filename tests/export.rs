@@ -183,7 +183,7 @@ fn measured_materials_become_diffuse_with_their_albedo() {
     let table = MeasuredTable::tabulate(|_, _| reflectance / PI).unwrap();
     let path = "paint.binary".into();
     scene.materials[0].kind = MaterialKind::Measured { path, table: Arc::new(table) };
-    let export = Export::new(&scene, SETTINGS).unwrap();
+    let export = Export::new(&scene, Path::new("a.xml"), SETTINGS).unwrap();
     let [warning] = &export.warnings[..] else { unreachable!("one warning") };
     let found = warning.rsplit_once("reflectance ").unwrap().1;
     let found: Vec<f32> = found.split(", ").map(|number| number.parse().unwrap()).collect();
