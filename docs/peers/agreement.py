@@ -215,7 +215,7 @@ SCENES = [
     ("emission texture, seen", shows(DIFFUSE + '\nemission = { texture = "colours.png", '
                                      "factor = [3.0, 2.0, 1.0] }", GREY), 2, True),
     ("area lamp, one-sided", lit("emission = [20, 18, 15]", 90.0), 2, True),
-    ("area lamp, turned away", lit("emission = [20, 18, 15]", -90.0), 2, True),
+    ("area lamp, upright", lit("emission = [20, 18, 15]", 0.0), 2, True),
     ("area lamp, two-sided", lit("emission = [20, 18, 15]\nemission_two_sided = true", -60.0), 2, True),
     ("area lamp, textured", lit('emission = { texture = "colours.png", factor = [40, 40, 40] }', 90.0),
      2, True),

@@ -32,7 +32,7 @@ pub(super) enum Recipe {
     Number(f32),
     /// Square of one number times a factor.
     Squared(f32),
-    /// Normals, with factors of the components along the tangent and the bitangent.
+    /// Normals of another length, with factors of the components along the tangent and the bitangent.
     Normal(Vec2),
     /// 1 where `factor` times the number is at least `cutoff`, else 0.
     Cut { factor: f32, cutoff: f32 },
@@ -202,7 +202,11 @@ impl Picture {
             Recipe::Color(factor) => value * factor,
             Recipe::Number(factor) => Vec3::splat(factor * luminance(value)),
             Recipe::Squared(factor) => Vec3::splat(factor * luminance(value).powi(2)),
-            Recipe::Normal(factor) => 0.5 + 0.5 * factor.extend(1.0) * (2.0 * value - 1.0),
+            Recipe::Normal(factor) => {
+                // The length of a normal does not count. Texels stay within 0…1.
+                let factor = factor.extend(1.0) / factor.abs().max_element().max(1.0);
+                0.5 + 0.5 * factor * (2.0 * value - 1.0)
+            }
             Recipe::Cut { factor, cutoff } => {
                 Vec3::splat(if factor * luminance(value) >= cutoff { 1.0 } else { 0.0 })
             }
