@@ -286,7 +286,8 @@ def compare(mi, np, fenestra, folder, case, samples):
     error = lambda images: mean(images).std(ddof=1) / mean(images).mean() / SEEDS**0.5
     ratio = mean(ours).mean() / mean(theirs).mean()
     pairs = [block_means(pictures).mean(axis=0) for pictures in (ours, theirs)]
-    lit = pairs[0] + pairs[1] > 0
+    # Leave out dark blocks.
+    lit = pairs[1] > 0.01 * pairs[1].mean()
     ratios = pairs[0][lit] / pairs[1][lit]
     far, _ = far_blocks(np, ours, theirs, 0.02)
     return (ratio, float(np.hypot(error(ours), error(theirs))), ratios.min(), ratios.max(),
