@@ -13,9 +13,10 @@ use fenestra::{
     brdf::{MeasuredTable, material::MaterialKind},
     export::mitsuba::{Export, Settings},
     film::Image,
-    scene::Scene,
+    scene::{Scene, lamp::LampKind},
+    texture::{TextureTables, TextureUse, lookup::texture_value},
 };
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 const DIFFUSE: &str = "type = \"diffuse\"\nreflectance = [0.5, 0.25, 0.125]";
 const PLASTIC: &str = "type = \"plastic\"\ndiffuse = [0.5, 0.25, 0.125]\nalpha = 0.25\nior = 1.33";
@@ -183,11 +184,280 @@ fn measured_materials_become_diffuse_with_their_albedo() {
     let table = MeasuredTable::tabulate(|_, _| reflectance / PI).unwrap();
     let path = "paint.binary".into();
     scene.materials[0].kind = MaterialKind::Measured { path, table: Arc::new(table) };
-    let export = Export::new(&scene, SETTINGS).unwrap();
+    let export = Export::new(&scene, Path::new("a.xml"), SETTINGS).unwrap();
     let [warning] = &export.warnings[..] else { unreachable!("one warning") };
     let found = warning.rsplit_once("reflectance ").unwrap().1;
     let found: Vec<f32> = found.split(", ").map(|number| number.parse().unwrap()).collect();
     let error = (Vec3::from_slice(&found) - reflectance).abs() / reflectance;
     assert!(warning.contains("`clay`") && warning.contains("paint.binary"), "{warning}");
     assert!(error.max_element() < 0.01, "{warning}");
+}
+
+/// Writes an image of 2 × 2 texels and a square with texture coordinates.
+fn write_square(folder: &Folder) {
+    let texels = vec![255, 0, 0, 0, 255, 0, 0, 51, 255, 255, 255, 255];
+    let image = image::RgbImage::from_raw(2, 2, texels).unwrap();
+    image.save(folder.path().join("four colours.png")).unwrap();
+    folder.write(
+        "square.obj",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n\
+         f 1/1/1 2/2/1 3/3/1 4/4/1\n",
+    );
+}
+
+/// Exports a square of the material `clay` with further tables, and reads both scenes.
+#[track_caller]
+fn both(clay: &str, more: &str) -> (Folder, String, Vec<String>, [Scene; 2]) {
+    let folder = Folder::new();
+    write_square(&folder);
+    let text = yard([8, 6], "constant = [0, 0, 0]", clay, "mesh = \"square.obj\"") + more;
+    let ours = Scene::load(&folder.write("scene.toml", text)).unwrap();
+    let path = folder.path().join("out.xml");
+    let export = Export::new(&ours, &path, SETTINGS).unwrap();
+    export.write().unwrap();
+    let xml = fs::read_to_string(&path).unwrap();
+    let read = Scene::load(&path).unwrap();
+    let warnings = export.warnings.clone();
+    (folder, xml, warnings, [ours, read])
+}
+
+/// Value of a texture at some coordinates of the mesh.
+fn value_at(used: &TextureUse, uv: Vec2) -> Vec3 {
+    let mut tables = TextureTables::default();
+    let index = tables.add(Some(used));
+    let words = tables.words(0..tables.word_count());
+    texture_value(&words, &tables.uses, index, uv, uv).truncate()
+}
+
+/// Fails unless factor times texture is the same for both, in and beyond the image.
+#[track_caller]
+fn assert_same_values(pairs: [(Vec3, &Option<TextureUse>); 2]) {
+    for index in 0..40 {
+        let uv = Vec2::new(0.37 * index as f32 - 4.0, 0.53 * index as f32 - 9.0);
+        let [ours, read] = pairs
+            .map(|(factor, used)| factor * used.as_ref().map_or(Vec3::ONE, |u| value_at(u, uv)));
+        assert!(ours.abs_diff_eq(read, 1e-3), "at {uv}: {read}, expected {ours}");
+    }
+}
+
+#[test]
+fn textures_are_the_same_at_all_coordinates() {
+    for (keys, file) in [
+        ("", "t00_four_colours.png"),
+        (", linear = true, wrap = \"mirror\"", "t00_four_colours.png"),
+        (", wrap = \"clamp\", interpolation = \"nearest\"", "t00_four_colours.png"),
+        (", scale = [2, 3], offset = [0.3, 0.1], rotate_deg = 30.0", "t00_four_colours.png"),
+        (", channel = \"g\"", "t00_four_colours.png"),
+        (", factor = [0.5, 0.25, 1.0]", "t00_four_colours.exr"),
+    ] {
+        let clay =
+            format!("type = \"diffuse\"\nreflectance = {{ texture = \"four colours.png\"{keys} }}");
+        let (folder, xml, warnings, [ours, read]) = both(&clay, "");
+        assert_eq!(warnings, [""; 0]);
+        assert!(folder.path().join("out").join(file).is_file(), "{keys}: {xml}");
+        assert_parts(&xml, &[&format!("value=\"out/{file}\"")]);
+        let uses = [&ours, &read].map(|scene| {
+            let MaterialKind::Diffuse { reflectance } = scene.materials[0].kind else {
+                unreachable!("diffuse")
+            };
+            (reflectance, &scene.materials[0].surface.color)
+        });
+        assert_same_values(uses);
+        let (header, _) = ply(&folder.path().join("out/m00_clay.ply"));
+        assert_parts(&header, &["property float u\nproperty float v\n"]);
+        assert_eq!(read.materials[0].surface.two_sided, ours.materials[0].surface.two_sided);
+    }
+}
+
+#[test]
+fn one_image_serves_all_uses_of_equal_values() {
+    let use_of = |channel| format!("{{ texture = \"four colours.png\", channel = \"{channel}\" }}");
+    let clay = format!(
+        "type = \"principled\"\nbase_color = [0.5, 0.5, 0.5]\nmetallic = {}\nroughness = {}\n\
+         opacity = {}",
+        use_of("r"),
+        use_of("g"),
+        use_of("g")
+    );
+    let (folder, _, warnings, [ours, read]) = both(&clay, "");
+    assert_eq!(warnings.len(), 2, "masking and the diffuse part: {warnings:?}");
+    let images = fs::read_dir(folder.path().join("out")).unwrap();
+    let is_image = |name: &std::ffi::OsString| name.to_string_lossy().ends_with(".png");
+    assert_eq!(images.filter(|entry| is_image(&entry.as_ref().unwrap().file_name())).count(), 2);
+    let surfaces = [&ours, &read].map(|scene| &scene.materials[0].surface);
+    assert_same_values(surfaces.map(|surface| (Vec3::ONE, &surface.metallic)));
+    assert_same_values(surfaces.map(|surface| (Vec3::ONE, &surface.roughness)));
+    assert_same_values(surfaces.map(|surface| (Vec3::ONE, &surface.opacity.texture)));
+    let kind = |scene: &Scene| format!("{:?}", scene.materials[0].kind);
+    assert_eq!(kind(&read), kind(&ours));
+}
+
+#[test]
+fn surfaces_keep_sides_opacity_and_bumps() {
+    let diffuse = |keys: &str| format!("{DIFFUSE}\n{keys}");
+    let (_, xml, _, [_, read]) = both(&diffuse("two_sided = false\nopacity = 0.25"), "");
+    assert!(!xml.contains("twosided"), "{xml}");
+    assert_parts(&xml, &["<bsdf type=\"mask\" id=\"m00_clay\">", "\"opacity\" value=\"0.25\""]);
+    assert!(!read.materials[0].surface.two_sided);
+    assert_eq!(read.materials[0].surface.opacity.factor, 0.25);
+
+    let bumps = "normal = { texture = \"four colours.png\", strength = 2.0 }";
+    let (_, xml, warnings, [ours, read]) = both(&diffuse(bumps), "");
+    assert_eq!(warnings, [""; 0]);
+    // Inside of `twosided`, Mitsuba mirrors the bumps of the back.
+    let order = ["normalmap", "twosided", "diffuse"].map(|kind| xml.find(kind).unwrap());
+    assert!(order.is_sorted(), "{xml}");
+    let map = |scene: &Scene| scene.materials[0].surface.normal.clone().unwrap();
+    for index in 0..9 {
+        let uv = Vec2::new(0.3 * (index % 3) as f32 + 0.1, 0.3 * (index / 3) as f32 + 0.1);
+        let expected = Vec3::new(2.0, 2.0, 1.0) * (2.0 * value_at(&map(&ours), uv) - 1.0);
+        let found = 2.0 * value_at(&map(&read), uv) - 1.0;
+        assert!(
+            found.normalize().abs_diff_eq(expected.normalize(), 1e-3),
+            "at {uv}: {found}, expected {expected}"
+        );
+    }
+
+    let cut = "opacity = { texture = \"four colours.png\", interpolation = \"nearest\" }\n\
+               opacity_cutoff = 0.5";
+    let (_, _, warnings, [_, read]) = both(&diffuse(cut), "");
+    assert_eq!(warnings, [""; 0]);
+    let used = read.materials[0].surface.opacity.texture.clone().unwrap();
+    // Luminances are 0.21 and 0.72 above 0.21 and 1, in linear values.
+    for (uv, expected) in
+        [([0.2, 0.8], 0.0), ([0.8, 0.8], 1.0), ([0.2, 0.2], 0.0), ([0.8, 0.2], 1.0)]
+    {
+        assert_eq!(value_at(&used, uv.into()), Vec3::splat(expected));
+    }
+    let blurred = cut.replace(", interpolation = \"nearest\"", "");
+    let (folder, _, warnings, _) = both(&diffuse(&blurred), "");
+    assert!(matches!(&warnings[..], [one] if one.contains("cutoff")), "{warnings:?}");
+    let enlarged = folder.path().join("out/t00_four_colours.exr");
+    assert_eq!(Image::read_exr(&enlarged).unwrap().width, 16);
+}
+
+#[test]
+fn surfaces_emit_on_the_sides_that_the_scene_says() {
+    let clay = format!("{DIFFUSE}\nemission = [1, 2, 3]");
+    let (folder, xml, warnings, [ours, read]) = both(&clay, "");
+    assert_eq!(warnings, [""; 0]);
+    assert_eq!(read.materials[0].surface.emission, ours.materials[0].surface.emission);
+    assert!(!xml.contains("type=\"constant\""), "{xml}");
+    assert!(!folder.path().join("out/m00_clay_back.ply").exists());
+
+    let factor = "factor = [4, 2, 1]";
+    let clay = format!("{DIFFUSE}\nemission = {{ texture = \"four colours.png\", {factor} }}");
+    let (_, _, _, [ours, read]) = both(&clay, "");
+    let emissions =
+        [&ours, &read].map(|scene| scene.materials[0].surface.emission.as_ref().unwrap());
+    assert_same_values(emissions.map(|emission| (emission.radiance, &emission.texture)));
+
+    let (folder, xml, warnings, [ours, read]) =
+        both(&format!("{DIFFUSE}\nemission = [1, 2, 3]\nemission_two_sided = true"), "");
+    assert_eq!(warnings, [""; 0]);
+    assert_eq!(xml.matches("type=\"area\"").count(), 2);
+    assert!(folder.path().join("out/m00_clay_back.ply").is_file());
+    let count = ours.geometry.triangles.len();
+    assert_eq!(read.geometry.triangles.len(), 2 * count);
+    let normal = |triangle: usize| {
+        let [a, b, c] = read.geometry.triangles[triangle]
+            .map(|at| Vec3::from(read.geometry.positions[at as usize]));
+        (b - a).cross(c - a).normalize()
+    };
+    for triangle in 0..count {
+        assert!(normal(triangle).dot(normal(count + triangle)) < -0.999);
+    }
+
+    let glass = "type = \"dielectric\"\nemission = [1, 2, 3]\nemission_two_sided = true";
+    let (_, _, warnings, _) = both(glass, "");
+    assert!(matches!(&warnings[..], [one] if one.contains("light of the back")), "{warnings:?}");
+}
+
+#[test]
+fn specular_materials_come_back_as_they_were() {
+    for (clay, element) in [
+        ("type = \"mirror\"\nreflectance = [0.9, 0.5, 0.25]", "\"conductor\""),
+        ("type = \"dielectric\"\nior = 1.25\ntransmittance = [0.5, 1, 1]", "\"dielectric\""),
+        ("type = \"dielectric\"\nalpha = 0.0625\nreflectance = [0.5, 1, 1]", "\"roughdielectric\""),
+        ("type = \"thin_dielectric\"\nior = 1.5", "\"thindielectric\""),
+    ] {
+        let (_, xml, warnings, [ours, read]) = both(clay, "");
+        assert_eq!(warnings, [""; 0]);
+        assert_parts(&xml, &[element]);
+        assert_eq!(xml.contains("twosided"), element == "\"conductor\"", "{xml}");
+        let kind = |scene: &Scene| format!("{:?}", scene.materials[0].kind);
+        assert_eq!(kind(&read), kind(&ours));
+        assert_eq!(read.materials[0].surface, ours.materials[0].surface);
+    }
+}
+
+#[test]
+fn lamps_come_back_as_they_were() {
+    let lamps = r#"
+[[lamp]]
+type = "point"
+position = [1, 2, 3]
+intensity = [4, 5, 6]
+
+[[lamp]]
+type = "directional"
+direction = [0, -0.6, 0.8]
+irradiance = [1, 2, 3]
+
+[[lamp]]
+type = "spot"
+position = [1, 2, 3]
+direction = [0.6, -0.8, 0]
+intensity = [4, 5, 6]
+inner_angle_deg = 10.0
+outer_angle_deg = 30.0
+falloff = "linear_angle"
+"#;
+    let (_, _, warnings, [ours, read]) = both(DIFFUSE, lamps);
+    assert_eq!(warnings, [""; 0]);
+    assert_eq!(read.lamps[..2], ours.lamps[..2]);
+    let [ours, read] = [ours, read].map(|scene| scene.lamps[2].kind);
+    let (
+        LampKind::Spot { position, direction, inner_angle_rad, outer_angle_rad, intensity, .. },
+        LampKind::Spot {
+            position: place,
+            direction: axis,
+            inner_angle_rad: inner,
+            outer_angle_rad: outer,
+            ..
+        },
+    ) = (ours, read)
+    else {
+        unreachable!("two spots")
+    };
+    assert_eq!((position, intensity), (place, Vec3::new(4.0, 5.0, 6.0)));
+    assert!(direction.abs_diff_eq(axis, 1e-6));
+    assert!((inner_angle_rad - inner).abs() < 1e-6 && (outer_angle_rad - outer).abs() < 1e-6);
+
+    let (_, _, warnings, _) = both(DIFFUSE, &lamps.replace("linear_angle", "smooth_cosine"));
+    assert!(matches!(&warnings[..], [one] if one.contains("spot falls off")), "{warnings:?}");
+}
+
+#[test]
+fn colours_of_vertices_are_written_with_their_factor() {
+    let folder = Folder::new();
+    let text = yard([8, 6], "constant = [1, 1, 1]", DIFFUSE, BALL);
+    let mut scene = Scene::load(&folder.write("scene.toml", text)).unwrap();
+    scene.geometry.colors = vec![[0.5, 0.5, 1.0, 1.0]; scene.geometry.positions.len()];
+    scene.materials[0].surface.vertex_color = true;
+    let path = folder.path().join("out.xml");
+    let export = Export::new(&scene, &path, SETTINGS).unwrap();
+    assert_eq!(export.warnings, [""; 0]);
+    export.write().unwrap();
+    let xml = fs::read_to_string(&path).unwrap();
+    assert_parts(&xml, &["type=\"mesh_attribute\"", "value=\"vertex_color\""]);
+    let mesh = folder.path().join("out/m00_clay.ply");
+    let (header, _) = ply(&mesh);
+    assert_parts(&header, &["property float r\nproperty float g\nproperty float b\n"]);
+    let expected = [0.25_f32, 0.125, 0.125].map(f32::to_le_bytes).concat();
+    let bytes = fs::read(&mesh).unwrap();
+    assert!(bytes.windows(12).any(|window| window == expected));
+    scene.geometry.colors.iter_mut().for_each(|color| color[3] = 0.5);
+    let export = Export::new(&scene, &path, SETTINGS).unwrap();
+    assert!(matches!(&export.warnings[..], [one] if one.contains("opacity of its vertices")));
 }

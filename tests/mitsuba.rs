@@ -708,7 +708,7 @@ fn exported(environment: &str, clay: &str) -> [Scene; 2] {
     let text = yard([32, 24], environment, clay, BALL).replace("vertical_fov_deg = 45.0", lens);
     let scene = Scene::load(&folder.write("scene.toml", text)).unwrap();
     let path = folder.path().join("out/a.xml");
-    Export::new(&scene, Settings { depth: 3, samples: 4 }).unwrap().write(&path).unwrap();
+    Export::new(&scene, &path, Settings { depth: 3, samples: 4 }).unwrap().write().unwrap();
     [scene, Scene::load(&path).unwrap()]
 }
 

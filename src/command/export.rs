@@ -15,7 +15,7 @@ pub struct Arguments {
     /// Scene file (.toml).
     pub scene: PathBuf,
     /// Folder, in which the scene is called `scene`, or file with the format's extension (.xml).
-    /// Meshes and the environment go into a folder of the same name beside it.
+    /// Meshes, images and the environment go into a folder of the same name beside it.
     pub output: PathBuf,
     /// Renderer to write for.
     #[arg(long, value_enum)]
@@ -46,7 +46,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let Format::Mitsuba = arguments.format;
     let scene = Scene::load(&arguments.scene)?;
     let settings = mitsuba::Settings { depth: arguments.depth, samples: arguments.spp };
-    let export = mitsuba::Export::new(&scene, settings)?;
+    let output = if files::extension(&arguments.output) == "xml" {
+        arguments.output.clone()
+    } else {
+        arguments.output.join("scene.xml")
+    };
+    let export = mitsuba::Export::new(&scene, &output, settings)?;
     if arguments.strict
         && let Some(difference) = export.warnings.first()
     {
@@ -55,11 +60,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     for warning in scene.warnings.iter().chain(&export.warnings) {
         log::warn!("{warning}");
     }
-    let output = if files::extension(&arguments.output) == "xml" {
-        arguments.output.clone()
-    } else {
-        arguments.output.join("scene.xml")
-    };
-    export.write(&output)?;
+    export.write()?;
     super::print_line(&output.display().to_string())
 }

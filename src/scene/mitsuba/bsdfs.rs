@@ -201,6 +201,7 @@ impl Reader<'_> {
 
     fn normal_map(&mut self, parameters: &Parameters<'_>, depth_left: usize) -> Result<Model> {
         let mut model = self.inner(parameters, depth_left)?;
+        parameters.without_effect(&["flip_invalid_normals", "use_shadowing_function"]);
         match self.value(parameters, "normalmap", Role::Index)? {
             Some(Value::Texture(texture)) => model.surface.normal = Some(*texture),
             _ => return Err(parameters.node.error("normalmap: expected the texture `normalmap`")),
