@@ -8,8 +8,8 @@ The second form lets both programs render one Mitsuba file, and compares means a
 
 Needs a built `fenestra` and `pip install mitsuba`; prints SKIPPED and exits with 77 where Mitsuba is
 missing. Exits with 1 if in a scene where the models agree means differ by more than 0.5% and four
-standard errors, or more than one block in fifty does by 2%, and with `--file` if means differ by more than `--tolerance` and four standard errors or
-if more than one block in fifty does. `--variant llvm_ad_rgb` is several times faster than the default and needs LLVM
+standard errors, or more than one block in fifty does by 2%; with `--file`, if either differs by more
+than `--tolerance`. `--variant llvm_ad_rgb` is several times faster than the default and needs LLVM
 (DRJIT_LIBLLVM_PATH names the library).
 """
 
