@@ -687,8 +687,8 @@ fn scenes_of_other_programs_are_included_with_their_lamps() {
     );
     folder.write(
         "quad.xml",
-        "<scene version=\"3.0.0\"><sensor type=\"perspective\"/><shape type=\"rectangle\"><bsdf type=\"diffuse\" id=\"wall\"/>\
-         </shape></scene>",
+        "<scene version=\"3.0.0\"><sensor type=\"perspective\"/><shape type=\"rectangle\">\
+         <bsdf type=\"diffuse\" id=\"wall\"/></shape></scene>",
     );
     let text = format!(
         "{HEAD}[[include]]\nfile = \"lamp.pbrt\"\ntranslate = [0, 5, 0]\n\
