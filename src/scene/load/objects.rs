@@ -46,6 +46,12 @@ impl Loader<'_> {
         let lacks_material = |object: &&ObjectEntry| object.material.is_none();
         let own_materials: HashSet<PathBuf> =
             objects.iter().filter(lacks_material).map(|object| self.mesh_key(object)).collect();
+        // Shapes without textures need no texture coordinates, and their scenes keep their hashes.
+        let textured: HashSet<PathBuf> = objects
+            .iter()
+            .filter(|object| is_textured(object, materials))
+            .map(|object| self.mesh_key(object))
+            .collect();
         // Read all meshes before placing any, so that the arrays are allocated once.
         let mut meshes = HashMap::new();
         let (mut vertices, mut triangles, mut shape_triangles) = (0, 0, 0);
@@ -61,9 +67,15 @@ impl Loader<'_> {
                         warnings.extend(ignored.warnings(&key));
                         mesh
                     }
-                    ObjectSource::Shape { shape, .. } => shape.mesh().map_err(|message| {
-                        self.error(format!("{}: {message}", object_label(index, object)))
-                    })?,
+                    ObjectSource::Shape { shape, .. } => {
+                        let mut mesh = shape.mesh().map_err(|message| {
+                            self.error(format!("{}: {message}", object_label(index, object)))
+                        })?;
+                        if !textured.contains(&key) {
+                            mesh.uvs = Default::default();
+                        }
+                        mesh
+                    }
                 };
                 meshes.insert(key.clone(), mesh);
             }
@@ -253,6 +265,15 @@ fn ignored_in_object(mesh: &Mesh, own_materials: bool) -> Ignored {
         ignored.merge(&mesh.ignored_in_materials());
     }
     ignored
+}
+
+/// Tests whether an object names a material with textures.
+fn is_textured(object: &ObjectEntry, materials: &[Material]) -> bool {
+    let named = |material: &&Material| Some(&material.name) == object.material.as_ref();
+    materials
+        .iter()
+        .find(named)
+        .is_some_and(|material| material.surface.textures().next().is_some())
 }
 
 /// Label of an object in messages: name or number, source and line.

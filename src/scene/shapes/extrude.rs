@@ -6,8 +6,8 @@ use glam::{DVec2, DVec3, DVec4};
 use serde::Deserialize;
 
 use super::{
-    Builder, MAX_POINTS, Mesh, Shape, count, curve, default_count, default_crease_deg, finite,
-    from_zero_to, positive,
+    Builder, MAX_POINTS, Mesh, Shape, Vertex, count, curve, default_count, default_crease_deg,
+    finite, from_zero_to, positive,
 };
 use crate::scene::triangulate::{is_simple, signed_area, triangulate};
 
@@ -76,21 +76,33 @@ impl Shape for Extrude {
             rings.push((outline, -depth, -angle));
         }
         let mut builder = Builder::default();
+        let side = |index: usize| outline[index].distance(outline[(index + 1) % outline.len()]);
+        let mut along = 0.0;
         for chain in curve::chains(&outline, true, crease_deg, [None, None]) {
+            let mut lengths = vec![along];
+            for &(index, _) in &chain[..chain.len() - 1] {
+                along += side(index);
+                lengths.push(along);
+            }
             // Outline counter-clockwise, rings toward +z: columns × rows points outward.
             builder.patch(rings.len(), chain.len(), |row, column| {
                 let (ring, depth, angle) = &rings[row];
                 let (index, normal) = chain[column];
-                let position = ring[index].extend(*depth);
-                (position, (angle.cos() * normal).extend(angle.sin()))
+                Vertex {
+                    position: ring[index].extend(*depth),
+                    normal: (angle.cos() * normal).extend(angle.sin()),
+                    uv: DVec2::new(lengths[column], half_depth + depth),
+                }
             });
         }
         let triangles = triangulate(&rim);
-        let cap =
-            |depth: f64| -> Vec<DVec3> { rim.iter().map(|point| point.extend(depth)).collect() };
-        builder.face(&cap(half_depth), DVec3::Z, &triangles);
+        let cap = |side: f64| -> Vec<(DVec3, DVec2)> {
+            let mirror = DVec2::new(side, 1.0);
+            rim.iter().map(|point| (point.extend(side * half_depth), mirror * point)).collect()
+        };
+        builder.face(&cap(1.0), DVec3::Z, &triangles);
         let reversed: Vec<_> = triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
-        builder.face(&cap(-half_depth), DVec3::NEG_Z, &reversed);
+        builder.face(&cap(-1.0), DVec3::NEG_Z, &reversed);
         builder.finish()
     }
 }

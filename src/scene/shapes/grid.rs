@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use serde::Deserialize;
 
-use super::{Builder, Mesh, Shape, count, finite, positive};
+use super::{Builder, Mesh, Shape, Vertex, count, finite, positive};
 
 /// `grid`: centred on the origin in x and z.
 #[derive(Clone, Debug, Deserialize)]
@@ -83,13 +83,16 @@ impl Shape for Grid {
             ) / (2.0 * step * size);
             let flat = (at - 0.5) * size;
             let normal = DVec3::new(-slope.x, 1.0, -slope.y).normalize();
-            (DVec3::new(flat.x, height(at.x, at.y), flat.y), normal)
+            let position = DVec3::new(flat.x, height(at.x, at.y), flat.y);
+            Vertex { position, normal, uv: DVec2::new(at.x, 1.0 - at.y) * size }
         };
         let sheet: Vec<_> =
             (0..rows * columns).map(|index| place(index / columns, index % columns)).collect();
         let side = |row: usize, column: usize, side: f64| {
-            let (position, normal) = sheet[row * columns + column];
-            (position + side * half_thickness * normal, side * normal)
+            let Vertex { position, normal, uv } = sheet[row * columns + column];
+            let uv = if side < 0.0 { DVec2::new(size.x - uv.x, uv.y) } else { uv };
+            let position = position + side * half_thickness * normal;
+            Vertex { position, normal: side * normal, uv }
         };
         let mut builder = Builder::default();
         // Run rows from +z to −z, so that x × rows points up.
@@ -98,7 +101,8 @@ impl Shape for Grid {
         // Close the rim from bottom to top, walked so that columns × rows points outward.
         let sign = |row: usize| 2.0 * row as f64 - 1.0;
         let rim = |row: usize, column: usize, level: usize, normal: DVec3| {
-            (side(row, column, sign(level)).0, normal)
+            let uv = sheet[row * columns + column].uv;
+            Vertex { position: side(row, column, sign(level)).position, normal, uv }
         };
         builder.patch(2, columns, |level, step| rim(rows - 1, step, level, DVec3::Z));
         builder.patch(2, columns, |level, step| rim(0, columns - 1 - step, level, DVec3::NEG_Z));

@@ -11,6 +11,20 @@
 //! | `tube`, `blobs` | placed by their points |
 //! | `grid` | centred on the origin in x and z, heights along +Y |
 //!
+//! All but `blobs` have texture coordinates, with u to the right and v up as seen from outside:
+//!
+//! | shape | u | v |
+//! |---|---|---|
+//! | `box` | metres from the left edge of each face | metres from its lower edge |
+//! | `sphere`, `cylinder`, `cone`, `torus`, `lathe` | turns about the axis | metres along the profile |
+//! | `extrude`, sides | metres along the outline | metres from the back |
+//! | `extrude`, front and back | x, −x | y |
+//! | `tube` | turns about the centre line | metres along it |
+//! | `tube`, flat ends | metres from the centre | likewise |
+//! | `grid`, above and below | metres from the −x and +x edges | metres from the +z edge |
+//!
+//! The faces ±X and ±Z of a box have +Y up, the face +Y has −Z up and the face −Y has +Z up.
+//!
 //! Counts and list lengths are bounded, so that no scene text asks for more memory than a machine has.
 
 mod blobs;
@@ -27,7 +41,7 @@ use std::{fmt::Debug, ops::RangeInclusive};
 
 pub use blobs::{Blob, Blobs};
 pub use extrude::Extrude;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 pub use grid::{Grid, Wave};
 pub use revolve::{Cone, Cylinder, Lathe, Sphere, Torus};
 pub use rounded_box::RoundedBox;
@@ -99,6 +113,15 @@ fn count(key: &str, count: usize, range: RangeInclusive<usize>) -> Result<usize,
     }
 }
 
+/// Vertex of a patch.
+#[derive(Clone, Copy, Debug)]
+struct Vertex {
+    position: DVec3,
+    /// Outward, of any length.
+    normal: DVec3,
+    uv: DVec2,
+}
+
 /// Assembles a surface from patches.
 #[derive(Debug, Default)]
 struct Builder {
@@ -108,10 +131,16 @@ struct Builder {
 }
 
 impl Builder {
+    /// Adds a vertex without texture coordinates; a shape has them at all of its vertices or none.
     fn vertex(&mut self, position: DVec3, normal: DVec3) -> u32 {
         self.mesh.positions.push(position.as_vec3().to_array());
         self.mesh.normals.push(normal.normalize_or_zero().as_vec3().to_array());
         (self.mesh.positions.len() - 1) as u32
+    }
+
+    fn mapped_vertex(&mut self, Vertex { position, normal, uv }: Vertex) {
+        self.vertex(position, normal);
+        self.mesh.uvs[0].push(uv.as_vec2().to_array());
     }
 
     /// Adds a triangle, unless two of its corners coincide, as at a pole.
@@ -123,12 +152,7 @@ impl Builder {
     }
 
     /// Adds a patch of `rows` × `columns` vertices; columns × rows (cross product) points outward.
-    fn patch(
-        &mut self,
-        rows: usize,
-        columns: usize,
-        position_and_normal: impl Fn(usize, usize) -> (DVec3, DVec3),
-    ) {
+    fn patch(&mut self, rows: usize, columns: usize, vertex: impl Fn(usize, usize) -> Vertex) {
         self.asked_triangles += 2 * rows.saturating_sub(1) * columns.saturating_sub(1);
         if self.asked_triangles > MAX_TRIANGLES {
             return;
@@ -136,8 +160,7 @@ impl Builder {
         let first = self.mesh.positions.len() as u32;
         for row in 0..rows {
             for column in 0..columns {
-                let (position, normal) = position_and_normal(row, column);
-                self.vertex(position, normal);
+                self.mapped_vertex(vertex(row, column));
             }
         }
         let at = |row: usize, column: usize| first + (row * columns + column) as u32;
@@ -151,11 +174,12 @@ impl Builder {
         }
     }
 
-    /// Adds a flat face with its triangles, given as indices into `positions`.
-    fn face(&mut self, positions: &[DVec3], normal: DVec3, triangles: &[[usize; 3]]) {
+    /// Adds a flat face of positions and texture coordinates, with its triangles, given as indices
+    /// of these.
+    fn face(&mut self, corners: &[(DVec3, DVec2)], normal: DVec3, triangles: &[[usize; 3]]) {
         let first = self.mesh.positions.len() as u32;
-        for &position in positions {
-            self.vertex(position, normal);
+        for &(position, uv) in corners {
+            self.mapped_vertex(Vertex { position, normal, uv });
         }
         for triangle in triangles {
             self.triangle(triangle.map(|index| first + index as u32));
@@ -172,6 +196,8 @@ impl Builder {
         if volume(&mesh) < 0.0 {
             mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
             mesh.normals.iter_mut().flatten().for_each(|component| *component = -*component);
+            // Images were mirrored seen from the new outside; now v grows against the profile.
+            mesh.uvs[0].iter_mut().for_each(|uv| uv[1] = -uv[1]);
         }
         Ok(mesh)
     }

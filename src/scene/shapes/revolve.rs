@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3, DVec4};
 use serde::Deserialize;
 
 use super::{
-    Builder, DEFAULT_CREASE_DEG, MAX_POINTS, Mesh, SEGMENT_RANGE, Shape, count, curve,
+    Builder, DEFAULT_CREASE_DEG, MAX_POINTS, Mesh, SEGMENT_RANGE, Shape, Vertex, count, curve,
     default_count, default_crease_deg, finite, from_zero_to, positive,
 };
 
@@ -234,11 +234,18 @@ fn revolve(
         })
         .collect();
     let mut builder = Builder::default();
+    let mut along = 0.0;
     for chain in curve::chains(profile, closed, crease_deg, ends) {
+        let mut lengths = vec![along];
+        for pair in chain.windows(2) {
+            along += profile[pair[0].0].distance(profile[pair[1].0]);
+            lengths.push(along);
+        }
         builder.patch(chain.len(), turns.len(), |row, column| {
             let (point, normal) = (profile[chain[row].0], chain[row].1);
             let turn = |vector: DVec2| vector.x * turns[column] + vector.y * DVec3::Y;
-            (turn(point), turn(normal))
+            let uv = DVec2::new(column as f64 / segments as f64, lengths[row]);
+            Vertex { position: turn(point), normal: turn(normal), uv }
         });
     }
     builder.finish()

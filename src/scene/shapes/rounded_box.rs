@@ -2,10 +2,10 @@
 
 use std::f64::consts::FRAC_PI_4;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use serde::Deserialize;
 
-use super::{Builder, Mesh, Shape, count, default_count, from_zero_to, positive};
+use super::{Builder, Mesh, Shape, Vertex, count, default_count, from_zero_to, positive};
 
 /// `box`: centre at the origin, 12 triangles without a bevel.
 #[derive(Clone, Debug, Deserialize)]
@@ -47,16 +47,29 @@ impl Shape for RoundedBox {
                 if sign < 0.0 {
                     std::mem::swap(&mut column_axis, &mut row_axis);
                 }
+                let [right, up] = face_axes(axis, sign);
                 builder.patch(lines.len(), lines.len(), |row, column| {
                     let (mut corner, mut offset) = (DVec3::ZERO, DVec3::ZERO);
                     (corner[axis], offset[axis]) = (sign, sign);
                     (corner[column_axis], offset[column_axis]) = lines[column];
                     (corner[row_axis], offset[row_axis]) = lines[row];
                     let normal = offset.normalize();
-                    (corner * inner + bevel * normal, normal)
+                    let position = corner * inner + bevel * normal;
+                    let from_edges = position + half * (right + up);
+                    let uv = DVec2::new(from_edges.dot(right), from_edges.dot(up));
+                    Vertex { position, normal, uv }
                 });
             }
         }
         builder.finish()
+    }
+}
+
+/// Directions to the right and up on a face, as seen from outside.
+fn face_axes(axis: usize, sign: f64) -> [DVec3; 2] {
+    match axis {
+        0 => [DVec3::NEG_Z * sign, DVec3::Y],
+        1 => [DVec3::X, DVec3::NEG_Z * sign],
+        _ => [DVec3::X * sign, DVec3::Y],
     }
 }

@@ -280,3 +280,66 @@ fn impossible_parameters_name_the_key_and_the_value() {
     let ragged = shape::<Grid>("size = [1, 1]\nheights = [[0, 0], [0]]").mesh();
     assert!(message(ragged).contains("expected rows of 2 numbers, found 1"));
 }
+
+/// Asserts that no triangle shows images mirrored, and returns the most and the least stretch: the
+/// ratio of an area in texture coordinates to that in metres, both of triangles facing `toward`.
+fn check_uvs(mesh: &Mesh, toward: Vec3) -> [f32; 2] {
+    assert_eq!(mesh.uvs[0].len(), mesh.positions.len());
+    let mut stretch = [f32::INFINITY, 0.0_f32];
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|index| Vec3::from_array(mesh.positions[index as usize]));
+        let [p, q, r] = triangle.map(|index| glam::Vec2::from_array(mesh.uvs[0][index as usize]));
+        let face = (b - a).cross(c - a);
+        let image = (q - p).perp_dot(r - p);
+        assert!(image > -1e-6, "mirrored by {image}");
+        if face.normalize().dot(toward) > 0.999 {
+            stretch =
+                [stretch[0].min(image / face.length()), stretch[1].max(image / face.length())];
+        }
+    }
+    stretch
+}
+
+#[test]
+fn texture_coordinates_are_metres_and_not_mirrored() {
+    let close = |[low, high]: [f32; 2]| assert!(low > 0.99 && high < 1.01, "{low} to {high}");
+    let cuboid = shape::<RoundedBox>("size = [2.0, 3.0, 0.5]").mesh().unwrap();
+    for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+        close(check_uvs(&cuboid, axis));
+        close(check_uvs(&cuboid, -axis));
+    }
+    // The face +Z has (0, 0) at its lower left corner and (2, 3) at its upper right one.
+    for (position, uv) in [([-1.0, -1.5, 0.25], [0.0, 0.0]), ([1.0, 1.5, 0.25], [2.0, 3.0])] {
+        let is_there = |index: &usize| mesh_at(&cuboid, *index) == (position, [0.0, 0.0, 1.0]);
+        let index = (0..cuboid.positions.len()).find(is_there).unwrap();
+        assert_eq!(cuboid.uvs[0][index], uv);
+    }
+    let sheet = shape::<Grid>("size = [2.0, 3.0]\ncells = [4, 4]").mesh().unwrap();
+    close(check_uvs(&sheet, Vec3::Y));
+    close(check_uvs(&sheet, Vec3::NEG_Y));
+    let prism = shape::<Extrude>("outline = [[0, 0], [2, 0], [2, 1], [0, 1]]\ndepth = 0.5");
+    let prism = prism.mesh().unwrap();
+    for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+        close(check_uvs(&prism, axis));
+        close(check_uvs(&prism, -axis));
+    }
+    // u runs once around a lathe, either way its profile runs, and v along the profile.
+    for profile in ["[[0, 0], [1, 0], [1, 2], [0, 2]]", "[[0, 2], [1, 2], [1, 0], [0, 0]]"] {
+        let lathe = shape::<Lathe>(&format!("profile = {profile}\nsegments = 256")).mesh().unwrap();
+        check_uvs(&lathe, Vec3::X);
+        let range = |axis: usize| {
+            let values = || lathe.uvs[0].iter().map(|uv| uv[axis]);
+            values().fold(f32::MIN, f32::max) - values().fold(f32::MAX, f32::min)
+        };
+        assert_eq!([range(0), range(1)], [1.0, 4.0]);
+    }
+    let tube = shape::<Tube>("path = [[0, 0, 0], [0, 2, 0]]\nradius = 0.1").mesh().unwrap();
+    check_uvs(&tube, Vec3::X);
+    assert!(tube.uvs[0].contains(&[1.0, 2.0]));
+    let blobs = shape::<Blobs>("balls = [{ at = [0, 0, 0], radius = 1.0 }]\ncells = 8");
+    assert!(blobs.mesh().unwrap().uvs[0].is_empty());
+}
+
+fn mesh_at(mesh: &Mesh, index: usize) -> ([f32; 3], [f32; 3]) {
+    (mesh.positions[index], mesh.normals[index])
+}

@@ -2,11 +2,12 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use glam::{DVec3, DVec4};
+use glam::{DVec2, DVec3, DVec4};
 use serde::Deserialize;
 
 use super::{
-    Builder, MAX_POINTS, Mesh, SEGMENT_RANGE, Shape, count, curve, default_count, finite, positive,
+    Builder, MAX_POINTS, Mesh, SEGMENT_RANGE, Shape, Vertex, count, curve, default_count, finite,
+    positive,
 };
 
 /// `tube`: placed by its path.
@@ -175,25 +176,34 @@ fn sweep(rings: &[Ring], closed: bool, round: bool, segments: usize) -> Result<M
         let angle = TAU * (segment % segments) as f64 / segments as f64;
         angle.cos() * ring.start + angle.sin() * ring.tangent.cross(ring.start)
     };
+    let mut lengths = vec![0.0];
+    for pair in rows.windows(2) {
+        lengths.push(lengths[lengths.len() - 1] + pair[0].center.distance(pair[1].center));
+    }
     let mut builder = Builder::default();
     builder.patch(rows.len(), segments + 1, |row, column| {
         let ring = &rows[row];
         let spoke = spoke(ring, column);
         let normal = ring.tilt.cos() * spoke + ring.tilt.sin() * ring.tangent;
-        (ring.center + ring.radius * spoke, normal)
+        let uv = DVec2::new(column as f64 / segments as f64, lengths[row]);
+        Vertex { position: ring.center + ring.radius * spoke, normal, uv }
     });
     if !round && !closed {
         for (ring, side) in [(first, -1.0), (last, 1.0)] {
-            let mut positions: Vec<_> =
-                (0..segments).map(|s| ring.center + ring.radius * spoke(&ring, s)).collect();
-            positions.push(ring.center);
+            let corner = |segment: usize| {
+                let flat = DVec2::from_angle(TAU * segment as f64 / segments as f64);
+                let position = ring.center + ring.radius * spoke(&ring, segment);
+                (position, ring.radius * DVec2::new(side, 1.0) * flat)
+            };
+            let mut corners: Vec<_> = (0..segments).map(corner).collect();
+            corners.push((ring.center, DVec2::ZERO));
             let triangles: Vec<_> = (0..segments)
                 .map(|segment| {
                     let next = (segment + 1) % segments;
                     if side > 0.0 { [segment, next, segments] } else { [next, segment, segments] }
                 })
                 .collect();
-            builder.face(&positions, side * ring.tangent, &triangles);
+            builder.face(&corners, side * ring.tangent, &triangles);
         }
     }
     builder.finish()
