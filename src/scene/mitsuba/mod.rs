@@ -1,6 +1,6 @@
-//! Mitsuba scene files, XML of versions 0.5 to 3 → parts of a [`Scene`](super::Scene).
+//! Mitsuba scene files, XML of versions 0.5 to 3 → parts of a `Scene`(super::Scene).
 //!
-//! [`document`] makes one tree of all files, [`parameters`] and [`spectra`] read from it, and one module
+//! `document` makes one tree of all files, `parameters` and `spectra` read from it, and one module
 //! each turns shapes, models, textures, lights and sensors into Fenestra's. Conventions are those of
 //! Mitsuba 3.9.1, whose documentation is at <https://mitsuba.readthedocs.io>.
 

@@ -1,6 +1,6 @@
 //! Scene descriptions of pbrt-v4 \[Pharr et al. 2023\].
 //!
-//! bytes → [`tokens`] → [`parameters`] → [`directives`], with the [`state`] in force → shapes,
+//! bytes → `tokens` → `parameters` → `directives`, with the `state` in force → shapes,
 //! materials, textures and lights. The format is that of <https://pbrt.org/fileformat-v4>; details that
 //! it leaves open follow pbrt-v4's source. Paths are relative to the folder of the main file.
 //!
