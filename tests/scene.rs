@@ -1108,7 +1108,15 @@ fn bad_triangles_are_dropped_with_a_warning_that_counts_them() {
 #[test]
 fn the_scenes_of_the_repository_load_without_a_warning() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
-    for name in ["buddha_and_car", "bathroom", "meeting_room", "restroom", "courtyard", "furnace"] {
+    for name in [
+        "buddha_and_car",
+        "bathroom",
+        "meeting_room",
+        "restroom",
+        "courtyard",
+        "furnace",
+        "reading_room",
+    ] {
         let scene = Scene::load(&folder.join(format!("{name}.toml"))).unwrap();
         assert_eq!(scene.name, name);
         assert!(scene.warnings.is_empty(), "{name}: {:?}", scene.warnings);
