@@ -39,6 +39,7 @@ fn mean_and_error(scene: &Scene, settings: &Settings, samples: u32, seeds: u32) 
 
 #[test]
 fn without_shadow_rays_only_the_environment_is_seen() {
+    let _alone = support::alone();
     let scene = scenes::convex_furnace(diffuse(Vec3::splat(0.5)), Vec3::new(1.0, 2.0, 3.0));
     let sums = render(&scene, Settings { shadow_rays: 0, ..Settings::default() }, 1);
     let background = sums.mean(0);
@@ -48,6 +49,7 @@ fn without_shadow_rays_only_the_environment_is_seen() {
 
 #[test]
 fn a_convex_diffuse_body_in_a_furnace_is_its_reflectance() {
+    let _alone = support::alone();
     let reflectance = Vec3::new(0.2, 0.5, 1.0);
     let radiance = Vec3::new(3.0, 2.0, 1.0);
     let scene = scenes::convex_furnace(diffuse(reflectance), radiance);
@@ -70,6 +72,7 @@ fn a_convex_diffuse_body_in_a_furnace_is_its_reflectance() {
 
 #[test]
 fn irradiance_of_a_plane_is_the_integral_of_the_map() {
+    let _alone = support::alone();
     // Integrate the map itself in f64, bilinear as the renderer sees it.
     let reflectance = Vec3::new(0.3, 0.6, 0.9);
     let scene = scenes::plane(reflectance, scenes::sky());
@@ -105,6 +108,7 @@ fn irradiance_of_a_plane_is_the_integral_of_the_map() {
 
 #[test]
 fn a_concave_white_body_vanishes_in_the_furnace() {
+    let _alone = support::alone();
     let scene = scenes::concave_furnace();
     let settings = Settings { depth: 24, roulette_vertex: 64, ..Settings::default() };
     for sampler in [Sampler::Cosine, Sampler::Mis, Sampler::Ris] {
@@ -124,6 +128,7 @@ fn a_concave_white_body_vanishes_in_the_furnace() {
 
 #[test]
 fn roulette_keeps_the_mean() {
+    let _alone = support::alone();
     let scene = scenes::concave_furnace();
     let settings = Settings { depth: 24, roulette_vertex: 2, ..Settings::default() };
     let mut scene = scene;

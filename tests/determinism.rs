@@ -40,6 +40,7 @@ fn render(settings: Settings, passes: &[u32]) -> Sums {
 
 #[test]
 fn one_pass_of_64_equals_64_passes_of_one() {
+    let _alone = support::alone();
     for &sampler in Sampler::ALL {
         let together = render(settings(sampler), &[64]);
         let apart = render(settings(sampler), &[1; 64]);
@@ -51,6 +52,7 @@ fn one_pass_of_64_equals_64_passes_of_one() {
 /// Many places look for cells of their own at once, and the table of missing cells has 64 slots.
 #[test]
 fn a_full_table_of_missing_cells_gives_the_same_bits() {
+    let _alone = support::alone();
     let mut small = settings(Sampler::Guided);
     small.parameters.guided.guide_memory = 256 * 24 * 20;
     let mut scene = scene();
@@ -68,6 +70,7 @@ fn a_full_table_of_missing_cells_gives_the_same_bits() {
 
 #[test]
 fn another_seed_gives_another_picture() {
+    let _alone = support::alone();
     let one = render(settings(Sampler::Mis), &[4]);
     let other = render(Settings { seed: 8, ..settings(Sampler::Mis) }, &[4]);
     assert_ne!(one.sum, other.sum);
@@ -75,6 +78,7 @@ fn another_seed_gives_another_picture() {
 
 #[test]
 fn a_resumed_render_equals_an_uninterrupted_one() {
+    let _alone = support::alone();
     let uninterrupted = render(settings(Sampler::Ris), &[16]);
     let half = render(settings(Sampler::Ris), &[7]);
     let mut renderer = renderer(&scene(), settings(Sampler::Ris));
@@ -85,6 +89,7 @@ fn a_resumed_render_equals_an_uninterrupted_one() {
 
 #[test]
 fn sums_of_another_window_are_refused() {
+    let _alone = support::alone();
     let mut sums = render(settings(Sampler::Mis), &[1]);
     sums.origin = [1, 0];
     let mut renderer = renderer(&scene(), settings(Sampler::Mis));
@@ -94,6 +99,7 @@ fn sums_of_another_window_are_refused() {
 
 #[test]
 fn a_crop_window_shows_the_same_pixels() {
+    let _alone = support::alone();
     let whole = render(settings(Sampler::Mis), &[4]);
     let window = Window { x: 5, y: 3, width: 13, height: 9 };
     let crop = render(Settings { window: Some(window), ..settings(Sampler::Mis) }, &[4]);
@@ -109,6 +115,7 @@ fn a_crop_window_shows_the_same_pixels() {
 
 #[test]
 fn sample_ranges_add_up() {
+    let _alone = support::alone();
     let whole = render(settings(Sampler::Cosine), &[12]);
     let mut first = render(settings(Sampler::Cosine), &[5]);
     let rest = render(Settings { first_sample: 5, ..settings(Sampler::Cosine) }, &[7]);
