@@ -556,10 +556,17 @@ fn what_textures_cannot_do_is_refused_by_name() {
 fn a_texture_without_coordinates_is_a_warning_by_name() {
     let folder = Folder::new();
     folder.write("wood.png", png());
-    let text = with_box("name = \"cube\"").replace("[0.5, 0.5, 0.5]", "{ texture = \"wood.png\" }");
-    let scene = folder.load(&text).unwrap();
+    folder.write("bare.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let textured = HEAD.replace("[0.5, 0.5, 0.5]", "{ texture = \"wood.png\" }");
+    let object = "[[object]]\nname = \"sheet\"\nmesh = \"bare.obj\"\nmaterial = \"grey\"\n";
+    let scene = folder.load(&format!("{textured}{object}")).unwrap();
     let [warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
-    assert!(warning.contains("object `cube` (box, line 14): the material `grey` has textures"));
+    assert!(
+        warning.contains("object `sheet` (bare.obj, line 14): the material `grey` has textures")
+    );
+    // A shape has coordinates of its own.
+    let with_shape = with_box("").replace("[0.5, 0.5, 0.5]", "{ texture = \"wood.png\" }");
+    assert_eq!(folder.load(&with_shape).unwrap().warnings, [""; 0]);
 }
 
 #[test]
