@@ -37,9 +37,7 @@ void main() {
         }
         Frame frame = frame_from_normal(hit.shading_normal);
         Material material = load_surface(path, triangle_materials[hit.triangle]);
-        albedo += is_specular(material.kind)
-            ? material.reflectance
-            : brdf_albedo(material, to_local(frame, -rays[path].direction));
+        albedo += brdf_albedo(material, to_local(frame, -rays[path].direction));
         normal += hit.shading_normal;
         position += hit.position;
     }

@@ -31,8 +31,8 @@
 //! | frames, random numbers, alias tables | [`math`] | `include/frame`, `include/random` |
 //! | constants, structs, buffers of both languages | [`shader`] | `include/layout` |
 //! | Vulkan | [`gpu`] | |
-//! | passes of a wave, in their order | [`pass`] | `camera`, `trace`, `sample`, `shadow`, `gather`, |
-//! | | | `features`, `bounce`, `accumulate` |
+//! | passes of a wave, in their order | [`pass`] | `camera`, `trace`, `texture`, `emit`, `sample`, |
+//! | | | `sample_lamps`, `shadow`, `gather`, `features`, `bounce`, `accumulate` |
 //! | `product` | [`sampler::product`] | `product/`: `multiply_lobes`, `sample_lobes` |
 //! | `visibility`, on top of it | [`sampler::visibility`] | `visibility/`: `record_blocked`, `reweight`, |
 //! | | | `count_entries` |

@@ -97,6 +97,10 @@ fn a_glowing_box_fills_itself_with_light() {
     ] {
         assert_mean(&scene, settings(sampler, depth), 64, expected);
     }
+    // Walls that let half of the light out shine and reflect half as much.
+    scene.materials[0].surface.opacity.factor = 0.5;
+    assert_mean(&scene, settings(Sampler::Mis, 1), 128, 0.5 * (2.0 + 0.5 * 0.5 * 2.0));
+    scene.materials[0].surface.opacity.factor = 1.0;
     // The box emits inward through the back of its triangles.
     scene.materials[0].surface.emission.as_mut().unwrap().two_sided = false;
     let (mean, _) = mean_and_error(&scene, settings(Sampler::Mis, 3), 4);

@@ -20,4 +20,10 @@ vec3 emitted_radiance(uint triangle, vec3 weights, bool is_back) {
     return radiance;
 }
 
+// Probability with which a ray meets a triangle at a point rather than pass through it.
+float meeting_share(uint triangle, vec3 weights) {
+    return surface_opacity(
+        load_material_surface(triangle_materials[triangle]), triangle_attributes(triangle, weights));
+}
+
 #endif

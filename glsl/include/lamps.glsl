@@ -75,6 +75,10 @@ LampSample sample_triangle_lamp(uint triangle, float probability, vec3 position,
         sampled.pdf = lamp_pdf(2.0 * probability / twice_area, distance, abs(cosine));
         sampled.radiance_over_pdf =
             emitted_radiance(triangle, weights, cosine < 0.0) / sampled.pdf;
+        if (HAS_PASSAGES) {
+            // As often as bounce rays meet the lamp here and do not pass through it.
+            sampled.radiance_over_pdf *= meeting_share(triangle, weights);
+        }
     }
     // End the ray before the lamp, which would else block it.
     sampled.to_lamp = point + (cosine < 0.0 ? -ray_offset() : ray_offset()) * (normal / twice_area)

@@ -251,7 +251,7 @@ binding_tables! {
         1 HITS: array Hit;
         /// Shadow rays: direction `k` of path `i` at `k · path_count + i`.
         2 SHADOW_RAYS: array ShadowRay;
-        /// One where a shadow ray reaches the environment, else zero.
+        /// One where a shadow ray reaches the light, else zero.
         3 VISIBILITY: array uint;
         /// State of each path.
         4 PATHS: array PathState;

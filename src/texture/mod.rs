@@ -127,8 +127,8 @@ impl TextureUse {
         }
     }
 
-    /// As [`TextureUse::new`] for coordinates whose (0, 0) is the lower left corner, as in OBJ, pbrt
-    /// and Mitsuba.
+    /// As [`TextureUse::new`] for coordinates whose (0, 0) is the lower left corner, as in OBJ and
+    /// pbrt.
     pub fn from_lower_left(texture: Arc<Texture>) -> Self {
         let image_from_uv = [[1.0, 0.0, 0.0], [0.0, -1.0, 1.0]];
         Self { image_from_uv, ..Self::new(texture) }
