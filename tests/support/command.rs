@@ -17,7 +17,10 @@ use tempfile::TempDir;
 /// Prepares the program to run in `folder`. Its caches lie in the build folder, so that pipelines
 /// are compiled once and the user's own caches stay untouched.
 pub fn program(folder: &Path) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_fenestra"));
+    prepared(Command::new(env!("CARGO_BIN_EXE_fenestra")), folder)
+}
+
+fn prepared(mut command: Command, folder: &Path) -> Command {
     command.current_dir(folder).env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
     command.env_remove("RUST_LOG");
     command
@@ -62,9 +65,12 @@ pub struct Running {
 }
 
 impl Running {
-    /// Starts the program in `folder` and waits for a message with this text.
+    /// Starts the program in `folder` and waits for a message with this text. The program heeds
+    /// signals also where the tests run under `nohup`, whose children ignore hangups.
     pub fn start(folder: &Path, arguments: &[&str], text: &str) -> Self {
-        let mut child = program(folder)
+        let mut heeding = Command::new("env");
+        heeding.args(["--default-signal=HUP,INT,TERM", env!("CARGO_BIN_EXE_fenestra")]);
+        let mut child = prepared(heeding, folder)
             .args(arguments)
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
