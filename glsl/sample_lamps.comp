@@ -1,6 +1,8 @@
 // Chooses one point on the lamps at every hit of the wave and writes a shadow ray to it, with its
 // unoccluded contribution. Draws candidates by the power of the lamps and keeps one in proportion to
-// what it brings: resampled importance sampling [Talbot et al. 2005]. Where a bounce ray may find the
+// what it brings: resampled importance sampling [Talbot et al. 2005]. The candidates of all rays of a
+// hit draw from strata of the lamps; their mean density is that of one free candidate, by which each
+// is divided. Where a bounce ray may find the
 // lamp too, the balance heuristic weighs both by the density of one candidate and of the BRDF.
 #version 460
 
@@ -11,9 +13,11 @@ layout(local_size_x = WORKGROUP_SIZE) in;
 
 layout(constant_id = CONSTANT_LAMP_CANDIDATES) const uint LAMP_CANDIDATES = 4u;
 
-// First dimension of lamps: each vertex has two for each candidate, and one for the choice.
-const uint DIMENSION_LAMP = 0x8000u;
-const uint DIMENSIONS_PER_LAMP_VERTEX = 32u;
+// First dimension of lamps: each ray has two for each candidate, and one for the choice; at most 2048
+// rays a vertex.
+const uint DIMENSION_LAMP = 0x4000000u;
+const uint DIMENSIONS_PER_LAMP_RAY = 2u * LAMP_CANDIDATES + 1u;
+const uint DIMENSIONS_PER_LAMP_VERTEX = 2048u * DIMENSIONS_PER_LAMP_RAY;
 
 void main() {
     uint path = gl_GlobalInvocationID.x;
@@ -25,7 +29,9 @@ void main() {
         return;
     }
     Vertex vertex = load_vertex(path, hit);
-    uint dimension = DIMENSION_LAMP + wave.vertex * DIMENSIONS_PER_LAMP_VERTEX;
+    uint dimension = DIMENSION_LAMP + wave.vertex * DIMENSIONS_PER_LAMP_VERTEX
+        + wave.first_shadow_ray * DIMENSIONS_PER_LAMP_RAY;
+    uint strata = LAMP_CANDIDATES * wave.total_shadow_rays;
     uint number = vertex.index.sample_index;
     float u_choice = random_1d(vertex.index.pixel, number, dimension, wave.seed);
     vec3 chosen_to_lamp = vec3(0.0);
@@ -34,9 +40,10 @@ void main() {
     float sum = 0.0;
     for (uint c = 0u; c < LAMP_CANDIDATES; ++c) {
         uint own = dimension + 1u + 2u * c;
+        uvec2 bits = random_bits_2d(vertex.index.pixel, number, own, wave.seed);
+        bits.x = stratified(bits.x, c * wave.total_shadow_rays + wave.first_shadow_ray, strata);
         LampSample lamp = sample_lamp(
-            hit.position, random_bits_2d(vertex.index.pixel, number, own, wave.seed),
-            random_2d(vertex.index.pixel, number, own + 1u, wave.seed));
+            hit.position, bits, random_2d(vertex.index.pixel, number, own + 1u, wave.seed));
         vec3 incident_local = to_local(vertex.frame, lamp.direction);
         vec3 value;
         float brdf_pdf;

@@ -58,6 +58,14 @@ uint scaled(uint bits, uint count) {
     return high;
 }
 
+// Moves uniform bits into one of `strata` equal parts of their range: floor(2^32 (stratum + u) / strata)
+// for u = bits / 2^32, to one unit. `strata` is at most 2^16.
+uint stratified(uint bits, uint stratum, uint strata) {
+    uint width = 0xffffffffu / strata;
+    uint rest = 0xffffffffu % strata + 1u;
+    return stratum * width + stratum * rest / strata + bits / strata;
+}
+
 const uint RANDOM_KEY_TAG = 0x9e3779b9u;
 
 // Keys of a pixel and dimension: of the shuffled index and of the two coordinates.

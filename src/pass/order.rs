@@ -65,16 +65,19 @@ pub fn wave_order(
                 add(Kernel::new("emit", Domain::Paths, &constants), &wave);
             }
             if surfaces.lamp_count > 0 {
-                let to_lamps = Wave {
-                    shadow_ray_count: 1,
-                    first_shadow_ray: 0,
-                    total_shadow_rays: 1,
-                    to_lamps: 1,
-                    ..wave
-                };
-                add(Kernel::new("sample_lamps", Domain::Paths, &constants), &to_lamps);
-                add(traversal.shadow(incoherent, surfaces), &to_lamps);
-                add(Kernel::new("gather", Domain::Paths, &[]), &to_lamps);
+                let rays = rays_to_lamps(wave.total_shadow_rays);
+                for ray in 0..rays {
+                    let to_lamps = Wave {
+                        shadow_ray_count: 1,
+                        first_shadow_ray: ray,
+                        total_shadow_rays: rays,
+                        to_lamps: 1,
+                        ..wave
+                    };
+                    add(Kernel::new("sample_lamps", Domain::Paths, &constants), &to_lamps);
+                    add(traversal.shadow(incoherent, surfaces), &to_lamps);
+                    add(Kernel::new("gather", Domain::Paths, &[]), &to_lamps);
+                }
             }
         }
 
@@ -126,6 +129,12 @@ pub fn wave_order(
     }
     add(Kernel::new("accumulate", Domain::Pixels, &[]), &wave);
     order
+}
+
+/// Number of rays to lamps at a vertex with `shadow_rays` rays to the environment: half as many, at
+/// least one (docs/experiments/rays_to_lamps.md).
+fn rays_to_lamps(shadow_rays: u32) -> u32 {
+    shadow_rays.div_ceil(2).max(1)
 }
 
 /// The pass that continues paths by the BRDF's own sampling; `only_specular` ends all others.
