@@ -2,6 +2,7 @@
 // ray's origin, else the share of the BRDF's sampling in the balance heuristic with sample_lamps.comp.
 #version 460
 
+#include "hit_instance.glsl"
 #include "lamps.glsl"
 #include "load.glsl"
 #include "wave.glsl"
@@ -19,14 +20,16 @@ void main() {
     if (hit.triangle == NO_TRIANGLE) {
         return;
     }
-    MaterialSurface surface = load_material_surface(triangle_materials[hit.triangle]);
+    uint instance = load_hit_instance(path);
+    MaterialSurface surface =
+        load_material_surface(triangle_material(hit.triangle, instance));
     if (surface.emission_radiance == vec3(0.0)) {
         return;
     }
     Ray ray = load_ray(path);
-    bool is_behind = is_back(hit.triangle, ray.direction);
+    bool is_behind = is_back(hit.triangle, instance, ray.direction);
     vec3 radiance = emitted_radiance(
-        hit.triangle, barycentric(hit.triangle, ray.origin, ray.direction), is_behind);
+        hit.triangle, barycentric(hit.triangle, instance, ray.origin, ray.direction), is_behind);
     float weight = 1.0;
     if (ray.brdf_pdf > 0.0) {
         float cosine = abs(dot(ray.direction, hit.geometric_normal));

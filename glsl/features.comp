@@ -3,13 +3,13 @@
 
 #include "brdf.glsl"
 #include "frame.glsl"
+#include "hit_instance.glsl"
 #include "hit_surface.glsl"
 #include "load.glsl"
 #include "wave.glsl"
 
 READS(rays)
 READS(hits)
-READS(triangle_materials)
 UPDATES(film_albedo)
 UPDATES(film_normal)
 UPDATES(film_position)
@@ -36,7 +36,8 @@ void main() {
             continue;
         }
         Frame frame = frame_from_normal(hit.shading_normal);
-        Material material = load_surface(path, triangle_materials[hit.triangle]);
+        Material material =
+            load_surface(path, triangle_material(hit.triangle, load_hit_instance(path)));
         albedo += brdf_albedo(material, to_local(frame, -rays[path].direction));
         normal += hit.shading_normal;
         position += hit.position;

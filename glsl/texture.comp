@@ -2,6 +2,7 @@
 // normal maps. Later passes evaluate the BRDF with these values.
 #version 460
 
+#include "hit_instance.glsl"
 #include "load.glsl"
 #include "texture.glsl"
 #include "wave.glsl"
@@ -23,12 +24,13 @@ void main() {
     if (hit.triangle == NO_TRIANGLE) {
         return;
     }
-    uint index = triangle_materials[hit.triangle];
+    uint instance = load_hit_instance(path);
+    uint index = triangle_material(hit.triangle, instance);
     Material material = load_material(index);
     MaterialSurface surface = load_material_surface(index);
     Ray ray = load_ray(path);
     Attributes attributes = triangle_attributes(
-        hit.triangle, barycentric(hit.triangle, ray.origin, ray.direction));
+        hit.triangle, barycentric(hit.triangle, instance, ray.origin, ray.direction));
 
     vec3 color = texture_value(surface.color, attributes.uv0, attributes.uv1).rgb;
     if ((surface.flags & SURFACE_VERTEX_COLOR) != 0u) {
@@ -42,9 +44,10 @@ void main() {
         clamp(material.ior * metallic, 0.0, 1.0));
 
     if (surface.normal != NO_TEXTURE) {
-        float side = is_back(hit.triangle, ray.direction) ? -1.0 : 1.0;
+        float side = is_back(hit.triangle, instance, ray.direction) ? -1.0 : 1.0;
         vec3 mapped = mapped_normal(
-            surface.normal, surface.normal_scale, hit.triangle, attributes, hit.shading_normal, side);
+            surface.normal, surface.normal_scale, hit.triangle, instance, attributes,
+            hit.shading_normal, side);
         hits[path].shading_normal =
             visible_normal(mapped, hit.geometric_normal, ray.direction);
     }

@@ -11,6 +11,7 @@
 #include "wave.glsl"
 
 WRITES(hits)
+WRITES(hit_instances)
 UPDATES(paths)
 UPDATES(counters)
 
@@ -21,23 +22,22 @@ layout(constant_id = CONSTANT_REFILL_LANES) const uint REFILL_LANES = 0xffffffff
 
 // Tests whether light is sampled at a surface: not at a specular one, nor at the black back of a
 // one-sided one.
-bool samples_light(uint material, uint triangle, vec3 direction) {
+bool samples_light(uint material, uint triangle, uint instance, vec3 direction) {
     if (HAS_SPECULAR && is_specular(load_material(material).kind)) {
         return false;
     }
     return !HAS_BACKS || (load_material_surface(material).flags & SURFACE_TWO_SIDED) != 0u
-        || !is_back(triangle, direction);
+        || !is_back(triangle, instance, direction);
 }
 
 // Decides by chance whether the ray of a path goes through the surface that it has met, and weighs the
 // path by the share of light over the probability. Sends the ray on beyond the surface if it does.
 bool goes_through(uint path) {
     uint triangle = bvh_triangle;
-    vec3 weights = barycentric(triangle, bvh_origin, bvh_direction);
-    vec3 a = uintBitsToFloat(triangle_texel(triangle, 0u).xyz);
-    vec3 b = uintBitsToFloat(triangle_texel(triangle, 1u).xyz);
-    vec3 c = uintBitsToFloat(triangle_texel(triangle, 2u).xyz);
-    Passing shares = passing(triangle, weights, to_local(bvh_frame, cross(b - a, c - a)));
+    uint instance = bvh_hit_instance;
+    vec3 weights = barycentric(triangle, instance, bvh_origin, bvh_direction);
+    vec3 normal = front_normal(triangle, instance);
+    Passing shares = passing(triangle, instance, weights, to_local(bvh_frame, normal));
     float passed = dot(shares.passed, LUMINANCE_WEIGHTS);
     float stopped = dot(shares.stopped, LUMINANCE_WEIGHTS);
     if (passed <= 0.0) {
@@ -46,14 +46,14 @@ bool goes_through(uint path) {
     PathIndex index = wave_path(path);
     uint bits = hash_4d(uvec4(
         index.pixel, index.sample_index, vertex_dimension() + DIMENSION_PASSAGE,
-        wave.seed ^ hash_4d(uvec4(triangle, 0u, 0u, 0u)).x)).x;
+        wave.seed ^ hash_4d(uvec4(triangle, HAS_INSTANCES ? instance : 0u, 0u, 0u)).x)).x;
     float probability = passed / (passed + stopped);
     bool goes_on = unit_float(bits) < probability;
     vec3 weight = goes_on ? shares.passed / probability : shares.stopped / (1.0 - probability);
     paths[path].throughput *= weight;
     if (goes_on) {
         bvh_passed_distance = bvh_distance;
-        bvh_restart(FAR_AWAY);
+        bvh_restart(FAR_AWAY, false);
     }
     return goes_on;
 }
@@ -62,6 +62,7 @@ void main() {
     uint ray_count = wave.pixel_count * wave.sample_count;
     uint first = gl_WorkGroupID.x * WORKGROUP_SIZE * RAYS_PER_INVOCATION + gl_LocalInvocationID.x;
     uint found[RAYS_PER_INVOCATION];
+    uint found_instances[RAYS_PER_INVOCATION];
 
     uint turn = 0u;
     uint steps = 0u;
@@ -91,6 +92,9 @@ void main() {
                 continue;
             }
             found[turn] = bvh_triangle;
+            if (HAS_INSTANCES) {
+                found_instances[turn] = bvh_hit_instance;
+            }
             turn++;
             has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
             if (has_ray) {
@@ -106,14 +110,18 @@ void main() {
         if (index < ray_count) {
             Ray ray = load_ray(index);
             uint triangle = found[turn];
+            uint instance = HAS_INSTANCES ? found_instances[turn] : NO_INSTANCE;
             if (triangle == NO_TRIANGLE) {
                 hits[index] = no_surface();
             } else {
-                Hit hit = surface_at(triangle, ray.origin, ray.direction);
-                hit.material = samples_light(hit.material, triangle, ray.direction)
+                Hit hit = surface_at(triangle, instance, ray.origin, ray.direction);
+                hit.material = samples_light(hit.material, triangle, instance, ray.direction)
                     ? hit.material
                     : NO_MATERIAL;
                 hits[index] = hit;
+                if (HAS_INSTANCES) {
+                    hit_instances[index] = instance;
+                }
             }
         }
     }

@@ -3,7 +3,8 @@
 //!
 //! One wave over the whole film goes through `camera`, `trace`, `sample`, `shadow`, `bounce` and
 //! `trace`. The rays are read back and given to obvhs on every core. Device and CPU take turns, so
-//! that both see the same state of the machine.
+//! that both see the same state of the machine. A tree of two levels, which obvhs does not know, goes
+//! through the Rust twin of the shader's traversal instead.
 
 use std::{
     sync::{
@@ -95,17 +96,23 @@ pub struct RayRate {
 /// A ray of the CPU traversal.
 type CpuRay = obvhs::ray::Ray;
 
-/// obvhs's own traversal of the arrays of an [`Accel`].
-struct Yardstick {
+/// obvhs's own traversal of the arrays of an [`Accel`], or the twin's of a tree of two levels.
+struct Yardstick<'a> {
+    two_levels: Option<&'a Accel>,
     bvh: CwBvh,
     triangles: Vec<RtTriangle>,
     threads: usize,
 }
 
-impl Yardstick {
-    fn new(accel: &Accel, threads: usize) -> Self {
+impl<'a> Yardstick<'a> {
+    fn new(accel: &'a Accel, threads: usize) -> Self {
+        if accel.is_instanced() {
+            let (bvh, triangles) = (CwBvh::default(), Vec::new());
+            return Self { two_levels: Some(accel), bvh, triangles, threads };
+        }
         let count = accel.triangle_count() as u32;
         Self {
+            two_levels: None,
             bvh: CwBvh {
                 nodes: bytemuck::cast_slice::<_, CwBvhNode>(&accel.nodes).to_vec(),
                 ..CwBvh::default()
@@ -121,6 +128,14 @@ impl Yardstick {
     }
 
     fn meets(&self, ray: &CpuRay, any_hit: bool) -> bool {
+        if let Some(accel) = self.two_levels {
+            let (origin, direction) = (ray.origin.into(), ray.direction.into());
+            return if any_hit {
+                accel.is_occluded(origin, direction)
+            } else {
+                accel.closest(origin, direction).is_some()
+            };
+        }
         let test = |ray: &CpuRay, triangle: usize| self.triangles[triangle].intersect(ray);
         if any_hit {
             !self.bvh.ray_traverse_miss(*ray, test)
@@ -170,6 +185,7 @@ struct Bench<'a> {
     visibility: Buffer,
     // Kept alive for the sets.
     _paths: Buffer,
+    _instances: Buffer,
     _counters: Buffer,
     wave: Wave,
 }
@@ -184,6 +200,7 @@ impl<'a> Bench<'a> {
         let shadow_rays = make("shadow rays", shadow_ray_count, size_of::<ShadowRay>())?;
         let visibility = make("visibility", shadow_ray_count, size_of::<u32>())?;
         let path_states = make("paths", paths, size_of::<PathState>())?;
+        let instances = make("hit instances", paths, size_of::<u32>())?;
         let counters = Buffer::zeroed(device, "counters", size_of::<Counters>() as u64)?;
         let bound = [
             (bindings::RAYS, &rays),
@@ -194,6 +211,7 @@ impl<'a> Bench<'a> {
             (bindings::SHADOW_RAY_TEXELS, &shadow_rays),
             (bindings::VISIBILITY, &visibility),
             (bindings::PATHS, &path_states),
+            (bindings::HIT_INSTANCES, &instances),
         ];
         let wave_set = DescriptorSet::new(device, &WAVE, &bound)?;
         let film_set = DescriptorSet::new(device, &FILM, &[(film::COUNTERS, &counters)])?;
@@ -214,6 +232,7 @@ impl<'a> Bench<'a> {
             shadow_rays,
             visibility,
             _paths: path_states,
+            _instances: instances,
             _counters: counters,
             wave,
         })
@@ -332,7 +351,7 @@ pub fn measure(
 /// Measures device and CPU in turns on the same rays; `run` returns device seconds.
 fn compare(
     kind: &'static str,
-    yardstick: &Yardstick,
+    yardstick: &Yardstick<'_>,
     rays: &[Option<CpuRay>],
     any_hit: bool,
     repetitions: usize,

@@ -19,7 +19,7 @@ use std::f64::consts::PI;
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
-    pass::{PathDemand, SceneBuffers, WaveBuffers},
+    pass::{PathDemand, SceneBuffers, Surfaces, WaveBuffers},
     renderer::{Renderer, Settings, window_of},
     sampler::{
         Parameters, Sampler,
@@ -145,7 +145,7 @@ impl Paths {
         Self {
             scene: SceneBuffers::new(device, scene, window).unwrap(),
             guide: GuideBuffers::new(device, scene, &parameters().guided, SIZE).unwrap(),
-            waves: WaveBuffers::new(device, 64, 1, PathDemand::default(), false).unwrap(),
+            waves: WaveBuffers::new(device, 64, 1, PathDemand::default(), Surfaces::default()).unwrap(),
         }
     }
 

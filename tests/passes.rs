@@ -35,7 +35,7 @@ fn settings(shadow_rays: u32, depth: u32) -> PassSettings {
         aovs: AOV_ALBEDO | AOV_CACHE_ENTRIES | AOV_GUIDE_CELL,
         roulette_vertex: 8,
         surfaces: Surfaces::default(),
-        traversal: Traversal { page_count: 1, page_shift: 20 },
+        traversal: Traversal { page_count: 1, page_shift: 20, is_instanced: false },
         incoherent: Schedule { rays_per_invocation: 16, refill_lanes: 3 },
     }
 }

@@ -516,6 +516,8 @@ fn compare(bits: u32) {
         (scene::TEXTURE_USE_TEXELS, bytemuck::cast_slice(&textures.uses)),
         (scene::MATERIAL_SURFACES, bytemuck::cast_slice(&surfaces.surfaces)),
         (scene::MATERIAL_SURFACE_TEXELS, bytemuck::cast_slice(&surfaces.surfaces)),
+        // No instances: the shader leaves this alone.
+        (scene::INSTANCES, bytemuck::cast_slice(&[0_u32; 32])),
     ]);
     let triangles = bytemuck::cast_slice(&accel.triangle_pages[0]);
     let page = |name| (name, triangles);

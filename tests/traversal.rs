@@ -13,7 +13,7 @@ use fenestra::{
     pass::geometry::Schedule,
     scene::Geometry,
     shader::{
-        constants::NO_MATERIAL,
+        constants::{NO_INSTANCE, NO_MATERIAL},
         structs::{Hit, Ray, ShadowRay},
     },
 };
@@ -465,7 +465,7 @@ fn surfaces_are_consistent() {
         assert!(geometric.dot(direction) <= 0.0, "{hit:?}");
         assert!(shading.dot(direction) < 0.0, "{hit:?}");
         assert!(position.distance(origin + hit.distance * direction) < 1e-5, "{hit:?}");
-        let twin = accel.surface_at(hit.triangle, origin, direction);
+        let twin = accel.surface_at(hit.triangle, NO_INSTANCE, origin, direction);
         assert!(twin.position.distance(position) < 1e-6, "{hit:?} {twin:?}");
         assert!(twin.geometric_normal.distance(geometric) < 1e-5, "{hit:?} {twin:?}");
         assert!(twin.shading_normal.distance(shading) < 1e-4, "{hit:?} {twin:?}");

@@ -4,6 +4,7 @@
 #define BOUNCE_GLSL
 
 #include "frame.glsl"
+#include "hit_instance.glsl"
 #include "hit_surface.glsl"
 #include "load.glsl"
 #include "random.glsl"
@@ -65,7 +66,7 @@ bool follow_specular(uint path, PathIndex index, Hit hit, uint number, uint seed
     Material material;
     bool goes_on = HAS_SPECULAR && hit.triangle != NO_TRIANGLE;
     if (goes_on) {
-        material = load_surface(path, triangle_materials[hit.triangle]);
+        material = load_surface(path, triangle_material(hit.triangle, load_hit_instance(path)));
         goes_on = is_specular(material.kind);
     }
     if (!goes_on) {
@@ -85,7 +86,8 @@ bool follow_specular(uint path, PathIndex index, Hit hit, uint number, uint seed
         scattered =
             Scatter(vec3(-outgoing_local.xy, outgoing_local.z), vec3(1.0), false);
     } else {
-        scattered = scatter(material, outgoing_local, is_back(hit.triangle, -outgoing), u);
+        bool is_behind = is_back(hit.triangle, load_hit_instance(path), -outgoing);
+        scattered = scatter(material, outgoing_local, is_behind, u);
     }
     vec3 direction = to_world(frame, scattered.direction_local);
     bool is_behind = dot(direction, hit.geometric_normal) < 0.0;

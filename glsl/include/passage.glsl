@@ -17,8 +17,8 @@ struct Passing {
     vec3 stopped;
 };
 
-Passing passing(uint triangle, vec3 weights, vec3 normal) {
-    uint index = triangle_materials[triangle];
+Passing passing(uint triangle, uint instance, vec3 weights, vec3 normal) {
+    uint index = triangle_material(triangle, instance);
     float opacity =
         surface_opacity(load_material_surface(index), triangle_attributes(triangle, weights));
     Material material = load_material(index);
@@ -31,8 +31,8 @@ Passing passing(uint triangle, vec3 weights, vec3 normal) {
     return shares;
 }
 
-vec3 passage(uint triangle, vec3 weights, vec3 normal) {
-    return passing(triangle, weights, normal).passed;
+vec3 passage(uint triangle, uint instance, vec3 weights, vec3 normal) {
+    return passing(triangle, instance, weights, normal).passed;
 }
 
 #endif

@@ -279,11 +279,21 @@ vec4 gradient_tangent(vec3 edge_1, vec3 edge_2, vec2 image_1, vec2 image_2, vec3
 // Unit tangent of a normal map at a point, at right angles to `normal`, and the sign of the
 // bitangent: the stored one, else from the coordinates of the triangle. `normal` is the unit shading
 // normal on the front, from where the triangle is counter-clockwise. 0 if there is no tangent.
-vec4 surface_tangent(uint use_index, uint triangle, Attributes attributes, vec3 normal) {
-    vec3 stored = attributes.tangent.xyz - dot(attributes.tangent.xyz, normal) * normal;
+vec4 surface_tangent(
+    uint use_index, uint triangle, uint instance, Attributes attributes, vec3 normal
+) {
+    vec3 along = attributes.tangent.xyz;
+    float turn = 1.0;
+    if (HAS_INSTANCES) {
+        along = instance_vector(instance, along);
+        along *= inversesqrt(max(dot(along, along), 1.0e-30));
+        turn = instance_winding(instance);
+    }
+    vec3 stored = along - dot(along, normal) * normal;
     float squared = dot(stored, stored);
     if (squared > 1.0e-8) {
-        return vec4(stored * inversesqrt(squared), attributes.tangent.w < 0.0 ? -1.0 : 1.0);
+        return vec4(
+            stored * inversesqrt(squared), turn * attributes.tangent.w < 0.0 ? -1.0 : 1.0);
     }
     TextureUse used = load_texture_use(use_index);
     vec2 image[3];
@@ -292,29 +302,21 @@ vec4 surface_tangent(uint use_index, uint triangle, Attributes attributes, vec3 
             used, corner_uv(triangle, corner, ATTRIBUTE_FIRST_UVS),
             corner_uv(triangle, corner, ATTRIBUTE_SECOND_UVS));
     }
-    vec3 a = uintBitsToFloat(triangle_texel(triangle, 0u).xyz);
-    vec3 b = uintBitsToFloat(triangle_texel(triangle, 1u).xyz);
-    vec3 c = uintBitsToFloat(triangle_texel(triangle, 2u).xyz);
+    vec3 a = triangle_corner(triangle, 0u, instance);
+    vec3 b = triangle_corner(triangle, 1u, instance);
+    vec3 c = triangle_corner(triangle, 2u, instance);
     return gradient_tangent(b - a, c - a, image[1] - image[0], image[2] - image[0], normal);
-}
-
-// 1 if `direction` leads to the front of a triangle, from where it is counter-clockwise, else -1.
-float triangle_side(uint triangle, vec3 direction) {
-    vec3 a = uintBitsToFloat(triangle_texel(triangle, 0u).xyz);
-    vec3 b = uintBitsToFloat(triangle_texel(triangle, 1u).xyz);
-    vec3 c = uintBitsToFloat(triangle_texel(triangle, 2u).xyz);
-    return dot(cross(b - a, c - a), direction) < 0.0 ? -1.0 : 1.0;
 }
 
 // Unit shading normal after a normal map. `shading_normal` and the result are on the same side of
 // the surface: the front for a `side` of 1, the back for -1, where the map's normals are turned
 // round. The caller still has to turn the result toward the viewer with consistent_normal.
 vec3 mapped_normal(
-    uint use_index, float normal_scale, uint triangle, Attributes attributes, vec3 shading_normal,
-    float side
+    uint use_index, float normal_scale, uint triangle, uint instance, Attributes attributes,
+    vec3 shading_normal, float side
 ) {
     vec3 normal = side * shading_normal;
-    vec4 tangent = surface_tangent(use_index, triangle, attributes, normal);
+    vec4 tangent = surface_tangent(use_index, triangle, instance, attributes, normal);
     if (tangent.w == 0.0) {
         return shading_normal;
     }

@@ -51,8 +51,8 @@ void main() {
         + uint(surface != material_surfaces[query.material]);
     Attributes attributes = triangle_attributes(query.triangle, query.weights);
     vec3 mapped = mapped_normal(
-        query.use_index, surface.normal_scale, query.triangle, attributes, query.shading_normal,
-        query.side);
+        query.use_index, surface.normal_scale, query.triangle, NO_INSTANCE, attributes,
+        query.shading_normal, query.side);
     outputs[index] = TextureAnswer(
         texture_value(query.use_index, query.uv0, query.uv1),
         texture_number(query.use_index, query.uv0, query.uv1), differences, attributes.uv0,

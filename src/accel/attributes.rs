@@ -13,8 +13,13 @@ use crate::{
     },
 };
 
-/// Bits `ATTRIBUTE_…` of what the vertices of a geometry have.
+/// Bits `ATTRIBUTE_…` of what the vertices of a geometry have, those of its instances included.
 pub fn attributes_of(geometry: &Geometry) -> u32 {
+    let prototypes = geometry.prototypes.iter();
+    prototypes.fold(own_attributes(geometry), |bits, mesh| bits | own_attributes(mesh))
+}
+
+fn own_attributes(geometry: &Geometry) -> u32 {
     let bit = |is_empty: bool, bit: u32| if is_empty { 0 } else { bit };
     bit(geometry.uvs[0].is_empty(), ATTRIBUTE_FIRST_UVS)
         | bit(geometry.uvs[1].is_empty(), ATTRIBUTE_SECOND_UVS)
@@ -51,15 +56,20 @@ impl TriangleAttributes {
         let stride = 6 * bits.count_ones() as usize;
         let mut words = vec![0; accel.triangle_count() * stride];
         if stride > 0 {
-            words.par_chunks_exact_mut(stride).zip(&accel.scene_triangles).for_each(
-                |(words, &triangle)| {
-                    let corners = geometry.triangles[triangle as usize];
-                    let places = words.chunks_exact_mut(stride / 3);
-                    for (corner, words) in corners.into_iter().zip(places) {
-                        write_corner(words, geometry, bits, corner as usize);
-                    }
-                },
-            );
+            let meshes = std::iter::once(geometry).chain(&geometry.prototypes);
+            for (mesh, range) in meshes.zip(accel.first_triangles.windows(2)) {
+                let (first, end) = (range[0] as usize, range[1] as usize);
+                words[first * stride..end * stride]
+                    .par_chunks_exact_mut(stride)
+                    .zip(&accel.scene_triangles[first..end])
+                    .for_each(|(words, &triangle)| {
+                        let corners = mesh.triangles[triangle as usize];
+                        let places = words.chunks_exact_mut(stride / 3);
+                        for (corner, words) in corners.into_iter().zip(places) {
+                            write_corner(words, mesh, bits, corner as usize);
+                        }
+                    });
+            }
         }
         Self { bits, words }
     }
@@ -118,17 +128,22 @@ fn write_corner(words: &mut [u32], geometry: &Geometry, bits: u32, vertex: usize
             words.copy_from_slice(&pair());
         }
     };
-    write(ATTRIBUTE_FIRST_UVS, &|| geometry.uvs[0][vertex].map(f32::to_bits));
-    write(ATTRIBUTE_SECOND_UVS, &|| geometry.uvs[1][vertex].map(f32::to_bits));
+    // One mesh may lack what another one has.
+    let uv = |set: usize| {
+        geometry.uvs[set].get(vertex).copied().unwrap_or_default().map(f32::to_bits)
+    };
+    write(ATTRIBUTE_FIRST_UVS, &|| uv(0));
+    write(ATTRIBUTE_SECOND_UVS, &|| uv(1));
     write(ATTRIBUTE_TANGENT, &|| {
-        let [x, y, z, sign] = geometry.tangents[vertex];
+        let [x, y, z, sign] = geometry.tangents.get(vertex).copied().unwrap_or_default();
         let tangent = Vec3::new(x, y, z);
         let is_there = tangent.length_squared() > 0.25;
         [if is_there { octahedron::pack(tangent) } else { FLAT_NORMAL }, sign.to_bits()]
     });
     write(ATTRIBUTE_COLOR, &|| {
         let quantise = |x: f32| (x.clamp(0.0, 1.0) * 65_535.0).round() as u32;
-        let [red, green, blue, alpha] = geometry.colors[vertex].map(quantise);
+        let [red, green, blue, alpha] =
+            geometry.colors.get(vertex).copied().unwrap_or([1.0; 4]).map(quantise);
         [red | green << 16, blue | alpha << 16]
     });
 }

@@ -1,14 +1,18 @@
-//! Triangles in world space → compressed wide BVH → flat arrays for the GPU.
+//! Triangles and instances → compressed wide BVH → flat arrays for the GPU.
 //!
 //! The tree is obvhs's CWBVH: eight children per node, their boxes quantised to 8 bits per plane,
 //! 80 bytes a node. \[Ylitie et al. 2017\]; binary tree by clustering and reinsertion, \[Meister &
 //! Bittner 2018\].
+//!
+//! A scene without instances is one tree over its triangles. One with instances has a tree over them
+//! before the trees of their meshes, each in the space of its mesh ([`instances`]).
 //!
 //! [`Accel`] holds exactly what the shaders read (`glsl/include/bvh.glsl`); [`traverse`] is the
 //! Rust twin of the shader's traversal over the same arrays.
 
 pub mod attributes;
 mod binary;
+pub mod instances;
 pub mod traverse;
 
 use bytemuck::{Pod, Zeroable};
@@ -20,6 +24,7 @@ use obvhs::{
 
 use crate::math::octahedron;
 use crate::scene::geometry::MAX_COORDINATE;
+use instances::{Level, Record};
 use crate::{
     error::{Error, Result},
     scene::Geometry,
@@ -55,7 +60,8 @@ pub struct VertexRecord {
 /// The scene's triangles in BVH order and the tree over them.
 #[derive(Clone, Debug)]
 pub struct Accel {
-    /// CWBVH nodes, the root first; never empty.
+    /// CWBVH nodes, the root first; never empty. With instances, the tree over them comes first, then
+    /// that over the placed triangles, then those of the meshes.
     pub nodes: Vec<Node>,
     /// Triangles in BVH order; every page but the last holds `1 << page_shift` triangles. At least
     /// one page, none empty.
@@ -64,9 +70,14 @@ pub struct Accel {
     pub page_shift: u32,
     /// Material index per triangle in BVH order.
     pub triangle_materials: Vec<u32>,
-    /// Index in the scene per triangle in BVH order.
+    /// Index in its mesh per triangle in BVH order.
     pub scene_triangles: Vec<u32>,
-    /// Levels of nodes below the root, less than [`BVH_STACK_ENTRIES`].
+    /// First triangle in BVH order of the placed ones and of each mesh that has instances, and their
+    /// number at the end.
+    pub first_triangles: Vec<u32>,
+    /// Instances in the order of the upper level; empty for a tree of one level.
+    pub instances: Vec<Record>,
+    /// Stack entries that traversal may need, at most [`BVH_STACK_ENTRIES`].
     pub depth: usize,
 }
 
@@ -80,30 +91,85 @@ impl Accel {
     /// More triangles than [`MAX_TRIANGLE_PAGES`] pages hold, a vertex index out of range, a
     /// coordinate that is not finite or beyond [`MAX_COORDINATE`], or a tree too deep for the stack.
     pub fn build(geometry: &Geometry, page_bytes: u64) -> Result<Self> {
-        let kept = checked_triangles(geometry)?;
-        let page_shift = page_shift(kept.len(), page_bytes)?;
-        let bvh = build_tree(geometry, &kept)?;
-        let depth = depth(&bvh.nodes)?;
-        let CwBvh { nodes, primitive_indices, .. } = bvh;
-        let mut nodes: Vec<Node> = bytemuck::allocation::cast_vec(nodes);
+        let mut trees = Trees::default();
+        let around_placed = trees.add(geometry)?;
+        let mut instances = Vec::new();
+        if !geometry.instances.is_empty() {
+            let mut level = Level::default();
+            if let Some(around) = around_placed {
+                level.add_placed(around, 0);
+            }
+            let mut meshes = Vec::with_capacity(geometry.prototypes.len());
+            for mesh in &geometry.prototypes {
+                let first_node = trees.nodes.len() as u32;
+                meshes.push((trees.add(mesh)?, first_node));
+            }
+            for (label, instance) in geometry.instances.iter().enumerate() {
+                let Some((around, first_node)) = meshes.get(instance.prototype as usize) else {
+                    return Err(geometry_error(format!(
+                        "instance {label} is of mesh {}, but there are {}",
+                        instance.prototype,
+                        meshes.len()
+                    )));
+                };
+                // Nothing is left of a mesh without area.
+                if let Some(around) = around {
+                    level.add(label, instance, *around, *first_node)?;
+                }
+            }
+            instances = trees.put_level_first(level)?;
+        }
+        let Trees { mut nodes, scene_triangles, first_triangles, depth } = trees;
+        if depth > BVH_STACK_ENTRIES as usize {
+            return Err(too_deep(depth));
+        }
         if nodes.is_empty() {
             nodes.push([0; 20]);
         }
         nodes.shrink_to_fit();
-
-        let scene_triangles: Vec<u32> =
-            primitive_indices.iter().map(|&index| kept[index as usize]).collect();
-        drop((primitive_indices, kept));
-        let triangle_materials =
-            scene_triangles.iter().map(|&triangle| geometry.materials[triangle as usize]).collect();
+        let page_shift = page_shift(scene_triangles.len(), page_bytes)?;
+        let mesh_of = |at: usize| {
+            let mesh = first_triangles.partition_point(|&first| first as usize <= at) - 1;
+            mesh.checked_sub(1).map_or(geometry, |mesh| &geometry.prototypes[mesh])
+        };
+        let triangle_materials = scene_triangles
+            .iter()
+            .enumerate()
+            .map(|(at, &triangle)| mesh_of(at).materials[triangle as usize])
+            .collect();
         let mut triangle_pages: Vec<Vec<TriangleRecord>> = scene_triangles
             .chunks(1 << page_shift)
-            .map(|page| page.iter().map(|&triangle| record(geometry, triangle)).collect())
+            .enumerate()
+            .map(|(page, triangles)| {
+                let first = page << page_shift;
+                let record =
+                    |(at, &triangle): (usize, &u32)| record(mesh_of(first + at), triangle);
+                triangles.iter().enumerate().map(record).collect()
+            })
             .collect();
         if triangle_pages.is_empty() {
             triangle_pages.push(vec![TriangleRecord::default()]);
         }
-        Ok(Self { nodes, triangle_pages, page_shift, triangle_materials, scene_triangles, depth })
+        Ok(Self {
+            nodes,
+            triangle_pages,
+            page_shift,
+            triangle_materials,
+            scene_triangles,
+            first_triangles,
+            instances,
+            depth,
+        })
+    }
+
+    /// True if the tree has two levels.
+    pub fn is_instanced(&self) -> bool {
+        !self.instances.is_empty()
+    }
+
+    /// Number of triangles that lie in the world; they come first.
+    pub fn placed_count(&self) -> usize {
+        self.first_triangles.get(1).map_or(0, |&count| count as usize)
     }
 
     /// Number of triangles in BVH order.
@@ -119,6 +185,85 @@ impl Accel {
         let page = (index >> self.page_shift) as usize;
         &self.triangle_pages[page][index as usize & ((1 << self.page_shift) - 1)]
     }
+}
+
+/// Trees one after the other, and their triangles.
+#[derive(Debug, Default)]
+struct Trees {
+    nodes: Vec<Node>,
+    scene_triangles: Vec<u32>,
+    first_triangles: Vec<u32>,
+    /// Stack entries that the deepest tree needs.
+    depth: usize,
+}
+
+impl Trees {
+    /// Adds the tree of the triangles of `mesh`; returns their bounds, none without triangles.
+    fn add(&mut self, mesh: &Geometry) -> Result<Option<[Vec3; 2]>> {
+        let kept = checked_triangles(mesh)?;
+        let total = self.scene_triangles.len() + kept.len();
+        if u32::try_from(total).is_err() {
+            return Err(too_many(total, u64::from(u32::MAX)));
+        }
+        let around = instances::bounds_of(mesh, &kept);
+        let CwBvh { nodes, primitive_indices, .. } = build_tree(mesh, &kept)?;
+        self.depth = self.depth.max(stack_entries(&nodes));
+        if self.first_triangles.is_empty() {
+            self.first_triangles.push(0);
+        }
+        let (first_node, first_triangle) =
+            (self.nodes.len() as u32, self.scene_triangles.len() as u32);
+        let nodes: Vec<Node> = bytemuck::allocation::cast_vec(nodes);
+        self.append(nodes, first_node, first_triangle);
+        let of_mesh = primitive_indices.iter().map(|&index| kept[index as usize]);
+        if self.scene_triangles.is_empty() {
+            self.scene_triangles = of_mesh.collect();
+        } else {
+            self.scene_triangles.extend(of_mesh);
+        }
+        self.first_triangles.push(self.scene_triangles.len() as u32);
+        Ok(around)
+    }
+
+    fn append(&mut self, mut nodes: Vec<Node>, first_node: u32, first_triangle: u32) {
+        if self.nodes.is_empty() {
+            self.nodes = nodes;
+            return;
+        }
+        nodes.iter_mut().for_each(|node| shift(node, first_node, first_triangle));
+        self.nodes.append(&mut nodes);
+    }
+
+    /// Puts the tree over the instances before all others; returns their records in its order.
+    fn put_level_first(&mut self, level: Level) -> Result<Vec<Record>> {
+        let Level { mut records, boxes } = level;
+        let order;
+        let upper: Vec<Node> = if boxes.is_empty() {
+            order = Vec::new();
+            vec![[0; 20]]
+        } else {
+            // One instance a leaf: entering one in vain costs more than a box.
+            let tree = on_large_stack(|| {
+                bvh2_to_cwbvh(&binary::build(boxes), 1, true, false)
+            })?;
+            // An instance is entered with the rest of its group and the nodes beside it stacked.
+            self.depth += stack_entries(&tree.nodes) + 2;
+            order = tree.primitive_indices;
+            bytemuck::allocation::cast_vec(tree.nodes)
+        };
+        let first_node = upper.len() as u32;
+        let mut lower = std::mem::replace(&mut self.nodes, upper);
+        lower.iter_mut().for_each(|node| shift(node, first_node, 0));
+        self.nodes.append(&mut lower);
+        records.iter_mut().for_each(|record| record.first_node += first_node);
+        Ok(order.iter().map(|&index| records[index as usize]).collect())
+    }
+}
+
+/// Moves the children and triangles that a node refers to.
+fn shift(node: &mut Node, nodes: u32, triangles: u32) {
+    node[4] = node[4].wrapping_add(nodes);
+    node[5] = node[5].wrapping_add(triangles);
 }
 
 /// Corner positions of a triangle of the scene.
@@ -192,11 +337,15 @@ const BUILD_STACK_BYTES: usize = 1 << 30;
 
 /// Builds the CWBVH over the triangles `kept`.
 fn build_tree(geometry: &Geometry, kept: &[u32]) -> Result<CwBvh> {
+    on_large_stack(|| build_tree_here(geometry, kept))
+}
+
+fn on_large_stack(build: impl FnOnce() -> CwBvh + Send) -> Result<CwBvh> {
     std::thread::scope(|scope| {
         let builder = std::thread::Builder::new()
             .name("bvh".into())
             .stack_size(BUILD_STACK_BYTES)
-            .spawn_scoped(scope, || build_tree_here(geometry, kept))
+            .spawn_scoped(scope, build)
             .map_err(|error| geometry_error(format!("cannot start the BVH builder: {error}")))?;
         builder.join().map_err(|_| geometry_error("the BVH builder failed".into()))
     })
@@ -234,8 +383,8 @@ fn padded_boxes(geometry: &Geometry, kept: &[u32]) -> Vec<Aabb> {
     boxes
 }
 
-/// Levels of nodes below the root.
-fn depth(nodes: &[CwBvhNode]) -> Result<usize> {
+/// Stack entries that traversal of a tree may need: levels of nodes, the root among them.
+fn stack_entries(nodes: &[CwBvhNode]) -> usize {
     let mut deepest = 0;
     let mut pending: Vec<(u32, usize)> = if nodes.is_empty() { vec![] } else { vec![(0, 0)] };
     while let Some((index, level)) = pending.pop() {
@@ -244,13 +393,14 @@ fn depth(nodes: &[CwBvhNode]) -> Result<usize> {
         let children = node.imask.count_ones();
         pending.extend((0..children).map(|child| (node.child_base_idx + child, level + 1)));
     }
-    if deepest >= BVH_STACK_ENTRIES as usize {
-        return Err(geometry_error(format!(
-            "the BVH is {deepest} levels deep, traversal can stack {BVH_STACK_ENTRIES}: the scene has \
-             many coincident triangles; remove duplicates"
-        )));
-    }
-    Ok(deepest)
+    deepest + usize::from(!nodes.is_empty())
+}
+
+fn too_deep(depth: usize) -> Error {
+    geometry_error(format!(
+        "the BVH is {depth} levels deep, traversal can stack {BVH_STACK_ENTRIES}: the scene has many \
+         coincident triangles or instances; remove duplicates"
+    ))
 }
 
 /// Positions and packed normals of a triangle; flat if one of its vertices has no normal.

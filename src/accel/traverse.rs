@@ -4,11 +4,11 @@
 
 use glam::{UVec2, Vec3};
 
-use super::{Accel, Node, TriangleRecord, VertexRecord};
+use super::{Accel, Node, TriangleRecord, VertexRecord, instances::Record};
 use crate::math::octahedron;
 use crate::{
     math::frame::{Frame, frame_from_normal},
-    shader::constants::{BVH_STACK_ENTRIES, FLAT_NORMAL},
+    shader::constants::{BVH_STACK_ENTRIES, FLAT_NORMAL, NO_INSTANCE},
 };
 
 /// Closest hit of a ray.
@@ -16,6 +16,8 @@ use crate::{
 pub struct Intersection {
     /// Triangle in BVH order.
     pub triangle: u32,
+    /// Instance in the order of the upper level; `NO_INSTANCE` in a tree of one level.
+    pub instance: u32,
     /// Distance along the ray, metres.
     pub distance: f32,
 }
@@ -61,25 +63,48 @@ impl Accel {
 
     /// As [`Accel::closest`], and returns the work done.
     pub fn closest_with_work(&self, origin: Vec3, direction: Vec3) -> (Option<Intersection>, Work) {
-        let mut ray = Traversal::start(origin, direction, false);
-        while ray.step(self, false) {}
+        let mut ray = self.start(origin, direction, false);
+        while ray.step() {}
         (ray.hit(), ray.work)
     }
 
     /// True if the ray meets any triangle; `direction` is a unit vector.
     pub fn is_occluded(&self, origin: Vec3, direction: Vec3) -> bool {
-        let mut ray = Traversal::start(origin, direction, true);
-        while ray.step(self, true) {}
+        let mut ray = self.start(origin, direction, true);
+        while ray.step() {}
         ray.hit().is_some()
     }
 
-    /// Computes the surface that a ray meets on `triangle`.
+    fn start(&self, origin: Vec3, direction: Vec3, any_hit: bool) -> Traversal<'_> {
+        Traversal::start(self, origin, direction, any_hit)
+    }
+
+    /// Material of a triangle in an instance, or in a tree of one level with `NO_INSTANCE`.
+    ///
+    /// # Panics
+    /// Either is out of range.
+    pub fn triangle_material(&self, triangle: u32, instance: u32) -> u32 {
+        let own = self.triangle_materials[triangle as usize];
+        self.instances.get(instance as usize).map_or(own, |instance| {
+            instance.first_material + (own & instance.material_mask)
+        })
+    }
+
+    /// Computes the surface that a ray meets on `triangle` in `instance`, which is `NO_INSTANCE` in a
+    /// tree of one level.
     ///
     /// # Panics
     /// `triangle` is out of range.
-    pub fn surface_at(&self, triangle: u32, origin: Vec3, direction: Vec3) -> Surface {
+    pub fn surface_at(
+        &self,
+        triangle: u32,
+        instance: u32,
+        origin: Vec3,
+        direction: Vec3,
+    ) -> Surface {
         let TriangleRecord { vertices } = self.triangle(triangle);
-        let [a, b, c] = vertices.map(|vertex| Vec3::from_array(vertex.position));
+        let instance = self.instances.get(instance as usize);
+        let [a, b, c] = vertices.map(|vertex| placed(instance, vertex.position));
         let frame = frame_from_normal(direction);
         let local = [a, b, c].map(|vertex| frame.to_local(vertex - origin));
         let areas = edge_functions(local);
@@ -90,7 +115,10 @@ impl Accel {
         let geometric_normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
         let mut shading_normal = geometric_normal;
         if vertices[0].normal != FLAT_NORMAL {
-            let [a, b, c] = vertices.map(|vertex: VertexRecord| octahedron::unpack(vertex.normal));
+            let [a, b, c] = vertices.map(|vertex: VertexRecord| {
+                let normal = octahedron::unpack(vertex.normal);
+                instance.map_or(normal, |instance| instance.normal_to_world(normal))
+            });
             let interpolated = weights.x * a + weights.y * b + weights.z * c;
             if interpolated.length_squared() > 1e-12 {
                 let unit = interpolated.normalize();
@@ -131,6 +159,12 @@ impl Accel {
             + (if geometric_normal.dot(direction) < 0.0 { -offset } else { offset })
                 * geometric_normal
     }
+}
+
+/// Position of a vertex in the world.
+fn placed(instance: Option<&Record>, position: [f32; 3]) -> Vec3 {
+    let position = Vec3::from_array(position);
+    instance.map_or(position, |instance| instance.to_world(position))
 }
 
 /// Turns a shading normal toward `outgoing_direction` until their cosine is at least `least`.
@@ -181,10 +215,18 @@ fn inverse(x: f32) -> f32 {
 }
 
 /// State of one ray.
-struct Traversal {
+struct Traversal<'a> {
+    accel: &'a Accel,
+    any_hit: bool,
     origin: Vec3,
     direction: Vec3,
     frame: Frame,
+    node_origin: Vec3,
+    node_direction: Vec3,
+    node_margin: Vec3,
+    instance: u32,
+    hit_instance: u32,
+    stack_base: usize,
     inverse_direction: Vec3,
     octant4: u32,
     distance: f32,
@@ -197,22 +239,23 @@ struct Traversal {
     work: Work,
 }
 
-impl Traversal {
+impl<'a> Traversal<'a> {
     /// Starts a ray. The closest hit visits the nearest children first, any hit the farthest.
-    fn start(origin: Vec3, direction: Vec3, any_hit: bool) -> Self {
-        let octant = |x: f32, bits| if (x < 0.0) == any_hit { bits } else { 0 };
-        Self {
+    fn start(accel: &'a Accel, origin: Vec3, direction: Vec3, any_hit: bool) -> Self {
+        let mut ray = Self {
+            accel,
+            any_hit,
             origin,
             direction,
             frame: frame_from_normal(direction),
-            inverse_direction: Vec3::new(
-                inverse(direction.x),
-                inverse(direction.y),
-                inverse(direction.z),
-            ),
-            octant4: octant(direction.x, 0x0404_0404)
-                | octant(direction.y, 0x0202_0202)
-                | octant(direction.z, 0x0101_0101),
+            node_origin: origin,
+            node_direction: direction,
+            node_margin: Vec3::ZERO,
+            instance: NO_INSTANCE,
+            hit_instance: NO_INSTANCE,
+            stack_base: 0,
+            inverse_direction: Vec3::ZERO,
+            octant4: 0,
             distance: FAR_AWAY,
             triangle: None,
             nodes_waiting: UVec2::new(0, 0x8000_0000),
@@ -221,25 +264,101 @@ impl Traversal {
             stack: [UVec2::ZERO; BVH_STACK_ENTRIES as usize],
             stack_size: 0,
             work: Work::default(),
-        }
+        };
+        ray.see(direction);
+        ray
+    }
+
+    /// Sets the direction that nodes see.
+    fn see(&mut self, direction: Vec3) {
+        let octant = |x: f32, bits| if (x < 0.0) == self.any_hit { bits } else { 0 };
+        self.inverse_direction =
+            Vec3::new(inverse(direction.x), inverse(direction.y), inverse(direction.z));
+        self.octant4 = octant(direction.x, 0x0404_0404)
+            | octant(direction.y, 0x0202_0202)
+            | octant(direction.z, 0x0101_0101);
     }
 
     fn hit(&self) -> Option<Intersection> {
-        self.triangle.map(|triangle| Intersection { triangle, distance: self.distance })
+        let (instance, distance) = (self.hit_instance, self.distance);
+        self.triangle.map(|triangle| Intersection { triangle, instance, distance })
+    }
+
+    fn leave_instance(&mut self) {
+        self.instance = NO_INSTANCE;
+        self.node_origin = self.origin;
+        self.node_direction = self.direction;
+        self.node_margin = Vec3::ZERO;
+        self.see(self.direction);
+    }
+
+    fn enter_instance(&mut self, index: u32) {
+        let instance = &self.accel.instances[index as usize];
+        self.instance = index;
+        self.node_origin = instance.to_object(self.origin);
+        self.node_direction = instance.vector_to_object(self.direction);
+        self.node_margin = instance.margin_from(self.origin);
+        self.see(self.node_direction);
+        self.stack_base = self.stack_size;
+        self.nodes_waiting = UVec2::new(instance.first_node, 0x8000_0000);
+    }
+
+    fn push(&mut self, group: UVec2) {
+        self.stack[self.stack_size] = group;
+        self.stack_size += 1;
+    }
+
+    /// Moves between the levels of the tree as far as a step needs.
+    fn change_level(&mut self) {
+        let is_idle = self.nodes_waiting.y <= 0x00ff_ffff && self.triangles_waiting.y == 0;
+        if self.instance != NO_INSTANCE {
+            if !is_idle || self.stack_size > self.stack_base {
+                return;
+            }
+            self.leave_instance();
+        }
+        if is_idle && self.stack_size > 0 {
+            self.stack_size -= 1;
+            let group = self.stack[self.stack_size];
+            if group.y > 0x00ff_ffff {
+                self.nodes_waiting = group;
+            } else {
+                self.triangles_waiting = group;
+            }
+        }
+        if self.triangles_waiting.y != 0 {
+            let bit = 31 - self.triangles_waiting.y.leading_zeros();
+            let instance = self.triangles_waiting.x + bit;
+            self.triangles_waiting.y &= !(1 << bit);
+            if self.nodes_waiting.y > 0x00ff_ffff {
+                self.push(self.nodes_waiting);
+            }
+            if self.triangles_waiting.y != 0 {
+                self.push(self.triangles_waiting);
+            }
+            self.triangles_waiting.y = 0;
+            self.enter_instance(instance);
+        }
     }
 
     /// Visits at most one node and one triangle. Returns false when the ray is finished.
-    fn step(&mut self, accel: &Accel, any_hit: bool) -> bool {
+    fn step(&mut self) -> bool {
         self.work.steps += 1;
-        if self.nodes_waiting.y <= 0x00ff_ffff && self.stack_size > 0 {
+        let is_instanced = self.accel.is_instanced();
+        if is_instanced {
+            self.change_level();
+        }
+        let in_instance = self.instance != NO_INSTANCE;
+        let base = if in_instance { self.stack_base } else { 0 };
+        if self.nodes_waiting.y <= 0x00ff_ffff && self.stack_size > base {
             self.stack_size -= 1;
             self.nodes_waiting = self.stack[self.stack_size];
         }
         if self.nodes_waiting.y > 0x00ff_ffff && self.triangles_next.y == 0 {
-            self.visit_node(accel);
+            self.visit_node();
         }
-        if self.triangles_waiting.y != 0 {
-            self.test_triangle(accel, any_hit);
+        if self.triangles_waiting.y != 0 && (!is_instanced || in_instance) {
+            self.test_triangle();
         }
         if self.triangles_waiting.y == 0 {
             self.triangles_waiting = self.triangles_next;
@@ -248,21 +367,22 @@ impl Traversal {
         self.triangles_waiting.y != 0 || self.nodes_waiting.y > 0x00ff_ffff || self.stack_size > 0
     }
 
-    fn visit_node(&mut self, accel: &Accel) {
+    fn visit_node(&mut self) {
         self.work.nodes += 1;
         let hits = self.nodes_waiting.y;
         let bit = 31 - hits.leading_zeros();
         self.nodes_waiting.y &= !(1 << bit);
         if self.nodes_waiting.y > 0x00ff_ffff {
-            self.stack[self.stack_size] = self.nodes_waiting;
-            self.stack_size += 1;
+            self.push(self.nodes_waiting);
         }
         let slot = (bit - 24) ^ (self.octant4 & 0xff);
         let index = self.nodes_waiting.x + (hits & !(u32::MAX << slot)).count_ones();
-        let node = &accel.nodes[index as usize];
+        let node = &self.accel.nodes[index as usize];
 
         let scale = node_spacing(node) * self.inverse_direction;
-        let bias = (node_corner(node) - self.origin) * self.inverse_direction;
+        let bias = (node_corner(node) - self.node_origin) * self.inverse_direction;
+        let margin = self.node_margin * self.inverse_direction.abs();
+        let (near_bias, far_bias) = (bias - margin, bias + margin);
         let mut found = 0;
         for child in 0..8 {
             let half = child / 4;
@@ -272,12 +392,12 @@ impl Traversal {
             for axis in 0..3 {
                 let (lower, upper) = (byte(8 + 4 * axis), byte(10 + 4 * axis));
                 let (enter, leave) =
-                    if self.direction[axis] < 0.0 { (upper, lower) } else { (lower, upper) };
+                    if self.node_direction[axis] < 0.0 { (upper, lower) } else { (lower, upper) };
                 near[axis] = enter as f32;
                 far[axis] = leave as f32;
             }
-            let enter = near * scale + bias;
-            let leave = far * scale + bias;
+            let enter = near * scale + near_bias;
+            let leave = far * scale + far_bias;
             let first = enter.max_element().max(0.0);
             let last = leave.min_element().min(self.distance);
             if first <= last {
@@ -296,15 +416,17 @@ impl Traversal {
         }
     }
 
-    fn test_triangle(&mut self, accel: &Accel, any_hit: bool) {
+    fn test_triangle(&mut self) {
         self.work.triangles += 1;
         let bit = 31 - self.triangles_waiting.y.leading_zeros();
         self.triangles_waiting.y &= !(1 << bit);
         let triangle = self.triangles_waiting.x + bit;
-        let local = accel
+        let instance = self.accel.instances.get(self.instance as usize);
+        let local = self
+            .accel
             .triangle(triangle)
             .vertices
-            .map(|vertex| self.frame.to_local(Vec3::from_array(vertex.position) - self.origin));
+            .map(|vertex| self.frame.to_local(placed(instance, vertex.position) - self.origin));
         let areas = edge_functions(local);
         let area = areas.x + areas.y + areas.z;
         let distance = depth(areas, local) / area;
@@ -312,7 +434,8 @@ impl Traversal {
         if inside && area != 0.0 && distance > 0.0 && distance < self.distance {
             self.distance = distance;
             self.triangle = Some(triangle);
-            if any_hit {
+            self.hit_instance = self.instance;
+            if self.any_hit {
                 self.nodes_waiting.y = 0;
                 self.triangles_waiting.y = 0;
                 self.triangles_next.y = 0;

@@ -41,6 +41,9 @@ pub struct Arguments {
         value_parser = clap::value_parser!(u32).range(1..=1000)
     )]
     pub repetitions: u32,
+    /// Place every instance, for a tree of one level: what the second one costs.
+    #[arg(long)]
+    pub placed: bool,
     /// Threads of the CPU traversal that serves as the yardstick. Default: all cores.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub threads: Option<u32>,
@@ -57,7 +60,9 @@ pub struct Arguments {
 struct Report {
     version: &'static str,
     scene: String,
-    triangles: usize,
+    triangles: u64,
+    /// Instances, with the placed triangles as one; 0 for a tree of one level.
+    instances: usize,
     bvh_nodes: usize,
     film: [u32; 2],
     device: String,
@@ -95,6 +100,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut scene = Scene::load(&arguments.scene)?;
     scene.warnings.iter().for_each(|warning| log::warn!("{warning}"));
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
+    if arguments.placed {
+        let message = "--placed: the scene has too many triangles to place every instance";
+        scene.geometry = scene.geometry.flattened().ok_or_else(|| Error::usage(message))?;
+    }
     if let Some([width, height]) = arguments.size {
         (scene.film.width, scene.film.height) = (width, height);
     }
@@ -151,7 +160,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let report = Report {
         version: env!("CARGO_PKG_VERSION"),
         scene: scene.name.clone(),
-        triangles: accel.triangle_count(),
+        triangles: scene.geometry.triangle_count(),
+        instances: accel.instances.len(),
         bvh_nodes: accel.nodes.len(),
         film,
         device: capabilities.name.clone(),
@@ -159,7 +169,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         sampler: arguments.sampler.name(),
         shadow_rays_per_hit: arguments.shadow_rays,
         yardstick: format!(
-            "obvhs CWBVH traversal on the CPU, same tree, same rays, {} threads",
+            "{} traversal on the CPU, same tree, same rays, {} threads",
+            if accel.is_instanced() { "two-level" } else { "obvhs CWBVH" },
             plan.threads
         ),
         rays,
@@ -200,9 +211,10 @@ fn padded_pixels([width, height]: [u32; 2]) -> u32 {
 fn text(report: &Report) -> String {
     let mut lines = vec![
         format!(
-            "{}: {} triangles, {} BVH nodes, film {}x{}, sampler {}, {} shadow rays per hit",
+            "{}: {} triangles, {} instances, {} BVH nodes, film {}x{}, sampler {}, {} shadow rays per hit",
             report.scene,
             report.triangles,
+            report.instances,
             report.bvh_nodes,
             report.film[0],
             report.film[1],

@@ -44,7 +44,12 @@ pub enum Format {
 /// An unusable scene, a failing disk; with `--strict`, the first difference.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let Format::Mitsuba = arguments.format;
-    let scene = Scene::load(&arguments.scene)?;
+    let mut scene = Scene::load(&arguments.scene)?;
+    if !scene.geometry.instances.is_empty() {
+        let message = "expected fewer triangles: the export places every instance";
+        let flat = scene.geometry.flattened();
+        scene.geometry = flat.ok_or_else(|| Error::scene(&arguments.scene, message))?;
+    }
     let settings = mitsuba::Settings { depth: arguments.depth, samples: arguments.spp };
     let output = if files::extension(&arguments.output) == "xml" {
         arguments.output.clone()

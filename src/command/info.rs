@@ -112,7 +112,7 @@ fn scene(path: &Path) -> Result<Description> {
         MaterialKind::Measured { .. } => "measured",
     };
     let mut triangle_counts = vec![0_u64; scene.materials.len()];
-    for &material in &scene.geometry.materials {
+    for material in scene.geometry.materials_in_use() {
         if let Some(count) = triangle_counts.get_mut(material as usize) {
             *count += 1;
         }
@@ -121,7 +121,7 @@ fn scene(path: &Path) -> Result<Description> {
     let mut lines = vec![
         format!("scene {}", scene.name),
         format!("film         {}x{} pixels", scene.film.width, scene.film.height),
-        format!("triangles    {}", scene.geometry.triangles.len()),
+        format!("triangles    {}", scene.geometry.triangle_count()),
         format!("environment  {} ({}x{} texels)", map.source, map.width, map.height),
         format!("hash         {}", scene.hash),
     ];
@@ -136,7 +136,8 @@ fn scene(path: &Path) -> Result<Description> {
         "name": scene.name,
         "width": scene.film.width,
         "height": scene.film.height,
-        "triangles": scene.geometry.triangles.len(),
+        "triangles": scene.geometry.triangle_count(),
+        "instances": scene.geometry.instances.len(),
         "environment": { "source": map.source, "width": map.width, "height": map.height },
         "materials": materials,
         "hash": scene.hash,

@@ -7,14 +7,14 @@ use super::{
     surfaces::Surfaces,
 };
 use crate::{
-    accel::{Accel, MAX_TRIANGLE_PAGES, TriangleRecord},
+    accel::{Accel, MAX_TRIANGLE_PAGES, TriangleRecord, instances::Record},
     error::Result,
     gpu::{Buffer, Capabilities, Device},
     shader::{
         bindings::{Binding, scene},
         constants::{
             CONSTANT_RAYS_PER_INVOCATION, CONSTANT_REFILL_LANES, CONSTANT_TRIANGLE_PAGE_SHIFT,
-            CONSTANT_TRIANGLE_PAGES,
+            CONSTANT_TRIANGLE_PAGES, SURFACES_INSTANCED,
         },
     },
 };
@@ -27,7 +27,9 @@ pub struct GeometryBuffers {
     nodes: Buffer,
     pages: Vec<Buffer>,
     materials: Buffer,
+    instances: Buffer,
     page_shift: u32,
+    is_instanced: bool,
 }
 
 /// Largest number of bytes in one page of triangles on a device.
@@ -47,31 +49,43 @@ impl GeometryBuffers {
                 Buffer::texels_from_slice(device, &format!("triangles {index}"), page)
             })
             .collect::<Result<_>>()?;
+        // A buffer has at least one element.
+        let none = [Record::default()];
+        let instances = if accel.is_instanced() { &accel.instances[..] } else { &none };
         Ok(Self {
             nodes: Buffer::texels_from_slice(device, "BVH nodes", &accel.nodes)?,
             pages,
             materials: Buffer::from_slice(device, "triangle materials", &accel.triangle_materials)?,
+            instances: Buffer::texels_from_slice(device, "instances", instances)?,
             page_shift: accel.page_shift,
+            is_instanced: accel.is_instanced(),
         })
     }
 
     /// Returns the buffers with their bindings in the scene set. Missing pages repeat the first.
     pub fn bindings(&self) -> Vec<(Binding, &Buffer)> {
         let page = |(index, binding)| (binding, self.pages.get(index).unwrap_or(&self.pages[0]));
-        let mut bindings =
-            vec![(scene::BVH_NODES, &self.nodes), (scene::TRIANGLE_MATERIALS, &self.materials)];
+        let mut bindings = vec![
+            (scene::BVH_NODES, &self.nodes),
+            (scene::TRIANGLE_MATERIALS, &self.materials),
+            (scene::INSTANCES, &self.instances),
+        ];
         bindings.extend(PAGES.into_iter().enumerate().map(page));
         bindings
     }
 
     /// Returns every buffer once, for memory reports.
     pub fn buffers(&self) -> impl Iterator<Item = &Buffer> {
-        [&self.nodes, &self.materials].into_iter().chain(&self.pages)
+        [&self.nodes, &self.materials, &self.instances].into_iter().chain(&self.pages)
     }
 
     /// Returns the specialization of the passes that traverse this geometry.
     pub fn traversal(&self) -> Traversal {
-        Traversal { page_count: self.pages.len() as u32, page_shift: self.page_shift }
+        Traversal {
+            page_count: self.pages.len() as u32,
+            page_shift: self.page_shift,
+            is_instanced: self.is_instanced,
+        }
     }
 }
 
@@ -82,6 +96,8 @@ pub struct Traversal {
     pub page_count: u32,
     /// Base-2 logarithm of the triangles per page.
     pub page_shift: u32,
+    /// True if the tree has two levels.
+    pub is_instanced: bool,
 }
 
 impl Traversal {
@@ -90,8 +106,11 @@ impl Traversal {
         shader: &'static str,
         domain: Domain,
         schedule: Schedule,
-        surfaces: Surfaces,
+        mut surfaces: Surfaces,
     ) -> Kernel {
+        if self.is_instanced {
+            surfaces.features |= SURFACES_INSTANCED;
+        }
         let own = [
             (CONSTANT_TRIANGLE_PAGES, self.page_count),
             (CONSTANT_TRIANGLE_PAGE_SHIFT, self.page_shift),

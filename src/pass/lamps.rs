@@ -60,7 +60,9 @@ impl LampTables {
         let mut sources = Vec::new();
         let mut weights = Vec::new();
         if per_area.iter().any(|&power| power > 0.0) {
-            for (triangle, &material) in (0_u32..).zip(&accel.triangle_materials) {
+            // Surfaces that emit are placed in the world.
+            let placed = &accel.triangle_materials[..accel.placed_count()];
+            for (triangle, &material) in (0_u32..).zip(placed) {
                 let power = per_area[material as usize];
                 if power > 0.0 {
                     sources.push(triangle);
@@ -68,7 +70,7 @@ impl LampTables {
                 }
             }
         }
-        let radius = radius(&scene.geometry.positions);
+        let radius = radius(scene.geometry.extent());
         for (index, lamp) in (0_u32..).zip(&scene.lamps) {
             sources.push(LAMP_BIT | index);
             weights.push(power(&lamp.kind, radius));
@@ -109,14 +111,14 @@ fn area(accel: &Accel, triangle: u32) -> f64 {
 }
 
 /// Radius of a sphere around all positions, metres.
-fn radius(positions: &[[f32; 3]]) -> f32 {
+fn radius(positions: impl Iterator<Item = Vec3>) -> f32 {
     let mut low = Vec3::INFINITY;
     let mut high = Vec3::NEG_INFINITY;
     for position in positions {
-        low = low.min(Vec3::from_array(*position));
-        high = high.max(Vec3::from_array(*position));
+        low = low.min(position);
+        high = high.max(position);
     }
-    if positions.is_empty() { 0.0 } else { 0.5 * (high - low).length() }
+    if low.x > high.x { 0.0 } else { 0.5 * (high - low).length() }
 }
 
 /// Luminous part of the power that a lamp sends into the scene.

@@ -58,7 +58,7 @@ impl Runner {
             film.padded_pixels(),
             rays,
             demand,
-            settings.surfaces.is_textured(),
+            settings.surfaces,
         )?;
         Ok(Self {
             device: Arc::clone(device),

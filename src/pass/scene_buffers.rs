@@ -19,6 +19,7 @@ use crate::{
     scene::{EnvironmentMap, Filter, Scene, environment::EnvironmentTables},
     shader::{
         bindings::{Binding, SCENE, scene as bindings},
+        constants::SURFACES_INSTANCED,
         structs::{self, SceneParameters},
     },
 };
@@ -83,7 +84,8 @@ impl SceneBuffers {
             tables.materials.iter().fold(0, |bits, material| bits | 1 << material.kind);
         let surfaces = Surfaces {
             material_kinds,
-            features: surfaces::features(&scene.materials),
+            features: surfaces::features(&scene.materials)
+                | if geometry.traversal().is_instanced { SURFACES_INSTANCED } else { 0 },
             lamp_count: lamps.choices.len() as u32,
             access: textures.access(),
         };

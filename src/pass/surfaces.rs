@@ -4,8 +4,8 @@ use super::texture_buffers::TextureAccess;
 use crate::{
     brdf::{Material, material::MaterialKind},
     shader::constants::{
-        CONSTANT_MATERIAL_KINDS, CONSTANT_SURFACES, SURFACES_EMITTING, SURFACES_ONE_SIDED,
-        SURFACES_PASSING, SURFACES_SPECULAR, SURFACES_TEXTURED,
+        CONSTANT_MATERIAL_KINDS, CONSTANT_SURFACES, SURFACES_EMITTING, SURFACES_INSTANCED,
+        SURFACES_ONE_SIDED, SURFACES_PASSING, SURFACES_SPECULAR, SURFACES_TEXTURED,
     },
 };
 
@@ -33,6 +33,11 @@ impl Surfaces {
     /// True if textures or vertex colours vary a material.
     pub fn is_textured(&self) -> bool {
         self.features & SURFACES_TEXTURED != 0
+    }
+
+    /// True if the tree has two levels, and hits name an instance.
+    pub fn is_instanced(&self) -> bool {
+        self.features & SURFACES_INSTANCED != 0
     }
 
     /// True if some material emits light.

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use super::steps::PathDemand;
+use super::{steps::PathDemand, surfaces::Surfaces};
 use crate::{
     error::Result,
     gpu::{Buffer, DescriptorSet, Device},
@@ -30,18 +30,19 @@ pub struct WaveBuffers {
     visibility: Buffer,
     paths: Buffer,
     surfaces: Buffer,
+    instances: Buffer,
 }
 
 impl WaveBuffers {
     /// Allocates waves over a film of `padded_pixels` with up to `shadow_rays` rays per hit at a time,
-    /// and no more paths than `demand` allows; surfaces only if `is_textured`. Fails if the device does
-    /// or its limits are exceeded.
+    /// and no more paths than `demand` allows; textures and instances at hits only if `of` needs them.
+    /// Fails if the device does or its limits are exceeded.
     pub fn new(
         device: &Arc<Device>,
         padded_pixels: u32,
         shadow_rays: u32,
         demand: PathDemand,
-        is_textured: bool,
+        of: Surfaces,
     ) -> Result<Self> {
         let capabilities = device.capabilities();
         let most = if capabilities.kind == "software" { SOFTWARE_PATHS } else { GPU_PATHS };
@@ -67,8 +68,10 @@ impl WaveBuffers {
         let hits = make("hits", paths, size_of::<Hit>())?;
         let shadow_rays = make("shadow rays", shadow_ray_count, size_of::<ShadowRay>())?;
         let visibility = make("visibility", shadow_ray_count, size_of::<u32>())?;
-        let surface_count = if is_textured { paths } else { 1 };
+        let surface_count = if of.is_textured() { paths } else { 1 };
         let surfaces = make("hit surfaces", surface_count, size_of::<Surface>())?;
+        let instance_count = if of.is_instanced() { paths } else { 1 };
+        let instances = make("hit instances", instance_count, size_of::<u32>())?;
         let paths = make("paths", paths, size_of::<PathState>())?;
         let bound = [
             (wave::RAYS, &rays),
@@ -80,9 +83,20 @@ impl WaveBuffers {
             (wave::VISIBILITY, &visibility),
             (wave::PATHS, &paths),
             (wave::HIT_SURFACES, &surfaces),
+            (wave::HIT_INSTANCES, &instances),
         ];
         let set = DescriptorSet::new(device, &WAVE, &bound)?;
-        Ok(Self { set, capacity, rays, hits, shadow_rays, visibility, paths, surfaces })
+        Ok(Self {
+            set,
+            capacity,
+            rays,
+            hits,
+            shadow_rays,
+            visibility,
+            paths,
+            surfaces,
+            instances,
+        })
     }
 
     /// Descriptor set 2.
@@ -127,8 +141,16 @@ impl WaveBuffers {
 
     /// Bytes by buffer name.
     pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
-        [&self.rays, &self.hits, &self.shadow_rays, &self.visibility, &self.paths, &self.surfaces]
-            .map(|buffer| (buffer.name().to_owned(), buffer.size()))
-            .into()
+        [
+            &self.rays,
+            &self.hits,
+            &self.shadow_rays,
+            &self.visibility,
+            &self.paths,
+            &self.surfaces,
+            &self.instances,
+        ]
+        .map(|buffer| (buffer.name().to_owned(), buffer.size()))
+        .into()
     }
 }

@@ -1,11 +1,12 @@
-//! Triangles in world space.
+//! Triangles of the scene.
 
-use super::{mesh::Mesh, transform::Transform};
+use super::{instances::Instance, mesh::Mesh, transform::Transform};
 
 /// Largest magnitude of a coordinate, metres; products of four coordinates stay finite in `f32`.
 pub const MAX_COORDINATE: f32 = 1e9;
 
-/// All triangles of the scene in world space; a mesh that is used many times is repeated.
+/// All triangles of the scene in world space, and meshes that instances place there. Large meshes that
+/// are used many times are in memory once ([`super::instances`]).
 #[derive(Clone, Debug, Default)]
 pub struct Geometry {
     /// Vertex positions, metres.
@@ -25,6 +26,10 @@ pub struct Geometry {
     pub triangles: Vec<[u32; 3]>,
     /// Material index per triangle.
     pub materials: Vec<u32>,
+    /// Meshes in their own space, each in memory once. They emit no light and have no instances.
+    pub prototypes: Vec<Geometry>,
+    /// Uses of the prototypes.
+    pub instances: Vec<Instance>,
 }
 
 /// Counts of what [`Geometry::append`] leaves out of a mesh.
@@ -39,6 +44,13 @@ pub struct Dropped {
 }
 
 impl Dropped {
+    /// Adds the counts of another mesh.
+    pub fn add(&mut self, other: Self) {
+        self.degenerate += other.degenerate;
+        self.non_finite += other.non_finite;
+        self.normals += other.normals;
+    }
+
     /// One warning for each count; `of` is the number of triangles of the mesh.
     pub fn warnings(&self, label: &str, of: usize) -> Vec<String> {
         [
@@ -122,7 +134,7 @@ impl Geometry {
 }
 
 /// Appends an attribute of vertices to an array that stays empty until a mesh has the attribute.
-fn extend<T: Clone>(
+pub(super) fn extend<T: Clone>(
     all: &mut Vec<T>,
     own: &[T],
     first_vertex: usize,

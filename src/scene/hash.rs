@@ -7,7 +7,7 @@ use super::{Filter, Scene};
 use crate::{
     brdf::material::{ConductorFresnel, MaterialKind, Surface},
     files::hexadecimal,
-    scene::lamp::LampKind,
+    scene::{Geometry, instances::Instance, lamp::LampKind},
     texture::{Texels, TextureUse},
 };
 
@@ -30,11 +30,7 @@ pub fn hash(scene: &Scene) -> String {
     for material in &scene.materials {
         hasher.material(&material.kind);
     }
-    let geometry = &scene.geometry;
-    hasher.array(bytemuck::cast_slice(&geometry.positions));
-    hasher.array(bytemuck::cast_slice(&geometry.normals));
-    hasher.array(bytemuck::cast_slice(&geometry.triangles));
-    hasher.array(bytemuck::cast_slice(&geometry.materials));
+    hasher.triangles(&scene.geometry);
     // These enter only where they are there, tagged, so that scenes without keep their hashes.
     for (index, material) in scene.materials.iter().enumerate() {
         if material.surface != Surface::default() {
@@ -42,15 +38,13 @@ pub fn hash(scene: &Scene) -> String {
             hasher.surface(&material.surface);
         }
     }
-    let attributes: [&[u8]; 4] = [
-        bytemuck::cast_slice(&geometry.uvs[0]),
-        bytemuck::cast_slice(&geometry.uvs[1]),
-        bytemuck::cast_slice(&geometry.tangents),
-        bytemuck::cast_slice(&geometry.colors),
-    ];
-    for (tag, bytes) in attributes.into_iter().enumerate().filter(|(_, bytes)| !bytes.is_empty()) {
-        hasher.length(tag);
-        hasher.array(bytes);
+    hasher.attributes(&scene.geometry);
+    for prototype in &scene.geometry.prototypes {
+        hasher.triangles(prototype);
+        hasher.attributes(prototype);
+    }
+    for instance in &scene.geometry.instances {
+        hasher.instance(instance);
     }
     for lamp in &scene.lamps {
         hasher.lamp(&lamp.kind);
@@ -70,6 +64,13 @@ pub fn geometry_hash(scene: &Scene) -> String {
     let mut hasher = Hasher(Sha256::new());
     hasher.array(bytemuck::cast_slice(&scene.geometry.positions));
     hasher.array(bytemuck::cast_slice(&scene.geometry.triangles));
+    for prototype in &scene.geometry.prototypes {
+        hasher.array(bytemuck::cast_slice(&prototype.positions));
+        hasher.array(bytemuck::cast_slice(&prototype.triangles));
+    }
+    for instance in &scene.geometry.instances {
+        hasher.instance(instance);
+    }
     hasher.finish()
 }
 
@@ -85,6 +86,33 @@ impl Hasher {
         self.integers(&[environment.width, environment.height]);
         self.floats(&[environment.rotation_rad]);
         self.vectors(&environment.texels);
+    }
+
+    fn triangles(&mut self, geometry: &Geometry) {
+        self.array(bytemuck::cast_slice(&geometry.positions));
+        self.array(bytemuck::cast_slice(&geometry.normals));
+        self.array(bytemuck::cast_slice(&geometry.triangles));
+        self.array(bytemuck::cast_slice(&geometry.materials));
+    }
+
+    fn attributes(&mut self, geometry: &Geometry) {
+        let attributes: [&[u8]; 4] = [
+            bytemuck::cast_slice(&geometry.uvs[0]),
+            bytemuck::cast_slice(&geometry.uvs[1]),
+            bytemuck::cast_slice(&geometry.tangents),
+            bytemuck::cast_slice(&geometry.colors),
+        ];
+        let there = attributes.into_iter().enumerate().filter(|(_, bytes)| !bytes.is_empty());
+        for (tag, bytes) in there {
+            self.length(tag);
+            self.array(bytes);
+        }
+    }
+
+    fn instance(&mut self, instance: &Instance) {
+        let Instance { prototype, world_from_object, first_material, material_mask } = *instance;
+        self.integers(&[prototype, first_material, material_mask]);
+        self.floats(world_from_object.map(|row| row.to_array()).as_flattened());
     }
 
     fn length(&mut self, length: usize) {

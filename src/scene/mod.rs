@@ -6,6 +6,7 @@ pub mod features;
 pub mod file;
 pub mod geometry;
 mod hash;
+pub mod instances;
 pub mod lamp;
 pub mod load;
 pub mod mesh;
@@ -24,6 +25,7 @@ use crate::brdf::Material;
 pub use camera::Camera;
 pub use environment::EnvironmentMap;
 pub use geometry::Geometry;
+pub use instances::Instance;
 pub use hash::{environment_hash, geometry_hash};
 pub use lamp::Lamp;
 

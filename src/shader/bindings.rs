@@ -181,6 +181,8 @@ binding_tables! {
         30 TRIANGLE_ATTRIBUTES_2: texels R32Uint;
         /// Fourth page of attributes.
         31 TRIANGLE_ATTRIBUTES_3: texels R32Uint;
+        /// Instances in the order of the upper level of the tree, eight texels each.
+        32 INSTANCES: texels Rgba32Uint;
     }
 
     /// Set 1 of the samplers `product` and `visibility`.
@@ -263,6 +265,8 @@ binding_tables! {
         7 SHADOW_RAY_TEXELS: texels Rg32Uint;
         /// Surface at the hit of each path, in scenes with textures.
         8 HIT_SURFACES: array Surface;
+        /// Instance that each path has hit, in scenes with instances.
+        9 HIT_INSTANCES: array uint;
     }
 
     /// Set 3: the film, which grows by every wave.

@@ -126,6 +126,8 @@ constants! {
     SURFACES_TEXTURED = 8;
     /// Some surfaces emit light.
     SURFACES_EMITTING = 16;
+    /// Meshes are placed by instances: the tree has two levels.
+    SURFACES_INSTANCED = 32;
 
     // Bits of `Wave::aovs`: film layers to write.
     /// Albedo.
@@ -154,6 +156,15 @@ constants! {
     NO_MATERIAL = 0xffff_ffff;
     /// [`Hit::triangle`](super::structs::Hit::triangle) of a ray that met nothing.
     NO_TRIANGLE = 0xffff_ffff;
+    /// Instance of a ray in the upper level of the tree, and of hits in scenes without instances.
+    NO_INSTANCE = 0xffff_ffff;
+
+    // Instances, as `accel::instances::Record` lays them out.
+    /// Texels of a record: three rows of object from world, three of world from object, places of
+    /// node and material, margins.
+    INSTANCE_TEXELS = 8;
+    /// Bit of a record's flags: its transform mirrors.
+    INSTANCE_MIRRORS = 1;
 
     // Values of `Material::kind`.
     /// Lambertian.

@@ -126,7 +126,7 @@ impl Study<'_> {
             hash: scene.hash.clone(),
             width: scene.film.width,
             height: scene.film.height,
-            triangles: scene.geometry.triangles.len() as u64,
+            triangles: scene.geometry.triangle_count(),
             reference: None,
         });
         if self.plan.compares() {

@@ -25,7 +25,7 @@ impl RenderJob<'_> {
             version: metadata.version.clone(),
             scene: metadata.scene.clone(),
             scene_hash: metadata.scene_hash.clone(),
-            triangles: self.scene.geometry.triangles.len() as u64,
+            triangles: self.scene.geometry.triangle_count(),
             width: self.window.width,
             height: self.window.height,
             device: metadata.device.clone(),

@@ -476,8 +476,7 @@ fn guide_parameters(
     missing_slots: usize,
 ) -> GuideParameters {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for corner in scene.geometry.triangles.iter().flatten() {
-        let position = Vec3::from(scene.geometry.positions[*corner as usize]);
+    for position in scene.geometry.used_extent() {
         low = low.min(position);
         high = high.max(position);
     }

@@ -7,12 +7,12 @@ features! {
     GLTF;
     GLTF_FILE Done "`.gltf` and `.glb`, buffers beside the file or inline" "";
     GLTF_NODES Done "nodes with transforms, mirrored ones too"
-        "a mesh of several nodes is repeated in memory";
+        "many copies of a mesh are one in memory";
     GLTF_TRIANGLES Done "triangles, strips and fans, with or without indices" "";
     GLTF_NORMALS Done "vertex normals" "flat-shaded without";
     GLTF_SPARSE Done "sparse accessors" "";
     GLTF_QUANTIZATION Done "`KHR_mesh_quantization`" "";
-    GLTF_INSTANCING Done "`EXT_mesh_gpu_instancing`" "";
+    GLTF_INSTANCING Done "`EXT_mesh_gpu_instancing`" "likewise";
     GLTF_PERSPECTIVE Done "perspective cameras"
         "the first, or that of `--camera`; near and far planes do not clip";
     GLTF_CAMERAS Ignored "cameras that are not used" "";

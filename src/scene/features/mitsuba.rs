@@ -15,7 +15,7 @@ features! {
         "smooth normals where the file has none, unless `face_normals`";
     MI_QUADRIC Done "shapes `rectangle`, `cube`, `sphere`, `disk`, `cylinder`"
         "round ones of 128 segments";
-    MI_INSTANCE Done "`shapegroup` and `instance`" "repeated in memory";
+    MI_INSTANCE Done "`shapegroup` and `instance`" "many copies are one mesh in memory";
     MI_SIDES Done "`flip_normals`, `twosided`"
         "without `twosided` a surface that lets nothing through is black from behind";
     MI_TWO_MODELS Ignored "second model of `twosided`" "the first is on both sides";

@@ -11,7 +11,8 @@ features! {
         `ConcatTransform`, `CoordinateSystem`, `CoordSysTransform`"
         "a camera that does not mirror shows a left-handed world, which is mirrored as a whole";
     PBRT_STATE Done "`AttributeBegin`, `TransformBegin`, `Attribute`, `ReverseOrientation`" "";
-    PBRT_OBJECT Done "`ObjectBegin`, `ObjectInstance`" "repeated in memory";
+    PBRT_OBJECT Done "`ObjectBegin`, `ObjectInstance`"
+        "many copies are one mesh in memory";
     PBRT_MESH Done "`trianglemesh`, `plymesh` (`.ply`, `.ply.gz`)"
         "flat-shaded without normals; texture coordinates 00, 10, 11 without any";
     PBRT_QUADRIC Mapped "`sphere`, `disk`, `cylinder`, `bilinearmesh`, `loopsubdiv`"

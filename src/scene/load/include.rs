@@ -11,6 +11,7 @@ use crate::{
     scene::{
         Geometry, Lamp, Scene, features,
         file::{IncludeEntry, IncludeKeys},
+        instances::Instance,
         lamp::LampKind,
         mesh::Mesh,
         pbrt,
@@ -63,18 +64,83 @@ impl Loader<'_> {
         self.check_counts(vertices, triangles)?;
         let transform = Transform::new(scale.0, *rotate_deg, *translate);
         let first_vertex = geometry.positions.len();
-        let Geometry { positions, normals, uvs, tangents, colors, triangles, materials: of } =
-            placed;
-        let count = triangles.len();
+        let count = placed.triangle_count() as usize;
+        let Geometry {
+            positions,
+            normals,
+            uvs,
+            tangents,
+            colors,
+            triangles,
+            materials: of,
+            prototypes,
+            instances,
+        } = placed;
+        let emits: Vec<bool> =
+            materials.iter().map(|material| material.surface.emission.is_some()).collect();
+        let moved = Moved { transform: &transform, places: &places, emits: &emits };
+        self.include_instances(&label, geometry, prototypes, &instances, &moved)?;
         let mesh = Mesh { positions, normals, uvs, tangents, colors, triangles, ..Mesh::default() };
         let dropped = geometry.append(&mesh, &transform, |index| places[of[index] as usize]);
-        self.check_extent(&label, &geometry.positions[first_vertex..])?;
+        let positions = geometry.positions[first_vertex..].iter().copied().map(Vec3::from);
+        self.check_extent(&label, positions)?;
         warnings.extend(dropped.warnings(&label, count));
         if count == 0 && lamps.is_empty() {
             warnings.push(format!("{label}: the file has no triangles and no lamps"));
         }
         Ok(lamps.into_iter().map(|lamp| place_lamp(lamp, &transform)).collect())
     }
+}
+
+impl Loader<'_> {
+    /// Takes over the instances of an included file.
+    fn include_instances(
+        &self,
+        label: &str,
+        geometry: &mut Geometry,
+        prototypes: Vec<Geometry>,
+        instances: &[Instance],
+        moved: &Moved<'_>,
+    ) -> Result<()> {
+        let Moved { transform, places, emits } = *moved;
+        let first_prototype = geometry.prototypes.len() as u32;
+        geometry.prototypes.extend(prototypes);
+        let boxes = geometry.prototypes();
+        for instance in instances {
+            // In files of other formats an instance has one material.
+            let prototype = first_prototype + instance.prototype;
+            let first_material = places[instance.first_material as usize];
+            let placed = Instance { prototype, first_material, ..*instance };
+            let moved = placed.moved(transform).ok_or_else(|| {
+                self.error(format!("{label}: expected a placement of instances with an inverse"))
+            })?;
+            self.check_extent(label, boxes[prototype as usize].corners(&moved))?;
+            if emits[first_material as usize] {
+                // A material of the scene may emit in place of one of the file that does not.
+                let mesh = std::mem::take(&mut geometry.prototypes[prototype as usize]);
+                let vertices = geometry.positions.len() + mesh.positions.len();
+                let checked =
+                    self.check_counts(vertices, geometry.triangles.len() + mesh.triangles.len());
+                if checked.is_ok() {
+                    geometry.place_instance(&moved, &mesh);
+                }
+                geometry.prototypes[prototype as usize] = mesh;
+                checked?;
+            } else {
+                geometry.instances.push(moved);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// An included file in the scene.
+struct Moved<'a> {
+    transform: &'a Transform,
+    /// Its materials among those of the scene.
+    places: &'a [u32],
+    /// Materials of the scene that emit light.
+    emits: &'a [bool],
 }
 
 /// Materials, triangles and lamps of an included file.
@@ -109,7 +175,7 @@ impl Loader<'_> {
                  objects"
             )
         })?;
-        let mut mesh = Mesh::read(path, warnings)?;
+        let mut mesh = Mesh::read_whole(path, warnings)?;
         inputs.push(path.to_path_buf());
         inputs.extend_from_slice(&mesh.side_files);
         let mut ignored = mesh.ignored_in_materials();

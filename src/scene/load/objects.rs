@@ -5,6 +5,8 @@ use std::{
     path::PathBuf,
 };
 
+use glam::Vec3;
+
 use super::Loader;
 use crate::{
     brdf::Material,
@@ -15,6 +17,7 @@ use crate::{
         file::{ObjectEntry, ObjectSource},
         geometry::MAX_COORDINATE,
         mesh::{Mesh, MeshMaterial},
+        instances::{Budget, Instance, Prototype},
         shapes::check_triangles,
         transform::Transform,
     },
@@ -54,7 +57,7 @@ impl Loader<'_> {
             .collect();
         // Read all meshes before placing any, so that the arrays are allocated once.
         let mut meshes = HashMap::new();
-        let (mut vertices, mut triangles, mut shape_triangles) = (0, 0, 0);
+        let mut shape_triangles = 0;
         for (index, object) in objects.iter().enumerate() {
             let key = self.mesh_key(object);
             if !meshes.contains_key(&key) {
@@ -74,22 +77,43 @@ impl Loader<'_> {
                         if !textured.contains(&key) {
                             mesh.uvs = Default::default();
                         }
+                        shape_triangles += mesh.triangles.len();
+                        self.check_shapes(index, object, shape_triangles)?;
                         mesh
                     }
                 };
                 meshes.insert(key.clone(), mesh);
+            }
+        }
+        let mut budget = Budget::default();
+        let mut repeated = HashSet::new();
+        let mut seen = HashSet::new();
+        for object in objects {
+            let key = self.mesh_key(object);
+            let copies = uses.get(&key).copied().unwrap_or(0);
+            if copies > 1
+                && seen.insert(key.clone())
+                && budget.takes_instances(copies, meshes[&key].triangles.len())
+            {
+                repeated.insert(key);
+            }
+        }
+        let (mut vertices, mut triangles, mut shape_triangles) = (0_usize, 0_usize, 0);
+        for (index, object) in objects.iter().enumerate() {
+            let key = self.mesh_key(object);
+            if repeated.contains(&key) && !emits(object, &meshes[&key], materials) {
+                continue;
             }
             let count = meshes[&key].triangles.len();
             vertices += meshes[&key].positions.len();
             triangles += count;
             if let ObjectSource::Shape { .. } = object.source {
                 shape_triangles += count;
-                check_triangles(shape_triangles).map_err(|message| {
-                    self.error(format!("{}: {message}", object_label(index, object)))
-                })?;
+                self.check_shapes(index, object, shape_triangles)?;
             }
         }
         self.check_counts(vertices, triangles)?;
+        let mut prototypes: HashMap<PathBuf, Prototype> = HashMap::new();
         let mut geometry = Geometry::default();
         geometry.positions.reserve_exact(vertices);
         geometry.normals.reserve_exact(vertices);
@@ -97,7 +121,17 @@ impl Loader<'_> {
         geometry.materials.reserve_exact(triangles);
         for (index, object) in objects.iter().enumerate() {
             let key = self.mesh_key(object);
-            self.place(index, object, &meshes[&key], &mut geometry, materials, warnings)?;
+            let mesh = &meshes[&key];
+            let label = object_label(index, object);
+            let is_instance = repeated.contains(&key) && !emits(object, mesh, materials);
+            if is_instance && !prototypes.contains_key(&key) {
+                let own = |triangle| run_material(mesh, triangle) as u32;
+                let (prototype, dropped) = geometry.add_prototype(mesh, own);
+                warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
+                prototypes.insert(key.clone(), prototype);
+            }
+            let prototype = prototypes.get(&key).copied().filter(|_| is_instance);
+            self.place(&label, object, mesh, prototype, &mut geometry, materials, warnings)?;
             // Drop a mesh after its last use, so that a large one is not held twice for long.
             let left = uses.get_mut(&key).map_or(0, |left| {
                 *left -= 1;
@@ -116,6 +150,11 @@ impl Loader<'_> {
             ObjectSource::Mesh(mesh) => self.folder.join(mesh),
             ObjectSource::Shape { shape, .. } => PathBuf::from(format!("{shape:?}")),
         }
+    }
+
+    fn check_shapes(&self, index: usize, object: &ObjectEntry, triangles: usize) -> Result<()> {
+        let label = || object_label(index, object);
+        check_triangles(triangles).map_err(|message| self.error(format!("{}: {message}", label())))
     }
 
     fn check_placement(&self, label: &str, object: &ObjectEntry) -> Result<()> {
@@ -178,8 +217,12 @@ impl Loader<'_> {
     }
 
     /// Rejects an object that lies too far out for traversal.
-    pub(super) fn check_extent(&self, label: &str, positions: &[[f32; 3]]) -> Result<()> {
-        let distances = positions.iter().flatten().map(|coordinate| coordinate.abs());
+    pub(super) fn check_extent(
+        &self,
+        label: &str,
+        positions: impl IntoIterator<Item = Vec3>,
+    ) -> Result<()> {
+        let distances = positions.into_iter().map(|position| position.abs().max_element());
         let farthest = distances.fold(0.0, f32::max);
         self.check(farthest <= MAX_COORDINATE, || {
             format!(
@@ -189,17 +232,19 @@ impl Loader<'_> {
         })
     }
 
-    /// Appends an object to the geometry, with the materials of its mesh file if it names none.
+    /// Appends an object to the geometry, as an instance of `prototype` or placed, with the materials
+    /// of its mesh file if it names none.
+    #[expect(clippy::too_many_arguments, reason = "an object and all that it adds to")]
     fn place(
         &self,
-        index: usize,
+        label: &str,
         object: &ObjectEntry,
         mesh: &Mesh,
+        prototype: Option<Prototype>,
         geometry: &mut Geometry,
         materials: &mut Vec<Material>,
         warnings: &mut Vec<String>,
     ) -> Result<()> {
-        let label = object_label(index, object);
         let transform = Transform::new(object.scale, object.rotate_deg, object.translate);
         let first_vertex = geometry.positions.len();
         let named = object
@@ -207,9 +252,7 @@ impl Loader<'_> {
             .as_ref()
             .and_then(|name| materials.iter().position(|material| material.name == *name));
         let first_own = materials.len();
-        let dropped = if let Some(material) = named {
-            geometry.append(mesh, &transform, |_| material as u32)
-        } else {
+        if named.is_none() {
             let colored =
                 !mesh.runs.is_empty() && mesh.runs.iter().all(|run| run.material.is_some());
             self.check(colored, || {
@@ -223,20 +266,52 @@ impl Loader<'_> {
                 let name = format!("{object}/{}", material.name);
                 Material { name, ..material.clone() }
             }));
-            geometry.append(mesh, &transform, |triangle| {
-                let run = mesh.runs.partition_point(|run| run.first_triangle <= triangle) - 1;
-                (first_own + mesh.runs[run].material.unwrap_or(0)) as u32
-            })
-        };
+        }
         let own = named.map_or(&materials[first_own..], |index| &materials[index..=index]);
-        warnings.extend(own.iter().filter_map(|material| lacking_uvs(&label, material, mesh)));
+        warnings.extend(own.iter().filter_map(|material| lacking_uvs(label, material, mesh)));
         let of = mesh.triangles.len();
-        self.check_extent(&label, &geometry.positions[first_vertex..])?;
-        warnings.extend(dropped.warnings(&label, of));
+        let first_material = named.unwrap_or(first_own) as u32;
+        let instance = prototype.and_then(|prototype| {
+            let replaces = named.is_some();
+            Some((prototype, Instance::new(prototype.index, &transform, first_material, replaces)?))
+        });
+        if let Some((prototype, instance)) = instance {
+            self.check_extent(label, prototype.corners(&instance))?;
+            geometry.instances.push(instance);
+        } else {
+            let vertices = first_vertex + mesh.positions.len();
+            self.check_counts(vertices, geometry.triangles.len() + of)?;
+            let dropped = match named {
+                Some(material) => geometry.append(mesh, &transform, |_| material as u32),
+                None => geometry.append(mesh, &transform, |triangle| {
+                    (first_own + run_material(mesh, triangle)) as u32
+                }),
+            };
+            let placed = geometry.positions[first_vertex..].iter().copied().map(Vec3::from);
+            self.check_extent(label, placed)?;
+            warnings.extend(dropped.warnings(label, of));
+        }
         if of == 0 {
             warnings.push(format!("{label}: the mesh has no triangles"));
         }
         Ok(())
+    }
+}
+
+/// Material of a triangle among those of its mesh file.
+fn run_material(mesh: &Mesh, triangle: usize) -> usize {
+    let run = mesh.runs.partition_point(|run| run.first_triangle <= triangle);
+    run.checked_sub(1).and_then(|run| mesh.runs[run].material).unwrap_or(0)
+}
+
+/// Tests whether an object emits light: then it is placed, since lamps are triangles in the world.
+fn emits(object: &ObjectEntry, mesh: &Mesh, materials: &[Material]) -> bool {
+    match &object.material {
+        Some(name) => materials
+            .iter()
+            .find(|material| material.name == *name)
+            .is_some_and(|material| material.surface.emission.is_some()),
+        None => mesh.materials.iter().any(|own| own.material.surface.emission.is_some()),
     }
 }
 

@@ -19,7 +19,7 @@ impl Loader<'_> {
         let mut contents = pbrt::read(self.path)?;
         let camera = self.camera(&contents.camera)?;
         self.check_film(&contents.film)?;
-        self.check_extent("the scene", &contents.geometry.positions)?;
+        self.check_extent("the scene", contents.geometry.extent())?;
         let mut warnings = contents.warnings;
         let mut environment = contents.environment;
         if let Some(map) = &options.environment {

@@ -15,7 +15,8 @@ use crate::{
         Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Scene,
         features::{self, Ignored},
         file::CameraEntry,
-        mesh::{Mesh, MeshCamera, MeshMaterial, Perspective},
+        instances::{Instance, MAX_INSTANCES, bounds},
+        mesh::{Mesh, MeshCamera, MeshMaterial, Perspective, RepeatedMesh},
         transform::Transform,
     },
 };
@@ -32,7 +33,7 @@ impl Loader<'_> {
     /// Builds a scene from the mesh file at the loader's path.
     pub(super) fn whole(&self, options: &LoadOptions) -> Result<Scene> {
         let mut warnings = Vec::new();
-        let mesh = Mesh::read(self.path, &mut warnings)?;
+        let mesh = Mesh::read_whole(self.path, &mut warnings)?;
         let mut ignored = mesh.ignored_in_materials();
         let chosen = self.choose_camera(&mesh.cameras, options.camera.as_deref(), &mut ignored)?;
         let (materials, geometry) = self.place_whole(&mesh, &mut ignored, &mut warnings)?;
@@ -116,7 +117,10 @@ impl Loader<'_> {
         };
         let mut materials: Vec<_> = mesh.materials.iter().enumerate().map(named).collect();
         let lacking = materials.len();
-        if mesh.runs.is_empty() || mesh.runs.iter().any(|run| run.material.is_none()) {
+        if mesh.runs.is_empty()
+            || mesh.runs.iter().any(|run| run.material.is_none())
+            || mesh.repeated.iter().any(|repeated| repeated.material.is_none())
+        {
             // An OBJ file leaves the material open; glTF defines the one that is meant.
             materials.push(if files::extension(self.path) == "obj" {
                 if !mesh.triangles.is_empty() {
@@ -142,11 +146,57 @@ impl Loader<'_> {
             let run = next.checked_sub(1).and_then(|run| mesh.runs[run].material);
             run.unwrap_or(lacking) as u32
         });
-        self.check_extent("the scene", &geometry.positions)?;
+        for repeated in &mesh.repeated {
+            let material = repeated.material.unwrap_or(lacking);
+            let emits = materials[material].surface.emission.is_some();
+            self.place_repeated(repeated, material as u32, emits, &mut geometry, warnings)?;
+        }
+        self.check_extent("the scene", geometry.extent())?;
         let label = self.path.display().to_string();
-        warnings.extend(materials.iter().filter_map(|own| lacking_uvs(&label, own, mesh)));
+        let is_repeated = |index: usize| {
+            mesh.repeated.iter().any(|repeated| repeated.material == Some(index))
+        };
+        let copied = materials.iter().enumerate().filter(|(index, _)| !is_repeated(*index));
+        warnings.extend(copied.filter_map(|(_, own)| lacking_uvs(&label, own, mesh)));
         warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
         Ok((materials, geometry))
+    }
+
+    /// Adds the instances of a mesh that the file repeats; copies, if it emits light.
+    fn place_repeated(
+        &self,
+        repeated: &RepeatedMesh,
+        material: u32,
+        emits: bool,
+        geometry: &mut Geometry,
+        warnings: &mut Vec<String>,
+    ) -> Result<()> {
+        let mesh = &*repeated.mesh;
+        let count = geometry.instances.len() + repeated.places.len();
+        self.check(count <= MAX_INSTANCES, || {
+            format!("{count} instances, at most {MAX_INSTANCES} can be used")
+        })?;
+        let (prototype, mut dropped) = geometry.add_prototype(mesh, |_| 0);
+        for place in &repeated.places {
+            let Some(transform) = Transform::from_matrix(place.as_dmat4()) else {
+                // Scaled to nothing.
+                dropped.degenerate += mesh.triangles.len();
+                continue;
+            };
+            let instance = Instance::new(prototype.index, &transform, material, true);
+            match instance.filter(|_| !emits) {
+                Some(instance) => geometry.instances.push(instance),
+                None => {
+                    let vertices = geometry.positions.len() + mesh.positions.len();
+                    let triangles = geometry.triangles.len() + mesh.triangles.len();
+                    self.check_counts(vertices, triangles)?;
+                    dropped.add(geometry.append(mesh, &transform, |_| material));
+                }
+            }
+        }
+        let label = format!("{}: a mesh of several nodes", self.path.display());
+        warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
+        Ok(())
     }
 
     /// The map of `--environment`, else white.
@@ -168,14 +218,7 @@ impl Loader<'_> {
 
     /// Camera that sees the whole bounding sphere of the bounding box.
     fn frame(&self, geometry: &Geometry) -> Result<CameraEntry> {
-        let corners = geometry.triangles.iter().flatten();
-        let positions =
-            corners.map(|&corner| Vec3::from_array(geometry.positions[corner as usize]));
-        let bounds = positions.fold(None, |bounds, position| match bounds {
-            None => Some((position, position)),
-            Some((low, high)) => Some((position.min(low), position.max(high))),
-        });
-        let Some((low, high)) = bounds else {
+        let Some([low, high]) = bounds(geometry.used_extent()) else {
             return Err(self.error("expected triangles or a camera, found neither"));
         };
         let (centre, radius) = (0.5 * (low + high), 0.5 * (high - low).length());

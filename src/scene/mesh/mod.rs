@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use glam::Mat4;
 
-use super::{features::Ignored, lamp::Lamp};
+use super::{features::Ignored, instances::Budget, lamp::Lamp};
 use crate::{
     brdf::Material,
     error::{Error, Result},
@@ -48,8 +48,21 @@ pub struct Mesh {
     pub cameras: Vec<MeshCamera>,
     /// Lamps of the file.
     pub lamps: Vec<Lamp>,
+    /// Meshes that the file repeats so often that they are not copied; none by [`Mesh::read`].
+    pub repeated: Vec<RepeatedMesh>,
     /// Files beside the mesh file that were read for it: material libraries, buffers, images.
     pub side_files: Vec<PathBuf>,
+}
+
+/// Mesh that a file places many times.
+#[derive(Clone, Debug)]
+pub struct RepeatedMesh {
+    /// The mesh in its own space, without materials of its own.
+    pub mesh: Box<Mesh>,
+    /// Index into [`Mesh::materials`] of the whole; none if the file gives no material.
+    pub material: Option<usize>,
+    /// Where it stands in the space of the file.
+    pub places: Vec<Mat4>,
 }
 
 /// Start of a run of triangles of one material; it ends where the next begins.
@@ -107,13 +120,24 @@ impl Mesh {
         match files::extension(path).as_str() {
             "ply" => ply::read(path, warnings),
             "obj" => obj::read(path, warnings),
-            "gltf" | "glb" => gltf::read(path, warnings),
+            "gltf" | "glb" => gltf::read(path, None, warnings),
             found => {
                 let found =
                     if found.is_empty() { "no extension".into() } else { format!(".{found}") };
                 let expected = "expected a mesh in .ply, .obj, .gltf or .glb";
                 Err(Error::format(path, format!("{expected}, found {found}")))
             }
+        }
+    }
+
+    /// As [`Mesh::read`], with what a glTF file repeats in [`Mesh::repeated`].
+    ///
+    /// # Errors
+    /// As [`Mesh::read`].
+    pub fn read_whole(path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
+        match files::extension(path).as_str() {
+            "gltf" | "glb" => gltf::read(path, Some(Budget::default()), warnings),
+            _ => Self::read(path, warnings),
         }
     }
 
@@ -142,6 +166,9 @@ impl Mesh {
             if let Some(material) = run.material.filter(|_| run.first_triangle < end) {
                 used[material] = true;
             }
+        }
+        for repeated in self.repeated.iter().filter_map(|repeated| repeated.material) {
+            used[repeated] = true;
         }
         self.materials.iter().zip(used).filter_map(|(material, used)| used.then_some(material))
     }

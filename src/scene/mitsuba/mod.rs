@@ -32,6 +32,7 @@ use self::{bsdfs::Model, document::Document, shapes::Shape};
 use super::{
     Camera, EnvironmentMap, FilmSettings, Geometry, Lamp,
     features::{self, Ignored},
+    instances::{Budget, Prototype},
 };
 use crate::{brdf::Material, error::Result, texture::Texture};
 
@@ -68,7 +69,10 @@ struct Reader<'a> {
     geometry: Geometry,
     /// Shapes of groups by their element.
     shapes: HashMap<usize, Arc<Shape>>,
-    /// Triangles of shapes that are not in a file, and of instances.
+    /// Prototypes of shapes of groups by their element, and by a transform that mirrors.
+    prototypes: HashMap<(usize, bool), Prototype>,
+    budget: Budget,
+    /// Triangles of shapes that are not in a file, and of copies.
     repeated_triangles: usize,
     inputs: Vec<PathBuf>,
     ignored: Ignored,
@@ -91,6 +95,8 @@ pub fn read(path: &Path, camera: Option<&str>) -> Result<Parts> {
         material_numbers: HashMap::new(),
         geometry: Geometry::default(),
         shapes: HashMap::new(),
+        prototypes: HashMap::new(),
+        budget: Budget::default(),
         repeated_triangles: 0,
         inputs: document.files.clone(),
         ignored: Ignored::default(),

@@ -1,6 +1,6 @@
 //! Shapes → triangles in world space with their materials.
 
-use std::sync::Arc;
+use std::{borrow::Cow, sync::Arc};
 
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
@@ -10,7 +10,12 @@ use crate::{
     error::Result,
     files,
     scene::{
-        features, geometry::MAX_COORDINATE, mesh::Mesh, quadrics, shapes::check_triangles,
+        features,
+        geometry::MAX_COORDINATE,
+        instances::{Instance, MAX_INSTANCES},
+        mesh::Mesh,
+        quadrics,
+        shapes::check_triangles,
         transform::Transform,
     },
 };
@@ -38,6 +43,39 @@ struct Flips {
     mirrored: bool,
 }
 
+impl Shape {
+    /// The mesh as it is under a transform that mirrors or not.
+    fn turned(&self, mirrors: bool) -> Cow<'_, Mesh> {
+        let flips = self.flips.always != (self.flips.mirrored && mirrors);
+        let mirrors_tangents = mirrors && !self.mesh.tangents.is_empty();
+        if !flips && !mirrors_tangents {
+            return Cow::Borrowed(&self.mesh);
+        }
+        let mut mesh = self.mesh.clone();
+        if flips {
+            turn_inside_out(&mut mesh);
+        }
+        if mirrors_tangents {
+            // Mitsuba's bitangent is the normal × the tangent in the world.
+            mesh.tangents.iter_mut().for_each(|tangent| tangent[3] = -tangent[3]);
+        }
+        Cow::Owned(mesh)
+    }
+}
+
+/// Rejects a shape that lies too far out for traversal.
+fn check_extent(node: Node<'_>, positions: impl IntoIterator<Item = Vec3>) -> Result<()> {
+    let farthest = positions.into_iter().map(|position| position.abs().max_element());
+    let farthest = farthest.fold(0.0, f32::max);
+    if farthest > MAX_COORDINATE {
+        return Err(node.error(format!(
+            "a vertex has the coordinate {farthest:e}; expected at most {MAX_COORDINATE:e} m: scale \
+             or move the shape"
+        )));
+    }
+    Ok(())
+}
+
 impl Reader<'_> {
     /// Reads a shape, and places it unless it is a group.
     pub(super) fn shape(&mut self, node: Node<'_>) -> Result<()> {
@@ -62,11 +100,46 @@ impl Reader<'_> {
                 shape
             }
         };
+        let triangles = shape.mesh.triangles.len();
+        let matrix = outer * shape.to_world;
+        // Surfaces that emit are placed: lamps are triangles in the world.
+        let emits = self.materials[shape.material as usize].surface.emission.is_some();
+        if is_shared && !emits && self.budget.takes_instances(1, triangles) {
+            return self.add_instance(node, &shape, matrix);
+        }
         if is_shared || !shape.is_file {
-            self.repeated_triangles += shape.mesh.triangles.len();
+            self.repeated_triangles += triangles;
             check_triangles(self.repeated_triangles).map_err(|message| node.error(message))?;
         }
-        self.append(node, &shape, outer * shape.to_world)
+        self.append(node, &shape, matrix)
+    }
+
+    /// Adds an instance of a shape of a group, whose mesh is in memory once for each way to turn it.
+    fn add_instance(&mut self, node: Node<'_>, shape: &Shape, matrix: DMat4) -> Result<()> {
+        if self.geometry.instances.len() >= MAX_INSTANCES {
+            return Err(node.error(format!("at most {MAX_INSTANCES} instances can be used")));
+        }
+        let Some(transform) = Transform::from_matrix(matrix) else {
+            return Err(node.error("to_world: expected a matrix with an inverse"));
+        };
+        let key = (node.index, transform.mirrors);
+        let prototype = match self.prototypes.get(&key) {
+            Some(prototype) => *prototype,
+            None => {
+                let mesh = shape.turned(transform.mirrors);
+                let (prototype, dropped) = self.geometry.add_prototype(&mesh, |_| 0);
+                let label = format!("{}: shape of {}", self.document.files[0].display(), node.place());
+                self.warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
+                self.prototypes.insert(key, prototype);
+                prototype
+            }
+        };
+        let Some(instance) = Instance::new(prototype.index, &transform, shape.material, true) else {
+            return self.append(node, shape, matrix);
+        };
+        check_extent(node, prototype.corners(&instance))?;
+        self.geometry.instances.push(instance);
+        Ok(())
     }
 
     fn instance(&mut self, node: Node<'_>, outer: DMat4, groups_left: usize) -> Result<()> {
@@ -101,33 +174,11 @@ impl Reader<'_> {
                 "{vertices} vertices and {triangles} triangles, at most {limit} can be used"
             )));
         }
-        let flips = shape.flips.always != (shape.flips.mirrored && transform.mirrors);
-        let mirrors_tangents = transform.mirrors && !shape.mesh.tangents.is_empty();
-        let mut changed = None;
-        if flips || mirrors_tangents {
-            let mut mesh = shape.mesh.clone();
-            if flips {
-                turn_inside_out(&mut mesh);
-            }
-            if mirrors_tangents {
-                // Mitsuba's bitangent is the normal × the tangent in the world.
-                mesh.tangents.iter_mut().for_each(|tangent| tangent[3] = -tangent[3]);
-            }
-            changed = Some(mesh);
-        }
-        let mesh = changed.as_ref().unwrap_or(&shape.mesh);
-        let dropped = self.geometry.append(mesh, &transform, |_| shape.material);
+        let mesh = shape.turned(transform.mirrors);
+        let dropped = self.geometry.append(&mesh, &transform, |_| shape.material);
         let label = format!("{}: shape of {}", self.document.files[0].display(), node.place());
         self.warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
-        let coordinates = self.geometry.positions[first_vertex..].iter().flatten();
-        let farthest = coordinates.fold(0.0, |farthest: f32, c| farthest.max(c.abs()));
-        if farthest > MAX_COORDINATE {
-            return Err(node.error(format!(
-                "a vertex has the coordinate {farthest:e}; expected at most {MAX_COORDINATE:e} m: \
-                 scale or move the shape"
-            )));
-        }
-        Ok(())
+        check_extent(node, self.geometry.positions[first_vertex..].iter().copied().map(Vec3::from))
     }
 
     fn read_shape(&mut self, node: Node<'_>) -> Result<Shape> {

@@ -40,6 +40,7 @@ use super::{
     features::{self, Ignored},
     file::CameraEntry,
     geometry::Dropped,
+    instances::{Budget, Instance, MAX_INSTANCES},
     mesh::Mesh,
     transform::Transform,
 };
@@ -116,6 +117,7 @@ pub fn read(path: &Path) -> Result<Contents> {
         geometry: Geometry::default(),
         dropped: Dropped::default(),
         triangle_count: 0,
+        budget: Budget::default(),
     };
     for shape in &description.shapes {
         if let Some((mesh, material)) = builder.prepare(shape, false)? {
@@ -129,9 +131,9 @@ pub fn read(path: &Path) -> Result<Contents> {
         }
         for shape in object.shapes.iter().filter(|_| !object.instances.is_empty()) {
             let Some((mesh, material)) = builder.prepare(shape, true)? else { continue };
-            for instance in &object.instances {
-                builder.place(&mesh, material, shape, instance.world_from_object)?;
-            }
+            let places: Vec<_> =
+                object.instances.iter().map(|instance| instance.world_from_object).collect();
+            builder.place_all(&mesh, material, shape, &places)?;
         }
     }
     let environment = lights.environment().map_err(|message| Error::scene(path, message))?;
@@ -187,6 +189,7 @@ struct Builder<'a> {
     geometry: Geometry,
     dropped: Dropped,
     triangle_count: usize,
+    budget: Budget,
 }
 
 impl Builder<'_> {
@@ -267,6 +270,40 @@ impl Builder<'_> {
         Ok(kept)
     }
 
+    /// Puts a mesh of an object at the `places` of its instances: one in memory if they are many.
+    fn place_all(
+        &mut self,
+        mesh: &Mesh,
+        material: u32,
+        shape: &Shape,
+        places: &[DMat4],
+    ) -> Result<()> {
+        let is_instanced =
+            places.len() > 1 && self.budget.takes_instances(places.len(), mesh.triangles.len());
+        if !is_instanced {
+            return places.iter().try_for_each(|place| self.place(mesh, material, shape, *place));
+        }
+        let count = self.geometry.instances.len() + places.len();
+        if count > MAX_INSTANCES {
+            let message = format!("{count} instances, at most {MAX_INSTANCES} can be used");
+            return Err(shape.entity.error(message));
+        }
+        let (prototype, dropped) = self.geometry.add_prototype(mesh, |_| 0);
+        let prototype = prototype.index;
+        self.triangle_count += mesh.triangles.len();
+        self.dropped.add(dropped);
+        for place in places {
+            let placed = self.view.mirror * *place * shape.world_from_shape;
+            let instance = Transform::from_matrix(placed)
+                .and_then(|transform| Instance::new(prototype, &transform, material, true));
+            match instance {
+                Some(instance) => self.geometry.instances.push(instance),
+                None => self.place(mesh, material, shape, *place)?,
+            }
+        }
+        Ok(())
+    }
+
     /// Appends a mesh to the geometry.
     fn place(&mut self, mesh: &Mesh, material: u32, shape: &Shape, outer: DMat4) -> Result<()> {
         let placed = self.view.mirror * outer * shape.world_from_shape;
@@ -284,9 +321,7 @@ impl Builder<'_> {
             )));
         }
         let dropped = self.geometry.append(mesh, &transform, |_| material);
-        self.dropped.degenerate += dropped.degenerate;
-        self.dropped.non_finite += dropped.non_finite;
-        self.dropped.normals += dropped.normals;
+        self.dropped.add(dropped);
         Ok(())
     }
 }

@@ -22,16 +22,17 @@ use super::{Mesh, MeshCamera, images::Images};
 use crate::{
     error::{Error, Result},
     files,
-    scene::features::Ignored,
+    scene::{features::Ignored, instances::Budget},
     texture::Texture,
 };
 
-/// Reads a glTF file with its buffers and images; `warnings` counts the parts that are left out.
+/// Reads a glTF file with its buffers and images; `warnings` counts the parts that are left out. With a
+/// budget, meshes whose copies exceed it are not copied.
 ///
 /// # Errors
 /// [`Error::Io`] for a file that cannot be read, [`Error::Parse`] for bad JSON, [`Error::Format`]
 /// for any other fault.
-pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
+pub fn read(path: &Path, budget: Option<Budget>, warnings: &mut Vec<String>) -> Result<Mesh> {
     let bytes = files::read(path)?;
     if let (Some(b"glTF"), Some(&[a, b, c, d])) = (bytes.get(..4), bytes.get(8..12)) {
         let stated = u32::from_le_bytes([a, b, c, d]) as usize;
@@ -49,6 +50,9 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
         json: &json,
         buffers: document::read_buffers(path, &document, blob)?,
         mesh: Mesh::default(),
+        budget,
+        copies: HashMap::new(),
+        repeated: HashMap::new(),
         materials: HashMap::new(),
         embedded: HashMap::new(),
         images: Images::default(),
@@ -72,6 +76,14 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
         mesh.normals = Vec::new();
     }
     mesh.complete_tangents(-1.0);
+    let mut repeated = std::mem::take(&mut mesh.repeated);
+    for part in &mut repeated {
+        // Tangents depend on the materials, which the whole has.
+        std::mem::swap(&mut part.mesh.materials, &mut mesh.materials);
+        part.mesh.complete_tangents(-1.0);
+        std::mem::swap(&mut part.mesh.materials, &mut mesh.materials);
+    }
+    mesh.repeated = repeated;
     Ok(mesh)
 }
 
@@ -82,6 +94,12 @@ struct GltfReader<'a> {
     json: &'a Value,
     buffers: Vec<Vec<u8>>,
     mesh: Mesh,
+    /// Triangles that may still be copied; none to copy all.
+    budget: Option<Budget>,
+    /// Uses of each mesh of the document.
+    copies: HashMap<usize, usize>,
+    /// Place in `mesh.repeated` of the primitives of meshes; none for those that are copied.
+    repeated: HashMap<[usize; 2], Option<usize>>,
     /// Index into `mesh.materials` of the materials that have been used.
     materials: HashMap<usize, usize>,
     /// Images inside the document by their numbers; none for those that cannot be read.
@@ -107,6 +125,14 @@ impl GltfReader<'_> {
         let mut seen_meshes = vec![false; document.meshes().count()];
         let scene = document.default_scene().or_else(|| document.scenes().next());
         let scene = scene.ok_or_else(|| self.error("expected a scene with nodes, found none"))?;
+        if self.budget.is_some() {
+            for node in document.nodes() {
+                if let Some(mesh) = node.mesh() {
+                    let count = self.instances(&node, Mat4::IDENTITY)?.len();
+                    *self.copies.entry(mesh.index()).or_default() += count;
+                }
+            }
+        }
         // Use a stack, not recursion: nodes may nest deeper than the call stack.
         let mut stack: Vec<(Node, Mat4)> =
             scene.nodes().map(|node| (node, Mat4::IDENTITY)).collect();
@@ -127,7 +153,18 @@ impl GltfReader<'_> {
                 let weights = node.weights().or(mesh.weights()).unwrap_or_default();
                 for world_from_instance in self.instances(&node, world_from_node)? {
                     for primitive in mesh.primitives() {
-                        self.read_primitive(&primitive, weights, world_from_instance)?;
+                        let key = [mesh.index(), primitive.index()];
+                        // The weights of a node make its mesh another one.
+                        let repeated = match node.weights() {
+                            None => self.repeated_primitive(key, &primitive, weights)?,
+                            Some(_) => None,
+                        };
+                        match repeated {
+                            Some(at) => self.mesh.repeated[at].places.push(world_from_instance),
+                            None => {
+                                self.read_primitive(&primitive, weights, world_from_instance)?;
+                            }
+                        }
                     }
                 }
             }

@@ -7,9 +7,51 @@ use gltf::{
 };
 
 use super::GltfReader;
-use crate::{error::Result, scene::features};
+use crate::{
+    error::Result,
+    scene::{
+        features,
+        mesh::{Mesh, RepeatedMesh},
+    },
+};
 
 impl GltfReader<'_> {
+    /// Place in `mesh.repeated` of a primitive whose copies are too many; none if it is to be copied.
+    pub(super) fn repeated_primitive(
+        &mut self,
+        key: [usize; 2],
+        primitive: &Primitive,
+        weights: &[f32],
+    ) -> Result<Option<usize>> {
+        if let Some(found) = self.repeated.get(&key) {
+            return Ok(*found);
+        }
+        let corners = primitive.indices().or_else(|| primitive.get(&Semantic::Positions));
+        let triangles = corners.map_or(0, |corners| corners.count() / 3);
+        let copies = self.copies.get(&key[0]).copied().unwrap_or(0);
+        let is_repeated = copies > 1
+            && matches!(primitive.mode(), Mode::Triangles)
+            && self.budget.as_mut().is_some_and(|budget| budget.takes_instances(copies, triangles));
+        let place = if is_repeated {
+            // Read it into a mesh of its own, with the materials of the whole.
+            let materials = std::mem::take(&mut self.mesh.materials);
+            let own = Mesh { materials, ..Mesh::default() };
+            let whole = std::mem::replace(&mut self.mesh, own);
+            let read = self.read_primitive(primitive, weights, Mat4::IDENTITY);
+            let mut own = std::mem::replace(&mut self.mesh, whole);
+            self.mesh.materials = std::mem::take(&mut own.materials);
+            read?;
+            let material = own.runs.first().and_then(|run| run.material);
+            let repeated = RepeatedMesh { mesh: Box::new(own), material, places: Vec::new() };
+            self.mesh.repeated.push(repeated);
+            Some(self.mesh.repeated.len() - 1)
+        } else {
+            None
+        };
+        self.repeated.insert(key, place);
+        Ok(place)
+    }
+
     /// Adds a primitive of triangles with its morph targets; others add nothing.
     pub(super) fn read_primitive(
         &mut self,
