@@ -418,7 +418,8 @@ fn ply_coordinates_and_colours_are_read() {
         let text = format!(
             "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
              property float z\nproperty float {v}\nproperty float {u}\nproperty uchar red\n\
-             property uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+             property uchar green\nproperty uchar blue\nelement face 1\n\
+             property list uchar int vertex_indices\nend_header\n\
              0 0 0 0.1 0.2 255 0 188\n1 0 0 0.3 0.4 0 0 0\n0 1 0 0.5 0.6 0 0 0\n3 0 1 2\n"
         );
         let mut warnings = Vec::new();

@@ -286,7 +286,7 @@ fn models_become_materials() {
         <bsdf type="dielectric"/></bsdf>"#,
     );
     assert!(matches!(mixed.kind, MaterialKind::Dielectric { .. }));
-    assert!(warnings[0].contains("lesser part of `blendbsdf`"), "{warnings:?}");
+    assert!(warnings[0].contains("lesser part of other `blendbsdf`"), "{warnings:?}");
     let scene = load("<shape type=\"cube\"/>");
     let MaterialKind::Diffuse { reflectance } = scene.materials[0].kind else { panic!() };
     assert_eq!((reflectance, scene.materials[0].surface.two_sided), (Vec3::splat(0.5), false));
