@@ -11,7 +11,7 @@ use std::{f32::consts::PI, fs, path::Path, sync::Arc};
 use command::{BALL, Folder, yard};
 use fenestra::{
     brdf::{MeasuredTable, material::MaterialKind},
-    export::mitsuba::{Export, Settings},
+    export::{Export as _, Settings, mitsuba::Export},
     film::Image,
     scene::{Scene, lamp::LampKind},
     texture::{TextureTables, TextureUse, lookup::texture_value},
@@ -185,7 +185,7 @@ fn measured_materials_become_diffuse_with_their_albedo() {
     let path = "paint.binary".into();
     scene.materials[0].kind = MaterialKind::Measured { path, table: Arc::new(table) };
     let export = Export::new(&scene, Path::new("a.xml"), SETTINGS).unwrap();
-    let [warning] = &export.warnings[..] else { unreachable!("one warning") };
+    let [warning] = export.warnings() else { unreachable!("one warning") };
     let found = warning.rsplit_once("reflectance ").unwrap().1;
     let found: Vec<f32> = found.split(", ").map(|number| number.parse().unwrap()).collect();
     let error = (Vec3::from_slice(&found) - reflectance).abs() / reflectance;
@@ -217,7 +217,7 @@ fn both(clay: &str, more: &str) -> (Folder, String, Vec<String>, [Scene; 2]) {
     export.write().unwrap();
     let xml = fs::read_to_string(&path).unwrap();
     let read = Scene::load(&path).unwrap();
-    let warnings = export.warnings.clone();
+    let warnings = export.warnings().to_vec();
     (folder, xml, warnings, [ours, read])
 }
 
@@ -447,7 +447,7 @@ fn colours_of_vertices_are_written_with_their_factor() {
     scene.materials[0].surface.vertex_color = true;
     let path = folder.path().join("out.xml");
     let export = Export::new(&scene, &path, SETTINGS).unwrap();
-    assert_eq!(export.warnings, [""; 0]);
+    assert_eq!(export.warnings(), [""; 0]);
     export.write().unwrap();
     let xml = fs::read_to_string(&path).unwrap();
     assert_parts(&xml, &["type=\"mesh_attribute\"", "value=\"vertex_color\""]);
@@ -459,5 +459,5 @@ fn colours_of_vertices_are_written_with_their_factor() {
     assert!(bytes.windows(12).any(|window| window == expected));
     scene.geometry.colors.iter_mut().for_each(|color| color[3] = 0.5);
     let export = Export::new(&scene, &path, SETTINGS).unwrap();
-    assert!(matches!(&export.warnings[..], [one] if one.contains("opacity of its vertices")));
+    assert!(matches!(export.warnings(), [one] if one.contains("opacity of its vertices")));
 }

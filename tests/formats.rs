@@ -95,6 +95,23 @@ fn everything_that_a_gltf_file_loses_is_named_once() {
 }
 
 #[test]
+fn compressed_meshes_are_refused_by_name() {
+    for name in ["KHR_draco_mesh_compression", "EXT_meshopt_compression"] {
+        let rest =
+            format!(", \"extensionsRequired\": [\"{name}\"], \"extensionsUsed\": [\"{name}\"]");
+        let folder = Folder::new();
+        let path = folder.write("a.gltf", gltf(r#"{"mesh": 0}"#, "", "", &rest));
+        let found = Scene::load(&path).unwrap_err().to_string();
+        let expected = format!("the file requires the extension `{name}`, which is not supported");
+        assert!(found.contains("a.gltf") && found.contains(&expected), "{found}");
+        // Without the need for it, the uncompressed mesh is read and the extension named.
+        let scene =
+            load("a.gltf", &gltf(r#"{"mesh": 0}"#, "", "", &rest.replace("Required", "Wanted")));
+        assert_eq!(scene.geometry.triangles.len(), 1);
+    }
+}
+
+#[test]
 fn cameras_stand_at_their_nodes() {
     let nodes = r#"{"mesh": 0, "translation": [0, 0, 5], "children": [1, 2, 3]}, {"camera": 0},
         {"name": "side", "camera": 1, "rotation": [0, 0.70710678, 0, 0.70710678]}, {"camera": 2}"#;

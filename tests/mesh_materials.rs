@@ -411,21 +411,33 @@ fn extras_may_be_anything() {
 }
 
 #[test]
-fn ply_coordinates_are_read_and_colours_named() {
+fn ply_coordinates_and_colours_are_read() {
     let names = [("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t")];
     let folder = Folder::new();
     for (u, v) in names {
         let text = format!(
             "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
              property float z\nproperty float {v}\nproperty float {u}\nproperty uchar red\n\
-             element face 1\nproperty list uchar int vertex_indices\nend_header\n\
-             0 0 0 0.1 0.2 9\n1 0 0 0.3 0.4 9\n0 1 0 0.5 0.6 9\n3 0 1 2\n"
+             property uchar green\nproperty uchar blue\nelement face 1\n\
+             property list uchar int vertex_indices\nend_header\n\
+             0 0 0 0.1 0.2 255 0 188\n1 0 0 0.3 0.4 0 0 0\n0 1 0 0.5 0.6 0 0 0\n3 0 1 2\n"
         );
         let mut warnings = Vec::new();
         let mesh = Mesh::read(&folder.write("a.ply", text), &mut warnings).unwrap();
         assert_eq!(mesh.uvs[0], [[0.2, 0.1], [0.4, 0.3], [0.6, 0.5]]);
-        assert!(warnings[0].contains("ignored vertex colours `red green blue`"), "{warnings:?}");
+        assert_eq!(warnings, [""; 0]);
+        let [r, g, b, a] = mesh.colors[0];
+        assert!((r, g, a) == (1.0, 0.0, 1.0) && (b - 0.5029).abs() < 1e-3, "{b}");
     }
+    let clay = "type = \"diffuse\"\nreflectance = [1, 1, 1]";
+    let toml = |clay: &str| command::yard([8, 8], "constant = [1, 1, 1]", clay, "mesh = \"a.ply\"");
+    let plain = Scene::load(&folder.write("a.toml", toml(clay))).unwrap();
+    assert!(plain.geometry.colors.is_empty());
+    assert!(plain.warnings.iter().any(|text| text.contains("ignored vertex colours of other")));
+    let colored = toml(&format!("{clay}\nvertex_color = true"));
+    let colored = Scene::load(&folder.write("b.toml", colored)).unwrap();
+    assert_eq!(colored.geometry.colors.len(), colored.geometry.positions.len());
+    assert_eq!(colored.warnings, [""; 0]);
 }
 
 #[test]

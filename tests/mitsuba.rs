@@ -13,7 +13,7 @@ use fenestra::{
         Material,
         material::{ConductorFresnel, MaterialKind},
     },
-    export::mitsuba::{Export, Settings},
+    export::{Export as _, Settings, mitsuba::Export},
     scene::{
         Filter, Scene,
         lamp::{LampKind, SpotFalloff},
@@ -286,7 +286,7 @@ fn models_become_materials() {
         <bsdf type="dielectric"/></bsdf>"#,
     );
     assert!(matches!(mixed.kind, MaterialKind::Dielectric { .. }));
-    assert!(warnings[0].contains("lesser part of `blendbsdf`"), "{warnings:?}");
+    assert!(warnings[0].contains("lesser part of other `blendbsdf`"), "{warnings:?}");
     let scene = load("<shape type=\"cube\"/>");
     let MaterialKind::Diffuse { reflectance } = scene.materials[0].kind else { panic!() };
     assert_eq!((reflectance, scene.materials[0].surface.two_sided), (Vec3::splat(0.5), false));
@@ -699,6 +699,95 @@ fn text_that_would_exhaust_the_program_is_refused_soon() {
     let spheres = "<shape type=\"sphere\"/>".repeat(3000);
     let message = refusal(&spheres);
     assert!(message.contains("the shapes of a scene may have"), "{message}");
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_are_no_input() {
+    let folder = Folder::new();
+    for extension in ["xml", "ply", "obj", "serialized", "png", "exr"] {
+        let pipe = folder.path().join(format!("pipe.{extension}"));
+        assert!(std::process::Command::new("mkfifo").arg(pipe).status().unwrap().success());
+    }
+    let of = |kind: &str| format!("<string name=\"filename\" value=\"pipe.{kind}\"/>");
+    let mut cases: Vec<String> = ["ply", "obj", "serialized"]
+        .map(|kind| format!("<shape type=\"{kind}\">{}</shape>", of(kind)))
+        .into();
+    cases.push("<include filename=\"pipe.xml\"/>".to_owned());
+    cases.push(format!("<emitter type=\"envmap\">{}</emitter>", of("exr")));
+    cases.push(format!(
+        "<shape type=\"cube\"><bsdf type=\"diffuse\"><texture type=\"bitmap\" \
+         name=\"reflectance\">{}</texture></bsdf></shape>",
+        of("png")
+    ));
+    for content in cases {
+        let path = folder.write("a.xml", document(&format!("{SENSOR}{content}")));
+        let message = Scene::load(&path).unwrap_err().to_string();
+        assert!(message.contains("expected a regular file, found a pipe"), "{content}: {message}");
+    }
+    let message = Scene::load(&folder.path().join("pipe.xml")).unwrap_err().to_string();
+    assert!(message.contains("expected a regular file, found a pipe"), "{message}");
+}
+
+#[test]
+fn widths_and_colours_by_place_are_read() {
+    let folder = Folder::new();
+    write_image(&folder, "a.png");
+    let texture = "<texture type=\"bitmap\" name=\"alpha\"><string name=\"filename\" \
+                   value=\"a.png\"/><boolean name=\"raw\" value=\"true\"/></texture>";
+    for kind in ["roughplastic", "roughconductor", "roughdielectric"] {
+        let text = format!(
+            "{SENSOR}<shape type=\"rectangle\"><bsdf type=\"{kind}\"><string \
+             name=\"distribution\" value=\"ggx\"/>{texture}</bsdf></shape>"
+        );
+        let scene = Scene::load(&folder.write("a.xml", document(&text))).unwrap();
+        assert_eq!(scene.warnings, [""; 0], "{kind}");
+        let (MaterialKind::Plastic { alpha, .. }
+        | MaterialKind::Conductor { alpha, .. }
+        | MaterialKind::Dielectric { alpha, .. }) = scene.materials[0].kind
+        else {
+            panic!("{kind}")
+        };
+        assert_eq!(alpha, 1.0);
+        let surface = &scene.materials[0].surface;
+        let (roots, widths) = (surface.roughness.as_ref().unwrap().values(), {
+            let path = folder.path().join("a.png");
+            let image = fenestra::texture::Texture::load(&path).unwrap();
+            image.linear_texels(Encoding::Linear)
+        });
+        for (root, width) in roots.iter().zip(widths) {
+            assert!(
+                (root[0] * root[0] - width[0].clamp(1e-3, 1.0)).abs() < 2e-3,
+                "{root:?} {width:?}"
+            );
+        }
+    }
+    let header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+                  property float z\nproperty float r\nproperty float g\nproperty float b\n\
+                  element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    let corners = "0 0 0 0.25 0.5 1\n1 0 0 0.25 0.5 1\n0 1 0 0.5 0.25 0\n3 0 1 2\n";
+    folder.write("a.ply", format!("{header}{corners}"));
+    let of = |bsdf: &str| {
+        let text = format!(
+            "{SENSOR}<shape type=\"ply\"><string name=\"filename\" value=\"a.ply\"/>{bsdf}</shape>"
+        );
+        Scene::load(&folder.write("a.xml", document(&text))).unwrap()
+    };
+    let colored =
+        of("<bsdf type=\"diffuse\"><texture type=\"mesh_attribute\" name=\"reflectance\"/>\
+                      </bsdf>");
+    assert_eq!(colored.warnings, [""; 0]);
+    assert!(colored.materials[0].surface.vertex_color);
+    assert_eq!(colored.geometry.colors[2], [0.5, 0.25, 0.0, 1.0]);
+    let plain = of("");
+    assert!(plain.geometry.colors.is_empty() && plain.warnings.is_empty(), "{:?}", plain.warnings);
+    let (mixed, warnings) = material(
+        "<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"0.25\"/><bsdf type=\"diffuse\">\
+         <rgb name=\"reflectance\" value=\"1 0 0\"/></bsdf><bsdf type=\"diffuse\"><rgb \
+         name=\"reflectance\" value=\"0 0 1\"/></bsdf></bsdf>",
+    );
+    let MaterialKind::Diffuse { reflectance } = mixed.kind else { panic!() };
+    assert_eq!((reflectance, warnings.len()), (Vec3::new(0.75, 0.0, 0.25), 0));
 }
 
 /// Exports a scene of `environment`, `clay` and a camera with a lens, and reads both.

@@ -586,6 +586,119 @@ fn bad_text_is_one_error_with_file_line_and_column() {
     assert!(Scene::load_with(&path, &options).unwrap_err().to_string().contains("one camera"));
 }
 
+/// Makes a pipe that nobody writes to.
+#[cfg(unix)]
+fn pipe(folder: &Folder, name: &str) {
+    let made = std::process::Command::new("mkfifo").arg(folder.path().join(name)).status();
+    assert!(made.unwrap().success());
+}
+
+#[test]
+fn files_that_would_exhaust_the_program_are_refused_soon() {
+    let folder = Folder::new();
+    let head = format!("{MIRRORED} WorldBegin\n");
+    let refused = |text: String| {
+        let path = folder.write("room.pbrt", text);
+        Scene::load(&path).unwrap_err().to_string().replace(path.to_str().unwrap(), "room.pbrt")
+    };
+    // Each file includes the next ten times.
+    for level in 0..8 {
+        folder.write(
+            &format!("{level}.pbrt"),
+            format!("Include \"{}.pbrt\"\n", level + 1).repeat(10),
+        );
+    }
+    folder.write("8.pbrt", "AttributeBegin AttributeEnd");
+    let found = refused(format!("{head}Include \"0.pbrt\""));
+    assert!(found.contains(".pbrt:") && found.contains("more than 4096 files are"), "{found}");
+    // Each file includes the next.
+    for level in 0..40 {
+        folder.write(&format!("d{level}.pbrt"), format!("Include \"d{}.pbrt\"", level + 1));
+    }
+    let found = refused(format!("{head}Include \"d0.pbrt\""));
+    assert!(found.contains("d30.pbrt:1:1: more than 32 files include one another"), "{found}");
+    let instances = "ObjectInstance \"ball\"\n".repeat(20_000);
+    let found =
+        refused(format!("{head}ObjectBegin \"ball\"\nShape \"sphere\"\nObjectEnd\n{instances}"));
+    assert!(found.starts_with("room.pbrt:3:1: ") && found.contains("at most 134217728"), "{found}");
+    let vast = "Shape \"loopsubdiv\" \"integer levels\" 40 \"point3 P\" [0 0 0 1 0 0 0 1 0] \
+                \"integer indices\" [0 1 2]";
+    assert!(refused(format!("{head}{vast}")).starts_with("room.pbrt:2:1: "));
+    let saved = "AttributeBegin\n".repeat(5000);
+    assert!(refused(format!("{head}{saved}")).starts_with("room.pbrt:4098:1: "));
+    let mut textures = "Texture \"t0\" \"float\" \"scale\" \"texture tex\" \"t0\"\n".to_owned();
+    textures += &format!("{TRIANGLE} \"texture alpha\" \"t0\"");
+    let found = refused(format!("{head}{textures}"));
+    assert!(found.starts_with("room.pbrt:2:1: ") && found.contains("refer to one"), "{found}");
+    let mix = "MakeNamedMaterial \"m\" \"string type\" \"mix\" \"string materials\" [\"m\" \"m\"]\n\
+               NamedMaterial \"m\"";
+    let found = refused(format!("{head}{mix} {TRIANGLE}"));
+    assert!(found.starts_with("room.pbrt:2:1: ") && found.contains("mix one another"), "{found}");
+}
+
+#[test]
+fn files_elsewhere_and_pipes_are_no_input() {
+    let folder = Folder::new();
+    folder.write("metal.spd", "400 1 700 2");
+    let use_of = |name: &str| {
+        [
+            format!("Shape \"plymesh\" \"string filename\" \"{name}.ply\""),
+            format!("LightSource \"infinite\" \"string filename\" \"{name}.exr\""),
+            format!("Include \"{name}.pbrt\""),
+            format!("Import \"{name}.pbrt.gz\""),
+            format!(
+                "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"{name}.png\"\n\
+                 Material \"diffuse\" \"texture reflectance\" \"t\" {TRIANGLE}"
+            ),
+            format!("Material \"diffuse\" \"string normalmap\" \"{name}.png\" {TRIANGLE}"),
+            format!("Material \"conductor\" \"spectrum k\" \"{name}.spd\" {TRIANGLE}"),
+            format!("AreaLightSource \"diffuse\" \"string filename\" \"{name}.exr\" {TRIANGLE}"),
+        ]
+    };
+    let refused = |text: &str| {
+        let path = folder.write("room.pbrt", format!("{MIRRORED} WorldBegin\n{text}"));
+        let found = Scene::load(&path).unwrap_err().to_string();
+        assert!(found.contains("room.pbrt:2:"), "{found}");
+        found
+    };
+    for name in ["../metal", "/dev/zero", "a/../../metal"] {
+        for text in use_of(name) {
+            let found = refused(&text);
+            assert!(found.contains("in the folder of the scene, found `"), "{text}: {found}");
+        }
+    }
+    #[cfg(unix)]
+    {
+        for extension in ["ply", "exr", "pbrt", "pbrt.gz", "png", "spd"] {
+            pipe(&folder, &format!("pipe.{extension}"));
+        }
+        for text in use_of("pipe") {
+            let found = refused(&text);
+            assert!(found.contains("expected a regular file, found a pipe"), "{text}: {found}");
+        }
+        let found = Scene::load(&folder.path().join("pipe.pbrt")).unwrap_err().to_string();
+        assert!(found.contains("found a pipe"), "{found}");
+    }
+}
+
+#[test]
+fn mixtures_of_diffuse_materials_are_diffuse() {
+    let text = format!(
+        r#"MakeNamedMaterial "red" "string type" "diffuse" "rgb reflectance" [1 0 0]
+        MakeNamedMaterial "blue" "string type" "diffuse" "rgb reflectance" [0 0 1]
+        MakeNamedMaterial "both" "string type" "mix" "string materials" ["red" "blue"] "float amount" 0.25
+        NamedMaterial "both" {TRIANGLE}"#
+    );
+    let scene = world(&text);
+    let MaterialKind::Diffuse { reflectance } = scene.materials[0].kind else { panic!() };
+    assert_eq!(reflectance, Vec3::new(0.75, 0.0, 0.25));
+    assert_eq!(warnings(&scene), [DARK]);
+    assert!(matches!(
+        material(r#""conductor" "rgb reflectance" [1 1 1]"#).kind,
+        MaterialKind::Mirror { reflectance: Vec3::ONE }
+    ));
+}
+
 #[test]
 fn everything_left_out_is_named_once() {
     let head = r#"Option "integer seed" 3
@@ -621,7 +734,7 @@ fn everything_left_out_is_named_once() {
         "ignored `albedo` of coats (line 13): coats are clear",
         "ignored `uroughness` other than `vroughness` (line 13): their mean α, or the texture",
         "ignored shapes whose transformation flattens space (2, first in line 14): left out",
-        "ignored material `hair` (line 15)",
+        "ignored parameters of `hair` (line 15): rendered as diffuse of 0.5",
         DARK,
     ];
     let found = warnings(&scene);

@@ -2,9 +2,11 @@
 """Compares Fenestra's pictures with Mitsuba 3's renderings of `fenestra export`.
 
     python3 docs/peers/agreement.py [--fenestra target/release/fenestra] [--table]
-    python3 docs/peers/agreement.py --file scene.xml [--depth 12] [--width 96] [--keep FOLDER]
+    python3 docs/peers/agreement.py --file scene.xml [--ours FILE] [--depth 12] [--width 96]
+                                    [--keep FOLDER]
 
-The second form lets both programs render one Mitsuba file, and compares means and blocks of pixels.
+The second form lets both programs render one Mitsuba file, and compares means and blocks of pixels;
+Fenestra may render another form of the scene, such as the one that the Mitsuba file was exported from.
 
 Needs a built `fenestra` and `pip install mitsuba`; prints SKIPPED and exits with 77 where Mitsuba is
 missing. Exits with 1 if in a scene where the models agree means differ by more than 0.5% and four
@@ -336,7 +338,8 @@ def compare_file(mi, np, arguments, folder):
     for seed in range(seeds):
         options = ["--depth", arguments.depth, "--seed", seed, "--spp", arguments.samples, "--size",
                    f"{size[0]}x{size[1]}"]
-        ours.append(render_ours(mi, np, arguments.fenestra, path, folder / f"{seed}.exr", options))
+        own = (arguments.ours or path).resolve()
+        ours.append(render_ours(mi, np, arguments.fenestra, own, folder / f"{seed}.exr", options))
         image = mi.render(peer, integrator=integrator, seed=seed, spp=4 * arguments.samples)
         theirs.append(np.array(image, np.float64)[..., :3])
     ours, theirs = np.array(ours), np.array(theirs)
@@ -370,6 +373,7 @@ def main():
     parser.add_argument("--only", default="", help="regular expression for the names of scenes")
     parser.add_argument("--table", action="store_true", help="write the table into docs/peers.md")
     parser.add_argument("--file", type=pathlib.Path, help="Mitsuba file to render with both")
+    parser.add_argument("--ours", type=pathlib.Path, help="file for Fenestra, with --file")
     parser.add_argument("--depth", default=12, type=int, help="path vertices, with --file")
     parser.add_argument("--width", default=96, type=int, help="width of the film, with --file")
     parser.add_argument("--seeds", default=SEEDS, type=int, help="renders of each, with --file")

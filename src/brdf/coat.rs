@@ -27,6 +27,15 @@ pub fn albedo_below_coat(ior: f32) -> impl Fn(f32) -> f32 {
     }
 }
 
+/// Returns the albedo of the base that [`albedo_below_coat`] shows as `albedo`, its inverse.
+pub fn base_below_coat(ior: f32) -> impl Fn(f32) -> f32 {
+    let inside = internal_reflectance(ior);
+    move |albedo| {
+        let albedo = albedo.clamp(0.0, 1.0);
+        albedo / (1.0 - inside + albedo * inside)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -45,5 +54,7 @@ mod tests {
         // The series of bounces: ρ T Σ (ρ Fi)ⁿ, with T = 1 − Fi.
         let series: f32 = (0..200).map(|n| 0.5 * 0.4037 * (0.5 * 0.5963_f32).powi(n)).sum();
         assert!((below(0.5) - series).abs() < 1e-3, "{} and {series}", below(0.5));
+        let base = base_below_coat(1.5);
+        assert!([0.0, 0.3, 1.0].iter().all(|&albedo| (base(below(albedo)) - albedo).abs() < 1e-6));
     }
 }

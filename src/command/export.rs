@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::{
     error::{Error, Result},
-    export::mitsuba,
+    export::{Export, Settings, gltf, mitsuba, pbrt},
     files,
     scene::Scene,
 };
@@ -14,10 +14,11 @@ use crate::{
 pub struct Arguments {
     /// Scene file (.toml).
     pub scene: PathBuf,
-    /// Folder, in which the scene is called `scene`, or file with the format's extension (.xml).
+    /// Folder, in which the scene is called `scene`, or file with the format's extension (.xml,
+    /// .pbrt or .gltf).
     /// Meshes, images and the environment go into a folder of the same name beside it.
     pub output: PathBuf,
-    /// Renderer to write for.
+    /// Format to write.
     #[arg(long, value_enum)]
     pub format: Format,
     /// Number of path vertices lit by the environment; 1 is direct light.
@@ -31,11 +32,26 @@ pub struct Arguments {
     pub strict: bool,
 }
 
-/// Renderers that scenes can be written for.
+/// Formats that scenes can be written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
     /// Mitsuba 3 XML.
     Mitsuba,
+    /// A scene description of pbrt-v4.
+    Pbrt,
+    /// glTF 2.0, with the environment as an image beside it.
+    Gltf,
+}
+
+impl Format {
+    /// Extension of the scene file.
+    fn extension(self) -> &'static str {
+        match self {
+            Self::Mitsuba => "xml",
+            Self::Pbrt => "pbrt",
+            Self::Gltf => "gltf",
+        }
+    }
 }
 
 /// Writes the scene and warns, once for each material concerned, of what the format cannot express.
@@ -43,26 +59,30 @@ pub enum Format {
 /// # Errors
 /// An unusable scene, a failing disk; with `--strict`, the first difference.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let Format::Mitsuba = arguments.format;
     let mut scene = Scene::load(&arguments.scene)?;
     if !scene.geometry.instances.is_empty() {
         let message = "expected fewer triangles: the export places every instance";
         let flat = scene.geometry.flattened();
         scene.geometry = flat.ok_or_else(|| Error::scene(&arguments.scene, message))?;
     }
-    let settings = mitsuba::Settings { depth: arguments.depth, samples: arguments.spp };
-    let output = if files::extension(&arguments.output) == "xml" {
+    let settings = Settings { depth: arguments.depth, samples: arguments.spp };
+    let extension = arguments.format.extension();
+    let output = if files::extension(&arguments.output) == extension {
         arguments.output.clone()
     } else {
-        arguments.output.join("scene.xml")
+        arguments.output.join("scene").with_extension(extension)
     };
-    let export = mitsuba::Export::new(&scene, &output, settings)?;
+    let export: Box<dyn Export> = match arguments.format {
+        Format::Mitsuba => Box::new(mitsuba::Export::new(&scene, &output, settings)?),
+        Format::Pbrt => Box::new(pbrt::Export::new(&scene, &output, settings)?),
+        Format::Gltf => Box::new(gltf::Export::new(&scene, &output)?),
+    };
     if arguments.strict
-        && let Some(difference) = export.warnings.first()
+        && let Some(difference) = export.warnings().first()
     {
         return Err(Error::scene(&arguments.scene, format!("{difference} (--strict)")));
     }
-    for warning in scene.warnings.iter().chain(&export.warnings) {
+    for warning in scene.warnings.iter().chain(export.warnings()) {
         log::warn!("{warning}");
     }
     export.write()?;

@@ -1,5 +1,6 @@
 //! Scene file and the files it names → validated [`Scene`]. No GPU types.
 
+mod blend;
 pub mod camera;
 pub mod environment;
 pub mod features;

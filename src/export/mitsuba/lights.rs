@@ -4,9 +4,9 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::{relative, triple};
 use crate::{
     error::Result,
+    export::{names::relative, triple},
     film::Image,
     scene::{
         EnvironmentMap, Lamp,

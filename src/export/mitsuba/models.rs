@@ -4,16 +4,18 @@ use std::fmt::Write;
 
 use glam::{Vec2, Vec3};
 
-use super::{
-    images::{Pictures, Recipe},
-    relative, triple,
-};
 use crate::{
     brdf::{
         Material,
         material::{ConductorFresnel, MaterialKind},
     },
-    math::colour::luminance,
+    export::{
+        images::{Pictures, Recipe},
+        index_of,
+        names::relative,
+        parts::Triangles,
+        triple,
+    },
     texture::{Interpolation, TextureUse},
 };
 
@@ -22,17 +24,6 @@ use crate::{
 const SEPARATE_MASKING_ALPHA: f32 = 0.1;
 /// Smallest index of Mitsuba's `principled`, which stands for no reflection.
 const LEAST_ETA: f32 = 1.001;
-
-/// Facts about the triangles of a material that its model depends on.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Triangles {
-    /// Some vertices have colours.
-    pub(super) has_colors: bool,
-    /// Some vertices are not opaque.
-    pub(super) has_transparency: bool,
-    /// Triangles whose bitangent is the normal × the tangent, and those with the opposite.
-    pub(super) bitangents: [usize; 2],
-}
 
 /// Elements of a material.
 #[derive(Debug)]
@@ -167,7 +158,7 @@ impl Translator<'_> {
                 let content = self.color("base_color", *base_color)
                     + &self.number("metallic", *metallic, self.material.surface.metallic.as_ref())
                     + &self.roughness(*roughness)
-                    + &float("eta", index_of(*ior, *specular, *specular_color));
+                    + &float("eta", index_of(*ior, *specular, *specular_color).max(LEAST_ETA));
                 element("principled", &content)
             }
             MaterialKind::Mirror { reflectance } => {
@@ -190,7 +181,7 @@ impl Translator<'_> {
                 element("thindielectric", &glass(*ior, *reflectance, *transmittance))
             }
             MaterialKind::Measured { path, .. } => {
-                let share = reflected_share().clamp(Vec3::ZERO, Vec3::ONE);
+                let share = reflected_share();
                 self.warn(&format!(
                     "Mitsuba reads no table such as {}; written as diffuse with the reflectance {}",
                     path.display(),
@@ -368,18 +359,6 @@ impl Translator<'_> {
         let emitter = format!("<emitter type=\"area\">\n{radiance}</emitter>\n");
         (Some(emitter), emission.two_sided && can_have_back)
     }
-}
-
-/// Refractive index whose reflectance at normal incidence is that of a principled dielectric.
-fn index_of(ior: f32, specular: f32, specular_color: Vec3) -> f32 {
-    if specular == 1.0 && specular_color == Vec3::ONE {
-        return ior.max(LEAST_ETA);
-    }
-    let ratio = (ior - 1.0) / (ior + 1.0);
-    let reflectance = (ratio * ratio * specular_color).min(Vec3::ONE) * specular;
-    // At a root of 0.6 the index is 4, the largest that is read back.
-    let root = luminance(reflectance).max(0.0).sqrt().min(0.6);
-    ((1.0 + root) / (1.0 - root)).max(LEAST_ETA)
 }
 
 /// Parameters of a dielectric in air.

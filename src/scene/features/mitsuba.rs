@@ -33,12 +33,14 @@ features! {
         "from ½ a rough dielectric, below none of it; as is a metal";
     MI_PRINCIPLED_REST Ignored "further parameters of `principled`, by name" "";
     MI_OPACITY Done "`mask`, `null`, `blendbsdf` with `null`" "";
-    MI_BLEND Ignored "the lesser part of `blendbsdf`" "the other one is the whole surface";
+    MI_MIXTURE Done "`blendbsdf` of two `diffuse`" "with at most one image among both and `weight`";
+    MI_BLEND Ignored "the lesser part of other `blendbsdf`" "the other one is the whole surface";
     MI_NORMAL_MAP Done "`normalmap`" "";
     MI_BUMP_MAP Ignored "`bumpmap`" "";
     MI_BECKMANN Ignored "distribution `beckmann`" "`ggx` of the same α";
-    MI_ANISOTROPIC Ignored "`alpha_u` and `alpha_v` that differ" "their mean";
-    MI_ALPHA_TEXTURE Ignored "texture of `alpha`" "0.1";
+    MI_ALPHA Done "`alpha`, constant or textured" "between texels its root is interpolated";
+    MI_ANISOTROPIC Ignored "`alpha_u` and `alpha_v` that differ" "their mean, or `alpha_u`";
+    MI_ALPHA_TEXTURE Ignored "`alpha` of vertices" "0.1";
     MI_SPECULAR Ignored "`specular_reflectance` of plastic" "white";
     MI_SPECULAR_TEXTURE Ignored
         "textures of `specular_reflectance` and `specular_transmittance` of dielectrics" "white";

@@ -63,7 +63,9 @@ features! {
     PLY_UV Done "`u v`, `s t`, `texture_u texture_v`, `texture_s texture_t`"
         "from the lower left corner of an image";
     PLY_FACE Done "`vertex_indices`, `vertex_index`" "polygons are cut into triangles";
-    PLY_COLOR Ignored "vertex colours `red green blue`" "";
+    PLY_COLORS Done "vertex colours `red green blue`, `r g b`, with `alpha` or `a`"
+        "for materials with `vertex_color`; floats are linear, integers sRGB";
+    PLY_COLOR Ignored "vertex colours of other materials" "";
     PLY_OTHER Mapped "other elements and properties" "no part of the surface";
     PLY_STRIPS Refused "`tristrips`" "";
 }

@@ -20,6 +20,8 @@ features! {
     PBRT_ALPHA Done "`alpha` of shapes" "the share of light that a surface stops";
     PBRT_DIFFUSE Done "`diffuse`, `dielectric`, `thindielectric`, `interface`" "";
     PBRT_COATED Mapped "`coateddiffuse`" "plastic";
+    PBRT_BLEND Done "`mix` of two diffuse materials, or of one with `interface`"
+        "with at most one image among both and `amount`";
     PBRT_CONDUCTOR Done "`conductor`"
         "exact Fresnel; a textured `reflectance` by Schlick's approximation";
     PBRT_ROUGHNESS Done "`roughness`, `remaproughness`"
@@ -35,7 +37,7 @@ features! {
     PBRT_LAMP Done "`point`, `spot`, `distant`, `infinite`"
         "equal-area maps become lat-long maps twice as wide, of the same mean radiance";
     PBRT_AREA Done "`AreaLightSource`"
-        "`power` is that of the whole shape, where pbrt gives it to each of its triangles";
+        "images too; `power` is that of the whole shape, where pbrt gives it to each of its triangles";
     PBRT_CAMERA Done "`perspective`, with `lensradius` and `focaldistance`" "";
     PBRT_FILM Ignored "other parameters of the film"
         "`xresolution`, `yresolution` and `iso` are done; open time times `iso`/100 scales all light";
@@ -56,9 +58,11 @@ features! {
     PBRT_PARTIAL Ignored "`phimax`, `zmin`, `zmax`, by shape" "quadrics are whole";
     PBRT_DISPLACEMENT Ignored "`displacement`" "";
     PBRT_FLAT Ignored "shapes whose transformation flattens space" "left out";
-    PBRT_NEAREST_MATERIAL Ignored "parts of `coatedconductor`, `diffusetransmission`, `subsurface`, \
-        `hair` and `mix`, by name"
-        "the bare conductor, diffuse reflection, plastic, diffuse 0.5, and the greater share";
+    PBRT_COATED_CONDUCTOR Ignored "coat of `coatedconductor`" "rendered as the bare conductor";
+    PBRT_TRANSMISSION Ignored "light through `diffusetransmission`" "rendered as diffuse reflection";
+    PBRT_SUBSURFACE Ignored "light below `subsurface`" "rendered as plastic";
+    PBRT_HAIR Ignored "parameters of `hair`" "rendered as diffuse of 0.5";
+    PBRT_MIX Ignored "the lesser part of other `mix`" "the other one is the whole surface";
     PBRT_COAT_ALBEDO Ignored "`albedo` of coats" "coats are clear";
     PBRT_ANISOTROPY Ignored "`uroughness` other than `vroughness`" "their mean α, or the texture";
     PBRT_TEXTURE Ignored "other textures, by name"
@@ -69,7 +73,7 @@ features! {
     PBRT_TEXTURE_MAPPING Ignored "`mapping` of textures other than `uv`" "as `uv`";
     PBRT_LIGHT Ignored "`projection`, `goniometric`" "left out";
     PBRT_PORTAL Ignored "`portal` of lights" "they hide nothing";
-    PBRT_EMISSION_IMAGE Ignored "images of area lights" "`L` alone counts";
+    PBRT_EMISSION_IMAGE Ignored "images of bilinear patches that emit" "their area light counts";
     PBRT_INSTANCE_LIGHT Ignored "area lights in objects" "dark, as in pbrt";
     PBRT_INTERFACE_LIGHT Ignored "area lights without a surface" "left out, as in pbrt";
     PBRT_PARAMETER Ignored "other parameters, by name" "";

@@ -55,6 +55,13 @@ impl Loader<'_> {
             .filter(|object| is_textured(object, materials))
             .map(|object| self.mesh_key(object))
             .collect();
+        let colored: HashSet<PathBuf> = objects
+            .iter()
+            .filter(|object| {
+                named_material(object, materials).is_some_and(|own| own.surface.vertex_color)
+            })
+            .map(|object| self.mesh_key(object))
+            .collect();
         // Read all meshes before placing any, so that the arrays are allocated once.
         let mut meshes = HashMap::new();
         let mut shape_triangles = 0;
@@ -63,10 +70,15 @@ impl Loader<'_> {
             if !meshes.contains_key(&key) {
                 let mesh = match &object.source {
                     ObjectSource::Mesh(_) => {
-                        let mesh = Mesh::read(&key, warnings)?;
+                        let mut mesh = Mesh::read(&key, warnings)?;
                         inputs.push(key.clone());
                         inputs.extend_from_slice(&mesh.side_files);
-                        let ignored = ignored_in_object(&mesh, own_materials.contains(&key));
+                        let mut ignored = ignored_in_object(&mesh, own_materials.contains(&key));
+                        let is_ply = crate::files::extension(&key) == "ply";
+                        if is_ply && !mesh.colors.is_empty() && !colored.contains(&key) {
+                            ignored.add(features::PLY_COLOR, || "element `vertex`".to_owned());
+                            mesh.colors.clear();
+                        }
                         warnings.extend(ignored.warnings(&key));
                         mesh
                     }
@@ -344,11 +356,13 @@ fn ignored_in_object(mesh: &Mesh, own_materials: bool) -> Ignored {
 
 /// Tests whether an object names a material with textures.
 fn is_textured(object: &ObjectEntry, materials: &[Material]) -> bool {
-    let named = |material: &&Material| Some(&material.name) == object.material.as_ref();
-    materials
-        .iter()
-        .find(named)
+    named_material(object, materials)
         .is_some_and(|material| material.surface.textures().next().is_some())
+}
+
+/// Material that an object names.
+fn named_material<'a>(object: &ObjectEntry, materials: &'a [Material]) -> Option<&'a Material> {
+    materials.iter().find(|material| Some(&material.name) == object.material.as_ref())
 }
 
 /// Label of an object in messages: name or number, source and line.

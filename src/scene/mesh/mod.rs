@@ -118,7 +118,7 @@ impl Mesh {
     /// content is invalid: unknown format, truncation, an index out of range.
     pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
         match files::extension(path).as_str() {
-            "ply" => ply::read(path, warnings),
+            "ply" => ply::read(path),
             "obj" => obj::read(path, warnings),
             "gltf" | "glb" => gltf::read(path, None, warnings),
             found => {

@@ -18,7 +18,12 @@ use crate::{
     },
     error::Result,
     math::colour::luminance,
-    scene::{MIN_ALPHA, features},
+    scene::{
+        MIN_ALPHA,
+        blend::{Share, blend},
+        features,
+    },
+    texture::TextureUse,
 };
 
 /// Most models in one another; a model may name itself.
@@ -28,6 +33,13 @@ const LEAST_COAT_IOR: f32 = 1.01;
 /// Refractive indices that a coat may have, and those of a dielectric.
 const MAX_COAT_IOR: f32 = 4.0;
 const IOR_RANGE: (f32, f32) = (0.1, 10.0);
+
+/// Width of the distribution of a rough model.
+struct Width {
+    alpha: f32,
+    /// Factor of √α, for which `alpha` is then 1.
+    texture: Option<TextureUse>,
+}
 
 /// Reflection of a material with its textures and opacity.
 #[derive(Clone, Debug)]
@@ -51,6 +63,12 @@ impl Model {
         model.surface.color = texture;
         model.surface.vertex_color = is_of_vertices;
         model
+    }
+
+    /// The same with a factor of the roughness by place.
+    fn of_roughness(mut self, texture: Option<TextureUse>) -> Self {
+        self.surface.roughness = texture;
+        self
     }
 
     /// Model of a shape that names none.
@@ -99,18 +117,18 @@ impl Reader<'_> {
             }
             "plastic" => self.plastic(&parameters, MIN_ALPHA)?,
             "roughplastic" => {
-                let alpha = self.alpha(&parameters)?;
-                self.plastic(&parameters, alpha)?
+                let Width { alpha, texture } = self.width(&parameters)?;
+                self.plastic(&parameters, alpha)?.of_roughness(texture)
             }
             "conductor" => self.conductor(&parameters, None)?,
             "roughconductor" => {
-                let alpha = self.alpha(&parameters)?;
-                self.conductor(&parameters, Some(alpha))?
+                let Width { alpha, texture } = self.width(&parameters)?;
+                self.conductor(&parameters, Some(alpha))?.of_roughness(texture)
             }
             "dielectric" => self.dielectric(&parameters, 0.0)?,
             "roughdielectric" => {
-                let alpha = self.alpha(&parameters)?;
-                self.dielectric(&parameters, alpha)?
+                let Width { alpha, texture } = self.width(&parameters)?;
+                self.dielectric(&parameters, alpha)?.of_roughness(texture)
             }
             "thindielectric" => self.thin_dielectric(&parameters)?,
             "principled" => self.principled(&parameters)?,
@@ -168,7 +186,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Mixture of two models: an opacity if one of them is `null`, else the greater of them.
+    /// Mixture of two models: an opacity if one of them is `null`, else the greater of them if they do
+    /// not mix.
     fn blend(&mut self, parameters: &Parameters<'_>, depth_left: usize) -> Result<Model> {
         let node = parameters.node;
         let [first, second] = parameters.objects("bsdf")?[..] else {
@@ -194,9 +213,22 @@ impl Reader<'_> {
             self.cut(&mut model, node, weight);
             return Ok(model);
         }
-        self.ignored.add(features::MI_BLEND, || node.place());
-        let takes_second = matches!(weight, Value::Color(weight) if luminance(weight) > 0.5);
-        self.nested(if takes_second { second } else { first }, depth_left)
+        let [first, second] = [self.nested(first, depth_left)?, self.nested(second, depth_left)?];
+        let share = match weight {
+            Value::Texture(image) => Share::Image(*image),
+            Value::Color(weight) | Value::Vertices(weight) => {
+                Share::Constant(luminance(weight).clamp(0.0, 1.0))
+            }
+        };
+        let pair = [&first, &second].map(|model| (&model.kind, &model.surface));
+        if let Some((kind, surface)) = blend(pair, &share) {
+            return Ok(Model { kind, surface });
+        }
+        let takes_second = matches!(share, Share::Constant(share) if share > 0.5);
+        if !matches!(share, Share::Constant(0.0 | 1.0)) {
+            self.ignored.add(features::MI_BLEND, || node.place());
+        }
+        Ok(if takes_second { second } else { first })
     }
 
     fn normal_map(&mut self, parameters: &Parameters<'_>, depth_left: usize) -> Result<Model> {
@@ -210,7 +242,7 @@ impl Reader<'_> {
     }
 
     /// Width of the distribution of a rough model.
-    fn alpha(&mut self, parameters: &Parameters<'_>) -> Result<f32> {
+    fn width(&mut self, parameters: &Parameters<'_>) -> Result<Width> {
         let node = parameters.node;
         match parameters.string("distribution")? {
             Some("ggx") => {}
@@ -223,24 +255,34 @@ impl Reader<'_> {
             }
         }
         parameters.without_effect(&["sample_visible", "specular_sampling_weight"]);
-        let mut width = |name: &str| {
-            let value = self.value(parameters, name, Role::Index)?;
-            let width = self.without_texture(value, node, features::MI_ALPHA_TEXTURE);
-            Ok(width.map(|width| width.x))
-        };
-        let alpha = match (width("alpha_u")?, width("alpha_v")?) {
-            (Some(u), Some(v)) => {
+        let mut width = |name: &str| self.value(parameters, name, Role::Index);
+        let value = match (width("alpha_u")?, width("alpha_v")?) {
+            (Some(Value::Color(u)), Some(Value::Color(v))) => {
                 if u != v {
                     self.ignored.add(features::MI_ANISOTROPIC, || node.place());
                 }
-                0.5 * (u + v)
+                Some(Value::Color(0.5 * (u + v)))
             }
-            (one, other) => {
-                let alpha = one.or(other).or(width("alpha")?);
-                alpha.unwrap_or(0.1)
+            (Some(one), other) => {
+                if !matches!((&one, &other), (Value::Texture(u), Some(Value::Texture(v))) if u == v)
+                {
+                    self.ignored.add(features::MI_ANISOTROPIC, || node.place());
+                }
+                Some(one)
             }
+            (None, one) => one.or(width("alpha")?),
         };
-        Ok(alpha.clamp(MIN_ALPHA, 1.0))
+        Ok(match value {
+            Some(Value::Texture(texture)) => {
+                let root = |alpha: f32| alpha.clamp(MIN_ALPHA, 1.0).sqrt();
+                Width { alpha: 1.0, texture: Some(texture.mapped(root)) }
+            }
+            value => {
+                let alpha = self.without_texture(value, node, features::MI_ALPHA_TEXTURE);
+                let alpha = alpha.map_or(0.1, |alpha| alpha.x).clamp(MIN_ALPHA, 1.0);
+                Width { alpha, texture: None }
+            }
+        })
     }
 
     /// Index of the inside over that of the outside.

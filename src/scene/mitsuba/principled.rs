@@ -61,13 +61,12 @@ impl Reader<'_> {
                     Vec3::ONE
                 }
             };
-            let alpha = match roughness {
-                Value::Color(roughness) => (roughness.x * roughness.x).clamp(MIN_ALPHA, 1.0),
-                Value::Texture(_) | Value::Vertices(_) => 0.1,
-            };
+            let (roughness, texture) = roughness.split();
+            let alpha = (roughness.x * roughness.x).clamp(MIN_ALPHA, 1.0);
             let reflectance = Vec3::ONE;
             let kind = MaterialKind::Dielectric { ior, alpha, reflectance, transmittance };
-            return Ok(Model { kind, surface: Surface::default() });
+            let surface = Surface { roughness: texture, ..Surface::default() };
+            return Ok(Model { kind, surface });
         }
         let vertex_color = base.is_of_vertices();
         let (base_color, color) = base.split();

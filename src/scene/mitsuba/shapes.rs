@@ -230,7 +230,11 @@ impl Reader<'_> {
             }
         }
         shape.material = self.material(&parameters)?;
-        let has_bumps = self.materials[shape.material as usize].surface.normal.is_some();
+        let surface = &self.materials[shape.material as usize].surface;
+        if !surface.vertex_color {
+            shape.mesh.colors.clear();
+        }
+        let has_bumps = surface.normal.is_some();
         if has_bumps && !shape.mesh.uvs[0].is_empty() {
             shape.mesh.tangents = tangents(&shape.mesh);
         }

@@ -25,6 +25,18 @@ pub fn square_from_direction(direction: Vec3) -> Vec2 {
     0.5 * Vec2::new(u.copysign(direction.x) + 1.0, v.copysign(direction.y) + 1.0)
 }
 
+/// Unit direction of a point of the unit square: the inverse of [`square_from_direction`].
+pub fn direction_from_square(uv: Vec2) -> Vec3 {
+    let [u, v] = (2.0 * uv - 1.0).to_array();
+    let signed = 1.0 - (u.abs() + v.abs());
+    let radius = 1.0 - signed.abs();
+    let turn = if radius == 0.0 { 1.0 } else { (v.abs() - u.abs()) / radius + 1.0 };
+    let (sine, cosine) = (turn * FRAC_PI_4).sin_cos();
+    let z = (1.0 - radius * radius).copysign(signed);
+    let across = radius * (2.0 - radius * radius).max(0.0).sqrt();
+    Vec3::new((cosine * across).copysign(u), (sine * across).copysign(v), z)
+}
+
 /// Resamples a square map, whose `texels` are those of `side` rows. `light_from_world` turns a
 /// direction of the renderer to one of the map, up to its length.
 ///
@@ -73,18 +85,6 @@ pub fn resample(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Direction of a point of the square: the inverse, from the paper.
-    fn direction_from_square(uv: Vec2) -> Vec3 {
-        let [u, v] = (2.0 * uv - 1.0).to_array();
-        let signed = 1.0 - (u.abs() + v.abs());
-        let radius = 1.0 - signed.abs();
-        let turn = if radius == 0.0 { 1.0 } else { (v.abs() - u.abs()) / radius + 1.0 };
-        let (sine, cosine) = (turn * FRAC_PI_4).sin_cos();
-        let z = (1.0 - radius * radius).copysign(signed);
-        let across = radius * (2.0 - radius * radius).max(0.0).sqrt();
-        Vec3::new((cosine * across).copysign(u), (sine * across).copysign(v), z)
-    }
 
     #[test]
     fn points_of_the_square_come_back() {

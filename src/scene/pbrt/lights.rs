@@ -8,7 +8,10 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
-use super::{equal_area::resample, log::Log, parameters::Entity, spectra, textures::Textures};
+use super::{
+    equal_area::resample, log::Log, parameters::Entity, source::path_inside, spectra,
+    textures::Textures,
+};
 use crate::{
     error::Result,
     math::colour::luminance,
@@ -16,7 +19,7 @@ use crate::{
         EnvironmentMap, Lamp, features,
         lamp::{LampKind, SpotFalloff},
     },
-    texture::{Encoding, Texture},
+    texture::{Encoding, Texture, TextureUse},
 };
 
 /// Largest side of an equal-area map, texels.
@@ -41,10 +44,12 @@ struct SquareMap {
 }
 
 /// Emission of a shape.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct AreaLight {
-    /// Radiance.
+    /// Radiance, or its factor where an image gives it.
     pub radiance: Vec3,
+    /// Image of the radiance.
+    pub image: Option<TextureUse>,
     /// True if both sides emit.
     pub two_sided: bool,
 }
@@ -64,7 +69,7 @@ pub fn area_light(
     entity: &Entity,
     area: f64,
     exposure: f32,
-    textures: &Textures,
+    textures: &mut Textures,
     log: &mut Log,
 ) -> Result<AreaLight> {
     if entity.name != "diffuse" {
@@ -76,8 +81,10 @@ pub fn area_light(
         let sides = if two_sided { 2.0 } else { 1.0 };
         scale *= power / (sides * area * PI);
     }
-    if let Some(image) = entity.find("filename") {
-        log.ignore(features::PBRT_EMISSION_IMAGE, &image.place);
+    let image = textures.light_image(entity, log)?;
+    if let (Some(_), Some(color)) = (&image, entity.find("L")) {
+        let message = "expected either `L` or `filename`, found both";
+        return Err(color.place.error(format!("{}: {message}", entity.label())));
     }
     let radiance = color(entity, "L", textures)? * scale as f32 * exposure;
     log.unused(entity);
@@ -86,7 +93,7 @@ pub fn area_light(
             entity.error(format!("expected finite radiance of at least 0, found {radiance}"))
         );
     }
-    Ok(AreaLight { radiance, two_sided })
+    Ok(AreaLight { radiance, image, two_sided })
 }
 
 impl Lights {
@@ -197,7 +204,7 @@ impl Lights {
             let message = "expected either `L` or `filename`, found both";
             return Err(color.place.error(format!("{}: {message}", entity.label())));
         }
-        let path = textures.folder().join(file);
+        let path = path_inside(textures.folder(), file).map_err(|message| entity.error(message))?;
         let mut map = read_map(&path, log).map_err(|error| entity.error(error.to_string()))?;
         if map.width != map.height || map.width > MAX_SIDE {
             return Err(entity.error(format!(

@@ -18,7 +18,10 @@ use crate::{
         material::{ConductorFresnel, MaterialKind, Surface},
     },
     error::Result,
-    scene::features::{self, Feature},
+    scene::{
+        blend::{Share, blend},
+        features,
+    },
     texture::TextureUse,
 };
 
@@ -26,6 +29,8 @@ use crate::{
 const MAX_DEPTH: usize = 16;
 /// Widths below which pbrt-v4 takes a surface for smooth.
 const SMOOTH_ALPHA: f32 = 1e-3;
+/// Reflectance from which a smooth metal is a mirror; pbrt has none of more.
+const MIRROR_REFLECTANCE: f32 = 0.9999;
 /// Refractive indices that a coat may have.
 const COAT_IOR: (f32, f32) = (1.01, 4.0);
 /// Refractive indices of solids.
@@ -96,10 +101,6 @@ impl<'a> Materials<'a> {
         depth: usize,
         log: &mut Log,
     ) -> Result<Option<Material>> {
-        let nearest = |log: &mut Log| {
-            let name = format!("material `{kind}`");
-            log.ignore_named(features::PBRT_NEAREST_MATERIAL, &name, &entity.place);
-        };
         let mut surface = Surface::default();
         let kind = match kind {
             "diffuse" => self.diffuse(entity, "reflectance", 0.5, 1.0, &mut surface, log)?,
@@ -109,7 +110,7 @@ impl<'a> Materials<'a> {
             }
             "conductor" => self.conductor(entity, "", &mut surface, log)?,
             "coatedconductor" => {
-                nearest(log);
+                log.ignore(features::PBRT_COATED_CONDUCTOR, &entity.place);
                 self.layers(entity, log)?;
                 for name in ["interface.roughness", "interface.uroughness", "interface.vroughness"]
                 {
@@ -132,20 +133,20 @@ impl<'a> Materials<'a> {
                 transmittance: Vec3::ONE,
             },
             "diffusetransmission" => {
-                nearest(log);
+                log.ignore(features::PBRT_TRANSMISSION, &entity.place);
                 self.textures.spectrum(entity, "transmittance", log)?;
                 let scale = entity.number("scale", 1.0)? as f32;
                 self.diffuse(entity, "reflectance", 0.25, scale, &mut surface, log)?
             }
             "subsurface" => {
-                nearest(log);
+                log.ignore(features::PBRT_SUBSURFACE, &entity.place);
                 for name in ["name", "mfp", "sigma_a", "sigma_s", "g", "scale"] {
                     entity.find(name);
                 }
                 self.plastic(entity, &mut surface, log)?
             }
             "hair" => {
-                nearest(log);
+                log.ignore(features::PBRT_HAIR, &entity.place);
                 for name in [
                     "sigma_a",
                     "reflectance",
@@ -251,6 +252,14 @@ impl<'a> Materials<'a> {
             Some(value @ Value::Image(_)) => {
                 ConductorFresnel::Schlick { reflectance: color(value, surface) }
             }
+            // A smooth metal that reflects all light does so in all directions.
+            Some(Value::Constant(color))
+                if color.min_element() >= MIRROR_REFLECTANCE
+                    && surface.roughness.is_none()
+                    && roughness.alpha < SMOOTH_ALPHA =>
+            {
+                return Ok(MaterialKind::Mirror { reflectance: Vec3::ONE });
+            }
             // pbrt takes η = 1 and the k that reflects as much.
             Some(Value::Constant(color)) => {
                 let color = color.clamp(Vec3::ZERO, Vec3::splat(0.9999));
@@ -323,7 +332,8 @@ impl<'a> Materials<'a> {
         }
     }
 
-    /// The material of the greater share; its opacity is the share if the other is not there.
+    /// The mixture, else the material of the greater share; its opacity is the share if the other is
+    /// not there.
     fn mix(
         &mut self,
         entity: &Entity,
@@ -355,12 +365,19 @@ impl<'a> Materials<'a> {
             (None, Some(second)) => (second, Some(amount)),
             (Some(first), Some(second)) => {
                 let share = match amount {
-                    Value::Constant(amount) => amount.x,
-                    Value::Image(_) => 0.5,
+                    Value::Constant(amount) => Share::Constant(amount.x.clamp(0.0, 1.0)),
+                    Value::Image(image) => Share::Image(image),
+                };
+                let pair = [&first, &second].map(|part| (&part.kind, &part.surface));
+                if let Some((kind, surface)) = blend(pair, &share) {
+                    return Ok(Some(Material { name, kind, surface }));
+                }
+                let share = match share {
+                    Share::Constant(share) => share,
+                    Share::Image(_) => 0.5,
                 };
                 if share > 0.0 && share < 1.0 {
-                    let feature: Feature = features::PBRT_NEAREST_MATERIAL;
-                    log.ignore_named(feature, "material `mix`", &entity.place);
+                    log.ignore(features::PBRT_MIX, &entity.place);
                 }
                 (if share <= 0.5 { first } else { second }, None)
             }

@@ -13,7 +13,7 @@
 
 mod camera;
 mod directives;
-mod equal_area;
+pub(crate) mod equal_area;
 mod lights;
 mod log;
 mod materials;
@@ -170,7 +170,7 @@ fn integrator(description: &Description, log: &mut Log) {
 }
 
 /// Tells materials apart: the choice, the alpha of the shape and its light.
-type MaterialKey = (String, String, Option<([u32; 3], bool)>);
+type MaterialKey = (String, String, Option<([u32; 3], bool, String)>);
 
 /// Materials made so far; none for a surface that is not there.
 #[derive(Default)]
@@ -207,7 +207,7 @@ impl Builder<'_> {
             Some(entity) => {
                 let area = area(&mesh, self.view.mirror * shape.world_from_shape);
                 let exposure = self.view.exposure;
-                let textures = &self.materials.textures;
+                let textures = &mut self.materials.textures;
                 Some(lights::area_light(entity, area, exposure, textures, &mut self.log)?)
             }
             None => None,
@@ -237,8 +237,10 @@ impl Builder<'_> {
         };
         let alpha = shape.entity.find("alpha");
         let alpha_key = alpha.map_or(String::new(), |alpha| format!("{:?}", alpha.values));
-        let light_key =
-            light.map(|light| (light.radiance.to_array().map(f32::to_bits), light.two_sided));
+        let light_key = light.as_ref().map(|light| {
+            let image = light.image.as_ref().map_or("", |image| &image.texture.name);
+            (light.radiance.to_array().map(f32::to_bits), light.two_sided, image.to_owned())
+        });
         let key = (choice, alpha_key, light_key);
         let kept = match self.kept.by_key.get(&key) {
             Some(kept) => *kept,
@@ -252,9 +254,9 @@ impl Builder<'_> {
                     }
                     material.surface.emission = light
                         .filter(|light| light.radiance != Vec3::ZERO)
-                        .map(|AreaLight { radiance, two_sided }| Emission {
+                        .map(|AreaLight { radiance, image, two_sided }| Emission {
                             radiance,
-                            texture: None,
+                            texture: image,
                             two_sided,
                         });
                     self.kept.materials.push(material);
@@ -281,6 +283,7 @@ impl Builder<'_> {
         let is_instanced =
             places.len() > 1 && self.budget.takes_instances(places.len(), mesh.triangles.len());
         if !is_instanced {
+            self.check_counts(mesh, places.len(), shape)?;
             return places.iter().try_for_each(|place| self.place(mesh, material, shape, *place));
         }
         let count = self.geometry.instances.len() + places.len();
@@ -304,6 +307,20 @@ impl Builder<'_> {
         Ok(())
     }
 
+    /// Checks, before any is placed, that so many copies of a mesh can be used.
+    fn check_counts(&self, mesh: &Mesh, copies: usize, shape: &Shape) -> Result<()> {
+        let with = |own: usize, so_far: usize| own.saturating_mul(copies).saturating_add(so_far);
+        let vertices = with(mesh.positions.len(), self.geometry.positions.len());
+        let triangles = with(mesh.triangles.len(), self.triangle_count);
+        if vertices.max(triangles) <= MAX_COUNT {
+            return Ok(());
+        }
+        Err(shape.entity.error(format!(
+            "{vertices} vertices and {triangles} triangles with the instances so far, at most \
+             {MAX_COUNT} can be used"
+        )))
+    }
+
     /// Appends a mesh to the geometry.
     fn place(&mut self, mesh: &Mesh, material: u32, shape: &Shape, outer: DMat4) -> Result<()> {
         let placed = self.view.mirror * outer * shape.world_from_shape;
@@ -311,15 +328,8 @@ impl Builder<'_> {
             self.log.ignore(features::PBRT_FLAT, &shape.entity.place);
             return Ok(());
         };
-        let vertex_count = self.geometry.positions.len() + mesh.positions.len();
+        self.check_counts(mesh, 1, shape)?;
         self.triangle_count += mesh.triangles.len();
-        if vertex_count.max(self.triangle_count) > MAX_COUNT {
-            return Err(shape.entity.error(format!(
-                "{vertex_count} vertices and {} triangles with the instances so far, at most \
-                 {MAX_COUNT} can be used",
-                self.triangle_count
-            )));
-        }
         let dropped = self.geometry.append(mesh, &transform, |_| material);
         self.dropped.add(dropped);
         Ok(())

@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 use super::{
     log::Log,
     parameters::{Entity, Kind},
+    source::path_inside,
     subdivision::{MAX_TRIANGLES, subdivide},
 };
 use crate::{
@@ -33,9 +34,10 @@ pub fn mesh(entity: &Entity, folder: &Path, log: &mut Log) -> Result<Option<Mesh
             let Some(file) = entity.string("filename")? else {
                 return Err(entity.error("expected a `filename`"));
             };
-            let path = folder.join(file);
-            let mesh = ply::read(&path, &mut log.warnings)
-                .map_err(|error| entity.error(error.to_string()))?;
+            let path = path_inside(folder, file).map_err(|message| entity.error(message))?;
+            let mut mesh = ply::read(&path).map_err(|error| entity.error(error.to_string()))?;
+            // pbrt does not read them.
+            mesh.colors.clear();
             for name in ["displacement", "displacement.edgelength"] {
                 if let Some(parameter) = entity.find(name) {
                     log.ignore(features::PBRT_DISPLACEMENT, &parameter.place);

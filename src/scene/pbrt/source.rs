@@ -14,7 +14,9 @@ use crate::{error::Result, files};
 
 /// Most files that may include one another.
 const MAX_DEPTH: usize = 32;
-/// Most bytes of a file, after decompression.
+/// Most files that are included; a file may be included many times.
+const MAX_INCLUDES: usize = 1 << 12;
+/// Most bytes of all files together, after decompression.
 const MAX_BYTES: u64 = 1 << 33;
 
 type FileTokens = Tokens<BufReader<Box<dyn Read>>>;
@@ -33,6 +35,8 @@ pub struct Source {
     stack: Vec<Open>,
     /// Last token, if it is to be read again.
     held: Option<Token>,
+    /// Bytes that may still be read; those of the open files are taken off.
+    bytes_left: u64,
     /// Files read.
     pub inputs: Vec<PathBuf>,
 }
@@ -55,8 +59,9 @@ impl Source {
     /// [`Io`](crate::error::Error::Io), and [`Format`](crate::error::Error::Format) for a device.
     pub fn open(path: &Path) -> Result<Self> {
         let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
-        let first = Open { path: path.into(), tokens: open(path)?, restores: false };
-        Ok(Self { folder, stack: vec![first], held: None, inputs: vec![path.into()] })
+        let first = Open { path: path.into(), tokens: open(path, MAX_BYTES)?, restores: false };
+        let inputs = vec![path.into()];
+        Ok(Self { folder, stack: vec![first], held: None, bytes_left: MAX_BYTES, inputs })
     }
 
     /// Folder to which paths are relative.
@@ -80,7 +85,12 @@ impl Source {
             if self.stack.len() == 1 {
                 return Ok(Part::End);
             }
-            if self.stack.pop().is_some_and(|open| open.restores) {
+            let Some(closed) = self.stack.pop() else { return Ok(Part::End) };
+            self.bytes_left = closed.tokens.bytes_left();
+            if let Some(open) = self.stack.last_mut() {
+                open.tokens.limit(self.bytes_left);
+            }
+            if closed.restores {
                 return Ok(Part::EndOfImport);
             }
         }
@@ -121,13 +131,7 @@ impl Source {
     /// [`Parse`](crate::error::Error::Parse) with the place of the statement for a file outside the
     /// scene's folder, one that includes itself, one that cannot be read, and too many files in one another.
     pub fn include(&mut self, name: &str, restores: bool, place: &Place) -> Result<()> {
-        if !stays_inside(Path::new(name)) {
-            return Err(place.error(format!(
-                "expected a file in the folder of the scene, found `{name}`, which may be \
-                 elsewhere: copy it into the folder"
-            )));
-        }
-        let path = self.folder.join(name);
+        let path = path_inside(&self.folder, name).map_err(|message| place.error(message))?;
         if self.stack.iter().any(|open| files::is_same_file(&open.path, &path)) {
             return Err(place.error(format!("`{name}` includes itself")));
         }
@@ -135,11 +139,29 @@ impl Source {
             let message = format!("more than {MAX_DEPTH} files include one another");
             return Err(place.error(message));
         }
-        let tokens = open(&path).map_err(|error| place.error(error.to_string()))?;
+        if self.inputs.len() > MAX_INCLUDES {
+            return Err(place.error(format!("more than {MAX_INCLUDES} files are included")));
+        }
+        let left = self.stack.last().map_or(self.bytes_left, |open| open.tokens.bytes_left());
+        let tokens = open(&path, left).map_err(|error| place.error(error.to_string()))?;
         self.inputs.push(path.clone());
         self.stack.push(Open { path, tokens, restores });
         Ok(())
     }
+}
+
+/// Path of a file that a scene in `folder` names.
+///
+/// # Errors
+/// A message for a name that is absolute or leaves the folder.
+pub fn path_inside(folder: &Path, name: &str) -> Result<PathBuf, String> {
+    if stays_inside(Path::new(name)) {
+        return Ok(folder.join(name));
+    }
+    Err(format!(
+        "expected a file in the folder of the scene, found `{name}`, which may be elsewhere: copy it \
+         into the folder"
+    ))
 }
 
 /// Checks that a relative path never climbs out of the folder it starts in.
@@ -156,7 +178,7 @@ fn stays_inside(path: &Path) -> bool {
     })
 }
 
-fn open(path: &Path) -> Result<FileTokens> {
+fn open(path: &Path, most_bytes: u64) -> Result<FileTokens> {
     let file: File = files::open_regular(path)?;
     let reader: Box<dyn Read> = if files::extension(path) == "gz" {
         Box::new(MultiGzDecoder::new(file))
@@ -164,7 +186,7 @@ fn open(path: &Path) -> Result<FileTokens> {
         Box::new(file)
     };
     let reader = BufReader::with_capacity(1 << 16, reader);
-    Ok(Tokens::new(Rc::from(path), reader, MAX_BYTES))
+    Ok(Tokens::new(Rc::from(path), reader, most_bytes))
 }
 
 #[cfg(test)]

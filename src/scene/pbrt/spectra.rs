@@ -11,6 +11,7 @@ use glam::{DVec3, Vec3};
 use super::{
     named,
     parameters::{Kind, Parameter, Values},
+    source::path_inside,
 };
 use crate::{
     brdf::spectrum::{light_color, srgb_weights},
@@ -91,7 +92,8 @@ fn source<'a>(parameter: &'a Parameter, folder: &Path) -> Result<Source<'a>> {
             if !name.ends_with(".spd") {
                 return Ok(Source::Name(name));
             }
-            let text = files::read_text(&folder.join(name)).map_err(|e| error(e.to_string()))?;
+            let path = path_inside(folder, name).map_err(error)?;
+            let text = files::read_text(&path).map_err(|e| error(e.to_string()))?;
             let lines = text.lines().map(|line| line.split('#').next().unwrap_or(""));
             let words = lines.flat_map(str::split_ascii_whitespace);
             let numbers: Option<Vec<f64>> = words.map(|word| word.parse().ok()).collect();

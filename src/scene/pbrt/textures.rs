@@ -14,6 +14,7 @@ use super::{
     directives::Description,
     log::Log,
     parameters::{Entity, Kind, Parameter},
+    source::path_inside,
     spectra,
 };
 use crate::{
@@ -286,7 +287,7 @@ impl<'a> Textures<'a> {
         decoding: &Decoding,
         log: &mut Log,
     ) -> Result<Arc<Texture>> {
-        let path = self.folder.join(file);
+        let path = path_inside(self.folder, file).map_err(|message| entity.error(message))?;
         let key = (path.clone(), format!("{:?}", decoding.gamma));
         if let Some(texture) = self.images.get(&key) {
             return Ok(Arc::clone(texture));
@@ -319,6 +320,18 @@ impl<'a> Textures<'a> {
         let texture = self.load(entity, file, &decoding, log)?;
         let encoding = Encoding::Linear;
         Ok(Some(TextureUse { encoding, ..TextureUse::from_lower_left(texture) }))
+    }
+
+    /// Image of the radiance of an area light, if it names one: shown once, (0, 0) at its lower left.
+    ///
+    /// # Errors
+    /// With the place for an image that cannot be read.
+    pub fn light_image(&mut self, entity: &Entity, log: &mut Log) -> Result<Option<TextureUse>> {
+        let Some(file) = entity.string("filename")? else { return Ok(None) };
+        let decoding = Decoding { encoding: Encoding::Srgb, gamma: None };
+        let texture = self.load(entity, file, &decoding, log)?;
+        let wrap = [Wrap::ClampToEdge; 2];
+        Ok(Some(TextureUse { wrap, ..TextureUse::from_lower_left(texture) }))
     }
 }
 

@@ -67,6 +67,16 @@ impl<R: BufRead> Tokens<R> {
         Self { reader, path, line: 1, column: 1, bytes_left: most_bytes, buffer, text, place }
     }
 
+    /// Bytes that may still be read.
+    pub fn bytes_left(&self) -> u64 {
+        self.bytes_left
+    }
+
+    /// Lets no more than so many bytes be read.
+    pub fn limit(&mut self, most_bytes: u64) {
+        self.bytes_left = self.bytes_left.min(most_bytes);
+    }
+
     /// Characters of the last token.
     pub fn text(&self) -> &str {
         &self.text

@@ -51,6 +51,19 @@ impl Scalar {
         }
     }
 
+    /// Largest value of an integer, which stands for 1 in colours; none for floats.
+    pub(super) fn largest(self) -> Option<f64> {
+        Some(match self {
+            Self::Int8 => f64::from(i8::MAX),
+            Self::Uint8 => f64::from(u8::MAX),
+            Self::Int16 => f64::from(i16::MAX),
+            Self::Uint16 => f64::from(u16::MAX),
+            Self::Int32 => f64::from(i32::MAX),
+            Self::Uint32 => f64::from(u32::MAX),
+            Self::Float32 | Self::Float64 => return None,
+        })
+    }
+
     /// Value of little-endian bytes; every type fits a double exactly.
     pub(super) fn value(self, bytes: [u8; 8]) -> f64 {
         let [a, b, c, d, ..] = bytes;

@@ -1,7 +1,7 @@
 //! PLY \[Turk 1994\]: ascii and binary in both byte orders.
 //!
 //! The header may name elements and properties in any order and of any type. The reader uses
-//! `x y z`, `nx ny nz` and texture coordinates of `vertex` and the list `vertex_indices` (or
+//! `x y z`, `nx ny nz`, texture coordinates and colours of `vertex` and the list `vertex_indices` (or
 //! `vertex_index`) of `face`. It triangulates polygons with more than three corners in the plane of
 //! their Newell normal.
 
@@ -19,37 +19,34 @@ use super::Mesh;
 use crate::{
     error::{Error, Result},
     files,
-    scene::features::{self, Ignored},
+    texture::lookup::srgb_to_linear,
 };
 
 /// Names of texture coordinates; (0, 0) is the lower left corner.
 const UV_NAMES: [[&str; 2]; 4] =
     [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
 
+/// Names of colours, and of their opacity.
+const COLOR_NAMES: [[&str; 4]; 2] = [["red", "green", "blue", "alpha"], ["r", "g", "b", "a"]];
+
 /// Largest compression of gzip, which bounds what a compressed file may promise.
 const GZIP_LARGEST_RATIO: u64 = 1032;
 
-/// Reads a PLY file, or one compressed by gzip if its extension is `gz`. Vertex colours, which are left
-/// out, are a warning.
+/// Reads a PLY file, or one compressed by gzip if its extension is `gz`.
 ///
 /// # Errors
 /// [`Error::Io`], or [`Error::Format`] that names the element and what was expected and found.
-pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
+pub fn read(path: &Path) -> Result<Mesh> {
     let file = files::open_regular(path)?;
     let file_bytes = file.metadata().map_err(|source| Error::io(path, "read", source))?.len();
     if files::extension(path) == "gz" {
         let reader = BufReader::with_capacity(1 << 16, MultiGzDecoder::new(file));
-        return read_from(path, reader, file_bytes.saturating_mul(GZIP_LARGEST_RATIO), warnings);
+        return read_from(path, reader, file_bytes.saturating_mul(GZIP_LARGEST_RATIO));
     }
-    read_from(path, BufReader::with_capacity(1 << 16, file), file_bytes, warnings)
+    read_from(path, BufReader::with_capacity(1 << 16, file), file_bytes)
 }
 
-fn read_from<R: BufRead>(
-    path: &Path,
-    reader: R,
-    file_bytes: u64,
-    warnings: &mut Vec<String>,
-) -> Result<Mesh> {
+fn read_from<R: BufRead>(path: &Path, reader: R, file_bytes: u64) -> Result<Mesh> {
     let mut source = Source { path, reader, encoding: Encoding::Ascii, bytes_read: 0, line: 1 };
     let elements = source.read_header()?;
     let mut mesh = Mesh::default();
@@ -69,12 +66,8 @@ fn read_from<R: BufRead>(
             ));
         }
     }
-    let mut ignored = Ignored::default();
     let mut polygons = Polygons::default();
     for element in &elements {
-        if element.name == "vertex" && element.properties.iter().any(|p| p.name == "red") {
-            ignored.add(features::PLY_COLOR, || "element `vertex`".to_owned());
-        }
         match element.name.as_str() {
             "vertex" => source.read_vertices(element, &mut mesh)?,
             "face" => source.read_faces(element, vertex_count, &mut mesh, &mut polygons)?,
@@ -89,7 +82,6 @@ fn read_from<R: BufRead>(
         }
     }
     polygons.triangulate_into(&mut mesh);
-    warnings.extend(ignored.warnings(path));
     Ok(mesh)
 }
 
@@ -160,7 +152,13 @@ impl<R: BufRead> Source<'_, R> {
         let has_normals = !normals.contains(&None);
         let uvs = UV_NAMES.map(|[u, v]| Some([column(u)?, column(v)?]));
         let uvs = uvs.into_iter().flatten().next();
+        let colors =
+            COLOR_NAMES.map(|[r, g, b, a]| Some(([column(r)?, column(g)?, column(b)?], column(a))));
+        let colors = colors.into_iter().flatten().next();
         mesh.positions.reserve_exact(element.count as usize);
+        if colors.is_some() {
+            mesh.colors.reserve_exact(element.count as usize);
+        }
         if has_normals {
             mesh.normals.reserve_exact(element.count as usize);
         }
@@ -183,6 +181,16 @@ impl<R: BufRead> Source<'_, R> {
             mesh.positions.push(vector(positions));
             if has_normals {
                 mesh.normals.push(vector(normals));
+            }
+            if let Some((columns, opacity)) = colors {
+                let number = |column: usize| match element.properties[column].value.largest() {
+                    Some(largest) => {
+                        ((row[column] / largest) as f32, srgb_to_linear as fn(f32) -> f32)
+                    }
+                    None => (row[column] as f32, std::convert::identity as fn(f32) -> f32),
+                };
+                let [r, g, b] = columns.map(number).map(|(value, decode)| decode(value));
+                mesh.colors.push([r, g, b, opacity.map_or(1.0, |column| number(column).0)]);
             }
             if let Some(columns) = uvs {
                 mesh.uvs[0].push(columns.map(|column| row[column] as f32));

@@ -1,5 +1,5 @@
 //! Images of textures, as PNG where the texels go unchanged, else as OpenEXR with the factors of the
-//! material in the texels: Mitsuba's `bitmap` has none.
+//! material in the texels: formats whose textures have none share it.
 
 use std::{path::Path, sync::Arc};
 
@@ -7,8 +7,9 @@ use glam::{Vec2, Vec3};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use rayon::prelude::*;
 
-use super::safe_name;
+use super::names::safe_name;
 use crate::{
+    brdf::coat::base_below_coat,
     error::Result,
     files,
     film::Image,
@@ -28,6 +29,10 @@ const MAX_ENLARGED_SIDE: u32 = 4096;
 pub(super) enum Recipe {
     /// Colours times a factor.
     Color(Vec3),
+    /// Colours times a factor, as the base below a coat of this refractive index that shows them.
+    Base(Vec3, f32),
+    /// Radiance: colours times a factor, never in 8 or 16 bits.
+    Radiance(Vec3),
     /// One number times a factor.
     Number(f32),
     /// Square of one number times a factor.
@@ -131,7 +136,9 @@ impl Picture {
             // The number of three channels is their luminance.
             Recipe::Number(factor) => factor == 1.0 && self.used.channels != Channels::Color,
             Recipe::Normal(factor) => factor == Vec2::ONE,
-            Recipe::Squared(_) | Recipe::Cut { .. } => false,
+            Recipe::Base(..) | Recipe::Radiance(_) | Recipe::Squared(_) | Recipe::Cut { .. } => {
+                false
+            }
         };
         is_one
             && self.used.scale == [1.0; 3]
@@ -183,12 +190,13 @@ impl Picture {
         let mut tables = TextureTables::default();
         let index = tables.add(Some(&used));
         let words = tables.words(0..tables.word_count());
+        let of = self.value();
         let texel = |number: usize| {
             let (x, y) = (number as u32 % width, number as u32 / width);
             let image =
                 Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
             let value = texture_value(&words, &tables.uses, index, image, image).truncate();
-            self.value(value).to_array()
+            of(value).to_array()
         };
         let count = width as usize * height as usize;
         let texels: Vec<[f32; 3]> = (0..count).into_par_iter().map(texel).collect();
@@ -197,19 +205,28 @@ impl Picture {
         image.write_exr(path)
     }
 
-    fn value(&self, value: Vec3) -> Vec3 {
+    /// Function from values of the texture to those of the image.
+    fn value(&self) -> Box<dyn Fn(Vec3) -> Vec3 + Sync> {
         match self.recipe {
-            Recipe::Color(factor) => value * factor,
-            Recipe::Number(factor) => Vec3::splat(factor * luminance(value)),
-            Recipe::Squared(factor) => Vec3::splat(factor * luminance(value).powi(2)),
+            Recipe::Color(factor) | Recipe::Radiance(factor) => {
+                Box::new(move |value| value * factor)
+            }
+            Recipe::Base(factor, ior) => {
+                let base = base_below_coat(ior);
+                Box::new(move |value| (value * factor).map(&base))
+            }
+            Recipe::Number(factor) => Box::new(move |value| Vec3::splat(factor * luminance(value))),
+            Recipe::Squared(factor) => {
+                Box::new(move |value| Vec3::splat(factor * luminance(value).powi(2)))
+            }
             Recipe::Normal(factor) => {
                 // The length of a normal does not count. Texels stay within 0…1.
                 let factor = factor.extend(1.0) / factor.abs().max_element().max(1.0);
-                0.5 + 0.5 * factor * (2.0 * value - 1.0)
+                Box::new(move |value| 0.5 + 0.5 * factor * (2.0 * value - 1.0))
             }
-            Recipe::Cut { factor, cutoff } => {
+            Recipe::Cut { factor, cutoff } => Box::new(move |value| {
                 Vec3::splat(if factor * luminance(value) >= cutoff { 1.0 } else { 0.0 })
-            }
+            }),
         }
     }
 }

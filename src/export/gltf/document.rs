@@ -1,0 +1,237 @@
+//! Parts of a glTF document that others refer to by number: accessors of the buffer, textures.
+
+use std::{collections::BTreeSet, path::Path};
+
+use serde_json::{Map, Value, json};
+
+use super::images::Sheet;
+use crate::{
+    error::Result,
+    export::parts::{Part, Vertex},
+    texture::{Interpolation, TextureUse, Wrap},
+};
+
+/// Component types and targets of OpenGL.
+const FLOAT: u32 = 5126;
+const UNSIGNED_INT: u32 = 5125;
+const ARRAY_BUFFER: u32 = 34962;
+const ELEMENT_ARRAY_BUFFER: u32 = 34963;
+const NEAREST: u32 = 9728;
+const LINEAR: u32 = 9729;
+
+/// Textures with their images and samplers.
+#[derive(Debug, Default)]
+pub(super) struct Textures {
+    sheets: Vec<Sheet>,
+    samplers: Vec<Value>,
+    textures: Vec<Value>,
+    /// Names of the extensions that the document uses.
+    pub(super) extensions: BTreeSet<&'static str>,
+}
+
+impl Textures {
+    /// Adds an image that is looked up as `used`, or finds the same again. Returns the object that
+    /// refers to it, and false if its transformation is not one of glTF.
+    pub(super) fn add(&mut self, sheet: Sheet, used: &TextureUse) -> (Map<String, Value>, bool) {
+        let source = self.sheets.iter().position(|other| other.is_same(&sheet));
+        let source = source.unwrap_or_else(|| {
+            self.sheets.push(sheet);
+            self.sheets.len() - 1
+        });
+        let wrap = used.wrap.map(|wrap| match wrap {
+            Wrap::Repeat => 10497,
+            Wrap::MirroredRepeat => 33648,
+            Wrap::ClampToEdge => 33071,
+        });
+        let filter = if used.interpolation == Interpolation::Nearest { NEAREST } else { LINEAR };
+        let sampler =
+            json!({"wrapS": wrap[0], "wrapT": wrap[1], "magFilter": filter, "minFilter": filter});
+        let sampler = number_of(&mut self.samplers, sampler);
+        let index = number_of(&mut self.textures, json!({"source": source, "sampler": sampler}));
+        let mut info = Map::new();
+        info.insert("index".to_owned(), index.into());
+        if used.uv_set != 0 {
+            info.insert("texCoord".to_owned(), used.uv_set.into());
+        }
+        let (transform, is_exact) = transform(used.image_from_uv);
+        if let Some(transform) = transform {
+            self.extensions.insert("KHR_texture_transform");
+            info.insert("extensions".to_owned(), json!({"KHR_texture_transform": transform}));
+        }
+        (info, is_exact)
+    }
+
+    /// Adds the members of the document; `name_of` gives the URI of a file.
+    pub(super) fn add_to(
+        &self,
+        document: &mut Map<String, Value>,
+        uri_of: impl Fn(&str) -> String,
+    ) {
+        let image = |(index, sheet): (usize, &Sheet)| json!({"uri": uri_of(&sheet.name(index))});
+        let images: Vec<Value> = self.sheets.iter().enumerate().map(image).collect();
+        for (name, list) in
+            [("images", &images), ("samplers", &self.samplers), ("textures", &self.textures)]
+        {
+            if !list.is_empty() {
+                document.insert(name.to_owned(), list.clone().into());
+            }
+        }
+    }
+
+    /// Writes all images into a folder.
+    pub(super) fn write(&self, folder: &Path) -> Result<()> {
+        let mut sheets = self.sheets.iter().enumerate();
+        sheets.try_for_each(|(index, sheet)| sheet.write(&folder.join(sheet.name(index))))
+    }
+}
+
+/// Number of a value in a list, to which it is added if it is new.
+fn number_of(list: &mut Vec<Value>, value: Value) -> usize {
+    list.iter().position(|other| *other == value).unwrap_or_else(|| {
+        list.push(value);
+        list.len() - 1
+    })
+}
+
+/// `KHR_texture_transform` of a matrix, none if it changes nothing, and false for one that shears: it
+/// scales first, then turns, then shifts.
+fn transform([[a, b, u], [c, d, v]]: [[f32; 3]; 2]) -> (Option<Value>, bool) {
+    if [[a, b, u], [c, d, v]] == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] {
+        return (None, true);
+    }
+    // The first column is (cos, −sin) · scale_u, the second (sin, cos) · scale_v.
+    let scale_u = a.hypot(c);
+    let (sine, cosine) = if scale_u > 0.0 {
+        (-c / scale_u, a / scale_u)
+    } else {
+        let length = b.hypot(d).max(f32::MIN_POSITIVE);
+        (b / length, d / length)
+    };
+    let scale_v = b * sine + d * cosine;
+    let shear = b * cosine - d * sine;
+    // A turn by half of it is a mirror of both axes, which needs no angle.
+    let (scale_u, scale_v, rotation) = if sine == 0.0 && cosine < 0.0 {
+        (-scale_u, -scale_v, 0.0)
+    } else {
+        (scale_u, scale_v, sine.atan2(cosine))
+    };
+    let value = json!({"offset": [u, v], "rotation": rotation, "scale": [scale_u, scale_v]});
+    (Some(value), shear.abs() <= 1e-5 * scale_v.abs().max(scale_u))
+}
+
+/// Buffer with its views and accessors.
+#[derive(Debug, Default)]
+pub(super) struct Buffer {
+    pub(super) bytes: Vec<u8>,
+    pub(super) views: Vec<Value>,
+    pub(super) accessors: Vec<Value>,
+}
+
+/// Attributes of the vertices of a primitive beside their positions.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Attributes {
+    pub(super) normals: bool,
+    pub(super) tangents: bool,
+    /// Sets of texture coordinates.
+    pub(super) uv_sets: usize,
+    pub(super) colors: bool,
+}
+
+impl Buffer {
+    /// Adds the triangles of a part and returns a primitive without material.
+    pub(super) fn primitive(&mut self, part: &Part, attributes: Attributes) -> Map<String, Value> {
+        let vertices = &part.vertices;
+        let mut members = Map::new();
+        let positions = vertices.iter().map(|vertex| vertex.position);
+        let low = positions.clone().reduce(glam::Vec3::min).unwrap_or_default().to_array();
+        let high = positions.reduce(glam::Vec3::max).unwrap_or_default().to_array();
+        let index = self.vectors(vertices, |vertex| vertex.position.to_array());
+        self.accessors[index]["min"] = json!(low);
+        self.accessors[index]["max"] = json!(high);
+        members.insert("POSITION".to_owned(), index.into());
+        if attributes.normals {
+            let index =
+                self.vectors(vertices, |vertex| vertex.normal.normalize_or_zero().to_array());
+            members.insert("NORMAL".to_owned(), index.into());
+        }
+        if attributes.tangents {
+            let index = self.vectors(vertices, |vertex| {
+                let along = vertex.tangent.truncate().normalize_or(glam::Vec3::X);
+                along.extend(if vertex.tangent.w < 0.0 { -1.0 } else { 1.0 }).to_array()
+            });
+            members.insert("TANGENT".to_owned(), index.into());
+        }
+        for set in 0..attributes.uv_sets {
+            let index = self.vectors(vertices, |vertex| vertex.uvs[set].to_array());
+            members.insert(format!("TEXCOORD_{set}"), index.into());
+        }
+        if attributes.colors {
+            let index = self.vectors(vertices, |vertex| vertex.color.to_array());
+            members.insert("COLOR_0".to_owned(), index.into());
+        }
+        let start = self.bytes.len();
+        for index in part.triangles.iter().flatten() {
+            self.bytes.extend(index.to_le_bytes());
+        }
+        let count = 3 * part.triangles.len();
+        let indices = self.accessor(start, ELEMENT_ARRAY_BUFFER, UNSIGNED_INT, "SCALAR", count);
+        let mut primitive = Map::new();
+        primitive.insert("attributes".to_owned(), members.into());
+        primitive.insert("indices".to_owned(), indices.into());
+        primitive
+    }
+
+    fn vectors<const N: usize>(
+        &mut self,
+        vertices: &[Vertex],
+        of: impl Fn(&Vertex) -> [f32; N],
+    ) -> usize {
+        let start = self.bytes.len();
+        for vertex in vertices {
+            self.bytes.extend(of(vertex).iter().flat_map(|number| number.to_le_bytes()));
+        }
+        self.accessor(start, ARRAY_BUFFER, FLOAT, &format!("VEC{N}"), vertices.len())
+    }
+
+    /// Adds an accessor of the bytes from `start` on.
+    fn accessor(
+        &mut self,
+        start: usize,
+        target: u32,
+        component: u32,
+        kind: &str,
+        count: usize,
+    ) -> usize {
+        self.views.push(json!({
+            "buffer": 0, "byteOffset": start, "byteLength": self.bytes.len() - start, "target": target
+        }));
+        self.accessors.push(json!({
+            "bufferView": self.views.len() - 1, "componentType": component, "count": count,
+            "type": kind
+        }));
+        self.accessors.len() - 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn matrices_are_scale_turn_and_shift() {
+        for (scale, angle) in [([2.0, 3.0], 0.5_f32), ([1.0, -1.0], 0.0), ([-2.0, 0.5], 3.0)] {
+            let (sine, cosine) = angle.sin_cos();
+            let [x, y]: [f32; 2] = scale;
+            let matrix = [[cosine * x, sine * y, 0.25], [-sine * x, cosine * y, 0.75]];
+            let (found, is_exact) = transform(matrix);
+            let found = found.unwrap_or_default();
+            let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN) as f32;
+            let (sine, cosine) = number(&found["rotation"]).sin_cos();
+            let [x, y] = [0, 1].map(|axis| number(&found["scale"][axis]));
+            let again = [[cosine * x, sine * y, 0.25], [-sine * x, cosine * y, 0.75]];
+            let pairs = matrix.iter().flatten().zip(again.iter().flatten());
+            assert!(is_exact && pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-5), "{found}");
+        }
+        assert!(!transform([[1.0, 0.5, 0.0], [0.0, 1.0, 0.0]]).1);
+    }
+}

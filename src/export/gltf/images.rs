@@ -1,0 +1,128 @@
+//! Images of textures as PNG: the channels that glTF packs into one come from up to two textures.
+
+use std::{path::Path, sync::Arc};
+
+use glam::Vec3;
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+
+use crate::{
+    error::Result,
+    export::names::safe_name,
+    files,
+    film::png::srgb_from_linear,
+    math::colour::luminance,
+    texture::{Channels, Texels, TextureUse},
+};
+
+/// Channels of an image, and the meaning of its one or two textures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Layout {
+    /// sRGB colours over these largest values; opacity in the fourth channel.
+    ColorOpacity(Vec3),
+    /// Roughness in green, metallic share in blue, both linear.
+    RoughnessMetal,
+    /// Components of normals, linear.
+    Normal,
+}
+
+/// Image to write. At least one of the textures is there; if both are, they have the same size.
+#[derive(Clone, Debug)]
+pub(super) struct Sheet {
+    pub(super) layout: Layout,
+    pub(super) first: Option<TextureUse>,
+    pub(super) second: Option<TextureUse>,
+}
+
+impl Sheet {
+    /// Tests for the same texels.
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        let is_same = |pair: [&Option<TextureUse>; 2]| match pair {
+            [Some(one), Some(other)] => {
+                Arc::ptr_eq(&one.texture, &other.texture)
+                    && (one.channels, one.encoding) == (other.channels, other.encoding)
+                    && (one.scale, one.bias) == (other.scale, other.bias)
+            }
+            [None, None] => true,
+            _ => false,
+        };
+        self.layout == other.layout
+            && is_same([&self.first, &other.first])
+            && is_same([&self.second, &other.second])
+    }
+
+    fn sources(&self) -> impl Iterator<Item = &TextureUse> {
+        self.first.iter().chain(&self.second)
+    }
+
+    /// Name of the file.
+    pub(super) fn name(&self, index: usize) -> String {
+        let name = self.sources().next().map_or("", |used| used.texture.name.as_str());
+        let stem = Path::new(name).file_stem().unwrap_or_default();
+        format!("t{index:02}_{}.png", safe_name(&stem.to_string_lossy()))
+    }
+
+    /// Tests whether 8 bits hold the values of all textures as well as they are known.
+    fn is_of_bytes(&self) -> bool {
+        self.sources().all(|used| {
+            let is_number = self.layout == Layout::RoughnessMetal;
+            matches!(used.texture.texels, Texels::Bytes(_))
+                && (used.scale, used.bias) == ([1.0; 3], [0.0; 3])
+                && !(is_number && used.channels == Channels::Color)
+        })
+    }
+
+    /// Texels, 0 to 1, as the file stores them.
+    fn texels(&self) -> Vec<[f32; 4]> {
+        let values = |used: &Option<TextureUse>| used.as_ref().map(TextureUse::values);
+        let (first, second) = (values(&self.first), values(&self.second));
+        let count = first.as_ref().or(second.as_ref()).map_or(0, Vec::len);
+        let color = |values: &Option<Vec<[f32; 4]>>, index: usize| {
+            values.as_ref().map_or(Vec3::ONE, |values| Vec3::from_slice(&values[index][..3]))
+        };
+        let texel = |index: usize| {
+            let (first, second) = (color(&first, index), color(&second, index));
+            match self.layout {
+                Layout::ColorOpacity(peak) => {
+                    let encoded = (first / peak).clamp(Vec3::ZERO, Vec3::ONE).map(srgb_from_linear);
+                    encoded.extend(luminance(second).clamp(0.0, 1.0)).to_array()
+                }
+                Layout::RoughnessMetal => {
+                    let [rough, metal] = [first, second].map(|v| luminance(v).clamp(0.0, 1.0));
+                    [1.0, rough, metal, 1.0]
+                }
+                Layout::Normal => first.clamp(Vec3::ZERO, Vec3::ONE).extend(1.0).to_array(),
+            }
+        };
+        (0..count).map(texel).collect()
+    }
+
+    /// Writes the image.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] for a file that cannot be written.
+    pub(super) fn write(&self, path: &Path) -> Result<()> {
+        let Some(used) = self.sources().next() else { return Ok(()) };
+        let (width, height) = (used.texture.width, used.texture.height);
+        let texels = self.texels();
+        let stored = texels.iter().flatten();
+        files::write_atomically(path, |file| {
+            let encoder = PngEncoder::new(file);
+            let result = if self.is_of_bytes() {
+                let bytes: Vec<u8> = stored.map(|value| (value * 255.0).round() as u8).collect();
+                encoder.write_image(&bytes, width, height, ExtendedColorType::Rgba8)
+            } else {
+                let shorts: Vec<u16> =
+                    stored.map(|value| (value * 65_535.0).round() as u16).collect();
+                let bytes = bytemuck::cast_slice(&shorts);
+                encoder.write_image(bytes, width, height, ExtendedColorType::Rgba16)
+            };
+            result.map_err(std::io::Error::other)
+        })
+    }
+}
+
+/// Largest value of a texture by channel, at least 1.
+pub(super) fn peak(used: Option<&TextureUse>) -> Vec3 {
+    let values = used.map(TextureUse::values).unwrap_or_default();
+    values.iter().fold(Vec3::ONE, |peak, value| peak.max(Vec3::from_slice(&value[..3])))
+}
