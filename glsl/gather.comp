@@ -1,9 +1,11 @@
-// Adds visible shadow rays to every path, and the environment where no light was sampled: seen
-// directly, in a mirror or through glass.
+// Adds visible shadow rays to every path, and the environment where rays escape: all of it where no
+// light was sampled, which is seen directly, in a mirror or through glass; else the share of the
+// bounce ray among the samples of `mis`, or nothing.
 #version 460
 
 #include "environment.glsl"
 #include "load.glsl"
+#include "mis.glsl"
 #include "wave.glsl"
 
 READS(visibility)
@@ -18,14 +20,20 @@ void main() {
         return;
     }
     if (load_hit_origin(path).material == NO_MATERIAL) {
-        // Other vertices sample the environment: rays that escape from there would count it twice.
         Ray ray = load_ray(path);
         bool is_first = wave.first_shadow_ray == 0u && wave.to_lamps == 0u;
-        if (is_first && ray.is_active != 0u && ray.brdf_pdf == 0.0
+        uint rays = wave.arriving_shadow_rays;
+        if (is_first && ray.is_active != 0u && (ray.brdf_pdf == 0.0 || rays > 0u)
             && load_hit(path).triangle == NO_TRIANGLE) {
+            vec4 light = environment_light(ray.direction);
+            float weight = 1.0;
+            if (ray.brdf_pdf > 0.0) {
+                float environment_density = environment_pdf(ray.direction, light);
+                weight = ray.brdf_pdf
+                    / (float(rays) * mis_pdf(ray.brdf_pdf, environment_density, rays, 1u));
+            }
             PathState state = paths[path];
-            paths[path].radiance =
-                state.radiance + state.throughput * environment_radiance(ray.direction);
+            paths[path].radiance = state.radiance + state.throughput * light.xyz * weight;
         }
         return;
     }

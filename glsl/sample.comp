@@ -2,6 +2,7 @@
 // unoccluded contribution, BRDF * radiance * cosine / pdf. Densities are in solid angle measure.
 #version 460
 
+#include "mis.glsl"
 #include "vertex.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
@@ -12,7 +13,11 @@ layout(constant_id = CONSTANT_CANDIDATES) const uint CANDIDATES = 1u;
 
 // Density of the technique or mixture of SAMPLER, if neither uniform nor the cosine.
 float density(DirectionSample sampled) {
-    if (SAMPLER == SAMPLER_MIS || SAMPLER == SAMPLER_RIS) {
+    if (SAMPLER == SAMPLER_MIS) {
+        return mis_pdf(
+            sampled.brdf_pdf, sampled.environment_pdf, wave.total_shadow_rays, wave.bounce_rays);
+    }
+    if (SAMPLER == SAMPLER_RIS) {
         return 0.5 * (sampled.brdf_pdf + sampled.environment_pdf);
     }
     return SAMPLER == SAMPLER_ENV ? sampled.environment_pdf : sampled.brdf_pdf;
@@ -101,17 +106,34 @@ void main() {
                 reservoir.chosen.integrand * factor);
         }
     } else if (SAMPLER == SAMPLER_MIS) {
-        // Alternate the techniques from a random start: each ray's technique is a fair coin, shared
-        // by 8x8 pixels. A loop each: devices that run both sides of a branch then run one per ray.
-        uint coin = block_random_bits(vertex.index, DIMENSION_TECHNIQUE).x & 1u;
-        uint turn = (first_ray + coin) & 1u;
-        for (uint i = turn; i < wave.shadow_ray_count; i += 2u) {
-            DirectionSample sampled =
-                draw_environment_candidate(vertex, (first_ray + i + coin) >> 1u, 0u);
+        // Alternate the techniques by their shares from a random start, shared by 8x8 pixels: ray k is
+        // from the BRDF with exactly that probability, and neither sequence has gaps. A loop each:
+        // devices that run both sides of a branch then run one per ray.
+        uint share = mis_share(wave.total_shadow_rays, wave.bounce_rays);
+        uint bits = block_random_bits(vertex.index, DIMENSION_TECHNIQUE).x;
+        uint start = (bits & 1u) << 7u | ((bits >> 1u) & 127u);
+        uint before = (first_ray * share + start) >> 8u;
+        uint from_brdf = 0u;
+        for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
+            uint sum = ((first_ray + i) * share + start) & 255u;
+            from_brdf |= sum + share >= 256u ? 1u << i : 0u;
+        }
+        uint index = first_ray - before + (bits & 1u);
+        uint left = ~from_brdf & ((1u << wave.shadow_ray_count) - 1u);
+        while (left != 0u) {
+            uint i = uint(findLSB(left));
+            left &= left - 1u;
+            DirectionSample sampled = draw_environment_candidate(vertex, index, 0u);
+            index++;
             write_sample(i * path_count + path, sampled, density(sampled));
         }
-        for (uint i = 1u - turn; i < wave.shadow_ray_count; i += 2u) {
-            DirectionSample sampled = draw_brdf_candidate(vertex, (first_ray + i + coin) >> 1u, 0u);
+        index = before;
+        left = from_brdf;
+        while (left != 0u) {
+            uint i = uint(findLSB(left));
+            left &= left - 1u;
+            DirectionSample sampled = draw_brdf_candidate(vertex, index, 0u);
+            index++;
             write_sample(i * path_count + path, sampled, density(sampled));
         }
     } else {

@@ -13,7 +13,7 @@ use std::{path::Path, sync::Arc};
 use fenestra::{
     brdf::{Material, MeasuredTable, material::MaterialKind},
     renderer::Settings,
-    sampler::Sampler,
+    sampler::{Parameters, Sampler},
     scene::Scene,
 };
 use glam::Vec3;
@@ -53,11 +53,18 @@ fn total(values: &[Estimate]) -> (f64, f64) {
 
 /// Compares the `samplers` with the first of them, the reference.
 fn samplers_agree(scene: &Scene, depth: u32, samples: u32, samplers: &[Sampler]) {
-    let settings = |sampler| Settings { sampler, depth, ..Settings::default() };
-    let reference = replicates(scene, &settings(samplers[0]), 4 * samples);
+    let settings = |sampler: &Sampler| Settings { sampler: *sampler, depth, ..Settings::default() };
+    let all: Vec<Settings> = samplers.iter().map(settings).collect();
+    settings_agree(scene, samples, &all);
+}
+
+/// Compares renders with all `settings` with the first of them, the reference.
+fn settings_agree(scene: &Scene, samples: u32, settings: &[Settings]) {
+    let reference = replicates(scene, &settings[0], 4 * samples);
     let (reference_total, _) = total(&reference);
-    for &sampler in &samplers[1..] {
-        let values = replicates(scene, &settings(sampler), samples);
+    for settings in &settings[1..] {
+        let (sampler, depth) = (settings.sampler, settings.depth);
+        let values = replicates(scene, settings, samples);
         let Comparison { largest_t, ratio, largest_t_with_bias } =
             Comparison::new(&values, &reference);
         let (mean, error) = total(&values);
@@ -125,6 +132,52 @@ fn in_a_glazed_room_with_lamps() {
     let scene = scenes::glazed_room();
     let samplers = [Sampler::Cosine, Sampler::Mis, Sampler::Visibility, Sampler::Guided];
     samplers_agree(&scene, 4, 64, &samplers);
+}
+
+/// `cosine`, then `mis` with and without compensation and with one and five shadow rays, then `guided`.
+fn ways_to_weigh_the_bounce_ray(depth: u32) -> Vec<Settings> {
+    let with = |sampler, shadow_rays, assignments: &[&str]| {
+        let mut parameters = Parameters::default();
+        for assignment in assignments {
+            parameters.set(assignment).unwrap();
+        }
+        Settings { sampler, parameters, depth, shadow_rays, ..Settings::default() }
+    };
+    vec![
+        with(Sampler::Cosine, 5, &[]),
+        with(Sampler::Mis, 5, &[]),
+        with(Sampler::Mis, 5, &["compensation=off"]),
+        with(Sampler::Mis, 1, &[]),
+        with(Sampler::Guided, 5, &["candidates=1"]),
+    ]
+}
+
+#[test]
+fn with_escaped_bounces_in_the_open() {
+    let _alone = support::alone();
+    let scene = scenes::open(vec![
+        scenes::diffuse(Vec3::new(0.7, 0.6, 0.5)),
+        scenes::plastic(0.3),
+        scenes::copper(0.35),
+        measured(),
+    ]);
+    settings_agree(&scene, 64, &ways_to_weigh_the_bounce_ray(4));
+}
+
+#[test]
+fn with_escaped_bounces_in_a_roofless_room() {
+    let _alone = support::alone();
+    let materials = vec![scenes::diffuse(Vec3::splat(0.7)), measured(), scenes::plastic(0.3)];
+    let scene = scenes::without_ceiling(scenes::room(materials));
+    settings_agree(&scene, 64, &ways_to_weigh_the_bounce_ray(4));
+}
+
+#[test]
+fn with_escaped_bounces_past_mirrors_glass_and_lamps() {
+    let _alone = support::alone();
+    let scene = scenes::without_ceiling(scenes::glazed_room());
+    settings_agree(&scene, 64, &ways_to_weigh_the_bounce_ray(4));
+    settings_agree(&scene, 64, &ways_to_weigh_the_bounce_ray(1)[..4]);
 }
 
 /// Tests the thesis's scenes of real meshes, measured BRDFs and the Uffizi map, where they are at

@@ -15,6 +15,12 @@
 TEXELS(environment_texels)
 TEXELS(environment_rows)
 TEXELS(environment_cells)
+TEXELS(compensated_rows)
+TEXELS(compensated_cells)
+
+// Samples and evaluates the compensated density: the luminance above that which samples of the BRDF
+// cover well. It is 0 in places, so it serves only beside a density that is not.
+layout(constant_id = CONSTANT_COMPENSATION) const bool COMPENSATES = false;
 
 // Smallest sine of the polar angle in densities, to keep them finite near a pole.
 const float ENVIRONMENT_MIN_SIN_THETA = 1e-7;
@@ -26,12 +32,12 @@ struct EnvironmentSample {
     float pdf;
 };
 
-// Cell with its four texels: c_ij at column offset i, row offset j.
+// Cell with its four texels, radiance and compensated luminance: c_ij at column offset i, row offset j.
 struct EnvironmentCell {
-    vec3 c00;
-    vec3 c10;
-    vec3 c01;
-    vec3 c11;
+    vec4 c00;
+    vec4 c10;
+    vec4 c01;
+    vec4 c11;
 };
 
 // Luminance of linear Rec.709.
@@ -53,11 +59,22 @@ vec3 environment_world_from_map(vec3 direction) {
 }
 
 float environment_row(uint index) {
-    return texelFetch(environment_rows, int(index)).x;
+    return COMPENSATES ? texelFetch(compensated_rows, int(index)).x
+                       : texelFetch(environment_rows, int(index)).x;
 }
 
 float environment_cell_value(uint index) {
-    return texelFetch(environment_cells, int(index)).x;
+    return COMPENSATES ? texelFetch(compensated_cells, int(index)).x
+                       : texelFetch(environment_cells, int(index)).x;
+}
+
+float environment_density_total() {
+    return COMPENSATES ? parameters.compensated_total : parameters.environment_total;
+}
+
+// Returns the weight of light in the density, radiance with the compensated luminance behind it.
+float environment_weight(vec4 light) {
+    return COMPENSATES ? light.w : luminance(light.xyz);
 }
 
 // Intervals of the guide to a cumulative distribution: a power of two, at least half its entries.
@@ -71,13 +88,13 @@ EnvironmentCell environment_cell(uint column, uint row) {
     uint upper = (row == 0u ? 0u : row - 1u) * width;
     uint lower = min(row, parameters.environment_height - 1u) * width;
     return EnvironmentCell(
-        texelFetch(environment_texels, int(upper + column)).xyz,
-        texelFetch(environment_texels, int(upper + next_column)).xyz,
-        texelFetch(environment_texels, int(lower + column)).xyz,
-        texelFetch(environment_texels, int(lower + next_column)).xyz);
+        texelFetch(environment_texels, int(upper + column)),
+        texelFetch(environment_texels, int(upper + next_column)),
+        texelFetch(environment_texels, int(lower + column)),
+        texelFetch(environment_texels, int(lower + next_column)));
 }
 
-vec3 environment_interpolate(EnvironmentCell cell, vec2 position) {
+vec4 environment_interpolate(EnvironmentCell cell, vec2 position) {
     return mix(
         mix(cell.c00, cell.c10, position.x), mix(cell.c01, cell.c11, position.x), position.y);
 }
@@ -101,17 +118,21 @@ EnvironmentLocation environment_locate(vec3 direction) {
     return EnvironmentLocation(uint(column), uint(row), vec2(x - floor(x), y - floor(y)));
 }
 
-// Radiance from a direction: bilinear between texel centres, wrapping in u, clamped in v.
-vec3 environment_radiance(vec3 direction) {
+// Radiance from a direction, and compensated luminance: bilinear between texel centres, wrapping in
+// u, clamped in v.
+vec4 environment_light(vec3 direction) {
     EnvironmentLocation location = environment_locate(direction);
     return environment_interpolate(
         environment_cell(location.column, location.row), location.position);
 }
 
-// Density per steradian of environment_sample at a direction whose radiance is
-// environment_radiance(direction).
-float environment_pdf(vec3 direction, vec3 radiance) {
-    float total = parameters.environment_total;
+vec3 environment_radiance(vec3 direction) {
+    return environment_light(direction).xyz;
+}
+
+// Density per steradian of environment_sample at a direction with light environment_light(direction).
+float environment_pdf(vec3 direction, vec4 light) {
+    float total = environment_density_total();
     if (total <= 0.0) {
         return 0.0;
     }
@@ -120,7 +141,7 @@ float environment_pdf(vec3 direction, vec3 radiance) {
     float v = atan(sin_theta, direction.y) / PI;
     uint row = min(uint(v * height + 0.5), parameters.environment_height);
     float mean_sine = environment_row(parameters.environment_height + 1u + row);
-    return luminance(radiance) * mean_sine
+    return environment_weight(light) * mean_sine
         / (total * 2.0 * PI * PI * max(sin_theta, ENVIRONMENT_MIN_SIN_THETA));
 }
 
@@ -134,21 +155,21 @@ float environment_sample_linear(float a, float b, float u) {
 }
 
 // Samples a direction within a cell with two numbers in [0, 1); the density in (u, v) is
-// proportional to luminance. The pdf is that of environment_sample, over the whole map.
+// proportional to environment_weight. The pdf is that of environment_sample, over the whole map.
 EnvironmentSample environment_sample_cell(uint column, uint row, vec2 u) {
     uint width = parameters.environment_width;
     uint height = parameters.environment_height;
     // Sample the bilinear patch: its marginal along v, then its row at that v.
     EnvironmentCell cell = environment_cell(column, row);
-    float l00 = luminance(cell.c00);
-    float l10 = luminance(cell.c10);
-    float l01 = luminance(cell.c01);
-    float l11 = luminance(cell.c11);
+    float l00 = environment_weight(cell.c00);
+    float l10 = environment_weight(cell.c10);
+    float l01 = environment_weight(cell.c01);
+    float l11 = environment_weight(cell.c11);
     vec2 position;
     position.y = environment_sample_linear(l00 + l10, l01 + l11, u.y);
     position.x = environment_sample_linear(
         mix(l00, l01, position.y), mix(l10, l11, position.y), u.x);
-    vec3 radiance = environment_interpolate(cell, position);
+    vec4 light = environment_interpolate(cell, position);
 
     // Measure the polar angle from the nearer pole, in rows, for relative accuracy; the first and
     // the last row are half cells.
@@ -168,15 +189,15 @@ EnvironmentSample environment_sample_cell(uint column, uint row, vec2 u) {
         -theta.x * azimuth.x, northern ? theta.y : -theta.y, theta.x * azimuth.y);
 
     float mean_sine = environment_row(height + 1u + row);
-    float pdf = luminance(radiance) * mean_sine
-        / (parameters.environment_total * 2.0 * PI * PI
+    float pdf = environment_weight(light) * mean_sine
+        / (environment_density_total() * 2.0 * PI * PI
             * max(theta.x, ENVIRONMENT_MIN_SIN_THETA));
-    return EnvironmentSample(environment_world_from_map(direction), radiance, pdf);
+    return EnvironmentSample(environment_world_from_map(direction), light.xyz, pdf);
 }
 
 // Samples a direction with density environment_pdf, from two numbers in [0, 1).
 EnvironmentSample environment_sample(vec2 u) {
-    if (parameters.environment_total <= 0.0) {
+    if (environment_density_total() <= 0.0) {
         return EnvironmentSample(vec3(0.0, 1.0, 0.0), vec3(0.0), 0.0);
     }
     uint width = parameters.environment_width;

@@ -59,18 +59,18 @@ DirectionSample evaluate_direction(
 
 // Evaluates a direction in world space.
 DirectionSample evaluate_world(Vertex vertex, vec3 direction) {
-    vec3 radiance = environment_radiance(direction);
+    vec4 light = environment_light(direction);
     return evaluate_direction(
-        vertex, direction, to_local(vertex.frame, direction), radiance,
-        environment_pdf(direction, radiance));
+        vertex, direction, to_local(vertex.frame, direction), light.xyz,
+        environment_pdf(direction, light));
 }
 
 // Evaluates a direction in the frame of the vertex.
 DirectionSample evaluate_local(Vertex vertex, vec3 incident_local) {
     vec3 direction = to_world(vertex.frame, incident_local);
-    vec3 radiance = environment_radiance(direction);
+    vec4 light = environment_light(direction);
     return evaluate_direction(
-        vertex, direction, incident_local, radiance, environment_pdf(direction, radiance));
+        vertex, direction, incident_local, light.xyz, environment_pdf(direction, light));
 }
 
 // Samples a direction in proportion to the environment's luminance; u in [0, 1)^2.

@@ -31,9 +31,9 @@ void main() {
         return;
     }
     vec3 direction = inputs[index].direction;
-    vec3 radiance = environment_radiance(direction);
+    vec4 light = environment_light(direction);
     EnvironmentSample environment = environment_sample(inputs[index].u);
     outputs[index] = ProbeOutput(
-        radiance, environment_pdf(direction, radiance), environment.direction,
+        light.xyz, environment_pdf(direction, light), environment.direction,
         environment.radiance, environment.pdf);
 }

@@ -46,6 +46,9 @@ pub fn wave_order(
     let constants = surfaces.constants();
     // Training teaches the visibility of the environment; other light is not needed.
     let is_lit = wave.is_training == 0;
+    let follows_last = is_lit && surfaces.emits();
+    let escape = steps.escape();
+    let gather = || Kernel::new("gather", Domain::Paths, escape.as_deref().unwrap_or_default());
     let mut order = Vec::new();
     let mut add = |kernel: Kernel, wave: &Wave| order.push(Dispatch { kernel, wave: *wave });
     let mut wave = Wave { aovs: settings.aovs, ..wave };
@@ -53,7 +56,10 @@ pub fn wave_order(
     add(Kernel::new("camera", Domain::Paths, &[]), &wave);
     for vertex in 0..vertices {
         wave.vertex = vertex;
+        wave.arriving_shadow_rays = wave.bounce_rays * wave.total_shadow_rays;
         wave.total_shadow_rays = steps.shadow_rays_at(vertex, settings.shadow_rays);
+        let is_counted = escape.is_some() && wave.total_shadow_rays > 0;
+        wave.bounce_rays = u32::from(is_counted && (vertex + 1 < vertices || follows_last));
         // Camera rays stay coherent, bounce rays do not.
         let schedule = if vertex == 0 { Schedule::SINGLE } else { incoherent };
         add(traversal.trace(schedule, surfaces), &wave);
@@ -99,7 +105,7 @@ pub fn wave_order(
                     add(kernel, &wave);
                 }
             }
-            add(Kernel::new("gather", Domain::Paths, &[]), &wave);
+            add(gather(), &wave);
             if wave.first_shadow_ray + wave.shadow_ray_count >= wave.total_shadow_rays {
                 break;
             }
@@ -116,16 +122,17 @@ pub fn wave_order(
             add(guided.unwrap_or_else(|| bounce(settings, false)), &wave);
         }
     }
-    if is_lit && (surfaces.emits() || surfaces.has_specular()) {
+    if follows_last || is_lit && surfaces.has_specular() {
         // Follow the last vertices to light that is not sampled, or not sampled alone.
         add(bounce(settings, !surfaces.emits()), &wave);
+        wave.arriving_shadow_rays = wave.bounce_rays * wave.total_shadow_rays;
         wave = Wave { vertex: vertices, shadow_ray_count: 0, total_shadow_rays: 0, ..wave };
         wave.first_shadow_ray = 0;
         add(traversal.trace(incoherent, surfaces), &wave);
         if surfaces.emits() {
             add(Kernel::new("emit", Domain::Paths, &constants), &wave);
         }
-        add(Kernel::new("gather", Domain::Paths, &[]), &wave);
+        add(gather(), &wave);
     }
     add(Kernel::new("accumulate", Domain::Pixels, &[]), &wave);
     order

@@ -94,14 +94,16 @@ impl SceneBuffers {
         drop(tables);
 
         let tables = EnvironmentTables::new(&scene.environment);
+        let compensated = EnvironmentTables::compensated(&scene.environment);
         let parameters = SceneParameters {
             lamp_count: lamps.choices.len() as u32,
+            compensated_total: compensated.total,
             ..parameters(scene, &scene.environment, tables.total, window)
         };
         add(bindings::PARAMETERS, Buffer::from_slice(device, "parameters", &[parameters])?);
         let map = &scene.environment;
-        let texels: Vec<[f32; 4]> =
-            map.texels.iter().map(|texel| texel.extend(0.0).to_array()).collect();
+        let texel = |texel: &Vec3| texel.extend(compensated.weight(*texel)).to_array();
+        let texels: Vec<[f32; 4]> = map.texels.iter().map(texel).collect();
         add(
             bindings::ENVIRONMENT_TEXELS,
             Buffer::texels_from_slice(device, "environment texels", &texels)?,
@@ -113,6 +115,14 @@ impl SceneBuffers {
         add(
             bindings::ENVIRONMENT_CELLS,
             Buffer::texels_from_slice(device, "environment cells", &tables.cells)?,
+        );
+        add(
+            bindings::COMPENSATED_ROWS,
+            Buffer::texels_from_slice(device, "compensated rows", &compensated.rows)?,
+        );
+        add(
+            bindings::COMPENSATED_CELLS,
+            Buffer::texels_from_slice(device, "compensated cells", &compensated.cells)?,
         );
         let mut choices = lamps.choices;
         let mut point_lamps = lamps.lamps;
@@ -208,6 +218,7 @@ fn parameters(
         environment_cos_rotation: map.rotation_rad.cos(),
         environment_sin_rotation: map.rotation_rad.sin(),
         environment_total,
+        compensated_total: 0.0,
         lamp_count: 0,
     }
 }

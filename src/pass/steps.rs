@@ -37,6 +37,12 @@ pub trait Steps {
         Vec::new()
     }
 
+    /// Specialization of the pass `gather`, if bounce rays that escape are samples of the environment
+    /// beside the shadow rays of their vertex.
+    fn escape(&self) -> Option<Vec<(u32, u32)>> {
+        None
+    }
+
     /// The pass that continues the paths, where that is not the BRDF's own sampling.
     fn bounce(&self, _wave: &Wave) -> Option<Kernel> {
         None

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use super::{Context, Parameters, Room, knob};
+use super::{Context, Parameters, Room, knob, parameters::ON_OR_OFF};
 use crate::{
     error::Result,
     pass::{Domain, Kernel, Passes, Steps, Surfaces, Technique},
     shader::{
         constants::{
-            CONSTANT_CANDIDATES, CONSTANT_SAMPLER, SAMPLER_BRDF, SAMPLER_COSINE, SAMPLER_ENV,
-            SAMPLER_MIS, SAMPLER_RIS, SAMPLER_UNIFORM,
+            CONSTANT_CANDIDATES, CONSTANT_COMPENSATION, CONSTANT_SAMPLER, SAMPLER_BRDF,
+            SAMPLER_COSINE, SAMPLER_ENV, SAMPLER_MIS, SAMPLER_RIS, SAMPLER_UNIFORM,
         },
         structs::Wave,
     },
@@ -49,7 +49,9 @@ impl Basic {
 
     /// Returns the passes, or [`crate::Error::Usage`] for an unsupported number of candidates.
     pub fn steps(self, parameters: &Parameters, surfaces: Surfaces) -> Result<BasicSteps> {
-        Ok(BasicSteps { tag: self.tag, candidates: self.candidates(parameters)?, surfaces })
+        let candidates = self.candidates(parameters)?;
+        let compensates = self.tag == SAMPLER_MIS && parameters.compensation;
+        Ok(BasicSteps { tag: self.tag, candidates, compensates, surfaces })
     }
 }
 
@@ -63,11 +65,17 @@ impl Room for Basic {
     }
 
     fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
-        if self.tag != SAMPLER_RIS {
-            return BTreeMap::new();
-        }
-        let candidates = parameters.candidates.unwrap_or(AUTO_RIS_CANDIDATES);
-        [("candidates".to_owned(), knob::text_or_auto(Some(candidates)))].into()
+        let described = match self.tag {
+            SAMPLER_RIS => {
+                let candidates = parameters.candidates.unwrap_or(AUTO_RIS_CANDIDATES);
+                Some(("candidates", knob::text_or_auto(Some(candidates))))
+            }
+            SAMPLER_MIS => {
+                Some(("compensation", knob::name_of(&parameters.compensation, ON_OR_OFF)))
+            }
+            _ => None,
+        };
+        described.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
     }
 
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
@@ -81,14 +89,24 @@ impl Room for Basic {
 pub struct BasicSteps {
     tag: u32,
     candidates: u32,
+    compensates: bool,
     surfaces: Surfaces,
 }
 
 impl Steps for BasicSteps {
     fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
-        let own = [(CONSTANT_SAMPLER, self.tag), (CONSTANT_CANDIDATES, self.candidates)];
+        let own = [
+            (CONSTANT_SAMPLER, self.tag),
+            (CONSTANT_CANDIDATES, self.candidates),
+            (CONSTANT_COMPENSATION, u32::from(self.compensates)),
+        ];
         let constants = [&own[..], &self.surfaces.constants()].concat();
         vec![Kernel::new("sample", Domain::Paths, &constants)]
+    }
+
+    fn escape(&self) -> Option<Vec<(u32, u32)>> {
+        let compensates = (CONSTANT_COMPENSATION, u32::from(self.compensates));
+        (self.tag == SAMPLER_MIS).then(|| vec![compensates])
     }
 }
 

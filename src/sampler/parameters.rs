@@ -9,10 +9,13 @@ use super::{
 use crate::error::{Error, Result};
 
 /// Parameters of the samplers.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
     /// `candidates`: directions to choose each shadow ray of `ris` or `guided` from; `None` is `auto`.
     pub candidates: Option<u32>,
+    /// `compensation`: true if `mis` and what `guided` falls back to draw directions of the environment
+    /// by its compensated density.
+    pub compensation: bool,
     /// Parameters of `product`, also within `visibility`.
     pub product: ProductParameters,
     /// Parameters of `visibility`.
@@ -20,6 +23,21 @@ pub struct Parameters {
     /// Parameters of `guided`.
     pub guided: GuidedParameters,
 }
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            candidates: None,
+            compensation: true,
+            product: ProductParameters::default(),
+            visibility: VisibilityParameters::default(),
+            guided: GuidedParameters::default(),
+        }
+    }
+}
+
+/// Names of the values of `compensation`.
+pub(super) const ON_OR_OFF: &[(&str, bool)] = &[("on", true), ("off", false)];
 
 /// Parameters shared by several rooms.
 const KNOBS: &[Knob<Parameters>] = &[
@@ -34,6 +52,11 @@ const KNOBS: &[Knob<Parameters>] = &[
             Ok(())
         },
         get: |parameters| knob::text_or_auto(parameters.candidates),
+    },
+    Knob {
+        key: "compensation",
+        set: |parameters, value| knob::choice(&mut parameters.compensation, value, ON_OR_OFF),
+        get: |parameters| knob::name_of(&parameters.compensation, ON_OR_OFF),
     },
     Knob {
         key: "preset",

@@ -144,7 +144,7 @@ binding_tables! {
         8 MATERIALS: array Material;
         /// Words of the BRDF tables, addressed by offsets in the materials.
         9 BRDF_TABLE: texels R32Float;
-        /// Radiance of each texel of the environment map; the fourth component is unused.
+        /// Radiance of each texel of the environment map, and its compensated luminance.
         10 ENVIRONMENT_TEXELS: texels Rgba32Float;
         /// Cumulative probability over the rows of cells of the environment map.
         11 ENVIRONMENT_ROWS: texels R32Float;
@@ -156,6 +156,10 @@ binding_tables! {
         14 LAMP_CHOICES: array LampChoice;
         /// Lights without a surface.
         15 LAMPS: array Lamp;
+        /// `environment_rows` of the compensated density.
+        18 COMPENSATED_ROWS: texels R32Float;
+        /// `environment_cells` of the compensated density.
+        19 COMPENSATED_CELLS: texels R32Float;
         /// First page of the texels of all textures: a word a texel of bytes, two words a deeper one.
         20 TEXTURE_WORDS_0: texels R32Uint;
         /// Second page of texels; a missing page repeats the first.

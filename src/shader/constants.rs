@@ -58,6 +58,8 @@ constants! {
     CONSTANT_SURFACES = 20;
     /// 1 lets only paths at specular surfaces go on: the ray after the last vertex.
     CONSTANT_ONLY_SPECULAR = 21;
+    /// 1 samples the environment by its compensated density.
+    CONSTANT_COMPENSATION = 27;
     /// Candidates of `sample_lamps` for its shadow ray.
     CONSTANT_LAMP_CANDIDATES = 22;
 

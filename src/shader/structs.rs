@@ -108,6 +108,8 @@ structs! {
         environment_sin_rotation: float,
         /// Normalisation of the environment's density, see `environment_pdf`.
         environment_total: float,
+        /// The same of the compensated density.
+        compensated_total: float,
         /// Columns of the alias table over lamps.
         lamp_count: uint,
     }
@@ -336,6 +338,11 @@ structs! {
         /// 1 if the shadow rays lead to lamps: they end there, and their directions are not unit
         /// vectors but lead from the surface to the lamp.
         to_lamps: uint,
+        /// 1 if the bounce ray that leaves this vertex is a sample of the environment too.
+        bounce_rays: uint,
+        /// Shadow rays at the vertex before, if the bounce ray from there is a sample of the environment;
+        /// else 0.
+        arriving_shadow_rays: uint,
     }
 
     /// Cells that a path's bounces teach.

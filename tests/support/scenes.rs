@@ -235,6 +235,16 @@ pub fn room(materials: Vec<Material>) -> Scene {
     )
 }
 
+/// Takes the ceiling off a [`room`].
+pub fn without_ceiling(mut scene: Scene) -> Scene {
+    // Its slab comes after that of the floor, each of twelve triangles.
+    scene.geometry.triangles.drain(12..24);
+    scene.geometry.materials.drain(12..24);
+    scene.name += "_without_ceiling";
+    scene.hash = scene.name.clone();
+    scene
+}
+
 /// Makes a [`room`] of chequered walls whose window has a pane, with a glass sphere, a mirror box, a
 /// lamp under the ceiling, a glowing box of glossy paint and a sheet that is half opaque.
 pub fn glazed_room() -> Scene {

@@ -42,6 +42,7 @@ impl Room for GuidedRoom {
     fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
         let mut named = knob::describe(GuidedParameters::KNOBS, &parameters.guided);
         named.insert("candidates".to_owned(), knob::text_or_auto(parameters.candidates));
+        named.extend(basic::MIS.describe(parameters));
         named
     }
 

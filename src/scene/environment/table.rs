@@ -15,6 +15,11 @@
 //! and no table per cell is needed. Within a row, L/pdf varies only with sin θ. Cumulative
 //! probabilities are single precision, so a cell's probability within its row is off by up to 2⁻²⁴,
 //! with errors of opposite sign in its neighbours.
+//!
+//! Compensated tables have max(lum L − C, 0) at the texel centres in place of lum L, bilinear in
+//! between: under multiple importance sampling the BRDF's samples cover what is below C [Karlík et
+//! al. 2019, "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance Sampling"].
+//! They draw nothing where all four texels around are below C.
 
 use std::f64::consts::PI;
 
@@ -31,6 +36,11 @@ const MIN_SIN_THETA: f32 = 1e-7;
 /// Largest number below 1.
 const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 
+/// Luminance C that compensated tables subtract, in means of the map over the sphere: at least half of
+/// the energy is left, and without contrast the density stays as it is. Chosen by measurement
+/// (`docs/experiments/mis_compensation.md`).
+const COMPENSATION: f64 = 0.5;
+
 /// Contents of the device buffers that sample an environment map.
 #[derive(Clone, Debug)]
 pub struct EnvironmentTables {
@@ -44,6 +54,8 @@ pub struct EnvironmentTables {
     pub cells: Vec<f32>,
     /// Σ s(row) · ∬ lum L du dv over all cells; 0 for a black map, whose samples have pdf 0.
     pub total: f32,
+    /// Luminance C that the weight of every texel lacks; 0 without compensation.
+    pub compensation: f32,
 }
 
 /// Sampled direction.
@@ -76,6 +88,11 @@ fn sample_linear(a: f32, b: f32, u: f32) -> f32 {
     let end = 1.0 - start;
     let divisor = start + lerp(start * start, end * end, u).sqrt();
     if divisor > 0.0 { (u / divisor).min(BELOW_ONE) } else { 0.0 }
+}
+
+/// Weight of a texel in tables with a compensation.
+fn weight_of(texel: Vec3, compensation: f32) -> f32 {
+    (luminance(texel) - compensation).max(0.0)
 }
 
 fn lerp(a: f32, b: f32, t: f32) -> f32 {
@@ -135,9 +152,32 @@ fn search(cumulative: &[f32], guide: &[f32], u: f32) -> (usize, f32, f32) {
     (first, before, cumulative[first])
 }
 
+/// Returns the luminance C to subtract from `map`, from its texels at their centres.
+fn compensation(map: &EnvironmentMap) -> f32 {
+    let rows = map.texels.par_chunks(map.width as usize).enumerate().map(|(row, texels)| {
+        let sine = (PI * (row as f64 + 0.5) / f64::from(map.height)).sin();
+        let sum: f64 = texels.iter().map(|texel| f64::from(luminance(*texel))).sum();
+        [sine * sum, sine * texels.len() as f64]
+    });
+    // Collect before summing: the order of a parallel sum is not fixed.
+    let rows: Vec<[f64; 2]> = rows.collect();
+    let sum = |index: usize| rows.iter().map(|row| row[index]).sum::<f64>();
+    let compensation = (COMPENSATION * sum(0) / sum(1)) as f32;
+    if compensation.is_normal() { compensation } else { 0.0 }
+}
+
 impl EnvironmentTables {
     /// Builds the tables of `map` in O(texels), in parallel over rows, summed in double precision.
     pub fn new(map: &EnvironmentMap) -> Self {
+        Self::with_compensation(map, 0.0)
+    }
+
+    /// Builds the tables of `map` for samples that are weighed against those of BRDFs.
+    pub fn compensated(map: &EnvironmentMap) -> Self {
+        Self::with_compensation(map, compensation(map))
+    }
+
+    fn with_compensation(map: &EnvironmentMap, compensation: f32) -> Self {
         let (width, height) = (map.width as usize, map.height);
         let row_count = height as usize + 1;
         let stride = width + guide_size(width) + 1;
@@ -154,7 +194,10 @@ impl EnvironmentTables {
                 let edge: Vec<f64> = upper
                     .iter()
                     .zip(lower)
-                    .map(|(a, b)| f64::from(luminance(*a)) + f64::from(luminance(*b)))
+                    .map(|(a, b)| {
+                        let weight = |texel| f64::from(weight_of(texel, compensation));
+                        weight(*a) + weight(*b)
+                    })
                     .collect();
                 let weights = (0..width).map(|column| {
                     edge[column] + edge[if column + 1 == width { 0 } else { column + 1 }]
@@ -172,7 +215,12 @@ impl EnvironmentTables {
         rows.extend((0..=height).map(|row| mean_sine(row, height) as f32));
         rows.extend(guide);
         let total = (sum / (width as f64 * f64::from(height))) as f32;
-        Self { rows, cells, total: if total.is_normal() { total } else { 0.0 } }
+        Self { rows, cells, total: if total.is_normal() { total } else { 0.0 }, compensation }
+    }
+
+    /// Weight of a texel in the density: its luminance above the compensation.
+    pub fn weight(&self, texel: Vec3) -> f32 {
+        weight_of(texel, self.compensation)
     }
 
     /// Cumulative probabilities of the rows of cells of `map`.
@@ -201,14 +249,27 @@ impl EnvironmentTables {
         let sin_theta = (direction.x * direction.x + direction.z * direction.z).sqrt();
         let v = sin_theta.atan2(direction.y) / std::f32::consts::PI;
         let row = ((v * map.height as f32 + 0.5) as u32).min(map.height);
-        self.density(map, radiance, row, sin_theta)
+        let weight = if self.compensation > 0.0 {
+            let (column, row, position) = map.locate(direction);
+            self.weight_at(map, [column, row], position)
+        } else {
+            luminance(radiance)
+        };
+        self.density(map, weight, row, sin_theta)
     }
 
-    fn density(&self, map: &EnvironmentMap, radiance: Vec3, row: u32, sin_theta: f32) -> f32 {
+    /// Weight at a position inside a cell, interpolated between its texels.
+    fn weight_at(&self, map: &EnvironmentMap, [column, row]: [u32; 2], position: Vec2) -> f32 {
+        let cell = map.cell(column, row);
+        let [w00, w10, w01, w11] =
+            [cell.c00, cell.c10, cell.c01, cell.c11].map(|texel| self.weight(texel));
+        lerp(lerp(w00, w10, position.x), lerp(w01, w11, position.x), position.y)
+    }
+
+    fn density(&self, map: &EnvironmentMap, weight: f32, row: u32, sin_theta: f32) -> f32 {
         let mean_sine = self.rows[(map.height + 1 + row) as usize];
         let pi = std::f32::consts::PI;
-        luminance(radiance) * mean_sine
-            / (self.total * 2.0 * pi * pi * sin_theta.max(MIN_SIN_THETA))
+        weight * mean_sine / (self.total * 2.0 * pi * pi * sin_theta.max(MIN_SIN_THETA))
     }
 
     /// Samples a direction with the density [`Self::pdf`] from two numbers in [0, 1). Twin of
@@ -228,7 +289,7 @@ impl EnvironmentTables {
     }
 
     /// Samples a direction within the cell `[column, row]` from two numbers in [0, 1), with density
-    /// proportional to luminance in (u, v). The sample's pdf is that of [`Self::sample`], over the
+    /// proportional to the weight in (u, v). The sample's pdf is that of [`Self::sample`], over the
     /// whole map. Twin of `environment_sample_cell`.
     pub fn sample_cell(
         &self,
@@ -239,10 +300,16 @@ impl EnvironmentTables {
         let (width, height) = (map.width, map.height);
         // Sample the bilinear patch: its marginal along v, then its row at that v.
         let cell = map.cell(column, row);
-        let [l00, l10, l01, l11] = [cell.c00, cell.c10, cell.c01, cell.c11].map(luminance);
+        let [l00, l10, l01, l11] =
+            [cell.c00, cell.c10, cell.c01, cell.c11].map(|texel| self.weight(texel));
         let y = sample_linear(l00 + l10, l01 + l11, u[1]);
         let x = sample_linear(lerp(l00, l01, y), lerp(l10, l11, y), u[0]);
         let radiance = cell.interpolate(Vec2::new(x, y));
+        let weight = if self.compensation > 0.0 {
+            self.weight_at(map, [column, row], Vec2::new(x, y))
+        } else {
+            luminance(radiance)
+        };
 
         // Measure the polar angle from the nearer pole, in rows, so that it keeps its relative
         // accuracy; the first and last rows are half cells.
@@ -268,7 +335,7 @@ impl EnvironmentTables {
         EnvironmentSample {
             direction: map.world_from_map(direction),
             radiance,
-            pdf: self.density(map, radiance, row, theta.x),
+            pdf: self.density(map, weight, row, theta.x),
         }
     }
 }
