@@ -85,6 +85,22 @@ fn a_diffuse_scene_is_written_without_a_warning() {
     assert_eq!(bytes, 24 * vertices + 13 * triangles);
 }
 
+/// The plane of focus of a pinhole, which pbrt puts at 10⁶ m, does not count.
+#[test]
+fn clip_planes_stand_around_the_scene() {
+    let folder = Folder::new();
+    let focus = "vertical_fov_deg = 45.0\nfocus_distance = 1e6";
+    let text = yard([8, 6], "constant = [1, 1, 1]", DIFFUSE, BALL);
+    folder.write("scene.toml", text.replace("vertical_fov_deg = 45.0", focus));
+    folder.run(&["export", "scene.toml", "a.xml", "--format=mitsuba"]).assert(0, &[]);
+    let xml = fs::read_to_string(folder.path().join("a.xml")).unwrap();
+    let [near, far] = ["near_clip", "far_clip"].map(|name| {
+        let (_, rest) = xml.split_once(&format!("name=\"{name}\" value=\"")).unwrap();
+        rest.split_once('"').unwrap().0.parse::<f32>().unwrap()
+    });
+    assert!(near < 1e-4 && (5.0..30.0).contains(&far), "{near} and {far}");
+}
+
 #[test]
 fn triangles_without_normals_are_written_apart_and_stay_flat() {
     let folder = Folder::new();

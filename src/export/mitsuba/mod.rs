@@ -95,7 +95,7 @@ impl<'a> Export<'a> {
         let corner = parts::bounds(&self.parts).map_or(0.0, |[low, high]| {
             (low - position).abs().max((high - position).abs()).length()
         });
-        let far = 2.0 * corner.max(focus_distance);
+        let far = 2.0 * corner.max(1e-3);
         let kind = if aperture_radius > 0.0 { "thinlens" } else { "perspective" };
         let mut xml = format!("    <sensor type=\"{kind}\">\n");
         let mut number = |name: &str, value: f32| {
@@ -107,7 +107,8 @@ impl<'a> Export<'a> {
             number("focus_distance", focus_distance);
         }
         number("near_clip", 1e-6 * far);
-        number("far_clip", far);
+        // The plane of focus lies between the clip planes.
+        number("far_clip", if aperture_radius > 0.0 { far.max(2.0 * focus_distance) } else { far });
         let filter = match self.scene.film.filter {
             Filter::Box => "<rfilter type=\"box\"/>",
             Filter::Gaussian => {

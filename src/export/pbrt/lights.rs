@@ -19,8 +19,8 @@ use crate::{
 
 /// Sides of the square map, texels.
 const SIDES: (u32, u32) = (64, 4096);
-/// Points of a texel of the square map, along each side, whose mean it is.
-const POINTS: u32 = 6;
+/// Points of a texel of a square map with twice the rows of the other, along each side, whose mean it is.
+const POINTS: u32 = 3;
 
 /// Returns the light source of a lamp, and warns where it is not Fenestra's.
 pub(super) fn lamp(lamp: &Lamp, warnings: &mut Vec<String>) -> String {
@@ -84,15 +84,16 @@ pub(super) fn write_environment(
         return Ok(format!("LightSource \"infinite\" \"rgb L\" [{}]\n", triple(first)));
     }
     let side = map.height.saturating_mul(2).clamp(SIDES.0, SIDES.1);
+    let points = POINTS * map.height.saturating_mul(2).div_ceil(side);
     let texel = |index: u32| {
         let corner = Vec2::new((index % side) as f32, (index / side) as f32);
         let point = |index: u32| {
-            let inside = Vec2::new((index % POINTS) as f32, (index / POINTS) as f32) + 0.5;
-            let place = (corner + inside / POINTS as f32) / side as f32;
+            let inside = Vec2::new((index % points) as f32, (index / points) as f32) + 0.5;
+            let place = (corner + inside / points as f32) / side as f32;
             map.radiance(direction_from_square(place))
         };
-        let sum: Vec3 = (0..POINTS * POINTS).map(point).sum();
-        (sum / (POINTS * POINTS) as f32).to_array()
+        let sum: Vec3 = (0..points * points).map(point).sum();
+        (sum / (points * points) as f32).to_array()
     };
     let texels: Vec<[f32; 3]> = (0..side * side).into_par_iter().map(texel).collect();
     let mut image = Image::new(side, side);
