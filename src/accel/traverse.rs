@@ -85,9 +85,9 @@ impl Accel {
     /// Either is out of range.
     pub fn triangle_material(&self, triangle: u32, instance: u32) -> u32 {
         let own = self.triangle_materials[triangle as usize];
-        self.instances.get(instance as usize).map_or(own, |instance| {
-            instance.first_material + (own & instance.material_mask)
-        })
+        self.instances
+            .get(instance as usize)
+            .map_or(own, |instance| instance.first_material + (own & instance.material_mask))
     }
 
     /// Computes the surface that a ray meets on `triangle` in `instance`, which is `NO_INSTANCE` in a

@@ -123,10 +123,8 @@ impl Instance {
 
     /// Moves the instance by a further transform.
     pub fn moved(&self, outer: &Transform) -> Option<Self> {
-        let outer = DAffine3 {
-            matrix3: outer.linear.as_dmat3(),
-            translation: outer.translate.as_dvec3(),
-        };
+        let outer =
+            DAffine3 { matrix3: outer.linear.as_dmat3(), translation: outer.translate.as_dvec3() };
         let whole = outer * self.affine();
         let linear = whole.matrix3.transpose();
         let shift = whole.translation;
@@ -270,7 +268,12 @@ impl Geometry {
             unit(map * Vec3::new(x, y, z).as_dvec3()).extend(sign).to_array()
         };
         super::geometry::extend(
-            &mut self.tangents, &mesh.tangents, first, count, [0.0; 4], tangent,
+            &mut self.tangents,
+            &mesh.tangents,
+            first,
+            count,
+            [0.0; 4],
+            tangent,
         );
         super::geometry::extend(&mut self.colors, &mesh.colors, first, count, [1.0; 4], |&c| c);
         let first = first as u32;

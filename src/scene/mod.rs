@@ -25,8 +25,8 @@ use crate::brdf::Material;
 pub use camera::Camera;
 pub use environment::EnvironmentMap;
 pub use geometry::Geometry;
-pub use instances::Instance;
 pub use hash::{environment_hash, geometry_hash};
+pub use instances::Instance;
 pub use lamp::Lamp;
 
 /// Largest width and height of the film, pixels.
