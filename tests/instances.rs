@@ -15,7 +15,7 @@ use fenestra::{
     pass::Schedule,
     renderer::Settings,
     sampler::Sampler,
-    scene::{Geometry, Instance, Scene, instances::PLACED_TRIANGLES, transform::Transform},
+    scene::{Geometry, Instance, Scene, instance::PLACED_TRIANGLES, transform::Transform},
     shader::{
         constants::{BVH_STACK_ENTRIES, NO_MATERIAL},
         structs::{Hit, Ray, ShadowRay},

@@ -6,6 +6,7 @@ pub mod features;
 pub mod file;
 pub mod geometry;
 mod hash;
+pub mod instance;
 pub mod instances;
 pub mod lamp;
 pub mod load;
@@ -26,7 +27,7 @@ pub use camera::Camera;
 pub use environment::EnvironmentMap;
 pub use geometry::Geometry;
 pub use hash::{environment_hash, geometry_hash};
-pub use instances::Instance;
+pub use instance::Instance;
 pub use lamp::Lamp;
 
 /// Largest width and height of the film, pixels.

@@ -15,7 +15,7 @@ use crate::{
         Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Scene,
         features::{self, Ignored},
         file::CameraEntry,
-        instances::{Instance, MAX_INSTANCES, bounds},
+        instance::{Instance, MAX_INSTANCES, bounds},
         mesh::{Mesh, MeshCamera, MeshMaterial, Perspective, RepeatedMesh},
         transform::Transform,
     },

@@ -12,7 +12,7 @@ use crate::{
     scene::{
         features,
         geometry::MAX_COORDINATE,
-        instances::{Instance, MAX_INSTANCES},
+        instance::{Instance, MAX_INSTANCES},
         mesh::Mesh,
         quadrics,
         shapes::check_triangles,
