@@ -15,7 +15,7 @@ use fenestra::{
     pass::Schedule,
     renderer::Settings,
     sampler::Sampler,
-    scene::{Geometry, Instance, Scene, instances::PLACED_TRIANGLES, transform::Transform},
+    scene::{Geometry, Instance, Scene, instance::PLACED_TRIANGLES, transform::Transform},
     shader::{
         constants::{BVH_STACK_ENTRIES, NO_MATERIAL},
         structs::{Hit, Ray, ShadowRay},
@@ -31,9 +31,8 @@ use support::{
 
 /// A random affine map: turned, scaled differently along the axes, sheared, mirrored or not.
 fn transform(random: &mut Random, largest_scale: f32, spread: f32, mirrors: bool) -> Transform {
-    let scale = |random: &mut Random| {
-        f64::from(largest_scale.powf(2.0 * random.uniform_f32() - 1.0))
-    };
+    let scale =
+        |random: &mut Random| f64::from(largest_scale.powf(2.0 * random.uniform_f32() - 1.0));
     let axis = random.direction_from_point();
     let turn = Quat::from_axis_angle(axis, 6.0 * random.uniform_f32()).as_dquat();
     let mut scales = DVec3::new(scale(random), scale(random), scale(random));
@@ -103,7 +102,7 @@ fn check(name: &str, geometry: &Geometry, rays: &[Ray], tolerance: f32) -> f64 {
     assert_eq!(found, on_device.trace(rays, REFILLING), "{name}: the schedule changes hits");
     assert_eq!(on_device.overruns(), 0, "{name}");
     let expected = OnDevice::new(&one_level).trace(rays, REFILLING);
-    let (mut same, mut met, mut different) = (0, 0, 0);
+    let (mut same, mut met, mut elsewhere, mut turned) = (0, 0, 0, 0);
     for (index, ((ray, hit), flat)) in rays.iter().zip(&found).zip(&expected).enumerate() {
         let (origin, direction) = (Vec3::from(ray.origin), Vec3::from(ray.direction));
         let twin = two_levels.closest(origin, direction);
@@ -112,8 +111,7 @@ fn check(name: &str, geometry: &Geometry, rays: &[Ray], tolerance: f32) -> f64 {
             let off = (twin.distance - hit.distance).abs();
             assert!(off <= 1e-5 * hit.distance, "{name}, ray {index}: {hit:?} {twin:?}");
             let material = two_levels.triangle_material(twin.triangle, twin.instance);
-            let surface =
-                two_levels.surface_at(twin.triangle, twin.instance, origin, direction);
+            let surface = two_levels.surface_at(twin.triangle, twin.instance, origin, direction);
             if twin.triangle == hit.triangle {
                 assert_eq!(material, hit.material, "{name}, ray {index}");
                 let normal = Vec3::from(hit.shading_normal);
@@ -130,14 +128,23 @@ fn check(name: &str, geometry: &Geometry, rays: &[Ray], tolerance: f32) -> f64 {
         }
         met += 1;
         same += usize::from(hit.distance == flat.distance);
-        let is_close = (hit.distance - flat.distance).abs() <= tolerance * flat.distance
-            && hit.material == flat.material
+        let off = (hit.distance - flat.distance).abs();
+        if off > tolerance * flat.distance {
+            eprintln!("{name}, ray {index}: {hit:?}, flat {flat:?}");
+            elsewhere += 1;
+            continue;
+        }
+        let is_same = hit.material == flat.material
             && Vec3::from(hit.shading_normal).distance(flat.shading_normal.into()) < 5e-3
-            && Vec3::from(hit.geometric_normal).distance(flat.geometric_normal.into()) < 1e-3;
-        different += usize::from(!is_close);
+            && Vec3::from(hit.geometric_normal).distance(flat.geometric_normal.into()) < 5e-3;
+        turned += usize::from(!is_same);
     }
-    // At an edge that two triangles share, rounding decides on the normal.
-    assert!(different * 500 <= met, "{name}: {different} of {met} hits differ");
+    eprintln!(
+        "{name}: {met} hits, {same} the same to the bit, {elsewhere} elsewhere, {turned} turned"
+    );
+    assert_eq!(elsewhere, 0, "{name}: {elsewhere} of {met} hits are elsewhere");
+    // At an edge that two triangles share, rounding and order decide which one is met.
+    assert!(turned * 50 <= met, "{name}: {turned} of {met} hits are of another triangle");
     same as f64 / f64::from(u32::try_from(met.max(1)).unwrap())
 }
 
@@ -149,7 +156,7 @@ fn two_levels_find_what_one_level_finds() {
         let mut rays = random_rays(1500, seed, 6.0);
         rays.extend(aimed_rays(&flat, 1500, seed, 6.0));
         let same = check(&format!("{count} instances"), &geometry, &rays, 1e-5);
-        assert!(same > 0.99, "{count} instances: {same} of the distances are the same to the bit");
+        assert!(same > 0.999, "{count} instances: {same} of the distances are the same to the bit");
     }
 }
 
@@ -172,8 +179,9 @@ fn shadow_rays_are_blocked_by_instances() {
     let flat = geometry.flattened().unwrap();
     let mut random = Random(8);
     // Hits in space without a surface: their rays start where they are, but for the offset.
-    let hits: Vec<Hit> =
-        (0..500).map(|_| Hit { position: (5.0 * random.point()).into(), ..Hit::default() }).collect();
+    let hits: Vec<Hit> = (0..500)
+        .map(|_| Hit { position: (5.0 * random.point()).into(), ..Hit::default() })
+        .collect();
     let directions: Vec<ShadowRay> = (0..2000)
         .map(|_| ShadowRay {
             direction: random.direction_from_point().into(),
@@ -231,7 +239,10 @@ fn memory_does_not_grow_with_the_triangles_of_instances() {
             let place = transform(&mut random, 2.0, 50.0, false);
             geometry.instances.extend(Instance::new(0, &place, 0, false));
         }
-        assert_eq!(geometry.triangle_count(), (count * geometry.prototypes[0].triangles.len()) as u64);
+        assert_eq!(
+            geometry.triangle_count(),
+            (count * geometry.prototypes[0].triangles.len()) as u64
+        );
         let accel = Accel::build(&geometry, ONE_PAGE).unwrap();
         assert!(accel.triangle_count() <= geometry.prototypes[0].triangles.len());
         80 * accel.nodes.len() + 48 * accel.triangle_count() + 128 * accel.instances.len()
@@ -291,7 +302,7 @@ fn coincident_instances_do_not_deepen_the_tree() {
     assert_eq!(hit.distance, 4.0);
 }
 
-/// Objects on a floor, each a mesh of a quarter of a million triangles used six times over.
+/// Objects on a floor: a mesh of 200,000 triangles used six times over.
 fn objects(only: Option<usize>) -> String {
     let mut text = String::from(
         r#"
@@ -345,7 +356,7 @@ material = "floor"
     ];
     for (index, (material, place)) in placed.into_iter().enumerate() {
         if only.is_none_or(|only| only == index) {
-            let shape = "shape = \"sphere\"\nradius = 0.5\nsegments = 512";
+            let shape = "shape = \"sphere\"\nradius = 0.5\nsegments = 448";
             text += &format!("[[object]]\n{shape}\nmaterial = \"{material}\"\n{place}\n");
         }
     }
@@ -382,10 +393,9 @@ fn repeated_meshes_become_instances_that_look_like_copies() {
     }
 
     let settings = Settings { sampler: Sampler::Mis, depth: 3, ..Settings::default() };
-    let reference = replicates(&flat, &settings, 100, 16);
-    let values = replicates(&instanced, &settings, 200, 16);
-    let Comparison { largest_t, ratio, largest_t_with_bias } =
-        Comparison::new(&values, &reference);
+    let reference = replicates(&flat, &settings, 100, 4);
+    let values = replicates(&instanced, &settings, 200, 4);
+    let Comparison { largest_t, ratio, largest_t_with_bias } = Comparison::new(&values, &reference);
     eprintln!("largest |t| {largest_t:.2}, ratio {ratio:.4}, with bias {largest_t_with_bias:.1}");
     assert!(largest_t < LIMIT, "|t| = {largest_t}");
     // The test has teeth: an error of a tenth would not pass.

@@ -129,9 +129,8 @@ fn write_corner(words: &mut [u32], geometry: &Geometry, bits: u32, vertex: usize
         }
     };
     // One mesh may lack what another one has.
-    let uv = |set: usize| {
-        geometry.uvs[set].get(vertex).copied().unwrap_or_default().map(f32::to_bits)
-    };
+    let uv =
+        |set: usize| geometry.uvs[set].get(vertex).copied().unwrap_or_default().map(f32::to_bits);
     write(ATTRIBUTE_FIRST_UVS, &|| uv(0));
     write(ATTRIBUTE_SECOND_UVS, &|| uv(1));
     write(ATTRIBUTE_TANGENT, &|| {

@@ -11,7 +11,7 @@ use crate::{
     scene::{
         Geometry,
         geometry::MAX_COORDINATE,
-        instances::{Instance, bounds},
+        instance::{Instance, bounds},
     },
     shader::constants::INSTANCE_MIRRORS,
 };
@@ -136,7 +136,7 @@ pub(super) fn bounds_of(mesh: &Geometry, kept: &[u32]) -> Option<[Vec3; 2]> {
 
 impl Record {
     /// Takes a point to the space of the mesh.
-    pub(super) fn to_object(&self, point: Vec3) -> Vec3 {
+    pub(super) fn point_to_object(&self, point: Vec3) -> Vec3 {
         map_point(&self.object_from_world, point)
     }
 
@@ -146,7 +146,7 @@ impl Record {
     }
 
     /// Takes a position of the mesh to the world.
-    pub fn to_world(&self, position: Vec3) -> Vec3 {
+    pub fn point_to_world(&self, position: Vec3) -> Vec3 {
         map_point(&self.world_from_object, position)
     }
 

@@ -24,12 +24,12 @@ use obvhs::{
 
 use crate::math::octahedron;
 use crate::scene::geometry::MAX_COORDINATE;
-use instances::{Level, Record};
 use crate::{
     error::{Error, Result},
     scene::Geometry,
     shader::constants::{BVH_STACK_ENTRIES, FLAT_NORMAL},
 };
+use instances::{Level, Record};
 
 /// Most pages (buffers) for the triangles, bindings `BINDING_TRIANGLES_0` to `_3`.
 pub const MAX_TRIANGLE_PAGES: usize = 4;
@@ -142,8 +142,7 @@ impl Accel {
             .enumerate()
             .map(|(page, triangles)| {
                 let first = page << page_shift;
-                let record =
-                    |(at, &triangle): (usize, &u32)| record(mesh_of(first + at), triangle);
+                let record = |(at, &triangle): (usize, &u32)| record(mesh_of(first + at), triangle);
                 triangles.iter().enumerate().map(record).collect()
             })
             .collect();
@@ -243,9 +242,7 @@ impl Trees {
             vec![[0; 20]]
         } else {
             // One instance a leaf: entering one in vain costs more than a box.
-            let tree = on_large_stack(|| {
-                bvh2_to_cwbvh(&binary::build(boxes), 1, true, false)
-            })?;
+            let tree = on_large_stack(|| bvh2_to_cwbvh(&binary::build(boxes), 1, true, false))?;
             // An instance is entered with the rest of its group and the nodes beside it stacked.
             self.depth += stack_entries(&tree.nodes) + 2;
             order = tree.primitive_indices;

@@ -85,9 +85,9 @@ impl Accel {
     /// Either is out of range.
     pub fn triangle_material(&self, triangle: u32, instance: u32) -> u32 {
         let own = self.triangle_materials[triangle as usize];
-        self.instances.get(instance as usize).map_or(own, |instance| {
-            instance.first_material + (own & instance.material_mask)
-        })
+        self.instances
+            .get(instance as usize)
+            .map_or(own, |instance| instance.first_material + (own & instance.material_mask))
     }
 
     /// Computes the surface that a ray meets on `triangle` in `instance`, which is `NO_INSTANCE` in a
@@ -164,7 +164,7 @@ impl Accel {
 /// Position of a vertex in the world.
 fn placed(instance: Option<&Record>, position: [f32; 3]) -> Vec3 {
     let position = Vec3::from_array(position);
-    instance.map_or(position, |instance| instance.to_world(position))
+    instance.map_or(position, |instance| instance.point_to_world(position))
 }
 
 /// Turns a shading normal toward `outgoing_direction` until their cosine is at least `least`.
@@ -295,7 +295,7 @@ impl<'a> Traversal<'a> {
     fn enter_instance(&mut self, index: u32) {
         let instance = &self.accel.instances[index as usize];
         self.instance = index;
-        self.node_origin = instance.to_object(self.origin);
+        self.node_origin = instance.point_to_object(self.origin);
         self.node_direction = instance.vector_to_object(self.direction);
         self.node_margin = instance.margin_from(self.origin);
         self.see(self.node_direction);

@@ -53,13 +53,8 @@ impl Runner {
     ) -> Result<Self> {
         let film = FilmBuffers::new(device, scene.window(), settings.aovs)?;
         let rays = settings.shadow_rays.clamp(1, SHADOW_RAYS_PER_GROUP);
-        let waves = WaveBuffers::new(
-            device,
-            film.padded_pixels(),
-            rays,
-            demand,
-            settings.surfaces,
-        )?;
+        let waves =
+            WaveBuffers::new(device, film.padded_pixels(), rays, demand, settings.surfaces)?;
         Ok(Self {
             device: Arc::clone(device),
             scene,

@@ -86,17 +86,7 @@ impl WaveBuffers {
             (wave::HIT_INSTANCES, &instances),
         ];
         let set = DescriptorSet::new(device, &WAVE, &bound)?;
-        Ok(Self {
-            set,
-            capacity,
-            rays,
-            hits,
-            shadow_rays,
-            visibility,
-            paths,
-            surfaces,
-            instances,
-        })
+        Ok(Self { set, capacity, rays, hits, shadow_rays, visibility, paths, surfaces, instances })
     }
 
     /// Descriptor set 2.

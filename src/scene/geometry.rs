@@ -1,12 +1,12 @@
 //! Triangles of the scene.
 
-use super::{instances::Instance, mesh::Mesh, transform::Transform};
+use super::{instance::Instance, mesh::Mesh, transform::Transform};
 
 /// Largest magnitude of a coordinate, metres; products of four coordinates stay finite in `f32`.
 pub const MAX_COORDINATE: f32 = 1e9;
 
 /// All triangles of the scene in world space, and meshes that instances place there. Large meshes that
-/// are used many times are in memory once ([`super::instances`]).
+/// are used many times are in memory once ([`super::instance`]).
 #[derive(Clone, Debug, Default)]
 pub struct Geometry {
     /// Vertex positions, metres.

@@ -7,7 +7,7 @@ use super::{Filter, Scene};
 use crate::{
     brdf::material::{ConductorFresnel, MaterialKind, Surface},
     files::hexadecimal,
-    scene::{Geometry, instances::Instance, lamp::LampKind},
+    scene::{Geometry, instance::Instance, lamp::LampKind},
     texture::{Texels, TextureUse},
 };
 

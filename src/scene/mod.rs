@@ -7,6 +7,7 @@ pub mod features;
 pub mod file;
 pub mod geometry;
 mod hash;
+pub mod instance;
 pub mod instances;
 pub mod lamp;
 pub mod load;
@@ -26,8 +27,8 @@ use crate::brdf::Material;
 pub use camera::Camera;
 pub use environment::EnvironmentMap;
 pub use geometry::Geometry;
-pub use instances::Instance;
 pub use hash::{environment_hash, geometry_hash};
+pub use instance::Instance;
 pub use lamp::Lamp;
 
 /// Largest width and height of the film, pixels.

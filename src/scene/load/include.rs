@@ -11,7 +11,7 @@ use crate::{
     scene::{
         Geometry, Lamp, Scene, features,
         file::{IncludeEntry, IncludeKeys},
-        instances::Instance,
+        instance::Instance,
         lamp::LampKind,
         mesh::Mesh,
         pbrt,

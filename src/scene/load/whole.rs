@@ -15,7 +15,7 @@ use crate::{
         Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Scene,
         features::{self, Ignored},
         file::CameraEntry,
-        instances::{Instance, MAX_INSTANCES, bounds},
+        instance::{Instance, MAX_INSTANCES, bounds},
         mesh::{Mesh, MeshCamera, MeshMaterial, Perspective, RepeatedMesh},
         transform::Transform,
     },
@@ -153,9 +153,8 @@ impl Loader<'_> {
         }
         self.check_extent("the scene", geometry.extent())?;
         let label = self.path.display().to_string();
-        let is_repeated = |index: usize| {
-            mesh.repeated.iter().any(|repeated| repeated.material == Some(index))
-        };
+        let is_repeated =
+            |index: usize| mesh.repeated.iter().any(|repeated| repeated.material == Some(index));
         let copied = materials.iter().enumerate().filter(|(index, _)| !is_repeated(*index));
         warnings.extend(copied.filter_map(|(_, own)| lacking_uvs(&label, own, mesh)));
         warnings.extend(dropped.warnings(&label, mesh.triangles.len()));

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use glam::Mat4;
 
-use super::{features::Ignored, instances::Budget, lamp::Lamp};
+use super::{features::Ignored, instance::Budget, lamp::Lamp};
 use crate::{
     brdf::Material,
     error::{Error, Result},

@@ -32,7 +32,8 @@ use self::{bsdfs::Model, document::Document, shapes::Shape};
 use super::{
     Camera, EnvironmentMap, FilmSettings, Geometry, Lamp,
     features::{self, Ignored},
-    instances::{Budget, Prototype},
+    instance::Budget,
+    instances::Prototype,
 };
 use crate::{brdf::Material, error::Result, texture::Texture};
 

@@ -12,7 +12,7 @@ use crate::{
     scene::{
         features,
         geometry::MAX_COORDINATE,
-        instances::{Instance, MAX_INSTANCES},
+        instance::{Instance, MAX_INSTANCES},
         mesh::Mesh,
         quadrics,
         shapes::check_triangles,
@@ -128,13 +128,15 @@ impl Reader<'_> {
             None => {
                 let mesh = shape.turned(transform.mirrors);
                 let (prototype, dropped) = self.geometry.add_prototype(&mesh, |_| 0);
-                let label = format!("{}: shape of {}", self.document.files[0].display(), node.place());
+                let label =
+                    format!("{}: shape of {}", self.document.files[0].display(), node.place());
                 self.warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
                 self.prototypes.insert(key, prototype);
                 prototype
             }
         };
-        let Some(instance) = Instance::new(prototype.index, &transform, shape.material, true) else {
+        let Some(instance) = Instance::new(prototype.index, &transform, shape.material, true)
+        else {
             return self.append(node, shape, matrix);
         };
         check_extent(node, prototype.corners(&instance))?;

@@ -40,7 +40,7 @@ use super::{
     features::{self, Ignored},
     file::CameraEntry,
     geometry::Dropped,
-    instances::{Budget, Instance, MAX_INSTANCES},
+    instance::{Budget, Instance, MAX_INSTANCES},
     mesh::Mesh,
     transform::Transform,
 };

@@ -22,7 +22,7 @@ use super::{Mesh, MeshCamera, images::Images};
 use crate::{
     error::{Error, Result},
     files,
-    scene::{features::Ignored, instances::Budget},
+    scene::{features::Ignored, instance::Budget},
     texture::Texture,
 };
 

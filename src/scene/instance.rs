@@ -1,0 +1,142 @@
+//! Meshes that are in memory once and in the scene many times.
+
+use glam::{DAffine3, DMat3, DVec3, Vec3, Vec4};
+
+use super::transform::Transform;
+
+/// Triangles of repeated meshes that a scene holds in world space, all copies together. Beyond,
+/// meshes that repeat become instances. Placed copies are faster to trace (`docs/traversal.md`).
+pub const PLACED_TRIANGLES: usize = 1 << 20;
+
+/// Triangles of a mesh below which its copies are always placed: an instance takes as much memory as
+/// three triangles, and a ray that enters it about as long as a few nodes.
+pub const FEWEST_INSTANCED: usize = 32;
+
+/// Most instances of a scene.
+pub const MAX_INSTANCES: usize = 1 << 24;
+
+/// Largest size of the elements of a transform and its inverse; a copy beyond is placed.
+const LARGEST_ELEMENT: f64 = 1e6;
+
+/// Decides in the order of a file which copies of meshes are placed and which become instances.
+#[derive(Debug, Default)]
+pub struct Budget {
+    placed_triangles: usize,
+}
+
+impl Budget {
+    /// True if `copies` further uses of a mesh of so many triangles become instances: if there are too
+    /// many to be placed with those before.
+    pub fn takes_instances(&mut self, copies: usize, triangles: usize) -> bool {
+        let all = self.placed_triangles.saturating_add(copies.saturating_mul(triangles));
+        let instances = all > PLACED_TRIANGLES && triangles >= FEWEST_INSTANCED;
+        if !instances {
+            self.placed_triangles = all;
+        }
+        instances
+    }
+}
+
+/// A mesh of [`super::Geometry::prototypes`] in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instance {
+    /// Index into [`super::Geometry::prototypes`].
+    pub prototype: u32,
+    /// Rows of the affine map from the space of the mesh to the world; the fourth column is the
+    /// translation in metres.
+    pub world_from_object: [Vec4; 3],
+    /// Materials of the instance: its triangles have `first_material + (own & material_mask)`.
+    pub first_material: u32,
+    /// All bits to keep the materials of the mesh, none to replace them by one.
+    pub material_mask: u32,
+}
+
+impl Instance {
+    /// Places `prototype` with its own materials moved by `first_material`, or all of them replaced
+    /// by it. None for a transform too extreme to trace: elements of it or its inverse beyond 10⁶.
+    pub fn new(
+        prototype: u32,
+        transform: &Transform,
+        first_material: u32,
+        replaces: bool,
+    ) -> Option<Self> {
+        let linear = transform.linear.transpose();
+        let row = |row: Vec3, shift: f32| row.extend(shift);
+        let instance = Self {
+            prototype,
+            world_from_object: [
+                row(linear.x_axis, transform.translate.x),
+                row(linear.y_axis, transform.translate.y),
+                row(linear.z_axis, transform.translate.z),
+            ],
+            first_material,
+            material_mask: if replaces { 0 } else { u32::MAX },
+        };
+        instance.object_from_world().map(|_| instance)
+    }
+
+    /// Affine map from the space of the mesh to the world.
+    pub fn affine(&self) -> DAffine3 {
+        let [x, y, z] = self.world_from_object.map(|row| row.as_dvec4());
+        let linear = DMat3::from_cols(x.truncate(), y.truncate(), z.truncate()).transpose();
+        DAffine3 { matrix3: linear, translation: DVec3::new(x.w, y.w, z.w) }
+    }
+
+    /// Inverse of [`Instance::affine`]; none if it is not finite, or either of the two is extreme.
+    pub fn object_from_world(&self) -> Option<DAffine3> {
+        let forward = self.affine();
+        let backward = forward.inverse();
+        let largest = |map: &DAffine3| {
+            map.matrix3.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max)
+        };
+        let is_fine = forward.is_finite()
+            && backward.is_finite()
+            && largest(&forward).max(largest(&backward)) <= LARGEST_ELEMENT;
+        is_fine.then_some(backward)
+    }
+
+    /// True if triangles turn their winding round.
+    pub fn mirrors(&self) -> bool {
+        self.affine().matrix3.determinant() < 0.0
+    }
+
+    /// Takes a position of the mesh to the world; twin of `map_point` in `instance.glsl`.
+    pub fn position(&self, position: Vec3) -> Vec3 {
+        Vec3::from(self.world_from_object.map(|row| row.truncate().dot(position) + row.w))
+    }
+
+    /// Moves the instance by a further transform.
+    pub fn moved(&self, outer: &Transform) -> Option<Self> {
+        let outer =
+            DAffine3 { matrix3: outer.linear.as_dmat3(), translation: outer.translate.as_dvec3() };
+        let whole = outer * self.affine();
+        let linear = whole.matrix3.transpose();
+        let shift = whole.translation;
+        let row = |row: DVec3, shift: f64| row.extend(shift).as_vec4();
+        let moved = Self {
+            world_from_object: [
+                row(linear.x_axis, shift.x),
+                row(linear.y_axis, shift.y),
+                row(linear.z_axis, shift.z),
+            ],
+            ..*self
+        };
+        moved.object_from_world().map(|_| moved)
+    }
+
+    /// Corners of a box in the space of the mesh, in the world.
+    pub fn corners(&self, [low, high]: [Vec3; 2]) -> [Vec3; 8] {
+        std::array::from_fn(|corner| {
+            let pick = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
+            self.position(Vec3::new(pick(0), pick(1), pick(2)))
+        })
+    }
+}
+
+/// Box around positions; none without any.
+pub fn bounds(positions: impl IntoIterator<Item = Vec3>) -> Option<[Vec3; 2]> {
+    positions.into_iter().fold(None, |bounds, position| match bounds {
+        None => Some([position; 2]),
+        Some([low, high]) => Some([low.min(position), high.max(position)]),
+    })
+}
