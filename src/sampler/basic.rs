@@ -51,7 +51,7 @@ impl Basic {
     pub fn steps(self, parameters: &Parameters, surfaces: Surfaces) -> Result<BasicSteps> {
         let candidates = self.candidates(parameters)?;
         let compensates = self.tag == SAMPLER_MIS && parameters.compensation;
-        Ok(BasicSteps { tag: self.tag, candidates, compensates, surfaces })
+        Ok(BasicSteps { tag: self.tag, candidates, compensates, rays: None, surfaces })
     }
 }
 
@@ -90,10 +90,23 @@ pub struct BasicSteps {
     tag: u32,
     candidates: u32,
     compensates: bool,
+    rays: Option<[u32; 2]>,
     surfaces: Surfaces,
 }
 
+impl BasicSteps {
+    /// Returns the same steps with other numbers of shadow rays at the first and at later vertices.
+    pub(super) fn with_rays(self, rays: Option<[u32; 2]>) -> Self {
+        Self { rays, ..self }
+    }
+}
+
 impl Steps for BasicSteps {
+    fn shadow_rays_at(&self, vertex: u32, most: u32) -> u32 {
+        let [first, later] = self.rays.unwrap_or([most; 2]);
+        most.min(if vertex == 0 { first } else { later })
+    }
+
     fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
         let own = [
             (CONSTANT_SAMPLER, self.tag),
