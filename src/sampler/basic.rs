@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Context, Parameters, Room, knob, parameters::ON_OR_OFF};
+use super::{Context, Parameters, Room, knob};
 use crate::{
     error::Result,
     pass::{Domain, Kernel, Passes, Steps, Surfaces, Technique},
@@ -71,7 +71,7 @@ impl Room for Basic {
                 Some(("candidates", knob::text_or_auto(Some(candidates))))
             }
             SAMPLER_MIS => {
-                Some(("compensation", knob::name_of(&parameters.compensation, ON_OR_OFF)))
+                Some(("compensation", knob::name_of(&parameters.compensation, knob::ON_OR_OFF)))
             }
             _ => None,
         };

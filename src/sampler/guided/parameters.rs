@@ -1,9 +1,6 @@
 //! Parameters of the sampler `guided`.
 
-use crate::sampler::{
-    knob::{self, Knob},
-    parameters::ON_OR_OFF,
-};
+use crate::sampler::knob::{self, Knob};
 
 /// Parameters of `guided`, apart from the number of candidates.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,8 +55,8 @@ impl GuidedParameters {
         },
         Knob {
             key: "ray-choice",
-            set: |own, value| knob::choice(&mut own.chooses_rays, value, ON_OR_OFF),
-            get: |own| knob::name_of(&own.chooses_rays, ON_OR_OFF),
+            set: |own, value| knob::choice(&mut own.chooses_rays, value, knob::ON_OR_OFF),
+            get: |own| knob::name_of(&own.chooses_rays, knob::ON_OR_OFF),
         },
         Knob {
             key: "regions",
