@@ -36,8 +36,12 @@ pub struct Statistics {
     pub candidates: Option<u32>,
     /// Costs measured in this run to choose that number; empty if none were.
     pub candidate_costs: Vec<CandidateCost>,
-    /// Directions traced at every vertex.
+    /// Directions traced at every vertex, or the most of them where `guided` chose their number.
     pub shadow_rays_per_vertex: u32,
+    /// Sampler and numbers of shadow rays that `guided` chose; absent where they were given.
+    pub chosen_rays: Option<RayChoice>,
+    /// Costs measured in this run for that choice, by pairs that were compared.
+    pub ray_costs: Vec<RayCost>,
     /// Path vertices at which environment light is gathered.
     pub depth: u32,
     /// Samples of every pixel that the image holds.
@@ -86,6 +90,48 @@ impl Statistics {
     /// [`crate::Error::Io`] with the cause.
     pub fn write(&self, path: &Path) -> Result<()> {
         write_json(path, self)
+    }
+}
+
+/// Sampler and numbers of shadow rays.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RayChoice {
+    /// `guided`, or `mis` in its place.
+    pub sampler: String,
+    /// Shadow rays at the first vertex.
+    pub first: u32,
+    /// Shadow rays at each later vertex.
+    pub later: u32,
+}
+
+impl fmt::Display for RayChoice {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{} with {} and {} shadow rays", self.sampler, self.first, self.later)
+    }
+}
+
+/// Measured cost of a sampler with numbers of shadow rays.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RayCost {
+    /// Sampler and numbers.
+    pub way: RayChoice,
+    /// As in [`CandidateCost`].
+    pub ms_per_sample: f64,
+    /// As in [`CandidateCost`].
+    pub relative_variance: f64,
+    /// Standard error of the logarithm of the variance relative to that of the other of the pair.
+    pub log_variance_error: f64,
+}
+
+impl fmt::Display for RayCost {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { way, ms_per_sample, relative_variance, log_variance_error } = self;
+        let percent = 100.0 * log_variance_error;
+        write!(
+            formatter,
+            "{way}: {ms_per_sample:.2} ms a sample, relative variance {relative_variance:.3} \
+             (±{percent:.0}%)"
+        )
     }
 }
 

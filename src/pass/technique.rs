@@ -3,7 +3,11 @@
 use std::{any::Any, collections::BTreeMap};
 
 use super::{runner::Runner, steps::Passes};
-use crate::{error::Result, film::statistics::CandidateCost, shader::structs::Wave};
+use crate::{
+    error::Result,
+    film::statistics::{CandidateCost, RayChoice, RayCost},
+    shader::structs::Wave,
+};
 
 /// Progress of a progressive render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +40,10 @@ pub struct Report {
     pub candidates: Option<u32>,
     /// Measurements behind this choice.
     pub candidate_costs: Vec<CandidateCost>,
+    /// Sampler and numbers of shadow rays, for techniques that choose them.
+    pub chosen_rays: Option<RayChoice>,
+    /// Measurements behind this choice.
+    pub ray_costs: Vec<RayCost>,
 }
 
 /// A sampler at work in one render.

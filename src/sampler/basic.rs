@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Context, Parameters, Room, knob, parameters::ON_OR_OFF};
+use super::{Context, Parameters, Room, knob};
 use crate::{
     error::Result,
     pass::{Domain, Kernel, Passes, Steps, Surfaces, Technique},
@@ -51,7 +51,7 @@ impl Basic {
     pub fn steps(self, parameters: &Parameters, surfaces: Surfaces) -> Result<BasicSteps> {
         let candidates = self.candidates(parameters)?;
         let compensates = self.tag == SAMPLER_MIS && parameters.compensation;
-        Ok(BasicSteps { tag: self.tag, candidates, compensates, surfaces })
+        Ok(BasicSteps { tag: self.tag, candidates, compensates, rays: None, surfaces })
     }
 }
 
@@ -71,7 +71,7 @@ impl Room for Basic {
                 Some(("candidates", knob::text_or_auto(Some(candidates))))
             }
             SAMPLER_MIS => {
-                Some(("compensation", knob::name_of(&parameters.compensation, ON_OR_OFF)))
+                Some(("compensation", knob::name_of(&parameters.compensation, knob::ON_OR_OFF)))
             }
             _ => None,
         };
@@ -90,10 +90,23 @@ pub struct BasicSteps {
     tag: u32,
     candidates: u32,
     compensates: bool,
+    rays: Option<[u32; 2]>,
     surfaces: Surfaces,
 }
 
+impl BasicSteps {
+    /// Returns the same steps with other numbers of shadow rays at the first and at later vertices.
+    pub(super) fn with_rays(self, rays: Option<[u32; 2]>) -> Self {
+        Self { rays, ..self }
+    }
+}
+
 impl Steps for BasicSteps {
+    fn shadow_rays_at(&self, vertex: u32, most: u32) -> u32 {
+        let [first, later] = self.rays.unwrap_or([most; 2]);
+        most.min(if vertex == 0 { first } else { later })
+    }
+
     fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
         let own = [
             (CONSTANT_SAMPLER, self.tag),

@@ -4,6 +4,9 @@ use std::{collections::BTreeMap, fmt::Display, ops::RangeInclusive, str::FromStr
 
 use crate::error::{Error, Result};
 
+/// Names of the values of switches.
+pub const ON_OR_OFF: &[(&str, bool)] = &[("on", true), ("off", false)];
+
 /// A parameter of `P`.
 pub struct Knob<P> {
     /// Key of `--set`, also in metadata and statistics.

@@ -36,9 +36,6 @@ impl Default for Parameters {
     }
 }
 
-/// Names of the values of `compensation`.
-pub(super) const ON_OR_OFF: &[(&str, bool)] = &[("on", true), ("off", false)];
-
 /// Parameters shared by several rooms.
 const KNOBS: &[Knob<Parameters>] = &[
     Knob {
@@ -55,8 +52,8 @@ const KNOBS: &[Knob<Parameters>] = &[
     },
     Knob {
         key: "compensation",
-        set: |parameters, value| knob::choice(&mut parameters.compensation, value, ON_OR_OFF),
-        get: |parameters| knob::name_of(&parameters.compensation, ON_OR_OFF),
+        set: |parameters, value| knob::choice(&mut parameters.compensation, value, knob::ON_OR_OFF),
+        get: |parameters| knob::name_of(&parameters.compensation, knob::ON_OR_OFF),
     },
     Knob {
         key: "preset",

@@ -35,6 +35,8 @@ impl RenderJob<'_> {
             candidates: renderer.report().candidates,
             candidate_costs: renderer.report().candidate_costs,
             shadow_rays_per_vertex: metadata.shadow_rays,
+            chosen_rays: renderer.report().chosen_rays,
+            ray_costs: renderer.report().ray_costs,
             depth: metadata.depth,
             sample_ranges: metadata.sample_ranges.clone(),
             samples_per_pixel: renderer.sample_count(),

@@ -21,6 +21,7 @@ use crate::{
     gpu::DescriptorSet,
     math::colour::luminance,
     pass::{Passes, Progress, Runner, Steps},
+    sampler::basic::BasicSteps,
     shader::structs::{PathState, Wave},
 };
 
@@ -28,7 +29,7 @@ use crate::{
 const MEASURING_SEED: u32 = 0x2c1b_3c6d;
 /// Largest number of waves per number of candidates in a comparison, in turns and over other pixels.
 /// The comparison ends early if more candidates clearly lose: declining them is never wrong by much.
-const MOST_ROUNDS: u32 = 4;
+pub(super) const MOST_ROUNDS: u32 = 4;
 /// Least step between pixels in film order: one row or column of each of its blocks.
 const STRIDE: u32 = 8;
 /// Most pixels in a wave; a larger film needs no more to tell which number is better.
@@ -55,24 +56,28 @@ pub(super) struct Choice {
 
 /// Measurements for one number of candidates.
 #[derive(Default)]
-struct Measured {
+pub(super) struct Measured {
     /// For the fewest candidates from their first wave. For more, that of fewer times a ratio of
     /// consecutive waves, since other work may slow all of them down.
     ms_per_path: Option<f64>,
-    spread: PixelSpread,
+    pub(super) spread: PixelSpread,
 }
 
-/// The passes of `guided`, with the number of candidates under trial.
+/// The passes of `guided`, or of `mis` in its place, with the numbers under trial.
 pub(super) struct Trial<'a> {
     pub(super) buffers: &'a GuideBuffers,
     pub(super) steps: GuidedSteps,
+    /// Steps of `mis`.
+    pub(super) open_steps: BasicSteps,
+    /// True if these are on trial.
+    pub(super) is_mis: bool,
     /// Tag of the guides that this one went on from.
     pub(super) tag: u32,
 }
 
 impl Passes for Trial<'_> {
     fn steps(&self) -> &dyn Steps {
-        &self.steps
+        if self.is_mis { &self.open_steps } else { &self.steps }
     }
 
     fn set(&self) -> Option<&DescriptorSet> {
@@ -129,7 +134,7 @@ impl Trial<'_> {
 
     /// Finds the samples per pixel for a wave of at least [`LEAST_MS`], if there is room. The rays
     /// traced to find them also wake the device and are not used.
-    fn samples_to_measure(
+    pub(super) fn samples_to_measure(
         &mut self,
         runner: &mut Runner,
         progress: &Progress,
@@ -146,7 +151,7 @@ impl Trial<'_> {
     }
 
     /// Renders a wave and returns device milliseconds and the paths, sample after sample.
-    fn measure(
+    pub(super) fn measure(
         &mut self,
         runner: &mut Runner,
         progress: &Progress,
@@ -186,7 +191,7 @@ fn measured_pixels(runner: &Runner) -> (u32, u32) {
 
 impl Measured {
     /// Adds a wave of `samples` per pixel.
-    fn add(&mut self, paths: &[PathState], samples: u32) {
+    pub(super) fn add(&mut self, paths: &[PathState], samples: u32) {
         let pixel_count = paths.len() / samples as usize;
         for pixel in 0..pixel_count {
             let of_pixel = || paths[pixel..].iter().step_by(pixel_count);

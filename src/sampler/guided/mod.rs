@@ -36,6 +36,7 @@ mod split;
 mod state;
 mod steps;
 mod technique;
+pub mod ways;
 
 pub use arriving::{ARRIVAL_DIRECTIONS, ArrivalWords, ArrivingLight, Reflected, arrival_direction};
 pub use buffers::{GuideBuffers, GuideSize};

@@ -8,6 +8,9 @@ pub struct GuidedParameters {
     /// `bounce-candidates`: BRDF directions to choose each bounce from by learned arriving light, 1
     /// to 16; 1 turns learning and choosing off.
     pub bounce_candidates: u32,
+    /// `ray-choice`: true chooses the numbers of shadow rays, and in half-open scenes between `guided`
+    /// and `mis`, by measurement before the first sample.
+    pub chooses_rays: bool,
     /// `guide-memory`: most bytes for the cells.
     pub guide_memory: u64,
     /// `later-rays`: most shadow rays at each vertex after the first; `None` is `auto`, half of
@@ -19,7 +22,13 @@ pub struct GuidedParameters {
 
 impl Default for GuidedParameters {
     fn default() -> Self {
-        Self { bounce_candidates: 4, guide_memory: 128 << 20, later_rays: None, regions: 1024 }
+        Self {
+            bounce_candidates: 4,
+            chooses_rays: false,
+            guide_memory: 128 << 20,
+            later_rays: None,
+            regions: 1024,
+        }
     }
 }
 
@@ -45,6 +54,11 @@ impl GuidedParameters {
             get: |own| knob::text_or_auto(own.later_rays),
         },
         Knob {
+            key: "ray-choice",
+            set: |own, value| knob::choice(&mut own.chooses_rays, value, knob::ON_OR_OFF),
+            get: |own| knob::name_of(&own.chooses_rays, knob::ON_OR_OFF),
+        },
+        Knob {
             key: "regions",
             set: |own, value| knob::number(&mut own.regions, value, 16..=1024),
             get: |own| own.regions.to_string(),
@@ -55,6 +69,13 @@ impl GuidedParameters {
     /// vertices cause less of the error at the same cost per ray (`docs/experiments/later_rays.md`).
     pub fn later_rays_of(&self, shadow_rays: u32) -> u32 {
         self.later_rays.unwrap_or((shadow_rays / 2).max(1)).min(shadow_rays)
+    }
+
+    /// Returns the shadow rays at the first and at each later vertex in open scenes, where samples are
+    /// those of `mis`: there a bounce that escapes is a sample too, and one ray beside it is enough
+    /// (`docs/experiments/escaped_bounces.md`).
+    pub fn rays_in_the_open(&self, shadow_rays: u32) -> [u32; 2] {
+        [shadow_rays, self.later_rays.unwrap_or(1).min(shadow_rays)]
     }
 
     /// Returns true if paths of `depth` vertices have guided bounces.
@@ -88,6 +109,8 @@ mod tests {
         let mut all = Parameters::default();
         let later = |all: &Parameters, rays: u32| all.guided.later_rays_of(rays);
         assert_eq!([0, 1, 2, 5, 16].map(|rays| later(&all, rays)), [0, 1, 1, 2, 8]);
+        assert_eq!(all.guided.rays_in_the_open(5), [5, 1]);
+        assert_eq!(all.guided.rays_in_the_open(0), [0, 0]);
         all.set("later-rays=3").unwrap();
         assert_eq!([0, 2, 5].map(|rays| later(&all, rays)), [0, 2, 3]);
         assert_eq!(Sampler::Guided.describe(&all)["later-rays"], "3");

@@ -19,6 +19,8 @@ use crate::{
 pub struct GuidedSteps {
     /// Candidates per shadow ray, a quarter of them from the BRDF; 1 is the one-sample model.
     pub candidates: u32,
+    /// Shadow rays at the first and at each later vertex, where they were chosen.
+    pub rays: Option<[u32; 2]>,
     parameters: GuidedParameters,
     guides_bounces: bool,
     surfaces: Surfaces,
@@ -30,6 +32,7 @@ impl GuidedSteps {
     pub fn new(candidates: u32, parameters: GuidedParameters, settings: &PassSettings) -> Self {
         Self {
             candidates,
+            rays: None,
             parameters,
             guides_bounces: parameters.guides_bounces(settings.depth),
             surfaces: settings.surfaces,
@@ -41,11 +44,17 @@ impl GuidedSteps {
     pub fn with_candidates(self, candidates: u32) -> Self {
         Self { candidates, ..self }
     }
+
+    /// Returns the same steps with other numbers of shadow rays.
+    pub fn with_rays(self, rays: Option<[u32; 2]>) -> Self {
+        Self { rays, ..self }
+    }
 }
 
 impl Steps for GuidedSteps {
     fn shadow_rays_at(&self, vertex: u32, most: u32) -> u32 {
-        if vertex == 0 { most } else { self.parameters.later_rays_of(most) }
+        let [first, later] = self.rays.unwrap_or([most, self.parameters.later_rays_of(most)]);
+        most.min(if vertex == 0 { first } else { later })
     }
 
     fn sample(&self, wave: &Wave) -> Vec<Kernel> {

@@ -8,10 +8,11 @@ use super::{
     parameters::GuidedParameters,
     state::GuideState,
     steps::GuidedSteps,
+    ways::{ChosenWay, Way},
 };
 use crate::{
     error::Result,
-    film::Aov,
+    film::{Aov, statistics::RayCost},
     gpu::DescriptorSet,
     pass::{Passes, Progress, Report, Runner, SHADOW_RAYS_PER_GROUP, Steps, Technique},
     sampler::{
@@ -27,6 +28,8 @@ use std::collections::BTreeMap;
 const TRAINING_SWEEPS: u32 = 8;
 /// Share of visible rays above which a scene is open and rendered as by `mis`: learning would not pay.
 const OPEN_SHARE: f64 = 0.5;
+/// The same where a measurement decides below it.
+const CLEARLY_OPEN_SHARE: f64 = 0.9;
 
 pub(in crate::sampler) struct GuidedRoom;
 
@@ -56,12 +59,20 @@ impl Room for GuidedRoom {
             shadow_rays: settings.shadow_rays.clamp(1, SHADOW_RAYS_PER_GROUP),
             has_bounces: own.guides_bounces(settings.depth),
         };
+        let open_steps = basic::MIS.steps(parameters, settings.surfaces)?;
+        let rays_in_the_open = own.rays_in_the_open(settings.shadow_rays);
         let mut guided = Guided {
             buffers: GuideBuffers::new(runner.device(), scene, &own, size)?,
             steps: GuidedSteps::new(first_candidates(parameters)?, own, settings),
-            open_steps: basic::MIS.steps(parameters, settings.surfaces)?,
+            open_steps: open_steps.with_rays(Some(rays_in_the_open)),
+            rays_in_the_open,
             given_candidates: parameters.candidates,
+            parameters: own,
             choice: Choice::default(),
+            way: None,
+            ray_costs: Vec::new(),
+            way_ms: 0.0,
+            may_be_open: false,
             is_trained: false,
             is_open: false,
             rebuilt_at: 0,
@@ -83,9 +94,18 @@ pub struct Guided {
     steps: GuidedSteps,
     /// Steps of `mis`, for open scenes.
     open_steps: BasicSteps,
+    /// Their shadow rays unless others are chosen.
+    rays_in_the_open: [u32; 2],
     /// Number of candidates that the user asked for; `None` for `auto`.
     given_candidates: Option<u32>,
+    parameters: GuidedParameters,
     choice: Choice,
+    /// Chosen sampler and shadow rays; `None` while undecided and where they are given.
+    way: Option<Way>,
+    ray_costs: Vec<RayCost>,
+    way_ms: f64,
+    /// True if so much is visible that `mis` may be better: measured after the training.
+    may_be_open: bool,
     is_trained: bool,
     /// True if too little is blocked to learn anything.
     pub(super) is_open: bool,
@@ -103,6 +123,7 @@ impl Guided {
             rebuilt_at: self.rebuilt_at,
             is_open: self.is_open,
             candidates: self.candidates(),
+            rays: self.way.map(|way| way.rays),
             tag: self.tag,
             ..self.buffers.state()?
         })
@@ -133,6 +154,10 @@ impl Guided {
             self.tag = state.epoch_tag();
         }
         self.is_trained = true;
+        self.may_be_open = false;
+        if let Some(rays) = state.rays.filter(|_| self.parameters.chooses_rays && !has_moved) {
+            self.take_way(Way { is_mis: self.is_open, rays });
+        }
         if let Some(candidates) = state.candidates {
             self.take_choice(Choice { candidates: Some(candidates), ..Choice::default() });
             runner.warm_up(self)?;
@@ -151,6 +176,47 @@ impl Guided {
         if self.given_candidates.is_none() {
             self.steps.candidates = choice.candidates.unwrap_or(self.steps.candidates);
             self.choice = choice;
+        }
+    }
+
+    /// Takes sampler and shadow rays measured here or by an earlier render.
+    fn take_way(&mut self, way: Way) {
+        self.is_open = way.is_mis;
+        self.steps = self.steps.with_rays(Some(way.rays));
+        self.open_steps = self.open_steps.with_rays(Some(way.rays));
+        self.way = Some(way);
+    }
+
+    /// Chooses sampler and shadow rays by measurement: `mis` or `guided` where either may be better,
+    /// then fewer rays.
+    fn choose_way(&mut self, runner: &mut Runner, progress: &Progress) -> Result<()> {
+        let most = runner.settings().shadow_rays;
+        let later = self.parameters.later_rays;
+        let guided = Way { is_mis: false, rays: [most, self.parameters.later_rays_of(most)] };
+        let mis = Way { is_mis: true, rays: self.rays_in_the_open };
+        let (first, other) = match (self.is_open, self.may_be_open) {
+            (true, _) => (mis, None),
+            (false, true) => (mis, Some(guided)),
+            (false, false) => (guided, None),
+        };
+        let ChosenWay { way, costs, ms } = if most == 0 {
+            ChosenWay { way: first, costs: Vec::new(), ms: 0.0 }
+        } else {
+            self.trial().choose_way(runner, progress, first, other, later)?
+        };
+        self.ray_costs = costs;
+        self.way_ms = ms;
+        self.take_way(way);
+        Ok(())
+    }
+
+    fn trial(&self) -> Trial<'_> {
+        Trial {
+            buffers: &self.buffers,
+            steps: self.steps,
+            open_steps: self.open_steps,
+            is_mis: false,
+            tag: self.tag,
         }
     }
 
@@ -184,7 +250,12 @@ impl Guided {
             // the picture, so the picture does not depend on its own samples here.
             let visible = runner.totals().shadow_rays_visible - before.shadow_rays_visible;
             let traced = runner.totals().shadow_rays_traced - before.shadow_rays_traced;
-            if sweep == 0 && visible as f64 > OPEN_SHARE * traced as f64 {
+            let is_above = |share: f64| visible as f64 > share * traced as f64;
+            if sweep == 0 && self.parameters.chooses_rays {
+                self.may_be_open = is_above(OPEN_SHARE);
+            }
+            let limit = if self.may_be_open { CLEARLY_OPEN_SHARE } else { OPEN_SHARE };
+            if sweep == 0 && is_above(limit) {
                 log::info!("{visible} of {traced} rays of the first sweep are visible: as mis");
                 self.is_open = true;
                 return Ok(());
@@ -232,12 +303,15 @@ impl Technique for Guided {
         {
             self.rebuild(samples == SPLIT_AFTER, samples)?;
         }
+        if self.parameters.chooses_rays && self.way.is_none() {
+            self.choose_way(runner, progress)?;
+        }
         if self.is_open {
             return Ok(u32::MAX);
         }
         if self.choice.candidates.is_none() {
-            let trial = Trial { buffers: &self.buffers, steps: self.steps, tag: self.tag };
-            self.take_choice(trial.choose(runner, progress)?);
+            let choice = self.trial().choose(runner, progress)?;
+            self.take_choice(choice);
         }
         Ok(guide_schedule(samples + 1) - samples)
     }
@@ -246,6 +320,12 @@ impl Technique for Guided {
         self.buffers.forget()?;
         self.is_trained = false;
         self.is_open = false;
+        self.may_be_open = false;
+        self.way = None;
+        self.ray_costs = Vec::new();
+        self.way_ms = 0.0;
+        self.steps = self.steps.with_rays(None);
+        self.open_steps = self.open_steps.with_rays(Some(self.rays_in_the_open));
         self.rebuilt_at = 0;
         self.tag = 0;
         self.forget_choice();
@@ -257,11 +337,14 @@ impl Technique for Guided {
             host_ms: [
                 ("guide rebuilds".to_owned(), self.buffers.rebuild_ms()),
                 ("choice of candidates".to_owned(), self.choice.ms),
+                ("choice of shadow rays".to_owned(), self.way_ms),
             ]
             .into(),
             buffer_bytes: self.buffers.buffer_bytes(),
             candidates: self.candidates(),
             candidate_costs: self.choice.costs.clone(),
+            chosen_rays: self.way.as_ref().map(Way::described),
+            ray_costs: self.ray_costs.clone(),
             ..Report::default()
         }
     }
