@@ -132,7 +132,7 @@ fn bounce(floor: &Floor, candidates: u32, beliefs: &GuideState) -> Vec<(Vec3, Ve
     let mut guide = GuideBuffers::new(device, scene, &parameters, size).unwrap();
     let state = guide.state().unwrap();
     guide.restore(&GuideState { arrivals: beliefs.arrivals.clone(), ..state }).unwrap();
-    let waves = WaveBuffers::new(device, PIXELS, 1, PathDemand::default(), false).unwrap();
+    let waves = WaveBuffers::new(device, PIXELS, 1, PathDemand::default(), false, 1).unwrap();
     assert!(waves.capacity() >= paths);
     let input = support::PathInput {
         normal: floor.normal.into(),

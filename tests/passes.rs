@@ -34,6 +34,7 @@ fn settings(shadow_rays: u32, depth: u32) -> PassSettings {
         depth,
         aovs: AOV_ALBEDO | AOV_CACHE_ENTRIES | AOV_GUIDE_CELL,
         roulette_vertex: 8,
+        tile_edge: 1,
         surfaces: Surfaces::default(),
         traversal: Traversal { page_count: 1, page_shift: 20 },
         incoherent: Schedule { rays_per_invocation: 16, refill_lanes: 3 },

@@ -3,6 +3,7 @@
 use super::{
     geometry::{Schedule, Traversal},
     kernel::{Dispatch, Domain, Kernel},
+    sharing,
     steps::Steps,
     surfaces::Surfaces,
 };
@@ -27,6 +28,8 @@ pub struct PassSettings {
     pub aovs: u32,
     /// First vertex at which russian roulette may end a path.
     pub roulette_vertex: u32,
+    /// Edge of the tiles whose pixels share second vertices, one of [`sharing::TILE_EDGES`].
+    pub tile_edge: u32,
     /// Specialization by the surfaces of the scene.
     pub surfaces: Surfaces,
     /// Specialization of the passes that traverse.
@@ -46,6 +49,7 @@ pub fn wave_order(
     let constants = surfaces.constants();
     // Training teaches the visibility of the environment; other light is not needed.
     let is_lit = wave.is_training == 0;
+    let shares = is_lit && settings.tile_edge > 1 && vertices > 1;
     let mut order = Vec::new();
     let mut add = |kernel: Kernel, wave: &Wave| order.push(Dispatch { kernel, wave: *wave });
     let mut wave = Wave { aovs: settings.aovs, ..wave };
@@ -63,6 +67,9 @@ pub fn wave_order(
         if is_lit {
             if surfaces.emits() {
                 add(Kernel::new("emit", Domain::Paths, &constants), &wave);
+            }
+            if shares && vertex == 1 {
+                add(sharing::keep_second(settings), &wave);
             }
             if surfaces.lamp_count > 0 {
                 let to_lamps = Wave {
@@ -108,6 +115,9 @@ pub fn wave_order(
         if vertex == 0 && wave.aovs & FEATURES != 0 && wave.is_training == 0 {
             add(Kernel::new("features", Domain::Pixels, &constants), &wave);
         }
+        if shares && vertex == 0 {
+            add(sharing::keep_first(settings), &wave);
+        }
         if vertex + 1 < vertices {
             let guided = if wave.total_shadow_rays > 0 { steps.bounce(&wave) } else { None };
             add(guided.unwrap_or_else(|| bounce(settings, false)), &wave);
@@ -123,6 +133,11 @@ pub fn wave_order(
             add(Kernel::new("emit", Domain::Paths, &constants), &wave);
         }
         add(Kernel::new("gather", Domain::Paths, &[]), &wave);
+    }
+    if shares {
+        for Dispatch { kernel, wave } in sharing::connect_and_share(settings, &wave) {
+            add(kernel, &wave);
+        }
     }
     add(Kernel::new("accumulate", Domain::Pixels, &[]), &wave);
     order

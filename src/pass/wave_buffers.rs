@@ -9,7 +9,10 @@ use crate::{
     shader::{
         bindings::{WAVE, wave},
         constants::WORKGROUP_SIZE,
-        structs::{Hit, PathState, Ray, ShadowRay, Surface},
+        structs::{
+            Connection, FirstVertex, Hit, PathState, Ray, SecondVertex, ShadowRay, Surface,
+            TileWeight,
+        },
     },
 };
 
@@ -30,26 +33,34 @@ pub struct WaveBuffers {
     visibility: Buffer,
     paths: Buffer,
     surfaces: Buffer,
+    first_vertices: Buffer,
+    second_vertices: Buffer,
+    connections: Buffer,
+    tile_weights: Buffer,
 }
 
 impl WaveBuffers {
     /// Allocates waves over a film of `padded_pixels` with up to `shadow_rays` rays per hit at a time,
-    /// and no more paths than `demand` allows; surfaces only if `is_textured`. Fails if the device does
-    /// or its limits are exceeded.
+    /// and no more paths than `demand` allows; surfaces only if `is_textured`, and connections only if
+    /// `tile_pixels` are more than 1. Fails if the device does or its limits are exceeded.
     pub fn new(
         device: &Arc<Device>,
         padded_pixels: u32,
         shadow_rays: u32,
         demand: PathDemand,
         is_textured: bool,
+        tile_pixels: u32,
     ) -> Result<Self> {
         let capabilities = device.capabilities();
         let most = if capabilities.kind == "software" { SOFTWARE_PATHS } else { GPU_PATHS };
         let widest =
             (size_of::<Hit>() as u64).max(u64::from(shadow_rays) * size_of::<ShadowRay>() as u64);
         let widest = widest.max(demand.bytes);
+        let tile_pixels = if tile_pixels > 1 { u64::from(tile_pixels) } else { 0 };
+        let widest = widest.max(tile_pixels * size_of::<Connection>() as u64);
         let by_binding = capabilities.max_storage_buffer_range / widest;
-        let by_texels = capabilities.max_texel_buffer_elements / demand.texels.max(1);
+        let by_texels =
+            capabilities.max_texel_buffer_elements / demand.texels.max(tile_pixels).max(1);
         let by_groups = u64::from(capabilities.max_workgroup_count) * u64::from(WORKGROUP_SIZE)
             / u64::from(shadow_rays);
         let by_memory = capabilities.device_memory / 8 / (widest * 3);
@@ -69,6 +80,11 @@ impl WaveBuffers {
         let visibility = make("visibility", shadow_ray_count, size_of::<u32>())?;
         let surface_count = if is_textured { paths } else { 1 };
         let surfaces = make("hit surfaces", surface_count, size_of::<Surface>())?;
+        let kept = if tile_pixels > 0 { paths } else { 1 };
+        let first_vertices = make("first vertices", kept, size_of::<FirstVertex>())?;
+        let second_vertices = make("second vertices", kept, size_of::<SecondVertex>())?;
+        let connections = make("connections", kept * tile_pixels.max(1), size_of::<Connection>())?;
+        let tile_weights = make("tile weights", kept, size_of::<TileWeight>())?;
         let paths = make("paths", paths, size_of::<PathState>())?;
         let bound = [
             (wave::RAYS, &rays),
@@ -80,9 +96,29 @@ impl WaveBuffers {
             (wave::VISIBILITY, &visibility),
             (wave::PATHS, &paths),
             (wave::HIT_SURFACES, &surfaces),
+            (wave::FIRST_VERTICES, &first_vertices),
+            (wave::FIRST_VERTEX_TEXELS, &first_vertices),
+            (wave::SECOND_VERTICES, &second_vertices),
+            (wave::CONNECTIONS, &connections),
+            (wave::CONNECTION_TEXELS, &connections),
+            (wave::TILE_WEIGHTS, &tile_weights),
+            (wave::TILE_WEIGHT_TEXELS, &tile_weights),
         ];
         let set = DescriptorSet::new(device, &WAVE, &bound)?;
-        Ok(Self { set, capacity, rays, hits, shadow_rays, visibility, paths, surfaces })
+        Ok(Self {
+            set,
+            capacity,
+            rays,
+            hits,
+            shadow_rays,
+            visibility,
+            paths,
+            surfaces,
+            first_vertices,
+            second_vertices,
+            connections,
+            tile_weights,
+        })
     }
 
     /// Descriptor set 2.
@@ -127,8 +163,19 @@ impl WaveBuffers {
 
     /// Bytes by buffer name.
     pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
-        [&self.rays, &self.hits, &self.shadow_rays, &self.visibility, &self.paths, &self.surfaces]
-            .map(|buffer| (buffer.name().to_owned(), buffer.size()))
-            .into()
+        [
+            &self.rays,
+            &self.hits,
+            &self.shadow_rays,
+            &self.visibility,
+            &self.paths,
+            &self.surfaces,
+            &self.first_vertices,
+            &self.second_vertices,
+            &self.connections,
+            &self.tile_weights,
+        ]
+        .map(|buffer| (buffer.name().to_owned(), buffer.size()))
+        .into()
     }
 }

@@ -60,6 +60,7 @@ impl Renderer {
             depth: settings.depth,
             aovs: aov_bits(&settings.aovs),
             roulette_vertex: settings.roulette_vertex,
+            tile_edge: settings.parameters.tile_edge_of(settings.depth),
             surfaces: buffers.surfaces(),
             traversal: buffers.geometry().traversal(),
             incoherent: Schedule::incoherent(device.capabilities()),

@@ -11,6 +11,8 @@ use crate::error::{Error, Result};
 /// Parameters of the samplers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Parameters {
+    /// `share-tiles`: edge of the tiles whose pixels share second vertices; `None` is `off`.
+    pub share_tiles: Option<u32>,
     /// `candidates`: directions to choose each shadow ray of `ris` or `guided` from; `None` is `auto`.
     pub candidates: Option<u32>,
     /// Parameters of `product`, also within `visibility`.
@@ -50,7 +52,15 @@ const KNOBS: &[Knob<Parameters>] = &[
         },
         get: |_| String::new(),
     },
+    Knob {
+        key: "share-tiles",
+        set: |parameters, value| knob::choice(&mut parameters.share_tiles, value, SHARE_TILES),
+        get: |parameters| knob::name_of(&parameters.share_tiles, SHARE_TILES),
+    },
 ];
+
+const SHARE_TILES: &[(&str, Option<u32>)] =
+    &[("off", None), ("2", Some(2)), ("4", Some(4)), ("8", Some(8))];
 
 impl Parameters {
     /// Sets one parameter from `key=value`. Returns [`Error::Usage`] for a value out of range, or
@@ -70,6 +80,11 @@ impl Parameters {
             "--set {key}: unknown parameter; known: {}",
             Self::keys().join(", ")
         )))
+    }
+
+    /// Edge of the tiles whose pixels share second vertices of paths of `depth` vertices; 1 for none.
+    pub fn tile_edge_of(&self, depth: u32) -> u32 {
+        if depth > 1 { self.share_tiles.unwrap_or(1) } else { 1 }
     }
 
     /// Every key.

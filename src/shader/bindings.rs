@@ -263,6 +263,20 @@ binding_tables! {
         7 SHADOW_RAY_TEXELS: texels Rg32Uint;
         /// Surface at the hit of each path, in scenes with textures.
         8 HIT_SURFACES: array Surface;
+        /// First vertex of each path, while pixels share paths.
+        9 FIRST_VERTICES: array FirstVertex;
+        /// First vertices again, six texels each.
+        10 FIRST_VERTEX_TEXELS: texels Rgba32Uint;
+        /// Second vertex of each path.
+        11 SECOND_VERTICES: array SecondVertex;
+        /// Connections: pixel `k` of its tile with the second vertex of path `i` at `k · path_count + i`.
+        12 CONNECTIONS: array Connection;
+        /// Connections again, one texel each.
+        13 CONNECTION_TEXELS: texels Rgba32Float;
+        /// Weight of the second vertex of each path.
+        14 TILE_WEIGHTS: array TileWeight;
+        /// Weights again, one texel each.
+        15 TILE_WEIGHT_TEXELS: texels Rgba32Uint;
     }
 
     /// Set 3: the film, which grows by every wave.

@@ -61,6 +61,10 @@ constants! {
     /// Candidates of `sample_lamps` for its shadow ray.
     CONSTANT_LAMP_CANDIDATES = 22;
 
+    // Specialization constant of the passes that share paths.
+    /// Edge of a tile, pixels: 2, 4 or 8.
+    CONSTANT_TILE_EDGE = 27;
+
     // Specialization constants of `multiply_lobes`.
     /// Lobes of the environment.
     CONSTANT_ENVIRONMENT_LOBES = 32;
