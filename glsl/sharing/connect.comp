@@ -5,6 +5,7 @@
 // of its first vertices, weighted by the balance heuristic.
 #version 460
 
+#include "base.glsl"
 #include "brdf.glsl"
 #include "bvh.glsl"
 #include "first_vertex.glsl"
@@ -39,7 +40,7 @@ void main() {
         return;
     }
     SecondVertex second = second_vertices[path];
-    vec3 radiance = paths[path].radiance;
+    vec3 radiance = second.base + second.bounce_share * paths[path].radiance;
     bool is_shared = second.scale > 0.0 && radiance != vec3(0.0);
     if (wave.first_shadow_ray == 0u) {
         hits[path] = Hit(
@@ -50,7 +51,9 @@ void main() {
     if (!is_shared) {
         return;
     }
-    radiance /= second.scale;
+    Material material = load_material(second.material);
+    radiance /=
+        second.scale * base_view(material, dot(second.shading_normal, second.outgoing));
     Tile tile = tile_of(path);
     float offset = ray_offset();
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
@@ -69,8 +72,9 @@ void main() {
         }
         // From solid angle at the first vertex to area at the second.
         float geometry = cosine / squared;
+        float view = base_view(material, max(dot(second.shading_normal, direction), 0.0));
         connections[member * path_count + path] =
-            Connection(throughput * radiance * geometry, pdf * geometry);
+            Connection(throughput * radiance * (geometry * view), pdf * geometry);
         vec3 end = moved_off_surface(first.position, first.geometric_normal, -direction, offset);
         shadow_rays[i * path_count + path] =
             ShadowRay(end - second.position, vec3(pdf > 0.0 ? 1.0 : 0.0));

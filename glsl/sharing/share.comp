@@ -1,5 +1,6 @@
 // Adds the light of all second vertices of the tile that its first vertex sees to every path, each by
-// its share in the balance heuristic. A vertex that does not see its own first vertex stays with it.
+// its share in the balance heuristic. What the rest of the BRDF reflects
+// stays with its own path, and so does a vertex that does not see its own first vertex.
 #version 460
 
 #include "load.glsl"
@@ -28,10 +29,11 @@ void main() {
     vec3 radiance = paths[path].radiance;
     SecondVertex second = second_vertices[path];
     if (second.scale > 0.0) {
-        vec3 own = is_seen(load_weight(path), tile.member)
-            ? vec3(0.0)
-            : second.throughput * (radiance / second.scale);
-        radiance = second.radiance + own;
+        vec3 shared_light = is_seen(load_weight(path), tile.member)
+            ? second.base + second.bounce_share * radiance
+            : vec3(0.0);
+        vec3 rest = second.direct + radiance - shared_light;
+        radiance = second.radiance + second.throughput * (rest / second.scale);
     }
     for (uint member = 0u; member < TILE_PIXELS; ++member) {
         uint other = tile_path(tile, member);

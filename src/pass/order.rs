@@ -82,6 +82,12 @@ pub fn wave_order(
                 add(Kernel::new("sample_lamps", Domain::Paths, &constants), &to_lamps);
                 add(traversal.shadow(incoherent, surfaces), &to_lamps);
                 add(Kernel::new("gather", Domain::Paths, &[]), &to_lamps);
+                if shares
+                    && vertex == 1
+                    && let Some(kernel) = sharing::gather_base(settings)
+                {
+                    add(kernel, &to_lamps);
+                }
             }
         }
 
@@ -104,6 +110,12 @@ pub fn wave_order(
                 }
             }
             add(Kernel::new("gather", Domain::Paths, &[]), &wave);
+            if shares
+                && vertex == 1
+                && let Some(kernel) = sharing::gather_base(settings)
+            {
+                add(kernel, &wave);
+            }
             if wave.first_shadow_ray + wave.shadow_ray_count >= wave.total_shadow_rays {
                 break;
             }
@@ -122,10 +134,21 @@ pub fn wave_order(
             let guided = if wave.total_shadow_rays > 0 { steps.bounce(&wave) } else { None };
             add(guided.unwrap_or_else(|| bounce(settings, false)), &wave);
         }
+        if shares && vertex == 1 && vertex + 1 < vertices {
+            add(sharing::keep_third(settings), &wave);
+        }
     }
-    if is_lit && (surfaces.emits() || surfaces.has_specular()) {
+    let ends_at_second = shares && vertices == 2;
+    let follows_last = is_lit && (surfaces.emits() || surfaces.has_specular());
+    if ends_at_second && !follows_last {
+        add(sharing::keep_third(settings), &wave);
+    }
+    if follows_last {
         // Follow the last vertices to light that is not sampled, or not sampled alone.
         add(bounce(settings, !surfaces.emits()), &wave);
+        if ends_at_second {
+            add(sharing::keep_third(settings), &wave);
+        }
         wave = Wave { vertex: vertices, shadow_ray_count: 0, total_shadow_rays: 0, ..wave };
         wave.first_shadow_ray = 0;
         add(traversal.trace(incoherent, surfaces), &wave);

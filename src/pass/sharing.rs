@@ -6,10 +6,16 @@ use super::{
     order::PassSettings,
     steps::SHADOW_RAYS_PER_GROUP,
 };
-use crate::shader::{constants::CONSTANT_TILE_EDGE, structs::Wave};
+use crate::shader::{
+    constants::{CONSTANT_TILE_EDGE, MATERIAL_PLASTIC, MATERIAL_PRINCIPLED},
+    structs::Wave,
+};
 
 /// Edges of tiles, pixels; 1 shares nothing. A tile lies in a block of the film.
 pub const TILE_EDGES: [u32; 4] = [1, 2, 4, 8];
+
+/// Bits of the kinds of material that reflect more than a diffuse base (`glsl/include/base.glsl`).
+const WITH_BASE_AND_REST: u32 = 1 << MATERIAL_PLASTIC | 1 << MATERIAL_PRINCIPLED;
 
 /// Keeps the first vertices, before their paths go on.
 pub fn keep_first(settings: &PassSettings) -> Kernel {
@@ -19,6 +25,18 @@ pub fn keep_first(settings: &PassSettings) -> Kernel {
 /// Keeps the second vertices, before light is gathered there.
 pub fn keep_second(settings: &PassSettings) -> Kernel {
     Kernel::new("keep_second", Domain::Paths, &settings.surfaces.constants())
+}
+
+/// Adds the light of shadow rays that the base of second vertices reflects, where it is not all.
+pub fn gather_base(settings: &PassSettings) -> Option<Kernel> {
+    let has_rest = settings.surfaces.material_kinds & WITH_BASE_AND_REST != 0;
+    let constants = settings.surfaces.constants();
+    has_rest.then(|| Kernel::new("gather_base", Domain::Paths, &constants))
+}
+
+/// Parts the light of the second vertices, once their paths have bounced.
+pub fn keep_third(settings: &PassSettings) -> Kernel {
+    Kernel::new("keep_third", Domain::Paths, &settings.surfaces.constants())
 }
 
 /// Connects the vertices of a finished `wave` in groups of shadow rays, and shares the light.

@@ -233,10 +233,20 @@ structs! {
         geometric_normal: vec3,
         /// Unit shading normal.
         shading_normal: vec3,
+        /// Unit vector to the first vertex.
+        outgoing: vec3,
         /// [`PathState::throughput`] of the path up to here.
         throughput: vec3,
         /// [`PathState::radiance`] of the path up to here.
         radiance: vec3,
+        /// Direct light that its diffuse base reflects, times `scale`.
+        base: vec3,
+        /// Direct light that it reflects, times `scale`.
+        direct: vec3,
+        /// Share of the diffuse base in what it reflects of the path's next ray.
+        bounce_share: vec3,
+        /// Material index.
+        material: uint,
         /// Throughput with which the path goes on instead; 0 if the vertex is not shared.
         scale: float,
         /// Density of the BRDF's sampling over that with which the path came here.
