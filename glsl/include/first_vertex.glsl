@@ -3,6 +3,8 @@
 #ifndef FIRST_VERTEX_GLSL
 #define FIRST_VERTEX_GLSL
 
+#include "brdf.glsl"
+#include "frame.glsl"
 #include "load.glsl"
 #include "surfaces.glsl"
 
@@ -36,12 +38,12 @@ Material first_material(FirstVertex vertex) {
 
 // BRDF of a first vertex in a direction, with the cosine and the path's throughput, and the density
 // of the BRDF's sampling; both 0 where no path goes.
-void evaluate_first(FirstVertex vertex, vec3 direction, out vec3 throughput, out float pdf) {
-    Frame frame = frame_from_normal(vertex.shading_normal);
+void evaluate_first(
+    FirstVertex vertex, Material material, Frame frame, vec3 outgoing_local, vec3 direction,
+    out vec3 throughput, out float pdf) {
     vec3 incident_local = to_local(frame, direction);
     vec3 value;
-    brdf_evaluate_and_pdf(
-        first_material(vertex), to_local(frame, vertex.outgoing), incident_local, value, pdf);
+    brdf_evaluate_and_pdf(material, outgoing_local, incident_local, value, pdf);
     throughput = vertex.throughput * value * incident_local.z;
     bool goes = pdf > 0.0 && dot(direction, vertex.geometric_normal) > 0.0
         && max(throughput.r, max(throughput.g, throughput.b)) > 0.0;

@@ -42,9 +42,9 @@ uint tile_path(Tile tile, uint member) {
     return tile.block + place.y * FILM_BLOCK + place.x;
 }
 
-// Tests whether a pixel of the tile sees the second vertex with this weight.
-bool is_seen(TileWeight weight, uint member) {
-    return (((member < 32u ? weight.seen_low : weight.seen_high) >> (member & 31u)) & 1u) != 0u;
+// Tests the bit of a pixel of the tile.
+bool is_seen(uvec2 seen_pixels, uint member) {
+    return (((member < 32u ? seen_pixels.x : seen_pixels.y) >> (member & 31u)) & 1u) != 0u;
 }
 
 #endif

@@ -33,7 +33,10 @@ void main() {
     vec3 direction = load_ray(path).direction;
     vec3 expected;
     float pdf;
-    evaluate_first(first, direction, expected, pdf);
+    Frame frame = frame_from_normal(first.shading_normal);
+    evaluate_first(
+        first, first_material(first), frame, to_local(frame, first.outgoing), direction, expected,
+        pdf);
     float most = max(expected.r, max(expected.g, expected.b));
     if (most <= 0.0) {
         return;

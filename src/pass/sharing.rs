@@ -1,5 +1,5 @@
-//! Passes by which the pixels of a tile share the second vertices of their paths, after Bekaert,
-//! Sbert & Halton 2002, "Accelerating path tracing by re-using paths" (`docs/sharing.md`).
+//! Passes by which the pixels of a tile share the second vertices of their paths: Bekaert, Sbert &
+//! Halton 2002, "Accelerating path tracing by re-using paths" (`docs/shading.md`).
 
 use super::{
     kernel::{Dispatch, Domain, Kernel},
@@ -46,18 +46,21 @@ pub fn connect_and_share(settings: &PassSettings, wave: &Wave) -> Vec<Dispatch> 
     let constants = [&surfaces.constants()[..], &[edge]].concat();
     let pixels = tile_edge * tile_edge;
     let mut wave = Wave { to_lamps: 1, total_shadow_rays: pixels, ..*wave };
-    let mut order = Vec::new();
+    let mut order =
+        vec![Dispatch { kernel: Kernel::new("offer", Domain::Paths, &constants), wave }];
     for first in (0..pixels).step_by(SHADOW_RAYS_PER_GROUP as usize) {
         wave.first_shadow_ray = first;
         wave.shadow_ray_count = SHADOW_RAYS_PER_GROUP.min(pixels - first);
         for kernel in [
             Kernel::new("connect", Domain::Paths, &constants),
             traversal.shadow(incoherent, surfaces),
-            Kernel::new("weigh", Domain::Paths, &[]),
+            Kernel::new("admit", Domain::Paths, &[]),
         ] {
             order.push(Dispatch { kernel, wave });
         }
     }
-    order.push(Dispatch { kernel: Kernel::new("share", Domain::Paths, &[edge]), wave });
+    for shader in ["weigh", "share"] {
+        order.push(Dispatch { kernel: Kernel::new(shader, Domain::Paths, &[edge]), wave });
+    }
     order
 }

@@ -10,8 +10,7 @@ use crate::{
         bindings::{WAVE, wave},
         constants::WORKGROUP_SIZE,
         structs::{
-            Connection, FirstVertex, Hit, PathState, Ray, SecondVertex, ShadowRay, Surface,
-            TileWeight,
+            Connection, FirstVertex, Hit, Offer, PathState, Ray, SecondVertex, ShadowRay, Surface,
         },
     },
 };
@@ -35,8 +34,10 @@ pub struct WaveBuffers {
     surfaces: Buffer,
     first_vertices: Buffer,
     second_vertices: Buffer,
+    offers: Buffer,
+    offer_weights: Buffer,
     connections: Buffer,
-    tile_weights: Buffer,
+    seen: Buffer,
 }
 
 impl WaveBuffers {
@@ -84,7 +85,9 @@ impl WaveBuffers {
         let first_vertices = make("first vertices", kept, size_of::<FirstVertex>())?;
         let second_vertices = make("second vertices", kept, size_of::<SecondVertex>())?;
         let connections = make("connections", kept * tile_pixels.max(1), size_of::<Connection>())?;
-        let tile_weights = make("tile weights", kept, size_of::<TileWeight>())?;
+        let offers = make("offers", kept, size_of::<Offer>())?;
+        let offer_weights = make("offer weights", kept, size_of::<f32>())?;
+        let seen = make("seen offers", kept, size_of::<[u32; 2]>())?;
         let paths = make("paths", paths, size_of::<PathState>())?;
         let bound = [
             (wave::RAYS, &rays),
@@ -99,10 +102,14 @@ impl WaveBuffers {
             (wave::FIRST_VERTICES, &first_vertices),
             (wave::FIRST_VERTEX_TEXELS, &first_vertices),
             (wave::SECOND_VERTICES, &second_vertices),
+            (wave::OFFERS, &offers),
+            (wave::OFFER_TEXELS, &offers),
+            (wave::OFFER_WEIGHTS, &offer_weights),
+            (wave::OFFER_WEIGHT_TEXELS, &offer_weights),
             (wave::CONNECTIONS, &connections),
             (wave::CONNECTION_TEXELS, &connections),
-            (wave::TILE_WEIGHTS, &tile_weights),
-            (wave::TILE_WEIGHT_TEXELS, &tile_weights),
+            (wave::SEEN, &seen),
+            (wave::SEEN_TEXELS, &seen),
         ];
         let set = DescriptorSet::new(device, &WAVE, &bound)?;
         Ok(Self {
@@ -116,8 +123,10 @@ impl WaveBuffers {
             surfaces,
             first_vertices,
             second_vertices,
+            offers,
+            offer_weights,
             connections,
-            tile_weights,
+            seen,
         })
     }
 
@@ -172,8 +181,10 @@ impl WaveBuffers {
             &self.surfaces,
             &self.first_vertices,
             &self.second_vertices,
+            &self.offers,
+            &self.offer_weights,
             &self.connections,
-            &self.tile_weights,
+            &self.seen,
         ]
         .map(|buffer| (buffer.name().to_owned(), buffer.size()))
         .into()

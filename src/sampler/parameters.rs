@@ -169,6 +169,8 @@ mod tests {
             "brdf-share=0",
             "cache=scene",
             "preset=loose",
+            "share-tiles=3",
+            "share-tiles=auto",
         ] {
             let error = parameters.set(wrong).unwrap_err().to_string();
             assert!(error.contains(&format!("--set {wrong}: expected")), "{error}");

@@ -269,14 +269,22 @@ binding_tables! {
         10 FIRST_VERTEX_TEXELS: texels Rgba32Uint;
         /// Second vertex of each path.
         11 SECOND_VERTICES: array SecondVertex;
-        /// Connections: pixel `k` of its tile with the second vertex of path `i` at `k · path_count + i`.
-        12 CONNECTIONS: array Connection;
+        /// What each path offers to the pixels of its tile.
+        12 OFFERS: array Offer;
+        /// Offers again, four texels each.
+        13 OFFER_TEXELS: texels Rgba32Uint;
+        /// Weight of each offer.
+        14 OFFER_WEIGHTS: array float;
+        /// Weights of offers again.
+        15 OFFER_WEIGHT_TEXELS: texels R32Float;
+        /// Connections of path `i` with the offer of pixel `k` of its tile at `k · path_count + i`.
+        16 CONNECTIONS: array Connection;
         /// Connections again, one texel each.
-        13 CONNECTION_TEXELS: texels Rgba32Float;
-        /// Weight of the second vertex of each path.
-        14 TILE_WEIGHTS: array TileWeight;
-        /// Weights again, one texel each.
-        15 TILE_WEIGHT_TEXELS: texels Rgba32Uint;
+        17 CONNECTION_TEXELS: texels Rgba32Float;
+        /// Bits of the pixels of the tile whose offers each path sees.
+        18 SEEN: array uvec2;
+        /// These bits again.
+        19 SEEN_TEXELS: texels Rg32Uint;
     }
 
     /// Set 3: the film, which grows by every wave.

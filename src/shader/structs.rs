@@ -253,24 +253,32 @@ structs! {
         density_ratio: float,
     }
 
-    /// Connection of the second vertex of one path with the first vertex of another.
+    /// Second vertex of a path as the other pixels of its tile see it.
+    struct Offer {
+        /// Point on the surface, metres.
+        position: vec3,
+        /// Material index, or `NO_MATERIAL` if there is nothing to share.
+        material: uint,
+        /// Unit normal of the triangle on the side of its own first vertex.
+        geometric_normal: vec3,
+        /// [`SecondVertex::density_ratio`].
+        density_ratio: float,
+        /// Unit shading normal.
+        shading_normal: vec3,
+        /// Zero; pads a texel of four words.
+        reserved: float,
+        /// Radiance of its diffuse base, without the factor that depends on the direction to the viewer.
+        radiance: vec3,
+        /// Zero; pads the last of four texels of four words.
+        padding: float,
+    }
+
+    /// Connection of the first vertex of a path with the second vertex of another.
     struct Connection {
         /// Light that it carries, if nothing is in between and no other path came to this place.
         contribution: vec3,
         /// Density of the BRDF's sampling at the first vertex, per square metre at the second.
         density: float,
-    }
-
-    /// Weight of a second vertex in the balance heuristic over the first vertices of its tile.
-    struct TileWeight {
-        /// [`SecondVertex::density_ratio`].
-        density_ratio: float,
-        /// Sum of [`Connection::density`] over those of which nothing is in the way.
-        density: float,
-        /// Bits of the pixels of the tile that see it, 0 to 31.
-        seen_low: uint,
-        /// Bits 32 to 63.
-        seen_high: uint,
     }
 
     /// Totals over the film since the host last cleared them.
