@@ -178,6 +178,10 @@ fn the_same_seed_gives_the_same_bits_however_samples_are_grouped() {
     // Direct light has no second vertices.
     let direct = |edge| render(&scene, settings(Sampler::Mis, edge, 1), &[2]);
     assert!(direct("off") == direct("8"));
+    // Nor does copper have a diffuse base.
+    let copper = scenes::room(vec![scenes::copper(0.4)]);
+    let bounced = |edge| render(&copper, settings(Sampler::Mis, edge, 2), &[2]);
+    assert!(bounced("off") == bounced("8"));
     let bounced = |edge| render(&scene, settings(Sampler::Mis, edge, 2), &[2]);
     assert!(bounced("off") != bounced("8"));
 }
@@ -211,7 +215,7 @@ mod enumeration {
     /// Probability with which a path goes to a place, if it is visible.
     const PROBABILITY: [[f64; PLACES]; FIRST] =
         [[0.4, 0.3, 0.2, 0.1], [0.1, 0.1, 0.2, 0.6], [0.25, 0.25, 0.25, 0.25]];
-    /// What the weights take for these: any positive numbers.
+    /// Any positive numbers that the weights take for these.
     const DENSITY: [[f64; PLACES]; FIRST] =
         [[0.5, 0.2, 0.2, 0.3], [0.2, 0.3, 0.1, 0.9], [0.1, 0.2, 0.3, 0.4]];
     const VISIBLE: [[bool; PLACES]; FIRST] =

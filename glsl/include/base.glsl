@@ -7,8 +7,7 @@
 #include "brdf.glsl"
 
 bool has_base(Material material) {
-    return is_kind(material, MATERIAL_DIFFUSE) || is_kind(material, MATERIAL_PLASTIC)
-        || is_kind(material, MATERIAL_PRINCIPLED);
+    return ((1u << material.kind) & KINDS_WITH_BASE) != 0u;
 }
 
 // Factor of the base by the cosine of the outgoing direction.

@@ -3,7 +3,7 @@
 use super::{
     geometry::{Schedule, Traversal},
     kernel::{Dispatch, Domain, Kernel},
-    sharing,
+    sharing::Sharing,
     steps::Steps,
     surfaces::Surfaces,
 };
@@ -28,7 +28,7 @@ pub struct PassSettings {
     pub aovs: u32,
     /// First vertex at which russian roulette may end a path.
     pub roulette_vertex: u32,
-    /// Edge of the tiles whose pixels share second vertices, one of [`sharing::TILE_EDGES`].
+    /// Edge of the tiles whose pixels share second vertices: 2, 4, 8, or 1 for none.
     pub tile_edge: u32,
     /// Specialization by the surfaces of the scene.
     pub surfaces: Surfaces,
@@ -45,11 +45,12 @@ pub fn wave_order(
     wave: Wave,
     vertices: u32,
 ) -> Vec<Dispatch> {
-    let PassSettings { surfaces, traversal, incoherent, .. } = *settings;
+    let PassSettings { surfaces, traversal, incoherent, tile_edge, .. } = *settings;
     let constants = surfaces.constants();
     // Training teaches the visibility of the environment; other light is not needed.
     let is_lit = wave.is_training == 0;
-    let shares = is_lit && settings.tile_edge > 1 && vertices > 1;
+    let sharing = Sharing { tile_edge, surfaces, traversal, schedule: incoherent };
+    let shares = is_lit && tile_edge > 1 && vertices > 1;
     let mut order = Vec::new();
     let mut add = |kernel: Kernel, wave: &Wave| order.push(Dispatch { kernel, wave: *wave });
     let mut wave = Wave { aovs: settings.aovs, ..wave };
@@ -69,7 +70,7 @@ pub fn wave_order(
                 add(Kernel::new("emit", Domain::Paths, &constants), &wave);
             }
             if shares && vertex == 1 {
-                add(sharing::keep_second(settings), &wave);
+                add(sharing.keep_second(), &wave);
             }
             if surfaces.lamp_count > 0 {
                 let to_lamps = Wave {
@@ -84,7 +85,7 @@ pub fn wave_order(
                 add(Kernel::new("gather", Domain::Paths, &[]), &to_lamps);
                 if shares
                     && vertex == 1
-                    && let Some(kernel) = sharing::gather_base(settings)
+                    && let Some(kernel) = sharing.gather_base()
                 {
                     add(kernel, &to_lamps);
                 }
@@ -112,7 +113,7 @@ pub fn wave_order(
             add(Kernel::new("gather", Domain::Paths, &[]), &wave);
             if shares
                 && vertex == 1
-                && let Some(kernel) = sharing::gather_base(settings)
+                && let Some(kernel) = sharing.gather_base()
             {
                 add(kernel, &wave);
             }
@@ -128,26 +129,26 @@ pub fn wave_order(
             add(Kernel::new("features", Domain::Pixels, &constants), &wave);
         }
         if shares && vertex == 0 {
-            add(sharing::keep_first(settings), &wave);
+            add(sharing.keep_first(), &wave);
         }
         if vertex + 1 < vertices {
             let guided = if wave.total_shadow_rays > 0 { steps.bounce(&wave) } else { None };
             add(guided.unwrap_or_else(|| bounce(settings, false)), &wave);
         }
         if shares && vertex == 1 && vertex + 1 < vertices {
-            add(sharing::keep_third(settings), &wave);
+            add(sharing.keep_third(), &wave);
         }
     }
     let ends_at_second = shares && vertices == 2;
     let follows_last = is_lit && (surfaces.emits() || surfaces.has_specular());
     if ends_at_second && !follows_last {
-        add(sharing::keep_third(settings), &wave);
+        add(sharing.keep_third(), &wave);
     }
     if follows_last {
         // Follow the last vertices to light that is not sampled, or not sampled alone.
         add(bounce(settings, !surfaces.emits()), &wave);
         if ends_at_second {
-            add(sharing::keep_third(settings), &wave);
+            add(sharing.keep_third(), &wave);
         }
         wave = Wave { vertex: vertices, shadow_ray_count: 0, total_shadow_rays: 0, ..wave };
         wave.first_shadow_ray = 0;
@@ -158,7 +159,7 @@ pub fn wave_order(
         add(Kernel::new("gather", Domain::Paths, &[]), &wave);
     }
     if shares {
-        for Dispatch { kernel, wave } in sharing::connect_and_share(settings, &wave) {
+        for Dispatch { kernel, wave } in sharing.connect_and_share(&wave) {
             add(kernel, &wave);
         }
     }

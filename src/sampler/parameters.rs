@@ -82,11 +82,6 @@ impl Parameters {
         )))
     }
 
-    /// Edge of the tiles whose pixels share second vertices of paths of `depth` vertices; 1 for none.
-    pub fn tile_edge_of(&self, depth: u32) -> u32 {
-        if depth > 1 { self.share_tiles.unwrap_or(1) } else { 1 }
-    }
-
     /// Every key.
     pub fn keys() -> Vec<&'static str> {
         let mut keys: Vec<_> = KNOBS

@@ -269,7 +269,7 @@ binding_tables! {
         10 FIRST_VERTEX_TEXELS: texels Rgba32Uint;
         /// Second vertex of each path.
         11 SECOND_VERTICES: array SecondVertex;
-        /// What each path offers to the pixels of its tile.
+        /// Offer of each path to the pixels of its tile.
         12 OFFERS: array Offer;
         /// Offers again, four texels each.
         13 OFFER_TEXELS: texels Rgba32Uint;

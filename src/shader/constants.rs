@@ -179,6 +179,9 @@ constants! {
     /// Bits `1 << kind` of the specular kinds, at which no light is sampled.
     SPECULAR_KINDS = 1 << MATERIAL_MIRROR | 1 << MATERIAL_DIELECTRIC | 1 << MATERIAL_THIN_DIELECTRIC;
 
+    /// Bits `1 << kind` of the kinds with a diffuse base, whose light the pixels of a tile can share.
+    KINDS_WITH_BASE = 1 << MATERIAL_DIFFUSE | 1 << MATERIAL_PLASTIC | 1 << MATERIAL_PRINCIPLED;
+
     // Lamps.
     /// Marks a lamp without a surface in [`LampChoice::source`](super::structs::LampChoice::source).
     LAMP_BIT = 1 << 31;
