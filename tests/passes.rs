@@ -16,8 +16,8 @@ use fenestra::{
     },
     shader::{
         constants::{
-            AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, SURFACES_EMITTING, SURFACES_SPECULAR,
-            SURFACES_TEXTURED,
+            AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, MATERIAL_PLASTIC, SURFACES_EMITTING,
+            SURFACES_SPECULAR, SURFACES_TEXTURED,
         },
         spirv::PASSES,
         structs::Wave,
@@ -34,6 +34,7 @@ fn settings(shadow_rays: u32, depth: u32) -> PassSettings {
         depth,
         aovs: AOV_ALBEDO | AOV_CACHE_ENTRIES | AOV_GUIDE_CELL,
         roulette_vertex: 8,
+        tile_edge: 1,
         surfaces: Surfaces::default(),
         traversal: Traversal { page_count: 1, page_shift: 20, is_instanced: false },
         incoherent: Schedule { rays_per_invocation: 16, refill_lanes: 3 },
@@ -160,7 +161,47 @@ fn shown() -> Vec<(&'static str, Vec<Dispatch>)> {
         ("visibility", order(&deep, &visibility(CacheScope::Hit, 2), wave(0, 1))),
         ("guided", order(&deep, &guided(&deep), wave(0, 1))),
         ("one vertex, textures, lamps", order(&furnished, &mis(), wave(0, 1))),
+        ("shared paths", order(&shared(2), &mis(), wave(0, 1))),
     ]
+}
+
+/// Settings of a render of plastic in which the pixels of a tile share paths.
+fn shared(depth: u32) -> PassSettings {
+    let surfaces = Surfaces { material_kinds: 1 << MATERIAL_PLASTIC, ..Surfaces::default() };
+    PassSettings { tile_edge: 2, surfaces, ..settings(2, depth) }
+}
+
+#[test]
+fn paths_are_shared_from_the_second_vertex_on() {
+    let listed = |settings: &PassSettings, wave| names(&order(settings, &mis(), wave));
+    let start = "camera trace sample shadow gather features keep_first bounce trace keep_second sample \
+                 shadow gather gather_base";
+    let end = "offer connect shadow admit weigh share accumulate";
+    assert_eq!(listed(&shared(2), wave(0, 1)), format!("{start} keep_third {end}"));
+    assert_eq!(
+        listed(&shared(3), wave(0, 1)),
+        format!("{start} bounce keep_third trace sample shadow gather {end}")
+    );
+    // Diffuse surfaces have no rest, and what other lamps bring is parted too.
+    let diffuse = PassSettings { surfaces: Surfaces::default(), ..shared(2) };
+    assert!(!listed(&diffuse, wave(0, 1)).contains("gather_base"));
+    let lit = PassSettings { surfaces: everything(), ..shared(2) };
+    assert!(
+        listed(&lit, wave(0, 1)).contains("emit keep_second sample_lamps shadow gather sample")
+    );
+    assert!(listed(&lit, wave(0, 1)).contains("bounce keep_third trace emit gather offer"));
+    // Sixteen connections in groups of eight.
+    let larger = order(&PassSettings { tile_edge: 4, ..shared(2) }, &mis(), wave(0, 1));
+    let rays: Vec<_> = larger
+        .iter()
+        .filter(|dispatch| dispatch.kernel.shader == "connect")
+        .map(|dispatch| (dispatch.wave.first_shadow_ray, dispatch.wave.shadow_ray_count))
+        .collect();
+    assert_eq!(rays, [(0, 8), (8, 8)]);
+    let training = Wave { is_training: 1, ..wave(0, 1) };
+    for shares_nothing in [listed(&shared(1), wave(0, 1)), listed(&shared(2), training)] {
+        assert!(!shares_nothing.contains("keep") && !shares_nothing.contains("share"));
+    }
 }
 
 /// A scene with textures, glass, an emitting surface and a lamp.

@@ -10,6 +10,7 @@ pub mod lamps;
 pub mod order;
 pub mod runner;
 pub mod scene_buffers;
+pub mod sharing;
 pub mod steps;
 pub mod surfaces;
 pub mod technique;

@@ -3,6 +3,7 @@
 use super::{
     geometry::{Schedule, Traversal},
     kernel::{Dispatch, Domain, Kernel},
+    sharing::Sharing,
     steps::Steps,
     surfaces::Surfaces,
 };
@@ -27,6 +28,8 @@ pub struct PassSettings {
     pub aovs: u32,
     /// First vertex at which russian roulette may end a path.
     pub roulette_vertex: u32,
+    /// Edge of the tiles whose pixels share second vertices: 2, 4, 8, or 1 for none.
+    pub tile_edge: u32,
     /// Specialization by the surfaces of the scene.
     pub surfaces: Surfaces,
     /// Specialization of the passes that traverse.
@@ -42,13 +45,15 @@ pub fn wave_order(
     wave: Wave,
     vertices: u32,
 ) -> Vec<Dispatch> {
-    let PassSettings { surfaces, traversal, incoherent, .. } = *settings;
+    let PassSettings { surfaces, traversal, incoherent, tile_edge, .. } = *settings;
     let constants = surfaces.constants();
     // Training teaches the visibility of the environment; other light is not needed.
     let is_lit = wave.is_training == 0;
     let follows_last = is_lit && surfaces.emits();
     let escape = steps.escape();
     let gather = || Kernel::new("gather", Domain::Paths, escape.as_deref().unwrap_or_default());
+    let sharing = Sharing { tile_edge, surfaces, traversal, schedule: incoherent };
+    let shares = is_lit && tile_edge > 1 && vertices > 1;
     let mut order = Vec::new();
     let mut add = |kernel: Kernel, wave: &Wave| order.push(Dispatch { kernel, wave: *wave });
     let mut wave = Wave { aovs: settings.aovs, ..wave };
@@ -70,6 +75,9 @@ pub fn wave_order(
             if surfaces.emits() {
                 add(Kernel::new("emit", Domain::Paths, &constants), &wave);
             }
+            if shares && vertex == 1 {
+                add(sharing.keep_second(), &wave);
+            }
             if surfaces.lamp_count > 0 {
                 let rays = rays_to_lamps(wave.total_shadow_rays);
                 for ray in 0..rays {
@@ -83,6 +91,12 @@ pub fn wave_order(
                     add(Kernel::new("sample_lamps", Domain::Paths, &constants), &to_lamps);
                     add(traversal.shadow(incoherent, surfaces), &to_lamps);
                     add(Kernel::new("gather", Domain::Paths, &[]), &to_lamps);
+                    if shares
+                        && vertex == 1
+                        && let Some(kernel) = sharing.gather_base()
+                    {
+                        add(kernel, &to_lamps);
+                    }
                 }
             }
         }
@@ -106,6 +120,12 @@ pub fn wave_order(
                 }
             }
             add(gather(), &wave);
+            if shares
+                && vertex == 1
+                && let Some(kernel) = sharing.gather_base()
+            {
+                add(kernel, &wave);
+            }
             if wave.first_shadow_ray + wave.shadow_ray_count >= wave.total_shadow_rays {
                 break;
             }
@@ -117,14 +137,28 @@ pub fn wave_order(
         if vertex == 0 && wave.aovs & FEATURES != 0 && wave.is_training == 0 {
             add(Kernel::new("features", Domain::Pixels, &constants), &wave);
         }
+        if shares && vertex == 0 {
+            add(sharing.keep_first(), &wave);
+        }
         if vertex + 1 < vertices {
             let guided = if wave.total_shadow_rays > 0 { steps.bounce(&wave) } else { None };
             add(guided.unwrap_or_else(|| bounce(settings, false)), &wave);
         }
+        if shares && vertex == 1 && vertex + 1 < vertices {
+            add(sharing.keep_third(), &wave);
+        }
     }
-    if follows_last || is_lit && surfaces.has_specular() {
+    let ends_at_second = shares && vertices == 2;
+    let goes_on = follows_last || is_lit && surfaces.has_specular();
+    if ends_at_second && !goes_on {
+        add(sharing.keep_third(), &wave);
+    }
+    if goes_on {
         // Follow the last vertices to light that is not sampled, or not sampled alone.
         add(bounce(settings, !surfaces.emits()), &wave);
+        if ends_at_second {
+            add(sharing.keep_third(), &wave);
+        }
         wave.arriving_shadow_rays = wave.bounce_rays * wave.total_shadow_rays;
         wave = Wave { vertex: vertices, shadow_ray_count: 0, total_shadow_rays: 0, ..wave };
         wave.first_shadow_ray = 0;
@@ -133,6 +167,11 @@ pub fn wave_order(
             add(Kernel::new("emit", Domain::Paths, &constants), &wave);
         }
         add(gather(), &wave);
+    }
+    if shares {
+        for Dispatch { kernel, wave } in sharing.connect_and_share(&wave) {
+            add(kernel, &wave);
+        }
     }
     add(Kernel::new("accumulate", Domain::Pixels, &[]), &wave);
     order

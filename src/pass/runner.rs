@@ -52,9 +52,16 @@ impl Runner {
         demand: PathDemand,
     ) -> Result<Self> {
         let film = FilmBuffers::new(device, scene.window(), settings.aovs)?;
-        let rays = settings.shadow_rays.clamp(1, SHADOW_RAYS_PER_GROUP);
-        let waves =
-            WaveBuffers::new(device, film.padded_pixels(), rays, demand, settings.surfaces)?;
+        let tile_pixels = settings.tile_edge * settings.tile_edge;
+        let rays = settings.shadow_rays.max(tile_pixels).clamp(1, SHADOW_RAYS_PER_GROUP);
+        let waves = WaveBuffers::new(
+            device,
+            film.padded_pixels(),
+            rays,
+            demand,
+            settings.surfaces,
+            tile_pixels,
+        )?;
         Ok(Self {
             device: Arc::clone(device),
             scene,

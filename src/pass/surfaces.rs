@@ -4,8 +4,9 @@ use super::texture_buffers::TextureAccess;
 use crate::{
     brdf::{Material, material::MaterialKind},
     shader::constants::{
-        CONSTANT_MATERIAL_KINDS, CONSTANT_SURFACES, SURFACES_EMITTING, SURFACES_INSTANCED,
-        SURFACES_ONE_SIDED, SURFACES_PASSING, SURFACES_SPECULAR, SURFACES_TEXTURED,
+        CONSTANT_MATERIAL_KINDS, CONSTANT_SURFACES, KINDS_WITH_BASE, SURFACES_EMITTING,
+        SURFACES_INSTANCED, SURFACES_ONE_SIDED, SURFACES_PASSING, SURFACES_SPECULAR,
+        SURFACES_TEXTURED,
     },
 };
 
@@ -43,6 +44,11 @@ impl Surfaces {
     /// True if some material emits light.
     pub fn emits(&self) -> bool {
         self.features & SURFACES_EMITTING != 0
+    }
+
+    /// True if some material has a diffuse base, whose light the pixels of a tile can share.
+    pub fn has_base(&self) -> bool {
+        self.material_kinds & KINDS_WITH_BASE != 0
     }
 
     /// True if paths meet surfaces at which no light is sampled.

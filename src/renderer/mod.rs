@@ -55,12 +55,16 @@ impl Renderer {
         settings.check(film_size)?;
         assert_eq!(window_of(&settings, scene), buffers.window(), "buffers belong to one window");
 
+        let surfaces = buffers.surfaces();
+        let shares = settings.depth > 1 && surfaces.has_base();
+        let tile_edge = settings.parameters.share_tiles.filter(|_| shares).unwrap_or(1);
         let passes = PassSettings {
             shadow_rays: settings.shadow_rays,
             depth: settings.depth,
             aovs: aov_bits(&settings.aovs),
             roulette_vertex: settings.roulette_vertex,
-            surfaces: buffers.surfaces(),
+            tile_edge,
+            surfaces,
             traversal: buffers.geometry().traversal(),
             incoherent: Schedule::incoherent(device.capabilities()),
         };

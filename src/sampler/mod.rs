@@ -143,7 +143,11 @@ impl Sampler {
 
     /// Returns the parameters relevant to the sampler by key, for metadata and statistics.
     pub fn describe(self, parameters: &Parameters) -> BTreeMap<String, String> {
-        self.room().describe(parameters)
+        let mut named = self.room().describe(parameters);
+        if let Some(edge) = parameters.share_tiles {
+            named.insert("share-tiles".to_owned(), edge.to_string());
+        }
+        named
     }
 
     /// Memory per path in flight.

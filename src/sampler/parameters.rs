@@ -11,6 +11,8 @@ use crate::error::{Error, Result};
 /// Parameters of the samplers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
+    /// `share-tiles`: edge of the tiles whose pixels share second vertices; `None` is `off`.
+    pub share_tiles: Option<u32>,
     /// `candidates`: directions to choose each shadow ray of `ris` or `guided` from; `None` is `auto`.
     pub candidates: Option<u32>,
     /// `compensation`: true if `mis` and what `guided` falls back to draw directions of the environment
@@ -70,7 +72,15 @@ const KNOBS: &[Knob<Parameters>] = &[
         },
         get: |_| String::new(),
     },
+    Knob {
+        key: "share-tiles",
+        set: |parameters, value| knob::choice(&mut parameters.share_tiles, value, SHARE_TILES),
+        get: |parameters| knob::name_of(&parameters.share_tiles, SHARE_TILES),
+    },
 ];
+
+const SHARE_TILES: &[(&str, Option<u32>)] =
+    &[("off", None), ("2", Some(2)), ("4", Some(4)), ("8", Some(8))];
 
 impl Parameters {
     /// Sets one parameter from `key=value`. Returns [`Error::Usage`] for a value out of range, or
@@ -174,6 +184,8 @@ mod tests {
             "brdf-share=0",
             "cache=scene",
             "preset=loose",
+            "share-tiles=3",
+            "share-tiles=auto",
         ] {
             let error = parameters.set(wrong).unwrap_err().to_string();
             assert!(error.contains(&format!("--set {wrong}: expected")), "{error}");

@@ -271,6 +271,28 @@ binding_tables! {
         8 HIT_SURFACES: array Surface;
         /// Instance that each path has hit, in scenes with instances.
         9 HIT_INSTANCES: array uint;
+        /// First vertex of each path, while pixels share paths.
+        10 FIRST_VERTICES: array FirstVertex;
+        /// First vertices again, six texels each.
+        11 FIRST_VERTEX_TEXELS: texels Rgba32Uint;
+        /// Second vertex of each path.
+        12 SECOND_VERTICES: array SecondVertex;
+        /// Offer of each path to the pixels of its tile.
+        13 OFFERS: array Offer;
+        /// Offers again, four texels each.
+        14 OFFER_TEXELS: texels Rgba32Uint;
+        /// Weight of each offer.
+        15 OFFER_WEIGHTS: array float;
+        /// Weights of offers again.
+        16 OFFER_WEIGHT_TEXELS: texels R32Float;
+        /// Connections of path `i` with the offer of pixel `k` of its tile at `k · path_count + i`.
+        17 CONNECTIONS: array Connection;
+        /// Connections again, one texel each.
+        18 CONNECTION_TEXELS: texels Rgba32Float;
+        /// Bits of the pixels of the tile whose offers each path sees.
+        19 SEEN: array uvec2;
+        /// These bits again.
+        20 SEEN_TEXELS: texels Rg32Uint;
     }
 
     /// Set 3: the film, which grows by every wave.

@@ -63,6 +63,10 @@ constants! {
     /// Candidates of `sample_lamps` for its shadow ray.
     CONSTANT_LAMP_CANDIDATES = 22;
 
+    // Specialization constant of the passes that share paths.
+    /// Edge of a tile, pixels: 2, 4 or 8.
+    CONSTANT_TILE_EDGE = 27;
+
     // Specialization constants of `multiply_lobes`.
     /// Lobes of the environment.
     CONSTANT_ENVIRONMENT_LOBES = 32;
@@ -187,6 +191,9 @@ constants! {
     MATERIAL_THIN_DIELECTRIC = 7;
     /// Bits `1 << kind` of the specular kinds, at which no light is sampled.
     SPECULAR_KINDS = 1 << MATERIAL_MIRROR | 1 << MATERIAL_DIELECTRIC | 1 << MATERIAL_THIN_DIELECTRIC;
+
+    /// Bits `1 << kind` of the kinds with a diffuse base, whose light the pixels of a tile can share.
+    KINDS_WITH_BASE = 1 << MATERIAL_DIFFUSE | 1 << MATERIAL_PLASTIC | 1 << MATERIAL_PRINCIPLED;
 
     // Lamps.
     /// Marks a lamp without a surface in [`LampChoice::source`](super::structs::LampChoice::source).

@@ -203,6 +203,86 @@ structs! {
         rays_traced: uint,
     }
 
+    /// First vertex of a path, to be connected with the second vertices of its tile.
+    struct FirstVertex {
+        /// Point on the surface, metres.
+        position: vec3,
+        /// Material index, or `NO_MATERIAL` where no light is sampled.
+        material: uint,
+        /// Unit normal of the triangle on the viewer's side.
+        geometric_normal: vec3,
+        /// [`Surface::alpha`], in scenes with textures.
+        alpha: float,
+        /// Unit shading normal.
+        shading_normal: vec3,
+        /// [`Surface::metallic`], in scenes with textures.
+        metallic: float,
+        /// Unit vector to the viewer.
+        outgoing: vec3,
+        /// [`PathState::throughput`] of the path before it bounces here.
+        throughput: vec3,
+        /// [`Surface::reflectance`], in scenes with textures.
+        reflectance: vec3,
+        /// Zero; pads the last of six texels of four words.
+        reserved: vec3,
+    }
+
+    /// Second vertex of a path, offered to the other pixels of its tile.
+    struct SecondVertex {
+        /// Point on the surface, metres.
+        position: vec3,
+        /// Unit normal of the triangle on the side of the first vertex.
+        geometric_normal: vec3,
+        /// Unit shading normal.
+        shading_normal: vec3,
+        /// Unit vector to the first vertex.
+        outgoing: vec3,
+        /// [`PathState::throughput`] of the path up to here.
+        throughput: vec3,
+        /// [`PathState::radiance`] of the path up to here.
+        radiance: vec3,
+        /// Direct light that its diffuse base reflects, times `scale`.
+        base: vec3,
+        /// Direct light that it reflects, times `scale`.
+        direct: vec3,
+        /// Share of the diffuse base in what it reflects of the path's next ray.
+        bounce_share: vec3,
+        /// Material index.
+        material: uint,
+        /// Throughput with which the path goes on instead; 0 if the vertex is not shared.
+        scale: float,
+        /// Density of the BRDF's sampling over that with which the path came here.
+        density_ratio: float,
+    }
+
+    /// Second vertex of a path as the other pixels of its tile see it.
+    struct Offer {
+        /// Point on the surface, metres.
+        position: vec3,
+        /// Material index, or `NO_MATERIAL` if there is nothing to share.
+        material: uint,
+        /// Unit normal of the triangle on the side of its own first vertex.
+        geometric_normal: vec3,
+        /// [`SecondVertex::density_ratio`].
+        density_ratio: float,
+        /// Unit shading normal.
+        shading_normal: vec3,
+        /// Zero; pads a texel of four words.
+        reserved: float,
+        /// Radiance of its diffuse base, without the factor that depends on the direction to the viewer.
+        radiance: vec3,
+        /// Zero; pads the last of four texels of four words.
+        padding: float,
+    }
+
+    /// Connection of the first vertex of a path with the second vertex of another.
+    struct Connection {
+        /// Light that it carries, if nothing is in between and no other path came to this place.
+        contribution: vec3,
+        /// Density of the BRDF's sampling at the first vertex, per square metre at the second.
+        density: float,
+    }
+
     /// Totals over the film since the host last cleared them.
     struct Counters {
         /// Camera rays.

@@ -1,0 +1,48 @@
+// Diffuse base of the BRDF at a second vertex: the part that its light has in all directions but for a
+// factor. value = base_view(outgoing) * base_part(incident) + rest, and the rest is not negative.
+
+#ifndef BASE_GLSL
+#define BASE_GLSL
+
+#include "brdf.glsl"
+
+bool has_base(Material material) {
+    return ((1u << material.kind) & KINDS_WITH_BASE) != 0u;
+}
+
+// Factor of the base by the cosine of the outgoing direction.
+float base_view(Material material, float cosine) {
+    if (is_kind(material, MATERIAL_PLASTIC)) {
+        return cosine_table(material.table_offset + PLASTIC_TRANSMISSION_OFFSET, 1u, cosine);
+    }
+    return 1.0;
+}
+
+// Base by the cosine of the incident direction, 1/sr.
+vec3 base_part(Material material, float cosine) {
+    float factor = 1.0;
+    if (is_kind(material, MATERIAL_PLASTIC)) {
+        factor = cosine_table(material.table_offset + PLASTIC_TRANSMISSION_OFFSET, 1u, cosine);
+    } else if (is_kind(material, MATERIAL_PRINCIPLED)) {
+        // Least of 1 - F over the outgoing directions: they are at most 90 degrees + theta away, and so
+        // at most half of that from the half vector.
+        float sine = sqrt(max(0.0, 1.0 - cosine * cosine));
+        vec3 fresnel =
+            mix(material.eta, material.k, schlick_rise(sqrt(max(0.0, 0.5 * (1.0 - sine)))));
+        float strongest = max(fresnel.r, max(fresnel.g, fresnel.b));
+        factor = (1.0 - material.ior) * max(0.0, 1.0 - strongest);
+    }
+    return factor / PI * material.reflectance;
+}
+
+// Share of the base in what the BRDF reflects from one direction into another.
+vec3 base_share(Material material, vec3 outgoing_local, vec3 incident_local) {
+    if (is_kind(material, MATERIAL_DIFFUSE)) {
+        return vec3(1.0);
+    }
+    vec3 value = brdf_evaluate(material, outgoing_local, incident_local);
+    vec3 base = base_view(material, outgoing_local.z) * base_part(material, incident_local.z);
+    return mix(vec3(0.0), base / value, greaterThan(value, vec3(0.0)));
+}
+
+#endif

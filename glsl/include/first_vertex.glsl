@@ -1,0 +1,54 @@
+// First vertices of paths, kept while their hits are overwritten.
+
+#ifndef FIRST_VERTEX_GLSL
+#define FIRST_VERTEX_GLSL
+
+#include "brdf.glsl"
+#include "frame.glsl"
+#include "load.glsl"
+#include "surfaces.glsl"
+
+TEXELS(first_vertex_texels)
+
+FirstVertex load_first_vertex(uint path) {
+    int texel = int(6u * path);
+    uvec4 first = texelFetch(first_vertex_texels, texel);
+    uvec4 second = texelFetch(first_vertex_texels, texel + 1);
+    uvec4 third = texelFetch(first_vertex_texels, texel + 2);
+    uvec4 fourth = texelFetch(first_vertex_texels, texel + 3);
+    uvec4 fifth = texelFetch(first_vertex_texels, texel + 4);
+    uint last = texelFetch(first_vertex_texels, texel + 5).x;
+    return FirstVertex(
+        uintBitsToFloat(first.xyz), first.w, uintBitsToFloat(second.xyz), uintBitsToFloat(second.w),
+        uintBitsToFloat(third.xyz), uintBitsToFloat(third.w), uintBitsToFloat(fourth.xyz),
+        uintBitsToFloat(uvec3(fourth.w, fifth.xy)), uintBitsToFloat(uvec3(fifth.zw, last)),
+        vec3(0.0));
+}
+
+// Material of a first vertex, as textures vary it.
+Material first_material(FirstVertex vertex) {
+    Material material = load_material(vertex.material);
+    if (IS_TEXTURED) {
+        material.reflectance = vertex.reflectance;
+        material.alpha = vertex.alpha;
+        material.ior = material.kind == MATERIAL_PRINCIPLED ? vertex.metallic : material.ior;
+    }
+    return material;
+}
+
+// BRDF of a first vertex in a direction, with the cosine and the path's throughput, and the density
+// of the BRDF's sampling; both 0 where no path goes.
+void evaluate_first(
+    FirstVertex vertex, Material material, Frame frame, vec3 outgoing_local, vec3 direction,
+    out vec3 throughput, out float pdf) {
+    vec3 incident_local = to_local(frame, direction);
+    vec3 value;
+    brdf_evaluate_and_pdf(material, outgoing_local, incident_local, value, pdf);
+    throughput = vertex.throughput * value * incident_local.z;
+    bool goes = pdf > 0.0 && dot(direction, vertex.geometric_normal) > 0.0
+        && max(throughput.r, max(throughput.g, throughput.b)) > 0.0;
+    throughput = goes ? throughput : vec3(0.0);
+    pdf = goes ? pdf : 0.0;
+}
+
+#endif

@@ -1,0 +1,36 @@
+// Notes which connections of every path meet nothing. Light through panes and surfaces that are not
+// opaque, which dim the ray, is left to the path itself.
+#version 460
+
+#include "load.glsl"
+#include "wave.glsl"
+
+READS(visibility)
+UPDATES(paths)
+UPDATES(seen)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    uint path_count = wave_path_count();
+    if (path >= path_count || load_hit_origin(path).material == NO_MATERIAL) {
+        return;
+    }
+    uint traced = 0u;
+    uint visible = 0u;
+    uint bits = 0u;
+    for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
+        uint ray = i * path_count + path;
+        vec3 contribution = load_shadow_ray(ray).contribution;
+        traced += contribution != vec3(0.0) ? 1u : 0u;
+        if (contribution == vec3(1.0) && visibility[ray] != 0u) {
+            visible += 1u;
+            bits |= 1u << i;
+        }
+    }
+    uint first = wave.first_shadow_ray;
+    seen[path] |= first < 32u ? uvec2(bits << first, 0u) : uvec2(0u, bits << (first - 32u));
+    paths[path].shadow_rays_traced += traced;
+    paths[path].shadow_rays_visible += visible;
+}

@@ -1,0 +1,93 @@
+// Connects the first vertex of every path with second vertices of some pixels of its tile, by a shadow
+// ray each.
+//
+// [Bekaert, Sbert & Halton 2002]: all paths of a tile are one sample of many techniques, the BRDFs
+// of its first vertices, weighted by the balance heuristic.
+#version 460
+
+#include "base.glsl"
+#include "bvh.glsl"
+#include "first_vertex.glsl"
+#include "frame.glsl"
+#include "load.glsl"
+#include "tile.glsl"
+#include "wave.glsl"
+
+TEXELS(offer_texels)
+WRITES(hits)
+WRITES(shadow_rays)
+WRITES(connections)
+WRITES(seen)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+// Squared distance below which vertices are not connected, square metres: its inverse is finite.
+const float LEAST_SQUARED_DISTANCE = 1.0e-18;
+
+Offer load_offer(uint path) {
+    int texel = int(4u * path);
+    uvec4 first = texelFetch(offer_texels, texel);
+    uvec4 second = texelFetch(offer_texels, texel + 1);
+    uvec4 third = texelFetch(offer_texels, texel + 2);
+    uvec4 fourth = texelFetch(offer_texels, texel + 3);
+    return Offer(
+        uintBitsToFloat(first.xyz), first.w, uintBitsToFloat(second.xyz), uintBitsToFloat(second.w),
+        uintBitsToFloat(third.xyz), 0.0, uintBitsToFloat(fourth.xyz), 0.0);
+}
+
+// Tests whether the shading normal of a second vertex looks the same from a direction: `trace.comp`
+// turns those that could not be seen. A little stricter, so that turned ones fail from all sides.
+bool keeps_normal(Offer offer, vec3 to_first, float cosine) {
+    return dot(offer.shading_normal, to_first)
+        > 1.01 * max(min(LEAST_SHADING_COSINE, cosine), 1.0e-6);
+}
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    uint path_count = wave_path_count();
+    if (path >= path_count) {
+        return;
+    }
+    FirstVertex first = load_first_vertex(path);
+    if (wave.first_shadow_ray == 0u) {
+        hits[path] = Hit(
+            first.position, first.material, first.geometric_normal, 0.0, first.shading_normal, 0u);
+        seen[path] = uvec2(0u);
+    }
+    if (first.material == NO_MATERIAL) {
+        return;
+    }
+    Material material = first_material(first);
+    Frame frame = frame_from_normal(first.shading_normal);
+    vec3 outgoing_local = to_local(frame, first.outgoing);
+    Tile tile = tile_of(path);
+    float offset = ray_offset();
+    for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
+        uint member = wave.first_shadow_ray + i;
+        Offer offer = load_offer(tile_path(tile, member));
+        vec3 to_second = offer.position - first.position;
+        float squared = dot(to_second, to_second);
+        vec3 direction = to_second * inversesqrt(max(squared, LEAST_SQUARED_DISTANCE));
+        float cosine = -dot(offer.geometric_normal, direction);
+        bool is_joined = offer.material != NO_MATERIAL && squared > LEAST_SQUARED_DISTANCE
+            && cosine > 0.0 && keeps_normal(offer, -direction, cosine);
+        vec3 throughput = vec3(0.0);
+        float pdf = 0.0;
+        if (is_joined) {
+            evaluate_first(first, material, frame, outgoing_local, direction, throughput, pdf);
+        }
+        vec3 contribution = vec3(0.0);
+        if (pdf > 0.0) {
+            float view = base_view(
+                load_material(offer.material), -dot(offer.shading_normal, direction));
+            contribution = throughput * offer.radiance * view;
+        }
+        // From solid angle at the first vertex to area at the second.
+        float geometry = cosine / max(squared, LEAST_SQUARED_DISTANCE);
+        connections[member * path_count + path] =
+            Connection(contribution * geometry, pdf * geometry);
+        vec3 end = moved_off_surface(offer.position, offer.geometric_normal, -direction, offset);
+        shadow_rays[i * path_count + path] =
+            ShadowRay(end - first.position, vec3(pdf > 0.0 ? 1.0 : 0.0));
+    }
+}

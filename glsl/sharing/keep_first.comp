@@ -1,0 +1,28 @@
+// Keeps the first vertices of the wave, before their paths go on, for the connections of their tiles.
+#version 460
+
+#include "hit_surface.glsl"
+#include "load.glsl"
+#include "wave.glsl"
+
+READS(paths)
+WRITES(first_vertices)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    if (path >= wave_path_count()) {
+        return;
+    }
+    Hit hit = load_hit(path);
+    if (hit.material == NO_MATERIAL) {
+        first_vertices[path].material = NO_MATERIAL;
+        return;
+    }
+    Material material = load_surface(path, hit.material);
+    first_vertices[path] = FirstVertex(
+        hit.position, hit.material, hit.geometric_normal, material.alpha, hit.shading_normal,
+        material.ior, -load_ray(path).direction, paths[path].throughput, material.reflectance,
+        vec3(0.0));
+}

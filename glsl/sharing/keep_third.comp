@@ -1,0 +1,36 @@
+// Parts the light of second vertices in two: direct light, gathered so far, and what their paths still
+// find, of which the base has its share by the direction of the next ray.
+#version 460
+
+#include "base.glsl"
+#include "frame.glsl"
+#include "hit_surface.glsl"
+#include "load.glsl"
+#include "wave.glsl"
+
+UPDATES(paths)
+UPDATES(second_vertices)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    if (path >= wave_path_count()) {
+        return;
+    }
+    SecondVertex second = second_vertices[path];
+    if (second.scale == 0.0) {
+        return;
+    }
+    Material material = load_surface(path, second.material);
+    second.direct = paths[path].radiance;
+    second.base = is_kind(material, MATERIAL_DIFFUSE) ? second.direct : second.base;
+    Ray ray = load_ray(path);
+    if (ray.is_active != 0u) {
+        Frame frame = frame_from_normal(second.shading_normal);
+        second.bounce_share = base_share(
+            material, to_local(frame, second.outgoing), to_local(frame, ray.direction));
+    }
+    second_vertices[path] = second;
+    paths[path].radiance = vec3(0.0);
+}

@@ -1,0 +1,31 @@
+// Sums up what every path offers to the pixels of its tile: the light that the diffuse base of its
+// second vertex reflects. Paths that found no light have nothing to offer, and nothing is traced to them.
+#version 460
+
+#include "base.glsl"
+#include "load.glsl"
+#include "wave.glsl"
+
+READS(paths)
+READS(second_vertices)
+WRITES(offers)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    if (path >= wave_path_count()) {
+        return;
+    }
+    SecondVertex second = second_vertices[path];
+    vec3 radiance = second.base + second.bounce_share * paths[path].radiance;
+    if (second.scale == 0.0 || radiance == vec3(0.0)) {
+        offers[path].material = NO_MATERIAL;
+        return;
+    }
+    Material material = load_material(second.material);
+    float view = base_view(material, dot(second.shading_normal, second.outgoing));
+    offers[path] = Offer(
+        second.position, second.material, second.geometric_normal, second.density_ratio,
+        second.shading_normal, 0.0, radiance / (second.scale * view), 0.0);
+}

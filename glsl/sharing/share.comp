@@ -1,0 +1,46 @@
+// Adds the light of all second vertices of the tile that its first vertex sees to every path, each by
+// its weight. What the rest of the BRDF reflects stays with its own path, and so does a second vertex
+// that its own first vertex does not see.
+#version 460
+
+#include "load.glsl"
+#include "tile.glsl"
+#include "wave.glsl"
+
+READS(second_vertices)
+READS(seen)
+TEXELS(connection_texels)
+TEXELS(offer_weight_texels)
+UPDATES(paths)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    uint path_count = wave_path_count();
+    if (path >= path_count) {
+        return;
+    }
+    vec3 radiance = paths[path].radiance;
+    SecondVertex second = second_vertices[path];
+    if (second.scale > 0.0) {
+        vec3 shared_light = texelFetch(offer_weight_texels, int(path)).x > 0.0
+            ? second.base + second.bounce_share * radiance
+            : vec3(0.0);
+        vec3 rest = second.direct + radiance - shared_light;
+        radiance = second.radiance + second.throughput * (rest / second.scale);
+    }
+    uvec2 seen_by_path = seen[path];
+    if (seen_by_path != uvec2(0u)) {
+        Tile tile = tile_of(path);
+        for (uint member = 0u; member < TILE_PIXELS; ++member) {
+            float weight =
+                texelFetch(offer_weight_texels, int(tile_path(tile, member))).x;
+            if (weight > 0.0 && is_seen(seen_by_path, member)) {
+                radiance += weight
+                    * texelFetch(connection_texels, int(member * path_count + path)).xyz;
+            }
+        }
+    }
+    paths[path].radiance = radiance;
+}

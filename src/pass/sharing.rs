@@ -1,0 +1,80 @@
+//! Passes by which the pixels of a tile share the second vertices of their paths: Bekaert, Sbert &
+//! Halton 2002, "Accelerating path tracing by re-using paths" (`docs/shading.md`).
+
+use super::{
+    geometry::{Schedule, Traversal},
+    kernel::{Dispatch, Domain, Kernel},
+    steps::SHADOW_RAYS_PER_GROUP,
+    surfaces::Surfaces,
+};
+use crate::shader::{
+    constants::{CONSTANT_TILE_EDGE, KINDS_WITH_BASE, MATERIAL_DIFFUSE},
+    structs::Wave,
+};
+
+/// Bits of the kinds of material that reflect more than their diffuse base (`glsl/include/base.glsl`).
+const WITH_BASE_AND_REST: u32 = KINDS_WITH_BASE & !(1 << MATERIAL_DIFFUSE);
+
+/// Passes by which tiles share paths.
+#[derive(Clone, Copy, Debug)]
+pub struct Sharing {
+    /// Edge of the tiles, pixels: 2, 4 or 8, so that they lie in blocks of the film.
+    pub tile_edge: u32,
+    /// Specialization by the surfaces of the scene.
+    pub surfaces: Surfaces,
+    /// Specialization of the passes that traverse.
+    pub traversal: Traversal,
+    /// Schedule of the connections.
+    pub schedule: Schedule,
+}
+
+impl Sharing {
+    fn over_surfaces(&self, shader: &'static str) -> Kernel {
+        Kernel::new(shader, Domain::Paths, &self.surfaces.constants())
+    }
+
+    /// Keeps the first vertices, before their paths go on.
+    pub fn keep_first(&self) -> Kernel {
+        self.over_surfaces("keep_first")
+    }
+
+    /// Keeps the second vertices, before light is gathered there.
+    pub fn keep_second(&self) -> Kernel {
+        self.over_surfaces("keep_second")
+    }
+
+    /// Adds the light of shadow rays that the base of second vertices reflects, where it is not all.
+    pub fn gather_base(&self) -> Option<Kernel> {
+        let has_rest = self.surfaces.material_kinds & WITH_BASE_AND_REST != 0;
+        has_rest.then(|| self.over_surfaces("gather_base"))
+    }
+
+    /// Parts the light of the second vertices, once their paths have bounced.
+    pub fn keep_third(&self) -> Kernel {
+        self.over_surfaces("keep_third")
+    }
+
+    /// Connects the vertices of a finished `wave` in groups of shadow rays, and shares the light.
+    pub fn connect_and_share(&self, wave: &Wave) -> Vec<Dispatch> {
+        let edge = (CONSTANT_TILE_EDGE, self.tile_edge);
+        let constants = [&self.surfaces.constants()[..], &[edge]].concat();
+        let pixels = self.tile_edge * self.tile_edge;
+        let mut wave = Wave { to_lamps: 1, total_shadow_rays: pixels, ..*wave };
+        let mut order = vec![Dispatch { kernel: self.over_surfaces("offer"), wave }];
+        for first in (0..pixels).step_by(SHADOW_RAYS_PER_GROUP as usize) {
+            wave.first_shadow_ray = first;
+            wave.shadow_ray_count = SHADOW_RAYS_PER_GROUP.min(pixels - first);
+            for kernel in [
+                Kernel::new("connect", Domain::Paths, &constants),
+                self.traversal.shadow(self.schedule, self.surfaces),
+                Kernel::new("admit", Domain::Paths, &[]),
+            ] {
+                order.push(Dispatch { kernel, wave });
+            }
+        }
+        for shader in ["weigh", "share"] {
+            order.push(Dispatch { kernel: Kernel::new(shader, Domain::Paths, &[edge]), wave });
+        }
+        order
+    }
+}
