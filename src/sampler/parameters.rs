@@ -29,6 +29,7 @@ pub struct Parameters {
 impl Default for Parameters {
     fn default() -> Self {
         Self {
+            share_tiles: None,
             candidates: None,
             compensation: true,
             product: ProductParameters::default(),
