@@ -7,6 +7,7 @@
 mod command;
 
 use std::{
+    fmt::Write,
     fs,
     process::Command,
     time::{Duration, Instant},
@@ -503,9 +504,13 @@ fn every_output_is_tried_before_the_work() {
 #[test]
 fn shapes_of_too_many_triangles_are_refused() {
     let mut objects = String::new();
-    for _ in 0..100 {
-        objects +=
-            "[[object]]\nshape = \"sphere\"\nradius = 1.0\nsegments = 4096\nmaterial = \"grey\"\n";
+    // Equal shapes would be instances of one.
+    for index in 1..=100 {
+        writeln!(
+            objects,
+            "[[object]]\nshape = \"sphere\"\nradius = {index}.0\nsegments = 4096\nmaterial = \"grey\""
+        )
+        .unwrap();
     }
     let folder = scene("", "");
     folder.write("scene.toml", format!("{SCENE}{objects}"));

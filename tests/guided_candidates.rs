@@ -145,7 +145,7 @@ impl Paths {
         Self {
             scene: SceneBuffers::new(device, scene, window).unwrap(),
             guide: GuideBuffers::new(device, scene, &parameters().guided, SIZE).unwrap(),
-            waves: WaveBuffers::new(device, 64, 1, PathDemand::default(), Surfaces::default(), 1)
+            waves: WaveBuffers::new(device, 64, 1, PathDemand::default(), Surfaces::default())
                 .unwrap(),
         }
     }

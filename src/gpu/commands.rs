@@ -120,7 +120,7 @@ impl Commands {
         // and the caller keeps them alive until the submission has been waited for.
         unsafe {
             raw.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
-            for set in sets.iter().filter(|set| pipeline.uses_set(set.index())) {
+            for set in sets.iter().filter(|set| pipeline.uses(set)) {
                 raw.cmd_bind_descriptor_sets(
                     self.raw,
                     vk::PipelineBindPoint::COMPUTE,

@@ -123,6 +123,11 @@ impl DescriptorSet {
         self.raw
     }
 
+    /// Returns true if the set has a buffer with this number.
+    pub fn has(&self, number: u32) -> bool {
+        self.table.bindings.iter().any(|binding| binding.number == number)
+    }
+
     /// Number of the set.
     pub fn index(&self) -> u32 {
         self.table.set

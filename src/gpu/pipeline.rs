@@ -4,7 +4,7 @@ use std::{ffi::CStr, sync::Arc};
 
 use ash::vk;
 
-use super::{device::Device, labels, vulkan_error};
+use super::{descriptors::DescriptorSet, device::Device, labels, vulkan_error};
 use crate::{error::Result, shader::spirv::used_bindings};
 
 /// A compute pipeline.
@@ -12,8 +12,8 @@ pub struct Pipeline {
     raw: vk::Pipeline,
     layout: vk::PipelineLayout,
     name: String,
-    /// Tells for each descriptor set whether the shader uses it.
-    uses_set: [bool; 4],
+    /// Number of a buffer that the shader uses, for each descriptor set.
+    used: [Option<u32>; 4],
     device: Arc<Device>,
 }
 
@@ -50,7 +50,7 @@ impl Pipeline {
             raw: vk::Pipeline::null(),
             layout,
             name: name.to_owned(),
-            uses_set: first_used.map(|used| used.is_some()),
+            used: first_used.map(|used| used.map(|(_, number)| *number)),
             device: Arc::clone(device),
         };
 
@@ -103,9 +103,9 @@ impl Pipeline {
         &self.name
     }
 
-    /// Returns true if the shader uses the descriptor set with this number.
-    pub fn uses_set(&self, set: u32) -> bool {
-        self.uses_set[set as usize]
+    /// Returns true if the shader uses buffers of this descriptor set.
+    pub fn uses(&self, set: &DescriptorSet) -> bool {
+        self.used[set.index() as usize].is_some_and(|number| set.has(number))
     }
 
     pub(super) fn raw(&self) -> vk::Pipeline {

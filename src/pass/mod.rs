@@ -11,6 +11,7 @@ pub mod order;
 pub mod runner;
 pub mod scene_buffers;
 pub mod sharing;
+pub mod sharing_buffers;
 pub mod steps;
 pub mod surfaces;
 pub mod technique;

@@ -11,6 +11,7 @@ use super::{
     kernel::{Dispatch, Kernel, Pass},
     order::{PassSettings, wave_order},
     scene_buffers::SceneBuffers,
+    sharing_buffers::SharingBuffers,
     steps::{Passes, PathDemand, SHADOW_RAYS_PER_GROUP, Steps},
     totals::Totals,
     wave_buffers::WaveBuffers,
@@ -32,6 +33,7 @@ pub struct Runner {
     device: Arc<Device>,
     scene: Arc<SceneBuffers>,
     waves: WaveBuffers,
+    sharing: Option<SharingBuffers>,
     film: FilmBuffers,
     settings: PassSettings,
     passes: BTreeMap<Kernel, Pass>,
@@ -54,19 +56,18 @@ impl Runner {
         let film = FilmBuffers::new(device, scene.window(), settings.aovs)?;
         let tile_pixels = settings.tile_edge * settings.tile_edge;
         let rays = settings.shadow_rays.max(tile_pixels).clamp(1, SHADOW_RAYS_PER_GROUP);
-        let waves = WaveBuffers::new(
-            device,
-            film.padded_pixels(),
-            rays,
-            demand,
-            settings.surfaces,
-            tile_pixels,
-        )?;
+        let demand = SharingBuffers::demand(demand, tile_pixels);
+        let waves =
+            WaveBuffers::new(device, film.padded_pixels(), rays, demand, settings.surfaces)?;
+        let sharing = (tile_pixels > 1)
+            .then(|| SharingBuffers::new(device, waves.capacity(), tile_pixels))
+            .transpose()?;
         Ok(Self {
             device: Arc::clone(device),
             scene,
             wave_paths: waves.first_wave_paths(),
             waves,
+            sharing,
             film,
             most_shadow_rays: settings.shadow_rays,
             settings,
@@ -96,7 +97,7 @@ impl Runner {
                 let pass = vacant.insert(pass);
                 let start = Instant::now();
                 let mut commands = Commands::begin(&self.device)?;
-                let sets = sets(&self.scene, technique, &self.waves, &self.film);
+                let sets = sets(&self.scene, technique, &self.waves, &self.sharing, &self.film);
                 pass.record(&mut commands, &sets, &wave);
                 commands.submit_and_wait()?;
                 add_ms(shader, start);
@@ -127,7 +128,7 @@ impl Runner {
     pub fn run(&mut self, technique: &dyn Passes, wave: Wave, vertices: u32) -> Result<PassTimes> {
         let order = wave_order(&self.settings, technique.steps(), wave, vertices);
         let mut commands = Commands::begin_timed(&self.device, order.len() as u32)?;
-        let sets = sets(&self.scene, technique, &self.waves, &self.film);
+        let sets = sets(&self.scene, technique, &self.waves, &self.sharing, &self.film);
         for Dispatch { kernel, wave } in order {
             let pass = match self.passes.entry(kernel) {
                 Entry::Occupied(occupied) => occupied.into_mut(),
@@ -234,6 +235,7 @@ impl Runner {
     pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
         let mut bytes = self.scene.buffer_bytes();
         bytes.extend(self.waves.buffer_bytes());
+        bytes.extend(self.sharing.iter().flat_map(SharingBuffers::buffer_bytes));
         bytes.extend(self.film.buffer_bytes());
         bytes
     }
@@ -243,8 +245,10 @@ fn sets<'a>(
     scene: &'a SceneBuffers,
     technique: &'a dyn Passes,
     waves: &'a WaveBuffers,
+    sharing: &'a Option<SharingBuffers>,
     film: &'a FilmBuffers,
 ) -> Vec<&'a DescriptorSet> {
     let common = [scene.set(), waves.set(), film.set()];
-    common.into_iter().chain(technique.set()).collect()
+    let sharing = sharing.as_ref().map(SharingBuffers::set);
+    common.into_iter().chain(technique.set()).chain(sharing).collect()
 }

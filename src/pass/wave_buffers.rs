@@ -9,9 +9,7 @@ use crate::{
     shader::{
         bindings::{WAVE, wave},
         constants::WORKGROUP_SIZE,
-        structs::{
-            Connection, FirstVertex, Hit, Offer, PathState, Ray, SecondVertex, ShadowRay, Surface,
-        },
+        structs::{Hit, PathState, Ray, ShadowRay, Surface},
     },
 };
 
@@ -33,37 +31,26 @@ pub struct WaveBuffers {
     paths: Buffer,
     surfaces: Buffer,
     instances: Buffer,
-    first_vertices: Buffer,
-    second_vertices: Buffer,
-    offers: Buffer,
-    offer_weights: Buffer,
-    connections: Buffer,
-    seen: Buffer,
 }
 
 impl WaveBuffers {
     /// Allocates waves over a film of `padded_pixels` with up to `shadow_rays` rays per hit at a time,
-    /// and no more paths than `demand` allows; textures and instances at hits only if `of` needs them,
-    /// and connections only if `tile_pixels` are more than 1. Fails if the device does or its limits are
-    /// exceeded.
+    /// and no more paths than `demand` allows; textures and instances at hits only if `of` needs them.
+    /// Fails if the device does or its limits are exceeded.
     pub fn new(
         device: &Arc<Device>,
         padded_pixels: u32,
         shadow_rays: u32,
         demand: PathDemand,
         of: Surfaces,
-        tile_pixels: u32,
     ) -> Result<Self> {
         let capabilities = device.capabilities();
         let most = if capabilities.kind == "software" { SOFTWARE_PATHS } else { GPU_PATHS };
         let widest =
             (size_of::<Hit>() as u64).max(u64::from(shadow_rays) * size_of::<ShadowRay>() as u64);
         let widest = widest.max(demand.bytes);
-        let tile_pixels = if tile_pixels > 1 { u64::from(tile_pixels) } else { 0 };
-        let widest = widest.max(tile_pixels * size_of::<Connection>() as u64);
         let by_binding = capabilities.max_storage_buffer_range / widest;
-        let by_texels =
-            capabilities.max_texel_buffer_elements / demand.texels.max(tile_pixels).max(1);
+        let by_texels = capabilities.max_texel_buffer_elements / demand.texels.max(1);
         let by_groups = u64::from(capabilities.max_workgroup_count) * u64::from(WORKGROUP_SIZE)
             / u64::from(shadow_rays);
         let by_memory = capabilities.device_memory / 8 / (widest * 3);
@@ -85,13 +72,6 @@ impl WaveBuffers {
         let surfaces = make("hit surfaces", surface_count, size_of::<Surface>())?;
         let instance_count = if of.is_instanced() { paths } else { 1 };
         let instances = make("hit instances", instance_count, size_of::<u32>())?;
-        let kept = if tile_pixels > 0 { paths } else { 1 };
-        let first_vertices = make("first vertices", kept, size_of::<FirstVertex>())?;
-        let second_vertices = make("second vertices", kept, size_of::<SecondVertex>())?;
-        let connections = make("connections", kept * tile_pixels.max(1), size_of::<Connection>())?;
-        let offers = make("offers", kept, size_of::<Offer>())?;
-        let offer_weights = make("offer weights", kept, size_of::<f32>())?;
-        let seen = make("seen offers", kept, size_of::<[u32; 2]>())?;
         let paths = make("paths", paths, size_of::<PathState>())?;
         let bound = [
             (wave::RAYS, &rays),
@@ -104,36 +84,9 @@ impl WaveBuffers {
             (wave::PATHS, &paths),
             (wave::HIT_SURFACES, &surfaces),
             (wave::HIT_INSTANCES, &instances),
-            (wave::FIRST_VERTICES, &first_vertices),
-            (wave::FIRST_VERTEX_TEXELS, &first_vertices),
-            (wave::SECOND_VERTICES, &second_vertices),
-            (wave::OFFERS, &offers),
-            (wave::OFFER_TEXELS, &offers),
-            (wave::OFFER_WEIGHTS, &offer_weights),
-            (wave::OFFER_WEIGHT_TEXELS, &offer_weights),
-            (wave::CONNECTIONS, &connections),
-            (wave::CONNECTION_TEXELS, &connections),
-            (wave::SEEN, &seen),
-            (wave::SEEN_TEXELS, &seen),
         ];
         let set = DescriptorSet::new(device, &WAVE, &bound)?;
-        Ok(Self {
-            set,
-            capacity,
-            rays,
-            hits,
-            shadow_rays,
-            visibility,
-            paths,
-            surfaces,
-            instances,
-            first_vertices,
-            second_vertices,
-            offers,
-            offer_weights,
-            connections,
-            seen,
-        })
+        Ok(Self { set, capacity, rays, hits, shadow_rays, visibility, paths, surfaces, instances })
     }
 
     /// Descriptor set 2.
@@ -186,12 +139,6 @@ impl WaveBuffers {
             &self.paths,
             &self.surfaces,
             &self.instances,
-            &self.first_vertices,
-            &self.second_vertices,
-            &self.offers,
-            &self.offer_weights,
-            &self.connections,
-            &self.seen,
         ]
         .map(|buffer| (buffer.name().to_owned(), buffer.size()))
         .into()

@@ -1,7 +1,8 @@
 //! Buffers of the shaders by descriptor set: one declaration for Rust, GLSL and `docs/buffers.md`.
 //!
 //! Sets go by rate of change: 0 the scene, 1 the sampler, 2 the wave, 3 the film. Set 1 has a table
-//! per family of samplers; disjoint binding numbers tell the table of a shader. GLSL names are in
+//! per family of samplers, and one for what pixels share; disjoint binding numbers tell the table of a
+//! shader. GLSL names are in
 //! lower case; shaders say `READS(hits)`, `WRITES(rays)`, `UPDATES(paths)` or `TEXELS(hit_texels)`.
 
 /// A descriptor set: its number and its buffers.
@@ -249,6 +250,32 @@ binding_tables! {
         29 GUIDE_ARRIVALS: array uint;
     }
 
+    /// Set 1 of the passes by which pixels share paths.
+    SHARING = sharing: 1 {
+        /// First vertex of each path.
+        40 FIRST_VERTICES: array FirstVertex;
+        /// First vertices again, six texels each.
+        41 FIRST_VERTEX_TEXELS: texels Rgba32Uint;
+        /// Second vertex of each path.
+        42 SECOND_VERTICES: array SecondVertex;
+        /// Offer of each path to the pixels of its tile.
+        43 OFFERS: array Offer;
+        /// Offers again, four texels each.
+        44 OFFER_TEXELS: texels Rgba32Uint;
+        /// Weight of each offer.
+        45 OFFER_WEIGHTS: array float;
+        /// Weights of offers again.
+        46 OFFER_WEIGHT_TEXELS: texels R32Float;
+        /// Connections of path `i` with the offer of pixel `k` of its tile at `k · path_count + i`.
+        47 CONNECTIONS: array Connection;
+        /// Connections again, one texel each.
+        48 CONNECTION_TEXELS: texels Rgba32Float;
+        /// Bits of the pixels of the tile whose offers each path sees.
+        49 SEEN: array uvec2;
+        /// These bits again.
+        50 SEEN_TEXELS: texels Rg32Uint;
+    }
+
     /// Set 2: the wave in flight, rewritten by every pass.
     WAVE = wave: 2 {
         /// Next ray of each path.
@@ -271,28 +298,6 @@ binding_tables! {
         8 HIT_SURFACES: array Surface;
         /// Instance that each path has hit, in scenes with instances.
         9 HIT_INSTANCES: array uint;
-        /// First vertex of each path, while pixels share paths.
-        10 FIRST_VERTICES: array FirstVertex;
-        /// First vertices again, six texels each.
-        11 FIRST_VERTEX_TEXELS: texels Rgba32Uint;
-        /// Second vertex of each path.
-        12 SECOND_VERTICES: array SecondVertex;
-        /// Offer of each path to the pixels of its tile.
-        13 OFFERS: array Offer;
-        /// Offers again, four texels each.
-        14 OFFER_TEXELS: texels Rgba32Uint;
-        /// Weight of each offer.
-        15 OFFER_WEIGHTS: array float;
-        /// Weights of offers again.
-        16 OFFER_WEIGHT_TEXELS: texels R32Float;
-        /// Connections of path `i` with the offer of pixel `k` of its tile at `k · path_count + i`.
-        17 CONNECTIONS: array Connection;
-        /// Connections again, one texel each.
-        18 CONNECTION_TEXELS: texels Rgba32Float;
-        /// Bits of the pixels of the tile whose offers each path sees.
-        19 SEEN: array uvec2;
-        /// These bits again.
-        20 SEEN_TEXELS: texels Rg32Uint;
     }
 
     /// Set 3: the film, which grows by every wave.

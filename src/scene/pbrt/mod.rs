@@ -291,14 +291,21 @@ impl Builder<'_> {
             let message = format!("{count} instances, at most {MAX_INSTANCES} can be used");
             return Err(shape.entity.error(message));
         }
-        let (prototype, dropped) = self.geometry.add_prototype(mesh, |_| 0);
-        let prototype = prototype.index;
+        let index = self.geometry.prototypes.len() as u32;
+        let instances: Vec<_> = places
+            .iter()
+            .map(|place| {
+                let placed = self.view.mirror * *place * shape.world_from_shape;
+                let transform = Transform::from_matrix(placed)?;
+                Instance::new(index, &transform, material, true)
+            })
+            .collect();
+        let too_extreme = instances.iter().filter(|instance| instance.is_none()).count();
+        self.check_counts(mesh, too_extreme, shape)?;
+        let (_, dropped) = self.geometry.add_prototype(mesh, |_| 0);
         self.triangle_count += mesh.triangles.len();
         self.dropped.add(dropped);
-        for place in places {
-            let placed = self.view.mirror * *place * shape.world_from_shape;
-            let instance = Transform::from_matrix(placed)
-                .and_then(|transform| Instance::new(prototype, &transform, material, true));
+        for (place, instance) in places.iter().zip(instances) {
             match instance {
                 Some(instance) => self.geometry.instances.push(instance),
                 None => self.place(mesh, material, shape, *place)?,

@@ -1,0 +1,69 @@
+//! Buffers for what the pixels of a tile share.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use super::steps::PathDemand;
+use crate::{
+    error::Result,
+    gpu::{Buffer, DescriptorSet, Device},
+    shader::{
+        bindings::{SHARING, sharing},
+        structs::{Connection, FirstVertex, Offer, SecondVertex},
+    },
+};
+
+/// First and second vertices of one wave, and the connections between them.
+pub struct SharingBuffers {
+    set: DescriptorSet,
+    buffers: [Buffer; 6],
+}
+
+impl SharingBuffers {
+    /// Adds what tiles of so many pixels take for a path to `demand`.
+    pub fn demand(demand: PathDemand, tile_pixels: u32) -> PathDemand {
+        let connections = u64::from(tile_pixels);
+        PathDemand {
+            bytes: demand.bytes.max(connections * size_of::<Connection>() as u64),
+            texels: demand.texels.max(connections),
+        }
+    }
+
+    /// Allocates them for waves of up to `paths` and tiles of `tile_pixels`. Fails if the device does.
+    pub fn new(device: &Arc<Device>, paths: u32, tile_pixels: u32) -> Result<Self> {
+        let paths = u64::from(paths);
+        let make = |name, count: u64, size: usize| Buffer::new(device, name, count * size as u64);
+        let first_vertices = make("first vertices", paths, size_of::<FirstVertex>())?;
+        let second_vertices = make("second vertices", paths, size_of::<SecondVertex>())?;
+        let offers = make("offers", paths, size_of::<Offer>())?;
+        let offer_weights = make("offer weights", paths, size_of::<f32>())?;
+        let connections =
+            make("connections", paths * u64::from(tile_pixels), size_of::<Connection>())?;
+        let seen = make("seen offers", paths, size_of::<[u32; 2]>())?;
+        let bound = [
+            (sharing::FIRST_VERTICES, &first_vertices),
+            (sharing::FIRST_VERTEX_TEXELS, &first_vertices),
+            (sharing::SECOND_VERTICES, &second_vertices),
+            (sharing::OFFERS, &offers),
+            (sharing::OFFER_TEXELS, &offers),
+            (sharing::OFFER_WEIGHTS, &offer_weights),
+            (sharing::OFFER_WEIGHT_TEXELS, &offer_weights),
+            (sharing::CONNECTIONS, &connections),
+            (sharing::CONNECTION_TEXELS, &connections),
+            (sharing::SEEN, &seen),
+            (sharing::SEEN_TEXELS, &seen),
+        ];
+        let set = DescriptorSet::new(device, &SHARING, &bound)?;
+        let buffers = [first_vertices, second_vertices, offers, offer_weights, connections, seen];
+        Ok(Self { set, buffers })
+    }
+
+    /// Descriptor set 1 of the passes of sharing.
+    pub fn set(&self) -> &DescriptorSet {
+        &self.set
+    }
+
+    /// Bytes by buffer name.
+    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+        self.buffers.iter().map(|buffer| (buffer.name().to_owned(), buffer.size())).collect()
+    }
+}
