@@ -165,14 +165,6 @@ fn with_escaped_bounces_in_the_open() {
 }
 
 #[test]
-fn with_escaped_bounces_in_a_roofless_room() {
-    let _alone = support::alone();
-    let materials = vec![scenes::diffuse(Vec3::splat(0.7)), measured(), scenes::plastic(0.3)];
-    let scene = scenes::without_ceiling(scenes::room(materials));
-    settings_agree(&scene, 64, &ways_to_weigh_the_bounce_ray(4));
-}
-
-#[test]
 fn with_escaped_bounces_past_mirrors_glass_and_lamps() {
     let _alone = support::alone();
     let scene = scenes::without_ceiling(scenes::glazed_room());
