@@ -1,7 +1,7 @@
 //! Chooses sampler and numbers of shadow rays by measurement: from a short ladder of ways to render a
 //! sample, the next one as long as it clearly lowers variance × time.
 //!
-//! Measures as [`choice`](super::choice) does, with the guide as the first sample will find it: no ray
+//! Measures as `choice.rs` does, with the guide as the first sample will find it: no ray
 //! of it is in the picture, which depends on it through the chosen way only.
 
 use std::time::Instant;
