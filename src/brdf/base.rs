@@ -121,9 +121,7 @@ mod tests {
     use crate::brdf::{MeasuredTable, twin::cosine_table};
 
     fn base(words: &[u32], cosine: f32) -> Vec3 {
-        let channel = |channel| {
-            cosine_table(words, MEASURED_BASE_OFFSET + channel, 3, cosine)
-        };
+        let channel = |channel| cosine_table(words, MEASURED_BASE_OFFSET + channel, 3, cosine);
         vec3(channel(0), channel(1), channel(2))
     }
 

@@ -57,12 +57,13 @@ impl Renderer {
 
         let surfaces = buffers.surfaces();
         let shares = settings.depth > 1 && surfaces.has_base();
-        let tile_edge = settings.parameters.share_tiles.filter(|_| shares).unwrap_or(1);
+        let tile_edge = settings.sampler.tile_edge(&settings.parameters);
+        let tile_edge = if shares { tile_edge } else { 1 };
         let passes = PassSettings {
             shadow_rays: settings.shadow_rays,
             depth: settings.depth,
             aovs: aov_bits(&settings.aovs),
-            roulette_vertex: settings.roulette_vertex,
+            roulette: settings.roulette,
             tile_edge,
             surfaces,
             traversal: buffers.geometry().traversal(),

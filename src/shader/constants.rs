@@ -51,6 +51,8 @@ constants! {
     CONSTANT_BOUNCE_CANDIDATES = 26;
     /// First vertex at which russian roulette may end a path.
     CONSTANT_ROULETTE_VERTEX = 18;
+    /// Throughput below which it may, a float.
+    CONSTANT_ROULETTE_THROUGHPUT = 46;
     /// Bit `1 << kind` for every kind of material in the scene; saves devices that run both sides of a
     /// branch the others.
     CONSTANT_MATERIAL_KINDS = 19;
@@ -297,6 +299,12 @@ constants! {
     MEASURED_BASE_OFFSET = MEASURED_DENSITY_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
     /// Grid cells, two words each: halves red and green, half blue.
     MEASURED_GRID_OFFSET = MEASURED_BASE_OFFSET + 3 * BRDF_COSINE_NODES;
+
+    // Values of `Wave::is_training` other than 0.
+    /// The paths only teach the guide.
+    TRAINING_WAVE = 1;
+    /// The light of the paths is only compared.
+    MEASURED_WAVE = 2;
 
     // Lobes and learned visibility.
     /// Lobes between two sums of their weights; a power of two up to 32.

@@ -409,7 +409,10 @@ structs! {
         aovs: uint,
         /// Step in film order from one pixel of the wave to the next; 0 counts as 1.
         pixel_stride: uint,
-        /// 1 if the paths only teach the guide: their rays are counted, their light is not.
+        /// Step from one block of 8×8 pixels of the wave to the next, in blocks; 0 counts as 1.
+        block_stride: uint,
+        /// 0 for the picture; `TRAINING_WAVE` if the paths only teach the guide, `MEASURED_WAVE` if their
+        /// light is only compared: their rays are counted, their light is not.
         is_training: uint,
         /// Seed of the numbers of `guided`; changes with every rebuild.
         epoch_seed: uint,

@@ -27,6 +27,7 @@ use crate::{
         display::DisplayServer, metadata::seconds_of, png::write_preview,
     },
     gpu::Device,
+    pass::Roulette,
     renderer::{Renderer, Settings, window_of},
     sampler::Sampler,
     scene::Scene,
@@ -180,9 +181,10 @@ impl<'a> RenderJob<'a> {
     ) -> Self {
         let capabilities = device.capabilities();
         let mut parameters = settings.sampler.describe(&settings.parameters);
-        if settings.depth > settings.roulette_vertex {
-            let vertex = settings.roulette_vertex.to_string();
-            parameters.insert("roulette-depth".to_owned(), vertex);
+        if settings.depth > settings.roulette.vertex {
+            let Roulette { vertex, throughput } = settings.roulette;
+            parameters.insert("roulette-depth".to_owned(), vertex.to_string());
+            parameters.insert("roulette-throughput".to_owned(), throughput.to_string());
         }
         let metadata = Metadata {
             version: env!("CARGO_PKG_VERSION").to_owned(),
