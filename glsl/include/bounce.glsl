@@ -20,7 +20,7 @@ UPDATES(paths)
 // First vertex at which russian roulette may end a path.
 layout(constant_id = CONSTANT_ROULETTE_VERTEX) const uint ROULETTE_VERTEX = 2u;
 // Throughput below which it does: the light that such a path still brings is worth less than its time.
-layout(constant_id = CONSTANT_ROULETTE_THROUGHPUT) const float ROULETTE_THROUGHPUT = 0.05;
+layout(constant_id = CONSTANT_ROULETTE_THROUGHPUT) const float ROULETTE_THROUGHPUT = 0.02;
 
 // Returns BRDF * cosine / density of a direction drawn from the BRDF, and that density; 0 below
 // either horizon.

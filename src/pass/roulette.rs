@@ -9,13 +9,14 @@ use crate::shader::constants::{CONSTANT_ROULETTE_THROUGHPUT, CONSTANT_ROULETTE_V
 pub struct Roulette {
     /// First vertex, from 0 on, that a path may fail to reach.
     pub vertex: u32,
-    /// A path survives with its largest throughput of any channel over this, if that is below 1.
+    /// A path survives with its largest throughput of any channel over this, if that is below 1; with 0
+    /// all do.
     pub throughput: f32,
 }
 
 impl Default for Roulette {
     fn default() -> Self {
-        Self { vertex: 2, throughput: 0.05 }
+        Self { vertex: 2, throughput: 0.02 }
     }
 }
 
@@ -25,8 +26,9 @@ impl Roulette {
 
     /// Specialization of the passes that continue paths.
     pub fn constants(&self) -> [(u32, u32); 2] {
+        let vertex = if self.throughput > 0.0 { self.vertex } else { u32::MAX };
         [
-            (CONSTANT_ROULETTE_VERTEX, self.vertex),
+            (CONSTANT_ROULETTE_VERTEX, vertex),
             (CONSTANT_ROULETTE_THROUGHPUT, self.throughput.to_bits()),
         ]
     }

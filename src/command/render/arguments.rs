@@ -53,8 +53,9 @@ pub struct Arguments {
     /// First path vertex, from 0 on, at which Russian roulette may end a path.
     #[arg(long, value_name = "D", default_value_t = 2)]
     pub roulette_depth: u32,
-    /// Share of the camera's light that a path still carries, below which Russian roulette may end it.
-    #[arg(long, value_name = "T", default_value_t = 0.05)]
+    /// Share of the camera's light that a path still carries, below which Russian roulette may end it; 0 for
+    /// never.
+    #[arg(long, value_name = "T", default_value_t = 0.02)]
     pub roulette_throughput: f32,
     /// Environment, camera, strictness.
     #[command(flatten)]

@@ -114,7 +114,7 @@ impl EnvironmentMap {
                 self.texels.len()
             ));
         }
-        if self.texels.par_iter().all(|texel| *texel == Vec3::ZERO) {
+        if self.is_black() {
             warnings.push(format!("{}: the map is black: nothing is lit", self.source));
         }
     }
