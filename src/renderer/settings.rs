@@ -29,6 +29,9 @@ pub struct Settings {
     pub aovs: Vec<Aov>,
     /// First vertex at which russian roulette may end a path, if `depth` reaches it.
     pub roulette_vertex: u32,
+    /// Most bytes of one buffer of the film, beside the device's own limit; larger films have pages,
+    /// which changes no bit of the picture.
+    pub film_page_bytes: u64,
 }
 
 impl Default for Settings {
@@ -43,6 +46,7 @@ impl Default for Settings {
             window: None,
             aovs: Vec::new(),
             roulette_vertex: 8,
+            film_page_bytes: u64::MAX,
         }
     }
 }

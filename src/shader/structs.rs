@@ -423,6 +423,8 @@ structs! {
         /// Shadow rays at the vertex before, if the bounce ray from there is a sample of the environment;
         /// else 0.
         arriving_shadow_rays: uint,
+        /// Pixels of the crop window before the page of the film that the wave writes.
+        film_start: uint,
     }
 
     /// Cells that a path's bounces teach.

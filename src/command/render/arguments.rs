@@ -235,6 +235,7 @@ impl Arguments {
             window: self.crop,
             aovs: self.aov.clone(),
             roulette_vertex: self.roulette_depth,
+            ..Settings::default()
         })
     }
 }
