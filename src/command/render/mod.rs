@@ -406,10 +406,16 @@ impl<'a> RenderJob<'a> {
                 totals.dropped_samples
             ));
         }
-        if totals.traversal_overruns > 0 {
+        if let Some([left, top, right, bottom]) = totals.overrun_pixels {
+            let Window { x, y, .. } = self.window;
             self.warn(format!(
-                "{} rays were given up after too many steps of traversal",
-                totals.traversal_overruns
+                "{} rays were given up after too many steps of traversal, where many triangles meet in \
+                 one place: pixels within --crop {},{},{},{} may be wrong",
+                totals.traversal_overruns,
+                left + x,
+                top + y,
+                right + x,
+                bottom + y
             ));
         }
         let metadata = self.metadata(renderer);
