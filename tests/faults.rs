@@ -343,7 +343,7 @@ fn a_limit_of_file_sizes_is_an_error_and_no_signal() {
     assert!(folder.files().iter().all(|name| !name.ends_with(".tmp")), "{:?}", folder.files());
 }
 
-/// The disk is full after every power of two of blocks, at which a guide or a checkpoint breaks off.
+/// The disk is full after some blocks of 512 bytes, at which a guide or a checkpoint breaks off.
 #[test]
 fn a_disk_that_fills_keeps_the_last_checkpoint() {
     let folder = folder();
@@ -356,7 +356,7 @@ fn a_disk_that_fills_keeps_the_last_checkpoint() {
         checkpoint.sums.sample_count
     };
     let (mut failed, mut kept) = (0, samples());
-    for (turn, blocks) in [1, 4, 16, 64, 256, 1024, 4096].into_iter().enumerate() {
+    for (turn, blocks) in [1, 16, 256, 4096].into_iter().enumerate() {
         let spp = 3 + turn as u32;
         let line = format!("{} --resume --spp={spp}", options.join(" "));
         let run = run_after(&folder, &format!("ulimit -f {blocks}"), &line);
@@ -367,7 +367,7 @@ fn a_disk_that_fills_keeps_the_last_checkpoint() {
         failed += u32::from(!is_written);
         assert!(folder.files().iter().all(|name| !name.ends_with(".tmp")), "{:?}", folder.files());
     }
-    assert!((2..7).contains(&failed), "{failed} of 7 disks were too small");
+    assert!((1..4).contains(&failed), "{failed} of 4 disks were too small");
 }
 
 #[cfg(target_os = "linux")]
