@@ -41,6 +41,8 @@ fn settings(shadow_rays: u32, depth: u32) -> PassSettings {
         surfaces: Surfaces::default(),
         traversal: Traversal { page_count: 1, page_shift: 20, is_instanced: false },
         incoherent: Schedule { rays_per_invocation: 16, refill_lanes: 3 },
+        film_page_bytes: u64::MAX,
+        most_paths: u32::MAX,
     }
 }
 

@@ -38,7 +38,7 @@ const uint FILM_BLOCK = 8u;
 
 struct PathIndex {
     uvec2 crop_pixel;
-    // Index into the buffers of the film.
+    // Index in the crop window.
     uint film_index;
     // Index in the whole film: random numbers do not depend on the crop window.
     uint pixel;
@@ -79,6 +79,11 @@ PathIndex wave_path(uint path) {
     PathIndex index = wave_pixel(wave_film_position(sample_and_pixel.y));
     index.sample_index = wave.first_sample + sample_and_pixel.x;
     return index;
+}
+
+// Returns the index into the buffers of the film, which hold a page of the crop window.
+uint film_place(PathIndex index) {
+    return index.film_index - wave.film_start;
 }
 
 uint vertex_dimension() {

@@ -35,6 +35,10 @@ pub struct PassSettings {
     pub traversal: Traversal,
     /// Schedule of incoherent rays.
     pub incoherent: Schedule,
+    /// Most bytes of one buffer of the film.
+    pub film_page_bytes: u64,
+    /// Most paths in flight.
+    pub most_paths: u32,
 }
 
 /// Returns the dispatches of one wave for the first `vertices` vertices of its paths.

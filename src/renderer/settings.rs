@@ -30,6 +30,9 @@ pub struct Settings {
     pub aovs: Vec<Aov>,
     /// Where paths of several vertices end by chance.
     pub roulette: Roulette,
+    /// Most bytes of one buffer of the film, beside the device's own limit; larger films have pages,
+    /// which changes no bit of the picture.
+    pub film_page_bytes: u64,
 }
 
 impl Default for Settings {
@@ -44,6 +47,7 @@ impl Default for Settings {
             window: None,
             aovs: Vec::new(),
             roulette: Roulette::default(),
+            film_page_bytes: u64::MAX,
         }
     }
 }

@@ -243,6 +243,7 @@ impl Arguments {
                 vertex: self.roulette_depth,
                 throughput: self.roulette_throughput,
             },
+            ..Settings::default()
         })
     }
 }
