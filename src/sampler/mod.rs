@@ -156,6 +156,12 @@ impl Sampler {
         parameters.share_tiles.unwrap_or(automatic)
     }
 
+    /// Shadow rays at every vertex that the camera sees, where nobody says otherwise: 5 as in the thesis,
+    /// more for `guided` (`docs/experiments/shadow_rays_by_worth.md`).
+    pub fn shadow_rays(self) -> u32 {
+        if self == Self::Guided { guided::SHADOW_RAYS } else { 5 }
+    }
+
     /// Memory per path in flight.
     pub fn demand(self, parameters: &Parameters, shadow_rays: u32) -> PathDemand {
         self.room().demand(parameters, shadow_rays)

@@ -177,7 +177,7 @@ impl<'a> RenderJob<'a> {
             scene_hash: scene.hash.clone(),
             sampler: arguments.sampler.name().to_owned(),
             sampler_parameters: parameters,
-            shadow_rays: arguments.shadow_rays,
+            shadow_rays: settings.shadow_rays,
             depth: arguments.depth,
             device: capabilities.name.clone(),
             driver: capabilities.driver.clone(),
