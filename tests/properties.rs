@@ -190,7 +190,7 @@ fn no_scene_makes_an_impossible_pixel() {
         };
         let depth = [1, 2, 4][(3.0 * random.uniform()) as usize];
         for &sampler in Sampler::ALL {
-            let settings = Settings { sampler, depth, roulette_vertex: 2, ..Settings::default() };
+            let settings = Settings { sampler, depth, ..Settings::default() };
             let samples = if is_furnace { 16 } else { 3 };
             let (sums, totals) = support::render(&scene, settings, samples);
             let what = format!("seed {seed}, {}, depth {depth}\n{text}", sampler.name());

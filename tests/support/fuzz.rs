@@ -19,10 +19,15 @@ use std::{
     time::{Duration, Instant},
 };
 
+use fenestra::memory;
+
 /// Longest time that one input may take.
 const TIME_LIMIT: Duration = Duration::from_secs(20);
-/// Address space of a worker, KiB.
-const MEMORY_LIMIT_KIB: u32 = 2_000_000;
+/// Memory that the program allows itself in a worker, as `--max-memory` does, bytes.
+const ALLOWED_BYTES: u64 = 384 << 20;
+/// Address space of a worker, KiB: that, stacks and arenas of threads. An allocation that passes it
+/// aborts the worker, and was not checked.
+const MEMORY_LIMIT_KIB: u32 = 1_200_000;
 /// Longest input that mutations may grow to, relative to the seeds.
 const LARGEST_GROWTH: usize = 4;
 /// Crashes of workers after which a target is given up.
@@ -124,7 +129,8 @@ impl Target {
         let mut random = Random::new(self.name, seed, case);
         let mut bytes = self.seeds[random.below(self.seeds.len())].clone();
         let longest = bytes.len().max(1024) * LARGEST_GROWTH;
-        for _ in 0..1 + random.below(1 << random.below(4)) {
+        let most = 1 << random.below(4);
+        for _ in 0..1 + random.below(most) {
             let other = &self.seeds[random.below(self.seeds.len())];
             mutate(&mut bytes, other, &mut random);
             bytes.truncate(longest);
@@ -274,6 +280,7 @@ fn kept(target: &str, seed: u64, case: u64) -> PathBuf {
 pub fn work(target: &'static Target) {
     let [seed, first] = [setting("FENESTRA_FUZZ_SEED", 1), setting("FENESTRA_FUZZ_FIRST", 0)];
     let until = Instant::now() + Duration::from_secs_f64(seconds());
+    memory::set_limit(ALLOWED_BYTES);
     let folder = PathBuf::from(env::var_os("FENESTRA_FUZZ_FOLDER").expect("a folder"));
     let path = folder.join(target.file);
     target.beside.iter().for_each(|(name, bytes)| fs::write(folder.join(name), bytes).unwrap());
