@@ -146,8 +146,9 @@ fn targets() -> Vec<Target> {
     vec![
         Target {
             beside: beside(),
-            ..target("toml", "input.toml", texts(&[seeds::TOML, seeds::SKY]), scene)
+            ..target("toml", "input.toml", texts(&[seeds::TOML]), scene)
         },
+        target("sky", "input.toml", texts(&[seeds::SKY]), scene),
         target(
             "ply",
             "input.ply",
@@ -176,7 +177,7 @@ fn targets() -> Vec<Target> {
         Target { beside: beside(), ..target("pbrt", "input.pbrt", texts(&[seeds::PBRT]), scene) },
         Target { beside: beside(), ..target("xml", "input.xml", texts(&[seeds::XML]), scene) },
         Target {
-            beside: vec![("mesh.xml", seeds::XML.replace("image.png", "none.png").into())],
+            beside: vec![("mesh.xml", seeds::SERIALIZED_XML.into())],
             mend: seeds::pack_serialized,
             ..target("serialized", "mesh.serialized", vec![seeds::serialized()], |path, bytes| {
                 scene(&path.with_file_name("mesh.xml"), bytes)

@@ -46,7 +46,7 @@ k = [3.1, 3.1, 3.0]
 [[material]]
 name = "picture"
 type = "diffuse"
-reflectance = { image = "image.png" }
+reflectance = { texture = "image.png" }
 
 [[object]]
 mesh = "mesh.ply"
@@ -76,7 +76,7 @@ vertical_fov_deg = 45
 [film]
 width = 8
 height = 8
-filter = "tent"
+filter = "gaussian"
 [environment]
 sky = { sun_elevation_deg = 30.0 }
 [[material]]
@@ -217,6 +217,11 @@ pub const XML: &str = r#"<scene version="3.0.0">
 <emitter type="envmap"><string name="filename" value="map.pfm"/></emitter>
 <emitter type="point"><point name="position" value="1,2,3"/><rgb name="intensity" value="3"/></emitter>
 </scene>"#;
+
+/// A scene of one serialized mesh.
+pub const SERIALIZED_XML: &str = r#"<scene version="3.0.0"><sensor type="perspective"/>
+<shape type="serialized"><string name="filename" value="mesh.serialized"/></shape>
+<emitter type="constant"/></scene>"#;
 
 /// Content of a serialized mesh before its compression.
 pub fn serialized() -> Vec<u8> {
