@@ -22,7 +22,7 @@ use std::{
 use fenestra::memory;
 
 /// Longest time that one input may take.
-const TIME_LIMIT: Duration = Duration::from_secs(20);
+const TIME_LIMIT: Duration = Duration::from_secs(60);
 /// Memory that the program allows itself in a worker, as `--max-memory` does, bytes.
 const ALLOWED_BYTES: u64 = 384 << 20;
 /// Address space of a worker, KiB: that, stacks and arenas of threads. An allocation that passes it
