@@ -75,9 +75,9 @@ fn material(random: &mut Random) -> String {
         ),
         "mirror" => format!("type = \"mirror\"\nreflectance = {}", colour(random)),
         "glass" => format!(
-            "type = \"dielectric\"\nior = {}\nroughness = {}",
-            pick(random, &["1.01", "1.5", "3"]),
-            pick(random, &["0", "1", "0.3"])
+            "type = \"dielectric\"\nior = {}\n{}",
+            pick(random, &["1.02", "1.5", "3"]),
+            pick(random, &["", "roughness = 1", "roughness = 0.0317"])
         ),
         _ => format!("type = \"thin_dielectric\"\nior = {}", pick(random, &["1.01", "1.5", "3"])),
     }
@@ -102,7 +102,7 @@ fn object(random: &mut Random, name: &str) -> String {
 /// Text of a scene; under a furnace, light from every direction is 1.
 fn scene_text(random: &mut Random, is_furnace: bool) -> String {
     let camera =
-        pick(random, &["[0, 0.5, 3]", "[0.1, 0.2, 0.05]", "[0, 50, 0.001]", "[0, 0, 2000]"]);
+        pick(random, &["[0, 0.5, 3]", "[0.1, 0.2, 0.05]", "[0, 50, 1]", "[0, 0, 2000]"]);
     let sky = if is_furnace {
         "constant = [1, 1, 1]"
     } else {
@@ -122,7 +122,7 @@ fn scene_text(random: &mut Random, is_furnace: bool) -> String {
          8\nheight = 6\n[environment]\n{sky}\n",
         pick(random, &["1", "45", "150"])
     );
-    let count = (random.uniform() * 4.0) as usize;
+    let count = [0, 1, 3, 12, 12][(random.uniform() * 5.0) as usize];
     for index in 0..count {
         text += &format!("[[material]]\nname = \"m{index}\"\n{}\n", material(random));
     }
@@ -175,7 +175,7 @@ fn no_scene_makes_an_impossible_pixel() {
     fs::write(folder.path().join("black.pfm"), pfm([0.0; 32])).unwrap();
     let first = setting("FENESTRA_PROPERTY_SEED", 1);
     let (mut rendered, mut refused) = (0, 0);
-    for seed in first..first + setting("FENESTRA_PROPERTY_SCENES", 2) {
+    for seed in first..first + setting("FENESTRA_PROPERTY_SCENES", 3) {
         let mut random = Random(seed.wrapping_mul(0x9e37_79b9));
         fs::write(folder.path().join("triangles.ply"), triangles(&mut random)).unwrap();
         let is_furnace = random.uniform() < 0.4;
@@ -189,7 +189,9 @@ fn no_scene_makes_an_impossible_pixel() {
             }
         };
         let depth = [1, 2, 4][(3.0 * random.uniform()) as usize];
-        for &sampler in Sampler::ALL {
+        println!("{seed}: {} materials, depth {depth}", scene.materials.len());
+        // Three scenes have every sampler: making renderers takes most of the time.
+        for &sampler in Sampler::ALL.iter().skip(seed as usize % 3).step_by(3) {
             let settings = Settings { sampler, depth, ..Settings::default() };
             let samples = if is_furnace { 16 } else { 3 };
             let (sums, totals) = support::render(&scene, settings, samples);
