@@ -78,7 +78,11 @@ fn dependencies_come_from_the_registry_with_a_checksum() {
     let packages = lock["package"].as_array().unwrap();
     assert!(packages.len() > 50, "{}", packages.len());
     for package in packages.iter().filter(|package| package["name"].as_str() != Some("fenestra")) {
-        assert_eq!(package.get("source").and_then(toml::Value::as_str), Some(REGISTRY), "{package}");
+        assert_eq!(
+            package.get("source").and_then(toml::Value::as_str),
+            Some(REGISTRY),
+            "{package}"
+        );
         let checksum = package.get("checksum").and_then(toml::Value::as_str);
         assert!(checksum.is_some_and(|checksum| checksum.len() == 64), "{package}");
     }

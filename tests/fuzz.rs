@@ -144,10 +144,7 @@ fn targets() -> Vec<Target> {
         }
     });
     vec![
-        Target {
-            beside: beside(),
-            ..target("toml", "input.toml", texts(&[seeds::TOML]), scene)
-        },
+        Target { beside: beside(), ..target("toml", "input.toml", texts(&[seeds::TOML]), scene) },
         target("sky", "input.toml", texts(&[seeds::SKY]), scene),
         target(
             "ply",

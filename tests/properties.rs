@@ -101,8 +101,7 @@ fn object(random: &mut Random, name: &str) -> String {
 
 /// Text of a scene; under a furnace, light from every direction is 1.
 fn scene_text(random: &mut Random, is_furnace: bool) -> String {
-    let camera =
-        pick(random, &["[0, 0.5, 3]", "[0.1, 0.2, 0.05]", "[0, 50, 1]", "[0, 0, 2000]"]);
+    let camera = pick(random, &["[0, 0.5, 3]", "[0.1, 0.2, 0.05]", "[0, 50, 1]", "[0, 0, 2000]"]);
     let sky = if is_furnace {
         "constant = [1, 1, 1]"
     } else {

@@ -1092,7 +1092,10 @@ fn broken_gltf_files_are_refused() {
     let mut small = whole;
     small[8..12].copy_from_slice(&11_u32.to_le_bytes());
     let message = folder.mesh_message("small.glb", &small);
-    assert!(message.contains("the header states 11 bytes, expected at least its own 12"), "{message}");
+    assert!(
+        message.contains("the header states 11 bytes, expected at least its own 12"),
+        "{message}"
+    );
 }
 
 #[test]
