@@ -108,6 +108,13 @@ fn a_study_has_every_figure() {
     // Two levels of samples and one time, for two samplers.
     assert_eq!(results["summaries"].as_array().unwrap().len(), 6);
     assert_eq!(results["curves"].as_array().unwrap().len(), 2);
+    // Two samplers, two figures, two thresholds.
+    let times = results["times_to_quality"].as_array().unwrap();
+    assert_eq!(times.len(), 8);
+    for time in times {
+        assert_eq!(time["runs"], 2);
+        assert_ne!(time["seconds"].is_null(), time["extrapolated_seconds"].is_null(), "{time}");
+    }
     let reference = &results["scenes"][0]["reference"];
     assert_eq!(reference["spp"], 128);
     assert!(reference["mse"].as_f64().unwrap() > 0.0);
@@ -132,6 +139,7 @@ fn a_study_has_every_figure() {
         "relmse_p999",
         "relmse_max",
         "mean_ratio",
+        "seconds_to_relmse_0.1_of_run",
         "gpu_ms_per_sample_sample",
     ] {
         assert!(columns.contains(&column), "{column}: {columns:?}");
@@ -147,6 +155,7 @@ fn a_study_has_every_figure() {
     check_page(&page);
     for part in [
         "At a glance",
+        "Seconds until relMSE falls",
         "id=\"scene-0\"",
         "mis, 6 spp",
         "ris, 0.1 s: error",

@@ -3,7 +3,7 @@
 //! A study file and the command line ([`mod@file`], [`plan`], [`contender`]) → runs against a
 //! reference in two halves ([`engine`], [`job`], [`rule`], [`mod@reference`], [`own_errors`],
 //! [`overhead`]), each kept as a [`record`] in the report [`folder`] → figures over the seeds
-//! ([`summary`], [`statistics`]) → `results.json`, `results.csv` ([`results`]) and the page
+//! ([`summary`], [`quality`], [`statistics`]) → `results.json`, `results.csv` ([`results`]) and the page
 //! ([`report`]). [`metrics`] defines the errors.
 
 pub mod contender;
@@ -17,6 +17,7 @@ pub mod metrics;
 pub mod overhead;
 pub mod own_errors;
 pub mod plan;
+pub mod quality;
 pub mod record;
 pub mod reference;
 pub mod report;

@@ -80,7 +80,7 @@ pub(super) fn assignments(parameters: &BTreeMap<String, String>, separator: &str
 }
 
 /// Errors of a film after some samples.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
     /// Samples per pixel.
     pub spp: u32,

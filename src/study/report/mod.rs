@@ -53,6 +53,11 @@ pub fn write(report: &Report, plan: &Plan, folder: &Folder) -> Result<()> {
         body += "<section id=\"glance\"><h2>At a glance</h2>";
         body += &tables::at_a_glance(report, &rules);
         body += "</section>";
+        let times = tables::times_to_quality(report);
+        if !times.is_empty() {
+            let _ =
+                write!(body, "<section id=\"quality\"><h2>Time to quality</h2>{times}</section>");
+        }
         let published = tables::published(report);
         if !published.is_empty() {
             let _ = write!(
@@ -107,6 +112,7 @@ fn start(report: &Report) -> String {
     };
     if !report.summaries.is_empty() {
         link("glance", "At a glance");
+        link("quality", "Time to quality");
         for (index, scene) in report.scenes.iter().enumerate() {
             if report.summaries.iter().any(|summary| summary.scene == scene.name) {
                 link(&format!("scene-{index}"), &scene.name);

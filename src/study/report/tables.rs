@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use super::html::{Table, count, escape, interval, number, percent, percent_added, percent_more};
 use crate::study::{
     overhead::Overhead,
+    quality::{Figure, THRESHOLDS, TimeToQuality},
     results::Report,
     rule::Rule,
     statistics::Interval,
@@ -105,6 +106,80 @@ fn glance_table(
         }
     }
     table.html()
+}
+
+/// Seconds until relMSE falls to the thresholds, for every sampler in every scene.
+pub fn times_to_quality(report: &Report) -> String {
+    let mut html = String::new();
+    for (figure, name) in [(Figure::Relmse, "relMSE"), (Figure::RelmseTrimmed, "trimmed relMSE")] {
+        let caption = format!(
+            "Seconds until {name} falls to a threshold and stays there: median over the seeds, with \
+             the fastest and the slowest. Interpolated between the looks of a run. In italics: the \
+             error at the end of runs that did not get there, and an extrapolation as if it went on \
+             to fall as 1/time."
+        );
+        let mut table = Table::new(caption, &["scene", "down to"]);
+        for name in &report.order {
+            table.column(escape(name));
+        }
+        for scene in &report.scenes {
+            let mut is_first = true;
+            for threshold in THRESHOLDS {
+                let is_here = |time: &&TimeToQuality| {
+                    (time.scene.as_str(), time.figure) == (scene.name.as_str(), figure)
+                        && time.threshold == threshold
+                };
+                let here: Vec<&TimeToQuality> =
+                    report.times_to_quality.iter().filter(is_here).collect();
+                if here.is_empty() {
+                    continue;
+                }
+                let first = if is_first { escape(&scene.name) } else { String::new() };
+                let mut cells = vec![first, threshold.to_string()];
+                cells.extend(report.order.iter().map(|name| {
+                    here.iter()
+                        .find(|time| time.sampler == *name)
+                        .map_or_else(String::new, |time| time_cell(time))
+                }));
+                table.row(is_first, cells);
+                is_first = false;
+            }
+        }
+        if !table.is_empty() {
+            html += &table.html();
+        }
+    }
+    html
+}
+
+fn time_cell(time: &TimeToQuality) -> String {
+    let seconds = |value: f64| format!("{} s", number(value, 3));
+    if !time.is_judged {
+        return NOT_JUDGED.to_owned();
+    }
+    let Some(middle) = time.seconds else {
+        let extrapolated = time
+            .extrapolated_seconds
+            .map_or_else(String::new, |value| format!("; extrapolated {}", seconds(value)));
+        return format!(
+            "<span class=\"refused\">not reached by {} of {}: {} after {}{extrapolated}</span>",
+            time.runs - time.reached,
+            time.runs,
+            number(time.last_error, 2),
+            seconds(time.last_seconds)
+        );
+    };
+    let bound = if time.is_upper_bound { "≤ " } else { "" };
+    let spread = match (time.fastest, time.slowest) {
+        (Some(low), Some(high)) if low == high => String::new(),
+        (Some(low), Some(high)) => format!("({}–{})", number(low, 3), number(high, 3)),
+        (Some(low), None) => {
+            let missed = time.runs - time.reached;
+            format!("({}–; not reached by {missed} of {})", number(low, 3), time.runs)
+        }
+        (None, _) => String::new(),
+    };
+    format!("{bound}{} <span class=\"interval\">{spread}</span>", seconds(middle))
 }
 
 /// Tables of published figures beside the study's own, one for each source and scene.
