@@ -118,6 +118,10 @@ fn a_study_has_every_figure() {
     let reference = &results["scenes"][0]["reference"];
     assert_eq!(reference["spp"], 128);
     assert!(reference["mse"].as_f64().unwrap() > 0.0);
+    let check = &results["scenes"][0]["reference_check"];
+    assert!(check["description"].as_str().unwrap().starts_with("env, two halves of "), "{check}");
+    assert_ne!(check["verdict"], "disagrees", "{check}");
+    assert!(check["spp"].as_u64().unwrap() >= 2 && check["seconds"].as_f64().unwrap() > 0.0);
     assert!(results["circumstances"]["device"].is_string());
 
     let table = fs::read_to_string(folder.path().join("report/results.csv")).unwrap();
@@ -451,6 +455,7 @@ fn wrong_options_exit_with_2() {
     refuse(&["--samplers=ris:colour=1"], "known: bounce-candidates");
     refuse(&["--samplers=mis,mis"], "sampler \"mis\" is listed twice");
     refuse(&["--reference-sampler=best"], "there is no sampler \"best\"");
+    refuse(&["--reference-check=best"], "--reference-check best: there is no sampler \"best\"");
     refuse(&["--baseline=best"], "there is no sampler \"best\"");
     refuse(&["--spp=0"], "--spp: expected 1 to");
     refuse(&["--seeds=0"], "--seeds: expected 1 to");
@@ -521,6 +526,37 @@ fn references_can_be_given() {
     let text = fs::read_to_string(folder.path().join("more/results.json")).unwrap();
     let results: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(results["scenes"][0]["reference"]["mean"], own["mean"]);
+}
+
+#[test]
+fn a_biased_reference_is_found() {
+    let folder = folder();
+    reference(&folder, "a.exr", &["--seed=100", "--spp=256"]);
+    reference(&folder, "b.exr", &["--seed=101", "--spp=256"]);
+    // A third of the picture is a tenth too bright in both halves.
+    for name in ["a.exr", "b.exr"] {
+        let path = folder.path().join(name);
+        let mut image = Image::read_exr(&path).unwrap();
+        for channel in ["R", "G", "B"] {
+            for (index, value) in image.channels.get_mut(channel).unwrap().iter_mut().enumerate() {
+                *value *= if index % 24 < 8 { 1.1 } else { 1.0 };
+            }
+        }
+        image.write_exr(&path).unwrap();
+    }
+    let loud: Vec<&str> = WITH_REFERENCE.iter().filter(|o| **o != "--quiet").copied().collect();
+    reference(&folder, "c.exr", &["--seed=102", "--sampler=ris", "--spp=256"]);
+    let outside = ["--reference=a.exr", "--reference=b.exr", "--reference-check=c.exr"];
+    folder.run(&with(&loud, &outside)).assert(0, &["DISAGREES"]);
+    let check = json(&folder, "results.json")["scenes"][0]["reference_check"].clone();
+    assert_eq!(check["verdict"], "disagrees", "{check}");
+    assert!(check["block"][0].as_u64().unwrap() < 8, "{check}");
+    let page = fs::read_to_string(folder.path().join("report/index.html")).unwrap();
+    check_page(&page);
+    assert!(page.contains("is in doubt"));
+    let off = ["--reference=a.exr", "--reference=b.exr", "--reference-check=off"];
+    folder.run(&with(&loud, &off)).assert(0, &[]);
+    assert!(json(&folder, "results.json")["scenes"][0]["reference_check"].is_null());
 }
 
 #[test]

@@ -9,9 +9,10 @@ use super::{
     folder::Folder,
     job::{RunJob, exposure, image_of},
     overhead::OverheadJob,
-    plan::{Plan, ReferencePlan},
+    plan::{CheckPlan, Plan, ReferencePlan},
     record::{Round, Run, SceneRecord},
     reference::{HALF_STEMS, Reference},
+    reference_check::{self, CheckJob, ReferenceCheck, Verdict},
     rule::Rule,
     watch::{Observer, Watch},
 };
@@ -128,11 +129,16 @@ impl Study<'_> {
             height: scene.film.height,
             triangles: scene.geometry.triangle_count(),
             reference: None,
+            reference_check: None,
         });
         if self.plan.compares() {
             let reference = self.reference(scene, &mut buffers)?;
             if let Some(record) = results.scenes.last_mut() {
                 record.reference = Some(reference.own.clone());
+            }
+            let check = self.check_reference(scene, &mut buffers, &reference)?;
+            if let Some(record) = results.scenes.last_mut() {
+                record.reference_check = check;
             }
             self.compare(scene, &mut buffers, &reference, results)?;
         }
@@ -200,6 +206,35 @@ impl Study<'_> {
         let mean = reference.mean();
         write_preview(&path.with_extension("png"), &mean, exposure(&mean))?;
         Ok(reference)
+    }
+
+    /// Compares the reference with an independent picture, if the plan has one.
+    fn check_reference(
+        &mut self,
+        scene: &Scene,
+        buffers: &mut SharedBuffers<'_>,
+        reference: &Reference,
+    ) -> Result<Option<ReferenceCheck>> {
+        let plan = &self.plan.reference_check;
+        let check = if let CheckPlan::File(path) = plan {
+            reference_check::read(path, scene, reference)?
+        } else {
+            let Some(contender) = plan.contender(reference.sampler.as_deref()) else {
+                return Ok(None);
+            };
+            let settings = self.settings(&contender);
+            let metadata = self.metadata(scene, &contender);
+            let folder = self.folder;
+            let job = CheckJob { folder, scene, reference, contender: &contender, metadata };
+            job.execute(&mut || buffers.renderer(settings.clone()), &mut self.watch)?
+        };
+        let text = format!("{}: {}", scene.name, check.describe());
+        if check.verdict == Verdict::Disagrees {
+            log::warn!("{text}");
+        } else {
+            self.watch.note(&text);
+        }
+        Ok(Some(check))
     }
 
     /// Renders every run and compares it with the reference.

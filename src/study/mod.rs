@@ -1,8 +1,8 @@
 //! Comparisons of samplers as experiments.
 //!
 //! A study file and the command line ([`mod@file`], [`plan`], [`contender`]) → runs against a
-//! reference in two halves ([`engine`], [`job`], [`rule`], [`mod@reference`], [`own_errors`],
-//! [`overhead`]), each kept as a [`record`] in the report [`folder`] → figures over the seeds
+//! reference in two halves ([`engine`], [`job`], [`rule`], [`mod@reference`], [`reference_check`],
+//! [`own_errors`], [`overhead`]), each kept as a [`record`] in the report [`folder`] → figures over the seeds
 //! ([`summary`], [`quality`], [`statistics`]) → `results.json`, `results.csv` ([`results`]) and the page
 //! ([`report`]). [`metrics`] defines the errors.
 
@@ -20,6 +20,7 @@ pub mod plan;
 pub mod quality;
 pub mod record;
 pub mod reference;
+pub mod reference_check;
 pub mod report;
 pub mod results;
 pub mod rule;

@@ -315,6 +315,7 @@ mod tests {
             height: 3,
             triangles: 1,
             reference: Some(reference),
+            reference_check: None,
         };
         times_to_quality(&plan.unwrap(), &[scene], runs)
     }

@@ -9,6 +9,7 @@ use super::{
     metrics::Metrics,
     own_errors::{OwnErrors, is_judged},
     reference::Reference,
+    reference_check::ReferenceCheck,
     rule::Rule,
     statistics::mean_standard_error,
 };
@@ -310,6 +311,8 @@ pub struct SceneRecord {
     pub triangles: u64,
     /// The reference's own errors, if errors were compared.
     pub reference: Option<OwnErrors>,
+    /// Comparison of the reference with an independent picture, if it was checked.
+    pub reference_check: Option<ReferenceCheck>,
 }
 
 /// Returns the part of a file name that identifies its run.

@@ -17,6 +17,7 @@ use super::{
     own_errors::JUDGED_FROM,
     plan::Plan,
     record::SceneRecord,
+    reference_check::Verdict,
     results::Report,
     rule::Rule,
     summary::{Curve, CurvePoint, rules},
@@ -103,6 +104,16 @@ fn start(report: &Report) -> String {
         html += "<p class=\"warning\"><strong class=\"warn\">This study ended early.</strong> The \
                  page shows the runs that were finished; the same command continues it.</p>";
     }
+    for scene in &report.scenes {
+        if scene.reference_check.as_ref().is_some_and(|check| check.verdict == Verdict::Disagrees) {
+            let _ = write!(
+                html,
+                "<p class=\"warning\"><strong class=\"warn\">The reference of {} is in \
+                 doubt.</strong> An independent picture disagrees with it.</p>",
+                escape(&scene.name)
+            );
+        }
+    }
     for note in &report.notes {
         let _ = write!(html, "<p>{}</p>", escape(note));
     }
@@ -178,6 +189,17 @@ fn scene_section(
             (None, _) => "; how noisy it is itself is not known, and its noise is part of every \
                           error here.</p>"
                 .to_owned(),
+        };
+    }
+    if let Some(check) = &scene.reference_check {
+        let text = escape(&check.describe());
+        html += &match check.verdict {
+            Verdict::Disagrees => format!(
+                "<p class=\"warning\"><strong class=\"warn\">The reference is in doubt.</strong> \
+                 {text}. No figure of this scene is to be trusted before it is known which of the \
+                 two is wrong.</p>"
+            ),
+            Verdict::Agrees | Verdict::TooNoisy => format!("<p class=\"facts\">Check: {text}.</p>"),
         };
     }
     let refused = report

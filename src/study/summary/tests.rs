@@ -17,6 +17,7 @@ fn scene(own_mse: f64) -> SceneRecord {
         height: 3,
         triangles: 1,
         reference: Some(OwnErrors { mse: Some(own_mse), mean: 1.0, ..OwnErrors::default() }),
+        reference_check: None,
     }
 }
 
