@@ -18,9 +18,12 @@ void main() {
     if (pixel >= wave.pixel_count || !index.inside) {
         return;
     }
-    vec3 sum = film_sum[index.film_index];
-    vec3 compensation = film_compensation[index.film_index];
-    vec3 squares = film_squares[index.film_index];
+    // Training rays are counted, but their light stays out of the picture.
+    bool adds = wave.is_training == 0u;
+    uint place = adds ? film_place(index) : 0u;
+    vec3 sum = film_sum[place];
+    vec3 compensation = film_compensation[place];
+    vec3 squares = film_squares[place];
     uint bounce_rays = 0u;
     uint dropped = 0u;
     uvec2 shadow_rays = uvec2(0u);
@@ -43,13 +46,12 @@ void main() {
         compensation = next_compensation;
         squares += radiance * radiance;
     }
-    // Training rays are counted, but their light stays out of the picture.
-    if (wave.is_training == 0u) {
-        film_sum[index.film_index] = sum;
-        film_compensation[index.film_index] = compensation;
-        film_squares[index.film_index] = squares;
+    if (adds) {
+        film_sum[place] = sum;
+        film_compensation[place] = compensation;
+        film_squares[place] = squares;
         if ((wave.aovs & AOV_VISIBLE) != 0u) {
-            film_visible[index.film_index] += shadow_rays;
+            film_visible[place] += shadow_rays;
         }
     }
     atomicAdd(counters.camera_rays, wave.sample_count);

@@ -22,13 +22,14 @@ void main() {
     if (pixel >= wave.pixel_count || !index.inside) {
         return;
     }
+    uint place = film_place(index);
     // Add sample by sample: the sums must not depend on how samples are grouped into waves.
     bool wants_albedo = (wave.aovs & AOV_ALBEDO) != 0u;
     bool wants_normal = (wave.aovs & AOV_NORMAL) != 0u;
     bool wants_position = (wave.aovs & AOV_POSITION) != 0u;
-    vec3 albedo = wants_albedo ? film_albedo[index.film_index] : vec3(0.0);
-    vec3 normal = wants_normal ? film_normal[index.film_index] : vec3(0.0);
-    vec3 position = wants_position ? film_position[index.film_index] : vec3(0.0);
+    vec3 albedo = wants_albedo ? film_albedo[place] : vec3(0.0);
+    vec3 normal = wants_normal ? film_normal[place] : vec3(0.0);
+    vec3 position = wants_position ? film_position[place] : vec3(0.0);
     for (uint i = 0u; i < wave.sample_count; ++i) {
         uint path = i * wave.pixel_count + pixel;
         Hit hit = hits[path];
@@ -43,12 +44,12 @@ void main() {
         position += hit.position;
     }
     if (wants_albedo) {
-        film_albedo[index.film_index] = albedo;
+        film_albedo[place] = albedo;
     }
     if (wants_normal) {
-        film_normal[index.film_index] = normal;
+        film_normal[place] = normal;
     }
     if (wants_position) {
-        film_position[index.film_index] = position;
+        film_position[place] = position;
     }
 }

@@ -5,6 +5,7 @@
 #version 460
 #extension GL_KHR_shader_subgroup_ballot : require
 
+#include "given_up.glsl"
 #include "passage.glsl"
 #include "load.glsl"
 #include "wave.glsl"
@@ -55,6 +56,7 @@ void main() {
     uint visible_bits = 0u;
     uint turn = 0u;
     uint steps = 0u;
+    uint given_up = 0u;
     bool has_ray = first < ray_count;
     bool is_traced = false;
     if (has_ray) {
@@ -72,9 +74,7 @@ void main() {
         } while (subgroupBallotBitCount(subgroupBallot(!running)) < refill
             && steps < TRAVERSAL_STEP_LIMIT);
         if (!running || steps >= TRAVERSAL_STEP_LIMIT) {
-            if (running) {
-                atomicAdd(counters.traversal_overruns, 1u);
-            }
+            given_up |= running ? 1u << turn : 0u;
             bool is_visible = is_traced && !running && bvh_triangle == NO_TRIANGLE;
             visible_bits |= is_visible ? 1u << turn : 0u;
             if (HAS_PASSAGES && is_visible && bvh_transmittance != vec3(1.0)) {
@@ -88,6 +88,11 @@ void main() {
         }
     }
 
+    // A loop, since software devices run the body of every branch.
+    for (; given_up != 0u; given_up &= given_up - 1u) {
+        uint lost = uint(findLSB(given_up));
+        COUNT_GIVEN_UP(path_of(first + lost * WORKGROUP_SIZE, path_count));
+    }
     for (turn = 0u; turn < RAYS_PER_INVOCATION; turn++) {
         uint index = first + turn * WORKGROUP_SIZE;
         if (index < ray_count) {

@@ -5,6 +5,7 @@
 #version 460
 #extension GL_KHR_shader_subgroup_ballot : require
 
+#include "given_up.glsl"
 #include "passage.glsl"
 #include "load.glsl"
 #include "surfaces.glsl"
@@ -17,6 +18,7 @@ UPDATES(counters)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
+// At most 32: rays given up are kept as bits until the end.
 layout(constant_id = CONSTANT_RAYS_PER_INVOCATION) const uint RAYS_PER_INVOCATION = 1u;
 layout(constant_id = CONSTANT_REFILL_LANES) const uint REFILL_LANES = 0xffffffffu;
 
@@ -66,6 +68,7 @@ void main() {
 
     uint turn = 0u;
     uint steps = 0u;
+    uint given_up = 0u;
     bool has_ray = first < ray_count;
     if (has_ray) {
         Ray ray = load_ray(first);
@@ -84,9 +87,7 @@ void main() {
         } while (subgroupBallotBitCount(subgroupBallot(!running)) < refill
             && steps < TRAVERSAL_STEP_LIMIT);
         if (!running || steps >= TRAVERSAL_STEP_LIMIT) {
-            if (running) {
-                atomicAdd(counters.traversal_overruns, 1u);
-            }
+            given_up |= running ? 1u << turn : 0u;
             if (HAS_PASSAGES && !running && bvh_triangle != NO_TRIANGLE
                 && goes_through(first + turn * WORKGROUP_SIZE)) {
                 continue;
@@ -105,6 +106,11 @@ void main() {
         }
     }
 
+    // A loop, since software devices run the body of every branch.
+    for (; given_up != 0u; given_up &= given_up - 1u) {
+        uint lost = uint(findLSB(given_up));
+        COUNT_GIVEN_UP(first + lost * WORKGROUP_SIZE);
+    }
     for (turn = 0u; turn < RAYS_PER_INVOCATION; turn++) {
         uint index = first + turn * WORKGROUP_SIZE;
         if (index < ray_count) {

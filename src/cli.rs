@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::{command, error::Error};
+use crate::{command, error::Error, memory};
 
 /// Arguments of `fenestra`.
 #[derive(Debug, Parser)]
@@ -13,6 +13,10 @@ pub struct Cli {
     /// Command to run.
     #[command(subcommand)]
     pub command: Command,
+    /// Most memory to use, such as 512M or 8G. Default: three quarters of the machine's. A request
+    /// beyond it is an error that says what asked for how much.
+    #[arg(long, global = true, value_name = "SIZE", value_parser = memory::parse_size)]
+    pub max_memory: Option<u64>,
 }
 
 /// The commands; each variant holds the arguments that `command/<name>.rs` declares.
@@ -54,6 +58,9 @@ pub fn run() -> ExitCode {
         .format_timestamp(None)
         .format_target(false)
         .init();
+    if let Some(bytes) = cli.max_memory {
+        memory::set_limit(bytes);
+    }
     // The pool, if any, lives until the command has ended.
     let result = command::start_threads().and_then(|_pool| match &cli.command {
         Command::Render(arguments) => command::render::run(arguments),

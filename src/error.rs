@@ -5,6 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use crate::memory::Shortage;
+
 /// Result with Fenestra's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
@@ -65,6 +67,12 @@ pub enum Error {
         /// Advice to the user.
         help: String,
     },
+    /// The memory that the process may use, or that of the device, does not suffice.
+    #[error("{message}")]
+    Memory {
+        /// Who asks for how much, and how much there is.
+        message: String,
+    },
     /// Options that contradict each other or are out of range.
     #[error("{message}")]
     Usage {
@@ -115,6 +123,11 @@ impl Error {
     /// Creates an [`Error::Scene`] for `path`.
     pub fn scene(path: &Path, message: impl Into<String>) -> Self {
         Self::Scene { path: path.to_path_buf(), message: message.into() }
+    }
+
+    /// Creates an [`Error::Memory`] of a refused request.
+    pub(crate) fn memory(shortage: Shortage) -> Self {
+        Self::Memory { message: shortage.to_string() }
     }
 
     /// Creates an [`Error::Usage`].

@@ -11,7 +11,10 @@ use std::{
 
 use serde::Serialize;
 
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    memory, stage,
+};
 
 /// Start of the names of temporary files; the id of the process that writes them follows.
 const TEMPORARY_PREFIX: &str = ".fenestra-";
@@ -41,7 +44,10 @@ pub fn hexadecimal(bytes: &[u8]) -> String {
 /// Reads a whole regular file.
 pub fn read(path: &Path) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    let read = open_regular(path)?.read_to_end(&mut bytes);
+    let mut file = open_regular(path)?;
+    let length = file.metadata().map_or(0, |metadata| metadata.len());
+    memory::check(path.display(), length).map_err(Error::memory)?;
+    let read = file.read_to_end(&mut bytes);
     read.map(|_| bytes).map_err(|source| Error::io(path, "read", source))
 }
 
@@ -208,6 +214,7 @@ pub fn open_regular(path: &Path) -> Result<File> {
             format!("expected a regular file, found {}", name_of(kind)),
         ));
     }
+    stage::enter(format_args!("reading {}", path.display()));
     File::open(path).map_err(io_error)
 }
 

@@ -182,5 +182,7 @@ pub mod command;
 
 pub mod error;
 pub mod files;
+pub mod memory;
+pub mod stage;
 
 pub use error::{Error, Result};

@@ -519,6 +519,95 @@ fn shapes_of_too_many_triangles_are_refused() {
 }
 
 #[test]
+fn a_request_beyond_the_memory_limit_says_who_asks_for_how_much() {
+    // A header that lies about a map within the limits of its format.
+    let mut lie = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8192 +X 16384\n".to_vec();
+    lie.resize(3 << 20, 2);
+    let map = scene("constant = [1.0, 1.0, 1.0]", "map = \"lie.hdr\"");
+    map.write("lie.hdr", &lie);
+    let shape = scene("mesh = \"quad.ply\"", "shape = \"sphere\"\nradius = 1.0\nsegments = 4096");
+    let tree = scene("mesh = \"quad.ply\"", "shape = \"sphere\"\nradius = 1.0\nsegments = 1024");
+    let film = ["--size=8000x8000"];
+    let cases: [(&Folder, &str, &[&str], &str); 4] = [
+        (
+            &map,
+            "1G",
+            &[],
+            "lie.hdr: not enough memory: a map of 16384×8192 texels asks for 6.0 GiB",
+        ),
+        (&shape, "300M", &[], "a shape asks for 4"),
+        (&tree, "300M", &[], "the tree over 10"),
+        (&scene("", ""), "1G", &film, "a film of 8000x8000 pixels asks for 5"),
+    ];
+    for (folder, limit, options, who) in cases {
+        let limit = format!("--max-memory={limit}");
+        let run = folder.run(&[&RENDER[..], &[&*limit], options].concat());
+        run.assert(1, &["not enough memory: ", who, "; allow more, or make it smaller"]);
+        assert!(!folder.path().join("out.exr").exists());
+    }
+    let run = scene("", "").run(&[&RENDER[..], &["--max-memory=lots"]].concat());
+    run.assert(2, &["expected a size such as 512M or 8G, found \"lots\""]);
+}
+
+/// Thousands of triangles in one place, in the middle of the picture.
+#[test]
+fn rays_that_are_given_up_are_counted_with_their_pixels() {
+    let folder = scene("", "");
+    let mut faces = QUAD_FACES.map(str::to_owned).to_vec();
+    faces.resize(40_000, "3 4 5 6".to_owned());
+    let faces: Vec<&str> = faces.iter().map(String::as_str).collect();
+    let crowd = ["-0.1 -0.1 0.5", "0.1 -0.1 0.5", "0 0.1 0.5"];
+    folder.write("quad.ply", ply(&[&QUAD_VERTICES[..], &crowd].concat(), &faces));
+    let run = folder.run(&RENDER);
+    run.assert(0, &["rays were given up after too many steps of traversal"]);
+    let bounds = run.messages.split("within --crop ").nth(1).unwrap();
+    let bounds = bounds.split(' ').next().unwrap().split(',').map(|bound| bound.parse::<u32>());
+    let [left, top, right, bottom] = bounds.collect::<Result<Vec<_>, _>>().unwrap()[..] else {
+        panic!("expected four bounds in {}", run.messages)
+    };
+    // The crowd itself, and pixels of the quad whose shadow rays meet it.
+    assert!((1..8).contains(&left) && (1..6).contains(&top), "{}", run.messages);
+    assert!((9..=16).contains(&right) && (7..=12).contains(&bottom), "{}", run.messages);
+}
+
+/// Waves get smaller before anything is refused, which changes no bit.
+#[test]
+fn less_memory_makes_smaller_waves_and_the_same_picture() {
+    let folder = scene("width = 16\nheight = 12", "width = 160\nheight = 120");
+    let render = |limit: &str| {
+        let options = [&RENDER[..], &[limit, "--sampler=visibility", "--stats=s.json"]].concat();
+        folder.run(&options).assert(0, &[]);
+        let stats: serde_json::Value =
+            serde_json::from_slice(&fs::read(folder.path().join("s.json")).unwrap()).unwrap();
+        let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+        (stats["buffer_bytes"]["shadow rays"].as_u64().unwrap(), image.channels)
+    };
+    let (bytes, picture) = render("--max-memory=4G");
+    let (fewer, same) = render("--max-memory=300M");
+    assert!(fewer < bytes, "{fewer} of {bytes} bytes");
+    assert!(same == picture);
+}
+
+#[test]
+fn loading_that_takes_long_says_so_and_ends_at_an_interrupt() {
+    use std::fmt::Write;
+    let mut balls = String::from("shape = \"blobs\"\nblend = 0.5\ncells = 256\nballs = [\n");
+    for index in 0..512 {
+        writeln!(balls, "{{ at = [{}, 0, {}], radius = 1 }},", index % 23, index / 23).unwrap();
+    }
+    let folder = scene("mesh = \"quad.ply\"", &format!("{balls}]"));
+    let running = Running::start(
+        folder.path(),
+        &RENDER,
+        "loading scene.toml: 2 s, making object `quad` (blobs",
+    );
+    let start = Instant::now();
+    running.interrupt().assert(130, &["error: interrupted before anything was rendered"]);
+    assert!(start.elapsed() < Duration::from_secs(2), "took {:?}", start.elapsed());
+    assert!(!folder.path().join("out.exr").exists());
+}
+
+#[test]
 fn a_gltf_accessor_that_is_not_there_is_named() {
     let folder = scene("quad.ply", "quad.gltf");
     folder.write(

@@ -3,7 +3,7 @@
 
 mod support;
 
-use fenestra::{film::Sums, renderer::Settings, sampler::Sampler, scene::Scene};
+use fenestra::{film::Sums, pass::Roulette, renderer::Settings, sampler::Sampler, scene::Scene};
 use glam::{DVec3, Vec3};
 use support::{
     scenes::{self, diffuse},
@@ -110,7 +110,7 @@ fn irradiance_of_a_plane_is_the_integral_of_the_map() {
 fn a_concave_white_body_vanishes_in_the_furnace() {
     let _alone = support::alone();
     let scene = scenes::concave_furnace();
-    let settings = Settings { depth: 24, roulette_vertex: 64, ..Settings::default() };
+    let settings = Settings { depth: 24, roulette: Roulette::NEVER, ..Settings::default() };
     for sampler in [Sampler::Cosine, Sampler::Mis, Sampler::Ris] {
         let sums = render(&scene, Settings { sampler, ..settings.clone() }, 64);
         let mean = image_mean(&sums);
@@ -130,11 +130,15 @@ fn a_concave_white_body_vanishes_in_the_furnace() {
 fn roulette_keeps_the_mean() {
     let _alone = support::alone();
     let scene = scenes::concave_furnace();
-    let settings = Settings { depth: 24, roulette_vertex: 2, ..Settings::default() };
+    let settings = Settings {
+        depth: 24,
+        roulette: Roulette { vertex: 2, throughput: 1.0 },
+        ..Settings::default()
+    };
     let mut scene = scene;
     scene.materials = vec![diffuse(Vec3::splat(0.7))];
     let [with, with_error] = mean_and_error(&scene, &settings, 32, 8);
-    let without = Settings { roulette_vertex: 64, ..settings };
+    let without = Settings { roulette: Roulette::NEVER, ..settings };
     let [without, without_error] = mean_and_error(&scene, &without, 32, 8);
     let z = (with.x - without.x) / with_error.x.hypot(without_error.x);
     assert!(z.abs() < 6.0, "{with} against {without}, z {z}");

@@ -87,6 +87,28 @@ fn a_resumed_render_equals_an_uninterrupted_one() {
     assert!(renderer.sums().unwrap() == uninterrupted);
 }
 
+/// Pages of one row of blocks each, in a film and in a window that no block fits.
+#[test]
+fn pages_of_the_film_make_no_difference() {
+    let _alone = support::alone();
+    let window = Some(Window { x: 3, y: 5, width: 21, height: 19 });
+    for (sampler, window) in
+        [(Sampler::Mis, window), (Sampler::Visibility, None), (Sampler::Guided, None)]
+    {
+        let one_page = Settings { window, ..settings(sampler) };
+        let pages = Settings { film_page_bytes: 1, ..one_page.clone() };
+        let whole = render(one_page, &[2, 3]);
+        assert!(render(pages.clone(), &[2, 3]) == whole, "{} differs", sampler.name());
+        if sampler == Sampler::Mis {
+            let half = render(pages.clone(), &[2]);
+            let mut resumed = renderer(&scene(), pages);
+            resumed.restore(&half).unwrap();
+            resumed.render_pass(3).unwrap();
+            assert!(resumed.sums().unwrap() == whole, "the resumed film differs");
+        }
+    }
+}
+
 #[test]
 fn sums_of_another_window_are_refused() {
     let _alone = support::alone();

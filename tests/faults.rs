@@ -342,3 +342,79 @@ fn a_limit_of_file_sizes_is_an_error_and_no_signal() {
     assert_eq!(fs::read(folder.path().join("out.exr")).unwrap(), before);
     assert!(folder.files().iter().all(|name| !name.ends_with(".tmp")), "{:?}", folder.files());
 }
+
+/// The disk is full after some blocks of 512 bytes, at which a guide or a checkpoint breaks off.
+#[test]
+fn a_disk_that_fills_keeps_the_last_checkpoint() {
+    let folder = folder();
+    let options = [&GUIDED[..], &["--checkpoint-interval=1h"]].concat();
+    folder.run(&[&options[..], &["--spp=2"]].concat()).assert(0, &[]);
+    let path = folder.path().join("out.checkpoint.exr");
+    let samples = || {
+        let (checkpoint, guide) = Checkpoint::read_with_guide(&path).unwrap();
+        assert!(guide.is_some());
+        checkpoint.sums.sample_count
+    };
+    let (mut failed, mut kept) = (0, samples());
+    for (turn, blocks) in [1, 16, 256, 4096].into_iter().enumerate() {
+        let spp = 3 + turn as u32;
+        let line = format!("{} --resume --spp={spp}", options.join(" "));
+        let run = run_after(&folder, &format!("ulimit -f {blocks}"), &line);
+        assert!(matches!(run.status, Some(0 | 1)), "{:?}: {}", run.status, run.messages);
+        let is_written = run.status == Some(0);
+        assert_eq!(samples(), if is_written { spp } else { kept }, "{blocks}: {}", run.messages);
+        kept = samples();
+        failed += u32::from(!is_written);
+        assert!(folder.files().iter().all(|name| !name.ends_with(".tmp")), "{:?}", folder.files());
+    }
+    assert!((1..4).contains(&failed), "{failed} of 4 disks were too small");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_folder_that_takes_no_files_is_named_before_the_work() {
+    let run = folder().run(&["render", "scene.toml", "-o", "/proc/out.exr"]);
+    run.assert(1, &["error: /proc/out.exr: cannot write"]);
+    assert!(!run.messages.contains("device: "), "{}", run.messages);
+}
+
+/// Three processes at once find no pipelines, then one finds damaged ones. Fits have tests of their own.
+#[test]
+fn shared_and_damaged_pipelines_change_no_picture() {
+    let folder = folder();
+    let cache = folder.path().join("cache");
+    let names = ["a.exr", "b.exr", "c.exr"];
+    let start = |name: &&str| {
+        let mut command = program(folder.path());
+        command.env("XDG_CACHE_HOME", &cache);
+        command.args(["render", "scene.toml", "-q", "--spp=2", "-o", name]);
+        command.stderr(Stdio::piped()).spawn().unwrap()
+    };
+    let end = |child: process::Child| Run::of(&child.wait_with_output().unwrap()).assert(0, &[]);
+    let running: Vec<_> = names.iter().map(start).collect();
+    running.into_iter().for_each(end);
+    let picture = channels(&folder, "a.exr");
+    assert!(names.iter().all(|name| channels(&folder, name) == picture));
+    let files = || {
+        let entries = fs::read_dir(cache.join("fenestra/pipelines")).unwrap();
+        entries.map(|entry| entry.unwrap().path()).collect::<Vec<_>>()
+    };
+    let whole: Vec<_> = files().into_iter().map(|path| (fs::read(&path).unwrap(), path)).collect();
+    assert_eq!(whole.len(), 1);
+    for (bytes, path) in &whole {
+        let mut damaged = bytes.clone();
+        let middle = damaged.len() / 2;
+        damaged[middle] ^= 0x10;
+        fs::write(path, &damaged).unwrap();
+    }
+    end(start(&"d.exr"));
+    assert!(channels(&folder, "d.exr") == picture);
+    for (bytes, path) in &whole {
+        assert_eq!(
+            fs::read(path).unwrap().len(),
+            bytes.len(),
+            "{} is written anew",
+            path.display()
+        );
+    }
+}

@@ -8,6 +8,7 @@
 mod support;
 
 use fenestra::{
+    pass::Roulette,
     renderer::{Renderer, Settings},
     sampler::{
         Parameters, Sampler,
@@ -203,7 +204,10 @@ fn every_vertex_of_a_path_is_unbiased() {
         ("one-sample, depth 4, no fewer rays", every_ray),
         ("one-sample, depth 4, bounces by the BRDF", unguided),
         // Throughputs of guided bounces depend on the tables, and so does roulette.
-        ("one-sample, depth 4, roulette", Settings { roulette_vertex: 1, ..guided(1) }),
+        (
+            "one-sample, depth 4, roulette",
+            Settings { roulette: Roulette { vertex: 1, throughput: 1.0 }, ..guided(1) },
+        ),
     ];
     agree(&scene, 4, 32, &modes);
 }
@@ -214,6 +218,8 @@ fn later_vertices_have_the_rays_they_are_given() {
     let rays = |depth: u32, later_rays: Option<u32>| {
         let mut settings = Settings { depth, ..guided(1) };
         settings.parameters.guided.later_rays = later_rays;
+        // The choice of tiles traces rays too.
+        settings.parameters.share_tiles = Some(1);
         let mut renderer =
             Renderer::new(support::device(), &scenes::mixed_room(), settings).unwrap();
         renderer.render_pass(1).unwrap();

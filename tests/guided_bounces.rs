@@ -133,7 +133,8 @@ fn bounce(floor: &Floor, candidates: u32, beliefs: &GuideState) -> Vec<(Vec3, Ve
     let state = guide.state().unwrap();
     guide.restore(&GuideState { arrivals: beliefs.arrivals.clone(), ..state }).unwrap();
     let waves =
-        WaveBuffers::new(device, PIXELS, 1, PathDemand::default(), Surfaces::default()).unwrap();
+        WaveBuffers::new(device, PIXELS, 1 << 17, 1, PathDemand::default(), Surfaces::default())
+            .unwrap();
     assert!(waves.capacity() >= paths);
     let input = support::PathInput {
         normal: floor.normal.into(),

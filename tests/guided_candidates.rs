@@ -145,8 +145,15 @@ impl Paths {
         Self {
             scene: SceneBuffers::new(device, scene, window).unwrap(),
             guide: GuideBuffers::new(device, scene, &parameters().guided, SIZE).unwrap(),
-            waves: WaveBuffers::new(device, 64, 1, PathDemand::default(), Surfaces::default())
-                .unwrap(),
+            waves: WaveBuffers::new(
+                device,
+                64,
+                u32::MAX,
+                1,
+                PathDemand::default(),
+                Surfaces::default(),
+            )
+            .unwrap(),
         }
     }
 

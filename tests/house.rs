@@ -11,9 +11,10 @@ use std::collections::BTreeSet;
 use source::{Files, Graph, files_of, tokens, uses};
 
 /// Top-level modules of `src`; each may use those before it.
-const ORDER: [&str; 20] = [
-    "error", "files", "shader", "math", "gpu", "texture", "brdf", "srbf", "scene", "accel", "film",
-    "export", "fit", "pass", "sampler", "renderer", "study", "bench", "command", "cli",
+const ORDER: [&str; 22] = [
+    "memory", "stage", "error", "files", "shader", "math", "gpu", "texture", "brdf", "srbf",
+    "scene", "accel", "film", "export", "fit", "pass", "sampler", "renderer", "study", "bench",
+    "command", "cli",
 ];
 
 /// Modules that compile and test with no Vulkan loader present, although `gpu` stands before them.

@@ -7,7 +7,10 @@ mod page;
 use std::{collections::BTreeMap, fmt::Write};
 
 use fenestra::{
-    pass::{Dispatch, PassSettings, Schedule, Steps, Surfaces, geometry::Traversal, wave_order},
+    pass::{
+        Dispatch, PassSettings, Roulette, Schedule, Steps, Surfaces, geometry::Traversal,
+        wave_order,
+    },
     sampler::{
         Parameters, basic,
         guided::{GuidedParameters, GuidedSteps},
@@ -33,11 +36,13 @@ fn settings(shadow_rays: u32, depth: u32) -> PassSettings {
         shadow_rays,
         depth,
         aovs: AOV_ALBEDO | AOV_CACHE_ENTRIES | AOV_GUIDE_CELL,
-        roulette_vertex: 8,
+        roulette: Roulette::default(),
         tile_edge: 1,
         surfaces: Surfaces::default(),
         traversal: Traversal { page_count: 1, page_shift: 20, is_instanced: false },
         incoherent: Schedule { rays_per_invocation: 16, refill_lanes: 3 },
+        film_page_bytes: u64::MAX,
+        most_paths: u32::MAX,
     }
 }
 

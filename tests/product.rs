@@ -195,7 +195,8 @@ impl Paths {
             cache_capacity: visibility.cache_places(SHADOW_RAYS),
             cached_pixels: None,
         };
-        let waves = WaveBuffers::new(device, 64, 1, size.demand(), Surfaces::default()).unwrap();
+        let waves =
+            WaveBuffers::new(device, 64, 1 << 17, 1, size.demand(), Surfaces::default()).unwrap();
         let kinds = buffers.surfaces();
         let steps = VisibilitySteps::new(visibility, product, fits.sizes(), kinds, SHADOW_RAYS);
         let lobes = LobeBuffers::new(device, fits, size, waves.capacity()).unwrap();

@@ -46,13 +46,14 @@ fn the_first_rule_that_is_reached_ends_the_render() {
 fn rays_are_counted_by_kind() {
     let folder = folder();
     let pixels = 40 * 24;
-    let (_, direct) = render(&folder, "out.exr", &["--spp", "4", "--sampler", "cosine"]);
+    let (_, direct) =
+        render(&folder, "out.exr", &["--spp", "4", "--sampler", "cosine", "--depth", "1"]);
     assert_eq!(direct.rays["camera"], 4 * pixels);
     assert_eq!(direct.rays["bounce"], 0);
     assert!(direct.rays["shadow"] > 0 && direct.rays["shadow"] % 5 == 0);
     let share = direct.visible_share.unwrap();
     assert!((0.5..1.0).contains(&share), "an open scene: {share}");
-    let (_, deep) = render(&folder, "out.exr", &["--spp", "4", "--depth", "3"]);
+    let (_, deep) = render(&folder, "out.exr", &["--spp", "4", "--depth", "3", "--sampler", "mis"]);
     assert!(deep.rays["bounce"] > 0 && deep.rays["shadow"] > direct.rays["shadow"] / 2);
     assert_eq!(deep.dropped_samples, 0);
     for pass in ["camera", "trace", "sample", "shadow", "gather", "bounce", "accumulate"] {

@@ -8,6 +8,7 @@ mod support;
 use fenestra::{
     brdf::{Material, material::MaterialKind},
     film::{Sums, Window},
+    pass::Roulette,
     renderer::Settings,
     sampler::Sampler,
     scene::Scene,
@@ -131,7 +132,7 @@ fn in_a_room_of_plastic_and_of_paint() {
 fn with_roulette_from_the_first_bounce_on() {
     let _alone = support::alone();
     let scene = scenes::room(vec![scenes::diffuse(Vec3::new(0.8, 0.5, 0.3))]);
-    let roulette = Settings { roulette_vertex: 1, ..base(5) };
+    let roulette = Settings { roulette: Roulette { vertex: 1, throughput: 1.0 }, ..base(5) };
     agrees(&scene, &[(Sampler::Mis, "4"), (Sampler::Guided, "8")], 48, &roulette);
 }
 
@@ -147,7 +148,7 @@ fn with_lamps_panes_mirrors_and_sheets() {
 fn a_concave_white_body_vanishes_in_the_furnace() {
     let _alone = support::alone();
     let scene = scenes::concave_furnace();
-    let settings = Settings { roulette_vertex: 64, ..settings(Sampler::Cosine, "4", 24) };
+    let settings = Settings { roulette: Roulette::NEVER, ..settings(Sampler::Cosine, "4", 24) };
     let (sums, _) = support::render(&scene, settings, 64);
     let pixels = sums.pixel_count();
     let mean = (0..pixels).map(|pixel| sums.mean(pixel)[1]).sum::<f64>() / pixels as f64;

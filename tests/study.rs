@@ -342,6 +342,7 @@ fn interrupt_reference(sampler: &str) {
         "render",
         "yard.toml",
         "--spp=3000",
+        "--depth=1",
         &format!("--seed={seed}"),
         "--aov=variance",
         &format!("--sampler={sampler}"),

@@ -23,8 +23,9 @@ void main() {
     if (pixel >= wave.pixel_count || !index.inside) {
         return;
     }
-    vec3 colour = film_guide_cell[index.film_index];
-    vec3 level = film_guide_level[index.film_index];
+    uint place = film_place(index);
+    vec3 colour = film_guide_cell[place];
+    vec3 level = film_guide_level[place];
     for (uint i = 0u; i < wave.sample_count; ++i) {
         HitOrigin hit = load_hit_origin(i * wave.pixel_count + pixel);
         if (hit.material == NO_MATERIAL) {
@@ -39,6 +40,6 @@ void main() {
         colour += colour_of(is_face ? FACE_KEY | face : key);
         level += vec3(is_face, is_coarse, !is_face && !is_coarse);
     }
-    film_guide_cell[index.film_index] = colour;
-    film_guide_level[index.film_index] = level;
+    film_guide_cell[place] = colour;
+    film_guide_level[place] = level;
 }

@@ -1,4 +1,4 @@
-// Diffuse base of the BRDF at a second vertex: the part that its light has in all directions but for a
+// Base of the BRDF at a second vertex: the part whose light looks the same from all directions but for a
 // factor. value = base_view(outgoing) * base_part(incident) + rest, and the rest is not negative.
 
 #ifndef BASE_GLSL
@@ -10,16 +10,31 @@ bool has_base(Material material) {
     return ((1u << material.kind) & KINDS_WITH_BASE) != 0u;
 }
 
-// Factor of the base by the cosine of the outgoing direction.
-float base_view(Material material, float cosine) {
-    if (is_kind(material, MATERIAL_PLASTIC)) {
-        return cosine_table(material.table_offset + PLASTIC_TRANSMISSION_OFFSET, 1u, cosine);
-    }
-    return 1.0;
+// Separable part of a measured BRDF, sqrt(1/sr): src/brdf/base.rs.
+vec3 measured_base(uint table_offset, float cosine) {
+    uint offset = table_offset + MEASURED_BASE_OFFSET;
+    return vec3(
+        cosine_table(offset, 3u, cosine), cosine_table(offset + 1u, 3u, cosine),
+        cosine_table(offset + 2u, 3u, cosine));
 }
 
-// Base by the cosine of the incident direction, 1/sr.
+// Factor of the base by the cosine of the outgoing direction.
+vec3 base_view(Material material, float cosine) {
+    if (is_kind(material, MATERIAL_PLASTIC)) {
+        return vec3(
+            cosine_table(material.table_offset + PLASTIC_TRANSMISSION_OFFSET, 1u, cosine));
+    }
+    if (is_kind(material, MATERIAL_MEASURED)) {
+        return measured_base(material.table_offset, cosine);
+    }
+    return vec3(1.0);
+}
+
+// Rest of the base by the cosine of the incident direction; 1/sr together.
 vec3 base_part(Material material, float cosine) {
+    if (is_kind(material, MATERIAL_MEASURED)) {
+        return measured_base(material.table_offset, cosine);
+    }
     float factor = 1.0;
     if (is_kind(material, MATERIAL_PLASTIC)) {
         factor = cosine_table(material.table_offset + PLASTIC_TRANSMISSION_OFFSET, 1u, cosine);

@@ -18,7 +18,9 @@ READS(hits)
 UPDATES(paths)
 
 // First vertex at which russian roulette may end a path.
-layout(constant_id = CONSTANT_ROULETTE_VERTEX) const uint ROULETTE_VERTEX = 8u;
+layout(constant_id = CONSTANT_ROULETTE_VERTEX) const uint ROULETTE_VERTEX = 2u;
+// Throughput below which it does: the light that such a path still brings is worth less than its time.
+layout(constant_id = CONSTANT_ROULETTE_THROUGHPUT) const float ROULETTE_THROUGHPUT = 0.02;
 
 // Returns BRDF * cosine / density of a direction drawn from the BRDF, and that density; 0 below
 // either horizon.
@@ -36,6 +38,7 @@ vec3 bounce_factor(
 }
 
 // Sends a path on unless it carries nothing or loses at roulette, which draws with `number` and `seed`.
+// The pixels of a block draw the same number, so that invocations which run together end together.
 // `brdf_pdf` is the ray's. Returns true if it goes on.
 bool follow_bounce(
     uint path, PathIndex index, Hit hit, vec3 direction, float brdf_pdf, vec3 factor, uint number,
@@ -44,9 +47,9 @@ bool follow_bounce(
     vec3 throughput = state.throughput * factor;
     float strongest = max(throughput.r, max(throughput.g, throughput.b));
     if (wave.vertex + 1u >= ROULETTE_VERTEX && strongest > 0.0) {
-        float survival = min(1.0, strongest);
+        float survival = min(1.0, strongest / ROULETTE_THROUGHPUT);
         float u_roulette = random_1d(
-            index.pixel, number, vertex_dimension() + DIMENSION_ROULETTE, seed);
+            film_block(index), number, vertex_dimension() + DIMENSION_ROULETTE, seed);
         throughput = u_roulette < survival ? throughput / survival : vec3(0.0);
         strongest = u_roulette < survival ? strongest : 0.0;
     }

@@ -38,7 +38,7 @@ const uint FILM_BLOCK = 8u;
 
 struct PathIndex {
     uvec2 crop_pixel;
-    // Index into the buffers of the film.
+    // Index in the crop window.
     uint film_index;
     // Index in the whole film: random numbers do not depend on the crop window.
     uint pixel;
@@ -52,7 +52,9 @@ uint wave_path_count() {
 }
 
 uint wave_film_position(uint index) {
-    return wave.first_pixel + index * max(wave.pixel_stride, 1u);
+    uint skipped = index / (FILM_BLOCK * FILM_BLOCK) * (max(wave.block_stride, 1u) - 1u);
+    return wave.first_pixel
+        + (index + skipped * FILM_BLOCK * FILM_BLOCK) * max(wave.pixel_stride, 1u);
 }
 
 PathIndex wave_pixel(uint film_position) {
@@ -79,14 +81,30 @@ PathIndex wave_path(uint path) {
     return index;
 }
 
+// Returns the index into the buffers of the film, which hold a page of the crop window.
+uint film_place(PathIndex index) {
+    return index.film_index - wave.film_start;
+}
+
 uint vertex_dimension() {
     return DIMENSION_VERTEX + wave.vertex * DIMENSIONS_PER_VERTEX;
+}
+
+// Row and column of the 8x8 pixels of a path in the whole film.
+uvec2 film_block_place(PathIndex index) {
+    return divide(index.pixel, parameters.film_width) / FILM_BLOCK;
+}
+
+// Number of these pixels, in place of the pixel's own where all of them draw the same random number.
+uint film_block(PathIndex index) {
+    uvec2 place = film_block_place(index);
+    return place.x << 16u | place.y;
 }
 
 // Returns bits shared by 8x8 pixels, for choices that neighbouring invocations should make alike.
 // `dimension` counts from the first of the vertex.
 uvec4 block_random_bits(PathIndex index, uint dimension) {
-    uvec2 block = divide(index.pixel, parameters.film_width).yx / FILM_BLOCK;
+    uvec2 block = film_block_place(index).yx;
     return hash_4d(uvec4(block, vertex_dimension() + dimension, wave.seed));
 }
 

@@ -78,7 +78,7 @@ void main() {
         }
         vec3 contribution = vec3(0.0);
         if (pdf > 0.0) {
-            float view = base_view(
+            vec3 view = base_view(
                 load_material(offer.material), -dot(offer.shading_normal, direction));
             contribution = throughput * offer.radiance * view;
         }

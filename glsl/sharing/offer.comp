@@ -1,5 +1,5 @@
-// Sums up what every path offers to the pixels of its tile: the light that the diffuse base of its
-// second vertex reflects. Paths that found no light have nothing to offer, and nothing is traced to them.
+// Sums up what every path offers to the pixels of its tile: the light that the base of its second
+// vertex reflects. Paths that found no light have nothing to offer, and nothing is traced to them.
 #version 460
 
 #include "base.glsl"
@@ -24,8 +24,11 @@ void main() {
         return;
     }
     Material material = load_material(second.material);
-    float view = base_view(material, dot(second.shading_normal, second.outgoing));
+    vec3 view = base_view(material, dot(second.shading_normal, second.outgoing));
+    // A channel that the base does not reflect has no light of it either.
+    vec3 emitted = mix(
+        vec3(0.0), radiance / (second.scale * view), greaterThan(view, vec3(0.0)));
     offers[path] = Offer(
         second.position, second.material, second.geometric_normal, second.density_ratio,
-        second.shading_normal, 0.0, radiance / (second.scale * view), 0.0);
+        second.shading_normal, 0.0, emitted, 0.0);
 }

@@ -16,7 +16,8 @@ void main() {
     if (pixel >= wave.pixel_count || !index.inside) {
         return;
     }
-    uvec2 entries_and_hits = film_cache_entries[index.film_index];
+    uint place = film_place(index);
+    uvec2 entries_and_hits = film_cache_entries[place];
     for (uint i = 0u; i < wave.sample_count; ++i) {
         uint path = i * wave.pixel_count + pixel;
         if (load_hit_origin(path).material == NO_MATERIAL) {
@@ -25,5 +26,5 @@ void main() {
         uint recorded = visibility_cache[cache_head(path, index.film_index)] & ~CACHE_GROWN;
         entries_and_hits += uvec2(min(recorded, CACHE_CAPACITY), 1u);
     }
-    film_cache_entries[index.film_index] = entries_and_hits;
+    film_cache_entries[place] = entries_and_hits;
 }

@@ -20,8 +20,15 @@ const LARGEST_CROWD: usize = 16;
 /// Depth of the binary tree beyond which median splits build all of it.
 const DEEPEST: usize = 160;
 
+/// Largest overlap of boxes that are clustered: clustering and reinsertion look through boxes that
+/// overlap, and took minutes for a fan of 300,000 slivers, whose overlap is 75,000.
+const LARGEST_OVERLAP: f32 = 2000.0;
+
 /// Builds a binary BVH over `boxes`, one box per leaf. Consumes the boxes to free their memory early.
 pub(super) fn build(boxes: Vec<Aabb>) -> Bvh2 {
+    if overlap(&boxes) > LARGEST_OVERLAP {
+        return by_median_splits(&boxes);
+    }
     let (mut singles, crowds) = crowds(&boxes);
     if crowds.is_empty() {
         drop(singles);
@@ -64,6 +71,14 @@ pub(super) fn build(boxes: Vec<Aabb>) -> Bvh2 {
     binary.primitive_indices = singles;
     binary.parents.clear();
     binary
+}
+
+/// Mean number of boxes that a line through all of their bounds meets: the sum of their surfaces over
+/// that of the bounds.
+fn overlap(boxes: &[Aabb]) -> f32 {
+    let bounds = boxes.iter().fold(Aabb::empty(), |bounds, aabb| bounds.union(aabb));
+    let surfaces: f32 = boxes.iter().map(Aabb::half_area).sum();
+    surfaces / bounds.half_area().max(f32::MIN_POSITIVE)
 }
 
 /// Returns the indices of boxes that stand alone, and the groups of boxes that crowd in one cell.
@@ -201,6 +216,21 @@ mod tests {
             .map(|size| Aabb::new(Vec3A::splat(-size as f32), Vec3A::splat(size as f32)))
             .collect();
         assert!(check(&build(boxes.clone()), &boxes) < 20);
+    }
+
+    #[test]
+    fn a_fan_through_one_point_is_built_at_once() {
+        let start = std::time::Instant::now();
+        let boxes: Vec<Aabb> = (0..100_000)
+            .map(|index| {
+                let (y, x) = (index as f32 * 6.283e-5).sin_cos();
+                let end = Vec3A::new(x, y, 0.0);
+                Aabb::new(end.min(Vec3A::ZERO), end.max(Vec3A::ZERO))
+            })
+            .collect();
+        assert!(overlap(&boxes) > LARGEST_OVERLAP, "{}", overlap(&boxes));
+        check(&build(boxes.clone()), &boxes);
+        assert!(start.elapsed().as_secs() < 10, "{:?}", start.elapsed());
     }
 
     #[test]

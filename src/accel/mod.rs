@@ -15,6 +15,8 @@ mod binary;
 pub mod instances;
 pub mod traverse;
 
+use std::ops::RangeInclusive;
+
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3, Vec3A};
 use obvhs::{
@@ -26,13 +28,18 @@ use crate::math::octahedron;
 use crate::scene::geometry::MAX_COORDINATE;
 use crate::{
     error::{Error, Result},
+    memory,
     scene::Geometry,
     shader::constants::{BVH_STACK_ENTRIES, FLAT_NORMAL},
+    stage,
 };
 use instances::{Level, Record};
 
 /// Most pages (buffers) for the triangles, bindings `BINDING_TRIANGLES_0` to `_3`.
 pub const MAX_TRIANGLE_PAGES: usize = 4;
+
+/// Bytes that building takes for a triangle at its peak, measured.
+const BUILD_BYTES: usize = 250;
 
 /// A node as the shader reads it: five `uvec4`.
 pub type Node = [u32; 20];
@@ -91,6 +98,11 @@ impl Accel {
     /// More triangles than [`MAX_TRIANGLE_PAGES`] pages hold, a vertex index out of range, a
     /// coordinate that is not finite or beyond [`MAX_COORDINATE`], or a tree too deep for the stack.
     pub fn build(geometry: &Geometry, page_bytes: u64) -> Result<Self> {
+        let meshes = geometry.prototypes.iter().chain([geometry]);
+        let triangles = meshes.map(|mesh| mesh.triangles.len()).sum();
+        let asker = format_args!("the tree over {triangles} triangles");
+        memory::check_count(asker, triangles, BUILD_BYTES).map_err(Error::memory)?;
+        stage::enter(format_args!("building {asker}"));
         let mut trees = Trees::default();
         let around_placed = trees.add(geometry)?;
         let mut instances = Vec::new();
@@ -242,7 +254,9 @@ impl Trees {
             vec![[0; 20]]
         } else {
             // One instance a leaf: entering one in vain costs more than a box.
-            let tree = on_large_stack(|| bvh2_to_cwbvh(&binary::build(boxes), 1, true, false))?;
+            let tree = on_large_stack(boxes.len(), || {
+                bvh2_to_cwbvh(&binary::build(boxes), 1, true, false)
+            })?;
             // An instance is entered with the rest of its group and the nodes beside it stacked.
             self.depth += stack_entries(&tree.nodes) + 2;
             order = tree.primitive_indices;
@@ -328,22 +342,31 @@ fn page_shift(count: usize, page_bytes: u64) -> Result<u32> {
     if count as u64 > limit { Err(too_many(count, limit)) } else { Ok(shift) }
 }
 
-/// Stack of the thread that builds the tree. The conversion recurses once per level of the binary
-/// tree, which coincident triangles can make very deep.
-const BUILD_STACK_BYTES: usize = 1 << 30;
+/// Stack of the thread that builds the tree, at least and at most, and for each box. The conversion
+/// recurses once per level of the binary tree, which coincident triangles can make very deep.
+const BUILD_STACK_BYTES: RangeInclusive<usize> = 1 << 20..=1 << 30;
+const STACK_BYTES_PER_BOX: usize = 4096;
 
 /// Builds the CWBVH over the triangles `kept`.
 fn build_tree(geometry: &Geometry, kept: &[u32]) -> Result<CwBvh> {
-    on_large_stack(|| build_tree_here(geometry, kept))
+    on_large_stack(kept.len(), || build_tree_here(geometry, kept))
 }
 
-fn on_large_stack(build: impl FnOnce() -> CwBvh + Send) -> Result<CwBvh> {
+fn on_large_stack(boxes: usize, build: impl FnOnce() -> CwBvh + Send) -> Result<CwBvh> {
+    let (least, most) = BUILD_STACK_BYTES.into_inner();
+    let stack_bytes = boxes.saturating_mul(STACK_BYTES_PER_BOX).clamp(least, most);
     std::thread::scope(|scope| {
         let builder = std::thread::Builder::new()
             .name("bvh".into())
-            .stack_size(BUILD_STACK_BYTES)
+            .stack_size(stack_bytes)
             .spawn_scoped(scope, build)
-            .map_err(|error| geometry_error(format!("cannot start the BVH builder: {error}")))?;
+            .map_err(|error| Error::Memory {
+                message: format!(
+                    "the builder of the tree over {boxes} boxes, with a stack of {}, cannot start: \
+                     {error}",
+                    memory::size(stack_bytes as u64)
+                ),
+            })?;
         builder.join().map_err(|_| geometry_error("the BVH builder failed".into()))
     })
 }

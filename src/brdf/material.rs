@@ -155,6 +155,11 @@ pub enum ConductorFresnel {
 }
 
 impl MaterialKind {
+    /// True for dielectrics and thin panes, which let light through.
+    pub fn is_glass(&self) -> bool {
+        matches!(self, Self::Dielectric { .. } | Self::ThinDielectric { .. })
+    }
+
     /// True if no light is sampled at the material, since all of what it sends on comes from one
     /// direction or from behind: paths follow it (see [`specular`](super::specular)).
     pub fn is_specular(&self) -> bool {

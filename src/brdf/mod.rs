@@ -23,6 +23,7 @@
 //! 2023\], \[Rusinkiewicz 1998\], \[Schlick 1994\], glTF 2.0 appendix B.
 
 mod albedo;
+mod base;
 pub mod coat;
 pub mod cornell;
 pub mod fresnel;

@@ -2,7 +2,7 @@
 //! `measured_value`, `measured_pdf` and `measured_sample` of `brdf.glsl` read.
 //!
 //! Layout of the words: directional albedo, cosine shares, cumulative probabilities and densities
-//! of the sampling table, grid cells of two words; offsets are `MEASURED_…_OFFSET` of
+//! of the sampling table, separable base, grid cells of two words; offsets are `MEASURED_…_OFFSET` of
 //! [`constants`](crate::shader::constants).
 
 use std::{
@@ -16,6 +16,7 @@ use rayon::prelude::*;
 
 use crate::{
     brdf::{
+        base::separable_base,
         tabulate::{EnergyLimit, SamplingRow, directional_albedo},
         twin,
     },
@@ -155,8 +156,11 @@ impl MeasuredTable {
             .into_par_iter()
             .map(|node| directional_albedo(&words, node as f32 / BRDF_COSINE_INTERVALS as f32))
             .collect();
-        for (word, value) in words.iter_mut().zip(albedo.iter().flat_map(Vec3::to_array)) {
-            *word = value.to_bits();
+        for (offset, values) in [(0, albedo), (MEASURED_BASE_OFFSET, separable_base(&words))] {
+            let target = &mut words[offset as usize..];
+            for (word, value) in target.iter_mut().zip(values.iter().flat_map(Vec3::to_array)) {
+                *word = value.to_bits();
+            }
         }
         Ok(Self { words, invalid_cell_count, warnings })
     }

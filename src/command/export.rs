@@ -22,7 +22,7 @@ pub struct Arguments {
     #[arg(long, value_enum)]
     pub format: Format,
     /// Number of path vertices lit by the environment; 1 is direct light.
-    #[arg(long, value_name = "D", default_value_t = 1)]
+    #[arg(long, value_name = "D", default_value_t = 8)]
     pub depth: u32,
     /// Samples per pixel.
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]

@@ -7,6 +7,7 @@ pub mod export;
 pub mod fit;
 mod guide;
 pub mod info;
+mod interrupt;
 pub mod merge;
 pub mod new;
 pub mod options;

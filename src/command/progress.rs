@@ -2,9 +2,12 @@
 
 use std::{
     io::IsTerminal,
+    sync::mpsc,
+    thread,
     time::{Duration, Instant},
 };
 
+use crate::stage;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// Resolution of the bar, steps.
@@ -13,6 +16,43 @@ const STEPS: u64 = 10_000;
 const FIRST_INTERVAL: Duration = Duration::from_secs(1);
 /// Longest interval between plain lines.
 const LONGEST_INTERVAL: Duration = Duration::from_secs(60);
+
+/// Interval between the words of [`Patience`]; it doubles.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Says what takes long before the first pass, until it is dropped.
+pub struct Patience {
+    /// Ends the thread by closing.
+    end: Option<mpsc::Sender<()>>,
+    thread: Option<thread::JoinHandle<()>>,
+}
+
+impl Patience {
+    /// Starts the clock; `quiet` says nothing. So does a system that allows no more threads.
+    pub fn new(label: &str, quiet: bool) -> Self {
+        let (end, closed) = mpsc::channel::<()>();
+        let label = label.to_owned();
+        let watch = move || {
+            let start = Instant::now();
+            let mut interval = PATIENCE;
+            while closed.recv_timeout(interval) == Err(mpsc::RecvTimeoutError::Timeout) {
+                eprintln!("{label}: {:.0} s, {}", start.elapsed().as_secs_f64(), stage::current());
+                interval = (interval * 2).min(LONGEST_INTERVAL);
+            }
+        };
+        let thread = if quiet { None } else { thread::Builder::new().spawn(watch).ok() };
+        Self { end: Some(end), thread }
+    }
+}
+
+impl Drop for Patience {
+    fn drop(&mut self) {
+        drop(self.end.take());
+        if let Some(Err(_)) = self.thread.take().map(thread::JoinHandle::join) {
+            log::warn!("the thread that shows the progress of loading has failed");
+        }
+    }
+}
 
 /// State of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

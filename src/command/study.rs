@@ -2,14 +2,13 @@
 
 use std::{
     path::{Path, PathBuf},
-    sync::atomic::{AtomicBool, Ordering},
     time::Duration,
 };
 
 use super::{
+    interrupt::Interrupt,
     options::{check_strict, parse_duration, parse_size},
     progress::{Progress, Standing},
-    render::listen_for_interrupt,
 };
 use crate::{
     error::{Error, Result},
@@ -123,7 +122,8 @@ pub struct Arguments {
 /// no device, a failing device or disk; [`Error::Interrupted`] after Ctrl-C. Finished runs are
 /// always kept.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let interrupted = listen_for_interrupt();
+    let interrupt = Interrupt::listen();
+    interrupt.wait_for_caller();
     let plan = plan(arguments)?;
     for path in plan.scenes.iter().filter(|_| arguments.strict) {
         check_strict(true, &Scene::load(path)?)?;
@@ -135,7 +135,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         eprintln!("device: {} ({})", capabilities.name, capabilities.driver);
     }
     let mut display =
-        Display { progress: Progress::new("study", arguments.quiet), interrupted: &interrupted };
+        Display { progress: Progress::new("study", arguments.quiet), interrupt: &interrupt };
     let (results, end) = engine::run(&plan, &folder, &device, &mut display, arguments.redo)?;
     let reason = match &end {
         None => "finished",
@@ -260,12 +260,12 @@ fn quick_options(arguments: &Arguments) -> Options {
 /// Progress and interrupt flag, as seen by the engine.
 struct Display<'a> {
     progress: Progress,
-    interrupted: &'a AtomicBool,
+    interrupt: &'a Interrupt,
 }
 
 impl Observer for Display<'_> {
     fn is_interrupted(&self) -> bool {
-        self.interrupted.load(Ordering::SeqCst)
+        self.interrupt.is_raised()
     }
 
     fn update(&mut self, fraction: f64, rays_per_second: f64) {

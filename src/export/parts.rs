@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use glam::{Vec2, Vec3, Vec4};
 
 use crate::{
-    scene::{Geometry, Scene},
+    scene::{Geometry, Scene, instance},
     texture::{TextureUse, lookup::gradient_tangent},
 };
 
@@ -198,8 +198,5 @@ fn tangent(corners: [Vertex; 3], used: &TextureUse) -> Vec4 {
 pub(super) fn bounds(parts: &[Parts]) -> Option<[Vec3; 2]> {
     let parts = parts.iter().flat_map(Parts::each);
     let positions = parts.flat_map(|(part, _)| part.vertices.iter().map(|vertex| vertex.position));
-    positions.fold(None, |bounds, position| {
-        let [low, high] = bounds.unwrap_or([position; 2]);
-        Some([low.min(position), high.max(position)])
-    })
+    instance::bounds(positions)
 }

@@ -30,6 +30,7 @@ use crate::error::{Error, Result};
 use crate::files::{
     EXR_LARGEST_RATIO, check_promise, is_special_file, open_regular, write_atomically,
 };
+use crate::memory;
 
 /// Primaries and white point of ITU-R BT.709 (red, green, blue, white; CIE x, y).
 const REC_709: Chromaticities = Chromaticities {
@@ -240,6 +241,10 @@ impl Image {
             check_promise(size, pixel_bytes, file_bytes, EXR_LARGEST_RATIO).map_err(|message| {
                 Error::format(path, format!("corrupt OpenEXR file: {message}"))
             })?;
+            // Samples are floats in memory, beside those of the file for a while.
+            let channels = header.channels.list.len() as u64 * 8;
+            let bytes = size[0].saturating_mul(size[1]).saturating_mul(channels);
+            memory::check(path.display(), bytes).map_err(Error::memory)?;
         }
         let image = exr::prelude::read()
             .no_deep_data()

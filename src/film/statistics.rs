@@ -36,12 +36,13 @@ pub struct Statistics {
     pub candidates: Option<u32>,
     /// Costs measured in this run to choose that number; empty if none were.
     pub candidate_costs: Vec<CandidateCost>,
-    /// Directions traced at every vertex, or the most of them where `guided` chose their number.
+    /// Directions traced at every vertex.
     pub shadow_rays_per_vertex: u32,
-    /// Sampler and numbers of shadow rays that `guided` chose; absent where they were given.
-    pub chosen_rays: Option<RayChoice>,
-    /// Costs measured in this run for that choice, by pairs that were compared.
-    pub ray_costs: Vec<RayCost>,
+    /// Edge of the tiles that share paths as `guided` chose it, 1 for none; absent where it was given,
+    /// in open scenes and in direct light.
+    pub share_tiles: Option<u32>,
+    /// Gain measured in this run for that choice; absent if none was.
+    pub sharing_gain: Option<SharingGain>,
     /// Path vertices at which environment light is gathered.
     pub depth: u32,
     /// Samples of every pixel that the image holds.
@@ -93,45 +94,18 @@ impl Statistics {
     }
 }
 
-/// Sampler and numbers of shadow rays.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct RayChoice {
-    /// `guided`, or `mis` in its place.
-    pub sampler: String,
-    /// Shadow rays at the first vertex.
-    pub first: u32,
-    /// Shadow rays at each later vertex.
-    pub later: u32,
+/// Measured gain of paths that the pixels of a tile share.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SharingGain {
+    /// Relative variance without sharing over that with it, as in [`CandidateCost`].
+    pub variance_ratio: f64,
+    /// Standard error over the blocks of its logarithm; 1000 if there is only one block.
+    pub log_error: f64,
 }
 
-impl fmt::Display for RayChoice {
+impl fmt::Display for SharingGain {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{} with {} and {} shadow rays", self.sampler, self.first, self.later)
-    }
-}
-
-/// Measured cost of a sampler with numbers of shadow rays.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct RayCost {
-    /// Sampler and numbers.
-    pub way: RayChoice,
-    /// As in [`CandidateCost`].
-    pub ms_per_sample: f64,
-    /// As in [`CandidateCost`].
-    pub relative_variance: f64,
-    /// Standard error of the logarithm of the variance relative to that of the other of the pair.
-    pub log_variance_error: f64,
-}
-
-impl fmt::Display for RayCost {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { way, ms_per_sample, relative_variance, log_variance_error } = self;
-        let percent = 100.0 * log_variance_error;
-        write!(
-            formatter,
-            "{way}: {ms_per_sample:.2} ms a sample, relative variance {relative_variance:.3} \
-             (±{percent:.0}%)"
-        )
+        write!(formatter, "{:.2} (±{:.0}%)", self.variance_ratio, 100.0 * self.log_error)
     }
 }
 

@@ -4,12 +4,15 @@ use std::sync::Arc;
 
 use ash::vk;
 use gpu_allocator::{
-    MemoryLocation,
+    AllocationError, MemoryLocation,
     vulkan::{Allocation, AllocationCreateDesc, AllocationScheme},
 };
 
 use super::{device::Device, labels, vulkan_error};
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    memory,
+};
 
 /// A named storage buffer in device memory.
 pub struct Buffer {
@@ -25,7 +28,7 @@ impl Buffer {
     ///
     /// # Errors
     /// [`Error::Device`] if `size` exceeds the device's range of a storage buffer;
-    /// [`Error::Vulkan`] if memory runs out.
+    /// [`Error::Memory`] if memory runs out, [`Error::Vulkan`] if a call fails.
     pub fn new(device: &Arc<Device>, name: &str, size: u64) -> Result<Self> {
         let allowed = device.capabilities().max_storage_buffer_range;
         if size > allowed {
@@ -59,13 +62,17 @@ impl Buffer {
         usage: vk::BufferUsageFlags,
     ) -> Result<Self> {
         let size = size.max(16).next_multiple_of(4);
+        let asker = || format!("buffer {name} on {}", device.capabilities().name);
+        if device.capabilities().kind == "software" {
+            memory::check(asker(), size).map_err(Error::memory)?;
+        }
         let info = vk::BufferCreateInfo::default()
             .size(size)
             .usage(usage)
             .sharing_mode(vk::SharingMode::EXCLUSIVE);
         // SAFETY: the device is alive and `info` valid.
         let raw = unsafe { device.raw().create_buffer(&info, None) }
-            .map_err(|result| vulkan_error(&format!("vkCreateBuffer({name})"), result))?;
+            .map_err(|result| failed_buffer(&asker(), size, "vkCreateBuffer", result))?;
         // SAFETY: `raw` was just created from this device.
         let requirements = unsafe { device.raw().get_buffer_memory_requirements(raw) };
         // From here on `Drop` cleans up.
@@ -82,13 +89,16 @@ impl Buffer {
                 linear: true,
                 allocation_scheme: AllocationScheme::GpuAllocatorManaged,
             })
-            .map_err(|error| Error::Vulkan {
-                call: format!("memory for buffer {name} ({size} bytes)"),
-                result: error.to_string(),
+            .map_err(|error| match error {
+                AllocationError::OutOfMemory => out_of_memory(&asker(), size),
+                other => Error::Vulkan {
+                    call: format!("memory for buffer {name} ({size} bytes)"),
+                    result: other.to_string(),
+                },
             })?;
         // SAFETY: the allocation was made for this buffer's requirements and is bound once.
         unsafe { device.raw().bind_buffer_memory(raw, allocation.memory(), allocation.offset()) }
-            .map_err(|result| vulkan_error(&format!("vkBindBufferMemory({name})"), result))?;
+            .map_err(|result| failed_buffer(&asker(), size, "vkBindBufferMemory", result))?;
         buffer.allocation = Some(allocation);
         labels::name_object(device, raw, name);
         Ok(buffer)
@@ -129,5 +139,20 @@ impl Drop for Buffer {
         {
             log::error!("memory of buffer {} was not freed: {error}", self.name);
         }
+    }
+}
+
+fn out_of_memory(asker: &str, size: u64) -> Error {
+    let size = memory::size(size);
+    Error::Memory { message: format!("the device is out of memory: {asker} asks for {size}") }
+}
+
+/// Makes an error of a failed call; running out of memory is one of its own.
+fn failed_buffer(asker: &str, size: u64, call: &str, result: vk::Result) -> Error {
+    match result {
+        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
+            out_of_memory(asker, size)
+        }
+        other => vulkan_error(&format!("{call} ({asker})"), other),
     }
 }

@@ -9,6 +9,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
+    memory,
     shader::bindings::{Kind, TABLES},
 };
 
@@ -89,6 +90,15 @@ impl Capabilities {
             missing.push("a compute queue with timestamps: needed, not found".into());
         }
         missing
+    }
+
+    /// Memory that buffers may take: of a software device no more than the process may use.
+    pub fn memory_for_buffers(&self) -> u64 {
+        if self.kind == "software" {
+            self.device_memory.min(memory::room())
+        } else {
+            self.device_memory
+        }
     }
 
     /// Rank by which devices are chosen; the smallest wins.

@@ -2,12 +2,13 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use bytemuck::Zeroable;
+use bytemuck::{Pod, Zeroable};
 
 use crate::{
-    error::Result,
+    error::{Error, Result},
     film::{Aov, Sums, Window},
     gpu::{Buffer, Commands, DescriptorSet, Device},
+    memory,
     shader::{
         bindings::{FILM, film},
         constants::{
@@ -42,13 +43,44 @@ pub fn aov_bits(aovs: &[Aov]) -> u32 {
     aovs.iter().map(bit).fold(0, |bits, bit| bits | bit)
 }
 
-/// Sums per pixel of the window, row by row.
+/// Checks that there is memory for a film with the layers in the bits `aovs`, on a software device too,
+/// and for the sums that are read back and the image that is made of them.
+///
+/// # Errors
+/// [`Error::Memory`].
+pub fn check_memory(device: &Device, window: Window, aovs: u32) -> Result<()> {
+    let triples = (aovs & (AOV_ALBEDO | AOV_NORMAL | AOV_POSITION)).count_ones()
+        + 2 * (aovs & AOV_GUIDE_CELL).count_ones();
+    let pairs = (aovs & (AOV_VISIBLE | AOV_CACHE_ENTRIES)).count_ones();
+    // Three sums and the image, in three channels each.
+    let copies = if device.capabilities().kind == "software" { 2 } else { 1 };
+    let pixel_bytes =
+        u64::from(copies * (36 + 12 * triples + 8 * pairs) + 12 * (1 + triples + pairs));
+    let Window { width, height, .. } = window;
+    let asker = format_args!("a film of {width}x{height} pixels");
+    memory::check(asker, u64::from(width) * u64::from(height) * pixel_bytes).map_err(Error::memory)
+}
+
+/// Sums per pixel of the window, row by row, in pages of whole rows of blocks: a storage buffer has a
+/// limit, the film of a window has none.
 pub struct FilmBuffers {
+    pages: Vec<Page>,
+    counters: Buffer,
+    aovs: u32,
+    window: Window,
+    /// Positions in film order of every page but the last, which may have fewer.
+    page_positions: u32,
+}
+
+/// The film of some rows of blocks.
+struct Page {
     set: DescriptorSet,
+    /// Pixels of the window before the page, and in it.
+    first: usize,
+    pixels: usize,
     sum: Buffer,
     compensation: Buffer,
     squares: Buffer,
-    counters: Buffer,
     albedo: Buffer,
     normal: Buffer,
     position: Buffer,
@@ -56,66 +88,52 @@ pub struct FilmBuffers {
     cache_entries: Buffer,
     guide_cell: Buffer,
     guide_level: Buffer,
-    aovs: u32,
-    window: Window,
 }
 
 impl FilmBuffers {
-    /// Makes an empty film of the window, with the extra layers in the bits `aovs`.
-    pub fn new(device: &Arc<Device>, window: Window, aovs: u32) -> Result<Self> {
-        let pixels = u64::from(window.width) * u64::from(window.height);
-        let triple = |name: &str, wanted: bool| {
-            Buffer::zeroed(device, name, if wanted { 12 * pixels } else { 0 })
-        };
-        let sum = triple("film sum", true)?;
-        let compensation = triple("film compensation", true)?;
-        let squares = triple("film squares", true)?;
+    /// Makes an empty film of the window, with the extra layers in the bits `aovs`, in buffers of at
+    /// most `page_bytes` bytes and what the device allows, but of a row of blocks at least.
+    pub fn new(device: &Arc<Device>, window: Window, aovs: u32, page_bytes: u64) -> Result<Self> {
+        let page_bytes = page_bytes.min(device.capabilities().max_storage_buffer_range);
+        let row_bytes = u64::from(window.width) * size_of::<[f32; 3]>() as u64;
+        let blocks_down = window.height.div_ceil(BLOCK_EDGE);
+        let rows = page_bytes / row_bytes / u64::from(BLOCK_EDGE);
+        let rows = u32::try_from(rows).unwrap_or(blocks_down).clamp(1, blocks_down);
         let counters = Buffer::from_slice(device, "counters", &[Counters::zeroed()])?;
-        let albedo = triple("film albedo", aovs & AOV_ALBEDO != 0)?;
-        let normal = triple("film normal", aovs & AOV_NORMAL != 0)?;
-        let position = triple("film position", aovs & AOV_POSITION != 0)?;
-        let pair = |name: &str, bit: u32| {
-            Buffer::zeroed(device, name, if aovs & bit == 0 { 0 } else { 8 * pixels })
+        let make = |first: u32| {
+            let last = (first + rows * BLOCK_EDGE).min(window.height);
+            Page::new(device, &counters, [first, last].map(|row| row * window.width), aovs)
         };
-        let visible = pair("film visible", AOV_VISIBLE)?;
-        let cache_entries = pair("film cache entries", AOV_CACHE_ENTRIES)?;
-        let guide_cell = triple("film guide cell", aovs & AOV_GUIDE_CELL != 0)?;
-        let guide_level = triple("film guide level", aovs & AOV_GUIDE_CELL != 0)?;
-        let bound = [
-            (film::FILM_SUM, &sum),
-            (film::FILM_COMPENSATION, &compensation),
-            (film::FILM_SQUARES, &squares),
-            (film::COUNTERS, &counters),
-            (film::FILM_ALBEDO, &albedo),
-            (film::FILM_NORMAL, &normal),
-            (film::FILM_POSITION, &position),
-            (film::FILM_VISIBLE, &visible),
-            (film::FILM_CACHE_ENTRIES, &cache_entries),
-            (film::FILM_GUIDE_CELL, &guide_cell),
-            (film::FILM_GUIDE_LEVEL, &guide_level),
-        ];
-        let set = DescriptorSet::new(device, &FILM, &bound)?;
         Ok(Self {
-            set,
-            sum,
-            compensation,
-            squares,
+            pages: (0..window.height)
+                .step_by((rows * BLOCK_EDGE) as usize)
+                .map(make)
+                .collect::<Result<_>>()?,
             counters,
-            albedo,
-            normal,
-            position,
-            visible,
-            cache_entries,
-            guide_cell,
-            guide_level,
             aovs,
             window,
+            page_positions: rows * window.width.div_ceil(BLOCK_EDGE) * BLOCK_PIXELS,
         })
     }
 
-    /// Descriptor set 3.
-    pub fn set(&self) -> &DescriptorSet {
-        &self.set
+    fn page(&self, position: u32) -> &Page {
+        let last = self.pages.len() - 1;
+        &self.pages[last.min((position / self.page_positions) as usize)]
+    }
+
+    /// Descriptor set 3 of the page that has a position in film order.
+    pub fn set(&self, position: u32) -> &DescriptorSet {
+        &self.page(position).set
+    }
+
+    /// Index of the first pixel of that page.
+    pub fn first_pixel(&self, position: u32) -> u32 {
+        self.page(position).first as u32
+    }
+
+    /// Number of positions from `position` to the end of its page.
+    pub fn left_in_page(&self, position: u32) -> u32 {
+        self.page_positions - position % self.page_positions
     }
 
     /// Number of pixels in film order, counting whole blocks where they reach beyond the window.
@@ -144,69 +162,147 @@ impl FilmBuffers {
 
     /// Reads everything but the sample count and the film's size, which the renderer knows.
     pub fn download(&self) -> Result<Sums> {
-        let pixels = self.window.width as usize * self.window.height as usize;
-        let layer = |buffer: &Buffer, bit: u32| {
-            buffer.download::<[f32; 3]>(if self.aovs & bit == 0 { 0 } else { pixels })
-        };
-        let counts = |buffer: &Buffer, bit: u32| {
-            buffer.download::<[u32; 2]>(if self.aovs & bit == 0 { 0 } else { pixels })
-        };
         Ok(Sums {
             width: self.window.width,
             height: self.window.height,
             origin: [self.window.x, self.window.y],
-            sum: self.sum.download(pixels)?,
-            compensation: self.compensation.download(pixels)?,
-            squares: self.squares.download(pixels)?,
-            albedo: layer(&self.albedo, AOV_ALBEDO)?,
-            normal: layer(&self.normal, AOV_NORMAL)?,
-            position: layer(&self.position, AOV_POSITION)?,
-            visible: counts(&self.visible, AOV_VISIBLE)?,
-            cache_entries: counts(&self.cache_entries, AOV_CACHE_ENTRIES)?,
-            guide_cell: layer(&self.guide_cell, AOV_GUIDE_CELL)?,
-            guide_level: layer(&self.guide_level, AOV_GUIDE_CELL)?,
+            sum: self.layer(|page| &page.sum, true)?,
+            compensation: self.layer(|page| &page.compensation, true)?,
+            squares: self.layer(|page| &page.squares, true)?,
+            albedo: self.layer(|page| &page.albedo, self.has(AOV_ALBEDO))?,
+            normal: self.layer(|page| &page.normal, self.has(AOV_NORMAL))?,
+            position: self.layer(|page| &page.position, self.has(AOV_POSITION))?,
+            visible: self.layer(|page| &page.visible, self.has(AOV_VISIBLE))?,
+            cache_entries: self.layer(|page| &page.cache_entries, self.has(AOV_CACHE_ENTRIES))?,
+            guide_cell: self.layer(|page| &page.guide_cell, self.has(AOV_GUIDE_CELL))?,
+            guide_level: self.layer(|page| &page.guide_level, self.has(AOV_GUIDE_CELL))?,
             ..Sums::default()
         })
     }
 
     /// Replaces the content of the film by sums of the same window.
     pub fn upload(&self, sums: &Sums) -> Result<()> {
-        self.sum.upload(bytemuck::cast_slice(&sums.sum))?;
-        self.compensation.upload(bytemuck::cast_slice(&sums.compensation))?;
-        self.squares.upload(bytemuck::cast_slice(&sums.squares))?;
-        for (buffer, bit, layer) in [
-            (&self.albedo, AOV_ALBEDO, &sums.albedo),
-            (&self.normal, AOV_NORMAL, &sums.normal),
-            (&self.position, AOV_POSITION, &sums.position),
-            (&self.guide_cell, AOV_GUIDE_CELL, &sums.guide_cell),
-            (&self.guide_level, AOV_GUIDE_CELL, &sums.guide_level),
-        ] {
-            if self.aovs & bit != 0 {
-                buffer.upload(bytemuck::cast_slice(layer))?;
+        for page in &self.pages {
+            let range = page.first..page.first + page.pixels;
+            for (buffer, wanted, layer) in [
+                (&page.sum, true, &sums.sum),
+                (&page.compensation, true, &sums.compensation),
+                (&page.squares, true, &sums.squares),
+                (&page.albedo, self.has(AOV_ALBEDO), &sums.albedo),
+                (&page.normal, self.has(AOV_NORMAL), &sums.normal),
+                (&page.position, self.has(AOV_POSITION), &sums.position),
+                (&page.guide_cell, self.has(AOV_GUIDE_CELL), &sums.guide_cell),
+                (&page.guide_level, self.has(AOV_GUIDE_CELL), &sums.guide_level),
+            ] {
+                if wanted && let Some(layer) = layer.get(range.clone()) {
+                    buffer.upload(bytemuck::cast_slice(layer))?;
+                }
             }
-        }
-        for (buffer, bit, counts) in [
-            (&self.visible, AOV_VISIBLE, &sums.visible),
-            (&self.cache_entries, AOV_CACHE_ENTRIES, &sums.cache_entries),
-        ] {
-            if self.aovs & bit != 0 {
-                buffer.upload(bytemuck::cast_slice(counts))?;
+            for (buffer, bit, counts) in [
+                (&page.visible, AOV_VISIBLE, &sums.visible),
+                (&page.cache_entries, AOV_CACHE_ENTRIES, &sums.cache_entries),
+            ] {
+                if self.has(bit)
+                    && let Some(counts) = counts.get(range.clone())
+                {
+                    buffer.upload(bytemuck::cast_slice(counts))?;
+                }
             }
         }
         Ok(())
     }
 
-    /// Bytes by buffer name.
+    /// Bytes by buffer name, all pages together.
     pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
-        self.buffers().into_iter().map(|buffer| (buffer.name().to_owned(), buffer.size())).collect()
+        let mut bytes = BTreeMap::new();
+        for buffer in self.buffers() {
+            *bytes.entry(buffer.name().to_owned()).or_default() += buffer.size();
+        }
+        bytes
     }
 
-    fn buffers(&self) -> [&Buffer; 11] {
+    fn has(&self, bit: u32) -> bool {
+        self.aovs & bit != 0
+    }
+
+    /// Reads a layer of all pages, or nothing if it is not wanted.
+    fn layer<T: Pod>(&self, of: impl Fn(&Page) -> &Buffer, wanted: bool) -> Result<Vec<T>> {
+        let mut layer = Vec::new();
+        if wanted {
+            layer.reserve_exact(self.window.width as usize * self.window.height as usize);
+            for page in &self.pages {
+                let add = |piece: &[T]| layer.extend_from_slice(piece);
+                of(page).download_pieces(page.pixels, add)?;
+            }
+        }
+        Ok(layer)
+    }
+
+    fn buffers(&self) -> impl Iterator<Item = &Buffer> {
+        self.pages.iter().flat_map(Page::buffers).chain([&self.counters])
+    }
+}
+
+impl Page {
+    /// Makes the empty film of the pixels `first` to `end`, `end` excluded.
+    fn new(
+        device: &Arc<Device>,
+        counters: &Buffer,
+        [first, end]: [u32; 2],
+        aovs: u32,
+    ) -> Result<Self> {
+        let pixels = u64::from(end - first);
+        let make = |name: &str, bytes: u64, wanted: bool| {
+            Buffer::zeroed(device, name, if wanted { bytes * pixels } else { 0 })
+        };
+        let triple = |name: &str, bit: u32| make(name, 12, aovs & bit != 0);
+        let pair = |name: &str, bit: u32| make(name, 8, aovs & bit != 0);
+        let sum = make("film sum", 12, true)?;
+        let compensation = make("film compensation", 12, true)?;
+        let squares = make("film squares", 12, true)?;
+        let albedo = triple("film albedo", AOV_ALBEDO)?;
+        let normal = triple("film normal", AOV_NORMAL)?;
+        let position = triple("film position", AOV_POSITION)?;
+        let visible = pair("film visible", AOV_VISIBLE)?;
+        let cache_entries = pair("film cache entries", AOV_CACHE_ENTRIES)?;
+        let guide_cell = triple("film guide cell", AOV_GUIDE_CELL)?;
+        let guide_level = triple("film guide level", AOV_GUIDE_CELL)?;
+        let bound = [
+            (film::FILM_SUM, &sum),
+            (film::FILM_COMPENSATION, &compensation),
+            (film::FILM_SQUARES, &squares),
+            (film::COUNTERS, counters),
+            (film::FILM_ALBEDO, &albedo),
+            (film::FILM_NORMAL, &normal),
+            (film::FILM_POSITION, &position),
+            (film::FILM_VISIBLE, &visible),
+            (film::FILM_CACHE_ENTRIES, &cache_entries),
+            (film::FILM_GUIDE_CELL, &guide_cell),
+            (film::FILM_GUIDE_LEVEL, &guide_level),
+        ];
+        let set = DescriptorSet::new(device, &FILM, &bound)?;
+        Ok(Self {
+            set,
+            first: first as usize,
+            pixels: pixels as usize,
+            sum,
+            compensation,
+            squares,
+            albedo,
+            normal,
+            position,
+            visible,
+            cache_entries,
+            guide_cell,
+            guide_level,
+        })
+    }
+
+    fn buffers(&self) -> [&Buffer; 10] {
         [
             &self.sum,
             &self.compensation,
             &self.squares,
-            &self.counters,
             &self.albedo,
             &self.normal,
             &self.position,

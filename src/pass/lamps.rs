@@ -11,7 +11,7 @@ use crate::{
         colour::luminance,
     },
     scene::{
-        Scene,
+        Scene, instance,
         lamp::{LampKind, SpotFalloff},
     },
     shader::{
@@ -112,13 +112,7 @@ fn area(accel: &Accel, triangle: u32) -> f64 {
 
 /// Radius of a sphere around all positions, metres.
 fn radius(positions: impl Iterator<Item = Vec3>) -> f32 {
-    let mut low = Vec3::INFINITY;
-    let mut high = Vec3::NEG_INFINITY;
-    for position in positions {
-        low = low.min(position);
-        high = high.max(position);
-    }
-    if low.x > high.x { 0.0 } else { 0.5 * (high - low).length() }
+    instance::bounds(positions).map_or(0.0, |[low, high]| 0.5 * (high - low).length())
 }
 
 /// Luminous part of the power that a lamp sends into the scene.

@@ -3,14 +3,13 @@
 use super::{
     geometry::{Schedule, Traversal},
     kernel::{Dispatch, Domain, Kernel},
+    roulette::Roulette,
     sharing::Sharing,
     steps::Steps,
     surfaces::Surfaces,
 };
 use crate::shader::{
-    constants::{
-        AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, CONSTANT_ONLY_SPECULAR, CONSTANT_ROULETTE_VERTEX,
-    },
+    constants::{AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, CONSTANT_ONLY_SPECULAR, TRAINING_WAVE},
     structs::Wave,
 };
 
@@ -26,8 +25,8 @@ pub struct PassSettings {
     pub depth: u32,
     /// Bits `AOV_…`.
     pub aovs: u32,
-    /// First vertex at which russian roulette may end a path.
-    pub roulette_vertex: u32,
+    /// Where paths end by chance.
+    pub roulette: Roulette,
     /// Edge of the tiles whose pixels share second vertices: 2, 4, 8, or 1 for none.
     pub tile_edge: u32,
     /// Specialization by the surfaces of the scene.
@@ -36,6 +35,10 @@ pub struct PassSettings {
     pub traversal: Traversal,
     /// Schedule of incoherent rays.
     pub incoherent: Schedule,
+    /// Most bytes of one buffer of the film.
+    pub film_page_bytes: u64,
+    /// Most paths in flight.
+    pub most_paths: u32,
 }
 
 /// Returns the dispatches of one wave for the first `vertices` vertices of its paths.
@@ -48,12 +51,12 @@ pub fn wave_order(
     let PassSettings { surfaces, traversal, incoherent, tile_edge, .. } = *settings;
     let constants = surfaces.constants();
     // Training teaches the visibility of the environment; other light is not needed.
-    let is_lit = wave.is_training == 0;
+    let is_lit = wave.is_training != TRAINING_WAVE;
     let follows_last = is_lit && surfaces.emits();
     let escape = steps.escape();
     let gather = || Kernel::new("gather", Domain::Paths, escape.as_deref().unwrap_or_default());
     let sharing = Sharing { tile_edge, surfaces, traversal, schedule: incoherent };
-    let shares = is_lit && tile_edge > 1 && vertices > 1;
+    let shares = is_lit && tile_edge > 1 && vertices > 1 && steps.shares_paths();
     let mut order = Vec::new();
     let mut add = |kernel: Kernel, wave: &Wave| order.push(Dispatch { kernel, wave: *wave });
     let mut wave = Wave { aovs: settings.aovs, ..wave };
@@ -186,7 +189,7 @@ fn rays_to_lamps(shadow_rays: u32) -> u32 {
 /// The pass that continues paths by the BRDF's own sampling; `only_specular` ends all others.
 fn bounce(settings: &PassSettings, only_specular: bool) -> Kernel {
     let mut constants = settings.surfaces.constants();
-    constants.push((CONSTANT_ROULETTE_VERTEX, settings.roulette_vertex));
+    constants.extend(settings.roulette.constants());
     constants.push((CONSTANT_ONLY_SPECULAR, u32::from(only_specular)));
     Kernel::new("bounce", Domain::Paths, &constants)
 }

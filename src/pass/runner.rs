@@ -27,6 +27,8 @@ use crate::{
 /// the cost of a submission.
 const SHORT_DISPATCH_MS: f64 = 50.0;
 const LONG_DISPATCH_MS: f64 = 100.0;
+/// Counts after which the 32-bit counters are read: one more wave must fit.
+const COUNTER_ROOM: u64 = 1 << 30;
 
 /// A scene, a film and the paths in flight on a device. Knows no sampler.
 pub struct Runner {
@@ -53,12 +55,19 @@ impl Runner {
         settings: PassSettings,
         demand: PathDemand,
     ) -> Result<Self> {
-        let film = FilmBuffers::new(device, scene.window(), settings.aovs)?;
+        let film =
+            FilmBuffers::new(device, scene.window(), settings.aovs, settings.film_page_bytes)?;
         let tile_pixels = settings.tile_edge * settings.tile_edge;
         let rays = settings.shadow_rays.max(tile_pixels).clamp(1, SHADOW_RAYS_PER_GROUP);
         let demand = SharingBuffers::demand(demand, tile_pixels);
-        let waves =
-            WaveBuffers::new(device, film.padded_pixels(), rays, demand, settings.surfaces)?;
+        let waves = WaveBuffers::new(
+            device,
+            film.padded_pixels(),
+            settings.most_paths,
+            rays,
+            demand,
+            settings.surfaces,
+        )?;
         let sharing = (tile_pixels > 1)
             .then(|| SharingBuffers::new(device, waves.capacity(), tile_pixels))
             .transpose()?;
@@ -97,7 +106,8 @@ impl Runner {
                 let pass = vacant.insert(pass);
                 let start = Instant::now();
                 let mut commands = Commands::begin(&self.device)?;
-                let sets = sets(&self.scene, technique, &self.waves, &self.sharing, &self.film);
+                let film = self.film.set(0);
+                let sets = sets(&self.scene, technique, &self.waves, &self.sharing, film);
                 pass.record(&mut commands, &sets, &wave);
                 commands.submit_and_wait()?;
                 add_ms(shader, start);
@@ -106,29 +116,48 @@ impl Runner {
         Ok(())
     }
 
-    /// Runs waves like `wave` over `pixels` pixels, starting at its first. Fails if the device does.
+    /// Runs waves like `wave` over `pixels` pixels, starting at its first, and takes the counters
+    /// before they overflow. Fails if the device does.
     pub fn sweep(&mut self, technique: &dyn Passes, wave: Wave, pixels: u32) -> Result<()> {
         let mut done = 0;
+        let mut uncounted = 0;
         while done < pixels {
             let together =
                 (self.wave_paths / wave.sample_count / BLOCK_PIXELS).max(1) * BLOCK_PIXELS;
-            let wave = Wave {
-                first_pixel: wave.first_pixel + done * wave.pixel_stride,
-                pixel_count: together.min(pixels - done),
-                ..wave
+            let first_pixel = wave.first_pixel + done * wave.pixel_stride;
+            // Training leaves the film alone, and its pixels lie in all pages.
+            let of_page = match wave.is_training {
+                0 => self.film.left_in_page(first_pixel),
+                _ => pixels,
             };
+            let pixel_count = together.min(pixels - done).min(of_page);
+            let wave = Wave { first_pixel, pixel_count, ..wave };
             let times = self.run(technique, wave, self.settings.depth)?;
             self.steer(&times, wave);
             done += wave.pixel_count;
+            uncounted += u64::from(wave.pixel_count * wave.sample_count) * self.counts_per_path();
+            if uncounted > COUNTER_ROOM {
+                self.take_counters()?;
+                uncounted = 0;
+            }
         }
         Ok(())
     }
 
-    /// Runs one wave for `vertices` vertices; returns device ms by pass. Fails if the device does.
+    /// Most that one path adds to a counter: energy counts up to 256 at a vertex.
+    fn counts_per_path(&self) -> u64 {
+        u64::from(self.settings.shadow_rays.max(256)) * u64::from(self.settings.depth)
+    }
+
+    /// Runs one wave for `vertices` vertices; returns device ms by pass. All pixels lie in one page of
+    /// the film, unless the wave is for training. Fails if the device does.
     pub fn run(&mut self, technique: &dyn Passes, wave: Wave, vertices: u32) -> Result<PassTimes> {
+        let film_start = self.film.first_pixel(wave.first_pixel);
+        let wave = Wave { film_start, ..wave };
         let order = wave_order(&self.settings, technique.steps(), wave, vertices);
         let mut commands = Commands::begin_timed(&self.device, order.len() as u32)?;
-        let sets = sets(&self.scene, technique, &self.waves, &self.sharing, &self.film);
+        let film = self.film.set(wave.first_pixel);
+        let sets = sets(&self.scene, technique, &self.waves, &self.sharing, film);
         for Dispatch { kernel, wave } in order {
             let pass = match self.passes.entry(kernel) {
                 Entry::Occupied(occupied) => occupied.into_mut(),
@@ -246,9 +275,9 @@ fn sets<'a>(
     technique: &'a dyn Passes,
     waves: &'a WaveBuffers,
     sharing: &'a Option<SharingBuffers>,
-    film: &'a FilmBuffers,
+    film: &'a DescriptorSet,
 ) -> Vec<&'a DescriptorSet> {
-    let common = [scene.set(), waves.set(), film.set()];
+    let common = [scene.set(), waves.set(), film];
     let sharing = sharing.as_ref().map(SharingBuffers::set);
     common.into_iter().chain(technique.set()).chain(sharing).collect()
 }

@@ -19,6 +19,11 @@ pub trait Steps {
         most
     }
 
+    /// True if the pixels of a tile share paths, where the renderer has tiles.
+    fn shares_paths(&self) -> bool {
+        true
+    }
+
     /// Passes before the first group of shadow rays of a vertex.
     fn prepare(&self, _wave: &Wave) -> Vec<Kernel> {
         Vec::new()

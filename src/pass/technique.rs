@@ -5,7 +5,7 @@ use std::{any::Any, collections::BTreeMap};
 use super::{runner::Runner, steps::Passes};
 use crate::{
     error::Result,
-    film::statistics::{CandidateCost, RayChoice, RayCost},
+    film::statistics::{CandidateCost, SharingGain},
     shader::structs::Wave,
 };
 
@@ -40,10 +40,10 @@ pub struct Report {
     pub candidates: Option<u32>,
     /// Measurements behind this choice.
     pub candidate_costs: Vec<CandidateCost>,
-    /// Sampler and numbers of shadow rays, for techniques that choose them.
-    pub chosen_rays: Option<RayChoice>,
-    /// Measurements behind this choice.
-    pub ray_costs: Vec<RayCost>,
+    /// Edge of the tiles that share paths, 1 for none, for techniques that choose it.
+    pub share_tiles: Option<u32>,
+    /// Measurement behind this choice.
+    pub sharing_gain: Option<SharingGain>,
 }
 
 /// A sampler at work in one render.

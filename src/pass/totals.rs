@@ -19,6 +19,9 @@ pub struct Totals {
     pub dropped_samples: u64,
     /// Rays abandoned after too many traversal steps.
     pub traversal_overruns: u64,
+    /// Bounds of their pixels in the crop window: left, top, right, bottom, the latter two excluded;
+    /// none without such rays.
+    pub overrun_pixels: Option<[u32; 4]>,
     /// Hits with product lobes.
     pub product_hits: u64,
     /// Lobes kept at these hits.
@@ -42,6 +45,13 @@ impl Totals {
         self.shadow_rays_visible += u64::from(counters.shadow_rays_visible);
         self.dropped_samples += u64::from(counters.dropped_samples);
         self.traversal_overruns += u64::from(counters.traversal_overruns);
+        if counters.traversal_overruns > 0 {
+            let [left, top] = [!counters.overrun_left, !counters.overrun_top];
+            let new = [left, top, counters.overrun_right, counters.overrun_bottom];
+            let [a, b, c, d] = self.overrun_pixels.unwrap_or(new);
+            self.overrun_pixels =
+                Some([a.min(new[0]), b.min(new[1]), c.max(new[2]), d.max(new[3])]);
+        }
         self.product_hits += u64::from(counters.product_hits);
         self.lobes_kept += u64::from(counters.lobes_kept);
         self.energy_kept += u64::from(counters.energy_kept);

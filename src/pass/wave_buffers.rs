@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use super::{steps::PathDemand, surfaces::Surfaces};
 use crate::{
     error::Result,
-    gpu::{Buffer, DescriptorSet, Device},
+    gpu::{Buffer, Capabilities, DescriptorSet, Device},
     shader::{
         bindings::{WAVE, wave},
         constants::WORKGROUP_SIZE,
@@ -19,6 +19,11 @@ const SOFTWARE_PATHS: u32 = 1 << 17;
 const GPU_PATHS: u32 = 1 << 21;
 /// Paths of the first wave, before any timing is known.
 const FIRST_PATHS: u32 = 1 << 14;
+
+/// Returns the most paths in flight on a device.
+pub fn most_paths(capabilities: &Capabilities) -> u32 {
+    if capabilities.kind == "software" { SOFTWARE_PATHS } else { GPU_PATHS }
+}
 
 /// Rays, hits, shadow rays and path states of one wave.
 pub struct WaveBuffers {
@@ -35,17 +40,17 @@ pub struct WaveBuffers {
 
 impl WaveBuffers {
     /// Allocates waves over a film of `padded_pixels` with up to `shadow_rays` rays per hit at a time,
-    /// and no more paths than `demand` allows; textures and instances at hits only if `of` needs them.
-    /// Fails if the device does or its limits are exceeded.
+    /// and no more than `most_paths` paths, nor more than `demand` and memory allow; textures and
+    /// instances at hits only if `of` needs them. Fails if the device does or its limits are exceeded.
     pub fn new(
         device: &Arc<Device>,
         padded_pixels: u32,
+        most_paths: u32,
         shadow_rays: u32,
         demand: PathDemand,
         of: Surfaces,
     ) -> Result<Self> {
         let capabilities = device.capabilities();
-        let most = if capabilities.kind == "software" { SOFTWARE_PATHS } else { GPU_PATHS };
         let widest =
             (size_of::<Hit>() as u64).max(u64::from(shadow_rays) * size_of::<ShadowRay>() as u64);
         let widest = widest.max(demand.bytes);
@@ -53,11 +58,12 @@ impl WaveBuffers {
         let by_texels = capabilities.max_texel_buffer_elements / demand.texels.max(1);
         let by_groups = u64::from(capabilities.max_workgroup_count) * u64::from(WORKGROUP_SIZE)
             / u64::from(shadow_rays);
-        let by_memory = capabilities.device_memory / 8 / (widest * 3);
-        let limit = by_binding.min(by_texels).min(by_groups).min(by_memory).min(u64::from(most));
+        let by_memory = capabilities.memory_for_buffers() / 8 / (widest * 3);
+        let by_paths = u64::from(most_paths);
+        let limit = by_binding.min(by_texels).min(by_groups).min(by_memory).min(by_paths);
         // A small film needs only a handful of samples in flight.
         let useful = u64::from(padded_pixels) * 64;
-        let capacity = u32::try_from(limit.min(useful)).unwrap_or(most).max(WORKGROUP_SIZE)
+        let capacity = u32::try_from(limit.min(useful)).unwrap_or(most_paths).max(WORKGROUP_SIZE)
             / WORKGROUP_SIZE
             * WORKGROUP_SIZE;
 

@@ -15,12 +15,18 @@ use crate::{
     gpu::{Device, PassTimes},
     pass::{
         PassSettings, Progress, Report, Runner, SceneBuffers, Schedule, Technique, Totals,
-        film_buffers::aov_bits,
+        film_buffers::{aov_bits, check_memory},
+        wave_buffers::most_paths,
     },
     sampler::Context,
     scene::Scene,
     shader::structs::Wave,
 };
+
+/// Fewest paths in flight to try where memory does not suffice for more.
+const FEWEST_PATHS: u32 = 1 << 9;
+/// Factor between two tries.
+const PATHS_STEP: u32 = 1 << 4;
 
 /// A scene on a device, and the film it is rendered to.
 pub struct Renderer {
@@ -57,22 +63,40 @@ impl Renderer {
 
         let surfaces = buffers.surfaces();
         let shares = settings.depth > 1 && surfaces.has_base();
-        let tile_edge = settings.parameters.share_tiles.filter(|_| shares).unwrap_or(1);
+        let tile_edge = settings.sampler.tile_edge(&settings.parameters);
+        let tile_edge = if shares { tile_edge } else { 1 };
         let passes = PassSettings {
             shadow_rays: settings.shadow_rays,
             depth: settings.depth,
             aovs: aov_bits(&settings.aovs),
-            roulette_vertex: settings.roulette_vertex,
+            roulette: settings.roulette,
             tile_edge,
             surfaces,
             traversal: buffers.geometry().traversal(),
             incoherent: Schedule::incoherent(device.capabilities()),
+            film_page_bytes: settings.film_page_bytes,
+            most_paths: most_paths(device.capabilities()),
         };
+        check_memory(device, buffers.window(), passes.aovs)?;
         let demand = settings.sampler.demand(&settings.parameters, settings.shadow_rays);
-        let mut runner = Runner::new(device, buffers, passes, demand)?;
-        let context = Context { scene, parameters: &settings.parameters, runner: &runner };
-        let technique = settings.sampler.technique(context)?;
-        runner.warm_up(technique.as_ref())?;
+        let attempt = |most_paths| -> Result<_> {
+            let passes = PassSettings { most_paths, ..passes };
+            let mut runner = Runner::new(device, Arc::clone(&buffers), passes, demand)?;
+            let context = Context { scene, parameters: &settings.parameters, runner: &runner };
+            let technique = settings.sampler.technique(context)?;
+            runner.warm_up(technique.as_ref())?;
+            Ok((runner, technique))
+        };
+        let mut most_paths = passes.most_paths;
+        let (runner, technique) = loop {
+            match attempt(most_paths) {
+                Err(Error::Memory { message }) if most_paths > FEWEST_PATHS => {
+                    most_paths /= PATHS_STEP;
+                    log::warn!("{message}; trying with {most_paths} paths at a time");
+                }
+                result => break result?,
+            }
+        };
         Ok(Self { runner, technique, settings, film_size, sample_count: 0 })
     }
 

@@ -4,6 +4,7 @@ use crate::film::Window;
 use crate::{
     error::{Error, Result},
     film::Aov,
+    pass::Roulette,
     sampler::{Parameters, Sampler},
     scene::Scene,
 };
@@ -27,8 +28,11 @@ pub struct Settings {
     pub window: Option<Window>,
     /// Extra layers.
     pub aovs: Vec<Aov>,
-    /// First vertex at which russian roulette may end a path, if `depth` reaches it.
-    pub roulette_vertex: u32,
+    /// Where paths of several vertices end by chance.
+    pub roulette: Roulette,
+    /// Most bytes of one buffer of the film, beside the device's own limit; larger films have pages,
+    /// which changes no bit of the picture.
+    pub film_page_bytes: u64,
 }
 
 impl Default for Settings {
@@ -42,7 +46,8 @@ impl Default for Settings {
             first_sample: 0,
             window: None,
             aovs: Vec::new(),
-            roulette_vertex: 8,
+            roulette: Roulette::default(),
+            film_page_bytes: u64::MAX,
         }
     }
 }
@@ -85,6 +90,12 @@ impl Settings {
         }
         if !(1..=64).contains(&self.depth) {
             return Err(Error::usage(format!("--depth {}: expected 1 to 64", self.depth)));
+        }
+        if !(self.roulette.throughput >= 0.0 && self.roulette.throughput.is_finite()) {
+            return Err(Error::usage(format!(
+                "--roulette-throughput {}: expected 0 or more; 0 ends no path",
+                self.roulette.throughput
+            )));
         }
         self.sampler.check(&self.parameters, self.depth, &self.aovs)
     }

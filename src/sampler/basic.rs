@@ -51,7 +51,14 @@ impl Basic {
     pub fn steps(self, parameters: &Parameters, surfaces: Surfaces) -> Result<BasicSteps> {
         let candidates = self.candidates(parameters)?;
         let compensates = self.tag == SAMPLER_MIS && parameters.compensation;
-        Ok(BasicSteps { tag: self.tag, candidates, compensates, rays: None, surfaces })
+        Ok(BasicSteps {
+            tag: self.tag,
+            candidates,
+            compensates,
+            rays: None,
+            shares_paths: true,
+            surfaces,
+        })
     }
 }
 
@@ -91,13 +98,19 @@ pub struct BasicSteps {
     candidates: u32,
     compensates: bool,
     rays: Option<[u32; 2]>,
+    shares_paths: bool,
     surfaces: Surfaces,
 }
 
 impl BasicSteps {
     /// Returns the same steps with other numbers of shadow rays at the first and at later vertices.
-    pub(super) fn with_rays(self, rays: Option<[u32; 2]>) -> Self {
-        Self { rays, ..self }
+    pub(super) fn with_rays(self, rays: [u32; 2]) -> Self {
+        Self { rays: Some(rays), ..self }
+    }
+
+    /// Returns the same steps with or without shared paths.
+    pub(super) fn with_sharing(self, shares_paths: bool) -> Self {
+        Self { shares_paths, ..self }
     }
 }
 
@@ -105,6 +118,10 @@ impl Steps for BasicSteps {
     fn shadow_rays_at(&self, vertex: u32, most: u32) -> u32 {
         let [first, later] = self.rays.unwrap_or([most; 2]);
         most.min(if vertex == 0 { first } else { later })
+    }
+
+    fn shares_paths(&self) -> bool {
+        self.shares_paths
     }
 
     fn sample(&self, _wave: &Wave) -> Vec<Kernel> {

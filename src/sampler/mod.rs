@@ -144,10 +144,16 @@ impl Sampler {
     /// Returns the parameters relevant to the sampler by key, for metadata and statistics.
     pub fn describe(self, parameters: &Parameters) -> BTreeMap<String, String> {
         let mut named = self.room().describe(parameters);
-        if let Some(edge) = parameters.share_tiles {
-            named.insert("share-tiles".to_owned(), edge.to_string());
+        if self == Self::Guided || parameters.share_tiles.is_some_and(|edge| edge > 1) {
+            named.insert("share-tiles".to_owned(), parameters.share_tiles_text());
         }
         named
+    }
+
+    /// Edge of the tiles that may share paths, pixels; 1 for none.
+    pub fn tile_edge(self, parameters: &Parameters) -> u32 {
+        let automatic = if self == Self::Guided { guided::AUTO_TILE_EDGE } else { 1 };
+        parameters.share_tiles.unwrap_or(automatic)
     }
 
     /// Memory per path in flight.

@@ -11,7 +11,8 @@ use crate::error::{Error, Result};
 /// Parameters of the samplers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
-    /// `share-tiles`: edge of the tiles whose pixels share second vertices; `None` is `off`.
+    /// `share-tiles`: edge of the tiles whose pixels share second vertices, 1 for `off`. `None` is `auto`:
+    /// `guided` measures what it gains, the other samplers do not share.
     pub share_tiles: Option<u32>,
     /// `candidates`: directions to choose each shadow ray of `ris` or `guided` from; `None` is `auto`.
     pub candidates: Option<u32>,
@@ -76,14 +77,19 @@ const KNOBS: &[Knob<Parameters>] = &[
     Knob {
         key: "share-tiles",
         set: |parameters, value| knob::choice(&mut parameters.share_tiles, value, SHARE_TILES),
-        get: |parameters| knob::name_of(&parameters.share_tiles, SHARE_TILES),
+        get: Parameters::share_tiles_text,
     },
 ];
 
 const SHARE_TILES: &[(&str, Option<u32>)] =
-    &[("off", None), ("2", Some(2)), ("4", Some(4)), ("8", Some(8))];
+    &[("auto", None), ("off", Some(1)), ("2", Some(2)), ("4", Some(4)), ("8", Some(8))];
 
 impl Parameters {
+    /// Returns `share-tiles` as text.
+    pub fn share_tiles_text(&self) -> String {
+        knob::name_of(&self.share_tiles, SHARE_TILES)
+    }
+
     /// Sets one parameter from `key=value`. Returns [`Error::Usage`] for a value out of range, or
     /// for an unknown key, listing the known ones.
     pub fn set(&mut self, assignment: &str) -> Result<()> {
@@ -186,7 +192,6 @@ mod tests {
             "cache=scene",
             "preset=loose",
             "share-tiles=3",
-            "share-tiles=auto",
         ] {
             let error = parameters.set(wrong).unwrap_err().to_string();
             assert!(error.contains(&format!("--set {wrong}: expected")), "{error}");

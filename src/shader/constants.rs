@@ -51,6 +51,8 @@ constants! {
     CONSTANT_BOUNCE_CANDIDATES = 26;
     /// First vertex at which russian roulette may end a path.
     CONSTANT_ROULETTE_VERTEX = 18;
+    /// Throughput below which it may, a float.
+    CONSTANT_ROULETTE_THROUGHPUT = 46;
     /// Bit `1 << kind` for every kind of material in the scene; saves devices that run both sides of a
     /// branch the others.
     CONSTANT_MATERIAL_KINDS = 19;
@@ -192,8 +194,9 @@ constants! {
     /// Bits `1 << kind` of the specular kinds, at which no light is sampled.
     SPECULAR_KINDS = 1 << MATERIAL_MIRROR | 1 << MATERIAL_DIELECTRIC | 1 << MATERIAL_THIN_DIELECTRIC;
 
-    /// Bits `1 << kind` of the kinds with a diffuse base, whose light the pixels of a tile can share.
-    KINDS_WITH_BASE = 1 << MATERIAL_DIFFUSE | 1 << MATERIAL_PLASTIC | 1 << MATERIAL_PRINCIPLED;
+    /// Bits `1 << kind` of the kinds with a base, whose light the pixels of a tile can share.
+    KINDS_WITH_BASE = 1 << MATERIAL_DIFFUSE | 1 << MATERIAL_PLASTIC | 1 << MATERIAL_MEASURED
+        | 1 << MATERIAL_PRINCIPLED;
 
     // Lamps.
     /// Marks a lamp without a surface in [`LampChoice::source`](super::structs::LampChoice::source).
@@ -292,8 +295,16 @@ constants! {
     MEASURED_CUMULATIVE_OFFSET = MEASURED_COSINE_SHARE_OFFSET + MEASURED_ELEVATION_BINS;
     /// Densities of the sampling cells by elevation, per steradian of half vectors.
     MEASURED_DENSITY_OFFSET = MEASURED_CUMULATIVE_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
+    /// Factors of the separable base by cosine, three channels a node, square root of 1/sr.
+    MEASURED_BASE_OFFSET = MEASURED_DENSITY_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
     /// Grid cells, two words each: halves red and green, half blue.
-    MEASURED_GRID_OFFSET = MEASURED_DENSITY_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
+    MEASURED_GRID_OFFSET = MEASURED_BASE_OFFSET + 3 * BRDF_COSINE_NODES;
+
+    // Values of `Wave::is_training` other than 0.
+    /// The paths only teach the guide.
+    TRAINING_WAVE = 1;
+    /// The light of the paths is only compared.
+    MEASURED_WAVE = 2;
 
     // Lobes and learned visibility.
     /// Lobes between two sums of their weights; a power of two up to 32.

@@ -297,6 +297,15 @@ structs! {
         dropped_samples: uint,
         /// Rays abandoned after `TRAVERSAL_STEP_LIMIT` steps: blocked, or with the nearest hit so far.
         traversal_overruns: uint,
+        /// Bounds of their pixels in the crop window: the complements of left and top, then right and
+        /// bottom, excluded.
+        overrun_left: uint,
+        /// See `overrun_left`.
+        overrun_top: uint,
+        /// See `overrun_left`.
+        overrun_right: uint,
+        /// See `overrun_left`.
+        overrun_bottom: uint,
         /// Hits with product lobes.
         product_hits: uint,
         /// Lobes kept at these hits.
@@ -409,7 +418,10 @@ structs! {
         aovs: uint,
         /// Step in film order from one pixel of the wave to the next; 0 counts as 1.
         pixel_stride: uint,
-        /// 1 if the paths only teach the guide: their rays are counted, their light is not.
+        /// Step from one block of 8×8 pixels of the wave to the next, in blocks; 0 counts as 1.
+        block_stride: uint,
+        /// 0 for the picture; `TRAINING_WAVE` if the paths only teach the guide, `MEASURED_WAVE` if their
+        /// light is only compared: their rays are counted, their light is not.
         is_training: uint,
         /// Seed of the numbers of `guided`; changes with every rebuild.
         epoch_seed: uint,
@@ -423,6 +435,8 @@ structs! {
         /// Shadow rays at the vertex before, if the bounce ray from there is a sample of the environment;
         /// else 0.
         arriving_shadow_rays: uint,
+        /// Pixels of the crop window before the page of the film that the wave writes.
+        film_start: uint,
     }
 
     /// Cells that a path's bounces teach.

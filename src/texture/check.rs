@@ -2,10 +2,13 @@
 
 use half::f16;
 
-use crate::files;
+use crate::{files, memory};
 
 /// Longest side of a texture, texels.
 pub const MAX_TEXTURE_SIDE: u32 = 16_384;
+
+/// Bytes of a texel while it is decoded: four halves, and four channels of the decoder beside them.
+const DECODED_BYTES: u64 = 16;
 
 /// Checks the size that a header states, before memory is allocated for it. `ratio` is the largest
 /// compression of the format.
@@ -23,7 +26,10 @@ pub(super) fn check_size(
         ));
     }
     files::check_promise(size, texel_bytes, file_bytes as u64, ratio)
-        .map_err(|message| format!("not a readable image: {message}"))
+        .map_err(|message| format!("not a readable image: {message}"))?;
+    let bytes = width.saturating_mul(height).saturating_mul(DECODED_BYTES);
+    memory::check(format_args!("an image of {width}×{height} texels"), bytes)
+        .map_err(|shortage| shortage.to_string())
 }
 
 /// Counts of values of an image that no half can hold or no surface can have.

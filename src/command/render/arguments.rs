@@ -16,6 +16,7 @@ use crate::{
     error::{Error, Result},
     files::{check_writable, is_same_file, is_special_file},
     film::{Aov, Window, checkpoint::checkpoint_path},
+    pass::Roulette,
     renderer::Settings,
     sampler::{Parameters, Sampler},
     scene::{FilmSettings, Scene},
@@ -30,7 +31,7 @@ pub struct Arguments {
     #[arg(short, long, value_name = "FILE.exr", visible_alias = "outfile")]
     pub output: Option<PathBuf>,
     /// Sampler that chooses directions at a hit.
-    #[arg(long, value_enum, default_value = "mis")]
+    #[arg(long, value_enum, default_value = "guided")]
     pub sampler: Sampler,
     /// Stop after this many camera paths per pixel (64 if no stop rule is given).
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -47,11 +48,15 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
     pub shadow_rays: u32,
     /// Number of path vertices lit by the environment; 1 is direct light.
-    #[arg(long, value_name = "D", default_value_t = 1)]
-    pub depth: u32,
-    /// First path vertex at which Russian roulette may end a path.
     #[arg(long, value_name = "D", default_value_t = 8)]
+    pub depth: u32,
+    /// First path vertex, from 0 on, at which Russian roulette may end a path.
+    #[arg(long, value_name = "D", default_value_t = 2)]
     pub roulette_depth: u32,
+    /// Share of the camera's light that a path still carries, below which Russian roulette may end it; 0 for
+    /// never.
+    #[arg(long, value_name = "T", default_value_t = 0.02)]
+    pub roulette_throughput: f32,
     /// Environment, camera, strictness.
     #[command(flatten)]
     pub scene_options: SceneOptions,
@@ -234,7 +239,11 @@ impl Arguments {
             first_sample: self.sample_offset,
             window: self.crop,
             aovs: self.aov.clone(),
-            roulette_vertex: self.roulette_depth,
+            roulette: Roulette {
+                vertex: self.roulette_depth,
+                throughput: self.roulette_throughput,
+            },
+            ..Settings::default()
         })
     }
 }

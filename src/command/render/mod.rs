@@ -6,10 +6,6 @@ mod statistics;
 
 use std::{
     path::{Path, PathBuf},
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
     time::{Duration, Instant},
 };
 
@@ -17,7 +13,8 @@ pub use arguments::Arguments;
 
 use super::{
     guide,
-    progress::{Progress, Standing},
+    interrupt::Interrupt,
+    progress::{Patience, Progress, Standing},
 };
 use crate::{
     error::{Error, Result},
@@ -27,6 +24,7 @@ use crate::{
         display::DisplayServer, metadata::seconds_of, png::write_preview,
     },
     gpu::Device,
+    pass::Roulette,
     renderer::{Renderer, Settings, window_of},
     sampler::Sampler,
     scene::Scene,
@@ -79,9 +77,11 @@ impl StopReason {
 /// Wrong options, an unusable scene, no device, a failing device or disk; [`Error::Interrupted`]
 /// after Ctrl-C, once the partial result has been written.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let interrupted = listen_for_interrupt();
+    let interrupt = Interrupt::listen();
     let settings = arguments.settings()?;
     let start = Instant::now();
+    let patience =
+        Patience::new(&format!("loading {}", arguments.scene.display()), arguments.quiet);
     let mut scene = arguments.scene_options.load(&arguments.scene)?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
     arguments.resize(&mut scene.film);
@@ -94,6 +94,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         pixel::check(&settings, &scene, &output, at)?;
     }
 
+    interrupt.wait_for_caller();
     let device = Device::open(arguments.device.as_deref(), arguments.validate)?;
     if !arguments.quiet {
         let capabilities = device.capabilities();
@@ -106,8 +107,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     job.metadata.fit_hashes = renderer.report().fit_hashes;
     job.resume(&mut renderer)?;
+    drop(patience);
 
-    let reason = job.render(&mut renderer, &interrupted)?;
+    let reason = job.render(&mut renderer, &interrupt)?;
     device.save_pipeline_cache();
     job.finish(&renderer, reason, load_ms)?;
     if let Some(at) = arguments.pixel {
@@ -133,22 +135,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
     }
     if reason == StopReason::Interrupt { Err(Error::Interrupted) } else { Ok(()) }
-}
-
-/// Returns a flag that Ctrl-C raises, and SIGTERM and SIGHUP with it; a second one ends the process
-/// at once.
-pub(super) fn listen_for_interrupt() -> Arc<AtomicBool> {
-    let flag = Arc::new(AtomicBool::new(false));
-    let raised = Arc::clone(&flag);
-    let listening = ctrlc::set_handler(move || {
-        if raised.swap(true, Ordering::SeqCst) {
-            std::process::exit(130);
-        }
-    });
-    if let Err(error) = listening {
-        log::warn!("Ctrl-C will end the program without writing the image: {error}");
-    }
-    flag
 }
 
 /// One render, from its first pass to its files.
@@ -180,9 +166,10 @@ impl<'a> RenderJob<'a> {
     ) -> Self {
         let capabilities = device.capabilities();
         let mut parameters = settings.sampler.describe(&settings.parameters);
-        if settings.depth > settings.roulette_vertex {
-            let vertex = settings.roulette_vertex.to_string();
-            parameters.insert("roulette-depth".to_owned(), vertex);
+        if settings.depth > settings.roulette.vertex {
+            let Roulette { vertex, throughput } = settings.roulette;
+            parameters.insert("roulette-depth".to_owned(), vertex.to_string());
+            parameters.insert("roulette-throughput".to_owned(), throughput.to_string());
         }
         let metadata = Metadata {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -256,14 +243,14 @@ impl<'a> RenderJob<'a> {
     }
 
     /// Renders passes until a stop rule is met.
-    fn render(&mut self, renderer: &mut Renderer, interrupted: &AtomicBool) -> Result<StopReason> {
+    fn render(&mut self, renderer: &mut Renderer, interrupt: &Interrupt) -> Result<StopReason> {
         let mut progress = Progress::new(self.scene.name.clone(), self.arguments.quiet);
         let mut display = self.open_display()?;
         let mut next_look = Instant::now() + LOOK_INTERVAL;
         let mut last_checkpoint = Instant::now();
         let mut pass_samples = 1;
         let reason = loop {
-            if let Some(reason) = self.stop_reason(renderer, interrupted) {
+            if let Some(reason) = self.stop_reason(renderer, interrupt) {
                 break reason;
             }
             let target = self.target_spp().unwrap_or(u32::MAX).min(self.most_samples());
@@ -340,9 +327,9 @@ impl<'a> RenderJob<'a> {
         self.arguments.time.map(|time| time.as_secs_f64() - self.seconds())
     }
 
-    fn stop_reason(&self, renderer: &Renderer, interrupted: &AtomicBool) -> Option<StopReason> {
+    fn stop_reason(&self, renderer: &Renderer, interrupt: &Interrupt) -> Option<StopReason> {
         let samples = renderer.sample_count();
-        if interrupted.load(Ordering::SeqCst) && samples > 0 {
+        if interrupt.is_raised() && samples > 0 {
             return Some(StopReason::Interrupt);
         }
         if self.target_spp().is_some_and(|spp| samples >= spp) {
@@ -421,10 +408,16 @@ impl<'a> RenderJob<'a> {
                 totals.dropped_samples
             ));
         }
-        if totals.traversal_overruns > 0 {
+        if let Some([left, top, right, bottom]) = totals.overrun_pixels {
+            let Window { x, y, .. } = self.window;
             self.warn(format!(
-                "{} rays were given up after too many steps of traversal",
-                totals.traversal_overruns
+                "{} rays were given up after too many steps of traversal, where many triangles meet in \
+                 one place: pixels within --crop {},{},{},{} may be wrong",
+                totals.traversal_overruns,
+                left + x,
+                top + y,
+                right + x,
+                bottom + y
             ));
         }
         let metadata = self.metadata(renderer);

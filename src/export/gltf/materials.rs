@@ -54,7 +54,7 @@ impl<'a> Translator<'a> {
         }
         let color = match &surface.emission {
             Some(light) if is_unlit => light.texture.as_ref(),
-            _ if self.is_glass() => None,
+            _ if self.material.kind.is_glass() => None,
             _ => surface.color.as_ref(),
         };
         self.pbr(&core, color);
@@ -101,13 +101,6 @@ impl<'a> Translator<'a> {
                 .as_ref()
                 .is_some_and(|light| light.two_sided && light.radiance.max_element() <= 1.0)
             && !surface.vertex_color
-    }
-
-    fn is_glass(&self) -> bool {
-        matches!(
-            self.material.kind,
-            MaterialKind::Dielectric { .. } | MaterialKind::ThinDielectric { .. }
-        )
     }
 
     /// Factors of the model, with the extensions that it needs.

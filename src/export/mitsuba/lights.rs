@@ -78,15 +78,14 @@ pub(super) fn write_environment(
     folder: &Path,
     folder_name: &str,
 ) -> Result<String> {
-    let first = map.texels[0];
-    if map.texels.iter().all(|texel| *texel == Vec3::ZERO) {
+    if map.is_black() {
         return Ok(String::new());
     }
-    if map.texels.iter().all(|texel| *texel == first) {
+    if let Some(radiance) = map.uniform_radiance() {
         return Ok(format!(
             "    <emitter type=\"constant\">\n        <rgb name=\"radiance\" value=\"{}\"/>\n    \
              </emitter>\n",
-            triple(first)
+            triple(radiance)
         ));
     }
     let (width, height) = (map.width as usize, map.height as usize);

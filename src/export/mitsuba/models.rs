@@ -55,10 +55,7 @@ impl Translator<'_> {
     /// Translates the material; `reflected_share` is that of a measured one.
     pub(super) fn model(mut self, reflected_share: impl Fn() -> Vec3) -> Model {
         let surface = &self.material.surface;
-        let is_glass = matches!(
-            self.material.kind,
-            MaterialKind::Dielectric { .. } | MaterialKind::ThinDielectric { .. }
-        );
+        let is_glass = self.material.kind.is_glass();
         let mut bsdf = self.reflection(reflected_share);
         if surface.two_sided && !is_glass {
             bsdf = around("twosided", "", &bsdf);

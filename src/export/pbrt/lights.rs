@@ -76,12 +76,11 @@ pub(super) fn write_environment(
     folder: &Path,
     folder_name: &str,
 ) -> Result<String> {
-    let first = map.texels[0];
-    if map.texels.iter().all(|texel| *texel == Vec3::ZERO) {
+    if map.is_black() {
         return Ok(String::new());
     }
-    if map.texels.iter().all(|texel| *texel == first) {
-        return Ok(format!("LightSource \"infinite\" \"rgb L\" [{}]\n", triple(first)));
+    if let Some(radiance) = map.uniform_radiance() {
+        return Ok(format!("LightSource \"infinite\" \"rgb L\" [{}]\n", triple(radiance)));
     }
     let side = map.height.saturating_mul(2).clamp(SIDES.0, SIDES.1);
     let points = POINTS * map.height.saturating_mul(2).div_ceil(side);

@@ -16,7 +16,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     gpu::{Buffer, Commands, DescriptorSet, Device},
-    scene::{self, Scene},
+    scene::{self, Scene, instance},
     shader::{
         bindings::{GUIDED, guided},
         constants::{GUIDE_COUNT_WORDS, GUIDE_NO_KEY},
@@ -316,7 +316,7 @@ impl GuideBuffers {
             rebuilt_at: 0,
             is_open: false,
             candidates: None,
-            rays: None,
+            share_tiles: None,
             tag: 0,
             rectangles: self.partition.rectangles(),
             keys: self.learned.keys().iter().map(|key| key.0).collect(),
@@ -476,11 +476,8 @@ fn guide_parameters(
     slots: usize,
     missing_slots: usize,
 ) -> GuideParameters {
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for position in scene.geometry.used_extent() {
-        low = low.min(position);
-        high = high.max(position);
-    }
+    let bounds = instance::bounds(scene.geometry.used_extent());
+    let [low, high] = bounds.unwrap_or([Vec3::INFINITY, Vec3::NEG_INFINITY]);
     let size = (high - low).max_element();
     let size = if size.is_finite() && size > 0.0 { size } else { 1.0 };
     let pixel_angle = 2.0 * (0.5 * scene.camera.vertical_fov_deg).to_radians().tan()

@@ -21,8 +21,10 @@ use crate::{
     gpu::DescriptorSet,
     math::colour::luminance,
     pass::{Passes, Progress, Runner, Steps},
-    sampler::basic::BasicSteps,
-    shader::structs::{PathState, Wave},
+    shader::{
+        constants::TRAINING_WAVE,
+        structs::{PathState, Wave},
+    },
 };
 
 /// Separates the random numbers of measurements from those of the training and of the picture.
@@ -33,12 +35,12 @@ pub(super) const MOST_ROUNDS: u32 = 4;
 /// Least step between pixels in film order: one row or column of each of its blocks.
 const STRIDE: u32 = 8;
 /// Most pixels in a wave; a larger film needs no more to tell which number is better.
-const MEASURED_PIXELS: u32 = 4096;
+pub(super) const MEASURED_PIXELS: u32 = 4096;
 /// Consecutive measured pixels in a block of [`PixelSpread`]: enough that the logarithm of a
 /// block's variance does not mistake a distribution with few large values for a narrow one.
 const PIXELS_PER_BLOCK: usize = 32;
 /// Samples of each pixel in a wave, to see how they differ.
-const FEWEST_SAMPLES: u32 = 4;
+pub(super) const FEWEST_SAMPLES: u32 = 4;
 /// Limit on the samples if fewer take less than [`LEAST_MS`].
 const MOST_SAMPLES: u32 = 64;
 /// Device milliseconds below which a wave is too short to be timed or to fill the device.
@@ -63,21 +65,17 @@ pub(super) struct Measured {
     pub(super) spread: PixelSpread,
 }
 
-/// The passes of `guided`, or of `mis` in its place, with the numbers under trial.
+/// The passes of `guided` with the numbers under trial.
 pub(super) struct Trial<'a> {
     pub(super) buffers: &'a GuideBuffers,
     pub(super) steps: GuidedSteps,
-    /// Steps of `mis`.
-    pub(super) open_steps: BasicSteps,
-    /// True if these are on trial.
-    pub(super) is_mis: bool,
     /// Tag of the guides that this one went on from.
     pub(super) tag: u32,
 }
 
 impl Passes for Trial<'_> {
     fn steps(&self) -> &dyn Steps {
-        if self.is_mis { &self.open_steps } else { &self.steps }
+        &self.steps
     }
 
     fn set(&self) -> Option<&DescriptorSet> {
@@ -134,7 +132,7 @@ impl Trial<'_> {
 
     /// Finds the samples per pixel for a wave of at least [`LEAST_MS`], if there is room. The rays
     /// traced to find them also wake the device and are not used.
-    pub(super) fn samples_to_measure(
+    fn samples_to_measure(
         &mut self,
         runner: &mut Runner,
         progress: &Progress,
@@ -151,7 +149,7 @@ impl Trial<'_> {
     }
 
     /// Renders a wave and returns device milliseconds and the paths, sample after sample.
-    pub(super) fn measure(
+    fn measure(
         &mut self,
         runner: &mut Runner,
         progress: &Progress,
@@ -160,23 +158,34 @@ impl Trial<'_> {
         samples: u32,
     ) -> Result<(f64, Vec<PathState>)> {
         let (pixel_stride, pixel_count) = measured_pixels(runner);
-        let first_sample = progress.next_sample();
         let wave = Wave {
             first_pixel: round % STRIDE,
             pixel_count,
-            first_sample,
             sample_count: samples,
-            seed: progress.seed ^ TRAINING_SEED ^ MEASURING_SEED,
             pixel_stride,
-            is_training: 1,
+            is_training: TRAINING_WAVE,
             ..Wave::default()
         };
         self.steps.candidates = candidates;
+        self.run(runner, progress, wave)
+    }
+
+    /// Renders the next samples of the pixels of `wave` with numbers of their own; returns device
+    /// milliseconds and the paths, sample after sample.
+    pub(super) fn run(
+        &self,
+        runner: &mut Runner,
+        progress: &Progress,
+        wave: Wave,
+    ) -> Result<(f64, Vec<PathState>)> {
+        let first_sample = progress.next_sample();
+        let seed = progress.seed ^ TRAINING_SEED ^ MEASURING_SEED;
+        let wave = with_epoch(Wave { first_sample, seed, ..wave }, first_sample, self.tag);
         runner.warm_up(self)?;
         let depth = runner.settings().depth;
-        let times = runner.run(self, with_epoch(wave, first_sample, self.tag), depth)?;
-        let paths = runner.waves().paths().download((pixel_count * samples) as usize)?;
-        Ok((times.values().sum(), paths))
+        let times = runner.run(self, wave, depth)?;
+        let count = wave.pixel_count * wave.sample_count;
+        Ok((times.values().sum(), runner.waves().paths().download(count as usize)?))
     }
 }
 

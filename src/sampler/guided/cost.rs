@@ -26,29 +26,6 @@ fn variance_time(cost: &CandidateCost) -> f64 {
     cost.relative_variance * cost.ms_per_sample
 }
 
-/// Result of a comparison of two ways to render.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// The second has clearly less variance × time.
-    Better,
-    /// The second has clearly more.
-    Worse,
-    /// More measurements may tell.
-    Unclear,
-}
-
-/// Judges the `other` variance × time against the `chosen` one; `error` is the standard error of the
-/// logarithm of their ratio.
-pub fn judge(chosen: f64, other: f64, error: f64) -> Verdict {
-    if other * (CONFIDENCE * error).exp() < CLEAR_GAIN * chosen {
-        Verdict::Better
-    } else if other > CLEAR_LOSS * chosen || other * (-CONFIDENCE * error).exp() > chosen {
-        Verdict::Worse
-    } else {
-        Verdict::Unclear
-    }
-}
-
 /// Chooses a number of candidates: the fewest, unless more are clearly better. `costs` are in
 /// ascending order of candidates.
 ///
@@ -323,16 +300,6 @@ mod tests {
         let lone = variances(&[&four])[0];
         four.blocks[0].squared_deviations *= 1000.0;
         assert!((variances(&[&four])[0] / lone - 10.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn a_change_must_be_clearly_better() {
-        assert_eq!(judge(1.0, 0.5, 0.1), Verdict::Better);
-        assert_eq!(judge(1.0, 0.5, 0.4), Verdict::Unclear);
-        assert_eq!(judge(1.0, 0.95, 0.0), Verdict::Unclear);
-        assert_eq!(judge(1.0, 1.2, 0.01), Verdict::Worse);
-        assert_eq!(judge(1.0, 1.5, 1.0), Verdict::Worse);
-        assert_eq!(judge(1.0, f64::NAN, 0.1), Verdict::Unclear);
     }
 
     #[test]

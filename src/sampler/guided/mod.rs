@@ -36,7 +36,7 @@ mod split;
 mod state;
 mod steps;
 mod technique;
-pub mod ways;
+mod tiles;
 
 pub use arriving::{ARRIVAL_DIRECTIONS, ArrivalWords, ArrivingLight, Reflected, arrival_direction};
 pub use buffers::{GuideBuffers, GuideSize};
@@ -46,7 +46,7 @@ pub use entries::{decode_entry, decode_visibility};
 pub use estimate::Estimates;
 pub use guide::Guide;
 pub use key::{CellKey, FACE_COUNT, face_normal};
-pub use parameters::GuidedParameters;
+pub use parameters::{AUTO_TILE_EDGE, GuidedParameters};
 pub use partition::{MAX_REGIONS, Partition, Region};
 pub use record::{GuidedRay, RecordedGuide, RecordedRay};
 pub use recorded_cell::{CellLevel, RecordedCell, RecordedRegion};

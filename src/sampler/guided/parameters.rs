@@ -2,15 +2,15 @@
 
 use crate::sampler::knob::{self, Knob};
 
+/// Edge of the tiles that `share-tiles=auto` may choose, pixels (`docs/experiments/shared_paths.md`).
+pub const AUTO_TILE_EDGE: u32 = 4;
+
 /// Parameters of `guided`, apart from the number of candidates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuidedParameters {
     /// `bounce-candidates`: BRDF directions to choose each bounce from by learned arriving light, 1
     /// to 16; 1 turns learning and choosing off.
     pub bounce_candidates: u32,
-    /// `ray-choice`: true chooses the numbers of shadow rays, and in half-open scenes between `guided`
-    /// and `mis`, by measurement before the first sample.
-    pub chooses_rays: bool,
     /// `guide-memory`: most bytes for the cells.
     pub guide_memory: u64,
     /// `later-rays`: most shadow rays at each vertex after the first; `None` is `auto`, half of
@@ -22,13 +22,7 @@ pub struct GuidedParameters {
 
 impl Default for GuidedParameters {
     fn default() -> Self {
-        Self {
-            bounce_candidates: 4,
-            chooses_rays: false,
-            guide_memory: 128 << 20,
-            later_rays: None,
-            regions: 1024,
-        }
+        Self { bounce_candidates: 4, guide_memory: 128 << 20, later_rays: None, regions: 1024 }
     }
 }
 
@@ -52,11 +46,6 @@ impl GuidedParameters {
             key: "later-rays",
             set: |own, value| knob::number_or_auto(&mut own.later_rays, value, 1..=4096),
             get: |own| knob::text_or_auto(own.later_rays),
-        },
-        Knob {
-            key: "ray-choice",
-            set: |own, value| knob::choice(&mut own.chooses_rays, value, knob::ON_OR_OFF),
-            get: |own| knob::name_of(&own.chooses_rays, knob::ON_OR_OFF),
         },
         Knob {
             key: "regions",

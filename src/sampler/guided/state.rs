@@ -12,6 +12,7 @@ use crate::sampler::guided::{
     arriving::{ARRIVAL_DIRECTIONS, ArrivalWords},
     cost::GUIDED_CANDIDATES,
     counts::CountWords,
+    parameters::AUTO_TILE_EDGE,
     share::SHARE_WORDS,
 };
 use crate::{
@@ -22,7 +23,7 @@ use crate::{
 
 const COUNT_WORDS: usize = GUIDE_COUNT_WORDS as usize;
 const FORMAT: &str = "fenestra-guide";
-const VERSION: u32 = 10;
+const VERSION: u32 = 11;
 /// Upper bound of the rays of one cell and direction: each rebuild halves them and adds a word.
 const MAX_ARRIVAL_RAYS: f32 = 1e10;
 /// Upper bound of their light, such that its product with the rays of all cells stays finite.
@@ -41,8 +42,8 @@ pub struct GuideState {
     pub is_open: bool,
     /// Candidates per shadow ray, one of [`GUIDED_CANDIDATES`]; `None` where not decided.
     pub candidates: Option<u32>,
-    /// Shadow rays at the first and at each later vertex, where they were chosen.
-    pub rays: Option<[u32; 2]>,
+    /// Edge of the tiles that share paths, 1 for none, where it was chosen.
+    pub share_tiles: Option<u32>,
     /// Tag of the guides that this one went on from, see [`GuideState::epoch_tag`]; 0 for none.
     pub tag: u32,
     /// First column and row, number of columns and rows, and parent of every region.
@@ -95,7 +96,7 @@ struct Header {
     rebuilt_at: u32,
     is_open: bool,
     candidates: Option<u32>,
-    rays: Option<[u32; 2]>,
+    share_tiles: Option<u32>,
     #[serde(default)]
     tag: u32,
     cells: usize,
@@ -168,7 +169,7 @@ impl GuideState {
             rebuilt_at: self.rebuilt_at,
             is_open: self.is_open,
             candidates: self.candidates,
-            rays: self.rays,
+            share_tiles: self.share_tiles,
             tag: self.tag,
             cells: self.keys.len(),
             refined: self.refined.len(),
@@ -224,8 +225,8 @@ impl GuideState {
         if header.candidates.is_some_and(|count| !GUIDED_CANDIDATES.contains(&count)) {
             return Err(damaged("its header holds an impossible number of candidates"));
         }
-        if header.rays.is_some_and(|rays| rays.iter().any(|count| !(1..=4096).contains(count))) {
-            return Err(damaged("its header holds an impossible number of shadow rays"));
+        if header.share_tiles.is_some_and(|edge| ![1, AUTO_TILE_EDGE].contains(&edge)) {
+            return Err(damaged("its header holds an impossible edge of tiles"));
         }
         let counts = header.cells.checked_mul(header.origin.regions as usize);
         let length = counts.and_then(|counts| {
@@ -270,7 +271,7 @@ impl GuideState {
             rebuilt_at: header.rebuilt_at,
             is_open: header.is_open,
             candidates: header.candidates,
-            rays: header.rays,
+            share_tiles: header.share_tiles,
             tag: header.tag,
             rectangles: take(5 * regions)
                 .chunks_exact(5)
@@ -313,7 +314,7 @@ mod tests {
             rebuilt_at: 4,
             is_open: true,
             candidates: Some(8),
-            rays: Some([2, 1]),
+            share_tiles: Some(4),
             tag: 5,
             rectangles: vec![[0, 0, 5, 9, 0], [5, 0, 3, 9, 1]],
             keys: vec![u32::MAX, 7, 8],

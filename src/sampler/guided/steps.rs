@@ -3,12 +3,11 @@
 
 use super::parameters::GuidedParameters;
 use crate::{
-    pass::{Domain, Kernel, PassSettings, Steps, Surfaces},
+    pass::{Domain, Kernel, PassSettings, Roulette, Steps, Surfaces},
     shader::{
         constants::{
             AOV_GUIDE_CELL, CONSTANT_BOUNCE_CANDIDATES, CONSTANT_BRDF_CANDIDATES,
-            CONSTANT_CANDIDATES, CONSTANT_ROULETTE_VERTEX, GUIDE_SAMPLES_THAT_ALL_TEACH,
-            GUIDE_TEACHING_STEP,
+            CONSTANT_CANDIDATES, GUIDE_SAMPLES_THAT_ALL_TEACH, GUIDE_TEACHING_STEP,
         },
         structs::Wave,
     },
@@ -19,12 +18,12 @@ use crate::{
 pub struct GuidedSteps {
     /// Candidates per shadow ray, a quarter of them from the BRDF; 1 is the one-sample model.
     pub candidates: u32,
-    /// Shadow rays at the first and at each later vertex, where they were chosen.
-    pub rays: Option<[u32; 2]>,
+    /// True if the pixels of a tile share paths.
+    pub shares_paths: bool,
     parameters: GuidedParameters,
     guides_bounces: bool,
     surfaces: Surfaces,
-    roulette_vertex: u32,
+    roulette: Roulette,
 }
 
 impl GuidedSteps {
@@ -32,11 +31,11 @@ impl GuidedSteps {
     pub fn new(candidates: u32, parameters: GuidedParameters, settings: &PassSettings) -> Self {
         Self {
             candidates,
-            rays: None,
+            shares_paths: true,
             parameters,
             guides_bounces: parameters.guides_bounces(settings.depth),
             surfaces: settings.surfaces,
-            roulette_vertex: settings.roulette_vertex,
+            roulette: settings.roulette,
         }
     }
 
@@ -45,16 +44,19 @@ impl GuidedSteps {
         Self { candidates, ..self }
     }
 
-    /// Returns the same steps with other numbers of shadow rays.
-    pub fn with_rays(self, rays: Option<[u32; 2]>) -> Self {
-        Self { rays, ..self }
+    /// Returns the same steps with or without shared paths.
+    pub fn with_sharing(self, shares_paths: bool) -> Self {
+        Self { shares_paths, ..self }
     }
 }
 
 impl Steps for GuidedSteps {
     fn shadow_rays_at(&self, vertex: u32, most: u32) -> u32 {
-        let [first, later] = self.rays.unwrap_or([most, self.parameters.later_rays_of(most)]);
-        most.min(if vertex == 0 { first } else { later })
+        if vertex == 0 { most } else { self.parameters.later_rays_of(most) }
+    }
+
+    fn shares_paths(&self) -> bool {
+        self.shares_paths
     }
 
     fn sample(&self, wave: &Wave) -> Vec<Kernel> {
@@ -82,11 +84,8 @@ impl Steps for GuidedSteps {
     }
 
     fn bounce(&self, _wave: &Wave) -> Option<Kernel> {
-        let own = [
-            (CONSTANT_BOUNCE_CANDIDATES, self.parameters.bounce_candidates),
-            (CONSTANT_ROULETTE_VERTEX, self.roulette_vertex),
-        ];
-        let constants = [&own[..], &self.surfaces.constants()].concat();
+        let own = [(CONSTANT_BOUNCE_CANDIDATES, self.parameters.bounce_candidates)];
+        let constants = [&own[..], &self.roulette.constants(), &self.surfaces.constants()].concat();
         self.guides_bounces.then(|| Kernel::new("bounce_guided", Domain::Paths, &constants))
     }
 }

@@ -5,14 +5,14 @@ use super::{
     choice::{Choice, Trial},
     cost::GUIDED_CANDIDATES,
     epoch::{TRAINING_SEED, with_epoch},
-    parameters::GuidedParameters,
+    parameters::{AUTO_TILE_EDGE, GuidedParameters},
     state::GuideState,
     steps::GuidedSteps,
-    ways::{ChosenWay, Way},
+    tiles::TileChoice,
 };
 use crate::{
     error::Result,
-    film::{Aov, statistics::RayCost},
+    film::Aov,
     gpu::DescriptorSet,
     pass::{Passes, Progress, Report, Runner, SHADOW_RAYS_PER_GROUP, Steps, Technique},
     sampler::{
@@ -20,7 +20,7 @@ use crate::{
         basic::{self, BasicSteps},
         knob,
     },
-    shader::structs::Wave,
+    shader::{constants::TRAINING_WAVE, structs::Wave},
 };
 use std::collections::BTreeMap;
 
@@ -28,8 +28,6 @@ use std::collections::BTreeMap;
 const TRAINING_SWEEPS: u32 = 8;
 /// Share of visible rays above which a scene is open and rendered as by `mis`: learning would not pay.
 const OPEN_SHARE: f64 = 0.5;
-/// The same where a measurement decides below it.
-const CLEARLY_OPEN_SHARE: f64 = 0.9;
 
 pub(in crate::sampler) struct GuidedRoom;
 
@@ -64,21 +62,20 @@ impl Room for GuidedRoom {
         let mut guided = Guided {
             buffers: GuideBuffers::new(runner.device(), scene, &own, size)?,
             steps: GuidedSteps::new(first_candidates(parameters)?, own, settings),
-            open_steps: open_steps.with_rays(Some(rays_in_the_open)),
-            rays_in_the_open,
+            open_steps: open_steps
+                .with_rays(rays_in_the_open)
+                .with_sharing(parameters.share_tiles.is_some()),
             given_candidates: parameters.candidates,
-            parameters: own,
             choice: Choice::default(),
-            way: None,
-            ray_costs: Vec::new(),
-            way_ms: 0.0,
-            may_be_open: false,
+            chooses_tiles: parameters.share_tiles.is_none() && settings.tile_edge > 1,
+            tiles: TileChoice::default(),
             is_trained: false,
             is_open: false,
             rebuilt_at: 0,
             tag: 0,
         };
         guided.forget_choice();
+        guided.forget_tiles();
         Ok(Box::new(guided))
     }
 }
@@ -94,18 +91,12 @@ pub struct Guided {
     steps: GuidedSteps,
     /// Steps of `mis`, for open scenes.
     open_steps: BasicSteps,
-    /// Their shadow rays unless others are chosen.
-    rays_in_the_open: [u32; 2],
     /// Number of candidates that the user asked for; `None` for `auto`.
     given_candidates: Option<u32>,
-    parameters: GuidedParameters,
     choice: Choice,
-    /// Chosen sampler and shadow rays; `None` while undecided and where they are given.
-    way: Option<Way>,
-    ray_costs: Vec<RayCost>,
-    way_ms: f64,
-    /// True if so much is visible that `mis` may be better: measured after the training.
-    may_be_open: bool,
+    /// True under `share-tiles=auto`, where there is anything to share.
+    chooses_tiles: bool,
+    tiles: TileChoice,
     is_trained: bool,
     /// True if too little is blocked to learn anything.
     pub(super) is_open: bool,
@@ -123,7 +114,7 @@ impl Guided {
             rebuilt_at: self.rebuilt_at,
             is_open: self.is_open,
             candidates: self.candidates(),
-            rays: self.way.map(|way| way.rays),
+            share_tiles: self.share_tiles(),
             tag: self.tag,
             ..self.buffers.state()?
         })
@@ -154,9 +145,8 @@ impl Guided {
             self.tag = state.epoch_tag();
         }
         self.is_trained = true;
-        self.may_be_open = false;
-        if let Some(rays) = state.rays.filter(|_| self.parameters.chooses_rays && !has_moved) {
-            self.take_way(Way { is_mis: self.is_open, rays });
+        if self.chooses_tiles && state.share_tiles.is_some() {
+            self.take_tiles(TileChoice { edge: state.share_tiles, ..TileChoice::default() });
         }
         if let Some(candidates) = state.candidates {
             self.take_choice(Choice { candidates: Some(candidates), ..Choice::default() });
@@ -179,50 +169,30 @@ impl Guided {
         }
     }
 
-    /// Takes sampler and shadow rays measured here or by an earlier render.
-    fn take_way(&mut self, way: Way) {
-        self.is_open = way.is_mis;
-        self.steps = self.steps.with_rays(Some(way.rays));
-        self.open_steps = self.open_steps.with_rays(Some(way.rays));
-        self.way = Some(way);
+    /// Undoes the choice of tiles, unless the user made it.
+    fn forget_tiles(&mut self) {
+        self.tiles = TileChoice::default();
+        self.steps = self.steps.with_sharing(!self.chooses_tiles);
     }
 
-    /// Chooses sampler and shadow rays by measurement: `mis` or `guided` where either may be better,
-    /// then fewer rays.
-    fn choose_way(&mut self, runner: &mut Runner, progress: &Progress) -> Result<()> {
-        let most = runner.settings().shadow_rays;
-        let later = self.parameters.later_rays;
-        let guided = Way { is_mis: false, rays: [most, self.parameters.later_rays_of(most)] };
-        let mis = Way { is_mis: true, rays: self.rays_in_the_open };
-        let (first, other) = match (self.is_open, self.may_be_open) {
-            (true, _) => (mis, None),
-            (false, true) => (mis, Some(guided)),
-            (false, false) => (guided, None),
-        };
-        let ChosenWay { way, costs, ms } = if most == 0 {
-            ChosenWay { way: first, costs: Vec::new(), ms: 0.0 }
-        } else {
-            self.trial().choose_way(runner, progress, first, other, later)?
-        };
-        self.ray_costs = costs;
-        self.way_ms = ms;
-        self.take_way(way);
-        Ok(())
+    /// Takes the edge of tiles measured here or by an earlier render.
+    fn take_tiles(&mut self, tiles: TileChoice) {
+        self.steps = self.steps.with_sharing(tiles.edge == Some(AUTO_TILE_EDGE));
+        self.tiles = tiles;
     }
 
     fn trial(&self) -> Trial<'_> {
-        Trial {
-            buffers: &self.buffers,
-            steps: self.steps,
-            open_steps: self.open_steps,
-            is_mis: false,
-            tag: self.tag,
-        }
+        Trial { buffers: &self.buffers, steps: self.steps, tag: self.tag }
     }
 
     /// Returns the candidates per shadow ray; `None` while `auto` is undecided, and in open scenes.
     fn candidates(&self) -> Option<u32> {
         self.choice.candidates.filter(|_| !self.is_open)
+    }
+
+    /// Returns the chosen edge of tiles; `None` where it was given or is undecided, and in open scenes.
+    fn share_tiles(&self) -> Option<u32> {
+        self.tiles.edge.filter(|_| !self.is_open)
     }
 
     fn rebuild(&mut self, splits: bool, samples: u32) -> Result<()> {
@@ -239,7 +209,7 @@ impl Guided {
                 sample_count: 1,
                 seed: progress.seed ^ TRAINING_SEED,
                 pixel_stride: TRAINING_SWEEPS,
-                is_training: 1,
+                is_training: TRAINING_WAVE,
                 ..Wave::default()
             };
             let wave = with_epoch(wave, wave.first_sample, self.tag);
@@ -250,12 +220,7 @@ impl Guided {
             // the picture, so the picture does not depend on its own samples here.
             let visible = runner.totals().shadow_rays_visible - before.shadow_rays_visible;
             let traced = runner.totals().shadow_rays_traced - before.shadow_rays_traced;
-            let is_above = |share: f64| visible as f64 > share * traced as f64;
-            if sweep == 0 && self.parameters.chooses_rays {
-                self.may_be_open = is_above(OPEN_SHARE);
-            }
-            let limit = if self.may_be_open { CLEARLY_OPEN_SHARE } else { OPEN_SHARE };
-            if sweep == 0 && is_above(limit) {
+            if sweep == 0 && visible as f64 > OPEN_SHARE * traced as f64 {
                 log::info!("{visible} of {traced} rays of the first sweep are visible: as mis");
                 self.is_open = true;
                 return Ok(());
@@ -277,6 +242,9 @@ impl Passes for Guided {
 
     fn other_steps(&self) -> Vec<Box<dyn Steps>> {
         let mut others: Vec<Box<dyn Steps>> = vec![Box::new(self.open_steps)];
+        if self.chooses_tiles {
+            others.push(Box::new(self.steps.with_sharing(true)));
+        }
         if self.given_candidates.is_none() {
             for candidates in &GUIDED_CANDIDATES[..2] {
                 others.push(Box::new(self.steps.with_candidates(*candidates)));
@@ -303,15 +271,16 @@ impl Technique for Guided {
         {
             self.rebuild(samples == SPLIT_AFTER, samples)?;
         }
-        if self.parameters.chooses_rays && self.way.is_none() {
-            self.choose_way(runner, progress)?;
-        }
         if self.is_open {
             return Ok(u32::MAX);
         }
         if self.choice.candidates.is_none() {
             let choice = self.trial().choose(runner, progress)?;
             self.take_choice(choice);
+        }
+        if self.chooses_tiles && self.tiles.edge.is_none() {
+            let tiles = self.trial().choose_tiles(runner, progress)?;
+            self.take_tiles(tiles);
         }
         Ok(guide_schedule(samples + 1) - samples)
     }
@@ -320,15 +289,10 @@ impl Technique for Guided {
         self.buffers.forget()?;
         self.is_trained = false;
         self.is_open = false;
-        self.may_be_open = false;
-        self.way = None;
-        self.ray_costs = Vec::new();
-        self.way_ms = 0.0;
-        self.steps = self.steps.with_rays(None);
-        self.open_steps = self.open_steps.with_rays(Some(self.rays_in_the_open));
         self.rebuilt_at = 0;
         self.tag = 0;
         self.forget_choice();
+        self.forget_tiles();
         Ok(())
     }
 
@@ -337,14 +301,14 @@ impl Technique for Guided {
             host_ms: [
                 ("guide rebuilds".to_owned(), self.buffers.rebuild_ms()),
                 ("choice of candidates".to_owned(), self.choice.ms),
-                ("choice of shadow rays".to_owned(), self.way_ms),
+                ("choice of tiles".to_owned(), self.tiles.ms),
             ]
             .into(),
             buffer_bytes: self.buffers.buffer_bytes(),
             candidates: self.candidates(),
             candidate_costs: self.choice.costs.clone(),
-            chosen_rays: self.way.as_ref().map(Way::described),
-            ray_costs: self.ray_costs.clone(),
+            share_tiles: self.share_tiles(),
+            sharing_gain: self.tiles.gain,
             ..Report::default()
         }
     }

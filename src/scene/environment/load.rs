@@ -13,11 +13,14 @@ use rayon::prelude::*;
 use super::{EnvironmentMap, MAX_RADIANCE};
 use crate::{
     error::{Error, Result},
-    files,
+    files, memory,
 };
 
 /// Most texels of a map: 16384×8192.
 const MAX_TEXELS: u64 = 1 << 27;
+
+/// Bytes of a texel: its radiance, and its share of the sampling tables.
+const TEXEL_BYTES: u64 = 48;
 
 /// Largest compression of a Radiance file: a run of 255 texels of four bytes in four bytes.
 const HDR_LARGEST_RATIO: u64 = 255;
@@ -114,7 +117,7 @@ impl EnvironmentMap {
                 self.texels.len()
             ));
         }
-        if self.texels.par_iter().all(|texel| *texel == Vec3::ZERO) {
+        if self.is_black() {
             warnings.push(format!("{}: the map is black: nothing is lit", self.source));
         }
     }
@@ -137,7 +140,12 @@ fn check_size(width: u64, height: u64) -> Result<(), String> {
             "{width}×{height} texels; expected at least 1×1 and at most {MAX_TEXELS} in all"
         ));
     }
-    Ok(())
+    let texels = width.saturating_mul(height);
+    memory::check(
+        format_args!("a map of {width}×{height} texels"),
+        texels.saturating_mul(TEXEL_BYTES),
+    )
+    .map_err(|shortage| shortage.to_string())
 }
 
 fn read_hdr(bytes: &[u8]) -> Result<Image, String> {

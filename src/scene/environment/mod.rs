@@ -13,6 +13,7 @@ mod sky;
 mod table;
 
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 
 pub use court::CourtParameters;
 pub use sky::SkyParameters;
@@ -61,6 +62,17 @@ impl Cell {
 }
 
 impl EnvironmentMap {
+    /// Radiance in every direction, if it is the same in all.
+    pub fn uniform_radiance(&self) -> Option<Vec3> {
+        let first = *self.texels.first()?;
+        self.texels.par_iter().all(|texel| *texel == first).then_some(first)
+    }
+
+    /// True if no light comes from anywhere.
+    pub fn is_black(&self) -> bool {
+        self.texels.par_iter().all(|texel| *texel == Vec3::ZERO)
+    }
+
     /// Map of `radiance` times `scale` in every direction.
     ///
     /// # Errors

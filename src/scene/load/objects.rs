@@ -10,7 +10,8 @@ use glam::Vec3;
 use super::Loader;
 use crate::{
     brdf::Material,
-    error::Result,
+    error::{Error, Result},
+    memory,
     scene::{
         Geometry,
         features::{self, Ignored},
@@ -22,7 +23,13 @@ use crate::{
         shapes::check_triangles,
         transform::Transform,
     },
+    stage,
 };
+
+/// Bytes of a placed vertex: position, normal, coordinates, tangent.
+const VERTEX_BYTES: u64 = 48;
+/// Bytes of a placed triangle: corners and material.
+const TRIANGLE_BYTES: u64 = 16;
 
 impl Loader<'_> {
     pub(super) fn geometry(
@@ -84,6 +91,7 @@ impl Loader<'_> {
                         mesh
                     }
                     ObjectSource::Shape { shape, .. } => {
+                        stage::enter(format_args!("making {}", object_label(index, object)));
                         let mut mesh = shape.mesh().map_err(|message| {
                             self.error(format!("{}: {message}", object_label(index, object)))
                         })?;
@@ -190,14 +198,18 @@ impl Loader<'_> {
         })
     }
 
-    /// Checks that 32-bit indices address everything.
+    /// Checks that 32-bit indices address everything, and that there is memory for it.
     pub(super) fn check_counts(&self, vertices: usize, triangles: usize) -> Result<()> {
         self.check(u32::try_from(vertices).is_ok() && u32::try_from(triangles).is_ok(), || {
             format!(
                 "{vertices} vertices and {triangles} triangles, at most {} can be used",
                 u32::MAX
             )
-        })
+        })?;
+        let vertex_bytes = (vertices as u64).saturating_mul(VERTEX_BYTES);
+        let triangle_bytes = (triangles as u64).saturating_mul(TRIANGLE_BYTES);
+        let asker = format_args!("{}: {triangles} triangles", self.path.display());
+        memory::check(asker, vertex_bytes.saturating_add(triangle_bytes)).map_err(Error::memory)
     }
 
     fn check_material(

@@ -1,7 +1,5 @@
 //! A scene description of pbrt-v4 as a whole scene.
 
-use glam::Vec3;
-
 use super::{LoadOptions, Loader, MIN_ALPHA, default_material, light::Light};
 use crate::{
     brdf::material::MaterialKind,
@@ -39,7 +37,7 @@ impl Loader<'_> {
         if contents.materials.is_empty() {
             contents.materials.push(default_material());
         }
-        let is_dark = environment.texels.iter().all(|texel| *texel == Vec3::ZERO)
+        let is_dark = environment.is_black()
             && contents.lamps.is_empty()
             && contents.materials.iter().all(|material| material.surface.emission.is_none());
         if is_dark {

@@ -22,7 +22,7 @@ use glam::Vec3;
 use crate::{
     brdf::{Material, material::MaterialKind},
     error::{Error, Result},
-    files,
+    files, memory,
     scene::features::{self, Ignored},
 };
 
@@ -38,6 +38,9 @@ const LONGEST_CHAIN: usize = 16;
 /// [`Error::Io`], or [`Error::Parse`] with the line.
 pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
     let file = files::open_regular(path)?;
+    // The arrays of a mesh take about as much as its text.
+    memory::check(path.display(), file.metadata().map_or(0, |metadata| metadata.len()))
+        .map_err(Error::memory)?;
     let mut reader = ObjReader {
         path,
         line: 0,

@@ -48,6 +48,7 @@ pub use rounded_box::RoundedBox;
 pub use tube::Tube;
 
 use super::mesh::Mesh;
+use crate::memory::{self, Shortage};
 
 /// Allowed numbers of segments.
 const SEGMENT_RANGE: RangeInclusive<usize> = 3..=4096;
@@ -57,6 +58,9 @@ const MAX_POINTS: usize = 1024;
 
 /// Most triangles of all shapes of a scene together, each object counted.
 pub const MAX_TRIANGLES: usize = 1 << 25;
+
+/// Bytes of a triangle and half a vertex.
+const BYTES_PER_TRIANGLE: usize = 28;
 
 /// Angle above which a corner is a crease, degrees, for shapes that do not set it.
 const DEFAULT_CREASE_DEG: f64 = 40.0;
@@ -128,6 +132,8 @@ struct Builder {
     mesh: Mesh,
     /// Triangles of all patches asked for, of which those beyond [`MAX_TRIANGLES`] are not built.
     asked_triangles: usize,
+    /// Why patches were left out.
+    shortage: Option<Shortage>,
 }
 
 impl Builder {
@@ -154,7 +160,11 @@ impl Builder {
     /// Adds a patch of `rows` × `columns` vertices; columns × rows (cross product) points outward.
     fn patch(&mut self, rows: usize, columns: usize, vertex: impl Fn(usize, usize) -> Vertex) {
         self.asked_triangles += 2 * rows.saturating_sub(1) * columns.saturating_sub(1);
-        if self.asked_triangles > MAX_TRIANGLES {
+        let room = memory::check_count("a shape", self.asked_triangles, BYTES_PER_TRIANGLE);
+        if let Err(shortage) = room {
+            self.shortage = Some(shortage);
+        }
+        if self.asked_triangles > MAX_TRIANGLES || self.shortage.is_some() {
             return;
         }
         let first = self.mesh.positions.len() as u32;
@@ -192,6 +202,9 @@ impl Builder {
     /// Returns a message about a shape of more than [`MAX_TRIANGLES`].
     fn finish(self) -> Result<Mesh, String> {
         check_triangles(self.asked_triangles)?;
+        if let Some(shortage) = self.shortage {
+            return Err(shortage.to_string());
+        }
         let mut mesh = self.mesh;
         if volume(&mesh) < 0.0 {
             mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));

@@ -6,7 +6,10 @@ use gltf::{
 };
 
 use super::GltfReader;
-use crate::error::Result;
+use crate::{
+    error::{Error, Result},
+    memory,
+};
 
 /// Most elements of a sparse accessor that starts from zeros, which no buffer bounds.
 const MAX_ZEROS: usize = 1 << 26;
@@ -104,6 +107,12 @@ impl<'a> GltfReader<'a> {
     fn elements<T>(&self, accessor: &Accessor, element: impl Fn(&[u8]) -> T) -> Result<Vec<T>> {
         let label = format!("accessor {}", accessor.index());
         let (count, size) = (accessor.count(), accessor.size());
+        memory::check_count(
+            format_args!("{}: {label}", self.path.display()),
+            count,
+            size_of::<T>(),
+        )
+        .map_err(Error::memory)?;
         let range = |offset, count, size| Elements { offset, count, size };
         let mut elements: Vec<T> = match accessor.view() {
             Some(view) => self

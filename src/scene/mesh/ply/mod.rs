@@ -18,7 +18,7 @@ use header::{Element, Encoding, Property, Scalar};
 use super::Mesh;
 use crate::{
     error::{Error, Result},
-    files,
+    files, memory,
     texture::lookup::srgb_to_linear,
 };
 
@@ -31,6 +31,9 @@ const COLOR_NAMES: [[&str; 4]; 2] = [["red", "green", "blue", "alpha"], ["r", "g
 
 /// Largest compression of gzip, which bounds what a compressed file may promise.
 const GZIP_LARGEST_RATIO: u64 = 1032;
+
+/// Bytes of a vertex (position, normal, coordinates) or of the triangles of a face.
+const ELEMENT_BYTES: u64 = 32;
 
 /// Reads a PLY file, or one compressed by gzip if its extension is `gz`.
 ///
@@ -66,6 +69,8 @@ fn read_from<R: BufRead>(path: &Path, reader: R, file_bytes: u64) -> Result<Mesh
             ));
         }
     }
+    let count = elements.iter().map(|element| element.count).fold(0, u64::saturating_add);
+    memory::check(path.display(), count.saturating_mul(ELEMENT_BYTES)).map_err(Error::memory)?;
     let mut polygons = Polygons::default();
     for element in &elements {
         match element.name.as_str() {

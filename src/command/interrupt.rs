@@ -1,0 +1,45 @@
+//! Ctrl-C, SIGTERM and SIGHUP.
+
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering},
+};
+
+/// Interrupts of this process. One while there is nothing to lose, and a second one, end it at once
+/// with status 130; another is noted for the caller, who writes what there is.
+#[derive(Debug, Default)]
+pub struct Interrupt {
+    is_raised: AtomicBool,
+    has_caller: AtomicBool,
+}
+
+impl Interrupt {
+    /// Starts to listen.
+    pub fn listen() -> Arc<Self> {
+        let interrupt = Arc::new(Self::default());
+        let heard = Arc::clone(&interrupt);
+        let listening = ctrlc::set_handler(move || {
+            let waits = heard.has_caller.load(Ordering::SeqCst);
+            if !waits {
+                eprintln!("error: interrupted before anything was rendered");
+            }
+            if heard.is_raised.swap(true, Ordering::SeqCst) || !waits {
+                std::process::exit(130);
+            }
+        });
+        if let Err(error) = listening {
+            log::warn!("Ctrl-C will end the program without writing the image: {error}");
+        }
+        interrupt
+    }
+
+    /// Leaves the first interrupt from now on to the caller, who asks [`Interrupt::is_raised`].
+    pub fn wait_for_caller(&self) {
+        self.has_caller.store(true, Ordering::SeqCst);
+    }
+
+    /// Tests whether there was an interrupt.
+    pub fn is_raised(&self) -> bool {
+        self.is_raised.load(Ordering::SeqCst)
+    }
+}
