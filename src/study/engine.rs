@@ -14,15 +14,17 @@ use super::{
     reference::{HALF_STEMS, Reference},
     reference_check::{self, CheckJob, ReferenceCheck, Verdict},
     rule::Rule,
+    surfaces::Surfaces,
     watch::{Observer, Watch},
 };
 use crate::{
     error::{Error, Result},
     files::write_json,
-    film::{Metadata, png::write_preview},
+    film::{Aov, Metadata, png::write_preview},
     gpu::Device,
     pass::SceneBuffers,
     renderer::{Renderer, Settings, window_of},
+    sampler::Sampler,
     scene::Scene,
 };
 
@@ -130,6 +132,7 @@ impl Study<'_> {
             triangles: scene.geometry.triangle_count(),
             reference: None,
             reference_check: None,
+            parts: None,
         });
         if self.plan.compares() {
             let reference = self.reference(scene, &mut buffers)?;
@@ -140,7 +143,12 @@ impl Study<'_> {
             if let Some(record) = results.scenes.last_mut() {
                 record.reference_check = check;
             }
-            self.compare(scene, &mut buffers, &reference, results)?;
+            let make = &mut || buffers.renderer(mask_settings());
+            let surfaces = Surfaces::of(self.folder, scene, &reference, make)?;
+            if let Some(record) = results.scenes.last_mut() {
+                record.parts = Some(surfaces.own);
+            }
+            self.compare(scene, &mut buffers, (&reference, &surfaces), results)?;
         }
         if let Some(overhead) = &self.plan.overhead {
             let finished: Vec<Option<Round>> = (1..=overhead.repetitions)
@@ -242,7 +250,7 @@ impl Study<'_> {
         &mut self,
         scene: &Scene,
         buffers: &mut SharedBuffers<'_>,
-        reference: &Reference,
+        (reference, surfaces): (&Reference, &Surfaces),
         results: &mut Results,
     ) -> Result<()> {
         let exposure = exposure(&reference.mean());
@@ -263,6 +271,7 @@ impl Study<'_> {
             let job = RunJob {
                 scene,
                 reference,
+                surfaces,
                 exposure,
                 contender,
                 rule,
@@ -289,6 +298,12 @@ impl Study<'_> {
         }
         Ok(())
     }
+}
+
+/// Settings of the renders that tell surfaces and environment apart.
+fn mask_settings() -> Settings {
+    let sampler = Sampler::Cosine;
+    Settings { sampler, shadow_rays: 1, depth: 1, aovs: vec![Aov::Normal], ..Settings::default() }
 }
 
 /// Pixels of a scene's film.

@@ -2,9 +2,9 @@
 //!
 //! A study file and the command line ([`mod@file`], [`plan`], [`contender`]) → runs against a
 //! reference in two halves ([`engine`], [`job`], [`rule`], [`mod@reference`], [`reference_check`],
-//! [`own_errors`], [`overhead`]), each kept as a [`record`] in the report [`folder`] → figures over the seeds
-//! ([`summary`], [`quality`], [`statistics`]) → `results.json`, `results.csv` ([`results`]) and the page
-//! ([`report`]). [`metrics`] defines the errors.
+//! [`own_errors`], [`surfaces`], [`overhead`]), each kept as a [`record`] in the report [`folder`] →
+//! figures over the seeds ([`summary`], [`quality`], [`statistics`]) → `results.json`, `results.csv`
+//! ([`results`]) and the page ([`report`]). [`metrics`] defines the errors.
 
 pub mod contender;
 pub mod engine;
@@ -26,4 +26,5 @@ pub mod results;
 pub mod rule;
 pub mod statistics;
 pub mod summary;
+pub mod surfaces;
 pub mod watch;

@@ -316,6 +316,7 @@ mod tests {
             triangles: 1,
             reference: Some(reference),
             reference_check: None,
+            parts: None,
         };
         times_to_quality(&plan.unwrap(), &[scene], runs)
     }

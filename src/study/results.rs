@@ -247,6 +247,17 @@ fn columns(runs: &[Run]) -> Vec<Column> {
         column("mean_deviation", |_, _, m| optional(m.mean_deviation)),
         column("mse_judged", |_, _, m| m.mse_judged.to_string()),
         column("relmse_judged", |_, _, m| m.relmse_judged.to_string()),
+        column("surfaces_mse", |_, _, m| optional(m.parts.surfaces.map(|part| part.mse))),
+        column("surfaces_relmse", |_, _, m| optional(m.parts.surfaces.map(|part| part.relmse))),
+        column("surfaces_relmse_trimmed", |_, _, m| {
+            optional(m.parts.surfaces.map(|part| part.relmse_trimmed))
+        }),
+        column("surfaces_judged", |_, _, m| m.parts.surfaces_judged.to_string()),
+        column("environment_mse", |_, _, m| optional(m.parts.environment.map(|part| part.mse))),
+        column("environment_relmse", |_, _, m| {
+            optional(m.parts.environment.map(|part| part.relmse))
+        }),
+        column("flip", |_, _, m| optional(m.flip)),
     ]);
     for (figure, threshold) in
         Figure::ALL.into_iter().flat_map(|figure| THRESHOLDS.map(|threshold| (figure, threshold)))

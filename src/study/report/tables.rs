@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 
 use super::html::{Table, count, escape, interval, number, percent, percent_added, percent_more};
 use crate::study::{
+    metrics::parts::PartErrors,
     overhead::Overhead,
     quality::{Figure, THRESHOLDS, TimeToQuality},
     results::Report,
@@ -24,7 +25,13 @@ fn ratio_cell(ratio: Option<&Interval>, is_better: bool) -> String {
     }
 }
 
-fn find<'a>(report: &'a Report, scene: &str, sampler: &str, rule: Rule) -> Option<&'a Summary> {
+/// Finds the figures of a sampler in a scene under a rule.
+pub(super) fn find<'a>(
+    report: &'a Report,
+    scene: &str,
+    sampler: &str,
+    rule: Rule,
+) -> Option<&'a Summary> {
     report.summaries.iter().find(|summary| {
         summary.scene == scene && summary.sampler == sampler && summary.rule == rule
     })
@@ -37,7 +44,13 @@ struct Glance {
     is_less_better: bool,
 }
 
-const GLANCES: [Glance; 3] = [
+const GLANCES: [Glance; 4] = [
+    Glance {
+        caption: "Trimmed relMSE on lit surfaces over that of {first}: less is better. The environment \
+                  seen directly is left out.",
+        value: |summary| summary.surfaces_ratio.as_ref(),
+        is_less_better: true,
+    },
     Glance {
         caption: "RMSE over that of {first}: less is better. Bright pixels count most.",
         value: |summary| summary.rmse_ratio.as_ref(),
@@ -275,6 +288,10 @@ pub fn figures(report: &Report, scene: &str, rules: &[Rule]) -> String {
             "relMSE,<br>trimmed",
             "relMSE,<br>99.9%",
             "relMSE,<br>largest",
+            "relMSE,<br>surfaces",
+            "trimmed,<br>surfaces",
+            "MSE,<br>environment",
+            "ꟻLIP",
             "mean ratio",
             "visible<br>rays",
             "GPU ms<br>per sample",
@@ -288,6 +305,11 @@ pub fn figures(report: &Report, scene: &str, rules: &[Rule]) -> String {
         for (index, summary) in of_rule.into_iter().enumerate() {
             let relative = |value: f64| {
                 if summary.relmse_judged { number(value, 3) } else { NOT_JUDGED.to_owned() }
+            };
+            let on_surfaces = |value: fn(&PartErrors) -> f64| match summary.parts.surfaces {
+                None => "–".to_owned(),
+                Some(part) if summary.parts.surfaces_judged => number(value(&part), 3),
+                Some(_) => NOT_JUDGED.to_owned(),
             };
             let mut mean = interval(&summary.mean_ratio, 4);
             if summary.is_suspicious() {
@@ -306,6 +328,13 @@ pub fn figures(report: &Report, scene: &str, rules: &[Rule]) -> String {
                 relative(summary.relmse_trimmed),
                 relative(summary.relmse_p999),
                 relative(summary.relmse_max),
+                on_surfaces(|part| part.relmse),
+                on_surfaces(|part| part.relmse_trimmed),
+                summary
+                    .parts
+                    .environment
+                    .map_or_else(|| "–".to_owned(), |part| number(part.mse, 3)),
+                summary.flip.map_or_else(String::new, |flip| number(flip, 3)),
                 mean,
                 summary.visible_share.map_or_else(String::new, percent),
                 number(summary.total_ms(), 3),
