@@ -112,10 +112,15 @@ for (const group of document.querySelectorAll(".pictures")) {
 
   // Draws every picture of the scene anew, with the exposure, curve and gamma that are set.
   const canvas = document.createElement("canvas");
+  function nameStops() {
+    const stops = Number(part(".exposure").value);
+    const text = `${stops >= 0 ? "+" : "−"}${Math.abs(stops).toFixed(1)} stops`;
+    part(".stops").textContent = text;
+    part(".exposure").setAttribute("aria-valuetext", text);
+  }
   function develop() {
     const stops = Number(part(".exposure").value), gamma = Number(part(".gamma").value);
     const curve = CURVES[part("select.curve").value], scale = 2 ** stops;
-    // A table over the halves is exact, since every value is one.
     for (const [name, { values, width, height }] of pictures) {
       Object.assign(canvas, { width, height });
       const context = canvas.getContext("2d");
@@ -129,15 +134,13 @@ for (const group of document.querySelectorAll(".pictures")) {
       const rule = rules.get(name);
       if (rule) rule.style.backgroundImage = `url(${canvas.toDataURL()})`;
     }
-    const text = `${stops >= 0 ? "+" : "−"}${Math.abs(stops).toFixed(1)} stops`;
-    part(".stops").textContent = text;
-    part(".exposure").setAttribute("aria-valuetext", text);
+    nameStops();
   }
   let isDue = false;
   function developSoon() {
     if (isDue) return;
     isDue = true;
-    requestAnimationFrame(() => { isDue = false; develop(); });
+    setTimeout(() => { isDue = false; develop(); }, 16);
   }
   for (const name of [".exposure", ".gamma", "select.curve"]) {
     part(name).addEventListener("input", developSoon);
@@ -148,7 +151,7 @@ for (const group of document.querySelectorAll(".pictures")) {
     part("select.curve").value = "srgb";
     developSoon();
   });
-  part(".stops").textContent = `${Number(group.dataset.exposure).toFixed(1)} stops`;
+  nameStops();
 
   // Says what both pictures hold at a pixel, and marks it.
   const pixel = { x: 0, y: 0 };
