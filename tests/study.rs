@@ -55,10 +55,22 @@ fn json(folder: &Folder, name: &str) -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
+/// Cuts what lies between two marks, wherever they are.
+fn without(page: &str, start: &str, end: &str) -> String {
+    let mut parts = page.split(start);
+    let mut rest = parts.next().unwrap().to_owned();
+    for part in parts {
+        rest += part.split_once(end).unwrap().1;
+    }
+    rest
+}
+
 /// Checks that a page is whole, closes what it opens, and fetches nothing.
 #[track_caller]
 fn check_page(page: &str) {
     assert!(page.starts_with("<!DOCTYPE html>") && page.trim_end().ends_with("</html>"));
+    // Base 64 may hold any word, and the script has words of its own.
+    let page = without(&without(page, "url(data:", ")"), "<script", "</script>");
     for text in ["{{", "NaN", "http:", "https:", "src=", "@import", "<link"] {
         assert!(!page.contains(text), "{text}");
     }
@@ -66,6 +78,42 @@ fn check_page(page: &str) {
         let opened =
             page.matches(&format!("<{name}>")).count() + page.matches(&format!("<{name} ")).count();
         assert_eq!(opened, page.matches(&format!("</{name}>")).count(), "<{name}>");
+    }
+}
+
+/// Uses a page in Chromium, where there is one: exposure, keys, values, flip, sorting, at two widths.
+#[track_caller]
+fn use_in_browser(page: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("page.html");
+    let probe = include_str!("support/report_page.js");
+    fs::write(&path, page.replace("</body>", &format!("<script>{probe}</script></body>"))).unwrap();
+    for width in [1400, 500] {
+        let output = Command::new("chromium")
+            .args(["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=4000"])
+            .args(["--run-all-compositor-stages-before-draw", "--dump-dom"])
+            .arg(format!("--window-size={width},900"))
+            .arg(format!("--user-data-dir={}", folder.path().join("profile").display()))
+            .arg(&path)
+            .output();
+        let Ok(output) = output else {
+            eprintln!("note: no chromium here; the report's viewer was not tried in a browser");
+            return;
+        };
+        let dom = String::from_utf8_lossy(&output.stdout).into_owned();
+        let title = dom.split("<title>").nth(1).unwrap().split("</title>").next().unwrap();
+        let seen: Value = serde_json::from_str(&title.replace("&amp;", "&"))
+            .unwrap_or_else(|error| panic!("{error}: {title}"));
+        assert!(seen["error"].is_null(), "{seen}");
+        assert_eq!(seen["left"], "reference");
+        assert_eq!(seen["flipped"], seen["right"]);
+        assert_ne!(seen["right"], seen["left"]);
+        let values = seen["values"].as_str().unwrap();
+        assert!(values.contains(" · reference: ") && !values.contains("NaN"), "{seen}");
+        assert_ne!(seen["moved"], seen["values"]);
+        assert_eq!(seen["sorted"][0], "descending");
+        assert_eq!((&seen["restored"], &seen["developed"]), (&true.into(), &true.into()), "{seen}");
+        assert!(seen["wide"].as_i64().unwrap() <= 0, "wider than the window: {seen}");
     }
 }
 
@@ -108,10 +156,28 @@ fn a_study_has_every_figure() {
     // Two levels of samples and one time, for two samplers.
     assert_eq!(results["summaries"].as_array().unwrap().len(), 6);
     assert_eq!(results["curves"].as_array().unwrap().len(), 2);
+    // Two samplers, two figures, two thresholds.
+    let times = results["times_to_quality"].as_array().unwrap();
+    assert_eq!(times.len(), 8);
+    for time in times {
+        assert_eq!(time["runs"], 2);
+        assert_ne!(time["seconds"].is_null(), time["extrapolated_seconds"].is_null(), "{time}");
+    }
     let reference = &results["scenes"][0]["reference"];
     assert_eq!(reference["spp"], 128);
     assert!(reference["mse"].as_f64().unwrap() > 0.0);
+    let check = &results["scenes"][0]["reference_check"];
+    assert!(check["description"].as_str().unwrap().starts_with("env, two halves of "), "{check}");
+    assert_ne!(check["verdict"], "disagrees", "{check}");
+    assert!(check["spp"].as_u64().unwrap() >= 2 && check["seconds"].as_f64().unwrap() > 0.0);
     assert!(results["circumstances"]["device"].is_string());
+    let share = results["scenes"][0]["parts"]["surface_share"].as_f64().unwrap();
+    assert!(share > 0.0 && share < 1.0, "the sky is in the frame: {share}");
+    for summary in results["summaries"].as_array().unwrap() {
+        assert!(summary["parts"]["surfaces"]["relmse"].as_f64().unwrap() > 0.0, "{summary}");
+        assert!(summary["parts"]["environment"]["mse"].is_number(), "{summary}");
+        assert!((0.0..1.0).contains(&summary["flip"].as_f64().unwrap()), "{summary}");
+    }
 
     let table = fs::read_to_string(folder.path().join("report/results.csv")).unwrap();
     let mut lines = table.lines();
@@ -132,6 +198,10 @@ fn a_study_has_every_figure() {
         "relmse_p999",
         "relmse_max",
         "mean_ratio",
+        "surfaces_relmse_trimmed",
+        "environment_mse",
+        "flip",
+        "seconds_to_relmse_0.1_of_run",
         "gpu_ms_per_sample_sample",
     ] {
         assert!(columns.contains(&column), "{column}: {columns:?}");
@@ -145,8 +215,15 @@ fn a_study_has_every_figure() {
 
     let page = fs::read_to_string(folder.path().join("report/index.html")).unwrap();
     check_page(&page);
+    use_in_browser(&page);
     for part in [
         "At a glance",
+        "At equal time ",
+        "relMSE against time",
+        "efficiency against samples",
+        "href=\"results.csv\"",
+        "href=\"images/yard/ris-6spp-seed1.exr\"",
+        "Seconds until relMSE falls",
         "id=\"scene-0\"",
         "mis, 6 spp",
         "ris, 0.1 s: error",
@@ -162,6 +239,14 @@ fn a_study_has_every_figure() {
     }
     // One reference, and two samplers at three rules with their errors.
     assert_eq!(page.matches("{background-image:url(data:image/png;base64,").count(), 1 + 2 * 6);
+
+    // Each picture as halves, 24×16 pixels of three times two bytes in base 64.
+    let halves: Vec<&str> = page.split("class=\"halves\"").skip(1).collect();
+    assert_eq!(halves.len(), 1 + 6);
+    for text in halves {
+        let data = text.split_once('>').unwrap().1.split('<').next().unwrap();
+        assert_eq!(data.len(), 24 * 16 * 6 / 3 * 4);
+    }
 
     for name in ["mis-4spp-seed1", "mis-6spp-seed2", "ris-0.1s-seed1", "reference_1"] {
         let path = folder.path().join(format!("report/images/yard/{name}.exr"));
@@ -443,6 +528,7 @@ fn wrong_options_exit_with_2() {
     refuse(&["--samplers=ris:colour=1"], "known: bounce-candidates");
     refuse(&["--samplers=mis,mis"], "sampler \"mis\" is listed twice");
     refuse(&["--reference-sampler=best"], "there is no sampler \"best\"");
+    refuse(&["--reference-check=best"], "--reference-check best: there is no sampler \"best\"");
     refuse(&["--baseline=best"], "there is no sampler \"best\"");
     refuse(&["--spp=0"], "--spp: expected 1 to");
     refuse(&["--seeds=0"], "--seeds: expected 1 to");
@@ -513,6 +599,37 @@ fn references_can_be_given() {
     let text = fs::read_to_string(folder.path().join("more/results.json")).unwrap();
     let results: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(results["scenes"][0]["reference"]["mean"], own["mean"]);
+}
+
+#[test]
+fn a_biased_reference_is_found() {
+    let folder = folder();
+    reference(&folder, "a.exr", &["--seed=100", "--spp=256"]);
+    reference(&folder, "b.exr", &["--seed=101", "--spp=256"]);
+    // A third of the picture is a tenth too bright in both halves.
+    for name in ["a.exr", "b.exr"] {
+        let path = folder.path().join(name);
+        let mut image = Image::read_exr(&path).unwrap();
+        for channel in ["R", "G", "B"] {
+            for (index, value) in image.channels.get_mut(channel).unwrap().iter_mut().enumerate() {
+                *value *= if index % 24 < 8 { 1.1 } else { 1.0 };
+            }
+        }
+        image.write_exr(&path).unwrap();
+    }
+    let loud: Vec<&str> = WITH_REFERENCE.iter().filter(|o| **o != "--quiet").copied().collect();
+    reference(&folder, "c.exr", &["--seed=102", "--sampler=ris", "--spp=256"]);
+    let outside = ["--reference=a.exr", "--reference=b.exr", "--reference-check=c.exr"];
+    folder.run(&with(&loud, &outside)).assert(0, &["DISAGREES"]);
+    let check = json(&folder, "results.json")["scenes"][0]["reference_check"].clone();
+    assert_eq!(check["verdict"], "disagrees", "{check}");
+    assert!(check["block"][0].as_u64().unwrap() < 8, "{check}");
+    let page = fs::read_to_string(folder.path().join("report/index.html")).unwrap();
+    check_page(&page);
+    assert!(page.contains("is in doubt"));
+    let off = ["--reference=a.exr", "--reference=b.exr", "--reference-check=off"];
+    folder.run(&with(&loud, &off)).assert(0, &[]);
+    assert!(json(&folder, "results.json")["scenes"][0]["reference_check"].is_null());
 }
 
 #[test]

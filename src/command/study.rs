@@ -1,6 +1,9 @@
 //! `fenestra study`: compares samplers with a reference and with each other in a report.
 
-use std::{path::PathBuf, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use super::{
     interrupt::Interrupt,
@@ -17,7 +20,7 @@ use crate::{
         engine,
         file::{StudyFile, ValueParsers, is_study},
         folder::Folder,
-        plan::{Description, Options, Plan},
+        plan::{CheckPlan, Description, Options, Plan},
         report,
         results::{Circumstances, Report},
         watch::Observer,
@@ -75,6 +78,10 @@ pub struct Arguments {
     /// twice), or the report folder of another study.
     #[arg(long, value_name = "EXR|FOLDER")]
     pub reference: Vec<PathBuf>,
+    /// Check the reference by an independent picture: a sampler, an EXR of another renderer, or off
+    /// (default mis, or env for a reference by mis, in a tenth of the reference's time).
+    #[arg(long, value_name = "NAME|EXR|off")]
+    pub reference_check: Option<String>,
     /// Measure the extra time per sample over that of the first sampler, pass by pass.
     #[arg(long)]
     pub overhead: bool,
@@ -218,6 +225,14 @@ fn plan(arguments: &Arguments) -> Result<Plan> {
         depth: arguments.depth,
         reference_sampler: named("--reference-sampler", &arguments.reference_sampler)?,
         reference_spp: arguments.reference_spp,
+        reference_check: arguments
+            .reference_check
+            .as_ref()
+            .map(|text| {
+                CheckPlan::parse(text, Path::new(""), defaults)
+                    .map_err(|error| Error::usage(format!("--reference-check {text}: {error}")))
+            })
+            .transpose()?,
         overhead: arguments.overhead.then_some(true),
         overhead_baseline: named("--baseline", &arguments.baseline)?,
         overhead_spp: None,

@@ -20,6 +20,11 @@ pub struct Contender {
 }
 
 impl Contender {
+    /// Returns `sampler` with default parameters.
+    pub fn plain(sampler: Sampler) -> Self {
+        Self { label: sampler.name().to_owned(), sampler, parameters: Parameters::default() }
+    }
+
     /// Parses `name` or `name:key=value:…`; the parameters start from `defaults`.
     ///
     /// # Errors

@@ -9,19 +9,22 @@ use super::{
     folder::Folder,
     job::{RunJob, exposure, image_of},
     overhead::OverheadJob,
-    plan::{Plan, ReferencePlan},
+    plan::{CheckPlan, Plan, ReferencePlan},
     record::{Round, Run, SceneRecord},
     reference::{HALF_STEMS, Reference},
+    reference_check::{self, CheckJob, ReferenceCheck, Verdict},
     rule::Rule,
+    surfaces::Surfaces,
     watch::{Observer, Watch},
 };
 use crate::{
     error::{Error, Result},
     files::write_json,
-    film::{Metadata, png::write_preview},
+    film::{Aov, Metadata, png::write_preview},
     gpu::Device,
     pass::SceneBuffers,
     renderer::{Renderer, Settings, window_of},
+    sampler::Sampler,
     scene::Scene,
 };
 
@@ -128,13 +131,24 @@ impl Study<'_> {
             height: scene.film.height,
             triangles: scene.geometry.triangle_count(),
             reference: None,
+            reference_check: None,
+            parts: None,
         });
         if self.plan.compares() {
             let reference = self.reference(scene, &mut buffers)?;
             if let Some(record) = results.scenes.last_mut() {
                 record.reference = Some(reference.own.clone());
             }
-            self.compare(scene, &mut buffers, &reference, results)?;
+            let check = self.check_reference(scene, &mut buffers, &reference)?;
+            if let Some(record) = results.scenes.last_mut() {
+                record.reference_check = check;
+            }
+            let make = &mut || buffers.renderer(mask_settings());
+            let surfaces = Surfaces::of(self.folder, scene, &reference, make)?;
+            if let Some(record) = results.scenes.last_mut() {
+                record.parts = Some(surfaces.own);
+            }
+            self.compare(scene, &mut buffers, (&reference, &surfaces), results)?;
         }
         if let Some(overhead) = &self.plan.overhead {
             let finished: Vec<Option<Round>> = (1..=overhead.repetitions)
@@ -202,12 +216,41 @@ impl Study<'_> {
         Ok(reference)
     }
 
+    /// Compares the reference with an independent picture, if the plan has one.
+    fn check_reference(
+        &mut self,
+        scene: &Scene,
+        buffers: &mut SharedBuffers<'_>,
+        reference: &Reference,
+    ) -> Result<Option<ReferenceCheck>> {
+        let plan = &self.plan.reference_check;
+        let check = if let CheckPlan::File(path) = plan {
+            reference_check::read(path, scene, reference)?
+        } else {
+            let Some(contender) = plan.contender(reference.sampler.as_deref()) else {
+                return Ok(None);
+            };
+            let settings = self.settings(&contender);
+            let metadata = self.metadata(scene, &contender);
+            let folder = self.folder;
+            let job = CheckJob { folder, scene, reference, contender: &contender, metadata };
+            job.execute(&mut || buffers.renderer(settings.clone()), &mut self.watch)?
+        };
+        let text = format!("{}: {}", scene.name, check.describe());
+        if check.verdict == Verdict::Disagrees {
+            log::warn!("{text}");
+        } else {
+            self.watch.note(&text);
+        }
+        Ok(Some(check))
+    }
+
     /// Renders every run and compares it with the reference.
     fn compare(
         &mut self,
         scene: &Scene,
         buffers: &mut SharedBuffers<'_>,
-        reference: &Reference,
+        (reference, surfaces): (&Reference, &Surfaces),
         results: &mut Results,
     ) -> Result<()> {
         let exposure = exposure(&reference.mean());
@@ -228,6 +271,7 @@ impl Study<'_> {
             let job = RunJob {
                 scene,
                 reference,
+                surfaces,
                 exposure,
                 contender,
                 rule,
@@ -254,6 +298,12 @@ impl Study<'_> {
         }
         Ok(())
     }
+}
+
+/// Settings of the renders that tell surfaces and environment apart.
+fn mask_settings() -> Settings {
+    let sampler = Sampler::Cosine;
+    Settings { sampler, shadow_rays: 1, depth: 1, aovs: vec![Aov::Normal], ..Settings::default() }
 }
 
 /// Pixels of a scene's film.

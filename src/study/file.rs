@@ -30,7 +30,7 @@ use toml::{Spanned, de::DeTable};
 
 use super::{
     contender::Contender,
-    plan::{Description, Options, PublishedErrors, PublishedOverhead},
+    plan::{CheckPlan, Description, Options, PublishedErrors, PublishedOverhead},
 };
 use crate::{
     error::{Error, Result, TextError},
@@ -87,6 +87,7 @@ struct Entries {
     depth: Option<u32>,
     reference_sampler: Option<Spanned<String>>,
     reference_spp: Option<u32>,
+    reference_check: Option<Spanned<String>>,
     overhead: Option<bool>,
     overhead_baseline: Option<Spanned<String>>,
     overhead_spp: Option<u32>,
@@ -152,8 +153,8 @@ impl StudyFile {
                 published_errors: root.published.errors,
                 published_overheads: root.published.overheads,
             },
-            settings: root.settings.into_options(defaults, parsers)?,
-            quick: root.quick.into_options(defaults, parsers)?,
+            settings: root.settings.into_options(folder, defaults, parsers)?,
+            quick: root.quick.into_options(folder, defaults, parsers)?,
         })
     }
 }
@@ -174,6 +175,7 @@ fn read<T, V>(
 impl Entries {
     fn into_options(
         self,
+        folder: &Path,
         defaults: Parameters,
         parsers: ValueParsers,
     ) -> Result<Options, TextError> {
@@ -192,6 +194,9 @@ impl Entries {
             depth: self.depth,
             reference_sampler: read(self.reference_sampler, contender)?,
             reference_spp: self.reference_spp,
+            reference_check: read(self.reference_check, |text| {
+                CheckPlan::parse(text, folder, defaults).map_err(|error| error.to_string())
+            })?,
             overhead: self.overhead,
             overhead_baseline: read(self.overhead_baseline, contender)?,
             overhead_spp: self.overhead_spp,
@@ -224,7 +229,8 @@ mod tests {
             "study = \"Title\"\nnotes = [\"Why.\"]\nscenes = [\"../a.toml\"]\n\
              [settings]\nsamplers = [\"mis\", \"ris:candidates=8\"]\nspp = [2, 4]\ntime = \"30s\"\n\
              seeds = 4\nsize = \"160x120\"\nshadow_rays = 3\ndepth = 2\n\
-             reference_sampler = \"ris\"\nreference_spp = 99\noverhead = true\n\
+             reference_sampler = \"ris\"\nreference_spp = 99\nreference_check = \"cosine\"\n\
+             overhead = true\n\
              overhead_baseline = \"mis\"\noverhead_spp = 7\noverhead_repetitions = 8\n\
              [quick]\nspp = [1]\n\
              [[published.errors]]\nscene = \"a\"\nsource = \"Table 1\"\nspp = 2\n\
@@ -237,6 +243,7 @@ mod tests {
         assert_eq!(settings.samplers.as_ref().unwrap()[1].parameters.candidates, Some(8));
         assert_eq!(settings.time, Some(Duration::from_secs(30)));
         assert_eq!(settings.reference_sampler.as_ref().unwrap().sampler, Sampler::Ris);
+        assert!(matches!(settings.reference_check, Some(CheckPlan::Sampler(_))));
         assert_eq!((settings.overhead_spp, settings.overhead_repetitions), (Some(7), Some(8)));
         assert_eq!(study.quick, Options { spp: Some(vec![1]), ..Options::default() });
         assert_eq!(study.description.published_errors[0].values["mis"], 0.5);

@@ -6,6 +6,7 @@
 //! index.html                       the page
 //! runs/SCENE/SAMPLER-RULE-seedN.json
 //! runs/SCENE/overhead-N.json
+//! images/SCENE/surfaces.exr        where the camera sees surfaces alone
 //! images/SCENE/reference_1.exr, reference_2.exr, reference.png
 //! images/SCENE/SAMPLER-RULE-seedN.exr, .png
 //! images/SCENE/SAMPLER-RULE-error.png
@@ -27,7 +28,7 @@ use crate::{
 /// File that marks a report folder.
 const MARK: &str = "study.json";
 /// Text of its `format`.
-const FORMAT: &str = "fenestra study 2";
+const FORMAT: &str = "fenestra study 3";
 
 /// A report folder.
 #[derive(Clone, Debug)]
@@ -62,8 +63,9 @@ impl Folder {
                 return Err(Error::format(
                     &mark,
                     format!(
-                        "expected format {FORMAT:?}, found {format:?}: a study of another version; \
-                         choose another folder with -o"
+                        "expected format {FORMAT:?}, found {format:?}: a study of another version, \
+                         whose figures cannot be mixed with these; choose another folder with -o, \
+                         or give its references by --reference FOLDER"
                     ),
                 ));
             }
@@ -199,7 +201,8 @@ mod tests {
     #[test]
     fn another_version_is_refused() {
         let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join(MARK), r#"{"format": "fenestra study 99"}"#).unwrap();
-        assert!(Folder::open(folder.path()).unwrap_err().to_string().contains("another version"));
+        fs::write(folder.path().join(MARK), r#"{"format": "fenestra study 2"}"#).unwrap();
+        let error = Folder::open(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("another version") && error.contains("--reference"), "{error}");
     }
 }

@@ -3,14 +3,20 @@
 use super::{
     contender::Contender,
     folder::Folder,
+    metrics::flip::mean_flip,
     record::{Conditions, Figures, Measurement, Run, run_stem},
     reference::Reference,
     rule::Rule,
+    surfaces::Surfaces,
     watch::{Pace, Watch},
 };
 use crate::{
     error::Result,
-    film::{Image, Metadata, RgbImage, SampleRange, metadata::seconds_of, png::write_preview},
+    film::{
+        Image, Metadata, RgbImage, SampleRange,
+        metadata::seconds_of,
+        png::{preview, write_preview},
+    },
     renderer::Renderer,
     scene::Scene,
 };
@@ -22,6 +28,7 @@ pub const SHOWN_SEED: u32 = 1;
 pub(super) struct RunJob<'a> {
     pub(super) scene: &'a Scene,
     pub(super) reference: &'a Reference,
+    pub(super) surfaces: &'a Surfaces,
     /// Exposure of previews, stops.
     pub(super) exposure: f32,
     pub(super) contender: &'a Contender,
@@ -51,7 +58,7 @@ impl RunJob<'_> {
             let target = self.next_stop(renderer.sample_count());
             pace.advance(renderer, target, limit, watch)?;
             let (mut measurement, picture) =
-                Measurement::of(renderer, pace.seconds, self.reference)?;
+                Measurement::of(renderer, pace.seconds, self.reference, self.surfaces)?;
             let spp = measurement.spp;
             let is_level = match self.rule {
                 Rule::Spp(_) => self.levels.contains(&spp),
@@ -59,6 +66,7 @@ impl RunJob<'_> {
             };
             if is_level {
                 let level = if limit.is_some() { self.rule } else { Rule::Spp(spp) };
+                measurement.flip = Some(self.flip(&picture));
                 measurement.image = Some(self.keep(&picture, &measurement, renderer, level)?);
             }
             measurements.push(measurement);
@@ -92,6 +100,12 @@ impl RunJob<'_> {
             }
             Rule::Seconds(_) => power,
         }
+    }
+
+    /// Compares display pictures at the exposure of the previews.
+    fn flip(&self, picture: &RgbImage) -> f64 {
+        let shown = preview(&self.reference.mean(), self.exposure);
+        mean_flip(&preview(picture, self.exposure), &shown, picture.width as usize)
     }
 
     /// Writes the picture; returns its path inside the report folder.

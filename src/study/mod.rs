@@ -1,10 +1,10 @@
 //! Comparisons of samplers as experiments.
 //!
 //! A study file and the command line ([`mod@file`], [`plan`], [`contender`]) → runs against a
-//! reference in two halves ([`engine`], [`job`], [`rule`], [`mod@reference`], [`own_errors`],
-//! [`overhead`]), each kept as a [`record`] in the report [`folder`] → figures over the seeds
-//! ([`summary`], [`statistics`]) → `results.json`, `results.csv` ([`results`]) and the page
-//! ([`report`]). [`metrics`] defines the errors.
+//! reference in two halves ([`engine`], [`job`], [`rule`], [`mod@reference`], [`reference_check`],
+//! [`own_errors`], [`surfaces`], [`overhead`]), each kept as a [`record`] in the report [`folder`] →
+//! figures over the seeds ([`summary`], [`quality`], [`statistics`]) → `results.json`, `results.csv`
+//! ([`results`]) and the page ([`report`]). [`metrics`] defines the errors.
 
 pub mod contender;
 pub mod engine;
@@ -17,11 +17,14 @@ pub mod metrics;
 pub mod overhead;
 pub mod own_errors;
 pub mod plan;
+pub mod quality;
 pub mod record;
 pub mod reference;
+pub mod reference_check;
 pub mod report;
 pub mod results;
 pub mod rule;
 pub mod statistics;
 pub mod summary;
+pub mod surfaces;
 pub mod watch;

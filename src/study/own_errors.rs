@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::metrics::parts::PartErrors;
+
 /// A run is judged if its mean squared error is at least this many times the reference's own.
 pub const JUDGED_FROM: f64 = 4.0;
 
@@ -24,6 +26,25 @@ pub struct OwnErrors {
     pub mean: f64,
     /// Standard error of that mean, an upper estimate; absent if the files have no variances.
     pub mean_standard_error: Option<f64>,
+}
+
+/// A reference's own errors over lit surfaces and over the environment seen directly.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct OwnParts {
+    /// Share of the pixels that see surfaces alone.
+    pub surface_share: f64,
+    /// Over those pixels.
+    pub surfaces: Option<PartErrors>,
+    /// Over the others.
+    pub environment: Option<PartErrors>,
+}
+
+impl OwnParts {
+    /// Tests whether errors over the surfaces stand out of the reference's own.
+    pub fn judges(&self, part: &PartErrors) -> bool {
+        is_judged(part.relmse, self.surfaces.map(|own| own.relmse))
+            && is_judged(part.relmse_trimmed, self.surfaces.map(|own| own.relmse_trimmed))
+    }
 }
 
 /// Tests whether an error is well above the reference's own, or positive if that is unknown.

@@ -3,13 +3,18 @@
 //! Options come from the study file's `[settings]`, its `[quick]` table and the command line; later
 //! layers override earlier ones. [`Plan::new`] fills in defaults and rejects impossible plans.
 
-use std::{collections::BTreeMap, path::PathBuf, time::Duration};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use serde::{Deserialize, Serialize};
 
 use super::{contender::Contender, rule::Rule};
 use crate::{
     error::{Error, Result},
+    files::extension,
     sampler::{Parameters, Sampler},
 };
 
@@ -43,6 +48,8 @@ pub struct Options {
     pub reference_sampler: Option<Contender>,
     /// Samples per pixel of the reference, both halves together.
     pub reference_spp: Option<u32>,
+    /// Independent picture that checks the reference.
+    pub reference_check: Option<CheckPlan>,
     /// True to measure overhead.
     pub overhead: Option<bool>,
     /// Sampler that overhead is measured against.
@@ -67,6 +74,7 @@ impl Options {
             depth: self.depth.or(below.depth),
             reference_sampler: self.reference_sampler.or(below.reference_sampler),
             reference_spp: self.reference_spp.or(below.reference_spp),
+            reference_check: self.reference_check.or(below.reference_check),
             overhead: self.overhead.or(below.overhead),
             overhead_baseline: self.overhead_baseline.or(below.overhead_baseline),
             overhead_spp: self.overhead_spp.or(below.overhead_spp),
@@ -143,6 +151,45 @@ pub enum ReferencePlan {
     Study(PathBuf),
 }
 
+/// Source of the independent picture that checks the reference.
+#[derive(Clone, Debug, PartialEq)]
+pub enum CheckPlan {
+    /// No check.
+    Off,
+    /// By `mis`, or by `env` if the reference is by `mis`.
+    Default,
+    /// By this sampler.
+    Sampler(Contender),
+    /// A picture of another renderer.
+    File(PathBuf),
+}
+
+impl CheckPlan {
+    /// Parses `off`, `auto`, an EXR file (relative to `folder`) or a sampler with parameters.
+    ///
+    /// # Errors
+    /// As [`Contender::parse`].
+    pub fn parse(text: &str, folder: &Path, defaults: Parameters) -> Result<Self> {
+        Ok(match text.trim() {
+            "off" => Self::Off,
+            "auto" => Self::Default,
+            path if extension(Path::new(path)) == "exr" => Self::File(folder.join(path)),
+            sampler => Self::Sampler(Contender::parse(sampler, defaults)?),
+        })
+    }
+
+    /// Sampler of the check of a reference by `sampler`, if the check is to be rendered.
+    pub fn contender(&self, sampler: Option<&str>) -> Option<Contender> {
+        let name = match self {
+            Self::Off | Self::File(_) => return None,
+            Self::Sampler(contender) => return Some(contender.clone()),
+            Self::Default if sampler == Some(Sampler::Mis.name()) => Sampler::Env,
+            Self::Default => Sampler::Mis,
+        };
+        Some(Contender::plain(name))
+    }
+}
+
 /// Everything a study does.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -168,6 +215,8 @@ pub struct Plan {
     pub depth: u32,
     /// Source of the reference.
     pub reference: ReferencePlan,
+    /// Independent picture that checks it.
+    pub reference_check: CheckPlan,
     /// Overhead measurements, if any.
     pub overhead: Option<OverheadPlan>,
 }
@@ -216,7 +265,9 @@ impl Plan {
         range("--reference-spp", reference_spp, 2, 1 << 26)?;
         let reference = match &references[..] {
             [] => ReferencePlan::Render {
-                contender: options.reference_sampler.unwrap_or_else(|| plain(Sampler::Mis)),
+                contender: options
+                    .reference_sampler
+                    .unwrap_or_else(|| Contender::plain(Sampler::Mis)),
                 half_spp: reference_spp.div_ceil(2),
             },
             [folder] if folder.is_dir() => ReferencePlan::Study(folder.clone()),
@@ -237,6 +288,14 @@ impl Plan {
                 )));
             }
         };
+        let reference_check = options.reference_check.unwrap_or(CheckPlan::Default);
+        if let (CheckPlan::File(path), true) = (&reference_check, scenes.len() > 1) {
+            return Err(Error::usage(format!(
+                "--reference-check {}: an image serves one scene, found {} scenes; name a sampler",
+                path.display(),
+                scenes.len()
+            )));
+        }
         let overhead = if overhead {
             let baseline = options.overhead_baseline.unwrap_or_else(|| contenders[0].clone());
             let others: Vec<Contender> =
@@ -279,6 +338,7 @@ impl Plan {
             shadow_rays,
             depth,
             reference,
+            reference_check,
             overhead,
         })
     }
@@ -307,16 +367,11 @@ impl Plan {
     }
 }
 
-/// Returns `sampler` with default parameters.
-fn plain(sampler: Sampler) -> Contender {
-    Contender { label: sampler.name().to_owned(), sampler, parameters: Parameters::default() }
-}
-
 /// Every sampler that combines BRDF and environment.
 fn default_contenders() -> Vec<Contender> {
     let single = [Sampler::Uniform, Sampler::Cosine, Sampler::Brdf, Sampler::Env];
     let others = Sampler::ALL.iter().filter(|sampler| !single.contains(sampler));
-    others.copied().map(plain).collect()
+    others.copied().map(Contender::plain).collect()
 }
 
 #[cfg(test)]
@@ -357,7 +412,7 @@ mod tests {
 
     #[test]
     fn overhead_alone_needs_no_reference() {
-        let samplers = Some(vec![plain(Sampler::Mis), plain(Sampler::Ris)]);
+        let samplers = Some(vec![Contender::plain(Sampler::Mis), Contender::plain(Sampler::Ris)]);
         let options = Options { overhead: Some(true), samplers, ..Options::default() };
         let plan = plan(options).unwrap();
         assert!(!plan.compares());
@@ -369,7 +424,7 @@ mod tests {
     #[test]
     fn what_cannot_be_done_is_refused() {
         let message = |options| plan(options).unwrap_err().to_string();
-        let one = Some(vec![plain(Sampler::Mis)]);
+        let one = Some(vec![Contender::plain(Sampler::Mis)]);
         let alone = Options { overhead: Some(true), samplers: one, ..Options::default() };
         assert!(message(alone).contains("besides the baseline mis"));
         let none = Options { spp: Some(Vec::new()), ..Options::default() };
@@ -380,5 +435,23 @@ mod tests {
         let scenes = vec!["a.toml".into(), "b.toml".into()];
         let error = Plan::new(scenes, Description::default(), Options::default(), references);
         assert!(error.unwrap_err().to_string().contains("an image serves one scene"));
+        let reference_check = Some(CheckPlan::File("a.exr".into()));
+        let options = Options { reference_check, ..Options::default() };
+        let scenes = vec!["a.toml".into(), "b.toml".into()];
+        let error = Plan::new(scenes, Description::default(), options, Vec::new()).unwrap_err();
+        assert!(error.to_string().contains("name a sampler"), "{error}");
+    }
+
+    #[test]
+    fn a_check_shares_little_with_the_reference() {
+        let label = |plan: &CheckPlan, sampler| plan.contender(sampler).map(|other| other.label);
+        assert_eq!(label(&CheckPlan::Default, Some("guided")).as_deref(), Some("mis"));
+        assert_eq!(label(&CheckPlan::Default, Some("mis")).as_deref(), Some("env"));
+        assert_eq!(label(&CheckPlan::Default, None).as_deref(), Some("mis"));
+        assert_eq!(label(&CheckPlan::Off, Some("mis")), None);
+        let parse = |text| CheckPlan::parse(text, Path::new("studies"), Parameters::default());
+        assert_eq!(parse("a.exr").unwrap(), CheckPlan::File("studies/a.exr".into()));
+        assert_eq!(label(&parse("cosine").unwrap(), None).as_deref(), Some("cosine"));
+        assert!(parse("best").is_err());
     }
 }

@@ -7,10 +7,12 @@ use serde::{Deserialize, Serialize};
 use super::{
     contender::Contender,
     metrics::Metrics,
-    own_errors::{OwnErrors, is_judged},
+    own_errors::{OwnErrors, OwnParts, is_judged},
     reference::Reference,
+    reference_check::ReferenceCheck,
     rule::Rule,
     statistics::mean_standard_error,
+    surfaces::{Parts, Surfaces},
 };
 use crate::{error::Result, film::RgbImage, pass::Totals, renderer::Renderer};
 
@@ -80,7 +82,7 @@ pub(super) fn assignments(parameters: &BTreeMap<String, String>, separator: &str
 }
 
 /// Errors of a film after some samples.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
     /// Samples per pixel.
     pub spp: u32,
@@ -111,12 +113,17 @@ pub struct Measurement {
     pub mse_judged: bool,
     /// True if both relative errors are well above the reference's own.
     pub relmse_judged: bool,
+    /// Errors over lit surfaces and over the environment seen directly.
+    pub parts: Parts,
+    /// Mean FLIP of the display picture (`metrics::flip`), of pictures that are kept.
+    pub flip: Option<f64>,
     /// Path in the report folder, if the picture is kept.
     pub image: Option<String>,
 }
 
 impl Measurement {
-    /// Compares the film of `renderer` after `seconds` of passes with `reference`.
+    /// Compares the film of `renderer` after `seconds` of passes with `reference`, as a whole and
+    /// in the parts that `surfaces` tells apart.
     ///
     /// # Errors
     /// The device fails, or a pixel is not finite.
@@ -124,6 +131,7 @@ impl Measurement {
         renderer: &Renderer,
         seconds: f64,
         reference: &Reference,
+        surfaces: &Surfaces,
     ) -> Result<(Self, RgbImage)> {
         let sums = renderer.sums()?;
         let pixels = 0..sums.pixel_count();
@@ -157,6 +165,8 @@ impl Measurement {
             mse_judged: is_judged(metrics.mse, own.mse),
             relmse_judged: is_judged(metrics.relmse, own.relmse)
                 && is_judged(metrics.relmse_trimmed, own.relmse_trimmed),
+            parts: surfaces.errors(&picture, reference)?,
+            flip: None,
             image: None,
         };
         Ok((measurement, picture))
@@ -310,6 +320,10 @@ pub struct SceneRecord {
     pub triangles: u64,
     /// The reference's own errors, if errors were compared.
     pub reference: Option<OwnErrors>,
+    /// Comparison of the reference with an independent picture, if it was checked.
+    pub reference_check: Option<ReferenceCheck>,
+    /// The reference's own errors over lit surfaces and the environment seen directly.
+    pub parts: Option<OwnParts>,
 }
 
 /// Returns the part of a file name that identifies its run.

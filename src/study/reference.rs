@@ -47,6 +47,8 @@ pub struct Reference {
     pub first: RgbImage,
     /// Second half; the first again if there is only one image.
     pub second: RgbImage,
+    /// Sampler, if known.
+    pub sampler: Option<String>,
     /// Its own errors.
     pub own: OwnErrors,
 }
@@ -88,13 +90,16 @@ fn given_files(plan: &ReferencePlan, scene: &str) -> Result<Vec<PathBuf>> {
     }
 }
 
+/// Reads an image and checks that it shows the scene.
+pub(super) fn read_checked(path: &Path, scene: &Scene) -> Result<Image> {
+    let image = Image::read_exr(path)?;
+    check(&image, path, scene)?;
+    Ok(image)
+}
+
 /// Reads the images of a reference and checks that they show the scene.
 fn read_images(paths: Vec<PathBuf>, scene: &Scene) -> Result<Vec<(PathBuf, Image)>> {
-    let read = |path: PathBuf| {
-        let image = Image::read_exr(&path)?;
-        check(&image, &path, scene)?;
-        Ok((path, image))
-    };
+    let read = |path: PathBuf| read_checked(&path, scene).map(|image| (path, image));
     paths.into_iter().map(read).collect()
 }
 
@@ -229,7 +234,8 @@ impl Reference {
             let sum: f64 = variances[0].iter().flatten().map(|value| f64::from(*value)).sum();
             own.mse = Some(sum / (3.0 * variances[0].len() as f64));
         }
-        Ok(Self { first, second, own })
+        let sampler = metadata.first().map(|metadata| metadata.sampler.clone());
+        Ok(Self { first, second, sampler: sampler.filter(|_| whole), own })
     }
 
     /// Averages the halves.

@@ -12,6 +12,7 @@ use super::{
     folder::Folder,
     overhead::{Overhead, overheads},
     plan::{Plan, PublishedErrors, PublishedOverhead},
+    quality::{Figure, THRESHOLDS, Time, TimeToQuality, time_of_run, times_to_quality},
     record::{Figures, Measurement, Round, Run, SceneRecord, assignments},
     rule::Rule,
     summary::{Curve, Summary, curves, rules, summaries},
@@ -121,6 +122,8 @@ pub struct Report {
     pub summaries: Vec<Summary>,
     /// Errors against samples and time.
     pub curves: Vec<Curve>,
+    /// Seconds until errors fall to thresholds.
+    pub times_to_quality: Vec<TimeToQuality>,
     /// Overheads.
     pub overheads: Vec<Overhead>,
     /// Published errors to compare ratios with.
@@ -158,6 +161,7 @@ impl Report {
             order: plan.contenders.iter().map(|contender| contender.label.clone()).collect(),
             summaries: summaries(plan, &results.scenes, &results.runs),
             curves: curves(plan, &results.scenes, &results.runs),
+            times_to_quality: times_to_quality(plan, &results.scenes, &results.runs),
             overheads: baseline
                 .map_or_else(Vec::new, |baseline| overheads(&results.rounds, &baseline)),
             published_errors: plan.description.published_errors.clone(),
@@ -243,7 +247,26 @@ fn columns(runs: &[Run]) -> Vec<Column> {
         column("mean_deviation", |_, _, m| optional(m.mean_deviation)),
         column("mse_judged", |_, _, m| m.mse_judged.to_string()),
         column("relmse_judged", |_, _, m| m.relmse_judged.to_string()),
+        column("surfaces_mse", |_, _, m| optional(m.parts.surfaces.map(|part| part.mse))),
+        column("surfaces_relmse", |_, _, m| optional(m.parts.surfaces.map(|part| part.relmse))),
+        column("surfaces_relmse_trimmed", |_, _, m| {
+            optional(m.parts.surfaces.map(|part| part.relmse_trimmed))
+        }),
+        column("surfaces_judged", |_, _, m| m.parts.surfaces_judged.to_string()),
+        column("environment_mse", |_, _, m| optional(m.parts.environment.map(|part| part.mse))),
+        column("environment_relmse", |_, _, m| {
+            optional(m.parts.environment.map(|part| part.relmse))
+        }),
+        column("flip", |_, _, m| optional(m.flip)),
     ]);
+    for (figure, threshold) in
+        Figure::ALL.into_iter().flat_map(|figure| THRESHOLDS.map(|threshold| (figure, threshold)))
+    {
+        let name = format!("seconds_to_{}_{threshold}_of_run", figure.name());
+        columns.push(column(name, move |run, _, _| {
+            optional(time_of_run(run, figure, threshold).and_then(Time::seconds))
+        }));
+    }
     columns.extend(names(runs, |figures| &figures.gpu_ms_per_sample).into_iter().map(|pass| {
         column(format!("gpu_ms_per_sample_{pass}"), move |run, _, _| {
             optional(run.figures.gpu_ms_per_sample.get(&pass))

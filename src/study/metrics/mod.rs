@@ -21,6 +21,9 @@
 //! is free of the reference's own noise. Elsewhere `r` is the mean of the halves. The estimates of
 //! `mse` and `relmse` can then be negative: the reference is too noisy to judge the picture.
 
+pub mod flip;
+pub mod parts;
+
 use crate::{
     error::{Error, Result},
     film::RgbImage,

@@ -8,6 +8,7 @@ pub mod html;
 pub mod pictures;
 pub mod plot;
 pub mod tables;
+mod verdict;
 
 use std::fmt::Write;
 
@@ -17,8 +18,10 @@ use super::{
     own_errors::JUDGED_FROM,
     plan::Plan,
     record::SceneRecord,
+    reference_check::Verdict,
     results::Report,
     rule::Rule,
+    statistics::Interval,
     summary::{Curve, CurvePoint, rules},
 };
 use crate::{error::Result, files::write_text};
@@ -51,8 +54,14 @@ pub fn write(report: &Report, plan: &Plan, folder: &Folder) -> Result<()> {
     let mut style = String::new();
     if !report.summaries.is_empty() {
         body += "<section id=\"glance\"><h2>At a glance</h2>";
+        body += &verdict::all(report, &rules);
         body += &tables::at_a_glance(report, &rules);
         body += "</section>";
+        let times = tables::times_to_quality(report);
+        if !times.is_empty() {
+            let _ =
+                write!(body, "<section id=\"quality\"><h2>Time to quality</h2>{times}</section>");
+        }
         let published = tables::published(report);
         if !published.is_empty() {
             let _ = write!(
@@ -98,6 +107,16 @@ fn start(report: &Report) -> String {
         html += "<p class=\"warning\"><strong class=\"warn\">This study ended early.</strong> The \
                  page shows the runs that were finished; the same command continues it.</p>";
     }
+    for scene in &report.scenes {
+        if scene.reference_check.as_ref().is_some_and(|check| check.verdict == Verdict::Disagrees) {
+            let _ = write!(
+                html,
+                "<p class=\"warning\"><strong class=\"warn\">The reference of {} is in \
+                 doubt.</strong> An independent picture disagrees with it.</p>",
+                escape(&scene.name)
+            );
+        }
+    }
     for note in &report.notes {
         let _ = write!(html, "<p>{}</p>", escape(note));
     }
@@ -107,6 +126,7 @@ fn start(report: &Report) -> String {
     };
     if !report.summaries.is_empty() {
         link("glance", "At a glance");
+        link("quality", "Time to quality");
         for (index, scene) in report.scenes.iter().enumerate() {
             if report.summaries.iter().any(|summary| summary.scene == scene.name) {
                 link(&format!("scene-{index}"), &scene.name);
@@ -118,7 +138,8 @@ fn start(report: &Report) -> String {
     }
     link("definitions", "Definitions");
     link("circumstances", "Circumstances");
-    html + "</ul></nav></header>"
+    html + "</ul></nav><p class=\"facts\">Every run: <a href=\"results.csv\">CSV</a>, \
+            <a href=\"results.json\">JSON</a>. Pictures link to their EXR.</p></header>"
 }
 
 /// Name of a picture's class in the style sheet.
@@ -174,6 +195,17 @@ fn scene_section(
                 .to_owned(),
         };
     }
+    if let Some(check) = &scene.reference_check {
+        let text = escape(&check.describe());
+        html += &match check.verdict {
+            Verdict::Disagrees => format!(
+                "<p class=\"warning\"><strong class=\"warn\">The reference is in doubt.</strong> \
+                 {text}. No figure of this scene is to be trusted before it is known which of the \
+                 two is wrong.</p>"
+            ),
+            Verdict::Agrees | Verdict::TooNoisy => format!("<p class=\"facts\">Check: {text}.</p>"),
+        };
+    }
     let refused = report
         .summaries
         .iter()
@@ -187,17 +219,44 @@ fn scene_section(
              helps.</p>"
         );
     }
+    if let Some(part) = scene.parts.filter(|part| part.surface_share < 1.0) {
+        let _ = write!(
+            html,
+            "<p class=\"facts\">{} of the pixels see the environment directly. Their errors are those \
+             of smoothing it, and are given apart from those of lit surfaces.</p>",
+            html::percent(1.0 - part.surface_share)
+        );
+    }
+    let sentence = verdict::of_scene(report, scene, rules);
+    if !sentence.is_empty() {
+        let _ = write!(html, "<p class=\"verdict\">{sentence}</p>");
+    }
     html += &picture_group(index, scene, pictures);
     html += &plots(report, scene);
     html += &tables::figures(report, &scene.name, rules);
     html + "</section>"
 }
 
+/// Links to the files of a picture, named for readers who only hear them.
+fn links(picture: &Picture, caption: &str) -> String {
+    let link = |path: &String| {
+        format!(
+            " <a href=\"{}\" aria-label=\"{caption}: EXR {}\">EXR</a>",
+            escape(&path.replace('%', "%25").replace('#', "%23").replace('?', "%3F")),
+            escape(path)
+        )
+    };
+    picture.files.iter().map(link).collect()
+}
+
 /// Viewer, panes, error maps and crops.
 fn picture_group(index: usize, scene: &SceneRecord, scene_pictures: &ScenePictures) -> String {
-    let ScenePictures { pictures, scale, crops } = scene_pictures;
+    let ScenePictures { pictures, scale, crops, .. } = scene_pictures;
     let aspect = format!("--aspect:{}/{}", scene.width, scene.height);
-    let mut html = format!("<div class=\"pictures\" style=\"{aspect}\">");
+    let mut html = format!(
+        "<div class=\"pictures\" style=\"{aspect}\" data-exposure=\"{:.4}\">",
+        scene_pictures.exposure
+    );
     let options = |chosen: usize| {
         let mut options = String::new();
         for (number, picture) in pictures.iter().enumerate() {
@@ -216,18 +275,30 @@ fn picture_group(index: usize, scene: &SceneRecord, scene_pictures: &ScenePictur
         }
         options
     };
+    for (number, picture) in pictures.iter().enumerate().filter(|(_, p)| !p.halves.is_empty()) {
+        let _ = write!(
+            html,
+            "<script type=\"application/octet-stream\" class=\"halves\" data-picture=\"{}\" \
+             data-width=\"{}\">{}</script>",
+            picture_class(index, number, false),
+            scene.width,
+            picture.halves
+        );
+    }
     let _ = write!(
         html,
         "{}",
         include_str!("viewer.html")
+            .replace("{{exposure}}", &format!("{:.2}", scene_pictures.exposure))
             .replace("{{scene}}", &escape(&scene.name))
             .replace("{{left}}", &options(pictures.len() - 1))
             .replace("{{right}}", &options(0))
     );
     let pane = |number: usize, is_error: bool, caption: &str| {
+        let link = if is_error { String::new() } else { links(&pictures[number], caption) };
         format!(
             "<figure><div class=\"pane linked\"><div class=\"picture {}\" role=\"img\" \
-             aria-label=\"{caption}\"></div></div><figcaption>{caption}</figcaption></figure>",
+             aria-label=\"{caption}\"></div></div><figcaption>{caption}{link}</figcaption></figure>",
             picture_class(index, number, is_error)
         )
     };
@@ -236,8 +307,8 @@ fn picture_group(index: usize, scene: &SceneRecord, scene_pictures: &ScenePictur
         html += &pane(number, false, &picture_name(picture));
     }
     html += "</div><h3>Errors</h3><p class=\"soft\">Error of every pixel: root of the mean over \
-             RGB and the seeds of the squared error. One scale for the whole scene; what 1% of the \
-             pixels exceed is shown as its end.</p>";
+             RGB and the seeds of the squared error. One scale for the whole scene; its end is what \
+             1% of the pixels on surfaces exceed.</p>";
     html += &ramp(*scale);
     html += "<div class=\"grid-of-panes\">";
     for (number, picture) in pictures.iter().enumerate().skip(1) {
@@ -257,7 +328,8 @@ fn picture_group(index: usize, scene: &SceneRecord, scene_pictures: &ScenePictur
     let _ = write!(
         html,
         "<figure><div class=\"pane\"><div class=\"picture {}\" role=\"img\" aria-label=\"where the \
-         details lie\"></div>{frames}</div><figcaption>where the errors are largest</figcaption>\
+         details lie\"></div>{frames}</div><figcaption>where samplers differ most on \
+         surfaces</figcaption>\
          </figure>",
         picture_class(index, 0, false)
     );
@@ -269,7 +341,12 @@ fn picture_group(index: usize, scene: &SceneRecord, scene_pictures: &ScenePictur
     let is_magnified = |picture: &&(usize, &Picture)| {
         last.is_none() || picture.1.rule.is_none() || picture.1.rule == last
     };
+    html += "</div>";
     for (crop, name) in crops.iter().zip(["A", "B", "C"]) {
+        let _ = write!(
+            html,
+            "<div class=\"crop-row\" role=\"region\" tabindex=\"0\" aria-label=\"detail {name}\">"
+        );
         for (number, picture) in pictures.iter().enumerate().filter(|item| is_magnified(&item)) {
             let caption = format!("{name}: {}", picture_name(picture));
             // Background positions are shares of the space left over.
@@ -285,8 +362,9 @@ fn picture_group(index: usize, scene: &SceneRecord, scene_pictures: &ScenePictur
                 position(crop.top)
             );
         }
+        html += "</div>";
     }
-    html + "</div></div>"
+    html + "</div>"
 }
 
 /// Legend of the false colours.
@@ -309,7 +387,7 @@ fn ramp(scale: Scale) -> String {
     )
 }
 
-/// Error against samples and against time.
+/// Errors and efficiency against samples and against time.
 fn plots(report: &Report, scene: &SceneRecord) -> String {
     let curves: Vec<(usize, &Curve)> = report
         .order
@@ -324,55 +402,85 @@ fn plots(report: &Report, scene: &SceneRecord) -> String {
     if curves.is_empty() {
         return String::new();
     }
-    let series = |x: &dyn Fn(&CurvePoint) -> f64| -> Vec<Series> {
-        curves
-            .iter()
-            .map(|(style, curve)| Series {
-                style: *style,
-                name: curve.sampler.clone(),
-                points: curve
-                    .points
-                    .iter()
-                    .map(|point| plot::Point {
-                        x: x(point),
-                        y: point.rmse.middle,
-                        low: point.rmse.low,
-                        high: point.rmse.high,
-                        label: String::new(),
-                    })
-                    .collect(),
-            })
-            .collect()
-    };
-    let legend = |slope: &dyn Fn(&Curve) -> Option<f64>| {
-        let mut html = "<ul class=\"legend\">".to_owned();
-        for (style, curve) in &curves {
-            let slope = slope(curve)
-                .map_or_else(String::new, |slope| format!(", slope {}", number(slope, 3)));
-            html += &legend_entry(*style, &format!("{}{slope}", escape(&curve.sampler)));
+    let mut html = "<h3>Error on the way</h3><div class=\"plots\">".to_owned();
+    for ordinate in &ORDINATES {
+        for abscissa in &ABSCISSAS {
+            html += &plot_figure(&scene.name, &curves, abscissa, ordinate);
         }
-        html + "</ul>"
-    };
-    let name = &scene.name;
+    }
+    html + "</div><p class=\"soft\">Both axes logarithmic. relMSE is trimmed and over lit surfaces; \
+           efficiency is 1 / (relMSE × seconds). Bands: 95% interval of the mean over the seeds. \
+           Dashed: the slope of independent samples. Points that are not judged are left out.</p>"
+}
+
+/// Abscissa of the plots.
+struct Abscissa {
+    name: &'static str,
+    title: &'static str,
+    value: fn(&CurvePoint) -> f64,
+    slope: fn(&Curve) -> Option<f64>,
+}
+
+const ABSCISSAS: [Abscissa; 2] = [
+    Abscissa {
+        name: "samples",
+        title: "samples per pixel",
+        value: |point| f64::from(point.spp),
+        slope: |curve| curve.slope_spp,
+    },
+    Abscissa {
+        name: "time",
+        title: "seconds of passes",
+        value: |point| point.seconds,
+        slope: |curve| curve.slope_seconds,
+    },
+];
+
+/// Ordinate of the plots, with the slope of independent samples against it.
+struct Ordinate {
+    name: &'static str,
+    value: fn(&CurvePoint) -> Option<Interval>,
+    slope: f64,
+}
+
+const ORDINATES: [Ordinate; 3] = [
+    Ordinate { name: "RMSE", value: |point| Some(point.rmse), slope: -0.5 },
+    Ordinate { name: "relMSE", value: |point| point.relmse, slope: -1.0 },
+    Ordinate { name: "efficiency", value: |point| point.efficiency, slope: 0.0 },
+];
+
+/// One plot with its legend; empty where nothing is judged.
+fn plot_figure(
+    scene: &str,
+    curves: &[(usize, &Curve)],
+    abscissa: &Abscissa,
+    ordinate: &Ordinate,
+) -> String {
+    let mut legend = "<ul class=\"legend\">".to_owned();
+    let mut all = Vec::new();
+    for (style, curve) in curves {
+        let point = |point: &CurvePoint| {
+            let y = (ordinate.value)(point)?;
+            let x = (abscissa.value)(point);
+            Some(plot::Point { x, y: y.middle, low: y.low, high: y.high, label: String::new() })
+        };
+        let points: Vec<plot::Point> = curve.points.iter().filter_map(point).collect();
+        if points.is_empty() {
+            continue;
+        }
+        let slope = (abscissa.slope)(curve)
+            .filter(|_| ordinate.name == ORDINATES[0].name)
+            .map_or_else(String::new, |slope| format!(", slope {}", number(slope, 3)));
+        legend += &legend_entry(*style, &format!("{}{slope}", escape(&curve.sampler)));
+        all.push(Series { style: *style, name: curve.sampler.clone(), points });
+    }
+    if all.is_empty() {
+        return String::new();
+    }
+    let title = format!("{scene}: {} against {}", ordinate.name, abscissa.name);
     format!(
-        "<h3>Error on the way</h3><div class=\"plots\"><figure>{}{}</figure><figure>{}{}</figure>\
-         </div><p class=\"soft\">Both axes logarithmic. Bands: 95% interval of the mean over the \
-         seeds. Dashed: slope −½, that of independent samples. Points that are not judged are left \
-         out.</p>",
-        plot::log_log(
-            &format!("{name}: RMSE against samples"),
-            "samples per pixel",
-            "RMSE",
-            &series(&|point| f64::from(point.spp))
-        ),
-        legend(&|curve| curve.slope_spp),
-        plot::log_log(
-            &format!("{name}: RMSE against time"),
-            "seconds of passes",
-            "RMSE",
-            &series(&|point| point.seconds)
-        ),
-        legend(&|curve| curve.slope_seconds)
+        "<figure>{}{legend}</ul></figure>",
+        plot::log_log(&title, abscissa.title, ordinate.name, &all, ordinate.slope)
     )
 }
 
@@ -510,7 +618,8 @@ fn end(report: &Report) -> String {
     format!(
         "<section id=\"definitions\"><h2>Definitions</h2>{}</section><section \
          id=\"circumstances\"><h2>Circumstances</h2><dl>{rows}</dl><p class=\"soft\">Every run is in \
-         <code>results.csv</code> and <code>results.json</code> beside this page.</p></section>",
+         <a href=\"results.csv\">results.csv</a> and <a href=\"results.json\">results.json</a> beside \
+         this page.</p></section>",
         include_str!("definitions.html").replace("{{judged_from}}", &number(JUDGED_FROM, 1))
     )
 }

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use half::f16;
+
 use crate::{
     error::{Error, Result},
     film::{Image, RgbImage, png},
@@ -13,6 +15,7 @@ use crate::{
         record::{Run, SceneRecord},
         reference::{HALF_STEMS, mean},
         rule::Rule,
+        surfaces::{self, mask},
     },
 };
 
@@ -27,6 +30,10 @@ pub struct Picture {
     pub colour: String,
     /// Error map as a data URI; empty for the reference.
     pub error: String,
+    /// Linear radiance as little-endian halves R, G, B in base 64, row by row from the top.
+    pub halves: String,
+    /// EXR files, relative to the folder.
+    pub files: Vec<String>,
 }
 
 /// A magnified part, in shares of the picture's width and height.
@@ -47,7 +54,9 @@ pub struct ScenePictures {
     pub pictures: Vec<Picture>,
     /// Scale of every error map of the scene.
     pub scale: Scale,
-    /// Parts with the largest errors.
+    /// Exposure of the display pictures, stops.
+    pub exposure: f32,
+    /// Parts where samplers differ most on surfaces.
     pub crops: Vec<Crop>,
 }
 
@@ -79,6 +88,8 @@ pub fn load(
         rule: None,
         colour: display_uri(&mean, stops)?,
         error: String::new(),
+        halves: halves(&mean),
+        files: HALF_STEMS.map(|stem| Folder::image_name(&scene.name, stem)).to_vec(),
     }];
     let mut maps: Vec<Vec<f64>> = Vec::new();
     let mut error_paths: Vec<PathBuf> = Vec::new();
@@ -95,9 +106,9 @@ pub fn load(
                     *sum += error;
                 }
                 count += 1.0;
-                shown.get_or_insert((picture, path));
+                shown.get_or_insert((picture, path, name.clone()));
             }
-            if let Some((shown, path)) = shown {
+            if let Some((shown, path, name)) = shown {
                 let stem = path.file_stem().unwrap_or_default().to_string_lossy();
                 let stem = stem.rsplit_once("-seed").map_or(&*stem, |(run, _)| run);
                 error_paths.push(path.with_file_name(format!("{stem}-error.png")));
@@ -106,25 +117,57 @@ pub fn load(
                     rule: Some(*rule),
                     colour: display_uri(&shown, stops)?,
                     error: String::new(),
+                    halves: halves(&shown),
+                    files: vec![name],
                 });
                 maps.push(sum.into_iter().map(|sum| (sum / count).max(0.0).sqrt()).collect());
             }
         }
     }
-    let scale = Scale::of(&maps.concat());
+    let is_surface = mask(&read(surfaces::STEM)?);
+    // A picture of nothing but environment has no surface to look at.
+    let is_shown: Vec<bool> = match is_surface.contains(&true) {
+        true => is_surface,
+        false => vec![true; is_surface.len()],
+    };
+    let on_surfaces = |map: &Vec<f64>| -> Vec<f64> {
+        map.iter().zip(&is_shown).filter(|(_, shown)| **shown).map(|(error, _)| *error).collect()
+    };
+    let scale = Scale::of(&maps.iter().flat_map(on_surfaces).collect::<Vec<f64>>());
     for ((picture, map), path) in pictures[1..].iter_mut().zip(&maps).zip(&error_paths) {
         let colours: Vec<[u8; 3]> = map.iter().map(|error| scale.colour(*error)).collect();
         picture.error = data_uri(mean.width, mean.height, &colours)?;
         falsecolour::picture(map, mean.width as usize, scale).write_png(path)?;
     }
-    let mut worst = vec![0.0_f64; mean.pixels.len()];
-    for map in &maps {
-        for (worst, error) in worst.iter_mut().zip(map) {
-            *worst = worst.max(*error);
-        }
+    let worth = worth_seeing(&maps, samplers.len(), &is_shown);
+    let crops = choose_crops(&worth, mean.width as usize, mean.height as usize);
+    Ok(ScenePictures { pictures, scale, exposure: stops, crops })
+}
+
+/// Weighs pixels for the choice of crops: the spread of the samplers' errors in the last rule's maps
+/// (the error itself if there is one sampler, or no spread), and 0 where the mask is false.
+fn worth_seeing(maps: &[Vec<f64>], sampler_count: usize, is_shown: &[bool]) -> Vec<f64> {
+    let last = &maps[maps.len().saturating_sub(sampler_count)..];
+    let at = |index: usize| last.iter().map(move |map| map[index]);
+    let largest = |index| at(index).fold(0.0, f64::max);
+    let spread = |index| largest(index) - at(index).fold(f64::INFINITY, f64::min).min(1e300);
+    let masked = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        is_shown.iter().enumerate().map(|(i, shown)| if *shown { value(i) } else { 0.0 }).collect()
+    };
+    let spreads = masked(&spread);
+    if last.len() > 1 && spreads.iter().any(|spread| *spread > 0.0) {
+        spreads
+    } else {
+        masked(&largest)
     }
-    let crops = choose_crops(&worst, mean.width as usize, mean.height as usize);
-    Ok(ScenePictures { pictures, scale, crops })
+}
+
+/// Packs linear radiance as halves in base 64; values beyond the largest half become it.
+fn halves(picture: &RgbImage) -> String {
+    let clamp = |value: &f32| f16::from_f32(value.clamp(-65504.0, 65504.0));
+    let bytes: Vec<u8> =
+        picture.pixels.iter().flatten().flat_map(|value| clamp(value).to_le_bytes()).collect();
+    base64(&bytes)
 }
 
 fn display_uri(picture: &RgbImage, stops: f32) -> Result<String> {
@@ -210,6 +253,23 @@ mod tests {
                 && (crop.top..crop.top + crop.size).contains(&(y / 20.0))
         };
         assert!(holds(&crops[0], 5.5, 3.5) && holds(&crops[1], 33.5, 17.5), "{crops:?}");
+    }
+
+    #[test]
+    fn details_lie_where_samplers_differ_on_surfaces() {
+        // Both samplers err most in pixel 0; they differ in 1, and in 2, which is no surface.
+        let maps = [vec![9.0, 1.0, 0.0], vec![9.0, 3.0, 8.0]];
+        assert_eq!(worth_seeing(&maps, 2, &[true, true, false]), [0.0, 2.0, 0.0]);
+        assert_eq!(worth_seeing(&maps[..1], 1, &[true, true, false]), [9.0, 1.0, 0.0]);
+        let same = [maps[0].clone(), maps[0].clone()];
+        assert_eq!(worth_seeing(&same, 2, &[true; 3]), [9.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn radiance_is_packed_as_halves() {
+        let picture = RgbImage { width: 1, height: 1, pixels: vec![[1.0, 0.5, 1e9]] };
+        // 0x3c00, 0x3800, 0x7bff, low bytes first.
+        assert_eq!(halves(&picture), base64(&[0x00, 0x3c, 0x00, 0x38, 0xff, 0x7b]));
     }
 
     #[test]

@@ -186,8 +186,8 @@ fn tooltip(series: &Series, point: &Point) -> String {
     format!("<title>{}: {}, {}</title>", escape(&series.name), number(point.x), number(point.y))
 }
 
-/// Draws lines with bands on two logarithmic axes, and a faint line of slope −½.
-pub fn log_log(title: &str, x_title: &str, y_title: &str, series: &[Series]) -> String {
+/// Draws lines with bands on two logarithmic axes, and a faint line of the given slope, at most 0.
+pub fn log_log(title: &str, x_title: &str, y_title: &str, series: &[Series], slope: f64) -> String {
     let all = || series.iter().flat_map(|series| &series.points);
     let frame = Frame {
         x: Axis::logarithmic(all().map(|point| point.x)),
@@ -198,18 +198,22 @@ pub fn log_log(title: &str, x_title: &str, y_title: &str, series: &[Series]) -> 
     };
     let mut svg = frame.start(title, x_title, y_title);
     let [x0, x1] = [frame.x.low, frame.x.high];
-    let middle = (frame.y.low * frame.y.high).sqrt() * (x0 * x1).powf(0.25);
-    // Clip the guide to the frame.
-    let inside = |x: f64| x.clamp((middle / frame.y.high).powi(2), (middle / frame.y.low).powi(2));
+    let middle = (frame.y.low * frame.y.high).sqrt() * (x0 * x1).powf(-0.5 * slope);
+    // Clip the guide to the frame; a level one crosses all of it.
+    let inside = |x: f64| {
+        let [first, last] =
+            [frame.y.high, frame.y.low].map(|y: f64| (y / middle).powf(1.0 / slope));
+        if slope < 0.0 { x.clamp(first, last) } else { x }
+    };
     let [x0, x1] = [inside(x0), inside(x1)];
     let _ = write!(
         svg,
         "<line class=\"guide\" x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\"><title>slope \
-         −½</title></line>",
+         {slope}</title></line>",
         frame.x(x0),
-        frame.y(middle / x0.sqrt()),
+        frame.y(middle * x0.powf(slope)),
         frame.x(x1),
-        frame.y(middle / x1.sqrt())
+        frame.y(middle * x1.powf(slope))
     );
     for line in series {
         let style = line.style % STYLE_COUNT;
@@ -367,7 +371,7 @@ mod tests {
         let points: Vec<Point> =
             (0..8).map(|i| point(f64::from(1 << i), 1.0 / f64::from(1 << i).sqrt())).collect();
         let series = [Series { style: 0, name: "mis".into(), points }];
-        let svg = log_log("t", "samples", "RMSE", &series);
+        let svg = log_log("t", "samples", "RMSE", &series, -0.5);
         for name in ["x1", "x2", "x"] {
             assert!(attribute(&svg, name).iter().all(|x| (0.0..=WIDTH).contains(x)), "{name}");
         }
@@ -380,7 +384,11 @@ mod tests {
 
     #[test]
     fn a_plot_of_nothing_is_empty_but_whole() {
-        for svg in [log_log("t", "x", "y", &[]), scatter("t", "x", "y", &[], &[])] {
+        for svg in [
+            log_log("t", "x", "y", &[], -1.0),
+            log_log("t", "x", "y", &[], 0.0),
+            scatter("t", "x", "y", &[], &[]),
+        ] {
             assert!(svg.ends_with("</svg>") && !svg.contains("NaN") && !svg.contains("inf"));
         }
     }

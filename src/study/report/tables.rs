@@ -5,7 +5,9 @@ use std::collections::BTreeSet;
 
 use super::html::{Table, count, escape, interval, number, percent, percent_added, percent_more};
 use crate::study::{
+    metrics::parts::PartErrors,
     overhead::Overhead,
+    quality::{Figure, THRESHOLDS, TimeToQuality},
     results::Report,
     rule::Rule,
     statistics::Interval,
@@ -23,7 +25,13 @@ fn ratio_cell(ratio: Option<&Interval>, is_better: bool) -> String {
     }
 }
 
-fn find<'a>(report: &'a Report, scene: &str, sampler: &str, rule: Rule) -> Option<&'a Summary> {
+/// Finds the figures of a sampler in a scene under a rule.
+pub(super) fn find<'a>(
+    report: &'a Report,
+    scene: &str,
+    sampler: &str,
+    rule: Rule,
+) -> Option<&'a Summary> {
     report.summaries.iter().find(|summary| {
         summary.scene == scene && summary.sampler == sampler && summary.rule == rule
     })
@@ -36,7 +44,13 @@ struct Glance {
     is_less_better: bool,
 }
 
-const GLANCES: [Glance; 3] = [
+const GLANCES: [Glance; 4] = [
+    Glance {
+        caption: "Trimmed relMSE on lit surfaces over that of {first}: less is better. The environment \
+                  seen directly is left out.",
+        value: |summary| summary.surfaces_ratio.as_ref(),
+        is_less_better: true,
+    },
     Glance {
         caption: "RMSE over that of {first}: less is better. Bright pixels count most.",
         value: |summary| summary.rmse_ratio.as_ref(),
@@ -105,6 +119,80 @@ fn glance_table(
         }
     }
     table.html()
+}
+
+/// Seconds until relMSE falls to the thresholds, for every sampler in every scene.
+pub fn times_to_quality(report: &Report) -> String {
+    let mut html = String::new();
+    for (figure, name) in [(Figure::Relmse, "relMSE"), (Figure::RelmseTrimmed, "trimmed relMSE")] {
+        let caption = format!(
+            "Seconds until {name} falls to a threshold and stays there: median over the seeds, with \
+             the fastest and the slowest. Interpolated between the looks of a run. In italics: the \
+             error at the end of runs that did not get there, and an extrapolation as if it went on \
+             to fall as 1/time."
+        );
+        let mut table = Table::new(caption, &["scene", "down to"]);
+        for name in &report.order {
+            table.column(escape(name));
+        }
+        for scene in &report.scenes {
+            let mut is_first = true;
+            for threshold in THRESHOLDS {
+                let is_here = |time: &&TimeToQuality| {
+                    (time.scene.as_str(), time.figure) == (scene.name.as_str(), figure)
+                        && time.threshold == threshold
+                };
+                let here: Vec<&TimeToQuality> =
+                    report.times_to_quality.iter().filter(is_here).collect();
+                if here.is_empty() {
+                    continue;
+                }
+                let first = if is_first { escape(&scene.name) } else { String::new() };
+                let mut cells = vec![first, threshold.to_string()];
+                cells.extend(report.order.iter().map(|name| {
+                    here.iter()
+                        .find(|time| time.sampler == *name)
+                        .map_or_else(String::new, |time| time_cell(time))
+                }));
+                table.row(is_first, cells);
+                is_first = false;
+            }
+        }
+        if !table.is_empty() {
+            html += &table.html();
+        }
+    }
+    html
+}
+
+fn time_cell(time: &TimeToQuality) -> String {
+    let seconds = |value: f64| format!("{} s", number(value, 3));
+    if !time.is_judged {
+        return NOT_JUDGED.to_owned();
+    }
+    let Some(middle) = time.seconds else {
+        let extrapolated = time
+            .extrapolated_seconds
+            .map_or_else(String::new, |value| format!("; extrapolated {}", seconds(value)));
+        return format!(
+            "<span class=\"refused\">not reached by {} of {}: {} after {}{extrapolated}</span>",
+            time.runs - time.reached,
+            time.runs,
+            number(time.last_error, 2),
+            seconds(time.last_seconds)
+        );
+    };
+    let bound = if time.is_upper_bound { "≤ " } else { "" };
+    let spread = match (time.fastest, time.slowest) {
+        (Some(low), Some(high)) if low == high => String::new(),
+        (Some(low), Some(high)) => format!("({}–{})", number(low, 3), number(high, 3)),
+        (Some(low), None) => {
+            let missed = time.runs - time.reached;
+            format!("({}–; not reached by {missed} of {})", number(low, 3), time.runs)
+        }
+        (None, _) => String::new(),
+    };
+    format!("{bound}{} <span class=\"interval\">{spread}</span>", seconds(middle))
 }
 
 /// Tables of published figures beside the study's own, one for each source and scene.
@@ -200,6 +288,10 @@ pub fn figures(report: &Report, scene: &str, rules: &[Rule]) -> String {
             "relMSE,<br>trimmed",
             "relMSE,<br>99.9%",
             "relMSE,<br>largest",
+            "relMSE,<br>surfaces",
+            "trimmed,<br>surfaces",
+            "MSE,<br>environment",
+            "ꟻLIP",
             "mean ratio",
             "visible<br>rays",
             "GPU ms<br>per sample",
@@ -213,6 +305,11 @@ pub fn figures(report: &Report, scene: &str, rules: &[Rule]) -> String {
         for (index, summary) in of_rule.into_iter().enumerate() {
             let relative = |value: f64| {
                 if summary.relmse_judged { number(value, 3) } else { NOT_JUDGED.to_owned() }
+            };
+            let on_surfaces = |value: fn(&PartErrors) -> f64| match summary.parts.surfaces {
+                None => "–".to_owned(),
+                Some(part) if summary.parts.surfaces_judged => number(value(&part), 3),
+                Some(_) => NOT_JUDGED.to_owned(),
             };
             let mut mean = interval(&summary.mean_ratio, 4);
             if summary.is_suspicious() {
@@ -231,6 +328,13 @@ pub fn figures(report: &Report, scene: &str, rules: &[Rule]) -> String {
                 relative(summary.relmse_trimmed),
                 relative(summary.relmse_p999),
                 relative(summary.relmse_max),
+                on_surfaces(|part| part.relmse),
+                on_surfaces(|part| part.relmse_trimmed),
+                summary
+                    .parts
+                    .environment
+                    .map_or_else(|| "–".to_owned(), |part| number(part.mse, 3)),
+                summary.flip.map_or_else(String::new, |flip| number(flip, 3)),
                 mean,
                 summary.visible_share.map_or_else(String::new, percent),
                 number(summary.total_ms(), 3),

@@ -6,11 +6,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use super::{
+    metrics::parts::PartErrors,
     own_errors::is_judged,
     plan::Plan,
     record::{Measurement, Run, SceneRecord},
     rule::Rule,
     statistics::{Interval, geometric_interval, mean_interval, slope},
+    surfaces::Parts,
 };
 
 /// Standard errors between the means beyond which the report points the deviation out.
@@ -56,6 +58,13 @@ pub struct Summary {
     /// MSE · seconds of the first sampler over that of this one: how many times as fast this one
     /// reaches the same error. Absent if one is not judged.
     pub efficiency: Option<Interval>,
+    /// Means of the errors over lit surfaces and over the environment seen directly.
+    pub parts: Parts,
+    /// Trimmed relMSE over lit surfaces over that of the first sampler, by pairs of one seed; absent
+    /// if one is not judged.
+    pub surfaces_ratio: Option<Interval>,
+    /// Mean of the pictures' mean FLIP.
+    pub flip: Option<f64>,
     /// Mean over the seeds of the picture's mean over the reference's.
     pub mean_ratio: Interval,
     /// The largest deviation of a run's mean in standard errors.
@@ -134,6 +143,17 @@ fn means(
     names.into_iter().map(|name| (name.clone(), mean_of(name))).collect()
 }
 
+/// Means over the seeds of the errors in both parts of the picture.
+fn mean_parts(own: &[(&Run, &Measurement)], scene: &SceneRecord) -> Parts {
+    let average = |part: fn(&Parts) -> Option<PartErrors>| {
+        mean_of_parts(own.iter().map(|(_, m)| part(&m.parts)))
+    };
+    let (surfaces, environment) = (average(|p| p.surfaces), average(|p| p.environment));
+    let own = scene.parts.unwrap_or_default();
+    let surfaces_judged = surfaces.is_some_and(|part| own.judges(&part));
+    Parts { surfaces, environment, surfaces_judged }
+}
+
 fn summary(
     scene: &SceneRecord,
     sampler: &str,
@@ -166,6 +186,9 @@ fn summary(
             .collect();
         geometric_interval(&ratios)
     };
+    let parts = mean_parts(own, scene);
+    let surfaces_judged = parts.surfaces_judged && mean_parts(baseline, scene).surfaces_judged;
+    let trimmed = |m: &Measurement| m.parts.surfaces.map_or(0.0, |part| part.relmse_trimmed);
     let ratios: Vec<f64> = own.iter().map(|(_, m)| m.mean_ratio).collect();
     let largest = |a: f64, b: f64| if b.abs() > a.abs() { b } else { a };
     Summary {
@@ -193,6 +216,14 @@ fn summary(
             theirs.mse * theirs.seconds / (ours.mse * ours.seconds)
         })
         .filter(|_| both_judged),
+        parts,
+        surfaces_ratio: by_seed(&|ours, theirs| trimmed(ours) / trimmed(theirs))
+            .filter(|_| surfaces_judged),
+        flip: own
+            .iter()
+            .map(|(_, m)| m.flip)
+            .collect::<Option<Vec<f64>>>()
+            .map(|values| mean(values.into_iter())),
         mean_ratio: mean_interval(&ratios).unwrap_or(Interval { middle: 1.0, low: 1.0, high: 1.0 }),
         mean_deviation: own.iter().filter_map(|(_, m)| m.mean_deviation).reduce(largest),
         visible_share: {
@@ -215,6 +246,11 @@ pub struct CurvePoint {
     /// Root of the seeds' mean squared error, with the interval of the single runs' geometric mean
     /// scaled around it.
     pub rmse: Interval,
+    /// Trimmed relMSE over lit surfaces, likewise; absent if it is not judged.
+    pub relmse: Option<Interval>,
+    /// 1 / (that figure × seconds of each run), likewise: it stays level while error falls as
+    /// 1/time.
+    pub efficiency: Option<Interval>,
 }
 
 /// Error of one sampler in one scene against samples and time.
@@ -255,6 +291,17 @@ pub fn curves(plan: &Plan, scenes: &[SceneRecord], runs: &[Run]) -> Vec<Curve> {
     all
 }
 
+/// Mean of errors in a part of the picture; `None` if there are none or one lacks the part.
+fn mean_of_parts(parts: impl Iterator<Item = Option<PartErrors>>) -> Option<PartErrors> {
+    let parts: Vec<PartErrors> = parts.collect::<Option<Vec<_>>>()?;
+    let of = |value: fn(&PartErrors) -> f64| mean(parts.iter().map(value));
+    (!parts.is_empty()).then(|| PartErrors {
+        mse: of(|part| part.mse),
+        relmse: of(|part| part.relmse),
+        relmse_trimmed: of(|part| part.relmse_trimmed),
+    })
+}
+
 fn curve(scene: &SceneRecord, sampler: &str, runs: &[&Run]) -> Curve {
     let own = scene.reference.as_ref().and_then(|reference| reference.mse);
     let counts: BTreeSet<u32> =
@@ -272,10 +319,18 @@ fn curve(scene: &SceneRecord, sampler: &str, runs: &[&Run]) -> Curve {
             let around = geometric_interval(&single).filter(|_| is_judged(mse, own))?;
             let middle = mse.sqrt();
             let scale = middle / around.middle;
+            let trimmed = |m: &Measurement| m.parts.surfaces.map_or(0.0, |p| p.relmse_trimmed);
+            let part = mean_of_parts(at.iter().map(|m| m.parts.surfaces));
+            let part_judged =
+                part.is_some_and(|part| scene.parts.is_none_or(|own| own.judges(&part)));
+            let relative: Vec<f64> = at.iter().map(|m| trimmed(m)).collect();
+            let worth: Vec<f64> = at.iter().map(|m| 1.0 / (trimmed(m) * m.seconds)).collect();
             Some(CurvePoint {
                 spp,
                 seconds: mean(at.iter().map(|measurement| measurement.seconds)),
                 rmse: Interval { middle, low: around.low * scale, high: around.high * scale },
+                relmse: geometric_interval(&relative).filter(|_| part_judged),
+                efficiency: geometric_interval(&worth).filter(|_| part_judged),
             })
         })
         .collect();

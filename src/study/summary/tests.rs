@@ -17,6 +17,8 @@ fn scene(own_mse: f64) -> SceneRecord {
         height: 3,
         triangles: 1,
         reference: Some(OwnErrors { mse: Some(own_mse), mean: 1.0, ..OwnErrors::default() }),
+        reference_check: None,
+        parts: None,
     }
 }
 
@@ -44,6 +46,15 @@ fn run(sampler: &str, seed: u32, variance: f64) -> Run {
         mean_deviation: Some(-f64::from(seed)),
         mse_judged: true,
         relmse_judged: true,
+        parts: Parts {
+            surfaces: Some(PartErrors {
+                mse: 1.0,
+                relmse: 1.0,
+                relmse_trimmed: if sampler == "ris" { 0.25 } else { 1.0 } / f64::from(spp),
+            }),
+            ..Parts::default()
+        },
+        flip: None,
         image: None,
     };
     Run {
@@ -126,4 +137,23 @@ fn a_mean_that_is_off_is_pointed_out() {
     runs[1].measurements[2].mean_deviation = Some(4.5);
     let all = summaries(&plan(), &[scene(0.01)], &runs);
     assert!(all[3].is_suspicious() && !all[1].is_suspicious());
+}
+
+#[test]
+fn errors_on_surfaces_have_their_own_ratio_and_curve() {
+    let runs: Vec<Run> = [1, 2]
+        .into_iter()
+        .flat_map(|seed| [run("mis", seed, 1.0), run("ris", seed, 1.0)])
+        .collect();
+    let own = summaries(&plan(), &[scene(1e-9)], &runs);
+    let ris = own.iter().find(|s| s.sampler == "ris" && s.rule == Rule::Spp(4)).unwrap();
+    assert!((ris.surfaces_ratio.unwrap().middle - 0.25).abs() < 1e-12);
+    assert!(ris.parts.environment.is_none() && ris.flip.is_none());
+    let curves = curves(&plan(), &[scene(1e-9)], &runs);
+    let point = curves[1].points[2];
+    assert!((point.relmse.unwrap().middle - 0.0625).abs() < 1e-12);
+    // 1 / (0.0625 * 0.4 s), the same at every point.
+    for point in &curves[1].points {
+        assert!((point.efficiency.unwrap().middle - 40.0).abs() < 1e-9);
+    }
 }
