@@ -27,7 +27,7 @@ fn elsewhere(scene: &Scene) -> Camera {
 }
 
 fn settings(sampler: Sampler, seed: u32) -> Settings {
-    Settings { sampler, seed, depth: 2, shadow_rays: 2, ..Settings::default() }
+    Settings { sampler, seed, shadow_rays: 2, ..Settings::default() }
 }
 
 /// Numbers of rays that the guide has counted, those since the last rebuild included.
@@ -45,7 +45,7 @@ fn a_moved_camera_sees_what_a_new_renderer_sees() {
     let scene = scenes::mixed_room();
     let mut moving = support::renderer(&scene, settings(Sampler::Mis, 3));
     moving.render_pass(1).unwrap();
-    for (size, seed) in [([19, 13], 8), ([32, 24], 9), ([8, 8], 10)] {
+    for (size, seed) in [([19, 13], 8), ([32, 24], 9)] {
         moving.look(&elsewhere(&scene), size, seed, true).unwrap();
         moving.render_pass(2).unwrap();
         let mut there = scenes::mixed_room();
@@ -62,24 +62,22 @@ fn a_moved_camera_sees_what_a_new_renderer_sees() {
 fn a_pass_that_is_stopped_leaves_no_trace_after_the_next_look() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
-    for sampler in [Sampler::Mis, Sampler::Guided] {
-        let mut settings = settings(sampler, 3);
-        settings.parameters.set("candidates=1").unwrap();
-        settings.parameters.set("share-tiles=off").unwrap();
-        let mut renderer = support::renderer(&scene, settings.clone());
-        let stops = Rc::new(Cell::new(true));
-        let watched = Rc::clone(&stops);
-        renderer.set_watch(Box::new(move || watched.get()));
-        renderer.render_pass(4).unwrap();
-        assert!(renderer.is_stopped() && renderer.sample_count() == 0);
-        stops.set(false);
-        renderer.look(&scene.camera, [32, 24], 3, true).unwrap();
-        renderer.render_pass(2).unwrap();
-        assert!(!renderer.is_stopped() && renderer.sample_count() == 2);
-        let mut other = support::renderer(&scene, settings);
-        other.render_pass(2).unwrap();
-        assert!(renderer.sums().unwrap().sum == other.sums().unwrap().sum, "{}", sampler.name());
-    }
+    let mut settings = settings(Sampler::Guided, 3);
+    settings.parameters.set("candidates=1").unwrap();
+    settings.parameters.set("share-tiles=off").unwrap();
+    let mut renderer = support::renderer(&scene, settings.clone());
+    let stops = Rc::new(Cell::new(true));
+    let watched = Rc::clone(&stops);
+    renderer.set_watch(Box::new(move || watched.get()));
+    renderer.render_pass(4).unwrap();
+    assert!(renderer.is_stopped() && renderer.sample_count() == 0);
+    stops.set(false);
+    renderer.look(&scene.camera, [32, 24], 3, true).unwrap();
+    renderer.render_pass(2).unwrap();
+    assert!(!renderer.is_stopped() && renderer.sample_count() == 2);
+    let mut other = support::renderer(&scene, settings);
+    other.render_pass(2).unwrap();
+    assert!(renderer.sums().unwrap().sum == other.sums().unwrap().sum);
     support::assert_silent();
 }
 
@@ -111,8 +109,9 @@ fn pictures_after_a_motion_are_unbiased() {
     let mut scene = scenes::mixed_room();
     let home = scene.camera;
     scene.camera = elsewhere(&scene);
-    let reference = replicates(&scene, &settings(Sampler::Mis, 0), 0, 32);
-    let mut settings = settings(Sampler::Guided, 0);
+    let reference = Settings { depth: 2, ..settings(Sampler::Mis, 0) };
+    let reference = replicates(&scene, &reference, 0, 32);
+    let mut settings = Settings { depth: 2, ..settings(Sampler::Guided, 0) };
     settings.parameters.set("candidates=1").unwrap();
     let values = rows(&scene, &settings, 100..100 + REPLICATES, 16, |renderer| {
         let seed = renderer.seed();

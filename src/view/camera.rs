@@ -7,7 +7,7 @@ use crate::scene::Camera;
 /// Least angle between the view and the vertical, radians: there, left and right would swap.
 const POLE: f32 = 0.03;
 /// Share of the first distance to the centre of the picture that flying covers in a second.
-const PACE: f32 = 0.6;
+const PACE: f32 = 0.35;
 
 /// The camera, where it started, and how fast it flies.
 #[derive(Clone, Debug)]

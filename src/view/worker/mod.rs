@@ -34,7 +34,7 @@ use crate::{
 /// Time without a motion after which the camera is at rest.
 const REST: Duration = Duration::from_millis(150);
 /// Aim for the time between two pictures of a moving camera.
-const MOVING_TIME: Duration = Duration::from_millis(70);
+const MOVING_TIME: Duration = Duration::from_millis(60);
 /// Least side of the film of a moving camera, pixels, and the largest factor by which it shrinks.
 const LEAST_SIDE: u32 = 16;
 const MOST_SHRINKING: f32 = 32.0;
