@@ -50,7 +50,7 @@ impl Tone {
 
 fn reinhard(pixel: [f32; 3]) -> [f32; 3] {
     // Beyond this all is white, and infinity would give NaN.
-    let pixel = pixel.map(|value| value.min(1e6));
+    let pixel = pixel.map(|value| value.clamp(-1e6, 1e6));
     let luminance = luminance(pixel.into());
     let scale = (1.0 + luminance / (WHITE * WHITE)) / (1.0 + luminance);
     pixel.map(|value| value * scale)
