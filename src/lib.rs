@@ -43,6 +43,7 @@
 //! | scene → files of other renderers | [`export`] | |
 //! | runs of several samplers → report | [`study`] | |
 //! | ray rates beside those of the CPU | [`mod@bench`] | |
+//! | a window in which the camera moves | [`view`] | `view/`: `show`, `compose` |
 //! | command line | `cli`, `command` | |
 //!
 //! # Notation
@@ -102,9 +103,13 @@
 //! - \[Mikkelsen 2008\] *Simulation of Wrinkled Surfaces Revisited*, master's thesis, University of
 //!   Copenhagen.
 //! - \[Moshier 1992\] Cephes Mathematical Library.
+//! - \[Narkowicz 2015\] "ACES Filmic Tone Mapping Curve",
+//!   <https://knarkowicz.wordpress.com/2016/01/06/aces-filmic-tone-mapping-curve/>.
 //! - \[Nocedal & Wright 2006\] *Numerical Optimization*, second edition, Springer.
 //! - \[Pharr & Humphreys 2010\] *Physically Based Rendering*, second edition, Morgan Kaufmann.
 //! - \[Quilez 2008\] "Distance functions", <https://iquilezles.org/articles/distfunctions/>.
+//! - \[Reinhard et al. 2002\] "Photographic Tone Reproduction for Digital Images", ACM Transactions on
+//!   Graphics 21(3).
 //! - \[Rusinkiewicz 1998\] "A New Change of Variables for Efficient BRDF Representation",
 //!   Eurographics Workshop on Rendering.
 //! - \[Schlick 1994\] "An Inexpensive BRDF Model for Physically-based Rendering", Computer
@@ -179,6 +184,7 @@ pub mod bench;
 pub mod cli;
 #[doc(hidden)]
 pub mod command;
+pub mod view;
 
 pub mod error;
 pub mod files;

@@ -253,7 +253,8 @@ fn every_pass_is_in_an_order() {
         let is_used = |(_, order): &(_, Vec<Dispatch>)| {
             order.iter().any(|dispatch: &Dispatch| dispatch.kernel.shader == *pass)
         };
-        assert!(orders.iter().any(is_used), "{pass}: no technique runs it");
+        let is_of_window = ["show", "compose"].contains(pass);
+        assert!(is_of_window || orders.iter().any(is_used), "{pass}: no technique runs it");
     }
 }
 

@@ -198,6 +198,11 @@ impl Commands {
         );
     }
 
+    /// The command buffer, for commands that no pass needs.
+    pub(super) fn raw(&self) -> vk::CommandBuffer {
+        self.raw
+    }
+
     fn barrier(
         &self,
         source: vk::PipelineStageFlags,

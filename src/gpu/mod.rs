@@ -12,6 +12,7 @@ pub(crate) mod labels;
 pub mod pipeline;
 mod pipeline_cache;
 mod set_layouts;
+pub mod swapchain;
 pub(crate) mod timestamps;
 mod transfer;
 
@@ -21,6 +22,7 @@ pub use commands::Commands;
 pub use descriptors::DescriptorSet;
 pub use device::Device;
 pub use pipeline::Pipeline;
+pub use swapchain::{Presented, Swapchain};
 pub use timestamps::PassTimes;
 
 use crate::error::Error;

@@ -300,6 +300,18 @@ binding_tables! {
         9 HIT_INSTANCES: array uint;
     }
 
+    /// Set 1 of the passes that show films in a window.
+    VIEW = view: 1 {
+        /// Pixels of a film as they are shown: linear radiance, or the colours of a layer.
+        60 SHOWN: array vec3;
+        /// The same of the film to its right, if there are two.
+        61 SHOWN_RIGHT: array vec3;
+        /// A picture over the window, a word of bytes a pixel, red lowest.
+        62 INSET: array uint;
+        /// Pixels of the window in its own order of bytes.
+        63 WINDOW_PIXELS: array uint;
+    }
+
     /// Set 3: the film, which grows by every wave.
     FILM = film: 3 {
         /// Leading part of the sum of radiance.

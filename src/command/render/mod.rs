@@ -270,10 +270,7 @@ impl<'a> RenderJob<'a> {
                     self.warn_of_darkness(" so far: --error waits for light");
                 }
                 if let Some(display) = display.as_mut().filter(|display| display.is_connected()) {
-                    let pixels: Vec<[f32; 3]> = (0..sums.pixel_count())
-                        .map(|pixel| sums.mean(pixel).map(|value| value as f32))
-                        .collect();
-                    display.update(&pixels);
+                    display.update(&sums.to_image(&self.arguments.aov));
                 }
                 // Reading back a large film takes time from the passes.
                 next_look = Instant::now() + LOOK_INTERVAL.max(20 * start.elapsed());
@@ -291,6 +288,9 @@ impl<'a> RenderJob<'a> {
         };
         let sums = renderer.sums()?;
         self.look(&sums);
+        if let Some(display) = display.as_mut().filter(|display| display.is_connected()) {
+            display.update(&sums.to_image(&self.arguments.aov));
+        }
         progress.finish(&self.standing(renderer), reason.explain());
         Ok(reason)
     }
@@ -314,11 +314,11 @@ impl<'a> RenderJob<'a> {
         self.warnings.push(warning);
     }
 
-    /// Connects to the viewer named by `--display-server`.
+    /// Connects to the viewer named by `--display-server`. Images of other files and samplers stay there.
     fn open_display(&self) -> Result<Option<DisplayServer>> {
         let connect = |address: &String| {
-            let Window { width, height, .. } = self.window;
-            DisplayServer::connect(address, &self.scene.name, width, height)
+            let name = format!("{} ({})", self.output.display(), self.arguments.sampler.name());
+            DisplayServer::connect(address, &name)
         };
         self.arguments.display_server.as_ref().map(connect).transpose()
     }
