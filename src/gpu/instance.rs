@@ -8,7 +8,10 @@ use std::{
 use ash::{ext, vk};
 
 use super::vulkan_error;
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    memory,
+};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -39,8 +42,10 @@ impl Instance {
     /// including synchronization validation.
     ///
     /// # Errors
-    /// [`Error::Device`] if the Vulkan loader or the requested layer is missing.
+    /// [`Error::Device`] if the Vulkan loader or the requested layer is missing, [`Error::Memory`] if
+    /// the address space does not suffice for a driver.
     pub fn new(validate: bool) -> Result<Self> {
+        memory::check_driver().map_err(Error::memory)?;
         // SAFETY: loading the Vulkan loader runs its initialisers; it is the system's own library.
         let entry = unsafe { ash::Entry::load() }.map_err(|error| Error::Device {
             reason: format!("no Vulkan loader (libvulkan.so.1) on this system: {error}"),
