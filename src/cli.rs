@@ -98,7 +98,12 @@ fn report(error: &Error) {
         eprintln!("  caused by: {cause}");
         source = cause.source();
     }
-    if let Error::Device { help, .. } = error {
+    let help = match error {
+        Error::Device { help, .. } => Some(help.as_str()),
+        Error::Memory { help, .. } => *help,
+        _ => None,
+    };
+    if let Some(help) = help {
         eprintln!("help: {help}");
     }
 }

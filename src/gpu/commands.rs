@@ -230,8 +230,8 @@ impl Commands {
     /// Submits, waits, and returns the device time per pass (empty if not timed).
     ///
     /// # Errors
-    /// [`Error::Vulkan`] if a call fails; for a lost device it names the last pass of the
-    /// submission.
+    /// [`Error::Vulkan`] if a call fails, [`Error::Device`] if the device is lost; both name the last
+    /// pass of the submission.
     pub fn submit_and_wait(self) -> Result<PassTimes> {
         let raw = self.device.raw();
         let failed = |call: &str, result| {

@@ -9,7 +9,10 @@ use ash::{ext, vk};
 use winit::raw_window_handle::RawDisplayHandle;
 
 use super::vulkan_error;
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    memory,
+};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -40,8 +43,10 @@ impl Instance {
     /// including synchronization validation; `display` asks for the extensions that show windows there.
     ///
     /// # Errors
-    /// [`Error::Device`] if the Vulkan loader, the requested layer or such an extension is missing.
+    /// [`Error::Device`] if the Vulkan loader, the requested layer or such an extension is missing,
+    /// [`Error::Memory`] if the address space does not suffice for a driver.
     pub fn new(validate: bool, display: Option<RawDisplayHandle>) -> Result<Self> {
+        memory::check_driver().map_err(Error::memory)?;
         // SAFETY: loading the Vulkan loader runs its initialisers; it is the system's own library.
         let entry = unsafe { ash::Entry::load() }.map_err(|error| Error::Device {
             reason: format!("no Vulkan loader (libvulkan.so.1) on this system: {error}"),

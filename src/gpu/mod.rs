@@ -27,7 +27,17 @@ pub use timestamps::PassTimes;
 
 use crate::error::Error;
 
-/// Returns the [`Error::Vulkan`] for a failed call.
+/// Returns the [`Error::Vulkan`] for a failed call, or [`Error::Device`] for a lost device.
 fn vulkan_error(call: &str, result: ash::vk::Result) -> Error {
+    if result == ash::vk::Result::ERROR_DEVICE_LOST {
+        return Error::Device {
+            reason: format!("Vulkan: {call} failed: the device is lost"),
+            help:
+                "the driver crashed, was reset or was replaced: try again, with another --device \
+                   or a newer driver; with --checkpoint-interval a render keeps checkpoints, from \
+                   which --resume continues"
+                    .into(),
+        };
+    }
     Error::Vulkan { call: call.to_owned(), result: result.to_string() }
 }

@@ -91,7 +91,7 @@ impl Renderer {
         let mut most_paths = passes.most_paths;
         let (runner, technique) = loop {
             match attempt(most_paths) {
-                Err(Error::Memory { message }) if most_paths > FEWEST_PATHS => {
+                Err(Error::Memory { message, .. }) if most_paths > FEWEST_PATHS => {
                     most_paths /= PATHS_STEP;
                     log::warn!("{message}; trying with {most_paths} paths at a time");
                 }
