@@ -17,8 +17,8 @@ pub struct Parameters {
     pub share_tiles: Option<u32>,
     /// `candidates`: directions to choose each shadow ray of `ris` or `guided` from; `None` is `auto`.
     pub candidates: Option<u32>,
-    /// `compensation`: true if `mis`, `portal` and what `guided` falls back to draw directions of the environment
-    /// by its compensated density.
+    /// `compensation`: true if `mis`, `portal` and what `guided` falls back to draw directions of the
+    /// environment by its compensated density.
     pub compensation: bool,
     /// Parameters of `product`, also within `visibility`.
     pub product: ProductParameters,
