@@ -28,7 +28,8 @@
 //! | lobes: products, integrals, samples | [`srbf`] | `include/srbf` |
 //! | maps and BRDFs → lobes | [`fit`] | |
 //! | triangles → wide BVH | [`accel`] | `include/bvh` |
-//! | frames, random numbers, alias tables | [`math`] | `include/frame`, `include/random` |
+//! | frames, random numbers, rectangles | [`math`] | `include/frame`, `include/random`, |
+//! | | | `include/spherical_rectangle` |
 //! | constants, structs, buffers of both languages | [`shader`] | `include/layout` |
 //! | Vulkan | [`gpu`] | |
 //! | passes of a wave, in their order | [`pass`] | `camera`, `trace`, `texture`, `emit`, `sample`, |
@@ -38,6 +39,7 @@
 //! | | | `count_entries` |
 //! | `guided` | [`sampler::guided`] | `guided/`: `sample_guided`, `learn`, `show_cells`, |
 //! | | | `bounce_guided`, `learn_arrivals` |
+//! | `portal` | [`sampler::portal`] | `portal/`: `sample_portals` |
 //! | scene, settings, device → sums | [`renderer`] | |
 //! | sums → image files | [`film`] | |
 //! | scene → files of other renderers | [`export`] | |
@@ -129,6 +131,10 @@
 //! - \[Tsai et al. 2008\] "Importance Sampling of Products from Illumination and BRDF Using
 //!   Spherical Radial Basis Functions", The Visual Computer 24.
 //! - \[Turk 1994\] "The PLY Polygon File Format", Stanford University.
+//! - \[Ureña, Fajardo & King 2013\] "An Area-Preserving Parametrization for Spherical
+//!   Rectangles", Computer Graphics Forum 32(4).
+//! - \[van Oosterom & Strackee 1983\] "The Solid Angle of a Plane Triangle", IEEE Transactions on
+//!   Biomedical Engineering BME-30(2).
 //! - \[Veach & Guibas 1995\] "Optimally Combining Sampling Techniques for Monte Carlo Rendering",
 //!   SIGGRAPH.
 //! - \[Vegdahl 2021\] "Building a Better LK Hash",

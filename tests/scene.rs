@@ -178,7 +178,7 @@ fn text_that_is_no_scene_is_refused_with_line_and_column() {
     case(
         &format!("{HEAD}[lamps]\n"),
         "room.toml:14:2: unknown key `lamps` in the scene, expected one of `camera`, `film`, \
-         `environment`, `lamp`, `material`, `object`, `include`",
+         `environment`, `lamp`, `portal`, `material`, `object`, `include`",
     );
     case(
         &HEAD.replace("look_at", "lookat"),

@@ -250,6 +250,12 @@ binding_tables! {
         29 GUIDE_ARRIVALS: array uint;
     }
 
+    /// Set 1 of the sampler `portal`.
+    PORTAL = portal: 1 {
+        /// Portals, three texels each: corner, width; first axis, height; second axis.
+        36 PORTALS: texels Rgba32Float;
+    }
+
     /// Set 1 of the passes by which pixels share paths.
     SHARING = sharing: 1 {
         /// First vertex of each path.

@@ -103,6 +103,12 @@ constants! {
     /// k of V = (1 / (1 + Num))^k, bits of a float.
     CONSTANT_VISIBILITY_EXPONENT = 45;
 
+    // Specialization constants of `sample_portals`.
+    /// Number of portals.
+    CONSTANT_PORTALS = 47;
+    /// Share of the portals among directions that are not from the BRDF, bits of a float.
+    CONSTANT_PORTAL_SHARE = 48;
+
     // Values of CONSTANT_SAMPLER.
     /// Uniform over the hemisphere.
     SAMPLER_UNIFORM = 0;

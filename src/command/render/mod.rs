@@ -101,6 +101,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         eprintln!("device: {} ({})", capabilities.name, capabilities.driver);
     }
     let mut job = RenderJob::new(arguments, &settings, &scene, &device, output);
+    if let Some(warning) = settings.sampler.portal_warning(&scene) {
+        job.warn(warning);
+    }
     let mut renderer = Renderer::new(&device, &scene, settings.clone())?;
     if let Some(path) = &arguments.load_guide {
         guide::load(&mut renderer, path)?;
