@@ -27,6 +27,9 @@ use crate::{
 pub const TIME_SHARE: f64 = 0.1;
 /// Samples per pixel of both halves of a check where the reference's time is not known.
 const SPP_WITHOUT_TIME: u32 = 256;
+/// Samples per pixel of both halves below which a check by a sampler finds no disagreement: a light
+/// that it has not found yet leaves no trace in its noise either.
+const LEAST_SPP: u64 = 32;
 /// File stems of the check's halves.
 const HALF_STEMS: [&str; 2] = ["reference_check_1", "reference_check_2"];
 /// Seeds of the halves; those of the reference lie above, those of runs count up from 1.
@@ -300,7 +303,10 @@ impl CheckJob<'_> {
         let spp = u64::from(first.sample_count) + u64::from(second.sample_count);
         let description = format!("{}, two halves of {} spp,", self.contender.label, spp / 2);
         let halves = [&self.reference.first, &self.reference.second];
-        let check = ReferenceCheck::of(halves, [&first.picture, &second.picture], description)?;
+        let mut check = ReferenceCheck::of(halves, [&first.picture, &second.picture], description)?;
+        if spp < LEAST_SPP {
+            check.verdict = Verdict::TooNoisy;
+        }
         let seconds = Some(first.seconds + second.seconds);
         Ok(ReferenceCheck { spp: Some(spp), seconds, ..check })
     }
