@@ -91,9 +91,9 @@ mod tests {
                 "{curve:?}"
             );
         }
-        // Worked out by hand: 0.18 → 0.18 · (1 + 0.18/16) / 1.18 = 0.15426 → sRGB 0.4299.
+        // Worked out by hand: 0.18 → 0.18 · (1 + 0.18/16) / 1.18 = 0.15426 → sRGB 0.4292.
         let tone = Tone { exposure: 0.0, curve: Curve::Reinhard };
-        assert_eq!(tone.display([0.18; 3]), [110; 3]);
+        assert_eq!(tone.display([0.18; 3]), [109; 3]);
         // 0.18 → 0.18 · 0.4818 / (0.18 · 1.0274 + 0.14) = 0.26692 → sRGB 0.5534.
         let tone = Tone { exposure: -1.0, curve: Curve::Filmic };
         assert_eq!(tone.display([0.36; 3]), [141; 3]);
