@@ -27,6 +27,9 @@ use crate::{
 pub const TIME_SHARE: f64 = 0.1;
 /// Samples per pixel of both halves of a check where the reference's time is not known.
 const SPP_WITHOUT_TIME: u32 = 256;
+/// Inflation of the blocks' variance above which neighbours are taken to share paths; for independent
+/// pixels it is 1 ± 0.2.
+const SHARED_FROM: f64 = 2.0;
 /// Samples per pixel of both halves below which a check by a sampler finds no disagreement: a light
 /// that it has not found yet leaves no trace in its noise either.
 const LEAST_SPP: u64 = 32;
@@ -107,7 +110,7 @@ impl ReferenceCheck {
         let deviations =
             ours.blocks.iter().zip(&theirs.blocks).map(|(ours_block, theirs_block)| {
                 let variance =
-                    ours_block.variance * ours.inflation + theirs_block.variance * theirs.inflation;
+                    ours.block_variance(ours_block) + theirs.block_variance(theirs_block);
                 deviation(theirs_block.mean - ours_block.mean, variance.sqrt())
             });
         let worst = deviations.enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
@@ -170,6 +173,9 @@ struct Side {
     /// Factor by which blocks vary more than independent pixels would: samplers may share paths
     /// between neighbours.
     inflation: f64,
+    /// Least variance of a block over its squared mean: where neighbours share paths a block is
+    /// one witness or a few, too few to say how noisy it is.
+    floor: f64,
 }
 
 struct Block {
@@ -226,7 +232,17 @@ impl Side {
             }
         }
         let inflation = ratios.iter().sum::<f64>() / (ratios.len() as f64).max(1.0);
-        Ok(Self { blocks, inflation: inflation.max(1.0) })
+        let relative = blocks.iter().filter(|block| block.mean > 0.0);
+        let relative: Vec<f64> =
+            relative.map(|block| block.variance / (block.mean * block.mean)).collect();
+        let pooled = relative.iter().sum::<f64>() / (relative.len() as f64).max(1.0);
+        let floor = if inflation > SHARED_FROM { pooled } else { 0.0 };
+        Ok(Self { blocks, inflation: inflation.max(1.0), floor })
+    }
+
+    /// Variance of a block's mean.
+    fn block_variance(&self, block: &Block) -> f64 {
+        self.inflation * block.variance.max(self.floor * block.mean * block.mean)
     }
 
     /// Sums a value of the blocks, weighted by `weight` of their share of the pixels.

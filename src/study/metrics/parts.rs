@@ -118,7 +118,7 @@ mod tests {
         assert!((part.relmse - 0.01 / 1.01).abs() < 1e-6, "{part:?}");
         assert!((part.mse - 0.01).abs() < 1e-6, "{part:?}");
         let whole = Metrics::of(&picture, &reference).unwrap();
-        assert!(whole.relmse < 1e-3 * part.relmse, "the sun hides it in {}", whole.relmse);
+        assert!(whole.relmse < 1e-2 * part.relmse, "the sun hides it in {}", whole.relmse);
     }
 
     #[test]
