@@ -41,8 +41,11 @@ void main() {
         precise vec3 total = sum + radiance;
         precise vec3 added = total - sum;
         precise vec3 rest = (sum - (total - added)) + (radiance - added);
-        precise vec3 next_compensation = compensation + rest;
-        sum = total;
+        // Keep the compensation below half a unit of the sum: left to grow, it would round too.
+        precise vec3 low = compensation + rest;
+        precise vec3 next_sum = total + low;
+        precise vec3 next_compensation = low - (next_sum - total);
+        sum = next_sum;
         compensation = next_compensation;
         squares += radiance * radiance;
     }

@@ -106,20 +106,12 @@ void main() {
                 reservoir.chosen.integrand * factor);
         }
     } else if (SAMPLER == SAMPLER_MIS) {
-        // Alternate the techniques by their shares from a random start, shared by 8x8 pixels: ray k is
-        // from the BRDF with exactly that probability, and neither sequence has gaps. A loop each:
-        // devices that run both sides of a branch then run one per ray.
-        uint share = mis_share(wave.total_shadow_rays, wave.bounce_rays);
-        uint bits = block_random_bits(vertex.index, DIMENSION_TECHNIQUE).x;
-        uint start = (bits & 1u) << 7u | ((bits >> 1u) & 127u);
-        uint before = (first_ray * share + start) >> 8u;
-        uint from_brdf = 0u;
-        for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
-            uint sum = ((first_ray + i) * share + start) & 255u;
-            from_brdf |= sum + share >= 256u ? 1u << i : 0u;
-        }
-        uint index = first_ray - before + (bits & 1u);
-        uint left = ~from_brdf & ((1u << wave.shadow_ray_count) - 1u);
+        // A loop for each technique: devices that run both sides of a branch then run one per ray.
+        MisTurns turns = mis_turns(
+            first_ray, wave.shadow_ray_count, mis_share(wave.total_shadow_rays, wave.bounce_rays),
+            block_random_bits(vertex.index, DIMENSION_TECHNIQUE).x);
+        uint index = turns.light_index;
+        uint left = ~turns.from_brdf & ((1u << wave.shadow_ray_count) - 1u);
         while (left != 0u) {
             uint i = uint(findLSB(left));
             left &= left - 1u;
@@ -127,8 +119,8 @@ void main() {
             index++;
             write_sample(i * path_count + path, sampled, density(sampled));
         }
-        index = before;
-        left = from_brdf;
+        index = turns.brdf_index;
+        left = turns.from_brdf;
         while (left != 0u) {
             uint i = uint(findLSB(left));
             left &= left - 1u;

@@ -24,10 +24,14 @@ pub struct Cli {
 pub enum Command {
     /// Render a scene to an image.
     Render(Box<command::render::Arguments>),
+    /// Show a scene in a window, with a camera that moves.
+    View(Box<command::view::Arguments>),
     /// Compare samplers with a reference over scenes and seeds, in a report for the browser.
     Study(Box<command::study::Arguments>),
     /// Measure the error of an image against a reference, with thresholds for scripts.
     Compare(command::compare::Arguments),
+    /// Make a picture or another image of a render: exposure, tone curve, part, layer.
+    Convert(command::convert::Arguments),
     /// Combine renders of one scene made with different seeds or sample ranges.
     Merge(command::merge::Arguments),
     /// Measure how fast a scene's rays are traced, and where time and memory go.
@@ -64,9 +68,11 @@ pub fn run() -> ExitCode {
     // The pool, if any, lives until the command has ended.
     let result = command::start_threads().and_then(|_pool| match &cli.command {
         Command::Render(arguments) => command::render::run(arguments),
+        Command::View(arguments) => command::view::run(arguments),
         Command::Study(arguments) => command::study::run(arguments),
         Command::Bench(arguments) => command::bench::run(arguments),
         Command::Compare(arguments) => command::compare::run(arguments),
+        Command::Convert(arguments) => command::convert::run(arguments),
         Command::Info(arguments) => command::info::run(arguments),
         Command::Merge(arguments) => command::merge::run(arguments),
         Command::Fit(arguments) => command::fit::run(arguments),
@@ -92,7 +98,12 @@ fn report(error: &Error) {
         eprintln!("  caused by: {cause}");
         source = cause.source();
     }
-    if let Error::Device { help, .. } = error {
+    let help = match error {
+        Error::Device { help, .. } => Some(help.as_str()),
+        Error::Memory { help, .. } => *help,
+        _ => None,
+    };
+    if let Some(help) = help {
         eprintln!("help: {help}");
     }
 }

@@ -59,7 +59,7 @@ pub enum Error {
         /// The result code, or the allocator's message.
         result: String,
     },
-    /// No device, or none that meets the requirements.
+    /// No device, none that meets the requirements, or a device that is lost.
     #[error("{reason}")]
     Device {
         /// Required and found.
@@ -72,6 +72,8 @@ pub enum Error {
     Memory {
         /// Who asks for how much, and how much there is.
         message: String,
+        /// Advice to the user, where the message has none.
+        help: Option<&'static str>,
     },
     /// Options that contradict each other or are out of range.
     #[error("{message}")]
@@ -127,7 +129,7 @@ impl Error {
 
     /// Creates an [`Error::Memory`] of a refused request.
     pub(crate) fn memory(shortage: Shortage) -> Self {
-        Self::Memory { message: shortage.to_string() }
+        Self::Memory { message: shortage.to_string(), help: None }
     }
 
     /// Creates an [`Error::Usage`].

@@ -28,7 +28,8 @@
 //! | lobes: products, integrals, samples | [`srbf`] | `include/srbf` |
 //! | maps and BRDFs → lobes | [`fit`] | |
 //! | triangles → wide BVH | [`accel`] | `include/bvh` |
-//! | frames, random numbers, alias tables | [`math`] | `include/frame`, `include/random` |
+//! | frames, random numbers, rectangles | [`math`] | `include/frame`, `include/random`, |
+//! | | | `include/spherical_rectangle` |
 //! | constants, structs, buffers of both languages | [`shader`] | `include/layout` |
 //! | Vulkan | [`gpu`] | |
 //! | passes of a wave, in their order | [`pass`] | `camera`, `trace`, `texture`, `emit`, `sample`, |
@@ -38,11 +39,13 @@
 //! | | | `count_entries` |
 //! | `guided` | [`sampler::guided`] | `guided/`: `sample_guided`, `learn`, `show_cells`, |
 //! | | | `bounce_guided`, `learn_arrivals` |
+//! | `portal` | [`sampler::portal`] | `portal/`: `sample_portals` |
 //! | scene, settings, device → sums | [`renderer`] | |
 //! | sums → image files | [`film`] | |
 //! | scene → files of other renderers | [`export`] | |
 //! | runs of several samplers → report | [`study`] | |
 //! | ray rates beside those of the CPU | [`mod@bench`] | |
+//! | a window in which the camera moves | [`view`] | `view/`: `show`, `compose` |
 //! | command line | `cli`, `command` | |
 //!
 //! # Notation
@@ -102,9 +105,13 @@
 //! - \[Mikkelsen 2008\] *Simulation of Wrinkled Surfaces Revisited*, master's thesis, University of
 //!   Copenhagen.
 //! - \[Moshier 1992\] Cephes Mathematical Library.
+//! - \[Narkowicz 2015\] "ACES Filmic Tone Mapping Curve",
+//!   <https://knarkowicz.wordpress.com/2016/01/06/aces-filmic-tone-mapping-curve/>.
 //! - \[Nocedal & Wright 2006\] *Numerical Optimization*, second edition, Springer.
 //! - \[Pharr & Humphreys 2010\] *Physically Based Rendering*, second edition, Morgan Kaufmann.
 //! - \[Quilez 2008\] "Distance functions", <https://iquilezles.org/articles/distfunctions/>.
+//! - \[Reinhard et al. 2002\] "Photographic Tone Reproduction for Digital Images", ACM Transactions on
+//!   Graphics 21(3).
 //! - \[Rusinkiewicz 1998\] "A New Change of Variables for Efficient BRDF Representation",
 //!   Eurographics Workshop on Rendering.
 //! - \[Schlick 1994\] "An Inexpensive BRDF Model for Physically-based Rendering", Computer
@@ -124,6 +131,10 @@
 //! - \[Tsai et al. 2008\] "Importance Sampling of Products from Illumination and BRDF Using
 //!   Spherical Radial Basis Functions", The Visual Computer 24.
 //! - \[Turk 1994\] "The PLY Polygon File Format", Stanford University.
+//! - \[Ureña, Fajardo & King 2013\] "An Area-Preserving Parametrization for Spherical
+//!   Rectangles", Computer Graphics Forum 32(4).
+//! - \[van Oosterom & Strackee 1983\] "The Solid Angle of a Plane Triangle", IEEE Transactions on
+//!   Biomedical Engineering BME-30(2).
 //! - \[Veach & Guibas 1995\] "Optimally Combining Sampling Techniques for Monte Carlo Rendering",
 //!   SIGGRAPH.
 //! - \[Vegdahl 2021\] "Building a Better LK Hash",
@@ -179,6 +190,7 @@ pub mod bench;
 pub mod cli;
 #[doc(hidden)]
 pub mod command;
+pub mod view;
 
 pub mod error;
 pub mod files;

@@ -3,6 +3,7 @@
 //! The limit is one number for the whole process (`--max-memory`). A request states its size and who
 //! makes it; it is refused if the resident memory of the process and the request together pass the
 //! limit. Buffers of a software device are memory of the process and count, those of a GPU do not.
+//! A limit of the address space (`ulimit -v`) counts as well: past it allocations abort.
 
 use std::{
     fmt, fs,
@@ -14,6 +15,10 @@ const SMALL_BYTES: u64 = 1 << 20;
 /// Share of the machine's memory that is the limit unless `--max-memory` says otherwise.
 const DEFAULT_SHARE: f64 = 0.75;
 
+/// Address space that a driver with its compiler takes before it renders. Lavapipe of Mesa 22.3 frees
+/// memory twice where it gets less.
+const DRIVER_ADDRESS_SPACE: u64 = 3 << 29;
+
 /// Bytes; 0 before it is known.
 static LIMIT: AtomicU64 = AtomicU64::new(0);
 
@@ -23,20 +28,35 @@ pub struct Shortage {
     /// Part of the program or of the input that asks.
     asker: String,
     asked: u64,
-    in_use: u64,
+    bound: Bound,
+}
+
+/// A limit of the process and how much of it is used, bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Bound {
+    /// Option or command that sets the limit.
+    set_by: &'static str,
     limit: u64,
+    in_use: u64,
+}
+
+impl Bound {
+    fn room(&self) -> u64 {
+        self.limit.saturating_sub(self.in_use)
+    }
 }
 
 impl fmt::Display for Shortage {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             to,
-            "not enough memory: {} asks for {}, and {} of the {} that --max-memory allows are in use; \
+            "not enough memory: {} asks for {}, and {} of the {} that {} allows are in use; \
              allow more, or make it smaller",
             self.asker,
             size(self.asked),
-            size(self.in_use),
-            size(self.limit)
+            size(self.bound.in_use),
+            size(self.bound.limit),
+            self.bound.set_by
         )
     }
 }
@@ -74,7 +94,41 @@ pub fn limit() -> u64 {
 
 /// Bytes that may still be asked for.
 pub fn room() -> u64 {
-    limit().saturating_sub(in_use())
+    tightest_bound().room()
+}
+
+/// Returns the limit that leaves the least.
+fn tightest_bound() -> Bound {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let memory = Bound { set_by: "--max-memory", limit: limit(), in_use: in_use(&status) };
+    match address_space(&status) {
+        Some(space) if space.room() < memory.room() => space,
+        _ => memory,
+    }
+}
+
+/// Checks, before the driver is loaded, that it has address space to work in.
+///
+/// # Errors
+/// A limit (`ulimit -v`) leaves less than [`DRIVER_ADDRESS_SPACE`].
+pub fn check_driver() -> Result<(), Shortage> {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    match address_space(&status) {
+        Some(bound) if bound.room() < DRIVER_ADDRESS_SPACE => Err(Shortage {
+            asker: "the Vulkan driver".to_owned(),
+            asked: DRIVER_ADDRESS_SPACE,
+            bound,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// Returns the limit of the address space, if there is one; `status` is that of the process.
+fn address_space(status: &str) -> Option<Bound> {
+    let limits = fs::read_to_string("/proc/self/limits").ok()?;
+    let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+    let limit = line.split_whitespace().next()?.parse().ok()?;
+    Some(Bound { set_by: "ulimit -v", limit, in_use: kibibytes(status, "VmSize:")? })
 }
 
 /// Checks that `bytes` more fit under the limit, before they are allocated; `asker` says what for.
@@ -85,11 +139,11 @@ pub fn check(asker: impl fmt::Display, bytes: u64) -> Result<(), Shortage> {
     if bytes < SMALL_BYTES {
         return Ok(());
     }
-    let (limit, in_use) = (limit(), in_use());
-    if in_use.saturating_add(bytes) <= limit {
+    let bound = tightest_bound();
+    if bytes <= bound.room() {
         return Ok(());
     }
-    Err(Shortage { asker: asker.to_string(), asked: bytes, in_use, limit })
+    Err(Shortage { asker: asker.to_string(), asked: bytes, bound })
 }
 
 /// As [`check`], for `count` elements of `size` bytes.
@@ -100,10 +154,9 @@ pub fn check_count(asker: impl fmt::Display, count: usize, size: usize) -> Resul
     check(asker, (count as u64).saturating_mul(size as u64))
 }
 
-/// Resident memory of this process, bytes; 0 where the system has no `/proc`.
-fn in_use() -> u64 {
-    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    kibibytes(&status, "VmRSS:").unwrap_or(0)
+/// Resident memory of the process with this status, bytes; 0 where the system has no `/proc`.
+fn in_use(status: &str) -> u64 {
+    kibibytes(status, "VmRSS:").unwrap_or(0)
 }
 
 /// Memory of the machine, or less in a container that has a limit.
@@ -177,7 +230,8 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn the_limit_and_the_memory_in_use_are_known() {
-        assert!((1 << 20..1 << 50).contains(&in_use()), "{}", in_use());
+        let bound = tightest_bound();
+        assert!((1 << 20..1 << 50).contains(&bound.in_use), "{bound:?}");
         assert!((1 << 26..1 << 50).contains(&limit()), "{}", limit());
     }
 }

@@ -143,3 +143,39 @@ fn roulette_keeps_the_mean() {
     let z = (with.x - without.x) / with_error.x.hypot(without_error.x);
     assert!(z.abs() < 6.0, "{with} against {without}, z {z}");
 }
+
+/// A million samples per pixel in a film of 4×4: sums of floats that did not carry their rounding
+/// errors would drift by 1e-3 and stop growing at 2²⁴ times a sample.
+#[test]
+#[ignore = "takes minutes: cargo test --release --test closed_form -- --ignored --nocapture"]
+fn a_million_samples_do_not_drift() {
+    const MILLION: u32 = 1_000_000;
+    let _alone = support::alone();
+    let reflectance = Vec3::new(0.2, 0.5, 0.9);
+    let mut scene = scenes::plane(reflectance, scenes::environment(16, |_| Vec3::ONE));
+    (scene.film.width, scene.film.height) = (4, 4);
+    // No variance: what differs from the reflectance is rounding.
+    let sums =
+        render(&scene, Settings { sampler: Sampler::Cosine, ..Settings::default() }, MILLION);
+    let expected = reflectance.as_dvec3();
+    let drift = (0..sums.pixel_count())
+        .map(|pixel| (DVec3::from(sums.mean(pixel)) / expected - 1.0).abs().max_element())
+        .fold(0.0, f64::max);
+    eprintln!("cosine, constant map: largest drift {drift:.1e}");
+    assert!(drift < 1e-6, "{drift}");
+    // Pixels see the same plane: their spread is that of independent means of a million samples.
+    for sampler in [Sampler::Mis, Sampler::Guided] {
+        let sums = render(&scene, Settings { sampler, ..Settings::default() }, MILLION);
+        let means: Vec<DVec3> =
+            (0..sums.pixel_count()).map(|pixel| DVec3::from(sums.mean(pixel)) / expected).collect();
+        let mean = means.iter().sum::<DVec3>() / means.len() as f64;
+        let square = means.iter().map(|found| (*found - mean).powf(2.0)).sum::<DVec3>();
+        let error = (square / (means.len() * (means.len() - 1)) as f64).map(f64::sqrt);
+        let z = (mean - 1.0) / error;
+        eprintln!("{}: mean {mean} ± {error}, z {z:.2}", sampler.name());
+        // Two samplers of three channels with 15 degrees of freedom: |t| > 6 has a chance of 2e-4.
+        // Floats of a sample's weight are good to 1e-6.
+        let is_close = (mean - 1.0).abs().max_element() < 1e-6;
+        assert!(z.abs().max_element() < 6.0 || is_close, "{}: {mean}, z {z}", sampler.name());
+    }
+}

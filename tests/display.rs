@@ -1,6 +1,9 @@
 //! The display server's client, against a listener that reads tev's protocol.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
+#[path = "support/command.rs"]
+mod command;
+
 use std::{
     io::Read,
     net::TcpListener,
@@ -8,7 +11,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use fenestra::film::DisplayServer;
+use command::{BALL, Folder, yard};
+use fenestra::film::{DisplayServer, Image};
 
 /// Reads a packet field by field, as a server would.
 struct Packet(std::io::Cursor<Vec<u8>>);
@@ -46,65 +50,113 @@ impl Packet {
     }
 }
 
-/// Accepts one client and returns the name, size and pixels shown in the end.
-fn serve(listener: &TcpListener) -> (String, [i32; 2], Vec<[f32; 3]>) {
+/// Image shown by a server.
+#[derive(Debug, PartialEq)]
+struct Shown {
+    name: String,
+    size: [i32; 2],
+    channels: Vec<String>,
+    /// Samples of each channel.
+    samples: Vec<Vec<f32>>,
+    updates: usize,
+}
+
+/// Accepts one client and returns what it shows in the end.
+fn serve(listener: &TcpListener) -> Shown {
     let (mut stream, _) = listener.accept().unwrap();
     let mut packet = Packet::receive(&mut stream).expect("a first packet");
     assert_eq!(packet.byte(), 4, "the first packet creates the image");
     assert_eq!(packet.byte(), 1, "and brings it to the front");
     let name = packet.string();
     let size = [packet.integer(), packet.integer()];
-    let channels = packet.integer();
-    let names: Vec<String> = (0..channels).map(|_| packet.string()).collect();
-    assert_eq!(names, ["R", "G", "B"]);
+    let count = packet.integer();
+    let channels: Vec<String> = (0..count).map(|_| packet.string()).collect();
     assert!(packet.is_at_end());
-    let mut pixels = vec![[f32::NAN; 3]; (size[0] * size[1]) as usize];
+    let samples = vec![vec![f32::NAN; (size[0] * size[1]) as usize]; channels.len()];
+    let mut shown = Shown { name, size, channels, samples, updates: 0 };
     while let Some(mut packet) = Packet::receive(&mut stream) {
         assert_eq!(packet.byte(), 6, "later packets update it");
         assert_eq!(packet.byte(), 0, "without bringing it to the front");
-        assert_eq!(packet.string(), name);
-        let channels = packet.integer();
-        let names: Vec<String> = (0..channels).map(|_| packet.string()).collect();
-        assert_eq!(names, ["R", "G", "B"]);
+        assert_eq!(packet.string(), shown.name);
+        let count = packet.integer();
+        let names: Vec<String> = (0..count).map(|_| packet.string()).collect();
+        assert_eq!(names, shown.channels);
         let [x, y, width, height] = [(); 4].map(|()| packet.integer());
-        let offsets = [(); 3].map(|()| i64::from_le_bytes(packet.bytes()) as usize);
-        let strides = [(); 3].map(|()| i64::from_le_bytes(packet.bytes()) as usize);
+        let mut places =
+            || (0..count).map(|_| i64::from_le_bytes(packet.bytes()) as usize).collect::<Vec<_>>();
+        let (offsets, strides) = (places(), places());
         let mut data = Vec::new();
         while !packet.is_at_end() {
             data.push(f32::from_le_bytes(packet.bytes()));
         }
         for index in 0..(width * height) as usize {
             let (column, row) = (index as i32 % width, index as i32 / width);
-            let pixel = &mut pixels[((y + row) * size[0] + x + column) as usize];
-            for channel in 0..3 {
-                pixel[channel] = data[offsets[channel] + index * strides[channel]];
+            let pixel = ((y + row) * size[0] + x + column) as usize;
+            for (channel, samples) in shown.samples.iter_mut().enumerate() {
+                samples[pixel] = data[offsets[channel] + index * strides[channel]];
             }
         }
-        let last = offsets[2] + ((width * height) as usize - 1) * strides[2];
-        assert_eq!(data.len(), last + 1, "no data is left over");
+        assert_eq!(data.len(), (width * height * count) as usize, "no data is left over");
+        shown.updates += usize::from(y == 0);
     }
-    (name, size, pixels)
+    shown
+}
+
+/// Starts a server; returns its address too.
+fn start() -> (String, thread::JoinHandle<Shown>) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    (address, thread::spawn(move || serve(&listener)))
+}
+
+fn image(width: u32, height: u32, pass: f32) -> Image {
+    let mut image = Image::new(width, height);
+    let pixels: Vec<[f32; 3]> =
+        (0..width * height).map(|index| [index as f32, pass, -0.5]).collect();
+    image.insert_triple(["R", "G", "B"], &pixels);
+    image.channels.insert("Visible.Y".into(), vec![0.25 * pass; image.pixel_count()]);
+    image
 }
 
 #[test]
 fn the_server_shows_the_last_update() {
     // The second size needs several packets.
     for (width, height) in [(5_u32, 3_u32), (2000, 1100)] {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let address = listener.local_addr().unwrap().to_string();
-        let server = thread::spawn(move || serve(&listener));
-        let image = |pass: f32| -> Vec<[f32; 3]> {
-            (0..width * height).map(|index| [index as f32, pass, -0.5]).collect()
-        };
-        let mut display = DisplayServer::connect(&address, "kitchen", width, height).unwrap();
+        let (address, server) = start();
+        let mut display = DisplayServer::connect(&address, "kitchen").unwrap();
         assert!(display.is_connected());
-        display.update(&image(1.0));
-        display.update(&image(2.0));
+        display.update(&image(width, height, 1.0));
+        display.update(&image(width, height, 2.0));
         drop(display);
-        let (name, size, pixels) = server.join().unwrap();
-        assert_eq!(name, "kitchen");
-        assert_eq!(size, [width as i32, height as i32]);
-        assert!(pixels == image(2.0));
+        let shown = server.join().unwrap();
+        assert_eq!(shown.name, "kitchen");
+        assert_eq!(shown.size, [width as i32, height as i32]);
+        assert_eq!(shown.channels, ["R", "G", "B", "Visible.Y"]);
+        let expected = image(width, height, 2.0);
+        for (name, samples) in shown.channels.iter().zip(&shown.samples) {
+            assert!(*samples == expected.channels[name], "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_short_render_shows_its_last_film_and_layers() {
+    let folder = Folder::new();
+    let clay = "type = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]";
+    folder.write("yard.toml", yard([16, 12], "constant = [1, 1, 1]", clay, BALL));
+    for sampler in ["mis", "cosine"] {
+        let (address, server) = start();
+        let arguments = ["render", "yard.toml", "--sampler", sampler, "--depth", "1", "--spp", "2"];
+        let more = ["--aov", "albedo,variance", "-o", "out.exr", "--display-server", &address];
+        folder.run(&[&arguments[..], &more[..]].concat()).assert(0, &[]);
+        let shown = server.join().unwrap();
+        assert_eq!(shown.name, format!("out.exr ({sampler})"));
+        let written = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+        assert_eq!(shown.channels[..4], ["R", "G", "B", "Albedo.B"]);
+        assert_eq!(shown.channels.len(), written.channels.len());
+        for (name, samples) in shown.channels.iter().zip(&shown.samples) {
+            assert!(*samples == written.channels[name], "{name}");
+        }
     }
 }
 
@@ -112,25 +164,25 @@ fn the_server_shows_the_last_update() {
 fn a_missing_server_is_no_error() {
     // This port was free a moment ago.
     let address = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
-    let mut display = DisplayServer::connect(&address, "image", 2, 2).unwrap();
+    let mut display = DisplayServer::connect(&address, "image").unwrap();
     assert!(!display.is_connected());
-    display.update(&[[0.0; 3]; 4]);
-    let display = DisplayServer::connect("no-such-host.invalid", "image", 2, 2).unwrap();
+    display.update(&image(2, 2, 0.0));
+    let display = DisplayServer::connect("no-such-host.invalid", "image").unwrap();
     assert!(!display.is_connected());
 }
 
 #[test]
 fn a_server_that_leaves_or_stalls_is_given_up() {
-    let pixels = vec![[1.0; 3]; 2000 * 2000];
+    let image = image(2000, 2000, 1.0);
     for leaves in [true, false] {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap().to_string();
-        let mut display = DisplayServer::connect(&address, "image", 2000, 2000).unwrap();
+        let mut display = DisplayServer::connect(&address, "image").unwrap();
         let (stream, _) = listener.accept().unwrap();
         let held = if leaves { None } else { Some(stream) };
         let start = Instant::now();
-        display.update(&pixels);
-        display.update(&pixels);
+        display.update(&image);
+        display.update(&image);
         assert!(!display.is_connected());
         assert!(start.elapsed() < Duration::from_secs(20));
         drop(held);
@@ -140,7 +192,7 @@ fn a_server_that_leaves_or_stalls_is_given_up() {
 #[test]
 fn an_impossible_address_is_wrong_usage() {
     for address in ["", ":14158", "localhost:tev", "localhost:99999", "localhost:0", "[::1]:x"] {
-        let error = DisplayServer::connect(address, "image", 1, 1).unwrap_err();
+        let error = DisplayServer::connect(address, "image").unwrap_err();
         assert_eq!(error.exit_status(), 2, "{address}");
         assert!(error.to_string().contains(&format!("{address:?}")), "{error}");
     }

@@ -11,10 +11,10 @@ use std::collections::BTreeSet;
 use source::{Files, Graph, files_of, tokens, uses};
 
 /// Top-level modules of `src`; each may use those before it.
-const ORDER: [&str; 22] = [
+const ORDER: [&str; 23] = [
     "memory", "stage", "error", "files", "shader", "math", "gpu", "texture", "brdf", "srbf",
     "scene", "accel", "film", "export", "fit", "pass", "sampler", "renderer", "study", "bench",
-    "command", "cli",
+    "view", "command", "cli",
 ];
 
 /// Modules that compile and test with no Vulkan loader present, although `gpu` stands before them.

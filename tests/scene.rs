@@ -178,7 +178,7 @@ fn text_that_is_no_scene_is_refused_with_line_and_column() {
     case(
         &format!("{HEAD}[lamps]\n"),
         "room.toml:14:2: unknown key `lamps` in the scene, expected one of `camera`, `film`, \
-         `environment`, `lamp`, `material`, `object`, `include`",
+         `environment`, `lamp`, `portal`, `material`, `object`, `include`",
     );
     case(
         &HEAD.replace("look_at", "lookat"),
@@ -1089,6 +1089,13 @@ fn broken_gltf_files_are_refused() {
     for length in 0..whole.len().min(200) {
         folder.mesh_message("short.glb", &whole[..length]);
     }
+    let mut small = whole;
+    small[8..12].copy_from_slice(&11_u32.to_le_bytes());
+    let message = folder.mesh_message("small.glb", &small);
+    assert!(
+        message.contains("the header states 11 bytes, expected at least its own 12"),
+        "{message}"
+    );
 }
 
 #[test]

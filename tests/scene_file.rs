@@ -32,6 +32,7 @@ fn sources() -> String {
         "file/read.rs",
         "file/material.rs",
         "file/lamp.rs",
+        "file/portal.rs",
         "file/value.rs",
         "mod.rs",
         "environment/court.rs",
@@ -252,6 +253,7 @@ fn the_page_has_every_key_of_every_table() {
     for (name, entry) in kinds("LampKindEntry::", "(", "Entry") {
         section(&format!("`[[lamp]]` with `type = \"{name}\"`"), &entry);
     }
+    section("`[[portal]]`", "PortalKeys");
     section("`[[material]]`", "MaterialKeys");
     for (name, entry) in kinds("MaterialKindEntry::", "(", "Entry") {
         section(&format!("`[[material]]` with `type = \"{name}\"`"), &entry);

@@ -366,6 +366,7 @@ fn on_large_stack(boxes: usize, build: impl FnOnce() -> CwBvh + Send) -> Result<
                      {error}",
                     memory::size(stack_bytes as u64)
                 ),
+                help: None,
             })?;
         builder.join().map_err(|_| geometry_error("the BVH builder failed".into()))
     })

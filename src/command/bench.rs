@@ -98,7 +98,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let start = Instant::now();
     let mut scene = Scene::load(&arguments.scene)?;
-    scene.warnings.iter().for_each(|warning| log::warn!("{warning}"));
+    let ignored = arguments.sampler.portal_warning(&scene);
+    scene.warnings.iter().chain(&ignored).for_each(|warning| log::warn!("{warning}"));
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
     if arguments.placed {
         let message = "--placed: the scene has too many triangles to place every instance";

@@ -25,7 +25,7 @@ pub struct Arguments {
 /// # Errors
 /// No Vulkan loader, no device, or no suitable one.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let instance = Instance::new(false)?;
+    let instance = Instance::new(false, None)?;
     let devices = list(&instance)?;
     let chosen = choose(&devices, arguments.device.as_deref());
     let chosen_index = chosen.as_ref().ok().map(|device| device.index);

@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod compare;
+pub mod convert;
 pub mod devices;
 pub mod export;
 pub mod fit;
@@ -14,6 +15,7 @@ pub mod options;
 pub mod progress;
 pub mod render;
 pub mod study;
+pub mod view;
 
 use std::io::Write;
 

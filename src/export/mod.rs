@@ -17,6 +17,7 @@ use crate::{
     brdf::{self, MaterialTables},
     error::Result,
     math::colour::luminance,
+    scene::Scene,
 };
 
 /// Settings of the render that are not part of the scene.
@@ -38,6 +39,17 @@ pub trait Export {
     /// # Errors
     /// [`crate::Error::Io`] for a file that cannot be written.
     fn write(&self) -> Result<()>;
+}
+
+/// Warning about the portals of `scene`, which no export has.
+fn portal_warning(scene: &Scene) -> Option<String> {
+    let first = scene.portals.first()?;
+    let first = if first.name.is_empty() { "the first" } else { &first.name };
+    Some(format!(
+        "portals: left out, {} in all, `{first}` among them; they change the noise of a picture, not \
+         what it shows",
+        scene.portals.len()
+    ))
 }
 
 /// Share of light from a uniform hemisphere that a material reflects: 2 ∫ E(μ) μ dμ by midpoints.

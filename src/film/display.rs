@@ -10,6 +10,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use super::exr::Image;
 use crate::error::{Error, Result};
 
 /// Port that tev listens on by default.
@@ -20,14 +21,11 @@ const CREATE_IMAGE: u8 = 4;
 /// Operation that replaces a rectangle of an image; offset and stride locate each channel's floats.
 const UPDATE_IMAGE_V3: u8 = 6;
 
-/// Names of the channels sent.
-const CHANNELS: [&str; 3] = ["R", "G", "B"];
-
 /// Time limit for a connection, and for the viewer to take one packet.
 const TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Largest number of pixels in one packet: 3 MiB.
-const PACKET_PIXELS: usize = 1 << 18;
+/// Largest number of values in one packet, if a row has no more: 3 MiB.
+const PACKET_VALUES: usize = 3 << 18;
 
 /// Image shown by a display server. A server that is absent or goes away costs one warning in the
 /// log; rendering continues.
@@ -36,36 +34,27 @@ pub struct DisplayServer {
     stream: Option<TcpStream>,
     address: String,
     image_name: String,
-    width: u32,
-    height: u32,
+    /// True once the image is open there.
+    is_open: bool,
 }
 
 impl DisplayServer {
-    /// Connects to the server at `address` (`host:port`, or `host` for [`DEFAULT_PORT`]) and opens
-    /// an image of the given name and size there.
+    /// Connects to the server at `address` (`host:port`, or `host` for [`DEFAULT_PORT`]), to show an image
+    /// of this name.
     ///
     /// # Errors
     /// [`Error::Usage`] if `address` lacks a host or has an impossible port, not if none answers.
-    pub fn connect(address: &str, image_name: &str, width: u32, height: u32) -> Result<Self> {
+    pub fn connect(address: &str, image_name: &str) -> Result<Self> {
         let address = complete_address(address)?;
         let mut server = Self {
             stream: None,
             address,
             // A zero byte would end the name early.
             image_name: image_name.replace('\0', ""),
-            width,
-            height,
+            is_open: false,
         };
         match open(&server.address) {
-            Ok(stream) => {
-                server.stream = Some(stream);
-                let mut packet = Packet::new(CREATE_IMAGE);
-                packet.grab_focus(true);
-                packet.string(&server.image_name);
-                packet.integers(&[server.width, server.height, CHANNELS.len() as u32]);
-                CHANNELS.iter().for_each(|channel| packet.string(channel));
-                server.send(packet);
-            }
+            Ok(stream) => server.stream = Some(stream),
             Err(error) => log::warn!(
                 "no display server at {}: {error}; rendering without (is tev running?)",
                 server.address
@@ -79,37 +68,46 @@ impl DisplayServer {
         self.stream.is_some()
     }
 
-    /// Shows `pixels`: linear Rec.709, row by row from the top.
-    ///
-    /// # Panics
-    /// `pixels` is not `width * height` long.
-    pub fn update(&mut self, pixels: &[[f32; 3]]) {
-        assert_eq!(
-            pixels.len(),
-            self.width as usize * self.height as usize,
-            "one pixel for each of {}×{}",
-            self.width,
-            self.height
-        );
-        let band_height = (PACKET_PIXELS / self.width.max(1) as usize).max(1);
-        for (band, pixels) in pixels.chunks(band_height * self.width.max(1) as usize).enumerate() {
+    /// Shows all channels of `image`, the picture first; names with a dot make layers in the viewer. Every
+    /// image must have the size and channels of the first.
+    pub fn update(&mut self, image: &Image) {
+        let is_picture = |name: &str| matches!(name, "R" | "G" | "B");
+        let picture = ["R", "G", "B"].into_iter().filter(|name| image.channels.contains_key(*name));
+        let others = image.channels.keys().map(String::as_str).filter(|name| !is_picture(name));
+        let names: Vec<&str> = picture.chain(others).collect();
+        if names.is_empty() || image.pixel_count() == 0 {
+            return;
+        }
+        if !self.is_open {
+            let mut packet = Packet::new(CREATE_IMAGE);
+            packet.grab_focus(true);
+            packet.string(&self.image_name);
+            packet.integers(&[image.width, image.height, names.len() as u32]);
+            names.iter().for_each(|name| packet.string(name));
+            self.send(packet);
+            self.is_open = true;
+        }
+        let width = image.width as usize;
+        let band_height = (PACKET_VALUES / (width * names.len())).max(1);
+        for first_row in (0..image.height as usize).step_by(band_height) {
             if self.stream.is_none() {
                 return;
             }
-            let first_row = (band * band_height) as u32;
-            let rows = (pixels.len() / self.width as usize) as u32;
+            let rows = band_height.min(image.height as usize - first_row);
             let mut packet = Packet::new(UPDATE_IMAGE_V3);
             packet.grab_focus(false);
             packet.string(&self.image_name);
-            packet.integers(&[CHANNELS.len() as u32]);
-            CHANNELS.iter().for_each(|channel| packet.string(channel));
-            packet.integers(&[0, first_row, self.width, rows]);
+            packet.integers(&[names.len() as u32]);
+            names.iter().for_each(|name| packet.string(name));
+            packet.integers(&[0, first_row as u32, image.width, rows as u32]);
             // Offset of each channel's first value, then the stride to its next, in floats.
-            for value in [0_i64, 1, 2, 3, 3, 3] {
-                packet.bytes.extend(value.to_le_bytes());
+            let offsets = (0..names.len()).map(|channel| channel * rows * width);
+            for value in offsets.chain(names.iter().map(|_| 1)) {
+                packet.bytes.extend((value as i64).to_le_bytes());
             }
-            for value in pixels.as_flattened() {
-                packet.bytes.extend(value.to_le_bytes());
+            for name in &names {
+                let samples = &image.channels[*name][first_row * width..][..rows * width];
+                packet.bytes.extend(samples.iter().flat_map(|value| value.to_le_bytes()));
             }
             self.send(packet);
         }

@@ -26,6 +26,7 @@ use exr::{
     },
 };
 
+use super::window::Window;
 use crate::error::{Error, Result};
 use crate::files::{
     EXR_LARGEST_RATIO, check_promise, is_special_file, open_regular, write_atomically,
@@ -134,6 +135,76 @@ impl Image {
                 )
             })?;
         Ok(RgbImage { width: self.width, height: self.height, pixels })
+    }
+
+    /// Names of the layers: the parts of channel names before their last dot, "" for the picture.
+    pub fn layers(&self) -> Vec<&str> {
+        let mut names: Vec<&str> = self
+            .channels
+            .keys()
+            .map(|name| name.rsplit_once('.').map_or("", |split| split.0))
+            .collect();
+        names.sort_unstable();
+        names.dedup();
+        names
+    }
+
+    /// Returns a layer of colours (R, G, B), vectors (X, Y, Z) or single values (Y) as a picture.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] lists the layers of `path` if there is none of this name with such channels.
+    pub fn layer(&self, layer: &str, path: &Path) -> Result<RgbImage> {
+        let triple = |names: [&str; 3]| {
+            let dot = if layer.is_empty() { "" } else { "." };
+            let names = names.map(|name| format!("{layer}{dot}{name}"));
+            self.triple([&names[0], &names[1], &names[2]])
+        };
+        let choices = [["R", "G", "B"], ["X", "Y", "Z"], ["Y", "Y", "Y"]];
+        let pixels = choices.into_iter().find_map(triple).ok_or_else(|| {
+            let known: Vec<&str> = self.layers().into_iter().filter(|name| !name.is_empty()).collect();
+            Error::usage(format!(
+                "--layer {layer}: {} has no such layer of channels R, G, B or X, Y, Z or Y; it has {}",
+                path.display(),
+                if known.is_empty() { "none".to_owned() } else { known.join(", ") }
+            ))
+        })?;
+        Ok(RgbImage { width: self.width, height: self.height, pixels })
+    }
+
+    /// Returns the part of the image within `window`, in pixels of the whole film.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if the window does not lie in the part that is stored.
+    pub fn cropped(&self, window: Window, path: &Path) -> Result<Self> {
+        let start = |at: u32, origin: i32| i64::from(at) - i64::from(origin);
+        let [x, y] = [start(window.x, self.origin[0]), start(window.y, self.origin[1])];
+        let end = [x + i64::from(window.width), y + i64::from(window.height)];
+        if x < 0 || y < 0 || end[0] > i64::from(self.width) || end[1] > i64::from(self.height) {
+            let [left, top] = self.origin.map(i64::from);
+            return Err(Error::usage(format!(
+                "--crop: {} holds pixels {left} ≤ x < {}, {top} ≤ y < {}, expected a part of them",
+                path.display(),
+                left + i64::from(self.width),
+                top + i64::from(self.height)
+            )));
+        }
+        let rows = |samples: &Vec<f32>| {
+            let row = |row: i64| {
+                let first = (row * i64::from(self.width) + x) as usize;
+                &samples[first..first + window.width as usize]
+            };
+            (y..end[1]).flat_map(row).copied().collect()
+        };
+        let channels = self.channels.iter();
+        Ok(Self {
+            width: window.width,
+            height: window.height,
+            origin: [x + i64::from(self.origin[0]), y + i64::from(self.origin[1])]
+                .map(|value| i32::try_from(value).unwrap_or(i32::MAX)),
+            film_size: self.film_size,
+            channels: channels.map(|(name, samples)| (name.clone(), rows(samples))).collect(),
+            attributes: self.attributes.clone(),
+        })
     }
 
     /// Writes the image with ZIP compression, atomically.

@@ -9,10 +9,12 @@ pub mod display;
 pub mod exr;
 pub mod merge;
 pub mod metadata;
+pub mod picture;
 pub mod png;
 pub mod statistics;
 pub mod summary;
 pub mod sums;
+pub mod tone;
 mod window;
 
 pub use self::{
@@ -22,5 +24,6 @@ pub use self::{
     metadata::{Metadata, SampleRange},
     statistics::Statistics,
     sums::{Aov, Sums},
+    tone::{Curve, Tone},
     window::Window,
 };

@@ -4,14 +4,9 @@ use std::{io::Write, path::Path};
 
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
-use super::exr::RgbImage;
+use super::{exr::RgbImage, picture::io_error, tone::Tone};
 use crate::error::Result;
-use crate::files::write_atomically;
-
-/// sRGB transfer function (IEC 61966-2-1): linear 0…1 → display 0…1.
-pub fn srgb_from_linear(value: f32) -> f32 {
-    if value <= 0.003_130_8 { 12.92 * value } else { 1.055 * value.powf(1.0 / 2.4) - 0.055 }
-}
+use crate::{files::write_atomically, math::colour::srgb_from_linear};
 
 /// Converts a linear value to a byte: clamps to 0…1, applies the sRGB curve, rounds. NaN becomes 0.
 pub fn display_from_linear(value: f32) -> u8 {
@@ -30,9 +25,8 @@ pub fn write_preview(path: &Path, picture: &RgbImage, exposure: f32) -> Result<(
 
 /// Display values of a preview, as [`write_preview`] writes them.
 pub fn preview(picture: &RgbImage, exposure: f32) -> Vec<[u8; 3]> {
-    let scale = exposure.exp2();
-    let display = |pixel: &[f32; 3]| pixel.map(|value| display_from_linear(value * scale));
-    picture.pixels.iter().map(display).collect()
+    let tone = Tone { exposure, ..Tone::default() };
+    picture.pixels.iter().map(|pixel| tone.display(*pixel)).collect()
 }
 
 /// Writes display values unchanged.
@@ -56,8 +50,5 @@ pub fn encode_rgb8(
 ) -> std::io::Result<()> {
     PngEncoder::new(writer)
         .write_image(pixels.as_flattened(), width, height, ExtendedColorType::Rgb8)
-        .map_err(|error| match error {
-            image::ImageError::IoError(source) => source,
-            other => std::io::Error::other(other.to_string()),
-        })
+        .map_err(io_error)
 }

@@ -144,7 +144,10 @@ impl Drop for Buffer {
 
 fn out_of_memory(asker: &str, size: u64) -> Error {
     let size = memory::size(size);
-    Error::Memory { message: format!("the device is out of memory: {asker} asks for {size}") }
+    Error::Memory {
+        message: format!("the device is out of memory: {asker} asks for {size}"),
+        help: Some("make the scene or the film smaller, or choose another device with --device"),
+    }
 }
 
 /// Makes an error of a failed call; running out of memory is one of its own.

@@ -198,6 +198,11 @@ impl Commands {
         );
     }
 
+    /// The command buffer, for commands that no pass needs.
+    pub(super) fn raw(&self) -> vk::CommandBuffer {
+        self.raw
+    }
+
     fn barrier(
         &self,
         source: vk::PipelineStageFlags,
@@ -225,8 +230,8 @@ impl Commands {
     /// Submits, waits, and returns the device time per pass (empty if not timed).
     ///
     /// # Errors
-    /// [`Error::Vulkan`] if a call fails; for a lost device it names the last pass of the
-    /// submission.
+    /// [`Error::Vulkan`] if a call fails, [`Error::Device`] if the device is lost; both name the last
+    /// pass of the submission.
     pub fn submit_and_wait(self) -> Result<PassTimes> {
         let raw = self.device.raw();
         let failed = |call: &str, result| {

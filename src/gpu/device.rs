@@ -2,11 +2,12 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 use gpu_allocator::{
     AllocationSizes, AllocatorDebugSettings,
     vulkan::{Allocator, AllocatorCreateDesc},
 };
+use winit::raw_window_handle::RawDisplayHandle;
 
 use super::{
     capabilities::{Capabilities, choose, enumerate},
@@ -23,6 +24,7 @@ pub struct Device {
     debug_names: Option<ext::debug_utils::Device>,
     queue: Mutex<vk::Queue>,
     capabilities: Capabilities,
+    physical: vk::PhysicalDevice,
     set_layouts: SetLayouts,
     pipeline_cache: PipelineCache,
     // Emptied in `drop`, before the device is destroyed.
@@ -37,7 +39,27 @@ impl Device {
     /// # Errors
     /// No loader, no suitable device, or a failing driver.
     pub fn open(wanted: Option<&str>, validate: bool) -> Result<Arc<Self>> {
-        let instance = Arc::new(Instance::new(validate)?);
+        Self::open_with(wanted, validate, None)
+    }
+
+    /// As [`Device::open`], for windows on `display` too.
+    ///
+    /// # Errors
+    /// Also [`Error::Device`] if the device cannot show pictures in windows.
+    pub fn open_for_display(
+        wanted: Option<&str>,
+        validate: bool,
+        display: RawDisplayHandle,
+    ) -> Result<Arc<Self>> {
+        Self::open_with(wanted, validate, Some(display))
+    }
+
+    fn open_with(
+        wanted: Option<&str>,
+        validate: bool,
+        display: Option<RawDisplayHandle>,
+    ) -> Result<Arc<Self>> {
+        let instance = Arc::new(Instance::new(validate, display)?);
         let devices = enumerate(&instance)?;
         let list: Vec<Capabilities> =
             devices.iter().map(|(_, capabilities)| capabilities.clone()).collect();
@@ -51,8 +73,15 @@ impl Device {
             .queue_priorities(&priorities)];
         let mut features12 =
             vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true);
-        let info =
-            vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut features12);
+        let mut extensions = Vec::new();
+        if display.is_some() {
+            check_presents(&instance, physical, &capabilities)?;
+            extensions.push(khr::swapchain::NAME.as_ptr());
+        }
+        let info = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_extension_names(&extensions)
+            .push_next(&mut features12);
         // SAFETY: `physical` belongs to this instance and has the family and feature asked for.
         let raw = unsafe { instance.raw().create_device(physical, &info, None) }
             .map_err(|result| vulkan_error("vkCreateDevice", result))?;
@@ -86,6 +115,7 @@ impl Device {
             debug_names,
             queue: Mutex::new(queue),
             capabilities,
+            physical,
             set_layouts,
             pipeline_cache,
             allocator: Mutex::new(Some(allocator)),
@@ -110,6 +140,14 @@ impl Device {
 
     pub(super) fn raw(&self) -> &ash::Device {
         &self.raw
+    }
+
+    pub(super) fn instance(&self) -> &Arc<Instance> {
+        &self.instance
+    }
+
+    pub(super) fn physical(&self) -> vk::PhysicalDevice {
+        self.physical
     }
 
     pub(super) fn debug_names(&self) -> Option<&ext::debug_utils::Device> {
@@ -151,5 +189,29 @@ impl Drop for Device {
             self.pipeline_cache.destroy(&self.raw);
             self.raw.destroy_device(None);
         }
+    }
+}
+
+/// Checks that a device can show pictures at all.
+fn check_presents(
+    instance: &Instance,
+    physical: vk::PhysicalDevice,
+    capabilities: &Capabilities,
+) -> Result<()> {
+    // SAFETY: `physical` belongs to this instance.
+    let extensions = unsafe { instance.raw().enumerate_device_extension_properties(physical) }
+        .map_err(|result| vulkan_error("vkEnumerateDeviceExtensionProperties", result))?;
+    let is_swapchain = |extension: &vk::ExtensionProperties| {
+        extension.extension_name_as_c_str() == Ok(khr::swapchain::NAME)
+    };
+    if extensions.iter().any(is_swapchain) { Ok(()) } else { Err(cannot_present(capabilities)) }
+}
+
+/// Returns the error for a device that cannot show pictures in a window.
+pub(super) fn cannot_present(capabilities: &Capabilities) -> Error {
+    Error::Device {
+        reason: format!("{} cannot show pictures in windows of this display", capabilities.name),
+        help: "choose another device with --device, or render to a file with `fenestra render`"
+            .into(),
     }
 }

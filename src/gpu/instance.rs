@@ -6,9 +6,13 @@ use std::{
 };
 
 use ash::{ext, vk};
+use winit::raw_window_handle::RawDisplayHandle;
 
 use super::vulkan_error;
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    memory,
+};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -19,14 +23,14 @@ pub const NO_VULKAN_HELP: &str =
 /// Messages of the validation layers, oldest first.
 pub type Messages = Mutex<Vec<String>>;
 
-/// A Vulkan 1.2 instance without surface extensions.
+/// A Vulkan 1.2 instance, with surface extensions if it was made for a display.
 pub struct Instance {
     raw: ash::Instance,
     debug: Option<DebugMessenger>,
     messages: Arc<Messages>,
     has_debug_utils: bool,
     // Last, since the loader must outlive everything loaded from it.
-    _entry: ash::Entry,
+    entry: ash::Entry,
 }
 
 struct DebugMessenger {
@@ -36,11 +40,13 @@ struct DebugMessenger {
 
 impl Instance {
     /// Loads Vulkan and creates an instance. `validate` enables the Khronos validation layer,
-    /// including synchronization validation.
+    /// including synchronization validation; `display` asks for the extensions that show windows there.
     ///
     /// # Errors
-    /// [`Error::Device`] if the Vulkan loader or the requested layer is missing.
-    pub fn new(validate: bool) -> Result<Self> {
+    /// [`Error::Device`] if the Vulkan loader, the requested layer or such an extension is missing,
+    /// [`Error::Memory`] if the address space does not suffice for a driver.
+    pub fn new(validate: bool, display: Option<RawDisplayHandle>) -> Result<Self> {
+        memory::check_driver().map_err(Error::memory)?;
         // SAFETY: loading the Vulkan loader runs its initialisers; it is the system's own library.
         let entry = unsafe { ash::Entry::load() }.map_err(|error| Error::Device {
             reason: format!("no Vulkan loader (libvulkan.so.1) on this system: {error}"),
@@ -50,9 +56,21 @@ impl Instance {
         // SAFETY: `entry` is a loaded Vulkan loader.
         let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }
             .map_err(|result| vulkan_error("vkEnumerateInstanceExtensionProperties", result))?;
-        let has_debug_utils = extensions
-            .iter()
-            .any(|extension| extension.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
+        let has = |name: &CStr| {
+            extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name))
+        };
+        let has_debug_utils = has(ext::debug_utils::NAME);
+        let surfaces = display.map_or(Ok(Vec::new()), surface_extensions)?;
+        if let Some(missing) = surfaces.iter().find(|name| !has(name)) {
+            return Err(Error::Device {
+                reason: format!(
+                    "no window: the Vulkan loader and its drivers lack {}",
+                    missing.to_string_lossy()
+                ),
+                help: "`fenestra render` needs no window; a driver with this extension shows one"
+                    .into(),
+            });
+        }
 
         let mut layers = Vec::new();
         if validate {
@@ -74,7 +92,7 @@ impl Instance {
             .application_name(c"fenestra")
             .engine_name(c"fenestra")
             .api_version(vk::API_VERSION_1_2);
-        let mut extension_names = Vec::new();
+        let mut extension_names: Vec<_> = surfaces.iter().map(|name| name.as_ptr()).collect();
         if has_debug_utils {
             extension_names.push(ext::debug_utils::NAME.as_ptr());
         }
@@ -123,12 +141,17 @@ impl Instance {
         } else {
             None
         };
-        Ok(Self { raw, debug, messages, has_debug_utils, _entry: entry })
+        Ok(Self { raw, debug, messages, has_debug_utils, entry })
     }
 
     /// The ash instance.
     pub(super) fn raw(&self) -> &ash::Instance {
         &self.raw
+    }
+
+    /// The loader.
+    pub(super) fn entry(&self) -> &ash::Entry {
+        &self.entry
     }
 
     /// True if objects and passes can be named.
@@ -152,6 +175,14 @@ impl Drop for Instance {
             self.raw.destroy_instance(None);
         }
     }
+}
+
+/// Returns the extensions that show windows on a kind of display.
+fn surface_extensions(display: RawDisplayHandle) -> Result<Vec<&'static CStr>> {
+    let names = ash_window::enumerate_required_extensions(display)
+        .map_err(|result| vulkan_error("surface of this kind of display", result))?;
+    // SAFETY: the crate returns constants that end with a zero byte.
+    Ok(names.iter().map(|name| unsafe { CStr::from_ptr(*name) }).collect())
 }
 
 /// Returns the error for a system with a loader but no driver.

@@ -12,6 +12,7 @@ pub(crate) mod labels;
 pub mod pipeline;
 mod pipeline_cache;
 mod set_layouts;
+pub mod swapchain;
 pub(crate) mod timestamps;
 mod transfer;
 
@@ -21,11 +22,22 @@ pub use commands::Commands;
 pub use descriptors::DescriptorSet;
 pub use device::Device;
 pub use pipeline::Pipeline;
+pub use swapchain::{Presented, Swapchain};
 pub use timestamps::PassTimes;
 
 use crate::error::Error;
 
-/// Returns the [`Error::Vulkan`] for a failed call.
+/// Returns the [`Error::Vulkan`] for a failed call, or [`Error::Device`] for a lost device.
 fn vulkan_error(call: &str, result: ash::vk::Result) -> Error {
+    if result == ash::vk::Result::ERROR_DEVICE_LOST {
+        return Error::Device {
+            reason: format!("Vulkan: {call} failed: the device is lost"),
+            help:
+                "the driver crashed, was reset or was replaced: try again, with another --device \
+                   or a newer driver; with --checkpoint-interval a render keeps checkpoints, from \
+                   which --resume continues"
+                    .into(),
+        };
+    }
     Error::Vulkan { call: call.to_owned(), result: result.to_string() }
 }

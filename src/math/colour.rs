@@ -8,3 +8,8 @@ use crate::shader::constants::LUMINANCE_WEIGHTS;
 pub fn luminance(radiance: Vec3) -> f32 {
     radiance.dot(Vec3::from_array(LUMINANCE_WEIGHTS))
 }
+
+/// sRGB transfer function (IEC 61966-2-1): linear 0…1 → display 0…1.
+pub fn srgb_from_linear(value: f32) -> f32 {
+    if value <= 0.003_130_8 { 12.92 * value } else { 1.055 * value.powf(1.0 / 2.4) - 0.055 }
+}

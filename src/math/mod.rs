@@ -1,5 +1,5 @@
-//! Mathematics that several stages share: frames, random numbers, colour, packed directions, alias
-//! tables and the order of refinement.
+//! Mathematics that several stages share: frames, random numbers, colour, packed directions, rectangles
+//! seen from a point, alias tables and the order of refinement.
 
 pub mod alias;
 pub mod colour;
@@ -7,3 +7,4 @@ pub mod frame;
 pub mod octahedron;
 pub mod random;
 pub(crate) mod refinement;
+pub mod spherical_rectangle;

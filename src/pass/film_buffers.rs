@@ -67,8 +67,13 @@ pub struct FilmBuffers {
     pages: Vec<Page>,
     counters: Buffer,
     aovs: u32,
+    /// Window that there is room for.
+    whole: Window,
+    /// Window in use; another one lies in the first page.
     window: Window,
-    /// Positions in film order of every page but the last, which may have fewer.
+    /// Positions in film order of every page but the last, which may have fewer: of the whole window, and
+    /// of the one in use.
+    whole_page_positions: u32,
     page_positions: u32,
 }
 
@@ -100,6 +105,7 @@ impl FilmBuffers {
         let rows = page_bytes / row_bytes / u64::from(BLOCK_EDGE);
         let rows = u32::try_from(rows).unwrap_or(blocks_down).clamp(1, blocks_down);
         let counters = Buffer::from_slice(device, "counters", &[Counters::zeroed()])?;
+        let page_positions = rows * window.width.div_ceil(BLOCK_EDGE) * BLOCK_PIXELS;
         let make = |first: u32| {
             let last = (first + rows * BLOCK_EDGE).min(window.height);
             Page::new(device, &counters, [first, last].map(|row| row * window.width), aovs)
@@ -111,9 +117,49 @@ impl FilmBuffers {
                 .collect::<Result<_>>()?,
             counters,
             aovs,
+            whole: window,
             window,
-            page_positions: rows * window.width.div_ceil(BLOCK_EDGE) * BLOCK_PIXELS,
+            whole_page_positions: page_positions,
+            page_positions,
         })
+    }
+
+    /// Uses the buffers for a film of `size` pixels, or again for the whole one. The content means nothing
+    /// until [`FilmBuffers::clear`].
+    ///
+    /// # Panics
+    /// If a smaller film does not fit into the first page.
+    pub fn reshape(&mut self, [width, height]: [u32; 2]) {
+        if [width, height] == [self.whole.width, self.whole.height] {
+            self.window = self.whole;
+            self.page_positions = self.whole_page_positions;
+            return;
+        }
+        let room = self.pages[0].pixels;
+        assert!(
+            width as usize * height as usize <= room,
+            "a film of {width}x{height} in {room} pixels"
+        );
+        self.window = Window { x: 0, y: 0, width, height };
+        self.page_positions = self.padded_pixels();
+    }
+
+    /// Window in use.
+    pub fn window(&self) -> Window {
+        self.window
+    }
+
+    /// Descriptor set 3 of every page in use, its first pixel and its number of pixels.
+    pub fn pages(&self) -> impl Iterator<Item = (&DescriptorSet, u32, u32)> {
+        let used = self.pages.iter().map(|page| (page, self.pixels_of(page)));
+        used.filter(|(_, pixels)| *pixels > 0)
+            .map(|(page, pixels)| (&page.set, page.first as u32, pixels as u32))
+    }
+
+    /// Pixels of the window in use that lie in a page.
+    fn pixels_of(&self, page: &Page) -> usize {
+        let pixels = self.window.width as usize * self.window.height as usize;
+        page.pixels.min(pixels.saturating_sub(page.first))
     }
 
     fn page(&self, position: u32) -> &Page {
@@ -232,7 +278,7 @@ impl FilmBuffers {
             layer.reserve_exact(self.window.width as usize * self.window.height as usize);
             for page in &self.pages {
                 let add = |piece: &[T]| layer.extend_from_slice(piece);
-                of(page).download_pieces(page.pixels, add)?;
+                of(page).download_pieces(self.pixels_of(page), add)?;
             }
         }
         Ok(layer)

@@ -25,7 +25,7 @@ pub use geometry::{GeometryBuffers, Schedule};
 pub use kernel::{Dispatch, Domain, Kernel, Pass};
 pub use order::{PassSettings, wave_order};
 pub use roulette::Roulette;
-pub use runner::Runner;
+pub use runner::{Runner, Watch};
 pub use scene_buffers::SceneBuffers;
 pub use steps::{Passes, PathDemand, SHADOW_RAYS_PER_GROUP, Steps};
 pub use surfaces::Surfaces;

@@ -20,6 +20,7 @@ use crate::{
     error::Result,
     film::Sums,
     gpu::{Commands, DescriptorSet, Device, PassTimes},
+    scene::Camera,
     shader::structs::Wave,
 };
 
@@ -29,6 +30,9 @@ const SHORT_DISPATCH_MS: f64 = 50.0;
 const LONG_DISPATCH_MS: f64 = 100.0;
 /// Counts after which the 32-bit counters are read: one more wave must fit.
 const COUNTER_ROOM: u64 = 1 << 30;
+
+/// Called between waves; true stops the sweep under way.
+pub type Watch = Box<dyn FnMut() -> bool>;
 
 /// A scene, a film and the paths in flight on a device. Knows no sampler.
 pub struct Runner {
@@ -44,6 +48,8 @@ pub struct Runner {
     wave_paths: u32,
     totals: Totals,
     compile_ms: PassTimes,
+    watch: Option<Watch>,
+    is_stopped: bool,
 }
 
 impl Runner {
@@ -83,7 +89,28 @@ impl Runner {
             passes: BTreeMap::new(),
             totals: Totals::default(),
             compile_ms: PassTimes::new(),
+            watch: None,
+            is_stopped: false,
         })
+    }
+
+    /// Calls `watch` between the waves of all sweeps from now on.
+    pub fn set_watch(&mut self, watch: Watch) {
+        self.watch = Some(watch);
+    }
+
+    /// True if the watch has stopped a sweep since [`Runner::look`]: pixels have different numbers of
+    /// samples.
+    pub fn is_stopped(&self) -> bool {
+        self.is_stopped
+    }
+
+    /// Empties the film for another camera and film size. Fails if the device does.
+    pub fn look(&mut self, camera: &Camera, size: [u32; 2]) -> Result<()> {
+        self.scene.look(camera, size)?;
+        self.film.reshape(size);
+        self.is_stopped = false;
+        self.restart()
     }
 
     /// Compiles every pass that `technique` may use and runs it once over nothing, so that drivers
@@ -135,6 +162,10 @@ impl Runner {
             let times = self.run(technique, wave, self.settings.depth)?;
             self.steer(&times, wave);
             done += wave.pixel_count;
+            if self.watch.as_mut().is_some_and(|watch| watch()) {
+                self.is_stopped = true;
+                break;
+            }
             uncounted += u64::from(wave.pixel_count * wave.sample_count) * self.counts_per_path();
             if uncounted > COUNTER_ROOM {
                 self.take_counters()?;
@@ -233,6 +264,11 @@ impl Runner {
     /// The scene on the device.
     pub fn scene(&self) -> &SceneBuffers {
         &self.scene
+    }
+
+    /// The scene on the device, to share it.
+    pub fn shared_scene(&self) -> Arc<SceneBuffers> {
+        Arc::clone(&self.scene)
     }
 
     /// Buffers of the wave.

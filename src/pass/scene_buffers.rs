@@ -16,7 +16,7 @@ use crate::{
     error::Result,
     film::Window,
     gpu::{Buffer, DescriptorSet, Device},
-    scene::{EnvironmentMap, Filter, Scene, environment::EnvironmentTables},
+    scene::{Camera, EnvironmentMap, Filter, Scene, environment::EnvironmentTables},
     shader::{
         bindings::{Binding, SCENE, scene as bindings},
         constants::SURFACES_INSTANCED,
@@ -29,7 +29,9 @@ pub struct SceneBuffers {
     set: DescriptorSet,
     geometry: GeometryBuffers,
     textures: TextureBuffers,
+    /// The first holds the parameters.
     buffers: Vec<Buffer>,
+    parameters: SceneParameters,
     surfaces: Surfaces,
     window: Window,
     host_ms: BTreeMap<String, f64>,
@@ -141,7 +143,22 @@ impl SceneBuffers {
         let set = DescriptorSet::new(device, &SCENE, &bound)?;
         buffers.extend([materials, brdf_table]);
         host_ms.insert("upload".to_owned(), start.elapsed().as_secs_f64() * 1e3);
-        Ok(Self { set, geometry, textures, buffers, surfaces, window, host_ms })
+        Ok(Self { set, geometry, textures, buffers, parameters, surfaces, window, host_ms })
+    }
+
+    /// Looks at the scene through another camera, on a whole film of `size` pixels. Fails if the device
+    /// does.
+    pub fn look(&self, camera: &Camera, [width, height]: [u32; 2]) -> Result<()> {
+        let parameters = SceneParameters {
+            film_width: width,
+            film_height: height,
+            crop_x: 0,
+            crop_y: 0,
+            crop_width: width,
+            crop_height: height,
+            ..with_camera(self.parameters, camera)
+        };
+        self.buffers[0].upload(bytemuck::bytes_of(&parameters))
     }
 
     /// Descriptor set 0.
@@ -191,18 +208,7 @@ fn parameters(
     environment_total: f32,
     window: Window,
 ) -> SceneParameters {
-    let camera = &scene.camera;
-    let forward = (camera.look_at - camera.position).normalize_or(Vec3::NEG_Z);
-    let right = forward.cross(camera.up).normalize_or(Vec3::X);
-    let up = right.cross(forward);
-    SceneParameters {
-        camera_position: camera.position.into(),
-        camera_aperture_radius: camera.aperture_radius,
-        camera_right: right.into(),
-        camera_focus_distance: camera.focus_distance,
-        camera_up: up.into(),
-        camera_tan_half_fov: (0.5 * camera.vertical_fov_deg).to_radians().tan(),
-        camera_forward: forward.into(),
+    let parameters = SceneParameters {
         film_width: scene.film.width,
         film_height: scene.film.height,
         crop_x: window.x,
@@ -218,8 +224,25 @@ fn parameters(
         environment_cos_rotation: map.rotation_rad.cos(),
         environment_sin_rotation: map.rotation_rad.sin(),
         environment_total,
-        compensated_total: 0.0,
-        lamp_count: 0,
+        ..SceneParameters::default()
+    };
+    with_camera(parameters, &scene.camera)
+}
+
+/// Replaces the camera.
+fn with_camera(parameters: SceneParameters, camera: &Camera) -> SceneParameters {
+    let forward = (camera.look_at - camera.position).normalize_or(Vec3::NEG_Z);
+    let right = forward.cross(camera.up).normalize_or(Vec3::X);
+    let up = right.cross(forward);
+    SceneParameters {
+        camera_position: camera.position.into(),
+        camera_aperture_radius: camera.aperture_radius,
+        camera_right: right.into(),
+        camera_focus_distance: camera.focus_distance,
+        camera_up: up.into(),
+        camera_tan_half_fov: (0.5 * camera.vertical_fov_deg).to_radians().tan(),
+        camera_forward: forward.into(),
+        ..parameters
     }
 }
 

@@ -64,6 +64,13 @@ pub trait Technique: Passes + Any {
         Ok(())
     }
 
+    /// Goes on under another camera, whose random numbers are new, too. Uses what was counted so far if
+    /// `learns`; else that waits. Forgets everything unless it holds for the scene as a whole. Fails if
+    /// the device does.
+    fn look(&mut self, runner: &mut Runner, _learns: bool) -> Result<()> {
+        self.restart(runner)
+    }
+
     /// Returns [`crate::Error::Usage`] if sums alone cannot continue a film of so many `samples`.
     fn check_resume(&self, _samples: u32, _progress: &Progress) -> Result<()> {
         Ok(())

@@ -1,5 +1,6 @@
 //! Progressive rendering of a scene on a device.
 
+mod look;
 mod pixel;
 mod resume;
 mod settings;
@@ -90,7 +91,7 @@ impl Renderer {
         let mut most_paths = passes.most_paths;
         let (runner, technique) = loop {
             match attempt(most_paths) {
-                Err(Error::Memory { message }) if most_paths > FEWEST_PATHS => {
+                Err(Error::Memory { message, .. }) if most_paths > FEWEST_PATHS => {
                     most_paths /= PATHS_STEP;
                     log::warn!("{message}; trying with {most_paths} paths at a time");
                 }
@@ -115,6 +116,9 @@ impl Renderer {
             let progress = self.progress();
             let together = self.runner.samples_per_wave().clamp(1, left);
             let together = together.min(self.technique.learn(&mut self.runner, &progress)?);
+            if self.runner.is_stopped() {
+                return Ok(());
+            }
             let wave = Wave {
                 first_sample: progress.next_sample(),
                 sample_count: together,
@@ -126,6 +130,9 @@ impl Renderer {
             let pixels = self.runner.film().padded_pixels();
             self.runner.sweep(self.technique.as_ref(), wave, pixels)?;
             self.runner.take_counters()?;
+            if self.runner.is_stopped() {
+                return Ok(());
+            }
             self.sample_count += together;
             left -= together;
         }

@@ -11,7 +11,7 @@ use super::Renderer;
 use crate::{
     error::{Error, Result},
     gpu::Buffer,
-    pass::BLOCK_PIXELS,
+    pass::{BLOCK_PIXELS, Progress},
     sampler::{
         Sampler,
         guided::{Guided, RecordedGuide, RecordedRay},
@@ -26,6 +26,10 @@ use crate::{
         structs::{Hit, ShadowRay},
     },
 };
+
+/// Tells the random numbers of [`Renderer::inspect_guided_pixel`] from those of the picture.
+const INSPECTION_SEED: u32 = 0x3d4e_91c7;
+const INSPECTION_RAYS: u32 = 40;
 
 /// First hit of a pixel's first sample, with all its shadow rays.
 #[derive(Clone, Debug, PartialEq)]
@@ -122,6 +126,20 @@ impl Renderer {
             guided.record_pixel(runner, progress, at, rays)
         };
         self.with_technique(record).unwrap_or(Ok(None))
+    }
+
+    /// Finds the cell of film pixel `at` by a few shadow rays, with numbers of their own, which teach the
+    /// guide as those of a training do: the renderer may continue. `None` as for
+    /// [`Renderer::record_guided_pixel`]. Fails if the device does.
+    ///
+    /// # Panics
+    /// If the pixel is outside the window.
+    pub fn inspect_guided_pixel(&mut self, at: [u32; 2]) -> Result<Option<RecordedGuide>> {
+        let inspect = |guided: &mut Guided, runner: &mut _, progress: &Progress| {
+            let progress = Progress { seed: progress.seed ^ INSPECTION_SEED, ..*progress };
+            guided.record_pixel(runner, &progress, at, INSPECTION_RAYS)
+        };
+        self.with_technique(inspect).unwrap_or(Ok(None))
     }
 }
 

@@ -7,6 +7,7 @@ pub mod basic;
 pub mod guided;
 mod knob;
 mod parameters;
+pub mod portal;
 pub mod product;
 pub mod visibility;
 
@@ -112,6 +113,8 @@ samplers! {
     Visibility "visibility": visibility::VisibilityRoom;
     /// Regions of the environment by visibility learned in cells of the scene, across pixels and passes.
     Guided "guided": guided::GuidedRoom;
+    /// `mis` with directions through the portals of the scene (Ureña et al. 2013).
+    Portal "portal": portal::PortalRoom;
 }
 
 impl Sampler {
@@ -136,6 +139,25 @@ impl Sampler {
         self.room().check(parameters, 1)
     }
 
+    /// Returns a warning if the sampler and the portals of `scene` have no use for each other.
+    pub fn portal_warning(self, scene: &Scene) -> Option<String> {
+        let (name, path) = (self.name(), scene.path.display());
+        let Some(first) = scene.portals.first() else {
+            let message = "the scene has no [[portal]]; directions are those of mis";
+            return (self == Self::Portal).then(|| format!("{path}: --sampler {name}: {message}"));
+        };
+        (self != Self::Portal).then(|| {
+            let first = if first.name.is_empty() {
+                String::new()
+            } else {
+                format!(", `{}` first,", first.name)
+            };
+            let count = scene.portals.len();
+            format!("{path}: --sampler {name} ignores the portals of the scene ({count}{first} in all); \
+                     --sampler portal uses them")
+        })
+    }
+
     /// Returns the simple form of the sampler if it is one of [`basic`].
     pub fn basic(self) -> Option<basic::Basic> {
         self.room().basic()
@@ -154,6 +176,12 @@ impl Sampler {
     pub fn tile_edge(self, parameters: &Parameters) -> u32 {
         let automatic = if self == Self::Guided { guided::AUTO_TILE_EDGE } else { 1 };
         parameters.share_tiles.unwrap_or(automatic)
+    }
+
+    /// Shadow rays at every vertex that the camera sees, where nobody says otherwise: 5 as in the thesis,
+    /// more for `guided` (`docs/experiments/shadow_rays_by_worth.md`).
+    pub fn shadow_rays(self) -> u32 {
+        if self == Self::Guided { guided::SHADOW_RAYS } else { 5 }
     }
 
     /// Memory per path in flight.

@@ -3,6 +3,7 @@
 use super::{
     guided::GuidedParameters,
     knob::{self, Knob},
+    portal::PortalParameters,
     product::ProductParameters,
     visibility::VisibilityParameters,
 };
@@ -16,8 +17,8 @@ pub struct Parameters {
     pub share_tiles: Option<u32>,
     /// `candidates`: directions to choose each shadow ray of `ris` or `guided` from; `None` is `auto`.
     pub candidates: Option<u32>,
-    /// `compensation`: true if `mis` and what `guided` falls back to draw directions of the environment
-    /// by its compensated density.
+    /// `compensation`: true if `mis`, `portal` and what `guided` falls back to draw directions of the
+    /// environment by its compensated density.
     pub compensation: bool,
     /// Parameters of `product`, also within `visibility`.
     pub product: ProductParameters,
@@ -25,6 +26,8 @@ pub struct Parameters {
     pub visibility: VisibilityParameters,
     /// Parameters of `guided`.
     pub guided: GuidedParameters,
+    /// Parameters of `portal`.
+    pub portal: PortalParameters,
 }
 
 impl Default for Parameters {
@@ -36,6 +39,7 @@ impl Default for Parameters {
             product: ProductParameters::default(),
             visibility: VisibilityParameters::default(),
             guided: GuidedParameters::default(),
+            portal: PortalParameters::default(),
         }
     }
 }
@@ -99,7 +103,8 @@ impl Parameters {
         let is_known = knob::set(KNOBS, self, key, value)?
             || knob::set(ProductParameters::KNOBS, &mut self.product, key, value)?
             || knob::set(VisibilityParameters::KNOBS, &mut self.visibility, key, value)?
-            || knob::set(GuidedParameters::KNOBS, &mut self.guided, key, value)?;
+            || knob::set(GuidedParameters::KNOBS, &mut self.guided, key, value)?
+            || knob::set(PortalParameters::KNOBS, &mut self.portal, key, value)?;
         if is_known {
             return Ok(());
         }
@@ -117,6 +122,7 @@ impl Parameters {
             .chain(ProductParameters::KNOBS.iter().map(|knob| knob.key))
             .chain(VisibilityParameters::KNOBS.iter().map(|knob| knob.key))
             .chain(GuidedParameters::KNOBS.iter().map(|knob| knob.key))
+            .chain(PortalParameters::KNOBS.iter().map(|knob| knob.key))
             .collect();
         keys.sort_unstable();
         keys

@@ -49,6 +49,11 @@ pub fn hash(scene: &Scene) -> String {
     for lamp in &scene.lamps {
         hasher.lamp(&lamp.kind);
     }
+    for portal in &scene.portals {
+        hasher.integers(&[PORTAL_TAG]);
+        hasher.vectors(&[portal.corner, portal.axes[0], portal.axes[1]]);
+        hasher.floats(&portal.size);
+    }
     hasher.finish()
 }
 
@@ -73,6 +78,9 @@ pub fn geometry_hash(scene: &Scene) -> String {
     }
     hasher.finish()
 }
+
+/// Follows the tags of lamps.
+const PORTAL_TAG: u32 = 3;
 
 struct Hasher(Sha256);
 

@@ -14,6 +14,7 @@ pub mod load;
 pub mod mesh;
 pub mod mitsuba;
 pub mod pbrt;
+pub mod portal;
 pub mod quadrics;
 pub mod shapes;
 pub mod transform;
@@ -30,6 +31,7 @@ pub use geometry::Geometry;
 pub use hash::{environment_hash, geometry_hash};
 pub use instance::Instance;
 pub use lamp::Lamp;
+pub use portal::Portal;
 
 /// Largest width and height of the film, pixels.
 pub const MAX_FILM_SIDE: u32 = 16_384;
@@ -80,6 +82,8 @@ pub struct Scene {
     pub environment: EnvironmentMap,
     /// Lights without a surface.
     pub lamps: Vec<Lamp>,
+    /// Openings that the sampler `portal` knows.
+    pub portals: Vec<Portal>,
     /// Materials; [`Geometry::materials`] indexes them. Never empty.
     pub materials: Vec<Material>,
     /// All triangles, in world space.

@@ -250,6 +250,12 @@ binding_tables! {
         29 GUIDE_ARRIVALS: array uint;
     }
 
+    /// Set 1 of the sampler `portal`.
+    PORTAL = portal: 1 {
+        /// Portals, three texels each: corner, width; first axis, height; second axis.
+        36 PORTALS: texels Rgba32Float;
+    }
+
     /// Set 1 of the passes by which pixels share paths.
     SHARING = sharing: 1 {
         /// First vertex of each path.
@@ -298,6 +304,18 @@ binding_tables! {
         8 HIT_SURFACES: array Surface;
         /// Instance that each path has hit, in scenes with instances.
         9 HIT_INSTANCES: array uint;
+    }
+
+    /// Set 1 of the passes that show films in a window.
+    VIEW = view: 1 {
+        /// Pixels of a film as they are shown: linear radiance, or the colours of a layer.
+        60 SHOWN: array vec3;
+        /// The same of the film to its right, if there are two.
+        61 SHOWN_RIGHT: array vec3;
+        /// A picture over the window, a word of bytes a pixel, red lowest.
+        62 INSET: array uint;
+        /// Pixels of the window in its own order of bytes.
+        63 WINDOW_PIXELS: array uint;
     }
 
     /// Set 3: the film, which grows by every wave.

@@ -103,6 +103,12 @@ constants! {
     /// k of V = (1 / (1 + Num))^k, bits of a float.
     CONSTANT_VISIBILITY_EXPONENT = 45;
 
+    // Specialization constants of `sample_portals`.
+    /// Number of portals.
+    CONSTANT_PORTALS = 47;
+    /// Share of the portals among directions that are not from the BRDF, bits of a float.
+    CONSTANT_PORTAL_SHARE = 48;
+
     // Values of CONSTANT_SAMPLER.
     /// Uniform over the hemisphere.
     SAMPLER_UNIFORM = 0;
@@ -344,4 +350,28 @@ constants! {
     LEARN_FROM_BRDF_SHIFT = 8;
     /// First bit of the response of a shadow ray.
     LEARN_RESPONSE_SHIFT = 17;
+
+    // Layers that the pass `show` shows.
+    /// Mean radiance.
+    SHOW_PICTURE = 0;
+    /// Relative standard error, in false colour from 1% (blue) to 100% (red).
+    SHOW_ERROR = 1;
+    /// Albedo at first hits.
+    SHOW_ALBEDO = 2;
+    /// Shading normal at first hits, −1 to 1 as 0 to 1.
+    SHOW_NORMAL = 3;
+    /// Share of shadow rays that reached the environment.
+    SHOW_VISIBLE = 4;
+    /// Cells of the guide.
+    SHOW_CELLS = 5;
+    /// Kinds of these cells: of a face (red), coarse (green), fine (blue).
+    SHOW_LEVELS = 6;
+
+    // Tone curves of the pass `compose`: `film::Curve` in its order.
+    /// None.
+    CURVE_CLIP = 0;
+    /// Reinhard et al. 2002.
+    CURVE_REINHARD = 1;
+    /// Narkowicz 2015.
+    CURVE_FILMIC = 2;
 }

@@ -464,4 +464,58 @@ structs! {
         /// Slots for missing keys minus one.
         missing_mask: uint,
     }
+
+    /// Push constants of the pass `show`: a page of a film, and what it shows.
+    struct ShownFilm {
+        /// Pixels of the film before the page.
+        first_pixel: uint,
+        /// First pixel of the dispatch in the page.
+        first_place: uint,
+        /// End of its pixels there.
+        end_place: uint,
+        /// Samples per pixel in the film.
+        sample_count: uint,
+        /// One of `SHOW_…`.
+        layer: uint,
+        /// Mean radiance of the film, the floor of its relative error.
+        mean_radiance: float,
+    }
+
+    /// Push constants of the pass `compose`: films, window and tone.
+    struct WindowFrame {
+        /// Width of the window, pixels.
+        width: uint,
+        /// Height of the window, pixels.
+        height: uint,
+        /// Left edge of the film in the window, pixels.
+        left: uint,
+        /// Upper edge of the film in the window, pixels.
+        top: uint,
+        /// Width of the film in the window, pixels.
+        shown_width: uint,
+        /// Height of the film in the window, pixels.
+        shown_height: uint,
+        /// Width of the film, pixels.
+        film_width: uint,
+        /// Height of the film, pixels.
+        film_height: uint,
+        /// Width of the film to its right, pixels.
+        right_width: uint,
+        /// Height of the film to its right, pixels.
+        right_height: uint,
+        /// First column of the window that shows the film to the right; its width where there is none.
+        split: uint,
+        /// First pixel of the dispatch in the window.
+        first_index: uint,
+        /// Factor of the exposure.
+        exposure: float,
+        /// One of `CURVE_…`.
+        curve: uint,
+        /// 1 if blue comes first in memory.
+        is_bgra: uint,
+        /// Width of the inset, pixels; 0 for none. It lies in the lower right corner of the film.
+        inset_width: uint,
+        /// Height of the inset, pixels.
+        inset_height: uint,
+    }
 }

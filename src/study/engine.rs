@@ -84,7 +84,12 @@ impl Study<'_> {
         let mut scenes: Vec<Scene> = Vec::new();
         for path in &self.plan.scenes {
             let mut scene = Scene::load(path)?;
-            for warning in &scene.warnings {
+            let samplers = || self.plan.contenders.iter().map(|contender| contender.sampler);
+            // Beside `portal`, samplers that ignore portals are there to compare.
+            let heeded = samplers().find(|sampler| *sampler == Sampler::Portal);
+            let ignored = heeded.or(samplers().next());
+            let ignored = ignored.and_then(|sampler| sampler.portal_warning(&scene));
+            for warning in scene.warnings.iter().chain(&ignored) {
                 log::warn!("{warning}");
             }
             if let Some([width, height]) = self.plan.size {

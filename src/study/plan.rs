@@ -367,10 +367,11 @@ impl Plan {
     }
 }
 
-/// Every sampler that combines BRDF and environment.
+/// Every sampler that combines BRDF and environment; `portal` needs scenes made for it.
 fn default_contenders() -> Vec<Contender> {
-    let single = [Sampler::Uniform, Sampler::Cosine, Sampler::Brdf, Sampler::Env];
-    let others = Sampler::ALL.iter().filter(|sampler| !single.contains(sampler));
+    let left_out =
+        [Sampler::Uniform, Sampler::Cosine, Sampler::Brdf, Sampler::Env, Sampler::Portal];
+    let others = Sampler::ALL.iter().filter(|sampler| !left_out.contains(sampler));
     others.copied().map(Contender::plain).collect()
 }
 

@@ -124,32 +124,36 @@ pub fn tables() -> &'static MaterialTables {
 
 /// Returns every kind at which no light is sampled: tinted and not, smooth and rough, of indices above
 /// and below 1.
+pub fn specular_kinds() -> [MaterialKind; 8] {
+    let tint = vec3(0.9, 0.6, 0.3);
+    let dielectric = |ior, alpha| MaterialKind::Dielectric {
+        ior,
+        alpha,
+        reflectance: Vec3::ONE,
+        transmittance: Vec3::ONE,
+    };
+    [
+        MaterialKind::Mirror { reflectance: tint },
+        dielectric(1.5, 0.0),
+        dielectric(1.5, 0.2),
+        dielectric(1.33, 0.5),
+        dielectric(2.4, 0.35),
+        dielectric(0.75, 0.3),
+        MaterialKind::Dielectric {
+            ior: 1.5,
+            alpha: 0.3,
+            reflectance: 0.5 * tint,
+            transmittance: tint,
+        },
+        MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance: tint },
+    ]
+}
+
+/// Returns the device's materials of [`specular_kinds`].
 pub fn specular() -> &'static [structs::Material] {
     static MATERIALS: OnceLock<Vec<structs::Material>> = OnceLock::new();
     MATERIALS.get_or_init(|| {
-        let tint = vec3(0.9, 0.6, 0.3);
-        let dielectric = |ior, alpha| MaterialKind::Dielectric {
-            ior,
-            alpha,
-            reflectance: Vec3::ONE,
-            transmittance: Vec3::ONE,
-        };
-        let kinds = [
-            MaterialKind::Mirror { reflectance: tint },
-            dielectric(1.5, 0.0),
-            dielectric(1.5, 0.2),
-            dielectric(1.33, 0.5),
-            dielectric(2.4, 0.35),
-            dielectric(0.75, 0.3),
-            MaterialKind::Dielectric {
-                ior: 1.5,
-                alpha: 0.3,
-                reflectance: 0.5 * tint,
-                transmittance: tint,
-            },
-            MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance: tint },
-        ];
-        let materials = kinds.map(|kind| Material::new("specular", kind));
+        let materials = specular_kinds().map(|kind| Material::new("specular", kind));
         MaterialTables::new(&materials).unwrap().materials
     })
 }

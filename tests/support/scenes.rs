@@ -60,6 +60,7 @@ fn scene(
         film: FilmSettings { width: size[0], height: size[1], filter: Filter::Box },
         environment,
         lamps: Vec::new(),
+        portals: Vec::new(),
         materials,
         geometry,
         inputs: Vec::new(),

@@ -43,10 +43,10 @@ pub struct Arguments {
     /// decide when to stop.
     #[arg(long, value_name = "E")]
     pub error: Option<f64>,
-    /// Shadow rays traced at every vertex of a camera path; `guided` traces half as many at later
-    /// vertices (`--set later-rays=N`).
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
-    pub shadow_rays: u32,
+    /// Shadow rays traced at every vertex of a camera path: 8 for `guided`, which traces a quarter of
+    /// them at later vertices (`--set later-rays=N`), else 5 unless given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub shadow_rays: Option<u32>,
     /// Number of path vertices lit by the environment; 1 is direct light.
     #[arg(long, value_name = "D", default_value_t = 8)]
     pub depth: u32,
@@ -233,7 +233,7 @@ impl Arguments {
         Ok(Settings {
             sampler: self.sampler,
             parameters,
-            shadow_rays: self.shadow_rays,
+            shadow_rays: self.shadow_rays.unwrap_or(self.sampler.shadow_rays()),
             depth: self.depth,
             seed: self.seed,
             first_sample: self.sample_offset,

@@ -101,6 +101,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         eprintln!("device: {} ({})", capabilities.name, capabilities.driver);
     }
     let mut job = RenderJob::new(arguments, &settings, &scene, &device, output);
+    if let Some(warning) = settings.sampler.portal_warning(&scene) {
+        job.warn(warning);
+    }
     let mut renderer = Renderer::new(&device, &scene, settings.clone())?;
     if let Some(path) = &arguments.load_guide {
         guide::load(&mut renderer, path)?;
@@ -177,7 +180,7 @@ impl<'a> RenderJob<'a> {
             scene_hash: scene.hash.clone(),
             sampler: arguments.sampler.name().to_owned(),
             sampler_parameters: parameters,
-            shadow_rays: arguments.shadow_rays,
+            shadow_rays: settings.shadow_rays,
             depth: arguments.depth,
             device: capabilities.name.clone(),
             driver: capabilities.driver.clone(),
@@ -270,10 +273,7 @@ impl<'a> RenderJob<'a> {
                     self.warn_of_darkness(" so far: --error waits for light");
                 }
                 if let Some(display) = display.as_mut().filter(|display| display.is_connected()) {
-                    let pixels: Vec<[f32; 3]> = (0..sums.pixel_count())
-                        .map(|pixel| sums.mean(pixel).map(|value| value as f32))
-                        .collect();
-                    display.update(&pixels);
+                    display.update(&sums.to_image(&self.arguments.aov));
                 }
                 // Reading back a large film takes time from the passes.
                 next_look = Instant::now() + LOOK_INTERVAL.max(20 * start.elapsed());
@@ -291,6 +291,9 @@ impl<'a> RenderJob<'a> {
         };
         let sums = renderer.sums()?;
         self.look(&sums);
+        if let Some(display) = display.as_mut().filter(|display| display.is_connected()) {
+            display.update(&sums.to_image(&self.arguments.aov));
+        }
         progress.finish(&self.standing(renderer), reason.explain());
         Ok(reason)
     }
@@ -314,11 +317,11 @@ impl<'a> RenderJob<'a> {
         self.warnings.push(warning);
     }
 
-    /// Connects to the viewer named by `--display-server`.
+    /// Connects to the viewer named by `--display-server`. Images of other files and samplers stay there.
     fn open_display(&self) -> Result<Option<DisplayServer>> {
         let connect = |address: &String| {
-            let Window { width, height, .. } = self.window;
-            DisplayServer::connect(address, &self.scene.name, width, height)
+            let name = format!("{} ({})", self.output.display(), self.arguments.sampler.name());
+            DisplayServer::connect(address, &name)
         };
         self.arguments.display_server.as_ref().map(connect).transpose()
     }

@@ -1,6 +1,6 @@
 //! `--pixel x,y`: a picture that explains what the sampler did at one hit.
 //!
-//! Panels are lat-long, −Z in the middle and +Y on top, darkened below the hit's horizon (blue).
+//! Skys are lat-long, −Z in the middle and +Y on top, darkened below the hit's horizon (blue).
 //! They show the environment with the samples taken (green reached it, red were blocked, grey
 //! brought nothing and were not traced); the density of the product's lobes for the first ray; and
 //! that density for the last ray, at the same exposure, with the blocked directions in the visibility
@@ -22,12 +22,8 @@ use serde_json::json;
 use crate::{
     error::{Error, Result},
     files::{check_writable, write_text},
-    film::{
-        Window,
-        png::{display_from_linear, write_rgb8},
-    },
+    film::{Window, png::write_rgb8},
     gpu::Device,
-    math::frame::{direction_from_lat_long, lat_long_from_direction},
     renderer::{RecordedPixel, Renderer, Settings, window_of},
     sampler::{
         guided::{CellLevel, GuidedRay, RecordedCell, RecordedGuide, RecordedRay},
@@ -35,28 +31,21 @@ use crate::{
     },
     scene::Scene,
     srbf::kernel_value,
+    view::sky::{Sky, learned_skies, white_of},
 };
 
 /// Rays in the picture of `guided`, rounded up to whole samples.
 const GUIDED_RAYS: u32 = 64;
 /// Size of a panel, pixels.
 const WIDTH: usize = 512;
-const HEIGHT: usize = WIDTH / 2;
 /// Height of the white line between panels, pixels.
 const GAP: usize = 4;
-/// Share of a panel's pixels that may be over-exposed.
-const CLIPPED: f32 = 0.005;
-/// Factor that darkens colours below the horizon.
-const BELOW: f32 = 0.25;
 
 const VISIBLE: [u8; 3] = [40, 220, 70];
 const BLOCKED: [u8; 3] = [235, 40, 40];
 const UNTRACED: [u8; 3] = [150, 150, 150];
-const HORIZON: [u8; 3] = [90, 160, 255];
 /// Names of a cube's faces, in the guide's order.
 const FACES: [&str; 6] = ["+x", "-x", "+y", "-y", "+z", "-z"];
-/// Tint of regions that a cell has not counted itself, linear.
-const UNCOUNTED: Vec3 = Vec3::new(0.35, 0.6, 1.0);
 
 /// `out.exr` → `out.pixel_x_y.png`.
 pub fn picture_path(output: &Path, [x, y]: [u32; 2]) -> PathBuf {
@@ -129,13 +118,13 @@ fn warn_of_no_hit([x, y]: [u32; 2]) {
     log::warn!("--pixel {x},{y}: the pixel sees the environment; there is no hit to explain");
 }
 
-fn write_files(path: &Path, panels: &[Panel], numbers: &serde_json::Value) -> Result<Vec<PathBuf>> {
+fn write_files(path: &Path, panels: &[Sky], numbers: &serde_json::Value) -> Result<Vec<PathBuf>> {
     let mut rows: Vec<[u8; 3]> = Vec::new();
     for (index, panel) in panels.iter().enumerate() {
         if index > 0 {
             rows.extend(std::iter::repeat_n([255; 3], GAP * WIDTH));
         }
-        rows.extend(&panel.0);
+        rows.extend(panel.pixels());
     }
     write_rgb8(path, WIDTH as u32, (rows.len() / WIDTH) as u32, &rows)?;
     let numbers_path = path.with_extension("json");
@@ -215,13 +204,9 @@ fn guided_numbers_of(recorded: &RecordedGuide) -> serde_json::Value {
 }
 
 /// Draws the environment with rays: green reached it, red were blocked, grey brought nothing.
-fn draw_rays<'a>(
-    scene: &Scene,
-    normal: Vec3,
-    rays: impl Iterator<Item = &'a RecordedRay>,
-) -> Panel {
+fn draw_rays<'a>(scene: &Scene, normal: Vec3, rays: impl Iterator<Item = &'a RecordedRay>) -> Sky {
     let environment = |direction| scene.environment.radiance(direction);
-    let mut panel = Panel::new(normal, white_of(environment), environment);
+    let mut panel = Sky::new(WIDTH, normal, white_of(WIDTH, environment), environment);
     for ray in rays {
         let colour = match (ray.contribution == Vec3::ZERO, ray.is_visible) {
             (true, _) => UNTRACED,
@@ -234,28 +219,15 @@ fn draw_rays<'a>(
 }
 
 /// Draws the panels of `guided`, top to bottom: three, or one if nothing was learned.
-fn draw_guided(scene: &Scene, recorded: &RecordedGuide) -> Vec<Panel> {
+fn draw_guided(scene: &Scene, recorded: &RecordedGuide) -> Vec<Sky> {
     let normal = recorded.normal;
     let mut panels = vec![draw_rays(scene, normal, recorded.rays.iter().map(|ray| &ray.ray))];
-    if let Some(cell) = &recorded.cell {
-        let region_of = |direction| recorded.partition.region_of(&scene.environment, direction);
-        panels.push(Panel::new(normal, 1.0, |direction| {
-            let region = cell.regions[region_of(direction)];
-            let colour = if region.trials <= 0.0 { UNCOUNTED } else { Vec3::ONE };
-            region.visibility as f32 * colour
-        }));
-        let density = |direction| {
-            let index = region_of(direction);
-            let solid_angle = recorded.partition.regions[index].solid_angle;
-            Vec3::splat((cell.regions[index].probability / solid_angle) as f32)
-        };
-        panels.push(Panel::new(normal, white_of(density), density));
-    }
+    panels.extend(learned_skies(scene, recorded, WIDTH).into_iter().flatten());
     panels
 }
 
 /// Draws the panels, top to bottom.
-fn draw(scene: &Scene, recorded: &RecordedPixel) -> Vec<Panel> {
+fn draw(scene: &Scene, recorded: &RecordedPixel) -> Vec<Sky> {
     let normal = recorded.normal;
     let mut panels = vec![draw_rays(scene, normal, recorded.rays.iter())];
     if recorded.lobes.is_empty() {
@@ -272,67 +244,14 @@ fn draw(scene: &Scene, recorded: &RecordedPixel) -> Vec<Panel> {
         }
     };
     let before = density(|lobe| lobe.before);
-    let white = white_of(before);
-    panels.push(Panel::new(normal, white, before));
+    let white = white_of(WIDTH, before);
+    panels.push(Sky::new(WIDTH, normal, white, before));
     if let Some(cached) = &recorded.cached {
-        let mut after = Panel::new(normal, white, density(|lobe| lobe.after));
+        let mut after = Sky::new(WIDTH, normal, white, density(|lobe| lobe.after));
         for direction in cached {
             after.mark(*direction, BLOCKED);
         }
         panels.push(after);
     }
     panels
-}
-
-/// Returns the value that a share [`CLIPPED`] of a function's pixels exceeds.
-fn white_of(value: impl Fn(Vec3) -> Vec3) -> f32 {
-    let mut sorted: Vec<f32> =
-        (0..WIDTH * HEIGHT).map(|i| value(direction_of(i)).max_element()).collect();
-    sorted.sort_by(f32::total_cmp);
-    let largest = sorted.last().copied().unwrap_or(0.0);
-    let index = ((1.0 - CLIPPED) * sorted.len() as f32) as usize;
-    sorted.get(index).copied().filter(|white| *white > 0.0).unwrap_or(largest)
-}
-
-/// A lat-long picture.
-struct Panel(Vec<[u8; 3]>);
-
-impl Panel {
-    /// Draws a function of direction, with `white` shown as white.
-    fn new(normal: Vec3, white: f32, value: impl Fn(Vec3) -> Vec3) -> Self {
-        let values: Vec<Vec3> = (0..WIDTH * HEIGHT).map(|i| value(direction_of(i))).collect();
-        let show = |(index, value): (usize, &Vec3)| {
-            let cosine = direction_of(index).dot(normal);
-            if cosine.abs() < 2.0 / HEIGHT as f32 {
-                return HORIZON;
-            }
-            let scale = if cosine < 0.0 { BELOW } else { 1.0 } / white.max(f32::MIN_POSITIVE);
-            (*value * scale).to_array().map(display_from_linear)
-        };
-        Self(values.iter().enumerate().map(show).collect())
-    }
-
-    /// Draws a dot with a black rim.
-    fn mark(&mut self, direction: Vec3, colour: [u8; 3]) {
-        let uv = lat_long_from_direction(direction);
-        let centre = [(uv.x * WIDTH as f32) as i32, (uv.y * HEIGHT as f32) as i32];
-        for dy in -4_i32..=4 {
-            for dx in -4_i32..=4 {
-                let squared = dx * dx + dy * dy;
-                let row = centre[1] + dy;
-                if squared > 18 || !(0..HEIGHT as i32).contains(&row) {
-                    continue;
-                }
-                let column = (centre[0] + dx).rem_euclid(WIDTH as i32);
-                let colour = if squared > 9 { [0; 3] } else { colour };
-                self.0[row as usize * WIDTH + column as usize] = colour;
-            }
-        }
-    }
-}
-
-fn direction_of(pixel: usize) -> Vec3 {
-    let u = ((pixel % WIDTH) as f32 + 0.5) / WIDTH as f32;
-    let v = ((pixel / WIDTH) as f32 + 0.5) / HEIGHT as f32;
-    direction_from_lat_long(glam::Vec2::new(u, v))
 }

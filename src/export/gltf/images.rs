@@ -9,8 +9,7 @@ use crate::{
     error::Result,
     export::names::safe_name,
     files,
-    film::png::srgb_from_linear,
-    math::colour::luminance,
+    math::colour::{luminance, srgb_from_linear},
     texture::{Channels, Texels, TextureUse},
 };
 

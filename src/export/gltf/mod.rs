@@ -28,7 +28,7 @@ use self::{
 use super::{
     names::{folder_name, folder_of, identifier},
     parts::{self, Parts},
-    reflected_share,
+    portal_warning, reflected_share,
 };
 use crate::{
     brdf::MaterialTables,
@@ -93,6 +93,7 @@ impl<'a> Export<'a> {
         if !lights.is_empty() {
             textures.extensions.insert("KHR_lights_punctual");
         }
+        warnings.extend(portal_warning(scene));
         let rotation_deg = scene.environment.rotation_rad.to_degrees();
         warnings.push(format!(
             "environment: glTF has none; render with `--environment {folder_name}/{ENVIRONMENT} \

@@ -30,7 +30,7 @@ use super::{
     names::{folder_name, folder_of, identifier, relative},
     parts::{self, Parts},
     ply::{self, Attributes, SAME_UV},
-    reflected_share, triple,
+    portal_warning, reflected_share, triple,
 };
 use crate::{
     brdf::MaterialTables,
@@ -83,6 +83,7 @@ impl<'a> Export<'a> {
         });
         let models = models.collect();
         let lamps = scene.lamps.iter().map(|lamp| lights::lamp(lamp, &mut warnings)).collect();
+        warnings.extend(portal_warning(scene));
         let path = path.to_owned();
         Ok(Self { scene, settings, path, folder_name, parts, models, lamps, pictures, warnings })
     }

@@ -5,6 +5,9 @@ use crate::sampler::knob::{self, Knob};
 /// Edge of the tiles that `share-tiles=auto` may choose, pixels (`docs/experiments/shared_paths.md`).
 pub const AUTO_TILE_EDGE: u32 = 4;
 
+/// Shadow rays at the vertices that the camera sees, unless told otherwise.
+pub const SHADOW_RAYS: u32 = 8;
+
 /// Parameters of `guided`, apart from the number of candidates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuidedParameters {
@@ -13,8 +16,8 @@ pub struct GuidedParameters {
     pub bounce_candidates: u32,
     /// `guide-memory`: most bytes for the cells.
     pub guide_memory: u64,
-    /// `later-rays`: most shadow rays at each vertex after the first; `None` is `auto`, half of
-    /// `--shadow-rays`.
+    /// `later-rays`: most shadow rays at each vertex after the first; `None` is `auto`, a quarter of
+    /// `--shadow-rays`, rounded up.
     pub later_rays: Option<u32>,
     /// `regions`: most regions of the environment, 16 to 1024; a render starts with 256.
     pub regions: u32,
@@ -57,7 +60,7 @@ impl GuidedParameters {
     /// Returns the shadow rays at each later vertex, given `shadow_rays` at the first: later
     /// vertices cause less of the error at the same cost per ray (`docs/experiments/later_rays.md`).
     pub fn later_rays_of(&self, shadow_rays: u32) -> u32 {
-        self.later_rays.unwrap_or((shadow_rays / 2).max(1)).min(shadow_rays)
+        self.later_rays.unwrap_or(shadow_rays.div_ceil(4)).min(shadow_rays)
     }
 
     /// Returns the shadow rays at the first and at each later vertex in open scenes, where samples are
@@ -94,10 +97,10 @@ mod tests {
     use crate::sampler::{Parameters, Sampler};
 
     #[test]
-    fn later_vertices_have_half_of_the_rays_unless_told_otherwise() {
+    fn later_vertices_have_a_quarter_of_the_rays_unless_told_otherwise() {
         let mut all = Parameters::default();
         let later = |all: &Parameters, rays: u32| all.guided.later_rays_of(rays);
-        assert_eq!([0, 1, 2, 5, 16].map(|rays| later(&all, rays)), [0, 1, 1, 2, 8]);
+        assert_eq!([0, 1, 4, 5, 8, 16].map(|rays| later(&all, rays)), [0, 1, 1, 2, 2, 4]);
         assert_eq!(all.guided.rays_in_the_open(5), [5, 1]);
         assert_eq!(all.guided.rays_in_the_open(0), [0, 0]);
         all.set("later-rays=3").unwrap();

@@ -68,7 +68,7 @@ impl Guided {
         [x, y]: [u32; 2],
         rays: u32,
     ) -> Result<Option<RecordedGuide>> {
-        let window = runner.scene().window();
+        let window = runner.film().window();
         let (column, row) = (x.wrapping_sub(window.x), y.wrapping_sub(window.y));
         assert!(column < window.width && row < window.height, "a pixel of the window");
         let per_group = runner.last_group_rays(self.steps());

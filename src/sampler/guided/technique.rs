@@ -216,6 +216,9 @@ impl Guided {
             let before = runner.totals().clone();
             runner.sweep(self, wave, runner.film().padded_pixels() / TRAINING_SWEEPS)?;
             runner.take_counters()?;
+            if runner.is_stopped() {
+                return Ok(());
+            }
             // The first sweep samples only environment and BRDF: nothing is known yet. It is not in
             // the picture, so the picture does not depend on its own samples here.
             let visible = runner.totals().shadow_rays_visible - before.shadow_rays_visible;
@@ -267,6 +270,9 @@ impl Technique for Guided {
         let samples = progress.sample_count;
         if !self.is_trained && !self.is_open {
             self.train(runner, progress)?;
+            if runner.is_stopped() {
+                return Ok(u32::MAX);
+            }
         } else if self.rebuilt_at != samples && guide_schedule(samples) == samples && !self.is_open
         {
             self.rebuild(samples == SPLIT_AFTER, samples)?;
@@ -293,6 +299,20 @@ impl Technique for Guided {
         self.tag = 0;
         self.forget_choice();
         self.forget_tiles();
+        Ok(())
+    }
+
+    /// Keeps the guide, whose cells lie in the scene and not in the film. An open scene may have blocked
+    /// places elsewhere, so it is looked at again.
+    fn look(&mut self, _runner: &mut Runner, learns: bool) -> Result<()> {
+        if self.is_open || !self.is_trained {
+            self.buffers.forget()?;
+            self.is_open = false;
+            self.is_trained = false;
+        } else if learns {
+            self.buffers.rebuild(false)?;
+        }
+        self.rebuilt_at = 0;
         Ok(())
     }
 

@@ -4,6 +4,7 @@
 
 mod lamp;
 mod material;
+mod portal;
 mod read;
 mod value;
 
@@ -21,6 +22,7 @@ pub use material::{
     ConductorEntry, DielectricEntry, DiffuseEntry, MaterialEntry, MaterialKeys, MaterialKindEntry,
     MeasuredEntry, MirrorEntry, PlasticEntry, PrincipledEntry, ThinDielectricEntry,
 };
+pub use portal::{PortalEntry, PortalKeys};
 pub use value::{
     ChannelEntry, InterpolationEntry, NumberOr, NumberOrVector, TextureEntry, Textured, WrapEntry,
 };
@@ -43,6 +45,8 @@ pub struct SceneFile {
     pub environment: Option<EnvironmentEntry>,
     /// Every `[[lamp]]`, in file order.
     pub lamps: Vec<LampEntry>,
+    /// Every `[[portal]]`, in file order.
+    pub portals: Vec<PortalEntry>,
     /// Every `[[material]]`, in file order.
     pub materials: Vec<MaterialEntry>,
     /// Every `[[object]]`, in file order.

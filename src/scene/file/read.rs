@@ -17,7 +17,8 @@ use toml::{
 
 use super::{
     CameraEntry, EnvironmentEntry, IncludeEntry, LampEntry, LampKindEntry, MaterialEntry,
-    MaterialKeys, MaterialKindEntry, NumberOrVector, ObjectEntry, ObjectSource, SceneFile,
+    MaterialKeys, MaterialKindEntry, NumberOrVector, ObjectEntry, ObjectSource, PortalEntry,
+    SceneFile,
 };
 use crate::{
     error::{Result, TextError, line_and_column},
@@ -75,9 +76,11 @@ pub(super) fn read_root(text: &str) -> Result<SceneFile, TextError> {
     let root = DeTable::parse(text)?;
     let span = root.span();
     let mut table = root.into_inner();
-    let known = ["camera", "film", "environment", "lamp", "material", "object", "include"];
+    let known =
+        ["camera", "film", "environment", "lamp", "portal", "material", "object", "include"];
     refuse_unknown_keys(&table, &known, "the scene")?;
     let lamps = take_array(&mut table, "lamp")?;
+    let portals = take_array(&mut table, "portal")?;
     let materials = take_array(&mut table, "material")?;
     let objects = take_array(&mut table, "object")?;
     let includes = take_array(&mut table, "include")?;
@@ -87,6 +90,7 @@ pub(super) fn read_root(text: &str) -> Result<SceneFile, TextError> {
         film: root_keys.film,
         environment: root_keys.environment,
         lamps: read_all(lamps, text, read_lamp)?,
+        portals: read_all(portals, text, read_portal)?,
         materials: read_all(materials, text, read_material)?,
         objects: read_all(objects, text, read_object)?,
         includes: read_all(includes, text, read_include)?,
@@ -165,13 +169,28 @@ fn read_lamp(entry: Spanned<DeValue>, text: &str) -> Result<LampEntry, TextError
     Ok(LampEntry { line, name: keys.name, kind })
 }
 
+fn read_portal(entry: Spanned<DeValue>, text: &str) -> Result<PortalEntry, TextError> {
+    let (line, keys) = read_plain(entry, text, "[[portal]]")?;
+    Ok(PortalEntry { line, keys })
+}
+
 fn read_include(entry: Spanned<DeValue>, text: &str) -> Result<IncludeEntry, TextError> {
+    let (line, keys) = read_plain(entry, text, "[[include]]")?;
+    Ok(IncludeEntry { line, keys })
+}
+
+/// Reads an entry of an array of tables that has no kinds, with its line; `header` names it.
+fn read_plain<T: DeserializeOwned>(
+    entry: Spanned<DeValue>,
+    text: &str,
+    header: &str,
+) -> Result<(usize, T), TextError> {
     let span = entry.span();
     let line = line_and_column(text, span.start).0;
     let DeValue::Table(table) = entry.into_inner() else {
-        return Err(TextError { span, message: "expected a table, `[[include]]`".to_owned() });
+        return Err(TextError { span, message: format!("expected a table, `{header}`") });
     };
-    Ok(IncludeEntry { line, keys: read_table(table, span)? })
+    Ok((line, read_table(table, span)?))
 }
 
 fn read_object(entry: Spanned<DeValue>, text: &str) -> Result<ObjectEntry, TextError> {

@@ -1,4 +1,4 @@
-//! `[environment]` and `[[lamp]]` → the light of a scene.
+//! `[environment]`, `[[lamp]]` and `[[portal]]` → the light of a scene.
 
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ use crate::{
     brdf::Material,
     error::Result,
     scene::{
-        EnvironmentMap, Lamp,
+        EnvironmentMap, Lamp, Portal,
         file::{EnvironmentEntry, LampEntry, LampKindEntry, SceneFile, SpotFalloffEntry},
         lamp::{LampKind, SpotFalloff},
     },
@@ -19,10 +19,12 @@ use crate::{
 pub(super) struct Light {
     pub(super) environment: EnvironmentMap,
     pub(super) lamps: Vec<Lamp>,
+    /// Where it comes in.
+    pub(super) portals: Vec<Portal>,
 }
 
 impl Loader<'_> {
-    /// Makes environment and lamps of a scene file, with the options of the command line.
+    /// Makes environment, lamps and portals of a scene file, with the options of the command line.
     pub(super) fn light(
         &self,
         file: &SceneFile,
@@ -43,7 +45,7 @@ impl Loader<'_> {
         } else {
             EnvironmentMap::constant(Vec3::ZERO, 1.0).map_err(|message| self.error(message))?
         };
-        Ok(Light { environment, lamps })
+        Ok(Light { environment, lamps, portals: self.portals(&file.portals)? })
     }
 
     /// Warns of a scene without any light.

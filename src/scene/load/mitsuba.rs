@@ -28,7 +28,7 @@ impl Loader<'_> {
         } else if let Some(rotation_deg) = options.rotation_deg {
             environment.rotation_rad = rotation_deg.rem_euclid(360.0).to_radians();
         }
-        let light = Light { environment, lamps };
+        let light = Light { environment, lamps, portals: Vec::new() };
         let mut scene = self.scene(camera, film, light, materials, geometry, warnings);
         scene.inputs = inputs;
         scene.inputs.extend(options.environment.clone());

@@ -8,6 +8,7 @@ mod materials;
 mod mitsuba;
 mod objects;
 mod pbrt;
+mod portals;
 mod whole;
 
 use std::path::{Path, PathBuf};
@@ -149,6 +150,7 @@ impl<'a> Loader<'a> {
             film,
             environment: light.environment,
             lamps: light.lamps,
+            portals: light.portals,
             materials,
             geometry,
             inputs: vec![self.path.to_path_buf()],

@@ -43,7 +43,7 @@ impl Loader<'_> {
         if is_dark {
             warnings.push(format!("{}: no light: nothing is lit", self.path.display()));
         }
-        let light = Light { environment, lamps: contents.lamps };
+        let light = Light { environment, lamps: contents.lamps, portals: Vec::new() };
         let (film, geometry) = (contents.film, contents.geometry);
         let mut scene = self.scene(camera, film, light, contents.materials, geometry, warnings);
         scene.inputs = contents.inputs;

@@ -61,7 +61,7 @@ impl Loader<'_> {
         };
         let environment = self.whole_environment(options, &mut warnings)?;
         let camera: Camera = self.camera(&entry)?;
-        let light = Light { environment, lamps: mesh.lamps };
+        let light = Light { environment, lamps: mesh.lamps, portals: Vec::new() };
         let mut scene = self.scene(camera, film, light, materials, geometry, warnings);
         scene.inputs.extend(mesh.side_files);
         scene.inputs.extend(options.environment.clone());

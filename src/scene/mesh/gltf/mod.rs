@@ -26,6 +26,9 @@ use crate::{
     texture::Texture,
 };
 
+/// Bytes of the header of a GLB container.
+const GLB_HEADER_BYTES: usize = 12;
+
 /// Reads a glTF file with its buffers and images; `warnings` counts the parts that are left out. With a
 /// budget, meshes whose copies exceed it are not copied.
 ///
@@ -39,6 +42,13 @@ pub fn read(path: &Path, budget: Option<Budget>, warnings: &mut Vec<String>) -> 
         if stated > bytes.len() {
             let message =
                 format!("truncated: the header states {stated} bytes, found {}", bytes.len());
+            return Err(Error::format(path, message));
+        }
+        // The crate subtracts the bytes of the header without a look.
+        if stated < GLB_HEADER_BYTES {
+            let message = format!(
+                "the header states {stated} bytes, expected at least its own {GLB_HEADER_BYTES}"
+            );
             return Err(Error::format(path, message));
         }
     }

@@ -1,0 +1,98 @@
+//! `fenestra view`: a scene in a window.
+
+use std::path::PathBuf;
+
+use super::{
+    options::{SceneOptions, parse_size},
+    progress::Patience,
+};
+use crate::{
+    error::{Error, Result},
+    film::{Curve, Tone},
+    renderer::Settings,
+    sampler::{Parameters, Sampler},
+    view::{Display, Options},
+};
+
+/// Arguments of `view`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Scene file (.toml, .gltf, .glb, .obj, .pbrt, .xml).
+    pub scene: PathBuf,
+    /// Sampler at the start; a key changes it.
+    #[arg(long, value_enum, default_value = "guided")]
+    pub sampler: Sampler,
+    /// Camera paths per pixel at which a picture is finished.
+    #[arg(long, value_name = "N", default_value_t = 65536)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..))]
+    pub spp: u32,
+    /// Shadow rays traced at every vertex of a camera path.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
+    pub shadow_rays: u32,
+    /// Number of path vertices at the start; 1 is direct light.
+    #[arg(long, value_name = "D", default_value_t = 8)]
+    pub depth: u32,
+    /// Environment, camera, strictness.
+    #[command(flatten)]
+    pub scene_options: SceneOptions,
+    /// Film size in pixels, overriding the scene's. The window shows the film at any size.
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub size: Option<[u32; 2]>,
+    /// Random seed.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u32,
+    /// Device to use, by index or part of its name; see `fenestra devices`.
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
+    /// Run with the Vulkan validation layers; any message fails the command.
+    #[arg(long)]
+    pub validate: bool,
+    /// Exposure at the start, in stops.
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub exposure: f32,
+    /// Tone curve at the start.
+    #[arg(long, value_enum, value_name = "CURVE", default_value = "clip")]
+    pub curve: Curve,
+    /// Sampler parameter, such as candidates=4. May be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}
+
+/// Shows a scene until its window is closed.
+///
+/// # Errors
+/// Wrong options, an unusable scene, no display, no device that can show pictures there.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    if !arguments.exposure.is_finite() {
+        return Err(Error::usage("--exposure: expected a finite number of stops"));
+    }
+    let mut parameters = Parameters::default();
+    for assignment in &arguments.set {
+        parameters.set(assignment)?;
+    }
+    let settings = Settings {
+        sampler: arguments.sampler,
+        parameters,
+        shadow_rays: arguments.shadow_rays,
+        depth: arguments.depth,
+        seed: arguments.seed,
+        ..Settings::default()
+    };
+    let display = Display::open()?;
+    let patience = Patience::new(&format!("loading {}", arguments.scene.display()), false);
+    let mut scene = arguments.scene_options.load(&arguments.scene)?;
+    if let Some([width, height]) = arguments.size {
+        (scene.film.width, scene.film.height) = (width, height);
+    }
+    settings.check([scene.film.width, scene.film.height])?;
+    drop(patience);
+    let options = Options {
+        device: arguments.device.clone(),
+        validate: arguments.validate,
+        settings,
+        spp: arguments.spp,
+        tone: Tone { exposure: arguments.exposure, curve: arguments.curve },
+        folder: PathBuf::new(),
+    };
+    display.run(scene, options)
+}

@@ -1,0 +1,26 @@
+//! `[[portal]]`.
+
+use serde::Deserialize;
+
+/// One `[[portal]]`.
+#[derive(Clone, Debug)]
+pub struct PortalEntry {
+    /// Line of the entry, from 1.
+    pub line: usize,
+    /// Its keys.
+    pub keys: PortalKeys,
+}
+
+/// Keys of `[[portal]]`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PortalKeys {
+    /// Name, for messages.
+    pub name: Option<String>,
+    /// One corner of the rectangle, metres.
+    pub corner: [f32; 3],
+    /// Edge from that corner, metres.
+    pub first_edge: [f32; 3],
+    /// Other edge from that corner, metres, perpendicular to the first.
+    pub second_edge: [f32; 3],
+}

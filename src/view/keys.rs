@@ -1,0 +1,156 @@
+//! The keys of the window: one table for the program and for `docs/view.md`.
+
+use crate::shader::constants::{
+    SHOW_ALBEDO, SHOW_CELLS, SHOW_ERROR, SHOW_LEVELS, SHOW_NORMAL, SHOW_PICTURE, SHOW_VISIBLE,
+};
+
+/// Effect of a key.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Action {
+    /// Flies along an axis (0 right, 1 up, 2 forward) as long as the key is held.
+    Fly(usize, f32),
+    /// Renders by another sampler, counted from 1.
+    Sampler(usize),
+    /// Adds to the number of path vertices.
+    Depth(i32),
+    /// Adds to the exposure, stops.
+    Exposure(f32),
+    /// Sets the exposure by the picture.
+    AutoExposure,
+    /// Goes to the next tone curve.
+    Curve,
+    /// Shows two samplers side by side, or one again.
+    Split,
+    /// Lets the next sampler be that of the other side.
+    Swap,
+    /// Shows a layer, `SHOW_…`, or the picture again if it is shown.
+    Layer(u32),
+    /// Goes to the next layer.
+    NextLayer,
+    /// Shows what the pixel under the cursor has learned, or not.
+    Inset,
+    /// Writes picture, film and camera.
+    Save,
+    /// Takes the camera back to the start.
+    Home,
+    /// Prints the keys.
+    Help,
+    /// Closes the window.
+    Quit,
+}
+
+/// Layers in the order of [`Action::NextLayer`].
+pub const LAYERS: [(u32, &str); 7] = [
+    (SHOW_PICTURE, "picture"),
+    (SHOW_ERROR, "relative error"),
+    (SHOW_ALBEDO, "albedo"),
+    (SHOW_NORMAL, "normal"),
+    (SHOW_VISIBLE, "visible share"),
+    (SHOW_CELLS, "cells"),
+    (SHOW_LEVELS, "kinds of cells"),
+];
+
+/// A key by the text it types, or by its name, and its effect.
+#[derive(Clone, Copy, Debug)]
+pub struct Key {
+    /// Text, or one of the names `Escape` and `Tab`.
+    pub key: &'static str,
+    /// Effect.
+    pub action: Action,
+    /// One phrase for the documentation; empty where the row before says it.
+    pub about: &'static str,
+}
+
+const fn key(key: &'static str, action: Action, about: &'static str) -> Key {
+    Key { key, action, about }
+}
+
+/// Every key.
+pub const KEYS: &[Key] = &[
+    key("w", Action::Fly(2, 1.0), "fly forward and back"),
+    key("s", Action::Fly(2, -1.0), ""),
+    key("a", Action::Fly(0, -1.0), "fly left and right"),
+    key("d", Action::Fly(0, 1.0), ""),
+    key("q", Action::Fly(1, -1.0), "fly down and up"),
+    key("e", Action::Fly(1, 1.0), ""),
+    key("r", Action::Home, "return to the camera of the scene"),
+    key(
+        "1",
+        Action::Sampler(1),
+        "sampler: uniform, cosine, brdf, env, mis, ris, product, visibility, guided, portal",
+    ),
+    key("2", Action::Sampler(2), ""),
+    key("3", Action::Sampler(3), ""),
+    key("4", Action::Sampler(4), ""),
+    key("5", Action::Sampler(5), ""),
+    key("6", Action::Sampler(6), ""),
+    key("7", Action::Sampler(7), ""),
+    key("8", Action::Sampler(8), ""),
+    key("9", Action::Sampler(9), ""),
+    key("o", Action::Sampler(10), ""),
+    key("x", Action::Split, "two samplers side by side at equal time, or one"),
+    key("Tab", Action::Swap, "choose the sampler of the other side"),
+    key("[", Action::Depth(-1), "fewer and more path vertices"),
+    key("]", Action::Depth(1), ""),
+    key("-", Action::Exposure(-0.5), "exposure, half a stop down and up"),
+    key("=", Action::Exposure(0.5), ""),
+    key("0", Action::AutoExposure, "exposure by the picture"),
+    key("c", Action::Curve, "next tone curve: clip, reinhard, filmic"),
+    key(
+        "h",
+        Action::Layer(SHOW_ERROR),
+        "relative error in false colour, from 1% (blue) to 100% (red)",
+    ),
+    key("g", Action::Layer(SHOW_CELLS), "cells of `guided`"),
+    key(
+        "l",
+        Action::NextLayer,
+        "next layer: picture, error, albedo, normal, visible share, cells, their kinds",
+    ),
+    key(
+        "i",
+        Action::Inset,
+        "learned sky of the pixel under the cursor: visibility above, density below",
+    ),
+    key("p", Action::Save, "write the window (PNG), the film (EXR) and the camera (TOML)"),
+    key("?", Action::Help, "print the keys"),
+    key("Escape", Action::Quit, "close the window"),
+];
+
+/// Returns the effect of a key.
+pub fn action_of(key: &str) -> Option<Action> {
+    let key = if key.chars().count() == 1 { key.to_lowercase() } else { key.to_owned() };
+    KEYS.iter().find(|known| known.key == key).map(|known| known.action)
+}
+
+/// Keys that share an effect, joined, with it.
+pub fn rows() -> Vec<(String, &'static str)> {
+    let mut rows: Vec<(Vec<&str>, &str)> = Vec::new();
+    for Key { key, about, .. } in KEYS {
+        match rows.last_mut() {
+            Some((keys, _)) if about.is_empty() => keys.push(key),
+            _ => rows.push((vec![key], about)),
+        }
+    }
+    rows.into_iter().map(|(keys, about)| (keys.join(" "), about)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampler::Sampler;
+
+    #[test]
+    fn keys_are_distinct_and_complete() {
+        for (index, one) in KEYS.iter().enumerate() {
+            assert!(KEYS[..index].iter().all(|other| other.key != one.key), "{}", one.key);
+        }
+        assert_eq!(action_of("W"), Some(Action::Fly(2, 1.0)));
+        assert_eq!(action_of("Escape"), Some(Action::Quit));
+        assert_eq!(action_of("y"), None);
+        let names: Vec<&str> = Sampler::ALL.iter().map(|sampler| sampler.name()).collect();
+        let about = KEYS.iter().find(|key| key.key == "1").map_or("", |key| key.about);
+        assert_eq!(about, format!("sampler: {}", names.join(", ")));
+        assert!(rows().iter().any(|(keys, _)| keys == "1 2 3 4 5 6 7 8 9 o"));
+    }
+}

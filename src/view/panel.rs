@@ -1,0 +1,234 @@
+//! The window as the rendering thread sees it: input from it, and pictures to it.
+
+use std::{
+    collections::VecDeque,
+    sync::{
+        Arc,
+        mpsc::{Receiver, RecvTimeoutError, TryRecvError},
+    },
+    time::Duration,
+};
+
+use super::{
+    keys::Action,
+    projector::{Place, Projector, is_picture},
+};
+use crate::{
+    error::{Error, Result},
+    film::{Tone, tone::auto_exposure},
+    gpu::{Device, Presented, Swapchain, swapchain::Target},
+};
+
+/// Message from the window to the renderer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Input {
+    /// A key was pressed.
+    Key(Action),
+    /// Directions to fly to changed: right, up, forward, −1 to 1 each.
+    Held([f32; 3]),
+    /// The pointer moved with the first button held, in heights of the window.
+    Orbit([f32; 2]),
+    /// The pointer moved with the second button held.
+    Turn([f32; 2]),
+    /// The pointer moved with the third button held.
+    Pan([f32; 2]),
+    /// The wheel turned, notches away from the user.
+    Wheel(f32),
+    /// The pointer is at this pixel of the window.
+    Pointer([f64; 2]),
+    /// The window has this size now, pixels.
+    Resized([u32; 2]),
+    /// The window was uncovered.
+    Redraw,
+    /// The window is closed.
+    Close,
+}
+
+impl Input {
+    /// True if the film has to start again: a pass under way is worth nothing more.
+    fn restarts(self) -> bool {
+        match self {
+            Self::Key(action) => matches!(
+                action,
+                Action::Sampler(_) | Action::Depth(_) | Action::Split | Action::Home | Action::Quit
+            ),
+            Self::Held(direction) => direction != [0.0; 3],
+            Self::Orbit(_) | Self::Turn(_) | Self::Pan(_) | Self::Wheel(_) | Self::Close => true,
+            Self::Pointer(_) | Self::Resized(_) | Self::Redraw => false,
+        }
+    }
+}
+
+/// The window.
+pub struct Panel {
+    inputs: Receiver<Input>,
+    /// Input that waits for the end of a pass.
+    pub(super) pending: VecDeque<Input>,
+    pub(super) projector: Projector,
+    swapchain: Swapchain,
+    size: [u32; 2],
+    pub(super) tone: Tone,
+    /// Layer that is shown, `SHOW_…`.
+    pub(super) layer: u32,
+    pub(super) has_right: bool,
+    /// True while the camera moves: its small films are finished and shown, whatever comes.
+    pub(super) is_moving: bool,
+    /// Place of the pointer, pixels of the window.
+    pub(super) pointer: Option<[f64; 2]>,
+    /// True if tone has changed since it was announced.
+    pub(super) is_toned: bool,
+    /// Failure between the waves of a pass, which cannot return it.
+    failure: Option<Error>,
+}
+
+impl Panel {
+    /// Connects a window of `size` pixels. Fails if the device cannot show pictures there.
+    pub fn new(
+        device: &Arc<Device>,
+        window: Arc<dyn Target>,
+        size: [u32; 2],
+        projector: Projector,
+        inputs: Receiver<Input>,
+        tone: Tone,
+    ) -> Result<Self> {
+        Ok(Self {
+            inputs,
+            pending: VecDeque::new(),
+            projector,
+            swapchain: Swapchain::new(device, window, size)?,
+            size,
+            tone,
+            layer: 0,
+            has_right: false,
+            is_moving: false,
+            pointer: None,
+            is_toned: false,
+            failure: None,
+        })
+    }
+
+    /// Takes all input that is there, and acts on what needs no renderer. Returns true if a pass under way
+    /// is worth nothing more.
+    pub fn attend(&mut self) -> bool {
+        loop {
+            match self.inputs.try_recv() {
+                Ok(input) => self.take(input),
+                Err(TryRecvError::Empty) => break,
+                Err(TryRecvError::Disconnected) => {
+                    self.pending.push_back(Input::Close);
+                    break;
+                }
+            }
+        }
+        self.failure.is_some() || self.pending.iter().any(|input| input.restarts())
+    }
+
+    /// Waits for input, for this long at most.
+    pub fn wait(&mut self, longest: Duration) {
+        match self.inputs.recv_timeout(longest) {
+            Ok(input) => self.take(input),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => self.pending.push_back(Input::Close),
+        }
+    }
+
+    fn take(&mut self, input: Input) {
+        let acted = match input {
+            Input::Key(Action::Exposure(stops)) => {
+                self.tone.exposure += stops;
+                self.is_toned = true;
+                self.present()
+            }
+            Input::Key(Action::AutoExposure) => self.expose(),
+            Input::Key(Action::Curve) => {
+                let all = crate::film::Curve::ALL;
+                let now = all.iter().position(|curve| *curve == self.tone.curve).unwrap_or(0);
+                self.tone.curve = all[(now + 1) % all.len()];
+                self.present()
+            }
+            Input::Pointer(at) => {
+                self.pointer = Some(at);
+                self.pending.push_back(input);
+                Ok(())
+            }
+            Input::Resized(size) => {
+                self.size = size;
+                self.swapchain.resize(size).and_then(|()| self.present())
+            }
+            Input::Redraw => self.present(),
+            other => {
+                self.pending.push_back(other);
+                Ok(())
+            }
+        };
+        if let Err(error) = acted {
+            self.failure.get_or_insert(error);
+        }
+    }
+
+    /// Returns the failure between the waves of the last pass.
+    pub fn take_failure(&mut self) -> Result<()> {
+        self.failure.take().map_or(Ok(()), Err)
+    }
+
+    /// Sets the exposure by the picture to the left.
+    fn expose(&mut self) -> Result<()> {
+        if is_picture(self.layer) {
+            self.tone.exposure = auto_exposure(&self.projector.shown(Place::Left)?);
+            self.is_toned = true;
+        }
+        self.present()
+    }
+
+    /// Shows what the projector has. Fails if the device does or the window is gone.
+    pub fn present(&mut self) -> Result<()> {
+        // Twice: a window may change its size or lose its surface once in between.
+        for _ in 0..2 {
+            let size = self.swapchain.size();
+            if size.contains(&0) {
+                return Ok(());
+            }
+            let is_bgra = self.swapchain.is_bgra();
+            let pixels =
+                compose(&mut self.projector, size, self.has_right, self.tone, self.layer, is_bgra)?;
+            match self.swapchain.present(pixels)? {
+                Presented::Shown | Presented::Skipped => return Ok(()),
+                Presented::Outdated => self.swapchain.resize(self.size)?,
+                Presented::Lost => {
+                    log::warn!("the window lost its surface; making another");
+                    self.swapchain.renew(self.size).map_err(|error| Error::Device {
+                        reason: format!("the display is gone: {error}"),
+                        help: "`fenestra render` writes files and needs no display".into(),
+                    })?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns what the window shows: its size, and red, green, blue of each pixel. Fails if the device
+    /// does.
+    pub fn picture(&mut self) -> Result<([u32; 2], Vec<[u8; 3]>)> {
+        let size = self.swapchain.size();
+        if size.contains(&0) {
+            return Err(Error::usage("the window has no pixels to write"));
+        }
+        let pixels =
+            compose(&mut self.projector, size, self.has_right, self.tone, self.layer, false)?;
+        let pixels: Vec<[u8; 4]> = pixels.download(size[0] as usize * size[1] as usize)?;
+        Ok((size, pixels.into_iter().map(|[red, green, blue, _]| [red, green, blue]).collect()))
+    }
+}
+
+fn compose(
+    projector: &mut Projector,
+    size: [u32; 2],
+    has_right: bool,
+    tone: Tone,
+    layer: u32,
+    is_bgra: bool,
+) -> Result<&crate::gpu::Buffer> {
+    // Colours of layers are shown as they are.
+    let tone = if is_picture(layer) { tone } else { Tone::default() };
+    projector.compose(size, has_right, (tone.exposure.exp2(), tone.curve as u32), is_bgra)
+}

@@ -1,0 +1,232 @@
+//! From films to the pixels of a window: the passes `show` and `compose`.
+
+use std::sync::Arc;
+
+use crate::{
+    error::Result,
+    gpu::{Buffer, Commands, DescriptorSet, Device, Pipeline},
+    renderer::Renderer,
+    shader::{
+        bindings::{VIEW, view},
+        constants::SHOW_PICTURE,
+        spirv,
+        structs::{ShownFilm, WindowFrame},
+    },
+};
+
+/// Most invocations of a dispatch: every device allows 65,535 groups of 64.
+const MOST_INVOCATIONS: u32 = 1 << 21;
+
+/// One of the two films that a window can show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// The only film, or the one to the left.
+    Left,
+    /// The film to the right.
+    Right,
+}
+
+/// A picture over the window.
+#[derive(Clone, Debug, Default)]
+pub struct Inset {
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// Red, green, blue, 255: row by row.
+    pub pixels: Vec<[u8; 4]>,
+}
+
+/// Passes and buffers between films and a window.
+pub struct Projector {
+    device: Arc<Device>,
+    show: Pipeline,
+    compose: Pipeline,
+    /// Linear pixels of both films, and the set that writes each.
+    shown: [(Buffer, DescriptorSet); 2],
+    /// Width and height of the whole film, whose shape the picture has.
+    film: [u32; 2],
+    /// Width and height of what each of them shows.
+    sizes: [[u32; 2]; 2],
+    inset: Buffer,
+    inset_size: [u32; 2],
+    window: Option<(Buffer, DescriptorSet)>,
+    window_size: [u32; 2],
+}
+
+impl Projector {
+    /// Makes room for films of up to `film` pixels and insets of up to `inset`. Fails if the device does.
+    pub fn new(device: &Arc<Device>, film: [u32; 2], inset: [u32; 2]) -> Result<Self> {
+        let area = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height);
+        let pipeline = |name| Pipeline::new(device, name, spirv::pass(name), &[]);
+        let shown = |name| -> Result<_> {
+            let buffer = Buffer::zeroed(device, name, 12 * area(film))?;
+            let set = DescriptorSet::new(device, &VIEW, &[(view::SHOWN, &buffer)])?;
+            Ok((buffer, set))
+        };
+        Ok(Self {
+            device: Arc::clone(device),
+            show: pipeline("show")?,
+            compose: pipeline("compose")?,
+            shown: [shown("shown")?, shown("shown right")?],
+            film,
+            sizes: [[1, 1]; 2],
+            inset: Buffer::zeroed(device, "inset", 4 * area(inset))?,
+            inset_size: [0, 0],
+            window: None,
+            window_size: [0, 0],
+        })
+    }
+
+    /// Takes what the film of `renderer` shows: a layer `SHOW_…`, whose sums it has. `mean_radiance` is
+    /// that of the film, for its relative error. Fails if the device does.
+    pub fn show(
+        &mut self,
+        renderer: &Renderer,
+        place: Place,
+        layer: u32,
+        mean_radiance: f32,
+    ) -> Result<()> {
+        let index = usize::from(place == Place::Right);
+        let mut commands = Commands::begin(&self.device)?;
+        for (film, first_pixel, pixels) in renderer.film_pages() {
+            for first_place in (0..pixels).step_by(MOST_INVOCATIONS as usize) {
+                let end_place = pixels.min(first_place + MOST_INVOCATIONS);
+                let constants = ShownFilm {
+                    first_pixel,
+                    first_place,
+                    end_place,
+                    sample_count: renderer.sample_count(),
+                    layer,
+                    mean_radiance,
+                };
+                let sets = [film, &self.shown[index].1];
+                let bytes = bytemuck::bytes_of(&constants);
+                commands.dispatch(&self.show, &sets, bytes, end_place - first_place);
+            }
+        }
+        commands.submit_and_wait()?;
+        self.sizes[index] = renderer.film_size();
+        Ok(())
+    }
+
+    /// Replaces the inset; one of no size is not shown. Fails if the device does.
+    ///
+    /// # Panics
+    /// If it is larger than there is room for.
+    pub fn set_inset(&mut self, inset: &Inset) -> Result<()> {
+        self.inset.upload(bytemuck::cast_slice(&inset.pixels))?;
+        self.inset_size = inset.size;
+        Ok(())
+    }
+
+    /// Draws the pixels of a window of `size` pixels: films with this exposure factor and `CURVE_…`,
+    /// whole and at the largest size that fits. Fails if the device does.
+    pub fn compose(
+        &mut self,
+        [width, height]: [u32; 2],
+        has_right: bool,
+        (exposure, curve): (f32, u32),
+        is_bgra: bool,
+    ) -> Result<&Buffer> {
+        let window = match self.window.take() {
+            Some(window) if self.window_size == [width, height] => window,
+            _ => self.make_window([width, height])?,
+        };
+        self.window_size = [width, height];
+        let (buffer, set) = self.window.insert(window);
+        let [left, top, shown_width, shown_height] = fit(self.film, [width, height]);
+        let inset = self.inset_size;
+        let has_inset = inset[0] <= shown_width && inset[1] <= shown_height;
+        let frame = WindowFrame {
+            width,
+            height,
+            left,
+            top,
+            shown_width,
+            shown_height,
+            film_width: self.sizes[0][0],
+            film_height: self.sizes[0][1],
+            right_width: self.sizes[1][0],
+            right_height: self.sizes[1][1],
+            split: if has_right { left + shown_width / 2 } else { width },
+            first_index: 0,
+            exposure,
+            curve,
+            is_bgra: u32::from(is_bgra),
+            inset_width: if has_inset { inset[0] } else { 0 },
+            inset_height: if has_inset { inset[1] } else { 0 },
+        };
+        let mut commands = Commands::begin(&self.device)?;
+        let pixels = width * height;
+        for first_index in (0..pixels).step_by(MOST_INVOCATIONS as usize) {
+            let frame = WindowFrame { first_index, ..frame };
+            let invocations = MOST_INVOCATIONS.min(pixels - first_index);
+            commands.dispatch(&self.compose, &[set], bytemuck::bytes_of(&frame), invocations);
+        }
+        commands.submit_and_wait()?;
+        Ok(buffer)
+    }
+
+    fn make_window(&self, [width, height]: [u32; 2]) -> Result<(Buffer, DescriptorSet)> {
+        let buffer = Buffer::new(&self.device, "window", 4 * u64::from(width) * u64::from(height))?;
+        let bound = [
+            (view::SHOWN, &self.shown[0].0),
+            (view::SHOWN_RIGHT, &self.shown[1].0),
+            (view::INSET, &self.inset),
+            (view::WINDOW_PIXELS, &buffer),
+        ];
+        let set = DescriptorSet::new(&self.device, &VIEW, &bound)?;
+        Ok((buffer, set))
+    }
+
+    /// Returns the linear pixels of a film as they were shown last. Fails if the device does.
+    pub fn shown(&self, place: Place) -> Result<Vec<[f32; 3]>> {
+        let index = usize::from(place == Place::Right);
+        let [width, height] = self.sizes[index];
+        self.shown[index].0.download(width as usize * height as usize)
+    }
+
+    /// Returns the pixel of a film of `film` pixels under a place in the window, as composed last.
+    pub fn pixel_under(&self, [x, y]: [f64; 2], film: [u32; 2]) -> Option<[u32; 2]> {
+        let [left, top, width, height] = fit(self.film, self.window_size);
+        let at = |place: f64, start: u32, length: u32, pixels: u32| {
+            let share = (place - f64::from(start)) / f64::from(length.max(1));
+            (0.0..1.0).contains(&share).then_some((share * f64::from(pixels)) as u32)
+        };
+        Some([at(x, left, width, film[0])?, at(y, top, height, film[1])?])
+    }
+}
+
+/// True if `layer` is the picture, to which exposure and curve apply.
+pub fn is_picture(layer: u32) -> bool {
+    layer == SHOW_PICTURE
+}
+
+/// Returns left and upper edge, width and height of the largest picture of the shape of `film` in the middle
+/// of a window.
+fn fit(film: [u32; 2], window: [u32; 2]) -> [u32; 4] {
+    let [film_width, film_height] = film.map(|side| u64::from(side.max(1)));
+    let [width, height] = window.map(u64::from);
+    let is_wide = width * film_height > height * film_width;
+    let (shown_width, shown_height) = if is_wide {
+        (height * film_width / film_height, height)
+    } else {
+        (width, width * film_height / film_width)
+    };
+    let (shown_width, shown_height) = (shown_width.max(1), shown_height.max(1));
+    let left = width.saturating_sub(shown_width) / 2;
+    let top = height.saturating_sub(shown_height) / 2;
+    [left, top, shown_width, shown_height].map(|value| u32::try_from(value).unwrap_or(u32::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fit;
+
+    #[test]
+    fn films_fit_into_windows() {
+        assert_eq!(fit([64, 48], [64, 48]), [0, 0, 64, 48]);
+        assert_eq!(fit([64, 48], [128, 48]), [32, 0, 64, 48]);
+        assert_eq!(fit([64, 48], [64, 200]), [0, 76, 64, 48]);
+        assert_eq!(fit([640, 480], [1, 1]), [0, 0, 1, 1]);
+    }
+}

@@ -1,0 +1,102 @@
+//! Functions of direction as lat-long pictures: the environment, and what a cell has learned of it.
+
+use glam::{Vec2, Vec3};
+
+use crate::{
+    film::png::display_from_linear,
+    math::frame::{direction_from_lat_long, lat_long_from_direction},
+    sampler::guided::RecordedGuide,
+    scene::Scene,
+};
+
+/// Share of the pixels that may be over-exposed.
+const CLIPPED: f32 = 0.005;
+/// Factor that darkens colours below the horizon.
+const BELOW: f32 = 0.25;
+const HORIZON: [u8; 3] = [90, 160, 255];
+/// Tint of regions that a cell has not counted itself, linear.
+const UNCOUNTED: Vec3 = Vec3::new(0.35, 0.6, 1.0);
+
+/// Returns what the cell of a pixel has learned: the visibility of every region, white where all is
+/// visible, and the density of the shadow rays; `None` if it has learned nothing.
+pub fn learned_skies(scene: &Scene, recorded: &RecordedGuide, width: usize) -> Option<[Sky; 2]> {
+    let cell = recorded.cell.as_ref()?;
+    let region_of = |direction| recorded.partition.region_of(&scene.environment, direction);
+    let visibility = Sky::new(width, recorded.normal, 1.0, |direction| {
+        let region = cell.regions[region_of(direction)];
+        let colour = if region.trials <= 0.0 { UNCOUNTED } else { Vec3::ONE };
+        region.visibility as f32 * colour
+    });
+    let density = |direction| {
+        let index = region_of(direction);
+        let solid_angle = recorded.partition.regions[index].solid_angle;
+        Vec3::splat((cell.regions[index].probability / solid_angle) as f32)
+    };
+    let white = white_of(width, density);
+    Some([visibility, Sky::new(width, recorded.normal, white, density)])
+}
+
+/// Returns the value that a share of 0.5% of a function's pixels exceeds.
+pub fn white_of(width: usize, value: impl Fn(Vec3) -> Vec3) -> f32 {
+    let mut sorted: Vec<f32> = (0..width * (width / 2))
+        .map(|pixel| value(direction_of(width, pixel)).max_element())
+        .collect();
+    sorted.sort_by(f32::total_cmp);
+    let largest = sorted.last().copied().unwrap_or(0.0);
+    let index = ((1.0 - CLIPPED) * sorted.len() as f32) as usize;
+    sorted.get(index).copied().filter(|white| *white > 0.0).unwrap_or(largest)
+}
+
+/// A lat-long picture, half as high as wide.
+pub struct Sky {
+    width: usize,
+    pixels: Vec<[u8; 3]>,
+}
+
+impl Sky {
+    /// Draws a function of direction, with `white` shown as white; what lies below the horizon of `normal`
+    /// is darker.
+    pub fn new(width: usize, normal: Vec3, white: f32, value: impl Fn(Vec3) -> Vec3) -> Self {
+        let height = width / 2;
+        let show = |pixel: usize| {
+            let direction = direction_of(width, pixel);
+            let cosine = direction.dot(normal);
+            if cosine.abs() < 2.0 / height as f32 {
+                return HORIZON;
+            }
+            let scale = if cosine < 0.0 { BELOW } else { 1.0 } / white.max(f32::MIN_POSITIVE);
+            (value(direction) * scale).to_array().map(display_from_linear)
+        };
+        Self { width, pixels: (0..width * height).map(show).collect() }
+    }
+
+    /// Display values, row by row from the top.
+    pub fn pixels(&self) -> &[[u8; 3]] {
+        &self.pixels
+    }
+
+    /// Draws a dot with a black rim.
+    pub fn mark(&mut self, direction: Vec3, colour: [u8; 3]) {
+        let (width, height) = (self.width, self.width / 2);
+        let uv = lat_long_from_direction(direction);
+        let centre = [(uv.x * width as f32) as i32, (uv.y * height as f32) as i32];
+        for dy in -4_i32..=4 {
+            for dx in -4_i32..=4 {
+                let squared = dx * dx + dy * dy;
+                let row = centre[1] + dy;
+                if squared > 18 || !(0..height as i32).contains(&row) {
+                    continue;
+                }
+                let column = (centre[0] + dx).rem_euclid(width as i32);
+                let colour = if squared > 9 { [0; 3] } else { colour };
+                self.pixels[row as usize * width + column as usize] = colour;
+            }
+        }
+    }
+}
+
+fn direction_of(width: usize, pixel: usize) -> Vec3 {
+    let u = ((pixel % width) as f32 + 0.5) / width as f32;
+    let v = ((pixel / width) as f32 + 0.5) / (width / 2) as f32;
+    direction_from_lat_long(Vec2::new(u, v))
+}

@@ -1,0 +1,217 @@
+//! Effects of input: motions of the camera, keys, files.
+
+use super::{Motion, Worker};
+use crate::{
+    error::Result,
+    film::Metadata,
+    renderer::Settings,
+    sampler::Sampler,
+    shader::constants::SHOW_PICTURE,
+    view::{
+        inset,
+        keys::{Action, LAYERS, rows},
+        panel::Input,
+        projector::Inset,
+        save::{Saved, names},
+        side::Side,
+    },
+};
+
+/// Angle of an orbit or turn across the height of the window, radians.
+const TURN: f32 = 3.0;
+/// Factor of the distance at a notch of the wheel.
+const NOTCH: f32 = 0.88;
+
+impl Worker {
+    /// Acts on input between passes. Returns true if the camera has moved.
+    pub(super) fn apply(&mut self, input: Input) -> Result<bool> {
+        let action = match input {
+            Input::Held(direction) => {
+                self.held = direction.into();
+                return Ok(false);
+            }
+            Input::Orbit([x, y]) => {
+                self.rig.orbit(-TURN * x, TURN * y);
+                return Ok(true);
+            }
+            Input::Turn([x, y]) => {
+                self.rig.turn(TURN * x, -TURN * y);
+                return Ok(true);
+            }
+            Input::Pan([x, y]) => {
+                self.rig.pan(-x, y);
+                return Ok(true);
+            }
+            Input::Wheel(notches) => {
+                self.rig.zoom(NOTCH.powf(notches));
+                return Ok(true);
+            }
+            Input::Pointer(_) => {
+                self.update_inset()?;
+                return Ok(false);
+            }
+            Input::Key(action) => action,
+            Input::Resized(_) | Input::Redraw | Input::Close => return Ok(false),
+        };
+        match action {
+            Action::Sampler(number) => self.choose_sampler(number)?,
+            Action::Depth(more) => {
+                let depth = self.settings.depth.saturating_add_signed(more).clamp(1, 64);
+                if depth != self.settings.depth {
+                    self.settings.depth = depth;
+                    self.remake()?;
+                }
+            }
+            Action::Split => {
+                if self.right.take().is_none() {
+                    let side = self.make_side(self.right_sampler)?;
+                    self.right = Some(side);
+                } else {
+                    self.chooses_right = false;
+                }
+                self.look(self.whole(), true)?;
+            }
+            Action::Swap => self.chooses_right = self.right.is_some() && !self.chooses_right,
+            Action::Layer(layer) => self.toggle_layer(layer)?,
+            Action::NextLayer => {
+                let now = self.panel.borrow().layer;
+                let at = LAYERS.iter().position(|(layer, _)| *layer == now).unwrap_or(0);
+                self.panel.borrow_mut().layer = LAYERS[(at + 1) % LAYERS.len()].0;
+                self.show_again()?;
+            }
+            Action::Inset => {
+                self.shows_inset = !self.shows_inset;
+                self.update_inset()?;
+            }
+            Action::Save if self.motion == Motion::Rest && !self.is_stopped() => self.save()?,
+            Action::Save => self.saves_at_rest = true,
+            Action::Home => {
+                self.rig.go_home();
+                return Ok(true);
+            }
+            Action::Help => rows().iter().for_each(|(keys, about)| eprintln!("{keys:18} {about}")),
+            // These are done by the panel, or hold as long as the key.
+            Action::Exposure(_) | Action::AutoExposure | Action::Curve => {}
+            Action::Fly(..) | Action::Quit => {}
+        }
+        Ok(false)
+    }
+
+    /// Shows what the films have, unless a pass was stopped in them.
+    fn show_again(&mut self) -> Result<()> {
+        self.looked_at = None;
+        if self.is_stopped() { Ok(()) } else { self.show() }
+    }
+
+    fn toggle_layer(&mut self, layer: u32) -> Result<()> {
+        let mut panel = self.panel.borrow_mut();
+        panel.layer = if panel.layer == layer { SHOW_PICTURE } else { layer };
+        drop(panel);
+        self.show_again()
+    }
+
+    fn choose_sampler(&mut self, number: usize) -> Result<()> {
+        let Some(sampler) = Sampler::ALL.get(number.wrapping_sub(1)).copied() else {
+            return Ok(());
+        };
+        if self.chooses_right {
+            self.right_sampler = sampler;
+            self.right = None;
+            let side = self.make_side(sampler)?;
+            self.right = Some(side);
+        } else if sampler != self.left.sampler {
+            self.keep_guide()?;
+            self.left = self.make_side(sampler)?;
+        }
+        self.look(self.whole(), true)
+    }
+
+    /// Makes all renderers again, with settings that changed.
+    fn remake(&mut self) -> Result<()> {
+        self.keep_guide()?;
+        self.left = self.make_side(self.left.sampler)?;
+        if self.right.take().is_some() {
+            let side = self.make_side(self.right_sampler)?;
+            self.right = Some(side);
+        }
+        self.look(self.whole(), true)
+    }
+
+    /// Keeps what the left side has learned for the next renderer.
+    fn keep_guide(&mut self) -> Result<()> {
+        self.guide = self.left.guide()?.or(self.guide.take());
+        Ok(())
+    }
+
+    /// Makes the renderer of a sampler.
+    fn make_side(&self, sampler: Sampler) -> Result<Side> {
+        (self.announce)(format!("{} | preparing {}", self.scene.name, sampler.name()));
+        let settings = Settings { sampler, ..self.settings.clone() };
+        let buffers = Some(self.left.renderer.scene_buffers());
+        let guide = self.guide.as_ref();
+        let mut side = Side::new(&self.device, &self.scene, buffers, &settings, guide)?;
+        side.renderer.set_watch(self.watch());
+        Ok(side)
+    }
+
+    fn update_inset(&mut self) -> Result<()> {
+        if self.shows_inset {
+            if self.motion == Motion::Rest && !self.is_stopped() {
+                self.draw_inset()?;
+                self.panel.borrow_mut().present()?;
+            }
+        } else {
+            let mut panel = self.panel.borrow_mut();
+            panel.projector.set_inset(&Inset::default())?;
+            if self.left.renderer.sample_count() > 0 {
+                panel.present()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Draws what the pixel under the pointer has learned, into the inset.
+    pub(super) fn draw_inset(&mut self) -> Result<()> {
+        let film = self.left.renderer.film_size();
+        let panel = self.panel.borrow();
+        let pixel = panel.pointer.and_then(|at| panel.projector.pixel_under(at, film));
+        drop(panel);
+        let recorded = match pixel {
+            Some(pixel) => self.left.renderer.inspect_guided_pixel(pixel)?,
+            None => None,
+        };
+        let drawn = recorded.and_then(|recorded| inset::draw(&self.scene, &recorded));
+        self.panel.borrow_mut().projector.set_inset(&drawn.unwrap_or_default())
+    }
+
+    /// Writes the window, the film and the camera, and says where.
+    pub(super) fn save(&mut self) -> Result<()> {
+        if self.left.renderer.sample_count() == 0 {
+            self.saves_at_rest = true;
+            return Ok(());
+        }
+        let (size, pixels) = self.panel.borrow_mut().picture()?;
+        let sums = self.left.renderer.sums()?;
+        let metadata = Metadata {
+            sampler: self.left.sampler.name().to_owned(),
+            sampler_parameters: self.left.sampler.describe(&self.settings.parameters),
+            shadow_rays: self.settings.shadow_rays,
+            depth: self.settings.depth,
+            candidates: self.left.renderer.report().candidates,
+            seconds: self.left.time.as_secs_f64(),
+            ..self.metadata.clone()
+        };
+        let camera = self.rig.camera();
+        let seed = self.left.renderer.seed();
+        let files = names(&self.folder, &self.scene.name);
+        let saved = Saved { size, pixels: &pixels, sums: &sums, seed, metadata, camera };
+        // A full disk is no reason to lose the picture on the screen.
+        match saved.write(&files) {
+            Ok(()) => {
+                eprintln!("wrote {}", files.map(|file| file.display().to_string()).join(", "))
+            }
+            Err(error) => log::error!("{error}"),
+        }
+        Ok(())
+    }
+}

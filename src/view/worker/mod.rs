@@ -1,0 +1,338 @@
+//! The rendering thread: renders what the window asks for, and shows it.
+
+mod act;
+
+use std::{
+    cell::RefCell,
+    path::PathBuf,
+    rc::Rc,
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use glam::Vec3;
+
+use super::{
+    camera::Rig,
+    keys::{Action, LAYERS},
+    panel::{Input, Panel},
+    projector::Place,
+    side::Side,
+};
+use crate::{
+    error::Result,
+    film::Metadata,
+    gpu::Device,
+    math::random::hash_4d,
+    pass::Watch,
+    renderer::Settings,
+    sampler::{Sampler, guided::GuideState},
+    scene::Scene,
+    shader::constants::{SHOW_ERROR, SHOW_PICTURE},
+};
+
+/// Time without a motion after which the camera is at rest.
+const REST: Duration = Duration::from_millis(150);
+/// Aim for the time between two pictures of a moving camera.
+const MOVING_TIME: Duration = Duration::from_millis(60);
+/// Least side of the film of a moving camera, pixels, and the largest factor by which it shrinks.
+const LEAST_SIDE: u32 = 16;
+const MOST_SHRINKING: f32 = 32.0;
+/// Time between rebuilds of the guide while the camera moves.
+const LEARNING_INTERVAL: Duration = Duration::from_millis(500);
+/// Longest rebuild that a moving camera may wait for.
+const LEARNING_TIME: Duration = Duration::from_millis(30);
+/// Longest time that one step of flying covers: after a pause the camera must not jump.
+const LONGEST_STEP: f32 = 0.1;
+/// Interval between insets, and between means of the film for its relative error.
+const LOOK_INTERVAL: Duration = Duration::from_millis(400);
+/// Tells the seeds of moved cameras from other hashes.
+const MOVED_SEED: u32 = 0x51de_ca3b;
+
+/// Where the camera is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Motion {
+    /// At rest: the whole film refines.
+    Rest,
+    /// Moving, since this moment at the latest.
+    Moving(Instant),
+}
+
+/// Everything that the rendering thread has.
+pub struct Worker {
+    scene: Scene,
+    device: Arc<Device>,
+    settings: Settings,
+    /// Samples per pixel at which a film is finished.
+    spp: u32,
+    panel: Rc<RefCell<Panel>>,
+    left: Side,
+    right: Option<Side>,
+    /// Sampler of the right side when it is shown next.
+    right_sampler: Sampler,
+    /// True if the number keys choose the sampler of the right side.
+    chooses_right: bool,
+    /// Guide of the last renderer of `guided`, for the next one.
+    guide: Option<GuideState>,
+    rig: Rig,
+    held: Vec3,
+    motion: Motion,
+    /// Factor between the whole film and that of a moving camera.
+    shrinking: f32,
+    /// Number of cameras so far, for the seeds.
+    looks: u32,
+    learned_at: Instant,
+    /// Time that the last rebuild took; none is tried in motion before one at rest.
+    learning_time: Option<Duration>,
+    shows_inset: bool,
+    /// True if files are to be written once the camera is at rest.
+    saves_at_rest: bool,
+    looked_at: Option<Instant>,
+    mean_radiance: f32,
+    metadata: Metadata,
+    folder: PathBuf,
+    announce: Box<dyn Fn(String)>,
+}
+
+/// Parts of a worker.
+pub struct Parts {
+    /// The scene.
+    pub scene: Scene,
+    /// The device, opened for the display.
+    pub device: Arc<Device>,
+    /// Settings of the first renderer.
+    pub settings: Settings,
+    /// Samples per pixel at which a film is finished.
+    pub spp: u32,
+    /// Its side, made before the window was connected.
+    pub left: Side,
+    /// The window.
+    pub panel: Panel,
+    /// Metadata of the files.
+    pub metadata: Metadata,
+    /// Folder of the files that are written.
+    pub folder: PathBuf,
+    /// Shows a title.
+    pub announce: Box<dyn Fn(String)>,
+}
+
+impl Worker {
+    /// Prepares to render.
+    pub fn new(parts: Parts) -> Self {
+        let Parts { scene, device, settings, spp, left, panel, metadata, folder, announce } = parts;
+        let is_software = device.capabilities().kind == "software";
+        let mut worker = Self {
+            rig: Rig::new(scene.camera),
+            scene,
+            device,
+            settings,
+            spp,
+            panel: Rc::new(RefCell::new(panel)),
+            left,
+            right: None,
+            right_sampler: Sampler::Mis,
+            chooses_right: false,
+            guide: None,
+            held: Vec3::ZERO,
+            motion: Motion::Rest,
+            shrinking: if is_software { 8.0 } else { 2.0 },
+            looks: 0,
+            learned_at: Instant::now(),
+            learning_time: None,
+            shows_inset: false,
+            saves_at_rest: false,
+            looked_at: None,
+            mean_radiance: 0.0,
+            metadata,
+            folder,
+            announce,
+        };
+        let watch = worker.watch();
+        worker.left.renderer.set_watch(watch);
+        worker
+    }
+
+    /// Attends to the window between the waves of a pass.
+    fn watch(&self) -> Watch {
+        let panel = Rc::clone(&self.panel);
+        Box::new(move || {
+            let mut panel = panel.borrow_mut();
+            panel.attend() && !panel.is_moving
+        })
+    }
+
+    /// Renders until the window is closed.
+    ///
+    /// # Errors
+    /// A failing device, a lost display, a file that cannot be written.
+    pub fn run(&mut self) -> Result<()> {
+        let mut last = Instant::now();
+        loop {
+            self.panel.borrow_mut().attend();
+            self.panel.borrow_mut().take_failure()?;
+            if std::mem::take(&mut self.panel.borrow_mut().is_toned) {
+                (self.announce)(self.title());
+            }
+            let now = Instant::now();
+            let step = (now - last).as_secs_f32().min(LONGEST_STEP);
+            last = now;
+            let mut moved = false;
+            loop {
+                let Some(input) = self.panel.borrow_mut().pending.pop_front() else { break };
+                match input {
+                    Input::Close | Input::Key(Action::Quit) => return Ok(()),
+                    input => moved |= self.apply(input)?,
+                }
+            }
+            if self.held != Vec3::ZERO {
+                self.rig.fly(self.held, step);
+                moved = true;
+            }
+            if moved {
+                self.motion = Motion::Moving(Instant::now());
+                self.panel.borrow_mut().is_moving = true;
+                self.move_on()?;
+            } else if let Motion::Moving(since) = self.motion {
+                if since.elapsed() >= REST {
+                    self.motion = Motion::Rest;
+                    self.panel.borrow_mut().is_moving = false;
+                    self.look(self.whole(), true)?;
+                } else if !self.refine()? {
+                    self.panel.borrow_mut().wait(REST / 4);
+                }
+            } else if self.is_stopped() {
+                // Input stopped a pass that nothing has started again.
+                self.look(self.whole(), true)?;
+            } else if !self.refine()? {
+                self.panel.borrow_mut().wait(Duration::from_secs(1));
+                last = Instant::now();
+            }
+        }
+    }
+
+    fn sides(&mut self) -> impl Iterator<Item = &mut Side> {
+        [Some(&mut self.left), self.right.as_mut()].into_iter().flatten()
+    }
+
+    fn is_stopped(&mut self) -> bool {
+        self.sides().any(|side| side.renderer.is_stopped())
+    }
+
+    /// Width and height of the whole film.
+    fn whole(&self) -> [u32; 2] {
+        [self.scene.film.width, self.scene.film.height]
+    }
+
+    /// Starts all films again through the camera of now.
+    fn look(&mut self, size: [u32; 2], learns: bool) -> Result<()> {
+        self.looks = self.looks.wrapping_add(1);
+        let [seed, ..] = hash_4d([self.settings.seed, self.looks, MOVED_SEED, 0]);
+        let camera = *self.rig.camera();
+        let start = Instant::now();
+        for side in self.sides() {
+            side.look(&camera, size, seed, learns)?;
+        }
+        if learns {
+            self.learned_at = Instant::now();
+            self.learning_time = Some(start.elapsed());
+        }
+        Ok(())
+    }
+
+    /// Shows the scene through a camera that has moved, on a film small enough to answer at once.
+    fn move_on(&mut self) -> Result<()> {
+        let start = Instant::now();
+        let is_quick = self.learning_time.is_some_and(|time| time <= LEARNING_TIME);
+        let learns = is_quick && self.learned_at.elapsed() >= LEARNING_INTERVAL;
+        let shrinking = self.shrinking;
+        let side = |side: u32| ((side as f32 / shrinking) as u32).clamp(LEAST_SIDE.min(side), side);
+        let size = self.whole().map(side);
+        self.look(size, learns)?;
+        let before = Instant::now();
+        for side in self.sides() {
+            side.render(1)?;
+        }
+        let took = before.elapsed().as_secs_f32();
+        let wanted = (took / MOVING_TIME.as_secs_f32()).sqrt().clamp(0.7, 2.0);
+        self.shrinking = (self.shrinking * wanted).clamp(1.0, MOST_SHRINKING);
+        self.show()?;
+        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+        let (all, looking) = (ms(start.elapsed()), ms(before - start));
+        log::debug!("moving: {size:?} pixels in {all:.0} ms, {looking:.0} of them before the pass");
+        Ok(())
+    }
+
+    /// Renders a pass of the side that had less time, and shows it. Returns false if all is done.
+    fn refine(&mut self) -> Result<bool> {
+        let spp = self.spp;
+        let side = self
+            .sides()
+            .filter(|side| side.renderer.sample_count() < spp)
+            .min_by_key(|side| side.time);
+        let Some(side) = side else { return Ok(false) };
+        let most = spp - side.renderer.sample_count();
+        side.render(most)?;
+        if !side.renderer.is_stopped() {
+            self.show()?;
+            if self.saves_at_rest && self.motion == Motion::Rest {
+                self.saves_at_rest = false;
+                self.save()?;
+            }
+        }
+        Ok(true)
+    }
+
+    /// Takes over what the films show, and shows it.
+    fn show(&mut self) -> Result<()> {
+        let layer = self.panel.borrow().layer;
+        let is_due = self.looked_at.is_none_or(|at| at.elapsed() >= LOOK_INTERVAL);
+        if is_due && layer == SHOW_ERROR && self.left.renderer.sample_count() > 0 {
+            let sums = self.left.renderer.sums()?;
+            let total: f64 =
+                (0..sums.pixel_count()).map(|i| sums.mean(i).iter().sum::<f64>()).sum();
+            self.mean_radiance = (total / (3.0 * sums.pixel_count() as f64)) as f32;
+            self.looked_at = Some(Instant::now());
+        }
+        if is_due && self.shows_inset && self.motion == Motion::Rest {
+            self.draw_inset()?;
+            self.looked_at = Some(Instant::now());
+        }
+        let mean = self.mean_radiance;
+        let mut panel = self.panel.borrow_mut();
+        panel.has_right = self.right.is_some();
+        for (side, place) in [(Some(&self.left), Place::Left), (self.right.as_ref(), Place::Right)]
+        {
+            // A film without a sample goes on showing what was there before.
+            if let Some(side) = side.filter(|side| side.renderer.sample_count() > 0) {
+                panel.projector.show(&side.renderer, place, side.layer(layer), mean)?;
+            }
+        }
+        panel.present()?;
+        drop(panel);
+        (self.announce)(self.title());
+        Ok(())
+    }
+
+    /// One line about what is shown.
+    fn title(&self) -> String {
+        let describe = |side: &Side| {
+            let samples = side.renderer.sample_count();
+            format!("{} {samples} spp {:.1} s", side.sampler.name(), side.time.as_secs_f64())
+        };
+        let mut title = format!("{} | {}", self.scene.name, describe(&self.left));
+        if let Some(right) = &self.right {
+            title += &format!(" | {}", describe(right));
+        }
+        let panel = self.panel.borrow();
+        if panel.layer != SHOW_PICTURE {
+            let name =
+                LAYERS.iter().find(|(layer, _)| *layer == panel.layer).map(|(_, name)| *name);
+            title += &format!(" | {}", name.unwrap_or_default());
+        }
+        if self.motion != Motion::Rest {
+            title += " | moving";
+        }
+        let Settings { depth, .. } = self.settings;
+        title + &format!(" | depth {depth}, {:+.1} stops", panel.tone.exposure)
+    }
+}

@@ -1,0 +1,126 @@
+//! Devices that run out of memory or are lost while they render, by a Vulkan layer that fails on
+//! request (`support/faulty_layer.c`).
+#![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
+
+#[path = "support/command.rs"]
+mod command;
+
+use std::{
+    path::PathBuf,
+    process::{Command, Output},
+    sync::OnceLock,
+};
+
+use command::{Folder, Run, program};
+use fenestra::film::{Checkpoint, Image, checkpoint::remove_checkpoint};
+
+const LAYER: &str = "VK_LAYER_TEST_faulty";
+
+/// Compiles the layer, with the compiler that links Rust programs, and returns its folder.
+fn layer_folder() -> &'static PathBuf {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    FOLDER.get_or_init(|| {
+        let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("faulty_layer");
+        std::fs::create_dir_all(&folder).unwrap();
+        let library = folder.join("libfaulty_layer.so");
+        let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/support/faulty_layer.c");
+        let mut compiler = Command::new("cc");
+        compiler.args(["-O1", "-shared", "-fPIC", "-fvisibility=hidden", source, "-o"]);
+        assert!(compiler.arg(&library).status().expect("a C compiler").success());
+        let manifest = serde_json::json!({
+            "file_format_version": "1.1.2",
+            "layer": {
+                "name": LAYER, "type": "GLOBAL", "library_path": library, "api_version": "1.2.0",
+                "implementation_version": "1", "description": "A device that fails on request",
+            },
+        });
+        std::fs::write(folder.join("faulty_layer.json"), manifest.to_string()).unwrap();
+        folder
+    })
+}
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
+    folder.write("scene.toml", command::yard([64, 48], "sky = {}", clay, command::BALL));
+    folder
+}
+
+/// Renders with the layer; `faults` are its variables.
+fn render(folder: &Folder, faults: &[(&str, u64)], options: &[&str]) -> Run {
+    let mut command = program(folder.path());
+    command.env("VK_LAYER_PATH", layer_folder()).env("VK_INSTANCE_LAYERS", LAYER);
+    for (name, value) in faults {
+        command.env(name, value.to_string());
+    }
+    command.args(["render", "scene.toml", "-o", "out.exr"]).args(options);
+    let output: Output = command.output().unwrap();
+    Run::of(&output)
+}
+
+#[test]
+fn a_lost_device_ends_in_one_message_and_keeps_the_checkpoint() {
+    let folder = folder();
+    let path = folder.path().join("out.checkpoint.exr");
+    let picture = || Image::read_exr(&folder.path().join("out.exr")).unwrap().channels;
+    let mut kept = 0;
+    for sampler in ["--sampler=mis", "--sampler=guided"] {
+        // The first is an upload; the last comes some samples after the first checkpoint.
+        for submission in [1, 70, 110] {
+            let faults = [("FAULTY_SUBMISSION", submission)];
+            let options = [sampler, "--spp=1000000", "--checkpoint-interval=1ms"];
+            let run = render(&folder, &faults, &options);
+            run.assert(1, &["the device is lost", "help: ", "--resume"]);
+            assert_eq!(run.messages.matches("error: ").count(), 1, "{}", run.messages);
+            if !path.exists() {
+                continue;
+            }
+            let (checkpoint, guide) = Checkpoint::read_with_guide(&path).unwrap();
+            assert_eq!(guide.is_some(), sampler == "--sampler=guided");
+            let spp = format!("--spp={}", checkpoint.sums.sample_count + 6);
+            render(&folder, &[], &[sampler, "-q", &spp, "--resume"]).assert(0, &[]);
+            let resumed = picture();
+            render(&folder, &[], &[sampler, "-q", &spp]).assert(0, &[]);
+            assert!(resumed == picture(), "{sampler} lost at submission {submission}");
+            remove_checkpoint(&path).unwrap();
+            kept += 1;
+        }
+    }
+    assert!(kept >= 2, "{kept} devices were lost after a checkpoint");
+}
+
+/// The driver frees memory twice where `vkCreateDevice` finds too little.
+#[test]
+fn a_limit_of_address_space_is_an_error_before_the_driver_is_loaded() {
+    let folder = folder();
+    let mut shell = Command::new("sh");
+    let line = "ulimit -v 500000; exec \"$0\" render scene.toml --spp 1 -o out.exr";
+    shell.args(["-c", line, env!("CARGO_BIN_EXE_fenestra")]).current_dir(folder.path());
+    let run = Run::of(&shell.output().unwrap());
+    run.assert(1, &["not enough memory: the Vulkan driver asks for ", "that ulimit -v allows"]);
+}
+
+/// From no memory at all to enough: a message, then smaller waves, then the same picture.
+#[test]
+fn a_device_out_of_memory_takes_smaller_waves_before_it_refuses() {
+    let folder = folder();
+    let options = ["-q", "--sampler=mis", "--spp=2"];
+    render(&folder, &[], &options).assert(0, &[]);
+    let picture = Image::read_exr(&folder.path().join("out.exr")).unwrap().channels;
+    let (mut refused, mut smaller) = (0, 0);
+    for megabytes in [0, 30, 60, 75, 90, 105, 300] {
+        let run = render(&folder, &[("FAULTY_BYTES", megabytes << 20)], &options);
+        let is_smaller = run.messages.contains(" paths at a time");
+        if run.status == Some(0) {
+            let same = Image::read_exr(&folder.path().join("out.exr")).unwrap().channels;
+            assert!(same == picture, "{megabytes} MiB");
+            smaller += u32::from(is_smaller);
+        } else {
+            run.assert(1, &["error: the device is out of memory: buffer ", " asks for ", "help: "]);
+            assert_eq!(smaller, 0, "{megabytes} MiB are too little, less was enough");
+            refused += 1;
+        }
+    }
+    assert!(refused > 0 && smaller > 0, "{refused} refused, {smaller} with smaller waves");
+}

@@ -1,0 +1,199 @@
+//! `fenestra view` in a real window: on a virtual X server, with keys sent and pictures read back.
+#![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
+
+#[path = "support/command.rs"]
+mod command;
+#[path = "support/page.rs"]
+mod page;
+#[path = "support/x11.rs"]
+mod x11;
+
+use std::fmt::Write;
+
+use command::{BALL, Folder, yard};
+use fenestra::{film::Image, view::keys};
+use x11::{Server, View};
+
+const SIZE: [u32; 2] = [64, 48];
+const CLAY: &str = "type = \"diffuse\"\nreflectance = [0.5, 0.6, 0.4]";
+
+const SKY: &str = "sky = { width = 32, sun_radius_deg = 20.0, sun_radiance = [4, 3, 2] }";
+/// Walls around the yard and a roof; the wall to the left is low.
+const WALLS: [([f32; 3], [f32; 3]); 5] = [
+    ([8.0, 0.2, 8.0], [0.0, 3.0, 0.0]),
+    ([0.2, 3.0, 8.0], [4.0, 1.5, 0.0]),
+    ([0.2, 1.5, 8.0], [-4.0, 0.75, 0.0]),
+    ([8.0, 3.0, 0.2], [0.0, 1.5, -4.0]),
+    ([8.0, 3.0, 0.2], [0.0, 1.5, 4.0]),
+];
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    folder.write("yard.toml", yard(SIZE, SKY, CLAY, BALL));
+    let mut room = String::new();
+    for (size, place) in WALLS {
+        let wall = format!("shape = \"box\"\nsize = {size:?}\ntranslate = {place:?}");
+        let _ = write!(room, "{wall}\nmaterial = \"clay\"\n[[object]]\n");
+    }
+    folder.write("room.toml", yard(SIZE, SKY, CLAY, &(room + BALL)));
+    folder
+}
+
+/// Renders and converts to display values; `more` are options of `convert`.
+fn rendered(folder: &Folder, scene: &str, spp: &str, more: &[&str]) -> Vec<[u8; 3]> {
+    let render = ["render", scene, "--sampler", "mis", "--depth", "2", "--spp", spp, "-o", "r.exr"];
+    folder.run(&render).assert(0, &[]);
+    folder.run(&[&["convert", "r.exr", "r.png"], more].concat()).assert(0, &[]);
+    image::open(folder.path().join("r.png")).unwrap().into_rgb8().pixels().map(|p| p.0).collect()
+}
+
+/// Largest difference of two pictures, levels.
+fn difference(one: &[[u8; 3]], other: &[[u8; 3]]) -> u8 {
+    assert_eq!(one.len(), other.len());
+    let pairs = one.as_flattened().iter().zip(other.as_flattened());
+    pairs.map(|(one, other)| one.abs_diff(*other)).max().unwrap()
+}
+
+fn film(folder: &Folder, name: &str) -> Vec<[f32; 3]> {
+    let path = folder.path().join(name);
+    Image::read_exr(&path).unwrap().rgb(&path).unwrap().pixels
+}
+
+#[test]
+fn the_window_shows_what_render_writes() {
+    let folder = folder();
+    let server = Server::start();
+    let options = ["--sampler", "mis", "--depth", "2", "--spp", "8", "--validate"];
+    let mut view = View::open(&server, &folder, "yard.toml", &options, SIZE);
+    view.wait_for("mis 8 spp");
+    let expected = rendered(&folder, "yard.toml", "8", &[]);
+    assert!(difference(&view.picture(SIZE), &expected) <= 1, "the picture at rest");
+
+    // Exposure and curve act on the picture that is there.
+    view.tap("=");
+    view.wait_for("+0.5 stops");
+    view.tap("c");
+    let expected =
+        rendered(&folder, "yard.toml", "8", &["--exposure", "0.5", "--curve", "reinhard"]);
+    view.wait_until(|view| difference(&view.picture(SIZE), &expected) <= 1);
+    view.tap("c");
+    let filmic = rendered(&folder, "yard.toml", "8", &["--exposure", "0.5", "--curve", "filmic"]);
+    view.wait_until(|view| difference(&view.picture(SIZE), &filmic) <= 1);
+    view.tap("p");
+    view.wait_for_file("yard.view-1.toml");
+    assert!(film(&folder, "yard.view-1.exr") == film(&folder, "r.exr"), "the same bits");
+    let written = image::open(folder.path().join("yard.view-1.png")).unwrap().into_rgb8();
+    let written: Vec<[u8; 3]> = written.pixels().map(|pixel| pixel.0).collect();
+    assert!(written == view.picture(SIZE), "the file shows what the window shows");
+
+    // The camera flies to the right; the picture is that of `render` with the camera that was written.
+    view.press("d");
+    view.wait_for("moving");
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    view.release("d");
+    view.wait_for("mis 8 spp");
+    view.wait_until(|view| !view.title().contains("moving"));
+    view.tap("p");
+    view.wait_for_file("yard.view-2.toml");
+    let camera = std::fs::read_to_string(folder.path().join("yard.view-2.toml")).unwrap();
+    let scene = std::fs::read_to_string(folder.path().join("yard.toml")).unwrap();
+    let (_, rest) = scene.split_once("[film]").unwrap();
+    folder.write("moved.toml", format!("{camera}\n[film]{rest}"));
+    rendered(&folder, "moved.toml", "64", &[]);
+    let (shown, expected) = (film(&folder, "yard.view-2.exr"), film(&folder, "r.exr"));
+    let error = relative_error(&shown, &expected);
+    let moved = relative_error(&film(&folder, "yard.view-1.exr"), &expected);
+    assert!(error < 0.1 && moved > 3.0 * error, "{error} after the motion, {moved} before");
+
+    // The window grows: the film keeps its shape in the middle.
+    view.resize([160, 96]);
+    view.wait_until(|view| {
+        let picture = view.picture([160, 96]);
+        let grey = [33; 3];
+        picture[0] == grey && picture[16] != grey && picture[143] != grey && picture[144] == grey
+    });
+    view.tap("Escape");
+    let run = view.end();
+    run.assert(0, &["wrote yard.view-1.png, yard.view-1.exr, yard.view-1.toml"]);
+}
+
+/// Mean absolute difference over the mean.
+fn relative_error(one: &[[f32; 3]], other: &[[f32; 3]]) -> f32 {
+    let pairs = one.as_flattened().iter().zip(other.as_flattened());
+    let difference: f32 = pairs.map(|(one, other)| (one - other).abs()).sum();
+    difference / other.as_flattened().iter().sum::<f32>()
+}
+
+#[test]
+fn samplers_layers_and_insets_can_be_looked_at() {
+    let folder = folder();
+    let server = Server::start();
+    let options = ["--depth", "2", "--spp", "4", "--validate", "--set", "candidates=1"];
+    let mut view = View::open(&server, &folder, "room.toml", &options, SIZE);
+    view.wait_for("guided 4 spp");
+    let picture = view.picture(SIZE);
+    for (key, title) in [("h", "relative error"), ("g", "cells"), ("l", "kinds of cells")] {
+        let before = view.picture(SIZE);
+        view.tap(key);
+        view.wait_for(title);
+        view.wait_until(|view| view.picture(SIZE) != before);
+    }
+    view.tap("l");
+    view.wait_until(|view| view.picture(SIZE) == picture);
+    view.tap("x");
+    view.wait_for("guided 4 spp");
+    view.wait_for("mis 4 spp");
+    let line = SIZE[0] as usize / 2;
+    view.wait_until(|view| view.picture(SIZE)[line] == [255; 3]);
+    view.tap("Tab");
+    view.tap("4");
+    view.wait_for("env 4 spp");
+    view.tap("]");
+    view.wait_for("depth 3");
+    view.wait_for("env 4 spp");
+    // The inset lies in the corner, once the window has room for it.
+    view.resize([640, 480]);
+    let corner = 479 * 640 + 639;
+    view.wait_until(|view| view.picture([640, 480]).get(corner).is_some());
+    let before = view.picture([640, 480]);
+    view.point([320, 400]);
+    view.tap("i");
+    let line = (480 - 130) * 640 + 500;
+    view.wait_until(|view| view.picture([640, 480])[line..line + 9] != before[line..line + 9]);
+    view.tap("Escape");
+    view.end().assert(0, &[]);
+}
+
+#[test]
+fn a_display_that_is_missing_or_goes_away_is_an_error() {
+    let folder = folder();
+    let run = |display: Option<&str>| {
+        let mut program = command::program(folder.path());
+        program.args(["view", "yard.toml"]).env_remove("WAYLAND_DISPLAY").env_remove("DISPLAY");
+        if let Some(display) = display {
+            program.env("DISPLAY", display);
+        }
+        command::Run::of(&program.output().unwrap())
+    };
+    let parts = ["no window can be opened", "help: a window needs DISPLAY"];
+    run(None).assert(1, &parts);
+    run(Some(":4711")).assert(1, &parts);
+    let server = Server::start();
+    let mut view = View::open(&server, &folder, "yard.toml", &["--sampler", "mis"], SIZE);
+    view.wait_for("mis ");
+    drop(server);
+    let run = view.end();
+    assert!(run.status.is_some_and(|status| status != 0), "{:?} {}", run.status, run.messages);
+    assert!(!run.messages.contains("panicked"), "{}", run.messages);
+}
+
+#[test]
+fn the_page_lists_the_keys() {
+    let mut table = String::from("| key | effect |\n|---|---|\n");
+    for (keys, about) in keys::rows() {
+        let keys = keys.split(' ').map(|key| format!("`{key}`")).collect::<Vec<_>>().join(" ");
+        let _ = writeln!(table, "| {keys} | {about} |");
+    }
+    page::check("view.md", "keys", &table);
+}
