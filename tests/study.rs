@@ -139,7 +139,9 @@ fn a_study_has_every_figure() {
         let last = measurements.last().unwrap();
         assert!(last["seconds"].as_f64().unwrap() > 0.0);
         assert!((last["mean_ratio"].as_f64().unwrap() - 1.0).abs() < 0.2, "{last}");
-        assert!(last["mean_deviation"].as_f64().unwrap().abs() < 5.0, "{last}");
+        // One sample, all that a busy machine renders in 100 ms, has no standard error.
+        let deviation = last["mean_deviation"].as_f64();
+        assert!(deviation.map_or(last["spp"] == 1, |sigmas| sigmas.abs() < 5.0), "{last}");
         let [p999, max] = ["relmse_p999", "relmse_max"].map(|name| last[name].as_f64().unwrap());
         assert!(max > 0.0 && p999 <= max && last["relmse_trimmed"].as_f64() < Some(p999), "{last}");
         assert!(run["visible_share"].as_f64().unwrap() > 0.2);
@@ -415,6 +417,7 @@ fn interrupt_reference(sampler: &str) {
         "yard.toml",
         "--spp=3000",
         "--depth=1",
+        "--shadow-rays=5",
         &format!("--seed={seed}"),
         "--aov=variance",
         &format!("--sampler={sampler}"),

@@ -24,7 +24,8 @@ setTimeout(() => {
     press("f");
     seen.flipped = part(".tag.left").textContent;
     const head = document.querySelector("thead tr").lastElementChild;
-    const column = () => [...head.closest("table").tBodies[0].rows].map(row => row.lastElementChild.textContent);
+    const column = () =>
+      [...head.closest("table").tBodies[0].rows].map(row => row.lastElementChild.textContent);
     const original = column();
     head.querySelector("button").click();
     seen.sorted = [head.ariaSort, column()];
