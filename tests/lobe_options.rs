@@ -71,8 +71,8 @@ fn what_cannot_be_rendered_is_refused_with_its_remedy() {
 #[test]
 fn a_render_whose_pixels_keep_caches_is_not_resumed_but_merged() {
     let folder = clay();
-    let options = ["--sampler", "visibility", "--checkpoint-interval", "1h", "--set"];
-    let pixel = [&options[..], &["cache=pixel"]].concat();
+    let options = ["--sampler", "visibility", "--depth", "1", "--checkpoint-interval", "1h"];
+    let pixel = [&options[..], &["--set", "cache=pixel"]].concat();
     run(&folder, &pixel).assert(0, &[]);
     let parts = ["--resume with --set cache=pixel", "--sample-offset 2", "use cache=hit"];
     run(&folder, &[&pixel[..], &["--resume"]].concat()).assert(2, &parts);
