@@ -171,7 +171,7 @@ fn room() -> Folder {
 fn guided_shows_what_the_cell_of_the_hit_knows() {
     let folder = room();
     let options = ["--sampler", "guided", "--spp", "16", "--pixel", "12,8", "--set", "regions=64"];
-    run(&folder, &options).assert(0, &[]);
+    run(&folder, &[&options[..], &["--shadow-rays", "5"]].concat()).assert(0, &[]);
     assert_eq!(height(&folder), 3 * 256 + 2 * 4);
     let numbers = numbers(&folder);
     let regions = numbers["regions"].as_array().unwrap();
@@ -222,7 +222,8 @@ fn guided_shows_what_the_cell_of_the_hit_knows() {
 #[test]
 fn where_guided_learned_nothing_it_shows_its_rays() {
     let folder = scene(false);
-    run(&folder, &["--sampler", "guided", "--pixel", "12,8"]).assert(0, &[]);
+    let options = ["--sampler", "guided", "--shadow-rays", "5", "--pixel", "12,8"];
+    run(&folder, &options).assert(0, &[]);
     assert_eq!(height(&folder), 256);
     let numbers = numbers(&folder);
     assert!(numbers["cell"].is_null());

@@ -247,7 +247,7 @@ fn bad_portals_are_refused_and_ignored_ones_named() {
     assert!(Sampler::Portal.portal_warning(&without).unwrap().contains("no [[portal]]"));
     assert_ne!(scene.hash, without.hash);
     for (from, to, expected) in [
-        ("[0, 2, 0]", "[0, 0, 0]", "portal `window` (line 9): first_edge: expected an edge of"),
+        ("[0, 2, 0]", "[0, 0, 0]", "portal `window` (line 8): first_edge: expected an edge of"),
         ("[0, 2, 0]", "[0, nan, 0]", "first_edge: expected a finite number, found NaN"),
         ("[0, 2, 0]", "[0, inf, 0]", "first_edge: expected a finite number, found inf"),
         ("[0, 2, 0]", "[0, 3e38, 3e38]", "first_edge: expected an edge of"),
