@@ -110,7 +110,7 @@ fn tightest_bound() -> Bound {
 /// Checks, before the driver is loaded, that it has address space to work in.
 ///
 /// # Errors
-/// A limit (`ulimit -v`) leaves less than [`DRIVER_ADDRESS_SPACE`].
+/// A limit (`ulimit -v`) leaves less than 1.5 GiB.
 pub fn check_driver() -> Result<(), Shortage> {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     match address_space(&status) {

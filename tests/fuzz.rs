@@ -168,7 +168,7 @@ fn targets() -> Vec<Target> {
         },
         Target {
             beside: beside(),
-            mend: seeds::mend_glb,
+            mend: |bytes| seeds::mend_glb(bytes),
             ..target("glb", "input.glb", vec![seeds::glb(&document)], scene)
         },
         Target { beside: beside(), ..target("pbrt", "input.pbrt", texts(&[seeds::PBRT]), scene) },

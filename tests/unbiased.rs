@@ -243,7 +243,7 @@ fn every_sampler_with_every_material() {
     let white = scenes::diffuse(Vec3::splat(0.6));
     for (materials, samplers) in [(&rough, &ALL_AGAINST_COSINE[..]), (&polished, &sighted)] {
         for pair in materials.chunks(2) {
-            let all: Vec<Material> = [&[white.clone()], pair].concat();
+            let all: Vec<Material> = [std::slice::from_ref(&white), pair].concat();
             for (mut scene, depth) in [
                 (scenes::open(all.clone()), 1),
                 (scenes::room(all.clone()), 1),

@@ -157,7 +157,7 @@ pub fn glb(document: &str) -> Vec<u8> {
 }
 
 /// Corrects the lengths of a GLB container of one chunk.
-pub fn mend_glb(bytes: &mut Vec<u8>) {
+pub fn mend_glb(bytes: &mut [u8]) {
     if bytes.len() >= 20 {
         let length = bytes.len() as u32;
         bytes[8..12].copy_from_slice(&length.to_le_bytes());
