@@ -79,19 +79,12 @@ fn every_mode_is_unbiased_in_a_room() {
                 with(4, &|settings| settings.parameters.guided.guide_memory = 15 * 16 * 256),
             ),
             (
-                "overflow, one-sample",
-                with(1, &|settings| {
-                    settings.parameters.guided.guide_memory = 15 * 16 * 256;
-                }),
-            ),
-            (
                 "overflow, few regions",
                 with(1, &|settings| {
                     settings.parameters.guided.guide_memory = 15 * 16 * 256;
                     settings.parameters.guided.regions = 16;
                 }),
             ),
-            ("few regions", with(4, &|settings| settings.parameters.guided.regions = 16)),
             ("many regions", with(1, &|settings| settings.parameters.guided.regions = 1024)),
         ],
     );
