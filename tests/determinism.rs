@@ -124,9 +124,7 @@ fn pages_of_the_film_make_no_difference() {
 fn lists_of_living_paths_make_no_difference() {
     let _alone = support::alone();
     let scene = scenes::glazed_room();
-    for (sampler, tiles) in
-        [(Sampler::Mis, "off"), (Sampler::Guided, "off"), (Sampler::Guided, "4")]
-    {
+    for (sampler, tiles) in [(Sampler::Mis, "off"), (Sampler::Guided, "4")] {
         let mut settings = Settings { depth: 6, ..settings(sampler) };
         settings.roulette = Roulette { vertex: 1, throughput: 0.5 };
         settings.parameters.set(&format!("share-tiles={tiles}")).unwrap();
