@@ -271,8 +271,6 @@ fn end(report: &Report) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-
     #[test]
     fn templates_have_the_places_that_are_filled() {
         let page = include_str!("page.html");
