@@ -25,8 +25,8 @@ pub fn node_centre(level: u32, node: u32) -> Vec3 {
     direction_from_square(place_in_square(level, node, Vec2::splat(0.5)))
 }
 
-/// Luminance of BRDF × cosine of a node, in [`REFLECTANCE_UNIT`], for directions in the shading frame; 0 below
-/// the horizon. `material` is as the scene has it.
+/// Luminance of BRDF × cosine of a node, in [`REFLECTANCE_UNIT`], for directions in the shading frame; 0
+/// below the horizon. `material` is as the scene has it.
 ///
 /// # Panics
 /// The material is of an unknown kind.
@@ -57,7 +57,7 @@ pub fn node_reflectance(
 pub struct Product<'a> {
     tree: &'a Tree,
     level: u32,
-    /// What nodes reflect, in Morton order.
+    /// Mean reflectances of the nodes, in Morton order.
     reflectances: Vec<f32>,
     total: f32,
 }
