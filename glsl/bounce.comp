@@ -2,16 +2,13 @@
 #version 460
 
 #include "bounce.glsl"
+#include "path_list.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
 layout(constant_id = CONSTANT_ONLY_SPECULAR) const bool ONLY_SPECULAR = false;
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
-    if (path >= wave_path_count()) {
-        return;
-    }
+void bounce_path(uint path) {
     Hit hit = hits[path];
     PathIndex index = wave_path(path);
     if (hit.material == NO_MATERIAL) {
@@ -35,3 +32,5 @@ void main() {
     vec3 factor = bounce_factor(hit, material, outgoing_local, incident_local, direction, pdf);
     follow_bounce(path, index, hit, direction, pdf, factor, index.sample_index, wave.seed);
 }
+
+WALK_PATHS(bounce_path)

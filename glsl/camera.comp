@@ -7,6 +7,7 @@
 
 WRITES(rays)
 WRITES(paths)
+WRITES(path_lists)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
@@ -29,6 +30,9 @@ vec2 sample_filter(vec2 u) {
 
 void main() {
     uint path = gl_GlobalInvocationID.x;
+    if (path < PATH_LISTS) {
+        path_lists[path] = 0u;
+    }
     if (path >= wave_path_count()) {
         return;
     }

@@ -5,17 +5,14 @@
 #include "hit_instance.glsl"
 #include "lamps.glsl"
 #include "load.glsl"
+#include "path_list.glsl"
 #include "wave.glsl"
 
 UPDATES(paths)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
-    if (path >= wave_path_count()) {
-        return;
-    }
+void add_emission(uint path) {
     Hit hit = load_hit(path);
     if (hit.triangle == NO_TRIANGLE) {
         return;
@@ -39,3 +36,5 @@ void main() {
     PathState state = paths[path];
     paths[path].radiance = state.radiance + state.throughput * radiance * weight;
 }
+
+WALK_PATHS(add_emission)

@@ -6,6 +6,7 @@
 #include "environment.glsl"
 #include "load.glsl"
 #include "mis.glsl"
+#include "path_list.glsl"
 #include "wave.glsl"
 
 READS(visibility)
@@ -13,12 +14,8 @@ UPDATES(paths)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
+void gather_path(uint path) {
     uint path_count = wave_path_count();
-    if (path >= path_count) {
-        return;
-    }
     if (load_hit_origin(path).material == NO_MATERIAL) {
         Ray ray = load_ray(path);
         bool is_first = wave.first_shadow_ray == 0u && wave.to_lamps == 0u;
@@ -57,3 +54,5 @@ void main() {
     state.shadow_rays_visible += visible;
     paths[path] = state;
 }
+
+WALK_PATHS(gather_path)

@@ -3,6 +3,7 @@
 #version 460
 
 #include "mis.glsl"
+#include "path_list.glsl"
 #include "vertex.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
@@ -70,12 +71,8 @@ void add_to(inout Reservoir reservoir, DirectionSample candidate) {
     }
 }
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
+void sample_path(uint path) {
     uint path_count = wave_path_count();
-    if (path >= path_count) {
-        return;
-    }
     Hit hit = load_hit(path);
     if (hit.material == NO_MATERIAL) {
         return;
@@ -154,3 +151,5 @@ void main() {
         }
     }
 }
+
+WALK_PATHS(sample_path)

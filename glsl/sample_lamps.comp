@@ -7,6 +7,7 @@
 #version 460
 
 #include "lamps.glsl"
+#include "path_list.glsl"
 #include "vertex.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
@@ -19,11 +20,7 @@ const uint DIMENSION_LAMP = 0x4000000u;
 const uint DIMENSIONS_PER_LAMP_RAY = 2u * LAMP_CANDIDATES + 1u;
 const uint DIMENSIONS_PER_LAMP_VERTEX = 2048u * DIMENSIONS_PER_LAMP_RAY;
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
-    if (path >= wave_path_count()) {
-        return;
-    }
+void sample_path(uint path) {
     Hit hit = load_hit(path);
     if (hit.material == NO_MATERIAL) {
         return;
@@ -70,3 +67,5 @@ void main() {
     float factor = chosen_target > 0.0 ? sum / (float(LAMP_CANDIDATES) * chosen_target) : 0.0;
     write_ray(path, chosen_to_lamp, chosen_contribution * factor);
 }
+
+WALK_PATHS(sample_path)

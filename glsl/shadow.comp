@@ -8,6 +8,7 @@
 #include "given_up.glsl"
 #include "passage.glsl"
 #include "load.glsl"
+#include "path_list.glsl"
 #include "wave.glsl"
 
 WRITES(visibility)
@@ -20,20 +21,11 @@ layout(local_size_x = WORKGROUP_SIZE) in;
 layout(constant_id = CONSTANT_RAYS_PER_INVOCATION) const uint RAYS_PER_INVOCATION = 1u;
 layout(constant_id = CONSTANT_REFILL_LANES) const uint REFILL_LANES = 0xffffffffu;
 
-// index % path_count without an integer division, which is slow in software.
-uint path_of(uint index, uint path_count) {
-    uint quotient = uint(float(index) / float(path_count));
-    int remainder = int(index - quotient * path_count);
-    remainder += remainder < 0 ? int(path_count) : 0;
-    remainder -= remainder >= int(path_count) ? int(path_count) : 0;
-    return uint(remainder);
-}
-
 // Starts a ray, or finishes one without a contribution. Returns true if it is traced.
-bool start_ray(uint index, uint path_count, float offset) {
-    uint path = path_of(index, path_count);
-    HitOrigin hit = load_hit_origin(path);
-    ShadowRay ray = load_shadow_ray(index);
+bool start_ray(uint place, uint path_count, float offset) {
+    ListedRay listed = listed_ray(place, path_count);
+    HitOrigin hit = load_hit_origin(listed.path);
+    ShadowRay ray = load_shadow_ray(listed.ray);
     bool is_traced = hit.material != NO_MATERIAL && ray.contribution != vec3(0.0);
     vec3 origin = moved_off_surface(hit.position, hit.geometric_normal, ray.direction, offset);
     float farthest = FAR_AWAY;
@@ -48,7 +40,7 @@ bool start_ray(uint index, uint path_count, float offset) {
 }
 
 void main() {
-    uint path_count = wave.pixel_count * wave.sample_count;
+    uint path_count = listed_path_count();
     uint ray_count = path_count * wave.shadow_ray_count;
     uint first = gl_WorkGroupID.x * WORKGROUP_SIZE * RAYS_PER_INVOCATION + gl_LocalInvocationID.x;
     float offset = ray_offset();
@@ -78,7 +70,8 @@ void main() {
             bool is_visible = is_traced && !running && bvh_triangle == NO_TRIANGLE;
             visible_bits |= is_visible ? 1u << turn : 0u;
             if (HAS_PASSAGES && is_visible && bvh_transmittance != vec3(1.0)) {
-                shadow_rays[first + turn * WORKGROUP_SIZE].contribution *= bvh_transmittance;
+                uint ray = listed_ray(first + turn * WORKGROUP_SIZE, path_count).ray;
+                shadow_rays[ray].contribution *= bvh_transmittance;
             }
             turn++;
             has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
@@ -91,12 +84,11 @@ void main() {
     // A loop, since software devices run the body of every branch.
     for (; given_up != 0u; given_up &= given_up - 1u) {
         uint lost = uint(findLSB(given_up));
-        COUNT_GIVEN_UP(path_of(first + lost * WORKGROUP_SIZE, path_count));
+        COUNT_GIVEN_UP(listed_ray(first + lost * WORKGROUP_SIZE, path_count).path);
     }
-    for (turn = 0u; turn < RAYS_PER_INVOCATION; turn++) {
-        uint index = first + turn * WORKGROUP_SIZE;
-        if (index < ray_count) {
-            visibility[index] = (visible_bits >> turn) & 1u;
-        }
+    uint traced = turn;
+    for (turn = 0u; turn < traced; turn++) {
+        uint ray = listed_ray(first + turn * WORKGROUP_SIZE, path_count).ray;
+        visibility[ray] = (visible_bits >> turn) & 1u;
     }
 }

@@ -4,6 +4,7 @@
 
 #include "hit_instance.glsl"
 #include "load.glsl"
+#include "path_list.glsl"
 #include "texture.glsl"
 #include "wave.glsl"
 
@@ -15,11 +16,7 @@ layout(local_size_x = WORKGROUP_SIZE) in;
 // As SMALLEST_ALPHA of src/brdf/ggx.rs.
 const float SMALLEST_ALPHA = 1.0e-3;
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
-    if (path >= wave_path_count()) {
-        return;
-    }
+void read_textures(uint path) {
     Hit hit = hits[path];
     if (hit.triangle == NO_TRIANGLE) {
         return;
@@ -52,3 +49,5 @@ void main() {
             visible_normal(mapped, hit.geometric_normal, ray.direction);
     }
 }
+
+WALK_PATHS(read_textures)

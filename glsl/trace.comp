@@ -8,6 +8,7 @@
 #include "given_up.glsl"
 #include "passage.glsl"
 #include "load.glsl"
+#include "path_list.glsl"
 #include "surfaces.glsl"
 #include "wave.glsl"
 
@@ -61,7 +62,7 @@ bool goes_through(uint path) {
 }
 
 void main() {
-    uint ray_count = wave.pixel_count * wave.sample_count;
+    uint ray_count = listed_path_count();
     uint first = gl_WorkGroupID.x * WORKGROUP_SIZE * RAYS_PER_INVOCATION + gl_LocalInvocationID.x;
     uint found[RAYS_PER_INVOCATION];
     uint found_instances[RAYS_PER_INVOCATION];
@@ -71,7 +72,7 @@ void main() {
     uint given_up = 0u;
     bool has_ray = first < ray_count;
     if (has_ray) {
-        Ray ray = load_ray(first);
+        Ray ray = load_ray(listed_path(first));
         bvh_start(ray.origin, ray.direction, FAR_AWAY, false);
         bvh_nodes_waiting.y = ray.is_active != 0u ? bvh_nodes_waiting.y : 0u;
     }
@@ -89,7 +90,7 @@ void main() {
         if (!running || steps >= TRAVERSAL_STEP_LIMIT) {
             given_up |= running ? 1u << turn : 0u;
             if (HAS_PASSAGES && !running && bvh_triangle != NO_TRIANGLE
-                && goes_through(first + turn * WORKGROUP_SIZE)) {
+                && goes_through(listed_path(first + turn * WORKGROUP_SIZE))) {
                 continue;
             }
             found[turn] = bvh_triangle;
@@ -99,7 +100,7 @@ void main() {
             turn++;
             has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
             if (has_ray) {
-                Ray ray = load_ray(first + turn * WORKGROUP_SIZE);
+                Ray ray = load_ray(listed_path(first + turn * WORKGROUP_SIZE));
                 bvh_start(ray.origin, ray.direction, FAR_AWAY, false);
                 bvh_nodes_waiting.y = ray.is_active != 0u ? bvh_nodes_waiting.y : 0u;
             }
@@ -109,25 +110,24 @@ void main() {
     // A loop, since software devices run the body of every branch.
     for (; given_up != 0u; given_up &= given_up - 1u) {
         uint lost = uint(findLSB(given_up));
-        COUNT_GIVEN_UP(first + lost * WORKGROUP_SIZE);
+        COUNT_GIVEN_UP(listed_path(first + lost * WORKGROUP_SIZE));
     }
-    for (turn = 0u; turn < RAYS_PER_INVOCATION; turn++) {
-        uint index = first + turn * WORKGROUP_SIZE;
-        if (index < ray_count) {
-            Ray ray = load_ray(index);
-            uint triangle = found[turn];
-            uint instance = HAS_INSTANCES ? found_instances[turn] : NO_INSTANCE;
-            if (triangle == NO_TRIANGLE) {
-                hits[index] = no_surface();
-            } else {
-                Hit hit = surface_at(triangle, instance, ray.origin, ray.direction);
-                hit.material = samples_light(hit.material, triangle, instance, ray.direction)
-                    ? hit.material
-                    : NO_MATERIAL;
-                hits[index] = hit;
-                if (HAS_INSTANCES) {
-                    hit_instances[index] = instance;
-                }
+    uint traced = turn;
+    for (turn = 0u; turn < traced; turn++) {
+        uint path = listed_path(first + turn * WORKGROUP_SIZE);
+        Ray ray = load_ray(path);
+        uint triangle = found[turn];
+        uint instance = HAS_INSTANCES ? found_instances[turn] : NO_INSTANCE;
+        if (triangle == NO_TRIANGLE) {
+            hits[path] = no_surface();
+        } else {
+            Hit hit = surface_at(triangle, instance, ray.origin, ray.direction);
+            hit.material = samples_light(hit.material, triangle, instance, ray.direction)
+                ? hit.material
+                : NO_MATERIAL;
+            hits[path] = hit;
+            if (HAS_INSTANCES) {
+                hit_instances[path] = instance;
             }
         }
     }

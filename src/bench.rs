@@ -25,7 +25,7 @@ use crate::{
     accel::Accel,
     error::Result,
     gpu::{Buffer, Commands, DescriptorSet, Device},
-    pass::{Domain, Kernel, Pass, SceneBuffers, Schedule, Steps},
+    pass::{Domain, Kernel, Pass, SceneBuffers, Schedule, Steps, wave_buffers::path_list_bytes},
     sampler::{Parameters, basic::Basic},
     shader::{
         bindings::{FILM, WAVE, film, wave as bindings},
@@ -186,6 +186,7 @@ struct Bench<'a> {
     // Kept alive for the sets.
     _paths: Buffer,
     _instances: Buffer,
+    _path_lists: Buffer,
     _counters: Buffer,
     wave: Wave,
 }
@@ -201,6 +202,7 @@ impl<'a> Bench<'a> {
         let visibility = make("visibility", shadow_ray_count, size_of::<u32>())?;
         let path_states = make("paths", paths, size_of::<PathState>())?;
         let instances = make("hit instances", paths, size_of::<u32>())?;
+        let path_lists = Buffer::new(device, "path lists", path_list_bytes(paths))?;
         let counters = Buffer::zeroed(device, "counters", size_of::<Counters>() as u64)?;
         let bound = [
             (bindings::RAYS, &rays),
@@ -212,6 +214,8 @@ impl<'a> Bench<'a> {
             (bindings::VISIBILITY, &visibility),
             (bindings::PATHS, &path_states),
             (bindings::HIT_INSTANCES, &instances),
+            (bindings::PATH_LISTS, &path_lists),
+            (bindings::PATH_LIST_TEXELS, &path_lists),
         ];
         let wave_set = DescriptorSet::new(device, &WAVE, &bound)?;
         let film_set = DescriptorSet::new(device, &FILM, &[(film::COUNTERS, &counters)])?;
@@ -233,6 +237,7 @@ impl<'a> Bench<'a> {
             visibility,
             _paths: path_states,
             _instances: instances,
+            _path_lists: path_lists,
             _counters: counters,
             wave,
         })

@@ -5,6 +5,7 @@ mod support;
 
 use fenestra::{
     film::{Aov, Sums, Window},
+    pass::{PathLists, Roulette},
     renderer::Settings,
     sampler::{Parameters, Sampler},
     scene::Scene,
@@ -114,6 +115,30 @@ fn pages_of_the_film_make_no_difference() {
             resumed.restore(&half).unwrap();
             resumed.render_pass(3).unwrap();
             assert!(resumed.sums().unwrap() == whole, "the resumed film differs");
+        }
+    }
+}
+
+/// In a room with lamps, panes, mirrors and sheets, and with roulette, so that paths end for every reason.
+#[test]
+fn lists_of_living_paths_make_no_difference() {
+    let _alone = support::alone();
+    let scene = scenes::glazed_room();
+    for (sampler, tiles) in [(Sampler::Mis, "off"), (Sampler::Guided, "4")] {
+        let mut settings = Settings { depth: 6, ..settings(sampler) };
+        settings.roulette = Roulette { vertex: 1, throughput: 0.5 };
+        settings.parameters.set(&format!("share-tiles={tiles}")).unwrap();
+        let sums = |path_lists| {
+            let mut renderer = renderer(&scene, Settings { path_lists, ..settings.clone() });
+            renderer.render_pass(2).unwrap();
+            renderer.render_pass(6).unwrap();
+            support::assert_silent();
+            renderer.sums().unwrap()
+        };
+        let all = sums(PathLists::Never);
+        assert!(sums(PathLists::Always) == all, "{} {tiles} differs", sampler.name());
+        if tiles == "off" {
+            assert!(sums(PathLists::WherePathsEnd) == all, "{} differs", sampler.name());
         }
     }
 }

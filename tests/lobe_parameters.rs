@@ -298,6 +298,7 @@ fn every_range_is_named_where_it_is_left() {
         ("candidates", ["0", "3"], "auto, 2, 4, 6 or 8 for ris, auto, 1, 4 or 8 for guided"),
         ("guide-memory", ["1", "x"], "1MiB or more"),
         ("later-rays", ["0", "4097"], "auto, or 1 to 4096"),
+        ("open-rays", ["0", "4097"], "auto, or 1 to 4096"),
         ("portal-share", ["-0.1", "1.01"], "0 to 1"),
         ("haar-level", ["2", "6"], "3 to 5"),
         ("haar-cache", ["", "hit"], "on or off"),

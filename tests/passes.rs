@@ -8,8 +8,8 @@ use std::{collections::BTreeMap, fmt::Write};
 
 use fenestra::{
     pass::{
-        Dispatch, PassSettings, Roulette, Schedule, Steps, Surfaces, geometry::Traversal,
-        wave_order,
+        Dispatch, PassSettings, PathLists, Roulette, Schedule, Steps, Surfaces,
+        geometry::Traversal, wave_order,
     },
     sampler::{
         Parameters, basic,
@@ -43,6 +43,7 @@ fn settings(shadow_rays: u32, depth: u32) -> PassSettings {
         surfaces: Surfaces::default(),
         traversal: Traversal { page_count: 1, page_shift: 20, is_instanced: false },
         incoherent: Schedule { rays_per_invocation: 16, refill_lanes: 3 },
+        path_lists: PathLists::Never,
         film_page_bytes: u64::MAX,
         most_paths: u32::MAX,
     }
@@ -182,6 +183,7 @@ fn shown() -> Vec<(&'static str, Vec<Dispatch>)> {
         ("haar with a cache", order(&settings(2, 1), &haar("haar-cache=on"), wave(0, 1))),
         ("one vertex, textures, lamps", order(&furnished, &mis(), wave(0, 1))),
         ("shared paths", order(&shared(2), &mis(), wave(0, 1))),
+        ("lists of living paths", order(&listed(settings(2, 2)), &mis(), wave(0, 1))),
     ]
 }
 
@@ -222,6 +224,37 @@ fn paths_are_shared_from_the_second_vertex_on() {
     for shares_nothing in [listed(&shared(1), wave(0, 1)), listed(&shared(2), training)] {
         assert!(!shares_nothing.contains("keep") && !shares_nothing.contains("share"));
     }
+}
+
+fn listed(settings: PassSettings) -> PassSettings {
+    PassSettings { path_lists: PathLists::Always, ..settings }
+}
+
+#[test]
+fn later_vertices_walk_lists_of_living_paths() {
+    let walked = |order: &[Dispatch]| -> Vec<(&'static str, u32)> {
+        let of = |dispatch: &Dispatch| (dispatch.kernel.shader, dispatch.wave.path_list);
+        order.iter().map(of).filter(|(_, list)| *list > 0).collect()
+    };
+    let deep = order(&listed(settings(1, 3)), &mis(), wave(0, 1));
+    assert_eq!(
+        walked(&deep),
+        [
+            ("sample", 2),
+            ("shadow", 2),
+            ("bounce", 2),
+            ("trace", 2),
+            ("list_paths", 2),
+            ("sample", 3),
+            ("shadow", 3),
+            ("gather", 2),
+        ]
+    );
+    // Tiles keep second vertices of all paths, and connect the first ones of all.
+    let tiles = order(&listed(shared(3)), &mis(), wave(0, 1));
+    assert_eq!(walked(&tiles), [("sample", 3), ("shadow", 3)]);
+    // Lobes lie at places of all paths.
+    assert!(walked(&order(&listed(settings(1, 3)), &product(), wave(0, 1))).is_empty());
 }
 
 /// A scene with textures, glass, an emitting surface and a lamp.

@@ -25,6 +25,7 @@ use fenestra::{
             CONSTANT_ATTRIBUTE_PAGE_SHIFT, CONSTANT_ATTRIBUTE_PAGES, CONSTANT_ATTRIBUTES,
             CONSTANT_TEXTURE_PAGE_SHIFT, CONSTANT_TEXTURE_PAGES, NO_TEXTURE, TEXTURE_NEAREST,
         },
+        structs,
     },
     texture::{
         Channels, Encoding, Interpolation, MAX_TEXTURE_SIDE, Texels, Texture, TextureCache,
@@ -438,7 +439,8 @@ struct TextureQuery {
 struct TextureAnswer {
     value: [f32; 4],
     number: f32,
-    differences: u32,
+    used: structs::TextureUse,
+    surface: structs::MaterialSurface,
     uv0: Vec2,
     uv1: Vec2,
     tangent: [f32; 4],
@@ -512,9 +514,7 @@ fn compare(bits: u32) {
     buffers.extend(more);
     buffers.extend([
         (probe::PROBE_INPUT, bytemuck::cast_slice(&queries)),
-        (scene::TEXTURE_USES, bytemuck::cast_slice(&textures.uses)),
         (scene::TEXTURE_USE_TEXELS, bytemuck::cast_slice(&textures.uses)),
-        (scene::MATERIAL_SURFACES, bytemuck::cast_slice(&surfaces.surfaces)),
         (scene::MATERIAL_SURFACE_TEXELS, bytemuck::cast_slice(&surfaces.surfaces)),
         // No instances: the shader leaves this alone.
         (scene::INSTANCES, bytemuck::cast_slice(&[0_u32; 32])),
@@ -545,7 +545,8 @@ fn compare(bits: u32) {
     let mut other_texels = 0;
     for (query, answer) in queries.iter().zip(&answers) {
         let TextureQuery { use_index, uv0, uv1, triangle, side, .. } = *query;
-        assert_eq!(answer.differences, 0, "two ways to load the same");
+        assert_eq!(answer.used, textures.uses[use_index as usize], "the use as loaded");
+        assert_eq!(answer.surface, surfaces.surfaces[query.material as usize], "the surface");
         let at = attributes.triangle_attributes(triangle, query.weights);
         let surface = &surfaces.surfaces[query.material as usize];
         let value = lookup::texture_value(&words, &textures.uses, use_index, uv0, uv1);

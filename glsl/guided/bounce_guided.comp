@@ -5,6 +5,7 @@
 
 #include "guided/arriving.glsl"
 #include "bounce.glsl"
+#include "path_list.glsl"
 
 TEXELS(guide_arriving)
 UPDATES(path_cells)
@@ -13,11 +14,7 @@ layout(local_size_x = WORKGROUP_SIZE) in;
 
 layout(constant_id = CONSTANT_BOUNCE_CANDIDATES) const uint BOUNCE_CANDIDATES = 4u;
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
-    if (path >= wave_path_count()) {
-        return;
-    }
+void bounce_path(uint path) {
     Hit hit = hits[path];
     PathIndex index = wave_path(path);
     // Start the sequences anew at each rebuild: the cells depend on earlier samples.
@@ -66,3 +63,5 @@ void main() {
         follow_bounce(path, index, hit, direction, pdf, factor, number, wave.epoch_seed);
     path_cells[path].teaches = alive ? first + chosen_direction : NOTHING_TO_LEARN;
 }
+
+WALK_PATHS(bounce_path)

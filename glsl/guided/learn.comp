@@ -4,6 +4,7 @@
 #version 460
 
 #include "divide.glsl"
+#include "path_list.glsl"
 #include "wave.glsl"
 
 READS(visibility)
@@ -14,12 +15,9 @@ UPDATES(guide_shares)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
-void main() {
-    uint ray = gl_GlobalInvocationID.x;
-    if (ray >= wave.pixel_count * wave.sample_count * wave.shadow_ray_count) {
-        return;
-    }
-    uint sample_of_wave = divide(divide(ray, wave.pixel_count).x, wave.sample_count).y;
+void learn_ray(ListedRay listed) {
+    uint ray = listed.ray;
+    uint sample_of_wave = divide(listed.path, wave.pixel_count).x;
     uint since_rebuild = wave.first_sample + sample_of_wave - wave.epoch_start;
     if (since_rebuild >= GUIDE_SAMPLES_THAT_ALL_TEACH && since_rebuild % GUIDE_TEACHING_STEP != 0u) {
         return;
@@ -40,5 +38,13 @@ void main() {
                 atomicAdd(guide_shares[2u * octave + 1u], from_brdf);
             }
         }
+    }
+}
+
+void main() {
+    uint path_count = listed_path_count();
+    uint ray_count = path_count * wave.shadow_ray_count;
+    for (uint place = gl_GlobalInvocationID.x; place < ray_count; place += ray_count) {
+        learn_ray(listed_ray(place, path_count));
     }
 }

@@ -3,6 +3,8 @@
 #version 460
 
 #include "divide.glsl"
+#include "load.glsl"
+#include "path_list.glsl"
 #include "wave.glsl"
 
 READS(path_cells)
@@ -11,11 +13,7 @@ UPDATES(guide_arrivals)
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
-    if (path >= wave.pixel_count * wave.sample_count) {
-        return;
-    }
+void learn_arrival(uint path) {
     uint since_rebuild =
         wave.first_sample + divide(path, wave.pixel_count).x - wave.epoch_start;
     if (since_rebuild >= GUIDE_SAMPLES_THAT_ALL_TEACH && since_rebuild % GUIDE_TEACHING_STEP != 0u) {
@@ -25,9 +23,11 @@ void main() {
     // The light that comes from a specular surface is not known.
     if (found.teaches != NOTHING_TO_LEARN && found.cell != SPECULAR_CELL) {
         atomicAdd(guide_arrivals[2u * found.teaches], 1u);
-        if (found.cell != NOTHING_TO_LEARN) {
+        if (load_hit(path).triangle != NO_TRIANGLE && found.cell != NOTHING_TO_LEARN) {
             uint light = texelFetch(guide_reflected, int(found.cell)).x;
             atomicAdd(guide_arrivals[2u * found.teaches + 1u], light);
         }
     }
 }
+
+WALK_PATHS(learn_arrival)

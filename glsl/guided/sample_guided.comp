@@ -6,6 +6,7 @@
 #version 460
 
 #include "guided/candidates.glsl"
+#include "path_list.glsl"
 
 WRITES(learn_targets)
 UPDATES(path_cells)
@@ -105,12 +106,8 @@ void add_to(inout Reservoir reservoir, Guided candidate) {
     }
 }
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
+void sample_path(uint path) {
     uint path_count = wave_path_count();
-    if (path >= path_count) {
-        return;
-    }
     Hit hit = load_hit(path);
     if (hit.material == NO_MATERIAL) {
         for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
@@ -200,3 +197,5 @@ void main() {
         }
     }
 }
+
+WALK_PATHS(sample_path)

@@ -4,6 +4,7 @@
 #version 460
 
 #include "mis.glsl"
+#include "path_list.glsl"
 #include "portal/portals.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
@@ -17,12 +18,8 @@ float density(Vertex vertex, DirectionSample sampled, float light_share, float t
     return mis_pdf(sampled.brdf_pdf, light, wave.total_shadow_rays, wave.bounce_rays);
 }
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
+void sample_path(uint path) {
     uint path_count = wave_path_count();
-    if (path >= path_count) {
-        return;
-    }
     Hit hit = load_hit(path);
     if (hit.material == NO_MATERIAL) {
         return;
@@ -72,3 +69,5 @@ void main() {
             i * path_count + path, sampled, density(vertex, sampled, light_share, total));
     }
 }
+
+WALK_PATHS(sample_path)

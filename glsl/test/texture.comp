@@ -3,9 +3,6 @@
 
 #include "texture.glsl"
 
-READS(texture_uses)
-READS(material_surfaces)
-
 layout(local_size_x = WORKGROUP_SIZE) in;
 
 struct TextureQuery {
@@ -22,8 +19,8 @@ struct TextureQuery {
 struct TextureAnswer {
     vec4 value;
     float number;
-    // Words that differ between the two ways to load a use or a surface.
-    uint differences;
+    TextureUse used;
+    MaterialSurface surface;
     vec2 uv0;
     vec2 uv1;
     vec4 tangent;
@@ -47,15 +44,13 @@ void main() {
     TextureQuery query = inputs[index];
     MaterialSurface surface = load_material_surface(query.material);
     TextureUse used = load_texture_use(query.use_index);
-    uint differences = uint(used != texture_uses[query.use_index])
-        + uint(surface != material_surfaces[query.material]);
     Attributes attributes = triangle_attributes(query.triangle, query.weights);
     vec3 mapped = mapped_normal(
         query.use_index, surface.normal_scale, query.triangle, NO_INSTANCE, attributes,
         query.shading_normal, query.side);
     outputs[index] = TextureAnswer(
         texture_value(query.use_index, query.uv0, query.uv1),
-        texture_number(query.use_index, query.uv0, query.uv1), differences, attributes.uv0,
+        texture_number(query.use_index, query.uv0, query.uv1), used, surface, attributes.uv0,
         attributes.uv1, attributes.tangent, attributes.color, surface_opacity(surface, attributes),
         mapped);
 }

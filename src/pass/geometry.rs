@@ -124,7 +124,7 @@ impl Traversal {
 
     /// Finds the closest hit of every ray: `ray_texels` → `hits`.
     pub fn trace(self, schedule: Schedule, surfaces: Surfaces) -> Kernel {
-        self.kernel("trace", Domain::Paths, schedule, surfaces)
+        self.kernel("trace", Domain::Arrivals, schedule, surfaces)
     }
 
     /// Tests shadow rays for any hit: `shadow_ray_texels`, `hit_texels` → `visibility`. Ray

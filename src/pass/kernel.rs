@@ -13,9 +13,13 @@ use crate::{
 pub enum Domain {
     /// Paths of the wave.
     Paths,
+    /// Paths that had a surface at the vertex before, where the wave lists them.
+    Arrivals,
+    /// Paths that have a surface at this vertex, where the wave lists them.
+    Surfaces,
     /// Pixels of the wave.
     Pixels,
-    /// Shadow rays of one group.
+    /// Shadow rays of one group, of paths that have a surface at this vertex.
     ShadowRays,
 }
 
@@ -41,7 +45,9 @@ impl Kernel {
     /// Number of invocations for a wave; at least one, so that an empty wave makes drivers compile.
     pub fn invocations(&self, wave: &Wave) -> u32 {
         let elements = match self.domain {
-            Domain::Paths => wave.pixel_count * wave.sample_count,
+            Domain::Paths | Domain::Arrivals | Domain::Surfaces => {
+                wave.pixel_count * wave.sample_count
+            }
             Domain::Pixels => wave.pixel_count,
             Domain::ShadowRays => wave.pixel_count * wave.sample_count * wave.shadow_ray_count,
         };

@@ -23,7 +23,7 @@ pub mod wave_buffers;
 pub use film_buffers::BLOCK_PIXELS;
 pub use geometry::{GeometryBuffers, Schedule};
 pub use kernel::{Dispatch, Domain, Kernel, Pass};
-pub use order::{PassSettings, wave_order};
+pub use order::{PassSettings, PathLists, wave_order};
 pub use roulette::Roulette;
 pub use runner::{Runner, Watch};
 pub use scene_buffers::SceneBuffers;

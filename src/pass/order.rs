@@ -9,12 +9,27 @@ use super::{
     surfaces::Surfaces,
 };
 use crate::shader::{
-    constants::{AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, CONSTANT_ONLY_SPECULAR, TRAINING_WAVE},
+    constants::{
+        AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, CONSTANT_ONLY_SPECULAR, PATH_LISTS, TRAINING_WAVE,
+    },
     structs::Wave,
 };
 
 /// Bits of [`Wave::aovs`] that the pass `features` writes.
 const FEATURES: u32 = AOV_ALBEDO | AOV_NORMAL | AOV_POSITION;
+
+/// When the passes of later vertices walk lists of the paths that are still alive. The picture is the same
+/// to the bit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PathLists {
+    /// Where most paths end early: `docs/experiments/lists_of_living_paths.md`.
+    #[default]
+    WherePathsEnd,
+    /// Everywhere.
+    Always,
+    /// Nowhere.
+    Never,
+}
 
 /// Settings of a render that shape its passes, apart from the technique.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +50,8 @@ pub struct PassSettings {
     pub traversal: Traversal,
     /// Schedule of incoherent rays.
     pub incoherent: Schedule,
+    /// When passes walk lists of living paths instead of all.
+    pub path_lists: PathLists,
     /// Most bytes of one buffer of the film.
     pub film_page_bytes: u64,
     /// Most paths in flight.
@@ -54,11 +71,17 @@ pub fn wave_order(
     let is_lit = wave.is_training != TRAINING_WAVE;
     let follows_last = is_lit && surfaces.emits();
     let escape = steps.escape();
-    let gather = || Kernel::new("gather", Domain::Paths, escape.as_deref().unwrap_or_default());
+    let gather = || Kernel::new("gather", Domain::Arrivals, escape.as_deref().unwrap_or_default());
     let sharing = Sharing { tile_edge, surfaces, traversal, schedule: incoherent };
     let shares = is_lit && tile_edge > 1 && vertices > 1 && steps.shares_paths();
     let mut order = Vec::new();
-    let mut add = |kernel: Kernel, wave: &Wave| order.push(Dispatch { kernel, wave: *wave });
+    // Tiles keep the second vertices of all paths.
+    let walks_lists = steps.walks_lists() && settings.path_lists != PathLists::Never;
+    let first_listed = if walks_lists { 1 + u32::from(shares) } else { u32::MAX };
+    let mut add = |kernel: Kernel, wave: &Wave| {
+        let path_list = path_list(kernel.domain, wave.vertex, first_listed);
+        order.push(Dispatch { kernel, wave: Wave { path_list, ..*wave } });
+    };
     let mut wave = Wave { aovs: settings.aovs, ..wave };
 
     add(Kernel::new("camera", Domain::Paths, &[]), &wave);
@@ -71,12 +94,15 @@ pub fn wave_order(
         // Camera rays stay coherent, bounce rays do not.
         let schedule = if vertex == 0 { Schedule::SINGLE } else { incoherent };
         add(traversal.trace(schedule, surfaces), &wave);
+        if vertex >= first_listed {
+            add(Kernel::new("list_paths", Domain::Arrivals, &[]), &wave);
+        }
         if surfaces.is_textured() {
-            add(Kernel::new("texture", Domain::Paths, &constants), &wave);
+            add(Kernel::new("texture", Domain::Surfaces, &constants), &wave);
         }
         if is_lit {
             if surfaces.emits() {
-                add(Kernel::new("emit", Domain::Paths, &constants), &wave);
+                add(Kernel::new("emit", Domain::Surfaces, &constants), &wave);
             }
             if shares && vertex == 1 {
                 add(sharing.keep_second(), &wave);
@@ -91,9 +117,9 @@ pub fn wave_order(
                         to_lamps: 1,
                         ..wave
                     };
-                    add(Kernel::new("sample_lamps", Domain::Paths, &constants), &to_lamps);
+                    add(Kernel::new("sample_lamps", Domain::Surfaces, &constants), &to_lamps);
                     add(traversal.shadow(incoherent, surfaces), &to_lamps);
-                    add(Kernel::new("gather", Domain::Paths, &[]), &to_lamps);
+                    add(Kernel::new("gather", Domain::Arrivals, &[]), &to_lamps);
                     if shares
                         && vertex == 1
                         && let Some(kernel) = sharing.gather_base()
@@ -167,17 +193,25 @@ pub fn wave_order(
         wave.first_shadow_ray = 0;
         add(traversal.trace(incoherent, surfaces), &wave);
         if surfaces.emits() {
-            add(Kernel::new("emit", Domain::Paths, &constants), &wave);
+            add(Kernel::new("emit", Domain::Arrivals, &constants), &wave);
         }
         add(gather(), &wave);
     }
     if shares {
-        for Dispatch { kernel, wave } in sharing.connect_and_share(&wave) {
-            add(kernel, &wave);
-        }
+        order.extend(sharing.connect_and_share(&wave));
     }
-    add(Kernel::new("accumulate", Domain::Pixels, &[]), &wave);
+    order.push(Dispatch { kernel: Kernel::new("accumulate", Domain::Pixels, &[]), wave });
     order
+}
+
+/// Returns the list of paths that a pass walks at a vertex, as in [`Wave::path_list`].
+fn path_list(domain: Domain, vertex: u32, first_listed: u32) -> u32 {
+    let listed_at = match domain {
+        Domain::Surfaces | Domain::ShadowRays => Some(vertex),
+        Domain::Arrivals => vertex.checked_sub(1),
+        Domain::Paths | Domain::Pixels => None,
+    };
+    listed_at.filter(|vertex| *vertex >= first_listed).map_or(0, |vertex| 1 + vertex % PATH_LISTS)
 }
 
 /// Number of rays to lamps at a vertex with `shadow_rays` rays to the environment: half as many, at
@@ -191,5 +225,5 @@ fn bounce(settings: &PassSettings, only_specular: bool) -> Kernel {
     let mut constants = settings.surfaces.constants();
     constants.extend(settings.roulette.constants());
     constants.push((CONSTANT_ONLY_SPECULAR, u32::from(only_specular)));
-    Kernel::new("bounce", Domain::Paths, &constants)
+    Kernel::new("bounce", Domain::Surfaces, &constants)
 }

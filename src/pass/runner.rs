@@ -9,7 +9,7 @@ use std::{
 use super::{
     film_buffers::{BLOCK_PIXELS, FilmBuffers},
     kernel::{Dispatch, Kernel, Pass},
-    order::{PassSettings, wave_order},
+    order::{PassSettings, PathLists, wave_order},
     scene_buffers::SceneBuffers,
     sharing_buffers::SharingBuffers,
     steps::{Passes, PathDemand, SHADOW_RAYS_PER_GROUP, Steps},
@@ -30,6 +30,9 @@ const SHORT_DISPATCH_MS: f64 = 50.0;
 const LONG_DISPATCH_MS: f64 = 100.0;
 /// Counts after which the 32-bit counters are read: one more wave must fit.
 const COUNTER_ROOM: u64 = 1 << 30;
+
+/// Share of living paths, of all at later vertices, below which the passes there walk lists of them.
+const MOST_LIVING: f64 = 0.4;
 
 /// Called between waves; true stops the sweep under way.
 pub type Watch = Box<dyn FnMut() -> bool>;
@@ -185,7 +188,8 @@ impl Runner {
     pub fn run(&mut self, technique: &dyn Passes, wave: Wave, vertices: u32) -> Result<PassTimes> {
         let film_start = self.film.first_pixel(wave.first_pixel);
         let wave = Wave { film_start, ..wave };
-        let order = wave_order(&self.settings, technique.steps(), wave, vertices);
+        let settings = PassSettings { path_lists: self.path_lists(), ..self.settings };
+        let order = wave_order(&settings, technique.steps(), wave, vertices);
         let mut commands = Commands::begin_timed(&self.device, order.len() as u32)?;
         let film = self.film.set(wave.first_pixel);
         let sets = sets(&self.scene, technique, &self.waves, &self.sharing, film);
@@ -204,6 +208,13 @@ impl Runner {
             *self.totals.gpu_ms.entry(pass.clone()).or_default() += ms;
         }
         Ok(times)
+    }
+
+    /// Decides by the paths so far.
+    fn path_lists(&self) -> PathLists {
+        let asked = self.settings.path_lists;
+        let ends_early = self.totals.living_share(self.settings.depth) < MOST_LIVING;
+        if asked == PathLists::WherePathsEnd && !ends_early { PathLists::Never } else { asked }
     }
 
     /// Sizes the next wave so that its longest pass stays within the target range. Times are sums

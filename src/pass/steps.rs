@@ -24,6 +24,11 @@ pub trait Steps {
         true
     }
 
+    /// True if the passes walk the lists of living paths; otherwise all passes walk all paths.
+    fn walks_lists(&self) -> bool {
+        false
+    }
+
     /// Passes before the first group of shadow rays of a vertex.
     fn prepare(&self, _wave: &Wave) -> Vec<Kernel> {
         Vec::new()

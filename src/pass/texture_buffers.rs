@@ -100,9 +100,7 @@ impl TextureBuffers {
     /// Returns the buffers with their bindings in the scene set. Missing pages repeat the first.
     pub fn bindings(&self) -> Vec<(Binding, &Buffer)> {
         let mut bindings = vec![
-            (scene::TEXTURE_USES, &self.uses),
             (scene::TEXTURE_USE_TEXELS, &self.uses),
-            (scene::MATERIAL_SURFACES, &self.surfaces),
             (scene::MATERIAL_SURFACE_TEXELS, &self.surfaces),
         ];
         for (names, pages) in

@@ -59,6 +59,13 @@ impl Totals {
         self.cdf_rebuilds += u64::from(counters.cdf_rebuilds);
     }
 
+    /// Returns the share of paths that are alive at a vertex after the first, of `depth` vertices; 1 before
+    /// any is known.
+    pub fn living_share(&self, depth: u32) -> f64 {
+        let all = self.camera_rays as f64 * f64::from(depth.saturating_sub(1));
+        if all > 0.0 { self.bounce_rays as f64 / all } else { 1.0 }
+    }
+
     /// Returns sampler statistics as means per hit, by name; empty for samplers without lobes.
     pub fn sampler_statistics(&self) -> BTreeMap<String, f64> {
         if self.product_hits == 0 {

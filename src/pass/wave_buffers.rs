@@ -8,7 +8,7 @@ use crate::{
     gpu::{Buffer, Capabilities, DescriptorSet, Device},
     shader::{
         bindings::{WAVE, wave},
-        constants::WORKGROUP_SIZE,
+        constants::{PATH_LISTS, WORKGROUP_SIZE},
         structs::{Hit, PathState, Ray, ShadowRay, Surface},
     },
 };
@@ -25,6 +25,11 @@ pub fn most_paths(capabilities: &Capabilities) -> u32 {
     if capabilities.kind == "software" { SOFTWARE_PATHS } else { GPU_PATHS }
 }
 
+/// Returns the bytes of the lists of living paths in a wave of `paths` paths.
+pub fn path_list_bytes(paths: u64) -> u64 {
+    (u64::from(PATH_LISTS) + 2 * paths) * size_of::<u32>() as u64
+}
+
 /// Rays, hits, shadow rays and path states of one wave.
 pub struct WaveBuffers {
     set: DescriptorSet,
@@ -36,6 +41,7 @@ pub struct WaveBuffers {
     paths: Buffer,
     surfaces: Buffer,
     instances: Buffer,
+    path_lists: Buffer,
 }
 
 impl WaveBuffers {
@@ -78,6 +84,7 @@ impl WaveBuffers {
         let surfaces = make("hit surfaces", surface_count, size_of::<Surface>())?;
         let instance_count = if of.is_instanced() { paths } else { 1 };
         let instances = make("hit instances", instance_count, size_of::<u32>())?;
+        let path_lists = Buffer::new(device, "path lists", path_list_bytes(paths))?;
         let paths = make("paths", paths, size_of::<PathState>())?;
         let bound = [
             (wave::RAYS, &rays),
@@ -90,9 +97,22 @@ impl WaveBuffers {
             (wave::PATHS, &paths),
             (wave::HIT_SURFACES, &surfaces),
             (wave::HIT_INSTANCES, &instances),
+            (wave::PATH_LISTS, &path_lists),
+            (wave::PATH_LIST_TEXELS, &path_lists),
         ];
         let set = DescriptorSet::new(device, &WAVE, &bound)?;
-        Ok(Self { set, capacity, rays, hits, shadow_rays, visibility, paths, surfaces, instances })
+        Ok(Self {
+            set,
+            capacity,
+            rays,
+            hits,
+            shadow_rays,
+            visibility,
+            paths,
+            surfaces,
+            instances,
+            path_lists,
+        })
     }
 
     /// Descriptor set 2.
@@ -145,6 +165,7 @@ impl WaveBuffers {
             &self.paths,
             &self.surfaces,
             &self.instances,
+            &self.path_lists,
         ]
         .map(|buffer| (buffer.name().to_owned(), buffer.size()))
         .into()

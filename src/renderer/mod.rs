@@ -71,6 +71,7 @@ impl Renderer {
             depth: settings.depth,
             aovs: aov_bits(&settings.aovs),
             roulette: settings.roulette,
+            path_lists: settings.path_lists,
             tile_edge,
             surfaces,
             traversal: buffers.geometry().traversal(),

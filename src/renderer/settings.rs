@@ -4,7 +4,7 @@ use crate::film::Window;
 use crate::{
     error::{Error, Result},
     film::Aov,
-    pass::Roulette,
+    pass::{PathLists, Roulette},
     sampler::{Parameters, Sampler},
     scene::Scene,
 };
@@ -30,6 +30,8 @@ pub struct Settings {
     pub aovs: Vec<Aov>,
     /// Where paths of several vertices end by chance.
     pub roulette: Roulette,
+    /// When passes walk lists of living paths, which changes no bit of the picture.
+    pub path_lists: PathLists,
     /// Most bytes of one buffer of the film, beside the device's own limit; larger films have pages,
     /// which changes no bit of the picture.
     pub film_page_bytes: u64,
@@ -47,6 +49,7 @@ impl Default for Settings {
             window: None,
             aovs: Vec::new(),
             roulette: Roulette::default(),
+            path_lists: PathLists::default(),
             film_page_bytes: u64::MAX,
         }
     }

@@ -115,6 +115,10 @@ impl BasicSteps {
 }
 
 impl Steps for BasicSteps {
+    fn walks_lists(&self) -> bool {
+        true
+    }
+
     fn shadow_rays_at(&self, vertex: u32, most: u32) -> u32 {
         let [first, later] = self.rays.unwrap_or([most; 2]);
         most.min(if vertex == 0 { first } else { later })
@@ -131,7 +135,7 @@ impl Steps for BasicSteps {
             (CONSTANT_COMPENSATION, u32::from(self.compensates)),
         ];
         let constants = [&own[..], &self.surfaces.constants()].concat();
-        vec![Kernel::new("sample", Domain::Paths, &constants)]
+        vec![Kernel::new("sample", Domain::Surfaces, &constants)]
     }
 
     fn escape(&self) -> Option<Vec<(u32, u32)>> {

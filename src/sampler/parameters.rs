@@ -195,6 +195,7 @@ mod tests {
             "regions=2000",
             "bounce-candidates=0",
             "bounce-candidates=17",
+            "open-rays=0",
             "later-rays=0",
             "later-rays=x",
             "lobes=0",

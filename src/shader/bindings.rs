@@ -169,13 +169,9 @@ binding_tables! {
         22 TEXTURE_WORDS_2: texels R32Uint;
         /// Fourth page of texels.
         23 TEXTURE_WORDS_3: texels R32Uint;
-        /// Textures as the properties of materials read them.
-        24 TEXTURE_USES: array TextureUse;
-        /// Uses of textures again, four texels each.
+        /// Textures as the properties of materials read them, a `TextureUse` of four texels each.
         25 TEXTURE_USE_TEXELS: texels Rgba32Uint;
-        /// Textures, opacity and emission of each material.
-        26 MATERIAL_SURFACES: array MaterialSurface;
-        /// Surfaces of materials again, four texels each.
+        /// Textures, opacity and emission of each material, a `MaterialSurface` of four texels each.
         27 MATERIAL_SURFACE_TEXELS: texels Rgba32Uint;
         /// First page of what `CONSTANT_ATTRIBUTES` names for the three corners of each triangle in BVH
         /// order.
@@ -323,6 +319,11 @@ binding_tables! {
         8 HIT_SURFACES: array Surface;
         /// Instance that each path has hit, in scenes with instances.
         9 HIT_INSTANCES: array uint;
+        /// Lengths of `PATH_LISTS` lists of paths, then the lists themselves: even and odd ones share a
+        /// place each.
+        10 PATH_LISTS: array uint;
+        /// Lists of paths again.
+        11 PATH_LIST_TEXELS: texels R32Uint;
     }
 
     /// Set 1 of the passes that show films in a window.

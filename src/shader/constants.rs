@@ -312,6 +312,10 @@ constants! {
     /// Grid cells, two words each: halves red and green, half blue.
     MEASURED_GRID_OFFSET = MEASURED_BASE_OFFSET + 3 * BRDF_COSINE_NODES;
 
+    /// Lists of living paths: that of a vertex, the one before, which it is made from, and the next, which
+    /// is emptied meanwhile; a power of two.
+    PATH_LISTS = 4;
+
     // Values of `Wave::is_training` other than 0.
     /// The paths only teach the guide.
     TRAINING_WAVE = 1;

@@ -437,6 +437,8 @@ structs! {
         arriving_shadow_rays: uint,
         /// Pixels of the crop window before the page of the film that the wave writes.
         film_start: uint,
+        /// List of paths that the dispatch walks, from 1 on; 0 for all paths.
+        path_list: uint,
     }
 
     /// Cells that a path's bounces teach.

@@ -19,13 +19,22 @@ pub struct GuidedParameters {
     /// `later-rays`: most shadow rays at each vertex after the first; `None` is `auto`, a quarter of
     /// `--shadow-rays`, rounded up.
     pub later_rays: Option<u32>,
+    /// `open-rays`: most shadow rays at the first vertex in open scenes; `None` is `auto`, a quarter of
+    /// `--shadow-rays`, rounded up, where paths go on, and all of them in direct light.
+    pub open_rays: Option<u32>,
     /// `regions`: most regions of the environment, 16 to 1024; a render starts with 256.
     pub regions: u32,
 }
 
 impl Default for GuidedParameters {
     fn default() -> Self {
-        Self { bounce_candidates: 4, guide_memory: 128 << 20, later_rays: None, regions: 1024 }
+        Self {
+            bounce_candidates: 4,
+            guide_memory: 128 << 20,
+            later_rays: None,
+            open_rays: None,
+            regions: 1024,
+        }
     }
 }
 
@@ -51,6 +60,11 @@ impl GuidedParameters {
             get: |own| knob::text_or_auto(own.later_rays),
         },
         Knob {
+            key: "open-rays",
+            set: |own, value| knob::number_or_auto(&mut own.open_rays, value, 1..=4096),
+            get: |own| knob::text_or_auto(own.open_rays),
+        },
+        Knob {
             key: "regions",
             set: |own, value| knob::number(&mut own.regions, value, 16..=1024),
             get: |own| own.regions.to_string(),
@@ -63,11 +77,13 @@ impl GuidedParameters {
         self.later_rays.unwrap_or(shadow_rays.div_ceil(4)).min(shadow_rays)
     }
 
-    /// Returns the shadow rays at the first and at each later vertex in open scenes, where samples are
-    /// those of `mis`: there a bounce that escapes is a sample too, and one ray beside it is enough
-    /// (`docs/experiments/escaped_bounces.md`).
-    pub fn rays_in_the_open(&self, shadow_rays: u32) -> [u32; 2] {
-        [shadow_rays, self.later_rays.unwrap_or(1).min(shadow_rays)]
+    /// Returns the shadow rays at the first and at each later of `depth` vertices in open scenes, where
+    /// samples are those of `mis`: there a bounce that escapes is a sample too, and one or two rays beside
+    /// it are enough (`docs/experiments/escaped_bounces.md`).
+    pub fn rays_in_the_open(&self, shadow_rays: u32, depth: u32) -> [u32; 2] {
+        let first = if depth > 1 { shadow_rays.div_ceil(4) } else { shadow_rays };
+        [self.open_rays.unwrap_or(first), self.later_rays.unwrap_or(1)]
+            .map(|rays| rays.min(shadow_rays))
     }
 
     /// Returns true if paths of `depth` vertices have guided bounces.
@@ -101,8 +117,11 @@ mod tests {
         let mut all = Parameters::default();
         let later = |all: &Parameters, rays: u32| all.guided.later_rays_of(rays);
         assert_eq!([0, 1, 4, 5, 8, 16].map(|rays| later(&all, rays)), [0, 1, 1, 2, 2, 4]);
-        assert_eq!(all.guided.rays_in_the_open(5), [5, 1]);
-        assert_eq!(all.guided.rays_in_the_open(0), [0, 0]);
+        let open = |all: &Parameters, rays, depth| all.guided.rays_in_the_open(rays, depth);
+        assert_eq!([1, 6].map(|depth| open(&all, 8, depth)), [[8, 1], [2, 1]]);
+        assert_eq!(open(&all, 0, 6), [0, 0]);
+        all.set("open-rays=5").unwrap();
+        assert_eq!([8, 3].map(|rays| open(&all, rays, 6)), [[5, 1], [3, 1]]);
         all.set("later-rays=3").unwrap();
         assert_eq!([0, 2, 5].map(|rays| later(&all, rays)), [0, 2, 3]);
         assert_eq!(Sampler::Guided.describe(&all)["later-rays"], "3");

@@ -51,6 +51,10 @@ impl GuidedSteps {
 }
 
 impl Steps for GuidedSteps {
+    fn walks_lists(&self) -> bool {
+        true
+    }
+
     fn shadow_rays_at(&self, vertex: u32, most: u32) -> u32 {
         if vertex == 0 { most } else { self.parameters.later_rays_of(most) }
     }
@@ -65,10 +69,10 @@ impl Steps for GuidedSteps {
             (CONSTANT_BRDF_CANDIDATES, (self.candidates / 4).max(1)),
         ];
         let constants = [&own[..], &self.surfaces.constants()].concat();
-        let mut kernels = vec![Kernel::new("sample_guided", Domain::Paths, &constants)];
+        let mut kernels = vec![Kernel::new("sample_guided", Domain::Surfaces, &constants)];
         let has_arrived = wave.vertex > 0 && wave.first_shadow_ray == 0;
         if self.guides_bounces && has_arrived && teaches(wave) {
-            kernels.push(Kernel::new("learn_arrivals", Domain::Paths, &[]));
+            kernels.push(Kernel::new("learn_arrivals", Domain::Arrivals, &[]));
         }
         kernels
     }
@@ -86,7 +90,7 @@ impl Steps for GuidedSteps {
     fn bounce(&self, _wave: &Wave) -> Option<Kernel> {
         let own = [(CONSTANT_BOUNCE_CANDIDATES, self.parameters.bounce_candidates)];
         let constants = [&own[..], &self.roulette.constants(), &self.surfaces.constants()].concat();
-        self.guides_bounces.then(|| Kernel::new("bounce_guided", Domain::Paths, &constants))
+        self.guides_bounces.then(|| Kernel::new("bounce_guided", Domain::Surfaces, &constants))
     }
 }
 

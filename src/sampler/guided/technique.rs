@@ -58,7 +58,7 @@ impl Room for GuidedRoom {
             has_bounces: own.guides_bounces(settings.depth),
         };
         let open_steps = basic::MIS.steps(parameters, settings.surfaces)?;
-        let rays_in_the_open = own.rays_in_the_open(settings.shadow_rays);
+        let rays_in_the_open = own.rays_in_the_open(settings.shadow_rays, settings.depth);
         let mut guided = Guided {
             buffers: GuideBuffers::new(runner.device(), scene, &own, size)?,
             steps: GuidedSteps::new(first_candidates(parameters)?, own, settings),

@@ -75,6 +75,10 @@ impl PortalSteps {
 }
 
 impl Steps for PortalSteps {
+    fn walks_lists(&self) -> bool {
+        true
+    }
+
     fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
         let own = [
             (CONSTANT_PORTALS, self.count),
@@ -82,7 +86,7 @@ impl Steps for PortalSteps {
             (CONSTANT_COMPENSATION, u32::from(self.compensates)),
         ];
         let constants = [&own[..], &self.surfaces.constants()].concat();
-        vec![Kernel::new("sample_portals", Domain::Paths, &constants)]
+        vec![Kernel::new("sample_portals", Domain::Surfaces, &constants)]
     }
 }
 

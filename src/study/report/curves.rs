@@ -1,0 +1,119 @@
+//! Plots of a scene: errors and efficiency against samples and against time.
+
+use super::{
+    html::{escape, number},
+    plot::{self, STYLE_COUNT, Series},
+};
+use crate::study::{
+    record::SceneRecord,
+    results::Report,
+    statistics::Interval,
+    summary::{Curve, CurvePoint},
+};
+
+/// Errors and efficiency against samples and against time.
+pub fn plots(report: &Report, scene: &SceneRecord) -> String {
+    let curves: Vec<(usize, &Curve)> = report
+        .order
+        .iter()
+        .enumerate()
+        .filter_map(|(style, name)| {
+            let own = |curve: &&Curve| curve.scene == scene.name && curve.sampler == *name;
+            report.curves.iter().find(own).map(|curve| (style, curve))
+        })
+        .filter(|(_, curve)| !curve.points.is_empty())
+        .collect();
+    if curves.is_empty() {
+        return String::new();
+    }
+    let mut html = "<h3>Error on the way</h3><div class=\"plots\">".to_owned();
+    for ordinate in &ORDINATES {
+        for abscissa in &ABSCISSAS {
+            html += &plot_figure(&scene.name, &curves, abscissa, ordinate);
+        }
+    }
+    html + "</div><p class=\"soft\">Both axes logarithmic. relMSE is trimmed and over lit surfaces; \
+           efficiency is 1 / (relMSE × seconds). Bands: 95% interval of the mean over the seeds. \
+           Dashed: the slope of independent samples. Points that are not judged are left out.</p>"
+}
+
+/// Abscissa of the plots.
+struct Abscissa {
+    name: &'static str,
+    title: &'static str,
+    value: fn(&CurvePoint) -> f64,
+    slope: fn(&Curve) -> Option<f64>,
+}
+
+const ABSCISSAS: [Abscissa; 2] = [
+    Abscissa {
+        name: "samples",
+        title: "samples per pixel",
+        value: |point| f64::from(point.spp),
+        slope: |curve| curve.slope_spp,
+    },
+    Abscissa {
+        name: "time",
+        title: "seconds of passes",
+        value: |point| point.seconds,
+        slope: |curve| curve.slope_seconds,
+    },
+];
+
+/// Ordinate of the plots, with the slope of independent samples against it.
+struct Ordinate {
+    name: &'static str,
+    value: fn(&CurvePoint) -> Option<Interval>,
+    slope: f64,
+}
+
+const ORDINATES: [Ordinate; 3] = [
+    Ordinate { name: "RMSE", value: |point| Some(point.rmse), slope: -0.5 },
+    Ordinate { name: "relMSE", value: |point| point.relmse, slope: -1.0 },
+    Ordinate { name: "efficiency", value: |point| point.efficiency, slope: 0.0 },
+];
+
+/// One plot with its legend; empty where nothing is judged.
+fn plot_figure(
+    scene: &str,
+    curves: &[(usize, &Curve)],
+    abscissa: &Abscissa,
+    ordinate: &Ordinate,
+) -> String {
+    let mut legend = "<ul class=\"legend\">".to_owned();
+    let mut all = Vec::new();
+    for (style, curve) in curves {
+        let point = |point: &CurvePoint| {
+            let y = (ordinate.value)(point)?;
+            let x = (abscissa.value)(point);
+            Some(plot::Point { x, y: y.middle, low: y.low, high: y.high, label: String::new() })
+        };
+        let points: Vec<plot::Point> = curve.points.iter().filter_map(point).collect();
+        if points.is_empty() {
+            continue;
+        }
+        let slope = (abscissa.slope)(curve)
+            .filter(|_| ordinate.name == ORDINATES[0].name)
+            .map_or_else(String::new, |slope| format!(", slope {}", number(slope, 3)));
+        legend += &legend_entry(*style, &format!("{}{slope}", escape(&curve.sampler)));
+        all.push(Series { style: *style, name: curve.sampler.clone(), points });
+    }
+    if all.is_empty() {
+        return String::new();
+    }
+    let title = format!("{scene}: {} against {}", ordinate.name, abscissa.name);
+    format!(
+        "<figure>{}{legend}</ul></figure>",
+        plot::log_log(&title, abscissa.title, ordinate.name, &all, ordinate.slope)
+    )
+}
+
+/// Legend entry of marker and text; `text` is HTML.
+pub fn legend_entry(style: usize, text: &str) -> String {
+    format!(
+        "<li class=\"s{}\"><svg viewBox=\"-6 -6 12 12\" aria-hidden=\"true\"><g class=\"mark\">{}\
+         </g></svg>{text}</li>",
+        style % STYLE_COUNT,
+        plot::marker(style)
+    )
+}
