@@ -40,6 +40,7 @@
 //! | `guided` | [`sampler::guided`] | `guided/`: `sample_guided`, `learn`, `show_cells`, |
 //! | | | `bounce_guided`, `learn_arrivals` |
 //! | `portal` | [`sampler::portal`] | `portal/`: `sample_portals` |
+//! | `haar` | [`sampler::haar`] | `haar/`: `multiply_nodes`, `sample_nodes`, `lower_nodes` |
 //! | scene, settings, device → sums | [`renderer`] | |
 //! | sums → image files | [`film`] | |
 //! | scene → files of other renderers | [`export`] | |
@@ -75,6 +76,12 @@
 //! - \[CIE 015:2018\] *Colorimetry*, fourth edition.
 //! - \[Cigolle et al. 2014\] "A Survey of Efficient Representations for Independent Unit Vectors",
 //!   JCGT 3(2).
+//! - \[Clarberg 2008\] "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD", Journal of Graphics
+//!   Tools 13(3).
+//! - \[Clarberg & Akenine-Möller 2008\] "Practical Product Importance Sampling for Direct
+//!   Illumination", Computer Graphics Forum 27(2).
+//! - \[Clarberg et al. 2005\] "Wavelet Importance Sampling: Efficiently Evaluating Products of
+//!   Complex Functions", SIGGRAPH.
 //! - \[Douc et al. 2007\] "Convergence of Adaptive Mixtures of Importance Sampling Schemes", Annals
 //!   of Statistics 35(1); "Minimum Variance Importance Sampling via Population Monte Carlo", ESAIM:
 //!   Probability and Statistics 11.

@@ -300,6 +300,8 @@ fn every_range_is_named_where_it_is_left() {
         ("later-rays", ["0", "4097"], "auto, or 1 to 4096"),
         ("open-rays", ["0", "4097"], "auto, or 1 to 4096"),
         ("portal-share", ["-0.1", "1.01"], "0 to 1"),
+        ("haar-level", ["2", "6"], "3 to 5"),
+        ("haar-cache", ["", "hit"], "on or off"),
         ("regions", ["15", "1025"], "16 to 1024"),
         ("compensation", ["", "no"], "on or off"),
         ("share-tiles", ["3", "16"], "auto or off or 2 or 4 or 8"),

@@ -14,6 +14,7 @@ use fenestra::{
     sampler::{
         Parameters, basic,
         guided::{GuidedParameters, GuidedSteps},
+        haar::HaarSteps,
         portal::PortalSteps,
         product::{FitSizes, ProductParameters, ProductSteps},
         visibility::{CacheScope, VisibilityParameters, VisibilitySteps},
@@ -78,6 +79,12 @@ fn guided(settings: &PassSettings) -> impl Steps {
 
 fn portal() -> impl Steps {
     PortalSteps::new(&Parameters::default(), 1, Surfaces::default())
+}
+
+fn haar(cache: &str) -> impl Steps {
+    let mut parameters = Parameters::default();
+    parameters.set(cache).unwrap();
+    HaarSteps::new(&parameters, 8, Surfaces::default(), 2)
 }
 
 fn order(settings: &PassSettings, steps: &dyn Steps, wave: Wave) -> Vec<Dispatch> {
@@ -172,6 +179,8 @@ fn shown() -> Vec<(&'static str, Vec<Dispatch>)> {
         ("visibility", order(&deep, &visibility(CacheScope::Hit, 2), wave(0, 1))),
         ("guided", order(&deep, &guided(&deep), wave(0, 1))),
         ("portal", order(&deep, &portal(), wave(0, 1))),
+        ("haar", order(&deep, &haar("haar-cache=off"), wave(0, 1))),
+        ("haar with a cache", order(&settings(2, 1), &haar("haar-cache=on"), wave(0, 1))),
         ("one vertex, textures, lamps", order(&furnished, &mis(), wave(0, 1))),
         ("shared paths", order(&shared(2), &mis(), wave(0, 1))),
         ("lists of living paths", order(&listed(settings(2, 2)), &mis(), wave(0, 1))),

@@ -7,6 +7,7 @@
 #ifndef MIXTURE_GLSL
 #define MIXTURE_GLSL
 
+#include "product/numbers.glsl"
 #include "vertex.glsl"
 #include "visibility/weights.glsl"
 
@@ -25,13 +26,6 @@ struct Mixture {
     float lobe_share;
     float environment_share;
     float brdf_share;
-};
-
-// Random numbers for one direction, each in [0, 1).
-struct MixtureNumbers {
-    float technique;
-    vec2 direction;
-    float lobe;
 };
 
 // Loads the mixture at a path; `film_index` matters only for caches of pixels.

@@ -5,6 +5,7 @@
 
 pub mod basic;
 pub mod guided;
+pub mod haar;
 mod knob;
 mod parameters;
 pub mod portal;
@@ -115,6 +116,8 @@ samplers! {
     Guided "guided": guided::GuidedRoom;
     /// `mis` with directions through the portals of the scene (Ureña et al. 2013).
     Portal "portal": portal::PortalRoom;
+    /// Product of environment and BRDF on a wavelet basis (Clarberg & Akenine-Möller 2008).
+    Haar "haar": haar::HaarRoom;
 }
 
 impl Sampler {

@@ -2,6 +2,7 @@
 
 use super::{
     guided::GuidedParameters,
+    haar::HaarParameters,
     knob::{self, Knob},
     portal::PortalParameters,
     product::ProductParameters,
@@ -20,7 +21,7 @@ pub struct Parameters {
     /// `compensation`: true if `mis`, `portal` and what `guided` falls back to draw directions of the
     /// environment by its compensated density.
     pub compensation: bool,
-    /// Parameters of `product`, also within `visibility`.
+    /// Parameters of `product`, also within `visibility`; its shares also within `haar`.
     pub product: ProductParameters,
     /// Parameters of `visibility`.
     pub visibility: VisibilityParameters,
@@ -28,6 +29,8 @@ pub struct Parameters {
     pub guided: GuidedParameters,
     /// Parameters of `portal`.
     pub portal: PortalParameters,
+    /// Parameters of `haar`.
+    pub haar: HaarParameters,
 }
 
 impl Default for Parameters {
@@ -40,6 +43,7 @@ impl Default for Parameters {
             visibility: VisibilityParameters::default(),
             guided: GuidedParameters::default(),
             portal: PortalParameters::default(),
+            haar: HaarParameters::default(),
         }
     }
 }
@@ -104,7 +108,8 @@ impl Parameters {
             || knob::set(ProductParameters::KNOBS, &mut self.product, key, value)?
             || knob::set(VisibilityParameters::KNOBS, &mut self.visibility, key, value)?
             || knob::set(GuidedParameters::KNOBS, &mut self.guided, key, value)?
-            || knob::set(PortalParameters::KNOBS, &mut self.portal, key, value)?;
+            || knob::set(PortalParameters::KNOBS, &mut self.portal, key, value)?
+            || knob::set(HaarParameters::KNOBS, &mut self.haar, key, value)?;
         if is_known {
             return Ok(());
         }
@@ -123,6 +128,7 @@ impl Parameters {
             .chain(VisibilityParameters::KNOBS.iter().map(|knob| knob.key))
             .chain(GuidedParameters::KNOBS.iter().map(|knob| knob.key))
             .chain(PortalParameters::KNOBS.iter().map(|knob| knob.key))
+            .chain(HaarParameters::KNOBS.iter().map(|knob| knob.key))
             .collect();
         keys.sort_unstable();
         keys

@@ -252,6 +252,25 @@ binding_tables! {
         36 PORTALS: texels Rgba32Float;
     }
 
+    /// Set 1 of the sampler `haar`.
+    HAAR = haar: 1 {
+        /// Means of the environment's luminance over the four children of each node, level by level.
+        52 HAAR_TREE: texels Rgba32Float;
+        /// Direction to the centre of each node of the product.
+        53 HAAR_CENTRES: texels Rgba32Float;
+        /// Nodes of the product by fours, halves: quad `q` of path `i` at `q · path_count + i`.
+        54 HAAR_NODES: array uvec2;
+        /// Nodes of the product again.
+        55 HAAR_NODE_TEXELS: texels Rgba16Float;
+        /// Sums of the weights below the children of each coarse node: node `n` of path `i` at
+        /// `n · path_count + i`.
+        56 HAAR_SUMS: array vec4;
+        /// These sums again.
+        57 HAAR_SUM_TEXELS: texels Rgba32Float;
+        /// Blocked directions: their number of path `i` at `i`, the `k`th at `k · path_count + i`.
+        58 HAAR_CACHE: array uint;
+    }
+
     /// Set 1 of the passes by which pixels share paths.
     SHARING = sharing: 1 {
         /// First vertex of each path.

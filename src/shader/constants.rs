@@ -109,6 +109,12 @@ constants! {
     /// Share of the portals among directions that are not from the BRDF, bits of a float.
     CONSTANT_PORTAL_SHARE = 48;
 
+    // Specialization constants of the passes over nodes of the product.
+    /// Base-2 logarithm of the nodes along each side of the square, at least 3.
+    CONSTANT_HAAR_LEVEL = 49;
+    /// The same of the texels of the environment, more than that of the nodes.
+    CONSTANT_HAAR_DEPTH = 50;
+
     // Values of CONSTANT_SAMPLER.
     /// Uniform over the hemisphere.
     SAMPLER_UNIFORM = 0;

@@ -1,0 +1,104 @@
+//! Descriptor set 1 of `haar`: tree of the environment, nodes of the product at every hit of a wave.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use super::{
+    steps::cache_places,
+    tree::{Tree, first_of_level},
+    twin::node_centre,
+};
+use crate::{
+    error::Result,
+    gpu::{Buffer, DescriptorSet, Device},
+    pass::PathDemand,
+    sampler::Parameters,
+    shader::bindings::{HAAR, haar},
+};
+
+/// Storage for the nodes of a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NodeSize {
+    /// Base-2 logarithm of the nodes along each side of the square.
+    pub level: u32,
+    /// Directions in a cache; 0 without one.
+    pub cache_places: u32,
+}
+
+impl NodeSize {
+    /// Returns the size at `shadow_rays` rays per hit.
+    pub fn new(parameters: &Parameters, shadow_rays: u32) -> Self {
+        Self { level: parameters.haar.level, cache_places: cache_places(parameters, shadow_rays) }
+    }
+
+    /// Groups of four nodes.
+    fn quads(self) -> u64 {
+        1 << (2 * (self.level - 1))
+    }
+
+    /// Coarse nodes whose children are summed.
+    fn sums(self) -> u64 {
+        first_of_level(self.level - 2) as u64
+    }
+
+    fn cache_words(self) -> u64 {
+        if self.cache_places > 0 { 1 + u64::from(self.cache_places) } else { 0 }
+    }
+
+    /// Memory per path in flight.
+    pub fn demand(self) -> PathDemand {
+        let bytes = (8 * self.quads()).max(16 * self.sums()).max(4 * self.cache_words());
+        PathDemand { bytes, texels: self.quads().max(self.sums()) }
+    }
+}
+
+/// Descriptor set 1 of `haar`.
+pub struct NodeBuffers {
+    set: DescriptorSet,
+    /// Tree, centres, nodes, sums, caches.
+    buffers: [Buffer; 5],
+}
+
+impl NodeBuffers {
+    /// Uploads the tree, and allocates the nodes of `paths` paths. Fails if the device does or its
+    /// limits are exceeded.
+    pub fn new(device: &Arc<Device>, tree: &Tree, size: NodeSize, paths: u32) -> Result<Self> {
+        let paths = u64::from(paths);
+        let centres: Vec<[f32; 4]> = (0..1 << (2 * size.level))
+            .map(|node| node_centre(size.level, node).extend(0.0).to_array())
+            .collect();
+        let buffers = [
+            Buffer::texels_from_slice(device, "environment tree", tree.nodes())?,
+            Buffer::texels_from_slice(device, "node centres", &centres)?,
+            Buffer::new(device, "product nodes", paths * size.quads() * 8)?,
+            Buffer::new(device, "node sums", paths * size.sums() * 16)?,
+            Buffer::new(device, "blocked directions", paths * size.cache_words() * 4)?,
+        ];
+        let [tree, centres, nodes, sums, cache] = &buffers;
+        let bound = [
+            (haar::HAAR_TREE, tree),
+            (haar::HAAR_CENTRES, centres),
+            (haar::HAAR_NODES, nodes),
+            (haar::HAAR_NODE_TEXELS, nodes),
+            (haar::HAAR_SUMS, sums),
+            (haar::HAAR_SUM_TEXELS, sums),
+            (haar::HAAR_CACHE, cache),
+        ];
+        let set = DescriptorSet::new(device, &HAAR, &bound)?;
+        Ok(Self { set, buffers })
+    }
+
+    /// Descriptor set 1.
+    pub fn set(&self) -> &DescriptorSet {
+        &self.set
+    }
+
+    /// Halves of the nodes, two words for each four.
+    pub fn nodes(&self) -> &Buffer {
+        &self.buffers[2]
+    }
+
+    /// Bytes by buffer name.
+    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+        self.buffers.iter().map(|buffer| (buffer.name().to_owned(), buffer.size())).collect()
+    }
+}

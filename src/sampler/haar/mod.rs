@@ -1,0 +1,89 @@
+//! Product sampling on a wavelet basis, with the BRDF sampled on the fly.
+//!
+//! \[Clarberg & Akenine-Möller 2008\], after \[Clarberg et al. 2005\]. [`Tree`] of the environment →
+//! nodes of environment × BRDF at each hit (`glsl/haar/multiply_nodes.comp`) → directions by hierarchical
+//! warping, beside those of BRDF and environment (`glsl/haar/sample_nodes.comp`). With
+//! `--set haar-cache=on` nodes near blocked directions lose weight, as lobes do under `visibility`.
+
+mod buffers;
+mod parameters;
+mod steps;
+pub mod tree;
+pub mod twin;
+
+use std::{collections::BTreeMap, time::Instant};
+
+pub use buffers::{NodeBuffers, NodeSize};
+pub use parameters::HaarParameters;
+pub use steps::HaarSteps;
+use tree::Tree;
+
+use super::{
+    Context, Parameters, Room, knob, product::ProductParameters, visibility::VisibilityParameters,
+};
+use crate::{
+    error::Result,
+    gpu::DescriptorSet,
+    pass::{Passes, PathDemand, Report, Steps, Technique},
+};
+
+pub(super) struct HaarRoom;
+
+impl Room for HaarRoom {
+    fn check(&self, parameters: &Parameters, _depth: u32) -> Result<()> {
+        parameters.product.check()
+    }
+
+    fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
+        let mut named = knob::describe(HaarParameters::KNOBS, &parameters.haar);
+        let mut shared = knob::describe(ProductParameters::KNOBS, &parameters.product);
+        shared.extend(knob::describe(VisibilityParameters::KNOBS, &parameters.visibility));
+        let cache: &[&str] = if parameters.haar.has_cache { &["k", "tau"] } else { &[] };
+        let used = [&["brdf-share", "environment-share"], cache].concat();
+        named.extend(shared.into_iter().filter(|(key, _)| used.contains(&key.as_str())));
+        named
+    }
+
+    fn demand(&self, parameters: &Parameters, shadow_rays: u32) -> PathDemand {
+        NodeSize::new(parameters, shadow_rays).demand()
+    }
+
+    fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
+        let Context { scene, parameters, runner } = context;
+        let settings = runner.settings();
+        let start = Instant::now();
+        let tree = Tree::new(&scene.environment);
+        let tree_ms = start.elapsed().as_secs_f64() * 1e3;
+        let (surfaces, shadow_rays) = (settings.surfaces, settings.shadow_rays);
+        let steps = HaarSteps::new(parameters, tree.depth(), surfaces, shadow_rays);
+        let size = NodeSize::new(parameters, shadow_rays);
+        let nodes = NodeBuffers::new(runner.device(), &tree, size, runner.waves().capacity())?;
+        Ok(Box::new(HaarTechnique { steps, nodes, tree_ms }))
+    }
+}
+
+struct HaarTechnique {
+    steps: HaarSteps,
+    nodes: NodeBuffers,
+    tree_ms: f64,
+}
+
+impl Passes for HaarTechnique {
+    fn steps(&self) -> &dyn Steps {
+        &self.steps
+    }
+
+    fn set(&self) -> Option<&DescriptorSet> {
+        Some(self.nodes.set())
+    }
+}
+
+impl Technique for HaarTechnique {
+    fn report(&self) -> Report {
+        Report {
+            host_ms: BTreeMap::from([("environment tree".to_owned(), self.tree_ms)]),
+            buffer_bytes: self.nodes.buffer_bytes(),
+            ..Report::default()
+        }
+    }
+}
