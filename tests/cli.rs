@@ -47,7 +47,7 @@ fn every_command_has_help() {
         assert!(commands.iter().any(|command| command == expected), "{expected}: {commands:?}");
     }
     for name in commands.iter().filter(|name| *name != "help") {
-        let help = folder.run(&[name, "--help"]);
+        let help = folder.run(&[name.as_str(), "--help"]);
         assert_eq!(help.status, Some(0), "{name} --help: {}", help.messages);
         assert!(help.output.contains(&format!("Usage: fenestra {name}")), "{}", help.output);
     }

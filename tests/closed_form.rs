@@ -3,7 +3,13 @@
 
 mod support;
 
-use fenestra::{film::Sums, pass::Roulette, renderer::Settings, sampler::Sampler, scene::Scene};
+use fenestra::{
+    film::Sums,
+    pass::Roulette,
+    renderer::Settings,
+    sampler::{Parameters, Sampler},
+    scene::{Lamp, Portal, Scene, lamp::LampKind},
+};
 use glam::{DVec3, Vec3};
 use support::{
     scenes::{self, diffuse},
@@ -47,6 +53,60 @@ fn without_shadow_rays_only_the_environment_is_seen() {
     assert_eq!(sums.mean(sums.pixel_count() / 2 + 12), [0.0; 3]);
 }
 
+/// Shadow rays come in groups of eight, then in groups to lamps: the sky behind is added once.
+#[test]
+fn groups_of_shadow_rays_see_the_environment_once() {
+    let _alone = support::alone();
+    let mut scene = scenes::convex_furnace(diffuse(Vec3::splat(0.5)), Vec3::new(1.0, 2.0, 3.0));
+    let kind = LampKind::Directional { direction: Vec3::NEG_Y, irradiance: Vec3::ONE };
+    scene.lamps.push(Lamp { name: "lamp".into(), kind });
+    let sums = render(&scene, Settings { shadow_rays: 9, ..Settings::default() }, 1);
+    assert!((DVec3::from(sums.mean(0)) - DVec3::new(1.0, 2.0, 3.0)).abs().max_element() < 1e-5);
+}
+
+/// The border between a dark and a bright half of the sky: pixels left and right of it average what
+/// their filter and the lens see of either half.
+#[test]
+fn an_edge_has_the_blur_of_filter_and_lens() {
+    let _alone = support::alone();
+    const STEPS: u32 = 200;
+    let mut scene = scenes::convex_furnace(diffuse(Vec3::ONE), Vec3::ONE);
+    let is_right = |direction: Vec3| if direction.x > 0.0 { Vec3::ONE } else { Vec3::ZERO };
+    scene.environment = scenes::environment(512, is_right);
+    scene.environment.rotation_rad = 0.0;
+    // The box of the scene lies behind the camera, and the border in the middle of a column.
+    (scene.camera.position, scene.camera.look_at) = (Vec3::NEG_Z * 10.0, Vec3::NEG_Z * 20.0);
+    scene.camera.vertical_fov_deg = 50.0;
+    (scene.film.width, scene.film.height) = (21, 7);
+    let pixel = 2.0 * 25_f64.to_radians().tan() / 7.0;
+    // Share of a disk left of the line at `x` of its radius.
+    let disk = |x: f64| {
+        let x = x.clamp(-1.0, 1.0);
+        0.5 + (x * (1.0 - x * x).sqrt() + x.asin()) / std::f64::consts::PI
+    };
+    for (radius, focus) in [(0.0_f32, 1.0_f32), (1.5, 3.0)] {
+        (scene.camera.aperture_radius, scene.camera.focus_distance) = (radius, focus);
+        let sums = render(&scene, Settings { shadow_rays: 0, ..Settings::default() }, 4096);
+        for column in 0..21 {
+            let bright = |step: u32| {
+                let offset = (f64::from(step) + 0.5) / f64::from(STEPS) - 0.5;
+                let at = (f64::from(column) - 10.0 + offset) * pixel;
+                if radius > 0.0 { disk(at * f64::from(focus / radius)) } else { disk(at * 1e6) }
+            };
+            let expected = (0..STEPS).map(bright).sum::<f64>() / f64::from(STEPS);
+            let rows = (0..7).map(|row| sums.mean((row * 21 + column) as usize)[0]);
+            let found = rows.sum::<f64>() / 7.0;
+            // Interpolation between texels rounds the border off, evenly on both sides.
+            let name = format!("lens of {radius} m, column {column}");
+            assert!((found - expected).abs() < 5e-3, "{name}: {found}, not {expected}");
+            // A sample is 0 or 1, but for the texels of the border.
+            let variance = sums.variance_of_mean((3 * 21 + column) as usize)[0] * 4095.0;
+            let of_coin = expected * (1.0 - expected);
+            assert!((variance - of_coin).abs() < 0.02, "{name}: {variance}, not {of_coin}");
+        }
+    }
+}
+
 #[test]
 fn a_convex_diffuse_body_in_a_furnace_is_its_reflectance() {
     let _alone = support::alone();
@@ -70,31 +130,36 @@ fn a_convex_diffuse_body_in_a_furnace_is_its_reflectance() {
     }
 }
 
-#[test]
-fn irradiance_of_a_plane_is_the_integral_of_the_map() {
-    let _alone = support::alone();
-    // Integrate the map itself in f64, bilinear as the renderer sees it.
-    let reflectance = Vec3::new(0.3, 0.6, 0.9);
-    let scene = scenes::plane(reflectance, scenes::sky());
+/// Integrates the map itself over the upper hemisphere in f64, bilinear as the renderer sees it, and
+/// returns what a diffuse surface below it shows per reflectance. `seen` is the share of the film that
+/// sees a direction. Good to 1e-4.
+fn reflected_by_a_plane(scene: &Scene, seen: impl Fn(DVec3) -> f64) -> DVec3 {
     let steps = 1024;
-    let mut irradiance = DVec3::ZERO;
+    let mut sum = DVec3::ZERO;
     for i in 0..steps {
         for j in 0..steps {
             let cos_theta = ((f64::from(i) + 0.5) / f64::from(steps)).sqrt();
             let phi = std::f64::consts::TAU * (f64::from(j) + 0.5) / f64::from(steps);
             let sin_theta = (1.0 - cos_theta * cos_theta).sqrt();
             let direction = DVec3::new(sin_theta * phi.cos(), cos_theta, sin_theta * phi.sin());
-            irradiance += scene.environment.radiance(direction.as_vec3()).as_dvec3();
+            let radiance = scene.environment.radiance(direction.as_vec3());
+            sum += radiance.as_dvec3() * seen(direction);
         }
     }
-    irradiance *= std::f64::consts::PI / f64::from(steps * steps);
-    let expected = reflectance.as_dvec3() * irradiance / std::f64::consts::PI;
+    sum / f64::from(steps * steps)
+}
+
+#[test]
+fn irradiance_of_a_plane_is_the_integral_of_the_map() {
+    let _alone = support::alone();
+    let reflectance = Vec3::new(0.3, 0.6, 0.9);
+    let scene = scenes::plane(reflectance, scenes::sky());
+    let expected = reflectance.as_dvec3() * reflected_by_a_plane(&scene, |_| 1.0);
     for &sampler in Sampler::ALL {
         let settings = Settings { sampler, ..Settings::default() };
         let [mean, error] = mean_and_error(&scene, &settings, 16, 12);
         let z = (mean - expected) / error;
-        // 27 comparisons with 11 degrees of freedom: |t| > 7 has a chance of 6e-4 in all. The
-        // quadrature is good to 1e-4.
+        // 27 comparisons with 11 degrees of freedom: |t| > 7 has a chance of 6e-4 in all.
         let close = (mean / expected - 1.0).abs().max_element() < 2e-4;
         assert!(
             z.abs().max_element() < 7.0 || close,
@@ -103,6 +168,124 @@ fn irradiance_of_a_plane_is_the_integral_of_the_map() {
         );
         let relative_error = (error / expected).max_element();
         assert!(relative_error < 0.03, "{}: error {relative_error}", sampler.name());
+    }
+}
+
+/// A bright red patch in a dim blue sky: who resamples among candidates, or weighs techniques, by other
+/// shares than they have gives one colour too much. Luminance alone would not show it, since the choice
+/// of a candidate goes by luminance.
+#[test]
+fn bright_and_dim_light_keep_their_colours() {
+    let _alone = support::alone();
+    let patch = Vec3::new(0.6, 0.7, 0.4).normalize();
+    let sky = scenes::environment(64, |direction| {
+        if direction.dot(patch) > 0.95 {
+            Vec3::new(20.0, 1.0, 0.5)
+        } else {
+            Vec3::new(0.1, 0.2, 1.0)
+        }
+    });
+    let scene = scenes::plane(Vec3::splat(0.5), sky);
+    let expected = 0.5 * reflected_by_a_plane(&scene, |_| 1.0);
+    for (sampler, samples) in [(Sampler::Ris, 64), (Sampler::Mis, 16)] {
+        let settings = Settings { sampler, ..Settings::default() };
+        let [mean, error] = mean_and_error(&scene, &settings, samples, 12);
+        let z = (mean - expected) / error;
+        eprintln!("{}: {:.4} ± {:.4}", sampler.name(), mean / expected, error / expected);
+        // Six comparisons with 11 degrees of freedom: |t| > 7 has a chance of 1.3e-4 in all.
+        let close = (mean / expected - 1.0).abs().max_element() < 2e-4;
+        assert!(z.abs().max_element() < 7.0 || close, "{}: {mean}, z {z}", sampler.name());
+        assert!((error / expected).max_element() < 2e-3, "{}: {error}", sampler.name());
+    }
+}
+
+/// The same beside a wall that hides the brightest light: else `guided` samples as `mis` does.
+#[test]
+fn guided_keeps_colours_beside_a_wall() {
+    let _alone = support::alone();
+    let patch = Vec3::new(-0.6, 0.7, 0.4).normalize();
+    let hidden = Vec3::new(0.8, 0.45, 0.4).normalize();
+    let sky = scenes::environment(64, |direction| {
+        if direction.dot(hidden) > 0.95 {
+            Vec3::splat(100.0)
+        } else if direction.dot(patch) > 0.95 {
+            Vec3::new(20.0, 1.0, 0.5)
+        } else {
+            Vec3::new(0.1, 0.2, 1.0)
+        }
+    });
+    let mut scene = scenes::plane(Vec3::splat(0.5), sky);
+    scene.environment.rotation_rad = 0.0;
+    let (distance, height, half) = (8.0, 16.0, 100.0);
+    let size = Vec3::new(1.0, height, 2.0 * half);
+    scenes::add_box(&mut scene.geometry, Vec3::new(distance + 0.5, 0.5 * height, 0.0), size, 0);
+    // Places that the camera sees from 5 m above, 16 columns by 8 rows, all with z near 0.
+    let pixel = 2.0 * 5.0 * 15_f64.to_radians().tan() / 8.0;
+    let [distance, height, half] = [distance, height, half].map(f64::from);
+    let expected = 0.5
+        * reflected_by_a_plane(&scene, |direction| {
+            let passes = |column: &u32| {
+                let to_wall = (distance - (f64::from(*column) - 7.5) * pixel) / direction.x;
+                let is_beside = (direction.z * to_wall).abs() > half;
+                direction.x <= 0.0 || direction.y * to_wall > height || is_beside
+            };
+            (0..16).filter(passes).count() as f64 / 16.0
+        });
+    for (candidates, samples) in [(1, 256), (4, 128)] {
+        let parameters = Parameters { candidates: Some(candidates), ..Parameters::default() };
+        let settings = Settings { sampler: Sampler::Guided, parameters, ..Settings::default() };
+        let [mean, error] = mean_and_error(&scene, &settings, samples, 12);
+        let z = (mean - expected) / error;
+        eprintln!("{candidates}: {:.4} ± {:.4}, z {z:.1}", mean / expected, error / expected);
+        // Six comparisons as above. The places are those of pixel centres, good to 1e-3.
+        let close = (mean / expected - 1.0).abs().max_element() < 1e-3;
+        assert!(z.abs().max_element() < 7.0 || close, "{candidates} candidates: {mean}, z {z}");
+        assert!((error / expected).max_element() < 3e-3, "{candidates} candidates: {error}");
+    }
+}
+
+/// A portal overhead through which nearly all light of an even sky comes.
+#[test]
+fn a_portal_leaves_the_mean_as_it_is() {
+    let _alone = support::alone();
+    let mut scene = scenes::plane(Vec3::splat(0.5), scenes::environment(16, |_| Vec3::ONE));
+    let corner = Vec3::new(-30.0, 8.0, -30.0);
+    let axes = [Vec3::X, Vec3::Z];
+    scene.portals.push(Portal { name: "lid".into(), corner, axes, size: [60.0; 2] });
+    for shadow_rays in [2, 9] {
+        let settings = Settings { sampler: Sampler::Portal, shadow_rays, ..Settings::default() };
+        let [mean, error] = mean_and_error(&scene, &settings, 64, 12);
+        eprintln!("{shadow_rays} rays: {:.5} ± {:.5}", 2.0 * mean, 2.0 * error);
+        // Two comparisons with 11 degrees of freedom: |t| > 7 has a chance of 5e-5.
+        let z = (mean - 0.5) / error;
+        let close = (2.0 * mean - 1.0).abs().max_element() < 1e-4;
+        assert!(z.abs().max_element() < 7.0 || close, "{shadow_rays} rays: {mean}, z {z}");
+        assert!(error.max_element() < 1e-3, "{shadow_rays} rays: {error}");
+    }
+}
+
+/// A narrow lobe in a wide sky: where the BRDF samples, hardly any other ray goes. There `mis` must weigh
+/// its techniques by the shares of rays that they really have, with the bounce ray among them and
+/// without.
+#[test]
+fn techniques_are_weighed_by_the_rays_they_have() {
+    let _alone = support::alone();
+    let mut scene = scenes::plane(Vec3::ONE, scenes::environment(16, |_| Vec3::ONE));
+    scene.materials = vec![scenes::copper(0.1)];
+    let brdf = Settings { sampler: Sampler::Brdf, ..Settings::default() };
+    let [expected, expected_error] = mean_and_error(&scene, &brdf, 64, 12);
+    for (shadow_rays, depth) in [(1, 1), (5, 1), (5, 2)] {
+        let settings = Settings { shadow_rays, depth, ..Settings::default() };
+        let [mean, error] = mean_and_error(&scene, &settings, 64, 12);
+        let error = (error * error + expected_error * expected_error).map(f64::sqrt);
+        let ratio = mean / expected;
+        let name = format!("{shadow_rays} rays, depth {depth}");
+        eprintln!("{name}: {ratio:.5} ± {:.5}", error / expected);
+        // Seven errors, which nine comparisons of 12 + 12 renders pass with a chance below 2e-4, or
+        // the rounding of the densities.
+        let far = ((ratio - 1.0) * expected / error).abs().max_element() > 7.0;
+        assert!(!far || (ratio - 1.0).abs().max_element() < 1e-4, "{name}: {ratio}");
+        assert!((error / expected).max_element() < 1e-3, "{name}: {error}");
     }
 }
 
@@ -144,38 +327,65 @@ fn roulette_keeps_the_mean() {
     assert!(z.abs() < 6.0, "{with} against {without}, z {z}");
 }
 
-/// A million samples per pixel in a film of 4×4: sums of floats that did not carry their rounding
-/// errors would drift by 1e-3 and stop growing at 2²⁴ times a sample.
+const MILLION: u32 = 1_000_000;
+
+/// A white sky over a plane of this reflectance, in a film of 4×4.
+fn tiny_plane(reflectance: Vec3) -> Scene {
+    let mut scene = scenes::plane(reflectance, scenes::environment(16, |_| Vec3::ONE));
+    (scene.film.width, scene.film.height) = (4, 4);
+    scene
+}
+
+/// Sums of floats that did not carry their rounding errors would drift by 1e-3 and stop growing at 2²⁴
+/// times a sample.
 #[test]
 #[ignore = "takes minutes: cargo test --release --test closed_form -- --ignored --nocapture"]
 fn a_million_samples_do_not_drift() {
-    const MILLION: u32 = 1_000_000;
     let _alone = support::alone();
     let reflectance = Vec3::new(0.2, 0.5, 0.9);
-    let mut scene = scenes::plane(reflectance, scenes::environment(16, |_| Vec3::ONE));
-    (scene.film.width, scene.film.height) = (4, 4);
     // No variance: what differs from the reflectance is rounding.
-    let sums =
-        render(&scene, Settings { sampler: Sampler::Cosine, ..Settings::default() }, MILLION);
+    let settings = Settings { sampler: Sampler::Cosine, ..Settings::default() };
+    let sums = render(&tiny_plane(reflectance), settings, MILLION);
     let expected = reflectance.as_dvec3();
     let drift = (0..sums.pixel_count())
         .map(|pixel| (DVec3::from(sums.mean(pixel)) / expected - 1.0).abs().max_element())
         .fold(0.0, f64::max);
     eprintln!("cosine, constant map: largest drift {drift:.1e}");
     assert!(drift < 1e-6, "{drift}");
-    // Pixels see the same plane: their spread is that of independent means of a million samples.
-    for sampler in [Sampler::Mis, Sampler::Guided] {
-        let sums = render(&scene, Settings { sampler, ..Settings::default() }, MILLION);
-        let means: Vec<DVec3> =
-            (0..sums.pixel_count()).map(|pixel| DVec3::from(sums.mean(pixel)) / expected).collect();
-        let mean = means.iter().sum::<DVec3>() / means.len() as f64;
-        let square = means.iter().map(|found| (*found - mean).powf(2.0)).sum::<DVec3>();
-        let error = (square / (means.len() * (means.len() - 1)) as f64).map(f64::sqrt);
-        let z = (mean - 1.0) / error;
-        eprintln!("{}: mean {mean} ± {error}, z {z:.2}", sampler.name());
-        // Two samplers of three channels with 15 degrees of freedom: |t| > 6 has a chance of 2e-4.
-        // Floats of a sample's weight are good to 1e-6.
-        let is_close = (mean - 1.0).abs().max_element() < 1e-6;
-        assert!(z.abs().max_element() < 6.0 || is_close, "{}: {mean}, z {z}", sampler.name());
-    }
+}
+
+/// Compares a million samples of `sampler` with those of `cosine`. A wall hides half of the sky: else
+/// `guided` samples as `mis` does.
+fn million_samples_keep_the_mean(sampler: Sampler) {
+    let _alone = support::alone();
+    let mut scene = tiny_plane(Vec3::new(0.2, 0.5, 0.9));
+    let wall = (Vec3::new(8.5, 50.0, 0.0), Vec3::new(1.0, 100.0, 200.0));
+    scenes::add_box(&mut scene.geometry, wall.0, wall.1, 0);
+    let mean_and_variance = |sampler, seed| {
+        let sums = render(&scene, Settings { sampler, seed, ..Settings::default() }, MILLION);
+        let pixels = sums.pixel_count();
+        let variance: DVec3 =
+            (0..pixels).map(|pixel| DVec3::from(sums.variance_of_mean(pixel))).sum();
+        (image_mean(&sums), variance / (pixels * pixels) as f64)
+    };
+    let (expected, expected_variance) = mean_and_variance(Sampler::Cosine, 0);
+    let (mean, variance) = mean_and_variance(sampler, 1);
+    // Samples are stratified: their spread overestimates the error.
+    let error = (variance + expected_variance).map(f64::sqrt);
+    let z = (mean - expected) / error;
+    eprintln!("{}: {:.7} ± {:.7}, z {z:.2}", sampler.name(), mean / expected, error / expected);
+    assert!(z.abs().max_element() < 5.0, "{}: {mean}, z {z}", sampler.name());
+    assert!((error / expected).max_element() < 1e-3, "{}: {error}", sampler.name());
+}
+
+#[test]
+#[ignore = "takes minutes: cargo test --release --test closed_form -- --ignored --nocapture"]
+fn a_million_samples_of_mis_keep_the_mean() {
+    million_samples_keep_the_mean(Sampler::Mis);
+}
+
+#[test]
+#[ignore = "takes minutes: cargo test --release --test closed_form -- --ignored --nocapture"]
+fn a_million_samples_of_guided_keep_the_mean() {
+    million_samples_keep_the_mean(Sampler::Guided);
 }

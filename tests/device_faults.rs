@@ -3,6 +3,8 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
+#[path = "support/c_library.rs"]
+mod c_library;
 #[path = "support/command.rs"]
 mod command;
 
@@ -17,17 +19,12 @@ use fenestra::film::{Checkpoint, Image, checkpoint::remove_checkpoint};
 
 const LAYER: &str = "VK_LAYER_TEST_faulty";
 
-/// Compiles the layer, with the compiler that links Rust programs, and returns its folder.
+/// Compiles the layer and returns its folder.
 fn layer_folder() -> &'static PathBuf {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| {
-        let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("faulty_layer");
-        std::fs::create_dir_all(&folder).unwrap();
-        let library = folder.join("libfaulty_layer.so");
-        let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/support/faulty_layer.c");
-        let mut compiler = Command::new("cc");
-        compiler.args(["-O1", "-shared", "-fPIC", "-fvisibility=hidden", source, "-o"]);
-        assert!(compiler.arg(&library).status().expect("a C compiler").success());
+        let library = c_library::compile("faulty_layer");
+        let folder = library.parent().unwrap().to_owned();
         let manifest = serde_json::json!({
             "file_format_version": "1.1.2",
             "layer": {

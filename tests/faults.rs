@@ -17,10 +17,7 @@ use std::{
 use command::{Folder, Run, Running, program};
 use fenestra::{
     files::write_atomically,
-    film::{
-        Attribute, Checkpoint, Image, Metadata, SampleRange, Sums, checkpoint::guide_paths,
-        merge::merge_checkpoints,
-    },
+    film::{Attribute, Checkpoint, Image, Metadata, SampleRange, Sums, merge::merge_checkpoints},
 };
 
 fn folder() -> Folder {
@@ -57,40 +54,6 @@ fn checkpoint() -> Checkpoint {
     Checkpoint { sums, metadata }
 }
 
-/// Puts together every state of the folder that a killed process can leave: the guide is written,
-/// then the checkpoint, then the older guide removed.
-#[test]
-fn every_state_that_a_kill_can_leave_resumes_to_the_bit() {
-    let folder = folder();
-    let path = folder.path().join("out.checkpoint.exr");
-    let run = |options: &[&str]| folder.run(&[&GUIDED[..], options].concat()).assert(0, &[]);
-    run(&["--spp=9"]);
-    let whole = channels(&folder, "out.exr");
-    let keep = |spp: &str| {
-        run(&[spp, "--checkpoint-interval=1h"]);
-        let [guide] = guide_paths(&path).unwrap().try_into().unwrap();
-        let contents = (fs::read(&path).unwrap(), fs::read(&guide).unwrap());
-        (contents.0, guide, contents.1)
-    };
-    let (older, older_guide, older_bytes) = keep("--spp=2");
-    let (newer, newer_guide, newer_bytes) = keep("--spp=5");
-    assert!(older_guide != newer_guide && !older_guide.exists());
-    let both = [(&older_guide, &older_bytes), (&newer_guide, &newer_bytes)];
-    for (checkpoint, guides) in
-        [(&older, &both[..1]), (&older, &both[..]), (&newer, &both[..]), (&newer, &both[1..])]
-    {
-        fs::write(&path, checkpoint).unwrap();
-        for path in guide_paths(&path).unwrap() {
-            fs::remove_file(path).unwrap();
-        }
-        for (path, bytes) in guides {
-            fs::write(path, bytes).unwrap();
-        }
-        run(&["--spp=9", "--resume"]);
-        assert!(channels(&folder, "out.exr") == whole, "{} guides", guides.len());
-    }
-}
-
 #[test]
 fn a_killed_render_resumes_to_the_bit() {
     let folder = folder();
@@ -99,7 +62,7 @@ fn a_killed_render_resumes_to_the_bit() {
     let whole = channels(&folder, "out.exr");
     let path = folder.path().join("out.checkpoint.exr");
     let mut kept = 0;
-    for delay in [5, 20, 45, 80, 120, 170] {
+    for delay in [5, 60] {
         let mut child = program(folder.path())
             .args(GUIDED)
             .args(["--spp=1000000", "--checkpoint-interval=1ms", "--resume"])
@@ -341,33 +304,6 @@ fn a_limit_of_file_sizes_is_an_error_and_no_signal() {
     run.assert(1, &["out.exr: cannot write: File too large"]);
     assert_eq!(fs::read(folder.path().join("out.exr")).unwrap(), before);
     assert!(folder.files().iter().all(|name| !name.ends_with(".tmp")), "{:?}", folder.files());
-}
-
-/// The disk is full after some blocks of 512 bytes, at which a guide or a checkpoint breaks off.
-#[test]
-fn a_disk_that_fills_keeps_the_last_checkpoint() {
-    let folder = folder();
-    let options = [&GUIDED[..], &["--checkpoint-interval=1h"]].concat();
-    folder.run(&[&options[..], &["--spp=2"]].concat()).assert(0, &[]);
-    let path = folder.path().join("out.checkpoint.exr");
-    let samples = || {
-        let (checkpoint, guide) = Checkpoint::read_with_guide(&path).unwrap();
-        assert!(guide.is_some());
-        checkpoint.sums.sample_count
-    };
-    let (mut failed, mut kept) = (0, samples());
-    for (turn, blocks) in [1, 16, 256, 4096].into_iter().enumerate() {
-        let spp = 3 + turn as u32;
-        let line = format!("{} --resume --spp={spp}", options.join(" "));
-        let run = run_after(&folder, &format!("ulimit -f {blocks}"), &line);
-        assert!(matches!(run.status, Some(0 | 1)), "{:?}: {}", run.status, run.messages);
-        let is_written = run.status == Some(0);
-        assert_eq!(samples(), if is_written { spp } else { kept }, "{blocks}: {}", run.messages);
-        kept = samples();
-        failed += u32::from(!is_written);
-        assert!(folder.files().iter().all(|name| !name.ends_with(".tmp")), "{:?}", folder.files());
-    }
-    assert!((1..4).contains(&failed), "{failed} of 4 disks were too small");
 }
 
 #[cfg(target_os = "linux")]

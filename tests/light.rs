@@ -181,6 +181,19 @@ fn mean_over_plane(scene: &Scene, radiance: impl Fn(Vec3) -> f32) -> f64 {
     sum / f64::from(SIDE * SIDE)
 }
 
+/// Each lamp is drawn as often as its power asks for, and weighs as much as all others together leave it.
+#[test]
+fn lamps_of_unlike_power_add_up() {
+    let _alone = support::alone();
+    let mut scene = scenes::plane(Vec3::splat(0.5), black());
+    for irradiance in [Vec3::new(1.0, 0.0, 0.0), Vec3::new(3.0, 0.0, 1.0), Vec3::new(0.0, 9.0, 0.0)]
+    {
+        let kind = LampKind::Directional { direction: Vec3::NEG_Y, irradiance };
+        scene.lamps.push(Lamp { name: "lamp".into(), kind });
+    }
+    assert_mean(&scene, settings(Sampler::Mis, 1), 128, 4.0 * 0.5 / f64::from(PI));
+}
+
 #[test]
 fn an_area_lamp_agrees_with_a_point_far_away() {
     let _alone = support::alone();

@@ -92,10 +92,15 @@ fn base(depth: u32) -> Settings {
 const LARGER_EDGES: [(Sampler, &str); 3] =
     [(Sampler::Mis, "4"), (Sampler::Mis, "8"), (Sampler::Guided, "4")];
 
+/// Fins on the floor hide from one vertex of a tile what its neighbour sees.
 #[test]
 fn in_a_diffuse_room() {
     let _alone = support::alone();
-    let scene = scenes::room(vec![scenes::diffuse(Vec3::splat(0.8))]);
+    let mut scene = scenes::room(vec![scenes::diffuse(Vec3::splat(0.8))]);
+    for fin in 0..12 {
+        let centre = Vec3::new(-1.6 + 0.25 * fin as f32, 0.3, -0.6);
+        scenes::add_box(&mut scene.geometry, centre, Vec3::new(0.02, 0.6, 1.8), 0);
+    }
     agrees(&scene, &LARGER_EDGES, 32, &base(2));
 }
 

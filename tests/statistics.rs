@@ -13,8 +13,8 @@ mod statistics;
 
 use random::Random;
 use statistics::{
-    Comparison, chi_square_p_value, estimates, largest_t, upper_incomplete_gamma, z_of_mean,
-    z_p_value,
+    Comparison, chi_square_p_value, estimates, largest_t, smallest_p_value, student_p_value,
+    upper_incomplete_gamma, z_of_mean, z_p_value,
 };
 
 fn close(a: f64, b: f64) -> bool {
@@ -74,6 +74,21 @@ fn estimates_have_the_mean_and_its_error() {
     assert!(close(largest_t(&values, &others), 4.0 / 17.0_f64.sqrt()));
     assert_eq!(largest_t(&values[1..], &others[1..]), 0.0);
     assert!(largest_t(&values[1..], &estimates(&[vec![11.0], vec![11.0]])) > 1e6);
+}
+
+#[test]
+fn p_values_are_those_of_student_and_welch() {
+    // Tables of Student's distribution; with one degree of freedom it is Cauchy's.
+    assert!((student_p_value(3.499, 7.0) - 0.01).abs() < 1e-5);
+    assert!((student_p_value(1.0, 1.0) - 0.5).abs() < 1e-5);
+    let rows = |mean: f64, error: f64| estimates(&[vec![mean + error], vec![mean - error]]);
+    // Equal errors have the freedom of both sides, one error that of one side.
+    let p_value = |a: Vec<_>, b: Vec<_>| smallest_p_value(&a, &b, 8);
+    let t = 5.0 / 2.0_f64.sqrt();
+    assert!(close(p_value(rows(1.5, 0.1), rows(1.0, 0.1)), student_p_value(t, 14.0)));
+    assert!(close(p_value(rows(1.5, 0.1), rows(1.0, 0.0)), student_p_value(5.0, 7.0)));
+    assert_eq!(p_value(rows(1.0, 0.0), rows(1.0, 0.0)), 1.0);
+    assert!(p_value(rows(1.1, 0.0), rows(1.0, 0.0)) < 1e-12);
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! Every sampler converges to the same image: z-tests of block means of independent replicates.
 //!
 //! The reference is `cosine`, which knows neither BRDF nor environment. A scene has nine comparisons
-//! of 36 values (12 blocks × 3 channels). With 8 + 8 replicates, |t| > 7.5 has a chance of 3e-6, so a
-//! scene raises a false alarm once in about 1,000 runs, the three scenes once in 340. Seeds are fixed:
+//! of 36 values (12 blocks × 3 channels). A p-value below 3e-6 is an alarm, by Student's distribution
+//! with Welch's degrees of freedom: the errors of the two sides differ. So a scene raises a false alarm
+//! once in about 1,000 runs, the three scenes once in 340, the whole file once in 110. Seeds are fixed:
 //! a run that passed passes again on the same device. `every_sampler_with_every_material` is slow and
 //! runs on request.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
@@ -12,7 +13,7 @@ mod support;
 #[path = "support/materials.rs"]
 mod materials;
 
-use std::{path::Path, sync::Arc};
+use std::{env, path::Path, sync::Arc};
 
 use fenestra::{
     brdf::{Material, MeasuredTable, material::MaterialKind},
@@ -23,10 +24,13 @@ use fenestra::{
 use glam::Vec3;
 use materials::Case;
 use support::{
-    replicates::{self, LIMIT},
+    replicates::{self, LIMIT, REPLICATES},
     scenes,
-    statistics::{Comparison, Estimate},
+    statistics::{Comparison, Estimate, smallest_p_value},
 };
+
+/// Least p-value allowed, that of |t| = 7.5 where both sides have the same error.
+const LEAST_P_VALUE: f64 = 3e-6;
 
 const ALL_AGAINST_COSINE: [Sampler; 10] = [
     Sampler::Cosine,
@@ -75,13 +79,15 @@ fn settings_agree(scene: &Scene, samples: u32, settings: &[Settings]) {
         let Comparison { largest_t, ratio, largest_t_with_bias } =
             Comparison::new(&values, &reference);
         let (mean, error) = total(&values);
+        let p_value = smallest_p_value(&values, &reference, REPLICATES);
         eprintln!(
-            "{} depth {depth} {}: largest |t| {largest_t:.2}, mean ratio {ratio:.4} ± {:.4}",
+            "{} depth {depth} {}: largest |t| {largest_t:.2}, least p {p_value:.1e}, mean ratio \
+             {ratio:.4} ± {:.4}",
             scene.name,
             sampler.name(),
             error / reference_total
         );
-        assert!(largest_t < LIMIT, "{} {}: |t| = {largest_t}", scene.name, sampler.name());
+        assert!(p_value > LEAST_P_VALUE, "{} {}: p = {p_value:e}", scene.name, sampler.name());
         // The test has teeth: an error of a tenth would not pass.
         let detected =
             largest_t_with_bias > LIMIT || (1.1 * mean - reference_total).abs() > 3.0 * error;
@@ -220,7 +226,8 @@ fn in_the_scenes_of_the_thesis() {
 ///
 /// `uniform`, `cosine` and `env` find the highlights of polished materials (lobes below 0.05) too seldom for
 /// eight replicates to tell their error: `brdf` is the reference there, and they are left out. The
-/// false alarms of about 300 comparisons of 36 values: one in 30 runs.
+/// false alarms of 318 comparisons of 36 values: one in 29 runs. `FENESTRA_MATERIAL_PAIR` takes one pair,
+/// counted from 0.
 #[test]
 #[ignore = "takes half an hour: cargo test --release --test unbiased -- --ignored"]
 fn every_sampler_with_every_material() {
@@ -242,18 +249,21 @@ fn every_sampler_with_every_material() {
         )
         .collect();
     let white = scenes::diffuse(Vec3::splat(0.6));
-    for (materials, samplers) in [(&rough, &ALL_AGAINST_COSINE[..]), (&polished, &sighted)] {
-        for pair in materials.chunks(2) {
-            let all: Vec<Material> = [std::slice::from_ref(&white), pair].concat();
-            for (mut scene, depth) in [
-                (scenes::open(all.clone()), 1),
-                (scenes::room(all.clone()), 1),
-                (scenes::room(all), 4),
-            ] {
-                let names: Vec<&str> = pair.iter().map(|material| &*material.name).collect();
-                scene.name = format!("{} {names:?}", scene.name);
-                samplers_agree(&scene, depth, 64, samplers);
-            }
+    let wanted = env::var("FENESTRA_MATERIAL_PAIR").ok();
+    let wanted = wanted.map(|text| text.parse::<usize>().expect("the number of a pair"));
+    let rough = rough.chunks(2).map(|pair| (pair, &ALL_AGAINST_COSINE[..]));
+    let pairs = rough.chain(polished.chunks(2).map(|pair| (pair, &sighted[..])));
+    for (index, (pair, samplers)) in pairs.enumerate() {
+        if wanted.is_some_and(|wanted| wanted != index) {
+            continue;
+        }
+        let all: Vec<Material> = [std::slice::from_ref(&white), pair].concat();
+        for (mut scene, depth) in
+            [(scenes::open(all.clone()), 1), (scenes::room(all.clone()), 1), (scenes::room(all), 4)]
+        {
+            let names: Vec<&str> = pair.iter().map(|material| &*material.name).collect();
+            scene.name = format!("{index}: {} {names:?}", scene.name);
+            samplers_agree(&scene, depth, 64, samplers);
         }
     }
 }

@@ -337,7 +337,7 @@ pub fn work(target: &'static Target) {
 }
 
 fn seconds() -> f64 {
-    setting("FENESTRA_FUZZ_MILLISECONDS", 250) as f64 / 1000.0
+    setting("FENESTRA_FUZZ_MILLISECONDS", 150) as f64 / 1000.0
 }
 
 /// Numbers of one target.

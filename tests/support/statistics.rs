@@ -101,6 +101,37 @@ pub fn largest_t(a: &[Estimate], b: &[Estimate]) -> f64 {
     a.iter().zip(b).map(t).fold(0.0, f64::max)
 }
 
+/// Returns the smallest p-value of all t between two lists of estimates, from `replicates` each: under
+/// Student's distribution with the degrees of freedom of Welch (1947). They lie between those of one
+/// side, where its error is all there is, and those of both.
+pub fn smallest_p_value(a: &[Estimate], b: &[Estimate], replicates: u32) -> f64 {
+    assert_eq!(a.len(), b.len(), "estimates of the same values");
+    let p_value = |(a, b): (&Estimate, &Estimate)| {
+        let t = largest_t(&[*a], &[*b]);
+        let [a, b] = [a.squared_error, b.squared_error];
+        let freedom = f64::from(replicates - 1) * (a + b).powi(2) / (a * a + b * b);
+        // Without an error there is no distribution, and values agree or do not.
+        let freedom = if freedom.is_finite() { freedom } else { f64::from(replicates - 1) };
+        if t > 0.0 { student_p_value(t, freedom) } else { 1.0 }
+    };
+    a.iter().zip(b).map(p_value).fold(1.0, f64::min)
+}
+
+/// Returns the two-sided p-value of `t` > 0 under Student's distribution, by the midpoint rule in t/x.
+pub fn student_p_value(t: f64, freedom: f64) -> f64 {
+    const STEPS: u32 = 1000;
+    let front = (ln_gamma(0.5 * (freedom + 1.0)) - ln_gamma(0.5 * freedom)).exp()
+        / (freedom * std::f64::consts::PI).sqrt();
+    let density = |x: f64| front * (1.0 + x * x / freedom).powf(-0.5 * (freedom + 1.0));
+    let sum: f64 = (0..STEPS)
+        .map(|step| {
+            let u = (f64::from(step) + 0.5) / f64::from(STEPS);
+            density(t / u) * t / (u * u)
+        })
+        .sum();
+    2.0 * sum / f64::from(STEPS)
+}
+
 /// Result of comparing estimates with a reference.
 #[derive(Clone, Copy, Debug)]
 pub struct Comparison {
