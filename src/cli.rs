@@ -100,7 +100,7 @@ fn report(error: &Error) {
     }
     let help = match error {
         Error::Device { help, .. } => Some(help.as_str()),
-        Error::Memory { help, .. } => *help,
+        Error::Memory { help, .. } | Error::Denoiser { help, .. } => *help,
         _ => None,
     };
     if let Some(help) = help {

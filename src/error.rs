@@ -67,6 +67,14 @@ pub enum Error {
         /// Advice to the user.
         help: String,
     },
+    /// The denoiser's library is missing or fails.
+    #[error("{reason}")]
+    Denoiser {
+        /// Expected and found.
+        reason: String,
+        /// Advice to the user.
+        help: Option<&'static str>,
+    },
     /// The memory that the process may use, or that of the device, does not suffice.
     #[error("{message}")]
     Memory {

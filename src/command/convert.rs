@@ -2,16 +2,18 @@
 
 use std::path::PathBuf;
 
-use super::options::parse_crop;
+use super::{denoise::denoise, options::parse_crop};
 use crate::{
     error::{Error, Result},
     files::{check_writable, extension, is_same_file},
     film::{
         Curve, Image, RgbImage, Tone, Window,
+        denoised::DENOISED,
         picture::{write_hdr, write_jpeg},
         png::write_rgb8,
         tone::auto_exposure,
     },
+    gpu::Denoiser,
 };
 
 /// Arguments of `convert`.
@@ -37,6 +39,9 @@ pub struct Arguments {
     /// vectors from −1 to 1 as 0 to 1.
     #[arg(long, value_name = "NAME")]
     pub layer: Option<String>,
+    /// Denoise the picture by the library Open Image Denoise. Biased: the image itself stays as it is.
+    #[arg(long, conflicts_with = "layer")]
+    pub denoise: bool,
 }
 
 /// Layers of unit vectors.
@@ -75,7 +80,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         )));
     }
     check_writable(output)?;
+    let denoiser = arguments.denoise.then(Denoiser::load).transpose()?;
     let mut image = Image::read_exr(path)?;
+    if let Some(denoiser) = denoiser {
+        let denoised = denoise(&denoiser, &image, path)?;
+        eprintln!("{}: {}", output.display(), denoised.line);
+        image = denoised.image;
+    }
     if let Some(window) = arguments.crop {
         image = image.cropped(window, path)?;
     }
@@ -108,8 +119,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     if arguments.layer.is_some() || scale != 1.0 {
         // Attributes and other layers belong to the values of the render alone.
+        let denoised = image.attributes.remove_entry(DENOISED);
         image.channels.clear();
         image.attributes.clear();
+        image.attributes.extend(denoised);
         image.insert_triple(["R", "G", "B"], &picture.pixels);
     }
     image.write_exr(output)

@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod compare;
 pub mod convert;
+mod denoise;
 pub mod devices;
 pub mod export;
 pub mod fit;

@@ -11,7 +11,10 @@ use std::{
     str::FromStr,
 };
 
-use super::exr::{Attribute, Image};
+use super::{
+    denoised::check_film,
+    exr::{Attribute, Image},
+};
 use crate::error::{Error, Result};
 
 /// Samples `first … first + count − 1` of every pixel, drawn with one seed.
@@ -163,8 +166,10 @@ impl Metadata {
     /// Reads the metadata back from the attributes of `image`; `path` only serves error messages.
     ///
     /// # Errors
-    /// [`Error::Format`] names the attribute that is missing or malformed.
+    /// [`Error::Format`] names the attribute that is missing or malformed, or the denoiser of a picture
+    /// that is none of samples alone.
     pub fn load(image: &Image, path: &Path) -> Result<Self> {
+        check_film(image, path)?;
         let text = |name: &str| match image.attributes.get(name) {
             Some(Attribute::Text(value)) => Ok(value.clone()),
             Some(other) => Err(Error::format(

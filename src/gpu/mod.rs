@@ -1,10 +1,12 @@
-//! Vulkan on the host: one concept per file, and the only module with `unsafe` code.
+//! Vulkan on the host, and the library of the denoiser: one concept per file, and the only module with
+//! `unsafe` code.
 
-#![expect(unsafe_code, reason = "raw Vulkan calls are unsafe; each block states why it is sound")]
+#![expect(unsafe_code, reason = "calls of C are unsafe; each block states why it is sound")]
 
 pub mod buffer;
 pub mod capabilities;
 pub mod commands;
+pub mod denoiser;
 pub mod descriptors;
 pub mod device;
 pub mod instance;
@@ -19,6 +21,7 @@ mod transfer;
 pub use buffer::Buffer;
 pub use capabilities::Capabilities;
 pub use commands::Commands;
+pub use denoiser::Denoiser;
 pub use descriptors::DescriptorSet;
 pub use device::Device;
 pub use pipeline::Pipeline;

@@ -26,6 +26,7 @@ use crate::{
     film::{
         Aov, Attribute, Checkpoint, Image, Metadata, RgbImage, SampleRange,
         checkpoint::{checkpoint_path, remove_checkpoint},
+        denoised::check_film,
         metadata::seconds_of,
     },
     renderer::Renderer,
@@ -93,6 +94,7 @@ fn given_files(plan: &ReferencePlan, scene: &str) -> Result<Vec<PathBuf>> {
 /// Reads an image and checks that it shows the scene.
 pub(super) fn read_checked(path: &Path, scene: &Scene) -> Result<Image> {
     let image = Image::read_exr(path)?;
+    check_film(&image, path)?;
     check(&image, path, scene)?;
     Ok(image)
 }

@@ -90,6 +90,11 @@ pub struct Arguments {
     /// Also write a PNG preview beside the image.
     #[arg(long)]
     pub png: bool,
+    /// Also write the picture denoised by the library Open Image Denoise, as FILE.denoised.exr (and .png).
+    /// Biased: the image itself stays as rendered. Adds the layers albedo and normal, and leaves
+    /// `share-tiles` off unless set.
+    #[arg(long)]
+    pub denoise: bool,
     /// Exposure of the preview, in stops.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
     pub exposure: f32,
@@ -123,6 +128,11 @@ pub struct Arguments {
 /// Maximum film width of `--quick`, pixels.
 const QUICK_WIDTH: u32 = 240;
 
+/// `out.exr` → `out.denoised.exr`, or with another ending.
+pub(super) fn denoised_path(output: &Path, ending: &str) -> PathBuf {
+    output.with_extension(format!("denoised.{ending}"))
+}
+
 impl Arguments {
     /// Applies `--size` or `--quick` to the film.
     pub(super) fn resize(&self, film: &mut FilmSettings) {
@@ -143,9 +153,13 @@ impl Arguments {
     /// [`Error::Usage`] for an output that is an input, [`Error::Io`] for one that cannot be written.
     pub(super) fn check_outputs(&self, scene: &Scene, output: &Path) -> Result<()> {
         let preview = self.png.then(|| output.with_extension("png"));
+        let denoised = self.denoise.then(|| denoised_path(output, "exr"));
+        let shown = (self.denoise && self.png).then(|| denoised_path(output, "png"));
         let asked = [
             ("--output", Some(output)),
             ("--png", preview.as_deref()),
+            ("--denoise", denoised.as_deref()),
+            ("--denoise with --png", shown.as_deref()),
             ("--stats", self.stats.as_deref()),
             ("--save-guide", self.save_guide.as_deref()),
         ];
@@ -196,6 +210,7 @@ impl Arguments {
         {
             let beside = [
                 ("--png", self.png),
+                ("--denoise", self.denoise),
                 ("--resume", self.resume),
                 ("--checkpoint-interval", self.checkpoint_interval.is_some()),
                 ("--pixel", self.pixel.is_some()),
@@ -210,8 +225,16 @@ impl Arguments {
         let (save, load) = (self.save_guide.as_deref(), self.load_guide.as_deref());
         guide::check(self.sampler, save, load)?;
         let mut parameters = Parameters::default();
+        if self.denoise {
+            // Noise that the pixels of a tile have in common looks like a pattern to the denoiser.
+            parameters.set("share-tiles=off")?;
+        }
         for assignment in &self.set {
             parameters.set(assignment)?;
+        }
+        let mut aovs = self.aov.clone();
+        if self.denoise {
+            aovs.extend([Aov::Albedo, Aov::Normal].iter().filter(|aov| !self.aov.contains(aov)));
         }
         if let Some(error) = self.error
             && !(error.is_finite() && error > 0.0)
@@ -238,7 +261,7 @@ impl Arguments {
             seed: self.seed,
             first_sample: self.sample_offset,
             window: self.crop,
-            aovs: self.aov.clone(),
+            aovs,
             roulette: Roulette {
                 vertex: self.roulette_depth,
                 throughput: self.roulette_throughput,

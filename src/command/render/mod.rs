@@ -9,9 +9,12 @@ use std::{
     time::{Duration, Instant},
 };
 
+use arguments::denoised_path;
+
 pub use arguments::Arguments;
 
 use super::{
+    denoise::{Denoised, denoise},
     guide,
     interrupt::Interrupt,
     progress::{Patience, Progress, Standing},
@@ -20,10 +23,10 @@ use crate::{
     error::{Error, Result},
     files::{is_special_file, sweep_leftovers},
     film::{
-        Checkpoint, Metadata, SampleRange, Sums, Window, checkpoint::checkpoint_path,
+        Aov, Checkpoint, Image, Metadata, SampleRange, Sums, Window, checkpoint::checkpoint_path,
         display::DisplayServer, metadata::seconds_of, png::write_preview,
     },
-    gpu::Device,
+    gpu::{Denoiser, Device},
     pass::Roulette,
     renderer::{Renderer, Settings, window_of},
     sampler::Sampler,
@@ -94,6 +97,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         pixel::check(&settings, &scene, &output, at)?;
     }
 
+    let denoiser = arguments.denoise.then(Denoiser::load).transpose()?;
+
     interrupt.wait_for_caller();
     let device = Device::open(arguments.device.as_deref(), arguments.validate)?;
     if !arguments.quiet {
@@ -101,6 +106,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         eprintln!("device: {} ({})", capabilities.name, capabilities.driver);
     }
     let mut job = RenderJob::new(arguments, &settings, &scene, &device, output);
+    job.denoiser = denoiser;
     if let Some(warning) = settings.sampler.portal_warning(&scene) {
         job.warn(warning);
     }
@@ -148,6 +154,10 @@ struct RenderJob<'a> {
     window: Window,
     output: PathBuf,
     metadata: Metadata,
+    /// Layers of the image.
+    aovs: Vec<Aov>,
+    /// Denoiser, under `--denoise`.
+    denoiser: Option<Denoiser>,
     /// Wall time that earlier runs spent in passes, seconds.
     earlier_seconds: f64,
     /// Wall time that this run has spent in passes.
@@ -192,6 +202,8 @@ impl<'a> RenderJob<'a> {
             window: window_of(settings, scene),
             output,
             metadata,
+            aovs: settings.aovs.clone(),
+            denoiser: None,
             earlier_seconds: 0.0,
             elapsed: Duration::ZERO,
             relative_error: None,
@@ -273,7 +285,7 @@ impl<'a> RenderJob<'a> {
                     self.warn_of_darkness(" so far: --error waits for light");
                 }
                 if let Some(display) = display.as_mut().filter(|display| display.is_connected()) {
-                    display.update(&sums.to_image(&self.arguments.aov));
+                    display.update(&sums.to_image(&self.aovs));
                 }
                 // Reading back a large film takes time from the passes.
                 next_look = Instant::now() + LOOK_INTERVAL.max(20 * start.elapsed());
@@ -292,7 +304,7 @@ impl<'a> RenderJob<'a> {
         let sums = renderer.sums()?;
         self.look(&sums);
         if let Some(display) = display.as_mut().filter(|display| display.is_connected()) {
-            display.update(&sums.to_image(&self.arguments.aov));
+            display.update(&sums.to_image(&self.aovs));
         }
         progress.finish(&self.standing(renderer), reason.explain());
         Ok(reason)
@@ -424,7 +436,7 @@ impl<'a> RenderJob<'a> {
             ));
         }
         let metadata = self.metadata(renderer);
-        let mut image = sums.to_image(&self.arguments.aov);
+        let mut image = sums.to_image(&self.aovs);
         metadata.store(&mut image);
         let mut written = Vec::new();
         let mut failure = None;
@@ -438,6 +450,9 @@ impl<'a> RenderJob<'a> {
             let path = self.output.with_extension("png");
             let preview = |rgb| write_preview(&path, &rgb, self.arguments.exposure);
             note(&path, image.rgb(&self.output).and_then(preview));
+        }
+        if let Some(denoiser) = &self.denoiser {
+            self.write_denoised(denoiser, &image, &mut note);
         }
         drop(image);
         if let Some(path) = &self.arguments.stats {
@@ -455,6 +470,29 @@ impl<'a> RenderJob<'a> {
             eprintln!("wrote {}", written.join(", "));
         }
         failure.map_or(Ok(()), Err)
+    }
+
+    /// Writes the denoised picture, and its preview beside that of the image.
+    fn write_denoised(
+        &self,
+        denoiser: &Denoiser,
+        film: &Image,
+        note: &mut impl FnMut(&Path, Result<()>),
+    ) {
+        let path = denoised_path(&self.output, "exr");
+        let Denoised { image, line } = match denoise(denoiser, film, &self.output) {
+            Ok(denoised) => denoised,
+            Err(error) => return note(&path, Err(error)),
+        };
+        if !self.arguments.quiet {
+            eprintln!("{line}");
+        }
+        note(&path, image.write_exr(&path));
+        if self.arguments.png {
+            let shown = denoised_path(&self.output, "png");
+            let preview = |rgb| write_preview(&shown, &rgb, self.arguments.exposure);
+            note(&shown, image.rgb(&path).and_then(preview));
+        }
     }
 }
 

@@ -1,0 +1,97 @@
+//! Denoised pictures. They are biased: marked as such, and never a part of a merge or a reference.
+
+use std::path::Path;
+
+use super::exr::{Attribute, Image};
+use crate::error::{Error, Result};
+
+/// Attribute of an image that a denoiser has made, with its name.
+pub const DENOISED: &str = "fenestra.denoised";
+
+/// Layers of an image that guide a denoiser, those of the first hit.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Guides {
+    /// `Albedo`.
+    pub albedo: Option<Vec<[f32; 3]>>,
+    /// `N`, only beside albedo.
+    pub normal: Option<Vec<[f32; 3]>>,
+}
+
+impl Guides {
+    /// Takes the layers that `image` has.
+    pub fn of(image: &Image) -> Self {
+        let albedo = image.triple(["Albedo.R", "Albedo.G", "Albedo.B"]);
+        let normal = albedo.as_ref().and_then(|_| image.triple(["N.X", "N.Y", "N.Z"]));
+        Self { albedo, normal }
+    }
+
+    /// Names of the layers: "Albedo, N".
+    pub fn names(&self) -> String {
+        let names = [("Albedo", self.albedo.is_some()), ("N", self.normal.is_some())];
+        let present: Vec<&str> = names.iter().filter(|name| name.1).map(|name| name.0).collect();
+        present.join(", ")
+    }
+}
+
+/// Gives pixels that are not finite the mean of their finite neighbours, and black where there is none.
+/// Returns how many they were.
+pub fn repair(pixels: &mut [[f32; 3]], width: u32) -> usize {
+    let width = width as usize;
+    let is_finite = |pixel: &[f32; 3]| pixel.iter().all(|value| value.is_finite());
+    let bad: Vec<usize> = (0..pixels.len()).filter(|index| !is_finite(&pixels[*index])).collect();
+    let mean = |index: &usize| {
+        let (row, column) = (index / width, index % width);
+        let rows = row.saturating_sub(1)..(row + 2).min(pixels.len() / width);
+        let near = rows.flat_map(|row| {
+            (column.saturating_sub(1)..(column + 2).min(width)).map(move |at| row * width + at)
+        });
+        let good: Vec<[f32; 3]> = near.map(|at| pixels[at]).filter(is_finite).collect();
+        let share = 1.0 / good.len().max(1) as f32;
+        good.iter().fold([0.0; 3], |sum, pixel| {
+            std::array::from_fn(|channel| sum[channel] + share * pixel[channel])
+        })
+    };
+    let means: Vec<[f32; 3]> = bad.iter().map(mean).collect();
+    for (index, mean) in bad.iter().zip(means) {
+        pixels[*index] = mean;
+    }
+    bad.len()
+}
+
+/// Makes the image of a denoised picture: the window and the attributes of `film`, and the mark.
+///
+/// # Panics
+/// `pixels` is not as many as those of `film`.
+pub fn image_of(film: &Image, pixels: &[[f32; 3]], denoiser: String) -> Image {
+    let mut image = Image {
+        channels: std::collections::BTreeMap::new(),
+        attributes: film.attributes.clone(),
+        ..*film
+    };
+    image.insert_triple(["R", "G", "B"], pixels);
+    image.attributes.insert(DENOISED.to_owned(), Attribute::Text(denoiser));
+    image
+}
+
+/// Refuses a denoised image where the samples of a film are meant.
+///
+/// # Errors
+/// [`Error::Format`] names the denoiser.
+pub fn check_film(image: &Image, path: &Path) -> Result<()> {
+    match image.attributes.get(DENOISED) {
+        None => Ok(()),
+        Some(denoiser) => {
+            let name = match denoiser {
+                Attribute::Text(name) => name.as_str(),
+                _ => "a denoiser",
+            };
+            Err(Error::format(
+                path,
+                format!(
+                    "made by {name}, and so biased: no film to merge, to refer to or to denoise; take the \
+                     image that it was made of"
+                ),
+            ))
+        }
+    }
+}
