@@ -18,8 +18,11 @@ const CONFIDENCE: f64 = 2.0;
 /// Standard error where it is unknown, so that no gain is clear. Finite, since files cannot hold
 /// infinities.
 const UNKNOWN_ERROR: f64 = 1e3;
-/// Ratio of variance × time above which more candidates are not measured again.
+/// Ratio of variance × time above which more candidates are not measured again, however uncertain.
 const CLEAR_LOSS: f64 = 1.4;
+/// Ratio of variance × time above which more candidates are not measured again if it lies above by
+/// [`CONFIDENCE`]. Far from [`CLEAR_GAIN`], since this error knows nothing of the times'.
+const LIKELY_LOSS: f64 = 1.0;
 
 /// Relative variance after a millisecond of samples.
 fn variance_time(cost: &CandidateCost) -> f64 {
@@ -44,10 +47,12 @@ pub fn choose_candidates(costs: &[CandidateCost]) -> u32 {
 }
 
 /// Returns true if the largest number of candidates has so much more variance × time than a smaller
-/// one that more measurements would not change the choice.
+/// one that more measurements would hardly change the choice.
 pub fn is_largest_clearly_worse(costs: &[CandidateCost]) -> bool {
     let Some((largest, fewer)) = costs.split_last() else { return false };
-    fewer.iter().any(|cost| variance_time(largest) > CLEAR_LOSS * variance_time(cost))
+    let at_least = LIKELY_LOSS * (CONFIDENCE * largest.log_variance_error).exp();
+    let limit = at_least.min(CLEAR_LOSS);
+    fewer.iter().any(|cost| variance_time(largest) > limit * variance_time(cost))
 }
 
 /// Compares numbers of candidates pair by pair, from the fewest up, until more do not pay.
@@ -258,9 +263,14 @@ mod tests {
 
     #[test]
     fn only_losses_are_clear_early() {
-        let is_loss =
-            |four: f64| is_largest_clearly_worse(&[cost(1, 2.0, 3.0), cost(4, four, 3.0)]);
-        assert!(is_loss(2.9) && !is_loss(2.7) && !is_loss(0.1));
+        let is_loss = |four: f64, error: f64| {
+            let four = CandidateCost { log_variance_error: error, ..cost(4, four, 3.0) };
+            is_largest_clearly_worse(&[cost(1, 2.0, 3.0), four])
+        };
+        // Ratios of 1.45, 1.35 and 0.05; ln 1.35 is 0.30.
+        assert!(is_loss(2.9, UNKNOWN_ERROR) && !is_loss(2.7, UNKNOWN_ERROR));
+        assert!(is_loss(2.7, 0.14) && !is_loss(2.7, 0.16));
+        assert!(is_loss(2.02, 0.0) && !is_loss(1.98, 0.0) && !is_loss(0.1, 0.0));
         assert!(!is_largest_clearly_worse(&[cost(1, 2.0, 3.0)]) && !is_largest_clearly_worse(&[]));
         let best = [cost(1, 4.0, 1.0), cost(4, 2.0, 1.0), cost(8, 3.0, 1.0)];
         assert!(is_largest_clearly_worse(&best), "against the best of the fewer");
