@@ -165,6 +165,10 @@ fn a_denoised_picture_is_no_film() {
     folder.run(&["merge", "out.exr", "in.exr", "-o", "sum.exr"]).assert(1, &refused);
     run(&folder, &library, &["convert", "out.exr", "twice.exr", "--denoise"]).assert(1, &refused);
     assert_eq!(folder.files(), ["in.exr", "library", "out.exr"]);
+    folder.write("scene.toml", yard([WIDTH, HEIGHT], "constant = [1, 1, 1]", CLAY, BALL));
+    let study = ["study", "scene.toml", "--samplers", "mis", "--spp", "1", "--seeds", "1"];
+    let arguments = [&study[..], &["--reference", "out.exr", "-o", "report"]].concat();
+    folder.run(&arguments).assert(1, &refused);
 }
 
 #[test]
