@@ -1,11 +1,11 @@
 //! Every sampler converges to the same image: z-tests of block means of independent replicates.
 //!
-//! The reference is `cosine`, which knows neither BRDF nor environment. A scene has nine comparisons
-//! of 36 values (12 blocks × 3 channels). A p-value below 3e-6 is an alarm, by Student's distribution
-//! with Welch's degrees of freedom: the errors of the two sides differ. So a scene raises a false alarm
-//! once in about 1,000 runs, the three scenes once in 340, the whole file once in 110. Seeds are fixed:
-//! a run that passed passes again on the same device. `every_sampler_with_every_material` is slow and
-//! runs on request.
+//! The reference is `cosine`, which knows neither BRDF nor environment. A scene has up to nine
+//! comparisons of 36 values (12 blocks × 3 channels). A p-value below 3e-6 is an alarm, by Student's
+//! distribution with Welch's degrees of freedom: the errors of the two sides differ. So a scene raises a
+//! false alarm once in about 1,000 runs, the three scenes once in 340, the whole file once in 110. Seeds
+//! are fixed: a run that passed passes again on the same device. `every_sampler_with_every_material` is
+//! slow and runs on request.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 mod support;
@@ -146,7 +146,8 @@ fn in_a_closed_room_with_bounces() {
     let _alone = support::alone();
     let scene =
         scenes::room(vec![scenes::diffuse(Vec3::splat(0.8)), scenes::copper(0.4), principled()]);
-    samplers_agree(&scene, 4, 64, &ALL_AGAINST_COSINE);
+    // All but `haar`, which draws at later vertices as `product` does.
+    samplers_agree(&scene, 4, 64, &ALL_AGAINST_COSINE[..9]);
 }
 
 #[test]
