@@ -1,30 +1,31 @@
 //! `fenestra render`: scene file → finished image.
 
 mod arguments;
+mod finish;
 mod pixel;
 mod statistics;
+mod stop;
 
 use std::{
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
-use arguments::denoised_path;
+use stop::StopReason;
 
 pub use arguments::Arguments;
 
 use super::{
-    denoise::{Denoised, denoise},
     guide,
     interrupt::Interrupt,
-    progress::{Patience, Progress, Standing},
+    progress::{Patience, Progress},
 };
 use crate::{
     error::{Error, Result},
-    files::{is_special_file, sweep_leftovers},
+    files::sweep_leftovers,
     film::{
-        Aov, Checkpoint, Image, Metadata, SampleRange, Sums, Window, checkpoint::checkpoint_path,
-        display::DisplayServer, metadata::seconds_of, png::write_preview,
+        Aov, Checkpoint, Metadata, Sums, Window, checkpoint::checkpoint_path,
+        display::DisplayServer,
     },
     gpu::{Denoiser, Device},
     pass::Roulette,
@@ -40,39 +41,6 @@ const DEFAULT_SPP: u32 = 64;
 const LOOK_INTERVAL: Duration = Duration::from_secs(1);
 /// Samples per pixel of `--quick`.
 const QUICK_SPP: u32 = 16;
-
-/// Rule that ended a render.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum StopReason {
-    Spp,
-    Time,
-    Error,
-    /// The seed has no more samples.
-    LastSample,
-    Interrupt,
-}
-
-impl StopReason {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Spp => "spp",
-            Self::Time => "time",
-            Self::Error => "error",
-            Self::LastSample => "last-sample",
-            Self::Interrupt => "interrupt",
-        }
-    }
-
-    fn explain(self) -> &'static str {
-        match self {
-            Self::Spp => "stopped by --spp",
-            Self::Time => "stopped by --time",
-            Self::Error => "stopped by --error (stopping by the data is slightly biased)",
-            Self::LastSample => "stopped at the last sample of the seed",
-            Self::Interrupt => "interrupted",
-        }
-    }
-}
 
 /// Renders a scene.
 ///
@@ -241,22 +209,6 @@ impl<'a> RenderJob<'a> {
         Ok(())
     }
 
-    fn seconds(&self) -> f64 {
-        self.earlier_seconds + self.elapsed.as_secs_f64()
-    }
-
-    /// Returns the target of `--spp`, or the default if no stop rule is given.
-    fn target_spp(&self) -> Option<u32> {
-        let none = self.arguments.time.is_none() && self.arguments.error.is_none();
-        let default = if self.arguments.quick { QUICK_SPP } else { DEFAULT_SPP };
-        self.arguments.spp.or_else(|| none.then_some(default))
-    }
-
-    /// Returns the samples per pixel up to the last of the seed, whose index is below 2³².
-    fn most_samples(&self) -> u32 {
-        u32::MAX - self.arguments.sample_offset
-    }
-
     /// Renders passes until a stop rule is met.
     fn render(&mut self, renderer: &mut Renderer, interrupt: &Interrupt) -> Result<StopReason> {
         let mut progress = Progress::new(self.scene.name.clone(), self.arguments.quiet);
@@ -336,163 +288,6 @@ impl<'a> RenderJob<'a> {
             DisplayServer::connect(address, &name)
         };
         self.arguments.display_server.as_ref().map(connect).transpose()
-    }
-
-    fn time_left(&self) -> Option<f64> {
-        self.arguments.time.map(|time| time.as_secs_f64() - self.seconds())
-    }
-
-    fn stop_reason(&self, renderer: &Renderer, interrupt: &Interrupt) -> Option<StopReason> {
-        let samples = renderer.sample_count();
-        if interrupt.is_raised() && samples > 0 {
-            return Some(StopReason::Interrupt);
-        }
-        if self.target_spp().is_some_and(|spp| samples >= spp) {
-            return Some(StopReason::Spp);
-        }
-        if samples >= self.most_samples() {
-            return Some(StopReason::LastSample);
-        }
-        if samples > 0 && self.time_left().is_some_and(|left| left <= 0.0) {
-            return Some(StopReason::Time);
-        }
-        let reached = |limit: f64| samples > 1 && self.relative_error.is_some_and(|e| e <= limit);
-        if self.arguments.error.is_some_and(reached) {
-            return Some(StopReason::Error);
-        }
-        None
-    }
-
-    fn standing(&self, renderer: &Renderer) -> Standing {
-        let totals = renderer.totals();
-        let rays = totals.camera_rays + totals.bounce_rays + totals.shadow_rays_traced;
-        let share = |done: f64, target: f64| (done / target).clamp(0.0, 1.0);
-        let by_spp =
-            self.target_spp().map(|spp| share(f64::from(renderer.sample_count()), f64::from(spp)));
-        let by_time = self.arguments.time.map(|time| share(self.seconds(), time.as_secs_f64()));
-        // The error falls with the square root of the work.
-        let by_error = self.arguments.error.zip(self.relative_error).map(|(target, error)| {
-            if error > 0.0 { share((target / error).powi(2), 1.0) } else { 0.0 }
-        });
-        let fraction = [by_spp, by_time, by_error].into_iter().flatten().fold(0.0, f64::max);
-        Standing {
-            fraction,
-            samples: renderer.sample_count(),
-            rays_per_second: rays as f64 / self.elapsed.as_secs_f64().max(1e-9),
-            relative_error: self.relative_error,
-        }
-    }
-
-    /// Returns the metadata for the samples so far.
-    fn metadata(&self, renderer: &Renderer) -> Metadata {
-        Metadata {
-            sample_ranges: vec![SampleRange {
-                seed: self.arguments.seed,
-                first: self.arguments.sample_offset,
-                count: renderer.sample_count(),
-            }],
-            candidates: renderer.report().candidates,
-            seconds: self.seconds(),
-            gpu_seconds: seconds_of(&renderer.totals().gpu_ms),
-            ..self.metadata.clone()
-        }
-    }
-
-    /// Writes a checkpoint. The outer error is the device's, the inner one the disk's.
-    fn write_checkpoint(&self, renderer: &Renderer, sums: Sums) -> Result<Result<()>> {
-        let checkpoint = Checkpoint { sums, metadata: self.metadata(renderer) };
-        let path = checkpoint_path(&self.output);
-        let guide = renderer.guide_state()?.map(|state| state.to_bytes()).transpose();
-        Ok(guide
-            .map_err(|source| Error::io(&path, "write", source))
-            .and_then(|guide| checkpoint.write_with_guide(&path, guide.as_deref())))
-    }
-
-    /// Writes the image, then all other files asked for, each of them even if another fails.
-    ///
-    /// # Errors
-    /// The first failure; others are logged.
-    fn finish(&mut self, renderer: &Renderer, reason: StopReason, load_ms: f64) -> Result<()> {
-        let sums = renderer.sums()?;
-        let totals = renderer.totals();
-        self.warnings.clear();
-        self.warn_of_darkness(": the image is black");
-        if totals.dropped_samples > 0 {
-            self.warn(format!(
-                "{} samples were left out because their radiance was not finite",
-                totals.dropped_samples
-            ));
-        }
-        if let Some([left, top, right, bottom]) = totals.overrun_pixels {
-            let Window { x, y, .. } = self.window;
-            self.warn(format!(
-                "{} rays were given up after too many steps of traversal, where many triangles meet in \
-                 one place: pixels within --crop {},{},{},{} may be wrong",
-                totals.traversal_overruns,
-                left + x,
-                top + y,
-                right + x,
-                bottom + y
-            ));
-        }
-        let metadata = self.metadata(renderer);
-        let mut image = sums.to_image(&self.aovs);
-        metadata.store(&mut image);
-        let mut written = Vec::new();
-        let mut failure = None;
-        let mut note = |path: &Path, result: Result<()>| match (result, &failure) {
-            (Ok(()), _) => written.push(display(path)),
-            (Err(error), None) => failure = Some(error),
-            (Err(error), Some(_)) => log::error!("{error}"),
-        };
-        note(&self.output, image.write_exr(&self.output));
-        if self.arguments.png {
-            let path = self.output.with_extension("png");
-            let preview = |rgb| write_preview(&path, &rgb, self.arguments.exposure);
-            note(&path, image.rgb(&self.output).and_then(preview));
-        }
-        if let Some(denoiser) = &self.denoiser {
-            self.write_denoised(denoiser, &image, &mut note);
-        }
-        drop(image);
-        if let Some(path) = &self.arguments.stats {
-            note(path, self.statistics(renderer, &metadata, reason, load_ms).write(path));
-        }
-        let is_interrupted = reason == StopReason::Interrupt && !is_special_file(&self.output);
-        if is_interrupted || self.arguments.checkpoint_interval.is_some() {
-            let path = checkpoint_path(&self.output);
-            note(&path, self.write_checkpoint(renderer, sums).and_then(|written| written));
-        }
-        if let Some(path) = &self.arguments.save_guide {
-            note(path, guide::save(renderer, path));
-        }
-        if !self.arguments.quiet && !written.is_empty() {
-            eprintln!("wrote {}", written.join(", "));
-        }
-        failure.map_or(Ok(()), Err)
-    }
-
-    /// Writes the denoised picture, and its preview beside that of the image.
-    fn write_denoised(
-        &self,
-        denoiser: &Denoiser,
-        film: &Image,
-        note: &mut impl FnMut(&Path, Result<()>),
-    ) {
-        let path = denoised_path(&self.output, "exr");
-        let Denoised { image, line } = match denoise(denoiser, film, &self.output) {
-            Ok(denoised) => denoised,
-            Err(error) => return note(&path, Err(error)),
-        };
-        if !self.arguments.quiet {
-            eprintln!("{line}");
-        }
-        note(&path, image.write_exr(&path));
-        if self.arguments.png {
-            let shown = denoised_path(&self.output, "png");
-            let preview = |rgb| write_preview(&shown, &rgb, self.arguments.exposure);
-            note(&shown, image.rgb(&path).and_then(preview));
-        }
     }
 }
 
