@@ -138,13 +138,13 @@ constants! {
     SAMPLER_GUIDED = 8;
 
     // Values of CONSTANT_READING.
-    /// Of all lobes with their weights in force.
+    /// Density of all lobes with their weights in force.
     READING_MIXTURE = 0;
-    /// Of the chosen lobe; biased in practice.
+    /// Density of the chosen lobe; biased in practice.
     READING_CHOSEN_LOBE = 1;
-    /// Of the chosen lobe times its probability; biased.
+    /// Density of the chosen lobe times its probability; biased.
     READING_CHOSEN_PAIR = 2;
-    /// Of all lobes with their weights before the cache lowered them; biased.
+    /// Density of all lobes with their weights before the cache lowered them; biased.
     READING_WEIGHTS_BEFORE = 3;
 
     // Bits of CONSTANT_SURFACES.

@@ -37,15 +37,15 @@ const ELEVATIONS: &[(&str, Elevation)] =
 /// BRDF and environment, which the text does not have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
-    /// Of the whole mixture of lobes, BRDF and environment.
+    /// Density of the whole mixture of lobes, BRDF and environment.
     Mixture,
-    /// Of the mixture of the lobes, which hardly cover the hemisphere.
+    /// Density of the mixture of the lobes, which hardly cover the hemisphere.
     LobesAlone,
-    /// Of the chosen lobe.
+    /// Density of the chosen lobe.
     ChosenLobe,
-    /// Of the chosen lobe, times the probability of choosing it.
+    /// Density of the chosen lobe, times the probability of choosing it.
     ChosenPair,
-    /// Of the lobes with their weights before the cache lowered them.
+    /// Density of the lobes with their weights before the cache lowered them.
     WeightsBefore,
 }
 
