@@ -8,6 +8,7 @@
 #define MIXTURE_GLSL
 
 #include "product/numbers.glsl"
+#include "product/readings.glsl"
 #include "vertex.glsl"
 #include "visibility/weights.glsl"
 
@@ -81,6 +82,7 @@ vec3 mixture_sample(Vertex vertex, Mixture mixture, uint ray, MixtureNumbers num
     // Loops of at most one round instead of branches: devices that run both sides of a branch skip them.
     for (uint once = from_lobe ? 1u : 0u; once > 0u; --once) {
         uint l = find_lobe(mixture.lobes, numbers.lobe * mixture.total);
+        chosen_lobe = l;
         ProductLobe lobe = unpack_lobe(lobe_words(mixture.lobes, l));
         direction = draw_from_lobe(vertex, ray, lobe, numbers.direction);
     }
@@ -125,7 +127,8 @@ float mixture_lobe_density(Mixture mixture, vec3 direction, bool is_noted) {
 
 // Returns the density of the whole mixture where that of the lobes is `lobe_density`.
 float mixture_pdf(Mixture mixture, DirectionSample sampled, float lobe_density) {
-    return mixture.lobe_share * lobe_density
+    return mixture.lobe_share
+        * read_density(mixture.lobes, mixture.total, sampled.direction, lobe_density)
         + mixture.environment_share * sampled.environment_pdf
         + mixture.brdf_share * sampled.brdf_pdf;
 }

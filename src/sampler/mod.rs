@@ -69,7 +69,8 @@ pub trait Room: Sync {
 macro_rules! samplers {
     ($($(#[$doc:meta])* $sampler:ident $name:literal: $room:expr;)*) => {
         /// Samplers of directions at a hit. All trace one shadow ray per direction, and all are
-        /// unbiased except with [`Elevation::Metropolis`](product::Elevation::Metropolis).
+        /// unbiased except with [`Elevation::Metropolis`](product::Elevation::Metropolis) or another
+        /// [`Reading`](product::Reading) than `mixture`.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum)]
         pub enum Sampler {
             $($(#[$doc])* #[value(name = $name)] $sampler,)*

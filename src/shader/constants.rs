@@ -90,6 +90,8 @@ constants! {
     CONSTANT_ENVIRONMENT_SHARE = 40;
     /// 1 draws elevations by a random walk, which is biased.
     CONSTANT_METROPOLIS = 41;
+    /// Density that directions from lobes are divided by, `READING_…`.
+    CONSTANT_READING = 51;
 
     // Specialization constants of the passes over visibility caches.
     /// τ, closeness in deviations of a lobe, bits of a float.
@@ -134,6 +136,16 @@ constants! {
     SAMPLER_VISIBILITY = 7;
     /// Learned visibility; a shader of its own.
     SAMPLER_GUIDED = 8;
+
+    // Values of CONSTANT_READING.
+    /// Density of all lobes with their weights in force.
+    READING_MIXTURE = 0;
+    /// Density of the chosen lobe; biased in practice.
+    READING_CHOSEN_LOBE = 1;
+    /// Density of the chosen lobe times its probability; biased.
+    READING_CHOSEN_PAIR = 2;
+    /// Density of all lobes with their weights before the cache lowered them; biased.
+    READING_WEIGHTS_BEFORE = 3;
 
     // Bits of CONSTANT_SURFACES.
     /// Some surfaces reflect or transmit by paths alone: no light is sampled at them.

@@ -108,7 +108,7 @@ pub struct Arguments {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     pub aov: Vec<Aov>,
     /// Sampler parameter, such as candidates=4, lobes=64 or cache=pixel. May be repeated.
-    /// (elevation=metropolis is biased.)
+    /// (elevation=metropolis and every reading but mixture are biased.)
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
     /// Save the guide that the sampler `guided` has learned.

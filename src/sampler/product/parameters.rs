@@ -3,6 +3,9 @@
 use crate::{
     error::{Error, Result},
     sampler::knob::{self, Knob},
+    shader::constants::{
+        READING_CHOSEN_LOBE, READING_CHOSEN_PAIR, READING_MIXTURE, READING_WEIGHTS_BEFORE,
+    },
 };
 
 /// Order of the lobes of a product for dropping the weakest.
@@ -29,6 +32,54 @@ pub enum Elevation {
 const ELEVATIONS: &[(&str, Elevation)] =
     &[("inverse", Elevation::Inverse), ("metropolis", Elevation::Metropolis)];
 
+/// Reading of the density that the thesis divides a direction by, `Pr` of its Eq. 2. All but
+/// [`Reading::Mixture`] are biased and for studies alone: they draw from the lobes without shares of
+/// BRDF and environment, which the text does not have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reading {
+    /// Density of the whole mixture of lobes, BRDF and environment.
+    Mixture,
+    /// Density of the mixture of the lobes, which hardly cover the hemisphere.
+    LobesAlone,
+    /// Density of the chosen lobe.
+    ChosenLobe,
+    /// Density of the chosen lobe, times the probability of choosing it.
+    ChosenPair,
+    /// Density of the lobes with their weights before the cache lowered them.
+    WeightsBefore,
+}
+
+const READINGS: &[(&str, Reading)] = &[
+    ("mixture", Reading::Mixture),
+    ("lobes-alone", Reading::LobesAlone),
+    ("chosen-lobe", Reading::ChosenLobe),
+    ("chosen-pair", Reading::ChosenPair),
+    ("weights-before", Reading::WeightsBefore),
+];
+
+impl Reading {
+    /// Explains why the image is biased; `None` where it is not.
+    pub fn bias(self) -> Option<&'static str> {
+        match self {
+            Self::Mixture => None,
+            Self::LobesAlone => Some("lobes alone do not cover the hemisphere"),
+            Self::ChosenLobe => Some("the density of one lobe vanishes where others draw"),
+            Self::ChosenPair => Some("every lobe adds the whole integral"),
+            Self::WeightsBefore => Some("directions are not drawn with the density divided by"),
+        }
+    }
+
+    /// Tag in the shaders, `READING_…`.
+    pub fn tag(self) -> u32 {
+        match self {
+            Self::Mixture | Self::LobesAlone => READING_MIXTURE,
+            Self::ChosenLobe => READING_CHOSEN_LOBE,
+            Self::ChosenPair => READING_CHOSEN_PAIR,
+            Self::WeightsBefore => READING_WEIGHTS_BEFORE,
+        }
+    }
+}
+
 /// Parameters of `product`, also within `visibility`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProductParameters {
@@ -48,6 +99,8 @@ pub struct ProductParameters {
     pub environment_share: f32,
     /// `elevation`: `inverse` or `metropolis`.
     pub elevation: Elevation,
+    /// `reading`: `mixture`, or a biased reading of the thesis.
+    pub reading: Reading,
 }
 
 impl Default for ProductParameters {
@@ -61,6 +114,7 @@ impl Default for ProductParameters {
             brdf_share: 0.25,
             environment_share: 0.25,
             elevation: Elevation::Inverse,
+            reading: Reading::Mixture,
         }
     }
 }
@@ -114,6 +168,14 @@ impl ProductParameters {
                 Elevation::Metropolis => "metropolis (biased)".to_owned(),
             },
         },
+        Knob {
+            key: "reading",
+            set: |own, value| knob::choice(&mut own.reading, value, READINGS),
+            get: |own| {
+                let bias = own.reading.bias().map_or("", |_| " (biased)");
+                knob::name_of(&own.reading, READINGS) + bias
+            },
+        },
     ];
 
     /// Follows the thesis to the letter where it is sound: lobes by coefficient, and of the shares
@@ -124,6 +186,14 @@ impl ProductParameters {
             brdf_share: 0.05,
             environment_share: 0.0,
             ..Self::default()
+        }
+    }
+
+    /// Returns the shares of BRDF and environment: none in biased readings.
+    pub fn shares(&self) -> [f32; 2] {
+        match self.reading {
+            Reading::Mixture => [self.brdf_share, self.environment_share],
+            _ => [0.0; 2],
         }
     }
 

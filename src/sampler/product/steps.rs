@@ -10,8 +10,8 @@ use crate::{
         constants::{
             CONSTANT_BRDF_LOBES, CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_LOBES,
             CONSTANT_ENVIRONMENT_SHARE, CONSTANT_KEPT_LOBES, CONSTANT_METROPOLIS,
-            CONSTANT_ORDER_BY_COEFFICIENT, CONSTANT_SAMPLER, CONSTANT_STRONGEST_ENVIRONMENT_LOBE,
-            CONSTANT_VIEWS, SAMPLER_PRODUCT,
+            CONSTANT_ORDER_BY_COEFFICIENT, CONSTANT_READING, CONSTANT_SAMPLER,
+            CONSTANT_STRONGEST_ENVIRONMENT_LOBE, CONSTANT_VIEWS, SAMPLER_PRODUCT,
         },
         structs::Wave,
     },
@@ -66,12 +66,14 @@ impl Steps for ProductSteps {
     }
 
     fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
+        let [brdf_share, environment_share] = self.parameters.shares();
         let walks = self.parameters.elevation == Elevation::Metropolis;
         let own = [
             (CONSTANT_SAMPLER, self.sampler),
-            (CONSTANT_BRDF_SHARE, self.parameters.brdf_share.to_bits()),
-            (CONSTANT_ENVIRONMENT_SHARE, self.parameters.environment_share.to_bits()),
+            (CONSTANT_BRDF_SHARE, brdf_share.to_bits()),
+            (CONSTANT_ENVIRONMENT_SHARE, environment_share.to_bits()),
             (CONSTANT_METROPOLIS, u32::from(walks)),
+            (CONSTANT_READING, self.parameters.reading.tag()),
         ];
         vec![self.kernel("sample_lobes", &[&own[..], &self.surfaces.constants()].concat())]
     }
