@@ -149,8 +149,7 @@ fn pfm(texels: [f32; 32]) -> Vec<u8> {
 fn check(sums: &Sums, sampler: Sampler, is_furnace: bool, what: &str) {
     for pixel in 0..sums.pixel_count() {
         let mean = sums.mean(pixel);
-        let least =
-            if sampler == Sampler::ControlVariates { f64::NEG_INFINITY } else { 0.0 };
+        let least = if sampler == Sampler::ControlVariates { f64::NEG_INFINITY } else { 0.0 };
         let is_possible = mean.iter().all(|value| value.is_finite() && *value >= least);
         assert!(is_possible, "pixel {pixel}: {mean:?}\n{what}");
     }

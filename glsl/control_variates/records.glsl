@@ -5,7 +5,8 @@
 // point at; its bins are equal parts of the sphere. The edge of the cubes grows with the distance to the
 // camera in powers of two.
 //
-// Deviation: a record holds shares, from 0 to 1. The paper's hold bits.
+// Deviation: a record holds shares, which become bits where they are used (`control-bits`). The paper's hold
+// bits.
 //
 // Deviation: a place reads the one record of its cube, in a table without keys: two cubes may share a
 // record, which costs precision and nothing else. The paper looks for records nearby.

@@ -115,12 +115,7 @@ impl Parameters {
             || knob::set(GuidedParameters::KNOBS, &mut self.guided, key, value)?
             || knob::set(PortalParameters::KNOBS, &mut self.portal, key, value)?
             || knob::set(HaarParameters::KNOBS, &mut self.haar, key, value)?
-            || knob::set(
-                ControlVariatesParameters::KNOBS,
-                &mut self.control_variates,
-                key,
-                value,
-            )?;
+            || knob::set(ControlVariatesParameters::KNOBS, &mut self.control_variates, key, value)?;
         if is_known {
             return Ok(());
         }

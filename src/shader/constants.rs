@@ -120,6 +120,8 @@ constants! {
     CONSTANT_CONTROL_SHARE = 51;
     /// 1 chooses shadow rays where the records are in doubt, 0 by light alone.
     CONSTANT_CONTROL_CHOICE = 52;
+    /// 1 rounds the expected visibility to a bit in the control variate.
+    CONSTANT_CONTROL_BITS = 56;
     /// Bins of a record along each side of the square of directions.
     CONSTANT_RECORD_SIDE = 53;
     /// Edge of a record's cube per metre of distance to the camera, bits of a float.

@@ -6,7 +6,7 @@ use glam::Vec3;
 use super::parameters::ControlVariatesParameters;
 use crate::math::colour::luminance;
 
-/// Least mean square of V − α v.
+/// Least mean square of V − h.
 const LEAST_DOUBT: f32 = 0.01;
 
 /// A direction that a shadow ray may take.
@@ -30,11 +30,17 @@ pub struct Controlled {
 }
 
 impl ControlVariatesParameters {
+    /// Returns the control h of a candidate.
+    pub fn control(&self, candidate: &Candidate) -> f32 {
+        let bit = if candidate.visibility >= 0.5 { 1.0 } else { 0.0 };
+        self.control_share * if self.control_bits { bit } else { candidate.visibility }
+    }
+
     /// Returns what a candidate is chosen in proportion to.
     pub fn target(&self, candidate: &Candidate) -> f32 {
-        let (share, visibility) = (self.control_share, candidate.visibility);
-        let left = 1.0 - share;
-        let square = visibility * (left * left) + share * share * visibility * (1.0 - visibility);
+        let (visibility, control) = (candidate.visibility, self.control(candidate));
+        let left = 1.0 - control;
+        let square = visibility * (left * left) + (1.0 - visibility) * (control * control);
         let doubt = if self.control_choice { square.max(LEAST_DOUBT).sqrt() } else { 1.0 };
         luminance(candidate.weight) * doubt
     }
@@ -45,7 +51,7 @@ impl ControlVariatesParameters {
         let (mut sum, mut control) = (0.0, Vec3::ZERO);
         let mut chosen = None;
         for (index, candidate) in candidates.iter().enumerate() {
-            control += candidate.weight * (self.control_share * candidate.visibility);
+            control += candidate.weight * self.control(candidate);
             let target = self.target(candidate);
             sum += target;
             if target > 0.0 {
@@ -62,7 +68,7 @@ impl ControlVariatesParameters {
             return Controlled { chosen: None, contribution: Vec3::ZERO, rest: control / count };
         };
         let contribution = candidates[index].weight * (sum / (count * target));
-        let expected = contribution * (self.control_share * candidates[index].visibility);
+        let expected = contribution * self.control(&candidates[index]);
         Controlled { chosen: Some(index), contribution, rest: control / count - expected }
     }
 }
@@ -83,10 +89,12 @@ mod tests {
             Candidate { weight: vec3(0.0, 2.0, 0.1), visibility: 0.4 },
         ];
         const NUMBERS: u32 = 40_000;
-        for (control_share, control_choice) in [(1.0, true), (1.0, false), (0.5, true), (0.0, true)]
+        for (control_share, control_bits, control_choice) in
+            [(1.0, true, true), (1.0, true, false), (0.5, false, true), (0.0, false, true)]
         {
             let own = ControlVariatesParameters {
                 control_share,
+                control_bits,
                 control_choice,
                 ..ControlVariatesParameters::default()
             };
@@ -105,14 +113,20 @@ mod tests {
                     sum / f64::from(NUMBERS)
                 };
                 let seen_ones = candidates.iter().enumerate().filter(|(index, _)| is_seen(*index));
-                let expected =
-                    0.25 * seen_ones.map(|(_, candidate)| candidate.weight.as_dvec3()).sum::<glam::DVec3>();
+                let expected = 0.25
+                    * seen_ones
+                        .map(|(_, candidate)| candidate.weight.as_dvec3())
+                        .sum::<glam::DVec3>();
                 let off = (mean(&light) - expected).abs().max_element();
                 assert!(off < 1e-3, "{own:?}, {seen:04b}: off by {off}");
-                // Without the part that no ray carries, the mean is another.
-                let without = |outcome: &Controlled| light(outcome) - outcome.rest;
-                let off = (mean(&without) - expected).abs().max_element();
-                assert!(control_share == 0.0 || off > 0.01 || seen & 9 == 9, "{own:?} {seen:04b}: {off}");
+                // An estimate that takes back too little of the control has another mean.
+                let wrong = |outcome: &Controlled| {
+                    let control =
+                        outcome.chosen.map_or(0.0, |index| own.control(&candidates[index]));
+                    light(outcome) + 0.05 * control * outcome.contribution
+                };
+                let off = (mean(&wrong) - expected).abs().max_element();
+                assert!(control_share == 0.0 || off > 5e-3, "{own:?}, {seen:04b}: {off}");
             }
         }
     }

@@ -7,6 +7,9 @@ use crate::sampler::knob::{self, Knob};
 pub struct ControlVariatesParameters {
     /// `control-share`: α, the share of the expected visibility that is the control variate; 0 is none.
     pub control_share: f32,
+    /// `control-bits`: true if the expected visibility is rounded to 0 or 1 in the control variate, as in the
+    /// paper.
+    pub control_bits: bool,
     /// `control-choice`: true if shadow rays go where the records are in doubt, false if they go by light
     /// alone, as in the paper.
     pub control_choice: bool,
@@ -18,7 +21,13 @@ pub struct ControlVariatesParameters {
 
 impl Default for ControlVariatesParameters {
     fn default() -> Self {
-        Self { control_share: 1.0, control_choice: true, record_side: 16, record_pixels: 24 }
+        Self {
+            control_share: 1.0,
+            control_bits: true,
+            control_choice: true,
+            record_side: 16,
+            record_pixels: 24,
+        }
     }
 }
 
@@ -28,6 +37,11 @@ impl ControlVariatesParameters {
             key: "control-share",
             set: |own, value| knob::number(&mut own.control_share, value, 0.0..=1.0),
             get: |own| own.control_share.to_string(),
+        },
+        Knob {
+            key: "control-bits",
+            set: |own, value| knob::choice(&mut own.control_bits, value, knob::ON_OR_OFF),
+            get: |own| knob::name_of(&own.control_bits, knob::ON_OR_OFF),
         },
         Knob {
             key: "control-choice",

@@ -31,8 +31,7 @@ pub struct RecordGrid {
 impl RecordGrid {
     /// Returns the grid for the scene's camera and film.
     pub fn new(scene: &Scene, parameters: &ControlVariatesParameters) -> Self {
-        let [edge_per_distance, largest_edge] =
-            cell_edges(scene, parameters.record_pixels as f32);
+        let [edge_per_distance, largest_edge] = cell_edges(scene, parameters.record_pixels as f32);
         Self { side: parameters.record_side, edge_per_distance, largest_edge }
     }
 
@@ -57,9 +56,12 @@ impl RecordGrid {
         let cube = (position / edge).floor().clamp(Vec3::splat(-1e9), Vec3::splat(1e9)).as_ivec3();
         // The first of the faces that a normal points at most.
         let along = |face: &usize| face_normal(*face).dot(normal);
-        let face = (1..FACE_COUNT).fold(0, |best, face| {
-            if along(&face) > along(&best) { face } else { best }
-        });
+        let face = (1..FACE_COUNT).fold(
+            0,
+            |best, face| {
+                if along(&face) > along(&best) { face } else { best }
+            },
+        );
         let kind = (face as u32) << 8 | edge.to_bits() >> 23;
         let [x, y, z] = cube.to_array().map(|place| place as u32);
         hash_4d([x, y, z, kind])[0] & (VISIBILITY_RECORDS - 1)

@@ -11,8 +11,8 @@ use crate::{
     },
     shader::{
         constants::{
-            CONSTANT_CANDIDATES, CONSTANT_COMPENSATION, CONSTANT_CONTROL_CHOICE,
-            CONSTANT_CONTROL_SHARE,
+            CONSTANT_CANDIDATES, CONSTANT_COMPENSATION, CONSTANT_CONTROL_BITS,
+            CONSTANT_CONTROL_CHOICE, CONSTANT_CONTROL_SHARE,
         },
         structs::Wave,
     },
@@ -56,6 +56,7 @@ impl Steps for ControlledSteps {
             (CONSTANT_CANDIDATES, self.candidates),
             (CONSTANT_COMPENSATION, u32::from(self.parameters.compensation)),
             (CONSTANT_CONTROL_SHARE, control.control_share.to_bits()),
+            (CONSTANT_CONTROL_BITS, u32::from(control.control_bits)),
             (CONSTANT_CONTROL_CHOICE, u32::from(control.control_choice)),
         ];
         let constants = [&own[..], &self.grid.constants(), &self.surfaces.constants()].concat();
