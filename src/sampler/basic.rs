@@ -34,7 +34,8 @@ pub const MIS: Basic = Basic { tag: SAMPLER_MIS };
 /// Resampling over candidates of `mis`.
 pub const RIS: Basic = Basic { tag: SAMPLER_RIS };
 
-/// Numbers of candidates that `ris` and `control-variates` support, half from the BRDF and half from the environment.
+/// Numbers of candidates that `ris` and `control-variates` support, half from the BRDF and half from the
+/// environment.
 pub(super) const RIS_CANDIDATES: [u32; 4] = [2, 4, 6, 8];
 pub(super) const AUTO_RIS_CANDIDATES: u32 = 4;
 

@@ -17,7 +17,8 @@ pub struct Parameters {
     /// `share-tiles`: edge of the tiles whose pixels share second vertices, 1 for `off`. `None` is `auto`:
     /// `guided` measures what it gains, the other samplers do not share.
     pub share_tiles: Option<u32>,
-    /// `candidates`: directions to choose each shadow ray of `ris`, `control-variates` or `guided` from; `None` is `auto`.
+    /// `candidates`: directions to choose each shadow ray of `ris`, `control-variates` or `guided` from;
+    /// `None` is `auto`.
     pub candidates: Option<u32>,
     /// `compensation`: true if `mis`, `portal` and what `guided` falls back to draw directions of the
     /// environment by its compensated density.

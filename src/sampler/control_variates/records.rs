@@ -104,22 +104,3 @@ impl RecordGrid {
         counts.iter().enumerate().map(expect).collect()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_record_expects_what_it_has_counted_or_what_all_have() {
-        let grid = RecordGrid { side: 4, edge_per_distance: 0.1, largest_edge: 1.0 };
-        let mut counts = vec![[0, 0]; grid.entries()];
-        assert!(grid.expected(&counts).iter().all(|expected| *expected == 0.5), "nothing counted");
-        (counts[3], counts[16 + 3], counts[5]) = ([1000, 1000], [1000, 0], [500, 0]);
-        let expected = grid.expected(&counts);
-        assert!((expected[3] - 1.0).abs() < 2e-3, "seen: {}", expected[3]);
-        assert!(expected[16 + 3] < 2e-3 && expected[16 + 3] > 0.0, "blocked");
-        assert!((expected[32 + 3] - 0.5).abs() < 1e-2, "half of all rays of this bin");
-        assert!(expected[32 + 5] < 1e-2, "no ray of this bin");
-        assert!((expected[0] - 0.4).abs() < 1e-2, "two fifths of all rays");
-    }
-}
