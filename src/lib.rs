@@ -41,6 +41,8 @@
 //! | | | `bounce_guided`, `learn_arrivals` |
 //! | `portal` | [`sampler::portal`] | `portal/`: `sample_portals` |
 //! | `haar` | [`sampler::haar`] | `haar/`: `multiply_nodes`, `sample_nodes`, `lower_nodes` |
+//! | `control-variates` | [`sampler::control_variates`] | `control_variates/`: `record_visibility`, |
+//! | | | `sample_controlled` |
 //! | scene, settings, device → sums | [`renderer`] | |
 //! | sums → image files | [`film`] | |
 //! | scene → files of other renderers | [`export`] | |
@@ -80,6 +82,8 @@
 //!   Tools 13(3).
 //! - \[Clarberg & Akenine-Möller 2008\] "Practical Product Importance Sampling for Direct
 //!   Illumination", Computer Graphics Forum 27(2).
+//! - \[Clarberg & Akenine-Möller 2008b\] "Exploiting Visibility Correlation in Direct Illumination",
+//!   Computer Graphics Forum 27(4).
 //! - \[Clarberg et al. 2005\] "Wavelet Importance Sampling: Efficiently Evaluating Products of
 //!   Complex Functions", SIGGRAPH.
 //! - \[Douc et al. 2007\] "Convergence of Adaptive Mixtures of Importance Sampling Schemes", Annals
@@ -103,6 +107,8 @@
 //! - \[Knuth 1997\] *The Art of Computer Programming*, volume 2, third edition, section 4.2.2.
 //! - \[Laine & Karras 2011\] "Stratified Sampling for Stochastic Transparency", Computer Graphics
 //!   Forum 30(4).
+//! - \[Lavenberg & Welch 1981\] "A Perspective on the Use of Control Variables to Increase the
+//!   Efficiency of Monte Carlo Simulations", Management Science 27(3).
 //! - \[Matusik et al. 2003\] "A Data-Driven Reflectance Model", ACM Transactions on Graphics
 //!   22(3).
 //! - \[Meister & Bittner 2018\] "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy
@@ -114,6 +120,8 @@
 //! - \[Moshier 1992\] Cephes Mathematical Library.
 //! - \[Narkowicz 2015\] "ACES Filmic Tone Mapping Curve",
 //!   <https://knarkowicz.wordpress.com/2016/01/06/aces-filmic-tone-mapping-curve/>.
+//! - \[Neyman 1938\] "Contribution to the Theory of Sampling Human Populations", Journal of the American
+//!   Statistical Association 33(201).
 //! - \[Nocedal & Wright 2006\] *Numerical Optimization*, second edition, Springer.
 //! - \[Pharr & Humphreys 2010\] *Physically Based Rendering*, second edition, Morgan Kaufmann.
 //! - \[Quilez 2008\] "Distance functions", <https://iquilezles.org/articles/distfunctions/>.

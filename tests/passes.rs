@@ -13,6 +13,7 @@ use fenestra::{
     },
     sampler::{
         Parameters, basic,
+        control_variates::{ControlledSteps, PilotSteps, RecordGrid},
         guided::{GuidedParameters, GuidedSteps},
         haar::HaarSteps,
         portal::PortalSteps,
@@ -22,7 +23,7 @@ use fenestra::{
     shader::{
         constants::{
             AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, MATERIAL_PLASTIC, SURFACES_EMITTING,
-            SURFACES_SPECULAR, SURFACES_TEXTURED,
+            SURFACES_SPECULAR, SURFACES_TEXTURED, TRAINING_WAVE,
         },
         spirv::PASSES,
         structs::Wave,
@@ -85,6 +86,16 @@ fn haar(cache: &str) -> impl Steps {
     let mut parameters = Parameters::default();
     parameters.set(cache).unwrap();
     HaarSteps::new(&parameters, 8, Surfaces::default(), 2)
+}
+
+const GRID: RecordGrid = RecordGrid { side: 16, edge_per_distance: 0.1, largest_edge: 1.0 };
+
+fn controlled() -> impl Steps {
+    ControlledSteps::new(&Parameters::default(), GRID, Surfaces::default()).unwrap()
+}
+
+fn pilot() -> impl Steps {
+    PilotSteps::new(&Parameters::default(), GRID, Surfaces::default()).unwrap()
 }
 
 fn order(settings: &PassSettings, steps: &dyn Steps, wave: Wave) -> Vec<Dispatch> {
@@ -172,6 +183,7 @@ fn guided_counts_rays_and_bounces_where_samples_teach() {
 /// Every technique as the page shows it.
 fn shown() -> Vec<(&'static str, Vec<Dispatch>)> {
     let deep = settings(2, 2);
+    let training = Wave { is_training: TRAINING_WAVE, ..wave(0, 1) };
     let furnished = PassSettings { surfaces: everything(), ..settings(2, 1) };
     vec![
         ("uniform … ris", order(&deep, &mis(), wave(0, 1))),
@@ -181,6 +193,8 @@ fn shown() -> Vec<(&'static str, Vec<Dispatch>)> {
         ("portal", order(&deep, &portal(), wave(0, 1))),
         ("haar", order(&deep, &haar("haar-cache=off"), wave(0, 1))),
         ("haar with a cache", order(&settings(2, 1), &haar("haar-cache=on"), wave(0, 1))),
+        ("control-variates", order(&deep, &controlled(), wave(0, 1))),
+        ("pilot of control-variates", order(&deep, &pilot(), training)),
         ("one vertex, textures, lamps", order(&furnished, &mis(), wave(0, 1))),
         ("shared paths", order(&shared(2), &mis(), wave(0, 1))),
         ("lists of living paths", order(&listed(settings(2, 2)), &mis(), wave(0, 1))),

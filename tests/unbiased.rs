@@ -32,7 +32,7 @@ use support::{
 /// Least p-value allowed, that of |t| = 7.5 where both sides have the same error.
 const LEAST_P_VALUE: f64 = 3e-6;
 
-const ALL_AGAINST_COSINE: [Sampler; 10] = [
+const ALL_AGAINST_COSINE: [Sampler; 11] = [
     Sampler::Cosine,
     Sampler::Uniform,
     Sampler::Brdf,
@@ -42,6 +42,7 @@ const ALL_AGAINST_COSINE: [Sampler; 10] = [
     Sampler::Product,
     Sampler::Visibility,
     Sampler::Guided,
+    Sampler::ControlVariates,
     Sampler::Haar,
 ];
 
@@ -147,7 +148,7 @@ fn in_a_closed_room_with_bounces() {
     let scene =
         scenes::room(vec![scenes::diffuse(Vec3::splat(0.8)), scenes::copper(0.4), principled()]);
     // All but `haar`, which draws at later vertices as `product` does.
-    samplers_agree(&scene, 4, 64, &ALL_AGAINST_COSINE[..9]);
+    samplers_agree(&scene, 4, 64, &ALL_AGAINST_COSINE[..10]);
 }
 
 #[test]

@@ -42,14 +42,6 @@ GuideEntry guide_entry(uint index) {
         exp2(-level * (10.5 / float(GUIDE_VISIBILITY_LEVELS - 1u))));
 }
 
-// Returns the cube face that a normal points at most: +x, -x, +y, -y, +z, -z.
-uint guide_face(vec3 normal) {
-    vec3 size = abs(normal);
-    uint axis = size.x >= size.y && size.x >= size.z ? 0u : (size.y >= size.z ? 1u : 2u);
-    float along = axis == 0u ? normal.x : (axis == 1u ? normal.y : normal.z);
-    return 2u * axis + (along < 0.0 ? 1u : 0u);
-}
-
 // Returns the level of a place by its distance to the camera: its edge is the finest one times
 // 2^level. `bits` blurs the levels.
 uint guide_level(vec3 position, uint bits) {
@@ -163,7 +155,7 @@ GuideCell guide_cell(vec3 position, uint face, uint bits) {
 
 GuideCell guide_cell_of(Vertex vertex) {
     return guide_cell(
-        vertex.hit.position, guide_face(vertex.hit.geometric_normal),
+        vertex.hit.position, cube_face(vertex.hit.geometric_normal),
         guide_cell_bits(vertex.index, vertex.dimension));
 }
 

@@ -32,7 +32,7 @@ void main() {
             continue;
         }
         index.sample_index = wave.first_sample + i;
-        uint face = guide_face(hit.geometric_normal);
+        uint face = cube_face(hit.geometric_normal);
         uint key =
             guide_cell(hit.position, face, guide_cell_bits(index, vertex_dimension())).key;
         bool is_face = key == GUIDE_NO_KEY;

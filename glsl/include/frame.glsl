@@ -92,4 +92,12 @@ vec3 direction_from_lat_long(vec2 uv) {
     return vec3(-theta.x * azimuth.x, theta.y, theta.x * azimuth.y);
 }
 
+// Returns the cube face that a normal points at most: +x, -x, +y, -y, +z, -z.
+uint cube_face(vec3 normal) {
+    vec3 size = abs(normal);
+    uint axis = size.x >= size.y && size.x >= size.z ? 0u : (size.y >= size.z ? 1u : 2u);
+    float along = axis == 0u ? normal.x : (axis == 1u ? normal.y : normal.z);
+    return 2u * axis + (along < 0.0 ? 1u : 0u);
+}
+
 #endif

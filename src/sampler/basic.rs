@@ -34,9 +34,10 @@ pub const MIS: Basic = Basic { tag: SAMPLER_MIS };
 /// Resampling over candidates of `mis`.
 pub const RIS: Basic = Basic { tag: SAMPLER_RIS };
 
-/// Numbers of candidates that `ris` supports, half from the BRDF and half from the environment.
-const RIS_CANDIDATES: [u32; 4] = [2, 4, 6, 8];
-const AUTO_RIS_CANDIDATES: u32 = 4;
+/// Numbers of candidates that `ris` and `control-variates` support, half from the BRDF and half from the
+/// environment.
+pub(super) const RIS_CANDIDATES: [u32; 4] = [2, 4, 6, 8];
+pub(super) const AUTO_RIS_CANDIDATES: u32 = 4;
 
 impl Basic {
     fn candidates(self, parameters: &Parameters) -> Result<u32> {

@@ -4,6 +4,7 @@
 //! sampler takes a room and a line in `samplers!` below.
 
 pub mod basic;
+pub mod control_variates;
 pub mod guided;
 pub mod haar;
 mod knob;
@@ -119,6 +120,8 @@ samplers! {
     Portal "portal": portal::PortalRoom;
     /// Product of environment and BRDF on a wavelet basis (Clarberg & Akenine-Möller 2008).
     Haar "haar": haar::HaarRoom;
+    /// Rays among candidates, with recorded visibility as control variate (Clarberg & Akenine-Möller 2008).
+    ControlVariates "control-variates": control_variates::ControlVariatesRoom;
 }
 
 impl Sampler {

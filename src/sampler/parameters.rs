@@ -1,6 +1,7 @@
 //! Parameters of all samplers, set by `--set key=value`. The table of a new room joins `set` and `keys`.
 
 use super::{
+    control_variates::ControlVariatesParameters,
     guided::GuidedParameters,
     haar::HaarParameters,
     knob::{self, Knob},
@@ -16,7 +17,8 @@ pub struct Parameters {
     /// `share-tiles`: edge of the tiles whose pixels share second vertices, 1 for `off`. `None` is `auto`:
     /// `guided` measures what it gains, the other samplers do not share.
     pub share_tiles: Option<u32>,
-    /// `candidates`: directions to choose each shadow ray of `ris` or `guided` from; `None` is `auto`.
+    /// `candidates`: directions to choose each shadow ray of `ris`, `control-variates` or `guided` from;
+    /// `None` is `auto`.
     pub candidates: Option<u32>,
     /// `compensation`: true if `mis`, `portal` and what `guided` falls back to draw directions of the
     /// environment by its compensated density.
@@ -31,6 +33,8 @@ pub struct Parameters {
     pub portal: PortalParameters,
     /// Parameters of `haar`.
     pub haar: HaarParameters,
+    /// Parameters of `control-variates`.
+    pub control_variates: ControlVariatesParameters,
 }
 
 impl Default for Parameters {
@@ -44,6 +48,7 @@ impl Default for Parameters {
             guided: GuidedParameters::default(),
             portal: PortalParameters::default(),
             haar: HaarParameters::default(),
+            control_variates: ControlVariatesParameters::default(),
         }
     }
 }
@@ -53,7 +58,8 @@ const KNOBS: &[Knob<Parameters>] = &[
     Knob {
         key: "candidates",
         set: |parameters, value| {
-            let expected = "auto, 2, 4, 6 or 8 for ris, auto, 1, 4 or 8 for guided";
+            let expected =
+                "auto, 2, 4, 6 or 8 for ris and control-variates, auto, 1, 4 or 8 for guided";
             let is_known = |count: &Option<u32>| matches!(count, None | Some(1 | 2 | 4 | 6 | 8));
             let mut candidates = None;
             knob::number_or_auto(&mut candidates, value, 1..=8).map_err(|_| expected)?;
@@ -109,7 +115,8 @@ impl Parameters {
             || knob::set(VisibilityParameters::KNOBS, &mut self.visibility, key, value)?
             || knob::set(GuidedParameters::KNOBS, &mut self.guided, key, value)?
             || knob::set(PortalParameters::KNOBS, &mut self.portal, key, value)?
-            || knob::set(HaarParameters::KNOBS, &mut self.haar, key, value)?;
+            || knob::set(HaarParameters::KNOBS, &mut self.haar, key, value)?
+            || knob::set(ControlVariatesParameters::KNOBS, &mut self.control_variates, key, value)?;
         if is_known {
             return Ok(());
         }
@@ -129,6 +136,7 @@ impl Parameters {
             .chain(GuidedParameters::KNOBS.iter().map(|knob| knob.key))
             .chain(PortalParameters::KNOBS.iter().map(|knob| knob.key))
             .chain(HaarParameters::KNOBS.iter().map(|knob| knob.key))
+            .chain(ControlVariatesParameters::KNOBS.iter().map(|knob| knob.key))
             .collect();
         keys.sort_unstable();
         keys

@@ -271,6 +271,14 @@ binding_tables! {
         58 HAAR_CACHE: array uint;
     }
 
+    /// Set 1 of the sampler `control-variates`.
+    CONTROL_VARIATES = control_variates: 1 {
+        /// Rays of the pilot, and the visible ones among them, by record and direction (`record_entry`).
+        64 RECORD_COUNTS: array uint;
+        /// Expected visibility by record and direction.
+        65 RECORD_VISIBILITIES: texels R32Float;
+    }
+
     /// Set 1 of the passes by which pixels share paths.
     SHARING = sharing: 1 {
         /// First vertex of each path.

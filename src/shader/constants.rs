@@ -117,6 +117,20 @@ constants! {
     /// The same of the texels of the environment, more than that of the nodes.
     CONSTANT_HAAR_DEPTH = 50;
 
+    // Specialization constants of `sample_controlled` and `record_visibility`.
+    /// Share of the expected visibility that is the control variate, bits of a float.
+    CONSTANT_CONTROL_SHARE = 51;
+    /// 1 chooses shadow rays where the records are in doubt, 0 by light alone.
+    CONSTANT_CONTROL_CHOICE = 52;
+    /// 1 rounds the expected visibility to a bit in the control variate.
+    CONSTANT_CONTROL_BITS = 56;
+    /// Bins of a record along each side of the square of directions.
+    CONSTANT_RECORD_SIDE = 53;
+    /// Edge of a record's cube per metre of distance to the camera, bits of a float.
+    CONSTANT_RECORD_EDGE = 54;
+    /// Largest edge of a record's cube, metres, bits of a float.
+    CONSTANT_RECORD_LARGEST_EDGE = 55;
+
     // Values of CONSTANT_SAMPLER.
     /// Uniform over the hemisphere.
     SAMPLER_UNIFORM = 0;
@@ -372,6 +386,9 @@ constants! {
     LEARN_FROM_BRDF_SHIFT = 8;
     /// First bit of the response of a shadow ray.
     LEARN_RESPONSE_SHIFT = 17;
+
+    /// Visibility records; a power of two.
+    VISIBILITY_RECORDS = 1 << 13;
 
     // Layers that the pass `show` shows.
     /// Mean radiance.

@@ -77,7 +77,8 @@ pub const KEYS: &[Key] = &[
     key(
         "1",
         Action::Sampler(1),
-        "sampler: uniform, cosine, brdf, env, mis, ris, product, visibility, guided, portal, haar",
+        "sampler: uniform, cosine, brdf, env, mis, ris, product, visibility, guided, portal, haar, \
+         control-variates",
     ),
     key("2", Action::Sampler(2), ""),
     key("3", Action::Sampler(3), ""),
@@ -89,6 +90,7 @@ pub const KEYS: &[Key] = &[
     key("9", Action::Sampler(9), ""),
     key("o", Action::Sampler(10), ""),
     key("u", Action::Sampler(11), ""),
+    key("v", Action::Sampler(12), ""),
     key("x", Action::Split, "two samplers side by side at equal time, or one"),
     key("Tab", Action::Swap, "choose the sampler of the other side"),
     key("[", Action::Depth(-1), "fewer and more path vertices"),
@@ -152,6 +154,6 @@ mod tests {
         let names: Vec<&str> = Sampler::ALL.iter().map(|sampler| sampler.name()).collect();
         let about = KEYS.iter().find(|key| key.key == "1").map_or("", |key| key.about);
         assert_eq!(about, format!("sampler: {}", names.join(", ")));
-        assert!(rows().iter().any(|(keys, _)| keys == "1 2 3 4 5 6 7 8 9 o u"));
+        assert!(rows().iter().any(|(keys, _)| keys == "1 2 3 4 5 6 7 8 9 o u v"));
     }
 }

@@ -469,6 +469,23 @@ fn region_tables(partition: &Partition) -> (Vec<[u32; 4]>, Vec<[u32; 2]>) {
     (regions.collect(), aliases.collect())
 }
 
+/// Returns the edge of cells that are `pixels` wide in the picture, per metre of distance to the camera,
+/// and the largest edge, metres: a twentieth of the scene.
+pub(in crate::sampler) fn cell_edges(scene: &Scene, pixels: f32) -> [f32; 2] {
+    let [low, high] = bounds_of(scene);
+    let size = (high - low).max_element();
+    let size = if size.is_finite() && size > 0.0 { size } else { 1.0 };
+    let pixel_angle = 2.0 * (0.5 * scene.camera.vertical_fov_deg).to_radians().tan()
+        / scene.film.height.max(1) as f32;
+    [pixels * pixel_angle, size / CELLS_PER_SCENE]
+}
+
+/// Corners of the scene; infinite where it is empty.
+fn bounds_of(scene: &Scene) -> [Vec3; 2] {
+    let bounds = instance::bounds(scene.geometry.used_extent());
+    bounds.unwrap_or([Vec3::INFINITY, Vec3::NEG_INFINITY])
+}
+
 /// Makes cells about [`CELL_PIXELS`] wide in the picture, at most a twentieth of the scene.
 fn guide_parameters(
     scene: &Scene,
@@ -476,19 +493,14 @@ fn guide_parameters(
     slots: usize,
     missing_slots: usize,
 ) -> GuideParameters {
-    let bounds = instance::bounds(scene.geometry.used_extent());
-    let [low, high] = bounds.unwrap_or([Vec3::INFINITY, Vec3::NEG_INFINITY]);
-    let size = (high - low).max_element();
-    let size = if size.is_finite() && size > 0.0 { size } else { 1.0 };
-    let pixel_angle = 2.0 * (0.5 * scene.camera.vertical_fov_deg).to_radians().tan()
-        / scene.film.height.max(1) as f32;
-    let largest_edge = size / CELLS_PER_SCENE;
+    let low = bounds_of(scene)[0];
+    let [edge_per_distance, largest_edge] = cell_edges(scene, CELL_PIXELS);
     GuideParameters {
         // Shift the grid by a third of the largest edge from the corner of the scene, since walls
         // at its sides should not lie between two cells.
         grid_origin: if low.is_finite() { (low - largest_edge / 3.0).into() } else { [0.0; 3] },
         finest_edge: largest_edge * 0.5_f32.powi(LEVELS),
-        edge_per_distance: CELL_PIXELS * pixel_angle,
+        edge_per_distance,
         largest_edge,
         region_count: region_count as u32,
         table_mask: (slots - 1) as u32,

@@ -1,0 +1,35 @@
+// Counts every shadow ray of the pilot, and every visible one, in the record of its hit and the bin of its
+// direction. Sums of integers: the order of rays makes no difference.
+#version 460
+
+#include "control_variates/records.glsl"
+#include "load.glsl"
+#include "path_list.glsl"
+#include "wave.glsl"
+
+READS(visibility)
+UPDATES(record_counts)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+void record_ray(ListedRay listed) {
+    HitOrigin hit = load_hit_origin(listed.path);
+    ShadowRay ray = load_shadow_ray(listed.ray);
+    // Same test as in shadow.comp: rays without a contribution are not traced.
+    if (hit.material == NO_MATERIAL || ray.contribution == vec3(0.0)) {
+        return;
+    }
+    uint entry = record_entry(record_of(hit.position, hit.geometric_normal), ray.direction);
+    atomicAdd(record_counts[2u * entry], 1u);
+    if (visibility[listed.ray] != 0u) {
+        atomicAdd(record_counts[2u * entry + 1u], 1u);
+    }
+}
+
+void main() {
+    uint path_count = listed_path_count();
+    uint ray_count = path_count * wave.shadow_ray_count;
+    for (uint place = gl_GlobalInvocationID.x; place < ray_count; place += ray_count) {
+        record_ray(listed_ray(place, path_count));
+    }
+}

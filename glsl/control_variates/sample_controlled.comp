@@ -1,0 +1,66 @@
+// Chooses a shadow ray among candidates at every hit of the wave, once for each ray, writes it with its
+// contribution, and adds to the path what the records expect, which no shadow ray carries. Densities are
+// in solid angle measure.
+//
+// The records come from the pilot, whose random numbers are others, and do not change afterwards: the
+// samples are independent of them.
+#version 460
+
+#include "control_variates/controlled.glsl"
+#include "control_variates/records.glsl"
+#include "path_list.glsl"
+#include "vertex.glsl"
+
+TEXELS(record_visibilities)
+UPDATES(paths)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+// Candidates per shadow ray, half from the BRDF and half from the environment.
+layout(constant_id = CONSTANT_CANDIDATES) const uint CANDIDATES = 4u;
+const uint PAIRS = CANDIDATES / 2u;
+
+void add_candidate(inout Controlled chosen, uint record, DirectionSample candidate) {
+    float pdf = 0.5 * (candidate.brdf_pdf + candidate.environment_pdf);
+    vec3 weight = pdf > 0.0 ? candidate.integrand / pdf : vec3(0.0);
+    float expected =
+        texelFetch(record_visibilities, int(record_entry(record, candidate.direction))).x;
+    controlled_add(chosen, candidate.direction, weight, expected);
+}
+
+void sample_path(uint path) {
+    uint path_count = wave_path_count();
+    Hit hit = load_hit(path);
+    if (hit.material == NO_MATERIAL) {
+        return;
+    }
+    Vertex vertex = load_vertex(path, hit);
+    uint record = record_of(hit.position, hit.geometric_normal);
+    uint pixel = vertex.index.pixel;
+    // Number the rays through all samples: they share one sequence, and their candidates two.
+    uint first_ray = vertex.index.sample_index * wave.total_shadow_rays + wave.first_shadow_ray;
+    vec3 rest = vec3(0.0);
+    for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
+        Controlled chosen = controlled_start(random_1d(
+            pixel, first_ray + i, vertex.dimension + DIMENSION_RESAMPLING, wave.seed));
+        for (uint pair = 0u; pair < PAIRS; ++pair) {
+            uint number = (first_ray + i) * PAIRS + pair;
+            vec2 light = random_2d(
+                pixel, number, vertex.dimension + DIMENSION_ENVIRONMENT_DIRECTION, wave.seed);
+            add_candidate(chosen, record, draw_from_environment(vertex, light));
+            vec2 surface = random_2d(
+                pixel, number, vertex.dimension + DIMENSION_BRDF_DIRECTION, wave.seed);
+            float lobe =
+                random_1d(pixel, number, vertex.dimension + DIMENSION_BRDF_LOBE, wave.seed);
+            add_candidate(chosen, record, draw_from_brdf(vertex, vec3(surface, lobe)));
+        }
+        vec3 contribution = controlled_contribution(chosen, CANDIDATES);
+        write_ray(i * path_count + path, chosen.direction, contribution);
+        rest += controlled_rest(chosen, CANDIDATES, contribution);
+    }
+    PathState state = paths[path];
+    paths[path].radiance =
+        state.radiance + state.throughput * (rest / float(wave.total_shadow_rays));
+}
+
+WALK_PATHS(sample_path)

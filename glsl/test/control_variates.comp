@@ -1,0 +1,48 @@
+// Probe of control_variates/: a place and a direction in, their entry out; candidates in, the chosen ray out.
+#version 460
+
+#include "control_variates/controlled.glsl"
+#include "control_variates/records.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+struct ControlQuery {
+    vec3 position;
+    vec3 normal;
+    vec3 direction;
+    float u;
+    vec4 weights[4];
+};
+
+struct ControlAnswer {
+    uint entry;
+    // Index of the chosen candidate.
+    uint chosen;
+    vec3 contribution;
+    vec3 rest;
+};
+
+layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Queries {
+    ControlQuery queries[];
+};
+layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {
+    ControlAnswer answers[];
+};
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= uint(queries.length())) {
+        return;
+    }
+    ControlQuery query = queries[index];
+    Controlled chosen = controlled_start(query.u);
+    for (uint c = 0u; c < 4u; ++c) {
+        // The direction stands for the index.
+        vec4 weight = query.weights[c];
+        controlled_add(chosen, vec3(float(c)), weight.xyz, weight.w);
+    }
+    vec3 contribution = controlled_contribution(chosen, 4u);
+    answers[index] = ControlAnswer(
+        record_entry(record_of(query.position, query.normal), query.direction),
+        uint(chosen.direction.x), contribution, controlled_rest(chosen, 4u, contribution));
+}
