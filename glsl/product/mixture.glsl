@@ -105,34 +105,36 @@ float mixture_lobe_density(Mixture mixture, vec3 direction) {
     float density = 0.0;
     float sum = 0.0;
     for (uint word = 0u; 32u * word < lobes.count; ++word) {
-        Counts counts = close_counts[word];
-        Counts kept;
-        if (CACHE_CAPACITY > 0u) {
-            kept = counts_kept(lobes, word);
-        }
+        uint forgotten = CACHE_CAPACITY > 0u ? forgotten_mask(lobes, word) : 0u;
         uint mask = 0u;
-        uint end = min(lobes.count - 32u * word, 32u);
-        for (uint bit = 0u; bit < end; ++bit) {
-            ProductLobe lobe = unpack_lobe(lobe_words(lobes, 32u * word + bit));
-            float distance = distance_from_axis(lobe.axis, direction);
-            float tail = exp(-2.0 * lobe.bandwidth);
-            density += lobe.weight * counted_weight(counts, bit) * lobe.bandwidth / (1.0 - tail)
-                * exp(-lobe.bandwidth * distance);
-            if (CACHE_CAPACITY > 0u) {
-                uint close = is_close(lobe.bandwidth, tail, distance) ? 1u : 0u;
-                mask |= close << bit;
-                sum += lobe.weight * visibility_weight(float(count_of(kept, bit) + close));
-                if ((bit + 1u) % LOBES_PER_SUM == 0u) {
-                    sums_under_way[(32u * word + bit) / LOBES_PER_SUM] = sum;
+        uint quads_end = min((lobes.count + 3u) / 4u, 8u * word + 8u);
+        for (uint quad = 8u * word; quad < quads_end; ++quad) {
+            uint counts = counts_of(lobes, quad);
+            uint next = counts - bytes_of_bits(forgotten >> (4u * (quad % 8u)));
+            // Always four, so that compilers unroll the loop.
+            for (uint i = 0u; i < 4u; ++i) {
+                uint l = 4u * quad + i;
+                ProductLobe lobe = unpack_lobe(lobe_words(lobes, min(l, lobes.count - 1u)));
+                float distance = distance_from_axis(lobe.axis, direction);
+                float tail = exp(-2.0 * lobe.bandwidth);
+                lobe.weight = l < lobes.count ? lobe.weight : 0.0;
+                density += lobe.weight * visibility_weight(counts, i) * lobe.bandwidth
+                    / (1.0 - tail) * exp(-lobe.bandwidth * distance);
+                if (CACHE_CAPACITY > 0u) {
+                    uint close = is_close(lobe.bandwidth, tail, distance) ? 1u : 0u;
+                    mask |= close << (4u * (quad % 8u) + i);
+                    next += close << (8u * i);
+                    sum += lobe.weight * visibility_weight(next, i);
                 }
+            }
+            if (CACHE_CAPACITY > 0u) {
+                close_counts[QUADS - lobes.counts + quad] = next;
+                sums_under_way[quad / QUADS_PER_SUM] = sum;
             }
         }
         if (CACHE_CAPACITY > 0u) {
             masks_under_way[word] = mask;
         }
-    }
-    if (CACHE_CAPACITY > 0u && lobes.count > 0u) {
-        sums_under_way[(lobes.count - 1u) / LOBES_PER_SUM] = sum;
     }
     return mixture.total > 0.0 ? density / (2.0 * SRBF_PI * mixture.total) : 0.0;
 }

@@ -37,8 +37,8 @@ void main() {
     Lobes lobes = load_lobes(query.x, wave.pixel_count * wave.sample_count, 0u);
     ProductLobe lobe = unpack_lobe(lobe_words(lobes, query.y));
     load_weights(lobes);
-    Counts counts = close_counts[query.y / 32u];
+    float visibility = visibility_weight(counts_of(lobes, query.y / 4u), query.y % 4u);
     answers[index] = LobeAnswer(
-        lobe.axis, lobe.bandwidth, lobe.weight,
-        lobe.weight * counted_weight(counts, query.y % 32u), lobes.count, weight_total(lobes));
+        lobe.axis, lobe.bandwidth, lobe.weight, lobe.weight * visibility, lobes.count,
+        weight_total(lobes));
 }

@@ -13,12 +13,10 @@ WRITES(lobe_sums)
 void record_blocked(inout Lobes lobes, vec3 direction) {
     visibility_cache[lobes.head + 1u + lobes.recorded % CACHE_CAPACITY] = pack_normal(direction);
     for (uint word = 0u; word < MASK_WORDS; ++word) {
-        Counts counts = counts_kept(lobes, word);
-        add_mask(counts, masks_under_way[word]);
-        close_counts[word] = counts;
         close_lobes[close_lobes_index(lobes.path, lobes.path_count, lobes.recorded, word)] =
             masks_under_way[word];
     }
+    lobes.counts = QUADS - lobes.counts;
     for (uint s = 0u; s < SUMS; ++s) {
         weight_sums[s] = sums_under_way[s];
     }

@@ -42,15 +42,15 @@ void sum_with_all_entries(Lobes lobes) {
         for (uint bit = 0u; bit < end; ++bit) {
             ProductLobe lobe = unpack_lobe(lobe_words(lobes, 32u * word + bit));
             float tail = exp(-2.0 * lobe.bandwidth);
-            float close_count = 0.0;
+            uint close_count = 0u;
             for (uint i = 0u; i < CACHE_CAPACITY; ++i) {
                 bool close = i < entries
                     && is_close(
                         lobe.bandwidth, tail, distance_from_axis(lobe.axis, directions[i]));
                 masks[i] |= close ? 1u << bit : 0u;
-                close_count += close ? 1.0 : 0.0;
+                close_count += close ? 1u : 0u;
             }
-            sum += lobe.weight * visibility_weight(close_count);
+            sum += lobe.weight * visibility_weight(close_count, 0u);
             write_sum(lobes, 32u * word + bit, sum);
         }
         for (uint i = 0u; i < entries; ++i) {
