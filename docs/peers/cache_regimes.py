@@ -50,9 +50,11 @@ def scenes(folder, repository):
 
 def studies():
     """Yields name, environment, rays of a hit and samplers of every study."""
-    def three(parameters=""):
+    def three(parameters):
+        # A preset replaces all parameters, so it stands first.
         return ["product" + parameters.replace(":cache-capacity=64", ""),
-                "visibility:k=0" + parameters, "visibility" + parameters]
+                "visibility" + re.sub("^(:preset=[a-z]+)?", r"\1:k=0", parameters, count=1),
+                "visibility" + parameters]
     basic = three(":cache-capacity=64")
     pixel = ["visibility:cache=pixel:cache-capacity=64"]
     yield "smooth_5", "smooth", 5, basic + pixel
@@ -61,9 +63,12 @@ def studies():
     yield "smooth_256", "smooth", 256, basic + pixel
     yield "sun_5", "sun", 5, basic
     yield "sun_64", "sun", 64, basic + pixel
+    yield "sun_256", "sun", 256, basic
     yield "strict_64", "smooth", 64, three(":preset=strict:cache-capacity=64")
-    yield "lobes_8", "smooth", 64, three(":lobes=8:cache-capacity=64")
+    yield "strict_sun_64", "sun", 64, three(":preset=strict:cache-capacity=64")
+    yield "strict_sun_5", "sun", 5, three(":preset=strict:cache-capacity=64")
     yield "lobes_256", "smooth", 64, three(":lobes=256:cache-capacity=64")
+    yield "lobes_8", "smooth", 64, three(":lobes=8:cache-capacity=64")
 
 
 def run(arguments, folder, name, environment, rays, samplers, names):
@@ -74,7 +79,7 @@ def run(arguments, folder, name, environment, rays, samplers, names):
                "--seeds", str(arguments.seeds), "--size", arguments.size, "--shadow-rays", str(rays),
                "--reference-check", "off", "-q", "-o", folder / name]
     if reference.name == name:
-        command += ["--reference-sampler", "guided", "--reference-spp", "2048"]
+        command += ["--reference-sampler", "guided", "--reference-spp", str(10240 // rays)]
     else:
         command += ["--reference", reference]
     subprocess.run([str(part) for part in command], check=True, stderr=subprocess.DEVNULL)
