@@ -35,7 +35,7 @@
 //! | passes of a wave, in their order | [`pass`] | `camera`, `trace`, `texture`, `emit`, `sample`, |
 //! | | | `sample_lamps`, `shadow`, `gather`, `features`, `bounce`, `accumulate` |
 //! | `product` | [`sampler::product`] | `product/`: `multiply_lobes`, `sample_lobes` |
-//! | `visibility`, on top of it | [`sampler::visibility`] | `visibility/`: `record_blocked`, `reweight`, |
+//! | `visibility`, on top of it | [`sampler::visibility`] | `visibility/`: `reweight`, `sample_and_trace`, |
 //! | | | `count_entries` |
 //! | `guided` | [`sampler::guided`] | `guided/`: `sample_guided`, `learn`, `show_cells`, |
 //! | | | `bounce_guided`, `learn_arrivals` |

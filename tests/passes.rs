@@ -33,6 +33,8 @@ use fenestra::{
 const FITS: FitSizes =
     FitSizes { environment_lobes: 100, strongest_environment_lobe: 0.0, brdf_lobes: 20, views: 32 };
 
+const TRAVERSAL: Traversal = Traversal { page_count: 1, page_shift: 20, is_instanced: false };
+
 /// Settings of a render with all layers.
 fn settings(shadow_rays: u32, depth: u32) -> PassSettings {
     PassSettings {
@@ -42,7 +44,7 @@ fn settings(shadow_rays: u32, depth: u32) -> PassSettings {
         roulette: Roulette::default(),
         tile_edge: 1,
         surfaces: Surfaces::default(),
-        traversal: Traversal { page_count: 1, page_shift: 20, is_instanced: false },
+        traversal: TRAVERSAL,
         incoherent: Schedule { rays_per_invocation: 16, refill_lanes: 3 },
         path_lists: PathLists::Never,
         film_page_bytes: u64::MAX,
@@ -70,6 +72,7 @@ fn visibility(cache: CacheScope, shadow_rays: u32) -> impl Steps {
         ProductParameters::default(),
         FITS,
         Surfaces::default(),
+        TRAVERSAL,
         shadow_rays,
     )
 }
@@ -142,18 +145,17 @@ fn product_multiplies_lobes_once_per_vertex() {
 }
 
 #[test]
-fn visibility_learns_from_every_ray_but_the_last() {
+fn visibility_draws_and_traces_groups_of_eight_rays_in_one_pass() {
     assert_eq!(
-        names(&order(&settings(3, 1), &visibility(CacheScope::Hit, 3), wave(0, 1))),
-        "camera trace multiply_lobes sample_lobes shadow record_blocked reweight gather sample_lobes \
-         shadow record_blocked reweight gather sample_lobes shadow gather count_entries features \
-         accumulate"
+        names(&order(&settings(9, 1), &visibility(CacheScope::Hit, 9), wave(0, 1))),
+        "camera trace multiply_lobes sample_and_trace gather sample_and_trace gather count_entries \
+         features accumulate"
     );
-    // The last ray of a hit serves the pixel's next sample.
+    // The next sample of a pixel begins with the cache that the one before left.
     assert_eq!(
         names(&order(&settings(2, 1), &visibility(CacheScope::Pixel, 2), wave(0, 1))),
-        "camera trace multiply_lobes reweight sample_lobes shadow record_blocked reweight gather \
-         sample_lobes shadow record_blocked gather count_entries features accumulate"
+        "camera trace multiply_lobes reweight sample_and_trace gather count_entries features \
+         accumulate"
     );
 }
 
@@ -189,6 +191,10 @@ fn shown() -> Vec<(&'static str, Vec<Dispatch>)> {
         ("uniform … ris", order(&deep, &mis(), wave(0, 1))),
         ("product", order(&deep, &product(), wave(0, 1))),
         ("visibility", order(&deep, &visibility(CacheScope::Hit, 2), wave(0, 1))),
+        (
+            "visibility with caches of pixels",
+            order(&settings(2, 1), &visibility(CacheScope::Pixel, 2), wave(0, 1)),
+        ),
         ("guided", order(&deep, &guided(&deep), wave(0, 1))),
         ("portal", order(&deep, &portal(), wave(0, 1))),
         ("haar", order(&deep, &haar("haar-cache=off"), wave(0, 1))),

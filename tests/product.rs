@@ -17,7 +17,7 @@ use std::f64::consts::PI;
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
-    pass::{Kernel, Pass, SceneBuffers, Steps, Surfaces, WaveBuffers},
+    pass::{Kernel, Pass, SceneBuffers, Steps, Surfaces, WaveBuffers, geometry::Traversal},
     renderer::{Settings, window_of},
     sampler::{
         Parameters,
@@ -200,7 +200,9 @@ impl Paths {
         let waves =
             WaveBuffers::new(device, 64, 1 << 17, 1, size.demand(), Surfaces::default()).unwrap();
         let kinds = buffers.surfaces();
-        let steps = VisibilitySteps::new(visibility, product, fits.sizes(), kinds, SHADOW_RAYS);
+        let traversal = Traversal { page_count: 1, page_shift: 20, is_instanced: false };
+        let steps =
+            VisibilitySteps::new(visibility, product, fits.sizes(), kinds, traversal, SHADOW_RAYS);
         let lobes = LobeBuffers::new(device, fits, size, waves.capacity()).unwrap();
         let wave = Wave {
             pixel_count: surfaces.len() as u32,
@@ -259,11 +261,10 @@ impl Paths {
     /// Teaches the caches the outcome of one shadow ray per path.
     fn learn(&self, outcomes: &[(DVec3, bool)]) {
         self.put(outcomes);
-        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_note.spv"));
+        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_learn.spv"));
         let densities: Vec<f32> =
             self.probe(spirv, false, &self.constants(), &vec![0_u32; self.surfaces.len()]);
         assert!(densities.iter().all(|density| *density > 0.0), "{densities:?}");
-        self.run(self.steps.after_shadow_rays(&self.wave));
     }
 
     fn probe<Q: Pod, A: Pod>(

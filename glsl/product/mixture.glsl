@@ -1,6 +1,6 @@
 // Mixture that `product` and `visibility` draw from at one vertex: lobes by their current weights,
 // environment and BRDF. [Wu & Shih 2009], algorithm 5.1. Densities in solid angle measure. Entry
-// points declare visibility_cache.
+// points declare visibility_cache and close_lobes.
 //
 // Deviation: elevations by inversion; the thesis's Metropolis walk is optional, and biased.
 
@@ -11,8 +11,6 @@
 #include "product/readings.glsl"
 #include "vertex.glsl"
 #include "visibility/weights.glsl"
-
-WRITES(close_lobes)
 
 layout(constant_id = CONSTANT_BRDF_SHARE) const float BRDF_SHARE = 0.25;
 layout(constant_id = CONSTANT_ENVIRONMENT_SHARE) const float ENVIRONMENT_SHARE = 0.25;
@@ -29,12 +27,9 @@ struct Mixture {
     float brdf_share;
 };
 
-// Loads the mixture at a path; `film_index` matters only for caches of pixels.
-Mixture load_mixture(uint path, uint path_count, uint film_index) {
-    Mixture mixture = Mixture(load_lobes(path, path_count, film_index), 0.0, 0.0, 0.0, 0.0);
-    mixture.total = mixture.lobes.count > 0u
-        ? sum_of_stretch(mixture.lobes, (mixture.lobes.count - 1u) / LOBES_PER_SUM)
-        : 0.0;
+// Sets the probabilities of the techniques by the weights in force.
+void set_shares(inout Mixture mixture) {
+    mixture.total = weight_total(mixture.lobes);
     // Fall back on the BRDF without lobes or in the dark.
     float lobe_share = mixture.total > 0.0 ? 1.0 - BRDF_SHARE - ENVIRONMENT_SHARE : 0.0;
     float environment_share = parameters.environment_total > 0.0 ? ENVIRONMENT_SHARE : 0.0;
@@ -43,6 +38,13 @@ Mixture load_mixture(uint path, uint path_count, uint film_index) {
     mixture.lobe_share = lobe_share / shares;
     mixture.environment_share = environment_share / shares;
     mixture.brdf_share = brdf_share / shares;
+}
+
+// Loads the mixture at a path; `film_index` matters only for caches of pixels.
+Mixture load_mixture(uint path, uint path_count, uint film_index) {
+    Mixture mixture = Mixture(load_lobes(path, path_count, film_index), 0.0, 0.0, 0.0, 0.0);
+    load_weights(mixture.lobes);
+    set_shares(mixture);
     return mixture;
 }
 
@@ -98,28 +100,42 @@ vec3 mixture_sample(Vertex vertex, Mixture mixture, uint ray, MixtureNumbers num
     return direction;
 }
 
-// Returns the density of the lobes with their current weights; 0 without lobes. If `is_noted`,
-// notes the lobes close to the direction, in case it is recorded.
-float mixture_lobe_density(Mixture mixture, vec3 direction, bool is_noted) {
+// Returns the density of the lobes with their current weights; 0 without lobes. With a cache, finds
+// the lobes close to the direction, and sums the weights that they have if it is recorded.
+float mixture_lobe_density(Mixture mixture, vec3 direction) {
     Lobes lobes = mixture.lobes;
     float density = 0.0;
+    float sum = 0.0;
     for (uint word = 0u; 32u * word < lobes.count; ++word) {
-        load_counts(lobes, word);
+        uint forgotten = CACHE_CAPACITY > 0u ? forgotten_mask(lobes, word) : 0u;
         uint mask = 0u;
-        uint end = min(lobes.count - 32u * word, 32u);
-        for (uint bit = 0u; bit < end; ++bit) {
-            ProductLobe lobe = unpack_lobe(lobe_words(lobes, 32u * word + bit));
-            float distance = distance_from_axis(lobe.axis, direction);
-            float tail = exp(-2.0 * lobe.bandwidth);
-            density += lobe.weight * counted_weight(bit) * lobe.bandwidth / (1.0 - tail)
-                * exp(-lobe.bandwidth * distance);
+        uint quads_end = min((lobes.count + 3u) / 4u, 8u * word + 8u);
+        for (uint quad = 8u * word; quad < quads_end; ++quad) {
+            uint counts = counts_of(lobes, quad);
+            uint next = counts - bytes_of_bits(forgotten >> (4u * (quad % 8u)));
+            // Always four, so that compilers unroll the loop.
+            for (uint i = 0u; i < 4u; ++i) {
+                uint l = 4u * quad + i;
+                ProductLobe lobe = unpack_lobe(lobe_words(lobes, min(l, lobes.count - 1u)));
+                float distance = distance_from_axis(lobe.axis, direction);
+                float tail = exp(-2.0 * lobe.bandwidth);
+                lobe.weight = l < lobes.count ? lobe.weight : 0.0;
+                density += lobe.weight * visibility_weight(counts, i) * lobe.bandwidth
+                    / (1.0 - tail) * exp(-lobe.bandwidth * distance);
+                if (CACHE_CAPACITY > 0u) {
+                    uint close = is_close(lobe.bandwidth, tail, distance) ? 1u : 0u;
+                    mask |= close << (4u * (quad % 8u) + i);
+                    next += close << (8u * i);
+                    sum += lobe.weight * visibility_weight(next, i);
+                }
+            }
             if (CACHE_CAPACITY > 0u) {
-                mask |= is_close(lobe.bandwidth, tail, distance) ? 1u << bit : 0u;
+                close_counts[QUADS - lobes.counts + quad] = next;
+                sums_under_way[quad / QUADS_PER_SUM] = sum;
             }
         }
-        if (CACHE_CAPACITY > 0u && is_noted) {
-            close_lobes[close_lobes_index(lobes.path, lobes.path_count, lobes.recorded, word)] =
-                mask;
+        if (CACHE_CAPACITY > 0u) {
+            masks_under_way[word] = mask;
         }
     }
     return mixture.total > 0.0 ? density / (2.0 * SRBF_PI * mixture.total) : 0.0;
@@ -131,6 +147,15 @@ float mixture_pdf(Mixture mixture, DirectionSample sampled, float lobe_density) 
         * read_density(mixture.lobes, mixture.total, sampled.direction, lobe_density)
         + mixture.environment_share * sampled.environment_pdf
         + mixture.brdf_share * sampled.brdf_pdf;
+}
+
+// Draws one ray; its contribution is integrand / pdf, without occlusion.
+ShadowRay mixture_ray(Vertex vertex, Mixture mixture, uint ray, MixtureNumbers numbers) {
+    vec3 direction = mixture_sample(vertex, mixture, ray, numbers);
+    float lobe_density = mixture_lobe_density(mixture, direction);
+    DirectionSample sampled = evaluate_world(vertex, direction);
+    float pdf = mixture_pdf(mixture, sampled, lobe_density);
+    return ShadowRay(direction, pdf > 0.0 ? sampled.integrand / pdf : vec3(0.0));
 }
 
 #endif

@@ -13,8 +13,8 @@ uint chosen_lobe = 0u;
 
 // Returns the weight of a lobe with the cache as it is.
 float weight_in_force(Lobes lobes, uint l) {
-    load_counts(lobes, l / 32u);
-    return weight_of_words(lobe_words(lobes, l)) * counted_weight(l % 32u);
+    return weight_of_words(lobe_words(lobes, l))
+        * visibility_weight(counts_of(lobes, l / 4u), l % 4u);
 }
 
 // Returns the density of all lobes with their weights before the cache lowered them.

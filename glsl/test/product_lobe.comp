@@ -4,6 +4,7 @@
 #include "layout.glsl"
 
 READS(visibility_cache)
+READS(close_lobes)
 
 #include "visibility/weights.glsl"
 
@@ -35,9 +36,9 @@ void main() {
     uvec2 query = queries[index];
     Lobes lobes = load_lobes(query.x, wave.pixel_count * wave.sample_count, 0u);
     ProductLobe lobe = unpack_lobe(lobe_words(lobes, query.y));
-    load_counts(lobes, query.y / 32u);
+    load_weights(lobes);
+    float visibility = visibility_weight(counts_of(lobes, query.y / 4u), query.y % 4u);
     answers[index] = LobeAnswer(
-        lobe.axis, lobe.bandwidth, lobe.weight, lobe.weight * counted_weight(query.y % 32u),
-        lobes.count, 
-        sum_of_stretch(lobes, (lobes.count - 1u) / LOBES_PER_SUM));
+        lobe.axis, lobe.bandwidth, lobe.weight, lobe.weight * visibility, lobes.count,
+        weight_total(lobes));
 }

@@ -4,6 +4,7 @@
 #include "layout.glsl"
 
 READS(visibility_cache)
+READS(close_lobes)
 
 #include "product/mixture.glsl"
 
@@ -65,7 +66,7 @@ void main() {
     DirectionSample sampled = evaluate_world(vertex, direction);
     MixtureAnswer answer;
     answer.direction = direction;
-    answer.lobe_density = mixture_lobe_density(mixture, direction, false);
+    answer.lobe_density = mixture_lobe_density(mixture, direction);
     answer.pdf = mixture_pdf(mixture, sampled, answer.lobe_density);
     answer.unguided_lobe_density = sum > 0.0 ? unguided / sum : 0.0;
     answer.environment_pdf = sampled.environment_pdf;

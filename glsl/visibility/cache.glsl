@@ -14,7 +14,8 @@ layout(constant_id = CONSTANT_FIXED_THRESHOLD) const uint FIXED_THRESHOLD = 0u;
 layout(constant_id = CONSTANT_CACHE_CAPACITY) const uint CACHE_CAPACITY = 0u;
 layout(constant_id = CONSTANT_CACHE_OF_PIXEL) const uint CACHE_OF_PIXEL = 0u;
 
-// Head bit of a cache that has grown since the last sum of weights. The others count directions.
+// Head bit of a cache that holds the last ray of its hit, which no weights know. The other bits count
+// directions.
 const uint CACHE_GROWN = 0x80000000u;
 const uint MASK_WORDS = (KEPT_LOBES + 31u) / 32u;
 // Deviation of a lobe of bandwidth 20, for the fixed threshold.
@@ -42,7 +43,7 @@ uint cache_head(uint path, uint film_index) {
 }
 
 // Returns the index of a mask word of the direction `entry` of a path. There is room for one more
-// than a cache holds: the direction under way, before it is known to be recorded.
+// than a cache holds: the last ray of a hit, and those that the weights know.
 uint close_lobes_index(uint path, uint path_count, uint entry, uint word) {
     return (entry % (CACHE_CAPACITY + 1u) * MASK_WORDS + word) * path_count + path;
 }

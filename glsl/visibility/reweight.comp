@@ -1,14 +1,13 @@
-// Sums the weights of the lobes at every hit whose visibility cache has grown: lobes, visibility_cache,
-// close_lobes -> lobe_sums. [Wu & Shih 2009], section 4.2. See weights.glsl for the weights.
-//
-// Before a sample's first ray, finds the lobes close to its pixel's cached directions.
+// Finds the lobes of every hit close to the directions cached for its pixel, and sums their weights before
+// the first ray: lobes, visibility_cache -> close_lobes, lobe_sums. [Wu & Shih 2009], section 4.2. See
+// weights.glsl for the weights.
 #version 460
 
 #include "layout.glsl"
 
 WRITES(lobe_sums)
 UPDATES(visibility_cache)
-WRITES(close_lobes)
+UPDATES(close_lobes)
 UPDATES(counters)
 
 #include "visibility/weights.glsl"
@@ -21,19 +20,6 @@ const uint PLACES = CACHE_CAPACITY > 0u ? CACHE_CAPACITY : 1u;
 void write_sum(Lobes lobes, uint l, float sum) {
     for (uint once = is_sum_kept(l, lobes.count) ? 1u : 0u; once > 0u; --once) {
         lobe_sums[l / LOBES_PER_SUM * lobes.path_count + lobes.path] = sum;
-    }
-}
-
-// Sums the current weights in the order in which lobes are chosen.
-void sum_weights(Lobes lobes) {
-    float sum = 0.0;
-    for (uint word = 0u; 32u * word < lobes.count; ++word) {
-        load_counts(lobes, word);
-        uint end = min(lobes.count - 32u * word, 32u);
-        for (uint bit = 0u; bit < end; ++bit) {
-            sum += weight_of_words(lobe_words(lobes, 32u * word + bit)) * counted_weight(bit);
-            write_sum(lobes, 32u * word + bit, sum);
-        }
     }
 }
 
@@ -56,15 +42,15 @@ void sum_with_all_entries(Lobes lobes) {
         for (uint bit = 0u; bit < end; ++bit) {
             ProductLobe lobe = unpack_lobe(lobe_words(lobes, 32u * word + bit));
             float tail = exp(-2.0 * lobe.bandwidth);
-            float close_count = 0.0;
+            uint close_count = 0u;
             for (uint i = 0u; i < CACHE_CAPACITY; ++i) {
                 bool close = i < entries
                     && is_close(
                         lobe.bandwidth, tail, distance_from_axis(lobe.axis, directions[i]));
                 masks[i] |= close ? 1u << bit : 0u;
-                close_count += close ? 1.0 : 0.0;
+                close_count += close ? 1u : 0u;
             }
-            sum += lobe.weight * visibility_weight(close_count);
+            sum += lobe.weight * visibility_weight(close_count, 0u);
             write_sum(lobes, 32u * word + bit, sum);
         }
         for (uint i = 0u; i < entries; ++i) {
@@ -80,28 +66,15 @@ void main() {
     if (path >= path_count) {
         return;
     }
-    uint film_index = 0u;
-    if (CACHE_OF_PIXEL != 0u) {
-        PathIndex index = wave_path(path);
-        if (!index.inside) {
-            return;
-        }
-        film_index = index.film_index;
+    PathIndex index = wave_path(path);
+    if (!index.inside) {
+        return;
     }
-    Lobes lobes = load_lobes(path, path_count, film_index);
+    Lobes lobes = load_lobes(path, path_count, index.film_index);
     if (lobes.count == 0u || lobes.recorded == 0u) {
         return;
     }
-    bool is_new = CACHE_OF_PIXEL != 0u && wave.first_shadow_ray == 0u;
-    bool has_grown = (visibility_cache[lobes.head] & CACHE_GROWN) != 0u;
-    if (!has_grown && !is_new) {
-        return;
-    }
-    if (is_new) {
-        sum_with_all_entries(lobes);
-    } else {
-        sum_weights(lobes);
-    }
+    sum_with_all_entries(lobes);
     visibility_cache[lobes.head] = lobes.recorded;
     atomicAdd(counters.cdf_rebuilds, 1u);
 }

@@ -101,23 +101,30 @@ pub struct Traversal {
 }
 
 impl Traversal {
-    fn kernel(
-        self,
-        shader: &'static str,
-        domain: Domain,
-        schedule: Schedule,
-        mut surfaces: Surfaces,
-    ) -> Kernel {
+    /// Specialization constants of a pass that traverses and knows the surfaces of the scene.
+    pub fn constants(self, mut surfaces: Surfaces) -> Vec<(u32, u32)> {
         if self.is_instanced {
             surfaces.features |= SURFACES_INSTANCED;
         }
         let own = [
             (CONSTANT_TRIANGLE_PAGES, self.page_count),
             (CONSTANT_TRIANGLE_PAGE_SHIFT, self.page_shift),
+        ];
+        [&own[..], &surfaces.constants()].concat()
+    }
+
+    fn kernel(
+        self,
+        shader: &'static str,
+        domain: Domain,
+        schedule: Schedule,
+        surfaces: Surfaces,
+    ) -> Kernel {
+        let own = [
             (CONSTANT_RAYS_PER_INVOCATION, schedule.rays_per_invocation),
             (CONSTANT_REFILL_LANES, schedule.refill_lanes),
         ];
-        let constants = [&own[..], &surfaces.constants()].concat();
+        let constants = [&own[..], &self.constants(surfaces)].concat();
         let per_invocation = schedule.rays_per_invocation;
         Kernel { per_invocation, ..Kernel::new(shader, domain, &constants) }
     }

@@ -143,7 +143,9 @@ pub fn wave_order(
                 for kernel in steps.sample(&wave) {
                     add(kernel, &wave);
                 }
-                add(traversal.shadow(incoherent, surfaces), &wave);
+                if !steps.traces() {
+                    add(traversal.shadow(incoherent, surfaces), &wave);
+                }
                 for kernel in steps.after_shadow_rays(&wave) {
                     add(kernel, &wave);
                 }

@@ -34,6 +34,11 @@ pub trait Steps {
         Vec::new()
     }
 
+    /// True if the passes of [`Steps::sample`] trace the shadow rays that they choose.
+    fn traces(&self) -> bool {
+        false
+    }
+
     /// Passes that choose the directions of a group of shadow rays.
     fn sample(&self, wave: &Wave) -> Vec<Kernel>;
 

@@ -18,7 +18,7 @@ constants! {
     /// Invocations of a workgroup along x; every pass is one-dimensional.
     WORKGROUP_SIZE = 64;
 
-    // Specialization constants of `trace` and `shadow`.
+    // Specialization constants of `trace`, `shadow` and, but for the last two, `sample_and_trace`.
     /// Number of triangle pages in use.
     CONSTANT_TRIANGLE_PAGES = 0;
     /// Base-2 logarithm of the triangles per page.
@@ -41,7 +41,7 @@ constants! {
     CONSTANT_ATTRIBUTES = 8;
 
     // Specialization constants of the sampling and bounce passes.
-    /// Sampler of `sample` or `sample_lobes`, `SAMPLER_…`.
+    /// Sampler of `sample`, `SAMPLER_…`.
     CONSTANT_SAMPLER = 16;
     /// Candidates per shadow ray in `sample` and `sample_guided`.
     CONSTANT_CANDIDATES = 17;
@@ -83,7 +83,7 @@ constants! {
     /// Logarithm of an environment lobe's largest integral over 2π or largest amplitude, bits of a float.
     CONSTANT_STRONGEST_ENVIRONMENT_LOBE = 46;
 
-    // Specialization constants of `sample_lobes`.
+    // Specialization constants of `sample_lobes` and `sample_and_trace`.
     /// Share of directions from the BRDF, bits of a float.
     CONSTANT_BRDF_SHARE = 39;
     /// Share of directions from the environment map, bits of a float.
@@ -144,12 +144,6 @@ constants! {
     SAMPLER_MIS = 4;
     /// Resampling over the candidates of `mis`.
     SAMPLER_RIS = 5;
-    /// Lobes of the product of environment and BRDF.
-    SAMPLER_PRODUCT = 6;
-    /// The same with visibility caches.
-    SAMPLER_VISIBILITY = 7;
-    /// Learned visibility; a shader of its own.
-    SAMPLER_GUIDED = 8;
 
     // Values of CONSTANT_READING.
     /// Density of all lobes with their weights in force.

@@ -10,8 +10,8 @@ use crate::{
         constants::{
             CONSTANT_BRDF_LOBES, CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_LOBES,
             CONSTANT_ENVIRONMENT_SHARE, CONSTANT_KEPT_LOBES, CONSTANT_METROPOLIS,
-            CONSTANT_ORDER_BY_COEFFICIENT, CONSTANT_READING, CONSTANT_SAMPLER,
-            CONSTANT_STRONGEST_ENVIRONMENT_LOBE, CONSTANT_VIEWS, SAMPLER_PRODUCT,
+            CONSTANT_ORDER_BY_COEFFICIENT, CONSTANT_READING, CONSTANT_STRONGEST_ENVIRONMENT_LOBE,
+            CONSTANT_VIEWS,
         },
         structs::Wave,
     },
@@ -26,8 +26,6 @@ pub struct ProductSteps {
     pub fits: FitSizes,
     /// Specialization by the surfaces of the scene.
     pub surfaces: Surfaces,
-    /// Tag of the sampler, `SAMPLER_…`.
-    pub sampler: u32,
     /// Specialization of the visibility cache; empty without one.
     pub cache: Vec<(u32, u32)>,
 }
@@ -35,7 +33,7 @@ pub struct ProductSteps {
 impl ProductSteps {
     /// Returns the steps of `product`.
     pub fn new(parameters: ProductParameters, fits: FitSizes, surfaces: Surfaces) -> Self {
-        Self { parameters, fits, surfaces, sampler: SAMPLER_PRODUCT, cache: Vec::new() }
+        Self { parameters, fits, surfaces, cache: Vec::new() }
     }
 
     /// Makes a kernel over paths that knows lobes and cache.
@@ -44,6 +42,18 @@ impl ProductSteps {
         all.extend(&self.cache);
         all.extend(constants);
         Kernel::new(shader, Domain::Paths, &all)
+    }
+
+    /// Specialization of the passes that draw from the mixture.
+    pub fn mixture_constants(&self) -> [(u32, u32); 4] {
+        let [brdf_share, environment_share] = self.parameters.shares();
+        let walks = self.parameters.elevation == Elevation::Metropolis;
+        [
+            (CONSTANT_BRDF_SHARE, brdf_share.to_bits()),
+            (CONSTANT_ENVIRONMENT_SHARE, environment_share.to_bits()),
+            (CONSTANT_METROPOLIS, u32::from(walks)),
+            (CONSTANT_READING, self.parameters.reading.tag()),
+        ]
     }
 }
 
@@ -66,15 +76,7 @@ impl Steps for ProductSteps {
     }
 
     fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
-        let [brdf_share, environment_share] = self.parameters.shares();
-        let walks = self.parameters.elevation == Elevation::Metropolis;
-        let own = [
-            (CONSTANT_SAMPLER, self.sampler),
-            (CONSTANT_BRDF_SHARE, brdf_share.to_bits()),
-            (CONSTANT_ENVIRONMENT_SHARE, environment_share.to_bits()),
-            (CONSTANT_METROPOLIS, u32::from(walks)),
-            (CONSTANT_READING, self.parameters.reading.tag()),
-        ];
-        vec![self.kernel("sample_lobes", &[&own[..], &self.surfaces.constants()].concat())]
+        let constants = [&self.mixture_constants()[..], &self.surfaces.constants()].concat();
+        vec![self.kernel("sample_lobes", &constants)]
     }
 }

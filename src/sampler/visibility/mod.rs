@@ -1,7 +1,8 @@
 //! Visibility guidance: product sampling with less weight on lobes near blocked directions.
 //!
-//! After each shadow ray `record_blocked.comp` records a blocked direction in the visibility cache of
-//! the hit, and `reweight.comp` sums the weights of the lobes anew. \[Wu & Shih 2009\], the thesis.
+//! `sample_and_trace.comp` draws the shadow rays of a hit one after another, records blocked ones in the
+//! visibility cache of the hit and lowers the weights of the lobes close to them. \[Wu & Shih 2009\], the
+//! thesis.
 
 mod parameters;
 mod record;
@@ -63,6 +64,7 @@ impl Room for VisibilityRoom {
             parameters.product,
             fits.sizes(),
             settings.surfaces,
+            settings.traversal,
             settings.shadow_rays,
         );
         let window = runner.scene().window();

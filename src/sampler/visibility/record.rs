@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::Visibility;
 use crate::{error::Result, math::octahedron, pass::BLOCK_PIXELS};
 
-/// Head bit of a cache that has grown since weights were last summed; twin of `cache.glsl`.
+/// Head bit of a cache that holds the last ray of its hit; twin of `cache.glsl`.
 const CACHE_GROWN: u32 = 1 << 31;
 
 impl Visibility {

@@ -1,14 +1,13 @@
-//! Passes of visibility guidance: `record_blocked` and `reweight` after each single shadow ray.
+//! Passes of visibility guidance: `sample_and_trace` draws, traces and records the rays of a hit in turn.
 
 use super::parameters::{CacheScope, Threshold, VisibilityParameters};
 use crate::{
-    pass::{Domain, Kernel, Steps, Surfaces},
+    pass::{Domain, Kernel, Steps, Surfaces, geometry::Traversal},
     sampler::product::{FitSizes, ProductParameters, ProductSteps},
     shader::{
         constants::{
             AOV_CACHE_ENTRIES, CONSTANT_CACHE_CAPACITY, CONSTANT_CACHE_OF_PIXEL,
             CONSTANT_FIXED_THRESHOLD, CONSTANT_THRESHOLD_SCALE, CONSTANT_VISIBILITY_EXPONENT,
-            SAMPLER_VISIBILITY,
         },
         structs::Wave,
     },
@@ -19,6 +18,7 @@ use crate::{
 pub struct VisibilitySteps {
     product: ProductSteps,
     scope: CacheScope,
+    traversal: Traversal,
 }
 
 impl VisibilitySteps {
@@ -28,6 +28,7 @@ impl VisibilitySteps {
         product: ProductParameters,
         fits: FitSizes,
         surfaces: Surfaces,
+        traversal: Traversal,
         shadow_rays: u32,
     ) -> Self {
         let VisibilityParameters { exponent, threshold_scale, threshold, cache, .. } = parameters;
@@ -38,19 +39,15 @@ impl VisibilitySteps {
             (CONSTANT_CACHE_OF_PIXEL, u32::from(cache == CacheScope::Pixel)),
             (CONSTANT_VISIBILITY_EXPONENT, exponent.to_bits()),
         ];
-        let product = ProductSteps {
-            sampler: SAMPLER_VISIBILITY,
-            cache: constants,
-            ..ProductSteps::new(product, fits, surfaces)
-        };
-        Self { product, scope: cache }
+        let product =
+            ProductSteps { cache: constants, ..ProductSteps::new(product, fits, surfaces) };
+        Self { product, scope: cache, traversal }
     }
 }
 
 impl Steps for VisibilitySteps {
-    /// One, since each shadow ray teaches the next.
-    fn rays_per_group(&self) -> u32 {
-        1
+    fn traces(&self) -> bool {
+        true
     }
 
     fn prepare(&self, wave: &Wave) -> Vec<Kernel> {
@@ -61,21 +58,10 @@ impl Steps for VisibilitySteps {
         kernels
     }
 
-    fn sample(&self, wave: &Wave) -> Vec<Kernel> {
-        self.product.sample(wave)
-    }
-
-    fn after_shadow_rays(&self, wave: &Wave) -> Vec<Kernel> {
-        let is_last = wave.first_shadow_ray + wave.shadow_ray_count >= wave.total_shadow_rays;
-        let mut kernels = Vec::new();
-        // Only the pixel's next sample can use the last ray of a hit.
-        if !is_last || self.scope == CacheScope::Pixel {
-            kernels.push(self.product.kernel("record_blocked", &[]));
-        }
-        if !is_last {
-            kernels.push(self.product.kernel("reweight", &[]));
-        }
-        kernels
+    fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
+        let surfaces = self.traversal.constants(self.product.surfaces);
+        let constants = [&self.product.mixture_constants()[..], &surfaces].concat();
+        vec![self.product.kernel("sample_and_trace", &constants)]
     }
 
     fn finish(&self, wave: &Wave) -> Vec<Kernel> {

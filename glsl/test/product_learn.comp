@@ -1,0 +1,32 @@
+// Teaches the cache of every path the outcome of its shadow ray, as sample_and_trace.comp does. For
+// tests/product.rs.
+#version 460
+
+#include "layout.glsl"
+
+UPDATES(visibility_cache)
+UPDATES(close_lobes)
+READS(visibility)
+
+#include "product/mixture.glsl"
+#include "visibility/record.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {
+    float densities[];
+};
+
+void main() {
+    uint path = gl_GlobalInvocationID.x;
+    if (path >= wave_path_count()) {
+        return;
+    }
+    Mixture mixture = load_mixture(path, wave_path_count(), 0u);
+    vec3 direction = load_shadow_ray(path).direction;
+    densities[path] = mixture_lobe_density(mixture, direction);
+    if (visibility[path] == 0u) {
+        record_blocked(mixture.lobes, direction);
+        store_weights(mixture.lobes, 0u);
+    }
+}
