@@ -45,7 +45,7 @@ impl Steps for ControlledSteps {
         true
     }
 
-    /// What `sample_controlled` adds to a path is in no shadow ray that another pixel could share.
+    /// False: light that `sample_controlled` adds to a path is in no shadow ray that a pixel could share.
     fn shares_paths(&self) -> bool {
         false
     }
