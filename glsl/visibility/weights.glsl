@@ -62,24 +62,23 @@ Lobes load_lobes(uint path, uint path_count, uint film_index) {
 
 // Loads the counts as earlier passes left them.
 void load_counts(Lobes lobes) {
-    for (uint quad = 0u; quad < QUADS; ++quad) {
-        close_counts[quad] = 0u;
-    }
     // The cache of a hit holds no more than its rays so far.
     uint most =
         CACHE_OF_PIXEL != 0u ? CACHE_CAPACITY : min(CACHE_CAPACITY, wave.first_shadow_ray);
     most = min(most, lobes.recorded);
-    for (uint i = 0u; i < most; ++i) {
-        uint entry = lobes.recorded - 1u - i;
-        for (uint word = 0u; word < MASK_WORDS; ++word) {
+    for (uint word = 0u; word < MASK_WORDS; ++word) {
+        uint counts[8] = uint[](0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
+        for (uint i = 0u; i < most; ++i) {
+            uint entry = lobes.recorded - 1u - i;
             uint mask = texelFetch(
                 close_lobe_texels,
                 int(close_lobes_index(lobes.path, lobes.path_count, entry, word))).x;
-            uint end = min(8u * word + 8u, QUADS);
-            for (uint quad = 8u * word; quad < end; ++quad) {
-                close_counts[quad] += bytes_of_bits(mask);
-                mask >>= 4u;
+            for (uint quad = 0u; quad < 8u; ++quad) {
+                counts[quad] += bytes_of_bits(mask >> (4u * quad));
             }
+        }
+        for (uint quad = 0u; quad < min(8u, QUADS - 8u * word); ++quad) {
+            close_counts[8u * word + quad] = counts[quad];
         }
     }
 }
