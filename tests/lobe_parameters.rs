@@ -27,7 +27,7 @@ use support::{
 /// Applies `--set` assignments on top of few lobes.
 fn parameters(assignments: &[&str]) -> Parameters {
     let mut parameters = Parameters::default();
-    // A preset replaces all parameters, so it comes first and the numbers of lobes after it.
+    // A preset comes first, and the numbers of lobes after it.
     let (presets, others): (Vec<&str>, Vec<&str>) =
         assignments.iter().partition(|assignment| assignment.starts_with("preset="));
     let few = ["environment-lobes=40", "brdf-lobes=8", "views=16", "lobes=32"];

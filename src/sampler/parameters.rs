@@ -82,8 +82,15 @@ const KNOBS: &[Knob<Parameters>] = &[
                 ("strict", ProductParameters::strict()),
             ];
             knob::choice(&mut product, value, &presets)?;
+            let is_preset = presets.iter().any(|(_, preset)| parameters.product == *preset)
+                && parameters.visibility == VisibilityParameters::default();
+            if !is_preset {
+                return Err(
+                    "it ahead of other parameters of product and visibility, all of which it sets"
+                        .into(),
+                );
+            }
             parameters.product = product;
-            parameters.visibility = VisibilityParameters::default();
             Ok(())
         },
         get: |_| String::new(),
@@ -220,16 +227,19 @@ mod tests {
     }
 
     #[test]
-    fn a_preset_replaces_all() {
+    fn a_preset_replaces_no_parameter_that_was_set() {
         let mut parameters = Parameters::default();
-        for assignment in ["order=coefficient", "k=1", "cache=pixel"] {
-            parameters.set(assignment).unwrap();
-        }
-        assert_ne!(parameters, Parameters::default());
         parameters.set("preset=strict").unwrap();
         assert_eq!(parameters.product, ProductParameters::strict());
-        assert_eq!(parameters.visibility, VisibilityParameters::default());
         parameters.set("preset=default").unwrap();
         assert_eq!(parameters, Parameters::default());
+        for assignment in ["order=coefficient", "k=1", "cache=pixel"] {
+            let mut parameters = Parameters::default();
+            parameters.set(assignment).unwrap();
+            let before = parameters;
+            let error = parameters.set("preset=strict").unwrap_err().to_string();
+            assert!(error.contains("--set preset=strict: expected it ahead of"), "{error}");
+            assert_eq!(parameters, before);
+        }
     }
 }
