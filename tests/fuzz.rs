@@ -16,7 +16,7 @@ mod seeds;
 use std::{env, fs, path::Path};
 
 use fenestra::{
-    brdf::MeasuredTable,
+    brdf::{MeasuredTable, cornell},
     command::options::{parse_duration, parse_size},
     files::hexadecimal,
     film::{Checkpoint, Image},
@@ -182,6 +182,9 @@ fn targets() -> Vec<Target> {
         },
         target("merl", "input.binary", vec![merl()], |path, _| MeasuredTable::load(path).is_ok()),
         target("cornell", "input.brdf", texts(&[seeds::CORNELL]), |path, _| {
+            cornell::read(path).is_ok()
+        }),
+        target("cornell-table", "input.brdf", texts(&[seeds::CORNELL]), |path, _| {
             MeasuredTable::load(path).is_ok()
         }),
         target("hdr", "input.hdr", vec![seeds::hdr(false), seeds::hdr(true)], map),

@@ -66,6 +66,19 @@ struct Number {
 /// Omits records with values that are not finite or with a direction below the surface, and counts
 /// them in the table's warnings.
 pub fn load(path: &Path) -> Result<MeasuredTable> {
+    let (samples, left_out) = read(path)?;
+    let mut table = MeasuredTable::from_cells(bake(&samples))
+        .map_err(|message| Error::format(path, message))?;
+    if left_out > 0 {
+        table.warnings.push(format!(
+            "{left_out} records that are not finite or below the surface were left out"
+        ));
+    }
+    Ok(table)
+}
+
+/// Reads the samples of a `.brdf` file, and the number of records that were left out.
+pub fn read(path: &Path) -> Result<(SampleSet, usize)> {
     let text = String::from_utf8(files::read(path)?).map_err(|error| {
         Error::format(
             path,
@@ -83,15 +96,7 @@ pub fn load(path: &Path) -> Result<MeasuredTable> {
             "no usable record: all are below the surface or not finite",
         ));
     }
-    let samples = SampleSet::new(samples);
-    let mut table = MeasuredTable::from_cells(bake(&samples))
-        .map_err(|message| Error::format(path, message))?;
-    if left_out > 0 {
-        table.warnings.push(format!(
-            "{left_out} records that are not finite or below the surface were left out"
-        ));
-    }
-    Ok(table)
+    Ok((SampleSet::new(samples), left_out))
 }
 
 /// Interpolates the samples at the bin centres of the grid. The coordinates of the interpolation
@@ -216,8 +221,8 @@ fn mapped_point(outgoing: Vec3, incident: Vec3) -> Vec3 {
     )
 }
 
-/// Samples sorted by their first coordinate, so that a search visits only a slab.
-struct SampleSet {
+/// Measured samples, sorted by their first coordinate, so that a search visits only a slab.
+pub struct SampleSet {
     samples: Vec<Sample>,
 }
 

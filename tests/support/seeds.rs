@@ -78,7 +78,7 @@ width = 8
 height = 8
 filter = "gaussian"
 [environment]
-sky = { sun_elevation_deg = 30.0 }
+sky = { width = 16, sun_elevation_deg = 30.0 }
 [[material]]
 name = "m"
 type = "diffuse"
