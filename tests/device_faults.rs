@@ -87,6 +87,20 @@ fn a_lost_device_ends_in_one_message_and_keeps_the_checkpoint() {
     assert!(kept >= 2, "{kept} devices were lost after a checkpoint");
 }
 
+/// A process that was stopped finds its wait over, and goes on.
+#[test]
+fn waits_that_end_early_are_repeated_before_a_pass_is_given_up() {
+    let folder = folder();
+    let options = ["-q", "--sampler=mis", "--spp=2"];
+    let picture = || Image::read_exr(&folder.path().join("out.exr")).unwrap().channels;
+    render(&folder, &[], &options).assert(0, &[]);
+    let expected = picture();
+    render(&folder, &[("FAULTY_WAITS", 119)], &options).assert(0, &[]);
+    assert!(picture() == expected);
+    let run = render(&folder, &[("FAULTY_WAITS", 120)], &options);
+    run.assert(1, &["error: ", "took longer than 120 s"]);
+}
+
 /// The driver frees memory twice where `vkCreateDevice` finds too little.
 #[test]
 fn a_limit_of_address_space_is_an_error_before_the_driver_is_loaded() {

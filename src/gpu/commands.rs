@@ -16,8 +16,12 @@ use super::{
 use crate::error::{Error, Result};
 use crate::shader::constants::WORKGROUP_SIZE;
 
-/// Timeout of one submission; dispatches are sized to take about a tenth of a second.
-const SUBMISSION_TIMEOUT: Duration = Duration::from_secs(120);
+/// Waits for one submission before it is given up; dispatches are sized to take about a tenth of a
+/// second. The clock of a wait goes on while the process is stopped or the machine sleeps, so that
+/// one long wait would end then.
+const SUBMISSION_WAITS: u32 = 120;
+/// Length of each of them.
+const SUBMISSION_WAIT: Duration = Duration::from_secs(1);
 
 /// A command buffer that is recorded, submitted once and dropped.
 pub struct Commands {
@@ -248,16 +252,25 @@ impl Commands {
             let submit = vk::SubmitInfo::default().command_buffers(&buffers);
             raw.queue_submit(*queue, &[submit], self.fence)
                 .map_err(|result| failed("vkQueueSubmit", result))?;
-            let timeout = u64::try_from(SUBMISSION_TIMEOUT.as_nanos()).unwrap_or(u64::MAX);
-            match raw.wait_for_fences(&[self.fence], true, timeout) {
+            let timeout = u64::try_from(SUBMISSION_WAIT.as_nanos()).unwrap_or(u64::MAX);
+            let wait = || raw.wait_for_fences(&[self.fence], true, timeout);
+            let mut outcome = wait();
+            for _ in 1..SUBMISSION_WAITS {
+                if outcome != Err(vk::Result::TIMEOUT) {
+                    break;
+                }
+                outcome = wait();
+            }
+            match outcome {
                 Ok(()) => {}
                 Err(vk::Result::TIMEOUT) => {
                     // The commands may still use the callers' objects, so the device must be idle
                     // before this returns.
                     raw.device_wait_idle().map_err(|result| failed("vkDeviceWaitIdle", result))?;
+                    let seconds = SUBMISSION_WAITS * SUBMISSION_WAIT.as_secs() as u32;
                     return Err(Error::Vulkan {
                         call: format!("pass {}", self.last_pass),
-                        result: format!("took longer than {} s", SUBMISSION_TIMEOUT.as_secs()),
+                        result: format!("took longer than {seconds} s"),
                     });
                 }
                 Err(result) => return Err(failed("vkWaitForFences", result)),

@@ -2,6 +2,7 @@
  *
  * FAULTY_BYTES: allocations that exceed this many bytes together fail.
  * FAULTY_SUBMISSION: this submission, counted from 1, and all after it find the device lost.
+ * FAULTY_WAITS: so many waits for a fence, counted from the first, time out.
  *
  * One instance and one device. The few types of the loader's interface are declared here, so that
  * the test needs no headers of Vulkan. */
@@ -11,7 +12,7 @@
 
 #define EXPORT __attribute__((visibility("default")))
 
-enum { OUT_OF_DEVICE_MEMORY = -2, DEVICE_LOST = -4, INITIALIZATION_FAILED = -3 };
+enum { TIMEOUT = 2, OUT_OF_DEVICE_MEMORY = -2, DEVICE_LOST = -4, INITIALIZATION_FAILED = -3 };
 enum { INSTANCE_CHAIN = 47, DEVICE_CHAIN = 48, LAYER_LINK = 0 };
 
 typedef void (*Function)(void);
@@ -46,7 +47,7 @@ typedef struct {
 
 static void *instance;
 static GetAddress next_instance_address, next_device_address;
-static uint64_t allocated_bytes, submissions;
+static uint64_t allocated_bytes, submissions, waits;
 static struct { void *memory; uint64_t size; } live[1024];
 
 static uint64_t setting(const char *name)
@@ -123,12 +124,26 @@ static int32_t submit(void *queue, uint32_t count, const void *infos, void *fenc
     return next_submit(queue, count, infos, fence);
 }
 
+static int32_t (*next_wait)(void *, uint32_t, const void *, uint32_t, uint64_t);
+
+static int32_t wait_for_fences(void *device, uint32_t count, const void *fences, uint32_t all,
+                               uint64_t timeout)
+{
+    const uint64_t late = setting("FAULTY_WAITS");
+    int32_t result = next_wait(device, count, fences, all, timeout);
+    return late != UINT64_MAX && ++waits <= late ? TIMEOUT : result;
+}
+
 static Function device_address(void *device, const char *name)
 {
     if (!strcmp(name, "vkGetDeviceProcAddr")) return (Function)device_address;
     if (!strcmp(name, "vkAllocateMemory")) return (Function)allocate;
     if (!strcmp(name, "vkFreeMemory")) return (Function)release;
     Function next = next_device_address(device, name);
+    if (!strcmp(name, "vkWaitForFences")) {
+        next_wait = (void *)next;
+        return (Function)wait_for_fences;
+    }
     if (strcmp(name, "vkQueueSubmit")) return next;
     next_submit = (void *)next;
     return (Function)submit;
