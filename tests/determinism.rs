@@ -77,7 +77,7 @@ fn a_full_table_of_missing_cells_gives_the_same_bits() {
         renderer.sums().unwrap()
     };
     let first = render();
-    for repetition in 1..6 {
+    for repetition in 1..4 {
         assert!(first == render(), "repetition {repetition} differs");
     }
 }

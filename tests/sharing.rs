@@ -130,7 +130,7 @@ fn in_a_room_of_plastic_and_of_paint() {
         Material::new("paint", kind)
     };
     let scene = scenes::room(vec![paint(0.4), scenes::plastic(0.2), paint(0.1)]);
-    agrees(&scene, &[(Sampler::Mis, "8"), (Sampler::Guided, "4")], 48, &base(3));
+    agrees(&scene, &[(Sampler::Mis, "8"), (Sampler::Guided, "4")], 32, &base(3));
 }
 
 #[test]
@@ -138,15 +138,15 @@ fn with_roulette_from_the_first_bounce_on() {
     let _alone = support::alone();
     let scene = scenes::room(vec![scenes::diffuse(Vec3::new(0.8, 0.5, 0.3))]);
     let roulette = Settings { roulette: Roulette { vertex: 1, throughput: 1.0 }, ..base(5) };
-    agrees(&scene, &[(Sampler::Mis, "4"), (Sampler::Guided, "8")], 48, &roulette);
+    agrees(&scene, &[(Sampler::Mis, "4"), (Sampler::Guided, "8")], 32, &roulette);
 }
 
 #[test]
 fn with_lamps_panes_mirrors_and_sheets() {
     let _alone = support::alone();
     let scene = scenes::glazed_room();
-    agrees(&scene, &[(Sampler::Guided, "8")], 48, &base(4));
-    agrees(&scene, &[(Sampler::Mis, "8")], 48, &base(2));
+    agrees(&scene, &[(Sampler::Guided, "8")], 24, &base(4));
+    agrees(&scene, &[(Sampler::Mis, "8")], 24, &base(2));
 }
 
 #[test]

@@ -12,6 +12,7 @@ use winit::raw_window_handle::RawDisplayHandle;
 use super::{
     capabilities::{Capabilities, choose, enumerate},
     instance::Instance,
+    pipeline::Pipelines,
     pipeline_cache::PipelineCache,
     set_layouts::SetLayouts,
     vulkan_error,
@@ -27,6 +28,7 @@ pub struct Device {
     physical: vk::PhysicalDevice,
     set_layouts: SetLayouts,
     pipeline_cache: PipelineCache,
+    pipelines: Pipelines,
     // Emptied in `drop`, before the device is destroyed.
     allocator: Mutex<Option<Allocator>>,
     // Last: the instance must outlive the device.
@@ -118,6 +120,7 @@ impl Device {
             physical,
             set_layouts,
             pipeline_cache,
+            pipelines: Pipelines::default(),
             allocator: Mutex::new(Some(allocator)),
             instance,
         }))
@@ -169,6 +172,10 @@ impl Device {
         &self.set_layouts
     }
 
+    pub(super) fn pipelines(&self) -> &Pipelines {
+        &self.pipelines
+    }
+
     pub(super) fn pipeline_cache(&self) -> vk::PipelineCache {
         self.pipeline_cache.raw()
     }
@@ -186,6 +193,7 @@ impl Drop for Device {
         unsafe {
             drop(self.allocator().take());
             self.set_layouts.destroy(&self.raw);
+            self.pipelines.destroy(&self.raw);
             self.pipeline_cache.destroy(&self.raw);
             self.raw.destroy_device(None);
         }

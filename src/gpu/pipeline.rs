@@ -1,29 +1,113 @@
-//! Compute pipelines with specialization constants.
+//! Compute pipelines with specialization constants, made once for each device.
 
-use std::{ffi::CStr, sync::Arc};
+use std::{
+    collections::HashMap,
+    ffi::CStr,
+    sync::{Arc, Mutex, PoisonError},
+};
 
 use ash::vk;
+use sha2::{Digest, Sha256};
 
 use super::{descriptors::DescriptorSet, device::Device, labels, vulkan_error};
 use crate::{error::Result, shader::spirv::used_bindings};
 
 /// A compute pipeline.
 pub struct Pipeline {
+    made: Made,
+    name: String,
+    /// Keeps the pipeline's owner.
+    _device: Arc<Device>,
+}
+
+/// The pipelines of a device. They live as long as it does, so that renderers that follow each other,
+/// as in a window or a study, do not translate the same shaders again.
+#[derive(Default)]
+pub(super) struct Pipelines {
+    made: Mutex<HashMap<Key, Made>>,
+}
+
+#[derive(PartialEq, Eq, Hash)]
+struct Key {
+    name: String,
+    /// SHA-256 of the SPIR-V.
+    code: [u8; 32],
+    constants: Vec<(u32, u32)>,
+}
+
+#[derive(Clone, Copy)]
+struct Made {
     raw: vk::Pipeline,
     layout: vk::PipelineLayout,
-    name: String,
     /// Number of a buffer that the shader uses, for each descriptor set.
     used: [Option<u32>; 4],
-    device: Arc<Device>,
+}
+
+impl Pipelines {
+    /// # Safety
+    /// The device must be alive and idle, and no [`Pipeline`] of it left.
+    pub(super) unsafe fn destroy(&self, device: &ash::Device) {
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        for (_, made) in made.drain() {
+            // SAFETY: promised by the caller.
+            unsafe {
+                device.destroy_pipeline(made.raw, None);
+                device.destroy_pipeline_layout(made.layout, None);
+            }
+        }
+    }
 }
 
 impl Pipeline {
-    /// Creates a pipeline from `spirv`, with specialization constants as (`constant_id`, 32-bit
-    /// value).
+    /// Makes a pipeline from `spirv`, with specialization constants as (`constant_id`, 32-bit value),
+    /// or takes the one that was made from them before.
     ///
     /// # Errors
     /// [`Error::Vulkan`](crate::Error::Vulkan) if a call fails.
     pub fn new(
+        device: &Arc<Device>,
+        name: &str,
+        spirv: &[u8],
+        constants: &[(u32, u32)],
+    ) -> Result<Self> {
+        let key = Key {
+            name: name.to_owned(),
+            code: Sha256::digest(spirv).into(),
+            constants: constants.to_vec(),
+        };
+        let mut known = device.pipelines().made.lock().unwrap_or_else(PoisonError::into_inner);
+        let made = if let Some(made) = known.get(&key) {
+            *made
+        } else {
+            let made = Made::new(device, name, spirv, constants)?;
+            known.insert(key, made);
+            made
+        };
+        drop(known);
+        Ok(Self { made, name: name.to_owned(), _device: Arc::clone(device) })
+    }
+
+    /// Name of the pass.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Returns true if the shader uses buffers of this descriptor set.
+    pub fn uses(&self, set: &DescriptorSet) -> bool {
+        self.made.used[set.index() as usize].is_some_and(|number| set.has(number))
+    }
+
+    pub(super) fn raw(&self) -> vk::Pipeline {
+        self.made.raw
+    }
+
+    pub(super) fn layout(&self) -> vk::PipelineLayout {
+        self.made.layout
+    }
+}
+
+impl Made {
+    fn new(
         device: &Arc<Device>,
         name: &str,
         spirv: &[u8],
@@ -41,89 +125,60 @@ impl Pipeline {
         let layout_info = vk::PipelineLayoutCreateInfo::default()
             .set_layouts(&layouts)
             .push_constant_ranges(&push_constants);
-        let raw_device = device.raw();
         // SAFETY: the set layouts live as long as the device.
-        let layout = unsafe { raw_device.create_pipeline_layout(&layout_info, None) }
+        let layout = unsafe { device.raw().create_pipeline_layout(&layout_info, None) }
             .map_err(|result| vulkan_error(&format!("vkCreatePipelineLayout({name})"), result))?;
-        // From here on `Drop` cleans up.
-        let mut pipeline = Self {
-            raw: vk::Pipeline::null(),
-            layout,
-            name: name.to_owned(),
-            used: first_used.map(|used| used.map(|(_, number)| *number)),
-            device: Arc::clone(device),
-        };
-
-        let module_info = vk::ShaderModuleCreateInfo::default().code(&words);
-        // SAFETY: `words` is SPIR-V that the build compiled.
-        let module = unsafe { raw_device.create_shader_module(&module_info, None) }
-            .map_err(|result| vulkan_error(&format!("vkCreateShaderModule({name})"), result))?;
-        let entries: Vec<_> = constants
-            .iter()
-            .enumerate()
-            .map(|(position, (id, _))| {
-                vk::SpecializationMapEntry::default()
-                    .constant_id(*id)
-                    .offset(u32::try_from(4 * position).unwrap_or(u32::MAX))
-                    .size(4)
-            })
-            .collect();
-        let values: Vec<u32> = constants.iter().map(|(_, value)| *value).collect();
-        let specialization = vk::SpecializationInfo::default()
-            .map_entries(&entries)
-            .data(bytemuck::cast_slice(&values));
-        const MAIN: &CStr = c"main";
-        let stage = vk::PipelineShaderStageCreateInfo::default()
-            .stage(vk::ShaderStageFlags::COMPUTE)
-            .module(module)
-            .name(MAIN)
-            .specialization_info(&specialization);
-        let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
-        let queue = device.queue();
-        // SAFETY: module, layout and cache are alive; the module is not needed afterwards.
-        let result = unsafe {
-            let result = raw_device.create_compute_pipelines(device.pipeline_cache(), &info, None);
-            raw_device.destroy_shader_module(module, None);
-            result
-        };
-        drop(queue);
-        pipeline.raw = result
-            .map_err(|(_, result)| {
-                vulkan_error(&format!("vkCreateComputePipelines({name})"), result)
-            })?
-            .first()
-            .copied()
-            .unwrap_or_default();
-        labels::name_object(device, pipeline.raw, name);
-        Ok(pipeline)
-    }
-
-    /// Name of the pass.
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// Returns true if the shader uses buffers of this descriptor set.
-    pub fn uses(&self, set: &DescriptorSet) -> bool {
-        self.used[set.index() as usize].is_some_and(|number| set.has(number))
-    }
-
-    pub(super) fn raw(&self) -> vk::Pipeline {
-        self.raw
-    }
-
-    pub(super) fn layout(&self) -> vk::PipelineLayout {
-        self.layout
+        let raw = compile(device, name, &words, constants, layout).inspect_err(|_| {
+            // SAFETY: nothing uses the layout of a pipeline that was not made.
+            unsafe { device.raw().destroy_pipeline_layout(layout, None) };
+        })?;
+        labels::name_object(device, raw, name);
+        Ok(Self { raw, layout, used: first_used.map(|used| used.map(|(_, number)| *number)) })
     }
 }
 
-impl Drop for Pipeline {
-    fn drop(&mut self) {
-        let _queue = self.device.queue();
-        // SAFETY: every submission has been waited for; destroying null handles is allowed.
-        unsafe {
-            self.device.raw().destroy_pipeline(self.raw, None);
-            self.device.raw().destroy_pipeline_layout(self.layout, None);
-        }
-    }
+fn compile(
+    device: &Device,
+    name: &str,
+    words: &[u32],
+    constants: &[(u32, u32)],
+    layout: vk::PipelineLayout,
+) -> Result<vk::Pipeline> {
+    let raw_device = device.raw();
+    let module_info = vk::ShaderModuleCreateInfo::default().code(words);
+    // SAFETY: `words` is SPIR-V that the build compiled.
+    let module = unsafe { raw_device.create_shader_module(&module_info, None) }
+        .map_err(|result| vulkan_error(&format!("vkCreateShaderModule({name})"), result))?;
+    let entries: Vec<_> = constants
+        .iter()
+        .enumerate()
+        .map(|(position, (id, _))| {
+            vk::SpecializationMapEntry::default()
+                .constant_id(*id)
+                .offset(u32::try_from(4 * position).unwrap_or(u32::MAX))
+                .size(4)
+        })
+        .collect();
+    let values: Vec<u32> = constants.iter().map(|(_, value)| *value).collect();
+    let specialization =
+        vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&values));
+    const MAIN: &CStr = c"main";
+    let stage = vk::PipelineShaderStageCreateInfo::default()
+        .stage(vk::ShaderStageFlags::COMPUTE)
+        .module(module)
+        .name(MAIN)
+        .specialization_info(&specialization);
+    let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
+    let queue = device.queue();
+    // SAFETY: module, layout and cache are alive; the module is not needed afterwards.
+    let result = unsafe {
+        let result = raw_device.create_compute_pipelines(device.pipeline_cache(), &info, None);
+        raw_device.destroy_shader_module(module, None);
+        result
+    };
+    drop(queue);
+    let pipelines = result.map_err(|(_, result)| {
+        vulkan_error(&format!("vkCreateComputePipelines({name})"), result)
+    })?;
+    Ok(pipelines.first().copied().unwrap_or_default())
 }
