@@ -7,35 +7,13 @@
 mod c_library;
 #[path = "support/command.rs"]
 mod command;
+#[path = "support/faulty_layer.rs"]
+mod faulty_layer;
 
-use std::{
-    path::PathBuf,
-    process::{Command, Output},
-    sync::OnceLock,
-};
+use std::process::{Command, Output};
 
 use command::{Folder, Run, program};
 use fenestra::film::{Checkpoint, Image, checkpoint::remove_checkpoint};
-
-const LAYER: &str = "VK_LAYER_TEST_faulty";
-
-/// Compiles the layer and returns its folder.
-fn layer_folder() -> &'static PathBuf {
-    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
-    FOLDER.get_or_init(|| {
-        let library = c_library::compile("faulty_layer");
-        let folder = library.parent().unwrap().to_owned();
-        let manifest = serde_json::json!({
-            "file_format_version": "1.1.2",
-            "layer": {
-                "name": LAYER, "type": "GLOBAL", "library_path": library, "api_version": "1.2.0",
-                "implementation_version": "1", "description": "A device that fails on request",
-            },
-        });
-        std::fs::write(folder.join("faulty_layer.json"), manifest.to_string()).unwrap();
-        folder
-    })
-}
 
 fn folder() -> Folder {
     let folder = Folder::new();
@@ -47,10 +25,7 @@ fn folder() -> Folder {
 /// Renders with the layer; `faults` are its variables.
 fn render(folder: &Folder, faults: &[(&str, u64)], options: &[&str]) -> Run {
     let mut command = program(folder.path());
-    command.env("VK_LAYER_PATH", layer_folder()).env("VK_INSTANCE_LAYERS", LAYER);
-    for (name, value) in faults {
-        command.env(name, value.to_string());
-    }
+    faulty_layer::insert(&mut command, faults);
     command.args(["render", "scene.toml", "-o", "out.exr"]).args(options);
     let output: Output = command.output().unwrap();
     Run::of(&output)

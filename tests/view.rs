@@ -2,14 +2,18 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
+#[path = "support/c_library.rs"]
+mod c_library;
 #[path = "support/command.rs"]
 mod command;
+#[path = "support/faulty_layer.rs"]
+mod faulty_layer;
 #[path = "support/page.rs"]
 mod page;
 #[path = "support/x11.rs"]
 mod x11;
 
-use std::fmt::Write;
+use std::{fmt::Write, process::Command};
 
 use command::{BALL, Folder, yard};
 use fenestra::{film::Image, view::keys};
@@ -186,6 +190,24 @@ fn a_display_that_is_missing_or_goes_away_is_an_error() {
     let run = view.end();
     assert!(run.status.is_some_and(|status| status != 0), "{:?} {}", run.status, run.messages);
     assert!(!run.messages.contains("panicked"), "{}", run.messages);
+}
+
+#[test]
+fn a_surface_that_is_lost_is_made_again() {
+    let folder = folder();
+    let server = Server::start();
+    let options = ["--sampler", "mis", "--depth", "2", "--spp", "8"];
+    let expected = rendered(&folder, "yard.toml", "8", &[]);
+    for present in [1, 3] {
+        let lose = |command: &mut Command| {
+            faulty_layer::insert(command, &[("FAULTY_PRESENT", present)]);
+        };
+        let mut view = View::open_with(&server, &folder, "yard.toml", &options, SIZE, lose);
+        view.wait_for("mis 8 spp");
+        view.wait_until(|view| difference(&view.picture(SIZE), &expected) <= 1);
+        view.tap("Escape");
+        view.end().assert(0, &["the layer loses the surface"]);
+    }
 }
 
 #[test]

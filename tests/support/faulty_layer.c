@@ -2,17 +2,19 @@
  *
  * FAULTY_BYTES: allocations that exceed this many bytes together fail.
  * FAULTY_SUBMISSION: this submission, counted from 1, and all after it find the device lost.
+ * FAULTY_PRESENT: this picture for a window, counted from 1, finds the surface lost, and says so.
  * FAULTY_WAITS: so many waits for a fence, counted from the first, time out.
  *
  * One instance and one device. The few types of the loader's interface are declared here, so that
  * the test needs no headers of Vulkan. */
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define EXPORT __attribute__((visibility("default")))
 
-enum { TIMEOUT = 2, OUT_OF_DEVICE_MEMORY = -2, DEVICE_LOST = -4, INITIALIZATION_FAILED = -3 };
+enum { SURFACE_LOST = -1000000000, TIMEOUT = 2, OUT_OF_DEVICE_MEMORY = -2, DEVICE_LOST = -4, INITIALIZATION_FAILED = -3 };
 enum { INSTANCE_CHAIN = 47, DEVICE_CHAIN = 48, LAYER_LINK = 0 };
 
 typedef void (*Function)(void);
@@ -47,7 +49,7 @@ typedef struct {
 
 static void *instance;
 static GetAddress next_instance_address, next_device_address;
-static uint64_t allocated_bytes, submissions, waits;
+static uint64_t allocated_bytes, presents, submissions, waits;
 static struct { void *memory; uint64_t size; } live[1024];
 
 static uint64_t setting(const char *name)
@@ -124,6 +126,15 @@ static int32_t submit(void *queue, uint32_t count, const void *infos, void *fenc
     return next_submit(queue, count, infos, fence);
 }
 
+static int32_t (*next_present)(void *, const void *);
+
+static int32_t present(void *queue, const void *info)
+{
+    if (++presents != setting("FAULTY_PRESENT")) return next_present(queue, info);
+    fputs("the layer loses the surface\n", stderr);
+    return SURFACE_LOST;
+}
+
 static int32_t (*next_wait)(void *, uint32_t, const void *, uint32_t, uint64_t);
 
 static int32_t wait_for_fences(void *device, uint32_t count, const void *fences, uint32_t all,
@@ -140,6 +151,10 @@ static Function device_address(void *device, const char *name)
     if (!strcmp(name, "vkAllocateMemory")) return (Function)allocate;
     if (!strcmp(name, "vkFreeMemory")) return (Function)release;
     Function next = next_device_address(device, name);
+    if (!strcmp(name, "vkQueuePresentKHR")) {
+        next_present = (void *)next;
+        return (Function)present;
+    }
     if (!strcmp(name, "vkWaitForFences")) {
         next_wait = (void *)next;
         return (Function)wait_for_fences;

@@ -83,18 +83,31 @@ impl<'a> View<'a> {
         folder: &'a Folder,
         scene: &str,
         options: &[&str],
+        size: [u32; 2],
+    ) -> Self {
+        Self::open_with(server, folder, scene, options, size, |_| ())
+    }
+
+    /// As [`View::open`], after `prepare` has seen the command.
+    pub fn open_with(
+        server: &Server,
+        folder: &'a Folder,
+        scene: &str,
+        options: &[&str],
         [width, height]: [u32; 2],
+        prepare: impl FnOnce(&mut Command),
     ) -> Self {
         let (connection, screen) = RustConnection::connect(Some(&server.display)).unwrap();
         let root = connection.setup().roots[screen].root;
-        let child = program(folder.path())
+        let mut command = program(folder.path());
+        command
             .args(["view", scene])
             .args(options)
             .env("DISPLAY", &server.display)
             .env_remove("WAYLAND_DISPLAY")
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+            .stderr(Stdio::piped());
+        prepare(&mut command);
+        let child = command.spawn().unwrap();
         let mut view = Self { child, connection, root, window: 0, folder };
         let start = Instant::now();
         while view.window == 0 {
