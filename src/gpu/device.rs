@@ -12,8 +12,8 @@ use winit::raw_window_handle::RawDisplayHandle;
 use super::{
     capabilities::{Capabilities, choose, enumerate},
     instance::Instance,
-    pipeline::Pipelines,
     pipeline_cache::PipelineCache,
+    pipelines::Pipelines,
     set_layouts::SetLayouts,
     vulkan_error,
 };

@@ -13,6 +13,7 @@ pub mod instance;
 pub(crate) mod labels;
 pub mod pipeline;
 mod pipeline_cache;
+mod pipelines;
 mod set_layouts;
 pub mod swapchain;
 pub(crate) mod timestamps;

@@ -1,15 +1,16 @@
 //! Compute pipelines with specialization constants, made once for each device.
 
-use std::{
-    collections::HashMap,
-    ffi::CStr,
-    sync::{Arc, Mutex, PoisonError},
-};
+use std::{ffi::CStr, sync::Arc};
 
 use ash::vk;
-use sha2::{Digest, Sha256};
 
-use super::{descriptors::DescriptorSet, device::Device, labels, vulkan_error};
+use super::{
+    descriptors::DescriptorSet,
+    device::Device,
+    labels,
+    pipelines::{Key, Made},
+    vulkan_error,
+};
 use crate::{error::Result, shader::spirv::used_bindings};
 
 /// A compute pipeline.
@@ -18,44 +19,6 @@ pub struct Pipeline {
     name: String,
     /// Keeps the pipeline's owner.
     _device: Arc<Device>,
-}
-
-/// The pipelines of a device. They live as long as it does, so that renderers that follow each other,
-/// as in a window or a study, do not translate the same shaders again.
-#[derive(Default)]
-pub(super) struct Pipelines {
-    made: Mutex<HashMap<Key, Made>>,
-}
-
-#[derive(PartialEq, Eq, Hash)]
-struct Key {
-    name: String,
-    /// SHA-256 of the SPIR-V.
-    code: [u8; 32],
-    constants: Vec<(u32, u32)>,
-}
-
-#[derive(Clone, Copy)]
-struct Made {
-    raw: vk::Pipeline,
-    layout: vk::PipelineLayout,
-    /// Number of a buffer that the shader uses, for each descriptor set.
-    used: [Option<u32>; 4],
-}
-
-impl Pipelines {
-    /// # Safety
-    /// The device must be alive and idle, and no [`Pipeline`] of it left.
-    pub(super) unsafe fn destroy(&self, device: &ash::Device) {
-        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
-        for (_, made) in made.drain() {
-            // SAFETY: promised by the caller.
-            unsafe {
-                device.destroy_pipeline(made.raw, None);
-                device.destroy_pipeline_layout(made.layout, None);
-            }
-        }
-    }
 }
 
 impl Pipeline {
@@ -70,20 +33,8 @@ impl Pipeline {
         spirv: &[u8],
         constants: &[(u32, u32)],
     ) -> Result<Self> {
-        let key = Key {
-            name: name.to_owned(),
-            code: Sha256::digest(spirv).into(),
-            constants: constants.to_vec(),
-        };
-        let mut known = device.pipelines().made.lock().unwrap_or_else(PoisonError::into_inner);
-        let made = if let Some(made) = known.get(&key) {
-            *made
-        } else {
-            let made = Made::new(device, name, spirv, constants)?;
-            known.insert(key, made);
-            made
-        };
-        drop(known);
+        let key = Key::new(name, spirv, constants);
+        let made = device.pipelines().get_or_make(key, || make(device, name, spirv, constants))?;
         Ok(Self { made, name: name.to_owned(), _device: Arc::clone(device) })
     }
 
@@ -106,35 +57,28 @@ impl Pipeline {
     }
 }
 
-impl Made {
-    fn new(
-        device: &Arc<Device>,
-        name: &str,
-        spirv: &[u8],
-        constants: &[(u32, u32)],
-    ) -> Result<Self> {
-        let words: Vec<u32> = bytemuck::pod_collect_to_vec(spirv);
-        let used = used_bindings(&words);
-        let first_used = [0, 1, 2, 3].map(|set| used.iter().find(|(other, _)| *other == set));
-        let layouts = first_used.map(|used| match used {
-            Some((set, number)) => device.set_layouts().with_buffer(*set, *number),
-            None => device.set_layouts().empty(),
-        });
-        let push_constants =
-            [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(128)];
-        let layout_info = vk::PipelineLayoutCreateInfo::default()
-            .set_layouts(&layouts)
-            .push_constant_ranges(&push_constants);
-        // SAFETY: the set layouts live as long as the device.
-        let layout = unsafe { device.raw().create_pipeline_layout(&layout_info, None) }
-            .map_err(|result| vulkan_error(&format!("vkCreatePipelineLayout({name})"), result))?;
-        let raw = compile(device, name, &words, constants, layout).inspect_err(|_| {
-            // SAFETY: nothing uses the layout of a pipeline that was not made.
-            unsafe { device.raw().destroy_pipeline_layout(layout, None) };
-        })?;
-        labels::name_object(device, raw, name);
-        Ok(Self { raw, layout, used: first_used.map(|used| used.map(|(_, number)| *number)) })
-    }
+fn make(device: &Arc<Device>, name: &str, spirv: &[u8], constants: &[(u32, u32)]) -> Result<Made> {
+    let words: Vec<u32> = bytemuck::pod_collect_to_vec(spirv);
+    let used = used_bindings(&words);
+    let first_used = [0, 1, 2, 3].map(|set| used.iter().find(|(other, _)| *other == set));
+    let layouts = first_used.map(|used| match used {
+        Some((set, number)) => device.set_layouts().with_buffer(*set, *number),
+        None => device.set_layouts().empty(),
+    });
+    let push_constants =
+        [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(128)];
+    let layout_info = vk::PipelineLayoutCreateInfo::default()
+        .set_layouts(&layouts)
+        .push_constant_ranges(&push_constants);
+    // SAFETY: the set layouts live as long as the device.
+    let layout = unsafe { device.raw().create_pipeline_layout(&layout_info, None) }
+        .map_err(|result| vulkan_error(&format!("vkCreatePipelineLayout({name})"), result))?;
+    let raw = compile(device, name, &words, constants, layout).inspect_err(|_| {
+        // SAFETY: nothing uses the layout of a pipeline that was not made.
+        unsafe { device.raw().destroy_pipeline_layout(layout, None) };
+    })?;
+    labels::name_object(device, raw, name);
+    Ok(Made { raw, layout, used: first_used.map(|used| used.map(|(_, number)| *number)) })
 }
 
 fn compile(

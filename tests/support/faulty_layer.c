@@ -14,7 +14,8 @@
 
 #define EXPORT __attribute__((visibility("default")))
 
-enum { SURFACE_LOST = -1000000000, TIMEOUT = 2, OUT_OF_DEVICE_MEMORY = -2, DEVICE_LOST = -4, INITIALIZATION_FAILED = -3 };
+enum { SURFACE_LOST = -1000000000, TIMEOUT = 2 };
+enum { OUT_OF_DEVICE_MEMORY = -2, DEVICE_LOST = -4, INITIALIZATION_FAILED = -3 };
 enum { INSTANCE_CHAIN = 47, DEVICE_CHAIN = 48, LAYER_LINK = 0 };
 
 typedef void (*Function)(void);

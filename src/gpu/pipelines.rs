@@ -1,0 +1,68 @@
+//! The compute pipelines of a device, made once each.
+
+use std::{
+    collections::{HashMap, hash_map::Entry},
+    sync::{Mutex, PoisonError},
+};
+
+use ash::vk;
+use sha2::{Digest, Sha256};
+
+use crate::error::Result;
+
+/// The pipelines of a device. They live as long as it does, so that renderers that follow each other,
+/// as in a window or a study, do not translate the same shaders again.
+#[derive(Default)]
+pub(super) struct Pipelines {
+    made: Mutex<HashMap<Key, Made>>,
+}
+
+/// What a pipeline is made from.
+#[derive(PartialEq, Eq, Hash)]
+pub(super) struct Key {
+    name: String,
+    /// SHA-256 of the SPIR-V.
+    code: [u8; 32],
+    constants: Vec<(u32, u32)>,
+}
+
+#[derive(Clone, Copy)]
+pub(super) struct Made {
+    pub raw: vk::Pipeline,
+    pub layout: vk::PipelineLayout,
+    /// Number of a buffer that the shader uses, for each descriptor set.
+    pub used: [Option<u32>; 4],
+}
+
+impl Key {
+    pub fn new(name: &str, spirv: &[u8], constants: &[(u32, u32)]) -> Self {
+        Self {
+            name: name.to_owned(),
+            code: Sha256::digest(spirv).into(),
+            constants: constants.to_vec(),
+        }
+    }
+}
+
+impl Pipelines {
+    /// Returns the pipeline of `key`, which `make` makes the first time.
+    pub fn get_or_make(&self, key: Key, make: impl FnOnce() -> Result<Made>) -> Result<Made> {
+        match self.made.lock().unwrap_or_else(PoisonError::into_inner).entry(key) {
+            Entry::Occupied(made) => Ok(*made.get()),
+            Entry::Vacant(place) => Ok(*place.insert(make()?)),
+        }
+    }
+
+    /// # Safety
+    /// The device must be alive and idle, and nothing may use its pipelines any more.
+    pub unsafe fn destroy(&self, device: &ash::Device) {
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        for (_, made) in made.drain() {
+            // SAFETY: promised by the caller.
+            unsafe {
+                device.destroy_pipeline(made.raw, None);
+                device.destroy_pipeline_layout(made.layout, None);
+            }
+        }
+    }
+}
