@@ -32,7 +32,7 @@ use support::{
 /// Least p-value allowed, that of |t| = 7.5 where both sides have the same error.
 const LEAST_P_VALUE: f64 = 3e-6;
 
-const ALL_AGAINST_COSINE: [Sampler; 11] = [
+const ALL_AGAINST_COSINE: [Sampler; 12] = [
     Sampler::Cosine,
     Sampler::Uniform,
     Sampler::Brdf,
@@ -43,6 +43,7 @@ const ALL_AGAINST_COSINE: [Sampler; 11] = [
     Sampler::Visibility,
     Sampler::Guided,
     Sampler::ControlVariates,
+    Sampler::Tiles,
     Sampler::Haar,
 ];
 
@@ -148,7 +149,7 @@ fn in_a_closed_room_with_bounces() {
     let scene =
         scenes::room(vec![scenes::diffuse(Vec3::splat(0.8)), scenes::copper(0.4), principled()]);
     // All but `haar`, which draws at later vertices as `product` does.
-    samplers_agree(&scene, 4, 64, &ALL_AGAINST_COSINE[..10]);
+    samplers_agree(&scene, 4, 64, &ALL_AGAINST_COSINE[..11]);
 }
 
 #[test]

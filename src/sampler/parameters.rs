@@ -7,6 +7,7 @@ use super::{
     knob::{self, Knob},
     portal::PortalParameters,
     product::ProductParameters,
+    tiles::TilesParameters,
     visibility::VisibilityParameters,
 };
 use crate::error::{Error, Result};
@@ -35,6 +36,8 @@ pub struct Parameters {
     pub haar: HaarParameters,
     /// Parameters of `control-variates`.
     pub control_variates: ControlVariatesParameters,
+    /// Parameters of `tiles`.
+    pub tiles: TilesParameters,
 }
 
 impl Default for Parameters {
@@ -49,6 +52,7 @@ impl Default for Parameters {
             portal: PortalParameters::default(),
             haar: HaarParameters::default(),
             control_variates: ControlVariatesParameters::default(),
+            tiles: TilesParameters::default(),
         }
     }
 }
@@ -116,7 +120,8 @@ impl Parameters {
             || knob::set(GuidedParameters::KNOBS, &mut self.guided, key, value)?
             || knob::set(PortalParameters::KNOBS, &mut self.portal, key, value)?
             || knob::set(HaarParameters::KNOBS, &mut self.haar, key, value)?
-            || knob::set(ControlVariatesParameters::KNOBS, &mut self.control_variates, key, value)?;
+            || knob::set(ControlVariatesParameters::KNOBS, &mut self.control_variates, key, value)?
+            || knob::set(TilesParameters::KNOBS, &mut self.tiles, key, value)?;
         if is_known {
             return Ok(());
         }
@@ -137,6 +142,7 @@ impl Parameters {
             .chain(PortalParameters::KNOBS.iter().map(|knob| knob.key))
             .chain(HaarParameters::KNOBS.iter().map(|knob| knob.key))
             .chain(ControlVariatesParameters::KNOBS.iter().map(|knob| knob.key))
+            .chain(TilesParameters::KNOBS.iter().map(|knob| knob.key))
             .collect();
         keys.sort_unstable();
         keys
