@@ -1,5 +1,5 @@
-// Counts every shadow ray of the pilot, and the cosine of every visible one, in the sector of its hit and the
-// tile of its direction. Sums of integers: the order of rays makes no difference.
+// Counts every shadow ray of the pilot, and the squared cosine of every visible one, in the sector of its hit
+// and the tile of its direction. Sums of integers: the order of rays makes no difference.
 #version 460
 
 #include "load.glsl"
@@ -24,7 +24,7 @@ void count_ray(ListedRay listed) {
     if (ray.contribution != vec3(0.0) && visibility[listed.ray] != 0u) {
         float cosine = max(dot(hit.geometric_normal, ray.direction), 0.0);
         atomicAdd(
-            tile_counts[2u * entry + 1u], uint(cosine * float(TILE_RESPONSE_UNITS) + 0.5));
+            tile_counts[2u * entry + 1u], uint(cosine * cosine * float(TILE_RESPONSE_UNITS) + 0.5));
     }
 }
 

@@ -2,8 +2,8 @@
 // one shadow ray for each by the density of both: the balance heuristic of `mis`. Densities are in solid
 // angle measure.
 //
-// A hit reads a sector at random among those around it. The choice knows no direction, and all rays of the
-// hit have the density of that sector, so no bias comes of it.
+// With `sector-jitter=on` a hit reads a sector at random among those around it. The choice knows no
+// direction, and all rays of the hit have the density of that sector, so no bias comes of it.
 #version 460
 
 #include "mis.glsl"
@@ -13,7 +13,7 @@
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
-layout(constant_id = CONSTANT_SECTOR_JITTER) const bool SECTOR_JITTER = true;
+layout(constant_id = CONSTANT_SECTOR_JITTER) const bool SECTOR_JITTER = false;
 // True in the pilot, which learns from rays through tiles alone.
 layout(constant_id = CONSTANT_TILES_LEARN) const bool LEARNS = false;
 

@@ -281,7 +281,7 @@ binding_tables! {
 
     /// Set 1 of the sampler `tiles`.
     TILES = tiles: 1 {
-        /// Rays of the pilot, and the cosines of the visible ones in 64ths, by sector and tile.
+        /// Rays of the pilot, and the squared cosines of the visible ones in 64ths, by sector and tile.
         72 TILE_COUNTS: array uint;
         /// Probability of each tile over its share of the map's energy, and the sum of probabilities up
         /// to and including it in `TILE_SCALE`ths, by sector and tile.

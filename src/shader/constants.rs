@@ -396,7 +396,7 @@ constants! {
 
     /// Parts in which probabilities of tiles are counted: single precision holds them exactly.
     TILE_SCALE = 1 << 24;
-    /// Parts in which the cosine of a visible ray is counted.
+    /// Parts in which the squared cosine of a visible ray is counted.
     TILE_RESPONSE_UNITS = 64;
 
     // Layers that the pass `show` shows.

@@ -69,7 +69,7 @@ impl TileBuffers {
         self.upload(&self.cache.untrained().repeat(self.grid.sectors()))
     }
 
-    /// Reads rays and summed cosines by sector and tile. Fails if the device does.
+    /// Reads rays and their summed squares of cosines by sector and tile. Fails if the device does.
     pub fn counts(&self) -> Result<Vec<[u32; 2]>> {
         self.counts.download(self.grid.sectors() * self.cache.tiles())
     }

@@ -1,4 +1,4 @@
-//! What the pilot has counted → probabilities of the tiles in every sector.
+//! Counts of the pilot → probabilities of the tiles in every sector.
 
 use rayon::prelude::*;
 
@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// Rays of the surroundings that a sector leans on, where it has counted little itself.
-const PRIOR_RAYS: f64 = 2.0;
+const PRIOR_RAYS: f64 = 0.5;
 /// Sectors along each side of the surroundings.
 const SURROUNDINGS: usize = 4;
 /// Share of the map's energy below which a tile is left to the BRDF.
@@ -27,8 +27,8 @@ pub struct TileCache {
     floor: f64,
 }
 
-/// Mean cosine of visible rays among all that were counted, with [`PRIOR_RAYS`] rays of mean `prior`.
-fn mean_response([rays, units]: [f64; 2], prior: f64) -> f64 {
+/// Mean squared cosine of the rays that were counted, with [`PRIOR_RAYS`] rays of mean `prior`.
+fn mean_square([rays, units]: [f64; 2], prior: f64) -> f64 {
     (units / f64::from(TILE_RESPONSE_UNITS) + PRIOR_RAYS * prior) / (rays + PRIOR_RAYS)
 }
 
@@ -37,7 +37,8 @@ fn added(sum: [f64; 2], count: [u32; 2]) -> [f64; 2] {
 }
 
 impl TileCache {
-    /// Makes entries for the tiles of `partition`, with the share `floor` of the probability by the map alone.
+    /// Makes entries for the tiles of `partition`. The share `floor` of the probability follows the map
+    /// alone.
     pub fn new(partition: &Partition, floor: f64) -> Self {
         let share = |share: f64| if share > LEAST_SHARE { share } else { 0.0 };
         Self { shares: partition.regions.iter().map(|tile| share(tile.share)).collect(), floor }
@@ -56,11 +57,12 @@ impl TileCache {
         self.entries(|tile| 0.5 * self.shares[tile] + alike)
     }
 
-    /// Entries of all sectors by rays and their summed cosines, by sector and tile.
+    /// Entries of all sectors by rays and their summed squares of cosines, by sector and tile.
     ///
-    /// The response of a tile is the mean cosine of its rays, where a blocked one counts as 0: what light
-    /// from there brings to a diffuse surface. A sector that has counted little expects as much as the
-    /// 4×4 sectors around, these as much as all.
+    /// The response of a tile is the root mean square of what its light brings to diffuse surfaces: the
+    /// cosine of a visible ray, 0 of a blocked one. Probabilities by flux times response leave the least
+    /// variance that one choice for all surfaces of a sector allows. A sector that has counted little expects
+    /// as much as the 4×4 sectors around, these as much as all.
     ///
     /// # Panics
     /// There are not two counts for every tile in every sector.
@@ -71,7 +73,7 @@ impl TileCache {
             .into_par_iter()
             .map(|tile| counts.iter().skip(tile).step_by(tiles).copied().fold([0.0; 2], added))
             .collect();
-        let of_all: Vec<f64> = of_all.iter().map(|sum| mean_response(*sum, 1.0)).collect();
+        let of_all: Vec<f64> = of_all.iter().map(|sum| mean_square(*sum, 1.0)).collect();
         let blocks = side.div_ceil(SURROUNDINGS);
         let around: Vec<f64> = (0..blocks * blocks)
             .into_par_iter()
@@ -86,7 +88,7 @@ impl TileCache {
                     }
                 }
                 let priors = of_all.iter();
-                sums.into_iter().zip(priors).map(|(sum, prior)| mean_response(sum, *prior))
+                sums.into_iter().zip(priors).map(|(sum, prior)| mean_square(sum, *prior))
             })
             .collect();
         let of_sector = |(sector, counts): (usize, &[[u32; 2]])| {
@@ -97,7 +99,7 @@ impl TileCache {
                 .zip(priors)
                 .zip(&self.shares)
                 .map(|((count, prior), share)| {
-                    share * mean_response(added([0.0; 2], *count), *prior)
+                    share * mean_square(added([0.0; 2], *count), *prior).sqrt()
                 })
                 .collect();
             let sum: f64 = weights.iter().sum();

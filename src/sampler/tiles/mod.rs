@@ -6,16 +6,16 @@
 //! counts, which then stay as they are: shadow rays go through tiles by these, and to the BRDF's own
 //! directions, under the balance heuristic of `mis` (`glsl/tiles/sample_tiles.comp`).
 //!
-//! Of the talk only the abstract was at hand, and two implementations by others that follow it: a grid of
-//! directions from the camera, to which later vertices belong as well, and a probability of flux times
+//! The talk's abstract was at hand, not its pages, and two implementations by others that follow it: a grid
+//! of directions from the camera, to which later vertices belong as well, and a probability of flux times
 //! learned response for each tile are theirs. All else is ours:
 //!
 //! - Choice: tiles are the rectangles of `guided`, small where the map is bright; theirs have equal size.
-//! - Choice: a sector counts cosines of visible rays, so that tiles below the horizon lose too; theirs count
-//!   luminance.
+//! - Choice: a sector counts squared cosines of visible rays, so that tiles below the horizon lose too, and
+//!   probabilities leave least variance; theirs add up luminance.
 //! - Choice: the pilot draws tiles half by flux and half alike, from the vertices of its paths.
-//! - Choice: sectors with few rays lean on their surroundings, and a hit reads a sector at random among
-//!   those around it. The density is that of the sector it has read.
+//! - Choice: sectors with few rays lean on their surroundings. With `sector-jitter=on` a hit reads a sector
+//!   at random among those around it; the density is that of the sector it has read.
 //! - Choice: a share of the probability follows the map alone, so that no tile with light is lost.
 
 mod buffers;

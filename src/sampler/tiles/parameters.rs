@@ -24,8 +24,8 @@ impl Default for TilesParameters {
     fn default() -> Self {
         Self {
             environment_tiles: 128,
-            pilot_samples: 4,
-            sector_jitter: true,
+            pilot_samples: 8,
+            sector_jitter: false,
             sector_pixels: 8,
             tile_floor: 0.1,
         }
