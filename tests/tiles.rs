@@ -102,7 +102,7 @@ fn every_tile_with_light_keeps_a_probability() {
     for (index, map) in maps().iter().enumerate() {
         for count in [8, 128] {
             let partition = Partition::new(map, count);
-            let cache = TileCache::new(&partition, FLOOR);
+            let cache = TileCache::new(&partition, FLOOR, count == 8);
             let tiles = cache.tiles();
             let nothing = vec![[0, 0]; GRID.sectors() * tiles];
             let blocked = vec![[1000, 0]; nothing.len()];
@@ -140,7 +140,7 @@ fn every_tile_with_light_keeps_a_probability() {
 fn a_sector_follows_its_counts_or_those_around_it() {
     let partition = Partition::new(&maps()[2], 8);
     const RAYS: u32 = 1 << 20;
-    let cache = TileCache::new(&partition, 0.01);
+    let cache = TileCache::new(&partition, 0.01, false);
     let grid = SectorGrid { side: 9 };
     let tiles = cache.tiles();
     let mut counts = vec![[0, 0]; grid.sectors() * tiles];
@@ -184,7 +184,7 @@ fn samples_follow_the_density_which_integrates_to_one() {
     let maps = maps();
     for map in [&maps[0], &maps[2], &maps[3]] {
         let (tables, partition) = (EnvironmentTables::new(map), Partition::new(map, 64));
-        let cache = TileCache::new(&partition, 0.1);
+        let cache = TileCache::new(&partition, 0.1, true);
         let (untrained, counts) = (cache.untrained(), one_sided(&partition, GRID));
         let learned = cache.learned(GRID, &counts);
         let of = |entries| TileDensity { map, tables: &tables, partition: &partition, entries };
@@ -255,7 +255,7 @@ impl Cache {
     fn new(scene: Scene, tiles: usize, is_learned: bool) -> Self {
         let device = support::device();
         let partition = Partition::new(&scene.environment, tiles);
-        let cache = TileCache::new(&partition, 0.1);
+        let cache = TileCache::new(&partition, 0.1, true);
         let entries = if is_learned {
             cache.learned(GRID, &one_sided(&partition, GRID))
         } else {
@@ -504,7 +504,7 @@ fn parameters_change_no_image() {
     let cases: [&[&str]; 3] = [
         &["environment-tiles=8", "sector-pixels=1", "tile-floor=0.001", "pilot-samples=2"],
         &["environment-tiles=1024", "sector-jitter=on", "pilot-samples=1"],
-        &["sector-pixels=256", "tile-floor=1", "pilot-samples=1"],
+        &["sector-pixels=256", "compensation=off", "pilot-samples=1"],
     ];
     for (case, assignments) in cases.into_iter().enumerate() {
         let seed = 100 * (1 + case as u32);

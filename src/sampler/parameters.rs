@@ -22,7 +22,7 @@ pub struct Parameters {
     /// `None` is `auto`.
     pub candidates: Option<u32>,
     /// `compensation`: true if `mis`, `portal` and what `guided` falls back to draw directions of the
-    /// environment by its compensated density.
+    /// environment by its compensated density, and `tiles` compensates what it has learned.
     pub compensation: bool,
     /// Parameters of `product`, also within `visibility`; its shares also within `haar`.
     pub product: ProductParameters,

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::grid::SectorGrid;
 use crate::{
     sampler::guided::Partition,
+    scene::environment::COMPENSATION,
     shader::constants::{TILE_RESPONSE_UNITS, TILE_SCALE},
 };
 
@@ -24,7 +25,11 @@ pub type Entry = [u32; 2];
 pub struct TileCache {
     /// Share of each tile in the map's energy; 0 if it is not drawn.
     shares: Vec<f64>,
+    /// Solid angle of each tile, as a fraction of the sphere.
+    solid_angles: Vec<f64>,
     floor: f64,
+    /// Part of the mean luminance that is left to the BRDF; 0 without compensation.
+    compensation: f64,
 }
 
 /// Mean squared cosine of the rays that were counted, with [`PRIOR_RAYS`] rays of mean `prior`.
@@ -38,10 +43,16 @@ fn added(sum: [f64; 2], count: [u32; 2]) -> [f64; 2] {
 
 impl TileCache {
     /// Makes entries for the tiles of `partition`. The share `floor` of the probability follows the map
-    /// alone.
-    pub fn new(partition: &Partition, floor: f64) -> Self {
+    /// alone; the rest, if it `compensates`, leaves dim tiles to the BRDF.
+    pub fn new(partition: &Partition, floor: f64, compensates: bool) -> Self {
+        let tiles = partition.regions.iter();
         let share = |share: f64| if share > LEAST_SHARE { share } else { 0.0 };
-        Self { shares: partition.regions.iter().map(|tile| share(tile.share)).collect(), floor }
+        Self {
+            shares: tiles.clone().map(|tile| share(tile.share)).collect(),
+            solid_angles: tiles.map(|tile| tile.solid_angle).collect(),
+            floor,
+            compensation: if compensates { COMPENSATION } else { 0.0 },
+        }
     }
 
     /// Number of tiles.
@@ -94,19 +105,27 @@ impl TileCache {
         let of_sector = |(sector, counts): (usize, &[[u32; 2]])| {
             let block = sector / side / SURROUNDINGS * blocks + sector % side / SURROUNDINGS;
             let priors = &around[block * tiles..][..tiles];
-            let weights: Vec<f64> = counts
+            let responses: Vec<f64> = counts
                 .iter()
                 .zip(priors)
-                .zip(&self.shares)
-                .map(|((count, prior), share)| {
-                    share * mean_square(added([0.0; 2], *count), *prior).sqrt()
-                })
+                .map(|(count, prior)| mean_square(added([0.0; 2], *count), *prior).sqrt())
                 .collect();
+            let weights = self.weights(&responses);
             let sum: f64 = weights.iter().sum();
             let learned = if sum > 0.0 { (1.0 - self.floor) / sum } else { 0.0 };
             self.entries(|tile| learned * weights[tile] + self.floor * self.shares[tile])
         };
         counts.par_chunks(tiles).enumerate().flat_map_iter(of_sector).collect()
+    }
+
+    /// Flux times response of each tile, less what BRDFs cover: the compensation times the mean luminance
+    /// that the sector sees.
+    fn weights(&self, responses: &[f64]) -> Vec<f64> {
+        let seen = |of: &[f64]| of.iter().zip(responses).map(|(of, seen)| of * seen).sum::<f64>();
+        let [light, angle] = [seen(&self.shares), seen(&self.solid_angles)];
+        let least = if angle > 0.0 { self.compensation * light / angle } else { 0.0 };
+        let tiles = self.shares.iter().zip(&self.solid_angles).zip(responses);
+        tiles.map(|((share, angle), seen)| (share - least * angle).max(0.0) * seen).collect()
     }
 
     /// Entries of a sector by the weight of each tile, positive where there is light. Each tile with light

@@ -16,6 +16,8 @@
 //! - Choice: the pilot draws tiles half by flux and half alike, from the vertices of its paths.
 //! - Choice: sectors with few rays lean on their surroundings. With `sector-jitter=on` a hit reads a sector
 //!   at random among those around it; the density is that of the sector it has read.
+//! - Choice: dim tiles are left to the BRDF as `mis` does, by the mean luminance that the sector sees. One of
+//!   theirs can subtract the mean too.
 //! - Choice: a share of the probability follows the map alone, so that no tile with light is lost.
 
 mod buffers;
@@ -34,7 +36,7 @@ pub use grid::SectorGrid;
 pub use parameters::TilesParameters;
 pub use steps::TileSteps;
 
-use super::{Context, Parameters, Room, guided::Partition, knob, pilot};
+use super::{Context, Parameters, Room, basic, guided::Partition, knob, pilot};
 use crate::{
     error::Result,
     gpu::DescriptorSet,
@@ -45,7 +47,9 @@ pub(super) struct TilesRoom;
 
 impl Room for TilesRoom {
     fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
-        knob::describe(TilesParameters::KNOBS, &parameters.tiles)
+        let mut named = knob::describe(TilesParameters::KNOBS, &parameters.tiles);
+        named.extend(basic::MIS.describe(parameters));
+        named
     }
 
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
@@ -53,7 +57,7 @@ impl Room for TilesRoom {
         let own = &parameters.tiles;
         let start = Instant::now();
         let partition = Partition::new(&scene.environment, own.environment_tiles as usize);
-        let cache = TileCache::new(&partition, own.tile_floor);
+        let cache = TileCache::new(&partition, own.tile_floor, parameters.compensation);
         let grid = SectorGrid::new(scene, own, cache.tiles());
         let steps = TileSteps::new(own, cache.tiles(), grid, runner.settings().surfaces);
         let buffers = TileBuffers::new(runner.device(), &partition, grid, cache)?;
