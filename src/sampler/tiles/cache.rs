@@ -5,7 +5,6 @@ use rayon::prelude::*;
 use super::grid::SectorGrid;
 use crate::{
     sampler::guided::Partition,
-    scene::environment::COMPENSATION,
     shader::constants::{TILE_RESPONSE_UNITS, TILE_SCALE},
 };
 
@@ -13,6 +12,8 @@ use crate::{
 const PRIOR_RAYS: f64 = 0.5;
 /// Sectors along each side of the surroundings.
 const SURROUNDINGS: usize = 4;
+/// Part of the mean that is left to the BRDF: a quarter stays where all tiles are alike.
+const COMPENSATION: f64 = 0.75;
 /// Share of the map's energy below which a tile is left to the BRDF.
 const LEAST_SHARE: f64 = 1e-9;
 
@@ -28,8 +29,7 @@ pub struct TileCache {
     /// Solid angle of each tile, as a fraction of the sphere.
     solid_angles: Vec<f64>,
     floor: f64,
-    /// Part of the mean luminance that is left to the BRDF; 0 without compensation.
-    compensation: f64,
+    compensates: bool,
 }
 
 /// Mean squared cosine of the rays that were counted, with [`PRIOR_RAYS`] rays of mean `prior`.
@@ -43,7 +43,7 @@ fn added(sum: [f64; 2], count: [u32; 2]) -> [f64; 2] {
 
 impl TileCache {
     /// Makes entries for the tiles of `partition`. The share `floor` of the probability follows the map
-    /// alone; the rest, if it `compensates`, leaves dim tiles to the BRDF.
+    /// alone; the rest, if it `compensates`, leaves to the BRDF what is dim or hardly seen.
     pub fn new(partition: &Partition, floor: f64, compensates: bool) -> Self {
         let tiles = partition.regions.iter();
         let share = |share: f64| if share > LEAST_SHARE { share } else { 0.0 };
@@ -51,7 +51,7 @@ impl TileCache {
             shares: tiles.clone().map(|tile| share(tile.share)).collect(),
             solid_angles: tiles.map(|tile| tile.solid_angle).collect(),
             floor,
-            compensation: if compensates { COMPENSATION } else { 0.0 },
+            compensates,
         }
     }
 
@@ -118,14 +118,17 @@ impl TileCache {
         counts.par_chunks(tiles).enumerate().flat_map_iter(of_sector).collect()
     }
 
-    /// Flux times response of each tile, less what BRDFs cover: the compensation times the mean luminance
-    /// that the sector sees.
+    /// Flux times response of each tile, less a part of the mean over all directions, which the BRDF's own
+    /// rays cover.
     fn weights(&self, responses: &[f64]) -> Vec<f64> {
-        let seen = |of: &[f64]| of.iter().zip(responses).map(|(of, seen)| of * seen).sum::<f64>();
-        let [light, angle] = [seen(&self.shares), seen(&self.solid_angles)];
-        let least = if angle > 0.0 { self.compensation * light / angle } else { 0.0 };
-        let tiles = self.shares.iter().zip(&self.solid_angles).zip(responses);
-        tiles.map(|((share, angle), seen)| (share - least * angle).max(0.0) * seen).collect()
+        let mut weights: Vec<f64> =
+            self.shares.iter().zip(responses).map(|(share, seen)| share * seen).collect();
+        let sum: f64 = weights.iter().sum();
+        let least = if self.compensates { COMPENSATION * sum } else { 0.0 };
+        for (weight, angle) in weights.iter_mut().zip(&self.solid_angles) {
+            *weight = (*weight - least * angle).max(0.0);
+        }
+        weights
     }
 
     /// Entries of a sector by the weight of each tile, positive where there is light. Each tile with light

@@ -16,8 +16,8 @@
 //! - Choice: the pilot draws tiles half by flux and half alike, from the vertices of its paths.
 //! - Choice: sectors with few rays lean on their surroundings. With `sector-jitter=on` a hit reads a sector
 //!   at random among those around it; the density is that of the sector it has read.
-//! - Choice: dim tiles are left to the BRDF as `mis` does, by the mean luminance that the sector sees. One of
-//!   theirs can subtract the mean too.
+//! - Choice: what is dim or hardly seen is left to the BRDF, by subtracting a part of the mean. One of
+//!   theirs can do so too.
 //! - Choice: a share of the probability follows the map alone, so that no tile with light is lost.
 
 mod buffers;

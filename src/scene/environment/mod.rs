@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 pub use court::CourtParameters;
 pub use sky::SkyParameters;
-pub(crate) use table::{COMPENSATION, mean_sine};
+pub(crate) use table::mean_sine;
 pub use table::{EnvironmentSample, EnvironmentTables};
 
 use crate::math::frame::lat_long_from_direction;
