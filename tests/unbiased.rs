@@ -1,9 +1,9 @@
 //! Every sampler converges to the same image: z-tests of block means of independent replicates.
 //!
-//! The reference is `cosine`, which knows neither BRDF nor environment. A scene has up to nine
+//! The reference is `cosine`, which knows neither BRDF nor environment. A scene has up to eleven
 //! comparisons of 36 values (12 blocks × 3 channels). A p-value below 3e-6 is an alarm, by Student's
 //! distribution with Welch's degrees of freedom: the errors of the two sides differ. So a scene raises a
-//! false alarm once in about 1,000 runs, the three scenes once in 340, the whole file once in 110. Seeds
+//! false alarm once in about 840 runs, the three scenes once in 290, the whole file once in 100. Seeds
 //! are fixed: a run that passed passes again on the same device. `every_sampler_with_every_material` is
 //! slow and runs on request.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
