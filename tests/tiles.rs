@@ -518,10 +518,13 @@ fn parameters_change_no_image() {
     }
 }
 
-/// Sum over the pixels of the variance of their mean, estimated from the samples.
-fn variance(scene: &Scene, settings: Settings) -> f64 {
-    let (sums, _) = render(scene, settings, 16);
-    (0..sums.pixel_count()).map(|pixel| sums.variance_of_mean(pixel).iter().sum::<f64>()).sum()
+/// Sum over the pixels of the variance of their mean, estimated from the samples, and the share of the shadow
+/// rays that were visible.
+fn variance_and_visible(scene: &Scene, settings: Settings) -> [f64; 2] {
+    let (sums, totals) = render(scene, settings, 16);
+    let of_pixel = |pixel| sums.variance_of_mean(pixel).iter().sum::<f64>();
+    let visible = totals.shadow_rays_visible as f64 / totals.shadow_rays_traced as f64;
+    [(0..sums.pixel_count()).map(of_pixel).sum(), visible]
 }
 
 /// A cache that knows what is blocked brings much in the room, seen with the window behind the camera, and
@@ -532,11 +535,13 @@ fn the_cache_lowers_the_variance() {
     let mut room = room();
     (room.camera.position, room.camera.look_at) = (vec3(-1.7, 1.6, 1.5), vec3(0.6, 0.4, -0.8));
     let things = vec![scenes::diffuse(Vec3::splat(0.6)), scenes::plastic(0.3)];
-    for (scene, most) in [(room, 0.8), (scenes::open(things), 0.8)] {
-        let with = variance(&scene, settings(&[], 1));
-        let without = variance(&scene, settings(&["tile-floor=1"], 1));
-        eprintln!("{}: {with:.4} with, {without:.4} without", scene.name);
-        assert!(with < most * without, "{}: {with}, and {without} without", scene.name);
+    for (scene, least_visible) in [(room, 1.4), (scenes::open(things), 1.0)] {
+        let of = |floor| variance_and_visible(&scene, settings(&[floor, "pilot-samples=4"], 1));
+        let [with, without] = [of("tile-floor=0.1"), of("tile-floor=1")];
+        eprintln!("{}: {with:?} with, {without:?} without", scene.name);
+        assert!(with[0] < 0.8 * without[0], "{}: {with:?}, not {without:?}", scene.name);
+        let sees = with[1] > least_visible * without[1];
+        assert!(sees, "{}: {with:?}, not {without:?}", scene.name);
     }
 }
 
