@@ -43,6 +43,7 @@
 //! | `haar` | [`sampler::haar`] | `haar/`: `multiply_nodes`, `sample_nodes`, `lower_nodes` |
 //! | `control-variates` | [`sampler::control_variates`] | `control_variates/`: `record_visibility`, |
 //! | | | `sample_controlled` |
+//! | `tiles` | [`sampler::tiles`] | `tiles/`: `count_tiles`, `sample_tiles` |
 //! | scene, settings, device → sums | [`renderer`] | |
 //! | sums → image files | [`film`] | |
 //! | scene → files of other renderers | [`export`] | |
@@ -68,6 +69,7 @@
 //!   Performance Graphics.
 //! - \[Appleby 2011\] MurmurHash3, <https://github.com/aappleby/smhasher>.
 //! - \[Arthur & Vassilvitskii 2007\] "k-means++: The Advantages of Careful Seeding", SODA.
+//! - \[Atanasov et al. 2018\] "Adaptive Environment Sampling on CPU and GPU", SIGGRAPH Talks.
 //! - \[Banerjee et al. 2005\] "Clustering on the Unit Hypersphere using von Mises-Fisher
 //!   Distributions", JMLR 6.
 //! - \[Burke et al. 2005\] "Bidirectional Importance Sampling for Direct Illumination",

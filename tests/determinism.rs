@@ -31,14 +31,15 @@ fn settings(sampler: Sampler) -> Settings {
 }
 
 /// One sampler of each order of passes whose samples depend on no other sample of the film; the records of
-/// `control-variates` are those of a pilot, which is repeated. `guided` learns from all of
-/// them: `tests/faults.rs` resumes it with its guide.
-const WITHOUT_LEARNING: [Sampler; 5] = [
+/// `control-variates` and the cache of `tiles` are those of a pilot, which is repeated. `guided` learns from
+/// all of them: `tests/faults.rs` resumes it with its guide.
+const WITHOUT_LEARNING: [Sampler; 6] = [
     Sampler::Mis,
     Sampler::Product,
     Sampler::Visibility,
     Sampler::Portal,
     Sampler::ControlVariates,
+    Sampler::Tiles,
 ];
 
 fn render(settings: Settings, passes: &[u32]) -> Sums {
@@ -163,8 +164,8 @@ fn sums_of_another_window_are_refused() {
 fn a_crop_window_shows_the_same_pixels() {
     let _alone = support::alone();
     let window = Window { x: 5, y: 3, width: 13, height: 9 };
-    // The pilot of `control-variates` goes over the window.
-    let alone = |sampler: &Sampler| *sampler != Sampler::ControlVariates;
+    // A pilot goes over the window.
+    let alone = |sampler: &Sampler| !matches!(sampler, Sampler::ControlVariates | Sampler::Tiles);
     for sampler in WITHOUT_LEARNING.into_iter().filter(alone) {
         let whole = render(settings(sampler), &[2]);
         let crop = render(Settings { window: Some(window), ..settings(sampler) }, &[2]);

@@ -18,6 +18,7 @@ use fenestra::{
         haar::HaarSteps,
         portal::PortalSteps,
         product::{FitSizes, ProductParameters, ProductSteps},
+        tiles::{SectorGrid, TileSteps, TilesParameters},
         visibility::{CacheScope, VisibilityParameters, VisibilitySteps},
     },
     shader::{
@@ -99,6 +100,11 @@ fn controlled() -> impl Steps {
 
 fn pilot() -> impl Steps {
     PilotSteps::new(&Parameters::default(), GRID, Surfaces::default()).unwrap()
+}
+
+fn tiles() -> TileSteps {
+    let grid = SectorGrid { side: 16 };
+    TileSteps::new(&TilesParameters::default(), 128, grid, Surfaces::default())
 }
 
 fn order(settings: &PassSettings, steps: &dyn Steps, wave: Wave) -> Vec<Dispatch> {
@@ -201,6 +207,8 @@ fn shown() -> Vec<(&'static str, Vec<Dispatch>)> {
         ("haar with a cache", order(&settings(2, 1), &haar("haar-cache=on"), wave(0, 1))),
         ("control-variates", order(&deep, &controlled(), wave(0, 1))),
         ("pilot of control-variates", order(&deep, &pilot(), training)),
+        ("tiles", order(&deep, &tiles(), wave(0, 1))),
+        ("pilot of tiles", order(&deep, &tiles().learning(), training)),
         ("one vertex, textures, lamps", order(&furnished, &mis(), wave(0, 1))),
         ("shared paths", order(&shared(2), &mis(), wave(0, 1))),
         ("lists of living paths", order(&listed(settings(2, 2)), &mis(), wave(0, 1))),

@@ -6,6 +6,7 @@
 #ifndef GUIDE_GLSL
 #define GUIDE_GLSL
 
+#include "regions.glsl"
 #include "vertex.glsl"
 
 READS(guide)
@@ -196,19 +197,9 @@ Guided draw_guided(Vertex vertex, uint first, uvec2 bits, uvec4 more_bits) {
     guided.entry = guide_entry(first + guided.region);
 
     uvec4 region = texelFetch(guide_regions, int(guided.region));
-    uint count = region.y * region.z;
-    uint chosen = scaled(bits.y, count);
-    uvec2 alias = texelFetch(guide_aliases, int(region.x + chosen)).xy;
-    chosen = more_bits.z < alias.x ? chosen : alias.y;
-    // Divide chosen by columns without an integer division.
-    uint row = uint(float(chosen) / float(region.y));
-    int column = int(chosen) - int(row * region.y);
-    row = column < 0 ? row - 1u : (column >= int(region.y) ? row + 1u : row);
-    column += column < 0 ? int(region.y) : (column >= int(region.y) ? -int(region.y) : 0);
-
+    uvec2 cell = region_cell(guide_aliases, region, bits.y, more_bits.z);
     EnvironmentSample light = environment_sample_cell(
-        (region.w & 0xffffu) + uint(column), (region.w >> 16u) + row,
-        vec2(unit_float(more_bits.x), unit_float(more_bits.y)));
+        cell.x, cell.y, vec2(unit_float(more_bits.x), unit_float(more_bits.y)));
     // The density of a black map is 0 / 0.
     light.pdf = parameters.environment_total > 0.0 ? light.pdf : 0.0;
     guided.sampled = evaluate_direction(

@@ -56,7 +56,7 @@ fn reversed_sobol_1(mut index: u32) -> u32 {
 }
 
 /// Maps an integer to a multiple of 2⁻²⁴ in [0, 1).
-fn unit_float(bits: u32) -> f32 {
+pub fn unit_float(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 

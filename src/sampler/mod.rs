@@ -9,8 +9,10 @@ pub mod guided;
 pub mod haar;
 mod knob;
 mod parameters;
+mod pilot;
 pub mod portal;
 pub mod product;
+pub mod tiles;
 pub mod visibility;
 
 use std::collections::BTreeMap;
@@ -122,6 +124,8 @@ samplers! {
     Haar "haar": haar::HaarRoom;
     /// Rays among candidates, with recorded visibility as control variate (Clarberg & Akenine-Möller 2008).
     ControlVariates "control-variates": control_variates::ControlVariatesRoom;
+    /// `mis` with tiles of the environment by visibility learned in camera space (Atanasov et al. 2018).
+    Tiles "tiles": tiles::TilesRoom;
 }
 
 impl Sampler {

@@ -7,6 +7,7 @@ use super::{
     knob::{self, Knob},
     portal::PortalParameters,
     product::ProductParameters,
+    tiles::TilesParameters,
     visibility::VisibilityParameters,
 };
 use crate::error::{Error, Result};
@@ -21,7 +22,7 @@ pub struct Parameters {
     /// `None` is `auto`.
     pub candidates: Option<u32>,
     /// `compensation`: true if `mis`, `portal` and what `guided` falls back to draw directions of the
-    /// environment by its compensated density.
+    /// environment by its compensated density, and `tiles` compensates what it has learned.
     pub compensation: bool,
     /// Parameters of `product`, also within `visibility`; its shares also within `haar`.
     pub product: ProductParameters,
@@ -35,6 +36,8 @@ pub struct Parameters {
     pub haar: HaarParameters,
     /// Parameters of `control-variates`.
     pub control_variates: ControlVariatesParameters,
+    /// Parameters of `tiles`.
+    pub tiles: TilesParameters,
 }
 
 impl Default for Parameters {
@@ -49,6 +52,7 @@ impl Default for Parameters {
             portal: PortalParameters::default(),
             haar: HaarParameters::default(),
             control_variates: ControlVariatesParameters::default(),
+            tiles: TilesParameters::default(),
         }
     }
 }
@@ -123,7 +127,8 @@ impl Parameters {
             || knob::set(GuidedParameters::KNOBS, &mut self.guided, key, value)?
             || knob::set(PortalParameters::KNOBS, &mut self.portal, key, value)?
             || knob::set(HaarParameters::KNOBS, &mut self.haar, key, value)?
-            || knob::set(ControlVariatesParameters::KNOBS, &mut self.control_variates, key, value)?;
+            || knob::set(ControlVariatesParameters::KNOBS, &mut self.control_variates, key, value)?
+            || knob::set(TilesParameters::KNOBS, &mut self.tiles, key, value)?;
         if is_known {
             return Ok(());
         }
@@ -144,6 +149,7 @@ impl Parameters {
             .chain(PortalParameters::KNOBS.iter().map(|knob| knob.key))
             .chain(HaarParameters::KNOBS.iter().map(|knob| knob.key))
             .chain(ControlVariatesParameters::KNOBS.iter().map(|knob| knob.key))
+            .chain(TilesParameters::KNOBS.iter().map(|knob| knob.key))
             .collect();
         keys.sort_unstable();
         keys

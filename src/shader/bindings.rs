@@ -279,6 +279,21 @@ binding_tables! {
         65 RECORD_VISIBILITIES: texels R32Float;
     }
 
+    /// Set 1 of the sampler `tiles`.
+    TILES = tiles: 1 {
+        /// Rays of the pilot, and the squared cosines of the visible ones in 64ths, by sector and tile.
+        72 TILE_COUNTS: array uint;
+        /// Probability of each tile over its share of the map's energy, and the sum of probabilities up
+        /// to and including it in `TILE_SCALE`ths, by sector and tile.
+        73 TILE_ENTRIES: texels Rg32Uint;
+        /// Tiles: first alias entry, columns, rows, first row · 65,536 + first column.
+        74 TILE_REGIONS: texels Rgba32Uint;
+        /// Alias tables over the environment's cells in each tile: threshold, alias.
+        75 TILE_ALIASES: texels Rg32Uint;
+        /// Tile of every cell of the environment.
+        76 TILE_OF_CELL: texels R16Uint;
+    }
+
     /// Set 1 of the passes by which pixels share paths.
     SHARING = sharing: 1 {
         /// First vertex of each path.

@@ -131,6 +131,16 @@ constants! {
     /// Largest edge of a record's cube, metres, bits of a float.
     CONSTANT_RECORD_LARGEST_EDGE = 55;
 
+    // Specialization constants of `sample_tiles` and `count_tiles`.
+    /// Number of tiles of the environment.
+    CONSTANT_TILES = 57;
+    /// Sectors along each side of the square of directions from the camera.
+    CONSTANT_SECTOR_SIDE = 58;
+    /// 1 reads a sector at random among those around a hit, 0 the hit's own.
+    CONSTANT_SECTOR_JITTER = 59;
+    /// 1 draws all rays through tiles, for the pilot to learn from.
+    CONSTANT_TILES_LEARN = 60;
+
     // Values of CONSTANT_SAMPLER.
     /// Uniform over the hemisphere.
     SAMPLER_UNIFORM = 0;
@@ -383,6 +393,11 @@ constants! {
 
     /// Visibility records; a power of two.
     VISIBILITY_RECORDS = 1 << 13;
+
+    /// Parts in which probabilities of tiles are counted: single precision holds them exactly.
+    TILE_SCALE = 1 << 24;
+    /// Parts in which the squared cosine of a visible ray is counted.
+    TILE_RESPONSE_UNITS = 64;
 
     // Layers that the pass `show` shows.
     /// Mean radiance.

@@ -78,7 +78,7 @@ pub const KEYS: &[Key] = &[
         "1",
         Action::Sampler(1),
         "sampler: uniform, cosine, brdf, env, mis, ris, product, visibility, guided, portal, haar, \
-         control-variates",
+         control-variates, tiles",
     ),
     key("2", Action::Sampler(2), ""),
     key("3", Action::Sampler(3), ""),
@@ -91,6 +91,7 @@ pub const KEYS: &[Key] = &[
     key("o", Action::Sampler(10), ""),
     key("u", Action::Sampler(11), ""),
     key("v", Action::Sampler(12), ""),
+    key("t", Action::Sampler(13), ""),
     key("x", Action::Split, "two samplers side by side at equal time, or one"),
     key("Tab", Action::Swap, "choose the sampler of the other side"),
     key("[", Action::Depth(-1), "fewer and more path vertices"),
@@ -154,6 +155,6 @@ mod tests {
         let names: Vec<&str> = Sampler::ALL.iter().map(|sampler| sampler.name()).collect();
         let about = KEYS.iter().find(|key| key.key == "1").map_or("", |key| key.about);
         assert_eq!(about, format!("sampler: {}", names.join(", ")));
-        assert!(rows().iter().any(|(keys, _)| keys == "1 2 3 4 5 6 7 8 9 o u v"));
+        assert!(rows().iter().any(|(keys, _)| keys == "1 2 3 4 5 6 7 8 9 o u v t"));
     }
 }

@@ -6,9 +6,8 @@
 //! (`glsl/control_variates/sample_controlled.comp`): all of them bring the light that the records expect,
 //! the traced one corrects it.
 //!
-//! The pilot has random numbers of its own, so the picture's samples are independent of the records, and
-//! every estimate is unbiased whatever these hold. It depends on scene, film and seed alone: a render
-//! that goes on from its sums, and one of later samples, repeat it.
+//! The picture's samples are independent of those of the pilot (`src/sampler/pilot.rs`), and every estimate
+//! is unbiased whatever the records hold.
 
 mod buffers;
 pub mod controlled;
@@ -23,16 +22,12 @@ pub use parameters::ControlVariatesParameters;
 pub use records::RecordGrid;
 pub use steps::{ControlledSteps, PilotSteps};
 
-use super::{Context, Parameters, Room, basic, knob};
+use super::{Context, Parameters, Room, basic, knob, pilot};
 use crate::{
     error::{Error, Result},
     gpu::DescriptorSet,
     pass::{Passes, Progress, Report, Runner, Steps, Technique},
-    shader::{constants::TRAINING_WAVE, structs::Wave},
 };
-
-/// Tells the random numbers of the pilot from those of the picture.
-const PILOT_SEED: u32 = 0x3a91_0c57;
 
 pub(super) struct ControlVariatesRoom;
 
@@ -101,17 +96,8 @@ impl Technique for ControlVariates {
         if self.has_records {
             return Ok(u32::MAX);
         }
-        let wave = Wave {
-            sample_count: 1,
-            seed: progress.seed ^ PILOT_SEED,
-            pixel_stride: 1,
-            is_training: TRAINING_WAVE,
-            ..Wave::default()
-        };
         self.buffers.clear()?;
-        runner.sweep(self, wave, runner.film().padded_pixels())?;
-        runner.take_counters()?;
-        if runner.is_stopped() {
+        if !pilot::shoot(self, runner, progress, 1)? {
             return Ok(u32::MAX);
         }
         let start = Instant::now();

@@ -457,7 +457,7 @@ impl GuideBuffers {
 }
 
 /// Returns first alias entry, columns, rows and first place of every region, and all alias entries.
-fn region_tables(partition: &Partition) -> (Vec<[u32; 4]>, Vec<[u32; 2]>) {
+pub(in crate::sampler) fn region_tables(partition: &Partition) -> (Vec<[u32; 4]>, Vec<[u32; 2]>) {
     let regions = partition.regions.iter().map(|region| {
         let first = region.first[0] | region.first[1] << 16;
         [region.first_entry as u32, region.size[0], region.size[1], first]

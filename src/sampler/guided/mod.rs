@@ -39,8 +39,8 @@ mod technique;
 mod tiles;
 
 pub use arriving::{ARRIVAL_DIRECTIONS, ArrivalWords, ArrivingLight, Reflected, arrival_direction};
-pub(super) use buffers::cell_edges;
 pub use buffers::{GuideBuffers, GuideSize};
+pub(super) use buffers::{cell_edges, region_tables};
 pub use cells::MAX_CELLS;
 pub use counts::{Count, CountWords, PARTS_PER_RAY};
 pub use entries::{decode_entry, decode_visibility};

@@ -1,0 +1,43 @@
+// Probe of tiles/: sector of a place, density of a direction, and a draw. For tests/tiles.rs.
+#version 460
+
+#include "tiles/tiles.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+struct TileQuery {
+    vec3 position;
+    vec2 shift;
+    vec3 direction;
+    uint sector;
+    uvec2 bits;
+    uvec4 more_bits;
+};
+
+struct TileAnswer {
+    uint sector;
+    float pdf;
+    vec3 sampled_direction;
+    vec3 sampled_radiance;
+    float sampled_pdf;
+};
+
+layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Queries {
+    TileQuery queries[];
+};
+layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {
+    TileAnswer answers[];
+};
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= uint(queries.length())) {
+        return;
+    }
+    TileQuery query = queries[index];
+    float map_pdf = environment_pdf(query.direction, environment_light(query.direction));
+    EnvironmentSample light = draw_from_tiles(query.sector, query.bits, query.more_bits);
+    answers[index] = TileAnswer(
+        sector_of(query.position, query.shift), tiles_pdf(query.sector, query.direction, map_pdf),
+        light.direction, light.radiance, light.pdf);
+}

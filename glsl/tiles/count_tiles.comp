@@ -1,0 +1,37 @@
+// Counts every shadow ray of the pilot, and the squared cosine of every visible one, in the sector of its hit
+// and the tile of its direction. Sums of integers: the order of rays makes no difference.
+#version 460
+
+#include "load.glsl"
+#include "path_list.glsl"
+#include "tiles/sectors.glsl"
+#include "wave.glsl"
+
+READS(visibility)
+UPDATES(tile_counts)
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+void count_ray(ListedRay listed) {
+    HitOrigin hit = load_hit_origin(listed.path);
+    if (hit.material == NO_MATERIAL) {
+        return;
+    }
+    ShadowRay ray = load_shadow_ray(listed.ray);
+    uint entry = sector_of(hit.position, vec2(0.0)) * TILES + tile_of(ray.direction);
+    atomicAdd(tile_counts[2u * entry], 1u);
+    // Same test as in shadow.comp: rays without a contribution are not traced.
+    if (ray.contribution != vec3(0.0) && visibility[listed.ray] != 0u) {
+        float cosine = max(dot(hit.geometric_normal, ray.direction), 0.0);
+        atomicAdd(
+            tile_counts[2u * entry + 1u], uint(cosine * cosine * float(TILE_RESPONSE_UNITS) + 0.5));
+    }
+}
+
+void main() {
+    uint path_count = listed_path_count();
+    uint ray_count = path_count * wave.shadow_ray_count;
+    for (uint place = gl_GlobalInvocationID.x; place < ray_count; place += ray_count) {
+        count_ray(listed_ray(place, path_count));
+    }
+}

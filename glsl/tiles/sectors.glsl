@@ -1,0 +1,35 @@
+// Sectors of the directions from the camera, in which visibility is learned, and tiles of the environment.
+// Twin of src/sampler/tiles/{grid,density}.rs.
+
+#ifndef SECTORS_GLSL
+#define SECTORS_GLSL
+
+#include "environment.glsl"
+#include "equal_area.glsl"
+
+TEXELS(tile_of_cell)
+
+layout(constant_id = CONSTANT_TILES) const uint TILES = 128u;
+layout(constant_id = CONSTANT_SECTOR_SIDE) const uint SECTOR_SIDE = 64u;
+
+// Sector of a place as seen from the camera, moved by `shift` sectors. All sectors have the same solid angle;
+// the square of directions has its middle at the view axis, and its seam behind the camera.
+uint sector_of(vec3 position, vec2 shift) {
+    vec3 away = position - parameters.camera_position;
+    float far = length(away);
+    vec3 direction = far > 0.0 ? away / far : parameters.camera_forward;
+    vec2 at = square_from_direction(vec3(
+        dot(direction, parameters.camera_right), dot(direction, parameters.camera_up),
+        dot(direction, parameters.camera_forward)));
+    vec2 place = clamp(at * float(SECTOR_SIDE) + shift, 0.0, float(SECTOR_SIDE - 1u));
+    return uint(place.y) * SECTOR_SIDE + uint(place.x);
+}
+
+// Tile that holds a direction.
+uint tile_of(vec3 direction) {
+    EnvironmentLocation location = environment_locate(direction);
+    int cell = int(location.row * parameters.environment_width + location.column);
+    return texelFetch(tile_of_cell, cell).x;
+}
+
+#endif

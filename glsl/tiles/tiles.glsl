@@ -1,0 +1,47 @@
+// Directions through tiles of the environment, by what a sector of the camera has learned of them. Densities
+// in solid angle measure. Twin of src/sampler/tiles/density.rs.
+//
+// A sector's entries come from the pilot and do not change afterwards.
+
+#ifndef TILES_GLSL
+#define TILES_GLSL
+
+#include "regions.glsl"
+#include "tiles/sectors.glsl"
+
+TEXELS(tile_entries)
+TEXELS(tile_regions)
+TEXELS(tile_aliases)
+
+// Density of draw_from_tiles at a direction whose density in the whole map is `map_pdf`.
+float tiles_pdf(uint sector, vec3 direction, float map_pdf) {
+    uint ratio = texelFetch(tile_entries, int(sector * TILES + tile_of(direction))).x;
+    return uintBitsToFloat(ratio) * map_pdf;
+}
+
+// Draws a tile by bits.x, one of its cells by bits.y, and a direction from the bilinear patch.
+EnvironmentSample draw_from_tiles(uint sector, uvec2 bits, uvec4 more_bits) {
+    uint first = sector * TILES;
+    uint wanted = scaled(bits.x, TILE_SCALE);
+    // Find the first tile whose cumulative probability exceeds the number: never one without any.
+    uint tile = 0u;
+    uint last = TILES - 1u;
+    while (tile < last) {
+        uint middle = (tile + last) >> 1u;
+        if (texelFetch(tile_entries, int(first + middle)).y > wanted) {
+            last = middle;
+        } else {
+            tile = middle + 1u;
+        }
+    }
+    uvec2 cell =
+        region_cell(tile_aliases, texelFetch(tile_regions, int(tile)), bits.y, more_bits.z);
+    EnvironmentSample light = environment_sample_cell(
+        cell.x, cell.y, vec2(unit_float(more_bits.x), unit_float(more_bits.y)));
+    float ratio = uintBitsToFloat(texelFetch(tile_entries, int(first + tile)).x);
+    // The density of a black map is 0 / 0.
+    light.pdf = parameters.environment_total > 0.0 ? ratio * light.pdf : 0.0;
+    return light;
+}
+
+#endif

@@ -1,0 +1,93 @@
+//! Descriptor set 1 of `tiles`: counts of the pilot, and the probabilities that come of them.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use super::{
+    cache::{Entry, TileCache},
+    grid::SectorGrid,
+};
+use crate::{
+    error::Result,
+    gpu::{Buffer, Commands, DescriptorSet, Device},
+    sampler::guided::{Partition, region_tables},
+    shader::bindings::{TILES, tiles},
+};
+
+/// The cache on a device.
+pub struct TileBuffers {
+    device: Arc<Device>,
+    set: DescriptorSet,
+    grid: SectorGrid,
+    cache: TileCache,
+    counts: Buffer,
+    entries: Buffer,
+    tables: [Buffer; 3],
+}
+
+impl TileBuffers {
+    /// Uploads the tiles, with nothing learned of them. Fails if the device does or its limits are exceeded.
+    pub fn new(
+        device: &Arc<Device>,
+        partition: &Partition,
+        grid: SectorGrid,
+        cache: TileCache,
+    ) -> Result<Self> {
+        let bytes = 8 * (grid.sectors() * cache.tiles()) as u64;
+        let counts = Buffer::new(device, "tile counts", bytes)?;
+        let entries = Buffer::new(device, "tile entries", bytes)?;
+        let (regions, aliases) = region_tables(partition);
+        let tables = [
+            Buffer::texels_from_slice(device, "tiles", &regions)?,
+            Buffer::texels_from_slice(device, "tile aliases", &aliases)?,
+            Buffer::texels_from_slice(device, "tile of cell", &partition.region_of_cell)?,
+        ];
+        let [regions, aliases, of_cell] = &tables;
+        let bound = [
+            (tiles::TILE_COUNTS, &counts),
+            (tiles::TILE_ENTRIES, &entries),
+            (tiles::TILE_REGIONS, regions),
+            (tiles::TILE_ALIASES, aliases),
+            (tiles::TILE_OF_CELL, of_cell),
+        ];
+        let set = DescriptorSet::new(device, &TILES, &bound)?;
+        let buffers =
+            Self { device: Arc::clone(device), set, grid, cache, counts, entries, tables };
+        buffers.forget()?;
+        Ok(buffers)
+    }
+
+    /// Descriptor set 1.
+    pub fn set(&self) -> &DescriptorSet {
+        &self.set
+    }
+
+    /// Starts from nothing. Fails if the device does.
+    pub fn forget(&self) -> Result<()> {
+        let mut commands = Commands::begin(&self.device)?;
+        commands.fill(&self.counts, 0);
+        commands.submit_and_wait()?;
+        self.upload(&self.cache.untrained().repeat(self.grid.sectors()))
+    }
+
+    /// Reads rays and their summed squares of cosines by sector and tile. Fails if the device does.
+    pub fn counts(&self) -> Result<Vec<[u32; 2]>> {
+        self.counts.download(self.grid.sectors() * self.cache.tiles())
+    }
+
+    /// Turns the counts into probabilities for the passes to come. Fails if the device does.
+    pub fn freeze(&self) -> Result<()> {
+        self.upload(&self.cache.learned(self.grid, &self.counts()?))
+    }
+
+    /// Replaces the entries of all sectors. Fails if the device does.
+    pub fn upload(&self, entries: &[Entry]) -> Result<()> {
+        self.entries.upload(bytemuck::cast_slice(entries))
+    }
+
+    /// Bytes by buffer name.
+    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+        let own = [&self.counts, &self.entries];
+        let all = own.into_iter().chain(&self.tables);
+        all.map(|buffer| (buffer.name().to_owned(), buffer.size())).collect()
+    }
+}

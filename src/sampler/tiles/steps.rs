@@ -1,0 +1,65 @@
+//! Passes of `tiles`: `sample_tiles`, and in the pilot `count_tiles`.
+
+use super::{grid::SectorGrid, parameters::TilesParameters};
+use crate::{
+    pass::{Domain, Kernel, Steps, Surfaces},
+    shader::{
+        constants::{
+            CONSTANT_SECTOR_JITTER, CONSTANT_SECTOR_SIDE, CONSTANT_TILES, CONSTANT_TILES_LEARN,
+        },
+        structs::Wave,
+    },
+};
+
+/// Steps of the picture, or of the pilot before it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TileSteps {
+    tiles: u32,
+    grid: SectorGrid,
+    has_jitter: bool,
+    learns: bool,
+    surfaces: Surfaces,
+}
+
+impl TileSteps {
+    /// Returns the steps of the picture.
+    pub fn new(
+        parameters: &TilesParameters,
+        tiles: usize,
+        grid: SectorGrid,
+        surfaces: Surfaces,
+    ) -> Self {
+        let has_jitter = parameters.sector_jitter;
+        Self { tiles: tiles as u32, grid, has_jitter, learns: false, surfaces }
+    }
+
+    /// Returns the same steps for the pilot.
+    pub fn learning(self) -> Self {
+        Self { learns: true, ..self }
+    }
+
+    /// Specialization constants of all passes over the cache.
+    pub fn constants(&self) -> [(u32, u32); 2] {
+        [(CONSTANT_TILES, self.tiles), (CONSTANT_SECTOR_SIDE, self.grid.side)]
+    }
+}
+
+impl Steps for TileSteps {
+    fn walks_lists(&self) -> bool {
+        true
+    }
+
+    fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
+        let own = [
+            (CONSTANT_SECTOR_JITTER, u32::from(self.has_jitter)),
+            (CONSTANT_TILES_LEARN, u32::from(self.learns)),
+        ];
+        let constants = [&own[..], &self.constants(), &self.surfaces.constants()].concat();
+        vec![Kernel::new("sample_tiles", Domain::Surfaces, &constants)]
+    }
+
+    fn after_shadow_rays(&self, _wave: &Wave) -> Vec<Kernel> {
+        let count = Kernel::new("count_tiles", Domain::ShadowRays, &self.constants());
+        if self.learns { vec![count] } else { Vec::new() }
+    }
+}
