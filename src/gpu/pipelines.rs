@@ -17,7 +17,7 @@ pub(super) struct Pipelines {
     made: Mutex<HashMap<Key, Made>>,
 }
 
-/// What a pipeline is made from.
+/// Shader and constants that a pipeline is made from.
 #[derive(PartialEq, Eq, Hash)]
 pub(super) struct Key {
     name: String,
