@@ -104,6 +104,8 @@
 //! - \[Jarzynski & Olano 2020\] "Hash Functions for GPU Rendering", JCGT 9(3).
 //! - \[Joe & Kuo 2008\] "Constructing Sobol Sequences with Better Two-Dimensional Projections",
 //!   SIAM Journal on Scientific Computing 30(5).
+//! - \[Karlík et al. 2019\] "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance
+//!   Sampling", ACM Transactions on Graphics 38(6).
 //! - \[Kelemen & Szirmay-Kalos 2001\] "A Microfacet Based Coupled Specular-Matte BRDF Model with
 //!   Importance Sampling", Eurographics short presentations.
 //! - \[Knuth 1997\] *The Art of Computer Programming*, volume 2, third edition, section 4.2.2.
