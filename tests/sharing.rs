@@ -145,8 +145,8 @@ fn with_roulette_from_the_first_bounce_on() {
 fn with_lamps_panes_mirrors_and_sheets() {
     let _alone = support::alone();
     let scene = scenes::glazed_room();
-    agrees(&scene, &[(Sampler::Guided, "8")], 24, &base(4));
-    agrees(&scene, &[(Sampler::Mis, "8")], 24, &base(2));
+    agrees(&scene, &[(Sampler::Guided, "8")], 32, &base(4));
+    agrees(&scene, &[(Sampler::Mis, "8")], 48, &base(2));
 }
 
 #[test]
