@@ -19,7 +19,7 @@ use super::{
 };
 use crate::error::{Error, Result};
 
-/// A logical device with its queue, allocator, set layouts and pipeline cache.
+/// A logical device with its queue, allocator, set layouts, pipelines and the driver's pipeline cache.
 pub struct Device {
     raw: ash::Device,
     debug_names: Option<ext::debug_utils::Device>,
@@ -157,7 +157,7 @@ impl Device {
         self.debug_names.as_ref()
     }
 
-    /// Locks the queue for one thread. Pipelines are created and destroyed under the same lock:
+    /// Locks the queue for one thread. Pipelines are created under the same lock:
     /// software drivers compile a pipeline on the queue's own thread when a dispatch first uses it,
     /// and Mesa 22.3 was seen to crash there when tests ran in several threads.
     pub(super) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
