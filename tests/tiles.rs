@@ -273,7 +273,7 @@ impl Cache {
             ..SceneParameters::default()
         };
         let own = TilesParameters { sector_jitter: false, ..TilesParameters::default() };
-        let steps = TileSteps::new(&own, cache.tiles(), GRID, scene_buffers.surfaces());
+        let steps = TileSteps::new(&own, cache.tiles(), scene_buffers.surfaces());
         let buffers = TileBuffers::new(device, &partition, GRID, cache).unwrap();
         buffers.upload(&entries).unwrap();
         Self { scene, partition, entries, buffers, scene_buffers, parameters, steps }

@@ -8,9 +8,15 @@
 #include "equal_area.glsl"
 
 TEXELS(tile_of_cell)
+TEXELS(tile_entries)
 
 layout(constant_id = CONSTANT_TILES) const uint TILES = 128u;
-layout(constant_id = CONSTANT_SECTOR_SIDE) const uint SECTOR_SIDE = 64u;
+
+// Sectors along each side of the square of directions. No constant: a window in motion changes it with the
+// size of its film, and each constant has pipelines of its own.
+uint sector_side() {
+    return uint(sqrt(float(uint(textureSize(tile_entries)) / TILES)) + 0.5);
+}
 
 // Sector of a place as seen from the camera, moved by `shift` sectors. All sectors have the same solid angle;
 // the square of directions has its middle at the view axis, and its seam behind the camera.
@@ -21,8 +27,9 @@ uint sector_of(vec3 position, vec2 shift) {
     vec2 at = square_from_direction(vec3(
         dot(direction, parameters.camera_right), dot(direction, parameters.camera_up),
         dot(direction, parameters.camera_forward)));
-    vec2 place = clamp(at * float(SECTOR_SIDE) + shift, 0.0, float(SECTOR_SIDE - 1u));
-    return uint(place.y) * SECTOR_SIDE + uint(place.x);
+    uint side = sector_side();
+    vec2 place = clamp(at * float(side) + shift, 0.0, float(side - 1u));
+    return uint(place.y) * side + uint(place.x);
 }
 
 // Tile that holds a direction.

@@ -9,7 +9,6 @@
 #include "regions.glsl"
 #include "tiles/sectors.glsl"
 
-TEXELS(tile_entries)
 TEXELS(tile_regions)
 TEXELS(tile_aliases)
 

@@ -134,12 +134,10 @@ constants! {
     // Specialization constants of `sample_tiles` and `count_tiles`.
     /// Number of tiles of the environment.
     CONSTANT_TILES = 57;
-    /// Sectors along each side of the square of directions from the camera.
-    CONSTANT_SECTOR_SIDE = 58;
     /// 1 reads a sector at random among those around a hit, 0 the hit's own.
-    CONSTANT_SECTOR_JITTER = 59;
+    CONSTANT_SECTOR_JITTER = 58;
     /// 1 draws all rays through tiles, for the pilot to learn from.
-    CONSTANT_TILES_LEARN = 60;
+    CONSTANT_TILES_LEARN = 59;
 
     // Values of CONSTANT_SAMPLER.
     /// Uniform over the hemisphere.

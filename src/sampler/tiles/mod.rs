@@ -59,7 +59,7 @@ impl Room for TilesRoom {
         let partition = Partition::new(&scene.environment, own.environment_tiles as usize);
         let cache = TileCache::new(&partition, own.tile_floor, parameters.compensation);
         let grid = SectorGrid::new(scene, own, cache.tiles());
-        let steps = TileSteps::new(own, cache.tiles(), grid, runner.settings().surfaces);
+        let steps = TileSteps::new(own, cache.tiles(), runner.settings().surfaces);
         let buffers = TileBuffers::new(runner.device(), &partition, grid, cache)?;
         Ok(Box::new(Tiles {
             pilot: steps.learning(),

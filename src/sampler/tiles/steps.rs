@@ -1,12 +1,10 @@
 //! Passes of `tiles`: `sample_tiles`, and in the pilot `count_tiles`.
 
-use super::{grid::SectorGrid, parameters::TilesParameters};
+use super::parameters::TilesParameters;
 use crate::{
     pass::{Domain, Kernel, Steps, Surfaces},
     shader::{
-        constants::{
-            CONSTANT_SECTOR_JITTER, CONSTANT_SECTOR_SIDE, CONSTANT_TILES, CONSTANT_TILES_LEARN,
-        },
+        constants::{CONSTANT_SECTOR_JITTER, CONSTANT_TILES, CONSTANT_TILES_LEARN},
         structs::Wave,
     },
 };
@@ -15,7 +13,6 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TileSteps {
     tiles: u32,
-    grid: SectorGrid,
     has_jitter: bool,
     learns: bool,
     surfaces: Surfaces,
@@ -23,14 +20,9 @@ pub struct TileSteps {
 
 impl TileSteps {
     /// Returns the steps of the picture.
-    pub fn new(
-        parameters: &TilesParameters,
-        tiles: usize,
-        grid: SectorGrid,
-        surfaces: Surfaces,
-    ) -> Self {
+    pub fn new(parameters: &TilesParameters, tiles: usize, surfaces: Surfaces) -> Self {
         let has_jitter = parameters.sector_jitter;
-        Self { tiles: tiles as u32, grid, has_jitter, learns: false, surfaces }
+        Self { tiles: tiles as u32, has_jitter, learns: false, surfaces }
     }
 
     /// Returns the same steps for the pilot.
@@ -38,9 +30,9 @@ impl TileSteps {
         Self { learns: true, ..self }
     }
 
-    /// Specialization constants of all passes over the cache.
-    pub fn constants(&self) -> [(u32, u32); 2] {
-        [(CONSTANT_TILES, self.tiles), (CONSTANT_SECTOR_SIDE, self.grid.side)]
+    /// Specialization constant of all passes over the cache.
+    pub fn constants(&self) -> [(u32, u32); 1] {
+        [(CONSTANT_TILES, self.tiles)]
     }
 }
 
