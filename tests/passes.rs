@@ -18,7 +18,7 @@ use fenestra::{
         haar::HaarSteps,
         portal::PortalSteps,
         product::{FitSizes, ProductParameters, ProductSteps},
-        tiles::{SectorGrid, TileSteps, TilesParameters},
+        tiles::{TileSteps, TilesParameters},
         visibility::{CacheScope, VisibilityParameters, VisibilitySteps},
     },
     shader::{
@@ -103,8 +103,7 @@ fn pilot() -> impl Steps {
 }
 
 fn tiles() -> TileSteps {
-    let grid = SectorGrid { side: 16 };
-    TileSteps::new(&TilesParameters::default(), 128, grid, Surfaces::default())
+    TileSteps::new(&TilesParameters::default(), 128, Surfaces::default())
 }
 
 fn order(settings: &PassSettings, steps: &dyn Steps, wave: Wave) -> Vec<Dispatch> {
