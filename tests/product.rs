@@ -34,7 +34,7 @@ use fenestra::{
         },
         structs::{Counters, Wave},
     },
-    srbf::{kernel_deviation, kernel_pdf},
+    srbf::{kernel_deviation, kernel_hemisphere_part, kernel_pdf},
 };
 use glam::{DVec3, Vec3, dvec3};
 use support::{scenes, statistics};
@@ -90,7 +90,7 @@ impl MixtureAnswer {
 }
 
 #[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 struct LobeAnswer {
     axis: [f32; 3],
     bandwidth: f32,
@@ -613,6 +613,37 @@ fn samples_follow_the_density_with_other_parameters() {
     };
     let paths = Paths::new(product, visibility);
     every_state_of_the_cache(&paths, &[2, 3], |index| index % 2 == 1);
+}
+
+/// Where all products are kept, the order decides by what they are chosen: by their integrals over the
+/// sphere, or by the parts of them above the horizon.
+#[test]
+fn lobes_are_chosen_by_integral_in_either_order() {
+    let all = ProductParameters { environment_lobes: 8, ..few_lobes() };
+    let thesis = ProductParameters { order: LobeOrder::Coefficient, ..all };
+    let lobes = |product| Paths::new(product, VisibilityParameters::default()).lobes();
+    let (integrals, coefficients) = (lobes(all), lobes(thesis));
+    for (path, surface) in surfaces().iter().enumerate() {
+        let normal = surface.normal.as_vec3();
+        let scales: Vec<f32> = integrals[path]
+            .iter()
+            .zip(&coefficients[path])
+            .filter(|(lobe, _)| lobe.weight > 1e-3)
+            .map(|(lobe, other)| {
+                let same = lobe.axis == other.axis && lobe.bandwidth == other.bandwidth;
+                assert!(same, "path {path}: {lobe:?} and {other:?}");
+                let cosine = Vec3::from(lobe.axis).dot(normal);
+                other.weight * kernel_hemisphere_part(lobe.bandwidth, cosine) / lobe.weight
+            })
+            .collect();
+        let (least, most) = (
+            scales.iter().copied().fold(f32::MAX, f32::min),
+            scales.iter().copied().fold(0.0, f32::max),
+        );
+        eprintln!("path {path}: {} lobes, {least} to {most}", scales.len());
+        assert!(scales.len() > 8, "path {path}: {} lobes", scales.len());
+        assert!(most / least < 1.05, "path {path}: {least} to {most}");
+    }
 }
 
 /// Returns the lobe that a number chooses, with the weights in force; `None` where rounding decides.

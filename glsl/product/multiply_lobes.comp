@@ -6,8 +6,8 @@
 // logarithms; ordering by integral costs another one per pair. Loops of no rounds skip environment
 // lobes below the horizon: they end early on devices that run both sides of a branch.
 //
-// Deviation: a lobe's weight is its integral above the horizon [Tokuyoshi 2022], not over the sphere,
-// since directions drawn below are lost.
+// Deviation: by integral, a lobe's weight is its integral above the horizon [Tokuyoshi 2022], not over
+// the sphere, since directions drawn below are lost. By coefficient it is that over the sphere.
 #version 460
 
 #include "load.glsl"
@@ -82,6 +82,11 @@ float coarse_logarithm(float x) {
     return 0.69314718 * (float(floatBitsToInt(x)) * 1.1920929e-7 - 126.957);
 }
 
+// Logarithm of sqrt(bandwidth^2 + 1/4).
+float half_logarithm(float square) {
+    return 0.5 * coarse_logarithm(square + 0.25);
+}
+
 // Strength of a product: logarithm of its coefficient, or of its integral over 2 pi. The integral
 // is the coefficient times (1 - exp(-2 bandwidth)) / bandwidth, here 1 / sqrt(bandwidth^2 + 1/4).
 float strength_of(vec4 environment, vec4 brdf) {
@@ -89,7 +94,7 @@ float strength_of(vec4 environment, vec4 brdf) {
     float square = dot(sum, sum);
     float strength = environment.w + brdf.w + sqrt(square);
     if (ORDER_BY_COEFFICIENT == 0u) {
-        strength -= 0.5 * coarse_logarithm(square + 0.25);
+        strength -= half_logarithm(square);
     }
     return strength;
 }
@@ -174,7 +179,7 @@ bool is_stronger(vec3 environment, vec4 brdf, float threshold) {
     float square = dot(sum, sum);
     float root = threshold - brdf.w;
     if (ORDER_BY_COEFFICIENT == 0u) {
-        root += 0.5 * coarse_logarithm(square + 0.25);
+        root += half_logarithm(square);
     }
     return square > root * abs(root);
 }
@@ -282,7 +287,18 @@ void main() {
         }
     }
 
-    // Scale weights by the strongest of the guess, so that halves can hold them.
+    // Scale weights by the strongest lobe, so that halves can hold them: that of the guess or, where that
+    // is not the one of the largest integral, that of the kept ones.
+    float strongest = guessed.strongest;
+    if (ORDER_BY_COEFFICIENT != 0u) {
+        strongest = NO_STRENGTH;
+        for (uint l = 0u; l < count; ++l) {
+            vec4 product = environment_exponents(selected[l] & 0xffffu)
+                + brdf_exponents(view, selected[l] >> 16u);
+            float square = dot(product.xyz, product.xyz);
+            strongest = max(strongest, product.w + sqrt(square) - half_logarithm(square));
+        }
+    }
     float sum = 0.0;
     float kept = 0.0;
     for (uint l = 0u; l < count; ++l) {
@@ -291,11 +307,9 @@ void main() {
         float bandwidth = length(product.xyz);
         vec3 axis = bandwidth > 1e-20 ? product.xyz / bandwidth : view.normal;
         float drawn_bandwidth = clamp(bandwidth, SMALLEST_BANDWIDTH, LARGEST_BANDWIDTH);
-        float weight = exp(product.w + bandwidth - guessed.strongest);
-        if (ORDER_BY_COEFFICIENT == 0u) {
-            weight *= (1.0 - exp(-2.0 * drawn_bandwidth)) / drawn_bandwidth;
-        }
-        kept += weight;
+        float coefficient = exp(product.w + bandwidth - strongest);
+        float weight = coefficient * ((1.0 - exp(-2.0 * drawn_bandwidth)) / drawn_bandwidth);
+        kept += ORDER_BY_COEFFICIENT == 0u ? weight : coefficient;
         if (ORDER_BY_COEFFICIENT == 0u) {
             weight *= part_above_horizon(drawn_bandwidth, dot(axis, view.normal));
         }
@@ -307,7 +321,7 @@ void main() {
             lobe_sums[l / LOBES_PER_SUM * path_count + path] = sum;
         }
     }
-    kept *= exp(guessed.strongest - bound);
+    kept *= exp(strongest - bound);
     lobe_counts[path] = count;
     if (count > 0u) {
         atomicAdd(counters.product_hits, 1u);

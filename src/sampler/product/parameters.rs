@@ -8,12 +8,12 @@ use crate::{
     },
 };
 
-/// Order of the lobes of a product for dropping the weakest.
+/// Order of the lobes of a product for dropping the weakest, and what the others are chosen by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LobeOrder {
-    /// By integral over the sphere.
+    /// By integral over the sphere; chosen by its part above the horizon.
     Integral,
-    /// By coefficient, as in the thesis.
+    /// By coefficient; chosen by integral over the sphere, as in the thesis.
     Coefficient,
 }
 
