@@ -3,9 +3,6 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-
 use std::{
     fmt::Write,
     fs,
@@ -13,7 +10,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use command::{Folder, Run, Running, program};
+use crate::support::command::{Folder, Run, Running, program};
 use fenestra::{
     brdf::fresnel::fresnel_conductor,
     film::{Attribute, Image},

@@ -1,10 +1,7 @@
 //! `fenestra bench` on a small scene: every figure is there, and device and CPU see the same hits.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-
-use command::Folder;
+use crate::support::command::Folder;
 
 const SCENE: &str = r#"
 [camera]

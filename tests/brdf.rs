@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
+use crate::support::statistics;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use fenestra::{
@@ -11,12 +12,7 @@ use fenestra::{
 use glam::{DVec3, Vec3, vec3};
 use rayon::prelude::*;
 
-#[path = "support/materials.rs"]
-mod materials;
-#[path = "support/statistics.rs"]
-mod statistics;
-
-use materials::{cases, direction, hemisphere, tables, uniform};
+use crate::support::materials::{cases, direction, hemisphere, tables, uniform};
 
 /// Polar angles of the outgoing direction, in degrees.
 const ANGLES_DEG: [f64; 6] = [0.0, 20.0, 50.0, 75.0, 85.0, 89.5];

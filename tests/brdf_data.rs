@@ -14,10 +14,7 @@ use fenestra::math::colour::luminance;
 use glam::{DVec3, Vec3, dvec3};
 use rayon::prelude::*;
 
-#[path = "support/materials.rs"]
-mod materials;
-
-use materials::direction;
+use crate::support::materials::direction;
 
 /// Returns the path of a file, or `None` where there is no shared folder.
 fn shared(name: &str) -> Option<PathBuf> {

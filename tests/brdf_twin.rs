@@ -1,5 +1,6 @@
 //! `glsl/include/brdf.glsl` against its Rust twin, over all kinds of materials.
 
+use crate::support;
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     brdf::{self, fresnel, specular as twin},
@@ -10,11 +11,7 @@ use fenestra::{
 };
 use glam::Vec3;
 
-#[path = "support/materials.rs"]
-mod materials;
-mod support;
-
-use materials::{cases, direction, hemisphere, specular, tables, uniform};
+use crate::support::materials::{cases, direction, hemisphere, specular, tables, uniform};
 
 /// Twin of `BrdfQuery` in `glsl/test/brdf.comp`.
 #[repr(C)]

@@ -2,11 +2,9 @@
 //! that go on, and has no other influence on the picture.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-mod support;
-
-use command::Folder;
+use crate::support;
+use crate::support::command::Folder;
+use crate::support::{renderer, scenes};
 use fenestra::{
     film::{Attribute, Checkpoint, Image, Statistics, Sums},
     renderer::Settings,
@@ -19,7 +17,6 @@ use fenestra::{
     },
 };
 use glam::Vec3;
-use support::{renderer, scenes};
 
 fn guided(candidates: Option<u32>) -> Settings {
     let parameters = Parameters { candidates, ..Parameters::default() };

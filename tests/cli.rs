@@ -2,12 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-
 use std::process::Stdio;
 
-use command::{Folder, Run, program};
+use crate::support::command::{Folder, Run, program};
 use fenestra::film::Image;
 
 /// Makes an image of one colour.

@@ -1,8 +1,11 @@
 //! Scenes whose picture is known in closed form, rendered with every sampler.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-mod support;
-
+use crate::support;
+use crate::support::{
+    scenes::{self, diffuse},
+    statistics::{Estimate, estimates},
+};
 use fenestra::{
     film::Sums,
     pass::Roulette,
@@ -14,10 +17,6 @@ use fenestra::{
     scene::{Lamp, Portal, Scene, lamp::LampKind},
 };
 use glam::{DVec3, Vec3};
-use support::{
-    scenes::{self, diffuse},
-    statistics::{Estimate, estimates},
-};
 
 fn render(scene: &Scene, settings: Settings, samples: u32) -> Sums {
     let (sums, totals) = support::render(scene, settings, samples);
@@ -378,7 +377,7 @@ fn tiny_plane(reflectance: Vec3) -> Scene {
 /// Sums of floats that did not carry their rounding errors would drift by 1e-3 and stop growing at 2²⁴
 /// times a sample.
 #[test]
-#[ignore = "takes minutes: cargo test --release --test closed_form -- --ignored --nocapture"]
+#[ignore = "takes minutes: cargo test --release closed_form:: -- --ignored --nocapture"]
 fn a_million_samples_do_not_drift() {
     let _alone = support::alone();
     let reflectance = Vec3::new(0.2, 0.5, 0.9);
@@ -418,13 +417,13 @@ fn million_samples_keep_the_mean(sampler: Sampler) {
 }
 
 #[test]
-#[ignore = "takes minutes: cargo test --release --test closed_form -- --ignored --nocapture"]
+#[ignore = "takes minutes: cargo test --release closed_form:: -- --ignored --nocapture"]
 fn a_million_samples_of_mis_keep_the_mean() {
     million_samples_keep_the_mean(Sampler::Mis);
 }
 
 #[test]
-#[ignore = "takes minutes: cargo test --release --test closed_form -- --ignored --nocapture"]
+#[ignore = "takes minutes: cargo test --release closed_form:: -- --ignored --nocapture"]
 fn a_million_samples_of_guided_keep_the_mean() {
     million_samples_keep_the_mean(Sampler::Guided);
 }

@@ -2,8 +2,7 @@
 //! worse than those of `mis`, and its picture is better.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-mod support;
-
+use crate::support;
 use std::path::Path;
 
 use fenestra::{

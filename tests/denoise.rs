@@ -2,16 +2,13 @@
 //! (`support/oidn.c`), and with the real one where `FENESTRA_OIDN` names it.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-
 use std::{
     env, fs,
     path::{Path, PathBuf},
     process::Command,
 };
 
-use command::{BALL, Folder, Run, program, yard};
+use crate::support::command::{BALL, Folder, Run, program, yard};
 use fenestra::film::{Attribute, Image};
 
 const VARIABLE: &str = "FENESTRA_OIDN";

@@ -1,8 +1,8 @@
 //! The same seed gives the same bits, however samples are grouped, cropped, stopped and resumed.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-mod support;
-
+use crate::support;
+use crate::support::{renderer, scenes};
 use fenestra::{
     film::{Aov, Sums, Window},
     pass::{PathLists, Roulette},
@@ -11,7 +11,6 @@ use fenestra::{
     scene::Scene,
 };
 use glam::Vec3;
-use support::{renderer, scenes};
 
 fn scene() -> Scene {
     scenes::room(vec![scenes::diffuse(Vec3::splat(0.7)), scenes::plastic(0.1), scenes::copper(0.2)])

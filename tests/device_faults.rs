@@ -3,16 +3,11 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/c_library.rs"]
-mod c_library;
-#[path = "support/command.rs"]
-mod command;
-#[path = "support/faulty_layer.rs"]
-mod faulty_layer;
-
+use crate::support::command;
+use crate::support::faulty_layer;
 use std::process::{Command, Output};
 
-use command::{Folder, Run, program};
+use crate::support::command::{Folder, Run, program};
 use fenestra::film::{Checkpoint, Image, checkpoint::remove_checkpoint};
 
 fn folder() -> Folder {

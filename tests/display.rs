@@ -1,9 +1,6 @@
 //! The display server's client, against a listener that reads tev's protocol.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-
 use std::{
     io::Read,
     net::TcpListener,
@@ -11,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use command::{BALL, Folder, yard};
+use crate::support::command::{BALL, Folder, yard};
 use fenestra::film::{DisplayServer, Image};
 
 /// Reads a packet field by field, as a server would.

@@ -3,12 +3,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-
 use std::{f32::consts::PI, fs, path::Path, sync::Arc};
 
-use command::{BALL, Folder, yard};
+use crate::support::command::{BALL, Folder, yard};
 use fenestra::{
     brdf::{MeasuredTable, material::MaterialKind},
     export::{Export as _, Settings, mitsuba::Export},

@@ -3,9 +3,7 @@
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-
+use crate::support::command;
 use std::{
     fs::{self, File},
     path::Path,
@@ -14,7 +12,7 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use command::{Folder, Run, Running, program};
+use crate::support::command::{Folder, Run, Running, program};
 use fenestra::{
     files::write_atomically,
     film::{Attribute, Checkpoint, Image, Metadata, SampleRange, Sums, merge::merge_checkpoints},

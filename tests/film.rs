@@ -16,10 +16,7 @@ use fenestra::{
 };
 use io::Write;
 
-#[path = "support/random.rs"]
-mod random;
-
-use random::Random;
+use crate::support::random::Random;
 
 fn names_in(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(folder)

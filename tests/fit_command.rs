@@ -2,12 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-
 use std::fs;
 
-use command::{Folder, Run, program};
+use crate::support::command::{Folder, Run, program};
 use serde_json::Value;
 
 /// Encodes a grey PFM map of 16 × 8 texels, one of them bright.

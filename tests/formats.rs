@@ -3,15 +3,10 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-#[path = "support/gltf.rs"]
-mod document;
-#[path = "support/page.rs"]
-mod page;
-
-use command::Folder;
-use document::gltf;
+use crate::support::command;
+use crate::support::command::Folder;
+use crate::support::gltf::gltf;
+use crate::support::page;
 use fenestra::{
     brdf::material::MaterialKind,
     film::Statistics,

@@ -1,8 +1,7 @@
 //! Frames and the lat-long mapping: properties on the host, and the shader twin.
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-mod support;
-
+use crate::support;
 use fenestra::{
     math::{
         frame::{direction_from_lat_long, frame_from_normal, lat_long_from_direction, sin_cos_pi},

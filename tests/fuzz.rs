@@ -6,15 +6,12 @@
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/fuzz.rs"]
-mod fuzz;
-#[path = "support/gltf.rs"]
-mod gltf;
-#[path = "support/seeds.rs"]
-mod seeds;
-
+use crate::support::fuzz;
+use crate::support::gltf;
+use crate::support::seeds;
 use std::{env, fs, path::Path};
 
+use crate::support::fuzz::Target;
 use fenestra::{
     brdf::{MeasuredTable, cornell},
     command::options::{parse_duration, parse_size},
@@ -29,7 +26,6 @@ use fenestra::{
     },
     texture::Texture,
 };
-use fuzz::Target;
 use image::ImageFormat;
 use sha2::{Digest, Sha256};
 

@@ -2,8 +2,7 @@
 //! the estimators by exact enumeration.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-mod support;
-
+use crate::support::{scenes, statistics::chi_square_p_value};
 use fenestra::{
     math::random::{hash_4d, random_independent_2d},
     sampler::guided::{
@@ -18,7 +17,6 @@ use fenestra::{
     },
 };
 use glam::Vec3;
-use support::{scenes, statistics::chi_square_p_value};
 
 /// A sky with a small sun and a black ground: bright, dim and empty regions.
 fn sunny() -> EnvironmentMap {

@@ -5,8 +5,12 @@
 //! false alarm once in about 440 runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-mod support;
-
+use crate::support;
+use crate::support::{
+    replicates::{LIMIT, REPLICATES, replicates, rows},
+    scenes,
+    statistics::{Comparison, estimates, z_of_mean},
+};
 use fenestra::{
     pass::Roulette,
     renderer::{Renderer, Settings},
@@ -20,11 +24,6 @@ use fenestra::{
     shader::constants::{GUIDE_COUNT_WORDS, GUIDE_RESPONSE_UNITS},
 };
 use glam::Vec3;
-use support::{
-    replicates::{LIMIT, REPLICATES, replicates, rows},
-    scenes,
-    statistics::{Comparison, estimates, z_of_mean},
-};
 
 const FIRST_SEED: u32 = 7000;
 

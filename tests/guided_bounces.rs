@@ -4,10 +4,12 @@
 //! Seeds are fixed; others would raise a false alarm once in some hundred runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-#[path = "support/materials.rs"]
-mod materials;
-mod support;
-
+use crate::support;
+use crate::support::materials;
+use crate::support::{
+    replicates, scenes,
+    statistics::{self, estimates, largest_t},
+};
 use fenestra::{
     brdf::{self, MaterialTables},
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
@@ -33,10 +35,6 @@ use fenestra::{
     },
 };
 use glam::{Vec3, vec3};
-use support::{
-    replicates, scenes,
-    statistics::{self, estimates, largest_t},
-};
 
 const ARRIVING_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/arriving.spv"));
 

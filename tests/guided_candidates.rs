@@ -8,14 +8,13 @@
 //! candidates. Seeds are fixed; others would raise a false alarm once in some hundred runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-#[path = "support/hemisphere.rs"]
-mod hemisphere;
-#[path = "support/materials.rs"]
-mod materials;
-mod support;
-
+use crate::support;
+use crate::support::hemisphere;
+use crate::support::materials;
 use std::f64::consts::PI;
 
+use crate::support::hemisphere::BINS;
+use crate::support::{scenes, statistics};
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
@@ -33,8 +32,6 @@ use fenestra::{
     },
 };
 use glam::{DMat3, DVec3, Vec3, dvec3, vec3};
-use hemisphere::BINS;
-use support::{scenes, statistics};
 
 /// Candidates per surface and state.
 const DRAWN: u32 = 1 << 15;

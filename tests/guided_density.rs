@@ -8,14 +8,13 @@
 //! fixed; others would raise a false alarm once in some hundred runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-#[path = "support/hemisphere.rs"]
-mod hemisphere;
-#[path = "support/materials.rs"]
-mod materials;
-mod support;
-
+use crate::support;
+use crate::support::hemisphere;
+use crate::support::materials;
 use std::f64::consts::PI;
 
+use crate::support::hemisphere::{BIN_COLUMNS, BINS};
+use crate::support::{scenes, statistics};
 use fenestra::{
     brdf::{self, Material, MaterialTables},
     film::Window,
@@ -28,8 +27,6 @@ use fenestra::{
     scene::{Scene, environment::EnvironmentTables},
 };
 use glam::{Vec3, vec3};
-use hemisphere::{BIN_COLUMNS, BINS};
-use support::{scenes, statistics};
 
 /// Rays per surface and state, and per hit.
 const RAYS: u32 = 1 << 15;

@@ -1,8 +1,7 @@
 //! The Vulkan host: uploads, dispatches, timestamps, device choice, limits.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-mod support;
-
+use crate::support;
 use fenestra::{
     gpu::{
         Buffer, Commands, DescriptorSet, Pipeline,

@@ -3,12 +3,9 @@
 //! its check a planted violation.
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-#[path = "support/source.rs"]
-mod source;
-
 use std::collections::BTreeSet;
 
-use source::{Files, Graph, files_of, tokens, uses};
+use crate::support::source::{Files, Graph, files_of, tokens, uses};
 
 /// Top-level modules of `src`; each may use those before it.
 const ORDER: [&str; 23] = [

@@ -2,10 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-
-use command::Folder;
+use crate::support::command::Folder;
 use fenestra::film::{Checkpoint, Image, Metadata, SampleRange, Sums};
 use serde_json::Value;
 

@@ -2,14 +2,15 @@
 //! extreme transforms, bad input, memory, and pictures of textured, normal-mapped and clear instances.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-#[path = "support/random.rs"]
-mod random;
-#[path = "support/rays.rs"]
-mod rays;
-mod support;
-
+use crate::support;
 use std::path::Path;
 
+use crate::support::random::Random;
+use crate::support::rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, soup, sphere};
+use crate::support::{
+    replicates::{LIMIT, replicates},
+    statistics::Comparison,
+};
 use fenestra::{
     accel::Accel,
     pass::Schedule,
@@ -22,12 +23,6 @@ use fenestra::{
     },
 };
 use glam::{DMat3, DMat4, DVec3, Quat, Vec3};
-use random::Random;
-use rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, soup, sphere};
-use support::{
-    replicates::{LIMIT, replicates},
-    statistics::Comparison,
-};
 
 /// A random affine map: turned, scaled differently along the axes, sheared, mirrored or not.
 fn transform(random: &mut Random, largest_scale: f32, spread: f32, mirrors: bool) -> Transform {

@@ -2,17 +2,12 @@
 //! with have their triangles at the same places. Every format that repeats meshes.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-#[path = "support/gltf.rs"]
-mod gltf;
-
 use std::{fmt::Write, path::Path};
 
-use command::Folder;
+use crate::support::command::Folder;
+use crate::support::gltf::{base64, floats};
 use fenestra::scene::{Scene, instance::PLACED_TRIANGLES};
 use glam::Vec3;
-use gltf::{base64, floats};
 
 /// Edges of squares of the repeated mesh, each of two triangles.
 const SQUARES: u32 = 24;

@@ -2,9 +2,7 @@
 //! declarations of `src/shader` is read back and compared with the Rust types.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/page.rs"]
-mod page;
-
+use crate::support::page;
 use std::{
     collections::{BTreeMap, BTreeSet, HashMap},
     fmt::Write,

@@ -4,18 +4,15 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/c_library.rs"]
-mod c_library;
-#[path = "support/command.rs"]
-mod command;
-
+use crate::support::c_library;
+use crate::support::command;
 use std::{
     fs,
     path::{Path, PathBuf},
     sync::OnceLock,
 };
 
-use command::{Folder, Run, program};
+use crate::support::command::{Folder, Run, program};
 use fenestra::film::{Attribute, Checkpoint, Image, checkpoint::guide_paths};
 
 /// Choices by measurement would differ from render to render.

@@ -2,10 +2,10 @@
 //! learned visibility that were found.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-mod support;
-
+use crate::support;
 use std::collections::BTreeMap;
 
+use crate::support::{render, renderer, scenes};
 use fenestra::{
     film::Aov,
     renderer::{Renderer, Settings},
@@ -16,7 +16,6 @@ use fenestra::{
     scene::Scene,
 };
 use glam::Vec3;
-use support::{render, renderer, scenes};
 
 /// Returns settings of `visibility` with few lobes, `assignments` and the layer of its caches.
 fn visibility(assignments: &[&str]) -> Settings {

@@ -2,10 +2,10 @@
 //! surfaces that are not opaque.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-mod support;
-
+use crate::support;
 use std::f32::consts::PI;
 
+use crate::support::scenes;
 use fenestra::{
     brdf::{
         Material,
@@ -19,7 +19,6 @@ use fenestra::{
     },
 };
 use glam::Vec3;
-use support::scenes;
 
 /// Mean of the red channel over the film and its standard error, from renders of eight seeds.
 fn mean_and_error(scene: &Scene, settings: Settings, samples: u32) -> (f64, f64) {

@@ -2,10 +2,8 @@
 //! sampling does without lobes that cannot be fitted, and biased options say so.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-
-use command::Folder;
+use crate::support::command;
+use crate::support::command::Folder;
 use fenestra::film::{Image, Statistics};
 
 /// Writes a scene of a floor and a ball under an even sky.

@@ -5,8 +5,13 @@
 //! 7.5 has a chance of 3e-6, so the 10 comparisons raise a false alarm once in 900 runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-mod support;
-
+use crate::support;
+use crate::support::{
+    render, renderer,
+    replicates::{self, LIMIT},
+    scenes,
+    statistics::{Comparison, Estimate},
+};
 use fenestra::{
     renderer::Settings,
     sampler::{
@@ -17,12 +22,6 @@ use fenestra::{
     scene::Scene,
 };
 use glam::Vec3;
-use support::{
-    render, renderer,
-    replicates::{self, LIMIT},
-    scenes,
-    statistics::{Comparison, Estimate},
-};
 
 /// Applies `--set` assignments on top of few lobes.
 fn parameters(assignments: &[&str]) -> Parameters {

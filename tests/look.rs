@@ -1,21 +1,20 @@
 //! A camera that moves over one renderer: its pictures, and what `guided` keeps.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-mod support;
-
+use crate::support;
 use std::{cell::Cell, rc::Rc};
 
+use crate::support::{
+    replicates::{LIMIT, REPLICATES, replicates, rows},
+    scenes,
+    statistics::{Comparison, estimates},
+};
 use fenestra::{
     renderer::{Renderer, Settings},
     sampler::Sampler,
     scene::{Camera, Scene},
 };
 use glam::Vec3;
-use support::{
-    replicates::{LIMIT, REPLICATES, replicates, rows},
-    scenes,
-    statistics::{Comparison, estimates},
-};
 
 /// Camera at the other side of the room.
 fn elsewhere(scene: &Scene) -> Camera {

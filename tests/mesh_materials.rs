@@ -2,13 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-#[path = "support/gltf.rs"]
-mod document;
-
-use command::Folder;
-use document::{Attribute, base64, floats, gltf, gltf_of, png};
+use crate::support::command;
+use crate::support::command::Folder;
+use crate::support::gltf::{Attribute, base64, floats, gltf, gltf_of, png};
 use fenestra::{
     brdf::{Material, material::MaterialKind},
     scene::{

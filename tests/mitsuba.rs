@@ -2,12 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-
 use std::{f32::consts::PI, io::Write, path::Path};
 
-use command::{BALL, Folder, yard};
+use crate::support::command::{BALL, Folder, yard};
 use fenestra::{
     brdf::{
         Material,

@@ -1,9 +1,7 @@
 //! The order of the passes of a wave, for every technique: a list that needs no device.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-#[path = "support/page.rs"]
-mod page;
-
+use crate::support::page;
 use std::{collections::BTreeMap, fmt::Write};
 
 use fenestra::{

@@ -3,14 +3,10 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-#[path = "support/page.rs"]
-mod page;
-
+use crate::support::page;
 use std::{collections::HashSet, path::Path};
 
-use command::Folder;
+use crate::support::command::Folder;
 use fenestra::{
     brdf::{
         Material,

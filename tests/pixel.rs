@@ -1,10 +1,8 @@
 //! `--pixel x,y`: the picture of one hit and its numbers.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-
-use command::Folder;
+use crate::support::command;
+use crate::support::command::Folder;
 use serde_json::Value;
 
 /// Writes a scene of a clay ball in the open, with sky above it in the picture, or in a closed box.

@@ -2,10 +2,14 @@
 //! the picture against other samplers; the keys of `[[portal]]`.
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-mod support;
-
+use crate::support;
 use std::path::Path;
 
+use crate::support::{
+    replicates::{self, LIMIT},
+    scenes,
+    statistics::{Comparison, chi_square_p_value},
+};
 use fenestra::{
     math::{
         random::{random_2d, random_independent_1d},
@@ -17,11 +21,6 @@ use fenestra::{
     shader::bindings::probe,
 };
 use glam::{DVec2, DVec3, Vec2, Vec3};
-use support::{
-    replicates::{self, LIMIT},
-    scenes,
-    statistics::{Comparison, chi_square_p_value},
-};
 
 const RECTANGLE_PROBE: &[u8] =
     include_bytes!(concat!(env!("OUT_DIR"), "/test/spherical_rectangle.spv"));

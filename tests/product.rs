@@ -8,12 +8,11 @@
 //! hundred runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-#[path = "support/materials.rs"]
-mod materials;
-mod support;
-
+use crate::support;
+use crate::support::materials;
 use std::f64::consts::PI;
 
+use crate::support::{scenes, statistics};
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
@@ -37,7 +36,6 @@ use fenestra::{
     srbf::{kernel_deviation, kernel_hemisphere_part, kernel_pdf},
 };
 use glam::{DVec3, Vec3, dvec3};
-use support::{scenes, statistics};
 
 /// Samples per path and state of the cache.
 const SAMPLES: usize = 20_000;

@@ -6,14 +6,11 @@
 //! `docs/reliability.md`.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/random.rs"]
-mod random;
-mod support;
-
+use crate::support;
 use std::{env, fs};
 
+use crate::support::random::Random;
 use fenestra::{film::Sums, renderer::Settings, sampler::Sampler, scene::Scene};
-use random::Random;
 use tempfile::TempDir;
 
 /// Standard errors by which the mean of a furnace may pass one.

@@ -1,12 +1,11 @@
 //! Random numbers: stratification, uniformity, independence, and the shader twin bit for bit.
 
-mod support;
-
+use crate::support;
+use crate::support::statistics::{chi_square_p_value, z_p_value};
 use fenestra::{
     math::random::{random_1d, random_2d, random_independent_1d, random_independent_2d},
     shader::bindings::probe,
 };
-use support::statistics::{chi_square_p_value, z_p_value};
 
 /// Chance of a false alarm: a test fails by chance for less than one seed in a million.
 const FALSE_ALARM: f64 = 1e-6;

@@ -1,10 +1,8 @@
 //! The render command from its options to its files: stop rules, layers, previews, checkpoints.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-
-use command::Folder;
+use crate::support::command;
+use crate::support::command::Folder;
 use fenestra::film::{Attribute, Image, Statistics, checkpoint::guide_paths};
 
 /// Renders with these options and returns image and statistics.

@@ -6,21 +6,19 @@
 //! passed passes again on the same device.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-mod support;
-
+use crate::support;
+use crate::support::command;
 use std::{fs, path::PathBuf};
 
-use command::Folder;
+use crate::support::command::Folder;
+use crate::support::{
+    replicates::{LIMIT, replicates},
+    statistics::{Comparison, Estimate},
+};
 use fenestra::{
     export::{self, Export},
     renderer::Settings,
     scene::{Scene, lamp::LampKind, load::LoadOptions},
-};
-use support::{
-    replicates::{LIMIT, replicates},
-    statistics::{Comparison, Estimate},
 };
 
 const MITSUBA: &str = "xml";

@@ -3,14 +3,10 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-#[path = "support/page.rs"]
-mod page;
-
+use crate::support::page;
 use std::{fmt::Write, fs, path::Path};
 
-use command::Folder;
+use crate::support::command::Folder;
 
 /// A key of a table of the scene file.
 struct Key {

@@ -3,8 +3,12 @@
 //! The reference is `mis` without sharing; 15 comparisons raise a false alarm once in about 1,300 runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-mod support;
-
+use crate::support;
+use crate::support::{
+    replicates::REPLICATES,
+    scenes,
+    statistics::{Comparison, Estimate, estimates, largest_t},
+};
 use fenestra::{
     brdf::{Material, material::MaterialKind},
     film::{Sums, Window},
@@ -14,11 +18,6 @@ use fenestra::{
     scene::Scene,
 };
 use glam::Vec3;
-use support::{
-    replicates::REPLICATES,
-    scenes,
-    statistics::{Comparison, Estimate, estimates, largest_t},
-};
 
 fn settings(sampler: Sampler, share_tiles: &str, depth: u32) -> Settings {
     let mut settings = Settings { sampler, depth, ..Settings::default() };

@@ -2,20 +2,14 @@
 
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
+use crate::support::statistics;
 use std::f64::consts::PI;
 
 use fenestra::srbf::{self, Lobe, Mixture, special};
 use glam::{DVec3, Vec2, Vec3};
 
-#[path = "support/lobes.rs"]
-mod lobes;
-#[path = "support/random.rs"]
-mod random;
-#[path = "support/statistics.rs"]
-mod statistics;
-
-use lobes::{BANDWIDTHS, random_bandwidth};
-use random::Random;
+use crate::support::lobes::{BANDWIDTHS, random_bandwidth};
+use crate::support::random::Random;
 
 /// Integrates by composite Gauss-Legendre quadrature, 5 points on each of `count` intervals.
 fn integrate(from: f64, to: f64, count: usize, function: impl Fn(f64) -> f64) -> f64 {

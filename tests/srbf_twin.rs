@@ -2,6 +2,7 @@
 
 #![expect(clippy::expect_used, reason = "tests may panic")]
 
+use crate::support;
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     shader::bindings::probe,
@@ -9,14 +10,8 @@ use fenestra::{
 };
 use glam::{Vec2, Vec3};
 
-#[path = "support/lobes.rs"]
-mod lobes;
-#[path = "support/random.rs"]
-mod random;
-mod support;
-
-use lobes::{BANDWIDTHS, random_bandwidth};
-use random::Random;
+use crate::support::lobes::{BANDWIDTHS, random_bandwidth};
+use crate::support::random::Random;
 
 /// Twin of `Input` in `glsl/test/srbf.comp`.
 #[repr(C)]

@@ -1,18 +1,10 @@
 //! The statistical helpers against tabulated values and against themselves.
 
+use crate::support::hemisphere;
 use std::f64::consts::PI;
 
-#[path = "support/hemisphere.rs"]
-mod hemisphere;
-#[path = "support/materials.rs"]
-mod materials;
-#[path = "support/random.rs"]
-mod random;
-#[path = "support/statistics.rs"]
-mod statistics;
-
-use random::Random;
-use statistics::{
+use crate::support::random::Random;
+use crate::support::statistics::{
     Comparison, chi_square_p_value, estimates, largest_t, smallest_p_value, student_p_value,
     upper_incomplete_gamma, z_of_mean, z_p_value,
 };

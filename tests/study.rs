@@ -2,12 +2,10 @@
 //! for bad input.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/command.rs"]
-mod command;
-
+use crate::support::command;
 use std::{fs, path::Path, process::Command};
 
-use command::{Folder, Run, Running};
+use crate::support::command::{Folder, Run, Running};
 use fenestra::{
     command::options::{parse_duration, parse_size},
     film::{Attribute, Checkpoint, Image, Metadata},

@@ -2,8 +2,7 @@
 //! `glsl/include/texture.glsl` against its twins.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-mod support;
-
+use crate::support;
 use std::{io::Cursor, sync::Arc};
 
 use bytemuck::{Pod, Zeroable};

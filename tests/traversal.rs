@@ -2,12 +2,11 @@
 //! edges, self-intersection at every scale, pages, bounds.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-#[path = "support/random.rs"]
-mod random;
-#[path = "support/rays.rs"]
-mod rays;
-mod support;
-
+use crate::support::device;
+use crate::support::random::Random;
+use crate::support::rays::{
+    ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, scaled, soup, sphere,
+};
 use fenestra::{
     accel::Accel,
     pass::geometry::Schedule,
@@ -23,9 +22,6 @@ use obvhs::{
     ray::RayHit,
     rt_triangle::RtTriangle,
 };
-use random::Random;
-use rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, scaled, soup, sphere};
-use support::device;
 
 /// Finds the distance of the nearest triangle by testing all of them in double precision. The second
 /// result is true if an edge is touched so closely that rounding may decide.

@@ -8,13 +8,16 @@
 //! slow and runs on request.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-mod support;
-
-#[path = "support/materials.rs"]
-mod materials;
-
+use crate::support;
+use crate::support::materials;
 use std::{env, path::Path, sync::Arc};
 
+use crate::support::materials::Case;
+use crate::support::{
+    replicates::{self, LIMIT, REPLICATES},
+    scenes,
+    statistics::{Comparison, Estimate, smallest_p_value},
+};
 use fenestra::{
     brdf::{Material, MeasuredTable, material::MaterialKind},
     renderer::Settings,
@@ -22,12 +25,6 @@ use fenestra::{
     scene::Scene,
 };
 use glam::Vec3;
-use materials::Case;
-use support::{
-    replicates::{self, LIMIT, REPLICATES},
-    scenes,
-    statistics::{Comparison, Estimate, smallest_p_value},
-};
 
 /// Least p-value allowed, that of |t| = 7.5 where both sides have the same error.
 const LEAST_P_VALUE: f64 = 3e-6;
@@ -242,7 +239,7 @@ fn in_the_scenes_of_the_thesis() {
 /// false alarms of 444 comparisons of 36 values: one in 21 runs. `FENESTRA_MATERIAL_PAIR` takes one pair,
 /// counted from 0.
 #[test]
-#[ignore = "takes a quarter of an hour: cargo test --release --test unbiased -- --ignored"]
+#[ignore = "takes a quarter of an hour: cargo test --release unbiased:: -- --ignored"]
 fn every_sampler_with_every_material() {
     let _alone = support::alone();
     let blind = [Sampler::Uniform, Sampler::Cosine, Sampler::Env];

@@ -2,22 +2,14 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-#[path = "support/c_library.rs"]
-mod c_library;
-#[path = "support/command.rs"]
-mod command;
-#[path = "support/faulty_layer.rs"]
-mod faulty_layer;
-#[path = "support/page.rs"]
-mod page;
-#[path = "support/x11.rs"]
-mod x11;
-
+use crate::support::command;
+use crate::support::faulty_layer;
+use crate::support::page;
 use std::{fmt::Write, process::Command};
 
-use command::{BALL, Folder, yard};
+use crate::support::command::{BALL, Folder, yard};
+use crate::support::x11::{Server, View};
 use fenestra::{film::Image, view::keys};
-use x11::{Server, View};
 
 const SIZE: [u32; 2] = [64, 48];
 const CLAY: &str = "type = \"diffuse\"\nreflectance = [0.5, 0.6, 0.4]";

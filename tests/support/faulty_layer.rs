@@ -3,7 +3,7 @@
 
 use std::{path::PathBuf, process::Command, sync::OnceLock};
 
-use crate::c_library;
+use super::c_library;
 
 const LAYER: &str = "VK_LAYER_TEST_faulty";
 

@@ -366,7 +366,7 @@ pub fn run(target: &Target) -> Outcome {
         let mut worker = Command::new("sh");
         worker.args(["-c", "ulimit -v \"$1\"; ulimit -c 0; shift; exec \"$@\"", "sh"]);
         worker.arg(MEMORY_LIMIT_KIB.to_string()).arg(env::current_exe().unwrap());
-        worker.args(["--exact", "worker", "--nocapture"]);
+        worker.args(["--exact", "fuzz::worker", "--nocapture"]);
         worker.env("FENESTRA_FUZZ_WORKER", target.name);
         worker.env("FENESTRA_FUZZ_FOLDER", folder.path());
         worker.env("FENESTRA_FUZZ_FIRST", first.to_string());

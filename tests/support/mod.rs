@@ -2,9 +2,23 @@
 #![allow(dead_code, reason = "every test binary uses a part of this")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
+pub mod c_library;
+pub mod command;
+pub mod faulty_layer;
+pub mod fuzz;
+pub mod gltf;
+pub mod hemisphere;
+pub mod lobes;
+pub mod materials;
+pub mod page;
+pub mod random;
+pub mod rays;
 pub mod replicates;
 pub mod scenes;
+pub mod seeds;
+pub mod source;
 pub mod statistics;
+pub mod x11;
 
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 

@@ -14,7 +14,7 @@ use fenestra::{
 };
 use glam::{Quat, Vec3};
 
-use crate::random::Random;
+use super::random::Random;
 
 /// Size of a page that holds every test scene.
 pub const ONE_PAGE: u64 = 128 << 20;
@@ -123,7 +123,7 @@ fn set(
         |binding: &&Binding| !buffers.iter().any(|(other, _)| other.number == binding.number);
     let mut all = buffers.to_vec();
     all.extend(table.bindings.iter().filter(is_free).map(|binding| (*binding, spare)));
-    DescriptorSet::new(crate::support::device(), table, &all).unwrap()
+    DescriptorSet::new(super::device(), table, &all).unwrap()
 }
 
 /// Geometry on the shared device.
@@ -137,7 +137,7 @@ pub struct OnDevice {
 
 impl OnDevice {
     pub fn new(accel: &Accel) -> Self {
-        let device = crate::support::device();
+        let device = super::device();
         let geometry = GeometryBuffers::new(device, accel).unwrap();
         let spare = Buffer::zeroed(device, "spare", 256).unwrap();
         let scene = set(&SCENE, &geometry.bindings(), &spare);
@@ -153,7 +153,7 @@ impl OnDevice {
 
     /// Traces `rays` by the pass and returns their hits.
     pub fn trace(&self, rays: &[Ray], schedule: Schedule) -> Vec<Hit> {
-        let device = crate::support::device();
+        let device = super::device();
         let ray_buffer = Buffer::from_slice(device, "rays", rays).unwrap();
         let hits = Buffer::zeroed(device, "hits", (size_of::<Hit>() * rays.len()) as u64).unwrap();
         let own = [(bindings::RAY_TEXELS, &ray_buffer), (bindings::HITS, &hits)];
@@ -164,13 +164,13 @@ impl OnDevice {
         let mut commands = Commands::begin(device).unwrap();
         pass.record(&mut commands, &[&self.scene, &wave_set, &self.film], &wave(rays.len(), 0));
         commands.submit_and_wait().unwrap();
-        crate::support::assert_silent();
+        super::assert_silent();
         hits.download(rays.len()).unwrap()
     }
 
     /// Traces `shadow_rays`, a multiple of the number of hits, by the pass and returns their visibility.
     pub fn shadow(&self, hits: &[Hit], shadow_rays: &[ShadowRay], schedule: Schedule) -> Vec<u32> {
-        let device = crate::support::device();
+        let device = super::device();
         let hit_buffer = Buffer::from_slice(device, "hits", hits).unwrap();
         let ray_buffer = Buffer::from_slice(device, "shadow rays", shadow_rays).unwrap();
         let visibility =
@@ -190,7 +190,7 @@ impl OnDevice {
         let wave = wave(hits.len(), directions);
         pass.record(&mut commands, &[&self.scene, &wave_set, &self.film], &wave);
         commands.submit_and_wait().unwrap();
-        crate::support::assert_silent();
+        super::assert_silent();
         visibility.download(shadow_rays.len()).unwrap()
     }
 }

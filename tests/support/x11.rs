@@ -20,7 +20,7 @@ use x11rb::{
     rust_connection::RustConnection,
 };
 
-use crate::command::{Folder, Run, program};
+use super::command::{Folder, Run, program};
 
 /// Longest wait for anything: a first render compiles its pipelines, on a machine that may be busy.
 const LONGEST: Duration = Duration::from_secs(120);
