@@ -2,7 +2,7 @@
 //! learns which directions are blocked and stops shooting shadow rays there.
 //!
 //! ```rust,no_run
-//! use fenestra::{gpu::Device, renderer::{Renderer, Settings}, sampler::Sampler, scene::Scene};
+//! use fenestra::{gpu::Device, session::{Renderer, Settings}, sampler::Sampler, scene::Scene};
 //!
 //! # fn main() -> fenestra::Result<()> {
 //! let scene = Scene::load("scenes/meeting_room.toml".as_ref())?;
@@ -44,7 +44,7 @@
 //! | `control-variates` | [`sampler::control_variates`] | `control_variates/`: `record_visibility`, |
 //! | | | `sample_controlled` |
 //! | `tiles` | [`sampler::tiles`] | `tiles/`: `count_tiles`, `sample_tiles` |
-//! | scene, settings, device → sums | [`renderer`] | |
+//! | scene, settings, device → sums | [`session`] | |
 //! | sums → image files | [`film`] | |
 //! | scene → files of other renderers | [`export`] | |
 //! | runs of several samplers → report | [`study`] | |
@@ -198,7 +198,7 @@ pub mod gpu;
 pub mod pass;
 pub mod sampler;
 
-pub mod renderer;
+pub mod session;
 
 pub mod export;
 pub mod film;

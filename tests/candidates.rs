@@ -7,7 +7,6 @@ use crate::support::command::Folder;
 use crate::support::{renderer, scenes};
 use fenestra::{
     film::{Attribute, Checkpoint, Image, Statistics, Sums},
-    renderer::Settings,
     sampler::{
         Parameters, Sampler,
         guided::{
@@ -15,6 +14,7 @@ use fenestra::{
             cost::{GUIDED_CANDIDATES, choose_candidates},
         },
     },
+    session::Settings,
 };
 use glam::Vec3;
 

@@ -9,12 +9,12 @@ use crate::support::{
 use fenestra::{
     film::Sums,
     pass::Roulette,
-    renderer::Settings,
     sampler::{
         Parameters, Sampler,
         product::{ProductParameters, Reading},
     },
     scene::{Lamp, Portal, Scene, lamp::LampKind},
+    session::Settings,
 };
 use glam::{DVec3, Vec3};
 

@@ -7,9 +7,9 @@ use std::path::Path;
 
 use fenestra::{
     film::RgbImage,
-    renderer::Settings,
     sampler::{Parameters, Sampler},
     scene::Scene,
+    session::Settings,
     study::{metrics, record::Figures},
 };
 

@@ -15,7 +15,6 @@ use crate::support::{
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     math::random::random_independent_2d,
-    renderer::Settings,
     sampler::{
         Parameters, Sampler,
         control_variates::{
@@ -24,6 +23,7 @@ use fenestra::{
         },
     },
     scene::Scene,
+    session::Settings,
     shader::{
         bindings::{probe, scene},
         constants::{CONSTANT_CONTROL_BITS, CONSTANT_CONTROL_CHOICE, CONSTANT_CONTROL_SHARE},

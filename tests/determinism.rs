@@ -6,9 +6,9 @@ use crate::support::{renderer, scenes};
 use fenestra::{
     film::{Aov, Sums, Window},
     pass::{PathLists, Roulette},
-    renderer::Settings,
     sampler::{Parameters, Sampler},
     scene::Scene,
+    session::Settings,
 };
 use glam::Vec3;
 

@@ -13,7 +13,6 @@ use crate::support::{
 };
 use fenestra::{
     pass::Roulette,
-    renderer::{Renderer, Settings},
     sampler::{
         Parameters, Sampler,
         guided::{
@@ -21,6 +20,7 @@ use fenestra::{
         },
     },
     scene::Scene,
+    session::{Renderer, Settings},
     shader::constants::{GUIDE_COUNT_WORDS, GUIDE_RESPONSE_UNITS},
 };
 use glam::Vec3;

@@ -18,7 +18,6 @@ use fenestra::{
         random::{hash_4d, random_2d, random_independent_2d},
     },
     pass::{PathDemand, SceneBuffers, Surfaces, WaveBuffers},
-    renderer::{Renderer, Settings, window_of},
     sampler::{
         Parameters, Sampler,
         guided::{
@@ -27,6 +26,7 @@ use fenestra::{
         },
     },
     scene::Scene,
+    session::{Renderer, Settings, window_of},
     shader::{
         bindings::{PROBE, probe},
         constants::{CONSTANT_BOUNCE_CANDIDATES, CONSTANT_MATERIAL_KINDS},

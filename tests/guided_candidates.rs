@@ -19,12 +19,12 @@ use bytemuck::{Pod, Zeroable};
 use fenestra::{
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
     pass::{PathDemand, SceneBuffers, Surfaces, WaveBuffers},
-    renderer::{Renderer, Settings, window_of},
     sampler::{
         Parameters, Sampler,
         guided::{GuideBuffers, GuideSize, GuideState, GuidedParameters},
     },
     scene::Scene,
+    session::{Renderer, Settings, window_of},
     shader::{
         bindings::{PROBE, probe},
         constants::{CONSTANT_BRDF_CANDIDATES, CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS},

@@ -19,12 +19,12 @@ use fenestra::{
     brdf::{self, Material, MaterialTables},
     film::Window,
     math::frame::{Frame, frame_from_normal},
-    renderer::{Renderer, Settings},
     sampler::{
         Parameters, Sampler,
         guided::{GuidedParameters, GuidedRay, RecordedCell, RecordedGuide},
     },
     scene::{Scene, environment::EnvironmentTables},
+    session::{Renderer, Settings},
 };
 use glam::{Vec3, vec3};
 

@@ -21,7 +21,6 @@ use fenestra::{
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
     math::{equal_area::direction_from_square, frame::frame_from_normal, octahedron},
     pass::{Kernel, Pass, SceneBuffers, Steps, Surfaces, WaveBuffers},
-    renderer::{Settings, window_of},
     sampler::{
         Parameters, Sampler,
         haar::{
@@ -31,6 +30,7 @@ use fenestra::{
         },
     },
     scene::Scene,
+    session::{Settings, window_of},
     shader::{
         bindings::{PROBE, probe},
         constants::{

@@ -10,7 +10,7 @@ use crate::support::source::{Files, Graph, files_of, tokens, uses};
 /// Top-level modules of `src`; each may use those before it.
 const ORDER: [&str; 23] = [
     "memory", "stage", "error", "files", "shader", "math", "gpu", "texture", "brdf", "srbf",
-    "scene", "accel", "film", "export", "fit", "pass", "sampler", "renderer", "study", "bench",
+    "scene", "accel", "film", "export", "fit", "pass", "sampler", "session", "study", "bench",
     "view", "command", "cli",
 ];
 

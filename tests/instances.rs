@@ -14,9 +14,9 @@ use crate::support::{
 use fenestra::{
     accel::Accel,
     pass::Schedule,
-    renderer::Settings,
     sampler::Sampler,
     scene::{Geometry, Instance, Scene, instance::PLACED_TRIANGLES, transform::Transform},
+    session::Settings,
     shader::{
         constants::{BVH_STACK_ENTRIES, NO_MATERIAL},
         structs::{Hit, Ray, ShadowRay},

@@ -8,12 +8,12 @@ use std::collections::BTreeMap;
 use crate::support::{render, renderer, scenes};
 use fenestra::{
     film::Aov,
-    renderer::{Renderer, Settings},
     sampler::{
         Parameters, Sampler,
         guided::{CellKey, FACE_COUNT, face_normal},
     },
     scene::Scene,
+    session::{Renderer, Settings},
 };
 use glam::Vec3;
 

@@ -11,12 +11,12 @@ use fenestra::{
         Material,
         material::{Emission, MaterialKind},
     },
-    renderer::Settings,
     sampler::Sampler,
     scene::{
         Lamp, Scene,
         lamp::{LampKind, SpotFalloff},
     },
+    session::Settings,
 };
 use glam::Vec3;
 

@@ -13,13 +13,13 @@ use crate::support::{
     statistics::{Comparison, Estimate},
 };
 use fenestra::{
-    renderer::Settings,
     sampler::{
         Parameters, Sampler,
         product::{LobeOrder, ProductParameters},
         visibility::{CacheScope, Threshold},
     },
     scene::Scene,
+    session::Settings,
 };
 use glam::Vec3;
 

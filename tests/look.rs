@@ -10,9 +10,9 @@ use crate::support::{
     statistics::{Comparison, estimates},
 };
 use fenestra::{
-    renderer::{Renderer, Settings},
     sampler::Sampler,
     scene::{Camera, Scene},
+    session::{Renderer, Settings},
 };
 use glam::Vec3;
 

@@ -15,9 +15,9 @@ use fenestra::{
         random::{random_2d, random_independent_1d},
         spherical_rectangle::{LEAST_UNIFORM_SOLID_ANGLE, SphericalRectangle},
     },
-    renderer::Settings,
     sampler::{Parameters, Sampler},
     scene::{Portal, Scene},
+    session::Settings,
     shader::bindings::probe,
 };
 use glam::{DVec2, DVec3, Vec2, Vec3};

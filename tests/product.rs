@@ -17,13 +17,13 @@ use bytemuck::{Pod, Zeroable};
 use fenestra::{
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
     pass::{Kernel, Pass, SceneBuffers, Steps, Surfaces, WaveBuffers, geometry::Traversal},
-    renderer::{Settings, window_of},
     sampler::{
         Parameters,
         product::{Fits, LobeBuffers, LobeOrder, LobeSize, ProductParameters, Reading},
         visibility::{Threshold, VisibilityParameters, VisibilitySteps},
     },
     scene::Scene,
+    session::{Settings, window_of},
     shader::{
         bindings::{FILM, PROBE, film, probe},
         constants::{

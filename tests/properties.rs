@@ -10,7 +10,7 @@ use crate::support;
 use std::{env, fs};
 
 use crate::support::random::Random;
-use fenestra::{film::Sums, renderer::Settings, sampler::Sampler, scene::Scene};
+use fenestra::{film::Sums, sampler::Sampler, scene::Scene, session::Settings};
 use tempfile::TempDir;
 
 /// Standard errors by which the mean of a furnace may pass one.

@@ -17,8 +17,8 @@ use crate::support::{
 };
 use fenestra::{
     export::{self, Export},
-    renderer::Settings,
     scene::{Scene, lamp::LampKind, load::LoadOptions},
+    session::Settings,
 };
 
 const MITSUBA: &str = "xml";

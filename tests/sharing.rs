@@ -13,9 +13,9 @@ use fenestra::{
     brdf::{Material, material::MaterialKind},
     film::{Sums, Window},
     pass::Roulette,
-    renderer::Settings,
     sampler::Sampler,
     scene::Scene,
+    session::Settings,
 };
 use glam::Vec3;
 

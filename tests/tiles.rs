@@ -24,7 +24,6 @@ use fenestra::{
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
     math::{equal_area::direction_from_square, frame::frame_from_normal, random::hash_4d},
     pass::{Pass, PathDemand, SceneBuffers, Steps, Surfaces, WaveBuffers},
-    renderer::{Settings, window_of},
     sampler::{
         Parameters, Sampler,
         guided::Partition,
@@ -36,6 +35,7 @@ use fenestra::{
         Geometry, Scene,
         environment::{EnvironmentMap, EnvironmentTables},
     },
+    session::{Settings, window_of},
     shader::{
         bindings::{PROBE, probe},
         constants::{TILE_RESPONSE_UNITS, TILE_SCALE},

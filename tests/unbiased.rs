@@ -20,9 +20,9 @@ use crate::support::{
 };
 use fenestra::{
     brdf::{Material, MeasuredTable, material::MaterialKind},
-    renderer::Settings,
     sampler::{Parameters, Sampler},
     scene::Scene,
+    session::Settings,
 };
 use glam::Vec3;
 

@@ -11,9 +11,9 @@ use fenestra::{
     Error, Result,
     film::{Aov, Metadata, SampleRange},
     gpu::Device,
-    renderer::{Renderer, Settings},
     sampler::Sampler,
     scene::Scene,
+    session::{Renderer, Settings},
 };
 
 fn main() -> Result<()> {

@@ -11,9 +11,9 @@ use fenestra::{
     Result,
     film::RgbImage,
     gpu::Device,
-    renderer::{Renderer, Settings},
     sampler::Sampler,
     scene::Scene,
+    session::{Renderer, Settings},
     study::{metrics::Metrics, statistics::geometric_interval},
 };
 

@@ -11,9 +11,9 @@ use crate::{
     error::{Error, Result},
     gpu::{Device, PassTimes},
     pass::{SceneBuffers, geometry::triangle_page_bytes},
-    renderer::{Renderer, Settings, window_of},
     sampler::{Sampler, basic},
     scene::Scene,
+    session::{Renderer, Settings, window_of},
 };
 
 /// Maximum number of paths in a measurement; larger films are scaled down.

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use crate::{
     error::{Error, Result},
-    renderer::Renderer,
     sampler::{Sampler, guided::GuideState},
+    session::Renderer,
 };
 
 /// Rejects guide options for samplers that do not learn.

@@ -9,8 +9,8 @@ use super::{
 use crate::{
     error::{Error, Result},
     film::{Curve, Tone},
-    renderer::Settings,
     sampler::{Parameters, Sampler},
+    session::Settings,
     view::{Display, Options},
 };
 

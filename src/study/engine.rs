@@ -23,9 +23,9 @@ use crate::{
     film::{Aov, Metadata, png::write_preview},
     gpu::Device,
     pass::SceneBuffers,
-    renderer::{Renderer, Settings, window_of},
     sampler::Sampler,
     scene::Scene,
+    session::{Renderer, Settings, window_of},
 };
 
 /// Everything a study has measured.

@@ -17,8 +17,8 @@ use crate::{
         metadata::seconds_of,
         png::{preview, write_preview},
     },
-    renderer::Renderer,
     scene::Scene,
+    session::Renderer,
 };
 
 /// Seed whose pictures are also written as PNG.

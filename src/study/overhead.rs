@@ -16,7 +16,7 @@ use super::{
     statistics::{Interval, median_interval},
     watch::{Pace, Watch},
 };
-use crate::{error::Result, files::write_json, renderer::Renderer, scene::Scene};
+use crate::{error::Result, files::write_json, scene::Scene, session::Renderer};
 
 /// Overhead measurements of one scene.
 pub(super) struct OverheadJob<'a> {

@@ -14,7 +14,7 @@ use super::{
     statistics::mean_standard_error,
     surfaces::{Parts, Surfaces},
 };
-use crate::{error::Result, film::RgbImage, pass::Totals, renderer::Renderer};
+use crate::{error::Result, film::RgbImage, pass::Totals, session::Renderer};
 
 /// Name of the guide's rebuilds in [`Renderer::host_ms`].
 const GUIDE_REBUILDS: &str = "guide rebuilds";

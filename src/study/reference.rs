@@ -29,9 +29,9 @@ use crate::{
         denoised::check_film,
         metadata::seconds_of,
     },
-    renderer::Renderer,
     sampler::guided::GuideState,
     scene::Scene,
+    session::Renderer,
 };
 
 /// File stems of the halves.

@@ -19,8 +19,8 @@ use super::{
 use crate::{
     error::{Error, Result},
     film::{Image, Metadata, RgbImage, SampleRange, metadata::seconds_of},
-    renderer::Renderer,
     scene::Scene,
+    session::Renderer,
 };
 
 /// Time of a check by another sampler, as a share of the reference's.

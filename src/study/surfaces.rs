@@ -11,8 +11,8 @@ use super::{
 use crate::{
     error::Result,
     film::{Attribute, Image, RgbImage},
-    renderer::Renderer,
     scene::Scene,
+    session::Renderer,
 };
 
 /// File stem of the mask: share of the camera rays that hit a surface, in every channel.

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use crate::{
     error::{Error, Result},
-    renderer::Renderer,
+    session::Renderer,
 };
 
 /// Duration aimed at for a pass, and so the delay until stop rules and Ctrl-C are noticed.

@@ -1,7 +1,7 @@
 //! A window in which a scene refines while the camera moves.
 //!
 //! The window's thread turns events into `panel::Input`; the rendering thread owns everything of Vulkan.
-//! It renders by the same [`Renderer`](crate::renderer::Renderer) as `fenestra render`: through a camera at
+//! It renders by the same [`Renderer`](crate::session::Renderer) as `fenestra render`: through a camera at
 //! rest the whole film, through one that moves a small one. `docs/view.md` describes it and its keys.
 
 pub mod camera;

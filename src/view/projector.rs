@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     error::Result,
     gpu::{Buffer, Commands, DescriptorSet, Device, Pipeline},
-    renderer::Renderer,
+    session::Renderer,
     shader::{
         bindings::{VIEW, view},
         constants::SHOW_PICTURE,

@@ -11,9 +11,9 @@ use crate::{
     film::Aov,
     gpu::Device,
     pass::SceneBuffers,
-    renderer::{Renderer, Settings},
     sampler::{Sampler, guided::GuideState},
     scene::Scene,
+    session::{Renderer, Settings},
     shader::constants::{SHOW_CELLS, SHOW_LEVELS, SHOW_PICTURE},
 };
 

@@ -32,8 +32,8 @@ use crate::{
     error::{Error, Result},
     film::{Metadata, Tone},
     gpu::Device,
-    renderer::Settings,
     scene::Scene,
+    session::Settings,
 };
 
 /// Pixels of the wheel's finer events in a notch.

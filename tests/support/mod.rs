@@ -27,8 +27,8 @@ use fenestra::{
     film::Sums,
     gpu::{Buffer, Commands, DescriptorSet, Device, Pipeline},
     pass::Totals,
-    renderer::{Renderer, Settings},
     scene::Scene,
+    session::{Renderer, Settings},
     shader::{
         bindings::{Binding, TABLES, probe},
         constants::WORKGROUP_SIZE,

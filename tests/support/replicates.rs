@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use fenestra::{
     film::Sums,
-    renderer::{Renderer, Settings},
     scene::Scene,
+    session::{Renderer, Settings},
 };
 
 use super::statistics::{Estimate, estimates};

@@ -17,9 +17,9 @@ use crate::{
     files::{check_writable, is_same_file, is_special_file},
     film::{Aov, Window, checkpoint::checkpoint_path},
     pass::Roulette,
-    renderer::Settings,
     sampler::{Parameters, Sampler},
     scene::{FilmSettings, Scene},
+    session::Settings,
 };
 
 /// Arguments of `render`.

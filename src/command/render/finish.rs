@@ -15,7 +15,7 @@ use crate::{
         metadata::seconds_of, png::write_preview,
     },
     gpu::Denoiser,
-    renderer::Renderer,
+    session::Renderer,
 };
 
 impl RenderJob<'_> {

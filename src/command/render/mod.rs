@@ -29,9 +29,9 @@ use crate::{
     },
     gpu::{Denoiser, Device},
     pass::Roulette,
-    renderer::{Renderer, Settings, window_of},
     sampler::Sampler,
     scene::Scene,
+    session::{Renderer, Settings, window_of},
     study::watch::next_pass_samples,
 };
 

@@ -24,12 +24,12 @@ use crate::{
     files::{check_writable, write_text},
     film::{Window, png::write_rgb8},
     gpu::Device,
-    renderer::{RecordedPixel, Renderer, Settings, window_of},
     sampler::{
         guided::{CellLevel, GuidedRay, RecordedCell, RecordedGuide, RecordedRay},
         product::record::RecordedLobe,
     },
     scene::Scene,
+    session::{RecordedPixel, Renderer, Settings, window_of},
     srbf::kernel_value,
     view::sky::{Sky, learned_skies, white_of},
 };

@@ -3,7 +3,7 @@
 use super::{RenderJob, StopReason};
 use crate::{
     film::{Metadata, Statistics},
-    renderer::Renderer,
+    session::Renderer,
     study::record::Figures,
 };
 

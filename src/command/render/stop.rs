@@ -3,7 +3,7 @@
 use super::{DEFAULT_SPP, QUICK_SPP, RenderJob};
 use crate::{
     command::{interrupt::Interrupt, progress::Standing},
-    renderer::Renderer,
+    session::Renderer,
 };
 
 /// Rule that ended a render.

@@ -4,8 +4,8 @@ use super::{Motion, Worker};
 use crate::{
     error::Result,
     film::Metadata,
-    renderer::Settings,
     sampler::Sampler,
+    session::Settings,
     shader::constants::SHOW_PICTURE,
     view::{
         inset,

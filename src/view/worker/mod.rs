@@ -25,9 +25,9 @@ use crate::{
     gpu::Device,
     math::random::hash_4d,
     pass::Watch,
-    renderer::Settings,
     sampler::{Sampler, guided::GuideState},
     scene::Scene,
+    session::Settings,
     shader::constants::{SHOW_ERROR, SHOW_PICTURE},
 };
 
