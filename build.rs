@@ -11,11 +11,14 @@ mod constants;
 mod structs;
 
 use std::{
+    cell::RefCell,
+    collections::BTreeSet,
     env,
     fmt::Write,
     fs,
     path::{Path, PathBuf},
     process::ExitCode,
+    rc::Rc,
 };
 
 use bindings::{Binding, Kind, TABLES};
@@ -111,11 +114,16 @@ fn compile_all() -> Result<(), String> {
         options.add_macro_definition(&name, Some(&table.set.to_string()));
     }
     let interface = interface();
+    // Includes that the shader under way has had: each is given once, so that they need no guards.
+    let included = Rc::new(RefCell::new(BTreeSet::new()));
+    let seen = Rc::clone(&included);
     options.set_include_callback(move |requested, _, _, _| {
         // Includes of a room are named with its folder.
         let folder = if requested.contains('/') { "" } else { "include" };
         let path = Path::new(SHADER_FOLDER).join(folder).join(requested);
-        let content = if requested == INTERFACE {
+        let content = if !seen.borrow_mut().insert(requested.to_owned()) {
+            String::new()
+        } else if requested == INTERFACE {
             interface.clone()
         } else {
             fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?
@@ -124,6 +132,7 @@ fn compile_all() -> Result<(), String> {
     });
 
     let compile = |path: &Path, target: &Path| -> Result<(String, PathBuf), String> {
+        included.borrow_mut().clear();
         let source =
             fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
         let name = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default().to_owned();

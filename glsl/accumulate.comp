@@ -10,8 +10,6 @@ UPDATES(film_squares)
 UPDATES(film_visible)
 UPDATES(counters)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void main() {
     uint pixel = gl_GlobalInvocationID.x;
     PathIndex index = wave_pixel(wave_film_position(pixel));

@@ -4,8 +4,6 @@
 #include "bounce.glsl"
 #include "path_list.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 layout(constant_id = CONSTANT_ONLY_SPECULAR) const bool ONLY_SPECULAR = false;
 
 void bounce_path(uint path) {

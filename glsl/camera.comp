@@ -9,8 +9,6 @@ WRITES(rays)
 WRITES(paths)
 WRITES(path_lists)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 const uint FILTER_GAUSSIAN = 1u;
 // Gaussian with a standard deviation of half a pixel, cut off at one and a half.
 const float FILTER_SIGMA = 0.5;

@@ -10,8 +10,6 @@
 
 UPDATES(paths)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void add_emission(uint path) {
     Hit hit = load_hit(path);
     if (hit.triangle == NO_TRIANGLE) {

@@ -14,8 +14,6 @@ UPDATES(film_albedo)
 UPDATES(film_normal)
 UPDATES(film_position)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void main() {
     uint pixel = gl_GlobalInvocationID.x;
     PathIndex index = wave_pixel(wave_film_position(pixel));

@@ -12,8 +12,6 @@
 READS(visibility)
 UPDATES(paths)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void gather_path(uint path) {
     uint path_count = wave_path_count();
     if (load_hit_origin(path).material == NO_MATERIAL) {

@@ -8,8 +8,6 @@
 
 UPDATES(path_lists)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void main() {
     uint place = gl_GlobalInvocationID.x;
     uint list = wave.vertex & (PATH_LISTS - 1u);

@@ -6,8 +6,6 @@
 #include "path_list.glsl"
 #include "vertex.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 layout(constant_id = CONSTANT_SAMPLER) const uint SAMPLER = SAMPLER_MIS;
 // Candidates per shadow ray of `ris`, half from the BRDF and half from the environment; otherwise 1.
 layout(constant_id = CONSTANT_CANDIDATES) const uint CANDIDATES = 1u;

@@ -10,8 +10,6 @@
 #include "path_list.glsl"
 #include "vertex.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 layout(constant_id = CONSTANT_LAMP_CANDIDATES) const uint LAMP_CANDIDATES = 4u;
 
 // First dimension of lamps: each ray has two for each candidate, and one for the choice; at most 2048

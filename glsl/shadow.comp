@@ -15,8 +15,6 @@ WRITES(visibility)
 UPDATES(shadow_rays)
 UPDATES(counters)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 // At most 32: results are kept as bits until the end.
 layout(constant_id = CONSTANT_RAYS_PER_INVOCATION) const uint RAYS_PER_INVOCATION = 1u;
 layout(constant_id = CONSTANT_REFILL_LANES) const uint REFILL_LANES = 0xffffffffu;

@@ -11,8 +11,6 @@
 UPDATES(hits)
 WRITES(hit_surfaces)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 // As SMALLEST_ALPHA of src/brdf/ggx.rs.
 const float SMALLEST_ALPHA = 1.0e-3;
 

@@ -17,8 +17,6 @@ WRITES(hit_instances)
 UPDATES(paths)
 UPDATES(counters)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 // At most 32: rays given up are kept as bits until the end.
 layout(constant_id = CONSTANT_RAYS_PER_INVOCATION) const uint RAYS_PER_INVOCATION = 1u;
 layout(constant_id = CONSTANT_REFILL_LANES) const uint REFILL_LANES = 0xffffffffu;

@@ -16,9 +16,6 @@
 // Deviation: q goes by the light of a candidate times the root mean square of V - h that its record
 // expects, sqrt(v (1 - h)^2 + (1 - v) h^2). The paper follows the light alone (`control-choice=off`).
 
-#ifndef CONTROLLED_GLSL
-#define CONTROLLED_GLSL
-
 #include "layout.glsl"
 
 layout(constant_id = CONSTANT_CONTROL_SHARE) const float CONTROL_SHARE = 1.0;
@@ -90,5 +87,3 @@ vec3 controlled_contribution(Controlled chosen, uint candidates) {
 vec3 controlled_rest(Controlled chosen, uint candidates, vec3 contribution) {
     return chosen.control_sum / float(candidates) - contribution * chosen.control;
 }
-
-#endif

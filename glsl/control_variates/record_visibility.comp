@@ -10,8 +10,6 @@
 READS(visibility)
 UPDATES(record_counts)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void record_ray(ListedRay listed) {
     HitOrigin hit = load_hit_origin(listed.path);
     ShadowRay ray = load_shadow_ray(listed.ray);

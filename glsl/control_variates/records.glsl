@@ -11,9 +11,6 @@
 // Deviation: a place reads the one record of its cube, in a table without keys: two cubes may share a
 // record, which costs precision and nothing else. The paper looks for records nearby.
 
-#ifndef RECORDS_GLSL
-#define RECORDS_GLSL
-
 #include "equal_area.glsl"
 #include "frame.glsl"
 #include "parameters.glsl"
@@ -44,5 +41,3 @@ uint record_entry(uint record, vec3 direction) {
     uvec2 bin = min(uvec2(at), uvec2(RECORD_SIDE - 1u));
     return (record * RECORD_SIDE + bin.y) * RECORD_SIDE + bin.x;
 }
-
-#endif

@@ -14,8 +14,6 @@
 TEXELS(record_visibilities)
 UPDATES(paths)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 // Candidates per shadow ray, half from the BRDF and half from the environment.
 layout(constant_id = CONSTANT_CANDIDATES) const uint CANDIDATES = 4u;
 const uint PAIRS = CANDIDATES / 2u;

@@ -10,8 +10,6 @@
 TEXELS(guide_arriving)
 UPDATES(path_cells)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 layout(constant_id = CONSTANT_BOUNCE_CANDIDATES) const uint BOUNCE_CANDIDATES = 4u;
 
 void bounce_path(uint path) {

@@ -1,8 +1,5 @@
 // Candidates for the shadow rays of `guided`, from BRDF and guide. Densities in solid angle measure.
 
-#ifndef CANDIDATES_GLSL
-#define CANDIDATES_GLSL
-
 #include "guided/guide.glsl"
 
 // 1 draws each ray from BRDF or guide (one-sample model). More are resampled, BRDF_CANDIDATES of
@@ -45,5 +42,3 @@ float candidates_pdf(Guided candidate) {
     const float brdf_part = float(BRDF_CANDIDATES) / float(CANDIDATES);
     return brdf_part * candidate.sampled.brdf_pdf + (1.0 - brdf_part) * guided_pdf(candidate);
 }
-
-#endif

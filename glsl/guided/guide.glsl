@@ -3,9 +3,6 @@
 //
 // A pass reads only tables from earlier passes, so no density changes while it runs.
 
-#ifndef GUIDE_GLSL
-#define GUIDE_GLSL
-
 #include "regions.glsl"
 #include "vertex.glsl"
 
@@ -226,5 +223,3 @@ Guided draw_brdf_guided(Vertex vertex, uint first, vec3 u) {
 float guided_pdf(Guided guided) {
     return guided.entry.ratio * guided.sampled.environment_pdf;
 }
-
-#endif

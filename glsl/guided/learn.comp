@@ -13,8 +13,6 @@ READS(learn_targets)
 UPDATES(guide_counts)
 UPDATES(guide_shares)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void learn_ray(ListedRay listed) {
     uint ray = listed.ray;
     uint sample_of_wave = divide(listed.path, wave.pixel_count).x;

@@ -11,8 +11,6 @@ READS(path_cells)
 TEXELS(guide_reflected)
 UPDATES(guide_arrivals)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void learn_arrival(uint path) {
     uint since_rebuild =
         wave.first_sample + divide(path, wave.pixel_count).x - wave.epoch_start;

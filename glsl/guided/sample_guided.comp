@@ -11,8 +11,6 @@
 WRITES(learn_targets)
 UPDATES(path_cells)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 // Offsets from the first dimension of a vertex, for independent numbers.
 const uint DIMENSION_GUIDE_TECHNIQUE = 6u;
 const uint DIMENSION_GUIDE_RESAMPLING = 7u;

@@ -6,8 +6,6 @@
 UPDATES(film_guide_cell)
 UPDATES(film_guide_level)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 // Stands for the missing key of a face's cell: the face bits of other cells are lower.
 const uint FACE_KEY = 0xf0000000u;
 

@@ -16,8 +16,6 @@ READS(visibility)
 UPDATES(haar_nodes)
 UPDATES(haar_cache)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 layout(constant_id = CONSTANT_THRESHOLD_SCALE) const float THRESHOLD_SCALE = 1.0;
 layout(constant_id = CONSTANT_VISIBILITY_EXPONENT) const float VISIBILITY_EXPONENT = 2.0;
 

@@ -4,9 +4,6 @@
 // Deviation: shares of environment and BRDF, as in `product`. The paper draws from the product alone, which
 // needs a BRDF that its samples do not miss.
 
-#ifndef HAAR_MIXTURE_GLSL
-#define HAAR_MIXTURE_GLSL
-
 #include "haar/nodes.glsl"
 #include "product/numbers.glsl"
 #include "vertex.glsl"
@@ -68,5 +65,3 @@ float haar_pdf(HaarMixture mixture, DirectionSample sampled, float node_pdf) {
     return mixture.node_share * node_pdf + mixture.environment_share * sampled.environment_pdf
         + mixture.brdf_share * sampled.brdf_pdf;
 }
-
-#endif

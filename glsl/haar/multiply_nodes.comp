@@ -12,8 +12,6 @@ TEXELS(haar_centres)
 WRITES(haar_nodes)
 WRITES(haar_cache)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 layout(constant_id = CONSTANT_CACHE_CAPACITY) const uint CACHE_CAPACITY = 0u;
 
 void main() {

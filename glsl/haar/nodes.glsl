@@ -7,9 +7,6 @@
 // nodes' weights r(m) L(m) times their solid angle, L(m) the mean of L. Nodes hold r as halves, and these
 // halves are both drawn with and divided by.
 
-#ifndef NODES_GLSL
-#define NODES_GLSL
-
 #include "haar/tree.glsl"
 
 TEXELS(haar_node_texels)
@@ -72,5 +69,3 @@ NodeSample nodes_sample(uint path, uint path_count, float total, vec2 u) {
     return NodeSample(
         direction_in_texel(node, u), density_of(reflectances[child], light, total));
 }
-
-#endif

@@ -6,9 +6,6 @@
 //
 // Deviation: a node across the horizon has the mean of its cosine, not that of its centre.
 
-#ifndef REFLECTANCE_GLSL
-#define REFLECTANCE_GLSL
-
 #include "brdf.glsl"
 #include "haar/tree.glsl"
 
@@ -43,5 +40,3 @@ float node_reflectance(Material material, vec3 outgoing_local, vec3 centre_local
     vec3 value = brdf_evaluate(material, outgoing_local, incident_local);
     return min(dot(value, LUMINANCE_WEIGHTS) * cosine, LARGEST_REFLECTANCE) / REFLECTANCE_UNIT;
 }
-
-#endif

@@ -4,8 +4,6 @@
 
 #include "haar/mixture.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 layout(constant_id = CONSTANT_CACHE_CAPACITY) const uint CACHE_CAPACITY = 0u;
 
 void main() {

@@ -1,8 +1,5 @@
 // Nodes as halves, and sums of their weights, level by level, as nodes are gone through in Morton order.
 
-#ifndef SUMS_GLSL
-#define SUMS_GLSL
-
 #include "haar/tree.glsl"
 
 WRITES(haar_sums)
@@ -37,5 +34,3 @@ void add_group(uint path, uint path_count, uint group, float sum) {
         sum = sum_of_four(pending[level]);
     }
 }
-
-#endif

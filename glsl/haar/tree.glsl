@@ -4,9 +4,6 @@
 // Nodes of a level are numbered in Morton order. A texel of a node holds the means of its four
 // children, which is the same information as its mean and its three Haar coefficients.
 
-#ifndef TREE_GLSL
-#define TREE_GLSL
-
 #include "equal_area.glsl"
 #include "layout.glsl"
 
@@ -89,5 +86,3 @@ float warp_below(inout uint node, inout vec2 u) {
     }
     return light;
 }
-
-#endif

@@ -1,9 +1,6 @@
 // Base of the BRDF at a second vertex: the part whose light looks the same from all directions but for a
 // factor. value = base_view(outgoing) * base_part(incident) + rest, and the rest is not negative.
 
-#ifndef BASE_GLSL
-#define BASE_GLSL
-
 #include "brdf.glsl"
 
 bool has_base(Material material) {
@@ -59,5 +56,3 @@ vec3 base_share(Material material, vec3 outgoing_local, vec3 incident_local) {
     vec3 base = base_view(material, outgoing_local.z) * base_part(material, incident_local.z);
     return mix(vec3(0.0), base / value, greaterThan(value, vec3(0.0)));
 }
-
-#endif

@@ -1,8 +1,5 @@
 // Next direction of a path, for bounce.comp and bounce_guided.comp. Densities in solid angle measure.
 
-#ifndef BOUNCE_GLSL
-#define BOUNCE_GLSL
-
 #include "frame.glsl"
 #include "hit_instance.glsl"
 #include "hit_surface.glsl"
@@ -98,5 +95,3 @@ bool follow_specular(uint path, PathIndex index, Hit hit, uint number, uint seed
     vec3 factor = is_behind == scattered.is_transmitted ? scattered.weight : vec3(0.0);
     return follow_bounce(path, index, hit, direction, 0.0, factor, number, seed);
 }
-
-#endif

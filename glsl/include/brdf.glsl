@@ -6,9 +6,6 @@
 // directions. Both are 0 unless both directions are above the surface, and for mirrors, dielectrics and
 // thin panes, at which no light is sampled: see specular.glsl.
 
-#ifndef BRDF_GLSL
-#define BRDF_GLSL
-
 #include "frame.glsl"
 #include "fresnel.glsl"
 #include "ggx.glsl"
@@ -358,5 +355,3 @@ vec3 brdf_albedo(Material material, vec3 outgoing_local) {
         cosine_table(offset + 1u, 3u, outgoing_local.z),
         cosine_table(offset + 2u, 3u, outgoing_local.z));
 }
-
-#endif

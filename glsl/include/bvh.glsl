@@ -15,9 +15,6 @@
 // direction, so that its parameter stays the distance in the world; triangles are tested in the world,
 // where they meet those of other instances without cracks.
 
-#ifndef BVH_GLSL
-#define BVH_GLSL
-
 #include "frame.glsl"
 #include "instance.glsl"
 #include "layout.glsl"
@@ -516,5 +513,3 @@ vec3 moved_off_surface(vec3 position, vec3 geometric_normal, vec3 direction, flo
 vec3 offset_ray_origin(vec3 position, vec3 geometric_normal, vec3 direction) {
     return moved_off_surface(position, geometric_normal, direction, ray_offset());
 }
-
-#endif

@@ -1,8 +1,5 @@
 // Division of whole numbers by way of floats.
 
-#ifndef DIVIDE_GLSL
-#define DIVIDE_GLSL
-
 // Returns quotient and remainder for a quotient below 2^22. Divides floats and corrects by one,
 // since software devices divide integers lane by lane.
 uvec2 divide(uint dividend, uint divisor) {
@@ -17,5 +14,3 @@ uvec2 divide(uint dividend, uint divisor) {
     }
     return uvec2(quotient, remainder);
 }
-
-#endif

@@ -1,8 +1,5 @@
 // Light that triangles emit.
 
-#ifndef EMISSION_GLSL
-#define EMISSION_GLSL
-
 #include "bvh.glsl"
 #include "texture.glsl"
 
@@ -25,5 +22,3 @@ float meeting_share(uint triangle, vec3 weights) {
     return surface_opacity(
         load_material_surface(triangle_materials[triangle]), triangle_attributes(triangle, weights));
 }
-
-#endif

@@ -5,9 +5,6 @@
 // row's polar angle, then a guide to the probabilities. environment_cells: cumulative probability
 // over the width cells of each row, then a guide. src/scene/environment/table.rs describes both.
 
-#ifndef ENVIRONMENT_GLSL
-#define ENVIRONMENT_GLSL
-
 #include "frame.glsl"
 #include "layout.glsl"
 #include "parameters.glsl"
@@ -239,5 +236,3 @@ EnvironmentSample environment_sample(vec2 u) {
         (u.x - before) / (environment_cell_value(first_cell + column) - before), 0.99999994);
     return environment_sample_cell(column, row, vec2(column_remainder, row_remainder));
 }
-
-#endif

@@ -1,9 +1,6 @@
 // Equal-area octahedral map between the sphere and the unit square: a part of the square stands for
 // 4 pi times its area in steradians. [Clarberg 2008]. Twin of src/math/equal_area.rs.
 
-#ifndef EQUAL_AREA_GLSL
-#define EQUAL_AREA_GLSL
-
 #include "frame.glsl"
 
 // Unit direction at a point of the square.
@@ -32,5 +29,3 @@ vec2 square_from_direction(vec3 direction) {
     p = vec2(direction.x < 0.0 ? -p.x : p.x, direction.y < 0.0 ? -p.y : p.y);
     return clamp(0.5 * p + 0.5, 0.0, 1.0);
 }
-
-#endif

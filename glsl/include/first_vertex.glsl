@@ -1,8 +1,5 @@
 // First vertices of paths, kept while their hits are overwritten.
 
-#ifndef FIRST_VERTEX_GLSL
-#define FIRST_VERTEX_GLSL
-
 #include "brdf.glsl"
 #include "frame.glsl"
 #include "load.glsl"
@@ -50,5 +47,3 @@ void evaluate_first(
     throughput = goes ? throughput : vec3(0.0);
     pdf = goes ? pdf : 0.0;
 }
-
-#endif

@@ -5,9 +5,6 @@
 // mapping takes unit directions to the unit square; its Jacobian is 2 pi^2 sin(theta), with theta
 // measured from +Y.
 
-#ifndef FRAME_GLSL
-#define FRAME_GLSL
-
 const float PI = 3.14159265358979;
 
 struct Frame {
@@ -99,5 +96,3 @@ uint cube_face(vec3 normal) {
     float along = axis == 0u ? normal.x : (axis == 1u ? normal.y : normal.z);
     return 2u * axis + (along < 0.0 ? 1u : 0u);
 }
-
-#endif

@@ -1,9 +1,6 @@
 // Reflectance of smooth interfaces: dielectrics, conductors, Schlick's approximation, thin panes. Twin
 // of src/brdf/fresnel.rs, same names, same order. No buffers, so that traversal may include it.
 
-#ifndef FRESNEL_GLSL
-#define FRESNEL_GLSL
-
 #include "layout.glsl"
 
 // Reflectance of a dielectric of refractive index `ior` seen from outside; exact Fresnel.
@@ -73,5 +70,3 @@ vec3 pane_transmittance(Material material, float cosine) {
     float reflectance = fresnel_interface(abs(cosine), material.ior);
     return (1.0 - reflectance) / (1.0 + reflectance) * material.eta;
 }
-
-#endif

@@ -1,9 +1,6 @@
 // GGX microfacets: density of normals, masking, reflection, sampling. Twin of src/brdf/ggx.rs, same
 // names, same order. Densities are per steradian of incident directions unless stated.
 
-#ifndef GGX_GLSL
-#define GGX_GLSL
-
 #include "frame.glsl"
 
 // Density of GGX normals, per steradian, for a half vector of any length. [Walter et al. 2007] Eq.
@@ -82,5 +79,3 @@ vec3 ggx_sample(vec3 outgoing_local, float alpha, vec2 u) {
     vec3 normal = ggx_normal_sample(outgoing_local, alpha, cap_factor, u);
     return 2.0 * dot(outgoing_local, normal) * normal - outgoing_local;
 }
-
-#endif

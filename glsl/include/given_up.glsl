@@ -1,8 +1,5 @@
 // Rays given up after TRAVERSAL_STEP_LIMIT steps, and the pixels they belong to.
 
-#ifndef GIVEN_UP_GLSL
-#define GIVEN_UP_GLSL
-
 #include "wave.glsl"
 
 // Counts a ray of a path. The host clears counters to zero, so lower bounds are kept as complements.
@@ -14,5 +11,3 @@
     atomicMax(counters.overrun_right, at.x + 1u); \
     atomicMax(counters.overrun_bottom, at.y + 1u); \
 }
-
-#endif

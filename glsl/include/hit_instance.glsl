@@ -1,8 +1,5 @@
 // Instance that a path has hit.
 
-#ifndef HIT_INSTANCE_GLSL
-#define HIT_INSTANCE_GLSL
-
 #include "instance.glsl"
 
 READS(hit_instances)
@@ -10,5 +7,3 @@ READS(hit_instances)
 uint load_hit_instance(uint path) {
     return HAS_INSTANCES ? hit_instances[path] : NO_INSTANCE;
 }
-
-#endif

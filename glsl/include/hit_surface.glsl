@@ -1,8 +1,5 @@
 // Material at a hit, as textures vary it.
 
-#ifndef HIT_SURFACE_GLSL
-#define HIT_SURFACE_GLSL
-
 #include "load.glsl"
 #include "surfaces.glsl"
 
@@ -19,5 +16,3 @@ Material load_surface(uint path, uint index) {
     }
     return material;
 }
-
-#endif

@@ -4,9 +4,6 @@
 // to 5); root node, first material, mask of materials and flags (6); margin of node boxes per metre of
 // reach, and reach (7). Triangles in world space belong to a record that changes nothing.
 
-#ifndef INSTANCE_GLSL
-#define INSTANCE_GLSL
-
 #include "layout.glsl"
 #include "surfaces.glsl"
 
@@ -67,5 +64,3 @@ uint triangle_material(uint triangle, uint instance) {
     }
     return material;
 }
-
-#endif

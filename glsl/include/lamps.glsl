@@ -1,9 +1,6 @@
 // Lamps: emitting triangles, and lights without a surface. Sampled by an alias table in proportion to
 // their power, triangles uniformly over their area. Twin of src/pass/lamps.rs for the densities.
 
-#ifndef LAMPS_GLSL
-#define LAMPS_GLSL
-
 #include "bvh.glsl"
 #include "emission.glsl"
 #include "frame.glsl"
@@ -103,5 +100,3 @@ LampSample sample_lamp(vec3 position, uvec2 bits, vec2 u) {
     }
     return sampled;
 }
-
-#endif

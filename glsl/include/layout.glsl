@@ -1,11 +1,11 @@
-// Structs and buffers shared with the host: build.rs writes interface.glsl from src/shader.
-
-#ifndef LAYOUT_GLSL
-#define LAYOUT_GLSL
+// Structs and buffers shared with the host: build.rs writes interface.glsl from src/shader. It also gives an
+// include only where a shader first names it, so that files need no guards.
 
 #extension GL_EXT_scalar_block_layout : require
 
 #include "interface.glsl"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
 
 // Declare a buffer with the access of the pass; synchronization validation relies on it.
 #define READS(name) BUFFER_##name(readonly)
@@ -13,5 +13,3 @@
 #define UPDATES(name) BUFFER_##name(READ_WRITE)
 #define READ_WRITE
 #define TEXELS(name) TEXELS_##name
-
-#endif

@@ -1,9 +1,6 @@
 // Loads rays, hits, shadow rays and materials through texel buffers: on lavapipe a texel of four
 // words costs a fraction of four loads from a storage buffer (docs/traversal.md).
 
-#ifndef LOAD_GLSL
-#define LOAD_GLSL
-
 #include "layout.glsl"
 
 TEXELS(ray_texels)
@@ -58,5 +55,3 @@ Material load_material(uint index) {
         uintBitsToFloat(second.xyz), uintBitsToFloat(uvec3(second.w, third.xy)),
         uintBitsToFloat(uvec3(third.zw, last)), vec3(0.0));
 }
-
-#endif

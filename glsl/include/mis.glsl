@@ -1,9 +1,6 @@
 // Density of `mis`: shadow rays from BRDF and environment, and the bounce ray that may escape to the
 // environment. Multi-sample balance heuristic [Veach & Guibas 1995]. Solid angle measure.
 
-#ifndef MIS_GLSL
-#define MIS_GLSL
-
 // Share of shadow rays from the BRDF, in 256ths: with the bounce ray, half of all rays of the vertex.
 uint mis_share(uint shadow_rays, uint bounce_rays) {
     return 128u * (shadow_rays - bounce_rays) / shadow_rays;
@@ -37,5 +34,3 @@ MisTurns mis_turns(uint first_ray, uint ray_count, uint share, uint bits) {
     }
     return MisTurns(from_brdf, before, first_ray - before + (bits & 1u));
 }
-
-#endif

@@ -1,8 +1,5 @@
 // Light that goes straight through surfaces: where they are not opaque, and through thin panes.
 
-#ifndef PASSAGE_GLSL
-#define PASSAGE_GLSL
-
 #define MEETS_PASSAGES
 #include "bvh.glsl"
 #include "load.glsl"
@@ -34,5 +31,3 @@ Passing passing(uint triangle, uint instance, vec3 weights, vec3 normal) {
 vec3 passage(uint triangle, uint instance, vec3 weights, vec3 normal) {
     return passing(triangle, instance, weights, normal).passed;
 }
-
-#endif

@@ -1,9 +1,6 @@
 // Paths that a dispatch walks: all of the wave, or a list of those that are still alive, without gaps, so
 // that no lane works for a path that has ended.
 
-#ifndef PATH_LIST_GLSL
-#define PATH_LIST_GLSL
-
 #include "divide.glsl"
 #include "wave.glsl"
 
@@ -49,5 +46,3 @@ ListedRay listed_ray(uint place, uint path_count) {
             walk(listed_path(place)); \
         } \
     }
-
-#endif

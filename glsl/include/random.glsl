@@ -5,9 +5,6 @@
 // where nothing depends on earlier samples. random_independent_2d is not: use it where past
 // outcomes enter.
 
-#ifndef RANDOM_GLSL
-#define RANDOM_GLSL
-
 // PCG4D. [Jarzynski & Olano 2020].
 uvec4 hash_4d(uvec4 v) {
     v = v * 1664525u + 1013904223u;
@@ -108,5 +105,3 @@ vec2 random_independent_2d(uint pixel, uint sample_index, uint dimension, uint s
 float random_independent_1d(uint pixel, uint sample_index, uint dimension, uint seed) {
     return unit_float(hash_4d(uvec4(pixel, sample_index, dimension, seed)).x);
 }
-
-#endif

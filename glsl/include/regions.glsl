@@ -1,9 +1,6 @@
 // Cells of rectangles of the environment, drawn in proportion to their light. Twin of
 // src/sampler/guided/partition.rs.
 
-#ifndef REGIONS_GLSL
-#define REGIONS_GLSL
-
 #include "random.glsl"
 
 // Column and row of a cell of the environment, from the alias table of a region: `place` chooses an entry,
@@ -21,5 +18,3 @@ uvec2 region_cell(usamplerBuffer aliases, uvec4 region, uint place, uint keep) {
     column += column < 0 ? int(region.y) : (column >= int(region.y) ? -int(region.y) : 0);
     return uvec2((region.w & 0xffffu) + uint(column), (region.w >> 16u) + row);
 }
-
-#endif

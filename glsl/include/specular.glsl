@@ -8,9 +8,6 @@
 // interface is scaled by (index of the viewer's side / index of the light's side)^2, so that light that
 // goes in and out again has its former radiance. Values of importance would lack this factor.
 
-#ifndef SPECULAR_GLSL
-#define SPECULAR_GLSL
-
 #include "brdf.glsl"
 
 // Continuation of a path; a weight of 0 ends it.
@@ -132,5 +129,3 @@ Scatter scatter(Material material, vec3 outgoing_local, bool is_back, vec3 u) {
     }
     return Scatter(vec3(0.0, 0.0, 1.0), vec3(0.0), false);
 }
-
-#endif

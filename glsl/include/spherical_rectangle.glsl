@@ -1,9 +1,6 @@
 // Rectangle seen from a point: its solid angle, and directions into it. Twin of
 // src/math/spherical_rectangle.rs, which says where the numbers are good.
 
-#ifndef SPHERICAL_RECTANGLE_GLSL
-#define SPHERICAL_RECTANGLE_GLSL
-
 // Below this solid angle, directions are uniform over the area instead of over the solid angle.
 const float LEAST_UNIFORM_SOLID_ANGLE = 1e-2;
 
@@ -118,5 +115,3 @@ float spherical_rectangle_pdf(SphericalRectangle seen, vec3 direction) {
         ? spherical_rectangle_density(seen, direction)
         : 0.0;
 }
-
-#endif

@@ -2,9 +2,6 @@
 // Densities and integrals cover the whole sphere, in solid angle. The forms hold in 32-bit floats
 // for bandwidths from 1e-3 to 1e5; src/srbf gives the reason for each.
 
-#ifndef SRBF_GLSL
-#define SRBF_GLSL
-
 const float SRBF_PI = 3.14159265358979;
 
 // exp(x) - 1 with a small relative error: Taylor series below 1/2.
@@ -204,5 +201,3 @@ vec2 kernel_inverse(vec3 axis, float bandwidth, vec3 direction) {
     float azimuth = atan(dot(direction, bitangent), dot(direction, tangent)) / (2.0 * SRBF_PI);
     return vec2(clamp(u, 0.0, 1.0), azimuth < 0.0 ? azimuth + 1.0 : azimuth);
 }
-
-#endif

@@ -1,8 +1,5 @@
 // Specialization of passes by the kinds and properties of the surfaces in the scene.
 
-#ifndef SURFACES_GLSL
-#define SURFACES_GLSL
-
 #include "layout.glsl"
 
 // One bit per kind of material in the scene.
@@ -20,5 +17,3 @@ const bool IS_TEXTURED = (SURFACES & SURFACES_TEXTURED) != 0u;
 bool is_specular(uint kind) {
     return HAS_SPECULAR && ((1u << kind) & SPECULAR_KINDS) != 0u;
 }
-
-#endif

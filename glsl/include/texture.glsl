@@ -5,9 +5,6 @@
 // filter averages anyway once samples add up, and so blur the picture: a bias that no number of
 // samples removes.
 
-#ifndef TEXTURE_GLSL
-#define TEXTURE_GLSL
-
 #include "bvh.glsl"
 #include "layout.glsl"
 
@@ -327,5 +324,3 @@ vec3 mapped_normal(
     float squared = dot(mapped, mapped);
     return squared > 1.0e-12 ? side * mapped * inversesqrt(squared) : shading_normal;
 }
-
-#endif

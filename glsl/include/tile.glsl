@@ -1,9 +1,6 @@
 // Tiles: pixels of a block whose paths share their second vertices. The tiles of a block move from
 // sample to sample, around its edges, so that the errors they have in common do not line up.
 
-#ifndef TILE_GLSL
-#define TILE_GLSL
-
 #include "random.glsl"
 #include "wave.glsl"
 
@@ -46,5 +43,3 @@ uint tile_path(Tile tile, uint member) {
 bool is_seen(uvec2 seen_pixels, uint member) {
     return (((member < 32u ? seen_pixels.x : seen_pixels.y) >> (member & 31u)) & 1u) != 0u;
 }
-
-#endif

@@ -1,8 +1,5 @@
 // Tone: linear radiance → values that a screen can show; twin of src/film/tone.rs.
 
-#ifndef TONE_GLSL
-#define TONE_GLSL
-
 // Luminance that the curve of Reinhard et al. maps to white.
 const float TONE_WHITE = 4.0;
 // Beyond this all is white, and infinity would give NaN.
@@ -35,5 +32,3 @@ vec3 tone_map(vec3 value, float exposure, uint curve) {
     }
     return srgb_from_linear(clamp(value, vec3(0.0), vec3(1.0)));
 }
-
-#endif

@@ -1,9 +1,6 @@
 // Path vertex as the sampling passes see it: surface, integrand in a direction, and the densities
 // of sampling BRDF and environment. Densities in solid angle measure.
 
-#ifndef VERTEX_GLSL
-#define VERTEX_GLSL
-
 #include "frame.glsl"
 #include "hit_surface.glsl"
 #include "load.glsl"
@@ -94,5 +91,3 @@ void write_ray(uint index, vec3 direction, vec3 contribution) {
 void write_sample(uint index, DirectionSample sampled, float pdf) {
     write_ray(index, sampled.direction, pdf > 0.0 ? sampled.integrand / pdf : vec3(0.0));
 }
-
-#endif

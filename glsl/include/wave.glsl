@@ -1,8 +1,5 @@
 // Pixel and sample of each path of the wave, and the dimensions of its random numbers.
 
-#ifndef WAVE_GLSL
-#define WAVE_GLSL
-
 #include "divide.glsl"
 #include "layout.glsl"
 #include "parameters.glsl"
@@ -107,5 +104,3 @@ uvec4 block_random_bits(PathIndex index, uint dimension) {
     uvec2 block = film_block_place(index).yx;
     return hash_4d(uvec4(block, vertex_dimension() + dimension, wave.seed));
 }
-
-#endif

@@ -1,9 +1,6 @@
 // Portals of the scene as a vertex sees them: a choice among them in proportion to their solid angles,
 // those below the horizon left out, and a direction into the chosen one.
 
-#ifndef PORTALS_GLSL
-#define PORTALS_GLSL
-
 #include "spherical_rectangle.glsl"
 #include "vertex.glsl"
 
@@ -68,5 +65,3 @@ vec3 portal_sample(Vertex vertex, float total, float choice, vec2 u) {
     }
     return spherical_rectangle_sample(chosen, u);
 }
-
-#endif

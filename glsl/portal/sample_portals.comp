@@ -7,8 +7,6 @@
 #include "path_list.glsl"
 #include "portal/portals.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 // Density of all techniques at a direction; `light_share` is that of portals among light.
 float density(Vertex vertex, DirectionSample sampled, float light_share, float total) {
     float light = (1.0 - light_share) * sampled.environment_pdf;

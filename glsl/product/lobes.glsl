@@ -3,9 +3,6 @@
 // A lobe is two words: axis in the octahedral map; bandwidth and weight as halves. Weights are
 // relative to the strongest lobe of the guess at the hit.
 
-#ifndef LOBES_GLSL
-#define LOBES_GLSL
-
 #include "frame.glsl"
 #include "layout.glsl"
 #include "srbf.glsl"
@@ -35,5 +32,3 @@ ProductLobe unpack_lobe(uvec2 words) {
 bool is_sum_kept(uint l, uint count) {
     return (l + 1u) % LOBES_PER_SUM == 0u || l + 1u == count;
 }
-
-#endif

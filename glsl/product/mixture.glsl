@@ -4,9 +4,6 @@
 //
 // Deviation: elevations by inversion; the thesis's Metropolis walk is optional, and biased.
 
-#ifndef MIXTURE_GLSL
-#define MIXTURE_GLSL
-
 #include "product/numbers.glsl"
 #include "product/readings.glsl"
 #include "vertex.glsl"
@@ -157,5 +154,3 @@ ShadowRay mixture_ray(Vertex vertex, Mixture mixture, uint ray, MixtureNumbers n
     float pdf = mixture_pdf(mixture, sampled, lobe_density);
     return ShadowRay(direction, pdf > 0.0 ? sampled.integrand / pdf : vec3(0.0));
 }
-
-#endif

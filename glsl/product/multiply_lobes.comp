@@ -24,8 +24,6 @@ WRITES(lobe_sums)
 WRITES(visibility_cache)
 UPDATES(counters)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 layout(constant_id = CONSTANT_ENVIRONMENT_LOBES) const uint ENVIRONMENT_LOBES = 100u;
 layout(constant_id = CONSTANT_BRDF_LOBES) const uint BRDF_LOBES = 20u;
 layout(constant_id = CONSTANT_VIEWS) const uint VIEWS = 32u;

@@ -1,8 +1,5 @@
 // Random numbers of samplers that draw from a product, BRDF and environment.
 
-#ifndef NUMBERS_GLSL
-#define NUMBERS_GLSL
-
 #include "vertex.glsl"
 
 // Random numbers for one direction, each in [0, 1).
@@ -45,5 +42,3 @@ MixtureNumbers draw_numbers(
     }
     return numbers;
 }
-
-#endif

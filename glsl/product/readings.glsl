@@ -1,9 +1,6 @@
 // Densities that readings of [Wu & Shih 2009], Eq. 2, divide directions from lobes by. All but the
 // mixture's are biased and for studies alone. Solid angle measure.
 
-#ifndef READINGS_GLSL
-#define READINGS_GLSL
-
 #include "visibility/weights.glsl"
 
 layout(constant_id = CONSTANT_READING) const uint READING = READING_MIXTURE;
@@ -44,5 +41,3 @@ float read_density(Lobes lobes, float total, vec3 direction, float lobe_density)
         ? density * weight_in_force(lobes, chosen_lobe) / total
         : density;
 }
-
-#endif

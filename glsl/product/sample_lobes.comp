@@ -9,8 +9,6 @@ READS(close_lobes)
 
 #include "product/mixture.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void main() {
     uint path = gl_GlobalInvocationID.x;
     uint path_count = wave_path_count();

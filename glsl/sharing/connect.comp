@@ -19,8 +19,6 @@ WRITES(shadow_rays)
 WRITES(connections)
 WRITES(seen)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 // Squared distance below which vertices are not connected, square metres: its inverse is finite.
 const float LEAST_SQUARED_DISTANCE = 1.0e-18;
 

@@ -11,8 +11,6 @@
 READS(visibility)
 UPDATES(second_vertices)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void main() {
     uint path = gl_GlobalInvocationID.x;
     uint path_count = wave_path_count();

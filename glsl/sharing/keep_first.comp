@@ -8,8 +8,6 @@
 READS(paths)
 WRITES(first_vertices)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void main() {
     uint path = gl_GlobalInvocationID.x;
     if (path >= wave_path_count()) {

@@ -12,8 +12,6 @@
 UPDATES(paths)
 WRITES(second_vertices)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void main() {
     uint path = gl_GlobalInvocationID.x;
     if (path >= wave_path_count()) {

@@ -10,8 +10,6 @@ READS(paths)
 READS(second_vertices)
 WRITES(offers)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void main() {
     uint path = gl_GlobalInvocationID.x;
     if (path >= wave_path_count()) {

@@ -13,8 +13,6 @@ TEXELS(connection_texels)
 TEXELS(offer_weight_texels)
 UPDATES(paths)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void main() {
     uint path = gl_GlobalInvocationID.x;
     uint path_count = wave_path_count();

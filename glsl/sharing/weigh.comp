@@ -12,8 +12,6 @@ TEXELS(connection_texels)
 TEXELS(seen_texels)
 WRITES(offer_weights)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void main() {
     uint path = gl_GlobalInvocationID.x;
     uint path_count = wave_path_count();

@@ -2,10 +2,7 @@
 #version 460
 
 #include "guided/arriving.glsl"
-
-#extension GL_EXT_scalar_block_layout : require
-
-layout(local_size_x = WORKGROUP_SIZE) in;
+#include "layout.glsl"
 
 layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Inputs {
     vec3 inputs[];

@@ -4,8 +4,6 @@
 #include "control_variates/controlled.glsl"
 #include "control_variates/records.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 struct ControlQuery {
     vec3 position;
     vec3 normal;

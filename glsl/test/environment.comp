@@ -3,8 +3,6 @@
 
 #include "environment.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 struct ProbeInput {
     vec3 direction;
     vec2 u;

@@ -2,10 +2,7 @@
 #version 460
 
 #include "frame.glsl"
-
-#extension GL_EXT_scalar_block_layout : require
-
-layout(local_size_x = WORKGROUP_SIZE) in;
+#include "layout.glsl"
 
 struct ProbeInput {
     vec3 normal;

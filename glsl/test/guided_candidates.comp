@@ -3,8 +3,6 @@
 
 #include "guided/candidates.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 struct CandidateQuery {
     // 1 draws a candidate, 0 takes the direction.
     uint draws;

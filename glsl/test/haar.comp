@@ -3,8 +3,6 @@
 
 #include "haar/mixture.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 struct HaarQuery {
     uint path;
     // 1 draws a direction from the numbers, 0 takes the given one.

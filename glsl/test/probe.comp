@@ -1,9 +1,7 @@
 // Adds one to every word, to test the host itself.
 #version 460
 
-#extension GL_EXT_scalar_block_layout : require
-
-layout(local_size_x = WORKGROUP_SIZE) in;
+#include "layout.glsl"
 
 layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Input {
     uint probe_input[];

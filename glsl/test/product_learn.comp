@@ -11,8 +11,6 @@ READS(visibility)
 #include "product/mixture.glsl"
 #include "visibility/record.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {
     float densities[];
 };

@@ -8,8 +8,6 @@ READS(close_lobes)
 
 #include "visibility/weights.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 struct LobeAnswer {
     vec3 axis;
     float bandwidth;

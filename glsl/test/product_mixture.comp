@@ -8,8 +8,6 @@ READS(close_lobes)
 
 #include "product/mixture.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 struct MixtureQuery {
     uint path;
     // 1 draws a direction from the numbers, 0 takes the given one.

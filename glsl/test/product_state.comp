@@ -8,8 +8,6 @@ WRITES(hits)
 WRITES(shadow_rays)
 WRITES(visibility)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 struct PathInput {
     vec3 normal;
     uint material;

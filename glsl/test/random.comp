@@ -1,11 +1,8 @@
 // Probe of random.glsl: (pixel, sample, dimension, seed) in, numbers of each kind out.
 #version 460
 
+#include "layout.glsl"
 #include "random.glsl"
-
-#extension GL_EXT_scalar_block_layout : require
-
-layout(local_size_x = WORKGROUP_SIZE) in;
 
 struct ProbeOutput {
     vec2 stratified;

@@ -6,8 +6,6 @@
 
 READS(materials)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 struct SpecularQuery {
     vec3 outgoing_local;
     vec3 incident_local;

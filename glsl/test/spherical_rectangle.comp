@@ -1,11 +1,8 @@
 // Probe of spherical_rectangle.glsl: rectangle, two random numbers and a direction in, everything out.
 #version 460
 
+#include "layout.glsl"
 #include "spherical_rectangle.glsl"
-
-#extension GL_EXT_scalar_block_layout : require
-
-layout(local_size_x = WORKGROUP_SIZE) in;
 
 struct ProbeInput {
     vec3 corner;

@@ -1,9 +1,8 @@
 // Probe of srbf.glsl: one row of inputs in, the result of every function out.
 #version 460
-#extension GL_EXT_scalar_block_layout : require
-#include "srbf.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
+#include "layout.glsl"
+#include "srbf.glsl"
 
 struct Input {
     Lobe a;

@@ -3,8 +3,6 @@
 
 #include "texture.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 struct TextureQuery {
     uint use_index;
     uint material;

@@ -3,8 +3,6 @@
 
 #include "tiles/tiles.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 struct TileQuery {
     vec3 position;
     vec2 shift;

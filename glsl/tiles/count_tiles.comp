@@ -10,8 +10,6 @@
 READS(visibility)
 UPDATES(tile_counts)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void count_ray(ListedRay listed) {
     HitOrigin hit = load_hit_origin(listed.path);
     if (hit.material == NO_MATERIAL) {

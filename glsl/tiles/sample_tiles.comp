@@ -11,8 +11,6 @@
 #include "tiles/tiles.glsl"
 #include "vertex.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 layout(constant_id = CONSTANT_SECTOR_JITTER) const bool SECTOR_JITTER = false;
 // True in the pilot, which learns from rays through tiles alone.
 layout(constant_id = CONSTANT_TILES_LEARN) const bool LEARNS = false;

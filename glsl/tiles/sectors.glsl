@@ -1,9 +1,6 @@
 // Sectors of the directions from the camera, in which visibility is learned, and tiles of the environment.
 // Twin of src/sampler/tiles/{grid,density}.rs.
 
-#ifndef SECTORS_GLSL
-#define SECTORS_GLSL
-
 #include "environment.glsl"
 #include "equal_area.glsl"
 
@@ -38,5 +35,3 @@ uint tile_of(vec3 direction) {
     int cell = int(location.row * parameters.environment_width + location.column);
     return texelFetch(tile_of_cell, cell).x;
 }
-
-#endif

@@ -3,9 +3,6 @@
 //
 // A sector's entries come from the pilot and do not change afterwards.
 
-#ifndef TILES_GLSL
-#define TILES_GLSL
-
 #include "regions.glsl"
 #include "tiles/sectors.glsl"
 
@@ -42,5 +39,3 @@ EnvironmentSample draw_from_tiles(uint sector, uvec2 bits, uvec4 more_bits) {
     light.pdf = parameters.environment_total > 0.0 ? ratio * light.pdf : 0.0;
     return light;
 }
-
-#endif

@@ -13,8 +13,6 @@ layout(scalar, push_constant) uniform WindowFrameConstants {
     WindowFrame frame;
 };
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 // Grey around the film.
 const vec3 AROUND = vec3(0.13);
 

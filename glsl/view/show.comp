@@ -17,8 +17,6 @@ layout(scalar, push_constant) uniform ShownFilmConstants {
     ShownFilm film;
 };
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 // Colours from blue to red by a fit of the map "turbo" (Mikhailov 2019), about linear.
 vec3 false_colour(float value) {
     vec4 powers = vec4(1.0, value, value * value, value * value * value);

@@ -3,9 +3,6 @@
 // A direction d is close to a lobe with axis a if 1 - dot(a, d) is below a multiple of the lobe's
 // deviation (text after Eq. 10). Masks of MASK_WORDS words store the lobes close to each direction.
 
-#ifndef CACHE_GLSL
-#define CACHE_GLSL
-
 #include "product/lobes.glsl"
 
 layout(constant_id = CONSTANT_THRESHOLD_SCALE) const float THRESHOLD_SCALE = 1.0;
@@ -47,5 +44,3 @@ uint cache_head(uint path, uint film_index) {
 uint close_lobes_index(uint path, uint path_count, uint entry, uint word) {
     return (entry % (CACHE_CAPACITY + 1u) * MASK_WORDS + word) * path_count + path;
 }
-
-#endif

@@ -8,8 +8,6 @@
 READS(visibility_cache)
 UPDATES(film_cache_entries)
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void main() {
     uint pixel = gl_GlobalInvocationID.x;
     PathIndex index = wave_pixel(wave_film_position(pixel));

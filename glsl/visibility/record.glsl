@@ -1,9 +1,6 @@
 // Recording blocked directions in the visibility cache of a hit. [Wu & Shih 2009], section 4.2. A full
 // cache forgets its oldest entry. Entry points declare visibility_cache and close_lobes.
 
-#ifndef RECORD_GLSL
-#define RECORD_GLSL
-
 #include "visibility/weights.glsl"
 
 WRITES(lobe_sums)
@@ -30,5 +27,3 @@ void store_weights(Lobes lobes, uint head_bits) {
         lobe_sums[s * lobes.path_count + lobes.path] = weight_sums[s];
     }
 }
-
-#endif

@@ -12,8 +12,6 @@ UPDATES(counters)
 
 #include "visibility/weights.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 // Not 0: arrays need an element even in samplers without a cache.
 const uint PLACES = CACHE_CAPACITY > 0u ? CACHE_CAPACITY : 1u;
 

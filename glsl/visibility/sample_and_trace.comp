@@ -17,8 +17,6 @@ UPDATES(counters)
 #include "product/mixture.glsl"
 #include "visibility/record.glsl"
 
-layout(local_size_x = WORKGROUP_SIZE) in;
-
 void main() {
     uint path = gl_GlobalInvocationID.x;
     uint path_count = wave_path_count();

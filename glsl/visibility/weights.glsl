@@ -6,9 +6,6 @@
 //
 // Deviation: V = (1 / (1 + Num))^k, not (1 / Num)^k, infinite for lobes without close directions.
 
-#ifndef WEIGHTS_GLSL
-#define WEIGHTS_GLSL
-
 #include "visibility/cache.glsl"
 #include "wave.glsl"
 
@@ -152,5 +149,3 @@ uint find_lobe(Lobes lobes, float target) {
     }
     return chosen;
 }
-
-#endif
