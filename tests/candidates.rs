@@ -4,6 +4,7 @@
 
 use crate::support;
 use crate::support::command::Folder;
+use crate::support::guide::Guide as _;
 use crate::support::{renderer, scenes};
 use fenestra::{
     film::{Attribute, Checkpoint, Image, Statistics, Sums},

@@ -6,6 +6,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 use crate::support;
+use crate::support::guide::Guide as _;
 use crate::support::{
     replicates::{LIMIT, REPLICATES, replicates, rows},
     scenes,

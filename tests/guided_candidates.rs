@@ -9,6 +9,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 use crate::support;
+use crate::support::guide::Guide as _;
 use crate::support::hemisphere;
 use crate::support::materials;
 use std::f64::consts::PI;

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 use crate::support;
+use crate::support::guide::Guide as _;
 use std::collections::BTreeMap;
 
 use crate::support::{render, renderer, scenes};

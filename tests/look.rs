@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 use crate::support;
+use crate::support::guide::Guide as _;
 use std::{cell::Cell, rc::Rc};
 
 use crate::support::{

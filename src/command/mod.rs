@@ -7,7 +7,6 @@ mod denoise;
 pub mod devices;
 pub mod export;
 pub mod fit;
-mod guide;
 pub mod info;
 mod interrupt;
 pub mod merge;

@@ -12,6 +12,7 @@ pub mod merge;
 pub mod metadata;
 pub mod picture;
 pub mod png;
+pub mod sky;
 pub mod statistics;
 pub mod summary;
 pub mod sums;

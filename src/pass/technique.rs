@@ -1,10 +1,14 @@
 //! A sampler at work in a render: learning between passes, and the figures it reports.
 
-use std::{any::Any, collections::BTreeMap};
+use std::{any::Any, collections::BTreeMap, path::Path};
 
-use super::{runner::Runner, steps::Passes};
+use super::{
+    explanation::{Explanation, RecordedPixel},
+    runner::Runner,
+    steps::Passes,
+};
 use crate::{
-    error::Result,
+    error::{Error, Result},
     film::statistics::{CandidateCost, SharingGain},
     shader::structs::Wave,
 };
@@ -46,6 +50,18 @@ pub struct Report {
     pub sharing_gain: Option<SharingGain>,
 }
 
+/// Knowledge that the technique of an earlier render saved.
+#[derive(Clone, Copy, Debug)]
+pub struct Saved<'a> {
+    /// File that holds it, for messages.
+    pub path: &'a Path,
+    /// Content of the file.
+    pub bytes: &'a [u8],
+    /// True if it belongs to the samples in the film, so that the render continues bit for bit; else it
+    /// counts as learned before the first sample, whatever film it came from.
+    pub continues: bool,
+}
+
 /// A sampler at work in one render.
 pub trait Technique: Passes + Any {
     /// Completes the push constants of a wave of the picture.
@@ -74,6 +90,45 @@ pub trait Technique: Passes + Any {
     /// Returns [`crate::Error::Usage`] if sums alone cannot continue a film of so many `samples`.
     fn check_resume(&self, _samples: u32, _progress: &Progress) -> Result<()> {
         Ok(())
+    }
+
+    /// Returns what was learned in a film of `samples` samples per pixel, as the content of a file; `None`
+    /// if nothing outlives the render. Fails if the device does.
+    fn save(&self, _samples: u32) -> Result<Option<Vec<u8>>> {
+        Ok(None)
+    }
+
+    /// Continues from what an earlier render saved, without training. Returns true if the geometry
+    /// differs, so that most was forgotten.
+    ///
+    /// # Errors
+    /// [`Error::Format`] for other content; [`Error::Usage`] if it belongs to another scene, or if this
+    /// sampler learns nothing; [`Error::Vulkan`] if the device fails.
+    fn load(&mut self, _runner: &mut Runner, _: &Progress, saved: Saved<'_>) -> Result<bool> {
+        let path = saved.path.display();
+        Err(Error::usage(format!("{path}: this sampler learns nothing; expected --sampler guided")))
+    }
+
+    /// Adds what the technique knows at the first path of the last wave, which was one block, once its
+    /// last shadow ray is traced. Fails if the device does.
+    fn explain(&self, _pixel: &mut RecordedPixel) -> Result<()> {
+        Ok(())
+    }
+
+    /// Explains film pixel `at` by `rays` shadow rays in whole samples after those in the film, for
+    /// techniques whose choices depend on the whole picture. Counts them for learning. `None` if no camera
+    /// ray hits anything, and for all other techniques. Fails if the device does.
+    ///
+    /// # Panics
+    /// If the pixel is outside the window.
+    fn explain_learned(
+        &self,
+        _runner: &mut Runner,
+        _progress: &Progress,
+        _at: [u32; 2],
+        _rays: u32,
+    ) -> Result<Option<Box<dyn Explanation>>> {
+        Ok(None)
     }
 
     /// Returns figures for statistics and metadata.

@@ -54,6 +54,11 @@ pub trait Room: Sync {
         &[]
     }
 
+    /// True if the sampler learns a guide from the whole picture, which outlives its render in a file.
+    fn has_guide(&self) -> bool {
+        false
+    }
+
     /// Returns the parameters relevant to the sampler by key, for metadata and statistics.
     fn describe(&self, _parameters: &Parameters) -> BTreeMap<String, String> {
         BTreeMap::new()
@@ -167,6 +172,11 @@ impl Sampler {
             format!("{path}: --sampler {name} ignores the portals of the scene ({count}{first} in all); \
                      --sampler portal uses them")
         })
+    }
+
+    /// True if the sampler learns a guide from the whole picture, which outlives its render in a file.
+    pub fn has_guide(self) -> bool {
+        self.room().has_guide()
     }
 
     /// Returns the simple form of the sampler if it is one of [`basic`].

@@ -1,13 +1,12 @@
 //! Progressive rendering of a scene on a device.
 
+mod guide;
 mod look;
-mod pixel;
-mod resume;
+pub mod pixel;
 mod settings;
 
 use std::{any::Any, collections::BTreeMap, sync::Arc};
 
-pub use pixel::RecordedPixel;
 pub use settings::{Settings, window_of};
 
 use crate::{
@@ -186,7 +185,7 @@ impl Renderer {
     }
 
     /// Calls `work` with technique, runner and progress if the technique is a `T`.
-    fn with_technique<T: Technique, R>(
+    pub fn with_technique<T: Technique, R>(
         &mut self,
         work: impl FnOnce(&mut T, &mut Runner, &Progress) -> R,
     ) -> Option<R> {

@@ -1,69 +1,146 @@
-//! Records everything that happens at the first hit of one pixel, read back from the device.
+//! Explains a pixel: records its first hit on the device, and writes a picture with its numbers.
 //!
 //! Wave buffers hold only the last group of shadow rays and the final lobe weights. The pixel is
 //! therefore rendered with one ray, then two, and so on: the random numbers of a ray do not depend
 //! on how many follow, so each round repeats the one before and adds a ray.
+//!
+//! The picture shows skies, darkened below the hit's horizon (blue): the environment with the samples
+//! taken, then what the technique chose by, as in figures 4.3 to 4.8 of Wu & Shih 2009.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use bytemuck::Pod;
-use glam::Vec3;
 
-use super::Renderer;
+use super::{Renderer, Settings};
 use crate::{
     error::{Error, Result},
-    gpu::Buffer,
-    pass::{BLOCK_PIXELS, Progress},
-    sampler::{
-        Sampler,
-        guided::{Guided, RecordedGuide, RecordedRay},
-        product::{
-            Product,
-            record::{RecordedLobe, lobe_count, read_lobes},
-        },
-        visibility::Visibility,
+    files::{check_writable, write_text},
+    film::{Window, png::write_rgb8},
+    gpu::{Buffer, Device},
+    pass::{
+        BLOCK_PIXELS, Explanation, Progress, RecordedPixel, RecordedRay, explanation::draw_rays,
     },
+    scene::Scene,
     shader::{
         constants::NO_MATERIAL,
         structs::{Hit, ShadowRay},
     },
 };
 
-/// Tells the random numbers of [`Renderer::inspect_guided_pixel`] from those of the picture.
+/// Rays of an explanation by a renderer that has learned from its picture.
+const LEARNED_RAYS: u32 = 64;
+/// Tells the random numbers of [`Renderer::inspect_pixel`] from those of the picture.
 const INSPECTION_SEED: u32 = 0x3d4e_91c7;
 const INSPECTION_RAYS: u32 = 40;
+/// Width of a sky, pixels.
+const WIDTH: usize = 512;
+/// Height of the white line between skies, pixels.
+const GAP: usize = 4;
 
-/// First hit of a pixel's first sample, with all its shadow rays.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RecordedPixel {
-    /// Position, metres.
-    pub position: Vec3,
-    /// Unit shading normal.
-    pub normal: Vec3,
-    /// Shadow rays in the order of tracing.
-    pub rays: Vec<RecordedRay>,
-    /// Lobes of the product; empty for samplers without lobes.
-    pub lobes: Vec<RecordedLobe>,
-    /// Unit directions in the cache when the last ray was drawn, oldest first; `None` without a cache.
-    pub cached: Option<Vec<Vec3>>,
+/// `out.exr` → `out.pixel_x_y.png`.
+fn picture_path(output: &Path, [x, y]: [u32; 2]) -> PathBuf {
+    output.with_extension(format!("pixel_{x}_{y}.png"))
+}
+
+/// Checks that film pixel `at` can be explained beside `output`, before any work.
+///
+/// # Errors
+/// [`Error::Usage`] for a pixel outside the window; [`Error::Io`] if the picture cannot be written.
+pub fn check(settings: &Settings, scene: &Scene, output: &Path, at: [u32; 2]) -> Result<()> {
+    let [x, y] = at;
+    let window = super::window_of(settings, scene);
+    let is_inside = |at: u32, start: u32, length: u32| at >= start && at - start < length;
+    if !is_inside(x, window.x, window.width) || !is_inside(y, window.y, window.height) {
+        return Err(Error::usage(format!(
+            "--pixel {x},{y}: expected {} ≤ x < {} and {} ≤ y < {}, the part of the film that is \
+             rendered",
+            window.x,
+            u64::from(window.x) + u64::from(window.width),
+            window.y,
+            u64::from(window.y) + u64::from(window.height)
+        )));
+    }
+    check_writable(&picture_path(output, at))
+}
+
+/// Writes the picture of `explanation` beside `output`, and its numbers as JSON. Returns both files.
+///
+/// # Errors
+/// A failing disk.
+pub fn write(
+    explanation: &dyn Explanation,
+    scene: &Scene,
+    output: &Path,
+    at: [u32; 2],
+) -> Result<[PathBuf; 2]> {
+    let path = picture_path(output, at);
+    let mut rows: Vec<[u8; 3]> = draw_rays(scene, explanation, WIDTH).pixels().to_vec();
+    for sky in explanation.skies(scene, WIDTH) {
+        rows.extend(std::iter::repeat_n([255; 3], GAP * WIDTH));
+        rows.extend(sky.pixels());
+    }
+    write_rgb8(&path, WIDTH as u32, (rows.len() / WIDTH) as u32, &rows)?;
+    let numbers = path.with_extension("json");
+    write_text(&numbers, &explanation.numbers().to_string())?;
+    Ok([path, numbers])
 }
 
 impl Renderer {
-    /// Renders one sample of a renderer's only pixel and reads it back; `None` if the camera ray
-    /// leaves the scene. Empties the film.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for `guided`, whose choices depend on the whole picture: see
-    /// [`Renderer::record_guided_pixel`]; [`Error::Vulkan`] if the device fails.
+    /// Explains film pixel `at`: with what was learned, where choices depend on the whole picture, else by
+    /// rendering its first sample again on a film of its own. `None` if the pixel sees the environment.
+    /// Fails if the device does.
     ///
     /// # Panics
-    /// If the window is larger than one pixel.
-    pub fn record_pixel(&mut self) -> Result<Option<RecordedPixel>> {
-        let window = self.runner.scene().window();
-        assert!(window.width == 1 && window.height == 1, "a window of one pixel");
-        if self.settings.sampler == Sampler::Guided {
-            return Err(Error::usage(
-                "guided learns from the whole picture: one pixel alone has nothing to record",
-            ));
+    /// If the pixel is outside the window.
+    pub fn explain_pixel(
+        mut self,
+        device: &Arc<Device>,
+        scene: &Scene,
+        at: [u32; 2],
+    ) -> Result<Option<Box<dyn Explanation>>> {
+        if self.settings.sampler.has_guide() {
+            return self.explain_learned(self.settings.seed, at, LEARNED_RAYS);
         }
+        let [x, y] = at;
+        let settings = Settings {
+            window: Some(Window { x, y, width: 1, height: 1 }),
+            aovs: Vec::new(),
+            depth: 1,
+            first_sample: 0,
+            ..self.settings.clone()
+        };
+        drop(self);
+        let recorded = Self::new(device, scene, settings)?.record_pixel()?;
+        Ok(recorded.map(|recorded| Box::new(recorded) as Box<dyn Explanation>))
+    }
+
+    /// Explains film pixel `at` by a few shadow rays, with numbers of their own, which teach the guide as
+    /// those of a training do: the renderer may continue. `None` for samplers without a guide and if no
+    /// camera ray hits anything. Fails if the device does.
+    ///
+    /// # Panics
+    /// If the pixel is outside the window.
+    pub fn inspect_pixel(&mut self, at: [u32; 2]) -> Result<Option<Box<dyn Explanation>>> {
+        self.explain_learned(self.settings.seed ^ INSPECTION_SEED, at, INSPECTION_RAYS)
+    }
+
+    /// As [`Technique::explain_learned`](crate::pass::Technique::explain_learned), with numbers of `seed`.
+    /// With the seed of the picture, the renderer should not continue afterwards.
+    pub fn explain_learned(
+        &mut self,
+        seed: u32,
+        at: [u32; 2],
+        rays: u32,
+    ) -> Result<Option<Box<dyn Explanation>>> {
+        let progress = Progress { seed, ..self.progress() };
+        self.technique.explain_learned(&mut self.runner, &progress, at, rays)
+    }
+
+    /// Renders one sample of the only pixel and reads it back; `None` if the camera ray leaves the scene.
+    fn record_pixel(&mut self) -> Result<Option<RecordedPixel>> {
         let most = self.settings.shadow_rays;
         let mut recorded: Option<RecordedPixel> = None;
         for count in 1..=most.max(1) {
@@ -72,8 +149,7 @@ impl Renderer {
             self.render_pass(1)?;
             let hit: Hit = element(self.runner.waves().hits(), 0)?;
             if hit.material == NO_MATERIAL {
-                recorded = None;
-                break;
+                return Ok(None);
             }
             let pixel = recorded.get_or_insert_with(|| RecordedPixel {
                 position: hit.position.into(),
@@ -94,52 +170,9 @@ impl Renderer {
                 contribution: ray.contribution.into(),
                 is_visible: visible != 0,
             });
-            if let Some(product) = self.technique::<Product>() {
-                let lobes = product.lobes();
-                read_lobes(lobes, &vec![1.0; lobe_count(lobes)?], &mut pixel.lobes)?;
-            }
-            if let Some(visibility) = self.technique::<Visibility>() {
-                let lobes = visibility.lobes();
-                let factors = visibility.visibility_weights(lobe_count(lobes)?)?;
-                read_lobes(lobes, &factors, &mut pixel.lobes)?;
-                pixel.cached = Some(visibility.cached_directions()?);
-            }
+            self.technique.explain(pixel)?;
         }
-        self.runner.limit_shadow_rays(most);
         Ok(recorded)
-    }
-}
-
-impl Renderer {
-    /// Traces `rays` shadow rays of film pixel `at` with what `guided` has learned, in whole
-    /// samples after those in the film; `None` if no camera ray hits anything, or for other
-    /// samplers. The renderer should not continue afterwards. Fails if the device does.
-    ///
-    /// # Panics
-    /// If the pixel is outside the window.
-    pub fn record_guided_pixel(
-        &mut self,
-        at: [u32; 2],
-        rays: u32,
-    ) -> Result<Option<RecordedGuide>> {
-        let record = |guided: &mut Guided, runner: &mut _, progress: &_| {
-            guided.record_pixel(runner, progress, at, rays)
-        };
-        self.with_technique(record).unwrap_or(Ok(None))
-    }
-
-    /// Finds the cell of film pixel `at` by a few shadow rays, with numbers of their own, which teach the
-    /// guide as those of a training do: the renderer may continue. `None` as for
-    /// [`Renderer::record_guided_pixel`]. Fails if the device does.
-    ///
-    /// # Panics
-    /// If the pixel is outside the window.
-    pub fn inspect_guided_pixel(&mut self, at: [u32; 2]) -> Result<Option<RecordedGuide>> {
-        let inspect = |guided: &mut Guided, runner: &mut _, progress: &Progress| {
-            let progress = Progress { seed: progress.seed ^ INSPECTION_SEED, ..*progress };
-            guided.record_pixel(runner, &progress, at, INSPECTION_RAYS)
-        };
-        self.with_technique(inspect).unwrap_or(Ok(None))
     }
 }
 

@@ -29,7 +29,7 @@ use crate::{
         denoised::check_film,
         metadata::seconds_of,
     },
-    sampler::guided::GuideState,
+    pass::Saved,
     scene::Scene,
     session::Renderer,
 };
@@ -291,10 +291,8 @@ fn render_half(
             let candidates = renderer.report().candidates;
             let metadata = Metadata { sample_ranges: vec![range], candidates, ..metadata.clone() };
             let checkpoint = Checkpoint { sums: renderer.sums()?, metadata };
-            let guide = renderer.guide_state()?.map(|state| state.to_bytes()).transpose();
-            let written = guide
-                .map_err(|source| Error::io(&checkpoint_path, "write", source))
-                .and_then(|guide| checkpoint.write_with_guide(&checkpoint_path, guide.as_deref()));
+            let guide = renderer.guide()?;
+            let written = checkpoint.write_with_guide(&checkpoint_path, guide.as_deref());
             // A full disk may have room again at the next checkpoint or for the image.
             if let Err(error) = written {
                 log::warn!("{error}; the next checkpoint tries again");
@@ -330,14 +328,9 @@ fn resume(renderer: &mut Renderer, path: &Path, metadata: &Metadata) -> Result<f
     if samples > count || checkpoint.check_resume(path, metadata, &empty, seed, 0).is_err() {
         return Ok(0.0);
     }
-    let state = guide.and_then(|(path, bytes)| GuideState::from_bytes(&bytes, &path).ok());
-    let learns = renderer.guide_state()?.is_some();
-    if learns && state.as_ref().is_none_or(|state| state.samples != samples) {
-        return Ok(0.0);
-    }
     renderer.restore(&checkpoint.sums)?;
-    if let Some(state) = state.filter(|_| learns) {
-        renderer.restore_guide(&state)?;
+    if let Some((path, bytes)) = guide {
+        renderer.take_guide(Saved { path: &path, bytes: &bytes, continues: true })?;
     }
     Ok(checkpoint.metadata.seconds)
 }

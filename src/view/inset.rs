@@ -1,10 +1,7 @@
 //! The inset: what the pixel under the pointer has learned of the sky.
 
-use super::{
-    projector::Inset,
-    sky::{Sky, learned_skies},
-};
-use crate::{sampler::guided::RecordedGuide, scene::Scene};
+use super::projector::Inset;
+use crate::{film::sky::Sky, pass::Explanation, scene::Scene};
 
 /// Width of the inset, pixels.
 const WIDTH: usize = 256;
@@ -15,8 +12,8 @@ const GAP: usize = 2;
 pub const SIZE: [u32; 2] = [WIDTH as u32, (WIDTH + GAP) as u32];
 
 /// Draws visibility above density; `None` where nothing was learned.
-pub fn draw(scene: &Scene, recorded: &RecordedGuide) -> Option<Inset> {
-    let [visibility, density] = learned_skies(scene, recorded, WIDTH)?;
+pub fn draw(scene: &Scene, recorded: &dyn Explanation) -> Option<Inset> {
+    let [visibility, density]: [Sky; 2] = recorded.skies(scene, WIDTH).try_into().ok()?;
     let opaque = |sky: &Sky| -> Vec<[u8; 4]> {
         sky.pixels().iter().map(|[red, green, blue]| [*red, *green, *blue, 255]).collect()
     };

@@ -11,7 +11,6 @@ mod panel;
 pub mod projector;
 mod save;
 mod side;
-pub mod sky;
 mod window;
 mod worker;
 

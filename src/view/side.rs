@@ -10,8 +10,8 @@ use crate::{
     error::Result,
     film::Aov,
     gpu::Device,
-    pass::SceneBuffers,
-    sampler::{Sampler, guided::GuideState},
+    pass::{Saved, SceneBuffers},
+    sampler::Sampler,
     scene::Scene,
     session::{Renderer, Settings},
     shader::constants::{SHOW_CELLS, SHOW_LEVELS, SHOW_PICTURE},
@@ -39,7 +39,7 @@ impl Side {
         scene: &Scene,
         buffers: Option<Arc<SceneBuffers>>,
         settings: &Settings,
-        guide: Option<&GuideState>,
+        guide: Option<&[u8]>,
     ) -> Result<Self> {
         let sampler = settings.sampler;
         let mut aovs = vec![Aov::Albedo, Aov::Normal, Aov::Visible];
@@ -51,17 +51,11 @@ impl Side {
             Some(buffers) => Renderer::with_scene_buffers(device, buffers, scene, settings)?,
             None => Renderer::new(device, scene, settings)?,
         };
-        if let Some(guide) = guide.filter(|_| sampler == Sampler::Guided) {
-            renderer.restore_guide(guide)?;
+        if let Some(bytes) = guide.filter(|_| sampler.has_guide()) {
+            let path = "guide".as_ref();
+            renderer.take_guide(Saved { path, bytes, continues: false })?;
         }
         Ok(Self { renderer, sampler, time: Duration::ZERO, samples: 1 })
-    }
-
-    /// Returns what the sampler has learned, for a renderer that follows; `None` if it learns nothing.
-    pub fn guide(&self) -> Result<Option<GuideState>> {
-        let state = self.renderer.guide_state()?;
-        // Treat it as learned before the first sample, whatever film it came from.
-        Ok(state.map(|state| GuideState { samples: u32::MAX, ..state }))
     }
 
     /// Renders a pass of at most `most` samples. Fails if the device does.

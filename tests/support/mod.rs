@@ -7,6 +7,7 @@ pub mod command;
 pub mod faulty_layer;
 pub mod fuzz;
 pub mod gltf;
+pub mod guide;
 pub mod hemisphere;
 pub mod lobes;
 pub mod materials;

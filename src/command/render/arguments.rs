@@ -6,10 +6,7 @@ use std::{
 };
 
 use super::{
-    super::{
-        guide,
-        options::{SceneOptions, parse_crop, parse_duration, parse_pixel, parse_size},
-    },
+    super::options::{SceneOptions, parse_crop, parse_duration, parse_pixel, parse_size},
     DEFAULT_SPP,
 };
 use crate::{
@@ -222,8 +219,16 @@ impl Arguments {
                 )));
             }
         }
-        let (save, load) = (self.save_guide.as_deref(), self.load_guide.as_deref());
-        guide::check(self.sampler, save, load)?;
+        for (name, path) in [("--save-guide", &self.save_guide), ("--load-guide", &self.load_guide)]
+        {
+            if let Some(path) = path.as_ref().filter(|_| !self.sampler.has_guide()) {
+                return Err(Error::usage(format!(
+                    "{name} {}: the sampler {} learns nothing; expected --sampler guided",
+                    path.display(),
+                    self.sampler.name()
+                )));
+            }
+        }
         let mut parameters = Parameters::default();
         if self.denoise {
             // Noise that the pixels of a tile have in common looks like a pattern to the denoiser.

@@ -4,11 +4,8 @@ use std::path::Path;
 
 use super::{RenderJob, StopReason, arguments::denoised_path, display};
 use crate::{
-    command::{
-        denoise::{Denoised, denoise},
-        guide,
-    },
-    error::{Error, Result},
+    command::denoise::{Denoised, denoise},
+    error::Result,
     files::is_special_file,
     film::{
         Checkpoint, Image, Metadata, SampleRange, Sums, Window, checkpoint::checkpoint_path,
@@ -38,10 +35,7 @@ impl RenderJob<'_> {
     pub(super) fn write_checkpoint(&self, renderer: &Renderer, sums: Sums) -> Result<Result<()>> {
         let checkpoint = Checkpoint { sums, metadata: self.metadata(renderer) };
         let path = checkpoint_path(&self.output);
-        let guide = renderer.guide_state()?.map(|state| state.to_bytes()).transpose();
-        Ok(guide
-            .map_err(|source| Error::io(&path, "write", source))
-            .and_then(|guide| checkpoint.write_with_guide(&path, guide.as_deref())))
+        Ok(checkpoint.write_with_guide(&path, renderer.guide()?.as_deref()))
     }
 
     /// Writes the image, then all other files asked for, each of them even if another fails.
@@ -105,7 +99,7 @@ impl RenderJob<'_> {
             note(&path, self.write_checkpoint(renderer, sums).and_then(|written| written));
         }
         if let Some(path) = &self.arguments.save_guide {
-            note(path, guide::save(renderer, path));
+            note(path, renderer.save_guide(path));
         }
         if !self.arguments.quiet && !written.is_empty() {
             eprintln!("wrote {}", written.join(", "));

@@ -2,7 +2,6 @@
 
 mod arguments;
 mod finish;
-mod pixel;
 mod statistics;
 mod stop;
 
@@ -16,7 +15,6 @@ use stop::StopReason;
 pub use arguments::Arguments;
 
 use super::{
-    guide,
     interrupt::Interrupt,
     progress::{Patience, Progress},
 };
@@ -28,10 +26,9 @@ use crate::{
         display::DisplayServer,
     },
     gpu::{Denoiser, Device},
-    pass::Roulette,
-    sampler::Sampler,
+    pass::{Explanation, Roulette, Saved},
     scene::Scene,
-    session::{Renderer, Settings, window_of},
+    session::{Renderer, Settings, pixel, window_of},
     study::watch::next_pass_samples,
 };
 
@@ -80,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let mut renderer = Renderer::new(&device, &scene, settings.clone())?;
     if let Some(path) = &arguments.load_guide {
-        guide::load(&mut renderer, path)?;
+        renderer.load_guide(path)?;
     }
     job.metadata.fit_hashes = renderer.report().fit_hashes;
     job.resume(&mut renderer)?;
@@ -90,17 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     device.save_pipeline_cache();
     job.finish(&renderer, reason, load_ms)?;
     if let Some(at) = arguments.pixel {
-        let written = if settings.sampler == Sampler::Guided {
-            pixel::write_guided(&mut renderer, &scene, &job.output, at)?
-        } else {
-            drop(renderer);
-            pixel::write(&device, &scene, &settings, &job.output, at)?
-        };
-        for path in written {
-            if !arguments.quiet {
-                eprintln!("wrote {}", display(&path));
-            }
-        }
+        job.explain(renderer.explain_pixel(&device, &scene, at)?.as_deref(), at)?;
     }
     if arguments.validate {
         let messages = device.validation_messages();
@@ -200,10 +187,10 @@ impl<'a> RenderJob<'a> {
             self.arguments.sample_offset,
         )?;
         renderer.restore(&checkpoint.sums)?;
-        if self.arguments.sampler == Sampler::Guided {
-            let (guide_path, guide) =
+        if self.arguments.sampler.has_guide() {
+            let (path, bytes) =
                 guide.ok_or_else(|| Error::format(&path, "the checkpoint has no guide"))?;
-            guide::resume(renderer, &guide_path, &guide)?;
+            renderer.take_guide(Saved { path: &path, bytes: &bytes, continues: true })?;
         }
         self.earlier_seconds = checkpoint.metadata.seconds;
         Ok(())
@@ -274,6 +261,23 @@ impl<'a> RenderJob<'a> {
         if !self.found_light && self.warnings.is_empty() {
             self.warn(format!("no sample has found any light{end}"));
         }
+    }
+
+    /// Writes the picture of `--pixel`.
+    fn explain(&self, explanation: Option<&dyn Explanation>, at: [u32; 2]) -> Result<()> {
+        let Some(explanation) = explanation else {
+            let [x, y] = at;
+            log::warn!(
+                "--pixel {x},{y}: the pixel sees the environment; there is no hit to explain"
+            );
+            return Ok(());
+        };
+        for path in pixel::write(explanation, self.scene, &self.output, at)? {
+            if !self.arguments.quiet {
+                eprintln!("wrote {}", display(&path));
+            }
+        }
+        Ok(())
     }
 
     fn warn(&mut self, warning: String) {

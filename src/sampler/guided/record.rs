@@ -10,23 +10,12 @@ use super::{
 };
 use crate::{
     error::Result,
-    pass::{Passes, Progress, Runner, film_buffers::position_in_film_order},
+    pass::{Passes, Progress, RecordedRay, Runner, film_buffers::position_in_film_order},
     shader::{
         constants::{NO_MATERIAL, NOTHING_TO_LEARN},
         structs::{Hit, ShadowRay, Wave},
     },
 };
-
-/// A shadow ray and its outcome.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RecordedRay {
-    /// Unit direction, world space.
-    pub direction: Vec3,
-    /// BRDF · radiance · cosine / pdf; a zero vector was not traced.
-    pub contribution: Vec3,
-    /// True if it reached the environment.
-    pub is_visible: bool,
-}
 
 /// A shadow ray with its sample and region.
 #[derive(Clone, Copy, Debug, PartialEq)]

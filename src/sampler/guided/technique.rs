@@ -11,10 +11,13 @@ use super::{
     tiles::TileChoice,
 };
 use crate::{
-    error::Result,
+    error::{Error, Result},
     film::Aov,
     gpu::DescriptorSet,
-    pass::{Passes, Progress, Report, Runner, SHADOW_RAYS_PER_GROUP, Steps, Technique},
+    pass::{
+        Explanation, Passes, Progress, Report, Runner, SHADOW_RAYS_PER_GROUP, Saved, Steps,
+        Technique,
+    },
     sampler::{
         Context, Parameters, Room,
         basic::{self, BasicSteps},
@@ -38,6 +41,10 @@ impl Room for GuidedRoom {
 
     fn aovs(&self) -> &[Aov] {
         &[Aov::GuideCell]
+    }
+
+    fn has_guide(&self) -> bool {
+        true
     }
 
     fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
@@ -314,6 +321,43 @@ impl Technique for Guided {
         }
         self.rebuilt_at = 0;
         Ok(())
+    }
+
+    fn save(&self, samples: u32) -> Result<Option<Vec<u8>>> {
+        let bytes = self.state(samples)?.to_bytes();
+        bytes.map(Some).map_err(|source| Error::io("guide".as_ref(), "encode", source))
+    }
+
+    fn load(&mut self, runner: &mut Runner, progress: &Progress, saved: Saved<'_>) -> Result<bool> {
+        let Saved { path, bytes, continues } = saved;
+        let state = GuideState::from_bytes(bytes, path)?;
+        if !continues {
+            return self.restore(runner, progress, &GuideState { samples: u32::MAX, ..state });
+        }
+        if state.samples != progress.sample_count {
+            return Err(Error::format(
+                path,
+                format!(
+                    "what was learned belongs to {} samples per pixel, the checkpoint holds {}",
+                    state.samples, progress.sample_count
+                ),
+            ));
+        }
+        if self.restore(runner, progress, &state)? {
+            return Err(Error::format(path, "it was learned in another geometry"));
+        }
+        Ok(false)
+    }
+
+    fn explain_learned(
+        &self,
+        runner: &mut Runner,
+        progress: &Progress,
+        at: [u32; 2],
+        rays: u32,
+    ) -> Result<Option<Box<dyn Explanation>>> {
+        let recorded = self.record_pixel(runner, progress, at, rays)?;
+        Ok(recorded.map(|recorded| Box::new(recorded) as Box<dyn Explanation>))
     }
 
     fn report(&self) -> Report {

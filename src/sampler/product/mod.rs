@@ -7,7 +7,7 @@
 mod fits;
 mod lobes;
 mod parameters;
-pub mod record;
+pub(super) mod record;
 mod steps;
 
 use std::collections::BTreeMap;
@@ -21,7 +21,7 @@ use super::{Context, Parameters, Room, knob};
 use crate::{
     error::{Error, Result},
     gpu::DescriptorSet,
-    pass::{Passes, PathDemand, Report, Steps, Technique},
+    pass::{Passes, PathDemand, RecordedPixel, Report, Steps, Technique},
 };
 
 pub(super) struct ProductRoom;
@@ -66,13 +66,6 @@ pub struct Product {
     lobes: LobeBuffers,
 }
 
-impl Product {
-    /// Lobes and fits on the device.
-    pub fn lobes(&self) -> &LobeBuffers {
-        &self.lobes
-    }
-}
-
 impl Passes for Product {
     fn steps(&self) -> &dyn Steps {
         &self.steps
@@ -84,6 +77,11 @@ impl Passes for Product {
 }
 
 impl Technique for Product {
+    fn explain(&self, pixel: &mut RecordedPixel) -> Result<()> {
+        let count = record::lobe_count(&self.lobes)?;
+        record::read_lobes(&self.lobes, &vec![1.0; count], &mut pixel.lobes)
+    }
+
     fn report(&self) -> Report {
         report(&self.lobes)
     }

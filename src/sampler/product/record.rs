@@ -1,22 +1,11 @@
 //! Product lobes at one hit, read back from the device.
 
-use glam::Vec3;
-
 use super::lobes::LobeBuffers;
-use crate::{error::Result, math::octahedron, pass::BLOCK_PIXELS};
-
-/// A lobe of the product at a hit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RecordedLobe {
-    /// Unit axis, world space.
-    pub axis: Vec3,
-    /// Bandwidth of the SRBF.
-    pub bandwidth: f32,
-    /// Probability among the lobes for the first ray.
-    pub before: f64,
-    /// Probability among the lobes for the last ray.
-    pub after: f64,
-}
+use crate::{
+    error::Result,
+    math::octahedron,
+    pass::{BLOCK_PIXELS, RecordedLobe},
+};
 
 /// Number of lobes of the first path of the last wave. Fails if the device does.
 pub fn lobe_count(buffers: &LobeBuffers) -> Result<usize> {

@@ -21,7 +21,7 @@ use crate::{
     error::{Error, Result},
     film::Aov,
     gpu::{Commands, DescriptorSet},
-    pass::{Passes, PathDemand, Progress, Report, Runner, Steps, Technique},
+    pass::{Passes, PathDemand, Progress, RecordedPixel, Report, Runner, Steps, Technique},
 };
 
 pub(super) struct VisibilityRoom;
@@ -92,11 +92,6 @@ pub struct Visibility {
 }
 
 impl Visibility {
-    /// Lobes, caches and fits on the device.
-    pub fn lobes(&self) -> &LobeBuffers {
-        &self.lobes
-    }
-
     /// Returns true if caches outlive a wave.
     fn keeps_caches(&self) -> bool {
         self.parameters.cache == CacheScope::Pixel
@@ -138,6 +133,13 @@ impl Technique for Visibility {
              render without --resume, or with --sample-offset {} and merge the two, or use cache=hit",
             progress.first_sample.saturating_add(samples)
         )))
+    }
+
+    fn explain(&self, pixel: &mut RecordedPixel) -> Result<()> {
+        let factors = self.visibility_weights(product::record::lobe_count(&self.lobes)?)?;
+        product::record::read_lobes(&self.lobes, &factors, &mut pixel.lobes)?;
+        pixel.cached = Some(self.cached_directions()?);
+        Ok(())
     }
 
     fn report(&self) -> Report {

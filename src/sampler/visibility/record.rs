@@ -11,7 +11,7 @@ const CACHE_GROWN: u32 = 1 << 31;
 impl Visibility {
     /// V of the first path's lobes for its last ray, in a wave of one block; twin of
     /// `weights.glsl`. Fails if the device does.
-    pub fn visibility_weights(&self, lobe_count: usize) -> Result<Vec<f64>> {
+    pub(super) fn visibility_weights(&self, lobe_count: usize) -> Result<Vec<f64>> {
         let places = self.cache_places as usize;
         let cache: Vec<u32> = self.lobes.caches().download(1 + places)?;
         // Weights do not yet include what the last ray taught.
@@ -33,7 +33,7 @@ impl Visibility {
     }
 
     /// Reads the first path's cached directions in world space, oldest first. Fails if the device does.
-    pub fn cached_directions(&self) -> Result<Vec<Vec3>> {
+    pub(super) fn cached_directions(&self) -> Result<Vec<Vec3>> {
         let places = self.cache_places as usize;
         let words: Vec<u32> = self.lobes.caches().download(1 + places)?;
         let recorded = (words[0] & !CACHE_GROWN) as usize;

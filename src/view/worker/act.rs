@@ -139,7 +139,7 @@ impl Worker {
 
     /// Keeps what the left side has learned for the next renderer.
     fn keep_guide(&mut self) -> Result<()> {
-        self.guide = self.left.guide()?.or(self.guide.take());
+        self.guide = self.left.renderer.guide()?.or(self.guide.take());
         Ok(())
     }
 
@@ -148,7 +148,7 @@ impl Worker {
         (self.announce)(format!("{} | preparing {}", self.scene.name, sampler.name()));
         let settings = Settings { sampler, ..self.settings.clone() };
         let buffers = Some(self.left.renderer.scene_buffers());
-        let guide = self.guide.as_ref();
+        let guide = self.guide.as_deref();
         let mut side = Side::new(&self.device, &self.scene, buffers, &settings, guide)?;
         side.renderer.set_watch(self.watch());
         Ok(side)
@@ -177,10 +177,10 @@ impl Worker {
         let pixel = panel.pointer.and_then(|at| panel.projector.pixel_under(at, film));
         drop(panel);
         let recorded = match pixel {
-            Some(pixel) => self.left.renderer.inspect_guided_pixel(pixel)?,
+            Some(pixel) => self.left.renderer.inspect_pixel(pixel)?,
             None => None,
         };
-        let drawn = recorded.and_then(|recorded| inset::draw(&self.scene, &recorded));
+        let drawn = recorded.and_then(|recorded| inset::draw(&self.scene, recorded.as_ref()));
         self.panel.borrow_mut().projector.set_inset(&drawn.unwrap_or_default())
     }
 

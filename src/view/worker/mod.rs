@@ -25,7 +25,7 @@ use crate::{
     gpu::Device,
     math::random::hash_4d,
     pass::Watch,
-    sampler::{Sampler, guided::GuideState},
+    sampler::Sampler,
     scene::Scene,
     session::Settings,
     shader::constants::{SHOW_ERROR, SHOW_PICTURE},
@@ -73,7 +73,7 @@ pub struct Worker {
     /// True if the number keys choose the sampler of the right side.
     chooses_right: bool,
     /// Guide of the last renderer of `guided`, for the next one.
-    guide: Option<GuideState>,
+    guide: Option<Vec<u8>>,
     rig: Rig,
     held: Vec3,
     motion: Motion,

@@ -1,40 +1,15 @@
-//! Functions of direction as lat-long pictures: the environment, and what a cell has learned of it.
+//! Functions of direction as lat-long pictures, −Z in the middle and +Y on top.
 
 use glam::{Vec2, Vec3};
 
-use crate::{
-    film::png::display_from_linear,
-    math::frame::{direction_from_lat_long, lat_long_from_direction},
-    sampler::guided::RecordedGuide,
-    scene::Scene,
-};
+use super::png::display_from_linear;
+use crate::math::frame::{direction_from_lat_long, lat_long_from_direction};
 
 /// Share of the pixels that may be over-exposed.
 const CLIPPED: f32 = 0.005;
 /// Factor that darkens colours below the horizon.
 const BELOW: f32 = 0.25;
 const HORIZON: [u8; 3] = [90, 160, 255];
-/// Tint of regions that a cell has not counted itself, linear.
-const UNCOUNTED: Vec3 = Vec3::new(0.35, 0.6, 1.0);
-
-/// Returns what the cell of a pixel has learned: the visibility of every region, white where all is
-/// visible, and the density of the shadow rays; `None` if it has learned nothing.
-pub fn learned_skies(scene: &Scene, recorded: &RecordedGuide, width: usize) -> Option<[Sky; 2]> {
-    let cell = recorded.cell.as_ref()?;
-    let region_of = |direction| recorded.partition.region_of(&scene.environment, direction);
-    let visibility = Sky::new(width, recorded.normal, 1.0, |direction| {
-        let region = cell.regions[region_of(direction)];
-        let colour = if region.trials <= 0.0 { UNCOUNTED } else { Vec3::ONE };
-        region.visibility as f32 * colour
-    });
-    let density = |direction| {
-        let index = region_of(direction);
-        let solid_angle = recorded.partition.regions[index].solid_angle;
-        Vec3::splat((cell.regions[index].probability / solid_angle) as f32)
-    };
-    let white = white_of(width, density);
-    Some([visibility, Sky::new(width, recorded.normal, white, density)])
-}
 
 /// Returns the value that a share of 0.5% of a function's pixels exceeds.
 pub fn white_of(width: usize, value: impl Fn(Vec3) -> Vec3) -> f32 {
