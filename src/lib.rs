@@ -23,7 +23,7 @@
 //! | stage | module | shader in `glsl/` |
 //! |---|---|---|
 //! | scene file → validated [`Scene`](scene::Scene) | [`scene`] | `include/environment` |
-//! | images on surfaces | [`texture`] | `include/texture` |
+//! | images on surfaces | [`scene::texture`], [`surface`] | `include/texture` |
 //! | materials → values, densities, samples | [`brdf`] | `include/brdf` |
 //! | lobes: products, integrals, samples | [`srbf`] | `include/srbf` |
 //! | maps and BRDFs → lobes | [`fit`] | |
@@ -46,7 +46,7 @@
 //! | `tiles` | [`sampler::tiles`] | `tiles/`: `count_tiles`, `sample_tiles` |
 //! | scene, settings, device → sums | [`session`] | |
 //! | sums → image files | [`film`] | |
-//! | scene → files of other renderers | [`export`] | |
+//! | scene → files of other renderers | [`scene::export`] | |
 //! | runs of several samplers → report | [`study`] | |
 //! | ray rates beside those of the CPU | [`mod@bench`] | |
 //! | a window in which the camera moves | [`view`] | `view/`: `show`, `compose` |
@@ -182,11 +182,9 @@
 //!   Conference on Geometric and Physical Modeling.
 
 // Pipeline order; rustfmt sorts within a group.
-pub mod scene;
-
 pub mod brdf;
 pub mod srbf;
-pub mod texture;
+pub mod surface;
 
 pub mod fit;
 
@@ -200,7 +198,6 @@ pub mod sampler;
 
 pub mod session;
 
-pub mod export;
 pub mod film;
 pub mod study;
 
@@ -211,9 +208,6 @@ pub mod cli;
 pub mod command;
 pub mod view;
 
-pub mod error;
-pub mod files;
-pub mod memory;
-pub mod stage;
-
-pub use error::{Error, Result};
+pub use fenestra_scene::{
+    self as scene, Error, Result, error, export, files, memory, stage, texture,
+};

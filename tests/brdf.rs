@@ -6,7 +6,8 @@ use crate::support::statistics;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use fenestra::{
-    brdf::{self, MaterialTables, fresnel, ggx, material::MaterialKind, twin},
+    brdf::{self, MaterialTables, fresnel, ggx, twin},
+    scene::material::MaterialKind,
     shader::structs,
 };
 use glam::{DVec3, Vec3, vec3};

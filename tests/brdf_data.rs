@@ -9,8 +9,14 @@ use std::{
     sync::Arc,
 };
 
-use fenestra::brdf::{self, Material, MaterialTables, MeasuredTable, material::MaterialKind};
 use fenestra::math::colour::luminance;
+use fenestra::{
+    brdf::{self, MaterialTables},
+    scene::{
+        material::{Material, MaterialKind},
+        measured::MeasuredTable,
+    },
+};
 use glam::{DVec3, Vec3, dvec3};
 use rayon::prelude::*;
 

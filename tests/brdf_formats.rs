@@ -8,10 +8,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use fenestra::brdf::{
-    MeasuredTable,
+use fenestra::scene::measured::{
+    CELL_COUNT, MeasuredTable, bin_directions, cell_index,
     merl::{FILE_BYTES, HEADER_BYTES, SCALES},
-    table::{CELL_COUNT, bin_directions, cell_index},
 };
 use glam::Vec3;
 use tempfile::TempDir;

@@ -7,11 +7,11 @@ use std::{f32::consts::PI, fs, path::Path, sync::Arc};
 
 use crate::support::command::{BALL, Folder, yard};
 use fenestra::{
-    brdf::{MeasuredTable, material::MaterialKind},
     export::{Export as _, Settings, mitsuba::Export},
     film::Image,
-    scene::{Scene, lamp::LampKind},
-    texture::{TextureTables, TextureUse, lookup::texture_value},
+    scene::{Scene, lamp::LampKind, material::MaterialKind, measured::MeasuredTable},
+    surface::{TextureTables, lookup::texture_value},
+    texture::TextureUse,
 };
 use glam::{Vec2, Vec3};
 

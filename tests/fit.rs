@@ -6,16 +6,17 @@
 use std::{f32::consts::PI, fs, path::Path, sync::Arc};
 
 use fenestra::{
-    brdf::{
-        Material, MaterialTables, MeasuredTable,
-        material::{ConductorFresnel, MaterialKind},
-    },
+    brdf::MaterialTables,
     fit::{
         BrdfFit, BrdfOptions, Cache, EnvironmentFit, EnvironmentOptions, Fit, Method, brdf_lobes,
         config, describe, environment_lobes, read_fit, write_fit,
     },
     math::frame::direction_from_lat_long,
-    scene::EnvironmentMap,
+    scene::{
+        EnvironmentMap,
+        material::{ConductorFresnel, Material, MaterialKind},
+        measured::MeasuredTable,
+    },
     srbf::{Lobe, Mixture, lobe_integral},
 };
 use glam::{Vec2, Vec3};

@@ -8,12 +8,12 @@ use crate::support::command::Folder;
 use crate::support::gltf::gltf;
 use crate::support::page;
 use fenestra::{
-    brdf::material::MaterialKind,
     film::Statistics,
     scene::{
         Scene,
         features::{self, Feature, Support},
         load::LoadOptions,
+        material::MaterialKind,
     },
 };
 use glam::Vec3;

@@ -13,13 +13,16 @@ use std::{env, fs, path::Path};
 
 use crate::support::fuzz::Target;
 use fenestra::{
-    brdf::{MeasuredTable, cornell},
     command::options::{parse_duration, parse_size},
     files::hexadecimal,
     film::{Checkpoint, Image},
     fit::read_fit,
     sampler::{Parameters, guided::GuideState},
-    scene::{EnvironmentMap, Scene, mesh::Mesh},
+    scene::{
+        EnvironmentMap, Scene,
+        measured::{MeasuredTable, cornell},
+        mesh::Mesh,
+    },
     study::{
         contender::Contender,
         file::{StudyFile, ValueParsers, is_study},

@@ -16,14 +16,14 @@ use std::f64::consts::PI;
 use crate::support::hemisphere::{BIN_COLUMNS, BINS};
 use crate::support::{scenes, statistics};
 use fenestra::{
-    brdf::{self, Material, MaterialTables},
+    brdf::{self, MaterialTables},
     film::Window,
     math::frame::{Frame, frame_from_normal},
     sampler::{
         Parameters, Sampler,
         guided::{GuidedParameters, GuidedRay, RecordedCell, RecordedGuide},
     },
-    scene::{Scene, environment::EnvironmentTables},
+    scene::{Scene, environment::EnvironmentTables, material::Material},
     session::{Renderer, Settings},
 };
 use glam::{Vec3, vec3};

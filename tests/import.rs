@@ -5,9 +5,10 @@
 
 use std::path::{Path, PathBuf};
 
-use fenestra::{
-    brdf::{Material, material::MaterialKind},
-    scene::{Scene, mesh::Mesh},
+use fenestra::scene::{
+    Scene,
+    material::{Material, MaterialKind},
+    mesh::Mesh,
 };
 use glam::{Vec3, Vec4};
 

@@ -7,14 +7,11 @@ use std::f32::consts::PI;
 
 use crate::support::scenes;
 use fenestra::{
-    brdf::{
-        Material,
-        material::{Emission, MaterialKind},
-    },
     sampler::Sampler,
     scene::{
         Lamp, Scene,
         lamp::{LampKind, SpotFalloff},
+        material::{Emission, Material, MaterialKind},
     },
     session::Settings,
 };

@@ -6,10 +6,10 @@ use crate::support::command;
 use crate::support::command::Folder;
 use crate::support::gltf::{Attribute, base64, floats, gltf, gltf_of, png};
 use fenestra::{
-    brdf::{Material, material::MaterialKind},
     scene::{
         Scene,
         lamp::{LampKind, SpotFalloff},
+        material::{Material, MaterialKind},
         mesh::Mesh,
     },
     texture::{Channels, Encoding, Interpolation, TextureUse, Wrap},

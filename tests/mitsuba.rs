@@ -6,15 +6,12 @@ use std::{f32::consts::PI, io::Write, path::Path};
 
 use crate::support::command::{BALL, Folder, yard};
 use fenestra::{
-    brdf::{
-        Material,
-        material::{ConductorFresnel, MaterialKind},
-    },
     export::{Export as _, Settings, mitsuba::Export},
     scene::{
         Filter, Scene,
         lamp::{LampKind, SpotFalloff},
         load::LoadOptions,
+        material::{ConductorFresnel, Material, MaterialKind},
     },
     texture::{Encoding, Interpolation, Wrap},
 };

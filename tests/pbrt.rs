@@ -8,16 +8,13 @@ use std::{collections::HashSet, path::Path};
 
 use crate::support::command::Folder;
 use fenestra::{
-    brdf::{
-        Material,
-        coat::albedo_below_coat,
-        material::{ConductorFresnel, MaterialKind},
-    },
     scene::{
         Camera, Filter, Scene,
+        coat::albedo_below_coat,
         features::{self, Feature},
         lamp::{LampKind, SpotFalloff},
         load::LoadOptions,
+        material::{ConductorFresnel, Material, MaterialKind},
     },
     texture::{Channels, Encoding, Interpolation, Texels, Wrap},
 };

@@ -9,10 +9,10 @@ use std::{
 
 use fenestra::{
     Error,
-    brdf::material::{ConductorFresnel, MaterialKind},
     scene::{
         Scene,
         lamp::{LampKind, SpotFalloff},
+        material::{ConductorFresnel, MaterialKind},
         mesh::Mesh,
     },
     texture::{Channels, Encoding, Interpolation, Wrap},

@@ -18,7 +18,8 @@ struct Key {
 
 /// Text of a source file.
 fn source(path: &str) -> String {
-    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("src/scene").join(path)).unwrap()
+    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/scene/src").join(path))
+        .unwrap()
 }
 
 /// Text of every file that declares keys.
@@ -30,7 +31,7 @@ fn sources() -> String {
         "file/lamp.rs",
         "file/portal.rs",
         "file/value.rs",
-        "mod.rs",
+        "lib.rs",
         "environment/court.rs",
         "environment/sky.rs",
         "shapes/mod.rs",

@@ -10,11 +10,13 @@ use crate::support::{
     statistics::{Comparison, Estimate, estimates, largest_t},
 };
 use fenestra::{
-    brdf::{Material, material::MaterialKind},
     film::{Sums, Window},
     pass::Roulette,
     sampler::Sampler,
-    scene::Scene,
+    scene::{
+        Scene,
+        material::{Material, MaterialKind},
+    },
     session::Settings,
 };
 use glam::Vec3;

@@ -11,12 +11,11 @@ use fenestra::{
         Accel,
         attributes::{TriangleAttributes, attributes_of},
     },
-    brdf::{
-        Material, SurfaceTables,
-        material::{MaterialKind, Opacity},
-    },
     math::colour::luminance,
-    scene::Geometry,
+    scene::{
+        Geometry,
+        material::{Material, MaterialKind, Opacity},
+    },
     shader::{
         bindings::{Binding, probe, scene},
         constants::{
@@ -26,9 +25,10 @@ use fenestra::{
         },
         structs,
     },
+    surface::{SurfaceTables, TextureTables, lookup},
     texture::{
         Channels, Encoding, Interpolation, MAX_TEXTURE_SIDE, Texels, Texture, TextureCache,
-        TextureTables, TextureUse, Wrap, lookup,
+        TextureUse, Wrap, lookup::gradient_tangent,
     },
 };
 use glam::{Vec2, Vec3, Vec4, vec2, vec3, vec4};
@@ -288,7 +288,7 @@ fn channels_factors_and_coordinates_come_in_their_order() {
 #[test]
 fn tangents_follow_the_image_on_either_side_and_mirrored() {
     let edges = [vec3(2.0, 0.0, 0.0), vec3(0.0, 3.0, 0.0)];
-    let tangent = |image| lookup::gradient_tangent(edges, image, Vec3::Z);
+    let tangent = |image| gradient_tangent(edges, image, Vec3::Z);
     // u to the right, v of the image down.
     assert_eq!(tangent([vec2(1.0, 0.0), vec2(0.0, -1.0)]), vec4(1.0, 0.0, 0.0, 1.0));
     assert_eq!(tangent([vec2(-1.0, 0.0), vec2(0.0, -1.0)]), vec4(-1.0, 0.0, 0.0, -1.0));
@@ -570,7 +570,7 @@ fn compare(bits: u32) {
             });
             let [a, b, c] = accel.triangle(triangle).vertices.map(|v| Vec3::from(v.position));
             let image = [image[1] - image[0], image[2] - image[0]];
-            tangent = lookup::gradient_tangent([b - a, c - a], image, normal);
+            tangent = gradient_tangent([b - a, c - a], image, normal);
         }
         let texel = lookup::texture_value(&words, &textures.uses, use_index, at.uv0, at.uv1);
         let mapped = lookup::mapped_normal(

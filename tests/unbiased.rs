@@ -19,9 +19,12 @@ use crate::support::{
     statistics::{Comparison, Estimate, smallest_p_value},
 };
 use fenestra::{
-    brdf::{Material, MeasuredTable, material::MaterialKind},
     sampler::{Parameters, Sampler},
-    scene::Scene,
+    scene::{
+        Scene,
+        material::{Material, MaterialKind},
+        measured::MeasuredTable,
+    },
     session::Settings,
 };
 use glam::Vec3;

@@ -7,7 +7,7 @@ bool has_base(Material material) {
     return ((1u << material.kind) & KINDS_WITH_BASE) != 0u;
 }
 
-// Separable part of a measured BRDF, sqrt(1/sr): src/brdf/base.rs.
+// Separable part of a measured BRDF, sqrt(1/sr): crates/scene/src/measured/base.rs.
 vec3 measured_base(uint table_offset, float cosine) {
     uint offset = table_offset + MEASURED_BASE_OFFSET;
     return vec3(

@@ -1,9 +1,9 @@
 // The environment map: bilinear lookup and its exact sampling density per steradian. Twin of
-// src/scene/environment.
+// crates/scene/src/environment.
 //
 // environment_rows: cumulative probability over height + 1 rows of cells, the mean sine of each
 // row's polar angle, then a guide to the probabilities. environment_cells: cumulative probability
-// over the width cells of each row, then a guide. src/scene/environment/table.rs describes both.
+// over the width cells of each row, then a guide. crates/scene/src/environment/table.rs describes both.
 
 #include "frame.glsl"
 #include "layout.glsl"

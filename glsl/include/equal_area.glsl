@@ -1,5 +1,5 @@
 // Equal-area octahedral map between the sphere and the unit square: a part of the square stands for
-// 4 pi times its area in steradians. [Clarberg 2008]. Twin of src/math/equal_area.rs.
+// 4 pi times its area in steradians. [Clarberg 2008]. Twin of crates/scene/src/math/equal_area.rs.
 
 #include "frame.glsl"
 

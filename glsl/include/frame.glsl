@@ -1,5 +1,5 @@
 // Orthonormal frames, the octahedral map of normals and the lat-long mapping: twin of
-// src/math/frame.rs and src/math/octahedron.rs.
+// crates/scene/src/math/frame.rs and src/math/octahedron.rs.
 //
 // Local frames have the normal as z axis; names of vectors in them end in _local. The lat-long
 // mapping takes unit directions to the unit square; its Jacobian is 2 pi^2 sin(theta), with theta

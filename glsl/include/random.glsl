@@ -1,4 +1,4 @@
-// Counter-based random numbers for (pixel, sample, dimension, seed): twin of src/math/random.rs,
+// Counter-based random numbers for (pixel, sample, dimension, seed): twin of crates/scene/src/math/random.rs,
 // equal bit for bit. All numbers are multiples of 2^-24 in [0, 1).
 //
 // A dimension names a pair of numbers. random_2d is stratified over the samples of a pixel: use it

@@ -7,8 +7,9 @@ use glam::{Vec2, Vec3, vec2, vec3};
 use rayon::prelude::*;
 
 use crate::{
-    brdf::{fresnel::*, ggx::*, twin::sample_cosine_hemisphere},
+    brdf::{fresnel::*, ggx::*},
     math::colour::luminance,
+    scene::measured::lookup::sample_cosine_hemisphere,
     shader::constants::*,
 };
 

@@ -3,16 +3,8 @@
 
 use glam::{Vec3, vec3};
 
+pub use crate::scene::coat::fresnel_dielectric;
 use crate::shader::structs::Material;
-
-/// Reflectance of a dielectric of refractive index `ior` ≥ 1 seen from outside; exact Fresnel.
-pub fn fresnel_dielectric(cosine: f32, ior: f32) -> f32 {
-    let g = (ior * ior - 1.0 + cosine * cosine).max(0.0).sqrt();
-    let difference = (ior * ior - 1.0) / (g + cosine);
-    let perpendicular = difference / (g + cosine);
-    let ratio = (cosine * (g + cosine) - 1.0) / (cosine * difference + 1.0);
-    (0.5 * perpendicular * perpendicular * (1.0 + ratio * ratio)).min(1.0)
-}
 
 /// Reflectance of a conductor of refractive index eta + i·k; exact Fresnel.
 pub fn fresnel_conductor(cosine: f32, eta: Vec3, k: Vec3) -> Vec3 {

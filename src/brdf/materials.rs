@@ -8,9 +8,9 @@ use crate::{
     brdf::{
         albedo::{GGX_WORDS, conductor_words, ggx_words, plastic_words},
         ggx::SMALLEST_ALPHA,
-        material::{ConductorFresnel, Material, MaterialKind},
     },
     error::{Error, Result},
+    scene::material::{ConductorFresnel, Material, MaterialKind},
     shader::{constants::*, structs},
 };
 

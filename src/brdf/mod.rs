@@ -23,29 +23,16 @@
 //! 2023\], \[Rusinkiewicz 1998\], \[Schlick 1994\], glTF 2.0 appendix B.
 
 mod albedo;
-mod base;
-pub mod coat;
-pub mod cornell;
 pub mod fresnel;
 pub mod ggx;
-mod load;
-pub mod material;
 pub mod materials;
-pub mod merl;
 pub mod sanity;
-pub mod spectrum;
 pub mod specular;
-pub mod surfaces;
-pub mod table;
-mod tabulate;
 pub mod twin;
 
 use glam::Vec3;
 
-pub use material::Material;
 pub use materials::MaterialTables;
-pub use surfaces::SurfaceTables;
-pub use table::MeasuredTable;
 
 /// Value of a material (1/sr, without the cosine) and density of [`sample`].
 pub fn evaluate_and_pdf(

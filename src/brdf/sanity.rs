@@ -5,7 +5,7 @@ use std::f32::consts::{FRAC_PI_2, TAU};
 use glam::{DVec3, Vec3, vec3};
 use rayon::prelude::*;
 
-use crate::brdf::table::MeasuredTable;
+use crate::scene::measured::MeasuredTable;
 
 /// Elevations of the reported albedo, degrees from the normal.
 pub const ELEVATIONS_DEG: [f32; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];

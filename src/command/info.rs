@@ -8,16 +8,13 @@ use std::{
 use serde_json::json;
 
 use crate::{
-    brdf::{
-        MeasuredTable,
-        material::MaterialKind,
-        sanity::{ELEVATIONS_DEG, Sanity},
-    },
+    brdf::sanity::{ELEVATIONS_DEG, Sanity},
     error::{Error, Result},
     files,
     film::{Attribute, Checkpoint, Image, summary::ChannelSummary},
-    fit::{self, report::Description},
-    scene::{EnvironmentMap, Scene},
+    fit,
+    fit::report::Description,
+    scene::{EnvironmentMap, Scene, material::MaterialKind, measured::MeasuredTable},
 };
 
 /// Arguments of `info`.

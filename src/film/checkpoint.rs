@@ -20,7 +20,7 @@ use std::{
 use sha2::{Digest, Sha256};
 
 use super::{
-    exr::{Attribute, Image},
+    Attribute, Image,
     metadata::{Metadata, SampleRange},
     sums::{Sums, split},
 };

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::exr::{Attribute, Image};
+use super::{Attribute, Image};
 use crate::error::{Error, Result};
 
 /// Attribute of an image that a denoiser has made, with its name.

@@ -10,7 +10,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::exr::Image;
+use super::Image;
 use crate::error::{Error, Result};
 
 /// Port that tev listens on by default.

@@ -5,7 +5,7 @@
 
 use std::{collections::BTreeSet, path::Path};
 
-use super::{checkpoint::Checkpoint, exr::Image, metadata::Metadata};
+use super::{Image, checkpoint::Checkpoint, metadata::Metadata};
 use crate::error::{Error, Result};
 
 /// One image to merge.

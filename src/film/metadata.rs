@@ -11,10 +11,7 @@ use std::{
     str::FromStr,
 };
 
-use super::{
-    denoised::check_film,
-    exr::{Attribute, Image},
-};
+use super::{Attribute, Image, denoised::check_film};
 use crate::error::{Error, Result};
 
 /// Samples `first … first + count − 1` of every pixel, drawn with one seed.

@@ -7,7 +7,6 @@
 pub mod checkpoint;
 pub mod denoised;
 pub mod display;
-pub mod exr;
 pub mod merge;
 pub mod metadata;
 pub mod picture;
@@ -17,15 +16,13 @@ pub mod statistics;
 pub mod summary;
 pub mod sums;
 pub mod tone;
-mod window;
 
 pub use self::{
     checkpoint::Checkpoint,
     display::DisplayServer,
-    exr::{Attribute, Image, RgbImage},
     metadata::{Metadata, SampleRange},
     statistics::Statistics,
     sums::{Aov, Sums},
     tone::{Curve, Tone},
-    window::Window,
 };
+pub use fenestra_scene::picture::{Attribute, Image, RgbImage, Window};

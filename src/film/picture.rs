@@ -4,7 +4,7 @@ use std::path::Path;
 
 use image::{ExtendedColorType, ImageEncoder, ImageError, Rgb, codecs::hdr::HdrEncoder};
 
-use super::exr::RgbImage;
+use super::RgbImage;
 use crate::{error::Result, files::write_atomically};
 
 /// Quality of JPEG files, 1…100: no blocks are seen, at a tenth of the size of PNG.

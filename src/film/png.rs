@@ -4,7 +4,7 @@ use std::{io::Write, path::Path};
 
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
-use super::{exr::RgbImage, picture::io_error, tone::Tone};
+use super::{RgbImage, picture::io_error, tone::Tone};
 use crate::error::Result;
 use crate::{files::write_atomically, math::colour::srgb_from_linear};
 

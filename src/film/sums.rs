@@ -1,6 +1,6 @@
 //! Sums that the device's film holds after `n` samples of every pixel, and the image they give.
 
-use super::exr::Image;
+use super::Image;
 
 /// Extra layers of an image file, with pbrt's names and meaning where pbrt has them. The command
 /// line also accepts a layer's name in the file.

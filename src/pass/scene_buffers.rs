@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     accel::{Accel, attributes::TriangleAttributes},
-    brdf::{MaterialTables, SurfaceTables},
+    brdf::MaterialTables,
     error::Result,
     film::Window,
     gpu::{Buffer, DescriptorSet, Device},
@@ -22,6 +22,7 @@ use crate::{
         constants::SURFACES_INSTANCED,
         structs::{self, SceneParameters},
     },
+    surface::SurfaceTables,
 };
 
 /// A scene on a device: geometry, materials, environment and camera.

@@ -2,7 +2,7 @@
 
 use super::texture_buffers::TextureAccess;
 use crate::{
-    brdf::{Material, material::MaterialKind},
+    scene::material::{Material, MaterialKind},
     shader::constants::{
         CONSTANT_MATERIAL_KINDS, CONSTANT_SURFACES, KINDS_WITH_BASE, SURFACES_EMITTING,
         SURFACES_INSTANCED, SURFACES_ONE_SIDED, SURFACES_PASSING, SURFACES_SPECULAR,

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use crate::{
     accel::attributes::TriangleAttributes,
-    brdf::SurfaceTables,
     error::{Error, Result},
     gpu::{Buffer, Device},
     shader::{
@@ -14,7 +13,10 @@ use crate::{
             CONSTANT_TEXTURE_PAGE_SHIFT, CONSTANT_TEXTURE_PAGES,
         },
     },
-    texture::tables::{MAX_PAGES, page_shift},
+    surface::{
+        SurfaceTables,
+        textures::{MAX_PAGES, page_shift},
+    },
 };
 
 const TEXTURE_PAGES: [Binding; MAX_PAGES] = [

@@ -1,4 +1,4 @@
-//! What the sampler `guided` has learned, as fields and not as the content of a file.
+//! State that the sampler `guided` has learned, as fields and not as the content of a file.
 
 use fenestra::{
     Error, Result,

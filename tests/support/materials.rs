@@ -9,11 +9,12 @@ use std::{
 };
 
 use fenestra::{
-    brdf::{
-        self, Material, MaterialTables, MeasuredTable,
-        material::{ConductorFresnel, MaterialKind},
-    },
+    brdf::{self, MaterialTables},
     math::random::hash_4d,
+    scene::{
+        material::{ConductorFresnel, Material, MaterialKind},
+        measured::MeasuredTable,
+    },
     shader::structs,
 };
 use glam::{Vec3, vec3};

@@ -4,11 +4,11 @@
 use std::{path::PathBuf, sync::Arc};
 
 use fenestra::{
-    brdf::{
-        Material,
-        material::{ConductorFresnel, Emission, MaterialKind},
+    scene::{
+        Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Lamp, Scene,
+        lamp::LampKind,
+        material::{ConductorFresnel, Emission, Material, MaterialKind},
     },
-    scene::{Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Lamp, Scene, lamp::LampKind},
     texture::{Texels, Texture, TextureUse},
 };
 use glam::Vec3;

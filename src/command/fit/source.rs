@@ -3,10 +3,14 @@
 use std::path::Path;
 
 use crate::{
-    brdf::{Material, MaterialTables, MeasuredTable, material::MaterialKind},
+    brdf::MaterialTables,
     error::{Error, Result},
     files::extension,
-    scene::{EnvironmentMap, Scene},
+    scene::{
+        EnvironmentMap, Scene,
+        material::{Material, MaterialKind},
+        measured::MeasuredTable,
+    },
 };
 
 /// Extensions of measured BRDFs.

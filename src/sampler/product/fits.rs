@@ -4,14 +4,14 @@ use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
 use super::parameters::{Elevation, LobeOrder, ProductParameters};
 use crate::{
-    brdf::{Material, MaterialTables},
+    brdf::MaterialTables,
     error::{Error, Result},
     fit::{
         self, BrdfFit, BrdfOptions, EnvironmentLobe, EnvironmentOptions, Method, brdf_lobes,
         environment_lobes,
     },
     gpu::{Buffer, Device},
-    scene::Scene,
+    scene::{Scene, material::Material},
     shader::bindings::{Binding, product},
 };
 

@@ -1,0 +1,287 @@
+//! Environment maps from files: Radiance `.hdr`, OpenEXR, PFM.
+
+use std::{io::Cursor, path::Path};
+
+use exr::{
+    math::Vec2,
+    prelude::{ReadChannels, ReadLayers, ReadSpecificChannel},
+};
+use glam::Vec3;
+use image::{ImageDecoder, codecs::hdr::HdrDecoder};
+use rayon::prelude::*;
+
+use super::{EnvironmentMap, MAX_RADIANCE};
+use crate::{
+    error::{Error, Result},
+    files, memory,
+};
+
+/// Most texels of a map: 16384×8192.
+const MAX_TEXELS: u64 = 1 << 27;
+
+/// Bytes of a texel: its radiance, and its share of the sampling tables.
+const TEXEL_BYTES: u64 = 48;
+
+/// Largest compression of a Radiance file: a run of 255 texels of four bytes in four bytes.
+const HDR_LARGEST_RATIO: u64 = 255;
+
+/// Radiance as stored in the file, top row first.
+struct Image {
+    width: u32,
+    height: u32,
+    texels: Vec<Vec3>,
+}
+
+impl EnvironmentMap {
+    /// Reads a lat-long map in the format of its extension: `.hdr`, `.exr` or `.pfm`.
+    ///
+    /// Multiplies radiance by `scale` and rotates the map by `rotation_deg` about +Y,
+    /// counter-clockwise seen from above. Sets texels with a negative, infinite or NaN component to
+    /// 0 and counts them in a warning. Warns of a ratio other than 2:1 and of an all-black map.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the file cannot be read, [`Error::Format`] if it is truncated, of another
+    /// format, of an absurd size or without the channels R, G, B or Y.
+    pub fn load(
+        path: &Path,
+        scale: f32,
+        rotation_deg: f32,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self> {
+        check_placement(scale, rotation_deg).map_err(|message| Error::format(path, message))?;
+        let mut map = Self::read(path, scale, warnings)?;
+        if map.width != 2 * map.height {
+            warnings.push(format!(
+                "{}: {}×{} texels; a lat-long map is expected to be twice as wide as high and is \
+                 stretched to the whole sphere",
+                path.display(),
+                map.width,
+                map.height
+            ));
+        }
+        map.rotation_rad = rotation_deg.rem_euclid(360.0).to_radians();
+        Ok(map)
+    }
+
+    /// As [`EnvironmentMap::load`] without a rotation, for an image of any ratio and mapping.
+    ///
+    /// # Errors
+    /// As [`EnvironmentMap::load`].
+    pub(crate) fn read(path: &Path, scale: f32, warnings: &mut Vec<String>) -> Result<Self> {
+        let read = match files::extension(path).as_str() {
+            "hdr" => read_hdr,
+            "exr" => read_exr,
+            "pfm" => read_pfm,
+            _ => {
+                return Err(Error::format(
+                    path,
+                    "unknown kind of environment map; expected .hdr, .exr or .pfm",
+                ));
+            }
+        };
+        let image = read(&files::read(path)?).map_err(|message| Error::format(path, message))?;
+        let mut map = Self {
+            width: image.width,
+            height: image.height,
+            texels: image.texels,
+            rotation_rad: 0.0,
+            source: path.display().to_string(),
+        };
+        map.clean(scale, warnings);
+        Ok(map)
+    }
+
+    /// Applies `scale`, sets texels that are not radiance to 0, and warns of them and of a black map.
+    fn clean(&mut self, scale: f32, warnings: &mut Vec<String>) {
+        let invalid = self
+            .texels
+            .par_iter_mut()
+            .map(|texel| {
+                let scaled = *texel * scale;
+                let valid = texel.is_finite()
+                    && texel.min_element() >= 0.0
+                    && scaled.max_element() <= MAX_RADIANCE;
+                *texel = if valid { scaled } else { Vec3::ZERO };
+                usize::from(!valid)
+            })
+            .sum::<usize>();
+        if invalid > 0 {
+            warnings.push(format!(
+                "{}: {invalid} of {} texels are negative, infinite (above {MAX_RADIANCE:e}) or NaN \
+                 and were set to 0",
+                self.source,
+                self.texels.len()
+            ));
+        }
+        if self.is_black() {
+            warnings.push(format!("{}: the map is black: nothing is lit", self.source));
+        }
+    }
+}
+
+/// Rejects a scale that is negative or not finite and a rotation that is not finite.
+pub(super) fn check_placement(scale: f32, rotation_deg: f32) -> Result<(), String> {
+    if !(scale.is_finite() && scale >= 0.0) {
+        return Err(format!("scale = {scale}; expected a finite number, 0 or more"));
+    }
+    if !rotation_deg.is_finite() {
+        return Err(format!("rotation_deg = {rotation_deg}; expected a finite number"));
+    }
+    Ok(())
+}
+
+fn check_size(width: u64, height: u64) -> Result<(), String> {
+    if width == 0 || height == 0 || width.saturating_mul(height) > MAX_TEXELS {
+        return Err(format!(
+            "{width}×{height} texels; expected at least 1×1 and at most {MAX_TEXELS} in all"
+        ));
+    }
+    let texels = width.saturating_mul(height);
+    memory::check(
+        format_args!("a map of {width}×{height} texels"),
+        texels.saturating_mul(TEXEL_BYTES),
+    )
+    .map_err(|shortage| shortage.to_string())
+}
+
+fn read_hdr(bytes: &[u8]) -> Result<Image, String> {
+    let message = |error: image::ImageError| format!("not a readable Radiance file: {error}");
+    let decoder = HdrDecoder::new(Cursor::new(bytes)).map_err(message)?;
+    let (width, height) = decoder.dimensions();
+    check_size(width.into(), height.into())?;
+    files::check_promise([width, height].map(u64::from), 4, bytes.len() as u64, HDR_LARGEST_RATIO)
+        .map_err(|message| format!("not a readable Radiance file: {message}"))?;
+    let mut components = vec![0_f32; width as usize * height as usize * 3];
+    decoder.read_image(bytemuck::cast_slice_mut(&mut components)).map_err(message)?;
+    Ok(Image { width, height, texels: bytemuck::cast_vec(components) })
+}
+
+/// Reads the first layer with the channels R, G, B, else the first with Y.
+fn read_exr(bytes: &[u8]) -> Result<Image, String> {
+    let message = |error: exr::error::Error| format!("not a readable OpenEXR file: {error}");
+    let meta =
+        exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(message)?;
+    let has = |name: &str| {
+        let flat = meta.headers.iter().filter(|header| !header.deep);
+        flat.flat_map(|header| &header.channels.list).any(|channel| channel.name.eq(name))
+    };
+    let names = if has("R") && has("G") && has("B") {
+        ["R", "G", "B"]
+    } else if has("Y") {
+        ["Y"; 3]
+    } else {
+        let channels = meta.headers.iter().flat_map(|header| &header.channels.list);
+        let found: Vec<String> = channels.map(|channel| channel.name.to_string()).collect();
+        return Err(format!("expected the channels R, G, B or Y, found {}", found.join(", ")));
+    };
+    for header in &meta.headers {
+        let size = [header.layer_size.width() as u64, header.layer_size.height() as u64];
+        check_size(size[0], size[1])?;
+        let pixel_bytes = header.channels.bytes_per_pixel as u64;
+        files::check_promise(size, pixel_bytes, bytes.len() as u64, files::EXR_LARGEST_RATIO)
+            .map_err(|message| format!("not a readable OpenEXR file: {message}"))?;
+        for channel in &header.channels.list {
+            if names.iter().any(|name| channel.name.eq(name)) && channel.sampling != Vec2(1, 1) {
+                return Err(format!("channel {} is subsampled, which is not read", channel.name));
+            }
+        }
+    }
+    // Let the system zero pages on first use: a damaged header may claim more than the file holds.
+    let size = |size: Vec2<usize>| (size.width(), bytemuck::zeroed_vec::<Vec3>(size.area()));
+    let channels = exr::prelude::read().no_deep_data().largest_resolution_level();
+    let read = Cursor::new(bytes);
+    let (width, texels) = if names[0] == "Y" {
+        channels
+            .specific_channels()
+            .required("Y")
+            .collect_pixels(
+                move |resolution, _| size(resolution),
+                |(width, texels): &mut (usize, Vec<Vec3>), at, (grey,): (f32,)| {
+                    texels[at.y() * *width + at.x()] = Vec3::splat(grey);
+                },
+            )
+            .first_valid_layer()
+            .all_attributes()
+            .from_buffered(read)
+            .map_err(message)?
+            .layer_data
+            .channel_data
+            .pixels
+    } else {
+        channels
+            .specific_channels()
+            .required("R")
+            .required("G")
+            .required("B")
+            .collect_pixels(
+                move |resolution, _| size(resolution),
+                |(width, texels): &mut (usize, Vec<Vec3>), at, rgb: (f32, f32, f32)| {
+                    texels[at.y() * *width + at.x()] = rgb.into();
+                },
+            )
+            .first_valid_layer()
+            .all_attributes()
+            .from_buffered(read)
+            .map_err(message)?
+            .layer_data
+            .channel_data
+            .pixels
+    };
+    let height = texels.len() / width;
+    Ok(Image { width: width as u32, height: height as u32, texels })
+}
+
+/// Reads a portable float map: `PF` or `Pf`, width, height, scale (negative for little-endian),
+/// then rows of floats from the bottom up. Ignores the magnitude of the scale, as most readers do.
+fn read_pfm(bytes: &[u8]) -> Result<Image, String> {
+    let mut position = 0;
+    let mut token = |what: &str| -> Result<&str, String> {
+        let start = position
+            + bytes[position..].iter().take_while(|byte| byte.is_ascii_whitespace()).count();
+        let length =
+            bytes[start..].iter().take(32).take_while(|byte| byte.is_ascii_graphic()).count();
+        let text = std::str::from_utf8(&bytes[start..start + length]).unwrap_or_default();
+        position = start + length;
+        if text.is_empty() { Err(format!("PFM header ends before the {what}")) } else { Ok(text) }
+    };
+    let magic = token("magic number")?;
+    let component_count = match magic {
+        "PF" => 3,
+        "Pf" => 1,
+        _ => return Err(format!("not a PFM file: expected PF or Pf, found {magic:?}")),
+    };
+    let mut size = |what: &str| {
+        let text = token(what)?;
+        text.parse::<u32>().map_err(|_| format!("PFM {what}: expected an integer, found {text:?}"))
+    };
+    let (width, height) = (size("width")?, size("height")?);
+    check_size(width.into(), height.into())?;
+    let text = token("scale")?;
+    let scale: f32 = text
+        .parse()
+        .ok()
+        .filter(|scale: &f32| scale.is_finite() && *scale != 0.0)
+        .ok_or_else(|| format!("PFM scale: expected a number other than 0, found {text:?}"))?;
+    let data = bytes.get(position + 1..).unwrap_or_default();
+    let row_bytes = width as usize * component_count * 4;
+    let expected = row_bytes * height as usize;
+    if data.len() < expected {
+        return Err(format!(
+            "truncated: {width}×{height} texels of {component_count} floats need {expected} bytes, \
+             found {}",
+            data.len()
+        ));
+    }
+    let float = |bytes: &[u8]| {
+        let bytes = [bytes[0], bytes[1], bytes[2], bytes[3]];
+        if scale < 0.0 { f32::from_le_bytes(bytes) } else { f32::from_be_bytes(bytes) }
+    };
+    let mut texels = Vec::with_capacity(width as usize * height as usize);
+    for row in data[..expected].chunks_exact(row_bytes).rev() {
+        texels.extend(row.chunks_exact(component_count * 4).map(|texel| match texel.len() {
+            4 => Vec3::splat(float(texel)),
+            _ => Vec3::new(float(texel), float(&texel[4..]), float(&texel[8..])),
+        }));
+    }
+    Ok(Image { width, height, texels })
+}

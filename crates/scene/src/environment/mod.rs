@@ -1,0 +1,144 @@
+//! Lat-long environment map: orientation, lookup and sources.
+//!
+//! File or parameters → [`EnvironmentMap`] → [`EnvironmentTables`] → device buffers. Row 0 of the
+//! image is +Y, its centre looks along −Z, right of the centre is toward +X:
+//! u = 0.5 + atan2(x, −z)/2π, v = atan2(√(x² + z²), y)/π (`docs/environment_convention.svg`).
+//! Radiance is bilinear between texel centres, wrapping in u and clamped in v; camera, shading and
+//! sampling all see that one function.
+
+mod court;
+mod load;
+mod procedural;
+mod sky;
+mod table;
+
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+pub use court::CourtParameters;
+pub use sky::SkyParameters;
+pub use table::mean_sine;
+pub use table::{EnvironmentSample, EnvironmentTables};
+
+use crate::math::frame::lat_long_from_direction;
+
+/// Largest radiance of a texel after scaling. Larger values count as infinite, because their
+/// squares summed over a million samples would leave single precision.
+pub const MAX_RADIANCE: f32 = 1e16;
+
+/// Lat-long radiance image, cleaned and scaled but not rotated.
+///
+/// Row 0 is +Y; the image centre looks along −Z; right of the centre is toward +X.
+#[derive(Clone, Debug)]
+pub struct EnvironmentMap {
+    /// Width in texels.
+    pub width: u32,
+    /// Height in texels.
+    pub height: u32,
+    /// Radiance row by row, `width * height` texels; finite, not negative, `scale` applied.
+    pub texels: Vec<Vec3>,
+    /// Rotation of the map about +Y, radians, counter-clockwise seen from above.
+    pub rotation_rad: f32,
+    /// Source of the map, for messages and metadata: a path, or `constant`, `court`, `sky`.
+    pub source: String,
+}
+
+/// Radiance at the four texel centres around a cell.
+///
+/// Row `j` of cells lies between texel rows `j - 1` and `j`, so that the first and last rows are
+/// half cells. Column `i` lies between texel columns `i` and `i + 1`, wrapping.
+struct Cell {
+    c00: Vec3,
+    c10: Vec3,
+    c01: Vec3,
+    c11: Vec3,
+}
+
+impl Cell {
+    fn interpolate(&self, position: Vec2) -> Vec3 {
+        let upper = self.c00.lerp(self.c10, position.x);
+        upper.lerp(self.c01.lerp(self.c11, position.x), position.y)
+    }
+}
+
+impl EnvironmentMap {
+    /// Radiance in every direction, if it is the same in all.
+    pub fn uniform_radiance(&self) -> Option<Vec3> {
+        let first = *self.texels.first()?;
+        self.texels.par_iter().all(|texel| *texel == first).then_some(first)
+    }
+
+    /// True if no light comes from anywhere.
+    pub fn is_black(&self) -> bool {
+        self.texels.par_iter().all(|texel| *texel == Vec3::ZERO)
+    }
+
+    /// Map of `radiance` times `scale` in every direction.
+    ///
+    /// # Errors
+    /// Returns a message if the product is negative, infinite (above [`MAX_RADIANCE`]) or NaN.
+    pub fn constant(radiance: Vec3, scale: f32) -> Result<Self, String> {
+        let texel = radiance * scale;
+        if !texel.to_array().iter().all(|value| (0.0..=MAX_RADIANCE).contains(value)) {
+            return Err(format!(
+                "constant = {radiance} with scale = {scale}; expected numbers from 0 to \
+                 {MAX_RADIANCE:e}"
+            ));
+        }
+        // Use rows so low that the sampling density, which follows sin θ only from row to row, is
+        // nearly uniform.
+        let (width, height) = (64, 32);
+        Ok(Self {
+            width,
+            height,
+            texels: vec![texel; (width * height) as usize],
+            rotation_rad: 0.0,
+            source: "constant".into(),
+        })
+    }
+
+    /// Rotates a direction from the world into the frame of the map.
+    fn map_from_world(&self, direction: Vec3) -> Vec3 {
+        let (s, c) = self.rotation_rad.sin_cos();
+        Vec3::new(c * direction.x - s * direction.z, direction.y, s * direction.x + c * direction.z)
+    }
+
+    /// Rotates a direction from the frame of the map into the world.
+    fn world_from_map(&self, direction: Vec3) -> Vec3 {
+        let (s, c) = self.rotation_rad.sin_cos();
+        Vec3::new(c * direction.x + s * direction.z, direction.y, c * direction.z - s * direction.x)
+    }
+
+    fn cell(&self, column: u32, row: u32) -> Cell {
+        let next_column = if column + 1 == self.width { 0 } else { column + 1 };
+        let upper = row.saturating_sub(1);
+        let lower = row.min(self.height - 1);
+        let texel = |column: u32, row: u32| {
+            self.texels[row as usize * self.width as usize + column as usize]
+        };
+        Cell {
+            c00: texel(column, upper),
+            c10: texel(next_column, upper),
+            c01: texel(column, lower),
+            c11: texel(next_column, lower),
+        }
+    }
+
+    /// Finds the cell that contains a unit direction: its column, its row, and the position inside
+    /// it. Twin of `environment_locate`.
+    pub fn locate(&self, direction: Vec3) -> (u32, u32, Vec2) {
+        let uv = lat_long_from_direction(self.map_from_world(direction));
+        let x = uv.x * self.width as f32 - 0.5;
+        let y = uv.y * self.height as f32 + 0.5;
+        let column = if x < 0.0 { self.width - 1 } else { (x.floor() as u32).min(self.width - 1) };
+        let row = (y.floor() as u32).min(self.height);
+        (column, row, Vec2::new(x - x.floor(), y - y.floor()))
+    }
+
+    /// Radiance from a unit direction: bilinear between texel centres, wrapping in u, clamped in v.
+    /// Twin of `environment_radiance`.
+    pub fn radiance(&self, direction: Vec3) -> Vec3 {
+        let (column, row, position) = self.locate(direction);
+        self.cell(column, row).interpolate(position)
+    }
+}

@@ -1,0 +1,293 @@
+//! Materials → metallic-roughness materials with their extensions.
+
+use glam::Vec3;
+use serde_json::{Map, Value, json};
+
+use super::{
+    document::Textures,
+    images::{Layout, Sheet, peak},
+};
+use crate::{
+    export::{parts::Triangles, triple},
+    material::{ConductorFresnel, Emission, Material, MaterialKind},
+    texture::TextureUse,
+};
+
+/// Refractive index of a material that states none.
+const DEFAULT_IOR: f32 = 1.5;
+
+/// Material on its way to the document.
+pub(super) struct Translator<'a> {
+    pub(super) material: &'a Material,
+    pub(super) triangles: Triangles,
+    pub(super) textures: &'a mut Textures,
+    pub(super) warnings: &'a mut Vec<String>,
+    /// Members of the material and of its extensions.
+    pub(super) members: Map<String, Value>,
+    pub(super) extensions: Map<String, Value>,
+}
+
+/// Factors of the core model.
+struct Core {
+    base_color: Vec3,
+    metallic: f32,
+    roughness: f32,
+}
+
+impl<'a> Translator<'a> {
+    /// Translates the material.
+    pub(super) fn translate(mut self) -> Value {
+        let surface = &self.material.surface;
+        let is_unlit = self.is_unlit();
+        let core = if is_unlit {
+            self.extension("KHR_materials_unlit", json!({}));
+            let radiance = surface.emission.as_ref().map_or(Vec3::ZERO, |light| light.radiance);
+            Core { base_color: radiance, metallic: 0.0, roughness: 1.0 }
+        } else {
+            self.core()
+        };
+        if !surface.two_sided {
+            self.warn("its back is black in Fenestra, and seen or culled by readers of glTF");
+        }
+        let color = match &surface.emission {
+            Some(light) if is_unlit => light.texture.as_ref(),
+            _ if self.material.kind.is_glass() => None,
+            _ => surface.color.as_ref(),
+        };
+        self.pbr(&core, color);
+        let has_light = surface.emission.is_some() && !is_unlit;
+        if let (Some(emission), true) = (&surface.emission, has_light) {
+            self.emission(emission);
+        }
+        if let (Some(used), false) = (&surface.normal, is_unlit) {
+            let sheet = Sheet { layout: Layout::Normal, first: Some(used.clone()), second: None };
+            let mut info = self.texture(sheet, used);
+            if surface.normal_scale != 1.0 {
+                info.insert("scale".to_owned(), json!(surface.normal_scale));
+            }
+            self.members.insert("normalTexture".to_owned(), info.into());
+        }
+        self.opacity();
+        // The back of a double-sided material emits too.
+        let is_double = surface.emission.as_ref().map_or(surface.two_sided, |own| own.two_sided);
+        self.members.insert("doubleSided".to_owned(), is_double.into());
+        self.members.insert("name".to_owned(), self.material.name.clone().into());
+        if !self.extensions.is_empty() {
+            self.members.insert("extensions".to_owned(), self.extensions.into());
+        }
+        self.members.into()
+    }
+
+    fn warn(&mut self, difference: &str) {
+        self.warnings.push(format!("material `{}`: {difference}", self.material.name));
+    }
+
+    fn extension(&mut self, name: &'static str, value: Value) {
+        self.textures.extensions.insert(name);
+        self.extensions.insert(name.to_owned(), value);
+    }
+
+    /// Tests for a surface that shows the same colour in any light.
+    fn is_unlit(&self) -> bool {
+        let surface = &self.material.surface;
+        let is_black =
+            matches!(self.material.kind, MaterialKind::Diffuse { reflectance: Vec3::ZERO });
+        is_black
+            && surface
+                .emission
+                .as_ref()
+                .is_some_and(|light| light.two_sided && light.radiance.max_element() <= 1.0)
+            && !surface.vertex_color
+    }
+
+    /// Factors of the model, with the extensions that it needs.
+    fn core(&mut self) -> Core {
+        let metal =
+            |base_color, alpha: f32| Core { base_color, metallic: 1.0, roughness: alpha.sqrt() };
+        match &self.material.kind {
+            MaterialKind::Diffuse { reflectance } => self.diffuse(*reflectance),
+            MaterialKind::Plastic { diffuse, alpha, ior } => {
+                self.warn(
+                    "its coat and base become glTF's dielectric, which reflects by Schlick's \
+                     approximation and darkens its base in another way",
+                );
+                self.dielectric(*ior, 1.0, Vec3::ONE);
+                Core { base_color: *diffuse, metallic: 0.0, roughness: alpha.sqrt() }
+            }
+            MaterialKind::Conductor {
+                alpha,
+                fresnel: ConductorFresnel::Schlick { reflectance },
+            } => metal(*reflectance, *alpha),
+            MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } => {
+                self.warn(
+                    "its refractive index becomes the reflectance at normal incidence, from which \
+                     glTF's metal follows Schlick's approximation",
+                );
+                self.without_color("metal of a refractive index");
+                let (below, above) = (*eta - 1.0, *eta + 1.0);
+                let k = *k * *k;
+                metal((below * below + k) / (above * above + k), *alpha)
+            }
+            MaterialKind::Principled {
+                base_color,
+                metallic,
+                roughness,
+                ior,
+                specular,
+                specular_color,
+            } => {
+                self.dielectric(*ior, *specular, *specular_color);
+                Core { base_color: *base_color, metallic: *metallic, roughness: *roughness }
+            }
+            MaterialKind::Mirror { reflectance } => {
+                if *reflectance != Vec3::ONE || self.material.surface.color.is_some() {
+                    self.warn("its mirror becomes a metal, which is white toward the horizon");
+                }
+                metal(*reflectance, 0.0)
+            }
+            MaterialKind::Dielectric { ior, alpha, reflectance, transmittance } => {
+                let core = self.glass(*ior, alpha.sqrt(), *reflectance, *transmittance);
+                // A thickness makes the surface the boundary of a solid.
+                self.extension("KHR_materials_volume", json!({"thicknessFactor": 1.0}));
+                core
+            }
+            MaterialKind::ThinDielectric { ior, reflectance, transmittance } => {
+                self.glass(*ior, 0.0, *reflectance, *transmittance)
+            }
+            MaterialKind::Measured { path, table } => {
+                let share = super::super::reflected_share(table);
+                self.warn(&format!(
+                    "glTF reads no table such as {}; written as diffuse with the reflectance {}",
+                    path.display(),
+                    triple(share)
+                ));
+                self.diffuse(share)
+            }
+        }
+    }
+
+    fn diffuse(&mut self, reflectance: Vec3) -> Core {
+        self.dielectric(DEFAULT_IOR, 0.0, Vec3::ONE);
+        Core { base_color: reflectance, metallic: 0.0, roughness: 1.0 }
+    }
+
+    fn dielectric(&mut self, ior: f32, specular: f32, specular_color: Vec3) {
+        if ior != DEFAULT_IOR {
+            self.extension("KHR_materials_ior", json!({"ior": ior}));
+        }
+        if specular != 1.0 || specular_color != Vec3::ONE {
+            let color = specular_color.to_array();
+            let value = json!({"specularFactor": specular, "specularColorFactor": color});
+            self.extension("KHR_materials_specular", value);
+        }
+    }
+
+    fn glass(&mut self, ior: f32, roughness: f32, reflectance: Vec3, transmittance: Vec3) -> Core {
+        if reflectance != Vec3::ONE {
+            self.warn("the factor of its reflected light has no place in glTF's glass");
+        }
+        self.without_color("dielectric");
+        self.dielectric(ior, 1.0, Vec3::ONE);
+        self.extension("KHR_materials_transmission", json!({"transmissionFactor": 1.0}));
+        Core { base_color: transmittance, metallic: 0.0, roughness }
+    }
+
+    fn without_color(&mut self, kind: &str) {
+        let surface = &self.material.surface;
+        if surface.color.is_some() || surface.vertex_color && self.triangles.has_colors {
+            self.warn(&format!(
+                "the colours of its surface or its vertices have no place in a {kind}"
+            ));
+        }
+    }
+
+    /// `pbrMetallicRoughness`, with the textures of colour and opacity, roughness and metal.
+    fn pbr(&mut self, core: &Core, color: Option<&TextureUse>) {
+        let surface = &self.material.surface;
+        let largest = peak(color);
+        let base_color = (core.base_color * largest).clamp(Vec3::ZERO, Vec3::ONE);
+        let opacity = surface.opacity.factor;
+        let mut pbr = Map::new();
+        pbr.insert("baseColorFactor".to_owned(), json!(base_color.extend(opacity).to_array()));
+        pbr.insert("metallicFactor".to_owned(), json!(core.metallic));
+        pbr.insert("roughnessFactor".to_owned(), json!(core.roughness));
+        let layout = Layout::ColorOpacity(largest);
+        let pair = [color, surface.opacity.texture.as_ref()];
+        if let Some(info) = self.pair(layout, pair, ["colour", "opacity"]) {
+            pbr.insert("baseColorTexture".to_owned(), info.into());
+        }
+        let pair = [surface.roughness.as_ref(), surface.metallic.as_ref()];
+        if let Some(info) = self.pair(Layout::RoughnessMetal, pair, ["roughness", "metal"]) {
+            pbr.insert("metallicRoughnessTexture".to_owned(), info.into());
+        }
+        self.members.insert("pbrMetallicRoughness".to_owned(), pbr.into());
+    }
+
+    /// Reference to an image of one or two textures. Two must lie in the same way on the surface and
+    /// have equally many texels; else the second is left out.
+    fn pair(
+        &mut self,
+        layout: Layout,
+        [first, second]: [Option<&TextureUse>; 2],
+        names: [&str; 2],
+    ) -> Option<Map<String, Value>> {
+        let used = first.or(second)?;
+        let is_alike = |other: &&TextureUse| {
+            let place = |used: &TextureUse| {
+                let sides = (used.texture.width, used.texture.height);
+                (sides, used.uv_set, used.wrap, used.interpolation)
+            };
+            place(used) == place(other) && used.image_from_uv == other.image_from_uv
+        };
+        let kept = second.filter(is_alike);
+        if second.is_some() && kept.is_none() {
+            let [first, second] = names;
+            self.warn(&format!(
+                "its textures of {first} and {second} lie on the surface in two ways or differ in \
+                 size; glTF has one image for both, and that of {second} is left out"
+            ));
+        }
+        let sheet = Sheet { layout, first: first.cloned(), second: kept.cloned() };
+        Some(self.texture(sheet, used))
+    }
+
+    fn texture(&mut self, sheet: Sheet, used: &TextureUse) -> Map<String, Value> {
+        let (info, is_exact) = self.textures.add(sheet, used);
+        if !is_exact {
+            self.warn(
+                "a texture is sheared on its coordinates, which glTF's transformation cannot",
+            );
+        }
+        info
+    }
+
+    /// Factors of emission are at most 1 in glTF; an extension multiplies them.
+    fn emission(&mut self, emission: &Emission) {
+        let largest = peak(emission.texture.as_ref());
+        let radiance = emission.radiance * largest;
+        let strength = radiance.max_element().max(1.0);
+        self.members.insert("emissiveFactor".to_owned(), json!((radiance / strength).to_array()));
+        if strength > 1.0 {
+            let value = json!({"emissiveStrength": strength});
+            self.extension("KHR_materials_emissive_strength", value);
+        }
+        if let Some(used) = &emission.texture {
+            let layout = Layout::ColorOpacity(largest);
+            let sheet = Sheet { layout, first: Some(used.clone()), second: None };
+            let info = self.texture(sheet, used);
+            self.members.insert("emissiveTexture".to_owned(), info.into());
+        }
+    }
+
+    fn opacity(&mut self) {
+        let surface = &self.material.surface;
+        let opacity = &surface.opacity;
+        let has_colors = surface.vertex_color && self.triangles.has_transparency;
+        if let Some(cutoff) = opacity.cutoff {
+            self.members.insert("alphaMode".to_owned(), "MASK".into());
+            self.members.insert("alphaCutoff".to_owned(), json!(cutoff));
+        } else if opacity.factor < 1.0 || opacity.texture.is_some() || has_colors {
+            self.members.insert("alphaMode".to_owned(), "BLEND".into());
+        }
+    }
+}

@@ -1,0 +1,243 @@
+//! Images of textures, as PNG where the texels go unchanged, else as OpenEXR with the factors of the
+//! material in the texels: formats whose textures have none share it.
+
+use std::{path::Path, sync::Arc};
+
+use glam::{Vec2, Vec3};
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use rayon::prelude::*;
+
+use super::names::safe_name;
+use crate::{
+    coat::base_below_coat,
+    error::Result,
+    files,
+    math::colour::luminance,
+    picture::Image,
+    texture::{Channels, Encoding, Interpolation, Texels, Texture, TextureUse},
+};
+
+/// Most enlargement of an image that is cut off at an opacity, and its longest side after that.
+const MAX_ENLARGEMENT: u32 = 8;
+const MAX_ENLARGED_SIDE: u32 = 4096;
+
+/// Values that the texels of an exported image hold, from those of the use of a texture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Recipe {
+    /// Colours times a factor.
+    Color(Vec3),
+    /// Colours times a factor, as the base below a coat of this refractive index that shows them.
+    Base(Vec3, f32),
+    /// Radiance: colours times a factor, never in 8 or 16 bits.
+    Radiance(Vec3),
+    /// One number times a factor.
+    Number(f32),
+    /// Square of one number times a factor.
+    Squared(f32),
+    /// Normals of another length, with factors of the components along the tangent and the bitangent.
+    Normal(Vec2),
+    /// 1 where `factor` times the number is at least `cutoff`, else 0.
+    Cut { factor: f32, cutoff: f32 },
+}
+
+/// Image to write.
+#[derive(Clone, Debug, PartialEq)]
+struct Picture {
+    used: TextureUse,
+    recipe: Recipe,
+}
+
+/// Images of a scene, each once.
+#[derive(Debug, Default)]
+pub(super) struct Pictures {
+    list: Vec<Picture>,
+}
+
+/// Name and look-up of an exported image.
+#[derive(Debug, PartialEq)]
+pub(super) struct Bitmap {
+    /// File in the folder of the scene.
+    pub(super) name: String,
+    /// True for linear values.
+    pub(super) is_raw: bool,
+    /// True if texels are not interpolated.
+    pub(super) is_nearest: bool,
+}
+
+impl Pictures {
+    /// Adds an image; returns that of an equal one if there is one.
+    pub(super) fn add(&mut self, used: &TextureUse, recipe: Recipe) -> Bitmap {
+        // Coordinates and wrap modes belong to the look-up, but an enlarged image depends on the latter.
+        let picture = Picture {
+            used: TextureUse {
+                image_from_uv: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+                uv_set: 0,
+                ..used.clone()
+            },
+            recipe,
+        };
+        let same = |other: &Picture| {
+            Arc::ptr_eq(&other.used.texture, &picture.used.texture)
+                && TextureUse { texture: Arc::clone(&picture.used.texture), ..other.used.clone() }
+                    == picture.used
+                && other.recipe == recipe
+        };
+        let index = self.list.iter().position(same).unwrap_or_else(|| {
+            self.list.push(picture);
+            self.list.len() - 1
+        });
+        self.list[index].bitmap(index)
+    }
+
+    /// Writes all images into a folder.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] for a file that cannot be written.
+    pub(super) fn write(&self, folder: &Path) -> Result<()> {
+        self.list.iter().enumerate().try_for_each(|(index, picture)| {
+            let path = folder.join(picture.bitmap(index).name);
+            match picture.stored() {
+                Some(stored) => write_png(&path, &picture.used.texture, stored),
+                None => picture.write_exr(&path),
+            }
+        })
+    }
+}
+
+/// Texels without a change, of 8 or 16 bits.
+enum Stored {
+    Bytes(Vec<u8>),
+    Shorts(Vec<u16>),
+}
+
+impl Picture {
+    fn bitmap(&self, index: usize) -> Bitmap {
+        let extension = if self.is_stored() { "png" } else { "exr" };
+        let stem = Path::new(&self.used.texture.name).file_stem().unwrap_or_default();
+        let stem = safe_name(&stem.to_string_lossy());
+        let is_linear = self.used.encoding == Encoding::Linear
+            || self.used.channels == Channels::Alpha
+            || !self.is_stored();
+        Bitmap {
+            name: format!("t{index:02}_{stem}.{extension}"),
+            is_raw: is_linear,
+            is_nearest: self.used.interpolation == Interpolation::Nearest
+                || matches!(self.recipe, Recipe::Cut { .. }),
+        }
+    }
+
+    /// Tests whether the image holds nothing but channels of the texture as they are.
+    fn is_stored(&self) -> bool {
+        let is_one = match self.recipe {
+            Recipe::Color(factor) => factor == Vec3::ONE,
+            // The number of three channels is their luminance.
+            Recipe::Number(factor) => factor == 1.0 && self.used.channels != Channels::Color,
+            Recipe::Normal(factor) => factor == Vec2::ONE,
+            Recipe::Base(..) | Recipe::Radiance(_) | Recipe::Squared(_) | Recipe::Cut { .. } => {
+                false
+            }
+        };
+        is_one
+            && self.used.scale == [1.0; 3]
+            && self.used.bias == [0.0; 3]
+            && !matches!(self.used.texture.texels, Texels::Halves(_))
+    }
+
+    fn stored(&self) -> Option<Stored> {
+        if !self.is_stored() {
+            return None;
+        }
+        let channels = match self.used.channels {
+            Channels::Color => [0, 1, 2],
+            Channels::Red => [0; 3],
+            Channels::Green => [1; 3],
+            Channels::Blue => [2; 3],
+            Channels::Alpha => [3; 3],
+        };
+        match &self.used.texture.texels {
+            Texels::Bytes(texels) => {
+                let all = texels.iter().flat_map(|texel| channels.map(|channel| texel[channel]));
+                Some(Stored::Bytes(all.collect()))
+            }
+            Texels::Shorts(texels) => {
+                let all = texels.iter().flat_map(|texel| channels.map(|channel| texel[channel]));
+                Some(Stored::Shorts(all.collect()))
+            }
+            Texels::Halves(_) => None,
+        }
+    }
+
+    /// Texels of the image for each of the texture, along both axes.
+    fn enlargement(&self) -> u32 {
+        let is_blurred = self.used.interpolation == Interpolation::Bilinear;
+        if !is_blurred || !matches!(self.recipe, Recipe::Cut { .. }) {
+            return 1;
+        }
+        let longest = self.used.texture.width.max(self.used.texture.height);
+        (MAX_ENLARGED_SIDE / longest).clamp(1, MAX_ENLARGEMENT)
+    }
+
+    fn write_exr(&self, path: &Path) -> Result<()> {
+        let enlargement = self.enlargement();
+        let [width, height] =
+            [self.used.texture.width, self.used.texture.height].map(|side| side * enlargement);
+        let interpolation =
+            if enlargement == 1 { Interpolation::Nearest } else { Interpolation::Bilinear };
+        let used = TextureUse { interpolation, ..self.used.clone() };
+        let of = self.value();
+        let texel = |number: usize| {
+            let (x, y) = (number as u32 % width, number as u32 / width);
+            let image =
+                Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
+            let value = used.value(image).truncate();
+            of(value).to_array()
+        };
+        let count = width as usize * height as usize;
+        let texels: Vec<[f32; 3]> = (0..count).into_par_iter().map(texel).collect();
+        let mut image = Image::new(width, height);
+        image.insert_triple(["R", "G", "B"], &texels);
+        image.write_exr(path)
+    }
+
+    /// Function from values of the texture to those of the image.
+    fn value(&self) -> Box<dyn Fn(Vec3) -> Vec3 + Sync> {
+        match self.recipe {
+            Recipe::Color(factor) | Recipe::Radiance(factor) => {
+                Box::new(move |value| value * factor)
+            }
+            Recipe::Base(factor, ior) => {
+                let base = base_below_coat(ior);
+                Box::new(move |value| (value * factor).map(&base))
+            }
+            Recipe::Number(factor) => Box::new(move |value| Vec3::splat(factor * luminance(value))),
+            Recipe::Squared(factor) => {
+                Box::new(move |value| Vec3::splat(factor * luminance(value).powi(2)))
+            }
+            Recipe::Normal(factor) => {
+                // The length of a normal does not count. Texels stay within 0…1.
+                let factor = factor.extend(1.0) / factor.abs().max_element().max(1.0);
+                Box::new(move |value| 0.5 + 0.5 * factor * (2.0 * value - 1.0))
+            }
+            Recipe::Cut { factor, cutoff } => Box::new(move |value| {
+                Vec3::splat(if factor * luminance(value) >= cutoff { 1.0 } else { 0.0 })
+            }),
+        }
+    }
+}
+
+fn write_png(path: &Path, texture: &Texture, stored: Stored) -> Result<()> {
+    files::write_atomically(path, |file| {
+        let encoder = PngEncoder::new(file);
+        let (width, height) = (texture.width, texture.height);
+        let result = match stored {
+            Stored::Bytes(bytes) => {
+                encoder.write_image(&bytes, width, height, ExtendedColorType::Rgb8)
+            }
+            Stored::Shorts(shorts) => {
+                let bytes = bytemuck::cast_slice(&shorts);
+                encoder.write_image(bytes, width, height, ExtendedColorType::Rgb16)
+            }
+        };
+        result.map_err(std::io::Error::other)
+    })
+}

@@ -1,0 +1,109 @@
+//! Lamps and the environment.
+
+use std::path::Path;
+
+use glam::Vec3;
+
+use crate::{
+    EnvironmentMap, Lamp,
+    error::Result,
+    export::{names::relative, triple},
+    lamp::{LampKind, SpotFalloff},
+    picture::Image,
+};
+
+/// Returns the emitter of a lamp, and warns where it is not Fenestra's.
+pub(super) fn lamp(lamp: &Lamp, warnings: &mut Vec<String>) -> String {
+    let colour =
+        |name: &str, value| format!("        <rgb name=\"{name}\" value=\"{}\"/>\n", triple(value));
+    let point = |name: &str, value: Vec3| {
+        let [x, y, z] = value.to_array();
+        format!("<{name} x=\"{x}\" y=\"{y}\" z=\"{z}\"/>")
+    };
+    let (kind, content) = match lamp.kind {
+        LampKind::Point { position, intensity } => {
+            let place = point("point name=\"position\"", position);
+            ("point", format!("        {place}\n{}", colour("intensity", intensity)))
+        }
+        LampKind::Directional { direction, irradiance } => {
+            let along = point("vector name=\"direction\"", direction);
+            ("directional", format!("        {along}\n{}", colour("irradiance", irradiance)))
+        }
+        LampKind::Spot {
+            position,
+            direction,
+            intensity,
+            inner_angle_rad,
+            outer_angle_rad,
+            falloff,
+        } => {
+            if falloff != SpotFalloff::LinearAngle {
+                warnings.push(format!(
+                    "lamp `{}`: between its two angles Mitsuba's spot falls off in proportion to \
+                     the angle, Fenestra's by a smooth curve",
+                    lamp.name
+                ));
+            }
+            let target = position.as_dvec3() + direction.as_dvec3();
+            let content = format!(
+                "        <transform name=\"to_world\">\n            <lookat origin=\"{}\" \
+                 target=\"{}, {}, {}\" up=\"{}\"/>\n        </transform>\n{}        \
+                 <float name=\"cutoff_angle\" value=\"{}\"/>\n        \
+                 <float name=\"beam_width\" value=\"{}\"/>\n",
+                triple(position),
+                target.x,
+                target.y,
+                target.z,
+                triple(direction.any_orthonormal_vector()),
+                colour("intensity", intensity),
+                outer_angle_rad.to_degrees(),
+                inner_angle_rad.to_degrees()
+            );
+            ("spot", content)
+        }
+    };
+    format!("    <emitter type=\"{kind}\">\n{content}    </emitter>\n")
+}
+
+/// Writes the environment into `folder` and returns its emitter; black ones need none.
+///
+/// Mitsuba's texel columns have centres at (i + ½)/width as Fenestra's, but its rows lie at
+/// j/(height − 1), on the poles too. A map of 2·height + 1 rows holds Fenestra's bilinear function
+/// exactly: odd rows are the texels, even ones the means of their neighbours. Mitsuba's middle looks
+/// along +Z, Fenestra's along −Z: half a turn.
+pub(super) fn write_environment(
+    map: &EnvironmentMap,
+    folder: &Path,
+    folder_name: &str,
+) -> Result<String> {
+    if map.is_black() {
+        return Ok(String::new());
+    }
+    if let Some(radiance) = map.uniform_radiance() {
+        return Ok(format!(
+            "    <emitter type=\"constant\">\n        <rgb name=\"radiance\" value=\"{}\"/>\n    \
+             </emitter>\n",
+            triple(radiance)
+        ));
+    }
+    let (width, height) = (map.width as usize, map.height as usize);
+    let mut image = Image::new(map.width, 2 * map.height + 1);
+    let mut texels = Vec::with_capacity(image.pixel_count());
+    for row in 0..=2 * height {
+        let above = row.saturating_sub(1) / 2 * width;
+        let below = (row / 2).min(height - 1) * width;
+        texels.extend((0..width).map(|column| {
+            (0.5 * map.texels[above + column] + 0.5 * map.texels[below + column]).to_array()
+        }));
+    }
+    image.insert_triple(["R", "G", "B"], &texels);
+    let name = "environment.exr";
+    image.write_exr(&folder.join(name))?;
+    Ok(format!(
+        "    <emitter type=\"envmap\">\n        <string name=\"filename\" value=\"{}\"/>\n        \
+         <transform name=\"to_world\">\n            <rotate y=\"1\" angle=\"{}\"/>\n        \
+         </transform>\n    </emitter>\n",
+        relative(folder_name, name),
+        f64::from(map.rotation_rad).to_degrees() + 180.0
+    ))
+}

@@ -1,0 +1,203 @@
+//! Mitsuba 3 XML (version 3.0.0): one scene file, and a folder of the same name beside it with the
+//! environment (`environment.exr`), images of textures, and binary PLY meshes, a few for each material.
+//!
+//! Deviations from Fenestra's own picture, each a warning where it applies:
+//! - `roughconductor`, `roughdielectric`, `roughplastic` and `principled` mask and shadow separately,
+//!   Fenestra together (\[Heitz 2014\] Eq. 99): a difference that grows with α.
+//! - `roughplastic` loses light that Fenestra's coupled base keeps (\[Kelemen & Szirmay-Kalos 2001\]):
+//!   a white one of Mitsuba 3.9.1 reflects 0.96 of it at α = 0.05 and 0.69 at 0.3. Its linear variant
+//!   is nearer, since the base's albedo enters once.
+//! - `principled` has Disney's diffuse part.
+//! - Measured materials become diffuse with the same share of reflected light.
+//! - Further ones are where the warnings are, in `models` and `lights`.
+//!
+//! Differences too small for a warning: the Gaussian filter is cut off at 2 pixels, not at 1.5; the
+//! light of the back of a surface stands [`BACK_DISTANCE`] behind it; normal maps take the tangent of each
+//! triangle instead of those of vertices.
+
+mod lights;
+mod models;
+
+use std::{
+    fmt::Write,
+    path::{Path, PathBuf},
+};
+
+use self::models::{Model, Translator, indented};
+use super::{
+    Settings,
+    images::Pictures,
+    names::{folder_name, folder_of, identifier, relative},
+    parts::{self, Parts},
+    ply::{self, Attributes, SAME_UV},
+    portal_warning, triple,
+};
+use crate::{Camera, Filter, Scene, error::Result, files};
+
+/// Distance of a mesh that emits backwards from the one that emits forwards, as a part of the size of
+/// the scene.
+pub const BACK_DISTANCE: f32 = 1e-5;
+
+/// A scene on its way to Mitsuba.
+#[derive(Debug)]
+pub struct Export<'a> {
+    scene: &'a Scene,
+    settings: Settings,
+    path: PathBuf,
+    /// Name of the folder beside the scene file, escaped for XML.
+    folder_name: String,
+    /// One per material, as `models`.
+    parts: Vec<Parts>,
+    models: Vec<Model>,
+    lamps: String,
+    pictures: Pictures,
+    warnings: Vec<String>,
+}
+
+impl<'a> Export<'a> {
+    /// Translates the materials and lamps for a scene file at `path`, without writing anything.
+    pub fn new(scene: &'a Scene, path: &Path, settings: Settings) -> Result<Self> {
+        let folder_name = escaped(&folder_name(path));
+        let (mut warnings, mut pictures) = (Vec::new(), Pictures::default());
+        let parts = parts::divide(scene);
+        let models = scene.materials.iter().zip(&parts);
+        let models = models.map(|(material, parts)| {
+            let translator = Translator {
+                material,
+                triangles: parts.describe(material.surface.normal.as_ref()),
+                folder: &folder_name,
+                pictures: &mut pictures,
+                warnings: &mut warnings,
+                color_factor: None,
+            };
+            translator.model()
+        });
+        let models = models.collect();
+        let lamps = scene.lamps.iter().map(|lamp| lights::lamp(lamp, &mut warnings)).collect();
+        warnings.extend(portal_warning(scene));
+        let path = path.to_owned();
+        Ok(Self { scene, settings, path, folder_name, parts, models, lamps, pictures, warnings })
+    }
+
+    /// Camera, sampler and film. Mitsuba leaves out surfaces nearer or farther than its clip planes.
+    fn sensor(&self) -> String {
+        let Camera { position, look_at, up, .. } = self.scene.camera;
+        let Camera { vertical_fov_deg, aperture_radius, focus_distance, .. } = self.scene.camera;
+        // The farthest corner of the box is at least as far as all vertices.
+        let corner = parts::bounds(&self.parts).map_or(0.0, |[low, high]| {
+            (low - position).abs().max((high - position).abs()).length()
+        });
+        let far = 2.0 * corner.max(1e-3);
+        let kind = if aperture_radius > 0.0 { "thinlens" } else { "perspective" };
+        let mut xml = format!("    <sensor type=\"{kind}\">\n");
+        let mut number = |name: &str, value: f32| {
+            _ = writeln!(xml, "        <float name=\"{name}\" value=\"{value}\"/>");
+        };
+        number("fov", vertical_fov_deg);
+        if aperture_radius > 0.0 {
+            number("aperture_radius", aperture_radius);
+            number("focus_distance", focus_distance);
+        }
+        number("near_clip", 1e-6 * far);
+        // The plane of focus lies between the clip planes.
+        number("far_clip", if aperture_radius > 0.0 { far.max(2.0 * focus_distance) } else { far });
+        let filter = match self.scene.film.filter {
+            Filter::Box => "<rfilter type=\"box\"/>",
+            Filter::Gaussian => {
+                "<rfilter type=\"gaussian\"><float name=\"stddev\" value=\"0.5\"/></rfilter>"
+            }
+        };
+        _ = write!(
+            xml,
+            r#"        <string name="fov_axis" value="y"/>
+        <transform name="to_world">
+            <lookat origin="{}" target="{}" up="{}"/>
+        </transform>
+        <sampler type="independent">
+            <integer name="sample_count" value="{}"/>
+        </sampler>
+        <film type="hdrfilm">
+            <integer name="width" value="{}"/>
+            <integer name="height" value="{}"/>
+            <string name="pixel_format" value="rgb"/>
+            <string name="component_format" value="float32"/>
+            {filter}
+        </film>
+    </sensor>
+"#,
+            triple(position),
+            triple(look_at),
+            triple(up),
+            self.settings.samples,
+            self.scene.film.width,
+            self.scene.film.height,
+        );
+        xml
+    }
+}
+
+impl super::Export for Export<'_> {
+    fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    fn write(&self) -> Result<()> {
+        let folder = folder_of(&self.path);
+        let mut xml = format!(
+            "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<!-- Written by Fenestra {}. -->\n\
+             <scene version=\"3.0.0\">\n    <integrator type=\"path\">\n        \
+             <integer name=\"max_depth\" value=\"{}\"/>\n        \
+             <boolean name=\"hide_emitters\" value=\"false\"/>\n    </integrator>\n",
+            env!("CARGO_PKG_VERSION"),
+            // Mitsuba counts the edges of a path, the one to the light included.
+            u64::from(self.settings.depth) + 1
+        );
+        xml += &self.sensor();
+        xml += &lights::write_environment(&self.scene.environment, &folder, &self.folder_name)?;
+        xml += &self.lamps;
+        self.pictures.write(&folder)?;
+        let size = parts::bounds(&self.parts).map_or(0.0, |[low, high]| low.distance(high));
+        for (index, parts) in self.parts.iter().enumerate() {
+            let model = &self.models[index];
+            let id = identifier(index, &self.scene.materials[index].name);
+            if parts.each().next().is_some() {
+                xml += &indented(&model.bsdf.replacen('>', &format!(" id=\"{id}\">"), 1));
+            }
+            for (part, is_flat) in parts.each() {
+                let suffix = if is_flat { "_flat" } else { "" };
+                let mut meshes = vec![(format!("{id}{suffix}.ply"), part.clone())];
+                if model.has_back {
+                    let back = part.turned(BACK_DISTANCE * size);
+                    meshes.push((format!("{id}{suffix}_back.ply"), back));
+                }
+                for (name, part) in meshes {
+                    let attributes = Attributes {
+                        normals: !is_flat,
+                        uv_set: model.uv_set,
+                        written_from_uv: SAME_UV,
+                        color_factor: model.color_factor,
+                    };
+                    files::write_atomically(&folder.join(&name), |file| {
+                        ply::write(file, &part, attributes)
+                    })?;
+                    let file = relative(&self.folder_name, &name);
+                    let emitter = model.emitter.as_deref().unwrap_or_default();
+                    let emitter = indented(&indented(emitter));
+                    _ = write!(
+                        xml,
+                        "    <shape type=\"ply\">\n        \
+                         <string name=\"filename\" value=\"{file}\"/>\n        \
+                         <boolean name=\"face_normals\" value=\"{is_flat}\"/>\n        \
+                         <ref id=\"{id}\"/>\n{emitter}    </shape>\n"
+                    );
+                }
+            }
+        }
+        xml += "</scene>\n";
+        files::write_text(&self.path, &xml)
+    }
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
+}

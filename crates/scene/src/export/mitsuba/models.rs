@@ -1,0 +1,386 @@
+//! Materials → `bsdf` elements, and the light of their surfaces.
+
+use std::fmt::Write;
+
+use glam::{Vec2, Vec3};
+
+use crate::{
+    export::{
+        images::{Pictures, Recipe},
+        index_of,
+        names::relative,
+        parts::Triangles,
+        triple,
+    },
+    material::{ConductorFresnel, Material, MaterialKind},
+    texture::{Interpolation, TextureUse},
+};
+
+/// GGX width above which separate masking is worth a warning: below it, a white conductor reflects
+/// within 0.5% of what Fenestra's does at every elevation up to 80°.
+const SEPARATE_MASKING_ALPHA: f32 = 0.1;
+/// Smallest index of Mitsuba's `principled`, which stands for no reflection.
+const LEAST_ETA: f32 = 1.001;
+
+/// Elements of a material.
+#[derive(Debug)]
+pub(super) struct Model {
+    /// `bsdf` element.
+    pub(super) bsdf: String,
+    /// `emitter` element for the shapes, if they emit.
+    pub(super) emitter: Option<String>,
+    /// True if the shapes are repeated with their back to the front.
+    pub(super) has_back: bool,
+    /// Set of texture coordinates that the shapes need.
+    pub(super) uv_set: Option<usize>,
+    /// Factor of the colours of vertices, if the shapes need them.
+    pub(super) color_factor: Option<Vec3>,
+}
+
+/// Material on its way to a [`Model`].
+pub(super) struct Translator<'a> {
+    pub(super) material: &'a Material,
+    pub(super) triangles: Triangles,
+    /// Folder of the images, as the scene file calls it.
+    pub(super) folder: &'a str,
+    pub(super) pictures: &'a mut Pictures,
+    pub(super) warnings: &'a mut Vec<String>,
+    pub(super) color_factor: Option<Vec3>,
+}
+
+impl Translator<'_> {
+    /// Translates the material.
+    pub(super) fn model(mut self) -> Model {
+        let surface = &self.material.surface;
+        let is_glass = self.material.kind.is_glass();
+        let mut bsdf = self.reflection();
+        if surface.two_sided && !is_glass {
+            bsdf = around("twosided", "", &bsdf);
+        } else if !surface.two_sided && is_glass {
+            self.warn("its back is black in Fenestra, and glass in Mitsuba");
+        }
+        if let Some(normal) = &surface.normal {
+            bsdf = self.bumps(normal, &bsdf);
+        }
+        if let Some(opacity) = self.opacity() {
+            bsdf = around("mask", &opacity, &bsdf);
+        }
+        let (emitter, has_back) = self.light(is_glass);
+        let mut sets = surface.textures().map(|used| used.uv_set);
+        let uv_set = sets.next();
+        if sets.any(|set| Some(set) != uv_set) {
+            self.warn(
+                "its textures read two sets of coordinates, Mitsuba's only the first of them",
+            );
+        }
+        Model {
+            bsdf,
+            emitter,
+            has_back,
+            uv_set: uv_set.map(|set| set as usize),
+            color_factor: self.color_factor,
+        }
+    }
+
+    fn warn(&mut self, difference: &str) {
+        self.warnings.push(format!("material `{}`: {difference}", self.material.name));
+    }
+
+    fn warn_of_masking(&mut self, alpha: f32, kind: &str) {
+        if alpha > SEPARATE_MASKING_ALPHA {
+            self.warn(&format!(
+                "Mitsuba's {kind} masks and shadows separately, Fenestra together; highlights are \
+                 darker there at alpha = {alpha}"
+            ));
+        }
+    }
+
+    fn reflection(&mut self) -> String {
+        match &self.material.kind {
+            MaterialKind::Diffuse { reflectance } => {
+                element("diffuse", &self.color("reflectance", *reflectance))
+            }
+            MaterialKind::Plastic { diffuse, alpha, ior } => {
+                self.warn_of_masking(*alpha, "plastic");
+                self.warn(
+                    "Mitsuba's plastic loses light below its coat, Fenestra's does not; a white one \
+                     reflects 0.96 there at alpha = 0.05 and 0.69 at 0.3",
+                );
+                let mut content = self.ggx(*alpha);
+                content += &self.color("diffuse_reflectance", *diffuse);
+                content += &float("int_ior", *ior);
+                content += &float("ext_ior", 1.0);
+                content += "    <boolean name=\"nonlinear\" value=\"false\"/>\n";
+                element("roughplastic", &content)
+            }
+            MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } => {
+                self.warn_of_masking(*alpha, "conductor");
+                self.without_color("metal of a refractive index");
+                let content = self.ggx(*alpha) + &rgb("eta", *eta) + &rgb("k", *k);
+                element("roughconductor", &content)
+            }
+            MaterialKind::Conductor {
+                alpha,
+                fresnel: ConductorFresnel::Schlick { reflectance },
+            } => {
+                // Use a fully metallic `principled`, which has Schlick's Fresnel on the same GGX lobe.
+                self.warn_of_masking(*alpha, "conductor");
+                let content = self.color("base_color", *reflectance)
+                    + &float("metallic", 1.0)
+                    + &self.roughness(alpha.sqrt());
+                element("principled", &content)
+            }
+            MaterialKind::Principled {
+                base_color,
+                metallic,
+                roughness,
+                ior,
+                specular,
+                specular_color,
+            } => {
+                self.warn_of_masking(roughness * roughness, "principled");
+                self.warn(
+                    "Mitsuba's principled differs from glTF's: its diffuse part is Disney's, and its \
+                     dielectric reflects by Fresnel's equations instead of Schlick's",
+                );
+                if *specular != 1.0 || *specular_color != Vec3::ONE {
+                    self.warn(
+                        "strength and colour of the dielectric's reflection become a refractive \
+                         index of the same reflectance at normal incidence",
+                    );
+                }
+                let content = self.color("base_color", *base_color)
+                    + &self.number("metallic", *metallic, self.material.surface.metallic.as_ref())
+                    + &self.roughness(*roughness)
+                    + &float("eta", index_of(*ior, *specular, *specular_color).max(LEAST_ETA));
+                element("principled", &content)
+            }
+            MaterialKind::Mirror { reflectance } => {
+                let content = "    <string name=\"material\" value=\"none\"/>\n".to_owned()
+                    + &self.color("specular_reflectance", *reflectance);
+                element("conductor", &content)
+            }
+            MaterialKind::Dielectric { ior, alpha, reflectance, transmittance } => {
+                self.without_color("dielectric");
+                let glass = glass(*ior, *reflectance, *transmittance);
+                if *alpha > 0.0 {
+                    self.warn_of_masking(*alpha, "dielectric");
+                    element("roughdielectric", &(self.ggx(*alpha) + &glass))
+                } else {
+                    element("dielectric", &glass)
+                }
+            }
+            MaterialKind::ThinDielectric { ior, reflectance, transmittance } => {
+                self.without_color("dielectric");
+                element("thindielectric", &glass(*ior, *reflectance, *transmittance))
+            }
+            MaterialKind::Measured { path, table } => {
+                let share = super::super::reflected_share(table);
+                self.warn(&format!(
+                    "Mitsuba reads no table such as {}; written as diffuse with the reflectance {}",
+                    path.display(),
+                    triple(share)
+                ));
+                element("diffuse", &rgb("reflectance", share))
+            }
+        }
+    }
+
+    /// Names colours that the model of Mitsuba has no place for.
+    fn without_color(&mut self, kind: &str) {
+        let surface = &self.material.surface;
+        if surface.color.is_some() || surface.vertex_color && self.triangles.has_colors {
+            self.warn(&format!(
+                "the colours of its surface or its vertices have no place in a {kind}"
+            ));
+        }
+    }
+
+    /// Main colour of the model, with its texture or the colours of vertices.
+    fn color(&mut self, name: &str, factor: Vec3) -> String {
+        let surface = &self.material.surface;
+        let is_of_vertices = surface.vertex_color && self.triangles.has_colors;
+        if let Some(used) = &surface.color {
+            if is_of_vertices {
+                self.warn(
+                    "Mitsuba multiplies no texture by the colours of vertices; they are left out",
+                );
+            }
+            return self.bitmap(name, used, Recipe::Color(factor));
+        }
+        if is_of_vertices {
+            self.color_factor = Some(factor);
+            return format!(
+                "    <texture type=\"mesh_attribute\" name=\"{name}\">\n        \
+                 <string name=\"name\" value=\"vertex_color\"/>\n    </texture>\n"
+            );
+        }
+        rgb(name, factor)
+    }
+
+    fn number(&mut self, name: &str, factor: f32, used: Option<&TextureUse>) -> String {
+        match used {
+            Some(used) => self.bitmap(name, used, Recipe::Number(factor)),
+            None => float(name, factor),
+        }
+    }
+
+    fn roughness(&mut self, factor: f32) -> String {
+        self.number("roughness", factor, self.material.surface.roughness.as_ref())
+    }
+
+    /// Parameters of a GGX model of width `alpha`.
+    fn ggx(&mut self, alpha: f32) -> String {
+        let alpha = match &self.material.surface.roughness {
+            Some(used) => {
+                if used.interpolation == Interpolation::Bilinear {
+                    self.warn(
+                        "Mitsuba interpolates alpha between texels, Fenestra the roughness, its root",
+                    );
+                }
+                self.bitmap("alpha", used, Recipe::Squared(alpha))
+            }
+            None => float("alpha", alpha),
+        };
+        "    <string name=\"distribution\" value=\"ggx\"/>\n".to_owned() + &alpha
+    }
+
+    /// Texture element; the image is written later.
+    fn bitmap(&mut self, name: &str, used: &TextureUse, recipe: Recipe) -> String {
+        let wrap = |axis: usize| ["repeat", "mirror", "clamp"][used.wrap[axis] as usize];
+        if used.wrap[0] != used.wrap[1] {
+            self.warn(&format!(
+                "`{name}` continues along u by {}, along v by {}; Mitsuba has one way for both, that \
+                 of u",
+                wrap(0),
+                wrap(1)
+            ));
+        }
+        let bitmap = self.pictures.add(used, recipe);
+        let mut content = format!(
+            "    <string name=\"filename\" value=\"{}\"/>\n    \
+             <boolean name=\"raw\" value=\"{}\"/>\n    \
+             <string name=\"filter_type\" value=\"{}\"/>\n    \
+             <string name=\"wrap_mode\" value=\"{}\"/>\n",
+            relative(self.folder, &bitmap.name),
+            bitmap.is_raw,
+            if bitmap.is_nearest { "nearest" } else { "bilinear" },
+            wrap(0),
+        );
+        let [[a, b, c], [d, e, f]] = used.image_from_uv;
+        if used.image_from_uv != [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] {
+            _ = write!(
+                content,
+                "    <transform name=\"to_uv\">\n        \
+                 <matrix value=\"{a} {b} 0 {c}  {d} {e} 0 {f}  0 0 1 0  0 0 0 1\"/>\n    \
+                 </transform>\n"
+            );
+        }
+        indented(&format!("<texture type=\"bitmap\" name=\"{name}\">\n{content}</texture>\n"))
+    }
+
+    /// Normal map around a model. It stands around `twosided`: inside, it would mirror the bumps
+    /// of the back.
+    fn bumps(&mut self, normal: &TextureUse, bsdf: &str) -> String {
+        let [same, opposite] = self.triangles.bitangents;
+        if same > 0 && opposite > 0 {
+            let lesser = same.min(opposite);
+            self.warn(&format!(
+                "{lesser} of {} triangles show the normal map as a mirror image, which Mitsuba bends \
+                 the wrong way",
+                same + opposite
+            ));
+        }
+        let [along, across, _] = normal.image_from_uv[0];
+        if along <= 0.0 || across != 0.0 {
+            self.warn(
+                "its normal map is turned or mirrored on its coordinates; Mitsuba bends along those \
+                 of the mesh",
+            );
+        }
+        let scale = self.material.surface.normal_scale;
+        let across = if opposite > same { -scale } else { scale };
+        let content = self.bitmap("normalmap", normal, Recipe::Normal(Vec2::new(scale, across)))
+            + "    <boolean name=\"use_shadowing_function\" value=\"false\"/>\n";
+        around("normalmap", &content, bsdf)
+    }
+
+    /// Parameter of a `mask`, for a surface that is not opaque.
+    fn opacity(&mut self) -> Option<String> {
+        let surface = &self.material.surface;
+        let opacity = &surface.opacity;
+        if surface.vertex_color && self.triangles.has_transparency {
+            self.warn("the opacity of its vertices is left out");
+        }
+        let Some(used) = &opacity.texture else {
+            let factor = match opacity.cutoff {
+                Some(cutoff) if opacity.factor >= cutoff => 1.0,
+                Some(_) => 0.0,
+                None => opacity.factor,
+            };
+            return (factor < 1.0).then(|| float("opacity", factor));
+        };
+        Some(match opacity.cutoff {
+            Some(cutoff) => {
+                if used.interpolation == Interpolation::Bilinear {
+                    self.warn(
+                        "Mitsuba's mask has no cutoff; an enlarged image of 0 and 1 takes its place, \
+                         with edges in steps of a fraction of a texel",
+                    );
+                }
+                self.bitmap("opacity", used, Recipe::Cut { factor: opacity.factor, cutoff })
+            }
+            None => self.bitmap("opacity", used, Recipe::Number(opacity.factor)),
+        })
+    }
+
+    /// Emitter of the surface, and true if its back emits too.
+    fn light(&mut self, is_glass: bool) -> (Option<String>, bool) {
+        let surface = &self.material.surface;
+        let Some(emission) = &surface.emission else { return (None, false) };
+        let radiance = match &emission.texture {
+            Some(used) => self.bitmap("radiance", used, Recipe::Color(emission.radiance)),
+            None => rgb("radiance", emission.radiance),
+        };
+        let is_opaque = surface.opacity == Default::default();
+        if !is_opaque {
+            self.warn("Mitsuba's light is that of the whole surface, also where it is not opaque");
+        }
+        let can_have_back = is_opaque && !is_glass && surface.two_sided;
+        if emission.two_sided && !can_have_back {
+            self.warn("Mitsuba's surfaces emit in front only; the light of the back is left out");
+        }
+        let emitter = format!("<emitter type=\"area\">\n{radiance}</emitter>\n");
+        (Some(emitter), emission.two_sided && can_have_back)
+    }
+}
+
+/// Parameters of a dielectric in air.
+fn glass(ior: f32, reflectance: Vec3, transmittance: Vec3) -> String {
+    float("int_ior", ior)
+        + &float("ext_ior", 1.0)
+        + &rgb("specular_reflectance", reflectance)
+        + &rgb("specular_transmittance", transmittance)
+}
+
+fn element(kind: &str, content: &str) -> String {
+    format!("<bsdf type=\"{kind}\">\n{content}</bsdf>\n")
+}
+
+/// Element with parameters around a model.
+fn around(kind: &str, content: &str, bsdf: &str) -> String {
+    element(kind, &format!("{content}{}", indented(bsdf)))
+}
+
+fn float(name: &str, value: f32) -> String {
+    format!("    <float name=\"{name}\" value=\"{value}\"/>\n")
+}
+
+fn rgb(name: &str, value: Vec3) -> String {
+    format!("    <rgb name=\"{name}\" value=\"{}\"/>\n", triple(value))
+}
+
+/// Moves lines to the right by one level.
+pub(super) fn indented(text: &str) -> String {
+    text.lines().flat_map(|line| ["    ", line, "\n"]).collect()
+}

@@ -1,0 +1,202 @@
+//! Triangles of a scene by material: the one place where exports read its geometry.
+
+use std::collections::HashMap;
+
+use glam::{Vec2, Vec3, Vec4};
+
+use crate::{
+    Geometry, Scene, instance,
+    texture::{TextureUse, lookup::gradient_tangent},
+};
+
+/// Vertex in world space.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Vertex {
+    /// Position, metres.
+    pub(super) position: Vec3,
+    /// Unit normal; 0 without.
+    pub(super) normal: Vec3,
+    /// Two sets of texture coordinates; 0 without.
+    pub(super) uvs: [Vec2; 2],
+    /// Unit tangent and the sign of the bitangent; 0 without.
+    pub(super) tangent: Vec4,
+    /// Colour and opacity; 1 without.
+    pub(super) color: Vec4,
+}
+
+/// Triangles of one material that are all smooth or all flat, with the vertices they use.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Part {
+    /// Vertices, each once.
+    pub(super) vertices: Vec<Vertex>,
+    /// Three indices into `vertices` per triangle.
+    pub(super) triangles: Vec<[u32; 3]>,
+}
+
+/// Triangles of one material: those with normals at all corners, and the flat ones.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Parts {
+    /// Shaded by their normals.
+    pub(super) smooth: Part,
+    /// Shaded flat.
+    pub(super) flat: Part,
+}
+
+/// Facts about the triangles of a material that its translation depends on.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Triangles {
+    /// Some vertices have colours.
+    pub(super) has_colors: bool,
+    /// Some vertices are not opaque.
+    pub(super) has_transparency: bool,
+    /// Some vertices have tangents.
+    pub(super) has_tangents: bool,
+    /// Triangles whose bitangent is the normal × the tangent, and those with the opposite.
+    pub(super) bitangents: [usize; 2],
+    /// Triangles whose normals point to the side from which they are clockwise.
+    pub(super) opposed: usize,
+}
+
+/// Divides the triangles of a scene by material.
+pub(super) fn divide(scene: &Scene) -> Vec<Parts> {
+    let Geometry { triangles, materials, .. } = &scene.geometry;
+    let mut all = vec![Parts::default(); scene.materials.len()];
+    let mut places: Vec<[HashMap<u32, u32>; 2]> = Vec::new();
+    places.resize_with(all.len(), Default::default);
+    for (triangle, &material) in triangles.iter().zip(materials) {
+        let corners = triangle.map(|at| vertex(&scene.geometry, at as usize));
+        let is_flat = corners.iter().any(|corner| corner.normal == Vec3::ZERO);
+        let Parts { smooth, flat } = &mut all[material as usize];
+        let part = if is_flat { flat } else { smooth };
+        let places = &mut places[material as usize][usize::from(is_flat)];
+        let indices = [0, 1, 2].map(|corner| {
+            *places.entry(triangle[corner]).or_insert_with(|| {
+                part.vertices.push(corners[corner]);
+                part.vertices.len() as u32 - 1
+            })
+        });
+        part.triangles.push(indices);
+    }
+    all
+}
+
+fn vertex(geometry: &Geometry, at: usize) -> Vertex {
+    let Geometry { positions, normals, uvs, tangents, colors, .. } = geometry;
+    let uv = |set: usize| uvs[set].get(at).copied().unwrap_or_default().into();
+    Vertex {
+        position: positions[at].into(),
+        normal: normals[at].into(),
+        uvs: [uv(0), uv(1)],
+        tangent: tangents.get(at).copied().unwrap_or_default().into(),
+        color: colors.get(at).copied().unwrap_or([1.0; 4]).into(),
+    }
+}
+
+impl Parts {
+    /// The parts that have triangles, and true for the flat one.
+    pub(super) fn each(&self) -> impl Iterator<Item = (&Part, bool)> {
+        let parts = [(&self.smooth, false), (&self.flat, true)];
+        parts.into_iter().filter(|(part, _)| !part.triangles.is_empty())
+    }
+
+    /// Collects the facts; `normal` is the normal map of the material.
+    pub(super) fn describe(&self, normal: Option<&TextureUse>) -> Triangles {
+        let mut facts = Triangles::default();
+        for (part, is_flat) in self.each() {
+            for vertex in &part.vertices {
+                facts.has_colors |= vertex.color != Vec4::ONE;
+                facts.has_transparency |= vertex.color.w < 1.0;
+                facts.has_tangents |= vertex.tangent.truncate() != Vec3::ZERO;
+            }
+            for &triangle in &part.triangles {
+                let corners = triangle.map(|at| part.vertices[at as usize]);
+                if let Some(used) = normal {
+                    let sign = tangent(corners, used).w;
+                    facts.bitangents[usize::from(sign < 0.0)] += usize::from(sign != 0.0);
+                }
+                let shading: Vec3 = corners.iter().map(|corner| corner.normal).sum();
+                facts.opposed += usize::from(!is_flat && face(corners).dot(shading) < 0.0);
+            }
+        }
+        facts
+    }
+}
+
+impl Part {
+    /// Gives each vertex the normal of its triangle, and the tangent that this has by the coordinates of
+    /// a normal map, unless it has its own. Vertices are repeated where triangles differ.
+    pub(super) fn with_frames(&self, used: &TextureUse) -> Self {
+        let mut own = self.clone();
+        for triangle in &mut own.triangles {
+            let corners = triangle.map(|at| self.vertices[at as usize]);
+            let is_framed = |corner: &Vertex| {
+                corner.normal != Vec3::ZERO && corner.tangent.truncate() != Vec3::ZERO
+            };
+            if corners.iter().all(is_framed) {
+                continue;
+            }
+            let (flat, along) = (face(corners).normalize_or_zero(), tangent(corners, used));
+            let is_flat = corners.iter().any(|corner| corner.normal == Vec3::ZERO);
+            for (corner, index) in corners.iter().zip(triangle) {
+                let normal = if is_flat { flat } else { corner.normal };
+                *index = own.vertices.len() as u32;
+                own.vertices.push(Vertex { normal, tangent: along, ..*corner });
+            }
+        }
+        // Leave out the vertices that no triangle uses any more.
+        let mut places = vec![None; own.vertices.len()];
+        let mut vertices = Vec::with_capacity(own.vertices.len());
+        for index in own.triangles.iter_mut().flatten() {
+            *index = *places[*index as usize].get_or_insert_with(|| {
+                vertices.push(own.vertices[*index as usize]);
+                vertices.len() as u32 - 1
+            });
+        }
+        Self { vertices, ..own }
+    }
+
+    /// The same triangles seen from behind, so far behind their front, metres.
+    pub(super) fn turned(&self, distance: f32) -> Self {
+        let mut sums = vec![Vec3::ZERO; self.vertices.len()];
+        for &triangle in &self.triangles {
+            let normal = face(triangle.map(|at| self.vertices[at as usize])).normalize_or_zero();
+            triangle.iter().for_each(|&at| sums[at as usize] += normal);
+        }
+        let vertices = self.vertices.iter().zip(sums).map(|(vertex, sum)| Vertex {
+            position: vertex.position - distance * sum.normalize_or_zero(),
+            normal: -vertex.normal,
+            ..*vertex
+        });
+        let triangles = self.triangles.iter().map(|&[a, b, c]| [a, c, b]);
+        Self { vertices: vertices.collect(), triangles: triangles.collect() }
+    }
+}
+
+/// Twice the area of a triangle along its normal.
+fn face(corners: [Vertex; 3]) -> Vec3 {
+    let [a, b, c] = corners.map(|corner| corner.position);
+    (b - a).cross(c - a)
+}
+
+/// Tangent of a triangle and the sign of its bitangent: that of its first vertex, else by the
+/// coordinates of an image; 0 if these do not tell.
+fn tangent(corners: [Vertex; 3], used: &TextureUse) -> Vec4 {
+    if corners[0].tangent.truncate() != Vec3::ZERO {
+        return corners[0].tangent;
+    }
+    let [row_u, row_v] = used.image_from_uv.map(Vec3::from);
+    let [a, b, c] = corners.map(|corner| {
+        let uv = corner.uvs[used.uv_set as usize & 1].extend(1.0);
+        Vec2::new(row_u.dot(uv), row_v.dot(uv))
+    });
+    let [first, second, third] = corners.map(|corner| corner.position);
+    let normal = face(corners).normalize_or_zero();
+    gradient_tangent([second - first, third - first], [b - a, c - a], normal)
+}
+
+/// Corners of the box around all vertices, metres; none without any.
+pub(super) fn bounds(parts: &[Parts]) -> Option<[Vec3; 2]> {
+    let parts = parts.iter().flat_map(Parts::each);
+    let positions = parts.flat_map(|(part, _)| part.vertices.iter().map(|vertex| vertex.position));
+    instance::bounds(positions)
+}

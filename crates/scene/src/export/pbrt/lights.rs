@@ -1,0 +1,102 @@
+//! Lamps and the environment.
+
+use std::path::Path;
+
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::{escaped, triple};
+use crate::{
+    EnvironmentMap, Lamp,
+    error::Result,
+    export::names::relative,
+    lamp::{LampKind, SpotFalloff},
+    pbrt::equal_area::direction_from_square,
+    picture::Image,
+};
+
+/// Sides of the square map, texels.
+const SIDES: (u32, u32) = (64, 4096);
+/// Points of a texel of a square map with twice the rows of the other, along each side, whose mean it is.
+const POINTS: u32 = 3;
+
+/// Returns the light source of a lamp, and warns where it is not Fenestra's.
+pub(super) fn lamp(lamp: &Lamp, warnings: &mut Vec<String>) -> String {
+    match lamp.kind {
+        LampKind::Point { position, intensity } => format!(
+            "LightSource \"point\" \"rgb I\" [{}] \"point3 from\" [{}]\n",
+            triple(intensity),
+            triple(position)
+        ),
+        LampKind::Directional { direction, irradiance } => format!(
+            "LightSource \"distant\" \"rgb L\" [{}] \"point3 from\" [0 0 0] \"point3 to\" [{}]\n",
+            triple(irradiance),
+            triple(direction)
+        ),
+        LampKind::Spot {
+            position,
+            direction,
+            intensity,
+            inner_angle_rad,
+            outer_angle_rad,
+            falloff,
+        } => {
+            if falloff != SpotFalloff::SmoothCosine {
+                warnings.push(format!(
+                    "lamp `{}`: between its two angles pbrt's spot falls off by 3t² − 2t³, with t \
+                     linear in the cosine, Fenestra's by another curve",
+                    lamp.name
+                ));
+            }
+            let target = position.as_dvec3() + direction.as_dvec3();
+            let [inner, outer] =
+                [inner_angle_rad, outer_angle_rad].map(|angle| f64::from(angle).to_degrees());
+            format!(
+                "LightSource \"spot\" \"rgb I\" [{}] \"point3 from\" [{}]\n    \
+                 \"point3 to\" [{} {} {}] \"float coneangle\" {outer} \"float conedeltaangle\" {}\n",
+                triple(intensity),
+                triple(position),
+                target.x,
+                target.y,
+                target.z,
+                outer - inner
+            )
+        }
+    }
+}
+
+/// Writes the environment into `folder` and returns its light source; black ones need none.
+///
+/// A square equal-area map twice as high as the lat-long one has texels smaller than those at its
+/// horizon. The directions of the map are those of the world.
+pub(super) fn write_environment(
+    map: &EnvironmentMap,
+    folder: &Path,
+    folder_name: &str,
+) -> Result<String> {
+    if map.is_black() {
+        return Ok(String::new());
+    }
+    if let Some(radiance) = map.uniform_radiance() {
+        return Ok(format!("LightSource \"infinite\" \"rgb L\" [{}]\n", triple(radiance)));
+    }
+    let side = map.height.saturating_mul(2).clamp(SIDES.0, SIDES.1);
+    let points = POINTS * map.height.saturating_mul(2).div_ceil(side);
+    let texel = |index: u32| {
+        let corner = Vec2::new((index % side) as f32, (index / side) as f32);
+        let point = |index: u32| {
+            let inside = Vec2::new((index % points) as f32, (index / points) as f32) + 0.5;
+            let place = (corner + inside / points as f32) / side as f32;
+            map.radiance(direction_from_square(place))
+        };
+        let sum: Vec3 = (0..points * points).map(point).sum();
+        (sum / (points * points) as f32).to_array()
+    };
+    let texels: Vec<[f32; 3]> = (0..side * side).into_par_iter().map(texel).collect();
+    let mut image = Image::new(side, side);
+    image.insert_triple(["R", "G", "B"], &texels);
+    let name = "environment.exr";
+    image.write_exr(&folder.join(name))?;
+    let file = escaped(&relative(folder_name, name));
+    Ok(format!("LightSource \"infinite\" \"string filename\" \"{file}\"\n"))
+}

@@ -1,0 +1,367 @@
+//! Materials → named materials with their textures, and the light of their surfaces.
+
+use std::fmt::Write;
+
+use glam::{Mat3, Vec2, Vec3};
+
+use super::{escaped, triple};
+use crate::{
+    coat::base_below_coat,
+    export::{
+        images::{Pictures, Recipe},
+        index_of,
+        names::relative,
+        parts::Triangles,
+        ply::SAME_UV,
+    },
+    material::{ConductorFresnel, Material, MaterialKind},
+    texture::{Interpolation, TextureUse, Wrap},
+};
+
+/// Largest reflectance at normal incidence that pbrt finds an extinction coefficient for.
+const MAX_REFLECTANCE: f32 = 0.9999;
+/// Smallest index of a coat that is read back.
+const LEAST_COAT_IOR: f32 = 1.01;
+
+/// Directives of a material.
+#[derive(Debug)]
+pub(super) struct Model {
+    /// `Texture`s and `MakeNamedMaterial`.
+    pub(super) text: String,
+    /// `AreaLightSource`, if the surface emits.
+    pub(super) light: String,
+    /// Parameter of shapes for a surface that is not opaque.
+    pub(super) alpha: String,
+    /// Set of texture coordinates that the shapes need, and those written in their place.
+    pub(super) uv_set: Option<usize>,
+    pub(super) written_from_uv: [[f32; 3]; 2],
+}
+
+/// Material on its way to a [`Model`].
+pub(super) struct Translator<'a> {
+    pub(super) material: &'a Material,
+    /// Name in the file.
+    pub(super) id: String,
+    pub(super) triangles: Triangles,
+    /// Folder of the images, as the scene file calls it.
+    pub(super) folder: &'a str,
+    pub(super) pictures: &'a mut Pictures,
+    pub(super) warnings: &'a mut Vec<String>,
+    /// Directives of the textures.
+    pub(super) textures: String,
+    /// Use of a texture whose image coordinates the meshes have in place of their own.
+    pub(super) base: Option<&'a TextureUse>,
+}
+
+impl<'a> Translator<'a> {
+    /// Translates the material.
+    pub(super) fn model(mut self) -> Model {
+        let surface = &self.material.surface;
+        // A normal map has no mapping of its own.
+        self.base = surface.normal.as_ref().or(surface.textures().next());
+        if surface.textures().any(|used| Some(used.uv_set) != self.base.map(|base| base.uv_set)) {
+            self.warn("its textures read two sets of coordinates, pbrt's only one of them");
+        }
+        if surface.vertex_color && self.triangles.has_colors {
+            self.warn("pbrt has no colours of vertices; theirs and their opacity are left out");
+        }
+        if !surface.two_sided {
+            self.warn("its back is black in Fenestra, and as the front in pbrt");
+        }
+        let has_inside = matches!(self.material.kind, MaterialKind::Dielectric { .. });
+        if self.triangles.opposed > 0 && (has_inside || surface.emission.is_some()) {
+            let count = self.triangles.opposed;
+            self.warn(&format!(
+                "{count} triangles have normals of vertices that point to their back, which is the \
+                 front in pbrt"
+            ));
+        }
+        let (kind, mut parameters) = self.reflection();
+        if let Some(normal) = &surface.normal {
+            parameters += &self.bumps(normal);
+        }
+        let alpha = self.alpha();
+        let light = self.light();
+        let id = &self.id;
+        let text = format!(
+            "{}MakeNamedMaterial \"{id}\" \"string type\" \"{kind}\"{parameters}\n",
+            self.textures
+        );
+        let base = self.base;
+        Model {
+            text,
+            light,
+            alpha,
+            uv_set: base.map(|base| base.uv_set as usize),
+            written_from_uv: base.map_or(SAME_UV, |base| {
+                // v points up in pbrt, down in images.
+                let [row_u, [a, b, c]] = base.image_from_uv;
+                [row_u, [-a, -b, 1.0 - c]]
+            }),
+        }
+    }
+
+    fn warn(&mut self, difference: &str) {
+        self.warnings.push(format!("material `{}`: {difference}", self.material.name));
+    }
+
+    /// Kind of the material, and its parameters.
+    fn reflection(&mut self) -> (&'static str, String) {
+        match &self.material.kind {
+            MaterialKind::Diffuse { reflectance } => {
+                ("diffuse", self.color("reflectance", *reflectance))
+            }
+            MaterialKind::Plastic { diffuse, alpha, ior } => {
+                self.coated(*diffuse, *alpha, *ior, "its coat and base")
+            }
+            MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } => {
+                self.without_color("metal of a refractive index");
+                let index = rgb("eta", *eta) + &rgb("k", *k);
+                ("conductor", index + &self.roughness(*alpha))
+            }
+            MaterialKind::Conductor {
+                alpha,
+                fresnel: ConductorFresnel::Schlick { reflectance },
+            } => self.metal(*reflectance, *alpha),
+            MaterialKind::Principled {
+                base_color,
+                metallic,
+                roughness,
+                ior,
+                specular,
+                specular_color,
+            } => {
+                let texture = self.material.surface.metallic.as_ref();
+                let share = metallic * texture.map_or(1.0, |used| used.mean()[0]);
+                if share > 0.0 && share < 1.0 || texture.is_some() {
+                    self.warn("pbrt mixes no metal with others; the greater share is all of it");
+                }
+                if share >= 0.5 {
+                    return self.metal(*base_color, roughness * roughness);
+                }
+                let ior = index_of(*ior, *specular, *specular_color).max(LEAST_COAT_IOR);
+                self.coated(*base_color, roughness * roughness, ior, "its dielectric")
+            }
+            MaterialKind::Mirror { reflectance } => self.metal(*reflectance, 0.0),
+            MaterialKind::Dielectric { ior, alpha, reflectance, transmittance } => {
+                self.colored_glass(*reflectance, *transmittance);
+                ("dielectric", float("eta", *ior) + &self.roughness(*alpha))
+            }
+            MaterialKind::ThinDielectric { ior, reflectance, transmittance } => {
+                self.colored_glass(*reflectance, *transmittance);
+                ("thindielectric", float("eta", *ior))
+            }
+            MaterialKind::Measured { path, table } => {
+                let share = super::super::reflected_share(table);
+                self.warn(&format!(
+                    "pbrt reads no table such as {}; written as diffuse with the reflectance {}",
+                    path.display(),
+                    triple(share)
+                ));
+                ("diffuse", rgb("reflectance", share))
+            }
+        }
+    }
+
+    /// A coat over a base that shows `color` through it.
+    fn coated(&mut self, color: Vec3, alpha: f32, ior: f32, part: &str) -> (&'static str, String) {
+        self.warn(&format!(
+            "{part} become pbrt's coateddiffuse, in which light bounces between coat and base; the \
+             same colour shows through a smooth coat, a rough one differs"
+        ));
+        let reflectance = match &self.material.surface.color {
+            Some(used) => self.texture("reflectance", used, Recipe::Base(color, ior)),
+            None => rgb("reflectance", color.map(base_below_coat(ior))),
+        };
+        ("coateddiffuse", reflectance + &float("eta", ior) + &self.roughness(alpha))
+    }
+
+    /// A metal of this reflectance at normal incidence.
+    fn metal(&mut self, reflectance: Vec3, alpha: f32) -> (&'static str, String) {
+        if reflectance != Vec3::ONE || self.material.surface.color.is_some() {
+            self.warn(
+                "its reflectance is that of pbrt's metal at normal incidence alone; toward the \
+                 horizon that follows Fresnel's equations",
+            );
+        }
+        let reflectance = reflectance.min(Vec3::splat(MAX_REFLECTANCE));
+        ("conductor", self.color("reflectance", reflectance) + &self.roughness(alpha))
+    }
+
+    /// Names colours that glass has no place for.
+    fn colored_glass(&mut self, reflectance: Vec3, transmittance: Vec3) {
+        self.without_color("dielectric");
+        if reflectance != Vec3::ONE || transmittance != Vec3::ONE {
+            self.warn(
+                "the factors of reflected and transmitted light have no place in pbrt's glass",
+            );
+        }
+    }
+
+    fn without_color(&mut self, kind: &str) {
+        if self.material.surface.color.is_some() {
+            self.warn(&format!("the colours of its surface have no place in a {kind}"));
+        }
+    }
+
+    /// Main colour of the model, with its texture.
+    fn color(&mut self, name: &str, factor: Vec3) -> String {
+        match &self.material.surface.color {
+            Some(used) => self.texture(name, used, Recipe::Color(factor)),
+            None => rgb(name, factor),
+        }
+    }
+
+    /// Width of the microfacet distribution.
+    fn roughness(&mut self, alpha: f32) -> String {
+        let width = match &self.material.surface.roughness {
+            Some(used) => {
+                if used.interpolation == Interpolation::Bilinear {
+                    self.warn(
+                        "pbrt interpolates alpha between texels, Fenestra the roughness, its root",
+                    );
+                }
+                self.texture("roughness", used, Recipe::Squared(alpha))
+            }
+            None => float("roughness", alpha),
+        };
+        width + " \"bool remaproughness\" false"
+    }
+
+    /// Adds a texture, whose image is written later, and returns the parameter that names it.
+    fn texture(&mut self, name: &str, used: &TextureUse, recipe: Recipe) -> String {
+        let bitmap = self.pictures.add(used, recipe);
+        let wrap = match used.wrap {
+            [Wrap::Repeat, Wrap::Repeat] => "repeat",
+            [Wrap::ClampToEdge, Wrap::ClampToEdge] => "clamp",
+            [first, _] => {
+                self.warn(&format!(
+                    "`{name}` is mirrored beyond its edges, or continues along u and v in two ways; \
+                     pbrt repeats or clamps it"
+                ));
+                if first == Wrap::ClampToEdge { "clamp" } else { "repeat" }
+            }
+        };
+        let ([du, u], [dv, v]) = self.mapping(name, used);
+        let id = format!("{}_{name}", self.id);
+        let kind = match recipe {
+            Recipe::Number(_) | Recipe::Squared(_) | Recipe::Cut { .. } => "float",
+            _ => "spectrum",
+        };
+        _ = writeln!(
+            self.textures,
+            "Texture \"{id}\" \"{kind}\" \"imagemap\" \"string filename\" \"{}\"\n    \
+             \"string encoding\" \"{}\" \"string filter\" \"{}\" \"string wrap\" \"{wrap}\"\n    \
+             \"float udelta\" {du} \"float uscale\" {u} \"float vdelta\" {dv} \"float vscale\" {v}",
+            escaped(&relative(self.folder, &bitmap.name)),
+            if bitmap.is_raw { "linear" } else { "sRGB" },
+            if bitmap.is_nearest { "point" } else { "bilinear" },
+        );
+        format!(" \"texture {name}\" \"{id}\"")
+    }
+
+    /// Shift and scale along u and v, from the coordinates of the meshes to those of an image.
+    fn mapping(&mut self, name: &str, used: &TextureUse) -> ([f32; 2], [f32; 2]) {
+        let Some(base) = self.base.filter(|base| base.image_from_uv != used.image_from_uv) else {
+            return ([0.0, 1.0], [0.0, 1.0]);
+        };
+        let matrix =
+            |[u, v]: [[f32; 3]; 2]| Mat3::from_cols_array_2d(&[u, v, [0.0, 0.0, 1.0]]).transpose();
+        let relative = matrix(used.image_from_uv) * matrix(base.image_from_uv).inverse();
+        let [u, v, _] = relative.transpose().to_cols_array_2d();
+        let is_straight = u[1].abs() <= 1e-5 * u[0].abs() && v[0].abs() <= 1e-5 * v[1].abs();
+        if !(relative.is_finite() && is_straight) {
+            self.warn(&format!(
+                "`{name}` is turned against another texture; pbrt has one direction for both"
+            ));
+            return ([0.0, 1.0], [0.0, 1.0]);
+        }
+        // v of the image = v[1] · (1 − v of the mesh) + v[2], and pbrt turns it round again.
+        ([u[2], u[0]], [1.0 - v[1] - v[2], v[1]])
+    }
+
+    fn bumps(&mut self, normal: &TextureUse) -> String {
+        let [same, opposite] = self.triangles.bitangents;
+        if same > 0 && opposite > 0 {
+            let lesser = same.min(opposite);
+            self.warn(&format!(
+                "{lesser} of {} triangles show the normal map as a mirror image, which pbrt bends \
+                 the wrong way",
+                same + opposite
+            ));
+        }
+        let [along, across, _] = normal.image_from_uv[0];
+        if self.triangles.has_tangents && (along <= 0.0 || across != 0.0) {
+            self.warn(
+                "its normal map is turned or mirrored on its coordinates; pbrt bends along those of \
+                 the image",
+            );
+        }
+        if normal.wrap != [Wrap::Repeat; 2] || normal.interpolation == Interpolation::Nearest {
+            self.warn("pbrt repeats and interpolates its normal map");
+        }
+        let scale = self.material.surface.normal_scale;
+        let across = if opposite > same { -scale } else { scale };
+        let bitmap = self.pictures.add(normal, Recipe::Normal(Vec2::new(scale, across)));
+        let file = escaped(&relative(self.folder, &bitmap.name));
+        format!(" \"string normalmap\" \"{file}\"")
+    }
+
+    /// Parameter of shapes for a surface that is not opaque.
+    fn alpha(&mut self) -> String {
+        let opacity = &self.material.surface.opacity;
+        let Some(used) = &opacity.texture else {
+            let factor = match opacity.cutoff {
+                Some(cutoff) if opacity.factor >= cutoff => 1.0,
+                Some(_) => 0.0,
+                None => opacity.factor,
+            };
+            return if factor < 1.0 { float("alpha", factor) } else { String::new() };
+        };
+        let recipe = match opacity.cutoff {
+            Some(cutoff) => {
+                if used.interpolation == Interpolation::Bilinear {
+                    self.warn(
+                        "pbrt's alpha has no cutoff; an enlarged image of 0 and 1 takes its place, \
+                         with edges in steps of a fraction of a texel",
+                    );
+                }
+                Recipe::Cut { factor: opacity.factor, cutoff }
+            }
+            None => Recipe::Number(opacity.factor),
+        };
+        self.texture("alpha", used, recipe)
+    }
+
+    /// `AreaLightSource` of the surface.
+    fn light(&mut self) -> String {
+        let surface = &self.material.surface;
+        let Some(emission) = &surface.emission else { return String::new() };
+        let radiance = match &emission.texture {
+            Some(used) => {
+                if used.wrap != [Wrap::ClampToEdge; 2]
+                    || self.base.map(|base| base.image_from_uv) != Some(used.image_from_uv)
+                {
+                    self.warn(
+                        "pbrt shows the image of its light once on the coordinates of the mesh, and \
+                         continues it by the texels of its edge",
+                    );
+                }
+                let bitmap = self.pictures.add(used, Recipe::Radiance(emission.radiance));
+                let file = escaped(&relative(self.folder, &bitmap.name));
+                format!(" \"string filename\" \"{file}\"")
+            }
+            None => rgb("L", emission.radiance),
+        };
+        let two_sided = emission.two_sided;
+        format!("AreaLightSource \"diffuse\"{radiance} \"bool twosided\" {two_sided}\n")
+    }
+}
+
+fn float(name: &str, value: f32) -> String {
+    format!(" \"float {name}\" {value}")
+}
+
+fn rgb(name: &str, value: Vec3) -> String {
+    format!(" \"rgb {name}\" [{}]", triple(value))
+}

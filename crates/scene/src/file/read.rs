@@ -1,0 +1,353 @@
+//! TOML tables → entries.
+//!
+//! Materials and objects are tagged by `type` and `shape`. Their tables are split into the keys
+//! that all kinds share and the keys of one kind, so that a key of another kind is rejected too.
+
+use std::{ops::Range, path::PathBuf};
+
+use serde::{
+    Deserialize, Deserializer,
+    de::{DeserializeOwned, Error as _, Visitor, value},
+    forward_to_deserialize_any,
+};
+use toml::{
+    Spanned,
+    de::{DeTable, DeValue, ValueDeserializer},
+};
+
+use super::{
+    CameraEntry, EnvironmentEntry, IncludeEntry, LampEntry, LampKindEntry, MaterialEntry,
+    MaterialKeys, MaterialKindEntry, NumberOrVector, ObjectEntry, ObjectSource, PortalEntry,
+    SceneFile,
+};
+use crate::{
+    FilmSettings,
+    error::{Result, TextError, line_and_column},
+    shapes::{self, Shape},
+};
+
+/// Keys of every `[[object]]`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ObjectKeys {
+    /// Name, for messages.
+    name: Option<String>,
+    /// PLY, OBJ, glTF or GLB file, relative to the scene file; this or `shape`.
+    mesh: Option<PathBuf>,
+    /// Procedural shape; the keys of each are below.
+    shape: Option<Spanned<String>>,
+    /// Name of a material; may be absent where the mesh file brings its own.
+    material: Option<String>,
+    /// Factor along each axis, or one for all; applied first.
+    #[serde(default)]
+    scale: NumberOrVector,
+    /// Rotations about X, then Y, then Z, degrees.
+    #[serde(default)]
+    rotate_deg: [f32; 3],
+    /// Translation, metres, applied last.
+    #[serde(default)]
+    translate: [f32; 3],
+}
+
+/// Keys of every `[[lamp]]`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LampKeys {
+    /// Name, for messages.
+    name: Option<String>,
+    /// Kind; the keys of each are below.
+    r#type: Spanned<String>,
+}
+
+/// Tables that have no kinds.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RootKeys {
+    camera: CameraEntry,
+    #[serde(default)]
+    film: FilmSettings,
+    environment: Option<EnvironmentEntry>,
+}
+
+/// Reads a whole scene file.
+pub(super) fn read_root(text: &str) -> Result<SceneFile, TextError> {
+    let root = DeTable::parse(text)?;
+    let span = root.span();
+    let mut table = root.into_inner();
+    let known =
+        ["camera", "film", "environment", "lamp", "portal", "material", "object", "include"];
+    refuse_unknown_keys(&table, &known, "the scene")?;
+    let lamps = take_array(&mut table, "lamp")?;
+    let portals = take_array(&mut table, "portal")?;
+    let materials = take_array(&mut table, "material")?;
+    let objects = take_array(&mut table, "object")?;
+    let includes = take_array(&mut table, "include")?;
+    let root_keys: RootKeys = read_table(table, span)?;
+    Ok(SceneFile {
+        camera: root_keys.camera,
+        film: root_keys.film,
+        environment: root_keys.environment,
+        lamps: read_all(lamps, text, read_lamp)?,
+        portals: read_all(portals, text, read_portal)?,
+        materials: read_all(materials, text, read_material)?,
+        objects: read_all(objects, text, read_object)?,
+        includes: read_all(includes, text, read_include)?,
+    })
+}
+
+/// Reads every entry of an array of tables.
+fn read_all<T>(
+    entries: Vec<Spanned<DeValue>>,
+    text: &str,
+    read: fn(Spanned<DeValue>, &str) -> Result<T, TextError>,
+) -> Result<Vec<T>, TextError> {
+    entries.into_iter().map(|entry| read(entry, text)).collect()
+}
+
+/// Removes the array of tables `key` from `table`; empty if there is none.
+fn take_array<'i>(
+    table: &mut DeTable<'i>,
+    key: &str,
+) -> Result<Vec<Spanned<DeValue<'i>>>, TextError> {
+    let Some(entries) = table.remove(key) else { return Ok(Vec::new()) };
+    let span = entries.span();
+    match entries.into_inner() {
+        DeValue::Array(array) => Ok(array.into_iter().collect()),
+        _ => Err(TextError { span, message: format!("expected an array of tables, `[[{key}]]`") }),
+    }
+}
+
+fn read_material(entry: Spanned<DeValue>, text: &str) -> Result<MaterialEntry, TextError> {
+    let line = line_and_column(text, entry.span().start).0;
+    let (keys, rest): (MaterialKeys, _) = KindTable::split(entry, "[[material]]")?;
+    let type_name = keys.r#type.get_ref();
+    let owner = format!("material `{}` of type `{type_name}`", keys.name);
+    let kind = match type_name.as_str() {
+        "diffuse" => MaterialKindEntry::Diffuse(rest.read(&owner)?),
+        "plastic" => MaterialKindEntry::Plastic(rest.read(&owner)?),
+        "conductor" => MaterialKindEntry::Conductor(rest.read(&owner)?),
+        "principled" => MaterialKindEntry::Principled(rest.read(&owner)?),
+        "mirror" => MaterialKindEntry::Mirror(rest.read(&owner)?),
+        "dielectric" => MaterialKindEntry::Dielectric(rest.read(&owner)?),
+        "thin_dielectric" => MaterialKindEntry::ThinDielectric(rest.read(&owner)?),
+        "measured" => MaterialKindEntry::Measured(rest.read(&owner)?),
+        unknown => {
+            return Err(TextError {
+                span: keys.r#type.span(),
+                message: format!(
+                    "unknown material type `{unknown}`, expected one of `diffuse`, `plastic`, \
+                     `conductor`, `principled`, `mirror`, `dielectric`, `thin_dielectric`, \
+                     `measured`"
+                ),
+            });
+        }
+    };
+    Ok(MaterialEntry { line, keys, kind })
+}
+
+fn read_lamp(entry: Spanned<DeValue>, text: &str) -> Result<LampEntry, TextError> {
+    let line = line_and_column(text, entry.span().start).0;
+    let (keys, rest): (LampKeys, _) = KindTable::split(entry, "[[lamp]]")?;
+    let type_name = keys.r#type.get_ref();
+    let label = keys.name.as_ref().map_or("lamp".to_owned(), |name| format!("lamp `{name}`"));
+    let owner = format!("{label} of type `{type_name}`");
+    let kind = match type_name.as_str() {
+        "point" => LampKindEntry::Point(rest.read(&owner)?),
+        "spot" => LampKindEntry::Spot(rest.read(&owner)?),
+        "directional" => LampKindEntry::Directional(rest.read(&owner)?),
+        unknown => {
+            return Err(TextError {
+                span: keys.r#type.span(),
+                message: format!(
+                    "unknown lamp type `{unknown}`, expected one of `point`, `spot`, `directional`"
+                ),
+            });
+        }
+    };
+    Ok(LampEntry { line, name: keys.name, kind })
+}
+
+fn read_portal(entry: Spanned<DeValue>, text: &str) -> Result<PortalEntry, TextError> {
+    let (line, keys) = read_plain(entry, text, "[[portal]]")?;
+    Ok(PortalEntry { line, keys })
+}
+
+fn read_include(entry: Spanned<DeValue>, text: &str) -> Result<IncludeEntry, TextError> {
+    let (line, keys) = read_plain(entry, text, "[[include]]")?;
+    Ok(IncludeEntry { line, keys })
+}
+
+/// Reads an entry of an array of tables that has no kinds, with its line; `header` names it.
+fn read_plain<T: DeserializeOwned>(
+    entry: Spanned<DeValue>,
+    text: &str,
+    header: &str,
+) -> Result<(usize, T), TextError> {
+    let span = entry.span();
+    let line = line_and_column(text, span.start).0;
+    let DeValue::Table(table) = entry.into_inner() else {
+        return Err(TextError { span, message: format!("expected a table, `{header}`") });
+    };
+    Ok((line, read_table(table, span)?))
+}
+
+fn read_object(entry: Spanned<DeValue>, text: &str) -> Result<ObjectEntry, TextError> {
+    let line = line_and_column(text, entry.span().start).0;
+    let (keys, rest): (ObjectKeys, _) = KindTable::split(entry, "[[object]]")?;
+    let label = keys.name.as_ref().map_or("object".to_owned(), |name| format!("object `{name}`"));
+    let source = match (keys.mesh, keys.shape) {
+        (Some(mesh), None) => {
+            refuse_unknown_keys(&rest.table, rest.shared_keys, &format!("{label} with a mesh"))?;
+            ObjectSource::Mesh(mesh)
+        }
+        (None, Some(shape)) => {
+            let parameters = read_shape(&shape, rest, &label)?;
+            ObjectSource::Shape { name: shape.into_inner(), shape: parameters }
+        }
+        (found_mesh, _) => {
+            let found = if found_mesh.is_some() { "both" } else { "neither" };
+            return Err(TextError {
+                span: rest.span,
+                message: format!("{label} needs exactly one of `mesh` and `shape`, found {found}"),
+            });
+        }
+    };
+    Ok(ObjectEntry {
+        line,
+        name: keys.name,
+        material: keys.material,
+        scale: keys.scale.0,
+        rotate_deg: keys.rotate_deg,
+        translate: keys.translate,
+        source,
+    })
+}
+
+fn read_shape(
+    name: &Spanned<String>,
+    rest: KindTable,
+    label: &str,
+) -> Result<Box<dyn Shape>, TextError> {
+    let owner = format!("{label} of shape `{}`", name.get_ref());
+    Ok(match name.get_ref().as_str() {
+        "box" => Box::new(rest.read::<shapes::RoundedBox>(&owner)?),
+        "sphere" => Box::new(rest.read::<shapes::Sphere>(&owner)?),
+        "cylinder" => Box::new(rest.read::<shapes::Cylinder>(&owner)?),
+        "cone" => Box::new(rest.read::<shapes::Cone>(&owner)?),
+        "torus" => Box::new(rest.read::<shapes::Torus>(&owner)?),
+        "lathe" => Box::new(rest.read::<shapes::Lathe>(&owner)?),
+        "extrude" => Box::new(rest.read::<shapes::Extrude>(&owner)?),
+        "tube" => Box::new(rest.read::<shapes::Tube>(&owner)?),
+        "blobs" => Box::new(rest.read::<shapes::Blobs>(&owner)?),
+        "grid" => Box::new(rest.read::<shapes::Grid>(&owner)?),
+        unknown => {
+            return Err(TextError {
+                span: name.span(),
+                message: format!(
+                    "unknown shape `{unknown}`, expected one of `box`, `sphere`, `cylinder`, \
+                     `cone`, `torus`, `lathe`, `extrude`, `tube`, `blobs`, `grid`"
+                ),
+            });
+        }
+    })
+}
+
+/// Keys of one kind of material or shape, beside those that all kinds share.
+struct KindTable<'i> {
+    table: DeTable<'i>,
+    span: Range<usize>,
+    shared_keys: &'static [&'static str],
+}
+
+impl KindTable<'_> {
+    /// Splits the table of `entry` into the keys of `T`, which are read, and those of its kind;
+    /// `header` names it in messages if it is not a table.
+    fn split<'i, T: DeserializeOwned>(
+        entry: Spanned<DeValue<'i>>,
+        header: &str,
+    ) -> Result<(T, KindTable<'i>), TextError> {
+        let span = entry.span();
+        let DeValue::Table(all) = entry.into_inner() else {
+            return Err(TextError { span, message: format!("expected a table, `{header}`") });
+        };
+        let shared_keys = struct_fields::<T>();
+        let (mut shared, mut table) = (DeTable::new(), DeTable::new());
+        for (key, value) in all {
+            let is_shared = shared_keys.contains(&key.get_ref().as_ref());
+            if is_shared { &mut shared } else { &mut table }.insert(key, value);
+        }
+        Ok((read_table(shared, span.clone())?, KindTable { table, span, shared_keys }))
+    }
+
+    /// Reads the keys of the kind `T`; `owner` names it in messages.
+    fn read<T: DeserializeOwned>(self, owner: &str) -> Result<T, TextError> {
+        let known = [self.shared_keys, struct_fields::<T>()].concat();
+        refuse_unknown_keys(&self.table, &known, owner)?;
+        read_table(self.table, self.span).map_err(|error| TextError {
+            span: error.span,
+            message: format!("{owner}: {}", error.message),
+        })
+    }
+}
+
+fn read_table<T: DeserializeOwned>(table: DeTable, span: Range<usize>) -> Result<T, TextError> {
+    let deserializer = ValueDeserializer::from(Spanned::new(span.clone(), DeValue::Table(table)));
+    T::deserialize(deserializer).map_err(|error| {
+        let mut failure = TextError::from(error.clone());
+        if error.span().is_none() {
+            failure.span = span;
+        }
+        failure
+    })
+}
+
+fn refuse_unknown_keys(table: &DeTable, known: &[&str], owner: &str) -> Result<(), TextError> {
+    for key in table.keys() {
+        if !known.contains(&key.get_ref().as_ref()) {
+            let known: Vec<_> = known.iter().map(|key| format!("`{key}`")).collect();
+            return Err(TextError {
+                span: key.span(),
+                message: format!(
+                    "unknown key `{}` in {owner}, expected one of {}",
+                    key.get_ref(),
+                    known.join(", ")
+                ),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Names of the keys of a struct, as its `Deserialize` declares them.
+fn struct_fields<T: DeserializeOwned>() -> &'static [&'static str] {
+    struct FieldProbe<'a>(&'a mut &'static [&'static str]);
+
+    impl<'de> Deserializer<'de> for FieldProbe<'_> {
+        type Error = value::Error;
+
+        fn deserialize_struct<V: Visitor<'de>>(
+            self,
+            _name: &'static str,
+            fields: &'static [&'static str],
+            _visitor: V,
+        ) -> Result<V::Value, Self::Error> {
+            *self.0 = fields;
+            Err(value::Error::custom("only the names are wanted"))
+        }
+
+        fn deserialize_any<V: Visitor<'de>>(self, _visitor: V) -> Result<V::Value, Self::Error> {
+            Err(value::Error::custom("not a struct"))
+        }
+
+        forward_to_deserialize_any! {
+            bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf
+            option unit unit_struct newtype_struct seq tuple tuple_struct map enum identifier
+            ignored_any
+        }
+    }
+
+    let mut fields: &'static [&'static str] = &[];
+    // The probe always returns an error; its result is the list it writes on the way.
+    let _ = T::deserialize(FieldProbe(&mut fields));
+    fields
+}

@@ -1,0 +1,273 @@
+//! SHA-256 of everything that changes the picture.
+
+use glam::Vec3;
+use sha2::{Digest, Sha256};
+
+use super::{Filter, Scene};
+use crate::{
+    Geometry,
+    files::hexadecimal,
+    instance::Instance,
+    lamp::LampKind,
+    material::{ConductorFresnel, MaterialKind, Surface},
+    texture::{Texels, TextureUse},
+};
+
+/// Hashes camera, film, environment, materials and geometry; lower-case hexadecimal.
+///
+/// Names, paths and the order of the text do not enter. A length precedes every array and a tag
+/// every variant, so that no two scenes give the same bytes.
+pub fn hash(scene: &Scene) -> String {
+    let mut hasher = Hasher(Sha256::new());
+    let camera = &scene.camera;
+    hasher.vectors(&[camera.position, camera.look_at, camera.up]);
+    hasher.floats(&[camera.vertical_fov_deg, camera.aperture_radius, camera.focus_distance]);
+    let filter = match scene.film.filter {
+        Filter::Box => 0,
+        Filter::Gaussian => 1,
+    };
+    hasher.integers(&[scene.film.width, scene.film.height, filter]);
+    hasher.environment(scene);
+    hasher.length(scene.materials.len());
+    for material in &scene.materials {
+        hasher.material(&material.kind);
+    }
+    hasher.triangles(&scene.geometry);
+    // These enter only where they are there, tagged, so that scenes without keep their hashes.
+    for (index, material) in scene.materials.iter().enumerate() {
+        if material.surface != Surface::default() {
+            hasher.length(index);
+            hasher.surface(&material.surface);
+        }
+    }
+    hasher.attributes(&scene.geometry);
+    for prototype in &scene.geometry.prototypes {
+        hasher.triangles(prototype);
+        hasher.attributes(prototype);
+    }
+    for instance in &scene.geometry.instances {
+        hasher.instance(instance);
+    }
+    for lamp in &scene.lamps {
+        hasher.lamp(&lamp.kind);
+    }
+    for portal in &scene.portals {
+        hasher.integers(&[PORTAL_TAG]);
+        hasher.vectors(&[portal.corner, portal.axes[0], portal.axes[1]]);
+        hasher.floats(&portal.size);
+    }
+    hasher.finish()
+}
+
+/// Hashes the environment alone; lower-case hexadecimal.
+pub fn environment_hash(scene: &Scene) -> String {
+    let mut hasher = Hasher(Sha256::new());
+    hasher.environment(scene);
+    hasher.finish()
+}
+
+/// Hashes positions and triangles, all that can block light; lower-case hexadecimal.
+pub fn geometry_hash(scene: &Scene) -> String {
+    let mut hasher = Hasher(Sha256::new());
+    hasher.array(bytemuck::cast_slice(&scene.geometry.positions));
+    hasher.array(bytemuck::cast_slice(&scene.geometry.triangles));
+    for prototype in &scene.geometry.prototypes {
+        hasher.array(bytemuck::cast_slice(&prototype.positions));
+        hasher.array(bytemuck::cast_slice(&prototype.triangles));
+    }
+    for instance in &scene.geometry.instances {
+        hasher.instance(instance);
+    }
+    hasher.finish()
+}
+
+/// Follows the tags of lamps.
+const PORTAL_TAG: u32 = 3;
+
+struct Hasher(Sha256);
+
+impl Hasher {
+    fn finish(self) -> String {
+        hexadecimal(&self.0.finalize())
+    }
+
+    fn environment(&mut self, scene: &Scene) {
+        let environment = &scene.environment;
+        self.integers(&[environment.width, environment.height]);
+        self.floats(&[environment.rotation_rad]);
+        self.vectors(&environment.texels);
+    }
+
+    fn triangles(&mut self, geometry: &Geometry) {
+        self.array(bytemuck::cast_slice(&geometry.positions));
+        self.array(bytemuck::cast_slice(&geometry.normals));
+        self.array(bytemuck::cast_slice(&geometry.triangles));
+        self.array(bytemuck::cast_slice(&geometry.materials));
+    }
+
+    fn attributes(&mut self, geometry: &Geometry) {
+        let attributes: [&[u8]; 4] = [
+            bytemuck::cast_slice(&geometry.uvs[0]),
+            bytemuck::cast_slice(&geometry.uvs[1]),
+            bytemuck::cast_slice(&geometry.tangents),
+            bytemuck::cast_slice(&geometry.colors),
+        ];
+        let there = attributes.into_iter().enumerate().filter(|(_, bytes)| !bytes.is_empty());
+        for (tag, bytes) in there {
+            self.length(tag);
+            self.array(bytes);
+        }
+    }
+
+    fn instance(&mut self, instance: &Instance) {
+        let Instance { prototype, world_from_object, first_material, material_mask } = *instance;
+        self.integers(&[prototype, first_material, material_mask]);
+        self.floats(world_from_object.map(|row| row.to_array()).as_flattened());
+    }
+
+    fn length(&mut self, length: usize) {
+        self.0.update((length as u64).to_le_bytes());
+    }
+
+    fn array(&mut self, bytes: &[u8]) {
+        self.length(bytes.len());
+        self.0.update(bytes);
+    }
+
+    fn integers(&mut self, integers: &[u32]) {
+        self.array(bytemuck::cast_slice(integers));
+    }
+
+    fn floats(&mut self, floats: &[f32]) {
+        self.array(bytemuck::cast_slice(floats));
+    }
+
+    fn vectors(&mut self, vectors: &[Vec3]) {
+        self.array(bytemuck::cast_slice(vectors));
+    }
+
+    fn material(&mut self, kind: &MaterialKind) {
+        match kind {
+            MaterialKind::Diffuse { reflectance } => {
+                self.integers(&[0]);
+                self.vectors(&[*reflectance]);
+            }
+            MaterialKind::Plastic { diffuse, alpha, ior } => {
+                self.integers(&[1]);
+                self.vectors(&[*diffuse]);
+                self.floats(&[*alpha, *ior]);
+            }
+            MaterialKind::Conductor {
+                alpha,
+                fresnel: ConductorFresnel::Schlick { reflectance },
+            } => {
+                self.integers(&[2]);
+                self.floats(&[*alpha]);
+                self.vectors(&[*reflectance]);
+            }
+            MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } => {
+                self.integers(&[3]);
+                self.floats(&[*alpha]);
+                self.vectors(&[*eta, *k]);
+            }
+            MaterialKind::Principled {
+                base_color,
+                metallic,
+                roughness,
+                ior,
+                specular,
+                specular_color,
+            } => {
+                self.integers(&[5]);
+                self.vectors(&[*base_color, *specular_color]);
+                self.floats(&[*metallic, *roughness, *ior, *specular]);
+            }
+            MaterialKind::Mirror { reflectance } => {
+                self.integers(&[6]);
+                self.vectors(&[*reflectance]);
+            }
+            MaterialKind::Dielectric { ior, alpha, reflectance, transmittance } => {
+                self.integers(&[7]);
+                self.floats(&[*ior, *alpha]);
+                self.vectors(&[*reflectance, *transmittance]);
+            }
+            MaterialKind::ThinDielectric { ior, reflectance, transmittance } => {
+                self.integers(&[8]);
+                self.floats(&[*ior]);
+                self.vectors(&[*reflectance, *transmittance]);
+            }
+            MaterialKind::Measured { table, .. } => {
+                self.integers(&[4]);
+                self.integers(table.words());
+            }
+        }
+    }
+
+    fn surface(&mut self, surface: &Surface) {
+        let emission = surface.emission.as_ref();
+        let uses = [
+            &surface.color,
+            &surface.roughness,
+            &surface.metallic,
+            &surface.normal,
+            &surface.opacity.texture,
+            emission.map_or(&None, |emission| &emission.texture),
+        ];
+        for texture in uses {
+            self.texture(texture.as_ref());
+        }
+        let cutoff = surface.opacity.cutoff.unwrap_or(-1.0);
+        self.floats(&[surface.normal_scale, surface.opacity.factor, cutoff]);
+        self.integers(&[u32::from(surface.vertex_color), u32::from(surface.two_sided)]);
+        if let Some(emission) = emission {
+            self.vectors(&[emission.radiance]);
+            self.integers(&[u32::from(emission.two_sided)]);
+        }
+    }
+
+    fn texture(&mut self, texture: Option<&TextureUse>) {
+        let Some(used) = texture else {
+            self.length(0);
+            return;
+        };
+        let image = &used.texture;
+        self.integers(&[image.width, image.height, used.channels as u32, used.encoding as u32]);
+        self.integers(&[used.uv_set, used.wrap[0] as u32, used.wrap[1] as u32]);
+        self.integers(&[used.interpolation as u32]);
+        self.floats(used.image_from_uv.as_flattened());
+        self.floats(&[used.scale, used.bias].concat());
+        match &image.texels {
+            Texels::Bytes(texels) => self.array(texels.as_flattened()),
+            Texels::Shorts(texels) => {
+                self.integers(&[1]);
+                self.array(bytemuck::cast_slice(texels));
+            }
+            Texels::Halves(texels) => self.array(bytemuck::cast_slice(texels)),
+        }
+    }
+
+    fn lamp(&mut self, lamp: &LampKind) {
+        match *lamp {
+            LampKind::Point { position, intensity } => {
+                self.integers(&[0]);
+                self.vectors(&[position, intensity]);
+            }
+            LampKind::Spot {
+                position,
+                direction,
+                intensity,
+                inner_angle_rad,
+                outer_angle_rad,
+                falloff,
+            } => {
+                self.integers(&[1, falloff as u32]);
+                self.vectors(&[position, direction, intensity]);
+                self.floats(&[inner_angle_rad, outer_angle_rad]);
+            }
+            LampKind::Directional { direction, irradiance } => {
+                self.integers(&[2]);
+                self.vectors(&[direction, irradiance]);
+            }
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! Lights without a surface.
+
+use glam::Vec3;
+
+/// Light without a surface, which no ray can meet. Lamps with a surface are materials with an
+/// [`Emission`](crate::material::Emission).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lamp {
+    /// Name in the file; may be empty.
+    pub name: String,
+    /// Kind and its numbers.
+    pub kind: LampKind,
+}
+
+/// Kind of a [`Lamp`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LampKind {
+    /// Shines from a point into all directions.
+    Point {
+        /// Place, metres.
+        position: Vec3,
+        /// Radiant intensity per steradian, linear Rec.709.
+        intensity: Vec3,
+    },
+    /// Shines from a point into a cone.
+    Spot {
+        /// Place, metres.
+        position: Vec3,
+        /// Unit axis of the cone, away from the lamp.
+        direction: Vec3,
+        /// Radiant intensity along the axis, per steradian, linear Rec.709.
+        intensity: Vec3,
+        /// Angle to the axis where the light begins to fall off, radians.
+        inner_angle_rad: f32,
+        /// Angle to the axis from which there is no light, radians, above the inner one.
+        outer_angle_rad: f32,
+        /// Course of the light between these angles.
+        falloff: SpotFalloff,
+    },
+    /// Shines from infinitely far away along one direction.
+    Directional {
+        /// Unit direction in which the light travels.
+        direction: Vec3,
+        /// Irradiance on a surface that faces the light, linear Rec.709.
+        irradiance: Vec3,
+    },
+}
+
+/// Course of a spot's light between its two angles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SpotFalloff {
+    /// t², t linear in the cosine: `KHR_lights_punctual`.
+    SquaredCosine,
+    /// 3t² − 2t³, t linear in the cosine: pbrt-v4.
+    SmoothCosine,
+    /// t, linear in the angle: Mitsuba 3.
+    LinearAngle,
+}

@@ -1,0 +1,111 @@
+//! Scenes: a scene file and the files that it names → validated [`Scene`], and files of other renderers.
+
+mod blend;
+pub mod camera;
+pub mod coat;
+pub mod environment;
+pub mod error;
+pub mod export;
+pub mod features;
+pub mod file;
+pub mod files;
+pub mod geometry;
+mod hash;
+pub mod instance;
+pub mod instances;
+pub mod lamp;
+pub mod load;
+pub mod material;
+pub mod math;
+pub mod measured;
+pub mod memory;
+pub mod mesh;
+pub mod mitsuba;
+pub mod pbrt;
+pub mod picture;
+pub mod portal;
+pub mod quadrics;
+pub mod shapes;
+pub mod spectrum;
+pub mod stage;
+pub mod texture;
+pub mod transform;
+pub mod triangulate;
+
+use std::path::PathBuf;
+
+use serde::Deserialize;
+
+pub use camera::Camera;
+pub use environment::EnvironmentMap;
+pub use error::{Error, Result};
+pub use geometry::Geometry;
+pub use hash::{environment_hash, geometry_hash};
+pub use instance::Instance;
+pub use lamp::Lamp;
+pub use material::Material;
+pub use portal::Portal;
+
+/// Largest width and height of the film, pixels.
+pub const MAX_FILM_SIDE: u32 = 16_384;
+
+/// Smallest GGX width; single precision cannot sample the near-mirror highlight of a smaller one.
+pub const MIN_ALPHA: f32 = 1e-3;
+
+/// Reconstruction filter, importance-sampled so that every sample belongs to one pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Filter {
+    /// Box one pixel wide.
+    Box,
+    /// Gaussian with a standard deviation of ½ pixel, cut off at 1.5 pixels.
+    Gaussian,
+}
+
+/// Image plane: `[film]` of a scene file.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FilmSettings {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Reconstruction filter.
+    pub filter: Filter,
+}
+
+impl Default for FilmSettings {
+    fn default() -> Self {
+        Self { width: 640, height: 480, filter: Filter::Gaussian }
+    }
+}
+
+/// Validated scene in world space.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Stem of the file, or the name of its folder if the stem is `scene`.
+    pub name: String,
+    /// Path of the scene file.
+    pub path: PathBuf,
+    /// Viewer.
+    pub camera: Camera,
+    /// Image plane.
+    pub film: FilmSettings,
+    /// Light.
+    pub environment: EnvironmentMap,
+    /// Lights without a surface.
+    pub lamps: Vec<Lamp>,
+    /// Openings that the sampler `portal` knows.
+    pub portals: Vec<Portal>,
+    /// Materials; [`Geometry::materials`] indexes them. Never empty.
+    pub materials: Vec<Material>,
+    /// All triangles, in world space.
+    pub geometry: Geometry,
+    /// Files that the scene was read from; empty for a scene made in memory.
+    pub inputs: Vec<PathBuf>,
+    /// Warnings from loading, repairs among them, for the log.
+    pub warnings: Vec<String>,
+    /// SHA-256 of everything that changes the picture: camera, film, environment texels, materials
+    /// with their tables, geometry. Lower-case hexadecimal.
+    pub hash: String,
+}

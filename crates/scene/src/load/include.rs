@@ -1,0 +1,211 @@
+//! `[[include]]`: everything in a file of another format, placed in the scene.
+
+use std::path::{Path, PathBuf};
+
+use glam::Vec3;
+
+use super::{Loader, mitsuba, whole};
+use crate::{
+    Geometry, Lamp, Scene,
+    error::Result,
+    features,
+    file::{IncludeEntry, IncludeKeys},
+    instance::Instance,
+    lamp::LampKind,
+    material::Material,
+    mesh::Mesh,
+    pbrt,
+    transform::Transform,
+};
+
+impl Loader<'_> {
+    /// Appends the triangles of a file to the geometry, and its materials, apart from those that the
+    /// entry replaces; returns its lamps.
+    pub(super) fn include(
+        &self,
+        entry: &IncludeEntry,
+        materials: &mut Vec<Material>,
+        geometry: &mut Geometry,
+        inputs: &mut Vec<PathBuf>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<Lamp>> {
+        let IncludeKeys { file, scale, rotate_deg, translate, materials: replaced } = &entry.keys;
+        let label = format!("include {} (line {})", file.display(), entry.line);
+        self.check_transform(&label, scale.0, *rotate_deg, *translate)?;
+        let path = self.folder.join(file);
+        let Contents { materials: own_materials, geometry: placed, lamps } =
+            self.contents(&label, &path, inputs, warnings)?;
+        for name in replaced.keys() {
+            let is_there = own_materials.iter().any(|material| material.name == *name);
+            self.check(is_there, || {
+                let names: Vec<_> = own_materials.iter().map(|own| own.name.as_str()).collect();
+                format!(
+                    "{label}: materials: expected names of the file's materials, found `{name}`; \
+                     the file has {}",
+                    names.join(", ")
+                )
+            })?;
+        }
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let mut places = Vec::with_capacity(own_materials.len());
+        for own in own_materials {
+            places.push(match replaced.get(&own.name) {
+                Some(name) => self.material_index(&label, name, materials)?,
+                None => {
+                    let name = format!("{stem}/{}", own.name);
+                    materials.push(Material { name, ..own });
+                    materials.len() as u32 - 1
+                }
+            });
+        }
+        let vertices = geometry.positions.len() + placed.positions.len();
+        let triangles = geometry.triangles.len() + placed.triangles.len();
+        self.check_counts(vertices, triangles)?;
+        let transform = Transform::new(scale.0, *rotate_deg, *translate);
+        let first_vertex = geometry.positions.len();
+        let count = placed.triangle_count() as usize;
+        let Geometry {
+            positions,
+            normals,
+            uvs,
+            tangents,
+            colors,
+            triangles,
+            materials: of,
+            prototypes,
+            instances,
+        } = placed;
+        let emits: Vec<bool> =
+            materials.iter().map(|material| material.surface.emission.is_some()).collect();
+        let moved = Moved { transform: &transform, places: &places, emits: &emits };
+        self.include_instances(&label, geometry, prototypes, &instances, &moved)?;
+        let mesh = Mesh { positions, normals, uvs, tangents, colors, triangles, ..Mesh::default() };
+        let dropped = geometry.append(&mesh, &transform, |index| places[of[index] as usize]);
+        let positions = geometry.positions[first_vertex..].iter().copied().map(Vec3::from);
+        self.check_extent(&label, positions)?;
+        warnings.extend(dropped.warnings(&label, count));
+        if count == 0 && lamps.is_empty() {
+            warnings.push(format!("{label}: the file has no triangles and no lamps"));
+        }
+        Ok(lamps.into_iter().map(|lamp| place_lamp(lamp, &transform)).collect())
+    }
+}
+
+impl Loader<'_> {
+    /// Takes over the instances of an included file.
+    fn include_instances(
+        &self,
+        label: &str,
+        geometry: &mut Geometry,
+        prototypes: Vec<Geometry>,
+        instances: &[Instance],
+        moved: &Moved<'_>,
+    ) -> Result<()> {
+        let Moved { transform, places, emits } = *moved;
+        let first_prototype = geometry.prototypes.len() as u32;
+        geometry.prototypes.extend(prototypes);
+        let boxes = geometry.prototypes();
+        for instance in instances {
+            // In files of other formats an instance has one material.
+            let prototype = first_prototype + instance.prototype;
+            let first_material = places[instance.first_material as usize];
+            let placed = Instance { prototype, first_material, ..*instance };
+            let moved = placed.moved(transform).ok_or_else(|| {
+                self.error(format!("{label}: expected a placement of instances with an inverse"))
+            })?;
+            self.check_extent(label, boxes[prototype as usize].corners(&moved))?;
+            if emits[first_material as usize] {
+                // A material of the scene may emit in place of one of the file that does not.
+                let mesh = std::mem::take(&mut geometry.prototypes[prototype as usize]);
+                let vertices = geometry.positions.len() + mesh.positions.len();
+                let checked =
+                    self.check_counts(vertices, geometry.triangles.len() + mesh.triangles.len());
+                if checked.is_ok() {
+                    geometry.place_instance(&moved, &mesh);
+                }
+                geometry.prototypes[prototype as usize] = mesh;
+                checked?;
+            } else {
+                geometry.instances.push(moved);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// An included file in the scene.
+struct Moved<'a> {
+    transform: &'a Transform,
+    /// Its materials among those of the scene.
+    places: &'a [u32],
+    /// Materials of the scene that emit light.
+    emits: &'a [bool],
+}
+
+/// Materials, triangles and lamps of an included file.
+struct Contents {
+    materials: Vec<Material>,
+    geometry: Geometry,
+    lamps: Vec<Lamp>,
+}
+
+impl Loader<'_> {
+    /// Reads a file to be included: the same as of a whole scene.
+    fn contents(
+        &self,
+        label: &str,
+        path: &Path,
+        inputs: &mut Vec<PathBuf>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Contents> {
+        if mitsuba::is_mitsuba(path) || pbrt::is_pbrt(path) {
+            let scene = Scene::load(path)?;
+            inputs.extend(scene.inputs);
+            warnings.extend(scene.warnings);
+            if scene.environment.texels.iter().any(|texel| *texel != Vec3::ZERO) {
+                warnings.push(format!("{label}: ignored the environment of the file"));
+            }
+            let Scene { materials, geometry, lamps, .. } = scene;
+            return Ok(Contents { materials, geometry, lamps });
+        }
+        self.check(whole::is_whole(path), || {
+            format!(
+                "{label}: expected a file in .gltf, .glb, .obj, .pbrt or .xml; other meshes are \
+                 objects"
+            )
+        })?;
+        let mut mesh = Mesh::read_whole(path, warnings)?;
+        inputs.push(path.to_path_buf());
+        inputs.extend_from_slice(&mesh.side_files);
+        let mut ignored = mesh.ignored_in_materials();
+        for (index, camera) in mesh.cameras.iter().enumerate() {
+            ignored.add(features::GLTF_CAMERAS, || camera.label(index));
+        }
+        let lamps = std::mem::take(&mut mesh.lamps);
+        let (materials, geometry) = Loader::new(path).place_whole(&mesh, &mut ignored, warnings)?;
+        warnings.extend(ignored.warnings(path));
+        Ok(Contents { materials, geometry, lamps })
+    }
+}
+
+/// Places a lamp of a file. Intensities grow with the square of the scale, so that the lamp lights its
+/// file as before, and as surfaces that emit do.
+fn place_lamp(mut lamp: Lamp, transform: &Transform) -> Lamp {
+    let area = transform.linear.determinant().abs().powf(2.0 / 3.0);
+    let turn = |direction: &mut Vec3| {
+        *direction = (transform.linear * *direction).normalize_or(*direction);
+    };
+    match &mut lamp.kind {
+        LampKind::Point { position, intensity } => {
+            *position = transform.position(position.to_array()).into();
+            *intensity *= area;
+        }
+        LampKind::Spot { position, direction, intensity, .. } => {
+            *position = transform.position(position.to_array()).into();
+            *intensity *= area;
+            turn(direction);
+        }
+        LampKind::Directional { direction, .. } => turn(direction),
+    }
+    lamp
+}

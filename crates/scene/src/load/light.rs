@@ -1,0 +1,167 @@
+//! `[environment]`, `[[lamp]]` and `[[portal]]` → the light of a scene.
+
+use std::path::PathBuf;
+
+use glam::Vec3;
+
+use super::{LoadOptions, Loader};
+use crate::{
+    EnvironmentMap, Lamp, Portal,
+    error::Result,
+    file::{EnvironmentEntry, LampEntry, LampKindEntry, SceneFile, SpotFalloffEntry},
+    lamp::{LampKind, SpotFalloff},
+    material::Material,
+};
+
+/// Light of a scene apart from emitting surfaces.
+pub(super) struct Light {
+    pub(super) environment: EnvironmentMap,
+    pub(super) lamps: Vec<Lamp>,
+    /// Where it comes in.
+    pub(super) portals: Vec<Portal>,
+}
+
+impl Loader<'_> {
+    /// Makes environment, lamps and portals of a scene file, with the options of the command line.
+    pub(super) fn light(
+        &self,
+        file: &SceneFile,
+        options: &LoadOptions,
+        inputs: &mut Vec<PathBuf>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Light> {
+        let lamps = file.lamps.iter().enumerate().map(|(index, entry)| self.lamp(index, entry));
+        let lamps = lamps.collect::<Result<_>>()?;
+        let environment = if let Some(map) = &options.environment {
+            inputs.push(map.clone());
+            EnvironmentMap::load(map, 1.0, options.rotation_deg.unwrap_or(0.0), warnings)?
+        } else if let Some(entry) = &file.environment {
+            let mut entry = entry.clone();
+            inputs.extend(entry.map.iter().map(|map| self.folder.join(map)));
+            entry.rotation_deg = options.rotation_deg.unwrap_or(entry.rotation_deg);
+            self.environment(&entry, warnings)?
+        } else {
+            EnvironmentMap::constant(Vec3::ZERO, 1.0).map_err(|message| self.error(message))?
+        };
+        Ok(Light { environment, lamps, portals: self.portals(&file.portals)? })
+    }
+
+    /// Warns of a scene without any light.
+    pub(super) fn warn_of_darkness(
+        &self,
+        file: &SceneFile,
+        options: &LoadOptions,
+        light: &Light,
+        materials: &[Material],
+        warnings: &mut Vec<String>,
+    ) {
+        let is_lit = file.environment.is_some()
+            || options.environment.is_some()
+            || !light.lamps.is_empty()
+            || materials.iter().any(|material| material.surface.emission.is_some());
+        if !is_lit {
+            warnings.push(format!(
+                "{}: the scene has no [environment], no [[lamp]] and no material with `emission`: \
+                 nothing is lit",
+                self.path.display()
+            ));
+        }
+    }
+
+    fn environment(
+        &self,
+        entry: &EnvironmentEntry,
+        warnings: &mut Vec<String>,
+    ) -> Result<EnvironmentMap> {
+        let (scale, rotation_deg) = (entry.scale, entry.rotation_deg);
+        self.check_range("environment.scale", &[scale], (0.0, f32::MAX))?;
+        self.check_range("environment.rotation_deg", &[rotation_deg], (f32::MIN, f32::MAX))?;
+        match (&entry.map, &entry.constant, &entry.court, &entry.sky) {
+            (Some(map), None, None, None) => {
+                EnvironmentMap::load(&self.folder.join(map), scale, rotation_deg, warnings)
+            }
+            (None, Some(constant), None, None) => {
+                self.check_range("environment.constant", constant, (0.0, f32::MAX))?;
+                EnvironmentMap::constant(Vec3::from_array(*constant), scale)
+                    .map_err(|message| self.error(format!("environment.constant: {message}")))
+            }
+            (None, None, Some(court), None) => EnvironmentMap::court(court, scale, rotation_deg)
+                .map_err(|message| self.error(format!("environment.court: {message}"))),
+            (None, None, None, Some(sky)) => EnvironmentMap::sky(sky, scale, rotation_deg)
+                .map_err(|message| self.error(format!("environment.sky: {message}"))),
+            (map, constant, court, sky) => {
+                let found: Vec<_> = [
+                    ("map", map.is_some()),
+                    ("constant", constant.is_some()),
+                    ("court", court.is_some()),
+                    ("sky", sky.is_some()),
+                ]
+                .into_iter()
+                .filter_map(|(name, is_there)| is_there.then_some(name))
+                .collect();
+                let found = if found.is_empty() { "none".to_owned() } else { found.join(" and ") };
+                Err(self.error(format!(
+                    "environment: expected exactly one of map, constant, court, sky, found {found}"
+                )))
+            }
+        }
+    }
+
+    fn lamp(&self, index: usize, entry: &LampEntry) -> Result<Lamp> {
+        let label = match &entry.name {
+            Some(name) => format!("lamp `{name}` (line {})", entry.line),
+            None => format!("lamp {index} (line {})", entry.line),
+        };
+        let place = |position: [f32; 3]| {
+            self.check_range(&format!("{label}: position"), &position, (f32::MIN, f32::MAX))?;
+            Ok(Vec3::from_array(position))
+        };
+        let power = |key: &str, power: [f32; 3]| {
+            self.check_range(&format!("{label}: {key}"), &power, (0.0, f32::MAX))?;
+            Ok(Vec3::from_array(power))
+        };
+        let direction = |direction: [f32; 3]| {
+            let unit = Vec3::from_array(direction).try_normalize();
+            unit.ok_or_else(|| {
+                self.error(format!(
+                    "{label}: direction: expected a vector other than 0, found {direction:?}"
+                ))
+            })
+        };
+        let kind = match &entry.kind {
+            LampKindEntry::Point(entry) => LampKind::Point {
+                position: place(entry.position)?,
+                intensity: power("intensity", entry.intensity)?,
+            },
+            LampKindEntry::Spot(entry) => {
+                let (inner, outer) = (entry.inner_angle_deg, entry.outer_angle_deg);
+                let range = (0.0, 180.0);
+                self.check_range(&format!("{label}: inner_angle_deg"), &[inner], range)?;
+                self.check_range(&format!("{label}: outer_angle_deg"), &[outer], range)?;
+                self.check(inner < outer, || {
+                    format!(
+                        "{label}: expected inner_angle_deg below outer_angle_deg, found {inner} and \
+                         {outer}"
+                    )
+                })?;
+                LampKind::Spot {
+                    position: place(entry.position)?,
+                    direction: direction(entry.direction)?,
+                    intensity: power("intensity", entry.intensity)?,
+                    inner_angle_rad: inner.to_radians(),
+                    outer_angle_rad: outer.to_radians(),
+                    falloff: match entry.falloff {
+                        SpotFalloffEntry::SquaredCosine => SpotFalloff::SquaredCosine,
+                        SpotFalloffEntry::SmoothCosine => SpotFalloff::SmoothCosine,
+                        SpotFalloffEntry::LinearAngle => SpotFalloff::LinearAngle,
+                    },
+                }
+            }
+            LampKindEntry::Directional(entry) => LampKind::Directional {
+                direction: direction(entry.direction)?,
+                irradiance: power("irradiance", entry.irradiance)?,
+            },
+        };
+        Ok(Lamp { name: entry.name.clone().unwrap_or_default(), kind })
+    }
+}

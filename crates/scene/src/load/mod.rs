@@ -1,0 +1,231 @@
+//! Scene file or mesh file → validated [`Scene`]: checks everything the numbers of the file must satisfy.
+//!
+//! Messages name the object or material and the line of its entry.
+
+mod include;
+mod light;
+mod materials;
+mod mitsuba;
+mod objects;
+mod pbrt;
+mod portals;
+mod whole;
+
+use std::path::{Path, PathBuf};
+
+use glam::Vec3;
+
+use super::{
+    Camera, FilmSettings, Geometry, Scene,
+    file::{CameraEntry, SceneFile},
+};
+use crate::{
+    error::{Error, Result},
+    files,
+    material::{Material, MaterialKind},
+};
+use light::Light;
+
+pub use super::{MAX_FILM_SIDE, MIN_ALPHA};
+
+/// Options of the command line that add to a scene file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LoadOptions {
+    /// Environment map, instead of the scene's.
+    pub environment: Option<PathBuf>,
+    /// Rotation of the map about +Y, degrees, counter-clockwise seen from above, instead of the
+    /// scene's.
+    pub rotation_deg: Option<f32>,
+    /// Name of the camera in a glTF file, or its number from 0.
+    pub camera: Option<String>,
+}
+
+impl Scene {
+    /// Reads a scene file and everything it refers to by paths relative to it. The file is a scene
+    /// in TOML, a glTF or OBJ file as a whole scene, or a Mitsuba file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] for a file that cannot be read, [`Error::Parse`] with line and column for text
+    /// that is not a scene, [`Error::Scene`] with the name of the object or material for numbers
+    /// that cannot be rendered, and the errors of the mesh, map and BRDF readers.
+    pub fn load(path: &Path) -> Result<Self> {
+        Self::load_with(path, &LoadOptions::default())
+    }
+
+    /// As [`Scene::load`], with options of the command line.
+    ///
+    /// # Errors
+    /// As [`Scene::load`], and for a camera that the file does not have.
+    pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self> {
+        if mitsuba::is_mitsuba(path) {
+            return Loader::new(path).mitsuba(options);
+        }
+        if super::pbrt::is_pbrt(path) {
+            return Loader::new(path).pbrt(options);
+        }
+        if whole::is_whole(path) {
+            return Loader::new(path).whole(options);
+        }
+        Self::parse_with(path, &files::read_text(path)?, options)
+    }
+
+    /// Builds a scene from its text; `path` serves messages, its folder is that of relative paths.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self> {
+        Self::parse_with(path, text, &LoadOptions::default())
+    }
+
+    fn parse_with(path: &Path, text: &str, options: &LoadOptions) -> Result<Self> {
+        let file = SceneFile::parse(path, text)?;
+        let loader = Loader::new(path);
+        if let Some(name) = &options.camera {
+            let message = "a scene in .toml has one camera; the option is for glTF files";
+            return Err(loader.error(format!("--camera {name}: {message}")));
+        }
+        let mut warnings = Vec::new();
+        let camera = loader.camera(&file.camera)?;
+        loader.check_film(&file.film)?;
+        let mut inputs = Vec::new();
+        let mut materials = loader.materials(&file.materials, &mut inputs, &mut warnings)?;
+        let mut geometry =
+            loader.geometry(&file.objects, &mut materials, &mut inputs, &mut warnings)?;
+        let mut lamps = Vec::new();
+        for entry in &file.includes {
+            let inputs = &mut inputs;
+            let warnings = &mut warnings;
+            lamps.extend(loader.include(entry, &mut materials, &mut geometry, inputs, warnings)?);
+        }
+        if materials.is_empty() {
+            materials.push(default_material());
+        }
+        let mut light = loader.light(&file, options, &mut inputs, &mut warnings)?;
+        light.lamps.extend(lamps);
+        loader.warn_of_darkness(&file, options, &light, &materials, &mut warnings);
+        let mut scene = loader.scene(camera, file.film, light, materials, geometry, warnings);
+        scene.inputs.extend(inputs);
+        Ok(scene)
+    }
+}
+
+/// Stem of the file, or the name of its folder if the stem is `scene`.
+fn scene_name(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default();
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let folder = absolute.parent().and_then(Path::file_name);
+    let name = if stem == "scene" { folder.unwrap_or(stem) } else { stem };
+    name.to_string_lossy().into_owned()
+}
+
+/// Material of a scene that has nothing but an environment.
+fn default_material() -> Material {
+    Material::new("default", MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) })
+}
+
+struct Loader<'a> {
+    path: &'a Path,
+    folder: &'a Path,
+}
+
+impl<'a> Loader<'a> {
+    fn new(path: &'a Path) -> Self {
+        Self { path, folder: path.parent().unwrap_or(Path::new("")) }
+    }
+
+    /// Puts the parts together.
+    fn scene(
+        &self,
+        camera: Camera,
+        film: FilmSettings,
+        light: Light,
+        materials: Vec<Material>,
+        geometry: Geometry,
+        warnings: Vec<String>,
+    ) -> Scene {
+        let mut scene = Scene {
+            name: scene_name(self.path),
+            path: self.path.to_path_buf(),
+            camera,
+            film,
+            environment: light.environment,
+            lamps: light.lamps,
+            portals: light.portals,
+            materials,
+            geometry,
+            inputs: vec![self.path.to_path_buf()],
+            warnings,
+            hash: String::new(),
+        };
+        scene.hash = super::hash::hash(&scene);
+        scene
+    }
+
+    fn error(&self, message: impl Into<String>) -> Error {
+        Error::scene(self.path, message)
+    }
+
+    fn check(&self, holds: bool, message: impl FnOnce() -> String) -> Result<()> {
+        if holds { Ok(()) } else { Err(self.error(message())) }
+    }
+
+    /// Checks that all of `values` lie from `low` to `high`, both included; NaN does not.
+    fn check_range(&self, what: &str, values: &[f32], (low, high): (f32, f32)) -> Result<()> {
+        match values.iter().find(|value| !(low..=high).contains(*value)) {
+            None => Ok(()),
+            Some(found) => {
+                let expected = match (low, high) {
+                    (f32::MIN, f32::MAX) => "a finite number".to_owned(),
+                    (low, f32::MAX) => format!("a finite number of at least {low}"),
+                    (low, high) => format!("a number from {low} to {high}"),
+                };
+                Err(self.error(format!("{what}: expected {expected}, found {found}")))
+            }
+        }
+    }
+
+    fn camera(&self, entry: &CameraEntry) -> Result<Camera> {
+        let finite = (f32::MIN, f32::MAX);
+        self.check_range("camera.position", &entry.position, finite)?;
+        self.check_range("camera.look_at", &entry.look_at, finite)?;
+        self.check_range("camera.up", &entry.up, finite)?;
+        self.check_range("camera.vertical_fov_deg", &[entry.vertical_fov_deg], (0.01, 179.0))?;
+        self.check_range("camera.aperture_radius", &[entry.aperture_radius], (0.0, f32::MAX))?;
+        let position = Vec3::from_array(entry.position);
+        let look_at = Vec3::from_array(entry.look_at);
+        let up = Vec3::from_array(entry.up);
+        let view = look_at - position;
+        let Some(view_direction) = view.try_normalize() else {
+            return Err(self.error(format!(
+                "camera.position and camera.look_at must differ, found {position} and {look_at}"
+            )));
+        };
+        let across = up.try_normalize().map_or(0.0, |up| up.cross(view_direction).length());
+        self.check(across > 1e-4, || {
+            format!("camera.up must not be zero or along the view {view_direction}, found {up}")
+        })?;
+        if entry.aperture_radius > 0.0 && entry.focus_distance.is_none() {
+            return Err(self.error("camera.aperture_radius needs camera.focus_distance"));
+        }
+        let focus_distance = entry.focus_distance.unwrap_or(view.length());
+        let positive = (f32::MIN_POSITIVE, f32::MAX);
+        self.check_range("camera.focus_distance", &[focus_distance], positive)?;
+        Ok(Camera {
+            position,
+            look_at,
+            up,
+            vertical_fov_deg: entry.vertical_fov_deg,
+            aperture_radius: entry.aperture_radius,
+            focus_distance,
+        })
+    }
+
+    fn check_film(&self, film: &FilmSettings) -> Result<()> {
+        for (name, side) in [("width", film.width), ("height", film.height)] {
+            self.check((1..=MAX_FILM_SIDE).contains(&side), || {
+                format!("film.{name}: expected 1 to {MAX_FILM_SIDE} pixels, found {side}")
+            })?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,389 @@
+//! Objects of the scene file → triangles in world space.
+
+use std::{
+    collections::{HashMap, HashSet},
+    path::PathBuf,
+};
+
+use glam::Vec3;
+
+use super::Loader;
+use crate::{
+    Geometry,
+    error::{Error, Result},
+    features::{self, Ignored},
+    file::{ObjectEntry, ObjectSource},
+    geometry::MAX_COORDINATE,
+    instance::{Budget, Instance},
+    instances::Prototype,
+    material::Material,
+    memory,
+    mesh::{Mesh, MeshMaterial},
+    shapes::check_triangles,
+    stage,
+    transform::Transform,
+};
+
+/// Bytes of a placed vertex: position, normal, coordinates, tangent.
+const VERTEX_BYTES: u64 = 48;
+/// Bytes of a placed triangle: corners and material.
+const TRIANGLE_BYTES: u64 = 16;
+
+impl Loader<'_> {
+    pub(super) fn geometry(
+        &self,
+        objects: &[ObjectEntry],
+        materials: &mut Vec<Material>,
+        inputs: &mut Vec<PathBuf>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Geometry> {
+        let mut named = HashMap::new();
+        let mut uses: HashMap<PathBuf, usize> = HashMap::new();
+        for (index, object) in objects.iter().enumerate() {
+            let label = object_label(index, object);
+            if let Some(name) = &object.name
+                && let Some(first) = named.insert(name, object.line)
+            {
+                return Err(
+                    self.error(format!("{label}: the name is taken by the object of line {first}"))
+                );
+            }
+            self.check_placement(&label, object)?;
+            self.check_material(&label, object, materials)?;
+            *uses.entry(self.mesh_key(object)).or_default() += 1;
+        }
+        let lacks_material = |object: &&ObjectEntry| object.material.is_none();
+        let own_materials: HashSet<PathBuf> =
+            objects.iter().filter(lacks_material).map(|object| self.mesh_key(object)).collect();
+        // Shapes without textures need no texture coordinates, and their scenes keep their hashes.
+        let textured: HashSet<PathBuf> = objects
+            .iter()
+            .filter(|object| is_textured(object, materials))
+            .map(|object| self.mesh_key(object))
+            .collect();
+        let colored: HashSet<PathBuf> = objects
+            .iter()
+            .filter(|object| {
+                named_material(object, materials).is_some_and(|own| own.surface.vertex_color)
+            })
+            .map(|object| self.mesh_key(object))
+            .collect();
+        // Read all meshes before placing any, so that the arrays are allocated once.
+        let mut meshes = HashMap::new();
+        let mut shape_triangles = 0;
+        for (index, object) in objects.iter().enumerate() {
+            let key = self.mesh_key(object);
+            if !meshes.contains_key(&key) {
+                let mesh = match &object.source {
+                    ObjectSource::Mesh(_) => {
+                        let mut mesh = Mesh::read(&key, warnings)?;
+                        inputs.push(key.clone());
+                        inputs.extend_from_slice(&mesh.side_files);
+                        let mut ignored = ignored_in_object(&mesh, own_materials.contains(&key));
+                        let is_ply = crate::files::extension(&key) == "ply";
+                        if is_ply && !mesh.colors.is_empty() && !colored.contains(&key) {
+                            ignored.add(features::PLY_COLOR, || "element `vertex`".to_owned());
+                            mesh.colors.clear();
+                        }
+                        warnings.extend(ignored.warnings(&key));
+                        mesh
+                    }
+                    ObjectSource::Shape { shape, .. } => {
+                        stage::enter(format_args!("making {}", object_label(index, object)));
+                        let mut mesh = shape.mesh().map_err(|message| {
+                            self.error(format!("{}: {message}", object_label(index, object)))
+                        })?;
+                        if !textured.contains(&key) {
+                            mesh.uvs = Default::default();
+                        }
+                        shape_triangles += mesh.triangles.len();
+                        self.check_shapes(index, object, shape_triangles)?;
+                        mesh
+                    }
+                };
+                meshes.insert(key.clone(), mesh);
+            }
+        }
+        let mut budget = Budget::default();
+        let mut repeated = HashSet::new();
+        let mut seen = HashSet::new();
+        for object in objects {
+            let key = self.mesh_key(object);
+            let copies = uses.get(&key).copied().unwrap_or(0);
+            if copies > 1
+                && seen.insert(key.clone())
+                && budget.takes_instances(copies, meshes[&key].triangles.len())
+            {
+                repeated.insert(key);
+            }
+        }
+        let (mut vertices, mut triangles, mut shape_triangles) = (0_usize, 0_usize, 0);
+        for (index, object) in objects.iter().enumerate() {
+            let key = self.mesh_key(object);
+            if repeated.contains(&key) && !emits(object, &meshes[&key], materials) {
+                continue;
+            }
+            let count = meshes[&key].triangles.len();
+            vertices += meshes[&key].positions.len();
+            triangles += count;
+            if let ObjectSource::Shape { .. } = object.source {
+                shape_triangles += count;
+                self.check_shapes(index, object, shape_triangles)?;
+            }
+        }
+        self.check_counts(vertices, triangles)?;
+        let mut prototypes: HashMap<PathBuf, Prototype> = HashMap::new();
+        let mut geometry = Geometry::default();
+        geometry.positions.reserve_exact(vertices);
+        geometry.normals.reserve_exact(vertices);
+        geometry.triangles.reserve_exact(triangles);
+        geometry.materials.reserve_exact(triangles);
+        for (index, object) in objects.iter().enumerate() {
+            let key = self.mesh_key(object);
+            let mesh = &meshes[&key];
+            let label = object_label(index, object);
+            let is_instance = repeated.contains(&key) && !emits(object, mesh, materials);
+            if is_instance && !prototypes.contains_key(&key) {
+                let own = |triangle| run_material(mesh, triangle) as u32;
+                let (prototype, dropped) = geometry.add_prototype(mesh, own);
+                warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
+                prototypes.insert(key.clone(), prototype);
+            }
+            let prototype = prototypes.get(&key).copied().filter(|_| is_instance);
+            self.place(&label, object, mesh, prototype, &mut geometry, materials, warnings)?;
+            // Drop a mesh after its last use, so that a large one is not held twice for long.
+            let left = uses.get_mut(&key).map_or(0, |left| {
+                *left -= 1;
+                *left
+            });
+            if left == 0 {
+                meshes.remove(&key);
+            }
+        }
+        Ok(geometry)
+    }
+
+    /// Key that tells meshes apart: the path of a mesh file or the parameters of a shape.
+    fn mesh_key(&self, object: &ObjectEntry) -> PathBuf {
+        match &object.source {
+            ObjectSource::Mesh(mesh) => self.folder.join(mesh),
+            ObjectSource::Shape { shape, .. } => PathBuf::from(format!("{shape:?}")),
+        }
+    }
+
+    fn check_shapes(&self, index: usize, object: &ObjectEntry, triangles: usize) -> Result<()> {
+        let label = || object_label(index, object);
+        check_triangles(triangles).map_err(|message| self.error(format!("{}: {message}", label())))
+    }
+
+    fn check_placement(&self, label: &str, object: &ObjectEntry) -> Result<()> {
+        self.check_transform(label, object.scale, object.rotate_deg, object.translate)
+    }
+
+    pub(super) fn check_transform(
+        &self,
+        label: &str,
+        scale: [f32; 3],
+        rotate_deg: [f32; 3],
+        translate: [f32; 3],
+    ) -> Result<()> {
+        let finite = (f32::MIN, f32::MAX);
+        self.check_range(&format!("{label}: translate"), &translate, finite)?;
+        self.check_range(&format!("{label}: rotate_deg"), &rotate_deg, finite)?;
+        self.check_range(&format!("{label}: scale"), &scale, finite)?;
+        self.check(!scale.contains(&0.0), || {
+            format!("{label}: scale must not be 0, found {scale:?}")
+        })
+    }
+
+    /// Checks that 32-bit indices address everything, and that there is memory for it.
+    pub(super) fn check_counts(&self, vertices: usize, triangles: usize) -> Result<()> {
+        self.check(u32::try_from(vertices).is_ok() && u32::try_from(triangles).is_ok(), || {
+            format!(
+                "{vertices} vertices and {triangles} triangles, at most {} can be used",
+                u32::MAX
+            )
+        })?;
+        let vertex_bytes = (vertices as u64).saturating_mul(VERTEX_BYTES);
+        let triangle_bytes = (triangles as u64).saturating_mul(TRIANGLE_BYTES);
+        let asker = format_args!("{}: {triangles} triangles", self.path.display());
+        memory::check(asker, vertex_bytes.saturating_add(triangle_bytes)).map_err(Error::memory)
+    }
+
+    fn check_material(
+        &self,
+        label: &str,
+        object: &ObjectEntry,
+        materials: &[Material],
+    ) -> Result<()> {
+        match &object.material {
+            Some(name) => self.material_index(label, name, materials).map(drop),
+            None => self.check(matches!(object.source, ObjectSource::Mesh(_)), || {
+                format!("{label}: expected a material, found none")
+            }),
+        }
+    }
+
+    /// Finds a material of the scene by its name.
+    pub(super) fn material_index(
+        &self,
+        label: &str,
+        name: &str,
+        materials: &[Material],
+    ) -> Result<u32> {
+        let index = materials.iter().position(|material| material.name == name);
+        index.map(|index| index as u32).ok_or_else(|| {
+            let known: Vec<_> = materials.iter().map(|known| known.name.as_str()).collect();
+            let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+            self.error(format!("{label}: unknown material `{name}`, the scene has {known}"))
+        })
+    }
+
+    /// Rejects an object that lies too far out for traversal.
+    pub(super) fn check_extent(
+        &self,
+        label: &str,
+        positions: impl IntoIterator<Item = Vec3>,
+    ) -> Result<()> {
+        let distances = positions.into_iter().map(|position| position.abs().max_element());
+        let farthest = distances.fold(0.0, f32::max);
+        self.check(farthest <= MAX_COORDINATE, || {
+            format!(
+                "{label}: a vertex has the coordinate {farthest:e}; expected at most \
+                 {MAX_COORDINATE:e} m: scale or move the object"
+            )
+        })
+    }
+
+    /// Appends an object to the geometry, as an instance of `prototype` or placed, with the materials
+    /// of its mesh file if it names none.
+    #[expect(clippy::too_many_arguments, reason = "an object and all that it adds to")]
+    fn place(
+        &self,
+        label: &str,
+        object: &ObjectEntry,
+        mesh: &Mesh,
+        prototype: Option<Prototype>,
+        geometry: &mut Geometry,
+        materials: &mut Vec<Material>,
+        warnings: &mut Vec<String>,
+    ) -> Result<()> {
+        let transform = Transform::new(object.scale, object.rotate_deg, object.translate);
+        let first_vertex = geometry.positions.len();
+        let named = object
+            .material
+            .as_ref()
+            .and_then(|name| materials.iter().position(|material| material.name == *name));
+        let first_own = materials.len();
+        if named.is_none() {
+            let colored =
+                !mesh.runs.is_empty() && mesh.runs.iter().all(|run| run.material.is_some());
+            self.check(colored, || {
+                format!(
+                    "{label}: expected a material, found none, and the mesh file does not give one \
+                     to every triangle"
+                )
+            })?;
+            let object = object.name.as_deref().unwrap_or("mesh");
+            materials.extend(mesh.materials.iter().map(|MeshMaterial { material, .. }| {
+                let name = format!("{object}/{}", material.name);
+                Material { name, ..material.clone() }
+            }));
+        }
+        let own = named.map_or(&materials[first_own..], |index| &materials[index..=index]);
+        warnings.extend(own.iter().filter_map(|material| lacking_uvs(label, material, mesh)));
+        let of = mesh.triangles.len();
+        let first_material = named.unwrap_or(first_own) as u32;
+        let instance = prototype.and_then(|prototype| {
+            let replaces = named.is_some();
+            Some((prototype, Instance::new(prototype.index, &transform, first_material, replaces)?))
+        });
+        if let Some((prototype, instance)) = instance {
+            self.check_extent(label, prototype.corners(&instance))?;
+            geometry.instances.push(instance);
+        } else {
+            let vertices = first_vertex + mesh.positions.len();
+            self.check_counts(vertices, geometry.triangles.len() + of)?;
+            let dropped = match named {
+                Some(material) => geometry.append(mesh, &transform, |_| material as u32),
+                None => geometry.append(mesh, &transform, |triangle| {
+                    (first_own + run_material(mesh, triangle)) as u32
+                }),
+            };
+            let placed = geometry.positions[first_vertex..].iter().copied().map(Vec3::from);
+            self.check_extent(label, placed)?;
+            warnings.extend(dropped.warnings(label, of));
+        }
+        if of == 0 {
+            warnings.push(format!("{label}: the mesh has no triangles"));
+        }
+        Ok(())
+    }
+}
+
+/// Material of a triangle among those of its mesh file.
+fn run_material(mesh: &Mesh, triangle: usize) -> usize {
+    let run = mesh.runs.partition_point(|run| run.first_triangle <= triangle);
+    run.checked_sub(1).and_then(|run| mesh.runs[run].material).unwrap_or(0)
+}
+
+/// Tests whether an object emits light: then it is placed, since lamps are triangles in the world.
+fn emits(object: &ObjectEntry, mesh: &Mesh, materials: &[Material]) -> bool {
+    match &object.material {
+        Some(name) => materials
+            .iter()
+            .find(|material| material.name == *name)
+            .is_some_and(|material| material.surface.emission.is_some()),
+        None => mesh.materials.iter().any(|own| own.material.surface.emission.is_some()),
+    }
+}
+
+/// Warning of a material with textures on a mesh without texture coordinates.
+pub(super) fn lacking_uvs(label: &str, material: &Material, mesh: &Mesh) -> Option<String> {
+    let lacks = |set: u32| mesh.uvs[set.min(1) as usize].is_empty();
+    let texture = material.surface.textures().find(|used| lacks(used.uv_set))?;
+    Some(format!(
+        "{label}: the material `{}` has textures, but the mesh has no texture coordinates for {}: the \
+         object has the colour of one texel",
+        material.name, texture.texture.name
+    ))
+}
+
+/// Parts of a mesh file that an object of a scene file leaves out: cameras, lamps and, if its own
+/// materials are used, parts of these.
+fn ignored_in_object(mesh: &Mesh, own_materials: bool) -> Ignored {
+    let mut ignored = Ignored::default();
+    for (index, camera) in mesh.cameras.iter().enumerate() {
+        ignored.add(features::GLTF_CAMERAS, || camera.label(index));
+    }
+    for lamp in &mesh.lamps {
+        ignored.add(features::GLTF_OBJECT_LIGHTS, || format!("light `{}`", lamp.name));
+    }
+    if own_materials {
+        ignored.merge(&mesh.ignored_in_materials());
+    }
+    ignored
+}
+
+/// Tests whether an object names a material with textures.
+fn is_textured(object: &ObjectEntry, materials: &[Material]) -> bool {
+    named_material(object, materials)
+        .is_some_and(|material| material.surface.textures().next().is_some())
+}
+
+/// Material that an object names.
+fn named_material<'a>(object: &ObjectEntry, materials: &'a [Material]) -> Option<&'a Material> {
+    materials.iter().find(|material| Some(&material.name) == object.material.as_ref())
+}
+
+/// Label of an object in messages: name or number, source and line.
+fn object_label(index: usize, object: &ObjectEntry) -> String {
+    let source = match &object.source {
+        ObjectSource::Mesh(mesh) => mesh.display().to_string(),
+        ObjectSource::Shape { name, .. } => name.clone(),
+    };
+    match &object.name {
+        Some(name) => format!("object `{name}` ({source}, line {})", object.line),
+        None => format!("object {index} ({source}, line {})", object.line),
+    }
+}

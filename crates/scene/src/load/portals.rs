@@ -1,0 +1,67 @@
+//! `[[portal]]` → portals.
+
+use glam::Vec3;
+
+use super::Loader;
+use crate::{
+    error::Result,
+    file::PortalEntry,
+    portal::{MAX_PORTALS, Portal},
+};
+
+/// Lengths of edges, metres: products of three of them stay far inside single precision.
+const EDGES: (f32, f32) = (1e-6, 1e6);
+
+/// Largest cosine between edges that counts as a right angle: a twentieth of a degree.
+const RIGHT_ANGLE: f32 = 1e-3;
+
+impl Loader<'_> {
+    /// Checks the portals of a scene file.
+    pub(super) fn portals(&self, entries: &[PortalEntry]) -> Result<Vec<Portal>> {
+        self.check(entries.len() <= MAX_PORTALS, || {
+            format!(
+                "expected at most {MAX_PORTALS} `[[portal]]`, found {}: join those of one wall",
+                entries.len()
+            )
+        })?;
+        entries.iter().enumerate().map(|(index, entry)| self.portal(index, entry)).collect()
+    }
+
+    fn portal(&self, index: usize, entry: &PortalEntry) -> Result<Portal> {
+        let keys = &entry.keys;
+        let label = match &keys.name {
+            Some(name) => format!("portal `{name}` (line {})", entry.line),
+            None => format!("portal {index} (line {})", entry.line),
+        };
+        self.check_range(&format!("{label}: corner"), &keys.corner, (-1e6, 1e6))?;
+        let edge = |key: &str, edge: [f32; 3]| {
+            self.check_range(&format!("{label}: {key}"), &edge, (f32::MIN, f32::MAX))?;
+            let edge = Vec3::from_array(edge);
+            let (low, high) = EDGES;
+            self.check((low..=high).contains(&edge.length()), || {
+                format!(
+                    "{label}: {key}: expected an edge of {low} to {high} m, found {edge}, {} m long",
+                    edge.length()
+                )
+            })?;
+            Ok((edge.normalize(), edge.length()))
+        };
+        let (first, width) = edge("first_edge", keys.first_edge)?;
+        let (second, height) = edge("second_edge", keys.second_edge)?;
+        let cosine = first.dot(second);
+        self.check(cosine.abs() <= RIGHT_ANGLE, || {
+            format!(
+                "{label}: expected first_edge and second_edge at right angles, found {:.2} degrees: a \
+                 portal is a rectangle",
+                cosine.acos().to_degrees()
+            )
+        })?;
+        let second = (second - cosine * first).normalize();
+        Ok(Portal {
+            name: keys.name.clone().unwrap_or_default(),
+            corner: Vec3::from_array(keys.corner),
+            axes: [first, second],
+            size: [width, height],
+        })
+    }
+}

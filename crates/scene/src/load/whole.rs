@@ -1,0 +1,254 @@
+//! A glTF or OBJ file as a whole scene: its meshes, materials, lamps and camera in a given environment.
+
+use std::path::Path;
+
+use glam::Vec3;
+
+use super::{
+    LoadOptions, Loader, MAX_FILM_SIDE, default_material, light::Light, objects::lacking_uvs,
+};
+use crate::{
+    Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Scene,
+    error::Result,
+    features::{self, Ignored},
+    file::CameraEntry,
+    files,
+    instance::{Instance, MAX_INSTANCES, bounds},
+    material::{Material, MaterialKind},
+    mesh::{Mesh, MeshCamera, MeshMaterial, Perspective, RepeatedMesh},
+    transform::Transform,
+};
+
+/// Width of the film, pixels; the camera's aspect ratio gives the height.
+const FILM_WIDTH: u32 = 640;
+/// Aspect ratio of a camera that states none.
+const ASPECT_RATIO: f32 = 4.0 / 3.0;
+/// Direction from the middle of the scene to the camera that frames it, and its field of view.
+const FRAMING_DIRECTION: Vec3 = Vec3::new(0.5, 0.4, 1.0);
+const FRAMING_FOV_DEG: f32 = 45.0;
+
+impl Loader<'_> {
+    /// Builds a scene from the mesh file at the loader's path.
+    pub(super) fn whole(&self, options: &LoadOptions) -> Result<Scene> {
+        let mut warnings = Vec::new();
+        let mesh = Mesh::read_whole(self.path, &mut warnings)?;
+        let mut ignored = mesh.ignored_in_materials();
+        let chosen = self.choose_camera(&mesh.cameras, options.camera.as_deref(), &mut ignored)?;
+        let (materials, geometry) = self.place_whole(&mesh, &mut ignored, &mut warnings)?;
+        warnings.extend(ignored.warnings(self.path));
+        let (entry, aspect_ratio) = match chosen {
+            Some((camera, lens)) => (
+                camera_entry(camera, lens),
+                lens.aspect_ratio.filter(|ratio| *ratio > 0.0).unwrap_or(ASPECT_RATIO),
+            ),
+            None => {
+                let entry = self.frame(&geometry)?;
+                warnings.push(format!(
+                    "{}: no perspective camera; one at {:?} frames the bounding box",
+                    self.path.display(),
+                    entry.position
+                ));
+                (entry, ASPECT_RATIO)
+            }
+        };
+        let height = (FILM_WIDTH as f32 / aspect_ratio).round();
+        let film = FilmSettings {
+            width: FILM_WIDTH,
+            height: (height as u32).clamp(1, MAX_FILM_SIDE),
+            filter: Filter::Gaussian,
+        };
+        let environment = self.whole_environment(options, &mut warnings)?;
+        let camera: Camera = self.camera(&entry)?;
+        let light = Light { environment, lamps: mesh.lamps, portals: Vec::new() };
+        let mut scene = self.scene(camera, film, light, materials, geometry, warnings);
+        scene.inputs.extend(mesh.side_files);
+        scene.inputs.extend(options.environment.clone());
+        Ok(scene)
+    }
+
+    /// Finds the camera named `name`, else the first with perspective; the others are ignored.
+    fn choose_camera<'a>(
+        &self,
+        cameras: &'a [MeshCamera],
+        name: Option<&str>,
+        ignored: &mut Ignored,
+    ) -> Result<Option<(&'a MeshCamera, Perspective)>> {
+        let chosen = match name {
+            None => cameras.iter().position(|camera| camera.perspective.is_some()),
+            Some(name) => {
+                let has_name = |camera: &MeshCamera| camera.names.iter().any(|own| own == name);
+                let by_number = || name.parse().ok().filter(|&index: &usize| index < cameras.len());
+                let found = cameras.iter().position(has_name).or_else(by_number);
+                let Some(index) = found else {
+                    let labels: Vec<_> = (0..).zip(cameras).map(|(i, c)| c.label(i)).collect();
+                    let known =
+                        if labels.is_empty() { "none".to_owned() } else { labels.join(", ") };
+                    return Err(self.error(format!(
+                        "--camera {name}: there is no such camera, the file has {known}"
+                    )));
+                };
+                self.check(cameras[index].perspective.is_some(), || {
+                    format!("--camera {name}: an orthographic camera, which cannot be used")
+                })?;
+                Some(index)
+            }
+        };
+        for (index, camera) in cameras.iter().enumerate().filter(|(i, _)| Some(*i) != chosen) {
+            let is_perspective = camera.perspective.is_some();
+            let feature =
+                if is_perspective { features::GLTF_CAMERAS } else { features::GLTF_ORTHOGRAPHIC };
+            ignored.add(feature, || camera.label(index));
+        }
+        Ok(chosen.and_then(|index| Some((&cameras[index], cameras[index].perspective?))))
+    }
+
+    /// Takes the mesh as it stands, with one material more for triangles without.
+    pub(super) fn place_whole(
+        &self,
+        mesh: &Mesh,
+        ignored: &mut Ignored,
+        warnings: &mut Vec<String>,
+    ) -> Result<(Vec<Material>, Geometry)> {
+        let named = |(index, entry): (usize, &MeshMaterial)| match entry.material.name.as_str() {
+            "" => Material { name: format!("material {index}"), ..entry.material.clone() },
+            _ => entry.material.clone(),
+        };
+        let mut materials: Vec<_> = mesh.materials.iter().enumerate().map(named).collect();
+        let lacking = materials.len();
+        if mesh.runs.is_empty()
+            || mesh.runs.iter().any(|run| run.material.is_none())
+            || mesh.repeated.iter().any(|repeated| repeated.material.is_none())
+        {
+            // An OBJ file leaves the material open; glTF defines the one that is meant.
+            materials.push(if files::extension(self.path) == "obj" {
+                if !mesh.triangles.is_empty() {
+                    ignored.add(features::OBJ_NO_MATERIAL, || "the first faces".to_owned());
+                }
+                default_material()
+            } else {
+                let kind = MaterialKind::Principled {
+                    base_color: Vec3::ONE,
+                    metallic: 1.0,
+                    roughness: 1.0,
+                    ior: 1.5,
+                    specular: 1.0,
+                    specular_color: Vec3::ONE,
+                };
+                Material::new("default", kind)
+            });
+        }
+        let mut geometry = Geometry::default();
+        let transform = Transform::new([1.0; 3], [0.0; 3], [0.0; 3]);
+        let dropped = geometry.append(mesh, &transform, |triangle| {
+            let next = mesh.runs.partition_point(|run| run.first_triangle <= triangle);
+            let run = next.checked_sub(1).and_then(|run| mesh.runs[run].material);
+            run.unwrap_or(lacking) as u32
+        });
+        for repeated in &mesh.repeated {
+            let material = repeated.material.unwrap_or(lacking);
+            let emits = materials[material].surface.emission.is_some();
+            self.place_repeated(repeated, material as u32, emits, &mut geometry, warnings)?;
+        }
+        self.check_extent("the scene", geometry.extent())?;
+        let label = self.path.display().to_string();
+        let is_repeated =
+            |index: usize| mesh.repeated.iter().any(|repeated| repeated.material == Some(index));
+        let copied = materials.iter().enumerate().filter(|(index, _)| !is_repeated(*index));
+        warnings.extend(copied.filter_map(|(_, own)| lacking_uvs(&label, own, mesh)));
+        warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
+        Ok((materials, geometry))
+    }
+
+    /// Adds the instances of a mesh that the file repeats; copies, if it emits light.
+    fn place_repeated(
+        &self,
+        repeated: &RepeatedMesh,
+        material: u32,
+        emits: bool,
+        geometry: &mut Geometry,
+        warnings: &mut Vec<String>,
+    ) -> Result<()> {
+        let mesh = &*repeated.mesh;
+        let count = geometry.instances.len() + repeated.places.len();
+        self.check(count <= MAX_INSTANCES, || {
+            format!("{count} instances, at most {MAX_INSTANCES} can be used")
+        })?;
+        let (prototype, mut dropped) = geometry.add_prototype(mesh, |_| 0);
+        for place in &repeated.places {
+            let Some(transform) = Transform::from_matrix(place.as_dmat4()) else {
+                // Scaled to nothing.
+                dropped.degenerate += mesh.triangles.len();
+                continue;
+            };
+            let instance = Instance::new(prototype.index, &transform, material, true);
+            match instance.filter(|_| !emits) {
+                Some(instance) => geometry.instances.push(instance),
+                None => {
+                    let vertices = geometry.positions.len() + mesh.positions.len();
+                    let triangles = geometry.triangles.len() + mesh.triangles.len();
+                    self.check_counts(vertices, triangles)?;
+                    dropped.add(geometry.append(mesh, &transform, |_| material));
+                }
+            }
+        }
+        let label = format!("{}: a mesh of several nodes", self.path.display());
+        warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
+        Ok(())
+    }
+
+    /// The map of `--environment`, else white.
+    fn whole_environment(
+        &self,
+        options: &LoadOptions,
+        warnings: &mut Vec<String>,
+    ) -> Result<EnvironmentMap> {
+        let rotation_deg = options.rotation_deg.unwrap_or(0.0);
+        if let Some(map) = &options.environment {
+            return EnvironmentMap::load(map, 1.0, rotation_deg, warnings);
+        }
+        warnings.push(format!(
+            "{}: no --environment; lit by white light of radiance 1 from everywhere",
+            self.path.display()
+        ));
+        EnvironmentMap::constant(Vec3::ONE, 1.0).map_err(|message| self.error(message))
+    }
+
+    /// Camera that sees the whole bounding sphere of the bounding box.
+    fn frame(&self, geometry: &Geometry) -> Result<CameraEntry> {
+        let Some([low, high]) = bounds(geometry.used_extent()) else {
+            return Err(self.error("expected triangles or a camera, found neither"));
+        };
+        let (centre, radius) = (0.5 * (low + high), 0.5 * (high - low).length());
+        let distance = radius / (0.5 * FRAMING_FOV_DEG).to_radians().sin();
+        Ok(CameraEntry {
+            position: (centre + distance * FRAMING_DIRECTION.normalize()).to_array(),
+            look_at: centre.to_array(),
+            up: [0.0, 1.0, 0.0],
+            vertical_fov_deg: FRAMING_FOV_DEG,
+            aperture_radius: 0.0,
+            focus_distance: None,
+        })
+    }
+}
+
+/// Entry of a camera of the file, for the checks that all cameras pass.
+fn camera_entry(camera: &MeshCamera, lens: Perspective) -> CameraEntry {
+    let matrix = camera.world_from_camera;
+    let position = matrix.w_axis.truncate();
+    // Look at a point so far away that single precision keeps the direction.
+    let distance = position.length().max(1.0);
+    let forward = matrix.transform_vector3(Vec3::NEG_Z).normalize_or_zero();
+    CameraEntry {
+        position: position.to_array(),
+        look_at: (position + distance * forward).to_array(),
+        up: matrix.transform_vector3(Vec3::Y).normalize_or_zero().to_array(),
+        vertical_fov_deg: lens.vertical_fov_rad.to_degrees(),
+        aperture_radius: 0.0,
+        focus_distance: None,
+    }
+}
+
+/// Checks that a mesh file is one that [`Loader::whole`] reads.
+pub(super) fn is_whole(path: &Path) -> bool {
+    matches!(files::extension(path).as_str(), "gltf" | "glb" | "obj")
+}

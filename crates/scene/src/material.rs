@@ -1,0 +1,251 @@
+//! Validated materials of a scene.
+
+use std::{path::PathBuf, sync::Arc};
+
+use glam::Vec3;
+
+use crate::{math::colour::luminance, measured::MeasuredTable, texture::TextureUse};
+
+/// Named surface material.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// Name in the scene file.
+    pub name: String,
+    /// Reflection model.
+    pub kind: MaterialKind,
+    /// Textures, opacity and emission.
+    pub surface: Surface,
+}
+
+impl Material {
+    /// Makes an opaque, two-sided material without textures or emission.
+    pub fn new(name: impl Into<String>, kind: MaterialKind) -> Self {
+        Self { name: name.into(), kind, surface: Surface::default() }
+    }
+
+    /// Returns the reflection model with its textures replaced by their means: for fits, which have
+    /// one set of lobes for a material.
+    pub fn mean_kind(&self) -> MaterialKind {
+        let mean = |texture: &Option<TextureUse>| {
+            texture.as_ref().map_or(Vec3::ONE, |texture| texture.mean().into())
+        };
+        let color = mean(&self.surface.color);
+        let rough = luminance(mean(&self.surface.roughness));
+        let metal = luminance(mean(&self.surface.metallic));
+        let mut kind = self.kind.clone();
+        match &mut kind {
+            MaterialKind::Diffuse { reflectance } | MaterialKind::Mirror { reflectance } => {
+                *reflectance = (*reflectance * color).clamp(Vec3::ZERO, Vec3::ONE);
+            }
+            MaterialKind::Plastic { diffuse, .. } => {
+                *diffuse = (*diffuse * color).clamp(Vec3::ZERO, Vec3::ONE);
+            }
+            MaterialKind::Conductor { alpha, fresnel } => {
+                *alpha = (*alpha * rough * rough).clamp(0.0, 1.0);
+                if let ConductorFresnel::Schlick { reflectance } = fresnel {
+                    *reflectance = (*reflectance * color).clamp(Vec3::ZERO, Vec3::ONE);
+                }
+            }
+            MaterialKind::Principled { base_color, metallic, roughness, .. } => {
+                *base_color = (*base_color * color).clamp(Vec3::ZERO, Vec3::ONE);
+                *metallic = (*metallic * metal).clamp(0.0, 1.0);
+                *roughness = (*roughness * rough).clamp(0.0, 1.0);
+            }
+            MaterialKind::Dielectric { .. }
+            | MaterialKind::ThinDielectric { .. }
+            | MaterialKind::Measured { .. } => {}
+        }
+        kind
+    }
+}
+
+/// Properties of a material beside its reflection model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surface {
+    /// Factor of the model's colour: reflectance, base colour or the diffuse part of a plastic.
+    pub color: Option<TextureUse>,
+    /// True if the vertex colours of the mesh are a factor of colour and opacity too.
+    pub vertex_color: bool,
+    /// Factor of the roughness √α.
+    pub roughness: Option<TextureUse>,
+    /// Factor of the metallic share of a principled material.
+    pub metallic: Option<TextureUse>,
+    /// Normals in the tangent frame, n = 2 · texel − 1, linear.
+    pub normal: Option<TextureUse>,
+    /// Factor of the tangential components of `normal`.
+    pub normal_scale: f32,
+    /// Share of light that the surface stops.
+    pub opacity: Opacity,
+    /// Light that the surface emits.
+    pub emission: Option<Emission>,
+    /// False if the back reflects nothing and lets nothing through.
+    pub two_sided: bool,
+}
+
+impl Default for Surface {
+    fn default() -> Self {
+        Self {
+            color: None,
+            vertex_color: false,
+            roughness: None,
+            metallic: None,
+            normal: None,
+            normal_scale: 1.0,
+            opacity: Opacity::default(),
+            emission: None,
+            two_sided: true,
+        }
+    }
+}
+
+impl Surface {
+    /// Every use of a texture.
+    pub fn textures(&self) -> impl Iterator<Item = &TextureUse> {
+        let emission = self.emission.as_ref().and_then(|emission| emission.texture.as_ref());
+        [&self.color, &self.roughness, &self.metallic, &self.normal, &self.opacity.texture]
+            .into_iter()
+            .filter_map(Option::as_ref)
+            .chain(emission)
+    }
+}
+
+/// Share of light that a surface stops; the rest goes straight through.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Opacity {
+    /// Opacity, 0…1.
+    pub factor: f32,
+    /// Factor by place.
+    pub texture: Option<TextureUse>,
+    /// Opacity from which the surface is opaque, and below which it is not there; none blends.
+    pub cutoff: Option<f32>,
+}
+
+impl Default for Opacity {
+    fn default() -> Self {
+        Self { factor: 1.0, texture: None, cutoff: None }
+    }
+}
+
+/// Light that a surface emits, the same in all directions of a side.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Emission {
+    /// Radiance, linear Rec.709.
+    pub radiance: Vec3,
+    /// Factor by place.
+    pub texture: Option<TextureUse>,
+    /// True if the back emits too; else only the side from which the triangles are counter-clockwise.
+    pub two_sided: bool,
+}
+
+/// Fresnel reflectance of a conductor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ConductorFresnel {
+    /// Schlick's approximation.
+    Schlick {
+        /// Reflectance at normal incidence.
+        reflectance: Vec3,
+    },
+    /// Exact Fresnel equations.
+    Exact {
+        /// Real part of the refractive index per colour channel.
+        eta: Vec3,
+        /// Extinction coefficient per colour channel.
+        k: Vec3,
+    },
+}
+
+impl MaterialKind {
+    /// True for dielectrics and thin panes, which let light through.
+    pub fn is_glass(&self) -> bool {
+        matches!(self, Self::Dielectric { .. } | Self::ThinDielectric { .. })
+    }
+
+    /// True if no light is sampled at the material, since all of what it sends on comes from one
+    /// direction or from behind: paths follow it (see [`specular`](super::specular)).
+    pub fn is_specular(&self) -> bool {
+        match self {
+            Self::Mirror { .. } | Self::Dielectric { .. } | Self::ThinDielectric { .. } => true,
+            Self::Diffuse { .. }
+            | Self::Plastic { .. }
+            | Self::Conductor { .. }
+            | Self::Principled { .. }
+            | Self::Measured { .. } => false,
+        }
+    }
+}
+
+/// Reflection model with its parameters.
+#[derive(Clone, Debug)]
+pub enum MaterialKind {
+    /// Lambertian: reflectance / π.
+    Diffuse {
+        /// Albedo, 0…1.
+        reflectance: Vec3,
+    },
+    /// GGX dielectric coat over a diffuse base.
+    Plastic {
+        /// Albedo of the base, 0…1.
+        diffuse: Vec3,
+        /// GGX width α.
+        alpha: f32,
+        /// Refractive index of the coat.
+        ior: f32,
+    },
+    /// GGX microfacet conductor.
+    Conductor {
+        /// GGX width α.
+        alpha: f32,
+        /// Fresnel term.
+        fresnel: ConductorFresnel,
+    },
+    /// Metallic-roughness material of glTF 2.0, appendix B, with `KHR_materials_ior` and
+    /// `KHR_materials_specular`.
+    Principled {
+        /// Albedo of the dielectric's base, and reflectance of the metal at normal incidence, 0…1.
+        base_color: Vec3,
+        /// Share of metal, 0…1.
+        metallic: f32,
+        /// Roughness √α, 0…1.
+        roughness: f32,
+        /// Refractive index of the dielectric.
+        ior: f32,
+        /// Factor of the dielectric's specular reflection, 0…1.
+        specular: f32,
+        /// Factor of the dielectric's reflectance at normal incidence.
+        specular_color: Vec3,
+    },
+    /// Perfect mirror.
+    Mirror {
+        /// Reflectance in all directions, 0…1.
+        reflectance: Vec3,
+    },
+    /// Interface to a solid dielectric, which lies behind the side from which the triangles are
+    /// counter-clockwise.
+    Dielectric {
+        /// Refractive index of the inside over that of the outside.
+        ior: f32,
+        /// GGX width α; 0 is smooth.
+        alpha: f32,
+        /// Factor of the reflected light, 0…1.
+        reflectance: Vec3,
+        /// Factor of the transmitted light, 0…1.
+        transmittance: Vec3,
+    },
+    /// Thin pane of a dielectric: reflects as a mirror or lets light straight through, with all
+    /// reflections between its two sides.
+    ThinDielectric {
+        /// Refractive index.
+        ior: f32,
+        /// Factor of the reflected light, 0…1.
+        reflectance: Vec3,
+        /// Factor of the transmitted light, 0…1.
+        transmittance: Vec3,
+    },
+    /// Tabulated measurement (MERL or Cornell file).
+    Measured {
+        /// The file.
+        path: PathBuf,
+        /// Its table on the half/difference grid, shared by materials that name the same file.
+        table: Arc<MeasuredTable>,
+    },
+}

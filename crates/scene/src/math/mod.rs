@@ -1,0 +1,6 @@
+//! Mathematics of scenes: frames, colour, a square map of the sphere, random numbers.
+
+pub mod colour;
+pub mod equal_area;
+pub mod frame;
+pub mod random;

@@ -1,0 +1,102 @@
+//! MERL `.binary` files: header, half/difference angle indexing, the three RGB scales →
+//! [`MeasuredTable`]. \[Matusik et al. 2003\].
+
+use std::{io::Read, path::Path};
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::{
+    error::{Error, Result},
+    files,
+    measured::{
+        layout::*,
+        table::{CELL_COUNT, MeasuredTable},
+    },
+};
+
+/// Bytes before the values: three little-endian 32-bit counts.
+pub const HEADER_BYTES: usize = 12;
+
+/// Bins in θ_h, θ_d and φ_d, the same for every file of the database.
+pub const EXPECTED_DIMENSIONS: [i32; 3] = [
+    MEASURED_THETA_HALF_BINS as i32,
+    MEASURED_THETA_DIFFERENCE_BINS as i32,
+    MEASURED_PHI_DIFFERENCE_BINS as i32,
+];
+
+/// Size of a whole file: 34,992,012 bytes.
+pub const FILE_BYTES: usize = HEADER_BYTES + 3 * CELL_COUNT * size_of::<f64>();
+
+/// Factors from stored values to 1/sr, per channel.
+pub const SCALES: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
+
+/// The three counts of a header.
+pub fn dimensions(header: [u8; HEADER_BYTES]) -> [i32; 3] {
+    std::array::from_fn(|index| i32::from_le_bytes(header.as_chunks().0[index]))
+}
+
+/// Reads a MERL file.
+///
+/// A cell with a negative channel is invalid, as the format defines. A cell that is not finite is
+/// also invalid and counted in the table's warnings.
+pub fn load(path: &Path) -> Result<MeasuredTable> {
+    let io_error = |source| Error::io(path, "read", source);
+    let mut file = files::open_regular(path)?;
+    let found_bytes = file.metadata().map_err(io_error)?.len();
+    let mut header = [0; HEADER_BYTES];
+    if found_bytes < HEADER_BYTES as u64 {
+        return Err(wrong_size(path, found_bytes));
+    }
+    file.read_exact(&mut header).map_err(io_error)?;
+    let [theta_half, theta_difference, phi] = dimensions(header);
+    if [theta_half, theta_difference, phi] != EXPECTED_DIMENSIONS {
+        let [expected_half, expected_difference, expected_phi] = EXPECTED_DIMENSIONS;
+        return Err(Error::format(
+            path,
+            format!(
+                "expected a MERL table of {expected_half} × {expected_difference} × {expected_phi} \
+                 cells (θ_h, θ_d, φ_d), the header says {theta_half} × {theta_difference} × {phi}; \
+                 tables of other sizes, such as those with 360 bins in φ_d, cannot be read"
+            ),
+        ));
+    }
+    if found_bytes != FILE_BYTES as u64 {
+        return Err(wrong_size(path, found_bytes));
+    }
+    let mut bytes = Vec::new();
+    bytes.try_reserve_exact(FILE_BYTES - HEADER_BYTES).map_err(|_| {
+        Error::format(path, format!("not enough memory for the {FILE_BYTES} bytes of the file"))
+    })?;
+    // Allow one byte more than expected, in case the file grows meanwhile.
+    file.take((FILE_BYTES - HEADER_BYTES) as u64).read_to_end(&mut bytes).map_err(io_error)?;
+    if bytes.len() != FILE_BYTES - HEADER_BYTES {
+        return Err(wrong_size(path, (HEADER_BYTES + bytes.len()) as u64));
+    }
+
+    let stored = bytes.as_chunks().0;
+    let value = |channel: usize, cell: usize| {
+        (f64::from_le_bytes(stored[channel * CELL_COUNT + cell]) * SCALES[channel]) as f32
+    };
+    let cells: Vec<Vec3> = (0..CELL_COUNT)
+        .into_par_iter()
+        .map(|cell| Vec3::new(value(0, cell), value(1, cell), value(2, cell)))
+        .collect();
+    drop(bytes);
+    let non_finite = cells.par_iter().filter(|cell| !cell.is_finite()).count();
+    let mut table =
+        MeasuredTable::from_cells(cells).map_err(|message| Error::format(path, message))?;
+    if non_finite > 0 {
+        table.warnings.push(format!("{non_finite} cells that are not finite were left out"));
+    }
+    Ok(table)
+}
+
+/// Error for a file that ends early or holds more than the table.
+fn wrong_size(path: &Path, found_bytes: u64) -> Error {
+    let word = if found_bytes < FILE_BYTES as u64 { "truncated" } else { "too long" };
+    Error::format(
+        path,
+        format!("{word}: expected a MERL file of {FILE_BYTES} bytes, found {found_bytes}"),
+    )
+}

@@ -1,0 +1,187 @@
+//! Cameras and instances of a glTF file, and all that the file holds besides.
+
+use glam::{Mat4, Quat, Vec3};
+use gltf::{
+    Node,
+    camera::Projection,
+    mesh::{Mode, Semantic},
+};
+use serde_json::Value;
+
+use super::GltfReader;
+use crate::{
+    error::Result,
+    features::{self, Feature, Ignored, Support},
+    mesh::{MeshCamera, Perspective},
+};
+
+/// Parts of the document with extensions that belong to no material, node or mesh.
+const OTHER_PARTS: [&str; 10] = [
+    "accessors",
+    "animations",
+    "bufferViews",
+    "buffers",
+    "cameras",
+    "images",
+    "samplers",
+    "scenes",
+    "skins",
+    "textures",
+];
+
+/// Label of a part in warnings.
+pub(super) fn label(part: &str, index: usize, name: Option<&str>) -> String {
+    name.map_or_else(|| format!("{part} {index}"), |name| format!("{part} `{name}`"))
+}
+
+/// Counts an extension, unless it is done.
+pub(super) fn ignore_extension(
+    ignored: &mut Ignored,
+    extension: &str,
+    place: impl FnOnce() -> String,
+) {
+    let name = format!("`{extension}`");
+    let known: Option<&Feature> = features::GLTF.iter().find(|feature| feature.name == name);
+    match known.map(|feature| (feature, feature.support)) {
+        Some((_, Support::Done | Support::Mapped)) => {}
+        Some((&feature, Support::Ignored)) => ignored.add(feature, place),
+        _ => ignored.add_named(features::GLTF_EXTENSION, &format!("extension {name}"), place),
+    }
+}
+
+/// Calls `found` with every extension in a part of the document, at any depth.
+pub(super) fn for_each_extension(value: &Value, found: &mut impl FnMut(&str)) {
+    match value {
+        Value::Object(members) => {
+            for (key, member) in members {
+                if key == "extensions" {
+                    member.as_object().into_iter().flatten().for_each(|(name, _)| found(name));
+                }
+                // Extras are free to hold anything.
+                if key != "extras" {
+                    for_each_extension(member, found);
+                }
+            }
+        }
+        Value::Array(elements) => {
+            elements.iter().for_each(|element| for_each_extension(element, found));
+        }
+        _ => {}
+    }
+}
+
+impl GltfReader<'_> {
+    /// Counts the parts of the document that belong to no node.
+    pub(super) fn ignore_contents(&mut self) {
+        let Self { document, json, ignored, .. } = self;
+        for animation in document.animations() {
+            let place = || label("animation", animation.index(), animation.name());
+            ignored.add(features::GLTF_ANIMATION, place);
+        }
+        for scene in document.scenes().skip(1) {
+            ignored.add(features::GLTF_SCENES, || label("scene", scene.index(), scene.name()));
+        }
+        for part in OTHER_PARTS {
+            for (index, value) in json[part].as_array().into_iter().flatten().enumerate() {
+                let place = || format!("{part} {index}");
+                for_each_extension(value, &mut |name| ignore_extension(ignored, name, place));
+            }
+        }
+        for (name, _) in json["extensions"].as_object().into_iter().flatten() {
+            // Nodes name the lights that they place, primitives their variants.
+            if !["KHR_lights_punctual", "KHR_materials_variants"].contains(&name.as_str()) {
+                ignore_extension(ignored, name, || "the document".to_owned());
+            }
+        }
+    }
+
+    /// Keeps the camera of a node; counts its lights, skin and other extensions.
+    pub(super) fn read_node(&mut self, node: &Node, world_from_node: Mat4) {
+        let place = || label("node", node.index(), node.name());
+        if let Some(camera) = node.camera() {
+            let names = [camera.name(), node.name()].into_iter().flatten().map(str::to_owned);
+            let perspective = match camera.projection() {
+                Projection::Perspective(lens) => Some(Perspective {
+                    vertical_fov_rad: lens.yfov(),
+                    aspect_ratio: lens.aspect_ratio(),
+                }),
+                Projection::Orthographic(_) => None,
+            };
+            let names = names.collect();
+            let found = MeshCamera { names, world_from_camera: world_from_node, perspective };
+            self.cameras.push((camera.index(), found));
+        }
+        if node.skin().is_some() {
+            self.ignored.add(features::GLTF_SKIN, place);
+        }
+        let json = &self.json["nodes"][node.index()];
+        for_each_extension(json, &mut |name| ignore_extension(&mut self.ignored, name, place));
+    }
+
+    /// Counts what the primitives of a mesh hold besides triangles.
+    pub(super) fn ignore_in_mesh(&mut self, mesh: &gltf::Mesh) {
+        let place = || label("mesh", mesh.index(), mesh.name());
+        let ignored = &mut self.ignored;
+        for primitive in mesh.primitives() {
+            if !matches!(
+                primitive.mode(),
+                Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
+            ) {
+                ignored.add(features::GLTF_POINTS, place);
+                continue;
+            }
+            for (semantic, _) in primitive.attributes() {
+                match semantic {
+                    Semantic::Colors(1..) => ignored.add(features::GLTF_COLORS, place),
+                    Semantic::TexCoords(2..) => ignored.add(features::GLTF_UV, place),
+                    _ => {}
+                }
+            }
+        }
+        let json = &self.json["meshes"][mesh.index()];
+        for_each_extension(json, &mut |name| ignore_extension(ignored, name, place));
+    }
+
+    /// Placements of a node's mesh: its own, or those of `EXT_mesh_gpu_instancing`.
+    pub(super) fn instances(&self, node: &Node, world_from_node: Mat4) -> Result<Vec<Mat4>> {
+        let instancing = &self.json["nodes"][node.index()]["extensions"]["EXT_mesh_gpu_instancing"];
+        if instancing.is_null() {
+            return Ok(vec![world_from_node]);
+        }
+        let accessor = |name: &str| match &instancing["attributes"][name] {
+            Value::Null => Ok(None),
+            index => index
+                .as_u64()
+                .and_then(|index| self.document.accessors().nth(usize::try_from(index).ok()?))
+                .map(Some)
+                .ok_or_else(|| {
+                    let node = label("node", node.index(), node.name());
+                    self.error(format!("{node}: EXT_mesh_gpu_instancing has no accessor {index}"))
+                }),
+        };
+        let vectors = |name| accessor(name)?.map(|found| self.vectors::<3>(&found)).transpose();
+        let (shifts, scales) = (vectors("TRANSLATION")?, vectors("SCALE")?);
+        let rotations = accessor("ROTATION")?.map(|found| self.vectors::<4>(&found)).transpose()?;
+        let lengths = [
+            shifts.as_ref().map(Vec::len),
+            scales.as_ref().map(Vec::len),
+            rotations.as_ref().map(Vec::len),
+        ];
+        let count = lengths.into_iter().flatten().max().unwrap_or(1);
+        if lengths.into_iter().flatten().any(|length| length != count) {
+            let node = label("node", node.index(), node.name());
+            return Err(self.error(format!(
+                "{node}: the attributes of EXT_mesh_gpu_instancing differ in length"
+            )));
+        }
+        let instance = |index: usize| {
+            let shift = shifts.as_ref().map_or(Vec3::ZERO, |shifts| shifts[index].into());
+            let scale = scales.as_ref().map_or(Vec3::ONE, |scales| scales[index].into());
+            let rotation = rotations
+                .as_ref()
+                .map_or(Quat::IDENTITY, |rotations| Quat::from_array(rotations[index]).normalize());
+            world_from_node * Mat4::from_scale_rotation_translation(scale, rotation, shift)
+        };
+        Ok((0..count).map(instance).collect())
+    }
+}

@@ -1,0 +1,201 @@
+//! glTF file → checked document with its buffers.
+
+use std::path::{Path, PathBuf};
+
+use gltf::{
+    Document, Glb,
+    buffer::Source,
+    json::{Root, validation::Checked},
+    mesh::Semantic,
+};
+use serde_json::Value;
+
+use crate::{
+    error::{Error, Result},
+    features::{self, Support},
+    files,
+    mesh::beside::path_beside,
+};
+
+/// Parses and checks a document; returns it with its binary chunk and its JSON as a tree, which
+/// holds the extensions.
+pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>, Value)> {
+    let not_gltf =
+        |error: gltf::Error| Error::format(path, format!("not a glTF document: {error}"));
+    let not_json = |error: serde_json::Error| {
+        let message = format!("not a glTF document: {error}");
+        Error::parse(path, error.line(), error.column(), message)
+    };
+    let glb = bytes.starts_with(b"glTF").then(|| Glb::from_slice(bytes).map_err(not_gltf));
+    let glb = glb.transpose()?;
+    let text = glb.as_ref().map_or(bytes, |glb| &glb.json);
+    let json: Value = serde_json::from_slice(text).map_err(not_json)?;
+    let mut root: Root = match serde_json::from_slice(text) {
+        Ok(root) => root,
+        // The crate takes extras for objects; they may be anything.
+        Err(error) => {
+            let mut without = json.clone();
+            remove_extras(&mut without);
+            serde_json::from_value(without).map_err(|_| not_json(error))?
+        }
+    };
+    // Parsing checks against the extensions that the crate knows, not those that are known here.
+    for extension in std::mem::take(&mut root.extensions_required) {
+        let name = format!("`{extension}`");
+        let is_known = |feature: &features::Feature| {
+            feature.name == name && feature.support != Support::Refused
+        };
+        if !features::GLTF.iter().any(is_known) {
+            let message =
+                format!("the file requires the extension `{extension}`, which is not supported");
+            return Err(Error::format(path, message));
+        }
+    }
+    // Attributes of applications are no part of the picture, but the crate refuses their names.
+    for primitive in root.meshes.iter_mut().flat_map(|mesh| &mut mesh.primitives) {
+        primitive.attributes.retain(|name, _| matches!(name, Checked::Valid(_)));
+    }
+    check_positions(path, &root)?;
+    let document = Document::from_json(root).map_err(not_gltf)?;
+    Ok((document, glb.and_then(|glb| glb.bin).map(|bin| bin.into_owned()), json))
+}
+
+/// Reads all buffers of a document.
+pub(super) fn read_buffers(
+    path: &Path,
+    document: &Document,
+    mut blob: Option<Vec<u8>>,
+) -> Result<Vec<Vec<u8>>> {
+    let mut buffers = Vec::new();
+    for buffer in document.buffers() {
+        let index = buffer.index();
+        let bytes = match buffer.source() {
+            Source::Bin => blob.take().ok_or_else(|| {
+                Error::format(path, format!("buffer {index} is in a chunk that the file lacks"))
+            })?,
+            Source::Uri(uri) => match data_of(uri) {
+                Some(data) => data.ok_or_else(|| {
+                    Error::format(path, format!("buffer {index} is not base64 data"))
+                })?,
+                None => files::read(&beside(path, uri)?)?,
+            },
+        };
+        if bytes.len() < buffer.length() {
+            let message = format!(
+                "truncated: buffer {index} should have {} bytes, found {}",
+                buffer.length(),
+                bytes.len()
+            );
+            return Err(Error::format(path, message));
+        }
+        buffers.push(bytes);
+    }
+    Ok(buffers)
+}
+
+/// Checks that the accessor of every primitive's positions exists, on which the validation by the
+/// `gltf` crate relies.
+fn check_positions(path: &Path, root: &Root) -> Result<()> {
+    for primitive in root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
+        let position = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+        if let Some(accessor) = position.map(|index| index.value())
+            && accessor >= root.accessors.len()
+        {
+            return Err(Error::format(
+                path,
+                format!(
+                    "not a glTF document: a primitive's POSITION names accessor {accessor}, the \
+                     file has {}",
+                    root.accessors.len()
+                ),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Path of a file that is named by a relative URI.
+pub(super) fn beside(path: &Path, uri: &str) -> Result<PathBuf> {
+    let name = decode_percent(uri)
+        .ok_or_else(|| Error::format(path, format!("cannot read the file name `{uri}`")))?;
+    path_beside(path.parent().unwrap_or(Path::new("")), Path::new(""), &name)
+        .map_err(|message| Error::format(path, message))
+}
+
+/// Content of a URI that holds it; none if it names a file, and none inside if it is no base64.
+pub(super) fn data_of(uri: &str) -> Option<Option<Vec<u8>>> {
+    let data = uri.strip_prefix("data:")?;
+    Some(data.split_once(";base64,").and_then(|(_, text)| decode_base64(text)))
+}
+
+/// Removes the members `extras` of objects at any depth.
+fn remove_extras(value: &mut Value) {
+    match value {
+        Value::Object(members) => {
+            members.remove("extras");
+            members.values_mut().for_each(remove_extras);
+        }
+        Value::Array(elements) => elements.iter_mut().for_each(remove_extras),
+        _ => {}
+    }
+}
+
+/// Decodes the percent encoding of a relative URI.
+fn decode_percent(uri: &str) -> Option<String> {
+    let mut bytes = Vec::with_capacity(uri.len());
+    let mut rest = uri.as_bytes();
+    while let [first, tail @ ..] = rest {
+        rest = tail;
+        if *first == b'%' {
+            let digits = std::str::from_utf8(tail.get(..2)?).ok()?;
+            bytes.push(u8::from_str_radix(digits, 16).ok()?);
+            rest = &tail[2..];
+        } else {
+            bytes.push(*first);
+        }
+    }
+    String::from_utf8(bytes).ok()
+}
+
+/// Decodes standard base64 (RFC 4648 section 4), with or without padding.
+fn decode_base64(text: &str) -> Option<Vec<u8>> {
+    let digits = text.trim_end_matches('=').as_bytes();
+    let mut bytes = Vec::with_capacity(digits.len() * 3 / 4);
+    for group in digits.chunks(4) {
+        if group.len() == 1 {
+            return None;
+        }
+        let mut bits = 0_u32;
+        for digit in group {
+            let value = match digit {
+                b'A'..=b'Z' => digit - b'A',
+                b'a'..=b'z' => digit - b'a' + 26,
+                b'0'..=b'9' => digit - b'0' + 52,
+                b'+' => 62,
+                b'/' => 63,
+                _ => return None,
+            };
+            bits = bits << 6 | u32::from(value);
+        }
+        bits <<= 6 * (4 - group.len());
+        bytes.extend_from_slice(&bits.to_be_bytes()[1..group.len()]);
+    }
+    Some(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn base64_and_percent_codes_are_undone() {
+        // RFC 4648 section 10.
+        for (text, bytes) in [("", ""), ("Zg==", "f"), ("Zm8=", "fo"), ("Zm9vYmFy", "foobar")] {
+            assert_eq!(decode_base64(text).as_deref(), Some(bytes.as_bytes()));
+        }
+        assert_eq!(decode_base64("Zm9v*A=="), None);
+        assert_eq!(decode_base64("A"), None);
+        assert_eq!(decode_percent("a%20b.bin").as_deref(), Some("a b.bin"));
+        assert_eq!(decode_percent("a%2"), None);
+    }
+}

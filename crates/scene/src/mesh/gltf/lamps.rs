@@ -1,0 +1,84 @@
+//! `KHR_lights_punctual`: lights of nodes → lamps.
+//!
+//! Candela and lux count as radiant intensity and irradiance, channel by channel.
+
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
+
+use glam::{Mat4, Vec3};
+use gltf::Node;
+
+use super::{
+    GltfReader,
+    contents::label,
+    material::{number, vector},
+};
+use crate::{
+    error::Result,
+    features,
+    lamp::{Lamp, LampKind, SpotFalloff},
+};
+
+impl GltfReader<'_> {
+    /// Adds the light of a node, which shines along −Z.
+    pub(super) fn read_lamp(&mut self, node: &Node, world_from_node: Mat4) -> Result<()> {
+        let json = self.json;
+        let index = &json["nodes"][node.index()]["extensions"]["KHR_lights_punctual"]["light"];
+        if index.is_null() {
+            return Ok(());
+        }
+        let place = || label("node", node.index(), node.name());
+        let lights = &json["extensions"]["KHR_lights_punctual"]["lights"];
+        let light = index.as_u64().and_then(|index| lights.get(usize::try_from(index).ok()?));
+        let light = light
+            .ok_or_else(|| self.error(format!("{}: the file has no light {index}", place())))?;
+        let color = Vec3::from_array(vector(light, "color", [1.0; 3]));
+        let intensity = color * number(light, "intensity", 1.0);
+        if !intensity.is_finite() || intensity.min_element() < 0.0 {
+            return Err(self.error(format!(
+                "{}: expected a light of finite colour and intensity from 0, found {intensity}",
+                place()
+            )));
+        }
+        let position = world_from_node.w_axis.truncate();
+        let direction = world_from_node.transform_vector3(Vec3::NEG_Z).normalize_or(Vec3::NEG_Z);
+        let kind = match light["type"].as_str() {
+            Some("point") => LampKind::Point { position, intensity },
+            Some("spot") => {
+                let inner_angle_rad = number(&light["spot"], "innerConeAngle", 0.0);
+                let outer_angle_rad = number(&light["spot"], "outerConeAngle", FRAC_PI_4);
+                let is_cone = 0.0 <= inner_angle_rad
+                    && inner_angle_rad < outer_angle_rad
+                    && outer_angle_rad <= FRAC_PI_2 + 1e-6;
+                if !is_cone {
+                    return Err(self.error(format!(
+                        "{}: expected the angles of a spot with 0 ≤ innerConeAngle < \
+                         outerConeAngle ≤ π/2, found {inner_angle_rad} and {outer_angle_rad}",
+                        place()
+                    )));
+                }
+                LampKind::Spot {
+                    position,
+                    direction,
+                    intensity,
+                    inner_angle_rad,
+                    outer_angle_rad,
+                    falloff: SpotFalloff::SquaredCosine,
+                }
+            }
+            Some("directional") => LampKind::Directional { direction, irradiance: intensity },
+            _ => {
+                let found = &light["type"];
+                return Err(self.error(format!(
+                    "{}: expected a light of type point, spot or directional, found {found}",
+                    place()
+                )));
+            }
+        };
+        if !light["range"].is_null() && !matches!(kind, LampKind::Directional { .. }) {
+            self.ignored.add(features::GLTF_LIGHT_RANGE, place);
+        }
+        let name = light["name"].as_str().or(node.name()).unwrap_or_default().to_owned();
+        self.mesh.lamps.push(Lamp { name, kind });
+        Ok(())
+    }
+}

@@ -1,0 +1,186 @@
+//! glTF 2.0 (`.gltf` with buffers beside it or inline, `.glb`): meshes with the transforms of their
+//! nodes, materials with their textures, lamps and cameras.
+//!
+//! Names everything else that a file holds ([`features::GLTF`](crate::features::GLTF)) in a
+//! warning, or refuses it. Reads the accessors itself and checks every range.
+
+mod accessors;
+mod contents;
+mod document;
+mod lamps;
+mod material;
+mod primitive;
+mod textures;
+
+use std::{collections::HashMap, path::Path, sync::Arc};
+
+use glam::Mat4;
+use gltf::{Document, Node, buffer::Source};
+use serde_json::Value;
+
+use super::{Mesh, MeshCamera, images::Images};
+use crate::{
+    error::{Error, Result},
+    features::Ignored,
+    files,
+    instance::Budget,
+    texture::Texture,
+};
+
+/// Bytes of the header of a GLB container.
+const GLB_HEADER_BYTES: usize = 12;
+
+/// Reads a glTF file with its buffers and images; `warnings` counts the parts that are left out. With a
+/// budget, meshes whose copies exceed it are not copied.
+///
+/// # Errors
+/// [`Error::Io`] for a file that cannot be read, [`Error::Parse`] for bad JSON, [`Error::Format`]
+/// for any other fault.
+pub fn read(path: &Path, budget: Option<Budget>, warnings: &mut Vec<String>) -> Result<Mesh> {
+    let bytes = files::read(path)?;
+    if let (Some(b"glTF"), Some(&[a, b, c, d])) = (bytes.get(..4), bytes.get(8..12)) {
+        let stated = u32::from_le_bytes([a, b, c, d]) as usize;
+        if stated > bytes.len() {
+            let message =
+                format!("truncated: the header states {stated} bytes, found {}", bytes.len());
+            return Err(Error::format(path, message));
+        }
+        // The crate subtracts the bytes of the header without a look.
+        if stated < GLB_HEADER_BYTES {
+            let message = format!(
+                "the header states {stated} bytes, expected at least its own {GLB_HEADER_BYTES}"
+            );
+            return Err(Error::format(path, message));
+        }
+    }
+    let (document, blob, json) = document::parse(path, &bytes)?;
+    drop(bytes);
+    let mut reader = GltfReader {
+        path,
+        document: &document,
+        json: &json,
+        buffers: document::read_buffers(path, &document, blob)?,
+        mesh: Mesh::default(),
+        budget,
+        copies: HashMap::new(),
+        repeated: HashMap::new(),
+        materials: HashMap::new(),
+        embedded: HashMap::new(),
+        images: Images::default(),
+        cameras: Vec::new(),
+        ignored: Ignored::default(),
+        warnings,
+    };
+    let buffer_files = document.buffers().filter_map(|buffer| match buffer.source() {
+        Source::Uri(uri) if !uri.starts_with("data:") => document::beside(path, uri).ok(),
+        _ => None,
+    });
+    reader.mesh.side_files = buffer_files.collect();
+    reader.read_scene()?;
+    let mut mesh = reader.mesh;
+    mesh.side_files.extend(reader.images.files());
+    reader.cameras.sort_by_key(|(index, _)| *index);
+    mesh.cameras = reader.cameras.into_iter().map(|(_, camera)| camera).collect();
+    let ignored = reader.ignored.warnings(path);
+    warnings.extend(ignored);
+    if mesh.normals.iter().all(|normal| *normal == [0.0; 3]) {
+        mesh.normals = Vec::new();
+    }
+    mesh.complete_tangents(-1.0);
+    let mut repeated = std::mem::take(&mut mesh.repeated);
+    for part in &mut repeated {
+        // Tangents depend on the materials, which the whole has.
+        std::mem::swap(&mut part.mesh.materials, &mut mesh.materials);
+        part.mesh.complete_tangents(-1.0);
+        std::mem::swap(&mut part.mesh.materials, &mut mesh.materials);
+    }
+    mesh.repeated = repeated;
+    Ok(mesh)
+}
+
+struct GltfReader<'a> {
+    path: &'a Path,
+    document: &'a Document,
+    /// The document as a tree, which holds the extensions.
+    json: &'a Value,
+    buffers: Vec<Vec<u8>>,
+    mesh: Mesh,
+    /// Triangles that may still be copied; none to copy all.
+    budget: Option<Budget>,
+    /// Uses of each mesh of the document.
+    copies: HashMap<usize, usize>,
+    /// Place in `mesh.repeated` of the primitives of meshes; none for those that are copied.
+    repeated: HashMap<[usize; 2], Option<usize>>,
+    /// Index into `mesh.materials` of the materials that have been used.
+    materials: HashMap<usize, usize>,
+    /// Images inside the document by their numbers; none for those that cannot be read.
+    embedded: HashMap<usize, Option<Arc<Texture>>>,
+    /// Images beside it.
+    images: Images,
+    /// Cameras of the nodes with their numbers in the file.
+    cameras: Vec<(usize, MeshCamera)>,
+    ignored: Ignored,
+    warnings: &'a mut Vec<String>,
+}
+
+impl GltfReader<'_> {
+    fn error(&self, message: impl Into<String>) -> Error {
+        Error::format(self.path, message)
+    }
+
+    /// Walks through the nodes of the default scene, else the first.
+    fn read_scene(&mut self) -> Result<()> {
+        self.ignore_contents();
+        let document = self.document;
+        let mut visited = vec![false; document.nodes().count()];
+        let mut seen_meshes = vec![false; document.meshes().count()];
+        let scene = document.default_scene().or_else(|| document.scenes().next());
+        let scene = scene.ok_or_else(|| self.error("expected a scene with nodes, found none"))?;
+        if self.budget.is_some() {
+            for node in document.nodes() {
+                if let Some(mesh) = node.mesh() {
+                    let count = self.instances(&node, Mat4::IDENTITY)?.len();
+                    *self.copies.entry(mesh.index()).or_default() += count;
+                }
+            }
+        }
+        // Use a stack, not recursion: nodes may nest deeper than the call stack.
+        let mut stack: Vec<(Node, Mat4)> =
+            scene.nodes().map(|node| (node, Mat4::IDENTITY)).collect();
+        stack.reverse();
+        while let Some((node, world_from_parent)) = stack.pop() {
+            if std::mem::replace(&mut visited[node.index()], true) {
+                let message = format!("node {} has more than one parent", node.index());
+                return Err(self.error(message));
+            }
+            let parent_from_node = Mat4::from_cols_array_2d(&node.transform().matrix());
+            let world_from_node = world_from_parent * parent_from_node;
+            self.read_node(&node, world_from_node);
+            self.read_lamp(&node, world_from_node)?;
+            if let Some(mesh) = node.mesh() {
+                if !std::mem::replace(&mut seen_meshes[mesh.index()], true) {
+                    self.ignore_in_mesh(&mesh);
+                }
+                let weights = node.weights().or(mesh.weights()).unwrap_or_default();
+                for world_from_instance in self.instances(&node, world_from_node)? {
+                    for primitive in mesh.primitives() {
+                        let key = [mesh.index(), primitive.index()];
+                        // The weights of a node make its mesh another one.
+                        let repeated = match node.weights() {
+                            None => self.repeated_primitive(key, &primitive, weights)?,
+                            Some(_) => None,
+                        };
+                        match repeated {
+                            Some(at) => self.mesh.repeated[at].places.push(world_from_instance),
+                            None => {
+                                self.read_primitive(&primitive, weights, world_from_instance)?;
+                            }
+                        }
+                    }
+                }
+            }
+            stack.extend(node.children().map(|child| (child, world_from_node)));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,239 @@
+//! Primitives of a glTF mesh → triangles in world space.
+
+use glam::{Mat3, Mat4, Vec3};
+use gltf::{
+    Accessor, Primitive,
+    mesh::{Mode, Semantic},
+};
+
+use super::GltfReader;
+use crate::{
+    error::Result,
+    features,
+    mesh::{Mesh, RepeatedMesh},
+};
+
+impl GltfReader<'_> {
+    /// Place in `mesh.repeated` of a primitive whose copies are too many; none if it is to be copied.
+    pub(super) fn repeated_primitive(
+        &mut self,
+        key: [usize; 2],
+        primitive: &Primitive,
+        weights: &[f32],
+    ) -> Result<Option<usize>> {
+        if let Some(found) = self.repeated.get(&key) {
+            return Ok(*found);
+        }
+        let corners = primitive.indices().or_else(|| primitive.get(&Semantic::Positions));
+        let triangles = corners.map_or(0, |corners| corners.count() / 3);
+        let copies = self.copies.get(&key[0]).copied().unwrap_or(0);
+        let is_repeated = copies > 1
+            && matches!(primitive.mode(), Mode::Triangles)
+            && self.budget.as_mut().is_some_and(|budget| budget.takes_instances(copies, triangles));
+        let place = if is_repeated {
+            // Read it into a mesh of its own, with the materials of the whole.
+            let materials = std::mem::take(&mut self.mesh.materials);
+            let own = Mesh { materials, ..Mesh::default() };
+            let whole = std::mem::replace(&mut self.mesh, own);
+            let read = self.read_primitive(primitive, weights, Mat4::IDENTITY);
+            let mut own = std::mem::replace(&mut self.mesh, whole);
+            self.mesh.materials = std::mem::take(&mut own.materials);
+            read?;
+            let material = own.runs.first().and_then(|run| run.material);
+            let repeated = RepeatedMesh { mesh: Box::new(own), material, places: Vec::new() };
+            self.mesh.repeated.push(repeated);
+            Some(self.mesh.repeated.len() - 1)
+        } else {
+            None
+        };
+        self.repeated.insert(key, place);
+        Ok(place)
+    }
+
+    /// Adds a primitive of triangles with its morph targets; others add nothing.
+    pub(super) fn read_primitive(
+        &mut self,
+        primitive: &Primitive,
+        weights: &[f32],
+        world_from_node: Mat4,
+    ) -> Result<()> {
+        if !matches!(primitive.mode(), Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+            return Ok(());
+        }
+        let Some(position_accessor) = primitive.get(&Semantic::Positions) else {
+            return Err(self.error(format!("primitive {} has no positions", primitive.index())));
+        };
+        let mut positions = self.vectors::<3>(&position_accessor)?;
+        let count = positions.len();
+        let first_vertex = self.mesh.positions.len();
+        if u32::try_from(first_vertex + count).is_err() {
+            return Err(self.error("more than 4,294,967,295 vertices"));
+        }
+        let mut normals = self.attribute::<3>(primitive, &Semantic::Normals, count)?;
+        let mut tangents = self.attribute::<4>(primitive, &Semantic::Tangents, count)?;
+        for (target, &weight) in primitive.morph_targets().zip(weights) {
+            if weight == 0.0 {
+                continue;
+            }
+            self.morph(&mut positions, target.positions(), weight)?;
+            if let Some(normals) = &mut normals {
+                self.morph(normals, target.normals(), weight)?;
+            }
+            if let Some(tangents) = &mut tangents {
+                self.morph(tangents, target.tangents(), weight)?;
+            }
+        }
+        let material = primitive.material().index().map(|index| self.material_index(index));
+        let material = material.transpose()?;
+        let linear = Mat3::from_mat4(world_from_node);
+        let mirrors = linear.determinant() < 0.0;
+        let to_world = |position: &[f32; 3]| {
+            world_from_node.transform_point3(Vec3::from_array(*position)).to_array()
+        };
+        self.mesh.positions.extend(positions.iter().map(to_world));
+        let end = self.mesh.positions.len();
+        // A node scaled to nothing has no inverse; its normals become zero.
+        let turn = linear.inverse().transpose();
+        let to_world =
+            |normal: [f32; 3]| (turn * Vec3::from_array(normal)).normalize_or_zero().to_array();
+        let normals = normals.map(|normals| normals.into_iter().map(to_world).collect());
+        self.mesh.normals.extend::<Vec<_>>(normals.unwrap_or_default());
+        self.mesh.normals.resize(end, [0.0; 3]);
+        let to_world = |[x, y, z, sign]: [f32; 4]| {
+            let tangent = (linear * Vec3::new(x, y, z)).normalize_or_zero();
+            tangent.extend(if mirrors { -sign } else { sign }).to_array()
+        };
+        let tangents = tangents.map(|all| all.into_iter().map(to_world).collect());
+        append(&mut self.mesh.tangents, tangents, first_vertex, end, [0.0; 4]);
+        for set in 0..2 {
+            let uvs = self.attribute::<2>(primitive, &Semantic::TexCoords(set), count)?;
+            append(&mut self.mesh.uvs[set as usize], uvs, first_vertex, end, [0.0; 2]);
+        }
+        let colors = self.colors(primitive, material, count)?;
+        append(&mut self.mesh.colors, colors, first_vertex, end, [1.0; 4]);
+        let indices = match primitive.indices() {
+            Some(accessor) => self.indices(&accessor, count)?,
+            None => (0..count as u32).collect(),
+        };
+        self.mesh.start_run(material);
+        let first_vertex = first_vertex as u32;
+        let mut push = |[a, b, c]: [u32; 3]| {
+            let triangle = if mirrors { [a, c, b] } else { [a, b, c] };
+            self.mesh.triangles.push(triangle.map(|index| first_vertex + index));
+        };
+        match primitive.mode() {
+            Mode::TriangleStrip => {
+                for (index, corners) in indices.windows(3).enumerate() {
+                    let turn = index % 2;
+                    push([corners[turn], corners[1 - turn], corners[2]]);
+                }
+            }
+            Mode::TriangleFan => {
+                for corners in indices.get(1..).unwrap_or_default().windows(2) {
+                    push([indices[0], corners[0], corners[1]]);
+                }
+            }
+            _ => indices
+                .chunks_exact(3)
+                .for_each(|corners| push([corners[0], corners[1], corners[2]])),
+        }
+        Ok(())
+    }
+
+    /// Reads an attribute, one vector for each of `count` positions.
+    fn attribute<const N: usize>(
+        &self,
+        primitive: &Primitive,
+        semantic: &Semantic,
+        count: usize,
+    ) -> Result<Option<Vec<[f32; N]>>> {
+        let Some(accessor) = primitive.get(semantic) else { return Ok(None) };
+        let vectors = self.vectors::<N>(&accessor)?;
+        self.check_length(primitive, semantic, vectors.len(), count)?;
+        Ok(Some(vectors))
+    }
+
+    fn check_length(
+        &self,
+        primitive: &Primitive,
+        semantic: &Semantic,
+        found: usize,
+        count: usize,
+    ) -> Result<()> {
+        if found == count {
+            return Ok(());
+        }
+        Err(self.error(format!(
+            "primitive {} has {count} positions and {found} elements of {}",
+            primitive.index(),
+            semantic.to_string()
+        )))
+    }
+
+    /// Adds the differences of a morph target.
+    fn morph<const N: usize>(
+        &self,
+        vectors: &mut [[f32; N]],
+        target: Option<Accessor>,
+        weight: f32,
+    ) -> Result<()> {
+        let Some(accessor) = target else { return Ok(()) };
+        let differences = self.vectors::<3>(&accessor)?;
+        if differences.len() != vectors.len() {
+            return Err(self.error(format!(
+                "accessor {} of a morph target has {} elements for {} vertices",
+                accessor.index(),
+                differences.len(),
+                vectors.len()
+            )));
+        }
+        for (vector, difference) in vectors.iter_mut().zip(differences) {
+            for (component, difference) in vector.iter_mut().zip(difference) {
+                *component += weight * difference;
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads the vertex colours of a primitive, and lets its material use them.
+    fn colors(
+        &mut self,
+        primitive: &Primitive,
+        material: Option<usize>,
+        count: usize,
+    ) -> Result<Option<Vec<[f32; 4]>>> {
+        let semantic = Semantic::Colors(0);
+        let Some(accessor) = primitive.get(&semantic) else { return Ok(None) };
+        let mut colors = self.colors_of(&accessor)?;
+        self.check_length(primitive, &semantic, colors.len(), count)?;
+        let Some(material) = material else { return Ok(Some(colors)) };
+        let index = primitive.material().index().unwrap_or_default();
+        let json = &self.json["materials"][index];
+        if !json["extensions"]["KHR_materials_unlit"].is_null() {
+            let place = || super::contents::label("material", index, json["name"].as_str());
+            self.ignored.add(features::GLTF_UNLIT_COLOR, place);
+        }
+        if !matches!(json["alphaMode"].as_str(), Some("MASK" | "BLEND")) {
+            colors.iter_mut().for_each(|color| color[3] = 1.0);
+        }
+        self.mesh.materials[material].material.surface.vertex_color = true;
+        Ok(Some(colors))
+    }
+}
+
+/// Appends an attribute to an array that stays empty until a primitive has it.
+fn append<const N: usize>(
+    all: &mut Vec<[f32; N]>,
+    own: Option<Vec<[f32; N]>>,
+    first_vertex: usize,
+    end: usize,
+    absent: [f32; N],
+) {
+    if let Some(own) = own {
+        all.resize(first_vertex, absent);
+        all.extend(own);
+    }
+    if !all.is_empty() {
+        all.resize(end, absent);
+    }
+}

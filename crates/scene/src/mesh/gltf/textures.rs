@@ -1,0 +1,147 @@
+//! Textures of a glTF document: image, sampler and `KHR_texture_transform`.
+
+use std::sync::Arc;
+
+use serde_json::Value;
+
+use super::{
+    GltfReader, document,
+    material::{number, vector},
+};
+use crate::{
+    error::Result,
+    features::{self, Ignored},
+    texture::{Channels, Encoding, Interpolation, Texture, TextureUse, Wrap},
+};
+
+/// Values of a sampler, which are those of OpenGL.
+const NEAREST: u64 = 9728;
+const CLAMP_TO_EDGE: u64 = 33071;
+const MIRRORED_REPEAT: u64 = 33648;
+
+impl GltfReader<'_> {
+    /// Reads the texture that `info` names; none if it is absent or cannot be used.
+    pub(super) fn texture(
+        &mut self,
+        info: &Value,
+        (channels, encoding): (Channels, Encoding),
+        ignored: &mut Ignored,
+        place: &dyn Fn() -> String,
+    ) -> Result<Option<TextureUse>> {
+        if info.is_null() {
+            return Ok(None);
+        }
+        let json = self.json;
+        let number_of = |value: &Value| value.as_u64().and_then(|n| usize::try_from(n).ok());
+        let Some(texture) = number_of(&info["index"]).and_then(|index| json["textures"].get(index))
+        else {
+            let index = &info["index"];
+            return Err(self.error(format!("{}: the file has no texture {index}", place())));
+        };
+        let Some(source) = number_of(&texture["source"]) else {
+            ignored.add(features::GLTF_NO_IMAGE, place);
+            return Ok(None);
+        };
+        let transform = &info["extensions"]["KHR_texture_transform"];
+        let own_set = info["texCoord"].as_u64().unwrap_or(0);
+        let uv_set = match transform["texCoord"].as_u64().unwrap_or(own_set) {
+            0 => 0,
+            1 => 1,
+            _ => {
+                ignored.add(features::GLTF_HIGH_UV, place);
+                return Ok(None);
+            }
+        };
+        let Some(image) = self.image(source, place)? else { return Ok(None) };
+        let sampler = number_of(&texture["sampler"]).and_then(|at| json["samplers"].get(at));
+        let sampler = sampler.unwrap_or(&Value::Null);
+        let wrap = |key: &str| match sampler[key].as_u64() {
+            Some(CLAMP_TO_EDGE) => Wrap::ClampToEdge,
+            Some(MIRRORED_REPEAT) => Wrap::MirroredRepeat,
+            _ => Wrap::Repeat,
+        };
+        let interpolation = match sampler["magFilter"].as_u64() {
+            Some(NEAREST) => Interpolation::Nearest,
+            _ => Interpolation::Bilinear,
+        };
+        Ok(Some(TextureUse {
+            channels,
+            encoding,
+            uv_set,
+            image_from_uv: image_from_uv(transform),
+            wrap: [wrap("wrapS"), wrap("wrapT")],
+            interpolation,
+            ..TextureUse::new(image)
+        }))
+    }
+
+    /// Reads an image, or returns it again; one that cannot be read is a warning.
+    fn image(&mut self, index: usize, place: &dyn Fn() -> String) -> Result<Option<Arc<Texture>>> {
+        if let Some(found) = self.embedded.get(&index) {
+            return Ok(found.clone());
+        }
+        let image = &self.json["images"][index];
+        let name = format!("{}: image {index}", self.path.display());
+        let decoded = if let Some(uri) = image["uri"].as_str() {
+            match document::data_of(uri) {
+                Some(Some(bytes)) => Texture::decode_with(&name, &bytes, self.warnings),
+                Some(None) => Err("not base64 data".to_owned()),
+                None => {
+                    let path = document::beside(self.path, uri)?;
+                    return Ok(self.images.load(&path, &place(), self.warnings));
+                }
+            }
+        } else {
+            let view = image["bufferView"].as_u64().and_then(|at| usize::try_from(at).ok());
+            let view = view.and_then(|at| self.document.views().nth(at)).ok_or_else(|| {
+                self.error(format!("image {index}: expected a URI or a buffer view, found neither"))
+            })?;
+            let mut own = Vec::new();
+            let decoded = Texture::decode_with(&name, self.view_bytes(&view)?, &mut own);
+            self.warnings.append(&mut own);
+            decoded
+        };
+        let texture = match decoded {
+            Ok(texture) => Some(Arc::new(texture)),
+            Err(message) => {
+                let place = place();
+                self.warnings
+                    .push(format!("{name}: {message}; rendered without this texture ({place})"));
+                None
+            }
+        };
+        self.embedded.insert(index, texture.clone());
+        Ok(texture)
+    }
+}
+
+/// Matrix of `KHR_texture_transform`: scale, then rotation, then offset.
+///
+/// A positive angle turns coordinates counter-clockwise as one sees them, with v downwards; the
+/// Khronos model `TextureTransformTest` shows which way that is.
+fn image_from_uv(transform: &Value) -> [[f32; 3]; 2] {
+    let [offset_u, offset_v] = vector(transform, "offset", [0.0; 2]);
+    let [scale_u, scale_v] = vector(transform, "scale", [1.0; 2]);
+    let (sine, cosine) = number(transform, "rotation", 0.0).sin_cos();
+    [[cosine * scale_u, sine * scale_v, offset_u], [-sine * scale_u, cosine * scale_v, offset_v]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn transforms_turn_as_the_khronos_model_shows() {
+        // The tip of its arrow is at 7/9 of the image; its marks for the right place of the tip are
+        // the children of the nodes "Rotation" and "All", relative to the upper left corner.
+        let tip = |transform: Value, [u, v]: [f32; 2]| {
+            image_from_uv(&transform).map(|row| row[0] * u + row[1] * v + row[2])
+        };
+        let turned =
+            tip(serde_json::json!({"rotation": std::f32::consts::FRAC_PI_8}), [0.421, 1.016]);
+        let all = serde_json::json!({"rotation": 0.3, "scale": [1.5, 1.5], "offset": [-0.2, -0.1]});
+        for place in [turned, tip(all, [0.43, 0.75])] {
+            assert!(place.iter().all(|coordinate| (coordinate - 0.77).abs() < 0.03), "{place:?}");
+        }
+    }
+}

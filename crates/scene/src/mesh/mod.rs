@@ -1,0 +1,185 @@
+//! Mesh file → indexed triangles in object space, with normals if the file has them.
+//!
+//! The extension tells PLY, OBJ and glTF apart. PLY and OBJ are streamed, glTF is read whole. All
+//! keep single precision and leave nothing but the arrays of [`Mesh`] behind.
+
+mod beside;
+pub mod gltf;
+mod images;
+mod mtl;
+pub mod obj;
+pub mod ply;
+mod tangents;
+
+use std::path::{Path, PathBuf};
+
+use glam::Mat4;
+
+use super::{features::Ignored, instance::Budget, lamp::Lamp};
+use crate::{
+    error::{Error, Result},
+    files,
+    material::Material,
+    triangulate::triangulate_in_space,
+};
+
+/// Triangles in object space.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Vertex positions, metres before the object's scale.
+    pub positions: Vec<[f32; 3]>,
+    /// Vertex normals of any length, zero where there is none; as long as `positions`, or empty if
+    /// the mesh has no normals at all.
+    pub normals: Vec<[f32; 3]>,
+    /// Two sets of texture coordinates, each as long as `positions` or empty.
+    pub uvs: [Vec<[f32; 2]>; 2],
+    /// Tangents along u of the set that the normal texture reads, and the sign of the bitangent,
+    /// which points up in the image; zero where there is none. As long as `positions` or empty.
+    pub tangents: Vec<[f32; 4]>,
+    /// Linear Rec.709 colours and opacities, 0…1; as long as `positions` or empty.
+    pub colors: Vec<[f32; 4]>,
+    /// Three vertex indices per triangle, counter-clockwise seen from outside; all in range.
+    pub triangles: Vec<[u32; 3]>,
+    /// Runs of triangles of one material, in order from triangle 0; empty if the file has no materials.
+    pub runs: Vec<MaterialRun>,
+    /// Materials of the file.
+    pub materials: Vec<MeshMaterial>,
+    /// Cameras of the file.
+    pub cameras: Vec<MeshCamera>,
+    /// Lamps of the file.
+    pub lamps: Vec<Lamp>,
+    /// Meshes that the file repeats so often that they are not copied; none by [`Mesh::read`].
+    pub repeated: Vec<RepeatedMesh>,
+    /// Files beside the mesh file that were read for it: material libraries, buffers, images.
+    pub side_files: Vec<PathBuf>,
+}
+
+/// Mesh that a file places many times.
+#[derive(Clone, Debug)]
+pub struct RepeatedMesh {
+    /// The mesh in its own space, without materials of its own.
+    pub mesh: Box<Mesh>,
+    /// Index into [`Mesh::materials`] of the whole; none if the file gives no material.
+    pub material: Option<usize>,
+    /// Where it stands in the space of the file.
+    pub places: Vec<Mat4>,
+}
+
+/// Start of a run of triangles of one material; it ends where the next begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MaterialRun {
+    /// First triangle of the run.
+    pub first_triangle: usize,
+    /// Index into [`Mesh::materials`]; none if the file gives these triangles no material.
+    pub material: Option<usize>,
+}
+
+/// Camera of a mesh file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshCamera {
+    /// Names by which it can be called: its own and that of its node.
+    pub names: Vec<String>,
+    /// The camera looks along −Z, with +Y up.
+    pub world_from_camera: Mat4,
+    /// None for an orthographic camera.
+    pub perspective: Option<Perspective>,
+}
+
+impl MeshCamera {
+    /// Name for messages; `index` counts the cameras of the file.
+    pub fn label(&self, index: usize) -> String {
+        self.names.first().map_or_else(|| format!("camera {index}"), |name| format!("`{name}`"))
+    }
+}
+
+/// Lens of a perspective camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Perspective {
+    /// Angle between the bottom and top edges of the image, radians.
+    pub vertical_fov_rad: f32,
+    /// Width of the image over its height, if the file states it.
+    pub aspect_ratio: Option<f32>,
+}
+
+/// Material of a mesh file, with the parts of it that are left out.
+#[derive(Clone, Debug)]
+pub struct MeshMaterial {
+    /// The material; its name may be empty.
+    pub material: Material,
+    /// Parts of the material that are left out.
+    pub ignored: Ignored,
+}
+
+impl Mesh {
+    /// Reads a mesh file; adds what it leaves out to `warnings`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the file cannot be read, [`Error::Format`] or [`Error::Parse`] if its
+    /// content is invalid: unknown format, truncation, an index out of range.
+    pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
+        match files::extension(path).as_str() {
+            "ply" => ply::read(path),
+            "obj" => obj::read(path, warnings),
+            "gltf" | "glb" => gltf::read(path, None, warnings),
+            found => {
+                let found =
+                    if found.is_empty() { "no extension".into() } else { format!(".{found}") };
+                let expected = "expected a mesh in .ply, .obj, .gltf or .glb";
+                Err(Error::format(path, format!("{expected}, found {found}")))
+            }
+        }
+    }
+
+    /// As [`Mesh::read`], with what a glTF file repeats in [`Mesh::repeated`].
+    ///
+    /// # Errors
+    /// As [`Mesh::read`].
+    pub fn read_whole(path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
+        match files::extension(path).as_str() {
+            "gltf" | "glb" => gltf::read(path, Some(Budget::default()), warnings),
+            _ => Self::read(path, warnings),
+        }
+    }
+
+    /// Adds the triangles of a polygon, in the plane of its Newell normal.
+    fn push_polygon(&mut self, corners: &[u32]) {
+        let positions: Vec<_> =
+            corners.iter().map(|&corner| self.positions[corner as usize]).collect();
+        let triangles = triangulate_in_space(&positions);
+        self.triangles.extend(triangles.iter().map(|triangle| triangle.map(|at| corners[at])));
+    }
+
+    /// Parts that the materials in use hold and that are left out.
+    pub fn ignored_in_materials(&self) -> Ignored {
+        let mut ignored = Ignored::default();
+        for material in self.used_materials() {
+            ignored.merge(&material.ignored);
+        }
+        ignored
+    }
+
+    /// Materials of at least one triangle.
+    pub fn used_materials(&self) -> impl Iterator<Item = &MeshMaterial> {
+        let mut used = vec![false; self.materials.len()];
+        let ends = self.runs.iter().skip(1).map(|run| run.first_triangle);
+        for (run, end) in self.runs.iter().zip(ends.chain([self.triangles.len()])) {
+            if let Some(material) = run.material.filter(|_| run.first_triangle < end) {
+                used[material] = true;
+            }
+        }
+        for repeated in self.repeated.iter().filter_map(|repeated| repeated.material) {
+            used[repeated] = true;
+        }
+        self.materials.iter().zip(used).filter_map(|(material, used)| used.then_some(material))
+    }
+
+    /// Starts a run of triangles of `material` at the next triangle.
+    fn start_run(&mut self, material: Option<usize>) {
+        let first_triangle = self.triangles.len();
+        match self.runs.last_mut() {
+            Some(last) if last.first_triangle == first_triangle => last.material = material,
+            Some(last) if last.material == material => {}
+            _ => self.runs.push(MaterialRun { first_triangle, material }),
+        }
+    }
+}

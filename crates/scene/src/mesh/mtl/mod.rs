@@ -1,0 +1,172 @@
+//! MTL, the material libraries of OBJ files: one line at a time → materials.
+
+mod map;
+mod surface;
+
+use std::path::{Path, PathBuf};
+
+use glam::Vec3;
+
+use super::beside::path_beside;
+use crate::{
+    error::{Error, Result},
+    features::{self, Feature, Ignored},
+};
+use map::Map;
+
+/// Material library as far as it has been read.
+pub(super) struct Library<'a> {
+    /// Folder of the OBJ file.
+    folder: &'a Path,
+    /// Folder of the library, relative to `folder`.
+    within: PathBuf,
+    path: &'a Path,
+    pub(super) materials: Vec<LibraryMaterial>,
+}
+
+/// Material of a library: its keys as they stand.
+pub(super) struct LibraryMaterial {
+    pub(super) name: String,
+    ignored: Ignored,
+    /// Name of the library and number of the line that was read last, for messages.
+    place: String,
+    diffuse: Vec3,
+    specular: Vec3,
+    exponent: f32,
+    ior: Option<f32>,
+    model: u32,
+    opacity: Option<f32>,
+    transparency: Option<f32>,
+    filter: Option<Vec3>,
+    emission: Option<Vec3>,
+    roughness: Option<f32>,
+    metallic: Option<f32>,
+    color_map: Option<Map>,
+    opacity_map: Option<Map>,
+    emission_map: Option<Map>,
+    roughness_map: Option<Map>,
+    metallic_map: Option<Map>,
+    normal_map: Option<Map>,
+}
+
+impl LibraryMaterial {
+    fn new(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            ignored: Ignored::default(),
+            place: String::new(),
+            diffuse: Vec3::ONE,
+            specular: Vec3::ZERO,
+            exponent: 0.0,
+            ior: None,
+            model: 2,
+            opacity: None,
+            transparency: None,
+            filter: None,
+            emission: None,
+            roughness: None,
+            metallic: None,
+            color_map: None,
+            opacity_map: None,
+            emission_map: None,
+            roughness_map: None,
+            metallic_map: None,
+            normal_map: None,
+        }
+    }
+
+    fn ignore(&mut self, feature: Feature, kind: &str) {
+        let place = || format!("material `{}`, {}", self.name, self.place);
+        self.ignored.add_named(feature, kind, place);
+    }
+}
+
+impl<'a> Library<'a> {
+    /// Begins the library at `path`, which belongs to an OBJ file in `folder`.
+    pub(super) fn new(folder: &'a Path, path: &'a Path) -> Self {
+        let within = path.parent().and_then(|own| own.strip_prefix(folder).ok());
+        let within = within.unwrap_or(Path::new("")).to_owned();
+        Self { folder, within, path, materials: Vec::new() }
+    }
+
+    /// Reads a line into the last material, or begins one.
+    ///
+    /// # Errors
+    /// [`Error::Parse`] with the line for a colour that is none, or an image outside the folder of
+    /// the scene.
+    pub(super) fn read_line(&mut self, line: usize, text: &str) -> Result<()> {
+        let text = text.split('#').next().unwrap_or_default().trim();
+        let (key, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+        if key == "newmtl" {
+            self.materials.push(LibraryMaterial::new(rest.trim()));
+            return Ok(());
+        }
+        let Self { folder, within, path, materials } = self;
+        let Some(entry) = materials.last_mut().filter(|_| !key.is_empty()) else { return Ok(()) };
+        let file = path.file_name().unwrap_or_default().to_string_lossy();
+        entry.place = format!("{file}:{line}");
+        let error = |message: String| Error::parse(path, line, 1, message);
+        let numbers: Vec<f32> =
+            rest.split_ascii_whitespace().map_while(|word| word.parse().ok()).collect();
+        let share = numbers.first().filter(|n| n.is_finite()).map(|n| n.clamp(0.0, 1.0));
+        let color = match numbers[..] {
+            [grey] => Some(Vec3::splat(grey)),
+            [red, green, blue, ..] => Some(Vec3::new(red, green, blue)),
+            _ => None,
+        };
+        let color = color.filter(|color| color.is_finite() && color.min_element() >= 0.0);
+        let map = |entry: &mut LibraryMaterial| -> Result<Option<Map>> {
+            let (map, unknown) = map::parse(rest);
+            for option in unknown {
+                entry.ignore(features::MTL_OPTION, &format!("option `{option}`"));
+            }
+            let place = entry.place.clone();
+            let found = path_beside(folder, within, map.name).map_err(error)?;
+            Ok(Some(Map { path: found, place, options: map.options }))
+        };
+        match key.to_ascii_lowercase().as_str() {
+            "kd" => {
+                let color = color.filter(|color| color.max_element() <= 1.0);
+                entry.diffuse = color.ok_or_else(|| {
+                    error(format!("expected `Kd` with three numbers from 0 to 1, found `{text}`"))
+                })?;
+            }
+            "ks" => match color {
+                Some(color) => entry.specular = color.min(Vec3::ONE),
+                None => entry.ignore(features::MTL_KEY, "`Ks` that is no colour"),
+            },
+            "ke" => match color {
+                Some(color) => entry.emission = Some(color),
+                None => entry.ignore(features::MTL_KEY, "`Ke` that is no colour"),
+            },
+            "tf" => match color {
+                Some(color) => entry.filter = Some(color.min(Vec3::ONE)),
+                None => entry.ignore(features::MTL_KEY, "`Tf` that is no colour"),
+            },
+            "ns" => {
+                let exponent = numbers.first().filter(|n| n.is_finite() && **n > 0.0);
+                entry.exponent = exponent.copied().unwrap_or(0.0);
+            }
+            "ni" => entry.ior = numbers.first().copied(),
+            "illum" => match rest.trim().parse() {
+                Ok(model @ (0..=7 | 9)) => entry.model = model,
+                _ => entry.ignore(features::MTL_ILLUM_MODEL, &format!("`illum {}`", rest.trim())),
+            },
+            "d" if share.is_some() => entry.opacity = share,
+            "tr" if share.is_some() => entry.transparency = share,
+            "pr" if share.is_some() => entry.roughness = share,
+            "pm" if share.is_some() => entry.metallic = share,
+            "ka" if color == Some(Vec3::ZERO) => {}
+            "ka" => entry.ignore(features::MTL_KA, features::MTL_KA.name),
+            "map_kd" => entry.color_map = map(entry)?,
+            "map_d" => entry.opacity_map = map(entry)?,
+            "map_ke" => entry.emission_map = map(entry)?,
+            "map_pr" => entry.roughness_map = map(entry)?,
+            "map_pm" => entry.metallic_map = map(entry)?,
+            "norm" => entry.normal_map = map(entry)?,
+            "bump" | "map_bump" => entry.ignore(features::MTL_BUMP, features::MTL_BUMP.name),
+            _ => entry.ignore(features::MTL_KEY, &format!("`{key}`")),
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,130 @@
+//! Keys of an MTL material → the material of a scene.
+
+use glam::Vec3;
+
+use super::{LibraryMaterial, map::Map};
+use crate::{
+    features::{self, Feature},
+    material::{Emission, Material, MaterialKind, Opacity, Surface},
+    mesh::{
+        MeshMaterial,
+        images::{Images, has_alpha},
+    },
+    texture::{Channels, Encoding},
+};
+
+/// Refractive index of a material that states none, or one that a coat cannot have.
+const DEFAULT_IOR: f32 = 1.5;
+/// Refractive indices of coats and glass.
+const IOR_RANGE: std::ops::RangeInclusive<f32> = 1.01..=4.0;
+/// Roughness of a material that states no more than its metallic share.
+const DEFAULT_ROUGHNESS: f32 = 0.5;
+/// Opacity below which glass is a pane, and not a coat on a base that lets some light through.
+const PANE_OPACITY: f32 = 0.5;
+/// Largest component of a black colour.
+const BLACK: f32 = 1e-3;
+/// Smallest GGX width of a gloss that is not a mirror.
+const SMALLEST_WIDTH: f32 = 1e-3;
+
+impl LibraryMaterial {
+    /// Returns the material of the scene; reads its images.
+    pub(in crate::mesh) fn finish(
+        &self,
+        images: &mut Images,
+        warnings: &mut Vec<String>,
+    ) -> MeshMaterial {
+        let color_map = self.color_map.as_ref();
+        let color =
+            color_map.and_then(|map| map.load(Channels::Color, Encoding::Srgb, images, warnings));
+        let mut load = |map: &Option<Map>, channels, encoding| {
+            let map = map.as_ref()?;
+            map.load(map.options.channels.unwrap_or(channels), encoding, images, warnings)
+        };
+        let mut opacity_texture = load(&self.opacity_map, Channels::Color, Encoding::Linear);
+        if let (Some(opacity), None) =
+            (&mut opacity_texture, self.opacity_map.as_ref().and_then(|map| map.options.channels))
+            && has_alpha(&opacity.texture)
+        {
+            opacity.channels = Channels::Alpha;
+        }
+        // The transparent texels of a colour image cut the surface out.
+        if self.opacity_map.is_none()
+            && let (Some(map), Some(color)) = (color_map, &color)
+            && has_alpha(&color.texture)
+        {
+            let texture = color.texture.clone();
+            opacity_texture = Some(map.reading(texture, Channels::Alpha, Encoding::Linear));
+        }
+        let emission_texture = load(&self.emission_map, Channels::Color, Encoding::Srgb);
+        let mut surface = Surface {
+            roughness: load(&self.roughness_map, Channels::Color, Encoding::Linear),
+            metallic: load(&self.metallic_map, Channels::Color, Encoding::Linear),
+            normal: load(&self.normal_map, Channels::Color, Encoding::Linear),
+            normal_scale: self.normal_map.as_ref().map_or(1.0, |map| map.options.strength),
+            ..Surface::default()
+        };
+        // Files with images often leave the colour black that would multiply them.
+        let diffuse = if color.is_some() && self.diffuse.max_element() <= BLACK {
+            Vec3::ONE
+        } else {
+            self.diffuse
+        };
+        surface.color = color;
+        let mut ignored = self.ignored.clone();
+        let mut ignore = |feature: Feature| {
+            ignored.add(feature, || format!("material `{}`", self.name));
+        };
+        let opacity = self.opacity.or(self.transparency.map(|share| 1.0 - share)).unwrap_or(1.0);
+        let ior = self.ior.filter(|ior| IOR_RANGE.contains(ior)).unwrap_or(DEFAULT_IOR);
+        let is_glossy = self.specular.max_element() > 0.0 && self.model >= 2;
+        let is_pane = matches!(self.model, 4 | 6 | 7 | 9) && opacity < PANE_OPACITY;
+        let kind = if self.is_metallic_roughness() {
+            let one_if = |texture: bool, otherwise| if texture { 1.0 } else { otherwise };
+            let roughness = one_if(surface.roughness.is_some(), DEFAULT_ROUGHNESS);
+            MaterialKind::Principled {
+                base_color: diffuse,
+                metallic: self.metallic.unwrap_or(one_if(surface.metallic.is_some(), 0.0)),
+                roughness: self.roughness.unwrap_or(roughness),
+                ior,
+                specular: 1.0,
+                specular_color: Vec3::ONE,
+            }
+        } else if is_pane {
+            let tint = Vec3::ONE.lerp(diffuse, opacity);
+            let transmittance = self.filter.unwrap_or(tint);
+            MaterialKind::ThinDielectric { ior, reflectance: Vec3::ONE, transmittance }
+        } else if is_glossy && matches!(self.model, 3 | 5) && diffuse.max_element() <= BLACK {
+            MaterialKind::Mirror { reflectance: self.specular }
+        } else if is_glossy {
+            ignore(features::MTL_KS_COLOR);
+            // The width at which GGX and Blinn's cosine power are alike near the normal.
+            let alpha = (2.0 / (self.exponent + 2.0)).sqrt().clamp(SMALLEST_WIDTH, 1.0);
+            MaterialKind::Plastic { diffuse, alpha, ior }
+        } else {
+            MaterialKind::Diffuse { reflectance: diffuse }
+        };
+        if !is_pane && self.filter.is_some_and(|filter| filter != Vec3::ONE) {
+            ignore(features::MTL_TF);
+        }
+        surface.opacity = Opacity {
+            factor: if is_pane { 1.0 } else { opacity },
+            texture: opacity_texture,
+            cutoff: None,
+        };
+        let default = if emission_texture.is_some() { Vec3::ONE } else { Vec3::ZERO };
+        let radiance = self.emission.filter(|e| *e != Vec3::ZERO).unwrap_or(default);
+        if radiance != Vec3::ZERO {
+            let texture = emission_texture;
+            surface.emission = Some(Emission { radiance, texture, two_sided: true });
+        }
+        MeshMaterial { material: Material { name: self.name.clone(), kind, surface }, ignored }
+    }
+
+    /// Tests for the keys of the metallic-roughness extension.
+    fn is_metallic_roughness(&self) -> bool {
+        self.roughness.is_some()
+            || self.metallic.is_some()
+            || self.roughness_map.is_some()
+            || self.metallic_map.is_some()
+    }
+}

@@ -1,0 +1,355 @@
+//! PLY \[Turk 1994\]: ascii and binary in both byte orders.
+//!
+//! The header may name elements and properties in any order and of any type. The reader uses
+//! `x y z`, `nx ny nz`, texture coordinates and colours of `vertex` and the list `vertex_indices` (or
+//! `vertex_index`) of `face`. It triangulates polygons with more than three corners in the plane of
+//! their Newell normal.
+
+mod header;
+
+use std::{
+    io::{BufRead, BufReader, ErrorKind},
+    path::Path,
+};
+
+use flate2::read::MultiGzDecoder;
+use header::{Element, Encoding, Property, Scalar};
+
+use super::Mesh;
+use crate::{
+    error::{Error, Result},
+    files,
+    math::colour::srgb_to_linear,
+    memory,
+};
+
+/// Names of texture coordinates; (0, 0) is the lower left corner.
+const UV_NAMES: [[&str; 2]; 4] =
+    [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
+
+/// Names of colours, and of their opacity.
+const COLOR_NAMES: [[&str; 4]; 2] = [["red", "green", "blue", "alpha"], ["r", "g", "b", "a"]];
+
+/// Largest compression of gzip, which bounds what a compressed file may promise.
+const GZIP_LARGEST_RATIO: u64 = 1032;
+
+/// Bytes of a vertex (position, normal, coordinates) or of the triangles of a face.
+const ELEMENT_BYTES: u64 = 32;
+
+/// Reads a PLY file, or one compressed by gzip if its extension is `gz`.
+///
+/// # Errors
+/// [`Error::Io`], or [`Error::Format`] that names the element and what was expected and found.
+pub fn read(path: &Path) -> Result<Mesh> {
+    let file = files::open_regular(path)?;
+    let file_bytes = file.metadata().map_err(|source| Error::io(path, "read", source))?.len();
+    if files::extension(path) == "gz" {
+        let reader = BufReader::with_capacity(1 << 16, MultiGzDecoder::new(file));
+        return read_from(path, reader, file_bytes.saturating_mul(GZIP_LARGEST_RATIO));
+    }
+    read_from(path, BufReader::with_capacity(1 << 16, file), file_bytes)
+}
+
+fn read_from<R: BufRead>(path: &Path, reader: R, file_bytes: u64) -> Result<Mesh> {
+    let mut source = Source { path, reader, encoding: Encoding::Ascii, bytes_read: 0, line: 1 };
+    let elements = source.read_header()?;
+    let mut mesh = Mesh::default();
+    let vertex_count = vertex_count(path, &elements)?;
+    let body_bytes = file_bytes.saturating_sub(source.bytes_read);
+    for element in &elements {
+        let least = element.least_bytes(source.encoding);
+        // An ascii file without a final newline is one byte shorter.
+        if least > body_bytes + 1 {
+            return Err(Error::format(
+                path,
+                format!(
+                    "truncated: {} elements `{}` need at least {least} bytes, the file has \
+                     {body_bytes} after its header",
+                    element.count, element.name
+                ),
+            ));
+        }
+    }
+    let count = elements.iter().map(|element| element.count).fold(0, u64::saturating_add);
+    memory::check(path.display(), count.saturating_mul(ELEMENT_BYTES)).map_err(Error::memory)?;
+    let mut polygons = Polygons::default();
+    for element in &elements {
+        match element.name.as_str() {
+            "vertex" => source.read_vertices(element, &mut mesh)?,
+            "face" => source.read_faces(element, vertex_count, &mut mesh, &mut polygons)?,
+            "tristrips" if element.count > 0 => {
+                return Err(Error::format(
+                    path,
+                    "triangle strips (element `tristrips`) are not supported; write the mesh with \
+                     faces",
+                ));
+            }
+            _ => source.skip(element)?,
+        }
+    }
+    polygons.triangulate_into(&mut mesh);
+    Ok(mesh)
+}
+
+fn vertex_count(path: &Path, elements: &[Element]) -> Result<u32> {
+    for name in ["vertex", "face"] {
+        let found = elements.iter().filter(|element| element.name == name).count();
+        if found != 1 {
+            let expected = format!("expected one element `{name}`, found {found}");
+            return Err(Error::format(path, expected));
+        }
+    }
+    let count = elements.iter().find(|element| element.name == "vertex").map_or(0, |v| v.count);
+    u32::try_from(count).map_err(|_| {
+        Error::format(path, format!("{count} vertices, at most {} can be used", u32::MAX))
+    })
+}
+
+/// Corners of the faces with more than three, kept until all positions are known.
+#[derive(Debug, Default)]
+struct Polygons {
+    corners: Vec<u32>,
+    ends: Vec<usize>,
+}
+
+impl Polygons {
+    fn triangulate_into(self, mesh: &mut Mesh) {
+        let mut start = 0;
+        for end in self.ends {
+            mesh.push_polygon(&self.corners[start..end]);
+            start = end;
+        }
+    }
+}
+
+/// Reader with its position in the file.
+struct Source<'a, R> {
+    path: &'a Path,
+    reader: R,
+    encoding: Encoding,
+    bytes_read: u64,
+    /// Line of an ascii file, from 1.
+    line: usize,
+}
+
+impl<R: BufRead> Source<'_, R> {
+    fn error(&self, message: impl Into<String>) -> Error {
+        match self.encoding {
+            Encoding::Ascii => Error::parse(self.path, self.line, 1, message),
+            _ => Error::format(self.path, message),
+        }
+    }
+
+    fn read_vertices(&mut self, element: &Element, mesh: &mut Mesh) -> Result<()> {
+        let column = |name: &str| {
+            element
+                .properties
+                .iter()
+                .position(|property| property.name == name && property.list_count.is_none())
+        };
+        let positions = [column("x"), column("y"), column("z")];
+        if positions.contains(&None) {
+            return Err(Error::format(
+                self.path,
+                "expected the properties `x`, `y` and `z` of element `vertex`",
+            ));
+        }
+        let normals = [column("nx"), column("ny"), column("nz")];
+        let has_normals = !normals.contains(&None);
+        let uvs = UV_NAMES.map(|[u, v]| Some([column(u)?, column(v)?]));
+        let uvs = uvs.into_iter().flatten().next();
+        let colors =
+            COLOR_NAMES.map(|[r, g, b, a]| Some(([column(r)?, column(g)?, column(b)?], column(a))));
+        let colors = colors.into_iter().flatten().next();
+        mesh.positions.reserve_exact(element.count as usize);
+        if colors.is_some() {
+            mesh.colors.reserve_exact(element.count as usize);
+        }
+        if has_normals {
+            mesh.normals.reserve_exact(element.count as usize);
+        }
+        if uvs.is_some() {
+            mesh.uvs[0].reserve_exact(element.count as usize);
+        }
+        let mut row = vec![0.0_f64; element.properties.len()];
+        for index in 0..element.count {
+            for (property, value) in element.properties.iter().zip(&mut row) {
+                let place = Place { element, index };
+                if let Some(count) = property.list_count {
+                    self.skip_list(count, property, place)?;
+                } else {
+                    *value = self.scalar(property.value, place)?;
+                }
+            }
+            let vector = |columns: [Option<usize>; 3]| {
+                columns.map(|column| column.map_or(0.0, |column| row[column] as f32))
+            };
+            mesh.positions.push(vector(positions));
+            if has_normals {
+                mesh.normals.push(vector(normals));
+            }
+            if let Some((columns, opacity)) = colors {
+                let number = |column: usize| match element.properties[column].value.largest() {
+                    Some(largest) => {
+                        ((row[column] / largest) as f32, srgb_to_linear as fn(f32) -> f32)
+                    }
+                    None => (row[column] as f32, std::convert::identity as fn(f32) -> f32),
+                };
+                let [r, g, b] = columns.map(number).map(|(value, decode)| decode(value));
+                mesh.colors.push([r, g, b, opacity.map_or(1.0, |column| number(column).0)]);
+            }
+            if let Some(columns) = uvs {
+                mesh.uvs[0].push(columns.map(|column| row[column] as f32));
+            }
+        }
+        Ok(())
+    }
+
+    fn read_faces(
+        &mut self,
+        element: &Element,
+        vertex_count: u32,
+        mesh: &mut Mesh,
+        polygons: &mut Polygons,
+    ) -> Result<()> {
+        let is_indices =
+            |property: &Property| matches!(&*property.name, "vertex_indices" | "vertex_index");
+        if element.count > 0
+            && !element.properties.iter().any(|p| is_indices(p) && p.list_count.is_some())
+        {
+            return Err(Error::format(
+                self.path,
+                "expected the list property `vertex_indices` of element `face`",
+            ));
+        }
+        mesh.triangles.reserve_exact(element.count as usize);
+        let mut corners = Vec::new();
+        for index in 0..element.count {
+            for property in &element.properties {
+                let place = Place { element, index };
+                match property.list_count {
+                    Some(count_type) if is_indices(property) => {
+                        let count = self.list_count(count_type, place)?;
+                        corners.clear();
+                        for _ in 0..count {
+                            let corner = self.scalar(property.value, place)?;
+                            if !(corner >= 0.0 && corner < f64::from(vertex_count)) {
+                                return Err(self.error(format!(
+                                    "face {index} of {}: vertex index {corner} is out of range, \
+                                     the file has {vertex_count} vertices",
+                                    element.count
+                                )));
+                            }
+                            corners.push(corner as u32);
+                        }
+                        match corners.as_slice() {
+                            &[a, b, c] => mesh.triangles.push([a, b, c]),
+                            [] | [_] | [_, _] => {}
+                            polygon => {
+                                polygons.corners.extend_from_slice(polygon);
+                                polygons.ends.push(polygons.corners.len());
+                            }
+                        }
+                    }
+                    Some(count) => self.skip_list(count, property, place)?,
+                    None => {
+                        self.scalar(property.value, place)?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn skip(&mut self, element: &Element) -> Result<()> {
+        for index in 0..element.count {
+            for property in &element.properties {
+                let place = Place { element, index };
+                if let Some(count) = property.list_count {
+                    self.skip_list(count, property, place)?;
+                } else {
+                    self.scalar(property.value, place)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn skip_list(&mut self, count: Scalar, property: &Property, place: Place) -> Result<()> {
+        for _ in 0..self.list_count(count, place)? {
+            self.scalar(property.value, place)?;
+        }
+        Ok(())
+    }
+
+    fn list_count(&mut self, count_type: Scalar, place: Place) -> Result<u64> {
+        let count = self.scalar(count_type, place)?;
+        if count >= 0.0 && count.fract() == 0.0 {
+            Ok(count as u64)
+        } else {
+            Err(self.error(format!("{place}: {count} is not the length of a list")))
+        }
+    }
+
+    fn scalar(&mut self, scalar: Scalar, place: Place) -> Result<f64> {
+        if self.encoding == Encoding::Ascii {
+            return self.ascii_scalar(place);
+        }
+        let byte_count = scalar.byte_count();
+        let mut bytes = [0_u8; 8];
+        match self.reader.read_exact(&mut bytes[..byte_count]) {
+            Ok(()) => {}
+            Err(error) if error.kind() == ErrorKind::UnexpectedEof => {
+                return Err(self.error(format!("truncated: the file ends in {place}")));
+            }
+            Err(error) => return Err(Error::io(self.path, "read", error)),
+        }
+        if self.encoding == Encoding::BinaryBigEndian {
+            bytes[..byte_count].reverse();
+        }
+        Ok(scalar.value(bytes))
+    }
+
+    fn ascii_scalar(&mut self, place: Place) -> Result<f64> {
+        // A double needs at most 24 characters; a word longer than this array is refused.
+        let mut word = [0_u8; 64];
+        let mut length = 0;
+        loop {
+            let buffer =
+                self.reader.fill_buf().map_err(|source| Error::io(self.path, "read", source))?;
+            let Some(&byte) = buffer.first() else { break };
+            if byte.is_ascii_whitespace() && length > 0 {
+                break;
+            }
+            self.reader.consume(1);
+            self.line += usize::from(byte == b'\n');
+            if !byte.is_ascii_whitespace() {
+                if length == word.len() {
+                    return Err(
+                        self.error(format!("{place}: expected a number, found a long word"))
+                    );
+                }
+                word[length] = byte;
+                length += 1;
+            }
+        }
+        if length == 0 {
+            return Err(self.error(format!("truncated: the file ends in {place}")));
+        }
+        let word = String::from_utf8_lossy(&word[..length]);
+        word.parse().map_err(|_| self.error(format!("{place}: expected a number, found `{word}`")))
+    }
+}
+
+/// Element of the file, for messages.
+#[derive(Clone, Copy)]
+struct Place<'a> {
+    element: &'a Element,
+    index: u64,
+}
+
+impl std::fmt::Display for Place<'_> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(formatter, "{} {} of {}", self.element.name, self.index, self.element.count)
+    }
+}

@@ -1,0 +1,405 @@
+//! Reflection models → [`MaterialKind`] and [`Surface`].
+
+use glam::Vec3;
+
+use super::{
+    Reader,
+    document::Node,
+    media,
+    parameters::Parameters,
+    spectra::{self, Role},
+    textures::Value,
+    values,
+};
+use crate::{
+    MIN_ALPHA,
+    blend::{Share, blend},
+    coat::albedo_below_coat,
+    error::Result,
+    features,
+    material::{ConductorFresnel, MaterialKind, Opacity, Surface},
+    math::colour::luminance,
+    texture::TextureUse,
+};
+
+/// Most models in one another; a model may name itself.
+const MAX_DEPTH: usize = 16;
+/// Index ratio below which a coat reflects next to nothing, and is left out.
+const LEAST_COAT_IOR: f32 = 1.01;
+/// Refractive indices that a coat may have, and those of a dielectric.
+const MAX_COAT_IOR: f32 = 4.0;
+const IOR_RANGE: (f32, f32) = (0.1, 10.0);
+
+/// Width of the distribution of a rough model.
+struct Width {
+    alpha: f32,
+    /// Factor of √α, for which `alpha` is then 1.
+    texture: Option<TextureUse>,
+}
+
+/// Reflection of a material with its textures and opacity.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Reflection model.
+    pub kind: MaterialKind,
+    /// Textures, opacity, sides.
+    pub surface: Surface,
+}
+
+impl Model {
+    fn new(kind: MaterialKind) -> Self {
+        Self { kind, surface: Surface { two_sided: false, ..Surface::default() } }
+    }
+
+    /// Model whose first factor is `value`.
+    fn colored(value: Value, kind: impl FnOnce(Vec3) -> MaterialKind) -> Self {
+        let is_of_vertices = value.is_of_vertices();
+        let (factor, texture) = value.split();
+        let mut model = Self::new(kind(factor));
+        model.surface.color = texture;
+        model.surface.vertex_color = is_of_vertices;
+        model
+    }
+
+    /// The same with a factor of the roughness by place.
+    fn of_roughness(mut self, texture: Option<TextureUse>) -> Self {
+        self.surface.roughness = texture;
+        self
+    }
+
+    /// Model of a shape that names none.
+    pub fn default_of_shapes() -> Self {
+        Self::new(MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) })
+    }
+}
+
+impl Reader<'_> {
+    /// Reads a reflection model and those in it.
+    pub fn model(&mut self, node: Node<'_>) -> Result<Model> {
+        self.nested(node, MAX_DEPTH)
+    }
+
+    fn nested(&mut self, node: Node<'_>, depth_left: usize) -> Result<Model> {
+        let Some(depth_left) = depth_left.checked_sub(1) else {
+            return Err(node.error("a bsdf contains itself, or is nested too deep"));
+        };
+        let parameters = Parameters::new(node);
+        let model = match node.kind() {
+            "twosided" => self.two_sided(&parameters, depth_left)?,
+            "mask" => self.mask(&parameters, depth_left)?,
+            "blendbsdf" => self.blend(&parameters, depth_left)?,
+            "bumpmap" | "bump" => {
+                self.ignored.add(features::MI_BUMP_MAP, || node.place());
+                let model = self.inner(&parameters, depth_left)?;
+                parameters.without_effect(&["arbitrary", "scale"]);
+                parameters.objects("texture")?;
+                model
+            }
+            "normalmap" => self.normal_map(&parameters, depth_left)?,
+            "null" => Model {
+                kind: MaterialKind::Diffuse { reflectance: Vec3::ZERO },
+                surface: Surface {
+                    opacity: Opacity { factor: 0.0, ..Opacity::default() },
+                    ..Surface::default()
+                },
+            },
+            "diffuse" => {
+                let mut value = self.value(&parameters, "reflectance", Role::Reflectance)?;
+                if value.is_none() {
+                    value = self.value(&parameters, "diffuse_reflectance", Role::Reflectance)?;
+                }
+                let value = value.unwrap_or(Value::Color(Vec3::splat(0.5)));
+                Model::colored(value, |reflectance| MaterialKind::Diffuse { reflectance })
+            }
+            "plastic" => self.plastic(&parameters, MIN_ALPHA)?,
+            "roughplastic" => {
+                let Width { alpha, texture } = self.width(&parameters)?;
+                self.plastic(&parameters, alpha)?.of_roughness(texture)
+            }
+            "conductor" => self.conductor(&parameters, None)?,
+            "roughconductor" => {
+                let Width { alpha, texture } = self.width(&parameters)?;
+                self.conductor(&parameters, Some(alpha))?.of_roughness(texture)
+            }
+            "dielectric" => self.dielectric(&parameters, 0.0)?,
+            "roughdielectric" => {
+                let Width { alpha, texture } = self.width(&parameters)?;
+                self.dielectric(&parameters, alpha)?.of_roughness(texture)
+            }
+            "thindielectric" => self.thin_dielectric(&parameters)?,
+            "principled" => self.principled(&parameters)?,
+            found => {
+                return Err(node.error(format!(
+                    "the reflection model `{found}` is not rendered; expected diffuse, plastic, \
+                     roughplastic, conductor, roughconductor, dielectric, roughdielectric, \
+                     thindielectric, principled, twosided, mask, blendbsdf, normalmap, bumpmap or \
+                     null"
+                )));
+            }
+        };
+        parameters.finish(&mut self.ignored);
+        Ok(model)
+    }
+
+    /// The one model in another.
+    fn inner(&mut self, parameters: &Parameters<'_>, depth_left: usize) -> Result<Model> {
+        match parameters.objects("bsdf")?.first() {
+            Some(&inner) => self.nested(inner, depth_left),
+            None => {
+                let kind = parameters.node.kind();
+                Err(parameters.node.error(format!("{kind}: expected a bsdf in it, found none")))
+            }
+        }
+    }
+
+    fn two_sided(&mut self, parameters: &Parameters<'_>, depth_left: usize) -> Result<Model> {
+        let mut model = self.inner(parameters, depth_left)?;
+        if let Some(second) = parameters.objects("bsdf")?.get(1) {
+            self.ignored.add(features::MI_TWO_MODELS, || second.place());
+        }
+        model.surface.two_sided = true;
+        Ok(model)
+    }
+
+    fn mask(&mut self, parameters: &Parameters<'_>, depth_left: usize) -> Result<Model> {
+        let mut model = self.inner(parameters, depth_left)?;
+        let opacity = self.value(parameters, "opacity", Role::Reflectance)?;
+        self.cut(&mut model, parameters.node, opacity.unwrap_or(Value::Color(Vec3::splat(0.5))));
+        Ok(model)
+    }
+
+    /// Multiplies the opacity of a model; of two textures, names the inner one.
+    fn cut(&mut self, model: &mut Model, node: Node<'_>, opacity: Value) {
+        let (factor, texture) = opacity.split();
+        let own = &mut model.surface.opacity;
+        own.factor *= luminance(factor);
+        if texture.is_some() {
+            if own.texture.is_some() {
+                let name = "second `opacity` texture of nested masks";
+                self.ignored.add_named(features::MI_PARAMETER, name, || node.place());
+            }
+            own.texture = texture;
+        }
+    }
+
+    /// Mixture of two models: an opacity if one of them is `null`, else the greater of them if they do
+    /// not mix.
+    fn blend(&mut self, parameters: &Parameters<'_>, depth_left: usize) -> Result<Model> {
+        let node = parameters.node;
+        let [first, second] = parameters.objects("bsdf")?[..] else {
+            return Err(node.error("blendbsdf: expected two bsdfs in it"));
+        };
+        let weight = self.value(parameters, "weight", Role::Reflectance)?;
+        let weight = weight.unwrap_or(Value::Color(Vec3::splat(0.5)));
+        if second.kind() == "null" {
+            let mut model = self.nested(first, depth_left)?;
+            let opacity = match weight {
+                Value::Color(weight) | Value::Vertices(weight) => Value::Color(Vec3::ONE - weight),
+                Value::Texture(mut texture) => {
+                    texture.scale = texture.scale.map(|scale| -scale);
+                    texture.bias = texture.bias.map(|bias| 1.0 - bias);
+                    Value::Texture(texture)
+                }
+            };
+            self.cut(&mut model, node, opacity);
+            return Ok(model);
+        }
+        if first.kind() == "null" {
+            let mut model = self.nested(second, depth_left)?;
+            self.cut(&mut model, node, weight);
+            return Ok(model);
+        }
+        let [first, second] = [self.nested(first, depth_left)?, self.nested(second, depth_left)?];
+        let share = match weight {
+            Value::Texture(image) => Share::Image(*image),
+            Value::Color(weight) | Value::Vertices(weight) => {
+                Share::Constant(luminance(weight).clamp(0.0, 1.0))
+            }
+        };
+        let pair = [&first, &second].map(|model| (&model.kind, &model.surface));
+        if let Some((kind, surface)) = blend(pair, &share) {
+            return Ok(Model { kind, surface });
+        }
+        let takes_second = matches!(share, Share::Constant(share) if share > 0.5);
+        if !matches!(share, Share::Constant(0.0 | 1.0)) {
+            self.ignored.add(features::MI_BLEND, || node.place());
+        }
+        Ok(if takes_second { second } else { first })
+    }
+
+    fn normal_map(&mut self, parameters: &Parameters<'_>, depth_left: usize) -> Result<Model> {
+        let mut model = self.inner(parameters, depth_left)?;
+        parameters.without_effect(&["flip_invalid_normals", "use_shadowing_function"]);
+        match self.value(parameters, "normalmap", Role::Index)? {
+            Some(Value::Texture(texture)) => model.surface.normal = Some(*texture),
+            _ => return Err(parameters.node.error("normalmap: expected the texture `normalmap`")),
+        }
+        Ok(model)
+    }
+
+    /// Width of the distribution of a rough model.
+    fn width(&mut self, parameters: &Parameters<'_>) -> Result<Width> {
+        let node = parameters.node;
+        match parameters.string("distribution")? {
+            Some("ggx") => {}
+            None | Some("beckmann" | "phong" | "as") => {
+                self.ignored.add(features::MI_BECKMANN, || node.place());
+            }
+            Some(found) => {
+                let message = format!("distribution: expected ggx or beckmann, found `{found}`");
+                return Err(node.error(message));
+            }
+        }
+        parameters.without_effect(&["sample_visible", "specular_sampling_weight"]);
+        let mut width = |name: &str| self.value(parameters, name, Role::Index);
+        let value = match (width("alpha_u")?, width("alpha_v")?) {
+            (Some(Value::Color(u)), Some(Value::Color(v))) => {
+                if u != v {
+                    self.ignored.add(features::MI_ANISOTROPIC, || node.place());
+                }
+                Some(Value::Color(0.5 * (u + v)))
+            }
+            (Some(one), other) => {
+                if !matches!((&one, &other), (Value::Texture(u), Some(Value::Texture(v))) if u == v)
+                {
+                    self.ignored.add(features::MI_ANISOTROPIC, || node.place());
+                }
+                Some(one)
+            }
+            (None, one) => one.or(width("alpha")?),
+        };
+        Ok(match value {
+            Some(Value::Texture(texture)) => {
+                let root = |alpha: f32| alpha.clamp(MIN_ALPHA, 1.0).sqrt();
+                Width { alpha: 1.0, texture: Some(texture.mapped(root)) }
+            }
+            value => {
+                let alpha = self.without_texture(value, node, features::MI_ALPHA_TEXTURE);
+                let alpha = alpha.map_or(0.1, |alpha| alpha.x).clamp(MIN_ALPHA, 1.0);
+                Width { alpha, texture: None }
+            }
+        })
+    }
+
+    /// Index of the inside over that of the outside.
+    fn ior(&mut self, parameters: &Parameters<'_>, inside: &str) -> Result<f32> {
+        let index = |name: &str, default: &str| {
+            let Some(node) = parameters.any(name)? else {
+                return Ok(media::dielectric(default).unwrap_or(1.0));
+            };
+            if node.tag() != "string" {
+                return values::float(node);
+            }
+            let medium = values::value(node)?;
+            media::dielectric(medium).ok_or_else(|| {
+                let names = media::dielectric_names();
+                node.error(format!("{name}: expected a number or one of {names}, found `{medium}`"))
+            })
+        };
+        let (int_ior, ext_ior) = (index("int_ior", inside)?, index("ext_ior", "air")?);
+        let ior = int_ior / ext_ior;
+        if (IOR_RANGE.0..=IOR_RANGE.1).contains(&ior) {
+            return Ok(ior);
+        }
+        let (low, high) = IOR_RANGE;
+        Err(parameters.node.error(format!(
+            "int_ior {int_ior} over ext_ior {ext_ior}: expected a ratio of {low} to {high}"
+        )))
+    }
+
+    fn plastic(&mut self, parameters: &Parameters<'_>, alpha: f32) -> Result<Model> {
+        let node = parameters.node;
+        let ior = self.ior(parameters, "polypropylene")?;
+        let value = self.value(parameters, "diffuse_reflectance", Role::Reflectance)?;
+        let specular = self.value(parameters, "specular_reflectance", Role::Reflectance)?;
+        if !matches!(specular, None | Some(Value::Color(Vec3::ONE))) {
+            self.ignored.add(features::MI_SPECULAR, || node.place());
+        }
+        let is_nonlinear = parameters.boolean("nonlinear")?.unwrap_or(false);
+        let mut value = value.unwrap_or(Value::Color(Vec3::splat(0.5)));
+        if ior > MAX_COAT_IOR {
+            let message = format!("int_ior over ext_ior: expected at most 4, found {ior}");
+            return Err(node.error(message));
+        }
+        if is_nonlinear {
+            value = value.mapped(albedo_below_coat(ior));
+        }
+        Ok(Model::colored(value, |diffuse| {
+            if ior < LEAST_COAT_IOR {
+                MaterialKind::Diffuse { reflectance: diffuse }
+            } else {
+                MaterialKind::Plastic { diffuse, alpha, ior }
+            }
+        }))
+    }
+
+    /// Metal; `alpha` is none for a smooth one.
+    fn conductor(&mut self, parameters: &Parameters<'_>, alpha: Option<f32>) -> Result<Model> {
+        let node = parameters.node;
+        let material = parameters.string("material")?;
+        let eta = spectra::parameter(parameters, "eta", Role::Index)?;
+        let k = spectra::parameter(parameters, "k", Role::Index)?;
+        let outside = match parameters.any("ext_eta")? {
+            Some(node) if node.tag() != "string" => values::float(node)?,
+            Some(node) => media::dielectric(values::value(node)?).unwrap_or(1.0),
+            None => 1.0,
+        };
+        let metal = match (material, eta, k) {
+            (None, Some(eta), Some(k)) => Some((eta, k)),
+            (None | Some("none"), None, None) => None,
+            (Some(name), None, None) => Some(media::conductor(name).ok_or_else(|| {
+                let names = media::conductor_names();
+                node.error(format!("material: expected none or one of {names}, found `{name}`"))
+            })?),
+            _ => return Err(node.error("expected either `material` or both `eta` and `k`")),
+        };
+        let value = self.value(parameters, "specular_reflectance", Role::Reflectance)?;
+        let value = value.unwrap_or(Value::Color(Vec3::ONE));
+        let width = alpha.unwrap_or(MIN_ALPHA);
+        let Some((eta, k)) = metal else {
+            return Ok(Model::colored(value, |reflectance| match alpha {
+                None => MaterialKind::Mirror { reflectance },
+                Some(alpha) => MaterialKind::Conductor {
+                    alpha,
+                    // An ideal mirror reflects the same at all angles only if it is white.
+                    fresnel: ConductorFresnel::Schlick { reflectance },
+                },
+            }));
+        };
+        let (eta, k) = (eta.max(Vec3::splat(0.01)) / outside, k / outside);
+        if matches!(value, Value::Color(Vec3::ONE)) {
+            let fresnel = ConductorFresnel::Exact { eta, k };
+            return Ok(Model::new(MaterialKind::Conductor { alpha: width, fresnel }));
+        }
+        let normal = ((eta - 1.0) * (eta - 1.0) + k * k) / ((eta + 1.0) * (eta + 1.0) + k * k);
+        Ok(Model::colored(value, |factor| MaterialKind::Conductor {
+            alpha: width,
+            fresnel: ConductorFresnel::Schlick { reflectance: factor * normal },
+        }))
+    }
+
+    /// Factors of reflected and transmitted light.
+    fn glass_colors(&mut self, parameters: &Parameters<'_>) -> Result<[Vec3; 2]> {
+        let mut color = |name: &str| {
+            let value = self.value(parameters, name, Role::Reflectance)?;
+            let feature = features::MI_SPECULAR_TEXTURE;
+            let color = self.without_texture(value, parameters.node, feature);
+            Ok(color.unwrap_or(Vec3::ONE))
+        };
+        Ok([color("specular_reflectance")?, color("specular_transmittance")?])
+    }
+
+    fn dielectric(&mut self, parameters: &Parameters<'_>, alpha: f32) -> Result<Model> {
+        let ior = self.ior(parameters, "bk7")?;
+        let [reflectance, transmittance] = self.glass_colors(parameters)?;
+        let kind = MaterialKind::Dielectric { ior, alpha, reflectance, transmittance };
+        Ok(Model { kind, surface: Surface::default() })
+    }
+
+    fn thin_dielectric(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+        let ior = self.ior(parameters, "bk7")?;
+        let [reflectance, transmittance] = self.glass_colors(parameters)?;
+        let kind = MaterialKind::ThinDielectric { ior, reflectance, transmittance };
+        Ok(Model { kind, surface: Surface::default() })
+    }
+}

@@ -1,0 +1,150 @@
+//! Lights: lamps, the environment, and the emission of shapes.
+
+use glam::{DMat4, DVec3, Vec3};
+
+use super::{
+    Reader,
+    document::Node,
+    environment,
+    parameters::Parameters,
+    spectra::{self, Role},
+    textures::Value,
+};
+use crate::{
+    EnvironmentMap, Lamp,
+    error::Result,
+    features,
+    lamp::{LampKind, SpotFalloff},
+    material::Emission,
+};
+
+impl Reader<'_> {
+    /// Reads an emitter that belongs to no shape.
+    pub(super) fn emitter(&mut self, node: Node<'_>) -> Result<()> {
+        let parameters = Parameters::new(node);
+        let kind = match node.kind() {
+            "constant" => {
+                let radiance = light(&parameters, "radiance")?;
+                let map = EnvironmentMap::constant(radiance, 1.0);
+                self.surround(node, map.map_err(|message| node.error(message))?)?;
+                None
+            }
+            "envmap" => {
+                let map = self.environment_map(&parameters)?;
+                self.surround(node, map)?;
+                None
+            }
+            "point" => Some(point(&parameters)?),
+            "spot" => Some(self.spot(&parameters)?),
+            "directional" | "distant" => Some(directional(&parameters)?),
+            "area" => return Err(node.error("an area light must stand in a shape")),
+            found => {
+                return Err(node.error(format!(
+                    "the emitter `{found}` is not rendered; expected area, point, spot, \
+                     directional, constant or envmap"
+                )));
+            }
+        };
+        parameters.without_effect(&["sampling_weight"]);
+        parameters.finish(&mut self.ignored);
+        if let Some(kind) = kind {
+            let name = node.attribute("id").unwrap_or_default().to_owned();
+            self.lamps.push(Lamp { name, kind });
+        }
+        Ok(())
+    }
+
+    /// Takes the environment, of which there is one.
+    fn surround(&mut self, node: Node<'_>, map: EnvironmentMap) -> Result<()> {
+        if self.environment.is_some() {
+            return Err(node.error("expected at most one envmap or constant, found another"));
+        }
+        self.environment = Some(map);
+        Ok(())
+    }
+
+    fn environment_map(&mut self, parameters: &Parameters<'_>) -> Result<EnvironmentMap> {
+        let node = parameters.node;
+        let Some(name) = parameters.string("filename")? else {
+            return Err(node.error("envmap: expected the parameter `filename`"));
+        };
+        let path = node.file(name)?;
+        let scale = parameters.float_in("scale", (0.0, f32::MAX))?.unwrap_or(1.0);
+        let matrix = parameters.transform("to_world")?;
+        parameters.without_effect(&["mis_compensation", "cache", "gamma"]);
+        let map = environment::load(&path, scale, matrix, &mut self.warnings)?;
+        self.inputs.push(path);
+        map.ok_or_else(|| {
+            node.error("to_world: expected a rotation, found a matrix without inverse")
+        })
+    }
+
+    fn spot(&mut self, parameters: &Parameters<'_>) -> Result<LampKind> {
+        let node = parameters.node;
+        let matrix = parameters.transform("to_world")?;
+        let outer = parameters.float_in("cutoff_angle", (0.01, 179.0))?.unwrap_or(20.0);
+        let inner = parameters.float_in("beam_width", (0.0, 179.0))?.unwrap_or(0.75 * outer);
+        if parameters.any("texture")?.is_some() {
+            self.ignored.add(features::MI_SPOT_TEXTURE, || node.place());
+        }
+        Ok(LampKind::Spot {
+            position: matrix.w_axis.truncate().as_vec3(),
+            direction: along_z(node, matrix)?,
+            intensity: light(parameters, "intensity")?,
+            // A sharp edge is a steep one.
+            inner_angle_rad: inner.min(0.999 * outer).to_radians(),
+            outer_angle_rad: outer.to_radians(),
+            falloff: SpotFalloff::LinearAngle,
+        })
+    }
+
+    /// Reads the light of a shape; none if it has none.
+    pub(super) fn emission(&mut self, node: Node<'_>) -> Result<Emission> {
+        if node.kind() != "area" {
+            let found = node.kind();
+            let message = format!("the emitter `{found}` cannot stand in a shape; expected area");
+            return Err(node.error(message));
+        }
+        let parameters = Parameters::new(node);
+        let value = self.value(&parameters, "radiance", Role::Light)?;
+        parameters.without_effect(&["sampling_weight"]);
+        parameters.finish(&mut self.ignored);
+        let value = value.unwrap_or(Value::Color(Vec3::ONE));
+        if value.is_of_vertices() {
+            return Err(node.error("radiance: expected a colour or a bitmap, found vertex colours"));
+        }
+        let (radiance, texture) = value.split();
+        Ok(Emission { radiance, texture, two_sided: false })
+    }
+}
+
+fn light(parameters: &Parameters<'_>, name: &str) -> Result<Vec3> {
+    Ok(spectra::parameter(parameters, name, Role::Light)?.unwrap_or(Vec3::ONE))
+}
+
+fn point(parameters: &Parameters<'_>) -> Result<LampKind> {
+    let position = match parameters.vector("position")? {
+        Some(position) => position,
+        None => parameters.transform("to_world")?.w_axis.truncate().as_vec3(),
+    };
+    Ok(LampKind::Point { position, intensity: light(parameters, "intensity")? })
+}
+
+fn directional(parameters: &Parameters<'_>) -> Result<LampKind> {
+    let node = parameters.node;
+    let direction = match parameters.vector("direction")? {
+        Some(direction) => direction
+            .try_normalize()
+            .ok_or_else(|| node.error("direction: expected a vector other than 0, found 0 0 0"))?,
+        None => along_z(node, parameters.transform("to_world")?)?,
+    };
+    Ok(LampKind::Directional { direction, irradiance: light(parameters, "irradiance")? })
+}
+
+/// Unit direction of the z axis of a placed object.
+fn along_z(node: Node<'_>, matrix: DMat4) -> Result<Vec3> {
+    let direction = matrix.transform_vector3(DVec3::Z).try_normalize();
+    direction
+        .map(|direction| direction.as_vec3())
+        .ok_or_else(|| node.error("to_world: expected a matrix with an inverse"))
+}

@@ -1,0 +1,148 @@
+//! Mitsuba scene files, XML of versions 0.5 to 3 → parts of a `Scene`(super::Scene).
+//!
+//! `document` makes one tree of all files, `parameters` and `spectra` read from it, and one module
+//! each turns shapes, models, textures, lights and sensors into Fenestra's. Conventions are those of
+//! Mitsuba 3.9.1, whose documentation is at <https://mitsuba.readthedocs.io>.
+
+mod bsdfs;
+mod document;
+mod emitters;
+mod environment;
+mod media;
+mod parameters;
+mod principled;
+mod sensor;
+mod serialized;
+mod shapes;
+mod spectra;
+mod text;
+mod textures;
+mod transforms;
+mod values;
+
+use std::{
+    collections::{HashMap, HashSet},
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use glam::Vec3;
+
+use self::{bsdfs::Model, document::Document, shapes::Shape};
+use super::{
+    Camera, EnvironmentMap, FilmSettings, Geometry, Lamp,
+    features::{self, Ignored},
+    instance::Budget,
+    instances::Prototype,
+};
+use crate::{error::Result, material::Material, texture::Texture};
+
+/// Parts of a scene.
+#[derive(Debug)]
+pub struct Parts {
+    /// Viewer.
+    pub camera: Camera,
+    /// Image plane.
+    pub film: FilmSettings,
+    /// Light from everywhere; black if the file has none.
+    pub environment: EnvironmentMap,
+    /// Lights without a surface.
+    pub lamps: Vec<Lamp>,
+    /// Materials, at least one.
+    pub materials: Vec<Material>,
+    /// All triangles.
+    pub geometry: Geometry,
+    /// Files that were read, the scene file first.
+    pub inputs: Vec<PathBuf>,
+    /// Repairs, and one warning for each kind of thing that is left out.
+    pub warnings: Vec<String>,
+}
+
+/// Scene on its way from the document.
+struct Reader<'a> {
+    document: &'a Document,
+    textures: HashMap<PathBuf, Arc<Texture>>,
+    environment: Option<EnvironmentMap>,
+    lamps: Vec<Lamp>,
+    materials: Vec<Material>,
+    /// Material by the elements of its model and of its light.
+    material_numbers: HashMap<[Option<usize>; 2], u32>,
+    geometry: Geometry,
+    /// Shapes of groups by their element.
+    shapes: HashMap<usize, Arc<Shape>>,
+    /// Prototypes of shapes of groups by their element, and by a transform that mirrors.
+    prototypes: HashMap<(usize, bool), Prototype>,
+    budget: Budget,
+    /// Triangles of shapes that are not in a file, and of copies.
+    repeated_triangles: usize,
+    inputs: Vec<PathBuf>,
+    ignored: Ignored,
+    warnings: Vec<String>,
+}
+
+/// Reads a scene file; `camera` is the id or number of its sensor, which is else the first.
+///
+/// # Errors
+/// [`crate::Error::Parse`] with file and line for what cannot be read or rendered, and errors of the
+/// readers of meshes, images and maps.
+pub fn read(path: &Path, camera: Option<&str>) -> Result<Parts> {
+    let document = Document::read(path)?;
+    let mut reader = Reader {
+        document: &document,
+        textures: HashMap::new(),
+        environment: None,
+        lamps: Vec::new(),
+        materials: Vec::new(),
+        material_numbers: HashMap::new(),
+        geometry: Geometry::default(),
+        shapes: HashMap::new(),
+        prototypes: HashMap::new(),
+        budget: Budget::default(),
+        repeated_triangles: 0,
+        inputs: document.files.clone(),
+        ignored: Ignored::default(),
+        warnings: Vec::new(),
+    };
+    let mut sensors = Vec::new();
+    for node in document.root().children() {
+        match node.tag() {
+            "sensor" | "camera" => sensors.push(node),
+            "shape" => reader.shape(node)?,
+            "emitter" | "luminaire" => reader.emitter(node)?,
+            "integrator" => reader.not_taken(node, "max_depth", "integrator"),
+            "sampler" => reader.not_taken(node, "sample_count", "sampler"),
+            "medium" => reader.ignored.add(features::MI_MEDIUM, || node.place()),
+            // Models and textures are read where a shape uses them.
+            "bsdf" | "texture" | "spectrum" | "rgb" => {}
+            found => {
+                let name = format!("`{found}` in `scene`");
+                reader.ignored.add_named(features::MI_ELEMENT, &name, || node.place());
+            }
+        }
+    }
+    let (camera, film) = reader.sensor(&sensors, camera)?;
+    if reader.materials.is_empty() {
+        let Model { kind, surface } = Model::default_of_shapes();
+        reader.materials.push(Material { name: "default".into(), kind, surface });
+    }
+    let environment = match reader.environment {
+        Some(environment) => environment,
+        None => EnvironmentMap::constant(Vec3::ZERO, 1.0)
+            .map_err(|message| document.root().error(message))?,
+    };
+    let mut warnings = reader.warnings;
+    warnings.extend(reader.ignored.warnings(path));
+    let mut inputs = reader.inputs;
+    let mut seen = HashSet::new();
+    inputs.retain(|input| seen.insert(input.clone()));
+    Ok(Parts {
+        camera,
+        film,
+        environment,
+        lamps: reader.lamps,
+        materials: reader.materials,
+        geometry: reader.geometry,
+        inputs,
+        warnings,
+    })
+}

@@ -1,0 +1,102 @@
+//! The `principled` model → glTF's metallic-roughness material, or a rough dielectric.
+
+use glam::Vec3;
+
+use super::{Reader, bsdfs::Model, parameters::Parameters, spectra::Role, textures::Value};
+use crate::{
+    MIN_ALPHA,
+    error::Result,
+    features,
+    material::{MaterialKind, Surface},
+};
+
+/// Parameters without a counterpart, which change nothing at 0.
+const WITHOUT_COUNTERPART: [&str; 5] =
+    ["anisotropic", "spec_tint", "sheen", "flatness", "clearcoat"];
+
+impl Reader<'_> {
+    /// Reads a `principled` model.
+    pub(super) fn principled(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+        let node = parameters.node;
+        let (roughness, metallic) =
+            (self.number(parameters, "roughness", 0.5)?, self.number(parameters, "metallic", 0.0)?);
+        let spec_trans = self.number(parameters, "spec_trans", 0.0)?;
+        for name in WITHOUT_COUNTERPART {
+            if !matches!(self.number(parameters, name, 0.0)?, Value::Color(Vec3::ZERO)) {
+                let place = || node.place();
+                self.ignored.add_named(features::MI_PRINCIPLED_REST, &format!("`{name}`"), place);
+            }
+        }
+        parameters.without_effect(&[
+            "sheen_tint",
+            "clearcoat_gloss",
+            "diffuse_reflectance_sampling_rate",
+            "main_specular_sampling_rate",
+            "clearcoat_sampling_rate",
+        ]);
+        let base = self.value(parameters, "base_color", Role::Reflectance)?;
+        let base = base.unwrap_or(Value::Color(Vec3::splat(0.5)));
+        let ior = match (parameters.float_in("eta", (1.0, 4.0))?, parameters.float("specular")?) {
+            (Some(eta), _) => eta,
+            // Index whose reflectance at normal incidence is 0.08 times `specular`.
+            (None, specular) => {
+                let root = (0.08 * specular.unwrap_or(0.5).clamp(0.0, 1.0)).sqrt();
+                (1.0 + root) / (1.0 - root)
+            }
+        };
+        let is_metal = matches!(&metallic, Value::Color(share) if share.x >= 0.5);
+        let share = match &spec_trans {
+            Value::Color(share) => share.x,
+            Value::Texture(_) | Value::Vertices(_) => 0.5,
+        };
+        let is_whole = matches!(&metallic, Value::Color(Vec3::ZERO)) && share == 1.0;
+        if share > 0.0 && !is_whole {
+            self.ignored.add(features::MI_SPEC_TRANS, || node.place());
+        }
+        if share >= 0.5 && !is_metal {
+            // The model's transmission is the root of the colour, since light goes in and out.
+            let transmittance = match base {
+                Value::Color(color) => color.map(f32::sqrt),
+                Value::Texture(_) | Value::Vertices(_) => {
+                    self.ignored.add(features::MI_SPECULAR_TEXTURE, || node.place());
+                    Vec3::ONE
+                }
+            };
+            let (roughness, texture) = roughness.split();
+            let alpha = (roughness.x * roughness.x).clamp(MIN_ALPHA, 1.0);
+            let reflectance = Vec3::ONE;
+            let kind = MaterialKind::Dielectric { ior, alpha, reflectance, transmittance };
+            let surface = Surface { roughness: texture, ..Surface::default() };
+            return Ok(Model { kind, surface });
+        }
+        let vertex_color = base.is_of_vertices();
+        let (base_color, color) = base.split();
+        let (metallic, metallic_texture) = metallic.split();
+        let (roughness, roughness_texture) = roughness.split();
+        // An index of 1 has no reflection at all, which the factor says better.
+        let (ior, specular) = if ior < 1.01 { (1.5, 0.0) } else { (ior, 1.0) };
+        let kind = MaterialKind::Principled {
+            base_color,
+            metallic: metallic.x.clamp(0.0, 1.0),
+            roughness: roughness.x.clamp(0.0, 1.0),
+            ior,
+            specular,
+            specular_color: Vec3::ONE,
+        };
+        let surface = Surface {
+            color,
+            vertex_color,
+            metallic: metallic_texture,
+            roughness: roughness_texture,
+            two_sided: false,
+            ..Surface::default()
+        };
+        Ok(Model { kind, surface })
+    }
+
+    /// Number or texture of a parameter.
+    fn number(&mut self, parameters: &Parameters<'_>, name: &str, default: f32) -> Result<Value> {
+        let value = self.value(parameters, name, Role::Index)?;
+        Ok(value.unwrap_or(Value::Color(Vec3::splat(default))))
+    }
+}

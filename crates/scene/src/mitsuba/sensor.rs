@@ -1,0 +1,264 @@
+//! Sensors and their film → [`Camera`] and [`FilmSettings`].
+
+use glam::{DMat4, DVec3};
+
+use super::{Reader, document::Node, parameters::Parameters};
+use crate::{Camera, FilmSettings, Filter, MAX_FILM_SIDE, error::Result, features};
+
+/// Diagonal of a film of 36 × 24 mm, millimetres.
+const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
+/// Vertical fields of view that a camera may have, degrees.
+const FOV_RANGE_DEG: (f64, f64) = (0.01, 179.0);
+
+/// Film with the part of it that is rendered.
+struct Film {
+    settings: FilmSettings,
+    /// Height of the part over that of the whole film.
+    height_share: f64,
+    /// Width of the whole film over its height.
+    aspect: f64,
+}
+
+impl Reader<'_> {
+    /// Reads the sensor named or numbered `name`, else the first, and names the others.
+    ///
+    /// # Errors
+    /// [`crate::Error`] if there is none or none of that name.
+    pub(super) fn sensor(
+        &mut self,
+        sensors: &[Node<'_>],
+        name: Option<&str>,
+    ) -> Result<(Camera, FilmSettings)> {
+        let root = self.document.root();
+        let chosen = match name {
+            None => 0,
+            Some(name) => {
+                let has_id = |sensor: &Node<'_>| sensor.attribute("id") == Some(name);
+                let by_number = || name.parse().ok().filter(|&index: &usize| index < sensors.len());
+                let Some(chosen) = sensors.iter().position(has_id).or_else(by_number) else {
+                    let ids = sensors.iter().enumerate().map(|(index, sensor)| {
+                        sensor.attribute("id").map_or(index.to_string(), |id| format!("`{id}`"))
+                    });
+                    let known = ids.collect::<Vec<_>>().join(", ");
+                    return Err(root.error(format!(
+                        "--camera {name}: there is no such sensor, the file has {known}"
+                    )));
+                };
+                chosen
+            }
+        };
+        let Some(&sensor) = sensors.get(chosen) else {
+            return Err(root.error("expected a sensor, found none"));
+        };
+        for other in sensors.iter().filter(|other| other.index != sensor.index) {
+            self.ignored.add(features::MI_SENSORS, || other.place());
+        }
+        let parameters = Parameters::new(sensor);
+        if !matches!(sensor.kind(), "perspective" | "thinlens") {
+            let found = sensor.kind();
+            return Err(sensor.error(format!(
+                "the sensor `{found}` is not rendered; expected perspective or thinlens"
+            )));
+        }
+        let film = self.film(&parameters)?;
+        let camera = self.camera(&parameters, &film)?;
+        for sampler in parameters.objects("sampler")? {
+            self.not_taken(sampler, "sample_count", "sampler");
+        }
+        parameters.without_effect(&["near_clip", "far_clip", "shutter_open", "shutter_close"]);
+        parameters.finish(&mut self.ignored);
+        Ok((camera, film.settings))
+    }
+
+    /// Names an integrator or sampler with the number that it would set.
+    pub(super) fn not_taken(&mut self, node: Node<'_>, number: &str, tag: &str) {
+        let value = node.children().find(|child| child.name() == number);
+        let value = value.and_then(|child| child.attribute("value"));
+        let value = value.map(|value| format!(" with `{number}` {value}")).unwrap_or_default();
+        let name = format!("{tag} `{}`{value}", node.kind());
+        self.ignored.add_named(features::MI_INTEGRATOR, &name, || node.place());
+    }
+
+    fn camera(&mut self, parameters: &Parameters<'_>, film: &Film) -> Result<Camera> {
+        let node = parameters.node;
+        let matrix = parameters.transform("to_world")?;
+        let axis = |axis: DVec3| matrix.transform_vector3(axis).try_normalize();
+        let (Some(forward), Some(up)) = (axis(DVec3::Z), axis(DVec3::Y)) else {
+            return Err(node.error("to_world: expected a matrix with an inverse"));
+        };
+        if forward.cross(up).length() < 1e-4 || !is_whole(matrix) {
+            return Err(node.error("to_world: expected a matrix with an inverse"));
+        }
+        // The axes of the camera are +X to the left, +Y up, +Z along the view.
+        if matrix.determinant() < 0.0 {
+            self.ignored.add(features::MI_MIRRORED, || node.place());
+        }
+        for name in ["principal_point_offset_x", "principal_point_offset_y"] {
+            if parameters.float(name)?.is_some_and(|offset| offset != 0.0) {
+                self.ignored.add(features::MI_PRINCIPAL_POINT, || node.place());
+            }
+        }
+        let tangent = half_height_tangent(parameters, film.aspect)? * film.height_share;
+        let vertical_fov_deg = 2.0 * tangent.atan().to_degrees();
+        if !(FOV_RANGE_DEG.0..=FOV_RANGE_DEG.1).contains(&vertical_fov_deg) {
+            let (low, high) = FOV_RANGE_DEG;
+            return Err(node.error(format!(
+                "expected a vertical field of view of {low}° to {high}°, found {vertical_fov_deg}°"
+            )));
+        }
+        let (mut aperture_radius, mut focus_distance) = (0.0, 1.0);
+        if node.kind() == "thinlens" {
+            let radius = parameters.float_in("aperture_radius", (0.0, f32::MAX))?;
+            let Some(radius) = radius else {
+                return Err(node.error("thinlens: expected the parameter `aperture_radius`"));
+            };
+            aperture_radius = radius;
+            let far = parameters.float("far_clip")?.unwrap_or(1e4);
+            let range = (f32::MIN_POSITIVE, f32::MAX);
+            focus_distance = parameters.float_in("focus_distance", range)?.unwrap_or(far);
+        } else {
+            // A pinhole has no use for it; files that were made for both kinds have it.
+            parameters.without_effect(&["focus_distance", "aperture_radius"]);
+        }
+        let position = matrix.w_axis.truncate();
+        // Look at a point so far away that single precision keeps the direction.
+        let look_at = position + forward * position.length().max(1.0);
+        Ok(Camera {
+            position: position.as_vec3(),
+            look_at: look_at.as_vec3(),
+            up: up.as_vec3(),
+            vertical_fov_deg: vertical_fov_deg as f32,
+            aperture_radius,
+            focus_distance,
+        })
+    }
+
+    fn film(&mut self, sensor: &Parameters<'_>) -> Result<Film> {
+        let films = sensor.objects("film")?;
+        let node = films.first().copied();
+        let parameters = node.map(Parameters::new);
+        let side = |name: &str, default: i64| match &parameters {
+            Some(parameters) => Ok(parameters.integer(name)?.unwrap_or(default)),
+            None => Ok(default),
+        };
+        let (width, height) = (side("width", 768)?, side("height", 576)?);
+        let size = (side("crop_width", width)?, side("crop_height", height)?);
+        let offset = (side("crop_offset_x", 0)?, side("crop_offset_y", 0)?);
+        for (name, side) in [("width", width), ("height", height)] {
+            if !(1..=i64::from(MAX_FILM_SIDE)).contains(&side) {
+                return Err(node.unwrap_or(sensor.node).error(format!(
+                    "film: {name}: expected 1 to {MAX_FILM_SIDE} pixels, found {side}"
+                )));
+            }
+        }
+        let fits = |offset: i64, size: i64, whole: i64| {
+            offset >= 0 && size >= 1 && offset.checked_add(size).is_some_and(|end| end <= whole)
+        };
+        if !fits(offset.0, size.0, width) || !fits(offset.1, size.1, height) {
+            return Err(node.unwrap_or(sensor.node).error(format!(
+                "film: expected a crop within {width}×{height} pixels, found {}×{} from ({}, {})",
+                size.0, size.1, offset.0, offset.1
+            )));
+        }
+        let is_middle = 2 * offset.0 + size.0 == width && 2 * offset.1 + size.1 == height;
+        let rendered = if is_middle { size } else { (width, height) };
+        let mut filter = Filter::Gaussian;
+        if let Some(parameters) = &parameters {
+            if !is_middle {
+                self.ignored.add(features::MI_CROP, || parameters.node.place());
+            }
+            filter = self.filter(parameters)?;
+            parameters.without_effect(&[
+                "file_format",
+                "pixel_format",
+                "component_format",
+                "banner",
+                "sample_border",
+                "compensate",
+                "gamma",
+                "exposure",
+            ]);
+            parameters.finish(&mut self.ignored);
+        }
+        let settings = FilmSettings { width: rendered.0 as u32, height: rendered.1 as u32, filter };
+        Ok(Film {
+            settings,
+            height_share: rendered.1 as f64 / height as f64,
+            aspect: width as f64 / height as f64,
+        })
+    }
+
+    fn filter(&mut self, film: &Parameters<'_>) -> Result<Filter> {
+        let filters = film.objects("rfilter")?;
+        let Some(&node) = filters.first() else { return Ok(Filter::Gaussian) };
+        let parameters = Parameters::new(node);
+        let is_ours = match node.kind() {
+            "box" => {
+                let radius = parameters.float("radius")?.unwrap_or(0.5);
+                if (radius - 0.5).abs() < 1e-6 {
+                    parameters.finish(&mut self.ignored);
+                    return Ok(Filter::Box);
+                }
+                false
+            }
+            "gaussian" => {
+                let deviation = parameters.float("stddev")?.unwrap_or(0.5);
+                (deviation - 0.5).abs() < 1e-6
+            }
+            "tent" | "mitchell" | "catmullrom" | "lanczos" => {
+                parameters.without_effect(&["radius", "B", "C", "b", "c", "lobes"]);
+                false
+            }
+            found => {
+                let expected = "expected box, gaussian, tent, mitchell, catmullrom or lanczos";
+                return Err(node.error(format!("{expected}, found the rfilter `{found}`")));
+            }
+        };
+        if !is_ours {
+            let name =
+                format!("rfilter `{}`, of which `gaussian` of ½ takes the place", node.kind());
+            self.ignored.add_named(features::MI_FILTER, &name, || node.place());
+        }
+        parameters.finish(&mut self.ignored);
+        Ok(Filter::Gaussian)
+    }
+}
+
+fn is_whole(matrix: DMat4) -> bool {
+    matrix.is_finite() && matrix.determinant() != 0.0
+}
+
+/// Tangent of half the angle between the lower and upper edges of the film.
+fn half_height_tangent(parameters: &Parameters<'_>, aspect: f64) -> Result<f64> {
+    let node = parameters.node;
+    let diagonal = (1.0 + aspect * aspect).sqrt();
+    let fov = parameters.float_in("fov", (1e-3, 179.99))?;
+    let (length, axis) =
+        (parameters.string("focal_length")?, parameters.string("fov_axis")?.unwrap_or("x"));
+    let Some(fov) = fov else {
+        let length = length.unwrap_or("50mm").trim();
+        let millimetres: Option<f64> = length.trim_end_matches("mm").trim().parse().ok();
+        let positive = millimetres.filter(|length| *length > 0.0 && length.is_finite());
+        let Some(millimetres) = positive else {
+            let message = format!("focal_length: expected millimetres, as 50mm, found `{length}`");
+            return Err(node.error(message));
+        };
+        return Ok(0.5 * FILM_DIAGONAL_MM / millimetres / diagonal);
+    };
+    if length.is_some() {
+        return Err(node.error("expected either `fov` or `focal_length`, found both"));
+    }
+    let tangent = f64::from(0.5 * fov).to_radians().tan();
+    let along_x = match axis {
+        "x" => true,
+        "y" => false,
+        "diagonal" => return Ok(tangent / diagonal),
+        "smaller" => aspect <= 1.0,
+        "larger" => aspect > 1.0,
+        found => {
+            let expected = "expected x, y, diagonal, smaller or larger";
+            return Err(node.error(format!("fov_axis: {expected}, found `{found}`")));
+        }
+    };
+    Ok(if along_x { tangent / aspect } else { tangent })
+}

@@ -1,0 +1,373 @@
+//! Shapes → triangles in world space with their materials.
+
+use std::{borrow::Cow, sync::Arc};
+
+use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
+
+use super::{Reader, bsdfs::Model, document::Node, parameters::Parameters, serialized};
+use crate::{
+    error::Result,
+    features, files,
+    geometry::MAX_COORDINATE,
+    instance::{Instance, MAX_INSTANCES},
+    material::Material,
+    mesh::Mesh,
+    quadrics,
+    shapes::check_triangles,
+    transform::Transform,
+};
+
+/// Most groups in one another; Mitsuba allows one.
+const MAX_GROUPS: usize = 4;
+
+/// Shape as it stands in its group or in the scene.
+#[derive(Debug)]
+pub(super) struct Shape {
+    mesh: Mesh,
+    to_world: DMat4,
+    material: u32,
+    flips: Flips,
+    /// True for a mesh file, which is as large as it is.
+    is_file: bool,
+}
+
+/// Cases in which triangles turn their other side out.
+#[derive(Clone, Copy, Debug)]
+struct Flips {
+    /// By `flip_normals`.
+    always: bool,
+    /// Under a transform that mirrors: Mitsuba computes these normals after the transform.
+    mirrored: bool,
+}
+
+impl Shape {
+    /// The mesh as it is under a transform that mirrors or not.
+    fn turned(&self, mirrors: bool) -> Cow<'_, Mesh> {
+        let flips = self.flips.always != (self.flips.mirrored && mirrors);
+        let mirrors_tangents = mirrors && !self.mesh.tangents.is_empty();
+        if !flips && !mirrors_tangents {
+            return Cow::Borrowed(&self.mesh);
+        }
+        let mut mesh = self.mesh.clone();
+        if flips {
+            turn_inside_out(&mut mesh);
+        }
+        if mirrors_tangents {
+            // Mitsuba's bitangent is the normal × the tangent in the world.
+            mesh.tangents.iter_mut().for_each(|tangent| tangent[3] = -tangent[3]);
+        }
+        Cow::Owned(mesh)
+    }
+}
+
+/// Rejects a shape that lies too far out for traversal.
+fn check_extent(node: Node<'_>, positions: impl IntoIterator<Item = Vec3>) -> Result<()> {
+    let farthest = positions.into_iter().map(|position| position.abs().max_element());
+    let farthest = farthest.fold(0.0, f32::max);
+    if farthest > MAX_COORDINATE {
+        return Err(node.error(format!(
+            "a vertex has the coordinate {farthest:e}; expected at most {MAX_COORDINATE:e} m: scale \
+             or move the shape"
+        )));
+    }
+    Ok(())
+}
+
+impl Reader<'_> {
+    /// Reads a shape, and places it unless it is a group.
+    pub(super) fn shape(&mut self, node: Node<'_>) -> Result<()> {
+        if node.kind() == "shapegroup" {
+            return Ok(());
+        }
+        self.place(node, DMat4::IDENTITY, MAX_GROUPS)
+    }
+
+    fn place(&mut self, node: Node<'_>, outer: DMat4, groups_left: usize) -> Result<()> {
+        if node.kind() == "instance" {
+            return self.instance(node, outer, groups_left);
+        }
+        let is_shared = groups_left < MAX_GROUPS;
+        let shape = match self.shapes.get(&node.index) {
+            Some(shape) => Arc::clone(shape),
+            None => {
+                let shape = Arc::new(self.read_shape(node)?);
+                if is_shared {
+                    self.shapes.insert(node.index, Arc::clone(&shape));
+                }
+                shape
+            }
+        };
+        let triangles = shape.mesh.triangles.len();
+        let matrix = outer * shape.to_world;
+        // Surfaces that emit are placed: lamps are triangles in the world.
+        let emits = self.materials[shape.material as usize].surface.emission.is_some();
+        if is_shared && !emits && self.budget.takes_instances(1, triangles) {
+            return self.add_instance(node, &shape, matrix);
+        }
+        if is_shared || !shape.is_file {
+            self.repeated_triangles += triangles;
+            check_triangles(self.repeated_triangles).map_err(|message| node.error(message))?;
+        }
+        self.append(node, &shape, matrix)
+    }
+
+    /// Adds an instance of a shape of a group, whose mesh is in memory once for each way to turn it.
+    fn add_instance(&mut self, node: Node<'_>, shape: &Shape, matrix: DMat4) -> Result<()> {
+        if self.geometry.instances.len() >= MAX_INSTANCES {
+            return Err(node.error(format!("at most {MAX_INSTANCES} instances can be used")));
+        }
+        let Some(transform) = Transform::from_matrix(matrix) else {
+            return Err(node.error("to_world: expected a matrix with an inverse"));
+        };
+        let key = (node.index, transform.mirrors);
+        let prototype = match self.prototypes.get(&key) {
+            Some(prototype) => *prototype,
+            None => {
+                let mesh = shape.turned(transform.mirrors);
+                let (prototype, dropped) = self.geometry.add_prototype(&mesh, |_| 0);
+                let label =
+                    format!("{}: shape of {}", self.document.files[0].display(), node.place());
+                self.warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
+                self.prototypes.insert(key, prototype);
+                prototype
+            }
+        };
+        let Some(instance) = Instance::new(prototype.index, &transform, shape.material, true)
+        else {
+            return self.append(node, shape, matrix);
+        };
+        check_extent(node, prototype.corners(&instance))?;
+        self.geometry.instances.push(instance);
+        Ok(())
+    }
+
+    fn instance(&mut self, node: Node<'_>, outer: DMat4, groups_left: usize) -> Result<()> {
+        let Some(groups_left) = groups_left.checked_sub(1) else {
+            return Err(node.error("a shapegroup contains itself, or is nested too deep"));
+        };
+        let parameters = Parameters::new(node);
+        let groups = parameters.objects("shape")?;
+        let Some(group) = groups.first().filter(|group| group.kind() == "shapegroup") else {
+            return Err(node.error("instance: expected a reference to a shapegroup"));
+        };
+        let matrix = outer * parameters.transform("to_world")?;
+        let inside = Parameters::new(*group);
+        for shape in inside.objects("shape")? {
+            self.place(shape, matrix, groups_left)?;
+        }
+        inside.finish(&mut self.ignored);
+        parameters.finish(&mut self.ignored);
+        Ok(())
+    }
+
+    fn append(&mut self, node: Node<'_>, shape: &Shape, matrix: DMat4) -> Result<()> {
+        let Some(transform) = Transform::from_matrix(matrix) else {
+            return Err(node.error("to_world: expected a matrix with an inverse"));
+        };
+        let first_vertex = self.geometry.positions.len();
+        let vertices = first_vertex + shape.mesh.positions.len();
+        let triangles = self.geometry.triangles.len() + shape.mesh.triangles.len();
+        if u32::try_from(vertices).is_err() || u32::try_from(triangles).is_err() {
+            let limit = u32::MAX;
+            return Err(node.error(format!(
+                "{vertices} vertices and {triangles} triangles, at most {limit} can be used"
+            )));
+        }
+        let mesh = shape.turned(transform.mirrors);
+        let dropped = self.geometry.append(&mesh, &transform, |_| shape.material);
+        let label = format!("{}: shape of {}", self.document.files[0].display(), node.place());
+        self.warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
+        check_extent(node, self.geometry.positions[first_vertex..].iter().copied().map(Vec3::from))
+    }
+
+    fn read_shape(&mut self, node: Node<'_>) -> Result<Shape> {
+        let parameters = Parameters::new(node);
+        let to_world = parameters.transform("to_world")?;
+        let always = parameters.boolean("flip_normals")?.unwrap_or(false);
+        let mut shape = Shape {
+            mesh: Mesh::default(),
+            to_world,
+            material: 0,
+            flips: Flips { always, mirrored: false },
+            is_file: false,
+        };
+        let radius = || Ok(parameters.float_in("radius", (1e-9, 1e9))?.unwrap_or(1.0));
+        match node.kind() {
+            "obj" | "ply" | "serialized" => self.mesh_file(&parameters, &mut shape)?,
+            "rectangle" => shape.mesh = quadrics::rectangle(),
+            "cube" => {
+                shape.mesh = quadrics::cube();
+                if parameters.boolean("face_normals")?.unwrap_or(false) {
+                    shape.mesh.normals.clear();
+                    shape.flips.mirrored = true;
+                }
+            }
+            "disk" => shape.mesh = quadrics::disk(1.0, 0.0),
+            "sphere" => {
+                let center = parameters.vector("center")?.unwrap_or(Vec3::ZERO);
+                shape.mesh = quadrics::sphere(radius()?);
+                shape.to_world *= DMat4::from_translation(center.as_dvec3());
+                // Mitsuba 3.9.1 turns mirrored spheres inside out, but no other round shape.
+                shape.flips.mirrored = true;
+            }
+            "cylinder" => {
+                let point = |name: &str, default: Vec3| {
+                    Ok(parameters.vector(name)?.unwrap_or(default).as_dvec3())
+                };
+                let (from, to) = (point("p0", Vec3::ZERO)?, point("p1", Vec3::Z)?);
+                shape.mesh = quadrics::cylinder(radius()?, 0.0, 1.0);
+                let Some(frame) = frame_along(to - from) else {
+                    return Err(node.error("cylinder: expected `p0` and `p1` to differ"));
+                };
+                shape.to_world *= DMat4::from(DAffine3::from_mat3_translation(frame, from));
+            }
+            found => {
+                return Err(node.error(format!(
+                    "the shape `{found}` is not rendered; expected obj, ply, serialized, \
+                     rectangle, cube, sphere, disk, cylinder, instance or shapegroup"
+                )));
+            }
+        }
+        shape.material = self.material(&parameters)?;
+        let surface = &self.materials[shape.material as usize].surface;
+        if !surface.vertex_color {
+            shape.mesh.colors.clear();
+        }
+        let has_bumps = surface.normal.is_some();
+        if has_bumps && !shape.mesh.uvs[0].is_empty() {
+            shape.mesh.tangents = tangents(&shape.mesh);
+        }
+        for medium in parameters.objects("medium")? {
+            self.ignored.add(features::MI_MEDIUM, || medium.place());
+        }
+        parameters.finish(&mut self.ignored);
+        Ok(shape)
+    }
+
+    fn mesh_file(&mut self, parameters: &Parameters<'_>, shape: &mut Shape) -> Result<()> {
+        let node = parameters.node;
+        let Some(name) = parameters.string("filename")? else {
+            let kind = node.kind();
+            return Err(node.error(format!("{kind}: expected the parameter `filename`")));
+        };
+        let path = node.file(name)?;
+        let mut is_flat = parameters.boolean("face_normals")?.unwrap_or(false);
+        let kind = node.kind();
+        if files::extension(&path) != kind {
+            return Err(node.error(format!("{kind}: expected a file in .{kind}, found `{name}`")));
+        }
+        let is_obj = kind == "obj";
+        let mut mesh = if kind == "serialized" {
+            let index = parameters.integer("shape_index")?.unwrap_or(0);
+            let Ok(index) = usize::try_from(index) else {
+                let message = format!("shape_index: expected 0 or more, found {index}");
+                return Err(node.error(message));
+            };
+            let (mesh, own_flat) = serialized::read(&path, index)?;
+            is_flat |= own_flat;
+            mesh
+        } else {
+            let mut warnings = Vec::new();
+            let mesh = Mesh::read(&path, &mut warnings)?;
+            // The materials of an OBJ file do not count, nor what is wrong with them.
+            self.warnings.extend(warnings.into_iter().filter(|_| !is_obj));
+            mesh
+        };
+        if parameters.boolean("flip_tex_coords")?.unwrap_or(is_obj) {
+            mesh.uvs.iter_mut().flatten().for_each(|uv| uv[1] = 1.0 - uv[1]);
+        }
+        self.inputs.push(path);
+        if is_flat {
+            mesh.normals.clear();
+        }
+        shape.flips.mirrored = mesh.normals.is_empty();
+        if mesh.normals.is_empty() && !is_flat {
+            mesh.normals = smooth_normals(&mesh);
+        }
+        shape.mesh = mesh;
+        shape.is_file = true;
+        Ok(())
+    }
+
+    /// Material of a shape's model and light, shared by shapes of the same.
+    fn material(&mut self, parameters: &Parameters<'_>) -> Result<u32> {
+        let model = parameters.objects("bsdf")?.first().copied();
+        let light = parameters.objects("emitter")?.first().copied();
+        let key = [model, light].map(|node| node.map(|node| node.index));
+        if let Some(&material) = self.material_numbers.get(&key) {
+            return Ok(material);
+        }
+        let read = match model {
+            Some(node) => self.model(node)?,
+            None => Model::default_of_shapes(),
+        };
+        let mut name = match model {
+            Some(node) => node.attribute("id").map_or_else(|| node.place(), str::to_owned),
+            None => "default".to_owned(),
+        };
+        let mut surface = read.surface;
+        if let Some(light) = light {
+            surface.emission = Some(self.emission(light)?);
+            name = format!("{name}, light of {}", light.place());
+        }
+        let material = self.materials.len() as u32;
+        self.materials.push(Material { name, kind: read.kind, surface });
+        self.material_numbers.insert(key, material);
+        Ok(material)
+    }
+}
+
+/// Axes whose z leads along `axis` with its length, as Mitsuba chooses the others \[Duff et al. 2017\].
+fn frame_along(axis: DVec3) -> Option<DMat3> {
+    let z = axis.try_normalize()?;
+    let sign = if z.z >= 0.0 { 1.0 } else { -1.0 };
+    let a = -1.0 / (sign + z.z);
+    let b = z.x * z.y * a;
+    let x = DVec3::new(1.0 + sign * z.x * z.x * a, sign * b, -sign * z.x);
+    let y = DVec3::new(b, sign + z.y * z.y * a, -z.y);
+    Some(DMat3::from_cols(x, y, axis))
+}
+
+/// Turns the inside of a mesh out.
+fn turn_inside_out(mesh: &mut Mesh) {
+    mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    mesh.normals.iter_mut().flatten().for_each(|component| *component = -*component);
+}
+
+/// Tangents of vertices along u, as the bumps of a normal map need them: the bitangent is the normal ×
+/// the tangent, also where texture coordinates are mirrored.
+fn tangents(mesh: &Mesh) -> Vec<[f32; 4]> {
+    let mut tangents = vec![Vec3::ZERO; mesh.positions.len()];
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|at| Vec3::from_array(mesh.positions[at as usize]));
+        let [u, v, w] = triangle.map(|at| Vec2::from_array(mesh.uvs[0][at as usize]));
+        let (along, across) = (v - u, w - u);
+        let determinant = along.perp_dot(across);
+        let tangent = (b - a) * across.y - (c - a) * along.y;
+        let Some(tangent) = (tangent * determinant.signum()).try_normalize() else { continue };
+        for corner in triangle {
+            tangents[*corner as usize] += tangent;
+        }
+    }
+    tangents.iter().map(|tangent| tangent.normalize_or_zero().extend(1.0).to_array()).collect()
+}
+
+/// Normals of vertices from those of their triangles, by the angle of the corner \[Thürmer & Wüthrich
+/// 1998\]; zero where there are none.
+fn smooth_normals(mesh: &Mesh) -> Vec<[f32; 3]> {
+    let mut normals = vec![DVec3::ZERO; mesh.positions.len()];
+    for triangle in &mesh.triangles {
+        let corners = triangle.map(|at| Vec3::from_array(mesh.positions[at as usize]).as_dvec3());
+        let [a, b, c] = corners;
+        let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
+        for corner in 0..3 {
+            let own = corners[corner];
+            let sides = [corners[(corner + 1) % 3] - own, corners[(corner + 2) % 3] - own];
+            let angle = sides[0].angle_between(sides[1]);
+            if angle.is_finite() {
+                normals[triangle[corner] as usize] += normal * angle;
+            }
+        }
+    }
+    normals.iter().map(|normal| normal.normalize_or_zero().as_vec3().to_array()).collect()
+}

@@ -1,0 +1,221 @@
+//! Textures and the colours that stand in their place.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::{
+    Reader,
+    document::Node,
+    parameters::Parameters,
+    spectra::{self, Role},
+    transforms,
+};
+use crate::{
+    error::Result,
+    features,
+    texture::{Encoding, Interpolation, Texels, Texture, TextureUse, Wrap},
+};
+
+/// Most `scale` textures around one another.
+const MAX_SCALES: usize = 8;
+
+/// Value that may vary over a surface.
+#[derive(Clone, Debug)]
+pub enum Value {
+    /// The same everywhere.
+    Color(Vec3),
+    /// By texture coordinates.
+    Texture(Box<TextureUse>),
+    /// Colours of the vertices, times a factor.
+    Vertices(Vec3),
+}
+
+impl Value {
+    /// Factor for the model and texture for the surface.
+    pub fn split(self) -> (Vec3, Option<TextureUse>) {
+        match self {
+            Self::Color(color) | Self::Vertices(color) => (color, None),
+            Self::Texture(texture) => (Vec3::ONE, Some(*texture)),
+        }
+    }
+
+    /// Value of which every colour is `of` the former one; colours of vertices take it of the factor.
+    pub fn mapped(self, of: impl Fn(f32) -> f32) -> Self {
+        match self {
+            Self::Color(color) => Self::Color(color.map(of)),
+            Self::Vertices(color) => Self::Vertices(color.map(of)),
+            Self::Texture(texture) => Self::Texture(Box::new(texture.mapped(of))),
+        }
+    }
+
+    /// Tests for the colours of vertices.
+    pub fn is_of_vertices(&self) -> bool {
+        matches!(self, Self::Vertices(_))
+    }
+}
+
+impl Reader<'_> {
+    /// Colour or texture of a parameter, if it is there.
+    pub fn value(
+        &mut self,
+        parameters: &Parameters<'_>,
+        name: &str,
+        role: Role,
+    ) -> Result<Option<Value>> {
+        let Some(node) = parameters.any(name)? else { return Ok(None) };
+        match node.tag() {
+            "texture" => self.texture(node, MAX_SCALES).map(Some),
+            _ => spectra::color(node, role).map(|color| Some(Value::Color(color))),
+        }
+    }
+
+    fn texture(&mut self, node: Node<'_>, scales_left: usize) -> Result<Value> {
+        let parameters = Parameters::new(node);
+        let value = match node.kind() {
+            "bitmap" | "ldrtexture" => Value::Texture(Box::new(self.bitmap(&parameters)?)),
+            "checkerboard" => Value::Texture(Box::new(checkerboard(&parameters)?)),
+            "mesh_attribute" | "vertexcolors" => {
+                let name = parameters.string("name")?.unwrap_or("vertex_color");
+                if name != "vertex_color" {
+                    let message =
+                        format!("mesh_attribute: expected `vertex_color`, found `{name}`");
+                    return Err(node.error(message));
+                }
+                Value::Vertices(Vec3::splat(parameters.float("scale")?.unwrap_or(1.0)))
+            }
+            "scale" if scales_left > 0 => self.scaled(&parameters, scales_left)?,
+            found => {
+                return Err(node.error(format!(
+                    "the texture `{found}` is not read; expected bitmap, checkerboard or \
+                     mesh_attribute"
+                )));
+            }
+        };
+        parameters.finish(&mut self.ignored);
+        Ok(value)
+    }
+
+    /// Texture of version 0.6 that multiplies another.
+    fn scaled(&mut self, parameters: &Parameters<'_>, scales_left: usize) -> Result<Value> {
+        let node = parameters.node;
+        let Some(&inner) = parameters.objects("texture")?.first() else {
+            return Err(node.error("scale: expected a texture in it, found none"));
+        };
+        let factor = spectra::parameter(parameters, "scale", Role::Index)?.unwrap_or(Vec3::ONE);
+        Ok(match self.texture(inner, scales_left - 1)? {
+            Value::Color(color) => Value::Color(color * factor),
+            Value::Vertices(color) => Value::Vertices(color * factor),
+            Value::Texture(mut texture) => {
+                texture.scale = (Vec3::from_array(texture.scale) * factor).to_array();
+                texture.bias = (Vec3::from_array(texture.bias) * factor).to_array();
+                Value::Texture(texture)
+            }
+        })
+    }
+
+    fn bitmap(&mut self, parameters: &Parameters<'_>) -> Result<TextureUse> {
+        let node = parameters.node;
+        let Some(name) = parameters.string("filename")? else {
+            return Err(node.error("bitmap: expected the parameter `filename`"));
+        };
+        let path = node.file(name)?;
+        let texture = match self.textures.get(&path) {
+            Some(texture) => Arc::clone(texture),
+            None => {
+                let loaded = Texture::load(&path).map_err(|error| node.error(error.to_string()))?;
+                let texture = Arc::new(loaded);
+                self.inputs.push(path.clone());
+                self.textures.insert(path, Arc::clone(&texture));
+                texture
+            }
+        };
+        // Version 0.6 states an exponent; only that of linear values is different from sRGB.
+        let is_linear = parameters.float("gamma")? == Some(1.0);
+        let is_raw = parameters.boolean("raw")?.unwrap_or(is_linear);
+        let wrap = |name: &str| {
+            Ok(match parameters.string(name)? {
+                None | Some("repeat") => Wrap::Repeat,
+                Some("mirror") => Wrap::MirroredRepeat,
+                Some("clamp") => Wrap::ClampToEdge,
+                Some(found) => {
+                    let message =
+                        format!("{name}: expected repeat, mirror or clamp, found `{found}`");
+                    return Err(node.error(message));
+                }
+            })
+        };
+        let both = wrap("wrap_mode")?;
+        let of_axis =
+            |name: &str| if parameters.string(name)?.is_some() { wrap(name) } else { Ok(both) };
+        let interpolation = match parameters.string("filter_type")? {
+            Some("nearest") => Interpolation::Nearest,
+            None | Some("bilinear" | "trilinear" | "ewa") => Interpolation::Bilinear,
+            Some(found) => {
+                let message = format!("filter_type: expected bilinear or nearest, found `{found}`");
+                return Err(node.error(message));
+            }
+        };
+        parameters.without_effect(&["format", "cache", "max_anisotropy", "accel"]);
+        Ok(TextureUse {
+            encoding: if is_raw { Encoding::Linear } else { Encoding::Srgb },
+            image_from_uv: image_from_uv(parameters)?,
+            wrap: [of_axis("wrap_mode_u")?, of_axis("wrap_mode_v")?],
+            interpolation,
+            ..TextureUse::new(texture)
+        })
+    }
+
+    /// Colour of a value where a texture cannot be used, which `feature` names.
+    pub fn without_texture(
+        &mut self,
+        value: Option<Value>,
+        node: Node<'_>,
+        feature: features::Feature,
+    ) -> Option<Vec3> {
+        match value? {
+            Value::Color(color) => Some(color),
+            Value::Texture(_) | Value::Vertices(_) => {
+                self.ignored.add(feature, || node.place());
+                None
+            }
+        }
+    }
+}
+
+/// Two colours on squares of half a unit: the first where both coordinates are in the same half.
+fn checkerboard(parameters: &Parameters<'_>) -> Result<TextureUse> {
+    let color = |name: &str, grey: f32| {
+        let found = spectra::parameter(parameters, name, Role::Reflectance)?;
+        Ok(found.unwrap_or(Vec3::splat(grey)))
+    };
+    let (first, second) = (color("color0", 0.4)?, color("color1", 0.2)?);
+    let (zero, one) = ([0, 0, 0, 255], [255; 4]);
+    let texture = Texture {
+        name: format!("checkerboard of {}", parameters.node.place()),
+        width: 2,
+        height: 2,
+        texels: Texels::Bytes(vec![zero, one, one, zero]),
+    };
+    Ok(TextureUse {
+        encoding: Encoding::Linear,
+        interpolation: Interpolation::Nearest,
+        image_from_uv: image_from_uv(parameters)?,
+        scale: (second - first).to_array(),
+        bias: first.to_array(),
+        ..TextureUse::new(Arc::new(texture))
+    })
+}
+
+/// Image coordinates from those of the mesh: (0, 0) is the upper left corner in Mitsuba 3 too, whose
+/// OBJ reader turns v round. `uoffset` and `uscale` of version 0.6 go in the order of its upgrade.
+fn image_from_uv(parameters: &Parameters<'_>) -> Result<[[f32; 3]; 2]> {
+    let matrix = parameters.transform("to_uv")?;
+    let [mut u, mut v] = transforms::of_coordinates(parameters.node, matrix)?;
+    for (row, axis) in [(&mut u, "u"), (&mut v, "v")] {
+        let scale = parameters.float(&format!("{axis}scale"))?.unwrap_or(1.0);
+        row[2] += parameters.float(&format!("{axis}offset"))?.unwrap_or(0.0);
+        row.iter_mut().for_each(|number| *number *= scale);
+    }
+    Ok([u, v])
+}

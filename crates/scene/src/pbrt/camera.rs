@@ -1,0 +1,179 @@
+//! Camera, film and filter of a scene description.
+
+use std::path::Path;
+
+use glam::{DMat4, DVec3};
+
+use super::{
+    directives::Description,
+    log::Log,
+    parameters::{Entity, Kind},
+};
+use crate::{
+    FilmSettings, Filter,
+    error::{Error, Result},
+    features,
+    file::CameraEntry,
+};
+
+/// Viewer and image plane.
+pub struct View {
+    /// Camera in the space of the renderer.
+    pub camera: CameraEntry,
+    /// Film.
+    pub film: FilmSettings,
+    /// Radiance of the picture over that of the scene.
+    pub exposure: f32,
+    /// Renderer from the world of the file: the identity or a mirror.
+    pub mirror: DMat4,
+}
+
+/// Reads camera, film and filter.
+///
+/// pbrt looks along +z with +x to the right and +y up, so that a camera without a mirror shows a
+/// left-handed world. The renderer is right-handed. If the camera does not mirror already, the whole
+/// world is mirrored in z, and the picture is the same.
+///
+/// # Errors
+/// With the place for cameras that cannot be used and numbers out of range.
+pub fn view(description: &Description, main: &Path, log: &mut Log) -> Result<View> {
+    let (film, mut exposure, aspect) = film(description, log)?;
+    let Some((entity, camera_from_world)) = &description.camera else {
+        return Err(Error::scene(main, "expected a Camera, found none"));
+    };
+    if entity.name != "perspective" {
+        return Err(entity.error("expected a perspective camera; others cannot be used"));
+    }
+    let world_from_camera = camera_from_world.inverse();
+    let determinant = world_from_camera.determinant();
+    if !world_from_camera.is_finite() || determinant == 0.0 {
+        return Err(entity.error("the transformation of the camera flattens space"));
+    }
+    let mirror = if determinant > 0.0 {
+        DMat4::from_scale(DVec3::new(1.0, 1.0, -1.0))
+    } else {
+        DMat4::IDENTITY
+    };
+    let open = entity.number("shutteropen", 0.0)?;
+    let time = entity.number("shutterclose", 1.0)? - open;
+    if time <= 0.0 {
+        return Err(entity.error("the shutter closes before it opens"));
+    }
+    exposure *= time as f32;
+    let vertical_fov_deg = vertical_fov_deg(entity, aspect, log)?;
+    let renderer_from_camera = mirror * world_from_camera;
+    let position = renderer_from_camera.w_axis.truncate();
+    let axis = |axis: DVec3| renderer_from_camera.transform_vector3(axis);
+    // Look at a point so far away that single precision keeps the direction.
+    let distance = position.length().max(1.0);
+    let forward = axis(DVec3::Z);
+    let aperture_radius = entity.number("lensradius", 0.0)? * axis(DVec3::X).length();
+    let focus_distance = entity.number("focaldistance", 1e6)? * forward.length();
+    let camera = CameraEntry {
+        position: position.as_vec3().to_array(),
+        look_at: (position + distance * forward.normalize_or_zero()).as_vec3().to_array(),
+        up: axis(DVec3::Y).normalize_or_zero().as_vec3().to_array(),
+        vertical_fov_deg: vertical_fov_deg as f32,
+        aperture_radius: aperture_radius as f32,
+        focus_distance: Some(focus_distance as f32),
+    };
+    log.unused(entity);
+    Ok(View { camera, film, exposure, mirror })
+}
+
+/// Field of view from bottom to top; `fov` is that of the shorter side.
+fn vertical_fov_deg(entity: &Entity, aspect: f64, log: &mut Log) -> Result<f64> {
+    let fov = entity.number("fov", 90.0)?;
+    if !(fov > 0.0 && fov < 180.0) {
+        return Err(entity.error(format!("expected a `fov` from 0 to 180 degrees, found {fov}")));
+    }
+    if let Some(own) = entity.optional("frameaspectratio")?
+        && (own - aspect).abs() > 1e-3 * aspect
+        && let Some(parameter) = entity.find("frameaspectratio")
+    {
+        log.ignore(features::PBRT_ASPECT, &parameter.place);
+    }
+    let mut height = if aspect >= 1.0 { 1.0 } else { 1.0 / aspect };
+    if let [left, right, bottom, top] = *entity.numbers("screenwindow", Kind::Float)? {
+        height = 0.5 * (top - bottom);
+        let is_centred = (left + right).abs() < 1e-4 * (right - left)
+            && (top + bottom).abs() < 1e-4 * (top - bottom);
+        let is_square = ((right - left) / (top - bottom) - aspect).abs() < 1e-3 * aspect;
+        if height <= 0.0 {
+            return Err(entity.error("expected a `screenwindow` with a height above 0"));
+        }
+        if !(is_centred && is_square)
+            && let Some(parameter) = entity.find("screenwindow")
+        {
+            log.ignore(features::PBRT_SCREEN_WINDOW, &parameter.place);
+        }
+    }
+    let tangent = (0.5 * fov).to_radians().tan() * height;
+    Ok((2.0 * tangent.atan()).to_degrees())
+}
+
+/// Film, the factor of its sensor and its ratio of width to height.
+fn film(description: &Description, log: &mut Log) -> Result<(FilmSettings, f32, f64)> {
+    let mut film = FilmSettings { width: 1280, height: 720, filter: filter(description, log)? };
+    let mut exposure = 1.0;
+    if let Some(entity) = &description.film {
+        let side = |name: &str, otherwise: u32| {
+            let found = entity.number(name, f64::from(otherwise))?;
+            if found >= 1.0 && found <= f64::from(u32::MAX) {
+                return Ok(found as u32);
+            }
+            Err(entity.error(format!("`{name}`: expected pixels, found {found}")))
+        };
+        film.width = side("xresolution", film.width)?;
+        film.height = side("yresolution", film.height)?;
+        // With iso 100 and an open time of 1, the sensor `cie1931` gives radiance as it is.
+        exposure = (entity.number("iso", 100.0)? / 100.0) as f32;
+        if !(exposure >= 0.0 && exposure.is_finite()) {
+            return Err(entity.error("`iso`: expected a number of at least 0"));
+        }
+        if let Some(sensor) = entity.find("sensor")
+            && sensor.text() != "cie1931"
+        {
+            let name = format!("sensor `{}`", sensor.text());
+            log.ignore_named(features::PBRT_SENSOR, &name, &sensor.place);
+        }
+        for name in ["whitebalance", "maxcomponentvalue", "cropwindow", "pixelbounds"] {
+            if let Some(parameter) = entity.find(name) {
+                let name = format!("`{name}` of the film");
+                log.ignore_named(features::PBRT_FILM, &name, &parameter.place);
+            }
+        }
+        // No part of the picture.
+        for name in ["filename", "savefp16", "diagonal", "coordinatesystem"] {
+            entity.find(name);
+        }
+        log.unused(entity);
+    }
+    let aspect = f64::from(film.width) / f64::from(film.height);
+    Ok((film, exposure, aspect))
+}
+
+fn filter(description: &Description, log: &mut Log) -> Result<Filter> {
+    let Some(entity) = &description.filter else { return Ok(Filter::Gaussian) };
+    let (filter, radius, sigma) = match entity.name.as_str() {
+        "box" => (Filter::Box, 0.5, None),
+        "gaussian" => (Filter::Gaussian, 1.5, Some(0.5)),
+        "triangle" | "mitchell" | "sinc" => {
+            let name = format!("PixelFilter `{}`", entity.name);
+            log.ignore_named(features::PBRT_FILTER, &name, &entity.place);
+            return Ok(Filter::Gaussian);
+        }
+        other => return Err(entity.error(format!("unknown filter `{other}`"))),
+    };
+    let is_same = |name: &str, own: f64| Ok((entity.number(name, own)? - own).abs() < 1e-6);
+    let mut is_exact = is_same("xradius", radius)? && is_same("yradius", radius)?;
+    if let Some(sigma) = sigma {
+        is_exact &= is_same("sigma", sigma)?;
+    }
+    if !is_exact {
+        let name = format!("radius of PixelFilter `{}`", entity.name);
+        log.ignore_named(features::PBRT_FILTER, &name, &entity.place);
+    }
+    log.unused(entity);
+    Ok(filter)
+}

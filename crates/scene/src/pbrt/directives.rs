@@ -1,0 +1,476 @@
+//! Directives of a scene description → [`Description`]: entities with the state in force.
+
+use std::{collections::HashMap, path::Path, rc::Rc};
+
+use glam::{DMat4, DVec3};
+
+use super::{
+    parameters::{Entity, read_parameters},
+    source::{Part, Source},
+    state::{MaterialChoice, Saved, States, look_at, rotation},
+    tokens::{Place, Token},
+};
+use crate::{
+    error::Result,
+    features::{self, Feature, Ignored},
+};
+
+/// Shape with the state in force at its directive.
+#[derive(Debug)]
+pub struct Shape {
+    /// Type and parameters.
+    pub entity: Entity,
+    /// World, or object of instances, from shape.
+    pub world_from_shape: DMat4,
+    /// True if the outside is the inside.
+    pub reverse: bool,
+    /// Material.
+    pub material: MaterialChoice,
+    /// `AreaLightSource`, if the shape emits.
+    pub light: Option<Rc<Entity>>,
+}
+
+/// Use of an object.
+#[derive(Debug)]
+pub struct Instance {
+    /// World from the world of the object's definition.
+    pub world_from_object: DMat4,
+    /// Place of `ObjectInstance`.
+    pub place: Place,
+}
+
+/// Object that may be used many times.
+#[derive(Debug, Default)]
+pub struct Object {
+    /// Its name.
+    pub name: String,
+    /// Its shapes.
+    pub shapes: Vec<Shape>,
+    /// Its uses.
+    pub instances: Vec<Instance>,
+    /// True once `ObjectBegin` has named it.
+    pub is_defined: bool,
+}
+
+/// Entities of a scene.
+#[derive(Debug, Default)]
+pub struct Description {
+    /// `Camera`, and camera from world.
+    pub camera: Option<(Entity, DMat4)>,
+    /// `Film`.
+    pub film: Option<Entity>,
+    /// `PixelFilter`.
+    pub filter: Option<Entity>,
+    /// `Integrator`.
+    pub integrator: Option<Entity>,
+    /// `Texture` of type `float`, by name.
+    pub float_textures: HashMap<String, Entity>,
+    /// `Texture` of type `spectrum`, by name.
+    pub spectrum_textures: HashMap<String, Entity>,
+    /// `MakeNamedMaterial`.
+    pub materials: HashMap<String, Entity>,
+    /// Shapes that are no part of an object, in order.
+    pub shapes: Vec<Shape>,
+    /// Objects in the order in which they are named.
+    pub objects: Vec<Object>,
+    /// `LightSource`, and world from light.
+    pub lights: Vec<(Entity, DMat4)>,
+}
+
+/// Reader of directives.
+pub struct Reader<'a> {
+    source: Source,
+    main: &'a Path,
+    states: States,
+    in_world: bool,
+    /// Object between `ObjectBegin` and `ObjectEnd`.
+    object: Option<usize>,
+    object_names: HashMap<String, usize>,
+    description: Description,
+    ignored: &'a mut Ignored,
+}
+
+impl<'a> Reader<'a> {
+    /// Reads all directives of the main file `main`, to which `source` belongs. Returns the files read
+    /// too.
+    ///
+    /// # Errors
+    /// [`Parse`](crate::error::Error::Parse) with the place, and errors of the files.
+    pub fn read(
+        main: &'a Path,
+        source: Source,
+        ignored: &'a mut Ignored,
+    ) -> Result<(Description, Source)> {
+        let mut reader = Self {
+            source,
+            main,
+            states: States::default(),
+            in_world: false,
+            object: None,
+            object_names: HashMap::new(),
+            description: Description::default(),
+            ignored,
+        };
+        loop {
+            match reader.source.next()? {
+                Part::Token(Token::Word) => {
+                    let place = reader.source.place();
+                    let name = reader.source.text().to_owned();
+                    reader.directive(&name, place)?;
+                }
+                Part::Token(_) => {
+                    let found = reader.source.text();
+                    let message = format!("expected a directive, found {found:?} in its place");
+                    return Err(reader.source.place().error(message));
+                }
+                Part::EndOfImport => {
+                    let place = reader.source.place();
+                    reader.states.restore(Saved::Import, &place)?;
+                }
+                Part::End => break,
+            }
+        }
+        reader.states.check_end()?;
+        if !reader.in_world {
+            let message = "the file ends before WorldBegin: expected a scene of pbrt-v4";
+            return Err(reader.source.place().error(message));
+        }
+        Ok((reader.description, reader.source))
+    }
+
+    fn ignore(&mut self, feature: Feature, name: &str, place: &Place) {
+        let main = self.main;
+        self.ignored.add_named(feature, name, || place.describe(main));
+    }
+
+    fn directive(&mut self, name: &str, place: Place) -> Result<()> {
+        match name {
+            "Identity" | "Translate" | "Scale" | "Rotate" | "LookAt" | "Transform"
+            | "ConcatTransform" | "CoordinateSystem" | "CoordSysTransform" | "ActiveTransform"
+            | "TransformTimes" => self.transformation(name, &place),
+            "AttributeBegin" => self.states.save(Saved::Attribute, place),
+            "AttributeEnd" => self.states.restore(Saved::Attribute, &place),
+            "TransformBegin" => self.states.save(Saved::Transform, place),
+            "TransformEnd" => self.states.restore(Saved::Transform, &place),
+            "Attribute" => {
+                let target = self.text("Attribute")?;
+                let parameters = read_parameters(&mut self.source)?;
+                self.states.now.attributes.add(&target, parameters, &place)
+            }
+            "ReverseOrientation" => {
+                self.states.now.reverse ^= true;
+                Ok(())
+            }
+            "Include" | "Import" => {
+                let file = self.text(name)?;
+                let restores = name == "Import";
+                if restores {
+                    self.check_world(name, &place)?;
+                    self.states.save(Saved::Import, place.clone())?;
+                }
+                self.source.include(&file, restores, &place)
+            }
+            "WorldBegin" => {
+                if std::mem::replace(&mut self.in_world, true) {
+                    return Err(place.error("a second WorldBegin"));
+                }
+                self.states.now.ctm = DMat4::IDENTITY;
+                self.states.named.insert("world".to_owned(), DMat4::IDENTITY);
+                Ok(())
+            }
+            "ObjectBegin" | "ObjectEnd" | "ObjectInstance" => self.object(name, place),
+            "Camera" | "Film" | "PixelFilter" | "Integrator" | "Sampler" | "Accelerator"
+            | "Option" | "ColorSpace" => self.option(name, place),
+            "Shape" | "LightSource" | "AreaLightSource" | "Material" | "NamedMaterial"
+            | "MakeNamedMaterial" | "Texture" => {
+                if name != "MakeNamedMaterial" && name != "Texture" {
+                    self.check_world(name, &place)?;
+                }
+                self.entity(name, place)
+            }
+            "MediumInterface" => {
+                self.text(name)?;
+                if let Some(token) = self.source.next_here()? {
+                    // The outside may be left out.
+                    if token == Token::Word {
+                        self.source.hold(token);
+                    }
+                }
+                self.ignore(features::PBRT_MEDIUM, features::PBRT_MEDIUM.name, &place);
+                Ok(())
+            }
+            "MakeNamedMedium" => {
+                self.text(name)?;
+                read_parameters(&mut self.source)?;
+                self.ignore(features::PBRT_MEDIUM, features::PBRT_MEDIUM.name, &place);
+                Ok(())
+            }
+            _ => Err(place.error(format!(
+                "unknown directive `{name}`; files of pbrt-v3 are converted by `pbrt --upgrade`"
+            ))),
+        }
+    }
+
+    fn check_world(&self, name: &str, place: &Place) -> Result<()> {
+        if self.in_world {
+            return Ok(());
+        }
+        Err(place.error(format!("{name} before WorldBegin")))
+    }
+
+    /// Reads a string in quotes.
+    fn text(&mut self, directive: &str) -> Result<String> {
+        match self.source.next_here()? {
+            Some(Token::Text) => Ok(self.source.text().to_owned()),
+            found => {
+                let found =
+                    if found.is_some() { self.source.text() } else { "the end of the file" };
+                let message = format!("{directive}: expected a string in quotes, found {found}");
+                Err(self.source.place().error(message))
+            }
+        }
+    }
+
+    /// Reads numbers, in brackets or not.
+    fn numbers<const N: usize>(&mut self, directive: &str) -> Result<[f64; N]> {
+        let mut numbers = [0.0; N];
+        let mut token = self.source.next_here()?;
+        let in_brackets = token == Some(Token::Open);
+        if in_brackets {
+            token = self.source.next_here()?;
+        }
+        for (index, number) in numbers.iter_mut().enumerate() {
+            if index > 0 {
+                token = self.source.next_here()?;
+            }
+            let text = self.source.text();
+            let parsed = text.parse().ok().filter(|number: &f64| number.is_finite());
+            match (token, parsed) {
+                (Some(Token::Word), Some(parsed)) => *number = parsed,
+                (token, _) => {
+                    let found = if token.is_some() { text } else { "the end of the file" };
+                    let message = format!("{directive}: expected {N} numbers, found `{found}`");
+                    return Err(self.source.place().error(message));
+                }
+            }
+        }
+        if in_brackets && self.source.next_here()? != Some(Token::Close) {
+            let message = format!("{directive}: expected {N} numbers and a closing bracket");
+            return Err(self.source.place().error(message));
+        }
+        Ok(numbers)
+    }
+
+    fn transformation(&mut self, name: &str, place: &Place) -> Result<()> {
+        let ctm = self.states.now.ctm;
+        self.states.now.ctm = match name {
+            "Identity" => DMat4::IDENTITY,
+            "Translate" => {
+                ctm * DMat4::from_translation(DVec3::from_array(self.numbers("Translate")?))
+            }
+            "Scale" => ctm * DMat4::from_scale(DVec3::from_array(self.numbers("Scale")?)),
+            "Rotate" => {
+                let [angle, x, y, z] = self.numbers("Rotate")?;
+                let turn = rotation(angle, DVec3::new(x, y, z))
+                    .ok_or_else(|| place.error("Rotate: expected an axis with a direction"))?;
+                ctm * turn
+            }
+            "LookAt" => {
+                let [a, b, c, d, e, f, g, h, i] = self.numbers("LookAt")?;
+                let view = look_at(DVec3::new(a, b, c), DVec3::new(d, e, f), DVec3::new(g, h, i));
+                let message =
+                    "LookAt: eye and target must differ, and up must not lie between them";
+                ctm * view.ok_or_else(|| place.error(message))?
+            }
+            // Files give matrices column by column.
+            "Transform" => DMat4::from_cols_array(&self.numbers("Transform")?),
+            "ConcatTransform" => ctm * DMat4::from_cols_array(&self.numbers("ConcatTransform")?),
+            "CoordinateSystem" => {
+                let system = self.text(name)?;
+                self.states.named.insert(system, ctm);
+                ctm
+            }
+            "CoordSysTransform" => {
+                let system = self.text(name)?;
+                let known = self.states.named.get(&system).copied();
+                let message = || place.error(format!("there is no coordinate system `{system}`"));
+                known.ok_or_else(message)?
+            }
+            "TransformTimes" => {
+                self.numbers::<2>(name)?;
+                self.ignore(features::PBRT_MOTION, features::PBRT_MOTION.name, place);
+                ctm
+            }
+            _ => {
+                let token = self.source.next_here()?;
+                let which = self.source.text().to_owned();
+                if token != Some(Token::Word)
+                    || !["All", "StartTime", "EndTime"].contains(&which.as_str())
+                {
+                    let message = "ActiveTransform: expected All, StartTime or EndTime";
+                    return Err(self.source.place().error(message));
+                }
+                if which != "All" {
+                    self.ignore(features::PBRT_MOTION, features::PBRT_MOTION.name, place);
+                }
+                ctm
+            }
+        };
+        if self.states.now.ctm.is_finite() {
+            return Ok(());
+        }
+        Err(place.error(format!("{name}: the transformation leaves the range of numbers")))
+    }
+
+    /// Index of an object by name.
+    fn object_index(&mut self, name: String) -> usize {
+        let objects = &mut self.description.objects;
+        *self.object_names.entry(name.clone()).or_insert_with(|| {
+            objects.push(Object { name, ..Object::default() });
+            objects.len() - 1
+        })
+    }
+
+    fn object(&mut self, directive: &str, place: Place) -> Result<()> {
+        self.check_world(directive, &place)?;
+        if directive == "ObjectEnd" {
+            self.object = None;
+            return self.states.restore(Saved::Object, &place);
+        }
+        let name = self.text(directive)?;
+        let index = self.object_index(name.clone());
+        if self.object.is_some() {
+            return Err(place.error(format!("{directive} `{name}` inside an object")));
+        }
+        let object = &mut self.description.objects[index];
+        if directive == "ObjectInstance" {
+            let world_from_object = self.states.now.ctm;
+            object.instances.push(Instance { world_from_object, place });
+            return Ok(());
+        }
+        if std::mem::replace(&mut object.is_defined, true) {
+            return Err(place.error(format!("object `{name}` is defined twice")));
+        }
+        self.object = Some(index);
+        self.states.save(Saved::Object, place)
+    }
+
+    /// Reads a directive of the part before `WorldBegin`.
+    fn option(&mut self, name: &str, place: Place) -> Result<()> {
+        if name == "Option" {
+            let parameters = read_parameters(&mut self.source)?;
+            for parameter in parameters {
+                let name = format!("Option `{}`", parameter.name);
+                self.ignore(features::PBRT_OPTION, &name, &parameter.place);
+            }
+            return Ok(());
+        }
+        let kind = self.text(name)?;
+        if name == "ColorSpace" {
+            if kind != "srgb" {
+                let name = format!("ColorSpace `{kind}`");
+                self.ignore(features::PBRT_COLOR_SPACE, &name, &place);
+            }
+            return Ok(());
+        }
+        let directive = match name {
+            "Camera" => "Camera",
+            "Film" => "Film",
+            "PixelFilter" => "PixelFilter",
+            "Integrator" => "Integrator",
+            "Sampler" => "Sampler",
+            _ => "Accelerator",
+        };
+        if self.in_world {
+            return Err(place.error(format!("{directive} after WorldBegin")));
+        }
+        let entity = Entity::read(&mut self.source, directive, kind, place, &[])?;
+        match directive {
+            "Camera" => {
+                let ctm = self.states.now.ctm;
+                self.states.named.insert("camera".to_owned(), ctm.inverse());
+                self.description.camera = Some((entity, ctm));
+            }
+            "Film" => self.description.film = Some(entity),
+            "PixelFilter" => self.description.filter = Some(entity),
+            "Integrator" => self.description.integrator = Some(entity),
+            // The command line chooses samples and trees.
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn entity(&mut self, name: &str, place: Place) -> Result<()> {
+        let kind = self.text(name)?;
+        let now = self.states.now.clone();
+        let source = &mut self.source;
+        match name {
+            "NamedMaterial" => {
+                self.states.now.material = MaterialChoice::Named(Rc::from(kind), place);
+            }
+            "Shape" => {
+                let inherited = now.attributes.of("shape");
+                let shape = Shape {
+                    entity: Entity::read(source, "Shape", kind, place, inherited)?,
+                    world_from_shape: now.ctm,
+                    reverse: now.reverse,
+                    material: now.material,
+                    light: now.area_light,
+                };
+                match self.object {
+                    Some(index) => self.description.objects[index].shapes.push(shape),
+                    None => self.description.shapes.push(shape),
+                }
+            }
+            "LightSource" => {
+                let inherited = now.attributes.of("light");
+                let entity = Entity::read(source, "LightSource", kind, place, inherited)?;
+                self.description.lights.push((entity, now.ctm));
+            }
+            "AreaLightSource" => {
+                let inherited = now.attributes.of("light");
+                let entity = Entity::read(source, "AreaLightSource", kind, place, inherited)?;
+                self.states.now.area_light = Some(Rc::new(entity));
+            }
+            "Material" => {
+                let inherited = now.attributes.of("material");
+                let entity = Entity::read(source, "Material", kind, place, inherited)?;
+                self.states.now.material = MaterialChoice::Own(Rc::new(entity));
+            }
+            "MakeNamedMaterial" => {
+                let inherited = now.attributes.of("material");
+                let directive = "MakeNamedMaterial";
+                let entity = Entity::read(source, directive, kind.clone(), place, inherited)?;
+                let error = entity.error("the name is taken by another material");
+                if self.description.materials.insert(kind, entity).is_some() {
+                    return Err(error);
+                }
+            }
+            _ => self.texture(kind, place)?,
+        }
+        Ok(())
+    }
+
+    /// Reads `Texture "name" "float" "imagemap"` from its second string on.
+    fn texture(&mut self, name: String, place: Place) -> Result<()> {
+        let values = self.text("Texture")?;
+        let kind = self.text("Texture")?;
+        let attributes = self.states.now.attributes.clone();
+        let inherited = attributes.of("texture");
+        let entity = Entity::read(&mut self.source, "Texture", kind, place, inherited)?;
+        let textures = match values.as_str() {
+            "float" => &mut self.description.float_textures,
+            "spectrum" => &mut self.description.spectrum_textures,
+            _ => {
+                let message =
+                    format!("`{name}`: expected values of float or spectrum, found {values}");
+                return Err(entity.error(message));
+            }
+        };
+        let error = entity.error(format!("the name `{name}` is taken by another texture"));
+        if textures.insert(name, entity).is_some() {
+            return Err(error);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,140 @@
+//! Square equal-area maps of the sphere \[Clarberg 2008\] → lat-long environment maps.
+
+use std::f32::consts::FRAC_PI_4;
+
+use glam::{Mat3, Vec2, Vec3};
+use rayon::prelude::*;
+
+use crate::{EnvironmentMap, math::frame::direction_from_lat_long};
+
+/// Points of a texel of the lat-long map, along each side, whose mean it is.
+const POINTS: u32 = 6;
+
+/// Point of the unit square where a unit direction lies, (0, 0) at the upper left of the image.
+pub fn square_from_direction(direction: Vec3) -> Vec2 {
+    let [x, y, z] = direction.abs().to_array();
+    let radius = (1.0 - z).max(0.0).sqrt();
+    let (greater, less) = (x.max(y), x.min(y));
+    let ratio = if greater == 0.0 { 0.0 } else { less / greater };
+    let turn = ratio.atan() / (2.0 * FRAC_PI_4);
+    let turn = if x < y { 1.0 - turn } else { turn };
+    let (mut u, mut v) = (radius - turn * radius, turn * radius);
+    if direction.z < 0.0 {
+        (u, v) = (1.0 - v, 1.0 - u);
+    }
+    0.5 * Vec2::new(u.copysign(direction.x) + 1.0, v.copysign(direction.y) + 1.0)
+}
+
+/// Unit direction of a point of the unit square: the inverse of [`square_from_direction`].
+pub fn direction_from_square(uv: Vec2) -> Vec3 {
+    let [u, v] = (2.0 * uv - 1.0).to_array();
+    let signed = 1.0 - (u.abs() + v.abs());
+    let radius = 1.0 - signed.abs();
+    let turn = if radius == 0.0 { 1.0 } else { (v.abs() - u.abs()) / radius + 1.0 };
+    let (sine, cosine) = (turn * FRAC_PI_4).sin_cos();
+    let z = (1.0 - radius * radius).copysign(signed);
+    let across = radius * (2.0 - radius * radius).max(0.0).sqrt();
+    Vec3::new((cosine * across).copysign(u), (sine * across).copysign(v), z)
+}
+
+/// Resamples a square map, whose `texels` are those of `side` rows. `light_from_world` turns a
+/// direction of the renderer to one of the map, up to its length.
+///
+/// Every texel is the mean of the map over points of it, and a factor for each channel keeps the mean
+/// radiance of the sphere, which in an equal-area map is that of the texels.
+pub fn resample(
+    texels: &[Vec3],
+    side: u32,
+    light_from_world: Mat3,
+    source: String,
+) -> EnvironmentMap {
+    let (width, height) = (2 * side.max(32), side.max(32));
+    let lookup = |direction: Vec3| {
+        let uv = square_from_direction((light_from_world * direction).normalize_or(Vec3::Z));
+        let [column, row] =
+            uv.to_array().map(|at| ((at * side as f32) as u32).min(side - 1) as usize);
+        texels[row * side as usize + column]
+    };
+    let texel = |index: u32| {
+        let corner = Vec2::new((index % width) as f32, (index / width) as f32);
+        let point = |index: u32| {
+            let inside = Vec2::new((index % POINTS) as f32, (index / POINTS) as f32) + 0.5;
+            let place = corner + inside / POINTS as f32;
+            lookup(direction_from_lat_long(place / Vec2::new(width as f32, height as f32)))
+        };
+        (0..POINTS * POINTS).map(point).sum::<Vec3>() / (POINTS * POINTS) as f32
+    };
+    let mut resampled: Vec<Vec3> = (0..width * height).into_par_iter().map(texel).collect();
+    let row_mean = |row: usize| -> glam::DVec3 {
+        let texels = &resampled[row * width as usize..(row + 1) * width as usize];
+        let edge = |row: usize| (std::f64::consts::PI * row as f64 / f64::from(height)).cos();
+        let weight = 0.5 * (edge(row) - edge(row + 1)) / f64::from(width);
+        texels.iter().map(|texel| texel.as_dvec3() * weight).sum()
+    };
+    let found: glam::DVec3 = (0..height as usize).map(row_mean).sum();
+    let expected: glam::DVec3 = texels.iter().map(|texel| texel.as_dvec3()).sum();
+    let expected = expected / texels.len() as f64;
+    let factor = Vec3::from_array(std::array::from_fn(|channel| {
+        let factor = (expected[channel] / found[channel]) as f32;
+        if factor.is_finite() { factor } else { 1.0 }
+    }));
+    resampled.iter_mut().for_each(|texel| *texel *= factor);
+    EnvironmentMap { width, height, texels: resampled, rotation_rad: 0.0, source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_of_the_square_come_back() {
+        for index in 0..1000_u32 {
+            let uv = Vec2::new((index as f32 + 0.5) / 1000.0, (index as f32 * 0.618_034).fract());
+            let direction = direction_from_square(uv);
+            assert!((direction.length() - 1.0).abs() < 1e-5);
+            let back = square_from_direction(direction);
+            assert!((back - uv).length() < 1e-3, "{uv} {direction} {back}");
+        }
+        // The middle is +z, the corners are −z, +x is to the right and +y below.
+        assert_eq!(square_from_direction(Vec3::Z), Vec2::splat(0.5));
+        assert!(square_from_direction(Vec3::X).x > 0.9);
+        assert!(square_from_direction(Vec3::Y).y > 0.9);
+    }
+
+    /// A map that is a function of direction keeps its values and its mean.
+    #[test]
+    fn radiance_stays_in_its_direction() {
+        let side = 64;
+        let color = |direction: Vec3| Vec3::splat(2.0) + direction;
+        let texels: Vec<Vec3> = (0..side * side)
+            .map(|index| {
+                let at = Vec2::new((index % side) as f32 + 0.5, (index / side) as f32 + 0.5);
+                color(direction_from_square(at / side as f32))
+            })
+            .collect();
+        let turn = Mat3::from_diagonal(Vec3::new(1.0, 1.0, -1.0))
+            * Mat3::from_axis_angle(Vec3::new(1.0, 2.0, 3.0).normalize(), 1.0);
+        let map = resample(&texels, side, turn, String::new());
+        for direction in [Vec3::X, -Vec3::Z, Vec3::new(0.6, -0.48, 0.64)] {
+            let (found, expected) = (map.radiance(direction), color(turn * direction));
+            assert!((found - expected).abs().max_element() < 0.05, "{found} {expected}");
+        }
+    }
+
+    #[test]
+    fn a_single_bright_texel_keeps_its_power() {
+        let side = 40;
+        let mut texels = vec![Vec3::ZERO; 1600];
+        texels[123] = Vec3::new(1000.0, 500.0, 0.0);
+        let map = resample(&texels, side, Mat3::IDENTITY, String::new());
+        let mut mean = glam::DVec3::ZERO;
+        for (index, texel) in map.texels.iter().enumerate() {
+            let row = index as f64 / f64::from(map.width);
+            let edge = |row: f64| (std::f64::consts::PI * row / f64::from(map.height)).cos();
+            let solid = 0.5 * (edge(row.floor()) - edge(row.floor() + 1.0)) / f64::from(map.width);
+            mean += texel.as_dvec3() * solid;
+        }
+        let expected = glam::DVec3::new(1000.0, 500.0, 0.0) / 1600.0;
+        assert!((mean - expected).abs().max_element() < 1e-5, "{mean} {expected}");
+    }
+}

@@ -1,0 +1,321 @@
+//! Lights of a scene description → lamps and the environment map.
+//!
+//! pbrt-v4 divides the spectrum of a light by its luminance before it applies `scale`: that of `rgb`
+//! by the luminance of the white alone, so that `rgb` 1 is radiance 1 in the picture, that of others by
+//! their own. `spectra` returns colours to which this has been done.
+
+use std::f64::consts::PI;
+
+use glam::{DMat3, DMat4, DVec3, Vec3};
+
+use super::{
+    equal_area::resample, log::Log, parameters::Entity, source::path_inside, spectra,
+    textures::Textures,
+};
+use crate::{
+    EnvironmentMap, Lamp,
+    error::Result,
+    features,
+    lamp::{LampKind, SpotFalloff},
+    math::colour::luminance,
+    texture::{Encoding, Texture, TextureUse},
+};
+
+/// Largest side of an equal-area map, texels.
+const MAX_SIDE: u32 = 8192;
+
+/// Lights of a scene.
+#[derive(Default)]
+pub struct Lights {
+    /// Lamps.
+    pub lamps: Vec<Lamp>,
+    /// Radiance from everywhere.
+    constant: Vec3,
+    maps: Vec<SquareMap>,
+}
+
+/// Equal-area map as the file gives it.
+struct SquareMap {
+    texels: Vec<Vec3>,
+    side: u32,
+    light_from_world: DMat3,
+    source: String,
+}
+
+/// Emission of a shape.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AreaLight {
+    /// Radiance, or its factor where an image gives it.
+    pub radiance: Vec3,
+    /// Image of the radiance.
+    pub image: Option<TextureUse>,
+    /// True if both sides emit.
+    pub two_sided: bool,
+}
+
+fn color(entity: &Entity, name: &str, textures: &Textures) -> Result<Vec3> {
+    match entity.find_of(name, &spectra::KINDS)? {
+        Some(parameter) => spectra::light(parameter, textures.folder()),
+        None => Ok(Vec3::ONE),
+    }
+}
+
+/// Reads the emission of a shape with this area, in the units of the scene.
+///
+/// # Errors
+/// With the place for other kinds of lights.
+pub fn area_light(
+    entity: &Entity,
+    area: f64,
+    exposure: f32,
+    textures: &mut Textures,
+    log: &mut Log,
+) -> Result<AreaLight> {
+    if entity.name != "diffuse" {
+        return Err(entity.error("expected a diffuse light"));
+    }
+    let two_sided = entity.boolean("twosided", false)?;
+    let mut scale = entity.number("scale", 1.0)?;
+    if let Some(power) = entity.optional("power")?.filter(|power| *power > 0.0) {
+        let sides = if two_sided { 2.0 } else { 1.0 };
+        scale *= power / (sides * area * PI);
+    }
+    let image = textures.light_image(entity, log)?;
+    if let (Some(_), Some(color)) = (&image, entity.find("L")) {
+        let message = "expected either `L` or `filename`, found both";
+        return Err(color.place.error(format!("{}: {message}", entity.label())));
+    }
+    let radiance = color(entity, "L", textures)? * scale as f32 * exposure;
+    log.unused(entity);
+    if !radiance.is_finite() || radiance.min_element() < 0.0 {
+        return Err(
+            entity.error(format!("expected finite radiance of at least 0, found {radiance}"))
+        );
+    }
+    Ok(AreaLight { radiance, image, two_sided })
+}
+
+impl Lights {
+    /// Adds a light. `world_from_light` leads to the renderer's world.
+    ///
+    /// # Errors
+    /// With the place for kinds that pbrt does not have, transformations that flatten, and maps that
+    /// cannot be read.
+    pub fn add(
+        &mut self,
+        entity: &Entity,
+        world_from_light: DMat4,
+        exposure: f32,
+        textures: &Textures,
+        log: &mut Log,
+    ) -> Result<()> {
+        let scale = entity.number("scale", 1.0)?;
+        let power = entity.optional("power")?.filter(|power| *power > 0.0);
+        let illuminance = entity.optional("illuminance")?.filter(|power| *power > 0.0);
+        let from = entity.point("from", DVec3::ZERO)?;
+        let to = entity.point("to", DVec3::Z)?;
+        let place = |point: DVec3| world_from_light.transform_point3(point).as_vec3();
+        let direction = |direction: DVec3| {
+            let turned = world_from_light.transform_vector3(direction).try_normalize();
+            let message = "`from` and `to` must differ";
+            turned.map(DVec3::as_vec3).ok_or_else(|| entity.error(message))
+        };
+        let kind = match entity.name.as_str() {
+            "infinite" => {
+                self.infinite(
+                    entity,
+                    world_from_light,
+                    scale,
+                    illuminance,
+                    exposure,
+                    textures,
+                    log,
+                )?;
+                log.unused(entity);
+                return Ok(());
+            }
+            "distant" => {
+                let factor = (scale * illuminance.unwrap_or(1.0)) as f32;
+                let irradiance = color(entity, "L", textures)? * factor * exposure;
+                LampKind::Directional { direction: direction(to - from)?, irradiance }
+            }
+            "point" => {
+                let factor = scale * power.map_or(1.0, |power| power / (4.0 * PI));
+                let intensity = color(entity, "I", textures)? * factor as f32 * exposure;
+                LampKind::Point { position: place(from), intensity }
+            }
+            "spot" => {
+                let outer = entity.number("coneangle", 30.0)?.clamp(0.01, 180.0);
+                let inner = outer - entity.number("conedeltaangle", 5.0)?;
+                let [inner, outer] = [inner.clamp(0.0, outer), outer].map(f64::to_radians);
+                let cone = 2.0 * PI * (1.0 - 0.5 * (inner.cos() + outer.cos()));
+                let factor = scale * power.map_or(1.0, |power| power / cone);
+                LampKind::Spot {
+                    position: place(from),
+                    direction: direction(to - from)?,
+                    intensity: color(entity, "I", textures)? * factor as f32 * exposure,
+                    // A falloff needs some width.
+                    inner_angle_rad: inner.min(outer * (1.0 - 1e-4)) as f32,
+                    outer_angle_rad: outer as f32,
+                    falloff: SpotFalloff::SmoothCosine,
+                }
+            }
+            "projection" | "goniometric" => {
+                let name = format!("LightSource `{}`", entity.name);
+                log.ignore_named(features::PBRT_LIGHT, &name, &entity.place);
+                return Ok(());
+            }
+            other => return Err(entity.error(format!("unknown light `{other}`"))),
+        };
+        log.unused(entity);
+        let (LampKind::Point { intensity: color, .. }
+        | LampKind::Spot { intensity: color, .. }
+        | LampKind::Directional { irradiance: color, .. }) = kind;
+        if !color.is_finite() || color.min_element() < 0.0 {
+            return Err(entity.error(format!("expected finite light of at least 0, found {color}")));
+        }
+        let name = format!("{} of line {}", entity.name, entity.place.line);
+        self.lamps.push(Lamp { name, kind });
+        Ok(())
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "what `add` has read, and its own")]
+    fn infinite(
+        &mut self,
+        entity: &Entity,
+        world_from_light: DMat4,
+        scale: f64,
+        illuminance: Option<f64>,
+        exposure: f32,
+        textures: &Textures,
+        log: &mut Log,
+    ) -> Result<()> {
+        if let Some(portal) = entity.find("portal") {
+            log.ignore(features::PBRT_PORTAL, &portal.place);
+        }
+        let Some(file) = entity.string("filename")? else {
+            // A hemisphere of radiance 1 gives an illuminance of π.
+            let factor = scale * illuminance.map_or(1.0, |illuminance| illuminance / PI);
+            self.constant += color(entity, "L", textures)? * factor as f32 * exposure;
+            return Ok(());
+        };
+        if let Some(color) = entity.find("L") {
+            let message = "expected either `L` or `filename`, found both";
+            return Err(color.place.error(format!("{}: {message}", entity.label())));
+        }
+        let path = path_inside(textures.folder(), file).map_err(|message| entity.error(message))?;
+        let mut map = read_map(&path, log).map_err(|error| entity.error(error.to_string()))?;
+        if map.width != map.height || map.width > MAX_SIDE {
+            return Err(entity.error(format!(
+                "{}: expected a square equal-area map of at most {MAX_SIDE} texels a side, found \
+                 {}×{}; pbrt's `imgtool makeequiarea` makes one of a lat-long map",
+                path.display(),
+                map.width,
+                map.height
+            )));
+        }
+        let light_from_world = DMat3::from_mat4(world_from_light).inverse();
+        if !light_from_world.is_finite() {
+            return Err(entity.error("the transformation of the light flattens space"));
+        }
+        let factor = scale
+            * illuminance.map_or(1.0, |wanted| wanted / upper_illuminance(&map.texels, map.width));
+        map.texels.iter_mut().for_each(|texel| *texel *= factor as f32 * exposure);
+        self.maps.push(SquareMap {
+            texels: map.texels,
+            side: map.width,
+            light_from_world,
+            source: path.display().to_string(),
+        });
+        log.inputs.push(path);
+        Ok(())
+    }
+
+    /// Sum of the infinite lights as one map.
+    ///
+    /// # Errors
+    /// A message for radiance that is not finite or negative.
+    pub fn environment(&mut self) -> Result<EnvironmentMap, String> {
+        // Resample the largest first, and the others to its size.
+        let side = self.maps.iter().map(|map| map.side).max().unwrap_or(0);
+        let mut sum: Option<EnvironmentMap> = None;
+        for map in self.maps.drain(..) {
+            let texels = enlarge(map.texels, map.side, side);
+            let turn = map.light_from_world.as_mat3();
+            let map = resample(&texels, side, turn, map.source);
+            match &mut sum {
+                None => sum = Some(map),
+                Some(sum) => {
+                    sum.texels.iter_mut().zip(&map.texels).for_each(|(sum, texel)| *sum += *texel);
+                }
+            }
+        }
+        let Some(mut sum) = sum else { return EnvironmentMap::constant(self.constant, 1.0) };
+        sum.texels.iter_mut().for_each(|texel| *texel += self.constant);
+        let is_radiance = |texel: &Vec3| texel.is_finite() && texel.min_element() >= 0.0;
+        if sum.texels.iter().all(is_radiance) {
+            return Ok(sum);
+        }
+        Err(format!("{}: radiance that is not finite or negative", sum.source))
+    }
+}
+
+/// Repeats texels of a square map so that it has `wanted` rows.
+fn enlarge(texels: Vec<Vec3>, side: u32, wanted: u32) -> Vec<Vec3> {
+    if side == wanted {
+        return texels;
+    }
+    let at = |index: u32| (u64::from(index) * u64::from(side) / u64::from(wanted)) as usize;
+    let rows = (0..wanted).flat_map(|row| (0..wanted).map(move |column| (row, column)));
+    rows.map(|(row, column)| texels[at(row) * side as usize + at(column)]).collect()
+}
+
+/// Reads an image of radiance: high dynamic range, or 8-bit sRGB.
+fn read_map(path: &std::path::Path, log: &mut Log) -> Result<EnvironmentMap> {
+    if matches!(crate::files::extension(path).as_str(), "hdr" | "exr" | "pfm") {
+        return EnvironmentMap::read(path, 1.0, &mut log.warnings);
+    }
+    let image = Texture::load_with(path, &mut log.warnings)?;
+    let texels = image.linear_texels(Encoding::Srgb);
+    let texels = texels.iter().map(|&[red, green, blue, _]| Vec3::new(red, green, blue)).collect();
+    let (width, height) = (image.width, image.height);
+    Ok(EnvironmentMap { width, height, texels, rotation_rad: 0.0, source: image.name })
+}
+
+/// Illuminance of a plane that faces +z of a square equal-area map.
+fn upper_illuminance(texels: &[Vec3], side: u32) -> f64 {
+    let sum: f64 = (0..texels.len())
+        .map(|index| {
+            let index = index as u32;
+            let [u, v] = [index % side, index / side]
+                .map(|at| 2.0 * (f64::from(at) + 0.5) / f64::from(side) - 1.0);
+            // Inside the diamond, the distance from its edge gives the height.
+            let radius = u.abs() + v.abs();
+            let cosine = if radius < 1.0 { 1.0 - radius * radius } else { 0.0 };
+            cosine * f64::from(luminance(texels[index as usize]))
+        })
+        .sum();
+    4.0 * PI * sum / texels.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pbrt::equal_area::square_from_direction;
+
+    #[test]
+    fn a_white_map_gives_an_illuminance_of_pi() {
+        assert!((upper_illuminance(&[Vec3::ONE; 64 * 64], 64) - PI).abs() < 0.01);
+        // Above the horizon is inside the diamond.
+        let uv = square_from_direction(Vec3::new(0.6, 0.0, 0.8));
+        assert!((uv.x - 0.5).abs() + (uv.y - 0.5).abs() < 0.5);
+    }
+
+    #[test]
+    fn small_maps_are_repeated_to_the_size_of_large_ones() {
+        let texels = [1.0, 2.0, 3.0, 4.0].map(Vec3::splat).to_vec();
+        let large = enlarge(texels, 2, 4);
+        assert_eq!(large.len(), 16);
+        assert_eq!([large[0].x, large[3].x, large[4].x, large[15].x], [1.0, 2.0, 1.0, 4.0]);
+    }
+}

@@ -1,0 +1,43 @@
+//! Report of the reader: parts left out, and files read.
+
+use std::path::{Path, PathBuf};
+
+use super::{parameters::Entity, tokens::Place};
+use crate::features::{self, Feature, Ignored};
+
+/// Parts of a scene that are left out, and files read.
+pub struct Log<'a> {
+    /// Main file.
+    pub main: &'a Path,
+    /// Parts that are left out.
+    pub ignored: Ignored,
+    /// Files read.
+    pub inputs: Vec<PathBuf>,
+    /// Warnings of the readers of other files.
+    pub warnings: Vec<String>,
+}
+
+impl Log<'_> {
+    /// Counts a part.
+    pub fn ignore(&mut self, feature: Feature, place: &Place) {
+        self.ignore_named(feature, feature.name, place);
+    }
+
+    /// Counts a part that has a name of its own.
+    pub fn ignore_named(&mut self, feature: Feature, name: &str, place: &Place) {
+        let main = self.main;
+        self.ignored.add_named(feature, name, || place.describe(main));
+    }
+
+    /// Counts the parameters of a directive that nothing has asked for.
+    pub fn unused(&mut self, entity: &Entity) {
+        for parameter in entity.unused() {
+            let name = match entity.directive {
+                // Their names are the author's own.
+                "MakeNamedMaterial" => format!("parameter `{}` of materials", parameter.name),
+                _ => format!("parameter `{}` of {}", parameter.name, entity.label()),
+            };
+            self.ignore_named(features::PBRT_PARAMETER, &name, &parameter.place);
+        }
+    }
+}

@@ -1,0 +1,417 @@
+//! Materials of a scene description → the nearest [`Material`]s.
+
+use glam::Vec3;
+
+use super::{
+    directives::Description,
+    log::Log,
+    named,
+    parameters::{Entity, Kind, Values},
+    spectra,
+    state::MaterialChoice,
+    textures::{Textures, Value, map_numbers},
+};
+use crate::{
+    blend::{Share, blend},
+    coat::albedo_below_coat,
+    error::Result,
+    features,
+    material::{ConductorFresnel, Material, MaterialKind, Surface},
+    texture::TextureUse,
+};
+
+/// Most materials that may mix one another.
+const MAX_DEPTH: usize = 16;
+/// Widths below which pbrt-v4 takes a surface for smooth.
+const SMOOTH_ALPHA: f32 = 1e-3;
+/// Reflectance from which a smooth metal is a mirror; pbrt has none of more.
+const MIRROR_REFLECTANCE: f32 = 0.9999;
+/// Refractive indices that a coat may have.
+const COAT_IOR: (f32, f32) = (1.01, 4.0);
+/// Refractive indices of solids.
+const SOLID_IOR: (f32, f32) = (0.1, 10.0);
+
+/// Materials of a scene.
+pub struct Materials<'a> {
+    description: &'a Description,
+    /// Textures that the materials read.
+    pub textures: Textures<'a>,
+}
+
+/// Width of the microfacet distribution, constant or by place.
+struct Roughness {
+    alpha: f32,
+    /// Factor of √α, for which `alpha` is then 1.
+    texture: Option<TextureUse>,
+}
+
+impl<'a> Materials<'a> {
+    /// Takes the materials of `description`.
+    pub fn new(description: &'a Description, textures: Textures<'a>) -> Self {
+        Self { description, textures }
+    }
+
+    /// Makes the material that a shape takes; none for a surface that is not there.
+    ///
+    /// # Errors
+    /// With the place for unknown names and kinds, and parameters of the wrong type.
+    pub fn make(&mut self, choice: &MaterialChoice, log: &mut Log) -> Result<Option<Material>> {
+        match choice {
+            MaterialChoice::Default => {
+                let kind = MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) };
+                Ok(Some(Material::new("default", kind)))
+            }
+            MaterialChoice::Own(entity) => {
+                let name = format!("{} of line {}", entity.name, entity.place.line);
+                self.of_entity(entity, &entity.name, name, 0, log)
+            }
+            MaterialChoice::Named(name, place) => match self.description.materials.get(&**name) {
+                Some(entity) => self.named(name, entity, 0, log),
+                None => {
+                    let message = format!("NamedMaterial \"{name}\": there is no such material");
+                    Err(place.error(message))
+                }
+            },
+        }
+    }
+
+    fn named(
+        &mut self,
+        name: &str,
+        entity: &Entity,
+        depth: usize,
+        log: &mut Log,
+    ) -> Result<Option<Material>> {
+        let Some(kind) = entity.string("type")? else {
+            return Err(entity.error("expected a `type`"));
+        };
+        self.of_entity(entity, kind, name.to_owned(), depth, log)
+    }
+
+    fn of_entity(
+        &mut self,
+        entity: &Entity,
+        kind: &str,
+        name: String,
+        depth: usize,
+        log: &mut Log,
+    ) -> Result<Option<Material>> {
+        let mut surface = Surface::default();
+        let kind = match kind {
+            "diffuse" => self.diffuse(entity, "reflectance", 0.5, 1.0, &mut surface, log)?,
+            "coateddiffuse" => {
+                self.layers(entity, log)?;
+                self.plastic(entity, &mut surface, log)?
+            }
+            "conductor" => self.conductor(entity, "", &mut surface, log)?,
+            "coatedconductor" => {
+                log.ignore(features::PBRT_COATED_CONDUCTOR, &entity.place);
+                self.layers(entity, log)?;
+                for name in ["interface.roughness", "interface.uroughness", "interface.vroughness"]
+                {
+                    entity.find(name);
+                }
+                entity.find("interface.eta");
+                self.conductor(entity, "conductor.", &mut surface, log)?
+            }
+            "dielectric" => {
+                let roughness = self.roughness(entity, "", log)?;
+                surface.roughness = roughness.texture;
+                let alpha = if roughness.alpha < SMOOTH_ALPHA { 0.0 } else { roughness.alpha };
+                let ior = self.ior(entity, "eta", SOLID_IOR)?;
+                let (reflectance, transmittance) = (Vec3::ONE, Vec3::ONE);
+                MaterialKind::Dielectric { ior, alpha, reflectance, transmittance }
+            }
+            "thindielectric" => MaterialKind::ThinDielectric {
+                ior: self.ior(entity, "eta", SOLID_IOR)?,
+                reflectance: Vec3::ONE,
+                transmittance: Vec3::ONE,
+            },
+            "diffusetransmission" => {
+                log.ignore(features::PBRT_TRANSMISSION, &entity.place);
+                self.textures.spectrum(entity, "transmittance", log)?;
+                let scale = entity.number("scale", 1.0)? as f32;
+                self.diffuse(entity, "reflectance", 0.25, scale, &mut surface, log)?
+            }
+            "subsurface" => {
+                log.ignore(features::PBRT_SUBSURFACE, &entity.place);
+                for name in ["name", "mfp", "sigma_a", "sigma_s", "g", "scale"] {
+                    entity.find(name);
+                }
+                self.plastic(entity, &mut surface, log)?
+            }
+            "hair" => {
+                log.ignore(features::PBRT_HAIR, &entity.place);
+                for name in [
+                    "sigma_a",
+                    "reflectance",
+                    "color",
+                    "eumelanin",
+                    "pheomelanin",
+                    "eta",
+                    "beta_m",
+                    "beta_n",
+                    "alpha",
+                ] {
+                    entity.find(name);
+                }
+                MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) }
+            }
+            "mix" => return self.mix(entity, name, depth, log),
+            "interface" | "none" | "" => return Ok(None),
+            "measured" => {
+                let message = "the material `measured` cannot be rendered; choose another, such as \
+                               coateddiffuse";
+                return Err(entity.error(message));
+            }
+            other => {
+                return Err(entity.error(format!(
+                    "unknown material `{other}`; files of pbrt-v3 are converted by `pbrt --upgrade`"
+                )));
+            }
+        };
+        surface.normal = self.textures.normal_map(entity, log)?;
+        if let Some(displacement) = entity.find_of("displacement", &[Kind::Texture, Kind::Float])? {
+            log.ignore(features::PBRT_DISPLACEMENT, &displacement.place);
+        }
+        log.unused(entity);
+        Ok(Some(Material { name, kind, surface }))
+    }
+
+    /// Marks the parameters of a coat as read, and reports a coat that absorbs or scatters.
+    fn layers(&mut self, entity: &Entity, log: &mut Log) -> Result<()> {
+        for name in ["thickness", "maxdepth", "nsamples", "g"] {
+            entity.find(name);
+        }
+        let is_clear = match self.textures.spectrum(entity, "albedo", log)? {
+            Some(Value::Constant(albedo)) => albedo == Vec3::ZERO,
+            Some(Value::Image(_)) => false,
+            None => true,
+        };
+        if !is_clear {
+            log.ignore(features::PBRT_COAT_ALBEDO, &entity.place);
+        }
+        Ok(())
+    }
+
+    fn diffuse(
+        &mut self,
+        entity: &Entity,
+        parameter: &str,
+        otherwise: f64,
+        scale: f32,
+        surface: &mut Surface,
+        log: &mut Log,
+    ) -> Result<MaterialKind> {
+        let value = self.textures.spectrum(entity, parameter, log)?;
+        let value = value.unwrap_or(Value::number(otherwise)).scaled(scale);
+        let reflectance = color(value, surface);
+        Ok(MaterialKind::Diffuse { reflectance: reflectance.clamp(Vec3::ZERO, Vec3::ONE) })
+    }
+
+    fn plastic(
+        &mut self,
+        entity: &Entity,
+        surface: &mut Surface,
+        log: &mut Log,
+    ) -> Result<MaterialKind> {
+        let value = self.textures.spectrum(entity, "reflectance", log)?;
+        let ior = self.ior(entity, "eta", COAT_IOR)?;
+        let below = albedo_below_coat(ior);
+        let mut diffuse = color(value.unwrap_or(Value::number(0.5)), surface);
+        match &mut surface.color {
+            Some(texture) => *texture = texture.mapped(below),
+            None => diffuse = diffuse.map(below),
+        }
+        let roughness = self.roughness(entity, "", log)?;
+        surface.roughness = roughness.texture;
+        Ok(MaterialKind::Plastic { diffuse, alpha: roughness.alpha, ior })
+    }
+
+    fn conductor(
+        &mut self,
+        entity: &Entity,
+        prefix: &str,
+        surface: &mut Surface,
+        log: &mut Log,
+    ) -> Result<MaterialKind> {
+        let roughness = self.roughness(entity, prefix, log)?;
+        surface.roughness = roughness.texture;
+        let own = |name: &str| format!("{prefix}{name}");
+        let reflectance = match self.textures.spectrum(entity, &own("reflectance"), log)? {
+            // coatedconductor names this one without a prefix.
+            None => self.textures.spectrum(entity, "reflectance", log)?,
+            found => found,
+        };
+        let fresnel = match reflectance {
+            Some(value @ Value::Image(_)) => {
+                ConductorFresnel::Schlick { reflectance: color(value, surface) }
+            }
+            // A smooth metal that reflects all light does so in all directions.
+            Some(Value::Constant(color))
+                if color.min_element() >= MIRROR_REFLECTANCE
+                    && surface.roughness.is_none()
+                    && roughness.alpha < SMOOTH_ALPHA =>
+            {
+                return Ok(MaterialKind::Mirror { reflectance: Vec3::ONE });
+            }
+            // pbrt takes η = 1 and the k that reflects as much.
+            Some(Value::Constant(color)) => {
+                let color = color.clamp(Vec3::ZERO, Vec3::splat(0.9999));
+                let root = |part: f32| part.sqrt();
+                let k = Vec3::from_array(color.to_array().map(root))
+                    / Vec3::from_array((Vec3::ONE - color).to_array().map(root));
+                ConductorFresnel::Exact { eta: Vec3::ONE, k: 2.0 * k }
+            }
+            None => {
+                let index = |name: &str| match entity.find_of(&own(name), &spectra::KINDS)? {
+                    Some(parameter) => spectra::index(parameter, self.textures.folder()),
+                    None => {
+                        Ok(named::index(&format!("metal-Cu-{name}")).unwrap_or_default().as_vec3())
+                    }
+                };
+                ConductorFresnel::Exact {
+                    eta: index("eta")?.max(Vec3::splat(0.01)),
+                    k: index("k")?,
+                }
+            }
+        };
+        Ok(MaterialKind::Conductor { alpha: roughness.alpha, fresnel })
+    }
+
+    /// Refractive index, a number or the mean of a spectrum.
+    fn ior(&self, entity: &Entity, name: &str, (low, high): (f32, f32)) -> Result<f32> {
+        let kinds = [Kind::Float, Kind::Rgb, Kind::Spectrum];
+        let Some(parameter) = entity.find_of(name, &kinds)? else { return Ok(1.5) };
+        let ior = match (parameter.kind, parameter.numbers()) {
+            (Kind::Float, [ior, ..]) => *ior as f32,
+            _ => spectra::index(parameter, self.textures.folder())?.element_sum() / 3.0,
+        };
+        if !(low..=high).contains(&ior) {
+            let message = format!("expected a refractive index from {low} to {high}, found {ior}");
+            return Err(parameter.place.error(format!("{}: {message}", entity.label())));
+        }
+        Ok(ior)
+    }
+
+    /// Width α from `roughness`, or `uroughness` and `vroughness`, and `remaproughness`.
+    fn roughness(&mut self, entity: &Entity, prefix: &str, log: &mut Log) -> Result<Roughness> {
+        // α = √roughness unless the file says that it is α itself.
+        let remaps = entity.boolean("remaproughness", true)?;
+        let alpha_of = |roughness: f32| {
+            let roughness = roughness.max(0.0);
+            if remaps { roughness.sqrt() } else { roughness }
+        };
+        let mut number = |name: &str| {
+            let name = format!("{prefix}{name}");
+            self.textures.number(entity, &name, log)
+        };
+        let both = number("roughness")?.unwrap_or(Value::number(0.0));
+        let along_u = number("uroughness")?.unwrap_or(both.clone());
+        let along_v = number("vroughness")?.unwrap_or(both);
+        match (along_u, along_v) {
+            (Value::Constant(u), Value::Constant(v)) => {
+                if u != v {
+                    log.ignore(features::PBRT_ANISOTROPY, &entity.place);
+                }
+                let alpha = 0.5 * (alpha_of(u.x) + alpha_of(v.x));
+                Ok(Roughness { alpha: alpha.min(1.0), texture: None })
+            }
+            (Value::Image(image), other) | (other, Value::Image(image)) => {
+                if !matches!(&other, Value::Image(same) if *same == image) {
+                    log.ignore(features::PBRT_ANISOTROPY, &entity.place);
+                }
+                let texture = map_numbers(&image, |roughness| alpha_of(roughness).min(1.0).sqrt());
+                Ok(Roughness { alpha: 1.0, texture: Some(texture) })
+            }
+        }
+    }
+
+    /// The mixture, else the material of the greater share; its opacity is the share if the other is
+    /// not there.
+    fn mix(
+        &mut self,
+        entity: &Entity,
+        name: String,
+        depth: usize,
+        log: &mut Log,
+    ) -> Result<Option<Material>> {
+        let names = match entity.find_of("materials", &[Kind::Text])?.map(|found| &found.values) {
+            Some(Values::Texts(names)) if names.len() == 2 => names,
+            _ => return Err(entity.error("expected two names of `materials`")),
+        };
+        if depth == MAX_DEPTH {
+            let message = format!("more than {MAX_DEPTH} materials mix one another");
+            return Err(entity.error(message));
+        }
+        let mut parts = Vec::new();
+        for part in names {
+            let Some(part_entity) = self.description.materials.get(part) else {
+                return Err(entity.error(format!("there is no material `{part}`")));
+            };
+            parts.push(self.named(part, part_entity, depth + 1, log)?);
+        }
+        let (second, first) = (parts.pop().flatten(), parts.pop().flatten());
+        let amount = self.textures.number(entity, "amount", log)?.unwrap_or(Value::number(0.5));
+        log.unused(entity);
+        let (material, opacity) = match (first, second) {
+            (None, None) => return Ok(None),
+            (Some(first), None) => (first, Some(complement(amount))),
+            (None, Some(second)) => (second, Some(amount)),
+            (Some(first), Some(second)) => {
+                let share = match amount {
+                    Value::Constant(amount) => Share::Constant(amount.x.clamp(0.0, 1.0)),
+                    Value::Image(image) => Share::Image(image),
+                };
+                let pair = [&first, &second].map(|part| (&part.kind, &part.surface));
+                if let Some((kind, surface)) = blend(pair, &share) {
+                    return Ok(Some(Material { name, kind, surface }));
+                }
+                let share = match share {
+                    Share::Constant(share) => share,
+                    Share::Image(_) => 0.5,
+                };
+                if share > 0.0 && share < 1.0 {
+                    log.ignore(features::PBRT_MIX, &entity.place);
+                }
+                (if share <= 0.5 { first } else { second }, None)
+            }
+        };
+        let mut material = Material { name, ..material };
+        if let Some(opacity) = opacity {
+            set_opacity(&mut material.surface, opacity);
+        }
+        Ok(Some(material))
+    }
+}
+
+/// Returns 1 − value.
+fn complement(value: Value) -> Value {
+    match value {
+        Value::Constant(value) => Value::Constant(Vec3::ONE - value),
+        Value::Image(mut image) => {
+            image.scale = image.scale.map(|scale| -scale);
+            image.bias = image.bias.map(|bias| 1.0 - bias);
+            Value::Image(image)
+        }
+    }
+}
+
+/// Makes a number the opacity of a surface.
+pub fn set_opacity(surface: &mut Surface, value: Value) {
+    match value {
+        Value::Constant(opacity) => surface.opacity.factor = opacity.x.clamp(0.0, 1.0),
+        Value::Image(image) => surface.opacity.texture = Some(image),
+    }
+}
+
+/// Returns the constant colour of a model, 1 if a texture gives it.
+fn color(value: Value, surface: &mut Surface) -> Vec3 {
+    match value {
+        Value::Constant(color) => color,
+        Value::Image(image) => {
+            surface.color = Some(image);
+            Vec3::ONE
+        }
+    }
+}

@@ -1,0 +1,357 @@
+//! Scene descriptions of pbrt-v4 \[Pharr et al. 2023\].
+//!
+//! bytes → `tokens` → `parameters` → `directives`, with the `state` in force → shapes,
+//! materials, textures and lights. The format is that of <https://pbrt.org/fileformat-v4>; details that
+//! it leaves open follow pbrt-v4's source. Paths are relative to the folder of the main file.
+//!
+//! The side of a surface from which light leaves, and behind which the inside of a dielectric lies, is
+//! that of its normal: of the vertex normals where a mesh has some, else of its winding; turned by
+//! `ReverseOrientation`. A mirror in the transformation turns neither, since pbrt undoes it.
+//!
+//! Deviation: pbrt-v4 turns the normal of mirrored spheres, disks and cylinders that a ray meets, but
+//! not of those that it samples as lights. Here neither is turned.
+
+mod camera;
+mod directives;
+pub(crate) mod equal_area;
+mod lights;
+mod log;
+mod materials;
+mod named;
+mod parameters;
+mod shapes;
+mod source;
+mod spectra;
+mod state;
+mod subdivision;
+mod textures;
+mod tokens;
+
+use std::{
+    collections::HashMap,
+    path::{Path, PathBuf},
+    rc::Rc,
+};
+
+use glam::{DMat4, Vec3};
+
+use super::{
+    EnvironmentMap, FilmSettings, Geometry, Lamp,
+    features::{self, Ignored},
+    file::CameraEntry,
+    geometry::Dropped,
+    instance::{Budget, Instance, MAX_INSTANCES},
+    mesh::Mesh,
+    transform::Transform,
+};
+use crate::{
+    error::{Error, Result},
+    files,
+    material::{Emission, Material},
+};
+use camera::View;
+use directives::{Description, Reader, Shape};
+use lights::{AreaLight, Lights};
+use log::Log;
+use materials::{Materials, set_opacity};
+use source::Source;
+use state::MaterialChoice;
+use textures::Textures;
+
+/// Most vertices, and most triangles, of a scene with all its instances.
+const MAX_COUNT: usize = 1 << 27;
+
+/// Everything that a scene description says.
+pub struct Contents {
+    /// Viewer.
+    pub camera: CameraEntry,
+    /// Image plane.
+    pub film: FilmSettings,
+    /// Sum of the infinite lights; black without any.
+    pub environment: EnvironmentMap,
+    /// Other lights without a surface.
+    pub lamps: Vec<Lamp>,
+    /// Materials; widths α from 0.
+    pub materials: Vec<Material>,
+    /// Triangles.
+    pub geometry: Geometry,
+    /// Files read, the main file first.
+    pub inputs: Vec<PathBuf>,
+    /// Warnings.
+    pub warnings: Vec<String>,
+}
+
+/// Tests whether a path names a scene description, compressed or not.
+pub fn is_pbrt(path: &Path) -> bool {
+    match files::extension(path).as_str() {
+        "pbrt" => true,
+        "gz" => files::extension(Path::new(path.file_stem().unwrap_or_default())) == "pbrt",
+        _ => false,
+    }
+}
+
+/// Reads a scene description and the files that it names.
+///
+/// # Errors
+/// [`Error::Parse`] with file, line and column for everything that cannot be read or rendered,
+/// [`Error::Io`] for the main file.
+pub fn read(path: &Path) -> Result<Contents> {
+    let mut ignored = Ignored::default();
+    let (description, source) = Reader::read(path, Source::open(path)?, &mut ignored)?;
+    let folder = source.folder().to_path_buf();
+    let mut log = Log { main: path, ignored, inputs: source.inputs, warnings: Vec::new() };
+    integrator(&description, &mut log);
+    let view = camera::view(&description, path, &mut log)?;
+    let textures = Textures::new(&description, &folder);
+    let mut lights = Lights::default();
+    for (entity, world_from_light) in &description.lights {
+        let placed = view.mirror * *world_from_light;
+        lights.add(entity, placed, view.exposure, &textures, &mut log)?;
+    }
+    let mut builder = Builder {
+        folder: &folder,
+        view,
+        materials: Materials::new(&description, textures),
+        kept: Kept::default(),
+        log,
+        geometry: Geometry::default(),
+        dropped: Dropped::default(),
+        triangle_count: 0,
+        budget: Budget::default(),
+    };
+    for shape in &description.shapes {
+        if let Some((mesh, material)) = builder.prepare(shape, false)? {
+            builder.place(&mesh, material, shape, DMat4::IDENTITY)?;
+        }
+    }
+    for object in &description.objects {
+        if let (false, Some(instance)) = (object.is_defined, object.instances.first()) {
+            let message = format!("there is no object `{}`", object.name);
+            return Err(instance.place.error(message));
+        }
+        for shape in object.shapes.iter().filter(|_| !object.instances.is_empty()) {
+            let Some((mesh, material)) = builder.prepare(shape, true)? else { continue };
+            let places: Vec<_> =
+                object.instances.iter().map(|instance| instance.world_from_object).collect();
+            builder.place_all(&mesh, material, shape, &places)?;
+        }
+    }
+    let environment = lights.environment().map_err(|message| Error::scene(path, message))?;
+    let Builder { view, kept, mut log, geometry, dropped, triangle_count, .. } = builder;
+    let mut warnings = log.ignored.warnings(path);
+    warnings.append(&mut log.warnings);
+    warnings.extend(dropped.warnings(&path.display().to_string(), triangle_count));
+    Ok(Contents {
+        camera: view.camera,
+        film: view.film,
+        environment,
+        lamps: lights.lamps,
+        materials: kept.materials,
+        geometry,
+        inputs: log.inputs,
+        warnings,
+    })
+}
+
+/// Reports an integrator that makes other pictures than the renderer's.
+fn integrator(description: &Description, log: &mut Log) {
+    let Some(entity) = &description.integrator else { return };
+    if let Some(depth) = entity.find("maxdepth") {
+        let count = depth.numbers().first().copied().unwrap_or(0.0);
+        let name = format!("`maxdepth` {count} of the integrator");
+        log.ignore_named(features::PBRT_DEPTH, &name, &depth.place);
+    }
+    let is_known =
+        ["path", "volpath", "simplepath", "simplevolpath", "bdpt", "mlt", "sppm", "lightpath"];
+    if !is_known.contains(&entity.name.as_str()) {
+        let name = format!("Integrator `{}`", entity.name);
+        log.ignore_named(features::PBRT_INTEGRATOR, &name, &entity.place);
+    }
+}
+
+/// Tells materials apart: the choice, the alpha of the shape and its light.
+type MaterialKey = (String, String, Option<([u32; 3], bool, String)>);
+
+/// Materials made so far; none for a surface that is not there.
+#[derive(Default)]
+struct Kept {
+    materials: Vec<Material>,
+    by_key: HashMap<MaterialKey, Option<u32>>,
+}
+
+/// Puts shapes in the world.
+struct Builder<'a> {
+    folder: &'a Path,
+    view: View,
+    materials: Materials<'a>,
+    kept: Kept,
+    log: Log<'a>,
+    geometry: Geometry,
+    dropped: Dropped,
+    triangle_count: usize,
+    budget: Budget,
+}
+
+impl Builder<'_> {
+    /// Makes the mesh of a shape and finds its material; none for a shape that is left out.
+    fn prepare(&mut self, shape: &Shape, in_object: bool) -> Result<Option<(Mesh, u32)>> {
+        let Some(mut mesh) = shapes::mesh(&shape.entity, self.folder, &mut self.log)? else {
+            self.log.unused(&shape.entity);
+            return Ok(None);
+        };
+        let light = match &shape.light {
+            Some(entity) if in_object => {
+                self.log.ignore(features::PBRT_INSTANCE_LIGHT, &entity.place);
+                None
+            }
+            Some(entity) => {
+                let area = area(&mesh, self.view.mirror * shape.world_from_shape);
+                let exposure = self.view.exposure;
+                let textures = &mut self.materials.textures;
+                Some(lights::area_light(entity, area, exposure, textures, &mut self.log)?)
+            }
+            None => None,
+        };
+        let material = self.material(shape, light)?;
+        self.log.unused(&shape.entity);
+        let Some(material) = material else { return Ok(None) };
+        let surface = &self.kept.materials[material as usize].surface;
+        if surface.textures().next().is_some() {
+            let error = |message: String| shape.entity.error(message);
+            shapes::give_coordinates(&mut mesh).map_err(error)?;
+        }
+        if shape.reverse {
+            shapes::reverse(&mut mesh);
+        }
+        if surface.normal.is_some() {
+            shapes::give_tangents(&mut mesh, shape.world_from_shape.determinant() < 0.0);
+        }
+        Ok(Some((mesh, material)))
+    }
+
+    fn material(&mut self, shape: &Shape, light: Option<AreaLight>) -> Result<Option<u32>> {
+        let choice = match &shape.material {
+            MaterialChoice::Default => String::new(),
+            MaterialChoice::Own(entity) => format!("{:p}", Rc::as_ptr(entity)),
+            MaterialChoice::Named(name, _) => format!("named {name}"),
+        };
+        let alpha = shape.entity.find("alpha");
+        let alpha_key = alpha.map_or(String::new(), |alpha| format!("{:?}", alpha.values));
+        let light_key = light.as_ref().map(|light| {
+            let image = light.image.as_ref().map_or("", |image| &image.texture.name);
+            (light.radiance.to_array().map(f32::to_bits), light.two_sided, image.to_owned())
+        });
+        let key = (choice, alpha_key, light_key);
+        let kept = match self.kept.by_key.get(&key) {
+            Some(kept) => *kept,
+            None => {
+                let made = self.materials.make(&shape.material, &mut self.log)?;
+                let opacity =
+                    self.materials.textures.number(&shape.entity, "alpha", &mut self.log)?;
+                let kept = made.map(|mut material| {
+                    if let Some(opacity) = opacity {
+                        set_opacity(&mut material.surface, opacity);
+                    }
+                    material.surface.emission = light
+                        .filter(|light| light.radiance != Vec3::ZERO)
+                        .map(|AreaLight { radiance, image, two_sided }| Emission {
+                            radiance,
+                            texture: image,
+                            two_sided,
+                        });
+                    self.kept.materials.push(material);
+                    (self.kept.materials.len() - 1) as u32
+                });
+                self.kept.by_key.insert(key, kept);
+                kept
+            }
+        };
+        if let (None, Some(entity)) = (kept, &shape.light) {
+            self.log.ignore(features::PBRT_INTERFACE_LIGHT, &entity.place);
+        }
+        Ok(kept)
+    }
+
+    /// Puts a mesh of an object at the `places` of its instances: one in memory if they are many.
+    fn place_all(
+        &mut self,
+        mesh: &Mesh,
+        material: u32,
+        shape: &Shape,
+        places: &[DMat4],
+    ) -> Result<()> {
+        let is_instanced =
+            places.len() > 1 && self.budget.takes_instances(places.len(), mesh.triangles.len());
+        if !is_instanced {
+            self.check_counts(mesh, places.len(), shape)?;
+            return places.iter().try_for_each(|place| self.place(mesh, material, shape, *place));
+        }
+        let count = self.geometry.instances.len() + places.len();
+        if count > MAX_INSTANCES {
+            let message = format!("{count} instances, at most {MAX_INSTANCES} can be used");
+            return Err(shape.entity.error(message));
+        }
+        let index = self.geometry.prototypes.len() as u32;
+        let instances: Vec<_> = places
+            .iter()
+            .map(|place| {
+                let placed = self.view.mirror * *place * shape.world_from_shape;
+                let transform = Transform::from_matrix(placed)?;
+                Instance::new(index, &transform, material, true)
+            })
+            .collect();
+        let too_extreme = instances.iter().filter(|instance| instance.is_none()).count();
+        self.check_counts(mesh, too_extreme, shape)?;
+        let (_, dropped) = self.geometry.add_prototype(mesh, |_| 0);
+        self.triangle_count += mesh.triangles.len();
+        self.dropped.add(dropped);
+        for (place, instance) in places.iter().zip(instances) {
+            match instance {
+                Some(instance) => self.geometry.instances.push(instance),
+                None => self.place(mesh, material, shape, *place)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks, before any is placed, that so many copies of a mesh can be used.
+    fn check_counts(&self, mesh: &Mesh, copies: usize, shape: &Shape) -> Result<()> {
+        let with = |own: usize, so_far: usize| own.saturating_mul(copies).saturating_add(so_far);
+        let vertices = with(mesh.positions.len(), self.geometry.positions.len());
+        let triangles = with(mesh.triangles.len(), self.triangle_count);
+        if vertices.max(triangles) <= MAX_COUNT {
+            return Ok(());
+        }
+        Err(shape.entity.error(format!(
+            "{vertices} vertices and {triangles} triangles with the instances so far, at most \
+             {MAX_COUNT} can be used"
+        )))
+    }
+
+    /// Appends a mesh to the geometry.
+    fn place(&mut self, mesh: &Mesh, material: u32, shape: &Shape, outer: DMat4) -> Result<()> {
+        let placed = self.view.mirror * outer * shape.world_from_shape;
+        let Some(transform) = Transform::from_matrix(placed) else {
+            self.log.ignore(features::PBRT_FLAT, &shape.entity.place);
+            return Ok(());
+        };
+        self.check_counts(mesh, 1, shape)?;
+        self.triangle_count += mesh.triangles.len();
+        let dropped = self.geometry.append(mesh, &transform, |_| material);
+        self.dropped.add(dropped);
+        Ok(())
+    }
+}
+
+/// Area of a mesh in the world.
+fn area(mesh: &Mesh, world_from_shape: DMat4) -> f64 {
+    let corner = |at: u32| {
+        let position = Vec3::from_array(mesh.positions[at as usize]).as_dvec3();
+        world_from_shape.transform_point3(position)
+    };
+    let triangles = mesh.triangles.iter().map(|triangle| {
+        let [a, b, c] = triangle.map(corner);
+        0.5 * (b - a).cross(c - a).length()
+    });
+    triangles.filter(|area| area.is_finite()).sum()
+}

@@ -1,0 +1,326 @@
+//! Shapes of a scene description → meshes in the space of the shape, counter-clockwise from the side
+//! of the normal.
+
+use std::path::Path;
+
+use glam::{DVec3, Vec3};
+
+use super::{
+    log::Log,
+    parameters::{Entity, Kind},
+    source::path_inside,
+    subdivision::{MAX_TRIANGLES, subdivide},
+};
+use crate::{
+    error::Result,
+    features,
+    mesh::{Mesh, ply},
+    quadrics,
+};
+
+/// Columns and rows of a bilinear patch that is not flat, or whose coordinates are not linear.
+const PATCH_CELLS: u32 = 16;
+
+/// Makes the mesh of a shape; none for a kind that is left out.
+///
+/// # Errors
+/// With the place for parameters that are no shape, and files that cannot be read.
+pub fn mesh(entity: &Entity, folder: &Path, log: &mut Log) -> Result<Option<Mesh>> {
+    let mut mesh = match entity.name.as_str() {
+        "trianglemesh" => triangle_mesh(entity, log)?,
+        "plymesh" => {
+            let Some(file) = entity.string("filename")? else {
+                return Err(entity.error("expected a `filename`"));
+            };
+            let path = path_inside(folder, file).map_err(|message| entity.error(message))?;
+            let mut mesh = ply::read(&path).map_err(|error| entity.error(error.to_string()))?;
+            // pbrt does not read them.
+            mesh.colors.clear();
+            for name in ["displacement", "displacement.edgelength"] {
+                if let Some(parameter) = entity.find(name) {
+                    log.ignore(features::PBRT_DISPLACEMENT, &parameter.place);
+                }
+            }
+            log.inputs.push(path);
+            mesh
+        }
+        "loopsubdiv" => {
+            let positions = positions(entity)?;
+            let triangles = triangles(entity, positions.len())?;
+            if let Some(scheme) = entity.find("scheme") {
+                log.ignore_named(features::PBRT_PARAMETER, "parameter `scheme`", &scheme.place);
+            }
+            let levels = entity.number("levels", 3.0)?;
+            subdivide(&positions, triangles, levels as i64)
+                .map_err(|message| entity.error(message))?
+        }
+        "bilinearmesh" => bilinear_mesh(entity, log)?,
+        "sphere" | "disk" | "cylinder" => quadric(entity, log)?,
+        "curve" => {
+            log.ignore_named(features::PBRT_SHAPE, "shape `curve`", &entity.place);
+            return Ok(None);
+        }
+        other => return Err(entity.error(format!("unknown shape `{other}`"))),
+    };
+    face_normals(&mut mesh);
+    Ok(Some(mesh))
+}
+
+fn vector<const N: usize>(numbers: &[f64]) -> Vec<[f32; N]> {
+    let vectors = numbers.chunks_exact(N);
+    vectors.map(|numbers| std::array::from_fn(|index| numbers[index] as f32)).collect()
+}
+
+fn positions(entity: &Entity) -> Result<Vec<[f32; 3]>> {
+    let positions = vector(entity.numbers("P", Kind::Triple)?);
+    if positions.is_empty() {
+        return Err(entity.error("expected vertex positions `P`"));
+    }
+    Ok(positions)
+}
+
+/// Reads `indices`, in groups of `N`; `0 1 2 …` for as many vertices as one group needs.
+fn groups<const N: usize>(entity: &Entity, vertex_count: usize) -> Result<Vec<[u32; N]>> {
+    let Some(parameter) = entity.find_of("indices", &[Kind::Integer])? else {
+        if vertex_count == N {
+            return Ok(vec![std::array::from_fn(|index| index as u32)]);
+        }
+        return Err(entity.error(format!("expected `indices` of {vertex_count} vertices")));
+    };
+    let indices = parameter.numbers();
+    if let Some(found) = indices.iter().find(|index| !(0.0..vertex_count as f64).contains(*index)) {
+        let message = format!("the index {found} is out of range of {vertex_count} vertices");
+        return Err(parameter.place.error(format!("{}: {message}", entity.label())));
+    }
+    if indices.len() % N != 0 {
+        let message = format!("expected a multiple of {N} indices, found {}", indices.len());
+        return Err(parameter.place.error(format!("{}: {message}", entity.label())));
+    }
+    let groups = indices.chunks_exact(N);
+    Ok(groups.map(|indices| std::array::from_fn(|at| indices[at] as u32)).collect())
+}
+
+fn triangles(entity: &Entity, vertex_count: usize) -> Result<Vec<[u32; 3]>> {
+    groups(entity, vertex_count)
+}
+
+/// Reads an attribute of vertices: nothing, or one for each.
+fn attribute<const N: usize>(
+    entity: &Entity,
+    name: &str,
+    kind: Kind,
+    vertex_count: usize,
+) -> Result<Vec<[f32; N]>> {
+    let found = vector(entity.numbers(name, kind)?);
+    if found.is_empty() || found.len() == vertex_count {
+        return Ok(found);
+    }
+    let message = format!("`{name}`: expected one for each of {vertex_count} vertices");
+    Err(entity.error(format!("{message}, found {}", found.len())))
+}
+
+fn triangle_mesh(entity: &Entity, log: &mut Log) -> Result<Mesh> {
+    let positions = positions(entity)?;
+    let count = positions.len();
+    if let Some(tangents) = entity.find("S") {
+        log.ignore_named(features::PBRT_PARAMETER, "tangents `S` of meshes", &tangents.place);
+    }
+    // They number faces for Ptex alone.
+    entity.find("faceIndices");
+    Ok(Mesh {
+        triangles: triangles(entity, count)?,
+        normals: attribute(entity, "N", Kind::Triple, count)?,
+        uvs: [attribute(entity, "uv", Kind::Pair, count)?, Vec::new()],
+        positions,
+        ..Mesh::default()
+    })
+}
+
+fn quadric(entity: &Entity, log: &mut Log) -> Result<Mesh> {
+    let radius = entity.number("radius", 1.0)? as f32;
+    if !(radius > 0.0 && radius.is_finite()) {
+        return Err(entity.error(format!("expected a radius above 0, found {radius}")));
+    }
+    let mut partial = |name: &str, whole: f64| -> Result<()> {
+        if entity.number(name, whole)? != whole
+            && let Some(parameter) = entity.find(name)
+        {
+            let name = format!("`{name}` of {}", entity.label());
+            log.ignore_named(features::PBRT_PARTIAL, &name, &parameter.place);
+        }
+        Ok(())
+    };
+    partial("phimax", 360.0)?;
+    Ok(match entity.name.as_str() {
+        "sphere" => {
+            let radius = f64::from(radius);
+            partial("zmin", -radius)?;
+            partial("zmax", radius)?;
+            let mut mesh = quadrics::sphere(radius as f32);
+            // v runs from −z to +z.
+            mesh.uvs[0].iter_mut().for_each(|uv| uv[1] = 1.0 - uv[1]);
+            mesh
+        }
+        "disk" => {
+            let inner = entity.number("innerradius", 0.0)? as f32;
+            let height = entity.number("height", 0.0)? as f32;
+            if !(0.0..radius).contains(&inner) {
+                let message = "expected an `innerradius` from 0 to below the radius, found";
+                return Err(entity.error(format!("{message} {inner}")));
+            }
+            let mut mesh = quadrics::disk(radius, inner);
+            mesh.positions.iter_mut().for_each(|position| position[2] += height);
+            // u goes around, v from the rim inward.
+            for uv in &mut mesh.uvs[0] {
+                *uv = [uv[1], radius * (1.0 - uv[0]) / (radius - inner)];
+            }
+            mesh
+        }
+        _ => {
+            let [a, b] = [entity.number("zmin", -1.0)?, entity.number("zmax", 1.0)?];
+            quadrics::cylinder(radius, a.min(b) as f32, a.max(b) as f32)
+        }
+    })
+}
+
+fn bilinear_mesh(entity: &Entity, log: &mut Log) -> Result<Mesh> {
+    let positions = positions(entity)?;
+    let count = positions.len();
+    let patches: Vec<[u32; 4]> = groups(entity, count)?;
+    let normals: Vec<[f32; 3]> = attribute(entity, "N", Kind::Triple, count)?;
+    let uvs: Vec<[f32; 2]> = attribute(entity, "uv", Kind::Pair, count)?;
+    entity.find("faceIndices");
+    if let Some(parameter) = entity.find("emissionfilename") {
+        log.ignore(features::PBRT_EMISSION_IMAGE, &parameter.place);
+    }
+    if patches.len().saturating_mul(2 * (PATCH_CELLS * PATCH_CELLS) as usize) > MAX_TRIANGLES {
+        let message = format!("{} patches, more than can be cut into triangles", patches.len());
+        return Err(entity.error(message));
+    }
+    let mut mesh = Mesh::default();
+    for patch in patches {
+        let corners = patch.map(|at| Vec3::from_array(positions[at as usize]).as_dvec3());
+        let normals = (!normals.is_empty())
+            .then(|| patch.map(|at| Vec3::from_array(normals[at as usize]).as_dvec3()));
+        let uvs = match uvs.is_empty() {
+            true => [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]],
+            false => patch.map(|at| uvs[at as usize]),
+        };
+        push_patch(&mut mesh, corners, normals, uvs);
+    }
+    Ok(mesh)
+}
+
+/// Adds a patch with the corners p00, p10, p01 and p11.
+fn push_patch(
+    mesh: &mut Mesh,
+    corners: [DVec3; 4],
+    normals: Option<[DVec3; 4]>,
+    uvs: [[f32; 2]; 4],
+) {
+    let [p00, p10, p01, p11] = corners;
+    // A parallelogram is two triangles, with linear coordinates.
+    let size = (p11 - p00).abs().max_element();
+    let cells =
+        if (p00 + p11 - p10 - p01).abs().max_element() <= 1e-6 * size { 1 } else { PATCH_CELLS };
+    let first = mesh.positions.len() as u32;
+    for row in 0..=cells {
+        for column in 0..=cells {
+            let (u, v) = (f64::from(column) / f64::from(cells), f64::from(row) / f64::from(cells));
+            let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
+            let blend = |values: [DVec3; 4]| -> DVec3 {
+                values.iter().zip(weights).map(|(value, weight)| *value * weight).sum()
+            };
+            let normal = match normals {
+                Some(normals) => blend(normals),
+                None => {
+                    let along_u = (p10 - p00).lerp(p11 - p01, v);
+                    along_u.cross((p01 - p00).lerp(p11 - p10, u))
+                }
+            };
+            mesh.positions.push(blend(corners).as_vec3().to_array());
+            mesh.normals.push(normal.normalize_or_zero().as_vec3().to_array());
+            let uv = [0, 1].map(|axis| {
+                let values = uvs.iter().zip(weights);
+                values.map(|(uv, weight)| uv[axis] * weight as f32).sum()
+            });
+            mesh.uvs[0].push(uv);
+        }
+    }
+    for row in 0..cells {
+        for column in 0..cells {
+            let at = first + row * (cells + 1) + column;
+            mesh.triangles.push([at, at + 1, at + cells + 2]);
+            mesh.triangles.push([at, at + cells + 2, at + cells + 1]);
+        }
+    }
+}
+
+/// Turns triangles whose vertex normals point to the other side: these tell the outside in pbrt.
+fn face_normals(mesh: &mut Mesh) {
+    if mesh.normals.is_empty() {
+        return;
+    }
+    for triangle in &mut mesh.triangles {
+        let at = |values: &[[f32; 3]]| {
+            triangle.map(|corner| Vec3::from_array(values[corner as usize]).as_dvec3())
+        };
+        let [a, b, c] = at(&mesh.positions);
+        let shading: DVec3 = at(&mesh.normals).iter().sum();
+        if (b - a).cross(c - a).dot(shading) < 0.0 {
+            triangle.swap(1, 2);
+        }
+    }
+}
+
+/// Turns a mesh inside out.
+pub fn reverse(mesh: &mut Mesh) {
+    mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    mesh.normals.iter_mut().for_each(|normal| *normal = normal.map(|part| -part));
+}
+
+/// Gives a mesh without texture coordinates those of pbrt: (0, 0), (1, 0) and (1, 1) on every triangle.
+///
+/// # Errors
+/// A message for more corners than indices can address.
+pub fn give_coordinates(mesh: &mut Mesh) -> Result<(), String> {
+    if !mesh.uvs[0].is_empty() || mesh.triangles.is_empty() {
+        return Ok(());
+    }
+    let count = mesh.triangles.len() * 3;
+    if count > 3 * MAX_TRIANGLES {
+        return Err("too many triangles without texture coordinates under a texture".to_owned());
+    }
+    let order: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
+    let pick = |values: &[[f32; 3]]| -> Vec<[f32; 3]> {
+        if values.is_empty() {
+            return Vec::new();
+        }
+        order.iter().map(|&at| values[at as usize]).collect()
+    };
+    (mesh.positions, mesh.normals) = (pick(&mesh.positions), pick(&mesh.normals));
+    mesh.uvs[0] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]].repeat(mesh.triangles.len());
+    mesh.triangles = (0..count as u32 / 3).map(|face| [0, 1, 2].map(|at| 3 * face + at)).collect();
+    Ok(())
+}
+
+/// Gives a mesh tangents along u for normal maps, with the bitangent n × tangent of pbrt; `mirrors`
+/// tells whether the placement of the shape, before any mirror of the whole world, does.
+pub fn give_tangents(mesh: &mut Mesh, mirrors: bool) {
+    let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|at| Vec3::from_array(mesh.positions[at as usize]).as_dvec3());
+        let [s, t, r] = triangle.map(|at| mesh.uvs[0][at as usize].map(f64::from));
+        let (first, second) = ([t[0] - s[0], t[1] - s[1]], [r[0] - s[0], r[1] - s[1]]);
+        let determinant = first[0] * second[1] - first[1] * second[0];
+        let along_u = (b - a) * second[1] - (c - a) * first[1];
+        // The sum weighs triangles by their area.
+        let tangent = along_u * determinant.signum();
+        for corner in triangle {
+            sums[*corner as usize] += if determinant == 0.0 { DVec3::ZERO } else { tangent };
+        }
+    }
+    let sign = if mirrors { -1.0 } else { 1.0 };
+    let tangent = |sum: &DVec3| sum.normalize_or_zero().as_vec3().extend(sign).to_array();
+    mesh.tangents = sums.iter().map(tangent).collect();
+}

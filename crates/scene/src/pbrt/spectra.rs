@@ -1,0 +1,188 @@
+//! Spectra of a scene description → linear Rec.709.
+//!
+//! `rgb` is taken as it is: pbrt makes a smooth spectrum of it whose colour is the same. Other spectra
+//! are integrated against the CIE 1931 observer: reflectances under D65, so that grey stays grey,
+//! lights alone, with luminance 1, as pbrt-v4 normalises every light before its `scale`.
+
+use std::path::Path;
+
+use glam::{DVec3, Vec3};
+
+use super::{
+    named,
+    parameters::{Kind, Parameter, Values},
+    source::path_inside,
+};
+use crate::{
+    error::Result,
+    files,
+    spectrum::{light_color, srgb_weights},
+};
+
+/// Types of parameters that are spectra.
+pub const KINDS: [Kind; 3] = [Kind::Rgb, Kind::Spectrum, Kind::Blackbody];
+
+/// Second radiation constant, nm·K.
+const SECOND_RADIATION: f64 = 1.438_776_877e7;
+/// Spacing at which reflectances are sampled, nm.
+const STEP_NM: f64 = 5.0;
+
+/// Spectrum as pairs of wavelength in nm and value.
+struct Samples(Vec<[f64; 2]>);
+
+impl Samples {
+    /// Takes wavelengths and values in turn.
+    fn new(numbers: &[f64]) -> Option<Self> {
+        let pairs: Vec<_> = numbers.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
+        let increases = pairs.windows(2).all(|pairs| pairs[0][0] < pairs[1][0]);
+        (numbers.len().is_multiple_of(2) && !pairs.is_empty() && increases).then_some(Self(pairs))
+    }
+
+    /// Value at a wavelength: linear between samples, 0 outside them.
+    fn at(&self, wavelength_nm: f64) -> f64 {
+        let next = self.0.partition_point(|sample| sample[0] < wavelength_nm);
+        let Some(&[high, above]) = self.0.get(next) else { return 0.0 };
+        if high == wavelength_nm {
+            return above;
+        }
+        let Some(&[low, below]) = next.checked_sub(1).and_then(|last| self.0.get(last)) else {
+            return 0.0;
+        };
+        below + (above - below) * (wavelength_nm - low) / (high - low)
+    }
+
+    /// Colour of a reflectance.
+    fn color(&self) -> DVec3 {
+        let count = (400.0 / STEP_NM) as usize + 1;
+        let wavelengths: Vec<f64> =
+            (0..count).map(|index| 380.0 + index as f64 * STEP_NM).collect();
+        let weights = srgb_weights(&wavelengths).unwrap_or_default();
+        weights.iter().zip(&wavelengths).map(|(weight, &nm)| *weight * self.at(nm)).sum()
+    }
+}
+
+/// Meaning of a spectrum.
+enum Source<'a> {
+    Color(DVec3),
+    Samples(Samples),
+    Temperature(f64),
+    Name(&'a str),
+}
+
+fn source<'a>(parameter: &'a Parameter, folder: &Path) -> Result<Source<'a>> {
+    let error = |message: String| {
+        parameter.place.error(format!("parameter `{}`: {message}", parameter.name))
+    };
+    let samples = |numbers: &[f64]| {
+        let expected = "expected pairs of wavelength and value in increasing order of wavelength";
+        Samples::new(numbers).map(Source::Samples).ok_or_else(|| error(expected.to_owned()))
+    };
+    match (parameter.kind, &parameter.values) {
+        (Kind::Rgb, Values::Numbers(numbers)) => match numbers[..] {
+            [red, green, blue] => Ok(Source::Color(DVec3::new(red, green, blue))),
+            _ => Err(error(format!("expected 3 numbers, found {}", numbers.len()))),
+        },
+        (Kind::Blackbody, Values::Numbers(numbers)) => match numbers[..] {
+            [kelvin] if kelvin > 0.0 => Ok(Source::Temperature(kelvin)),
+            _ => Err(error("expected one temperature above 0 K".to_owned())),
+        },
+        (_, Values::Numbers(numbers)) => samples(numbers),
+        _ => {
+            let name = parameter.text();
+            if !name.ends_with(".spd") {
+                return Ok(Source::Name(name));
+            }
+            let path = path_inside(folder, name).map_err(error)?;
+            let text = files::read_text(&path).map_err(|e| error(e.to_string()))?;
+            let lines = text.lines().map(|line| line.split('#').next().unwrap_or(""));
+            let words = lines.flat_map(str::split_ascii_whitespace);
+            let numbers: Option<Vec<f64>> = words.map(|word| word.parse().ok()).collect();
+            samples(&numbers.unwrap_or_default())
+        }
+    }
+}
+
+fn unknown(parameter: &Parameter, expected: &str) -> crate::error::Error {
+    let found = parameter.text();
+    parameter.place.error(format!(
+        "parameter `{}`: expected {expected}, found the unknown spectrum `{found}`",
+        parameter.name
+    ))
+}
+
+/// Reflectance, 0…1.
+///
+/// # Errors
+/// With the place for lists that are no spectrum and unknown names.
+pub fn reflectance(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
+    let color = match source(parameter, folder)? {
+        Source::Color(color) => color,
+        Source::Samples(samples) => samples.color(),
+        Source::Temperature(kelvin) => blackbody(kelvin),
+        Source::Name(_) => return Err(unknown(parameter, "rgb or pairs of wavelength and value")),
+    };
+    Ok(color.clamp(DVec3::ZERO, DVec3::ONE).as_vec3())
+}
+
+/// Colour of a light; that of `rgb` as given, others with luminance 1.
+///
+/// # Errors
+/// As [`reflectance`].
+pub fn light(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
+    let color = match source(parameter, folder)? {
+        Source::Color(color) => color,
+        Source::Samples(samples) => light_color(|nm| samples.at(nm)).unwrap_or(DVec3::ZERO),
+        Source::Temperature(kelvin) => blackbody(kelvin),
+        Source::Name(name) => named::illuminant(name)
+            .ok_or_else(|| unknown(parameter, "an illuminant such as stdillum-D65"))?,
+    };
+    Ok(color.max(DVec3::ZERO).as_vec3())
+}
+
+/// Refractive index or extinction coefficient.
+///
+/// # Errors
+/// As [`reflectance`].
+pub fn index(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
+    let color = match source(parameter, folder)? {
+        Source::Color(color) => color,
+        Source::Samples(samples) => samples.color(),
+        Source::Temperature(_) => return Err(unknown(parameter, "a refractive index")),
+        Source::Name(name) => named::index(name).ok_or_else(|| {
+            unknown(parameter, "a metal such as metal-Cu-eta or a glass such as glass-BK7")
+        })?,
+    };
+    Ok(color.max(DVec3::ZERO).as_vec3())
+}
+
+/// Colour of a black body with luminance 1 \[Planck 1901\].
+fn blackbody(kelvin: f64) -> DVec3 {
+    let power = |nm: f64| nm.powi(-5) / (SECOND_RADIATION / (nm * kelvin)).exp_m1();
+    light_color(power).unwrap_or(DVec3::ZERO)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn black_bodies_have_their_known_colours() {
+        // The white of D65 lies beside the black body of 6504 K, towards green.
+        let white = blackbody(6504.0);
+        assert!((white - DVec3::ONE).abs().max_element() < 0.06, "{white}");
+        // Illuminant A is a black body of 2856 K: x = 0.4476, y = 0.4074.
+        let warm = named::illuminant("stdillum-A").unwrap_or_default();
+        assert!((blackbody(2856.0) - warm).abs().max_element() < 0.01, "{warm}");
+    }
+
+    #[test]
+    fn grey_samples_are_grey_and_end_at_their_ends() {
+        let grey = Samples::new(&[300.0, 0.4, 900.0, 0.4]).map(|grey| grey.color());
+        assert!(grey.is_some_and(|grey| (grey - DVec3::splat(0.4)).abs().max_element() < 2e-3));
+        let samples = Samples::new(&[500.0, 1.0, 600.0, 3.0])
+            .map(|samples| [499.0, 500.0, 525.0, 600.0, 601.0].map(|nm| samples.at(nm)));
+        assert_eq!(samples, Some([0.0, 1.0, 1.5, 3.0, 0.0]));
+        assert!(Samples::new(&[500.0, 1.0, 400.0, 1.0]).is_none());
+        assert!(Samples::new(&[500.0]).is_none());
+    }
+}

@@ -1,0 +1,413 @@
+//! Textures of a scene description → constants and [`TextureUse`]s: every texture that is one image,
+//! scaled, inverted, mixed with constants or not.
+
+use std::{
+    collections::HashMap,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use glam::Vec3;
+use half::f16;
+
+use super::{
+    directives::Description,
+    log::Log,
+    parameters::{Entity, Kind, Parameter},
+    source::path_inside,
+    spectra,
+};
+use crate::{
+    error::Result,
+    features,
+    texture::{Channels, Encoding, Interpolation, Texels, Texture, TextureUse, Wrap},
+};
+
+/// Most textures that may refer to one another.
+const MAX_DEPTH: usize = 16;
+
+/// Value of a parameter over a surface.
+#[derive(Clone, Debug)]
+pub enum Value {
+    /// The same everywhere; all three are equal for a number.
+    Constant(Vec3),
+    /// By place.
+    Image(TextureUse),
+}
+
+impl Value {
+    /// The same number everywhere.
+    pub fn number(number: f64) -> Self {
+        Self::Constant(Vec3::splat(number as f32))
+    }
+
+    /// Returns factor · value + shift.
+    fn affine(self, factor: Vec3, shift: Vec3) -> Self {
+        match self {
+            Self::Constant(value) => Self::Constant(value * factor + shift),
+            Self::Image(mut image) => {
+                image.scale = (Vec3::from_array(image.scale) * factor).to_array();
+                image.bias = (Vec3::from_array(image.bias) * factor + shift).to_array();
+                Self::Image(image)
+            }
+        }
+    }
+
+    /// Multiplies by a constant.
+    pub fn scaled(self, factor: f32) -> Self {
+        self.affine(Vec3::splat(factor), Vec3::ZERO)
+    }
+}
+
+/// Encoding of 8-bit colours, and the exponent of one that is neither of [`Encoding`].
+struct Decoding {
+    encoding: Encoding,
+    gamma: Option<f32>,
+}
+
+/// Textures of a scene, with the images read so far.
+pub struct Textures<'a> {
+    description: &'a Description,
+    folder: &'a Path,
+    images: HashMap<(PathBuf, String), Arc<Texture>>,
+    /// Values of named textures, those of numbers apart.
+    values: HashMap<(bool, String), Value>,
+}
+
+impl<'a> Textures<'a> {
+    /// Takes the textures of `description`; paths are relative to `folder`.
+    pub fn new(description: &'a Description, folder: &'a Path) -> Self {
+        Self { description, folder, images: HashMap::new(), values: HashMap::new() }
+    }
+
+    /// Folder to which paths are relative.
+    pub fn folder(&self) -> &'a Path {
+        self.folder
+    }
+
+    /// Spectrum of a parameter, constant or textured, if it is given.
+    ///
+    /// # Errors
+    /// With the place for unknown names, other types and images that cannot be read.
+    pub fn spectrum(
+        &mut self,
+        entity: &Entity,
+        name: &str,
+        log: &mut Log,
+    ) -> Result<Option<Value>> {
+        self.value(entity, name, false, 0, log)
+    }
+
+    /// Number of a parameter, constant or textured, if it is given.
+    ///
+    /// # Errors
+    /// As [`Textures::spectrum`].
+    pub fn number(&mut self, entity: &Entity, name: &str, log: &mut Log) -> Result<Option<Value>> {
+        self.value(entity, name, true, 0, log)
+    }
+
+    fn value(
+        &mut self,
+        entity: &Entity,
+        name: &str,
+        is_number: bool,
+        depth: usize,
+        log: &mut Log,
+    ) -> Result<Option<Value>> {
+        let kinds: &[Kind] = if is_number {
+            &[Kind::Float, Kind::Integer, Kind::Texture]
+        } else {
+            &[Kind::Rgb, Kind::Spectrum, Kind::Blackbody, Kind::Texture]
+        };
+        let Some(parameter) = entity.find_of(name, kinds)? else { return Ok(None) };
+        Ok(Some(match parameter.kind {
+            Kind::Texture => self.named(parameter, is_number, depth, log)?,
+            Kind::Float | Kind::Integer => {
+                Value::number(parameter.numbers().first().copied().unwrap_or(0.0))
+            }
+            _ => Value::Constant(spectra::reflectance(parameter, self.folder)?),
+        }))
+    }
+
+    /// Texture that a parameter names.
+    fn named(
+        &mut self,
+        parameter: &Parameter,
+        is_number: bool,
+        depth: usize,
+        log: &mut Log,
+    ) -> Result<Value> {
+        let name = parameter.text();
+        let textures = if is_number {
+            &self.description.float_textures
+        } else {
+            &self.description.spectrum_textures
+        };
+        let Some(entity) = textures.get(name) else {
+            let kind = if is_number { "float" } else { "spectrum" };
+            let message = format!("parameter `{}`: there is no {kind} texture", parameter.name);
+            return Err(parameter.place.error(format!("{message} `{name}`")));
+        };
+        if depth == MAX_DEPTH {
+            let message = format!("more than {MAX_DEPTH} textures refer to one another");
+            return Err(entity.error(message));
+        }
+        let key = (is_number, name.to_owned());
+        if let Some(value) = self.values.get(&key) {
+            return Ok(value.clone());
+        }
+        let value = self.texture(entity, is_number, depth + 1, log)?;
+        log.unused(entity);
+        self.values.insert(key, value.clone());
+        Ok(value)
+    }
+
+    fn texture(
+        &mut self,
+        entity: &Entity,
+        is_number: bool,
+        depth: usize,
+        log: &mut Log,
+    ) -> Result<Value> {
+        let of = |this: &mut Self, name: &str, otherwise: f64, log: &mut Log| {
+            let value = this.value(entity, name, is_number, depth, log)?;
+            Ok(value.unwrap_or(Value::number(otherwise)))
+        };
+        match entity.name.as_str() {
+            "imagemap" => self.image(entity, is_number, log),
+            "constant" => of(self, "value", 1.0, log),
+            "scale" => {
+                let texture = of(self, "tex", 1.0, log)?;
+                let scale = self.value(entity, "scale", true, depth, log)?;
+                Ok(match (texture, scale.unwrap_or(Value::number(1.0))) {
+                    (Value::Constant(factor), other) | (other, Value::Constant(factor)) => {
+                        other.affine(factor, Vec3::ZERO)
+                    }
+                    (first, _) => {
+                        log.ignore(features::PBRT_TEXTURE_PRODUCT, &entity.place);
+                        first
+                    }
+                })
+            }
+            "mix" | "directionmix" => {
+                let (first, second) = (of(self, "tex1", 0.0, log)?, of(self, "tex2", 1.0, log)?);
+                let amount = match self.value(entity, "amount", true, depth, log)? {
+                    Some(Value::Constant(amount)) => amount.x,
+                    Some(Value::Image(_)) => {
+                        log.ignore(features::PBRT_TEXTURE_MIX, &entity.place);
+                        0.5
+                    }
+                    None => 0.5,
+                };
+                if entity.name == "directionmix" {
+                    log.ignore_named(features::PBRT_TEXTURE, "directionmix", &entity.place);
+                }
+                Ok(match (first, second) {
+                    (Value::Constant(constant), image) => {
+                        image.affine(Vec3::splat(amount), constant * (1.0 - amount))
+                    }
+                    (image, Value::Constant(constant)) => {
+                        image.affine(Vec3::splat(1.0 - amount), constant * amount)
+                    }
+                    (first, second) => {
+                        log.ignore(features::PBRT_TEXTURE_MIX, &entity.place);
+                        if amount <= 0.5 { first } else { second }
+                    }
+                })
+            }
+            "checkerboard" => {
+                let (first, second) = (of(self, "tex1", 1.0, log)?, of(self, "tex2", 0.0, log)?);
+                let is_flat = entity.number("dimension", 2.0)? == 2.0;
+                match (first, second) {
+                    (Value::Constant(first), Value::Constant(second)) if is_flat => {
+                        let mapping = mapping(entity, log)?;
+                        Ok(Value::Image(checkerboard(first, second, mapping)))
+                    }
+                    (first, _) => {
+                        log.ignore_named(features::PBRT_TEXTURE, "checkerboard", &entity.place);
+                        Ok(first)
+                    }
+                }
+            }
+            "bilerp" | "dots" | "fbm" | "marble" | "windy" | "wrinkled" | "ptex" => {
+                log.ignore_named(features::PBRT_TEXTURE, &entity.name, &entity.place);
+                Ok(Value::number(0.5))
+            }
+            _ => Err(entity.error("expected a kind of texture that pbrt-v4 has")),
+        }
+    }
+
+    fn image(&mut self, entity: &Entity, is_number: bool, log: &mut Log) -> Result<Value> {
+        let Some(file) = entity.string("filename")? else {
+            return Err(entity.error("expected a `filename`"));
+        };
+        let decoding = decoding(entity)?;
+        let texture = self.load(entity, file, &decoding, log)?;
+        let ([du, u], [dv, v]) = mapping(entity, log)?;
+        let mut image = TextureUse {
+            // v points up in pbrt, down in images.
+            image_from_uv: [[u, 0.0, du], [0.0, -v, 1.0 - dv]],
+            encoding: decoding.encoding,
+            ..TextureUse::new(texture)
+        };
+        image.interpolation = match entity.string("filter")?.unwrap_or("bilinear") {
+            "point" => Interpolation::Nearest,
+            "bilinear" | "trilinear" | "ewa" | "EWA" => Interpolation::Bilinear,
+            other => return Err(entity.error(format!("unknown filter `{other}`"))),
+        };
+        entity.optional("maxanisotropy")?;
+        image.wrap = [match entity.string("wrap")?.unwrap_or("repeat") {
+            "repeat" => Wrap::Repeat,
+            "clamp" => Wrap::ClampToEdge,
+            other @ ("black" | "octahedralsphere") => {
+                let name = format!("wrap `{other}` of a texture");
+                log.ignore_named(features::PBRT_TEXTURE_WRAP, &name, &entity.place);
+                Wrap::ClampToEdge
+            }
+            other => return Err(entity.error(format!("unknown wrap mode `{other}`"))),
+        }; 2];
+        if is_number {
+            // pbrt takes opacity where the image has it, else the mean of the colours.
+            image.channels =
+                if has_opacity(&image.texture) { Channels::Alpha } else { Channels::Color };
+        }
+        let scale = entity.number("scale", 1.0)? as f32;
+        let value = Value::Image(image).scaled(scale);
+        if entity.boolean("invert", false)? {
+            return Ok(value.affine(Vec3::NEG_ONE, Vec3::ONE));
+        }
+        Ok(value)
+    }
+
+    /// Reads an image file once for each way of decoding it.
+    fn load(
+        &mut self,
+        entity: &Entity,
+        file: &str,
+        decoding: &Decoding,
+        log: &mut Log,
+    ) -> Result<Arc<Texture>> {
+        let path = path_inside(self.folder, file).map_err(|message| entity.error(message))?;
+        let key = (path.clone(), format!("{:?}", decoding.gamma));
+        if let Some(texture) = self.images.get(&key) {
+            return Ok(Arc::clone(texture));
+        }
+        let loaded = Texture::load_with(&path, &mut log.warnings);
+        let mut texture = loaded.map_err(|error| entity.error(error.to_string()))?;
+        if let (Some(gamma), Texels::Bytes(_) | Texels::Shorts(_)) =
+            (decoding.gamma, &texture.texels)
+        {
+            let decoded = |[red, green, blue, alpha]: [f32; 4]| {
+                let [red, green, blue] = [red, green, blue].map(|value| value.powf(gamma));
+                [red, green, blue, alpha].map(f16::from_f32)
+            };
+            let texels = texture.linear_texels(Encoding::Linear).into_iter().map(decoded);
+            texture.texels = Texels::Halves(texels.collect());
+        }
+        let texture = Arc::new(texture);
+        log.inputs.push(path);
+        self.images.insert(key, Arc::clone(&texture));
+        Ok(texture)
+    }
+
+    /// Normal map that a material names, if it does.
+    ///
+    /// # Errors
+    /// With the place for an image that cannot be read.
+    pub fn normal_map(&mut self, entity: &Entity, log: &mut Log) -> Result<Option<TextureUse>> {
+        let Some(file) = entity.string("normalmap")? else { return Ok(None) };
+        let decoding = Decoding { encoding: Encoding::Linear, gamma: None };
+        let texture = self.load(entity, file, &decoding, log)?;
+        let encoding = Encoding::Linear;
+        Ok(Some(TextureUse { encoding, ..TextureUse::from_lower_left(texture) }))
+    }
+
+    /// Image of the radiance of an area light, if it names one: shown once, (0, 0) at its lower left.
+    ///
+    /// # Errors
+    /// With the place for an image that cannot be read.
+    pub fn light_image(&mut self, entity: &Entity, log: &mut Log) -> Result<Option<TextureUse>> {
+        let Some(file) = entity.string("filename")? else { return Ok(None) };
+        let decoding = Decoding { encoding: Encoding::Srgb, gamma: None };
+        let texture = self.load(entity, file, &decoding, log)?;
+        let wrap = [Wrap::ClampToEdge; 2];
+        Ok(Some(TextureUse { wrap, ..TextureUse::from_lower_left(texture) }))
+    }
+}
+
+fn decoding(entity: &Entity) -> Result<Decoding> {
+    let linear = Decoding { encoding: Encoding::Linear, gamma: None };
+    // Only 8-bit colours are encoded; other texels are linear whatever this says.
+    match entity.string("encoding")?.unwrap_or("sRGB") {
+        "sRGB" => Ok(Decoding { encoding: Encoding::Srgb, gamma: None }),
+        "linear" => Ok(linear),
+        other => {
+            let gamma = other.strip_prefix("gamma ").and_then(|gamma| gamma.trim().parse().ok());
+            let gamma = gamma.filter(|gamma: &f32| *gamma > 0.0 && gamma.is_finite());
+            let error = || {
+                let expected = "expected the encoding sRGB, linear or gamma with a number";
+                entity.error(format!("{expected}, found `{other}`"))
+            };
+            Ok(Decoding { gamma: Some(gamma.ok_or_else(error)?), ..linear })
+        }
+    }
+}
+
+/// Shift and scale along u and v.
+type Mapping = ([f32; 2], [f32; 2]);
+
+fn mapping(entity: &Entity, log: &mut Log) -> Result<Mapping> {
+    let kind = entity.string("mapping")?.unwrap_or("uv");
+    if kind != "uv" {
+        let name = format!("mapping `{kind}` of a texture");
+        log.ignore_named(features::PBRT_TEXTURE_MAPPING, &name, &entity.place);
+    }
+    let of = |name: &str, otherwise: f64| Ok(entity.number(name, otherwise)? as f32);
+    Ok(([of("udelta", 0.0)?, of("uscale", 1.0)?], [of("vdelta", 0.0)?, of("vscale", 1.0)?]))
+}
+
+/// Image of 2×2 texels, each of which is a square of one unit of the mapped coordinates.
+fn checkerboard(first: Vec3, second: Vec3, ([du, u], [dv, v]): Mapping) -> TextureUse {
+    let [first, second] =
+        [first, second].map(|color| color.extend(1.0).to_array().map(f16::from_f32));
+    let texture = Texture {
+        name: "checkerboard".to_owned(),
+        width: 2,
+        height: 2,
+        texels: Texels::Halves(vec![first, second, second, first]),
+    };
+    TextureUse {
+        image_from_uv: [[0.5 * u, 0.0, 0.5 * du], [0.0, 0.5 * v, 0.5 * dv]],
+        encoding: Encoding::Linear,
+        interpolation: Interpolation::Nearest,
+        ..TextureUse::new(Arc::new(texture))
+    }
+}
+
+fn has_opacity(texture: &Texture) -> bool {
+    match &texture.texels {
+        Texels::Bytes(texels) => texels.iter().any(|texel| texel[3] != u8::MAX),
+        Texels::Shorts(texels) => texels.iter().any(|texel| texel[3] != u16::MAX),
+        Texels::Halves(texels) => texels.iter().any(|texel| texel[3] != f16::ONE),
+    }
+}
+
+/// Makes a texture of numbers, `of` the numbers of another.
+pub fn map_numbers(image: &TextureUse, of: impl Fn(f32) -> f32) -> TextureUse {
+    let texels = image.values().into_iter();
+    let texels = texels.map(|[red, green, blue, _]| {
+        let number =
+            if image.channels == Channels::Color { (red + green + blue) / 3.0 } else { red };
+        [f16::from_f32(of(number)); 4]
+    });
+    let texels = texels.collect();
+    let texture = Texture { texels: Texels::Halves(texels), ..Texture::clone(&image.texture) };
+    TextureUse {
+        texture: Arc::new(texture),
+        channels: Channels::Red,
+        encoding: Encoding::Linear,
+        scale: [1.0; 3],
+        bias: [0.0; 3],
+        ..image.clone()
+    }
+}
