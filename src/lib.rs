@@ -2,21 +2,24 @@
 //! learns which directions are blocked and stops shooting shadow rays there.
 //!
 //! ```rust,no_run
-//! use fenestra::{gpu::Device, session::{Renderer, Settings}, sampler::Sampler, scene::Scene};
+//! use fenestra::{
+//!     gpu::Device, sampler::Sampler, scene::Scene, session::{Event, Rules, Session, Settings},
+//! };
 //!
 //! # fn main() -> fenestra::Result<()> {
 //! let scene = Scene::load("scenes/meeting_room.toml".as_ref())?;
 //! let device = Device::open(None, false)?;
 //! let settings = Settings { sampler: Sampler::Guided, ..Settings::default() };
-//! let mut renderer = Renderer::new(&device, &scene, settings)?;
-//! renderer.render_pass(16)?;
-//! renderer.sums()?.to_image(&[]).write_exr("meeting_room.exr".as_ref())?;
+//! let mut session = Session::new(&device, &scene, settings)?;
+//! let rules = Rules { error: Some(0.02), seconds: Some(60.0), ..Rules::default() };
+//! session.run(&rules, &mut |event: &Event<'_>| eprintln!("{event}"))?;
+//! session.image(&[])?.write_exr("meeting_room.exr".as_ref())?;
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! `docs/examples/render.rs` adds progress and metadata, `docs/examples/study.rs` compares two
-//! samplers. `docs/architecture.md` follows one sample from the scene file to the image.
+//! `docs/examples/render.rs` adds checkpoints, `docs/examples/study.rs` compares two samplers.
+//! `docs/architecture.md` follows one sample from the scene file to the image.
 //!
 //! # Pipeline
 //!
@@ -44,7 +47,7 @@
 //! | `control-variates` | [`sampler::control_variates`] | `control_variates/`: `record_visibility`, |
 //! | | | `sample_controlled` |
 //! | `tiles` | [`sampler::tiles`] | `tiles/`: `count_tiles`, `sample_tiles` |
-//! | scene, settings, device → sums | [`session`] | |
+//! | scene, settings, device → sums: loop, stop rules, checkpoints | [`session`] | |
 //! | sums → image files | [`film`] | |
 //! | scene → files of other renderers | [`scene::export`] | |
 //! | runs of several samplers → report | [`study`] | |

@@ -9,8 +9,8 @@ use fenestra::{
     film::RgbImage,
     sampler::{Parameters, Sampler},
     scene::Scene,
-    session::Settings,
-    study::{metrics, record::Figures},
+    session::{Figures, Settings},
+    study::metrics,
 };
 
 const SAMPLES: u32 = 64;

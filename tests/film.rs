@@ -357,10 +357,11 @@ fn a_checkpoint_of_another_render_is_refused_with_every_difference() {
     let window = Sums::new(sums.origin, 4, 2, sums.film_size);
     let checkpoint = Checkpoint { sums, metadata: metadata(&[range(4, 8, 4)]) };
     let path = Path::new("room.checkpoint.exr");
-    let expected = Metadata { sample_ranges: Vec::new(), seconds: 0.0, ..metadata(&[]) };
-    checkpoint.check_resume(path, &expected, &window, 4, 8).unwrap();
+    let at = |seed, first| Metadata { seconds: 0.0, ..metadata(&[range(seed, first, 0)]) };
+    let expected = at(4, 8);
+    checkpoint.check_resume(path, &expected, &window).unwrap();
 
-    let mut other = expected.clone();
+    let mut other = at(5, 8);
     other.scene_hash = "cd34".to_owned();
     other.sampler = "mis".to_owned();
     other.sampler_parameters.clear();
@@ -368,7 +369,7 @@ fn a_checkpoint_of_another_render_is_refused_with_every_difference() {
     other.shadow_rays = 6;
     other.depth = 2;
     let smaller = Sums::new([0, 0], 3, 2, [10, 6]);
-    let message = checkpoint.check_resume(path, &other, &smaller, 5, 8).unwrap_err().to_string();
+    let message = checkpoint.check_resume(path, &other, &smaller).unwrap_err().to_string();
     for part in [
         "room.checkpoint.exr: the checkpoint belongs to another render",
         "scene hash: ab12 against cd34",
@@ -384,18 +385,18 @@ fn a_checkpoint_of_another_render_is_refused_with_every_difference() {
         assert!(message.contains(part), "no {part:?} in {message}");
     }
     let message = |seed, first| {
-        checkpoint.check_resume(path, &expected, &window, seed, first).unwrap_err().to_string()
+        checkpoint.check_resume(path, &at(seed, first), &window).unwrap_err().to_string()
     };
     assert!(message(4, 0).contains("first sample: 8 against 0"));
     let mut merged = checkpoint.clone();
     merged.metadata.sample_ranges.push(range(9, 0, 4));
-    let error = merged.check_resume(path, &expected, &window, 4, 8).unwrap_err().to_string();
+    let error = merged.check_resume(path, &expected, &window).unwrap_err().to_string();
     assert!(error.contains("a merged checkpoint cannot be continued"), "{error}");
     let mut bare = checkpoint.clone();
     bare.sums.albedo.clear();
     bare.sums.cache_entries.clear();
     bare.sums.guide_cell.clear();
-    let error = bare.check_resume(path, &expected, &checkpoint.sums, 4, 8).unwrap_err().to_string();
+    let error = bare.check_resume(path, &expected, &checkpoint.sums).unwrap_err().to_string();
     for layer in ["albedo", "cache-entries", "guide-cell"] {
         assert!(error.contains(&format!("layer {layer}: absent against asked for")), "{error}");
     }

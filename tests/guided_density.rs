@@ -217,7 +217,8 @@ fn mixed(share: f64, [from_brdf, guided]: &[Vec<f64>; 2]) -> Vec<f64> {
 }
 
 fn record(renderer: &mut Renderer, surface: &Surface) -> RecordedGuide {
-    let recorded = renderer.explain_learned(renderer.seed(), surface.pixel, RAYS).unwrap().unwrap();
+    let recorded =
+        renderer.explain_learned(renderer.settings().seed, surface.pixel, RAYS).unwrap().unwrap();
     let recorded: Box<dyn std::any::Any> = recorded;
     let recorded = *recorded.downcast::<RecordedGuide>().unwrap();
     support::assert_silent();

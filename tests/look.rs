@@ -114,7 +114,7 @@ fn pictures_after_a_motion_are_unbiased() {
     let mut settings = Settings { depth: 2, ..settings(Sampler::Guided, 0) };
     settings.parameters.set("candidates=1").unwrap();
     let values = rows(&scene, &settings, 100..100 + REPLICATES, 8, |renderer| {
-        let seed = renderer.seed();
+        let seed = renderer.settings().seed;
         renderer.look(&home, [32, 24], seed + 1000, true).unwrap();
         renderer.render_pass(4).unwrap();
         renderer.look(&home, [16, 12], seed + 2000, false).unwrap();

@@ -1,82 +1,30 @@
-//! Renders a scene with `guided`, one sample per pixel at a time, and writes an OpenEXR file that
-//! says how it was made.
-//!
-//! ```text
-//! cargo run --release --example render -- [SCENE [SAMPLES]]
-//! ```
+//! Renders a scene until its error is below 2% or a minute has passed. A checkpoint every ten seconds lets
+//! the next start continue: `cargo run --release --example render -- [SCENE]`.
 
-use std::{env, path::PathBuf, time::Instant};
+use std::{env, path::Path, time::Duration};
 
 use fenestra::{
-    Error, Result,
-    film::{Aov, Metadata, SampleRange},
+    Result, film,
     gpu::Device,
     sampler::Sampler,
     scene::Scene,
-    session::{Renderer, Settings},
+    session::{Event, Rules, Session, Settings},
 };
 
 fn main() -> Result<()> {
-    let mut arguments = env::args().skip(1);
-    let path = arguments.next().map_or_else(|| "scenes/meeting_room.toml".into(), PathBuf::from);
-    let samples: u32 = arguments.next().map_or(Ok(16), |text| {
-        text.parse().map_err(|_| Error::usage(format!("samples: expected a number, found {text}")))
-    })?;
-
-    let scene = Scene::load(&path)?;
-    // Take the first suitable device, without validation layers.
-    let device = Device::open(None, false)?;
+    let path = env::args().nth(1).unwrap_or("scenes/meeting_room.toml".into());
+    let (scene, device) = (Scene::load(Path::new(&path))?, Device::open(None, false)?);
     let settings = Settings { sampler: Sampler::Guided, depth: 2, ..Settings::default() };
-    let mut renderer = Renderer::new(&device, &scene, settings.clone())?;
-
-    let start = Instant::now();
-    while renderer.sample_count() < samples {
-        renderer.render_pass(1)?;
-        eprint!("\r{}: {} of {samples} spp", scene.name, renderer.sample_count());
+    let mut session = Session::new(&device, &scene, settings)?;
+    let output = Path::new("render.exr");
+    let checkpoint = film::checkpoint::checkpoint_path(output);
+    if checkpoint.exists() {
+        session.resume(&checkpoint)?;
     }
-    eprintln!(" in {:.1} s", start.elapsed().as_secs_f64());
-
-    let sums = renderer.sums()?;
-    let mut image = sums.to_image(&[Aov::Variance]);
-    metadata(&renderer, &settings, &scene, &device, start).store(&mut image);
-    let output = PathBuf::from(format!("{}.exr", scene.name));
-    image.write_exr(&output)?;
-    eprintln!(
-        "wrote {}, mean relative standard error {:.3}",
-        output.display(),
-        sums.relative_standard_error()
-    );
-    Ok(())
-}
-
-/// Describes the render, so that `fenestra merge` and `fenestra compare` know what they read.
-fn metadata(
-    renderer: &Renderer,
-    settings: &Settings,
-    scene: &Scene,
-    device: &Device,
-    start: Instant,
-) -> Metadata {
-    let capabilities = device.capabilities();
-    let report = renderer.report();
-    Metadata {
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        scene: scene.name.clone(),
-        scene_hash: scene.hash.clone(),
-        fit_hashes: report.fit_hashes,
-        sampler: settings.sampler.name().to_owned(),
-        sampler_parameters: settings.sampler.describe(&settings.parameters),
-        candidates: report.candidates,
-        shadow_rays: settings.shadow_rays,
-        depth: settings.depth,
-        sample_ranges: vec![SampleRange {
-            seed: settings.seed,
-            first: settings.first_sample,
-            count: renderer.sample_count(),
-        }],
-        seconds: start.elapsed().as_secs_f64(),
-        device: capabilities.name.clone(),
-        driver: capabilities.driver.clone(),
-        ..Metadata::default()
-    }
+    let checkpoints = Some((checkpoint, Duration::from_secs(10)));
+    let (error, seconds) = (Some(0.02), Some(60.0));
+    let rules = Rules { error, seconds, checkpoints, ..Rules::default() };
+    let reason = session.run(&rules, &mut |event: &Event<'_>| eprintln!("{event}"))?;
+    eprintln!("stopped by {}", reason.name());
+    session.image(&[film::Aov::Variance])?.write_exr(output)
 }

@@ -13,7 +13,7 @@ use fenestra::{
     gpu::Device,
     sampler::Sampler,
     scene::Scene,
-    session::{Renderer, Settings},
+    session::{Event, Rules, Session, Settings},
     study::{metrics::Metrics, statistics::geometric_interval},
 };
 
@@ -36,8 +36,7 @@ fn main() -> Result<()> {
     let mut scene = Scene::load(&path)?;
     [scene.film.width, scene.film.height] = SIZE;
     let device = Device::open(None, false)?;
-    let make =
-        |sampler| Renderer::new(&device, &scene, Settings { sampler, ..Settings::default() });
+    let make = |sampler| Session::new(&device, &scene, Settings { sampler, ..Settings::default() });
     let [mut first, mut second] = [make(SAMPLERS[0])?, make(SAMPLERS[1])?];
 
     // Two independent halves keep the reference's own noise out of the errors.
@@ -50,8 +49,8 @@ fn main() -> Result<()> {
     println!("seed  {name:>10}  {other:>10}  ratio");
     let mut ratios = Vec::new();
     for seed in SEEDS {
-        let relmse = |renderer: &mut Renderer| -> Result<f64> {
-            let picture = render(renderer, seed, SPP)?;
+        let relmse = |session: &mut Session| -> Result<f64> {
+            let picture = render(session, seed, SPP)?;
             // Without the worst 0.1% of the pixels: a single bright one can outweigh all others.
             Ok(Metrics::of_halves(&picture, &halves[0], &halves[1])?.relmse_trimmed)
         };
@@ -71,8 +70,9 @@ fn main() -> Result<()> {
 }
 
 /// Renders from nothing with `seed`: a sampler that learns starts again.
-fn render(renderer: &mut Renderer, seed: u32, spp: u32) -> Result<RgbImage> {
-    renderer.restart(seed)?;
-    renderer.render_pass(spp)?;
-    renderer.sums()?.to_image(&[]).rgb("rendered picture".as_ref())
+fn render(session: &mut Session, seed: u32, spp: u32) -> Result<RgbImage> {
+    session.restart(seed)?;
+    let rules = Rules { samples: Some(spp), ..Rules::default() };
+    session.run(&rules, &mut |_: &Event<'_>| ())?;
+    session.image(&[])?.rgb("rendered picture".as_ref())
 }

@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::stage;
+use crate::{session::Standing, stage};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// Resolution of the bar, steps.
@@ -54,36 +54,6 @@ impl Drop for Patience {
     }
 }
 
-/// State of a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Standing {
-    /// Fraction done, 0…1, by the stop rule that is nearest to being met.
-    pub fraction: f64,
-    /// Camera paths per pixel so far.
-    pub samples: u32,
-    /// Rays per second so far; 0 if unknown.
-    pub rays_per_second: f64,
-    /// Mean relative standard error, if known.
-    pub relative_error: Option<f64>,
-}
-
-impl Standing {
-    /// Formats "64 spp, 3.21 Mrays/s, error 4.2%", leaving out zeros and unknowns.
-    fn describe(&self) -> String {
-        let mut parts = Vec::new();
-        if self.samples > 0 {
-            parts.push(format!("{} spp", self.samples));
-        }
-        if self.rays_per_second > 0.0 {
-            parts.push(format!("{:.2} Mrays/s", self.rays_per_second * 1e-6));
-        }
-        if let Some(error) = self.relative_error.filter(|error| error.is_finite()) {
-            parts.push(format!("error {:.2}%", 100.0 * error));
-        }
-        parts.join(", ")
-    }
-}
-
 enum Output {
     Bar(ProgressBar),
     Lines { last: Instant, interval: Duration },
@@ -123,7 +93,7 @@ impl Progress {
         let message = || {
             let remaining = remaining(elapsed, standing.fraction)
                 .map_or_else(String::new, |time| format!(", {} left", HumanDuration(time)));
-            let mut parts = vec![standing.describe(), HumanDuration(elapsed).to_string()];
+            let mut parts = vec![standing.to_string(), HumanDuration(elapsed).to_string()];
             parts.retain(|part| !part.is_empty());
             parts.join(", ") + &remaining
         };
@@ -160,7 +130,7 @@ impl Progress {
         }
         if !matches!(self.output, Output::Quiet) {
             let elapsed = self.start.elapsed().as_secs_f64();
-            let mut parts = vec![standing.describe(), format!("in {elapsed:.1} s ({reason})")];
+            let mut parts = vec![standing.to_string(), format!("in {elapsed:.1} s ({reason})")];
             parts.retain(|part| !part.is_empty());
             eprintln!("{}: {}", self.label, parts.join(" "));
         }
@@ -186,16 +156,5 @@ mod tests {
         assert_eq!(remaining(time(10), 0.0), None);
         assert_eq!(remaining(time(10), 1.0), None);
         assert_eq!(remaining(time(10), f64::NAN), None);
-    }
-
-    #[test]
-    fn standing_leaves_out_what_is_unknown() {
-        let mut standing = Standing { samples: 64, ..Standing::default() };
-        assert_eq!(standing.describe(), "64 spp");
-        standing.rays_per_second = 3.21e6;
-        standing.relative_error = Some(0.042);
-        assert_eq!(standing.describe(), "64 spp, 3.21 Mrays/s, error 4.20%");
-        standing.relative_error = Some(f64::INFINITY);
-        assert_eq!(standing.describe(), "64 spp, 3.21 Mrays/s");
     }
 }

@@ -8,13 +8,14 @@ use std::{
 use super::{
     interrupt::Interrupt,
     options::{check_strict, parse_duration, parse_size},
-    progress::{Progress, Standing},
+    progress::Progress,
 };
 use crate::{
     error::{Error, Result},
     gpu::Device,
     sampler::Parameters,
     scene::Scene,
+    session::{Event, Observer, Standing},
     study::{
         contender::Contender,
         engine,
@@ -23,7 +24,6 @@ use crate::{
         plan::{CheckPlan, Description, Options, Plan},
         report,
         results::{Circumstances, Report},
-        watch::Observer,
     },
 };
 
@@ -163,13 +163,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if !arguments.quiet {
         eprintln!("wrote {}", folder.path().join("index.html").display());
     }
-    if let Some(first) = device.validation_messages().first().filter(|_| arguments.validate) {
-        return Err(Error::Vulkan {
-            call: "validation".into(),
-            result: format!("{} messages, the first: {first}", device.validation_messages().len()),
-        });
-    }
-    Ok(())
+    if arguments.validate { device.check_validation() } else { Ok(()) }
 }
 
 /// Layers the options over the quick settings over the study file.
@@ -268,11 +262,11 @@ impl Observer for Display<'_> {
         self.interrupt.is_raised()
     }
 
-    fn update(&mut self, fraction: f64, rays_per_second: f64) {
-        self.progress.update(&Standing { fraction, rays_per_second, ..Standing::default() });
-    }
-
-    fn note(&mut self, line: &str) {
-        self.progress.print(line);
+    fn notice(&mut self, event: &Event<'_>) {
+        match event {
+            Event::Pass { standing, .. } => self.progress.update(standing),
+            Event::Note(line) => self.progress.print(line),
+            Event::Look(_) => {}
+        }
     }
 }

@@ -21,7 +21,7 @@ use sha2::{Digest, Sha256};
 
 use super::{
     Attribute, Image,
-    metadata::{Metadata, SampleRange},
+    metadata::Metadata,
     sums::{Sums, split},
 };
 use crate::{
@@ -326,19 +326,12 @@ impl Checkpoint {
 
     /// Checks that a render described by `expected` can continue from this checkpoint. It needs the
     /// same scene, sampler with its parameters, shadow rays, depth and window, and a single range
-    /// of samples, `first …` of `seed`. `window` holds no samples yet; every layer that it has
-    /// (albedo, …) must be in the checkpoint too.
+    /// of samples, with the seed and the first sample of the range expected. `window` holds no samples
+    /// yet; every layer that it has (albedo, …) must be in the checkpoint too.
     ///
     /// # Errors
     /// [`Error::Format`] lists every difference and the remedy.
-    pub fn check_resume(
-        &self,
-        path: &Path,
-        expected: &Metadata,
-        window: &Sums,
-        seed: u32,
-        first: u32,
-    ) -> Result<()> {
+    pub fn check_resume(&self, path: &Path, expected: &Metadata, window: &Sums) -> Result<()> {
         let mut differences = self.metadata.differences(expected);
         let described = |sums: &Sums| {
             format!(
@@ -355,14 +348,14 @@ impl Checkpoint {
         if ours != theirs {
             differences.push(format!("window: {ours} against {theirs}"));
         }
-        match self.metadata.sample_ranges[..] {
-            [SampleRange { seed: ours, .. }] if ours != seed => {
-                differences.push(format!("seed: {ours} against {seed}"));
+        match (&self.metadata.sample_ranges[..], &expected.sample_ranges[..]) {
+            ([ours], [theirs]) if ours.seed != theirs.seed => {
+                differences.push(format!("seed: {} against {}", ours.seed, theirs.seed));
             }
-            [SampleRange { first: ours, .. }] if ours != first => {
-                differences.push(format!("first sample: {ours} against {first}"));
+            ([ours], [theirs]) if ours.first != theirs.first => {
+                differences.push(format!("first sample: {} against {}", ours.first, theirs.first));
             }
-            [_] => {}
+            ([_], _) => {}
             _ => differences.push(format!(
                 "{} ranges of samples against one: a merged checkpoint cannot be continued",
                 self.metadata.sample_ranges.len()
@@ -472,6 +465,7 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
     use super::*;
+    use crate::film::SampleRange;
 
     fn checkpoint(samples: u32) -> Checkpoint {
         let mut sums = Sums::new([0, 0], 2, 1, [2, 1]);

@@ -136,6 +136,17 @@ impl Device {
         self.instance.validation_messages()
     }
 
+    /// Returns [`Error::Vulkan`] with the first message of the validation layers, if there is any.
+    pub fn check_validation(&self) -> Result<()> {
+        let messages = self.validation_messages();
+        messages.first().map_or(Ok(()), |first| {
+            Err(Error::Vulkan {
+                call: "validation".into(),
+                result: format!("{} messages, the first: {first}", messages.len()),
+            })
+        })
+    }
+
     /// Writes compiled pipelines to the user's cache folder; failures are only logged.
     pub fn save_pipeline_cache(&self) {
         self.pipeline_cache.save(&self.raw, &self.capabilities);

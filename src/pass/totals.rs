@@ -59,6 +59,11 @@ impl Totals {
         self.cdf_rebuilds += u64::from(counters.cdf_rebuilds);
     }
 
+    /// Rays of every kind.
+    pub fn rays(&self) -> u64 {
+        self.camera_rays + self.bounce_rays + self.shadow_rays_traced
+    }
+
     /// Returns the share of paths that are alive at a vertex after the first, of `depth` vertices; 1 before
     /// any is known.
     pub fn living_share(&self, depth: u32) -> f64 {

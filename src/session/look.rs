@@ -39,11 +39,6 @@ impl Renderer {
         self.runner.is_stopped()
     }
 
-    /// Seed of the random numbers.
-    pub fn seed(&self) -> u32 {
-        self.settings.seed
-    }
-
     /// Width and height of the film in use, pixels.
     pub fn film_size(&self) -> [u32; 2] {
         self.film_size

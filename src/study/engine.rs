@@ -15,17 +15,17 @@ use super::{
     reference_check::{self, CheckJob, ReferenceCheck, Verdict},
     rule::Rule,
     surfaces::Surfaces,
-    watch::{Observer, Watch},
+    watch::Watch,
 };
 use crate::{
     error::{Error, Result},
     files::write_json,
-    film::{Aov, Metadata, png::write_preview},
+    film::{Aov, png::write_preview},
     gpu::Device,
     pass::SceneBuffers,
     sampler::Sampler,
     scene::Scene,
-    session::{Renderer, Settings, window_of},
+    session::{Observer, Session, Settings, describe, window_of},
 };
 
 /// Everything a study has measured.
@@ -148,7 +148,7 @@ impl Study<'_> {
             if let Some(record) = results.scenes.last_mut() {
                 record.reference_check = check;
             }
-            let make = &mut || buffers.renderer(mask_settings());
+            let make = &mut || buffers.session(mask_settings());
             let surfaces = Surfaces::of(self.folder, scene, &reference, make)?;
             if let Some(record) = results.scenes.last_mut() {
                 record.parts = Some(surfaces.own);
@@ -163,7 +163,7 @@ impl Study<'_> {
             let job = OverheadJob { plan: overhead, scene, conditions, folder: self.folder };
             let all = std::iter::once(&overhead.baseline).chain(&overhead.contenders);
             let settings: Vec<Settings> = all.map(|contender| self.settings(contender)).collect();
-            let make = &mut |index: usize| buffers.renderer(settings[index].clone());
+            let make = &mut |index: usize| buffers.session(settings[index].clone());
             job.execute(finished, make, &mut self.watch, &mut results.rounds)?;
         }
         self.device.save_pipeline_cache();
@@ -180,29 +180,12 @@ impl Study<'_> {
         }
     }
 
-    /// Metadata of a contender's renders, without samples and times.
-    fn metadata(&self, scene: &Scene, contender: &Contender) -> Metadata {
-        let capabilities = self.device.capabilities();
-        Metadata {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            scene: scene.name.clone(),
-            scene_hash: scene.hash.clone(),
-            sampler: contender.sampler.name().to_owned(),
-            sampler_parameters: contender.describe_parameters(),
-            shadow_rays: self.plan.shadow_rays,
-            depth: self.plan.depth,
-            device: capabilities.name.clone(),
-            driver: capabilities.driver.clone(),
-            ..Metadata::default()
-        }
-    }
-
     fn reference(&mut self, scene: &Scene, buffers: &mut SharedBuffers<'_>) -> Result<Reference> {
         let reference = match &self.plan.reference {
             ReferencePlan::Render { contender, half_spp } => {
                 let settings = self.settings(contender);
-                let metadata = self.metadata(scene, contender);
-                let make = &mut || buffers.renderer(settings.clone());
+                let metadata = describe(self.device, scene, &settings);
+                let make = &mut || buffers.session(settings.clone());
                 let what = (contender, *half_spp);
                 Reference::render(self.folder, scene, what, &metadata, make, &mut self.watch)?
             }
@@ -236,10 +219,10 @@ impl Study<'_> {
                 return Ok(None);
             };
             let settings = self.settings(&contender);
-            let metadata = self.metadata(scene, &contender);
+            let metadata = describe(self.device, scene, &settings);
             let folder = self.folder;
             let job = CheckJob { folder, scene, reference, contender: &contender, metadata };
-            job.execute(&mut || buffers.renderer(settings.clone()), &mut self.watch)?
+            job.execute(&mut || buffers.session(settings.clone()), &mut self.watch)?
         };
         let text = format!("{}: {}", scene.name, check.describe());
         if check.verdict == Verdict::Disagrees {
@@ -259,7 +242,7 @@ impl Study<'_> {
         results: &mut Results,
     ) -> Result<()> {
         let exposure = exposure(&reference.mean());
-        let mut renderers: BTreeMap<String, Renderer> = BTreeMap::new();
+        let mut sessions: BTreeMap<String, Session> = BTreeMap::new();
         for task in self.plan.tasks() {
             let (rule, seed, contender) = task;
             if let Some(run) = self.finished.run(scene, task)? {
@@ -268,11 +251,11 @@ impl Study<'_> {
                 continue;
             }
             self.watch.check()?;
-            if !renderers.contains_key(&contender.label) {
-                let renderer = buffers.renderer(self.settings(contender))?;
-                renderers.insert(contender.label.clone(), renderer);
+            if !sessions.contains_key(&contender.label) {
+                let session = buffers.session(self.settings(contender))?;
+                sessions.insert(contender.label.clone(), session);
             }
-            let Some(renderer) = renderers.get_mut(&contender.label) else { continue };
+            let Some(session) = sessions.get_mut(&contender.label) else { continue };
             let job = RunJob {
                 scene,
                 reference,
@@ -283,10 +266,9 @@ impl Study<'_> {
                 seed,
                 levels: &self.plan.spp,
                 conditions: self.finished.conditions(scene, Some(contender))?,
-                metadata: self.metadata(scene, contender),
                 folder: self.folder,
             };
-            let run = job.execute(renderer, &mut self.watch)?;
+            let run = job.execute(session, &mut self.watch)?;
             write_json(&self.finished.run_record(scene, task), &run)?;
             if let Some(last) = run.last() {
                 self.watch.note(&format!(
@@ -324,7 +306,7 @@ fn expect_run(watch: &mut Watch<'_>, rule: Rule, pixels: f64, count: f64) {
     }
 }
 
-/// Device buffers of a scene, created when the first renderer needs them.
+/// Device buffers of a scene, created when the first session needs them.
 struct SharedBuffers<'a> {
     device: &'a Arc<Device>,
     scene: &'a Scene,
@@ -332,7 +314,7 @@ struct SharedBuffers<'a> {
 }
 
 impl SharedBuffers<'_> {
-    fn renderer(&mut self, settings: Settings) -> Result<Renderer> {
+    fn session(&mut self, settings: Settings) -> Result<Session> {
         let buffers = match &self.made {
             Some(buffers) => Arc::clone(buffers),
             None => {
@@ -342,6 +324,6 @@ impl SharedBuffers<'_> {
                 buffers
             }
         };
-        Renderer::with_scene_buffers(self.device, buffers, self.scene, settings)
+        Session::with_scene_buffers(self.device, buffers, self.scene, settings)
     }
 }

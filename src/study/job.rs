@@ -4,21 +4,20 @@ use super::{
     contender::Contender,
     folder::Folder,
     metrics::flip::mean_flip,
-    record::{Conditions, Figures, Measurement, Run, run_stem},
+    record::{Conditions, Measurement, Run, run_stem},
     reference::Reference,
     rule::Rule,
     surfaces::Surfaces,
-    watch::{Pace, Watch},
+    watch::Watch,
 };
 use crate::{
     error::Result,
     film::{
-        Image, Metadata, RgbImage, SampleRange,
-        metadata::seconds_of,
+        Image, RgbImage,
         png::{preview, write_preview},
     },
     scene::Scene,
-    session::Renderer,
+    session::{Figures, Rules, Session},
 };
 
 /// Seed whose pictures are also written as PNG.
@@ -37,37 +36,34 @@ pub(super) struct RunJob<'a> {
     /// Samples at which a run that ends by samples keeps its picture; ascending.
     pub(super) levels: &'a [u32],
     pub(super) conditions: Conditions,
-    /// Metadata of the pictures, without samples and times.
-    pub(super) metadata: Metadata,
     pub(super) folder: &'a Folder,
 }
 
 impl RunJob<'_> {
     /// Renders the run and compares the film at powers of two of samples and at the levels. Reading
     /// and comparing it does not count as time of the passes.
-    pub(super) fn execute(self, renderer: &mut Renderer, watch: &mut Watch<'_>) -> Result<Run> {
-        renderer.restart(self.seed)?;
-        let pixels = f64::from(self.scene.film.width) * f64::from(self.scene.film.height);
+    pub(super) fn execute(self, session: &mut Session, watch: &mut Watch<'_>) -> Result<Run> {
+        session.restart(self.seed)?;
         let limit = match self.rule {
             Rule::Spp(_) => None,
             Rule::Seconds(seconds) => Some(seconds),
         };
-        let mut pace = Pace::new(pixels, limit.is_some());
         let mut measurements: Vec<Measurement> = Vec::new();
         loop {
-            let target = self.next_stop(renderer.sample_count());
-            pace.advance(renderer, target, limit, watch)?;
+            let samples = Some(self.next_stop(session.renderer.sample_count()));
+            let rules = Rules { samples, seconds: limit, ..Rules::default() };
+            watch.run(session, &rules, limit.is_some())?;
             let (mut measurement, picture) =
-                Measurement::of(renderer, pace.seconds, self.reference, self.surfaces)?;
+                Measurement::of(session, self.reference, self.surfaces)?;
             let spp = measurement.spp;
             let is_level = match self.rule {
                 Rule::Spp(_) => self.levels.contains(&spp),
-                Rule::Seconds(_) => pace.is_over(limit, renderer),
+                Rule::Seconds(seconds) => session.seconds() >= seconds,
             };
             if is_level {
                 let level = if limit.is_some() { self.rule } else { Rule::Spp(spp) };
                 measurement.flip = Some(self.flip(&picture));
-                measurement.image = Some(self.keep(&picture, &measurement, renderer, level)?);
+                measurement.image = Some(self.keep(&picture, session, level)?);
             }
             measurements.push(measurement);
             let done = match self.rule {
@@ -85,7 +81,7 @@ impl RunJob<'_> {
             seed: self.seed,
             conditions: self.conditions,
             measurements,
-            figures: Figures::of(renderer, pace.seconds),
+            figures: Figures::of(&session.renderer, session.seconds()),
         })
     }
 
@@ -109,22 +105,9 @@ impl RunJob<'_> {
     }
 
     /// Writes the picture; returns its path inside the report folder.
-    fn keep(
-        &self,
-        picture: &RgbImage,
-        measurement: &Measurement,
-        renderer: &Renderer,
-        level: Rule,
-    ) -> Result<String> {
+    fn keep(&self, picture: &RgbImage, session: &Session, level: Rule) -> Result<String> {
         let mut image = image_of(picture);
-        let metadata = Metadata {
-            sample_ranges: vec![SampleRange { seed: self.seed, first: 0, count: measurement.spp }],
-            candidates: renderer.report().candidates,
-            seconds: measurement.seconds,
-            gpu_seconds: seconds_of(&renderer.totals().gpu_ms),
-            ..self.metadata.clone()
-        };
-        metadata.store(&mut image);
+        session.metadata().store(&mut image);
         let stem = run_stem(self.contender, level, self.seed);
         let path = self.folder.image(&self.scene.name, &stem);
         image.write_exr(&path)?;

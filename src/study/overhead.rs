@@ -12,11 +12,16 @@ use super::{
     contender::Contender,
     folder::Folder,
     plan::OverheadPlan,
-    record::{Conditions, Figures, Round, Timing, assignments},
+    record::{Conditions, Round, Timing, assignments},
     statistics::{Interval, median_interval},
-    watch::{Pace, Watch},
+    watch::Watch,
 };
-use crate::{error::Result, files::write_json, scene::Scene, session::Renderer};
+use crate::{
+    error::Result,
+    files::write_json,
+    scene::Scene,
+    session::{Figures, Rules, Session},
+};
 
 /// Overhead measurements of one scene.
 pub(super) struct OverheadJob<'a> {
@@ -32,7 +37,7 @@ impl OverheadJob<'_> {
     pub(super) fn execute(
         self,
         finished: Vec<Option<Round>>,
-        make: &mut dyn FnMut(usize) -> Result<Renderer>,
+        make: &mut dyn FnMut(usize) -> Result<Session>,
         watch: &mut Watch<'_>,
         rounds: &mut Vec<Round>,
     ) -> Result<()> {
@@ -40,32 +45,32 @@ impl OverheadJob<'_> {
         let samplers: Vec<_> = std::iter::once(baseline).chain(contenders).collect();
         let pixels = f64::from(self.scene.film.width) * f64::from(self.scene.film.height);
         let paths_per_round = pixels * f64::from(*spp) * samplers.len() as f64;
-        let mut renderers: Vec<Renderer> = Vec::new();
+        let mut sessions: Vec<Session> = Vec::new();
+        let rules = Rules { samples: Some(*spp), ..Rules::default() };
         for (repetition, finished) in (1_u32..).zip(finished) {
             if let Some(round) = finished {
                 watch.expect(-paths_per_round, 0.0);
                 rounds.push(round);
                 continue;
             }
-            if renderers.is_empty() {
+            if sessions.is_empty() {
                 for index in 0..samplers.len() {
-                    let mut renderer = make(index)?;
+                    let mut session = make(index)?;
                     // Render until the size of the waves has settled.
-                    Pace::new(pixels, false).advance(&mut renderer, *spp, None, watch)?;
-                    renderers.push(renderer);
+                    watch.run(&mut session, &rules, false)?;
+                    sessions.push(session);
                 }
             }
             let mut timings = Vec::new();
             for index in 0..samplers.len() {
                 let turned = (index + repetition as usize - 1) % samplers.len();
-                let renderer = &mut renderers[turned];
-                renderer.restart(repetition)?;
-                let mut pace = Pace::new(pixels, false);
-                pace.advance(renderer, *spp, None, watch)?;
-                let figures = Figures::of(renderer, pace.seconds);
+                let session = &mut sessions[turned];
+                session.restart(repetition)?;
+                watch.run(session, &rules, false)?;
+                let figures = Figures::of(&session.renderer, session.seconds());
                 timings.push(Timing {
                     sampler: samplers[turned].label.clone(),
-                    wall_ms_per_sample: pace.seconds * 1e3 / f64::from(*spp),
+                    wall_ms_per_sample: session.seconds() * 1e3 / f64::from(*spp),
                     gpu_ms_per_sample: figures.gpu_ms_per_sample,
                     visible_share: figures.visible_share,
                     statistics: figures.statistics,

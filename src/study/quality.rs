@@ -227,10 +227,11 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
+    use crate::session::Figures;
     use crate::study::{
         own_errors::OwnErrors,
         plan::{Description, Options},
-        record::{Conditions, Figures},
+        record::Conditions,
         rule::Rule,
     };
 

@@ -6,32 +6,25 @@
 
 use std::{
     path::{Path, PathBuf},
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use sha2::{Digest, Sha256};
 
 use super::{
-    contender::Contender,
-    folder::Folder,
-    metrics::Metrics,
-    own_errors::OwnErrors,
-    plan::ReferencePlan,
-    statistics::mean_standard_error,
-    watch::{Pace, Watch},
+    contender::Contender, folder::Folder, metrics::Metrics, own_errors::OwnErrors,
+    plan::ReferencePlan, statistics::mean_standard_error, watch::Watch,
 };
 use crate::{
     error::{Error, Result},
     files,
     film::{
-        Aov, Attribute, Checkpoint, Image, Metadata, RgbImage, SampleRange,
+        Aov, Attribute, Image, Metadata, RgbImage, SampleRange,
         checkpoint::{checkpoint_path, remove_checkpoint},
         denoised::check_film,
-        metadata::seconds_of,
     },
-    pass::Saved,
     scene::Scene,
-    session::Renderer,
+    session::{Rules, Session},
 };
 
 /// File stems of the halves.
@@ -146,7 +139,7 @@ impl Reference {
     /// Renders what `folder` lacks of the two halves and reads both. An interrupted half continues
     /// from its checkpoint.
     ///
-    /// `metadata` describes the render without its samples; `make_renderer` is called only if there
+    /// `metadata` describes the render without its samples; `make_session` is called only if there
     /// is something to render.
     ///
     /// # Errors
@@ -156,11 +149,11 @@ impl Reference {
         scene: &Scene,
         (contender, half_spp): (&Contender, u32),
         metadata: &Metadata,
-        make_renderer: &mut dyn FnMut() -> Result<Renderer>,
+        make_session: &mut dyn FnMut() -> Result<Session>,
         watch: &mut Watch<'_>,
     ) -> Result<Self> {
         let pixels = f64::from(scene.film.width) * f64::from(scene.film.height);
-        let mut renderer = None;
+        let mut session = None;
         let paths = HALF_STEMS.map(|stem| folder.image(&scene.name, stem));
         for (path, seed) in paths.iter().zip(SEEDS) {
             let range = SampleRange { seed, first: 0, count: half_spp };
@@ -169,9 +162,9 @@ impl Reference {
                 watch.expect(-pixels * f64::from(half_spp), 0.0);
                 continue;
             }
-            let renderer = match &mut renderer {
-                Some(renderer) => renderer,
-                none => none.insert(make_renderer()?),
+            let session = match &mut session {
+                Some(session) => session,
+                none => none.insert(make_session()?),
             };
             watch.note(&format!(
                 "{}: reference {} of 2 by {}, {half_spp} spp",
@@ -179,7 +172,7 @@ impl Reference {
                 seed - SEEDS[0] + 1,
                 contender.label
             ));
-            render_half(renderer, path, metadata, pixels, watch)?;
+            render_half(session, path, range, watch)?;
         }
         let images = read_images(paths.to_vec(), scene)?;
         Self::from_images(&images, format!("{}, two halves of {half_spp} spp", contender.label))
@@ -251,88 +244,49 @@ fn is_finished(path: &Path, metadata: &Metadata) -> Result<bool> {
     if !path.exists() {
         return Ok(false);
     }
-    let found = Metadata::load(&Image::read_exr(path)?, path)?;
+    // Fits are known only to the renderer, and follow from the rest.
+    let fit_hashes = metadata.fit_hashes.clone();
+    let found = Metadata { fit_hashes, ..Metadata::load(&Image::read_exr(path)?, path)? };
     Ok(found.differences(metadata).is_empty()
         && found.sample_ranges == metadata.sample_ranges
         && (&found.device, &found.driver, &found.version)
             == (&metadata.device, &metadata.driver, &metadata.version))
 }
 
-/// Renders one half, from its checkpoint if there is one; `metadata` has its one sample range.
+/// Renders one half, from its checkpoint if there is one of the same render; else, or if that is damaged,
+/// from its first sample.
 fn render_half(
-    renderer: &mut Renderer,
+    session: &mut Session,
     path: &Path,
-    mut metadata: Metadata,
-    pixels: f64,
+    SampleRange { seed, count, .. }: SampleRange,
     watch: &mut Watch<'_>,
 ) -> Result<()> {
-    let SampleRange { seed, count, .. } = metadata.sample_ranges[0];
-    let checkpoint_path = checkpoint_path(path);
+    let checkpoint = checkpoint_path(path);
     files::sweep_leftovers(path);
-    renderer.restart(seed)?;
-    let earlier_seconds = resume(renderer, &checkpoint_path, &metadata)?;
-    watch.expect(-pixels * f64::from(renderer.sample_count()), 0.0);
-    let mut pace = Pace::new(pixels, false);
-    let mut last_checkpoint = Instant::now();
-    while renderer.sample_count() < count {
-        // Render whole passes until the samples double or the next checkpoint is due.
-        let step = renderer.sample_count().max(1).saturating_mul(2).min(count);
-        let limit = (last_checkpoint + CHECKPOINT_INTERVAL)
-            .saturating_duration_since(Instant::now())
-            .as_secs_f64();
-        let result = pace.advance(renderer, step, Some(pace.seconds + limit), watch);
-        metadata.seconds = earlier_seconds + pace.seconds;
-        metadata.gpu_seconds = seconds_of(&renderer.totals().gpu_ms);
-        let interrupted = matches!(result, Err(Error::Interrupted));
-        if (interrupted || last_checkpoint.elapsed() >= CHECKPOINT_INTERVAL)
-            && renderer.sample_count() > 0
-        {
-            let range = SampleRange { seed, first: 0, count: renderer.sample_count() };
-            let candidates = renderer.report().candidates;
-            let metadata = Metadata { sample_ranges: vec![range], candidates, ..metadata.clone() };
-            let checkpoint = Checkpoint { sums: renderer.sums()?, metadata };
-            let guide = renderer.guide()?;
-            let written = checkpoint.write_with_guide(&checkpoint_path, guide.as_deref());
-            // A full disk may have room again at the next checkpoint or for the image.
-            if let Err(error) = written {
-                log::warn!("{error}; the next checkpoint tries again");
-            }
-            last_checkpoint = Instant::now();
+    session.restart(seed)?;
+    if checkpoint.exists() {
+        let resumed = session.resume(&checkpoint);
+        let is_usable = resumed.is_ok() && session.renderer.sample_count() <= count;
+        match resumed {
+            Err(error @ Error::Vulkan { .. }) => return Err(error),
+            Err(error) => log::warn!("{error}; starting this half again"),
+            Ok(()) => {}
         }
-        result?;
-    }
-    metadata.candidates = renderer.report().candidates;
-    let mut image = renderer.sums()?.to_image(&[Aov::Variance]);
-    metadata.store(&mut image);
-    image.write_exr(path)?;
-    remove_checkpoint(&checkpoint_path)
-}
-
-/// Restores a half from a checkpoint of the same render, with the guide if the sampler learns, and
-/// returns the seconds of its passes. Without one, or with a damaged one, the half starts from its
-/// first sample.
-fn resume(renderer: &mut Renderer, path: &Path, metadata: &Metadata) -> Result<f64> {
-    let SampleRange { seed, count, .. } = metadata.sample_ranges[0];
-    if !path.exists() {
-        return Ok(0.0);
-    }
-    let (checkpoint, guide) = match Checkpoint::read_with_guide(path) {
-        Ok(pair) => pair,
-        Err(error) => {
-            log::warn!("{error}; starting this half again");
-            return Ok(0.0);
+        if !is_usable {
+            session.restart(seed)?;
         }
-    };
-    let empty = renderer.sums()?;
-    let samples = checkpoint.sums.sample_count;
-    if samples > count || checkpoint.check_resume(path, metadata, &empty, seed, 0).is_err() {
-        return Ok(0.0);
     }
-    renderer.restore(&checkpoint.sums)?;
-    if let Some((path, bytes)) = guide {
-        renderer.take_guide(Saved { path: &path, bytes: &bytes, continues: true })?;
+    let [width, height] = session.renderer.film_size().map(f64::from);
+    watch.expect(-width * height * f64::from(session.renderer.sample_count()), 0.0);
+    let checkpoints = Some((checkpoint.clone(), CHECKPOINT_INTERVAL));
+    let rules = Rules { samples: Some(count), checkpoints, ..Rules::default() };
+    let result = watch.run(session, &rules, false);
+    if matches!(result, Err(Error::Interrupted)) && session.renderer.sample_count() > 0 {
+        session.write_checkpoint(&checkpoint)?.unwrap_or_else(|error| log::warn!("{error}"));
     }
-    Ok(checkpoint.metadata.seconds)
+    result?;
+    session.image(&[Aov::Variance])?.write_exr(path)?;
+    remove_checkpoint(&checkpoint)
 }
 
 /// Refuses a picture of another size or scene or with values that are not finite.

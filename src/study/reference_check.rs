@@ -14,13 +14,13 @@ use super::{
     contender::Contender,
     folder::Folder,
     reference::{Reference, read_checked},
-    watch::{Pace, Watch},
+    watch::Watch,
 };
 use crate::{
     error::{Error, Result},
-    film::{Image, Metadata, RgbImage, SampleRange, metadata::seconds_of},
+    film::{Image, Metadata, RgbImage, SampleRange},
     scene::Scene,
-    session::Renderer,
+    session::{Rules, Session},
 };
 
 /// Time of a check by another sampler, as a share of the reference's.
@@ -290,7 +290,7 @@ impl CheckJob<'_> {
     /// [`Error::Interrupted`]; a failing device or disk.
     pub(super) fn execute(
         self,
-        make: &mut dyn FnMut() -> Result<Renderer>,
+        make: &mut dyn FnMut() -> Result<Session>,
         watch: &mut Watch<'_>,
     ) -> Result<ReferenceCheck> {
         let paths = HALF_STEMS.map(|stem| self.folder.image(&self.scene.name, stem));
@@ -303,14 +303,14 @@ impl CheckJob<'_> {
                 "{}: check of the reference by {}",
                 self.scene.name, self.contender.label
             ));
-            let mut renderer = make()?;
+            let mut session = make()?;
             let limit = self.reference.own.seconds.map(|seconds| 0.5 * TIME_SHARE * seconds);
             watch.expect(0.0, 2.0 * limit.unwrap_or(0.0));
-            let spp = if limit.is_some() { u32::MAX } else { SPP_WITHOUT_TIME / 2 };
-            let first = self.render(&mut renderer, &paths[0], SEEDS[0], (spp, limit), watch)?;
+            let spp = limit.is_none().then_some(SPP_WITHOUT_TIME / 2);
+            let first = self.render(&mut session, &paths[0], SEEDS[0], (spp, limit), watch)?;
             // The second half has as many samples as the first.
-            let spp = first.sample_count;
-            let second = self.render(&mut renderer, &paths[1], SEEDS[1], (spp, None), watch)?;
+            let spp = Some(first.sample_count);
+            let second = self.render(&mut session, &paths[1], SEEDS[1], (spp, None), watch)?;
             found = [Some(first), Some(second)];
         }
         let [Some(first), Some(second)] = found else {
@@ -336,7 +336,9 @@ impl CheckJob<'_> {
         let found = Metadata::load(&image, path)?;
         let count = found.sample_ranges.first().map_or(0, |range| range.count);
         let range = SampleRange { seed, first: 0, count };
-        let asked = Metadata { sample_ranges: vec![range], ..self.metadata.clone() };
+        // Fits are known only to the renderer, and follow from the rest.
+        let fit_hashes = found.fit_hashes.clone();
+        let asked = Metadata { sample_ranges: vec![range], fit_hashes, ..self.metadata.clone() };
         let is_same = found.differences(&asked).is_empty()
             && found.sample_ranges == asked.sample_ranges
             && found.version == asked.version
@@ -349,28 +351,18 @@ impl CheckJob<'_> {
     /// Renders one half until it has `spp` samples or its passes have taken the limit.
     fn render(
         &self,
-        renderer: &mut Renderer,
+        session: &mut Session,
         path: &Path,
         seed: u32,
-        (spp, limit): (u32, Option<f64>),
+        (samples, seconds): (Option<u32>, Option<f64>),
         watch: &mut Watch<'_>,
     ) -> Result<Half> {
-        renderer.restart(seed)?;
-        let pixels = f64::from(self.scene.film.width) * f64::from(self.scene.film.height);
-        let mut pace = Pace::new(pixels, true);
-        pace.advance(renderer, spp, limit, watch)?;
-        let count = renderer.sample_count();
-        let metadata = Metadata {
-            sample_ranges: vec![SampleRange { seed, first: 0, count }],
-            candidates: renderer.report().candidates,
-            seconds: pace.seconds,
-            gpu_seconds: seconds_of(&renderer.totals().gpu_ms),
-            ..self.metadata.clone()
-        };
-        let mut image = renderer.sums()?.to_image(&[]);
-        metadata.store(&mut image);
+        session.restart(seed)?;
+        watch.run(session, &Rules { samples, seconds, ..Rules::default() }, true)?;
+        let image = session.image(&[])?;
         image.write_exr(path)?;
-        Ok(Half { picture: image.rgb(path)?, sample_count: count, seconds: pace.seconds })
+        let sample_count = session.renderer.sample_count();
+        Ok(Half { picture: image.rgb(path)?, sample_count, seconds: session.seconds() })
     }
 }
 

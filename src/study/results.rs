@@ -13,7 +13,7 @@ use super::{
     overhead::{Overhead, overheads},
     plan::{Plan, PublishedErrors, PublishedOverhead},
     quality::{Figure, THRESHOLDS, Time, TimeToQuality, time_of_run, times_to_quality},
-    record::{Figures, Measurement, Round, Run, SceneRecord, assignments},
+    record::{Measurement, Round, Run, SceneRecord, assignments},
     rule::Rule,
     summary::{Curve, Summary, curves, rules, summaries},
 };
@@ -21,6 +21,7 @@ use crate::{
     error::Result,
     files::{write_json, write_text},
     gpu::Device,
+    session::Figures,
 };
 
 /// Machine, version and command of a study.

@@ -12,7 +12,7 @@ use crate::{
     error::Result,
     film::{Attribute, Image, RgbImage},
     scene::Scene,
-    session::Renderer,
+    session::{Renderer, Session},
 };
 
 /// File stem of the mask: share of the camera rays that hit a surface, in every channel.
@@ -43,7 +43,7 @@ pub struct Parts {
 }
 
 impl Surfaces {
-    /// Reads the mask from `folder` or renders it there; `make` gives a renderer with the layer of
+    /// Reads the mask from `folder` or renders it there; `make` gives a session with the layer of
     /// normals.
     ///
     /// # Errors
@@ -52,7 +52,7 @@ impl Surfaces {
         folder: &Folder,
         scene: &Scene,
         reference: &Reference,
-        make: &mut dyn FnMut() -> Result<Renderer>,
+        make: &mut dyn FnMut() -> Result<Session>,
     ) -> Result<Self> {
         let path = folder.image(&scene.name, STEM);
         let hash = Attribute::Text(scene.hash.clone());
@@ -64,7 +64,7 @@ impl Surfaces {
             Some(image) => image,
             None => {
                 let mut image = Image::new(size.0, size.1);
-                image.insert_triple(["R", "G", "B"], &shares(&mut make()?)?);
+                image.insert_triple(["R", "G", "B"], &shares(&mut make()?.renderer)?);
                 image.attributes.insert(HASH.to_owned(), hash);
                 image.write_exr(&path)?;
                 image

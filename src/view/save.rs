@@ -8,7 +8,7 @@ use std::{
 use crate::{
     error::Result,
     files::write_text,
-    film::{Metadata, SampleRange, Sums, png::write_rgb8},
+    film::{Image, png::write_rgb8},
     scene::Camera,
 };
 
@@ -46,12 +46,8 @@ pub struct Saved<'a> {
     pub size: [u32; 2],
     /// Pixels of the window.
     pub pixels: &'a [[u8; 3]],
-    /// The film to the left.
-    pub sums: &'a Sums,
-    /// Seed of its random numbers.
-    pub seed: u32,
-    /// Other metadata of its file.
-    pub metadata: Metadata,
+    /// The film to the left, with its metadata.
+    pub film: &'a Image,
     /// The camera.
     pub camera: &'a Camera,
 }
@@ -63,11 +59,7 @@ impl Saved<'_> {
     /// [`crate::Error::Io`] with the cause.
     pub fn write(&self, [png, exr, toml]: &[PathBuf; 3]) -> Result<()> {
         write_rgb8(png, self.size[0], self.size[1], self.pixels)?;
-        let mut image = self.sums.to_image(&[]);
-        let count = self.sums.sample_count;
-        let ranges = vec![SampleRange { seed: self.seed, first: 0, count }];
-        Metadata { sample_ranges: ranges, ..self.metadata.clone() }.store(&mut image);
-        image.write_exr(exr)?;
+        self.film.write_exr(exr)?;
         write_text(toml, &camera_toml(self.camera))
     }
 }

@@ -30,7 +30,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    film::{Metadata, Tone},
+    film::Tone,
     gpu::Device,
     scene::Scene,
     session::Settings,
@@ -286,15 +286,6 @@ fn render(
     let Options { device: wanted, validate, settings, spp, tone, folder } = options;
     let display = window.display_handle().map_err(|error| no_window(&error))?.as_raw();
     let device = Device::open_for_display(wanted.as_deref(), validate, display)?;
-    let capabilities = device.capabilities();
-    let metadata = Metadata {
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        scene: scene.name.clone(),
-        scene_hash: scene.hash.clone(),
-        device: capabilities.name.clone(),
-        driver: capabilities.driver.clone(),
-        ..Metadata::default()
-    };
     let projector = Projector::new(&device, [scene.film.width, scene.film.height], inset::SIZE)?;
     let left = Side::new(&device, &scene, None, &settings, None)?;
     let size = window.inner_size();
@@ -302,27 +293,11 @@ fn render(
     let announce = Box::new(move |title| {
         let _ = proxy.send_event(Report::Title(title));
     });
-    let parts = Parts {
-        scene,
-        device: Arc::clone(&device),
-        settings,
-        spp,
-        left,
-        panel,
-        metadata,
-        folder,
-        announce,
-    };
+    let parts =
+        Parts { scene, device: Arc::clone(&device), settings, spp, left, panel, folder, announce };
     let mut worker = Worker::new(parts);
     let result = worker.run();
     device.save_pipeline_cache();
     drop(worker);
-    let messages = device.validation_messages();
-    match messages.first() {
-        Some(first) if result.is_ok() => Err(Error::Vulkan {
-            call: "validation".into(),
-            result: format!("{} messages, the first: {first}", messages.len()),
-        }),
-        _ => result,
-    }
+    result.and_then(|()| device.check_validation())
 }

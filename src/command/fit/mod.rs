@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
 
-use super::progress::{Progress, Standing};
+use super::progress::Progress;
 use crate::{
     error::Result,
     fit::{
@@ -16,6 +16,7 @@ use crate::{
         report::{Description, describe_brdf, describe_environment},
         write_fit,
     },
+    session::Standing,
 };
 
 /// Arguments of `fit`.

@@ -7,7 +7,7 @@ use std::{
 
 use super::{
     super::options::{SceneOptions, parse_crop, parse_duration, parse_pixel, parse_size},
-    DEFAULT_SPP,
+    DEFAULT_SPP, QUICK_SPP,
 };
 use crate::{
     error::{Error, Result},
@@ -16,7 +16,7 @@ use crate::{
     pass::Roulette,
     sampler::{Parameters, Sampler},
     scene::{FilmSettings, Scene},
-    session::Settings,
+    session::{Rules, Settings},
 };
 
 /// Arguments of `render`.
@@ -186,6 +186,19 @@ impl Arguments {
             seen.push((name, path));
         }
         asked.into_iter().filter_map(|(_, path)| path).try_for_each(check_writable)
+    }
+
+    /// Translates the options into stop rules; the default number of samples holds where there is none.
+    pub(super) fn rules(&self) -> Rules {
+        let none = self.time.is_none() && self.error.is_none();
+        let default = if self.quick { QUICK_SPP } else { DEFAULT_SPP };
+        Rules {
+            samples: self.spp.or_else(|| none.then_some(default)),
+            seconds: self.time.map(|time| time.as_secs_f64()),
+            error: self.error,
+            looks: true,
+            checkpoints: None,
+        }
     }
 
     /// Translates the options into renderer settings.

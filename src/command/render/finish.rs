@@ -7,72 +7,20 @@ use crate::{
     command::denoise::{Denoised, denoise},
     error::Result,
     files::is_special_file,
-    film::{
-        Checkpoint, Image, Metadata, SampleRange, Sums, Window, checkpoint::checkpoint_path,
-        metadata::seconds_of, png::write_preview,
-    },
+    film::{Image, checkpoint::checkpoint_path, png::write_preview},
     gpu::Denoiser,
-    session::Renderer,
+    session::Session,
 };
 
 impl RenderJob<'_> {
-    /// Returns the metadata for the samples so far.
-    pub(super) fn metadata(&self, renderer: &Renderer) -> Metadata {
-        Metadata {
-            sample_ranges: vec![SampleRange {
-                seed: self.arguments.seed,
-                first: self.arguments.sample_offset,
-                count: renderer.sample_count(),
-            }],
-            candidates: renderer.report().candidates,
-            seconds: self.seconds(),
-            gpu_seconds: seconds_of(&renderer.totals().gpu_ms),
-            ..self.metadata.clone()
-        }
-    }
-
-    /// Writes a checkpoint. The outer error is the device's, the inner one the disk's.
-    pub(super) fn write_checkpoint(&self, renderer: &Renderer, sums: Sums) -> Result<Result<()>> {
-        let checkpoint = Checkpoint { sums, metadata: self.metadata(renderer) };
-        let path = checkpoint_path(&self.output);
-        Ok(checkpoint.write_with_guide(&path, renderer.guide()?.as_deref()))
-    }
-
     /// Writes the image, then all other files asked for, each of them even if another fails.
     ///
     /// # Errors
     /// The first failure; others are logged.
-    pub(super) fn finish(
-        &mut self,
-        renderer: &Renderer,
-        reason: StopReason,
-        load_ms: f64,
-    ) -> Result<()> {
-        let sums = renderer.sums()?;
-        let totals = renderer.totals();
-        self.warnings.clear();
-        self.warn_of_darkness(": the image is black");
-        if totals.dropped_samples > 0 {
-            self.warn(format!(
-                "{} samples were left out because their radiance was not finite",
-                totals.dropped_samples
-            ));
-        }
-        if let Some([left, top, right, bottom]) = totals.overrun_pixels {
-            let Window { x, y, .. } = self.window;
-            self.warn(format!(
-                "{} rays were given up after too many steps of traversal, where many triangles meet in \
-                 one place: pixels within --crop {},{},{},{} may be wrong",
-                totals.traversal_overruns,
-                left + x,
-                top + y,
-                right + x,
-                bottom + y
-            ));
-        }
-        let metadata = self.metadata(renderer);
-        let mut image = sums.to_image(&self.aovs);
-        metadata.store(&mut image);
+    pub(super) fn finish(&self, session: &Session, reason: StopReason) -> Result<()> {
+        let warnings = session.warnings(self.scene);
+        warnings.iter().for_each(|warning| log::warn!("{warning}"));
+        let image = session.image(&self.aovs)?;
         let mut written = Vec::new();
         let mut failure = None;
         let mut note = |path: &Path, result: Result<()>| match (result, &failure) {
@@ -91,15 +39,18 @@ impl RenderJob<'_> {
         }
         drop(image);
         if let Some(path) = &self.arguments.stats {
-            note(path, self.statistics(renderer, &metadata, reason, load_ms).write(path));
+            let mut statistics = session.statistics(self.scene, reason);
+            statistics.warnings.extend(warnings);
+            statistics.host_ms.insert("load".into(), self.load_ms);
+            note(path, statistics.write(path));
         }
         let is_interrupted = reason == StopReason::Interrupt && !is_special_file(&self.output);
         if is_interrupted || self.arguments.checkpoint_interval.is_some() {
             let path = checkpoint_path(&self.output);
-            note(&path, self.write_checkpoint(renderer, sums).and_then(|written| written));
+            note(&path, session.write_checkpoint(&path).and_then(|written| written));
         }
         if let Some(path) = &self.arguments.save_guide {
-            note(path, renderer.save_guide(path));
+            note(path, session.renderer.save_guide(path));
         }
         if !self.arguments.quiet && !written.is_empty() {
             eprintln!("wrote {}", written.join(", "));

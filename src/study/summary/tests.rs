@@ -2,10 +2,11 @@
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
 use super::*;
+use crate::session::Figures;
 use crate::study::{
     own_errors::OwnErrors,
     plan::{Description, Options},
-    record::{Conditions, Figures},
+    record::Conditions,
 };
 
 fn scene(own_mse: f64) -> SceneRecord {

@@ -3,7 +3,6 @@
 use super::{Motion, Worker};
 use crate::{
     error::Result,
-    film::Metadata,
     sampler::Sampler,
     session::Settings,
     shader::constants::SHOW_PICTURE,
@@ -139,7 +138,7 @@ impl Worker {
 
     /// Keeps what the left side has learned for the next renderer.
     fn keep_guide(&mut self) -> Result<()> {
-        self.guide = self.left.renderer.guide()?.or(self.guide.take());
+        self.guide = self.left.session.renderer.guide()?.or(self.guide.take());
         Ok(())
     }
 
@@ -147,10 +146,10 @@ impl Worker {
     fn make_side(&self, sampler: Sampler) -> Result<Side> {
         (self.announce)(format!("{} | preparing {}", self.scene.name, sampler.name()));
         let settings = Settings { sampler, ..self.settings.clone() };
-        let buffers = Some(self.left.renderer.scene_buffers());
+        let buffers = Some(self.left.session.renderer.scene_buffers());
         let guide = self.guide.as_deref();
         let mut side = Side::new(&self.device, &self.scene, buffers, &settings, guide)?;
-        side.renderer.set_watch(self.watch());
+        side.session.renderer.set_watch(self.watch());
         Ok(side)
     }
 
@@ -163,7 +162,7 @@ impl Worker {
         } else {
             let mut panel = self.panel.borrow_mut();
             panel.projector.set_inset(&Inset::default())?;
-            if self.left.renderer.sample_count() > 0 {
+            if self.left.sample_count() > 0 {
                 panel.present()?;
             }
         }
@@ -172,12 +171,12 @@ impl Worker {
 
     /// Draws what the pixel under the pointer has learned, into the inset.
     pub(super) fn draw_inset(&mut self) -> Result<()> {
-        let film = self.left.renderer.film_size();
+        let film = self.left.session.renderer.film_size();
         let panel = self.panel.borrow();
         let pixel = panel.pointer.and_then(|at| panel.projector.pixel_under(at, film));
         drop(panel);
         let recorded = match pixel {
-            Some(pixel) => self.left.renderer.inspect_pixel(pixel)?,
+            Some(pixel) => self.left.session.renderer.inspect_pixel(pixel)?,
             None => None,
         };
         let drawn = recorded.and_then(|recorded| inset::draw(&self.scene, recorded.as_ref()));
@@ -186,25 +185,15 @@ impl Worker {
 
     /// Writes the window, the film and the camera, and says where.
     pub(super) fn save(&mut self) -> Result<()> {
-        if self.left.renderer.sample_count() == 0 {
+        if self.left.sample_count() == 0 {
             self.saves_at_rest = true;
             return Ok(());
         }
         let (size, pixels) = self.panel.borrow_mut().picture()?;
-        let sums = self.left.renderer.sums()?;
-        let metadata = Metadata {
-            sampler: self.left.sampler.name().to_owned(),
-            sampler_parameters: self.left.sampler.describe(&self.settings.parameters),
-            shadow_rays: self.settings.shadow_rays,
-            depth: self.settings.depth,
-            candidates: self.left.renderer.report().candidates,
-            seconds: self.left.time.as_secs_f64(),
-            ..self.metadata.clone()
-        };
+        let film = self.left.session.image(&[])?;
         let camera = self.rig.camera();
-        let seed = self.left.renderer.seed();
         let files = names(&self.folder, &self.scene.name);
-        let saved = Saved { size, pixels: &pixels, sums: &sums, seed, metadata, camera };
+        let saved = Saved { size, pixels: &pixels, film: &film, camera };
         // A full disk is no reason to lose the picture on the screen.
         match saved.write(&files) {
             Ok(()) => {

@@ -21,7 +21,6 @@ use super::{
 };
 use crate::{
     error::Result,
-    film::Metadata,
     gpu::Device,
     math::random::hash_4d,
     pass::Watch,
@@ -89,7 +88,6 @@ pub struct Worker {
     saves_at_rest: bool,
     looked_at: Option<Instant>,
     mean_radiance: f32,
-    metadata: Metadata,
     folder: PathBuf,
     announce: Box<dyn Fn(String)>,
 }
@@ -108,8 +106,6 @@ pub struct Parts {
     pub left: Side,
     /// The window.
     pub panel: Panel,
-    /// Metadata of the files.
-    pub metadata: Metadata,
     /// Folder of the files that are written.
     pub folder: PathBuf,
     /// Shows a title.
@@ -119,7 +115,7 @@ pub struct Parts {
 impl Worker {
     /// Prepares to render.
     pub fn new(parts: Parts) -> Self {
-        let Parts { scene, device, settings, spp, left, panel, metadata, folder, announce } = parts;
+        let Parts { scene, device, settings, spp, left, panel, folder, announce } = parts;
         let is_software = device.capabilities().kind == "software";
         let mut worker = Self {
             rig: Rig::new(scene.camera),
@@ -143,12 +139,11 @@ impl Worker {
             saves_at_rest: false,
             looked_at: None,
             mean_radiance: 0.0,
-            metadata,
             folder,
             announce,
         };
         let watch = worker.watch();
-        worker.left.renderer.set_watch(watch);
+        worker.left.session.renderer.set_watch(watch);
         worker
     }
 
@@ -215,7 +210,7 @@ impl Worker {
     }
 
     fn is_stopped(&mut self) -> bool {
-        self.sides().any(|side| side.renderer.is_stopped())
+        self.sides().any(|side| side.session.renderer.is_stopped())
     }
 
     /// Width and height of the whole film.
@@ -230,7 +225,7 @@ impl Worker {
         let camera = *self.rig.camera();
         let start = Instant::now();
         for side in self.sides() {
-            side.look(&camera, size, seed, learns)?;
+            side.session.look(&camera, size, seed, learns)?;
         }
         if learns {
             self.learned_at = Instant::now();
@@ -250,7 +245,7 @@ impl Worker {
         self.look(size, learns)?;
         let before = Instant::now();
         for side in self.sides() {
-            side.render(1)?;
+            side.session.pass(1, f64::INFINITY)?;
         }
         let took = before.elapsed().as_secs_f32();
         let wanted = (took / MOVING_TIME.as_secs_f32()).sqrt().clamp(0.7, 2.0);
@@ -267,12 +262,12 @@ impl Worker {
         let spp = self.spp;
         let side = self
             .sides()
-            .filter(|side| side.renderer.sample_count() < spp)
-            .min_by_key(|side| side.time);
+            .filter(|side| side.sample_count() < spp)
+            .min_by(|a, b| a.session.seconds().total_cmp(&b.session.seconds()));
         let Some(side) = side else { return Ok(false) };
-        let most = spp - side.renderer.sample_count();
-        side.render(most)?;
-        if !side.renderer.is_stopped() {
+        let most = spp - side.sample_count();
+        side.session.pass(most, f64::INFINITY)?;
+        if !side.session.renderer.is_stopped() {
             self.show()?;
             if self.saves_at_rest && self.motion == Motion::Rest {
                 self.saves_at_rest = false;
@@ -286,8 +281,8 @@ impl Worker {
     fn show(&mut self) -> Result<()> {
         let layer = self.panel.borrow().layer;
         let is_due = self.looked_at.is_none_or(|at| at.elapsed() >= LOOK_INTERVAL);
-        if is_due && layer == SHOW_ERROR && self.left.renderer.sample_count() > 0 {
-            let sums = self.left.renderer.sums()?;
+        if is_due && layer == SHOW_ERROR && self.left.sample_count() > 0 {
+            let sums = self.left.session.renderer.sums()?;
             let total: f64 =
                 (0..sums.pixel_count()).map(|i| sums.mean(i).iter().sum::<f64>()).sum();
             self.mean_radiance = (total / (3.0 * sums.pixel_count() as f64)) as f32;
@@ -303,8 +298,8 @@ impl Worker {
         for (side, place) in [(Some(&self.left), Place::Left), (self.right.as_ref(), Place::Right)]
         {
             // A film without a sample goes on showing what was there before.
-            if let Some(side) = side.filter(|side| side.renderer.sample_count() > 0) {
-                panel.projector.show(&side.renderer, place, side.layer(layer), mean)?;
+            if let Some(side) = side.filter(|side| side.sample_count() > 0) {
+                panel.projector.show(&side.session.renderer, place, side.layer(layer), mean)?;
             }
         }
         panel.present()?;
@@ -316,8 +311,8 @@ impl Worker {
     /// One line about what is shown.
     fn title(&self) -> String {
         let describe = |side: &Side| {
-            let samples = side.renderer.sample_count();
-            format!("{} {samples} spp {:.1} s", side.sampler.name(), side.time.as_secs_f64())
+            let samples = side.sample_count();
+            format!("{} {samples} spp {:.1} s", side.sampler.name(), side.session.seconds())
         };
         let mut title = format!("{} | {}", self.scene.name, describe(&self.left));
         if let Some(right) = &self.right {

@@ -1,0 +1,235 @@
+//! Progressive rendering of a scene on a device.
+
+use std::{any::Any, collections::BTreeMap, sync::Arc};
+
+use super::{Settings, window_of};
+use crate::{
+    error::{Error, Result},
+    film::Sums,
+    gpu::{Device, PassTimes},
+    pass::{
+        PassSettings, Progress, Report, Runner, SceneBuffers, Schedule, Technique, Totals,
+        film_buffers::{aov_bits, check_memory},
+        wave_buffers::most_paths,
+    },
+    sampler::Context,
+    scene::Scene,
+    shader::structs::Wave,
+};
+
+/// Fewest paths in flight to try where memory does not suffice for more.
+const FEWEST_PATHS: u32 = 1 << 9;
+/// Factor between two tries.
+const PATHS_STEP: u32 = 1 << 4;
+
+/// A scene on a device, and the film it is rendered to.
+pub struct Renderer {
+    pub(super) runner: Runner,
+    pub(super) technique: Box<dyn Technique>,
+    pub(super) settings: Settings,
+    pub(super) film_size: [u32; 2],
+    pub(super) sample_count: u32,
+}
+
+impl Renderer {
+    /// Uploads `scene` and prepares to render it. Fails if an option is out of range, memory runs
+    /// out or a limit of the device is exceeded.
+    pub fn new(device: &Arc<Device>, scene: &Scene, settings: Settings) -> Result<Self> {
+        let window = window_of(&settings, scene);
+        settings.check([scene.film.width, scene.film.height])?;
+        let buffers = Arc::new(SceneBuffers::new(device, scene, window)?);
+        Self::with_scene_buffers(device, buffers, scene, settings)
+    }
+
+    /// As [`Renderer::new`], sharing buffers of the same scene and window.
+    ///
+    /// # Panics
+    /// If the buffers were made for another window.
+    pub fn with_scene_buffers(
+        device: &Arc<Device>,
+        buffers: Arc<SceneBuffers>,
+        scene: &Scene,
+        settings: Settings,
+    ) -> Result<Self> {
+        let film_size = [scene.film.width, scene.film.height];
+        settings.check(film_size)?;
+        assert_eq!(window_of(&settings, scene), buffers.window(), "buffers belong to one window");
+
+        let surfaces = buffers.surfaces();
+        let shares = settings.depth > 1 && surfaces.has_base();
+        let tile_edge = settings.sampler.tile_edge(&settings.parameters);
+        let tile_edge = if shares { tile_edge } else { 1 };
+        let passes = PassSettings {
+            shadow_rays: settings.shadow_rays,
+            depth: settings.depth,
+            aovs: aov_bits(&settings.aovs),
+            roulette: settings.roulette,
+            path_lists: settings.path_lists,
+            tile_edge,
+            surfaces,
+            traversal: buffers.geometry().traversal(),
+            incoherent: Schedule::incoherent(device.capabilities()),
+            film_page_bytes: settings.film_page_bytes,
+            most_paths: most_paths(device.capabilities()),
+        };
+        check_memory(device, buffers.window(), passes.aovs)?;
+        let demand = settings.sampler.demand(&settings.parameters, settings.shadow_rays);
+        let attempt = |most_paths| -> Result<_> {
+            let passes = PassSettings { most_paths, ..passes };
+            let mut runner = Runner::new(device, Arc::clone(&buffers), passes, demand)?;
+            let context = Context { scene, parameters: &settings.parameters, runner: &runner };
+            let technique = settings.sampler.technique(context)?;
+            runner.warm_up(technique.as_ref())?;
+            Ok((runner, technique))
+        };
+        let mut most_paths = passes.most_paths;
+        let (runner, technique) = loop {
+            match attempt(most_paths) {
+                Err(Error::Memory { message, .. }) if most_paths > FEWEST_PATHS => {
+                    most_paths /= PATHS_STEP;
+                    log::warn!("{message}; trying with {most_paths} paths at a time");
+                }
+                result => break result?,
+            }
+        };
+        Ok(Self { runner, technique, settings, film_size, sample_count: 0 })
+    }
+
+    pub(super) fn progress(&self) -> Progress {
+        Progress {
+            first_sample: self.settings.first_sample,
+            sample_count: self.sample_count,
+            seed: self.settings.seed,
+        }
+    }
+
+    /// Adds `samples` samples to every pixel. Fails if the device does.
+    pub fn render_pass(&mut self, samples: u32) -> Result<()> {
+        let mut left = samples;
+        while left > 0 {
+            let progress = self.progress();
+            let together = self.runner.samples_per_wave().clamp(1, left);
+            let together = together.min(self.technique.learn(&mut self.runner, &progress)?);
+            if self.runner.is_stopped() {
+                return Ok(());
+            }
+            let wave = Wave {
+                first_sample: progress.next_sample(),
+                sample_count: together,
+                seed: progress.seed,
+                pixel_stride: 1,
+                ..Wave::default()
+            };
+            let wave = self.technique.complete(wave, &progress);
+            let pixels = self.runner.film().padded_pixels();
+            self.runner.sweep(self.technique.as_ref(), wave, pixels)?;
+            self.runner.take_counters()?;
+            if self.runner.is_stopped() {
+                return Ok(());
+            }
+            self.sample_count += together;
+            left -= together;
+        }
+        Ok(())
+    }
+
+    /// Empties the film to render with another seed. The technique forgets what it learned: every
+    /// run pays for its own learning. Fails if the device does.
+    pub fn restart(&mut self, seed: u32) -> Result<()> {
+        self.runner.restart()?;
+        self.technique.restart(&mut self.runner)?;
+        self.settings.seed = seed;
+        self.sample_count = 0;
+        Ok(())
+    }
+
+    /// Continues from the sums of an earlier renderer with the same settings.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if window or layers differ, or if the next sample depends on more than the
+    /// sums; [`Error::Vulkan`] if the device fails.
+    pub fn restore(&mut self, sums: &Sums) -> Result<()> {
+        self.technique.check_resume(sums.sample_count, &self.progress())?;
+        let window = self.runner.scene().window();
+        if sums.film_size != self.film_size
+            || sums.origin != [window.x, window.y]
+            || [sums.width, sums.height] != [window.width, window.height]
+        {
+            return Err(Error::usage(format!(
+                "the checkpoint holds pixels {}x{} from {:?} of a film of {:?}, expected {}x{} from \
+                 {:?} of {:?}",
+                sums.width,
+                sums.height,
+                sums.origin,
+                sums.film_size,
+                window.width,
+                window.height,
+                [window.x, window.y],
+                self.film_size
+            )));
+        }
+        self.runner.film().upload(sums)?;
+        self.sample_count = sums.sample_count;
+        Ok(())
+    }
+
+    /// Returns the technique if it is a `T`.
+    pub fn technique<T: Technique>(&self) -> Option<&T> {
+        (self.technique.as_ref() as &dyn Any).downcast_ref()
+    }
+
+    /// Calls `work` with technique, runner and progress if the technique is a `T`.
+    pub fn with_technique<T: Technique, R>(
+        &mut self,
+        work: impl FnOnce(&mut T, &mut Runner, &Progress) -> R,
+    ) -> Option<R> {
+        let progress = self.progress();
+        let technique = (self.technique.as_mut() as &mut dyn Any).downcast_mut()?;
+        Some(work(technique, &mut self.runner, &progress))
+    }
+
+    /// Settings of the render; its seed is that of the film.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Samples per pixel in the film.
+    pub fn sample_count(&self) -> u32 {
+        self.sample_count
+    }
+
+    /// Counts and device times so far.
+    pub fn totals(&self) -> &Totals {
+        self.runner.totals()
+    }
+
+    /// Milliseconds that the first use of each pass took, and the creation of all as `pipelines`.
+    pub fn compile_ms(&self) -> &PassTimes {
+        self.runner.compile_ms()
+    }
+
+    /// Figures of the technique.
+    pub fn report(&self) -> Report {
+        self.technique.report()
+    }
+
+    /// Host milliseconds by stage, including those of the technique.
+    pub fn host_ms(&self) -> BTreeMap<String, f64> {
+        let mut host_ms = self.runner.scene().host_ms().clone();
+        host_ms.extend(self.report().host_ms);
+        host_ms
+    }
+
+    /// Device memory by buffer, bytes.
+    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+        let mut bytes = self.runner.buffer_bytes();
+        bytes.extend(self.report().buffer_bytes);
+        bytes
+    }
+
+    /// Reads the film. Fails if the device does.
+    pub fn sums(&self) -> Result<Sums> {
+        let sums = self.runner.sums()?;
+        Ok(Sums { film_size: self.film_size, sample_count: self.sample_count, ..sums })
+    }
+}

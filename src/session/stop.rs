@@ -1,0 +1,91 @@
+//! Rules that end a run, and how far it is from them.
+
+use std::{fmt, path::PathBuf, time::Duration};
+
+/// When a run ends, at the first rule that is met, and what happens on its way. Without any rule it ends
+/// at the last sample of the seed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Rules {
+    /// Camera paths per pixel, those of earlier runs included.
+    pub samples: Option<u32>,
+    /// Wall time of the passes, those of earlier runs included, seconds.
+    pub seconds: Option<f64>,
+    /// Mean relative standard error. Slightly biased, since the data decide when to stop; a black film has
+    /// no error and never stops.
+    pub error: Option<f64>,
+    /// True to look at the film about once a second, for the error and [`Event::Look`](super::Event).
+    pub looks: bool,
+    /// File and interval of checkpoints.
+    pub checkpoints: Option<(PathBuf, Duration)>,
+}
+
+/// Rule that ended a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopReason {
+    /// The film has the samples.
+    Samples,
+    /// The passes have taken the time.
+    Time,
+    /// The error is small enough.
+    Error,
+    /// The seed has no more samples.
+    LastSample,
+    /// The observer interrupts the run.
+    Interrupt,
+}
+
+impl StopReason {
+    /// Name in statistics.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Samples => "spp",
+            Self::Time => "time",
+            Self::Error => "error",
+            Self::LastSample => "last-sample",
+            Self::Interrupt => "interrupt",
+        }
+    }
+}
+
+/// State of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Standing {
+    /// Fraction done, 0…1, by the stop rule that is nearest to being met.
+    pub fraction: f64,
+    /// Camera paths per pixel so far.
+    pub samples: u32,
+    /// Rays per second so far; 0 if unknown.
+    pub rays_per_second: f64,
+    /// Mean relative standard error, if known.
+    pub relative_error: Option<f64>,
+}
+
+impl fmt::Display for Standing {
+    /// Formats "64 spp, 3.21 Mrays/s, error 4.20%", leaving out zeros and unknowns.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let error = self.relative_error.filter(|error| error.is_finite());
+        let parts = [
+            (self.samples > 0).then(|| format!("{} spp", self.samples)),
+            (self.rays_per_second > 0.0)
+                .then(|| format!("{:.2} Mrays/s", self.rays_per_second * 1e-6)),
+            error.map(|error| format!("error {:.2}%", 100.0 * error)),
+        ];
+        formatter.write_str(&parts.into_iter().flatten().collect::<Vec<_>>().join(", "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn standing_leaves_out_what_is_unknown() {
+        let mut standing = Standing { samples: 64, ..Standing::default() };
+        assert_eq!(standing.to_string(), "64 spp");
+        standing.rays_per_second = 3.21e6;
+        standing.relative_error = Some(0.042);
+        assert_eq!(standing.to_string(), "64 spp, 3.21 Mrays/s, error 4.20%");
+        standing.relative_error = Some(f64::INFINITY);
+        assert_eq!(standing.to_string(), "64 spp, 3.21 Mrays/s");
+    }
+}
