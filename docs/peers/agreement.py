@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compares Fenestra's pictures with Mitsuba 3's renderings of `fenestra export`.
 
-    python3 docs/peers/agreement.py [--fenestra target/release/fenestra] [--table]
+    python3 docs/peers/agreement.py [--fenestra target/release/fenestra]
     python3 docs/peers/agreement.py --file scene.xml [--ours FILE] [--depth 12] [--width 96]
                                     [--keep FOLDER]
 
@@ -371,7 +371,6 @@ def main():
     parser.add_argument("--variant", default="scalar_rgb")
     parser.add_argument("--samples", default=128, type=int, help="Fenestra's; Mitsuba takes 4 times as many")
     parser.add_argument("--only", default="", help="regular expression for the names of scenes")
-    parser.add_argument("--table", action="store_true", help="write the table into docs/peers.md")
     parser.add_argument("--file", type=pathlib.Path, help="Mitsuba file to render with both")
     parser.add_argument("--ours", type=pathlib.Path, help="file for Fenestra, with --file")
     parser.add_argument("--depth", default=12, type=int, help="path vertices, with --file")
@@ -394,7 +393,7 @@ def main():
         with tempfile.TemporaryDirectory() as name:
             return compare_file(mi, np, arguments, pathlib.Path(name))
     version = subprocess.run([arguments.fenestra, "--version"], capture_output=True, text=True).stdout
-    lines = [
+    head = [
         f"{datetime.date.today()}, {version.strip()}, Mitsuba {mi.__version__} ({arguments.variant}), "
         f"{SIZE[0]}×{SIZE[1]} pixels, {SEEDS} seeds of {arguments.samples} and "
         f"{4 * arguments.samples} samples per pixel.",
@@ -406,7 +405,7 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         write_inputs(folder)
-        print("\n".join(lines))
+        print("\n".join(head))
         for case in SCENES:
             if not re.search(arguments.only, case[0]):
                 continue
@@ -415,15 +414,8 @@ def main():
             same = case[3]
             failed = same and (abs(ratio - 1) > max(TOLERANCE, 4 * error) or is_far)
             failures += failed
-            lines.append(f"| {case[0]} | {'yes' if same else 'no'} | {ratio:.4f} | {error:.4f} | "
-                         f"{low:.3f} to {high:.3f} |")
-            print(lines[-1] + (" FAILED" if failed else ""), flush=True)
-    if arguments.table:
-        page = root / "docs/peers.md"
-        block = "<!-- agreement -->\n" + "\n".join(lines) + "\n<!-- end of agreement -->"
-        text = page.read_text()
-        page.write_text(re.sub(r"<!-- agreement -->.*?<!-- end of agreement -->", lambda _: block,
-                               text, flags=re.S))
+            print(f"| {case[0]} | {'yes' if same else 'no'} | {ratio:.4f} | {error:.4f} | "
+                  f"{low:.3f} to {high:.3f} |" + (" FAILED" if failed else ""), flush=True)
     return 1 if failures else 0
 
 
