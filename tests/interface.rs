@@ -2,10 +2,8 @@
 //! declarations of `src/shader` is read back and compared with the Rust types.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support::page;
 use std::{
     collections::{BTreeMap, BTreeSet, HashMap},
-    fmt::Write,
     fs,
     path::Path,
 };
@@ -401,23 +399,6 @@ fn shaders_use_the_declared_buffers_of_one_table_a_set() {
     for (place, binding) in declared {
         assert!(used.contains(&place), "{}: no shader uses it", binding.name);
     }
-}
-
-#[test]
-fn the_page_lists_every_buffer() {
-    let mut text =
-        String::from("| set, binding | name | elements | content |\n|---|---|---|---|\n");
-    for binding in TABLES.iter().flat_map(|table| table.bindings) {
-        let Binding { set, number, kind, about, .. } = binding;
-        let elements = match kind {
-            Kind::One(element) => format!("one `{element}`"),
-            Kind::Array(element) => format!("`{element}[]`"),
-            Kind::Texels(format) => format!("texels {format:?}"),
-        };
-        let name = binding.glsl_name();
-        writeln!(text, "| {set}, {number} | `{name}` | {elements} |{about} |").unwrap();
-    }
-    page::check("buffers.md", "buffers", &text);
 }
 
 #[test]

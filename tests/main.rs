@@ -52,6 +52,7 @@ mod look;
 mod mesh_materials;
 mod mitsuba;
 mod new;
+mod pages;
 mod passes;
 mod pbrt;
 mod pixel;

@@ -22,7 +22,7 @@ impl Support {
         match self {
             Self::Done => "done",
             Self::Mapped => "mapped",
-            Self::Ignored => "ignored with a warning",
+            Self::Ignored => "warning",
             Self::Refused => "refused",
         }
     }
