@@ -1,12 +1,9 @@
-//! `docs/scene_file.md` follows the structs that the parser of scene files reads, and its first scene
-//! renders as printed.
+//! `docs/scene_file.md` follows the structs that the parser of scene files reads.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
 use crate::support::page;
 use std::{fmt::Write, fs, path::Path};
-
-use crate::support::command::Folder;
 
 /// A key of a table of the scene file.
 struct Key {
@@ -277,20 +274,4 @@ fn declarations_are_read_with_their_defaults() {
                     | `at` | three numbers | required | Place, metres. |\n\
                     | `power` | number | 2.5 | Power. |\n| `type` | number | bright | Kind. |\n";
     assert_eq!(table(all, "Lamp"), expected);
-}
-
-#[test]
-fn the_first_scene_is_that_of_new_and_renders_as_printed() {
-    let scene = fs::read_to_string(
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("src/command/first_scene.toml"),
-    );
-    page::check("scene_file.md", "first scene", &format!("```toml\n{}```\n", scene.unwrap()));
-    let page = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/scene_file.md"));
-    let page = page.unwrap();
-    let folder = Folder::new();
-    let printed = between(&page, "<!-- first scene -->\n```toml\n", "```").unwrap();
-    folder.write("scene.toml", printed);
-    let run = folder.run(&["render", "scene.toml", "--size=16x12", "--spp=1", "-o", "a.exr"]);
-    run.assert(0, &[]);
-    assert!(folder.path().join("a.exr").exists());
 }
