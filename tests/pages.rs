@@ -16,7 +16,7 @@ fn root() -> &'static Path {
 }
 
 fn files_of(folder: &str) -> Vec<PathBuf> {
-    let entries = fs::read_dir(root().join(folder)).unwrap();
+    let entries = fs::read_dir(root().join(folder)).into_iter().flatten();
     entries.map(|entry| entry.unwrap().path()).collect()
 }
 
