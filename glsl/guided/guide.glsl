@@ -3,6 +3,7 @@
 //
 // A pass reads only tables from earlier passes, so no density changes while it runs.
 
+#include "once.glsl"
 #include "regions.glsl"
 #include "vertex.glsl"
 
@@ -125,16 +126,13 @@ GuideCell guide_cell(vec3 position, uint face, uint bits) {
     uint level = guide_level(position, bits);
     uint key = guide_key(position, face, level);
     GuideCell cell = GuideCell(key, guide_find(key));
-    // Loop instead of branching: some devices pay for the body of a branch everywhere.
-    bool is_missing = cell.found == GUIDE_NO_KEY;
-    while (is_missing) {
+    ONCE_IF(cell.found == GUIDE_NO_KEY) {
         guide_note_missing(key);
         cell.key = guide_coarse_key(key);
         cell.found = guide_find(cell.key);
         if (cell.found == GUIDE_NO_KEY) {
             cell = GuideCell(GUIDE_NO_KEY, face);
         }
-        is_missing = false;
     }
     bool has_parts = (cell.found & GUIDE_REFINED) != 0u;
     while (has_parts && level > 0u) {

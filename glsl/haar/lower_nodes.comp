@@ -9,6 +9,7 @@
 #include "frame.glsl"
 #include "haar/sums.glsl"
 #include "load.glsl"
+#include "once.glsl"
 #include "wave.glsl"
 
 TEXELS(haar_centres)
@@ -68,7 +69,7 @@ void main() {
             for (uint k = 0u; k < 4u; ++k) {
                 vec3 centre = texelFetch(haar_centres, int(4u * quad + k)).xyz;
                 bool near = reflectances[k] > 0.0 && is_near(centre, direction);
-                for (uint once = near ? 1u : 0u; once > 0u; --once) {
+                ONCE_IF(near) {
                     reflectances[k] *= next_factor(path, path_count, recorded, centre);
                     has_near = true;
                 }

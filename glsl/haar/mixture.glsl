@@ -5,6 +5,7 @@
 // needs a BRDF that its samples do not miss.
 
 #include "haar/nodes.glsl"
+#include "once.glsl"
 #include "product/numbers.glsl"
 #include "vertex.glsl"
 
@@ -39,21 +40,20 @@ NodeSample haar_sample(Vertex vertex, HaarMixture mixture, MixtureNumbers number
     bool from_environment =
         !from_nodes && numbers.technique < mixture.node_share + mixture.environment_share;
     NodeSample drawn = NodeSample(vertex.frame.normal, 0.0);
-    // Loops of at most one round instead of branches: devices that run both sides of a branch skip them.
-    for (uint once = from_nodes ? 1u : 0u; once > 0u; --once) {
+    ONCE_IF(from_nodes) {
         drawn = nodes_sample(
             mixture.path, mixture.path_count, mixture.total, numbers.direction);
     }
-    for (uint once = from_environment ? 1u : 0u; once > 0u; --once) {
+    ONCE_IF(from_environment) {
         drawn.direction = environment_sample(numbers.direction).direction;
     }
-    for (uint once = from_nodes || from_environment ? 0u : 1u; once > 0u; --once) {
+    ONCE_IF(!from_nodes && !from_environment) {
         drawn.direction = to_world(
             vertex.frame,
             brdf_sample(
                 vertex.material, vertex.outgoing_local, vec3(numbers.direction, numbers.lobe)));
     }
-    for (uint once = from_nodes ? 0u : 1u; once > 0u; --once) {
+    ONCE_IF(!from_nodes) {
         drawn.pdf =
             nodes_pdf(mixture.path, mixture.path_count, mixture.total, drawn.direction);
     }

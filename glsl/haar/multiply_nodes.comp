@@ -6,6 +6,7 @@
 #include "haar/sums.glsl"
 #include "hit_surface.glsl"
 #include "load.glsl"
+#include "once.glsl"
 #include "wave.glsl"
 
 TEXELS(haar_centres)
@@ -38,8 +39,7 @@ void main() {
                 vec3 centre_local = to_local(frame, centre);
                 bool is_above = centre_local.z > -node_radius() && light[k] > 0.0
                     && dot(hit.geometric_normal, centre) > -node_radius();
-                // A loop of at most one round: devices that run both sides of a branch skip it.
-                for (uint once = is_above ? 1u : 0u; once > 0u; --once) {
+                ONCE_IF(is_above) {
                     reflectances[k] = node_reflectance(material, outgoing_local, centre_local);
                 }
             }

@@ -78,17 +78,16 @@ vec3 mixture_sample(Vertex vertex, Mixture mixture, uint ray, MixtureNumbers num
     bool from_environment =
         !from_lobe && numbers.technique < mixture.lobe_share + mixture.environment_share;
     vec3 direction = vertex.frame.normal;
-    // Loops of at most one round instead of branches: devices that run both sides of a branch skip them.
-    for (uint once = from_lobe ? 1u : 0u; once > 0u; --once) {
+    ONCE_IF(from_lobe) {
         uint l = find_lobe(mixture.lobes, numbers.lobe * mixture.total);
         chosen_lobe = l;
         ProductLobe lobe = unpack_lobe(lobe_words(mixture.lobes, l));
         direction = draw_from_lobe(vertex, ray, lobe, numbers.direction);
     }
-    for (uint once = from_environment ? 1u : 0u; once > 0u; --once) {
+    ONCE_IF(from_environment) {
         direction = environment_sample(numbers.direction).direction;
     }
-    for (uint once = from_lobe || from_environment ? 0u : 1u; once > 0u; --once) {
+    ONCE_IF(!from_lobe && !from_environment) {
         direction = to_world(
             vertex.frame,
             brdf_sample(

@@ -3,14 +3,14 @@
 //
 // Selects pairs stronger than about the n-th strongest. Guesses that threshold from every eighth
 // pair and corrects it in rounds over all pairs, noting the stronger ones as bits. Strengths are
-// logarithms; ordering by integral costs another one per pair. Loops of no rounds skip environment
-// lobes below the horizon: they end early on devices that run both sides of a branch.
+// logarithms; ordering by integral costs another one per pair.
 //
 // Deviation: by integral, a lobe's weight is its integral above the horizon [Tokuyoshi 2022], not over
 // the sphere, since directions drawn below are lost. By coefficient it is that over the sphere.
 #version 460
 
 #include "load.glsl"
+#include "once.glsl"
 #include "product/lobes.glsl"
 #include "visibility/cache.glsl"
 #include "wave.glsl"
@@ -113,12 +113,12 @@ float part_above_horizon(float bandwidth, float cosine) {
     return kernel_part_of_ratio(bandwidth, ratio);
 }
 
-// Returns 1 for an environment lobe with a part above the horizon, else 0.
-uint is_above_horizon(vec4 environment, vec3 normal) {
+// Tests whether an environment lobe has a part above the horizon.
+bool is_above_horizon(vec4 environment, vec3 normal) {
     float bandwidth = length(environment.xyz);
     float cosine = dot(environment.xyz, normal);
     float sine = sqrt(max(bandwidth * bandwidth - cosine * cosine, 0.0));
-    return cosine < 0.0 && bandwidth - sine > BELOW_HORIZON ? 0u : 1u;
+    return !(cosine < 0.0 && bandwidth - sine > BELOW_HORIZON);
 }
 
 void load_group(View view, uint group) {
@@ -150,7 +150,7 @@ Guess guess(View view, float bound) {
                 uint e = stretch + (5u * i + 3u * (stretch / GUESS_STRIDE)) % GUESS_STRIDE;
                 vec4 environment = environment_exponents(min(e, ENVIRONMENT_LOBES - 1u));
                 bool counts =
-                    e < ENVIRONMENT_LOBES && is_above_horizon(environment, view.normal) > 0u;
+                    e < ENVIRONMENT_LOBES && is_above_horizon(environment, view.normal);
                 float strength = counts ? strength_of(environment, brdf[i]) : NO_STRENGTH;
                 strongest = max(strongest, strength);
                 histogram[uint(clamp((bound - strength) * BINS_PER_E_FOLD, 0.0, float(BINS - 1u)))] += 1u;
@@ -191,7 +191,7 @@ uint note_stronger(View view, float threshold) {
         for (uint e = 0u; e < ENVIRONMENT_LOBES; ++e) {
             vec4 environment = environment_exponents(e);
             uint bits = 0u;
-            for (uint once = is_above_horizon(environment, view.normal); once > 0u; --once) {
+            ONCE_IF(is_above_horizon(environment, view.normal)) {
                 float left = threshold - environment.w;
                 for (uint i = 0u; i < GROUP; ++i) {
                     bits |= is_stronger(environment.xyz, brdf[i], left) ? 1u << i : 0u;
@@ -314,8 +314,7 @@ void main() {
         uvec2 words = pack_lobe(ProductLobe(axis, drawn_bandwidth, min(weight, 6e4)));
         sum += unpackHalf2x16(words.y).y;
         lobes[l * path_count + path] = words;
-        // A loop of no rounds instead of a branch, as above.
-        for (uint once = is_sum_kept(l, count) ? 1u : 0u; once > 0u; --once) {
+        ONCE_IF(is_sum_kept(l, count)) {
             lobe_sums[l / LOBES_PER_SUM * path_count + path] = sum;
         }
     }

@@ -55,22 +55,20 @@ void main() {
         shadow_rays[i * path_count + path] = ray;
         visibility[i * path_count + path] = is_visible ? 1u : 0u;
 
-        // Loops of at most one round instead of branches: devices that run both sides of a branch skip
-        // them.
-        for (uint once = running ? 1u : 0u; once > 0u; --once) {
+        ONCE_IF(running) {
             COUNT_GIVEN_UP(path);
         }
         // Only the pixel's next sample can use the last ray of a hit.
         bool is_last = index + 1u == wave.total_shadow_rays;
         bool is_learned = is_traced && !is_visible && (CACHE_OF_PIXEL != 0u || !is_last);
-        for (uint once = is_learned ? 1u : 0u; once > 0u; --once) {
+        ONCE_IF(is_learned) {
             record_blocked(mixture.lobes, ray.direction);
             set_shares(mixture);
             grown = is_last ? CACHE_GROWN : 0u;
         }
     }
     uint recorded = mixture.lobes.recorded - recorded_before;
-    for (uint once = recorded > 0u ? 1u : 0u; once > 0u; --once) {
+    ONCE_IF(recorded > 0u) {
         store_weights(mixture.lobes, grown);
         atomicAdd(counters.cache_entries, recorded);
         atomicAdd(counters.cdf_rebuilds, grown != 0u ? recorded - 1u : recorded);
