@@ -7,7 +7,7 @@
 #version 460
 
 #include "lamps.glsl"
-#include "path_list.glsl"
+#include "reservoir.glsl"
 #include "vertex.glsl"
 
 layout(constant_id = CONSTANT_LAMP_CANDIDATES) const uint LAMP_CANDIDATES = 4u;
@@ -18,21 +18,16 @@ const uint DIMENSION_LAMP = 0x4000000u;
 const uint DIMENSIONS_PER_LAMP_RAY = 2u * LAMP_CANDIDATES + 1u;
 const uint DIMENSIONS_PER_LAMP_VERTEX = 2048u * DIMENSIONS_PER_LAMP_RAY;
 
-void sample_path(uint path) {
-    Hit hit = load_hit(path);
-    if (hit.material == NO_MATERIAL) {
-        return;
-    }
-    Vertex vertex = load_vertex(path, hit);
+void sample_vertex(uint path, Vertex vertex) {
+    Hit hit = vertex.hit;
     uint dimension = DIMENSION_LAMP + wave.vertex * DIMENSIONS_PER_LAMP_VERTEX
         + wave.first_shadow_ray * DIMENSIONS_PER_LAMP_RAY;
     uint strata = LAMP_CANDIDATES * wave.total_shadow_rays;
     uint number = vertex.index.sample_index;
-    float u_choice = random_1d(vertex.index.pixel, number, dimension, wave.seed);
+    Reservoir reservoir =
+        reservoir_start(random_1d(vertex.index.pixel, number, dimension, wave.seed));
     vec3 chosen_to_lamp = vec3(0.0);
     vec3 chosen_contribution = vec3(0.0);
-    float chosen_target = 0.0;
-    float sum = 0.0;
     for (uint c = 0u; c < LAMP_CANDIDATES; ++c) {
         uint own = dimension + 1u + 2u * c;
         uvec2 bits = random_bits_2d(vertex.index.pixel, number, own, wave.seed);
@@ -51,19 +46,13 @@ void sample_path(uint path) {
             ? value * lamp.radiance_over_pdf * (incident_local.z * weight)
             : vec3(0.0);
         float target = luminance(contribution);
-        sum += target;
-        if (target > 0.0) {
-            float probability = target / sum;
-            bool is_chosen = u_choice < probability;
-            u_choice = is_chosen ? u_choice / probability
-                                 : (u_choice - probability) / max(1.0 - probability, 1e-7);
-            chosen_to_lamp = is_chosen ? lamp.to_lamp : chosen_to_lamp;
-            chosen_contribution = is_chosen ? contribution : chosen_contribution;
-            chosen_target = is_chosen ? target : chosen_target;
+        if (reservoir_takes(reservoir, target, target)) {
+            chosen_to_lamp = lamp.to_lamp;
+            chosen_contribution = contribution;
         }
     }
-    float factor = chosen_target > 0.0 ? sum / (float(LAMP_CANDIDATES) * chosen_target) : 0.0;
+    float factor = reservoir_factor(reservoir, LAMP_CANDIDATES);
     write_ray(path, chosen_to_lamp, chosen_contribution * factor);
 }
 
-WALK_PATHS(sample_path)
+WALK_VERTICES(sample_vertex)

@@ -17,6 +17,7 @@
 // expects, sqrt(v (1 - h)^2 + (1 - v) h^2). The paper follows the light alone (`control-choice=off`).
 
 #include "layout.glsl"
+#include "reservoir.glsl"
 
 layout(constant_id = CONSTANT_CONTROL_SHARE) const float CONTROL_SHARE = 1.0;
 layout(constant_id = CONSTANT_CONTROL_BITS) const bool CONTROL_BITS = true;
@@ -27,15 +28,12 @@ const float LEAST_DOUBT = 0.01;
 
 struct Controlled {
     vec3 direction;
-    // Weight and control of the chosen candidate, and what it was chosen in proportion to.
+    // Weight and control of the chosen candidate.
     vec3 weight;
     float control;
-    float target;
-    // Sums over all candidates.
-    float target_sum;
+    // Sum over all candidates.
     vec3 control_sum;
-    // Random number, rescaled after each choice for the next.
-    float u;
+    Reservoir reservoir;
 };
 
 // h where a share `visibility` of the rays is visible.
@@ -52,7 +50,7 @@ float doubt(float visibility, float control) {
 }
 
 Controlled controlled_start(float u) {
-    return Controlled(vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0, vec3(0.0), u);
+    return Controlled(vec3(0.0), vec3(0.0), 0.0, vec3(0.0), reservoir_start(u));
 }
 
 void controlled_add(inout Controlled chosen, vec3 direction, vec3 weight, float visibility) {
@@ -60,27 +58,16 @@ void controlled_add(inout Controlled chosen, vec3 direction, vec3 weight, float 
     chosen.control_sum += weight * control;
     float target =
         dot(weight, LUMINANCE_WEIGHTS) * (CONTROL_CHOICE ? doubt(visibility, control) : 1.0);
-    chosen.target_sum += target;
-    if (target > 0.0) {
-        float probability = target / chosen.target_sum;
-        if (chosen.u < probability) {
-            chosen.u /= probability;
-            chosen.direction = direction;
-            chosen.weight = weight;
-            chosen.control = control;
-            chosen.target = target;
-        } else {
-            chosen.u = (chosen.u - probability) / (1.0 - probability);
-        }
+    if (reservoir_takes(chosen.reservoir, target, target)) {
+        chosen.direction = direction;
+        chosen.weight = weight;
+        chosen.control = control;
     }
 }
 
 // w_i / (n q_i), the contribution of the chosen candidate if it is visible.
 vec3 controlled_contribution(Controlled chosen, uint candidates) {
-    float factor = chosen.target > 0.0
-        ? chosen.target_sum / (float(candidates) * chosen.target)
-        : 0.0;
-    return chosen.weight * factor;
+    return chosen.weight * reservoir_factor(chosen.reservoir, candidates);
 }
 
 // The rest, visible or not: expected light of all candidates less that of the chosen one. May be negative.

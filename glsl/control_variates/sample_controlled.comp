@@ -8,7 +8,6 @@
 
 #include "control_variates/controlled.glsl"
 #include "control_variates/records.glsl"
-#include "path_list.glsl"
 #include "vertex.glsl"
 
 TEXELS(record_visibilities)
@@ -26,31 +25,19 @@ void add_candidate(inout Controlled chosen, uint record, DirectionSample candida
     controlled_add(chosen, candidate.direction, weight, expected);
 }
 
-void sample_path(uint path) {
+void sample_vertex(uint path, Vertex vertex) {
     uint path_count = wave_path_count();
-    Hit hit = load_hit(path);
-    if (hit.material == NO_MATERIAL) {
-        return;
-    }
-    Vertex vertex = load_vertex(path, hit);
-    uint record = record_of(hit.position, hit.geometric_normal);
-    uint pixel = vertex.index.pixel;
-    // Number the rays through all samples: they share one sequence, and their candidates two.
-    uint first_ray = vertex.index.sample_index * wave.total_shadow_rays + wave.first_shadow_ray;
+    uint record = record_of(vertex.hit.position, vertex.hit.geometric_normal);
+    uint first_ray = first_ray_number(vertex);
     vec3 rest = vec3(0.0);
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
-        Controlled chosen = controlled_start(random_1d(
-            pixel, first_ray + i, vertex.dimension + DIMENSION_RESAMPLING, wave.seed));
+        Controlled chosen =
+            controlled_start(vertex_number(vertex, first_ray + i, DIMENSION_RESAMPLING));
+        // The candidates of all rays share two sequences.
         for (uint pair = 0u; pair < PAIRS; ++pair) {
             uint number = (first_ray + i) * PAIRS + pair;
-            vec2 light = random_2d(
-                pixel, number, vertex.dimension + DIMENSION_ENVIRONMENT_DIRECTION, wave.seed);
-            add_candidate(chosen, record, draw_from_environment(vertex, light));
-            vec2 surface = random_2d(
-                pixel, number, vertex.dimension + DIMENSION_BRDF_DIRECTION, wave.seed);
-            float lobe =
-                random_1d(pixel, number, vertex.dimension + DIMENSION_BRDF_LOBE, wave.seed);
-            add_candidate(chosen, record, draw_from_brdf(vertex, vec3(surface, lobe)));
+            add_candidate(chosen, record, draw_environment_ray(vertex, number, 0u));
+            add_candidate(chosen, record, draw_brdf_ray(vertex, number, 0u));
         }
         vec3 contribution = controlled_contribution(chosen, CANDIDATES);
         write_ray(i * path_count + path, chosen.direction, contribution);
@@ -61,4 +48,4 @@ void sample_path(uint path) {
         state.radiance + state.throughput * (rest / float(wave.total_shadow_rays));
 }
 
-WALK_PATHS(sample_path)
+WALK_VERTICES(sample_vertex)

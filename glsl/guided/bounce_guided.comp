@@ -6,6 +6,7 @@
 #include "guided/arriving.glsl"
 #include "bounce.glsl"
 #include "path_list.glsl"
+#include "reservoir.glsl"
 
 TEXELS(guide_arriving)
 UPDATES(path_cells)
@@ -29,33 +30,27 @@ void bounce_path(uint path) {
     vec3 u = vec3(
         random_2d(index.pixel, number, dimension + DIMENSION_BOUNCE, wave.epoch_seed),
         random_1d(index.pixel, number, dimension + DIMENSION_BOUNCE_LOBE, wave.epoch_seed));
-    float u_choice =
-        random_1d(index.pixel, number, dimension + DIMENSION_RESAMPLING, wave.epoch_seed);
+    Reservoir reservoir = reservoir_start(
+        random_1d(index.pixel, number, dimension + DIMENSION_RESAMPLING, wave.epoch_seed));
     // Rotate from candidate to candidate: each stays stratified over samples, all cover the BRDF.
     vec3 rotation = vec3(1.0 / float(BOUNCE_CANDIDATES), 0.618034, 0.754878);
     uint first = path_cells[path].cell * GUIDE_ARRIVAL_SIDE * GUIDE_ARRIVAL_SIDE;
     vec3 chosen = vec3(0.0, 0.0, 1.0);
     uint chosen_direction = 0u;
-    float chosen_light = 0.0;
-    float sum = 0.0;
     for (uint c = 0u; c < BOUNCE_CANDIDATES; ++c) {
         vec3 incident_local = brdf_sample(material, outgoing_local, u);
         uint direction = arrival_direction(to_world(frame, incident_local));
         float light = texelFetch(guide_arriving, int(first + direction)).x;
-        sum += light;
-        float probability = light / sum;
-        bool is_chosen = u_choice < probability;
-        u_choice = is_chosen ? u_choice / probability
-                             : (u_choice - probability) / max(1.0 - probability, 1e-7);
-        chosen = is_chosen ? incident_local : chosen;
-        chosen_direction = is_chosen ? direction : chosen_direction;
-        chosen_light = is_chosen ? light : chosen_light;
+        if (reservoir_takes(reservoir, light, light)) {
+            chosen = incident_local;
+            chosen_direction = direction;
+        }
         u = fract(u + rotation);
     }
     vec3 direction = to_world(frame, chosen);
     float pdf;
     vec3 factor = bounce_factor(hit, material, outgoing_local, chosen, direction, pdf)
-        * (sum / (float(BOUNCE_CANDIDATES) * chosen_light));
+        * reservoir_factor(reservoir, BOUNCE_CANDIDATES);
     // The throughput depends on the tables, and so roulette takes the numbers since their rebuild too.
     bool alive =
         follow_bounce(path, index, hit, direction, pdf, factor, number, wave.epoch_seed);

@@ -197,9 +197,7 @@ Guided draw_guided(Vertex vertex, uint first, uvec2 bits, uvec4 more_bits) {
         cell.x, cell.y, vec2(unit_float(more_bits.x), unit_float(more_bits.y)));
     // The density of a black map is 0 / 0.
     light.pdf = parameters.environment_total > 0.0 ? light.pdf : 0.0;
-    guided.sampled = evaluate_direction(
-        vertex, light.direction, to_local(vertex.frame, light.direction), light.radiance,
-        light.pdf);
+    guided.sampled = evaluate_light(vertex, light);
     return guided;
 }
 

@@ -7,6 +7,8 @@
 
 #include "guided/candidates.glsl"
 #include "path_list.glsl"
+#include "reservoir.glsl"
+#include "turns.glsl"
 
 WRITES(learn_targets)
 UPDATES(path_cells)
@@ -71,7 +73,7 @@ void finish_one(uint index, uint first, Guided guided, float share) {
 
 // Candidate chosen with probability 0.9 guided / guided_sum + 0.1 unguided / unguided_sum, which
 // bounds the estimate where the guide is wrong.
-struct Reservoir {
+struct Resampled {
     Guided chosen;
     float chosen_pdf;
     float chosen_guided;
@@ -79,28 +81,21 @@ struct Reservoir {
     float guided_sum;
     float unguided_sum;
     bool is_unguided;
-    float u;
+    Reservoir reservoir;
 };
 
-void add_to(inout Reservoir reservoir, Guided candidate) {
+void add_to(inout Resampled ray, Guided candidate) {
     float pdf = candidates_pdf(candidate);
     float unguided = pdf > 0.0 ? luminance(candidate.sampled.integrand) / pdf : 0.0;
     float guided = unguided * candidate.entry.visibility;
-    reservoir.guided_sum += guided;
-    reservoir.unguided_sum += unguided;
-    float weight = reservoir.is_unguided ? unguided : guided;
-    float sum = reservoir.is_unguided ? reservoir.unguided_sum : reservoir.guided_sum;
-    if (weight > 0.0) {
-        float probability = weight / sum;
-        if (reservoir.u < probability) {
-            reservoir.u /= probability;
-            reservoir.chosen = candidate;
-            reservoir.chosen_pdf = pdf;
-            reservoir.chosen_guided = guided;
-            reservoir.chosen_unguided = unguided;
-        } else {
-            reservoir.u = (reservoir.u - probability) / (1.0 - probability);
-        }
+    ray.guided_sum += guided;
+    ray.unguided_sum += unguided;
+    float weight = ray.is_unguided ? unguided : guided;
+    if (reservoir_takes(ray.reservoir, weight, weight)) {
+        ray.chosen = candidate;
+        ray.chosen_pdf = pdf;
+        ray.chosen_guided = guided;
+        ray.chosen_unguided = unguided;
     }
 }
 
@@ -127,71 +122,45 @@ void sample_path(uint path) {
         + wave.first_shadow_ray;
 
     if (CANDIDATES == 1u) {
-        // Alternate the techniques by their shares from a random start: ray k is from the BRDF with
-        // exactly that probability, and neither sequence has gaps. 8x8 pixels share the start, and each
-        // technique has its own loop: devices that run both sides of a branch then run one per ray.
         uint share = learned_share > 0u ? learned_share : brdf_share(vertex.material);
         share = wave.vertex > 0u ? max(share, LEAST_LATER_SHARE) : share;
-        uvec2 block = uvec2(
-            vertex.index.pixel % parameters.film_width, vertex.index.pixel / parameters.film_width)
-            / FILM_BLOCK;
+        // Pixels of a block start alike.
         uint start = hash_4d(uvec4(
-            block, vertex.dimension + DIMENSION_GUIDE_TECHNIQUE, wave.epoch_seed)).x & 255u;
-        uint before = (first_ray * share + start) >> 8u;
-        uint from_brdf = 0u;
-        for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
-            uint sum = ((first_ray + i) * share + start) & 255u;
-            from_brdf |= sum + share >= 256u ? 1u << i : 0u;
-        }
+            film_block_place(vertex.index).yx, vertex.dimension + DIMENSION_GUIDE_TECHNIQUE,
+            wave.epoch_seed)).x & 255u;
         float probability = float(share) * (1.0 / 256.0);
-        uint index = before;
-        uint left = from_brdf;
-        while (left != 0u) {
-            uint i = uint(findLSB(left));
-            left &= left - 1u;
-            Guided guided = draw_brdf_candidate(vertex, first, index);
-            index++;
-            finish_one(i * path_count + path, first, guided, probability);
-        }
-        index = first_ray - before;
-        left = ~from_brdf & ((1u << wave.shadow_ray_count) - 1u);
-        while (left != 0u) {
-            uint i = uint(findLSB(left));
-            left &= left - 1u;
-            Guided guided = draw_candidate(vertex, first, index);
-            index++;
-            finish_one(i * path_count + path, first, guided, probability);
-        }
+        Turns turns = turns_from(first_ray, share, start);
+        TAKE_ALL_TURNS(
+            turns,
+            finish_one(
+                ray * path_count + path, first, draw_candidate(vertex, first, index), probability),
+            finish_one(
+                ray * path_count + path, first, draw_brdf_candidate(vertex, first, index),
+                probability))
     } else {
         for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
             uvec2 bits = epoch_bits(vertex, first_ray + i, DIMENSION_GUIDE_RESAMPLING);
-            Reservoir reservoir;
-            reservoir.chosen.sampled = DirectionSample(vec3(0.0), vec3(0.0), 0.0, 0.0);
-            reservoir.chosen.region = 0u;
-            reservoir.chosen.entry = GuideEntry(0.0, 0u, 0u, 0.0);
-            reservoir.chosen_pdf = 0.0;
-            reservoir.chosen_guided = 0.0;
-            reservoir.chosen_unguided = 0.0;
-            reservoir.guided_sum = 0.0;
-            reservoir.unguided_sum = 0.0;
-            reservoir.is_unguided = unit_float(bits.x) < UNGUIDED_CHOICE;
-            reservoir.u = unit_float(bits.y);
+            Guided none = Guided(
+                DirectionSample(vec3(0.0), vec3(0.0), 0.0, 0.0), 0u, GuideEntry(0.0, 0u, 0u, 0.0));
+            Resampled ray = Resampled(
+                none, 0.0, 0.0, 0.0, 0.0, 0.0, unit_float(bits.x) < UNGUIDED_CHOICE,
+                reservoir_start(unit_float(bits.y)));
             for (uint c = 0u; c < BRDF_CANDIDATES; ++c) {
                 uint index = (first_ray + i) * BRDF_CANDIDATES + c;
-                add_to(reservoir, draw_brdf_candidate(vertex, first, index));
+                add_to(ray, draw_brdf_candidate(vertex, first, index));
             }
             for (uint c = 0u; c < CANDIDATES - BRDF_CANDIDATES; ++c) {
                 uint index = (first_ray + i) * (CANDIDATES - BRDF_CANDIDATES) + c;
-                add_to(reservoir, draw_candidate(vertex, first, index));
+                add_to(ray, draw_candidate(vertex, first, index));
             }
             float factor = 0.0;
-            if (reservoir.chosen_unguided > 0.0 && reservoir.guided_sum > 0.0) {
+            if (ray.chosen_unguided > 0.0 && ray.guided_sum > 0.0) {
                 float chance =
-                    (1.0 - UNGUIDED_CHOICE) * reservoir.chosen_guided / reservoir.guided_sum
-                    + UNGUIDED_CHOICE * reservoir.chosen_unguided / reservoir.unguided_sum;
-                factor = 1.0 / (float(CANDIDATES) * reservoir.chosen_pdf * chance);
+                    (1.0 - UNGUIDED_CHOICE) * ray.chosen_guided / ray.guided_sum
+                    + UNGUIDED_CHOICE * ray.chosen_unguided / ray.unguided_sum;
+                factor = 1.0 / (float(CANDIDATES) * ray.chosen_pdf * chance);
             }
-            finish(i * path_count + path, first, reservoir.chosen, factor, 0u);
+            finish(i * path_count + path, first, ray.chosen, factor, 0u);
         }
     }
 }

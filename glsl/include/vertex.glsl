@@ -4,6 +4,7 @@
 #include "frame.glsl"
 #include "hit_surface.glsl"
 #include "load.glsl"
+#include "path_list.glsl"
 #include "random.glsl"
 #include "wave.glsl"
 #include "brdf.glsl"
@@ -70,17 +71,47 @@ DirectionSample evaluate_local(Vertex vertex, vec3 incident_local) {
         vertex, direction, incident_local, light.xyz, environment_pdf(direction, light));
 }
 
-// Samples a direction in proportion to the environment's luminance; u in [0, 1)^2.
-DirectionSample draw_from_environment(Vertex vertex, vec2 u) {
-    EnvironmentSample light = environment_sample(u);
+// Evaluates a direction drawn from the environment.
+DirectionSample evaluate_light(Vertex vertex, EnvironmentSample light) {
     return evaluate_direction(
         vertex, light.direction, to_local(vertex.frame, light.direction), light.radiance,
         light.pdf);
 }
 
+// Samples a direction in proportion to the environment's luminance; u in [0, 1)^2.
+DirectionSample draw_from_environment(Vertex vertex, vec2 u) {
+    return evaluate_light(vertex, environment_sample(u));
+}
+
 // Samples a direction from the BRDF; u in [0, 1)^3.
 DirectionSample draw_from_brdf(Vertex vertex, vec3 u) {
     return evaluate_local(vertex, brdf_sample(vertex.material, vertex.outgoing_local, u));
+}
+
+// Number of the first ray of the group through all samples: they share one sequence.
+uint first_ray_number(Vertex vertex) {
+    return vertex.index.sample_index * wave.total_shadow_rays + wave.first_shadow_ray;
+}
+
+vec2 vertex_numbers(Vertex vertex, uint number, uint dimension) {
+    return random_2d(vertex.index.pixel, number, vertex.dimension + dimension, wave.seed);
+}
+
+float vertex_number(Vertex vertex, uint number, uint dimension) {
+    return random_1d(vertex.index.pixel, number, vertex.dimension + dimension, wave.seed);
+}
+
+// Draws direction `number` of the sequence of a vertex's candidate from the environment.
+DirectionSample draw_environment_ray(Vertex vertex, uint number, uint candidate) {
+    return draw_from_environment(
+        vertex, vertex_numbers(vertex, number, DIMENSION_ENVIRONMENT_DIRECTION + candidate));
+}
+
+// Draws direction `number` of the sequence of a vertex's candidate from the BRDF.
+DirectionSample draw_brdf_ray(Vertex vertex, uint number, uint candidate) {
+    vec2 u = vertex_numbers(vertex, number, DIMENSION_BRDF_DIRECTION + candidate);
+    float lobe = vertex_number(vertex, number, DIMENSION_BRDF_LOBE + candidate);
+    return draw_from_brdf(vertex, vec3(u, lobe));
 }
 
 void write_ray(uint index, vec3 direction, vec3 contribution) {
@@ -91,3 +122,13 @@ void write_ray(uint index, vec3 direction, vec3 contribution) {
 void write_sample(uint index, DirectionSample sampled, float pdf) {
     write_ray(index, sampled.direction, pdf > 0.0 ? sampled.integrand / pdf : vec3(0.0));
 }
+
+// Defines main: runs `walk` for the path of the invocation and its vertex, if light is sampled there.
+#define WALK_VERTICES(walk) \
+    void walk_vertex(uint path) { \
+        Hit hit = load_hit(path); \
+        if (hit.material != NO_MATERIAL) { \
+            walk(path, load_vertex(path, hit)); \
+        } \
+    } \
+    WALK_PATHS(walk_vertex)

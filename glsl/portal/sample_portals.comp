@@ -3,69 +3,47 @@
 // `mis`. Densities are in solid angle measure.
 #version 460
 
-#include "mis.glsl"
-#include "path_list.glsl"
+#include "mis_rays.glsl"
 #include "portal/portals.glsl"
 
-// Density of all techniques at a direction; `light_share` is that of portals among light.
-float density(Vertex vertex, DirectionSample sampled, float light_share, float total) {
-    float light = (1.0 - light_share) * sampled.environment_pdf;
-    if (light_share > 0.0) {
-        light += light_share * portal_pdf(vertex, total, sampled.direction);
+// Light at a vertex as the techniques beside the BRDF draw it.
+struct Light {
+    // Share of the portals; where none is seen, the environment takes it.
+    float portal_share;
+    float portal_total;
+};
+
+// Replaces the density of the environment by that of portals and environment.
+DirectionSample with_portals(Vertex vertex, Light light, DirectionSample sampled) {
+    sampled.environment_pdf *= 1.0 - light.portal_share;
+    if (light.portal_share > 0.0) {
+        sampled.environment_pdf += light.portal_share
+            * portal_pdf(vertex, light.portal_total, sampled.direction);
     }
-    return mis_pdf(sampled.brdf_pdf, light, wave.total_shadow_rays, wave.bounce_rays);
+    return sampled;
 }
 
-void sample_path(uint path) {
-    uint path_count = wave_path_count();
-    Hit hit = load_hit(path);
-    if (hit.material == NO_MATERIAL) {
-        return;
+DirectionSample draw_light(Vertex vertex, Light light, uint index) {
+    vec2 u = vertex_numbers(vertex, index, DIMENSION_ENVIRONMENT_DIRECTION);
+    float choice = vertex_number(vertex, index, DIMENSION_RESAMPLING);
+    DirectionSample sampled;
+    if (choice < light.portal_share) {
+        vec3 direction =
+            portal_sample(vertex, light.portal_total, choice / light.portal_share, u);
+        sampled = evaluate_world(vertex, direction);
+    } else {
+        sampled = draw_from_environment(vertex, u);
     }
-    Vertex vertex = load_vertex(path, hit);
-    uint pixel = vertex.index.pixel;
-    // Number the rays through all samples: they share one sequence.
-    uint first_ray = vertex.index.sample_index * wave.total_shadow_rays + wave.first_shadow_ray;
+    return with_portals(vertex, light, sampled);
+}
+
+void sample_vertex(uint path, Vertex vertex) {
     float total = portal_total(vertex);
-    // Where no portal is seen, the environment takes their share.
-    float light_share = total > 0.0 ? PORTAL_SHARE : 0.0;
-
-    MisTurns turns = mis_turns(
-        first_ray, wave.shadow_ray_count, mis_share(wave.total_shadow_rays, wave.bounce_rays),
-        block_random_bits(vertex.index, DIMENSION_TECHNIQUE).x);
-    uint index = turns.light_index;
-    uint left = ~turns.from_brdf & ((1u << wave.shadow_ray_count) - 1u);
-    while (left != 0u) {
-        uint i = uint(findLSB(left));
-        left &= left - 1u;
-        vec2 u = random_2d(
-            pixel, index, vertex.dimension + DIMENSION_ENVIRONMENT_DIRECTION, wave.seed);
-        float choice =
-            random_1d(pixel, index, vertex.dimension + DIMENSION_RESAMPLING, wave.seed);
-        index++;
-        DirectionSample sampled;
-        if (choice < light_share) {
-            sampled =
-                evaluate_world(vertex, portal_sample(vertex, total, choice / light_share, u));
-        } else {
-            sampled = draw_from_environment(vertex, u);
-        }
-        write_sample(
-            i * path_count + path, sampled, density(vertex, sampled, light_share, total));
-    }
-    index = turns.brdf_index;
-    left = turns.from_brdf;
-    while (left != 0u) {
-        uint i = uint(findLSB(left));
-        left &= left - 1u;
-        vec2 u =
-            random_2d(pixel, index, vertex.dimension + DIMENSION_BRDF_DIRECTION, wave.seed);
-        float lobe = random_1d(pixel, index, vertex.dimension + DIMENSION_BRDF_LOBE, wave.seed);
-        index++;
-        DirectionSample sampled = draw_from_brdf(vertex, vec3(u, lobe));
-        write_sample(
-            i * path_count + path, sampled, density(vertex, sampled, light_share, total));
-    }
+    Light light = Light(total > 0.0 ? PORTAL_SHARE : 0.0, total);
+    WRITE_MIS_RAYS(
+        path, vertex, mis_share(wave.total_shadow_rays, wave.bounce_rays),
+        draw_light(vertex, light, index),
+        with_portals(vertex, light, draw_brdf_ray(vertex, index, 0u)))
 }
 
-WALK_PATHS(sample_path)
+WALK_VERTICES(sample_vertex)

@@ -6,10 +6,8 @@
 // direction, and all rays of the hit have the density of that sector, so no bias comes of it.
 #version 460
 
-#include "mis.glsl"
-#include "path_list.glsl"
+#include "mis_rays.glsl"
 #include "tiles/tiles.glsl"
-#include "vertex.glsl"
 
 layout(constant_id = CONSTANT_SECTOR_JITTER) const bool SECTOR_JITTER = false;
 // True in the pilot, which learns from rays through tiles alone.
@@ -20,12 +18,6 @@ const uint DIMENSION_SECTOR = 6u;
 const uint DIMENSION_TILE = 24u;
 const uint DIMENSION_TILE_PATCH = 25u;
 
-// Density of both techniques; that of the tiles is in place of the environment's.
-float density(DirectionSample sampled) {
-    return mis_pdf(
-        sampled.brdf_pdf, sampled.environment_pdf, wave.total_shadow_rays, wave.bounce_rays);
-}
-
 uint sector_at(Vertex vertex) {
     uvec4 bits = hash_4d(uvec4(
         vertex.index.pixel, vertex.index.sample_index, vertex.dimension + DIMENSION_SECTOR,
@@ -34,50 +26,26 @@ uint sector_at(Vertex vertex) {
     return sector_of(vertex.hit.position, shift);
 }
 
-void sample_path(uint path) {
-    uint path_count = wave_path_count();
-    Hit hit = load_hit(path);
-    if (hit.material == NO_MATERIAL) {
-        return;
-    }
-    Vertex vertex = load_vertex(path, hit);
-    uint sector = sector_at(vertex);
+DirectionSample draw_tile(Vertex vertex, uint sector, uint index) {
     uint pixel = vertex.index.pixel;
-    // Number the rays through all samples: they share one sequence.
-    uint first_ray = vertex.index.sample_index * wave.total_shadow_rays + wave.first_shadow_ray;
-
-    uint share = LEARNS ? 0u : mis_share(wave.total_shadow_rays, wave.bounce_rays);
-    MisTurns turns = mis_turns(
-        first_ray, wave.shadow_ray_count, share,
-        block_random_bits(vertex.index, DIMENSION_TECHNIQUE).x);
-    uint index = turns.light_index;
-    uint left = ~turns.from_brdf & ((1u << wave.shadow_ray_count) - 1u);
-    while (left != 0u) {
-        uint i = uint(findLSB(left));
-        left &= left - 1u;
-        EnvironmentSample light = draw_from_tiles(
-            sector, random_bits_2d(pixel, index, vertex.dimension + DIMENSION_TILE, wave.seed),
-            hash_4d(uvec4(pixel, index, vertex.dimension + DIMENSION_TILE_PATCH, wave.seed)));
-        index++;
-        DirectionSample sampled = evaluate_direction(
-            vertex, light.direction, to_local(vertex.frame, light.direction), light.radiance,
-            light.pdf);
-        write_sample(i * path_count + path, sampled, density(sampled));
-    }
-    index = turns.brdf_index;
-    left = turns.from_brdf;
-    while (left != 0u) {
-        uint i = uint(findLSB(left));
-        left &= left - 1u;
-        vec2 u =
-            random_2d(pixel, index, vertex.dimension + DIMENSION_BRDF_DIRECTION, wave.seed);
-        float lobe = random_1d(pixel, index, vertex.dimension + DIMENSION_BRDF_LOBE, wave.seed);
-        index++;
-        DirectionSample sampled = draw_from_brdf(vertex, vec3(u, lobe));
-        sampled.environment_pdf =
-            tiles_pdf(sector, sampled.direction, sampled.environment_pdf);
-        write_sample(i * path_count + path, sampled, density(sampled));
-    }
+    EnvironmentSample light = draw_from_tiles(
+        sector, random_bits_2d(pixel, index, vertex.dimension + DIMENSION_TILE, wave.seed),
+        hash_4d(uvec4(pixel, index, vertex.dimension + DIMENSION_TILE_PATCH, wave.seed)));
+    return evaluate_light(vertex, light);
 }
 
-WALK_PATHS(sample_path)
+// Draws from the BRDF, with the density of the tiles in place of the environment's.
+DirectionSample draw_brdf(Vertex vertex, uint sector, uint index) {
+    DirectionSample sampled = draw_brdf_ray(vertex, index, 0u);
+    sampled.environment_pdf = tiles_pdf(sector, sampled.direction, sampled.environment_pdf);
+    return sampled;
+}
+
+void sample_vertex(uint path, Vertex vertex) {
+    uint sector = sector_at(vertex);
+    uint share = LEARNS ? 0u : mis_share(wave.total_shadow_rays, wave.bounce_rays);
+    WRITE_MIS_RAYS(
+        path, vertex, share, draw_tile(vertex, sector, index), draw_brdf(vertex, sector, index))
+}
+
+WALK_VERTICES(sample_vertex)
