@@ -10,12 +10,7 @@ UPDATES(film_squares)
 UPDATES(film_visible)
 UPDATES(counters)
 
-void main() {
-    uint pixel = gl_GlobalInvocationID.x;
-    PathIndex index = wave_pixel(wave_film_position(pixel));
-    if (pixel >= wave.pixel_count || !index.inside) {
-        return;
-    }
+void accumulate_pixel(uint pixel, PathIndex index) {
     // Training rays are counted, but their light stays out of the picture.
     bool adds = wave.is_training == 0u;
     uint place = adds ? film_place(index) : 0u;
@@ -67,3 +62,5 @@ void main() {
         atomicAdd(counters.dropped_samples, dropped);
     }
 }
+
+RUN_PIXELS(accumulate_pixel)

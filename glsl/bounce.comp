@@ -20,11 +20,8 @@ void bounce_path(uint path) {
     Material material = load_surface(path, hit.material);
     Frame frame = frame_from_normal(hit.shading_normal);
     vec3 outgoing_local = to_local(frame, -rays[path].direction);
-    uint dimension = vertex_dimension();
-    vec2 u = random_2d(index.pixel, index.sample_index, dimension + DIMENSION_BOUNCE, wave.seed);
-    float lobe =
-        random_1d(index.pixel, index.sample_index, dimension + DIMENSION_BOUNCE_LOBE, wave.seed);
-    vec3 incident_local = brdf_sample(material, outgoing_local, vec3(u, lobe));
+    vec3 u = bounce_numbers(index, index.sample_index, wave.seed);
+    vec3 incident_local = brdf_sample(material, outgoing_local, u);
     vec3 direction = to_world(frame, incident_local);
     float pdf;
     vec3 factor = bounce_factor(hit, material, outgoing_local, incident_local, direction, pdf);

@@ -14,12 +14,7 @@ UPDATES(film_albedo)
 UPDATES(film_normal)
 UPDATES(film_position)
 
-void main() {
-    uint pixel = gl_GlobalInvocationID.x;
-    PathIndex index = wave_pixel(wave_film_position(pixel));
-    if (pixel >= wave.pixel_count || !index.inside) {
-        return;
-    }
+void add_features(uint pixel, PathIndex index) {
     uint place = film_place(index);
     // Add sample by sample: the sums must not depend on how samples are grouped into waves.
     bool wants_albedo = (wave.aovs & AOV_ALBEDO) != 0u;
@@ -51,3 +46,5 @@ void main() {
         film_position[place] = position;
     }
 }
+
+RUN_PIXELS(add_features)

@@ -3,6 +3,7 @@
 #version 460
 
 #include "mis_rays.glsl"
+#include "path_list.glsl"
 #include "reservoir.glsl"
 
 layout(constant_id = CONSTANT_SAMPLER) const uint SAMPLER = SAMPLER_MIS;

@@ -7,6 +7,7 @@
 #version 460
 
 #include "lamps.glsl"
+#include "path_list.glsl"
 #include "reservoir.glsl"
 #include "vertex.glsl"
 

@@ -24,10 +24,4 @@ void record_ray(ListedRay listed) {
     }
 }
 
-void main() {
-    uint path_count = listed_path_count();
-    uint ray_count = path_count * wave.shadow_ray_count;
-    for (uint place = gl_GlobalInvocationID.x; place < ray_count; place += ray_count) {
-        record_ray(listed_ray(place, path_count));
-    }
-}
+WALK_RAYS(record_ray)

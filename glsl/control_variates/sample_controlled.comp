@@ -8,6 +8,7 @@
 
 #include "control_variates/controlled.glsl"
 #include "control_variates/records.glsl"
+#include "path_list.glsl"
 #include "vertex.glsl"
 
 TEXELS(record_visibilities)

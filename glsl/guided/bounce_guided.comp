@@ -26,12 +26,9 @@ void bounce_path(uint path) {
     Material material = load_surface(path, hit.material);
     Frame frame = frame_from_normal(hit.shading_normal);
     vec3 outgoing_local = to_local(frame, -rays[path].direction);
-    uint dimension = vertex_dimension();
-    vec3 u = vec3(
-        random_2d(index.pixel, number, dimension + DIMENSION_BOUNCE, wave.epoch_seed),
-        random_1d(index.pixel, number, dimension + DIMENSION_BOUNCE_LOBE, wave.epoch_seed));
-    Reservoir reservoir = reservoir_start(
-        random_1d(index.pixel, number, dimension + DIMENSION_RESAMPLING, wave.epoch_seed));
+    vec3 u = bounce_numbers(index, number, wave.epoch_seed);
+    Reservoir reservoir = reservoir_start(random_1d(
+        index.pixel, number, vertex_dimension() + DIMENSION_RESAMPLING, wave.epoch_seed));
     // Rotate from candidate to candidate: each stays stratified over samples, all cover the BRDF.
     vec3 rotation = vec3(1.0 / float(BOUNCE_CANDIDATES), 0.618034, 0.754878);
     uint first = path_cells[path].cell * GUIDE_ARRIVAL_SIDE * GUIDE_ARRIVAL_SIDE;

@@ -192,22 +192,16 @@ Guided draw_guided(Vertex vertex, uint first, uvec2 bits, uvec4 more_bits) {
     guided.entry = guide_entry(first + guided.region);
 
     uvec4 region = texelFetch(guide_regions, int(guided.region));
-    uvec2 cell = region_cell(guide_aliases, region, bits.y, more_bits.z);
-    EnvironmentSample light = environment_sample_cell(
-        cell.x, cell.y, vec2(unit_float(more_bits.x), unit_float(more_bits.y)));
-    // The density of a black map is 0 / 0.
-    light.pdf = parameters.environment_total > 0.0 ? light.pdf : 0.0;
-    guided.sampled = evaluate_light(vertex, light);
+    guided.sampled =
+        evaluate_light(vertex, region_sample(guide_aliases, region, bits.y, more_bits));
     return guided;
 }
 
 Guided locate_guided(uint first, DirectionSample sampled) {
     Guided guided;
     guided.sampled = sampled;
-    EnvironmentLocation location = environment_locate(guided.sampled.direction);
-    guided.region = texelFetch(
-        guide_region_of_cell,
-        int(location.row * parameters.environment_width + location.column)).x;
+    guided.region =
+        texelFetch(guide_region_of_cell, environment_cell_index(sampled.direction)).x;
     guided.entry = guide_entry(first + guided.region);
     return guided;
 }

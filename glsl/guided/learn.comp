@@ -39,10 +39,4 @@ void learn_ray(ListedRay listed) {
     }
 }
 
-void main() {
-    uint path_count = listed_path_count();
-    uint ray_count = path_count * wave.shadow_ray_count;
-    for (uint place = gl_GlobalInvocationID.x; place < ray_count; place += ray_count) {
-        learn_ray(listed_ray(place, path_count));
-    }
-}
+WALK_RAYS(learn_ray)

@@ -15,12 +15,7 @@ vec3 colour_of(uint key) {
     return vec3(uvec3(hash, hash >> 8u, hash >> 16u) & 255u) * (1.0 / 256.0);
 }
 
-void main() {
-    uint pixel = gl_GlobalInvocationID.x;
-    PathIndex index = wave_pixel(wave_film_position(pixel));
-    if (pixel >= wave.pixel_count || !index.inside) {
-        return;
-    }
+void show_pixel(uint pixel, PathIndex index) {
     uint place = film_place(index);
     vec3 colour = film_guide_cell[place];
     vec3 level = film_guide_level[place];
@@ -41,3 +36,5 @@ void main() {
     film_guide_cell[place] = colour;
     film_guide_level[place] = level;
 }
+
+RUN_PIXELS(show_pixel)

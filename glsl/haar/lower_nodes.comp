@@ -44,10 +44,9 @@ float next_factor(uint path, uint path_count, uint recorded, vec3 centre) {
     return pow((1.0 + near) / (2.0 + near), VISIBILITY_EXPONENT);
 }
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
+void lower_path(uint path) {
     uint path_count = wave_path_count();
-    if (path >= path_count || load_hit_origin(path).material == NO_MATERIAL) {
+    if (load_hit_origin(path).material == NO_MATERIAL) {
         return;
     }
     // Rays without a contribution were not traced.
@@ -86,3 +85,5 @@ void main() {
     haar_cache[cache_place(path, path_count, recorded + 1u)] = packed_direction;
     haar_cache[path] = recorded + 1u;
 }
+
+RUN_PATHS(lower_path)

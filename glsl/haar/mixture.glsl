@@ -5,63 +5,33 @@
 // needs a BRDF that its samples do not miss.
 
 #include "haar/nodes.glsl"
-#include "once.glsl"
-#include "product/numbers.glsl"
-#include "vertex.glsl"
-
-layout(constant_id = CONSTANT_BRDF_SHARE) const float BRDF_SHARE = 0.25;
-layout(constant_id = CONSTANT_ENVIRONMENT_SHARE) const float ENVIRONMENT_SHARE = 0.25;
+#include "product/techniques.glsl"
 
 struct HaarMixture {
     uint path;
     uint path_count;
     // Sum of the weights of the nodes.
     float total;
-    // Probabilities of the three techniques.
-    float node_share;
-    float environment_share;
-    float brdf_share;
+    Shares shares;
 };
 
 HaarMixture load_haar_mixture(uint path, uint path_count) {
     float total = nodes_total(path, path_count);
-    // Fall back on the BRDF where nothing is reflected, and in the dark.
-    float node_share = total > 0.0 ? 1.0 - BRDF_SHARE - ENVIRONMENT_SHARE : 0.0;
-    float environment_share = parameters.environment_total > 0.0 ? ENVIRONMENT_SHARE : 0.0;
-    float shares = node_share + environment_share + BRDF_SHARE;
-    return HaarMixture(
-        path, path_count, total, node_share / shares, environment_share / shares,
-        BRDF_SHARE / shares);
+    return HaarMixture(path, path_count, total, shares_at(total));
 }
 
 // Samples the world direction of one ray, with the density of the nodes there.
 NodeSample haar_sample(Vertex vertex, HaarMixture mixture, MixtureNumbers numbers) {
-    bool from_nodes = numbers.technique < mixture.node_share;
-    bool from_environment =
-        !from_nodes && numbers.technique < mixture.node_share + mixture.environment_share;
-    NodeSample drawn = NodeSample(vertex.frame.normal, 0.0);
+    NodeSample drawn =
+        NodeSample(draw_beside_product(vertex, mixture.shares, numbers), 0.0);
+    bool from_nodes = is_from_product(mixture.shares, numbers);
     ONCE_IF(from_nodes) {
         drawn = nodes_sample(
             mixture.path, mixture.path_count, mixture.total, numbers.direction);
-    }
-    ONCE_IF(from_environment) {
-        drawn.direction = environment_sample(numbers.direction).direction;
-    }
-    ONCE_IF(!from_nodes && !from_environment) {
-        drawn.direction = to_world(
-            vertex.frame,
-            brdf_sample(
-                vertex.material, vertex.outgoing_local, vec3(numbers.direction, numbers.lobe)));
     }
     ONCE_IF(!from_nodes) {
         drawn.pdf =
             nodes_pdf(mixture.path, mixture.path_count, mixture.total, drawn.direction);
     }
     return drawn;
-}
-
-// Density of the whole mixture where that of the nodes is `node_pdf`.
-float haar_pdf(HaarMixture mixture, DirectionSample sampled, float node_pdf) {
-    return mixture.node_share * node_pdf + mixture.environment_share * sampled.environment_pdf
-        + mixture.brdf_share * sampled.brdf_pdf;
 }

@@ -15,12 +15,8 @@ WRITES(haar_cache)
 
 layout(constant_id = CONSTANT_CACHE_CAPACITY) const uint CACHE_CAPACITY = 0u;
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
+void multiply_path(uint path) {
     uint path_count = wave_path_count();
-    if (path >= path_count) {
-        return;
-    }
     Hit hit = load_hit(path);
     if (hit.material == NO_MATERIAL) {
         return;
@@ -54,3 +50,5 @@ void main() {
         haar_cache[path] = 0u;
     }
 }
+
+RUN_PATHS(multiply_path)

@@ -6,23 +6,16 @@
 
 layout(constant_id = CONSTANT_CACHE_CAPACITY) const uint CACHE_CAPACITY = 0u;
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
+void sample_vertex(uint path, Vertex vertex) {
     uint path_count = wave_path_count();
-    if (path >= path_count) {
-        return;
-    }
-    Hit hit = load_hit(path);
-    if (hit.material == NO_MATERIAL) {
-        return;
-    }
-    Vertex vertex = load_vertex(path, hit);
     HaarMixture mixture = load_haar_mixture(path, path_count);
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
         MixtureNumbers numbers =
             draw_numbers(vertex, wave.first_shadow_ray + i, CACHE_CAPACITY > 0u, false);
         NodeSample drawn = haar_sample(vertex, mixture, numbers);
         DirectionSample sampled = evaluate_world(vertex, drawn.direction);
-        write_sample(i * path_count + path, sampled, haar_pdf(mixture, sampled, drawn.pdf));
+        write_sample(i * path_count + path, sampled, shares_pdf(mixture.shares, sampled, drawn.pdf));
     }
 }
+
+RUN_VERTICES(sample_vertex)

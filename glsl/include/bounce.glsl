@@ -19,6 +19,14 @@ layout(constant_id = CONSTANT_ROULETTE_VERTEX) const uint ROULETTE_VERTEX = 2u;
 // Throughput below which it does: the light that such a path still brings is worth less than its time.
 layout(constant_id = CONSTANT_ROULETTE_THROUGHPUT) const float ROULETTE_THROUGHPUT = 0.02;
 
+// Random numbers for a direction of the BRDF: those of sample `number`.
+vec3 bounce_numbers(PathIndex index, uint number, uint seed) {
+    uint dimension = vertex_dimension();
+    return vec3(
+        random_2d(index.pixel, number, dimension + DIMENSION_BOUNCE, seed),
+        random_1d(index.pixel, number, dimension + DIMENSION_BOUNCE_LOBE, seed));
+}
+
 // Returns BRDF * cosine / density of a direction drawn from the BRDF, and that density; 0 below
 // either horizon.
 vec3 bounce_factor(
@@ -75,10 +83,7 @@ bool follow_specular(uint path, PathIndex index, Hit hit, uint number, uint seed
     }
     vec3 outgoing = -rays[path].direction;
     Frame frame = frame_from_normal(hit.shading_normal);
-    uint dimension = vertex_dimension();
-    vec3 u = vec3(
-        random_2d(index.pixel, number, dimension + DIMENSION_BOUNCE, seed),
-        random_1d(index.pixel, number, dimension + DIMENSION_BOUNCE_LOBE, seed));
+    vec3 u = bounce_numbers(index, number, seed);
     vec3 outgoing_local = to_local(frame, outgoing);
     Scatter scattered;
     if (is_kind(material, MATERIAL_THIN_DIELECTRIC)) {

@@ -115,16 +115,18 @@ EnvironmentLocation environment_locate(vec3 direction) {
     return EnvironmentLocation(uint(column), uint(row), vec2(x - floor(x), y - floor(y)));
 }
 
+// Index of the cell that holds a direction.
+int environment_cell_index(vec3 direction) {
+    EnvironmentLocation location = environment_locate(direction);
+    return int(location.row * parameters.environment_width + location.column);
+}
+
 // Radiance from a direction, and compensated luminance: bilinear between texel centres, wrapping in
 // u, clamped in v.
 vec4 environment_light(vec3 direction) {
     EnvironmentLocation location = environment_locate(direction);
     return environment_interpolate(
         environment_cell(location.column, location.row), location.position);
-}
-
-vec3 environment_radiance(vec3 direction) {
-    return environment_light(direction).xyz;
 }
 
 // Density per steradian of environment_sample at a direction with light environment_light(direction).

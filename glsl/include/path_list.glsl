@@ -46,3 +46,13 @@ ListedRay listed_ray(uint place, uint path_count) {
             walk(listed_path(place)); \
         } \
     }
+
+// The same for the shadow ray of the invocation.
+#define WALK_RAYS(walk) \
+    void main() { \
+        uint path_count = listed_path_count(); \
+        uint count = path_count * wave.shadow_ray_count; \
+        for (uint place = gl_GlobalInvocationID.x; place < count; place += count) { \
+            walk(listed_ray(place, path_count)); \
+        } \
+    }

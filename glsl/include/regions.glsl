@@ -1,6 +1,7 @@
 // Cells of rectangles of the environment, drawn in proportion to their light. Twin of
 // src/sampler/guided/partition.rs.
 
+#include "environment.glsl"
 #include "random.glsl"
 
 // Column and row of a cell of the environment, from the alias table of a region: `place` chooses an entry,
@@ -17,4 +18,14 @@ uvec2 region_cell(usamplerBuffer aliases, uvec4 region, uint place, uint keep) {
     row = column < 0 ? row - 1u : (column >= int(region.y) ? row + 1u : row);
     column += column < 0 ? int(region.y) : (column >= int(region.y) ? -int(region.y) : 0);
     return uvec2((region.w & 0xffffu) + uint(column), (region.w >> 16u) + row);
+}
+
+// Draws a cell of a region by `place`, and a direction from its bilinear patch by other bits.
+EnvironmentSample region_sample(usamplerBuffer aliases, uvec4 region, uint place, uvec4 bits) {
+    uvec2 cell = region_cell(aliases, region, place, bits.z);
+    EnvironmentSample light =
+        environment_sample_cell(cell.x, cell.y, vec2(unit_float(bits.x), unit_float(bits.y)));
+    // The density of a black map is 0 / 0.
+    light.pdf = parameters.environment_total > 0.0 ? light.pdf : 0.0;
+    return light;
 }

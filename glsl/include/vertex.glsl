@@ -4,7 +4,6 @@
 #include "frame.glsl"
 #include "hit_surface.glsl"
 #include "load.glsl"
-#include "path_list.glsl"
 #include "random.glsl"
 #include "wave.glsl"
 #include "brdf.glsl"
@@ -123,12 +122,15 @@ void write_sample(uint index, DirectionSample sampled, float pdf) {
     write_ray(index, sampled.direction, pdf > 0.0 ? sampled.integrand / pdf : vec3(0.0));
 }
 
-// Defines main: runs `walk` for the path of the invocation and its vertex, if light is sampled there.
-#define WALK_VERTICES(walk) \
-    void walk_vertex(uint path) { \
+// Runs `run` for a path and its vertex, if light is sampled there.
+#define AT_VERTEX(run) \
+    void at_vertex(uint path) { \
         Hit hit = load_hit(path); \
         if (hit.material != NO_MATERIAL) { \
-            walk(path, load_vertex(path, hit)); \
+            run(path, load_vertex(path, hit)); \
         } \
-    } \
-    WALK_PATHS(walk_vertex)
+    }
+
+// Define main: run `run` for the vertices of the paths to walk, or of all paths in the wave.
+#define WALK_VERTICES(run) AT_VERTEX(run) WALK_PATHS(at_vertex)
+#define RUN_VERTICES(run) AT_VERTEX(run) RUN_PATHS(at_vertex)

@@ -104,3 +104,22 @@ uvec4 block_random_bits(PathIndex index, uint dimension) {
     uvec2 block = film_block_place(index).yx;
     return hash_4d(uvec4(block, vertex_dimension() + dimension, wave.seed));
 }
+
+// Defines main: runs `run` for the path of the invocation, of all paths in the wave.
+#define RUN_PATHS(run) \
+    void main() { \
+        uint path = gl_GlobalInvocationID.x; \
+        if (path < wave_path_count()) { \
+            run(path); \
+        } \
+    }
+
+// Defines main: runs `run` for the pixel of the invocation and its place, of the wave inside the crop window.
+#define RUN_PIXELS(run) \
+    void main() { \
+        uint pixel = gl_GlobalInvocationID.x; \
+        PathIndex index = wave_pixel(wave_film_position(pixel)); \
+        if (pixel < wave.pixel_count && index.inside) { \
+            run(pixel, index); \
+        } \
+    }

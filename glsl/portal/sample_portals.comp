@@ -4,6 +4,7 @@
 #version 460
 
 #include "mis_rays.glsl"
+#include "path_list.glsl"
 #include "portal/portals.glsl"
 
 // Light at a vertex as the techniques beside the BRDF draw it.

@@ -4,13 +4,11 @@
 //
 // Deviation: elevations by inversion; the thesis's Metropolis walk is optional, and biased.
 
-#include "product/numbers.glsl"
 #include "product/readings.glsl"
+#include "product/techniques.glsl"
 #include "vertex.glsl"
 #include "visibility/weights.glsl"
 
-layout(constant_id = CONSTANT_BRDF_SHARE) const float BRDF_SHARE = 0.25;
-layout(constant_id = CONSTANT_ENVIRONMENT_SHARE) const float ENVIRONMENT_SHARE = 0.25;
 layout(constant_id = CONSTANT_METROPOLIS) const uint METROPOLIS = 0u;
 
 const uint WALK_STEPS = 16u;
@@ -18,28 +16,19 @@ const uint WALK_STEPS = 16u;
 struct Mixture {
     Lobes lobes;
     float total;
-    // Probabilities of the three techniques.
-    float lobe_share;
-    float environment_share;
-    float brdf_share;
+    Shares shares;
 };
 
 // Sets the probabilities of the techniques by the weights in force.
 void set_shares(inout Mixture mixture) {
     mixture.total = weight_total(mixture.lobes);
-    // Fall back on the BRDF without lobes or in the dark.
-    float lobe_share = mixture.total > 0.0 ? 1.0 - BRDF_SHARE - ENVIRONMENT_SHARE : 0.0;
-    float environment_share = parameters.environment_total > 0.0 ? ENVIRONMENT_SHARE : 0.0;
-    float brdf_share = lobe_share + environment_share + BRDF_SHARE > 0.0 ? BRDF_SHARE : 1.0;
-    float shares = lobe_share + environment_share + brdf_share;
-    mixture.lobe_share = lobe_share / shares;
-    mixture.environment_share = environment_share / shares;
-    mixture.brdf_share = brdf_share / shares;
+    mixture.shares = shares_at(mixture.total);
 }
 
 // Loads the mixture at a path; `film_index` matters only for caches of pixels.
 Mixture load_mixture(uint path, uint path_count, uint film_index) {
-    Mixture mixture = Mixture(load_lobes(path, path_count, film_index), 0.0, 0.0, 0.0, 0.0);
+    Mixture mixture;
+    mixture.lobes = load_lobes(path, path_count, film_index);
     load_weights(mixture.lobes);
     set_shares(mixture);
     return mixture;
@@ -74,24 +63,12 @@ vec3 draw_from_lobe(Vertex vertex, uint ray, ProductLobe lobe, vec2 u) {
 
 // Samples the world direction of one ray. Directions below the horizon contribute nothing.
 vec3 mixture_sample(Vertex vertex, Mixture mixture, uint ray, MixtureNumbers numbers) {
-    bool from_lobe = numbers.technique < mixture.lobe_share;
-    bool from_environment =
-        !from_lobe && numbers.technique < mixture.lobe_share + mixture.environment_share;
-    vec3 direction = vertex.frame.normal;
-    ONCE_IF(from_lobe) {
+    vec3 direction = draw_beside_product(vertex, mixture.shares, numbers);
+    ONCE_IF(is_from_product(mixture.shares, numbers)) {
         uint l = find_lobe(mixture.lobes, numbers.lobe * mixture.total);
         chosen_lobe = l;
         ProductLobe lobe = unpack_lobe(lobe_words(mixture.lobes, l));
         direction = draw_from_lobe(vertex, ray, lobe, numbers.direction);
-    }
-    ONCE_IF(from_environment) {
-        direction = environment_sample(numbers.direction).direction;
-    }
-    ONCE_IF(!from_lobe && !from_environment) {
-        direction = to_world(
-            vertex.frame,
-            brdf_sample(
-                vertex.material, vertex.outgoing_local, vec3(numbers.direction, numbers.lobe)));
     }
     return direction;
 }
@@ -139,10 +116,9 @@ float mixture_lobe_density(Mixture mixture, vec3 direction) {
 
 // Returns the density of the whole mixture where that of the lobes is `lobe_density`.
 float mixture_pdf(Mixture mixture, DirectionSample sampled, float lobe_density) {
-    return mixture.lobe_share
-        * read_density(mixture.lobes, mixture.total, sampled.direction, lobe_density)
-        + mixture.environment_share * sampled.environment_pdf
-        + mixture.brdf_share * sampled.brdf_pdf;
+    return shares_pdf(
+        mixture.shares, sampled,
+        read_density(mixture.lobes, mixture.total, sampled.direction, lobe_density));
 }
 
 // Draws one ray; its contribution is integrand / pdf, without occlusion.

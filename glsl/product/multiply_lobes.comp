@@ -204,12 +204,8 @@ uint note_stronger(View view, float threshold) {
     return count;
 }
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
-    uint path_count = wave.pixel_count * wave.sample_count;
-    if (path >= path_count) {
-        return;
-    }
+void multiply_path(uint path) {
+    uint path_count = wave_path_count();
     if (CACHE_CAPACITY > 0u && CACHE_OF_PIXEL == 0u) {
         visibility_cache[cache_head(path, 0u)] = 0u;
     }
@@ -326,3 +322,5 @@ void main() {
         atomicAdd(counters.energy_kept, uint(256.0 * min(kept / max(guessed.energy, 1e-30), 1.0)));
     }
 }
+
+RUN_PATHS(multiply_path)

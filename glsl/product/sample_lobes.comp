@@ -9,17 +9,8 @@ READS(close_lobes)
 
 #include "product/mixture.glsl"
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
+void sample_vertex(uint path, Vertex vertex) {
     uint path_count = wave_path_count();
-    if (path >= path_count) {
-        return;
-    }
-    Hit hit = load_hit(path);
-    if (hit.material == NO_MATERIAL) {
-        return;
-    }
-    Vertex vertex = load_vertex(path, hit);
     Mixture mixture = load_mixture(path, path_count, vertex.index.film_index);
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
         uint ray = wave.first_shadow_ray + i;
@@ -27,3 +18,5 @@ void main() {
         shadow_rays[i * path_count + path] = mixture_ray(vertex, mixture, ray, numbers);
     }
 }
+
+RUN_VERTICES(sample_vertex)

@@ -9,10 +9,9 @@ READS(visibility)
 UPDATES(paths)
 UPDATES(seen)
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
+void admit_path(uint path) {
     uint path_count = wave_path_count();
-    if (path >= path_count || load_hit_origin(path).material == NO_MATERIAL) {
+    if (load_hit_origin(path).material == NO_MATERIAL) {
         return;
     }
     uint traced = 0u;
@@ -32,3 +31,5 @@ void main() {
     paths[path].shadow_rays_traced += traced;
     paths[path].shadow_rays_visible += visible;
 }
+
+RUN_PATHS(admit_path)

@@ -40,12 +40,8 @@ bool keeps_normal(Offer offer, vec3 to_first, float cosine) {
         > 1.01 * max(min(LEAST_SHADING_COSINE, cosine), 1.0e-6);
 }
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
+void connect_path(uint path) {
     uint path_count = wave_path_count();
-    if (path >= path_count) {
-        return;
-    }
     FirstVertex first = load_first_vertex(path);
     if (wave.first_shadow_ray == 0u) {
         hits[path] = Hit(
@@ -89,3 +85,5 @@ void main() {
             ShadowRay(end - first.position, vec3(pdf > 0.0 ? 1.0 : 0.0));
     }
 }
+
+RUN_PATHS(connect_path)

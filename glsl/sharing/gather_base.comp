@@ -11,12 +11,8 @@
 READS(visibility)
 UPDATES(second_vertices)
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
+void gather_path(uint path) {
     uint path_count = wave_path_count();
-    if (path >= path_count) {
-        return;
-    }
     SecondVertex second = second_vertices[path];
     if (second.scale == 0.0) {
         return;
@@ -40,3 +36,5 @@ void main() {
     second_vertices[path].base =
         second.base + second.scale * (sum / float(max(wave.total_shadow_rays, 1u)));
 }
+
+RUN_PATHS(gather_path)

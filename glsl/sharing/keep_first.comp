@@ -8,11 +8,7 @@
 READS(paths)
 WRITES(first_vertices)
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
-    if (path >= wave_path_count()) {
-        return;
-    }
+void keep_first(uint path) {
     Hit hit = load_hit(path);
     if (hit.material == NO_MATERIAL) {
         first_vertices[path].material = NO_MATERIAL;
@@ -24,3 +20,5 @@ void main() {
         material.ior, -load_ray(path).direction, paths[path].throughput, material.reflectance,
         vec3(0.0));
 }
+
+RUN_PATHS(keep_first)

@@ -12,11 +12,7 @@
 UPDATES(paths)
 WRITES(second_vertices)
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
-    if (path >= wave_path_count()) {
-        return;
-    }
+void keep_second(uint path) {
     second_vertices[path].scale = 0.0;
     Hit hit = load_hit(path);
     if (hit.material == NO_MATERIAL || !has_base(load_material(hit.material))) {
@@ -49,3 +45,5 @@ void main() {
     state.radiance = vec3(0.0);
     paths[path] = state;
 }
+
+RUN_PATHS(keep_second)

@@ -11,11 +11,7 @@
 UPDATES(paths)
 UPDATES(second_vertices)
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
-    if (path >= wave_path_count()) {
-        return;
-    }
+void keep_third(uint path) {
     SecondVertex second = second_vertices[path];
     if (second.scale == 0.0) {
         return;
@@ -32,3 +28,5 @@ void main() {
     second_vertices[path] = second;
     paths[path].radiance = vec3(0.0);
 }
+
+RUN_PATHS(keep_third)

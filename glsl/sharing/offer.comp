@@ -10,11 +10,7 @@ READS(paths)
 READS(second_vertices)
 WRITES(offers)
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
-    if (path >= wave_path_count()) {
-        return;
-    }
+void offer_path(uint path) {
     SecondVertex second = second_vertices[path];
     vec3 radiance = second.base + second.bounce_share * paths[path].radiance;
     if (second.scale == 0.0 || radiance == vec3(0.0)) {
@@ -30,3 +26,5 @@ void main() {
         second.position, second.material, second.geometric_normal, second.density_ratio,
         second.shading_normal, 0.0, emitted, 0.0);
 }
+
+RUN_PATHS(offer_path)

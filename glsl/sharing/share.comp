@@ -13,12 +13,8 @@ TEXELS(connection_texels)
 TEXELS(offer_weight_texels)
 UPDATES(paths)
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
+void share_path(uint path) {
     uint path_count = wave_path_count();
-    if (path >= path_count) {
-        return;
-    }
     vec3 radiance = paths[path].radiance;
     SecondVertex second = second_vertices[path];
     if (second.scale > 0.0) {
@@ -42,3 +38,5 @@ void main() {
     }
     paths[path].radiance = radiance;
 }
+
+RUN_PATHS(share_path)

@@ -12,12 +12,8 @@ TEXELS(connection_texels)
 TEXELS(seen_texels)
 WRITES(offer_weights)
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
+void weigh_path(uint path) {
     uint path_count = wave_path_count();
-    if (path >= path_count) {
-        return;
-    }
     float weight = 0.0;
     if (offers[path].material != NO_MATERIAL) {
         Tile tile = tile_of(path);
@@ -35,3 +31,5 @@ void main() {
     }
     offer_weights[path] = weight;
 }
+
+RUN_PATHS(weigh_path)

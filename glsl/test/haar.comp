@@ -50,7 +50,7 @@ void main() {
     }
     DirectionSample sampled = evaluate_world(vertex, drawn.direction);
     answers[index] = HaarAnswer(
-        drawn.direction, haar_pdf(mixture, sampled, drawn.pdf), drawn.pdf, mixture.node_share,
-        mixture.environment_share, sampled.environment_pdf, sampled.brdf_pdf, mixture.total,
+        drawn.direction, shares_pdf(mixture.shares, sampled, drawn.pdf), drawn.pdf, mixture.shares.product,
+        mixture.shares.environment, sampled.environment_pdf, sampled.brdf_pdf, mixture.total,
         sampled.integrand);
 }

@@ -69,9 +69,9 @@ void main() {
     answer.unguided_lobe_density = sum > 0.0 ? unguided / sum : 0.0;
     answer.environment_pdf = sampled.environment_pdf;
     answer.brdf_pdf = sampled.brdf_pdf;
-    answer.lobe_share = mixture.lobe_share;
-    answer.environment_share = mixture.environment_share;
-    answer.brdf_share = mixture.brdf_share;
+    answer.lobe_share = mixture.shares.product;
+    answer.environment_share = mixture.shares.environment;
+    answer.brdf_share = mixture.shares.brdf;
     answer.integrand = sampled.integrand;
     answers[index] = answer;
 }

@@ -26,10 +26,4 @@ void count_ray(ListedRay listed) {
     }
 }
 
-void main() {
-    uint path_count = listed_path_count();
-    uint ray_count = path_count * wave.shadow_ray_count;
-    for (uint place = gl_GlobalInvocationID.x; place < ray_count; place += ray_count) {
-        count_ray(listed_ray(place, path_count));
-    }
-}
+WALK_RAYS(count_ray)

@@ -7,6 +7,7 @@
 #version 460
 
 #include "mis_rays.glsl"
+#include "path_list.glsl"
 #include "tiles/tiles.glsl"
 
 layout(constant_id = CONSTANT_SECTOR_JITTER) const bool SECTOR_JITTER = false;

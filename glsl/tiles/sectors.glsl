@@ -31,7 +31,5 @@ uint sector_of(vec3 position, vec2 shift) {
 
 // Tile that holds a direction.
 uint tile_of(vec3 direction) {
-    EnvironmentLocation location = environment_locate(direction);
-    int cell = int(location.row * parameters.environment_width + location.column);
-    return texelFetch(tile_of_cell, cell).x;
+    return texelFetch(tile_of_cell, environment_cell_index(direction)).x;
 }

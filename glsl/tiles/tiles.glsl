@@ -30,12 +30,8 @@ EnvironmentSample draw_from_tiles(uint sector, uvec2 bits, uvec4 more_bits) {
             tile = middle + 1u;
         }
     }
-    uvec2 cell =
-        region_cell(tile_aliases, texelFetch(tile_regions, int(tile)), bits.y, more_bits.z);
-    EnvironmentSample light = environment_sample_cell(
-        cell.x, cell.y, vec2(unit_float(more_bits.x), unit_float(more_bits.y)));
-    float ratio = uintBitsToFloat(texelFetch(tile_entries, int(first + tile)).x);
-    // The density of a black map is 0 / 0.
-    light.pdf = parameters.environment_total > 0.0 ? ratio * light.pdf : 0.0;
+    EnvironmentSample light =
+        region_sample(tile_aliases, texelFetch(tile_regions, int(tile)), bits.y, more_bits);
+    light.pdf *= uintBitsToFloat(texelFetch(tile_entries, int(first + tile)).x);
     return light;
 }

@@ -8,12 +8,7 @@
 READS(visibility_cache)
 UPDATES(film_cache_entries)
 
-void main() {
-    uint pixel = gl_GlobalInvocationID.x;
-    PathIndex index = wave_pixel(wave_film_position(pixel));
-    if (pixel >= wave.pixel_count || !index.inside) {
-        return;
-    }
+void count_pixel(uint pixel, PathIndex index) {
     uint place = film_place(index);
     uvec2 entries_and_hits = film_cache_entries[place];
     for (uint i = 0u; i < wave.sample_count; ++i) {
@@ -26,3 +21,5 @@ void main() {
     }
     film_cache_entries[place] = entries_and_hits;
 }
+
+RUN_PIXELS(count_pixel)

@@ -58,12 +58,8 @@ void sum_with_all_entries(Lobes lobes) {
     }
 }
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
+void reweight_path(uint path) {
     uint path_count = wave_path_count();
-    if (path >= path_count) {
-        return;
-    }
     PathIndex index = wave_path(path);
     if (!index.inside) {
         return;
@@ -76,3 +72,5 @@ void main() {
     visibility_cache[lobes.head] = lobes.recorded;
     atomicAdd(counters.cdf_rebuilds, 1u);
 }
+
+RUN_PATHS(reweight_path)

@@ -17,17 +17,8 @@ UPDATES(counters)
 #include "product/mixture.glsl"
 #include "visibility/record.glsl"
 
-void main() {
-    uint path = gl_GlobalInvocationID.x;
+void sample_vertex(uint path, Vertex vertex) {
     uint path_count = wave_path_count();
-    if (path >= path_count) {
-        return;
-    }
-    Hit hit = load_hit(path);
-    if (hit.material == NO_MATERIAL) {
-        return;
-    }
-    Vertex vertex = load_vertex(path, hit);
     Mixture mixture = load_mixture(path, path_count, vertex.index.film_index);
     float offset = ray_offset();
     uint recorded_before = mixture.lobes.recorded;
@@ -42,7 +33,8 @@ void main() {
         bool is_traced = ray.contribution != vec3(0.0);
         bool running = is_traced;
         bvh_start(
-            moved_off_surface(hit.position, hit.geometric_normal, ray.direction, offset),
+            moved_off_surface(
+                vertex.hit.position, vertex.hit.geometric_normal, ray.direction, offset),
             ray.direction, FAR_AWAY, true);
         while (running && steps < TRAVERSAL_STEP_LIMIT) {
             running = bvh_step(true);
@@ -74,3 +66,5 @@ void main() {
         atomicAdd(counters.cdf_rebuilds, grown != 0u ? recorded - 1u : recorded);
     }
 }
+
+RUN_VERTICES(sample_vertex)
