@@ -1,10 +1,11 @@
-//! Order of the passes in one wave, as data.
+//! Order of the passes in one wave, as data: camera, [`STAGES`] of every vertex, film. A sampler adds its own
+//! passes by [`Steps`], and sharing by [`Moment`].
 
 use super::{
     geometry::{Schedule, Traversal},
     kernel::{Dispatch, Domain, Kernel},
     roulette::Roulette,
-    sharing::Sharing,
+    sharing::{Moment, Sharing},
     steps::Steps,
     surfaces::Surfaces,
 };
@@ -58,6 +59,25 @@ pub struct PassSettings {
     pub most_paths: u32,
 }
 
+/// Stages of a vertex in their order. Each adds its passes, if scene, sampler and settings want any.
+const STAGES: [fn(&mut Order); 11] = [
+    |order| order.trace(),
+    |order| order.list_paths(),
+    |order| order.read_textures(),
+    |order| order.add_emission(),
+    |order| order.share(Moment::Met, order.wave),
+    |order| order.sample_lamps(),
+    |order| order.sample_environment(),
+    |order| order.add_features(),
+    |order| order.share(Moment::Leaving, order.wave),
+    |order| order.bounce(),
+    |order| order.share(Moment::Left, order.wave),
+];
+
+/// Stages where the last vertices' rays arrive, at light that is not sampled, or not sampled alone.
+const LAST_STAGES: [fn(&mut Order); 3] =
+    [|order| order.trace(), |order| order.add_emission(), |order| order.gather(order.wave)];
+
 /// Returns the dispatches of one wave for the first `vertices` vertices of its paths.
 pub fn wave_order(
     settings: &PassSettings,
@@ -65,145 +85,209 @@ pub fn wave_order(
     wave: Wave,
     vertices: u32,
 ) -> Vec<Dispatch> {
-    let PassSettings { surfaces, traversal, incoherent, tile_edge, .. } = *settings;
-    let constants = surfaces.constants();
-    // Training teaches the visibility of the environment; other light is not needed.
-    let is_lit = wave.is_training != TRAINING_WAVE;
-    let follows_last = is_lit && surfaces.emits();
-    let escape = steps.escape();
-    let gather = || Kernel::new("gather", Domain::Arrivals, escape.as_deref().unwrap_or_default());
-    let sharing = Sharing { tile_edge, surfaces, traversal, schedule: incoherent };
-    let shares = is_lit && tile_edge > 1 && vertices > 1 && steps.shares_paths();
-    let mut order = Vec::new();
-    // Tiles keep the second vertices of all paths.
-    let walks_lists = steps.walks_lists() && settings.path_lists != PathLists::Never;
-    let first_listed = if walks_lists { 1 + u32::from(shares) } else { u32::MAX };
-    let mut add = |kernel: Kernel, wave: &Wave| {
-        let path_list = path_list(kernel.domain, wave.vertex, first_listed);
-        order.push(Dispatch { kernel, wave: Wave { path_list, ..*wave } });
-    };
-    let mut wave = Wave { aovs: settings.aovs, ..wave };
-
-    add(Kernel::new("camera", Domain::Paths, &[]), &wave);
+    let mut order = Order::new(settings, steps, wave, vertices);
+    order.add(Kernel::new("camera", Domain::Paths, &[]));
     for vertex in 0..vertices {
-        wave.vertex = vertex;
-        wave.arriving_shadow_rays = wave.bounce_rays * wave.total_shadow_rays;
-        wave.total_shadow_rays = steps.shadow_rays_at(vertex, settings.shadow_rays);
-        let is_counted = escape.is_some() && wave.total_shadow_rays > 0;
-        wave.bounce_rays = u32::from(is_counted && (vertex + 1 < vertices || follows_last));
-        // Camera rays stay coherent, bounce rays do not.
-        let schedule = if vertex == 0 { Schedule::SINGLE } else { incoherent };
-        add(traversal.trace(schedule, surfaces), &wave);
-        if vertex >= first_listed {
-            add(Kernel::new("list_paths", Domain::Arrivals, &[]), &wave);
-        }
-        if surfaces.is_textured() {
-            add(Kernel::new("texture", Domain::Surfaces, &constants), &wave);
-        }
-        if is_lit {
-            if surfaces.emits() {
-                add(Kernel::new("emit", Domain::Surfaces, &constants), &wave);
-            }
-            if shares && vertex == 1 {
-                add(sharing.keep_second(), &wave);
-            }
-            if surfaces.lamp_count > 0 {
-                let rays = rays_to_lamps(wave.total_shadow_rays);
-                for ray in 0..rays {
-                    let to_lamps = Wave {
-                        shadow_ray_count: 1,
-                        first_shadow_ray: ray,
-                        total_shadow_rays: rays,
-                        to_lamps: 1,
-                        ..wave
-                    };
-                    add(Kernel::new("sample_lamps", Domain::Surfaces, &constants), &to_lamps);
-                    add(traversal.shadow(incoherent, surfaces), &to_lamps);
-                    add(Kernel::new("gather", Domain::Arrivals, &[]), &to_lamps);
-                    if shares
-                        && vertex == 1
-                        && let Some(kernel) = sharing.gather_base()
-                    {
-                        add(kernel, &to_lamps);
-                    }
-                }
-            }
-        }
+        order.arrive_at(vertex);
+        STAGES.iter().for_each(|stage| stage(&mut order));
+    }
+    if order.goes_on() {
+        order.arrive_at(vertices);
+        LAST_STAGES.iter().for_each(|stage| stage(&mut order));
+    }
+    if let Some(sharing) = order.sharing {
+        order.dispatches.extend(sharing.connect_and_share(&order.wave));
+    }
+    order.add(Kernel::new("accumulate", Domain::Pixels, &[]));
+    order.dispatches
+}
 
-        wave.first_shadow_ray = 0;
-        if wave.total_shadow_rays > 0 {
-            for kernel in steps.prepare(&wave) {
-                add(kernel, &wave);
-            }
+/// The dispatches so far, and the vertex under way.
+struct Order<'a> {
+    settings: &'a PassSettings,
+    steps: &'a dyn Steps,
+    sharing: Option<Sharing>,
+    /// Specialization of the pass `gather`, as in [`Steps::escape`].
+    escape: Option<Vec<(u32, u32)>>,
+    vertices: u32,
+    /// First vertex with a list of living paths.
+    first_listed: u32,
+    wave: Wave,
+    dispatches: Vec<Dispatch>,
+}
+
+impl<'a> Order<'a> {
+    fn new(settings: &'a PassSettings, steps: &'a dyn Steps, wave: Wave, vertices: u32) -> Self {
+        let PassSettings { surfaces, traversal, incoherent, tile_edge, .. } = *settings;
+        let is_lit = wave.is_training != TRAINING_WAVE;
+        let shares = is_lit && tile_edge > 1 && vertices > 1 && steps.shares_paths();
+        let sharing = Sharing { tile_edge, surfaces, traversal, schedule: incoherent };
+        let walks_lists = steps.walks_lists() && settings.path_lists != PathLists::Never;
+        Self {
+            settings,
+            steps,
+            sharing: shares.then_some(sharing),
+            escape: steps.escape(),
+            vertices,
+            // Tiles keep the second vertices of all paths.
+            first_listed: if walks_lists { 1 + u32::from(shares) } else { u32::MAX },
+            wave: Wave { aovs: settings.aovs, ..wave },
+            dispatches: Vec::new(),
+        }
+    }
+
+    fn add(&mut self, kernel: Kernel) {
+        self.add_with(kernel, self.wave);
+    }
+
+    fn add_all(&mut self, kernels: Vec<Kernel>) {
+        kernels.into_iter().for_each(|kernel| self.add(kernel));
+    }
+
+    fn add_with(&mut self, kernel: Kernel, wave: Wave) {
+        let path_list = path_list(kernel.domain, wave.vertex, self.first_listed);
+        self.dispatches.push(Dispatch { kernel, wave: Wave { path_list, ..wave } });
+    }
+
+    fn add_over(&mut self, shader: &'static str, domain: Domain) {
+        self.add(Kernel::new(shader, domain, &self.settings.surfaces.constants()));
+    }
+
+    /// Adds the pass of sharing at a moment of the vertex, if there is one.
+    fn share(&mut self, moment: Moment, wave: Wave) {
+        let vertex = self.wave.vertex;
+        if let Some(kernel) = self.sharing.and_then(|sharing| sharing.at(moment, vertex)) {
+            self.add_with(kernel, wave);
+        }
+    }
+
+    /// True unless the wave teaches the visibility of the environment, which needs no other light.
+    fn is_lit(&self) -> bool {
+        self.wave.is_training != TRAINING_WAVE
+    }
+
+    fn is_last_vertex(&self) -> bool {
+        self.wave.vertex + 1 >= self.vertices
+    }
+
+    fn emits(&self) -> bool {
+        self.is_lit() && self.settings.surfaces.emits()
+    }
+
+    /// True if paths go on from their last vertices.
+    fn goes_on(&self) -> bool {
+        self.emits() || self.is_lit() && self.settings.surfaces.has_specular()
+    }
+
+    /// Begins a vertex. After the last one no light is sampled.
+    fn arrive_at(&mut self, vertex: u32) {
+        let most = self.settings.shadow_rays;
+        let is_sampled = vertex < self.vertices;
+        let rays = if is_sampled { self.steps.shadow_rays_at(vertex, most) } else { 0 };
+        self.wave = Wave {
+            vertex,
+            arriving_shadow_rays: self.wave.bounce_rays * self.wave.total_shadow_rays,
+            total_shadow_rays: rays,
+            first_shadow_ray: 0,
+            shadow_ray_count: 0,
+            ..self.wave
+        };
+        let is_counted = self.escape.is_some() && rays > 0;
+        self.wave.bounce_rays = u32::from(is_counted && (!self.is_last_vertex() || self.emits()));
+    }
+
+    fn trace(&mut self) {
+        let PassSettings { surfaces, traversal, incoherent, .. } = *self.settings;
+        // Camera rays stay coherent, bounce rays do not.
+        let schedule = if self.wave.vertex == 0 { Schedule::SINGLE } else { incoherent };
+        self.add(traversal.trace(schedule, surfaces));
+    }
+
+    fn list_paths(&mut self) {
+        if self.wave.vertex >= self.first_listed {
+            self.add(Kernel::new("list_paths", Domain::Arrivals, &[]));
+        }
+    }
+
+    fn read_textures(&mut self) {
+        if self.settings.surfaces.is_textured() {
+            self.add_over("texture", Domain::Surfaces);
+        }
+    }
+
+    fn add_emission(&mut self) {
+        if self.emits() {
+            let is_listed = self.wave.vertex < self.vertices;
+            self.add_over("emit", if is_listed { Domain::Surfaces } else { Domain::Arrivals });
+        }
+    }
+
+    /// One shadow ray to a lamp after another.
+    fn sample_lamps(&mut self) {
+        let PassSettings { surfaces, traversal, incoherent, .. } = *self.settings;
+        if !self.is_lit() || surfaces.lamp_count == 0 {
+            return;
+        }
+        let rays = rays_to_lamps(self.wave.total_shadow_rays);
+        let to_lamps =
+            Wave { to_lamps: 1, shadow_ray_count: 1, total_shadow_rays: rays, ..self.wave };
+        let sample = Kernel::new("sample_lamps", Domain::Surfaces, &surfaces.constants());
+        for ray in 0..rays {
+            let wave = Wave { first_shadow_ray: ray, ..to_lamps };
+            self.add_with(sample.clone(), wave);
+            self.add_with(traversal.shadow(incoherent, surfaces), wave);
+            self.gather(wave);
+        }
+    }
+
+    /// The sampler's own shadow rays, in groups.
+    fn sample_environment(&mut self) {
+        let PassSettings { surfaces, traversal, incoherent, .. } = *self.settings;
+        let steps = self.steps;
+        if self.wave.total_shadow_rays > 0 {
+            self.add_all(steps.prepare(&self.wave));
         }
         loop {
-            let left = wave.total_shadow_rays - wave.first_shadow_ray;
-            wave.shadow_ray_count = left.min(steps.rays_per_group());
-            if wave.shadow_ray_count > 0 {
-                for kernel in steps.sample(&wave) {
-                    add(kernel, &wave);
-                }
+            let left = self.wave.total_shadow_rays - self.wave.first_shadow_ray;
+            self.wave.shadow_ray_count = left.min(steps.rays_per_group());
+            if self.wave.shadow_ray_count > 0 {
+                self.add_all(steps.sample(&self.wave));
                 if !steps.traces() {
-                    add(traversal.shadow(incoherent, surfaces), &wave);
+                    self.add(traversal.shadow(incoherent, surfaces));
                 }
-                for kernel in steps.after_shadow_rays(&wave) {
-                    add(kernel, &wave);
-                }
+                self.add_all(steps.after_shadow_rays(&self.wave));
             }
-            add(gather(), &wave);
-            if shares
-                && vertex == 1
-                && let Some(kernel) = sharing.gather_base()
-            {
-                add(kernel, &wave);
-            }
-            if wave.first_shadow_ray + wave.shadow_ray_count >= wave.total_shadow_rays {
+            self.gather(self.wave);
+            if self.wave.shadow_ray_count == left {
                 break;
             }
-            wave.first_shadow_ray += wave.shadow_ray_count;
+            self.wave.first_shadow_ray += self.wave.shadow_ray_count;
         }
-        for kernel in steps.finish(&wave) {
-            add(kernel, &wave);
-        }
-        if vertex == 0 && wave.aovs & FEATURES != 0 && wave.is_training == 0 {
-            add(Kernel::new("features", Domain::Pixels, &constants), &wave);
-        }
-        if shares && vertex == 0 {
-            add(sharing.keep_first(), &wave);
-        }
-        if vertex + 1 < vertices {
-            let guided = if wave.total_shadow_rays > 0 { steps.bounce(&wave) } else { None };
-            add(guided.unwrap_or_else(|| bounce(settings, false)), &wave);
-        }
-        if shares && vertex == 1 && vertex + 1 < vertices {
-            add(sharing.keep_third(), &wave);
+        self.add_all(steps.finish(&self.wave));
+    }
+
+    fn gather(&mut self, wave: Wave) {
+        let escape = self.escape.as_deref().filter(|_| wave.to_lamps == 0).unwrap_or_default();
+        self.add_with(Kernel::new("gather", Domain::Arrivals, escape), wave);
+        self.share(Moment::Gathered, wave);
+    }
+
+    fn add_features(&mut self) {
+        let Wave { vertex, aovs, is_training, .. } = self.wave;
+        if vertex == 0 && aovs & FEATURES != 0 && is_training == 0 {
+            self.add_over("features", Domain::Pixels);
         }
     }
-    let ends_at_second = shares && vertices == 2;
-    let goes_on = follows_last || is_lit && surfaces.has_specular();
-    if ends_at_second && !goes_on {
-        add(sharing.keep_third(), &wave);
-    }
-    if goes_on {
-        // Follow the last vertices to light that is not sampled, or not sampled alone.
-        add(bounce(settings, !surfaces.emits()), &wave);
-        if ends_at_second {
-            add(sharing.keep_third(), &wave);
+
+    fn bounce(&mut self) {
+        if !self.is_last_vertex() {
+            let samples = self.wave.total_shadow_rays > 0;
+            let guided = samples.then(|| self.steps.bounce(&self.wave)).flatten();
+            self.add(guided.unwrap_or_else(|| bounce(self.settings, false)));
+        } else if self.goes_on() {
+            self.add(bounce(self.settings, !self.settings.surfaces.emits()));
         }
-        wave.arriving_shadow_rays = wave.bounce_rays * wave.total_shadow_rays;
-        wave = Wave { vertex: vertices, shadow_ray_count: 0, total_shadow_rays: 0, ..wave };
-        wave.first_shadow_ray = 0;
-        add(traversal.trace(incoherent, surfaces), &wave);
-        if surfaces.emits() {
-            add(Kernel::new("emit", Domain::Arrivals, &constants), &wave);
-        }
-        add(gather(), &wave);
     }
-    if shares {
-        order.extend(sharing.connect_and_share(&wave));
-    }
-    order.push(Dispatch { kernel: Kernel::new("accumulate", Domain::Pixels, &[]), wave });
-    order
 }
 
 /// Returns the list of paths that a pass walks at a vertex, as in [`Wave::path_list`].

@@ -15,6 +15,19 @@ use crate::shader::{
 /// Bits of the kinds of material that reflect more than their diffuse base (`glsl/include/base.glsl`).
 const WITH_BASE_AND_REST: u32 = KINDS_WITH_BASE & !(1 << MATERIAL_DIFFUSE);
 
+/// Moments of a vertex at which sharing may add a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moment {
+    /// Surfaces are known, and no light is gathered.
+    Met,
+    /// The light of a group of shadow rays is gathered.
+    Gathered,
+    /// All light is gathered, and paths are about to go on.
+    Leaving,
+    /// Paths have gone on or ended.
+    Left,
+}
+
 /// Passes by which tiles share paths.
 #[derive(Clone, Copy, Debug)]
 pub struct Sharing {
@@ -33,25 +46,19 @@ impl Sharing {
         Kernel::new(shader, Domain::Paths, &self.surfaces.constants())
     }
 
-    /// Keeps the first vertices, before their paths go on.
-    pub fn keep_first(&self) -> Kernel {
-        self.over_surfaces("keep_first")
-    }
-
-    /// Keeps the second vertices, before light is gathered there.
-    pub fn keep_second(&self) -> Kernel {
-        self.over_surfaces("keep_second")
-    }
-
-    /// Adds the light of shadow rays that the base of second vertices reflects, where it is not all.
-    pub fn gather_base(&self) -> Option<Kernel> {
+    /// The pass at a moment of a vertex, if there is one.
+    pub fn at(&self, moment: Moment, vertex: u32) -> Option<Kernel> {
         let has_rest = self.surfaces.material_kinds & WITH_BASE_AND_REST != 0;
-        has_rest.then(|| self.over_surfaces("gather_base"))
-    }
-
-    /// Parts the light of the second vertices, once their paths have bounced.
-    pub fn keep_third(&self) -> Kernel {
-        self.over_surfaces("keep_third")
+        let shader = match (vertex, moment) {
+            (0, Moment::Leaving) => "keep_first",
+            (1, Moment::Met) => "keep_second",
+            // Adds the light that the base of second vertices reflects, where it is not all.
+            (1, Moment::Gathered) if has_rest => "gather_base",
+            // Parts the light of the second vertices.
+            (1, Moment::Left) => "keep_third",
+            _ => return None,
+        };
+        Some(self.over_surfaces(shader))
     }
 
     /// Connects the vertices of a finished `wave` in groups of shadow rays, and shares the light.
