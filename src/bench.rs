@@ -65,7 +65,7 @@ pub struct RateSpread {
 
 impl RateSpread {
     /// Median and extremes of `values`; zeros if there are none.
-    pub fn of(mut values: Vec<f64>) -> Self {
+    pub(crate) fn of(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         let at = |index: usize| values.get(index).copied().unwrap_or(0.0);
         let last = values.len().saturating_sub(1);

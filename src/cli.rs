@@ -9,7 +9,7 @@ use crate::{command, error::Error, memory};
 /// Arguments of `fenestra`.
 #[derive(Debug, Parser)]
 #[command(name = "fenestra", version, about, propagate_version = true)]
-pub struct Cli {
+pub(crate) struct Cli {
     /// Command to run.
     #[command(subcommand)]
     pub command: Command,

@@ -146,12 +146,12 @@ impl Record {
     }
 
     /// Takes a position of the mesh to the world.
-    pub fn point_to_world(&self, position: Vec3) -> Vec3 {
+    pub(crate) fn point_to_world(&self, position: Vec3) -> Vec3 {
         map_point(&self.world_from_object, position)
     }
 
     /// Takes a normal of the mesh to the world, a unit vector unless it has no direction.
-    pub fn normal_to_world(&self, normal: Vec3) -> Vec3 {
+    pub(crate) fn normal_to_world(&self, normal: Vec3) -> Vec3 {
         let [x, y, z] = self.object_from_world.map(|[x, y, z, _]| Vec3::new(x, y, z));
         let world = normal.x * x + normal.y * y + normal.z * z;
         let largest = world.abs().max_element();

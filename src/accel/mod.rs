@@ -13,7 +13,7 @@
 pub mod attributes;
 mod binary;
 pub mod instances;
-pub mod traverse;
+pub(crate) mod traverse;
 
 use std::ops::RangeInclusive;
 
@@ -36,13 +36,13 @@ use crate::{
 use instances::{Level, Record};
 
 /// Most pages (buffers) for the triangles, bindings `BINDING_TRIANGLES_0` to `_3`.
-pub const MAX_TRIANGLE_PAGES: usize = 4;
+pub(crate) const MAX_TRIANGLE_PAGES: usize = 4;
 
 /// Bytes that building takes for a triangle at its peak, measured.
 const BUILD_BYTES: usize = 250;
 
 /// A node as the shader reads it: five `uvec4`.
-pub type Node = [u32; 20];
+pub(crate) type Node = [u32; 20];
 
 /// Three vertices of a triangle, each with its packed shading normal: three `uvec4` in the shader.
 ///
@@ -179,7 +179,7 @@ impl Accel {
     }
 
     /// Number of triangles that lie in the world; they come first.
-    pub fn placed_count(&self) -> usize {
+    pub(crate) fn placed_count(&self) -> usize {
         self.first_triangles.get(1).map_or(0, |&count| count as usize)
     }
 

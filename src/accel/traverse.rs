@@ -37,7 +37,7 @@ pub struct Surface {
 
 /// Work done for one ray.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Work {
+pub(crate) struct Work {
     /// Calls of the step function.
     pub steps: u32,
     /// Nodes visited.
@@ -62,7 +62,11 @@ impl Accel {
     }
 
     /// As [`Accel::closest`], and returns the work done.
-    pub fn closest_with_work(&self, origin: Vec3, direction: Vec3) -> (Option<Intersection>, Work) {
+    pub(crate) fn closest_with_work(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+    ) -> (Option<Intersection>, Work) {
         let mut ray = self.start(origin, direction, false);
         while ray.step() {}
         (ray.hit(), ray.work)

@@ -52,7 +52,7 @@ fn ggx_albedo(outgoing: Vec3, alpha: f32, points: u32, fresnel: impl Fn(f32) -> 
 
 /// Words of a plastic: directional albedo of the coat, transmission into and out of the base,
 /// probability of sampling the coat; see `PLASTIC_…_OFFSET`.
-pub fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
+pub(crate) fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
     let fresnel = |cosine| Vec3::splat(fresnel_dielectric(cosine, ior));
     let coat_albedo = |direction| ggx_albedo(direction, alpha, FINE_POINTS, fresnel).x.min(1.0);
     let mut coat: Vec<f32> = (0..BRDF_COSINE_NODES)
@@ -94,7 +94,7 @@ pub fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
 }
 
 /// Words of a conductor with exact Fresnel: directional albedo.
-pub fn conductor_words(alpha: f32, eta: Vec3, k: Vec3) -> Vec<u32> {
+pub(crate) fn conductor_words(alpha: f32, eta: Vec3, k: Vec3) -> Vec<u32> {
     let fresnel = |cosine: f32| fresnel_conductor(cosine, eta, k);
     (0..BRDF_COSINE_NODES)
         .into_par_iter()
@@ -109,13 +109,13 @@ pub fn conductor_words(alpha: f32, eta: Vec3, k: Vec3) -> Vec<u32> {
 }
 
 /// Words of the table that all GGX surfaces with a Schlick reflectance share.
-pub const GGX_WORDS: usize = (DIFFUSE_RISE_OFFSET + BRDF_COSINE_NODES) as usize;
+pub(crate) const GGX_WORDS: usize = (DIFFUSE_RISE_OFFSET + BRDF_COSINE_NODES) as usize;
 
 /// Albedo of GGX by roughness and cosine as factors of the reflectance at normal and at grazing
 /// incidence, and the mean rise of Schlick's reflectance over a diffuse base; see
 /// `GGX_ROUGHNESS_WORDS` and `DIFFUSE_RISE_OFFSET`. Computed once a process, by one
 /// thread: one that waits for others in here could be given work that waits for it.
-pub fn ggx_words() -> &'static [u32] {
+pub(crate) fn ggx_words() -> &'static [u32] {
     static WORDS: LazyLock<Vec<u32>> = LazyLock::new(|| {
         let nodes = (GGX_ROUGHNESS_INTERVALS + 1) * BRDF_COSINE_NODES;
         let ggx: Vec<[f32; 2]> = (0..nodes)

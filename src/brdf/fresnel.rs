@@ -30,20 +30,20 @@ fn square_root(v: Vec3) -> Vec3 {
 }
 
 /// Share of the way from normal to grazing reflectance, (1 − cosθ)⁵. \[Schlick 1994\].
-pub fn schlick_rise(cosine: f32) -> f32 {
+pub(crate) fn schlick_rise(cosine: f32) -> f32 {
     let complement = 1.0 - cosine;
     let square = complement * complement;
     square * square * complement
 }
 
 /// Reflectance of a conductor from that at normal incidence. \[Schlick 1994\].
-pub fn fresnel_schlick(cosine: f32, reflectance: Vec3) -> Vec3 {
+pub(crate) fn fresnel_schlick(cosine: f32, reflectance: Vec3) -> Vec3 {
     reflectance + (Vec3::ONE - reflectance) * schlick_rise(cosine)
 }
 
 /// Cosine of the refracted direction with the inverted normal; `eta` is the refractive index beyond
 /// the interface over that of this side. 0 for total reflection.
-pub fn refracted_cosine(cosine: f32, eta: f32) -> f32 {
+pub(crate) fn refracted_cosine(cosine: f32, eta: f32) -> f32 {
     (1.0 - (1.0 - cosine * cosine) / (eta * eta)).max(0.0).sqrt()
 }
 

@@ -6,7 +6,7 @@ use std::f32::consts::PI;
 use glam::{Vec2, Vec3, vec3};
 
 /// Smallest GGX width: single-precision directions cannot resolve a narrower lobe.
-pub const SMALLEST_ALPHA: f32 = 1e-3;
+pub(crate) const SMALLEST_ALPHA: f32 = 1e-3;
 
 /// Density of GGX normals, per steradian, for a half vector of any length. \[Walter et al. 2007\]
 /// Eq. 33, without the cancellation in 1 − cos²θ, which matters for α below 0.01.
@@ -18,7 +18,7 @@ pub fn ggx_normal_density(half_vector: Vec3, alpha: f32) -> f32 {
 }
 
 /// Length of the direction after stretching the surface to α = 1: √(cos²θ + α² sin²θ).
-pub fn ggx_stretched_length(direction: Vec3, alpha: f32) -> f32 {
+pub(crate) fn ggx_stretched_length(direction: Vec3, alpha: f32) -> f32 {
     (alpha * direction.truncate()).extend(direction.z).length()
 }
 
@@ -34,7 +34,7 @@ fn ggx_cap_factor(outgoing_local: Vec3, alpha: f32) -> f32 {
 
 /// Microfacet reflection at unit reflectance, per steradian: D·G₂/(4 cosθ_o cosθ_i) with the
 /// height-correlated masking of \[Heitz 2014\] Eq. 99.
-pub fn ggx_reflection(
+pub(crate) fn ggx_reflection(
     half_vector: Vec3,
     outgoing_local: Vec3,
     incident_local: Vec3,
@@ -46,7 +46,7 @@ pub fn ggx_reflection(
 }
 
 /// Density of [`ggx_sample`]. \[Eto & Tokuyoshi 2023\] Eq. 8 with the Jacobian of the reflection.
-pub fn ggx_pdf(half_vector: Vec3, outgoing_local: Vec3, alpha: f32) -> f32 {
+pub(crate) fn ggx_pdf(half_vector: Vec3, outgoing_local: Vec3, alpha: f32) -> f32 {
     let cap = ggx_cap_factor(outgoing_local, alpha) * outgoing_local.z
         + ggx_stretched_length(outgoing_local, alpha);
     0.5 * ggx_normal_density(half_vector, alpha) / cap
@@ -54,7 +54,12 @@ pub fn ggx_pdf(half_vector: Vec3, outgoing_local: Vec3, alpha: f32) -> f32 {
 
 /// Samples a normal by its projection toward the outgoing direction, on the spherical cap above
 /// −`cap_factor`; a factor of 1 gives all visible normals. \[Dupuy & Benyoub 2023\].
-pub fn ggx_normal_sample(outgoing_local: Vec3, alpha: f32, cap_factor: f32, u: Vec2) -> Vec3 {
+pub(crate) fn ggx_normal_sample(
+    outgoing_local: Vec3,
+    alpha: f32,
+    cap_factor: f32,
+    u: Vec2,
+) -> Vec3 {
     let stretched = (alpha * outgoing_local.truncate()).extend(outgoing_local.z).normalize();
     let cap = cap_factor * stretched.z;
     // 1 − z rather than z keeps the root below accurate near the pole.
@@ -67,14 +72,14 @@ pub fn ggx_normal_sample(outgoing_local: Vec3, alpha: f32, cap_factor: f32, u: V
 
 /// Density of all visible normals, per steradian, over the cosine of outgoing direction and normal:
 /// G₁·D/cosθ_o. \[Heitz 2014\] Eq. 21.
-pub fn ggx_visible_density(normal: Vec3, outgoing_local: Vec3, alpha: f32) -> f32 {
+pub(crate) fn ggx_visible_density(normal: Vec3, outgoing_local: Vec3, alpha: f32) -> f32 {
     2.0 * ggx_normal_density(normal, alpha)
         / (outgoing_local.z + ggx_stretched_length(outgoing_local, alpha))
 }
 
 /// G₂ of both directions over G₁ of the outgoing one; height-correlated on one side, and the same
 /// expression where the other direction is below the surface. 0…1.
-pub fn ggx_masking_ratio(outgoing_local: Vec3, incident_local: Vec3, alpha: f32) -> f32 {
+pub(crate) fn ggx_masking_ratio(outgoing_local: Vec3, incident_local: Vec3, alpha: f32) -> f32 {
     let cosine = incident_local.z.abs();
     let stretched = ggx_stretched_length(outgoing_local, alpha);
     (outgoing_local.z + stretched) * cosine
@@ -84,7 +89,7 @@ pub fn ggx_masking_ratio(outgoing_local: Vec3, incident_local: Vec3, alpha: f32)
 /// Samples an incident direction by the visible normals of GGX, on the spherical cap that omits
 /// most reflections below the surface. Those that remain have z ≤ 0: no sample. \[Dupuy & Benyoub
 /// 2023\], \[Eto & Tokuyoshi 2023\].
-pub fn ggx_sample(outgoing_local: Vec3, alpha: f32, u: Vec2) -> Vec3 {
+pub(crate) fn ggx_sample(outgoing_local: Vec3, alpha: f32, u: Vec2) -> Vec3 {
     let cap_factor = ggx_cap_factor(outgoing_local, alpha);
     let normal = ggx_normal_sample(outgoing_local, alpha, cap_factor, u);
     2.0 * outgoing_local.dot(normal) * normal - outgoing_local

@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Largest size of the BRDF table buffer: Vulkan guarantees it for one storage buffer.
-pub const LARGEST_TABLE_BYTES: usize = 128 << 20;
+pub(crate) const LARGEST_TABLE_BYTES: usize = 128 << 20;
 
 /// Contents of the material and BRDF table buffers.
 #[derive(Clone, Debug, PartialEq)]

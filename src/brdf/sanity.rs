@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::scene::measured::MeasuredTable;
 
 /// Elevations of the reported albedo, degrees from the normal.
-pub const ELEVATIONS_DEG: [f32; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
+pub(crate) const ELEVATIONS_DEG: [f32; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
 
 /// Angle between the directions tried in pairs, degrees.
 const STEP_DEG: usize = 15;
@@ -19,7 +19,7 @@ const QUADRATURE_STEPS: [usize; 2] = [360, 720];
 
 /// Figures on the plausibility of a measured BRDF.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Sanity {
+pub(crate) struct Sanity {
     /// Reflected share of light from a uniform hemisphere, linear Rec.709, at each of
     /// [`ELEVATIONS_DEG`]: ∫ value · cosine dω by the midpoint rule. Unlike the albedo used for
     /// rendering, it is not clamped.
@@ -34,7 +34,7 @@ pub struct Sanity {
 
 impl Sanity {
     /// Examines a table.
-    pub fn of(table: &MeasuredTable) -> Self {
+    pub(crate) fn of(table: &MeasuredTable) -> Self {
         let albedo: Vec<[f32; 3]> =
             ELEVATIONS_DEG.iter().map(|&elevation_deg| albedo(table, elevation_deg)).collect();
         let (largest_value, largest_reciprocity_error) = try_pairs(table);
@@ -47,7 +47,7 @@ impl Sanity {
     }
 
     /// Warnings for a user who renders with it.
-    pub fn warnings(&self) -> Vec<String> {
+    pub(crate) fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         if self.largest_albedo > 1.0 {
             warnings.push(format!(

@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// A denoised picture, and a line about it.
-pub struct Denoised {
+pub(crate) struct Denoised {
     /// Picture, window and attributes, with the mark of the denoiser.
     pub image: Image,
     /// Denoiser, layers and time, for the terminal.

@@ -8,14 +8,14 @@ use std::sync::{
 /// Interrupts of this process. One while there is nothing to lose, and a second one, end it at once
 /// with status 130; another is noted for the caller, who writes what there is.
 #[derive(Debug, Default)]
-pub struct Interrupt {
+pub(crate) struct Interrupt {
     is_raised: AtomicBool,
     has_caller: AtomicBool,
 }
 
 impl Interrupt {
     /// Starts to listen.
-    pub fn listen() -> Arc<Self> {
+    pub(crate) fn listen() -> Arc<Self> {
         let interrupt = Arc::new(Self::default());
         let heard = Arc::clone(&interrupt);
         let listening = ctrlc::set_handler(move || {
@@ -34,12 +34,12 @@ impl Interrupt {
     }
 
     /// Leaves the first interrupt from now on to the caller, who asks [`Interrupt::is_raised`].
-    pub fn wait_for_caller(&self) {
+    pub(crate) fn wait_for_caller(&self) {
         self.has_caller.store(true, Ordering::SeqCst);
     }
 
     /// Tests whether there was an interrupt.
-    pub fn is_raised(&self) -> bool {
+    pub(crate) fn is_raised(&self) -> bool {
         self.is_raised.load(Ordering::SeqCst)
     }
 }

@@ -49,7 +49,7 @@ fn block_signals() -> nix::Result<()> {
 ///
 /// # Errors
 /// A pool of one thread cannot be made either.
-pub fn start_threads() -> Result<Option<ThreadPool>> {
+pub(crate) fn start_threads() -> Result<Option<ThreadPool>> {
     #[cfg(unix)]
     if let Err(error) = block_signals() {
         log::warn!("signals cannot be blocked: {error}");
@@ -70,7 +70,7 @@ pub fn start_threads() -> Result<Option<ThreadPool>> {
 ///
 /// # Errors
 /// Standard output cannot be written.
-pub fn print_line(text: &str) -> Result<()> {
+pub(crate) fn print_line(text: &str) -> Result<()> {
     let mut output = std::io::stdout().lock();
     match writeln!(output, "{text}").and_then(|()| output.flush()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {

@@ -33,7 +33,7 @@ impl SceneOptions {
     ///
     /// # Errors
     /// As [`Scene::load_with`]; [`Error::Scene`] for any warning under `--strict`.
-    pub fn load(&self, path: &Path) -> Result<Scene> {
+    pub(crate) fn load(&self, path: &Path) -> Result<Scene> {
         let scene = Scene::load_with(
             path,
             &LoadOptions {
@@ -49,7 +49,7 @@ impl SceneOptions {
 }
 
 /// Fails under `--strict` if loading `scene` left anything out; lists the warnings.
-pub fn check_strict(strict: bool, scene: &Scene) -> Result<()> {
+pub(crate) fn check_strict(strict: bool, scene: &Scene) -> Result<()> {
     if !strict || scene.warnings.is_empty() {
         return Ok(());
     }
@@ -91,7 +91,7 @@ pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
 }
 
 /// Parses `x0,y0,x1,y1` in pixels, upper bounds excluded.
-pub fn parse_crop(text: &str) -> Result<Window, String> {
+pub(crate) fn parse_crop(text: &str) -> Result<Window, String> {
     let numbers: Option<Vec<u32>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
     match numbers.as_deref() {
         Some(&[x0, y0, x1, y1]) if x0 < x1 && y0 < y1 => {
@@ -104,7 +104,7 @@ pub fn parse_crop(text: &str) -> Result<Window, String> {
 }
 
 /// Parses `x,y` in pixels.
-pub fn parse_pixel(text: &str) -> Result<[u32; 2], String> {
+pub(crate) fn parse_pixel(text: &str) -> Result<[u32; 2], String> {
     text.split_once(',')
         .and_then(|(x, y)| Some([x.trim().parse().ok()?, y.trim().parse().ok()?]))
         .ok_or_else(|| format!("expected x,y in pixels from the upper left, found {text:?}"))

@@ -21,7 +21,7 @@ const LONGEST_INTERVAL: Duration = Duration::from_secs(60);
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Says what takes long before the first pass, until it is dropped.
-pub struct Patience {
+pub(crate) struct Patience {
     /// Ends the thread by closing.
     end: Option<mpsc::Sender<()>>,
     thread: Option<thread::JoinHandle<()>>,
@@ -29,7 +29,7 @@ pub struct Patience {
 
 impl Patience {
     /// Starts the clock; `quiet` says nothing. So does a system that allows no more threads.
-    pub fn new(label: &str, quiet: bool) -> Self {
+    pub(crate) fn new(label: &str, quiet: bool) -> Self {
         let (end, closed) = mpsc::channel::<()>();
         let label = label.to_owned();
         let watch = move || {
@@ -61,7 +61,7 @@ enum Output {
 }
 
 /// Progress of one run.
-pub struct Progress {
+pub(crate) struct Progress {
     label: String,
     start: Instant,
     output: Output,
@@ -69,7 +69,7 @@ pub struct Progress {
 
 impl Progress {
     /// Starts the clock. `quiet` shows nothing.
-    pub fn new(label: impl Into<String>, quiet: bool) -> Self {
+    pub(crate) fn new(label: impl Into<String>, quiet: bool) -> Self {
         let label = label.into();
         let output = if quiet {
             Output::Quiet
@@ -88,7 +88,7 @@ impl Progress {
     }
 
     /// Updates the display; call it as often as convenient.
-    pub fn update(&mut self, standing: &Standing) {
+    pub(crate) fn update(&mut self, standing: &Standing) {
         let elapsed = self.start.elapsed();
         let message = || {
             let remaining = remaining(elapsed, standing.fraction)
@@ -115,7 +115,7 @@ impl Progress {
     }
 
     /// Prints a permanent line above the bar (a warning, a file written).
-    pub fn print(&self, line: &str) {
+    pub(crate) fn print(&self, line: &str) {
         match &self.output {
             Output::Bar(bar) => bar.suspend(|| eprintln!("{line}")),
             Output::Lines { .. } => eprintln!("{line}"),
@@ -124,7 +124,7 @@ impl Progress {
     }
 
     /// Removes the bar and prints a last line: the final state and why the run ended.
-    pub fn finish(self, standing: &Standing, reason: &str) {
+    pub(crate) fn finish(self, standing: &Standing, reason: &str) {
         if let Output::Bar(bar) = &self.output {
             bar.finish_and_clear();
         }

@@ -128,13 +128,13 @@ pub fn remove_checkpoint(path: &Path) -> Result<()> {
 }
 
 /// Tests whether `path` is named like a checkpoint.
-pub fn is_checkpoint_path(path: &Path) -> bool {
+pub(crate) fn is_checkpoint_path(path: &Path) -> bool {
     path.file_name()
         .is_some_and(|name| name.to_string_lossy().to_lowercase().ends_with(".checkpoint.exr"))
 }
 
 /// Path and bytes of a guide.
-pub type GuideFile = (PathBuf, Vec<u8>);
+pub(crate) type GuideFile = (PathBuf, Vec<u8>);
 
 impl Checkpoint {
     /// Tests whether an image file holds a checkpoint.

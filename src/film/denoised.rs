@@ -6,7 +6,7 @@ use super::{Attribute, Image};
 use crate::error::{Error, Result};
 
 /// Attribute of an image that a denoiser has made, with its name.
-pub const DENOISED: &str = "fenestra.denoised";
+pub(crate) const DENOISED: &str = "fenestra.denoised";
 
 /// Layers of an image that guide a denoiser, those of the first hit.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -19,14 +19,14 @@ pub struct Guides {
 
 impl Guides {
     /// Takes the layers that `image` has.
-    pub fn of(image: &Image) -> Self {
+    pub(crate) fn of(image: &Image) -> Self {
         let albedo = image.triple(["Albedo.R", "Albedo.G", "Albedo.B"]);
         let normal = albedo.as_ref().and_then(|_| image.triple(["N.X", "N.Y", "N.Z"]));
         Self { albedo, normal }
     }
 
     /// Names of the layers: "Albedo, N".
-    pub fn names(&self) -> String {
+    pub(crate) fn names(&self) -> String {
         let names = [("Albedo", self.albedo.is_some()), ("N", self.normal.is_some())];
         let present: Vec<&str> = names.iter().filter(|name| name.1).map(|name| name.0).collect();
         present.join(", ")
@@ -35,7 +35,7 @@ impl Guides {
 
 /// Gives pixels that are not finite the mean of their finite neighbours, and black where there is none.
 /// Returns how many they were.
-pub fn repair(pixels: &mut [[f32; 3]], width: u32) -> usize {
+pub(crate) fn repair(pixels: &mut [[f32; 3]], width: u32) -> usize {
     let width = width as usize;
     let is_finite = |pixel: &[f32; 3]| pixel.iter().all(|value| value.is_finite());
     let bad: Vec<usize> = (0..pixels.len()).filter(|index| !is_finite(&pixels[*index])).collect();
@@ -62,7 +62,7 @@ pub fn repair(pixels: &mut [[f32; 3]], width: u32) -> usize {
 ///
 /// # Panics
 /// `pixels` is not as many as those of `film`.
-pub fn image_of(film: &Image, pixels: &[[f32; 3]], denoiser: String) -> Image {
+pub(crate) fn image_of(film: &Image, pixels: &[[f32; 3]], denoiser: String) -> Image {
     let mut image = Image {
         channels: std::collections::BTreeMap::new(),
         attributes: film.attributes.clone(),
@@ -77,7 +77,7 @@ pub fn image_of(film: &Image, pixels: &[[f32; 3]], denoiser: String) -> Image {
 ///
 /// # Errors
 /// [`Error::Format`] names the denoiser.
-pub fn check_film(image: &Image, path: &Path) -> Result<()> {
+pub(crate) fn check_film(image: &Image, path: &Path) -> Result<()> {
     match image.attributes.get(DENOISED) {
         None => Ok(()),
         Some(denoiser) => {

@@ -14,7 +14,7 @@ use super::Image;
 use crate::error::{Error, Result};
 
 /// Port that tev listens on by default.
-pub const DEFAULT_PORT: u16 = 14158;
+pub(crate) const DEFAULT_PORT: u16 = 14158;
 
 /// Operation that opens an image by name, replacing one of the same name.
 const CREATE_IMAGE: u8 = 4;

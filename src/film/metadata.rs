@@ -112,7 +112,7 @@ fn check_ranges(ranges: &[SampleRange]) -> Result<(), String> {
 }
 
 /// Converts times by pass from milliseconds to seconds.
-pub fn seconds_of(ms: &BTreeMap<String, f64>) -> BTreeMap<String, f64> {
+pub(crate) fn seconds_of(ms: &BTreeMap<String, f64>) -> BTreeMap<String, f64> {
     ms.iter().map(|(pass, ms)| (pass.clone(), ms * 1e-3)).collect()
 }
 
@@ -244,7 +244,7 @@ impl Metadata {
 
     /// Lists the settings that keep two renders from being parts of one image, as "name: ours
     /// against theirs". Seeds, sample ranges, devices and times may differ.
-    pub fn differences(&self, other: &Self) -> Vec<String> {
+    pub(crate) fn differences(&self, other: &Self) -> Vec<String> {
         let mut found = Vec::new();
         let mut compare = |what: &str, ours: String, theirs: String| {
             if ours != theirs {

@@ -15,14 +15,14 @@ pub mod sky;
 pub mod statistics;
 pub mod summary;
 pub mod sums;
-pub mod tone;
+pub(crate) mod tone;
 
+pub(crate) use self::tone::{Curve, Tone};
 pub use self::{
     checkpoint::Checkpoint,
     display::DisplayServer,
     metadata::{Metadata, SampleRange},
     statistics::Statistics,
     sums::{Aov, Sums},
-    tone::{Curve, Tone},
 };
 pub use fenestra_scene::picture::{Attribute, Image, RgbImage, Window};

@@ -14,7 +14,7 @@ const JPEG_QUALITY: u8 = 92;
 ///
 /// # Errors
 /// [`crate::Error::Io`] with the cause.
-pub fn write_jpeg(path: &Path, width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<()> {
+pub(crate) fn write_jpeg(path: &Path, width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<()> {
     write_atomically(path, |file| {
         image::codecs::jpeg::JpegEncoder::new_with_quality(file, JPEG_QUALITY)
             .write_image(pixels.as_flattened(), width, height, ExtendedColorType::Rgb8)
@@ -27,7 +27,7 @@ pub fn write_jpeg(path: &Path, width: u32, height: u32, pixels: &[[u8; 3]]) -> R
 ///
 /// # Errors
 /// [`crate::Error::Io`] with the cause.
-pub fn write_hdr(path: &Path, picture: &RgbImage) -> Result<()> {
+pub(crate) fn write_hdr(path: &Path, picture: &RgbImage) -> Result<()> {
     let pixels: Vec<Rgb<f32>> = picture.pixels.iter().map(|pixel| Rgb(*pixel)).collect();
     write_atomically(path, |file| {
         let (width, height) = (picture.width as usize, picture.height as usize);

@@ -36,13 +36,13 @@ pub fn preview(picture: &RgbImage, exposure: f32) -> Vec<[u8; 3]> {
 ///
 /// # Panics
 /// `pixels` is not `width * height` long.
-pub fn write_rgb8(path: &Path, width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<()> {
+pub(crate) fn write_rgb8(path: &Path, width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<()> {
     assert_eq!(pixels.len(), width as usize * height as usize, "one value per pixel");
     write_atomically(path, |file| encode_rgb8(file, width, height, pixels))
 }
 
 /// Encodes display values as PNG.
-pub fn encode_rgb8(
+pub(crate) fn encode_rgb8(
     writer: impl Write,
     width: u32,
     height: u32,

@@ -12,7 +12,7 @@ const BELOW: f32 = 0.25;
 const HORIZON: [u8; 3] = [90, 160, 255];
 
 /// Returns the value that a share of 0.5% of a function's pixels exceeds.
-pub fn white_of(width: usize, value: impl Fn(Vec3) -> Vec3) -> f32 {
+pub(crate) fn white_of(width: usize, value: impl Fn(Vec3) -> Vec3) -> f32 {
     let mut sorted: Vec<f32> = (0..width * (width / 2))
         .map(|pixel| value(direction_of(width, pixel)).max_element())
         .collect();
@@ -31,7 +31,12 @@ pub struct Sky {
 impl Sky {
     /// Draws a function of direction, with `white` shown as white; what lies below the horizon of `normal`
     /// is darker.
-    pub fn new(width: usize, normal: Vec3, white: f32, value: impl Fn(Vec3) -> Vec3) -> Self {
+    pub(crate) fn new(
+        width: usize,
+        normal: Vec3,
+        white: f32,
+        value: impl Fn(Vec3) -> Vec3,
+    ) -> Self {
         let height = width / 2;
         let show = |pixel: usize| {
             let direction = direction_of(width, pixel);
@@ -46,12 +51,12 @@ impl Sky {
     }
 
     /// Display values, row by row from the top.
-    pub fn pixels(&self) -> &[[u8; 3]] {
+    pub(crate) fn pixels(&self) -> &[[u8; 3]] {
         &self.pixels
     }
 
     /// Draws a dot with a black rim.
-    pub fn mark(&mut self, direction: Vec3, colour: [u8; 3]) {
+    pub(crate) fn mark(&mut self, direction: Vec3, colour: [u8; 3]) {
         let (width, height) = (self.width, self.width / 2);
         let uv = lat_long_from_direction(direction);
         let centre = [(uv.x * width as f32) as i32, (uv.y * height as f32) as i32];

@@ -89,7 +89,7 @@ impl Statistics {
     ///
     /// # Errors
     /// [`crate::Error::Io`] with the cause.
-    pub fn write(&self, path: &Path) -> Result<()> {
+    pub(crate) fn write(&self, path: &Path) -> Result<()> {
         write_json(path, self)
     }
 }

@@ -2,7 +2,7 @@
 
 /// Summary of the samples of a channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
-pub struct ChannelSummary {
+pub(crate) struct ChannelSummary {
     /// Smallest finite sample; absent if there is none.
     pub minimum: Option<f32>,
     /// Largest finite sample; absent if there is none.
@@ -19,7 +19,7 @@ pub struct ChannelSummary {
 
 impl ChannelSummary {
     /// Summarises `samples`.
-    pub fn of(samples: impl IntoIterator<Item = f32>) -> Self {
+    pub(crate) fn of(samples: impl IntoIterator<Item = f32>) -> Self {
         let mut summary = Self::default();
         let (mut sum, mut count) = (0.0_f64, 0_usize);
         for sample in samples {

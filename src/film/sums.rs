@@ -110,7 +110,7 @@ impl Sums {
     }
 
     /// Tests whether any sample found light.
-    pub fn found_light(&self) -> bool {
+    pub(crate) fn found_light(&self) -> bool {
         self.sum.iter().flatten().any(|&sum| sum != 0.0)
     }
 

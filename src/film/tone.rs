@@ -35,7 +35,7 @@ pub struct Tone {
 
 impl Tone {
     /// Maps a linear pixel to bytes. NaN becomes 0.
-    pub fn display(&self, pixel: [f32; 3]) -> [u8; 3] {
+    pub(crate) fn display(&self, pixel: [f32; 3]) -> [u8; 3] {
         let scale = self.exposure.exp2();
         let scaled = pixel.map(|value| value * scale);
         let mapped = match self.curve {
@@ -63,7 +63,7 @@ fn filmic(value: f32) -> f32 {
 
 /// Returns the exposure, in stops, that makes the geometric mean of the luminance middle grey (0.18),
 /// as in Reinhard et al. 2002. Pixels without light do not count; 0 where none has any.
-pub fn auto_exposure(pixels: &[[f32; 3]]) -> f32 {
+pub(crate) fn auto_exposure(pixels: &[[f32; 3]]) -> f32 {
     let logarithms = pixels
         .iter()
         .map(|pixel| f64::from(luminance((*pixel).into())))

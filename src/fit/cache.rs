@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Extension of fit files.
-pub const EXTENSION: &str = "fit";
+pub(crate) const EXTENSION: &str = "fit";
 /// Name of the format in the header.
 const FORMAT: &str = "fenestra-fit";
 
@@ -105,7 +105,7 @@ pub struct Cache {
 
 impl Cache {
     /// The user's cache, `fenestra/fits` in `$XDG_CACHE_HOME` or `~/.cache`; none if neither is set.
-    pub fn user() -> Option<Self> {
+    pub(crate) fn user() -> Option<Self> {
         files::cache_folder("fits").map(Self::at)
     }
 
@@ -115,12 +115,12 @@ impl Cache {
     }
 
     /// File of a fit.
-    pub fn path(&self, key: &str) -> PathBuf {
+    pub(crate) fn path(&self, key: &str) -> PathBuf {
         self.folder.join(format!("{key}.{EXTENSION}"))
     }
 
     /// Loads the fit named `key` if present. Logs a warning if the file is unsound.
-    pub fn load(&self, key: &str) -> Option<Fit> {
+    pub(crate) fn load(&self, key: &str) -> Option<Fit> {
         match read_fit(&self.path(key)) {
             Ok(fit) => Some(fit),
             Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => None,
@@ -132,7 +132,7 @@ impl Cache {
     }
 
     /// Stores a fit. Logs a warning if the cache cannot be written.
-    pub fn store(&self, key: &str, fit: &Fit) {
+    pub(crate) fn store(&self, key: &str, fit: &Fit) {
         if let Err(error) = write_fit(&self.path(key), fit) {
             log::warn!("{error}; the fit is not kept");
         }

@@ -25,7 +25,10 @@ const MAX_SWEEPS: usize = 400;
 const TOLERANCE: f64 = 1e-5;
 
 /// Finds amplitudes per lobe and channel that lower each channel's divergence.
-pub fn divergence_colours(patches: &[ColouredPatch], components: &[Component]) -> Vec<DVec3> {
+pub(crate) fn divergence_colours(
+    patches: &[ColouredPatch],
+    components: &[Component],
+) -> Vec<DVec3> {
     let channel = |index: usize| -> Vec<f64> {
         let points =
             PointSet::weighted(patches.iter().map(|patch| (&patch.patch, patch.colour[index])));
@@ -43,7 +46,7 @@ pub fn divergence_colours(patches: &[ColouredPatch], components: &[Component]) -
 }
 
 /// Finds the amplitudes per lobe and channel of the smallest squared error, from the guess `start`.
-pub fn least_squares_colours(
+pub(crate) fn least_squares_colours(
     patches: &[ColouredPatch],
     components: &[Component],
     start: &[DVec3],

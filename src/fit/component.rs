@@ -7,9 +7,9 @@ use glam::DVec3;
 use crate::srbf::Lobe;
 
 /// Smallest bandwidth of a fit; a wider lobe is a constant for every purpose.
-pub const MIN_BANDWIDTH: f64 = 1e-3;
+pub(crate) const MIN_BANDWIDTH: f64 = 1e-3;
 /// Largest bandwidth of a fit: 0.4° wide at half height, a sun of one texel in a map of 1024.
-pub const MAX_BANDWIDTH: f64 = 1e5;
+pub(crate) const MAX_BANDWIDTH: f64 = 1e5;
 
 /// `share · exp(λ(ω·ξ − 1)) / I(λ)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,7 +24,7 @@ pub struct Component {
 
 impl Component {
     /// The component as a lobe of a function with integral `energy`.
-    pub fn lobe(&self, energy: f64) -> Lobe {
+    pub(crate) fn lobe(&self, energy: f64) -> Lobe {
         Lobe {
             axis: self.axis.as_vec3(),
             bandwidth: self.bandwidth as f32,
@@ -33,7 +33,7 @@ impl Component {
     }
 
     /// The component that a lobe is in a function with integral `energy`.
-    pub fn from_lobe(lobe: &Lobe, energy: f64) -> Self {
+    pub(crate) fn from_lobe(lobe: &Lobe, energy: f64) -> Self {
         let bandwidth = f64::from(lobe.bandwidth);
         Self {
             axis: lobe.axis.as_dvec3().normalize(),
@@ -52,12 +52,12 @@ pub fn kernel_integral(bandwidth: f64) -> f64 {
 }
 
 /// Integral of a lobe in 64 bits.
-pub fn lobe_energy(lobe: &Lobe) -> f64 {
+pub(crate) fn lobe_energy(lobe: &Lobe) -> f64 {
     f64::from(lobe.amplitude) * kernel_integral(lobe.bandwidth.into())
 }
 
 /// `1 − A(λ)` with the mean resultant length `A(λ) = coth λ − 1/λ`, without cancellation.
-pub fn mean_shortfall(bandwidth: f64) -> f64 {
+pub(crate) fn mean_shortfall(bandwidth: f64) -> f64 {
     if bandwidth < 1e-2 {
         return 1.0 - bandwidth / 3.0;
     }
@@ -67,7 +67,7 @@ pub fn mean_shortfall(bandwidth: f64) -> f64 {
 /// Bandwidth whose mean resultant length is 1 − `shortfall`, clamped to
 /// [`MIN_BANDWIDTH`]…[`MAX_BANDWIDTH`]: `λ = r̄(3 − r̄²)/(1 − r̄²)` of \[Banerjee et al. 2005\],
 /// refined by Newton's method to be exact, so that expectation maximization never gets worse.
-pub fn bandwidth_from_shortfall(shortfall: f64) -> f64 {
+pub(crate) fn bandwidth_from_shortfall(shortfall: f64) -> f64 {
     let mean = 1.0 - shortfall;
     if mean <= MIN_BANDWIDTH / 3.0 {
         return MIN_BANDWIDTH;

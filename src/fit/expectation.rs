@@ -92,7 +92,7 @@ fn responsibilities(blocks: &[Block], point: Point, row: &mut [Lanes]) -> f32 {
 /// below −40 at e⁻⁴⁰: negligible, yet products with it avoid denormal numbers, which are a hundred
 /// times slower.
 #[inline]
-pub fn fast_exp(x: f32) -> f32 {
+pub(crate) fn fast_exp(x: f32) -> f32 {
     /// 1.5·2²³: adding it rounds to an integer in the lowest bits.
     const ROUND: f32 = 12_582_912.0;
     let x = if x < -40.0 { -40.0 } else { x };
@@ -202,7 +202,7 @@ pub fn step(points: &PointSet, components: &mut [Component]) -> f64 {
 }
 
 /// Performs one step that changes only the shares.
-pub fn reweigh(points: &PointSet, components: &mut [Component]) {
+pub(crate) fn reweigh(points: &PointSet, components: &mut [Component]) {
     let (sums, _) = sum_over_points::<1>(points, components, |share, _, _, sums| {
         for k in 0..LANES {
             sums[0][k] += share[k];
@@ -216,7 +216,7 @@ pub fn reweigh(points: &PointSet, components: &mut [Component]) {
 
 /// Performs at most `steps` steps, until one lowers the divergence by less than `tolerance`.
 /// Returns the divergence before the last step.
-pub fn maximize(
+pub(crate) fn maximize(
     points: &PointSet,
     components: &mut [Component],
     steps: usize,
@@ -235,7 +235,7 @@ pub fn maximize(
 
 /// Statistics of a lobe that decide which lobes to split, and how.
 #[derive(Clone, Copy, Debug)]
-pub struct Holding {
+pub(crate) struct Holding {
     /// The lobe's contribution to the divergence, nats: `Σ γ w ln(p/q)`.
     pub divergence: f64,
     /// Covariance of the points about the axis, weighted by responsibility.
@@ -243,7 +243,7 @@ pub struct Holding {
 }
 
 /// Computes divergence and covariance per lobe.
-pub fn holdings(points: &PointSet, components: &[Component]) -> Vec<Holding> {
+pub(crate) fn holdings(points: &PointSet, components: &[Component]) -> Vec<Holding> {
     let (sums, _) =
         sum_over_points::<8>(points, components, |share, [dx, dy, dz], excess, sums| {
             for k in 0..LANES {

@@ -144,7 +144,7 @@ pub struct BrdfSummary {
 }
 
 /// Angle between the normal and view `view` of `views`, radians.
-pub fn view_theta(view: usize, views: usize) -> f64 {
+pub(crate) fn view_theta(view: usize, views: usize) -> f64 {
     (view as f64 + 0.5) / views as f64 * FRAC_PI_2
 }
 

@@ -17,7 +17,7 @@ const MIN_WIDTH: usize = 512;
 const CHANNELS: usize = 7;
 
 /// Parts along each side of a steep cell.
-pub const STEEP_PARTS: usize = 4;
+pub(crate) const STEEP_PARTS: usize = 4;
 /// Share of the energy above which a steep cell is cut into its parts.
 const HEAVY_SHARE: f64 = 1e-4;
 
@@ -49,7 +49,7 @@ struct Rectangle {
 
 /// Patch of a map with its colour.
 #[derive(Clone, Copy, Debug)]
-pub struct ColouredPatch {
+pub(crate) struct ColouredPatch {
     /// Luminance.
     pub patch: Patch,
     /// Integral of red, green and blue over the patch.
@@ -58,7 +58,7 @@ pub struct ColouredPatch {
 
 impl Grid {
     /// The map without its rotation, at its own resolution or a multiple of it.
-    pub fn new(map: &EnvironmentMap) -> Self {
+    pub(crate) fn new(map: &EnvironmentMap) -> Self {
         let (width, height) = (map.width as usize, map.height as usize);
         let factor = MIN_WIDTH.div_ceil(width.max(1));
         if factor <= 1 {
@@ -75,14 +75,14 @@ impl Grid {
     }
 
     /// Direction of a point in cell coordinates; the centre of cell (x, y) is (x + ½, y + ½).
-    pub fn direction(&self, x: f64, y: f64) -> DVec3 {
+    pub(crate) fn direction(&self, x: f64, y: f64) -> DVec3 {
         let azimuth = 2.0 * PI * (x / self.width as f64 - 0.5);
         let theta = PI * y / self.height as f64;
         DVec3::new(theta.sin() * azimuth.sin(), theta.cos(), -theta.sin() * azimuth.cos())
     }
 
     /// Exact solid angle of a cell in row `y`, steradians.
-    pub fn cell_solid_angle(&self, y: usize) -> f64 {
+    pub(crate) fn cell_solid_angle(&self, y: usize) -> f64 {
         let half = 0.5 * PI / self.height as f64;
         let theta = PI * (y as f64 + 0.5) / self.height as f64;
         // cos a − cos b = 2 sin((a + b)/2) sin((b − a)/2)
@@ -95,7 +95,7 @@ impl Grid {
 
     /// Radiance at a point in cell coordinates, bilinear between cell centres as in the renderer's
     /// lookup.
-    pub fn lookup(&self, x: f64, y: f64) -> Vec3 {
+    pub(crate) fn lookup(&self, x: f64, y: f64) -> Vec3 {
         let (left, top) = ((x - 0.5).floor(), (y - 0.5).floor());
         let (u, v) = ((x - 0.5 - left) as f32, (y - 0.5 - top) as f32);
         let column = |offset: i64| (left as i64 + offset).rem_euclid(self.width as i64) as usize;
@@ -106,7 +106,7 @@ impl Grid {
 
     /// True if the brightest of a cell and its eight neighbours is over four times the darkest, so
     /// that the centre does not represent the cell.
-    pub fn is_steep(&self, x: usize, y: usize) -> bool {
+    pub(crate) fn is_steep(&self, x: usize, y: usize) -> bool {
         let (mut darkest, mut brightest) = (f32::MAX, 0.0_f32);
         for row in y.saturating_sub(1)..=(y + 1).min(self.height - 1) {
             for column in [(x + self.width - 1) % self.width, x, (x + 1) % self.width] {
@@ -180,7 +180,7 @@ impl Grid {
 
     /// Cuts the sphere into about `count` patches, small where energy and solid angle are large.
     /// Halves the rectangle with the largest √(energy · solid angle) until there are enough.
-    pub fn patches(&self, count: usize) -> Vec<ColouredPatch> {
+    pub(crate) fn patches(&self, count: usize) -> Vec<ColouredPatch> {
         let table = self.summed_area();
         let stride = self.width + 1;
         let cosine = |y: usize| (PI * y as f64 / self.height as f64).cos();
@@ -258,6 +258,6 @@ impl Grid {
 }
 
 /// Number of patches for a fit of `lobes` lobes.
-pub fn patch_count(lobes: usize) -> usize {
+pub(crate) fn patch_count(lobes: usize) -> usize {
     (config::PATCHES_PER_LOBE * lobes).clamp(config::MIN_PATCHES, config::MAX_PATCHES)
 }

@@ -15,7 +15,7 @@ const MAX_DEPTH: u32 = 9;
 
 /// Direction and value in a quarter of a cell.
 #[derive(Clone, Copy, Debug)]
-pub struct HemisphereSample {
+pub(crate) struct HemisphereSample {
     /// Unit direction in the local frame.
     pub direction: DVec3,
     /// Value of the function there.
@@ -26,7 +26,7 @@ pub struct HemisphereSample {
 
 /// A function on the upper hemisphere.
 #[derive(Clone, Debug)]
-pub struct HemisphereTarget {
+pub(crate) struct HemisphereTarget {
     /// Quadrature over the hemisphere.
     pub samples: Vec<HemisphereSample>,
     /// The cells, four samples each.
@@ -35,7 +35,7 @@ pub struct HemisphereTarget {
 
 impl HemisphereTarget {
     /// Integral of the function.
-    pub fn energy(&self) -> f64 {
+    pub(crate) fn energy(&self) -> f64 {
         self.patches.iter().map(|patch| patch.energy).sum()
     }
 }
@@ -105,7 +105,7 @@ impl Cell {
 
 /// Samples a non-negative function of direction; any other value counts as 0. Always refines the
 /// cells toward `peak`, to find a highlight narrower than a cell.
-pub fn sample_hemisphere(function: &dyn Fn(DVec3) -> f64, peak: DVec3) -> HemisphereTarget {
+pub(crate) fn sample_hemisphere(function: &dyn Fn(DVec3) -> f64, peak: DVec3) -> HemisphereTarget {
     let mut cells: Vec<Cell> = Vec::new();
     let mut queue = BinaryHeap::new();
     for index in 0..FIRST_CELLS * FIRST_CELLS {

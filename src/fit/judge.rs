@@ -50,7 +50,7 @@ const CULL: f64 = 18.0;
 
 /// Lobe with its colour: `component` gives the luminance density, `colour` the value.
 #[derive(Clone, Copy, Debug)]
-pub struct ColouredComponent {
+pub(crate) struct ColouredComponent {
     /// Shape and share of the sampling density.
     pub component: Component,
     /// Value at the axis per colour channel.
@@ -122,7 +122,11 @@ impl Selection {
 }
 
 /// Error figures of a fit of a map whose luminance has the integral `energy`.
-pub fn judge_environment(grid: &Grid, energy: f64, lobes: &[ColouredComponent]) -> FitErrors {
+pub(crate) fn judge_environment(
+    grid: &Grid,
+    energy: f64,
+    lobes: &[ColouredComponent],
+) -> FitErrors {
     let (columns, rows) = (grid.width.div_ceil(TILE), grid.height.div_ceil(TILE));
     let share: f64 = lobes.iter().map(|lobe| lobe.component.share).sum();
     let tiles: Vec<[f64; 5]> = (0..columns * rows)
@@ -173,7 +177,7 @@ pub fn judge_environment(grid: &Grid, energy: f64, lobes: &[ColouredComponent]) 
 
 /// Error figures of a fit of BRDF × cosine for one view. The uniform part of q covers the
 /// hemisphere; energy of lobes below the horizon is lost to f, to the energy of F and to q.
-pub fn judge_hemisphere(target: &HemisphereTarget, lobes: &[Lobe]) -> FitErrors {
+pub(crate) fn judge_hemisphere(target: &HemisphereTarget, lobes: &[Lobe]) -> FitErrors {
     let energy = target.energy();
     let lobe_sum: f64 = lobes.iter().map(lobe_energy).sum();
     if energy <= 0.0 || lobe_sum <= 0.0 {

@@ -26,12 +26,12 @@ impl std::fmt::Display for Method {
 }
 
 /// Checks that the number of lobes is within limits.
-pub fn check_lobes(lobes: usize) -> Result<()> {
+pub(crate) fn check_lobes(lobes: usize) -> Result<()> {
     check_count(lobes, "lobes", config::MAX_LOBES)
 }
 
 /// Checks that the number of view elevations is within limits.
-pub fn check_views(views: usize) -> Result<()> {
+pub(crate) fn check_views(views: usize) -> Result<()> {
     check_count(views, "view elevations", config::MAX_VIEWS)
 }
 

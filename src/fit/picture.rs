@@ -98,7 +98,11 @@ fn write(path: &Path, stack: &[Panels]) -> Result<()> {
 ///
 /// # Errors
 /// [`crate::Error::Io`] with the cause.
-pub fn write_environment(path: &Path, map: &EnvironmentMap, fit: &EnvironmentFit) -> Result<()> {
+pub(crate) fn write_environment(
+    path: &Path,
+    map: &EnvironmentMap,
+    fit: &EnvironmentFit,
+) -> Result<()> {
     let grid = Grid::new(map);
     let (width, height) = (MAP_WIDTH, MAP_WIDTH / 2);
     let pixel = |index: usize| {
@@ -127,7 +131,7 @@ pub fn write_environment(path: &Path, map: &EnvironmentMap, fit: &EnvironmentFit
 ///
 /// # Errors
 /// [`crate::Error::Io`] with the cause.
-pub fn write_brdf(
+pub(crate) fn write_brdf(
     path: &Path,
     tables: &MaterialTables,
     material_index: usize,

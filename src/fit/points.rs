@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 /// Patch of the sphere with the moments of the target over it.
 #[derive(Clone, Copy, Debug)]
-pub struct Patch {
+pub(crate) struct Patch {
     /// Integral of the target (luminance) over the patch.
     pub energy: f64,
     /// Integral of target × direction; shorter than `energy` by the patch's extent.
@@ -15,7 +15,7 @@ pub struct Patch {
 
 impl Patch {
     /// Unit mean direction and variance per axis, `½(1 − |m|²)`; none for a patch without energy.
-    pub fn spread(&self) -> Option<(DVec3, f64)> {
+    pub(crate) fn spread(&self) -> Option<(DVec3, f64)> {
         let mean = self.moment / self.energy;
         let direction = mean.try_normalize().filter(|_| self.energy > 0.0)?;
         Some((direction, (0.5 * (1.0 - mean.length_squared())).max(0.0)))
@@ -57,12 +57,12 @@ pub struct PointSet {
 
 impl PointSet {
     /// Keeps the patches that hold energy, in their order.
-    pub fn new(patches: &[Patch]) -> Self {
+    pub(crate) fn new(patches: &[Patch]) -> Self {
         Self::weighted(patches.iter().map(|patch| (patch, patch.energy)))
     }
 
     /// Takes patches with energies in place of their own, such as those of a colour channel.
-    pub fn weighted<'a>(patches: impl Iterator<Item = (&'a Patch, f64)> + Clone) -> Self {
+    pub(crate) fn weighted<'a>(patches: impl Iterator<Item = (&'a Patch, f64)> + Clone) -> Self {
         let energy: f64 = patches.clone().map(|(_, energy)| energy).sum();
         let mut points = Self { energy, ..Self::default() };
         for (patch, patch_energy) in patches {
@@ -84,17 +84,17 @@ impl PointSet {
     }
 
     /// Number of points.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.weight.len()
     }
 
     /// True if the target holds no energy.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.weight.is_empty()
     }
 
     /// Mean direction of a point.
-    pub fn mean(&self, index: usize) -> DVec3 {
+    pub(crate) fn mean(&self, index: usize) -> DVec3 {
         self.places[index].mean.as_dvec3()
     }
 }

@@ -61,7 +61,7 @@ fn bandwidths(lobes: impl Iterator<Item = (f32, f32)>) -> (f32, f32) {
 }
 
 /// Describes the fit of a map.
-pub fn describe_environment(fit: &EnvironmentFit) -> Description {
+pub(crate) fn describe_environment(fit: &EnvironmentFit) -> Description {
     let (low, high) = bandwidths(fit.lobes.iter().map(|lobe| (lobe.bandwidth, lobe.amplitude)));
     let mut lines = vec![
         format!("environment fit of {}", fit.source),
@@ -84,7 +84,7 @@ pub fn describe_environment(fit: &EnvironmentFit) -> Description {
 }
 
 /// Describes the fit of a BRDF.
-pub fn describe_brdf(fit: &BrdfFit) -> Description {
+pub(crate) fn describe_brdf(fit: &BrdfFit) -> Description {
     let lobes = fit.views.iter().flat_map(|view| &view.lobes);
     let (low, high) = bandwidths(lobes.map(|lobe| (lobe.bandwidth, lobe.amplitude)));
     let count = fit.views.first().map_or(0, |view| view.lobes.len());

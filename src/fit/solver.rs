@@ -12,7 +12,7 @@ const MAX_HALVINGS: usize = 30;
 
 /// Limits of the unknowns.
 #[derive(Clone, Debug)]
-pub struct Bounds {
+pub(crate) struct Bounds {
     /// Lower and upper limit per unknown.
     pub limits: Vec<(f64, f64)>,
 }
@@ -38,7 +38,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// Lowers `function` (value and gradient) from `unknowns`, in place. Ends when ten steps gain less
 /// than `tolerance` relative to the value, when no step along the direction lowers it, or after
 /// `steps`. Calls `progress` with the number of each finished step.
-pub fn minimize(
+pub(crate) fn minimize(
     function: impl Fn(&[f64]) -> (f64, Vec<f64>),
     bounds: &Bounds,
     unknowns: &mut Vec<f64>,

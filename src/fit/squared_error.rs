@@ -20,7 +20,7 @@ use super::{
 const UNKNOWNS: usize = 5;
 
 /// Objective over all lobes.
-pub struct SquaredError {
+pub(crate) struct SquaredError {
     /// Energies, mean directions and variances of the patches that hold energy.
     patches: Vec<(f64, DVec3, f64)>,
     /// `∫L²`.
@@ -39,7 +39,11 @@ struct Scaled {
 impl SquaredError {
     /// Returns the objective for a target whose square has the integral `square`, and the unknowns
     /// of `components` (shares of the energy of `patches`).
-    pub fn new(patches: &[Patch], square: f64, components: &[Component]) -> (Self, Vec<f64>) {
+    pub(crate) fn new(
+        patches: &[Patch],
+        square: f64,
+        components: &[Component],
+    ) -> (Self, Vec<f64>) {
         let energy: f64 = patches.iter().map(|patch| patch.energy).sum();
         let mut unknowns = Vec::with_capacity(UNKNOWNS * components.len());
         let mut scales = Vec::with_capacity(components.len());
@@ -60,7 +64,7 @@ impl SquaredError {
     }
 
     /// Box constraints of the unknowns.
-    pub fn bounds(&self) -> Bounds {
+    pub(crate) fn bounds(&self) -> Bounds {
         let free = (f64::NEG_INFINITY, f64::INFINITY);
         let one =
             [free, free, free, (MIN_BANDWIDTH.ln(), MAX_BANDWIDTH.ln()), (0.0, f64::INFINITY)];
@@ -80,7 +84,7 @@ impl SquaredError {
     }
 
     /// Returns the lobes of the unknowns, with shares of their own sum, and their energy.
-    pub fn components(&self, unknowns: &[f64]) -> (Vec<Component>, f64) {
+    pub(crate) fn components(&self, unknowns: &[f64]) -> (Vec<Component>, f64) {
         let lobes = self.lobes(unknowns);
         let energy_of = |lobe: &Scaled| lobe.amplitude * kernel_integral(lobe.shape.bandwidth);
         let energy: f64 = lobes.iter().map(energy_of).sum();
@@ -92,7 +96,7 @@ impl SquaredError {
     }
 
     /// Evaluates value and gradient.
-    pub fn evaluate(&self, unknowns: &[f64]) -> (f64, Vec<f64>) {
+    pub(crate) fn evaluate(&self, unknowns: &[f64]) -> (f64, Vec<f64>) {
         let lobes = self.lobes(unknowns);
         let row = |index: usize| {
             let Scaled { shape: a, amplitude } = lobes[index];
@@ -148,7 +152,7 @@ impl SquaredError {
 /// Lowers the squared error of `components` by L-BFGS. Takes shares of the energy of `patches` and
 /// returns shares of the returned energy. `square` is the integral of the target's square;
 /// `progress` receives the share of the steps that are done.
-pub fn minimize_squared_error(
+pub(crate) fn minimize_squared_error(
     patches: &[Patch],
     square: f64,
     components: &[Component],

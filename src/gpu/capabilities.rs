@@ -93,7 +93,7 @@ impl Capabilities {
     }
 
     /// Memory that buffers may take: of a software device no more than the process may use.
-    pub fn memory_for_buffers(&self) -> u64 {
+    pub(crate) fn memory_for_buffers(&self) -> u64 {
         if self.kind == "software" {
             self.device_memory.min(memory::room())
         } else {

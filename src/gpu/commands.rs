@@ -153,12 +153,12 @@ impl Commands {
     }
 
     /// Fills a whole buffer with a repeated 32-bit word.
-    pub fn fill(&mut self, buffer: &Buffer, word: u32) {
+    pub(crate) fn fill(&mut self, buffer: &Buffer, word: u32) {
         self.fill_start(buffer, vk::WHOLE_SIZE, word);
     }
 
     /// Fills the first `bytes`, a positive multiple of 4, with a repeated word, after earlier use.
-    pub fn fill_start(&mut self, buffer: &Buffer, bytes: u64, word: u32) {
+    pub(crate) fn fill_start(&mut self, buffer: &Buffer, bytes: u64, word: u32) {
         self.barrier(
             vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER,
             vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE,
@@ -172,7 +172,7 @@ impl Commands {
     }
 
     /// Copies `size` bytes from one buffer to another.
-    pub fn copy(
+    pub(crate) fn copy(
         &mut self,
         from: &Buffer,
         from_offset: u64,
@@ -193,7 +193,7 @@ impl Commands {
     }
 
     /// Makes everything written so far readable by the host once the submission has finished.
-    pub fn make_visible_to_host(&mut self) {
+    pub(crate) fn make_visible_to_host(&mut self) {
         self.barrier(
             vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER,
             vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE,

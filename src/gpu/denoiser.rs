@@ -17,7 +17,7 @@ use libloading::Library;
 use crate::error::{Error, Result};
 
 /// Environment variable with the library's file, or the folder that holds it.
-pub const LIBRARY_VARIABLE: &str = "FENESTRA_OIDN";
+pub(crate) const LIBRARY_VARIABLE: &str = "FENESTRA_OIDN";
 /// Names of the library, newest first.
 const NAMES: [&str; 3] =
     ["libOpenImageDenoise.so.2", "libOpenImageDenoise.so.1", "libOpenImageDenoise.so"];
@@ -49,7 +49,7 @@ type SetImage = unsafe extern "C" fn(
 
 /// A picture and what guides its filter, row by row from the top.
 #[derive(Clone, Copy, Debug)]
-pub struct Noisy<'a> {
+pub(crate) struct Noisy<'a> {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
@@ -63,7 +63,7 @@ pub struct Noisy<'a> {
 }
 
 /// The library and a device of it.
-pub struct Denoiser {
+pub(crate) struct Denoiser {
     new_filter: unsafe extern "C" fn(Handle, *const c_char) -> Handle,
     set_image: SetImage,
     set_bool: unsafe extern "C" fn(Handle, *const c_char, bool),
@@ -84,7 +84,7 @@ impl Denoiser {
     ///
     /// # Errors
     /// [`Error::Denoiser`] if there is no library, if it lacks a function, or if it refuses the device.
-    pub fn load() -> Result<Self> {
+    pub(crate) fn load() -> Result<Self> {
         let (library, path) = open_library()?;
         let new_device: unsafe extern "C" fn(c_int) -> Handle =
             function(&library, &path, &["oidnNewDevice"])?;
@@ -124,7 +124,7 @@ impl Denoiser {
     }
 
     /// Version of the library: "2.3.1".
-    pub fn version(&self) -> &str {
+    pub(crate) fn version(&self) -> &str {
         &self.version
     }
 
@@ -132,7 +132,7 @@ impl Denoiser {
     ///
     /// # Errors
     /// [`Error::Denoiser`] for layers of another size than the picture, and with the library's message.
-    pub fn denoise(&self, noisy: &Noisy<'_>) -> Result<Vec<[f32; 3]>> {
+    pub(crate) fn denoise(&self, noisy: &Noisy<'_>) -> Result<Vec<[f32; 3]>> {
         let [width, height] = [noisy.width as usize, noisy.height as usize];
         let guides = [("albedo", noisy.albedo), ("normal", noisy.normal)];
         let layers = [("picture", Some(noisy.color))].into_iter().chain(guides);

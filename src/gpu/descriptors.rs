@@ -124,12 +124,12 @@ impl DescriptorSet {
     }
 
     /// Returns true if the set has a buffer with this number.
-    pub fn has(&self, number: u32) -> bool {
+    pub(crate) fn has(&self, number: u32) -> bool {
         self.table.bindings.iter().any(|binding| binding.number == number)
     }
 
     /// Number of the set.
-    pub fn index(&self) -> u32 {
+    pub(crate) fn index(&self) -> u32 {
         self.table.set
     }
 }

@@ -48,7 +48,7 @@ impl Device {
     ///
     /// # Errors
     /// Also [`Error::Device`] if the device cannot show pictures in windows.
-    pub fn open_for_display(
+    pub(crate) fn open_for_display(
         wanted: Option<&str>,
         validate: bool,
         display: RawDisplayHandle,
@@ -137,7 +137,7 @@ impl Device {
     }
 
     /// Returns [`Error::Vulkan`] with the first message of the validation layers, if there is any.
-    pub fn check_validation(&self) -> Result<()> {
+    pub(crate) fn check_validation(&self) -> Result<()> {
         let messages = self.validation_messages();
         messages.first().map_or(Ok(()), |first| {
             Err(Error::Vulkan {
@@ -148,7 +148,7 @@ impl Device {
     }
 
     /// Writes compiled pipelines to the user's cache folder; failures are only logged.
-    pub fn save_pipeline_cache(&self) {
+    pub(crate) fn save_pipeline_cache(&self) {
         self.pipeline_cache.save(&self.raw, &self.capabilities);
     }
 

@@ -17,7 +17,7 @@ use crate::{
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
 /// Advice for a system without any usable Vulkan.
-pub const NO_VULKAN_HELP: &str =
+pub(crate) const NO_VULKAN_HELP: &str =
     "run ./setup, which installs the Vulkan loader and the software device lavapipe";
 
 /// Messages of the validation layers, oldest first.
@@ -45,7 +45,7 @@ impl Instance {
     /// # Errors
     /// [`Error::Device`] if the Vulkan loader, the requested layer or such an extension is missing,
     /// [`Error::Memory`] if the address space does not suffice for a driver.
-    pub fn new(validate: bool, display: Option<RawDisplayHandle>) -> Result<Self> {
+    pub(crate) fn new(validate: bool, display: Option<RawDisplayHandle>) -> Result<Self> {
         memory::check_driver().map_err(Error::memory)?;
         // SAFETY: loading the Vulkan loader runs its initialisers; it is the system's own library.
         let entry = unsafe { ash::Entry::load() }.map_err(|error| Error::Device {
@@ -160,7 +160,7 @@ impl Instance {
     }
 
     /// Messages of the validation layers so far; empty without validation.
-    pub fn validation_messages(&self) -> Vec<String> {
+    pub(crate) fn validation_messages(&self) -> Vec<String> {
         self.messages.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }

@@ -6,8 +6,8 @@
 pub mod buffer;
 pub mod capabilities;
 pub mod commands;
-pub mod denoiser;
-pub mod descriptors;
+pub(crate) mod denoiser;
+pub(crate) mod descriptors;
 pub mod device;
 pub mod instance;
 pub(crate) mod labels;
@@ -15,19 +15,19 @@ pub mod pipeline;
 mod pipeline_cache;
 mod pipelines;
 mod set_layouts;
-pub mod swapchain;
+pub(crate) mod swapchain;
 pub(crate) mod timestamps;
 mod transfer;
 
 pub use buffer::Buffer;
 pub use capabilities::Capabilities;
 pub use commands::Commands;
-pub use denoiser::Denoiser;
+pub(crate) use denoiser::Denoiser;
 pub use descriptors::DescriptorSet;
 pub use device::Device;
 pub use pipeline::Pipeline;
-pub use swapchain::{Presented, Swapchain};
-pub use timestamps::PassTimes;
+pub(crate) use swapchain::{Presented, Swapchain};
+pub(crate) use timestamps::PassTimes;
 
 use crate::error::Error;
 

@@ -39,12 +39,12 @@ impl Pipeline {
     }
 
     /// Name of the pass.
-    pub fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
     /// Returns true if the shader uses buffers of this descriptor set.
-    pub fn uses(&self, set: &DescriptorSet) -> bool {
+    pub(crate) fn uses(&self, set: &DescriptorSet) -> bool {
         self.made.used[set.index() as usize].is_some_and(|number| set.has(number))
     }
 

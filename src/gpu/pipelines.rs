@@ -35,7 +35,7 @@ pub(super) struct Made {
 }
 
 impl Key {
-    pub fn new(name: &str, spirv: &[u8], constants: &[(u32, u32)]) -> Self {
+    pub(crate) fn new(name: &str, spirv: &[u8], constants: &[(u32, u32)]) -> Self {
         Self {
             name: name.to_owned(),
             code: Sha256::digest(spirv).into(),
@@ -46,7 +46,11 @@ impl Key {
 
 impl Pipelines {
     /// Returns the pipeline of `key`, which `make` makes the first time.
-    pub fn get_or_make(&self, key: Key, make: impl FnOnce() -> Result<Made>) -> Result<Made> {
+    pub(crate) fn get_or_make(
+        &self,
+        key: Key,
+        make: impl FnOnce() -> Result<Made>,
+    ) -> Result<Made> {
         match self.made.lock().unwrap_or_else(PoisonError::into_inner).entry(key) {
             Entry::Occupied(made) => Ok(*made.get()),
             Entry::Vacant(place) => Ok(*place.insert(make()?)),
@@ -55,7 +59,7 @@ impl Pipelines {
 
     /// # Safety
     /// The device must be alive and idle, and nothing may use its pipelines any more.
-    pub unsafe fn destroy(&self, device: &ash::Device) {
+    pub(crate) unsafe fn destroy(&self, device: &ash::Device) {
         let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
         for (_, made) in made.drain() {
             // SAFETY: promised by the caller.

@@ -26,7 +26,7 @@ impl<T: HasWindowHandle + HasDisplayHandle + Send + Sync> Target for T {}
 
 /// Outcome of [`Swapchain::present`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Presented {
+pub(crate) enum Presented {
     /// The picture is in the window.
     Shown,
     /// The display had no room for it; the next one may be shown.
@@ -38,7 +38,7 @@ pub enum Presented {
 }
 
 /// Images of a window.
-pub struct Swapchain {
+pub(crate) struct Swapchain {
     surfaces: khr::surface::Instance,
     functions: khr::swapchain::Device,
     surface: vk::SurfaceKHR,
@@ -59,7 +59,11 @@ impl Swapchain {
     ///
     /// # Errors
     /// [`Error::Device`] if the device cannot show pictures there, [`Error::Vulkan`] if a call fails.
-    pub fn new(device: &Arc<Device>, window: Arc<dyn Target>, size: [u32; 2]) -> Result<Self> {
+    pub(crate) fn new(
+        device: &Arc<Device>,
+        window: Arc<dyn Target>,
+        size: [u32; 2],
+    ) -> Result<Self> {
         let instance = device.instance();
         let surfaces = khr::surface::Instance::new(instance.entry(), instance.raw());
         let functions = khr::swapchain::Device::new(instance.raw(), device.raw());
@@ -88,7 +92,7 @@ impl Swapchain {
     ///
     /// # Errors
     /// As [`Swapchain::new`].
-    pub fn renew(&mut self, size: [u32; 2]) -> Result<()> {
+    pub(crate) fn renew(&mut self, size: [u32; 2]) -> Result<()> {
         let no_handle = |error| Error::Device {
             reason: format!("the window has no handle for Vulkan: {error}"),
             help: "`fenestra render` needs no window".into(),
@@ -125,7 +129,7 @@ impl Swapchain {
     ///
     /// # Errors
     /// As [`Swapchain::new`].
-    pub fn resize(&mut self, [width, height]: [u32; 2]) -> Result<()> {
+    pub(crate) fn resize(&mut self, [width, height]: [u32; 2]) -> Result<()> {
         let physical = self.device.physical();
         // SAFETY: device and surface belong together.
         let (limits, formats) = unsafe {
@@ -197,12 +201,12 @@ impl Swapchain {
     }
 
     /// Width and height of the images; zeros while nothing can be shown.
-    pub fn size(&self) -> [u32; 2] {
+    pub(crate) fn size(&self) -> [u32; 2] {
         self.size
     }
 
     /// True if the bytes of a pixel are blue, green, red, else red, green, blue; the fourth is unused.
-    pub fn is_bgra(&self) -> bool {
+    pub(crate) fn is_bgra(&self) -> bool {
         self.is_bgra
     }
 
@@ -213,7 +217,7 @@ impl Swapchain {
     ///
     /// # Panics
     /// If the buffer has fewer pixels than the images.
-    pub fn present(&mut self, pixels: &Buffer) -> Result<Presented> {
+    pub(crate) fn present(&mut self, pixels: &Buffer) -> Result<Presented> {
         let [width, height] = self.size;
         if self.images.is_empty() {
             return Ok(Presented::Skipped);

@@ -8,7 +8,7 @@ use super::{device::Device, vulkan_error};
 use crate::error::Result;
 
 /// Device time by pass name, milliseconds.
-pub type PassTimes = BTreeMap<String, f64>;
+pub(crate) type PassTimes = BTreeMap<String, f64>;
 
 /// Two queries per timed pass of one command buffer.
 pub(super) struct Timestamps {

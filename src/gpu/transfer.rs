@@ -18,7 +18,11 @@ impl Buffer {
     ///
     /// # Errors
     /// [`crate::Error::Vulkan`] if memory runs out.
-    pub fn texels_from_slice<T: Pod>(device: &Arc<Device>, name: &str, data: &[T]) -> Result<Self> {
+    pub(crate) fn texels_from_slice<T: Pod>(
+        device: &Arc<Device>,
+        name: &str,
+        data: &[T],
+    ) -> Result<Self> {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let buffer = Self::with_location(
             device,
@@ -110,7 +114,11 @@ impl Buffer {
     ///
     /// # Panics
     /// If the buffer is shorter, which is a bug in the caller.
-    pub fn download_pieces<T: Pod>(&self, length: usize, mut take: impl FnMut(&[T])) -> Result<()> {
+    pub(crate) fn download_pieces<T: Pod>(
+        &self,
+        length: usize,
+        mut take: impl FnMut(&[T]),
+    ) -> Result<()> {
         let bytes = length * size_of::<T>();
         assert!(bytes as u64 <= self.size(), "download from {} is too long", self.name());
         if bytes == 0 {

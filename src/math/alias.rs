@@ -16,7 +16,7 @@ pub struct AliasEntry {
 ///
 /// # Panics
 /// Panics if a weight is negative or not finite: a mistake of the caller.
-pub fn alias_table(weights: &[f64], scale: u64) -> Option<Vec<AliasEntry>> {
+pub(crate) fn alias_table(weights: &[f64], scale: u64) -> Option<Vec<AliasEntry>> {
     assert!(
         weights.iter().all(|weight| weight.is_finite() && *weight >= 0.0),
         "weights are finite and not negative"

@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 
 /// Part that waits to be split: the largest priority is next, the older part on a tie.
-pub struct Queued {
+pub(crate) struct Queued {
     /// Worth of a split.
     pub priority: f64,
     /// Index of the part.

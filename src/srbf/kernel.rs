@@ -37,7 +37,7 @@ impl From<Lobe> for [f32; 5] {
 }
 
 /// Kernel `exp(λ(ω·ξ − 1))`, computed as `exp(−½λ|ω − ξ|²)`: `λ·dot − λ` errs by 1e-2 at λ = 1e5.
-pub fn kernel_value(axis: Vec3, bandwidth: f32, direction: Vec3) -> f32 {
+pub(crate) fn kernel_value(axis: Vec3, bandwidth: f32, direction: Vec3) -> f32 {
     let d = direction - axis;
     (-0.5 * bandwidth * d.dot(d)).exp()
 }

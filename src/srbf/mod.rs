@@ -14,9 +14,9 @@ pub mod product;
 pub mod sample;
 pub mod special;
 
+pub(crate) use kernel::kernel_value;
 pub use kernel::{
-    Lobe, kernel_deviation, kernel_hemisphere_part, kernel_integral, kernel_value, lobe_integral,
-    lobe_value,
+    Lobe, kernel_deviation, kernel_hemisphere_part, kernel_integral, lobe_integral, lobe_value,
 };
 pub use mixture::Mixture;
 pub use product::{lobe_convolution, lobe_product};

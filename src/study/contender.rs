@@ -21,7 +21,7 @@ pub struct Contender {
 
 impl Contender {
     /// Returns `sampler` with default parameters.
-    pub fn plain(sampler: Sampler) -> Self {
+    pub(crate) fn plain(sampler: Sampler) -> Self {
         Self { label: sampler.name().to_owned(), sampler, parameters: Parameters::default() }
     }
 
@@ -53,7 +53,7 @@ impl Contender {
     ///
     /// # Errors
     /// As [`Contender::parse`], and for labels that occur twice or would share file names.
-    pub fn parse_all<'a>(
+    pub(crate) fn parse_all<'a>(
         texts: impl IntoIterator<Item = &'a str>,
         defaults: Parameters,
     ) -> Result<Vec<Self>> {
@@ -69,13 +69,13 @@ impl Contender {
     }
 
     /// Returns the label for file names; hyphens replace all but letters, digits and underscores.
-    pub fn file_stem(&self) -> String {
+    pub(crate) fn file_stem(&self) -> String {
         let keep = |character: char| character.is_ascii_alphanumeric() || character == '_';
         self.label.chars().map(|c| if keep(c) { c } else { '-' }).collect()
     }
 
     /// Returns the parameters that the sampler uses, by name.
-    pub fn describe_parameters(&self) -> BTreeMap<String, String> {
+    pub(crate) fn describe_parameters(&self) -> BTreeMap<String, String> {
         self.sampler.describe(&self.parameters)
     }
 }

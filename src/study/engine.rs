@@ -30,7 +30,7 @@ use crate::{
 
 /// Everything a study has measured.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Results {
+pub(crate) struct Results {
     /// Scenes in the plan's order.
     pub scenes: Vec<SceneRecord>,
     /// Finished runs.

@@ -18,7 +18,7 @@ pub struct Scale {
 impl Scale {
     /// Spans 0 to the 99th percentile of `values`, so that a few outliers do not turn the rest
     /// blue; 0 to 1 if that is not positive.
-    pub fn of(values: &[f64]) -> Self {
+    pub(crate) fn of(values: &[f64]) -> Self {
         let mut sorted: Vec<f64> =
             values.iter().copied().filter(|value| value.is_finite()).collect();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -28,7 +28,7 @@ impl Scale {
     }
 
     /// Returns the display colour of a value; NaN is magenta, which the map does not contain.
-    pub fn colour(&self, value: f64) -> [u8; 3] {
+    pub(crate) fn colour(&self, value: f64) -> [u8; 3] {
         if value.is_nan() {
             return [255, 0, 255];
         }
@@ -39,7 +39,7 @@ impl Scale {
 
 /// A display picture: sRGB bytes, row by row.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Canvas {
+pub(crate) struct Canvas {
     /// Width in pixels.
     pub width: usize,
     /// Height in pixels.
@@ -113,7 +113,7 @@ impl Canvas {
     ///
     /// # Errors
     /// [`crate::Error::Io`] with the cause.
-    pub fn write_png(&self, path: &Path) -> Result<()> {
+    pub(crate) fn write_png(&self, path: &Path) -> Result<()> {
         let dimension = |value: usize| {
             u32::try_from(value).map_err(|_| {
                 crate::Error::format(path, format!("{value} pixels along one side of a PNG"))

@@ -50,7 +50,7 @@ impl Folder {
     /// # Errors
     /// [`Error::Format`] if `path` holds something else; [`Error::Io`] if it cannot be written;
     /// [`Error::Usage`] if another study is at work in it.
-    pub fn open(path: &Path) -> Result<Self> {
+    pub(crate) fn open(path: &Path) -> Result<Self> {
         let folder = Self { path: path.to_path_buf(), _lock: None };
         let mark = path.join(MARK);
         if path.exists() && !path.is_dir() {
@@ -114,7 +114,7 @@ impl Folder {
     ///
     /// # Errors
     /// [`Error::Format`] if it is no report folder.
-    pub fn existing(path: &Path) -> Result<Self> {
+    pub(crate) fn existing(path: &Path) -> Result<Self> {
         if path.join(MARK).exists() {
             Ok(Self { path: path.to_path_buf(), _lock: None })
         } else {
@@ -123,27 +123,27 @@ impl Folder {
     }
 
     /// Path of the folder.
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
     /// Path of the record of a run.
-    pub fn record(&self, scene: &str, stem: &str) -> PathBuf {
+    pub(crate) fn record(&self, scene: &str, stem: &str) -> PathBuf {
         self.path.join("runs").join(scene).join(format!("{stem}.json"))
     }
 
     /// Path of the record of an overhead round.
-    pub fn round(&self, scene: &str, repetition: u32) -> PathBuf {
+    pub(crate) fn round(&self, scene: &str, repetition: u32) -> PathBuf {
         self.record(scene, &format!("overhead-{repetition}"))
     }
 
     /// Path of the picture of a run or reference inside this folder.
-    pub fn image_name(scene: &str, stem: &str) -> String {
+    pub(crate) fn image_name(scene: &str, stem: &str) -> String {
         format!("images/{scene}/{stem}.exr")
     }
 
     /// Path of the picture of a run or reference.
-    pub fn image(&self, scene: &str, stem: &str) -> PathBuf {
+    pub(crate) fn image(&self, scene: &str, stem: &str) -> PathBuf {
         self.path.join(Self::image_name(scene, stem))
     }
 
@@ -151,7 +151,7 @@ impl Folder {
     ///
     /// # Errors
     /// [`Error::Io`], or [`Error::Format`] if the file holds something else.
-    pub fn read_json<T: DeserializeOwned>(&self, path: &Path) -> Result<Option<T>> {
+    pub(crate) fn read_json<T: DeserializeOwned>(&self, path: &Path) -> Result<Option<T>> {
         let text = match fs::read_to_string(path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             result => result.map_err(|source| Error::io(path, "read", source))?,

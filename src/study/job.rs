@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// Seed whose pictures are also written as PNG.
-pub const SHOWN_SEED: u32 = 1;
+pub(crate) const SHOWN_SEED: u32 = 1;
 
 /// A run to render and measure.
 pub(super) struct RunJob<'a> {

@@ -7,15 +7,15 @@
 //! ([`results`]) and the page ([`report`]). [`metrics`] defines the errors.
 
 pub mod contender;
-pub mod engine;
-pub mod falsecolour;
+pub(crate) mod engine;
+pub(crate) mod falsecolour;
 pub mod file;
 mod finished;
 pub mod folder;
-pub mod job;
+pub(crate) mod job;
 pub mod metrics;
 pub mod overhead;
-pub mod own_errors;
+pub(crate) mod own_errors;
 pub mod plan;
 pub mod quality;
 pub mod record;
@@ -27,4 +27,4 @@ pub mod rule;
 pub mod statistics;
 pub mod summary;
 pub mod surfaces;
-pub mod watch;
+pub(crate) mod watch;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::metrics::parts::PartErrors;
 
 /// A run is judged if its mean squared error is at least this many times the reference's own.
-pub const JUDGED_FROM: f64 = 4.0;
+pub(crate) const JUDGED_FROM: f64 = 4.0;
 
 /// A reference's own errors, as far as they are known.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -41,7 +41,7 @@ pub struct OwnParts {
 
 impl OwnParts {
     /// Tests whether errors over the surfaces stand out of the reference's own.
-    pub fn judges(&self, part: &PartErrors) -> bool {
+    pub(crate) fn judges(&self, part: &PartErrors) -> bool {
         is_judged(part.relmse, self.surfaces.map(|own| own.relmse))
             && is_judged(part.relmse_trimmed, self.surfaces.map(|own| own.relmse_trimmed))
     }

@@ -169,7 +169,7 @@ impl CheckPlan {
     ///
     /// # Errors
     /// As [`Contender::parse`].
-    pub fn parse(text: &str, folder: &Path, defaults: Parameters) -> Result<Self> {
+    pub(crate) fn parse(text: &str, folder: &Path, defaults: Parameters) -> Result<Self> {
         Ok(match text.trim() {
             "off" => Self::Off,
             "auto" => Self::Default,
@@ -179,7 +179,7 @@ impl CheckPlan {
     }
 
     /// Sampler of the check of a reference by `sampler`, if the check is to be rendered.
-    pub fn contender(&self, sampler: Option<&str>) -> Option<Contender> {
+    pub(crate) fn contender(&self, sampler: Option<&str>) -> Option<Contender> {
         let name = match self {
             Self::Off | Self::File(_) => return None,
             Self::Sampler(contender) => return Some(contender.clone()),
@@ -344,14 +344,14 @@ impl Plan {
     }
 
     /// True if errors are compared, which needs a reference.
-    pub fn compares(&self) -> bool {
+    pub(crate) fn compares(&self) -> bool {
         !self.spp.is_empty() || self.time.is_some()
     }
 
     /// Lists every run of a scene in order of execution: by rule (the largest number of samples,
     /// then the time), seed and sampler. The samplers rotate by one from seed to seed, so that none
     /// is always first.
-    pub fn tasks(&self) -> Vec<(Rule, u32, &Contender)> {
+    pub(crate) fn tasks(&self) -> Vec<(Rule, u32, &Contender)> {
         let samples = self.spp.last().copied().map(Rule::Spp);
         let contenders = &self.contenders;
         let mut tasks = Vec::new();

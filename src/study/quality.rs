@@ -13,7 +13,7 @@ use super::{
 };
 
 /// Relative squared errors whose times are reported: a picture of visible noise, and one of little.
-pub const THRESHOLDS: [f64; 2] = [0.1, 0.02];
+pub(crate) const THRESHOLDS: [f64; 2] = [0.1, 0.02];
 
 /// Figure that falls to a threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -30,7 +30,7 @@ impl Figure {
     pub const ALL: [Self; 2] = [Self::Relmse, Self::RelmseTrimmed];
 
     /// Name in `results.csv`.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Relmse => "relmse",
             Self::RelmseTrimmed => "relmse_trimmed",
@@ -38,7 +38,7 @@ impl Figure {
     }
 
     /// Value of a look.
-    pub fn of(self, measurement: &Measurement) -> f64 {
+    pub(crate) fn of(self, measurement: &Measurement) -> f64 {
         match self {
             Self::Relmse => measurement.relmse,
             Self::RelmseTrimmed => measurement.relmse_trimmed,
@@ -48,7 +48,7 @@ impl Figure {
 
 /// Time after which one run stays at or below a threshold.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Time {
+pub(crate) enum Time {
     /// Interpolated between two looks, seconds.
     Reached(f64),
     /// Its first look was already there: no later than these seconds.
@@ -64,7 +64,7 @@ pub enum Time {
 
 impl Time {
     /// Seconds, if the threshold was reached.
-    pub fn seconds(self) -> Option<f64> {
+    pub(crate) fn seconds(self) -> Option<f64> {
         match self {
             Self::Reached(seconds) | Self::AtMost(seconds) => Some(seconds),
             Self::NotReached { .. } => None,
@@ -77,7 +77,7 @@ impl Time {
 ///
 /// An error that is not positive, which a reference in two halves can give, has no logarithm; then
 /// the look's own time counts, which is too late rather than too early.
-pub fn time_to(looks: &[[f64; 2]], threshold: f64) -> Option<Time> {
+pub(crate) fn time_to(looks: &[[f64; 2]], threshold: f64) -> Option<Time> {
     let [seconds, error] = *looks.last()?;
     let is_above = |look: &[f64; 2]| look[1].is_nan() || look[1] > threshold;
     Some(match looks.iter().rposition(is_above) {
@@ -93,7 +93,7 @@ pub fn time_to(looks: &[[f64; 2]], threshold: f64) -> Option<Time> {
 }
 
 /// Time of one run.
-pub fn time_of_run(run: &Run, figure: Figure, threshold: f64) -> Option<Time> {
+pub(crate) fn time_of_run(run: &Run, figure: Figure, threshold: f64) -> Option<Time> {
     let looks: Vec<[f64; 2]> =
         run.measurements.iter().map(|look| [look.seconds, figure.of(look)]).collect();
     time_to(&looks, threshold)

@@ -45,7 +45,7 @@ pub struct Conditions {
 
 impl Conditions {
     /// Lists differing conditions as "name: ours there, theirs asked for".
-    pub fn differences(&self, asked: &Self) -> Vec<String> {
+    pub(crate) fn differences(&self, asked: &Self) -> Vec<String> {
         let mut found = Vec::new();
         let mut compare = |what: &str, ours: String, theirs: String| {
             if ours != theirs {
@@ -128,7 +128,7 @@ impl Measurement {
     ///
     /// # Errors
     /// The device fails, or a pixel is not finite.
-    pub fn of(
+    pub(crate) fn of(
         session: &Session,
         reference: &Reference,
         surfaces: &Surfaces,
@@ -195,12 +195,12 @@ pub struct Run {
 
 impl Run {
     /// Returns the finished film's measurement.
-    pub fn last(&self) -> Option<&Measurement> {
+    pub(crate) fn last(&self) -> Option<&Measurement> {
         self.measurements.last()
     }
 
     /// Returns the measurement at the rule's number of samples, or the last of a run by time.
-    pub fn at(&self, rule: Rule) -> Option<&Measurement> {
+    pub(crate) fn at(&self, rule: Rule) -> Option<&Measurement> {
         match (rule, self.rule) {
             (Rule::Spp(spp), Rule::Spp(_)) => {
                 self.measurements.iter().find(|measurement| measurement.spp == spp)
@@ -227,7 +227,7 @@ pub struct Timing {
 
 impl Timing {
     /// Device milliseconds per sample of all passes.
-    pub fn total_ms(&self) -> f64 {
+    pub(crate) fn total_ms(&self) -> f64 {
         self.gpu_ms_per_sample.values().sum()
     }
 }
@@ -271,7 +271,7 @@ pub struct SceneRecord {
 }
 
 /// Returns the part of a file name that identifies its run.
-pub fn run_stem(contender: &Contender, rule: Rule, seed: u32) -> String {
+pub(crate) fn run_stem(contender: &Contender, rule: Rule, seed: u32) -> String {
     format!("{}-{}-seed{seed}", contender.file_stem(), rule.file_stem())
 }
 

@@ -28,7 +28,7 @@ use crate::{
 };
 
 /// File stems of the halves.
-pub const HALF_STEMS: [&str; 2] = ["reference_1", "reference_2"];
+pub(crate) const HALF_STEMS: [&str; 2] = ["reference_1", "reference_2"];
 /// Seeds of the halves; those of runs count up from 1.
 pub const SEEDS: [u32; 2] = [u32::MAX - 1, u32::MAX];
 /// Time between checkpoints of a half: even a killed program loses only the passes since the last.
@@ -36,7 +36,7 @@ const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
 
 /// A reference with its own errors.
 #[derive(Clone, Debug)]
-pub struct Reference {
+pub(crate) struct Reference {
     /// First half.
     pub first: RgbImage,
     /// Second half; the first again if there is only one image.
@@ -51,7 +51,7 @@ pub struct Reference {
 ///
 /// # Errors
 /// [`Error::Io`] for a reference file that cannot be read.
-pub fn identity(plan: &ReferencePlan, scene: &str) -> Result<String> {
+pub(crate) fn identity(plan: &ReferencePlan, scene: &str) -> Result<String> {
     match plan {
         ReferencePlan::Render { contender, half_spp } => {
             let mut name = contender.sampler.name().to_owned();
@@ -113,7 +113,7 @@ impl Reference {
     /// # Errors
     /// Files that cannot be read; [`Error::Comparison`] for another size or scene, values that are
     /// not finite, a black picture, or halves that share samples.
-    pub fn read(plan: &ReferencePlan, scene: &Scene) -> Result<Self> {
+    pub(crate) fn read(plan: &ReferencePlan, scene: &Scene) -> Result<Self> {
         let images = read_images(given_files(plan, &scene.name)?, scene)?;
         if let [(first_path, first), (second_path, second)] = &images[..] {
             let metadata = (Metadata::load(first, first_path), Metadata::load(second, second_path));
@@ -144,7 +144,7 @@ impl Reference {
     ///
     /// # Errors
     /// [`Error::Interrupted`] after the checkpoint has been written; a failing device or disk.
-    pub fn render(
+    pub(crate) fn render(
         folder: &Folder,
         scene: &Scene,
         (contender, half_spp): (&Contender, u32),
@@ -234,7 +234,7 @@ impl Reference {
     }
 
     /// Averages the halves.
-    pub fn mean(&self) -> RgbImage {
+    pub(crate) fn mean(&self) -> RgbImage {
         mean(&self.first, &self.second)
     }
 }

@@ -24,7 +24,7 @@ use crate::{
 };
 
 /// Time of a check by another sampler, as a share of the reference's.
-pub const TIME_SHARE: f64 = 0.1;
+pub(crate) const TIME_SHARE: f64 = 0.1;
 /// Samples per pixel of both halves of a check where the reference's time is not known.
 const SPP_WITHOUT_TIME: u32 = 256;
 /// Inflation of the blocks' variance above which neighbours are taken to share paths; for independent
@@ -42,11 +42,11 @@ const GRID: [usize; 2] = [8, 6];
 /// Least side of a block in pixels, so that its own pixels tell how noisy it is.
 const LEAST_BLOCK: usize = 8;
 /// Standard errors between the means beyond which the pictures disagree.
-pub const MEAN_LIMIT: f64 = 4.0;
+pub(crate) const MEAN_LIMIT: f64 = 4.0;
 /// Standard errors in one block beyond which they disagree; there are up to 48 blocks.
-pub const BLOCK_LIMIT: f64 = 5.0;
+pub(crate) const BLOCK_LIMIT: f64 = 5.0;
 /// Relative standard error of the difference of the means above which nothing can be told.
-pub const NOISE_LIMIT: f64 = 0.02;
+pub(crate) const NOISE_LIMIT: f64 = 0.02;
 
 /// Result of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -93,7 +93,7 @@ impl ReferenceCheck {
     ///
     /// # Errors
     /// [`Error::Comparison`]: pictures of different sizes or without pixels, a black reference.
-    pub fn of(
+    pub(crate) fn of(
         reference: [&RgbImage; 2],
         check: [&RgbImage; 2],
         description: String,
@@ -141,7 +141,7 @@ impl ReferenceCheck {
     }
 
     /// One sentence: "agrees with mis, 256 spp: its mean is +0.10% ± 0.12% off, …".
-    pub fn describe(&self) -> String {
+    pub(crate) fn describe(&self) -> String {
         let [left, top, width, height] = self.block;
         let figures = format!(
             "its mean differs by {:+.2}% ± {:.2}% ({:+.1} standard errors), the worst of {} blocks, \

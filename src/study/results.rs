@@ -43,7 +43,7 @@ pub struct Circumstances {
 
 impl Circumstances {
     /// Describes this process and device, now.
-    pub fn new(device: &Device) -> Self {
+    pub(crate) fn new(device: &Device) -> Self {
         let capabilities = device.capabilities();
         let arguments: Vec<String> = std::env::args_os()
             .enumerate()
@@ -139,7 +139,7 @@ pub struct Report {
 
 impl Report {
     /// Computes the figures of `results`.
-    pub fn new(
+    pub(crate) fn new(
         plan: &Plan,
         results: Results,
         is_complete: bool,
@@ -177,7 +177,7 @@ impl Report {
     ///
     /// # Errors
     /// [`crate::Error::Io`] with the cause.
-    pub fn write(&self, plan: &Plan, folder: &Folder) -> Result<()> {
+    pub(crate) fn write(&self, plan: &Plan, folder: &Folder) -> Result<()> {
         write_json(&folder.path().join("results.json"), self)?;
         write_text(&folder.path().join("results.csv"), &self.csv(&rules(plan)))
     }

@@ -16,12 +16,12 @@ pub enum Rule {
 
 impl Rule {
     /// Rule of a wall time.
-    pub fn time(time: Duration) -> Self {
+    pub(crate) fn time(time: Duration) -> Self {
         Self::Seconds(time.as_secs_f64())
     }
 
     /// Returns "400 spp" or "30 s".
-    pub fn describe(self) -> String {
+    pub(crate) fn describe(self) -> String {
         match self {
             Self::Spp(spp) => format!("{spp} spp"),
             Self::Seconds(seconds) => format!("{seconds} s"),
@@ -29,7 +29,7 @@ impl Rule {
     }
 
     /// Returns "400spp" or "30s", for file names.
-    pub fn file_stem(self) -> String {
+    pub(crate) fn file_stem(self) -> String {
         self.describe().replace(' ', "")
     }
 }

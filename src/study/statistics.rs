@@ -16,7 +16,7 @@ pub struct Interval {
 impl Interval {
     /// Applies an increasing function to the estimate and both ends.
     #[must_use]
-    pub fn map(&self, function: impl Fn(f64) -> f64) -> Self {
+    pub(crate) fn map(&self, function: impl Fn(f64) -> f64) -> Self {
         let [middle, low, high] = [self.middle, self.low, self.high].map(function);
         Self { middle, low, high }
     }
@@ -40,7 +40,7 @@ fn t_quantile(degrees_of_freedom: usize) -> f64 {
 }
 
 /// Mean of normally distributed values; a single value is its own interval. `None` for no values.
-pub fn mean_interval(values: &[f64]) -> Option<Interval> {
+pub(crate) fn mean_interval(values: &[f64]) -> Option<Interval> {
     let count = values.len();
     let mean = values.iter().sum::<f64>() / count as f64;
     match count {
@@ -67,7 +67,7 @@ pub fn geometric_interval(values: &[f64]) -> Option<Interval> {
 /// Median with the narrowest pair of order statistics that holds the true median with at least 95%
 /// confidence, whatever the distribution; below six values, where no pair does, the whole range.
 /// Zeros for no values.
-pub fn median_interval(mut values: Vec<f64>) -> Interval {
+pub(crate) fn median_interval(mut values: Vec<f64>) -> Interval {
     values.sort_by(f64::total_cmp);
     let count = values.len();
     let at = |index: usize| values.get(index).copied().unwrap_or(0.0);
@@ -99,7 +99,7 @@ pub fn slope(points: &[[f64; 2]]) -> Option<f64> {
 
 /// Standard error of the mean over pixels and channels, from the pixels' standard errors; takes
 /// channels as fully correlated and pixels as independent.
-pub fn mean_standard_error(errors: impl Iterator<Item = [f64; 3]>) -> f64 {
+pub(crate) fn mean_standard_error(errors: impl Iterator<Item = [f64; 3]>) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0_f64);
     for error in errors {
         let mean = (error[0] + error[1] + error[2]) / 3.0;

@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// File stem of the mask: share of the camera rays that hit a surface, in every channel.
-pub const STEM: &str = "surfaces";
+pub(crate) const STEM: &str = "surfaces";
 /// Camera rays per pixel.
 const RAY_COUNT: u32 = 16;
 /// Attribute that says which scene a mask is of.
@@ -83,7 +83,7 @@ impl Surfaces {
     ///
     /// # Errors
     /// Values that are not finite, or another size.
-    pub fn errors(&self, picture: &RgbImage, reference: &Reference) -> Result<Parts> {
+    pub(crate) fn errors(&self, picture: &RgbImage, reference: &Reference) -> Result<Parts> {
         let halves = [&reference.first, &reference.second];
         let [surfaces, environment] = split(picture, halves, &self.is_surface)?;
         let surfaces_judged = surfaces.is_some_and(|part| self.own.judges(&part));

@@ -11,7 +11,7 @@ use crate::{
 const FIRST_GUESS: f64 = 2e-6;
 
 /// An observer with the forecast of a study.
-pub struct Watch<'a> {
+pub(crate) struct Watch<'a> {
     observer: &'a mut dyn Observer,
     start: Instant,
     /// Camera paths left in runs that end by samples.
@@ -24,7 +24,7 @@ pub struct Watch<'a> {
 
 impl<'a> Watch<'a> {
     /// Starts the clock.
-    pub fn new(observer: &'a mut dyn Observer) -> Self {
+    pub(crate) fn new(observer: &'a mut dyn Observer) -> Self {
         Self {
             observer,
             start: Instant::now(),
@@ -36,13 +36,13 @@ impl<'a> Watch<'a> {
     }
 
     /// Adds expected work; negative values take it back.
-    pub fn expect(&mut self, paths: f64, seconds: f64) {
+    pub(crate) fn expect(&mut self, paths: f64, seconds: f64) {
         self.paths_left += paths;
         self.seconds_left += seconds;
     }
 
     /// Shows a permanent line.
-    pub fn note(&mut self, line: &str) {
+    pub(crate) fn note(&mut self, line: &str) {
         self.observer.notice(&Event::Note(line));
     }
 
@@ -50,7 +50,7 @@ impl<'a> Watch<'a> {
     ///
     /// # Errors
     /// [`Error::Interrupted`].
-    pub fn check(&self) -> Result<()> {
+    pub(crate) fn check(&self) -> Result<()> {
         if self.observer.is_interrupted() { Err(Error::Interrupted) } else { Ok(()) }
     }
 
@@ -70,7 +70,12 @@ impl<'a> Watch<'a> {
     ///
     /// # Errors
     /// [`Error::Interrupted`], or the device fails.
-    pub fn run(&mut self, session: &mut Session, rules: &Rules, by_time: bool) -> Result<()> {
+    pub(crate) fn run(
+        &mut self,
+        session: &mut Session,
+        rules: &Rules,
+        by_time: bool,
+    ) -> Result<()> {
         self.check()?;
         let pixels = session.renderer.film_size().map(f64::from);
         let mut run = WatchedRun { watch: self, pixels: pixels[0] * pixels[1], by_time };

@@ -43,7 +43,7 @@ fn texture_texel(words: &[u32], used: &TextureUse, [x, y]: [u32; 2]) -> Vec4 {
 }
 
 /// Linear colour and opacity of an image at image coordinates. Centres of texels lie at +0.5.
-pub fn texture_lookup(words: &[u32], used: &TextureUse, image: Vec2) -> Vec4 {
+pub(crate) fn texture_lookup(words: &[u32], used: &TextureUse, image: Vec2) -> Vec4 {
     let wrap = |shift: u32| match (used.flags >> shift) & 3 {
         TEXTURE_REPEAT => Wrap::Repeat,
         TEXTURE_MIRROR => Wrap::MirroredRepeat,
@@ -86,7 +86,7 @@ pub fn texture_value(
 }
 
 /// The same for a property that is one number: the luminance.
-pub fn texture_number(
+pub(crate) fn texture_number(
     words: &[u32],
     uses: &[TextureUse],
     use_index: u32,

@@ -16,10 +16,10 @@ use crate::{
 };
 
 /// Most pages (buffers) of texels, bindings `TEXTURE_WORDS_0` to `_3`; of triangle attributes too.
-pub const MAX_PAGES: usize = 4;
+pub(crate) const MAX_PAGES: usize = 4;
 
 /// Most words of a page, whatever the device allows.
-pub const MAX_PAGE_WORDS: u64 = 1 << 27;
+pub(crate) const MAX_PAGE_WORDS: u64 = 1 << 27;
 
 /// Base-2 logarithm of the words of a page on a device with texel buffers of `device_words`.
 pub fn page_shift(device_words: u64) -> u32 {

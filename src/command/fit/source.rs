@@ -23,7 +23,7 @@ const SCENE: &str = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n\
     [[object]]\nshape = \"sphere\"\nradius = 1\nmaterial = \"material\"\n";
 
 /// A material with its tables and a name for files.
-pub struct Source {
+pub(crate) struct Source {
     /// Stem of the output files.
     pub name: String,
     /// Tables of this one material.

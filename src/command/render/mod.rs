@@ -8,7 +8,7 @@ use std::{
     time::Instant,
 };
 
-pub use arguments::Arguments;
+pub(crate) use arguments::Arguments;
 
 use super::{
     interrupt::Interrupt,

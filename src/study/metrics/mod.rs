@@ -63,7 +63,7 @@ pub struct Metrics {
 
 impl Metrics {
     /// Returns every metric with its name.
-    pub fn named(&self) -> [(&'static str, f64); 10] {
+    pub(crate) fn named(&self) -> [(&'static str, f64); 10] {
         [
             ("mse", self.mse),
             ("rmse", self.rmse),
@@ -79,22 +79,20 @@ impl Metrics {
     }
 
     /// Looks up a metric by name.
-    pub fn get(&self, name: &str) -> Option<f64> {
+    pub(crate) fn get(&self, name: &str) -> Option<f64> {
         self.named().into_iter().find(|(known, _)| *known == name).map(|(_, value)| value)
     }
 
-    /// Compares a picture with a reference taken as exact.
-    ///
-    /// # Errors
-    /// [`Error::Comparison`]: no pixels, different sizes, values that are not finite.
-    pub fn of(picture: &RgbImage, reference: &RgbImage) -> Result<Self> {
+    /// Compares a picture with a reference taken as exact. Fails as [`Metrics::of_halves`].
+    #[cfg(test)]
+    pub(crate) fn of(picture: &RgbImage, reference: &RgbImage) -> Result<Self> {
         Self::of_halves(picture, reference, reference)
     }
 
     /// Compares a picture with a reference rendered in two independent halves.
     ///
     /// # Errors
-    /// As [`Metrics::of`].
+    /// [`Error::Comparison`]: no pixels, different sizes, values that are not finite.
     pub fn of_halves(picture: &RgbImage, first: &RgbImage, second: &RgbImage) -> Result<Self> {
         let squared = squared_errors(picture, first, second)?;
         let reference = mean_picture(first, second);
@@ -153,7 +151,11 @@ fn mean_picture(first: &RgbImage, second: &RgbImage) -> MeanReference {
 ///
 /// # Errors
 /// [`Error::Comparison`]: no pixels, different sizes, values that are not finite.
-pub fn squared_errors(picture: &RgbImage, first: &RgbImage, second: &RgbImage) -> Result<Vec<f64>> {
+pub(crate) fn squared_errors(
+    picture: &RgbImage,
+    first: &RgbImage,
+    second: &RgbImage,
+) -> Result<Vec<f64>> {
     check(picture, first, second)?;
     let error = |((x, r1), r2): ((&[f32; 3], &[f32; 3]), &[f32; 3])| {
         let product = |channel: usize| {

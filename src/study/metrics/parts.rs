@@ -34,7 +34,7 @@ impl PartErrors {
     ///
     /// # Errors
     /// As [`squared_errors`].
-    pub fn of_halves(
+    pub(crate) fn of_halves(
         picture: &RgbImage,
         [first, second]: [&RgbImage; 2],
         is_inside: &[bool],
@@ -56,7 +56,7 @@ impl PartErrors {
 
     /// Applies a function to every figure.
     #[must_use]
-    pub fn map(self, function: impl Fn(f64) -> f64) -> Self {
+    pub(crate) fn map(self, function: impl Fn(f64) -> f64) -> Self {
         Self {
             mse: function(self.mse),
             relmse: function(self.relmse),

@@ -12,7 +12,7 @@ use crate::study::{
 };
 
 /// Errors and efficiency against samples and against time.
-pub fn plots(report: &Report, scene: &SceneRecord) -> String {
+pub(crate) fn plots(report: &Report, scene: &SceneRecord) -> String {
     let curves: Vec<(usize, &Curve)> = report
         .order
         .iter()
@@ -109,7 +109,7 @@ fn plot_figure(
 }
 
 /// Legend entry of marker and text; `text` is HTML.
-pub fn legend_entry(style: usize, text: &str) -> String {
+pub(crate) fn legend_entry(style: usize, text: &str) -> String {
     format!(
         "<li class=\"s{}\"><svg viewBox=\"-6 -6 12 12\" aria-hidden=\"true\"><g class=\"mark\">{}\
          </g></svg>{text}</li>",

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use crate::study::statistics::Interval;
 
 /// Escapes the special characters of HTML, for content and attributes.
-pub fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
@@ -42,12 +42,12 @@ pub fn interval(interval: &Interval, digits: usize) -> String {
 }
 
 /// Formats a ratio of times as a percentage more or less: "+12.3% (+11.9 to +12.8)".
-pub fn percent_more(ratio: &Interval) -> String {
+pub(crate) fn percent_more(ratio: &Interval) -> String {
     percent_added(&ratio.map(|ratio| ratio - 1.0))
 }
 
 /// Formats an added share as a percentage, as [`percent_more`] does.
-pub fn percent_added(share: &Interval) -> String {
+pub(crate) fn percent_added(share: &Interval) -> String {
     let percent = |value: f64| format!("{:+.1}", 100.0 * value).replace('-', "−");
     let [middle, low, high] = [share.middle, share.low, share.high].map(percent);
     format!("{middle}% <span class=\"interval\">({low} to {high})</span>")
@@ -59,7 +59,7 @@ pub fn count(value: f64) -> String {
 }
 
 /// Formats a share as a percentage.
-pub fn percent(share: f64) -> String {
+pub(crate) fn percent(share: f64) -> String {
     format!("{}%", number(100.0 * share, 3))
 }
 
@@ -72,7 +72,7 @@ pub struct Table {
 
 impl Table {
     /// Creates a table without rows.
-    pub fn new(caption: impl Into<String>, head: &[&str]) -> Self {
+    pub(crate) fn new(caption: impl Into<String>, head: &[&str]) -> Self {
         Self {
             caption: caption.into(),
             head: head.iter().map(|text| (*text).to_owned()).collect(),
@@ -81,22 +81,22 @@ impl Table {
     }
 
     /// Adds a column.
-    pub fn column(&mut self, head: impl Into<String>) {
+    pub(crate) fn column(&mut self, head: impl Into<String>) {
         self.head.push(head.into());
     }
 
     /// Adds a row; `starts_group` draws a line above it.
-    pub fn row(&mut self, starts_group: bool, cells: Vec<String>) {
+    pub(crate) fn row(&mut self, starts_group: bool, cells: Vec<String>) {
         self.rows.push((starts_group, cells));
     }
 
     /// True if there are no rows.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
     /// Renders the table in a frame that scrolls sideways if it is too wide for the page.
-    pub fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let mut html = format!(
             "<p class=\"caption\">{0}</p><div class=\"table\" role=\"region\" tabindex=\"0\" \
              aria-label=\"{0}\"><table><thead><tr>",

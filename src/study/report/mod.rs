@@ -8,7 +8,7 @@ mod curves;
 pub mod html;
 mod overhead;
 pub mod pictures;
-pub mod plot;
+pub(crate) mod plot;
 pub mod tables;
 mod verdict;
 mod viewer;

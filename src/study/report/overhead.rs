@@ -9,7 +9,7 @@ use super::{
 use crate::study::results::Report;
 
 /// Overhead against the share of blocked rays, and the tables.
-pub fn overhead_section(report: &Report) -> String {
+pub(crate) fn overhead_section(report: &Report) -> String {
     let Some(first) = report.overheads.first() else { return String::new() };
     let mut samplers: Vec<&str> = Vec::new();
     for overhead in &report.overheads {

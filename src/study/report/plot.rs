@@ -11,7 +11,7 @@ const RIGHT: f64 = 12.0;
 const TOP: f64 = 10.0;
 const BOTTOM: f64 = 46.0;
 /// Number of colours and markers of the page.
-pub const STYLE_COUNT: usize = 8;
+pub(crate) const STYLE_COUNT: usize = 8;
 
 /// A point with its band or error bar.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,7 +30,7 @@ pub struct Point {
 
 /// Points of one colour.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Series {
+pub(crate) struct Series {
     /// Index of colour and marker.
     pub style: usize,
     /// Name in the tooltip.
@@ -168,7 +168,7 @@ impl Frame {
 }
 
 /// Marker of a style, centred on the origin.
-pub fn marker(style: usize) -> &'static str {
+pub(crate) fn marker(style: usize) -> &'static str {
     match style % STYLE_COUNT {
         0 => "<circle r=\"4\"/>",
         1 => "<rect x=\"-3.6\" y=\"-3.6\" width=\"7.2\" height=\"7.2\"/>",
@@ -187,7 +187,13 @@ fn tooltip(series: &Series, point: &Point) -> String {
 }
 
 /// Draws lines with bands on two logarithmic axes, and a faint line of the given slope, at most 0.
-pub fn log_log(title: &str, x_title: &str, y_title: &str, series: &[Series], slope: f64) -> String {
+pub(crate) fn log_log(
+    title: &str,
+    x_title: &str,
+    y_title: &str,
+    series: &[Series],
+    slope: f64,
+) -> String {
     let all = || series.iter().flat_map(|series| &series.points);
     let frame = Frame {
         x: Axis::logarithmic(all().map(|point| point.x)),

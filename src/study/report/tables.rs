@@ -71,7 +71,7 @@ const GLANCES: [Glance; 4] = [
 ];
 
 /// Ratios to the first sampler in every scene.
-pub fn at_a_glance(report: &Report, rules: &[Rule]) -> String {
+pub(crate) fn at_a_glance(report: &Report, rules: &[Rule]) -> String {
     let [first, others @ ..] = &report.order[..] else { return String::new() };
     if others.is_empty() || report.summaries.is_empty() {
         return String::new();

@@ -29,7 +29,7 @@ pub fn all(report: &Report, rules: &[Rule]) -> String {
 
 /// The verdict of one scene, at equal time if the study has that, else at its most samples; empty
 /// if there is nothing to compare.
-pub fn of_scene(report: &Report, scene: &SceneRecord, rules: &[Rule]) -> String {
+pub(crate) fn of_scene(report: &Report, scene: &SceneRecord, rules: &[Rule]) -> String {
     let ([first, others @ ..], Some(rule)) = (&report.order[..], rules.last()) else {
         return String::new();
     };

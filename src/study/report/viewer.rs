@@ -17,7 +17,7 @@ fn picture_class(scene: usize, picture: usize, is_error: bool) -> String {
 }
 
 /// Style sheet rules of a picture and its error map: they hold the images.
-pub fn picture_style(scene: usize, number: usize, picture: &Picture) -> String {
+pub(crate) fn picture_style(scene: usize, number: usize, picture: &Picture) -> String {
     let rule = |is_error, uri: &String| {
         if uri.is_empty() {
             return String::new();
@@ -48,7 +48,11 @@ fn links(picture: &Picture, caption: &str) -> String {
 }
 
 /// Viewer, panes, error maps and crops.
-pub fn picture_group(index: usize, scene: &SceneRecord, scene_pictures: &ScenePictures) -> String {
+pub(crate) fn picture_group(
+    index: usize,
+    scene: &SceneRecord,
+    scene_pictures: &ScenePictures,
+) -> String {
     let ScenePictures { pictures, scale, crops, .. } = scene_pictures;
     let aspect = format!("--aspect:{}/{}", scene.width, scene.height);
     let mut html = format!(

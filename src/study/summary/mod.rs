@@ -16,7 +16,7 @@ use super::{
 };
 
 /// Standard errors between the means beyond which the report points the deviation out.
-pub const SUSPICIOUS_DEVIATION: f64 = 4.0;
+pub(crate) const SUSPICIOUS_DEVIATION: f64 = 4.0;
 
 /// One sampler in one scene under one rule, over all seeds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -79,12 +79,12 @@ pub struct Summary {
 
 impl Summary {
     /// True if the mean deviates from the reference's by more than noise explains.
-    pub fn is_suspicious(&self) -> bool {
+    pub(crate) fn is_suspicious(&self) -> bool {
         self.mean_deviation.is_some_and(|deviation| deviation.abs() > SUSPICIOUS_DEVIATION)
     }
 
     /// Device milliseconds per sample of all passes.
-    pub fn total_ms(&self) -> f64 {
+    pub(crate) fn total_ms(&self) -> f64 {
         self.gpu_ms_per_sample.values().sum()
     }
 }
