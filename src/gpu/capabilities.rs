@@ -4,8 +4,8 @@ use ash::vk;
 use serde::Serialize;
 
 use super::{
+    Called,
     instance::{Instance, no_driver},
-    vulkan_error,
 };
 use crate::{
     error::{Error, Result},
@@ -138,7 +138,7 @@ pub fn list(instance: &Instance) -> Result<Vec<Capabilities>> {
 pub(super) fn enumerate(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, Capabilities)>> {
     // SAFETY: the instance is alive.
     let devices = unsafe { instance.raw().enumerate_physical_devices() }
-        .map_err(|result| vulkan_error("vkEnumeratePhysicalDevices", result))?;
+        .called("vkEnumeratePhysicalDevices")?;
     if devices.is_empty() {
         return Err(no_driver());
     }

@@ -5,6 +5,7 @@ use std::{sync::Arc, time::Duration};
 use ash::vk;
 
 use super::{
+    Called,
     buffer::Buffer,
     descriptors::DescriptorSet,
     device::Device,
@@ -45,7 +46,7 @@ impl Commands {
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
         // SAFETY: the family belongs to the device.
         let pool = unsafe { raw_device.create_command_pool(&pool_info, None) }
-            .map_err(|result| vulkan_error("vkCreateCommandPool", result))?;
+            .called("vkCreateCommandPool")?;
         // From here on `Drop` cleans up.
         let mut commands = Self {
             pool,
@@ -65,13 +66,11 @@ impl Commands {
         unsafe {
             commands.raw = raw_device
                 .allocate_command_buffers(&allocate)
-                .map_err(|result| vulkan_error("vkAllocateCommandBuffers", result))?[0];
+                .called("vkAllocateCommandBuffers")?[0];
             commands.fence = raw_device
                 .create_fence(&vk::FenceCreateInfo::default(), None)
-                .map_err(|result| vulkan_error("vkCreateFence", result))?;
-            raw_device
-                .begin_command_buffer(commands.raw, &begin)
-                .map_err(|result| vulkan_error("vkBeginCommandBuffer", result))?;
+                .called("vkCreateFence")?;
+            raw_device.begin_command_buffer(commands.raw, &begin).called("vkBeginCommandBuffer")?;
         }
         Ok(commands)
     }
@@ -112,8 +111,6 @@ impl Commands {
         let raw = self.device.raw();
         labels::begin(&self.device, self.raw, pipeline.name());
         self.barrier(
-            vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER,
-            vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE,
             vk::PipelineStageFlags::COMPUTE_SHADER,
             vk::AccessFlags::SHADER_READ | vk::AccessFlags::SHADER_WRITE,
         );
@@ -159,12 +156,7 @@ impl Commands {
 
     /// Fills the first `bytes`, a positive multiple of 4, with a repeated word, after earlier use.
     pub(crate) fn fill_start(&mut self, buffer: &Buffer, bytes: u64, word: u32) {
-        self.barrier(
-            vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER,
-            vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE,
-            vk::PipelineStageFlags::TRANSFER,
-            vk::AccessFlags::TRANSFER_WRITE,
-        );
+        self.barrier(vk::PipelineStageFlags::TRANSFER, vk::AccessFlags::TRANSFER_WRITE);
         // SAFETY: recording; the buffer has transfer usage and the caller keeps it alive.
         unsafe {
             self.device.raw().cmd_fill_buffer(self.raw, buffer.raw(), 0, bytes, word);
@@ -181,8 +173,6 @@ impl Commands {
         size: u64,
     ) {
         self.barrier(
-            vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER,
-            vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE,
             vk::PipelineStageFlags::TRANSFER,
             vk::AccessFlags::TRANSFER_READ | vk::AccessFlags::TRANSFER_WRITE,
         );
@@ -194,12 +184,7 @@ impl Commands {
 
     /// Makes everything written so far readable by the host once the submission has finished.
     pub(crate) fn make_visible_to_host(&mut self) {
-        self.barrier(
-            vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER,
-            vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE,
-            vk::PipelineStageFlags::HOST,
-            vk::AccessFlags::HOST_READ,
-        );
+        self.barrier(vk::PipelineStageFlags::HOST, vk::AccessFlags::HOST_READ);
     }
 
     /// The command buffer, for commands that no pass needs.
@@ -207,28 +192,16 @@ impl Commands {
         self.raw
     }
 
-    fn barrier(
-        &self,
-        source: vk::PipelineStageFlags,
-        source_access: vk::AccessFlags,
-        destination: vk::PipelineStageFlags,
-        destination_access: vk::AccessFlags,
-    ) {
+    /// Lets everything written so far be seen by `access` in the stages `next`.
+    fn barrier(&self, next: vk::PipelineStageFlags, access: vk::AccessFlags) {
+        let writers = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
         let barrier = vk::MemoryBarrier::default()
-            .src_access_mask(source_access)
-            .dst_access_mask(destination_access);
+            .src_access_mask(vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE)
+            .dst_access_mask(access);
+        let flags = vk::DependencyFlags::empty();
+        let raw = self.device.raw();
         // SAFETY: the command buffer is recording.
-        unsafe {
-            self.device.raw().cmd_pipeline_barrier(
-                self.raw,
-                source,
-                destination,
-                vk::DependencyFlags::empty(),
-                &[barrier],
-                &[],
-                &[],
-            );
-        }
+        unsafe { raw.cmd_pipeline_barrier(self.raw, writers, next, flags, &[barrier], &[], &[]) };
     }
 
     /// Submits, waits, and returns the device time per pass (empty if not timed).
@@ -253,15 +226,10 @@ impl Commands {
             raw.queue_submit(*queue, &[submit], self.fence)
                 .map_err(|result| failed("vkQueueSubmit", result))?;
             let timeout = u64::try_from(SUBMISSION_WAIT.as_nanos()).unwrap_or(u64::MAX);
-            let wait = || raw.wait_for_fences(&[self.fence], true, timeout);
-            let mut outcome = wait();
-            for _ in 1..SUBMISSION_WAITS {
-                if outcome != Err(vk::Result::TIMEOUT) {
-                    break;
-                }
-                outcome = wait();
-            }
-            match outcome {
+            let mut waits = (0..SUBMISSION_WAITS)
+                .map(|_| raw.wait_for_fences(&[self.fence], true, timeout))
+                .skip_while(|outcome| *outcome == Err(vk::Result::TIMEOUT));
+            match waits.next().unwrap_or(Err(vk::Result::TIMEOUT)) {
                 Ok(()) => {}
                 Err(vk::Result::TIMEOUT) => {
                     // The commands may still use the callers' objects, so the device must be idle

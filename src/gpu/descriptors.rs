@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::{buffer::Buffer, device::Device, labels, set_layouts::descriptor_type, vulkan_error};
+use super::{Called, buffer::Buffer, device::Device, labels, set_layouts::descriptor_type};
 use crate::{
     error::{Error, Result},
     shader::bindings::{Binding, BindingTable, Kind, TexelFormat},
@@ -52,7 +52,7 @@ impl DescriptorSet {
         let pool_info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
         // SAFETY: the device is alive.
         let pool = unsafe { device.raw().create_descriptor_pool(&pool_info, None) }
-            .map_err(|result| vulkan_error("vkCreateDescriptorPool", result))?;
+            .called("vkCreateDescriptorPool")?;
         // From here on `Drop` cleans up.
         let mut set = Self {
             pool,
@@ -66,7 +66,7 @@ impl DescriptorSet {
             vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
         // SAFETY: the pool has room for this one set.
         set.raw = unsafe { device.raw().allocate_descriptor_sets(&allocate) }
-            .map_err(|result| vulkan_error("vkAllocateDescriptorSets", result))?[0];
+            .called("vkAllocateDescriptorSets")?[0];
         labels::name_object(device, set.raw, table.name);
         for (binding, buffer) in buffers {
             let info =
@@ -110,10 +110,8 @@ impl DescriptorSet {
             .format(vulkan_format(format))
             .range(texels * texel_bytes);
         // SAFETY: the buffer is alive, has texel-buffer usage and holds that many texels.
-        let view =
-            unsafe { self.device.raw().create_buffer_view(&info, None) }.map_err(|result| {
-                vulkan_error(&format!("vkCreateBufferView({})", buffer.name()), result)
-            })?;
+        let view = unsafe { self.device.raw().create_buffer_view(&info, None) }
+            .called(&format!("vkCreateBufferView({})", buffer.name()))?;
         self.views.push(view);
         labels::name_object(&self.device, view, buffer.name());
         Ok(view)

@@ -10,12 +10,12 @@ use gpu_allocator::{
 use winit::raw_window_handle::RawDisplayHandle;
 
 use super::{
+    Called,
     capabilities::{Capabilities, choose, enumerate},
     instance::Instance,
     pipeline_cache::PipelineCache,
     pipelines::Pipelines,
     set_layouts::SetLayouts,
-    vulkan_error,
 };
 use crate::error::{Error, Result};
 
@@ -86,7 +86,7 @@ impl Device {
             .push_next(&mut features12);
         // SAFETY: `physical` belongs to this instance and has the family and feature asked for.
         let raw = unsafe { instance.raw().create_device(physical, &info, None) }
-            .map_err(|result| vulkan_error("vkCreateDevice", result))?;
+            .called("vkCreateDevice")?;
         // SAFETY: the queue was requested at creation.
         let queue = unsafe { raw.get_device_queue(queue_family, 0) };
         let debug_names =
@@ -219,7 +219,7 @@ fn check_presents(
 ) -> Result<()> {
     // SAFETY: `physical` belongs to this instance.
     let extensions = unsafe { instance.raw().enumerate_device_extension_properties(physical) }
-        .map_err(|result| vulkan_error("vkEnumerateDeviceExtensionProperties", result))?;
+        .called("vkEnumerateDeviceExtensionProperties")?;
     let is_swapchain = |extension: &vk::ExtensionProperties| {
         extension.extension_name_as_c_str() == Ok(khr::swapchain::NAME)
     };

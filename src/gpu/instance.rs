@@ -8,7 +8,7 @@ use std::{
 use ash::{ext, vk};
 use winit::raw_window_handle::RawDisplayHandle;
 
-use super::vulkan_error;
+use super::{Called, vulkan_error};
 use crate::{
     error::{Error, Result},
     memory,
@@ -55,7 +55,7 @@ impl Instance {
 
         // SAFETY: `entry` is a loaded Vulkan loader.
         let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }
-            .map_err(|result| vulkan_error("vkEnumerateInstanceExtensionProperties", result))?;
+            .called("vkEnumerateInstanceExtensionProperties")?;
         let has = |name: &CStr| {
             extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name))
         };
@@ -76,7 +76,7 @@ impl Instance {
         if validate {
             // SAFETY: as above.
             let available = unsafe { entry.enumerate_instance_layer_properties() }
-                .map_err(|result| vulkan_error("vkEnumerateInstanceLayerProperties", result))?;
+                .called("vkEnumerateInstanceLayerProperties")?;
             if !available.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
                 return Err(Error::Device {
                     reason: "--validate needs the Vulkan layer VK_LAYER_KHRONOS_validation, \
@@ -136,7 +136,7 @@ impl Instance {
             // `messages`, which lives until after the messenger is destroyed (see `Drop`).
             let messenger =
                 unsafe { functions.create_debug_utils_messenger(&messenger_info, None) }
-                    .map_err(|result| vulkan_error("vkCreateDebugUtilsMessengerEXT", result))?;
+                    .called("vkCreateDebugUtilsMessengerEXT")?;
             Some(DebugMessenger { functions, messenger })
         } else {
             None
@@ -180,7 +180,7 @@ impl Drop for Instance {
 /// Returns the extensions that show windows on a kind of display.
 fn surface_extensions(display: RawDisplayHandle) -> Result<Vec<&'static CStr>> {
     let names = ash_window::enumerate_required_extensions(display)
-        .map_err(|result| vulkan_error("surface of this kind of display", result))?;
+        .called("surface of this kind of display")?;
     // SAFETY: the crate returns constants that end with a zero byte.
     Ok(names.iter().map(|name| unsafe { CStr::from_ptr(*name) }).collect())
 }

@@ -29,7 +29,19 @@ pub use pipeline::Pipeline;
 pub(crate) use swapchain::{Presented, Swapchain};
 pub(crate) use timestamps::PassTimes;
 
-use crate::error::Error;
+use crate::error::{Error, Result};
+
+/// Result of a call of Vulkan.
+trait Called<T> {
+    /// Names the call in the error, as [`vulkan_error`] does.
+    fn called(self, call: &str) -> Result<T>;
+}
+
+impl<T> Called<T> for ash::prelude::VkResult<T> {
+    fn called(self, call: &str) -> Result<T> {
+        self.map_err(|result| vulkan_error(call, result))
+    }
+}
 
 /// Returns the [`Error::Vulkan`] for a failed call, or [`Error::Device`] for a lost device.
 fn vulkan_error(call: &str, result: ash::vk::Result) -> Error {

@@ -1,15 +1,11 @@
 //! Compute pipelines with specialization constants, made once for each device.
 
-use std::{ffi::CStr, sync::Arc};
+use std::sync::Arc;
 
 use ash::vk;
 
 use super::{
-    descriptors::DescriptorSet,
-    device::Device,
-    labels,
-    pipelines::{Key, Made},
-    vulkan_error,
+    Called, descriptors::DescriptorSet, device::Device, labels, pipelines::Made, vulkan_error,
 };
 use crate::{error::Result, shader::spirv::used_bindings};
 
@@ -33,7 +29,7 @@ impl Pipeline {
         spirv: &[u8],
         constants: &[(u32, u32)],
     ) -> Result<Self> {
-        let key = Key::new(name, spirv, constants);
+        let key = (name, spirv, constants);
         let made = device.pipelines().get_or_make(key, || make(device, name, spirv, constants))?;
         Ok(Self { made, name: name.to_owned(), _device: Arc::clone(device) })
     }
@@ -72,7 +68,7 @@ fn make(device: &Arc<Device>, name: &str, spirv: &[u8], constants: &[(u32, u32)]
         .push_constant_ranges(&push_constants);
     // SAFETY: the set layouts live as long as the device.
     let layout = unsafe { device.raw().create_pipeline_layout(&layout_info, None) }
-        .map_err(|result| vulkan_error(&format!("vkCreatePipelineLayout({name})"), result))?;
+        .called(&format!("vkCreatePipelineLayout({name})"))?;
     let raw = compile(device, name, &words, constants, layout).inspect_err(|_| {
         // SAFETY: nothing uses the layout of a pipeline that was not made.
         unsafe { device.raw().destroy_pipeline_layout(layout, None) };
@@ -92,7 +88,7 @@ fn compile(
     let module_info = vk::ShaderModuleCreateInfo::default().code(words);
     // SAFETY: `words` is SPIR-V that the build compiled.
     let module = unsafe { raw_device.create_shader_module(&module_info, None) }
-        .map_err(|result| vulkan_error(&format!("vkCreateShaderModule({name})"), result))?;
+        .called(&format!("vkCreateShaderModule({name})"))?;
     let entries: Vec<_> = constants
         .iter()
         .enumerate()
@@ -106,11 +102,10 @@ fn compile(
     let values: Vec<u32> = constants.iter().map(|(_, value)| *value).collect();
     let specialization =
         vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&values));
-    const MAIN: &CStr = c"main";
     let stage = vk::PipelineShaderStageCreateInfo::default()
         .stage(vk::ShaderStageFlags::COMPUTE)
         .module(module)
-        .name(MAIN)
+        .name(c"main")
         .specialization_info(&specialization);
     let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
     let queue = device.queue();

@@ -17,14 +17,8 @@ pub(super) struct Pipelines {
     made: Mutex<HashMap<Key, Made>>,
 }
 
-/// Shader and constants that a pipeline is made from.
-#[derive(PartialEq, Eq, Hash)]
-pub(super) struct Key {
-    name: String,
-    /// SHA-256 of the SPIR-V.
-    code: [u8; 32],
-    constants: Vec<(u32, u32)>,
-}
+/// Name, SHA-256 of the SPIR-V and constants that a pipeline is made from.
+type Key = (String, [u8; 32], Vec<(u32, u32)>);
 
 #[derive(Clone, Copy)]
 pub(super) struct Made {
@@ -34,23 +28,14 @@ pub(super) struct Made {
     pub used: [Option<u32>; 4],
 }
 
-impl Key {
-    pub(crate) fn new(name: &str, spirv: &[u8], constants: &[(u32, u32)]) -> Self {
-        Self {
-            name: name.to_owned(),
-            code: Sha256::digest(spirv).into(),
-            constants: constants.to_vec(),
-        }
-    }
-}
-
 impl Pipelines {
-    /// Returns the pipeline of `key`, which `make` makes the first time.
+    /// Returns the pipeline of a shader and its constants, which `make` makes the first time.
     pub(crate) fn get_or_make(
         &self,
-        key: Key,
+        (name, spirv, constants): (&str, &[u8], &[(u32, u32)]),
         make: impl FnOnce() -> Result<Made>,
     ) -> Result<Made> {
+        let key = (name.to_owned(), Sha256::digest(spirv).into(), constants.to_vec());
         match self.made.lock().unwrap_or_else(PoisonError::into_inner).entry(key) {
             Entry::Occupied(made) => Ok(*made.get()),
             Entry::Vacant(place) => Ok(*place.insert(make()?)),

@@ -2,7 +2,7 @@
 
 use ash::vk;
 
-use super::vulkan_error;
+use super::Called;
 use crate::{
     error::Result,
     shader::bindings::{Binding, BindingTable, Kind, TABLES},
@@ -70,5 +70,5 @@ fn create_layout(device: &ash::Device, bindings: &[Binding]) -> Result<vk::Descr
     let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
     // SAFETY: the device is alive and `info` valid.
     unsafe { device.create_descriptor_set_layout(&info, None) }
-        .map_err(|result| vulkan_error("vkCreateDescriptorSetLayout", result))
+        .called("vkCreateDescriptorSetLayout")
 }

@@ -9,6 +9,7 @@ use ash::{khr, vk};
 use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 
 use super::{
+    Called,
     buffer::Buffer,
     commands::Commands,
     device::{Device, cannot_present},
@@ -83,7 +84,7 @@ impl Swapchain {
         // SAFETY: the device is alive.
         swapchain.acquired =
             unsafe { device.raw().create_fence(&vk::FenceCreateInfo::default(), None) }
-                .map_err(|result| vulkan_error("vkCreateFence", result))?;
+                .called("vkCreateFence")?;
         swapchain.renew(size)?;
         Ok(swapchain)
     }
@@ -109,7 +110,7 @@ impl Swapchain {
             self.surface = vk::SurfaceKHR::null();
             ash_window::create_surface(instance.entry(), instance.raw(), display, handle, None)
         };
-        self.surface = surface.map_err(|result| vulkan_error("surface of the window", result))?;
+        self.surface = surface.called("surface of the window")?;
         // SAFETY: device, family and surface belong together.
         let presents = unsafe {
             self.surfaces.get_physical_device_surface_support(
@@ -138,10 +139,8 @@ impl Swapchain {
                 self.surfaces.get_physical_device_surface_formats(physical, self.surface),
             )
         };
-        let limits = limits
-            .map_err(|result| vulkan_error("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", result))?;
-        let formats = formats
-            .map_err(|result| vulkan_error("vkGetPhysicalDeviceSurfaceFormatsKHR", result))?;
+        let limits = limits.called("vkGetPhysicalDeviceSurfaceCapabilitiesKHR")?;
+        let formats = formats.called("vkGetPhysicalDeviceSurfaceFormatsKHR")?;
         // The passes apply the sRGB curve themselves, so the format must not.
         let is_plain = |format: &&vk::SurfaceFormatKHR| {
             matches!(format.format, vk::Format::B8G8R8A8_UNORM | vk::Format::R8G8B8A8_UNORM)
@@ -191,10 +190,10 @@ impl Swapchain {
             .clipped(true);
         // SAFETY: the surface is alive and has no other swapchain.
         self.raw = unsafe { self.functions.create_swapchain(&info, None) }
-            .map_err(|result| vulkan_error("vkCreateSwapchainKHR", result))?;
+            .called("vkCreateSwapchainKHR")?;
         // SAFETY: the swapchain was just created.
         self.images = unsafe { self.functions.get_swapchain_images(self.raw) }
-            .map_err(|result| vulkan_error("vkGetSwapchainImagesKHR", result))?;
+            .called("vkGetSwapchainImagesKHR")?;
         self.size = [extent.width, extent.height];
         self.is_bgra = format.format == vk::Format::B8G8R8A8_UNORM;
         Ok(())
@@ -242,7 +241,7 @@ impl Swapchain {
         unsafe {
             raw.wait_for_fences(&[self.acquired], true, u64::MAX)
                 .and_then(|()| raw.reset_fences(&[self.acquired]))
-                .map_err(|result| vulkan_error("fence of an image of the window", result))?;
+                .called("fence of an image of the window")?;
         }
         let image = self.images[index as usize];
         let mut commands = Commands::begin(&self.device)?;

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use ash::vk;
 
-use super::{device::Device, vulkan_error};
+use super::{Called, device::Device};
 use crate::error::Result;
 
 /// Device time by pass name, milliseconds.
@@ -30,8 +30,8 @@ impl Timestamps {
             .query_type(vk::QueryType::TIMESTAMP)
             .query_count(2 * capacity);
         // SAFETY: the device is alive; the queue family has timestamps (checked at its choice).
-        let pool = unsafe { device.raw().create_query_pool(&info, None) }
-            .map_err(|result| vulkan_error("vkCreateQueryPool", result))?;
+        let pool =
+            unsafe { device.raw().create_query_pool(&info, None) }.called("vkCreateQueryPool")?;
         // SAFETY: recording, outside of any pass.
         unsafe { device.raw().cmd_reset_query_pool(commands, pool, 0, 2 * capacity) };
         Ok(Self { pool, commands, names: Vec::new(), capacity, device: Arc::clone(device) })
@@ -75,7 +75,7 @@ impl Timestamps {
                     vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT,
                 )
             }
-            .map_err(|result| vulkan_error("vkGetQueryPoolResults", result))?;
+            .called("vkGetQueryPoolResults")?;
         }
         let capabilities = self.device.capabilities();
         let mask = match capabilities.timestamp_valid_bits {
