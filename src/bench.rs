@@ -6,24 +6,19 @@
 //! that both see the same state of the machine. A tree of two levels, which obvhs does not know, goes
 //! through the Rust twin of the shader's traversal instead.
 
-use std::{
-    sync::{
-        Arc,
-        atomic::{AtomicUsize, Ordering},
-    },
-    time::Instant,
-};
+use std::{sync::Arc, time::Instant};
 
 use obvhs::{
     cwbvh::{CwBvh, node::CwBvhNode},
     ray::RayHit,
     rt_triangle::RtTriangle,
 };
+use rayon::{ThreadPool, ThreadPoolBuilder, prelude::*};
 use serde::Serialize;
 
 use crate::{
     accel::Accel,
-    error::Result,
+    error::{Error, Result},
     gpu::{Buffer, Commands, DescriptorSet, Device},
     pass::{Domain, Kernel, Pass, SceneBuffers, Schedule, Steps, wave_buffers::path_list_bytes},
     sampler::{Parameters, basic::Basic},
@@ -32,9 +27,10 @@ use crate::{
         constants::NO_MATERIAL,
         structs::{Counters, Hit, PathState, Ray, ShadowRay, Wave},
     },
+    study::statistics::median,
 };
 
-/// Number of rays that a CPU thread takes at a time.
+/// Least number of rays that a CPU thread takes at a time.
 const CHUNK: usize = 4096;
 
 /// Parameters of a measurement.
@@ -67,10 +63,8 @@ impl RateSpread {
     /// Median and extremes of `values`; zeros if there are none.
     pub(crate) fn of(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
-        let at = |index: usize| values.get(index).copied().unwrap_or(0.0);
-        let last = values.len().saturating_sub(1);
-        let median = 0.5 * (at(last / 2) + at(last.div_ceil(2)));
-        Self { median, least: at(0), most: at(last) }
+        let end = |value: Option<&f64>| value.copied().unwrap_or(0.0);
+        Self { median: median(&values), least: end(values.first()), most: end(values.last()) }
     }
 }
 
@@ -101,30 +95,30 @@ struct Yardstick<'a> {
     two_levels: Option<&'a Accel>,
     bvh: CwBvh,
     triangles: Vec<RtTriangle>,
-    threads: usize,
+    threads: ThreadPool,
 }
 
 impl<'a> Yardstick<'a> {
-    fn new(accel: &'a Accel, threads: usize) -> Self {
+    fn new(accel: &'a Accel, threads: usize) -> Result<Self> {
+        let threads = ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(|error| Error::usage(format!("{threads} threads of the CPU: {error}")))?;
         if accel.is_instanced() {
             let (bvh, triangles) = (CwBvh::default(), Vec::new());
-            return Self { two_levels: Some(accel), bvh, triangles, threads };
+            return Ok(Self { two_levels: Some(accel), bvh, triangles, threads });
         }
-        let count = accel.triangle_count() as u32;
-        Self {
+        let nodes = bytemuck::cast_slice::<_, CwBvhNode>(&accel.nodes).to_vec();
+        let triangle = |index: u32| {
+            let [a, b, c] = accel.triangle(index).vertices.map(|v| v.position.into());
+            RtTriangle::new(a, b, c)
+        };
+        Ok(Self {
             two_levels: None,
-            bvh: CwBvh {
-                nodes: bytemuck::cast_slice::<_, CwBvhNode>(&accel.nodes).to_vec(),
-                ..CwBvh::default()
-            },
-            triangles: (0..count)
-                .map(|index| {
-                    let [a, b, c] = accel.triangle(index).vertices.map(|v| v.position.into());
-                    RtTriangle::new(a, b, c)
-                })
-                .collect(),
+            bvh: CwBvh { nodes, ..CwBvh::default() },
+            triangles: (0..accel.triangle_count() as u32).map(triangle).collect(),
             threads,
-        }
+        })
     }
 
     fn meets(&self, ray: &CpuRay, any_hit: bool) -> bool {
@@ -146,30 +140,10 @@ impl<'a> Yardstick<'a> {
 
     /// Traces all rays. Returns wall time in seconds, and for each ray whether it meets a surface.
     fn trace(&self, rays: &[CpuRay], any_hit: bool) -> (f64, Vec<bool>) {
-        let mut met = vec![false; rays.len()];
         let start = Instant::now();
-        let next = AtomicUsize::new(0);
-        let results: Vec<Vec<(usize, Vec<bool>)>> = std::thread::scope(|scope| {
-            let work = || {
-                let mut done = Vec::new();
-                loop {
-                    let first = next.fetch_add(CHUNK, Ordering::Relaxed);
-                    let Some(rest) = rays.get(first..).filter(|rest| !rest.is_empty()) else {
-                        return done;
-                    };
-                    let chunk = &rest[..rest.len().min(CHUNK)];
-                    done.push((first, chunk.iter().map(|ray| self.meets(ray, any_hit)).collect()));
-                }
-            };
-            let threads: Vec<_> = (0..self.threads.max(1)).map(|_| scope.spawn(work)).collect();
-            // The scope passes on a panic in a thread.
-            threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
-        });
-        let seconds = start.elapsed().as_secs_f64();
-        for (first, chunk) in results.into_iter().flatten() {
-            met[first..first + chunk.len()].copy_from_slice(&chunk);
-        }
-        (seconds, met)
+        let rays = rays.par_iter().with_min_len(CHUNK);
+        let met = self.threads.install(|| rays.map(|ray| self.meets(ray, any_hit)).collect());
+        (start.elapsed().as_secs_f64(), met)
     }
 }
 
@@ -183,11 +157,8 @@ struct Bench<'a> {
     hits: Buffer,
     shadow_rays: Buffer,
     visibility: Buffer,
-    // Kept alive for the sets.
-    _paths: Buffer,
-    _instances: Buffer,
-    _path_lists: Buffer,
-    _counters: Buffer,
+    /// The other buffers of the sets.
+    _others: [Buffer; 4],
     wave: Wave,
 }
 
@@ -235,10 +206,7 @@ impl<'a> Bench<'a> {
             hits,
             shadow_rays,
             visibility,
-            _paths: path_states,
-            _instances: instances,
-            _path_lists: path_lists,
-            _counters: counters,
+            _others: [path_states, instances, path_lists, counters],
             wave,
         })
     }
@@ -262,13 +230,8 @@ impl<'a> Bench<'a> {
     /// Downloads the rays that `trace` would follow.
     fn active_rays(&self) -> Result<Vec<Option<CpuRay>>> {
         let rays: Vec<Ray> = self.rays.download(self.wave.pixel_count as usize)?;
-        Ok(rays
-            .iter()
-            .map(|ray| {
-                (ray.is_active != 0)
-                    .then(|| CpuRay::new_inf(ray.origin.into(), ray.direction.into()))
-            })
-            .collect())
+        let cpu_ray = |ray: &Ray| CpuRay::new_inf(ray.origin.into(), ray.direction.into());
+        Ok(rays.iter().map(|ray| (ray.is_active != 0).then(|| cpu_ray(ray))).collect())
     }
 
     /// Downloads the rays that `shadow` would follow.
@@ -293,9 +256,13 @@ impl<'a> Bench<'a> {
             .collect())
     }
 
-    /// Tests for each ray whether it met a surface, after `trace`.
-    fn hits_met(&self) -> Result<Vec<bool>> {
-        let hits: Vec<Hit> = self.hits.download(self.wave.pixel_count as usize)?;
+    /// Tests for each of `count` rays whether it met a surface, after `trace` or, for any hit, `shadow`.
+    fn met(&self, any_hit: bool, count: usize) -> Result<Vec<bool>> {
+        if any_hit {
+            let visibility: Vec<u32> = self.visibility.download(count)?;
+            return Ok(visibility.iter().map(|visible| *visible == 0).collect());
+        }
+        let hits: Vec<Hit> = self.hits.download(count)?;
         Ok(hits.iter().map(|hit| hit.material != NO_MATERIAL).collect())
     }
 }
@@ -311,81 +278,63 @@ pub fn measure(
     plan: &RayPlan,
 ) -> Result<Vec<RayRate>> {
     let bench = Bench::new(device, scene, plan)?;
-    let yardstick = Yardstick::new(accel, plan.threads);
+    let yardstick = Yardstick::new(accel, plan.threads)?;
+    let (traversal, surfaces) = (scene.geometry().traversal(), scene.surfaces());
     let incoherent = Schedule::incoherent(device.capabilities());
-    let trace =
-        Pass::new(device, scene.geometry().traversal().trace(Schedule::SINGLE, scene.surfaces()))?;
-    let trace_bounce =
-        Pass::new(device, scene.geometry().traversal().trace(incoherent, scene.surfaces()))?;
-    let shadow =
-        Pass::new(device, scene.geometry().traversal().shadow(incoherent, scene.surfaces()))?;
-    let compare = |kind, rays: &[Option<CpuRay>], any_hit, run: &dyn Fn() -> Result<f64>| {
-        compare(kind, &yardstick, rays, any_hit, plan.repetitions, run)
+    let compare = |kind, kernel, any_hit| {
+        compare(kind, &yardstick, &bench, &Pass::new(device, kernel)?, any_hit, plan.repetitions)
     };
-    let mut rates = Vec::new();
-    let disagreements = |rays: &[Option<CpuRay>], device: &[bool], cpu: &[bool]| {
-        let device = rays.iter().zip(device).filter_map(|(ray, met)| ray.is_some().then_some(met));
-        device.zip(cpu).filter(|(device, cpu)| device != cpu).count()
-    };
-
     bench.run_once(Kernel::new("camera", Domain::Paths, &[]))?;
-    let rays = bench.active_rays()?;
-    let (mut rate, met) = compare("camera", &rays, false, &|| bench.run(&trace))?;
-    rate.disagreements = disagreements(&rays, &bench.hits_met()?, &met);
-    rates.push(rate);
-
-    let steps = plan.sampler.steps(&Parameters::default(), scene.surfaces())?;
+    let camera = compare("camera", traversal.trace(Schedule::SINGLE, surfaces), None)?;
+    let steps = plan.sampler.steps(&Parameters::default(), surfaces)?;
     for kernel in steps.sample(&bench.wave) {
         bench.run_once(kernel)?;
     }
-    let rays = bench.active_shadow_rays(accel)?;
-    let (mut rate, met) = compare("shadow", &rays, true, &|| bench.run(&shadow))?;
-    let visibility: Vec<u32> = bench.visibility.download(rays.len())?;
-    let blocked: Vec<bool> = visibility.iter().map(|visible| *visible == 0).collect();
-    rate.disagreements = disagreements(&rays, &blocked, &met);
-    rates.push(rate);
-
+    let shadow = compare("shadow", traversal.shadow(incoherent, surfaces), Some(accel))?;
     bench.run_once(Kernel::new("bounce", Domain::Paths, &[]))?;
-    let rays = bench.active_rays()?;
-    let (mut rate, met) = compare("bounce", &rays, false, &|| bench.run(&trace_bounce))?;
-    rate.disagreements = disagreements(&rays, &bench.hits_met()?, &met);
-    rates.push(rate);
-    Ok(rates)
+    let bounce = compare("bounce", traversal.trace(incoherent, surfaces), None)?;
+    Ok(vec![camera, shadow, bounce])
 }
 
-/// Measures device and CPU in turns on the same rays; `run` returns device seconds.
+/// Measures device and CPU in turns on the same rays: shadow rays off the surfaces of `shadows_of`, else
+/// those that `trace` follows.
 fn compare(
     kind: &'static str,
     yardstick: &Yardstick<'_>,
-    rays: &[Option<CpuRay>],
-    any_hit: bool,
+    bench: &Bench<'_>,
+    pass: &Pass,
+    shadows_of: Option<&Accel>,
     repetitions: usize,
-    run: &dyn Fn() -> Result<f64>,
-) -> Result<(RayRate, Vec<bool>)> {
-    let rays: Vec<CpuRay> = rays.iter().flatten().copied().collect();
+) -> Result<RayRate> {
+    let any_hit = shadows_of.is_some();
+    let all =
+        shadows_of.map_or_else(|| bench.active_rays(), |accel| bench.active_shadow_rays(accel))?;
+    let rays: Vec<CpuRay> = all.iter().flatten().copied().collect();
     // Warm up: some drivers compile at first use.
-    run()?;
+    bench.run(pass)?;
     let (_, met) = yardstick.trace(&rays, any_hit);
     let (mut device, mut cpu, mut ratio) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..repetitions {
         let millions = rays.len() as f64 * 1e-6;
-        let device_seconds = run()?.max(1e-9);
+        let device_seconds = bench.run(pass)?.max(1e-9);
         let cpu_seconds = yardstick.trace(&rays, any_hit).0.max(1e-9);
         device.push(millions / device_seconds);
         cpu.push(millions / cpu_seconds);
         ratio.push(cpu_seconds / device_seconds);
     }
+    let on_device = bench.met(any_hit, all.len())?;
+    let on_device = all.iter().zip(on_device).filter_map(|(ray, met)| ray.is_some().then_some(met));
+    let disagreements = on_device.zip(&met).filter(|(device, cpu)| device != *cpu).count();
     let hits = met.iter().filter(|met| **met).count();
-    let rate = RayRate {
+    Ok(RayRate {
         kind,
         rays: rays.len(),
         hit_share: hits as f64 / rays.len().max(1) as f64,
         device_mrays: RateSpread::of(device),
         obvhs_mrays: RateSpread::of(cpu),
         ratio: RateSpread::of(ratio),
-        disagreements: 0,
-    };
-    Ok((rate, met))
+        disagreements,
+    })
 }
 
 #[cfg(test)]

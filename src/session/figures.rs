@@ -11,7 +11,7 @@ use crate::pass::Totals;
 const GUIDE_REBUILDS: &str = "guide rebuilds";
 
 /// Figures of a renderer besides its picture.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
     /// Device milliseconds per sample of every pixel, by pass.
     pub gpu_ms_per_sample: BTreeMap<String, f64>,

@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use super::statistics::percentile;
 use crate::{error::Result, film::png};
 
 /// Values at the two ends of the colour map; values outside take the colour of the end.
@@ -19,11 +20,8 @@ impl Scale {
     /// Spans 0 to the 99th percentile of `values`, so that a few outliers do not turn the rest
     /// blue; 0 to 1 if that is not positive.
     pub(crate) fn of(values: &[f64]) -> Self {
-        let mut sorted: Vec<f64> =
-            values.iter().copied().filter(|value| value.is_finite()).collect();
-        sorted.sort_unstable_by(f64::total_cmp);
-        let index = (sorted.len() * 99).div_ceil(100).max(1) - 1;
-        let high = sorted.get(index).copied().filter(|&value| value > 0.0).unwrap_or(1.0);
+        let finite = values.iter().copied().filter(|value| value.is_finite()).collect();
+        let high = percentile(finite, 99).filter(|high| *high > 0.0).unwrap_or(1.0);
         Self { low: 0.0, high }
     }
 

@@ -7,6 +7,7 @@ use super::{
     record::{Conditions, Measurement, Run, run_stem},
     reference::Reference,
     rule::Rule,
+    statistics::percentile,
     surfaces::Surfaces,
     watch::Watch,
 };
@@ -127,14 +128,9 @@ pub(super) fn image_of(picture: &RgbImage) -> Image {
 
 /// Exposure in stops at which 85% of the pixels stay below white, by their brightest channel.
 pub fn exposure(picture: &RgbImage) -> f32 {
-    let mut brightest: Vec<f32> =
-        picture.pixels.iter().map(|pixel| pixel[0].max(pixel[1]).max(pixel[2])).collect();
-    brightest.sort_unstable_by(f32::total_cmp);
-    let index = (brightest.len() * 85).div_ceil(100).max(1) - 1;
-    match brightest.get(index) {
-        Some(value) if *value > 0.0 => -value.log2(),
-        _ => 0.0,
-    }
+    let brightest = |pixel: &[f32; 3]| f64::from(pixel[0].max(pixel[1]).max(pixel[2]));
+    let white = percentile(picture.pixels.iter().map(brightest).collect(), 85);
+    white.filter(|white| *white > 0.0).map_or(0.0, |white| -(white as f32).log2())
 }
 
 #[cfg(test)]

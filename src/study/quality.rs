@@ -10,6 +10,7 @@ use super::{
     own_errors::JUDGED_FROM,
     plan::Plan,
     record::{Measurement, Run, SceneRecord},
+    statistics::median_interval,
 };
 
 /// Relative squared errors whose times are reported: a picture of visible noise, and one of little.
@@ -188,7 +189,7 @@ fn over_seeds(
         Figure::RelmseTrimmed => reference.relmse_trimmed,
     });
     let ends = |value: &dyn Fn(&Measurement) -> f64| {
-        median(runs.iter().filter_map(|run| run.last()).map(value).collect())
+        median_interval(runs.iter().filter_map(|run| run.last()).map(value).collect()).middle
     };
     let extrapolated = times.iter().map(|time| match *time {
         Time::NotReached { seconds, error } => seconds * error / threshold,
@@ -208,23 +209,15 @@ fn over_seeds(
         slowest: times.last().and_then(|time| time.seconds()),
         last_error: ends(&|look| figure.of(look)),
         last_seconds: ends(&|look| look.seconds),
-        extrapolated_seconds: seconds.is_none().then(|| median(extrapolated.collect())),
+        extrapolated_seconds: seconds
+            .is_none()
+            .then(|| median_interval(extrapolated.collect()).middle),
     }
-}
-
-/// Median; 0 for no values.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().saturating_sub(1);
-    let at = |index: usize| values.get(index).copied().unwrap_or(0.0);
-    0.5 * (at(last / 2) + at(last.div_ceil(2)))
 }
 
 #[cfg(test)]
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
-    use std::collections::BTreeMap;
 
     use super::*;
     use crate::session::Figures;
@@ -294,12 +287,7 @@ mod tests {
             seed,
             conditions: Conditions::default(),
             measurements: (0..6).map(look).collect(),
-            figures: Figures {
-                gpu_ms_per_sample: BTreeMap::new(),
-                rays: BTreeMap::new(),
-                visible_share: None,
-                statistics: BTreeMap::new(),
-            },
+            figures: Figures::default(),
         }
     }
 
@@ -308,17 +296,8 @@ mod tests {
         let options = Options { samplers: samplers.ok(), ..Options::default() };
         let plan = Plan::new(vec!["room.toml".into()], Description::default(), options, Vec::new());
         let reference = OwnErrors { relmse: Some(own), ..OwnErrors::default() };
-        let scene = SceneRecord {
-            name: "room".into(),
-            path: "room.toml".into(),
-            hash: String::new(),
-            width: 4,
-            height: 3,
-            triangles: 1,
-            reference: Some(reference),
-            reference_check: None,
-            parts: None,
-        };
+        let reference = Some(reference);
+        let scene = SceneRecord { name: "room".into(), reference, ..SceneRecord::default() };
         times_to_quality(&plan.unwrap(), &[scene], runs)
     }
 

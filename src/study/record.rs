@@ -248,7 +248,7 @@ pub struct Round {
 }
 
 /// A scene of a study.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SceneRecord {
     /// Name.
     pub name: String,

@@ -64,6 +64,13 @@ pub fn geometric_interval(values: &[f64]) -> Option<Interval> {
     mean_interval(&logarithms).map(|interval| interval.map(f64::exp))
 }
 
+/// Median of ascending values; 0 for none.
+pub fn median(ascending: &[f64]) -> f64 {
+    let last = ascending.len().saturating_sub(1);
+    let at = |index: usize| ascending.get(index).copied().unwrap_or(0.0);
+    0.5 * (at(last / 2) + at(last.div_ceil(2)))
+}
+
 /// Median with the narrowest pair of order statistics that holds the true median with at least 95%
 /// confidence, whatever the distribution; below six values, where no pair does, the whole range.
 /// Zeros for no values.
@@ -71,8 +78,6 @@ pub(crate) fn median_interval(mut values: Vec<f64>) -> Interval {
     values.sort_by(f64::total_cmp);
     let count = values.len();
     let at = |index: usize| values.get(index).copied().unwrap_or(0.0);
-    let last = count.saturating_sub(1);
-    let middle = 0.5 * (at(last / 2) + at(last.div_ceil(2)));
     // The interval from the k-th smallest to the k-th largest misses the median with probability
     // 2·P(at most k − 1 of the values are below it), a binomial distribution with p = ½.
     let mut term = 0.5_f64.powi(i32::try_from(count).unwrap_or(i32::MAX));
@@ -84,7 +89,14 @@ pub(crate) fn median_interval(mut values: Vec<f64>) -> Interval {
         below += term;
     }
     let index = cut.saturating_sub(1);
-    Interval { middle, low: at(index), high: at(last - index.min(last)) }
+    let last = count.saturating_sub(1);
+    Interval { middle: median(&values), low: at(index), high: at(last - index.min(last)) }
+}
+
+/// The value that `percent` of the values do not exceed, by the nearest rank. `None` for no values.
+pub fn percentile(mut values: Vec<f64>, percent: usize) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get((values.len() * percent).div_ceil(100).max(1) - 1).copied()
 }
 
 /// Slope of the least-squares line through points. `None` below two different abscissae.

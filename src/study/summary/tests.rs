@@ -12,14 +12,8 @@ use crate::study::{
 fn scene(own_mse: f64) -> SceneRecord {
     SceneRecord {
         name: "room".into(),
-        path: "room.toml".into(),
-        hash: String::new(),
-        width: 4,
-        height: 3,
-        triangles: 1,
         reference: Some(OwnErrors { mse: Some(own_mse), mean: 1.0, ..OwnErrors::default() }),
-        reference_check: None,
-        parts: None,
+        ..SceneRecord::default()
     }
 }
 
@@ -36,17 +30,11 @@ fn run(sampler: &str, seed: u32, variance: f64) -> Run {
         spp,
         seconds: 0.1 * f64::from(spp),
         gpu_seconds: 0.09 * f64::from(spp),
-        rays: 12,
         mse: variance / f64::from(spp),
-        rmse: (variance / f64::from(spp)).sqrt(),
         relmse: 1.0,
         relmse_trimmed: if sampler == "ris" { 0.49 } else { 1.0 },
-        relmse_p999: 10.0 * f64::from(seed),
-        relmse_max: 100.0 * f64::from(seed),
         mean_ratio: 1.0 + 0.01 * f64::from(seed),
         mean_deviation: Some(-f64::from(seed)),
-        mse_judged: true,
-        relmse_judged: true,
         parts: Parts {
             surfaces: Some(PartErrors {
                 mse: 1.0,
@@ -55,8 +43,7 @@ fn run(sampler: &str, seed: u32, variance: f64) -> Run {
             }),
             ..Parts::default()
         },
-        flip: None,
-        image: None,
+        ..Measurement::default()
     };
     Run {
         scene: "room".into(),
@@ -67,9 +54,9 @@ fn run(sampler: &str, seed: u32, variance: f64) -> Run {
         measurements: [1, 2, 4].map(measurement).to_vec(),
         figures: Figures {
             gpu_ms_per_sample: BTreeMap::from([("sample".into(), 3.0)]),
-            rays: BTreeMap::new(),
             visible_share: Some(0.1 * f64::from(seed)),
             statistics: BTreeMap::from([("rebuilds".into(), f64::from(seed))]),
+            ..Figures::default()
         },
     }
 }
