@@ -1,9 +1,6 @@
 //! `results.json` and `results.csv`: every run of a study and its circumstances.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    time::{SystemTime, UNIX_EPOCH},
-};
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
@@ -45,18 +42,15 @@ impl Circumstances {
     /// Describes this process and device, now.
     pub(crate) fn new(device: &Device) -> Self {
         let capabilities = device.capabilities();
-        let arguments: Vec<String> = std::env::args_os()
-            .enumerate()
-            .map(|(index, argument)| {
-                // The program's own folder says nothing about the study.
-                let text = argument.to_string_lossy().into_owned();
-                if index == 0 { "fenestra".to_owned() } else { text }
-            })
-            .collect();
+        // The program's own folder says nothing about the study.
+        let mut command = "fenestra".to_owned();
+        for argument in std::env::args_os().skip(1) {
+            command += &format!(" {}", argument.display());
+        }
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            date: date(SystemTime::now()),
-            command: arguments.join(" "),
+            date: jiff::Timestamp::now().strftime("%Y-%m-%d %H:%M UTC").to_string(),
+            command,
             machine: machine(),
             device: capabilities.name.clone(),
             driver: capabilities.driver.clone(),
@@ -73,27 +67,6 @@ fn machine() -> String {
         .find_map(|line| line.strip_prefix("model name")?.split_once(':').map(|(_, name)| name))
         .map_or_else(|| std::env::consts::ARCH.to_owned(), |name| name.trim().to_owned());
     format!("{name}, {cores} cores, {}", std::env::consts::OS)
-}
-
-/// Formats a time as "2026-11-21 05:40 UTC". Days count from 1 March 2000, so that every block of
-/// 400, 100, 4 and 1 years has its leap day at its end.
-fn date(now: SystemTime) -> String {
-    let seconds = now.duration_since(UNIX_EPOCH).map_or(0, |elapsed| elapsed.as_secs());
-    const DAYS_TO_MARCH_2000: i64 = 11_017;
-    let days = i64::try_from(seconds / 86_400).unwrap_or(0) - DAYS_TO_MARCH_2000;
-    let (blocks, rest) = (days.div_euclid(146_097), days.rem_euclid(146_097));
-    let centuries = (rest / 36_524).min(3);
-    let rest = rest - centuries * 36_524;
-    let (leaps, rest) = (rest / 1461, rest % 1461);
-    let years = (rest / 365).min(3);
-    let day_of_year = rest - years * 365;
-    let year = 2000 + 400 * blocks + 100 * centuries + 4 * leaps + years;
-    // Months from March have 31, 30, 31, 30, 31 days, twice, followed by January and February.
-    let month = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * month + 2) / 5 + 1;
-    let (year, month) = if month < 10 { (year, month + 3) } else { (year + 1, month - 9) };
-    let (hour, minute) = (seconds / 3600 % 24, seconds / 60 % 60);
-    format!("{year:04}-{month:02}-{day:02} {hour:02}:{minute:02} UTC")
 }
 
 /// Everything in `results.json`.
@@ -188,12 +161,11 @@ impl Report {
         let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
         let mut text = names.join(",") + "\n";
         for run in &self.runs {
-            for rule in rules {
-                if let Some(measurement) = run.at(*rule) {
-                    let fields = columns.iter().map(|(_, field)| field(run, *rule, measurement));
-                    let row: Vec<String> = fields.map(|field| quoted(&field)).collect();
-                    text += &(row.join(",") + "\n");
-                }
+            for (rule, measurement) in rules.iter().filter_map(|rule| Some((*rule, run.at(*rule)?)))
+            {
+                let fields =
+                    columns.iter().map(|(_, field)| quoted(&field(run, rule, measurement)));
+                text += &(fields.collect::<Vec<_>>().join(",") + "\n");
             }
         }
         text
@@ -290,20 +262,7 @@ fn quoted(field: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use super::*;
-
-    #[test]
-    fn dates_are_those_of_the_calendar() {
-        let at = |seconds| date(UNIX_EPOCH + Duration::from_secs(seconds));
-        assert_eq!(at(0), "1970-01-01 00:00 UTC");
-        assert_eq!(at(951_782_400), "2000-02-29 00:00 UTC");
-        assert_eq!(at(951_868_800), "2000-03-01 00:00 UTC");
-        assert_eq!(at(1_709_164_800 + 3600 * 23 + 59 * 60), "2024-02-29 23:59 UTC");
-        assert_eq!(at(1_709_251_200), "2024-03-01 00:00 UTC");
-        assert_eq!(at(4_107_542_400), "2100-03-01 00:00 UTC");
-    }
 
     #[test]
     fn fields_with_commas_are_quoted() {
