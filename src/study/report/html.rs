@@ -72,17 +72,14 @@ pub struct Table {
 
 impl Table {
     /// Creates a table without rows.
-    pub(crate) fn new(caption: impl Into<String>, head: &[&str]) -> Self {
-        Self {
-            caption: caption.into(),
-            head: head.iter().map(|text| (*text).to_owned()).collect(),
-            rows: Vec::new(),
-        }
+    pub(crate) fn new(caption: String, head: &[&str]) -> Self {
+        let head = head.iter().map(|text| (*text).to_owned()).collect();
+        Self { caption, head, rows: Vec::new() }
     }
 
-    /// Adds a column.
-    pub(crate) fn column(&mut self, head: impl Into<String>) {
-        self.head.push(head.into());
+    /// Adds columns with these texts as heads.
+    pub(crate) fn columns<'a>(&mut self, heads: impl IntoIterator<Item = &'a String>) {
+        self.head.extend(heads.into_iter().map(|text| escape(text)));
     }
 
     /// Adds a row; `starts_group` draws a line above it.
@@ -90,13 +87,12 @@ impl Table {
         self.rows.push((starts_group, cells));
     }
 
-    /// True if there are no rows.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.rows.is_empty()
-    }
-
-    /// Renders the table in a frame that scrolls sideways if it is too wide for the page.
+    /// Renders the table in a frame that scrolls sideways if it is too wide for the page; nothing
+    /// without rows.
     pub(crate) fn html(&self) -> String {
+        if self.rows.is_empty() {
+            return String::new();
+        }
         let mut html = format!(
             "<p class=\"caption\">{0}</p><div class=\"table\" role=\"region\" tabindex=\"0\" \
              aria-label=\"{0}\"><table><thead><tr>",
@@ -108,12 +104,9 @@ impl Table {
         html += "</tr></thead><tbody>";
         for (starts_group, cells) in &self.rows {
             html += if *starts_group { "<tr class=\"group\">" } else { "<tr>" };
-            for (index, cell) in cells.iter().enumerate() {
-                let _ = if index == 0 {
-                    write!(html, "<th scope=\"row\">{cell}</th>")
-                } else {
-                    write!(html, "<td>{cell}</td>")
-                };
+            if let [heading, cells @ ..] = &cells[..] {
+                let _ = write!(html, "<th scope=\"row\">{heading}</th>");
+                html.extend(cells.iter().map(|cell| format!("<td>{cell}</td>")));
             }
             html += "</tr>";
         }
@@ -159,9 +152,9 @@ mod tests {
 
     #[test]
     fn tables_have_headings_for_columns_and_rows() {
-        let mut table = Table::new("Errors", &["sampler"]);
-        assert!(table.is_empty());
-        table.column("RMSE");
+        let mut table = Table::new("Errors".into(), &["sampler"]);
+        assert_eq!(table.html(), "");
+        table.columns([&"RMSE".to_owned()]);
         table.row(true, vec!["mis".into(), "0.1".into()]);
         let html = table.html();
         assert!(html.contains("<th scope=\"col\">RMSE</th>"), "{html}");

@@ -33,36 +33,22 @@ const FEW_SAMPLERS: usize = 3;
 /// A picture cannot be read, or the page cannot be written.
 pub fn write(report: &Report, plan: &Plan, folder: &Folder) -> Result<()> {
     let rules = rules(plan);
-    let shown: Vec<Rule> = rules
-        .iter()
-        .copied()
-        .filter(|rule| {
-            report.order.len() <= FEW_SAMPLERS
-                || matches!(rule, Rule::Seconds(_))
-                || plan.spp.last().is_some_and(|spp| *rule == Rule::Spp(*spp))
-        })
-        .collect();
+    let is_shown = |rule: &Rule| {
+        report.order.len() <= FEW_SAMPLERS
+            || matches!(rule, Rule::Seconds(_))
+            || plan.spp.last().is_some_and(|spp| *rule == Rule::Spp(*spp))
+    };
+    let shown: Vec<Rule> = rules.iter().copied().filter(is_shown).collect();
     let mut body = start(report);
     let mut style = String::new();
     if !report.summaries.is_empty() {
-        body += "<section id=\"glance\"><h2>At a glance</h2>";
-        body += &verdict::all(report, &rules);
-        body += &tables::at_a_glance(report, &rules);
-        body += "</section>";
-        let times = tables::times_to_quality(report);
-        if !times.is_empty() {
-            let _ =
-                write!(body, "<section id=\"quality\"><h2>Time to quality</h2>{times}</section>");
-        }
+        let verdicts = verdict::all(report, &rules);
+        let glance = verdicts + &tables::at_a_glance(report, &rules);
+        body += &format!("<section id=\"glance\"><h2>At a glance</h2>{glance}</section>");
+        body += &section("quality", "Time to quality", "", &tables::times_to_quality(report));
+        let about = include_str!("published.html");
         let published = tables::published(report);
-        if !published.is_empty() {
-            let _ = write!(
-                body,
-                "<section id=\"published\"><h2>Beside the published figures</h2>{}{published}\
-                 </section>",
-                include_str!("published.html")
-            );
-        }
+        body += &section("published", "Beside the published figures", about, &published);
         for (index, scene) in report.scenes.iter().enumerate() {
             let own = report.summaries.iter().any(|summary| summary.scene == scene.name);
             if scene.reference.is_some() && own {
@@ -83,6 +69,14 @@ pub fn write(report: &Report, plan: &Plan, folder: &Folder) -> Result<()> {
         .replace("{{pictures}}", &style)
         .replace("{{body}}", &body);
     write_text(&folder.path().join("index.html"), &page)
+}
+
+/// A section under a heading, opened by `about`; nothing without tables.
+fn section(id: &str, heading: &str, about: &str, tables: &str) -> String {
+    if tables.is_empty() {
+        return String::new();
+    }
+    format!("<section id=\"{id}\"><h2>{heading}</h2>{about}{tables}</section>")
 }
 
 /// Header: title, notes, links.
@@ -150,17 +144,15 @@ fn scene_section(
     );
     if let Some(reference) = &scene.reference {
         let _ = write!(html, "Reference: {}", escape(&reference.description));
-        html += &match (reference.mse, reference.seconds) {
-            (Some(mse), Some(seconds)) => format!(
-                "; its own RMSE is {}, it took {} s.</p>",
+        let took = |seconds| format!(", it took {} s", number(seconds, 3));
+        html += &match reference.mse {
+            Some(mse) => format!(
+                "; its own RMSE is {}{}.</p>",
                 number(mse.max(0.0).sqrt(), 3),
-                number(seconds, 3)
+                reference.seconds.map_or_else(String::new, took)
             ),
-            (Some(mse), None) => {
-                format!("; its own RMSE is {}.</p>", number(mse.max(0.0).sqrt(), 3))
-            }
-            (None, _) => "; how noisy it is itself is not known, and its noise is part of every \
-                          error here.</p>"
+            None => "; how noisy it is itself is not known, and its noise is part of every error \
+                     here.</p>"
                 .to_owned(),
         };
     }
@@ -239,27 +231,17 @@ fn end(report: &Report) -> String {
             seeds => format!("1 to {seeds}; pictures are of seed 1"),
         },
     );
-    let samplers: Vec<String> = report
-        .order
-        .iter()
-        .map(|label| {
-            let parameters: Vec<String> = report
-                .samplers
-                .get(label)
-                .into_iter()
-                .flatten()
-                .map(|(name, value)| {
-                    format!("{} {}", escape(&name.replace('_', " ")), escape(value))
-                })
-                .collect();
-            if parameters.is_empty() {
-                escape(label)
-            } else {
-                format!("{} ({})", escape(label), parameters.join(", "))
-            }
-        })
-        .collect();
-    row("Samplers", &samplers.join(", "));
+    let describe = |label: &String| {
+        let assign = |(name, value): (&String, &String)| {
+            format!("{} {}", escape(&name.replace('_', " ")), escape(value))
+        };
+        let parameters = report.samplers.get(label).into_iter().flatten().map(assign);
+        match &parameters.collect::<Vec<_>>()[..] {
+            [] => escape(label),
+            parameters => format!("{} ({})", escape(label), parameters.join(", ")),
+        }
+    };
+    row("Samplers", &report.order.iter().map(describe).collect::<Vec<_>>().join(", "));
     format!(
         "<section id=\"definitions\"><h2>Definitions</h2>{}</section><section \
          id=\"circumstances\"><h2>Circumstances</h2><dl>{rows}</dl><p class=\"soft\">Every run is in \

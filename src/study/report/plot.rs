@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::html::escape;
+use super::html::{escape, number};
 
 const WIDTH: f64 = 460.0;
 const HEIGHT: f64 = 330.0;
@@ -181,9 +181,17 @@ pub(crate) fn marker(style: usize) -> &'static str {
     }
 }
 
-fn tooltip(series: &Series, point: &Point) -> String {
-    let number = |value| super::html::number(value, 3);
-    format!("<title>{}: {}, {}</title>", escape(&series.name), number(point.x), number(point.y))
+/// Marker at a point, with a tooltip.
+fn mark(frame: &Frame, series: &Series, point: &Point) -> String {
+    format!(
+        "<g class=\"mark\" transform=\"translate({:.1} {:.1})\"><title>{}: {}, {}</title>{}</g>",
+        frame.x(point.x),
+        frame.y(point.y),
+        escape(&series.name),
+        number(point.x, 3),
+        number(point.y, 3),
+        marker(series.style)
+    )
 }
 
 /// Draws lines with bands on two logarithmic axes, and a faint line of the given slope, at most 0.
@@ -222,7 +230,6 @@ pub(crate) fn log_log(
         frame.y(middle * x1.powf(slope))
     );
     for line in series {
-        let style = line.style % STYLE_COUNT;
         let place = |x: f64, y: f64| format!("{:.1},{:.1}", frame.x(x), frame.y(y));
         let upper = line.points.iter().map(|point| place(point.x, point.high));
         let lower = line.points.iter().rev().map(|point| place(point.x, point.low));
@@ -230,21 +237,13 @@ pub(crate) fn log_log(
         let middle: Vec<String> = line.points.iter().map(|p| place(p.x, p.y)).collect();
         let _ = write!(
             svg,
-            "<g class=\"s{style}\"><polygon class=\"band\" points=\"{}\"/><polyline \
-             class=\"line\" points=\"{}\"/>",
+            "<g class=\"s{}\"><polygon class=\"band\" points=\"{}\"/><polyline class=\"line\" \
+             points=\"{}\"/>",
+            line.style % STYLE_COUNT,
             band.join(" "),
             middle.join(" ")
         );
-        for point in &line.points {
-            let _ = write!(
-                svg,
-                "<g class=\"mark\" transform=\"translate({:.1} {:.1})\">{}{}</g>",
-                frame.x(point.x),
-                frame.y(point.y),
-                tooltip(line, point),
-                marker(style)
-            );
-        }
+        svg.extend(line.points.iter().map(|point| mark(&frame, line, point)));
         svg += "</g>";
     }
     svg + "</svg>"
@@ -296,18 +295,15 @@ pub fn scatter(
         );
     }
     for dots in series {
-        let style = dots.style % STYLE_COUNT;
-        let _ = write!(svg, "<g class=\"s{style}\">");
+        let _ = write!(svg, "<g class=\"s{}\">", dots.style % STYLE_COUNT);
         for point in &dots.points {
-            let (x, y) = (frame.x(point.x), frame.y(point.y));
+            let x = frame.x(point.x);
             let _ = write!(
                 svg,
-                "<line class=\"bar\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{:.1}\" y2=\"{:.1}\"/><g \
-                 class=\"mark\" transform=\"translate({x:.1} {y:.1})\">{}{}</g>",
+                "<line class=\"bar\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{:.1}\" y2=\"{:.1}\"/>{}",
                 frame.y(point.low),
                 frame.y(point.high),
-                tooltip(dots, point),
-                marker(style)
+                mark(&frame, dots, point)
             );
         }
         svg += "</g>";

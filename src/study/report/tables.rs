@@ -12,6 +12,7 @@ use crate::study::{
     rule::Rule,
     statistics::Interval,
     summary::{SUSPICIOUS_DEVIATION, Summary},
+    surfaces::Parts,
 };
 
 const NOT_JUDGED: &str = "<span class=\"refused\">not judged</span>";
@@ -94,9 +95,7 @@ fn glance_table(
     glance: &Glance,
 ) -> String {
     let mut table = Table::new(glance.caption.replace("{first}", &escape(first)), &["scene", "at"]);
-    for name in others {
-        table.column(escape(name));
-    }
+    table.columns(others);
     for scene in &report.scenes {
         let mut is_first = true;
         for rule in rules {
@@ -132,9 +131,7 @@ pub fn times_to_quality(report: &Report) -> String {
              to fall as 1/time."
         );
         let mut table = Table::new(caption, &["scene", "down to"]);
-        for name in &report.order {
-            table.column(escape(name));
-        }
+        table.columns(&report.order);
         for scene in &report.scenes {
             let mut is_first = true;
             for threshold in THRESHOLDS {
@@ -150,17 +147,14 @@ pub fn times_to_quality(report: &Report) -> String {
                 let first = if is_first { escape(&scene.name) } else { String::new() };
                 let mut cells = vec![first, threshold.to_string()];
                 cells.extend(report.order.iter().map(|name| {
-                    here.iter()
-                        .find(|time| time.sampler == *name)
-                        .map_or_else(String::new, |time| time_cell(time))
+                    let own = here.iter().find(|time| time.sampler == *name);
+                    own.map_or_else(String::new, |time| time_cell(time))
                 }));
                 table.row(is_first, cells);
                 is_first = false;
             }
         }
-        if !table.is_empty() {
-            html += &table.html();
-        }
+        html += &table.html();
     }
     html
 }
@@ -218,6 +212,7 @@ pub fn published(report: &Report) -> String {
             .filter(|name| entries.iter().any(|entry| entry.values.contains_key(*name)))
             .collect();
         let [first, second] = names[..] else { continue };
+        let [a, b] = [first, second].map(|name| escape(name));
         let mut table = Table::new(
             format!(
                 "{} beside this study: {}. The published unit is unknown, so that only the ratios \
@@ -225,21 +220,24 @@ pub fn published(report: &Report) -> String {
                 escape(source),
                 escape(scene)
             ),
-            &["samples per pixel"],
+            &[
+                "samples per pixel",
+                &format!("published,<br>{a}"),
+                &format!("published,<br>{b}"),
+                "published<br>ratio",
+                &format!("RMSE here,<br>{a}"),
+                &format!("RMSE here,<br>{b}"),
+                "ratio<br>here",
+            ],
         );
-        for who in ["published", "RMSE here"] {
-            for name in [first, second] {
-                table.column(format!("{who},<br>{}", escape(name)));
-            }
-            table.column(if who == "published" { "published<br>ratio" } else { "ratio<br>here" });
-        }
         for entry in &entries {
             let value = |name: &String| entry.values.get(name).copied();
             let published = |name| value(name).map_or_else(String::new, |value| number(value, 6));
             let ratio = value(first).zip(value(second)).map(|(a, b)| number(b / a, 3));
             let rule = Rule::Spp(entry.spp);
-            let ours = |name: &str| find(report, scene, name, rule);
-            let rmse = |name| ours(name).map_or_else(|| "–".to_owned(), rmse_cell);
+            let ours = |name: &str, cell: fn(&Summary) -> String| {
+                find(report, scene, name, rule).map_or_else(|| "–".to_owned(), cell)
+            };
             table.row(
                 false,
                 vec![
@@ -247,12 +245,9 @@ pub fn published(report: &Report) -> String {
                     published(first),
                     published(second),
                     ratio.unwrap_or_default(),
-                    rmse(first),
-                    rmse(second),
-                    ours(second).map_or_else(
-                        || "–".to_owned(),
-                        |summary| ratio_cell(summary.rmse_ratio.as_ref(), false),
-                    ),
+                    ours(first, rmse_cell),
+                    ours(second, rmse_cell),
+                    ours(second, |summary| ratio_cell(summary.rmse_ratio.as_ref(), false)),
                 ],
             );
         }
@@ -261,8 +256,17 @@ pub fn published(report: &Report) -> String {
     html
 }
 
+fn judged_cell(value: f64, is_judged: bool) -> String {
+    if is_judged { number(value, 3) } else { NOT_JUDGED.to_owned() }
+}
+
 fn rmse_cell(summary: &Summary) -> String {
-    if summary.mse_judged { number(summary.rmse, 3) } else { NOT_JUDGED.to_owned() }
+    judged_cell(summary.rmse, summary.mse_judged)
+}
+
+/// Three digits of a figure, or nothing.
+fn optional_cell(value: Option<f64>) -> String {
+    value.map_or_else(String::new, |value| number(value, 3))
 }
 
 /// Every figure of one scene.
@@ -297,19 +301,14 @@ pub fn figures(report: &Report, scene: &str, rules: &[Rule]) -> String {
             "GPU ms<br>per sample",
         ],
     );
-    for name in &names {
-        table.column(escape(&name.replace('_', " ")));
-    }
+    table.columns(&names.iter().map(|name| name.replace('_', " ")).collect::<Vec<_>>());
     for rule in rules {
         let of_rule: Vec<&&Summary> = own.iter().filter(|summary| summary.rule == *rule).collect();
         for (index, summary) in of_rule.into_iter().enumerate() {
-            let relative = |value: f64| {
-                if summary.relmse_judged { number(value, 3) } else { NOT_JUDGED.to_owned() }
-            };
-            let on_surfaces = |value: fn(&PartErrors) -> f64| match summary.parts.surfaces {
-                None => "–".to_owned(),
-                Some(part) if summary.parts.surfaces_judged => number(value(&part), 3),
-                Some(_) => NOT_JUDGED.to_owned(),
+            let relative = |value: f64| judged_cell(value, summary.relmse_judged);
+            let Parts { surfaces, environment, surfaces_judged } = summary.parts;
+            let on_surfaces = |value: fn(PartErrors) -> f64| {
+                surfaces.map_or("–".to_owned(), |part| judged_cell(value(part), surfaces_judged))
             };
             let mut mean = interval(&summary.mean_ratio, 4);
             if summary.is_suspicious() {
@@ -323,29 +322,25 @@ pub fn figures(report: &Report, scene: &str, rules: &[Rule]) -> String {
                 count(summary.spp),
                 number(summary.seconds, 3),
                 rmse_cell(summary),
-                if summary.mse_judged { number(summary.mse, 3) } else { NOT_JUDGED.to_owned() },
+                judged_cell(summary.mse, summary.mse_judged),
                 relative(summary.relmse),
                 relative(summary.relmse_trimmed),
                 relative(summary.relmse_p999),
                 relative(summary.relmse_max),
                 on_surfaces(|part| part.relmse),
                 on_surfaces(|part| part.relmse_trimmed),
-                summary
-                    .parts
-                    .environment
-                    .map_or_else(|| "–".to_owned(), |part| number(part.mse, 3)),
-                summary.flip.map_or_else(String::new, |flip| number(flip, 3)),
+                environment.map_or("–".to_owned(), |part| number(part.mse, 3)),
+                optional_cell(summary.flip),
                 mean,
                 summary.visible_share.map_or_else(String::new, percent),
                 number(summary.total_ms(), 3),
             ];
-            cells.extend(names.iter().map(|name| {
-                summary.statistics.get(*name).map_or_else(String::new, |value| number(*value, 3))
-            }));
+            let statistics = &summary.statistics;
+            cells.extend(names.iter().map(|name| optional_cell(statistics.get(*name).copied())));
             table.row(index == 0, cells);
         }
     }
-    if table.is_empty() { String::new() } else { table.html() }
+    table.html()
 }
 
 /// Overhead of every sampler in every scene, then pass by pass.
@@ -359,16 +354,20 @@ pub fn overheads(overheads: &[Overhead]) -> String {
              confidence.",
             first.rounds
         ),
-        &["scene", "sampler", "blocked rays<br>of the baseline", "blocked rays<br>of the sampler"],
+        &[
+            "scene",
+            "sampler",
+            "blocked rays<br>of the baseline",
+            "blocked rays<br>of the sampler",
+            "device time",
+            "wall time",
+            "ms per sample,<br>baseline",
+            "ms per sample,<br>sampler",
+        ],
     );
-    for head in
-        ["device time", "wall time", "ms per sample,<br>baseline", "ms per sample,<br>sampler"]
-    {
-        table.column(head);
-    }
+    let share = |share: Option<f64>| share.map_or_else(String::new, percent);
     let mut scene = "";
     for overhead in overheads {
-        let share = |share: Option<f64>| share.map_or_else(String::new, percent);
         table.row(
             scene != overhead.scene,
             vec![
@@ -387,27 +386,21 @@ pub fn overheads(overheads: &[Overhead]) -> String {
     let mut html = table.html();
     for overhead in overheads {
         let (scene, sampler) = (escape(&overhead.scene), escape(&overhead.sampler));
-        let mut table =
-            Table::new(format!("{sampler} against {baseline} in {scene}, pass by pass"), &["pass"]);
-        for head in [
-            "ms per sample,<br>baseline",
-            "ms per sample,<br>sampler",
-            "ratio",
-            "adds to the<br>whole time",
-        ] {
-            table.column(head);
-        }
+        let mut table = Table::new(
+            format!("{sampler} against {baseline} in {scene}, pass by pass"),
+            &[
+                "pass",
+                "ms per sample,<br>baseline",
+                "ms per sample,<br>sampler",
+                "ratio",
+                "adds to the<br>whole time",
+            ],
+        );
         for pass in &overhead.passes {
-            table.row(
-                false,
-                vec![
-                    escape(&pass.pass),
-                    number(pass.ms[0], 3),
-                    number(pass.ms[1], 3),
-                    pass.ratio.map_or_else(|| "–".to_owned(), |ratio| interval(&ratio, 3)),
-                    percent_added(&pass.added_share),
-                ],
-            );
+            let [ours, theirs] = pass.ms.map(|ms| number(ms, 3));
+            let ratio = pass.ratio.map_or("–".to_owned(), |ratio| interval(&ratio, 3));
+            let added = percent_added(&pass.added_share);
+            table.row(false, vec![escape(&pass.pass), ours, theirs, ratio, added]);
         }
         html += &format!(
             "<details><summary>{sampler} in {scene}, pass by pass</summary>{}</details>",
