@@ -3,7 +3,10 @@
 //! Checkpoints merge exactly, by adding their sums. Images merge by averaging their means, weighted
 //! by sample count, which equals one run up to rounding.
 
-use std::{collections::BTreeSet, path::Path};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 use super::{Image, checkpoint::Checkpoint, metadata::Metadata};
 use crate::error::{Error, Result};
@@ -25,20 +28,15 @@ pub struct Part<'a> {
 /// [`Error::Format`] names two files that differ in scene, sampler, window, …, or that share
 /// samples. [`Error::Usage`] without parts.
 pub fn merge_checkpoints(parts: &[(&Path, &Checkpoint)]) -> Result<Checkpoint> {
-    let Some(((first_path, first), others)) = parts.split_first() else {
+    let Some(((_, first), others)) = parts.split_first() else {
         return Err(Error::usage("nothing to merge"));
     };
+    check(parts, |(path, Checkpoint { sums, metadata })| {
+        let window = (sums.origin.map(i64::from), sums.width, sums.height, sums.film_size);
+        (path, window, metadata)
+    })?;
     let mut merged = (*first).clone();
-    for (index, (path, part)) in others.iter().enumerate() {
-        let window = |checkpoint: &Checkpoint| {
-            let sums = &checkpoint.sums;
-            (sums.origin.map(i64::from), sums.width, sums.height, sums.film_size)
-        };
-        check_window(first_path, window(first), path, window(part))?;
-        check_metadata(first_path, &first.metadata, path, &part.metadata)?;
-        for (earlier_path, earlier) in &parts[..=index] {
-            check_overlap(earlier_path, &earlier.metadata, path, &part.metadata)?;
-        }
+    for (path, part) in others {
         if merged.sums.sample_count.checked_add(part.sums.sample_count).is_none() {
             return Err(Error::format(
                 path,
@@ -65,23 +63,17 @@ pub fn merge_images(parts: &[Part<'_>]) -> Result<(Image, Metadata)> {
     let Some((first, others)) = parts.split_first() else {
         return Err(Error::usage("nothing to merge"));
     };
+    check(parts, |Part { path, image, metadata }| {
+        let window = (image.origin.map(i64::from), image.width, image.height, image.film_size);
+        (path, window, metadata)
+    })?;
     let mut metadata = first.metadata.clone();
-    for (index, part) in others.iter().enumerate() {
-        let window = |image: &Image| {
-            (image.origin.map(i64::from), image.width, image.height, image.film_size)
-        };
-        check_window(first.path, window(first.image), part.path, window(part.image))?;
-        check_metadata(first.path, first.metadata, part.path, part.metadata)?;
-        for earlier in &parts[..=index] {
-            check_overlap(earlier.path, earlier.metadata, part.path, part.metadata)?;
-        }
-        add_metadata(&mut metadata, part.metadata);
-    }
+    others.iter().for_each(|part| add_metadata(&mut metadata, part.metadata));
     if metadata.sample_count() == 0 {
         return Err(Error::format(first.path, "no part holds any sample"));
     }
     let mut merged = Image {
-        channels: std::collections::BTreeMap::new(),
+        channels: BTreeMap::new(),
         attributes: first.image.attributes.clone(),
         ..*first.image
     };
@@ -162,46 +154,47 @@ fn pooled_variance(samples: &[Samples<'_>], total: f64, pixel: usize) -> f64 {
 /// Origin, width, height and film size of a part.
 type Placement = ([i64; 2], u32, u32, [u32; 2]);
 
-fn check_window(first_path: &Path, first: Placement, path: &Path, part: Placement) -> Result<()> {
-    if first == part {
-        return Ok(());
-    }
-    let describe = |([x, y], width, height, [film_width, film_height]): Placement| {
-        format!("{width}x{height} pixels at {x},{y} of {film_width}x{film_height}")
-    };
-    Err(Error::format(
-        path,
-        format!("shows {}, but {} shows {}", describe(part), first_path.display(), describe(first)),
-    ))
-}
-
-fn check_metadata(first_path: &Path, first: &Metadata, path: &Path, part: &Metadata) -> Result<()> {
-    let differences = part.differences(first);
-    if differences.is_empty() {
-        return Ok(());
-    }
-    Err(Error::format(
-        path,
-        format!("not of one render with {}: {}", first_path.display(), differences.join("; ")),
-    ))
-}
-
-fn check_overlap(first_path: &Path, first: &Metadata, path: &Path, part: &Metadata) -> Result<()> {
-    for range in &part.sample_ranges {
-        if let Some(other) = first.sample_ranges.iter().find(|other| other.overlaps(range)) {
-            return Err(Error::format(
-                path,
-                format!(
+/// Refuses parts that differ from the first in window or metadata, or share samples with one before.
+fn check<T>(parts: &[T], facts: impl Fn(&T) -> (&Path, Placement, &Metadata)) -> Result<()> {
+    let facts: Vec<_> = parts.iter().map(facts).collect();
+    let (first_path, first_window, first) = facts[0];
+    for (index, (path, window, metadata)) in facts.iter().enumerate().skip(1) {
+        let refuse = |message: String| Err(Error::format(path, message));
+        if first_window != *window {
+            let describe = |([x, y], width, height, [film_width, film_height]): Placement| {
+                format!("{width}x{height} pixels at {x},{y} of {film_width}x{film_height}")
+            };
+            return refuse(format!(
+                "shows {}, but {} shows {}",
+                describe(*window),
+                first_path.display(),
+                describe(first_window)
+            ));
+        }
+        let differences = metadata.differences(first);
+        if !differences.is_empty() {
+            return refuse(format!(
+                "not of one render with {}: {}",
+                first_path.display(),
+                differences.join("; ")
+            ));
+        }
+        for (earlier_path, _, earlier) in &facts[..index] {
+            let ranges = metadata.sample_ranges.iter();
+            let mut pairs =
+                ranges.flat_map(|own| earlier.sample_ranges.iter().map(move |o| (own, o)));
+            if let Some((own, other)) = pairs.find(|(own, other)| other.overlaps(own)) {
+                return refuse(format!(
                     "holds samples {}..{} of seed {}, but {} holds samples {}..{} of it; render the \
                      parts with different --seed or --sample-offset",
-                    range.first,
-                    u64::from(range.first) + u64::from(range.count),
-                    range.seed,
-                    first_path.display(),
+                    own.first,
+                    u64::from(own.first) + u64::from(own.count),
+                    own.seed,
+                    earlier_path.display(),
                     other.first,
                     u64::from(other.first) + u64::from(other.count),
-                ),
-            ));
+                ));
+            }
         }
     }
     Ok(())

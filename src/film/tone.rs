@@ -1,6 +1,7 @@
 //! Tone: linear radiance → values that a screen can show; twin of `glsl/include/tone.glsl`.
 
-use crate::math::colour::{luminance, srgb_from_linear};
+use super::png::display_from_linear;
+use crate::math::colour::luminance;
 
 /// Luminance that [`auto_exposure`] gives to the middle of a picture.
 const MIDDLE_GREY: f64 = 0.18;
@@ -43,8 +44,7 @@ impl Tone {
             Curve::Reinhard => reinhard(scaled),
             Curve::Filmic => scaled.map(filmic),
         };
-        // `as` saturates and turns NaN into 0.
-        mapped.map(|value| (srgb_from_linear(value.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8)
+        mapped.map(display_from_linear)
     }
 }
 

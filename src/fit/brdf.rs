@@ -19,7 +19,7 @@ use super::{
     growth::grow,
     hemisphere::{HemisphereTarget, sample_hemisphere},
     judge::{FitErrors, judge_hemisphere},
-    options::{Method, check_lobes, check_views},
+    options::{Method, check_count},
     points::PointSet,
     squared_error::minimize_squared_error,
 };
@@ -59,8 +59,8 @@ pub fn brdf_lobes(
     progress: &mut dyn FnMut(f64),
 ) -> Result<BrdfFit> {
     let start = Instant::now();
-    check_lobes(options.lobes)?;
-    check_views(options.views)?;
+    check_count(options.lobes, "lobes", config::MAX_LOBES)?;
+    check_count(options.views, "view elevations", config::MAX_VIEWS)?;
     let view = |theta: f64| sample_view(tables, material_index, theta);
     // Sample the views and the elevations halfway between, which judge the interpolation.
     let targets: Vec<HemisphereTarget> = (0..2 * options.views - 1)

@@ -8,11 +8,12 @@ use super::{
     cache::{self, Cache},
     colour::{divergence_colours, least_squares_colours},
     component::{Component, kernel_integral},
+    config,
     fitted::{EnvironmentFit, EnvironmentLobe, Fit},
     grid::{ColouredPatch, Grid, patch_count},
     growth::grow,
     judge::{FitErrors, judge_environment},
-    options::{Method, check_lobes},
+    options::{Method, check_count},
     points::{Patch, PointSet},
     squared_error::minimize_squared_error,
 };
@@ -44,7 +45,7 @@ pub fn environment_lobes(
     progress: &mut dyn FnMut(f64),
 ) -> Result<EnvironmentFit> {
     let start = Instant::now();
-    check_lobes(options.lobes)?;
+    check_count(options.lobes, "lobes", config::MAX_LOBES)?;
     let key = key(map, options);
     if let Some(Fit::Environment(fit)) = cache.and_then(|cache| cache.load(&key)) {
         let seconds = start.elapsed().as_secs_f64();

@@ -201,59 +201,50 @@ impl Grid {
             };
             ColouredPatch { patch, colour: DVec3::new(sum(1), sum(2), sum(3)).max(DVec3::ZERO) }
         };
-        let root = Rectangle { x0: 0, y0: 0, x1: self.width, y1: self.height };
-        let mut rectangles = vec![root];
-        let mut measured = vec![measure(root)];
-        let mut queue = BinaryHeap::new();
-        let priority = |r: Rectangle, m: &ColouredPatch| {
-            let is_cell = r.x1 - r.x0 == 1 && r.y1 - r.y0 == 1;
-            if is_cell { 0.0 } else { (m.patch.energy * m.patch.solid_angle).sqrt() }
+        let measured = |rectangle: Rectangle| (rectangle, measure(rectangle));
+        let is_cell = |r: &Rectangle| r.x1 - r.x0 == 1 && r.y1 - r.y0 == 1;
+        let priority = |(r, ColouredPatch { patch, .. }): &(Rectangle, ColouredPatch)| {
+            if is_cell(r) { 0.0 } else { (patch.energy * patch.solid_angle).sqrt() }
         };
-        queue.push(Queued { priority: priority(root, &measured[0]), index: 0 });
-        while rectangles.len() < count {
-            let Some(Queued { priority: largest, index }) = queue.pop() else {
+        let root = measured(Rectangle { x0: 0, y0: 0, x1: self.width, y1: self.height });
+        let mut queue = BinaryHeap::from([Queued { priority: priority(&root), index: 0 }]);
+        let mut pieces = vec![root];
+        while pieces.len() < count {
+            let Some(Queued { index, .. }) = queue.pop().filter(|largest| largest.priority > 0.0)
+            else {
                 break;
             };
-            if largest <= 0.0 {
-                break;
-            }
-            let parent = rectangles[index];
+            let (parent, _) = pieces[index];
             let Rectangle { x0, y0, x1, y1 } = parent;
             // Halve the longer side, as measured on the sphere.
             let theta = PI * (y0 + y1) as f64 / (2 * self.height) as f64;
             let width = 2.0 * (x1 - x0) as f64 / self.width as f64 * theta.sin();
             let height = (y1 - y0) as f64 / self.height as f64;
-            let halves = if x1 - x0 > 1 && (width > height || y1 - y0 == 1) {
+            let [first, second] = if x1 - x0 > 1 && (width > height || y1 - y0 == 1) {
                 let middle = (x0 + x1) / 2;
                 [Rectangle { x1: middle, ..parent }, Rectangle { x0: middle, ..parent }]
             } else {
                 let middle = (y0 + y1) / 2;
                 [Rectangle { y1: middle, ..parent }, Rectangle { y0: middle, ..parent }]
             };
-            for (half, slot) in halves.into_iter().zip([index, rectangles.len()]) {
-                let patch = measure(half);
-                if slot == rectangles.len() {
-                    rectangles.push(half);
-                    measured.push(patch);
-                } else {
-                    rectangles[slot] = half;
-                    measured[slot] = patch;
-                }
-                queue.push(Queued { priority: priority(half, &patch), index: slot });
+            pieces[index] = measured(first);
+            pieces.push(measured(second));
+            for index in [index, pieces.len() - 1] {
+                queue.push(Queued { priority: priority(&pieces[index]), index });
             }
         }
         // Resolve heavy cells: for a sun of a few texels, radiance within a cell matters.
-        let total: f64 = measured.iter().map(|patch| patch.patch.energy).sum();
-        for (index, r) in rectangles.iter().enumerate() {
-            let is_cell = r.x1 - r.x0 == 1 && r.y1 - r.y0 == 1;
-            let is_heavy = measured[index].patch.energy > HEAVY_SHARE * total;
-            if is_cell && is_heavy && self.is_steep(r.x0, r.y0) {
+        let total: f64 = pieces.iter().map(|(_, patch)| patch.patch.energy).sum();
+        let mut patches: Vec<ColouredPatch> = pieces.iter().map(|(_, patch)| *patch).collect();
+        for (index, (r, patch)) in pieces.iter().enumerate() {
+            let is_heavy = patch.patch.energy > HEAVY_SHARE * total;
+            if is_cell(r) && is_heavy && self.is_steep(r.x0, r.y0) {
                 let parts = self.parts(r.x0, r.y0);
-                measured[index] = parts[0];
-                measured.extend(&parts[1..]);
+                patches[index] = parts[0];
+                patches.extend(&parts[1..]);
             }
         }
-        measured
+        patches
     }
 }
 

@@ -106,11 +106,9 @@ impl Cell {
 /// Samples a non-negative function of direction; any other value counts as 0. Always refines the
 /// cells toward `peak`, to find a highlight narrower than a cell.
 pub(crate) fn sample_hemisphere(function: &dyn Fn(DVec3) -> f64, peak: DVec3) -> HemisphereTarget {
-    let mut cells: Vec<Cell> = Vec::new();
+    let first = |index| Cell::new(0, index % FIRST_CELLS, index / FIRST_CELLS, function);
+    let mut cells: Vec<Cell> = (0..FIRST_CELLS * FIRST_CELLS).map(first).collect();
     let mut queue = BinaryHeap::new();
-    for index in 0..FIRST_CELLS * FIRST_CELLS {
-        cells.push(Cell::new(0, index % FIRST_CELLS, index / FIRST_CELLS, function));
-    }
     let mut index = 0;
     while index < cells.len() {
         let cell = cells[index];
@@ -125,12 +123,10 @@ pub(crate) fn sample_hemisphere(function: &dyn Fn(DVec3) -> f64, peak: DVec3) ->
         }
     }
     while cells.len() + 3 <= config::HEMISPHERE_CELLS {
-        let Some(Queued { priority, index }) = queue.pop() else {
+        let Some(Queued { index, .. }) = queue.pop().filter(|largest| largest.priority > 0.0)
+        else {
             break;
         };
-        if priority <= 0.0 {
-            break;
-        }
         let [first, rest @ ..] = cells[index].children(function);
         cells[index] = first;
         queue.push(Queued { priority: first.priority(), index });

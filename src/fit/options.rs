@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::config;
 use crate::error::{Error, Result};
 
 /// Objective of a fit.
@@ -25,17 +24,8 @@ impl std::fmt::Display for Method {
     }
 }
 
-/// Checks that the number of lobes is within limits.
-pub(crate) fn check_lobes(lobes: usize) -> Result<()> {
-    check_count(lobes, "lobes", config::MAX_LOBES)
-}
-
-/// Checks that the number of view elevations is within limits.
-pub(crate) fn check_views(views: usize) -> Result<()> {
-    check_count(views, "view elevations", config::MAX_VIEWS)
-}
-
-fn check_count(count: usize, what: &str, most: usize) -> Result<()> {
+/// Checks that a number, such as that of lobes, is from 1 to `most`.
+pub(crate) fn check_count(count: usize, what: &str, most: usize) -> Result<()> {
     if (1..=most).contains(&count) {
         return Ok(());
     }
