@@ -172,16 +172,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_folder_of_something_else_is_left_alone() {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("thesis.txt"), "precious").unwrap();
-        let error = Folder::open(folder.path()).unwrap_err().to_string();
-        assert!(error.contains("something else") && error.contains("thesis.txt"), "{error}");
-        let file = folder.path().join("thesis.txt");
-        assert!(Folder::open(&file).unwrap_err().to_string().contains("found a file"));
-    }
-
-    #[test]
     fn records_come_back() {
         let parent = tempfile::tempdir().unwrap();
         let folder = Folder::open(&parent.path().join("report")).unwrap();

@@ -424,23 +424,18 @@ mod tests {
 
     #[test]
     fn what_cannot_be_done_is_refused() {
-        let message = |options| plan(options).unwrap_err().to_string();
-        let one = Some(vec![Contender::plain(Sampler::Mis)]);
-        let alone = Options { overhead: Some(true), samplers: one, ..Options::default() };
-        assert!(message(alone).contains("besides the baseline mis"));
         let none = Options { spp: Some(Vec::new()), ..Options::default() };
-        assert!(message(none).contains("nothing to do"));
-        let zero = Options { spp: Some(vec![0]), ..Options::default() };
-        assert!(message(zero).contains("--spp: expected 1 to"));
-        let references = vec!["a.exr".into()];
-        let scenes = vec!["a.toml".into(), "b.toml".into()];
-        let error = Plan::new(scenes, Description::default(), Options::default(), references);
-        assert!(error.unwrap_err().to_string().contains("an image serves one scene"));
+        assert!(plan(none).unwrap_err().to_string().contains("nothing to do"));
         let reference_check = Some(CheckPlan::File("a.exr".into()));
         let options = Options { reference_check, ..Options::default() };
-        let scenes = vec!["a.toml".into(), "b.toml".into()];
-        let error = Plan::new(scenes, Description::default(), options, Vec::new()).unwrap_err();
-        assert!(error.to_string().contains("name a sampler"), "{error}");
+        for (options, references, part) in [
+            (Options::default(), vec!["a.exr".into()], "an image serves one scene"),
+            (options, Vec::new(), "name a sampler"),
+        ] {
+            let scenes = vec!["a.toml".into(), "b.toml".into()];
+            let error = Plan::new(scenes, Description::default(), options, references).unwrap_err();
+            assert!(error.to_string().contains(part), "{error}");
+        }
     }
 
     #[test]
