@@ -300,7 +300,8 @@ impl HalfVectorBins {
                 let cosine = outgoing.dot(half_vector);
                 let incident = 2.0 * cosine * half_vector - outgoing;
                 if cosine > 0.0 && incident.z > 0.0 {
-                    let pdf = brdf::pdf(tables(), material, outgoing, incident.normalize());
+                    let incident = incident.normalize();
+                    let (_, pdf) = brdf::evaluate_and_pdf(tables(), material, outgoing, incident);
                     sum += f64::from(pdf) * 4.0 * f64::from(cosine) * theta.sin();
                 }
             }

@@ -34,7 +34,8 @@ use glam::Vec3;
 
 pub use materials::MaterialTables;
 
-/// Value of a material (1/sr, without the cosine) and density of [`sample`].
+/// Value of a material (1/sr, without the cosine) and density of [`sample`], which integrates to 1 less
+/// the share of samples below the surface.
 pub fn evaluate_and_pdf(
     tables: &MaterialTables,
     material_index: usize,
@@ -53,16 +54,6 @@ pub fn evaluate(
     incident_local: Vec3,
 ) -> Vec3 {
     evaluate_and_pdf(tables, material_index, outgoing_local, incident_local).0
-}
-
-/// Density of [`sample`] per steradian. Integrates to 1 less the share of samples below the surface.
-pub fn pdf(
-    tables: &MaterialTables,
-    material_index: usize,
-    outgoing_local: Vec3,
-    incident_local: Vec3,
-) -> f32 {
-    evaluate_and_pdf(tables, material_index, outgoing_local, incident_local).1
 }
 
 /// Samples an incident direction with three numbers in [0, 1); z ≤ 0 means no sample.
