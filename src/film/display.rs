@@ -79,9 +79,7 @@ impl DisplayServer {
             return;
         }
         if !self.is_open {
-            let mut packet = Packet::new(CREATE_IMAGE);
-            packet.grab_focus(true);
-            packet.string(&self.image_name);
+            let mut packet = Packet::new(CREATE_IMAGE, true, &self.image_name);
             packet.integers(&[image.width, image.height, names.len() as u32]);
             names.iter().for_each(|name| packet.string(name));
             self.send(packet);
@@ -94,9 +92,7 @@ impl DisplayServer {
                 return;
             }
             let rows = band_height.min(image.height as usize - first_row);
-            let mut packet = Packet::new(UPDATE_IMAGE_V3);
-            packet.grab_focus(false);
-            packet.string(&self.image_name);
+            let mut packet = Packet::new(UPDATE_IMAGE_V3, false, &self.image_name);
             packet.integers(&[names.len() as u32]);
             names.iter().for_each(|name| packet.string(name));
             packet.integers(&[0, first_row as u32, image.width, rows as u32]);
@@ -178,13 +174,11 @@ struct Packet {
 }
 
 impl Packet {
-    fn new(operation: u8) -> Self {
-        Self { bytes: vec![0, 0, 0, 0, operation] }
-    }
-
-    /// Appends the flag that makes the viewer bring the image to the front.
-    fn grab_focus(&mut self, grab: bool) {
-        self.bytes.push(u8::from(grab));
+    /// Starts the packet of an operation on an image; `focus` brings the image to the front.
+    fn new(operation: u8, focus: bool, image_name: &str) -> Self {
+        let mut packet = Self { bytes: vec![0, 0, 0, 0, operation, u8::from(focus)] };
+        packet.string(image_name);
+        packet
     }
 
     fn string(&mut self, text: &str) {

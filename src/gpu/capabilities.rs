@@ -252,22 +252,12 @@ pub fn choose<'a>(devices: &'a [Capabilities], wanted: Option<&str>) -> Result<&
             .collect::<Vec<_>>()
             .join("; ")
     };
-    let mut candidates: Vec<&Capabilities> = match wanted {
-        None => devices.iter().collect(),
-        Some(wanted) => {
-            let lower = wanted.to_lowercase();
-            let index = wanted.parse::<usize>().ok();
-            devices
-                .iter()
-                .filter(|device| {
-                    index.map_or_else(
-                        || device.name.to_lowercase().contains(&lower),
-                        |index| device.index == index,
-                    )
-                })
-                .collect()
-        }
+    let is_named = |device: &Capabilities, wanted: &str| match wanted.parse::<usize>() {
+        Ok(index) => device.index == index,
+        Err(_) => device.name.to_lowercase().contains(&wanted.to_lowercase()),
     };
+    let is_wanted = |device: &&Capabilities| wanted.is_none_or(|wanted| is_named(device, wanted));
+    let mut candidates: Vec<&Capabilities> = devices.iter().filter(is_wanted).collect();
     if candidates.is_empty() {
         return Err(Error::Device {
             reason: format!(

@@ -294,11 +294,10 @@ impl CheckJob<'_> {
         watch: &mut Watch<'_>,
     ) -> Result<ReferenceCheck> {
         let paths = HALF_STEMS.map(|stem| self.folder.image(&self.scene.name, stem));
-        let mut found = [None, None];
-        for ((path, seed), found) in paths.iter().zip(SEEDS).zip(&mut found) {
-            *found = self.finished(path, seed)?;
-        }
-        if found.iter().any(Option::is_none) {
+        let found = [self.finished(&paths[0], SEEDS[0])?, self.finished(&paths[1], SEEDS[1])?];
+        let [first, second] = if let [Some(first), Some(second)] = found {
+            [first, second]
+        } else {
             watch.note(&format!(
                 "{}: check of the reference by {}",
                 self.scene.name, self.contender.label
@@ -311,10 +310,7 @@ impl CheckJob<'_> {
             // The second half has as many samples as the first.
             let spp = Some(first.sample_count);
             let second = self.render(&mut session, &paths[1], SEEDS[1], (spp, None), watch)?;
-            found = [Some(first), Some(second)];
-        }
-        let [Some(first), Some(second)] = found else {
-            return Err(Error::comparison("the check of the reference has no pictures"));
+            [first, second]
         };
         let spp = u64::from(first.sample_count) + u64::from(second.sample_count);
         let description = format!("{}, two halves of {} spp,", self.contender.label, spp / 2);
