@@ -217,7 +217,9 @@ impl Trees {
             return Err(too_many(total, u64::from(u32::MAX)));
         }
         let around = instances::bounds_of(mesh, &kept);
-        let CwBvh { nodes, primitive_indices, .. } = build_tree(mesh, &kept)?;
+        let CwBvh { nodes, primitive_indices, .. } = on_large_stack(kept.len(), || {
+            bvh2_to_cwbvh(&binary::build(padded_boxes(mesh, &kept)), 3, true, false)
+        })?;
         self.depth = self.depth.max(stack_entries(&nodes));
         if self.first_triangles.is_empty() {
             self.first_triangles.push(0);
@@ -248,10 +250,8 @@ impl Trees {
     /// Puts the tree over the instances before all others; returns their records in its order.
     fn put_level_first(&mut self, level: Level) -> Result<Vec<Record>> {
         let Level { mut records, boxes } = level;
-        let order;
-        let upper: Vec<Node> = if boxes.is_empty() {
-            order = Vec::new();
-            vec![[0; 20]]
+        let (upper, order): (Vec<Node>, Vec<u32>) = if boxes.is_empty() {
+            (vec![[0; 20]], Vec::new())
         } else {
             // One instance a leaf: entering one in vain costs more than a box.
             let tree = on_large_stack(boxes.len(), || {
@@ -259,8 +259,7 @@ impl Trees {
             })?;
             // An instance is entered with the rest of its group and the nodes beside it stacked.
             self.depth += stack_entries(&tree.nodes) + 2;
-            order = tree.primitive_indices;
-            bytemuck::allocation::cast_vec(tree.nodes)
+            (bytemuck::allocation::cast_vec(tree.nodes), tree.primitive_indices)
         };
         let first_node = upper.len() as u32;
         let mut lower = std::mem::replace(&mut self.nodes, upper);
@@ -347,11 +346,6 @@ fn page_shift(count: usize, page_bytes: u64) -> Result<u32> {
 const BUILD_STACK_BYTES: RangeInclusive<usize> = 1 << 20..=1 << 30;
 const STACK_BYTES_PER_BOX: usize = 4096;
 
-/// Builds the CWBVH over the triangles `kept`.
-fn build_tree(geometry: &Geometry, kept: &[u32]) -> Result<CwBvh> {
-    on_large_stack(kept.len(), || build_tree_here(geometry, kept))
-}
-
 fn on_large_stack(boxes: usize, build: impl FnOnce() -> CwBvh + Send) -> Result<CwBvh> {
     let (least, most) = BUILD_STACK_BYTES.into_inner();
     let stack_bytes = boxes.saturating_mul(STACK_BYTES_PER_BOX).clamp(least, most);
@@ -370,12 +364,6 @@ fn on_large_stack(boxes: usize, build: impl FnOnce() -> CwBvh + Send) -> Result<
             })?;
         builder.join().map_err(|_| geometry_error("the BVH builder failed".into()))
     })
-}
-
-fn build_tree_here(geometry: &Geometry, kept: &[u32]) -> CwBvh {
-    let boxes = padded_boxes(geometry, kept);
-    let binary = binary::build(boxes);
-    bvh2_to_cwbvh(&binary, 3, true, false)
 }
 
 /// Boxes of the triangles, padded by a few units in the last place of the largest coordinate: the

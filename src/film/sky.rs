@@ -13,13 +13,17 @@ const HORIZON: [u8; 3] = [90, 160, 255];
 
 /// Returns the value that a share of 0.5% of a function's pixels exceeds.
 pub(crate) fn white_of(width: usize, value: impl Fn(Vec3) -> Vec3) -> f32 {
-    let mut sorted: Vec<f32> = (0..width * (width / 2))
-        .map(|pixel| value(direction_of(width, pixel)).max_element())
-        .collect();
-    sorted.sort_by(f32::total_cmp);
-    let largest = sorted.last().copied().unwrap_or(0.0);
-    let index = ((1.0 - CLIPPED) * sorted.len() as f32) as usize;
-    sorted.get(index).copied().filter(|white| *white > 0.0).unwrap_or(largest)
+    let pixels = 0..width * (width / 2);
+    let values = pixels.map(|pixel| value(direction_of(width, pixel)).max_element());
+    white(values.collect(), CLIPPED)
+}
+
+/// Returns the value that a share `clipped` of the values exceeds, the largest if that is not positive.
+pub(crate) fn white(mut values: Vec<f32>, clipped: f32) -> f32 {
+    values.sort_by(f32::total_cmp);
+    let largest = values.last().copied().unwrap_or(0.0);
+    let index = ((1.0 - clipped) * values.len() as f32) as usize;
+    values.get(index).copied().filter(|white| *white > 0.0).unwrap_or(largest)
 }
 
 /// A lat-long picture, half as high as wide.

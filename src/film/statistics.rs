@@ -1,11 +1,10 @@
 //! Statistics of a render as JSON, which `render --stats` writes.
 
-use std::{collections::BTreeMap, fmt, path::Path};
+use std::{collections::BTreeMap, fmt};
 
 use serde::{Deserialize, Serialize};
 
 use super::metadata::SampleRange;
-use crate::{error::Result, files::write_json};
 
 /// Figures of one render. Times cover this run only, even if it continued a checkpoint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -82,16 +81,6 @@ pub struct Statistics {
     pub pipeline_compile_ms: BTreeMap<String, f64>,
     /// Device memory by buffer, bytes.
     pub buffer_bytes: BTreeMap<String, u64>,
-}
-
-impl Statistics {
-    /// Writes the statistics as JSON, atomically.
-    ///
-    /// # Errors
-    /// [`crate::Error::Io`] with the cause.
-    pub(crate) fn write(&self, path: &Path) -> Result<()> {
-        write_json(path, self)
-    }
 }
 
 /// Measured gain of paths that the pixels of a tile share.

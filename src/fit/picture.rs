@@ -17,7 +17,10 @@ use super::{
 use crate::{
     brdf::{self, MaterialTables},
     error::Result,
-    film::png::{display_from_linear, write_rgb8},
+    film::{
+        png::{display_from_linear, write_rgb8},
+        sky::white,
+    },
     math::colour::luminance,
     scene::EnvironmentMap,
     srbf::{Mixture, kernel_value},
@@ -45,13 +48,8 @@ struct Panels {
 impl Panels {
     /// Radiance shown as white: all but the brightest pixels of the data are below it.
     fn white(&self) -> f32 {
-        let mut values: Vec<f32> =
-            self.data.iter().flatten().map(|value| value.max_element()).collect();
-        values.sort_by(f32::total_cmp);
-        let index = ((1.0 - CLIPPED) * values.len() as f32) as usize;
-        let largest = values.last().copied().unwrap_or(1.0);
-        let white = values.get(index).copied().unwrap_or(largest);
-        if white > 0.0 { white } else { largest.max(1e-30) }
+        let values = self.data.iter().flatten().map(|value| value.max_element());
+        white(values.collect(), CLIPPED).max(1e-30)
     }
 
     /// Rows of display values: data, fit and difference.

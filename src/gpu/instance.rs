@@ -101,7 +101,7 @@ impl Instance {
         }
 
         let messages = Arc::new(Messages::default());
-        let mut messenger_info = vk::DebugUtilsMessengerCreateInfoEXT::default()
+        let messenger_info = vk::DebugUtilsMessengerCreateInfoEXT::default()
             .message_severity(
                 vk::DebugUtilsMessageSeverityFlagsEXT::WARNING
                     | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
@@ -131,7 +131,6 @@ impl Instance {
 
         let debug = if validate && has_debug_utils {
             let functions = ext::debug_utils::Instance::new(&entry, &raw);
-            messenger_info.p_next = std::ptr::null();
             // SAFETY: the instance was created with VK_EXT_debug_utils; `user_data` points into
             // `messages`, which lives until after the messenger is destroyed (see `Drop`).
             let messenger =

@@ -6,7 +6,7 @@ use super::{RenderJob, StopReason, arguments::denoised_path, display};
 use crate::{
     command::denoise::{Denoised, denoise},
     error::Result,
-    files::is_special_file,
+    files::{is_special_file, write_json},
     film::{Image, checkpoint::checkpoint_path, png::write_preview},
     gpu::Denoiser,
     session::Session,
@@ -42,7 +42,7 @@ impl RenderJob<'_> {
             let mut statistics = session.statistics(self.scene, reason);
             statistics.warnings.extend(warnings);
             statistics.host_ms.insert("load".into(), self.load_ms);
-            note(path, statistics.write(path));
+            note(path, write_json(path, &statistics));
         }
         let is_interrupted = reason == StopReason::Interrupt && !is_special_file(&self.output);
         if is_interrupted || self.arguments.checkpoint_interval.is_some() {
