@@ -26,9 +26,8 @@ FirstVertex load_first_vertex(uint path) {
 Material first_material(FirstVertex vertex) {
     Material material = load_material(vertex.material);
     if (IS_TEXTURED) {
-        material.reflectance = vertex.reflectance;
-        material.alpha = vertex.alpha;
-        material.ior = material.kind == MATERIAL_PRINCIPLED ? vertex.metallic : material.ior;
+        material =
+            varied(material, Surface(vertex.reflectance, vertex.alpha, vertex.metallic));
     }
     return material;
 }

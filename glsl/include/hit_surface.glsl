@@ -9,10 +9,7 @@ READS(hit_surfaces)
 Material load_surface(uint path, uint index) {
     Material material = load_material(index);
     if (IS_TEXTURED) {
-        Surface surface = hit_surfaces[path];
-        material.reflectance = surface.reflectance;
-        material.alpha = surface.alpha;
-        material.ior = material.kind == MATERIAL_PRINCIPLED ? surface.metallic : material.ior;
+        material = varied(material, hit_surfaces[path]);
     }
     return material;
 }

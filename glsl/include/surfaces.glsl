@@ -17,3 +17,11 @@ const bool IS_TEXTURED = (SURFACES & SURFACES_TEXTURED) != 0u;
 bool is_specular(uint kind) {
     return HAS_SPECULAR && ((1u << kind) & SPECULAR_KINDS) != 0u;
 }
+
+// Material as the textures at a place vary it.
+Material varied(Material material, Surface surface) {
+    material.reflectance = surface.reflectance;
+    material.alpha = surface.alpha;
+    material.ior = material.kind == MATERIAL_PRINCIPLED ? surface.metallic : material.ior;
+    return material;
+}

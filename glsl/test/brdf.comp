@@ -3,6 +3,7 @@
 // Probe of brdf.glsl for tests/brdf.rs: value, density, sample and albedo of given materials.
 
 #include "brdf.glsl"
+#include "test/answers.glsl"
 
 READS(materials)
 
@@ -20,24 +21,14 @@ struct BrdfAnswer {
     vec3 albedo;
 };
 
-layout(scalar, set = SET_PROBE, binding = 32) readonly buffer QueriesBuffer {
-    BrdfQuery queries[];
-};
-layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer AnswersBuffer {
-    BrdfAnswer answers[];
-};
-
-void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= queries.length()) {
-        return;
-    }
-    BrdfQuery query = queries[index];
+BrdfAnswer answer(BrdfQuery query) {
     Material material = materials[query.material];
-    BrdfAnswer answer;
+    BrdfAnswer result;
     brdf_evaluate_and_pdf(
-        material, query.outgoing_local, query.incident_local, answer.value, answer.pdf);
-    answer.sampled_local = brdf_sample(material, query.outgoing_local, query.u);
-    answer.albedo = brdf_albedo(material, query.outgoing_local);
-    answers[index] = answer;
+        material, query.outgoing_local, query.incident_local, result.value, result.pdf);
+    result.sampled_local = brdf_sample(material, query.outgoing_local, query.u);
+    result.albedo = brdf_albedo(material, query.outgoing_local);
+    return result;
 }
+
+ANSWER_QUERIES(BrdfQuery, BrdfAnswer, answer)

@@ -3,6 +3,7 @@
 
 #include "control_variates/controlled.glsl"
 #include "control_variates/records.glsl"
+#include "test/answers.glsl"
 
 struct ControlQuery {
     vec3 position;
@@ -20,19 +21,7 @@ struct ControlAnswer {
     vec3 rest;
 };
 
-layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Queries {
-    ControlQuery queries[];
-};
-layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {
-    ControlAnswer answers[];
-};
-
-void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= uint(queries.length())) {
-        return;
-    }
-    ControlQuery query = queries[index];
+ControlAnswer answer(ControlQuery query) {
     Controlled chosen = controlled_start(query.u);
     for (uint c = 0u; c < 4u; ++c) {
         // The direction stands for the index.
@@ -40,7 +29,9 @@ void main() {
         controlled_add(chosen, vec3(float(c)), weight.xyz, weight.w);
     }
     vec3 contribution = controlled_contribution(chosen, 4u);
-    answers[index] = ControlAnswer(
+    return ControlAnswer(
         record_entry(record_of(query.position, query.normal), query.direction),
         uint(chosen.direction.x), contribution, controlled_rest(chosen, 4u, contribution));
 }
+
+ANSWER_QUERIES(ControlQuery, ControlAnswer, answer)

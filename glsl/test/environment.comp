@@ -2,6 +2,7 @@
 #version 460
 
 #include "environment.glsl"
+#include "test/answers.glsl"
 
 struct ProbeInput {
     vec3 direction;
@@ -16,22 +17,13 @@ struct ProbeOutput {
     float sampled_pdf;
 };
 
-layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Inputs {
-    ProbeInput inputs[];
-};
-layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Outputs {
-    ProbeOutput outputs[];
-};
-
-void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= uint(inputs.length())) {
-        return;
-    }
-    vec3 direction = inputs[index].direction;
+ProbeOutput answer(ProbeInput query) {
+    vec3 direction = query.direction;
     vec4 light = environment_light(direction);
-    EnvironmentSample environment = environment_sample(inputs[index].u);
-    outputs[index] = ProbeOutput(
+    EnvironmentSample environment = environment_sample(query.u);
+    return ProbeOutput(
         light.xyz, environment_pdf(direction, light), environment.direction,
         environment.radiance, environment.pdf);
 }
+
+ANSWER_QUERIES(ProbeInput, ProbeOutput, answer)

@@ -2,7 +2,7 @@
 #version 460
 
 #include "frame.glsl"
-#include "layout.glsl"
+#include "test/answers.glsl"
 
 struct ProbeInput {
     vec3 normal;
@@ -20,23 +20,13 @@ struct ProbeOutput {
     vec2 sin_cos;
 };
 
-layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Inputs {
-    ProbeInput inputs[];
-};
-layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Outputs {
-    ProbeOutput outputs[];
-};
-
-void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= uint(inputs.length())) {
-        return;
-    }
-    ProbeInput probe = inputs[index];
+ProbeOutput answer(ProbeInput probe) {
     Frame frame = frame_from_normal(probe.normal);
     vec3 direction_local = to_local(frame, probe.direction);
-    outputs[index] = ProbeOutput(
+    return ProbeOutput(
         frame.tangent, frame.bitangent, direction_local, to_world(frame, direction_local),
         lat_long_from_direction(probe.direction), direction_from_lat_long(probe.uv),
         sin_cos_pi(2.0 * probe.uv.x));
 }
+
+ANSWER_QUERIES(ProbeInput, ProbeOutput, answer)

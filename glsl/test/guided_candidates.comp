@@ -2,6 +2,7 @@
 #version 460
 
 #include "guided/candidates.glsl"
+#include "test/answers.glsl"
 
 struct CandidateQuery {
     // 1 draws a candidate, 0 takes the direction.
@@ -19,19 +20,7 @@ struct CandidateAnswer {
     float guided_pdf;
 };
 
-layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Queries {
-    CandidateQuery queries[];
-};
-layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {
-    CandidateAnswer answers[];
-};
-
-void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= queries.length()) {
-        return;
-    }
-    CandidateQuery query = queries[index];
+CandidateAnswer answer(CandidateQuery query) {
     Vertex vertex = load_vertex(0u, load_hit(0u));
     uint cell = guide_cell_index(guide_cell_of(vertex));
     uint first = cell * guide.region_count;
@@ -46,7 +35,9 @@ void main() {
         uint number = query.ray * guided_count + query.candidate - BRDF_CANDIDATES;
         guided = draw_candidate(vertex, first, number);
     }
-    answers[index] = CandidateAnswer(
+    return CandidateAnswer(
         guided.sampled.direction, candidates_pdf(guided), guided.sampled.brdf_pdf,
         guided_pdf(guided));
 }
+
+ANSWER_QUERIES(CandidateQuery, CandidateAnswer, answer)

@@ -2,6 +2,7 @@
 #version 460
 
 #include "haar/mixture.glsl"
+#include "test/answers.glsl"
 
 struct HaarQuery {
     uint path;
@@ -25,19 +26,7 @@ struct HaarAnswer {
     vec3 integrand;
 };
 
-layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Queries {
-    HaarQuery queries[];
-};
-layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {
-    HaarAnswer answers[];
-};
-
-void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= queries.length()) {
-        return;
-    }
-    HaarQuery query = queries[index];
+HaarAnswer answer(HaarQuery query) {
     Vertex vertex = load_vertex(query.path, load_hit(query.path));
     HaarMixture mixture = load_haar_mixture(query.path, wave_path_count());
     NodeSample drawn = NodeSample(
@@ -49,8 +38,10 @@ void main() {
         drawn = haar_sample(vertex, mixture, numbers);
     }
     DirectionSample sampled = evaluate_world(vertex, drawn.direction);
-    answers[index] = HaarAnswer(
-        drawn.direction, shares_pdf(mixture.shares, sampled, drawn.pdf), drawn.pdf, mixture.shares.product,
-        mixture.shares.environment, sampled.environment_pdf, sampled.brdf_pdf, mixture.total,
+    return HaarAnswer(
+        drawn.direction, shares_pdf(mixture.shares, sampled, drawn.pdf), drawn.pdf,
+        mixture.shares.product, mixture.shares.environment, sampled.environment_pdf, sampled.brdf_pdf, mixture.total,
         sampled.integrand);
 }
+
+ANSWER_QUERIES(HaarQuery, HaarAnswer, answer)

@@ -1,7 +1,7 @@
 // Reads back the lobes of paths and their current weights. For tests/product.rs.
 #version 460
 
-#include "layout.glsl"
+#include "test/answers.glsl"
 
 READS(visibility_cache)
 READS(close_lobes)
@@ -19,24 +19,14 @@ struct LobeAnswer {
     float total;
 };
 
-layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Queries {
-    uvec2 queries[];
-};
-layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {
-    LobeAnswer answers[];
-};
-
-void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= queries.length()) {
-        return;
-    }
-    uvec2 query = queries[index];
-    Lobes lobes = load_lobes(query.x, wave.pixel_count * wave.sample_count, 0u);
+LobeAnswer answer(uvec2 query) {
+    Lobes lobes = load_lobes(query.x, wave_path_count(), 0u);
     ProductLobe lobe = unpack_lobe(lobe_words(lobes, query.y));
     load_weights(lobes);
     float visibility = visibility_weight(counts_of(lobes, query.y / 4u), query.y % 4u);
-    answers[index] = LobeAnswer(
+    return LobeAnswer(
         lobe.axis, lobe.bandwidth, lobe.weight, lobe.weight * visibility, lobes.count,
         weight_total(lobes));
 }
+
+ANSWER_QUERIES(uvec2, LobeAnswer, answer)

@@ -1,7 +1,7 @@
 // Densities (solid angle) of a draw from the mixture or a given direction. For tests/product.rs.
 #version 460
 
-#include "layout.glsl"
+#include "test/answers.glsl"
 
 READS(visibility_cache)
 READS(close_lobes)
@@ -32,19 +32,7 @@ struct MixtureAnswer {
     vec3 integrand;
 };
 
-layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Queries {
-    MixtureQuery queries[];
-};
-layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {
-    MixtureAnswer answers[];
-};
-
-void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= queries.length()) {
-        return;
-    }
-    MixtureQuery query = queries[index];
+MixtureAnswer answer(MixtureQuery query) {
     Vertex vertex = load_vertex(query.path, load_hit(query.path));
     Mixture mixture = load_mixture(query.path, wave_path_count(), 0u);
     vec3 direction = query.direction;
@@ -62,16 +50,18 @@ void main() {
             * kernel_value(lobe.axis, lobe.bandwidth, direction);
     }
     DirectionSample sampled = evaluate_world(vertex, direction);
-    MixtureAnswer answer;
-    answer.direction = direction;
-    answer.lobe_density = mixture_lobe_density(mixture, direction);
-    answer.pdf = mixture_pdf(mixture, sampled, answer.lobe_density);
-    answer.unguided_lobe_density = sum > 0.0 ? unguided / sum : 0.0;
-    answer.environment_pdf = sampled.environment_pdf;
-    answer.brdf_pdf = sampled.brdf_pdf;
-    answer.lobe_share = mixture.shares.product;
-    answer.environment_share = mixture.shares.environment;
-    answer.brdf_share = mixture.shares.brdf;
-    answer.integrand = sampled.integrand;
-    answers[index] = answer;
+    MixtureAnswer result;
+    result.direction = direction;
+    result.lobe_density = mixture_lobe_density(mixture, direction);
+    result.pdf = mixture_pdf(mixture, sampled, result.lobe_density);
+    result.unguided_lobe_density = sum > 0.0 ? unguided / sum : 0.0;
+    result.environment_pdf = sampled.environment_pdf;
+    result.brdf_pdf = sampled.brdf_pdf;
+    result.lobe_share = mixture.shares.product;
+    result.environment_share = mixture.shares.environment;
+    result.brdf_share = mixture.shares.brdf;
+    result.integrand = sampled.integrand;
+    return result;
 }
+
+ANSWER_QUERIES(MixtureQuery, MixtureAnswer, answer)

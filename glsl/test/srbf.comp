@@ -1,8 +1,8 @@
 // Probe of srbf.glsl: one row of inputs in, the result of every function out.
 #version 460
 
-#include "layout.glsl"
 #include "srbf.glsl"
+#include "test/answers.glsl"
 
 struct Input {
     Lobe a;
@@ -28,19 +28,7 @@ struct Output {
     vec2 inverse;
 };
 
-layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Inputs {
-    Input inputs[];
-};
-layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Outputs {
-    Output outputs[];
-};
-
-void main() {
-    uint i = gl_GlobalInvocationID.x;
-    if (i >= inputs.length()) {
-        return;
-    }
-    Input given = inputs[i];
+Output answer(Input given) {
     Lobe a = given.a;
     Output result;
     result.expm1_x = expm1(given.x);
@@ -56,5 +44,7 @@ void main() {
     result.sampled = kernel_sample(a.axis, a.bandwidth, given.u);
     result.pdf = kernel_pdf(a.axis, a.bandwidth, given.direction);
     result.inverse = kernel_inverse(a.axis, a.bandwidth, result.sampled);
-    outputs[i] = result;
+    return result;
 }
+
+ANSWER_QUERIES(Input, Output, answer)

@@ -1,6 +1,7 @@
 // Probe of texture.glsl: a use and coordinates, and a point of a triangle, in; values out.
 #version 460
 
+#include "test/answers.glsl"
 #include "texture.glsl"
 
 struct TextureQuery {
@@ -27,28 +28,18 @@ struct TextureAnswer {
     vec3 mapped;
 };
 
-layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Inputs {
-    TextureQuery inputs[];
-};
-layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Outputs {
-    TextureAnswer outputs[];
-};
-
-void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= uint(inputs.length())) {
-        return;
-    }
-    TextureQuery query = inputs[index];
+TextureAnswer answer(TextureQuery query) {
     MaterialSurface surface = load_material_surface(query.material);
     TextureUse used = load_texture_use(query.use_index);
     Attributes attributes = triangle_attributes(query.triangle, query.weights);
     vec3 mapped = mapped_normal(
         query.use_index, surface.normal_scale, query.triangle, NO_INSTANCE, attributes,
         query.shading_normal, query.side);
-    outputs[index] = TextureAnswer(
+    return TextureAnswer(
         texture_value(query.use_index, query.uv0, query.uv1),
         texture_number(query.use_index, query.uv0, query.uv1), used, surface, attributes.uv0,
         attributes.uv1, attributes.tangent, attributes.color, surface_opacity(surface, attributes),
         mapped);
 }
+
+ANSWER_QUERIES(TextureQuery, TextureAnswer, answer)

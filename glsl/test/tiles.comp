@@ -1,6 +1,7 @@
 // Probe of tiles/: sector of a place, density of a direction, and a draw. For tests/tiles.rs.
 #version 460
 
+#include "test/answers.glsl"
 #include "tiles/tiles.glsl"
 
 struct TileQuery {
@@ -20,22 +21,12 @@ struct TileAnswer {
     float sampled_pdf;
 };
 
-layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Queries {
-    TileQuery queries[];
-};
-layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {
-    TileAnswer answers[];
-};
-
-void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= uint(queries.length())) {
-        return;
-    }
-    TileQuery query = queries[index];
+TileAnswer answer(TileQuery query) {
     float map_pdf = environment_pdf(query.direction, environment_light(query.direction));
     EnvironmentSample light = draw_from_tiles(query.sector, query.bits, query.more_bits);
-    answers[index] = TileAnswer(
+    return TileAnswer(
         sector_of(query.position, query.shift), tiles_pdf(query.sector, query.direction, map_pdf),
         light.direction, light.radiance, light.pdf);
 }
+
+ANSWER_QUERIES(TileQuery, TileAnswer, answer)
