@@ -231,7 +231,8 @@ vec3 measured_sample(uint table_offset, vec3 outgoing_local, vec3 u) {
     return 2.0 * dot(outgoing_local, half_vector) * half_vector - outgoing_local;
 }
 
-// Value (1/sr, without the cosine) and density of brdf_sample at one pair of directions.
+// Value (1/sr, without the cosine) and density of brdf_sample at one pair of directions. The density
+// integrates over the hemisphere to 1 less the share of samples below the surface.
 void brdf_evaluate_and_pdf(
     Material material, vec3 outgoing_local, vec3 incident_local, out vec3 value, out float pdf) {
     value = vec3(0.0);
@@ -282,15 +283,6 @@ vec3 brdf_evaluate(Material material, vec3 outgoing_local, vec3 incident_local) 
     float pdf;
     brdf_evaluate_and_pdf(material, outgoing_local, incident_local, value, pdf);
     return value;
-}
-
-// Density of brdf_sample per steradian. Integrates over the hemisphere to 1 less the share of
-// samples below the surface.
-float brdf_pdf(Material material, vec3 outgoing_local, vec3 incident_local) {
-    vec3 value;
-    float pdf;
-    brdf_evaluate_and_pdf(material, outgoing_local, incident_local, value, pdf);
-    return pdf;
 }
 
 // Samples an incident direction with three numbers in [0, 1); z ≤ 0 means no sample, which counts

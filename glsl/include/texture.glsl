@@ -47,24 +47,28 @@ MaterialSurface load_material_surface(uint material) {
         uintBitsToFloat(fourth.y), vec2(0.0));
 }
 
-// A word of the texels of all textures; with one page the choice folds away.
-uint texture_word(uint index) {
-    if (TEXTURE_PAGES == 1u) {
-        return texelFetch(texture_words_0, int(index)).x;
+// Defines a function that reads a word of a buffer in up to four pages; with one page the choice folds away.
+#define PAGED_WORDS(read, words, PAGES, PAGE_SHIFT) \
+    uint read(uint index) { \
+        if (PAGES == 1u) { \
+            return texelFetch(words##_0, int(index)).x; \
+        } \
+        uint page = index >> PAGE_SHIFT; \
+        int word = int(index - (page << PAGE_SHIFT)); \
+        if (page == 0u) { \
+            return texelFetch(words##_0, word).x; \
+        } \
+        if (page == 1u) { \
+            return texelFetch(words##_1, word).x; \
+        } \
+        if (page == 2u) { \
+            return texelFetch(words##_2, word).x; \
+        } \
+        return texelFetch(words##_3, word).x; \
     }
-    uint page = index >> TEXTURE_PAGE_SHIFT;
-    int word = int(index - (page << TEXTURE_PAGE_SHIFT));
-    if (page == 0u) {
-        return texelFetch(texture_words_0, word).x;
-    }
-    if (page == 1u) {
-        return texelFetch(texture_words_1, word).x;
-    }
-    if (page == 2u) {
-        return texelFetch(texture_words_2, word).x;
-    }
-    return texelFetch(texture_words_3, word).x;
-}
+
+PAGED_WORDS(texture_word, texture_words, TEXTURE_PAGES, TEXTURE_PAGE_SHIFT)
+PAGED_WORDS(attribute_word, triangle_attributes, ATTRIBUTE_PAGES, ATTRIBUTE_PAGE_SHIFT)
 
 // Linear value of a number 0 to 1 in the encoding of [IEC 61966-2-1:1999].
 float srgb_to_linear(float encoded) {
@@ -176,24 +180,6 @@ struct Attributes {
     // Linear colour and opacity, 1 where there is none.
     vec4 color;
 };
-
-uint attribute_word(uint index) {
-    if (ATTRIBUTE_PAGES == 1u) {
-        return texelFetch(triangle_attributes_0, int(index)).x;
-    }
-    uint page = index >> ATTRIBUTE_PAGE_SHIFT;
-    int word = int(index - (page << ATTRIBUTE_PAGE_SHIFT));
-    if (page == 0u) {
-        return texelFetch(triangle_attributes_0, word).x;
-    }
-    if (page == 1u) {
-        return texelFetch(triangle_attributes_1, word).x;
-    }
-    if (page == 2u) {
-        return texelFetch(triangle_attributes_2, word).x;
-    }
-    return texelFetch(triangle_attributes_3, word).x;
-}
 
 // Two words of attribute `bit` at a corner (0 to 2) of a triangle that has it.
 uvec2 corner_attribute(uint triangle, uint corner, uint bit) {
