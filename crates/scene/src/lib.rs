@@ -1,6 +1,5 @@
 //! Scenes: a scene file and the files that it names → validated [`Scene`], and files of other renderers.
 
-mod blend;
 pub mod camera;
 pub mod coat;
 pub mod environment;
@@ -11,6 +10,7 @@ pub mod file;
 pub mod files;
 pub mod geometry;
 mod hash;
+mod import;
 pub mod instance;
 pub mod instances;
 pub mod lamp;

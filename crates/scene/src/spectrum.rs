@@ -1,85 +1,94 @@
-//! Reflectance spectra → linear sRGB by the CIE 1931 standard observer under illuminant D65.
+//! Spectra → linear Rec.709 by the CIE 1931 standard observer: reflectances under illuminant D65, lights by
+//! themselves.
 
-use glam::{DMat3, DVec3, dvec3};
+use glam::{DMat3, DVec3, DVec4, Vec4Swizzles, dvec3, dvec4};
 
-/// First wavelength of [`COLOUR_MATCHING`], nm.
-const FIRST_NM: f64 = 380.0;
+/// First wavelength of [`OBSERVER`], nm.
+const FIRST_NM: f64 = 360.0;
 /// Spacing of its rows, nm.
 const STEP_NM: f64 = 10.0;
 
-/// Colour matching functions x̄, ȳ, z̄ of the CIE 1931 standard observer (2°), 380 to 780 nm by 10:
-/// \[CIE 015:2018\], table of the 1931 observer.
-const COLOUR_MATCHING: [[f64; 3]; 41] = [
-    [0.001368, 0.000039, 0.006450],
-    [0.004243, 0.000120, 0.020050],
-    [0.014310, 0.000396, 0.067850],
-    [0.043510, 0.001210, 0.207400],
-    [0.134380, 0.004000, 0.645600],
-    [0.283900, 0.011600, 1.385600],
-    [0.348280, 0.023000, 1.747060],
-    [0.336200, 0.038000, 1.772110],
-    [0.290800, 0.060000, 1.669200],
-    [0.195360, 0.090980, 1.287640],
-    [0.095640, 0.139020, 0.812950],
-    [0.032010, 0.208020, 0.465180],
-    [0.004900, 0.323000, 0.272000],
-    [0.009300, 0.503000, 0.158200],
-    [0.063270, 0.710000, 0.078250],
-    [0.165500, 0.862000, 0.042160],
-    [0.290400, 0.954000, 0.020300],
-    [0.433450, 0.994950, 0.008750],
-    [0.594500, 0.995000, 0.003900],
-    [0.762100, 0.952000, 0.002100],
-    [0.916300, 0.870000, 0.001650],
-    [1.026300, 0.757000, 0.001100],
-    [1.062200, 0.631000, 0.000800],
-    [1.002600, 0.503000, 0.000340],
-    [0.854450, 0.381000, 0.000190],
-    [0.642400, 0.265000, 0.000050],
-    [0.447900, 0.175000, 0.000020],
-    [0.283500, 0.107000, 0.000000],
-    [0.164900, 0.061000, 0.000000],
-    [0.087400, 0.032000, 0.000000],
-    [0.046770, 0.017000, 0.000000],
-    [0.022700, 0.008210, 0.000000],
-    [0.011359, 0.004102, 0.000000],
-    [0.005790, 0.002091, 0.000000],
-    [0.002899, 0.001047, 0.000000],
-    [0.001440, 0.000520, 0.000000],
-    [0.000690, 0.000249, 0.000000],
-    [0.000332, 0.000120, 0.000000],
-    [0.000166, 0.000060, 0.000000],
-    [0.000083, 0.000030, 0.000000],
-    [0.000042, 0.000015, 0.000000],
-];
-
-/// Relative spectral power of the CIE standard illuminant D65, 380 to 780 nm by 10: \[ISO/CIE
-/// 11664-2:2022\].
-const ILLUMINANT_D65: [f64; 41] = [
-    49.9755, 54.6482, 82.7549, 91.4860, 93.4318, 86.6823, 104.8650, 117.0080, 117.8120, 114.8610,
-    115.9230, 108.8110, 109.3540, 107.8020, 104.7900, 107.6890, 104.4050, 104.0460, 100.0000,
-    96.3342, 95.7880, 88.6856, 90.0062, 89.5991, 87.6987, 83.2886, 83.6992, 80.0268, 80.2146,
-    82.2778, 78.2842, 69.7213, 71.6091, 74.3490, 61.6040, 69.8856, 75.0870, 63.5927, 46.4182,
-    66.8054, 63.3828,
-];
-
-/// Linear sRGB from XYZ, by columns: the inverse matrix of \[IEC 61966-2-1:1999\].
-const SRGB_FROM_XYZ: DMat3 = DMat3::from_cols(
-    dvec3(3.2406, -0.9689, 0.0557),
-    dvec3(-1.5372, 1.8758, -0.2040),
-    dvec3(-0.4986, 0.0415, 1.0570),
+/// Linear Rec.709 from CIE XYZ, by columns.
+const RGB_FROM_XYZ: DMat3 = DMat3::from_cols(
+    dvec3(3.240479, -0.969256, 0.055648),
+    dvec3(-1.537150, 1.875991, -0.204043),
+    dvec3(-0.498535, 0.041556, 1.057311),
 );
 
-/// x̄, ȳ, z̄ times the illuminant at a wavelength in nm: linear between rows, 0 outside them.
-fn weighted_colour_matching(wavelength_nm: f64) -> DVec3 {
+/// Second constant of Planck's law hc/k, metre kelvins, and the first for radiance, 2hc², W m².
+const PLANCK_SECOND: f64 = 1.438_776_877e-2;
+const PLANCK_FIRST: f64 = 1.191_042_972e-16;
+
+/// Spectrum by values at wavelengths in nm: linear between them, 0 beyond.
+pub struct Samples(Vec<[f64; 2]>);
+
+impl Samples {
+    /// Takes pairs of wavelength and value; none without any, and where wavelengths do not rise.
+    pub fn new(pairs: Vec<[f64; 2]>) -> Option<Self> {
+        let rises = pairs.windows(2).all(|pair| pair[0][0] < pair[1][0]);
+        (rises && !pairs.is_empty()).then_some(Self(pairs))
+    }
+
+    /// Value at a wavelength.
+    pub fn at(&self, wavelength_nm: f64) -> f64 {
+        let next = self.0.partition_point(|sample| sample[0] < wavelength_nm);
+        match (next.checked_sub(1).map(|before| self.0[before]), self.0.get(next)) {
+            (_, Some(&[own, value])) if own == wavelength_nm => value,
+            (Some([low, from]), Some(&[high, to])) => {
+                from + (to - from) * (wavelength_nm - low) / (high - low)
+            }
+            _ => 0.0,
+        }
+    }
+}
+
+/// Row of the table at a wavelength, linear between rows; 0 outside them.
+fn observer(wavelength_nm: f64) -> DVec4 {
     let position = (wavelength_nm - FIRST_NM) / STEP_NM;
-    let last = COLOUR_MATCHING.len() - 1;
+    let last = OBSERVER.len() - 1;
     if !(0.0..=last as f64).contains(&position) {
-        return DVec3::ZERO;
+        return DVec4::ZERO;
     }
     let row = (position as usize).min(last - 1);
-    let at = |row: usize| DVec3::from(COLOUR_MATCHING[row]) * ILLUMINANT_D65[row];
-    at(row).lerp(at(row + 1), position - row as f64)
+    OBSERVER[row] + (OBSERVER[row + 1] - OBSERVER[row]) * (position - row as f64)
+}
+
+/// Linear Rec.709 from CIE XYZ.
+pub fn rgb_from_xyz(xyz: DVec3) -> DVec3 {
+    RGB_FROM_XYZ * xyz
+}
+
+/// XYZ of a spectrum nanometre by nanometre; `weight` is that of each row of the observer.
+fn xyz(spectrum: impl Fn(f64) -> f64, weight: impl Fn(DVec4) -> f64) -> DVec3 {
+    let wavelengths = (0..(OBSERVER.len() - 1) * STEP_NM as usize).map(|nm| FIRST_NM + nm as f64);
+    let parts = wavelengths.map(|nm| {
+        let row = observer(nm);
+        row.xyz() * weight(row) * spectrum(nm)
+    });
+    parts.sum()
+}
+
+/// Colour of a reflectance, or of another property of a medium, under D65: a constant is grey.
+pub fn reflectance(spectrum: impl Fn(f64) -> f64) -> DVec3 {
+    let under_d65 = |row: DVec4| row.w;
+    rgb_from_xyz(xyz(spectrum, under_d65)) / rgb_from_xyz(xyz(|_| 1.0, under_d65))
+}
+
+/// Colour of light of a spectral power. A power of 1 has luminance 1 and is not white.
+pub fn light(power: impl Fn(f64) -> f64) -> DVec3 {
+    rgb_from_xyz(xyz(power, |_| 1.0)) / xyz(|_| 1.0, |_| 1.0).y
+}
+
+/// As [`light`], scaled to luminance 1. `None` if nothing of it is visible.
+pub fn light_color(power: impl Fn(f64) -> f64) -> Option<DVec3> {
+    let xyz = xyz(power, |_| 1.0);
+    (xyz.y > 0.0 && xyz.is_finite()).then(|| rgb_from_xyz(xyz) / xyz.y)
+}
+
+/// Radiance of a black body, W m⁻² sr⁻¹ nm⁻¹ \[Planck 1901\].
+pub fn planck(wavelength_nm: f64, kelvin: f64) -> f64 {
+    let metres = wavelength_nm * 1e-9;
+    1e-9 * PLANCK_FIRST / (metres.powi(5) * (PLANCK_SECOND / (metres * kelvin)).exp_m1())
 }
 
 /// Weights w such that Σ w_j·s(λ_j) is the linear sRGB colour of a reflectance spectrum s sampled
@@ -96,28 +105,69 @@ pub fn srgb_weights(wavelengths_nm: &[f64]) -> Option<Vec<DVec3>> {
             let before = wavelengths_nm[index.saturating_sub(1)];
             let after = wavelengths_nm[(index + 1).min(count - 1)];
             let width = if count == 1 { 1.0 } else { 0.5 * (after - before) };
-            weighted_colour_matching(wavelengths_nm[index]) * width
+            {
+                let row = observer(wavelengths_nm[index]);
+                row.xyz() * row.w * width
+            }
         })
         .collect();
     let luminous: f64 = weighted.iter().map(|xyz| xyz.y).sum();
-    (luminous > 0.0)
-        .then(|| weighted.into_iter().map(|xyz| SRGB_FROM_XYZ * xyz / luminous).collect())
+    (luminous > 0.0).then(|| weighted.into_iter().map(|xyz| rgb_from_xyz(xyz / luminous)).collect())
 }
 
-/// Linear sRGB colour, of luminance 1, of light whose spectral power at a wavelength in nm is `power`,
-/// by sums at every nanometre. `None` if nothing of it is visible.
-pub fn light_color(power: impl Fn(f64) -> f64) -> Option<DVec3> {
-    let last = COLOUR_MATCHING.len() - 1;
-    let xyz: DVec3 = (0..last * STEP_NM as usize)
-        .map(|index| {
-            let position = index as f64 / STEP_NM;
-            let row = position as usize;
-            let [low, high] = [row, row + 1].map(|row| DVec3::from(COLOUR_MATCHING[row]));
-            low.lerp(high, position - row as f64) * power(FIRST_NM + index as f64)
-        })
-        .sum();
-    (xyz.y > 0.0 && xyz.is_finite()).then(|| SRGB_FROM_XYZ * xyz / xyz.y)
-}
+/// x̄, ȳ, z̄ of the CIE 1931 observer \[CIE 015:2018\] from 360 nm in steps of 10 nm, and CIE illuminant
+/// D65 \[ISO/CIE 11664-2:2022\] divided by the sum that makes its luminance 1.
+#[rustfmt::skip]
+const OBSERVER: [DVec4; 48] = [
+    dvec4(0.00013, 0.000004, 0.000606, 0.471106),
+    dvec4(0.000415, 0.000012, 0.001946, 0.526166),
+    dvec4(0.001368, 0.000039, 0.00645, 0.504816),
+    dvec4(0.004243, 0.00012, 0.02005, 0.552016),
+    dvec4(0.01431, 0.000396, 0.06785, 0.83593),
+    dvec4(0.04351, 0.00121, 0.2074, 0.924125),
+    dvec4(0.13438, 0.004, 0.6456, 0.94378),
+    dvec4(0.2839, 0.0116, 1.3856, 0.875602),
+    dvec4(0.34828, 0.023, 1.74706, 1.05927),
+    dvec4(0.3362, 0.038, 1.77211, 1.18193),
+    dvec4(0.2908, 0.06, 1.6692, 1.190051),
+    dvec4(0.19536, 0.09098, 1.28764, 1.160242),
+    dvec4(0.09564, 0.13902, 0.81295, 1.17097),
+    dvec4(0.03201, 0.20802, 0.46518, 1.09913),
+    dvec4(0.0049, 0.323, 0.272, 1.104615),
+    dvec4(0.0093, 0.503, 0.1582, 1.088938),
+    dvec4(0.06327, 0.71, 0.07825, 1.058512),
+    dvec4(0.1655, 0.862, 0.04216, 1.087796),
+    dvec4(0.2904, 0.954, 0.0203, 1.054623),
+    dvec4(0.43345, 0.99495, 0.00875, 1.050997),
+    dvec4(0.5945, 0.995, 0.0039, 1.010127),
+    dvec4(0.7621, 0.952, 0.0021, 0.973098),
+    dvec4(0.9163, 0.87, 0.00165, 0.967581),
+    dvec4(1.0263, 0.757, 0.0011, 0.895837),
+    dvec4(1.0622, 0.631, 0.0008, 0.909177),
+    dvec4(1.0026, 0.503, 0.00034, 0.905065),
+    dvec4(0.85445, 0.381, 0.00019, 0.885869),
+    dvec4(0.6424, 0.265, 0.00005, 0.841321),
+    dvec4(0.4479, 0.175, 0.00002, 0.845469),
+    dvec4(0.2835, 0.107, 0.0, 0.808373),
+    dvec4(0.1649, 0.061, 0.0, 0.81027),
+    dvec4(0.0874, 0.032, 0.0, 0.831111),
+    dvec4(0.04677, 0.017, 0.0, 0.79077),
+    dvec4(0.0227, 0.00821, 0.0, 0.704274),
+    dvec4(0.011359, 0.004102, 0.0, 0.723343),
+    dvec4(0.00579, 0.002091, 0.0, 0.75102),
+    dvec4(0.002899, 0.001047, 0.0, 0.622279),
+    dvec4(0.00144, 0.00052, 0.0, 0.705934),
+    dvec4(0.00069, 0.000249, 0.0, 0.758474),
+    dvec4(0.000332, 0.00012, 0.0, 0.642367),
+    dvec4(0.000166, 0.00006, 0.0, 0.468883),
+    dvec4(0.000083, 0.00003, 0.0, 0.67482),
+    dvec4(0.000042, 0.000015, 0.0, 0.640247),
+    dvec4(0.000021, 0.000007, 0.0, 0.649552),
+    dvec4(0.00001, 0.000004, 0.0, 0.60054),
+    dvec4(0.000005, 0.000002, 0.0, 0.524852),
+    dvec4(0.000003, 0.000001, 0.0, 0.580223),
+    dvec4(0.000001, 0.0, 0.0, 0.609233),
+];
 
 #[cfg(test)]
 mod tests {
@@ -135,14 +185,20 @@ mod tests {
 
     #[test]
     fn light_of_the_illuminant_is_white() {
-        let row = |nm: f64| ((nm - FIRST_NM) / STEP_NM) as usize;
-        let color = light_color(|nm| {
-            let position = (nm - FIRST_NM) / STEP_NM;
-            let [low, high] = [row(nm), row(nm) + 1].map(|row| ILLUMINANT_D65[row]);
-            low + (high - low) * position.fract()
-        });
+        let color = light_color(|nm| observer(nm).w);
         assert!((color.unwrap() - DVec3::ONE).abs().max_element() < 5e-3, "{color:?}");
         assert!(light_color(|_| 0.0).is_none());
+        assert!((reflectance(|_| 0.4) - DVec3::splat(0.4)).abs().max_element() < 1e-6);
+    }
+
+    #[test]
+    fn samples_end_at_their_ends() {
+        let samples = Samples::new(vec![[500.0, 1.0], [600.0, 3.0]]);
+        let found =
+            samples.map(|samples| [499.0, 500.0, 525.0, 600.0, 601.0].map(|nm| samples.at(nm)));
+        assert_eq!(found, Some([0.0, 1.0, 1.5, 3.0, 0.0]));
+        assert!(Samples::new(vec![[500.0, 1.0], [400.0, 1.0]]).is_none());
+        assert!(Samples::new(Vec::new()).is_none());
     }
 
     /// A spectrum sampled twice as finely has the same colour.

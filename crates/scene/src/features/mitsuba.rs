@@ -11,6 +11,7 @@ features! {
     MI_TRANSFORM Done "`translate`, `rotate`, `scale`, `matrix`, `lookat`" "in their order";
     MI_COLOR Done "`rgb`, `srgb`, `spectrum`, `blackbody`"
         "spectra become linear Rec.709; those of reflectance under D65";
+    MI_GAMUT Ignored "saturation of reflectance spectra beyond Rec.709" "clipped";
     MI_MESH Done "shapes `obj`, `ply`, `serialized`"
         "smooth normals where the file has none, unless `face_normals`";
     MI_QUADRIC Done "shapes `rectangle`, `cube`, `sphere`, `disk`, `cylinder`"

@@ -29,6 +29,7 @@ features! {
     PBRT_SPECTRUM Mapped "`rgb`, `blackbody`, `spectrum`"
         "colours by CIE 1931: reflectances under D65, lights with luminance 1; named metals, glasses \
          (587.6 nm) and illuminants";
+    PBRT_GAMUT Ignored "saturation of reflectance spectra beyond Rec.709" "clipped";
     PBRT_IMAGEMAP Done "`imagemap`, `constant`"
         "bilinear or nearest texels; a number is the opacity of an image that has some, else its \
          luminance; 8-bit colours are sRGB unless `encoding` differs";

@@ -4,17 +4,17 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-use super::{Loader, mitsuba, whole};
+use super::{Loader, whole};
 use crate::{
-    Geometry, Lamp, Scene,
+    Geometry, Lamp,
     error::Result,
     features,
     file::{IncludeEntry, IncludeKeys},
+    import::Imported,
     instance::Instance,
     lamp::LampKind,
     material::Material,
     mesh::Mesh,
-    pbrt,
     transform::Transform,
 };
 
@@ -158,22 +158,21 @@ impl Loader<'_> {
         inputs: &mut Vec<PathBuf>,
         warnings: &mut Vec<String>,
     ) -> Result<Contents> {
-        if mitsuba::is_mitsuba(path) || pbrt::is_pbrt(path) {
-            let scene = Scene::load(path)?;
-            inputs.extend(scene.inputs);
-            warnings.extend(scene.warnings);
-            if scene.environment.texels.iter().any(|texel| *texel != Vec3::ZERO) {
+        if !whole::is_whole(path) {
+            let imported = Loader::new(path).import(None)?.ok_or_else(|| {
+                self.error(format!(
+                    "{label}: expected a file in .gltf, .glb, .obj, .pbrt or .xml; other meshes \
+                     are objects"
+                ))
+            })?;
+            inputs.extend(imported.inputs);
+            warnings.extend(imported.warnings);
+            if imported.environment.is_some_and(|environment| !environment.is_black()) {
                 warnings.push(format!("{label}: ignored the environment of the file"));
             }
-            let Scene { materials, geometry, lamps, .. } = scene;
+            let Imported { materials, geometry, lamps, .. } = imported;
             return Ok(Contents { materials, geometry, lamps });
         }
-        self.check(whole::is_whole(path), || {
-            format!(
-                "{label}: expected a file in .gltf, .glb, .obj, .pbrt or .xml; other meshes are \
-                 objects"
-            )
-        })?;
         let mut mesh = Mesh::read_whole(path, warnings)?;
         inputs.push(path.to_path_buf());
         inputs.extend_from_slice(&mesh.side_files);

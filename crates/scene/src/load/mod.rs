@@ -2,12 +2,11 @@
 //!
 //! Messages name the object or material and the line of its entry.
 
+mod import;
 mod include;
 mod light;
 mod materials;
-mod mitsuba;
 mod objects;
-mod pbrt;
 mod portals;
 mod whole;
 
@@ -57,14 +56,9 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`], and for a camera that the file does not have.
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self> {
-        if mitsuba::is_mitsuba(path) {
-            return Loader::new(path).mitsuba(options);
-        }
-        if super::pbrt::is_pbrt(path) {
-            return Loader::new(path).pbrt(options);
-        }
-        if whole::is_whole(path) {
-            return Loader::new(path).whole(options);
+        let loader = Loader::new(path);
+        if let Some(imported) = loader.import(options.camera.as_deref())? {
+            return loader.imported(imported, options);
         }
         Self::parse_with(path, &files::read_text(path)?, options)
     }

@@ -4,15 +4,14 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::{
-    LoadOptions, Loader, MAX_FILM_SIDE, default_material, light::Light, objects::lacking_uvs,
-};
+use super::{Loader, MAX_FILM_SIDE, default_material, objects::lacking_uvs};
 use crate::{
-    Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Scene,
+    FilmSettings, Filter, Geometry,
     error::Result,
     features::{self, Ignored},
     file::CameraEntry,
     files,
+    import::Imported,
     instance::{Instance, MAX_INSTANCES, bounds},
     material::{Material, MaterialKind},
     mesh::{Mesh, MeshCamera, MeshMaterial, Perspective, RepeatedMesh},
@@ -28,15 +27,15 @@ const FRAMING_DIRECTION: Vec3 = Vec3::new(0.5, 0.4, 1.0);
 const FRAMING_FOV_DEG: f32 = 45.0;
 
 impl Loader<'_> {
-    /// Builds a scene from the mesh file at the loader's path.
-    pub(super) fn whole(&self, options: &LoadOptions) -> Result<Scene> {
+    /// Reads the mesh file at the loader's path as a whole scene, with the camera that is named.
+    pub(super) fn whole(&self, camera: Option<&str>) -> Result<Imported> {
         let mut warnings = Vec::new();
         let mesh = Mesh::read_whole(self.path, &mut warnings)?;
         let mut ignored = mesh.ignored_in_materials();
-        let chosen = self.choose_camera(&mesh.cameras, options.camera.as_deref(), &mut ignored)?;
+        let chosen = self.choose_camera(&mesh.cameras, camera, &mut ignored)?;
         let (materials, geometry) = self.place_whole(&mesh, &mut ignored, &mut warnings)?;
         warnings.extend(ignored.warnings(self.path));
-        let (entry, aspect_ratio) = match chosen {
+        let (camera, aspect_ratio) = match chosen {
             Some((camera, lens)) => (
                 camera_entry(camera, lens),
                 lens.aspect_ratio.filter(|ratio| *ratio > 0.0).unwrap_or(ASPECT_RATIO),
@@ -57,13 +56,9 @@ impl Loader<'_> {
             height: (height as u32).clamp(1, MAX_FILM_SIDE),
             filter: Filter::Gaussian,
         };
-        let environment = self.whole_environment(options, &mut warnings)?;
-        let camera: Camera = self.camera(&entry)?;
-        let light = Light { environment, lamps: mesh.lamps, portals: Vec::new() };
-        let mut scene = self.scene(camera, film, light, materials, geometry, warnings);
-        scene.inputs.extend(mesh.side_files);
-        scene.inputs.extend(options.environment.clone());
-        Ok(scene)
+        let inputs = [vec![self.path.to_path_buf()], mesh.side_files].concat();
+        let (environment, lamps) = (None, mesh.lamps);
+        Ok(Imported { camera, film, environment, lamps, materials, geometry, inputs, warnings })
     }
 
     /// Finds the camera named `name`, else the first with perspective; the others are ignored.
@@ -194,23 +189,6 @@ impl Loader<'_> {
         let label = format!("{}: a mesh of several nodes", self.path.display());
         warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
         Ok(())
-    }
-
-    /// The map of `--environment`, else white.
-    fn whole_environment(
-        &self,
-        options: &LoadOptions,
-        warnings: &mut Vec<String>,
-    ) -> Result<EnvironmentMap> {
-        let rotation_deg = options.rotation_deg.unwrap_or(0.0);
-        if let Some(map) = &options.environment {
-            return EnvironmentMap::load(map, 1.0, rotation_deg, warnings);
-        }
-        warnings.push(format!(
-            "{}: no --environment; lit by white light of radiance 1 from everywhere",
-            self.path.display()
-        ));
-        EnvironmentMap::constant(Vec3::ONE, 1.0).map_err(|message| self.error(message))
     }
 
     /// Camera that sees the whole bounding sphere of the bounding box.

@@ -5,7 +5,6 @@ use glam::Vec3;
 use super::{
     Reader,
     document::Node,
-    media,
     parameters::Parameters,
     spectra::{self, Role},
     textures::Value,
@@ -13,10 +12,13 @@ use super::{
 };
 use crate::{
     MIN_ALPHA,
-    blend::{Share, blend},
     coat::albedo_below_coat,
     error::Result,
     features,
+    import::{
+        blend::{Share, blend},
+        media,
+    },
     material::{ConductorFresnel, MaterialKind, Opacity, Surface},
     math::colour::luminance,
     texture::TextureUse,
@@ -347,10 +349,16 @@ impl Reader<'_> {
         let metal = match (material, eta, k) {
             (None, Some(eta), Some(k)) => Some((eta, k)),
             (None | Some("none"), None, None) => None,
-            (Some(name), None, None) => Some(media::conductor(name).ok_or_else(|| {
-                let names = media::conductor_names();
-                node.error(format!("material: expected none or one of {names}, found `{name}`"))
-            })?),
+            (Some(name), None, None) => Some(
+                media::conductor(name).map(|(eta, k)| (eta.as_vec3(), k.as_vec3())).ok_or_else(
+                    || {
+                        let names = media::conductor_names();
+                        node.error(format!(
+                            "material: expected none or one of {names}, found `{name}`"
+                        ))
+                    },
+                )?,
+            ),
             _ => return Err(node.error("expected either `material` or both `eta` and `k`")),
         };
         let value = self.value(parameters, "specular_reflectance", Role::Reflectance)?;

@@ -1,4 +1,4 @@
-//! Mitsuba scene files, XML of versions 0.5 to 3 → parts of a `Scene`(super::Scene).
+//! Mitsuba scene files, XML of versions 0.5 to 3 → [`Imported`].
 //!
 //! `document` makes one tree of all files, `parameters` and `spectra` read from it, and one module
 //! each turns shapes, models, textures, lights and sensors into Fenestra's. Conventions are those of
@@ -8,7 +8,6 @@ mod bsdfs;
 mod document;
 mod emitters;
 mod environment;
-mod media;
 mod parameters;
 mod principled;
 mod sensor;
@@ -30,33 +29,12 @@ use glam::Vec3;
 
 use self::{bsdfs::Model, document::Document, shapes::Shape};
 use super::{
-    Camera, EnvironmentMap, FilmSettings, Geometry, Lamp,
+    EnvironmentMap, Geometry, Lamp,
     features::{self, Ignored},
     instance::Budget,
     instances::Prototype,
 };
-use crate::{error::Result, material::Material, texture::Texture};
-
-/// Parts of a scene.
-#[derive(Debug)]
-pub struct Parts {
-    /// Viewer.
-    pub camera: Camera,
-    /// Image plane.
-    pub film: FilmSettings,
-    /// Light from everywhere; black if the file has none.
-    pub environment: EnvironmentMap,
-    /// Lights without a surface.
-    pub lamps: Vec<Lamp>,
-    /// Materials, at least one.
-    pub materials: Vec<Material>,
-    /// All triangles.
-    pub geometry: Geometry,
-    /// Files that were read, the scene file first.
-    pub inputs: Vec<PathBuf>,
-    /// Repairs, and one warning for each kind of thing that is left out.
-    pub warnings: Vec<String>,
-}
+use crate::{error::Result, import::Imported, material::Material, texture::Texture};
 
 /// Scene on its way from the document.
 struct Reader<'a> {
@@ -85,7 +63,7 @@ struct Reader<'a> {
 /// # Errors
 /// [`crate::Error::Parse`] with file and line for what cannot be read or rendered, and errors of the
 /// readers of meshes, images and maps.
-pub fn read(path: &Path, camera: Option<&str>) -> Result<Parts> {
+pub fn read(path: &Path, camera: Option<&str>) -> Result<Imported> {
     let document = Document::read(path)?;
     let mut reader = Reader {
         document: &document,
@@ -135,10 +113,10 @@ pub fn read(path: &Path, camera: Option<&str>) -> Result<Parts> {
     let mut inputs = reader.inputs;
     let mut seen = HashSet::new();
     inputs.retain(|input| seen.insert(input.clone()));
-    Ok(Parts {
+    Ok(Imported {
         camera,
         film,
-        environment,
+        environment: Some(environment),
         lamps: reader.lamps,
         materials: reader.materials,
         geometry: reader.geometry,

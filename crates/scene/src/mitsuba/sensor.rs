@@ -1,9 +1,9 @@
-//! Sensors and their film → [`Camera`] and [`FilmSettings`].
+//! Sensors and their film → [`CameraEntry`] and [`FilmSettings`].
 
 use glam::{DMat4, DVec3};
 
 use super::{Reader, document::Node, parameters::Parameters};
-use crate::{Camera, FilmSettings, Filter, MAX_FILM_SIDE, error::Result, features};
+use crate::{FilmSettings, Filter, MAX_FILM_SIDE, error::Result, features, file::CameraEntry};
 
 /// Diagonal of a film of 36 × 24 mm, millimetres.
 const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
@@ -28,7 +28,7 @@ impl Reader<'_> {
         &mut self,
         sensors: &[Node<'_>],
         name: Option<&str>,
-    ) -> Result<(Camera, FilmSettings)> {
+    ) -> Result<(CameraEntry, FilmSettings)> {
         let root = self.document.root();
         let chosen = match name {
             None => 0,
@@ -79,7 +79,7 @@ impl Reader<'_> {
         self.ignored.add_named(features::MI_INTEGRATOR, &name, || node.place());
     }
 
-    fn camera(&mut self, parameters: &Parameters<'_>, film: &Film) -> Result<Camera> {
+    fn camera(&mut self, parameters: &Parameters<'_>, film: &Film) -> Result<CameraEntry> {
         let node = parameters.node;
         let matrix = parameters.transform("to_world")?;
         let axis = |axis: DVec3| matrix.transform_vector3(axis).try_normalize();
@@ -123,13 +123,13 @@ impl Reader<'_> {
         let position = matrix.w_axis.truncate();
         // Look at a point so far away that single precision keeps the direction.
         let look_at = position + forward * position.length().max(1.0);
-        Ok(Camera {
-            position: position.as_vec3(),
-            look_at: look_at.as_vec3(),
-            up: up.as_vec3(),
+        Ok(CameraEntry {
+            position: position.as_vec3().to_array(),
+            look_at: look_at.as_vec3().to_array(),
+            up: up.as_vec3().to_array(),
             vertical_fov_deg: vertical_fov_deg as f32,
             aperture_radius,
-            focus_distance,
+            focus_distance: Some(focus_distance),
         })
     }
 

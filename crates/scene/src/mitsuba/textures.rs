@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    features,
+    features::{self, Ignored},
     texture::{Encoding, Interpolation, Texels, Texture, TextureUse, Wrap},
 };
 
@@ -66,6 +66,9 @@ impl Reader<'_> {
         let Some(node) = parameters.any(name)? else { return Ok(None) };
         match node.tag() {
             "texture" => self.texture(node, MAX_SCALES).map(Some),
+            _ if role == Role::Reflectance => {
+                spectra::reflectance(node, &mut self.ignored).map(|color| Some(Value::Color(color)))
+            }
             _ => spectra::color(node, role).map(|color| Some(Value::Color(color))),
         }
     }
@@ -74,7 +77,9 @@ impl Reader<'_> {
         let parameters = Parameters::new(node);
         let value = match node.kind() {
             "bitmap" | "ldrtexture" => Value::Texture(Box::new(self.bitmap(&parameters)?)),
-            "checkerboard" => Value::Texture(Box::new(checkerboard(&parameters)?)),
+            "checkerboard" => {
+                Value::Texture(Box::new(checkerboard(&parameters, &mut self.ignored)?))
+            }
             "mesh_attribute" | "vertexcolors" => {
                 let name = parameters.string("name")?.unwrap_or("vertex_color");
                 if name != "vertex_color" {
@@ -184,10 +189,10 @@ impl Reader<'_> {
 }
 
 /// Two colours on squares of half a unit: the first where both coordinates are in the same half.
-fn checkerboard(parameters: &Parameters<'_>) -> Result<TextureUse> {
-    let color = |name: &str, grey: f32| {
-        let found = spectra::parameter(parameters, name, Role::Reflectance)?;
-        Ok(found.unwrap_or(Vec3::splat(grey)))
+fn checkerboard(parameters: &Parameters<'_>, ignored: &mut Ignored) -> Result<TextureUse> {
+    let mut color = |name: &str, grey: f32| {
+        let node = parameters.any(name)?;
+        node.map_or(Ok(Vec3::splat(grey)), |node| spectra::reflectance(node, ignored))
     };
     let (first, second) = (color("color0", 0.4)?, color("color1", 0.2)?);
     let (zero, one) = ([0, 0, 0, 255], [255; 4]);

@@ -8,14 +8,12 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
-use super::{
-    equal_area::resample, log::Log, parameters::Entity, source::path_inside, spectra,
-    textures::Textures,
-};
+use super::{log::Log, parameters::Entity, source::path_inside, spectra, textures::Textures};
 use crate::{
     EnvironmentMap, Lamp,
     error::Result,
     features,
+    import::equal_area::resample,
     lamp::{LampKind, SpotFalloff},
     math::colour::luminance,
     texture::{Encoding, Texture, TextureUse},
@@ -301,7 +299,7 @@ fn upper_illuminance(texels: &[Vec3], side: u32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pbrt::equal_area::square_from_direction;
+    use crate::math::equal_area::square_from_direction;
 
     #[test]
     fn a_white_map_gives_an_illuminance_of_pi() {

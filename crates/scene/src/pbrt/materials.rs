@@ -5,17 +5,19 @@ use glam::Vec3;
 use super::{
     directives::Description,
     log::Log,
-    named,
     parameters::{Entity, Kind, Values},
     spectra,
     state::MaterialChoice,
     textures::{Textures, Value, map_numbers},
 };
 use crate::{
-    blend::{Share, blend},
     coat::albedo_below_coat,
     error::Result,
     features,
+    import::{
+        blend::{Share, blend},
+        media,
+    },
     material::{ConductorFresnel, Material, MaterialKind, Surface},
     texture::TextureUse,
 };
@@ -267,7 +269,7 @@ impl<'a> Materials<'a> {
                 let index = |name: &str| match entity.find_of(&own(name), &spectra::KINDS)? {
                     Some(parameter) => spectra::index(parameter, self.textures.folder()),
                     None => {
-                        Ok(named::index(&format!("metal-Cu-{name}")).unwrap_or_default().as_vec3())
+                        Ok(media::index(&format!("metal-Cu-{name}")).unwrap_or_default().as_vec3())
                     }
                 };
                 ConductorFresnel::Exact {

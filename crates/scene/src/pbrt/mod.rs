@@ -13,11 +13,9 @@
 
 mod camera;
 mod directives;
-pub(crate) mod equal_area;
 mod lights;
 mod log;
 mod materials;
-mod named;
 mod parameters;
 mod shapes;
 mod source;
@@ -27,18 +25,13 @@ mod subdivision;
 mod textures;
 mod tokens;
 
-use std::{
-    collections::HashMap,
-    path::{Path, PathBuf},
-    rc::Rc,
-};
+use std::{collections::HashMap, path::Path, rc::Rc};
 
 use glam::{DMat4, Vec3};
 
 use super::{
-    EnvironmentMap, FilmSettings, Geometry, Lamp,
+    Geometry, MIN_ALPHA,
     features::{self, Ignored},
-    file::CameraEntry,
     geometry::Dropped,
     instance::{Budget, Instance, MAX_INSTANCES},
     mesh::Mesh,
@@ -47,7 +40,8 @@ use super::{
 use crate::{
     error::{Error, Result},
     files,
-    material::{Emission, Material},
+    import::Imported,
+    material::{Emission, Material, MaterialKind},
 };
 use camera::View;
 use directives::{Description, Reader, Shape};
@@ -60,26 +54,6 @@ use textures::Textures;
 
 /// Most vertices, and most triangles, of a scene with all its instances.
 const MAX_COUNT: usize = 1 << 27;
-
-/// Everything that a scene description says.
-pub struct Contents {
-    /// Viewer.
-    pub camera: CameraEntry,
-    /// Image plane.
-    pub film: FilmSettings,
-    /// Sum of the infinite lights; black without any.
-    pub environment: EnvironmentMap,
-    /// Other lights without a surface.
-    pub lamps: Vec<Lamp>,
-    /// Materials; widths α from 0.
-    pub materials: Vec<Material>,
-    /// Triangles.
-    pub geometry: Geometry,
-    /// Files read, the main file first.
-    pub inputs: Vec<PathBuf>,
-    /// Warnings.
-    pub warnings: Vec<String>,
-}
 
 /// Tests whether a path names a scene description, compressed or not.
 pub fn is_pbrt(path: &Path) -> bool {
@@ -95,7 +69,7 @@ pub fn is_pbrt(path: &Path) -> bool {
 /// # Errors
 /// [`Error::Parse`] with file, line and column for everything that cannot be read or rendered,
 /// [`Error::Io`] for the main file.
-pub fn read(path: &Path) -> Result<Contents> {
+pub fn read(path: &Path) -> Result<Imported> {
     let mut ignored = Ignored::default();
     let (description, source) = Reader::read(path, Source::open(path)?, &mut ignored)?;
     let folder = source.folder().to_path_buf();
@@ -138,15 +112,23 @@ pub fn read(path: &Path) -> Result<Contents> {
     }
     let environment = lights.environment().map_err(|message| Error::scene(path, message))?;
     let Builder { view, kept, mut log, geometry, dropped, triangle_count, .. } = builder;
+    let mut materials = kept.materials;
+    for material in &mut materials {
+        if let MaterialKind::Plastic { alpha, .. } | MaterialKind::Conductor { alpha, .. } =
+            &mut material.kind
+        {
+            *alpha = alpha.clamp(MIN_ALPHA, 1.0);
+        }
+    }
     let mut warnings = log.ignored.warnings(path);
     warnings.append(&mut log.warnings);
     warnings.extend(dropped.warnings(&path.display().to_string(), triangle_count));
-    Ok(Contents {
+    Ok(Imported {
         camera: view.camera,
         film: view.film,
-        environment,
+        environment: Some(environment),
         lamps: lights.lamps,
-        materials: kept.materials,
+        materials,
         geometry,
         inputs: log.inputs,
         warnings,

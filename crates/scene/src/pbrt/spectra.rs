@@ -9,57 +9,19 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 
 use super::{
-    named,
+    log::Log,
     parameters::{Kind, Parameter, Values},
     source::path_inside,
 };
 use crate::{
     error::Result,
-    files,
-    spectrum::{light_color, srgb_weights},
+    features, files,
+    import::{clipped, media},
+    spectrum::{self, Samples, light_color, planck},
 };
 
 /// Types of parameters that are spectra.
 pub const KINDS: [Kind; 3] = [Kind::Rgb, Kind::Spectrum, Kind::Blackbody];
-
-/// Second radiation constant, nm·K.
-const SECOND_RADIATION: f64 = 1.438_776_877e7;
-/// Spacing at which reflectances are sampled, nm.
-const STEP_NM: f64 = 5.0;
-
-/// Spectrum as pairs of wavelength in nm and value.
-struct Samples(Vec<[f64; 2]>);
-
-impl Samples {
-    /// Takes wavelengths and values in turn.
-    fn new(numbers: &[f64]) -> Option<Self> {
-        let pairs: Vec<_> = numbers.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
-        let increases = pairs.windows(2).all(|pairs| pairs[0][0] < pairs[1][0]);
-        (numbers.len().is_multiple_of(2) && !pairs.is_empty() && increases).then_some(Self(pairs))
-    }
-
-    /// Value at a wavelength: linear between samples, 0 outside them.
-    fn at(&self, wavelength_nm: f64) -> f64 {
-        let next = self.0.partition_point(|sample| sample[0] < wavelength_nm);
-        let Some(&[high, above]) = self.0.get(next) else { return 0.0 };
-        if high == wavelength_nm {
-            return above;
-        }
-        let Some(&[low, below]) = next.checked_sub(1).and_then(|last| self.0.get(last)) else {
-            return 0.0;
-        };
-        below + (above - below) * (wavelength_nm - low) / (high - low)
-    }
-
-    /// Colour of a reflectance.
-    fn color(&self) -> DVec3 {
-        let count = (400.0 / STEP_NM) as usize + 1;
-        let wavelengths: Vec<f64> =
-            (0..count).map(|index| 380.0 + index as f64 * STEP_NM).collect();
-        let weights = srgb_weights(&wavelengths).unwrap_or_default();
-        weights.iter().zip(&wavelengths).map(|(weight, &nm)| *weight * self.at(nm)).sum()
-    }
-}
 
 /// Meaning of a spectrum.
 enum Source<'a> {
@@ -75,7 +37,9 @@ fn source<'a>(parameter: &'a Parameter, folder: &Path) -> Result<Source<'a>> {
     };
     let samples = |numbers: &[f64]| {
         let expected = "expected pairs of wavelength and value in increasing order of wavelength";
-        Samples::new(numbers).map(Source::Samples).ok_or_else(|| error(expected.to_owned()))
+        let (pairs, rest) = numbers.as_chunks();
+        let found = rest.is_empty().then(|| Samples::new(pairs.to_vec())).flatten();
+        found.map(Source::Samples).ok_or_else(|| error(expected.to_owned()))
     };
     match (parameter.kind, &parameter.values) {
         (Kind::Rgb, Values::Numbers(numbers)) => match numbers[..] {
@@ -114,10 +78,14 @@ fn unknown(parameter: &Parameter, expected: &str) -> crate::error::Error {
 ///
 /// # Errors
 /// With the place for lists that are no spectrum and unknown names.
-pub fn reflectance(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
+pub fn reflectance(parameter: &Parameter, folder: &Path, log: &mut Log) -> Result<Vec3> {
     let color = match source(parameter, folder)? {
         Source::Color(color) => color,
-        Source::Samples(samples) => samples.color(),
+        Source::Samples(samples) => {
+            let color = spectrum::reflectance(|nm| samples.at(nm));
+            let place = || parameter.place.describe(log.main);
+            clipped(color, features::PBRT_GAMUT, &mut log.ignored, place)
+        }
         Source::Temperature(kelvin) => blackbody(kelvin),
         Source::Name(_) => return Err(unknown(parameter, "rgb or pairs of wavelength and value")),
     };
@@ -133,7 +101,7 @@ pub fn light(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
         Source::Color(color) => color,
         Source::Samples(samples) => light_color(|nm| samples.at(nm)).unwrap_or(DVec3::ZERO),
         Source::Temperature(kelvin) => blackbody(kelvin),
-        Source::Name(name) => named::illuminant(name)
+        Source::Name(name) => media::illuminant(name)
             .ok_or_else(|| unknown(parameter, "an illuminant such as stdillum-D65"))?,
     };
     Ok(color.max(DVec3::ZERO).as_vec3())
@@ -146,9 +114,9 @@ pub fn light(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
 pub fn index(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
     let color = match source(parameter, folder)? {
         Source::Color(color) => color,
-        Source::Samples(samples) => samples.color(),
+        Source::Samples(samples) => spectrum::reflectance(|nm| samples.at(nm)),
         Source::Temperature(_) => return Err(unknown(parameter, "a refractive index")),
-        Source::Name(name) => named::index(name).ok_or_else(|| {
+        Source::Name(name) => media::index(name).ok_or_else(|| {
             unknown(parameter, "a metal such as metal-Cu-eta or a glass such as glass-BK7")
         })?,
     };
@@ -157,8 +125,7 @@ pub fn index(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
 
 /// Colour of a black body with luminance 1 \[Planck 1901\].
 fn blackbody(kelvin: f64) -> DVec3 {
-    let power = |nm: f64| nm.powi(-5) / (SECOND_RADIATION / (nm * kelvin)).exp_m1();
-    light_color(power).unwrap_or(DVec3::ZERO)
+    light_color(|nm| planck(nm, kelvin)).unwrap_or(DVec3::ZERO)
 }
 
 #[cfg(test)]
@@ -171,18 +138,7 @@ mod tests {
         let white = blackbody(6504.0);
         assert!((white - DVec3::ONE).abs().max_element() < 0.06, "{white}");
         // Illuminant A is a black body of 2856 K: x = 0.4476, y = 0.4074.
-        let warm = named::illuminant("stdillum-A").unwrap_or_default();
+        let warm = media::illuminant("stdillum-A").unwrap_or_default();
         assert!((blackbody(2856.0) - warm).abs().max_element() < 0.01, "{warm}");
-    }
-
-    #[test]
-    fn grey_samples_are_grey_and_end_at_their_ends() {
-        let grey = Samples::new(&[300.0, 0.4, 900.0, 0.4]).map(|grey| grey.color());
-        assert!(grey.is_some_and(|grey| (grey - DVec3::splat(0.4)).abs().max_element() < 2e-3));
-        let samples = Samples::new(&[500.0, 1.0, 600.0, 3.0])
-            .map(|samples| [499.0, 500.0, 525.0, 600.0, 601.0].map(|nm| samples.at(nm)));
-        assert_eq!(samples, Some([0.0, 1.0, 1.5, 3.0, 0.0]));
-        assert!(Samples::new(&[500.0, 1.0, 400.0, 1.0]).is_none());
-        assert!(Samples::new(&[500.0]).is_none());
     }
 }

@@ -125,7 +125,7 @@ impl<'a> Textures<'a> {
             Kind::Float | Kind::Integer => {
                 Value::number(parameter.numbers().first().copied().unwrap_or(0.0))
             }
-            _ => Value::Constant(spectra::reflectance(parameter, self.folder)?),
+            _ => Value::Constant(spectra::reflectance(parameter, self.folder, log)?),
         }))
     }
 

@@ -11,7 +11,7 @@ use crate::{
     error::Result,
     export::names::relative,
     lamp::{LampKind, SpotFalloff},
-    pbrt::equal_area::direction_from_square,
+    math::equal_area::direction_from_square,
     picture::Image,
 };
 

@@ -1,41 +1,15 @@
 //! Square equal-area maps of the sphere \[Clarberg 2008\] → lat-long environment maps.
 
-use std::f32::consts::FRAC_PI_4;
-
 use glam::{Mat3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use crate::{EnvironmentMap, math::frame::direction_from_lat_long};
+use crate::{
+    EnvironmentMap,
+    math::{equal_area::square_from_direction, frame::direction_from_lat_long},
+};
 
 /// Points of a texel of the lat-long map, along each side, whose mean it is.
 const POINTS: u32 = 6;
-
-/// Point of the unit square where a unit direction lies, (0, 0) at the upper left of the image.
-pub fn square_from_direction(direction: Vec3) -> Vec2 {
-    let [x, y, z] = direction.abs().to_array();
-    let radius = (1.0 - z).max(0.0).sqrt();
-    let (greater, less) = (x.max(y), x.min(y));
-    let ratio = if greater == 0.0 { 0.0 } else { less / greater };
-    let turn = ratio.atan() / (2.0 * FRAC_PI_4);
-    let turn = if x < y { 1.0 - turn } else { turn };
-    let (mut u, mut v) = (radius - turn * radius, turn * radius);
-    if direction.z < 0.0 {
-        (u, v) = (1.0 - v, 1.0 - u);
-    }
-    0.5 * Vec2::new(u.copysign(direction.x) + 1.0, v.copysign(direction.y) + 1.0)
-}
-
-/// Unit direction of a point of the unit square: the inverse of [`square_from_direction`].
-pub fn direction_from_square(uv: Vec2) -> Vec3 {
-    let [u, v] = (2.0 * uv - 1.0).to_array();
-    let signed = 1.0 - (u.abs() + v.abs());
-    let radius = 1.0 - signed.abs();
-    let turn = if radius == 0.0 { 1.0 } else { (v.abs() - u.abs()) / radius + 1.0 };
-    let (sine, cosine) = (turn * FRAC_PI_4).sin_cos();
-    let z = (1.0 - radius * radius).copysign(signed);
-    let across = radius * (2.0 - radius * radius).max(0.0).sqrt();
-    Vec3::new((cosine * across).copysign(u), (sine * across).copysign(v), z)
-}
 
 /// Resamples a square map, whose `texels` are those of `side` rows. `light_from_world` turns a
 /// direction of the renderer to one of the map, up to its length.
@@ -85,21 +59,7 @@ pub fn resample(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn points_of_the_square_come_back() {
-        for index in 0..1000_u32 {
-            let uv = Vec2::new((index as f32 + 0.5) / 1000.0, (index as f32 * 0.618_034).fract());
-            let direction = direction_from_square(uv);
-            assert!((direction.length() - 1.0).abs() < 1e-5);
-            let back = square_from_direction(direction);
-            assert!((back - uv).length() < 1e-3, "{uv} {direction} {back}");
-        }
-        // The middle is +z, the corners are −z, +x is to the right and +y below.
-        assert_eq!(square_from_direction(Vec3::Z), Vec2::splat(0.5));
-        assert!(square_from_direction(Vec3::X).x > 0.9);
-        assert!(square_from_direction(Vec3::Y).y > 0.9);
-    }
+    use crate::math::equal_area::direction_from_square;
 
     /// A map that is a function of direction keeps its values and its mean.
     #[test]

@@ -1,0 +1,56 @@
+//! What readers of other formats share: the scene that they return, media and illuminants by name,
+//! mixtures of materials, equal-area maps, and the gamut of reflectances.
+
+pub mod blend;
+pub mod equal_area;
+pub mod media;
+
+use std::path::PathBuf;
+
+use glam::DVec3;
+
+use crate::{
+    EnvironmentMap, FilmSettings, Geometry, Lamp,
+    features::{Feature, Ignored},
+    file::CameraEntry,
+    material::Material,
+};
+
+/// Everything that a file of another format says.
+#[derive(Debug)]
+pub struct Imported {
+    /// Viewer, before its numbers are checked.
+    pub camera: CameraEntry,
+    /// Image plane.
+    pub film: FilmSettings,
+    /// Light from everywhere, black if the file has none; `None` for a format without.
+    pub environment: Option<EnvironmentMap>,
+    /// Lights without a surface.
+    pub lamps: Vec<Lamp>,
+    /// Materials.
+    pub materials: Vec<Material>,
+    /// All triangles.
+    pub geometry: Geometry,
+    /// Files that were read, the file itself first.
+    pub inputs: Vec<PathBuf>,
+    /// Repairs, and one warning for each kind of thing that is left out.
+    pub warnings: Vec<String>,
+}
+
+/// Largest change of a channel that is no loss of colour.
+const ROUNDING: f64 = 1e-3;
+
+/// Clips the colour of a reflectance spectrum to Rec.709, which saturated spectra lie outside, and counts
+/// that as `feature`.
+pub fn clipped(
+    color: DVec3,
+    feature: Feature,
+    ignored: &mut Ignored,
+    place: impl FnOnce() -> String,
+) -> DVec3 {
+    let clipped = color.clamp(DVec3::ZERO, DVec3::ONE);
+    if (clipped - color).abs().max_element() > ROUNDING {
+        ignored.add(feature, place);
+    }
+    clipped
+}
