@@ -260,14 +260,15 @@ fn the_page_lists_every_feature() {
         let rows: String = features.iter().map(row).collect();
         format!("| feature | support | details |\n|---|---|---|\n{rows}")
     };
-    for (name, features) in [
-        ("gltf", features::GLTF),
-        ("obj", features::OBJ),
-        ("mtl", features::MTL),
-        ("ply", features::PLY),
-        ("mitsuba", features::MITSUBA),
+    for (page, name, features) in [
+        ("formats.md", "gltf", features::GLTF),
+        ("formats.md", "obj", features::OBJ),
+        ("formats.md", "mtl", features::MTL),
+        ("formats.md", "ply", features::PLY),
+        ("formats.md", "mitsuba", features::MITSUBA),
+        ("pbrt.md", "pbrt", features::PBRT),
     ] {
-        page::check("formats.md", name, &table(features));
+        page::check(page, name, &table(features));
         for feature in features {
             let same = |other: &&Feature| other.name == feature.name;
             assert_eq!(features.iter().filter(same).count(), 1, "{}", feature.name);

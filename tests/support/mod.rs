@@ -5,7 +5,11 @@
 pub mod c_library;
 pub mod command;
 pub mod faulty_layer;
+#[path = "../../crates/scene/tests/support/folder.rs"]
+pub mod folder;
+#[path = "../../crates/scene/tests/support/fuzz.rs"]
 pub mod fuzz;
+#[path = "../../crates/scene/tests/support/gltf.rs"]
 pub mod gltf;
 pub mod guide;
 pub mod hemisphere;
@@ -16,7 +20,6 @@ pub mod random;
 pub mod rays;
 pub mod replicates;
 pub mod scenes;
-pub mod seeds;
 pub mod source;
 pub mod statistics;
 pub mod x11;

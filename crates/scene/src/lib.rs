@@ -1,18 +1,19 @@
-//! Scenes: a scene file and the files that it names → validated [`Scene`], and files of other renderers.
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
 
-pub mod camera;
+mod camera;
 pub mod coat;
 pub mod environment;
 pub mod error;
 pub mod export;
 pub mod features;
-pub mod file;
+mod file;
 pub mod files;
 pub mod geometry;
 mod hash;
 mod import;
 pub mod instance;
-pub mod instances;
+mod instances;
 pub mod lamp;
 pub mod load;
 pub mod material;
@@ -20,17 +21,17 @@ pub mod math;
 pub mod measured;
 pub mod memory;
 pub mod mesh;
-pub mod mitsuba;
-pub mod pbrt;
+mod mitsuba;
+mod pbrt;
 pub mod picture;
-pub mod portal;
-pub mod quadrics;
-pub mod shapes;
-pub mod spectrum;
+mod portal;
+mod quadrics;
+mod shapes;
+mod spectrum;
 pub mod stage;
 pub mod texture;
 pub mod transform;
-pub mod triangulate;
+mod triangulate;
 
 use std::path::PathBuf;
 

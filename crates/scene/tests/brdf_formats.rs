@@ -8,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use fenestra::scene::measured::{
+use fenestra_scene::measured::{
     CELL_COUNT, MeasuredTable, bin_directions, cell_index,
     merl::{FILE_BYTES, HEADER_BYTES, SCALES},
 };

@@ -9,9 +9,9 @@ use std::{
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage,
 };
-use fenestra::{
+use fenestra_scene::{
+    environment::{CourtParameters, EnvironmentMap, EnvironmentTables, SkyParameters},
     math::{colour::luminance, frame::direction_from_lat_long},
-    scene::environment::{CourtParameters, EnvironmentMap, EnvironmentTables, SkyParameters},
 };
 use glam::{Vec2, Vec3};
 use tempfile::TempDir;
@@ -269,8 +269,8 @@ fn a_file_with_flipped_bytes_never_panics() {
 
 #[test]
 fn the_uffizi_map_loads_where_it_is_present() {
-    let path =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes/env/uffizi_1200x600.hdr");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../../shared/scenes/env/uffizi_1200x600.hdr");
     if !path.exists() {
         return;
     }

@@ -7,7 +7,7 @@ use std::{fs, path::Path};
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Layer, LayerAttributes, WritableImage, f16,
 };
-use fenestra::film::{Attribute, Image};
+use fenestra_scene::picture::{Attribute, Image};
 
 fn example() -> Image {
     let mut image = Image::new(5, 3);

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use fenestra::scene::{
+use fenestra_scene::{
     Scene,
     material::{Material, MaterialKind},
     mesh::Mesh,
@@ -14,7 +14,7 @@ use glam::{Vec3, Vec4};
 
 /// Folder of the files; none if this machine has none.
 fn folder() -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/import");
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/import");
     let folder = std::env::var_os("FENESTRA_IMPORT").map_or(beside, PathBuf::from);
     folder.is_dir().then_some(folder)
 }

@@ -4,9 +4,9 @@
 
 use std::{fmt::Write, path::Path};
 
-use crate::support::command::Folder;
+use crate::support::folder::Folder;
 use crate::support::gltf::{base64, floats};
-use fenestra::scene::{Scene, instance::PLACED_TRIANGLES};
+use fenestra_scene::{Scene, instance::PLACED_TRIANGLES};
 use glam::Vec3;
 
 /// Edges of squares of the repeated mesh, each of two triangles.

@@ -2,16 +2,14 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support::command;
-use crate::support::command::Folder;
+use crate::support::folder;
+use crate::support::folder::Folder;
 use crate::support::gltf::{Attribute, base64, floats, gltf, gltf_of, png};
-use fenestra::{
-    scene::{
-        Scene,
-        lamp::{LampKind, SpotFalloff},
-        material::{Material, MaterialKind},
-        mesh::Mesh,
-    },
+use fenestra_scene::{
+    Scene,
+    lamp::{LampKind, SpotFalloff},
+    material::{Material, MaterialKind},
+    mesh::Mesh,
     texture::{Channels, Encoding, Interpolation, TextureUse, Wrap},
 };
 use glam::Vec3;
@@ -426,7 +424,7 @@ fn ply_coordinates_and_colours_are_read() {
         assert!((r, g, a) == (1.0, 0.0, 1.0) && (b - 0.5029).abs() < 1e-3, "{b}");
     }
     let clay = "type = \"diffuse\"\nreflectance = [1, 1, 1]";
-    let toml = |clay: &str| command::yard([8, 8], "constant = [1, 1, 1]", clay, "mesh = \"a.ply\"");
+    let toml = |clay: &str| folder::yard([8, 8], "constant = [1, 1, 1]", clay, "mesh = \"a.ply\"");
     let plain = Scene::load(&folder.write("a.toml", toml(clay))).unwrap();
     assert!(plain.geometry.colors.is_empty());
     assert!(plain.warnings.iter().any(|text| text.contains("ignored vertex colours of other")));
@@ -442,7 +440,7 @@ fn objects_of_a_scene_take_whole_materials_of_their_mesh() {
     let material = r#"{"name": "brass", "emissiveFactor": [1, 0, 0]}"#;
     folder.write("a.gltf", gltf(r#"{"mesh": 0}"#, material, r#", "material": 0"#, ""));
     let clay = "type = \"diffuse\"\nreflectance = [0, 0, 0]";
-    let toml = command::yard([8, 8], "constant = [1, 1, 1]", clay, "mesh = \"a.gltf\"");
+    let toml = folder::yard([8, 8], "constant = [1, 1, 1]", clay, "mesh = \"a.gltf\"");
     let own = toml.strip_suffix("material = \"clay\"\n").unwrap();
     let scene = Scene::load(&folder.write("b.toml", own)).unwrap();
     let found = scene.materials.last().unwrap();

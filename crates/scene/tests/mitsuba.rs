@@ -4,15 +4,13 @@
 
 use std::{f32::consts::PI, io::Write, path::Path};
 
-use crate::support::command::{BALL, Folder, yard};
-use fenestra::{
+use crate::support::folder::{BALL, Folder, yard};
+use fenestra_scene::{
+    Filter, Scene,
     export::{Export as _, Settings, mitsuba::Export},
-    scene::{
-        Filter, Scene,
-        lamp::{LampKind, SpotFalloff},
-        load::LoadOptions,
-        material::{ConductorFresnel, Material, MaterialKind},
-    },
+    lamp::{LampKind, SpotFalloff},
+    load::LoadOptions,
+    material::{ConductorFresnel, Material, MaterialKind},
     texture::{Encoding, Interpolation, Wrap},
 };
 use glam::Vec3;
@@ -746,7 +744,7 @@ fn widths_and_colours_by_place_are_read() {
         let surface = &scene.materials[0].surface;
         let (roots, widths) = (surface.roughness.as_ref().unwrap().values(), {
             let path = folder.path().join("a.png");
-            let image = fenestra::texture::Texture::load(&path).unwrap();
+            let image = fenestra_scene::texture::Texture::load(&path).unwrap();
             image.linear_texels(Encoding::Linear)
         });
         for (root, width) in roots.iter().zip(widths) {
@@ -856,7 +854,7 @@ fn environments_turn_as_in_mitsuba() {
     );
     let folder = Folder::new();
     // A map that is not of our own export, turned by a matrix and then by the other way of saying it.
-    let mut image = fenestra::film::Image::new(64, 32);
+    let mut image = fenestra_scene::picture::Image::new(64, 32);
     let texels: Vec<_> = ours.environment.texels.iter().map(|texel| texel.to_array()).collect();
     image.insert_triple(["R", "G", "B"], &texels);
     image.write_exr(&folder.path().join("sky map.exr")).unwrap();
@@ -898,7 +896,7 @@ fn environments_turn_as_in_mitsuba() {
 
 /// Folder of scenes from elsewhere, which a checkout may lack.
 fn imports() -> Option<std::path::PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/import/mitsuba");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/import/mitsuba");
     folder.is_dir().then_some(folder)
 }
 

@@ -3,19 +3,15 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support::page;
-use std::{collections::HashSet, path::Path};
+use std::path::Path;
 
-use crate::support::command::Folder;
-use fenestra::{
-    scene::{
-        Camera, Filter, Scene,
-        coat::albedo_below_coat,
-        features::{self, Feature},
-        lamp::{LampKind, SpotFalloff},
-        load::LoadOptions,
-        material::{ConductorFresnel, Material, MaterialKind},
-    },
+use crate::support::folder::Folder;
+use fenestra_scene::{
+    Camera, Filter, Scene,
+    coat::albedo_below_coat,
+    lamp::{LampKind, SpotFalloff},
+    load::LoadOptions,
+    material::{ConductorFresnel, Material, MaterialKind},
     texture::{Channels, Encoding, Interpolation, Texels, Wrap},
 };
 use glam::{Vec2, Vec3};
@@ -735,22 +731,6 @@ fn everything_left_out_is_named_once() {
     let found = warnings(&scene);
     let missing: Vec<_> = expected.iter().filter(|e| !found.iter().any(|f| f == *e)).collect();
     assert!(missing.is_empty() && found.len() == expected.len(), "{missing:#?}\n{found:#?}");
-}
-
-#[test]
-fn the_page_lists_every_feature() {
-    let row = |feature: &Feature| {
-        let Feature { name, support, details } = feature;
-        format!("| {name} | {} | {details} |\n", support.name())
-    };
-    let rows: String = features::PBRT.iter().map(row).collect();
-    page::check(
-        "pbrt.md",
-        "pbrt",
-        &format!("| feature | support | details |\n|---|---|---|\n{rows}"),
-    );
-    let names: HashSet<_> = features::PBRT.iter().map(|feature| feature.name).collect();
-    assert_eq!(names.len(), features::PBRT.len());
 }
 
 /// Folder of scenes from elsewhere, which the repository does not hold: `FENESTRA_IMPORT`.

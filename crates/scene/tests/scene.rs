@@ -7,14 +7,11 @@ use std::{
     sync::Arc,
 };
 
-use fenestra::{
-    Error,
-    scene::{
-        Scene,
-        lamp::{LampKind, SpotFalloff},
-        material::{ConductorFresnel, MaterialKind},
-        mesh::Mesh,
-    },
+use fenestra_scene::{
+    Error, Scene,
+    lamp::{LampKind, SpotFalloff},
+    material::{ConductorFresnel, MaterialKind},
+    mesh::Mesh,
     texture::{Channels, Encoding, Interpolation, Wrap},
 };
 use glam::Vec3;
@@ -85,7 +82,7 @@ fn defaults_are_those_of_the_format() {
     assert_eq!(scene.name, "room");
     assert_eq!(scene.camera.up, Vec3::Y);
     assert_eq!((scene.film.width, scene.film.height), (640, 480));
-    assert_eq!(scene.film.filter, fenestra::scene::Filter::Gaussian);
+    assert_eq!(scene.film.filter, fenestra_scene::Filter::Gaussian);
     assert_eq!(scene.geometry.triangles.len(), 12);
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
 }
@@ -1121,7 +1118,7 @@ fn bad_triangles_are_dropped_with_a_warning_that_counts_them() {
 
 #[test]
 fn the_scenes_of_the_repository_load_without_a_warning() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     for name in [
         "buddha_and_car",
         "bathroom",
@@ -1140,7 +1137,7 @@ fn the_scenes_of_the_repository_load_without_a_warning() {
 
 #[test]
 fn the_four_test_scenes_have_their_triangles() {
-    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes");
     if !scenes.is_dir() {
         return;
     }

@@ -15,16 +15,11 @@ use std::{
 
 use serde::Deserialize;
 
-pub use lamp::{
-    DirectionalEntry, LampEntry, LampKindEntry, PointEntry, SpotEntry, SpotFalloffEntry,
-};
-pub use material::{
-    ConductorEntry, DielectricEntry, DiffuseEntry, MaterialEntry, MaterialKeys, MaterialKindEntry,
-    MeasuredEntry, MirrorEntry, PlasticEntry, PrincipledEntry, ThinDielectricEntry,
-};
-pub use portal::{PortalEntry, PortalKeys};
+pub use lamp::{LampEntry, LampKindEntry, SpotFalloffEntry};
+pub use material::{ConductorEntry, MaterialEntry, MaterialKeys, MaterialKindEntry};
+pub use portal::PortalEntry;
 pub use value::{
-    ChannelEntry, InterpolationEntry, NumberOr, NumberOrVector, TextureEntry, Textured, WrapEntry,
+    ChannelEntry, InterpolationEntry, NumberOrVector, TextureEntry, Textured, WrapEntry,
 };
 
 use super::{

@@ -39,10 +39,10 @@ mod tube;
 
 use std::{fmt::Debug, ops::RangeInclusive};
 
-pub use blobs::{Blob, Blobs};
+pub use blobs::Blobs;
 pub use extrude::Extrude;
 use glam::{DVec2, DVec3};
-pub use grid::{Grid, Wave};
+pub use grid::Grid;
 pub use revolve::{Cone, Cylinder, Lathe, Sphere, Torus};
 pub use rounded_box::RoundedBox;
 pub use tube::Tube;

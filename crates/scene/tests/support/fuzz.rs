@@ -19,7 +19,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use fenestra::memory;
+use fenestra_scene::memory;
 
 /// Longest time that one input may take.
 const TIME_LIMIT: Duration = Duration::from_secs(60);
@@ -124,6 +124,17 @@ impl Random {
 }
 
 impl Target {
+    /// A parser of files of their own, without mending.
+    pub fn new(
+        name: &'static str,
+        file: &'static str,
+        seeds: Vec<Vec<u8>>,
+        parse: fn(&Path, &[u8]) -> bool,
+    ) -> Self {
+        let mend = |_: &mut Vec<u8>| ();
+        Self { name, file, beside: Vec::new(), seeds, is_file: true, mend, parse }
+    }
+
     /// Makes the input of a case; the same case gives the same bytes.
     pub fn input(&self, seed: u64, case: u64) -> Vec<u8> {
         let mut random = Random::new(self.name, seed, case);
@@ -268,7 +279,7 @@ fn overwrite(bytes: &mut [u8], random: &mut Random) {
 }
 
 /// Reads a number from the environment.
-pub fn setting(name: &str, otherwise: u64) -> u64 {
+fn setting(name: &str, otherwise: u64) -> u64 {
     env::var(name).map_or(otherwise, |text| text.parse().expect("a whole number"))
 }
 
@@ -277,7 +288,7 @@ fn kept(target: &str, seed: u64, case: u64) -> PathBuf {
 }
 
 /// Tries inputs until the time is over, as a process of its own: see [`run`].
-pub fn work(target: &'static Target) {
+fn work(target: &'static Target) {
     let [seed, first] = [setting("FENESTRA_FUZZ_SEED", 1), setting("FENESTRA_FUZZ_FIRST", 0)];
     let until = Instant::now() + Duration::from_secs_f64(seconds());
     memory::set_limit(ALLOWED_BYTES);
@@ -342,20 +353,20 @@ fn seconds() -> f64 {
 
 /// Numbers of one target.
 #[derive(Default)]
-pub struct Outcome {
+struct Outcome {
     /// Inputs tried.
-    pub executions: u64,
+    executions: u64,
     /// Inputs that the parser accepted.
-    pub accepted: u64,
+    accepted: u64,
     /// Longest time of one input, ms.
-    pub slowest_ms: u64,
+    slowest_ms: u64,
     /// Failures, each with its case and the file that keeps its input.
-    pub failures: Vec<String>,
+    failures: Vec<String>,
 }
 
 /// Tries inputs of a target in a worker process with limited memory, and in another after each
 /// crash.
-pub fn run(target: &Target) -> Outcome {
+fn run(target: &Target) -> Outcome {
     let seed = setting("FENESTRA_FUZZ_SEED", 1);
     let mut first = setting("FENESTRA_FUZZ_FIRST", 0);
     let mut outcome = Outcome::default();
@@ -403,4 +414,57 @@ pub fn run(target: &Target) -> Outcome {
 fn folder() -> tempfile::TempDir {
     let memory = Path::new("/dev/shm");
     if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() }.unwrap()
+}
+
+/// Does the work of one target in a process that [`check`] starts, by the test `fuzz::worker`.
+pub fn work_if_asked(targets: Vec<Target>) {
+    let Ok(name) = env::var("FENESTRA_FUZZ_WORKER") else { return };
+    let target = targets.into_iter().find(|target| target.name == name).unwrap();
+    work(Box::leak(Box::new(target)));
+}
+
+/// Fails unless every seed is accepted.
+pub fn check_seeds(targets: Vec<Target>) {
+    let folder = tempfile::tempdir().unwrap();
+    for target in targets {
+        let folder = folder.path().join(target.name);
+        fs::create_dir(&folder).unwrap();
+        for (name, bytes) in &target.beside {
+            fs::write(folder.join(name), bytes).unwrap();
+        }
+        for seed in &target.seeds {
+            let mut bytes = seed.clone();
+            (target.mend)(&mut bytes);
+            let path = folder.join(target.file);
+            fs::write(&path, &bytes).unwrap();
+            // A MERL file is too large to be a seed: its head is.
+            let is_sound = (target.parse)(&path, &bytes);
+            assert!(is_sound || target.name == "merl", "{}", target.name);
+        }
+    }
+}
+
+/// Fails if a mutated file crashes, hangs or exhausts memory.
+pub fn check(targets: Vec<Target>) {
+    let wanted = env::var("FENESTRA_FUZZ_TARGET").ok();
+    let mut failures = String::new();
+    println!("{:<12}{:>12}{:>12}{:>12}", "target", "executions", "accepted", "longest ms");
+    for target in targets {
+        if wanted.as_ref().is_some_and(|name| name != target.name) {
+            continue;
+        }
+        let outcome = run(&target);
+        println!(
+            "{:<12}{:>12}{:>12}{:>12}",
+            target.name, outcome.executions, outcome.accepted, outcome.slowest_ms
+        );
+        for failure in outcome.failures {
+            failures += &format!("{}: {failure}\n", target.name);
+        }
+    }
+    assert!(
+        failures.is_empty(),
+        "the inputs lie in {} by target, seed and case:\n{failures}",
+        env!("CARGO_TARGET_TMPDIR")
+    );
 }

@@ -4,14 +4,8 @@
 
 use std::{fs, io::Cursor, path::Path};
 
-use fenestra::{
-    film::{Checkpoint, Image, Metadata, SampleRange, Sums},
-    fit::{EnvironmentOptions, Fit, Method, environment_lobes, write_fit},
-    sampler::guided::{ARRIVAL_DIRECTIONS, GuideState, Origin, SHARE_WORDS},
-    scene::EnvironmentMap,
-};
+use fenestra_scene::picture::Image;
 use flate2::{Compression, write::ZlibEncoder};
-use glam::Vec3;
 use image::{DynamicImage, ImageFormat, RgbImage, RgbaImage};
 
 /// A scene with a mesh, maps and a part of everything that scene files may say.
@@ -250,31 +244,6 @@ pub fn pack_serialized(content: &mut Vec<u8>) {
 pub const CORNELL: &str = "# paint\n3 # wavelengths\n450 550\n650\n0.3 0 0.2 -2 0.1 0.1 0.2\n\
     0.8 0 0.7 1 0.1 0.3 0.1\n1.3 0 1.2 3.1 0.1 0.1 0.1\n0.3 0 0.7 0 0.2 0.1 0.1\n";
 
-pub const STUDY: &str = r#"study = "What learning costs"
-notes = ["one", "two"]
-scenes = ["../courtyard.toml", "roofless.toml"]
-[settings]
-samplers = ["product", "visibility", "guided:later-rays=2"]
-spp = [4, 16]
-time = "30s"
-seeds = 3
-reference_sampler = "mis"
-reference_spp = 64
-overhead = true
-overhead_baseline = "product"
-overhead_spp = 16
-overhead_repetitions = 15
-size = "96x72"
-shadow_rays = 5
-depth = 1
-[quick]
-size = "80x60"
-[[published.overheads]]
-label = "thesis"
-low = 1.02
-high = 1.02
-"#;
-
 /// A PFM map of 4×2 texels.
 pub fn pfm() -> Vec<u8> {
     let mut bytes = b"PF\n4 2\n-1.0\n".to_vec();
@@ -326,60 +295,4 @@ pub fn exr(is_compressed: bool) -> Vec<u8> {
         if is_compressed { image.write_exr(path) } else { image.write_exr_uncompressed(path) }
             .unwrap();
     })
-}
-
-/// A checkpoint of 4×2 pixels.
-pub fn checkpoint() -> Vec<u8> {
-    let mut sums = Sums::new([0, 0], 4, 2, [4, 2]);
-    sums.sum.as_flattened_mut().fill(3.0);
-    sums.squares = sums.sum.clone();
-    sums.visible = vec![[3, 5]; 8];
-    sums.sample_count = 6;
-    let metadata = Metadata {
-        version: "0.1.0".to_owned(),
-        sampler: "mis".to_owned(),
-        shadow_rays: 5,
-        depth: 1,
-        sample_ranges: vec![SampleRange { seed: 1, first: 2, count: 6 }],
-        seconds: 1.5,
-        ..Metadata::default()
-    };
-    written("a.exr", |path| Checkpoint { sums, metadata }.write(path).unwrap())
-}
-
-/// A guide of three cells and two regions.
-pub fn guide() -> Vec<u8> {
-    let origin = Origin { regions: 2, largest_edge: 0.3, ..Origin::default() };
-    let state = GuideState {
-        origin,
-        samples: 5,
-        rebuilt_at: 4,
-        candidates: Some(8),
-        share_tiles: Some(1),
-        tag: 5,
-        rectangles: vec![[0, 0, 5, 9, 0], [5, 0, 3, 9, 1]],
-        keys: vec![u32::MAX, 7, 8],
-        refined: vec![1],
-        counts: vec![[3, 1, 7]; 6],
-        shares: vec![1; 3 * SHARE_WORDS],
-        pending: vec![[4, 4, 5]],
-        missing: vec![9],
-        arrivals: vec![[1; 2]; ARRIVAL_DIRECTIONS],
-        ..GuideState::default()
-    };
-    state.to_bytes().unwrap()
-}
-
-/// A fit of a map by three lobes.
-pub fn fit() -> Vec<u8> {
-    let texels = (0..512).map(|index| Vec3::splat(0.5 + (index % 37) as f32)).collect();
-    let map = EnvironmentMap {
-        width: 32,
-        height: 16,
-        texels,
-        ..EnvironmentMap::constant(Vec3::ONE, 1.0).unwrap()
-    };
-    let options = EnvironmentOptions { lobes: 3, method: Method::Em };
-    let fit = environment_lobes(&map, options, None, &mut |_| ()).unwrap();
-    written("a.fit", |path| write_fit(path, &Fit::Environment(fit)).unwrap())
 }

@@ -1,0 +1,15 @@
+//! The integration tests of scenes, one program: a module a subject.
+
+mod support;
+
+mod brdf_formats;
+mod environment_files;
+mod exr;
+mod fuzz;
+mod import;
+mod instances_in_files;
+mod mesh_materials;
+mod mitsuba;
+mod pbrt;
+mod scene;
+mod spectra;
