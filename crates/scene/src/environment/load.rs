@@ -2,10 +2,6 @@
 
 use std::{io::Cursor, path::Path};
 
-use exr::{
-    math::Vec2,
-    prelude::{ReadChannels, ReadLayers, ReadSpecificChannel},
-};
 use glam::Vec3;
 use image::{ImageDecoder, codecs::hdr::HdrDecoder};
 use rayon::prelude::*;
@@ -14,6 +10,7 @@ use super::{EnvironmentMap, MAX_RADIANCE};
 use crate::{
     error::{Error, Result},
     files, memory,
+    texture::exr,
 };
 
 /// Most texels of a map: 16384×8192.
@@ -156,79 +153,15 @@ fn read_hdr(bytes: &[u8]) -> Result<Image, String> {
     Ok(Image { width, height, texels: bytemuck::cast_vec(components) })
 }
 
-/// Reads the first layer with the channels R, G, B, else the first with Y.
 fn read_exr(bytes: &[u8]) -> Result<Image, String> {
-    let message = |error: exr::error::Error| format!("not a readable OpenEXR file: {error}");
-    let meta =
-        exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(message)?;
-    let has = |name: &str| {
-        let flat = meta.headers.iter().filter(|header| !header.deep);
-        flat.flat_map(|header| &header.channels.list).any(|channel| channel.name.eq(name))
-    };
-    let names = if has("R") && has("G") && has("B") {
-        ["R", "G", "B"]
-    } else if has("Y") {
-        ["Y"; 3]
-    } else {
-        let channels = meta.headers.iter().flat_map(|header| &header.channels.list);
-        let found: Vec<String> = channels.map(|channel| channel.name.to_string()).collect();
-        return Err(format!("expected the channels R, G, B or Y, found {}", found.join(", ")));
-    };
-    for header in &meta.headers {
-        let size = [header.layer_size.width() as u64, header.layer_size.height() as u64];
+    let check = |size: [u64; 2], pixel_bytes: u64| {
         check_size(size[0], size[1])?;
-        let pixel_bytes = header.channels.bytes_per_pixel as u64;
         files::check_promise(size, pixel_bytes, bytes.len() as u64, files::EXR_LARGEST_RATIO)
-            .map_err(|message| format!("not a readable OpenEXR file: {message}"))?;
-        for channel in &header.channels.list {
-            if names.iter().any(|name| channel.name.eq(name)) && channel.sampling != Vec2(1, 1) {
-                return Err(format!("channel {} is subsampled, which is not read", channel.name));
-            }
-        }
-    }
-    // Let the system zero pages on first use: a damaged header may claim more than the file holds.
-    let size = |size: Vec2<usize>| (size.width(), bytemuck::zeroed_vec::<Vec3>(size.area()));
-    let channels = exr::prelude::read().no_deep_data().largest_resolution_level();
-    let read = Cursor::new(bytes);
-    let (width, texels) = if names[0] == "Y" {
-        channels
-            .specific_channels()
-            .required("Y")
-            .collect_pixels(
-                move |resolution, _| size(resolution),
-                |(width, texels): &mut (usize, Vec<Vec3>), at, (grey,): (f32,)| {
-                    texels[at.y() * *width + at.x()] = Vec3::splat(grey);
-                },
-            )
-            .first_valid_layer()
-            .all_attributes()
-            .from_buffered(read)
-            .map_err(message)?
-            .layer_data
-            .channel_data
-            .pixels
-    } else {
-        channels
-            .specific_channels()
-            .required("R")
-            .required("G")
-            .required("B")
-            .collect_pixels(
-                move |resolution, _| size(resolution),
-                |(width, texels): &mut (usize, Vec<Vec3>), at, rgb: (f32, f32, f32)| {
-                    texels[at.y() * *width + at.x()] = rgb.into();
-                },
-            )
-            .first_valid_layer()
-            .all_attributes()
-            .from_buffered(read)
-            .map_err(message)?
-            .layer_data
-            .channel_data
-            .pixels
+            .map_err(|message| format!("not a readable OpenEXR file: {message}"))
     };
-    let height = texels.len() / width;
-    Ok(Image { width: width as u32, height: height as u32, texels })
+    let texel = |(): &mut (), [r, g, b, _]: [f32; 4]| Vec3::new(r, g, b);
+    let ([width, height], texels, ()) = exr::decode(bytes, check, texel)?;
+    Ok(Image { width, height, texels })
 }
 
 /// Reads a portable float map: `PF` or `Pf`, width, height, scale (negative for little-endian),

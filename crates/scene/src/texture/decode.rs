@@ -79,7 +79,15 @@ fn decode(
 ) -> Result<Texture, String> {
     let guessed = image::guess_format(bytes).ok().or(format);
     let ratio = match guessed {
-        Some(ImageFormat::OpenExr) => return exr::decode(name, bytes, warnings),
+        Some(ImageFormat::OpenExr) => {
+            let check = |size: [u64; 2], texel_bytes: u64| {
+                check_size(size, texel_bytes, bytes.len(), files::EXR_LARGEST_RATIO)
+            };
+            let ([width, height], texels, repairs) = exr::decode(bytes, check, Repairs::texel)?;
+            repairs.warn(name, warnings);
+            let texels = Texels::Halves(texels);
+            return Ok(Texture { name: name.to_owned(), width, height, texels });
+        }
         // Deflate, times the growth of one bit of a palette to four bytes.
         Some(ImageFormat::Png) => 1032 * 32,
         // One bit for a block of 64 texels.

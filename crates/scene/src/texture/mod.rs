@@ -3,7 +3,7 @@
 mod cache;
 mod check;
 mod decode;
-mod exr;
+pub(crate) mod exr;
 mod linear;
 pub mod lookup;
 
