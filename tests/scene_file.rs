@@ -29,6 +29,8 @@ fn sources() -> String {
         "file/portal.rs",
         "file/value.rs",
         "lib.rs",
+        "lamp.rs",
+        "texture/mod.rs",
         "environment/court.rs",
         "environment/sky.rs",
         "shapes/mod.rs",

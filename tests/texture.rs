@@ -205,13 +205,13 @@ fn a_ramp_is_interpolated_and_continued() {
     let (first, last) = (1.0 / 16.0, 15.0 / 16.0);
     for step in 0..100 {
         let u = first + (last - first) * step as f32 / 99.0;
-        for wrap in [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::ClampToEdge] {
+        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
             used.wrap = [wrap; 2];
             close(&used, u, u);
-            close(&used, u + 6.0, if wrap == Wrap::ClampToEdge { last } else { u });
-            close(&used, u - 4.0, if wrap == Wrap::ClampToEdge { first } else { u });
+            close(&used, u + 6.0, if wrap == Wrap::Clamp { last } else { u });
+            close(&used, u - 4.0, if wrap == Wrap::Clamp { first } else { u });
         }
-        used.wrap = [Wrap::MirroredRepeat; 2];
+        used.wrap = [Wrap::Mirror; 2];
         close(&used, -u, u);
         close(&used, 2.0 - u, u);
         close(&used, u - 3.0, 1.0 - u);
@@ -219,7 +219,7 @@ fn a_ramp_is_interpolated_and_continued() {
     used.wrap = [Wrap::Repeat; 2];
     close(&used, 0.0, 0.5 * (first + last));
     close(&used, -7.0, 0.5 * (first + last));
-    used.wrap = [Wrap::MirroredRepeat; 2];
+    used.wrap = [Wrap::Mirror; 2];
     close(&used, 1.0, last);
     close(&used, f32::INFINITY, first);
     close(&used, f32::NAN, first);
@@ -356,7 +356,7 @@ fn images(numbers: &mut Numbers) -> Vec<Arc<Texture>> {
 /// Every combination of what a use can say, with random placement.
 fn uses(images: &[Arc<Texture>], numbers: &mut Numbers) -> Vec<TextureUse> {
     let mut uses = Vec::new();
-    let wraps = [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::ClampToEdge];
+    let wraps = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
     let channels =
         [Channels::Color, Channels::Red, Channels::Green, Channels::Blue, Channels::Alpha];
     for image in images {

@@ -14,7 +14,7 @@ use crate::{
     film::{Attribute, Checkpoint, Image, summary::ChannelSummary},
     fit,
     fit::report::Description,
-    scene::{EnvironmentMap, Scene, material::MaterialKind, measured::MeasuredTable},
+    scene::{EnvironmentMap, Scene, measured::MeasuredTable},
 };
 
 /// Arguments of `info`.
@@ -98,16 +98,6 @@ fn installation() -> Description {
 
 fn scene(path: &Path) -> Result<Description> {
     let scene = Scene::load(path)?;
-    let kind = |kind: &MaterialKind| match kind {
-        MaterialKind::Diffuse { .. } => "diffuse",
-        MaterialKind::Plastic { .. } => "plastic",
-        MaterialKind::Conductor { .. } => "conductor",
-        MaterialKind::Principled { .. } => "principled",
-        MaterialKind::Mirror { .. } => "mirror",
-        MaterialKind::Dielectric { .. } => "dielectric",
-        MaterialKind::ThinDielectric { .. } => "thin_dielectric",
-        MaterialKind::Measured { .. } => "measured",
-    };
     let mut triangle_counts = vec![0_u64; scene.materials.len()];
     for material in scene.geometry.materials_in_use() {
         if let Some(count) = triangle_counts.get_mut(material as usize) {
@@ -124,7 +114,7 @@ fn scene(path: &Path) -> Result<Description> {
     ];
     let mut materials = Vec::new();
     for (material, count) in scene.materials.iter().zip(&triangle_counts) {
-        let kind = kind(&material.kind);
+        let (kind, ..) = material.kind.parameters();
         lines.push(format!("material     {} ({kind}, {count} triangles)", material.name));
         materials.push(json!({ "name": material.name, "type": kind, "triangles": count }));
     }

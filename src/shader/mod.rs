@@ -33,7 +33,7 @@ const _: () = {
     let (ours, theirs) = (constants::LUMINANCE_WEIGHTS, colour::LUMINANCE_WEIGHTS);
     assert!(ours[0] == theirs[0] && ours[1] == theirs[1] && ours[2] == theirs[2]);
     assert!(constants::TEXTURE_REPEAT == Wrap::Repeat as u32);
-    assert!(constants::TEXTURE_MIRROR == Wrap::MirroredRepeat as u32);
-    assert!(constants::TEXTURE_CLAMP == Wrap::ClampToEdge as u32);
+    assert!(constants::TEXTURE_MIRROR == Wrap::Mirror as u32);
+    assert!(constants::TEXTURE_CLAMP == Wrap::Clamp as u32);
     assert!(Channels::Color as u32 == 0 && Channels::Alpha as u32 == 4);
 };

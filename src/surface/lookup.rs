@@ -46,8 +46,8 @@ fn texture_texel(words: &[u32], used: &TextureUse, [x, y]: [u32; 2]) -> Vec4 {
 pub(crate) fn texture_lookup(words: &[u32], used: &TextureUse, image: Vec2) -> Vec4 {
     let wrap = |shift: u32| match (used.flags >> shift) & 3 {
         TEXTURE_REPEAT => Wrap::Repeat,
-        TEXTURE_MIRROR => Wrap::MirroredRepeat,
-        _ => Wrap::ClampToEdge,
+        TEXTURE_MIRROR => Wrap::Mirror,
+        _ => Wrap::Clamp,
     };
     let is_nearest = used.flags & TEXTURE_NEAREST != 0;
     let grid = Grid {

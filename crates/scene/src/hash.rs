@@ -9,7 +9,7 @@ use crate::{
     files::hexadecimal,
     instance::Instance,
     lamp::LampKind,
-    material::{ConductorFresnel, MaterialKind, Surface},
+    material::{MaterialKind, Surface},
     texture::{Texels, TextureUse},
 };
 
@@ -147,59 +147,11 @@ impl Hasher {
     }
 
     fn material(&mut self, kind: &MaterialKind) {
-        match kind {
-            MaterialKind::Diffuse { reflectance } => {
-                self.integers(&[0]);
-                self.vectors(&[*reflectance]);
-            }
-            MaterialKind::Plastic { diffuse, alpha, ior } => {
-                self.integers(&[1]);
-                self.vectors(&[*diffuse]);
-                self.floats(&[*alpha, *ior]);
-            }
-            MaterialKind::Conductor {
-                alpha,
-                fresnel: ConductorFresnel::Schlick { reflectance },
-            } => {
-                self.integers(&[2]);
-                self.floats(&[*alpha]);
-                self.vectors(&[*reflectance]);
-            }
-            MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } => {
-                self.integers(&[3]);
-                self.floats(&[*alpha]);
-                self.vectors(&[*eta, *k]);
-            }
-            MaterialKind::Principled {
-                base_color,
-                metallic,
-                roughness,
-                ior,
-                specular,
-                specular_color,
-            } => {
-                self.integers(&[5]);
-                self.vectors(&[*base_color, *specular_color]);
-                self.floats(&[*metallic, *roughness, *ior, *specular]);
-            }
-            MaterialKind::Mirror { reflectance } => {
-                self.integers(&[6]);
-                self.vectors(&[*reflectance]);
-            }
-            MaterialKind::Dielectric { ior, alpha, reflectance, transmittance } => {
-                self.integers(&[7]);
-                self.floats(&[*ior, *alpha]);
-                self.vectors(&[*reflectance, *transmittance]);
-            }
-            MaterialKind::ThinDielectric { ior, reflectance, transmittance } => {
-                self.integers(&[8]);
-                self.floats(&[*ior]);
-                self.vectors(&[*reflectance, *transmittance]);
-            }
-            MaterialKind::Measured { table, .. } => {
-                self.integers(&[4]);
-                self.integers(table.words());
-            }
+        let (_, number, groups) = kind.parameters();
+        self.integers(&[number]);
+        groups.iter().for_each(|group| self.floats(group));
+        if let MaterialKind::Measured { table, .. } = kind {
+            self.integers(table.words());
         }
     }
 

@@ -1,6 +1,7 @@
 //! Lights without a surface.
 
 use glam::Vec3;
+use serde::Deserialize;
 
 /// Light without a surface, which no ray can meet. Lamps with a surface are materials with an
 /// [`Emission`](crate::material::Emission).
@@ -47,9 +48,11 @@ pub enum LampKind {
 }
 
 /// Course of a spot's light between its two angles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum SpotFalloff {
     /// t², t linear in the cosine: `KHR_lights_punctual`.
+    #[default]
     SquaredCosine,
     /// 3t² − 2t³, t linear in the cosine: pbrt-v4.
     SmoothCosine,

@@ -155,13 +155,46 @@ pub enum ConductorFresnel {
 }
 
 impl MaterialKind {
+    /// Name in scene files, number in hashes, and the parameters in groups; the table of a measured one is
+    /// not among them.
+    pub fn parameters(&self) -> (&'static str, u32, Vec<Vec<f32>>) {
+        let colors = |colors: &[&Vec3]| colors.iter().flat_map(|color| color.to_array()).collect();
+        match self {
+            Self::Diffuse { reflectance } => ("diffuse", 0, vec![colors(&[reflectance])]),
+            Self::Plastic { diffuse, alpha, ior } => {
+                ("plastic", 1, vec![colors(&[diffuse]), vec![*alpha, *ior]])
+            }
+            Self::Conductor { alpha, fresnel } => {
+                let (number, colors) = match fresnel {
+                    ConductorFresnel::Schlick { reflectance } => (2, colors(&[reflectance])),
+                    ConductorFresnel::Exact { eta, k } => (3, colors(&[eta, k])),
+                };
+                ("conductor", number, vec![vec![*alpha], colors])
+            }
+            Self::Measured { .. } => ("measured", 4, Vec::new()),
+            Self::Principled { base_color, metallic, roughness, ior, specular, specular_color } => {
+                let numbers = vec![*metallic, *roughness, *ior, *specular];
+                ("principled", 5, vec![colors(&[base_color, specular_color]), numbers])
+            }
+            Self::Mirror { reflectance } => ("mirror", 6, vec![colors(&[reflectance])]),
+            Self::Dielectric { ior, alpha, reflectance, transmittance } => {
+                let factors = colors(&[reflectance, transmittance]);
+                ("dielectric", 7, vec![vec![*ior, *alpha], factors])
+            }
+            Self::ThinDielectric { ior, reflectance, transmittance } => {
+                let factors = colors(&[reflectance, transmittance]);
+                ("thin_dielectric", 8, vec![vec![*ior], factors])
+            }
+        }
+    }
+
     /// True for dielectrics and thin panes, which let light through.
     pub fn is_glass(&self) -> bool {
         matches!(self, Self::Dielectric { .. } | Self::ThinDielectric { .. })
     }
 
     /// True if no light is sampled at the material, since all of what it sends on comes from one
-    /// direction or from behind: paths follow it (see [`specular`](super::specular)).
+    /// direction or from behind: paths follow it.
     pub fn is_specular(&self) -> bool {
         match self {
             Self::Mirror { .. } | Self::Dielectric { .. } | Self::ThinDielectric { .. } => true,

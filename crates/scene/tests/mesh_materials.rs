@@ -68,7 +68,7 @@ fn metallic_roughness_materials_come_with_all_their_textures() {
     let surface = found.surface;
     let color = surface.color.unwrap();
     assert_eq!((color.channels, color.encoding), (Channels::Color, Encoding::Srgb));
-    assert_eq!(color.wrap, [Wrap::ClampToEdge, Wrap::MirroredRepeat]);
+    assert_eq!(color.wrap, [Wrap::Clamp, Wrap::Mirror]);
     assert_eq!((color.interpolation, color.uv_set), (Interpolation::Nearest, 0));
     assert_eq!((color.texture.width, color.texture.height), (2, 1));
     let of =
@@ -335,7 +335,7 @@ fn mtl_materials_become_surfaces() {
     let MaterialKind::Diffuse { reflectance: Vec3::ONE } = found.kind else { panic!("{found:?}") };
     let color = found.surface.color.unwrap();
     assert_eq!(color.image_from_uv, [[2.0, 0.0, 0.5], [0.0, -3.0, 0.75]]);
-    assert_eq!((color.wrap, color.encoding), ([Wrap::ClampToEdge; 2], Encoding::Srgb));
+    assert_eq!((color.wrap, color.encoding), ([Wrap::Clamp; 2], Encoding::Srgb));
     let opacity = found.surface.opacity;
     let texture = opacity.texture.unwrap();
     assert_eq!((opacity.factor, opacity.cutoff, texture.channels), (0.5, None, Channels::Alpha));

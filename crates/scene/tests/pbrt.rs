@@ -365,7 +365,7 @@ fn images_are_scaled_inverted_mixed_and_placed() {
         "string wrap" "clamp" "string filter" "point" "float scale" 0.5 "bool invert" true"#,
     );
     assert_eq!(plain.image_from_uv, [[2.0, 0.0, 0.25], [0.0, -3.0, 0.5]]);
-    assert_eq!(plain.wrap, [Wrap::ClampToEdge; 2]);
+    assert_eq!(plain.wrap, [Wrap::Clamp; 2]);
     assert_eq!(plain.interpolation, Interpolation::Nearest);
     assert_eq!((plain.scale, plain.bias), ([-0.5; 3], [1.0; 3]));
     assert_eq!((plain.encoding, plain.channels), (Encoding::Srgb, Channels::Color));

@@ -440,7 +440,7 @@ fn materials_take_textures_opacity_and_emission() {
     let metallic = surface.metallic.as_ref().unwrap();
     assert_eq!((metallic.encoding, metallic.channels), (Encoding::Linear, Channels::Blue));
     assert!(Arc::ptr_eq(&metallic.texture, &color.texture), "one file is one texture");
-    assert_eq!(surface.roughness.as_ref().unwrap().wrap, [Wrap::MirroredRepeat; 2]);
+    assert_eq!(surface.roughness.as_ref().unwrap().wrap, [Wrap::Mirror; 2]);
     let normal = surface.normal.as_ref().unwrap();
     assert_eq!((normal.encoding, normal.interpolation), (Encoding::Linear, Interpolation::Nearest));
     assert_eq!(surface.normal_scale, 2.0);

@@ -2,6 +2,8 @@
 
 use serde::Deserialize;
 
+use crate::lamp::SpotFalloff;
+
 /// One `[[lamp]]`.
 #[derive(Clone, Debug)]
 pub struct LampEntry {
@@ -52,24 +54,11 @@ pub struct SpotEntry {
     pub outer_angle_deg: f32,
     /// Course of the light between these angles.
     #[serde(default)]
-    pub falloff: SpotFalloffEntry,
+    pub falloff: SpotFalloff,
 }
 
 fn default_outer_angle_deg() -> f32 {
     45.0
-}
-
-/// `falloff` of a spot.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SpotFalloffEntry {
-    /// As in glTF.
-    #[default]
-    SquaredCosine,
-    /// As in pbrt.
-    SmoothCosine,
-    /// As in Mitsuba.
-    LinearAngle,
 }
 
 /// Keys of a `directional` lamp.

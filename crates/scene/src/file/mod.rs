@@ -15,12 +15,10 @@ use std::{
 
 use serde::Deserialize;
 
-pub use lamp::{LampEntry, LampKindEntry, SpotFalloffEntry};
+pub use lamp::{LampEntry, LampKindEntry};
 pub use material::{ConductorEntry, MaterialEntry, MaterialKeys, MaterialKindEntry};
 pub use portal::PortalEntry;
-pub use value::{
-    ChannelEntry, InterpolationEntry, NumberOrVector, TextureEntry, Textured, WrapEntry,
-};
+pub use value::{ChannelEntry, NumberOrVector, TextureEntry, Textured};
 
 use super::{
     FilmSettings,

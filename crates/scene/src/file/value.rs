@@ -8,6 +8,8 @@ use serde::{
     de::{self, MapAccess, SeqAccess, Unexpected, Visitor, value},
 };
 
+use crate::texture::{Interpolation, Wrap};
+
 /// One number for all axes, or one per axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NumberOr<const N: usize>(pub [f32; N]);
@@ -73,10 +75,10 @@ pub struct TextureEntry {
     pub rotate_deg: f32,
     /// Continuation beyond the edges of the image.
     #[serde(default)]
-    pub wrap: WrapEntry,
+    pub wrap: Wrap,
     /// Values between the centres of texels.
     #[serde(default)]
-    pub interpolation: InterpolationEntry,
+    pub interpolation: Interpolation,
     /// Channel that is read; all three colours without, and their luminance for a number.
     pub channel: Option<ChannelEntry>,
     /// True for values as they are stored, false for colours in sRGB. Default: false for colours,
@@ -86,30 +88,6 @@ pub struct TextureEntry {
     pub factor: Option<NumberOrVector>,
     /// Factor of the slopes of a normal map; in `normal` only, which has no `factor`. Default: 1.
     pub strength: Option<f32>,
-}
-
-/// `wrap` of a texture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum WrapEntry {
-    /// Repeats the image.
-    #[default]
-    Repeat,
-    /// Repeats the image, every second time mirrored.
-    Mirror,
-    /// Repeats the texels of the edge.
-    Clamp,
-}
-
-/// `interpolation` of a texture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum InterpolationEntry {
-    /// Bilinear.
-    #[default]
-    Bilinear,
-    /// Value of the nearest texel.
-    Nearest,
 }
 
 /// `channel` of a texture.

@@ -8,8 +8,8 @@ use super::{LoadOptions, Loader};
 use crate::{
     EnvironmentMap, Lamp, Portal,
     error::Result,
-    file::{EnvironmentEntry, LampEntry, LampKindEntry, SceneFile, SpotFalloffEntry},
-    lamp::{LampKind, SpotFalloff},
+    file::{EnvironmentEntry, LampEntry, LampKindEntry, SceneFile},
+    lamp::LampKind,
     material::Material,
 };
 
@@ -150,11 +150,7 @@ impl Loader<'_> {
                     intensity: power("intensity", entry.intensity)?,
                     inner_angle_rad: inner.to_radians(),
                     outer_angle_rad: outer.to_radians(),
-                    falloff: match entry.falloff {
-                        SpotFalloffEntry::SquaredCosine => SpotFalloff::SquaredCosine,
-                        SpotFalloffEntry::SmoothCosine => SpotFalloff::SmoothCosine,
-                        SpotFalloffEntry::LinearAngle => SpotFalloff::LinearAngle,
-                    },
+                    falloff: entry.falloff,
                 }
             }
             LampKindEntry::Directional(entry) => LampKind::Directional {

@@ -12,12 +12,12 @@ use super::{Loader, MIN_ALPHA};
 use crate::{
     error::Result,
     file::{
-        ChannelEntry, ConductorEntry, InterpolationEntry, MaterialEntry, MaterialKeys,
-        MaterialKindEntry, TextureEntry, Textured, WrapEntry,
+        ChannelEntry, ConductorEntry, MaterialEntry, MaterialKeys, MaterialKindEntry, TextureEntry,
+        Textured,
     },
     material::{ConductorFresnel, Emission, Material, MaterialKind, Opacity, Surface},
     measured::MeasuredTable,
-    texture::{Channels, Encoding, Interpolation, TextureCache, TextureUse, Wrap},
+    texture::{Channels, Encoding, TextureCache, TextureUse},
     transform::sine_cosine_deg,
 };
 
@@ -337,11 +337,6 @@ impl Loader<'_> {
         self.check_range(&format!("{label}: {key}.rotate_deg"), &[entry.rotate_deg], finite)?;
         let path = self.folder.join(&entry.texture);
         let texture = loaded.textures.load(&path, &mut loaded.warnings)?;
-        let wrap = match entry.wrap {
-            WrapEntry::Repeat => Wrap::Repeat,
-            WrapEntry::Mirror => Wrap::MirroredRepeat,
-            WrapEntry::Clamp => Wrap::ClampToEdge,
-        };
         Ok(TextureUse {
             channels: match entry.channel {
                 None => Channels::Color,
@@ -356,11 +351,8 @@ impl Loader<'_> {
                 Some(false) => Encoding::Srgb,
             },
             image_from_uv: image_from_uv(entry),
-            wrap: [wrap; 2],
-            interpolation: match entry.interpolation {
-                InterpolationEntry::Bilinear => Interpolation::Bilinear,
-                InterpolationEntry::Nearest => Interpolation::Nearest,
-            },
+            wrap: [entry.wrap; 2],
+            interpolation: entry.interpolation,
             ..TextureUse::new(texture)
         })
     }

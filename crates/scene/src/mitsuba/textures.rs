@@ -141,8 +141,8 @@ impl Reader<'_> {
         let wrap = |name: &str| {
             Ok(match parameters.string(name)? {
                 None | Some("repeat") => Wrap::Repeat,
-                Some("mirror") => Wrap::MirroredRepeat,
-                Some("clamp") => Wrap::ClampToEdge,
+                Some("mirror") => Wrap::Mirror,
+                Some("clamp") => Wrap::Clamp,
                 Some(found) => {
                     let message =
                         format!("{name}: expected repeat, mirror or clamp, found `{found}`");

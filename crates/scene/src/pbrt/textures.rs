@@ -258,11 +258,11 @@ impl<'a> Textures<'a> {
         entity.optional("maxanisotropy")?;
         image.wrap = [match entity.string("wrap")?.unwrap_or("repeat") {
             "repeat" => Wrap::Repeat,
-            "clamp" => Wrap::ClampToEdge,
+            "clamp" => Wrap::Clamp,
             other @ ("black" | "octahedralsphere") => {
                 let name = format!("wrap `{other}` of a texture");
                 log.ignore_named(features::PBRT_TEXTURE_WRAP, &name, &entity.place);
-                Wrap::ClampToEdge
+                Wrap::Clamp
             }
             other => return Err(entity.error(format!("unknown wrap mode `{other}`"))),
         }; 2];
@@ -330,7 +330,7 @@ impl<'a> Textures<'a> {
         let Some(file) = entity.string("filename")? else { return Ok(None) };
         let decoding = Decoding { encoding: Encoding::Srgb, gamma: None };
         let texture = self.load(entity, file, &decoding, log)?;
-        let wrap = [Wrap::ClampToEdge; 2];
+        let wrap = [Wrap::Clamp; 2];
         Ok(Some(TextureUse { wrap, ..TextureUse::from_lower_left(texture) }))
     }
 }

@@ -10,8 +10,8 @@ fn texture_place(coordinate: f32, wrap: Wrap, size: u32) -> f32 {
     let coordinate = if coordinate.abs() < 1e9 { coordinate } else { 0.0 };
     let coordinate = match wrap {
         Wrap::Repeat => coordinate - coordinate.floor(),
-        Wrap::MirroredRepeat => coordinate - 2.0 * (0.5 * coordinate).floor(),
-        Wrap::ClampToEdge => coordinate.clamp(-1.0, 2.0),
+        Wrap::Mirror => coordinate - 2.0 * (0.5 * coordinate).floor(),
+        Wrap::Clamp => coordinate.clamp(-1.0, 2.0),
     };
     coordinate * size as f32
 }
@@ -22,7 +22,7 @@ fn wrapped_texel(place: i32, wrap: Wrap, size: u32) -> u32 {
     let place = match wrap {
         Wrap::Repeat if place < 0 => place + size,
         Wrap::Repeat if place > last => place - size,
-        Wrap::MirroredRepeat => {
+        Wrap::Mirror => {
             let place = if place < 0 { -1 - place } else { place };
             let place = if place > last { 2 * last + 1 - place } else { place };
             if place < 0 { -1 - place } else { place }

@@ -9,6 +9,8 @@ pub mod lookup;
 
 use std::sync::Arc;
 
+use serde::Deserialize;
+
 pub use cache::TextureCache;
 pub use check::MAX_TEXTURE_SIDE;
 
@@ -47,19 +49,21 @@ pub enum Encoding {
 }
 
 /// Continuation of a texture beyond its edges.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Wrap {
     /// Repeats the image.
     #[default]
     Repeat,
     /// Repeats the image, every second time mirrored.
-    MirroredRepeat,
+    Mirror,
     /// Repeats the texels of the edge.
-    ClampToEdge,
+    Clamp,
 }
 
 /// Values between the centres of texels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Interpolation {
     /// Bilinear.
     #[default]

@@ -40,8 +40,8 @@ impl Textures {
         });
         let wrap = used.wrap.map(|wrap| match wrap {
             Wrap::Repeat => 10497,
-            Wrap::MirroredRepeat => 33648,
-            Wrap::ClampToEdge => 33071,
+            Wrap::Mirror => 33648,
+            Wrap::Clamp => 33071,
         });
         let filter = if used.interpolation == Interpolation::Nearest { NEAREST } else { LINEAR };
         let sampler =

@@ -233,13 +233,13 @@ impl<'a> Translator<'a> {
         let bitmap = self.pictures.add(used, recipe);
         let wrap = match used.wrap {
             [Wrap::Repeat, Wrap::Repeat] => "repeat",
-            [Wrap::ClampToEdge, Wrap::ClampToEdge] => "clamp",
+            [Wrap::Clamp, Wrap::Clamp] => "clamp",
             [first, _] => {
                 self.warn(&format!(
                     "`{name}` is mirrored beyond its edges, or continues along u and v in two ways; \
                      pbrt repeats or clamps it"
                 ));
-                if first == Wrap::ClampToEdge { "clamp" } else { "repeat" }
+                if first == Wrap::Clamp { "clamp" } else { "repeat" }
             }
         };
         let ([du, u], [dv, v]) = self.mapping(name, used);
@@ -339,7 +339,7 @@ impl<'a> Translator<'a> {
         let Some(emission) = &surface.emission else { return String::new() };
         let radiance = match &emission.texture {
             Some(used) => {
-                if used.wrap != [Wrap::ClampToEdge; 2]
+                if used.wrap != [Wrap::Clamp; 2]
                     || self.base.map(|base| base.image_from_uv) != Some(used.image_from_uv)
                 {
                     self.warn(

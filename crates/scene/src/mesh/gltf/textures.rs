@@ -56,8 +56,8 @@ impl GltfReader<'_> {
         let sampler = number_of(&texture["sampler"]).and_then(|at| json["samplers"].get(at));
         let sampler = sampler.unwrap_or(&Value::Null);
         let wrap = |key: &str| match sampler[key].as_u64() {
-            Some(CLAMP_TO_EDGE) => Wrap::ClampToEdge,
-            Some(MIRRORED_REPEAT) => Wrap::MirroredRepeat,
+            Some(CLAMP_TO_EDGE) => Wrap::Clamp,
+            Some(MIRRORED_REPEAT) => Wrap::Mirror,
             _ => Wrap::Repeat,
         };
         let interpolation = match sampler["magFilter"].as_u64() {

@@ -149,7 +149,7 @@ impl Map {
             encoding,
             // v counts from the lower edge of the image.
             image_from_uv: [[scale[0], 0.0, offset[0]], [0.0, -scale[1], 1.0 - offset[1]]],
-            wrap: [if clamps { Wrap::ClampToEdge } else { Wrap::Repeat }; 2],
+            wrap: [if clamps { Wrap::Clamp } else { Wrap::Repeat }; 2],
             scale: [gain; 3],
             bias: [base; 3],
             ..TextureUse::from_lower_left(texture)
