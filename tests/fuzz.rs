@@ -1,4 +1,5 @@
-//! The parsers of the renderer on mutated files, as `crates/scene/tests/fuzz.rs` tries those of scenes: an error or a result, soon, in little memory, and no panic.
+//! The parsers of the renderer on mutated files, as `crates/scene/tests/fuzz.rs` tries those of scenes: an
+//! error or a result, soon, in little memory, and no panic.
 //!
 //! `FENESTRA_FUZZ_MILLISECONDS` is the time for each target, `FENESTRA_FUZZ_TARGET` one target,
 //! `FENESTRA_FUZZ_SEED` the seed and `FENESTRA_FUZZ_FIRST` the first case. The input of a case

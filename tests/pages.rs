@@ -1,5 +1,5 @@
-//! The pages of the repository: their links lead somewhere, their pictures are shown, and all of them together
-//! are short.
+//! The pages of the repository: their links lead somewhere, their pictures are shown, and all together are
+//! short.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
 use std::{

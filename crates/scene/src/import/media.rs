@@ -78,8 +78,8 @@ const DIELECTRICS: [(&str, f32); 23] = [
 
 /// η and k of metals and other absorbing media as Rec.709 colours, from the measurements of luxpop.com.
 ///
-/// Of Ag, Al, Au, Cu, CuZn, MgO and TiO2, η is the mean under D65, and k gives the colour of the reflectance at
-/// normal incidence, at most 0.98. The others are what Mitsuba 3.9.1 renders in RGB, cut off at 0.
+/// For Ag, Al, Au, Cu, CuZn, MgO and TiO2, η is the mean under D65, and k gives the colour of the reflectance
+/// at normal incidence, at most 0.98. The others are what Mitsuba 3.9.1 renders in RGB, cut off at 0.
 #[rustfmt::skip]
 const CONDUCTORS: [(&str, [[f64; 3]; 2]); 38] = [
     ("a-C", [[2.94405, 2.22714, 1.96816], [0.887465, 0.799299, 0.81529]]),

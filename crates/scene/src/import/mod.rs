@@ -1,4 +1,4 @@
-//! What readers of other formats share: the scene that they return, media and illuminants by name,
+//! Shared by the readers of other formats: the scene that they return, media and illuminants by name,
 //! mixtures of materials, equal-area maps, and the gamut of reflectances.
 
 pub mod blend;

@@ -24,8 +24,9 @@ impl<T: Zeroable, N: Default> Canvas<T, N> {
 }
 
 /// Decodes the first layer with the channels R, G, B, else the first with Y, to texels that `texel` makes of
-/// colour and opacity; returns width and height too, and the notes that `texel` keeps. `check_size` is asked with the size and the bytes of a
-/// pixel before memory is allocated.
+/// colour and opacity; returns width and height too, and the notes that `texel` keeps.
+///
+/// `check_size` is asked with the size and the bytes of a pixel before memory is allocated.
 pub(crate) fn decode<T: Zeroable + 'static, N: Default + 'static>(
     bytes: &[u8],
     check_size: impl Fn([u64; 2], u64) -> Result<(), String>,
