@@ -7,12 +7,12 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{Renderer, Rules, Settings, Standing, StopReason, window_of};
+use super::{Renderer, Rules, Settings, Standing, StopReason};
 use crate::{
     error::{Error, Result},
     film::{Aov, Checkpoint, Image, Metadata, SampleRange, Sums, metadata::seconds_of},
     gpu::Device,
-    pass::{Saved, SceneBuffers},
+    pass::Saved,
     scene::{Camera, Scene},
 };
 
@@ -114,26 +114,14 @@ pub fn describe(device: &Device, scene: &Scene, settings: &Settings) -> Metadata
 impl Session {
     /// Prepares to render `scene`. Fails as [`Renderer::new`].
     pub fn new(device: &Arc<Device>, scene: &Scene, settings: Settings) -> Result<Self> {
-        settings.check([scene.film.width, scene.film.height])?;
-        let window = window_of(&settings, scene);
-        let buffers = Arc::new(SceneBuffers::new(device, scene, window)?);
-        Self::with_scene_buffers(device, buffers, scene, settings)
+        Ok(Self::of(Renderer::new(device, scene, settings)?, device, scene))
     }
 
-    /// As [`Session::new`], sharing buffers of the same scene and window.
-    ///
-    /// # Panics
-    /// If the buffers were made for another window.
-    pub fn with_scene_buffers(
-        device: &Arc<Device>,
-        buffers: Arc<SceneBuffers>,
-        scene: &Scene,
-        settings: Settings,
-    ) -> Result<Self> {
-        let description = describe(device, scene, &settings);
-        let renderer = Renderer::with_scene_buffers(device, buffers, scene, settings)?;
+    /// Drives a renderer of `scene` that has no samples yet.
+    pub fn of(renderer: Renderer, device: &Device, scene: &Scene) -> Self {
         let fit_hashes = renderer.report().fit_hashes;
-        Ok(Self {
+        let description = describe(device, scene, renderer.settings());
+        Self {
             renderer,
             description: Metadata { fit_hashes, ..description },
             pace: PACE,
@@ -142,7 +130,7 @@ impl Session {
             own_seconds: 0.0,
             relative_error: None,
             found_light: false,
-        })
+        }
     }
 
     /// Aims at another duration of a pass.

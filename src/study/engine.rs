@@ -25,7 +25,7 @@ use crate::{
     pass::SceneBuffers,
     sampler::Sampler,
     scene::Scene,
-    session::{Observer, Session, Settings, describe, window_of},
+    session::{Observer, Renderer, Session, Settings, describe, window_of},
 };
 
 /// Everything a study has measured.
@@ -324,6 +324,7 @@ impl SharedBuffers<'_> {
                 buffers
             }
         };
-        Session::with_scene_buffers(self.device, buffers, self.scene, settings)
+        let renderer = Renderer::with_scene_buffers(self.device, buffers, self.scene, settings)?;
+        Ok(Session::of(renderer, self.device, self.scene))
     }
 }

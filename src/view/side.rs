@@ -10,7 +10,7 @@ use crate::{
     pass::{Saved, SceneBuffers},
     sampler::Sampler,
     scene::Scene,
-    session::{Session, Settings, window_of},
+    session::{Renderer, Session, Settings},
     shader::constants::{SHOW_CELLS, SHOW_LEVELS, SHOW_PICTURE},
 };
 
@@ -39,12 +39,11 @@ impl Side {
             aovs.push(Aov::GuideCell);
         }
         let settings = Settings { aovs, ..settings.clone() };
-        let buffers = match buffers {
-            Some(buffers) => buffers,
-            None => Arc::new(SceneBuffers::new(device, scene, window_of(&settings, scene))?),
+        let renderer = match buffers {
+            Some(buffers) => Renderer::with_scene_buffers(device, buffers, scene, settings)?,
+            None => Renderer::new(device, scene, settings)?,
         };
-        let mut session =
-            Session::with_scene_buffers(device, buffers, scene, settings)?.with_pace(PICTURE_TIME);
+        let mut session = Session::of(renderer, device, scene).with_pace(PICTURE_TIME);
         if let Some(bytes) = guide.filter(|_| sampler.has_guide()) {
             let path = "guide".as_ref();
             session.renderer.take_guide(Saved { path, bytes, continues: false })?;
