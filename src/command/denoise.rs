@@ -23,7 +23,7 @@ pub(crate) struct Denoised {
 ///
 /// # Errors
 /// An image without a picture, or one that is denoised already; the library's own.
-pub fn denoise(denoiser: &Denoiser, film: &Image, path: &Path) -> Result<Denoised> {
+pub(super) fn denoise(denoiser: &Denoiser, film: &Image, path: &Path) -> Result<Denoised> {
     check_film(film, path)?;
     let start = Instant::now();
     let mut picture = film.rgb(path)?;

@@ -140,7 +140,11 @@ fn start(points: &PointSet, count: usize) -> Vec<Component> {
 
 /// Grows a mixture of `count` lobes, or of as many as there are points. `progress` receives the
 /// share of the work that is done.
-pub fn grow(points: &PointSet, count: usize, progress: &mut dyn FnMut(f64)) -> Vec<Component> {
+pub(crate) fn grow(
+    points: &PointSet,
+    count: usize,
+    progress: &mut dyn FnMut(f64),
+) -> Vec<Component> {
     let count = count.min(points.len());
     let mut components = start(points, count.min(config::FIRST_LOBES));
     while components.len() < count {

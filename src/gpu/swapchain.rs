@@ -21,7 +21,7 @@ use crate::error::{Error, Result};
 const ACQUIRE_TIMEOUT: u64 = 200_000_000;
 
 /// A window of any toolkit.
-pub trait Target: HasWindowHandle + HasDisplayHandle + Send + Sync {}
+pub(crate) trait Target: HasWindowHandle + HasDisplayHandle + Send + Sync {}
 
 impl<T: HasWindowHandle + HasDisplayHandle + Send + Sync> Target for T {}
 

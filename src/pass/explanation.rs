@@ -28,7 +28,7 @@ pub struct RecordedRay {
 
 impl RecordedRay {
     /// Returns the ray as JSON.
-    pub fn numbers(&self) -> Value {
+    pub(crate) fn numbers(&self) -> Value {
         json!({
             "direction": self.direction.to_array(),
             "contribution": self.contribution.to_array(),
@@ -63,7 +63,7 @@ pub trait Explanation: Any {
 }
 
 /// Draws the environment with the rays of a pixel: green reached it, red were blocked, grey brought nothing.
-pub fn draw_rays(scene: &Scene, explanation: &dyn Explanation, width: usize) -> Sky {
+pub(crate) fn draw_rays(scene: &Scene, explanation: &dyn Explanation, width: usize) -> Sky {
     let environment = |direction| scene.environment.radiance(direction);
     let white = white_of(width, environment);
     let mut sky = Sky::new(width, explanation.normal(), white, environment);

@@ -19,18 +19,18 @@ use crate::{
 };
 
 /// Pixels of a block in film order; waves hold whole blocks.
-pub const BLOCK_PIXELS: u32 = 64;
+pub(crate) const BLOCK_PIXELS: u32 = 64;
 /// Edge of a block, pixels.
 const BLOCK_EDGE: u32 = 8;
 
 /// Returns a pixel's position in film order; twin of `wave_pixel` in `glsl/include/wave.glsl`.
-pub fn position_in_film_order(window: Window, column: u32, row: u32) -> u32 {
+pub(crate) fn position_in_film_order(window: Window, column: u32, row: u32) -> u32 {
     let block = row / BLOCK_EDGE * window.width.div_ceil(BLOCK_EDGE) + column / BLOCK_EDGE;
     block * BLOCK_PIXELS + row % BLOCK_EDGE * BLOCK_EDGE + column % BLOCK_EDGE
 }
 
 /// Returns the bits `AOV_…` of the layers that passes write.
-pub fn aov_bits(aovs: &[Aov]) -> u32 {
+pub(crate) fn aov_bits(aovs: &[Aov]) -> u32 {
     let bit = |aov: &Aov| match aov {
         Aov::Albedo => AOV_ALBEDO,
         Aov::Normal => AOV_NORMAL,
@@ -48,7 +48,7 @@ pub fn aov_bits(aovs: &[Aov]) -> u32 {
 ///
 /// # Errors
 /// [`Error::Memory`].
-pub fn check_memory(device: &Device, window: Window, aovs: u32) -> Result<()> {
+pub(crate) fn check_memory(device: &Device, window: Window, aovs: u32) -> Result<()> {
     let triples = (aovs & (AOV_ALBEDO | AOV_NORMAL | AOV_POSITION)).count_ones()
         + 2 * (aovs & AOV_GUIDE_CELL).count_ones();
     let pairs = (aovs & (AOV_VISIBLE | AOV_CACHE_ENTRIES)).count_ones();
@@ -63,7 +63,7 @@ pub fn check_memory(device: &Device, window: Window, aovs: u32) -> Result<()> {
 
 /// Sums per pixel of the window, row by row, in pages of whole rows of blocks: a storage buffer has a
 /// limit, the film of a window has none.
-pub struct FilmBuffers {
+pub(crate) struct FilmBuffers {
     pages: Vec<Page>,
     counters: Buffer,
     aovs: u32,
@@ -98,7 +98,12 @@ struct Page {
 impl FilmBuffers {
     /// Makes an empty film of the window, with the extra layers in the bits `aovs`, in buffers of at
     /// most `page_bytes` bytes and what the device allows, but of a row of blocks at least.
-    pub fn new(device: &Arc<Device>, window: Window, aovs: u32, page_bytes: u64) -> Result<Self> {
+    pub(crate) fn new(
+        device: &Arc<Device>,
+        window: Window,
+        aovs: u32,
+        page_bytes: u64,
+    ) -> Result<Self> {
         let page_bytes = page_bytes.min(device.capabilities().max_storage_buffer_range);
         let row_bytes = u64::from(window.width) * size_of::<[f32; 3]>() as u64;
         let blocks_down = window.height.div_ceil(BLOCK_EDGE);
@@ -129,7 +134,7 @@ impl FilmBuffers {
     ///
     /// # Panics
     /// If a smaller film does not fit into the first page.
-    pub fn reshape(&mut self, [width, height]: [u32; 2]) {
+    pub(crate) fn reshape(&mut self, [width, height]: [u32; 2]) {
         if [width, height] == [self.whole.width, self.whole.height] {
             self.window = self.whole;
             self.page_positions = self.whole_page_positions;
@@ -145,12 +150,12 @@ impl FilmBuffers {
     }
 
     /// Window in use.
-    pub fn window(&self) -> Window {
+    pub(crate) fn window(&self) -> Window {
         self.window
     }
 
     /// Descriptor set 3 of every page in use, its first pixel and its number of pixels.
-    pub fn pages(&self) -> impl Iterator<Item = (&DescriptorSet, u32, u32)> {
+    pub(crate) fn pages(&self) -> impl Iterator<Item = (&DescriptorSet, u32, u32)> {
         let used = self.pages.iter().map(|page| (page, self.pixels_of(page)));
         used.filter(|(_, pixels)| *pixels > 0)
             .map(|(page, pixels)| (&page.set, page.first as u32, pixels as u32))
@@ -168,29 +173,29 @@ impl FilmBuffers {
     }
 
     /// Descriptor set 3 of the page that has a position in film order.
-    pub fn set(&self, position: u32) -> &DescriptorSet {
+    pub(crate) fn set(&self, position: u32) -> &DescriptorSet {
         &self.page(position).set
     }
 
     /// Index of the first pixel of that page.
-    pub fn first_pixel(&self, position: u32) -> u32 {
+    pub(crate) fn first_pixel(&self, position: u32) -> u32 {
         self.page(position).first as u32
     }
 
     /// Number of positions from `position` to the end of its page.
-    pub fn left_in_page(&self, position: u32) -> u32 {
+    pub(crate) fn left_in_page(&self, position: u32) -> u32 {
         self.page_positions - position % self.page_positions
     }
 
     /// Number of pixels in film order, counting whole blocks where they reach beyond the window.
-    pub fn padded_pixels(&self) -> u32 {
+    pub(crate) fn padded_pixels(&self) -> u32 {
         let blocks =
             self.window.width.div_ceil(BLOCK_EDGE) * self.window.height.div_ceil(BLOCK_EDGE);
         blocks * BLOCK_PIXELS
     }
 
     /// Sets everything to zero.
-    pub fn clear(&self, device: &Arc<Device>) -> Result<()> {
+    pub(crate) fn clear(&self, device: &Arc<Device>) -> Result<()> {
         let mut commands = Commands::begin(device)?;
         for buffer in self.buffers() {
             commands.fill(buffer, 0);
@@ -200,14 +205,14 @@ impl FilmBuffers {
     }
 
     /// Reads the counters and sets them to zero.
-    pub fn take_counters(&self) -> Result<Counters> {
+    pub(crate) fn take_counters(&self) -> Result<Counters> {
         let counters = self.counters.download::<Counters>(1)?;
         self.counters.upload(bytemuck::bytes_of(&Counters::zeroed()))?;
         Ok(counters.first().copied().unwrap_or_default())
     }
 
     /// Reads everything but the sample count and the film's size, which the renderer knows.
-    pub fn download(&self) -> Result<Sums> {
+    pub(crate) fn download(&self) -> Result<Sums> {
         Ok(Sums {
             width: self.window.width,
             height: self.window.height,
@@ -227,7 +232,7 @@ impl FilmBuffers {
     }
 
     /// Replaces the content of the film by sums of the same window.
-    pub fn upload(&self, sums: &Sums) -> Result<()> {
+    pub(crate) fn upload(&self, sums: &Sums) -> Result<()> {
         for page in &self.pages {
             let range = page.first..page.first + page.pixels;
             for (buffer, wanted, layer) in [
@@ -259,7 +264,7 @@ impl FilmBuffers {
     }
 
     /// Bytes by buffer name, all pages together.
-    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+    pub(crate) fn buffer_bytes(&self) -> BTreeMap<String, u64> {
         let mut bytes = BTreeMap::new();
         for buffer in self.buffers() {
             *bytes.entry(buffer.name().to_owned()).or_default() += buffer.size();

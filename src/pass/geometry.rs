@@ -33,7 +33,7 @@ pub struct GeometryBuffers {
 }
 
 /// Largest number of bytes in one page of triangles on a device.
-pub fn triangle_page_bytes(capabilities: &Capabilities) -> u64 {
+pub(crate) fn triangle_page_bytes(capabilities: &Capabilities) -> u64 {
     capabilities.max_texel_buffer_elements.saturating_mul(16)
 }
 
@@ -75,7 +75,7 @@ impl GeometryBuffers {
     }
 
     /// Returns every buffer once, for memory reports.
-    pub fn buffers(&self) -> impl Iterator<Item = &Buffer> {
+    pub(crate) fn buffers(&self) -> impl Iterator<Item = &Buffer> {
         [&self.nodes, &self.materials, &self.instances].into_iter().chain(&self.pages)
     }
 
@@ -102,7 +102,7 @@ pub struct Traversal {
 
 impl Traversal {
     /// Specialization constants of a pass that traverses and knows the surfaces of the scene.
-    pub fn constants(self, mut surfaces: Surfaces) -> Vec<(u32, u32)> {
+    pub(crate) fn constants(self, mut surfaces: Surfaces) -> Vec<(u32, u32)> {
         if self.is_instanced {
             surfaces.features |= SURFACES_INSTANCED;
         }
@@ -156,7 +156,7 @@ impl Schedule {
     pub const SINGLE: Self = Self { rays_per_invocation: 1, refill_lanes: u32::MAX };
 
     /// For incoherent rays. Software devices gain by refilling lanes (`docs/traversal.md`).
-    pub fn incoherent(capabilities: &Capabilities) -> Self {
+    pub(crate) fn incoherent(capabilities: &Capabilities) -> Self {
         if capabilities.kind == "software" {
             Self { rays_per_invocation: 16, refill_lanes: capabilities.subgroup_size.div_ceil(3) }
         } else {

@@ -38,7 +38,7 @@ pub struct Kernel {
 
 impl Kernel {
     /// Makes a kernel with one invocation per element of `domain`.
-    pub fn new(shader: &'static str, domain: Domain, constants: &[(u32, u32)]) -> Self {
+    pub(crate) fn new(shader: &'static str, domain: Domain, constants: &[(u32, u32)]) -> Self {
         Self { shader, constants: constants.to_vec(), domain, per_invocation: 1 }
     }
 

@@ -28,7 +28,7 @@ const THRESHOLD_SCALE: u64 = u32::MAX as u64;
 
 /// Contents of the lamp buffers.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct LampTables {
+pub(crate) struct LampTables {
     /// Alias table over emitting triangles and lamps, in proportion to their power.
     pub choices: Vec<structs::LampChoice>,
     /// Lights without a surface.
@@ -42,7 +42,7 @@ impl LampTables {
     ///
     /// Power weighs the choice: of a triangle π · area · luminance of its mean radiance, for both
     /// sides if both emit. A textured triangle takes the mean of the whole image.
-    pub fn new(scene: &Scene, accel: &Accel) -> Self {
+    pub(crate) fn new(scene: &Scene, accel: &Accel) -> Self {
         let per_area: Vec<f32> = scene
             .materials
             .iter()

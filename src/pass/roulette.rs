@@ -25,7 +25,7 @@ impl Roulette {
     pub const NEVER: Self = Self { vertex: u32::MAX, throughput: 1.0 };
 
     /// Specialization of the passes that continue paths.
-    pub fn constants(&self) -> [(u32, u32); 2] {
+    pub(crate) fn constants(&self) -> [(u32, u32); 2] {
         let vertex = if self.throughput > 0.0 { self.vertex } else { u32::MAX };
         [
             (CONSTANT_ROULETTE_VERTEX, vertex),

@@ -35,7 +35,7 @@ const COUNTER_ROOM: u64 = 1 << 30;
 const MOST_LIVING: f64 = 0.4;
 
 /// Called between waves; true stops the sweep under way.
-pub type Watch = Box<dyn FnMut() -> bool>;
+pub(crate) type Watch = Box<dyn FnMut() -> bool>;
 
 /// A scene, a film and the paths in flight on a device. Knows no sampler.
 pub struct Runner {
@@ -58,7 +58,7 @@ pub struct Runner {
 impl Runner {
     /// Allocates the film of `scene` and waves over it. Fails if the device does or its limits are
     /// exceeded.
-    pub fn new(
+    pub(crate) fn new(
         device: &Arc<Device>,
         scene: Arc<SceneBuffers>,
         settings: PassSettings,
@@ -98,18 +98,18 @@ impl Runner {
     }
 
     /// Calls `watch` between the waves of all sweeps from now on.
-    pub fn set_watch(&mut self, watch: Watch) {
+    pub(crate) fn set_watch(&mut self, watch: Watch) {
         self.watch = Some(watch);
     }
 
     /// True if the watch has stopped a sweep since [`Runner::look`]: pixels have different numbers of
     /// samples.
-    pub fn is_stopped(&self) -> bool {
+    pub(crate) fn is_stopped(&self) -> bool {
         self.is_stopped
     }
 
     /// Empties the film for another camera and film size. Fails if the device does.
-    pub fn look(&mut self, camera: &Camera, size: [u32; 2]) -> Result<()> {
+    pub(crate) fn look(&mut self, camera: &Camera, size: [u32; 2]) -> Result<()> {
         self.scene.look(camera, size)?;
         self.film.reshape(size);
         self.is_stopped = false;
@@ -118,7 +118,7 @@ impl Runner {
 
     /// Compiles every pass that `technique` may use and runs it once over nothing, so that drivers
     /// that compile lazily compile now. Fails if the device does.
-    pub fn warm_up(&mut self, technique: &dyn Passes) -> Result<()> {
+    pub(crate) fn warm_up(&mut self, technique: &dyn Passes) -> Result<()> {
         let others = technique.other_steps();
         let all = [technique.steps()].into_iter().chain(others.iter().map(Box::as_ref));
         for steps in all {
@@ -148,7 +148,7 @@ impl Runner {
 
     /// Runs waves like `wave` over `pixels` pixels, starting at its first, and takes the counters
     /// before they overflow. Fails if the device does.
-    pub fn sweep(&mut self, technique: &dyn Passes, wave: Wave, pixels: u32) -> Result<()> {
+    pub(crate) fn sweep(&mut self, technique: &dyn Passes, wave: Wave, pixels: u32) -> Result<()> {
         let mut done = 0;
         let mut uncounted = 0;
         while done < pixels {
@@ -185,7 +185,12 @@ impl Runner {
 
     /// Runs one wave for `vertices` vertices; returns device ms by pass. All pixels lie in one page of
     /// the film, unless the wave is for training. Fails if the device does.
-    pub fn run(&mut self, technique: &dyn Passes, wave: Wave, vertices: u32) -> Result<PassTimes> {
+    pub(crate) fn run(
+        &mut self,
+        technique: &dyn Passes,
+        wave: Wave,
+        vertices: u32,
+    ) -> Result<PassTimes> {
         let film_start = self.film.first_pixel(wave.first_pixel);
         let wave = Wave { film_start, ..wave };
         let settings = PassSettings { path_lists: self.path_lists(), ..self.settings };
@@ -231,18 +236,18 @@ impl Runner {
     }
 
     /// Number of samples of all pixels that fit into the next wave.
-    pub fn samples_per_wave(&self) -> u32 {
+    pub(crate) fn samples_per_wave(&self) -> u32 {
         self.wave_paths / self.film.padded_pixels()
     }
 
     /// Sets the number of shadow rays per hit. Panics if there are more than the buffers can hold.
-    pub fn limit_shadow_rays(&mut self, shadow_rays: u32) {
+    pub(crate) fn limit_shadow_rays(&mut self, shadow_rays: u32) {
         assert!(shadow_rays <= self.most_shadow_rays, "buffers have room for {shadow_rays}");
         self.settings.shadow_rays = shadow_rays;
     }
 
     /// Shadow rays per hit in the last group at the first vertex, the one left in the wave buffers.
-    pub fn last_group_rays(&self, steps: &dyn Steps) -> u32 {
+    pub(crate) fn last_group_rays(&self, steps: &dyn Steps) -> u32 {
         match steps.shadow_rays_at(0, self.settings.shadow_rays) {
             0 => 0,
             rays => (rays - 1) % steps.rays_per_group() + 1,
@@ -250,65 +255,65 @@ impl Runner {
     }
 
     /// Adds the device's counts to the totals. Fails if the device does.
-    pub fn take_counters(&mut self) -> Result<()> {
+    pub(crate) fn take_counters(&mut self) -> Result<()> {
         self.totals.add(&self.film.take_counters()?);
         Ok(())
     }
 
     /// Empties the film and the totals. Fails if the device does.
-    pub fn restart(&mut self) -> Result<()> {
+    pub(crate) fn restart(&mut self) -> Result<()> {
         self.film.clear(&self.device)?;
         self.totals = Totals::default();
         Ok(())
     }
 
     /// Reads the film without its size and sample count. Fails if the device does.
-    pub fn sums(&self) -> Result<Sums> {
+    pub(crate) fn sums(&self) -> Result<Sums> {
         self.film.download()
     }
 
     /// The device.
-    pub fn device(&self) -> &Arc<Device> {
+    pub(crate) fn device(&self) -> &Arc<Device> {
         &self.device
     }
 
     /// The scene on the device.
-    pub fn scene(&self) -> &SceneBuffers {
+    pub(crate) fn scene(&self) -> &SceneBuffers {
         &self.scene
     }
 
     /// The scene on the device, to share it.
-    pub fn shared_scene(&self) -> Arc<SceneBuffers> {
+    pub(crate) fn shared_scene(&self) -> Arc<SceneBuffers> {
         Arc::clone(&self.scene)
     }
 
     /// Buffers of the wave.
-    pub fn waves(&self) -> &WaveBuffers {
+    pub(crate) fn waves(&self) -> &WaveBuffers {
         &self.waves
     }
 
     /// The film on the device.
-    pub fn film(&self) -> &FilmBuffers {
+    pub(crate) fn film(&self) -> &FilmBuffers {
         &self.film
     }
 
     /// Settings of the passes.
-    pub fn settings(&self) -> &PassSettings {
+    pub(crate) fn settings(&self) -> &PassSettings {
         &self.settings
     }
 
     /// Counts and device times so far.
-    pub fn totals(&self) -> &Totals {
+    pub(crate) fn totals(&self) -> &Totals {
         &self.totals
     }
 
     /// Milliseconds that the first use of each pass took, and the creation of all as `pipelines`.
-    pub fn compile_ms(&self) -> &PassTimes {
+    pub(crate) fn compile_ms(&self) -> &PassTimes {
         &self.compile_ms
     }
 
     /// Device memory by buffer, bytes.
-    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+    pub(crate) fn buffer_bytes(&self) -> BTreeMap<String, u64> {
         let mut bytes = self.scene.buffer_bytes();
         bytes.extend(self.waves.buffer_bytes());
         bytes.extend(self.sharing.iter().flat_map(SharingBuffers::buffer_bytes));

@@ -55,7 +55,7 @@ impl SceneBuffers {
     }
 
     /// As [`SceneBuffers::new`], with an acceleration structure that the caller keeps.
-    pub fn from_accel(
+    pub(crate) fn from_accel(
         device: &Arc<Device>,
         scene: &Scene,
         window: Window,
@@ -149,7 +149,7 @@ impl SceneBuffers {
 
     /// Looks at the scene through another camera, on a whole film of `size` pixels. Fails if the device
     /// does.
-    pub fn look(&self, camera: &Camera, [width, height]: [u32; 2]) -> Result<()> {
+    pub(crate) fn look(&self, camera: &Camera, [width, height]: [u32; 2]) -> Result<()> {
         let parameters = SceneParameters {
             film_width: width,
             film_height: height,
@@ -168,13 +168,8 @@ impl SceneBuffers {
     }
 
     /// Tree and triangles.
-    pub fn geometry(&self) -> &GeometryBuffers {
+    pub(crate) fn geometry(&self) -> &GeometryBuffers {
         &self.geometry
-    }
-
-    /// Textures, surfaces and attributes of triangles.
-    pub fn textures(&self) -> &TextureBuffers {
-        &self.textures
     }
 
     /// Specialization of passes by the surfaces of the scene.
@@ -183,17 +178,17 @@ impl SceneBuffers {
     }
 
     /// Part of the film that the parameters describe.
-    pub fn window(&self) -> Window {
+    pub(crate) fn window(&self) -> Window {
         self.window
     }
 
     /// Host milliseconds by stage: `bvh`, `upload`.
-    pub fn host_ms(&self) -> &BTreeMap<String, f64> {
+    pub(crate) fn host_ms(&self) -> &BTreeMap<String, f64> {
         &self.host_ms
     }
 
     /// Bytes by buffer name.
-    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+    pub(crate) fn buffer_bytes(&self) -> BTreeMap<String, u64> {
         self.buffers
             .iter()
             .chain(self.geometry.buffers())

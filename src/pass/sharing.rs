@@ -17,7 +17,7 @@ const WITH_BASE_AND_REST: u32 = KINDS_WITH_BASE & !(1 << MATERIAL_DIFFUSE);
 
 /// Moments of a vertex at which sharing may add a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Moment {
+pub(crate) enum Moment {
     /// Surfaces are known, and no light is gathered.
     Met,
     /// The light of a group of shadow rays is gathered.
@@ -30,7 +30,7 @@ pub enum Moment {
 
 /// Passes by which tiles share paths.
 #[derive(Clone, Copy, Debug)]
-pub struct Sharing {
+pub(crate) struct Sharing {
     /// Edge of the tiles, pixels: 2, 4 or 8, so that they lie in blocks of the film.
     pub tile_edge: u32,
     /// Specialization by the surfaces of the scene.
@@ -47,7 +47,7 @@ impl Sharing {
     }
 
     /// The pass at a moment of a vertex, if there is one.
-    pub fn at(&self, moment: Moment, vertex: u32) -> Option<Kernel> {
+    pub(crate) fn at(&self, moment: Moment, vertex: u32) -> Option<Kernel> {
         let has_rest = self.surfaces.material_kinds & WITH_BASE_AND_REST != 0;
         let shader = match (vertex, moment) {
             (0, Moment::Leaving) => "keep_first",
@@ -62,7 +62,7 @@ impl Sharing {
     }
 
     /// Connects the vertices of a finished `wave` in groups of shadow rays, and shares the light.
-    pub fn connect_and_share(&self, wave: &Wave) -> Vec<Dispatch> {
+    pub(crate) fn connect_and_share(&self, wave: &Wave) -> Vec<Dispatch> {
         let edge = (CONSTANT_TILE_EDGE, self.tile_edge);
         let constants = [&self.surfaces.constants()[..], &[edge]].concat();
         let pixels = self.tile_edge * self.tile_edge;

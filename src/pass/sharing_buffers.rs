@@ -13,14 +13,14 @@ use crate::{
 };
 
 /// First and second vertices of one wave, and the connections between them.
-pub struct SharingBuffers {
+pub(crate) struct SharingBuffers {
     set: DescriptorSet,
     buffers: [Buffer; 6],
 }
 
 impl SharingBuffers {
     /// Adds what tiles of so many pixels take for a path to `demand`.
-    pub fn demand(demand: PathDemand, tile_pixels: u32) -> PathDemand {
+    pub(crate) fn demand(demand: PathDemand, tile_pixels: u32) -> PathDemand {
         let connections = u64::from(tile_pixels);
         PathDemand {
             bytes: demand.bytes.max(connections * size_of::<Connection>() as u64),
@@ -29,7 +29,7 @@ impl SharingBuffers {
     }
 
     /// Allocates them for waves of up to `paths` and tiles of `tile_pixels`. Fails if the device does.
-    pub fn new(device: &Arc<Device>, paths: u32, tile_pixels: u32) -> Result<Self> {
+    pub(crate) fn new(device: &Arc<Device>, paths: u32, tile_pixels: u32) -> Result<Self> {
         let paths = u64::from(paths);
         let make = |name, count: u64, size: usize| Buffer::new(device, name, count * size as u64);
         let first_vertices = make("first vertices", paths, size_of::<FirstVertex>())?;
@@ -58,12 +58,12 @@ impl SharingBuffers {
     }
 
     /// Descriptor set 1 of the passes of sharing.
-    pub fn set(&self) -> &DescriptorSet {
+    pub(crate) fn set(&self) -> &DescriptorSet {
         &self.set
     }
 
     /// Bytes by buffer name.
-    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+    pub(crate) fn buffer_bytes(&self) -> BTreeMap<String, u64> {
         self.buffers.iter().map(|buffer| (buffer.name().to_owned(), buffer.size())).collect()
     }
 }

@@ -4,7 +4,7 @@ use super::kernel::Kernel;
 use crate::{gpu::DescriptorSet, shader::structs::Wave};
 
 /// Shadow rays per hit in one group: bounds the work of an invocation and the size of the buffers.
-pub const SHADOW_RAYS_PER_GROUP: u32 = 8;
+pub(crate) const SHADOW_RAYS_PER_GROUP: u32 = 8;
 
 /// The passes that a technique adds to a wave. Holds no device object, so that tests read the order
 /// of passes without a GPU. Every `wave` states vertex and shadow rays of the place in the order.

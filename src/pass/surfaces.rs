@@ -25,34 +25,34 @@ pub struct Surfaces {
 
 impl Surfaces {
     /// Specialization constants of a pass over surfaces.
-    pub fn constants(&self) -> Vec<(u32, u32)> {
+    pub(crate) fn constants(&self) -> Vec<(u32, u32)> {
         let own =
             [(CONSTANT_MATERIAL_KINDS, self.material_kinds), (CONSTANT_SURFACES, self.features)];
         [&own[..], &self.access.constants()].concat()
     }
 
     /// True if textures or vertex colours vary a material.
-    pub fn is_textured(&self) -> bool {
+    pub(crate) fn is_textured(&self) -> bool {
         self.features & SURFACES_TEXTURED != 0
     }
 
     /// True if the tree has two levels, and hits name an instance.
-    pub fn is_instanced(&self) -> bool {
+    pub(crate) fn is_instanced(&self) -> bool {
         self.features & SURFACES_INSTANCED != 0
     }
 
     /// True if some material emits light.
-    pub fn emits(&self) -> bool {
+    pub(crate) fn emits(&self) -> bool {
         self.features & SURFACES_EMITTING != 0
     }
 
     /// True if some material has a diffuse base, whose light the pixels of a tile can share.
-    pub fn has_base(&self) -> bool {
+    pub(crate) fn has_base(&self) -> bool {
         self.material_kinds & KINDS_WITH_BASE != 0
     }
 
     /// True if paths meet surfaces at which no light is sampled.
-    pub fn has_specular(&self) -> bool {
+    pub(crate) fn has_specular(&self) -> bool {
         self.features & SURFACES_SPECULAR != 0
     }
 }

@@ -34,7 +34,7 @@ const ATTRIBUTE_PAGES: [Binding; MAX_PAGES] = [
 
 /// Buffers that shaders read by `glsl/include/texture.glsl`. A scene without textures has buffers of one
 /// element, which no shader reads.
-pub struct TextureBuffers {
+pub(crate) struct TextureBuffers {
     texture_pages: Vec<Buffer>,
     attribute_pages: Vec<Buffer>,
     uses: Buffer,
@@ -48,7 +48,7 @@ impl TextureBuffers {
     /// # Errors
     /// [`Error::Usage`] with sizes if four pages do not hold the texels or the attributes, and those of
     /// [`Buffer`].
-    pub fn new(
+    pub(crate) fn new(
         device: &Arc<Device>,
         tables: &SurfaceTables,
         attributes: &TriangleAttributes,
@@ -100,7 +100,7 @@ impl TextureBuffers {
     }
 
     /// Returns the buffers with their bindings in the scene set. Missing pages repeat the first.
-    pub fn bindings(&self) -> Vec<(Binding, &Buffer)> {
+    pub(crate) fn bindings(&self) -> Vec<(Binding, &Buffer)> {
         let mut bindings = vec![
             (scene::TEXTURE_USE_TEXELS, &self.uses),
             (scene::MATERIAL_SURFACE_TEXELS, &self.surfaces),
@@ -115,7 +115,7 @@ impl TextureBuffers {
     }
 
     /// Returns every buffer once, for memory reports.
-    pub fn buffers(&self) -> impl Iterator<Item = &Buffer> {
+    pub(crate) fn buffers(&self) -> impl Iterator<Item = &Buffer> {
         [&self.uses, &self.surfaces]
             .into_iter()
             .chain(&self.texture_pages)
@@ -123,7 +123,7 @@ impl TextureBuffers {
     }
 
     /// Returns the specialization of the passes that read textures.
-    pub fn access(&self) -> TextureAccess {
+    pub(crate) fn access(&self) -> TextureAccess {
         self.access
     }
 }
@@ -143,7 +143,7 @@ pub struct TextureAccess {
 
 impl TextureAccess {
     /// Specialization constants with their values.
-    pub fn constants(self) -> [(u32, u32); 5] {
+    pub(crate) fn constants(self) -> [(u32, u32); 5] {
         [
             (CONSTANT_TEXTURE_PAGES, self.texture_pages),
             (CONSTANT_TEXTURE_PAGE_SHIFT, self.page_shift),

@@ -38,7 +38,7 @@ pub struct Totals {
 
 impl Totals {
     /// Adds the counts of the device.
-    pub fn add(&mut self, counters: &Counters) {
+    pub(crate) fn add(&mut self, counters: &Counters) {
         self.camera_rays += u64::from(counters.camera_rays);
         self.bounce_rays += u64::from(counters.bounce_rays);
         self.shadow_rays_traced += u64::from(counters.shadow_rays_traced);
@@ -60,13 +60,13 @@ impl Totals {
     }
 
     /// Rays of every kind.
-    pub fn rays(&self) -> u64 {
+    pub(crate) fn rays(&self) -> u64 {
         self.camera_rays + self.bounce_rays + self.shadow_rays_traced
     }
 
     /// Returns the share of paths that are alive at a vertex after the first, of `depth` vertices; 1 before
     /// any is known.
-    pub fn living_share(&self, depth: u32) -> f64 {
+    pub(crate) fn living_share(&self, depth: u32) -> f64 {
         let all = self.camera_rays as f64 * f64::from(depth.saturating_sub(1));
         if all > 0.0 { self.bounce_rays as f64 / all } else { 1.0 }
     }

@@ -21,12 +21,12 @@ const GPU_PATHS: u32 = 1 << 21;
 const FIRST_PATHS: u32 = 1 << 14;
 
 /// Returns the most paths in flight on a device.
-pub fn most_paths(capabilities: &Capabilities) -> u32 {
+pub(crate) fn most_paths(capabilities: &Capabilities) -> u32 {
     if capabilities.kind == "software" { SOFTWARE_PATHS } else { GPU_PATHS }
 }
 
 /// Returns the bytes of the lists of living paths in a wave of `paths` paths.
-pub fn path_list_bytes(paths: u64) -> u64 {
+pub(crate) fn path_list_bytes(paths: u64) -> u64 {
     (u64::from(PATH_LISTS) + 2 * paths) * size_of::<u32>() as u64
 }
 
@@ -126,7 +126,7 @@ impl WaveBuffers {
     }
 
     /// Number of paths in the first wave.
-    pub fn first_wave_paths(&self) -> u32 {
+    pub(crate) fn first_wave_paths(&self) -> u32 {
         FIRST_PATHS.min(self.capacity)
     }
 
@@ -136,7 +136,7 @@ impl WaveBuffers {
     }
 
     /// [`Hit`] of every path.
-    pub fn hits(&self) -> &Buffer {
+    pub(crate) fn hits(&self) -> &Buffer {
         &self.hits
     }
 
@@ -146,7 +146,7 @@ impl WaveBuffers {
     }
 
     /// One word per shadow ray, in their order: 1 if it reaches the environment, else 0.
-    pub fn visibility(&self) -> &Buffer {
+    pub(crate) fn visibility(&self) -> &Buffer {
         &self.visibility
     }
 
@@ -156,7 +156,7 @@ impl WaveBuffers {
     }
 
     /// Bytes by buffer name.
-    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+    pub(crate) fn buffer_bytes(&self) -> BTreeMap<String, u64> {
         [
             &self.rays,
             &self.hits,

@@ -89,7 +89,7 @@ pub struct Session {
 }
 
 /// Describes a render by its settings, without fits, samples and times.
-pub fn describe(device: &Device, scene: &Scene, settings: &Settings) -> Metadata {
+pub(crate) fn describe(device: &Device, scene: &Scene, settings: &Settings) -> Metadata {
     let capabilities = device.capabilities();
     let mut parameters = settings.sampler.describe(&settings.parameters);
     let roulette = settings.roulette;

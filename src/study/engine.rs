@@ -47,7 +47,7 @@ pub(crate) struct Results {
 /// # Errors
 /// Anything that keeps the study from starting: an unusable scene or reference, runs made under
 /// other conditions.
-pub fn run(
+pub(crate) fn run(
     plan: &Plan,
     folder: &Folder,
     device: &Arc<Device>,

@@ -126,7 +126,7 @@ impl Canvas {
 ///
 /// # Panics
 /// `values` is not a whole number of rows of `width`.
-pub fn picture(values: &[f64], width: usize, scale: Scale) -> Canvas {
+pub(crate) fn picture(values: &[f64], width: usize, scale: Scale) -> Canvas {
     assert!(width > 0 && values.len().is_multiple_of(width), "whole rows of {width} values");
     let height = values.len() / width;
     let canvas_width = width.max(LEAST_WIDTH);

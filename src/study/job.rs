@@ -127,7 +127,7 @@ pub(super) fn image_of(picture: &RgbImage) -> Image {
 }
 
 /// Exposure in stops at which 85% of the pixels stay below white, by their brightest channel.
-pub fn exposure(picture: &RgbImage) -> f32 {
+pub(crate) fn exposure(picture: &RgbImage) -> f32 {
     let brightest = |pixel: &[f32; 3]| f64::from(pixel[0].max(pixel[1]).max(pixel[2]));
     let white = percentile(picture.pixels.iter().map(brightest).collect(), 85);
     white.filter(|white| *white > 0.0).map_or(0.0, |white| -(white as f32).log2())

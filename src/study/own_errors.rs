@@ -48,7 +48,7 @@ impl OwnParts {
 }
 
 /// Tests whether an error is well above the reference's own, or positive if that is unknown.
-pub fn is_judged(error: f64, own: Option<f64>) -> bool {
+pub(crate) fn is_judged(error: f64, own: Option<f64>) -> bool {
     error > 0.0 && own.is_none_or(|own| error >= JUDGED_FROM * own)
 }
 

@@ -11,7 +11,7 @@ const PACE: f32 = 0.35;
 
 /// The camera, where it started, and how fast it flies.
 #[derive(Clone, Debug)]
-pub struct Rig {
+pub(crate) struct Rig {
     home: Camera,
     camera: Camera,
     metres_per_second: f32,
@@ -19,29 +19,29 @@ pub struct Rig {
 
 impl Rig {
     /// Starts at the camera of the scene.
-    pub fn new(camera: Camera) -> Self {
+    pub(crate) fn new(camera: Camera) -> Self {
         let distance = (camera.look_at - camera.position).length();
         Self { home: camera, camera, metres_per_second: PACE * distance.max(1e-3) }
     }
 
     /// The camera now.
-    pub fn camera(&self) -> &Camera {
+    pub(crate) fn camera(&self) -> &Camera {
         &self.camera
     }
 
     /// Returns to the start.
-    pub fn go_home(&mut self) {
+    pub(crate) fn go_home(&mut self) {
         self.camera = self.home;
     }
 
     /// Moves around the centre of the picture by angles in radians, to the right and up.
-    pub fn orbit(&mut self, right: f32, up: f32) {
+    pub(crate) fn orbit(&mut self, right: f32, up: f32) {
         let offset = self.camera.position - self.camera.look_at;
         self.camera.position = self.camera.look_at + self.turned(offset, -right, up);
     }
 
     /// Turns on the spot by angles in radians, to the right and up.
-    pub fn turn(&mut self, right: f32, up: f32) {
+    pub(crate) fn turn(&mut self, right: f32, up: f32) {
         let offset = self.camera.look_at - self.camera.position;
         self.camera.look_at = self.camera.position + self.turned(offset, -right, up);
     }
@@ -57,7 +57,7 @@ impl Rig {
     }
 
     /// Moves sideways, in heights of the picture at its centre.
-    pub fn pan(&mut self, right: f32, up: f32) {
+    pub(crate) fn pan(&mut self, right: f32, up: f32) {
         let distance = (self.camera.look_at - self.camera.position).length();
         let height = 2.0 * distance * (0.5 * self.camera.vertical_fov_deg).to_radians().tan();
         let [axis_right, axis_up, _] = self.axes();
@@ -65,13 +65,13 @@ impl Rig {
     }
 
     /// Multiplies the distance to the centre of the picture.
-    pub fn zoom(&mut self, factor: f32) {
+    pub(crate) fn zoom(&mut self, factor: f32) {
         let offset = self.camera.position - self.camera.look_at;
         self.camera.position = self.camera.look_at + offset * factor;
     }
 
     /// Flies to the right, up and forward, each −1 to 1, for some seconds.
-    pub fn fly(&mut self, direction: Vec3, seconds: f32) {
+    pub(crate) fn fly(&mut self, direction: Vec3, seconds: f32) {
         let [right, up, forward] = self.axes();
         let way = direction.x * right + direction.y * up + direction.z * forward;
         self.shift(way * (seconds * self.metres_per_second));

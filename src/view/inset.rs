@@ -9,10 +9,10 @@ const WIDTH: usize = 256;
 const GAP: usize = 2;
 
 /// Width and height of an inset, pixels.
-pub const SIZE: [u32; 2] = [WIDTH as u32, (WIDTH + GAP) as u32];
+pub(super) const SIZE: [u32; 2] = [WIDTH as u32, (WIDTH + GAP) as u32];
 
 /// Draws visibility above density; `None` where nothing was learned.
-pub fn draw(scene: &Scene, recorded: &dyn Explanation) -> Option<Inset> {
+pub(super) fn draw(scene: &Scene, recorded: &dyn Explanation) -> Option<Inset> {
     let [visibility, density]: [Sky; 2] = recorded.skies(scene, WIDTH).try_into().ok()?;
     let opaque = |sky: &Sky| -> Vec<[u8; 4]> {
         sky.pixels().iter().map(|[red, green, blue]| [*red, *green, *blue, 255]).collect()

@@ -40,7 +40,7 @@ pub enum Action {
 }
 
 /// Layers in the order of [`Action::NextLayer`].
-pub const LAYERS: [(u32, &str); 7] = [
+pub(crate) const LAYERS: [(u32, &str); 7] = [
     (SHOW_PICTURE, "picture"),
     (SHOW_ERROR, "relative error"),
     (SHOW_ALBEDO, "albedo"),
@@ -66,7 +66,7 @@ const fn key(key: &'static str, action: Action, about: &'static str) -> Key {
 }
 
 /// Every key.
-pub const KEYS: &[Key] = &[
+pub(crate) const KEYS: &[Key] = &[
     key("w", Action::Fly(2, 1.0), "fly forward and back"),
     key("s", Action::Fly(2, -1.0), ""),
     key("a", Action::Fly(0, -1.0), "fly left and right"),
@@ -122,7 +122,7 @@ pub const KEYS: &[Key] = &[
 ];
 
 /// Returns the effect of a key.
-pub fn action_of(key: &str) -> Option<Action> {
+pub(crate) fn action_of(key: &str) -> Option<Action> {
     let key = if key.chars().count() == 1 { key.to_lowercase() } else { key.to_owned() };
     KEYS.iter().find(|known| known.key == key).map(|known| known.action)
 }

@@ -8,10 +8,11 @@ pub mod camera;
 mod inset;
 pub mod keys;
 mod panel;
-pub mod projector;
+pub(crate) mod projector;
 mod save;
 mod side;
 mod window;
 mod worker;
 
-pub use window::{Display, Options};
+pub(crate) use window::Display;
+pub use window::Options;

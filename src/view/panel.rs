@@ -21,7 +21,7 @@ use crate::{
 
 /// Message from the window to the renderer.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Input {
+pub(super) enum Input {
     /// A key was pressed.
     Key(Action),
     /// Directions to fly to changed: right, up, forward, −1 to 1 each.
@@ -60,7 +60,7 @@ impl Input {
 }
 
 /// The window.
-pub struct Panel {
+pub(crate) struct Panel {
     inputs: Receiver<Input>,
     /// Input that waits for the end of a pass.
     pub(super) pending: VecDeque<Input>,
@@ -83,7 +83,7 @@ pub struct Panel {
 
 impl Panel {
     /// Connects a window of `size` pixels. Fails if the device cannot show pictures there.
-    pub fn new(
+    pub(crate) fn new(
         device: &Arc<Device>,
         window: Arc<dyn Target>,
         size: [u32; 2],
@@ -109,7 +109,7 @@ impl Panel {
 
     /// Takes all input that is there, and acts on what needs no renderer. Returns true if a pass under way
     /// is worth nothing more.
-    pub fn attend(&mut self) -> bool {
+    pub(crate) fn attend(&mut self) -> bool {
         loop {
             match self.inputs.try_recv() {
                 Ok(input) => self.take(input),
@@ -124,7 +124,7 @@ impl Panel {
     }
 
     /// Waits for input, for this long at most.
-    pub fn wait(&mut self, longest: Duration) {
+    pub(crate) fn wait(&mut self, longest: Duration) {
         match self.inputs.recv_timeout(longest) {
             Ok(input) => self.take(input),
             Err(RecvTimeoutError::Timeout) => {}
@@ -167,7 +167,7 @@ impl Panel {
     }
 
     /// Returns the failure between the waves of the last pass.
-    pub fn take_failure(&mut self) -> Result<()> {
+    pub(crate) fn take_failure(&mut self) -> Result<()> {
         self.failure.take().map_or(Ok(()), Err)
     }
 
@@ -181,7 +181,7 @@ impl Panel {
     }
 
     /// Shows what the projector has. Fails if the device does or the window is gone.
-    pub fn present(&mut self) -> Result<()> {
+    pub(crate) fn present(&mut self) -> Result<()> {
         // Twice: a window may change its size or lose its surface once in between.
         for _ in 0..2 {
             let size = self.swapchain.size();
@@ -208,7 +208,7 @@ impl Panel {
 
     /// Returns what the window shows: its size, and red, green, blue of each pixel. Fails if the device
     /// does.
-    pub fn picture(&mut self) -> Result<([u32; 2], Vec<[u8; 3]>)> {
+    pub(crate) fn picture(&mut self) -> Result<([u32; 2], Vec<[u8; 3]>)> {
         let size = self.swapchain.size();
         if size.contains(&0) {
             return Err(Error::usage("the window has no pixels to write"));

@@ -19,7 +19,7 @@ const MOST_INVOCATIONS: u32 = 1 << 21;
 
 /// One of the two films that a window can show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub(crate) enum Place {
     /// The only film, or the one to the left.
     Left,
     /// The film to the right.
@@ -28,7 +28,7 @@ pub enum Place {
 
 /// A picture over the window.
 #[derive(Clone, Debug, Default)]
-pub struct Inset {
+pub(crate) struct Inset {
     /// Width and height, pixels.
     pub size: [u32; 2],
     /// Red, green, blue, 255: row by row.
@@ -36,7 +36,7 @@ pub struct Inset {
 }
 
 /// Passes and buffers between films and a window.
-pub struct Projector {
+pub(crate) struct Projector {
     device: Arc<Device>,
     show: Pipeline,
     compose: Pipeline,
@@ -54,7 +54,7 @@ pub struct Projector {
 
 impl Projector {
     /// Makes room for films of up to `film` pixels and insets of up to `inset`. Fails if the device does.
-    pub fn new(device: &Arc<Device>, film: [u32; 2], inset: [u32; 2]) -> Result<Self> {
+    pub(crate) fn new(device: &Arc<Device>, film: [u32; 2], inset: [u32; 2]) -> Result<Self> {
         let area = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height);
         let pipeline = |name| Pipeline::new(device, name, spirv::pass(name), &[]);
         let shown = |name| -> Result<_> {
@@ -78,7 +78,7 @@ impl Projector {
 
     /// Takes what the film of `renderer` shows: a layer `SHOW_…`, whose sums it has. `mean_radiance` is
     /// that of the film, for its relative error. Fails if the device does.
-    pub fn show(
+    pub(crate) fn show(
         &mut self,
         renderer: &Renderer,
         place: Place,
@@ -112,7 +112,7 @@ impl Projector {
     ///
     /// # Panics
     /// If it is larger than there is room for.
-    pub fn set_inset(&mut self, inset: &Inset) -> Result<()> {
+    pub(crate) fn set_inset(&mut self, inset: &Inset) -> Result<()> {
         self.inset.upload(bytemuck::cast_slice(&inset.pixels))?;
         self.inset_size = inset.size;
         Ok(())
@@ -120,7 +120,7 @@ impl Projector {
 
     /// Draws the pixels of a window of `size` pixels: films with this exposure factor and `CURVE_…`,
     /// whole and at the largest size that fits. Fails if the device does.
-    pub fn compose(
+    pub(crate) fn compose(
         &mut self,
         [width, height]: [u32; 2],
         has_right: bool,
@@ -179,14 +179,14 @@ impl Projector {
     }
 
     /// Returns the linear pixels of a film as they were shown last. Fails if the device does.
-    pub fn shown(&self, place: Place) -> Result<Vec<[f32; 3]>> {
+    pub(crate) fn shown(&self, place: Place) -> Result<Vec<[f32; 3]>> {
         let index = usize::from(place == Place::Right);
         let [width, height] = self.sizes[index];
         self.shown[index].0.download(width as usize * height as usize)
     }
 
     /// Returns the pixel of a film of `film` pixels under a place in the window, as composed last.
-    pub fn pixel_under(&self, [x, y]: [f64; 2], film: [u32; 2]) -> Option<[u32; 2]> {
+    pub(crate) fn pixel_under(&self, [x, y]: [f64; 2], film: [u32; 2]) -> Option<[u32; 2]> {
         let [left, top, width, height] = fit(self.film, self.window_size);
         let at = |place: f64, start: u32, length: u32, pixels: u32| {
             let share = (place - f64::from(start)) / f64::from(length.max(1));
@@ -197,7 +197,7 @@ impl Projector {
 }
 
 /// True if `layer` is the picture, to which exposure and curve apply.
-pub fn is_picture(layer: u32) -> bool {
+pub(crate) fn is_picture(layer: u32) -> bool {
     layer == SHOW_PICTURE
 }
 

@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Returns a camera as the table of a scene file.
-pub fn camera_toml(camera: &Camera) -> String {
+pub(crate) fn camera_toml(camera: &Camera) -> String {
     // Shortest decimals that read back as the same numbers.
     let vector = |value: glam::Vec3| format!("[{:?}, {:?}, {:?}]", value.x, value.y, value.z);
     let mut text = format!(
@@ -32,7 +32,7 @@ pub fn camera_toml(camera: &Camera) -> String {
 
 /// Names of the files of one press of the key: `NAME.view-1.png`, `.exr` and `.toml`, with the first number
 /// that none of them has.
-pub fn names(folder: &Path, scene: &str) -> [PathBuf; 3] {
+pub(super) fn names(folder: &Path, scene: &str) -> [PathBuf; 3] {
     let of = |number: u32| {
         ["png", "exr", "toml"].map(|kind| folder.join(format!("{scene}.view-{number}.{kind}")))
     };
@@ -41,7 +41,7 @@ pub fn names(folder: &Path, scene: &str) -> [PathBuf; 3] {
 }
 
 /// Content of the three files.
-pub struct Saved<'a> {
+pub(crate) struct Saved<'a> {
     /// Width and height of the window, pixels.
     pub size: [u32; 2],
     /// Pixels of the window.
@@ -57,7 +57,7 @@ impl Saved<'_> {
     ///
     /// # Errors
     /// [`crate::Error::Io`] with the cause.
-    pub fn write(&self, [png, exr, toml]: &[PathBuf; 3]) -> Result<()> {
+    pub(crate) fn write(&self, [png, exr, toml]: &[PathBuf; 3]) -> Result<()> {
         write_rgb8(png, self.size[0], self.size[1], self.pixels)?;
         self.film.write_exr(exr)?;
         write_text(toml, &camera_toml(self.camera))

@@ -18,7 +18,7 @@ use crate::{
 const PICTURE_TIME: Duration = Duration::from_millis(60);
 
 /// A film and what renders it.
-pub struct Side {
+pub(super) struct Side {
     pub(super) session: Session,
     pub(super) sampler: Sampler,
 }
@@ -26,7 +26,7 @@ pub struct Side {
 impl Side {
     /// Makes a session over buffers of the scene, or the first one without, with what another has
     /// learned. Fails if an option is out of range or the device fails.
-    pub fn new(
+    pub(crate) fn new(
         device: &Arc<Device>,
         scene: &Scene,
         buffers: Option<Arc<SceneBuffers>>,
@@ -52,14 +52,14 @@ impl Side {
     }
 
     /// Returns `layer`, or the picture where the sampler has no such layer.
-    pub fn layer(&self, layer: u32) -> u32 {
+    pub(crate) fn layer(&self, layer: u32) -> u32 {
         let is_known = LAYERS.iter().any(|(known, _)| *known == layer);
         let is_of_guide = layer == SHOW_CELLS || layer == SHOW_LEVELS;
         if is_known && (self.sampler.has_guide() || !is_of_guide) { layer } else { SHOW_PICTURE }
     }
 
     /// Samples per pixel in the film.
-    pub fn sample_count(&self) -> u32 {
+    pub(crate) fn sample_count(&self) -> u32 {
         self.session.renderer.sample_count()
     }
 }

@@ -66,14 +66,14 @@ enum Report {
 }
 
 /// A display that shows windows.
-pub struct Display(EventLoop<Report>);
+pub(crate) struct Display(EventLoop<Report>);
 
 impl Display {
     /// Connects to the display of the environment. Once in a process, in its first thread.
     ///
     /// # Errors
     /// [`Error::Device`] if there is none.
-    pub fn open() -> Result<Self> {
+    pub(crate) fn open() -> Result<Self> {
         let event_loop = EventLoop::with_user_event().build();
         event_loop.map(Self).map_err(|error| no_window(&error))
     }
@@ -82,7 +82,7 @@ impl Display {
     ///
     /// # Errors
     /// [`Error::Device`] without a device that can show pictures there; all that rendering can fail of.
-    pub fn run(self, scene: Scene, options: Options) -> Result<()> {
+    pub(crate) fn run(self, scene: Scene, options: Options) -> Result<()> {
         let Self(event_loop) = self;
         let (sender, inputs) = channel();
         let mut app = App {

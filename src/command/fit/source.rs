@@ -31,7 +31,7 @@ pub(crate) struct Source {
 }
 
 /// Tests for the extension of a measured BRDF.
-pub fn is_measured(path: &Path) -> bool {
+pub(super) fn is_measured(path: &Path) -> bool {
     MEASURED.contains(&extension(path).as_str())
 }
 
@@ -49,7 +49,7 @@ fn warn(warnings: &[String]) {
 ///
 /// # Errors
 /// Those of the readers.
-pub fn environment(path: &Path) -> Result<(EnvironmentMap, String)> {
+pub(super) fn environment(path: &Path) -> Result<(EnvironmentMap, String)> {
     if extension(path) == "toml" {
         let scene = Scene::load(path)?;
         warn(&scene.warnings);
@@ -65,7 +65,7 @@ pub fn environment(path: &Path) -> Result<(EnvironmentMap, String)> {
 ///
 /// # Errors
 /// Those of the readers, or a text that is none of the three.
-pub fn material(text: &str) -> Result<Source> {
+pub(super) fn material(text: &str) -> Result<Source> {
     let path = Path::new(text);
     if let Some((kind, keys)) = text.split_once(':')
         && TYPES.contains(&kind)

@@ -48,7 +48,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// A source that cannot be read or fitted, options out of range, a file that cannot be written.
-pub fn run(arguments: &Arguments) -> Result<()> {
+pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let (mut maps, mut brdfs) = (String::new(), String::new());
     for text in &arguments.sources {
         let path = Path::new(text);

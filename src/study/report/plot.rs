@@ -15,7 +15,7 @@ pub(crate) const STYLE_COUNT: usize = 8;
 
 /// A point with its band or error bar.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Point {
+pub(crate) struct Point {
     /// Abscissa.
     pub x: f64,
     /// Ordinate.
@@ -251,7 +251,7 @@ pub(crate) fn log_log(
 
 /// A published range, drawn as a band over the whole width.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Range {
+pub(crate) struct Range {
     /// Text of the band.
     pub label: String,
     /// Lower ordinate.
@@ -261,7 +261,7 @@ pub struct Range {
 }
 
 /// Draws points with error bars over 0…100% on linear axes; ordinates in percent.
-pub fn scatter(
+pub(crate) fn scatter(
     title: &str,
     x_title: &str,
     y_title: &str,

@@ -10,7 +10,7 @@ use crate::study::{
 };
 
 /// The verdicts of all scenes.
-pub fn all(report: &Report, rules: &[Rule]) -> String {
+pub(super) fn all(report: &Report, rules: &[Rule]) -> String {
     let items: String = report
         .scenes
         .iter()

@@ -58,7 +58,7 @@ enum Motion {
 }
 
 /// Everything that the rendering thread has.
-pub struct Worker {
+pub(crate) struct Worker {
     scene: Scene,
     device: Arc<Device>,
     settings: Settings,
@@ -93,7 +93,7 @@ pub struct Worker {
 }
 
 /// Parts of a worker.
-pub struct Parts {
+pub(super) struct Parts {
     /// The scene.
     pub scene: Scene,
     /// The device, opened for the display.
@@ -114,7 +114,7 @@ pub struct Parts {
 
 impl Worker {
     /// Prepares to render.
-    pub fn new(parts: Parts) -> Self {
+    pub(crate) fn new(parts: Parts) -> Self {
         let Parts { scene, device, settings, spp, left, panel, folder, announce } = parts;
         let is_software = device.capabilities().kind == "software";
         let mut worker = Self {
@@ -160,7 +160,7 @@ impl Worker {
     ///
     /// # Errors
     /// A failing device, a lost display, a file that cannot be written.
-    pub fn run(&mut self) -> Result<()> {
+    pub(crate) fn run(&mut self) -> Result<()> {
         let mut last = Instant::now();
         loop {
             self.panel.borrow_mut().attend();
