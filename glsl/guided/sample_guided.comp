@@ -42,7 +42,7 @@ const uint LEAST_LATER_SHARE = 40u;
 // part of its density in the one-sample model, in 256ths. There, at vertices that the camera sees,
 // untraced directions without a contribution (mostly below the horizon) count as blocked. Resampled
 // candidates are not known one by one; at later vertices such rays did not pay
-// (docs/experiments/directions_that_bring_nothing.md).
+// (docs/experiments.md, directions_that_bring_nothing).
 void finish(uint index, uint first, Guided guided, float factor, uint from_brdf) {
     vec3 contribution = guided.sampled.integrand * factor;
     write_ray(index, guided.sampled.direction, contribution);

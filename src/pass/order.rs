@@ -23,7 +23,7 @@ const FEATURES: u32 = AOV_ALBEDO | AOV_NORMAL | AOV_POSITION;
 /// to the bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PathLists {
-    /// Where most paths end early: `docs/experiments/lists_of_living_paths.md`.
+    /// Where most paths end early: `docs/experiments.md`, lists_of_living_paths.
     #[default]
     WherePathsEnd,
     /// Everywhere.
@@ -301,7 +301,7 @@ fn path_list(domain: Domain, vertex: u32, first_listed: u32) -> u32 {
 }
 
 /// Number of rays to lamps at a vertex with `shadow_rays` rays to the environment: half as many, at
-/// least one (docs/experiments/rays_to_lamps.md).
+/// least one (docs/experiments.md, rays_to_lamps).
 fn rays_to_lamps(shadow_rays: u32) -> u32 {
     shadow_rays.div_ceil(2).max(1)
 }

@@ -38,7 +38,7 @@ const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 
 /// Luminance C that compensated tables subtract, in means of the map over the sphere: at least half of
 /// the energy is left, and without contrast the density stays as it is. Chosen by measurement
-/// (`docs/experiments/mis_compensation.md`).
+/// (`docs/experiments.md`, mis_compensation).
 const COMPENSATION: f64 = 0.5;
 
 /// Contents of the device buffers that sample an environment map.
