@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Context, Parameters, Room, knob};
+use super::{Context, Parameters, Room};
 use crate::{
     error::Result,
     pass::{Domain, Kernel, Passes, Steps, Surfaces, Technique},
@@ -73,17 +73,14 @@ impl Room for Basic {
     }
 
     fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
-        let described = match self.tag {
+        match self.tag {
             SAMPLER_RIS => {
                 let candidates = parameters.candidates.unwrap_or(AUTO_RIS_CANDIDATES);
-                Some(("candidates", knob::text_or_auto(Some(candidates))))
+                [("candidates".to_owned(), candidates.to_string())].into()
             }
-            SAMPLER_MIS => {
-                Some(("compensation", knob::name_of(&parameters.compensation, knob::ON_OR_OFF)))
-            }
-            _ => None,
-        };
-        described.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+            SAMPLER_MIS => [parameters.shared("compensation")].into(),
+            _ => BTreeMap::new(),
+        }
     }
 
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {

@@ -1,4 +1,4 @@
-//! Parameters that `--set key=value` sets, one table row each; `Parameters` goes through the tables.
+//! Parameters that `--set key=value` sets: a room declares each in one place, by `parameters!`.
 
 use std::{collections::BTreeMap, fmt::Display, ops::RangeInclusive, str::FromStr};
 
@@ -17,61 +17,102 @@ pub struct Knob<P> {
     pub get: fn(&P) -> String,
 }
 
-/// Sets a parameter; returns false for an unknown key, [`Error::Usage`] for a value out of range.
-pub fn set<P>(knobs: &[Knob<P>], parameters: &mut P, key: &str, value: &str) -> Result<bool> {
-    let Some(knob) = knobs.iter().find(|knob| knob.key == key) else { return Ok(false) };
-    (knob.set)(parameters, value)
-        .map_err(|expected| Error::usage(format!("--set {key}={value}: expected {expected}")))?;
-    Ok(true)
-}
+/// Parameters that a table of knobs sets.
+pub trait Knobs: Sized + 'static {
+    /// The table.
+    const KNOBS: &'static [Knob<Self>];
 
-/// Returns the parameters of a table by key.
-pub fn describe<P>(knobs: &[Knob<P>], parameters: &P) -> BTreeMap<String, String> {
-    knobs.iter().map(|knob| (knob.key.to_owned(), (knob.get)(parameters))).collect()
-}
-
-/// Parses a number within a range.
-pub fn number<T: FromStr + PartialOrd + Display>(
-    target: &mut T,
-    value: &str,
-    range: RangeInclusive<T>,
-) -> Result<(), String> {
-    let parsed = value.parse().ok().filter(|number| range.contains(number));
-    *target = parsed.ok_or_else(|| format!("{} to {}", range.start(), range.end()))?;
-    Ok(())
-}
-
-/// Parses `auto` as `None`, or a number within a range.
-pub fn number_or_auto(
-    target: &mut Option<u32>,
-    value: &str,
-    range: RangeInclusive<u32>,
-) -> Result<(), String> {
-    if value == "auto" {
-        *target = None;
-        return Ok(());
+    /// Sets a parameter; returns false for an unknown key, [`Error::Usage`] for a value out of range.
+    fn set_knob(&mut self, key: &str, value: &str) -> Result<bool> {
+        let Some(knob) = Self::KNOBS.iter().find(|knob| knob.key == key) else { return Ok(false) };
+        let refused = |expected| Error::usage(format!("--set {key}={value}: expected {expected}"));
+        (knob.set)(self, value).map_err(refused)?;
+        Ok(true)
     }
-    let mut count = 0;
-    number(&mut count, value, range).map_err(|expected| format!("auto, or {expected}"))?;
-    *target = Some(count);
-    Ok(())
+
+    /// Returns all parameters by key.
+    fn describe(&self) -> BTreeMap<String, String> {
+        Self::KNOBS.iter().map(|knob| (knob.key.to_owned(), (knob.get)(self))).collect()
+    }
 }
 
-/// Returns `auto` for `None`, else the number.
-pub fn text_or_auto(value: Option<u32>) -> String {
-    value.map_or("auto".to_owned(), |number| number.to_string())
+/// Values that a parameter may have, as text: a range, a table of names, [`Auto`].
+pub trait Values<T> {
+    /// Parses a value, or returns a description of the expected ones.
+    fn parse(&self, text: &str) -> Result<T, String>;
+    /// Returns a value as text.
+    fn text(&self, value: &T) -> String;
 }
 
-/// Parses one of the named values.
-pub fn choice<T: Copy>(target: &mut T, value: &str, names: &[(&str, T)]) -> Result<(), String> {
-    let found = names.iter().find(|(name, _)| *name == value);
-    let known = || names.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(" or ");
-    *target = found.map(|(_, choice)| *choice).ok_or_else(known)?;
-    Ok(())
+impl<T: FromStr + PartialOrd + Display> Values<T> for RangeInclusive<T> {
+    fn parse(&self, text: &str) -> Result<T, String> {
+        let parsed = text.parse().ok().filter(|number| self.contains(number));
+        parsed.ok_or_else(|| format!("{} to {}", self.start(), self.end()))
+    }
+
+    fn text(&self, value: &T) -> String {
+        value.to_string()
+    }
 }
 
-/// Returns the name of a value.
-pub fn name_of<T: PartialEq>(value: &T, names: &[(&str, T)]) -> String {
-    let found = names.iter().find(|(_, choice)| choice == value);
-    found.map_or_else(String::new, |(name, _)| (*name).to_owned())
+impl<T: Copy + PartialEq> Values<T> for &[(&str, T)] {
+    fn parse(&self, text: &str) -> Result<T, String> {
+        let found = self.iter().find(|(name, _)| *name == text);
+        let known = || self.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(" or ");
+        found.map(|(_, value)| *value).ok_or_else(known)
+    }
+
+    fn text(&self, value: &T) -> String {
+        let found = self.iter().find(|(_, named)| named == value);
+        found.map_or_else(String::new, |(name, _)| (*name).to_owned())
+    }
 }
+
+/// A number within the range, or `auto` for `None`.
+pub struct Auto(pub RangeInclusive<u32>);
+
+impl Values<Option<u32>> for Auto {
+    fn parse(&self, text: &str) -> Result<Option<u32>, String> {
+        if text == "auto" {
+            return Ok(None);
+        }
+        self.0.parse(text).map(Some).map_err(|expected| format!("auto, or {expected}"))
+    }
+
+    fn text(&self, value: &Option<u32>) -> String {
+        value.map_or("auto".to_owned(), |number| number.to_string())
+    }
+}
+
+/// Declares a struct of parameters with their keys, defaults and [`Values`].
+macro_rules! parameters {
+    ($(#[$doc:meta])* pub struct $name:ident {
+        $($(#[$about:meta])* $key:literal $field:ident: $kind:ty = $default:expr, $values:expr;)*
+    }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $name {
+            $($(#[$about])* pub $field: $kind,)*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: $default,)* }
+            }
+        }
+
+        impl $crate::sampler::knob::Knobs for $name {
+            const KNOBS: &'static [$crate::sampler::knob::Knob<Self>] = &[
+                $($crate::sampler::knob::Knob {
+                    key: $key,
+                    set: |own, text| {
+                        own.$field = $crate::sampler::knob::Values::parse(&$values, text)?;
+                        Ok(())
+                    },
+                    get: |own| $crate::sampler::knob::Values::text(&$values, &own.$field),
+                },)*
+            ];
+        }
+    };
+}
+pub(super) use parameters;

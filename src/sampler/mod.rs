@@ -1,7 +1,7 @@
 //! The samplers: one room per technique, and the registry of their names.
 //!
 //! A room holds parameters, tables, buffers, passes, learning and figures of one technique. A new
-//! sampler takes a room and a line in `samplers!` below.
+//! sampler takes a room and a line in `registry.rs`.
 
 pub mod basic;
 pub mod control_variates;
@@ -12,6 +12,7 @@ mod parameters;
 mod pilot;
 pub mod portal;
 pub mod product;
+mod registry;
 pub mod tiles;
 pub mod visibility;
 
@@ -19,6 +20,7 @@ use std::collections::BTreeMap;
 
 use clap::{ValueEnum, builder::PossibleValue};
 pub use parameters::Parameters;
+use registry::registry;
 
 use crate::{
     error::{Error, Result},
@@ -49,9 +51,24 @@ pub trait Room: Sync {
         None
     }
 
+    /// Shadow rays at every vertex that the camera sees, where nobody says otherwise: as in the thesis.
+    fn shadow_rays(&self) -> u32 {
+        5
+    }
+
+    /// Edge of the tiles that may share paths under `share-tiles=auto`, pixels; 1 for none.
+    fn auto_tile_edge(&self) -> u32 {
+        1
+    }
+
     /// Film layers that no other sampler has.
     fn aovs(&self) -> &[Aov] {
         &[]
+    }
+
+    /// True if the sampler draws directions through the portals of the scene.
+    fn uses_portals(&self) -> bool {
+        false
     }
 
     /// True if the sampler learns a guide from the whole picture, which outlives its render in a file.
@@ -75,7 +92,8 @@ pub trait Room: Sync {
 }
 
 macro_rules! samplers {
-    ($($(#[$doc:meta])* $sampler:ident $name:literal: $room:expr;)*) => {
+    ($($(#[$doc:meta])* $sampler:ident $name:literal $key:literal = $room:ident $entry:ident
+        $($parameters:ident)?;)*) => {
         /// Samplers of directions at a hit. All trace one shadow ray per direction, and all are
         /// unbiased except with [`Elevation::Metropolis`](product::Elevation::Metropolis) or another
         /// [`Reading`](product::Reading) than `mixture`.
@@ -95,43 +113,22 @@ macro_rules! samplers {
                 }
             }
 
+            /// Key that chooses the sampler in the window.
+            pub fn key(self) -> &'static str {
+                match self {
+                    $(Self::$sampler => $key,)*
+                }
+            }
+
             fn room(self) -> &'static dyn Room {
                 match self {
-                    $(Self::$sampler => &$room,)*
+                    $(Self::$sampler => &$room::$entry,)*
                 }
             }
         }
     };
 }
-
-samplers! {
-    /// Uniform over the hemisphere.
-    Uniform "uniform": basic::UNIFORM;
-    /// Proportional to the cosine.
-    Cosine "cosine": basic::COSINE;
-    /// The BRDF's own sampling.
-    Brdf "brdf": basic::BRDF;
-    /// Proportional to the luminance of the environment map.
-    Env "env": basic::ENV;
-    /// `brdf` and `env` in turns with the one-sample balance heuristic (Veach & Guibas 1995).
-    Mis "mis": basic::MIS;
-    /// Resampled importance sampling over candidates of `mis` (Burke et al. 2005; Talbot et al. 2005).
-    Ris "ris": basic::RIS;
-    /// Lobes of the product of environment and BRDF (Tsai et al. 2008).
-    Product "product": product::ProductRoom;
-    /// `product`, with less weight on lobes near blocked directions (Wu & Shih 2009).
-    Visibility "visibility": visibility::VisibilityRoom;
-    /// Regions of the environment by visibility learned in cells of the scene, across pixels and passes.
-    Guided "guided": guided::GuidedRoom;
-    /// `mis` with directions through the portals of the scene (Ureña et al. 2013).
-    Portal "portal": portal::PortalRoom;
-    /// Product of environment and BRDF on a wavelet basis (Clarberg & Akenine-Möller 2008).
-    Haar "haar": haar::HaarRoom;
-    /// Rays among candidates, with recorded visibility as control variate (Clarberg & Akenine-Möller 2008).
-    ControlVariates "control-variates": control_variates::ControlVariatesRoom;
-    /// `mis` with tiles of the environment by visibility learned in camera space (Atanasov et al. 2018).
-    Tiles "tiles": tiles::TilesRoom;
-}
+registry!(samplers);
 
 impl Sampler {
     /// Returns [`Error::Usage`] for parameters and layers that cannot be rendered.
@@ -160,9 +157,12 @@ impl Sampler {
         let (name, path) = (self.name(), scene.path.display());
         let Some(first) = scene.portals.first() else {
             let message = "the scene has no [[portal]]; directions are those of mis";
-            return (self == Self::Portal).then(|| format!("{path}: --sampler {name}: {message}"));
+            return self
+                .room()
+                .uses_portals()
+                .then(|| format!("{path}: --sampler {name}: {message}"));
         };
-        (self != Self::Portal).then(|| {
+        (!self.room().uses_portals()).then(|| {
             let first = if first.name.is_empty() {
                 String::new()
             } else {
@@ -187,7 +187,7 @@ impl Sampler {
     /// Returns the parameters relevant to the sampler by key, for metadata and statistics.
     pub fn describe(self, parameters: &Parameters) -> BTreeMap<String, String> {
         let mut named = self.room().describe(parameters);
-        if self == Self::Guided || parameters.share_tiles.is_some_and(|edge| edge > 1) {
+        if self.tile_edge(parameters) > 1 || self.room().auto_tile_edge() > 1 {
             named.insert("share-tiles".to_owned(), parameters.share_tiles_text());
         }
         named
@@ -195,14 +195,18 @@ impl Sampler {
 
     /// Edge of the tiles that may share paths, pixels; 1 for none.
     pub fn tile_edge(self, parameters: &Parameters) -> u32 {
-        let automatic = if self == Self::Guided { guided::AUTO_TILE_EDGE } else { 1 };
-        parameters.share_tiles.unwrap_or(automatic)
+        parameters.share_tiles.unwrap_or(self.room().auto_tile_edge())
     }
 
-    /// Shadow rays at every vertex that the camera sees, where nobody says otherwise: 5 as in the thesis,
-    /// more for `guided` (`docs/experiments/shadow_rays_by_worth.md`).
+    /// Shadow rays at every vertex that the camera sees, where nobody says otherwise.
     pub fn shadow_rays(self) -> u32 {
-        if self == Self::Guided { guided::SHADOW_RAYS } else { 5 }
+        self.room().shadow_rays()
+    }
+
+    /// True if no sampler or this one has the film layer for itself.
+    pub fn has_layer(self, layer: Aov) -> bool {
+        let owns = |sampler: &Self| sampler.room().aovs().contains(&layer);
+        owns(&self) || !Self::ALL.iter().any(owns)
     }
 
     /// Memory per path in flight.

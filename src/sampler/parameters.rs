@@ -1,110 +1,116 @@
-//! Parameters of all samplers, set by `--set key=value`. The table of a new room joins `set` and `keys`.
+//! Parameters of all samplers, set by `--set key=value`.
 
 use super::{
-    control_variates::ControlVariatesParameters,
-    guided::GuidedParameters,
-    haar::HaarParameters,
-    knob::{self, Knob},
-    portal::PortalParameters,
+    knob::{Auto, Knob, Knobs, ON_OR_OFF, Values},
     product::ProductParameters,
-    tiles::TilesParameters,
+    registry::registry,
     visibility::VisibilityParameters,
 };
 use crate::error::{Error, Result};
 
-/// Parameters of the samplers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Parameters {
-    /// `share-tiles`: edge of the tiles whose pixels share second vertices, 1 for `off`. `None` is `auto`:
-    /// `guided` measures what it gains, the other samplers do not share.
-    pub share_tiles: Option<u32>,
-    /// `candidates`: directions to choose each shadow ray of `ris`, `control-variates` or `guided` from;
-    /// `None` is `auto`.
-    pub candidates: Option<u32>,
-    /// `compensation`: true if `mis`, `portal` and what `guided` falls back to draw directions of the
-    /// environment by its compensated density, and `tiles` compensates what it has learned.
-    pub compensation: bool,
-    /// Parameters of `product`, also within `visibility`; its shares also within `haar`.
-    pub product: ProductParameters,
-    /// Parameters of `visibility`.
-    pub visibility: VisibilityParameters,
-    /// Parameters of `guided`.
-    pub guided: GuidedParameters,
-    /// Parameters of `portal`.
-    pub portal: PortalParameters,
-    /// Parameters of `haar`.
-    pub haar: HaarParameters,
-    /// Parameters of `control-variates`.
-    pub control_variates: ControlVariatesParameters,
-    /// Parameters of `tiles`.
-    pub tiles: TilesParameters,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            share_tiles: None,
-            candidates: None,
-            compensation: true,
-            product: ProductParameters::default(),
-            visibility: VisibilityParameters::default(),
-            guided: GuidedParameters::default(),
-            portal: PortalParameters::default(),
-            haar: HaarParameters::default(),
-            control_variates: ControlVariatesParameters::default(),
-            tiles: TilesParameters::default(),
+macro_rules! parameters {
+    ($($(#[$doc:meta])* $sampler:ident $name:literal $key:literal = $room:ident $entry:ident
+        $($parameters:ident)?;)*) => {
+        /// Parameters of the samplers.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct Parameters {
+            /// `share-tiles`: edge of the tiles whose pixels share second vertices, 1 for `off`. `None` is
+            /// `auto`: `guided` measures what it gains, the other samplers do not share.
+            pub share_tiles: Option<u32>,
+            /// `candidates`: directions to choose each shadow ray of `ris`, `control-variates` or `guided`
+            /// from; `None` is `auto`.
+            pub candidates: Option<u32>,
+            /// `compensation`: true if `mis`, `portal` and what `guided` falls back to draw directions of the
+            /// environment by its compensated density, and `tiles` compensates what it has learned.
+            pub compensation: bool,
+            $($(#[doc = concat!("Parameters of `", $name, "`.")]
+            pub $room: super::$room::$parameters,)?)*
         }
-    }
+
+        impl Default for Parameters {
+            fn default() -> Self {
+                Self {
+                    share_tiles: None,
+                    candidates: None,
+                    compensation: true,
+                    $($($room: super::$room::$parameters::default(),)?)*
+                }
+            }
+        }
+
+        impl Parameters {
+            /// Sets a parameter; returns false for an unknown key.
+            fn set_any(&mut self, key: &str, value: &str) -> Result<bool> {
+                Ok(self.set_knob(key, value)?
+                    $($(|| super::$room::$parameters::set_knob(&mut self.$room, key, value)?)?)*)
+            }
+
+            /// Every key, sorted.
+            pub fn keys() -> Vec<&'static str> {
+                let mut keys: Vec<_> = Self::KNOBS.iter().map(|knob| knob.key).collect();
+                $($(keys.extend(super::$room::$parameters::KNOBS.iter().map(|knob| knob.key));)?)*
+                keys.sort_unstable();
+                keys
+            }
+        }
+    };
 }
+registry!(parameters);
 
 /// Parameters shared by several rooms.
-const KNOBS: &[Knob<Parameters>] = &[
-    Knob {
-        key: "candidates",
-        set: |parameters, value| {
-            let expected =
-                "auto, 2, 4, 6 or 8 for ris and control-variates, auto, 1, 4 or 8 for guided";
-            let is_known = |count: &Option<u32>| matches!(count, None | Some(1 | 2 | 4 | 6 | 8));
-            let mut candidates = None;
-            knob::number_or_auto(&mut candidates, value, 1..=8).map_err(|_| expected)?;
-            parameters.candidates = Some(candidates).filter(is_known).ok_or(expected)?;
-            Ok(())
+impl Knobs for Parameters {
+    const KNOBS: &'static [Knob<Self>] = &[
+        Knob {
+            key: "candidates",
+            set: |parameters, value| {
+                let expected =
+                    "auto, 2, 4, 6 or 8 for ris and control-variates, auto, 1, 4 or 8 for guided";
+                let is_known =
+                    |count: &Option<u32>| matches!(count, None | Some(1 | 2 | 4 | 6 | 8));
+                let candidates = Auto(1..=8).parse(value).ok().filter(is_known);
+                parameters.candidates = candidates.ok_or(expected)?;
+                Ok(())
+            },
+            get: |parameters| Auto(1..=8).text(&parameters.candidates),
         },
-        get: |parameters| knob::text_or_auto(parameters.candidates),
-    },
-    Knob {
-        key: "compensation",
-        set: |parameters, value| knob::choice(&mut parameters.compensation, value, knob::ON_OR_OFF),
-        get: |parameters| knob::name_of(&parameters.compensation, knob::ON_OR_OFF),
-    },
-    Knob {
-        key: "preset",
-        set: |parameters, value| {
-            let mut product = ProductParameters::default();
-            let presets = [
-                ("default", ProductParameters::default()),
-                ("strict", ProductParameters::strict()),
-            ];
-            knob::choice(&mut product, value, &presets)?;
-            let is_preset = presets.iter().any(|(_, preset)| parameters.product == *preset)
-                && parameters.visibility == VisibilityParameters::default();
-            if !is_preset {
-                return Err(
-                    "it ahead of other parameters of product and visibility, all of which it sets"
-                        .into(),
-                );
-            }
-            parameters.product = product;
-            Ok(())
+        Knob {
+            key: "compensation",
+            set: |parameters, value| {
+                parameters.compensation = ON_OR_OFF.parse(value)?;
+                Ok(())
+            },
+            get: |parameters| ON_OR_OFF.text(&parameters.compensation),
         },
-        get: |_| String::new(),
-    },
-    Knob {
-        key: "share-tiles",
-        set: |parameters, value| knob::choice(&mut parameters.share_tiles, value, SHARE_TILES),
-        get: Parameters::share_tiles_text,
-    },
-];
+        Knob {
+            key: "preset",
+            set: |parameters, value| {
+                let presets: &[_] = &[
+                    ("default", ProductParameters::default()),
+                    ("strict", ProductParameters::strict()),
+                ];
+                let product = presets.parse(value)?;
+                let is_preset = presets.iter().any(|(_, preset)| parameters.product == *preset)
+                    && parameters.visibility == VisibilityParameters::default();
+                if !is_preset {
+                    return Err("it ahead of other parameters of product and visibility, all of \
+                                which it sets"
+                        .into());
+                }
+                parameters.product = product;
+                Ok(())
+            },
+            get: |_| String::new(),
+        },
+        Knob {
+            key: "share-tiles",
+            set: |parameters, value| {
+                parameters.share_tiles = SHARE_TILES.parse(value)?;
+                Ok(())
+            },
+            get: Self::share_tiles_text,
+        },
+    ];
+}
 
 const SHARE_TILES: &[(&str, Option<u32>)] =
     &[("auto", None), ("off", Some(1)), ("2", Some(2)), ("4", Some(4)), ("8", Some(8))];
@@ -112,7 +118,7 @@ const SHARE_TILES: &[(&str, Option<u32>)] =
 impl Parameters {
     /// Returns `share-tiles` as text.
     pub fn share_tiles_text(&self) -> String {
-        knob::name_of(&self.share_tiles, SHARE_TILES)
+        SHARE_TILES.text(&self.share_tiles)
     }
 
     /// Sets one parameter from `key=value`. Returns [`Error::Usage`] for a value out of range, or
@@ -121,15 +127,7 @@ impl Parameters {
         let (key, value) = assignment.split_once('=').ok_or_else(|| {
             Error::usage(format!("--set {assignment}: expected key=value, found no '='"))
         })?;
-        let is_known = knob::set(KNOBS, self, key, value)?
-            || knob::set(ProductParameters::KNOBS, &mut self.product, key, value)?
-            || knob::set(VisibilityParameters::KNOBS, &mut self.visibility, key, value)?
-            || knob::set(GuidedParameters::KNOBS, &mut self.guided, key, value)?
-            || knob::set(PortalParameters::KNOBS, &mut self.portal, key, value)?
-            || knob::set(HaarParameters::KNOBS, &mut self.haar, key, value)?
-            || knob::set(ControlVariatesParameters::KNOBS, &mut self.control_variates, key, value)?
-            || knob::set(TilesParameters::KNOBS, &mut self.tiles, key, value)?;
-        if is_known {
+        if self.set_any(key, value)? {
             return Ok(());
         }
         Err(Error::usage(format!(
@@ -138,21 +136,10 @@ impl Parameters {
         )))
     }
 
-    /// Every key.
-    pub fn keys() -> Vec<&'static str> {
-        let mut keys: Vec<_> = KNOBS
-            .iter()
-            .map(|knob| knob.key)
-            .chain(ProductParameters::KNOBS.iter().map(|knob| knob.key))
-            .chain(VisibilityParameters::KNOBS.iter().map(|knob| knob.key))
-            .chain(GuidedParameters::KNOBS.iter().map(|knob| knob.key))
-            .chain(PortalParameters::KNOBS.iter().map(|knob| knob.key))
-            .chain(HaarParameters::KNOBS.iter().map(|knob| knob.key))
-            .chain(ControlVariatesParameters::KNOBS.iter().map(|knob| knob.key))
-            .chain(TilesParameters::KNOBS.iter().map(|knob| knob.key))
-            .collect();
-        keys.sort_unstable();
-        keys
+    /// Returns one of the parameters shared by several rooms as text, by its key.
+    pub(super) fn shared(&self, key: &str) -> (String, String) {
+        let knob = Self::KNOBS.iter().find(|knob| knob.key == key);
+        (key.to_owned(), knob.map_or_else(String::new, |knob| (knob.get)(self)))
     }
 
     /// Returns the number of candidates; [`Error::Usage`] if one outside `allowed` was requested.

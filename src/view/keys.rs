@@ -1,7 +1,11 @@
 //! The keys of the window: one table for the program and for `docs/view.md`.
 
-use crate::shader::constants::{
-    SHOW_ALBEDO, SHOW_CELLS, SHOW_ERROR, SHOW_LEVELS, SHOW_NORMAL, SHOW_PICTURE, SHOW_VISIBLE,
+use crate::{
+    film::Aov,
+    sampler::Sampler,
+    shader::constants::{
+        SHOW_ALBEDO, SHOW_CELLS, SHOW_ERROR, SHOW_LEVELS, SHOW_NORMAL, SHOW_PICTURE, SHOW_VISIBLE,
+    },
 };
 
 /// Effect of a key.
@@ -9,8 +13,8 @@ use crate::shader::constants::{
 pub enum Action {
     /// Flies along an axis (0 right, 1 up, 2 forward) as long as the key is held.
     Fly(usize, f32),
-    /// Renders by another sampler, counted from 1.
-    Sampler(usize),
+    /// Renders by another sampler.
+    Sampler(Sampler),
     /// Adds to the number of path vertices.
     Depth(i32),
     /// Adds to the exposure, stops.
@@ -39,15 +43,15 @@ pub enum Action {
     Quit,
 }
 
-/// Layers in the order of [`Action::NextLayer`].
-pub(crate) const LAYERS: [(u32, &str); 7] = [
-    (SHOW_PICTURE, "picture"),
-    (SHOW_ERROR, "relative error"),
-    (SHOW_ALBEDO, "albedo"),
-    (SHOW_NORMAL, "normal"),
-    (SHOW_VISIBLE, "visible share"),
-    (SHOW_CELLS, "cells"),
-    (SHOW_LEVELS, "kinds of cells"),
+/// Layers in the order of [`Action::NextLayer`], with the layer of the film that each shows.
+pub(crate) const LAYERS: [(u32, &str, Option<Aov>); 7] = [
+    (SHOW_PICTURE, "picture", None),
+    (SHOW_ERROR, "relative error", None),
+    (SHOW_ALBEDO, "albedo", Some(Aov::Albedo)),
+    (SHOW_NORMAL, "normal", Some(Aov::Normal)),
+    (SHOW_VISIBLE, "visible share", Some(Aov::Visible)),
+    (SHOW_CELLS, "cells", Some(Aov::GuideCell)),
+    (SHOW_LEVELS, "kinds of cells", Some(Aov::GuideCell)),
 ];
 
 /// A key by the text it types, or by its name, and its effect.
@@ -65,8 +69,8 @@ const fn key(key: &'static str, action: Action, about: &'static str) -> Key {
     Key { key, action, about }
 }
 
-/// Every key.
-pub(crate) const KEYS: &[Key] = &[
+/// Every key but those of samplers.
+const KEYS: &[Key] = &[
     key("w", Action::Fly(2, 1.0), "fly forward and back"),
     key("s", Action::Fly(2, -1.0), ""),
     key("a", Action::Fly(0, -1.0), "fly left and right"),
@@ -74,24 +78,6 @@ pub(crate) const KEYS: &[Key] = &[
     key("q", Action::Fly(1, -1.0), "fly down and up"),
     key("e", Action::Fly(1, 1.0), ""),
     key("r", Action::Home, "return to the camera of the scene"),
-    key(
-        "1",
-        Action::Sampler(1),
-        "sampler: uniform, cosine, brdf, env, mis, ris, product, visibility, guided, portal, haar, \
-         control-variates, tiles",
-    ),
-    key("2", Action::Sampler(2), ""),
-    key("3", Action::Sampler(3), ""),
-    key("4", Action::Sampler(4), ""),
-    key("5", Action::Sampler(5), ""),
-    key("6", Action::Sampler(6), ""),
-    key("7", Action::Sampler(7), ""),
-    key("8", Action::Sampler(8), ""),
-    key("9", Action::Sampler(9), ""),
-    key("o", Action::Sampler(10), ""),
-    key("u", Action::Sampler(11), ""),
-    key("v", Action::Sampler(12), ""),
-    key("t", Action::Sampler(13), ""),
     key("x", Action::Split, "two samplers side by side at equal time, or one"),
     key("Tab", Action::Swap, "choose the sampler of the other side"),
     key("[", Action::Depth(-1), "fewer and more path vertices"),
@@ -124,11 +110,17 @@ pub(crate) const KEYS: &[Key] = &[
 /// Returns the effect of a key.
 pub(crate) fn action_of(key: &str) -> Option<Action> {
     let key = if key.chars().count() == 1 { key.to_lowercase() } else { key.to_owned() };
-    KEYS.iter().find(|known| known.key == key).map(|known| known.action)
+    let of_sampler = || Sampler::ALL.iter().copied().find(|sampler| sampler.key() == key);
+    let known = KEYS.iter().find(|known| known.key == key).map(|known| known.action);
+    known.or_else(|| of_sampler().map(Action::Sampler))
 }
 
 /// Keys that share an effect, joined, with it.
-pub fn rows() -> Vec<(String, &'static str)> {
+pub fn rows() -> Vec<(String, String)> {
+    let named = |of: fn(Sampler) -> &'static str, separator| {
+        Sampler::ALL.iter().map(|sampler| of(*sampler)).collect::<Vec<_>>().join(separator)
+    };
+    let samplers = (named(Sampler::key, " "), format!("sampler: {}", named(Sampler::name, ", ")));
     let mut rows: Vec<(Vec<&str>, &str)> = Vec::new();
     for Key { key, about, .. } in KEYS {
         match rows.last_mut() {
@@ -136,25 +128,26 @@ pub fn rows() -> Vec<(String, &'static str)> {
             _ => rows.push((vec![key], about)),
         }
     }
-    rows.into_iter().map(|(keys, about)| (keys.join(" "), about)).collect()
+    let others = rows.into_iter().map(|(keys, about)| (keys.join(" "), about.to_owned()));
+    [samplers].into_iter().chain(others).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampler::Sampler;
 
     #[test]
     fn keys_are_distinct_and_complete() {
-        for (index, one) in KEYS.iter().enumerate() {
-            assert!(KEYS[..index].iter().all(|other| other.key != one.key), "{}", one.key);
+        let mut keys: Vec<&str> = KEYS.iter().map(|key| key.key).collect();
+        keys.extend(Sampler::ALL.iter().map(|sampler| sampler.key()));
+        keys.sort_unstable();
+        assert!(keys.windows(2).all(|pair| pair[0] != pair[1]), "{keys:?}");
+        for sampler in Sampler::ALL {
+            assert_eq!(action_of(sampler.key()), Some(Action::Sampler(*sampler)));
         }
         assert_eq!(action_of("W"), Some(Action::Fly(2, 1.0)));
         assert_eq!(action_of("Escape"), Some(Action::Quit));
         assert_eq!(action_of("y"), None);
-        let names: Vec<&str> = Sampler::ALL.iter().map(|sampler| sampler.name()).collect();
-        let about = KEYS.iter().find(|key| key.key == "1").map_or("", |key| key.about);
-        assert_eq!(about, format!("sampler: {}", names.join(", ")));
-        assert!(rows().iter().any(|(keys, _)| keys == "1 2 3 4 5 6 7 8 9 o u v t"));
+        assert!(rows().iter().any(|(keys, _)| keys == "w s"));
     }
 }

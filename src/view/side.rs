@@ -11,7 +11,7 @@ use crate::{
     sampler::Sampler,
     scene::Scene,
     session::{Renderer, Session, Settings},
-    shader::constants::{SHOW_CELLS, SHOW_LEVELS, SHOW_PICTURE},
+    shader::constants::SHOW_PICTURE,
 };
 
 /// Aim for the time between two pictures.
@@ -34,10 +34,9 @@ impl Side {
         guide: Option<&[u8]>,
     ) -> Result<Self> {
         let sampler = settings.sampler;
-        let mut aovs = vec![Aov::Albedo, Aov::Normal, Aov::Visible];
-        if sampler.has_guide() {
-            aovs.push(Aov::GuideCell);
-        }
+        let mut aovs: Vec<Aov> = LAYERS.iter().filter_map(|(.., layer)| *layer).collect();
+        aovs.retain(|layer| sampler.has_layer(*layer));
+        aovs.dedup();
         let settings = Settings { aovs, ..settings.clone() };
         let renderer = match buffers {
             Some(buffers) => Renderer::with_scene_buffers(device, buffers, scene, settings)?,
@@ -53,9 +52,10 @@ impl Side {
 
     /// Returns `layer`, or the picture where the sampler has no such layer.
     pub(crate) fn layer(&self, layer: u32) -> u32 {
-        let is_known = LAYERS.iter().any(|(known, _)| *known == layer);
-        let is_of_guide = layer == SHOW_CELLS || layer == SHOW_LEVELS;
-        if is_known && (self.sampler.has_guide() || !is_of_guide) { layer } else { SHOW_PICTURE }
+        let is_known = LAYERS.iter().any(|(known, _, of_film)| {
+            *known == layer && of_film.is_none_or(|of_film| self.sampler.has_layer(of_film))
+        });
+        if is_known { layer } else { SHOW_PICTURE }
     }
 
     /// Samples per pixel in the film.

@@ -22,7 +22,7 @@ pub use parameters::ControlVariatesParameters;
 pub use records::RecordGrid;
 pub use steps::{ControlledSteps, PilotSteps};
 
-use super::{Context, Parameters, Room, basic, knob, pilot};
+use super::{Context, Parameters, Room, basic, knob::Knobs, pilot};
 use crate::{
     error::{Error, Result},
     gpu::DescriptorSet,
@@ -45,8 +45,7 @@ impl Room for ControlVariatesRoom {
     }
 
     fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
-        let mut named =
-            knob::describe(ControlVariatesParameters::KNOBS, &parameters.control_variates);
+        let mut named = parameters.control_variates.describe();
         let candidates = parameters.candidates.unwrap_or(basic::AUTO_RIS_CANDIDATES);
         named.insert("candidates".to_owned(), candidates.to_string());
         named.extend(basic::MIS.describe(parameters));

@@ -48,7 +48,7 @@ pub use entries::{decode_entry, decode_visibility};
 pub use estimate::Estimates;
 pub use guide::Guide;
 pub use key::{CellKey, FACE_COUNT, face_normal};
-pub use parameters::{AUTO_TILE_EDGE, GuidedParameters, SHADOW_RAYS};
+pub use parameters::GuidedParameters;
 pub use partition::{MAX_REGIONS, Partition, Region};
 pub use record::{GuidedRay, RecordedGuide};
 pub use recorded_cell::{CellLevel, RecordedCell, RecordedRegion};

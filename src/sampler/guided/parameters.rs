@@ -1,76 +1,44 @@
 //! Parameters of the sampler `guided`.
 
-use crate::sampler::knob::{self, Knob};
+use crate::sampler::knob::{Auto, Values, parameters};
 
 /// Edge of the tiles that `share-tiles=auto` may choose, pixels (`docs/experiments/shared_paths.md`).
 pub const AUTO_TILE_EDGE: u32 = 4;
 
-/// Shadow rays at the vertices that the camera sees, unless told otherwise.
-pub const SHADOW_RAYS: u32 = 8;
-
-/// Parameters of `guided`, apart from the number of candidates.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GuidedParameters {
-    /// `bounce-candidates`: BRDF directions to choose each bounce from by learned arriving light, 1
-    /// to 16; 1 turns learning and choosing off.
-    pub bounce_candidates: u32,
-    /// `guide-memory`: most bytes for the cells.
-    pub guide_memory: u64,
-    /// `later-rays`: most shadow rays at each vertex after the first; `None` is `auto`, a quarter of
-    /// `--shadow-rays`, rounded up.
-    pub later_rays: Option<u32>,
-    /// `open-rays`: most shadow rays at the first vertex in open scenes; `None` is `auto`, a quarter of
-    /// `--shadow-rays`, rounded up, where paths go on, and all of them in direct light.
-    pub open_rays: Option<u32>,
-    /// `regions`: most regions of the environment, 16 to 1024; a render starts with 256.
-    pub regions: u32,
+parameters! {
+    /// Parameters of `guided`, apart from the number of candidates.
+    pub struct GuidedParameters {
+        /// `bounce-candidates`: BRDF directions to choose each bounce from by learned arriving light, 1
+        /// to 16; 1 turns learning and choosing off.
+        "bounce-candidates" bounce_candidates: u32 = 4, 1..=16;
+        /// `guide-memory`: most bytes for the cells.
+        "guide-memory" guide_memory: u64 = 128 << 20, Bytes;
+        /// `later-rays`: most shadow rays at each vertex after the first; `None` is `auto`, a quarter of
+        /// `--shadow-rays`, rounded up.
+        "later-rays" later_rays: Option<u32> = None, Auto(1..=4096);
+        /// `open-rays`: most shadow rays at the first vertex in open scenes; `None` is `auto`, a quarter of
+        /// `--shadow-rays`, rounded up, where paths go on, and all of them in direct light.
+        "open-rays" open_rays: Option<u32> = None, Auto(1..=4096);
+        /// `regions`: most regions of the environment, 16 to 1024; a render starts with 256.
+        "regions" regions: u32 = 1024, 16..=1024;
+    }
 }
 
-impl Default for GuidedParameters {
-    fn default() -> Self {
-        Self {
-            bounce_candidates: 4,
-            guide_memory: 128 << 20,
-            later_rays: None,
-            open_rays: None,
-            regions: 1024,
-        }
+/// At least a mebibyte, with or without a unit.
+struct Bytes;
+
+impl Values<u64> for Bytes {
+    fn parse(&self, text: &str) -> Result<u64, String> {
+        let bytes = parse_bytes(text).filter(|bytes| (1 << 20..=1 << 40).contains(bytes));
+        bytes.ok_or_else(|| "1MiB or more, as in 128MiB".to_owned())
+    }
+
+    fn text(&self, value: &u64) -> String {
+        value.to_string()
     }
 }
 
 impl GuidedParameters {
-    pub(in crate::sampler) const KNOBS: &'static [Knob<Self>] = &[
-        Knob {
-            key: "bounce-candidates",
-            set: |own, value| knob::number(&mut own.bounce_candidates, value, 1..=16),
-            get: |own| own.bounce_candidates.to_string(),
-        },
-        Knob {
-            key: "guide-memory",
-            set: |own, value| {
-                let bytes = parse_bytes(value).filter(|bytes| (1 << 20..=1 << 40).contains(bytes));
-                own.guide_memory = bytes.ok_or("1MiB or more, as in 128MiB")?;
-                Ok(())
-            },
-            get: |own| own.guide_memory.to_string(),
-        },
-        Knob {
-            key: "later-rays",
-            set: |own, value| knob::number_or_auto(&mut own.later_rays, value, 1..=4096),
-            get: |own| knob::text_or_auto(own.later_rays),
-        },
-        Knob {
-            key: "open-rays",
-            set: |own, value| knob::number_or_auto(&mut own.open_rays, value, 1..=4096),
-            get: |own| knob::text_or_auto(own.open_rays),
-        },
-        Knob {
-            key: "regions",
-            set: |own, value| knob::number(&mut own.regions, value, 16..=1024),
-            get: |own| own.regions.to_string(),
-        },
-    ];
-
     /// Returns the shadow rays at each later vertex, given `shadow_rays` at the first: later
     /// vertices cause less of the error at the same cost per ray (`docs/experiments/later_rays.md`).
     pub fn later_rays_of(&self, shadow_rays: u32) -> u32 {

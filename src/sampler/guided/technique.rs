@@ -5,7 +5,7 @@ use super::{
     choice::{Choice, Trial},
     cost::GUIDED_CANDIDATES,
     epoch::{TRAINING_SEED, with_epoch},
-    parameters::{AUTO_TILE_EDGE, GuidedParameters},
+    parameters::AUTO_TILE_EDGE,
     state::GuideState,
     steps::GuidedSteps,
     tiles::TileChoice,
@@ -21,7 +21,7 @@ use crate::{
     sampler::{
         Context, Parameters, Room,
         basic::{self, BasicSteps},
-        knob,
+        knob::Knobs,
     },
     shader::{constants::TRAINING_WAVE, structs::Wave},
 };
@@ -43,14 +43,22 @@ impl Room for GuidedRoom {
         &[Aov::GuideCell]
     }
 
+    /// More than others: `docs/experiments/shadow_rays_by_worth.md`.
+    fn shadow_rays(&self) -> u32 {
+        8
+    }
+
+    fn auto_tile_edge(&self) -> u32 {
+        AUTO_TILE_EDGE
+    }
+
     fn has_guide(&self) -> bool {
         true
     }
 
     fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
-        let mut named = knob::describe(GuidedParameters::KNOBS, &parameters.guided);
-        named.insert("candidates".to_owned(), knob::text_or_auto(parameters.candidates));
-        named.extend(basic::MIS.describe(parameters));
+        let mut named = parameters.guided.describe();
+        named.extend([parameters.shared("candidates"), parameters.shared("compensation")]);
         named
     }
 

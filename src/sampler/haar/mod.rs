@@ -18,9 +18,7 @@ pub use parameters::HaarParameters;
 pub use steps::HaarSteps;
 use tree::Tree;
 
-use super::{
-    Context, Parameters, Room, knob, product::ProductParameters, visibility::VisibilityParameters,
-};
+use super::{Context, Parameters, Room, knob::Knobs};
 use crate::{
     error::Result,
     gpu::DescriptorSet,
@@ -35,9 +33,9 @@ impl Room for HaarRoom {
     }
 
     fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
-        let mut named = knob::describe(HaarParameters::KNOBS, &parameters.haar);
-        let mut shared = knob::describe(ProductParameters::KNOBS, &parameters.product);
-        shared.extend(knob::describe(VisibilityParameters::KNOBS, &parameters.visibility));
+        let mut named = parameters.haar.describe();
+        let mut shared = parameters.product.describe();
+        shared.extend(parameters.visibility.describe());
         let cache: &[&str] = if parameters.haar.has_cache { &["k", "tau"] } else { &[] };
         let used = [&["brdf-share", "environment-share"], cache].concat();
         named.extend(shared.into_iter().filter(|(key, _)| used.contains(&key.as_str())));

@@ -10,7 +10,7 @@ use std::{collections::BTreeMap, sync::Arc};
 
 pub use parameters::PortalParameters;
 
-use super::{Context, Parameters, Room, knob};
+use super::{Context, Parameters, Room, knob::Knobs};
 use crate::{
     error::Result,
     gpu::{Buffer, DescriptorSet, Device},
@@ -26,10 +26,13 @@ use crate::{
 pub(super) struct PortalRoom;
 
 impl Room for PortalRoom {
+    fn uses_portals(&self) -> bool {
+        true
+    }
+
     fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
-        let mut named = knob::describe(PortalParameters::KNOBS, &parameters.portal);
-        let compensation = knob::name_of(&parameters.compensation, knob::ON_OR_OFF);
-        named.insert("compensation".to_owned(), compensation);
+        let mut named = parameters.portal.describe();
+        named.extend([parameters.shared("compensation")]);
         named
     }
 

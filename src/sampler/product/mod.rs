@@ -17,7 +17,7 @@ pub use lobes::{LobeBuffers, LobeSize};
 pub use parameters::{Elevation, LobeOrder, ProductParameters, Reading};
 pub use steps::ProductSteps;
 
-use super::{Context, Parameters, Room, knob};
+use super::{Context, Parameters, Room, knob::Knobs};
 use crate::{
     error::{Error, Result},
     gpu::DescriptorSet,
@@ -42,7 +42,7 @@ impl Room for ProductRoom {
     }
 
     fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
-        knob::describe(ProductParameters::KNOBS, &parameters.product)
+        parameters.product.describe()
     }
 
     fn demand(&self, parameters: &Parameters, _shadow_rays: u32) -> PathDemand {

@@ -2,7 +2,7 @@
 
 use crate::{
     error::{Error, Result},
-    sampler::knob::{self, Knob},
+    sampler::knob::{Values, parameters},
     shader::constants::{
         READING_CHOSEN_LOBE, READING_CHOSEN_PAIR, READING_MIXTURE, READING_WEIGHTS_BEFORE,
     },
@@ -80,42 +80,45 @@ impl Reading {
     }
 }
 
-/// Parameters of `product`, also within `visibility`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ProductParameters {
-    /// `environment-lobes`: lobes fitted to the environment.
-    pub environment_lobes: u32,
-    /// `brdf-lobes`: lobes fitted to each view of a material.
-    pub brdf_lobes: u32,
-    /// `views`: view elevations at which a material is fitted; a hit takes the nearest.
-    pub views: u32,
-    /// `lobes`: product lobes kept at a hit.
-    pub kept_lobes: u32,
-    /// `order`: `integral` or `coefficient`.
-    pub order: LobeOrder,
-    /// `brdf-share`: share of directions from the BRDF's own sampling, more than 0.
-    pub brdf_share: f32,
-    /// `environment-share`: share of directions from the environment map.
-    pub environment_share: f32,
-    /// `elevation`: `inverse` or `metropolis`.
-    pub elevation: Elevation,
-    /// `reading`: `mixture`, or a biased reading of the thesis.
-    pub reading: Reading,
+/// Values of which some bias the image, which their text says too.
+struct MaybeBiased<T: 'static>(&'static [(&'static str, T)], fn(&T) -> bool);
+
+impl<T: Copy + PartialEq> Values<T> for MaybeBiased<T> {
+    fn parse(&self, text: &str) -> Result<T, String> {
+        self.0.parse(text)
+    }
+
+    fn text(&self, value: &T) -> String {
+        self.0.text(value) + if (self.1)(value) { " (biased)" } else { "" }
+    }
 }
 
-impl Default for ProductParameters {
-    fn default() -> Self {
-        Self {
-            environment_lobes: 100,
-            brdf_lobes: 20,
-            views: 32,
-            kept_lobes: 64,
-            order: LobeOrder::Integral,
-            brdf_share: 0.25,
-            environment_share: 0.25,
-            elevation: Elevation::Inverse,
-            reading: Reading::Mixture,
-        }
+const MAYBE_BIASED_ELEVATIONS: MaybeBiased<Elevation> =
+    MaybeBiased(ELEVATIONS, |elevation| *elevation == Elevation::Metropolis);
+const MAYBE_BIASED_READINGS: MaybeBiased<Reading> =
+    MaybeBiased(READINGS, |reading| reading.bias().is_some());
+
+parameters! {
+    /// Parameters of `product`, also within `visibility`.
+    pub struct ProductParameters {
+        /// `environment-lobes`: lobes fitted to the environment.
+        "environment-lobes" environment_lobes: u32 = 100, 1..=1000;
+        /// `brdf-lobes`: lobes fitted to each view of a material.
+        "brdf-lobes" brdf_lobes: u32 = 20, 1..=64;
+        /// `views`: view elevations at which a material is fitted; a hit takes the nearest.
+        "views" views: u32 = 32, 1..=256;
+        /// `lobes`: product lobes kept at a hit.
+        "lobes" kept_lobes: u32 = 64, 1..=512;
+        /// `order`: `integral` or `coefficient`.
+        "order" order: LobeOrder = LobeOrder::Integral, ORDERS;
+        /// `brdf-share`: share of directions from the BRDF's own sampling, more than 0.
+        "brdf-share" brdf_share: f32 = 0.25, 0.001..=1.0;
+        /// `environment-share`: share of directions from the environment map.
+        "environment-share" environment_share: f32 = 0.25, 0.0..=0.999;
+        /// `elevation`: `inverse` or `metropolis`.
+        "elevation" elevation: Elevation = Elevation::Inverse, MAYBE_BIASED_ELEVATIONS;
+        /// `reading`: `mixture`, or a biased reading of the thesis.
+        "reading" reading: Reading = Reading::Mixture, MAYBE_BIASED_READINGS;
     }
 }
 
@@ -124,60 +127,6 @@ impl Default for ProductParameters {
 const MOST_PAIRS: u32 = 25_000;
 
 impl ProductParameters {
-    pub(in crate::sampler) const KNOBS: &'static [Knob<Self>] = &[
-        Knob {
-            key: "environment-lobes",
-            set: |own, value| knob::number(&mut own.environment_lobes, value, 1..=1000),
-            get: |own| own.environment_lobes.to_string(),
-        },
-        Knob {
-            key: "brdf-lobes",
-            set: |own, value| knob::number(&mut own.brdf_lobes, value, 1..=64),
-            get: |own| own.brdf_lobes.to_string(),
-        },
-        Knob {
-            key: "views",
-            set: |own, value| knob::number(&mut own.views, value, 1..=256),
-            get: |own| own.views.to_string(),
-        },
-        Knob {
-            key: "lobes",
-            set: |own, value| knob::number(&mut own.kept_lobes, value, 1..=512),
-            get: |own| own.kept_lobes.to_string(),
-        },
-        Knob {
-            key: "order",
-            set: |own, value| knob::choice(&mut own.order, value, ORDERS),
-            get: |own| knob::name_of(&own.order, ORDERS),
-        },
-        Knob {
-            key: "brdf-share",
-            set: |own, value| knob::number(&mut own.brdf_share, value, 0.001..=1.0),
-            get: |own| own.brdf_share.to_string(),
-        },
-        Knob {
-            key: "environment-share",
-            set: |own, value| knob::number(&mut own.environment_share, value, 0.0..=0.999),
-            get: |own| own.environment_share.to_string(),
-        },
-        Knob {
-            key: "elevation",
-            set: |own, value| knob::choice(&mut own.elevation, value, ELEVATIONS),
-            get: |own| match own.elevation {
-                Elevation::Inverse => "inverse".to_owned(),
-                Elevation::Metropolis => "metropolis (biased)".to_owned(),
-            },
-        },
-        Knob {
-            key: "reading",
-            set: |own, value| knob::choice(&mut own.reading, value, READINGS),
-            get: |own| {
-                let bias = own.reading.bias().map_or("", |_| " (biased)");
-                knob::name_of(&own.reading, READINGS) + bias
-            },
-        },
-    ];
-
     /// Follows the thesis to the letter where it is sound: lobes by coefficient, and of the shares
     /// that it lacks only as much as keeps the sampler unbiased.
     pub fn strict() -> Self {

@@ -36,7 +36,7 @@ pub use grid::SectorGrid;
 pub use parameters::TilesParameters;
 pub use steps::TileSteps;
 
-use super::{Context, Parameters, Room, basic, guided::Partition, knob, pilot};
+use super::{Context, Parameters, Room, basic, guided::Partition, knob::Knobs, pilot};
 use crate::{
     error::Result,
     gpu::DescriptorSet,
@@ -47,7 +47,7 @@ pub(super) struct TilesRoom;
 
 impl Room for TilesRoom {
     fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
-        let mut named = knob::describe(TilesParameters::KNOBS, &parameters.tiles);
+        let mut named = parameters.tiles.describe();
         named.extend(basic::MIS.describe(parameters));
         named
     }

@@ -14,8 +14,9 @@ pub use parameters::{CacheScope, Threshold, VisibilityParameters};
 pub use steps::VisibilitySteps;
 
 use super::{
-    Context, Parameters, Room, knob,
-    product::{self, Fits, LobeBuffers, LobeSize, ProductParameters},
+    Context, Parameters, Room,
+    knob::Knobs,
+    product::{self, Fits, LobeBuffers, LobeSize},
 };
 use crate::{
     error::{Error, Result},
@@ -46,8 +47,8 @@ impl Room for VisibilityRoom {
     }
 
     fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
-        let mut named = knob::describe(ProductParameters::KNOBS, &parameters.product);
-        named.extend(knob::describe(VisibilityParameters::KNOBS, &parameters.visibility));
+        let mut named = parameters.product.describe();
+        named.extend(parameters.visibility.describe());
         named
     }
 

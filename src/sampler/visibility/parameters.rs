@@ -2,7 +2,7 @@
 
 use crate::{
     error::{Error, Result},
-    sampler::knob::{self, Knob},
+    sampler::knob::parameters,
 };
 
 /// Criterion for a direction close to a lobe.
@@ -28,62 +28,23 @@ pub enum CacheScope {
 
 const SCOPES: &[(&str, CacheScope)] = &[("hit", CacheScope::Hit), ("pixel", CacheScope::Pixel)];
 
-/// Parameters of `visibility` beside those of `product`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct VisibilityParameters {
-    /// `k`: exponent of the visibility weight `(1 / (1 + Num))^k`.
-    pub exponent: f32,
-    /// `tau`: closeness in deviations of a lobe.
-    pub threshold_scale: f32,
-    /// `threshold`: `sigma` or `fixed`.
-    pub threshold: Threshold,
-    /// `cache`: `hit` or `pixel`.
-    pub cache: CacheScope,
-    /// `cache-capacity`: directions in a cache.
-    pub cache_capacity: u32,
-}
-
-impl Default for VisibilityParameters {
-    fn default() -> Self {
-        Self {
-            exponent: 2.0,
-            threshold_scale: 1.0,
-            threshold: Threshold::Sigma,
-            cache: CacheScope::Hit,
-            cache_capacity: 16,
-        }
+parameters! {
+    /// Parameters of `visibility` beside those of `product`.
+    pub struct VisibilityParameters {
+        /// `k`: exponent of the visibility weight `(1 / (1 + Num))^k`.
+        "k" exponent: f32 = 2.0, 0.0..=16.0;
+        /// `tau`: closeness in deviations of a lobe.
+        "tau" threshold_scale: f32 = 1.0, 0.0..=100.0;
+        /// `threshold`: `sigma` or `fixed`.
+        "threshold" threshold: Threshold = Threshold::Sigma, THRESHOLDS;
+        /// `cache`: `hit` or `pixel`.
+        "cache" cache: CacheScope = CacheScope::Hit, SCOPES;
+        /// `cache-capacity`: directions in a cache.
+        "cache-capacity" cache_capacity: u32 = 16, 1..=64;
     }
 }
 
 impl VisibilityParameters {
-    pub(in crate::sampler) const KNOBS: &'static [Knob<Self>] = &[
-        Knob {
-            key: "k",
-            set: |own, value| knob::number(&mut own.exponent, value, 0.0..=16.0),
-            get: |own| own.exponent.to_string(),
-        },
-        Knob {
-            key: "tau",
-            set: |own, value| knob::number(&mut own.threshold_scale, value, 0.0..=100.0),
-            get: |own| own.threshold_scale.to_string(),
-        },
-        Knob {
-            key: "threshold",
-            set: |own, value| knob::choice(&mut own.threshold, value, THRESHOLDS),
-            get: |own| knob::name_of(&own.threshold, THRESHOLDS),
-        },
-        Knob {
-            key: "cache",
-            set: |own, value| knob::choice(&mut own.cache, value, SCOPES),
-            get: |own| knob::name_of(&own.cache, SCOPES),
-        },
-        Knob {
-            key: "cache-capacity",
-            set: |own, value| knob::number(&mut own.cache_capacity, value, 1..=64),
-            get: |own| own.cache_capacity.to_string(),
-        },
-    ];
-
     /// Returns [`Error::Usage`] for combinations that cannot be rendered.
     pub fn check(&self, depth: u32) -> Result<()> {
         if self.cache == CacheScope::Pixel && depth > 1 {

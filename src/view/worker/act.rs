@@ -74,7 +74,7 @@ impl Worker {
             Action::Layer(layer) => self.toggle_layer(layer)?,
             Action::NextLayer => {
                 let now = self.panel.borrow().layer;
-                let at = LAYERS.iter().position(|(layer, _)| *layer == now).unwrap_or(0);
+                let at = LAYERS.iter().position(|(layer, ..)| *layer == now).unwrap_or(0);
                 self.panel.borrow_mut().layer = LAYERS[(at + 1) % LAYERS.len()].0;
                 self.show_again()?;
             }
@@ -109,10 +109,7 @@ impl Worker {
         self.show_again()
     }
 
-    fn choose_sampler(&mut self, number: usize) -> Result<()> {
-        let Some(sampler) = Sampler::ALL.get(number.wrapping_sub(1)).copied() else {
-            return Ok(());
-        };
+    fn choose_sampler(&mut self, sampler: Sampler) -> Result<()> {
         if self.chooses_right {
             self.right_sampler = sampler;
             self.right = None;

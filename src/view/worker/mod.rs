@@ -321,7 +321,7 @@ impl Worker {
         let panel = self.panel.borrow();
         if panel.layer != SHOW_PICTURE {
             let name =
-                LAYERS.iter().find(|(layer, _)| *layer == panel.layer).map(|(_, name)| *name);
+                LAYERS.iter().find(|(layer, ..)| *layer == panel.layer).map(|(_, name, _)| *name);
             title += &format!(" | {}", name.unwrap_or_default());
         }
         if self.motion != Motion::Rest {
