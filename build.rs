@@ -1,14 +1,14 @@
-//! Compiles `glsl/**/*.comp` to SPIR-V against the declarations of `src/shader`, and writes the table of
-//! shaders.
+//! Compiles `glsl/**/*.comp` to SPIR-V against the declarations of `src/shader` and of the rooms in
+//! `src/sampler`, and writes the table of shaders.
 
-#[path = "src/shader/bindings.rs"]
+#[path = "src/shader"]
 #[expect(dead_code, reason = "the crate uses the rest")]
-mod bindings;
-#[path = "src/shader/constants.rs"]
-mod constants;
-#[path = "src/shader/structs.rs"]
-#[expect(dead_code, reason = "the crate uses the rest")]
-mod structs;
+mod shader {
+    pub mod bindings;
+    pub mod constants;
+    pub mod rooms;
+    pub mod structs;
+}
 
 use std::{
     cell::RefCell,
@@ -21,7 +21,10 @@ use std::{
     rc::Rc,
 };
 
-use bindings::{Binding, Kind, TABLES};
+use shader::{
+    bindings::{Binding, Kind},
+    constants, rooms,
+};
 
 /// Folder of the common passes; one folder in it for the passes of each technique.
 const SHADER_FOLDER: &str = "glsl";
@@ -64,14 +67,14 @@ fn entry_points(folder: &Path) -> Result<Vec<PathBuf>, String> {
 /// GLSL of every struct, and a macro for every buffer.
 fn interface() -> String {
     let mut text = String::new();
-    for shared in structs::STRUCTS {
+    for shared in rooms::structs() {
         let members = shared.members.iter().fold(String::new(), |mut members, member| {
             let _ = write!(members, "{} {}; ", member.kind, member.name);
             members
         });
         let _ = writeln!(text, "struct {} {{ {members}}};", shared.name);
     }
-    for binding in TABLES.iter().flat_map(|table| table.bindings) {
+    for binding in rooms::tables().flat_map(|table| table.bindings) {
         let Binding { set, number, kind, .. } = *binding;
         let name = binding.glsl_name();
         let buffer = |element: &str, brackets: &str| {
@@ -103,13 +106,13 @@ fn compile_all() -> Result<(), String> {
     options.set_optimization_level(shaderc::OptimizationLevel::Performance);
     options.set_generate_debug_info();
     options.set_warnings_as_errors();
-    for (name, value) in constants::CONSTANTS {
+    for (name, value) in rooms::constants() {
         options.add_macro_definition(name, Some(&format!("{value}u")));
     }
     let [red, green, blue] = constants::LUMINANCE_WEIGHTS;
     let weights = format!("vec3({red}, {green}, {blue})");
     options.add_macro_definition("LUMINANCE_WEIGHTS", Some(&weights));
-    for table in TABLES {
+    for table in rooms::tables() {
         let name = format!("SET_{}", table.name.to_uppercase());
         options.add_macro_definition(&name, Some(&table.set.to_string()));
     }

@@ -26,7 +26,9 @@ use fenestra::{
     session::Settings,
     shader::{
         bindings::{probe, scene},
-        constants::{CONSTANT_CONTROL_BITS, CONSTANT_CONTROL_CHOICE, CONSTANT_CONTROL_SHARE},
+        rooms::control_variates::{
+            CONSTANT_CONTROL_BITS, CONSTANT_CONTROL_CHOICE, CONSTANT_CONTROL_SHARE,
+        },
         structs::SceneParameters,
     },
 };

@@ -11,8 +11,7 @@ use fenestra::{
     },
     scene::environment::{EnvironmentMap, EnvironmentTables},
     shader::{
-        bindings::guided,
-        constants::{GUIDE_NO_KEY, GUIDE_REFINED, GUIDE_RESPONSE_UNITS},
+        rooms::guided::{self, GUIDE_NO_KEY, GUIDE_REFINED, GUIDE_RESPONSE_UNITS},
         spirv::used_bindings,
     },
 };

@@ -22,7 +22,7 @@ use fenestra::{
     },
     scene::Scene,
     session::{Renderer, Settings},
-    shader::constants::{GUIDE_COUNT_WORDS, GUIDE_RESPONSE_UNITS},
+    shader::rooms::guided::{GUIDE_COUNT_WORDS, GUIDE_RESPONSE_UNITS},
 };
 use glam::Vec3;
 

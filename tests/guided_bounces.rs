@@ -30,7 +30,8 @@ use fenestra::{
     session::{Renderer, Settings, window_of},
     shader::{
         bindings::{PROBE, probe},
-        constants::{CONSTANT_BOUNCE_CANDIDATES, CONSTANT_MATERIAL_KINDS},
+        constants::CONSTANT_MATERIAL_KINDS,
+        rooms::guided::CONSTANT_BOUNCE_CANDIDATES,
         spirv,
         structs::{PathState, Ray, Wave},
     },

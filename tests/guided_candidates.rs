@@ -28,7 +28,8 @@ use fenestra::{
     session::{Renderer, Settings, window_of},
     shader::{
         bindings::{PROBE, probe},
-        constants::{CONSTANT_BRDF_CANDIDATES, CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS},
+        constants::{CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS},
+        rooms::guided::CONSTANT_BRDF_CANDIDATES,
         structs::Wave,
     },
 };

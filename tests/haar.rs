@@ -33,10 +33,8 @@ use fenestra::{
     session::{Settings, window_of},
     shader::{
         bindings::{PROBE, probe},
-        constants::{
-            CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_SHARE, CONSTANT_HAAR_DEPTH,
-            CONSTANT_HAAR_LEVEL,
-        },
+        rooms::haar::{CONSTANT_HAAR_DEPTH, CONSTANT_HAAR_LEVEL},
+        rooms::product::{CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_SHARE},
         structs::Wave,
     },
 };

@@ -9,9 +9,10 @@ use std::{
 };
 
 use fenestra::shader::{
-    bindings::{Binding, Kind, TABLES},
+    bindings::{Binding, Kind},
+    rooms,
     spirv::PASSES,
-    structs::{STRUCTS, SharedStruct},
+    structs::SharedStruct,
 };
 
 /// One member on either side; `kind` is the GLSL type.
@@ -214,7 +215,7 @@ fn member_drifts(name: &str, host: &[Member], shader: &[Member]) -> Vec<String> 
 /// How a module differs from the host, one line each; the structs it uses join `used`. A struct
 /// that the host does not have is a drift where `is_pass`; probes may have their own.
 fn drifts(module: &Module, is_pass: bool, used: &mut BTreeSet<&'static str>) -> Vec<String> {
-    let host = |name: &str| STRUCTS.iter().find(|host| host.name == name);
+    let host = |name: &str| rooms::structs().find(|host| host.name == name);
     let mut drifts = Vec::new();
     for (id, kinds) in module.structs_in_memory() {
         let name = module.name(id);
@@ -226,7 +227,7 @@ fn drifts(module: &Module, is_pass: bool, used: &mut BTreeSet<&'static str>) -> 
                 drifts.push(format!("{name}: host {} bytes, shader {size}", host.size));
             }
         } else if is_pass {
-            drifts.push(format!("{name}: not in src/shader/structs.rs"));
+            drifts.push(format!("{name}: neither in src/shader/structs.rs nor in a room"));
         }
     }
     for (array, stride) in &module.array_strides {
@@ -276,7 +277,7 @@ fn shaders_and_host_agree_on_every_struct() {
         let of_shader = drifts(&module, is_pass, &mut used);
         found.extend(of_shader.into_iter().map(|drift| format!("{name}: {drift}")));
     }
-    for host in STRUCTS {
+    for host in rooms::structs() {
         if !used.contains(host.name) {
             found.push(format!("{}: no shader uses it", host.name));
         }
@@ -336,7 +337,7 @@ fn a_planted_drift_is_found() {
 
 #[test]
 fn missing_and_retyped_members_are_found() {
-    let ray = members_of(STRUCTS.iter().find(|host| host.name == "Ray").unwrap());
+    let ray = members_of(rooms::structs().find(|host| host.name == "Ray").unwrap());
     let drifts = |shader: &[Member]| member_drifts("Ray", &ray, shader);
     assert_eq!(drifts(&ray), [""; 0]);
     assert_eq!(drifts(&ray[..3]), ["Ray.brdf_pdf: missing in the shader"]);
@@ -353,15 +354,15 @@ fn missing_and_retyped_members_are_found() {
 
 /// Every declared buffer by set and number.
 fn declared() -> BTreeMap<(u32, u32), Binding> {
-    let bindings = TABLES.iter().flat_map(|table| table.bindings);
+    let bindings = rooms::tables().flat_map(|table| table.bindings);
     bindings.map(|binding| ((binding.set, binding.number), *binding)).collect()
 }
 
 #[test]
 fn tables_are_in_order_and_share_no_number() {
-    let all = TABLES.iter().flat_map(|table| table.bindings).count();
+    let all = rooms::tables().flat_map(|table| table.bindings).count();
     assert_eq!(declared().len(), all, "two buffers share a place");
-    for table in TABLES {
+    for table in rooms::tables() {
         assert!(table.bindings.windows(2).all(|pair| pair[0].number < pair[1].number));
         assert!(table.bindings.iter().all(|binding| binding.set == table.set));
         assert!(table.bindings.iter().all(|binding| !binding.about.is_empty()));
@@ -372,7 +373,7 @@ fn tables_are_in_order_and_share_no_number() {
 fn shaders_use_the_declared_buffers_of_one_table_a_set() {
     let declared = declared();
     let table_of = |place: (u32, u32)| {
-        TABLES.iter().position(|table| {
+        rooms::tables().position(|table| {
             let at = |binding: &Binding| (binding.set, binding.number);
             table.bindings.iter().any(|binding| at(binding) == place)
         })

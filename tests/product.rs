@@ -26,10 +26,12 @@ use fenestra::{
     session::{Settings, window_of},
     shader::{
         bindings::{FILM, PROBE, film, probe},
-        constants::{
-            CONSTANT_BRDF_SHARE, CONSTANT_CACHE_CAPACITY, CONSTANT_ENVIRONMENT_SHARE,
-            CONSTANT_FIXED_THRESHOLD, CONSTANT_KEPT_LOBES, CONSTANT_READING,
-            CONSTANT_THRESHOLD_SCALE, CONSTANT_VISIBILITY_EXPONENT,
+        rooms::product::{
+            CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_SHARE, CONSTANT_KEPT_LOBES, CONSTANT_READING,
+        },
+        rooms::visibility::{
+            CONSTANT_CACHE_CAPACITY, CONSTANT_FIXED_THRESHOLD, CONSTANT_THRESHOLD_SCALE,
+            CONSTANT_VISIBILITY_EXPONENT,
         },
         structs::{Counters, Wave},
     },

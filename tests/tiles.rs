@@ -38,7 +38,7 @@ use fenestra::{
     session::{Settings, window_of},
     shader::{
         bindings::{PROBE, probe},
-        constants::{TILE_RESPONSE_UNITS, TILE_SCALE},
+        rooms::tiles::{TILE_RESPONSE_UNITS, TILE_SCALE},
         structs::{SceneParameters, ShadowRay, Wave},
     },
 };

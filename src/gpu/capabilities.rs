@@ -10,7 +10,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     memory,
-    shader::bindings::{Kind, TABLES},
+    shader::{bindings::Kind, rooms},
 };
 
 /// Identity, limits and features of a Vulkan device, as far as Fenestra needs them.
@@ -117,7 +117,7 @@ impl Capabilities {
 /// but of the sampler and the film the larger one. Texel buffers do not count.
 fn most_bindings() -> u32 {
     let [scene, sampler, wave, film] = [0, 1, 2, 3].map(|set| {
-        let tables = TABLES.iter().filter(|table| table.set == set);
+        let tables = rooms::tables().filter(|table| table.set == set);
         let storage_buffers = tables.map(|table| {
             let is_storage = |kind| !matches!(kind, Kind::Texels(_));
             table.bindings.iter().filter(|binding| is_storage(binding.kind)).count() as u32

@@ -1,11 +1,14 @@
-//! Layouts of descriptor sets, made from the tables of `shader::bindings`.
+//! Layouts of descriptor sets, made from the tables of `shader::rooms`.
 
 use ash::vk;
 
 use super::Called;
 use crate::{
     error::Result,
-    shader::bindings::{Binding, BindingTable, Kind, TABLES},
+    shader::{
+        bindings::{Binding, BindingTable, Kind},
+        rooms,
+    },
 };
 
 /// Returns the type of descriptor that the buffer of `binding` takes.
@@ -24,16 +27,16 @@ pub(super) struct SetLayouts {
 
 impl SetLayouts {
     pub(super) fn new(device: &ash::Device) -> Result<Self> {
-        let tables = TABLES.iter().map(|table| create_layout(device, table.bindings));
+        let tables = rooms::tables().map(|table| create_layout(device, table.bindings));
         Ok(Self { tables: tables.collect::<Result<_>>()?, empty: create_layout(device, &[])? })
     }
 
     /// The layout of the table with the buffer at this set and number.
     pub(super) fn with_buffer(&self, set: u32, number: u32) -> vk::DescriptorSetLayout {
-        let has_buffer = |table: &&BindingTable| {
+        let has_buffer = |table: &BindingTable| {
             table.set == set && table.bindings.iter().any(|binding| binding.number == number)
         };
-        let found = TABLES.iter().position(has_buffer);
+        let found = rooms::tables().position(has_buffer);
         found.map_or(self.empty, |index| self.tables[index])
     }
 

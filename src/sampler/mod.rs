@@ -12,7 +12,6 @@ mod parameters;
 mod pilot;
 pub mod portal;
 pub mod product;
-mod registry;
 pub mod tiles;
 pub mod visibility;
 
@@ -20,13 +19,13 @@ use std::collections::BTreeMap;
 
 use clap::{ValueEnum, builder::PossibleValue};
 pub use parameters::Parameters;
-use registry::registry;
 
 use crate::{
     error::{Error, Result},
     film::Aov,
     pass::{PathDemand, Runner, Technique},
     scene::Scene,
+    shader::rooms::registry,
 };
 
 /// Input for creating a technique.
@@ -92,23 +91,29 @@ pub trait Room: Sync {
 }
 
 macro_rules! samplers {
-    ($($(#[$doc:meta])* $sampler:ident $name:literal $key:literal = $room:ident $entry:ident
-        $($parameters:ident)?;)*) => {
+    (basic {
+        $($(#[$basic_doc:meta])* $basic:ident $basic_name:literal $basic_key:literal = $tag:ident;)*
+    } rooms {
+        $($(#[$doc:meta])* $sampler:ident $name:literal $key:literal = $room:ident $entry:ident
+            $parameters:ident;)*
+    }) => {
         /// Samplers of directions at a hit. All trace one shadow ray per direction, and all are
         /// unbiased except with [`Elevation::Metropolis`](product::Elevation::Metropolis) or another
         /// [`Reading`](product::Reading) than `mixture`.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum)]
         pub enum Sampler {
+            $($(#[$basic_doc])* #[value(name = $basic_name)] $basic,)*
             $($(#[$doc])* #[value(name = $name)] $sampler,)*
         }
 
         impl Sampler {
             /// Every sampler, simplest first.
-            pub const ALL: &[Self] = &[$(Self::$sampler),*];
+            pub const ALL: &[Self] = &[$(Self::$basic,)* $(Self::$sampler),*];
 
             /// Name on the command line, in files and in tables.
             pub fn name(self) -> &'static str {
                 match self {
+                    $(Self::$basic => $basic_name,)*
                     $(Self::$sampler => $name,)*
                 }
             }
@@ -116,12 +121,14 @@ macro_rules! samplers {
             /// Key that chooses the sampler in the window.
             pub fn key(self) -> &'static str {
                 match self {
+                    $(Self::$basic => $basic_key,)*
                     $(Self::$sampler => $key,)*
                 }
             }
 
             fn room(self) -> &'static dyn Room {
                 match self {
+                    $(Self::$basic => &basic::$tag,)*
                     $(Self::$sampler => &$room::$entry,)*
                 }
             }

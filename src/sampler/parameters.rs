@@ -3,14 +3,18 @@
 use super::{
     knob::{Auto, Knob, Knobs, ON_OR_OFF, Values},
     product::ProductParameters,
-    registry::registry,
     visibility::VisibilityParameters,
 };
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    shader::rooms::registry,
+};
 
 macro_rules! parameters {
-    ($($(#[$doc:meta])* $sampler:ident $name:literal $key:literal = $room:ident $entry:ident
-        $($parameters:ident)?;)*) => {
+    (basic { $($basic:tt)* } rooms {
+        $($(#[$doc:meta])* $sampler:ident $name:literal $key:literal = $room:ident $entry:ident
+            $parameters:ident;)*
+    }) => {
         /// Parameters of the samplers.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct Parameters {
@@ -23,8 +27,8 @@ macro_rules! parameters {
             /// `compensation`: true if `mis`, `portal` and what `guided` falls back to draw directions of the
             /// environment by its compensated density, and `tiles` compensates what it has learned.
             pub compensation: bool,
-            $($(#[doc = concat!("Parameters of `", $name, "`.")]
-            pub $room: super::$room::$parameters,)?)*
+            $(#[doc = concat!("Parameters of `", $name, "`.")]
+            pub $room: super::$room::$parameters,)*
         }
 
         impl Default for Parameters {
@@ -33,7 +37,7 @@ macro_rules! parameters {
                     share_tiles: None,
                     candidates: None,
                     compensation: true,
-                    $($($room: super::$room::$parameters::default(),)?)*
+                    $($room: super::$room::$parameters::default(),)*
                 }
             }
         }
@@ -42,13 +46,13 @@ macro_rules! parameters {
             /// Sets a parameter; returns false for an unknown key.
             fn set_any(&mut self, key: &str, value: &str) -> Result<bool> {
                 Ok(self.set_knob(key, value)?
-                    $($(|| super::$room::$parameters::set_knob(&mut self.$room, key, value)?)?)*)
+                    $(|| self.$room.set_knob(key, value)?)*)
             }
 
             /// Every key, sorted.
             pub fn keys() -> Vec<&'static str> {
                 let mut keys: Vec<_> = Self::KNOBS.iter().map(|knob| knob.key).collect();
-                $($(keys.extend(super::$room::$parameters::KNOBS.iter().map(|knob| knob.key));)?)*
+                $(keys.extend(super::$room::$parameters::KNOBS.iter().map(|knob| knob.key));)*
                 keys.sort_unstable();
                 keys
             }

@@ -5,42 +5,47 @@
 //! [`Sampler`]: crate::sampler::Sampler
 //! [`Parameters`]: crate::sampler::Parameters
 
-/// Calls the macro `$then` with every sampler, simplest first: name in Rust and on the command line, key in
-/// the window, room, entry point and parameters. Rooms with parameters have a file `shader.rs`.
+/// Calls the macro `$then` with every sampler, simplest first. A line has the name in Rust and on the command
+/// line, the key in the window and the entry point; one of a room, which has parameters and a file
+/// `shader.rs`, room, entry point and parameters.
 macro_rules! registry {
     ($then:ident) => {
         $then! {
-            /// Uniform over the hemisphere.
-            Uniform "uniform" "1" = basic UNIFORM;
-            /// Proportional to the cosine.
-            Cosine "cosine" "2" = basic COSINE;
-            /// The BRDF's own sampling.
-            Brdf "brdf" "3" = basic BRDF;
-            /// Proportional to the luminance of the environment map.
-            Env "env" "4" = basic ENV;
-            /// `brdf` and `env` in turns with the one-sample balance heuristic (Veach & Guibas 1995).
-            Mis "mis" "5" = basic MIS;
-            /// Resampled importance sampling over candidates of `mis` (Burke et al. 2005; Talbot et al.
-            /// 2005).
-            Ris "ris" "6" = basic RIS;
-            /// Lobes of the product of environment and BRDF (Tsai et al. 2008).
-            Product "product" "7" = product ProductRoom ProductParameters;
-            /// `product`, with less weight on lobes near blocked directions (Wu & Shih 2009).
-            Visibility "visibility" "8" = visibility VisibilityRoom VisibilityParameters;
-            /// Regions of the environment by visibility learned in cells of the scene, across pixels and
-            /// passes.
-            Guided "guided" "9" = guided GuidedRoom GuidedParameters;
-            /// `mis` with directions through the portals of the scene (Ureña et al. 2013).
-            Portal "portal" "o" = portal PortalRoom PortalParameters;
-            /// Product of environment and BRDF on a wavelet basis (Clarberg & Akenine-Möller 2008).
-            Haar "haar" "u" = haar HaarRoom HaarParameters;
-            /// Rays among candidates, with recorded visibility as control variate (Clarberg &
-            /// Akenine-Möller 2008).
-            ControlVariates "control-variates" "v" =
-                control_variates ControlVariatesRoom ControlVariatesParameters;
-            /// `mis` with tiles of the environment by visibility learned in camera space (Atanasov et al.
-            /// 2018).
-            Tiles "tiles" "t" = tiles TilesRoom TilesParameters;
+            basic {
+                /// Uniform over the hemisphere.
+                Uniform "uniform" "1" = UNIFORM;
+                /// Proportional to the cosine.
+                Cosine "cosine" "2" = COSINE;
+                /// The BRDF's own sampling.
+                Brdf "brdf" "3" = BRDF;
+                /// Proportional to the luminance of the environment map.
+                Env "env" "4" = ENV;
+                /// `brdf` and `env` in turns with the one-sample balance heuristic (Veach & Guibas 1995).
+                Mis "mis" "5" = MIS;
+                /// Resampled importance sampling over candidates of `mis` (Burke et al. 2005; Talbot et al.
+                /// 2005).
+                Ris "ris" "6" = RIS;
+            }
+            rooms {
+                /// Lobes of the product of environment and BRDF (Tsai et al. 2008).
+                Product "product" "7" = product ProductRoom ProductParameters;
+                /// `product`, with less weight on lobes near blocked directions (Wu & Shih 2009).
+                Visibility "visibility" "8" = visibility VisibilityRoom VisibilityParameters;
+                /// Regions of the environment by visibility learned in cells of the scene, across pixels and
+                /// passes.
+                Guided "guided" "9" = guided GuidedRoom GuidedParameters;
+                /// `mis` with directions through the portals of the scene (Ureña et al. 2013).
+                Portal "portal" "o" = portal PortalRoom PortalParameters;
+                /// Product of environment and BRDF on a wavelet basis (Clarberg & Akenine-Möller 2008).
+                Haar "haar" "u" = haar HaarRoom HaarParameters;
+                /// Rays among candidates, with recorded visibility as control variate (Clarberg &
+                /// Akenine-Möller 2008).
+                ControlVariates "control-variates" "v" =
+                    control_variates ControlVariatesRoom ControlVariatesParameters;
+                /// `mis` with tiles of the environment by visibility learned in camera space (Atanasov et
+                /// al. 2018).
+                Tiles "tiles" "t" = tiles TilesRoom TilesParameters;
+            }
         }
     };
 }

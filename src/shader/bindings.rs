@@ -1,9 +1,9 @@
 //! Buffers of the shaders by descriptor set: one declaration for Rust, GLSL and `docs/buffers.md`.
 //!
-//! Sets go by rate of change: 0 the scene, 1 the sampler, 2 the wave, 3 the film. Set 1 has a table
-//! per family of samplers, and one for what pixels share; disjoint binding numbers tell the table of a
-//! shader. GLSL names are in
-//! lower case; shaders say `READS(hits)`, `WRITES(rays)`, `UPDATES(paths)` or `TEXELS(hit_texels)`.
+//! Sets go by rate of change: 0 the scene, 1 the sampler, 2 the wave, 3 the film. Set 1 has a table for
+//! each room of samplers ([`rooms`](super::rooms)), one for what pixels share and one for the window;
+//! disjoint numbers tell the table of a shader. GLSL names are in lower case; shaders say `READS(hits)`,
+//! `WRITES(rays)`, `UPDATES(paths)` or `TEXELS(hit_texels)`.
 
 /// A descriptor set: its number and its buffers.
 #[derive(Clone, Copy, Debug)]
@@ -88,6 +88,38 @@ impl TexelFormat {
     }
 }
 
+macro_rules! kind {
+    (one $of:ident) => {
+        $crate::shader::bindings::Kind::One(stringify!($of))
+    };
+    (array $of:ident) => {
+        $crate::shader::bindings::Kind::Array(stringify!($of))
+    };
+    (texels $of:ident) => {
+        $crate::shader::bindings::Kind::Texels($crate::shader::bindings::TexelFormat::$of)
+    };
+}
+pub(crate) use kind;
+
+/// Declares the buffers of a room in descriptor set `$set`, which `$number` numbers by their names.
+macro_rules! buffers {
+    ($set:path, $number:path; $($(#[doc = $doc:literal])* $name:ident: $kind:ident $of:ident;)*) => {
+        /// Names of the buffers, in the order of declaration.
+        pub const BUFFER_NAMES: &[&str] = &[$(stringify!($name)),*];
+        /// Every buffer.
+        pub const BUFFERS: &[$crate::shader::bindings::Binding] = &[$($name),*];
+        $($(#[doc = $doc])*
+        pub const $name: $crate::shader::bindings::Binding = $crate::shader::bindings::Binding {
+            set: $set,
+            number: $number(stringify!($name)),
+            name: stringify!($name),
+            kind: $crate::shader::bindings::kind!($kind $of),
+            about: concat!($($doc),*),
+        };)*
+    };
+}
+pub(crate) use buffers;
+
 macro_rules! binding_tables {
     ($($(#[$table_doc:meta])* $table:ident = $module:ident: $set:literal {
         $($(#[doc = $doc:literal])* $number:literal $name:ident: $kind:ident $of:ident;)*
@@ -101,7 +133,7 @@ macro_rules! binding_tables {
                     set: $set,
                     number: $number,
                     name: stringify!($name),
-                    kind: binding_tables!(@kind $kind $of),
+                    kind: kind!($kind $of),
                     about: concat!($($doc),*),
                 };)*
             }
@@ -114,12 +146,9 @@ macro_rules! binding_tables {
             };
         )*
 
-        /// Every table.
+        /// Every table but those of rooms.
         pub const TABLES: &[&BindingTable] = &[$(&$table),*];
     };
-    (@kind one $of:ident) => { Kind::One(stringify!($of)) };
-    (@kind array $of:ident) => { Kind::Array(stringify!($of)) };
-    (@kind texels $of:ident) => { Kind::Texels(TexelFormat::$of) };
 }
 
 binding_tables! {
@@ -184,114 +213,6 @@ binding_tables! {
         31 TRIANGLE_ATTRIBUTES_3: texels R32Uint;
         /// Instances in the order of the upper level of the tree, eight texels each.
         32 INSTANCES: texels Rgba32Uint;
-    }
-
-    /// Set 1 of the samplers `product` and `visibility`.
-    PRODUCT = product: 1 {
-        /// Environment lobes in world space, by integral: bandwidth · axis, ln(amplitude) − bandwidth.
-        0 ENVIRONMENT_LOBES: texels Rgba32Float;
-        /// Lobes of BRDF · cosine by material and view, likewise, in the frame of view and normal.
-        1 BRDF_LOBES: texels Rgba32Float;
-        /// First lobe of each material, and its lobes per view.
-        2 MATERIAL_LOBES: texels Rg32Uint;
-        /// Lobes of the product: lobe `l` of path `i` at `l · path_count + i`.
-        3 LOBES: array uvec2;
-        /// Lobes of the product again.
-        4 LOBE_TEXELS: texels Rg32Uint;
-        /// Number of lobes of each path.
-        5 LOBE_COUNTS: array uint;
-        /// Sums of the current weights up to every `LOBES_PER_SUM`th lobe of a path and to the
-        /// last: sum `s` of path `i` at `s · path_count + i`.
-        6 LOBE_SUMS: array float;
-        /// Sums of weights again.
-        7 LOBE_SUM_TEXELS: texels R32Float;
-        /// Bits of the lobes close to each cached direction (`close_lobes_index`).
-        8 CLOSE_LOBES: array uint;
-        /// Bits of close lobes again.
-        9 CLOSE_LOBE_TEXELS: texels R32Uint;
-        /// Visibility caches by path or by film pixel: a head and `CACHE_CAPACITY` directions each.
-        10 VISIBILITY_CACHE: array uint;
-    }
-
-    /// Set 1 of the sampler `guided`.
-    GUIDED = guided: 1 {
-        /// Grids of the cells, number of regions, and masks of the hash tables.
-        16 GUIDE: one GuideParameters;
-        /// Hash table of the cells: key; index, refined or not, and share of the BRDF.
-        17 GUIDE_TABLE: texels Rg32Uint;
-        /// Density and visibility of each region in each cell (`decode_entry`).
-        18 GUIDE_ENTRIES: texels Rg32Uint;
-        /// Regions: first alias entry, columns, rows, first row · 65,536 + first column.
-        19 GUIDE_REGIONS: texels Rgba32Uint;
-        /// Alias tables over the environment's cells in each region: threshold, alias.
-        20 GUIDE_ALIASES: texels Rg32Uint;
-        /// Region of every cell of the environment.
-        21 GUIDE_REGION_OF_CELL: texels R16Uint;
-        /// Rays traced, rays visible and their responses, by cell and region, since the last rebuild.
-        22 GUIDE_COUNTS: array uint;
-        /// Visible rays and their c p_B / q in 256ths, by cell and octave, since the last rebuild.
-        23 GUIDE_SHARES: array uint;
-        /// Keys of missing cells that passes looked for.
-        24 GUIDE_MISSING: array uint;
-        /// Count of each shadow ray, or `NOTHING_TO_LEARN`; octave of light, c p_B / q in 256ths
-        /// (from bit `LEARN_FROM_BRDF_SHIFT`), response (from bit `LEARN_RESPONSE_SHIFT`).
-        25 LEARN_TARGETS: array uvec2;
-        /// Current cell of each path, and the cell and direction that its bounce ray teaches.
-        26 PATH_CELLS: array PathCell;
-        /// Learned light from other surfaces by cell and direction, relative to the cell's mean.
-        27 GUIDE_ARRIVING: texels R32Float;
-        /// Learned light that each cell reflects, in whole units.
-        28 GUIDE_REFLECTED: texels R32Uint;
-        /// Bounce rays and the light where they arrived, by cell and direction, since the last rebuild.
-        29 GUIDE_ARRIVALS: array uint;
-    }
-
-    /// Set 1 of the sampler `portal`.
-    PORTAL = portal: 1 {
-        /// Portals, three texels each: corner, width; first axis, height; second axis.
-        36 PORTALS: texels Rgba32Float;
-    }
-
-    /// Set 1 of the sampler `haar`.
-    HAAR = haar: 1 {
-        /// Means of the environment's luminance over the four children of each node, level by level.
-        52 HAAR_TREE: texels Rgba32Float;
-        /// Direction to the centre of each node of the product.
-        53 HAAR_CENTRES: texels Rgba32Float;
-        /// Nodes of the product by fours, halves: quad `q` of path `i` at `q · path_count + i`.
-        54 HAAR_NODES: array uvec2;
-        /// Nodes of the product again.
-        55 HAAR_NODE_TEXELS: texels Rgba16Float;
-        /// Sums of the weights below the children of each coarse node: node `n` of path `i` at
-        /// `n · path_count + i`.
-        56 HAAR_SUMS: array vec4;
-        /// These sums again.
-        57 HAAR_SUM_TEXELS: texels Rgba32Float;
-        /// Blocked directions: their number of path `i` at `i`, the `k`th at `k · path_count + i`.
-        58 HAAR_CACHE: array uint;
-    }
-
-    /// Set 1 of the sampler `control-variates`.
-    CONTROL_VARIATES = control_variates: 1 {
-        /// Rays of the pilot, and the visible ones among them, by record and direction (`record_entry`).
-        64 RECORD_COUNTS: array uint;
-        /// Expected visibility by record and direction.
-        65 RECORD_VISIBILITIES: texels R32Float;
-    }
-
-    /// Set 1 of the sampler `tiles`.
-    TILES = tiles: 1 {
-        /// Rays of the pilot, and the squared cosines of the visible ones in 64ths, by sector and tile.
-        72 TILE_COUNTS: array uint;
-        /// Probability of each tile over its share of the map's energy, and the sum of probabilities up
-        /// to and including it in `TILE_SCALE`ths, by sector and tile.
-        73 TILE_ENTRIES: texels Rg32Uint;
-        /// Tiles: first alias entry, columns, rows, first row · 65,536 + first column.
-        74 TILE_REGIONS: texels Rgba32Uint;
-        /// Alias tables over the environment's cells in each tile: threshold, alias.
-        75 TILE_ALIASES: texels Rg32Uint;
-        /// Tile of every cell of the environment.
-        76 TILE_OF_CELL: texels R16Uint;
     }
 
     /// Set 1 of the passes by which pixels share paths.

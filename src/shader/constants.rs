@@ -13,131 +13,107 @@ macro_rules! constants {
         pub const CONSTANTS: &[(&str, u32)] = &[$((stringify!($name), $name)),*];
     };
 }
+pub(crate) use constants;
+
+/// Declares specialization constants, which `$number` numbers by their names.
+macro_rules! specializations {
+    ($number:path; $($(#[$doc:meta])* $name:ident;)*) => {
+        $($(#[$doc])* pub const $name: u32 = $number(stringify!($name));)*
+
+        /// Name of every specialization constant, in the order of declaration.
+        pub const SPECIALIZATIONS: &[&str] = &[$(stringify!($name)),*];
+    };
+}
+pub(crate) use specializations;
+
+/// Place of a name among those of all lists. Fails to compile if it is in none, or twice.
+pub(crate) const fn place(lists: &[&[&str]], name: &str) -> u32 {
+    let (mut list, mut passed, mut found) = (0, 0, None);
+    while list < lists.len() {
+        let mut index = 0;
+        while index < lists[list].len() {
+            if is_same(lists[list][index], name) {
+                assert!(found.is_none(), "two rooms declare the same name");
+                found = Some(passed);
+            }
+            (index, passed) = (index + 1, passed + 1);
+        }
+        list += 1;
+    }
+    match found {
+        Some(place) => place,
+        None => panic!("no room declares the name"),
+    }
+}
+
+const fn is_same(one: &str, other: &str) -> bool {
+    let (one, other) = (one.as_bytes(), other.as_bytes());
+    let mut index = 0;
+    while index < one.len() && index < other.len() && one[index] == other[index] {
+        index += 1;
+    }
+    index == one.len() && index == other.len()
+}
+
+/// Identifier of a specialization constant that belongs to no room; those of rooms follow.
+const fn number(name: &str) -> u32 {
+    place(&[SPECIALIZATIONS], name)
+}
+
+specializations! {
+    number;
+
+    // Specialization constants of `trace`, `shadow` and, but for the last two, `sample_and_trace`.
+    /// Number of triangle pages in use.
+    CONSTANT_TRIANGLE_PAGES;
+    /// Base-2 logarithm of the triangles per page.
+    CONSTANT_TRIANGLE_PAGE_SHIFT;
+    /// Rays that one invocation traces, 1 to 32.
+    CONSTANT_RAYS_PER_INVOCATION;
+    /// Finished lanes of a subgroup at which they take their next rays.
+    CONSTANT_REFILL_LANES;
+
+    // Specialization constants of the passes that read textures.
+    /// Number of pages of texels in use.
+    CONSTANT_TEXTURE_PAGES;
+    /// Base-2 logarithm of the words per page of texels.
+    CONSTANT_TEXTURE_PAGE_SHIFT;
+    /// Number of pages of triangle attributes in use.
+    CONSTANT_ATTRIBUTE_PAGES;
+    /// Base-2 logarithm of the words per page of triangle attributes.
+    CONSTANT_ATTRIBUTE_PAGE_SHIFT;
+    /// Bits `ATTRIBUTE_…` of the attributes that triangles have; 0 if the scene needs none.
+    CONSTANT_ATTRIBUTES;
+
+    // Specialization constants of the sampling and bounce passes.
+    /// Sampler of `sample`, `SAMPLER_…`.
+    CONSTANT_SAMPLER;
+    /// Candidates per shadow ray in `sample` and `sample_guided`.
+    CONSTANT_CANDIDATES;
+    /// First vertex at which russian roulette may end a path.
+    CONSTANT_ROULETTE_VERTEX;
+    /// Throughput below which it may, a float.
+    CONSTANT_ROULETTE_THROUGHPUT;
+    /// Bit `1 << kind` for every kind of material in the scene; saves devices that run both sides of a
+    /// branch the others.
+    CONSTANT_MATERIAL_KINDS;
+    /// Bits `SURFACES_…` of what the surfaces of the scene need.
+    CONSTANT_SURFACES;
+    /// 1 lets only paths at specular surfaces go on: the ray after the last vertex.
+    CONSTANT_ONLY_SPECULAR;
+    /// 1 samples the environment by its compensated density.
+    CONSTANT_COMPENSATION;
+    /// Candidates of `sample_lamps` for its shadow ray.
+    CONSTANT_LAMP_CANDIDATES;
+
+    // Specialization constant of the passes that share paths.
+    /// Edge of a tile, pixels: 2, 4 or 8.
+    CONSTANT_TILE_EDGE;
+}
 
 constants! {
     /// Invocations of a workgroup along x; every pass is one-dimensional.
     WORKGROUP_SIZE = 64;
-
-    // Specialization constants of `trace`, `shadow` and, but for the last two, `sample_and_trace`.
-    /// Number of triangle pages in use.
-    CONSTANT_TRIANGLE_PAGES = 0;
-    /// Base-2 logarithm of the triangles per page.
-    CONSTANT_TRIANGLE_PAGE_SHIFT = 1;
-    /// Rays that one invocation traces, 1 to 32.
-    CONSTANT_RAYS_PER_INVOCATION = 2;
-    /// Finished lanes of a subgroup at which they take their next rays.
-    CONSTANT_REFILL_LANES = 3;
-
-    // Specialization constants of the passes that read textures.
-    /// Number of pages of texels in use.
-    CONSTANT_TEXTURE_PAGES = 4;
-    /// Base-2 logarithm of the words per page of texels.
-    CONSTANT_TEXTURE_PAGE_SHIFT = 5;
-    /// Number of pages of triangle attributes in use.
-    CONSTANT_ATTRIBUTE_PAGES = 6;
-    /// Base-2 logarithm of the words per page of triangle attributes.
-    CONSTANT_ATTRIBUTE_PAGE_SHIFT = 7;
-    /// Bits `ATTRIBUTE_…` of the attributes that triangles have; 0 if the scene needs none.
-    CONSTANT_ATTRIBUTES = 8;
-
-    // Specialization constants of the sampling and bounce passes.
-    /// Sampler of `sample`, `SAMPLER_…`.
-    CONSTANT_SAMPLER = 16;
-    /// Candidates per shadow ray in `sample` and `sample_guided`.
-    CONSTANT_CANDIDATES = 17;
-    /// Candidates of `sample_guided` from the BRDF, among all.
-    CONSTANT_BRDF_CANDIDATES = 24;
-    /// Directions from the BRDF that `bounce_guided` chooses from.
-    CONSTANT_BOUNCE_CANDIDATES = 26;
-    /// First vertex at which russian roulette may end a path.
-    CONSTANT_ROULETTE_VERTEX = 18;
-    /// Throughput below which it may, a float.
-    CONSTANT_ROULETTE_THROUGHPUT = 46;
-    /// Bit `1 << kind` for every kind of material in the scene; saves devices that run both sides of a
-    /// branch the others.
-    CONSTANT_MATERIAL_KINDS = 19;
-    /// Bits `SURFACES_…` of what the surfaces of the scene need.
-    CONSTANT_SURFACES = 20;
-    /// 1 lets only paths at specular surfaces go on: the ray after the last vertex.
-    CONSTANT_ONLY_SPECULAR = 21;
-    /// 1 samples the environment by its compensated density.
-    CONSTANT_COMPENSATION = 27;
-    /// Candidates of `sample_lamps` for its shadow ray.
-    CONSTANT_LAMP_CANDIDATES = 22;
-
-    // Specialization constant of the passes that share paths.
-    /// Edge of a tile, pixels: 2, 4 or 8.
-    CONSTANT_TILE_EDGE = 27;
-
-    // Specialization constants of `multiply_lobes`.
-    /// Lobes of the environment.
-    CONSTANT_ENVIRONMENT_LOBES = 32;
-    /// Largest number of lobes of a material in one view.
-    CONSTANT_BRDF_LOBES = 33;
-    /// View elevations of a BRDF fit.
-    CONSTANT_VIEWS = 34;
-    /// Largest number of lobes kept at a hit, in every pass over lobes.
-    CONSTANT_KEPT_LOBES = 35;
-    /// 1 keeps lobes by coefficient instead of integral.
-    CONSTANT_ORDER_BY_COEFFICIENT = 36;
-    /// Logarithm of an environment lobe's largest integral over 2π or largest amplitude, bits of a float.
-    CONSTANT_STRONGEST_ENVIRONMENT_LOBE = 46;
-
-    // Specialization constants of `sample_lobes` and `sample_and_trace`.
-    /// Share of directions from the BRDF, bits of a float.
-    CONSTANT_BRDF_SHARE = 39;
-    /// Share of directions from the environment map, bits of a float.
-    CONSTANT_ENVIRONMENT_SHARE = 40;
-    /// 1 draws elevations by a random walk, which is biased.
-    CONSTANT_METROPOLIS = 41;
-    /// Density that directions from lobes are divided by, `READING_…`.
-    CONSTANT_READING = 51;
-
-    // Specialization constants of the passes over visibility caches.
-    /// τ, closeness in deviations of a lobe, bits of a float.
-    CONSTANT_THRESHOLD_SCALE = 37;
-    /// 1 uses one closeness for lobes of all bandwidths.
-    CONSTANT_FIXED_THRESHOLD = 38;
-    /// Directions that a visibility cache holds; 0 without caches.
-    CONSTANT_CACHE_CAPACITY = 42;
-    /// 1 keeps a cache for all samples of a pixel, 0 for one hit.
-    CONSTANT_CACHE_OF_PIXEL = 43;
-    /// k of V = (1 / (1 + Num))^k, bits of a float.
-    CONSTANT_VISIBILITY_EXPONENT = 45;
-
-    // Specialization constants of `sample_portals`.
-    /// Number of portals.
-    CONSTANT_PORTALS = 47;
-    /// Share of the portals among directions that are not from the BRDF, bits of a float.
-    CONSTANT_PORTAL_SHARE = 48;
-
-    // Specialization constants of the passes over nodes of the product.
-    /// Base-2 logarithm of the nodes along each side of the square, at least 3.
-    CONSTANT_HAAR_LEVEL = 49;
-    /// The same of the texels of the environment, more than that of the nodes.
-    CONSTANT_HAAR_DEPTH = 50;
-
-    // Specialization constants of `sample_controlled` and `record_visibility`.
-    /// Share of the expected visibility that is the control variate, bits of a float.
-    CONSTANT_CONTROL_SHARE = 51;
-    /// 1 chooses shadow rays where the records are in doubt, 0 by light alone.
-    CONSTANT_CONTROL_CHOICE = 52;
-    /// 1 rounds the expected visibility to a bit in the control variate.
-    CONSTANT_CONTROL_BITS = 56;
-    /// Bins of a record along each side of the square of directions.
-    CONSTANT_RECORD_SIDE = 53;
-    /// Edge of a record's cube per metre of distance to the camera, bits of a float.
-    CONSTANT_RECORD_EDGE = 54;
-    /// Largest edge of a record's cube, metres, bits of a float.
-    CONSTANT_RECORD_LARGEST_EDGE = 55;
-
-    // Specialization constants of `sample_tiles` and `count_tiles`.
-    /// Number of tiles of the environment.
-    CONSTANT_TILES = 57;
-    /// 1 reads a sector at random among those around a hit, 0 the hit's own.
-    CONSTANT_SECTOR_JITTER = 58;
-    /// 1 draws all rays through tiles, for the pilot to learn from.
-    CONSTANT_TILES_LEARN = 59;
 
     // Values of CONSTANT_SAMPLER.
     /// Uniform over the hemisphere.
@@ -152,16 +128,6 @@ constants! {
     SAMPLER_MIS = 4;
     /// Resampling over the candidates of `mis`.
     SAMPLER_RIS = 5;
-
-    // Values of CONSTANT_READING.
-    /// Density of all lobes with their weights in force.
-    READING_MIXTURE = 0;
-    /// Density of the chosen lobe; biased in practice.
-    READING_CHOSEN_LOBE = 1;
-    /// Density of the chosen lobe times its probability; biased.
-    READING_CHOSEN_PAIR = 2;
-    /// Density of all lobes with their weights before the cache lowered them; biased.
-    READING_WEIGHTS_BEFORE = 3;
 
     // Bits of CONSTANT_SURFACES.
     /// Some surfaces reflect or transmit by paths alone: no light is sampled at them.
@@ -233,7 +199,6 @@ constants! {
     MATERIAL_THIN_DIELECTRIC = 7;
     /// Bits `1 << kind` of the specular kinds, at which no light is sampled.
     SPECULAR_KINDS = 1 << MATERIAL_MIRROR | 1 << MATERIAL_DIELECTRIC | 1 << MATERIAL_THIN_DIELECTRIC;
-
     /// Bits `1 << kind` of the kinds with a base, whose light the pixels of a tile can share.
     KINDS_WITH_BASE = 1 << MATERIAL_DIFFUSE | 1 << MATERIAL_PLASTIC | 1 << MATERIAL_MEASURED
         | 1 << MATERIAL_PRINCIPLED;
@@ -339,7 +304,6 @@ constants! {
     MEASURED_BASE_OFFSET = MEASURED_DENSITY_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
     /// Grid cells, two words each: halves red and green, half blue.
     MEASURED_GRID_OFFSET = MEASURED_BASE_OFFSET + 3 * BRDF_COSINE_NODES;
-
     /// Lists of living paths: that of a vertex, the one before, which it is made from, and the next, which
     /// is emptied meanwhile; a power of two.
     PATH_LISTS = 4;
@@ -349,53 +313,6 @@ constants! {
     TRAINING_WAVE = 1;
     /// The light of the paths is only compared.
     MEASURED_WAVE = 2;
-
-    // Lobes and learned visibility.
-    /// Lobes between two sums of their weights; a power of two up to 32.
-    LOBES_PER_SUM = 16;
-    /// Slots probed for one key in the hash table of cells.
-    GUIDE_PROBES = 8;
-    /// Key of no cell.
-    GUIDE_NO_KEY = 0xffff_ffff;
-    /// First bit of a cell's share of the BRDF in the hash table, 256ths.
-    GUIDE_SHARE_SHIFT = 24;
-    /// Bit in the hash table of a cell whose parts may be cells; the cell's index is below it.
-    GUIDE_REFINED = 1 << 23;
-    /// Levels of the visibility in an entry.
-    GUIDE_VISIBILITY_LEVELS = 64;
-    /// Octaves of light by which rays are counted for the share of the BRDF, from 2^-32 on.
-    GUIDE_SHARE_OCTAVES = 64;
-    /// Words of a cell per region that are counted: trials, hits and the responses of the hits.
-    GUIDE_COUNT_WORDS = 3;
-    /// Fixed-point unit of a response: two million rays of the greatest one fit a word between rebuilds.
-    GUIDE_RESPONSE_UNITS = 4096;
-    /// Greatest response of one ray, a half: stronger reflection is the peak of a lobe, which the BRDF's
-    /// own sampling finds, and few cells have one for all of their surfaces.
-    GUIDE_RESPONSE_MOST = 2048;
-    /// Samples after a rebuild whose rays are all counted.
-    GUIDE_SAMPLES_THAT_ALL_TEACH = 16;
-    /// After those, one in this many samples is counted.
-    GUIDE_TEACHING_STEP = 4;
-    /// Bins of arriving light along each side of the octahedral square.
-    GUIDE_ARRIVAL_SIDE = 12;
-    /// [`PathCell::cell`](super::structs::PathCell::cell) at a specular surface, which has no cell.
-    SPECULAR_CELL = 0xffff_fffe;
-    /// Learning target of a shadow ray that teaches nothing.
-    NOTHING_TO_LEARN = 0xffff_ffff;
-    /// Evidence for the share of the BRDF of a shadow ray that was not drawn from two techniques.
-    NO_SHARE_TO_LEARN = 0x1ff;
-    /// First bit of a shadow ray's evidence for the share of the BRDF, 9 bits.
-    LEARN_FROM_BRDF_SHIFT = 8;
-    /// First bit of the response of a shadow ray.
-    LEARN_RESPONSE_SHIFT = 17;
-
-    /// Visibility records; a power of two.
-    VISIBILITY_RECORDS = 1 << 13;
-
-    /// Parts in which probabilities of tiles are counted: single precision holds them exactly.
-    TILE_SCALE = 1 << 24;
-    /// Parts in which the squared cosine of a visible ray is counted.
-    TILE_RESPONSE_UNITS = 64;
 
     // Layers that the pass `show` shows.
     /// Mean radiance.

@@ -2,6 +2,7 @@
 
 pub mod bindings;
 pub mod constants;
+pub mod rooms;
 pub mod spirv;
 pub mod structs;
 

@@ -1,10 +1,6 @@
 //! Structs in buffers and push constants, in `scalar` layout: one declaration for Rust and GLSL.
 //! `tests/interface.rs` compares every member with the offsets in the compiled SPIR-V.
 
-use std::mem::{offset_of, size_of};
-
-use bytemuck::{Pod, Zeroable};
-
 /// Two floats in scalar layout: 8 bytes.
 #[expect(non_camel_case_types, reason = "GLSL's name")]
 pub type vec2 = [f32; 2];
@@ -48,24 +44,26 @@ macro_rules! structs {
         $(
             $(#[$doc])*
             #[repr(C)]
-            #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+            #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
             pub struct $name {
                 $($(#[$member_doc])* pub $member: $kind,)*
             }
         )*
 
         /// Every struct, in the order of declaration.
-        pub const STRUCTS: &[SharedStruct] = &[$(SharedStruct {
-            name: stringify!($name),
-            size: size_of::<$name>(),
-            members: &[$(SharedMember {
-                name: stringify!($member),
-                kind: stringify!($kind),
-                offset: offset_of!($name, $member),
-            }),*],
-        }),*];
+        pub const STRUCTS: &[$crate::shader::structs::SharedStruct] =
+            &[$($crate::shader::structs::SharedStruct {
+                name: stringify!($name),
+                size: std::mem::size_of::<$name>(),
+                members: &[$($crate::shader::structs::SharedMember {
+                    name: stringify!($member),
+                    kind: stringify!($kind),
+                    offset: std::mem::offset_of!($name, $member),
+                }),*],
+            }),*];
     };
 }
+pub(crate) use structs;
 
 structs! {
     /// Constants of a render: camera, environment and film.
@@ -439,32 +437,6 @@ structs! {
         film_start: uint,
         /// List of paths that the dispatch walks, from 1 on; 0 for all paths.
         path_list: uint,
-    }
-
-    /// Cells that a path's bounces teach.
-    struct PathCell {
-        /// Cell of its current vertex, `SPECULAR_CELL`, or `NOTHING_TO_LEARN` if it left the scene.
-        cell: uint,
-        /// Cell and direction that its last bounce ray teaches, or `NOTHING_TO_LEARN`.
-        teaches: uint,
-    }
-
-    /// Mapping from places in the scene to cells of the guide.
-    struct GuideParameters {
-        /// Corner of the grids, metres.
-        grid_origin: vec3,
-        /// Edge of a cell of level 0, metres.
-        finest_edge: float,
-        /// Edge of a cell per metre of distance to the camera.
-        edge_per_distance: float,
-        /// Largest edge of a cell, metres.
-        largest_edge: float,
-        /// Regions of the environment.
-        region_count: uint,
-        /// Slots of the hash table minus one.
-        table_mask: uint,
-        /// Slots for missing keys minus one.
-        missing_mask: uint,
     }
 
     /// Push constants of the pass `show`: a page of a film, and what it shows.

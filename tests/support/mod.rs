@@ -34,8 +34,9 @@ use fenestra::{
     scene::Scene,
     session::{Renderer, Settings},
     shader::{
-        bindings::{Binding, TABLES, probe},
+        bindings::{Binding, probe},
         constants::WORKGROUP_SIZE,
+        rooms,
     },
 };
 
@@ -121,8 +122,7 @@ pub fn run_specialized_probe(
     let output = Buffer::zeroed(device, "probe output", output_bytes as u64).unwrap();
     let mut bound: Vec<_> = uploaded.iter().map(|(binding, buffer)| (*binding, buffer)).collect();
     bound.push((probe::PROBE_OUTPUT, &output));
-    let sets: Vec<DescriptorSet> = TABLES
-        .iter()
+    let sets: Vec<DescriptorSet> = rooms::tables()
         .filter_map(|table| {
             let is_in_table = |(binding, _): &&(Binding, _)| table.bindings.contains(binding);
             let buffers: Vec<_> = bound.iter().filter(is_in_table).copied().collect();

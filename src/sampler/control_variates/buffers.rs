@@ -6,7 +6,7 @@ use super::records::RecordGrid;
 use crate::{
     error::Result,
     gpu::{Buffer, Commands, DescriptorSet, Device},
-    shader::bindings::{CONTROL_VARIATES, control_variates},
+    shader::rooms::control_variates,
 };
 
 /// The visibility records on a device.
@@ -28,7 +28,7 @@ impl RecordBuffers {
             (control_variates::RECORD_COUNTS, &counts),
             (control_variates::RECORD_VISIBILITIES, &visibilities),
         ];
-        let set = DescriptorSet::new(device, &CONTROL_VARIATES, &bound)?;
+        let set = DescriptorSet::new(device, &control_variates::TABLE, &bound)?;
         Ok(Self { device: Arc::clone(device), set, grid, counts, visibilities })
     }
 

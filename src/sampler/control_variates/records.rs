@@ -8,7 +8,7 @@ use crate::{
     math::{equal_area::square_from_direction, random::hash_4d},
     sampler::guided::{FACE_COUNT, cell_edges, face_normal},
     scene::Scene,
-    shader::constants::{
+    shader::rooms::control_variates::{
         CONSTANT_RECORD_EDGE, CONSTANT_RECORD_LARGEST_EDGE, CONSTANT_RECORD_SIDE,
         VISIBILITY_RECORDS,
     },

@@ -10,9 +10,9 @@ use crate::{
         basic::{self, AUTO_RIS_CANDIDATES, BasicSteps, RIS_CANDIDATES},
     },
     shader::{
-        constants::{
-            CONSTANT_CANDIDATES, CONSTANT_COMPENSATION, CONSTANT_CONTROL_BITS,
-            CONSTANT_CONTROL_CHOICE, CONSTANT_CONTROL_SHARE,
+        constants::{CONSTANT_CANDIDATES, CONSTANT_COMPENSATION},
+        rooms::control_variates::{
+            CONSTANT_CONTROL_BITS, CONSTANT_CONTROL_CHOICE, CONSTANT_CONTROL_SHARE,
         },
         structs::Wave,
     },

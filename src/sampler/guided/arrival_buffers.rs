@@ -6,7 +6,7 @@ use super::{ARRIVAL_DIRECTIONS, ArrivalWords, Snapshot};
 use crate::{
     error::Result,
     gpu::{Buffer, Commands, Device},
-    shader::bindings::{Binding, guided},
+    shader::{bindings::Binding, rooms::guided},
 };
 
 /// Bytes of a cell: by direction the light and two counted words, and its reflected light.

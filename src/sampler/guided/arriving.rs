@@ -10,7 +10,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::sampler::guided::{cells::Tree, key::FACE_COUNT};
-use crate::shader::constants::GUIDE_ARRIVAL_SIDE;
+use crate::shader::rooms::guided::GUIDE_ARRIVAL_SIDE;
 
 /// Number of directions that a cell distinguishes.
 pub const ARRIVAL_DIRECTIONS: usize = (GUIDE_ARRIVAL_SIDE * GUIDE_ARRIVAL_SIDE) as usize;

@@ -17,11 +17,7 @@ use crate::{
     error::{Error, Result},
     gpu::{Buffer, Commands, DescriptorSet, Device},
     scene::{self, Scene, instance},
-    shader::{
-        bindings::{GUIDED, guided},
-        constants::{GUIDE_COUNT_WORDS, GUIDE_NO_KEY},
-        structs::{GuideParameters, PathCell},
-    },
+    shader::rooms::guided::{self, GUIDE_COUNT_WORDS, GUIDE_NO_KEY, GuideParameters, PathCell},
 };
 
 /// Pixels along the edge of a cell, unless the scene limits it.
@@ -168,7 +164,7 @@ impl GuideBuffers {
             (guided::PATH_CELLS, &path_cells),
         ];
         bound.extend(arrivals.iter().flat_map(ArrivalBuffers::bindings));
-        let set = DescriptorSet::new(device, &GUIDED, &bound)?;
+        let set = DescriptorSet::new(device, &guided::TABLE, &bound)?;
         let mut buffers = Self {
             device: Arc::clone(device),
             set,

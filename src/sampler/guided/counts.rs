@@ -1,6 +1,6 @@
 //! Counts of visible rays: as they lie on the device and in files, in fixed point, and in rays.
 
-use crate::shader::constants::GUIDE_COUNT_WORDS;
+use crate::shader::rooms::guided::GUIDE_COUNT_WORDS;
 
 /// Trials, hits and the sum of the responses of the hits, as they lie on the device and in files.
 pub type CountWords = [u32; GUIDE_COUNT_WORDS as usize];

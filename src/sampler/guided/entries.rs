@@ -7,7 +7,7 @@ use crate::sampler::guided::{
     estimate::Estimates,
     partition::{Partition, Region},
 };
-use crate::shader::constants::GUIDE_VISIBILITY_LEVELS;
+use crate::shader::rooms::guided::GUIDE_VISIBILITY_LEVELS;
 
 /// Exponent of the visibility in the probability of a region. Variance is least with ½ where the
 /// response is constant and the visibility of a cell is the same chance everywhere in it, and with

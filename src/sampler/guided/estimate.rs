@@ -33,7 +33,7 @@ pub struct Estimate {
     /// V̂, the fraction of rays that reach the environment.
     pub visibility: f32,
     /// Mean response of those rays, in units of
-    /// 1 / [`GUIDE_RESPONSE_UNITS`](crate::shader::constants::GUIDE_RESPONSE_UNITS).
+    /// 1 / [`GUIDE_RESPONSE_UNITS`](crate::shader::rooms::guided::GUIDE_RESPONSE_UNITS).
     pub response: f32,
 }
 

@@ -12,7 +12,8 @@ use crate::{
     error::Result,
     pass::{Passes, Progress, RecordedRay, Runner, film_buffers::position_in_film_order},
     shader::{
-        constants::{NO_MATERIAL, NOTHING_TO_LEARN},
+        constants::NO_MATERIAL,
+        rooms::guided::NOTHING_TO_LEARN,
         structs::{Hit, ShadowRay, Wave},
     },
 };

@@ -14,7 +14,7 @@
 //!
 //! Octave of the light of every visible ray, its c p_B / q → [`ShareEvidence`] → share in 256ths.
 
-use crate::shader::constants::GUIDE_SHARE_OCTAVES;
+use crate::shader::rooms::guided::GUIDE_SHARE_OCTAVES;
 
 /// Words of the counts of one cell: for every octave of X from 2⁻³² on, the number of visible rays
 /// and the sum of their c p_B / q in 256ths.

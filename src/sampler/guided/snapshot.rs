@@ -18,8 +18,8 @@ use crate::sampler::guided::{
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Snapshot {
     /// Hash table: the key of a cell, [`CellKey::NONE`](super::CellKey::NONE) where empty; its
-    /// index, [`GUIDE_REFINED`](crate::shader::constants::GUIDE_REFINED) where its children may be
-    /// cells and, from bit [`GUIDE_SHARE_SHIFT`](crate::shader::constants::GUIDE_SHARE_SHIFT) on,
+    /// index, [`GUIDE_REFINED`](crate::shader::rooms::guided::GUIDE_REFINED) where its children may be
+    /// cells and, from bit [`GUIDE_SHARE_SHIFT`](crate::shader::rooms::guided::GUIDE_SHARE_SHIFT) on,
     /// its share of the BRDF in 256ths, 0 where the material decides.
     pub table: Vec<[u32; 2]>,
     /// Entries of every cell, region by region.

@@ -18,7 +18,7 @@ use crate::sampler::guided::{
 use crate::{
     error::{Error, Result},
     files::{self, hexadecimal, write_atomically},
-    shader::constants::GUIDE_COUNT_WORDS,
+    shader::rooms::guided::GUIDE_COUNT_WORDS,
 };
 
 const COUNT_WORDS: usize = GUIDE_COUNT_WORDS as usize;

@@ -5,9 +5,10 @@ use super::parameters::GuidedParameters;
 use crate::{
     pass::{Domain, Kernel, PassSettings, Roulette, Steps, Surfaces},
     shader::{
-        constants::{
-            AOV_GUIDE_CELL, CONSTANT_BOUNCE_CANDIDATES, CONSTANT_BRDF_CANDIDATES,
-            CONSTANT_CANDIDATES, GUIDE_SAMPLES_THAT_ALL_TEACH, GUIDE_TEACHING_STEP,
+        constants::{AOV_GUIDE_CELL, CONSTANT_CANDIDATES},
+        rooms::guided::{
+            CONSTANT_BOUNCE_CANDIDATES, CONSTANT_BRDF_CANDIDATES, GUIDE_SAMPLES_THAT_ALL_TEACH,
+            GUIDE_TEACHING_STEP,
         },
         structs::Wave,
     },

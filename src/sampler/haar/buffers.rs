@@ -12,7 +12,7 @@ use crate::{
     gpu::{Buffer, DescriptorSet, Device},
     pass::PathDemand,
     sampler::Parameters,
-    shader::bindings::{HAAR, haar},
+    shader::rooms::haar,
 };
 
 /// Storage for the nodes of a path.
@@ -83,7 +83,7 @@ impl NodeBuffers {
             (haar::HAAR_SUM_TEXELS, sums),
             (haar::HAAR_CACHE, cache),
         ];
-        let set = DescriptorSet::new(device, &HAAR, &bound)?;
+        let set = DescriptorSet::new(device, &haar::TABLE, &bound)?;
         Ok(Self { set, buffers })
     }
 

@@ -5,10 +5,10 @@ use crate::{
     pass::{Domain, Kernel, SHADOW_RAYS_PER_GROUP, Steps, Surfaces},
     sampler::Parameters,
     shader::{
-        constants::{
-            CONSTANT_BRDF_SHARE, CONSTANT_CACHE_CAPACITY, CONSTANT_ENVIRONMENT_SHARE,
-            CONSTANT_HAAR_DEPTH, CONSTANT_HAAR_LEVEL, CONSTANT_THRESHOLD_SCALE,
-            CONSTANT_VISIBILITY_EXPONENT,
+        rooms::haar::{CONSTANT_HAAR_DEPTH, CONSTANT_HAAR_LEVEL},
+        rooms::product::{CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_SHARE},
+        rooms::visibility::{
+            CONSTANT_CACHE_CAPACITY, CONSTANT_THRESHOLD_SCALE, CONSTANT_VISIBILITY_EXPONENT,
         },
         structs::Wave,
     },

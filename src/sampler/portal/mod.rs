@@ -17,8 +17,8 @@ use crate::{
     pass::{Domain, Kernel, Passes, Report, Steps, Surfaces, Technique},
     scene::Portal,
     shader::{
-        bindings::{PORTAL, portal},
-        constants::{CONSTANT_COMPENSATION, CONSTANT_PORTAL_SHARE, CONSTANT_PORTALS},
+        constants::CONSTANT_COMPENSATION,
+        rooms::portal::{self, CONSTANT_PORTAL_SHARE, CONSTANT_PORTALS},
         structs::Wave,
     },
 };
@@ -56,7 +56,7 @@ fn upload(device: &Arc<Device>, portals: &[Portal]) -> Result<(DescriptorSet, Bu
     // A buffer has at least one element.
     words.resize(words.len().max(1), [0.0; 4]);
     let buffer = Buffer::texels_from_slice(device, "portals", &words)?;
-    let set = DescriptorSet::new(device, &PORTAL, &[(portal::PORTALS, &buffer)])?;
+    let set = DescriptorSet::new(device, &portal::TABLE, &[(portal::PORTALS, &buffer)])?;
     Ok((set, buffer))
 }
 

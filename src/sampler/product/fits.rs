@@ -12,7 +12,7 @@ use crate::{
     },
     gpu::{Buffer, Device},
     scene::{Scene, material::Material},
-    shader::bindings::{Binding, product},
+    shader::{bindings::Binding, rooms::product},
 };
 
 /// Sizes of the fits on the device.

@@ -7,10 +7,7 @@ use crate::{
     error::Result,
     gpu::{Buffer, DescriptorSet, Device},
     pass::PathDemand,
-    shader::{
-        bindings::{PRODUCT, product},
-        constants::LOBES_PER_SUM,
-    },
+    shader::rooms::product::{self, LOBES_PER_SUM},
 };
 
 /// Storage for the lobes of a path.
@@ -75,7 +72,7 @@ impl LobeBuffers {
             (product::CLOSE_LOBE_TEXELS, close),
             (product::VISIBILITY_CACHE, caches),
         ]);
-        let set = DescriptorSet::new(device, &PRODUCT, &bound)?;
+        let set = DescriptorSet::new(device, &product::TABLE, &bound)?;
         Ok(Self { set, buffers, fits })
     }
 

@@ -3,7 +3,7 @@
 use crate::{
     error::{Error, Result},
     sampler::knob::{Values, parameters},
-    shader::constants::{
+    shader::rooms::product::{
         READING_CHOSEN_LOBE, READING_CHOSEN_PAIR, READING_MIXTURE, READING_WEIGHTS_BEFORE,
     },
 };

@@ -7,7 +7,7 @@ use super::{
 use crate::{
     pass::{Domain, Kernel, Steps, Surfaces},
     shader::{
-        constants::{
+        rooms::product::{
             CONSTANT_BRDF_LOBES, CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_LOBES,
             CONSTANT_ENVIRONMENT_SHARE, CONSTANT_KEPT_LOBES, CONSTANT_METROPOLIS,
             CONSTANT_ORDER_BY_COEFFICIENT, CONSTANT_READING, CONSTANT_STRONGEST_ENVIRONMENT_LOBE,

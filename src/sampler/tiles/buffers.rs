@@ -10,7 +10,7 @@ use crate::{
     error::Result,
     gpu::{Buffer, Commands, DescriptorSet, Device},
     sampler::guided::{Partition, region_tables},
-    shader::bindings::{TILES, tiles},
+    shader::rooms::tiles,
 };
 
 /// The cache on a device.
@@ -49,7 +49,7 @@ impl TileBuffers {
             (tiles::TILE_ALIASES, aliases),
             (tiles::TILE_OF_CELL, of_cell),
         ];
-        let set = DescriptorSet::new(device, &TILES, &bound)?;
+        let set = DescriptorSet::new(device, &tiles::TABLE, &bound)?;
         let buffers =
             Self { device: Arc::clone(device), set, grid, cache, counts, entries, tables };
         buffers.forget()?;

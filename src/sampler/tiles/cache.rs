@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::grid::SectorGrid;
 use crate::{
     sampler::guided::Partition,
-    shader::constants::{TILE_RESPONSE_UNITS, TILE_SCALE},
+    shader::rooms::tiles::{TILE_RESPONSE_UNITS, TILE_SCALE},
 };
 
 /// Rays of the surroundings that a sector leans on, where it has counted little itself.

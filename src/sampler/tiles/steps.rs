@@ -4,7 +4,7 @@ use super::parameters::TilesParameters;
 use crate::{
     pass::{Domain, Kernel, Steps, Surfaces},
     shader::{
-        constants::{CONSTANT_SECTOR_JITTER, CONSTANT_TILES, CONSTANT_TILES_LEARN},
+        rooms::tiles::{CONSTANT_SECTOR_JITTER, CONSTANT_TILES, CONSTANT_TILES_LEARN},
         structs::Wave,
     },
 };

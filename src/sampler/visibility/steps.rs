@@ -5,9 +5,10 @@ use crate::{
     pass::{Domain, Kernel, Steps, Surfaces, geometry::Traversal},
     sampler::product::{FitSizes, ProductParameters, ProductSteps},
     shader::{
-        constants::{
-            AOV_CACHE_ENTRIES, CONSTANT_CACHE_CAPACITY, CONSTANT_CACHE_OF_PIXEL,
-            CONSTANT_FIXED_THRESHOLD, CONSTANT_THRESHOLD_SCALE, CONSTANT_VISIBILITY_EXPONENT,
+        constants::AOV_CACHE_ENTRIES,
+        rooms::visibility::{
+            CONSTANT_CACHE_CAPACITY, CONSTANT_CACHE_OF_PIXEL, CONSTANT_FIXED_THRESHOLD,
+            CONSTANT_THRESHOLD_SCALE, CONSTANT_VISIBILITY_EXPONENT,
         },
         structs::Wave,
     },
