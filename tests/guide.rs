@@ -6,9 +6,9 @@ use crate::support::{scenes, statistics::chi_square_p_value};
 use fenestra::{
     math::random::{hash_4d, random_independent_2d},
     sampler::guided::{
-        ARRIVAL_DIRECTIONS, CellKey, FACE_COUNT, Guide, GuideState, PARENT_COUNT, Partition,
-        decode_entry, decode_visibility,
+        ARRIVAL_DIRECTIONS, CellKey, Guide, GuideState, decode_entry, decode_visibility,
     },
+    sampler::regions::{FACE_COUNT, PARENT_COUNT, Partition},
     scene::environment::{EnvironmentMap, EnvironmentTables},
     shader::{
         rooms::guided::{self, GUIDE_NO_KEY, GUIDE_REFINED, GUIDE_RESPONSE_UNITS},
@@ -52,7 +52,7 @@ fn regions_are_nested_rectangles_that_fill_the_map() {
         }
     }
     assert!(covered.iter().all(|count| *count == 1), "every cell lies in one region");
-    let sum = |value: &dyn Fn(&fenestra::sampler::guided::Region) -> f64| -> f64 {
+    let sum = |value: &dyn Fn(&fenestra::sampler::regions::Region) -> f64| -> f64 {
         fine.regions.iter().map(value).sum()
     };
     assert!((sum(&|region| region.share) - 1.0).abs() < 1e-12);

@@ -16,9 +16,8 @@ use fenestra::{
     pass::Roulette,
     sampler::{
         Parameters, Sampler,
-        guided::{
-            CellKey, FACE_COUNT, GuideState, PARTS_PER_RAY, Partition, SHARE_WORDS, face_normal,
-        },
+        guided::{CellKey, GuideState, PARTS_PER_RAY, SHARE_WORDS},
+        regions::{FACE_COUNT, Partition, face_normal},
     },
     scene::Scene,
     session::{Renderer, Settings},

@@ -22,9 +22,10 @@ use fenestra::{
     sampler::{
         Parameters, Sampler,
         guided::{
-            ARRIVAL_DIRECTIONS, FACE_COUNT, Guide, GuideBuffers, GuideSize, GuideState,
-            GuidedParameters, arrival_direction,
+            ARRIVAL_DIRECTIONS, Guide, GuideBuffers, GuideSize, GuideState, GuidedParameters,
+            arrival_direction,
         },
+        regions::FACE_COUNT,
     },
     scene::Scene,
     session::{Renderer, Settings, window_of},
@@ -113,7 +114,7 @@ fn arriving() -> (GuideState, Vec<f32>) {
     };
     let words: Vec<[u32; 2]> = (0..FACE_COUNT * ARRIVAL_DIRECTIONS).map(words).collect();
     let scene = scenes::room(vec![scenes::diffuse(Vec3::splat(0.5))]);
-    let partition = fenestra::sampler::guided::Partition::new(&scene.environment, 256);
+    let partition = fenestra::sampler::regions::Partition::new(&scene.environment, 256);
     let learned = Guide::new(256, FACE_COUNT, 8).with_bounces(&words, 1);
     let snapshot = learned.snapshot(&partition);
     let read = snapshot.arriving[2 * ARRIVAL_DIRECTIONS..][..ARRIVAL_DIRECTIONS].to_vec();

@@ -11,7 +11,8 @@ use fenestra::{
     film::Aov,
     sampler::{
         Parameters, Sampler,
-        guided::{CellKey, FACE_COUNT, face_normal},
+        guided::CellKey,
+        regions::{FACE_COUNT, face_normal},
     },
     scene::Scene,
     session::{Renderer, Settings},

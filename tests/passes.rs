@@ -14,12 +14,12 @@ use fenestra::{
     },
     sampler::{
         Parameters, basic,
-        control_variates::{ControlledSteps, PilotSteps, RecordGrid},
+        control_variates::{self, RecordGrid},
         guided::{GuidedParameters, GuidedSteps},
         haar::HaarSteps,
-        portal::PortalSteps,
+        portal,
         product::{FitSizes, ProductParameters, ProductSteps},
-        tiles::{TileSteps, TilesParameters},
+        tiles::{self, TilesParameters},
         visibility::{CacheScope, VisibilityParameters, VisibilitySteps},
     },
     shader::{
@@ -84,7 +84,7 @@ fn guided(settings: &PassSettings) -> impl Steps {
 }
 
 fn portal() -> impl Steps {
-    PortalSteps::new(&Parameters::default(), 1, Surfaces::default())
+    portal::steps(&Parameters::default(), 1, Surfaces::default())
 }
 
 fn haar(cache: &str) -> impl Steps {
@@ -96,15 +96,15 @@ fn haar(cache: &str) -> impl Steps {
 const GRID: RecordGrid = RecordGrid { side: 16, edge_per_distance: 0.1, largest_edge: 1.0 };
 
 fn controlled() -> impl Steps {
-    ControlledSteps::new(&Parameters::default(), GRID, Surfaces::default()).unwrap()
+    control_variates::steps(&Parameters::default(), GRID, Surfaces::default()).unwrap()
 }
 
 fn pilot() -> impl Steps {
-    PilotSteps::new(&Parameters::default(), GRID, Surfaces::default()).unwrap()
+    control_variates::pilot_steps(&Parameters::default(), GRID, Surfaces::default()).unwrap()
 }
 
-fn tiles() -> TileSteps {
-    TileSteps::new(&TilesParameters::default(), 128, Surfaces::default())
+fn tiles(learns: bool) -> impl Steps {
+    tiles::steps(&TilesParameters::default(), 128, learns, Surfaces::default())
 }
 
 fn order(settings: &PassSettings, steps: &dyn Steps, wave: Wave) -> Vec<Dispatch> {
@@ -207,8 +207,8 @@ fn shown() -> Vec<(&'static str, Vec<Dispatch>)> {
         ("haar with a cache", order(&settings(2, 1), &haar("haar-cache=on"), wave(0, 1))),
         ("control-variates", order(&deep, &controlled(), wave(0, 1))),
         ("pilot of control-variates", order(&deep, &pilot(), training)),
-        ("tiles", order(&deep, &tiles(), wave(0, 1))),
-        ("pilot of tiles", order(&deep, &tiles().learning(), training)),
+        ("tiles", order(&deep, &tiles(false), wave(0, 1))),
+        ("pilot of tiles", order(&deep, &tiles(true), training)),
         ("one vertex, textures, lamps", order(&furnished, &mis(), wave(0, 1))),
         ("shared paths", order(&shared(2), &mis(), wave(0, 1))),
         ("lists of living paths", order(&listed(settings(2, 2)), &mis(), wave(0, 1))),

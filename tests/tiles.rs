@@ -26,10 +26,10 @@ use fenestra::{
     pass::{Pass, PathDemand, SceneBuffers, Steps, Surfaces, WaveBuffers},
     sampler::{
         Parameters, Sampler,
-        guided::Partition,
-        tiles::{
-            Entry, SectorGrid, TileBuffers, TileCache, TileDensity, TileSteps, TilesParameters,
-        },
+        pilot::Tables,
+        rays::RaySteps,
+        regions::Partition,
+        tiles::{self, Entry, SectorGrid, TileBuffers, TileCache, TileDensity, TilesParameters},
     },
     scene::{
         Geometry, Scene,
@@ -38,7 +38,7 @@ use fenestra::{
     session::{Settings, window_of},
     shader::{
         bindings::{PROBE, probe},
-        rooms::tiles::{TILE_RESPONSE_UNITS, TILE_SCALE},
+        rooms::tiles::{CONSTANT_TILES, TILE_RESPONSE_UNITS, TILE_SCALE},
         structs::{SceneParameters, ShadowRay, Wave},
     },
 };
@@ -245,7 +245,8 @@ struct Cache {
     buffers: TileBuffers,
     scene_buffers: SceneBuffers,
     parameters: SceneParameters,
-    steps: TileSteps,
+    steps: RaySteps,
+    tiles: u32,
 }
 
 impl Cache {
@@ -270,10 +271,11 @@ impl Cache {
             ..SceneParameters::default()
         };
         let own = TilesParameters { sector_jitter: false, ..TilesParameters::default() };
-        let steps = TileSteps::new(&own, cache.tiles(), scene_buffers.surfaces());
+        let tiles = cache.tiles() as u32;
+        let steps = tiles::steps(&own, cache.tiles(), false, scene_buffers.surfaces());
         let buffers = TileBuffers::new(device, &partition, GRID, cache).unwrap();
         buffers.upload(&entries).unwrap();
-        Self { scene, partition, entries, buffers, scene_buffers, parameters, steps }
+        Self { scene, partition, entries, buffers, scene_buffers, parameters, steps, tiles }
     }
 
     fn density<'a>(&'a self, tables: &'a EnvironmentTables, sector: u32) -> TileDensity<'a> {
@@ -288,7 +290,8 @@ impl Cache {
         let bytes = queries.len() * size_of::<Answer>();
         let output = Buffer::zeroed(device, "answers", bytes as u64).unwrap();
         let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/tiles.spv"));
-        let pipeline = Pipeline::new(device, "tiles", spirv, &self.steps.constants()).unwrap();
+        let pipeline =
+            Pipeline::new(device, "tiles", spirv, &[(CONSTANT_TILES, self.tiles)]).unwrap();
         let bound = [(probe::PROBE_INPUT, &input), (probe::PROBE_OUTPUT, &output)];
         let film = DescriptorSet::new(device, &PROBE, &bound).unwrap();
         let sets = [self.scene_buffers.set(), self.buffers.set(), &film];

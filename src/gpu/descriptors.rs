@@ -3,7 +3,7 @@
 //! A pipeline sees only the sets that its shader uses, and a set may leave bindings unwritten that the
 //! shader does not use.
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use ash::vk;
 
@@ -30,6 +30,7 @@ pub struct DescriptorSet {
     pool: vk::DescriptorPool,
     raw: vk::DescriptorSet,
     views: Vec<vk::BufferView>,
+    buffer_bytes: BTreeMap<String, u64>,
     table: &'static BindingTable,
     device: Arc<Device>,
 }
@@ -58,6 +59,10 @@ impl DescriptorSet {
             pool,
             raw: vk::DescriptorSet::null(),
             views: Vec::new(),
+            buffer_bytes: buffers
+                .iter()
+                .map(|(_, buffer)| (buffer.name().to_owned(), buffer.size()))
+                .collect(),
             table,
             device: Arc::clone(device),
         };
@@ -115,6 +120,11 @@ impl DescriptorSet {
         self.views.push(view);
         labels::name_object(&self.device, view, buffer.name());
         Ok(view)
+    }
+
+    /// Bytes of the buffers in the set by their names.
+    pub fn buffer_bytes(&self) -> &BTreeMap<String, u64> {
+        &self.buffer_bytes
     }
 
     pub(super) fn raw(&self) -> vk::DescriptorSet {

@@ -36,8 +36,6 @@ impl Progress {
 pub struct Report {
     /// Host milliseconds by stage.
     pub host_ms: BTreeMap<String, f64>,
-    /// Device memory by buffer, bytes.
-    pub buffer_bytes: BTreeMap<String, u64>,
     /// Hash of each fit by what was fitted.
     pub fit_hashes: BTreeMap<String, String>,
     /// Candidates per shadow ray, for techniques that choose their number.

@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use super::{Context, Parameters, Room};
+use super::{
+    Context, Parameters, Room,
+    rays::{RaySteps, RayTechnique},
+};
 use crate::{
     error::Result,
-    pass::{Domain, Kernel, Passes, Steps, Surfaces, Technique},
-    shader::{
-        constants::{
-            CONSTANT_CANDIDATES, CONSTANT_COMPENSATION, CONSTANT_SAMPLER, SAMPLER_BRDF,
-            SAMPLER_COSINE, SAMPLER_ENV, SAMPLER_MIS, SAMPLER_RIS, SAMPLER_UNIFORM,
-        },
-        structs::Wave,
+    pass::{Surfaces, Technique},
+    shader::constants::{
+        CONSTANT_CANDIDATES, CONSTANT_COMPENSATION, CONSTANT_SAMPLER, SAMPLER_BRDF, SAMPLER_COSINE,
+        SAMPLER_ENV, SAMPLER_MIS, SAMPLER_RIS, SAMPLER_UNIFORM,
     },
 };
 
@@ -49,17 +49,16 @@ impl Basic {
     }
 
     /// Returns the passes, or [`crate::Error::Usage`] for an unsupported number of candidates.
-    pub fn steps(self, parameters: &Parameters, surfaces: Surfaces) -> Result<BasicSteps> {
-        let candidates = self.candidates(parameters)?;
+    pub fn steps(self, parameters: &Parameters, surfaces: Surfaces) -> Result<RaySteps> {
         let compensates = self.tag == SAMPLER_MIS && parameters.compensation;
-        Ok(BasicSteps {
-            tag: self.tag,
-            candidates,
-            compensates,
-            rays: None,
-            shares_paths: true,
-            surfaces,
-        })
+        let compensation = (CONSTANT_COMPENSATION, u32::from(compensates));
+        let own = [
+            (CONSTANT_SAMPLER, self.tag),
+            (CONSTANT_CANDIDATES, self.candidates(parameters)?),
+            compensation,
+        ];
+        let steps = RaySteps::new("sample", &own, surfaces);
+        Ok(if self.tag == SAMPLER_MIS { steps.with_escape(&[compensation]) } else { steps })
     }
 }
 
@@ -85,71 +84,7 @@ impl Room for Basic {
 
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
         let surfaces = context.runner.settings().surfaces;
-        Ok(Box::new(BasicTechnique { steps: self.steps(context.parameters, surfaces)? }))
+        let steps = self.steps(context.parameters, surfaces)?;
+        Ok(Box::new(RayTechnique { steps, tables: None }))
     }
 }
-
-/// The pass `sample`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BasicSteps {
-    tag: u32,
-    candidates: u32,
-    compensates: bool,
-    rays: Option<[u32; 2]>,
-    shares_paths: bool,
-    surfaces: Surfaces,
-}
-
-impl BasicSteps {
-    /// Returns the same steps with other numbers of shadow rays at the first and at later vertices.
-    pub(super) fn with_rays(self, rays: [u32; 2]) -> Self {
-        Self { rays: Some(rays), ..self }
-    }
-
-    /// Returns the same steps with or without shared paths.
-    pub(super) fn with_sharing(self, shares_paths: bool) -> Self {
-        Self { shares_paths, ..self }
-    }
-}
-
-impl Steps for BasicSteps {
-    fn walks_lists(&self) -> bool {
-        true
-    }
-
-    fn shadow_rays_at(&self, vertex: u32, most: u32) -> u32 {
-        let [first, later] = self.rays.unwrap_or([most; 2]);
-        most.min(if vertex == 0 { first } else { later })
-    }
-
-    fn shares_paths(&self) -> bool {
-        self.shares_paths
-    }
-
-    fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
-        let own = [
-            (CONSTANT_SAMPLER, self.tag),
-            (CONSTANT_CANDIDATES, self.candidates),
-            (CONSTANT_COMPENSATION, u32::from(self.compensates)),
-        ];
-        let constants = [&own[..], &self.surfaces.constants()].concat();
-        vec![Kernel::new("sample", Domain::Surfaces, &constants)]
-    }
-
-    fn escape(&self) -> Option<Vec<(u32, u32)>> {
-        let compensates = (CONSTANT_COMPENSATION, u32::from(self.compensates));
-        (self.tag == SAMPLER_MIS).then(|| vec![compensates])
-    }
-}
-
-struct BasicTechnique {
-    steps: BasicSteps,
-}
-
-impl Passes for BasicTechnique {
-    fn steps(&self) -> &dyn Steps {
-        &self.steps
-    }
-}
-
-impl Technique for BasicTechnique {}

@@ -9,9 +9,11 @@ pub mod guided;
 pub mod haar;
 mod knob;
 mod parameters;
-mod pilot;
+pub mod pilot;
 pub mod portal;
 pub mod product;
+pub mod rays;
+pub mod regions;
 pub mod tiles;
 pub mod visibility;
 

@@ -1,11 +1,12 @@
 //! Descriptor set 1 of `control-variates`: counts of the pilot, and what they let expect.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::sync::Arc;
 
 use super::records::RecordGrid;
 use crate::{
     error::Result,
     gpu::{Buffer, Commands, DescriptorSet, Device},
+    sampler::pilot::Tables,
     shader::rooms::control_variates,
 };
 
@@ -32,33 +33,27 @@ impl RecordBuffers {
         Ok(Self { device: Arc::clone(device), set, grid, counts, visibilities })
     }
 
-    /// Descriptor set 1.
-    pub fn set(&self) -> &DescriptorSet {
+    /// Reads rays and visible rays of every entry. Fails if the device does.
+    pub fn counts(&self) -> Result<Vec<[u32; 2]>> {
+        self.counts.download(self.grid.entries())
+    }
+}
+
+impl Tables for RecordBuffers {
+    const STAGE: &'static str = "visibility records";
+
+    fn set(&self) -> &DescriptorSet {
         &self.set
     }
 
-    /// Empties the counts. Fails if the device does.
-    pub fn clear(&self) -> Result<()> {
+    fn forget(&self) -> Result<()> {
         let mut commands = Commands::begin(&self.device)?;
         commands.fill(&self.counts, 0);
         commands.submit_and_wait().map(drop)
     }
 
-    /// Reads rays and visible rays of every entry. Fails if the device does.
-    pub fn counts(&self) -> Result<Vec<[u32; 2]>> {
-        self.counts.download(self.grid.entries())
-    }
-
-    /// Turns the counts into expected visibilities for the passes to come. Fails if the device does.
-    pub fn freeze(&self) -> Result<()> {
+    fn freeze(&self) -> Result<()> {
         let expected = self.grid.expected(&self.counts()?);
         self.visibilities.upload(bytemuck::cast_slice(&expected))
-    }
-
-    /// Bytes by buffer name.
-    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
-        [&self.counts, &self.visibilities]
-            .map(|buffer| (buffer.name().to_owned(), buffer.size()))
-            .into()
     }
 }

@@ -15,18 +15,17 @@ mod parameters;
 mod records;
 mod steps;
 
-use std::{collections::BTreeMap, time::Instant};
+use std::collections::BTreeMap;
 
 pub use buffers::RecordBuffers;
 pub use parameters::ControlVariatesParameters;
 pub use records::RecordGrid;
-pub use steps::{ControlledSteps, PilotSteps};
+pub use steps::{pilot_steps, steps};
 
-use super::{Context, Parameters, Room, basic, knob::Knobs, pilot};
+use super::{Context, Parameters, Room, basic, knob::Knobs, pilot::Piloted};
 use crate::{
     error::{Error, Result},
-    gpu::DescriptorSet,
-    pass::{Passes, Progress, Report, Runner, Steps, Technique},
+    pass::Technique,
 };
 
 pub(super) struct ControlVariatesRoom;
@@ -56,67 +55,9 @@ impl Room for ControlVariatesRoom {
         let Context { scene, parameters, runner } = context;
         let surfaces = runner.settings().surfaces;
         let grid = RecordGrid::new(scene, &parameters.control_variates);
-        Ok(Box::new(ControlVariates {
-            pilot: PilotSteps::new(parameters, grid, surfaces)?,
-            steps: ControlledSteps::new(parameters, grid, surfaces)?,
-            buffers: RecordBuffers::new(runner.device(), grid)?,
-            has_records: false,
-            freeze_ms: 0.0,
-        }))
-    }
-}
-
-/// `control-variates` in one render.
-struct ControlVariates {
-    pilot: PilotSteps,
-    steps: ControlledSteps,
-    buffers: RecordBuffers,
-    has_records: bool,
-    freeze_ms: f64,
-}
-
-impl Passes for ControlVariates {
-    fn steps(&self) -> &dyn Steps {
-        if self.has_records { &self.steps } else { &self.pilot }
-    }
-
-    fn other_steps(&self) -> Vec<Box<dyn Steps>> {
-        vec![Box::new(self.steps)]
-    }
-
-    fn set(&self) -> Option<&DescriptorSet> {
-        Some(self.buffers.set())
-    }
-}
-
-impl Technique for ControlVariates {
-    /// Runs the pilot before the first sample: one sample of every pixel.
-    fn learn(&mut self, runner: &mut Runner, progress: &Progress) -> Result<u32> {
-        if self.has_records {
-            return Ok(u32::MAX);
-        }
-        self.buffers.clear()?;
-        if !pilot::shoot(self, runner, progress, 1)? {
-            return Ok(u32::MAX);
-        }
-        let start = Instant::now();
-        self.buffers.freeze()?;
-        self.freeze_ms += start.elapsed().as_secs_f64() * 1e3;
-        self.has_records = true;
-        Ok(u32::MAX)
-    }
-
-    fn restart(&mut self, _runner: &mut Runner) -> Result<()> {
-        self.has_records = false;
-        self.freeze_ms = 0.0;
-        Ok(())
-    }
-
-    fn report(&self) -> Report {
-        Report {
-            host_ms: BTreeMap::from([("visibility records".to_owned(), self.freeze_ms)]),
-            buffer_bytes: self.buffers.buffer_bytes(),
-            ..Report::default()
-        }
+        let pilot = pilot_steps(parameters, grid, surfaces)?;
+        let steps = steps(parameters, grid, surfaces)?;
+        let buffers = RecordBuffers::new(runner.device(), grid)?;
+        Ok(Box::new(Piloted::new(buffers, [pilot, steps], 1, BTreeMap::new())))
     }
 }

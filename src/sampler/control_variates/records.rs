@@ -6,7 +6,7 @@ use glam::Vec3;
 use super::parameters::ControlVariatesParameters;
 use crate::{
     math::{equal_area::square_from_direction, random::hash_4d},
-    sampler::guided::{FACE_COUNT, cell_edges, face_normal},
+    sampler::regions::{FACE_COUNT, cell_edges, face_normal},
     scene::Scene,
     shader::rooms::control_variates::{
         CONSTANT_RECORD_EDGE, CONSTANT_RECORD_LARGEST_EDGE, CONSTANT_RECORD_SIDE,

@@ -62,8 +62,4 @@ impl ArrivalBuffers {
         self.arriving.upload(bytemuck::cast_slice(&snapshot.arriving))?;
         self.reflected.upload(bytemuck::cast_slice(&snapshot.reflected.units))
     }
-
-    pub fn buffers(&self) -> [&Buffer; 3] {
-        [&self.arriving, &self.reflected, &self.arrivals]
-    }
 }

@@ -9,7 +9,7 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use crate::sampler::guided::{cells::Tree, key::FACE_COUNT};
+use crate::sampler::{guided::cells::Tree, regions::FACE_COUNT};
 use crate::shader::rooms::guided::GUIDE_ARRIVAL_SIDE;
 
 /// Number of directions that a cell distinguishes.

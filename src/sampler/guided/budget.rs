@@ -1,6 +1,6 @@
 //! Divides the memory of the guide: memory, counted rays → number of cells and regions.
 
-use super::FACE_COUNT;
+use crate::sampler::regions::FACE_COUNT;
 
 /// Rays per cell and region required after the number of regions doubles.
 const RAYS_PER_REGION: u64 = 2;

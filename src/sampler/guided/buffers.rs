@@ -1,12 +1,10 @@
 //! Device buffers of learned visibility, and the rebuild: counts of the passes → tables they read.
 
-use std::{collections::BTreeMap, sync::Arc, time::Instant};
-
-use glam::Vec3;
+use std::{sync::Arc, time::Instant};
 
 use super::{
-    ARRIVAL_DIRECTIONS, ArrivalWords, CellKey, CountWords, FACE_COUNT, Guide, GuideState,
-    MAX_CELLS, Origin, Partition, SHARE_WORDS, Snapshot,
+    ARRIVAL_DIRECTIONS, ArrivalWords, CellKey, CountWords, Guide, GuideState, MAX_CELLS, Origin,
+    SHARE_WORDS, Snapshot,
     arrival_buffers::{self, ArrivalBuffers},
     budget::GuideBudget,
     decode_entry, decode_visibility,
@@ -16,14 +14,13 @@ use super::{
 use crate::{
     error::{Error, Result},
     gpu::{Buffer, Commands, DescriptorSet, Device},
-    scene::{self, Scene, instance},
+    sampler::regions::{FACE_COUNT, Partition, bounds_of, cell_edges},
+    scene::{self, Scene},
     shader::rooms::guided::{self, GUIDE_COUNT_WORDS, GUIDE_NO_KEY, GuideParameters, PathCell},
 };
 
 /// Pixels along the edge of a cell, unless the scene limits it.
 const CELL_PIXELS: f32 = 24.0;
-/// Smallest number of cells along the longest side of the scene.
-const CELLS_PER_SCENE: f32 = 20.0;
 /// Number of levels below the largest cell.
 const LEVELS: i32 = 12;
 const COUNT_BYTES: u64 = 4 * GUIDE_COUNT_WORDS as u64;
@@ -84,6 +81,7 @@ pub struct GuideBuffers {
     shares: Buffer,
     missing: Buffer,
     targets: Buffer,
+    #[expect(dead_code, reason = "the set binds it")]
     path_cells: Buffer,
     arrivals: Option<ArrivalBuffers>,
     missing_slots: usize,
@@ -122,7 +120,7 @@ impl GuideBuffers {
         let missing_slots = (2 * capacity).next_power_of_two();
         let learned = Guide::new(region_count, capacity, slots);
 
-        let (mut regions, aliases) = region_tables(&partition);
+        let (mut regions, aliases) = partition.tables();
         regions.resize(most_regions.max(region_count), [0; 4]);
         let (entry_bytes, count_bytes) =
             (8 * budget.counts as u64, COUNT_BYTES * budget.counts as u64);
@@ -392,7 +390,7 @@ impl GuideBuffers {
     }
 
     fn take_regions(&mut self, partition: Partition) -> Result<()> {
-        let (regions, aliases) = region_tables(&partition);
+        let (regions, aliases) = partition.tables();
         self.regions.upload(bytemuck::cast_slice(&regions))?;
         self.aliases.upload(bytemuck::cast_slice(&aliases))?;
         self.region_of_cell.upload(bytemuck::cast_slice(&partition.region_of_cell))?;
@@ -429,57 +427,6 @@ impl GuideBuffers {
         self.table.upload(bytemuck::cast_slice(table))?;
         self.entries.upload(bytemuck::cast_slice(entries))
     }
-
-    /// Bytes by buffer name.
-    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
-        [
-            &self.parameters,
-            &self.table,
-            &self.entries,
-            &self.regions,
-            &self.aliases,
-            &self.region_of_cell,
-            &self.counts,
-            &self.shares,
-            &self.missing,
-            &self.targets,
-            &self.path_cells,
-        ]
-        .into_iter()
-        .chain(self.arrivals.iter().flat_map(ArrivalBuffers::buffers))
-        .map(|buffer| (buffer.name().to_owned(), buffer.size()))
-        .collect()
-    }
-}
-
-/// Returns first alias entry, columns, rows and first place of every region, and all alias entries.
-pub(in crate::sampler) fn region_tables(partition: &Partition) -> (Vec<[u32; 4]>, Vec<[u32; 2]>) {
-    let regions = partition.regions.iter().map(|region| {
-        let first = region.first[0] | region.first[1] << 16;
-        [region.first_entry as u32, region.size[0], region.size[1], first]
-    });
-    let aliases = partition
-        .entries
-        .iter()
-        .map(|entry| [u32::try_from(entry.threshold).unwrap_or(u32::MAX), entry.alias]);
-    (regions.collect(), aliases.collect())
-}
-
-/// Returns the edge of cells that are `pixels` wide in the picture, per metre of distance to the camera,
-/// and the largest edge, metres: a twentieth of the scene.
-pub(in crate::sampler) fn cell_edges(scene: &Scene, pixels: f32) -> [f32; 2] {
-    let [low, high] = bounds_of(scene);
-    let size = (high - low).max_element();
-    let size = if size.is_finite() && size > 0.0 { size } else { 1.0 };
-    let pixel_angle = 2.0 * (0.5 * scene.camera.vertical_fov_deg).to_radians().tan()
-        / scene.film.height.max(1) as f32;
-    [pixels * pixel_angle, size / CELLS_PER_SCENE]
-}
-
-/// Corners of the scene; infinite where it is empty.
-fn bounds_of(scene: &Scene) -> [Vec3; 2] {
-    let bounds = instance::bounds(scene.geometry.used_extent());
-    bounds.unwrap_or([Vec3::INFINITY, Vec3::NEG_INFINITY])
 }
 
 /// Makes cells about [`CELL_PIXELS`] wide in the picture, at most a twentieth of the scene.

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::sampler::guided::key::{CellKey, FACE_COUNT};
+use crate::sampler::{guided::key::CellKey, regions::FACE_COUNT};
 use crate::shader::rooms::guided::{GUIDE_PROBES, GUIDE_REFINED, GUIDE_SHARE_SHIFT};
 
 /// Upper bound of the number of cells, faces included: their index lies below [`GUIDE_REFINED`].

@@ -3,11 +3,13 @@
 //! The probability of a region is proportional to energy · response · V̂^¾, mixed with a small
 //! share that follows the energy alone.
 
-use crate::sampler::guided::{
-    estimate::Estimates,
-    partition::{Partition, Region},
+use crate::{
+    sampler::{
+        guided::estimate::Estimates,
+        regions::{Partition, Region},
+    },
+    shader::rooms::guided::GUIDE_VISIBILITY_LEVELS,
 };
-use crate::shader::rooms::guided::GUIDE_VISIBILITY_LEVELS;
 
 /// Exponent of the visibility in the probability of a region. Variance is least with ½ where the
 /// response is constant and the visibility of a cell is the same chance everywhere in it, and with

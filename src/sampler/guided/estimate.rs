@@ -13,11 +13,9 @@
 
 use glam::Vec3;
 
-use crate::sampler::guided::{
-    counts::Tally,
-    key::{FACE_COUNT, face_normal},
-    partition::{Partition, Region},
-    split::PARENT_COUNT,
+use crate::sampler::{
+    guided::counts::Tally,
+    regions::{FACE_COUNT, PARENT_COUNT, Partition, Region, face_normal},
 };
 
 /// Weight of the prior of the visibility, in rays.

@@ -2,14 +2,16 @@
 
 use rayon::prelude::*;
 
-use crate::sampler::guided::{
-    arriving::{ArrivalWords, ArrivingLight, Reflected},
-    cells::Cells,
-    counts::{Count, CountWords, MAX_WORD, PARTS_PER_RAY},
-    key::{CellKey, FACE_COUNT},
-    partition::Partition,
-    share::SHARE_WORDS,
-    state::GuideState,
+use crate::sampler::{
+    guided::{
+        arriving::{ArrivalWords, ArrivingLight, Reflected},
+        cells::Cells,
+        counts::{Count, CountWords, MAX_WORD, PARTS_PER_RAY},
+        key::CellKey,
+        share::SHARE_WORDS,
+        state::GuideState,
+    },
+    regions::{FACE_COUNT, Partition},
 };
 
 /// Trials of one region and cell above which its counts are halved, so that the responses fit a

@@ -6,15 +6,7 @@
 //! the same edge, which costs precision but no correctness. The grids are nested: a cell consists
 //! of eight of half its edge. Twin of `guide_key` in `glsl/guided/guide.glsl`.
 
-use glam::Vec3;
-
-/// Faces of a cube, in the order +x, −x, +y, −y, +z, −z.
-pub const FACE_COUNT: usize = 6;
-
-/// Outward normal of a face of the cube.
-pub fn face_normal(face: usize) -> Vec3 {
-    [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z][face % FACE_COUNT]
-}
+use crate::sampler::regions::FACE_COUNT;
 
 /// Key of a cell: x, y, z in 8 bits each, the level of size in 4, the face in 3. The highest bit
 /// marks coarse cells, four times as long, which hold 64 fine ones.

@@ -1,11 +1,12 @@
 //! Sampler `guided`: learns visibility and reflection between passes.
 //!
-//! Splits the environment into up to 1024 rectangles of its sampling cells ([`Partition`]) and draws
-//! directions within a rectangle exactly in proportion to the map. The [`Guide`] learns how often each
-//! rectangle is visible from each cell of the scene, and how strongly the surfaces there reflect it:
-//! passes count rays, and between passes [`Estimates`] turns the counts into probabilities for the
-//! next ones. From bounce rays it learns where light arrives from other surfaces ([`ArrivingLight`]).
-//! Now and then it splits the environment again, into more rectangles, finely where the scene sees it.
+//! Splits the environment into up to 1024 rectangles of its sampling cells
+//! ([`Partition`](super::regions::Partition)) and draws directions within a rectangle exactly in
+//! proportion to the map. The [`Guide`] learns how often each rectangle is visible from each cell of
+//! the scene, and how strongly the surfaces there reflect it: passes count rays, and between passes
+//! [`Estimates`] turns the counts into probabilities for the next ones. From bounce rays it learns
+//! where light arrives from other surfaces ([`ArrivingLight`]). Now and then it splits the environment
+//! again, into more rectangles, finely where the scene sees it.
 //!
 //! A pass reads only tables learned by earlier passes ([`Snapshot`]). Its samples are therefore
 //! independent of them and every estimate stays unbiased, as in Vévoda et al. 2018 for light sources.
@@ -28,12 +29,10 @@ mod explained;
 mod guide;
 mod key;
 mod parameters;
-mod partition;
 mod record;
 mod recorded_cell;
 mod share;
 mod snapshot;
-mod split;
 mod state;
 mod steps;
 mod technique;
@@ -41,20 +40,17 @@ mod tiles;
 
 pub use arriving::{ARRIVAL_DIRECTIONS, ArrivalWords, ArrivingLight, Reflected, arrival_direction};
 pub use buffers::{GuideBuffers, GuideSize};
-pub(super) use buffers::{cell_edges, region_tables};
 pub use cells::MAX_CELLS;
 pub use counts::{Count, CountWords, PARTS_PER_RAY};
 pub use entries::{decode_entry, decode_visibility};
 pub use estimate::Estimates;
 pub use guide::Guide;
-pub use key::{CellKey, FACE_COUNT, face_normal};
+pub use key::CellKey;
 pub use parameters::GuidedParameters;
-pub use partition::{MAX_REGIONS, Partition, Region};
 pub use record::{GuidedRay, RecordedGuide};
 pub use recorded_cell::{CellLevel, RecordedCell, RecordedRegion};
 pub use share::{SHARE_WORDS, ShareEvidence, share_in_256ths};
 pub use snapshot::Snapshot;
-pub use split::PARENT_COUNT;
 pub use state::{GuideState, Origin};
 pub use steps::GuidedSteps;
 pub use technique::Guided;

@@ -5,12 +5,11 @@
 
 use glam::Vec3;
 
-use super::{
-    epoch::with_epoch, partition::Partition, recorded_cell::RecordedCell, technique::Guided,
-};
+use super::{epoch::with_epoch, recorded_cell::RecordedCell, technique::Guided};
 use crate::{
     error::Result,
     pass::{Passes, Progress, RecordedRay, Runner, film_buffers::position_in_film_order},
+    sampler::regions::Partition,
     shader::{
         constants::NO_MATERIAL,
         rooms::guided::NOTHING_TO_LEARN,

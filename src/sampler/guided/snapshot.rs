@@ -2,16 +2,17 @@
 
 use rayon::prelude::*;
 
-use crate::sampler::guided::{
-    arriving::Reflected,
-    cells::Tree,
-    counts::Tally,
-    entries::{EntryTables, EntryWriter, decode_entry},
-    estimate::{Estimates, RegionTables},
-    guide::Guide,
-    key::FACE_COUNT,
-    partition::Partition,
-    share::{SHARE_WORDS, ShareEvidence, share_in_256ths},
+use crate::sampler::{
+    guided::{
+        arriving::Reflected,
+        cells::Tree,
+        counts::Tally,
+        entries::{EntryTables, EntryWriter, decode_entry},
+        estimate::{Estimates, RegionTables},
+        guide::Guide,
+        share::{SHARE_WORDS, ShareEvidence, share_in_256ths},
+    },
+    regions::{FACE_COUNT, Partition},
 };
 
 /// Tables that the next passes read, as they lie on the device.

@@ -18,11 +18,7 @@ use crate::{
         Explanation, Passes, Progress, Report, Runner, SHADOW_RAYS_PER_GROUP, Saved, Steps,
         Technique,
     },
-    sampler::{
-        Context, Parameters, Room,
-        basic::{self, BasicSteps},
-        knob::Knobs,
-    },
+    sampler::{Context, Parameters, Room, basic, knob::Knobs, rays::RaySteps},
     shader::{constants::TRAINING_WAVE, structs::Wave},
 };
 use std::collections::BTreeMap;
@@ -105,7 +101,7 @@ pub struct Guided {
     pub(super) buffers: GuideBuffers,
     steps: GuidedSteps,
     /// Steps of `mis`, for open scenes.
-    open_steps: BasicSteps,
+    open_steps: RaySteps,
     /// Number of candidates that the user asked for; `None` for `auto`.
     given_candidates: Option<u32>,
     choice: Choice,
@@ -259,7 +255,7 @@ impl Passes for Guided {
     }
 
     fn other_steps(&self) -> Vec<Box<dyn Steps>> {
-        let mut others: Vec<Box<dyn Steps>> = vec![Box::new(self.open_steps)];
+        let mut others: Vec<Box<dyn Steps>> = vec![Box::new(self.open_steps.clone())];
         if self.chooses_tiles {
             others.push(Box::new(self.steps.with_sharing(true)));
         }
@@ -376,7 +372,6 @@ impl Technique for Guided {
                 ("choice of tiles".to_owned(), self.tiles.ms),
             ]
             .into(),
-            buffer_bytes: self.buffers.buffer_bytes(),
             candidates: self.candidates(),
             candidate_costs: self.choice.costs.clone(),
             share_tiles: self.share_tiles(),

@@ -1,6 +1,6 @@
 //! Descriptor set 1 of `haar`: tree of the environment, nodes of the product at every hit of a wave.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::sync::Arc;
 
 use super::{
     steps::cache_places,
@@ -95,10 +95,5 @@ impl NodeBuffers {
     /// Halves of the nodes, two words for each four.
     pub fn nodes(&self) -> &Buffer {
         &self.buffers[2]
-    }
-
-    /// Bytes by buffer name.
-    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
-        self.buffers.iter().map(|buffer| (buffer.name().to_owned(), buffer.size())).collect()
     }
 }

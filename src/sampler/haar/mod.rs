@@ -80,7 +80,6 @@ impl Technique for HaarTechnique {
     fn report(&self) -> Report {
         Report {
             host_ms: BTreeMap::from([("environment tree".to_owned(), self.tree_ms)]),
-            buffer_bytes: self.nodes.buffer_bytes(),
             ..Report::default()
         }
     }

@@ -10,16 +10,19 @@ use std::{collections::BTreeMap, sync::Arc};
 
 pub use parameters::PortalParameters;
 
-use super::{Context, Parameters, Room, knob::Knobs};
+use super::{
+    Context, Parameters, Room,
+    knob::Knobs,
+    rays::{RaySteps, RayTechnique},
+};
 use crate::{
     error::Result,
     gpu::{Buffer, DescriptorSet, Device},
-    pass::{Domain, Kernel, Passes, Report, Steps, Surfaces, Technique},
+    pass::{Surfaces, Technique},
     scene::Portal,
     shader::{
         constants::CONSTANT_COMPENSATION,
         rooms::portal::{self, CONSTANT_PORTAL_SHARE, CONSTANT_PORTALS},
-        structs::Wave,
     },
 };
 
@@ -38,11 +41,21 @@ impl Room for PortalRoom {
 
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
         let Context { scene, parameters, runner } = context;
-        let surfaces = runner.settings().surfaces;
-        let steps = PortalSteps::new(parameters, scene.portals.len() as u32, surfaces);
+        let count = scene.portals.len() as u32;
+        let steps = steps(parameters, count, runner.settings().surfaces);
         let (set, buffer) = upload(runner.device(), &scene.portals)?;
-        Ok(Box::new(PortalTechnique { steps, set, buffer }))
+        Ok(Box::new(RayTechnique { steps, tables: Some((set, vec![buffer])) }))
     }
+}
+
+/// Returns the passes for `count` portals.
+pub fn steps(parameters: &Parameters, count: u32, surfaces: Surfaces) -> RaySteps {
+    let own = [
+        (CONSTANT_PORTALS, count),
+        (CONSTANT_PORTAL_SHARE, parameters.portal.portal_share.to_bits()),
+        (CONSTANT_COMPENSATION, u32::from(parameters.compensation)),
+    ];
+    RaySteps::new("sample_portals", &own, surfaces)
 }
 
 /// Makes descriptor set 1 of the portals.
@@ -58,60 +71,4 @@ fn upload(device: &Arc<Device>, portals: &[Portal]) -> Result<(DescriptorSet, Bu
     let buffer = Buffer::texels_from_slice(device, "portals", &words)?;
     let set = DescriptorSet::new(device, &portal::TABLE, &[(portal::PORTALS, &buffer)])?;
     Ok((set, buffer))
-}
-
-/// The pass `sample_portals`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PortalSteps {
-    count: u32,
-    share: f32,
-    compensates: bool,
-    surfaces: Surfaces,
-}
-
-impl PortalSteps {
-    /// Returns the passes for `count` portals.
-    pub fn new(parameters: &Parameters, count: u32, surfaces: Surfaces) -> Self {
-        let share = parameters.portal.portal_share;
-        Self { count, share, compensates: parameters.compensation, surfaces }
-    }
-}
-
-impl Steps for PortalSteps {
-    fn walks_lists(&self) -> bool {
-        true
-    }
-
-    fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
-        let own = [
-            (CONSTANT_PORTALS, self.count),
-            (CONSTANT_PORTAL_SHARE, self.share.to_bits()),
-            (CONSTANT_COMPENSATION, u32::from(self.compensates)),
-        ];
-        let constants = [&own[..], &self.surfaces.constants()].concat();
-        vec![Kernel::new("sample_portals", Domain::Surfaces, &constants)]
-    }
-}
-
-struct PortalTechnique {
-    steps: PortalSteps,
-    set: DescriptorSet,
-    buffer: Buffer,
-}
-
-impl Passes for PortalTechnique {
-    fn steps(&self) -> &dyn Steps {
-        &self.steps
-    }
-
-    fn set(&self) -> Option<&DescriptorSet> {
-        Some(&self.set)
-    }
-}
-
-impl Technique for PortalTechnique {
-    fn report(&self) -> Report {
-        let bytes = (self.buffer.name().to_owned(), self.buffer.size());
-        Report { buffer_bytes: BTreeMap::from([bytes]), ..Report::default() }
-    }
 }

@@ -147,11 +147,6 @@ impl Fits {
     pub fn fit_ms(&self) -> f64 {
         self.fit_ms
     }
-
-    /// Every table.
-    pub fn buffers(&self) -> &[Buffer] {
-        &self.buffers
-    }
 }
 
 fn or_warn<T>(fitted: Result<T>) -> Result<Option<T>> {

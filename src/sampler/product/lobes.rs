@@ -1,6 +1,6 @@
 //! Product lobes of all hits of a wave on the device, with the fits they are made from.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::sync::Arc;
 
 use super::fits::Fits;
 use crate::{
@@ -104,11 +104,5 @@ impl LobeBuffers {
     /// Visibility caches: a head and its directions each.
     pub fn caches(&self) -> &Buffer {
         &self.buffers[4]
-    }
-
-    /// Bytes by buffer name.
-    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
-        let all = self.buffers.iter().chain(self.fits.buffers());
-        all.map(|buffer| (buffer.name().to_owned(), buffer.size())).collect()
     }
 }

@@ -90,7 +90,6 @@ impl Technique for Product {
 pub(super) fn report(lobes: &LobeBuffers) -> Report {
     Report {
         host_ms: [("fits".to_owned(), lobes.fits().fit_ms())].into(),
-        buffer_bytes: lobes.buffer_bytes(),
         fit_hashes: lobes.fits().hashes().clone(),
         ..Report::default()
     }

@@ -1,6 +1,6 @@
 //! Descriptor set 1 of `tiles`: counts of the pilot, and the probabilities that come of them.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::sync::Arc;
 
 use super::{
     cache::{Entry, TileCache},
@@ -9,7 +9,7 @@ use super::{
 use crate::{
     error::Result,
     gpu::{Buffer, Commands, DescriptorSet, Device},
-    sampler::guided::{Partition, region_tables},
+    sampler::{pilot::Tables, regions::Partition},
     shader::rooms::tiles,
 };
 
@@ -21,6 +21,7 @@ pub struct TileBuffers {
     cache: TileCache,
     counts: Buffer,
     entries: Buffer,
+    #[expect(dead_code, reason = "the set binds them")]
     tables: [Buffer; 3],
 }
 
@@ -35,7 +36,7 @@ impl TileBuffers {
         let bytes = 8 * (grid.sectors() * cache.tiles()) as u64;
         let counts = Buffer::new(device, "tile counts", bytes)?;
         let entries = Buffer::new(device, "tile entries", bytes)?;
-        let (regions, aliases) = region_tables(partition);
+        let (regions, aliases) = partition.tables();
         let tables = [
             Buffer::texels_from_slice(device, "tiles", &regions)?,
             Buffer::texels_from_slice(device, "tile aliases", &aliases)?,
@@ -56,38 +57,32 @@ impl TileBuffers {
         Ok(buffers)
     }
 
-    /// Descriptor set 1.
-    pub fn set(&self) -> &DescriptorSet {
-        &self.set
-    }
-
-    /// Starts from nothing. Fails if the device does.
-    pub fn forget(&self) -> Result<()> {
-        let mut commands = Commands::begin(&self.device)?;
-        commands.fill(&self.counts, 0);
-        commands.submit_and_wait()?;
-        self.upload(&self.cache.untrained().repeat(self.grid.sectors()))
-    }
-
     /// Reads rays and their summed squares of cosines by sector and tile. Fails if the device does.
     pub fn counts(&self) -> Result<Vec<[u32; 2]>> {
         self.counts.download(self.grid.sectors() * self.cache.tiles())
-    }
-
-    /// Turns the counts into probabilities for the passes to come. Fails if the device does.
-    pub fn freeze(&self) -> Result<()> {
-        self.upload(&self.cache.learned(self.grid, &self.counts()?))
     }
 
     /// Replaces the entries of all sectors. Fails if the device does.
     pub fn upload(&self, entries: &[Entry]) -> Result<()> {
         self.entries.upload(bytemuck::cast_slice(entries))
     }
+}
 
-    /// Bytes by buffer name.
-    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
-        let own = [&self.counts, &self.entries];
-        let all = own.into_iter().chain(&self.tables);
-        all.map(|buffer| (buffer.name().to_owned(), buffer.size())).collect()
+impl Tables for TileBuffers {
+    const STAGE: &'static str = "tile cache";
+
+    fn set(&self) -> &DescriptorSet {
+        &self.set
+    }
+
+    fn forget(&self) -> Result<()> {
+        let mut commands = Commands::begin(&self.device)?;
+        commands.fill(&self.counts, 0);
+        commands.submit_and_wait()?;
+        self.upload(&self.cache.untrained().repeat(self.grid.sectors()))
+    }
+
+    fn freeze(&self) -> Result<()> {
+        self.upload(&self.cache.learned(self.grid, &self.counts()?))
     }
 }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::grid::SectorGrid;
 use crate::{
-    sampler::guided::Partition,
+    sampler::regions::Partition,
     shader::rooms::tiles::{TILE_RESPONSE_UNITS, TILE_SCALE},
 };
 

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::cache::Entry;
 use crate::{
     math::random::unit_float,
-    sampler::guided::Partition,
+    sampler::regions::Partition,
     scene::environment::{EnvironmentMap, EnvironmentSample, EnvironmentTables},
 };
 

@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3, vec3};
 
 use super::parameters::TilesParameters;
 use crate::{
-    math::equal_area::square_from_direction, sampler::guided::cell_edges, scene::Scene,
+    math::equal_area::square_from_direction, sampler::regions::cell_edges, scene::Scene,
     shader::structs::SceneParameters,
 };
 

@@ -25,7 +25,6 @@ mod cache;
 mod density;
 mod grid;
 mod parameters;
-mod steps;
 
 use std::{collections::BTreeMap, time::Instant};
 
@@ -34,13 +33,15 @@ pub use cache::{Entry, TileCache};
 pub use density::TileDensity;
 pub use grid::SectorGrid;
 pub use parameters::TilesParameters;
-pub use steps::TileSteps;
 
-use super::{Context, Parameters, Room, basic, guided::Partition, knob::Knobs, pilot};
+use super::{
+    Context, Parameters, Room, basic, knob::Knobs, pilot::Piloted, rays::RaySteps,
+    regions::Partition,
+};
 use crate::{
     error::Result,
-    gpu::DescriptorSet,
-    pass::{Passes, Progress, Report, Runner, Steps, Technique},
+    pass::{Surfaces, Technique},
+    shader::rooms::tiles::{CONSTANT_SECTOR_JITTER, CONSTANT_TILES, CONSTANT_TILES_LEARN},
 };
 
 pub(super) struct TilesRoom;
@@ -59,74 +60,23 @@ impl Room for TilesRoom {
         let partition = Partition::new(&scene.environment, own.environment_tiles as usize);
         let cache = TileCache::new(&partition, own.tile_floor, parameters.compensation);
         let grid = SectorGrid::new(scene, own, cache.tiles());
-        let steps = TileSteps::new(own, cache.tiles(), runner.settings().surfaces);
+        let surfaces = runner.settings().surfaces;
+        let steps = [true, false].map(|learns| steps(own, cache.tiles(), learns, surfaces));
         let buffers = TileBuffers::new(runner.device(), &partition, grid, cache)?;
-        Ok(Box::new(Tiles {
-            pilot: steps.learning(),
-            steps,
-            buffers,
-            pilot_samples: own.pilot_samples,
-            has_learned: false,
-            tiles_ms: start.elapsed().as_secs_f64() * 1e3,
-            freeze_ms: 0.0,
-        }))
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        let prepare_ms = [("environment tiles".to_owned(), ms)].into();
+        Ok(Box::new(Piloted::new(buffers, steps, own.pilot_samples, prepare_ms)))
     }
 }
 
-/// `tiles` in one render.
-struct Tiles {
-    pilot: TileSteps,
-    steps: TileSteps,
-    buffers: TileBuffers,
-    pilot_samples: u32,
-    has_learned: bool,
-    tiles_ms: f64,
-    freeze_ms: f64,
-}
-
-impl Passes for Tiles {
-    fn steps(&self) -> &dyn Steps {
-        if self.has_learned { &self.steps } else { &self.pilot }
-    }
-
-    fn other_steps(&self) -> Vec<Box<dyn Steps>> {
-        vec![Box::new(self.steps)]
-    }
-
-    fn set(&self) -> Option<&DescriptorSet> {
-        Some(self.buffers.set())
-    }
-}
-
-impl Technique for Tiles {
-    /// Runs the pilot before the first sample.
-    fn learn(&mut self, runner: &mut Runner, progress: &Progress) -> Result<u32> {
-        if self.has_learned {
-            return Ok(u32::MAX);
-        }
-        self.buffers.forget()?;
-        if !pilot::shoot(self, runner, progress, self.pilot_samples)? {
-            return Ok(u32::MAX);
-        }
-        let start = Instant::now();
-        self.buffers.freeze()?;
-        self.freeze_ms += start.elapsed().as_secs_f64() * 1e3;
-        self.has_learned = true;
-        Ok(u32::MAX)
-    }
-
-    fn restart(&mut self, _runner: &mut Runner) -> Result<()> {
-        self.has_learned = false;
-        self.freeze_ms = 0.0;
-        Ok(())
-    }
-
-    fn report(&self) -> Report {
-        let host_ms = [("environment tiles", self.tiles_ms), ("tile cache", self.freeze_ms)];
-        Report {
-            host_ms: host_ms.map(|(name, ms)| (name.to_owned(), ms)).into(),
-            buffer_bytes: self.buffers.buffer_bytes(),
-            ..Report::default()
-        }
-    }
+/// Returns the steps of the picture, or of the pilot, which `learns`, for so many tiles.
+pub fn steps(own: &TilesParameters, tiles: usize, learns: bool, surfaces: Surfaces) -> RaySteps {
+    let tiles = (CONSTANT_TILES, tiles as u32);
+    let constants = [
+        tiles,
+        (CONSTANT_SECTOR_JITTER, u32::from(own.sector_jitter)),
+        (CONSTANT_TILES_LEARN, u32::from(learns)),
+    ];
+    let steps = RaySteps::new("sample_tiles", &constants, surfaces);
+    if learns { steps.learning("count_tiles", &[tiles]) } else { steps }
 }

@@ -1,8 +1,8 @@
 //! Parameters of `tiles`.
 
 use crate::sampler::{
-    guided::MAX_REGIONS,
     knob::{ON_OR_OFF, parameters},
+    regions::MAX_REGIONS,
 };
 
 parameters! {

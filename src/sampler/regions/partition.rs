@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use crate::scene::environment::EnvironmentMap;
 use crate::{
     math::alias::{AliasEntry, alias_table},
-    sampler::guided::split::{MapCells, PARENT_COUNT, Rectangle, SummedAreas, split_greedily},
+    sampler::regions::split::{MapCells, PARENT_COUNT, Rectangle, SummedAreas, split_greedily},
 };
 
 /// Upper bound of the number of regions: their index has ten bits on the device.
@@ -91,6 +91,20 @@ impl Partition {
         let rectangles = split_greedily(&SummedAreas::new(&self.cells, weight), region_count);
         (rectangles.len() >= region_count.min(self.regions.len()))
             .then(|| Self::assemble(Arc::clone(&self.cells), &rectangles))
+    }
+
+    /// Returns first alias entry, columns, rows and first place of every region, and all alias entries, as
+    /// devices read them.
+    pub(in crate::sampler) fn tables(&self) -> (Vec<[u32; 4]>, Vec<[u32; 2]>) {
+        let regions = self.regions.iter().map(|region| {
+            let first = region.first[0] | region.first[1] << 16;
+            [region.first_entry as u32, region.size[0], region.size[1], first]
+        });
+        let aliases = self
+            .entries
+            .iter()
+            .map(|entry| [u32::try_from(entry.threshold).unwrap_or(u32::MAX), entry.alias]);
+        (regions.collect(), aliases.collect())
     }
 
     /// Returns first column and row, columns, rows and parent of every region, for a file.

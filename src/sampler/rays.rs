@@ -1,0 +1,102 @@
+//! Samplers that choose each shadow ray by itself, in one pass: those of the kind of `mis`. Such a room
+//! supplies the pass, which draws a light direction and knows its density, and its constants.
+
+use crate::{
+    gpu::{Buffer, DescriptorSet},
+    pass::{Domain, Kernel, Passes, Steps, Surfaces, Technique},
+    shader::structs::Wave,
+};
+
+/// The pass, and where it departs from other samplers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RaySteps {
+    sample: Kernel,
+    /// Pass that counts the rays, for a technique to learn from.
+    learn: Option<Kernel>,
+    rays: Option<[u32; 2]>,
+    shares_paths: bool,
+    escape: Option<Vec<(u32, u32)>>,
+}
+
+impl RaySteps {
+    /// Returns the steps for the pass `shader`, specialized by `own` and by the surfaces of the scene.
+    pub fn new(shader: &'static str, own: &[(u32, u32)], surfaces: Surfaces) -> Self {
+        let constants = [own, &surfaces.constants()].concat();
+        Self {
+            sample: Kernel::new(shader, Domain::Surfaces, &constants),
+            learn: None,
+            rays: None,
+            shares_paths: true,
+            escape: None,
+        }
+    }
+
+    /// Returns the same steps for a pilot: the pass `shader` counts the shadow rays, and bounce rays are no
+    /// samples of the environment.
+    pub(super) fn learning(self, shader: &'static str, constants: &[(u32, u32)]) -> Self {
+        let learn = Some(Kernel::new(shader, Domain::ShadowRays, constants));
+        Self { learn, escape: None, ..self }
+    }
+
+    /// Returns the same steps with other numbers of shadow rays at the first and at later vertices.
+    pub(super) fn with_rays(self, rays: [u32; 2]) -> Self {
+        Self { rays: Some(rays), ..self }
+    }
+
+    /// Returns the same steps with or without shared paths.
+    pub(super) fn with_sharing(self, shares_paths: bool) -> Self {
+        Self { shares_paths, ..self }
+    }
+
+    /// Returns the same steps where bounce rays that escape are samples of the environment too.
+    pub(super) fn with_escape(self, constants: &[(u32, u32)]) -> Self {
+        Self { escape: Some(constants.to_vec()), ..self }
+    }
+}
+
+impl Steps for RaySteps {
+    fn walks_lists(&self) -> bool {
+        true
+    }
+
+    fn shadow_rays_at(&self, vertex: u32, most: u32) -> u32 {
+        let [first, later] = self.rays.unwrap_or([most; 2]);
+        most.min(if vertex == 0 { first } else { later })
+    }
+
+    fn shares_paths(&self) -> bool {
+        self.shares_paths
+    }
+
+    fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
+        vec![self.sample.clone()]
+    }
+
+    fn after_shadow_rays(&self, _wave: &Wave) -> Vec<Kernel> {
+        self.learn.iter().cloned().collect()
+    }
+
+    fn escape(&self) -> Option<Vec<(u32, u32)>> {
+        self.escape.clone()
+    }
+}
+
+/// A technique that learns nothing: steps, and tables that stay as they are.
+pub struct RayTechnique {
+    /// The steps.
+    pub steps: RaySteps,
+    /// Descriptor set 1 and its buffers.
+    pub tables: Option<(DescriptorSet, Vec<Buffer>)>,
+}
+
+impl Passes for RayTechnique {
+    fn steps(&self) -> &dyn Steps {
+        &self.steps
+    }
+
+    fn set(&self) -> Option<&DescriptorSet> {
+        self.tables.as_ref().map(|(set, _)| set)
+    }
+}
+
+impl Technique for RayTechnique {}
