@@ -370,6 +370,16 @@ fn tables_are_in_order_and_share_no_number() {
 }
 
 #[test]
+fn constants_of_rooms_share_neither_name_nor_identifier() {
+    let all: Vec<_> = rooms::constants().collect();
+    let names: BTreeSet<_> = all.iter().map(|(name, _)| name).collect();
+    assert_eq!(names.len(), all.len(), "two rooms declare the same name");
+    let is_identifier = |(name, _): &&(&str, u32)| name.starts_with("CONSTANT_");
+    let identifiers: BTreeSet<_> = all.iter().filter(is_identifier).map(|(_, id)| id).collect();
+    assert_eq!(identifiers.len(), all.iter().filter(is_identifier).count());
+}
+
+#[test]
 fn shaders_use_the_declared_buffers_of_one_table_a_set() {
     let declared = declared();
     let table_of = |place: (u32, u32)| {

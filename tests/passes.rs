@@ -13,13 +13,10 @@ use fenestra::{
         geometry::Traversal, wave_order,
     },
     sampler::{
-        Parameters, basic,
-        control_variates::{self, RecordGrid},
+        Parameters, Sampler, basic,
         guided::{GuidedParameters, GuidedSteps},
         haar::HaarSteps,
-        portal,
         product::{FitSizes, ProductParameters, ProductSteps},
-        tiles::{self, TilesParameters},
         visibility::{CacheScope, VisibilityParameters, VisibilitySteps},
     },
     shader::{
@@ -83,28 +80,10 @@ fn guided(settings: &PassSettings) -> impl Steps {
     GuidedSteps::new(4, GuidedParameters::default(), settings)
 }
 
-fn portal() -> impl Steps {
-    portal::steps(&Parameters::default(), 1, Surfaces::default())
-}
-
 fn haar(cache: &str) -> impl Steps {
     let mut parameters = Parameters::default();
     parameters.set(cache).unwrap();
     HaarSteps::new(&parameters, 8, Surfaces::default(), 2)
-}
-
-const GRID: RecordGrid = RecordGrid { side: 16, edge_per_distance: 0.1, largest_edge: 1.0 };
-
-fn controlled() -> impl Steps {
-    control_variates::steps(&Parameters::default(), GRID, Surfaces::default()).unwrap()
-}
-
-fn pilot() -> impl Steps {
-    control_variates::pilot_steps(&Parameters::default(), GRID, Surfaces::default()).unwrap()
-}
-
-fn tiles(learns: bool) -> impl Steps {
-    tiles::steps(&TilesParameters::default(), 128, learns, Surfaces::default())
 }
 
 fn order(settings: &PassSettings, steps: &dyn Steps, wave: Wave) -> Vec<Dispatch> {
@@ -193,7 +172,7 @@ fn shown() -> Vec<(&'static str, Vec<Dispatch>)> {
     let deep = settings(2, 2);
     let training = Wave { is_training: TRAINING_WAVE, ..wave(0, 1) };
     let furnished = PassSettings { surfaces: everything(), ..settings(2, 1) };
-    vec![
+    let mut shown = vec![
         ("uniform … ris", order(&deep, &mis(), wave(0, 1))),
         ("product", order(&deep, &product(), wave(0, 1))),
         ("visibility", order(&deep, &visibility(CacheScope::Hit, 2), wave(0, 1))),
@@ -202,17 +181,19 @@ fn shown() -> Vec<(&'static str, Vec<Dispatch>)> {
             order(&settings(2, 1), &visibility(CacheScope::Pixel, 2), wave(0, 1)),
         ),
         ("guided", order(&deep, &guided(&deep), wave(0, 1))),
-        ("portal", order(&deep, &portal(), wave(0, 1))),
         ("haar", order(&deep, &haar("haar-cache=off"), wave(0, 1))),
         ("haar with a cache", order(&settings(2, 1), &haar("haar-cache=on"), wave(0, 1))),
-        ("control-variates", order(&deep, &controlled(), wave(0, 1))),
-        ("pilot of control-variates", order(&deep, &pilot(), training)),
-        ("tiles", order(&deep, &tiles(false), wave(0, 1))),
-        ("pilot of tiles", order(&deep, &tiles(true), training)),
         ("one vertex, textures, lamps", order(&furnished, &mis(), wave(0, 1))),
         ("shared paths", order(&shared(2), &mis(), wave(0, 1))),
         ("lists of living paths", order(&listed(settings(2, 2)), &mis(), wave(0, 1))),
-    ]
+    ];
+    let listed =
+        Sampler::ALL.iter().flat_map(|sampler| sampler.listed_steps(deep.surfaces).unwrap());
+    shown.extend(listed.map(|(name, steps)| {
+        let is_pilot = name.starts_with("pilot");
+        (name, order(&deep, &steps, if is_pilot { training } else { wave(0, 1) }))
+    }));
+    shown
 }
 
 /// Settings of a render of plastic in which the pixels of a tile share paths.

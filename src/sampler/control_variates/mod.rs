@@ -20,12 +20,12 @@ use std::collections::BTreeMap;
 pub use buffers::RecordBuffers;
 pub use parameters::ControlVariatesParameters;
 pub use records::RecordGrid;
-pub use steps::{pilot_steps, steps};
+use steps::{pilot_steps, steps};
 
-use super::{Context, Parameters, Room, basic, knob::Knobs, pilot::Piloted};
+use super::{Context, Parameters, Room, basic, knob::Knobs, pilot::Piloted, rays::RaySteps};
 use crate::{
     error::{Error, Result},
-    pass::Technique,
+    pass::{Surfaces, Technique},
 };
 
 pub(super) struct ControlVariatesRoom;
@@ -49,6 +49,18 @@ impl Room for ControlVariatesRoom {
         named.insert("candidates".to_owned(), candidates.to_string());
         named.extend(basic::MIS.describe(parameters));
         named
+    }
+
+    fn listed_steps(
+        &self,
+        parameters: &Parameters,
+        surfaces: Surfaces,
+    ) -> Result<Vec<(&'static str, RaySteps)>> {
+        let grid = RecordGrid { side: 16, edge_per_distance: 0.1, largest_edge: 1.0 };
+        Ok(vec![
+            ("control-variates", steps(parameters, grid, surfaces)?),
+            ("pilot of control-variates", pilot_steps(parameters, grid, surfaces)?),
+        ])
     }
 
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {

@@ -53,6 +53,15 @@ impl Room for TilesRoom {
         named
     }
 
+    fn listed_steps(
+        &self,
+        parameters: &Parameters,
+        surfaces: Surfaces,
+    ) -> Result<Vec<(&'static str, RaySteps)>> {
+        let of = |learns| steps(&parameters.tiles, 1, learns, surfaces);
+        Ok(vec![("tiles", of(false)), ("pilot of tiles", of(true))])
+    }
+
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
         let Context { scene, parameters, runner } = context;
         let own = &parameters.tiles;
