@@ -1,4 +1,4 @@
-//! Buffers of the shaders by descriptor set: one declaration for Rust, GLSL and `docs/buffers.md`.
+//! Buffers of the shaders by descriptor set: one declaration for Rust and GLSL.
 //!
 //! Sets go by rate of change: 0 the scene, 1 the sampler, 2 the wave, 3 the film. Set 1 has a table for
 //! each room of samplers ([`rooms`](super::rooms)), one for what pixels share and one for the window;

@@ -2,7 +2,7 @@
 
 use crate::sampler::knob::{Auto, Values, parameters};
 
-/// Edge of the tiles that `share-tiles=auto` may choose, pixels (`docs/experiments/shared_paths.md`).
+/// Edge of the tiles that `share-tiles=auto` may choose, pixels (`docs/experiments.md`, shared_paths).
 pub const AUTO_TILE_EDGE: u32 = 4;
 
 parameters! {
@@ -40,14 +40,14 @@ impl Values<u64> for Bytes {
 
 impl GuidedParameters {
     /// Returns the shadow rays at each later vertex, given `shadow_rays` at the first: later
-    /// vertices cause less of the error at the same cost per ray (`docs/experiments/later_rays.md`).
+    /// vertices cause less of the error at the same cost per ray (`docs/experiments.md`, later_rays).
     pub fn later_rays_of(&self, shadow_rays: u32) -> u32 {
         self.later_rays.unwrap_or(shadow_rays.div_ceil(4)).min(shadow_rays)
     }
 
     /// Returns the shadow rays at the first and at each later of `depth` vertices in open scenes, where
     /// samples are those of `mis`: there a bounce that escapes is a sample too, and one or two rays beside
-    /// it are enough (`docs/experiments/escaped_bounces.md`).
+    /// it are enough (`docs/experiments.md`, escaped_bounces).
     pub fn rays_in_the_open(&self, shadow_rays: u32, depth: u32) -> [u32; 2] {
         let first = if depth > 1 { shadow_rays.div_ceil(4) } else { shadow_rays };
         [self.open_rays.unwrap_or(first), self.later_rays.unwrap_or(1)]

@@ -6,8 +6,8 @@
 //! Marin & Robert 2007, "Convergence of adaptive mixtures of importance sampling schemes"). With X²
 //! in place of X it would lower the variance (the same, "Minimum variance importance sampling via
 //! population Monte Carlo"), which depends on the brightest hits of a cell alone; measured in
-//! `docs/guided.md`. X is heavy-tailed, so the evidence of a cell weighs as much as its effective
-//! number of rays, (Σ X)² / Σ X², against the prior of its surroundings.
+//! `docs/experiments.md`, brdf_shares. X is heavy-tailed, so the evidence of a cell weighs as much as its
+//! effective number of rays, (Σ X)² / Σ X², against the prior of its surroundings.
 //!
 //! Deviation: averages the evidence of several rebuilds, each older one with half the weight, where
 //! the paper takes the last iteration only. X is known to the octave.

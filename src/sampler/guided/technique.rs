@@ -39,7 +39,7 @@ impl Room for GuidedRoom {
         &[Aov::GuideCell]
     }
 
-    /// More than others: `docs/experiments/shadow_rays_by_worth.md`.
+    /// More than others: `docs/experiments.md`, shadow_rays_by_worth.
     fn shadow_rays(&self) -> u32 {
         8
     }
