@@ -21,7 +21,7 @@ use fenestra::{
     math::frame::{Frame, frame_from_normal},
     sampler::{
         Parameters, Sampler,
-        guided::{GuidedParameters, GuidedRay, RecordedCell, RecordedGuide},
+        guided::{CellReadback, GuideReadback, GuidedParameters, GuidedRay},
     },
     scene::{Scene, environment::EnvironmentTables, material::Material},
     session::{Renderer, Settings},
@@ -118,7 +118,7 @@ struct DirectionSample {
 }
 
 impl<'a> Host<'a> {
-    fn new(surface: &'a Surface, recorded: &RecordedGuide) -> Self {
+    fn new(surface: &'a Surface, recorded: &GuideReadback) -> Self {
         assert!(recorded.position.distance(surface.point) < 0.01, "{}", recorded.position);
         let frame = frame_from_normal(recorded.normal);
         let outgoing = (surface.scene.camera.position - recorded.position).normalize();
@@ -158,7 +158,7 @@ impl<'a> Host<'a> {
 }
 
 /// Returns the density of a cell's guided directions over that of the map, by region.
-fn ratios(recorded: &RecordedGuide, cell: &RecordedCell) -> Vec<f64> {
+fn ratios(recorded: &GuideReadback, cell: &CellReadback) -> Vec<f64> {
     let regions = cell.regions.iter().zip(&recorded.partition.regions);
     // A black region is never drawn.
     let ratio = |share: f64, probability: f64| if share > 0.0 { probability / share } else { 0.0 };
@@ -194,7 +194,7 @@ fn brdf_share(name: &str, host: &Host<'_>, rays: &[GuidedRay], ratios: &[f64]) -
 }
 
 /// Integrates both parts of the mixture over every bin. The last bin holds the lost BRDF samples.
-fn expected_shares(name: &str, host: &Host<'_>, recorded: &RecordedGuide) -> [Vec<f64>; 2] {
+fn expected_shares(name: &str, host: &Host<'_>, recorded: &GuideReadback) -> [Vec<f64>; 2] {
     let ratios = ratios(recorded, recorded.cell.as_ref().unwrap());
     let (mut from_brdf, mut guided) = (vec![0.0; BINS], vec![0.0; BINS]);
     for (direction, solid_angle) in host.directions() {
@@ -216,11 +216,11 @@ fn mixed(share: f64, [from_brdf, guided]: &[Vec<f64>; 2]) -> Vec<f64> {
     from_brdf.iter().zip(guided).map(|(a, b)| share * a + (1.0 - share) * b).collect()
 }
 
-fn record(renderer: &mut Renderer, surface: &Surface) -> RecordedGuide {
+fn record(renderer: &mut Renderer, surface: &Surface) -> GuideReadback {
     let recorded =
         renderer.explain_learned(renderer.settings().seed, surface.pixel, RAYS).unwrap().unwrap();
     let recorded: Box<dyn std::any::Any> = recorded;
-    let recorded = *recorded.downcast::<RecordedGuide>().unwrap();
+    let recorded = *recorded.downcast::<GuideReadback>().unwrap();
     support::assert_silent();
     assert_eq!(recorded.rays.len(), RAYS as usize);
     recorded

@@ -9,7 +9,7 @@ UPDATES(close_lobes)
 READS(visibility)
 
 #include "product/mixture.glsl"
-#include "visibility/record.glsl"
+#include "visibility/blocked.glsl"
 
 layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {
     float densities[];
@@ -24,7 +24,7 @@ void main() {
     vec3 direction = load_shadow_ray(path).direction;
     densities[path] = mixture_lobe_density(mixture, direction);
     if (visibility[path] == 0u) {
-        record_blocked(mixture.lobes, direction);
+        cache_blocked(mixture.lobes, direction);
         store_weights(mixture.lobes, 0u);
     }
 }

@@ -15,7 +15,7 @@ WRITES(visibility)
 UPDATES(counters)
 
 #include "product/mixture.glsl"
-#include "visibility/record.glsl"
+#include "visibility/blocked.glsl"
 
 void sample_vertex(uint path, Vertex vertex) {
     uint path_count = wave_path_count();
@@ -54,7 +54,7 @@ void sample_vertex(uint path, Vertex vertex) {
         bool is_last = index + 1u == wave.total_shadow_rays;
         bool is_learned = is_traced && !is_visible && (CACHE_OF_PIXEL != 0u || !is_last);
         ONCE_IF(is_learned) {
-            record_blocked(mixture.lobes, ray.direction);
+            cache_blocked(mixture.lobes, ray.direction);
             set_shares(mixture);
             grown = is_last ? CACHE_GROWN : 0u;
         }

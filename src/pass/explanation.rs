@@ -17,7 +17,7 @@ const UNTRACED: [u8; 3] = [150, 150, 150];
 
 /// A shadow ray and its outcome.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RecordedRay {
+pub struct RayReadback {
     /// Unit direction, world space.
     pub direction: Vec3,
     /// BRDF · radiance · cosine / pdf; a zero vector was not traced.
@@ -26,7 +26,7 @@ pub struct RecordedRay {
     pub is_visible: bool,
 }
 
-impl RecordedRay {
+impl RayReadback {
     /// Returns the ray as JSON.
     pub(crate) fn numbers(&self) -> Value {
         json!({
@@ -39,7 +39,7 @@ impl RecordedRay {
 
 /// A lobe of the product at a hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RecordedLobe {
+pub struct LobeReadback {
     /// Unit axis, world space.
     pub axis: Vec3,
     /// Bandwidth of the SRBF.
@@ -55,7 +55,7 @@ pub trait Explanation: Any {
     /// Unit shading normal of the hit.
     fn normal(&self) -> Vec3;
     /// Shadow rays at the hit.
-    fn rays(&self) -> Vec<RecordedRay>;
+    fn rays(&self) -> Vec<RayReadback>;
     /// Draws functions of direction that the technique chose by, `width` pixels wide.
     fn skies(&self, scene: &Scene, width: usize) -> Vec<Sky>;
     /// Returns everything as JSON.
@@ -80,25 +80,25 @@ pub(crate) fn draw_rays(scene: &Scene, explanation: &dyn Explanation, width: usi
 
 /// First hit of a pixel's first sample, with all its shadow rays.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RecordedPixel {
+pub struct PixelReadback {
     /// Position, metres.
     pub position: Vec3,
     /// Unit shading normal.
     pub normal: Vec3,
     /// Shadow rays in the order of tracing.
-    pub rays: Vec<RecordedRay>,
+    pub rays: Vec<RayReadback>,
     /// Lobes of the product; empty for samplers without lobes.
-    pub lobes: Vec<RecordedLobe>,
+    pub lobes: Vec<LobeReadback>,
     /// Unit directions in the cache when the last ray was drawn, oldest first; `None` without a cache.
     pub cached: Option<Vec<Vec3>>,
 }
 
-impl Explanation for RecordedPixel {
+impl Explanation for PixelReadback {
     fn normal(&self) -> Vec3 {
         self.normal
     }
 
-    fn rays(&self) -> Vec<RecordedRay> {
+    fn rays(&self) -> Vec<RayReadback> {
         self.rays.clone()
     }
 
@@ -108,9 +108,9 @@ impl Explanation for RecordedPixel {
         if self.lobes.is_empty() {
             return Vec::new();
         }
-        let density = |probability: fn(&RecordedLobe) -> f64| {
+        let density = |probability: fn(&LobeReadback) -> f64| {
             move |direction| {
-                let part = |lobe: &RecordedLobe| {
+                let part = |lobe: &LobeReadback| {
                     let kernel = kernel_value(lobe.axis, lobe.bandwidth, direction);
                     probability(lobe) as f32 * kernel / kernel_integral(lobe.bandwidth)
                 };
@@ -132,7 +132,7 @@ impl Explanation for RecordedPixel {
         json!({
             "position": self.position.to_array(),
             "normal": self.normal.to_array(),
-            "rays": self.rays.iter().map(RecordedRay::numbers).collect::<Vec<_>>(),
+            "rays": self.rays.iter().map(RayReadback::numbers).collect::<Vec<_>>(),
             "lobes": self.lobes.iter().map(|lobe| json!({
                 "axis": lobe.axis.to_array(),
                 "bandwidth": lobe.bandwidth,

@@ -21,7 +21,7 @@ pub(crate) mod texture_buffers;
 mod totals;
 pub(crate) mod wave_buffers;
 
-pub(crate) use explanation::{Explanation, RecordedLobe, RecordedPixel, RecordedRay};
+pub(crate) use explanation::{Explanation, LobeReadback, PixelReadback, RayReadback};
 pub(crate) use film_buffers::BLOCK_PIXELS;
 pub use geometry::{GeometryBuffers, Schedule};
 pub(crate) use kernel::Domain;

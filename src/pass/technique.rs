@@ -3,7 +3,7 @@
 use std::{any::Any, collections::BTreeMap, path::Path};
 
 use super::{
-    explanation::{Explanation, RecordedPixel},
+    explanation::{Explanation, PixelReadback},
     runner::Runner,
     steps::Passes,
 };
@@ -109,7 +109,7 @@ pub trait Technique: Passes + Any {
 
     /// Adds what the technique knows at the first path of the last wave, which was one block, once its
     /// last shadow ray is traced. Fails if the device does.
-    fn explain(&self, _pixel: &mut RecordedPixel) -> Result<()> {
+    fn explain(&self, _pixel: &mut PixelReadback) -> Result<()> {
         Ok(())
     }
 

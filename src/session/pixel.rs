@@ -21,7 +21,7 @@ use crate::{
     film::{Window, png::write_rgb8},
     gpu::{Buffer, Device},
     pass::{
-        BLOCK_PIXELS, Explanation, Progress, RecordedPixel, RecordedRay, explanation::draw_rays,
+        BLOCK_PIXELS, Explanation, PixelReadback, Progress, RayReadback, explanation::draw_rays,
     },
     scene::Scene,
     shader::{
@@ -113,7 +113,7 @@ impl Renderer {
             ..self.settings.clone()
         };
         drop(self);
-        let recorded = Self::new(device, scene, settings)?.record_pixel()?;
+        let recorded = Self::new(device, scene, settings)?.read_pixel()?;
         Ok(recorded.map(|recorded| Box::new(recorded) as Box<dyn Explanation>))
     }
 
@@ -140,9 +140,9 @@ impl Renderer {
     }
 
     /// Renders one sample of the only pixel and reads it back; `None` if the camera ray leaves the scene.
-    fn record_pixel(&mut self) -> Result<Option<RecordedPixel>> {
+    fn read_pixel(&mut self) -> Result<Option<PixelReadback>> {
         let most = self.settings.shadow_rays;
-        let mut recorded: Option<RecordedPixel> = None;
+        let mut recorded: Option<PixelReadback> = None;
         for count in 1..=most.max(1) {
             self.runner.limit_shadow_rays(count.min(most));
             self.restart(self.settings.seed)?;
@@ -151,7 +151,7 @@ impl Renderer {
             if hit.material == NO_MATERIAL {
                 return Ok(None);
             }
-            let pixel = recorded.get_or_insert_with(|| RecordedPixel {
+            let pixel = recorded.get_or_insert_with(|| PixelReadback {
                 position: hit.position.into(),
                 normal: hit.shading_normal.into(),
                 rays: Vec::new(),
@@ -165,7 +165,7 @@ impl Renderer {
             let last = (in_group * BLOCK_PIXELS) as usize;
             let ray: ShadowRay = element(self.runner.waves().shadow_rays(), last)?;
             let visible: u32 = element(self.runner.waves().visibility(), last)?;
-            pixel.rays.push(RecordedRay {
+            pixel.rays.push(RayReadback {
                 direction: ray.direction.into(),
                 contribution: ray.contribution.into(),
                 is_visible: visible != 0,

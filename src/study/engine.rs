@@ -10,10 +10,10 @@ use super::{
     job::{RunJob, exposure, image_of},
     overhead::OverheadJob,
     plan::{CheckPlan, Plan, ReferencePlan},
-    record::{Round, Run, SceneRecord},
     reference::{HALF_STEMS, Reference},
     reference_check::{self, CheckJob, ReferenceCheck, Verdict},
     rule::Rule,
+    runs::{Round, Run, StudiedScene},
     surfaces::Surfaces,
     watch::Watch,
 };
@@ -32,7 +32,7 @@ use crate::{
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Results {
     /// Scenes in the plan's order.
-    pub scenes: Vec<SceneRecord>,
+    pub scenes: Vec<StudiedScene>,
     /// Finished runs.
     pub runs: Vec<Run>,
     /// Finished overhead rounds.
@@ -128,7 +128,7 @@ impl Study<'_> {
 
     fn run_scene(&mut self, scene: &Scene, results: &mut Results) -> Result<()> {
         let mut buffers = SharedBuffers { device: self.device, scene, made: None };
-        results.scenes.push(SceneRecord {
+        results.scenes.push(StudiedScene {
             name: scene.name.clone(),
             path: scene.path.display().to_string(),
             hash: scene.hash.clone(),
@@ -141,17 +141,17 @@ impl Study<'_> {
         });
         if self.plan.compares() {
             let reference = self.reference(scene, &mut buffers)?;
-            if let Some(record) = results.scenes.last_mut() {
-                record.reference = Some(reference.own.clone());
+            if let Some(studied) = results.scenes.last_mut() {
+                studied.reference = Some(reference.own.clone());
             }
             let check = self.check_reference(scene, &mut buffers, &reference)?;
-            if let Some(record) = results.scenes.last_mut() {
-                record.reference_check = check;
+            if let Some(studied) = results.scenes.last_mut() {
+                studied.reference_check = check;
             }
             let make = &mut || buffers.session(mask_settings());
             let surfaces = Surfaces::of(self.folder, scene, &reference, make)?;
-            if let Some(record) = results.scenes.last_mut() {
-                record.parts = Some(surfaces.own);
+            if let Some(studied) = results.scenes.last_mut() {
+                studied.parts = Some(surfaces.own);
             }
             self.compare(scene, &mut buffers, (&reference, &surfaces), results)?;
         }
@@ -269,7 +269,7 @@ impl Study<'_> {
                 folder: self.folder,
             };
             let run = job.execute(session, &mut self.watch)?;
-            write_json(&self.finished.run_record(scene, task), &run)?;
+            write_json(&self.finished.run_path(scene, task), &run)?;
             if let Some(last) = run.last() {
                 self.watch.note(&format!(
                     "{}: {}, {}, seed {seed}: {} spp in {:.2} s, RMSE {:.4e}",

@@ -7,9 +7,9 @@ use super::{
     folder::Folder,
     overhead,
     plan::Plan,
-    record::{Conditions, Round, Run, run_stem},
     reference,
     rule::Rule,
+    runs::{Conditions, Round, Run, run_stem},
 };
 use crate::{
     error::{Error, Result},
@@ -54,18 +54,18 @@ impl FinishedRuns<'_> {
         })
     }
 
-    /// Path of a run's record.
-    pub(super) fn run_record(
+    /// Path of a run's file.
+    pub(super) fn run_path(
         &self,
         scene: &Scene,
         (rule, seed, contender): (Rule, u32, &Contender),
     ) -> PathBuf {
-        self.folder.record(&scene.name, &run_stem(contender, rule, seed))
+        self.folder.run(&scene.name, &run_stem(contender, rule, seed))
     }
 
-    /// Reads the record of a run that is finished and holds everything the plan asks for.
+    /// Reads a run that is finished and holds everything the plan asks for.
     pub(super) fn run(&self, scene: &Scene, task: (Rule, u32, &Contender)) -> Result<Option<Run>> {
-        let path = self.run_record(scene, task);
+        let path = self.run_path(scene, task);
         Ok(self.folder.read_json::<Run>(&path)?.filter(|run| {
             let has_image =
                 |spp: &u32| run.at(Rule::Spp(*spp)).is_some_and(|level| level.image.is_some());
@@ -73,7 +73,7 @@ impl FinishedRuns<'_> {
         }))
     }
 
-    /// Reads the record of a finished overhead round with the plan's number of samples.
+    /// Reads a finished overhead round with the plan's number of samples.
     pub(super) fn round(&self, scene: &Scene, repetition: u32) -> Result<Option<Round>> {
         let round = self.folder.read_json::<Round>(&self.folder.round(&scene.name, repetition))?;
         Ok(round.filter(|round| Some(round.spp) == self.plan.overhead.as_ref().map(|o| o.spp)))
@@ -90,7 +90,7 @@ impl FinishedRuns<'_> {
             for task in self.plan.tasks() {
                 if let Some(run) = self.run(scene, task)? {
                     let asked = self.conditions(scene, Some(task.2))?;
-                    compare(self.run_record(scene, task), &run.conditions, &asked);
+                    compare(self.run_path(scene, task), &run.conditions, &asked);
                 }
             }
             let rounds = self.plan.overhead.as_ref().map_or(0, |overhead| overhead.repetitions);

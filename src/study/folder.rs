@@ -127,14 +127,14 @@ impl Folder {
         &self.path
     }
 
-    /// Path of the record of a run.
-    pub(crate) fn record(&self, scene: &str, stem: &str) -> PathBuf {
+    /// Path of the file of a run.
+    pub(crate) fn run(&self, scene: &str, stem: &str) -> PathBuf {
         self.path.join("runs").join(scene).join(format!("{stem}.json"))
     }
 
-    /// Path of the record of an overhead round.
+    /// Path of the file of an overhead round.
     pub(crate) fn round(&self, scene: &str, repetition: u32) -> PathBuf {
-        self.record(scene, &format!("overhead-{repetition}"))
+        self.run(scene, &format!("overhead-{repetition}"))
     }
 
     /// Path of the picture of a run or reference inside this folder.
@@ -147,7 +147,7 @@ impl Folder {
         self.path.join(Self::image_name(scene, stem))
     }
 
-    /// Reads a record, or `None` if there is no such file.
+    /// Reads such a file, or `None` if there is no such file.
     ///
     /// # Errors
     /// [`Error::Io`], or [`Error::Format`] if the file holds something else.
@@ -157,10 +157,7 @@ impl Folder {
             result => result.map_err(|source| Error::io(path, "read", source))?,
         };
         serde_json::from_str(&text).map(Some).map_err(|error| {
-            Error::format(
-                path,
-                format!("damaged record ({error}); delete the file to redo the run"),
-            )
+            Error::format(path, format!("damaged file ({error}); delete the file to redo the run"))
         })
     }
 }
@@ -175,7 +172,7 @@ mod tests {
     fn records_come_back() {
         let parent = tempfile::tempdir().unwrap();
         let folder = Folder::open(&parent.path().join("report")).unwrap();
-        let path = folder.record("room", "mis-4spp-seed1");
+        let path = folder.run("room", "mis-4spp-seed1");
         assert_eq!(folder.read_json::<Vec<u32>>(&path).unwrap(), None);
         write_json(&path, &[1, 2, 3]).unwrap();
         let other = Folder::open(folder.path()).unwrap_err().to_string();

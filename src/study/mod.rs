@@ -2,7 +2,7 @@
 //!
 //! A study file and the command line ([`mod@file`], [`plan`], [`contender`]) → runs against a
 //! reference in two halves ([`engine`], [`job`], [`rule`], [`mod@reference`], [`reference_check`],
-//! [`own_errors`], [`surfaces`], [`overhead`]), each kept as a [`record`] in the report [`folder`] →
+//! [`own_errors`], [`surfaces`], [`overhead`]), each kept as one of the [`runs`] in the report [`folder`] →
 //! figures over the seeds ([`summary`], [`quality`], [`statistics`]) → `results.json`, `results.csv`
 //! ([`results`]) and the page ([`report`]). [`metrics`] defines the errors.
 
@@ -18,12 +18,12 @@ pub mod overhead;
 pub(crate) mod own_errors;
 pub mod plan;
 pub mod quality;
-pub mod record;
 pub mod reference;
 pub mod reference_check;
 pub mod report;
 pub mod results;
 pub mod rule;
+pub mod runs;
 pub mod statistics;
 pub mod summary;
 pub mod surfaces;

@@ -12,7 +12,7 @@ use super::{
     contender::Contender,
     folder::Folder,
     plan::OverheadPlan,
-    record::{Conditions, Round, Timing, assignments},
+    runs::{Conditions, Round, Timing, assignments},
     statistics::{Interval, median_interval},
     watch::Watch,
 };

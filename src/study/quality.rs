@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::{
     own_errors::JUDGED_FROM,
     plan::Plan,
-    record::{Measurement, Run, SceneRecord},
+    runs::{Measurement, Run, StudiedScene},
     statistics::median_interval,
 };
 
@@ -135,7 +135,7 @@ pub struct TimeToQuality {
 }
 
 /// Computes the times of every sampler in every scene, in the plan's order, by threshold and figure.
-pub fn times_to_quality(plan: &Plan, scenes: &[SceneRecord], runs: &[Run]) -> Vec<TimeToQuality> {
+pub fn times_to_quality(plan: &Plan, scenes: &[StudiedScene], runs: &[Run]) -> Vec<TimeToQuality> {
     let mut all = Vec::new();
     for scene in scenes {
         for figure in Figure::ALL {
@@ -167,7 +167,7 @@ fn longest_runs<'a>(runs: &'a [Run], scene: &str, sampler: &str) -> Vec<&'a Run>
 }
 
 fn over_seeds(
-    scene: &SceneRecord,
+    scene: &StudiedScene,
     sampler: &str,
     runs: &[&Run],
     figure: Figure,
@@ -224,8 +224,8 @@ mod tests {
     use crate::study::{
         own_errors::OwnErrors,
         plan::{Description, Options},
-        record::Conditions,
         rule::Rule,
+        runs::Conditions,
     };
 
     fn assert_near(found: Option<f64>, expected: f64) {
@@ -297,7 +297,7 @@ mod tests {
         let plan = Plan::new(vec!["room.toml".into()], Description::default(), options, Vec::new());
         let reference = OwnErrors { relmse: Some(own), ..OwnErrors::default() };
         let reference = Some(reference);
-        let scene = SceneRecord { name: "room".into(), reference, ..SceneRecord::default() };
+        let scene = StudiedScene { name: "room".into(), reference, ..StudiedScene::default() };
         times_to_quality(&plan.unwrap(), &[scene], runs)
     }
 

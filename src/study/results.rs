@@ -10,8 +10,8 @@ use super::{
     overhead::{Overhead, overheads},
     plan::{Plan, PublishedErrors, PublishedOverhead},
     quality::{Figure, THRESHOLDS, Time, TimeToQuality, time_of_run, times_to_quality},
-    record::{Measurement, Round, Run, SceneRecord, assignments},
     rule::Rule,
+    runs::{Measurement, Round, Run, StudiedScene, assignments},
     summary::{Curve, Summary, curves, rules, summaries},
 };
 use crate::{
@@ -91,7 +91,7 @@ pub struct Report {
     /// Samplers in the order of the plan.
     pub order: Vec<String>,
     /// Scenes.
-    pub scenes: Vec<SceneRecord>,
+    pub scenes: Vec<StudiedScene>,
     /// Figures over the seeds.
     pub summaries: Vec<Summary>,
     /// Errors against samples and time.

@@ -7,9 +7,9 @@ use super::{
     SHARE_WORDS, Snapshot,
     arrival_buffers::{self, ArrivalBuffers},
     budget::GuideBudget,
+    cell_readback::{CellLevel, CellReadback, RegionReadback},
     decode_entry, decode_visibility,
     parameters::GuidedParameters,
-    recorded_cell::{CellLevel, RecordedCell, RecordedRegion},
 };
 use crate::{
     error::{Error, Result},
@@ -277,7 +277,7 @@ impl GuideBuffers {
     }
 
     /// Returns a cell as passes read it. Fails if the device does, panics if there is no such cell.
-    pub fn cell(&self, index: usize) -> Result<RecordedCell> {
+    pub fn cell(&self, index: usize) -> Result<CellReadback> {
         let key = self.learned.keys()[index];
         let level = match (index < FACE_COUNT, key.is_coarse()) {
             (true, _) => CellLevel::Face(index),
@@ -288,13 +288,13 @@ impl GuideBuffers {
         let known =
             self.snapshot.entries[index * count..][..count].iter().zip(&self.partition.regions);
         let regions =
-            known.zip(self.learned.counts(index)).map(|((entry, region), count)| RecordedRegion {
+            known.zip(self.learned.counts(index)).map(|((entry, region), count)| RegionReadback {
                 trials: count.trials_in_rays(),
                 hits: count.hits_in_rays(),
                 visibility: decode_visibility(*entry),
                 probability: f64::from(decode_entry(*entry).0) * region.share,
             });
-        Ok(RecordedCell { level, regions: regions.collect() })
+        Ok(CellReadback { level, regions: regions.collect() })
     }
 
     /// Returns what was learned, and the counts since the last rebuild. Fails if the device does.

@@ -4,12 +4,12 @@ use glam::Vec3;
 use serde_json::{Value, json};
 
 use super::{
-    record::{GuidedRay, RecordedGuide},
-    recorded_cell::{CellLevel, RecordedCell},
+    cell_readback::{CellLevel, CellReadback},
+    readback::{GuideReadback, GuidedRay},
 };
 use crate::{
     film::sky::{Sky, white_of},
-    pass::{Explanation, RecordedRay},
+    pass::{Explanation, RayReadback},
     scene::Scene,
 };
 
@@ -18,12 +18,12 @@ const FACES: [&str; 6] = ["+x", "-x", "+y", "-y", "+z", "-z"];
 /// Tint of regions that a cell has not counted itself, linear.
 const UNCOUNTED: Vec3 = Vec3::new(0.35, 0.6, 1.0);
 
-impl Explanation for RecordedGuide {
+impl Explanation for GuideReadback {
     fn normal(&self) -> Vec3 {
         self.normal
     }
 
-    fn rays(&self) -> Vec<RecordedRay> {
+    fn rays(&self) -> Vec<RayReadback> {
         self.rays.iter().map(|ray| ray.ray).collect()
     }
 
@@ -77,7 +77,7 @@ fn ray_numbers(ray: &GuidedRay) -> Value {
     numbers
 }
 
-fn cell_numbers(cell: &RecordedCell) -> Value {
+fn cell_numbers(cell: &CellReadback) -> Value {
     let (level, key, face) = match cell.level {
         CellLevel::Face(face) => ("face", None, face),
         CellLevel::Coarse(key) => ("coarse", Some(key), key.face()),

@@ -360,7 +360,7 @@ impl Technique for Guided {
         at: [u32; 2],
         rays: u32,
     ) -> Result<Option<Box<dyn Explanation>>> {
-        let recorded = self.record_pixel(runner, progress, at, rays)?;
+        let recorded = self.read_pixel(runner, progress, at, rays)?;
         Ok(recorded.map(|recorded| Box::new(recorded) as Box<dyn Explanation>))
     }
 

@@ -7,7 +7,7 @@
 mod fits;
 mod lobes;
 mod parameters;
-pub(super) mod record;
+pub(super) mod readback;
 mod steps;
 
 use std::collections::BTreeMap;
@@ -21,7 +21,7 @@ use super::{Context, Parameters, Room, knob::Knobs};
 use crate::{
     error::{Error, Result},
     gpu::DescriptorSet,
-    pass::{Passes, PathDemand, RecordedPixel, Report, Steps, Technique},
+    pass::{Passes, PathDemand, PixelReadback, Report, Steps, Technique},
 };
 
 pub(super) struct ProductRoom;
@@ -77,9 +77,9 @@ impl Passes for Product {
 }
 
 impl Technique for Product {
-    fn explain(&self, pixel: &mut RecordedPixel) -> Result<()> {
-        let count = record::lobe_count(&self.lobes)?;
-        record::read_lobes(&self.lobes, &vec![1.0; count], &mut pixel.lobes)
+    fn explain(&self, pixel: &mut PixelReadback) -> Result<()> {
+        let count = readback::lobe_count(&self.lobes)?;
+        readback::read_lobes(&self.lobes, &vec![1.0; count], &mut pixel.lobes)
     }
 
     fn report(&self) -> Report {

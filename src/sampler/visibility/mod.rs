@@ -5,7 +5,7 @@
 //! thesis.
 
 mod parameters;
-mod record;
+mod readback;
 mod steps;
 
 use std::collections::BTreeMap;
@@ -22,7 +22,7 @@ use crate::{
     error::{Error, Result},
     film::Aov,
     gpu::{Commands, DescriptorSet},
-    pass::{Passes, PathDemand, Progress, RecordedPixel, Report, Runner, Steps, Technique},
+    pass::{Passes, PathDemand, PixelReadback, Progress, Report, Runner, Steps, Technique},
 };
 
 pub(super) struct VisibilityRoom;
@@ -136,9 +136,9 @@ impl Technique for Visibility {
         )))
     }
 
-    fn explain(&self, pixel: &mut RecordedPixel) -> Result<()> {
-        let factors = self.visibility_weights(product::record::lobe_count(&self.lobes)?)?;
-        product::record::read_lobes(&self.lobes, &factors, &mut pixel.lobes)?;
+    fn explain(&self, pixel: &mut PixelReadback) -> Result<()> {
+        let factors = self.visibility_weights(product::readback::lobe_count(&self.lobes)?)?;
+        product::readback::read_lobes(&self.lobes, &factors, &mut pixel.lobes)?;
         pixel.cached = Some(self.cached_directions()?);
         Ok(())
     }

@@ -5,14 +5,14 @@ use super::{
     plot::{self, STYLE_COUNT, Series},
 };
 use crate::study::{
-    record::SceneRecord,
     results::Report,
+    runs::StudiedScene,
     statistics::Interval,
     summary::{Curve, CurvePoint},
 };
 
 /// Errors and efficiency against samples and against time.
-pub(crate) fn plots(report: &Report, scene: &SceneRecord) -> String {
+pub(crate) fn plots(report: &Report, scene: &StudiedScene) -> String {
     let curves: Vec<(usize, &Curve)> = report
         .order
         .iter()

@@ -16,8 +16,8 @@ mod viewer;
 use std::fmt::Write;
 
 use super::{
-    folder::Folder, own_errors::JUDGED_FROM, plan::Plan, record::SceneRecord,
-    reference_check::Verdict, results::Report, rule::Rule, summary::rules,
+    folder::Folder, own_errors::JUDGED_FROM, plan::Plan, reference_check::Verdict, results::Report,
+    rule::Rule, runs::StudiedScene, summary::rules,
 };
 use crate::{error::Result, files::write_text};
 use html::{escape, number};
@@ -131,7 +131,7 @@ fn start(report: &Report) -> String {
 fn scene_section(
     report: &Report,
     index: usize,
-    scene: &SceneRecord,
+    scene: &StudiedScene,
     pictures: &ScenePictures,
     rules: &[Rule],
 ) -> String {

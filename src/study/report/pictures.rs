@@ -12,9 +12,9 @@ use crate::{
         folder::Folder,
         job::exposure,
         metrics::squared_errors,
-        record::{Run, SceneRecord},
         reference::{HALF_STEMS, mean},
         rule::Rule,
+        runs::{Run, StudiedScene},
         surfaces::{self, mask},
     },
 };
@@ -71,7 +71,7 @@ const CROP_COUNT: usize = 2;
 /// A picture cannot be read, or an error map cannot be written.
 pub fn load(
     folder: &Folder,
-    scene: &SceneRecord,
+    scene: &StudiedScene,
     samplers: &[String],
     rules: &[Rule],
     runs: &[Run],

@@ -5,7 +5,7 @@ use super::{
     tables::find,
 };
 use crate::study::{
-    record::SceneRecord, reference_check::Verdict, results::Report, rule::Rule,
+    reference_check::Verdict, results::Report, rule::Rule, runs::StudiedScene,
     statistics::Interval, summary::Summary,
 };
 
@@ -29,7 +29,7 @@ pub(super) fn all(report: &Report, rules: &[Rule]) -> String {
 
 /// The verdict of one scene, at equal time if the study has that, else at its most samples; empty
 /// if there is nothing to compare.
-pub(crate) fn of_scene(report: &Report, scene: &SceneRecord, rules: &[Rule]) -> String {
+pub(crate) fn of_scene(report: &Report, scene: &StudiedScene, rules: &[Rule]) -> String {
     let ([first, others @ ..], Some(rule)) = (&report.order[..], rules.last()) else {
         return String::new();
     };

@@ -6,7 +6,7 @@ use super::{
     html::{escape, number},
     pictures::{Picture, ScenePictures},
 };
-use crate::study::{falsecolour::Scale, record::SceneRecord, rule::Rule};
+use crate::study::{falsecolour::Scale, rule::Rule, runs::StudiedScene};
 
 /// Steps of the false-colour legend.
 const RAMP_STEPS: u32 = 16;
@@ -50,7 +50,7 @@ fn links(picture: &Picture, caption: &str) -> String {
 /// Viewer, panes, error maps and crops.
 pub(crate) fn picture_group(
     index: usize,
-    scene: &SceneRecord,
+    scene: &StudiedScene,
     scene_pictures: &ScenePictures,
 ) -> String {
     let ScenePictures { pictures, scale, crops, .. } = scene_pictures;

@@ -9,8 +9,8 @@ use super::{
     metrics::parts::PartErrors,
     own_errors::is_judged,
     plan::Plan,
-    record::{Measurement, Run, SceneRecord},
     rule::Rule,
+    runs::{Measurement, Run, StudiedScene},
     statistics::{Interval, geometric_interval, mean_interval, slope},
     surfaces::Parts,
 };
@@ -96,7 +96,7 @@ pub fn rules(plan: &Plan) -> Vec<Rule> {
 
 /// Summarises runs in the plan's order of scenes, rules and samplers; leaves out samplers without a
 /// finished run.
-pub fn summaries(plan: &Plan, scenes: &[SceneRecord], runs: &[Run]) -> Vec<Summary> {
+pub fn summaries(plan: &Plan, scenes: &[StudiedScene], runs: &[Run]) -> Vec<Summary> {
     let mut all = Vec::new();
     for scene in scenes {
         for rule in rules(plan) {
@@ -144,7 +144,7 @@ fn means(
 }
 
 /// Means over the seeds of the errors in both parts of the picture.
-fn mean_parts(own: &[(&Run, &Measurement)], scene: &SceneRecord) -> Parts {
+fn mean_parts(own: &[(&Run, &Measurement)], scene: &StudiedScene) -> Parts {
     let average = |part: fn(&Parts) -> Option<PartErrors>| {
         mean_of_parts(own.iter().map(|(_, m)| part(&m.parts)))
     };
@@ -155,7 +155,7 @@ fn mean_parts(own: &[(&Run, &Measurement)], scene: &SceneRecord) -> Parts {
 }
 
 fn summary(
-    scene: &SceneRecord,
+    scene: &StudiedScene,
     sampler: &str,
     rule: Rule,
     own: &[(&Run, &Measurement)],
@@ -270,7 +270,7 @@ pub struct Curve {
 
 /// Computes curves in the plan's order, from runs by samples if there are some, else from runs by
 /// time. Points are at numbers of samples that every run has reached.
-pub fn curves(plan: &Plan, scenes: &[SceneRecord], runs: &[Run]) -> Vec<Curve> {
+pub fn curves(plan: &Plan, scenes: &[StudiedScene], runs: &[Run]) -> Vec<Curve> {
     let mut all = Vec::new();
     for scene in scenes {
         for contender in &plan.contenders {
@@ -302,7 +302,7 @@ fn mean_of_parts(parts: impl Iterator<Item = Option<PartErrors>>) -> Option<Part
     })
 }
 
-fn curve(scene: &SceneRecord, sampler: &str, runs: &[&Run]) -> Curve {
+fn curve(scene: &StudiedScene, sampler: &str, runs: &[&Run]) -> Curve {
     let own = scene.reference.as_ref().and_then(|reference| reference.mse);
     let counts: BTreeSet<u32> =
         runs.iter().flat_map(|run| run.measurements.iter().map(|m| m.spp)).collect();

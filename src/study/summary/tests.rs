@@ -6,14 +6,14 @@ use crate::session::Figures;
 use crate::study::{
     own_errors::OwnErrors,
     plan::{Description, Options},
-    record::Conditions,
+    runs::Conditions,
 };
 
-fn scene(own_mse: f64) -> SceneRecord {
-    SceneRecord {
+fn scene(own_mse: f64) -> StudiedScene {
+    StudiedScene {
         name: "room".into(),
         reference: Some(OwnErrors { mse: Some(own_mse), mean: 1.0, ..OwnErrors::default() }),
-        ..SceneRecord::default()
+        ..StudiedScene::default()
     }
 }
 

@@ -15,7 +15,7 @@ pub enum CellLevel {
 
 /// Knowledge of a cell about one region of the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RecordedRegion {
+pub struct RegionReadback {
     /// Rays that the cell itself had counted when its estimates were made, with one candidate also
     /// directions that brought nothing; shares of rays where the regions were split afterwards.
     pub trials: f64,
@@ -29,9 +29,9 @@ pub struct RecordedRegion {
 
 /// A cell of learned visibility.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RecordedCell {
+pub struct CellReadback {
     /// Level, and the key or face of the cell.
     pub level: CellLevel,
-    /// Knowledge by region, in the order of [`super::RecordedGuide::partition`].
-    pub regions: Vec<RecordedRegion>,
+    /// Knowledge by region, in the order of [`super::GuideReadback::partition`].
+    pub regions: Vec<RegionReadback>,
 }

@@ -7,7 +7,7 @@ WRITES(lobe_sums)
 
 // Records the direction under way, for which mixture_lobe_density ran last, as blocked. The weights
 // that follow from it are in force from now on.
-void record_blocked(inout Lobes lobes, vec3 direction) {
+void cache_blocked(inout Lobes lobes, vec3 direction) {
     visibility_cache[lobes.head + 1u + lobes.recorded % CACHE_CAPACITY] = pack_normal(direction);
     for (uint word = 0u; word < MASK_WORDS; ++word) {
         close_lobes[close_lobes_index(lobes.path, lobes.path_count, lobes.recorded, word)] =

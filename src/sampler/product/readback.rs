@@ -4,7 +4,7 @@ use super::lobes::LobeBuffers;
 use crate::{
     error::Result,
     math::octahedron,
-    pass::{BLOCK_PIXELS, RecordedLobe},
+    pass::{BLOCK_PIXELS, LobeReadback},
 };
 
 /// Number of lobes of the first path of the last wave. Fails if the device does.
@@ -17,7 +17,7 @@ pub fn lobe_count(buffers: &LobeBuffers) -> Result<usize> {
 pub fn read_lobes(
     buffers: &LobeBuffers,
     factors: &[f64],
-    lobes: &mut Vec<RecordedLobe>,
+    lobes: &mut Vec<LobeReadback>,
 ) -> Result<()> {
     let count = factors.len();
     if count == 0 {
@@ -29,7 +29,7 @@ pub fn read_lobes(
     let total: f64 = (0..count).map(weight).sum();
     let probability = |lobe: usize| if total > 0.0 { weight(lobe) / total } else { 0.0 };
     if lobes.is_empty() {
-        lobes.extend((0..count).map(|lobe| RecordedLobe {
+        lobes.extend((0..count).map(|lobe| LobeReadback {
             axis: octahedron::unpack(words[lobe * stride][0]),
             bandwidth: half(words[lobe * stride][1]),
             before: probability(lobe),

@@ -5,10 +5,10 @@
 
 use glam::Vec3;
 
-use super::{epoch::with_epoch, recorded_cell::RecordedCell, technique::Guided};
+use super::{cell_readback::CellReadback, epoch::with_epoch, technique::Guided};
 use crate::{
     error::Result,
-    pass::{Passes, Progress, RecordedRay, Runner, film_buffers::position_in_film_order},
+    pass::{Passes, Progress, RayReadback, Runner, film_buffers::position_in_film_order},
     sampler::regions::Partition,
     shader::{
         constants::NO_MATERIAL,
@@ -21,7 +21,7 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuidedRay {
     /// The ray.
-    pub ray: RecordedRay,
+    pub ray: RayReadback,
     /// Index of its sample.
     pub sample: u32,
     /// Region of the environment; `None` for rays without a contribution.
@@ -30,7 +30,7 @@ pub struct GuidedRay {
 
 /// One pixel as the sampler `guided` saw it.
 #[derive(Clone, Debug)]
-pub struct RecordedGuide {
+pub struct GuideReadback {
     /// First hit of the first of the samples, metres.
     pub position: Vec3,
     /// Unit shading normal there.
@@ -38,7 +38,7 @@ pub struct RecordedGuide {
     /// Rays of all samples with a hit, in sample order; of more than eight rays a hit, the last group.
     pub rays: Vec<GuidedRay>,
     /// Cell of the first sample with a ray to trace; `None` if the scene is open or no ray contributed.
-    pub cell: Option<RecordedCell>,
+    pub cell: Option<CellReadback>,
     /// The regions of the environment.
     pub partition: Partition,
 }
@@ -50,13 +50,13 @@ impl Guided {
     ///
     /// # Panics
     /// If the pixel is outside the window.
-    pub fn record_pixel(
+    pub fn read_pixel(
         &self,
         runner: &mut Runner,
         progress: &Progress,
         [x, y]: [u32; 2],
         rays: u32,
-    ) -> Result<Option<RecordedGuide>> {
+    ) -> Result<Option<GuideReadback>> {
         let window = runner.film().window();
         let (column, row) = (x.wrapping_sub(window.x), y.wrapping_sub(window.y));
         assert!(column < window.width && row < window.height, "a pixel of the window");
@@ -102,7 +102,7 @@ impl Guided {
                     cell = Some(self.buffers.cell((targets[index] / region_count) as usize)?);
                 }
                 rays.push(GuidedRay {
-                    ray: RecordedRay {
+                    ray: RayReadback {
                         direction: shadow_rays[index].direction.into(),
                         contribution,
                         is_visible: visible[index] != 0,
@@ -113,7 +113,7 @@ impl Guided {
                 });
             }
         }
-        Ok(Some(RecordedGuide {
+        Ok(Some(GuideReadback {
             position: first_hit.position.into(),
             normal: first_hit.shading_normal.into(),
             rays,

@@ -1,4 +1,4 @@
-//! Records of runs, stored in `runs/` and in `results.json`.
+//! Runs and what they found, stored in `runs/` and in `results.json`.
 
 use std::collections::BTreeMap;
 
@@ -249,7 +249,7 @@ pub struct Round {
 
 /// A scene of a study.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct SceneRecord {
+pub struct StudiedScene {
     /// Name.
     pub name: String,
     /// File.
