@@ -277,10 +277,10 @@ fn records_lower_the_variance() {
 }
 
 #[test]
-fn tiles_that_share_paths_are_refused() {
-    let parameters = settings(&["share-tiles=4"]).parameters;
+fn cohorts_that_share_paths_are_refused() {
+    let parameters = settings(&["share-paths=4"]).parameters;
     let error = Sampler::ControlVariates.check(&parameters, 4, &[]).unwrap_err().to_string();
-    assert!(error.contains("share-tiles=4") && error.contains("expected auto or off"), "{error}");
+    assert!(error.contains("share-paths=4") && error.contains("expected auto or off"), "{error}");
     let parameters = settings(&["candidates=1"]).parameters;
     let error = Sampler::ControlVariates.check(&parameters, 1, &[]).unwrap_err().to_string();
     assert!(error.contains("[2, 4, 6, 8]"), "{error}");

@@ -130,10 +130,10 @@ fn pages_of_the_film_make_no_difference() {
 fn lists_of_living_paths_make_no_difference() {
     let _alone = support::alone();
     let scene = scenes::glazed_room();
-    for (sampler, tiles) in [(Sampler::Mis, "off"), (Sampler::Guided, "4")] {
+    for (sampler, sharing) in [(Sampler::Mis, "off"), (Sampler::Guided, "4")] {
         let mut settings = Settings { depth: 6, ..settings(sampler) };
         settings.roulette = Roulette { vertex: 1, throughput: 0.5 };
-        settings.parameters.set(&format!("share-tiles={tiles}")).unwrap();
+        settings.parameters.set(&format!("share-paths={sharing}")).unwrap();
         let sums = |path_lists| {
             let mut renderer = renderer(&scene, Settings { path_lists, ..settings.clone() });
             renderer.render_pass(2).unwrap();
@@ -142,8 +142,8 @@ fn lists_of_living_paths_make_no_difference() {
             renderer.sums().unwrap()
         };
         let all = sums(PathLists::Never);
-        assert!(sums(PathLists::Always) == all, "{} {tiles} differs", sampler.name());
-        if tiles == "off" {
+        assert!(sums(PathLists::Always) == all, "{} {sharing} differs", sampler.name());
+        if sharing == "off" {
             assert!(sums(PathLists::WherePathsEnd) == all, "{} differs", sampler.name());
         }
     }

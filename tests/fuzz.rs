@@ -89,7 +89,7 @@ fn guide() -> Vec<u8> {
         samples: 5,
         rebuilt_at: 4,
         candidates: Some(8),
-        share_tiles: Some(1),
+        share_paths: Some(1),
         tag: 5,
         rectangles: vec![[0, 0, 5, 9, 0], [5, 0, 3, 9, 1]],
         keys: vec![u32::MAX, 7, 8],

@@ -209,8 +209,8 @@ fn later_vertices_have_the_rays_they_are_given() {
     let rays = |depth: u32, later_rays: Option<u32>| {
         let mut settings = Settings { depth, ..guided(1) };
         settings.parameters.guided.later_rays = later_rays;
-        // The choice of tiles traces rays too.
-        settings.parameters.share_tiles = Some(1);
+        // The choice of cohorts traces rays too.
+        settings.parameters.share_paths = Some(1);
         let mut renderer =
             Renderer::new(support::device(), &scenes::mixed_room(), settings).unwrap();
         renderer.render_pass(1).unwrap();

@@ -22,7 +22,7 @@ const GUIDED: [&str; 8] = [
     "-q",
     "--sampler=guided",
     "--set=candidates=1",
-    "--set=share-tiles=off",
+    "--set=share-paths=off",
     "-o",
     "out.exr",
 ];

@@ -318,7 +318,7 @@ fn every_range_is_named_where_it_is_left() {
         ("tile-floor", ["0", "1.01"], "0.001 to 1"),
         ("regions", ["15", "1025"], "16 to 1024"),
         ("compensation", ["", "no"], "on or off"),
-        ("share-tiles", ["3", "16"], "auto or off or 2 or 4 or 8"),
+        ("share-paths", ["3", "16"], "auto or off or 2 or 4 or 8"),
     ] {
         assert!(keys.contains(&key), "{key}");
         keys.retain(|other| *other != key);

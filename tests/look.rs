@@ -64,7 +64,7 @@ fn a_pass_that_is_stopped_leaves_no_trace_after_the_next_look() {
     let scene = scenes::mixed_room();
     let mut settings = settings(Sampler::Guided, 3);
     settings.parameters.set("candidates=1").unwrap();
-    settings.parameters.set("share-tiles=off").unwrap();
+    settings.parameters.set("share-paths=off").unwrap();
     let mut renderer = support::renderer(&scene, settings.clone());
     let stops = Rc::new(Cell::new(true));
     let watched = Rc::clone(&stops);
@@ -87,7 +87,7 @@ fn what_guided_has_learned_stays() {
     let scene = scenes::mixed_room();
     let mut settings = settings(Sampler::Guided, 3);
     settings.parameters.set("candidates=1").unwrap();
-    settings.parameters.set("share-tiles=off").unwrap();
+    settings.parameters.set("share-paths=off").unwrap();
     let mut renderer = support::renderer(&scene, settings);
     renderer.render_pass(4).unwrap();
     let before = counted(&renderer);

@@ -41,7 +41,7 @@ fn settings(shadow_rays: u32, depth: u32) -> PassSettings {
         depth,
         aovs: AOV_ALBEDO | AOV_CACHE_ENTRIES | AOV_GUIDE_CELL,
         roulette: Roulette::default(),
-        tile_edge: 1,
+        cohort_edge: 1,
         surfaces: Surfaces::default(),
         traversal: TRAVERSAL,
         incoherent: Schedule { rays_per_invocation: 16, refill_lanes: 3 },
@@ -196,10 +196,10 @@ fn shown() -> Vec<(&'static str, Vec<Dispatch>)> {
     shown
 }
 
-/// Settings of a render of plastic in which the pixels of a tile share paths.
+/// Settings of a render of plastic in which the pixels of a cohort share paths.
 fn shared(depth: u32) -> PassSettings {
     let surfaces = Surfaces { material_kinds: 1 << MATERIAL_PLASTIC, ..Surfaces::default() };
-    PassSettings { tile_edge: 2, surfaces, ..settings(2, depth) }
+    PassSettings { cohort_edge: 2, surfaces, ..settings(2, depth) }
 }
 
 #[test]
@@ -222,7 +222,7 @@ fn paths_are_shared_from_the_second_vertex_on() {
     );
     assert!(listed(&lit, wave(0, 1)).contains("bounce keep_third trace emit gather offer"));
     // Sixteen connections in groups of eight.
-    let larger = order(&PassSettings { tile_edge: 4, ..shared(2) }, &mis(), wave(0, 1));
+    let larger = order(&PassSettings { cohort_edge: 4, ..shared(2) }, &mis(), wave(0, 1));
     let rays: Vec<_> = larger
         .iter()
         .filter(|dispatch| dispatch.kernel.shader == "connect")
@@ -259,9 +259,9 @@ fn later_vertices_walk_lists_of_living_paths() {
             ("gather", 2),
         ]
     );
-    // Tiles keep second vertices of all paths, and connect the first ones of all.
-    let tiles = order(&listed(shared(3)), &mis(), wave(0, 1));
-    assert_eq!(walked(&tiles), [("sample", 3), ("shadow", 3)]);
+    // Cohorts keep second vertices of all paths, and connect the first ones of all.
+    let cohorts = order(&listed(shared(3)), &mis(), wave(0, 1));
+    assert_eq!(walked(&cohorts), [("sample", 3), ("shadow", 3)]);
     // Lobes lie at places of all paths.
     assert!(walked(&order(&listed(settings(1, 3)), &product(), wave(0, 1))).is_empty());
 }

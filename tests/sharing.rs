@@ -1,4 +1,4 @@
-//! Paths shared by the pixels of a tile: the same picture as without, by z-test and in closed form.
+//! Paths shared by the pixels of a cohort: the same picture as without, by z-test and in closed form.
 //!
 //! The reference is `mis` without sharing; 15 comparisons raise a false alarm once in about 1,300 runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
@@ -21,14 +21,14 @@ use fenestra::{
 };
 use glam::Vec3;
 
-fn settings(sampler: Sampler, share_tiles: &str, depth: u32) -> Settings {
+fn settings(sampler: Sampler, share_paths: &str, depth: u32) -> Settings {
     let mut settings = Settings { sampler, depth, ..Settings::default() };
     settings.parameters.candidates = (sampler == Sampler::Guided).then_some(1);
-    settings.parameters.set(&format!("share-tiles={share_tiles}")).unwrap();
+    settings.parameters.set(&format!("share-paths={share_paths}")).unwrap();
     settings
 }
 
-/// Edge of a block, a quarter of those in which tiles lie: in whole ones sharing keeps the sum of a
+/// Edge of a block, a quarter of those in which cohorts lie: in whole ones sharing keeps the sum of a
 /// diffuse surface's light, however it is spread.
 const BLOCK: usize = 4;
 /// Largest |t| of a block. One of 144 values exceeds it with a chance of 5e-5.
@@ -93,7 +93,7 @@ fn base(depth: u32) -> Settings {
 const LARGER_EDGES: [(Sampler, &str); 3] =
     [(Sampler::Mis, "4"), (Sampler::Mis, "8"), (Sampler::Guided, "4")];
 
-/// Fins on the floor hide from one vertex of a tile what its neighbour sees.
+/// Fins on the floor hide from one vertex of a cohort what its neighbour sees.
 #[test]
 fn in_a_diffuse_room() {
     let _alone = support::alone();
@@ -191,7 +191,7 @@ fn the_same_seed_gives_the_same_bits_however_samples_are_grouped() {
     assert!(bounced("off") != bounced("8"));
 }
 
-/// Films that are no multiple of a tile, or smaller than one, and crop windows.
+/// Films that are no multiple of a cohort, or smaller than one, and crop windows.
 #[test]
 fn films_of_odd_sizes_and_crop_windows_have_the_same_mean() {
     let _alone = support::alone();
@@ -208,7 +208,7 @@ fn films_of_odd_sizes_and_crop_windows_have_the_same_mean() {
         let of = |edge| mean(&scene, Settings { window, ..settings(Sampler::Mis, edge, 3) });
         let ((plain, error), (shared, _)) = (of("off"), of("8"));
         eprintln!("{size:?}: {plain:.5} {shared:.5}, error of a pixel {error:.5}");
-        // Errors of a pixel, though those of a tile are alike: no more than about two of them.
+        // Errors of a pixel, though those of a cohort are alike: no more than about two of them.
         assert!((plain - shared).abs() < 5.0 * error, "{size:?}: {plain} {shared} {error}");
     }
 }

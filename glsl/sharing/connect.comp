@@ -1,7 +1,7 @@
-// Connects the first vertex of every path with second vertices of some pixels of its tile, by a shadow
+// Connects the first vertex of every path with second vertices of some pixels of its cohort, by a shadow
 // ray each.
 //
-// [Bekaert, Sbert & Halton 2002]: all paths of a tile are one sample of many techniques, the BRDFs
+// [Bekaert, Sbert & Halton 2002]: all paths of a cohort are one sample of many techniques, the BRDFs
 // of its first vertices, weighted by the balance heuristic.
 #version 460
 
@@ -10,7 +10,7 @@
 #include "first_vertex.glsl"
 #include "frame.glsl"
 #include "load.glsl"
-#include "tile.glsl"
+#include "sharing/cohort.glsl"
 #include "wave.glsl"
 
 TEXELS(offer_texels)
@@ -54,11 +54,11 @@ void connect_path(uint path) {
     Material material = first_material(first);
     Frame frame = frame_from_normal(first.shading_normal);
     vec3 outgoing_local = to_local(frame, first.outgoing);
-    Tile tile = tile_of(path);
+    Cohort cohort = cohort_of(path);
     float offset = ray_offset();
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
         uint member = wave.first_shadow_ray + i;
-        Offer offer = load_offer(tile_path(tile, member));
+        Offer offer = load_offer(cohort_path(cohort, member));
         vec3 to_second = offer.position - first.position;
         float squared = dot(to_second, to_second);
         vec3 direction = to_second * inversesqrt(max(squared, LEAST_SQUARED_DISTANCE));

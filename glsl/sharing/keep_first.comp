@@ -1,4 +1,4 @@
-// Keeps the first vertices of the wave, before their paths go on, for the connections of their tiles.
+// Keeps the first vertices of the wave, before their paths go on, for the connections of their cohorts.
 #version 460
 
 #include "hit_surface.glsl"

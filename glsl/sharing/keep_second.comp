@@ -1,4 +1,4 @@
-// Keeps the second vertices that the pixels of a tile share: those with a diffuse base, whose light
+// Keeps the second vertices that the pixels of a cohort share: those with a diffuse base, whose light
 // does not depend on the direction from which it is seen. Their paths go on as if they had begun there,
 // and what they have gathered before waits in the vertex. All other paths stay as they are.
 #version 460

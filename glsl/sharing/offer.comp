@@ -1,4 +1,4 @@
-// Sums up what every path offers to the pixels of its tile: the light that the base of its second
+// Sums up what every path offers to the pixels of its cohort: the light that the base of its second
 // vertex reflects. Paths that found no light have nothing to offer, and nothing is traced to them.
 #version 460
 

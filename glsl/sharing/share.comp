@@ -1,10 +1,10 @@
-// Adds the light of all second vertices of the tile that its first vertex sees to every path, each by
+// Adds the light of all second vertices of the cohort that its first vertex sees to every path, each by
 // its weight. What the rest of the BRDF reflects stays with its own path, and so does a second vertex
 // that its own first vertex does not see.
 #version 460
 
 #include "load.glsl"
-#include "tile.glsl"
+#include "sharing/cohort.glsl"
 #include "wave.glsl"
 
 READS(second_vertices)
@@ -26,10 +26,10 @@ void share_path(uint path) {
     }
     uvec2 seen_by_path = seen[path];
     if (seen_by_path != uvec2(0u)) {
-        Tile tile = tile_of(path);
-        for (uint member = 0u; member < TILE_PIXELS; ++member) {
+        Cohort cohort = cohort_of(path);
+        for (uint member = 0u; member < COHORT_PIXELS; ++member) {
             float weight =
-                texelFetch(offer_weight_texels, int(tile_path(tile, member))).x;
+                texelFetch(offer_weight_texels, int(cohort_path(cohort, member))).x;
             if (weight > 0.0 && is_seen(seen_by_path, member)) {
                 radiance += weight
                     * texelFetch(connection_texels, int(member * path_count + path)).xyz;

@@ -1,10 +1,10 @@
-// Weighs the second vertex of every path by the balance heuristic over the first vertices of its tile
+// Weighs the second vertex of every path by the balance heuristic over the first vertices of its cohort
 // that see it. Visibility belongs into this sum: a path cannot come from a first vertex to a place that
 // is hidden from it. The weight is 0 if the own first vertex does not see it.
 #version 460
 
 #include "load.glsl"
-#include "tile.glsl"
+#include "sharing/cohort.glsl"
 #include "wave.glsl"
 
 READS(offers)
@@ -16,15 +16,15 @@ void weigh_path(uint path) {
     uint path_count = wave_path_count();
     float weight = 0.0;
     if (offers[path].material != NO_MATERIAL) {
-        Tile tile = tile_of(path);
+        Cohort cohort = cohort_of(path);
         bool is_own_seen = false;
         float density = 0.0;
-        for (uint member = 0u; member < TILE_PIXELS; ++member) {
-            uint other = tile_path(tile, member);
-            if (is_seen(texelFetch(seen_texels, int(other)).xy, tile.member)) {
-                is_own_seen = is_own_seen || member == tile.member;
+        for (uint member = 0u; member < COHORT_PIXELS; ++member) {
+            uint other = cohort_path(cohort, member);
+            if (is_seen(texelFetch(seen_texels, int(other)).xy, cohort.member)) {
+                is_own_seen = is_own_seen || member == cohort.member;
                 density +=
-                    texelFetch(connection_texels, int(tile.member * path_count + other)).w;
+                    texelFetch(connection_texels, int(cohort.member * path_count + other)).w;
             }
         }
         weight = is_own_seen ? offers[path].density_ratio / density : 0.0;

@@ -37,9 +37,9 @@ pub struct Statistics {
     pub candidate_costs: Vec<CandidateCost>,
     /// Directions traced at every vertex.
     pub shadow_rays_per_vertex: u32,
-    /// Edge of the tiles that share paths as `guided` chose it, 1 for none; absent where it was given,
+    /// Edge of the cohorts that share paths as `guided` chose it, 1 for none; absent where it was given,
     /// in open scenes and in direct light.
-    pub share_tiles: Option<u32>,
+    pub share_paths: Option<u32>,
     /// Gain measured in this run for that choice; absent if none was.
     pub sharing_gain: Option<SharingGain>,
     /// Path vertices at which environment light is gathered.
@@ -83,7 +83,7 @@ pub struct Statistics {
     pub buffer_bytes: BTreeMap<String, u64>,
 }
 
-/// Measured gain of paths that the pixels of a tile share.
+/// Measured gain of paths that the pixels of a cohort share.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SharingGain {
     /// Relative variance without sharing over that with it, as in [`CandidateCost`].

@@ -43,9 +43,9 @@ impl FitErrors {
     }
 }
 
-/// Side of a tile, in cells. Each tile is compared only with the lobes that matter in it.
-const TILE: usize = 16;
-/// Difference in exponent from the largest beyond which a lobe does not matter in a tile.
+/// Side of a block, in cells. Each block is compared only with the lobes that matter in it.
+const BLOCK: usize = 16;
+/// Difference in exponent from the largest beyond which a lobe does not matter in a block.
 const CULL: f64 = 18.0;
 
 /// Lobe with its colour: `component` gives the luminance density, `colour` the value.
@@ -57,7 +57,7 @@ pub(crate) struct ColouredComponent {
     pub colour: DVec3,
 }
 
-/// The lobes that matter in a tile.
+/// The lobes that matter in a block.
 #[derive(Default)]
 struct Selection {
     /// Axis, bandwidth, logarithm of the density at the axis, and value at the axis.
@@ -127,16 +127,16 @@ pub(crate) fn judge_environment(
     energy: f64,
     lobes: &[ColouredComponent],
 ) -> FitErrors {
-    let (columns, rows) = (grid.width.div_ceil(TILE), grid.height.div_ceil(TILE));
+    let (columns, rows) = (grid.width.div_ceil(BLOCK), grid.height.div_ceil(BLOCK));
     let share: f64 = lobes.iter().map(|lobe| lobe.component.share).sum();
-    let tiles: Vec<[f64; 5]> = (0..columns * rows)
+    let blocks: Vec<[f64; 5]> = (0..columns * rows)
         .into_par_iter()
-        .map_init(Selection::default, |selection, tile| {
-            let (x0, y0) = (tile % columns * TILE, tile / columns * TILE);
-            let (x1, y1) = ((x0 + TILE).min(grid.width), (y0 + TILE).min(grid.height));
+        .map_init(Selection::default, |selection, block| {
+            let (x0, y0) = (block % columns * BLOCK, block / columns * BLOCK);
+            let (x1, y1) = ((x0 + BLOCK).min(grid.width), (y0 + BLOCK).min(grid.height));
             let centre = grid.direction(0.5 * (x0 + x1) as f64, 0.5 * (y0 + y1) as f64);
-            // Half a tile's diagonal, measured along meridian and parallel.
-            let radius = PI * TILE as f64 * 1.5 / grid.height.min(grid.width / 2).max(1) as f64;
+            // Half a block's diagonal, measured along meridian and parallel.
+            let radius = PI * BLOCK as f64 * 1.5 / grid.height.min(grid.width / 2).max(1) as f64;
             selection.choose(lobes, centre, radius);
             let mut sums = [0.0; 5];
             for (x, y) in (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y))) {
@@ -167,8 +167,8 @@ pub(crate) fn judge_environment(
         })
         .collect();
     let mut sums = [0.0; 5];
-    for tile in tiles {
-        for (sum, value) in sums.iter_mut().zip(tile) {
+    for block in blocks {
+        for (sum, value) in sums.iter_mut().zip(block) {
             *sum += value;
         }
     }

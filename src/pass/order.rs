@@ -43,8 +43,8 @@ pub struct PassSettings {
     pub aovs: u32,
     /// Where paths end by chance.
     pub roulette: Roulette,
-    /// Edge of the tiles whose pixels share second vertices: 2, 4, 8, or 1 for none.
-    pub tile_edge: u32,
+    /// Edge of the cohorts whose pixels share second vertices: 2, 4, 8, or 1 for none.
+    pub cohort_edge: u32,
     /// Specialization by the surfaces of the scene.
     pub surfaces: Surfaces,
     /// Specialization of the passes that traverse.
@@ -118,10 +118,10 @@ struct Order<'a> {
 
 impl<'a> Order<'a> {
     fn new(settings: &'a PassSettings, steps: &'a dyn Steps, wave: Wave, vertices: u32) -> Self {
-        let PassSettings { surfaces, traversal, incoherent, tile_edge, .. } = *settings;
+        let PassSettings { surfaces, traversal, incoherent, cohort_edge, .. } = *settings;
         let is_lit = wave.is_training != TRAINING_WAVE;
-        let shares = is_lit && tile_edge > 1 && vertices > 1 && steps.shares_paths();
-        let sharing = Sharing { tile_edge, surfaces, traversal, schedule: incoherent };
+        let shares = is_lit && cohort_edge > 1 && vertices > 1 && steps.shares_paths();
+        let sharing = Sharing { cohort_edge, surfaces, traversal, schedule: incoherent };
         let walks_lists = steps.walks_lists() && settings.path_lists != PathLists::Never;
         Self {
             settings,
@@ -129,7 +129,7 @@ impl<'a> Order<'a> {
             sharing: shares.then_some(sharing),
             escape: steps.escape(),
             vertices,
-            // Tiles keep the second vertices of all paths.
+            // Cohorts keep the second vertices of all paths.
             first_listed: if walks_lists { 1 + u32::from(shares) } else { u32::MAX },
             wave: Wave { aovs: settings.aovs, ..wave },
             dispatches: Vec::new(),

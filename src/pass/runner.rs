@@ -66,9 +66,9 @@ impl Runner {
     ) -> Result<Self> {
         let film =
             FilmBuffers::new(device, scene.window(), settings.aovs, settings.film_page_bytes)?;
-        let tile_pixels = settings.tile_edge * settings.tile_edge;
-        let rays = settings.shadow_rays.max(tile_pixels).clamp(1, SHADOW_RAYS_PER_GROUP);
-        let demand = SharingBuffers::demand(demand, tile_pixels);
+        let cohort_pixels = settings.cohort_edge * settings.cohort_edge;
+        let rays = settings.shadow_rays.max(cohort_pixels).clamp(1, SHADOW_RAYS_PER_GROUP);
+        let demand = SharingBuffers::demand(demand, cohort_pixels);
         let waves = WaveBuffers::new(
             device,
             film.padded_pixels(),
@@ -77,8 +77,8 @@ impl Runner {
             demand,
             settings.surfaces,
         )?;
-        let sharing = (tile_pixels > 1)
-            .then(|| SharingBuffers::new(device, waves.capacity(), tile_pixels))
+        let sharing = (cohort_pixels > 1)
+            .then(|| SharingBuffers::new(device, waves.capacity(), cohort_pixels))
             .transpose()?;
         Ok(Self {
             device: Arc::clone(device),

@@ -1,4 +1,4 @@
-//! Passes by which the pixels of a tile share the second vertices of their paths: Bekaert, Sbert &
+//! Passes by which the pixels of a cohort share the second vertices of their paths: Bekaert, Sbert &
 //! Halton 2002, "Accelerating path tracing by re-using paths" (`docs/shading.md`).
 
 use super::{
@@ -8,7 +8,7 @@ use super::{
     surfaces::Surfaces,
 };
 use crate::shader::{
-    constants::{CONSTANT_TILE_EDGE, KINDS_WITH_BASE, MATERIAL_DIFFUSE},
+    constants::{CONSTANT_COHORT_EDGE, KINDS_WITH_BASE, MATERIAL_DIFFUSE},
     structs::Wave,
 };
 
@@ -28,11 +28,11 @@ pub(crate) enum Moment {
     Left,
 }
 
-/// Passes by which tiles share paths.
+/// Passes by which cohorts share paths.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sharing {
-    /// Edge of the tiles, pixels: 2, 4 or 8, so that they lie in blocks of the film.
-    pub tile_edge: u32,
+    /// Edge of the cohorts, pixels: 2, 4 or 8, so that they lie in blocks of the film.
+    pub cohort_edge: u32,
     /// Specialization by the surfaces of the scene.
     pub surfaces: Surfaces,
     /// Specialization of the passes that traverse.
@@ -63,9 +63,9 @@ impl Sharing {
 
     /// Connects the vertices of a finished `wave` in groups of shadow rays, and shares the light.
     pub(crate) fn connect_and_share(&self, wave: &Wave) -> Vec<Dispatch> {
-        let edge = (CONSTANT_TILE_EDGE, self.tile_edge);
+        let edge = (CONSTANT_COHORT_EDGE, self.cohort_edge);
         let constants = [&self.surfaces.constants()[..], &[edge]].concat();
-        let pixels = self.tile_edge * self.tile_edge;
+        let pixels = self.cohort_edge * self.cohort_edge;
         let mut wave = Wave { to_lamps: 1, total_shadow_rays: pixels, ..*wave };
         let mut order = vec![Dispatch { kernel: self.over_surfaces("offer"), wave }];
         for first in (0..pixels).step_by(SHADOW_RAYS_PER_GROUP as usize) {

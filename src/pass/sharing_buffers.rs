@@ -1,4 +1,4 @@
-//! Buffers for what the pixels of a tile share.
+//! Buffers for what the pixels of a cohort share.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -19,17 +19,17 @@ pub(crate) struct SharingBuffers {
 }
 
 impl SharingBuffers {
-    /// Adds what tiles of so many pixels take for a path to `demand`.
-    pub(crate) fn demand(demand: PathDemand, tile_pixels: u32) -> PathDemand {
-        let connections = u64::from(tile_pixels);
+    /// Adds what cohorts of so many pixels take for a path to `demand`.
+    pub(crate) fn demand(demand: PathDemand, cohort_pixels: u32) -> PathDemand {
+        let connections = u64::from(cohort_pixels);
         PathDemand {
             bytes: demand.bytes.max(connections * size_of::<Connection>() as u64),
             texels: demand.texels.max(connections),
         }
     }
 
-    /// Allocates them for waves of up to `paths` and tiles of `tile_pixels`. Fails if the device does.
-    pub(crate) fn new(device: &Arc<Device>, paths: u32, tile_pixels: u32) -> Result<Self> {
+    /// Allocates them for waves of up to `paths` and cohorts of `cohort_pixels`. Fails if the device does.
+    pub(crate) fn new(device: &Arc<Device>, paths: u32, cohort_pixels: u32) -> Result<Self> {
         let paths = u64::from(paths);
         let make = |name, count: u64, size: usize| Buffer::new(device, name, count * size as u64);
         let first_vertices = make("first vertices", paths, size_of::<FirstVertex>())?;
@@ -37,7 +37,7 @@ impl SharingBuffers {
         let offers = make("offers", paths, size_of::<Offer>())?;
         let offer_weights = make("offer weights", paths, size_of::<f32>())?;
         let connections =
-            make("connections", paths * u64::from(tile_pixels), size_of::<Connection>())?;
+            make("connections", paths * u64::from(cohort_pixels), size_of::<Connection>())?;
         let seen = make("seen offers", paths, size_of::<[u32; 2]>())?;
         let bound = [
             (sharing::FIRST_VERTICES, &first_vertices),

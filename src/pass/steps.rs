@@ -19,7 +19,7 @@ pub trait Steps {
         most
     }
 
-    /// True if the pixels of a tile share paths, where the renderer has tiles.
+    /// True if the pixels of a cohort share paths, where the renderer has cohorts.
     fn shares_paths(&self) -> bool {
         true
     }

@@ -46,7 +46,7 @@ impl Surfaces {
         self.features & SURFACES_EMITTING != 0
     }
 
-    /// True if some material has a diffuse base, whose light the pixels of a tile can share.
+    /// True if some material has a diffuse base, whose light the pixels of a cohort can share.
     pub(crate) fn has_base(&self) -> bool {
         self.material_kinds & KINDS_WITH_BASE != 0
     }

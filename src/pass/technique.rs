@@ -42,8 +42,8 @@ pub struct Report {
     pub candidates: Option<u32>,
     /// Measurements behind this choice.
     pub candidate_costs: Vec<CandidateCost>,
-    /// Edge of the tiles that share paths, 1 for none, for techniques that choose it.
-    pub share_tiles: Option<u32>,
+    /// Edge of the cohorts that share paths, 1 for none, for techniques that choose it.
+    pub share_paths: Option<u32>,
     /// Measurement behind this choice.
     pub sharing_gain: Option<SharingGain>,
 }

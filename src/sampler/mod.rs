@@ -58,8 +58,8 @@ pub trait Room: Sync {
         5
     }
 
-    /// Edge of the tiles that may share paths under `share-tiles=auto`, pixels; 1 for none.
-    fn auto_tile_edge(&self) -> u32 {
+    /// Edge of the cohorts that may share paths under `share-paths=auto`, pixels; 1 for none.
+    fn auto_cohort_edge(&self) -> u32 {
         1
     }
 
@@ -203,15 +203,15 @@ impl Sampler {
     /// Returns the parameters relevant to the sampler by key, for metadata and statistics.
     pub fn describe(self, parameters: &Parameters) -> BTreeMap<String, String> {
         let mut named = self.room().describe(parameters);
-        if self.tile_edge(parameters) > 1 || self.room().auto_tile_edge() > 1 {
-            named.insert("share-tiles".to_owned(), parameters.share_tiles_text());
+        if self.cohort_edge(parameters) > 1 || self.room().auto_cohort_edge() > 1 {
+            named.insert("share-paths".to_owned(), parameters.share_paths_text());
         }
         named
     }
 
-    /// Edge of the tiles that may share paths, pixels; 1 for none.
-    pub fn tile_edge(self, parameters: &Parameters) -> u32 {
-        parameters.share_tiles.unwrap_or(self.room().auto_tile_edge())
+    /// Edge of the cohorts that may share paths, pixels; 1 for none.
+    pub fn cohort_edge(self, parameters: &Parameters) -> u32 {
+        parameters.share_paths.unwrap_or(self.room().auto_cohort_edge())
     }
 
     /// Shadow rays at every vertex that the camera sees, where nobody says otherwise.

@@ -18,9 +18,9 @@ macro_rules! parameters {
         /// Parameters of the samplers.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct Parameters {
-            /// `share-tiles`: edge of the tiles whose pixels share second vertices, 1 for `off`. `None` is
+            /// `share-paths`: edge of the cohorts whose pixels share second vertices, 1 for `off`. `None` is
             /// `auto`: `guided` measures what it gains, the other samplers do not share.
-            pub share_tiles: Option<u32>,
+            pub share_paths: Option<u32>,
             /// `candidates`: directions to choose each shadow ray of `ris`, `control-variates` or `guided`
             /// from; `None` is `auto`.
             pub candidates: Option<u32>,
@@ -34,7 +34,7 @@ macro_rules! parameters {
         impl Default for Parameters {
             fn default() -> Self {
                 Self {
-                    share_tiles: None,
+                    share_paths: None,
                     candidates: None,
                     compensation: true,
                     $($room: super::$room::$parameters::default(),)*
@@ -106,23 +106,23 @@ impl Knobs for Parameters {
             get: |_| String::new(),
         },
         Knob {
-            key: "share-tiles",
+            key: "share-paths",
             set: |parameters, value| {
-                parameters.share_tiles = SHARE_TILES.parse(value)?;
+                parameters.share_paths = SHARE_PATHS.parse(value)?;
                 Ok(())
             },
-            get: Self::share_tiles_text,
+            get: Self::share_paths_text,
         },
     ];
 }
 
-const SHARE_TILES: &[(&str, Option<u32>)] =
+const SHARE_PATHS: &[(&str, Option<u32>)] =
     &[("auto", None), ("off", Some(1)), ("2", Some(2)), ("4", Some(4)), ("8", Some(8))];
 
 impl Parameters {
-    /// Returns `share-tiles` as text.
-    pub fn share_tiles_text(&self) -> String {
-        SHARE_TILES.text(&self.share_tiles)
+    /// Returns `share-paths` as text.
+    pub fn share_paths_text(&self) -> String {
+        SHARE_PATHS.text(&self.share_paths)
     }
 
     /// Sets one parameter from `key=value`. Returns [`Error::Usage`] for a value out of range, or
@@ -216,7 +216,7 @@ mod tests {
             "brdf-share=0",
             "cache=scene",
             "preset=loose",
-            "share-tiles=3",
+            "share-paths=3",
         ] {
             let error = parameters.set(wrong).unwrap_err().to_string();
             assert!(error.contains(&format!("--set {wrong}: expected")), "{error}");

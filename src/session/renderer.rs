@@ -57,15 +57,15 @@ impl Renderer {
 
         let surfaces = buffers.surfaces();
         let shares = settings.depth > 1 && surfaces.has_base();
-        let tile_edge = settings.sampler.tile_edge(&settings.parameters);
-        let tile_edge = if shares { tile_edge } else { 1 };
+        let cohort_edge = settings.sampler.cohort_edge(&settings.parameters);
+        let cohort_edge = if shares { cohort_edge } else { 1 };
         let passes = PassSettings {
             shadow_rays: settings.shadow_rays,
             depth: settings.depth,
             aovs: aov_bits(&settings.aovs),
             roulette: settings.roulette,
             path_lists: settings.path_lists,
-            tile_edge,
+            cohort_edge,
             surfaces,
             traversal: buffers.geometry().traversal(),
             incoherent: Schedule::incoherent(device.capabilities()),

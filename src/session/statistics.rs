@@ -29,7 +29,7 @@ impl Session {
             candidates: report.candidates,
             candidate_costs: report.candidate_costs,
             shadow_rays_per_vertex: metadata.shadow_rays,
-            share_tiles: report.share_tiles,
+            share_paths: report.share_paths,
             sharing_gain: report.sharing_gain,
             depth: metadata.depth,
             sample_ranges: metadata.sample_ranges,

@@ -223,7 +223,7 @@ binding_tables! {
         41 FIRST_VERTEX_TEXELS: texels Rgba32Uint;
         /// Second vertex of each path.
         42 SECOND_VERTICES: array SecondVertex;
-        /// Offer of each path to the pixels of its tile.
+        /// Offer of each path to the pixels of its cohort.
         43 OFFERS: array Offer;
         /// Offers again, four texels each.
         44 OFFER_TEXELS: texels Rgba32Uint;
@@ -231,11 +231,11 @@ binding_tables! {
         45 OFFER_WEIGHTS: array float;
         /// Weights of offers again.
         46 OFFER_WEIGHT_TEXELS: texels R32Float;
-        /// Connections of path `i` with the offer of pixel `k` of its tile at `k · path_count + i`.
+        /// Connections of path `i` with the offer of pixel `k` of its cohort at `k · path_count + i`.
         47 CONNECTIONS: array Connection;
         /// Connections again, one texel each.
         48 CONNECTION_TEXELS: texels Rgba32Float;
-        /// Bits of the pixels of the tile whose offers each path sees.
+        /// Bits of the pixels of the cohort whose offers each path sees.
         49 SEEN: array uvec2;
         /// These bits again.
         50 SEEN_TEXELS: texels Rg32Uint;

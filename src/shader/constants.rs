@@ -107,8 +107,8 @@ specializations! {
     CONSTANT_LAMP_CANDIDATES;
 
     // Specialization constant of the passes that share paths.
-    /// Edge of a tile, pixels: 2, 4 or 8.
-    CONSTANT_TILE_EDGE;
+    /// Edge of a cohort, pixels: 2, 4 or 8.
+    CONSTANT_COHORT_EDGE;
 }
 
 constants! {
@@ -199,7 +199,7 @@ constants! {
     MATERIAL_THIN_DIELECTRIC = 7;
     /// Bits `1 << kind` of the specular kinds, at which no light is sampled.
     SPECULAR_KINDS = 1 << MATERIAL_MIRROR | 1 << MATERIAL_DIELECTRIC | 1 << MATERIAL_THIN_DIELECTRIC;
-    /// Bits `1 << kind` of the kinds with a base, whose light the pixels of a tile can share.
+    /// Bits `1 << kind` of the kinds with a base, whose light the pixels of a cohort can share.
     KINDS_WITH_BASE = 1 << MATERIAL_DIFFUSE | 1 << MATERIAL_PLASTIC | 1 << MATERIAL_MEASURED
         | 1 << MATERIAL_PRINCIPLED;
 

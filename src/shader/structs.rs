@@ -201,7 +201,7 @@ structs! {
         rays_traced: uint,
     }
 
-    /// First vertex of a path, to be connected with the second vertices of its tile.
+    /// First vertex of a path, to be connected with the second vertices of its cohort.
     struct FirstVertex {
         /// Point on the surface, metres.
         position: vec3,
@@ -225,7 +225,7 @@ structs! {
         reserved: vec3,
     }
 
-    /// Second vertex of a path, offered to the other pixels of its tile.
+    /// Second vertex of a path, offered to the other pixels of its cohort.
     struct SecondVertex {
         /// Point on the surface, metres.
         position: vec3,
@@ -253,7 +253,7 @@ structs! {
         density_ratio: float,
     }
 
-    /// Second vertex of a path as the other pixels of its tile see it.
+    /// Second vertex of a path as the other pixels of its cohort see it.
     struct Offer {
         /// Point on the surface, metres.
         position: vec3,

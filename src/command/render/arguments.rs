@@ -89,7 +89,7 @@ pub struct Arguments {
     pub png: bool,
     /// Also write the picture denoised by the library Open Image Denoise, as FILE.denoised.exr (and .png).
     /// Biased: the image itself stays as rendered. Adds the layers albedo and normal, and leaves
-    /// `share-tiles` off unless set.
+    /// `share-paths` off unless set.
     #[arg(long)]
     pub denoise: bool,
     /// Exposure of the preview, in stops.
@@ -244,8 +244,8 @@ impl Arguments {
         }
         let mut parameters = Parameters::default();
         if self.denoise {
-            // Noise that the pixels of a tile have in common looks like a pattern to the denoiser.
-            parameters.set("share-tiles=off")?;
+            // Noise that the pixels of a cohort have in common looks like a pattern to the denoiser.
+            parameters.set("share-paths=off")?;
         }
         for assignment in &self.set {
             parameters.set(assignment)?;

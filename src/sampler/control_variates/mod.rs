@@ -33,11 +33,11 @@ pub(super) struct ControlVariatesRoom;
 impl Room for ControlVariatesRoom {
     fn check(&self, parameters: &Parameters, _depth: u32) -> Result<()> {
         steps::candidates(parameters)?;
-        if parameters.share_tiles.is_some_and(|edge| edge > 1) {
+        if parameters.share_paths.is_some_and(|edge| edge > 1) {
             return Err(Error::usage(format!(
-                "--set share-tiles={}: control-variates adds light that no shadow ray carries, which \
+                "--set share-paths={}: control-variates adds light that no shadow ray carries, which \
                  pixels cannot share; expected auto or off",
-                parameters.share_tiles_text()
+                parameters.share_paths_text()
             )));
         }
         Ok(())

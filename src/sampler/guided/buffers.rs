@@ -310,7 +310,7 @@ impl GuideBuffers {
             rebuilt_at: 0,
             is_open: false,
             candidates: None,
-            share_tiles: None,
+            share_paths: None,
             tag: 0,
             rectangles: self.partition.rectangles(),
             keys: self.learned.keys().iter().map(|key| key.0).collect(),

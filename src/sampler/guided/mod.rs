@@ -32,11 +32,11 @@ mod key;
 mod parameters;
 mod readback;
 mod share;
+mod sharing;
 mod snapshot;
 mod state;
 mod steps;
 mod technique;
-mod tiles;
 
 pub use arriving::{ARRIVAL_DIRECTIONS, ArrivalWords, ArrivingLight, Reflected, arrival_direction};
 pub use buffers::{GuideBuffers, GuideSize};

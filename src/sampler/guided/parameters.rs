@@ -2,8 +2,8 @@
 
 use crate::sampler::knob::{Auto, Values, parameters};
 
-/// Edge of the tiles that `share-tiles=auto` may choose, pixels (`docs/experiments.md`, shared_paths).
-pub const AUTO_TILE_EDGE: u32 = 4;
+/// Edge of the cohorts that `share-paths=auto` may choose, pixels (`docs/experiments.md`, shared_paths).
+pub const AUTO_COHORT_EDGE: u32 = 4;
 
 parameters! {
     /// Parameters of `guided`, apart from the number of candidates.

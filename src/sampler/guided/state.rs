@@ -12,7 +12,7 @@ use crate::sampler::guided::{
     arriving::{ARRIVAL_DIRECTIONS, ArrivalWords},
     cost::GUIDED_CANDIDATES,
     counts::CountWords,
-    parameters::AUTO_TILE_EDGE,
+    parameters::AUTO_COHORT_EDGE,
     share::SHARE_WORDS,
 };
 use crate::{
@@ -42,8 +42,8 @@ pub struct GuideState {
     pub is_open: bool,
     /// Candidates per shadow ray, one of [`GUIDED_CANDIDATES`]; `None` where not decided.
     pub candidates: Option<u32>,
-    /// Edge of the tiles that share paths, 1 for none, where it was chosen.
-    pub share_tiles: Option<u32>,
+    /// Edge of the cohorts that share paths, 1 for none, where it was chosen.
+    pub share_paths: Option<u32>,
     /// Tag of the guides that this one went on from, see [`GuideState::epoch_tag`]; 0 for none.
     pub tag: u32,
     /// First column and row, number of columns and rows, and parent of every region.
@@ -96,7 +96,8 @@ struct Header {
     rebuilt_at: u32,
     is_open: bool,
     candidates: Option<u32>,
-    share_tiles: Option<u32>,
+    #[serde(rename = "share_tiles")]
+    share_paths: Option<u32>,
     #[serde(default)]
     tag: u32,
     cells: usize,
@@ -169,7 +170,7 @@ impl GuideState {
             rebuilt_at: self.rebuilt_at,
             is_open: self.is_open,
             candidates: self.candidates,
-            share_tiles: self.share_tiles,
+            share_paths: self.share_paths,
             tag: self.tag,
             cells: self.keys.len(),
             refined: self.refined.len(),
@@ -225,8 +226,8 @@ impl GuideState {
         if header.candidates.is_some_and(|count| !GUIDED_CANDIDATES.contains(&count)) {
             return Err(damaged("its header holds an impossible number of candidates"));
         }
-        if header.share_tiles.is_some_and(|edge| ![1, AUTO_TILE_EDGE].contains(&edge)) {
-            return Err(damaged("its header holds an impossible edge of tiles"));
+        if header.share_paths.is_some_and(|edge| ![1, AUTO_COHORT_EDGE].contains(&edge)) {
+            return Err(damaged("its header holds an impossible edge of cohorts"));
         }
         let counts = header.cells.checked_mul(header.origin.regions as usize);
         let length = counts.and_then(|counts| {
@@ -271,7 +272,7 @@ impl GuideState {
             rebuilt_at: header.rebuilt_at,
             is_open: header.is_open,
             candidates: header.candidates,
-            share_tiles: header.share_tiles,
+            share_paths: header.share_paths,
             tag: header.tag,
             rectangles: take(5 * regions)
                 .chunks_exact(5)
@@ -314,7 +315,7 @@ mod tests {
             rebuilt_at: 4,
             is_open: true,
             candidates: Some(8),
-            share_tiles: Some(4),
+            share_paths: Some(4),
             tag: 5,
             rectangles: vec![[0, 0, 5, 9, 0], [5, 0, 3, 9, 1]],
             keys: vec![u32::MAX, 7, 8],

@@ -19,7 +19,7 @@ use crate::{
 pub struct GuidedSteps {
     /// Candidates per shadow ray, a quarter of them from the BRDF; 1 is the one-sample model.
     pub candidates: u32,
-    /// True if the pixels of a tile share paths.
+    /// True if the pixels of a cohort share paths.
     pub shares_paths: bool,
     parameters: GuidedParameters,
     guides_bounces: bool,

@@ -5,10 +5,10 @@ use super::{
     choice::{Choice, Trial},
     cost::GUIDED_CANDIDATES,
     epoch::{TRAINING_SEED, with_epoch},
-    parameters::AUTO_TILE_EDGE,
+    parameters::AUTO_COHORT_EDGE,
+    sharing::SharingChoice,
     state::GuideState,
     steps::GuidedSteps,
-    tiles::TileChoice,
 };
 use crate::{
     error::{Error, Result},
@@ -44,8 +44,8 @@ impl Room for GuidedRoom {
         8
     }
 
-    fn auto_tile_edge(&self) -> u32 {
-        AUTO_TILE_EDGE
+    fn auto_cohort_edge(&self) -> u32 {
+        AUTO_COHORT_EDGE
     }
 
     fn has_guide(&self) -> bool {
@@ -75,18 +75,18 @@ impl Room for GuidedRoom {
             steps: GuidedSteps::new(first_candidates(parameters)?, own, settings),
             open_steps: open_steps
                 .with_rays(rays_in_the_open)
-                .with_sharing(parameters.share_tiles.is_some()),
+                .with_sharing(parameters.share_paths.is_some()),
             given_candidates: parameters.candidates,
             choice: Choice::default(),
-            chooses_tiles: parameters.share_tiles.is_none() && settings.tile_edge > 1,
-            tiles: TileChoice::default(),
+            chooses_sharing: parameters.share_paths.is_none() && settings.cohort_edge > 1,
+            sharing: SharingChoice::default(),
             is_trained: false,
             is_open: false,
             rebuilt_at: 0,
             tag: 0,
         };
         guided.forget_choice();
-        guided.forget_tiles();
+        guided.forget_sharing();
         Ok(Box::new(guided))
     }
 }
@@ -105,9 +105,9 @@ pub struct Guided {
     /// Number of candidates that the user asked for; `None` for `auto`.
     given_candidates: Option<u32>,
     choice: Choice,
-    /// True under `share-tiles=auto`, where there is anything to share.
-    chooses_tiles: bool,
-    tiles: TileChoice,
+    /// True under `share-paths=auto`, where there is anything to share.
+    chooses_sharing: bool,
+    sharing: SharingChoice,
     is_trained: bool,
     /// True if too little is blocked to learn anything.
     pub(super) is_open: bool,
@@ -125,7 +125,7 @@ impl Guided {
             rebuilt_at: self.rebuilt_at,
             is_open: self.is_open,
             candidates: self.candidates(),
-            share_tiles: self.share_tiles(),
+            share_paths: self.share_paths(),
             tag: self.tag,
             ..self.buffers.state()?
         })
@@ -156,8 +156,11 @@ impl Guided {
             self.tag = state.epoch_tag();
         }
         self.is_trained = true;
-        if self.chooses_tiles && state.share_tiles.is_some() {
-            self.take_tiles(TileChoice { edge: state.share_tiles, ..TileChoice::default() });
+        if self.chooses_sharing && state.share_paths.is_some() {
+            self.take_sharing(SharingChoice {
+                edge: state.share_paths,
+                ..SharingChoice::default()
+            });
         }
         if let Some(candidates) = state.candidates {
             self.take_choice(Choice { candidates: Some(candidates), ..Choice::default() });
@@ -180,16 +183,16 @@ impl Guided {
         }
     }
 
-    /// Undoes the choice of tiles, unless the user made it.
-    fn forget_tiles(&mut self) {
-        self.tiles = TileChoice::default();
-        self.steps = self.steps.with_sharing(!self.chooses_tiles);
+    /// Undoes the choice of cohorts, unless the user made it.
+    fn forget_sharing(&mut self) {
+        self.sharing = SharingChoice::default();
+        self.steps = self.steps.with_sharing(!self.chooses_sharing);
     }
 
-    /// Takes the edge of tiles measured here or by an earlier render.
-    fn take_tiles(&mut self, tiles: TileChoice) {
-        self.steps = self.steps.with_sharing(tiles.edge == Some(AUTO_TILE_EDGE));
-        self.tiles = tiles;
+    /// Takes the edge of cohorts measured here or by an earlier render.
+    fn take_sharing(&mut self, sharing: SharingChoice) {
+        self.steps = self.steps.with_sharing(sharing.edge == Some(AUTO_COHORT_EDGE));
+        self.sharing = sharing;
     }
 
     fn trial(&self) -> Trial<'_> {
@@ -201,9 +204,9 @@ impl Guided {
         self.choice.candidates.filter(|_| !self.is_open)
     }
 
-    /// Returns the chosen edge of tiles; `None` where it was given or is undecided, and in open scenes.
-    fn share_tiles(&self) -> Option<u32> {
-        self.tiles.edge.filter(|_| !self.is_open)
+    /// Returns the chosen edge of cohorts; `None` where it was given or is undecided, and in open scenes.
+    fn share_paths(&self) -> Option<u32> {
+        self.sharing.edge.filter(|_| !self.is_open)
     }
 
     fn rebuild(&mut self, splits: bool, samples: u32) -> Result<()> {
@@ -256,7 +259,7 @@ impl Passes for Guided {
 
     fn other_steps(&self) -> Vec<Box<dyn Steps>> {
         let mut others: Vec<Box<dyn Steps>> = vec![Box::new(self.open_steps.clone())];
-        if self.chooses_tiles {
+        if self.chooses_sharing {
             others.push(Box::new(self.steps.with_sharing(true)));
         }
         if self.given_candidates.is_none() {
@@ -295,9 +298,9 @@ impl Technique for Guided {
             let choice = self.trial().choose(runner, progress)?;
             self.take_choice(choice);
         }
-        if self.chooses_tiles && self.tiles.edge.is_none() {
-            let tiles = self.trial().choose_tiles(runner, progress)?;
-            self.take_tiles(tiles);
+        if self.chooses_sharing && self.sharing.edge.is_none() {
+            let sharing = self.trial().choose_sharing(runner, progress)?;
+            self.take_sharing(sharing);
         }
         Ok(guide_schedule(samples + 1) - samples)
     }
@@ -309,7 +312,7 @@ impl Technique for Guided {
         self.rebuilt_at = 0;
         self.tag = 0;
         self.forget_choice();
-        self.forget_tiles();
+        self.forget_sharing();
         Ok(())
     }
 
@@ -369,13 +372,13 @@ impl Technique for Guided {
             host_ms: [
                 ("guide rebuilds".to_owned(), self.buffers.rebuild_ms()),
                 ("choice of candidates".to_owned(), self.choice.ms),
-                ("choice of tiles".to_owned(), self.tiles.ms),
+                ("choice of sharing".to_owned(), self.sharing.ms),
             ]
             .into(),
             candidates: self.candidates(),
             candidate_costs: self.choice.costs.clone(),
-            share_tiles: self.share_tiles(),
-            sharing_gain: self.tiles.gain,
+            share_paths: self.share_paths(),
+            sharing_gain: self.sharing.gain,
             ..Report::default()
         }
     }

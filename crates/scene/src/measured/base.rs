@@ -1,7 +1,7 @@
 //! Separable part of a measured BRDF: g(θ_o)·g(θ_i) per channel, nowhere above the BRDF.
 //!
 //! The light that such a part reflects looks the same from all directions but for a factor, so that
-//! the pixels of a tile can share it (`glsl/include/base.glsl`). g is made as large as it can be by
+//! the pixels of a cohort can share it (`glsl/include/base.glsl`). g is made as large as it can be by
 //! coordinate ascent, directions next to the normal first, since most light is there.
 
 use std::f32::consts::PI;

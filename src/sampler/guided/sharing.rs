@@ -1,4 +1,4 @@
-//! Measures what it gains that the pixels of a tile share paths, for `guided` with `share-tiles=auto`.
+//! Measures what it gains that the pixels of a cohort share paths, for `guided` with `share-paths=auto`.
 //!
 //! Renders the same blocks of pixels without and with sharing, as `choice.rs` does for candidates.
 //! Compares variances alone: what sharing costs is known, and no busy machine can disturb it.
@@ -8,7 +8,7 @@ use std::time::Instant;
 use super::{
     choice::{FEWEST_SAMPLES, MEASURED_PIXELS, MOST_ROUNDS, Measured, Trial},
     cost::relative_variances,
-    parameters::AUTO_TILE_EDGE,
+    parameters::AUTO_COHORT_EDGE,
 };
 use crate::{
     error::Result,
@@ -22,9 +22,9 @@ const LEAST_RATIO: f64 = 1.6;
 /// Standard errors by which the logarithm of the ratio must differ for an early end.
 const CONFIDENCE: f64 = 2.0;
 
-/// Edge of the tiles that `guided` chose, and why.
+/// Edge of the cohorts that `guided` chose, and why.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct TileChoice {
+pub(super) struct SharingChoice {
     /// The edge, 1 for none; `None` while undecided.
     pub(super) edge: Option<u32>,
     /// Measurement behind it.
@@ -34,11 +34,11 @@ pub(super) struct TileChoice {
 
 impl Trial<'_> {
     /// Measures and chooses. Forgets the counts since the last rebuild.
-    pub(super) fn choose_tiles(
+    pub(super) fn choose_sharing(
         mut self,
         runner: &mut Runner,
         progress: &Progress,
-    ) -> Result<TileChoice> {
+    ) -> Result<SharingChoice> {
         let start = Instant::now();
         let blocks = runner.film().padded_pixels() / BLOCK_PIXELS;
         let most = MEASURED_PIXELS.min(runner.waves().capacity() / FEWEST_SAMPLES) / BLOCK_PIXELS;
@@ -76,11 +76,11 @@ impl Trial<'_> {
         self.buffers.clear_counts()?;
         runner.take_counters()?;
         let pays = gain.is_some_and(|gain| gain.variance_ratio > LEAST_RATIO);
-        let edge = if pays { AUTO_TILE_EDGE } else { 1 };
+        let edge = if pays { AUTO_COHORT_EDGE } else { 1 };
         let ms = start.elapsed().as_secs_f64() * 1e3;
         if let Some(gain) = gain {
-            log::info!("share-tiles={edge} by measurement in {ms:.0} ms: variance {gain} lower");
+            log::info!("share-paths={edge} by measurement in {ms:.0} ms: variance {gain} lower");
         }
-        Ok(TileChoice { edge: Some(edge), gain, ms })
+        Ok(SharingChoice { edge: Some(edge), gain, ms })
     }
 }
