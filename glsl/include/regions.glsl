@@ -1,5 +1,5 @@
 // Cells of rectangles of the environment, drawn in proportion to their light. Twin of
-// src/sampler/guided/partition.rs.
+// src/sampler/regions/partition.rs.
 
 #include "environment.glsl"
 #include "random.glsl"
