@@ -13,6 +13,7 @@ use fenestra::{
         merge::{Part, merge_checkpoints, merge_images},
         png,
     },
+    math::colour::display_from_linear,
 };
 use io::Write;
 
@@ -535,11 +536,11 @@ fn parts_that_do_not_belong_together_are_refused() {
 #[test]
 fn previews_apply_exposure_and_the_srgb_curve() {
     // IEC 61966-2-1: 0.5 linear is 188, 0.0021 is on the linear foot.
-    assert_eq!(png::display_from_linear(0.5), 188);
-    assert_eq!(png::display_from_linear(0.0021), 7);
-    assert_eq!(png::display_from_linear(-1.0), 0);
-    assert_eq!(png::display_from_linear(7.0), 255);
-    assert_eq!(png::display_from_linear(f32::NAN), 0);
+    assert_eq!(display_from_linear(0.5), 188);
+    assert_eq!(display_from_linear(0.0021), 7);
+    assert_eq!(display_from_linear(-1.0), 0);
+    assert_eq!(display_from_linear(7.0), 255);
+    assert_eq!(display_from_linear(f32::NAN), 0);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("preview.png");
     let picture = RgbImage { width: 2, height: 1, pixels: vec![[0.25, 0.5, 1.0], [0.0; 3]] };

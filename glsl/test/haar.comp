@@ -40,8 +40,8 @@ HaarAnswer answer(HaarQuery query) {
     DirectionSample sampled = evaluate_world(vertex, drawn.direction);
     return HaarAnswer(
         drawn.direction, shares_pdf(mixture.shares, sampled, drawn.pdf), drawn.pdf,
-        mixture.shares.product, mixture.shares.environment, sampled.environment_pdf, sampled.brdf_pdf, mixture.total,
-        sampled.integrand);
+        mixture.shares.product, mixture.shares.environment, sampled.environment_pdf,
+        sampled.brdf_pdf, mixture.total, sampled.integrand);
 }
 
 ANSWER_QUERIES(HaarQuery, HaarAnswer, answer)

@@ -5,14 +5,7 @@ use std::{io::Write, path::Path};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 use super::{RgbImage, picture::io_error, tone::Tone};
-use crate::error::Result;
-use crate::{files::write_atomically, math::colour::srgb_from_linear};
-
-/// Converts a linear value to a byte: clamps to 0…1, applies the sRGB curve, rounds. NaN becomes 0.
-pub fn display_from_linear(value: f32) -> u8 {
-    // `as` saturates and turns NaN into 0.
-    (srgb_from_linear(value.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8
-}
+use crate::{error::Result, files::write_atomically};
 
 /// Writes the picture scaled by 2^`exposure` (in stops), clamped, with the sRGB curve. No other
 /// tone curve applies, so two previews of one exposure can be compared.

@@ -2,8 +2,10 @@
 
 use glam::{Vec2, Vec3};
 
-use super::png::display_from_linear;
-use crate::math::frame::{direction_from_lat_long, lat_long_from_direction};
+use crate::math::{
+    colour::display_from_linear,
+    frame::{direction_from_lat_long, lat_long_from_direction},
+};
 
 /// Share of the pixels that may be over-exposed.
 const CLIPPED: f32 = 0.005;

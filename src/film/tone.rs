@@ -1,7 +1,6 @@
 //! Tone: linear radiance → values that a screen can show; twin of `glsl/include/tone.glsl`.
 
-use super::png::display_from_linear;
-use crate::math::colour::luminance;
+use crate::math::colour::{display_from_linear, luminance};
 
 /// Luminance that [`auto_exposure`] gives to the middle of a picture.
 const MIDDLE_GREY: f64 = 0.18;

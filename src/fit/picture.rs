@@ -17,11 +17,8 @@ use super::{
 use crate::{
     brdf::{self, MaterialTables},
     error::Result,
-    film::{
-        png::{display_from_linear, write_rgb8},
-        sky::white,
-    },
-    math::colour::luminance,
+    film::{png::write_rgb8, sky::white},
+    math::colour::{display_from_linear, luminance},
     scene::EnvironmentMap,
     srbf::{Mixture, kernel_value},
 };

@@ -52,7 +52,9 @@ impl Loader<'_> {
         if let Some(rotation_deg) = options.rotation_deg {
             environment.rotation_rad = rotation_deg.rem_euclid(360.0).to_radians();
         }
-        let is_dark = environment.is_black()
+        // A black map of the option has said so itself.
+        let is_dark = options.environment.is_none()
+            && environment.is_black()
             && lamps.is_empty()
             && materials.iter().all(|material| material.surface.emission.is_none());
         if is_dark {
