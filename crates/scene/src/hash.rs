@@ -17,7 +17,7 @@ use crate::{
 ///
 /// Names, paths and the order of the text do not enter. A length precedes every array and a tag
 /// every variant, so that no two scenes give the same bytes.
-pub fn hash(scene: &Scene) -> String {
+pub(crate) fn hash(scene: &Scene) -> String {
     let mut hasher = Hasher(Sha256::new());
     let camera = &scene.camera;
     hasher.vectors(&[camera.position, camera.look_at, camera.up]);

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 /// Most portals of a scene: every shadow ray goes through all of them.
-pub const MAX_PORTALS: usize = 256;
+pub(crate) const MAX_PORTALS: usize = 256;
 
 /// Rectangle that light of the environment comes through. It serves sampling alone: neither the picture
 /// nor what rays meet depends on it. Both sides count.

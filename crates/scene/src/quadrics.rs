@@ -16,7 +16,7 @@ const SEGMENTS: usize = 128;
 const SPHERE_ROWS: usize = 64;
 
 /// Sphere about the origin, normals outward: u = φ/2π from +X towards +Y, v = θ/π from +Z.
-pub fn sphere(radius: f32) -> Mesh {
+pub(crate) fn sphere(radius: f32) -> Mesh {
     let radius = f64::from(radius);
     grid(SPHERE_ROWS, |u, v| {
         let (turn, (sine, cosine)) = (turn(u), (PI * v).sin_cos());
@@ -29,7 +29,7 @@ pub fn sphere(radius: f32) -> Mesh {
 
 /// Ring about the origin in the plane z = 0, with the normal +Z: u = r/`radius`, v = φ/2π from +X
 /// towards +Y. An `inner_radius` of 0 makes a disk.
-pub fn disk(radius: f32, inner_radius: f32) -> Mesh {
+pub(crate) fn disk(radius: f32, inner_radius: f32) -> Mesh {
     let (radius, inner) = (f64::from(radius), f64::from(inner_radius));
     grid(1, |u, v| {
         let distance = inner + (radius - inner) * v;
@@ -40,7 +40,7 @@ pub fn disk(radius: f32, inner_radius: f32) -> Mesh {
 
 /// Open cylinder about the z axis, normals outward: u = φ/2π from +X towards +Y, v from 0 at `z_min`
 /// to 1 at `z_max`.
-pub fn cylinder(radius: f32, z_min: f32, z_max: f32) -> Mesh {
+pub(crate) fn cylinder(radius: f32, z_min: f32, z_max: f32) -> Mesh {
     let (radius, z_min, z_max) = (f64::from(radius), f64::from(z_min), f64::from(z_max));
     grid(1, |u, v| {
         // Rows run from the top, so that columns × rows points outward.
@@ -51,7 +51,7 @@ pub fn cylinder(radius: f32, z_min: f32, z_max: f32) -> Mesh {
 }
 
 /// Square from (−1, −1, 0) to (1, 1, 0) with the normal +Z: u along +X, v along +Y.
-pub fn rectangle() -> Mesh {
+pub(crate) fn rectangle() -> Mesh {
     let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     let uvs = corners.map(|corner: [f32; 2]| corner.map(|coordinate| 0.5 * (coordinate + 1.0)));
     Mesh {
@@ -76,7 +76,7 @@ const CUBE_FACES: [[[f32; 3]; 4]; 6] = [
 
 /// Cube from (−1, −1, −1) to (1, 1, 1), normals outward, every face with the whole unit square of
 /// texture coordinates.
-pub fn cube() -> Mesh {
+pub(crate) fn cube() -> Mesh {
     let mut mesh = Mesh::default();
     for face in CUBE_FACES {
         let first = mesh.positions.len() as u32;

@@ -20,17 +20,17 @@ const PLANCK_SECOND: f64 = 1.438_776_877e-2;
 const PLANCK_FIRST: f64 = 1.191_042_972e-16;
 
 /// Spectrum by values at wavelengths in nm: linear between them, 0 beyond.
-pub struct Samples(Vec<[f64; 2]>);
+pub(crate) struct Samples(Vec<[f64; 2]>);
 
 impl Samples {
     /// Takes pairs of wavelength and value; none without any, and where wavelengths do not rise.
-    pub fn new(pairs: Vec<[f64; 2]>) -> Option<Self> {
+    pub(crate) fn new(pairs: Vec<[f64; 2]>) -> Option<Self> {
         let rises = pairs.windows(2).all(|pair| pair[0][0] < pair[1][0]);
         (rises && !pairs.is_empty()).then_some(Self(pairs))
     }
 
     /// Value at a wavelength.
-    pub fn at(&self, wavelength_nm: f64) -> f64 {
+    pub(crate) fn at(&self, wavelength_nm: f64) -> f64 {
         let next = self.0.partition_point(|sample| sample[0] < wavelength_nm);
         match (next.checked_sub(1).map(|before| self.0[before]), self.0.get(next)) {
             (_, Some(&[own, value])) if own == wavelength_nm => value,
@@ -54,7 +54,7 @@ fn observer(wavelength_nm: f64) -> DVec4 {
 }
 
 /// Linear Rec.709 from CIE XYZ.
-pub fn rgb_from_xyz(xyz: DVec3) -> DVec3 {
+pub(crate) fn rgb_from_xyz(xyz: DVec3) -> DVec3 {
     RGB_FROM_XYZ * xyz
 }
 
@@ -69,24 +69,24 @@ fn xyz(spectrum: impl Fn(f64) -> f64, weight: impl Fn(DVec4) -> f64) -> DVec3 {
 }
 
 /// Colour of a reflectance, or of another property of a medium, under D65: a constant is grey.
-pub fn reflectance(spectrum: impl Fn(f64) -> f64) -> DVec3 {
+pub(crate) fn reflectance(spectrum: impl Fn(f64) -> f64) -> DVec3 {
     let under_d65 = |row: DVec4| row.w;
     rgb_from_xyz(xyz(spectrum, under_d65)) / rgb_from_xyz(xyz(|_| 1.0, under_d65))
 }
 
 /// Colour of light of a spectral power. A power of 1 has luminance 1 and is not white.
-pub fn light(power: impl Fn(f64) -> f64) -> DVec3 {
+pub(crate) fn light(power: impl Fn(f64) -> f64) -> DVec3 {
     rgb_from_xyz(xyz(power, |_| 1.0)) / xyz(|_| 1.0, |_| 1.0).y
 }
 
 /// As [`light`], scaled to luminance 1. `None` if nothing of it is visible.
-pub fn light_color(power: impl Fn(f64) -> f64) -> Option<DVec3> {
+pub(crate) fn light_color(power: impl Fn(f64) -> f64) -> Option<DVec3> {
     let xyz = xyz(power, |_| 1.0);
     (xyz.y > 0.0 && xyz.is_finite()).then(|| rgb_from_xyz(xyz) / xyz.y)
 }
 
 /// Radiance of a black body, W m⁻² sr⁻¹ nm⁻¹ \[Planck 1901\].
-pub fn planck(wavelength_nm: f64, kelvin: f64) -> f64 {
+pub(crate) fn planck(wavelength_nm: f64, kelvin: f64) -> f64 {
     let metres = wavelength_nm * 1e-9;
     1e-9 * PLANCK_FIRST / (metres.powi(5) * (PLANCK_SECOND / (metres * kelvin)).exp_m1())
 }
@@ -98,7 +98,7 @@ pub fn planck(wavelength_nm: f64, kelvin: f64) -> f64 {
 /// Deviation: pbrt-v2 integrates without an illuminant, which turns a grey reflectance into (1.20,
 /// 0.95, 0.91) of its value. Scene lights are colours whose white is D65, so a grey surface must
 /// stay grey.
-pub fn srgb_weights(wavelengths_nm: &[f64]) -> Option<Vec<DVec3>> {
+pub(crate) fn srgb_weights(wavelengths_nm: &[f64]) -> Option<Vec<DVec3>> {
     let count = wavelengths_nm.len();
     let weighted: Vec<DVec3> = (0..count)
         .map(|index| {

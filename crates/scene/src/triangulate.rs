@@ -8,13 +8,13 @@
 use glam::{DVec2, DVec3};
 
 /// Most corners of a polygon that is clipped; a longer one becomes a fan, correct where convex.
-pub const MAX_CLIPPED_CORNERS: usize = 1024;
+pub(crate) const MAX_CLIPPED_CORNERS: usize = 1024;
 
 /// Most remaining corners among which the best ear is searched for.
 const MAX_BEST_CORNERS: usize = 64;
 
 /// Triangulates a polygon in space in the plane of its Newell normal; indices into `positions`.
-pub fn triangulate_in_space(positions: &[[f32; 3]]) -> Vec<[usize; 3]> {
+pub(crate) fn triangulate_in_space(positions: &[[f32; 3]]) -> Vec<[usize; 3]> {
     let positions: Vec<_> =
         positions.iter().map(|position| DVec3::from_array(position.map(f64::from))).collect();
     let origin = positions.first().copied().unwrap_or_default();
@@ -36,7 +36,7 @@ pub fn triangulate_in_space(positions: &[[f32; 3]]) -> Vec<[usize; 3]> {
 ///
 /// An outline that crosses or touches itself may run out of ears. A fan then closes the rest, so
 /// that there are always n − 2 triangles.
-pub fn triangulate(outline: &[DVec2]) -> Vec<[usize; 3]> {
+pub(crate) fn triangulate(outline: &[DVec2]) -> Vec<[usize; 3]> {
     let turn = signed_area(outline).signum();
     let mut remaining: Vec<usize> = (0..outline.len()).collect();
     let mut triangles = Vec::with_capacity(outline.len().saturating_sub(2));
@@ -53,13 +53,13 @@ pub fn triangulate(outline: &[DVec2]) -> Vec<[usize; 3]> {
 }
 
 /// Area of a polygon, positive if counter-clockwise.
-pub fn signed_area(outline: &[DVec2]) -> f64 {
+pub(crate) fn signed_area(outline: &[DVec2]) -> f64 {
     let next = outline.iter().cycle().skip(1);
     0.5 * outline.iter().zip(next).map(|(from, to)| from.perp_dot(*to)).sum::<f64>()
 }
 
 /// Tests that no two sides of the closed outline cross and no corner lies on another side.
-pub fn is_simple(outline: &[DVec2]) -> bool {
+pub(crate) fn is_simple(outline: &[DVec2]) -> bool {
     let count = outline.len();
     let side = |index: usize| (outline[index], outline[(index + 1) % count]);
     (0..count).all(|first| {

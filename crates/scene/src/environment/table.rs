@@ -119,7 +119,7 @@ fn write_cumulative(weights: impl Iterator<Item = f64> + Clone, cumulative: &mut
 /// Entry k of the guide is the first index whose cumulative probability exceeds k / size; the last
 /// entry is the last index. A u in interval k is found between entries k and k + 1. Chen & Asau
 /// 1974, "On Generating Random Variates from an Empirical Distribution".
-pub fn guide_size(count: usize) -> usize {
+pub(super) fn guide_size(count: usize) -> usize {
     if count > 2 { 1 << (count - 1).ilog2() } else { 1 }
 }
 

@@ -6,7 +6,7 @@ use crate::lamp::SpotFalloff;
 
 /// One `[[lamp]]`.
 #[derive(Clone, Debug)]
-pub struct LampEntry {
+pub(crate) struct LampEntry {
     /// Line of the entry, from 1.
     pub line: usize,
     /// Name, for messages.
@@ -17,7 +17,7 @@ pub struct LampEntry {
 
 /// Keys of a `[[lamp]]` that depend on its `type`.
 #[derive(Clone, Debug)]
-pub enum LampKindEntry {
+pub(crate) enum LampKindEntry {
     /// `point`.
     Point(PointEntry),
     /// `spot`.
@@ -29,7 +29,7 @@ pub enum LampKindEntry {
 /// Keys of a `point` lamp.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct PointEntry {
+pub(crate) struct PointEntry {
     /// Place, metres.
     pub position: [f32; 3],
     /// Radiant intensity per steradian.
@@ -39,7 +39,7 @@ pub struct PointEntry {
 /// Keys of a `spot` lamp.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SpotEntry {
+pub(crate) struct SpotEntry {
     /// Place, metres.
     pub position: [f32; 3],
     /// Axis of the cone, away from the lamp, of any length.
@@ -64,7 +64,7 @@ fn default_outer_angle_deg() -> f32 {
 /// Keys of a `directional` lamp.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct DirectionalEntry {
+pub(crate) struct DirectionalEntry {
     /// Direction in which the light travels, of any length.
     pub direction: [f32; 3],
     /// Irradiance on a surface that faces the light.

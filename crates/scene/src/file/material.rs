@@ -9,7 +9,7 @@ use super::value::{TextureEntry, Textured};
 
 /// One `[[material]]`.
 #[derive(Clone, Debug)]
-pub struct MaterialEntry {
+pub(crate) struct MaterialEntry {
     /// Line of the entry, from 1.
     pub line: usize,
     /// Keys of all types.
@@ -21,7 +21,7 @@ pub struct MaterialEntry {
 /// Keys of every `[[material]]`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct MaterialKeys {
+pub(crate) struct MaterialKeys {
     /// Name that objects refer to.
     pub name: String,
     /// Model; the keys of each are below.
@@ -52,7 +52,7 @@ fn default_two_sided() -> bool {
 
 /// Keys of a `[[material]]` that depend on its `type`.
 #[derive(Clone, Debug)]
-pub enum MaterialKindEntry {
+pub(crate) enum MaterialKindEntry {
     /// `diffuse`.
     Diffuse(DiffuseEntry),
     /// `plastic`.
@@ -74,7 +74,7 @@ pub enum MaterialKindEntry {
 /// Keys of a `diffuse` material.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct DiffuseEntry {
+pub(crate) struct DiffuseEntry {
     /// Albedo, 0…1.
     pub reflectance: Textured<[f32; 3]>,
 }
@@ -82,7 +82,7 @@ pub struct DiffuseEntry {
 /// Keys of a `plastic` material.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct PlasticEntry {
+pub(crate) struct PlasticEntry {
     /// Albedo of the base, 0…1.
     pub diffuse: Textured<[f32; 3]>,
     /// GGX width α, 0.001…1; this or `roughness`.
@@ -101,7 +101,7 @@ fn default_ior() -> f32 {
 /// Keys of a `conductor` material; either `reflectance` or `eta` and `k`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ConductorEntry {
+pub(crate) struct ConductorEntry {
     /// GGX width α, 0.001…1; this or `roughness`.
     pub alpha: Option<f32>,
     /// √α.
@@ -117,7 +117,7 @@ pub struct ConductorEntry {
 /// Keys of a `principled` material.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct PrincipledEntry {
+pub(crate) struct PrincipledEntry {
     /// Albedo of the dielectric's base, and reflectance of the metal at normal incidence, 0…1.
     pub base_color: Textured<[f32; 3]>,
     /// Share of metal, 0…1.
@@ -151,7 +151,7 @@ fn default_factor() -> [f32; 3] {
 /// Keys of a `mirror`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct MirrorEntry {
+pub(crate) struct MirrorEntry {
     /// Reflectance in all directions, 0…1.
     pub reflectance: Textured<[f32; 3]>,
 }
@@ -159,7 +159,7 @@ pub struct MirrorEntry {
 /// Keys of a `dielectric` material.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct DielectricEntry {
+pub(crate) struct DielectricEntry {
     /// Refractive index of the inside over that of the outside, 0.2…5.
     #[serde(default = "default_ior")]
     pub ior: f32,
@@ -178,7 +178,7 @@ pub struct DielectricEntry {
 /// Keys of a `thin_dielectric` material.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ThinDielectricEntry {
+pub(crate) struct ThinDielectricEntry {
     /// Refractive index, 1…4.
     #[serde(default = "default_ior")]
     pub ior: f32,
@@ -193,14 +193,14 @@ pub struct ThinDielectricEntry {
 /// Keys of a `measured` material.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct MeasuredEntry {
+pub(crate) struct MeasuredEntry {
     /// MERL or Cornell file, relative to the scene file.
     pub file: PathBuf,
 }
 
 impl MaterialEntry {
     /// Every texture that the entry names.
-    pub fn textures(&self) -> impl Iterator<Item = &TextureEntry> {
+    pub(crate) fn textures(&self) -> impl Iterator<Item = &TextureEntry> {
         let keys = &self.keys;
         let (color, roughness, metallic) = match &self.kind {
             MaterialKindEntry::Diffuse(entry) => (entry.reflectance.texture(), None, None),

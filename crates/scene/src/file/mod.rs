@@ -15,10 +15,10 @@ use std::{
 
 use serde::Deserialize;
 
-pub use lamp::{LampEntry, LampKindEntry};
-pub use material::{ConductorEntry, MaterialEntry, MaterialKeys, MaterialKindEntry};
-pub use portal::PortalEntry;
-pub use value::{ChannelEntry, NumberOrVector, TextureEntry, Textured};
+pub(crate) use lamp::{LampEntry, LampKindEntry};
+pub(crate) use material::{ConductorEntry, MaterialEntry, MaterialKeys, MaterialKindEntry};
+pub(crate) use portal::PortalEntry;
+pub(crate) use value::{ChannelEntry, NumberOrVector, TextureEntry, Textured};
 
 use super::{
     FilmSettings,
@@ -29,7 +29,7 @@ use crate::error::Result;
 
 /// Scene file as written.
 #[derive(Debug)]
-pub struct SceneFile {
+pub(crate) struct SceneFile {
     /// `[camera]`.
     pub camera: CameraEntry,
     /// `[film]`.
@@ -51,7 +51,7 @@ pub struct SceneFile {
 /// `[camera]`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct CameraEntry {
+pub(crate) struct CameraEntry {
     /// Centre of projection, metres.
     pub position: [f32; 3],
     /// Point at the centre of the image, metres.
@@ -75,7 +75,7 @@ fn default_up() -> [f32; 3] {
 /// `[environment]`; exactly one of `map`, `constant`, `court` and `sky`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct EnvironmentEntry {
+pub(crate) struct EnvironmentEntry {
     /// Lat-long image file, relative to the scene file.
     pub map: Option<PathBuf>,
     /// Radiance that is the same in every direction.
@@ -98,7 +98,7 @@ fn default_environment_scale() -> f32 {
 
 /// One `[[object]]`.
 #[derive(Debug)]
-pub struct ObjectEntry {
+pub(crate) struct ObjectEntry {
     /// Line of the entry, from 1.
     pub line: usize,
     /// Name, for messages.
@@ -117,7 +117,7 @@ pub struct ObjectEntry {
 
 /// Source of an object's triangles.
 #[derive(Debug)]
-pub enum ObjectSource {
+pub(crate) enum ObjectSource {
     /// A mesh file, relative to the scene file.
     Mesh(PathBuf),
     /// A procedural shape.
@@ -131,7 +131,7 @@ pub enum ObjectSource {
 
 /// One `[[include]]`.
 #[derive(Debug)]
-pub struct IncludeEntry {
+pub(crate) struct IncludeEntry {
     /// Line of the entry, from 1.
     pub line: usize,
     /// Its keys.
@@ -141,7 +141,7 @@ pub struct IncludeEntry {
 /// Keys of `[[include]]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct IncludeKeys {
+pub(crate) struct IncludeKeys {
     /// glTF or OBJ file with everything in it but its cameras, relative to the scene file.
     pub file: PathBuf,
     /// Factor along each axis, or one for all; applied first. Intensities of lamps grow with its
@@ -164,7 +164,7 @@ impl SceneFile {
     ///
     /// # Errors
     /// [`crate::Error::Parse`] with line and column.
-    pub fn parse(path: &Path, text: &str) -> Result<Self> {
+    pub(crate) fn parse(path: &Path, text: &str) -> Result<Self> {
         read::read_root(text).map_err(|failure| failure.locate(path, text))
     }
 }

@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 /// One `[[portal]]`.
 #[derive(Clone, Debug)]
-pub struct PortalEntry {
+pub(crate) struct PortalEntry {
     /// Line of the entry, from 1.
     pub line: usize,
     /// Its keys.
@@ -14,7 +14,7 @@ pub struct PortalEntry {
 /// Keys of `[[portal]]`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct PortalKeys {
+pub(crate) struct PortalKeys {
     /// Name, for messages.
     pub name: Option<String>,
     /// One corner of the rectangle, metres.

@@ -12,10 +12,10 @@ use crate::texture::{Interpolation, Wrap};
 
 /// One number for all axes, or one per axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NumberOr<const N: usize>(pub [f32; N]);
+pub(crate) struct NumberOr<const N: usize>(pub [f32; N]);
 
 /// One number for all of x, y and z, or of red, green and blue, or one for each.
-pub type NumberOrVector = NumberOr<3>;
+pub(crate) type NumberOrVector = NumberOr<3>;
 
 impl<const N: usize> Default for NumberOr<N> {
     fn default() -> Self {
@@ -61,7 +61,7 @@ where
 /// Image in place of a number or colour.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct TextureEntry {
+pub(crate) struct TextureEntry {
     /// PNG, JPEG, TGA, HDR or EXR image, relative to the scene file.
     pub texture: PathBuf,
     /// Repetitions of the image per unit of the texture coordinates, along u and v or both.
@@ -93,7 +93,7 @@ pub struct TextureEntry {
 /// `channel` of a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum ChannelEntry {
+pub(crate) enum ChannelEntry {
     /// Red.
     R,
     /// Green.
@@ -106,7 +106,7 @@ pub enum ChannelEntry {
 
 /// A value that is the same everywhere, or a texture.
 #[derive(Clone, Debug)]
-pub enum Textured<T> {
+pub(crate) enum Textured<T> {
     /// Same everywhere.
     Uniform(T),
     /// By place.
@@ -115,7 +115,7 @@ pub enum Textured<T> {
 
 impl<T> Textured<T> {
     /// The texture, if it is one.
-    pub fn texture(&self) -> Option<&TextureEntry> {
+    pub(crate) fn texture(&self) -> Option<&TextureEntry> {
         match self {
             Self::Uniform(_) => None,
             Self::Texture(entry) => Some(entry),

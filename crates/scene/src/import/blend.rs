@@ -13,7 +13,7 @@ use crate::{
 
 /// Share of the second of two materials.
 #[derive(Clone, Debug)]
-pub enum Share {
+pub(crate) enum Share {
     /// The same everywhere, 0…1.
     Constant(f32),
     /// By place, one number.
@@ -24,7 +24,7 @@ pub enum Share {
 ///
 /// Two diffuse ones are diffuse with the mixed reflectance, of which at most one of first, second and
 /// share may be an image, or first and second the same one.
-pub fn blend(
+pub(crate) fn blend(
     [(first, own), (second, other)]: [(&MaterialKind, &Surface); 2],
     share: &Share,
 ) -> Option<(MaterialKind, Surface)> {

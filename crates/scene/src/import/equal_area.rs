@@ -16,7 +16,7 @@ const POINTS: u32 = 6;
 ///
 /// Every texel is the mean of the map over points of it, and a factor for each channel keeps the mean
 /// radiance of the sphere, which in an equal-area map is that of the texels.
-pub fn resample(
+pub(crate) fn resample(
     texels: &[Vec3],
     side: u32,
     light_from_world: Mat3,

@@ -5,13 +5,13 @@ use glam::{DVec3, dvec3};
 use crate::spectrum::rgb_from_xyz;
 
 /// Refractive index of a dielectric.
-pub fn dielectric(name: &str) -> Option<f32> {
+pub(crate) fn dielectric(name: &str) -> Option<f32> {
     let name = name.to_lowercase();
     DIELECTRICS.iter().find(|(own, _)| *own == name).map(|(_, index)| *index)
 }
 
 /// Real part of the refractive index and extinction coefficient of a metal or other absorbing medium.
-pub fn conductor(name: &str) -> Option<(DVec3, DVec3)> {
+pub(crate) fn conductor(name: &str) -> Option<(DVec3, DVec3)> {
     // The name may tell the source of the measurement, as `Cu_palik`.
     let name = name.strip_suffix("_palik").unwrap_or(name);
     let found = CONDUCTORS.iter().find(|(own, _)| *own == name);
@@ -19,7 +19,7 @@ pub fn conductor(name: &str) -> Option<(DVec3, DVec3)> {
 }
 
 /// Refractive index or extinction coefficient by pbrt's names `metal-…-eta`, `metal-…-k` and of glasses.
-pub fn index(name: &str) -> Option<DVec3> {
+pub(crate) fn index(name: &str) -> Option<DVec3> {
     if let Some((_, ior)) = GLASSES.iter().find(|(glass, _)| *glass == name) {
         return Some(DVec3::splat(*ior));
     }
@@ -33,18 +33,18 @@ pub fn index(name: &str) -> Option<DVec3> {
 }
 
 /// Linear Rec.709 colour of an illuminant with luminance 1, by pbrt's name.
-pub fn illuminant(name: &str) -> Option<DVec3> {
+pub(crate) fn illuminant(name: &str) -> Option<DVec3> {
     let (_, x, y) = ILLUMINANTS.iter().find(|(known, ..)| *known == name)?;
     Some(rgb_from_xyz(dvec3(x / y, 1.0, (1.0 - x - y) / y)))
 }
 
 /// Names of all conductors, for messages.
-pub fn conductor_names() -> String {
+pub(crate) fn conductor_names() -> String {
     CONDUCTORS.map(|(name, _)| name).join(", ")
 }
 
 /// Names of all dielectrics, for messages.
-pub fn dielectric_names() -> String {
+pub(crate) fn dielectric_names() -> String {
     DIELECTRICS.map(|(name, _)| name).join(", ")
 }
 

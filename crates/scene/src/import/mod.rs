@@ -1,9 +1,9 @@
 //! Shared by the readers of other formats: the scene that they return, media and illuminants by name,
 //! mixtures of materials, equal-area maps, and the gamut of reflectances.
 
-pub mod blend;
-pub mod equal_area;
-pub mod media;
+pub(crate) mod blend;
+pub(crate) mod equal_area;
+pub(crate) mod media;
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ use crate::{
 
 /// Everything that a file of another format says.
 #[derive(Debug)]
-pub struct Imported {
+pub(crate) struct Imported {
     /// Viewer, before its numbers are checked.
     pub camera: CameraEntry,
     /// Image plane.
@@ -42,7 +42,7 @@ const ROUNDING: f64 = 1e-3;
 
 /// Clips the colour of a reflectance spectrum to Rec.709, which saturated spectra lie outside, and counts
 /// that as `feature`.
-pub fn clipped(
+pub(crate) fn clipped(
     color: DVec3,
     feature: Feature,
     ignored: &mut Ignored,

@@ -23,7 +23,7 @@ const MARGIN: f32 = 0.97;
 const ROUNDS: usize = 16;
 
 /// Values of g at the nodes of the cosine 0…1, square root of 1/sr, for the grid in `words`.
-pub fn separable_base(words: &[u32]) -> Vec<Vec3> {
+pub(super) fn separable_base(words: &[u32]) -> Vec<Vec3> {
     let least = least_values(words);
     let channels: Vec<Vec<f32>> = (0..3)
         .map(|channel| {

@@ -10,7 +10,7 @@ use crate::math::colour::luminance;
 use crate::measured::{layout::*, lookup};
 
 /// Sampling table of one bin of outgoing elevation.
-pub struct SamplingRow {
+pub(super) struct SamplingRow {
     /// Probability of the cosine lobe.
     pub cosine_share: f32,
     /// Cumulative probabilities of the cells, the last one exactly 1.
@@ -37,7 +37,7 @@ impl SamplingRow {
     const POINTS: u32 = 3;
 
     /// Tabulates BRDF × cosine of an elevation bin over half vectors, from the grid in `words`.
-    pub fn new(words: &[u32], elevation: u32) -> Self {
+    pub(super) fn new(words: &[u32], elevation: u32) -> Self {
         let cells: Vec<Vec<QuadraturePoint>> = (0..MEASURED_SAMPLING_CELLS)
             .map(|cell| Self::quadrature(words, elevation, cell))
             .collect();
@@ -157,7 +157,7 @@ impl SamplingRow {
 
 /// ∫ BRDF·cosθ_i dω_i from 1024 samples of the material's own density, at the points of an additive
 /// lattice of irrational steps. Accurate to about 1%, for images only.
-pub fn directional_albedo(words: &[u32], cosine: f32) -> Vec3 {
+pub(super) fn directional_albedo(words: &[u32], cosine: f32) -> Vec3 {
     const SAMPLES: u32 = 1024;
     let cosine = cosine.max(0.5 / BRDF_COSINE_INTERVALS as f32 / 8.0);
     let outgoing = vec3((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine);
@@ -189,7 +189,7 @@ const AZIMUTH_POINTS: usize = 90;
 
 /// Factors by polar angle, applied for both directions, that keep a BRDF from reflecting more light
 /// than it receives.
-pub struct EnergyLimit {
+pub(super) struct EnergyLimit {
     /// Largest directional albedo of any channel before scaling.
     pub largest_albedo: f32,
     /// Factor at the centre of each polar bin.
@@ -200,7 +200,7 @@ impl EnergyLimit {
     /// Measures the albedo of the grid in `words` at every polar angle. If one exceeds 1, finds
     /// s(θ) ≤ 1 such that s(θ_o)·∫ f·s(θ_i)·cosθ_i dω_i stays below 1 everywhere; the product form
     /// keeps the BRDF reciprocal. `None` if none exceeds 1.
-    pub fn new(words: &[u32]) -> Option<Self> {
+    pub(super) fn new(words: &[u32]) -> Option<Self> {
         let theta = |bin: usize| (bin as f32 + 0.5) / POLAR_BINS as f32 * FRAC_PI_2;
         // ∫ f dφ · cosθ_i sinθ_i dθ_i by bins of outgoing and incident polar angle.
         let transport: Vec<Vec<Vec3>> = (0..POLAR_BINS)
@@ -252,7 +252,7 @@ impl EnergyLimit {
     }
 
     /// s(θ) of a direction above the surface, linear between bin centres.
-    pub fn factor(&self, direction_local: Vec3) -> f32 {
+    pub(super) fn factor(&self, direction_local: Vec3) -> f32 {
         let theta = direction_local.truncate().length().atan2(direction_local.z);
         let last = POLAR_BINS - 1;
         let position = (theta / FRAC_PI_2 * POLAR_BINS as f32 - 0.5).clamp(0.0, last as f32);

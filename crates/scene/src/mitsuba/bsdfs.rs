@@ -41,7 +41,7 @@ struct Width {
 
 /// Reflection of a material with its textures and opacity.
 #[derive(Clone, Debug)]
-pub struct Model {
+pub(super) struct Model {
     /// Reflection model.
     pub kind: MaterialKind,
     /// Textures, opacity, sides.
@@ -70,14 +70,14 @@ impl Model {
     }
 
     /// Model of a shape that names none.
-    pub fn default_of_shapes() -> Self {
+    pub(super) fn default_of_shapes() -> Self {
         Self::new(MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) })
     }
 }
 
 impl Reader<'_> {
     /// Reads a reflection model and those in it.
-    pub fn model(&mut self, node: Node<'_>) -> Result<Model> {
+    pub(super) fn model(&mut self, node: Node<'_>) -> Result<Model> {
         self.nested(node, MAX_DEPTH)
     }
 

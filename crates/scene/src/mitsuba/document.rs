@@ -28,7 +28,7 @@ const MAX_VALUE: usize = 1 << 16;
 
 /// Elements of a scene file and those that it includes.
 #[derive(Debug)]
-pub struct Document {
+pub(super) struct Document {
     elements: Vec<Element>,
     /// Files in the order in which they were met; the scene first.
     pub files: Vec<PathBuf>,
@@ -51,7 +51,7 @@ struct Element {
 
 /// Element of a [`Document`].
 #[derive(Clone, Copy, Debug)]
-pub struct Node<'a> {
+pub(super) struct Node<'a> {
     /// The document.
     pub document: &'a Document,
     /// Number of the element, by which it is told from others.
@@ -64,34 +64,34 @@ impl<'a> Node<'a> {
     }
 
     /// Name of the element.
-    pub fn tag(self) -> &'a str {
+    pub(super) fn tag(self) -> &'a str {
         &self.element().tag
     }
 
     /// Value of an attribute.
-    pub fn attribute(self, name: &str) -> Option<&'a str> {
+    pub(super) fn attribute(self, name: &str) -> Option<&'a str> {
         let found = self.element().attributes.iter().find(|(own, _)| own == name);
         found.map(|(_, value)| value.as_str())
     }
 
     /// Name of the parameter that the element is; empty if it has none.
-    pub fn name(self) -> &'a str {
+    pub(super) fn name(self) -> &'a str {
         self.attribute("name").unwrap_or_default()
     }
 
     /// Type of the plugin; empty if it has none.
-    pub fn kind(self) -> &'a str {
+    pub(super) fn kind(self) -> &'a str {
         self.attribute("type").unwrap_or_default()
     }
 
     /// Elements in this one, in their order.
-    pub fn children(self) -> impl Iterator<Item = Node<'a>> {
+    pub(super) fn children(self) -> impl Iterator<Item = Node<'a>> {
         let document = self.document;
         self.element().children.iter().map(move |&index| Node { document, index })
     }
 
     /// Element that a `ref` names; any other is itself.
-    pub fn target(self) -> Result<Node<'a>> {
+    pub(super) fn target(self) -> Result<Node<'a>> {
         if self.tag() != "ref" {
             return Ok(self);
         }
@@ -103,7 +103,7 @@ impl<'a> Node<'a> {
     }
 
     /// Line for warnings, with the file where it is not the scene.
-    pub fn place(self) -> String {
+    pub(super) fn place(self) -> String {
         let Element { file, line, .. } = self.element();
         if *file == 0 {
             format!("line {line}")
@@ -113,7 +113,7 @@ impl<'a> Node<'a> {
     }
 
     /// Error at this element.
-    pub fn error(self, message: impl Into<String>) -> Error {
+    pub(super) fn error(self, message: impl Into<String>) -> Error {
         let Element { file, line, .. } = self.element();
         Error::parse(&self.document.files[*file], *line as usize, 1, message)
     }
@@ -122,7 +122,7 @@ impl<'a> Node<'a> {
     ///
     /// # Errors
     /// [`Error::Parse`] for a name that leaves the folder of the scene, or a file that is not there.
-    pub fn file(self, name: &str) -> Result<PathBuf> {
+    pub(super) fn file(self, name: &str) -> Result<PathBuf> {
         let document = self.document;
         document.resolve(name).map_err(|message| self.error(message))
     }
@@ -133,7 +133,7 @@ impl Document {
     ///
     /// # Errors
     /// [`Error::Parse`] with the line, and errors of reading.
-    pub fn read(path: &Path) -> Result<Self> {
+    pub(super) fn read(path: &Path) -> Result<Self> {
         let mut builder = Builder {
             document: Self {
                 elements: Vec::new(),
@@ -158,7 +158,7 @@ impl Document {
     }
 
     /// Element of the whole scene.
-    pub fn root(&self) -> Node<'_> {
+    pub(super) fn root(&self) -> Node<'_> {
         Node { document: self, index: 0 }
     }
 

@@ -21,7 +21,7 @@ const AXIS_TOLERANCE: f64 = 1e-4;
 ///
 /// # Errors
 /// Those of [`EnvironmentMap::load`].
-pub fn load(
+pub(super) fn load(
     path: &Path,
     scale: f32,
     matrix: DMat4,

@@ -63,7 +63,7 @@ struct Reader<'a> {
 /// # Errors
 /// [`crate::Error::Parse`] with file and line for what cannot be read or rendered, and errors of the
 /// readers of meshes, images and maps.
-pub fn read(path: &Path, camera: Option<&str>) -> Result<Imported> {
+pub(crate) fn read(path: &Path, camera: Option<&str>) -> Result<Imported> {
     let document = Document::read(path)?;
     let mut reader = Reader {
         document: &document,

@@ -16,7 +16,7 @@ use crate::{
 
 /// Child elements of a plugin.
 #[derive(Debug)]
-pub struct Parameters<'a> {
+pub(super) struct Parameters<'a> {
     /// The plugin.
     pub node: Node<'a>,
     used: RefCell<Vec<usize>>,
@@ -24,7 +24,7 @@ pub struct Parameters<'a> {
 
 impl<'a> Parameters<'a> {
     /// Takes the children of a plugin, none of them used yet.
-    pub fn new(node: Node<'a>) -> Self {
+    pub(super) fn new(node: Node<'a>) -> Self {
         Self { node, used: RefCell::default() }
     }
 
@@ -35,7 +35,7 @@ impl<'a> Parameters<'a> {
     }
 
     /// Child of a name, whatever it is; a `ref` as the element that it names.
-    pub fn any(&self, name: &str) -> Result<Option<Node<'a>>> {
+    pub(super) fn any(&self, name: &str) -> Result<Option<Node<'a>>> {
         let child = self.node.children().find(|child| child.name() == name);
         child.map(|child| self.take(child).target()).transpose()
     }
@@ -50,12 +50,12 @@ impl<'a> Parameters<'a> {
     }
 
     /// Number, if it is there.
-    pub fn float(&self, name: &str) -> Result<Option<f32>> {
+    pub(super) fn float(&self, name: &str) -> Result<Option<f32>> {
         self.typed(name, &["float", "integer"])?.map(float).transpose()
     }
 
     /// Number from `low` to `high`, if it is there.
-    pub fn float_in(&self, name: &str, (low, high): (f32, f32)) -> Result<Option<f32>> {
+    pub(super) fn float_in(&self, name: &str, (low, high): (f32, f32)) -> Result<Option<f32>> {
         let Some(value) = self.float(name)? else { return Ok(None) };
         if (low..=high).contains(&value) {
             return Ok(Some(value));
@@ -65,7 +65,7 @@ impl<'a> Parameters<'a> {
     }
 
     /// Whole number, if it is there.
-    pub fn integer(&self, name: &str) -> Result<Option<i64>> {
+    pub(super) fn integer(&self, name: &str) -> Result<Option<i64>> {
         let Some(node) = self.typed(name, &["integer"])? else { return Ok(None) };
         let text = value(node)?.trim();
         let message = || format!("`{name}`: expected a whole number, found `{text}`");
@@ -73,7 +73,7 @@ impl<'a> Parameters<'a> {
     }
 
     /// Truth value, if it is there.
-    pub fn boolean(&self, name: &str) -> Result<Option<bool>> {
+    pub(super) fn boolean(&self, name: &str) -> Result<Option<bool>> {
         let Some(node) = self.typed(name, &["boolean"])? else { return Ok(None) };
         match value(node)?.trim() {
             "true" | "True" | "1" => Ok(Some(true)),
@@ -83,24 +83,24 @@ impl<'a> Parameters<'a> {
     }
 
     /// Text, if it is there.
-    pub fn string(&self, name: &str) -> Result<Option<&'a str>> {
+    pub(super) fn string(&self, name: &str) -> Result<Option<&'a str>> {
         self.typed(name, &["string"])?.map(value).transpose()
     }
 
     /// Point or vector, if it is there.
-    pub fn vector(&self, name: &str) -> Result<Option<Vec3>> {
+    pub(super) fn vector(&self, name: &str) -> Result<Option<Vec3>> {
         let node = self.typed(name, &["point", "vector"])?;
         node.map(|node| transforms::vector(node, [0.0; 3]).map(|v| v.as_vec3())).transpose()
     }
 
     /// Transform; the identity if it is not there.
-    pub fn transform(&self, name: &str) -> Result<DMat4> {
+    pub(super) fn transform(&self, name: &str) -> Result<DMat4> {
         let node = self.typed(name, &["transform"])?;
         node.map_or(Ok(DMat4::IDENTITY), transforms::transform)
     }
 
     /// Objects of a kind (`bsdf`, `emitter`, …), references among them.
-    pub fn objects(&self, tag: &str) -> Result<Vec<Node<'a>>> {
+    pub(super) fn objects(&self, tag: &str) -> Result<Vec<Node<'a>>> {
         let mut objects = Vec::new();
         for child in self.node.children() {
             let target = child.target()?;
@@ -113,14 +113,14 @@ impl<'a> Parameters<'a> {
     }
 
     /// Counts as used what changes nothing in the picture.
-    pub fn without_effect(&self, names: &[&str]) {
+    pub(super) fn without_effect(&self, names: &[&str]) {
         for child in self.node.children().filter(|child| names.contains(&child.name())) {
             self.take(child);
         }
     }
 
     /// Names every parameter that has not been used.
-    pub fn finish(&self, ignored: &mut Ignored) {
+    pub(super) fn finish(&self, ignored: &mut Ignored) {
         let used = self.used.borrow();
         for child in self.node.children().filter(|child| !used.contains(&child.index)) {
             let owner = match self.node.kind() {

@@ -29,7 +29,7 @@ const MAX_NAME: usize = 4096;
 /// # Errors
 /// [`Error::Io`], or [`Error::Format`] for a file that is truncated, of another format or without that
 /// mesh.
-pub fn read(path: &Path, index: usize) -> Result<(Mesh, bool)> {
+pub(super) fn read(path: &Path, index: usize) -> Result<(Mesh, bool)> {
     let bytes = files::read(path)?;
     parse(&bytes, index).map_err(|message| Error::format(path, message))
 }

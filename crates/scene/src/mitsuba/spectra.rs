@@ -22,7 +22,7 @@ use crate::{
 const MAX_NUMBERS: usize = 1 << 14;
 /// Meaning of a spectrum, on which its colour depends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
+pub(super) enum Role {
     /// Factor of light: under D65, as sRGB's white is.
     Reflectance,
     /// Light by itself: equal energy is not white.
@@ -35,7 +35,11 @@ pub enum Role {
 ///
 /// # Errors
 /// As [`color`].
-pub fn parameter(parameters: &Parameters<'_>, name: &str, role: Role) -> Result<Option<Vec3>> {
+pub(super) fn parameter(
+    parameters: &Parameters<'_>,
+    name: &str,
+    role: Role,
+) -> Result<Option<Vec3>> {
     parameters.any(name)?.map(|node| color(node, role)).transpose()
 }
 
@@ -43,7 +47,7 @@ pub fn parameter(parameters: &Parameters<'_>, name: &str, role: Role) -> Result<
 ///
 /// # Errors
 /// [`crate::Error::Parse`] for another element, and for text that holds no numbers.
-pub fn color(node: Node<'_>, role: Role) -> Result<Vec3> {
+pub(super) fn color(node: Node<'_>, role: Role) -> Result<Vec3> {
     let color = match node.tag() {
         "float" | "integer" => Vec3::splat(float(node)?),
         "rgb" | "srgb" | "color" => rgb(node, value(node)?, node.tag() == "srgb")?,
@@ -76,7 +80,7 @@ pub fn color(node: Node<'_>, role: Role) -> Result<Vec3> {
 ///
 /// # Errors
 /// As [`color`], and for colours that are no spectrum and above 1.
-pub fn reflectance(node: Node<'_>, ignored: &mut Ignored) -> Result<Vec3> {
+pub(super) fn reflectance(node: Node<'_>, ignored: &mut Ignored) -> Result<Vec3> {
     if node.tag() == "spectrum" {
         let color = of_spectrum(node, Role::Reflectance)?.as_dvec3();
         return Ok(clipped(color, features::MI_GAMUT, ignored, || node.place()).as_vec3());

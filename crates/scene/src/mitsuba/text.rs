@@ -5,22 +5,22 @@ use std::path::Path;
 use crate::error::{Error, Result};
 
 /// Starts of the lines of a text.
-pub struct Lines(Vec<usize>);
+pub(super) struct Lines(Vec<usize>);
 
 impl Lines {
     /// Finds the lines of a text.
-    pub fn new(text: &str) -> Self {
+    pub(super) fn new(text: &str) -> Self {
         Self(text.match_indices('\n').map(|(at, _)| at + 1).collect())
     }
 
     /// Line of a byte, from 1.
-    pub fn line(&self, byte: usize) -> u32 {
+    pub(super) fn line(&self, byte: usize) -> u32 {
         self.0.partition_point(|start| *start <= byte) as u32 + 1
     }
 }
 
 /// Refuses text that nests elements so deep that a parser could run out of stack.
-pub fn check_nesting(path: &Path, text: &str, deepest: usize) -> Result<()> {
+pub(super) fn check_nesting(path: &Path, text: &str, deepest: usize) -> Result<()> {
     let mut depth = 0_usize;
     let mut rest = text;
     while let Some(at) = rest.find('<') {
@@ -61,7 +61,7 @@ pub fn check_nesting(path: &Path, text: &str, deepest: usize) -> Result<()> {
 }
 
 /// Name of version 3 for one of version 0.6: `toWorld` is `to_world`, `intIOR` `int_ior`.
-pub fn snake_case(name: &str) -> String {
+pub(super) fn snake_case(name: &str) -> String {
     let mut snake = String::with_capacity(name.len() + 2);
     let mut before = '_';
     for c in name.chars() {

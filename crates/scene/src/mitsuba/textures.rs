@@ -22,7 +22,7 @@ const MAX_SCALES: usize = 8;
 
 /// Value that may vary over a surface.
 #[derive(Clone, Debug)]
-pub enum Value {
+pub(super) enum Value {
     /// The same everywhere.
     Color(Vec3),
     /// By texture coordinates.
@@ -33,7 +33,7 @@ pub enum Value {
 
 impl Value {
     /// Factor for the model and texture for the surface.
-    pub fn split(self) -> (Vec3, Option<TextureUse>) {
+    pub(super) fn split(self) -> (Vec3, Option<TextureUse>) {
         match self {
             Self::Color(color) | Self::Vertices(color) => (color, None),
             Self::Texture(texture) => (Vec3::ONE, Some(*texture)),
@@ -41,7 +41,7 @@ impl Value {
     }
 
     /// Value of which every colour is `of` the former one; colours of vertices take it of the factor.
-    pub fn mapped(self, of: impl Fn(f32) -> f32) -> Self {
+    pub(super) fn mapped(self, of: impl Fn(f32) -> f32) -> Self {
         match self {
             Self::Color(color) => Self::Color(color.map(of)),
             Self::Vertices(color) => Self::Vertices(color.map(of)),
@@ -50,14 +50,14 @@ impl Value {
     }
 
     /// Tests for the colours of vertices.
-    pub fn is_of_vertices(&self) -> bool {
+    pub(super) fn is_of_vertices(&self) -> bool {
         matches!(self, Self::Vertices(_))
     }
 }
 
 impl Reader<'_> {
     /// Colour or texture of a parameter, if it is there.
-    pub fn value(
+    pub(super) fn value(
         &mut self,
         parameters: &Parameters<'_>,
         name: &str,
@@ -172,7 +172,7 @@ impl Reader<'_> {
     }
 
     /// Colour of a value where a texture cannot be used, which `feature` names.
-    pub fn without_texture(
+    pub(super) fn without_texture(
         &mut self,
         value: Option<Value>,
         node: Node<'_>,

@@ -12,7 +12,7 @@ use crate::error::Result;
 ///
 /// # Errors
 /// [`crate::Error::Parse`] for an element that is no transform, and for a matrix that is not affine.
-pub fn transform(node: Node<'_>) -> Result<DMat4> {
+pub(super) fn transform(node: Node<'_>) -> Result<DMat4> {
     let mut matrix = DMat4::IDENTITY;
     for child in node.children() {
         let next = match child.tag() {
@@ -37,7 +37,7 @@ pub fn transform(node: Node<'_>) -> Result<DMat4> {
 
 /// Vector by `x`, `y`, `z`, with `absent` for those that are not there, or by `value` of one or three
 /// numbers.
-pub fn vector(node: Node<'_>, absent: [f64; 3]) -> Result<DVec3> {
+pub(super) fn vector(node: Node<'_>, absent: [f64; 3]) -> Result<DVec3> {
     if let Some(text) = node.attribute("value") {
         return match numbers(node, text)?[..] {
             [all] => Ok(DVec3::splat(all)),
@@ -111,7 +111,7 @@ fn look_at(node: Node<'_>) -> Result<DMat4> {
 }
 
 /// Rows of a transform of texture coordinates.
-pub fn of_coordinates(node: Node<'_>, matrix: DMat4) -> Result<[[f32; 3]; 2]> {
+pub(super) fn of_coordinates(node: Node<'_>, matrix: DMat4) -> Result<[[f32; 3]; 2]> {
     let row = |index: usize| {
         let row = matrix.row(index);
         [row.x, row.y, row.w].map(|number| number as f32)

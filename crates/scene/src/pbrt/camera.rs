@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// Viewer and image plane.
-pub struct View {
+pub(super) struct View {
     /// Camera in the space of the renderer.
     pub camera: CameraEntry,
     /// Film.
@@ -36,7 +36,7 @@ pub struct View {
 ///
 /// # Errors
 /// With the place for cameras that cannot be used and numbers out of range.
-pub fn view(description: &Description, main: &Path, log: &mut Log) -> Result<View> {
+pub(super) fn view(description: &Description, main: &Path, log: &mut Log) -> Result<View> {
     let (film, mut exposure, aspect) = film(description, log)?;
     let Some((entity, camera_from_world)) = &description.camera else {
         return Err(Error::scene(main, "expected a Camera, found none"));

@@ -17,7 +17,7 @@ use crate::{
 
 /// Shape with the state in force at its directive.
 #[derive(Debug)]
-pub struct Shape {
+pub(super) struct Shape {
     /// Type and parameters.
     pub entity: Entity,
     /// World, or object of instances, from shape.
@@ -32,7 +32,7 @@ pub struct Shape {
 
 /// Use of an object.
 #[derive(Debug)]
-pub struct Instance {
+pub(super) struct Instance {
     /// World from the world of the object's definition.
     pub world_from_object: DMat4,
     /// Place of `ObjectInstance`.
@@ -41,7 +41,7 @@ pub struct Instance {
 
 /// Object that may be used many times.
 #[derive(Debug, Default)]
-pub struct Object {
+pub(super) struct Object {
     /// Its name.
     pub name: String,
     /// Its shapes.
@@ -54,7 +54,7 @@ pub struct Object {
 
 /// Entities of a scene.
 #[derive(Debug, Default)]
-pub struct Description {
+pub(super) struct Description {
     /// `Camera`, and camera from world.
     pub camera: Option<(Entity, DMat4)>,
     /// `Film`.
@@ -78,7 +78,7 @@ pub struct Description {
 }
 
 /// Reader of directives.
-pub struct Reader<'a> {
+pub(super) struct Reader<'a> {
     source: Source,
     main: &'a Path,
     states: States,
@@ -96,7 +96,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// [`Parse`](crate::error::Error::Parse) with the place, and errors of the files.
-    pub fn read(
+    pub(super) fn read(
         main: &'a Path,
         source: Source,
         ignored: &'a mut Ignored,

@@ -24,7 +24,7 @@ const MAX_SIDE: u32 = 8192;
 
 /// Lights of a scene.
 #[derive(Default)]
-pub struct Lights {
+pub(super) struct Lights {
     /// Lamps.
     pub lamps: Vec<Lamp>,
     /// Radiance from everywhere.
@@ -42,7 +42,7 @@ struct SquareMap {
 
 /// Emission of a shape.
 #[derive(Clone, Debug, PartialEq)]
-pub struct AreaLight {
+pub(super) struct AreaLight {
     /// Radiance, or its factor where an image gives it.
     pub radiance: Vec3,
     /// Image of the radiance.
@@ -62,7 +62,7 @@ fn color(entity: &Entity, name: &str, textures: &Textures) -> Result<Vec3> {
 ///
 /// # Errors
 /// With the place for other kinds of lights.
-pub fn area_light(
+pub(super) fn area_light(
     entity: &Entity,
     area: f64,
     exposure: f32,
@@ -99,7 +99,7 @@ impl Lights {
     /// # Errors
     /// With the place for kinds that pbrt does not have, transformations that flatten, and maps that
     /// cannot be read.
-    pub fn add(
+    pub(super) fn add(
         &mut self,
         entity: &Entity,
         world_from_light: DMat4,
@@ -233,7 +233,7 @@ impl Lights {
     ///
     /// # Errors
     /// A message for radiance that is not finite or negative.
-    pub fn environment(&mut self) -> Result<EnvironmentMap, String> {
+    pub(super) fn environment(&mut self) -> Result<EnvironmentMap, String> {
         // Resample the largest first, and the others to its size.
         let side = self.maps.iter().map(|map| map.side).max().unwrap_or(0);
         let mut sum: Option<EnvironmentMap> = None;

@@ -6,7 +6,7 @@ use super::{parameters::Entity, tokens::Place};
 use crate::features::{self, Feature, Ignored};
 
 /// Parts of a scene that are left out, and files read.
-pub struct Log<'a> {
+pub(super) struct Log<'a> {
     /// Main file.
     pub main: &'a Path,
     /// Parts that are left out.
@@ -19,18 +19,18 @@ pub struct Log<'a> {
 
 impl Log<'_> {
     /// Counts a part.
-    pub fn ignore(&mut self, feature: Feature, place: &Place) {
+    pub(super) fn ignore(&mut self, feature: Feature, place: &Place) {
         self.ignore_named(feature, feature.name, place);
     }
 
     /// Counts a part that has a name of its own.
-    pub fn ignore_named(&mut self, feature: Feature, name: &str, place: &Place) {
+    pub(super) fn ignore_named(&mut self, feature: Feature, name: &str, place: &Place) {
         let main = self.main;
         self.ignored.add_named(feature, name, || place.describe(main));
     }
 
     /// Counts the parameters of a directive that nothing has asked for.
-    pub fn unused(&mut self, entity: &Entity) {
+    pub(super) fn unused(&mut self, entity: &Entity) {
         for parameter in entity.unused() {
             let name = match entity.directive {
                 // Their names are the author's own.

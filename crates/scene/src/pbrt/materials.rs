@@ -34,7 +34,7 @@ const COAT_IOR: (f32, f32) = (1.01, 4.0);
 const SOLID_IOR: (f32, f32) = (0.1, 10.0);
 
 /// Materials of a scene.
-pub struct Materials<'a> {
+pub(super) struct Materials<'a> {
     description: &'a Description,
     /// Textures that the materials read.
     pub textures: Textures<'a>,
@@ -49,7 +49,7 @@ struct Roughness {
 
 impl<'a> Materials<'a> {
     /// Takes the materials of `description`.
-    pub fn new(description: &'a Description, textures: Textures<'a>) -> Self {
+    pub(super) fn new(description: &'a Description, textures: Textures<'a>) -> Self {
         Self { description, textures }
     }
 
@@ -57,7 +57,11 @@ impl<'a> Materials<'a> {
     ///
     /// # Errors
     /// With the place for unknown names and kinds, and parameters of the wrong type.
-    pub fn make(&mut self, choice: &MaterialChoice, log: &mut Log) -> Result<Option<Material>> {
+    pub(super) fn make(
+        &mut self,
+        choice: &MaterialChoice,
+        log: &mut Log,
+    ) -> Result<Option<Material>> {
         match choice {
             MaterialChoice::Default => {
                 let kind = MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) };
@@ -400,7 +404,7 @@ fn complement(value: Value) -> Value {
 }
 
 /// Makes a number the opacity of a surface.
-pub fn set_opacity(surface: &mut Surface, value: Value) {
+pub(super) fn set_opacity(surface: &mut Surface, value: Value) {
     match value {
         Value::Constant(opacity) => surface.opacity.factor = opacity.x.clamp(0.0, 1.0),
         Value::Image(image) => surface.opacity.texture = Some(image),

@@ -56,7 +56,7 @@ use textures::Textures;
 const MAX_COUNT: usize = 1 << 27;
 
 /// Tests whether a path names a scene description, compressed or not.
-pub fn is_pbrt(path: &Path) -> bool {
+pub(crate) fn is_pbrt(path: &Path) -> bool {
     match files::extension(path).as_str() {
         "pbrt" => true,
         "gz" => files::extension(Path::new(path.file_stem().unwrap_or_default())) == "pbrt",
@@ -69,7 +69,7 @@ pub fn is_pbrt(path: &Path) -> bool {
 /// # Errors
 /// [`Error::Parse`] with file, line and column for everything that cannot be read or rendered,
 /// [`Error::Io`] for the main file.
-pub fn read(path: &Path) -> Result<Imported> {
+pub(crate) fn read(path: &Path) -> Result<Imported> {
     let mut ignored = Ignored::default();
     let (description, source) = Reader::read(path, Source::open(path)?, &mut ignored)?;
     let folder = source.folder().to_path_buf();

@@ -18,7 +18,7 @@ const MAX_PARAMETERS: usize = 256;
 
 /// Type of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub(super) enum Kind {
     /// `bool`
     Boolean,
     /// `integer`
@@ -85,7 +85,7 @@ impl Kind {
 
 /// Values of a parameter.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Values {
+pub(super) enum Values {
     /// Finite numbers.
     Numbers(Vec<f64>),
     /// Strings.
@@ -106,7 +106,7 @@ impl Values {
 
 /// Parameter of a directive.
 #[derive(Clone, Debug)]
-pub struct Parameter {
+pub(super) struct Parameter {
     /// Type.
     pub kind: Kind,
     /// Name.
@@ -120,12 +120,12 @@ pub struct Parameter {
 
 impl Parameter {
     /// Numbers; empty for strings and truth values.
-    pub fn numbers(&self) -> &[f64] {
+    pub(super) fn numbers(&self) -> &[f64] {
         if let Values::Numbers(numbers) = &self.values { numbers } else { &[] }
     }
 
     /// First string; empty for numbers.
-    pub fn text(&self) -> &str {
+    pub(super) fn text(&self) -> &str {
         if let Values::Texts(texts) = &self.values {
             texts.first().map_or("", |text| text)
         } else {
@@ -253,7 +253,7 @@ fn push_value(
 
 /// Directive with a type and parameters: `Shape "sphere" "float radius" 2`.
 #[derive(Clone, Debug)]
-pub struct Entity {
+pub(super) struct Entity {
     /// Directive.
     pub directive: &'static str,
     /// Type, such as `sphere`; the name for directives that name something.
@@ -270,7 +270,7 @@ impl Entity {
     ///
     /// # Errors
     /// Those of [`Parameter`], and for a parameter that is given twice.
-    pub fn read(
+    pub(super) fn read(
         source: &mut Source,
         directive: &'static str,
         name: String,
@@ -284,17 +284,17 @@ impl Entity {
     }
 
     /// Directive and type, for messages.
-    pub fn label(&self) -> String {
+    pub(super) fn label(&self) -> String {
         format!("{} \"{}\"", self.directive, self.name)
     }
 
     /// Makes an error of the directive's place.
-    pub fn error(&self, message: impl AsRef<str>) -> crate::error::Error {
+    pub(super) fn error(&self, message: impl AsRef<str>) -> crate::error::Error {
         self.place.error(format!("{}: {}", self.label(), message.as_ref()))
     }
 
     /// Parameter with this name.
-    pub fn find(&self, name: &str) -> Option<&Parameter> {
+    pub(super) fn find(&self, name: &str) -> Option<&Parameter> {
         let found = self.parameters.iter().find(|parameter| parameter.name == name);
         found.inspect(|parameter| parameter.used.set(true))
     }
@@ -303,7 +303,7 @@ impl Entity {
     ///
     /// # Errors
     /// With the place for another type.
-    pub fn find_of(&self, name: &str, kinds: &[Kind]) -> Result<Option<&Parameter>> {
+    pub(super) fn find_of(&self, name: &str, kinds: &[Kind]) -> Result<Option<&Parameter>> {
         let Some(found) = self.find(name) else { return Ok(None) };
         if kinds.contains(&found.kind) {
             return Ok(Some(found));
@@ -318,34 +318,34 @@ impl Entity {
     }
 
     /// All numbers of a parameter; empty if it is not given.
-    pub fn numbers(&self, name: &str, kind: Kind) -> Result<&[f64]> {
+    pub(super) fn numbers(&self, name: &str, kind: Kind) -> Result<&[f64]> {
         Ok(self.find_of(name, &[kind])?.map_or(&[], Parameter::numbers))
     }
 
     /// First number of a parameter, if it is given.
-    pub fn optional(&self, name: &str) -> Result<Option<f64>> {
+    pub(super) fn optional(&self, name: &str) -> Result<Option<f64>> {
         let found = self.find_of(name, &[Kind::Float, Kind::Integer])?;
         Ok(found.and_then(|parameter| parameter.numbers().first().copied()))
     }
 
     /// Number, or `otherwise`.
-    pub fn number(&self, name: &str, otherwise: f64) -> Result<f64> {
+    pub(super) fn number(&self, name: &str, otherwise: f64) -> Result<f64> {
         Ok(self.optional(name)?.unwrap_or(otherwise))
     }
 
     /// Truth value, or `otherwise`.
-    pub fn boolean(&self, name: &str, otherwise: bool) -> Result<bool> {
+    pub(super) fn boolean(&self, name: &str, otherwise: bool) -> Result<bool> {
         let found = self.find_of(name, &[Kind::Boolean])?;
         Ok(found.map_or(otherwise, |parameter| parameter.values == Values::Booleans(vec![true])))
     }
 
     /// String, if it is given.
-    pub fn string(&self, name: &str) -> Result<Option<&str>> {
+    pub(super) fn string(&self, name: &str) -> Result<Option<&str>> {
         Ok(self.find_of(name, &[Kind::Text])?.map(Parameter::text))
     }
 
     /// Point or vector, or `otherwise`.
-    pub fn point(&self, name: &str, otherwise: DVec3) -> Result<DVec3> {
+    pub(super) fn point(&self, name: &str, otherwise: DVec3) -> Result<DVec3> {
         match self.numbers(name, Kind::Triple)? {
             [x, y, z, ..] => Ok(DVec3::new(*x, *y, *z)),
             _ => Ok(otherwise),
@@ -353,7 +353,7 @@ impl Entity {
     }
 
     /// Own parameters that nothing has asked for, the first time.
-    pub fn unused(&self) -> impl Iterator<Item = &Parameter> {
+    pub(super) fn unused(&self) -> impl Iterator<Item = &Parameter> {
         self.parameters[..self.own].iter().filter(|parameter| !parameter.used.replace(true))
     }
 }
@@ -362,7 +362,7 @@ impl Entity {
 ///
 /// # Errors
 /// As [`Entity::read`].
-pub fn read_parameters(source: &mut Source) -> Result<Vec<Parameter>> {
+pub(super) fn read_parameters(source: &mut Source) -> Result<Vec<Parameter>> {
     let mut parameters: Vec<Parameter> = Vec::new();
     loop {
         match source.next_here()? {

@@ -25,7 +25,7 @@ const PATCH_CELLS: u32 = 16;
 ///
 /// # Errors
 /// With the place for parameters that are no shape, and files that cannot be read.
-pub fn mesh(entity: &Entity, folder: &Path, log: &mut Log) -> Result<Option<Mesh>> {
+pub(super) fn mesh(entity: &Entity, folder: &Path, log: &mut Log) -> Result<Option<Mesh>> {
     let mut mesh = match entity.name.as_str() {
         "trianglemesh" => triangle_mesh(entity, log)?,
         "plymesh" => {
@@ -274,7 +274,7 @@ fn face_normals(mesh: &mut Mesh) {
 }
 
 /// Turns a mesh inside out.
-pub fn reverse(mesh: &mut Mesh) {
+pub(super) fn reverse(mesh: &mut Mesh) {
     mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
     mesh.normals.iter_mut().for_each(|normal| *normal = normal.map(|part| -part));
 }
@@ -283,7 +283,7 @@ pub fn reverse(mesh: &mut Mesh) {
 ///
 /// # Errors
 /// A message for more corners than indices can address.
-pub fn give_coordinates(mesh: &mut Mesh) -> Result<(), String> {
+pub(super) fn give_coordinates(mesh: &mut Mesh) -> Result<(), String> {
     if !mesh.uvs[0].is_empty() || mesh.triangles.is_empty() {
         return Ok(());
     }
@@ -306,7 +306,7 @@ pub fn give_coordinates(mesh: &mut Mesh) -> Result<(), String> {
 
 /// Gives a mesh tangents along u for normal maps, with the bitangent n × tangent of pbrt; `mirrors`
 /// tells whether the placement of the shape, before any mirror of the whole world, does.
-pub fn give_tangents(mesh: &mut Mesh, mirrors: bool) {
+pub(super) fn give_tangents(mesh: &mut Mesh, mirrors: bool) {
     let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
     for triangle in &mesh.triangles {
         let [a, b, c] = triangle.map(|at| Vec3::from_array(mesh.positions[at as usize]).as_dvec3());

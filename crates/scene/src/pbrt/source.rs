@@ -29,7 +29,7 @@ struct Open {
 }
 
 /// Tokens of the main file and of the files that it includes.
-pub struct Source {
+pub(super) struct Source {
     /// Folder of the main file, to which all paths are relative.
     folder: PathBuf,
     stack: Vec<Open>,
@@ -43,7 +43,7 @@ pub struct Source {
 
 /// Next part of a source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
+pub(super) enum Part {
     /// Token of a file.
     Token(Token),
     /// End of a file that `Import` named.
@@ -57,7 +57,7 @@ impl Source {
     ///
     /// # Errors
     /// [`Io`](crate::error::Error::Io), and [`Format`](crate::error::Error::Format) for a device.
-    pub fn open(path: &Path) -> Result<Self> {
+    pub(super) fn open(path: &Path) -> Result<Self> {
         let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
         let first = Open { path: path.into(), tokens: open(path, MAX_BYTES)?, restores: false };
         let inputs = vec![path.into()];
@@ -65,7 +65,7 @@ impl Source {
     }
 
     /// Folder to which paths are relative.
-    pub fn folder(&self) -> &Path {
+    pub(super) fn folder(&self) -> &Path {
         &self.folder
     }
 
@@ -73,7 +73,7 @@ impl Source {
     ///
     /// # Errors
     /// Those of the tokeniser.
-    pub fn next(&mut self) -> Result<Part> {
+    pub(super) fn next(&mut self) -> Result<Part> {
         if let Some(token) = self.held.take() {
             return Ok(Part::Token(token));
         }
@@ -100,7 +100,7 @@ impl Source {
     ///
     /// # Errors
     /// Those of the tokeniser.
-    pub fn next_here(&mut self) -> Result<Option<Token>> {
+    pub(super) fn next_here(&mut self) -> Result<Option<Token>> {
         match (self.held.take(), self.stack.last_mut()) {
             (None, Some(open)) => open.tokens.next(),
             (held, _) => Ok(held),
@@ -108,17 +108,17 @@ impl Source {
     }
 
     /// Returns the last token to be read again.
-    pub fn hold(&mut self, token: Token) {
+    pub(super) fn hold(&mut self, token: Token) {
         self.held = Some(token);
     }
 
     /// Characters of the last token.
-    pub fn text(&self) -> &str {
+    pub(super) fn text(&self) -> &str {
         self.stack.last().map_or("", |open| open.tokens.text())
     }
 
     /// Place of the last token.
-    pub fn place(&self) -> Place {
+    pub(super) fn place(&self) -> Place {
         match self.stack.last() {
             Some(open) => open.tokens.place().clone(),
             None => Place { path: Rc::from(self.folder.as_path()), line: 0, column: 0 },
@@ -130,7 +130,7 @@ impl Source {
     /// # Errors
     /// [`Parse`](crate::error::Error::Parse) with the place of the statement for a file outside the
     /// scene's folder, one that includes itself, one that cannot be read, and too many files in one another.
-    pub fn include(&mut self, name: &str, restores: bool, place: &Place) -> Result<()> {
+    pub(super) fn include(&mut self, name: &str, restores: bool, place: &Place) -> Result<()> {
         let path = path_inside(&self.folder, name).map_err(|message| place.error(message))?;
         if self.stack.iter().any(|open| files::is_same_file(&open.path, &path)) {
             return Err(place.error(format!("`{name}` includes itself")));
@@ -154,7 +154,7 @@ impl Source {
 ///
 /// # Errors
 /// A message for a name that is absolute or leaves the folder.
-pub fn path_inside(folder: &Path, name: &str) -> Result<PathBuf, String> {
+pub(super) fn path_inside(folder: &Path, name: &str) -> Result<PathBuf, String> {
     if stays_inside(Path::new(name)) {
         return Ok(folder.join(name));
     }

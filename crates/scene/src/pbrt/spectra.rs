@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// Types of parameters that are spectra.
-pub const KINDS: [Kind; 3] = [Kind::Rgb, Kind::Spectrum, Kind::Blackbody];
+pub(super) const KINDS: [Kind; 3] = [Kind::Rgb, Kind::Spectrum, Kind::Blackbody];
 
 /// Meaning of a spectrum.
 enum Source<'a> {
@@ -78,7 +78,7 @@ fn unknown(parameter: &Parameter, expected: &str) -> crate::error::Error {
 ///
 /// # Errors
 /// With the place for lists that are no spectrum and unknown names.
-pub fn reflectance(parameter: &Parameter, folder: &Path, log: &mut Log) -> Result<Vec3> {
+pub(super) fn reflectance(parameter: &Parameter, folder: &Path, log: &mut Log) -> Result<Vec3> {
     let color = match source(parameter, folder)? {
         Source::Color(color) => color,
         Source::Samples(samples) => {
@@ -96,7 +96,7 @@ pub fn reflectance(parameter: &Parameter, folder: &Path, log: &mut Log) -> Resul
 ///
 /// # Errors
 /// As [`reflectance`].
-pub fn light(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
+pub(super) fn light(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
     let color = match source(parameter, folder)? {
         Source::Color(color) => color,
         Source::Samples(samples) => light_color(|nm| samples.at(nm)).unwrap_or(DVec3::ZERO),
@@ -111,7 +111,7 @@ pub fn light(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
 ///
 /// # Errors
 /// As [`reflectance`].
-pub fn index(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
+pub(super) fn index(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
     let color = match source(parameter, folder)? {
         Source::Color(color) => color,
         Source::Samples(samples) => spectrum::reflectance(|nm| samples.at(nm)),

@@ -16,7 +16,7 @@ const MAX_SAVED: usize = 1 << 12;
 
 /// Material that shapes take.
 #[derive(Clone, Debug)]
-pub enum MaterialChoice {
+pub(super) enum MaterialChoice {
     /// That of pbrt where a file chooses none: diffuse, 0.5.
     Default,
     /// From `Material`.
@@ -27,7 +27,7 @@ pub enum MaterialChoice {
 
 /// Directives that `Attribute` gives parameters to.
 #[derive(Clone, Debug, Default)]
-pub struct Attributes {
+pub(super) struct Attributes {
     /// Parameters of shapes, lights, materials, media and textures.
     lists: [Rc<Vec<Parameter>>; 5],
 }
@@ -40,7 +40,7 @@ impl Attributes {
     }
 
     /// Parameters for a target.
-    pub fn of(&self, target: &str) -> &[Parameter] {
+    pub(super) fn of(&self, target: &str) -> &[Parameter] {
         Self::index(target).map_or(&[], |index| &self.lists[index])
     }
 
@@ -48,7 +48,7 @@ impl Attributes {
     ///
     /// # Errors
     /// With the place for an unknown target.
-    pub fn add(
+    pub(super) fn add(
         &mut self,
         target: &str,
         mut parameters: Vec<Parameter>,
@@ -70,7 +70,7 @@ impl Attributes {
 
 /// Settings that the next shape or light takes.
 #[derive(Clone, Debug)]
-pub struct State {
+pub(super) struct State {
     /// Current transformation matrix: world from object, or camera from world before `Camera`.
     pub ctm: DMat4,
     /// True after an odd number of `ReverseOrientation`.
@@ -97,7 +97,7 @@ impl Default for State {
 
 /// Directive that saves the state, and that ends at its own counterpart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Saved {
+pub(super) enum Saved {
     /// `AttributeBegin`
     Attribute,
     /// `TransformBegin`: restores the matrix alone.
@@ -121,7 +121,7 @@ impl Saved {
 
 /// States saved by directives that have not ended yet.
 #[derive(Debug, Default)]
-pub struct States {
+pub(super) struct States {
     /// State in force.
     pub now: State,
     saved: Vec<(Saved, State, Place)>,
@@ -134,7 +134,7 @@ impl States {
     ///
     /// # Errors
     /// With the place if too many are saved.
-    pub fn save(&mut self, why: Saved, place: Place) -> Result<()> {
+    pub(super) fn save(&mut self, why: Saved, place: Place) -> Result<()> {
         if self.saved.len() == MAX_SAVED {
             let message = format!("more than {MAX_SAVED} blocks in one another");
             return Err(place.error(message));
@@ -147,7 +147,7 @@ impl States {
     ///
     /// # Errors
     /// With the place if it was saved for another reason, or not at all.
-    pub fn restore(&mut self, why: Saved, place: &Place) -> Result<()> {
+    pub(super) fn restore(&mut self, why: Saved, place: &Place) -> Result<()> {
         match self.saved.pop() {
             Some((found, state, _)) if found == why => {
                 if why == Saved::Transform {
@@ -170,7 +170,7 @@ impl States {
     ///
     /// # Errors
     /// With the place of the beginning.
-    pub fn check_end(&self) -> Result<()> {
+    pub(super) fn check_end(&self) -> Result<()> {
         match self.saved.last() {
             Some((why, _, place)) => {
                 Err(place.error(format!("{} without an end in the file", why.name())))
@@ -182,13 +182,13 @@ impl States {
 
 /// Rotation about an axis by an angle in degrees, counter-clockwise seen against the axis; none for
 /// an axis without direction.
-pub fn rotation(angle_deg: f64, axis: DVec3) -> Option<DMat4> {
+pub(super) fn rotation(angle_deg: f64, axis: DVec3) -> Option<DMat4> {
     Some(DMat4::from_axis_angle(axis.try_normalize()?, angle_deg.to_radians()))
 }
 
 /// Camera from world for a viewer at `eye` that looks to `target`; none if these coincide or `up`
 /// lies along the view. The camera looks along +z with +x to the right and +y up.
-pub fn look_at(eye: DVec3, target: DVec3, up: DVec3) -> Option<DMat4> {
+pub(super) fn look_at(eye: DVec3, target: DVec3, up: DVec3) -> Option<DMat4> {
     let forward = (target - eye).try_normalize()?;
     let right = up.try_normalize()?.cross(forward).try_normalize()?;
     let columns = [right, forward.cross(right), forward].map(|axis| axis.extend(0.0));

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use crate::mesh::Mesh;
 
 /// Most triangles that one shape may be cut into.
-pub const MAX_TRIANGLES: usize = 1 << 25;
+pub(super) const MAX_TRIANGLES: usize = 1 << 25;
 
 /// Most levels; each makes four triangles of one.
 const MAX_LEVELS: i64 = 12;
@@ -85,7 +85,7 @@ fn rings(positions: &[DVec3], edges: &HashMap<[u32; 2], Edge>) -> Vec<Ring> {
 ///
 /// # Errors
 /// A message for levels that are out of range or make too many triangles.
-pub fn subdivide(
+pub(super) fn subdivide(
     positions: &[[f32; 3]],
     mut triangles: Vec<[u32; 3]>,
     levels: i64,

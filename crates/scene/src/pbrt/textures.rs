@@ -28,7 +28,7 @@ const MAX_DEPTH: usize = 16;
 
 /// Value of a parameter over a surface.
 #[derive(Clone, Debug)]
-pub enum Value {
+pub(super) enum Value {
     /// The same everywhere; all three are equal for a number.
     Constant(Vec3),
     /// By place.
@@ -37,7 +37,7 @@ pub enum Value {
 
 impl Value {
     /// The same number everywhere.
-    pub fn number(number: f64) -> Self {
+    pub(super) fn number(number: f64) -> Self {
         Self::Constant(Vec3::splat(number as f32))
     }
 
@@ -54,7 +54,7 @@ impl Value {
     }
 
     /// Multiplies by a constant.
-    pub fn scaled(self, factor: f32) -> Self {
+    pub(super) fn scaled(self, factor: f32) -> Self {
         self.affine(Vec3::splat(factor), Vec3::ZERO)
     }
 }
@@ -66,7 +66,7 @@ struct Decoding {
 }
 
 /// Textures of a scene, with the images read so far.
-pub struct Textures<'a> {
+pub(super) struct Textures<'a> {
     description: &'a Description,
     folder: &'a Path,
     images: HashMap<(PathBuf, String), Arc<Texture>>,
@@ -76,12 +76,12 @@ pub struct Textures<'a> {
 
 impl<'a> Textures<'a> {
     /// Takes the textures of `description`; paths are relative to `folder`.
-    pub fn new(description: &'a Description, folder: &'a Path) -> Self {
+    pub(super) fn new(description: &'a Description, folder: &'a Path) -> Self {
         Self { description, folder, images: HashMap::new(), values: HashMap::new() }
     }
 
     /// Folder to which paths are relative.
-    pub fn folder(&self) -> &'a Path {
+    pub(super) fn folder(&self) -> &'a Path {
         self.folder
     }
 
@@ -89,7 +89,7 @@ impl<'a> Textures<'a> {
     ///
     /// # Errors
     /// With the place for unknown names, other types and images that cannot be read.
-    pub fn spectrum(
+    pub(super) fn spectrum(
         &mut self,
         entity: &Entity,
         name: &str,
@@ -102,7 +102,12 @@ impl<'a> Textures<'a> {
     ///
     /// # Errors
     /// As [`Textures::spectrum`].
-    pub fn number(&mut self, entity: &Entity, name: &str, log: &mut Log) -> Result<Option<Value>> {
+    pub(super) fn number(
+        &mut self,
+        entity: &Entity,
+        name: &str,
+        log: &mut Log,
+    ) -> Result<Option<Value>> {
         self.value(entity, name, true, 0, log)
     }
 
@@ -314,7 +319,11 @@ impl<'a> Textures<'a> {
     ///
     /// # Errors
     /// With the place for an image that cannot be read.
-    pub fn normal_map(&mut self, entity: &Entity, log: &mut Log) -> Result<Option<TextureUse>> {
+    pub(super) fn normal_map(
+        &mut self,
+        entity: &Entity,
+        log: &mut Log,
+    ) -> Result<Option<TextureUse>> {
         let Some(file) = entity.string("normalmap")? else { return Ok(None) };
         let decoding = Decoding { encoding: Encoding::Linear, gamma: None };
         let texture = self.load(entity, file, &decoding, log)?;
@@ -326,7 +335,11 @@ impl<'a> Textures<'a> {
     ///
     /// # Errors
     /// With the place for an image that cannot be read.
-    pub fn light_image(&mut self, entity: &Entity, log: &mut Log) -> Result<Option<TextureUse>> {
+    pub(super) fn light_image(
+        &mut self,
+        entity: &Entity,
+        log: &mut Log,
+    ) -> Result<Option<TextureUse>> {
         let Some(file) = entity.string("filename")? else { return Ok(None) };
         let decoding = Decoding { encoding: Encoding::Srgb, gamma: None };
         let texture = self.load(entity, file, &decoding, log)?;
@@ -393,7 +406,7 @@ fn has_opacity(texture: &Texture) -> bool {
 }
 
 /// Makes a texture of numbers, `of` the numbers of another.
-pub fn map_numbers(image: &TextureUse, of: impl Fn(f32) -> f32) -> TextureUse {
+pub(super) fn map_numbers(image: &TextureUse, of: impl Fn(f32) -> f32) -> TextureUse {
     let texels = image.values().into_iter();
     let texels = texels.map(|[red, green, blue, _]| {
         let number =

@@ -9,7 +9,7 @@ const MAX_LENGTH: usize = 1 << 16;
 
 /// Place in a file; line and column count from 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub(super) struct Place {
     /// File.
     pub path: Rc<Path>,
     /// Line.
@@ -20,12 +20,12 @@ pub struct Place {
 
 impl Place {
     /// Makes an error of this place.
-    pub fn error(&self, message: impl Into<String>) -> Error {
+    pub(super) fn error(&self, message: impl Into<String>) -> Error {
         Error::parse(&self.path, self.line, self.column, message)
     }
 
     /// Place for a warning that begins with the path of the main file.
-    pub fn describe(&self, main: &Path) -> String {
+    pub(super) fn describe(&self, main: &Path) -> String {
         if *self.path == *main {
             format!("line {}", self.line)
         } else {
@@ -36,7 +36,7 @@ impl Place {
 
 /// Kind of a token; [`Tokens::text`] holds its characters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Token {
+pub(super) enum Token {
     /// `[`
     Open,
     /// `]`
@@ -48,7 +48,7 @@ pub enum Token {
 }
 
 /// Tokeniser that holds one token at a time.
-pub struct Tokens<R> {
+pub(super) struct Tokens<R> {
     reader: R,
     path: Rc<Path>,
     line: usize,
@@ -61,29 +61,29 @@ pub struct Tokens<R> {
 
 impl<R: BufRead> Tokens<R> {
     /// Starts at the first byte; more than `most_bytes` are an error.
-    pub fn new(path: Rc<Path>, reader: R, most_bytes: u64) -> Self {
+    pub(super) fn new(path: Rc<Path>, reader: R, most_bytes: u64) -> Self {
         let place = Place { path: Rc::clone(&path), line: 1, column: 1 };
         let (buffer, text) = (Vec::new(), String::new());
         Self { reader, path, line: 1, column: 1, bytes_left: most_bytes, buffer, text, place }
     }
 
     /// Bytes that may still be read.
-    pub fn bytes_left(&self) -> u64 {
+    pub(super) fn bytes_left(&self) -> u64 {
         self.bytes_left
     }
 
     /// Lets no more than so many bytes be read.
-    pub fn limit(&mut self, most_bytes: u64) {
+    pub(super) fn limit(&mut self, most_bytes: u64) {
         self.bytes_left = self.bytes_left.min(most_bytes);
     }
 
     /// Characters of the last token.
-    pub fn text(&self) -> &str {
+    pub(super) fn text(&self) -> &str {
         &self.text
     }
 
     /// Place of the last token, or of the end of the file.
-    pub fn place(&self) -> &Place {
+    pub(super) fn place(&self) -> &Place {
         &self.place
     }
 
@@ -92,7 +92,7 @@ impl<R: BufRead> Tokens<R> {
     /// # Errors
     /// [`Error::Io`], and [`Error::Parse`] for strings without an end, vast words and text that is
     /// not UTF-8.
-    pub fn next(&mut self) -> Result<Option<Token>> {
+    pub(super) fn next(&mut self) -> Result<Option<Token>> {
         self.buffer.clear();
         self.skip_blank()?;
         (self.place.line, self.place.column) = (self.line, self.column);

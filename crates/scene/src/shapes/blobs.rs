@@ -15,7 +15,7 @@ use crate::file::NumberOrVector;
 /// `blobs`: placed by its points.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Blobs {
+pub(crate) struct Blobs {
     /// The parts.
     pub balls: Vec<Blob>,
     /// Width of the zone in which parts melt together, metres; 0 leaves creases.
@@ -29,7 +29,7 @@ pub struct Blobs {
 /// Part of [`Blobs`].
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Blob {
+pub(crate) struct Blob {
     /// Centre, or the first end of a rounded cone, metres.
     pub at: [f32; 3],
     /// Radius, or the three radii of an ellipsoid, metres.

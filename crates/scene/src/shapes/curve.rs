@@ -7,7 +7,7 @@ use glam::{DVec2, DVec4};
 /// Centripetal Catmull-Rom splines \[Yuksel et al. 2009\] neither loop nor overshoot within a span.
 /// One piece per span gives the polyline itself. A point given twice is a corner, where the curve
 /// may turn sharply. The last point of a closed curve leads to the first.
-pub fn smooth(points: &[DVec4], per_span: usize, closed: bool) -> Vec<DVec4> {
+pub(super) fn smooth(points: &[DVec4], per_span: usize, closed: bool) -> Vec<DVec4> {
     let is_corner = |index: usize| index > 0 && points[index] == points[index - 1];
     let corner = (1..points.len()).find(|&index| is_corner(index));
     let mut control: Vec<DVec4> = points.to_vec();
@@ -86,13 +86,13 @@ fn span_point(points: [DVec4; 4], parameter: f64) -> DVec4 {
 }
 
 /// Stretch of an outline without sharp corners: its point indices, with the unit normal at each.
-pub type Chain = Vec<(usize, DVec2)>;
+pub(super) type Chain = Vec<(usize, DVec2)>;
 
 /// Cuts a polyline at corners sharper than `crease_deg` into chains of point index and normal.
 ///
 /// Normals point to the right of the direction of travel and are averaged at soft corners. `ends`
 /// holds the normals beyond the first and the last segment, if any.
-pub fn chains(
+pub(super) fn chains(
     points: &[DVec2],
     closed: bool,
     crease_deg: f64,

@@ -14,7 +14,7 @@ use crate::triangulate::{is_simple, signed_area, triangulate};
 /// `extrude`: outline in the x-y plane, from z = −depth / 2 to depth / 2.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Extrude {
+pub(crate) struct Extrude {
     /// Corners [x, y] of a simple polygon, wound either way, metres; the last leads to the first.
     pub outline: Vec<[f32; 2]>,
     /// Length along z, metres.

@@ -8,7 +8,7 @@ use super::{Builder, Mesh, Shape, Vertex, count, finite, positive};
 /// `grid`: centred on the origin in x and z.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Grid {
+pub(crate) struct Grid {
     /// Lengths along x and z, metres.
     pub size: [f32; 2],
     /// Thickness of the sheet, half above and half below, metres.
@@ -29,7 +29,7 @@ pub struct Grid {
 /// Sine wave of a [`Grid`].
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Wave {
+pub(crate) struct Wave {
     /// Half the height from trough to crest, metres.
     pub amplitude: f32,
     /// Distance from crest to crest, metres.

@@ -39,13 +39,13 @@ mod tube;
 
 use std::{fmt::Debug, ops::RangeInclusive};
 
-pub use blobs::Blobs;
-pub use extrude::Extrude;
+pub(crate) use blobs::Blobs;
+pub(crate) use extrude::Extrude;
 use glam::{DVec2, DVec3};
-pub use grid::Grid;
-pub use revolve::{Cone, Cylinder, Lathe, Sphere, Torus};
-pub use rounded_box::RoundedBox;
-pub use tube::Tube;
+pub(crate) use grid::Grid;
+pub(crate) use revolve::{Cone, Cylinder, Lathe, Sphere, Torus};
+pub(crate) use rounded_box::RoundedBox;
+pub(crate) use tube::Tube;
 
 use super::mesh::Mesh;
 use crate::memory::{self, Shortage};
@@ -57,7 +57,7 @@ const SEGMENT_RANGE: RangeInclusive<usize> = 3..=4096;
 const MAX_POINTS: usize = 1024;
 
 /// Most triangles of all shapes of a scene together, each object counted.
-pub const MAX_TRIANGLES: usize = 1 << 25;
+pub(crate) const MAX_TRIANGLES: usize = 1 << 25;
 
 /// Bytes of a triangle and half a vertex.
 const BYTES_PER_TRIANGLE: usize = 28;
@@ -75,7 +75,7 @@ fn default_count<const COUNT: usize>() -> usize {
 }
 
 /// Parameters of a procedural shape.
-pub trait Shape: Debug {
+pub(crate) trait Shape: Debug {
     /// Builds the closed mesh.
     ///
     /// # Errors
@@ -220,7 +220,7 @@ impl Builder {
 ///
 /// # Errors
 /// Returns a message with both numbers.
-pub fn check_triangles(found: usize) -> Result<(), String> {
+pub(crate) fn check_triangles(found: usize) -> Result<(), String> {
     if found > MAX_TRIANGLES {
         return Err(format!(
             "the shapes of a scene may have {MAX_TRIANGLES} triangles together, found {found}: \

@@ -13,7 +13,7 @@ use super::{
 /// `sphere`: centre at the origin.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Sphere {
+pub(crate) struct Sphere {
     /// Radius, metres.
     pub radius: f32,
     /// Segments around the equator; half as many from pole to pole.
@@ -24,7 +24,7 @@ pub struct Sphere {
 /// `cylinder`: base on y = 0.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Cylinder {
+pub(crate) struct Cylinder {
     /// Radius, metres.
     pub radius: f32,
     /// Height, metres.
@@ -40,7 +40,7 @@ pub struct Cylinder {
 /// `cone`, or a truncated one: base on y = 0.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Cone {
+pub(crate) struct Cone {
     /// Radius of the base, metres.
     pub radius: f32,
     /// Radius of the top, metres; 0 is a point.
@@ -56,7 +56,7 @@ pub struct Cone {
 /// `torus`: centre at the origin, axis +Y.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Torus {
+pub(crate) struct Torus {
     /// Distance from the centre to the middle of the tube, metres.
     pub radius: f32,
     /// Radius of the tube, metres; less than `radius`.
@@ -72,7 +72,7 @@ pub struct Torus {
 /// `lathe`: a profile revolved about +Y.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Lathe {
+pub(crate) struct Lathe {
     /// Points [radius, y], metres. Flat disks close the ends of an open profile.
     pub profile: Vec<[f32; 2]>,
     /// Joins the profile's last point to its first: a ring.

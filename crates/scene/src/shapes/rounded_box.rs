@@ -10,7 +10,7 @@ use super::{Builder, Mesh, Shape, Vertex, count, default_count, from_zero_to, po
 /// `box`: centre at the origin, 12 triangles without a bevel.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct RoundedBox {
+pub(crate) struct RoundedBox {
     /// Full lengths along x, y, z, metres.
     pub size: [f32; 3],
     /// Radius of the rounded edges, metres; 0 is sharp. At most half the shortest length.

@@ -13,7 +13,7 @@ use super::{
 /// `tube`: placed by its path.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Tube {
+pub(crate) struct Tube {
     /// Points of the centre line, metres.
     pub path: Vec<[f32; 3]>,
     /// Radius, metres: one, or one per point of the path.
@@ -36,7 +36,7 @@ pub struct Tube {
 /// One radius for the whole path, or one per point.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(untagged, expecting = "expected a number or an array of numbers")]
-pub enum Radius {
+pub(crate) enum Radius {
     /// Same everywhere.
     Constant(f32),
     /// One per point.
