@@ -36,7 +36,7 @@ room! {
         GUIDE_TEACHING_STEP = 4;
         /// Bins of arriving light along each side of the octahedral square.
         GUIDE_ARRIVAL_SIDE = 12;
-        /// [`PathCell::cell`](super::structs::PathCell::cell) at a specular surface, which has no cell.
+        /// `PathCell::cell` at a specular surface, which has no cell.
         SPECULAR_CELL = 0xffff_fffe;
         /// Learning target of a shadow ray that teaches nothing.
         NOTHING_TO_LEARN = 0xffff_ffff;
