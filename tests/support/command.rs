@@ -1,5 +1,4 @@
 //! Runs the program itself, for its exit status and output.
-#![allow(dead_code, reason = "every test binary uses a part of this")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
 use std::{

@@ -1,6 +1,5 @@
 //! Materials of every kind, and directions, for the tests of the reflection models.
 
-#![allow(dead_code, reason = "every test binary uses its own part")]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 use std::{

@@ -1,5 +1,4 @@
 //! Shared by the integration tests: the Vulkan device, renderers, and probes of shader functions.
-#![allow(dead_code, reason = "every test binary uses a part of this")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
 pub mod c_library;
@@ -59,7 +58,7 @@ pub struct PathInput {
     pub is_visible: u32,
 }
 
-/// Returns the device that all tests of one binary share, with validation and synchronization
+/// Returns the device that all tests share, with validation and synchronization
 /// validation on.
 ///
 /// # Panics

@@ -1,7 +1,5 @@
 //! Reproducible random numbers.
 
-#![allow(dead_code, reason = "every test binary uses its own part")]
-
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};

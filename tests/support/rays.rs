@@ -1,5 +1,4 @@
 //! Geometry and rays for the traversal tests, and traversal on the device through the passes.
-#![allow(dead_code, reason = "every test binary uses a part of this")]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 use fenestra::{

@@ -1,5 +1,4 @@
 //! Small scenes made of boxes and spheres, for tests of the renderer.
-#![allow(dead_code, reason = "every test binary uses a part of this")]
 
 use std::{path::PathBuf, sync::Arc};
 

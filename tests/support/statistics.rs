@@ -1,7 +1,5 @@
 //! Statistical tests: χ², z and their p-values.
 
-#![allow(dead_code, reason = "every test binary uses its own part")]
-
 /// Bins that expect fewer counts are pooled with their neighbours.
 const MIN_EXPECTED: f64 = 5.0;
 

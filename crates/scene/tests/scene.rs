@@ -17,6 +17,8 @@ use fenestra_scene::{
 use glam::Vec3;
 use tempfile::TempDir;
 
+use crate::support::gltf::base64;
+
 const HEAD: &str = r#"
 [camera]
 position = [0, 1, 5]
@@ -992,23 +994,6 @@ fn glb(json: &str, buffer: &[u8]) -> Vec<u8> {
     bytes.extend(b"BIN\0");
     bytes.extend(buffer);
     bytes
-}
-
-/// Encodes bytes in base64.
-fn base64(bytes: &[u8]) -> String {
-    const DIGITS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    bytes
-        .chunks(3)
-        .flat_map(|group| {
-            let bits = group.iter().fold(0, |bits, byte| bits << 8 | u32::from(*byte))
-                << (8 * (3 - group.len()));
-            let digit = move |place: usize| match place <= group.len() {
-                true => DIGITS[(bits >> (18 - 6 * place) & 63) as usize] as char,
-                false => '=',
-            };
-            (0..4).map(digit).collect::<Vec<_>>()
-        })
-        .collect()
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! Temporary folders, and a scene to vary.
-#![allow(dead_code, reason = "every test program uses a part of this")]
+#![allow(dead_code, reason = "two test programs use a part each")]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 use std::{

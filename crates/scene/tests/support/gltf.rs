@@ -1,5 +1,5 @@
 //! Small glTF documents.
-#![allow(dead_code, reason = "every test binary uses a part of this")]
+#![allow(dead_code, reason = "two test programs use a part each")]
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
 use std::io::Cursor;

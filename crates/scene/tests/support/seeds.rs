@@ -1,5 +1,4 @@
 //! Small sound files of every format that the program reads, for mutations to begin from.
-#![allow(dead_code, reason = "every test binary uses a part of this")]
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
 use std::{fs, io::Cursor, path::Path};
