@@ -10,13 +10,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::support::command::{Folder, Run, Running, program};
 use fenestra::{
     brdf::fresnel::fresnel_conductor,
     film::{Attribute, Image},
     scene::mesh::Mesh,
 };
 use glam::Vec3;
+
+use crate::support::command::{Folder, Run, Running, program};
 
 /// One quad, `quad.ply`, under a constant environment. Each case changes a part of it.
 const SCENE: &str = r#"[camera]

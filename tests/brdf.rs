@@ -2,7 +2,6 @@
 
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
-use crate::support::statistics;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use fenestra::{
@@ -13,7 +12,10 @@ use fenestra::{
 use glam::{DVec3, Vec3, vec3};
 use rayon::prelude::*;
 
-use crate::support::materials::{cases, direction, hemisphere, tables, uniform};
+use crate::support::{
+    materials::{cases, direction, hemisphere, tables, uniform},
+    statistics,
+};
 
 /// Polar angles of the outgoing direction, in degrees.
 const ANGLES_DEG: [f64; 6] = [0.0, 20.0, 50.0, 75.0, 85.0, 89.5];

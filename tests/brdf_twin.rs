@@ -1,6 +1,5 @@
 //! `glsl/include/brdf.glsl` against its Rust twin, over all kinds of materials.
 
-use crate::support;
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     brdf::{self, fresnel, specular as twin},
@@ -11,7 +10,10 @@ use fenestra::{
 };
 use glam::Vec3;
 
-use crate::support::materials::{cases, direction, hemisphere, specular, tables, uniform};
+use crate::support::{
+    self,
+    materials::{cases, direction, hemisphere, specular, tables, uniform},
+};
 
 /// Twin of `BrdfQuery` in `glsl/test/brdf.comp`.
 #[repr(C)]

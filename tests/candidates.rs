@@ -2,10 +2,6 @@
 //! that go on, and has no other influence on the picture.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::command::Folder;
-use crate::support::guide::Guide as _;
-use crate::support::{renderer, scenes};
 use fenestra::{
     film::{Attribute, Checkpoint, Image, Statistics, Sums},
     sampler::{
@@ -18,6 +14,8 @@ use fenestra::{
     session::Settings,
 };
 use glam::Vec3;
+
+use crate::support::{self, command::Folder, guide::Guide as _, renderer, scenes};
 
 fn guided(candidates: Option<u32>) -> Settings {
     let parameters = Parameters { candidates, ..Parameters::default() };

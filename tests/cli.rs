@@ -4,8 +4,9 @@
 
 use std::process::Stdio;
 
-use crate::support::command::{Folder, Run, program};
 use fenestra::film::Image;
+
+use crate::support::command::{Folder, Run, program};
 
 /// Makes an image of one colour.
 fn image(width: u32, height: u32, value: f32) -> Image {

@@ -1,11 +1,6 @@
 //! Scenes whose picture is known in closed form, rendered with every sampler.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::{
-    scenes::{self, diffuse},
-    statistics::{Estimate, estimates},
-};
 use fenestra::{
     film::Sums,
     pass::Roulette,
@@ -17,6 +12,12 @@ use fenestra::{
     session::Settings,
 };
 use glam::{DVec3, Vec3};
+
+use crate::support::{
+    self,
+    scenes::{self, diffuse},
+    statistics::{Estimate, estimates},
+};
 
 fn render(scene: &Scene, settings: Settings, samples: u32) -> Sums {
     let (sums, totals) = support::render(scene, settings, samples);

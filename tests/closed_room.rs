@@ -2,7 +2,6 @@
 //! worse than those of `mis`, and its picture is better.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
 use std::path::Path;
 
 use fenestra::{
@@ -12,6 +11,8 @@ use fenestra::{
     session::{Figures, Settings},
     study::metrics,
 };
+
+use crate::support;
 
 const SAMPLES: u32 = 64;
 const REPLICATES: u32 = 12;

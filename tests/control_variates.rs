@@ -5,13 +5,6 @@
 //! has a chance of 3e-6, so the 3 comparisons raise a false alarm once in 3,000 runs.
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::{
-    render,
-    replicates::{self, LIMIT},
-    scenes,
-    statistics::Comparison,
-};
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     math::random::random_independent_2d,
@@ -33,6 +26,13 @@ use fenestra::{
     },
 };
 use glam::{DVec3, Vec3, vec3};
+
+use crate::support::{
+    self, render,
+    replicates::{self, LIMIT},
+    scenes,
+    statistics::Comparison,
+};
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]

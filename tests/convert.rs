@@ -1,8 +1,9 @@
 //! `fenestra convert`: pictures and images of a small EXR file, read back.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support::command::Folder;
 use fenestra::film::{Attribute, Image};
+
+use crate::support::command::Folder;
 
 /// Writes a film of 6×4 pixels, of which the image holds 4×3 from (1, 1): R is the column of the film, G
 /// its row, in tenths.

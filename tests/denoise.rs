@@ -8,8 +8,9 @@ use std::{
     process::Command,
 };
 
-use crate::support::command::{BALL, Folder, Run, program, yard};
 use fenestra::film::{Attribute, Image};
+
+use crate::support::command::{BALL, Folder, Run, program, yard};
 
 const VARIABLE: &str = "FENESTRA_OIDN";
 const WIDTH: u32 = 24;

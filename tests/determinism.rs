@@ -1,8 +1,6 @@
 //! The same seed gives the same bits, however samples are grouped, cropped, stopped and resumed.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::{renderer, scenes};
 use fenestra::{
     film::{Aov, Sums, Window},
     pass::{PathLists, Roulette},
@@ -11,6 +9,8 @@ use fenestra::{
     session::Settings,
 };
 use glam::Vec3;
+
+use crate::support::{self, renderer, scenes};
 
 fn scene() -> Scene {
     scenes::room(vec![scenes::diffuse(Vec3::splat(0.7)), scenes::plastic(0.1), scenes::copper(0.2)])

@@ -3,12 +3,14 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support::command;
-use crate::support::faulty_layer;
 use std::process::{Command, Output};
 
-use crate::support::command::{Folder, Run, program};
 use fenestra::film::{Checkpoint, Image, checkpoint::remove_checkpoint};
+
+use crate::support::{
+    command::{self, Folder, Run, program},
+    faulty_layer,
+};
 
 fn folder() -> Folder {
     let folder = Folder::new();

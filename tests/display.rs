@@ -8,8 +8,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::support::command::{BALL, Folder, yard};
 use fenestra::film::{DisplayServer, Image};
+
+use crate::support::command::{BALL, Folder, yard};
 
 /// Reads a packet field by field, as a server would.
 struct Packet(std::io::Cursor<Vec<u8>>);

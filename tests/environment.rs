@@ -1,10 +1,8 @@
 //! The environment map: orientation, lookup, the density its tables sample, and the shader twin.
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-use crate::support;
 use std::f64::consts::PI;
 
-use crate::support::statistics::chi_square_p_value;
 use fenestra::{
     math::{
         colour::luminance,
@@ -19,6 +17,8 @@ use fenestra::{
     },
 };
 use glam::{Vec2, Vec3};
+
+use crate::support::{self, statistics::chi_square_p_value};
 
 const ENVIRONMENT_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/environment.spv"));
 

@@ -5,7 +5,6 @@
 
 use std::{f32::consts::PI, fs, path::Path, sync::Arc};
 
-use crate::support::command::{BALL, Folder, yard};
 use fenestra::{
     export::{Export as _, Settings, mitsuba::Export},
     film::Image,
@@ -14,6 +13,8 @@ use fenestra::{
     texture::TextureUse,
 };
 use glam::{Vec2, Vec3};
+
+use crate::support::command::{BALL, Folder, yard};
 
 const DIFFUSE: &str = "type = \"diffuse\"\nreflectance = [0.5, 0.25, 0.125]";
 const PLASTIC: &str = "type = \"plastic\"\ndiffuse = [0.5, 0.25, 0.125]\nalpha = 0.25\nior = 1.33";

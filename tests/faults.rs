@@ -3,7 +3,6 @@
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support::command;
 use std::{
     fs::{self, File},
     path::Path,
@@ -12,11 +11,12 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use crate::support::command::{Folder, Run, Running, program};
 use fenestra::{
     files::write_atomically,
     film::{Attribute, Checkpoint, Image, Metadata, SampleRange, Sums, merge::merge_checkpoints},
 };
+
+use crate::support::command::{self, Folder, Run, Running, program};
 
 fn folder() -> Folder {
     let folder = Folder::new();

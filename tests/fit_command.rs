@@ -4,8 +4,9 @@
 
 use std::fs;
 
-use crate::support::command::{Folder, Run, program};
 use serde_json::Value;
+
+use crate::support::command::{Folder, Run, program};
 
 /// Encodes a grey PFM map of 16 × 8 texels, one of them bright.
 fn pfm() -> Vec<u8> {

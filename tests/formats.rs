@@ -3,10 +3,6 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support::command;
-use crate::support::command::Folder;
-use crate::support::gltf::gltf;
-use crate::support::page;
 use fenestra::{
     film::Statistics,
     scene::{
@@ -17,6 +13,12 @@ use fenestra::{
     },
 };
 use glam::Vec3;
+
+use crate::support::{
+    command::{self, Folder},
+    gltf::gltf,
+    page,
+};
 
 /// Warnings without the path that begins each.
 fn warnings(scene: &Scene) -> Vec<String> {

@@ -1,7 +1,6 @@
 //! Frames and the lat-long mapping: properties on the host, and the shader twin.
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-use crate::support;
 use fenestra::{
     math::{
         frame::{direction_from_lat_long, frame_from_normal, lat_long_from_direction, sin_cos_pi},
@@ -10,6 +9,8 @@ use fenestra::{
     shader::bindings::probe,
 };
 use glam::{Vec2, Vec3};
+
+use crate::support;
 
 const FRAME_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/frame.spv"));
 

@@ -2,7 +2,6 @@
 //! the estimators by exact enumeration.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support::{scenes, statistics::chi_square_p_value};
 use fenestra::{
     math::random::{hash_4d, random_independent_2d},
     sampler::guided::{
@@ -16,6 +15,8 @@ use fenestra::{
     },
 };
 use glam::Vec3;
+
+use crate::support::{scenes, statistics::chi_square_p_value};
 
 /// A sky with a small sun and a black ground: bright, dim and empty regions.
 fn sunny() -> EnvironmentMap {

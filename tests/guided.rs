@@ -5,13 +5,6 @@
 //! false alarm once in about 440 runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::guide::Guide as _;
-use crate::support::{
-    replicates::{LIMIT, REPLICATES, replicates, rows},
-    scenes,
-    statistics::{Comparison, estimates, z_of_mean},
-};
 use fenestra::{
     pass::Roulette,
     sampler::{
@@ -24,6 +17,14 @@ use fenestra::{
     shader::rooms::guided::{GUIDE_COUNT_WORDS, GUIDE_RESPONSE_UNITS},
 };
 use glam::Vec3;
+
+use crate::support::{
+    self,
+    guide::Guide as _,
+    replicates::{LIMIT, REPLICATES, replicates, rows},
+    scenes,
+    statistics::{Comparison, estimates, z_of_mean},
+};
 
 const FIRST_SEED: u32 = 7000;
 

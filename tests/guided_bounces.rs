@@ -4,13 +4,6 @@
 //! Seeds are fixed; others would raise a false alarm once in some hundred runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::guide::Guide as _;
-use crate::support::materials;
-use crate::support::{
-    replicates, scenes,
-    statistics::{self, estimates, largest_t},
-};
 use fenestra::{
     brdf::{self, MaterialTables},
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
@@ -38,6 +31,13 @@ use fenestra::{
     },
 };
 use glam::{Vec3, vec3};
+
+use crate::support::{
+    self,
+    guide::Guide as _,
+    materials, replicates, scenes,
+    statistics::{self, estimates, largest_t},
+};
 
 const ARRIVING_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/arriving.spv"));
 

@@ -8,14 +8,8 @@
 //! candidates. Seeds are fixed; others would raise a false alarm once in some hundred runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::guide::Guide as _;
-use crate::support::hemisphere;
-use crate::support::materials;
 use std::f64::consts::PI;
 
-use crate::support::hemisphere::BINS;
-use crate::support::{scenes, statistics};
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
@@ -34,6 +28,13 @@ use fenestra::{
     },
 };
 use glam::{DMat3, DVec3, Vec3, dvec3, vec3};
+
+use crate::support::{
+    self,
+    guide::Guide as _,
+    hemisphere::{self, BINS},
+    materials, scenes, statistics,
+};
 
 /// Candidates per surface and state.
 const DRAWN: u32 = 1 << 15;

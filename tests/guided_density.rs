@@ -8,13 +8,8 @@
 //! fixed; others would raise a false alarm once in some hundred runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::hemisphere;
-use crate::support::materials;
 use std::f64::consts::PI;
 
-use crate::support::hemisphere::{BIN_COLUMNS, BINS};
-use crate::support::{scenes, statistics};
 use fenestra::{
     brdf::{self, MaterialTables},
     film::Window,
@@ -27,6 +22,12 @@ use fenestra::{
     session::{Renderer, Settings},
 };
 use glam::{Vec3, vec3};
+
+use crate::support::{
+    self,
+    hemisphere::{self, BIN_COLUMNS, BINS},
+    materials, scenes, statistics,
+};
 
 /// Rays per surface and state, and per hit.
 const RAYS: u32 = 1 << 15;

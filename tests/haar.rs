@@ -6,15 +6,8 @@
 //! are fixed; others would raise a false alarm once in some thousand runs.
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::materials;
 use std::f64::consts::PI;
 
-use crate::support::{
-    replicates::{self, LIMIT},
-    scenes,
-    statistics::{Comparison, chi_square_p_value, z_of_mean},
-};
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     brdf::MaterialTables,
@@ -40,6 +33,13 @@ use fenestra::{
 };
 use glam::{Vec2, Vec3, vec3};
 use half::f16;
+
+use crate::support::{
+    self, materials,
+    replicates::{self, LIMIT},
+    scenes,
+    statistics::{Comparison, chi_square_p_value, z_of_mean},
+};
 
 /// Samples per path and state of the cache.
 const SAMPLES: u32 = 10_000;

@@ -1,7 +1,6 @@
 //! The Vulkan host: uploads, dispatches, timestamps, device choice, limits.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
 use fenestra::{
     gpu::{
         Buffer, Commands, DescriptorSet, Pipeline,
@@ -9,6 +8,8 @@ use fenestra::{
     },
     shader::bindings::{PROBE as PROBE_TABLE, probe},
 };
+
+use crate::support;
 
 const PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/probe.spv"));
 

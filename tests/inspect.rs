@@ -2,9 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support::command::Folder;
 use fenestra::film::{Checkpoint, Image, Metadata, SampleRange, Sums};
 use serde_json::Value;
+
+use crate::support::command::Folder;
 
 /// Makes a checkpoint of 4×2 pixels whose samples are all `value`.
 fn checkpoint(seed: u32, count: u32, value: f32) -> Checkpoint {

@@ -2,15 +2,8 @@
 //! extreme transforms, bad input, memory, and pictures of textured, normal-mapped and clear instances.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
 use std::path::Path;
 
-use crate::support::random::Random;
-use crate::support::rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, soup, sphere};
-use crate::support::{
-    replicates::{LIMIT, replicates},
-    statistics::Comparison,
-};
 use fenestra::{
     accel::Accel,
     pass::Schedule,
@@ -23,6 +16,14 @@ use fenestra::{
     },
 };
 use glam::{DMat3, DMat4, DVec3, Quat, Vec3};
+
+use crate::support::{
+    self,
+    random::Random,
+    rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, soup, sphere},
+    replicates::{LIMIT, replicates},
+    statistics::Comparison,
+};
 
 /// A random affine map: turned, scaled differently along the axes, sheared, mirrored or not.
 fn transform(random: &mut Random, largest_scale: f32, spread: f32, mirrors: bool) -> Transform {

@@ -4,16 +4,18 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support::c_library;
-use crate::support::command;
 use std::{
     fs,
     path::{Path, PathBuf},
     sync::OnceLock,
 };
 
-use crate::support::command::{Folder, Run, program};
 use fenestra::film::{Attribute, Checkpoint, Image, checkpoint::guide_paths};
+
+use crate::support::{
+    c_library,
+    command::{self, Folder, Run, program},
+};
 
 /// Choices by measurement would differ from render to render.
 const GUIDED: [&str; 8] = [

@@ -2,11 +2,8 @@
 //! learned visibility that were found.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::guide::Guide as _;
 use std::collections::BTreeMap;
 
-use crate::support::{render, renderer, scenes};
 use fenestra::{
     film::Aov,
     sampler::{
@@ -18,6 +15,8 @@ use fenestra::{
     session::{Renderer, Settings},
 };
 use glam::Vec3;
+
+use crate::support::{self, guide::Guide as _, render, renderer, scenes};
 
 /// Returns settings of `visibility` with few lobes, `assignments` and the layer of its caches.
 fn visibility(assignments: &[&str]) -> Settings {

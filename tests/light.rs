@@ -2,10 +2,8 @@
 //! surfaces that are not opaque.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
 use std::f32::consts::PI;
 
-use crate::support::scenes;
 use fenestra::{
     sampler::Sampler,
     scene::{
@@ -16,6 +14,8 @@ use fenestra::{
     session::Settings,
 };
 use glam::Vec3;
+
+use crate::support::{self, scenes};
 
 /// Mean of the red channel over the film and its standard error, from renders of eight seeds.
 fn mean_and_error(scene: &Scene, settings: Settings, samples: u32) -> (f64, f64) {

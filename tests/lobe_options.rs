@@ -2,9 +2,9 @@
 //! sampling does without lobes that cannot be fitted, and biased options say so.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support::command;
-use crate::support::command::Folder;
 use fenestra::film::{Image, Statistics};
+
+use crate::support::command::{self, Folder};
 
 /// Writes a scene of a floor and a ball under an even sky.
 fn scene(radiance: &str, reflectance: &str) -> Folder {

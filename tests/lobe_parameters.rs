@@ -5,13 +5,6 @@
 //! 7.5 has a chance of 3e-6, so the 10 comparisons raise a false alarm once in 900 runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::{
-    render, renderer,
-    replicates::{self, LIMIT},
-    scenes,
-    statistics::{Comparison, Estimate},
-};
 use fenestra::{
     sampler::{
         Parameters, Sampler,
@@ -22,6 +15,13 @@ use fenestra::{
     session::Settings,
 };
 use glam::Vec3;
+
+use crate::support::{
+    self, render, renderer,
+    replicates::{self, LIMIT},
+    scenes,
+    statistics::{Comparison, Estimate},
+};
 
 /// Applies `--set` assignments on top of few lobes.
 fn parameters(assignments: &[&str]) -> Parameters {

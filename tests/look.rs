@@ -1,21 +1,22 @@
 //! A camera that moves over one renderer: its pictures, and what `guided` keeps.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::guide::Guide as _;
 use std::{cell::Cell, rc::Rc};
 
-use crate::support::{
-    replicates::{LIMIT, REPLICATES, replicates, rows},
-    scenes,
-    statistics::{Comparison, estimates},
-};
 use fenestra::{
     sampler::Sampler,
     scene::{Camera, Scene},
     session::{Renderer, Settings},
 };
 use glam::Vec3;
+
+use crate::support::{
+    self,
+    guide::Guide as _,
+    replicates::{LIMIT, REPLICATES, replicates, rows},
+    scenes,
+    statistics::{Comparison, estimates},
+};
 
 /// Camera at the other side of the room.
 fn elsewhere(scene: &Scene) -> Camera {

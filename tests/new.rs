@@ -2,8 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support::command::Folder;
 use fenestra::film::Image;
+
+use crate::support::command::Folder;
 
 #[test]
 fn the_first_scene_renders() {

@@ -1,7 +1,6 @@
 //! The order of the passes of a wave, for every technique: a list that needs no device.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support::page;
 use std::{
     collections::{BTreeMap, BTreeSet},
     fmt::Write,
@@ -28,6 +27,8 @@ use fenestra::{
         structs::Wave,
     },
 };
+
+use crate::support::page;
 
 const FITS: FitSizes =
     FitSizes { environment_lobes: 100, strongest_environment_lobe: 0.0, brdf_lobes: 20, views: 32 };

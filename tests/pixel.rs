@@ -1,9 +1,9 @@
 //! `--pixel x,y`: the picture of one hit and its numbers.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support::command;
-use crate::support::command::Folder;
 use serde_json::Value;
+
+use crate::support::command::{self, Folder};
 
 /// Writes a scene of a clay ball in the open, with sky above it in the picture, or in a closed box.
 fn scene(is_closed: bool) -> Folder {

@@ -2,14 +2,8 @@
 //! the picture against other samplers; the keys of `[[portal]]`.
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-use crate::support;
 use std::path::Path;
 
-use crate::support::{
-    replicates::{self, LIMIT},
-    scenes,
-    statistics::{Comparison, chi_square_p_value},
-};
 use fenestra::{
     math::{
         random::{random_2d, random_independent_1d},
@@ -21,6 +15,13 @@ use fenestra::{
     shader::bindings::probe,
 };
 use glam::{DVec2, DVec3, Vec2, Vec3};
+
+use crate::support::{
+    self,
+    replicates::{self, LIMIT},
+    scenes,
+    statistics::{Comparison, chi_square_p_value},
+};
 
 const RECTANGLE_PROBE: &[u8] =
     include_bytes!(concat!(env!("OUT_DIR"), "/test/spherical_rectangle.spv"));

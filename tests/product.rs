@@ -8,11 +8,8 @@
 //! hundred runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::materials;
 use std::f64::consts::PI;
 
-use crate::support::{scenes, statistics};
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
@@ -38,6 +35,8 @@ use fenestra::{
     srbf::{kernel_deviation, kernel_hemisphere_part, kernel_pdf},
 };
 use glam::{DVec3, Vec3, dvec3};
+
+use crate::support::{self, materials, scenes, statistics};
 
 /// Samples per path and state of the cache.
 const SAMPLES: usize = 20_000;

@@ -6,12 +6,12 @@
 //! `docs/reliability.md`.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support;
 use std::{env, fs};
 
-use crate::support::random::Random;
 use fenestra::{film::Sums, sampler::Sampler, scene::Scene, session::Settings};
 use tempfile::TempDir;
+
+use crate::support::{self, random::Random};
 
 /// Standard errors by which the mean of a furnace may pass one.
 const FURNACE_LIMIT: f64 = 6.0;

@@ -1,10 +1,13 @@
 //! Random numbers: stratification, uniformity, independence, and the shader twin bit for bit.
 
-use crate::support;
-use crate::support::statistics::{chi_square_p_value, z_p_value};
 use fenestra::{
     math::random::{random_1d, random_2d, random_independent_1d, random_independent_2d},
     shader::bindings::probe,
+};
+
+use crate::support::{
+    self,
+    statistics::{chi_square_p_value, z_p_value},
 };
 
 /// Chance of a false alarm: a test fails by chance for less than one seed in a million.

@@ -1,9 +1,9 @@
 //! The render command from its options to its files: stop rules, layers, previews, checkpoints.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support::command;
-use crate::support::command::Folder;
 use fenestra::film::{Attribute, Image, Statistics, checkpoint::guide_paths};
+
+use crate::support::command::{self, Folder};
 
 /// Renders with these options and returns image and statistics.
 fn render(folder: &Folder, output: &str, options: &[&str]) -> (Image, Statistics) {

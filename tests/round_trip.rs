@@ -6,19 +6,19 @@
 //! passed passes again on the same device.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::command;
 use std::{fs, path::PathBuf};
 
-use crate::support::command::Folder;
-use crate::support::{
-    replicates::{LIMIT, replicates},
-    statistics::{Comparison, Estimate},
-};
 use fenestra::{
     export::{self, Export},
     scene::{Scene, lamp::LampKind, load::LoadOptions},
     session::Settings,
+};
+
+use crate::support::{
+    self,
+    command::{self, Folder},
+    replicates::{LIMIT, replicates},
+    statistics::{Comparison, Estimate},
 };
 
 const MITSUBA: &str = "xml";

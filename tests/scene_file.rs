@@ -2,8 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support::page;
 use std::{fmt::Write, fs, path::Path};
+
+use crate::support::page;
 
 /// A key of a table of the scene file.
 struct Key {

@@ -3,12 +3,6 @@
 //! The reference is `mis` without sharing; 15 comparisons raise a false alarm once in about 1,300 runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::{
-    replicates::REPLICATES,
-    scenes,
-    statistics::{Comparison, Estimate, estimates, largest_t},
-};
 use fenestra::{
     film::{Sums, Window},
     pass::Roulette,
@@ -20,6 +14,13 @@ use fenestra::{
     session::Settings,
 };
 use glam::Vec3;
+
+use crate::support::{
+    self,
+    replicates::REPLICATES,
+    scenes,
+    statistics::{Comparison, Estimate, estimates, largest_t},
+};
 
 fn settings(sampler: Sampler, share_paths: &str, depth: u32) -> Settings {
     let mut settings = Settings { sampler, depth, ..Settings::default() };

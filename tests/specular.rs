@@ -3,7 +3,6 @@
 
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
-use crate::support::statistics;
 use std::f64::consts::PI;
 
 use fenestra::{
@@ -19,7 +18,10 @@ use fenestra::{
 use glam::{DVec3, Vec3, vec3};
 use rayon::prelude::*;
 
-use crate::support::materials::{direction, hemisphere, specular, uniform};
+use crate::support::{
+    materials::{direction, hemisphere, specular, uniform},
+    statistics,
+};
 
 /// Polar angles of the outgoing direction, in degrees.
 const ANGLES_DEG: [f64; 5] = [0.0, 30.0, 55.0, 75.0, 87.0];

@@ -2,14 +2,16 @@
 
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
-use crate::support::statistics;
 use std::f64::consts::PI;
 
 use fenestra::srbf::{self, Lobe, Mixture, special};
 use glam::{DVec3, Vec2, Vec3};
 
-use crate::support::lobes::{BANDWIDTHS, random_bandwidth};
-use crate::support::random::Random;
+use crate::support::{
+    lobes::{BANDWIDTHS, random_bandwidth},
+    random::Random,
+    statistics,
+};
 
 /// Integrates by composite Gauss-Legendre quadrature, 5 points on each of `count` intervals.
 fn integrate(from: f64, to: f64, count: usize, function: impl Fn(f64) -> f64) -> f64 {

@@ -2,7 +2,6 @@
 
 #![expect(clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     shader::bindings::probe,
@@ -10,8 +9,11 @@ use fenestra::{
 };
 use glam::{Vec2, Vec3};
 
-use crate::support::lobes::{BANDWIDTHS, random_bandwidth};
-use crate::support::random::Random;
+use crate::support::{
+    self,
+    lobes::{BANDWIDTHS, random_bandwidth},
+    random::Random,
+};
 
 /// Twin of `Input` in `glsl/test/srbf.comp`.
 #[repr(C)]

@@ -1,12 +1,14 @@
 //! The statistical helpers against tabulated values and against themselves.
 
-use crate::support::hemisphere;
 use std::f64::consts::PI;
 
-use crate::support::random::Random;
-use crate::support::statistics::{
-    Comparison, chi_square_p_value, estimates, largest_t, smallest_p_value, student_p_value,
-    upper_incomplete_gamma, z_of_mean, z_p_value,
+use crate::support::{
+    hemisphere,
+    random::Random,
+    statistics::{
+        Comparison, chi_square_p_value, estimates, largest_t, smallest_p_value, student_p_value,
+        upper_incomplete_gamma, z_of_mean, z_p_value,
+    },
 };
 
 fn close(a: f64, b: f64) -> bool {

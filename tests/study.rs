@@ -2,10 +2,8 @@
 //! for bad input.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support::command;
 use std::{fs, path::Path, process::Command};
 
-use crate::support::command::{Folder, Run, Running};
 use fenestra::{
     command::options::{parse_duration, parse_size},
     film::{Attribute, Checkpoint, Image, Metadata},
@@ -17,6 +15,8 @@ use fenestra::{
     },
 };
 use serde_json::Value;
+
+use crate::support::command::{self, Folder, Run, Running};
 
 const SMALL: [&str; 10] = [
     "study",

@@ -2,7 +2,6 @@
 //! `glsl/include/texture.glsl` against its twins.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support;
 use std::{io::Cursor, sync::Arc};
 
 use bytemuck::{Pod, Zeroable};
@@ -34,6 +33,8 @@ use fenestra::{
 use glam::{Vec2, Vec3, Vec4, vec2, vec3, vec4};
 use half::f16;
 use image::{DynamicImage, ImageFormat};
+
+use crate::support;
 
 // Image files
 

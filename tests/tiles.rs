@@ -6,18 +6,8 @@
 //! has a chance of 3e-6, so the 3 comparisons raise a false alarm once in 3,000 runs.
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::hemisphere;
-use crate::support::materials;
 use std::f64::consts::PI;
 
-use crate::support::hemisphere::BINS;
-use crate::support::{
-    render,
-    replicates::{self, LIMIT},
-    scenes,
-    statistics::{Comparison, chi_square_p_value},
-};
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     brdf::{self, MaterialTables},
@@ -43,6 +33,15 @@ use fenestra::{
     },
 };
 use glam::{DVec3, Vec2, Vec3, vec2, vec3};
+
+use crate::support::{
+    self,
+    hemisphere::{self, BINS},
+    materials, render,
+    replicates::{self, LIMIT},
+    scenes,
+    statistics::{Comparison, chi_square_p_value},
+};
 
 /// Chance of a false alarm of one χ² test; there are 12.
 const FALSE_ALARM: f64 = 1e-5;

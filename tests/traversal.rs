@@ -2,11 +2,6 @@
 //! edges, self-intersection at every scale, pages, bounds.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support::device;
-use crate::support::random::Random;
-use crate::support::rays::{
-    ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, scaled, soup, sphere,
-};
 use fenestra::{
     accel::Accel,
     pass::geometry::Schedule,
@@ -21,6 +16,12 @@ use obvhs::{
     cwbvh::{CwBvh, node::CwBvhNode},
     ray::RayHit,
     rt_triangle::RtTriangle,
+};
+
+use crate::support::{
+    device,
+    random::Random,
+    rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, scaled, soup, sphere},
 };
 
 /// Finds the distance of the nearest triangle by testing all of them in double precision. The second

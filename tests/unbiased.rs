@@ -8,16 +8,8 @@
 //! slow and runs on request.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use crate::support;
-use crate::support::materials;
 use std::{env, path::Path, sync::Arc};
 
-use crate::support::materials::Case;
-use crate::support::{
-    replicates::{self, LIMIT, REPLICATES},
-    scenes,
-    statistics::{Comparison, Estimate, smallest_p_value},
-};
 use fenestra::{
     sampler::{Parameters, Sampler},
     scene::{
@@ -28,6 +20,14 @@ use fenestra::{
     session::Settings,
 };
 use glam::Vec3;
+
+use crate::support::{
+    self,
+    materials::{self, Case},
+    replicates::{self, LIMIT, REPLICATES},
+    scenes,
+    statistics::{Comparison, Estimate, smallest_p_value},
+};
 
 /// Least p-value allowed, that of |t| = 7.5 where both sides have the same error.
 const LEAST_P_VALUE: f64 = 3e-6;

@@ -2,14 +2,15 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support::command;
-use crate::support::faulty_layer;
-use crate::support::page;
 use std::{fmt::Write, process::Command};
 
-use crate::support::command::{BALL, Folder, yard};
-use crate::support::x11::{Server, View};
 use fenestra::{film::Image, view::keys};
+
+use crate::support::{
+    command::{self, BALL, Folder, yard},
+    faulty_layer, page,
+    x11::{Server, View},
+};
 
 const SIZE: [u32; 2] = [64, 48];
 const CLAY: &str = "type = \"diffuse\"\nreflectance = [0.5, 0.6, 0.4]";

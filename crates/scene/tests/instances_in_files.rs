@@ -4,10 +4,13 @@
 
 use std::{fmt::Write, path::Path};
 
-use crate::support::folder::Folder;
-use crate::support::gltf::{base64, floats};
 use fenestra_scene::{Scene, instance::PLACED_TRIANGLES};
 use glam::Vec3;
+
+use crate::support::{
+    folder::Folder,
+    gltf::{base64, floats},
+};
 
 /// Edges of squares of the repeated mesh, each of two triangles.
 const SQUARES: u32 = 24;

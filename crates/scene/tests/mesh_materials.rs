@@ -2,9 +2,6 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use crate::support::folder;
-use crate::support::folder::Folder;
-use crate::support::gltf::{Attribute, base64, floats, gltf, gltf_of, png};
 use fenestra_scene::{
     Scene,
     lamp::{LampKind, SpotFalloff},
@@ -13,6 +10,11 @@ use fenestra_scene::{
     texture::{Channels, Encoding, Interpolation, TextureUse, Wrap},
 };
 use glam::Vec3;
+
+use crate::support::{
+    folder::{self, Folder},
+    gltf::{Attribute, base64, floats, gltf, gltf_of, png},
+};
 
 /// Positions of a triangle in the plane z = 0, and its texture coordinates, v downwards.
 const CORNERS: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];

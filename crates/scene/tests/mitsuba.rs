@@ -4,7 +4,6 @@
 
 use std::{f32::consts::PI, io::Write, path::Path};
 
-use crate::support::folder::{BALL, Folder, yard};
 use fenestra_scene::{
     Filter, Scene,
     export::{Export as _, Settings, mitsuba::Export},
@@ -14,6 +13,8 @@ use fenestra_scene::{
     texture::{Encoding, Interpolation, Wrap},
 };
 use glam::Vec3;
+
+use crate::support::folder::{BALL, Folder, yard};
 
 /// Sensor of 40 × 20 pixels that looks from (0, 0, 5) to the origin.
 const SENSOR: &str = r#"<sensor type="perspective"><float name="fov" value="60"/>

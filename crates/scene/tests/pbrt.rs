@@ -5,7 +5,6 @@
 
 use std::path::Path;
 
-use crate::support::folder::Folder;
 use fenestra_scene::{
     Camera, Filter, Scene,
     coat::albedo_below_coat,
@@ -15,6 +14,8 @@ use fenestra_scene::{
     texture::{Channels, Encoding, Interpolation, Texels, Wrap},
 };
 use glam::{Vec2, Vec3};
+
+use crate::support::folder::Folder;
 
 /// A triangle at the corners of the axes, counter-clockwise seen from (1, 1, 1).
 const TRIANGLE: &str =
