@@ -27,11 +27,11 @@
 //! |---|---|---|
 //! | scene file → validated [`Scene`](scene::Scene) | [`scene`] | `include/environment` |
 //! | images on surfaces | [`scene::texture`], [`surface`] | `include/texture` |
-//! | materials → values, densities, samples | [`brdf`] | `include/brdf` |
-//! | lobes: products, integrals, samples | [`srbf`] | `include/srbf` |
+//! | materials → tables, values | [`brdf`] | `include/brdf` |
+//! | lobes and their kernel | [`srbf`] | `include/srbf` |
 //! | maps and BRDFs → lobes | [`fit`] | |
 //! | triangles → wide BVH | [`accel`] | `include/bvh` |
-//! | frames, random numbers, rectangles | [`math`] | `include/frame`, `include/random`, |
+//! | frames, random numbers | [`math`] | `include/frame`, `include/random`, |
 //! | | | `include/spherical_rectangle` |
 //! | constants, structs, buffers of both languages | [`shader`] | `include/layout` |
 //! | Vulkan | [`gpu`] | |

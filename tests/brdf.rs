@@ -5,16 +5,19 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use fenestra::{
-    brdf::{self, MaterialTables, fresnel, ggx, twin},
+    brdf::{MaterialTables, evaluate, fresnel, ggx},
     scene::material::MaterialKind,
     shader::structs,
 };
 use glam::{DVec3, Vec3, vec3};
 use rayon::prelude::*;
 
-use crate::support::{
-    materials::{cases, direction, hemisphere, tables, uniform},
-    statistics,
+use crate::{
+    support::{
+        materials::{cases, direction, hemisphere, tables, uniform},
+        statistics,
+    },
+    twin::brdf,
 };
 
 /// Polar angles of the outgoing direction, in degrees.
@@ -45,10 +48,8 @@ fn values_are_reciprocal() {
             } else {
                 brdf::sample(tables(), material, a, uniform(index, 2))
             };
-            let (there, back) = (
-                brdf::evaluate(tables(), material, a, b),
-                brdf::evaluate(tables(), material, b, a),
-            );
+            let (there, back) =
+                (evaluate(tables(), material, a, b), evaluate(tables(), material, b, a));
             let difference = (there - back).abs().max_element();
             assert!(
                 difference <= 1e-4 * there.max_element(),
@@ -208,7 +209,7 @@ fn principled_materials_follow_the_specification() {
                     view.as_dvec3().normalize(),
                     light.as_dvec3().normalize(),
                 );
-                let found = brdf::evaluate(tables(), material, view, light).as_dvec3();
+                let found = evaluate(tables(), material, view, light).as_dvec3();
                 assert!(
                     (found - expected).abs().max_element() < 1e-4 * expected.max_element() + 1e-6,
                     "{}: {found} against {expected} for {view}, {light}",
@@ -244,15 +245,15 @@ fn albedo_follows_the_colour_of_the_hit() {
         let words = &tables().words;
         let (mut sum, count) = (DVec3::ZERO, 40_000);
         for index in 0..count {
-            let incident = twin::brdf_sample(words, &textured, outgoing, uniform(index, 23));
+            let incident = brdf::brdf_sample(words, &textured, outgoing, uniform(index, 23));
             if incident.z > 0.0 {
                 let (value, pdf) =
-                    twin::brdf_evaluate_and_pdf(words, &textured, outgoing, incident);
+                    brdf::brdf_evaluate_and_pdf(words, &textured, outgoing, incident);
                 sum += (value * incident.z / pdf).as_dvec3();
             }
         }
         let expected = sum / f64::from(count);
-        let shown = twin::brdf_albedo(words, &textured, outgoing).as_dvec3();
+        let shown = brdf::brdf_albedo(words, &textured, outgoing).as_dvec3();
         assert!(
             (shown - expected).abs().max_element() < 0.01,
             "{}: {shown} shown, {expected} reflected",
@@ -265,7 +266,7 @@ fn albedo_follows_the_colour_of_the_hit() {
 #[should_panic(expected = "unknown kind 4711")]
 fn unknown_kinds_are_refused() {
     let material = structs::Material { kind: 4711, ..tables().materials[1] };
-    twin::brdf_evaluate_and_pdf(&tables().words, &material, Vec3::Z, Vec3::Z);
+    brdf::brdf_evaluate_and_pdf(&tables().words, &material, Vec3::Z, Vec3::Z);
 }
 
 /// Bins over half vectors, logarithmic in θ_h from a tenth of the lobe's width, and the mass of the

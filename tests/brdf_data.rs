@@ -20,7 +20,7 @@ use fenestra::{
 use glam::{DVec3, Vec3, dvec3};
 use rayon::prelude::*;
 
-use crate::support::materials::direction;
+use crate::{support::materials::direction, twin::brdf::evaluate_and_pdf};
 
 /// Returns the path of a file, or `None` where there is no shared folder.
 fn shared(name: &str) -> Option<PathBuf> {
@@ -128,7 +128,7 @@ fn measured_materials_are_sampled_well() {
         for angle_deg in [0.0_f64, 45.0, 75.0, 88.0] {
             let outgoing = direction(angle_deg.to_radians(), 0.3);
             let moments = integrate(outgoing, |incident| {
-                let (value, pdf) = brdf::evaluate_and_pdf(&tables, 0, outgoing, incident);
+                let (value, pdf) = evaluate_and_pdf(&tables, 0, outgoing, incident);
                 let reflected = f64::from(luminance(value) * incident.z);
                 let second =
                     if reflected > 0.0 { reflected * reflected / f64::from(pdf) } else { 0.0 };

@@ -1,18 +1,18 @@
 //! `glsl/include/brdf.glsl` against its Rust twin, over all kinds of materials.
 
 use bytemuck::{Pod, Zeroable};
-use fenestra::{
-    brdf::{self, fresnel, specular as twin},
-    shader::{
-        bindings::{probe, scene},
-        constants::MATERIAL_MEASURED,
-    },
+use fenestra::shader::{
+    bindings::{probe, scene},
+    constants::MATERIAL_MEASURED,
 };
 use glam::Vec3;
 
-use crate::support::{
-    self,
-    materials::{cases, direction, hemisphere, specular, tables, uniform},
+use crate::{
+    support::{
+        self,
+        materials::{cases, direction, hemisphere, specular, tables, uniform},
+    },
+    twin::{brdf, specular},
 };
 
 /// Twin of `BrdfQuery` in `glsl/test/brdf.comp`.
@@ -143,7 +143,8 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
         let material = index % specular().len() as u32;
         let (outgoing_local, u) = (hemisphere(index, 11), uniform(index, 12));
         let is_back = index / 3 % 2;
-        let found = twin::scatter(&specular()[material as usize], outgoing_local, is_back == 1, u);
+        let found =
+            specular::scatter(&specular()[material as usize], outgoing_local, is_back == 1, u);
         let incident_local = match index % 5 {
             0 => hemisphere(index, 13),
             1 => -hemisphere(index, 13),
@@ -169,7 +170,7 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
     for (query, answer) in queries.iter().zip(&answers) {
         let material = &specular()[query.material as usize];
         let is_back = query.is_back == 1;
-        let found = twin::scatter(material, query.outgoing_local, is_back, query.u);
+        let found = specular::scatter(material, query.outgoing_local, is_back, query.u);
         let is_other = found.is_transmitted != (answer.is_transmitted == 1)
             || (found.weight == Vec3::ZERO) != (answer.weight == Vec3::ZERO);
         other_choices += u32::from(is_other);
@@ -183,7 +184,7 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
                 "{answer:?} in the shader, {found:?} in its twin, for {query:?}"
             );
         }
-        let (value, pdf) = twin::dielectric_evaluate_and_pdf(
+        let (value, pdf) = specular::dielectric_evaluate_and_pdf(
             material,
             query.outgoing_local,
             query.incident_local,
@@ -196,8 +197,8 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
         );
         let cosine = query.outgoing_local.z;
         let pane = [
-            fresnel::pane_reflectance(material, cosine),
-            fresnel::pane_transmittance(material, cosine),
+            specular::pane_reflectance(material, cosine),
+            specular::pane_transmittance(material, cosine),
         ];
         // A mirror has no index, and its answers no meaning.
         if material.ior > 0.0 {

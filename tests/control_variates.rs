@@ -10,10 +10,7 @@ use fenestra::{
     math::random::random_independent_2d,
     sampler::{
         Parameters, Sampler,
-        control_variates::{
-            ControlVariatesParameters, RecordGrid,
-            controlled::{Candidate, Controlled},
-        },
+        control_variates::{ControlVariatesParameters, RecordGrid},
     },
     scene::Scene,
     session::Settings,
@@ -27,11 +24,14 @@ use fenestra::{
 };
 use glam::{DVec3, Vec3, vec3};
 
-use crate::support::{
-    self, render,
-    replicates::{self, LIMIT},
-    scenes,
-    statistics::Comparison,
+use crate::{
+    support::{
+        self, render,
+        replicates::{self, LIMIT},
+        scenes,
+        statistics::Comparison,
+    },
+    twin::control_variates::{Candidate, Controlled, choose, control_of, entry, record_of},
 };
 
 #[repr(C)]
@@ -116,12 +116,12 @@ fn the_shader_agrees() {
         let answers: &[Answer] = bytemuck::cast_slice(&output);
         let (mut other_entries, mut other_choices, mut negative) = (0, 0, 0);
         for (query, answer) in queries.iter().zip(answers) {
-            let record = grid.record_of(query.position.into(), query.normal.into(), camera);
-            other_entries += u32::from(answer.entry != grid.entry(record, query.direction.into()));
+            let record = record_of(grid, query.position.into(), query.normal.into(), camera);
+            other_entries += u32::from(answer.entry != entry(grid, record, query.direction.into()));
             let candidates = query
                 .weights
                 .map(|[x, y, z, visibility]| Candidate { weight: Vec3::new(x, y, z), visibility });
-            let expected = own.choose(&candidates, query.u);
+            let expected = choose(&own, &candidates, query.u);
             // Rounding decides between candidates now and then.
             if expected.chosen.unwrap_or(0) as u32 == answer.chosen {
                 let is_same = is_close(answer.contribution, expected.contribution)
@@ -157,7 +157,7 @@ fn the_mean_is_the_light_of_the_visible_candidates() {
             ..ControlVariatesParameters::default()
         };
         let outcomes: Vec<Controlled> = (0..NUMBERS)
-            .map(|index| own.choose(&candidates, (index as f32 + 0.5) / NUMBERS as f32))
+            .map(|index| choose(&own, &candidates, (index as f32 + 0.5) / NUMBERS as f32))
             .collect();
         for seen in 0..16_u32 {
             let is_seen = |index: usize| seen >> index & 1 == 1;
@@ -176,7 +176,8 @@ fn the_mean_is_the_light_of_the_visible_candidates() {
             assert!(off < 1e-3, "{own:?}, {seen:04b}: off by {off}");
             // An estimate that takes back too little of the control has another mean.
             let wrong = |outcome: &Controlled| {
-                let control = outcome.chosen.map_or(0.0, |index| own.control(&candidates[index]));
+                let control =
+                    outcome.chosen.map_or(0.0, |index| control_of(&own, &candidates[index]));
                 light(outcome) + 0.05 * control * outcome.contribution
             };
             let off = (mean(&wrong) - expected).abs().max_element();
@@ -191,7 +192,7 @@ fn certain_candidates_leave_no_variance() {
     let candidates = [certain(1.0), certain(0.0), certain(0.0), certain(1.0)];
     let own = ControlVariatesParameters::default();
     for index in 0..100 {
-        let outcome = own.choose(&candidates, (index as f32 + 0.5) / 100.0);
+        let outcome = choose(&own, &candidates, (index as f32 + 0.5) / 100.0);
         let visibility = candidates[outcome.chosen.unwrap_or(0)].visibility;
         let light = outcome.rest + outcome.contribution * visibility;
         assert!((light - 0.5).abs().max_element() < 1e-6, "{outcome:?}");
@@ -201,7 +202,7 @@ fn certain_candidates_leave_no_variance() {
 #[test]
 fn darkness_has_no_ray() {
     let dark = [Candidate { weight: Vec3::ZERO, visibility: 0.5 }; 4];
-    let outcome = ControlVariatesParameters::default().choose(&dark, 0.3);
+    let outcome = choose(&ControlVariatesParameters::default(), &dark, 0.3);
     assert_eq!((outcome.chosen, outcome.rest), (None, Vec3::ZERO));
 }
 

@@ -9,12 +9,15 @@ use fenestra::{
     export::{Export as _, Settings, mitsuba::Export},
     film::Image,
     scene::{Scene, lamp::LampKind, material::MaterialKind, measured::MeasuredTable},
-    surface::{TextureTables, lookup::texture_value},
+    surface::TextureTables,
     texture::TextureUse,
 };
 use glam::{Vec2, Vec3};
 
-use crate::support::command::{BALL, Folder, yard};
+use crate::{
+    support::command::{BALL, Folder, yard},
+    twin::texture::texture_value,
+};
 
 const DIFFUSE: &str = "type = \"diffuse\"\nreflectance = [0.5, 0.25, 0.125]";
 const PLASTIC: &str = "type = \"plastic\"\ndiffuse = [0.5, 0.25, 0.125]\nalpha = 0.25\nior = 1.33";

@@ -17,9 +17,11 @@ use fenestra::{
         material::{ConductorFresnel, Material, MaterialKind},
         measured::MeasuredTable,
     },
-    srbf::{Lobe, Mixture, lobe_integral},
+    srbf::{Lobe, lobe_value},
 };
 use glam::{Vec2, Vec3};
+
+use crate::twin::srbf::{Mixture, lobe_integral};
 
 /// Tabulates a function of the direction as a map.
 fn map(width: u32, function: impl Fn(Vec3) -> Vec3) -> EnvironmentMap {
@@ -90,7 +92,7 @@ fn planted_mixtures_are_recovered() {
     ];
     let colours = [Vec3::new(1.0, 0.5, 0.2), Vec3::ONE, Vec3::new(0.1, 0.3, 1.0), Vec3::Y];
     let target = map(512, |d| {
-        let value = |(lobe, colour): (&Lobe, &Vec3)| *colour * fenestra::srbf::lobe_value(lobe, d);
+        let value = |(lobe, colour): (&Lobe, &Vec3)| *colour * lobe_value(lobe, d);
         planted.iter().zip(&colours).map(value).sum()
     });
     for method in [Method::Em, Method::L2] {

@@ -5,7 +5,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 use fenestra::{
-    brdf::{self, MaterialTables},
+    brdf::MaterialTables,
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
     math::{
         frame::frame_from_normal,
@@ -16,7 +16,6 @@ use fenestra::{
         Parameters, Sampler,
         guided::{
             ARRIVAL_DIRECTIONS, Guide, GuideBuffers, GuideSize, GuideState, GuidedParameters,
-            arrival_direction,
         },
         regions::FACE_COUNT,
     },
@@ -32,11 +31,14 @@ use fenestra::{
 };
 use glam::{Vec3, vec3};
 
-use crate::support::{
-    self,
-    guide::Guide as _,
-    materials, replicates, scenes,
-    statistics::{self, estimates, largest_t},
+use crate::{
+    support::{
+        self,
+        guide::Guide as _,
+        materials, replicates, scenes,
+        statistics::{self, estimates, largest_t},
+    },
+    twin::{brdf, guided::arrival_direction},
 };
 
 const ARRIVING_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/arriving.spv"));

@@ -11,7 +11,7 @@
 use std::f64::consts::PI;
 
 use fenestra::{
-    brdf::{self, MaterialTables},
+    brdf::MaterialTables,
     film::Window,
     math::frame::{Frame, frame_from_normal},
     sampler::{
@@ -23,10 +23,13 @@ use fenestra::{
 };
 use glam::{Vec3, vec3};
 
-use crate::support::{
-    self,
-    hemisphere::{self, BIN_COLUMNS, BINS},
-    materials, scenes, statistics,
+use crate::{
+    support::{
+        self,
+        hemisphere::{self, BIN_COLUMNS, BINS},
+        materials, scenes, statistics,
+    },
+    twin::brdf,
 };
 
 /// Rays per surface and state, and per hit.

@@ -18,8 +18,7 @@ use fenestra::{
         Parameters, Sampler,
         haar::{
             HaarSteps, NodeBuffers, NodeSize,
-            tree::{Tree, place_in_square},
-            twin::{self, Product},
+            tree::{Tree, node_centre, place_in_square},
         },
     },
     scene::Scene,
@@ -34,11 +33,14 @@ use fenestra::{
 use glam::{Vec2, Vec3, vec3};
 use half::f16;
 
-use crate::support::{
-    self, materials,
-    replicates::{self, LIMIT},
-    scenes,
-    statistics::{Comparison, chi_square_p_value, z_of_mean},
+use crate::{
+    support::{
+        self, materials,
+        replicates::{self, LIMIT},
+        scenes,
+        statistics::{Comparison, chi_square_p_value, z_of_mean},
+    },
+    twin::haar::{Product, node_reflectance},
 };
 
 /// Samples per path and state of the cache.
@@ -314,8 +316,8 @@ fn nodes_and_densities_are_those_of_the_twin() {
             let material = paths.tables.materials[surface.material as usize];
             let mut above = 0;
             for (index, node) in nodes.iter().enumerate() {
-                let centre = twin::node_centre(paths.level(), index as u32);
-                let expected = twin::node_reflectance(
+                let centre = node_centre(paths.level(), index as u32);
+                let expected = node_reflectance(
                     &paths.tables.words,
                     &material,
                     outgoing,
@@ -445,7 +447,7 @@ fn samples_follow_the_density_whatever_is_cached() {
 fn weights_are_those_of_the_thesis(paths: &Paths, path: usize, first: &[f32], blocked: &[Vec3]) {
     let mut lowered = 0;
     for (index, (node, first)) in paths.nodes_of(path).iter().zip(first).enumerate() {
-        let centre = twin::node_centre(paths.level(), index as u32);
+        let centre = node_centre(paths.level(), index as u32);
         let distances = || blocked.iter().map(|direction| 1.0 - centre.dot(*direction));
         if distances().any(|distance| (distance / 0.0707 - 1.0).abs() < 0.01) {
             // Rounding decides.

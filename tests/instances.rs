@@ -17,12 +17,15 @@ use fenestra::{
 };
 use glam::{DMat3, DMat4, DVec3, Quat, Vec3};
 
-use crate::support::{
-    self,
-    random::Random,
-    rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, soup, sphere},
-    replicates::{LIMIT, replicates},
-    statistics::Comparison,
+use crate::{
+    support::{
+        self,
+        random::Random,
+        rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, soup, sphere},
+        replicates::{LIMIT, replicates},
+        statistics::Comparison,
+    },
+    twin::surface::{surface_at, triangle_material},
 };
 
 /// A random affine map: turned, scaled differently along the axes, sheared, mirrored or not.
@@ -106,8 +109,8 @@ fn check(name: &str, geometry: &Geometry, rays: &[Ray], tolerance: f32) -> f64 {
         if let Some(twin) = twin {
             let off = (twin.distance - hit.distance).abs();
             assert!(off <= 1e-5 * hit.distance, "{name}, ray {index}: {hit:?} {twin:?}");
-            let material = two_levels.triangle_material(twin.triangle, twin.instance);
-            let surface = two_levels.surface_at(twin.triangle, twin.instance, origin, direction);
+            let material = triangle_material(&two_levels, twin.triangle, twin.instance);
+            let surface = surface_at(&two_levels, twin.triangle, twin.instance, origin, direction);
             if twin.triangle == hit.triangle {
                 assert_eq!(material, hit.material, "{name}, ray {index}");
                 let normal = Vec3::from(hit.shading_normal);

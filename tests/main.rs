@@ -64,5 +64,6 @@ mod study;
 mod texture;
 mod tiles;
 mod traversal;
+mod twin;
 mod unbiased;
 mod view;

@@ -12,10 +12,13 @@ use fenestra::{
         geometry::Traversal, wave_order,
     },
     sampler::{
-        Parameters, Sampler, basic,
+        Parameters, basic,
+        control_variates::{self, RecordGrid},
         guided::{GuidedParameters, GuidedSteps},
         haar::HaarSteps,
+        portal,
         product::{FitSizes, ProductParameters, ProductSteps},
+        tiles,
         visibility::{CacheScope, VisibilityParameters, VisibilitySteps},
     },
     shader::{
@@ -188,12 +191,19 @@ fn shown() -> Vec<(&'static str, Vec<Dispatch>)> {
         ("shared paths", order(&shared(2), &mis(), wave(0, 1))),
         ("lists of living paths", order(&listed(settings(2, 2)), &mis(), wave(0, 1))),
     ];
-    let listed =
-        Sampler::ALL.iter().flat_map(|sampler| sampler.listed_steps(deep.surfaces).unwrap());
-    shown.extend(listed.map(|(name, steps)| {
-        let is_pilot = name.starts_with("pilot");
-        (name, order(&deep, &steps, if is_pilot { training } else { wave(0, 1) }))
-    }));
+    let (parameters, surfaces) = (Parameters::default(), deep.surfaces);
+    let grid = RecordGrid { side: 16, edge_per_distance: 0.1, largest_edge: 1.0 };
+    let controlled = control_variates::steps(&parameters, grid, surfaces).unwrap();
+    let of_records = control_variates::pilot_steps(&parameters, grid, surfaces).unwrap();
+    let tiles = |learns| tiles::steps(&parameters.tiles, 1, learns, surfaces);
+    let of_rays = [
+        ("portal", portal::steps(&parameters, 1, surfaces), wave(0, 1)),
+        ("control-variates", controlled, wave(0, 1)),
+        ("pilot of control-variates", of_records, training),
+        ("tiles", tiles(false), wave(0, 1)),
+        ("pilot of tiles", tiles(true), training),
+    ];
+    shown.extend(of_rays.map(|(name, steps, wave)| (name, order(&deep, &steps, wave))));
     shown
 }
 

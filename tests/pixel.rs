@@ -3,7 +3,10 @@
 
 use serde_json::Value;
 
-use crate::support::command::{self, Folder};
+use crate::{
+    support::command::{self, Folder},
+    twin::srbf::kernel_deviation,
+};
 
 /// Writes a scene of a clay ball in the open, with sky above it in the picture, or in a closed box.
 fn scene(is_closed: bool) -> Folder {
@@ -109,7 +112,7 @@ fn lobes_near_blocked_directions_lose_weight() {
         .map(|lobe| {
             let axis = vector(&lobe["axis"]);
             let bandwidth = lobe["bandwidth"].as_f64().unwrap();
-            let deviation = fenestra::srbf::kernel_deviation(bandwidth as f32);
+            let deviation = kernel_deviation(bandwidth as f32);
             let is_close = |entry: &&Value| {
                 let direction = vector(&entry["direction"]);
                 let cosine: f64 = (0..3).map(|i| axis[i] * direction[i]).sum();

@@ -5,10 +5,7 @@
 use std::path::Path;
 
 use fenestra::{
-    math::{
-        random::{random_2d, random_independent_1d},
-        spherical_rectangle::{LEAST_UNIFORM_SOLID_ANGLE, SphericalRectangle},
-    },
+    math::random::{random_2d, random_independent_1d},
     sampler::{Parameters, Sampler},
     scene::{Portal, Scene},
     session::Settings,
@@ -16,11 +13,14 @@ use fenestra::{
 };
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
-use crate::support::{
-    self,
-    replicates::{self, LIMIT},
-    scenes,
-    statistics::{Comparison, chi_square_p_value},
+use crate::{
+    support::{
+        self,
+        replicates::{self, LIMIT},
+        scenes,
+        statistics::{Comparison, chi_square_p_value},
+    },
+    twin::spherical_rectangle::{LEAST_UNIFORM_SOLID_ANGLE, SphericalRectangle},
 };
 
 const RECTANGLE_PROBE: &[u8] =

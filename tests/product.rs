@@ -32,11 +32,13 @@ use fenestra::{
         },
         structs::{Counters, Wave},
     },
-    srbf::{kernel_deviation, kernel_hemisphere_part, kernel_pdf},
 };
 use glam::{DVec3, Vec3, dvec3};
 
-use crate::support::{self, materials, scenes, statistics};
+use crate::{
+    support::{self, materials, scenes, statistics},
+    twin::srbf::{kernel_deviation, kernel_hemisphere_part, kernel_pdf},
+};
 
 /// Samples per path and state of the cache.
 const SAMPLES: usize = 20_000;

@@ -6,10 +6,7 @@
 use std::f64::consts::PI;
 
 use fenestra::{
-    brdf::{
-        fresnel::{fresnel_dielectric, fresnel_interface, pane_reflectance, pane_transmittance},
-        specular::{dielectric_evaluate_and_pdf, scatter},
-    },
+    brdf::fresnel::fresnel_dielectric,
     shader::{
         constants::{MATERIAL_DIELECTRIC, MATERIAL_MIRROR, MATERIAL_THIN_DIELECTRIC},
         structs::Material,
@@ -18,9 +15,15 @@ use fenestra::{
 use glam::{DVec3, Vec3, vec3};
 use rayon::prelude::*;
 
-use crate::support::{
-    materials::{direction, hemisphere, specular, uniform},
-    statistics,
+use crate::{
+    support::{
+        materials::{direction, hemisphere, specular, uniform},
+        statistics,
+    },
+    twin::specular::{
+        dielectric_evaluate_and_pdf, fresnel_interface, pane_reflectance, pane_transmittance,
+        scatter,
+    },
 };
 
 /// Polar angles of the outgoing direction, in degrees.

@@ -4,13 +4,16 @@
 
 use std::f64::consts::PI;
 
-use fenestra::srbf::{self, Lobe, Mixture, special};
+use fenestra::srbf::{Lobe, expm1, kernel_integral, lobe_value};
 use glam::{DVec3, Vec2, Vec3};
 
-use crate::support::{
-    lobes::{BANDWIDTHS, random_bandwidth},
-    random::Random,
-    statistics,
+use crate::{
+    support::{
+        lobes::{BANDWIDTHS, random_bandwidth},
+        random::Random,
+        statistics,
+    },
+    twin::srbf,
 };
 
 /// Integrates by composite Gauss-Legendre quadrature, 5 points on each of `count` intervals.
@@ -51,12 +54,12 @@ fn elementary_functions_hold_near_zero() {
         for sign in [-1.0, 1.0] {
             let x = (sign * 2_f64.powf(f64::from(exponent) * 0.5)) as f32;
             let exact = f64::from(x);
-            assert_close(special::expm1(x), exact.exp_m1(), 3e-7, &format!("expm1({x})"));
+            assert_close(expm1(x), exact.exp_m1(), 3e-7, &format!("expm1({x})"));
             if x > -0.9999 {
-                assert_close(special::log1p(x), exact.ln_1p(), 4e-7, &format!("log1p({x})"));
+                assert_close(srbf::log1p(x), exact.ln_1p(), 4e-7, &format!("log1p({x})"));
             }
             let integral = 2.0 / PI.sqrt() * integrate(0.0, exact, 64, |t| (-t * t).exp());
-            assert_close(special::erf(x), integral, 1e-6, &format!("erf({x})"));
+            assert_close(srbf::erf(x), integral, 1e-6, &format!("erf({x})"));
         }
     }
 }
@@ -66,12 +69,12 @@ fn integral_and_deviation_match_quadrature() {
     for bandwidth in BANDWIDTHS {
         let exact = f64::from(bandwidth);
         let integral = 2.0 * PI * moment(exact, 0);
-        assert_close(srbf::kernel_integral(bandwidth), integral, 1e-6, &format!("I({bandwidth})"));
+        assert_close(kernel_integral(bandwidth), integral, 1e-6, &format!("I({bandwidth})"));
         let deviation = (moment(exact, 2) / moment(exact, 0)).sqrt();
         let found = srbf::kernel_deviation(bandwidth);
         assert_close(found, deviation, 2e-6, &format!("sigma({bandwidth})"));
     }
-    assert_close(srbf::kernel_integral(0.0), 4.0 * PI, 1e-6, "I(0)");
+    assert_close(kernel_integral(0.0), 4.0 * PI, 1e-6, "I(0)");
 }
 
 #[test]
@@ -154,9 +157,9 @@ fn products_are_pointwise_products_and_convolutions_their_integrals() {
             assert_close(srbf::lobe_convolution(&a, &b), integral, tolerance + 1e-3, &what);
         }
         let direction = near.normalize();
-        let pointwise = srbf::lobe_value(&a, direction) * srbf::lobe_value(&b, direction);
+        let pointwise = lobe_value(&a, direction) * lobe_value(&b, direction);
         if pointwise > 1e-6 {
-            let relative = srbf::lobe_value(&product, direction) / pointwise - 1.0;
+            let relative = lobe_value(&product, direction) / pointwise - 1.0;
             assert!(relative.abs() < 0.02, "{what} at {direction}: {relative}");
         }
     }
@@ -264,7 +267,7 @@ fn mixtures_sample_their_density() {
         Lobe { axis: -Vec3::X, bandwidth: 5.0, amplitude: 0.0 },
         Lobe { axis: Vec3::new(0.0, -0.6, 0.8), bandwidth: 300.0, amplitude: 20.0 },
     ];
-    let mixture = Mixture { lobes };
+    let mixture = srbf::Mixture { lobes };
     let direction = Vec3::new(0.6, 0.0, 0.8);
     let ratio = mixture.value(direction) / mixture.integral();
     assert_close(mixture.pdf(direction), f64::from(ratio), 1e-5, "pdf");
@@ -298,14 +301,14 @@ fn mixtures_sample_their_density() {
     assert!((whole - 1.0).abs() < 1e-3, "the density integrates to {whole}");
     let p = statistics::chi_square_p_value(&observed, &expected);
     assert!(p > 3e-6, "p = {p:e}");
-    assert_eq!(Mixture::default().sample(Vec2::splat(0.5)), None);
-    assert_eq!(Mixture::default().pdf(Vec3::Z), 0.0);
+    assert_eq!(srbf::Mixture::default().sample(Vec2::splat(0.5)), None);
+    assert_eq!(srbf::Mixture::default().pdf(Vec3::Z), 0.0);
 }
 
 #[test]
 fn mixture_products_are_pointwise_products() {
     let mut random = Random(4);
-    let mut mixture = || Mixture {
+    let mut mixture = || srbf::Mixture {
         lobes: (0..5)
             .map(|_| Lobe {
                 axis: random.direction(),

@@ -5,14 +5,17 @@
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     shader::bindings::probe,
-    srbf::{self, Lobe, special},
+    srbf::{Lobe, expm1, lobe_value},
 };
 use glam::{Vec2, Vec3};
 
-use crate::support::{
-    self,
-    lobes::{BANDWIDTHS, random_bandwidth},
-    random::Random,
+use crate::{
+    support::{
+        self,
+        lobes::{BANDWIDTHS, random_bandwidth},
+        random::Random,
+    },
+    twin::srbf,
 };
 
 /// Twin of `Input` in `glsl/test/srbf.comp`.
@@ -89,9 +92,9 @@ fn shader_twin_agrees_over_the_whole_range() {
                 "{name}: shader {found:e}, host {expected:e} at {input:?}"
             );
         };
-        check("expm1", shader.expm1_x, special::expm1(input.x), 2e-6);
-        check("log1p", shader.log1p_x, special::log1p(input.x.max(-0.9999)), 2e-6);
-        check("erf", shader.erf_x, special::erf(input.x), 1e-6);
+        check("expm1", shader.expm1_x, expm1(input.x), 2e-6);
+        check("log1p", shader.log1p_x, srbf::log1p(input.x.max(-0.9999)), 2e-6);
+        check("erf", shader.erf_x, srbf::erf(input.x), 1e-6);
         check("integral", shader.integral, srbf::lobe_integral(a), 1e-6);
         check("deviation", shader.deviation, srbf::kernel_deviation(a.bandwidth), 1e-5);
         let part = srbf::kernel_hemisphere_part(a.bandwidth, a.axis.dot(input.direction));
@@ -99,7 +102,7 @@ fn shader_twin_agrees_over_the_whole_range() {
         // The shader reproduces the exponent to a few units in its last place.
         let d = input.direction - a.axis;
         let exponent = 0.5 * a.bandwidth * d.dot(d);
-        let value = srbf::lobe_value(a, input.direction);
+        let value = lobe_value(a, input.direction);
         check("value", shader.value, value, 2e-6 + 5e-7 * exponent);
         let pdf = srbf::kernel_pdf(a.axis, a.bandwidth, input.direction);
         check("pdf", shader.pdf, pdf, 2e-6 + 5e-7 * exponent);

@@ -24,7 +24,7 @@ use fenestra::{
         },
         structs,
     },
-    surface::{SurfaceTables, TextureTables, lookup},
+    surface::{SurfaceTables, TextureTables},
     texture::{
         Channels, Encoding, Interpolation, MAX_TEXTURE_SIDE, Texels, Texture, TextureCache,
         TextureUse, Wrap, lookup::gradient_tangent,
@@ -34,7 +34,7 @@ use glam::{Vec2, Vec3, Vec4, vec2, vec3, vec4};
 use half::f16;
 use image::{DynamicImage, ImageFormat};
 
-use crate::support;
+use crate::{support, twin::texture as twin};
 
 // Image files
 
@@ -183,7 +183,7 @@ fn value(used: &TextureUse, uv: Vec2) -> Vec4 {
     let mut tables = TextureTables::default();
     let index = tables.add(Some(used));
     let words = tables.words(0..tables.word_count());
-    lookup::texture_value(&words, &tables.uses, index, uv, Vec2::NAN)
+    twin::texture_value(&words, &tables.uses, index, uv, Vec2::NAN)
 }
 
 fn texture(width: u32, height: u32, texels: Texels) -> Arc<Texture> {
@@ -283,7 +283,7 @@ fn channels_factors_and_coordinates_come_in_their_order() {
     let lower_left =
         TextureUse { image_from_uv: TextureUse::from_lower_left(image).image_from_uv, ..used };
     assert_eq!((value(&lower_left, vec2(0.1, 0.1)) * 255.0).round(), Vec4::splat(3.0));
-    assert_eq!(lookup::texture_value(&[], &[], NO_TEXTURE, Vec2::ZERO, Vec2::ZERO), Vec4::ONE);
+    assert_eq!(twin::texture_value(&[], &[], NO_TEXTURE, Vec2::ZERO, Vec2::ZERO), Vec4::ONE);
 }
 
 #[test]
@@ -300,14 +300,14 @@ fn tangents_follow_the_image_on_either_side_and_mirrored() {
     let up = vec3(0.5, 1.0, 0.5);
     let along = vec4(1.0, 0.0, 0.0, 1.0);
     for side in [1.0, -1.0] {
-        let mapped = |texel| lookup::mapped_normal(texel, 1.0, along, side * Vec3::Z, side);
+        let mapped = |texel| twin::mapped_normal(texel, 1.0, along, side * Vec3::Z, side);
         assert!(mapped(flat).abs_diff_eq(side * Vec3::Z, 1e-6));
         // The back is the same relief from behind: its normals point the other way.
         assert!(mapped(right).abs_diff_eq(side * Vec3::X, 1e-6));
         assert!(mapped(up).abs_diff_eq(side * Vec3::Y, 1e-6));
     }
-    assert_eq!(lookup::mapped_normal(right, 1.0, Vec4::ZERO, Vec3::Z, 1.0), Vec3::Z);
-    assert!(lookup::mapped_normal(right, 0.0, along, Vec3::Z, 1.0).abs_diff_eq(Vec3::Z, 1e-6));
+    assert_eq!(twin::mapped_normal(right, 1.0, Vec4::ZERO, Vec3::Z, 1.0), Vec3::Z);
+    assert!(twin::mapped_normal(right, 0.0, along, Vec3::Z, 1.0).abs_diff_eq(Vec3::Z, 1e-6));
 }
 
 // The shader against its twins
@@ -547,11 +547,11 @@ fn compare(bits: u32) {
         let TextureQuery { use_index, uv0, uv1, triangle, side, .. } = *query;
         assert_eq!(answer.used, textures.uses[use_index as usize], "the use as loaded");
         assert_eq!(answer.surface, surfaces.surfaces[query.material as usize], "the surface");
-        let at = attributes.triangle_attributes(triangle, query.weights);
+        let at = twin::triangle_attributes(&attributes, triangle, query.weights);
         let surface = &surfaces.surfaces[query.material as usize];
-        let value = lookup::texture_value(&words, &textures.uses, use_index, uv0, uv1);
+        let value = twin::texture_value(&words, &textures.uses, use_index, uv0, uv1);
         let opacity =
-            lookup::surface_opacity(&words, &textures.uses, surface, [at.uv0, at.uv1], at.color.w);
+            twin::surface_opacity(&words, &textures.uses, surface, [at.uv0, at.uv1], at.color.w);
         let number = answer.number - luminance(value.truncate());
         let is_other = !Vec4::from(answer.value).abs_diff_eq(value, 2e-4)
             || number.abs() > 2e-4
@@ -562,19 +562,19 @@ fn compare(bits: u32) {
         assert!(Vec4::from(answer.color).abs_diff_eq(at.color, 1e-5), "{query:?}");
 
         let normal = side * query.shading_normal;
-        let mut tangent = lookup::stored_tangent(at.tangent, normal);
+        let mut tangent = twin::stored_tangent(at.tangent, normal);
         if tangent == Vec4::ZERO {
             let used = &textures.uses[use_index as usize];
             let image = [0, 1, 2].map(|corner| {
-                let uv = |bit| attributes.corner_uv(triangle, corner, bit);
-                lookup::image_coordinates(used, uv(ATTRIBUTE_FIRST_UVS), uv(ATTRIBUTE_SECOND_UVS))
+                let uv = |bit| twin::corner_uv(&attributes, triangle, corner, bit);
+                twin::image_coordinates(used, uv(ATTRIBUTE_FIRST_UVS), uv(ATTRIBUTE_SECOND_UVS))
             });
             let [a, b, c] = accel.triangle(triangle).vertices.map(|v| Vec3::from(v.position));
             let image = [image[1] - image[0], image[2] - image[0]];
             tangent = gradient_tangent([b - a, c - a], image, normal);
         }
-        let texel = lookup::texture_value(&words, &textures.uses, use_index, at.uv0, at.uv1);
-        let mapped = lookup::mapped_normal(
+        let texel = twin::texture_value(&words, &textures.uses, use_index, at.uv0, at.uv1);
+        let mapped = twin::mapped_normal(
             texel.truncate(),
             surface.normal_scale,
             tangent,

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
-    brdf::{self, MaterialTables},
+    brdf::MaterialTables,
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
     math::{equal_area::direction_from_square, frame::frame_from_normal, random::hash_4d},
     pass::{Pass, PathDemand, SceneBuffers, Steps, Surfaces, WaveBuffers},
@@ -19,7 +19,7 @@ use fenestra::{
         pilot::Tables,
         rays::RaySteps,
         regions::Partition,
-        tiles::{self, Entry, SectorGrid, TileBuffers, TileCache, TileDensity, TilesParameters},
+        tiles::{self, Entry, SectorGrid, TileBuffers, TileCache, TilesParameters},
     },
     scene::{
         Geometry, Scene,
@@ -34,13 +34,19 @@ use fenestra::{
 };
 use glam::{DVec3, Vec2, Vec3, vec2, vec3};
 
-use crate::support::{
-    self,
-    hemisphere::{self, BINS},
-    materials, render,
-    replicates::{self, LIMIT},
-    scenes,
-    statistics::{Comparison, chi_square_p_value},
+use crate::{
+    support::{
+        self,
+        hemisphere::{self, BINS},
+        materials, render,
+        replicates::{self, LIMIT},
+        scenes,
+        statistics::{Comparison, chi_square_p_value},
+    },
+    twin::{
+        brdf,
+        tiles::{TileDensity, sector_of},
+    },
 };
 
 /// Chance of a false alarm of one χ² test; there are 12.
@@ -332,7 +338,7 @@ fn the_shader_agrees() {
         let (mut sectors, mut pdfs, mut draws) = (0, 0, 0);
         for (query, answer) in queries.iter().zip(cache.probe(&queries)) {
             let (position, shift) = (query.position.into(), query.shift.into());
-            let sector = GRID.sector_of(&cache.parameters, position, shift);
+            let sector = sector_of(GRID, &cache.parameters, position, shift);
             let density = cache.density(&tables, query.sector);
             let drawn = density.sample(query.bits, query.more_bits);
             let is_same = drawn.direction.distance(answer.direction.into()) < 1e-3
@@ -424,7 +430,7 @@ fn rays_follow_the_density_that_they_are_divided_by() {
         let tables = EnvironmentTables::new(&cache.scene.environment);
         let brdfs = MaterialTables::new(&cache.scene.materials).unwrap();
         // The product_state probe puts all paths at the origin.
-        let sector = GRID.sector_of(&cache.parameters, Vec3::ZERO, Vec2::ZERO);
+        let sector = sector_of(GRID, &cache.parameters, Vec3::ZERO, Vec2::ZERO);
         let density = cache.density(&tables, sector);
         of_states.push([0, 1, 2, 3].map(|material: usize| {
             let name = format!("material {material}, learned {is_learned}");

@@ -18,10 +18,13 @@ use obvhs::{
     rt_triangle::RtTriangle,
 };
 
-use crate::support::{
-    device,
-    random::Random,
-    rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, scaled, soup, sphere},
+use crate::{
+    support::{
+        device,
+        random::Random,
+        rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, scaled, soup, sphere},
+    },
+    twin::surface::surface_at,
 };
 
 /// Finds the distance of the nearest triangle by testing all of them in double precision. The second
@@ -462,7 +465,7 @@ fn surfaces_are_consistent() {
         assert!(geometric.dot(direction) <= 0.0, "{hit:?}");
         assert!(shading.dot(direction) < 0.0, "{hit:?}");
         assert!(position.distance(origin + hit.distance * direction) < 1e-5, "{hit:?}");
-        let twin = accel.surface_at(hit.triangle, NO_INSTANCE, origin, direction);
+        let twin = surface_at(&accel, hit.triangle, NO_INSTANCE, origin, direction);
         assert!(twin.position.distance(position) < 1e-6, "{hit:?} {twin:?}");
         assert!(twin.geometric_normal.distance(geometric) < 1e-5, "{hit:?} {twin:?}");
         assert!(twin.shading_normal.distance(shading) < 1e-4, "{hit:?} {twin:?}");

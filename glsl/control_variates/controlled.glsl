@@ -1,6 +1,6 @@
 // One shadow ray chosen among candidates, with the expected visibility of all candidates as control
 // variate. [Clarberg & Akenine-Möller 2008b], [Lavenberg & Welch 1981]. Twin of
-// src/sampler/control_variates/controlled.rs.
+// tests/twin/control_variates.rs.
 //
 // Candidate c has the weight w_c, its integrand without occlusion over its density, and the control h_c:
 // a times the expected visibility v_c, as a bit or as a share. With n candidates, one of them, i, chosen

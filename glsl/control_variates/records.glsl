@@ -1,5 +1,5 @@
 // Visibility records: shares of visible rays by place in the scene and direction, counted in a pilot.
-// [Clarberg & Akenine-Möller 2008b]. Twin of src/sampler/control_variates/records.rs.
+// [Clarberg & Akenine-Möller 2008b]. Twin of tests/twin/control_variates.rs.
 //
 // A record belongs to all places that share a cube of a grid and the face of the cube that their normals
 // point at; its bins are equal parts of the sphere. The edge of the cubes grows with the distance to the

@@ -1,5 +1,5 @@
 // Directional bins of arriving light: a grid over the octahedral map [Cigolle et al. 2014, A Survey
-// of Efficient Representations for Independent Unit Vectors]. Twin of src/sampler/guided/arriving.rs.
+// of Efficient Representations for Independent Unit Vectors]. Twin of tests/twin/guided.rs.
 
 uint arrival_direction(vec3 direction) {
     vec2 place = direction.xy / (abs(direction.x) + abs(direction.y) + abs(direction.z));

@@ -1,6 +1,6 @@
 // Product of environment and BRDF at one hit, constant over each of 4^LEVEL nodes of the sphere but for
 // the environment's own detail below. [Clarberg & Akenine-Möller 2008]. Densities in solid angle
-// measure. Twin of src/sampler/haar/twin.rs.
+// measure. Twin of tests/twin/haar.rs.
 //
 // A direction in node m has the density r(m) L / Z: L is the luminance of the environment's texel there,
 // r(m) the mean of BRDF * cosine over the node, lowered by what the cache knows, and Z the sum of the

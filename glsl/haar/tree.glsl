@@ -1,5 +1,5 @@
 // Quadtree over the equal-area square: means of the environment's luminance, and hierarchical warping.
-// [Clarberg et al. 2005], section 5; [Clarberg & Akenine-Möller 2008]. Twin of src/sampler/haar/tree.rs.
+// [Clarberg et al. 2005], section 5; [Clarberg & Akenine-Möller 2008]. Twin of tests/twin/haar.rs.
 //
 // Nodes of a level are numbered in Morton order. A texel of a node holds the means of its four
 // children, which is the same information as its mean and its three Haar coefficients.

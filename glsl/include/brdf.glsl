@@ -1,5 +1,5 @@
-// Reflection models: evaluate, pdf, sample and directional albedo of every material. Twin of
-// src/brdf/twin.rs, same names, same order.
+// Reflection models: evaluate, pdf, sample and directional albedo of every material. Twins:
+// src/brdf/value.rs and tests/twin/brdf.rs, same names, same order.
 //
 // Directions are unit vectors in the shading frame (z is the normal) and point away from the
 // surface. Values are per steradian without the cosine; pdfs are per steradian of incident

@@ -1,5 +1,5 @@
 // Traversal of the compressed wide BVH, one step at a time, so that a pass may keep several rays in
-// flight per invocation. Twin: src/accel/traverse.rs.
+// flight per invocation. Twins: src/accel/traverse.rs, tests/twin/surface.rs.
 //
 // [Ylitie et al. 2017]. Node layout as in obvhs (planes of x, y, z; low bytes first):
 //   texel 0: corner.xyz, exponents x, y, z and the mask of inner children (one byte each)

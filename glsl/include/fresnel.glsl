@@ -1,5 +1,5 @@
-// Reflectance of smooth interfaces: dielectrics, conductors, Schlick's approximation, thin panes. Twin
-// of src/brdf/fresnel.rs, same names, same order. No buffers, so that traversal may include it.
+// Reflectance of smooth interfaces: dielectrics, conductors, Schlick's approximation, thin panes. No
+// buffers, so that traversal may include it. Twins: src/brdf/fresnel.rs, tests/twin/specular.rs.
 
 #include "layout.glsl"
 

@@ -1,5 +1,5 @@
-// GGX microfacets: density of normals, masking, reflection, sampling. Twin of src/brdf/ggx.rs, same
-// names, same order. Densities are per steradian of incident directions unless stated.
+// GGX microfacets: density of normals, masking, reflection, sampling. Twins: src/brdf/ggx.rs,
+// tests/twin/specular.rs. Densities are per steradian of incident directions unless stated.
 
 #include "frame.glsl"
 

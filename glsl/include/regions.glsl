@@ -1,5 +1,5 @@
 // Cells of rectangles of the environment, drawn in proportion to their light. Twin of
-// src/sampler/regions/partition.rs.
+// tests/twin/regions.rs.
 
 #include "environment.glsl"
 #include "random.glsl"

@@ -1,5 +1,5 @@
 // Mirrors, dielectrics and thin panes: materials at which paths go on in a sampled direction, and no
-// light is sampled. Twin of src/brdf/specular.rs, same names, same order.
+// light is sampled. Twin of tests/twin/specular.rs, same names, same order.
 //
 // Directions are unit vectors in the shading frame, whose z points to the side of the viewer, and point
 // away from the surface: transmitted ones have z < 0. Values are per steradian without the cosine.

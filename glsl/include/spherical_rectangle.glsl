@@ -1,5 +1,5 @@
 // Rectangle seen from a point: its solid angle, and directions into it. Twin of
-// src/math/spherical_rectangle.rs, which says where the numbers are good.
+// tests/twin/spherical_rectangle.rs, which says where the numbers are good.
 
 // Below this solid angle, directions are uniform over the area instead of over the solid angle.
 const float LEAST_UNIFORM_SOLID_ANGLE = 1e-2;

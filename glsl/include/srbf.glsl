@@ -1,6 +1,6 @@
-// Gaussian spherical radial basis functions: the twin of src/srbf, same names, same order.
+// Gaussian spherical radial basis functions: twins src/srbf.rs and tests/twin/srbf.rs.
 // Densities and integrals cover the whole sphere, in solid angle. The forms hold in 32-bit floats
-// for bandwidths from 1e-3 to 1e5; src/srbf gives the reason for each.
+// for bandwidths from 1e-3 to 1e5; the twins give the reason for each.
 
 const float SRBF_PI = 3.14159265358979;
 

@@ -1,5 +1,5 @@
-// Textures, attributes of triangles and normal maps. Twins: src/surface/lookup.rs,
-// crates/scene/src/texture/lookup.rs and src/accel/attributes.rs.
+// Textures, attributes of triangles and normal maps. Twins: tests/twin/texture.rs
+// and crates/scene/src/texture/lookup.rs.
 //
 // Lookups read the full resolution. A mip level would average texels over an area that the pixel
 // filter averages anyway once samples add up, and so blur the picture: a bias that no number of

@@ -1,5 +1,5 @@
 // Sectors of the directions from the camera, in which visibility is learned, and tiles of the environment.
-// Twin of src/sampler/tiles/{grid,density}.rs.
+// Twin of tests/twin/tiles.rs.
 
 #include "environment.glsl"
 #include "equal_area.glsl"

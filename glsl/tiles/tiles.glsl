@@ -1,5 +1,5 @@
 // Directions through tiles of the environment, by what a sector of the camera has learned of them. Densities
-// in solid angle measure. Twin of src/sampler/tiles/density.rs.
+// in solid angle measure. Twin of tests/twin/tiles.rs.
 //
 // A sector's entries come from the pilot and do not change afterwards.
 

@@ -1,7 +1,7 @@
-//! Texture coordinates, tangents and colours of triangles in BVH order, as the shaders read them: twin
-//! of `triangle_attributes` in `glsl/include/texture.glsl`.
+//! Texture coordinates, tangents and colours of triangles in BVH order, as `triangle_attributes` in
+//! `glsl/include/texture.glsl` reads them.
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::Accel;
@@ -25,19 +25,6 @@ fn own_attributes(geometry: &Geometry) -> u32 {
         | bit(geometry.uvs[1].is_empty(), ATTRIBUTE_SECOND_UVS)
         | bit(geometry.tangents.is_empty(), ATTRIBUTE_TANGENT)
         | bit(geometry.colors.is_empty(), ATTRIBUTE_COLOR)
-}
-
-/// Attributes of a point of a triangle, as in the shader.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Attributes {
-    /// First set of texture coordinates; 0 where there is none.
-    pub uv0: Vec2,
-    /// Second set.
-    pub uv1: Vec2,
-    /// Tangent of any length along u of the first set, and sign of the bitangent; 0 for none.
-    pub tangent: Vec4,
-    /// Linear colour and opacity; 1 where there is none.
-    pub color: Vec4,
 }
 
 /// Words of the attributes of all triangles.
@@ -72,50 +59,6 @@ impl TriangleAttributes {
             }
         }
         Self { bits, words }
-    }
-
-    fn corner_attribute(&self, triangle: u32, corner: u32, bit: u32) -> [u32; 2] {
-        let place = 2 * (self.bits & (bit - 1)).count_ones();
-        let stride = 2 * self.bits.count_ones();
-        let word = ((3 * triangle + corner) * stride + place) as usize;
-        [self.words[word], self.words[word + 1]]
-    }
-
-    /// Texture coordinates `ATTRIBUTE_FIRST_UVS` or `ATTRIBUTE_SECOND_UVS` at a corner (0 to 2).
-    pub fn corner_uv(&self, triangle: u32, corner: u32, bit: u32) -> Vec2 {
-        if self.bits & bit == 0 {
-            return Vec2::ZERO;
-        }
-        self.corner_attribute(triangle, corner, bit).map(f32::from_bits).into()
-    }
-
-    /// Attributes at the point of a triangle in BVH order with these barycentric coordinates.
-    pub fn triangle_attributes(&self, triangle: u32, weights: Vec3) -> Attributes {
-        let uv = |bit| {
-            let [a, b, c] = [0, 1, 2].map(|corner| self.corner_uv(triangle, corner, bit));
-            weights.x * a + weights.y * b + weights.z * c
-        };
-        let (uv0, uv1) = (uv(ATTRIBUTE_FIRST_UVS), uv(ATTRIBUTE_SECOND_UVS));
-        let mut attributes = Attributes { uv0, uv1, tangent: Vec4::ZERO, color: Vec4::ONE };
-        if self.bits & ATTRIBUTE_TANGENT != 0 {
-            let [a, b, c] =
-                [0, 1, 2].map(|corner| self.corner_attribute(triangle, corner, ATTRIBUTE_TANGENT));
-            if ![a[0], b[0], c[0]].contains(&FLAT_NORMAL) {
-                let tangent = weights.x * octahedron::unpack(a[0])
-                    + weights.y * octahedron::unpack(b[0])
-                    + weights.z * octahedron::unpack(c[0]);
-                attributes.tangent = tangent.extend(f32::from_bits(a[1]));
-            }
-        }
-        if self.bits & ATTRIBUTE_COLOR != 0 {
-            let color = |corner| {
-                let [low, high] = self.corner_attribute(triangle, corner, ATTRIBUTE_COLOR);
-                let shorts = [low, low >> 16, high, high >> 16].map(|word| word as u16);
-                Vec4::from(shorts.map(f32::from)) / 65_535.0
-            };
-            attributes.color = weights.x * color(0) + weights.y * color(1) + weights.z * color(2);
-        }
-        attributes
     }
 }
 

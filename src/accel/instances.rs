@@ -150,14 +150,6 @@ impl Record {
         map_point(&self.world_from_object, position)
     }
 
-    /// Takes a normal of the mesh to the world, a unit vector unless it has no direction.
-    pub(crate) fn normal_to_world(&self, normal: Vec3) -> Vec3 {
-        let [x, y, z] = self.object_from_world.map(|[x, y, z, _]| Vec3::new(x, y, z));
-        let world = normal.x * x + normal.y * y + normal.z * z;
-        let largest = world.abs().max_element();
-        if largest > 0.0 { (world / largest).normalize() } else { Vec3::ZERO }
-    }
-
     /// Growth of node boxes for a ray that starts at `origin`.
     pub(super) fn margin_from(&self, origin: Vec3) -> Vec3 {
         Vec3::from(self.margin) * (self.reach + origin.abs().max_element())

@@ -13,7 +13,7 @@
 pub mod attributes;
 mod binary;
 pub mod instances;
-pub(crate) mod traverse;
+pub mod traverse;
 
 use std::ops::RangeInclusive;
 

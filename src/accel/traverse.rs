@@ -4,11 +4,10 @@
 
 use glam::{UVec2, Vec3};
 
-use super::{Accel, Node, TriangleRecord, VertexRecord, instances::Record};
-use crate::math::octahedron;
+use super::{Accel, Node, instances::Record};
 use crate::{
     math::frame::{Frame, frame_from_normal},
-    shader::constants::{BVH_STACK_ENTRIES, FLAT_NORMAL, NO_INSTANCE},
+    shader::constants::{BVH_STACK_ENTRIES, NO_INSTANCE},
 };
 
 /// Closest hit of a ray.
@@ -20,19 +19,6 @@ pub struct Intersection {
     pub instance: u32,
     /// Distance along the ray, metres.
     pub distance: f32,
-}
-
-/// Surface where a ray meets a triangle; twin of the shader's `Hit`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Surface {
-    /// Point on the triangle, metres.
-    pub position: Vec3,
-    /// Distance along the ray, metres.
-    pub distance: f32,
-    /// Unit normal of the triangle, turned toward the ray's origin.
-    pub geometric_normal: Vec3,
-    /// Unit interpolated normal, turned toward the ray's origin, with a positive cosine to it.
-    pub shading_normal: Vec3,
 }
 
 /// Work done for one ray.
@@ -51,9 +37,6 @@ const FAR_AWAY: f32 = 3.0e38;
 
 /// Offset of ray origins from their surface, as a share of the scene's size.
 const RAY_OFFSET_SHARE: f32 = 3.814_697_3e-6;
-
-/// Cosine with the outgoing direction below which shading normals are turned.
-const LEAST_SHADING_COSINE: f32 = 0.01;
 
 impl Accel {
     /// Finds the first triangle that the ray meets; `direction` is a unit vector.
@@ -83,65 +66,6 @@ impl Accel {
         Traversal::start(self, origin, direction, any_hit)
     }
 
-    /// Material of a triangle in an instance, or in a tree of one level with `NO_INSTANCE`.
-    ///
-    /// # Panics
-    /// Either is out of range.
-    pub fn triangle_material(&self, triangle: u32, instance: u32) -> u32 {
-        let own = self.triangle_materials[triangle as usize];
-        self.instances
-            .get(instance as usize)
-            .map_or(own, |instance| instance.first_material + (own & instance.material_mask))
-    }
-
-    /// Computes the surface that a ray meets on `triangle` in `instance`, which is `NO_INSTANCE` in a
-    /// tree of one level.
-    ///
-    /// # Panics
-    /// `triangle` is out of range.
-    pub fn surface_at(
-        &self,
-        triangle: u32,
-        instance: u32,
-        origin: Vec3,
-        direction: Vec3,
-    ) -> Surface {
-        let TriangleRecord { vertices } = self.triangle(triangle);
-        let instance = self.instances.get(instance as usize);
-        let [a, b, c] = vertices.map(|vertex| placed(instance, vertex.position));
-        let frame = frame_from_normal(direction);
-        let local = [a, b, c].map(|vertex| frame.to_local(vertex - origin));
-        let areas = edge_functions(local);
-        let area = areas.x + areas.y + areas.z;
-        let weights = areas / area;
-        let normal = (b - a).cross(c - a);
-        let normal = (normal / normal.abs().max_element()).normalize();
-        let geometric_normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
-        let mut shading_normal = geometric_normal;
-        if vertices[0].normal != FLAT_NORMAL {
-            let [a, b, c] = vertices.map(|vertex: VertexRecord| {
-                let normal = octahedron::unpack(vertex.normal);
-                instance.map_or(normal, |instance| instance.normal_to_world(normal))
-            });
-            let interpolated = weights.x * a + weights.y * b + weights.z * c;
-            if interpolated.length_squared() > 1e-12 {
-                let unit = interpolated.normalize();
-                shading_normal = if unit.dot(geometric_normal) < 0.0 { -unit } else { unit };
-            }
-        }
-        let cosine = -geometric_normal.dot(direction);
-        Surface {
-            position: weights.x * a + weights.y * b + weights.z * c,
-            distance: depth(areas, local) / area,
-            geometric_normal,
-            shading_normal: consistent_normal(
-                shading_normal,
-                -direction,
-                LEAST_SHADING_COSINE.min(cosine).max(1e-6),
-            ),
-        }
-    }
-
     /// Offset of ray origins from their surface, metres.
     pub fn ray_offset(&self) -> f32 {
         let root = &self.nodes[0];
@@ -166,30 +90,19 @@ impl Accel {
 }
 
 /// Position of a vertex in the world.
-fn placed(instance: Option<&Record>, position: [f32; 3]) -> Vec3 {
+pub fn placed(instance: Option<&Record>, position: [f32; 3]) -> Vec3 {
     let position = Vec3::from_array(position);
     instance.map_or(position, |instance| instance.point_to_world(position))
 }
 
-/// Turns a shading normal toward `outgoing_direction` until their cosine is at least `least`.
-fn consistent_normal(shading_normal: Vec3, outgoing_direction: Vec3, least: f32) -> Vec3 {
-    let cosine = shading_normal.dot(outgoing_direction);
-    let tangential = shading_normal - cosine * outgoing_direction;
-    let size = tangential.length();
-    if cosine >= least || size == 0.0 {
-        return shading_normal;
-    }
-    tangential * ((1.0 - least * least).sqrt() / size) + least * outgoing_direction
-}
-
 /// Twice the signed areas of the three sub-triangles around a ray, given the vertices in its frame.
 /// \[Woop et al. 2013\], with an orthonormal frame for the shear.
-fn edge_functions([a, b, c]: [Vec3; 3]) -> Vec3 {
+pub fn edge_functions([a, b, c]: [Vec3; 3]) -> Vec3 {
     Vec3::new(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x)
 }
 
 /// Sum of the vertices' distances along the ray, weighted by `areas`.
-fn depth(areas: Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
+pub fn depth(areas: Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
     areas.x * a.z + areas.y * b.z + areas.z * c.z
 }
 

@@ -18,7 +18,7 @@ pub fn ggx_normal_density(half_vector: Vec3, alpha: f32) -> f32 {
 }
 
 /// Length of the direction after stretching the surface to α = 1: √(cos²θ + α² sin²θ).
-pub(crate) fn ggx_stretched_length(direction: Vec3, alpha: f32) -> f32 {
+pub fn ggx_stretched_length(direction: Vec3, alpha: f32) -> f32 {
     (alpha * direction.truncate()).extend(direction.z).length()
 }
 
@@ -46,7 +46,7 @@ pub(crate) fn ggx_reflection(
 }
 
 /// Density of [`ggx_sample`]. \[Eto & Tokuyoshi 2023\] Eq. 8 with the Jacobian of the reflection.
-pub(crate) fn ggx_pdf(half_vector: Vec3, outgoing_local: Vec3, alpha: f32) -> f32 {
+pub fn ggx_pdf(half_vector: Vec3, outgoing_local: Vec3, alpha: f32) -> f32 {
     let cap = ggx_cap_factor(outgoing_local, alpha) * outgoing_local.z
         + ggx_stretched_length(outgoing_local, alpha);
     0.5 * ggx_normal_density(half_vector, alpha) / cap
@@ -54,12 +54,7 @@ pub(crate) fn ggx_pdf(half_vector: Vec3, outgoing_local: Vec3, alpha: f32) -> f3
 
 /// Samples a normal by its projection toward the outgoing direction, on the spherical cap above
 /// −`cap_factor`; a factor of 1 gives all visible normals. \[Dupuy & Benyoub 2023\].
-pub(crate) fn ggx_normal_sample(
-    outgoing_local: Vec3,
-    alpha: f32,
-    cap_factor: f32,
-    u: Vec2,
-) -> Vec3 {
+pub fn ggx_normal_sample(outgoing_local: Vec3, alpha: f32, cap_factor: f32, u: Vec2) -> Vec3 {
     let stretched = (alpha * outgoing_local.truncate()).extend(outgoing_local.z).normalize();
     let cap = cap_factor * stretched.z;
     // 1 − z rather than z keeps the root below accurate near the pole.
@@ -70,26 +65,10 @@ pub(crate) fn ggx_normal_sample(
     (alpha * normal.truncate()).extend(normal.z.max(1e-7)).normalize()
 }
 
-/// Density of all visible normals, per steradian, over the cosine of outgoing direction and normal:
-/// G₁·D/cosθ_o. \[Heitz 2014\] Eq. 21.
-pub(crate) fn ggx_visible_density(normal: Vec3, outgoing_local: Vec3, alpha: f32) -> f32 {
-    2.0 * ggx_normal_density(normal, alpha)
-        / (outgoing_local.z + ggx_stretched_length(outgoing_local, alpha))
-}
-
-/// G₂ of both directions over G₁ of the outgoing one; height-correlated on one side, and the same
-/// expression where the other direction is below the surface. 0…1.
-pub(crate) fn ggx_masking_ratio(outgoing_local: Vec3, incident_local: Vec3, alpha: f32) -> f32 {
-    let cosine = incident_local.z.abs();
-    let stretched = ggx_stretched_length(outgoing_local, alpha);
-    (outgoing_local.z + stretched) * cosine
-        / (stretched * cosine + outgoing_local.z * ggx_stretched_length(incident_local, alpha))
-}
-
 /// Samples an incident direction by the visible normals of GGX, on the spherical cap that omits
 /// most reflections below the surface. Those that remain have z ≤ 0: no sample. \[Dupuy & Benyoub
 /// 2023\], \[Eto & Tokuyoshi 2023\].
-pub(crate) fn ggx_sample(outgoing_local: Vec3, alpha: f32, u: Vec2) -> Vec3 {
+pub fn ggx_sample(outgoing_local: Vec3, alpha: f32, u: Vec2) -> Vec3 {
     let cap_factor = ggx_cap_factor(outgoing_local, alpha);
     let normal = ggx_normal_sample(outgoing_local, alpha, cap_factor, u);
     2.0 * outgoing_local.dot(normal) * normal - outgoing_local

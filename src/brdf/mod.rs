@@ -1,11 +1,10 @@
-//! Reflection models: materials of the scene → [`MaterialTables`] for the device, and the twin of
-//! `glsl/include/brdf.glsl` that reads them: evaluate, pdf, sample and directional albedo.
+//! Reflection models: materials of the scene → [`MaterialTables`] for the device, and their values. The
+//! sampling of `glsl/include/brdf.glsl` and `specular.glsl` has its twin in `tests/twin`.
 //!
 //! Directions are unit vectors in the shading frame (z is the normal) and point away from the
-//! surface. Values are per steradian without the cosine; pdfs are per steradian of incident
-//! directions. Both are 0 unless both directions are above the surface. Mirrors, dielectrics and thin
-//! panes send light where no other sampling finds it: paths follow them by [`specular`], and their
-//! value and pdf here are 0.
+//! surface. Values are per steradian without the cosine, and 0 unless both directions are above the
+//! surface. Mirrors, dielectrics and thin panes send light where no other sampling finds it: paths follow
+//! them by `specular.glsl`, and their value here is 0.
 //!
 //! | kind | value | samples |
 //! |---|---|---|
@@ -27,24 +26,12 @@ pub mod fresnel;
 pub mod ggx;
 pub mod materials;
 pub mod sanity;
-pub mod specular;
-pub mod twin;
+mod value;
 
 use glam::Vec3;
 
 pub use materials::MaterialTables;
-
-/// Value of a material (1/sr, without the cosine) and density of [`sample`], which integrates to 1 less
-/// the share of samples below the surface.
-pub fn evaluate_and_pdf(
-    tables: &MaterialTables,
-    material_index: usize,
-    outgoing_local: Vec3,
-    incident_local: Vec3,
-) -> (Vec3, f32) {
-    let material = &tables.materials[material_index];
-    twin::brdf_evaluate_and_pdf(&tables.words, material, outgoing_local, incident_local)
-}
+pub use value::brdf_evaluate;
 
 /// Value of a material, 1/sr, without the cosine.
 pub fn evaluate(
@@ -53,20 +40,5 @@ pub fn evaluate(
     outgoing_local: Vec3,
     incident_local: Vec3,
 ) -> Vec3 {
-    evaluate_and_pdf(tables, material_index, outgoing_local, incident_local).0
-}
-
-/// Samples an incident direction with three numbers in [0, 1); z ≤ 0 means no sample.
-pub fn sample(
-    tables: &MaterialTables,
-    material_index: usize,
-    outgoing_local: Vec3,
-    u: Vec3,
-) -> Vec3 {
-    twin::brdf_sample(&tables.words, &tables.materials[material_index], outgoing_local, u)
-}
-
-/// Share of light from a uniform white hemisphere reflected toward the outgoing direction.
-pub fn albedo(tables: &MaterialTables, material_index: usize, outgoing_local: Vec3) -> Vec3 {
-    twin::brdf_albedo(&tables.words, &tables.materials[material_index], outgoing_local)
+    brdf_evaluate(&tables.words, &tables.materials[material_index], outgoing_local, incident_local)
 }

@@ -20,7 +20,7 @@ use crate::{
     film::{png::write_rgb8, sky::white},
     math::colour::{display_from_linear, luminance},
     scene::EnvironmentMap,
-    srbf::{Mixture, kernel_value},
+    srbf::{kernel_value, lobe_value},
 };
 
 /// Width of one lat-long panel, pixels.
@@ -137,7 +137,6 @@ pub(crate) fn write_brdf(
         let view = &fit.views[row * (fit.views.len() - 1) / (rows - 1).max(1)];
         let theta = view.theta;
         let outgoing_local = Vec3::new(theta.sin(), 0.0, theta.cos());
-        let mixture = Mixture { lobes: view.lobes.clone() };
         let pixel = |index: usize| {
             let side = DISK as f32;
             let x = ((index % DISK) as f32 + 0.5) / side * 2.0 - 1.0;
@@ -149,7 +148,8 @@ pub(crate) fn write_brdf(
             let incident_local = Vec3::new(x, y, (1.0 - squared).sqrt());
             let value = brdf::evaluate(tables, material_index, outgoing_local, incident_local);
             let data = luminance(value) * incident_local.z;
-            (Some(Vec3::splat(data)), Some(Vec3::splat(mixture.value(incident_local))))
+            let fit = view.lobes.iter().map(|lobe| lobe_value(lobe, incident_local)).sum();
+            (Some(Vec3::splat(data)), Some(Vec3::splat(fit)))
         };
         let (data, fit) = (0..DISK * DISK).into_par_iter().map(pixel).unzip();
         Panels { width: DISK, height: DISK, data, fit }

@@ -21,12 +21,11 @@ use std::collections::BTreeMap;
 
 use clap::{ValueEnum, builder::PossibleValue};
 pub use parameters::Parameters;
-use rays::RaySteps;
 
 use crate::{
     error::{Error, Result},
     film::Aov,
-    pass::{PathDemand, Runner, Surfaces, Technique},
+    pass::{PathDemand, Runner, Technique},
     scene::Scene,
     shader::rooms::registry,
 };
@@ -86,12 +85,6 @@ pub trait Room: Sync {
     /// Memory per path in flight.
     fn demand(&self, _parameters: &Parameters, _shadow_rays: u32) -> PathDemand {
         PathDemand::default()
-    }
-
-    /// Steps by name, those of a pilot too, of a room whose [`RaySteps`] need nothing of a scene that would
-    /// change their passes: `docs/architecture.md` lists them.
-    fn listed_steps(&self, _: &Parameters, _: Surfaces) -> Result<Vec<(&'static str, RaySteps)>> {
-        Ok(Vec::new())
     }
 
     /// Creates tables, buffers and passes for one render. Fails if the device does or its limits
@@ -228,11 +221,6 @@ impl Sampler {
     /// Memory per path in flight.
     pub fn demand(self, parameters: &Parameters, shadow_rays: u32) -> PathDemand {
         self.room().demand(parameters, shadow_rays)
-    }
-
-    /// Returns steps by name, as the page of passes lists them, of samplers that draw ray by ray.
-    pub fn listed_steps(self, surfaces: Surfaces) -> Result<Vec<(&'static str, RaySteps)>> {
-        self.room().listed_steps(&Parameters::default(), surfaces)
     }
 
     /// Creates the technique of one render. Fails if the device does or its limits are exceeded.

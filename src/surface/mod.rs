@@ -1,6 +1,5 @@
 //! Textures, opacity and emission of the scene's materials → the buffers of the device.
 
-pub mod lookup;
 pub mod textures;
 
 use crate::{

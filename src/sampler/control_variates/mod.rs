@@ -10,7 +10,6 @@
 //! is unbiased whatever the records hold.
 
 mod buffers;
-pub mod controlled;
 mod parameters;
 mod records;
 mod steps;
@@ -20,12 +19,12 @@ use std::collections::BTreeMap;
 pub use buffers::RecordBuffers;
 pub use parameters::ControlVariatesParameters;
 pub use records::RecordGrid;
-use steps::{pilot_steps, steps};
+pub use steps::{pilot_steps, steps};
 
-use super::{Context, Parameters, Room, basic, knob::Knobs, pilot::Piloted, rays::RaySteps};
+use super::{Context, Parameters, Room, basic, knob::Knobs, pilot::Piloted};
 use crate::{
     error::{Error, Result},
-    pass::{Surfaces, Technique},
+    pass::Technique,
 };
 
 pub(super) struct ControlVariatesRoom;
@@ -49,18 +48,6 @@ impl Room for ControlVariatesRoom {
         named.insert("candidates".to_owned(), candidates.to_string());
         named.extend(basic::MIS.describe(parameters));
         named
-    }
-
-    fn listed_steps(
-        &self,
-        parameters: &Parameters,
-        surfaces: Surfaces,
-    ) -> Result<Vec<(&'static str, RaySteps)>> {
-        let grid = RecordGrid { side: 16, edge_per_distance: 0.1, largest_edge: 1.0 };
-        Ok(vec![
-            ("control-variates", steps(parameters, grid, surfaces)?),
-            ("pilot of control-variates", pilot_steps(parameters, grid, surfaces)?),
-        ])
     }
 
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {

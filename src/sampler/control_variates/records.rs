@@ -1,12 +1,9 @@
-//! Visibility records on the host: where a place and a direction are counted, and counts → expected
-//! visibility. Twin of `glsl/control_variates/records.glsl`.
-
-use glam::Vec3;
+//! Visibility records on the host: their cubes and bins, and counts → expected visibility. Places and
+//! directions find their record by `glsl/control_variates/records.glsl`.
 
 use super::parameters::ControlVariatesParameters;
 use crate::{
-    math::{equal_area::square_from_direction, random::hash_4d},
-    sampler::regions::{FACE_COUNT, cell_edges, face_normal},
+    sampler::regions::cell_edges,
     scene::Scene,
     shader::rooms::control_variates::{
         CONSTANT_RECORD_EDGE, CONSTANT_RECORD_LARGEST_EDGE, CONSTANT_RECORD_SIDE,
@@ -47,31 +44,6 @@ impl RecordGrid {
             (CONSTANT_RECORD_EDGE, self.edge_per_distance.to_bits()),
             (CONSTANT_RECORD_LARGEST_EDGE, self.largest_edge.to_bits()),
         ]
-    }
-
-    /// Index of the record for a place on a surface.
-    pub fn record_of(&self, position: Vec3, normal: Vec3, camera: Vec3) -> u32 {
-        let wanted = self.largest_edge.min(self.edge_per_distance * position.distance(camera));
-        let edge = f32::from_bits(wanted.max(1e-9).to_bits() & 0x7f80_0000);
-        let cube = (position / edge).floor().clamp(Vec3::splat(-1e9), Vec3::splat(1e9)).as_ivec3();
-        // The first of the faces that a normal points at most.
-        let along = |face: &usize| face_normal(*face).dot(normal);
-        let face = (1..FACE_COUNT).fold(
-            0,
-            |best, face| {
-                if along(&face) > along(&best) { face } else { best }
-            },
-        );
-        let kind = (face as u32) << 8 | edge.to_bits() >> 23;
-        let [x, y, z] = cube.to_array().map(|place| place as u32);
-        hash_4d([x, y, z, kind])[0] & (VISIBILITY_RECORDS - 1)
-    }
-
-    /// Index of a direction's entry in a record, among those of all records.
-    pub fn entry(&self, record: u32, direction: Vec3) -> u32 {
-        let at = square_from_direction(direction) * self.side as f32;
-        let [column, row] = at.to_array().map(|place| (place as u32).min(self.side - 1));
-        (record * self.side + row) * self.side + column
     }
 
     /// Expected visibility of all entries from their rays and visible rays. A record that has counted n

@@ -6,7 +6,6 @@
 //! other surfaces. Bounces are resampled by the result, so its errors cost precision only (Vorba et
 //! al. 2014 guide paths by learned light, fitted with mixtures of Gaussians).
 
-use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::sampler::{guided::cells::Tree, regions::FACE_COUNT};
@@ -31,19 +30,6 @@ const MAX_SUM: f32 = 1e30;
 /// Bounce rays in one direction of one cell. Files hold the bits of two floats, the number of rays
 /// and the sum of the light where they arrived; passes count rays and whole units of light.
 pub type ArrivalWords = [u32; 2];
-
-/// Index below [`ARRIVAL_DIRECTIONS`] of the direction of a unit vector, in a grid over the
-/// octahedron (Cigolle et al. 2014). Twin of `glsl/guided/arriving.glsl`.
-pub fn arrival_direction(direction: Vec3) -> usize {
-    let place = direction.truncate() / (direction.x.abs() + direction.y.abs() + direction.z.abs());
-    let sign = |value: f32| if value < 0.0 { -1.0 } else { 1.0 };
-    let folded =
-        Vec2::new((1.0 - place.y.abs()) * sign(place.x), (1.0 - place.x.abs()) * sign(place.y));
-    let place = if direction.z < 0.0 { folded } else { place };
-    let side = GUIDE_ARRIVAL_SIDE as f32;
-    let cell = |place: f32| ((0.5 * place + 0.5) * side).clamp(0.0, side - 1.0) as usize;
-    cell(place.y) * GUIDE_ARRIVAL_SIDE as usize + cell(place.x)
-}
 
 /// Number of bounce rays in one direction and sum of the light where they arrived.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -38,7 +38,7 @@ mod state;
 mod steps;
 mod technique;
 
-pub use arriving::{ARRIVAL_DIRECTIONS, ArrivalWords, ArrivingLight, Reflected, arrival_direction};
+pub use arriving::{ARRIVAL_DIRECTIONS, ArrivalWords, ArrivingLight, Reflected};
 pub use buffers::{GuideBuffers, GuideSize};
 pub use cell_readback::{CellLevel, CellReadback, RegionReadback};
 pub use cells::MAX_CELLS;

@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use super::{
     steps::cache_places,
-    tree::{Tree, first_of_level},
-    twin::node_centre,
+    tree::{Tree, first_of_level, node_centre},
 };
 use crate::{
     error::Result,

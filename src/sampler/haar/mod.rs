@@ -9,7 +9,6 @@ mod buffers;
 mod parameters;
 mod steps;
 pub mod tree;
-pub mod twin;
 
 use std::{collections::BTreeMap, time::Instant};
 

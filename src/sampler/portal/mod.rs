@@ -39,14 +39,6 @@ impl Room for PortalRoom {
         named
     }
 
-    fn listed_steps(
-        &self,
-        parameters: &Parameters,
-        surfaces: Surfaces,
-    ) -> Result<Vec<(&'static str, RaySteps)>> {
-        Ok(vec![("portal", steps(parameters, 1, surfaces))])
-    }
-
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
         let Context { scene, parameters, runner } = context;
         let count = scene.portals.len() as u32;

@@ -53,8 +53,6 @@ pub struct Region {
 pub struct Partition {
     /// Regions, which cover the map without overlap.
     pub regions: Vec<Region>,
-    /// Number of parents: [`PARENT_COUNT`] unless the map has fewer cells or regions.
-    pub parent_count: usize,
     /// Alias tables over the cells of each region, row by row, one region after another.
     pub entries: Vec<AliasEntry>,
     /// Region of every cell, `height + 1` rows of `width`.
@@ -206,7 +204,6 @@ impl Partition {
             entries.extend(table);
         }
         Self {
-            parent_count: rectangles.len().min(PARENT_COUNT),
             regions,
             entries,
             region_of_cell,
@@ -220,16 +217,5 @@ impl Partition {
     pub fn region_of(&self, map: &EnvironmentMap, direction: Vec3) -> usize {
         let (column, row, _) = map.locate(direction);
         usize::from(self.region_of_cell[(row * self.width + column) as usize])
-    }
-
-    /// Draws the column and row of a cell of region `index`, as the shader does: the first word of
-    /// `bits` chooses a column of the alias table, the second keeps it or takes its alias.
-    pub fn choose_cell(&self, index: usize, bits: [u32; 2]) -> [u32; 2] {
-        let region = &self.regions[index];
-        let count = region.size[0] * region.size[1];
-        let own = ((u64::from(bits[0]) * u64::from(count)) >> 32) as u32;
-        let entry = self.entries[region.first_entry + own as usize];
-        let chosen = if u64::from(bits[1]) < entry.threshold { own } else { entry.alias };
-        [region.first[0] + chosen % region.size[0], region.first[1] + chosen / region.size[0]]
     }
 }

@@ -1,14 +1,9 @@
-//! Sectors of the directions from the camera: twin of `sector_of` in `glsl/tiles/sectors.glsl`.
+//! Sectors of the directions from the camera, which `glsl/tiles/sectors.glsl` looks up.
 
 use std::f32::consts::PI;
 
-use glam::{Vec2, Vec3, vec3};
-
 use super::parameters::TilesParameters;
-use crate::{
-    math::equal_area::square_from_direction, sampler::regions::cell_edges, scene::Scene,
-    shader::structs::SceneParameters,
-};
+use crate::{sampler::regions::cell_edges, scene::Scene};
 
 /// Most entries of all sectors together: 32 MiB of counts, and as much of probabilities.
 const MOST_ENTRIES: usize = 1 << 22;
@@ -33,22 +28,5 @@ impl SectorGrid {
     /// Number of sectors.
     pub fn sectors(&self) -> usize {
         (self.side * self.side) as usize
-    }
-
-    /// Sector of a place as `camera` sees it, moved by `shift` sectors.
-    pub fn sector_of(&self, camera: &SceneParameters, position: Vec3, shift: Vec2) -> u32 {
-        let [right, up, forward] =
-            [camera.camera_right, camera.camera_up, camera.camera_forward].map(Vec3::from);
-        let away = position - Vec3::from(camera.camera_position);
-        let far = away.length();
-        let direction = if far > 0.0 { away / far } else { forward };
-        let at = square_from_direction(vec3(
-            direction.dot(right),
-            direction.dot(up),
-            direction.dot(forward),
-        ));
-        let last = Vec2::splat((self.side - 1) as f32);
-        let place = (at * self.side as f32 + shift).clamp(Vec2::ZERO, last);
-        place.y as u32 * self.side + place.x as u32
     }
 }

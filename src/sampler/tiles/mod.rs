@@ -22,7 +22,6 @@
 
 mod buffers;
 mod cache;
-mod density;
 mod grid;
 mod parameters;
 
@@ -30,7 +29,6 @@ use std::{collections::BTreeMap, time::Instant};
 
 pub use buffers::TileBuffers;
 pub use cache::{Entry, TileCache};
-pub use density::TileDensity;
 pub use grid::SectorGrid;
 pub use parameters::TilesParameters;
 
@@ -51,15 +49,6 @@ impl Room for TilesRoom {
         let mut named = parameters.tiles.describe();
         named.extend(basic::MIS.describe(parameters));
         named
-    }
-
-    fn listed_steps(
-        &self,
-        parameters: &Parameters,
-        surfaces: Surfaces,
-    ) -> Result<Vec<(&'static str, RaySteps)>> {
-        let of = |learns| steps(&parameters.tiles, 1, learns, surfaces);
-        Ok(vec![("tiles", of(false)), ("pilot of tiles", of(true))])
     }
 
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {

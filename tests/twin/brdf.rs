@@ -1,20 +1,47 @@
-//! Twin of `glsl/include/brdf.glsl`: same names, same order, same f32 arithmetic, to be read line
-//! by line against the shader. `brdf_table` is the word buffer of
-//! [`MaterialTables`](super::MaterialTables), a binding in the shader.
+//! Densities, samples and albedos of `glsl/include/brdf.glsl`, in the same order and the same f32
+//! arithmetic, to be read line by line against the shader. The values are those of the renderer.
 
 use std::f32::consts::PI;
 
-use glam::{Vec2, Vec3, vec2, vec3};
-
-use crate::{
-    brdf::{fresnel::*, ggx::*},
+use fenestra::{
+    brdf::{MaterialTables, brdf_evaluate, ggx::*},
     math::colour::luminance,
     scene::measured::lookup::{
-        cosine_table, half_difference_angles, measured_pdf, measured_sample, measured_value, mix,
+        cosine_table, half_difference_angles, measured_pdf, measured_sample, mix,
         sample_cosine_hemisphere,
     },
     shader::{constants::*, structs::Material},
 };
+use glam::{Vec2, Vec3, vec2, vec3};
+
+use super::specular::{fresnel_interface, pane_reflectance, pane_transmittance};
+
+/// Value of a material (1/sr, without the cosine) and density of [`sample`], which integrates to 1 less
+/// the share of samples below the surface.
+pub fn evaluate_and_pdf(
+    tables: &MaterialTables,
+    material_index: usize,
+    outgoing_local: Vec3,
+    incident_local: Vec3,
+) -> (Vec3, f32) {
+    let material = &tables.materials[material_index];
+    brdf_evaluate_and_pdf(&tables.words, material, outgoing_local, incident_local)
+}
+
+/// Samples an incident direction with three numbers in [0, 1); z ≤ 0 means no sample.
+pub fn sample(
+    tables: &MaterialTables,
+    material_index: usize,
+    outgoing_local: Vec3,
+    u: Vec3,
+) -> Vec3 {
+    brdf_sample(&tables.words, &tables.materials[material_index], outgoing_local, u)
+}
+
+/// Share of light from a uniform white hemisphere reflected toward the outgoing direction.
+pub fn albedo(tables: &MaterialTables, material_index: usize, outgoing_local: Vec3) -> Vec3 {
+    brdf_albedo(&tables.words, &tables.materials[material_index], outgoing_local)
+}
 
 /// GLSL's `mix` of vectors.
 fn mix_vec3(a: Vec3, b: Vec3, fraction: f32) -> Vec3 {
@@ -67,23 +94,6 @@ fn principled_specular_share(brdf_table: &[u32], material: &Material, cosine: f3
     if sum > 0.0 { specular / sum } else { 0.5 }
 }
 
-/// Metal and dielectric in one: `reflection` is that of GGX at unit reflectance. glTF 2.0, appendix B.
-fn principled_value(material: &Material, reflection: f32, cosine_difference: f32) -> Vec3 {
-    let metallic = material.ior;
-    let reflectance = Vec3::from(material.reflectance);
-    let metal = fresnel_schlick(cosine_difference, reflectance);
-    let rise = schlick_rise(cosine_difference);
-    let dielectric = mix_vec3(material.eta.into(), material.k.into(), rise);
-    let strongest = dielectric.max_element();
-    let base = (1.0 - strongest) / PI * reflectance;
-    mix_vec3(base + reflection * dielectric, reflection * metal, metallic)
-}
-
-/// Fails on a kind that this file does not know, where the shader returns 0.
-fn unknown_kind(kind: u32) -> ! {
-    panic!("material of the unknown kind {kind}")
-}
-
 /// Value (1/sr, without the cosine) and density of [`brdf_sample`] at one pair of directions.
 ///
 /// # Panics
@@ -94,54 +104,37 @@ pub fn brdf_evaluate_and_pdf(
     outgoing_local: Vec3,
     incident_local: Vec3,
 ) -> (Vec3, f32) {
+    let value = brdf_evaluate(brdf_table, material, outgoing_local, incident_local);
     if outgoing_local.z <= 0.0 || incident_local.z <= 0.0 {
-        return (Vec3::ZERO, 0.0);
+        return (value, 0.0);
     }
-    let reflectance = Vec3::from(material.reflectance);
+    let offset = material.table_offset;
     let cosine_pdf = incident_local.z / PI;
-    if material.kind == MATERIAL_DIFFUSE {
-        return (reflectance / PI, cosine_pdf);
-    }
-    if material.kind == MATERIAL_MEASURED {
-        let angles = half_difference_angles(outgoing_local, incident_local);
-        let offset = material.table_offset;
-        return (
-            measured_value(brdf_table, offset, angles),
-            measured_pdf(brdf_table, offset, outgoing_local, incident_local, angles.x),
-        );
-    }
     let half_vector = outgoing_local + incident_local;
-    let cosine_difference = (0.5 * half_vector.length()).min(1.0);
-    let reflection = ggx_reflection(half_vector, outgoing_local, incident_local, material.alpha);
-    let pdf = ggx_pdf(half_vector, outgoing_local, material.alpha);
-    match material.kind {
-        MATERIAL_PLASTIC => {
-            let transmission = material.table_offset + PLASTIC_TRANSMISSION_OFFSET;
-            let specular_share = cosine_table(
-                brdf_table,
-                material.table_offset + PLASTIC_SPECULAR_SHARE_OFFSET,
-                1,
-                outgoing_local.z,
-            );
-            let base = cosine_table(brdf_table, transmission, 1, outgoing_local.z)
-                * cosine_table(brdf_table, transmission, 1, incident_local.z)
-                / PI;
-            let coat = reflection * fresnel_dielectric(cosine_difference, material.ior);
-            (Vec3::splat(coat) + base * reflectance, mix(cosine_pdf, pdf, specular_share))
+    let specular_pdf = || ggx_pdf(half_vector, outgoing_local, material.alpha);
+    let pdf = match material.kind {
+        MATERIAL_DIFFUSE => cosine_pdf,
+        MATERIAL_MEASURED => {
+            let theta_half = half_difference_angles(outgoing_local, incident_local).x;
+            measured_pdf(brdf_table, offset, outgoing_local, incident_local, theta_half)
         }
-        MATERIAL_PRINCIPLED => {
-            let share = principled_specular_share(brdf_table, material, outgoing_local.z);
-            let value = principled_value(material, reflection, cosine_difference);
-            (value, mix(cosine_pdf, pdf, share))
+        MATERIAL_PLASTIC | MATERIAL_PRINCIPLED => {
+            let share = specular_share(brdf_table, material, outgoing_local.z);
+            mix(cosine_pdf, specular_pdf(), share)
         }
-        MATERIAL_CONDUCTOR if material.ior > 0.0 => {
-            let (eta, k) = (Vec3::from(material.eta), Vec3::from(material.k));
-            (reflection * fresnel_conductor(cosine_difference, eta, k), pdf)
-        }
-        MATERIAL_CONDUCTOR => (reflection * fresnel_schlick(cosine_difference, reflectance), pdf),
-        MATERIAL_MIRROR | MATERIAL_DIELECTRIC | MATERIAL_THIN_DIELECTRIC => (Vec3::ZERO, 0.0),
-        kind => unknown_kind(kind),
+        MATERIAL_CONDUCTOR => specular_pdf(),
+        _ => 0.0,
+    };
+    (value, pdf)
+}
+
+/// Probability of sampling the specular part of a material that has another.
+fn specular_share(brdf_table: &[u32], material: &Material, cosine: f32) -> f32 {
+    if material.kind == MATERIAL_PRINCIPLED {
+        return principled_specular_share(brdf_table, material, cosine);
     }
+    let offset = material.table_offset + PLASTIC_SPECULAR_SHARE_OFFSET;
+    cosine_table(brdf_table, offset, 1, cosine)
 }
 
 /// Samples an incident direction with three numbers in [0, 1); z ≤ 0 means no sample, which counts
@@ -162,14 +155,10 @@ pub fn brdf_sample(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
         }
         MATERIAL_DIFFUSE => 0.0,
         MATERIAL_CONDUCTOR => 1.0,
-        MATERIAL_PLASTIC => cosine_table(
-            brdf_table,
-            material.table_offset + PLASTIC_SPECULAR_SHARE_OFFSET,
-            1,
-            outgoing_local.z,
-        ),
-        MATERIAL_PRINCIPLED => principled_specular_share(brdf_table, material, outgoing_local.z),
-        kind => unknown_kind(kind),
+        MATERIAL_PLASTIC | MATERIAL_PRINCIPLED => {
+            specular_share(brdf_table, material, outgoing_local.z)
+        }
+        kind => panic!("material of the unknown kind {kind}"),
     };
     if u.x < specular_share {
         return ggx_sample(outgoing_local, material.alpha, vec2(u.y, u.z));
@@ -213,6 +202,6 @@ pub fn brdf_albedo(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
             cosine_table(brdf_table, offset + 1, 3, cosine),
             cosine_table(brdf_table, offset + 2, 3, cosine),
         ),
-        kind => unknown_kind(kind),
+        kind => panic!("material of the unknown kind {kind}"),
     }
 }

@@ -13,7 +13,7 @@ use glam::{Vec2, Vec3};
 pub const LEAST_UNIFORM_SOLID_ANGLE: f32 = 1e-2;
 
 /// Distance from the plane of the rectangle, in lengths of its longer edge, below which it is not seen.
-pub(crate) const LEAST_RECTANGLE_DISTANCE: f32 = 1e-3;
+const LEAST_RECTANGLE_DISTANCE: f32 = 1e-3;
 
 /// Rectangle seen from a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,7 +97,7 @@ impl SphericalRectangle {
     }
 
     /// Returns true if a direction from the point meets the rectangle.
-    pub(crate) fn meets(&self, direction: Vec3) -> bool {
+    fn meets(&self, direction: Vec3) -> bool {
         let cosine = direction.dot(self.axes[2]);
         let across = Vec2::new(direction.dot(self.axes[0]), direction.dot(self.axes[1]));
         let across = across * self.distance;

@@ -1,14 +1,13 @@
-//! Values of textures on the host: twin of `glsl/include/texture.glsl`, which has the comments on how
-//! and why, in the same order and with the same names.
+//! Values of textures and attributes of triangles: twin of `glsl/include/texture.glsl`, which has the
+//! comments on how and why, in the same order and with the same names.
 
-use glam::{Vec2, Vec3, Vec4, vec2};
-use half::f16;
-
-use crate::{
-    math::colour::srgb_to_linear,
+use fenestra::{
+    accel::attributes::TriangleAttributes,
+    math::{colour::srgb_to_linear, octahedron},
     shader::{
         constants::{
-            LUMINANCE_WEIGHTS, NO_TEXTURE, SURFACE_VERTEX_COLOR, TEXTURE_BYTES,
+            ATTRIBUTE_COLOR, ATTRIBUTE_FIRST_UVS, ATTRIBUTE_SECOND_UVS, ATTRIBUTE_TANGENT,
+            FLAT_NORMAL, LUMINANCE_WEIGHTS, NO_TEXTURE, SURFACE_VERTEX_COLOR, TEXTURE_BYTES,
             TEXTURE_CHANNEL_SHIFT, TEXTURE_FORMAT_MASK, TEXTURE_MIRROR, TEXTURE_NEAREST,
             TEXTURE_REPEAT, TEXTURE_SECOND_UVS, TEXTURE_SHORTS, TEXTURE_SRGB, TEXTURE_WRAP_U_SHIFT,
             TEXTURE_WRAP_V_SHIFT,
@@ -17,6 +16,8 @@ use crate::{
     },
     texture::{Interpolation, Wrap, lookup::Grid},
 };
+use glam::{Vec2, Vec3, Vec4, vec2};
+use half::f16;
 
 /// Linear colour and opacity of a texel; `words` are those of all textures.
 fn texture_texel(words: &[u32], used: &TextureUse, [x, y]: [u32; 2]) -> Vec4 {
@@ -43,7 +44,7 @@ fn texture_texel(words: &[u32], used: &TextureUse, [x, y]: [u32; 2]) -> Vec4 {
 }
 
 /// Linear colour and opacity of an image at image coordinates. Centres of texels lie at +0.5.
-pub(crate) fn texture_lookup(words: &[u32], used: &TextureUse, image: Vec2) -> Vec4 {
+fn texture_lookup(words: &[u32], used: &TextureUse, image: Vec2) -> Vec4 {
     let wrap = |shift: u32| match (used.flags >> shift) & 3 {
         TEXTURE_REPEAT => Wrap::Repeat,
         TEXTURE_MIRROR => Wrap::Mirror,
@@ -86,13 +87,7 @@ pub fn texture_value(
 }
 
 /// The same for a property that is one number: the luminance.
-pub(crate) fn texture_number(
-    words: &[u32],
-    uses: &[TextureUse],
-    use_index: u32,
-    uv0: Vec2,
-    uv1: Vec2,
-) -> f32 {
+fn texture_number(words: &[u32], uses: &[TextureUse], use_index: u32, uv0: Vec2, uv1: Vec2) -> f32 {
     texture_value(words, uses, use_index, uv0, uv1).truncate().dot(LUMINANCE_WEIGHTS.into())
 }
 
@@ -147,4 +142,70 @@ pub fn mapped_normal(
         + local.z * normal;
     let squared = mapped.length_squared();
     if squared > 1e-12 { side * mapped / squared.sqrt() } else { shading_normal }
+}
+
+/// Attributes of a point of a triangle, as in the shader.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attributes {
+    /// First set of texture coordinates; 0 where there is none.
+    pub uv0: Vec2,
+    /// Second set.
+    pub uv1: Vec2,
+    /// Tangent of any length along u of the first set, and sign of the bitangent; 0 for none.
+    pub tangent: Vec4,
+    /// Linear colour and opacity; 1 where there is none.
+    pub color: Vec4,
+}
+
+fn corner_attribute(
+    attributes: &TriangleAttributes,
+    triangle: u32,
+    corner: u32,
+    bit: u32,
+) -> [u32; 2] {
+    let place = 2 * (attributes.bits & (bit - 1)).count_ones();
+    let stride = 2 * attributes.bits.count_ones();
+    let word = ((3 * triangle + corner) * stride + place) as usize;
+    [attributes.words[word], attributes.words[word + 1]]
+}
+
+/// Texture coordinates `ATTRIBUTE_FIRST_UVS` or `ATTRIBUTE_SECOND_UVS` at a corner (0 to 2).
+pub fn corner_uv(attributes: &TriangleAttributes, triangle: u32, corner: u32, bit: u32) -> Vec2 {
+    if attributes.bits & bit == 0 {
+        return Vec2::ZERO;
+    }
+    corner_attribute(attributes, triangle, corner, bit).map(f32::from_bits).into()
+}
+
+/// Attributes at the point of a triangle in BVH order with these barycentric coordinates.
+pub fn triangle_attributes(
+    stored: &TriangleAttributes,
+    triangle: u32,
+    weights: Vec3,
+) -> Attributes {
+    let uv = |bit| {
+        let [a, b, c] = [0, 1, 2].map(|corner| corner_uv(stored, triangle, corner, bit));
+        weights.x * a + weights.y * b + weights.z * c
+    };
+    let (uv0, uv1) = (uv(ATTRIBUTE_FIRST_UVS), uv(ATTRIBUTE_SECOND_UVS));
+    let mut attributes = Attributes { uv0, uv1, tangent: Vec4::ZERO, color: Vec4::ONE };
+    if stored.bits & ATTRIBUTE_TANGENT != 0 {
+        let [a, b, c] =
+            [0, 1, 2].map(|corner| corner_attribute(stored, triangle, corner, ATTRIBUTE_TANGENT));
+        if ![a[0], b[0], c[0]].contains(&FLAT_NORMAL) {
+            let tangent = weights.x * octahedron::unpack(a[0])
+                + weights.y * octahedron::unpack(b[0])
+                + weights.z * octahedron::unpack(c[0]);
+            attributes.tangent = tangent.extend(f32::from_bits(a[1]));
+        }
+    }
+    if stored.bits & ATTRIBUTE_COLOR != 0 {
+        let color = |corner| {
+            let [low, high] = corner_attribute(stored, triangle, corner, ATTRIBUTE_COLOR);
+            let shorts = [low, low >> 16, high, high >> 16].map(|word| word as u16);
+            Vec4::from(shorts.map(f32::from)) / 65_535.0
+        };
+        attributes.color = weights.x * color(0) + weights.y * color(1) + weights.z * color(2);
+    }
+    attributes
 }

@@ -1,0 +1,74 @@
+//! Value of a material: twin of the values in `glsl/include/brdf.glsl`, in the same order and the same f32
+//! arithmetic. `brdf_table` is the word buffer of [`MaterialTables`](super::MaterialTables), a binding in
+//! the shader.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+
+use crate::{
+    brdf::{fresnel::*, ggx::*},
+    scene::measured::lookup::{cosine_table, half_difference_angles, measured_value},
+    shader::{constants::*, structs::Material},
+};
+
+/// GLSL's `mix` of vectors.
+fn mix_vec3(a: Vec3, b: Vec3, fraction: f32) -> Vec3 {
+    a * (1.0 - fraction) + b * fraction
+}
+
+/// Metal and dielectric in one: `reflection` is that of GGX at unit reflectance. glTF 2.0, appendix B.
+fn principled_value(material: &Material, reflection: f32, cosine_difference: f32) -> Vec3 {
+    let metallic = material.ior;
+    let reflectance = Vec3::from(material.reflectance);
+    let metal = fresnel_schlick(cosine_difference, reflectance);
+    let rise = schlick_rise(cosine_difference);
+    let dielectric = mix_vec3(material.eta.into(), material.k.into(), rise);
+    let strongest = dielectric.max_element();
+    let base = (1.0 - strongest) / PI * reflectance;
+    mix_vec3(base + reflection * dielectric, reflection * metal, metallic)
+}
+
+/// Value of a material at one pair of directions, 1/sr, without the cosine.
+///
+/// # Panics
+/// The material is of an unknown kind, for which the shader returns 0.
+pub fn brdf_evaluate(
+    brdf_table: &[u32],
+    material: &Material,
+    outgoing_local: Vec3,
+    incident_local: Vec3,
+) -> Vec3 {
+    if outgoing_local.z <= 0.0 || incident_local.z <= 0.0 {
+        return Vec3::ZERO;
+    }
+    let reflectance = Vec3::from(material.reflectance);
+    if material.kind == MATERIAL_DIFFUSE {
+        return reflectance / PI;
+    }
+    if material.kind == MATERIAL_MEASURED {
+        let angles = half_difference_angles(outgoing_local, incident_local);
+        return measured_value(brdf_table, material.table_offset, angles);
+    }
+    let half_vector = outgoing_local + incident_local;
+    let cosine_difference = (0.5 * half_vector.length()).min(1.0);
+    let reflection = ggx_reflection(half_vector, outgoing_local, incident_local, material.alpha);
+    match material.kind {
+        MATERIAL_PLASTIC => {
+            let transmission = material.table_offset + PLASTIC_TRANSMISSION_OFFSET;
+            let base = cosine_table(brdf_table, transmission, 1, outgoing_local.z)
+                * cosine_table(brdf_table, transmission, 1, incident_local.z)
+                / PI;
+            let coat = reflection * fresnel_dielectric(cosine_difference, material.ior);
+            Vec3::splat(coat) + base * reflectance
+        }
+        MATERIAL_PRINCIPLED => principled_value(material, reflection, cosine_difference),
+        MATERIAL_CONDUCTOR if material.ior > 0.0 => {
+            let (eta, k) = (Vec3::from(material.eta), Vec3::from(material.k));
+            reflection * fresnel_conductor(cosine_difference, eta, k)
+        }
+        MATERIAL_CONDUCTOR => reflection * fresnel_schlick(cosine_difference, reflectance),
+        MATERIAL_MIRROR | MATERIAL_DIELECTRIC | MATERIAL_THIN_DIELECTRIC => Vec3::ZERO,
+        kind => panic!("material of the unknown kind {kind}"),
+    }
+}
