@@ -15,7 +15,7 @@ use fenestra::{
 use crate::support;
 
 const SAMPLES: u32 = 64;
-const REPLICATES: u32 = 12;
+const REPLICATES: u32 = 8;
 
 /// Renders pictures with seeds of their own, each learned from nothing, and counts the rays traced.
 fn pictures(scene: &Scene, sampler: Sampler, candidates: u32) -> (Vec<RgbImage>, f64) {

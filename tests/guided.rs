@@ -64,7 +64,7 @@ fn every_mode_is_unbiased_in_a_room() {
     agree(
         &scenes::mixed_room(),
         1,
-        40,
+        20,
         &[
             ("as measured", with(1, &|settings| settings.parameters.candidates = None)),
             ("one-sample", with(1, &unchanged)),
@@ -201,7 +201,7 @@ fn every_vertex_of_a_path_is_unbiased() {
             Settings { roulette: Roulette { vertex: 1, throughput: 1.0 }, ..guided(1) },
         ),
     ];
-    agree(&scene, 4, 16, &modes);
+    agree(&scene, 4, 8, &modes);
 }
 
 #[test]

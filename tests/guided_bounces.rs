@@ -306,7 +306,7 @@ fn images_are_those_of_unguided_bounces() {
             |row: &Vec<f64>| row.chunks(3).map(|rgb| rgb.iter().sum::<f64>() / 3.0).collect();
         estimates(&rows.iter().map(grey).collect::<Vec<_>>())
     };
-    let reference = replicates(1, None, 64);
+    let reference = replicates(1, None, 32);
     let mut taught = Renderer::new(support::device(), &scene, guided(4)).unwrap();
     taught.render_pass(4).unwrap();
     let mut beliefs = taught.guide_state().unwrap().unwrap();
@@ -317,7 +317,7 @@ fn images_are_those_of_unguided_bounces() {
     for (name, candidates, beliefs) in
         [("4", 4, None), ("16", 16, None), ("4, misled", 4, Some(&beliefs))]
     {
-        let worst = largest_t(&replicates(candidates, beliefs, 32), &reference);
+        let worst = largest_t(&replicates(candidates, beliefs, 16), &reference);
         eprintln!("{name}: |t| {worst:.2}");
         assert!(worst < 6.0, "{name}: |t| = {worst}");
     }

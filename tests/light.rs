@@ -91,11 +91,11 @@ fn a_glowing_box_fills_itself_with_light() {
         (Sampler::Guided, 3, 3.75),
         (Sampler::Product, 2, 3.5),
     ] {
-        assert_mean(&scene, settings(sampler, depth), 64, expected);
+        assert_mean(&scene, settings(sampler, depth), 16, expected);
     }
     // Walls that let half of the light out shine and reflect half as much.
     scene.materials[0].surface.opacity.factor = 0.5;
-    assert_mean(&scene, settings(Sampler::Mis, 1), 128, 0.5 * (2.0 + 0.5 * 0.5 * 2.0));
+    assert_mean(&scene, settings(Sampler::Mis, 1), 32, 0.5 * (2.0 + 0.5 * 0.5 * 2.0));
     scene.materials[0].surface.opacity.factor = 1.0;
     // The box emits inward through the back of its triangles.
     scene.materials[0].surface.emission.as_mut().unwrap().two_sided = false;
@@ -238,7 +238,7 @@ fn mirrors_and_glass_lose_nothing_in_a_furnace() {
     for (kind, depth) in [(mirror, 1), (glass(Vec3::ONE), 12), (solid, 24)] {
         let scene = scenes::convex_furnace(Material::new("specular", kind), Vec3::splat(2.0));
         for sampler in [Sampler::Mis, Sampler::Guided] {
-            let (mean, _) = mean_and_error(&scene, settings(sampler, depth), 16);
+            let (mean, _) = mean_and_error(&scene, settings(sampler, depth), 4);
             eprintln!("{:?}: {mean}", scene.materials[0].kind);
             assert!((mean - 2.0).abs() < 0.01, "{:?}: {mean}", scene.materials[0].kind);
         }

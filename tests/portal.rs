@@ -186,14 +186,14 @@ fn pictures_agree_with_other_samplers() {
     let mut room = scenes::room(materials());
     let reference_of = |scene: &Scene, depth| {
         let settings = Settings { sampler: Sampler::Mis, depth, ..Settings::default() };
-        replicates::replicates(scene, &settings, 4000, 256)
+        replicates::replicates(scene, &settings, 4000, 128)
     };
     let agrees = |scene: &Scene, depth, share: &str, reference: &[_]| {
         let mut parameters = Parameters::default();
         parameters.set(share).unwrap();
         let settings =
             Settings { sampler: Sampler::Portal, depth, parameters, ..Settings::default() };
-        let values = replicates::replicates(scene, &settings, 9000, 64);
+        let values = replicates::replicates(scene, &settings, 9000, 32);
         let compared = Comparison::new(&values, reference);
         let label = format!("{} {share} {}", scene.name, scene.portals.len());
         eprintln!("{label}: {compared:?}");

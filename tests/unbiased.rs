@@ -132,7 +132,7 @@ fn in_the_open() {
         scenes::copper(0.35),
         measured(),
     ]);
-    samplers_agree(&scene, 1, 64, &ALL_AGAINST_COSINE);
+    samplers_agree(&scene, 1, 32, &ALL_AGAINST_COSINE);
 }
 
 #[test]
@@ -140,7 +140,7 @@ fn in_a_closed_room() {
     let _alone = support::alone();
     let scene =
         scenes::room(vec![scenes::diffuse(Vec3::splat(0.6)), measured(), scenes::plastic(0.3)]);
-    samplers_agree(&scene, 1, 128, &ALL_AGAINST_COSINE);
+    samplers_agree(&scene, 1, 64, &ALL_AGAINST_COSINE);
 }
 
 #[test]
@@ -159,7 +159,7 @@ fn in_a_closed_room_with_bounces() {
         Sampler::ControlVariates,
         Sampler::Tiles,
     ];
-    samplers_agree(&scene, 4, 64, &samplers);
+    samplers_agree(&scene, 4, 32, &samplers);
 }
 
 #[test]
@@ -167,7 +167,7 @@ fn in_a_glazed_room_with_lamps() {
     let _alone = support::alone();
     let scene = scenes::glazed_room();
     let samplers = [Sampler::Cosine, Sampler::Mis, Sampler::Visibility, Sampler::Guided];
-    samplers_agree(&scene, 4, 32, &samplers);
+    samplers_agree(&scene, 4, 16, &samplers);
 }
 
 /// `cosine`, then `mis` with and without compensation and with one and five shadow rays, then `guided`.
@@ -197,15 +197,15 @@ fn with_escaped_bounces_in_the_open() {
         scenes::copper(0.35),
         measured(),
     ]);
-    settings_agree(&scene, 64, &ways_to_weigh_the_bounce_ray(4));
+    settings_agree(&scene, 32, &ways_to_weigh_the_bounce_ray(4));
 }
 
 #[test]
 fn with_escaped_bounces_past_mirrors_glass_and_lamps() {
     let _alone = support::alone();
     let scene = scenes::without_ceiling(scenes::glazed_room());
-    settings_agree(&scene, 32, &ways_to_weigh_the_bounce_ray(4));
-    settings_agree(&scene, 32, &ways_to_weigh_the_bounce_ray(1)[..4]);
+    settings_agree(&scene, 16, &ways_to_weigh_the_bounce_ray(4));
+    settings_agree(&scene, 16, &ways_to_weigh_the_bounce_ray(1)[..4]);
 }
 
 /// Tests the thesis's scenes of real meshes, measured BRDFs and the Uffizi map, where they are at
@@ -230,7 +230,7 @@ fn in_the_scenes_of_the_thesis() {
             Sampler::Product,
             Sampler::Visibility,
         ];
-        samplers_agree(&scene, 1, 48, &samplers);
+        samplers_agree(&scene, 1, 16, &samplers);
     }
 }
 

@@ -23,7 +23,10 @@ pub mod source;
 pub mod statistics;
 pub mod x11;
 
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::{
+    cell::Cell,
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, TryLockError},
+};
 
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
@@ -39,11 +42,28 @@ use fenestra::{
     },
 };
 
-/// Lets one test run at a time: the validation layers were seen to crash when several threads made
-/// and dropped renderers at once.
+/// Devices of which each has one test at a time.
+static DEVICES: [OnceLock<Arc<Device>>; 2] = [const { OnceLock::new() }; 2];
+static IN_USE: [Mutex<()>; DEVICES.len()] = [const { Mutex::new(()) }; DEVICES.len()];
+
+thread_local! {
+    /// Which of [`DEVICES`] the test of this thread uses.
+    static DEVICE: Cell<usize> = const { Cell::new(0) };
+}
+
+/// Gives the calling test a device to itself: the validation layers were seen to crash when several
+/// threads made and dropped renderers of one device at once.
 pub fn alone() -> MutexGuard<'static, ()> {
-    static LOCK: Mutex<()> = Mutex::new(());
-    LOCK.lock().unwrap_or_else(PoisonError::into_inner)
+    let free = |number: usize| match IN_USE[number].try_lock() {
+        Ok(guard) => Some((number, guard)),
+        Err(TryLockError::Poisoned(guard)) => Some((number, guard.into_inner())),
+        Err(TryLockError::WouldBlock) => None,
+    };
+    let (number, guard) = (0..DEVICES.len())
+        .find_map(free)
+        .unwrap_or_else(|| (0, IN_USE[0].lock().unwrap_or_else(PoisonError::into_inner)));
+    DEVICE.set(number);
+    guard
 }
 
 /// Input of the probe `product_state` for one path: a surface seen along a direction, and a shadow
@@ -58,14 +78,13 @@ pub struct PathInput {
     pub is_visible: u32,
 }
 
-/// Returns the device that all tests share, with validation and synchronization
-/// validation on.
+/// Returns the device of the calling test, the first one unless it is [`alone`], with validation and
+/// synchronization validation on.
 ///
 /// # Panics
 /// Without a Vulkan device or the validation layers: run `./setup`.
 pub fn device() -> &'static Arc<Device> {
-    static DEVICE: OnceLock<Arc<Device>> = OnceLock::new();
-    DEVICE.get_or_init(|| match Device::open(None, true) {
+    DEVICES[DEVICE.get()].get_or_init(|| match Device::open(None, true) {
         Ok(device) => {
             eprintln!("device: {} ({})", device.capabilities().name, device.capabilities().driver);
             device
@@ -76,7 +95,7 @@ pub fn device() -> &'static Arc<Device> {
     })
 }
 
-/// Makes a renderer of `scene` on the shared device.
+/// Makes a renderer of `scene` on the test's device.
 pub fn renderer(scene: &Scene, settings: Settings) -> Renderer {
     Renderer::new(device(), scene, settings).unwrap()
 }
