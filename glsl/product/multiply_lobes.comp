@@ -104,7 +104,7 @@ float coarse_erf(float x) {
     return sign(x) * sqrt(1.0 - exp(exponent));
 }
 
-// Share of a kernel's integral above the horizon: kernel_hemisphere_part with a coarse erf.
+// Share of a kernel's integral above the horizon, with a coarse erf.
 float part_above_horizon(float bandwidth, float cosine) {
     float steepness = kernel_steepness(bandwidth);
     float ratio = steepness < 1e-2

@@ -15,17 +15,14 @@ struct Input {
 struct Output {
     float expm1_x;
     float log1p_x;
-    float erf_x;
     float integral;
-    float deviation;
+    float steepness;
     float hemisphere_part;
     float value;
     Lobe product;
-    float convolution;
     float distance;
     vec3 sampled;
     float pdf;
-    vec2 inverse;
 };
 
 Output answer(Input given) {
@@ -33,17 +30,14 @@ Output answer(Input given) {
     Output result;
     result.expm1_x = expm1(given.x);
     result.log1p_x = log1p(max(given.x, -0.9999));
-    result.erf_x = erf(given.x);
-    result.integral = lobe_integral(a);
-    result.deviation = kernel_deviation(a.bandwidth);
-    result.hemisphere_part = kernel_hemisphere_part(a.bandwidth, dot(a.axis, given.direction));
-    result.value = lobe_value(a, given.direction);
+    result.integral = kernel_integral(a.bandwidth);
+    result.steepness = kernel_steepness(a.bandwidth);
+    result.hemisphere_part = kernel_part_of_ratio(a.bandwidth, dot(a.axis, given.direction));
+    result.value = kernel_value(a.axis, a.bandwidth, given.direction);
     result.product = lobe_product(a, given.b);
-    result.convolution = lobe_convolution(a, given.b);
     result.distance = kernel_sample_distance(a.bandwidth, given.u.x);
     result.sampled = kernel_sample(a.axis, a.bandwidth, given.u);
     result.pdf = kernel_pdf(a.axis, a.bandwidth, given.direction);
-    result.inverse = kernel_inverse(a.axis, a.bandwidth, result.sampled);
     return result;
 }
 

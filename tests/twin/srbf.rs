@@ -1,5 +1,5 @@
-//! Products, integrals and samples of lobes: twin of `glsl/include/srbf.glsl`, in the same arithmetic, apart
-//! from mixtures, because a shader loops over lobes in its own buffers.
+//! Products, integrals and samples of lobes: twin of `glsl/include/srbf.glsl`, in the same arithmetic. Tests
+//! alone compare with mixtures, convolutions, inverses, deviations and the exact error function.
 //!
 //! `x = 1 − ω·ξ` has density `λe^{−λx}/(1 − e^{−2λ})` on 0…2 under a kernel; the azimuth is uniform.
 //! Densities are per steradian over the whole sphere.
@@ -84,17 +84,26 @@ pub fn kernel_deviation(bandwidth: f32) -> f32 {
     (second_moment / (1.0 - e)).sqrt()
 }
 
-/// Share of the kernel's integral above a plane, where `ω·n > 0`; `cosine` is `ξ·n`.
-/// \[Tokuyoshi 2022\]'s fit by an error function; largest error 0.005, at λ = 8.
-pub fn kernel_hemisphere_part(bandwidth: f32, cosine: f32) -> f32 {
-    let steepness = bandwidth
-        * ((0.5 * bandwidth + 0.651_733) / ((bandwidth + 1.341_828) * bandwidth + 7.221_669))
-            .sqrt();
-    // erf(s·c)/erf(s) → c for s → 0.
-    let ratio = if steepness < 1e-4 { cosine } else { erf(steepness * cosine) / erf(steepness) };
+/// Steepness of the error function that gives a kernel's share above a plane. \[Tokuyoshi 2022\].
+pub fn kernel_steepness(bandwidth: f32) -> f32 {
+    bandwidth
+        * ((0.5 * bandwidth + 0.651_733) / ((bandwidth + 1.341_828) * bandwidth + 7.221_669)).sqrt()
+}
+
+/// That share, where `ratio` is erf(steepness · cosine) / erf(steepness).
+pub fn kernel_part_of_ratio(bandwidth: f32, ratio: f32) -> f32 {
     let blend = (0.5 + 0.5 * ratio).clamp(0.0, 1.0);
     let e = (-bandwidth).exp();
     (e + (1.0 - e) * blend) / (1.0 + e)
+}
+
+/// Share of the kernel's integral above a plane, where `ω·n > 0`; `cosine` is `ξ·n`. \[Tokuyoshi
+/// 2022\]'s fit by an error function; largest error 0.005, at λ = 8.
+pub fn kernel_hemisphere_part(bandwidth: f32, cosine: f32) -> f32 {
+    let steepness = kernel_steepness(bandwidth);
+    // erf(s·c)/erf(s) → c for s → 0.
+    let ratio = if steepness < 1e-4 { cosine } else { erf(steepness * cosine) / erf(steepness) };
+    kernel_part_of_ratio(bandwidth, ratio)
 }
 
 /// Integral of a lobe over the sphere.
