@@ -16,7 +16,7 @@ pub fn check(page_name: &str, name: &str, expected: &str) {
     }
     assert_eq!(
         found, expected,
-        "docs/{page_name} differs from the code at {name}: run `interface`, `passes`, `formats` and \
-         `scene_file` with FENESTRA_WRITE_DOCS=1"
+        "docs/{page_name} differs from the code at {name}: run `interface`, `passes` and `scene_file` \
+         with FENESTRA_WRITE_DOCS=1"
     );
 }

@@ -11,7 +11,7 @@ use serde_json::Value;
 use super::GltfReader;
 use crate::{
     error::Result,
-    features::{self, Feature, Ignored, Support},
+    features::{self, Ignored},
     mesh::{MeshCamera, Perspective},
 };
 
@@ -40,12 +40,13 @@ pub(super) fn ignore_extension(
     extension: &str,
     place: impl FnOnce() -> String,
 ) {
+    if features::GLTF_EXTENSIONS.contains(&extension) {
+        return;
+    }
     let name = format!("`{extension}`");
-    let known: Option<&Feature> = features::GLTF.iter().find(|feature| feature.name == name);
-    match known.map(|feature| (feature, feature.support)) {
-        Some((_, Support::Done | Support::Mapped)) => {}
-        Some((&feature, Support::Ignored)) => ignored.add(feature, place),
-        _ => ignored.add_named(features::GLTF_EXTENSION, &format!("extension {name}"), place),
+    match features::GLTF.iter().find(|feature| feature.name == name) {
+        Some(&feature) => ignored.add(feature, place),
+        None => ignored.add_named(features::GLTF_EXTENSION, &format!("extension {name}"), place),
     }
 }
 

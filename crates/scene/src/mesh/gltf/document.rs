@@ -12,8 +12,7 @@ use serde_json::Value;
 
 use crate::{
     error::{Error, Result},
-    features::{self, Support},
-    files,
+    features, files,
     mesh::beside::path_beside,
 };
 
@@ -42,10 +41,8 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<(Document, Option<Vec<u
     // Parsing checks against the extensions that the crate knows, not those that are known here.
     for extension in std::mem::take(&mut root.extensions_required) {
         let name = format!("`{extension}`");
-        let is_known = |feature: &features::Feature| {
-            feature.name == name && feature.support != Support::Refused
-        };
-        if !features::GLTF.iter().any(is_known) {
+        let is_left_out = features::GLTF.iter().any(|feature| feature.name == name);
+        if !is_left_out && !features::GLTF_EXTENSIONS.contains(&extension.as_str()) {
             let message =
                 format!("the file requires the extension `{extension}`, which is not supported");
             return Err(Error::format(path, message));

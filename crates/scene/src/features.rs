@@ -1,0 +1,285 @@
+//! Parts of foreign files that Fenestra leaves out with a warning. The tables of `docs/formats.md` have
+//! these rows word for word, beside those of what is rendered or refused.
+
+use std::path::Path;
+
+/// Part of a file that is left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Feature {
+    /// Name in warnings and tables; that of an extension or keyword is the format's own.
+    pub name: &'static str,
+    /// Details; may be empty.
+    pub details: &'static str,
+}
+
+macro_rules! features {
+    ($(#[$about:meta])* $table:ident; $($feature:ident $name:literal $details:literal;)*) => {
+        $(
+            #[doc = $name]
+            pub const $feature: Feature = Feature { name: $name, details: $details };
+        )*
+        $(#[$about])*
+        pub const $table: &[Feature] = &[$($feature),*];
+    };
+}
+
+features! {
+    /// Parts of glTF 2.0.
+    GLTF;
+    GLTF_CAMERAS "cameras that are not used" "";
+    GLTF_ORTHOGRAPHIC "orthographic cameras" "refused if `--camera` names one";
+    GLTF_NO_IMAGE "textures without an image"
+        "or with none but that of an extension which is ignored";
+    GLTF_HIGH_UV "textures with coordinates of the third or a further set" "";
+    GLTF_COLORS "further sets of vertex colours" "";
+    GLTF_UV "third and further sets of texture coordinates" "";
+    GLTF_SKIN "skins" "the mesh is placed by its node";
+    GLTF_ANIMATION "animations" "nodes stand as the file places them";
+    GLTF_POINTS "points and lines" "";
+    GLTF_SCENES "further scenes" "the default scene is rendered, else the first";
+    GLTF_LIGHT_RANGE "range of lights" "light falls off with the squared distance alone";
+    GLTF_OBJECT_LIGHTS "lights of a file in a `.toml` scene" "";
+    GLTF_UNLIT_COLOR "vertex colours of unlit materials" "";
+    GLTF_SPECULAR_TEXTURE "textures of `KHR_materials_specular`" "";
+    GLTF_LOW_TRANSMISSION "transmission of less than half the light" "the surface is opaque";
+    GLTF_TRANSMISSION_TEXTURE "texture of transmission" "its mean counts";
+    GLTF_GLASS_COLOR "base colour texture of glass" "the factor alone tints it";
+    GLTF_THIN_ROUGHNESS "roughness of thin glass" "a pane is smooth";
+    GLTF_ABSORPTION "absorption of `KHR_materials_volume`" "";
+    GLTF_GLOSSINESS_TEXTURE "specular colour texture of `KHR_materials_pbrSpecularGlossiness`"
+        "the factor alone counts; its glossiness is read";
+    GLTF_CLEARCOAT "`KHR_materials_clearcoat`" "";
+    GLTF_SHEEN "`KHR_materials_sheen`" "";
+    GLTF_IRIDESCENCE "`KHR_materials_iridescence`" "";
+    GLTF_ANISOTROPY "`KHR_materials_anisotropy`" "";
+    GLTF_DISPERSION "`KHR_materials_dispersion`" "";
+    GLTF_VARIANTS "`KHR_materials_variants`" "";
+    GLTF_BASISU "`KHR_texture_basisu`" "the other image of the texture is used";
+    GLTF_WEBP "`EXT_texture_webp`" "the other image of the texture is used";
+    GLTF_EXTENSION "other extensions, by name" "refused where the file requires them";
+}
+
+features! {
+    /// Statements of OBJ files.
+    OBJ;
+    OBJ_COLOR "vertex colours" "";
+    OBJ_SMOOTHING "smoothing groups `s`" "where faces have no normals";
+    OBJ_POINTS "points and lines" "`p`, `l`";
+    OBJ_UNDESCRIBED "materials that no library describes" "they are white";
+    OBJ_NO_MATERIAL "faces without a material" "grey, 0.5; in a `.toml` scene an error";
+    OBJ_STATEMENT "other statements, by name" "curves and surfaces among them";
+}
+
+features! {
+    /// Keys of MTL files.
+    MTL;
+    MTL_KS_COLOR "colour and strength of `Ks`" "Fresnel's equations give the gloss of plastic";
+    MTL_ILLUM_MODEL "other models of `illum`" "as 2";
+    MTL_OPTION "other options of images, by name" "";
+    MTL_BUMP "`bump`, `map_bump`" "height maps";
+    MTL_KA "`Ka` other than black" "";
+    MTL_TF "`Tf` other than white" "of all but thin panes";
+    MTL_KEY "other keys, by name" "`map_Ks`, `refl` and `Pc` among them";
+}
+
+features! {
+    /// Parts of PLY files.
+    PLY;
+    PLY_COLOR "vertex colours of other materials" "";
+}
+
+features! {
+    /// Directives and parameters of pbrt-v4.
+    PBRT;
+    PBRT_GAMUT "saturation of reflectance spectra beyond Rec.709" "clipped";
+    PBRT_FILM "other parameters of the film"
+        "`xresolution`, `yresolution` and `iso` are done; open time times `iso`/100 scales all light";
+    PBRT_DEPTH "`maxdepth` of the integrator" "the command line chooses the length of paths";
+    PBRT_INTEGRATOR "other integrators than path tracers, by name" "";
+    PBRT_FILTER "`PixelFilter` other than a box of 0.5 and a Gaussian of 1.5, by name"
+        "a Gaussian of 1.5, or the box";
+    PBRT_SENSOR "`sensor` other than `cie1931`" "";
+    PBRT_OPTION "`Option`, by name" "";
+    PBRT_COLOR_SPACE "`ColorSpace` other than `srgb`" "colours are those of Rec.709";
+    PBRT_MOTION "`ActiveTransform`, `TransformTimes`" "nothing moves";
+    PBRT_MEDIUM "`MakeNamedMedium`, `MediumInterface`" "all space is empty";
+    PBRT_SCREEN_WINDOW "`screenwindow` that is not centred or of another ratio"
+        "its height alone counts";
+    PBRT_ASPECT "`frameaspectratio` other than that of the film" "pixels are square";
+    PBRT_SHAPE "`curve`" "left out";
+    PBRT_PARTIAL "`phimax`, `zmin`, `zmax`, by shape" "quadrics are whole";
+    PBRT_DISPLACEMENT "`displacement`" "";
+    PBRT_FLAT "shapes whose transformation flattens space" "left out";
+    PBRT_COATED_CONDUCTOR "coat of `coatedconductor`" "rendered as the bare conductor";
+    PBRT_TRANSMISSION "light through `diffusetransmission`" "rendered as diffuse reflection";
+    PBRT_SUBSURFACE "light below `subsurface`" "rendered as plastic";
+    PBRT_HAIR "parameters of `hair`" "rendered as diffuse of 0.5";
+    PBRT_MIX "the lesser part of other `mix`" "the other one is the whole surface";
+    PBRT_COAT_ALBEDO "`albedo` of coats" "coats are clear";
+    PBRT_ANISOTROPY "`uroughness` other than `vroughness`" "their mean α, or the texture";
+    PBRT_TEXTURE "other textures, by name" "`fbm`, `marble`, `dots`, `ptex` and others are 0.5";
+    PBRT_TEXTURE_PRODUCT "products of two images" "the first counts";
+    PBRT_TEXTURE_MIX "mixtures of two images, or by an image" "the greater share counts";
+    PBRT_TEXTURE_WRAP "`wrap` other than `repeat` and `clamp`" "as `clamp`";
+    PBRT_TEXTURE_MAPPING "`mapping` of textures other than `uv`" "as `uv`";
+    PBRT_LIGHT "`projection`, `goniometric`" "left out";
+    PBRT_PORTAL "`portal` of lights" "they hide nothing";
+    PBRT_EMISSION_IMAGE "images of bilinear patches that emit" "their area light counts";
+    PBRT_INSTANCE_LIGHT "area lights in objects" "dark, as in pbrt";
+    PBRT_INTERFACE_LIGHT "area lights without a surface" "left out, as in pbrt";
+    PBRT_PARAMETER "other parameters, by name" "";
+}
+
+features! {
+    /// Parts of Mitsuba scene files.
+    MITSUBA;
+    MI_GAMUT "saturation of reflectance spectra beyond Rec.709" "clipped";
+    MI_TWO_MODELS "second model of `twosided`" "the first is on both sides";
+    MI_SPEC_TRANS "`spec_trans` between 0 and 1"
+        "from ½ a rough dielectric, below none of it; as is a metal";
+    MI_PRINCIPLED_REST "further parameters of `principled`, by name" "";
+    MI_BLEND "the lesser part of other `blendbsdf`" "the other one is the whole surface";
+    MI_BUMP_MAP "`bumpmap`" "";
+    MI_BECKMANN "distribution `beckmann`" "`ggx` of the same α";
+    MI_ANISOTROPIC "`alpha_u` and `alpha_v` that differ" "their mean, or `alpha_u`";
+    MI_ALPHA_TEXTURE "`alpha` of vertices" "0.1";
+    MI_SPECULAR "`specular_reflectance` of plastic" "white";
+    MI_SPECULAR_TEXTURE "textures of `specular_reflectance` and `specular_transmittance` of dielectrics"
+        "white";
+    MI_SPOT_TEXTURE "`texture` of a `spot`" "";
+    MI_SENSORS "sensors that are not used" "";
+    MI_MIRRORED "mirror image of the sensor's `to_world`" "the picture is not mirrored";
+    MI_PRINCIPAL_POINT "`principal_point_offset_x`, `principal_point_offset_y`" "";
+    MI_CROP "crop of the film off its middle" "the whole film; one in the middle is done";
+    MI_FILTER "other `rfilter`s" "`gaussian` of ½";
+    MI_INTEGRATOR "`integrator` and `sampler`"
+        "options of the command line and their defaults, as `--depth` and `--spp`";
+    MI_MEDIUM "`medium`" "";
+    MI_ELEMENT "other elements, by name" "";
+    MI_PARAMETER "other parameters, by name" "";
+}
+
+/// Extensions of glTF that are read.
+pub const GLTF_EXTENSIONS: [&str; 11] = [
+    "EXT_mesh_gpu_instancing",
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+];
+
+/// Most kinds counted for one file; a file that is not what it seems may hold any number.
+const MAX_KINDS: usize = 64;
+/// Most characters of a name or place in a warning.
+const MAX_CHARACTERS: usize = 80;
+
+/// Counts what a file says and Fenestra leaves out, by kind.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Ignored {
+    kinds: Vec<Kind>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Kind {
+    feature: Feature,
+    name: String,
+    count: usize,
+    first: String,
+}
+
+impl Ignored {
+    /// Counts `feature` once more; `place` is asked for the first time only.
+    pub fn add(&mut self, feature: Feature, place: impl FnOnce() -> String) {
+        self.add_named(feature, feature.name, place);
+    }
+
+    /// Counts a kind of `feature` that has a name of its own.
+    pub fn add_named(&mut self, feature: Feature, name: &str, place: impl FnOnce() -> String) {
+        self.count(feature, name, 1, place);
+    }
+
+    fn count(
+        &mut self,
+        feature: Feature,
+        name: &str,
+        count: usize,
+        place: impl FnOnce() -> String,
+    ) {
+        let same = |kind: &&mut Kind| kind.feature == feature && kind.name == name;
+        if let Some(kind) = self.kinds.iter_mut().find(same) {
+            kind.count += count;
+        } else if self.kinds.len() < MAX_KINDS || name == feature.name {
+            let name = name.to_owned();
+            self.kinds.push(Kind { feature, name, count, first: place() });
+        } else {
+            self.count(feature, feature.name, count, place);
+        }
+    }
+
+    /// Adds the counts of another.
+    pub fn merge(&mut self, other: &Self) {
+        for kind in &other.kinds {
+            self.count(kind.feature, &kind.name, kind.count, || kind.first.clone());
+        }
+    }
+
+    /// One warning for each kind, in the order in which they came.
+    pub fn warnings(&self, path: &Path) -> Vec<String> {
+        let text = |kind: &Kind| {
+            let Kind { feature, name, count, first } = kind;
+            let (name, first) = (shorten(name), shorten(first));
+            // The details of a table's "other" row say nothing of one of its kinds.
+            let details = match feature.details {
+                details if details.is_empty() || kind.name != feature.name => String::new(),
+                details => format!(": {details}"),
+            };
+            let path = path.display();
+            let first = if *count == 1 { first } else { format!("{count}, first in {first}") };
+            format!("{path}: ignored {name} ({first}){details}")
+        };
+        self.kinds.iter().map(text).collect()
+    }
+}
+
+/// Cuts a text that comes from a file, and replaces characters that would disturb a log.
+fn shorten(text: &str) -> String {
+    let mut characters = text.chars().map(|c| if c.is_control() { '?' } else { c });
+    let mut short: String = characters.by_ref().take(MAX_CHARACTERS).collect();
+    if characters.next().is_some() {
+        short.push('…');
+    }
+    short
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_kind_is_one_warning_and_kinds_are_bounded() {
+        let mut ignored = Ignored::default();
+        for line in 1..=3 {
+            ignored.add(OBJ_COLOR, || format!("line {line}"));
+        }
+        ignored.add_named(OBJ_STATEMENT, "`deg`", || "line\n4".to_owned());
+        let path = Path::new("a.obj");
+        assert_eq!(ignored.warnings(path)[0], "a.obj: ignored vertex colours (3, first in line 1)");
+        let second = "a.obj: ignored `deg` (line?4)";
+        assert_eq!(ignored.warnings(path)[1], second);
+        for number in 0..1000 {
+            ignored.add_named(OBJ_STATEMENT, &format!("`x{number}`"), || "line 5".to_owned());
+        }
+        let warnings = ignored.warnings(path);
+        assert_eq!(warnings.len(), MAX_KINDS + 1);
+        assert!(warnings[MAX_KINDS].contains("other statements, by name (938, first in line 5)"));
+        let mut twice = ignored.clone();
+        twice.merge(&ignored);
+        assert!(twice.warnings(path)[0].contains("(6, first in line 1)"));
+    }
+}
