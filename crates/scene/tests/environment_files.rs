@@ -168,11 +168,8 @@ fn texels_that_are_not_radiance_become_black_and_are_counted() {
 }
 
 #[test]
-fn black_maps_and_other_ratios_are_warned_of() {
+fn other_ratios_are_warned_of() {
     let folder = TempDir::new().unwrap();
-    let path = write(&folder, "black.pfm", &pfm_bytes(8, 4, &[Vec3::ZERO; 32], false, false));
-    let (_, warnings) = load(&path);
-    assert!(warnings.len() == 1 && warnings[0].contains("black"), "{warnings:?}");
     let path = write(&folder, "square.pfm", &pfm_bytes(4, 8, &texels(), false, false));
     let (map, warnings) = load(&path);
     assert!(warnings.len() == 1 && warnings[0].contains("4×8"), "{warnings:?}");

@@ -592,6 +592,10 @@ fn lamps_take_every_form_and_a_scene_needs_no_environment() {
         type = \"directional\"
         direction = [0, -1, -1]
         irradiance = [1, 2, 3]\n";
+    // A black map lights nothing, and is no matter of a warning beside a lamp.
+    let black = with_box("").replace("constant = [1, 1, 1]", "constant = [0, 0, 0]");
+    assert_eq!(folder.load(&black).unwrap().warnings, scene.warnings);
+    assert_eq!(folder.load(&format!("{black}{lamps}")).unwrap().warnings, [""; 0]);
     let scene = folder.load(&format!("{dark}{lamps}")).unwrap();
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
     assert_eq!(scene.lamps[0].name, "bulb");

@@ -34,7 +34,7 @@ impl EnvironmentMap {
     ///
     /// Multiplies radiance by `scale` and rotates the map by `rotation_deg` about +Y,
     /// counter-clockwise seen from above. Sets texels with a negative, infinite or NaN component to
-    /// 0 and counts them in a warning. Warns of a ratio other than 2:1 and of an all-black map.
+    /// 0 and counts them in a warning. Warns of a ratio other than 2:1.
     ///
     /// # Errors
     /// [`Error::Io`] if the file cannot be read, [`Error::Format`] if it is truncated, of another
@@ -88,7 +88,7 @@ impl EnvironmentMap {
         Ok(map)
     }
 
-    /// Applies `scale`, sets texels that are not radiance to 0, and warns of them and of a black map.
+    /// Applies `scale`, and sets texels that are not radiance to 0 with a warning.
     fn clean(&mut self, scale: f32, warnings: &mut Vec<String>) {
         let invalid = self
             .texels
@@ -109,9 +109,6 @@ impl EnvironmentMap {
                 self.source,
                 self.texels.len()
             ));
-        }
-        if self.is_black() {
-            warnings.push(format!("{}: the map is black: nothing is lit", self.source));
         }
     }
 }

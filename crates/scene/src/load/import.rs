@@ -52,14 +52,6 @@ impl Loader<'_> {
         if let Some(rotation_deg) = options.rotation_deg {
             environment.rotation_rad = rotation_deg.rem_euclid(360.0).to_radians();
         }
-        // A black map of the option has said so itself.
-        let is_dark = options.environment.is_none()
-            && environment.is_black()
-            && lamps.is_empty()
-            && materials.iter().all(|material| material.surface.emission.is_none());
-        if is_dark {
-            warnings.push(format!("{}: no light: nothing is lit", self.path.display()));
-        }
         let light = Light { environment, lamps, portals: Vec::new() };
         let mut scene = self.scene(camera, film, light, materials, geometry, warnings);
         scene.inputs = inputs;

@@ -10,7 +10,6 @@ use crate::{
     error::Result,
     file::{EnvironmentEntry, LampEntry, LampKindEntry, SceneFile},
     lamp::LampKind,
-    material::Material,
 };
 
 /// Light of a scene apart from emitting surfaces.
@@ -44,28 +43,6 @@ impl Loader<'_> {
             EnvironmentMap::constant(Vec3::ZERO, 1.0).map_err(|message| self.error(message))?
         };
         Ok(Light { environment, lamps, portals: self.portals(&file.portals)? })
-    }
-
-    /// Warns of a scene without any light.
-    pub(super) fn warn_of_darkness(
-        &self,
-        file: &SceneFile,
-        options: &LoadOptions,
-        light: &Light,
-        materials: &[Material],
-        warnings: &mut Vec<String>,
-    ) {
-        let is_lit = file.environment.is_some()
-            || options.environment.is_some()
-            || !light.lamps.is_empty()
-            || materials.iter().any(|material| material.surface.emission.is_some());
-        if !is_lit {
-            warnings.push(format!(
-                "{}: the scene has no [environment], no [[lamp]] and no material with `emission`: \
-                 nothing is lit",
-                self.path.display()
-            ));
-        }
     }
 
     fn environment(

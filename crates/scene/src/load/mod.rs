@@ -96,7 +96,6 @@ impl Scene {
         }
         let mut light = loader.light(&file, options, &mut inputs, &mut warnings)?;
         light.lamps.extend(lamps);
-        loader.warn_of_darkness(&file, options, &light, &materials, &mut warnings);
         let mut scene = loader.scene(camera, file.film, light, materials, geometry, warnings);
         scene.inputs.extend(inputs);
         Ok(scene)
@@ -127,7 +126,7 @@ impl<'a> Loader<'a> {
         Self { path, folder: path.parent().unwrap_or(Path::new("")) }
     }
 
-    /// Puts the parts together.
+    /// Puts the parts together; warns of a scene without any light.
     fn scene(
         &self,
         camera: Camera,
@@ -135,8 +134,14 @@ impl<'a> Loader<'a> {
         light: Light,
         materials: Vec<Material>,
         geometry: Geometry,
-        warnings: Vec<String>,
+        mut warnings: Vec<String>,
     ) -> Scene {
+        let is_dark = light.lamps.is_empty()
+            && materials.iter().all(|material| material.surface.emission.is_none())
+            && light.environment.is_black();
+        if is_dark {
+            warnings.push(format!("{}: no light: nothing is lit", self.path.display()));
+        }
         let mut scene = Scene {
             name: scene_name(self.path),
             path: self.path.to_path_buf(),
