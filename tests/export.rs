@@ -6,7 +6,7 @@
 use std::{f32::consts::PI, fs, path::Path, sync::Arc};
 
 use fenestra::{
-    export::{Export as _, Settings, mitsuba::Export},
+    export::{Settings, mitsuba::export},
     film::Image,
     scene::{Scene, lamp::LampKind, material::MaterialKind, measured::MeasuredTable},
     surface::TextureTables,
@@ -201,8 +201,8 @@ fn measured_materials_become_diffuse_with_their_albedo() {
     let table = MeasuredTable::tabulate(|_, _| reflectance / PI).unwrap();
     let path = "paint.binary".into();
     scene.materials[0].kind = MaterialKind::Measured { path, table: Arc::new(table) };
-    let export = Export::new(&scene, Path::new("a.xml"), SETTINGS).unwrap();
-    let [warning] = export.warnings() else { unreachable!("one warning") };
+    let exported = export(&scene, Path::new("a.xml"), SETTINGS);
+    let [warning] = &exported.warnings[..] else { unreachable!("one warning") };
     let found = warning.rsplit_once("reflectance ").unwrap().1;
     let found: Vec<f32> = found.split(", ").map(|number| number.parse().unwrap()).collect();
     let error = (Vec3::from_slice(&found) - reflectance).abs() / reflectance;
@@ -230,11 +230,13 @@ fn both(clay: &str, more: &str) -> (Folder, String, Vec<String>, [Scene; 2]) {
     let text = yard([8, 6], "constant = [0, 0, 0]", clay, "mesh = \"square.obj\"") + more;
     let ours = Scene::load(&folder.write("scene.toml", text)).unwrap();
     let path = folder.path().join("out.xml");
-    let export = Export::new(&ours, &path, SETTINGS).unwrap();
-    export.write().unwrap();
+    let warnings = {
+        let exported = export(&ours, &path, SETTINGS);
+        exported.write().unwrap();
+        exported.warnings
+    };
     let xml = fs::read_to_string(&path).unwrap();
     let read = Scene::load(&path).unwrap();
-    let warnings = export.warnings().to_vec();
     (folder, xml, warnings, [ours, read])
 }
 
@@ -463,9 +465,9 @@ fn colours_of_vertices_are_written_with_their_factor() {
     scene.geometry.colors = vec![[0.5, 0.5, 1.0, 1.0]; scene.geometry.positions.len()];
     scene.materials[0].surface.vertex_color = true;
     let path = folder.path().join("out.xml");
-    let export = Export::new(&scene, &path, SETTINGS).unwrap();
-    assert_eq!(export.warnings(), [""; 0]);
-    export.write().unwrap();
+    let exported = export(&scene, &path, SETTINGS);
+    assert_eq!(exported.warnings, [""; 0]);
+    exported.write().unwrap();
     let xml = fs::read_to_string(&path).unwrap();
     assert_parts(&xml, &["type=\"mesh_attribute\"", "value=\"vertex_color\""]);
     let mesh = folder.path().join("out/m00_clay.ply");
@@ -474,7 +476,8 @@ fn colours_of_vertices_are_written_with_their_factor() {
     let expected = [0.25_f32, 0.125, 0.125].map(f32::to_le_bytes).concat();
     let bytes = fs::read(&mesh).unwrap();
     assert!(bytes.windows(12).any(|window| window == expected));
+    drop(exported);
     scene.geometry.colors.iter_mut().for_each(|color| color[3] = 0.5);
-    let export = Export::new(&scene, &path, SETTINGS).unwrap();
-    assert!(matches!(export.warnings(), [one] if one.contains("opacity of its vertices")));
+    let exported = export(&scene, &path, SETTINGS);
+    assert!(matches!(&exported.warnings[..], [one] if one.contains("opacity of its vertices")));
 }

@@ -9,7 +9,7 @@
 use std::{fs, path::PathBuf};
 
 use fenestra::{
-    export::{self, Export},
+    export,
     scene::{Scene, lamp::LampKind, load::LoadOptions},
     session::Settings,
 };
@@ -105,10 +105,10 @@ impl Original {
     fn again(&self, format: &str) -> (Scene, Vec<String>) {
         let path: PathBuf = self.folder.path().join(format!("out it/{format} a.{format}"));
         let own = export::Settings { depth: 4, samples: 4 };
-        let export: Box<dyn Export> = match format {
-            MITSUBA => Box::new(export::mitsuba::Export::new(&self.scene, &path, own).unwrap()),
-            PBRT => Box::new(export::pbrt::Export::new(&self.scene, &path, own).unwrap()),
-            _ => Box::new(export::gltf::Export::new(&self.scene, &path).unwrap()),
+        let export = match format {
+            MITSUBA => export::mitsuba::export(&self.scene, &path, own),
+            PBRT => export::pbrt::export(&self.scene, &path, own),
+            _ => export::gltf::export(&self.scene, &path),
         };
         export.write().unwrap();
         let mut options = LoadOptions::default();
@@ -121,7 +121,7 @@ impl Original {
             scene.film = self.scene.film;
         }
         assert_eq!(scene.film, self.scene.film);
-        (scene, export.warnings().to_vec())
+        (scene, export.warnings)
     }
 
     /// Fails unless the scene comes back from the format with the same picture. Values may differ by

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::{
     error::{Error, Result},
-    export::{Export, Settings, gltf, mitsuba, pbrt},
+    export::{Settings, gltf, mitsuba, pbrt},
     files,
     scene::Scene,
 };
@@ -72,17 +72,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     } else {
         arguments.output.join("scene").with_extension(extension)
     };
-    let export: Box<dyn Export> = match arguments.format {
-        Format::Mitsuba => Box::new(mitsuba::Export::new(&scene, &output, settings)?),
-        Format::Pbrt => Box::new(pbrt::Export::new(&scene, &output, settings)?),
-        Format::Gltf => Box::new(gltf::Export::new(&scene, &output)?),
+    let export = match arguments.format {
+        Format::Mitsuba => mitsuba::export(&scene, &output, settings),
+        Format::Pbrt => pbrt::export(&scene, &output, settings),
+        Format::Gltf => gltf::export(&scene, &output),
     };
     if arguments.strict
-        && let Some(difference) = export.warnings().first()
+        && let Some(difference) = export.warnings.first()
     {
         return Err(Error::scene(&arguments.scene, format!("{difference} (--strict)")));
     }
-    for warning in scene.warnings.iter().chain(export.warnings()) {
+    for warning in scene.warnings.iter().chain(&export.warnings) {
         log::warn!("{warning}");
     }
     export.write()?;

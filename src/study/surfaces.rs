@@ -63,8 +63,8 @@ impl Surfaces {
         }) {
             Some(image) => image,
             None => {
-                let mut image = Image::new(size.0, size.1);
-                image.insert_triple(["R", "G", "B"], &shares(&mut make()?.renderer)?);
+                let shares = shares(&mut make()?.renderer)?;
+                let mut image = Image::of_rgb(size.0, size.1, &shares);
                 image.attributes.insert(HASH.to_owned(), hash);
                 image.write_exr(&path)?;
                 image

@@ -112,6 +112,16 @@ impl Image {
         self.width as usize * self.height as usize
     }
 
+    /// Creates an image of the channels `R`, `G`, `B`.
+    ///
+    /// # Panics
+    /// `pixels` is not `width * height` long.
+    pub fn of_rgb(width: u32, height: u32, pixels: &[[f32; 3]]) -> Self {
+        let mut image = Self::new(width, height);
+        image.insert_triple(["R", "G", "B"], pixels);
+        image
+    }
+
     /// Adds the three components of `values` as the channels `names`.
     ///
     /// # Panics

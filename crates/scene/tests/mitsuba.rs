@@ -6,7 +6,7 @@ use std::{f32::consts::PI, io::Write, path::Path};
 
 use fenestra_scene::{
     Filter, Scene,
-    export::{Export as _, Settings, mitsuba::Export},
+    export::{Settings, mitsuba::export},
     lamp::{LampKind, SpotFalloff},
     load::LoadOptions,
     material::{ConductorFresnel, Material, MaterialKind},
@@ -803,7 +803,7 @@ fn exported(environment: &str, clay: &str) -> [Scene; 2] {
     let text = yard([32, 24], environment, clay, BALL).replace("vertical_fov_deg = 45.0", lens);
     let scene = loaded(&folder.write("scene.toml", text));
     let path = folder.path().join("out/a.xml");
-    Export::new(&scene, &path, Settings { depth: 3, samples: 4 }).unwrap().write().unwrap();
+    export(&scene, &path, Settings { depth: 3, samples: 4 }).write().unwrap();
     [scene, loaded(&path)]
 }
 

@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use rayon::prelude::*;
 
-use super::names::safe_name;
+use super::folder::safe_name;
 use crate::{
     coat::base_below_coat,
     error::Result,
@@ -194,9 +194,7 @@ impl Picture {
         };
         let count = width as usize * height as usize;
         let texels: Vec<[f32; 3]> = (0..count).into_par_iter().map(texel).collect();
-        let mut image = Image::new(width, height);
-        image.insert_triple(["R", "G", "B"], &texels);
-        image.write_exr(path)
+        Image::of_rgb(width, height, &texels).write_exr(path)
     }
 
     /// Function from values of the texture to those of the image.

@@ -7,7 +7,7 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 use crate::{
     error::Result,
-    export::names::safe_name,
+    export::folder::safe_name,
     files,
     math::colour::{luminance, srgb_from_linear},
     texture::{Channels, Texels, TextureUse},

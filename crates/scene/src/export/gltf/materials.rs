@@ -8,8 +8,8 @@ use super::{
     images::{Layout, Sheet, peak},
 };
 use crate::{
-    export::{parts::Triangles, triple},
-    material::{ConductorFresnel, Emission, Material, MaterialKind},
+    export::subject::Subject,
+    material::{ConductorFresnel, Emission, MaterialKind},
     texture::TextureUse,
 };
 
@@ -18,10 +18,8 @@ const DEFAULT_IOR: f32 = 1.5;
 
 /// Material on its way to the document.
 pub(super) struct Translator<'a> {
-    pub(super) material: &'a Material,
-    pub(super) triangles: Triangles,
+    pub(super) subject: Subject<'a>,
     pub(super) textures: &'a mut Textures,
-    pub(super) warnings: &'a mut Vec<String>,
     /// Members of the material and of its extensions.
     pub(super) members: Map<String, Value>,
     pub(super) extensions: Map<String, Value>,
@@ -37,7 +35,7 @@ struct Core {
 impl<'a> Translator<'a> {
     /// Translates the material.
     pub(super) fn translate(mut self) -> Value {
-        let surface = &self.material.surface;
+        let surface = self.subject.surface;
         let is_unlit = self.is_unlit();
         let core = if is_unlit {
             self.extension("KHR_materials_unlit", json!({}));
@@ -47,11 +45,12 @@ impl<'a> Translator<'a> {
             self.core()
         };
         if !surface.two_sided {
-            self.warn("its back is black in Fenestra, and seen or culled by readers of glTF");
+            self.subject
+                .warn("its back is black in Fenestra, and seen or culled by readers of glTF");
         }
         let color = match &surface.emission {
             Some(light) if is_unlit => light.texture.as_ref(),
-            _ if self.material.kind.is_glass() => None,
+            _ if self.subject.material.kind.is_glass() => None,
             _ => surface.color.as_ref(),
         };
         self.pbr(&core, color);
@@ -71,15 +70,11 @@ impl<'a> Translator<'a> {
         // The back of a double-sided material emits too.
         let is_double = surface.emission.as_ref().map_or(surface.two_sided, |own| own.two_sided);
         self.members.insert("doubleSided".to_owned(), is_double.into());
-        self.members.insert("name".to_owned(), self.material.name.clone().into());
+        self.members.insert("name".to_owned(), self.subject.material.name.clone().into());
         if !self.extensions.is_empty() {
             self.members.insert("extensions".to_owned(), self.extensions.into());
         }
         self.members.into()
-    }
-
-    fn warn(&mut self, difference: &str) {
-        self.warnings.push(format!("material `{}`: {difference}", self.material.name));
     }
 
     fn extension(&mut self, name: &'static str, value: Value) {
@@ -89,9 +84,9 @@ impl<'a> Translator<'a> {
 
     /// Tests for a surface that shows the same colour in any light.
     fn is_unlit(&self) -> bool {
-        let surface = &self.material.surface;
+        let surface = self.subject.surface;
         let is_black =
-            matches!(self.material.kind, MaterialKind::Diffuse { reflectance: Vec3::ZERO });
+            matches!(self.subject.material.kind, MaterialKind::Diffuse { reflectance: Vec3::ZERO });
         is_black
             && surface
                 .emission
@@ -104,10 +99,10 @@ impl<'a> Translator<'a> {
     fn core(&mut self) -> Core {
         let metal =
             |base_color, alpha: f32| Core { base_color, metallic: 1.0, roughness: alpha.sqrt() };
-        match &self.material.kind {
+        match &self.subject.material.kind {
             MaterialKind::Diffuse { reflectance } => self.diffuse(*reflectance),
             MaterialKind::Plastic { diffuse, alpha, ior } => {
-                self.warn(
+                self.subject.warn(
                     "its coat and base become glTF's dielectric, which reflects by Schlick's \
                      approximation and darkens its base in another way",
                 );
@@ -119,11 +114,11 @@ impl<'a> Translator<'a> {
                 fresnel: ConductorFresnel::Schlick { reflectance },
             } => metal(*reflectance, *alpha),
             MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } => {
-                self.warn(
+                self.subject.warn(
                     "its refractive index becomes the reflectance at normal incidence, from which \
                      glTF's metal follows Schlick's approximation",
                 );
-                self.without_color("metal of a refractive index");
+                self.subject.without_color("metal of a refractive index");
                 let (below, above) = (*eta - 1.0, *eta + 1.0);
                 let k = *k * *k;
                 metal((below * below + k) / (above * above + k), *alpha)
@@ -140,8 +135,9 @@ impl<'a> Translator<'a> {
                 Core { base_color: *base_color, metallic: *metallic, roughness: *roughness }
             }
             MaterialKind::Mirror { reflectance } => {
-                if *reflectance != Vec3::ONE || self.material.surface.color.is_some() {
-                    self.warn("its mirror becomes a metal, which is white toward the horizon");
+                if *reflectance != Vec3::ONE || self.subject.surface.color.is_some() {
+                    self.subject
+                        .warn("its mirror becomes a metal, which is white toward the horizon");
                 }
                 metal(*reflectance, 0.0)
             }
@@ -155,12 +151,7 @@ impl<'a> Translator<'a> {
                 self.glass(*ior, 0.0, *reflectance, *transmittance)
             }
             MaterialKind::Measured { path, table } => {
-                let share = super::super::reflected_share(table);
-                self.warn(&format!(
-                    "glTF reads no table such as {}; written as diffuse with the reflectance {}",
-                    path.display(),
-                    triple(share)
-                ));
+                let share = self.subject.measured(path, table);
                 self.diffuse(share)
             }
         }
@@ -184,26 +175,17 @@ impl<'a> Translator<'a> {
 
     fn glass(&mut self, ior: f32, roughness: f32, reflectance: Vec3, transmittance: Vec3) -> Core {
         if reflectance != Vec3::ONE {
-            self.warn("the factor of its reflected light has no place in glTF's glass");
+            self.subject.warn("the factor of its reflected light has no place in glTF's glass");
         }
-        self.without_color("dielectric");
+        self.subject.without_color("dielectric");
         self.dielectric(ior, 1.0, Vec3::ONE);
         self.extension("KHR_materials_transmission", json!({"transmissionFactor": 1.0}));
         Core { base_color: transmittance, metallic: 0.0, roughness }
     }
 
-    fn without_color(&mut self, kind: &str) {
-        let surface = &self.material.surface;
-        if surface.color.is_some() || surface.vertex_color && self.triangles.has_colors {
-            self.warn(&format!(
-                "the colours of its surface or its vertices have no place in a {kind}"
-            ));
-        }
-    }
-
     /// `pbrMetallicRoughness`, with the textures of colour and opacity, roughness and metal.
     fn pbr(&mut self, core: &Core, color: Option<&TextureUse>) {
-        let surface = &self.material.surface;
+        let surface = self.subject.surface;
         let largest = peak(color);
         let base_color = (core.base_color * largest).clamp(Vec3::ZERO, Vec3::ONE);
         let opacity = surface.opacity.factor;
@@ -242,7 +224,7 @@ impl<'a> Translator<'a> {
         let kept = second.filter(is_alike);
         if second.is_some() && kept.is_none() {
             let [first, second] = names;
-            self.warn(&format!(
+            self.subject.warn(&format!(
                 "its textures of {first} and {second} lie on the surface in two ways or differ in \
                  size; glTF has one image for both, and that of {second} is left out"
             ));
@@ -254,7 +236,7 @@ impl<'a> Translator<'a> {
     fn texture(&mut self, sheet: Sheet, used: &TextureUse) -> Map<String, Value> {
         let (info, is_exact) = self.textures.add(sheet, used);
         if !is_exact {
-            self.warn(
+            self.subject.warn(
                 "a texture is sheared on its coordinates, which glTF's transformation cannot",
             );
         }
@@ -280,9 +262,9 @@ impl<'a> Translator<'a> {
     }
 
     fn opacity(&mut self) {
-        let surface = &self.material.surface;
+        let surface = self.subject.surface;
         let opacity = &surface.opacity;
-        let has_colors = surface.vertex_color && self.triangles.has_transparency;
+        let has_colors = surface.vertex_color && self.subject.triangles.has_transparency;
         if let Some(cutoff) = opacity.cutoff {
             self.members.insert("alphaMode".to_owned(), "MASK".into());
             self.members.insert("alphaCutoff".to_owned(), json!(cutoff));

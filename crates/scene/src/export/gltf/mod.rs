@@ -13,10 +13,7 @@ mod images;
 mod materials;
 mod nodes;
 
-use std::{
-    io::Write,
-    path::{Path, PathBuf},
-};
+use std::{io::Write, path::Path};
 
 use glam::Vec3;
 use serde_json::{Map, Value, json};
@@ -26,133 +23,60 @@ use self::{
     materials::Translator,
 };
 use super::{
-    names::{folder_name, folder_of, identifier},
+    Export,
+    folder::{ENVIRONMENT, Folder, identifier},
     parts::{self, Parts},
     portal_warning,
+    subject::Subject,
 };
-use crate::{EnvironmentMap, Scene, error::Result, files, picture::Image};
+use crate::{EnvironmentMap, Scene, files, picture::Image};
 
-/// Name of the file of the environment.
-const ENVIRONMENT: &str = "environment.exr";
-
-/// A scene on its way to glTF.
-#[derive(Debug)]
-pub struct Export<'a> {
-    scene: &'a Scene,
-    path: PathBuf,
-    folder_name: String,
-    /// One per material, as `materials`.
-    parts: Vec<Parts>,
-    materials: Vec<Value>,
-    textures: Textures,
-    cameras: Value,
-    lights: Vec<Value>,
-    /// Those of the camera and the lamps.
-    nodes: Vec<Value>,
-    warnings: Vec<String>,
-}
-
-impl<'a> Export<'a> {
-    /// Translates the materials and lamps for a scene file at `path`, without writing anything.
-    pub fn new(scene: &'a Scene, path: &Path) -> Result<Self> {
-        let folder_name = folder_name(path);
-        let (mut warnings, mut textures) = (Vec::new(), Textures::default());
-        let parts = parts::divide(scene);
-        let materials = scene.materials.iter().zip(&parts);
-        let materials = materials.map(|(material, parts)| {
-            let translator = Translator {
-                material,
-                triangles: parts.describe(material.surface.normal.as_ref()),
-                textures: &mut textures,
-                warnings: &mut warnings,
-                members: Map::new(),
-                extensions: Map::new(),
-            };
-            translator.translate()
-        });
-        let materials = materials.collect();
-        let size = parts::bounds(&parts).map_or(1.0, |[low, high]| low.distance(high));
-        let near = 1e-4 * size.max(1e-6);
-        let [camera, node] = nodes::camera(&scene.camera, &scene.film, near, &mut warnings);
-        let (mut lights, mut nodes) = (Vec::new(), vec![node]);
-        for (index, lamp) in scene.lamps.iter().enumerate() {
-            let [light, node] = nodes::lamp(lamp, index, &mut warnings);
-            lights.push(light);
-            nodes.push(node);
-        }
-        if !lights.is_empty() {
-            textures.extensions.insert("KHR_lights_punctual");
-        }
-        warnings.extend(portal_warning(scene));
-        let rotation_deg = scene.environment.rotation_rad.to_degrees();
-        warnings.push(format!(
-            "environment: glTF has none; render with `--environment {folder_name}/{ENVIRONMENT} \
-             --rotate-environment {rotation_deg}`"
-        ));
-        Ok(Self {
-            scene,
-            path: path.to_owned(),
-            folder_name,
-            parts,
-            materials,
-            textures,
-            cameras: json!([camera]),
-            lights,
-            nodes,
-            warnings,
-        })
+/// Translates the materials and lamps for a scene file at `path`, without writing anything.
+pub fn export<'a>(scene: &'a Scene, path: &Path) -> Export<'a> {
+    let folder = Folder::beside(path, str::to_owned);
+    let (mut warnings, mut textures) = (Vec::new(), Textures::default());
+    let parts = parts::divide(scene);
+    let materials = scene.materials.iter().zip(&parts);
+    let materials = materials.map(|(material, parts)| {
+        let translator = Translator {
+            subject: Subject::new("glTF", material, parts, &mut warnings),
+            textures: &mut textures,
+            members: Map::new(),
+            extensions: Map::new(),
+        };
+        translator.translate()
+    });
+    let materials: Vec<Value> = materials.collect();
+    let size = parts::bounds(&parts).map_or(1.0, |[low, high]| low.distance(high));
+    let near = 1e-4 * size.max(1e-6);
+    let [camera, node] = nodes::camera(&scene.camera, &scene.film, near, &mut warnings);
+    let (mut lights, mut nodes) = (Vec::new(), vec![node]);
+    for (index, lamp) in scene.lamps.iter().enumerate() {
+        let [light, node] = nodes::lamp(lamp, index, &mut warnings);
+        lights.push(light);
+        nodes.push(node);
     }
-
-    /// Meshes of all materials, one for each of their parts, and the buffer of their vertices.
-    fn meshes(&self) -> (Vec<Value>, Buffer) {
-        let (mut meshes, mut buffer) = (Vec::new(), Buffer::default());
-        for (index, parts) in self.parts.iter().enumerate() {
-            let material = &self.scene.materials[index];
-            let surface = &material.surface;
-            let sets = surface.textures().map(|used| used.uv_set as usize + 1);
-            let uv_sets = sets.max().unwrap_or(0);
-            for (part, is_flat) in parts.each() {
-                let framed;
-                let part = match &surface.normal {
-                    Some(used) => {
-                        framed = part.with_frames(used);
-                        &framed
-                    }
-                    None => part,
-                };
-                let attributes = Attributes {
-                    normals: !is_flat || surface.normal.is_some(),
-                    tangents: surface.normal.is_some(),
-                    uv_sets,
-                    colors: surface.vertex_color
-                        && part.vertices.iter().any(|vertex| vertex.color != glam::Vec4::ONE),
-                };
-                let mut primitive = buffer.primitive(part, attributes);
-                primitive.insert("material".to_owned(), index.into());
-                let name = identifier(index, &material.name);
-                meshes.push(json!({"name": name, "primitives": [primitive]}));
-            }
-        }
-        (meshes, buffer)
+    if !lights.is_empty() {
+        textures.extensions.insert("KHR_lights_punctual");
     }
-}
-
-impl super::Export for Export<'_> {
-    fn warnings(&self) -> &[String] {
-        &self.warnings
-    }
-
-    fn write(&self) -> Result<()> {
-        let folder = folder_of(&self.path);
-        let (meshes, buffer) = self.meshes();
-        let mut nodes = self.nodes.clone();
+    warnings.extend(portal_warning(scene));
+    let rotation_deg = scene.environment.rotation_rad.to_degrees();
+    warnings.push(format!(
+        "environment: glTF has none; render with `--environment {}/{ENVIRONMENT} \
+         --rotate-environment {rotation_deg}`",
+        folder.name
+    ));
+    let path = path.to_owned();
+    Export::new(warnings, move || {
+        let (meshes, buffer) = meshes(scene, &parts);
+        let mut nodes = nodes.clone();
         nodes.extend(
             meshes
                 .iter()
                 .enumerate()
                 .map(|(index, mesh)| json!({"name": mesh["name"], "mesh": index})),
         );
-        let uri_of = |name: &str| format!("{}/{name}", percent_encoded(&self.folder_name));
+        let uri_of = |name: &str| format!("{}/{name}", percent_encoded(&folder.name));
         let version = env!("CARGO_PKG_VERSION");
         let mut document = Map::new();
         let mut insert = |name: &str, value: Value| {
@@ -162,37 +86,68 @@ impl super::Export for Export<'_> {
             }
         };
         insert("asset", json!({"version": "2.0", "generator": format!("Fenestra {version}")}));
-        insert("extensionsUsed", json!(self.textures.extensions));
+        insert("extensionsUsed", json!(textures.extensions));
         insert("scene", json!(0));
         insert("scenes", json!([{"nodes": (0..nodes.len()).collect::<Vec<_>>()}]));
         insert("nodes", nodes.into());
-        insert("cameras", self.cameras.clone());
+        insert("cameras", json!([camera]));
         insert("meshes", meshes.into());
-        insert("materials", self.materials.clone().into());
+        insert("materials", materials.clone().into());
         insert("accessors", buffer.accessors.into());
         insert("bufferViews", buffer.views.into());
         if !buffer.bytes.is_empty() {
             let name = "meshes.bin";
             let buffers = json!([{"uri": uri_of(name), "byteLength": buffer.bytes.len()}]);
             insert("buffers", buffers);
-            files::write_atomically(&folder.join(name), |file| file.write_all(&buffer.bytes))?;
+            files::write_atomically(&folder.path.join(name), |file| file.write_all(&buffer.bytes))?;
         }
-        if !self.lights.is_empty() {
-            insert("extensions", json!({"KHR_lights_punctual": {"lights": self.lights}}));
+        if !lights.is_empty() {
+            insert("extensions", json!({"KHR_lights_punctual": {"lights": lights}}));
         }
-        self.textures.add_to(&mut document, uri_of);
-        self.textures.write(&folder)?;
-        write_environment(&self.scene.environment, &folder)?;
-        files::write_json(&self.path, &document)
-    }
+        textures.add_to(&mut document, uri_of);
+        textures.write(&folder.path)?;
+        folder.write_environment(&scene.environment, unturned)?;
+        files::write_json(&path, &document)
+    })
 }
 
-/// Writes the environment as it is, before its rotation.
-fn write_environment(map: &EnvironmentMap, folder: &Path) -> Result<()> {
-    let mut image = Image::new(map.width, map.height);
+/// Meshes of all materials, one for each of their parts, and the buffer of their vertices.
+fn meshes(scene: &Scene, parts: &[Parts]) -> (Vec<Value>, Buffer) {
+    let (mut meshes, mut buffer) = (Vec::new(), Buffer::default());
+    for (index, parts) in parts.iter().enumerate() {
+        let material = &scene.materials[index];
+        let surface = &material.surface;
+        let sets = surface.textures().map(|used| used.uv_set as usize + 1);
+        let uv_sets = sets.max().unwrap_or(0);
+        for (part, is_flat) in parts.each() {
+            let framed;
+            let part = match &surface.normal {
+                Some(used) => {
+                    framed = part.with_frames(used);
+                    &framed
+                }
+                None => part,
+            };
+            let attributes = Attributes {
+                normals: !is_flat || surface.normal.is_some(),
+                tangents: surface.normal.is_some(),
+                uv_sets,
+                colors: surface.vertex_color
+                    && part.vertices.iter().any(|vertex| vertex.color != glam::Vec4::ONE),
+            };
+            let mut primitive = buffer.primitive(part, attributes);
+            primitive.insert("material".to_owned(), index.into());
+            let name = identifier(index, &material.name);
+            meshes.push(json!({"name": name, "primitives": [primitive]}));
+        }
+    }
+    (meshes, buffer)
+}
+
+/// The environment as it is, before its rotation.
+fn unturned(map: &EnvironmentMap) -> Image {
     let texels: Vec<[f32; 3]> = map.texels.iter().map(Vec3::to_array).collect();
-    image.insert_triple(["R", "G", "B"], &texels);
-    image.write_exr(&folder.join(ENVIRONMENT))
+    Image::of_rgb(map.width, map.height, &texels)
 }
 
 /// Name as a part of a URI (RFC 3986).

@@ -1,13 +1,11 @@
 //! Lamps and the environment.
 
-use std::path::Path;
-
 use glam::Vec3;
 
 use crate::{
     EnvironmentMap, Lamp,
     error::Result,
-    export::{names::relative, triple},
+    export::{folder::Folder, triple},
     lamp::{LampKind, SpotFalloff},
     picture::Image,
 };
@@ -71,11 +69,7 @@ pub(super) fn lamp(lamp: &Lamp, warnings: &mut Vec<String>) -> String {
 /// j/(height − 1), on the poles too. A map of 2·height + 1 rows holds Fenestra's bilinear function
 /// exactly: odd rows are the texels, even ones the means of their neighbours. Mitsuba's middle looks
 /// along +Z, Fenestra's along −Z: half a turn.
-pub(super) fn write_environment(
-    map: &EnvironmentMap,
-    folder: &Path,
-    folder_name: &str,
-) -> Result<String> {
+pub(super) fn write_environment(map: &EnvironmentMap, folder: &Folder) -> Result<String> {
     if map.is_black() {
         return Ok(String::new());
     }
@@ -86,9 +80,19 @@ pub(super) fn write_environment(
             triple(radiance)
         ));
     }
+    Ok(format!(
+        "    <emitter type=\"envmap\">\n        <string name=\"filename\" value=\"{}\"/>\n        \
+         <transform name=\"to_world\">\n            <rotate y=\"1\" angle=\"{}\"/>\n        \
+         </transform>\n    </emitter>\n",
+        folder.write_environment(map, rows_on_poles)?,
+        f64::from(map.rotation_rad).to_degrees() + 180.0
+    ))
+}
+
+/// The map with rows on the poles.
+fn rows_on_poles(map: &EnvironmentMap) -> Image {
     let (width, height) = (map.width as usize, map.height as usize);
-    let mut image = Image::new(map.width, 2 * map.height + 1);
-    let mut texels = Vec::with_capacity(image.pixel_count());
+    let mut texels = Vec::with_capacity((2 * height + 1) * width);
     for row in 0..=2 * height {
         let above = row.saturating_sub(1) / 2 * width;
         let below = (row / 2).min(height - 1) * width;
@@ -96,14 +100,5 @@ pub(super) fn write_environment(
             (0.5 * map.texels[above + column] + 0.5 * map.texels[below + column]).to_array()
         }));
     }
-    image.insert_triple(["R", "G", "B"], &texels);
-    let name = "environment.exr";
-    image.write_exr(&folder.join(name))?;
-    Ok(format!(
-        "    <emitter type=\"envmap\">\n        <string name=\"filename\" value=\"{}\"/>\n        \
-         <transform name=\"to_world\">\n            <rotate y=\"1\" angle=\"{}\"/>\n        \
-         </transform>\n    </emitter>\n",
-        relative(folder_name, name),
-        f64::from(map.rotation_rad).to_degrees() + 180.0
-    ))
+    Image::of_rgb(map.width, 2 * map.height + 1, &texels)
 }

@@ -18,131 +18,40 @@
 mod lights;
 mod models;
 
-use std::{
-    fmt::Write,
-    path::{Path, PathBuf},
-};
+use std::{fmt::Write, path::Path};
 
 use self::models::{Model, Translator, indented};
 use super::{
-    Settings,
+    Export, Settings,
+    folder::{Folder, identifier},
     images::Pictures,
-    names::{folder_name, folder_of, identifier, relative},
     parts::{self, Parts},
-    ply::{self, Attributes, SAME_UV},
-    portal_warning, triple,
+    ply::{Attributes, SAME_UV},
+    portal_warning,
+    subject::Subject,
+    triple,
 };
-use crate::{Camera, Filter, Scene, error::Result, files};
+use crate::{Camera, Filter, Scene, files};
 
 /// Distance of a mesh that emits backwards from the one that emits forwards, as a part of the size of
 /// the scene.
 pub const BACK_DISTANCE: f32 = 1e-5;
 
-/// A scene on its way to Mitsuba.
-#[derive(Debug)]
-pub struct Export<'a> {
-    scene: &'a Scene,
-    settings: Settings,
-    path: PathBuf,
-    /// Name of the folder beside the scene file, escaped for XML.
-    folder_name: String,
-    /// One per material, as `models`.
-    parts: Vec<Parts>,
-    models: Vec<Model>,
-    lamps: String,
-    pictures: Pictures,
-    warnings: Vec<String>,
-}
-
-impl<'a> Export<'a> {
-    /// Translates the materials and lamps for a scene file at `path`, without writing anything.
-    pub fn new(scene: &'a Scene, path: &Path, settings: Settings) -> Result<Self> {
-        let folder_name = escaped(&folder_name(path));
-        let (mut warnings, mut pictures) = (Vec::new(), Pictures::default());
-        let parts = parts::divide(scene);
-        let models = scene.materials.iter().zip(&parts);
-        let models = models.map(|(material, parts)| {
-            let translator = Translator {
-                material,
-                triangles: parts.describe(material.surface.normal.as_ref()),
-                folder: &folder_name,
-                pictures: &mut pictures,
-                warnings: &mut warnings,
-                color_factor: None,
-            };
-            translator.model()
-        });
-        let models = models.collect();
-        let lamps = scene.lamps.iter().map(|lamp| lights::lamp(lamp, &mut warnings)).collect();
-        warnings.extend(portal_warning(scene));
-        let path = path.to_owned();
-        Ok(Self { scene, settings, path, folder_name, parts, models, lamps, pictures, warnings })
-    }
-
-    /// Camera, sampler and film. Mitsuba leaves out surfaces nearer or farther than its clip planes.
-    fn sensor(&self) -> String {
-        let Camera { position, look_at, up, .. } = self.scene.camera;
-        let Camera { vertical_fov_deg, aperture_radius, focus_distance, .. } = self.scene.camera;
-        // The farthest corner of the box is at least as far as all vertices.
-        let corner = parts::bounds(&self.parts).map_or(0.0, |[low, high]| {
-            (low - position).abs().max((high - position).abs()).length()
-        });
-        let far = 2.0 * corner.max(1e-3);
-        let kind = if aperture_radius > 0.0 { "thinlens" } else { "perspective" };
-        let mut xml = format!("    <sensor type=\"{kind}\">\n");
-        let mut number = |name: &str, value: f32| {
-            _ = writeln!(xml, "        <float name=\"{name}\" value=\"{value}\"/>");
-        };
-        number("fov", vertical_fov_deg);
-        if aperture_radius > 0.0 {
-            number("aperture_radius", aperture_radius);
-            number("focus_distance", focus_distance);
-        }
-        number("near_clip", 1e-6 * far);
-        // The plane of focus lies between the clip planes.
-        number("far_clip", if aperture_radius > 0.0 { far.max(2.0 * focus_distance) } else { far });
-        let filter = match self.scene.film.filter {
-            Filter::Box => "<rfilter type=\"box\"/>",
-            Filter::Gaussian => {
-                "<rfilter type=\"gaussian\"><float name=\"stddev\" value=\"0.5\"/></rfilter>"
-            }
-        };
-        _ = write!(
-            xml,
-            r#"        <string name="fov_axis" value="y"/>
-        <transform name="to_world">
-            <lookat origin="{}" target="{}" up="{}"/>
-        </transform>
-        <sampler type="independent">
-            <integer name="sample_count" value="{}"/>
-        </sampler>
-        <film type="hdrfilm">
-            <integer name="width" value="{}"/>
-            <integer name="height" value="{}"/>
-            <string name="pixel_format" value="rgb"/>
-            <string name="component_format" value="float32"/>
-            {filter}
-        </film>
-    </sensor>
-"#,
-            triple(position),
-            triple(look_at),
-            triple(up),
-            self.settings.samples,
-            self.scene.film.width,
-            self.scene.film.height,
-        );
-        xml
-    }
-}
-
-impl super::Export for Export<'_> {
-    fn warnings(&self) -> &[String] {
-        &self.warnings
-    }
-
-    fn write(&self) -> Result<()> {
-        let folder = folder_of(&self.path);
+/// Translates the materials and lamps for a scene file at `path`, without writing anything.
+pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'a> {
+    let folder = Folder::beside(path, escaped);
+    let (mut warnings, mut pictures) = (Vec::new(), Pictures::default());
+    let parts = parts::divide(scene);
+    let models = scene.materials.iter().zip(&parts).map(|(material, parts)| {
+        let subject = Subject::new("Mitsuba", material, parts, &mut warnings);
+        let pictures = &mut pictures;
+        Translator { subject, folder: &folder, pictures, color_factor: None }.model()
+    });
+    let models: Vec<Model> = models.collect();
+    let lamps: String = scene.lamps.iter().map(|lamp| lights::lamp(lamp, &mut warnings)).collect();
+    warnings.extend(portal_warning(scene));
+    let path = path.to_owned();
+    Export::new(warnings, move || {
         let mut xml = format!(
             "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<!-- Written by Fenestra {}. -->\n\
              <scene version=\"3.0.0\">\n    <integrator type=\"path\">\n        \
@@ -150,16 +59,16 @@ impl super::Export for Export<'_> {
              <boolean name=\"hide_emitters\" value=\"false\"/>\n    </integrator>\n",
             env!("CARGO_PKG_VERSION"),
             // Mitsuba counts the edges of a path, the one to the light included.
-            u64::from(self.settings.depth) + 1
+            u64::from(settings.depth) + 1
         );
-        xml += &self.sensor();
-        xml += &lights::write_environment(&self.scene.environment, &folder, &self.folder_name)?;
-        xml += &self.lamps;
-        self.pictures.write(&folder)?;
-        let size = parts::bounds(&self.parts).map_or(0.0, |[low, high]| low.distance(high));
-        for (index, parts) in self.parts.iter().enumerate() {
-            let model = &self.models[index];
-            let id = identifier(index, &self.scene.materials[index].name);
+        xml += &sensor(scene, &parts, settings.samples);
+        xml += &lights::write_environment(&scene.environment, &folder)?;
+        xml += &lamps;
+        pictures.write(&folder.path)?;
+        let size = parts::bounds(&parts).map_or(0.0, |[low, high]| low.distance(high));
+        for (index, parts) in parts.iter().enumerate() {
+            let model = &models[index];
+            let id = identifier(index, &scene.materials[index].name);
             if parts.each().next().is_some() {
                 xml += &indented(&model.bsdf.replacen('>', &format!(" id=\"{id}\">"), 1));
             }
@@ -177,10 +86,7 @@ impl super::Export for Export<'_> {
                         written_from_uv: SAME_UV,
                         color_factor: model.color_factor,
                     };
-                    files::write_atomically(&folder.join(&name), |file| {
-                        ply::write(file, &part, attributes)
-                    })?;
-                    let file = relative(&self.folder_name, &name);
+                    let file = folder.write_mesh(&name, &part, attributes)?;
                     let emitter = model.emitter.as_deref().unwrap_or_default();
                     let emitter = indented(&indented(emitter));
                     _ = write!(
@@ -194,8 +100,63 @@ impl super::Export for Export<'_> {
             }
         }
         xml += "</scene>\n";
-        files::write_text(&self.path, &xml)
+        files::write_text(&path, &xml)
+    })
+}
+
+/// Camera, sampler and film. Mitsuba leaves out surfaces nearer or farther than its clip planes.
+fn sensor(scene: &Scene, parts: &[Parts], samples: u32) -> String {
+    let Camera { position, look_at, up, .. } = scene.camera;
+    let Camera { vertical_fov_deg, aperture_radius, focus_distance, .. } = scene.camera;
+    // The farthest corner of the box is at least as far as all vertices.
+    let corner = parts::bounds(parts)
+        .map_or(0.0, |[low, high]| (low - position).abs().max((high - position).abs()).length());
+    let far = 2.0 * corner.max(1e-3);
+    let kind = if aperture_radius > 0.0 { "thinlens" } else { "perspective" };
+    let mut xml = format!("    <sensor type=\"{kind}\">\n");
+    let mut number = |name: &str, value: f32| {
+        _ = writeln!(xml, "        <float name=\"{name}\" value=\"{value}\"/>");
+    };
+    number("fov", vertical_fov_deg);
+    if aperture_radius > 0.0 {
+        number("aperture_radius", aperture_radius);
+        number("focus_distance", focus_distance);
     }
+    number("near_clip", 1e-6 * far);
+    // The plane of focus lies between the clip planes.
+    number("far_clip", if aperture_radius > 0.0 { far.max(2.0 * focus_distance) } else { far });
+    let filter = match scene.film.filter {
+        Filter::Box => "<rfilter type=\"box\"/>",
+        Filter::Gaussian => {
+            "<rfilter type=\"gaussian\"><float name=\"stddev\" value=\"0.5\"/></rfilter>"
+        }
+    };
+    _ = write!(
+        xml,
+        r#"        <string name="fov_axis" value="y"/>
+        <transform name="to_world">
+            <lookat origin="{}" target="{}" up="{}"/>
+        </transform>
+        <sampler type="independent">
+            <integer name="sample_count" value="{}"/>
+        </sampler>
+        <film type="hdrfilm">
+            <integer name="width" value="{}"/>
+            <integer name="height" value="{}"/>
+            <string name="pixel_format" value="rgb"/>
+            <string name="component_format" value="float32"/>
+            {filter}
+        </film>
+    </sensor>
+"#,
+        triple(position),
+        triple(look_at),
+        triple(up),
+        samples,
+        scene.film.width,
+        scene.film.height,
+    );
+    xml
 }
 
 fn escaped(text: &str) -> String {

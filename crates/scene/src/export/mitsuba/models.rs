@@ -2,18 +2,17 @@
 
 use std::fmt::Write;
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 use crate::{
     export::{
+        folder::Folder,
         images::{Pictures, Recipe},
-        index_of,
-        names::relative,
-        parts::Triangles,
+        subject::{Opacity, Subject, index_of},
         triple,
     },
-    material::{ConductorFresnel, Material, MaterialKind},
-    texture::{Interpolation, TextureUse},
+    material::{ConductorFresnel, MaterialKind},
+    texture::TextureUse,
 };
 
 /// GGX width above which separate masking is worth a warning: below it, a white conductor reflects
@@ -39,25 +38,22 @@ pub(super) struct Model {
 
 /// Material on its way to a [`Model`].
 pub(super) struct Translator<'a> {
-    pub(super) material: &'a Material,
-    pub(super) triangles: Triangles,
-    /// Folder of the images, as the scene file calls it.
-    pub(super) folder: &'a str,
+    pub(super) subject: Subject<'a>,
+    pub(super) folder: &'a Folder,
     pub(super) pictures: &'a mut Pictures,
-    pub(super) warnings: &'a mut Vec<String>,
     pub(super) color_factor: Option<Vec3>,
 }
 
 impl Translator<'_> {
     /// Translates the material.
     pub(super) fn model(mut self) -> Model {
-        let surface = &self.material.surface;
-        let is_glass = self.material.kind.is_glass();
+        let surface = self.subject.surface;
+        let is_glass = self.subject.material.kind.is_glass();
         let mut bsdf = self.reflection();
         if surface.two_sided && !is_glass {
             bsdf = around("twosided", "", &bsdf);
         } else if !surface.two_sided && is_glass {
-            self.warn("its back is black in Fenestra, and glass in Mitsuba");
+            self.subject.warn("its back is black in Fenestra, and glass in Mitsuba");
         }
         if let Some(normal) = &surface.normal {
             bsdf = self.bumps(normal, &bsdf);
@@ -69,7 +65,7 @@ impl Translator<'_> {
         let mut sets = surface.textures().map(|used| used.uv_set);
         let uv_set = sets.next();
         if sets.any(|set| Some(set) != uv_set) {
-            self.warn(
+            self.subject.warn(
                 "its textures read two sets of coordinates, Mitsuba's only the first of them",
             );
         }
@@ -82,13 +78,9 @@ impl Translator<'_> {
         }
     }
 
-    fn warn(&mut self, difference: &str) {
-        self.warnings.push(format!("material `{}`: {difference}", self.material.name));
-    }
-
     fn warn_of_masking(&mut self, alpha: f32, kind: &str) {
         if alpha > SEPARATE_MASKING_ALPHA {
-            self.warn(&format!(
+            self.subject.warn(&format!(
                 "Mitsuba's {kind} masks and shadows separately, Fenestra together; highlights are \
                  darker there at alpha = {alpha}"
             ));
@@ -96,13 +88,13 @@ impl Translator<'_> {
     }
 
     fn reflection(&mut self) -> String {
-        match &self.material.kind {
+        match &self.subject.material.kind {
             MaterialKind::Diffuse { reflectance } => {
                 element("diffuse", &self.color("reflectance", *reflectance))
             }
             MaterialKind::Plastic { diffuse, alpha, ior } => {
                 self.warn_of_masking(*alpha, "plastic");
-                self.warn(
+                self.subject.warn(
                     "Mitsuba's plastic loses light below its coat, Fenestra's does not; a white one \
                      reflects 0.96 there at alpha = 0.05 and 0.69 at 0.3",
                 );
@@ -115,7 +107,7 @@ impl Translator<'_> {
             }
             MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } => {
                 self.warn_of_masking(*alpha, "conductor");
-                self.without_color("metal of a refractive index");
+                self.subject.without_color("metal of a refractive index");
                 let content = self.ggx(*alpha) + &rgb("eta", *eta) + &rgb("k", *k);
                 element("roughconductor", &content)
             }
@@ -139,18 +131,18 @@ impl Translator<'_> {
                 specular_color,
             } => {
                 self.warn_of_masking(roughness * roughness, "principled");
-                self.warn(
+                self.subject.warn(
                     "Mitsuba's principled differs from glTF's: its diffuse part is Disney's, and its \
                      dielectric reflects by Fresnel's equations instead of Schlick's",
                 );
                 if *specular != 1.0 || *specular_color != Vec3::ONE {
-                    self.warn(
+                    self.subject.warn(
                         "strength and colour of the dielectric's reflection become a refractive \
                          index of the same reflectance at normal incidence",
                     );
                 }
                 let content = self.color("base_color", *base_color)
-                    + &self.number("metallic", *metallic, self.material.surface.metallic.as_ref())
+                    + &self.number("metallic", *metallic, self.subject.surface.metallic.as_ref())
                     + &self.roughness(*roughness)
                     + &float("eta", index_of(*ior, *specular, *specular_color).max(LEAST_ETA));
                 element("principled", &content)
@@ -161,7 +153,7 @@ impl Translator<'_> {
                 element("conductor", &content)
             }
             MaterialKind::Dielectric { ior, alpha, reflectance, transmittance } => {
-                self.without_color("dielectric");
+                self.subject.without_color("dielectric");
                 let glass = glass(*ior, *reflectance, *transmittance);
                 if *alpha > 0.0 {
                     self.warn_of_masking(*alpha, "dielectric");
@@ -171,38 +163,22 @@ impl Translator<'_> {
                 }
             }
             MaterialKind::ThinDielectric { ior, reflectance, transmittance } => {
-                self.without_color("dielectric");
+                self.subject.without_color("dielectric");
                 element("thindielectric", &glass(*ior, *reflectance, *transmittance))
             }
             MaterialKind::Measured { path, table } => {
-                let share = super::super::reflected_share(table);
-                self.warn(&format!(
-                    "Mitsuba reads no table such as {}; written as diffuse with the reflectance {}",
-                    path.display(),
-                    triple(share)
-                ));
-                element("diffuse", &rgb("reflectance", share))
+                element("diffuse", &rgb("reflectance", self.subject.measured(path, table)))
             }
-        }
-    }
-
-    /// Names colours that the model of Mitsuba has no place for.
-    fn without_color(&mut self, kind: &str) {
-        let surface = &self.material.surface;
-        if surface.color.is_some() || surface.vertex_color && self.triangles.has_colors {
-            self.warn(&format!(
-                "the colours of its surface or its vertices have no place in a {kind}"
-            ));
         }
     }
 
     /// Main colour of the model, with its texture or the colours of vertices.
     fn color(&mut self, name: &str, factor: Vec3) -> String {
-        let surface = &self.material.surface;
-        let is_of_vertices = surface.vertex_color && self.triangles.has_colors;
+        let surface = self.subject.surface;
+        let is_of_vertices = surface.vertex_color && self.subject.triangles.has_colors;
         if let Some(used) = &surface.color {
             if is_of_vertices {
-                self.warn(
+                self.subject.warn(
                     "Mitsuba multiplies no texture by the colours of vertices; they are left out",
                 );
             }
@@ -226,20 +202,13 @@ impl Translator<'_> {
     }
 
     fn roughness(&mut self, factor: f32) -> String {
-        self.number("roughness", factor, self.material.surface.roughness.as_ref())
+        self.number("roughness", factor, self.subject.surface.roughness.as_ref())
     }
 
     /// Parameters of a GGX model of width `alpha`.
     fn ggx(&mut self, alpha: f32) -> String {
-        let alpha = match &self.material.surface.roughness {
-            Some(used) => {
-                if used.interpolation == Interpolation::Bilinear {
-                    self.warn(
-                        "Mitsuba interpolates alpha between texels, Fenestra the roughness, its root",
-                    );
-                }
-                self.bitmap("alpha", used, Recipe::Squared(alpha))
-            }
+        let alpha = match self.subject.width(alpha) {
+            Some((used, recipe)) => self.bitmap("alpha", used, recipe),
             None => float("alpha", alpha),
         };
         "    <string name=\"distribution\" value=\"ggx\"/>\n".to_owned() + &alpha
@@ -249,7 +218,7 @@ impl Translator<'_> {
     fn bitmap(&mut self, name: &str, used: &TextureUse, recipe: Recipe) -> String {
         let wrap = |axis: usize| ["repeat", "mirror", "clamp"][used.wrap[axis] as usize];
         if used.wrap[0] != used.wrap[1] {
-            self.warn(&format!(
+            self.subject.warn(&format!(
                 "`{name}` continues along u by {}, along v by {}; Mitsuba has one way for both, that \
                  of u",
                 wrap(0),
@@ -262,7 +231,7 @@ impl Translator<'_> {
              <boolean name=\"raw\" value=\"{}\"/>\n    \
              <string name=\"filter_type\" value=\"{}\"/>\n    \
              <string name=\"wrap_mode\" value=\"{}\"/>\n",
-            relative(self.folder, &bitmap.name),
+            self.folder.relative(&bitmap.name),
             bitmap.is_raw,
             if bitmap.is_nearest { "nearest" } else { "bilinear" },
             wrap(0),
@@ -282,61 +251,33 @@ impl Translator<'_> {
     /// Normal map around a model. It stands around `twosided`: inside, it would mirror the bumps
     /// of the back.
     fn bumps(&mut self, normal: &TextureUse, bsdf: &str) -> String {
-        let [same, opposite] = self.triangles.bitangents;
-        if same > 0 && opposite > 0 {
-            let lesser = same.min(opposite);
-            self.warn(&format!(
-                "{lesser} of {} triangles show the normal map as a mirror image, which Mitsuba bends \
-                 the wrong way",
-                same + opposite
-            ));
-        }
+        let recipe = self.subject.bumps();
         let [along, across, _] = normal.image_from_uv[0];
         if along <= 0.0 || across != 0.0 {
-            self.warn(
+            self.subject.warn(
                 "its normal map is turned or mirrored on its coordinates; Mitsuba bends along those \
                  of the mesh",
             );
         }
-        let scale = self.material.surface.normal_scale;
-        let across = if opposite > same { -scale } else { scale };
-        let content = self.bitmap("normalmap", normal, Recipe::Normal(Vec2::new(scale, across)))
+        let content = self.bitmap("normalmap", normal, recipe)
             + "    <boolean name=\"use_shadowing_function\" value=\"false\"/>\n";
         around("normalmap", &content, bsdf)
     }
 
     /// Parameter of a `mask`, for a surface that is not opaque.
     fn opacity(&mut self) -> Option<String> {
-        let surface = &self.material.surface;
-        let opacity = &surface.opacity;
-        if surface.vertex_color && self.triangles.has_transparency {
-            self.warn("the opacity of its vertices is left out");
+        if self.subject.surface.vertex_color && self.subject.triangles.has_transparency {
+            self.subject.warn("the opacity of its vertices is left out");
         }
-        let Some(used) = &opacity.texture else {
-            let factor = match opacity.cutoff {
-                Some(cutoff) if opacity.factor >= cutoff => 1.0,
-                Some(_) => 0.0,
-                None => opacity.factor,
-            };
-            return (factor < 1.0).then(|| float("opacity", factor));
-        };
-        Some(match opacity.cutoff {
-            Some(cutoff) => {
-                if used.interpolation == Interpolation::Bilinear {
-                    self.warn(
-                        "Mitsuba's mask has no cutoff; an enlarged image of 0 and 1 takes its place, \
-                         with edges in steps of a fraction of a texel",
-                    );
-                }
-                self.bitmap("opacity", used, Recipe::Cut { factor: opacity.factor, cutoff })
-            }
-            None => self.bitmap("opacity", used, Recipe::Number(opacity.factor)),
+        Some(match self.subject.opacity("mask")? {
+            Opacity::Factor(factor) => float("opacity", factor),
+            Opacity::Image(used, recipe) => self.bitmap("opacity", used, recipe),
         })
     }
 
     /// Emitter of the surface, and true if its back emits too.
     fn light(&mut self, is_glass: bool) -> (Option<String>, bool) {
-        let surface = &self.material.surface;
+        let surface = self.subject.surface;
         let Some(emission) = &surface.emission else { return (None, false) };
         let radiance = match &emission.texture {
             Some(used) => self.bitmap("radiance", used, Recipe::Color(emission.radiance)),
@@ -344,11 +285,13 @@ impl Translator<'_> {
         };
         let is_opaque = surface.opacity == Default::default();
         if !is_opaque {
-            self.warn("Mitsuba's light is that of the whole surface, also where it is not opaque");
+            self.subject
+                .warn("Mitsuba's light is that of the whole surface, also where it is not opaque");
         }
         let can_have_back = is_opaque && !is_glass && surface.two_sided;
         if emission.two_sided && !can_have_back {
-            self.warn("Mitsuba's surfaces emit in front only; the light of the back is left out");
+            self.subject
+                .warn("Mitsuba's surfaces emit in front only; the light of the back is left out");
         }
         let emitter = format!("<emitter type=\"area\">\n{radiance}</emitter>\n");
         (Some(emitter), emission.two_sided && can_have_back)

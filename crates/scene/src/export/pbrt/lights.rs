@@ -1,15 +1,13 @@
 //! Lamps and the environment.
 
-use std::path::Path;
-
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::{escaped, triple};
+use super::triple;
 use crate::{
     EnvironmentMap, Lamp,
     error::Result,
-    export::names::relative,
+    export::folder::Folder,
     lamp::{LampKind, SpotFalloff},
     math::equal_area::direction_from_square,
     picture::Image,
@@ -69,17 +67,19 @@ pub(super) fn lamp(lamp: &Lamp, warnings: &mut Vec<String>) -> String {
 ///
 /// A square equal-area map twice as high as the lat-long one has texels smaller than those at its
 /// horizon. The directions of the map are those of the world.
-pub(super) fn write_environment(
-    map: &EnvironmentMap,
-    folder: &Path,
-    folder_name: &str,
-) -> Result<String> {
+pub(super) fn write_environment(map: &EnvironmentMap, folder: &Folder) -> Result<String> {
     if map.is_black() {
         return Ok(String::new());
     }
     if let Some(radiance) = map.uniform_radiance() {
         return Ok(format!("LightSource \"infinite\" \"rgb L\" [{}]\n", triple(radiance)));
     }
+    let file = folder.write_environment(map, equal_area)?;
+    Ok(format!("LightSource \"infinite\" \"string filename\" \"{file}\"\n"))
+}
+
+/// The map as an equal-area square, in the directions of the world.
+fn equal_area(map: &EnvironmentMap) -> Image {
     let side = map.height.saturating_mul(2).clamp(SIDES.0, SIDES.1);
     let points = POINTS * map.height.saturating_mul(2).div_ceil(side);
     let texel = |index: u32| {
@@ -93,10 +93,5 @@ pub(super) fn write_environment(
         (sum / (points * points) as f32).to_array()
     };
     let texels: Vec<[f32; 3]> = (0..side * side).into_par_iter().map(texel).collect();
-    let mut image = Image::new(side, side);
-    image.insert_triple(["R", "G", "B"], &texels);
-    let name = "environment.exr";
-    image.write_exr(&folder.join(name))?;
-    let file = escaped(&relative(folder_name, name));
-    Ok(format!("LightSource \"infinite\" \"string filename\" \"{file}\"\n"))
+    Image::of_rgb(side, side, &texels)
 }

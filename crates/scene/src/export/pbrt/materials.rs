@@ -2,19 +2,18 @@
 
 use std::fmt::Write;
 
-use glam::{Mat3, Vec2, Vec3};
+use glam::{Mat3, Vec3};
 
-use super::{escaped, triple};
+use super::triple;
 use crate::{
     coat::base_below_coat,
     export::{
+        folder::Folder,
         images::{Pictures, Recipe},
-        index_of,
-        names::relative,
-        parts::Triangles,
         ply::SAME_UV,
+        subject::{Opacity, Subject, index_of},
     },
-    material::{ConductorFresnel, Material, MaterialKind},
+    material::{ConductorFresnel, MaterialKind},
     texture::{Interpolation, TextureUse, Wrap},
 };
 
@@ -39,14 +38,11 @@ pub(super) struct Model {
 
 /// Material on its way to a [`Model`].
 pub(super) struct Translator<'a> {
-    pub(super) material: &'a Material,
+    pub(super) subject: Subject<'a>,
     /// Name in the file.
     pub(super) id: String,
-    pub(super) triangles: Triangles,
-    /// Folder of the images, as the scene file calls it.
-    pub(super) folder: &'a str,
+    pub(super) folder: &'a Folder,
     pub(super) pictures: &'a mut Pictures,
-    pub(super) warnings: &'a mut Vec<String>,
     /// Directives of the textures.
     pub(super) textures: String,
     /// Use of a texture whose image coordinates the meshes have in place of their own.
@@ -56,22 +52,23 @@ pub(super) struct Translator<'a> {
 impl<'a> Translator<'a> {
     /// Translates the material.
     pub(super) fn model(mut self) -> Model {
-        let surface = &self.material.surface;
+        let surface = self.subject.surface;
         // A normal map has no mapping of its own.
         self.base = surface.normal.as_ref().or(surface.textures().next());
         if surface.textures().any(|used| Some(used.uv_set) != self.base.map(|base| base.uv_set)) {
-            self.warn("its textures read two sets of coordinates, pbrt's only one of them");
+            self.subject.warn("its textures read two sets of coordinates, pbrt's only one of them");
         }
-        if surface.vertex_color && self.triangles.has_colors {
-            self.warn("pbrt has no colours of vertices; theirs and their opacity are left out");
+        if surface.vertex_color && self.subject.triangles.has_colors {
+            self.subject
+                .warn("pbrt has no colours of vertices; theirs and their opacity are left out");
         }
         if !surface.two_sided {
-            self.warn("its back is black in Fenestra, and as the front in pbrt");
+            self.subject.warn("its back is black in Fenestra, and as the front in pbrt");
         }
-        let has_inside = matches!(self.material.kind, MaterialKind::Dielectric { .. });
-        if self.triangles.opposed > 0 && (has_inside || surface.emission.is_some()) {
-            let count = self.triangles.opposed;
-            self.warn(&format!(
+        let has_inside = matches!(self.subject.material.kind, MaterialKind::Dielectric { .. });
+        if self.subject.triangles.opposed > 0 && (has_inside || surface.emission.is_some()) {
+            let count = self.subject.triangles.opposed;
+            self.subject.warn(&format!(
                 "{count} triangles have normals of vertices that point to their back, which is the \
                  front in pbrt"
             ));
@@ -101,13 +98,9 @@ impl<'a> Translator<'a> {
         }
     }
 
-    fn warn(&mut self, difference: &str) {
-        self.warnings.push(format!("material `{}`: {difference}", self.material.name));
-    }
-
     /// Kind of the material, and its parameters.
     fn reflection(&mut self) -> (&'static str, String) {
-        match &self.material.kind {
+        match &self.subject.material.kind {
             MaterialKind::Diffuse { reflectance } => {
                 ("diffuse", self.color("reflectance", *reflectance))
             }
@@ -131,10 +124,11 @@ impl<'a> Translator<'a> {
                 specular,
                 specular_color,
             } => {
-                let texture = self.material.surface.metallic.as_ref();
+                let texture = self.subject.surface.metallic.as_ref();
                 let share = metallic * texture.map_or(1.0, |used| used.mean()[0]);
                 if share > 0.0 && share < 1.0 || texture.is_some() {
-                    self.warn("pbrt mixes no metal with others; the greater share is all of it");
+                    self.subject
+                        .warn("pbrt mixes no metal with others; the greater share is all of it");
                 }
                 if share >= 0.5 {
                     return self.metal(*base_color, roughness * roughness);
@@ -152,24 +146,18 @@ impl<'a> Translator<'a> {
                 ("thindielectric", float("eta", *ior))
             }
             MaterialKind::Measured { path, table } => {
-                let share = super::super::reflected_share(table);
-                self.warn(&format!(
-                    "pbrt reads no table such as {}; written as diffuse with the reflectance {}",
-                    path.display(),
-                    triple(share)
-                ));
-                ("diffuse", rgb("reflectance", share))
+                ("diffuse", rgb("reflectance", self.subject.measured(path, table)))
             }
         }
     }
 
     /// A coat over a base that shows `color` through it.
     fn coated(&mut self, color: Vec3, alpha: f32, ior: f32, part: &str) -> (&'static str, String) {
-        self.warn(&format!(
+        self.subject.warn(&format!(
             "{part} become pbrt's coateddiffuse, in which light bounces between coat and base; the \
              same colour shows through a smooth coat, a rough one differs"
         ));
-        let reflectance = match &self.material.surface.color {
+        let reflectance = match &self.subject.surface.color {
             Some(used) => self.texture("reflectance", used, Recipe::Base(color, ior)),
             None => rgb("reflectance", color.map(base_below_coat(ior))),
         };
@@ -178,8 +166,8 @@ impl<'a> Translator<'a> {
 
     /// A metal of this reflectance at normal incidence.
     fn metal(&mut self, reflectance: Vec3, alpha: f32) -> (&'static str, String) {
-        if reflectance != Vec3::ONE || self.material.surface.color.is_some() {
-            self.warn(
+        if reflectance != Vec3::ONE || self.subject.surface.color.is_some() {
+            self.subject.warn(
                 "its reflectance is that of pbrt's metal at normal incidence alone; toward the \
                  horizon that follows Fresnel's equations",
             );
@@ -192,21 +180,21 @@ impl<'a> Translator<'a> {
     fn colored_glass(&mut self, reflectance: Vec3, transmittance: Vec3) {
         self.without_color("dielectric");
         if reflectance != Vec3::ONE || transmittance != Vec3::ONE {
-            self.warn(
+            self.subject.warn(
                 "the factors of reflected and transmitted light have no place in pbrt's glass",
             );
         }
     }
 
     fn without_color(&mut self, kind: &str) {
-        if self.material.surface.color.is_some() {
-            self.warn(&format!("the colours of its surface have no place in a {kind}"));
+        if self.subject.surface.color.is_some() {
+            self.subject.warn(&format!("the colours of its surface have no place in a {kind}"));
         }
     }
 
     /// Main colour of the model, with its texture.
     fn color(&mut self, name: &str, factor: Vec3) -> String {
-        match &self.material.surface.color {
+        match &self.subject.surface.color {
             Some(used) => self.texture(name, used, Recipe::Color(factor)),
             None => rgb(name, factor),
         }
@@ -214,15 +202,8 @@ impl<'a> Translator<'a> {
 
     /// Width of the microfacet distribution.
     fn roughness(&mut self, alpha: f32) -> String {
-        let width = match &self.material.surface.roughness {
-            Some(used) => {
-                if used.interpolation == Interpolation::Bilinear {
-                    self.warn(
-                        "pbrt interpolates alpha between texels, Fenestra the roughness, its root",
-                    );
-                }
-                self.texture("roughness", used, Recipe::Squared(alpha))
-            }
+        let width = match self.subject.width(alpha) {
+            Some((used, recipe)) => self.texture("roughness", used, recipe),
             None => float("roughness", alpha),
         };
         width + " \"bool remaproughness\" false"
@@ -235,7 +216,7 @@ impl<'a> Translator<'a> {
             [Wrap::Repeat, Wrap::Repeat] => "repeat",
             [Wrap::Clamp, Wrap::Clamp] => "clamp",
             [first, _] => {
-                self.warn(&format!(
+                self.subject.warn(&format!(
                     "`{name}` is mirrored beyond its edges, or continues along u and v in two ways; \
                      pbrt repeats or clamps it"
                 ));
@@ -253,7 +234,7 @@ impl<'a> Translator<'a> {
             "Texture \"{id}\" \"{kind}\" \"imagemap\" \"string filename\" \"{}\"\n    \
              \"string encoding\" \"{}\" \"string filter\" \"{}\" \"string wrap\" \"{wrap}\"\n    \
              \"float udelta\" {du} \"float uscale\" {u} \"float vdelta\" {dv} \"float vscale\" {v}",
-            escaped(&relative(self.folder, &bitmap.name)),
+            self.folder.relative(&bitmap.name),
             if bitmap.is_raw { "linear" } else { "sRGB" },
             if bitmap.is_nearest { "point" } else { "bilinear" },
         );
@@ -271,7 +252,7 @@ impl<'a> Translator<'a> {
         let [u, v, _] = relative.transpose().to_cols_array_2d();
         let is_straight = u[1].abs() <= 1e-5 * u[0].abs() && v[0].abs() <= 1e-5 * v[1].abs();
         if !(relative.is_finite() && is_straight) {
-            self.warn(&format!(
+            self.subject.warn(&format!(
                 "`{name}` is turned against another texture; pbrt has one direction for both"
             ));
             return ([0.0, 1.0], [0.0, 1.0]);
@@ -281,74 +262,46 @@ impl<'a> Translator<'a> {
     }
 
     fn bumps(&mut self, normal: &TextureUse) -> String {
-        let [same, opposite] = self.triangles.bitangents;
-        if same > 0 && opposite > 0 {
-            let lesser = same.min(opposite);
-            self.warn(&format!(
-                "{lesser} of {} triangles show the normal map as a mirror image, which pbrt bends \
-                 the wrong way",
-                same + opposite
-            ));
-        }
+        let recipe = self.subject.bumps();
         let [along, across, _] = normal.image_from_uv[0];
-        if self.triangles.has_tangents && (along <= 0.0 || across != 0.0) {
-            self.warn(
+        if self.subject.triangles.has_tangents && (along <= 0.0 || across != 0.0) {
+            self.subject.warn(
                 "its normal map is turned or mirrored on its coordinates; pbrt bends along those of \
                  the image",
             );
         }
         if normal.wrap != [Wrap::Repeat; 2] || normal.interpolation == Interpolation::Nearest {
-            self.warn("pbrt repeats and interpolates its normal map");
+            self.subject.warn("pbrt repeats and interpolates its normal map");
         }
-        let scale = self.material.surface.normal_scale;
-        let across = if opposite > same { -scale } else { scale };
-        let bitmap = self.pictures.add(normal, Recipe::Normal(Vec2::new(scale, across)));
-        let file = escaped(&relative(self.folder, &bitmap.name));
+        let file = self.folder.relative(&self.pictures.add(normal, recipe).name);
         format!(" \"string normalmap\" \"{file}\"")
     }
 
     /// Parameter of shapes for a surface that is not opaque.
     fn alpha(&mut self) -> String {
-        let opacity = &self.material.surface.opacity;
-        let Some(used) = &opacity.texture else {
-            let factor = match opacity.cutoff {
-                Some(cutoff) if opacity.factor >= cutoff => 1.0,
-                Some(_) => 0.0,
-                None => opacity.factor,
-            };
-            return if factor < 1.0 { float("alpha", factor) } else { String::new() };
-        };
-        let recipe = match opacity.cutoff {
-            Some(cutoff) => {
-                if used.interpolation == Interpolation::Bilinear {
-                    self.warn(
-                        "pbrt's alpha has no cutoff; an enlarged image of 0 and 1 takes its place, \
-                         with edges in steps of a fraction of a texel",
-                    );
-                }
-                Recipe::Cut { factor: opacity.factor, cutoff }
-            }
-            None => Recipe::Number(opacity.factor),
-        };
-        self.texture("alpha", used, recipe)
+        match self.subject.opacity("alpha") {
+            None => String::new(),
+            Some(Opacity::Factor(factor)) => float("alpha", factor),
+            Some(Opacity::Image(used, recipe)) => self.texture("alpha", used, recipe),
+        }
     }
 
     /// `AreaLightSource` of the surface.
     fn light(&mut self) -> String {
-        let surface = &self.material.surface;
+        let surface = self.subject.surface;
         let Some(emission) = &surface.emission else { return String::new() };
         let radiance = match &emission.texture {
             Some(used) => {
                 if used.wrap != [Wrap::Clamp; 2]
                     || self.base.map(|base| base.image_from_uv) != Some(used.image_from_uv)
                 {
-                    self.warn(
+                    self.subject.warn(
                         "pbrt shows the image of its light once on the coordinates of the mesh, and \
                          continues it by the texels of its edge",
                     );
                 }
                 let bitmap = self.pictures.add(used, Recipe::Radiance(emission.radiance));
-                let file = escaped(&relative(self.folder, &bitmap.name));
+                let file = self.folder.relative(&bitmap.name);
                 format!(" \"string filename\" \"{file}\"")
             }
             None => rgb("L", emission.radiance),

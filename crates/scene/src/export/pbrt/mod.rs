@@ -14,128 +14,56 @@
 mod lights;
 mod materials;
 
-use std::{
-    fmt::Write,
-    path::{Path, PathBuf},
-};
+use std::{fmt::Write, path::Path};
 
 use glam::Vec3;
 
 use self::materials::{Model, Translator};
 use super::{
-    Settings,
+    Export, Settings,
+    folder::{Folder, identifier},
     images::Pictures,
-    names::{folder_name, folder_of, identifier, relative},
-    parts::{self, Parts},
-    ply::{self, Attributes},
+    parts,
+    ply::Attributes,
     portal_warning,
+    subject::Subject,
 };
-use crate::{Camera, Filter, Scene, error::Result, files};
+use crate::{Camera, Filter, Scene, files};
 
-/// A scene on its way to pbrt.
-#[derive(Debug)]
-pub struct Export<'a> {
-    scene: &'a Scene,
-    settings: Settings,
-    path: PathBuf,
-    /// Name of the folder beside the scene file.
-    folder_name: String,
-    /// One per material, as `models`.
-    parts: Vec<Parts>,
-    models: Vec<Model>,
-    lamps: String,
-    pictures: Pictures,
-    warnings: Vec<String>,
-}
-
-impl<'a> Export<'a> {
-    /// Translates the materials and lamps for a scene file at `path`, without writing anything.
-    pub fn new(scene: &'a Scene, path: &Path, settings: Settings) -> Result<Self> {
-        let folder_name = folder_name(path);
-        let (mut warnings, mut pictures) = (Vec::new(), Pictures::default());
-        let parts = parts::divide(scene);
-        let models = scene.materials.iter().zip(&parts).enumerate();
-        let models = models.map(|(index, (material, parts))| {
-            let translator = Translator {
-                material,
-                id: identifier(index, &material.name),
-                triangles: parts.describe(material.surface.normal.as_ref()),
-                folder: &folder_name,
-                pictures: &mut pictures,
-                warnings: &mut warnings,
-                textures: String::new(),
-                base: None,
-            };
-            translator.model()
-        });
-        let models = models.collect();
-        let lamps = scene.lamps.iter().map(|lamp| lights::lamp(lamp, &mut warnings)).collect();
-        warnings.extend(portal_warning(scene));
-        let path = path.to_owned();
-        Ok(Self { scene, settings, path, folder_name, parts, models, lamps, pictures, warnings })
-    }
-
-    /// Camera, film, filter and sampler. pbrt's camera looks along +z with +x to the right, so that a
-    /// mirror makes it one of a right-handed world. `fov` is that of the shorter side.
-    fn view(&self) -> String {
-        let Camera { position, look_at, up, .. } = self.scene.camera;
-        let Camera { vertical_fov_deg, aperture_radius, focus_distance, .. } = self.scene.camera;
-        let film = self.scene.film;
-        let aspect = f64::from(film.width) / f64::from(film.height);
-        let tangent = (0.5 * f64::from(vertical_fov_deg)).to_radians().tan();
-        let fov = 2.0 * (tangent * aspect.min(1.0)).atan().to_degrees();
-        let mut text = format!(
-            "Scale -1 1 1\nLookAt {}\n       {}\n       {}\nCamera \"perspective\" \"float fov\" {fov}",
-            triple(position),
-            triple(look_at),
-            triple(up)
-        );
-        if aperture_radius > 0.0 {
-            _ = write!(
-                text,
-                " \"float lensradius\" {aperture_radius} \"float focaldistance\" {focus_distance}"
-            );
-        }
-        text + &format!(
-            "\nFilm \"rgb\" \"integer xresolution\" {} \"integer yresolution\" {}\n    \
-             \"string sensor\" \"cie1931\" \"string filename\" \"{}.exr\"\nPixelFilter {}\n\
-             Sampler \"independent\" \"integer pixelsamples\" {}\n\
-             Integrator \"path\" \"integer maxdepth\" {}\n",
-            film.width,
-            film.height,
-            escaped(&self.folder_name),
-            match film.filter {
-                Filter::Box => "\"box\" \"float xradius\" 0.5 \"float yradius\" 0.5",
-                Filter::Gaussian => {
-                    "\"gaussian\" \"float xradius\" 1.5 \"float yradius\" 1.5 \"float sigma\" 0.5"
-                }
-            },
-            self.settings.samples,
-            self.settings.depth,
-        )
-    }
-}
-
-impl super::Export for Export<'_> {
-    fn warnings(&self) -> &[String] {
-        &self.warnings
-    }
-
-    fn write(&self) -> Result<()> {
-        let folder = folder_of(&self.path);
+/// Translates the materials and lamps for a scene file at `path`, without writing anything.
+pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'a> {
+    let folder = Folder::beside(path, escaped);
+    let (mut warnings, mut pictures) = (Vec::new(), Pictures::default());
+    let parts = parts::divide(scene);
+    let models = scene.materials.iter().zip(&parts).enumerate();
+    let models = models.map(|(index, (material, parts))| {
+        let translator = Translator {
+            subject: Subject::new("pbrt", material, parts, &mut warnings),
+            id: identifier(index, &material.name),
+            folder: &folder,
+            pictures: &mut pictures,
+            textures: String::new(),
+            base: None,
+        };
+        translator.model()
+    });
+    let models: Vec<Model> = models.collect();
+    let lamps: String = scene.lamps.iter().map(|lamp| lights::lamp(lamp, &mut warnings)).collect();
+    warnings.extend(portal_warning(scene));
+    let path = path.to_owned();
+    Export::new(warnings, move || {
         let mut text = format!("# Written by Fenestra {}.\n", env!("CARGO_PKG_VERSION"));
-        text += &self.view();
+        text += &view(scene, settings, &folder.name);
         text += "\nWorldBegin\n";
-        let environment = &self.scene.environment;
-        text += &lights::write_environment(environment, &folder, &self.folder_name)?;
-        text += &self.lamps;
-        self.pictures.write(&folder)?;
-        for (index, parts) in self.parts.iter().enumerate() {
-            let model = &self.models[index];
+        text += &lights::write_environment(&scene.environment, &folder)?;
+        text += &lamps;
+        pictures.write(&folder.path)?;
+        for (index, parts) in parts.iter().enumerate() {
+            let model = &models[index];
             if parts.each().next().is_none() {
                 continue;
             }
-            let id = identifier(index, &self.scene.materials[index].name);
+            let id = identifier(index, &scene.materials[index].name);
             text += &model.text;
             _ = write!(text, "AttributeBegin\nNamedMaterial \"{id}\"\n{}", model.light);
             for (part, is_flat) in parts.each() {
@@ -146,17 +74,54 @@ impl super::Export for Export<'_> {
                     written_from_uv: model.written_from_uv,
                     color_factor: None,
                 };
-                files::write_atomically(&folder.join(&name), |file| {
-                    ply::write(file, part, attributes)
-                })?;
-                let file = escaped(&relative(&self.folder_name, &name));
+                let file = folder.write_mesh(&name, part, attributes)?;
                 let alpha = &model.alpha;
                 _ = writeln!(text, "Shape \"plymesh\" \"string filename\" \"{file}\"{alpha}");
             }
             text += "AttributeEnd\n";
         }
-        files::write_text(&self.path, &text)
+        files::write_text(&path, &text)
+    })
+}
+
+/// Camera, film, filter and sampler. pbrt's camera looks along +z with +x to the right, so that a
+/// mirror makes it one of a right-handed world. `fov` is that of the shorter side.
+fn view(scene: &Scene, settings: Settings, name: &str) -> String {
+    let Camera { position, look_at, up, .. } = scene.camera;
+    let Camera { vertical_fov_deg, aperture_radius, focus_distance, .. } = scene.camera;
+    let film = scene.film;
+    let aspect = f64::from(film.width) / f64::from(film.height);
+    let tangent = (0.5 * f64::from(vertical_fov_deg)).to_radians().tan();
+    let fov = 2.0 * (tangent * aspect.min(1.0)).atan().to_degrees();
+    let mut text = format!(
+        "Scale -1 1 1\nLookAt {}\n       {}\n       {}\nCamera \"perspective\" \"float fov\" {fov}",
+        triple(position),
+        triple(look_at),
+        triple(up)
+    );
+    if aperture_radius > 0.0 {
+        _ = write!(
+            text,
+            " \"float lensradius\" {aperture_radius} \"float focaldistance\" {focus_distance}"
+        );
     }
+    text + &format!(
+        "\nFilm \"rgb\" \"integer xresolution\" {} \"integer yresolution\" {}\n    \
+         \"string sensor\" \"cie1931\" \"string filename\" \"{}.exr\"\nPixelFilter {}\n\
+         Sampler \"independent\" \"integer pixelsamples\" {}\n\
+         Integrator \"path\" \"integer maxdepth\" {}\n",
+        film.width,
+        film.height,
+        name,
+        match film.filter {
+            Filter::Box => "\"box\" \"float xradius\" 0.5 \"float yradius\" 0.5",
+            Filter::Gaussian => {
+                "\"gaussian\" \"float xradius\" 1.5 \"float yradius\" 1.5 \"float sigma\" 0.5"
+            }
+        },
+        settings.samples,
+        settings.depth,
+    )
 }
 
 fn triple(vector: Vec3) -> String {

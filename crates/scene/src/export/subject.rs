@@ -1,0 +1,146 @@
+//! What all formats do to a material.
+
+use std::path::Path;
+
+use glam::{Vec2, Vec3};
+
+use super::{
+    images::Recipe,
+    parts::{Parts, Triangles},
+    triple,
+};
+use crate::{
+    material::{Material, Surface},
+    math::colour::luminance,
+    measured::MeasuredTable,
+    texture::{Interpolation, TextureUse},
+};
+
+/// Material on its way to a format.
+pub(super) struct Subject<'a> {
+    /// Format or program, as warnings call it.
+    pub(super) program: &'static str,
+    pub(super) material: &'a Material,
+    pub(super) surface: &'a Surface,
+    pub(super) triangles: Triangles,
+    pub(super) warnings: &'a mut Vec<String>,
+}
+
+/// Opacity of a surface that is not opaque.
+pub(super) enum Opacity<'a> {
+    Factor(f32),
+    Image(&'a TextureUse, Recipe),
+}
+
+impl<'a> Subject<'a> {
+    pub(super) fn new(
+        program: &'static str,
+        material: &'a Material,
+        parts: &Parts,
+        warnings: &'a mut Vec<String>,
+    ) -> Self {
+        let surface = &material.surface;
+        let triangles = parts.describe(surface.normal.as_ref());
+        Self { program, material, surface, triangles, warnings }
+    }
+
+    pub(super) fn warn(&mut self, difference: &str) {
+        self.warnings.push(format!("material `{}`: {difference}", self.material.name));
+    }
+
+    /// Names colours that a model of `kind` has no place for.
+    pub(super) fn without_color(&mut self, kind: &str) {
+        if self.surface.color.is_some() || self.surface.vertex_color && self.triangles.has_colors {
+            self.warn(&format!(
+                "the colours of its surface or its vertices have no place in a {kind}"
+            ));
+        }
+    }
+
+    /// Reflectance of the diffuse surface that stands for a measured one.
+    pub(super) fn measured(&mut self, path: &Path, table: &MeasuredTable) -> Vec3 {
+        let share = reflected_share(table);
+        self.warn(&format!(
+            "{} reads no table such as {}; written as diffuse with the reflectance {}",
+            self.program,
+            path.display(),
+            triple(share)
+        ));
+        share
+    }
+
+    /// Image of the GGX width, if the roughness has one.
+    pub(super) fn width(&mut self, alpha: f32) -> Option<(&'a TextureUse, Recipe)> {
+        let used = self.surface.roughness.as_ref()?;
+        if used.interpolation == Interpolation::Bilinear {
+            self.warn(&format!(
+                "{} interpolates alpha between texels, Fenestra the roughness, its root",
+                self.program
+            ));
+        }
+        Some((used, Recipe::Squared(alpha)))
+    }
+
+    /// Image of the normal map, for the greater part of the triangles.
+    pub(super) fn bumps(&mut self) -> Recipe {
+        let [same, opposite] = self.triangles.bitangents;
+        if same > 0 && opposite > 0 {
+            self.warn(&format!(
+                "{} of {} triangles show the normal map as a mirror image, which {} bends the wrong \
+                 way",
+                same.min(opposite),
+                same + opposite,
+                self.program
+            ));
+        }
+        let scale = self.surface.normal_scale;
+        Recipe::Normal(Vec2::new(scale, if opposite > same { -scale } else { scale }))
+    }
+
+    /// Opacity for a parameter called `name`.
+    pub(super) fn opacity(&mut self, name: &str) -> Option<Opacity<'a>> {
+        let opacity = &self.surface.opacity;
+        let factor = opacity.factor;
+        let Some(used) = &opacity.texture else {
+            let factor = match opacity.cutoff {
+                Some(cutoff) if factor >= cutoff => 1.0,
+                Some(_) => 0.0,
+                None => factor,
+            };
+            return (factor < 1.0).then_some(Opacity::Factor(factor));
+        };
+        let Some(cutoff) = opacity.cutoff else {
+            return Some(Opacity::Image(used, Recipe::Number(factor)));
+        };
+        if used.interpolation == Interpolation::Bilinear {
+            self.warn(&format!(
+                "{}'s {name} has no cutoff; an enlarged image of 0 and 1 takes its place, with edges \
+                 in steps of a fraction of a texel",
+                self.program
+            ));
+        }
+        Some(Opacity::Image(used, Recipe::Cut { factor, cutoff }))
+    }
+}
+
+/// Share of light from a uniform hemisphere that a measured material reflects: 2 ∫ E(μ) μ dμ by midpoints.
+fn reflected_share(table: &MeasuredTable) -> Vec3 {
+    const STEPS: u32 = 64;
+    let step = |index: u32| {
+        let cosine = (index as f32 + 0.5) / STEPS as f32;
+        table.albedo(cosine) * (2.0 * cosine / STEPS as f32)
+    };
+    (0..STEPS).map(step).sum::<Vec3>().clamp(Vec3::ZERO, Vec3::ONE)
+}
+
+/// Refractive index, up to 4, whose reflectance at normal incidence is that of a principled dielectric.
+pub(super) fn index_of(ior: f32, specular: f32, specular_color: Vec3) -> f32 {
+    if specular == 1.0 && specular_color == Vec3::ONE {
+        return ior;
+    }
+    let ratio = (ior - 1.0) / (ior + 1.0);
+    let reflectance = (ratio * ratio * specular_color).min(Vec3::ONE) * specular;
+    // At a root of 0.6 the index is 4, the largest that is read back.
+    let root = luminance(reflectance).max(0.0).sqrt().min(0.6);
+    (1.0 + root) / (1.0 - root)
+}
