@@ -2,24 +2,31 @@
 //! that go on, and has no other influence on the picture.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
+use std::collections::BTreeMap;
+
 use fenestra::{
     film::{Attribute, Checkpoint, Image, Statistics, Sums},
     sampler::{
         Parameters, Sampler,
         guided::{
             GuideState,
-            cost::{GUIDED_CANDIDATES, choose_candidates},
+            cost::{CandidateCost, GUIDED_CANDIDATES, choose_candidates},
         },
     },
     session::Settings,
 };
 use glam::Vec3;
+use serde_json::Value;
 
 use crate::support::{self, command::Folder, guide::Guide as _, renderer, scenes};
 
 fn guided(candidates: Option<u32>) -> Settings {
     let parameters = Parameters { candidates, ..Parameters::default() };
     Settings { sampler: Sampler::Guided, parameters, ..Settings::default() }
+}
+
+fn costs(figures: &BTreeMap<String, Value>) -> Vec<CandidateCost> {
+    serde_json::from_value(figures["candidate_costs"].clone()).unwrap()
 }
 
 fn assert_same(a: &Sums, b: &Sums) {
@@ -32,18 +39,18 @@ fn the_choice_is_measured_and_changes_nothing_else() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
     let mut auto = renderer(&scene, guided(None));
-    assert_eq!((auto.report().candidates, auto.report().candidate_costs.len()), (None, 0));
+    assert_eq!((auto.report().candidates, costs(&auto.report().figures).len()), (None, 0));
     auto.render_pass(5).unwrap();
     let chosen = auto.report().candidates.unwrap();
-    let costs = auto.report().candidate_costs.to_vec();
-    eprintln!("{chosen} of {costs:?}");
-    assert_eq!(chosen, choose_candidates(&costs));
-    let tried: Vec<u32> = costs.iter().map(|cost| cost.candidates).collect();
+    let found = costs(&auto.report().figures);
+    eprintln!("{chosen} of {found:?}");
+    assert_eq!(chosen, choose_candidates(&found));
+    let tried: Vec<u32> = found.iter().map(|cost| cost.candidates).collect();
     assert_eq!(tried, GUIDED_CANDIDATES[..tried.len()]);
     assert!(tried.len() == 3 || chosen == 1, "8 are tried where 4 are worth it");
-    assert!(costs.iter().all(|cost| cost.ms_per_sample > 0.0));
+    assert!(found.iter().all(|cost| cost.ms_per_sample > 0.0));
     // So few samples say little, but both variances are those of the same picture.
-    let gain = costs[0].relative_variance / costs[1].relative_variance;
+    let gain = found[0].relative_variance / found[1].relative_variance;
     assert!((0.2..5.0).contains(&gain), "{gain}");
     assert_eq!(auto.guide_state().unwrap().unwrap().candidates, Some(chosen));
     assert!(auto.host_ms()["choice of candidates"] > 0.0);
@@ -52,7 +59,7 @@ fn the_choice_is_measured_and_changes_nothing_else() {
     // to the bit.
     let mut one = renderer(&scene, guided(Some(1)));
     one.render_pass(5).unwrap();
-    assert_eq!((one.report().candidates, one.report().candidate_costs.len()), (Some(1), 0));
+    assert_eq!((one.report().candidates, costs(&one.report().figures).len()), (Some(1), 0));
     if chosen == 1 {
         assert_same(&one.sums().unwrap(), &auto.sums().unwrap());
         assert!(one.guide_state().unwrap() == auto.guide_state().unwrap(), "the same was learned");
@@ -77,7 +84,7 @@ fn whoever_goes_on_takes_the_recorded_choice() {
     };
     let second = go_on(guided(None), &state);
     assert_eq!(second.report().candidates, first.report().candidates);
-    assert!(second.report().candidate_costs.is_empty(), "nothing was measured");
+    assert!(costs(&second.report().figures).is_empty(), "nothing was measured");
     first.render_pass(4).unwrap();
     assert_same(&first.sums().unwrap(), &second.sums().unwrap());
     // The recorded number is taken, and 1 and 8 give different pictures.
@@ -91,12 +98,12 @@ fn whoever_goes_on_takes_the_recorded_choice() {
     assert!(one.sums().unwrap() != eight.sums().unwrap());
     // Without a record, the choice is measured.
     let none = go_on(guided(None), &GuideState { candidates: None, ..state });
-    assert!(none.report().candidates.is_some() && none.report().candidate_costs.len() >= 2);
+    assert!(none.report().candidates.is_some() && costs(&none.report().figures).len() >= 2);
     // A restart forgets the choice.
     eight.restart(0).unwrap();
     assert_eq!(eight.report().candidates, None);
     eight.render_pass(1).unwrap();
-    assert!(eight.report().candidates.is_some() && eight.report().candidate_costs.len() >= 2);
+    assert!(eight.report().candidates.is_some() && costs(&eight.report().figures).len() >= 2);
     support::assert_silent();
 }
 
@@ -111,7 +118,7 @@ fn nothing_is_measured_where_there_is_nothing_to_choose() {
     assert_eq!((auto.report().candidates, state.candidates), (None, None));
     let mut dark = renderer(&scenes::mixed_room(), Settings { shadow_rays: 0, ..guided(None) });
     dark.render_pass(2).unwrap();
-    assert_eq!((dark.report().candidates, dark.report().candidate_costs.len()), (Some(1), 0));
+    assert_eq!((dark.report().candidates, costs(&dark.report().figures).len()), (Some(1), 0));
     let mut mis = renderer(&open, Settings::default());
     mis.render_pass(1).unwrap();
     assert_eq!(mis.report().candidates, None);
@@ -134,7 +141,7 @@ fn files_and_figures_tell_the_choice() {
     let keep = ["--spp", "3", "--checkpoint-interval", "1h", "--save-guide", "room.guide"];
     let (image, statistics) = render("a.exr", &keep);
     let chosen = statistics.candidates.unwrap();
-    assert_eq!(chosen, choose_candidates(&statistics.candidate_costs));
+    assert_eq!(chosen, choose_candidates(&costs(&statistics.sampler_figures)));
     let text = |image: &Image, name: &str| match &image.attributes[name] {
         Attribute::Text(text) => text.clone(),
         other => panic!("{other:?}"),
@@ -162,10 +169,10 @@ fn files_and_figures_tell_the_choice() {
     let guide = with_other(GuideState::from_bytes(&bytes, &guide_path).unwrap());
     checkpoint.write_with_guide(&path, Some(&guide.to_bytes().unwrap())).unwrap();
     let (image, statistics) = render("a.exr", &["--spp", "5", "--resume"]);
-    assert_eq!((statistics.candidates, statistics.candidate_costs.len()), (Some(other), 0));
+    assert_eq!((statistics.candidates, costs(&statistics.sampler_figures).len()), (Some(other), 0));
     assert_eq!(text(&image, "fenestra.candidates"), other.to_string());
     let (_, statistics) = render("b.exr", &["--spp", "2", "--load-guide", "room.guide"]);
-    assert_eq!((statistics.candidates, statistics.candidate_costs.len()), (Some(other), 0));
+    assert_eq!((statistics.candidates, costs(&statistics.sampler_figures).len()), (Some(other), 0));
     let pinned = ["--spp", "2", "--load-guide", "room.guide", "--set", "candidates=1"];
     assert_eq!(render("c.exr", &pinned).1.candidates, Some(1));
 }

@@ -1,8 +1,9 @@
 //! Statistics of a render as JSON, which `render --stats` writes.
 
-use std::{collections::BTreeMap, fmt};
+use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::metadata::SampleRange;
 
@@ -33,15 +34,8 @@ pub struct Statistics {
     /// Number of candidates from which `guided` chose each shadow ray, asked for or measured;
     /// absent for other samplers and in open scenes.
     pub candidates: Option<u32>,
-    /// Costs measured in this run to choose that number; empty if none were.
-    pub candidate_costs: Vec<CandidateCost>,
     /// Directions traced at every vertex.
     pub shadow_rays_per_vertex: u32,
-    /// Edge of the cohorts that share paths as `guided` chose it, 1 for none; absent where it was given,
-    /// in open scenes and in direct light.
-    pub share_paths: Option<u32>,
-    /// Gain measured in this run for that choice; absent if none was.
-    pub sharing_gain: Option<SharingGain>,
     /// Path vertices at which environment light is gathered.
     pub depth: u32,
     /// Samples of every pixel that the image holds.
@@ -59,14 +53,9 @@ pub struct Statistics {
     pub rays: BTreeMap<String, u64>,
     /// Share of shadow rays that reached the environment; absent if none was traced.
     pub visible_share: Option<f64>,
-    /// Mean entries in the visibility cache per hit, for samplers that have one.
-    pub cache_entries_per_hit: Option<f64>,
-    /// Mean product lobes kept per hit, for samplers with a product.
-    pub lobes_per_hit: Option<f64>,
-    /// Mean share of the product's energy in the kept lobes, for samplers with a product.
-    pub energy_kept: Option<f64>,
-    /// Mean rebuilds of the lobe probabilities per hit, for samplers that have them.
-    pub cdf_rebuilds_per_hit: Option<f64>,
+    /// Further figures of the sampler, by name.
+    #[serde(flatten)]
+    pub sampler_figures: BTreeMap<String, Value>,
     /// Samples dropped because their radiance was not finite.
     pub dropped_samples: u64,
     /// True if any sample found light; otherwise the image is black.
@@ -81,46 +70,4 @@ pub struct Statistics {
     pub pipeline_compile_ms: BTreeMap<String, f64>,
     /// Device memory by buffer, bytes.
     pub buffer_bytes: BTreeMap<String, u64>,
-}
-
-/// Measured gain of paths that the pixels of a cohort share.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct SharingGain {
-    /// Relative variance without sharing over that with it, as in [`CandidateCost`].
-    pub variance_ratio: f64,
-    /// Standard error over the blocks of its logarithm; 1000 if there is only one block.
-    pub log_error: f64,
-}
-
-impl fmt::Display for SharingGain {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{:.2} (±{:.0}%)", self.variance_ratio, 100.0 * self.log_error)
-    }
-}
-
-/// Measured cost of a number of candidates.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CandidateCost {
-    /// Candidates per shadow ray.
-    pub candidates: u32,
-    /// Device milliseconds of all passes for one sample of every pixel.
-    pub ms_per_sample: f64,
-    /// Variance of a pixel's samples relative to the squared mean of its block, geometric mean over
-    /// the blocks.
-    pub relative_variance: f64,
-    /// Standard error over the blocks of the logarithm of the variance relative to that of the
-    /// fewest candidates measured; 0 for these, 1000 if there is only one block.
-    pub log_variance_error: f64,
-}
-
-impl fmt::Display for CandidateCost {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { candidates, ms_per_sample, relative_variance, log_variance_error } = self;
-        let percent = 100.0 * log_variance_error;
-        write!(
-            formatter,
-            "{candidates}: {ms_per_sample:.2} ms a sample, relative variance {relative_variance:.3} \
-             (±{percent:.0}%)"
-        )
-    }
 }

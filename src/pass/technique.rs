@@ -2,6 +2,8 @@
 
 use std::{any::Any, collections::BTreeMap, path::Path};
 
+use serde_json::Value;
+
 use super::{
     explanation::{Explanation, PixelReadback},
     runner::Runner,
@@ -9,7 +11,6 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    film::statistics::{CandidateCost, SharingGain},
     shader::structs::Wave,
 };
 
@@ -40,12 +41,8 @@ pub struct Report {
     pub fit_hashes: BTreeMap<String, String>,
     /// Candidates per shadow ray, for techniques that choose their number.
     pub candidates: Option<u32>,
-    /// Measurements behind this choice.
-    pub candidate_costs: Vec<CandidateCost>,
-    /// Edge of the cohorts that share paths, 1 for none, for techniques that choose it.
-    pub share_paths: Option<u32>,
-    /// Measurement behind this choice.
-    pub sharing_gain: Option<SharingGain>,
+    /// Further figures for statistics, by name.
+    pub figures: BTreeMap<String, Value>,
 }
 
 /// Knowledge that the technique of an earlier render saved.

@@ -12,7 +12,9 @@ impl Session {
         let renderer = &self.renderer;
         let (totals, report) = (renderer.totals(), renderer.report());
         let figures = Figures::of(renderer, self.seconds());
-        let figure = |name: &str| figures.statistics.get(name).copied();
+        let mut sampler_figures = report.figures;
+        let of_totals = totals.sampler_statistics().into_iter();
+        sampler_figures.extend(of_totals.map(|(name, value)| (name, value.into())));
         let metadata = self.metadata();
         let window = window_of(renderer.settings(), scene);
         Statistics {
@@ -27,10 +29,7 @@ impl Session {
             sampler: metadata.sampler,
             sampler_parameters: metadata.sampler_parameters,
             candidates: report.candidates,
-            candidate_costs: report.candidate_costs,
             shadow_rays_per_vertex: metadata.shadow_rays,
-            share_paths: report.share_paths,
-            sharing_gain: report.sharing_gain,
             depth: metadata.depth,
             sample_ranges: metadata.sample_ranges,
             samples_per_pixel: renderer.sample_count(),
@@ -38,10 +37,7 @@ impl Session {
             relative_standard_error: self.relative_error.filter(|error| error.is_finite()),
             seconds: self.seconds(),
             visible_share: figures.visible_share,
-            cache_entries_per_hit: figure("cache_entries_per_hit"),
-            lobes_per_hit: figure("lobes_per_hit"),
-            energy_kept: figure("energy_kept"),
-            cdf_rebuilds_per_hit: figure("cdf_rebuilds_per_hit"),
+            sampler_figures,
             rays: figures.rays,
             found_light: self.found_light,
             warnings: scene.warnings.clone(),

@@ -9,15 +9,14 @@ use std::{collections::BTreeMap, time::Instant};
 use super::{
     buffers::GuideBuffers,
     cost::{
-        PixelSpread, choose_by_comparison, is_largest_clearly_worse, relative_variances,
-        upper_median,
+        CandidateCost, PixelSpread, choose_by_comparison, is_largest_clearly_worse,
+        relative_variances, upper_median,
     },
     epoch::{TRAINING_SEED, with_epoch},
     steps::GuidedSteps,
 };
 use crate::{
     error::Result,
-    film::statistics::CandidateCost,
     gpu::DescriptorSet,
     math::colour::luminance,
     pass::{Passes, Progress, Runner, Steps},

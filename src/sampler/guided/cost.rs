@@ -5,7 +5,11 @@
 //! to the squared mean of its block of pixels, so that dark regions count as much as bright ones;
 //! the geometric mean over the blocks keeps a few fireflies from deciding.
 
-use crate::{error::Result, film::statistics::CandidateCost};
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::Result;
 
 /// Numbers of candidates that `guided` can choose a shadow ray from.
 pub const GUIDED_CANDIDATES: [u32; 3] = [1, 4, 8];
@@ -23,6 +27,33 @@ const CLEAR_LOSS: f64 = 1.4;
 /// Ratio of variance × time above which more candidates are not measured again if it lies above by
 /// [`CONFIDENCE`]. Far from [`CLEAR_GAIN`], since this error knows nothing of the times'.
 const LIKELY_LOSS: f64 = 1.0;
+
+/// Measured cost of a number of candidates.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CandidateCost {
+    /// Candidates per shadow ray.
+    pub candidates: u32,
+    /// Device milliseconds of all passes for one sample of every pixel.
+    pub ms_per_sample: f64,
+    /// Variance of a pixel's samples relative to the squared mean of its block, geometric mean over
+    /// the blocks.
+    pub relative_variance: f64,
+    /// Standard error over the blocks of the logarithm of the variance relative to that of the
+    /// fewest candidates measured; 0 for these, 1000 if there is only one block.
+    pub log_variance_error: f64,
+}
+
+impl fmt::Display for CandidateCost {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { candidates, ms_per_sample, relative_variance, log_variance_error } = self;
+        let percent = 100.0 * log_variance_error;
+        write!(
+            formatter,
+            "{candidates}: {ms_per_sample:.2} ms a sample, relative variance {relative_variance:.3} \
+             (±{percent:.0}%)"
+        )
+    }
+}
 
 /// Relative variance after a millisecond of samples.
 fn variance_time(cost: &CandidateCost) -> f64 {

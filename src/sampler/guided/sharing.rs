@@ -3,7 +3,9 @@
 //! Renders the same blocks of pixels without and with sharing, as `choice.rs` does for candidates.
 //! Compares variances alone: what sharing costs is known, and no busy machine can disturb it.
 
-use std::time::Instant;
+use std::{fmt, time::Instant};
+
+use serde::Serialize;
 
 use super::{
     choice::{FEWEST_SAMPLES, MEASURED_PIXELS, MOST_ROUNDS, Measured, Trial},
@@ -12,7 +14,6 @@ use super::{
 };
 use crate::{
     error::Result,
-    film::statistics::SharingGain,
     pass::{Progress, Runner, film_buffers::BLOCK_PIXELS},
     shader::{constants::MEASURED_WAVE, structs::Wave},
 };
@@ -21,6 +22,21 @@ use crate::{
 const LEAST_RATIO: f64 = 1.6;
 /// Standard errors by which the logarithm of the ratio must differ for an early end.
 const CONFIDENCE: f64 = 2.0;
+
+/// Measured gain of paths that the pixels of a cohort share.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct SharingGain {
+    /// Relative variance without sharing over that with it, as in [`CandidateCost`](super::cost::CandidateCost).
+    pub(super) variance_ratio: f64,
+    /// Standard error over the blocks of its logarithm; 1000 if there is only one block.
+    pub(super) log_error: f64,
+}
+
+impl fmt::Display for SharingGain {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{:.2} (±{:.0}%)", self.variance_ratio, 100.0 * self.log_error)
+    }
+}
 
 /// Edge of the cohorts that `guided` chose, and why.
 #[derive(Clone, Copy, Debug, Default)]

@@ -1,5 +1,9 @@
 //! `guided` in one render: its training, rebuilds, choice of candidates, and reports.
 
+use std::collections::BTreeMap;
+
+use serde_json::json;
+
 use super::{
     buffers::{GuideBuffers, GuideSize, SPLIT_AFTER, guide_schedule},
     choice::{Choice, Trial},
@@ -21,7 +25,6 @@ use crate::{
     sampler::{Context, Parameters, Room, basic, knob::Knobs, rays::RaySteps},
     shader::{constants::TRAINING_WAVE, structs::Wave},
 };
-use std::collections::BTreeMap;
 
 /// Training sweeps before the first sample; each covers one pixel in this many.
 const TRAINING_SWEEPS: u32 = 8;
@@ -376,9 +379,12 @@ impl Technique for Guided {
             ]
             .into(),
             candidates: self.candidates(),
-            candidate_costs: self.choice.costs.clone(),
-            share_paths: self.share_paths(),
-            sharing_gain: self.sharing.gain,
+            figures: [
+                ("candidate_costs".to_owned(), json!(self.choice.costs)),
+                ("share_paths".to_owned(), json!(self.share_paths())),
+                ("sharing_gain".to_owned(), json!(self.sharing.gain)),
+            ]
+            .into(),
             ..Report::default()
         }
     }
