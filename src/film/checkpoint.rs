@@ -22,7 +22,7 @@ use sha2::{Digest, Sha256};
 use super::{
     Attribute, Image,
     metadata::Metadata,
-    sums::{Sums, split},
+    sums::{COUNTS, Sums, TRIPLES, split},
 };
 use crate::{
     error::{Error, Result},
@@ -38,29 +38,6 @@ const CHECKSUM_ATTRIBUTE: &str = "fenestra.checksum";
 const GUIDE_ATTRIBUTE: &str = "fenestra.guide";
 /// Digits of that hash in the file's name.
 const GUIDE_NAME_DIGITS: usize = 12;
-
-const SUM: [&str; 3] = ["Sum.R", "Sum.G", "Sum.B"];
-const COMPENSATION: [&str; 3] = ["SumCompensation.R", "SumCompensation.G", "SumCompensation.B"];
-const SQUARES: [&str; 3] = ["Squares.R", "Squares.G", "Squares.B"];
-const ALBEDO: [&str; 3] = ["AlbedoSum.R", "AlbedoSum.G", "AlbedoSum.B"];
-const NORMAL: [&str; 3] = ["NSum.X", "NSum.Y", "NSum.Z"];
-const POSITION: [&str; 3] = ["PSum.X", "PSum.Y", "PSum.Z"];
-const GUIDE_CELL: [&str; 3] = ["GuideCellSum.R", "GuideCellSum.G", "GuideCellSum.B"];
-const GUIDE_LEVEL: [&str; 3] = ["GuideLevelSum.R", "GuideLevelSum.G", "GuideLevelSum.B"];
-/// Visible and traced shadow rays: leading part and rest of each count.
-const SHADOW_RAYS: [&str; 4] = [
-    "ShadowRays.Visible",
-    "ShadowRays.VisibleCompensation",
-    "ShadowRays.Traced",
-    "ShadowRays.TracedCompensation",
-];
-/// Entries of visibility caches and hits that have a cache, in the same way.
-const CACHE_ENTRIES: [&str; 4] = [
-    "CacheEntries.Entries",
-    "CacheEntries.EntriesCompensation",
-    "CacheEntries.Hits",
-    "CacheEntries.HitsCompensation",
-];
 
 /// Steps in which a checkpoint is written, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -146,23 +123,14 @@ impl Checkpoint {
     fn to_image(&self) -> Image {
         let sums = &self.sums;
         let mut image = sums.to_image(&[]);
-        let layers = [
-            (SUM, &sums.sum),
-            (COMPENSATION, &sums.compensation),
-            (SQUARES, &sums.squares),
-            (ALBEDO, &sums.albedo),
-            (NORMAL, &sums.normal),
-            (POSITION, &sums.position),
-            (GUIDE_CELL, &sums.guide_cell),
-            (GUIDE_LEVEL, &sums.guide_level),
-        ];
-        for (names, values) in layers {
+        for (layer, values) in TRIPLES.iter().zip(sums.triples()) {
             if !values.is_empty() {
-                image.insert_triple(names, values);
+                image.insert_triple(layer.channels, values);
             }
         }
-        insert_counts(&mut image, SHADOW_RAYS, &sums.visible);
-        insert_counts(&mut image, CACHE_ENTRIES, &sums.cache_entries);
+        for (layer, counts) in COUNTS.iter().zip(sums.counts()) {
+            insert_counts(&mut image, layer.channels, counts);
+        }
         self.metadata.store(&mut image);
         image.attributes.insert(FORMAT_ATTRIBUTE.to_owned(), Attribute::Integer(FORMAT_VERSION));
         image
@@ -272,11 +240,6 @@ impl Checkpoint {
             }
         }
         let metadata = Metadata::load(image, path)?;
-        let required = |names: [&str; 3]| {
-            image.triple(names).ok_or_else(|| {
-                Error::format(path, format!("incomplete checkpoint: no channels {names:?}"))
-            })
-        };
         let sample_count =
             u32::try_from(metadata.sample_count()).ok().filter(|count| *count > 0).ok_or_else(
                 || Error::format(path, format!("{} samples per pixel", metadata.sample_count())),
@@ -290,23 +253,28 @@ impl Checkpoint {
                 )
             })?;
         }
-        let sums = Sums {
+        let mut sums = Sums {
             width: image.width,
             height: image.height,
             origin,
             film_size: image.film_size,
             sample_count,
-            sum: required(SUM)?,
-            compensation: required(COMPENSATION)?,
-            squares: required(SQUARES)?,
-            albedo: image.triple(ALBEDO).unwrap_or_default(),
-            normal: image.triple(NORMAL).unwrap_or_default(),
-            position: image.triple(POSITION).unwrap_or_default(),
-            visible: counts(image, SHADOW_RAYS, path)?,
-            cache_entries: counts(image, CACHE_ENTRIES, path)?,
-            guide_cell: image.triple(GUIDE_CELL).unwrap_or_default(),
-            guide_level: image.triple(GUIDE_LEVEL).unwrap_or_default(),
+            ..Sums::default()
         };
+        for (layer, values) in TRIPLES.iter().zip(sums.triples_mut()) {
+            let names = layer.channels;
+            *values = match image.triple(names) {
+                Some(found) => found,
+                None if layer.aov.is_some() => Vec::new(),
+                None => {
+                    let message = format!("incomplete checkpoint: no channels {names:?}");
+                    return Err(Error::format(path, message));
+                }
+            };
+        }
+        for (layer, values) in COUNTS.iter().zip(sums.counts_mut()) {
+            *values = counts(image, layer.channels, path)?;
+        }
         if sums.non_finite_count() > 0 {
             return Err(Error::format(
                 path,
@@ -361,18 +329,8 @@ impl Checkpoint {
                 self.metadata.sample_ranges.len()
             )),
         }
-        let layers = [
-            ("albedo", self.sums.albedo.is_empty(), window.albedo.is_empty()),
-            ("normal", self.sums.normal.is_empty(), window.normal.is_empty()),
-            ("position", self.sums.position.is_empty(), window.position.is_empty()),
-            ("visible", self.sums.visible.is_empty(), window.visible.is_empty()),
-            ("cache-entries", self.sums.cache_entries.is_empty(), window.cache_entries.is_empty()),
-            ("guide-cell", self.sums.guide_cell.is_empty(), window.guide_cell.is_empty()),
-        ];
-        for (name, ours_missing, theirs_missing) in layers {
-            if ours_missing && !theirs_missing {
-                differences.push(format!("layer {name}: absent against asked for"));
-            }
+        for aov in window.aovs().difference(&self.sums.aovs()) {
+            differences.push(format!("layer {}: absent against asked for", aov.name()));
         }
         if differences.is_empty() {
             return Ok(());

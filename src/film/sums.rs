@@ -1,10 +1,14 @@
 //! Sums that the device's film holds after `n` samples of every pixel, and the image they give.
 
+use std::collections::BTreeSet;
+
+use clap::ValueEnum;
+
 use super::Image;
 
 /// Extra layers of an image file, with pbrt's names and meaning where pbrt has them. The command
 /// line also accepts a layer's name in the file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum)]
 pub enum Aov {
     /// `Variance.R/G/B`: variance of the pixel mean.
     #[value(aliases = ["Variance"])]
@@ -35,6 +39,60 @@ pub enum Aov {
     #[value(aliases = ["GuideCell"])]
     GuideCell,
 }
+
+impl Aov {
+    /// Name on the command line.
+    pub(crate) fn name(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+}
+
+/// Layer of [`Sums`]: the layer of an image file that needs it, none for those that every film has, and
+/// the channels that hold it in a checkpoint.
+pub(crate) struct Layer<const N: usize> {
+    pub aov: Option<Aov>,
+    pub channels: [&'static str; N],
+}
+
+/// Layers of three numbers.
+pub(crate) const TRIPLES: [Layer<3>; 8] = [
+    Layer { aov: None, channels: ["Sum.R", "Sum.G", "Sum.B"] },
+    Layer { aov: None, channels: ["SumCompensation.R", "SumCompensation.G", "SumCompensation.B"] },
+    Layer { aov: None, channels: ["Squares.R", "Squares.G", "Squares.B"] },
+    Layer { aov: Some(Aov::Albedo), channels: ["AlbedoSum.R", "AlbedoSum.G", "AlbedoSum.B"] },
+    Layer { aov: Some(Aov::Normal), channels: ["NSum.X", "NSum.Y", "NSum.Z"] },
+    Layer { aov: Some(Aov::Position), channels: ["PSum.X", "PSum.Y", "PSum.Z"] },
+    Layer {
+        aov: Some(Aov::GuideCell),
+        channels: ["GuideCellSum.R", "GuideCellSum.G", "GuideCellSum.B"],
+    },
+    Layer {
+        aov: Some(Aov::GuideCell),
+        channels: ["GuideLevelSum.R", "GuideLevelSum.G", "GuideLevelSum.B"],
+    },
+];
+
+/// Layers of two counts; leading part and rest of each.
+pub(crate) const COUNTS: [Layer<4>; 2] = [
+    Layer {
+        aov: Some(Aov::Visible),
+        channels: [
+            "ShadowRays.Visible",
+            "ShadowRays.VisibleCompensation",
+            "ShadowRays.Traced",
+            "ShadowRays.TracedCompensation",
+        ],
+    },
+    Layer {
+        aov: Some(Aov::CacheEntries),
+        channels: [
+            "CacheEntries.Entries",
+            "CacheEntries.EntriesCompensation",
+            "CacheEntries.Hits",
+            "CacheEntries.HitsCompensation",
+        ],
+    },
+];
 
 /// Sums over the samples of every pixel of the rendered window, row by row from the top.
 ///
@@ -76,7 +134,24 @@ pub struct Sums {
     pub guide_level: Vec<[f32; 3]>,
 }
 
+/// Defines a method that returns all layers of a table, and one to change them.
+macro_rules! layers {
+    ($all:ident $all_mut:ident $table:ident $sum:ty: $($layer:ident)*) => {
+        pub(crate) fn $all(&self) -> [&Vec<$sum>; $table.len()] {
+            [$(&self.$layer),*]
+        }
+
+        pub(crate) fn $all_mut(&mut self) -> [&mut Vec<$sum>; $table.len()] {
+            [$(&mut self.$layer),*]
+        }
+    };
+}
+
 impl Sums {
+    layers!(triples triples_mut TRIPLES [f32; 3]:
+        sum compensation squares albedo normal position guide_cell guide_level);
+    layers!(counts counts_mut COUNTS [u32; 2]: visible cache_entries);
+
     /// Creates sums of no samples, without extra layers.
     pub fn new(origin: [u32; 2], width: u32, height: u32, film_size: [u32; 2]) -> Self {
         let zeros = vec![[0.0; 3]; width as usize * height as usize];
@@ -90,6 +165,15 @@ impl Sums {
             squares: zeros,
             ..Self::default()
         }
+    }
+
+    /// Layers of an image file whose sums exist, apart from those that every film has.
+    pub(crate) fn aovs(&self) -> BTreeSet<Aov> {
+        let triples = TRIPLES.iter().zip(self.triples().map(Vec::is_empty));
+        let triples = triples.filter_map(|(layer, is_empty)| layer.aov.filter(|_| !is_empty));
+        let counts = COUNTS.iter().zip(self.counts().map(Vec::is_empty));
+        let counts = counts.filter_map(|(layer, is_empty)| layer.aov.filter(|_| !is_empty));
+        triples.chain(counts).collect()
     }
 
     /// `width * height`.
@@ -158,16 +242,7 @@ impl Sums {
     /// Counts pixels with a non-finite sum in any layer. Passes drop such samples, so anything but 0
     /// is a defect.
     pub fn non_finite_count(&self) -> usize {
-        let layers = [
-            &self.sum,
-            &self.compensation,
-            &self.squares,
-            &self.albedo,
-            &self.normal,
-            &self.position,
-            &self.guide_cell,
-            &self.guide_level,
-        ];
+        let layers = self.triples();
         let is_bad = |value: &[f32; 3]| value.iter().any(|component| !component.is_finite());
         let has_bad =
             |pixel: &usize| layers.iter().any(|sums| sums.get(*pixel).is_some_and(is_bad));
@@ -247,32 +322,23 @@ impl Sums {
                 self.compensation[pixel][channel] = rest;
             }
         }
-        let add_all = |ours: &mut Vec<[f32; 3]>, theirs: &[[f32; 3]]| {
+        // The two parts of radiance are added.
+        for (ours, theirs) in self.triples_mut().into_iter().zip(other.triples()).skip(2) {
             if theirs.is_empty() {
                 ours.clear();
             }
-            for (our, their) in ours.iter_mut().zip(theirs) {
-                for (value, more) in our.iter_mut().zip(their) {
-                    *value += more;
-                }
+            for (value, more) in ours.as_flattened_mut().iter_mut().zip(theirs.as_flattened()) {
+                *value += more;
             }
-        };
-        add_all(&mut self.squares, &other.squares);
-        add_all(&mut self.albedo, &other.albedo);
-        add_all(&mut self.normal, &other.normal);
-        add_all(&mut self.position, &other.position);
-        add_all(&mut self.guide_cell, &other.guide_cell);
-        add_all(&mut self.guide_level, &other.guide_level);
-        let add_counts = |ours: &mut Vec<[u32; 2]>, theirs: &[[u32; 2]]| {
+        }
+        for (ours, theirs) in self.counts_mut().into_iter().zip(other.counts()) {
             if theirs.is_empty() {
                 ours.clear();
             }
             for (value, more) in ours.as_flattened_mut().iter_mut().zip(theirs.as_flattened()) {
                 *value = value.saturating_add(*more);
             }
-        };
-        add_counts(&mut self.visible, &other.visible);
-        add_counts(&mut self.cache_entries, &other.cache_entries);
+        }
         self.sample_count = self.sample_count.saturating_add(other.sample_count);
     }
 }

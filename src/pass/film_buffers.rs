@@ -6,11 +6,14 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::{
     error::{Error, Result},
-    film::{Aov, Sums, Window},
+    film::{
+        Aov, Sums, Window,
+        sums::{COUNTS, TRIPLES},
+    },
     gpu::{Buffer, Commands, DescriptorSet, Device},
     memory,
     shader::{
-        bindings::{FILM, film},
+        bindings::{Binding, FILM, film},
         constants::{
             AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, AOV_NORMAL, AOV_POSITION, AOV_VISIBLE,
         },
@@ -22,6 +25,21 @@ use crate::{
 pub(crate) const BLOCK_PIXELS: u32 = 64;
 /// Edge of a block, pixels.
 const BLOCK_EDGE: u32 = 8;
+
+/// Buffers of the layers: name, binding, and bit `AOV_…` that asks for it, 0 for those that every film has.
+/// First [`Sums::triples`], then [`Sums::counts`].
+const LAYERS: [(&str, Binding, u32); TRIPLES.len() + COUNTS.len()] = [
+    ("film sum", film::FILM_SUM, 0),
+    ("film compensation", film::FILM_COMPENSATION, 0),
+    ("film squares", film::FILM_SQUARES, 0),
+    ("film albedo", film::FILM_ALBEDO, AOV_ALBEDO),
+    ("film normal", film::FILM_NORMAL, AOV_NORMAL),
+    ("film position", film::FILM_POSITION, AOV_POSITION),
+    ("film guide cell", film::FILM_GUIDE_CELL, AOV_GUIDE_CELL),
+    ("film guide level", film::FILM_GUIDE_LEVEL, AOV_GUIDE_CELL),
+    ("film visible", film::FILM_VISIBLE, AOV_VISIBLE),
+    ("film cache entries", film::FILM_CACHE_ENTRIES, AOV_CACHE_ENTRIES),
+];
 
 /// Returns a pixel's position in film order; twin of `wave_pixel` in `glsl/include/wave.glsl`.
 pub(crate) fn position_in_film_order(window: Window, column: u32, row: u32) -> u32 {
@@ -83,16 +101,8 @@ struct Page {
     /// Pixels of the window before the page, and in it.
     first: usize,
     pixels: usize,
-    sum: Buffer,
-    compensation: Buffer,
-    squares: Buffer,
-    albedo: Buffer,
-    normal: Buffer,
-    position: Buffer,
-    visible: Buffer,
-    cache_entries: Buffer,
-    guide_cell: Buffer,
-    guide_level: Buffer,
+    /// One for each of [`LAYERS`].
+    layers: Vec<Buffer>,
 }
 
 impl FilmBuffers {
@@ -213,52 +223,28 @@ impl FilmBuffers {
 
     /// Reads everything but the sample count and the film's size, which the renderer knows.
     pub(crate) fn download(&self) -> Result<Sums> {
-        Ok(Sums {
+        let mut sums = Sums {
             width: self.window.width,
             height: self.window.height,
             origin: [self.window.x, self.window.y],
-            sum: self.layer(|page| &page.sum, true)?,
-            compensation: self.layer(|page| &page.compensation, true)?,
-            squares: self.layer(|page| &page.squares, true)?,
-            albedo: self.layer(|page| &page.albedo, self.has(AOV_ALBEDO))?,
-            normal: self.layer(|page| &page.normal, self.has(AOV_NORMAL))?,
-            position: self.layer(|page| &page.position, self.has(AOV_POSITION))?,
-            visible: self.layer(|page| &page.visible, self.has(AOV_VISIBLE))?,
-            cache_entries: self.layer(|page| &page.cache_entries, self.has(AOV_CACHE_ENTRIES))?,
-            guide_cell: self.layer(|page| &page.guide_cell, self.has(AOV_GUIDE_CELL))?,
-            guide_level: self.layer(|page| &page.guide_level, self.has(AOV_GUIDE_CELL))?,
             ..Sums::default()
-        })
+        };
+        for (index, layer) in sums.triples_mut().into_iter().enumerate() {
+            self.download_layer(index, layer)?;
+        }
+        for (index, layer) in sums.counts_mut().into_iter().enumerate() {
+            self.download_layer(TRIPLES.len() + index, layer)?;
+        }
+        Ok(sums)
     }
 
     /// Replaces the content of the film by sums of the same window.
     pub(crate) fn upload(&self, sums: &Sums) -> Result<()> {
-        for page in &self.pages {
-            let range = page.first..page.first + page.pixels;
-            for (buffer, wanted, layer) in [
-                (&page.sum, true, &sums.sum),
-                (&page.compensation, true, &sums.compensation),
-                (&page.squares, true, &sums.squares),
-                (&page.albedo, self.has(AOV_ALBEDO), &sums.albedo),
-                (&page.normal, self.has(AOV_NORMAL), &sums.normal),
-                (&page.position, self.has(AOV_POSITION), &sums.position),
-                (&page.guide_cell, self.has(AOV_GUIDE_CELL), &sums.guide_cell),
-                (&page.guide_level, self.has(AOV_GUIDE_CELL), &sums.guide_level),
-            ] {
-                if wanted && let Some(layer) = layer.get(range.clone()) {
-                    buffer.upload(bytemuck::cast_slice(layer))?;
-                }
-            }
-            for (buffer, bit, counts) in [
-                (&page.visible, AOV_VISIBLE, &sums.visible),
-                (&page.cache_entries, AOV_CACHE_ENTRIES, &sums.cache_entries),
-            ] {
-                if self.has(bit)
-                    && let Some(counts) = counts.get(range.clone())
-                {
-                    buffer.upload(bytemuck::cast_slice(counts))?;
-                }
-            }
+        for (index, layer) in sums.triples().into_iter().enumerate() {
+            self.upload_layer(index, layer)?;
+        }
+        for (index, layer) in sums.counts().into_iter().enumerate() {
+            self.upload_layer(TRIPLES.len() + index, layer)?;
         }
         Ok(())
     }
@@ -272,25 +258,29 @@ impl FilmBuffers {
         bytes
     }
 
-    fn has(&self, bit: u32) -> bool {
-        self.aovs & bit != 0
-    }
-
-    /// Reads a layer of all pages, or nothing if it is not wanted.
-    fn layer<T: Pod>(&self, of: impl Fn(&Page) -> &Buffer, wanted: bool) -> Result<Vec<T>> {
-        let mut layer = Vec::new();
-        if wanted {
+    /// Reads one of [`LAYERS`] of all pages, if it is asked for.
+    fn download_layer<T: Pod>(&self, index: usize, layer: &mut Vec<T>) -> Result<()> {
+        if is_asked_for(index, self.aovs) {
             layer.reserve_exact(self.window.width as usize * self.window.height as usize);
             for page in &self.pages {
                 let add = |piece: &[T]| layer.extend_from_slice(piece);
-                of(page).download_pieces(self.pixels_of(page), add)?;
+                page.layers[index].download_pieces(self.pixels_of(page), add)?;
             }
         }
-        Ok(layer)
+        Ok(())
+    }
+
+    fn upload_layer<T: Pod>(&self, index: usize, layer: &[T]) -> Result<()> {
+        for page in self.pages.iter().filter(|_| is_asked_for(index, self.aovs)) {
+            if let Some(pixels) = layer.get(page.first..page.first + page.pixels) {
+                page.layers[index].upload(bytemuck::cast_slice(pixels))?;
+            }
+        }
+        Ok(())
     }
 
     fn buffers(&self) -> impl Iterator<Item = &Buffer> {
-        self.pages.iter().flat_map(Page::buffers).chain([&self.counters])
+        self.pages.iter().flat_map(|page| &page.layers).chain([&self.counters])
     }
 }
 
@@ -303,64 +293,20 @@ impl Page {
         aovs: u32,
     ) -> Result<Self> {
         let pixels = u64::from(end - first);
-        let make = |name: &str, bytes: u64, wanted: bool| {
-            Buffer::zeroed(device, name, if wanted { bytes * pixels } else { 0 })
+        let make = |(index, (name, ..)): (usize, &(&str, Binding, u32))| {
+            let bytes = if index < TRIPLES.len() { 12 } else { 8 };
+            Buffer::zeroed(device, name, if is_asked_for(index, aovs) { bytes * pixels } else { 0 })
         };
-        let triple = |name: &str, bit: u32| make(name, 12, aovs & bit != 0);
-        let pair = |name: &str, bit: u32| make(name, 8, aovs & bit != 0);
-        let sum = make("film sum", 12, true)?;
-        let compensation = make("film compensation", 12, true)?;
-        let squares = make("film squares", 12, true)?;
-        let albedo = triple("film albedo", AOV_ALBEDO)?;
-        let normal = triple("film normal", AOV_NORMAL)?;
-        let position = triple("film position", AOV_POSITION)?;
-        let visible = pair("film visible", AOV_VISIBLE)?;
-        let cache_entries = pair("film cache entries", AOV_CACHE_ENTRIES)?;
-        let guide_cell = triple("film guide cell", AOV_GUIDE_CELL)?;
-        let guide_level = triple("film guide level", AOV_GUIDE_CELL)?;
-        let bound = [
-            (film::FILM_SUM, &sum),
-            (film::FILM_COMPENSATION, &compensation),
-            (film::FILM_SQUARES, &squares),
-            (film::COUNTERS, counters),
-            (film::FILM_ALBEDO, &albedo),
-            (film::FILM_NORMAL, &normal),
-            (film::FILM_POSITION, &position),
-            (film::FILM_VISIBLE, &visible),
-            (film::FILM_CACHE_ENTRIES, &cache_entries),
-            (film::FILM_GUIDE_CELL, &guide_cell),
-            (film::FILM_GUIDE_LEVEL, &guide_level),
-        ];
+        let layers = LAYERS.iter().enumerate().map(make).collect::<Result<Vec<_>>>()?;
+        let bound = LAYERS.iter().zip(&layers).map(|((_, binding, _), buffer)| (*binding, buffer));
+        let bound: Vec<_> = bound.chain([(film::COUNTERS, counters)]).collect();
         let set = DescriptorSet::new(device, &FILM, &bound)?;
-        Ok(Self {
-            set,
-            first: first as usize,
-            pixels: pixels as usize,
-            sum,
-            compensation,
-            squares,
-            albedo,
-            normal,
-            position,
-            visible,
-            cache_entries,
-            guide_cell,
-            guide_level,
-        })
+        Ok(Self { set, first: first as usize, pixels: pixels as usize, layers })
     }
+}
 
-    fn buffers(&self) -> [&Buffer; 10] {
-        [
-            &self.sum,
-            &self.compensation,
-            &self.squares,
-            &self.albedo,
-            &self.normal,
-            &self.position,
-            &self.visible,
-            &self.cache_entries,
-            &self.guide_cell,
-            &self.guide_level,
-        ]
-    }
+/// Tests whether a film with the layers in the bits `aovs` has one of [`LAYERS`].
+fn is_asked_for(index: usize, aovs: u32) -> bool {
+    let (.., bit) = LAYERS[index];
+    bit == 0 || aovs & bit != 0
 }

@@ -19,7 +19,7 @@ pub mod visibility;
 
 use std::collections::BTreeMap;
 
-use clap::{ValueEnum, builder::PossibleValue};
+use clap::ValueEnum;
 pub use parameters::Parameters;
 
 use crate::{
@@ -144,10 +144,9 @@ impl Sampler {
     pub fn check(self, parameters: &Parameters, depth: u32, aovs: &[Aov]) -> Result<()> {
         for other in Self::ALL.iter().filter(|other| **other != self) {
             if let Some(layer) = other.room().aovs().iter().find(|layer| aovs.contains(layer)) {
-                let layer = layer.to_possible_value();
                 return Err(Error::usage(format!(
                     "--aov {}: the sampler {} has no such layer; expected --sampler {}",
-                    layer.as_ref().map_or("", PossibleValue::get_name),
+                    layer.name(),
                     self.name(),
                     other.name()
                 )));
