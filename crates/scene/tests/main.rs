@@ -12,4 +12,5 @@ mod mesh_materials;
 mod mitsuba;
 mod pbrt;
 mod scene;
+mod shapes;
 mod spectra;

@@ -33,8 +33,6 @@ mod extrude;
 mod grid;
 mod revolve;
 mod rounded_box;
-#[cfg(test)]
-mod tests;
 mod tube;
 
 use std::{fmt::Debug, ops::RangeInclusive};
