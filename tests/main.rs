@@ -44,6 +44,7 @@ mod light;
 mod lobe_options;
 mod lobe_parameters;
 mod look;
+mod metrics;
 mod new;
 mod pages;
 mod passes;

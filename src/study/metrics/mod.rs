@@ -83,12 +83,6 @@ impl Metrics {
         self.named().into_iter().find(|(known, _)| *known == name).map(|(_, value)| value)
     }
 
-    /// Compares a picture with a reference taken as exact. Fails as [`Metrics::of_halves`].
-    #[cfg(test)]
-    pub(crate) fn of(picture: &RgbImage, reference: &RgbImage) -> Result<Self> {
-        Self::of_halves(picture, reference, reference)
-    }
-
     /// Compares a picture with a reference rendered in two independent halves.
     ///
     /// # Errors
@@ -268,4 +262,19 @@ fn check(picture: &RgbImage, first: &RgbImage, second: &RgbImage) -> Result<()> 
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_find_their_values() {
+        let metrics = Metrics { mae: 1.0, max_error: 2.0, psnr: 3.0, ..Metrics::default() };
+        assert_eq!(metrics.get("mae"), Some(1.0));
+        assert_eq!(metrics.get("max_error"), Some(2.0));
+        assert_eq!(metrics.get("psnr"), Some(3.0));
+        assert_eq!(metrics.get("ssim"), None);
+        let json = serde_json::json!(metrics);
+        for (name, value) in metrics.named() {
+            assert_eq!(json[name].as_f64(), Some(value), "{name}");
+        }
+    }
+}

@@ -117,7 +117,7 @@ mod tests {
         let part = PartErrors::of_halves(&picture, halves, &is_surface).unwrap().unwrap();
         assert!((part.relmse - 0.01 / 1.01).abs() < 1e-6, "{part:?}");
         assert!((part.mse - 0.01).abs() < 1e-6, "{part:?}");
-        let whole = Metrics::of(&picture, &reference).unwrap();
+        let whole = Metrics::of_halves(&picture, &reference, &reference).unwrap();
         assert!(whole.relmse < 1e-2 * part.relmse, "the sun hides it in {}", whole.relmse);
     }
 
@@ -138,7 +138,7 @@ mod tests {
         let picture = grey((0..400).map(|index| 1.0 + 0.01 * (index % 7) as f32), 20);
         let halves = [&reference, &reference];
         let part = PartErrors::of_halves(&picture, halves, &[true; 400]).unwrap().unwrap();
-        let whole = Metrics::of(&picture, &reference).unwrap();
+        let whole = Metrics::of_halves(&picture, &reference, &reference).unwrap();
         assert!((part.relmse - whole.relmse).abs() < 1e-12);
         assert!((part.relmse_trimmed - whole.relmse_trimmed).abs() < 1e-12);
         assert_eq!(PartErrors::of_halves(&picture, halves, &[false; 400]).unwrap(), None);
