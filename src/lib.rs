@@ -211,6 +211,5 @@ pub mod cli;
 pub mod command;
 pub mod view;
 
-pub use fenestra_scene::{
-    self as scene, Error, Result, error, export, files, memory, stage, texture,
-};
+pub use fenestra_scene::{self as scene, Error, Result};
+use fenestra_scene::{error, export, files, memory, stage, texture};

@@ -6,11 +6,16 @@
 use std::{f32::consts::PI, fs, path::Path, sync::Arc};
 
 use fenestra::{
-    export::{Settings, mitsuba::export},
     film::Image,
-    scene::{Scene, lamp::LampKind, material::MaterialKind, measured::MeasuredTable},
+    scene::{
+        Scene,
+        export::{Settings, mitsuba::export},
+        lamp::LampKind,
+        material::MaterialKind,
+        measured::MeasuredTable,
+        texture::TextureUse,
+    },
     surface::TextureTables,
-    texture::TextureUse,
 };
 use glam::{Vec2, Vec3};
 

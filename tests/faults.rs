@@ -12,8 +12,8 @@ use std::{
 };
 
 use fenestra::{
-    files::write_atomically,
     film::{Attribute, Checkpoint, Image, Metadata, SampleRange, Sums, merge::merge_checkpoints},
+    scene::files::write_atomically,
 };
 
 use crate::support::command::{self, Folder, Run, Running, program};

@@ -6,7 +6,6 @@ use std::{collections::BTreeMap, fs, io, path::Path};
 
 use clap::ValueEnum;
 use fenestra::{
-    files::write_atomically,
     film::{
         Aov, Attribute, Checkpoint, Image, Metadata, RgbImage, SampleRange, Sums,
         checkpoint::checkpoint_path,
@@ -14,6 +13,7 @@ use fenestra::{
         png,
     },
     math::colour::display_from_linear,
+    scene::files::write_atomically,
 };
 use io::Write;
 

@@ -11,14 +11,13 @@ use std::{fs, path::Path};
 
 use fenestra::{
     command::options::{parse_duration, parse_size},
-    files::hexadecimal,
     film::{Checkpoint, Metadata, SampleRange, Sums},
     fit::{EnvironmentOptions, Fit, Method, environment_lobes, read_fit, write_fit},
     sampler::{
         Parameters,
         guided::{ARRIVAL_DIRECTIONS, GuideState, Origin, SHARE_WORDS},
     },
-    scene::EnvironmentMap,
+    scene::{EnvironmentMap, files::hexadecimal},
     study::{
         contender::Contender,
         file::{StudyFile, ValueParsers, is_study},

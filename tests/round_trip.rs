@@ -9,8 +9,7 @@
 use std::{fs, path::PathBuf};
 
 use fenestra::{
-    export,
-    scene::{Scene, lamp::LampKind, load::LoadOptions},
+    scene::{Scene, export, lamp::LampKind, load::LoadOptions},
     session::Settings,
 };
 

@@ -14,6 +14,10 @@ use fenestra::{
     scene::{
         Geometry,
         material::{Material, MaterialKind, Opacity},
+        texture::{
+            Channels, Encoding, Interpolation, MAX_TEXTURE_SIDE, Texels, Texture, TextureCache,
+            TextureUse, Wrap, lookup::gradient_tangent,
+        },
     },
     shader::{
         bindings::{Binding, probe, scene},
@@ -25,10 +29,6 @@ use fenestra::{
         structs,
     },
     surface::{SurfaceTables, TextureTables},
-    texture::{
-        Channels, Encoding, Interpolation, MAX_TEXTURE_SIDE, Texels, Texture, TextureCache,
-        TextureUse, Wrap, lookup::gradient_tangent,
-    },
 };
 use glam::{Vec2, Vec3, Vec4, vec2, vec3, vec4};
 use half::f16;

@@ -2,12 +2,10 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use fenestra::{
-    scene::{
-        Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Lamp, Scene,
-        lamp::LampKind,
-        material::{ConductorFresnel, Emission, Material, MaterialKind},
-    },
+use fenestra::scene::{
+    Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Lamp, Scene,
+    lamp::LampKind,
+    material::{ConductorFresnel, Emission, Material, MaterialKind},
     texture::{Texels, Texture, TextureUse},
 };
 use glam::Vec3;
