@@ -1,5 +1,5 @@
-//! The pages of the repository: their links lead somewhere, their pictures are shown, and all together are
-//! short.
+//! The pages of the repository: their links lead somewhere, their pictures are shown, their tables of
+//! parameters have the defaults of the samplers, and all together are short.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
 use std::{
@@ -7,6 +7,8 @@ use std::{
     fs,
     path::{Path, PathBuf},
 };
+
+use fenestra::sampler::{Parameters, Sampler};
 
 /// Most words of `docs` and the README, as `cat docs/*.md README.md | wc -w` counts them.
 const WORDS: usize = 30_000;
@@ -76,6 +78,50 @@ fn every_picture_is_shown() {
             ["png", "jpg", "svg"].iter().any(|kind| file.extension() == Some(kind.as_ref()));
         assert!(!is_picture || shown.contains(&file), "{}: no page shows it", file.display());
     }
+}
+
+/// Keys and defaults in the tables of `--set`.
+fn parameters(text: &str) -> Vec<(String, String)> {
+    let mut found = Vec::new();
+    let mut is_table = false;
+    for line in text.lines() {
+        let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+        let [_, keys, defaults, ..] = cells[..] else {
+            is_table = false;
+            continue;
+        };
+        is_table |= keys == "`--set`";
+        let [keys, defaults] =
+            [keys, defaults].map(|cell| cell.split(", ").map(|name| name.trim_matches('`')));
+        for (key, default) in keys.zip(defaults) {
+            let key = match key.strip_prefix("--set ") {
+                Some(assignment) => assignment.split('=').next().unwrap(),
+                None if is_table && !key.starts_with('-') => key,
+                None => continue,
+            };
+            found.push((key.to_owned(), default.to_owned()));
+        }
+    }
+    found
+}
+
+#[test]
+fn tables_of_parameters_have_every_key_and_its_default() {
+    let defaults = Parameters::default();
+    let own: BTreeSet<(String, String)> =
+        Sampler::ALL.iter().flat_map(|sampler| sampler.describe(&defaults)).collect();
+    let mut keys: BTreeSet<&str> = Parameters::keys().into_iter().collect();
+    // The text names these two.
+    keys.remove("preset");
+    keys.remove("portal-share");
+    for (path, text) in &pages() {
+        for (key, default) in parameters(text) {
+            let path = path.display();
+            assert!(own.contains(&(key.clone(), default.clone())), "{path}: {key} = {default}");
+            keys.remove(&*key);
+        }
+    }
+    assert!(keys.is_empty(), "in no table: {keys:?}");
 }
 
 #[test]
