@@ -82,13 +82,6 @@ vec2 lat_long_from_direction(vec3 direction) {
     return vec2(0.5 + azimuth / (2.0 * PI), atan(sin_theta, direction.y) / PI);
 }
 
-// Unit direction at lat-long coordinates in the unit square; inverse of lat_long_from_direction.
-vec3 direction_from_lat_long(vec2 uv) {
-    vec2 azimuth = sin_cos_pi(2.0 * uv.x);
-    vec2 theta = sin_cos_pi(uv.y);
-    return vec3(-theta.x * azimuth.x, theta.y, theta.x * azimuth.y);
-}
-
 // Returns the cube face that a normal points at most: +x, -x, +y, -y, +z, -z.
 uint cube_face(vec3 normal) {
     vec3 size = abs(normal);

@@ -55,13 +55,6 @@ vec3 ggx_normal_sample(vec3 outgoing_local, float alpha, float cap_factor, vec2 
     return normalize(vec3(alpha * normal.xy, max(1e-7, normal.z)));
 }
 
-// Density of all visible normals, per steradian, over the cosine of outgoing direction and normal:
-// G₁·D/cosθ_o. [Heitz 2014] Eq. 21.
-float ggx_visible_density(vec3 normal, vec3 outgoing_local, float alpha) {
-    return 2.0 * ggx_normal_density(normal, alpha)
-        / (outgoing_local.z + ggx_stretched_length(outgoing_local, alpha));
-}
-
 // G₂ of both directions over G₁ of the outgoing one; height-correlated on one side, and the same
 // expression where the other direction is below the surface. 0…1.
 float ggx_masking_ratio(vec3 outgoing_local, vec3 incident_local, float alpha) {

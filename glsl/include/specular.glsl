@@ -66,40 +66,6 @@ Scatter dielectric_scatter(Material material, vec3 outgoing_local, bool is_back,
     return result;
 }
 
-// Value and density of dielectric_scatter at one pair of directions; 0 for a smooth interface.
-void dielectric_evaluate_and_pdf(
-    Material material, vec3 outgoing_local, vec3 incident_local, bool is_back, out vec3 value,
-    out float pdf) {
-    value = vec3(0.0);
-    pdf = 0.0;
-    if (material.alpha == 0.0 || outgoing_local.z <= 0.0 || incident_local.z == 0.0) {
-        return;
-    }
-    float eta = relative_index(material, is_back);
-    bool is_transmitted = incident_local.z < 0.0;
-    vec3 half_vector = outgoing_local + (is_transmitted ? eta : 1.0) * incident_local;
-    vec3 normal = normalize(half_vector.z < 0.0 ? -half_vector : half_vector);
-    float cosine = dot(outgoing_local, normal);
-    float incident_cosine = dot(incident_local, normal);
-    if (cosine <= 0.0 || (incident_cosine < 0.0) != is_transmitted) {
-        return;
-    }
-    float fresnel = fresnel_interface(cosine, eta);
-    float probability = reflection_probability(material, fresnel);
-    float density = ggx_visible_density(normal, outgoing_local, material.alpha);
-    // G2 * D / (cos o * cos i), by the density of visible normals.
-    float ratio = ggx_masking_ratio(outgoing_local, incident_local, material.alpha)
-        * density / abs(incident_local.z);
-    if (is_transmitted) {
-        float jacobian = cosine * abs(incident_cosine) / dot(half_vector, half_vector);
-        value = (1.0 - fresnel) * ratio * jacobian * material.eta;
-        pdf = (1.0 - probability) * density * jacobian * eta * eta;
-    } else {
-        value = 0.25 * fresnel * ratio * material.reflectance;
-        pdf = 0.25 * probability * density;
-    }
-}
-
 // Pane: reflects as a mirror or lets light straight through.
 Scatter pane_scatter(Material material, vec3 outgoing_local, vec3 u) {
     vec3 reflectance = pane_reflectance(material, outgoing_local.z);

@@ -1,4 +1,4 @@
-// Probe of frame.glsl: a normal, a direction and a point of the unit square in, everything out.
+// Probe of frame.glsl: a normal, a direction and a number in, everything out.
 #version 460
 
 #include "frame.glsl"
@@ -16,7 +16,6 @@ struct ProbeOutput {
     vec3 direction_local;
     vec3 direction_again;
     vec2 lat_long;
-    vec3 from_lat_long;
     vec2 sin_cos;
 };
 
@@ -25,8 +24,7 @@ ProbeOutput answer(ProbeInput probe) {
     vec3 direction_local = to_local(frame, probe.direction);
     return ProbeOutput(
         frame.tangent, frame.bitangent, direction_local, to_world(frame, direction_local),
-        lat_long_from_direction(probe.direction), direction_from_lat_long(probe.uv),
-        sin_cos_pi(2.0 * probe.uv.x));
+        lat_long_from_direction(probe.direction), sin_cos_pi(2.0 * probe.uv.x));
 }
 
 ANSWER_QUERIES(ProbeInput, ProbeOutput, answer)

@@ -9,7 +9,6 @@ READS(materials)
 
 struct SpecularQuery {
     vec3 outgoing_local;
-    vec3 incident_local;
     vec3 u;
     uint material;
     uint is_back;
@@ -19,8 +18,6 @@ struct SpecularAnswer {
     vec3 direction_local;
     uint is_transmitted;
     vec3 weight;
-    vec3 value;
-    float pdf;
     vec3 reflectance;
     vec3 transmittance;
 };
@@ -33,8 +30,6 @@ SpecularAnswer answer(SpecularQuery query) {
     result.direction_local = found.direction_local;
     result.is_transmitted = found.is_transmitted ? 1u : 0u;
     result.weight = found.weight;
-    dielectric_evaluate_and_pdf(
-        material, query.outgoing_local, query.incident_local, is_back, result.value, result.pdf);
     result.reflectance = pane_reflectance(material, query.outgoing_local.z);
     result.transmittance = pane_transmittance(material, query.outgoing_local.z);
     return result;
