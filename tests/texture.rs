@@ -60,7 +60,7 @@ fn chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
 
 fn decode(bytes: &[u8]) -> Texture {
     let mut warnings = Vec::new();
-    let texture = Texture::decode_with("image", bytes, &mut warnings).unwrap();
+    let texture = Texture::decode("image", bytes, &mut warnings).unwrap();
     assert!(warnings.is_empty(), "{warnings:?}");
     texture
 }
@@ -75,7 +75,7 @@ fn images_of_every_kind_become_texels() {
         // TGA has no magic number: the extension tells.
         let path = folder.path().join(format!("a.{}", format.extensions_str()[0]));
         std::fs::write(&path, bytes).unwrap();
-        let texture = Texture::load(&path).unwrap();
+        let texture = Texture::load(&path, &mut Vec::new()).unwrap();
         assert_eq!((texture.width, texture.height), (2, 1));
         assert_eq!(texture.texels, expected);
     }
@@ -117,7 +117,7 @@ fn values_that_no_half_holds_are_repaired_with_a_warning() {
     let image = image::Rgba32FImage::from_raw(2, 1, values).unwrap();
     let bytes = encode(&image.into(), ImageFormat::OpenExr);
     let mut warnings = Vec::new();
-    let texture = Texture::decode_with("sun.exr", &bytes, &mut warnings).unwrap();
+    let texture = Texture::decode("sun.exr", &bytes, &mut warnings).unwrap();
     let expected = [[0.0, 0.0, 65_504.0, 0.5], [65_504.0, 0.0, 0.25, 1.0]];
     let expected = expected.map(|texel: [f32; 4]| texel.map(f16::from_f32));
     assert_eq!(texture.texels, Texels::Halves(expected.to_vec()));
@@ -128,7 +128,7 @@ fn values_that_no_half_holds_are_repaired_with_a_warning() {
 #[test]
 fn damaged_and_huge_images_are_refused() {
     let case = |bytes: &[u8], expected: &str| {
-        let message = Texture::decode("image", bytes).expect_err(expected);
+        let message = Texture::decode("image", bytes, &mut Vec::new()).expect_err(expected);
         assert!(message.contains(expected), "expected `{expected}`, found `{message}`");
     };
     case(b"", "expected a PNG, JPEG, TGA, HDR or EXR image, found another file");

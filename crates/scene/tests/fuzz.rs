@@ -31,12 +31,12 @@ fn mesh(path: &Path, _: &[u8]) -> bool {
 }
 
 fn map(path: &Path, bytes: &[u8]) -> bool {
-    let texture = Texture::decode("map", bytes);
+    let texture = Texture::decode("map", bytes, &mut Vec::new());
     EnvironmentMap::load(path, 1.0, 0.0, &mut Vec::new()).is_ok() || texture.is_ok()
 }
 
 fn picture(_: &Path, bytes: &[u8]) -> bool {
-    Texture::decode("picture", bytes).is_ok()
+    Texture::decode("picture", bytes, &mut Vec::new()).is_ok()
 }
 
 fn image(path: &Path, _: &[u8]) -> bool {
@@ -128,7 +128,7 @@ fn targets() -> Vec<Target> {
         only_bytes(target("jpeg", "input.jpg", jpeg, picture)),
         only_bytes(target("tga", "input.tga", tga, |path, bytes| {
             fs::write(path, bytes).unwrap();
-            Texture::load(path).is_ok()
+            Texture::load(path, &mut Vec::new()).is_ok()
         })),
     ]
 }

@@ -758,7 +758,7 @@ fn widths_and_colours_by_place_are_read() {
         let surface = &scene.materials[0].surface;
         let (roots, widths) = (surface.roughness.as_ref().unwrap().values(), {
             let path = folder.path().join("a.png");
-            let image = fenestra_scene::texture::Texture::load(&path).unwrap();
+            let image = fenestra_scene::texture::Texture::load(&path, &mut Vec::new()).unwrap();
             image.linear_texels(Encoding::Linear)
         });
         for (root, width) in roots.iter().zip(widths) {

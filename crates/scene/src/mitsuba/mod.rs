@@ -34,12 +34,12 @@ use super::{
     instance::Budget,
     instances::Prototype,
 };
-use crate::{error::Result, import::Imported, material::Material, texture::Texture};
+use crate::{error::Result, import::Imported, material::Material, texture::TextureCache};
 
 /// Scene on its way from the document.
 struct Reader<'a> {
     document: &'a Document,
-    textures: HashMap<PathBuf, Arc<Texture>>,
+    textures: TextureCache,
     environment: Option<EnvironmentMap>,
     lamps: Vec<Lamp>,
     materials: Vec<Material>,
@@ -67,7 +67,7 @@ pub(crate) fn read(path: &Path, camera: Option<&str>) -> Result<Imported> {
     let document = Document::read(path)?;
     let mut reader = Reader {
         document: &document,
-        textures: HashMap::new(),
+        textures: TextureCache::default(),
         environment: None,
         lamps: Vec::new(),
         materials: Vec::new(),

@@ -125,16 +125,9 @@ impl Reader<'_> {
             return Err(node.error("bitmap: expected the parameter `filename`"));
         };
         let path = node.file(name)?;
-        let texture = match self.textures.get(&path) {
-            Some(texture) => Arc::clone(texture),
-            None => {
-                let loaded = Texture::load(&path).map_err(|error| node.error(error.to_string()))?;
-                let texture = Arc::new(loaded);
-                self.inputs.push(path.clone());
-                self.textures.insert(path, Arc::clone(&texture));
-                texture
-            }
-        };
+        let loaded = self.textures.load(&path, &mut self.warnings);
+        let texture = loaded.map_err(|error| node.error(error.to_string()))?;
+        self.inputs.push(path);
         // Version 0.6 states an exponent; only that of linear values is different from sRGB.
         let is_linear = parameters.float("gamma")? == Some(1.0);
         let is_raw = parameters.boolean("raw")?.unwrap_or(is_linear);

@@ -273,7 +273,7 @@ fn read_map(path: &std::path::Path, log: &mut Log) -> Result<EnvironmentMap> {
     if matches!(crate::files::extension(path).as_str(), "hdr" | "exr" | "pfm") {
         return EnvironmentMap::read(path, 1.0, &mut log.warnings);
     }
-    let image = Texture::load_with(path, &mut log.warnings)?;
+    let image = Texture::load(path, &mut log.warnings)?;
     let texels = image.linear_texels(Encoding::Srgb);
     let texels = texels.iter().map(|&[red, green, blue, _]| Vec3::new(red, green, blue)).collect();
     let (width, height) = (image.width, image.height);

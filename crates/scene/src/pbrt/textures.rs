@@ -297,7 +297,7 @@ impl<'a> Textures<'a> {
         if let Some(texture) = self.images.get(&key) {
             return Ok(Arc::clone(texture));
         }
-        let loaded = Texture::load_with(&path, &mut log.warnings);
+        let loaded = Texture::load(&path, &mut log.warnings);
         let mut texture = loaded.map_err(|error| entity.error(error.to_string()))?;
         if let (Some(gamma), Texels::Bytes(_) | Texels::Shorts(_)) =
             (decoding.gamma, &texture.texels)

@@ -19,10 +19,10 @@ pub struct TextureCache {
 
 impl TextureCache {
     /// Decodes the files among `paths` that are not there yet, on all cores. Adds the warnings of
-    /// [`Texture::load_with`] in the order of the paths.
+    /// [`Texture::load`] in the order of the paths.
     ///
     /// # Errors
-    /// Those of [`Texture::load_with`], for the first file in alphabetical order that fails.
+    /// Those of [`Texture::load`], for the first file in alphabetical order that fails.
     pub fn load_all(
         &mut self,
         paths: impl IntoIterator<Item = PathBuf>,
@@ -40,7 +40,7 @@ impl TextureCache {
             .into_par_iter()
             .map(|(key, path)| {
                 let mut own = Vec::new();
-                Texture::load_with(&path, &mut own).map(|texture| (key, Arc::new(texture), own))
+                Texture::load(&path, &mut own).map(|texture| (key, Arc::new(texture), own))
             })
             .collect();
         for result in decoded {
@@ -54,13 +54,13 @@ impl TextureCache {
     /// Returns the texture of a file, which it decodes if it is not there yet.
     ///
     /// # Errors
-    /// Those of [`Texture::load_with`].
+    /// Those of [`Texture::load`].
     pub fn load(&mut self, path: &Path, warnings: &mut Vec<String>) -> Result<Arc<Texture>> {
         let key = key(path);
         if let Some(texture) = self.textures.get(&key) {
             return Ok(Arc::clone(texture));
         }
-        let texture = Arc::new(Texture::load_with(path, warnings)?);
+        let texture = Arc::new(Texture::load(path, warnings)?);
         self.textures.insert(key, Arc::clone(&texture));
         Ok(texture)
     }

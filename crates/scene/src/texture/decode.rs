@@ -22,51 +22,24 @@ use crate::{
 const MAX_DECODER_BYTES: u64 = 16 * (MAX_TEXTURE_SIDE as u64).pow(2);
 
 impl Texture {
-    /// Reads an image file; its content tells the format, and the extension where it does not. The
-    /// log receives the warnings of [`Texture::load_with`].
-    ///
-    /// # Errors
-    /// As [`Texture::load_with`].
-    pub fn load(path: &Path) -> Result<Self> {
-        let mut warnings = Vec::new();
-        let texture = Self::load_with(path, &mut warnings)?;
-        warnings.iter().for_each(|warning| log::warn!("{warning}"));
-        Ok(texture)
-    }
-
-    /// As [`Texture::load`], with a warning if values of an HDR or EXR image are negative or not a
-    /// number, which become 0, or above the largest half, which become that.
+    /// Reads an image file; its content tells the format, and the extension where it does not. Warns if
+    /// values of an HDR or EXR image are negative or not a number, which become 0, or above the largest
+    /// half, which become that.
     ///
     /// # Errors
     /// [`Error::Io`] if the file cannot be read, [`Error::Format`] if it is no image, is damaged, or
     /// has more than [`MAX_TEXTURE_SIDE`] texels a side.
-    pub fn load_with(path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
+    pub fn load(path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
         let format = ImageFormat::from_extension(files::extension(path));
         decode(&path.display().to_string(), &files::read(path)?, format, warnings)
             .map_err(|message| Error::format(path, message))
     }
 
-    /// Decodes an image inside another file; `name` says where it is. The log receives the warnings
-    /// of [`Texture::decode_with`].
-    ///
-    /// # Errors
-    /// As [`Texture::decode_with`].
-    pub fn decode(name: &str, bytes: &[u8]) -> Result<Self, String> {
-        let mut warnings = Vec::new();
-        let texture = Self::decode_with(name, bytes, &mut warnings)?;
-        warnings.iter().for_each(|warning| log::warn!("{warning}"));
-        Ok(texture)
-    }
-
-    /// As [`Texture::load_with`] for an image inside another file; `name` says where it is.
+    /// As [`Texture::load`] for an image inside another file; `name` says where it is.
     ///
     /// # Errors
     /// A message for bytes that are no image, or a damaged or too large one.
-    pub fn decode_with(
-        name: &str,
-        bytes: &[u8],
-        warnings: &mut Vec<String>,
-    ) -> Result<Self, String> {
+    pub fn decode(name: &str, bytes: &[u8], warnings: &mut Vec<String>) -> Result<Self, String> {
         decode(name, bytes, None, warnings)
     }
 }

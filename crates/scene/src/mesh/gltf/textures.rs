@@ -84,7 +84,7 @@ impl GltfReader<'_> {
         let name = format!("{}: image {index}", self.path.display());
         let decoded = if let Some(uri) = image["uri"].as_str() {
             match document::data_of(uri) {
-                Some(Some(bytes)) => Texture::decode_with(&name, &bytes, self.warnings),
+                Some(Some(bytes)) => Texture::decode(&name, &bytes, self.warnings),
                 Some(None) => Err("not base64 data".to_owned()),
                 None => {
                     let path = document::beside(self.path, uri)?;
@@ -97,7 +97,7 @@ impl GltfReader<'_> {
                 self.error(format!("image {index}: expected a URI or a buffer view, found neither"))
             })?;
             let mut own = Vec::new();
-            let decoded = Texture::decode_with(&name, self.view_bytes(&view)?, &mut own);
+            let decoded = Texture::decode(&name, self.view_bytes(&view)?, &mut own);
             self.warnings.append(&mut own);
             decoded
         };
