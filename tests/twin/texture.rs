@@ -4,6 +4,7 @@
 use fenestra::{
     accel::attributes::TriangleAttributes,
     math::{colour::srgb_to_linear, octahedron},
+    scene::texture::{Interpolation, Wrap, lookup::Grid},
     shader::{
         constants::{
             ATTRIBUTE_COLOR, ATTRIBUTE_FIRST_UVS, ATTRIBUTE_SECOND_UVS, ATTRIBUTE_TANGENT,
@@ -14,7 +15,6 @@ use fenestra::{
         },
         structs::{MaterialSurface, TextureUse},
     },
-    texture::{Interpolation, Wrap, lookup::Grid},
 };
 use glam::{Vec2, Vec3, Vec4, vec2};
 use half::f16;
