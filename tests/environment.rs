@@ -7,7 +7,7 @@ use fenestra::{
     math::{
         colour::luminance,
         frame::{direction_from_lat_long, lat_long_from_direction},
-        random::{random_2d, random_independent_1d, random_independent_2d},
+        random::{random_independent_1d, random_independent_2d},
     },
     scene::environment::{EnvironmentMap, EnvironmentTables},
     shader::{
@@ -18,7 +18,10 @@ use fenestra::{
 };
 use glam::{Vec2, Vec3};
 
-use crate::support::{self, statistics::chi_square_p_value};
+use crate::{
+    support::{self, statistics::chi_square_p_value},
+    twin::{environment::EnvironmentSampling as _, random::random_2d},
+};
 
 const ENVIRONMENT_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/environment.spv"));
 

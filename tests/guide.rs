@@ -18,7 +18,7 @@ use glam::Vec3;
 
 use crate::{
     support::{scenes, statistics::chi_square_p_value},
-    twin::regions::choose_cell,
+    twin::{environment::EnvironmentSampling as _, regions::choose_cell},
 };
 
 /// A sky with a small sun and a black ground: bright, dim and empty regions.

@@ -9,7 +9,7 @@ use fenestra::{
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
     math::{
         frame::frame_from_normal,
-        random::{hash_4d, random_2d, random_independent_2d},
+        random::{hash_4d, random_independent_2d},
     },
     pass::{PathDemand, SceneBuffers, Surfaces, WaveBuffers},
     sampler::{
@@ -38,7 +38,7 @@ use crate::{
         materials, replicates, scenes,
         statistics::{self, estimates, largest_t},
     },
-    twin::{brdf, guided::arrival_direction},
+    twin::{brdf, guided::arrival_direction, random::random_2d},
 };
 
 const ARRIVING_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/arriving.spv"));

@@ -29,7 +29,7 @@ use crate::{
         hemisphere::{self, BIN_COLUMNS, BINS},
         materials, scenes, statistics,
     },
-    twin::brdf,
+    twin::{brdf, environment::EnvironmentSampling as _},
 };
 
 /// Rays per surface and state, and per hit.

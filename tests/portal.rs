@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use fenestra::{
-    math::random::{random_2d, random_independent_1d},
+    math::random::random_independent_1d,
     sampler::{Parameters, Sampler},
     scene::{Portal, Scene},
     session::Settings,
@@ -20,7 +20,10 @@ use crate::{
         scenes,
         statistics::{Comparison, chi_square_p_value},
     },
-    twin::spherical_rectangle::{LEAST_UNIFORM_SOLID_ANGLE, SphericalRectangle},
+    twin::{
+        random::random_2d,
+        spherical_rectangle::{LEAST_UNIFORM_SOLID_ANGLE, SphericalRectangle},
+    },
 };
 
 const RECTANGLE_PROBE: &[u8] =

@@ -1,13 +1,16 @@
 //! Random numbers: stratification, uniformity, independence, and the shader twin bit for bit.
 
 use fenestra::{
-    math::random::{random_1d, random_2d, random_independent_1d, random_independent_2d},
+    math::random::{random_independent_1d, random_independent_2d},
     shader::bindings::probe,
 };
 
-use crate::support::{
-    self,
-    statistics::{chi_square_p_value, z_p_value},
+use crate::{
+    support::{
+        self,
+        statistics::{chi_square_p_value, z_p_value},
+    },
+    twin::random::{random_1d, random_2d},
 };
 
 /// Chance of a false alarm: a test fails by chance for less than one seed in a million.

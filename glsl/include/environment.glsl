@@ -1,5 +1,5 @@
-// The environment map: bilinear lookup and its exact sampling density per steradian. Twin of
-// crates/scene/src/environment.
+// The environment map: bilinear lookup and its exact sampling density per steradian. Twins
+// crates/scene/src/environment and tests/twin/environment.rs.
 //
 // environment_rows: cumulative probability over height + 1 rows of cells, the mean sine of each
 // row's polar angle, then a guide to the probabilities. environment_cells: cumulative probability

@@ -7,12 +7,15 @@ use fenestra::{
         regions::Partition,
         tiles::{Entry, SectorGrid},
     },
-    scene::environment::{EnvironmentMap, EnvironmentSample, EnvironmentTables},
+    scene::environment::{EnvironmentMap, EnvironmentTables},
     shader::structs::SceneParameters,
 };
 use glam::{Vec2, Vec3, vec3};
 
-use super::regions::choose_cell;
+use super::{
+    environment::{EnvironmentSample, EnvironmentSampling as _},
+    regions::choose_cell,
+};
 
 /// The environment as the entries of one sector sample it.
 #[derive(Clone, Copy, Debug)]

@@ -17,8 +17,7 @@ use rayon::prelude::*;
 
 pub use court::CourtParameters;
 pub use sky::SkyParameters;
-pub use table::mean_sine;
-pub use table::{EnvironmentSample, EnvironmentTables};
+pub use table::{EnvironmentTables, mean_sine};
 
 use crate::math::frame::lat_long_from_direction;
 
@@ -101,12 +100,6 @@ impl EnvironmentMap {
     fn map_from_world(&self, direction: Vec3) -> Vec3 {
         let (s, c) = self.rotation_rad.sin_cos();
         Vec3::new(c * direction.x - s * direction.z, direction.y, s * direction.x + c * direction.z)
-    }
-
-    /// Rotates a direction from the frame of the map into the world.
-    fn world_from_map(&self, direction: Vec3) -> Vec3 {
-        let (s, c) = self.rotation_rad.sin_cos();
-        Vec3::new(c * direction.x + s * direction.z, direction.y, c * direction.z - s * direction.x)
     }
 
     fn cell(&self, column: u32, row: u32) -> Cell {
