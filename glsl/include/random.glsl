@@ -1,5 +1,6 @@
 // Counter-based random numbers for (pixel, sample, dimension, seed): twins
-// crates/scene/src/math/random.rs and tests/twin/random.rs, equal bit for bit. All numbers are multiples of 2^-24 in [0, 1).
+// crates/scene/src/math/random.rs and tests/twin/random.rs, equal bit for bit. All numbers are multiples of
+// 2^-24 in [0, 1).
 //
 // A dimension names a pair of numbers. random_2d is stratified over the samples of a pixel: use it
 // where nothing depends on earlier samples. random_independent_2d is not: use it where past

@@ -329,7 +329,7 @@ impl Checkpoint {
                 self.metadata.sample_ranges.len()
             )),
         }
-        for aov in window.aovs().difference(&self.sums.aovs()) {
+        for aov in self.sums.lacks(window) {
             differences.push(format!("layer {}: absent against asked for", aov.name()));
         }
         if differences.is_empty() {

@@ -167,13 +167,18 @@ impl Sums {
         }
     }
 
-    /// Layers of an image file whose sums exist, apart from those that every film has.
-    pub(crate) fn aovs(&self) -> BTreeSet<Aov> {
-        let triples = TRIPLES.iter().zip(self.triples().map(Vec::is_empty));
-        let triples = triples.filter_map(|(layer, is_empty)| layer.aov.filter(|_| !is_empty));
-        let counts = COUNTS.iter().zip(self.counts().map(Vec::is_empty));
-        let counts = counts.filter_map(|(layer, is_empty)| layer.aov.filter(|_| !is_empty));
-        triples.chain(counts).collect()
+    /// Extra layers of which `asked` has sums that these lack.
+    pub(crate) fn lacks(&self, asked: &Self) -> BTreeSet<Aov> {
+        let both = self.extra_layers().into_iter().zip(asked.extra_layers());
+        let lacking = both.filter(|((_, is_ours), (_, is_asked))| *is_asked && !is_ours);
+        lacking.map(|((aov, _), _)| aov).collect()
+    }
+
+    /// Layers that not every film has, and true for those that are there.
+    fn extra_layers(&self) -> Vec<(Aov, bool)> {
+        let triples = TRIPLES.iter().map(|layer| layer.aov).zip(self.triples().map(Vec::is_empty));
+        let counts = COUNTS.iter().map(|layer| layer.aov).zip(self.counts().map(Vec::is_empty));
+        triples.chain(counts).filter_map(|(aov, is_empty)| Some((aov?, !is_empty))).collect()
     }
 
     /// `width * height`.

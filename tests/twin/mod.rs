@@ -1,5 +1,6 @@
 //! Functions of `glsl` in Rust that only tests need, in the order and with the arithmetic of the shaders. The
-//! renderer has the twins that it calls itself: values of BRDFs, kernels, traversal, independent random numbers.
+//! renderer has the twins that it calls itself: values of BRDFs, kernels, traversal, independent random
+//! numbers.
 
 pub mod brdf;
 pub mod control_variates;

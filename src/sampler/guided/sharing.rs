@@ -26,7 +26,8 @@ const CONFIDENCE: f64 = 2.0;
 /// Measured gain of paths that the pixels of a cohort share.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct SharingGain {
-    /// Relative variance without sharing over that with it, as in [`CandidateCost`](super::cost::CandidateCost).
+    /// Relative variance without sharing over that with it, as in
+    /// [`CandidateCost`](super::cost::CandidateCost).
     pub(super) variance_ratio: f64,
     /// Standard error over the blocks of its logarithm; 1000 if there is only one block.
     pub(super) log_error: f64,

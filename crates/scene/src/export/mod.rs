@@ -1,8 +1,8 @@
 //! Writers of scenes for other renderers: validated [`crate::Scene`] → files.
 //!
 //! A format is a folder with a function `export`. Differences that it forces are [`Export::warnings`], each
-//! with the name of the material or lamp. `parts` alone reads the geometry; `subject` holds what all
-//! formats do to a material.
+//! with the name of the material or lamp. `parts` alone reads the geometry; `subject` translates
+//! materials as far as all formats share it.
 
 mod folder;
 pub mod gltf;

@@ -1,4 +1,4 @@
-//! What all formats do to a material.
+//! Translation of materials, as far as all formats share it.
 
 use std::path::Path;
 
