@@ -47,7 +47,7 @@ static DEVICES: [OnceLock<Arc<Device>>; 2] = [const { OnceLock::new() }; 2];
 static IN_USE: [Mutex<()>; DEVICES.len()] = [const { Mutex::new(()) }; DEVICES.len()];
 
 thread_local! {
-    /// Which of [`DEVICES`] the test of this thread uses.
+    /// Index in [`DEVICES`] of the one that the test of this thread uses.
     static DEVICE: Cell<usize> = const { Cell::new(0) };
 }
 

@@ -1,9 +1,10 @@
-//! Padded Owen-scrambled Sobol points: twin of `random_2d` and `random_1d` in `glsl/include/random.glsl`, bit for
-//! bit.
+//! Padded Owen-scrambled Sobol points: twin of `random_2d` and `random_1d` in `glsl/include/random.glsl`, bit
+//! for bit.
 //!
-//! Within a pixel and dimension, every aligned run of 2ᵏ samples is a (0, k, 2)-net in base 2; independent keys
-//! scramble and shuffle different dimensions, pixels and seeds. Such samples depend on each other: where the
-//! outcome of earlier samples decides how later numbers are used, only `random_independent_2d` is unbiased.
+//! Within a pixel and dimension, every aligned run of 2ᵏ samples is a (0, k, 2)-net in base 2; independent
+//! keys scramble and shuffle different dimensions, pixels and seeds. Such samples depend on each other: where
+//! the outcome of earlier samples decides how later numbers are used, only `random_independent_2d` is
+//! unbiased.
 //!
 //! Sources: Burley 2020, "Practical Hash-based Owen Scrambling", JCGT 9(4); Laine & Karras 2011,
 //! "Stratified Sampling for Stochastic Transparency"; Vegdahl 2021, "Building a Better LK Hash".
