@@ -17,7 +17,10 @@ use fenestra::{
 };
 use glam::Vec3;
 
-use crate::support::command::{Folder, Run, Running, program};
+use crate::support::{
+    c_library,
+    command::{Folder, Run, Running, program},
+};
 
 /// One quad, `quad.ply`, under a constant environment. Each case changes a part of it.
 const SCENE: &str = r#"[camera]
@@ -340,19 +343,10 @@ fn a_full_disk_is_reported_and_the_older_image_kept() {
     // Every write to this device fails for lack of space.
     let run = folder.run(&["render", "scene.toml", "--spp=2", "--output=/dev/full"]);
     run.assert(1, &["error: /dev/full: cannot write: No space left on device"]);
-    // Emulate a full disk by a limit on file size. Writes beyond it fail once the signal that would
-    // end the process is ignored. The caches do without their files.
-    let mut shell = Command::new("sh");
-    shell.args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$@\"", "sh"]);
-    let rendering = program(folder.path());
-    shell.arg(rendering.get_program()).args(RENDER).current_dir(folder.path());
-    for (name, value) in rendering.get_envs() {
-        if let Some(value) = value {
-            shell.env(name, value);
-        }
-    }
-    let run = Run::of(&shell.output().unwrap());
-    run.assert(1, &["error: out.exr: cannot write: File too large"]);
+    let mut rendering = program(folder.path());
+    c_library::fail_in(&mut rendering, folder.path(), ("FAULTY_BYTES", 512));
+    let run = Run::of(&rendering.args(RENDER).output().unwrap());
+    run.assert(1, &["error: out.exr: cannot write: No space left on device"]);
     assert_eq!(folder.files(), before, "no temporary file is left");
     assert_eq!(fs::read(folder.path().join("out.exr")).unwrap(), b"older image");
 }

@@ -294,13 +294,11 @@ fn an_ignored_hangup_stays_ignored() {
 #[test]
 fn a_limit_of_file_sizes_is_an_error_and_no_signal() {
     let folder = folder();
-    let options = ["render", "scene.toml", "--spp=1", "-o", "out.exr"];
-    folder.run(&options).assert(0, &[]);
-    let before = fs::read(folder.path().join("out.exr")).unwrap();
-    // Blocks of 512 bytes
-    let run = run_after(&folder, "ulimit -f 2", "render scene.toml --spp 2 -o out.exr");
-    run.assert(1, &["out.exr: cannot write: File too large"]);
-    assert_eq!(fs::read(folder.path().join("out.exr")).unwrap(), before);
+    folder.run(&["render", "scene.toml", "--spp=1", "-o", "out.exr"]).assert(0, &[]);
+    // Blocks of 512 bytes. Drivers need not survive such a limit, so none is loaded.
+    let run = run_after(&folder, "ulimit -f 1", "convert out.exr copy.exr");
+    run.assert(1, &["copy.exr: cannot write: File too large"]);
+    assert!(!folder.path().join("copy.exr").exists());
     assert!(folder.files().iter().all(|name| !name.ends_with(".tmp")), "{:?}", folder.files());
 }
 

@@ -4,11 +4,7 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    sync::OnceLock,
-};
+use std::{fs, path::Path};
 
 use fenestra::film::{Attribute, Checkpoint, Image, checkpoint::guide_paths};
 
@@ -48,12 +44,9 @@ fn folder() -> Folder {
 
 /// Renders with a fault, which is a variable of the library and its value.
 fn render(folder: &Folder, fault: Option<(&str, u64)>, options: &[&str]) -> Run {
-    static LIBRARY: OnceLock<PathBuf> = OnceLock::new();
-    let library = LIBRARY.get_or_init(|| c_library::compile("faulty_files"));
     let mut command = program(folder.path());
-    if let Some((name, value)) = fault {
-        command.env("LD_PRELOAD", library).env(name, value.to_string());
-        command.env("FAULTY_FOLDER", folder.path().canonicalize().unwrap());
+    if let Some(fault) = fault {
+        c_library::fail_in(&mut command, folder.path(), fault);
     }
     Run::of(&command.args(GUIDED).args(options).output().unwrap())
 }

@@ -16,7 +16,10 @@ use fenestra::{
 };
 use serde_json::Value;
 
-use crate::support::command::{self, Folder, Run, Running};
+use crate::support::{
+    c_library,
+    command::{self, Folder, Run, Running, program},
+};
 
 const SMALL: [&str; 10] = [
     "study",
@@ -689,24 +692,18 @@ fn a_sampler_below_the_references_noise_is_not_judged() {
     assert!(page.contains("not judged") && page.contains("--reference-spp"));
 }
 
-/// Emulates a full disk by a limit on file size.
 #[test]
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 fn no_space_is_an_error_and_finished_runs_stay() {
     let folder = folder();
     folder.run(&SMALL).assert(0, &[]);
     let record = "runs/yard/mis-6spp-seed1.json";
     let before = changed(&folder, record);
-    // Limit files to 512 bytes, with an error in place of the signal.
-    let script = "trap '' XFSZ; ulimit -f 1; exec \"$0\" \"$@\"";
-    let output = Command::new("sh")
-        .args(["-c", script, env!("CARGO_BIN_EXE_fenestra")])
-        .args(SMALL.iter().map(|o| if o.starts_with("--seeds") { "--seeds=3" } else { o }))
-        .current_dir(folder.path())
-        .env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"))
-        .output()
-        .unwrap();
-    Run::of(&output).assert(1, &["error: report/", ": cannot write: File too large"]);
+    let mut study = program(folder.path());
+    c_library::fail_in(&mut study, folder.path(), ("FAULTY_BYTES", 512));
+    study.args(SMALL.iter().map(|o| if o.starts_with("--seeds") { "--seeds=3" } else { o }));
+    let run = Run::of(&study.output().unwrap());
+    run.assert(1, &["error: report/", ": cannot write: No space left on device"]);
     assert_eq!(changed(&folder, record), before);
     let results = json(&folder, "results.json");
     assert_eq!(results["runs"].as_array().unwrap().len(), 4, "the old results stand");

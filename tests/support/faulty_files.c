@@ -1,5 +1,5 @@
 /* A library put before the C library (LD_PRELOAD) that ends a process, or fills its disk, at a given
- * moment of its writing to one folder, for tests/killed.rs.
+ * moment of its writing to one folder, for tests of disks.
  *
  * FAULTY_FOLDER: the folder, without links in its path; paths that are not absolute lie in it.
  * FAULTY_MOMENT: the process is killed at this moment, counted from 0. Moments come after every fsync of
