@@ -62,15 +62,14 @@ fn every_figure_is_there() {
     }
     assert!(report["compile_ms"]["pipelines"].as_f64().unwrap() > 0.0);
     assert_eq!(report["buffer_bytes"]["triangles 0"], 24 * 48);
-    assert!(report["direct_light_share"]["median"].as_f64().unwrap() < 1.0);
+    assert!(report["shadow_pass_share"]["median"].as_f64().unwrap() < 1.0);
 
-    let text = folder.run(&["bench", "two_boxes.toml", "--repetitions", "1"]);
+    let options = ["bench", "two_boxes.toml", "--repetitions=1", "--sampler=guided", "--depth=2"];
+    let text = folder.run(&options);
     text.assert(0, &[]);
-    assert!(
-        text.output.contains("ratio") && text.output.contains("triangles 0"),
-        "{}",
-        text.output
-    );
+    for part in ["ratio", "triangles 0", "2 vertices: ", "bounce_guided "] {
+        assert!(text.output.contains(part), "{part}: {}", text.output);
+    }
 }
 
 #[test]
