@@ -46,6 +46,9 @@ pub enum Command {
     New(command::new::Arguments),
     /// List the Vulkan devices with their relevant limits, and which one would be chosen.
     Devices(command::devices::Arguments),
+    /// Test a device, in a process that its driver may crash.
+    #[command(hide = true)]
+    SelfTest(command::self_test::Arguments),
 }
 
 /// Parses the arguments, runs the command and prints the error chain of a failure.
@@ -79,6 +82,7 @@ pub fn run() -> ExitCode {
         Command::Export(arguments) => command::export::run(arguments),
         Command::New(arguments) => command::new::run(arguments),
         Command::Devices(arguments) => command::devices::run(arguments),
+        Command::SelfTest(arguments) => command::self_test::run(arguments),
     });
     match result {
         Ok(()) => ExitCode::SUCCESS,

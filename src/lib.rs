@@ -48,6 +48,7 @@
 //! | | | `sample_controlled` |
 //! | `tiles` | [`sampler::tiles`] | `tiles/`: `count_tiles`, `sample_tiles` |
 //! | scene, settings, device → sums: loop, stop rules, checkpoints | [`session`] | |
+//! | device → is it right? | [`self_test`] | `trace`, `list_paths`, `shadow` |
 //! | sums → image files | [`film`] | |
 //! | scene → files of other renderers | [`scene::export`] | |
 //! | runs of several samplers → report | [`study`] | |
@@ -200,6 +201,8 @@ pub mod pass;
 pub mod sampler;
 
 pub mod session;
+
+pub mod self_test;
 
 pub mod film;
 pub mod study;

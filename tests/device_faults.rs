@@ -1,9 +1,12 @@
-//! Devices that run out of memory or are lost while they render, by a Vulkan layer that fails on
+//! Devices that compute wrong, crash, run out of memory or are lost, by a Vulkan layer that fails on
 //! request (`support/faulty_layer.c`).
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use std::process::{Command, Output};
+use std::{
+    fs,
+    process::{Command, Output},
+};
 
 use fenestra::film::{Checkpoint, Image, checkpoint::remove_checkpoint};
 
@@ -26,6 +29,36 @@ fn render(folder: &Folder, faults: &[(&str, u64)], options: &[&str]) -> Run {
     command.args(["render", "scene.toml", "-o", "out.exr"]).args(options);
     let output: Output = command.output().unwrap();
     Run::of(&output)
+}
+
+/// The first use of a device tests it, and only a driver that passes is remembered.
+#[test]
+fn a_driver_that_computes_wrong_or_crashes_is_refused() {
+    const IMAGE_FETCH: u64 = 95;
+    const BALLOT: u64 = 339;
+    let folder = folder();
+    let render = |fault: (&str, u64), setting: &str| {
+        let mut command = program(folder.path());
+        faulty_layer::insert(&mut command, &[fault]);
+        command.env("XDG_CACHE_HOME", folder.path().join("cache")).env("LP_SETTING", setting);
+        command.args(["render", "scene.toml", "-q", "--spp=1", "-o", "out.exr"]);
+        Run::of(&command.output().unwrap())
+    };
+    for (fault, part) in [
+        (("FAULTY_OPCODE", IMAGE_FETCH), "closest hits: "),
+        (("FAULTY_OPCODE", BALLOT), "subgroup ballots: "),
+        (("FAULTY_CRASH", 1), "the driver crashes (SIGABRT)"),
+    ] {
+        render(fault, "").assert(1, &["fails the self-test: ", part, "help: ", "./setup"]);
+        assert!(!folder.path().join("out.exr").exists());
+    }
+    let sound = ("FAULTY_BYTES", u64::MAX);
+    let records = || fs::read_dir(folder.path().join("cache/fenestra/self-tests")).unwrap().count();
+    render(sound, "").assert(0, &[]);
+    assert_eq!(records(), 1);
+    render(("FAULTY_OPCODE", BALLOT), "").assert(0, &[]);
+    render(("FAULTY_OPCODE", BALLOT), "other").assert(1, &["fails the self-test: "]);
+    assert_eq!(records(), 1);
 }
 
 #[test]

@@ -8,9 +8,26 @@ use std::collections::BTreeSet;
 use crate::support::source::{Files, Graph, files_of, tokens, uses};
 
 /// Top-level modules of `src`; each may use those before it. `lib.rs` brings in the crate of scenes.
-const ORDER: [&str; 18] = [
-    "lib", "shader", "math", "gpu", "surface", "brdf", "srbf", "accel", "film", "fit", "pass",
-    "sampler", "session", "study", "bench", "view", "command", "cli",
+const ORDER: [&str; 19] = [
+    "lib",
+    "shader",
+    "math",
+    "gpu",
+    "surface",
+    "brdf",
+    "srbf",
+    "accel",
+    "film",
+    "fit",
+    "pass",
+    "sampler",
+    "session",
+    "self_test",
+    "study",
+    "bench",
+    "view",
+    "command",
+    "cli",
 ];
 
 /// Modules that compile and test with no Vulkan loader present, although `gpu` stands before them.

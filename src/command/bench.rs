@@ -4,12 +4,12 @@ use std::{collections::BTreeMap, path::PathBuf, sync::Arc, time::Instant};
 
 use serde::Serialize;
 
-use super::{options::parse_size, print_line};
+use super::{options::parse_size, print_line, self_test};
 use crate::{
     accel::Accel,
     bench::{RateSpread, RayPlan, RayRate, measure},
     error::{Error, Result},
-    gpu::{Device, PassTimes},
+    gpu::PassTimes,
     pass::{SceneBuffers, geometry::triangle_page_bytes},
     sampler::{Sampler, basic},
     scene::Scene,
@@ -117,7 +117,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         log::warn!("measuring at {}x{} instead of the film's size", film[0], film[1]);
         [scene.film.width, scene.film.height] = film;
     }
-    let device = Device::open(arguments.device.as_deref(), false)?;
+    let device = self_test::open(arguments.device.as_deref(), false)?;
     let settings = Settings {
         sampler: arguments.sampler,
         shadow_rays: arguments.shadow_rays,

@@ -6,6 +6,7 @@ use crate::{
     gpu::{
         capabilities::{Capabilities, choose, list},
         instance::Instance,
+        lavapipe::hint,
     },
 };
 
@@ -37,6 +38,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                     "device": device,
                     "missing": device.missing(),
                     "chosen": Some(device.index) == chosen_index,
+                    "hint": hint(&device.driver),
                 })
             })
             .collect();
@@ -72,6 +74,7 @@ fn describe(device: &Capabilities, is_chosen: bool) -> String {
             device.timestamp_valid_bits, device.timestamp_period
         ),
     ];
+    lines.extend(hint(&device.driver).map(|hint| format!("    hint                 {hint}")));
     let missing = device.missing();
     if !missing.is_empty() {
         lines.push(format!("    cannot be used       {}", missing.join("; ")));

@@ -14,6 +14,7 @@ pub mod new;
 pub mod options;
 pub mod progress;
 pub mod render;
+pub mod self_test;
 pub mod study;
 pub mod view;
 

@@ -9,10 +9,10 @@ use super::{
     interrupt::Interrupt,
     options::{check_strict, parse_duration, parse_size},
     progress::Progress,
+    self_test,
 };
 use crate::{
     error::{Error, Result},
-    gpu::Device,
     sampler::Parameters,
     scene::Scene,
     session::{Event, Observer, Standing},
@@ -129,10 +129,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         check_strict(true, &Scene::load(path)?)?;
     }
     let folder = Folder::open(&arguments.output)?;
-    let device = Device::open(arguments.device.as_deref(), arguments.validate)?;
+    let device = self_test::open(arguments.device.as_deref(), arguments.validate)?;
     if !arguments.quiet {
-        let capabilities = device.capabilities();
-        eprintln!("device: {} ({})", capabilities.name, capabilities.driver);
+        self_test::announce(device.capabilities());
     }
     let mut display =
         Display { progress: Progress::new("study", arguments.quiet), interrupt: &interrupt };

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::{
     options::{SceneOptions, parse_size},
     progress::Patience,
+    self_test,
 };
 use crate::{
     error::{Error, Result},
@@ -89,6 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let options = Options {
         device: arguments.device.clone(),
         validate: arguments.validate,
+        check: self_test::check,
         settings,
         spp: arguments.spp,
         tone: Tone { exposure: arguments.exposure, curve: arguments.curve },

@@ -13,6 +13,7 @@ use super::{
     Called,
     capabilities::{Capabilities, choose, enumerate},
     instance::Instance,
+    lavapipe,
     pipeline_cache::PipelineCache,
     pipelines::Pipelines,
     set_layouts::SetLayouts,
@@ -41,10 +42,22 @@ impl Device {
     /// # Errors
     /// No loader, no suitable device, or a failing driver.
     pub fn open(wanted: Option<&str>, validate: bool) -> Result<Arc<Self>> {
-        Self::open_with(wanted, validate, None)
+        Self::open_checked(wanted, validate, |_| Ok(()))
     }
 
-    /// As [`Device::open`], for windows on `display` too.
+    /// As [`Device::open`], once `check` has let the device pass: drivers may crash as soon as it is made.
+    ///
+    /// # Errors
+    /// Also those of `check`.
+    pub(crate) fn open_checked(
+        wanted: Option<&str>,
+        validate: bool,
+        check: fn(&Capabilities) -> Result<()>,
+    ) -> Result<Arc<Self>> {
+        Self::open_with(wanted, validate, None, check)
+    }
+
+    /// As [`Device::open_checked`], for windows on `display` too.
     ///
     /// # Errors
     /// Also [`Error::Device`] if the device cannot show pictures in windows.
@@ -52,20 +65,24 @@ impl Device {
         wanted: Option<&str>,
         validate: bool,
         display: RawDisplayHandle,
+        check: fn(&Capabilities) -> Result<()>,
     ) -> Result<Arc<Self>> {
-        Self::open_with(wanted, validate, Some(display))
+        Self::open_with(wanted, validate, Some(display), check)
     }
 
     fn open_with(
         wanted: Option<&str>,
         validate: bool,
         display: Option<RawDisplayHandle>,
+        check: fn(&Capabilities) -> Result<()>,
     ) -> Result<Arc<Self>> {
         let instance = Arc::new(Instance::new(validate, display)?);
         let devices = enumerate(&instance)?;
         let list: Vec<Capabilities> =
             devices.iter().map(|(_, capabilities)| capabilities.clone()).collect();
         let capabilities = choose(&list, wanted)?.clone();
+        lavapipe::check_vector_width(&capabilities)?;
+        check(&capabilities)?;
         let (physical, _) = devices[capabilities.index];
         let queue_family = capabilities.queue_family.unwrap_or_default();
 

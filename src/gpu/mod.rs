@@ -11,6 +11,7 @@ pub(crate) mod descriptors;
 pub mod device;
 pub mod instance;
 pub(crate) mod labels;
+pub(crate) mod lavapipe;
 pub mod pipeline;
 mod pipeline_cache;
 mod pipelines;

@@ -31,7 +31,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     film::Tone,
-    gpu::Device,
+    gpu::{Capabilities, Device},
     scene::Scene,
     session::Settings,
 };
@@ -49,6 +49,8 @@ pub struct Options {
     pub device: Option<String>,
     /// True to run with the validation layers.
     pub validate: bool,
+    /// Refuses a device that must not be used.
+    pub check: fn(&Capabilities) -> Result<()>,
     /// Settings of the renderer.
     pub settings: Settings,
     /// Samples per pixel at which a film is finished.
@@ -283,9 +285,9 @@ fn render(
     window: Arc<Window>,
     proxy: EventLoopProxy<Report>,
 ) -> Result<()> {
-    let Options { device: wanted, validate, settings, spp, tone, folder } = options;
+    let Options { device: wanted, validate, check, settings, spp, tone, folder } = options;
     let display = window.display_handle().map_err(|error| no_window(&error))?.as_raw();
-    let device = Device::open_for_display(wanted.as_deref(), validate, display)?;
+    let device = Device::open_for_display(wanted.as_deref(), validate, display, check)?;
     let projector = Projector::new(&device, [scene.film.width, scene.film.height], inset::SIZE)?;
     let left = Side::new(&device, &scene, None, &settings, None)?;
     let size = window.inner_size();

@@ -1,7 +1,10 @@
-/* A Vulkan layer whose device runs out of memory or is lost, for tests/device_faults.rs.
+/* A Vulkan layer whose device computes wrong, crashes, runs out of memory or is lost, for
+ * tests/device_faults.rs.
  *
  * FAULTY_BYTES: allocations that exceed this many bytes together fail.
  * FAULTY_SUBMISSION: this submission, counted from 1, and all after it find the device lost.
+ * FAULTY_CRASH: the process crashes at this submission, counted from 1.
+ * FAULTY_OPCODE: instructions of SPIR-V with this number have no result.
  * FAULTY_PRESENT: this picture for a window, counted from 1, finds the surface lost, and says so.
  * FAULTY_WAITS: so many waits for a fence, counted from the first, time out.
  *
@@ -16,6 +19,7 @@
 
 enum { SURFACE_LOST = -1000000000, TIMEOUT = 2 };
 enum { OUT_OF_DEVICE_MEMORY = -2, DEVICE_LOST = -4, INITIALIZATION_FAILED = -3 };
+enum { UNDEFINED = 3 << 16 | 1, NOTHING = 1 << 16, FIRST_INSTRUCTION = 5 };
 enum { INSTANCE_CHAIN = 47, DEVICE_CHAIN = 48, LAYER_LINK = 0 };
 
 typedef void (*Function)(void);
@@ -40,6 +44,14 @@ typedef struct {
     void *next;
     uint64_t size;
 } AllocateInfo;
+
+typedef struct {
+    uint32_t type;
+    const void *next;
+    uint32_t flags;
+    size_t size;
+    const uint32_t *code;
+} ModuleInfo;
 
 typedef struct {
     uint32_t type;
@@ -118,12 +130,33 @@ static void release(void *device, void *memory, const void *allocator)
     next(device, memory, allocator);
 }
 
+/* Leaves the type and name of every result of the instruction, and nothing that computes it. */
+static int32_t create_module(void *device, const ModuleInfo *info, const void *allocator, void **module)
+{
+    int32_t (*next)(void *, const ModuleInfo *, const void *, void **) =
+        (void *)next_device_address(device, "vkCreateShaderModule");
+    uint32_t *code = malloc(info->size);
+    memcpy(code, info->code, info->size);
+    for (size_t at = FIRST_INSTRUCTION, length; at < info->size / sizeof *code; at += length) {
+        length = code[at] >> 16;
+        if ((code[at] & 0xffff) != setting("FAULTY_OPCODE")) continue;
+        code[at] = UNDEFINED;
+        for (size_t word = UNDEFINED >> 16; word < length; ++word) code[at + word] = NOTHING;
+    }
+    ModuleInfo changed = *info;
+    changed.code = code;
+    int32_t result = next(device, &changed, allocator, module);
+    free(code);
+    return result;
+}
+
 /* The queue has no address of its own to look names up with: its device keeps it. */
 static int32_t (*next_submit)(void *, uint32_t, const void *, void *);
 
 static int32_t submit(void *queue, uint32_t count, const void *infos, void *fence)
 {
     if (++submissions >= setting("FAULTY_SUBMISSION")) return DEVICE_LOST;
+    if (submissions == setting("FAULTY_CRASH")) abort();
     return next_submit(queue, count, infos, fence);
 }
 
@@ -151,6 +184,7 @@ static Function device_address(void *device, const char *name)
     if (!strcmp(name, "vkGetDeviceProcAddr")) return (Function)device_address;
     if (!strcmp(name, "vkAllocateMemory")) return (Function)allocate;
     if (!strcmp(name, "vkFreeMemory")) return (Function)release;
+    if (!strcmp(name, "vkCreateShaderModule")) return (Function)create_module;
     Function next = next_device_address(device, name);
     if (!strcmp(name, "vkQueuePresentKHR")) {
         next_present = (void *)next;

@@ -13,12 +13,13 @@ pub(crate) use arguments::Arguments;
 use super::{
     interrupt::Interrupt,
     progress::{Patience, Progress},
+    self_test,
 };
 use crate::{
     error::{Error, Result},
     files::sweep_leftovers,
     film::{Aov, checkpoint::checkpoint_path, display::DisplayServer},
-    gpu::{Denoiser, Device},
+    gpu::Denoiser,
     pass::Explanation,
     scene::Scene,
     session::{Event, Observer, Rules, Session, StopReason, pixel},
@@ -54,10 +55,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let denoiser = arguments.denoise.then(Denoiser::load).transpose()?;
 
     interrupt.wait_for_caller();
-    let device = Device::open(arguments.device.as_deref(), arguments.validate)?;
+    let device = self_test::open(arguments.device.as_deref(), arguments.validate)?;
     if !arguments.quiet {
-        let capabilities = device.capabilities();
-        eprintln!("device: {} ({})", capabilities.name, capabilities.driver);
+        self_test::announce(device.capabilities());
     }
     if let Some(warning) = settings.sampler.portal_warning(&scene) {
         log::warn!("{warning}");
