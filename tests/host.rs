@@ -6,18 +6,18 @@ use fenestra::{
         Buffer, Commands, DescriptorSet, Pipeline,
         capabilities::{Capabilities, choose},
     },
-    shader::bindings::{PROBE as PROBE_TABLE, probe},
+    shader::bindings::{PROBE, probe},
 };
 
 use crate::support;
 
-const PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/probe.spv"));
+const SHADER: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/probe.spv"));
 
 #[test]
 fn a_probe_sees_its_input_and_returns_its_output() {
     let input: Vec<u32> = (0..1000).map(|i| i * i).collect();
     let output = support::run_probe(
-        PROBE,
+        SHADER,
         &[(probe::PROBE_INPUT, bytemuck::cast_slice(&input))],
         4000,
         1000,
@@ -42,17 +42,17 @@ fn every_timed_pass_has_its_row() {
     let output = Buffer::zeroed(device, "output", 4 << 20).unwrap();
     let forth = DescriptorSet::new(
         device,
-        &PROBE_TABLE,
+        &PROBE,
         &[(probe::PROBE_INPUT, &input), (probe::PROBE_OUTPUT, &output)],
     )
     .unwrap();
     let back = DescriptorSet::new(
         device,
-        &PROBE_TABLE,
+        &PROBE,
         &[(probe::PROBE_INPUT, &output), (probe::PROBE_OUTPUT, &input)],
     )
     .unwrap();
-    let pipeline = Pipeline::new(device, "probe", PROBE, &[]).unwrap();
+    let pipeline = Pipeline::new(device, "probe", SHADER, &[]).unwrap();
     let mut commands = Commands::begin_timed(device, 4).unwrap();
     for _ in 0..2 {
         commands.dispatch(&pipeline, &[&forth], &[], 1 << 20);
@@ -120,11 +120,11 @@ fn a_mistake_is_heard_by_the_validation_layers() {
     let buffer = Buffer::zeroed(&device, "buffer", 64).unwrap();
     let set = DescriptorSet::new(
         &device,
-        &PROBE_TABLE,
+        &PROBE,
         &[(probe::PROBE_INPUT, &buffer), (probe::PROBE_OUTPUT, &buffer)],
     )
     .unwrap();
-    let pipeline = Pipeline::new(&device, "probe", PROBE, &[]).unwrap();
+    let pipeline = Pipeline::new(&device, "probe", SHADER, &[]).unwrap();
     let mut commands = Commands::begin(&device).unwrap();
     // Push constants come in multiples of four bytes.
     commands.dispatch(&pipeline, &[&set], &[0; 3], 1);
