@@ -1,10 +1,15 @@
 //! The command line: clap types, dispatch to the commands, exit status.
 
-use std::process::ExitCode;
+use std::{io::Write, process::ExitCode};
 
 use clap::{Parser, Subcommand};
 
-use crate::{command, error::Error, memory};
+use crate::{
+    command,
+    error::Error,
+    memory,
+    terminal::{escaped, say},
+};
 
 /// Arguments of `fenestra`.
 #[derive(Debug, Parser)]
@@ -62,8 +67,10 @@ pub fn run() -> ExitCode {
         }
     };
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn"))
-        .format_timestamp(None)
-        .format_target(false)
+        .format(|buffer, record| {
+            let (level, style) = (record.level(), buffer.default_level_style(record.level()));
+            writeln!(buffer, "[{style}{level:<5}{style:#}] {}", escaped(&record.args().to_string()))
+        })
         .init();
     if let Some(bytes) = cli.max_memory {
         memory::set_limit(bytes);
@@ -95,11 +102,11 @@ pub fn run() -> ExitCode {
 
 /// Prints an error, its causes and, if known, the remedy.
 fn report(error: &Error) {
-    eprintln!("error: {error}");
+    say!("error: {error}");
     let mut source = std::error::Error::source(error);
     // `Io` already prints its source in its own line.
     while let Some(cause) = source.filter(|_| !matches!(error, Error::Io { .. })) {
-        eprintln!("  caused by: {cause}");
+        say!("  caused by: {cause}");
         source = cause.source();
     }
     let help = match error {
@@ -108,6 +115,6 @@ fn report(error: &Error) {
         _ => None,
     };
     if let Some(help) = help {
-        eprintln!("help: {help}");
+        say!("help: {help}");
     }
 }

@@ -185,6 +185,8 @@
 //! - \[Yuksel et al. 2009\] "On the Parameterization of Catmull-Rom Curves", SIAM/ACM Joint
 //!   Conference on Geometric and Physical Modeling.
 
+#![warn(clippy::print_stderr, clippy::print_stdout)]
+
 // Pipeline order; rustfmt sorts within a group.
 pub mod brdf;
 pub mod srbf;
@@ -213,6 +215,8 @@ pub mod cli;
 #[doc(hidden)]
 pub mod command;
 pub mod view;
+
+mod terminal;
 
 pub use fenestra_scene::{self as scene, Error, Result};
 use fenestra_scene::{error, export, files, memory, stage, texture};

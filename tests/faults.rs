@@ -8,7 +8,7 @@ use std::{
     path::Path,
     process::{self, Command, Stdio},
     thread,
-    time::{Duration, SystemTime},
+    time::{Duration, Instant, SystemTime},
 };
 
 use fenestra::{
@@ -271,6 +271,66 @@ fn hangups_and_terminations_are_interrupts() {
         assert!(image.channels["R"].iter().all(|sample| sample.is_finite()));
         Checkpoint::read(&folder.path().join("out.checkpoint.exr")).unwrap();
     }
+}
+
+/// Standard errors that take no message: a full disk, and a pipe and a terminal that are closed.
+fn dead_ends() -> [(&'static str, Stdio); 3] {
+    let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let (_, pipe) = std::io::pipe().unwrap();
+    let terminal = nix::pty::openpty(None, None).unwrap().slave;
+    [("full disk", full.into()), ("closed pipe", pipe.into()), ("closed terminal", terminal.into())]
+}
+
+#[test]
+fn messages_that_cannot_be_written_cost_nothing() {
+    let folder = folder();
+    let output = folder.path().join("out.exr");
+    let run = |arguments: &[&str], messages: Stdio| {
+        program(folder.path()).args(arguments).stderr(messages).status().unwrap().code()
+    };
+    for (name, messages) in dead_ends() {
+        let status = run(&["render", "scene.toml", "--spp=2", "-o", "out.exr"], messages);
+        assert_eq!((status, output.exists()), (Some(0), true), "{name}");
+        fs::remove_file(&output).unwrap();
+    }
+    for command in ["bench", "compare", "convert", "export", "info", "merge", "study", "view"] {
+        for (name, messages) in dead_ends() {
+            let status = run(&[command, "missing.exr", "other.exr"], messages);
+            assert!(matches!(status, Some(1 | 2)), "{command}, {name}: {status:?}");
+        }
+    }
+}
+
+#[test]
+fn a_hangup_whose_message_cannot_be_written_keeps_the_picture() {
+    for (name, messages) in dead_ends() {
+        let folder = folder();
+        let options = ["--spp=100000000", "--checkpoint-interval=1s", "-o", "out.exr"];
+        let mut render = program(folder.path());
+        render.args(["render", "scene.toml"]).args(options).stderr(messages);
+        let mut child = render.spawn().unwrap();
+        let start = Instant::now();
+        while !folder.path().join("out.checkpoint.exr").exists() {
+            assert!(start.elapsed().as_secs() < 120, "{name}: no checkpoint");
+            thread::sleep(Duration::from_millis(20));
+        }
+        let id = nix::unistd::Pid::from_raw(child.id().try_into().unwrap());
+        nix::sys::signal::kill(id, nix::sys::signal::Signal::SIGTERM).unwrap();
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{name}");
+        assert!(folder.path().join("out.exr").exists(), "{name}");
+    }
+}
+
+#[test]
+fn names_do_not_steer_the_terminal() {
+    let folder = folder();
+    let text = fs::read_to_string(folder.path().join("scene.toml")).unwrap();
+    let steering = text.replace("material = \"clay\"", "material = \"\\u001b[2J\\u009b31m\"");
+    assert_ne!(steering, text);
+    folder.write("scene.toml", &steering);
+    let run = folder.run(&["info", "scene.toml"]);
+    run.assert(1, &["\\u001b[2J\\u009b31m"]);
+    assert!(!run.messages.contains(['\u{1b}', '\u{9b}']), "{:?}", run.messages);
 }
 
 /// Runs the program through the shell, after `before`.

@@ -8,8 +8,9 @@ use std::collections::BTreeSet;
 use crate::support::source::{Files, Graph, files_of, tokens, uses};
 
 /// Top-level modules of `src`; each may use those before it. `lib.rs` brings in the crate of scenes.
-const ORDER: [&str; 19] = [
+const ORDER: [&str; 20] = [
     "lib",
+    "terminal",
     "shader",
     "math",
     "gpu",

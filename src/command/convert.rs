@@ -14,6 +14,7 @@ use crate::{
         tone::auto_exposure,
     },
     gpu::Denoiser,
+    terminal::say,
 };
 
 /// Arguments of `convert`.
@@ -84,7 +85,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut image = Image::read_exr(path)?;
     if let Some(denoiser) = denoiser {
         let denoised = denoise(&denoiser, &image, path)?;
-        eprintln!("{}: {}", output.display(), denoised.line);
+        say!("{}: {}", output.display(), denoised.line);
         image = denoised.image;
     }
     if let Some(window) = arguments.crop {

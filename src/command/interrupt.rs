@@ -5,6 +5,8 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
+use crate::terminal::say;
+
 /// Interrupts of this process. One while there is nothing to lose, and a second one, end it at once
 /// with status 130; another is noted for the caller, who writes what there is.
 #[derive(Debug, Default)]
@@ -21,7 +23,7 @@ impl Interrupt {
         let listening = ctrlc::set_handler(move || {
             let waits = heard.has_caller.load(Ordering::SeqCst);
             if !waits {
-                eprintln!("error: interrupted before anything was rendered");
+                say!("error: interrupted before anything was rendered");
             }
             if heard.is_raised.swap(true, Ordering::SeqCst) || !waits {
                 std::process::exit(130);

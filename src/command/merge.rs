@@ -11,6 +11,7 @@ use crate::{
         checkpoint::is_checkpoint_path,
         merge::{Part, merge_checkpoints, merge_images},
     },
+    terminal::say,
 };
 
 /// Arguments of `merge`.
@@ -120,7 +121,7 @@ fn summarize(arguments: &Arguments, metadata: &Metadata) -> Result<()> {
         return super::print_line(&format!("{summary:#}"));
     }
     if !arguments.quiet {
-        eprintln!(
+        say!(
             "{}: {} samples per pixel from {} parts",
             arguments.output.display(),
             metadata.sample_count(),

@@ -22,7 +22,10 @@ use std::io::Write;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    terminal::escaped,
+};
 
 /// Blocks signals that would end the process in the wrong way, in this thread and those it starts.
 ///
@@ -73,7 +76,7 @@ pub(crate) fn start_threads() -> Result<Option<ThreadPool>> {
 /// Standard output cannot be written.
 pub(crate) fn print_line(text: &str) -> Result<()> {
     let mut output = std::io::stdout().lock();
-    match writeln!(output, "{text}").and_then(|()| output.flush()) {
+    match writeln!(output, "{}", escaped(text)).and_then(|()| output.flush()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(Error::io("standard output".as_ref(), "write", error))
         }

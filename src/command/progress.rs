@@ -7,7 +7,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::{session::Standing, stage};
+use crate::{
+    session::Standing,
+    stage,
+    terminal::{escaped, say},
+};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// Resolution of the bar, steps.
@@ -36,7 +40,7 @@ impl Patience {
             let start = Instant::now();
             let mut interval = PATIENCE;
             while closed.recv_timeout(interval) == Err(mpsc::RecvTimeoutError::Timeout) {
-                eprintln!("{label}: {:.0} s, {}", start.elapsed().as_secs_f64(), stage::current());
+                say!("{label}: {:.0} s, {}", start.elapsed().as_secs_f64(), stage::current());
                 interval = (interval * 2).min(LONGEST_INTERVAL);
             }
         };
@@ -70,7 +74,8 @@ pub(crate) struct Progress {
 impl Progress {
     /// Starts the clock. `quiet` shows nothing.
     pub(crate) fn new(label: impl Into<String>, quiet: bool) -> Self {
-        let label = label.into();
+        // A line of its own would pass for the program's.
+        let label = escaped(&label.into()).replace('\n', "\\u000a");
         let output = if quiet {
             Output::Quiet
         } else if std::io::stderr().is_terminal() {
@@ -107,7 +112,7 @@ impl Progress {
                     *last = Instant::now();
                     *interval = (*interval * 2).min(LONGEST_INTERVAL);
                     let percent = 100.0 * standing.fraction.clamp(0.0, 1.0);
-                    eprintln!("{}: {percent:.0}%, {}", self.label, message());
+                    say!("{}: {percent:.0}%, {}", self.label, message());
                 }
             }
             Output::Quiet => {}
@@ -117,8 +122,8 @@ impl Progress {
     /// Prints a permanent line above the bar (a warning, a file written).
     pub(crate) fn print(&self, line: &str) {
         match &self.output {
-            Output::Bar(bar) => bar.suspend(|| eprintln!("{line}")),
-            Output::Lines { .. } => eprintln!("{line}"),
+            Output::Bar(bar) => bar.suspend(|| say!("{line}")),
+            Output::Lines { .. } => say!("{line}"),
             Output::Quiet => {}
         }
     }
@@ -132,7 +137,7 @@ impl Progress {
             let elapsed = self.start.elapsed().as_secs_f64();
             let mut parts = vec![standing.to_string(), format!("in {elapsed:.1} s ({reason})")];
             parts.retain(|part| !part.is_empty());
-            eprintln!("{}: {}", self.label, parts.join(" "));
+            say!("{}: {}", self.label, parts.join(" "));
         }
     }
 }

@@ -19,6 +19,7 @@ use crate::{
     gpu::{Capabilities, Device, lavapipe},
     self_test,
     shader::spirv,
+    terminal::say,
 };
 
 /// Name of the hidden subcommand.
@@ -70,9 +71,9 @@ pub(crate) fn open(wanted: Option<&str>, validate: bool) -> Result<Arc<Device>> 
 
 /// Prints the device of a command, and the remedy for a slow driver.
 pub(crate) fn announce(capabilities: &Capabilities) {
-    eprintln!("device: {} ({})", capabilities.name, capabilities.driver);
+    say!("device: {} ({})", capabilities.name, capabilities.driver);
     if let Some(hint) = lavapipe::hint(&capabilities.driver) {
-        eprintln!("hint: {hint}");
+        say!("hint: {hint}");
     }
 }
 

@@ -25,6 +25,7 @@ use crate::{
         report,
         results::{Circumstances, Report},
     },
+    terminal::say,
 };
 
 /// Settings of `--quick` without a study file.
@@ -160,7 +161,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         super::print_line(&format!("{:#}", serde_json::json!(report)))?;
     }
     if !arguments.quiet {
-        eprintln!("wrote {}", folder.path().join("index.html").display());
+        say!("wrote {}", folder.path().join("index.html").display());
     }
     if arguments.validate { device.check_validation() } else { Ok(()) }
 }

@@ -10,6 +10,7 @@ use crate::{
     film::{Image, checkpoint::checkpoint_path, png::write_preview},
     gpu::Denoiser,
     session::Session,
+    terminal::say,
 };
 
 impl RenderJob<'_> {
@@ -53,7 +54,7 @@ impl RenderJob<'_> {
             note(path, session.renderer.save_guide(path));
         }
         if !self.arguments.quiet && !written.is_empty() {
-            eprintln!("wrote {}", written.join(", "));
+            say!("wrote {}", written.join(", "));
         }
         failure.map_or(Ok(()), Err)
     }
@@ -71,7 +72,7 @@ impl RenderJob<'_> {
             Err(error) => return note(&path, Err(error)),
         };
         if !self.arguments.quiet {
-            eprintln!("{line}");
+            say!("{line}");
         }
         note(&path, image.write_exr(&path));
         if self.arguments.png {

@@ -23,6 +23,7 @@ use crate::{
     pass::Explanation,
     scene::Scene,
     session::{Event, Observer, Rules, Session, StopReason, pixel},
+    terminal::say,
 };
 
 /// Samples per pixel if no stop rule is given.
@@ -142,7 +143,7 @@ impl RenderJob<'_> {
         };
         for path in pixel::write(explanation, self.scene, &self.output, at)? {
             if !self.arguments.quiet {
-                eprintln!("wrote {}", display(&path));
+                say!("wrote {}", display(&path));
             }
         }
         Ok(())

@@ -6,6 +6,7 @@ use crate::{
     sampler::Sampler,
     session::Settings,
     shader::constants::SHOW_PICTURE,
+    terminal::say,
     view::{
         inset,
         keys::{Action, LAYERS, rows},
@@ -88,7 +89,7 @@ impl Worker {
                 self.rig.go_home();
                 return Ok(true);
             }
-            Action::Help => rows().iter().for_each(|(keys, about)| eprintln!("{keys:18} {about}")),
+            Action::Help => rows().iter().for_each(|(keys, about)| say!("{keys:18} {about}")),
             // These are done by the panel, or hold as long as the key.
             Action::Exposure(_) | Action::AutoExposure | Action::Curve => {}
             Action::Fly(..) | Action::Quit => {}
@@ -194,7 +195,7 @@ impl Worker {
         // A full disk is no reason to lose the picture on the screen.
         match saved.write(&files) {
             Ok(()) => {
-                eprintln!("wrote {}", files.map(|file| file.display().to_string()).join(", "))
+                say!("wrote {}", files.map(|file| file.display().to_string()).join(", "))
             }
             Err(error) => log::error!("{error}"),
         }
