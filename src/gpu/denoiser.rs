@@ -5,7 +5,6 @@
 //! whose memory is ours.
 
 use std::{
-    env,
     ffi::{CStr, c_char, c_int, c_void},
     mem::ManuallyDrop,
     path::{Path, PathBuf},
@@ -14,6 +13,7 @@ use std::{
 
 use libloading::Library;
 
+use super::library;
 use crate::error::{Error, Result};
 
 /// Environment variable with the library's file, or the folder that holds it.
@@ -227,28 +227,7 @@ impl Drop for Denoiser {
 
 /// Opens the library that [`LIBRARY_VARIABLE`] names, or the system's.
 fn open_library() -> Result<(Library, PathBuf)> {
-    let named = env::var_os(LIBRARY_VARIABLE).filter(|value| !value.is_empty()).map(PathBuf::from);
-    let candidates: Vec<PathBuf> = match &named {
-        Some(folder) if folder.is_dir() => NAMES.iter().map(|name| folder.join(name)).collect(),
-        Some(file) => vec![file.clone()],
-        None => NAMES.iter().map(PathBuf::from).collect(),
-    };
-    let mut failures = Vec::new();
-    for path in candidates {
-        if named.is_some() && !path.exists() {
-            continue;
-        }
-        // SAFETY: loading Open Image Denoise runs its initialisers; the system or the user names it.
-        match unsafe { Library::new(&path) } {
-            Ok(library) => return Ok((library, path)),
-            Err(error) => failures.push(error.to_string()),
-        }
-    }
-    let found = match (&named, failures.first()) {
-        (Some(place), None) => format!("{LIBRARY_VARIABLE}={} holds none", place.display()),
-        (_, first) => first.cloned().unwrap_or_default(),
-    };
-    Err(Error::Denoiser {
+    library::open(LIBRARY_VARIABLE, &NAMES).map_err(|found| Error::Denoiser {
         reason: format!(
             "--denoise needs the library Open Image Denoise ({}), which cannot be loaded: {found}",
             NAMES[0]
@@ -259,13 +238,7 @@ fn open_library() -> Result<(Library, PathBuf)> {
 
 /// Looks up a function, whose type in oidn.h is `T`, under the first of its names that is there.
 fn function<T: Copy>(library: &Library, path: &Path, names: &[&str]) -> Result<T> {
-    for name in names {
-        // SAFETY: the symbol is a function, and callers give its type in oidn.h.
-        if let Ok(symbol) = unsafe { library.get::<T>(name.as_bytes()) } {
-            return Ok(*symbol);
-        }
-    }
-    Err(Error::Denoiser {
+    library::function(library, names).ok_or_else(|| Error::Denoiser {
         reason: format!(
             "{} is no Open Image Denoise of version 1.2 or later: it lacks {}",
             path.display(),

@@ -12,6 +12,7 @@ pub mod device;
 pub mod instance;
 pub(crate) mod labels;
 pub(crate) mod lavapipe;
+mod library;
 pub mod pipeline;
 mod pipeline_cache;
 mod pipelines;
