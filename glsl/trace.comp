@@ -2,6 +2,9 @@
 //
 // One traversal loop takes RAYS_PER_INVOCATION rays: once enough lanes of the subgroup have finished,
 // all of those take their next ray. Surfaces are evaluated afterwards, with all lanes in step.
+//
+// Where the host has answered (ANSWERED), hits hold the triangles that rays meet, and only the rays that the
+// host leaves to this pass are followed. Scenes with instances have no such host.
 #version 460
 #extension GL_KHR_shader_subgroup_ballot : require
 
@@ -12,7 +15,7 @@
 #include "surfaces.glsl"
 #include "wave.glsl"
 
-WRITES(hits)
+UPDATES(hits)
 WRITES(hit_instances)
 UPDATES(paths)
 UPDATES(counters)
@@ -20,6 +23,7 @@ UPDATES(counters)
 // At most 32: rays given up are kept as bits until the end.
 layout(constant_id = CONSTANT_RAYS_PER_INVOCATION) const uint RAYS_PER_INVOCATION = 1u;
 layout(constant_id = CONSTANT_REFILL_LANES) const uint REFILL_LANES = 0xffffffffu;
+layout(constant_id = CONSTANT_ANSWERED) const uint ANSWERED = 0u;
 
 // Tests whether light is sampled at a surface: not at a specular one, nor at the black back of a
 // one-sided one.
@@ -59,20 +63,34 @@ bool goes_through(uint path) {
     return goes_on;
 }
 
+// Returns the turn of the next ray that the host has not answered, from `turn` on.
+uint next_turn(uint turn, uint first, uint ray_count) {
+    while (ANSWERED != 0u && turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count
+        && hits[listed_path(first + turn * WORKGROUP_SIZE)].triangle != TRIANGLE_LEFT) {
+        turn++;
+    }
+    return turn;
+}
+
+void start_ray(uint path) {
+    Ray ray = load_ray(path);
+    bvh_start(ray.origin, ray.direction, FAR_AWAY, false);
+    bvh_nodes_waiting.y = ray.is_active != 0u ? bvh_nodes_waiting.y : 0u;
+}
+
 void main() {
     uint ray_count = listed_path_count();
     uint first = gl_WorkGroupID.x * WORKGROUP_SIZE * RAYS_PER_INVOCATION + gl_LocalInvocationID.x;
     uint found[RAYS_PER_INVOCATION];
     uint found_instances[RAYS_PER_INVOCATION];
 
-    uint turn = 0u;
+    const bool leaves_none = ANSWERED != 0u && !HAS_PASSAGES;
+    uint turn = leaves_none ? RAYS_PER_INVOCATION : next_turn(0u, first, ray_count);
     uint steps = 0u;
     uint given_up = 0u;
-    bool has_ray = first < ray_count;
+    bool has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
     if (has_ray) {
-        Ray ray = load_ray(listed_path(first));
-        bvh_start(ray.origin, ray.direction, FAR_AWAY, false);
-        bvh_nodes_waiting.y = ray.is_active != 0u ? bvh_nodes_waiting.y : 0u;
+        start_ray(listed_path(first + turn * WORKGROUP_SIZE));
     }
     while (has_ray) {
         bool running = true;
@@ -95,12 +113,10 @@ void main() {
             if (HAS_INSTANCES) {
                 found_instances[turn] = bvh_hit_instance;
             }
-            turn++;
+            turn = next_turn(turn + 1u, first, ray_count);
             has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
             if (has_ray) {
-                Ray ray = load_ray(listed_path(first + turn * WORKGROUP_SIZE));
-                bvh_start(ray.origin, ray.direction, FAR_AWAY, false);
-                bvh_nodes_waiting.y = ray.is_active != 0u ? bvh_nodes_waiting.y : 0u;
+                start_ray(listed_path(first + turn * WORKGROUP_SIZE));
             }
         }
     }
@@ -110,11 +126,12 @@ void main() {
         uint lost = uint(findLSB(given_up));
         COUNT_GIVEN_UP(listed_path(first + lost * WORKGROUP_SIZE));
     }
-    uint traced = turn;
-    for (turn = 0u; turn < traced; turn++) {
+    for (turn = 0u; turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count; turn++) {
         uint path = listed_path(first + turn * WORKGROUP_SIZE);
         Ray ray = load_ray(path);
-        uint triangle = found[turn];
+        uint triangle = ANSWERED == 0u ? found[turn] : hits[path].triangle;
+        bool is_answered = ANSWERED != 0u && (!HAS_PASSAGES || triangle != TRIANGLE_LEFT);
+        triangle = is_answered ? triangle : found[turn];
         uint instance = HAS_INSTANCES ? found_instances[turn] : NO_INSTANCE;
         if (triangle == NO_TRIANGLE) {
             hits[path] = no_surface();

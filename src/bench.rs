@@ -19,8 +19,11 @@ use serde::Serialize;
 use crate::{
     accel::Accel,
     error::{Error, Result},
-    gpu::{Buffer, Commands, DescriptorSet, Device},
-    pass::{Domain, Kernel, Pass, SceneBuffers, Schedule, Steps, wave_buffers::path_list_bytes},
+    gpu::{Buffer, DescriptorSet, Device},
+    pass::{
+        Answers, Domain, Kernel, Pass, Recording, SceneBuffers, Schedule, Steps,
+        wave_buffers::path_list_bytes,
+    },
     sampler::{Parameters, basic::Basic},
     shader::{
         bindings::{FILM, WAVE, film, wave as bindings},
@@ -157,8 +160,9 @@ struct Bench<'a> {
     hits: Buffer,
     shadow_rays: Buffer,
     visibility: Buffer,
+    path_lists: Buffer,
     /// The other buffers of the sets.
-    _others: [Buffer; 4],
+    _others: [Buffer; 3],
     wave: Wave,
 }
 
@@ -206,7 +210,8 @@ impl<'a> Bench<'a> {
             hits,
             shadow_rays,
             visibility,
-            _others: [path_states, instances, path_lists, counters],
+            path_lists,
+            _others: [path_states, instances, counters],
             wave,
         })
     }
@@ -215,11 +220,19 @@ impl<'a> Bench<'a> {
         [self.scene.set(), &self.wave_set, &self.film_set]
     }
 
-    /// Runs one pass; device seconds.
+    /// Runs one pass; seconds of the device, and of the host where it traces.
     fn run(&self, pass: &Pass) -> Result<f64> {
-        let mut commands = Commands::begin_timed(self.device, 1)?;
-        pass.record(&mut commands, &self.sets(), &self.wave);
-        Ok(commands.submit_and_wait()?.values().sum::<f64>() * 1e-3)
+        let answers = Answers {
+            rays: &self.rays,
+            hits: &self.hits,
+            shadow_rays: &self.shadow_rays,
+            visibility: &self.visibility,
+            path_lists: &self.path_lists,
+        };
+        let host = self.scene.geometry().host_tracer().map(|tracer| (tracer, answers));
+        let mut recording = Recording::begin(self.device, 1, host)?;
+        recording.add(pass, &self.sets(), &self.wave)?;
+        Ok(recording.finish()?.values().sum::<f64>() * 1e-3)
     }
 
     /// Compiles a kernel and runs it once.

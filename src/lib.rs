@@ -170,6 +170,8 @@
 //!   Distribution", IEEE Transactions on Software Engineering 17(9).
 //! - \[Wächter & Binder 2019\] "A Fast and Robust Method for Avoiding Self-Intersection", Ray
 //!   Tracing Gems, chapter 6.
+//! - \[Wald et al. 2014\] "Embree: A Kernel Framework for Efficient CPU Ray Tracing", ACM Transactions on
+//!   Graphics 33(4).
 //! - \[Walker 1977\] "An Efficient Method for Generating Discrete Random Variables with General
 //!   Distributions", ACM Transactions on Mathematical Software 3(3).
 //! - \[Walter et al. 2007\] "Microfacet Models for Refraction through Rough Surfaces",

@@ -550,7 +550,7 @@ fn rays_that_are_given_up_are_counted_with_their_pixels() {
     let faces: Vec<&str> = faces.iter().map(String::as_str).collect();
     let crowd = ["-0.1 -0.1 0.5", "0.1 -0.1 0.5", "0 0.1 0.5"];
     folder.write("quad.ply", ply(&[&QUAD_VERTICES[..], &crowd].concat(), &faces));
-    let run = folder.run(&RENDER);
+    let run = folder.run(&[&RENDER[..], &["--tracer", "device"]].concat());
     run.assert(0, &["rays were given up after too many steps of traversal"]);
     let bounds = run.messages.split("within --crop ").nth(1).unwrap();
     let bounds = bounds.split(' ').next().unwrap().split(',').map(|bound| bound.parse::<u32>());

@@ -45,6 +45,7 @@ fn metadata(ranges: &[SampleRange]) -> Metadata {
         gpu_seconds: BTreeMap::from([("trace".to_owned(), 0.1)]),
         device: "llvmpipe (LLVM 15, 256 bits) “ä”".to_owned(),
         driver: "Mesa 22.3.6".to_owned(),
+        tracer: "Embree 3.13.5".to_owned(),
     }
 }
 

@@ -64,6 +64,7 @@ mod statistics;
 mod study;
 mod texture;
 mod tiles;
+mod tracer;
 mod traversal;
 mod twin;
 mod unbiased;

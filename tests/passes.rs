@@ -36,7 +36,8 @@ use crate::support::page;
 const FITS: FitSizes =
     FitSizes { environment_lobes: 100, strongest_environment_lobe: 0.0, brdf_lobes: 20, views: 32 };
 
-const TRAVERSAL: Traversal = Traversal { page_count: 1, page_shift: 20, is_instanced: false };
+const TRAVERSAL: Traversal =
+    Traversal { page_count: 1, page_shift: 20, is_instanced: false, is_on_host: false };
 
 /// Settings of a render with all layers.
 fn settings(shadow_rays: u32, depth: u32) -> PassSettings {

@@ -201,7 +201,8 @@ impl Paths {
         let waves =
             WaveBuffers::new(device, 64, 1 << 17, 1, size.demand(), Surfaces::default()).unwrap();
         let kinds = buffers.surfaces();
-        let traversal = Traversal { page_count: 1, page_shift: 20, is_instanced: false };
+        let traversal =
+            Traversal { page_count: 1, page_shift: 20, is_instanced: false, is_on_host: false };
         let steps =
             VisibilitySteps::new(visibility, product, fits.sizes(), kinds, traversal, SHADOW_RAYS);
         let lobes = LobeBuffers::new(device, fits, size, waves.capacity()).unwrap();

@@ -65,11 +65,26 @@ fn brute_force(geometry: &Geometry, ray: &Ray) -> (Option<f64>, bool) {
     (nearest, doubtful)
 }
 
-/// Checks the device, under both schedules, and the twin against brute force. Returns the share of
-/// rays that brute force cannot decide.
+/// Checks device and host against brute force; returns the larger share of rays that brute force cannot
+/// decide.
 fn check(name: &str, geometry: &Geometry, rays: &[Ray]) -> f64 {
     let accel = Accel::build(geometry, ONE_PAGE).unwrap();
-    let on_device = OnDevice::new(&accel);
+    let check_one = |(tracer, on_device): &(&str, OnDevice)| {
+        check_tracer([name, tracer], geometry, &accel, on_device, rays)
+    };
+    OnDevice::both(&accel).iter().map(check_one).fold(0.0, f64::max)
+}
+
+/// Checks a tracer, under both schedules, and the twin against brute force. Returns the share of rays that
+/// brute force cannot decide.
+fn check_tracer(
+    [name, tracer]: [&str; 2],
+    geometry: &Geometry,
+    accel: &Accel,
+    on_device: &OnDevice,
+    rays: &[Ray],
+) -> f64 {
+    let name = format!("{name} by the {tracer}");
     let single = on_device.trace(rays, Schedule::SINGLE);
     let refilled = on_device.trace(rays, REFILLING);
     assert_eq!(single, refilled, "{name}: the schedule changes hits");
@@ -81,18 +96,18 @@ fn check(name: &str, geometry: &Geometry, rays: &[Ray]) -> f64 {
         let twin = accel.closest(ray.origin.into(), ray.direction.into());
         let distance = f64::from(hit.distance);
         let found = (hit.material != NO_MATERIAL).then_some(distance);
-        assert_eq!(
-            found.is_some(),
-            twin.is_some(),
-            "{name}, ray {index} {ray:?}: device {found:?}, twin {twin:?}"
-        );
-        if let Some(twin) = twin {
-            assert!(
-                (distance - f64::from(twin.distance)).abs() <= 1e-5 * distance,
-                "{name}, ray {index}: device {hit:?}, twin {twin:?}"
-            );
-        }
         let (expected, is_doubtful) = brute_force(geometry, ray);
+        let agrees = match (found, &twin) {
+            (Some(distance), Some(twin)) => {
+                (distance - f64::from(twin.distance)).abs() <= 1e-5 * distance
+            }
+            (found, twin) => found.is_none() == twin.is_none(),
+        };
+        // The twin decides as the device where rounding decides.
+        assert!(
+            agrees || is_doubtful && tracer == "host",
+            "{name}, ray {index} {ray:?}: {hit:?}, twin {twin:?}"
+        );
         if is_doubtful {
             doubtful += 1;
             continue;
@@ -101,9 +116,9 @@ fn check(name: &str, geometry: &Geometry, rays: &[Ray]) -> f64 {
             (None, None) => {}
             (Some(found), Some(expected)) => assert!(
                 (found - expected).abs() <= 2e-5 * expected + 2e-6 * size,
-                "{name}, ray {index} {ray:?}: device {found}, brute force {expected}"
+                "{name}, ray {index} {ray:?}: {found}, brute force {expected}"
             ),
-            _ => panic!("{name}, ray {index} {ray:?}: device {found:?}, brute force {expected:?}"),
+            _ => panic!("{name}, ray {index} {ray:?}: {found:?}, brute force {expected:?}"),
         }
     }
     doubtful as f64 / rays.len() as f64
@@ -131,15 +146,16 @@ fn an_empty_scene_is_left_by_every_ray() {
     for geometry in [Geometry::default(), zero_area] {
         let accel = Accel::build(&geometry, ONE_PAGE).unwrap();
         assert_eq!(accel.triangle_count(), 0);
-        let on_device = OnDevice::new(&accel);
         let rays = random_rays(100, 7, 1.0);
-        for hit in on_device.trace(&rays, REFILLING) {
-            assert_eq!((hit.material, hit.distance), (NO_MATERIAL, -1.0));
+        for (tracer, on_device) in OnDevice::both(&accel) {
+            for hit in on_device.trace(&rays, REFILLING) {
+                assert_eq!((hit.material, hit.distance), (NO_MATERIAL, -1.0), "{tracer}");
+            }
+            let hits = vec![Hit::default(); 100];
+            let towards = ShadowRay { direction: [0.0, 1.0, 0.0], contribution: [1.0; 3] };
+            let visible = on_device.shadow(&hits, &[towards; 300], REFILLING);
+            assert!(visible.iter().all(|visible| *visible == 1), "{tracer}");
         }
-        let hits = vec![Hit::default(); 100];
-        let towards = ShadowRay { direction: [0.0, 1.0, 0.0], contribution: [1.0; 3] };
-        let visible = on_device.shadow(&hits, &[towards; 300], REFILLING);
-        assert!(visible.iter().all(|visible| *visible == 1));
         assert_eq!(accel.closest(Vec3::ONE, Vec3::X), None);
     }
 }
@@ -221,18 +237,20 @@ fn obvhs_finds_the_same() {
         ..CwBvh::default()
     };
     let rays = random_rays(20_000, 42, 1.0);
-    let hits = OnDevice::new(&accel).trace(&rays, REFILLING);
-    let mut different = 0;
-    for (ray, hit) in rays.iter().zip(&hits) {
-        let theirs = obvhs::ray::Ray::new_inf(ray.origin.into(), ray.direction.into());
-        let mut nearest = RayHit::none();
-        bvh.ray_traverse(theirs, &mut nearest, |ray, index| triangles[index].intersect(ray));
-        let ours = if hit.distance < 0.0 { f32::INFINITY } else { hit.distance };
-        different +=
-            usize::from(ours != nearest.t && (ours - nearest.t).abs() > 1e-6 + 1e-5 * ours);
+    for (tracer, on_device) in OnDevice::both(&accel) {
+        let hits = on_device.trace(&rays, REFILLING);
+        let mut different = 0;
+        for (ray, hit) in rays.iter().zip(&hits) {
+            let theirs = obvhs::ray::Ray::new_inf(ray.origin.into(), ray.direction.into());
+            let mut nearest = RayHit::none();
+            bvh.ray_traverse(theirs, &mut nearest, |ray, index| triangles[index].intersect(ray));
+            let ours = if hit.distance < 0.0 { f32::INFINITY } else { hit.distance };
+            different +=
+                usize::from(ours != nearest.t && (ours - nearest.t).abs() > 1e-6 + 1e-5 * ours);
+        }
+        // Rounding decides on rays through edges.
+        assert!(different <= 2, "{tracer}: {different} of 20,000 rays differ");
     }
-    // Rounding decides on rays through edges.
-    assert!(different <= 2, "{different} of 20,000 rays differ");
 }
 
 /// No ray from inside at the vertices and edges of closed meshes gets out.
@@ -270,10 +288,13 @@ fn closed_meshes_do_not_leak() {
             rays.push(ray(origin, (target - origin).normalize()));
         }
         let accel = Accel::build(&geometry, ONE_PAGE).unwrap();
-        let on_device = OnDevice::new(&accel);
-        let hits = on_device.trace(&rays, REFILLING);
-        let leaks = hits.iter().filter(|hit| hit.material == NO_MATERIAL).count();
-        assert_eq!(leaks, 0, "{name}: {leaks} of {} rays leak", rays.len());
+        for (tracer, on_device) in OnDevice::both(&accel) {
+            let hits = on_device.trace(&rays, REFILLING);
+            let leaks = hits.iter().filter(|hit| hit.material == NO_MATERIAL).count();
+            // The host's test is watertight along edges, but not for rays right at vertices, a third here.
+            let at_vertices = if tracer == "host" { rays.len() / 1000 } else { 0 };
+            assert!(leaks <= at_vertices, "{name}, {tracer}: {leaks} of {} rays leak", rays.len());
+        }
     }
 }
 
@@ -321,17 +342,18 @@ fn rays_leave_their_surface_at_every_scale() {
                 let geometry = scaled(&geometry, scale);
                 let accel = Accel::build(&geometry, ONE_PAGE).unwrap();
                 let (hits, outward) = leaving_rays(&geometry, scale, 20_000);
-                let on_device = OnDevice::new(&accel);
-                let visible = on_device.shadow(&hits, &outward, REFILLING);
-                let blocked = visible.iter().filter(|visible| **visible == 0).count();
-                assert_eq!(blocked, 0, "outside, half size {half}, scale {scale}");
                 let inward: Vec<ShadowRay> = outward
                     .iter()
                     .map(|ray| ShadowRay { direction: ray.direction.map(|x| -x), ..*ray })
                     .collect();
-                let visible = on_device.shadow(&hits, &inward, REFILLING);
-                let leaks = visible.iter().filter(|visible| **visible == 1).count();
-                assert_eq!(leaks, 0, "inside, half size {half}, scale {scale}");
+                for (tracer, on_device) in OnDevice::both(&accel) {
+                    let visible = on_device.shadow(&hits, &outward, REFILLING);
+                    let blocked = visible.iter().filter(|visible| **visible == 0).count();
+                    assert_eq!(blocked, 0, "{tracer}, outside, half size {half}, scale {scale}");
+                    let visible = on_device.shadow(&hits, &inward, REFILLING);
+                    let leaks = visible.iter().filter(|visible| **visible == 1).count();
+                    assert_eq!(leaks, 0, "{tracer}, inside, half size {half}, scale {scale}");
+                }
             }
         }
     }
@@ -342,18 +364,20 @@ fn a_power_of_two_of_scale_changes_nothing() {
     let geometry = soup(1000, 71);
     let rays = random_rays(3000, 72, 1.0);
     let unscaled = Accel::build(&geometry, ONE_PAGE).unwrap();
-    let reference = OnDevice::new(&unscaled).trace(&rays, REFILLING);
+    let references = OnDevice::both(&unscaled);
+    let trace = |(_, on_device): &(_, OnDevice), rays: &[Ray]| on_device.trace(rays, REFILLING);
     for scale in [1024.0, 1.0 / 1024.0] {
         let accel = Accel::build(&scaled(&geometry, scale), ONE_PAGE).unwrap();
         assert_eq!(accel.ray_offset(), scale * unscaled.ray_offset());
-        let rays: Vec<Ray> =
+        let moved: Vec<Ray> =
             rays.iter().map(|ray| Ray { origin: ray.origin.map(|x| x * scale), ..*ray }).collect();
-        let hits = OnDevice::new(&accel).trace(&rays, REFILLING);
-        for (hit, reference) in hits.iter().zip(&reference) {
-            assert_eq!(hit.material, reference.material);
-            assert_eq!(hit.shading_normal, reference.shading_normal);
-            if hit.material != NO_MATERIAL {
-                assert_eq!(hit.distance, scale * reference.distance);
+        for (scaled, unscaled) in OnDevice::both(&accel).iter().zip(&references) {
+            for (hit, reference) in trace(scaled, &moved).iter().zip(&trace(unscaled, &rays)) {
+                assert_eq!(hit.material, reference.material, "{}", scaled.0);
+                assert_eq!(hit.shading_normal, reference.shading_normal, "{}", scaled.0);
+                if hit.material != NO_MATERIAL {
+                    assert_eq!(hit.distance, scale * reference.distance, "{}", scaled.0);
+                }
             }
         }
     }
@@ -364,12 +388,15 @@ fn pages_of_triangles_make_no_difference() {
     let geometry = soup(1000, 81);
     let rays = random_rays(2000, 82, 1.0);
     let whole = Accel::build(&geometry, ONE_PAGE).unwrap();
-    let reference = OnDevice::new(&whole).trace(&rays, REFILLING);
+    let references = OnDevice::both(&whole);
     // 256, 512 and 1,024 triangles per page make four, two and one page.
     for (page_bytes, pages) in [(48 * 256 + 47, 4), (48 * 512, 2), (48 * 1024, 1)] {
         let accel = Accel::build(&geometry, page_bytes).unwrap();
         assert_eq!(accel.triangle_pages.len(), pages);
-        assert_eq!(OnDevice::new(&accel).trace(&rays, REFILLING), reference, "{pages} pages");
+        for ((tracer, paged), (_, whole)) in OnDevice::both(&accel).iter().zip(&references) {
+            let expected = whole.trace(&rays, REFILLING);
+            assert_eq!(paged.trace(&rays, REFILLING), expected, "{tracer}, {pages} pages");
+        }
     }
     let error = Accel::build(&geometry, 48 * 128).unwrap_err().to_string();
     assert!(error.contains("1000 triangles") && error.contains("512"), "{error}");
@@ -377,8 +404,13 @@ fn pages_of_triangles_make_no_difference() {
 
 #[test]
 fn rays_without_need_are_not_traced() {
-    let geometry = soup(200, 91);
-    let on_device = OnDevice::new(&Accel::build(&geometry, ONE_PAGE).unwrap());
+    let accel = Accel::build(&soup(200, 91), ONE_PAGE).unwrap();
+    for (_, on_device) in OnDevice::both(&accel) {
+        check_needless(&on_device);
+    }
+}
+
+fn check_needless(on_device: &OnDevice) {
     let mut rays = random_rays(1000, 92, 1.0);
     let all = on_device.trace(&rays, Schedule::SINGLE);
     for ray in rays.iter_mut().skip(1).step_by(3) {
@@ -415,7 +447,14 @@ fn rays_without_need_are_not_traced() {
 fn shadow_rays_agree_with_closest_hits() {
     let geometry = soup(2000, 101);
     let accel = Accel::build(&geometry, ONE_PAGE).unwrap();
-    let on_device = OnDevice::new(&accel);
+    for (tracer, on_device) in OnDevice::both(&accel) {
+        // Rounding decides on rays through edges, alike on the device and in its twin.
+        check_shadows(&accel, &on_device, if tracer == "host" { 3 } else { 0 });
+    }
+}
+
+/// Compares shadow rays with those of the twin, but for `undecided` of them.
+fn check_shadows(accel: &Accel, on_device: &OnDevice, undecided: u32) {
     let hits: Vec<Hit> = on_device
         .trace(&random_rays(3001, 102, 1.0), Schedule::SINGLE)
         .into_iter()
@@ -431,16 +470,18 @@ fn shadow_rays_agree_with_closest_hits() {
     let single = on_device.shadow(&hits, &shadow_rays, Schedule::SINGLE);
     let refilled = on_device.shadow(&hits, &shadow_rays, REFILLING);
     assert_eq!(single, refilled);
-    let mut visible_count = 0;
+    let (mut visible_count, mut different) = (0, 0);
     for (index, (ray, visible)) in shadow_rays.iter().zip(&single).enumerate() {
         let hit = &hits[index % hits.len()];
         let direction = Vec3::from(ray.direction);
         let origin =
             accel.offset_ray_origin(hit.position.into(), hit.geometric_normal.into(), direction);
-        assert_eq!(*visible == 0, accel.is_occluded(origin, direction), "ray {index}");
-        assert_eq!(*visible == 0, accel.closest(origin, direction).is_some(), "ray {index}");
+        let is_occluded = accel.is_occluded(origin, direction);
+        different += u32::from((*visible == 0) != is_occluded);
+        assert_eq!(is_occluded, accel.closest(origin, direction).is_some(), "ray {index}");
         visible_count += visible;
     }
+    assert!(different <= undecided, "{different} of {} rays differ", single.len());
     // Both outcomes occur.
     assert!((100..single.len() as u32 - 100).contains(&visible_count), "{visible_count}");
 }
@@ -450,9 +491,15 @@ fn surfaces_are_consistent() {
     let geometry = sphere(4, 1.0);
     let accel = Accel::build(&geometry, ONE_PAGE).unwrap();
     // Rays come from inside and outside, many at grazing angles to the coarse sphere.
+    for (_, on_device) in OnDevice::both(&accel) {
+        check_surfaces(&accel, &on_device);
+    }
+}
+
+fn check_surfaces(accel: &Accel, on_device: &OnDevice) {
     let rays = random_rays(20_000, 111, 1.0);
     let mut turned = 0;
-    for (ray, hit) in rays.iter().zip(OnDevice::new(&accel).trace(&rays, REFILLING)) {
+    for (ray, hit) in rays.iter().zip(on_device.trace(&rays, REFILLING)) {
         if hit.material == NO_MATERIAL {
             continue;
         }

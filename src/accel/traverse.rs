@@ -82,11 +82,19 @@ impl Accel {
         geometric_normal: Vec3,
         direction: Vec3,
     ) -> Vec3 {
-        let offset = self.ray_offset();
-        position
-            + (if geometric_normal.dot(direction) < 0.0 { -offset } else { offset })
-                * geometric_normal
+        moved_off_surface(position, geometric_normal, direction, self.ray_offset())
     }
+}
+
+/// Moves `position` by `offset` to the side of the surface that `direction` leads to.
+pub(crate) fn moved_off_surface(
+    position: Vec3,
+    geometric_normal: Vec3,
+    direction: Vec3,
+    offset: f32,
+) -> Vec3 {
+    position
+        + (if geometric_normal.dot(direction) < 0.0 { -offset } else { offset }) * geometric_normal
 }
 
 /// Position of a vertex in the world.

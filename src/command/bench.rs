@@ -4,7 +4,10 @@ use std::{collections::BTreeMap, path::PathBuf, sync::Arc, time::Instant};
 
 use serde::Serialize;
 
-use super::{options::parse_size, print_line, self_test};
+use super::{
+    options::{DeviceOptions, parse_size},
+    print_line,
+};
 use crate::{
     accel::Accel,
     bench::{RateSpread, RayPlan, RayRate, measure},
@@ -50,9 +53,9 @@ pub struct Arguments {
     /// Threads of the CPU traversal that serves as the yardstick. Default: all cores.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub threads: Option<u32>,
-    /// Device to use, by index or part of its name; see `fenestra devices`.
-    #[arg(long, value_name = "INDEX|NAME")]
-    pub device: Option<String>,
+    /// Device and tracer.
+    #[command(flatten)]
+    pub device: DeviceOptions,
     /// Print JSON to standard output.
     #[arg(long)]
     pub json: bool,
@@ -70,6 +73,7 @@ struct Report {
     film: [u32; 2],
     device: String,
     driver: String,
+    tracer: String,
     sampler: &'static str,
     shadow_rays_per_hit: u32,
     depth: u32,
@@ -117,7 +121,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         log::warn!("measuring at {}x{} instead of the film's size", film[0], film[1]);
         [scene.film.width, scene.film.height] = film;
     }
-    let device = self_test::open(arguments.device.as_deref(), false)?;
+    let device = arguments.device.open(false)?;
     let settings = Settings {
         sampler: arguments.sampler,
         shadow_rays: arguments.shadow_rays,
@@ -172,6 +176,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         film,
         device: capabilities.name.clone(),
         driver: capabilities.driver.clone(),
+        tracer: device.tracer(),
         sampler: arguments.sampler.name(),
         shadow_rays_per_hit: arguments.shadow_rays,
         depth: arguments.depth,
@@ -229,6 +234,7 @@ fn text(report: &Report) -> String {
             report.shadow_rays_per_hit
         ),
         format!("device     {} ({})", report.device, report.driver),
+        format!("tracer     {}", report.tracer),
         format!("yardstick  {}", report.yardstick),
         String::new(),
         "rays         traced   hits   device Mrays/s          obvhs Mrays/s           ratio".into(),

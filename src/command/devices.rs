@@ -4,7 +4,9 @@ use super::print_line;
 use crate::{
     error::Result,
     gpu::{
+        Tracer,
         capabilities::{Capabilities, choose, list},
+        device::{embree_for, tracer_name},
         instance::Instance,
         lavapipe::hint,
     },
@@ -36,6 +38,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             .map(|device| {
                 serde_json::json!({
                     "device": device,
+                    "tracer": tracer(device),
                     "missing": device.missing(),
                     "chosen": Some(device.index) == chosen_index,
                     "hint": hint(&device.driver),
@@ -49,6 +52,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
     }
     chosen.map(|_| ())
+}
+
+/// Names what traces for a device unless `--tracer` says otherwise.
+fn tracer(device: &Capabilities) -> String {
+    tracer_name(embree_for(device, Tracer::Auto).ok().flatten().as_ref())
 }
 
 /// Lists the limits of a device, one a line.
@@ -68,6 +76,7 @@ fn describe(device: &Capabilities, is_chosen: bool) -> String {
         format!("    storage buffers      {} per stage", device.max_storage_buffers),
         format!("    push constants       {} bytes", device.max_push_constants_size),
         format!("    shared memory        {} KiB", device.max_shared_memory / 1024),
+        format!("    tracer               {}", tracer(device)),
         format!("    subgroup             {} invocations", device.subgroup_size),
         format!(
             "    timestamps           {} bits, {} ns per tick",

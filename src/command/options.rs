@@ -2,14 +2,39 @@
 
 use std::{
     path::{Path, PathBuf},
+    sync::Arc,
     time::Duration,
 };
 
+use super::self_test;
 use crate::{
     error::{Error, Result},
     film::Window,
+    gpu::{Device, Tracer},
     scene::{Scene, load::LoadOptions},
 };
+
+/// Options of what renders.
+#[derive(Clone, Debug, clap::Args)]
+pub struct DeviceOptions {
+    /// Device to use, by index or part of its name; see `fenestra devices`.
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
+    /// Part of the machine that traces rays. The host traces for software devices alone, by the library
+    /// Embree.
+    #[arg(long, value_enum, value_name = "PART", default_value = "auto")]
+    pub tracer: Tracer,
+}
+
+impl DeviceOptions {
+    /// Opens the device, once it has passed the self-test.
+    ///
+    /// # Errors
+    /// As [`Device::open_traced`], and a device that fails the test.
+    pub(crate) fn open(&self, validate: bool) -> Result<Arc<Device>> {
+        Device::open_checked(self.device.as_deref(), validate, self.tracer, self_test::check)
+    }
+}
 
 /// Options of what a scene file may leave open.
 #[derive(Debug, clap::Args)]

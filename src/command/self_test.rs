@@ -5,7 +5,6 @@ use std::{
     io::{Read, Write},
     path::PathBuf,
     process::{Command, ExitStatus, Stdio},
-    sync::Arc,
     thread,
     time::{Duration, Instant},
 };
@@ -16,7 +15,7 @@ use super::print_line;
 use crate::{
     error::Result,
     files,
-    gpu::{Capabilities, Device, lavapipe},
+    gpu::{Capabilities, Device, Tracer, lavapipe},
     self_test,
     shader::spirv,
     terminal::say,
@@ -46,7 +45,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     #[cfg(unix)]
     forbid_core_dumps();
-    let device = Device::open(Some(&arguments.device), false)?;
+    // The host's tracer needs no test of the driver.
+    let device = Device::open_traced(Some(&arguments.device), false, Tracer::Device)?;
     let faults = self_test::faults(&device)?;
     device.save_pipeline_cache();
     print_line(if faults.is_empty() { PASSED.to_owned() } else { faults.join("; ") }.as_str())
@@ -61,18 +61,10 @@ fn forbid_core_dumps() {
     }
 }
 
-/// Opens the device that `wanted` names, once it has passed the self-test.
-///
-/// # Errors
-/// As [`Device::open`], and a device that fails the test.
-pub(crate) fn open(wanted: Option<&str>, validate: bool) -> Result<Arc<Device>> {
-    Device::open_checked(wanted, validate, check)
-}
-
 /// Prints the device of a command, and the remedy for a slow driver.
-pub(crate) fn announce(capabilities: &Capabilities) {
-    say!("device: {} ({})", capabilities.name, capabilities.driver);
-    if let Some(hint) = lavapipe::hint(&capabilities.driver) {
+pub(crate) fn announce(device: &Device) {
+    say!("device: {}", device.describe());
+    if let Some(hint) = lavapipe::hint(&device.capabilities().driver) {
         say!("hint: {hint}");
     }
 }

@@ -7,7 +7,7 @@ use std::{
 
 use super::{
     interrupt::Interrupt,
-    options::{check_strict, parse_duration, parse_size},
+    options::{DeviceOptions, check_strict, parse_duration, parse_size},
     progress::Progress,
     self_test,
 };
@@ -102,9 +102,9 @@ pub struct Arguments {
     /// Discard finished runs in the folder that were made under other conditions.
     #[arg(long)]
     pub redo: bool,
-    /// Device to use, by index or part of its name; see `fenestra devices`.
-    #[arg(long, value_name = "INDEX|NAME")]
-    pub device: Option<String>,
+    /// Device and tracer.
+    #[command(flatten)]
+    pub device: DeviceOptions,
     /// Run with the Vulkan validation layers; any message fails the command.
     #[arg(long)]
     pub validate: bool,
@@ -130,9 +130,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         check_strict(true, &Scene::load(path)?)?;
     }
     let folder = Folder::open(&arguments.output)?;
-    let device = self_test::open(arguments.device.as_deref(), arguments.validate)?;
+    let device = arguments.device.open(arguments.validate)?;
     if !arguments.quiet {
-        self_test::announce(device.capabilities());
+        self_test::announce(&device);
     }
     let mut display =
         Display { progress: Progress::new("study", arguments.quiet), interrupt: &interrupt };

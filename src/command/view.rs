@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{
-    options::{SceneOptions, parse_size},
+    options::{DeviceOptions, SceneOptions, parse_size},
     progress::Patience,
     self_test,
 };
@@ -42,9 +42,9 @@ pub struct Arguments {
     /// Random seed.
     #[arg(long, default_value_t = 0)]
     pub seed: u32,
-    /// Device to use, by index or part of its name; see `fenestra devices`.
-    #[arg(long, value_name = "INDEX|NAME")]
-    pub device: Option<String>,
+    /// Device and tracer.
+    #[command(flatten)]
+    pub device: DeviceOptions,
     /// Run with the Vulkan validation layers; any message fails the command.
     #[arg(long)]
     pub validate: bool,
@@ -88,7 +88,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     settings.check([scene.film.width, scene.film.height])?;
     drop(patience);
     let options = Options {
-        device: arguments.device.clone(),
+        device: arguments.device.device.clone(),
+        tracer: arguments.device.tracer,
         validate: arguments.validate,
         check: self_test::check,
         settings,

@@ -209,6 +209,7 @@ fn add_metadata(merged: &mut Metadata, part: &Metadata) {
     }
     merged.device = joined(&merged.device, &part.device);
     merged.driver = joined(&merged.driver, &part.driver);
+    merged.tracer = joined(&merged.tracer, &part.tracer);
 }
 
 /// Joins both lists of names, without repetition.

@@ -93,6 +93,8 @@ pub struct Metadata {
     pub device: String,
     /// Its driver.
     pub driver: String,
+    /// Its tracer, as [`Device::tracer`](crate::gpu::Device::tracer) names it.
+    pub tracer: String,
 }
 
 /// Longest render time that is believed, seconds: a century.
@@ -146,6 +148,7 @@ impl Metadata {
         put("fenestra.seconds", Attribute::Double(self.seconds));
         put("fenestra.device", text(&self.device));
         put("fenestra.driver", text(&self.driver));
+        put("fenestra.tracer", text(&self.tracer));
         for (name, value) in &self.sampler_parameters {
             put(&format!("fenestra.sampler_parameters.{name}"), text(value));
         }
@@ -239,6 +242,8 @@ impl Metadata {
                 .collect(),
             device: text("fenestra.device")?,
             driver: text("fenestra.driver")?,
+            // Older files do not say; the device traced.
+            tracer: text("fenestra.tracer").unwrap_or_else(|_| "device".to_owned()),
         })
     }
 

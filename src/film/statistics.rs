@@ -27,6 +27,8 @@ pub struct Statistics {
     pub device: String,
     /// Its driver.
     pub driver: String,
+    /// Its tracer.
+    pub tracer: String,
     /// Sampler's name.
     pub sampler: String,
     /// Sampler's parameters as text, by name.

@@ -1,6 +1,9 @@
 //! Storage buffers.
 
-use std::sync::Arc;
+use std::{
+    slice,
+    sync::{Arc, atomic::AtomicU32},
+};
 
 use ash::vk;
 use gpu_allocator::{
@@ -118,14 +121,31 @@ impl Buffer {
         self.raw
     }
 
+    /// Returns the words of a buffer whose memory the host shares with the device, as software devices do.
+    /// The device must not be at work on it.
+    ///
+    /// # Errors
+    /// The host does not see the memory.
+    pub(crate) fn words(&self) -> Result<&[AtomicU32]> {
+        let start = self.allocation.as_ref().and_then(Allocation::mapped_ptr);
+        let start = start.ok_or_else(|| self.unmapped())?.cast::<AtomicU32>();
+        // SAFETY: the allocation is mapped as long as it lives, which is as long as `self`; it is aligned
+        // for storage buffers and holds `size` bytes, a multiple of 4. Any bits are a word, and threads
+        // of the host share atomic words. Submissions are waited for, so the device is not at work.
+        Ok(unsafe { slice::from_raw_parts(start.as_ptr(), (self.size / 4) as usize) })
+    }
+
     /// Returns the memory of a buffer that the host sees.
     pub(super) fn mapped(&mut self) -> Result<&mut [u8]> {
-        self.allocation.as_mut().and_then(Allocation::mapped_slice_mut).ok_or_else(|| {
-            Error::Vulkan {
-                call: format!("mapping of {}", self.name),
-                result: "memory is not visible to the host".into(),
-            }
-        })
+        let error = self.unmapped();
+        self.allocation.as_mut().and_then(Allocation::mapped_slice_mut).ok_or(error)
+    }
+
+    fn unmapped(&self) -> Error {
+        Error::Vulkan {
+            call: format!("mapping of {}", self.name),
+            result: "memory is not visible to the host".into(),
+        }
     }
 }
 

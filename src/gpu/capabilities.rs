@@ -46,6 +46,8 @@ pub struct Capabilities {
     pub subgroup_ballot: bool,
     /// Total size of the device-local memory heaps, bytes.
     pub device_memory: u64,
+    /// True if the device is software and all its memory is the host's.
+    pub shares_memory: bool,
     /// True if structs may have `scalar` layout.
     pub scalar_block_layout: bool,
     /// Queue family with compute and timestamps, if any.
@@ -227,6 +229,12 @@ fn capabilities(instance: &Instance, index: usize, physical: vk::PhysicalDevice)
             .filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
             .map(|heap| heap.size)
             .sum(),
+        shares_memory: properties.device_type == vk::PhysicalDeviceType::CPU
+            && memory.memory_types_as_slice().iter().all(|memory| {
+                memory.property_flags.contains(
+                    vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT,
+                )
+            }),
         scalar_block_layout: features12.scalar_block_layout == vk::TRUE,
         queue_family: queue_family.map(|(index, _)| index),
         timestamp_valid_bits: queue_family.map_or(0, |(_, bits)| bits),

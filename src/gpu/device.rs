@@ -12,13 +12,29 @@ use winit::raw_window_handle::RawDisplayHandle;
 use super::{
     Called,
     capabilities::{Capabilities, choose, enumerate},
+    embree::Embree,
     instance::Instance,
     lavapipe,
     pipeline_cache::PipelineCache,
     pipelines::Pipelines,
     set_layouts::SetLayouts,
 };
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    scene::Geometry,
+};
+
+/// Part of the machine that traces rays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Tracer {
+    /// The host where the device is software and the library Embree is found, else the device.
+    #[default]
+    Auto,
+    /// The device.
+    Device,
+    /// The host, by the library Embree; the device must be software.
+    Host,
+}
 
 /// A logical device with its queue, allocator, set layouts, pipelines and the driver's pipeline cache.
 pub struct Device {
@@ -27,6 +43,8 @@ pub struct Device {
     queue: Mutex<vk::Queue>,
     capabilities: Capabilities,
     physical: vk::PhysicalDevice,
+    tracer: Tracer,
+    embree: Option<Arc<Embree>>,
     set_layouts: SetLayouts,
     pipeline_cache: PipelineCache,
     pipelines: Pipelines,
@@ -37,24 +55,34 @@ pub struct Device {
 }
 
 impl Device {
-    /// Opens the device that [`choose`] picks.
+    /// Opens the device that [`choose`] picks; the host traces where it can.
     ///
     /// # Errors
     /// No loader, no suitable device, or a failing driver.
     pub fn open(wanted: Option<&str>, validate: bool) -> Result<Arc<Self>> {
-        Self::open_checked(wanted, validate, |_| Ok(()))
+        Self::open_traced(wanted, validate, Tracer::Auto)
     }
 
-    /// As [`Device::open`], once `check` has let the device pass: drivers may crash as soon as it is made.
+    /// As [`Device::open`], with a choice of what traces.
+    ///
+    /// # Errors
+    /// Also [`Error::Device`] if the host is to trace and cannot.
+    pub fn open_traced(wanted: Option<&str>, validate: bool, tracer: Tracer) -> Result<Arc<Self>> {
+        Self::open_checked(wanted, validate, tracer, |_| Ok(()))
+    }
+
+    /// As [`Device::open_traced`], once `check` has let the device pass: drivers may crash as soon as it is
+    /// made.
     ///
     /// # Errors
     /// Also those of `check`.
     pub(crate) fn open_checked(
         wanted: Option<&str>,
         validate: bool,
+        tracer: Tracer,
         check: fn(&Capabilities) -> Result<()>,
     ) -> Result<Arc<Self>> {
-        Self::open_with(wanted, validate, None, check)
+        Self::open_with(wanted, validate, tracer, None, check)
     }
 
     /// As [`Device::open_checked`], for windows on `display` too.
@@ -64,15 +92,17 @@ impl Device {
     pub(crate) fn open_for_display(
         wanted: Option<&str>,
         validate: bool,
+        tracer: Tracer,
         display: RawDisplayHandle,
         check: fn(&Capabilities) -> Result<()>,
     ) -> Result<Arc<Self>> {
-        Self::open_with(wanted, validate, Some(display), check)
+        Self::open_with(wanted, validate, tracer, Some(display), check)
     }
 
     fn open_with(
         wanted: Option<&str>,
         validate: bool,
+        tracer: Tracer,
         display: Option<RawDisplayHandle>,
         check: fn(&Capabilities) -> Result<()>,
     ) -> Result<Arc<Self>> {
@@ -84,6 +114,7 @@ impl Device {
         lavapipe::check_vector_width(&capabilities)?;
         check(&capabilities)?;
         let (physical, _) = devices[capabilities.index];
+        let embree = embree_for(&capabilities, tracer)?;
         let queue_family = capabilities.queue_family.unwrap_or_default();
 
         let priorities = [1.0];
@@ -135,6 +166,8 @@ impl Device {
             queue: Mutex::new(queue),
             capabilities,
             physical,
+            tracer,
+            embree,
             set_layouts,
             pipeline_cache,
             pipelines: Pipelines::default(),
@@ -146,6 +179,39 @@ impl Device {
     /// Identity, limits and features of this device.
     pub fn capabilities(&self) -> &Capabilities {
         &self.capabilities
+    }
+
+    /// Names device, driver and tracer.
+    pub(crate) fn describe(&self) -> String {
+        format!("{} ({})", self.capabilities.name, self.driver_and_tracer())
+    }
+
+    /// Names the driver, and what traces if it is not the device.
+    pub(crate) fn driver_and_tracer(&self) -> String {
+        let driver = &self.capabilities.driver;
+        self.embree
+            .as_ref()
+            .map_or_else(|| driver.clone(), |_| format!("{driver}, rays by {}", self.tracer()))
+    }
+
+    /// Names what traces: "device" or "Embree 3.13.5".
+    pub fn tracer(&self) -> String {
+        tracer_name(self.embree.as_ref())
+    }
+
+    /// Names what traces a geometry: the device where there are instances.
+    pub(crate) fn tracer_of(&self, geometry: &Geometry) -> String {
+        tracer_name(self.embree.as_ref().filter(|_| geometry.instances.is_empty()))
+    }
+
+    /// The library by which the host traces, if it does.
+    pub(crate) fn embree(&self) -> Option<&Arc<Embree>> {
+        self.embree.as_ref()
+    }
+
+    /// True if the device must not trace in the host's place.
+    pub(crate) fn must_trace_on_host(&self) -> bool {
+        self.tracer == Tracer::Host
     }
 
     /// Messages of the validation layers so far; empty without validation.
@@ -226,6 +292,35 @@ impl Drop for Device {
             self.raw.destroy_device(None);
         }
     }
+}
+
+/// Loads the library by which the host traces, where it is to.
+///
+/// # Errors
+/// [`Error::Device`] if the host was asked for and cannot.
+pub(crate) fn embree_for(
+    capabilities: &Capabilities,
+    tracer: Tracer,
+) -> Result<Option<Arc<Embree>>> {
+    match (tracer, capabilities.shares_memory) {
+        (Tracer::Device, _) | (Tracer::Auto, false) => Ok(None),
+        (Tracer::Host, false) => Err(Error::Device {
+            reason: format!(
+                "--tracer host: {} does not share its memory with the host, as software devices do",
+                capabilities.name
+            ),
+            help: "take --tracer device".into(),
+        }),
+        (Tracer::Host, true) => Embree::load().map(Some),
+        (Tracer::Auto, true) => {
+            Ok(Embree::load().inspect_err(|error| log::info!("the device traces: {error}")).ok())
+        }
+    }
+}
+
+/// Names what traces, given the host's library if it does.
+pub(crate) fn tracer_name(embree: Option<&Arc<Embree>>) -> String {
+    embree.map_or_else(|| "device".to_owned(), |embree| format!("Embree {}", embree.version()))
 }
 
 /// Checks that a device can show pictures at all.

@@ -1,5 +1,5 @@
-//! Vulkan on the host, and the library of the denoiser: one concept per file, and the only module with
-//! `unsafe` code.
+//! Vulkan on the host, and the libraries of the denoiser and of the host's tracer: one concept per file, and
+//! the only module with `unsafe` code.
 
 #![expect(unsafe_code, reason = "calls of C are unsafe; each block states why it is sound")]
 
@@ -9,6 +9,9 @@ pub mod commands;
 pub(crate) mod denoiser;
 pub(crate) mod descriptors;
 pub mod device;
+pub(crate) mod embree;
+pub(crate) mod embree_rays;
+pub(crate) mod embree_scene;
 pub mod instance;
 pub(crate) mod labels;
 pub(crate) mod lavapipe;
@@ -26,7 +29,8 @@ pub use capabilities::Capabilities;
 pub use commands::Commands;
 pub(crate) use denoiser::Denoiser;
 pub use descriptors::DescriptorSet;
-pub use device::Device;
+pub use device::{Device, Tracer};
+pub(crate) use embree::Embree;
 pub use pipeline::Pipeline;
 pub(crate) use swapchain::{Presented, Swapchain};
 pub(crate) use timestamps::PassTimes;

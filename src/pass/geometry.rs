@@ -1,20 +1,22 @@
-//! Geometry on the device: the arrays of [`Accel`], and how passes schedule rays through them.
+//! Geometry on the device: the arrays of [`Accel`], who traces it, and how passes schedule rays through it.
 
 use std::sync::Arc;
 
 use super::{
-    kernel::{Domain, Kernel},
+    host_tracer::HostTracer,
+    kernel::{Domain, Kernel, Question},
     surfaces::Surfaces,
 };
 use crate::{
     accel::{Accel, MAX_TRIANGLE_PAGES, TriangleRecord, instances::Record},
-    error::Result,
+    error::{Error, Result},
     gpu::{Buffer, Capabilities, Device},
     shader::{
         bindings::{Binding, scene},
         constants::{
-            CONSTANT_RAYS_PER_INVOCATION, CONSTANT_REFILL_LANES, CONSTANT_TRIANGLE_PAGE_SHIFT,
-            CONSTANT_TRIANGLE_PAGES, SURFACES_INSTANCED,
+            CONSTANT_ANSWERED, CONSTANT_RAYS_PER_INVOCATION, CONSTANT_REFILL_LANES,
+            CONSTANT_TRIANGLE_PAGE_SHIFT, CONSTANT_TRIANGLE_PAGES, SURFACES_INSTANCED,
+            SURFACES_PASSING,
         },
     },
 };
@@ -25,11 +27,12 @@ const PAGES: [Binding; MAX_TRIANGLE_PAGES] =
 /// Tree and triangles on the device.
 pub struct GeometryBuffers {
     nodes: Buffer,
-    pages: Vec<Buffer>,
+    pages: Vec<Arc<Buffer>>,
     materials: Buffer,
     instances: Buffer,
     page_shift: u32,
     is_instanced: bool,
+    host_tracer: Option<HostTracer>,
 }
 
 /// Largest number of bytes in one page of triangles on a device.
@@ -46,7 +49,7 @@ impl GeometryBuffers {
             .iter()
             .enumerate()
             .map(|(index, page): (usize, &Vec<TriangleRecord>)| {
-                Buffer::texels_from_slice(device, &format!("triangles {index}"), page)
+                Buffer::texels_from_slice(device, &format!("triangles {index}"), page).map(Arc::new)
             })
             .collect::<Result<_>>()?;
         // A buffer has at least one element.
@@ -59,12 +62,42 @@ impl GeometryBuffers {
             instances: Buffer::texels_from_slice(device, "instances", instances)?,
             page_shift: accel.page_shift,
             is_instanced: accel.is_instanced(),
+            host_tracer: None,
         })
+    }
+
+    /// Lets the host trace where the device is opened for that and there are no instances; `passes` says of
+    /// a material whether light may pass its surfaces. Where memory does not suffice for the host's tree,
+    /// the device traces, unless the host was asked for.
+    ///
+    /// # Errors
+    /// The library fails, or memory does not suffice for it and the host was asked for.
+    pub fn traced_by_host(
+        self,
+        device: &Device,
+        accel: &Accel,
+        passes: &dyn Fn(u32) -> bool,
+    ) -> Result<Self> {
+        let Some(embree) = device.embree().filter(|_| !self.is_instanced) else { return Ok(self) };
+        match HostTracer::new(embree, accel, &self.pages, passes) {
+            Ok(tracer) => Ok(Self { host_tracer: Some(tracer), ..self }),
+            Err(Error::Memory { message, .. }) if !device.must_trace_on_host() => {
+                log::warn!("{message}; the device traces");
+                Ok(self)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The host's tracer, if the host traces.
+    pub fn host_tracer(&self) -> Option<&HostTracer> {
+        self.host_tracer.as_ref()
     }
 
     /// Returns the buffers with their bindings in the scene set. Missing pages repeat the first.
     pub fn bindings(&self) -> Vec<(Binding, &Buffer)> {
-        let page = |(index, binding)| (binding, self.pages.get(index).unwrap_or(&self.pages[0]));
+        let page =
+            |(index, binding)| (binding, self.pages.get(index).unwrap_or(&self.pages[0]).as_ref());
         let mut bindings = vec![
             (scene::BVH_NODES, &self.nodes),
             (scene::TRIANGLE_MATERIALS, &self.materials),
@@ -76,7 +109,8 @@ impl GeometryBuffers {
 
     /// Returns every buffer once, for memory reports.
     pub(crate) fn buffers(&self) -> impl Iterator<Item = &Buffer> {
-        [&self.nodes, &self.materials, &self.instances].into_iter().chain(&self.pages)
+        let pages = self.pages.iter().map(Arc::as_ref);
+        [&self.nodes, &self.materials, &self.instances].into_iter().chain(pages)
     }
 
     /// Returns the specialization of the passes that traverse this geometry.
@@ -85,6 +119,7 @@ impl GeometryBuffers {
             page_count: self.pages.len() as u32,
             page_shift: self.page_shift,
             is_instanced: self.is_instanced,
+            is_on_host: self.host_tracer.is_some(),
         }
     }
 }
@@ -98,6 +133,8 @@ pub struct Traversal {
     pub page_shift: u32,
     /// True if the tree has two levels.
     pub is_instanced: bool,
+    /// True if the host traces.
+    pub is_on_host: bool,
 }
 
 impl Traversal {
@@ -119,25 +156,35 @@ impl Traversal {
         domain: Domain,
         schedule: Schedule,
         surfaces: Surfaces,
+        question: Question,
     ) -> Kernel {
+        let passes = surfaces.features & SURFACES_PASSING != 0;
+        // Rays that the host has answered take no turns.
+        let schedule = if self.is_on_host && !passes { Schedule::SINGLE } else { schedule };
         let own = [
             (CONSTANT_RAYS_PER_INVOCATION, schedule.rays_per_invocation),
             (CONSTANT_REFILL_LANES, schedule.refill_lanes),
+            (CONSTANT_ANSWERED, self.is_on_host.into()),
         ];
         let constants = [&own[..], &self.constants(surfaces)].concat();
         let per_invocation = schedule.rays_per_invocation;
-        Kernel { per_invocation, ..Kernel::new(shader, domain, &constants) }
+        let question = match question {
+            Question::Visible if passes => Question::VisibleIfOpaque,
+            question => question,
+        };
+        let question = self.is_on_host.then_some(question);
+        Kernel { per_invocation, question, ..Kernel::new(shader, domain, &constants) }
     }
 
     /// Finds the closest hit of every ray: `ray_texels` → `hits`.
     pub fn trace(self, schedule: Schedule, surfaces: Surfaces) -> Kernel {
-        self.kernel("trace", Domain::Arrivals, schedule, surfaces)
+        self.kernel("trace", Domain::Arrivals, schedule, surfaces, Question::Closest)
     }
 
     /// Tests shadow rays for any hit: `shadow_ray_texels`, `hit_texels` → `visibility`. Ray
     /// `direction_index · path_count + path_index` starts at hit `path_index`.
     pub fn shadow(self, schedule: Schedule, surfaces: Surfaces) -> Kernel {
-        self.kernel("shadow", Domain::ShadowRays, schedule, surfaces)
+        self.kernel("shadow", Domain::ShadowRays, schedule, surfaces, Question::Visible)
     }
 }
 

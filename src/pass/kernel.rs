@@ -23,6 +23,17 @@ pub enum Domain {
     ShadowRays,
 }
 
+/// Question of a pass to the host before its dispatch, where the host traces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Question {
+    /// Closest hits of rays.
+    Closest,
+    /// Visibility along shadow rays: the host answers all, and nothing is left to dispatch.
+    Visible,
+    /// The same where surfaces let light pass: those rays are left to the dispatch.
+    VisibleIfOpaque,
+}
+
 /// A compute shader with its specialization. The shader names the pass in debug tools and timings.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Kernel {
@@ -34,12 +45,14 @@ pub struct Kernel {
     pub domain: Domain,
     /// Elements per invocation, 1 to 32.
     pub per_invocation: u32,
+    /// Question to the host.
+    pub question: Option<Question>,
 }
 
 impl Kernel {
     /// Makes a kernel with one invocation per element of `domain`.
     pub(crate) fn new(shader: &'static str, domain: Domain, constants: &[(u32, u32)]) -> Self {
-        Self { shader, constants: constants.to_vec(), domain, per_invocation: 1 }
+        Self { shader, constants: constants.to_vec(), domain, per_invocation: 1, question: None }
     }
 
     /// Number of invocations for a wave; at least one, so that an empty wave makes drivers compile.
@@ -70,20 +83,30 @@ pub struct Dispatch {
 /// A kernel compiled for a device.
 pub struct Pass {
     kernel: Kernel,
-    pipeline: Pipeline,
+    /// None where the host does all.
+    pipeline: Option<Pipeline>,
 }
 
 impl Pass {
     /// Compiles `kernel`; [`crate::Error::Vulkan`] if the driver refuses it.
     pub fn new(device: &Arc<Device>, kernel: Kernel) -> Result<Self> {
         let spirv = spirv::pass(kernel.shader);
-        let pipeline = Pipeline::new(device, kernel.shader, spirv, &kernel.constants)?;
+        let pipeline = (kernel.question != Some(Question::Visible))
+            .then(|| Pipeline::new(device, kernel.shader, spirv, &kernel.constants))
+            .transpose()?;
         Ok(Self { kernel, pipeline })
     }
 
-    /// Records the pass over `wave`, binding those of `sets` that its shader uses.
+    /// The kernel.
+    pub(super) fn kernel(&self) -> &Kernel {
+        &self.kernel
+    }
+
+    /// Records the dispatch over `wave`, binding those of `sets` that its shader uses.
     pub fn record(&self, commands: &mut Commands, sets: &[&DescriptorSet], wave: &Wave) {
-        let invocations = self.kernel.invocations(wave);
-        commands.dispatch(&self.pipeline, sets, bytemuck::bytes_of(wave), invocations);
+        if let Some(pipeline) = &self.pipeline {
+            let invocations = self.kernel.invocations(wave);
+            commands.dispatch(pipeline, sets, bytemuck::bytes_of(wave), invocations);
+        }
     }
 }

@@ -10,6 +10,7 @@ use super::{
     film_buffers::{BLOCK_PIXELS, FilmBuffers},
     kernel::{Dispatch, Kernel, Pass},
     order::{PassSettings, PathLists, wave_order},
+    recording::Recording,
     scene_buffers::SceneBuffers,
     sharing_buffers::SharingBuffers,
     steps::{Passes, PathDemand, SHADOW_RAYS_PER_GROUP, Steps},
@@ -195,7 +196,9 @@ impl Runner {
         let wave = Wave { film_start, ..wave };
         let settings = PassSettings { path_lists: self.path_lists(), ..self.settings };
         let order = wave_order(&settings, technique.steps(), wave, vertices);
-        let mut commands = Commands::begin_timed(&self.device, order.len() as u32)?;
+        let tracer = self.scene.geometry().host_tracer();
+        let host = tracer.map(|tracer| (tracer, self.waves.answers()));
+        let mut recording = Recording::begin(&self.device, order.len() as u32, host)?;
         let film = self.film.set(wave.first_pixel);
         let sets = sets(&self.scene, technique, &self.waves, &self.sharing, film);
         for Dispatch { kernel, wave } in order {
@@ -206,9 +209,9 @@ impl Runner {
                     vacant.insert(pass)
                 }
             };
-            pass.record(&mut commands, &sets, &wave);
+            recording.add(pass, &sets, &wave)?;
         }
-        let times = commands.submit_and_wait()?;
+        let times = recording.finish()?;
         for (pass, ms) in &times {
             *self.totals.gpu_ms.entry(pass.clone()).or_default() += ms;
         }

@@ -251,13 +251,17 @@ struct Parts {
 
 impl Parts {
     fn new(device: &Arc<Device>, scene: &Scene, accel: &Accel) -> Result<Self> {
-        let mut surfaces = SurfaceTables::new(&scene.materials);
+        let mut tables = SurfaceTables::new(&scene.materials);
         let lamps = LampTables::new(scene, accel);
-        for (surface, density) in surfaces.surfaces.iter_mut().zip(&lamps.emission_densities) {
+        for (surface, density) in tables.surfaces.iter_mut().zip(&lamps.emission_densities) {
             surface.emission_density = *density;
         }
-        let attributes = TriangleAttributes::new(&scene.geometry, accel, surfaces.attributes);
-        let textures = TextureBuffers::new(device, &surfaces, &attributes)?;
-        Ok(Self { geometry: GeometryBuffers::new(device, accel)?, textures, lamps })
+        let attributes = TriangleAttributes::new(&scene.geometry, accel, tables.attributes);
+        let textures = TextureBuffers::new(device, &tables, &attributes)?;
+        let materials = &scene.materials;
+        let passes = |index: u32| surfaces::passes(&materials[index as usize]);
+        let geometry =
+            GeometryBuffers::new(device, accel)?.traced_by_host(device, accel, &passes)?;
+        Ok(Self { geometry, textures, lamps })
     }
 }

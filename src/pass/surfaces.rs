@@ -62,6 +62,11 @@ pub fn features(materials: &[Material]) -> u32 {
     materials.iter().fold(0, |bits, material| bits | features_of(material))
 }
 
+/// Tests whether light may pass the surfaces of a material.
+pub(crate) fn passes(material: &Material) -> bool {
+    features_of(material) & SURFACES_PASSING != 0
+}
+
 fn features_of(material: &Material) -> u32 {
     let surface = &material.surface;
     let is_pane = matches!(material.kind, MaterialKind::ThinDielectric { .. });

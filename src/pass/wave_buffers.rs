@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use super::{steps::PathDemand, surfaces::Surfaces};
+use super::{host_tracer::Answers, steps::PathDemand, surfaces::Surfaces};
 use crate::{
     error::Result,
     gpu::{Buffer, Capabilities, DescriptorSet, Device},
@@ -153,6 +153,17 @@ impl WaveBuffers {
     /// [`PathState`] of every path.
     pub fn paths(&self) -> &Buffer {
         &self.paths
+    }
+
+    /// Buffers that the host answers in where it traces.
+    pub(crate) fn answers(&self) -> Answers<'_> {
+        Answers {
+            rays: &self.rays,
+            hits: &self.hits,
+            shadow_rays: &self.shadow_rays,
+            visibility: &self.visibility,
+            path_lists: &self.path_lists,
+        }
     }
 
     /// Bytes by buffer name.

@@ -107,6 +107,7 @@ pub(crate) fn describe(device: &Device, scene: &Scene, settings: &Settings) -> M
         depth: settings.depth,
         device: capabilities.name.clone(),
         driver: capabilities.driver.clone(),
+        tracer: device.tracer_of(&scene.geometry),
         ..Metadata::default()
     }
 }

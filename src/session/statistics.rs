@@ -26,6 +26,7 @@ impl Session {
             height: window.height,
             device: metadata.device,
             driver: metadata.driver,
+            tracer: metadata.tracer,
             sampler: metadata.sampler,
             sampler_parameters: metadata.sampler_parameters,
             candidates: report.candidates,

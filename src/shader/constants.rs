@@ -63,7 +63,7 @@ const fn number(name: &str) -> u32 {
 specializations! {
     number;
 
-    // Specialization constants of `trace`, `shadow` and, but for the last two, `sample_and_trace`.
+    // Specialization constants of `trace`, `shadow` and, but for the last three, `sample_and_trace`.
     /// Number of triangle pages in use.
     CONSTANT_TRIANGLE_PAGES;
     /// Base-2 logarithm of the triangles per page.
@@ -72,6 +72,8 @@ specializations! {
     CONSTANT_RAYS_PER_INVOCATION;
     /// Finished lanes of a subgroup at which they take their next rays.
     CONSTANT_REFILL_LANES;
+    /// 1 where the host has answered, but for the rays that it leaves to the pass.
+    CONSTANT_ANSWERED;
 
     // Specialization constants of the passes that read textures.
     /// Number of pages of texels in use.
@@ -170,6 +172,10 @@ constants! {
     NO_MATERIAL = 0xffff_ffff;
     /// [`Hit::triangle`](super::structs::Hit::triangle) of a ray that met nothing.
     NO_TRIANGLE = 0xffff_ffff;
+    /// The same where the host leaves the ray to the pass `trace`.
+    TRIANGLE_LEFT = 0xffff_fffe;
+    /// Visibility of a shadow ray that the host leaves to the pass `shadow`.
+    VISIBILITY_LEFT = 2;
     /// Instance of a ray in the upper level of the tree, and of hits in scenes without instances.
     NO_INSTANCE = 0xffff_ffff;
 

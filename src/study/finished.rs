@@ -46,7 +46,7 @@ impl FinishedRuns<'_> {
             scene_hash: scene.hash.clone(),
             film: [scene.film.width, scene.film.height],
             device: capabilities.name.clone(),
-            driver: capabilities.driver.clone(),
+            driver: self.device.driver_and_tracer(),
             shadow_rays: self.plan.shadow_rays,
             depth: self.plan.depth,
             reference,

@@ -53,7 +53,7 @@ impl Circumstances {
             command,
             machine: machine(),
             device: capabilities.name.clone(),
-            driver: capabilities.driver.clone(),
+            driver: device.driver_and_tracer(),
         }
     }
 }

@@ -31,7 +31,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     film::Tone,
-    gpu::{Capabilities, Device},
+    gpu::{Capabilities, Device, Tracer},
     scene::Scene,
     session::Settings,
 };
@@ -47,6 +47,8 @@ const NO_DISPLAY_HELP: &str =
 pub struct Options {
     /// Device by index or name, as in [`Device::open`].
     pub device: Option<String>,
+    /// Choice of what traces.
+    pub tracer: Tracer,
     /// True to run with the validation layers.
     pub validate: bool,
     /// Refuses a device that must not be used.
@@ -285,9 +287,9 @@ fn render(
     window: Arc<Window>,
     proxy: EventLoopProxy<Report>,
 ) -> Result<()> {
-    let Options { device: wanted, validate, check, settings, spp, tone, folder } = options;
+    let Options { device: wanted, tracer, validate, check, settings, spp, tone, folder } = options;
     let display = window.display_handle().map_err(|error| no_window(&error))?.as_raw();
-    let device = Device::open_for_display(wanted.as_deref(), validate, display, check)?;
+    let device = Device::open_for_display(wanted.as_deref(), validate, tracer, display, check)?;
     let projector = Projector::new(&device, [scene.film.width, scene.film.height], inset::SIZE)?;
     let left = Side::new(&device, &scene, None, &settings, None)?;
     let size = window.inner_size();

@@ -3,8 +3,8 @@
 
 use fenestra::{
     accel::Accel,
-    gpu::{Buffer, Commands, DescriptorSet},
-    pass::{GeometryBuffers, Pass, Schedule, Surfaces},
+    gpu::{Buffer, DescriptorSet},
+    pass::{Answers, GeometryBuffers, Kernel, Pass, Recording, Schedule, Surfaces},
     scene::Geometry,
     shader::{
         bindings::{Binding, BindingTable, FILM, SCENE, WAVE, film, wave as bindings},
@@ -125,7 +125,7 @@ fn set(
     DescriptorSet::new(super::device(), table, &all).unwrap()
 }
 
-/// Geometry on the shared device.
+/// Geometry on the shared device, traced by it or by the host.
 pub struct OnDevice {
     geometry: GeometryBuffers,
     spare: Buffer,
@@ -136,8 +136,23 @@ pub struct OnDevice {
 
 impl OnDevice {
     pub fn new(accel: &Accel) -> Self {
+        Self::with(GeometryBuffers::new(super::device(), accel).unwrap())
+    }
+
+    /// Geometry that the device traces, and one that the host traces where the library for it is installed.
+    pub fn both(accel: &Accel) -> Vec<(&'static str, Self)> {
         let device = super::device();
         let geometry = GeometryBuffers::new(device, accel).unwrap();
+        let geometry = geometry.traced_by_host(device, accel, &|_| false).unwrap();
+        let host = geometry.host_tracer().is_some().then(|| ("host", Self::with(geometry)));
+        if host.is_none() {
+            eprintln!("not tested: there is no library by which the host traces (./setup)");
+        }
+        [("device", Self::new(accel))].into_iter().chain(host).collect()
+    }
+
+    fn with(geometry: GeometryBuffers) -> Self {
+        let device = super::device();
         let spare = Buffer::zeroed(device, "spare", 256).unwrap();
         let scene = set(&SCENE, &geometry.bindings(), &spare);
         let counters = Buffer::zeroed(device, "counters", size_of::<Counters>() as u64).unwrap();
@@ -156,14 +171,9 @@ impl OnDevice {
         let ray_buffer = Buffer::from_slice(device, "rays", rays).unwrap();
         let hits = Buffer::zeroed(device, "hits", (size_of::<Hit>() * rays.len()) as u64).unwrap();
         let own = [(bindings::RAY_TEXELS, &ray_buffer), (bindings::HITS, &hits)];
-        let wave_set = set(&WAVE, &own, &self.spare);
-        let pass =
-            Pass::new(device, self.geometry.traversal().trace(schedule, Surfaces::default()))
-                .unwrap();
-        let mut commands = Commands::begin(device).unwrap();
-        pass.record(&mut commands, &[&self.scene, &wave_set, &self.film], &wave(rays.len(), 0));
-        commands.submit_and_wait().unwrap();
-        super::assert_silent();
+        let answers = Answers { rays: &ray_buffer, hits: &hits, ..self.no_answers() };
+        let kernel = self.geometry.traversal().trace(schedule, Surfaces::default());
+        self.run(kernel, &own, answers, wave(rays.len(), 0));
         hits.download(rays.len()).unwrap()
     }
 
@@ -180,16 +190,31 @@ impl OnDevice {
             (bindings::SHADOW_RAY_TEXELS, &ray_buffer),
             (bindings::VISIBILITY, &visibility),
         ];
-        let wave_set = set(&WAVE, &own, &self.spare);
-        let pass =
-            Pass::new(device, self.geometry.traversal().shadow(schedule, Surfaces::default()))
-                .unwrap();
-        let mut commands = Commands::begin(device).unwrap();
+        let answers = Answers {
+            hits: &hit_buffer,
+            shadow_rays: &ray_buffer,
+            visibility: &visibility,
+            ..self.no_answers()
+        };
         let directions = (shadow_rays.len() / hits.len()) as u32;
-        let wave = wave(hits.len(), directions);
-        pass.record(&mut commands, &[&self.scene, &wave_set, &self.film], &wave);
-        commands.submit_and_wait().unwrap();
-        super::assert_silent();
+        let kernel = self.geometry.traversal().shadow(schedule, Surfaces::default());
+        self.run(kernel, &own, answers, wave(hits.len(), directions));
         visibility.download(shadow_rays.len()).unwrap()
+    }
+
+    fn no_answers(&self) -> Answers<'_> {
+        let none = &self.spare;
+        Answers { rays: none, hits: none, shadow_rays: none, visibility: none, path_lists: none }
+    }
+
+    fn run(&self, kernel: Kernel, own: &[(Binding, &Buffer)], answers: Answers<'_>, wave: Wave) {
+        let device = super::device();
+        let wave_set = set(&WAVE, own, &self.spare);
+        let pass = Pass::new(device, kernel).unwrap();
+        let host = self.geometry.host_tracer().map(|tracer| (tracer, answers));
+        let mut recording = Recording::begin(device, 1, host).unwrap();
+        recording.add(&pass, &[&self.scene, &wave_set, &self.film], &wave).unwrap();
+        recording.finish().unwrap();
+        super::assert_silent();
     }
 }

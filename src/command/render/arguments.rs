@@ -6,7 +6,9 @@ use std::{
 };
 
 use super::{
-    super::options::{SceneOptions, parse_crop, parse_duration, parse_pixel, parse_size},
+    super::options::{
+        DeviceOptions, SceneOptions, parse_crop, parse_duration, parse_pixel, parse_size,
+    },
     DEFAULT_SPP, QUICK_SPP,
 };
 use crate::{
@@ -75,9 +77,9 @@ pub struct Arguments {
     /// Write a checkpoint at this interval and at the end.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
     pub checkpoint_interval: Option<Duration>,
-    /// Device to use, by index or part of its name; see `fenestra devices`.
-    #[arg(long, value_name = "INDEX|NAME")]
-    pub device: Option<String>,
+    /// Device and tracer.
+    #[command(flatten)]
+    pub device: DeviceOptions,
     /// Run with the Vulkan validation layers; any message fails the command.
     #[arg(long)]
     pub validate: bool,

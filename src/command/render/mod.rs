@@ -56,9 +56,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let denoiser = arguments.denoise.then(Denoiser::load).transpose()?;
 
     interrupt.wait_for_caller();
-    let device = self_test::open(arguments.device.as_deref(), arguments.validate)?;
+    let device = arguments.device.open(arguments.validate)?;
     if !arguments.quiet {
-        self_test::announce(device.capabilities());
+        self_test::announce(&device);
     }
     if let Some(warning) = settings.sampler.portal_warning(&scene) {
         log::warn!("{warning}");

@@ -1,0 +1,76 @@
+//! Passes on their way to the device: one submission, or several where passes ask the host in between.
+
+use std::{sync::Arc, time::Instant};
+
+use super::{
+    host_tracer::{Answers, HostTracer},
+    kernel::Pass,
+};
+use crate::{
+    error::Result,
+    gpu::{Commands, DescriptorSet, Device, PassTimes},
+    shader::structs::Wave,
+};
+
+/// The host's tracer and the buffers of the wave whose rays it follows.
+pub type Host<'a> = (&'a HostTracer, Answers<'a>);
+
+/// Passes over a wave, in their order.
+pub struct Recording<'a> {
+    device: &'a Arc<Device>,
+    commands: Commands,
+    /// Passes of one submission, at most.
+    most_passes: u32,
+    times: PassTimes,
+    host: Option<Host<'a>>,
+}
+
+impl<'a> Recording<'a> {
+    /// Starts recording at most `most_passes` passes. Those of a scene that the host traces need `host`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Vulkan`] if a call fails.
+    pub fn begin(
+        device: &'a Arc<Device>,
+        most_passes: u32,
+        host: Option<Host<'a>>,
+    ) -> Result<Self> {
+        let commands = Commands::begin_timed(device, most_passes)?;
+        Ok(Self { device, commands, most_passes, times: PassTimes::new(), host })
+    }
+
+    /// Adds a pass. If it asks the host, waits for all before and lets the host answer first.
+    ///
+    /// # Errors
+    /// As [`Commands::submit_and_wait`].
+    pub fn add(&mut self, pass: &Pass, sets: &[&DescriptorSet], wave: &Wave) -> Result<()> {
+        if let (Some(question), Some((tracer, answers))) = (pass.kernel().question, &self.host) {
+            let next = Commands::begin_timed(self.device, self.most_passes)?;
+            let mut before = std::mem::replace(&mut self.commands, next);
+            before.make_visible_to_host();
+            add_times(&mut self.times, before.submit_and_wait()?);
+            let start = Instant::now();
+            tracer.answer(question, wave, answers)?;
+            let ms = start.elapsed().as_secs_f64() * 1e3;
+            *self.times.entry(pass.kernel().shader.to_owned()).or_default() += ms;
+        }
+        pass.record(&mut self.commands, sets, wave);
+        Ok(())
+    }
+
+    /// Submits, waits, and returns the time by pass, that of the host included.
+    ///
+    /// # Errors
+    /// As [`Commands::submit_and_wait`].
+    pub fn finish(self) -> Result<PassTimes> {
+        let mut times = self.times;
+        add_times(&mut times, self.commands.submit_and_wait()?);
+        Ok(times)
+    }
+}
+
+fn add_times(times: &mut PassTimes, more: PassTimes) {
+    for (pass, ms) in more {
+        *times.entry(pass).or_default() += ms;
+    }
+}
