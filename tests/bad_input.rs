@@ -461,20 +461,55 @@ fn an_output_never_replaces_an_input() {
     let contents = || before.iter().map(|name| fs::read(folder.path().join(name)).unwrap());
     let kept: Vec<_> = contents().collect();
     let guided = ["-o", "out.exr", "--sampler", "guided", "--save-guide", "./quad.obj"];
-    let cases: [(&[&str], &str); 6] = [
-        (&["-o", "m.exr"], "--output m.exr would replace m.exr, which this render reads"),
+    let twice = ["-o", "n.exr", "--sampler", "guided", "--save-guide", "./n.exr"];
+    let cases: [(&[&str], &str); 7] = [
+        (&["-o", "m.exr"], "--output m.exr would replace m.exr, which is read"),
         (
             &["-o", "out.exr", "--stats", "scene.toml"],
             "--stats scene.toml would replace scene.toml",
         ),
         (&["-o", "out.exr", "--stats", "quad.mtl"], "--stats quad.mtl would replace quad.mtl"),
         (&guided, "--save-guide ./quad.obj would replace quad.obj"),
+        (&twice, "--save-guide ./n.exr would replace the file of --output"),
         (&["-o", "out.exr", "--stats", "out.exr"], "--stats out.exr would replace the file of"),
         (&["-o", "out.exr", "--png", "--stats", "out.png"], "--stats out.png would replace"),
     ];
     for (options, message) in cases {
         let arguments = [&["render", "scene.toml", "--spp=2"], options].concat();
         folder.run(&arguments).assert(2, &[&format!("error: {message}")]);
+    }
+    assert_eq!(folder.files(), before);
+    assert_eq!(contents().collect::<Vec<_>>(), kept);
+}
+
+#[test]
+fn no_command_writes_over_what_it_reads() {
+    let folder = scene("constant = [1.0, 1.0, 1.0]", "map = \"m.exr\"");
+    let mut image = Image::new(8, 4);
+    image.insert_triple(["R", "G", "B"], &[[1.0; 3]; 32]);
+    image.write_exr(&folder.path().join("m.exr")).unwrap();
+    folder.run(&["export", "scene.toml", "s.xml", "--format=mitsuba"]).assert(0, &[]);
+    for name in ["a.exr", "b.exr"] {
+        folder.run(&["render", "scene.toml", "--spp=1", "-o", name]).assert(0, &[]);
+    }
+    std::os::unix::fs::symlink("a.exr", folder.path().join("soft.exr")).unwrap();
+    fs::hard_link(folder.path().join("a.exr"), folder.path().join("hard.exr")).unwrap();
+    let before = folder.files();
+    let contents = || before.iter().map(|name| fs::read(folder.path().join(name)).ok());
+    let kept: Vec<_> = contents().collect();
+    let mut commands: Vec<Vec<&str>> = vec![
+        vec!["fit", "env", "m.exr", "-o", "m.exr"],
+        vec!["fit", "env", "scene.toml", "-o", "./scene.toml"],
+        vec!["export", "s.xml", "./s.xml", "--format=mitsuba"],
+        vec!["export", "s.xml", "s.pbrt", "--format=pbrt"],
+    ];
+    for name in ["a.exr", "./a.exr", "soft.exr", "hard.exr"] {
+        commands.push(vec!["merge", "a.exr", "b.exr", "-o", name]);
+        commands.push(vec!["compare", "a.exr", "b.exr", "--heatmap", name]);
+        commands.push(vec!["convert", "a.exr", name]);
+    }
+    for command in commands {
+        folder.run(&command).assert(2, &[" would replace ", ", which is read"]);
     }
     assert_eq!(folder.files(), before);
     assert_eq!(contents().collect::<Vec<_>>(), kept);

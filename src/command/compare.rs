@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{
     error::{Error, Result},
+    files::check_replaces_nothing,
     film::{Attribute, Image},
     study::{
         falsecolour::{self, Scale},
@@ -64,6 +65,12 @@ fn parse_threshold(text: &str) -> Result<(String, f64), String> {
 pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(high) = arguments.heatmap_high.filter(|high| !(high.is_finite() && *high > 0.0)) {
         return Err(Error::usage(format!("--heatmap-high {high}: expected a positive number")));
+    }
+    if let Some(heatmap) = &arguments.heatmap {
+        let second = arguments.second_reference.as_deref();
+        let inputs = [Some(&*arguments.image), Some(&*arguments.reference), second];
+        let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
+        check_replaces_nothing(&[("--heatmap", heatmap)], &inputs)?;
     }
     let image = Image::read_exr(&arguments.image)?;
     let reference = Image::read_exr(&arguments.reference)?;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::{denoise::denoise, options::parse_crop};
 use crate::{
     error::{Error, Result},
-    files::{check_writable, extension, is_same_file},
+    files::{check_replaces_nothing, check_writable, extension},
     film::{
         Curve, Image, RgbImage, Tone, Window,
         denoised::DENOISED,
@@ -74,12 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             output.display()
         )));
     }
-    if is_same_file(path, output) {
-        return Err(Error::usage(format!(
-            "{} would replace the image it is made of",
-            output.display()
-        )));
-    }
+    check_replaces_nothing(&[("the output", output)], &[path])?;
     check_writable(output)?;
     let denoiser = arguments.denoise.then(Denoiser::load).transpose()?;
     let mut image = Image::read_exr(path)?;

@@ -1,6 +1,6 @@
 //! `fenestra export`: writes a scene for another renderer.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::{
     error::{Error, Result},
@@ -72,6 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     } else {
         arguments.output.join("scene").with_extension(extension)
     };
+    check_outputs(&scene, &output)?;
     let export = match arguments.format {
         Format::Mitsuba => mitsuba::export(&scene, &output, settings),
         Format::Pbrt => pbrt::export(&scene, &output, settings),
@@ -87,4 +88,22 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     export.write()?;
     super::print_line(&output.display().to_string())
+}
+
+/// Checks that neither the file nor the folder beside it would replace what the scene was read from.
+fn check_outputs(scene: &Scene, output: &Path) -> Result<()> {
+    let inputs: Vec<&Path> = scene.inputs.iter().map(PathBuf::as_path).collect();
+    files::check_replaces_nothing(&[("the export", output)], &inputs)?;
+    let folder = output.with_extension("");
+    let Ok(canonical) = folder.canonicalize() else { return Ok(()) };
+    let lies_in =
+        |input: &&&Path| input.canonicalize().is_ok_and(|path| path.starts_with(&canonical));
+    match inputs.iter().find(lies_in) {
+        Some(input) => Err(Error::usage(format!(
+            "the export's folder {} would replace {}, which is read",
+            folder.display(),
+            input.display()
+        ))),
+        None => Ok(()),
+    }
 }

@@ -6,6 +6,7 @@ use clap::ValueEnum;
 
 use crate::{
     error::{Error, Result},
+    files::check_replaces_nothing,
     film::{
         Aov, Checkpoint, Image, Metadata,
         checkpoint::is_checkpoint_path,
@@ -36,6 +37,8 @@ pub struct Arguments {
 /// # Errors
 /// Unreadable files, parts of different renders, samples held by two parts, an unwritable output.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let parts: Vec<&Path> = arguments.parts.iter().map(PathBuf::as_path).collect();
+    check_replaces_nothing(&[("--output", &arguments.output)], &parts)?;
     let mut images = Vec::new();
     for path in &arguments.parts {
         images.push((path.as_path(), Image::read_exr(path)?));

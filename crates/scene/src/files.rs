@@ -270,16 +270,49 @@ fn name_of(kind: FileType) -> &'static str {
     if is_pipe_or_socket(kind) { "a pipe or socket" } else { "a device" }
 }
 
-/// Tests whether two paths lead to the same existing file.
-pub fn is_same_file(one: &Path, other: &Path) -> bool {
+/// Identity of a file, by whatever path it is reached. A file that is not there yet has the
+/// folder in which it would lie, and its name.
+fn identity(path: &Path) -> Option<(PathBuf, [u64; 2])> {
     #[cfg(unix)]
-    let identity = |path: &Path| {
+    if let Ok(metadata) = fs::metadata(path) {
         use std::os::unix::fs::MetadataExt;
-        fs::metadata(path).ok().map(|metadata| (metadata.dev(), metadata.ino()))
-    };
-    #[cfg(not(unix))]
-    let identity = |path: &Path| path.canonicalize().ok();
-    identity(one).is_some_and(|found| identity(other) == Some(found))
+        return Some((PathBuf::new(), [metadata.dev(), metadata.ino()]));
+    }
+    let canonical = path.canonicalize().ok().or_else(|| {
+        let folder = path.parent().filter(|folder| *folder != Path::new(""));
+        let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
+        Some(folder.join(path.file_name()?))
+    });
+    canonical.map(|path| (path, [0; 2]))
+}
+
+/// Tests whether two paths lead to the same file: through links, and also where it is not there yet.
+pub fn is_same_file(one: &Path, other: &Path) -> bool {
+    one == other || identity(one).is_some_and(|found| identity(other) == Some(found))
+}
+
+/// Checks that none of the `outputs`, each with the option that asks for it, would replace one of the
+/// `inputs` or another output.
+///
+/// # Errors
+/// [`Error::Usage`] if one would.
+pub fn check_replaces_nothing(outputs: &[(&str, &Path)], inputs: &[&Path]) -> Result<()> {
+    for (index, (name, path)) in outputs.iter().enumerate() {
+        if is_special_file(path) {
+            continue;
+        }
+        let message = |what: &str| {
+            Err(Error::usage(format!("{name} {} would replace {what}", path.display())))
+        };
+        if let Some(input) = inputs.iter().find(|input| is_same_file(input, path)) {
+            return message(&format!("{}, which is read", input.display()));
+        }
+        let before = &outputs[..index];
+        if let Some((other, _)) = before.iter().find(|(_, other)| is_same_file(other, path)) {
+            return message(&format!("the file of {other}"));
+        }
+    }
+    Ok(())
 }
 
 /// Largest compression of real pixels by OpenEXR's lossless methods; a header that promises more

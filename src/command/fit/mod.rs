@@ -10,6 +10,7 @@ use clap::Subcommand;
 use super::progress::Progress;
 use crate::{
     error::Result,
+    files::check_replaces_nothing,
     fit::{
         BrdfOptions, Cache, EnvironmentOptions, Fit, Method, brdf_lobes, environment_lobes,
         picture,
@@ -121,9 +122,17 @@ fn cache(shared: &Shared) -> Option<Cache> {
     if shared.no_cache { None } else { Cache::user() }
 }
 
-/// Returns the output path: `--output`, or the source's name with extension `fit`.
-fn output(shared: &Shared, name: &str) -> PathBuf {
-    shared.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.fit")))
+/// Returns the paths of the fit, which is `--output` or the source's name with extension `fit`, and of its
+/// picture.
+///
+/// # Errors
+/// [`crate::Error::Usage`] if either is one of the `inputs`.
+fn outputs(shared: &Shared, name: &str, inputs: &[PathBuf]) -> Result<[PathBuf; 2]> {
+    let fit = shared.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.fit")));
+    let picture = fit.with_extension("png");
+    let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+    check_replaces_nothing(&[("the fit", &fit), ("its picture", &picture)], &inputs)?;
+    Ok([fit, picture])
 }
 
 /// Prints the figures of a fit and the files written.
@@ -151,13 +160,12 @@ fn report(
 
 fn environment(arguments: &EnvironmentArguments) -> Result<()> {
     let shared = &arguments.shared;
-    let (map, name) = source::environment(&arguments.map)?;
+    let (map, name, inputs) = source::environment(&arguments.map)?;
+    let [path, picture_path] = outputs(shared, &name, &inputs)?;
     let options = EnvironmentOptions { lobes: arguments.lobes, method: shared.method };
     let fit = with_progress(&format!("fit {name}"), shared.quiet, |progress| {
         environment_lobes(&map, options, cache(shared).as_ref(), progress)
     })?;
-    let path = output(shared, &name);
-    let picture_path = path.with_extension("png");
     write_fit(&path, &Fit::Environment(fit.clone()))?;
     picture::write_environment(&picture_path, &map, &fit)?;
     let took = (fit.seconds, fit.is_cached);
@@ -170,12 +178,11 @@ fn brdf(arguments: &BrdfArguments) -> Result<()> {
     let options =
         BrdfOptions { lobes: arguments.lobes, views: arguments.views, method: shared.method };
     let name = &source.name;
+    let [path, picture_path] = outputs(shared, name, &source.inputs)?;
     let fit = with_progress(&format!("fit {name}"), shared.quiet, |progress| {
         let cache = cache(shared);
         brdf_lobes(&source.tables, 0, &arguments.material, options, cache.as_ref(), progress)
     })?;
-    let path = output(shared, name);
-    let picture_path = path.with_extension("png");
     write_fit(&path, &Fit::Brdf(fit.clone()))?;
     picture::write_brdf(&picture_path, &source.tables, 0, &fit)?;
     let took = (fit.seconds, fit.is_cached);

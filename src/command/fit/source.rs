@@ -1,6 +1,6 @@
 //! Source of a fit: the user's text → map or material.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::{
     brdf::MaterialTables,
@@ -28,6 +28,8 @@ pub(crate) struct Source {
     pub name: String,
     /// Tables of this one material.
     pub tables: MaterialTables,
+    /// Files that it was read from.
+    pub inputs: Vec<PathBuf>,
 }
 
 /// Tests for the extension of a measured BRDF.
@@ -45,20 +47,20 @@ fn warn(warnings: &[String]) {
     }
 }
 
-/// Loads a map, or the environment of a scene, and derives a name for files.
+/// Loads a map, or the environment of a scene; derives a name for files, and tells which were read.
 ///
 /// # Errors
 /// Those of the readers.
-pub(super) fn environment(path: &Path) -> Result<(EnvironmentMap, String)> {
+pub(super) fn environment(path: &Path) -> Result<(EnvironmentMap, String, Vec<PathBuf>)> {
     if extension(path) == "toml" {
         let scene = Scene::load(path)?;
         warn(&scene.warnings);
-        return Ok((scene.environment, format!("{}_environment", scene.name)));
+        return Ok((scene.environment, format!("{}_environment", scene.name), scene.inputs));
     }
     let mut warnings = Vec::new();
     let map = EnvironmentMap::load(path, 1.0, 0.0, &mut warnings)?;
     warn(&warnings);
-    Ok((map, stem(path)))
+    Ok((map, stem(path), vec![path.into()]))
 }
 
 /// Loads a material from a measured file, `SCENE#name` or `TYPE:key=value,…`.
@@ -83,14 +85,14 @@ pub(super) fn material(text: &str) -> Result<Source> {
             ));
         };
         let tables = MaterialTables::new(std::slice::from_ref(found))?;
-        return Ok(Source { name: format!("{}_{name}", scene.name), tables });
+        return Ok(Source { name: format!("{}_{name}", scene.name), tables, inputs: scene.inputs });
     }
     if is_measured(path) {
         let table = MeasuredTable::load(path)?;
         warn(&table.warnings);
         let kind = MaterialKind::Measured { path: path.to_path_buf(), table: table.into() };
         let tables = MaterialTables::new(&[Material::new(stem(path), kind)])?;
-        return Ok(Source { name: stem(path), tables });
+        return Ok(Source { name: stem(path), tables, inputs: vec![path.into()] });
     }
     Err(Error::usage(format!(
         "`{text}` is no BRDF; expected a .binary or .brdf file, SCENE.toml#material, or \
@@ -146,7 +148,8 @@ fn in_words(text: &str, kind: &str, keys: &str) -> Result<Source> {
     let name: String =
         text.chars().map(|c| if c.is_ascii_alphanumeric() || c == '.' { c } else { '_' }).collect();
     // A dot would be taken for an extension.
-    Ok(Source { name: name.replace('.', "p"), tables: MaterialTables::new(&scene.materials)? })
+    let tables = MaterialTables::new(&scene.materials)?;
+    Ok(Source { name: name.replace('.', "p"), tables, inputs: scene.inputs })
 }
 
 #[cfg(test)]

@@ -53,7 +53,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     for text in &arguments.sources {
         let path = Path::new(text);
         if ["hdr", "exr", "pfm", "toml"].contains(&extension(path).as_str()) {
-            let (map, name) = source::environment(path)?;
+            let (map, name, _) = source::environment(path)?;
             environment(arguments, &map, &name, &mut maps)?;
         } else {
             brdf(arguments, text, &mut brdfs)?;

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    files::{check_writable, is_same_file, is_special_file},
+    files::{check_replaces_nothing, check_writable, is_special_file},
     film::{Aov, Window, checkpoint::checkpoint_path},
     pass::Roulette,
     sampler::{Parameters, Sampler},
@@ -162,31 +162,15 @@ impl Arguments {
             ("--stats", self.stats.as_deref()),
             ("--save-guide", self.save_guide.as_deref()),
         ];
+        let given = asked.into_iter().filter_map(|(name, path)| Some((name, path?)));
         // An interrupt writes a checkpoint without being asked to.
         let checkpoint = checkpoint_path(output);
-        let mut seen: Vec<(&str, &Path)> = Vec::new();
-        for (name, path) in asked.into_iter().chain([("the checkpoint", Some(&*checkpoint))]) {
-            let Some(path) = path.filter(|path| !is_special_file(path)) else {
-                continue;
-            };
-            let started_from = self.load_guide.as_deref().filter(|_| name != "--save-guide");
-            let mut inputs = scene.inputs.iter().map(PathBuf::as_path).chain(started_from);
-            if let Some(input) = inputs.find(|input| is_same_file(input, path)) {
-                return Err(Error::usage(format!(
-                    "{name} {} would replace {}, which this render reads",
-                    path.display(),
-                    input.display()
-                )));
-            }
-            let is_same = |(_, other): &&(&str, &Path)| *other == path || is_same_file(other, path);
-            if let Some((other, _)) = seen.iter().find(is_same) {
-                return Err(Error::usage(format!(
-                    "{name} {} would replace the file of {other}",
-                    path.display()
-                )));
-            }
-            seen.push((name, path));
-        }
+        let mut outputs: Vec<(&str, &Path)> =
+            given.chain([("the checkpoint", &*checkpoint)]).collect();
+        let inputs: Vec<&Path> = scene.inputs.iter().map(PathBuf::as_path).collect();
+        check_replaces_nothing(&outputs, &inputs)?;
+        outputs.retain(|(name, _)| *name != "--save-guide");
+        check_replaces_nothing(&outputs, self.load_guide.as_deref().as_slice())?;
         asked.into_iter().filter_map(|(_, path)| path).try_for_each(check_writable)
     }
 
