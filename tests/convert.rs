@@ -95,7 +95,7 @@ fn wrong_use_is_named() {
     folder.write("text.exr", "no image");
     let cases: [(&[&str], i32, &str); 9] = [
         (&["in.exr", "out.gif"], 2, "expected a name that ends in .png, .jpg, .hdr or .exr"),
-        (&["in.exr", "in.exr"], 2, "would replace the image it is made of"),
+        (&["in.exr", "in.exr"], 2, "the output in.exr would replace in.exr, which is read"),
         (&["in.exr", "out.hdr", "--curve", "filmic"], 2, "a curve is for PNG and JPEG"),
         (
             &["in.exr", "out.png", "--crop", "0,0,2,2"],

@@ -64,7 +64,7 @@ fn every_mode_is_unbiased_in_a_room() {
     agree(
         &scenes::mixed_room(),
         1,
-        20,
+        40,
         &[
             ("as measured", with(1, &|settings| settings.parameters.candidates = None)),
             ("one-sample", with(1, &unchanged)),
