@@ -512,7 +512,7 @@ fn check_surfaces(accel: &Accel, on_device: &OnDevice) {
         assert!(geometric.dot(direction) <= 0.0, "{hit:?}");
         assert!(shading.dot(direction) < 0.0, "{hit:?}");
         assert!(position.distance(origin + hit.distance * direction) < 1e-5, "{hit:?}");
-        let twin = surface_at(&accel, hit.triangle, NO_INSTANCE, origin, direction);
+        let twin = surface_at(accel, hit.triangle, NO_INSTANCE, origin, direction);
         assert!(twin.position.distance(position) < 1e-6, "{hit:?} {twin:?}");
         assert!(twin.geometric_normal.distance(geometric) < 1e-5, "{hit:?} {twin:?}");
         assert!(twin.shading_normal.distance(shading) < 1e-4, "{hit:?} {twin:?}");

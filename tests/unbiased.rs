@@ -230,7 +230,7 @@ fn in_the_scenes_of_the_thesis() {
             Sampler::Product,
             Sampler::Visibility,
         ];
-        samplers_agree(&scene, 1, 16, &samplers);
+        samplers_agree(&scene, 1, 48, &samplers);
     }
 }
 
