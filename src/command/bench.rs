@@ -176,7 +176,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         film,
         device: capabilities.name.clone(),
         driver: capabilities.driver.clone(),
-        tracer: device.tracer(),
+        tracer: renderer.tracer(),
         sampler: arguments.sampler.name(),
         shadow_rays_per_hit: arguments.shadow_rays,
         depth: arguments.depth,

@@ -93,7 +93,7 @@ pub struct Metadata {
     pub device: String,
     /// Its driver.
     pub driver: String,
-    /// Its tracer, as [`Device::tracer`](crate::gpu::Device::tracer) names it.
+    /// Its tracer: "device", or "Embree" with its version.
     pub tracer: String,
 }
 

@@ -19,10 +19,7 @@ use super::{
     pipelines::Pipelines,
     set_layouts::SetLayouts,
 };
-use crate::{
-    error::{Error, Result},
-    scene::Geometry,
-};
+use crate::error::{Error, Result};
 
 /// Part of the machine that traces rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -197,11 +194,6 @@ impl Device {
     /// Names what traces: "device" or "Embree 3.13.5".
     pub fn tracer(&self) -> String {
         tracer_name(self.embree.as_ref())
-    }
-
-    /// Names what traces a geometry: the device where there are instances.
-    pub(crate) fn tracer_of(&self, geometry: &Geometry) -> String {
-        tracer_name(self.embree.as_ref().filter(|_| geometry.instances.is_empty()))
     }
 
     /// The library by which the host traces, if it does.

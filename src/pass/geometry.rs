@@ -78,7 +78,13 @@ impl GeometryBuffers {
         accel: &Accel,
         passes: &dyn Fn(u32) -> bool,
     ) -> Result<Self> {
-        let Some(embree) = device.embree().filter(|_| !self.is_instanced) else { return Ok(self) };
+        let Some(embree) = device.embree() else { return Ok(self) };
+        if self.is_instanced {
+            if device.must_trace_on_host() {
+                log::warn!("--tracer host: the device traces scenes with instances");
+            }
+            return Ok(self);
+        }
         match HostTracer::new(embree, accel, &self.pages, passes) {
             Ok(tracer) => Ok(Self { host_tracer: Some(tracer), ..self }),
             Err(Error::Memory { message, .. }) if !device.must_trace_on_host() => {

@@ -280,6 +280,14 @@ impl Runner {
         &self.device
     }
 
+    /// Names what traces this scene, as [`Device::tracer`] does: the device where the host has no tree.
+    pub(crate) fn tracer(&self) -> String {
+        match self.scene.geometry().host_tracer() {
+            Some(_) => self.device.tracer(),
+            None => "device".to_owned(),
+        }
+    }
+
     /// The scene on the device.
     pub(crate) fn scene(&self) -> &SceneBuffers {
         &self.scene

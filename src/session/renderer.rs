@@ -198,6 +198,11 @@ impl Renderer {
         self.sample_count
     }
 
+    /// Names what traces: "device", or "Embree" with its version.
+    pub fn tracer(&self) -> String {
+        self.runner.tracer()
+    }
+
     /// Counts and device times so far.
     pub fn totals(&self) -> &Totals {
         self.runner.totals()

@@ -91,6 +91,7 @@ pub struct Session {
 /// Describes a render by its settings, without fits, samples and times.
 pub(crate) fn describe(device: &Device, scene: &Scene, settings: &Settings) -> Metadata {
     let capabilities = device.capabilities();
+    let is_instanced = !scene.geometry.instances.is_empty();
     let mut parameters = settings.sampler.describe(&settings.parameters);
     let roulette = settings.roulette;
     if settings.depth > roulette.vertex {
@@ -107,7 +108,7 @@ pub(crate) fn describe(device: &Device, scene: &Scene, settings: &Settings) -> M
         depth: settings.depth,
         device: capabilities.name.clone(),
         driver: capabilities.driver.clone(),
-        tracer: device.tracer_of(&scene.geometry),
+        tracer: if is_instanced { "device".to_owned() } else { device.tracer() },
         ..Metadata::default()
     }
 }
@@ -120,11 +121,11 @@ impl Session {
 
     /// Drives a renderer of `scene` that has no samples yet.
     pub fn of(renderer: Renderer, device: &Device, scene: &Scene) -> Self {
-        let fit_hashes = renderer.report().fit_hashes;
+        let (fit_hashes, tracer) = (renderer.report().fit_hashes, renderer.tracer());
         let description = describe(device, scene, renderer.settings());
         Self {
             renderer,
-            description: Metadata { fit_hashes, ..description },
+            description: Metadata { fit_hashes, tracer, ..description },
             pace: PACE,
             last_pass: None,
             earlier_seconds: 0.0,
