@@ -379,7 +379,7 @@ fn shared_and_damaged_pipelines_change_no_picture() {
     let start = |name: &&str| {
         let mut command = program(folder.path());
         command.env("XDG_CACHE_HOME", &cache);
-        command.args(["render", "scene.toml", "-q", "--spp=2", "-o", name]);
+        command.args(["render", "scene.toml", "-q", "--spp=2", "--sampler=cosine", "-o", name]);
         command.stderr(Stdio::piped()).spawn().unwrap()
     };
     let end = |child: process::Child| Run::of(&child.wait_with_output().unwrap()).assert(0, &[]);

@@ -502,7 +502,8 @@ fn a_guide_loaded_with_its_own_seed_is_unbiased() {
     const SAMPLES: u32 = 4;
     let mut scene = scenes::mixed_room();
     (scene.film.width, scene.film.height) = (16, 8);
-    let settings = Settings { shadow_rays: 1, ..guided(1) };
+    let mut settings = Settings { shadow_rays: 1, ..guided(1) };
+    settings.parameters.guided.regions = 64;
     let mean = |renderer: &Renderer| {
         let sums = renderer.sums().unwrap();
         let pixels = 0..sums.pixel_count();

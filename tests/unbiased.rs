@@ -209,7 +209,7 @@ fn with_escaped_bounces_past_mirrors_glass_and_lamps() {
 }
 
 /// Tests the thesis's scenes of real meshes, measured BRDFs and the Uffizi map, where they are at
-/// hand: 5 comparisons in 4 scenes with 72 values each raise a false alarm once in about 240 runs.
+/// hand: 2 comparisons in 4 scenes with 72 values each raise a false alarm once in about 600 runs.
 #[test]
 fn in_the_scenes_of_the_thesis() {
     let _alone = support::alone();
@@ -222,15 +222,7 @@ fn in_the_scenes_of_the_thesis() {
         }
         let mut scene = Scene::load(&path).unwrap();
         (scene.film.width, scene.film.height) = (48, 32);
-        let samplers = [
-            Sampler::Mis,
-            Sampler::Brdf,
-            Sampler::Env,
-            Sampler::Ris,
-            Sampler::Product,
-            Sampler::Visibility,
-        ];
-        samplers_agree(&scene, 1, 48, &samplers);
+        samplers_agree(&scene, 1, 24, &[Sampler::Mis, Sampler::Product, Sampler::Visibility]);
     }
 }
 
