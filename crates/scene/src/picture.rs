@@ -7,13 +7,16 @@
 use std::{
     collections::BTreeMap,
     fs::File,
-    io::{BufReader, BufWriter, Cursor, Write},
+    io::{self, BufRead, BufReader, BufWriter, Cursor, Read, Seek, SeekFrom, Write},
     path::Path,
 };
 
 use exr::{
     block::lines::LineRefMut,
-    image::write::samples::{SamplesWriter, WritableSamples},
+    image::write::{
+        layers::WritableLayers,
+        samples::{SamplesWriter, WritableSamples},
+    },
     math::RoundingMode,
     meta::{
         attribute::{LevelMode, SampleType},
@@ -21,7 +24,8 @@ use exr::{
     },
     prelude::{
         AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, IntegerBounds, Layer,
-        LayerAttributes, LineOrder, ReadChannels, ReadLayers, Text, Vec2, WritableImage,
+        LayerAttributes, LineOrder, ReadChannels, ReadLayers, SpecificChannels, Text, Vec2,
+        WritableImage,
         attribute::{AttributeValue, Chromaticities},
     },
 };
@@ -286,7 +290,7 @@ impl Image {
         let layer = Layer::new(
             (self.width as usize, self.height as usize),
             attributes,
-            Encoding { compression, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing },
+            encoding(compression),
             AnyChannels::sort(channels),
         );
         let mut image = exr::prelude::Image::from_layer(layer);
@@ -294,15 +298,7 @@ impl Image {
         image.attributes.display_window =
             IntegerBounds::from_dimensions((film_width as usize, film_height as usize));
         image.attributes.chromaticities = Some(REC_709);
-        write_atomically(path, |file: &mut BufWriter<File>| {
-            if !is_special_file(path) {
-                return image.write().to_buffered(file).map_err(io_error);
-            }
-            // The encoder goes back to fill its tables, which a stream cannot.
-            let mut bytes = Cursor::new(Vec::new());
-            image.write().to_buffered(&mut bytes).map_err(io_error)?;
-            file.write_all(bytes.get_ref())
-        })
+        write_file(path, &image)
     }
 
     /// Reads the first flat layer of an OpenEXR file; half and integer channels become floats.
@@ -314,7 +310,7 @@ impl Image {
         let open = || open_regular(path);
         let malformed = |error: exr::error::Error| match error {
             exr::error::Error::Io(source)
-                if source.kind() != std::io::ErrorKind::UnexpectedEof
+                if source.kind() != io::ErrorKind::UnexpectedEof
                     && source.raw_os_error().is_some() =>
             {
                 Error::io(path, "read", source)
@@ -405,6 +401,49 @@ impl Image {
     }
 }
 
+/// Writes the channels `R`, `G`, `B` with ZIP compression, atomically, by the colours of columns and rows,
+/// which are not held in memory.
+///
+/// # Errors
+/// As [`Image::write_exr`].
+pub(crate) fn write_colors(
+    path: &Path,
+    [width, height]: [usize; 2],
+    color: impl Fn(usize, usize) -> [f32; 3] + Sync,
+) -> Result<()> {
+    let channels = SpecificChannels::rgb(|Vec2(column, row)| {
+        let [red, green, blue] = color(column, row);
+        (red, green, blue)
+    });
+    let encoding = encoding(Compression::ZIP16);
+    let layer = Layer::new((width, height), LayerAttributes::default(), encoding, channels);
+    let mut image = exr::prelude::Image::from_layer(layer);
+    image.attributes.chromaticities = Some(REC_709);
+    write_file(path, &image)
+}
+
+fn encoding(compression: Compression) -> Encoding {
+    Encoding { compression, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing }
+}
+
+fn write_file<'a, L: WritableLayers<'a>>(
+    path: &Path,
+    image: &'a exr::prelude::Image<L>,
+) -> Result<()> {
+    write_atomically(path, |file: &mut BufWriter<File>| {
+        if !is_special_file(path) {
+            image.write().to_buffered(&mut *file).map_err(io_error)?;
+            file.flush()?;
+            return sort_attributes(file.get_mut());
+        }
+        // The encoder goes back to fill its tables, which a stream cannot.
+        let mut bytes = Cursor::new(Vec::new());
+        image.write().to_buffered(&mut bytes).map_err(io_error)?;
+        sort_attributes(&mut bytes)?;
+        file.write_all(bytes.get_ref())
+    })
+}
+
 /// Samples of a channel, borrowed so that large films are not copied.
 struct BorrowedSamples<'a>(&'a [f32]);
 
@@ -439,6 +478,31 @@ impl SamplesWriter for BorrowedWriter<'_> {
     }
 }
 
+/// Sorts the attributes in the header of an OpenEXR file: the encoder's order differs from run to run.
+fn sort_attributes(file: &mut (impl Read + Write + Seek)) -> io::Result<()> {
+    // Behind the magic number and the version
+    file.seek(SeekFrom::Start(8))?;
+    let mut reader = BufReader::new(&mut *file);
+    let mut attributes = Vec::new();
+    loop {
+        let mut attribute = Vec::new();
+        // An empty name ends the header; name and type end with a zero.
+        if reader.read_until(0, &mut attribute)? <= 1 {
+            break;
+        }
+        reader.read_until(0, &mut attribute)?;
+        let mut length = [0; 4];
+        reader.read_exact(&mut length)?;
+        attribute.extend(length);
+        let length = u64::from(u32::from_le_bytes(length));
+        reader.by_ref().take(length).read_to_end(&mut attribute)?;
+        attributes.push(attribute);
+    }
+    attributes.sort_unstable();
+    file.seek(SeekFrom::Start(8))?;
+    file.write_all(&attributes.concat())
+}
+
 /// Encodes `value` as OpenEXR text in UTF-8.
 fn text(value: &str) -> Text {
     Text::from_slice_unchecked(value.as_bytes())
@@ -449,9 +513,9 @@ fn string(value: &Text) -> String {
     String::from_utf8_lossy(value.as_slice()).into_owned()
 }
 
-fn io_error(error: exr::error::Error) -> std::io::Error {
+fn io_error(error: exr::error::Error) -> io::Error {
     match error {
         exr::error::Error::Io(source) => source,
-        other => std::io::Error::other(other.to_string()),
+        other => io::Error::other(other.to_string()),
     }
 }

@@ -73,6 +73,17 @@ fn images_come_back_as_they_were() {
 }
 
 #[test]
+fn the_same_image_gives_the_same_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = |name: &str| {
+        let path = folder.path().join(name);
+        example().write_exr(&path).unwrap();
+        fs::read(&path).unwrap()
+    };
+    assert!((0..4).all(|_| bytes("a.exr") == bytes("b.exr")));
+}
+
+#[test]
 fn every_bit_survives_compression() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bits.exr");

@@ -2,11 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use glam::Vec3;
+
 use super::{
     parts::Part,
     ply::{self, Attributes},
 };
-use crate::{EnvironmentMap, error::Result, files, picture::Image};
+use crate::{error::Result, files, picture::write_colors};
 
 /// Folder of the same name beside the scene file.
 pub(super) struct Folder {
@@ -39,13 +41,15 @@ impl Folder {
         Ok(self.relative(name))
     }
 
-    /// Writes the environment as `image` lays it out; returns its path as the scene file calls it.
+    /// Writes the environment by its radiance in columns and rows; returns its path as the scene file
+    /// calls it.
     pub(super) fn write_environment(
         &self,
-        map: &EnvironmentMap,
-        image: fn(&EnvironmentMap) -> Image,
+        size: [usize; 2],
+        radiance: impl Fn(usize, usize) -> Vec3 + Sync,
     ) -> Result<String> {
-        image(map).write_exr(&self.path.join(ENVIRONMENT))?;
+        let color = |column: usize, row: usize| radiance(column, row).to_array();
+        write_colors(&self.path.join(ENVIRONMENT), size, color)?;
         Ok(self.relative(ENVIRONMENT))
     }
 }

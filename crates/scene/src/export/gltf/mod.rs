@@ -15,7 +15,6 @@ mod nodes;
 
 use std::{io::Write, path::Path};
 
-use glam::Vec3;
 use serde_json::{Map, Value, json};
 
 use self::{
@@ -29,7 +28,7 @@ use super::{
     portal_warning,
     subject::Subject,
 };
-use crate::{EnvironmentMap, Scene, files, picture::Image};
+use crate::{Scene, files};
 
 /// Translates the materials and lamps for a scene file at `path`, without writing anything.
 pub fn export<'a>(scene: &'a Scene, path: &Path) -> Export<'a> {
@@ -106,7 +105,10 @@ pub fn export<'a>(scene: &'a Scene, path: &Path) -> Export<'a> {
         }
         textures.add_to(&mut document, uri_of);
         textures.write(&folder.path)?;
-        folder.write_environment(&scene.environment, unturned)?;
+        // As it is, before its rotation
+        let map = &scene.environment;
+        let (width, height) = (map.width as usize, map.height as usize);
+        folder.write_environment([width, height], |x, y| map.texels[y * width + x])?;
         files::write_json(&path, &document)
     })
 }
@@ -142,12 +144,6 @@ fn meshes(scene: &Scene, parts: &[Parts]) -> (Vec<Value>, Buffer) {
         }
     }
     (meshes, buffer)
-}
-
-/// The environment as it is, before its rotation.
-fn unturned(map: &EnvironmentMap) -> Image {
-    let texels: Vec<[f32; 3]> = map.texels.iter().map(Vec3::to_array).collect();
-    Image::of_rgb(map.width, map.height, &texels)
 }
 
 /// Name as a part of a URI (RFC 3986).

@@ -7,7 +7,6 @@ use crate::{
     error::Result,
     export::{folder::Folder, triple},
     lamp::{LampKind, SpotFalloff},
-    picture::Image,
 };
 
 /// Returns the emitter of a lamp, and warns where it is not Fenestra's.
@@ -80,25 +79,17 @@ pub(super) fn write_environment(map: &EnvironmentMap, folder: &Folder) -> Result
             triple(radiance)
         ));
     }
+    let (width, height) = (map.width as usize, map.height as usize);
+    let texel = |column: usize, row: usize| map.texels[row * width + column];
+    let file = folder.write_environment([width, 2 * height + 1], |column, row| {
+        let [above, below] = [row.saturating_sub(1) / 2, (row / 2).min(height - 1)];
+        0.5 * texel(column, above) + 0.5 * texel(column, below)
+    })?;
     Ok(format!(
         "    <emitter type=\"envmap\">\n        <string name=\"filename\" value=\"{}\"/>\n        \
          <transform name=\"to_world\">\n            <rotate y=\"1\" angle=\"{}\"/>\n        \
          </transform>\n    </emitter>\n",
-        folder.write_environment(map, rows_on_poles)?,
+        file,
         f64::from(map.rotation_rad).to_degrees() + 180.0
     ))
-}
-
-/// The map with rows on the poles.
-fn rows_on_poles(map: &EnvironmentMap) -> Image {
-    let (width, height) = (map.width as usize, map.height as usize);
-    let mut texels = Vec::with_capacity((2 * height + 1) * width);
-    for row in 0..=2 * height {
-        let above = row.saturating_sub(1) / 2 * width;
-        let below = (row / 2).min(height - 1) * width;
-        texels.extend((0..width).map(|column| {
-            (0.5 * map.texels[above + column] + 0.5 * map.texels[below + column]).to_array()
-        }));
-    }
-    Image::of_rgb(map.width, 2 * map.height + 1, &texels)
 }

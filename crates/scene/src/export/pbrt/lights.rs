@@ -10,7 +10,6 @@ use crate::{
     export::folder::Folder,
     lamp::{LampKind, SpotFalloff},
     math::equal_area::direction_from_square,
-    picture::Image,
 };
 
 /// Sides of the square map, texels.
@@ -74,12 +73,13 @@ pub(super) fn write_environment(map: &EnvironmentMap, folder: &Folder) -> Result
     if let Some(radiance) = map.uniform_radiance() {
         return Ok(format!("LightSource \"infinite\" \"rgb L\" [{}]\n", triple(radiance)));
     }
-    let file = folder.write_environment(map, equal_area)?;
+    let (side, texels) = equal_area(map);
+    let file = folder.write_environment([side; 2], |column, row| texels[row * side + column])?;
     Ok(format!("LightSource \"infinite\" \"string filename\" \"{file}\"\n"))
 }
 
-/// The map as an equal-area square, in the directions of the world.
-fn equal_area(map: &EnvironmentMap) -> Image {
+/// Side and rows of the map as an equal-area square, in the directions of the world.
+fn equal_area(map: &EnvironmentMap) -> (usize, Vec<Vec3>) {
     let side = map.height.saturating_mul(2).clamp(SIDES.0, SIDES.1);
     let points = POINTS * map.height.saturating_mul(2).div_ceil(side);
     let texel = |index: u32| {
@@ -90,8 +90,7 @@ fn equal_area(map: &EnvironmentMap) -> Image {
             map.radiance(direction_from_square(place))
         };
         let sum: Vec3 = (0..points * points).map(point).sum();
-        (sum / (points * points) as f32).to_array()
+        sum / (points * points) as f32
     };
-    let texels: Vec<[f32; 3]> = (0..side * side).into_par_iter().map(texel).collect();
-    Image::of_rgb(side, side, &texels)
+    (side as usize, (0..side * side).into_par_iter().map(texel).collect())
 }
