@@ -492,6 +492,9 @@ fn no_command_writes_over_what_it_reads() {
     for name in ["a.exr", "b.exr"] {
         folder.run(&["render", "scene.toml", "--spp=1", "-o", name]).assert(0, &[]);
     }
+    folder.write("report/study.json", r#"{"format": "fenestra study 3"}"#);
+    fs::copy(folder.path().join("a.exr"), folder.path().join("report/a.exr")).unwrap();
+    std::os::unix::fs::symlink("report/a.exr", folder.path().join("ours.exr")).unwrap();
     std::os::unix::fs::symlink("a.exr", folder.path().join("soft.exr")).unwrap();
     fs::hard_link(folder.path().join("a.exr"), folder.path().join("hard.exr")).unwrap();
     let before = folder.files();
@@ -500,6 +503,9 @@ fn no_command_writes_over_what_it_reads() {
     let mut commands: Vec<Vec<&str>> = vec![
         vec!["fit", "env", "m.exr", "-o", "m.exr"],
         vec!["fit", "env", "scene.toml", "-o", "./scene.toml"],
+        vec!["fit", "table", "m.exr", "-o", "./m.exr"],
+        vec!["study", "scene.toml", "-o", "report", "--reference=ours.exr"],
+        vec!["study", "scene.toml", "-o", "report", "--reference=report"],
         vec!["export", "s.xml", "./s.xml", "--format=mitsuba"],
         vec!["export", "s.xml", "s.pbrt", "--format=pbrt"],
     ];

@@ -94,16 +94,5 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 fn check_outputs(scene: &Scene, output: &Path) -> Result<()> {
     let inputs: Vec<&Path> = scene.inputs.iter().map(PathBuf::as_path).collect();
     files::check_replaces_nothing(&[("the export", output)], &inputs)?;
-    let folder = output.with_extension("");
-    let Ok(canonical) = folder.canonicalize() else { return Ok(()) };
-    let lies_in =
-        |input: &&&Path| input.canonicalize().is_ok_and(|path| path.starts_with(&canonical));
-    match inputs.iter().find(lies_in) {
-        Some(input) => Err(Error::usage(format!(
-            "the export's folder {} would replace {}, which is read",
-            folder.display(),
-            input.display()
-        ))),
-        None => Ok(()),
-    }
+    files::check_replaces_nothing_in("the export's folder", &output.with_extension(""), &inputs)
 }

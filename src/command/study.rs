@@ -130,6 +130,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         check_strict(true, &Scene::load(path)?)?;
     }
     let folder = Folder::open(&arguments.output)?;
+    let inputs = arguments.inputs.iter().map(PathBuf::as_path).chain(plan.pictures());
+    folder.check_replaces_nothing(&inputs.collect::<Vec<_>>())?;
     let device = arguments.device.open(arguments.validate)?;
     if !arguments.quiet {
         self_test::announce(&device);

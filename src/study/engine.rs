@@ -1,7 +1,7 @@
 //! Runs a plan: in each scene the reference, the runs, interleaved over seeds and samplers, and the
 //! overhead rounds. Finished runs are written at once, and those of an earlier study reused.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 
 use super::{
     contender::Contender,
@@ -57,6 +57,8 @@ pub(crate) fn run(
     let finished = FinishedRuns { plan, folder, device };
     let mut study = Study { plan, folder, device, finished, watch: Watch::new(observer) };
     let scenes = study.load_scenes()?;
+    let inputs = scenes.iter().flat_map(|scene| &scene.inputs).map(PathBuf::as_path);
+    folder.check_replaces_nothing(&inputs.collect::<Vec<_>>())?;
     study.finished.check(&scenes, redo)?;
     let mut results = Results::default();
     for scene in &scenes {

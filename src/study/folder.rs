@@ -22,7 +22,7 @@ use serde::{Serialize, de::DeserializeOwned};
 
 use crate::{
     error::{Error, Result},
-    files::{check_writable, write_json},
+    files::{check_replaces_nothing_in, check_writable, write_json},
 };
 
 /// File that marks a report folder.
@@ -120,6 +120,14 @@ impl Folder {
         } else {
             Err(Error::format(path, format!("expected the report folder of a study: no {MARK}")))
         }
+    }
+
+    /// Checks that no input lies in the folder.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if one does.
+    pub(crate) fn check_replaces_nothing(&self, inputs: &[&Path]) -> Result<()> {
+        check_replaces_nothing_in("the report in", &self.path, inputs)
     }
 
     /// Path of the folder.

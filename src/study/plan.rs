@@ -222,6 +222,20 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// Files and folders of the given references.
+    pub(crate) fn pictures(&self) -> impl Iterator<Item = &Path> {
+        let references: &[PathBuf] = match &self.reference {
+            ReferencePlan::Render { .. } => &[],
+            ReferencePlan::Files(files) => files,
+            ReferencePlan::Study(folder) => std::slice::from_ref(folder),
+        };
+        let check = match &self.reference_check {
+            CheckPlan::File(path) => Some(path),
+            _ => None,
+        };
+        references.iter().chain(check).map(PathBuf::as_path)
+    }
+
     /// Completes `options`; `references` are images, or the folder of another study.
     ///
     /// # Errors

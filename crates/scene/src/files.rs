@@ -315,6 +315,23 @@ pub fn check_replaces_nothing(outputs: &[(&str, &Path)], inputs: &[&Path]) -> Re
     Ok(())
 }
 
+/// Checks that none of the `inputs` lies in a folder of outputs, which is called `name`.
+///
+/// # Errors
+/// [`Error::Usage`] if one does.
+pub fn check_replaces_nothing_in(name: &str, folder: &Path, inputs: &[&Path]) -> Result<()> {
+    let Ok(canonical) = folder.canonicalize() else { return Ok(()) };
+    let lies_in =
+        |input: &&&Path| input.canonicalize().is_ok_and(|path| path.starts_with(&canonical));
+    inputs.iter().find(lies_in).map_or(Ok(()), |input| {
+        Err(Error::usage(format!(
+            "{name} {} would replace {}, which is read",
+            folder.display(),
+            input.display()
+        )))
+    })
+}
+
 /// Largest compression of real pixels by OpenEXR's lossless methods; a header that promises more
 /// than this times the file's size is corrupt, and trusting it would exhaust memory.
 pub const EXR_LARGEST_RATIO: u64 = 4096;

@@ -5,10 +5,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{source, with_progress};
+use super::{
+    source::{self, Source},
+    with_progress,
+};
 use crate::{
     error::Result,
-    files::{extension, write_text},
+    files::{check_replaces_nothing, extension, write_text},
     fit::{
         BrdfOptions, EnvironmentOptions, Method, brdf_lobes, config, environment_lobes, picture,
     },
@@ -49,14 +52,14 @@ pub struct Arguments {
 /// # Errors
 /// A source that cannot be read or fitted, options out of range, a file that cannot be written.
 pub(super) fn run(arguments: &Arguments) -> Result<()> {
+    let subjects: Vec<Subject> =
+        arguments.sources.iter().map(|text| Subject::load(text)).collect::<Result<_>>()?;
+    check_outputs(arguments, &subjects)?;
     let (mut maps, mut brdfs) = (String::new(), String::new());
-    for text in &arguments.sources {
-        let path = Path::new(text);
-        if ["hdr", "exr", "pfm", "toml"].contains(&extension(path).as_str()) {
-            let (map, name, _) = source::environment(path)?;
-            environment(arguments, &map, &name, &mut maps)?;
-        } else {
-            brdf(arguments, text, &mut brdfs)?;
+    for subject in &subjects {
+        match subject {
+            Subject::Map(map, name, _) => environment(arguments, map, name, &mut maps)?,
+            Subject::Brdf(source, name) => brdf(arguments, source, name, &mut brdfs)?,
         }
     }
     let mut tables = Vec::new();
@@ -80,6 +83,50 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         Some(path) => write_text(path, &text),
         None => crate::command::print_line(text.trim_end()),
     }
+}
+
+/// One source of the table.
+enum Subject {
+    /// A map, its name, and the files that it was read from.
+    Map(EnvironmentMap, String, Vec<PathBuf>),
+    /// A material, and its name in the table.
+    Brdf(Source, String),
+}
+
+impl Subject {
+    fn load(text: &str) -> Result<Self> {
+        let path = Path::new(text);
+        if ["hdr", "exr", "pfm", "toml"].contains(&extension(path).as_str()) {
+            let (map, name, inputs) = source::environment(path)?;
+            return Ok(Self::Map(map, name, inputs));
+        }
+        let source = source::material(text)?;
+        let name = if source::is_measured(path) { source.name.clone() } else { text.to_owned() };
+        Ok(Self::Brdf(source, name))
+    }
+
+    /// Its pictures.
+    fn pictures(&self, arguments: &Arguments) -> Vec<PathBuf> {
+        let (name, lobes) = match self {
+            Self::Map(_, name, _) => (name, &arguments.environment_lobes),
+            Self::Brdf(source, _) => (&source.name, &arguments.brdf_lobes),
+        };
+        lobes.iter().filter_map(|lobes| picture_path(arguments, name, *lobes)).collect()
+    }
+}
+
+/// Checks, before the work, that neither table nor pictures would replace a source or each other.
+fn check_outputs(arguments: &Arguments, subjects: &[Subject]) -> Result<()> {
+    let pictures: Vec<PathBuf> =
+        subjects.iter().flat_map(|subject| subject.pictures(arguments)).collect();
+    let table = arguments.output.iter().map(|path| ("--output", path.as_path()));
+    let outputs: Vec<(&str, &Path)> =
+        table.chain(pictures.iter().map(|path| ("the picture", path.as_path()))).collect();
+    let inputs = subjects.iter().flat_map(|subject| match subject {
+        Subject::Map(_, _, inputs) => inputs,
+        Subject::Brdf(source, _) => &source.inputs,
+    });
+    check_replaces_nothing(&outputs, &inputs.map(PathBuf::as_path).collect::<Vec<_>>())
 }
 
 fn picture_path(arguments: &Arguments, name: &str, lobes: usize) -> Option<PathBuf> {
@@ -119,9 +166,7 @@ fn environment(
     Ok(())
 }
 
-fn brdf(arguments: &Arguments, text: &str, table: &mut String) -> Result<()> {
-    let source = source::material(text)?;
-    let name = if source::is_measured(Path::new(text)) { source.name.as_str() } else { text };
+fn brdf(arguments: &Arguments, source: &Source, name: &str, table: &mut String) -> Result<()> {
     for &lobes in &arguments.brdf_lobes {
         let options = BrdfOptions { lobes, views: arguments.views, method: arguments.method };
         let fit = with_progress(&format!("{name}, {lobes} lobes"), arguments.quiet, |progress| {
