@@ -603,6 +603,32 @@ fn rays_that_are_given_up_are_counted_with_their_pixels() {
     assert!((9..=16).contains(&right) && (7..=12).contains(&bottom), "{}", run.messages);
 }
 
+/// A quarter of a gigabyte of zeros as the colour profile of a PNG image, under a limit of 300 MB.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_colour_profile_that_inflates_takes_no_memory() {
+    use std::io::Write;
+    let folder = scene("reflectance = [0.5, 0.5, 0.5]", "reflectance = { texture = \"bomb.png\" }");
+    let mut profile =
+        flate2::write::ZlibEncoder::new(b"x\0\0".to_vec(), flate2::Compression::fast());
+    (0..256).for_each(|_| profile.write_all(&[0; 1 << 20]).unwrap());
+    let mut chunk = b"iCCP".to_vec();
+    chunk.extend(profile.finish().unwrap());
+    let mut sum = flate2::Crc::new();
+    sum.update(&chunk);
+    let length = (chunk.len() as u32 - 4).to_be_bytes();
+    let chunk = [&length[..], &chunk, &sum.sum().to_be_bytes()].concat();
+    image::RgbImage::new(2, 2).save(folder.path().join("bomb.png")).unwrap();
+    let mut bytes = fs::read(folder.path().join("bomb.png")).unwrap();
+    // Behind the signature and the header
+    bytes.splice(33..33, chunk);
+    folder.write("bomb.png", bytes);
+    let mut shell = Command::new("sh");
+    let line = "ulimit -v 300000; exec \"$0\" info scene.toml";
+    shell.args(["-c", line, env!("CARGO_BIN_EXE_fenestra")]).current_dir(folder.path());
+    Run::of(&shell.output().unwrap()).assert(0, &[]);
+}
+
 /// Waves get smaller before anything is refused, which changes no bit.
 #[test]
 fn less_memory_makes_smaller_waves_and_the_same_picture() {

@@ -20,6 +20,9 @@ use crate::{
 
 /// Most bytes that a decoder may allocate: the largest image in floats of 32 bits.
 const MAX_DECODER_BYTES: u64 = 16 * (MAX_TEXTURE_SIDE as u64).pow(2);
+/// Most bytes that colour profiles and texts of a PNG file may grow by; the limit of its decoder counts
+/// nothing else.
+const MAX_INFLATION: u64 = 1 << 22;
 
 impl Texture {
     /// Reads an image file; its content tells the format, and the extension where it does not. Warns if
@@ -77,7 +80,10 @@ fn decode(
     };
     let unreadable = |error: image::ImageError| format!("not a readable image: {error}");
     let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(MAX_DECODER_BYTES);
+    limits.max_alloc = Some(match guessed {
+        Some(ImageFormat::Png) => bytes.len() as u64 + MAX_INFLATION,
+        _ => MAX_DECODER_BYTES,
+    });
     let mut reader = ImageReader::new(Cursor::new(bytes));
     reader.limits(limits);
     if let Some(format) = guessed {
