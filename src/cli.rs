@@ -8,7 +8,7 @@ use crate::{
     command,
     error::Error,
     memory,
-    terminal::{escaped, say},
+    terminal::{message, say},
 };
 
 /// Arguments of `fenestra`.
@@ -69,7 +69,7 @@ pub fn run() -> ExitCode {
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn"))
         .format(|buffer, record| {
             let (level, style) = (record.level(), buffer.default_level_style(record.level()));
-            writeln!(buffer, "[{style}{level:<5}{style:#}] {}", escaped(&record.args().to_string()))
+            writeln!(buffer, "[{style}{level:<5}{style:#}] {}", message(&record.args().to_string()))
         })
         .init();
     if let Some(bytes) = cli.max_memory {

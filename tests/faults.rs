@@ -331,6 +331,9 @@ fn names_do_not_steer_the_terminal() {
     let run = folder.run(&["info", "scene.toml"]);
     run.assert(1, &["\\u001b[2J\\u009b31m"]);
     assert!(!run.messages.contains(['\u{1b}', '\u{9b}']), "{:?}", run.messages);
+    let run = folder.run(&["info", "room\nerror: no disk.exr"]);
+    run.assert(1, &["error: room\n"]);
+    assert!(!run.messages.contains("\nerror: no disk"), "{:?}", run.messages);
 }
 
 /// Runs the program through the shell, after `before`.

@@ -2,7 +2,7 @@
 //! the picture against other samplers; the keys of `[[portal]]`.
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-use std::path::Path;
+use std::{fs, path::Path};
 
 use fenestra::{
     math::random::random_independent_1d,
@@ -16,6 +16,7 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 use crate::{
     support::{
         self,
+        command::Folder,
         replicates::{self, LIMIT},
         scenes,
         statistics::{Comparison, chi_square_p_value},
@@ -263,6 +264,13 @@ fn bad_portals_are_refused_and_ignored_ones_named() {
         let message = load(&SCENE.replace(from, to)).unwrap_err().to_string();
         assert!(message.contains(expected), "expected `{expected}`, found `{message}`");
     }
+    let folder = Folder::new();
+    let ball = "[[object]]\nshape = \"sphere\"\nradius = 1\nmaterial = \"default\"\n";
+    folder.write("room.toml", format!("{SCENE}{ball}"));
+    let options = ["render", "room.toml", "--quick", "--spp=1", "--sampler=mis", "--stats=s.json"];
+    folder.run(&options).assert(0, &[&warning]);
+    let statistics = fs::read_to_string(folder.path().join("s.json")).unwrap();
+    assert!(statistics.contains("--sampler mis ignores"), "{statistics}");
     let table = SCENE.split_once("[[portal]]").unwrap().1;
     let many = format!("{SCENE}{}", format!("[[portal]]{table}").repeat(256));
     assert!(load(&many).unwrap_err().to_string().contains("at most 256"));

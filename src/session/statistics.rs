@@ -17,6 +17,7 @@ impl Session {
         sampler_figures.extend(of_totals.map(|(name, value)| (name, value.into())));
         let metadata = self.metadata();
         let window = window_of(renderer.settings(), scene);
+        let portals = renderer.settings().sampler.portal_warning(scene);
         Statistics {
             version: metadata.version,
             scene: metadata.scene,
@@ -41,7 +42,7 @@ impl Session {
             sampler_figures,
             rays: figures.rays,
             found_light: self.found_light,
-            warnings: scene.warnings.clone(),
+            warnings: scene.warnings.iter().cloned().chain(portals).collect(),
             dropped_samples: totals.dropped_samples,
             gpu_ms: totals.gpu_ms.clone(),
             host_ms: renderer.host_ms(),

@@ -251,12 +251,15 @@ fn columns(runs: &[Run]) -> Vec<Column> {
     columns
 }
 
-/// Quotes a field that needs it (RFC 4180).
+/// Quotes a field that needs it (RFC 4180). An apostrophe keeps spreadsheets from computing a text.
 fn quoted(field: &str) -> String {
-    if field.contains([',', '"', '\n', '\r']) {
+    let is_formula =
+        field.starts_with(['=', '+', '-', '@', '\t', '\r']) && field.parse::<f64>().is_err();
+    let field = if is_formula { format!("'{field}") } else { field.to_owned() };
+    if is_formula || field.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", field.replace('"', "\"\""))
     } else {
-        field.to_owned()
+        field
     }
 }
 
@@ -268,5 +271,13 @@ mod tests {
     fn fields_with_commas_are_quoted() {
         assert_eq!(quoted("plain"), "plain");
         assert_eq!(quoted("a,\"b\""), "\"a,\"\"b\"\"\"");
+    }
+
+    #[test]
+    fn no_field_is_a_formula() {
+        for start in ["=", "+", "-", "@", "\t"] {
+            assert_eq!(quoted(&format!("{start}room")), format!("\"'{start}room\""));
+        }
+        assert_eq!(["-1.5", "+2e-7", "-inf"].map(quoted), ["-1.5", "+2e-7", "-inf"]);
     }
 }
