@@ -29,6 +29,7 @@ mod estimate;
 mod explained;
 mod guide;
 mod key;
+mod packing;
 mod parameters;
 mod readback;
 mod share;

@@ -1,7 +1,7 @@
 //! The guide in a file: `--save-guide`, `--load-guide`, and beside a checkpoint.
 //!
-//! A file is one line of JSON, then 32-bit words in little-endian order: the arrays of
-//! [`GuideState`] from `rectangles` on, in their order. The header holds the SHA-256 of both.
+//! A file is one line of JSON, then [packed](super::packing) words: the arrays of [`GuideState`] from
+//! `rectangles` on, in their order. The header holds the SHA-256 of both.
 
 use std::{io::Write, path::Path};
 
@@ -12,18 +12,20 @@ use crate::sampler::guided::{
     arriving::{ARRIVAL_DIRECTIONS, ArrivalWords},
     cost::GUIDED_CANDIDATES,
     counts::CountWords,
+    packing::{pack, unpack},
     parameters::AUTO_COHORT_EDGE,
     share::SHARE_WORDS,
 };
 use crate::{
     error::{Error, Result},
     files::{self, hexadecimal, write_atomically},
+    memory,
     shader::rooms::guided::GUIDE_COUNT_WORDS,
 };
 
 const COUNT_WORDS: usize = GUIDE_COUNT_WORDS as usize;
 const FORMAT: &str = "fenestra-guide";
-const VERSION: u32 = 11;
+const VERSION: u32 = 12;
 /// Upper bound of the rays of one cell and direction: each rebuild halves them and adds a word.
 const MAX_ARRIVAL_RAYS: f32 = 1e10;
 /// Upper bound of their light, such that its product with the rays of all cells stays finite.
@@ -120,10 +122,9 @@ impl Header {
 }
 
 impl GuideState {
-    /// The arrays from `rectangles` on, as bytes.
-    fn words(&self) -> Vec<u8> {
-        let all = self
-            .rectangles
+    /// The arrays from `rectangles` on.
+    fn words(&self) -> impl Iterator<Item = u32> {
+        self.rectangles
             .as_flattened()
             .iter()
             .chain(&self.keys)
@@ -134,14 +135,16 @@ impl GuideState {
             .chain(&self.pending_shares)
             .chain(&self.missing)
             .chain(self.arrivals.as_flattened())
-            .chain(self.pending_arrivals.as_flattened());
-        all.flat_map(|word| word.to_le_bytes()).collect()
+            .chain(self.pending_arrivals.as_flattened())
+            .copied()
     }
 
     /// Tells the random numbers of renders that start from this guide from those that taught it: a
     /// density shaped by the outcomes of some numbers must not be sampled with the same numbers.
     pub fn epoch_tag(&self) -> u32 {
-        let digest = Sha256::new().chain_update(self.tag.to_le_bytes()).chain_update(self.words());
+        let words: Vec<[u8; 4]> = self.words().map(u32::to_le_bytes).collect();
+        let digest = Sha256::new().chain_update(self.tag.to_le_bytes());
+        let digest = digest.chain_update(words.as_flattened());
         let digest: [u8; 32] = digest.finalize().into();
         u32::from_le_bytes([digest[0], digest[1], digest[2], digest[3]])
     }
@@ -160,7 +163,7 @@ impl GuideState {
     /// # Errors
     /// An error of the encoder.
     pub fn to_bytes(&self) -> std::io::Result<Vec<u8>> {
-        let words = self.words();
+        let words = pack(self.words());
         let mut header = Header {
             format: FORMAT.to_owned(),
             version: VERSION,
@@ -242,22 +245,20 @@ impl GuideState {
                 .checked_add(header.cells)?
                 .checked_add(header.refined)?
                 .checked_add(header.missing)?
-                .checked_add(arrivals)?
-                .checked_mul(4)
+                .checked_add(arrivals)
         });
         let (Some(counts), Some(length)) = (counts, length) else {
             return Err(damaged("its header holds impossible lengths"));
         };
         let shares = header.cells * SHARE_WORDS;
-        if length != words.len() || header.pending > counts || header.pending_shares > shares {
-            return Err(damaged(&format!("{length} bytes expected, {} found", words.len())));
-        }
+        memory::check(path.display(), (length as u64).saturating_mul(4)).map_err(Error::memory)?;
+        let words = unpack(words, length)
+            .filter(|_| header.pending <= counts && header.pending_shares <= shares)
+            .ok_or_else(|| damaged(&format!("{length} words expected")))?;
         if header.arrivals.max(header.pending_arrivals) > header.cells * ARRIVAL_DIRECTIONS {
             return Err(damaged("its bounces belong to more cells than it has"));
         }
-        let mut words = words
-            .chunks_exact(4)
-            .map(|word| word.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte)));
+        let mut words = words.into_iter();
         let mut take = |count: usize| words.by_ref().take(count).collect::<Vec<u32>>();
         let counted = |words: Vec<u32>| -> Vec<CountWords> {
             words.chunks_exact(COUNT_WORDS).map(|count| [count[0], count[1], count[2]]).collect()
@@ -380,7 +381,7 @@ mod tests {
             bytes.extend(&good[split..]);
             message(&bytes)
         };
-        assert!(forged(&|header| header.cells = 4).contains("bytes expected"));
+        assert!(forged(&|header| header.cells = 4).contains("words expected"));
         assert!(forged(&|header| header.cells = usize::MAX).contains("impossible lengths"));
         let message = forged(&|header| header.candidates = Some(3));
         assert!(message.contains("impossible number of candidates"));
