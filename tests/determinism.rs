@@ -6,11 +6,11 @@ use fenestra::{
     pass::{PathLists, Roulette},
     sampler::{Parameters, Sampler},
     scene::Scene,
-    session::Settings,
+    session::{Session, Settings},
 };
 use glam::Vec3;
 
-use crate::support::{self, renderer, scenes};
+use crate::support::{self, command::Folder, renderer, scenes};
 
 fn scene() -> Scene {
     scenes::room(vec![scenes::diffuse(Vec3::splat(0.7)), scenes::plastic(0.1), scenes::copper(0.2)])
@@ -121,6 +121,44 @@ fn pages_of_the_film_make_no_difference() {
             resumed.restore(&half).unwrap();
             resumed.render_pass(3).unwrap();
             assert!(resumed.sums().unwrap() == whole, "the resumed film differs");
+        }
+    }
+}
+
+/// Every page of the film is a wave of its own.
+#[test]
+fn a_sweep_that_was_stopped_goes_on_to_the_bit() {
+    let _alone = support::alone();
+    let scene = scene();
+    for sampler in [Sampler::Mis, Sampler::Tiles, Sampler::Guided] {
+        let settings = Settings { film_page_bytes: 1, ..settings(sampler) };
+        let whole = render(settings.clone(), &[5]);
+        let half = render(settings.clone(), &[2]);
+        let folder = Folder::new();
+        let path = folder.path().join("room.checkpoint.exr");
+        let mut stopped = Session::new(support::device(), &scene, settings.clone()).unwrap();
+        stopped.renderer.render_pass(2).unwrap();
+        let mut waves = 0;
+        stopped.renderer.set_watch(Box::new(move |_| {
+            waves += 1;
+            waves == 2
+        }));
+        stopped.renderer.render_pass(3).unwrap();
+        let sums = stopped.renderer.sums().unwrap();
+        let last = sums.pixel_count() - 1;
+        assert!(sums.samples(0) > 2 && sums.samples(last) == 2, "{:?}", sums.ahead);
+        if sampler == Sampler::Mis {
+            assert_eq!((sums.samples(0), sums.mean(0)), (5, whole.mean(0)));
+            assert_eq!(sums.variance_of_mean(0), whole.variance_of_mean(0));
+            assert_eq!(sums.mean(last), half.mean(last));
+        }
+        stopped.write_checkpoint(&path, sums).unwrap().unwrap();
+        let mut resumed = Session::new(support::device(), &scene, settings).unwrap();
+        resumed.resume(&path).unwrap();
+        stopped.renderer.set_watch(Box::new(|_| false));
+        for Session { renderer, .. } in [&mut resumed, &mut stopped] {
+            renderer.render_pass(3).unwrap();
+            assert!(renderer.sums().unwrap() == whole, "{} differs", sampler.name());
         }
     }
 }

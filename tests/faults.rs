@@ -273,6 +273,42 @@ fn hangups_and_terminations_are_interrupts() {
     }
 }
 
+#[test]
+fn an_interrupt_ends_a_render_within_a_sample() {
+    let folder = folder();
+    let options = ["render", "scene.toml", "--sampler=mis", "--shadow-rays=64", "--size=640x480"];
+    let options = [&options[..], &["--spp=1000", "-o", "out.exr"]].concat();
+    let run = Running::start(folder.path(), &options, "device: ").signal("TERM");
+    run.assert(130, &["interrupted", "wrote out.exr, out.checkpoint.exr"]);
+    let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+    assert!(
+        image.channels["R"].iter().all(|value| value.is_finite()) && image.channels["R"][0] > 0.0
+    );
+    assert!(image.attributes.contains_key("fenestra.ahead"), "{:?}", image.attributes);
+    folder
+        .run(&["merge", "out.checkpoint.exr", "-o", "merged.exr"])
+        .assert(1, &["it was interrupted within a sample of the film"]);
+}
+
+#[test]
+fn a_checkpoint_that_nobody_asked_for_goes_with_the_end() {
+    let folder = folder();
+    let run = |options: &[&str], written: &str| {
+        let options =
+            [&["render", "scene.toml", "-o", "out.exr", "--spp=100000000"], options].concat();
+        let run = Running::start(folder.path(), &options, "device: ").signal("TERM");
+        run.assert(130, &["interrupted", written]);
+    };
+    run(&["--no-checkpoint"], "wrote out.exr\n");
+    assert_eq!(folder.files(), ["out.exr", "scene.toml"]);
+    run(&[], "wrote out.exr, out.checkpoint.exr\n");
+    let done = ["render", "scene.toml", "-o", "out.exr", "--resume", "--spp=1"];
+    folder.run(&[&done[..], &["--checkpoint-interval=1h"]].concat()).assert(0, &[]);
+    assert_eq!(folder.files().len(), 4, "asked for: {:?}", folder.files());
+    folder.run(&done).assert(0, &["stopped by --spp"]);
+    assert_eq!(folder.files(), ["out.exr", "scene.toml"]);
+}
+
 /// Standard errors that take no message: a full disk, and a pipe and a terminal that are closed.
 fn dead_ends() -> [(&'static str, Stdio); 3] {
     let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();

@@ -11,6 +11,7 @@ use fenestra::{
         checkpoint::checkpoint_path,
         merge::{Part, merge_checkpoints, merge_images},
         png,
+        sums::Ahead,
     },
     math::colour::display_from_linear,
     scene::files::write_atomically,
@@ -41,6 +42,7 @@ fn metadata(ranges: &[SampleRange]) -> Metadata {
         shadow_rays: 5,
         depth: 1,
         sample_ranges: ranges.to_vec(),
+        ahead: Ahead::default(),
         seconds: 1.0 / 3.0,
         gpu_seconds: BTreeMap::from([("trace".to_owned(), 0.1)]),
         device: "llvmpipe (LLVM 15, 256 bits) “ä”".to_owned(),
@@ -313,7 +315,8 @@ fn checkpoints_come_back_to_the_bit() {
     sums.sum[0] = [-0.0, f32::MIN_POSITIVE / 8.0, f32::MAX];
     sums.visible[0] = [u32::MAX - 1, u32::MAX];
     sums.cache_entries[1] = [u32::MAX - 3, 16_777_217];
-    let checkpoint = Checkpoint { sums, metadata: metadata(&[range(4, 0, 1000)]) };
+    let metadata = metadata(&[range(4, 0, 1000)]);
+    let checkpoint = Checkpoint { sums, metadata: metadata.clone() };
     checkpoint.write(&path).unwrap();
     let read = Checkpoint::read(&path).unwrap();
     let bits = |values: &[[f32; 3]]| {
@@ -324,6 +327,11 @@ fn checkpoints_come_back_to_the_bit() {
     assert_eq!(read, checkpoint);
     let picture = Image::read_exr(&path).unwrap().rgb(&path).unwrap();
     assert_eq!(picture.pixels[3][1], checkpoint.sums.mean(3)[1] as f32, "viewers see the picture");
+    // The film has one block, which cannot be ahead of others.
+    let metadata = Metadata { ahead: Ahead { blocks: 1, samples: 2 }, ..metadata };
+    Checkpoint { metadata, ..checkpoint }.write(&path).unwrap();
+    let error = Checkpoint::read(&path).unwrap_err().to_string();
+    assert!(error.contains("1 blocks of its film have further samples"), "{error}");
 }
 
 #[test]

@@ -154,6 +154,15 @@ fn a_disk_that_fills_at_any_byte_keeps_the_last_checkpoint() {
     assert!(resumed == picture(&folder).channels);
 }
 
+#[test]
+fn a_checkpoint_leaves_room_for_the_image() {
+    let folder = folder();
+    let options = ["--spp=8", "--checkpoint-interval=1ms"];
+    let run = render(&folder, Some(("FAULTY_FREE", 1000)), &options);
+    run.assert(0, &["out.checkpoint.exr: removed, the disk has room for the image only"]);
+    assert!(folder.path().join(PICTURE).exists());
+}
+
 /// The folder of a file that was renamed may fail too: then both names are sound.
 #[test]
 fn a_disk_that_loses_what_was_written_is_an_error() {

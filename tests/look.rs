@@ -69,7 +69,7 @@ fn a_pass_that_is_stopped_leaves_no_trace_after_the_next_look() {
     let mut renderer = support::renderer(&scene, settings.clone());
     let stops = Rc::new(Cell::new(true));
     let watched = Rc::clone(&stops);
-    renderer.set_watch(Box::new(move || watched.get()));
+    renderer.set_watch(Box::new(move |_| watched.get()));
     renderer.render_pass(4).unwrap();
     assert!(renderer.is_stopped() && renderer.sample_count() == 0);
     stops.set(false);

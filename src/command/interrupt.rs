@@ -5,13 +5,13 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
-use crate::terminal::say;
+use crate::{session::Flag, terminal::say};
 
 /// Interrupts of this process. One while there is nothing to lose, and a second one, end it at once
 /// with status 130; another is noted for the caller, who writes what there is.
 #[derive(Debug, Default)]
 pub(crate) struct Interrupt {
-    is_raised: AtomicBool,
+    flag: Flag,
     has_caller: AtomicBool,
 }
 
@@ -25,7 +25,7 @@ impl Interrupt {
             if !waits {
                 say!("error: interrupted before anything was rendered");
             }
-            if heard.is_raised.swap(true, Ordering::SeqCst) || !waits {
+            if heard.flag.raise() || !waits {
                 std::process::exit(130);
             }
         });
@@ -35,13 +35,13 @@ impl Interrupt {
         interrupt
     }
 
-    /// Leaves the first interrupt from now on to the caller, who asks [`Interrupt::is_raised`].
+    /// Leaves the first interrupt from now on to the caller, who looks at [`Interrupt::flag`].
     pub(crate) fn wait_for_caller(&self) {
         self.has_caller.store(true, Ordering::SeqCst);
     }
 
-    /// Tests whether there was an interrupt.
-    pub(crate) fn is_raised(&self) -> bool {
-        self.is_raised.load(Ordering::SeqCst)
+    /// Raised once there was an interrupt.
+    pub(crate) fn flag(&self) -> Flag {
+        self.flag.clone()
     }
 }

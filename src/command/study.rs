@@ -15,7 +15,7 @@ use crate::{
     error::{Error, Result},
     sampler::Parameters,
     scene::Scene,
-    session::{Event, Observer, Standing},
+    session::{Event, Flag, Observer, Standing},
     study::{
         contender::Contender,
         engine,
@@ -260,8 +260,8 @@ struct Display<'a> {
 }
 
 impl Observer for Display<'_> {
-    fn is_interrupted(&self) -> bool {
-        self.interrupt.is_raised()
+    fn interrupt(&self) -> Flag {
+        self.interrupt.flag()
     }
 
     fn notice(&mut self, event: &Event<'_>) {

@@ -22,7 +22,7 @@ use sha2::{Digest, Sha256};
 use super::{
     Attribute, Image,
     metadata::Metadata,
-    sums::{COUNTS, Sums, TRIPLES, split},
+    sums::{BLOCK_EDGE, COUNTS, Sums, TRIPLES, split},
 };
 use crate::{
     error::{Error, Result},
@@ -104,6 +104,13 @@ pub fn remove_checkpoint(path: &Path) -> Result<()> {
     guide_paths(path)?.iter().try_for_each(|guide| files::remove(guide))
 }
 
+/// Locks the folder of a checkpoint against other writers, where the system has such locks.
+fn locked_folder(path: &Path) -> Option<fs::File> {
+    let folder = fs::File::open(files::parent_of(path)).ok()?;
+    folder.lock().ok()?;
+    Some(folder)
+}
+
 /// Tests whether `path` is named like a checkpoint.
 pub(crate) fn is_checkpoint_path(path: &Path) -> bool {
     path.file_name()
@@ -160,20 +167,34 @@ impl Checkpoint {
         guide: Option<&[u8]>,
         before: &mut dyn FnMut(Step) -> Result<()>,
     ) -> Result<()> {
+        // Others that write this checkpoint would remove the guide before its checkpoint is there.
+        let _lock = locked_folder(path);
         let mut image = self.to_image();
         let mut kept = None;
+        let mut added = None;
         if let Some(guide) = guide {
             let hash = hexadecimal(&Sha256::digest(guide));
             let guide_path = guide_path(path, &hash);
             before(Step::Guide)?;
+            let is_new = !guide_path.exists();
             write_atomically(&guide_path, |file| file.write_all(guide))?;
             image.attributes.insert(GUIDE_ATTRIBUTE.to_owned(), Attribute::Text(hash));
             kept = guide_path.file_name().map(ToOwned::to_owned);
+            added = is_new.then_some(guide_path);
         }
         let checksum = Attribute::Text(checksum(&image));
         image.attributes.insert(CHECKSUM_ATTRIBUTE.to_owned(), checksum);
         before(Step::Checkpoint)?;
-        image.write_exr_uncompressed(path)?;
+        if let Err(error) = image.write_exr_uncompressed(path) {
+            // Without its checkpoint a guide only takes space, but the disk may fail after the renaming.
+            let guide_of = |image: &Image| image.attributes.get(GUIDE_ATTRIBUTE).cloned();
+            let is_named =
+                Image::read_exr(path).is_ok_and(|found| guide_of(&found) == guide_of(&image));
+            for guide in added.iter().filter(|_| !is_named) {
+                files::remove(guide).unwrap_or_else(|error| log::warn!("{error}"));
+            }
+            return Err(error);
+        }
         before(Step::Removal)?;
         // The checkpoint is safe: a guide that stays behind does no harm.
         let remove_others = || {
@@ -240,10 +261,19 @@ impl Checkpoint {
             }
         }
         let metadata = Metadata::load(image, path)?;
+        let ahead = metadata.ahead;
+        let blocks = [image.width, image.height].map(|side| u64::from(side.div_ceil(BLOCK_EDGE)));
+        if u64::from(ahead.blocks) >= blocks[0] * blocks[1] {
+            let message = format!("{} blocks of its film have further samples", ahead.blocks);
+            return Err(Error::format(path, message));
+        }
+        let has_samples = |count: &u32| {
+            (*count > 0 || !ahead.is_none()) && count.checked_add(ahead.samples).is_some()
+        };
         let sample_count =
-            u32::try_from(metadata.sample_count()).ok().filter(|count| *count > 0).ok_or_else(
-                || Error::format(path, format!("{} samples per pixel", metadata.sample_count())),
-            )?;
+            u32::try_from(metadata.sample_count()).ok().filter(has_samples).ok_or_else(|| {
+                Error::format(path, format!("{} samples per pixel", metadata.sample_count()))
+            })?;
         let mut origin = [0; 2];
         for (value, stored) in origin.iter_mut().zip(image.origin) {
             *value = u32::try_from(stored).map_err(|_| {
@@ -259,6 +289,7 @@ impl Checkpoint {
             origin,
             film_size: image.film_size,
             sample_count,
+            ahead,
             ..Sums::default()
         };
         for (layer, values) in TRIPLES.iter().zip(sums.triples_mut()) {
@@ -403,8 +434,8 @@ fn checksum(image: &Image) -> String {
         hasher.update(bytes);
     };
     for (name, samples) in &image.channels {
-        let bytes: Vec<u8> = samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
-        add(0, name, &bytes);
+        let bytes: Vec<[u8; 4]> = samples.iter().map(|sample| sample.to_le_bytes()).collect();
+        add(0, name, bytes.as_flattened());
     }
     for (name, value) in &image.attributes {
         match value {
@@ -467,6 +498,29 @@ mod tests {
         }
     }
 
+    /// The second writer comes when the guide of the first is there, its checkpoint not yet.
+    #[test]
+    fn two_writers_leave_a_complete_pair() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("room.checkpoint.exr");
+        std::thread::scope(|scope| {
+            let second = || checkpoint(8).write_with_guide(&path, Some(b"second")).unwrap();
+            let mut before = |step| {
+                if step == Step::Checkpoint {
+                    let writer = scope.spawn(second);
+                    let start = std::time::Instant::now();
+                    while !writer.is_finished() && start.elapsed().as_millis() < 100 {
+                        std::thread::yield_now();
+                    }
+                }
+                Ok(())
+            };
+            checkpoint(4).write_in_steps(&path, Some(b"first"), &mut before).unwrap();
+            assert!(Checkpoint::read_with_guide(&path).unwrap().1.is_some());
+        });
+        assert_eq!(Checkpoint::read_with_guide(&path).unwrap().1.unwrap().1, b"second");
+    }
+
     #[test]
     fn obstacles_leave_the_older_pair() {
         let folder = tempfile::tempdir().unwrap();
@@ -484,6 +538,7 @@ mod tests {
         fs::rename(&path, &kept).unwrap();
         fs::create_dir(&path).unwrap();
         assert!(checkpoint(8).write_with_guide(&path, Some(b"newer")).is_err());
+        assert_eq!(guide_paths(&path).unwrap().len(), 1, "the try leaves nothing");
         fs::remove_dir(&path).unwrap();
         fs::rename(&kept, &path).unwrap();
         let (read, guide) = Checkpoint::read_with_guide(&path).unwrap();

@@ -157,6 +157,11 @@ type Placement = ([i64; 2], u32, u32, [u32; 2]);
 /// Refuses parts that differ from the first in window or metadata, or share samples with one before.
 fn check<T>(parts: &[T], facts: impl Fn(&T) -> (&Path, Placement, &Metadata)) -> Result<()> {
     let facts: Vec<_> = parts.iter().map(facts).collect();
+    if let Some((path, ..)) = facts.iter().find(|(_, _, metadata)| !metadata.ahead.is_none()) {
+        let message = "it was interrupted within a sample of the film, which only some pixels have; \
+                       finish that by render --resume";
+        return Err(Error::format(path, message));
+    }
     let (first_path, first_window, first) = facts[0];
     for (index, (path, window, metadata)) in facts.iter().enumerate().skip(1) {
         let refuse = |message: String| Err(Error::format(path, message));

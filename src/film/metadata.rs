@@ -11,7 +11,7 @@ use std::{
     str::FromStr,
 };
 
-use super::{Attribute, Image, denoised::check_film};
+use super::{Attribute, Image, denoised::check_film, sums::Ahead};
 use crate::error::{Error, Result};
 
 /// Samples `first … first + count − 1` of every pixel, drawn with one seed.
@@ -85,6 +85,8 @@ pub struct Metadata {
     pub depth: u32,
     /// Samples of every pixel that the image holds.
     pub sample_ranges: Vec<SampleRange>,
+    /// Further samples of some pixels.
+    pub ahead: Ahead,
     /// Wall time of the passes, seconds.
     pub seconds: f64,
     /// Device time by pass, seconds.
@@ -111,6 +113,13 @@ fn check_ranges(ranges: &[SampleRange]) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+/// Parses `blocks:samples`.
+fn parse_ahead(text: &str) -> Option<Ahead> {
+    let (blocks, samples) = text.split_once(':')?;
+    let ahead = Ahead { blocks: blocks.parse().ok()?, samples: samples.parse().ok()? };
+    (!ahead.is_none()).then_some(ahead)
 }
 
 /// Converts times by pass from milliseconds to seconds.
@@ -145,6 +154,10 @@ impl Metadata {
         }
         let ranges: Vec<String> = self.sample_ranges.iter().map(ToString::to_string).collect();
         put("fenestra.sample_ranges", Attribute::Text(ranges.join(" ")));
+        if !self.ahead.is_none() {
+            let Ahead { blocks, samples } = self.ahead;
+            put("fenestra.ahead", Attribute::Text(format!("{blocks}:{samples}")));
+        }
         put("fenestra.seconds", Attribute::Double(self.seconds));
         put("fenestra.device", text(&self.device));
         put("fenestra.driver", text(&self.driver));
@@ -212,6 +225,12 @@ impl Metadata {
             .map_err(|message| {
                 Error::format(path, format!("attribute fenestra.sample_ranges: {message}"))
             })?;
+        let ahead = match image.attributes.contains_key("fenestra.ahead") {
+            true => parse_ahead(&text("fenestra.ahead")?).ok_or_else(|| {
+                Error::format(path, "attribute fenestra.ahead: expected blocks:samples")
+            })?,
+            false => Ahead::default(),
+        };
         let seconds = image.attributes.get("fenestra.seconds").and_then(double).unwrap_or(0.0);
         if !(0.0..=LONGEST_RENDER).contains(&seconds) {
             return Err(Error::format(
@@ -236,6 +255,7 @@ impl Metadata {
             shadow_rays: number("fenestra.shadow_rays")?,
             depth: number("fenestra.depth")?,
             sample_ranges,
+            ahead,
             seconds,
             gpu_seconds: named("fenestra.gpu_seconds.")
                 .filter_map(|(name, value)| Some((name, double(value)?)))

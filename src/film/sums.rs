@@ -94,6 +94,25 @@ pub(crate) const COUNTS: [Layer<4>; 2] = [
     },
 ];
 
+/// Edge of the blocks in which the film is rendered, row by row from the top, in pixels.
+pub(crate) const BLOCK_EDGE: u32 = 8;
+
+/// Samples of a sweep over the film that was stopped on its way: the first blocks have them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Ahead {
+    /// Number of blocks of 8×8 pixels, row by row from the top.
+    pub blocks: u32,
+    /// Samples per pixel that these have more than the others.
+    pub samples: u32,
+}
+
+impl Ahead {
+    /// Tests whether no pixel has more samples than another.
+    pub fn is_none(self) -> bool {
+        self.blocks == 0 || self.samples == 0
+    }
+}
+
 /// Sums over the samples of every pixel of the rendered window, row by row from the top.
 ///
 /// `sum` and `compensation` are the two parts of a two-float sum: the value is their sum taken in
@@ -108,8 +127,10 @@ pub struct Sums {
     pub origin: [u32; 2],
     /// Width and height of the whole film in pixels.
     pub film_size: [u32; 2],
-    /// Samples (camera paths) per pixel, the same for every pixel.
+    /// Samples (camera paths) of every pixel.
     pub sample_count: u32,
+    /// Further samples of some pixels.
+    pub ahead: Ahead,
     /// Leading part of Σ radiance, W·sr⁻¹·m⁻².
     pub sum: Vec<[f32; 3]>,
     /// Rest of Σ radiance.
@@ -192,9 +213,20 @@ impl Sums {
         std::array::from_fn(|channel| f64::from(sum[channel]) + f64::from(rest[channel]))
     }
 
+    /// Samples of one pixel.
+    pub fn samples(&self, pixel: usize) -> u32 {
+        if self.ahead.is_none() {
+            return self.sample_count;
+        }
+        let width = self.width as usize;
+        let [column, row] = [pixel % width, pixel / width].map(|at| at as u32 / BLOCK_EDGE);
+        let is_ahead = row * self.width.div_ceil(BLOCK_EDGE) + column < self.ahead.blocks;
+        self.sample_count + if is_ahead { self.ahead.samples } else { 0 }
+    }
+
     /// Mean radiance of one pixel; 0 before the first sample.
     pub fn mean(&self, pixel: usize) -> [f64; 3] {
-        let count = f64::from(self.sample_count.max(1));
+        let count = f64::from(self.samples(pixel).max(1));
         self.total(pixel).map(|total| total / count)
     }
 
@@ -208,10 +240,11 @@ impl Sums {
     /// The estimate treats samples as independent. Stratification lowers the true variance, so this
     /// is an upper estimate. It is 0 below two samples, as in pbrt.
     pub fn variance_of_mean(&self, pixel: usize) -> [f64; 3] {
-        if self.sample_count < 2 {
+        let samples = self.samples(pixel);
+        if samples < 2 {
             return [0.0; 3];
         }
-        let count = f64::from(self.sample_count);
+        let count = f64::from(samples);
         let total = self.total(pixel);
         std::array::from_fn(|channel| {
             let squares = f64::from(self.squares[pixel][channel]);
@@ -267,11 +300,12 @@ impl Sums {
         let narrow = |value: [f64; 3]| value.map(|component| component as f32);
         let means: Vec<[f32; 3]> = pixels().map(|pixel| narrow(self.mean(pixel))).collect();
         image.insert_triple(["R", "G", "B"], &means);
-        let count = f64::from(self.sample_count.max(1));
         let insert_means = |image: &mut Image, names: [&str; 3], sums: &[[f32; 3]]| {
             if !sums.is_empty() {
-                let mean = |sum: &[f32; 3]| sum.map(|value| (f64::from(value) / count) as f32);
-                image.insert_triple(names, &sums.iter().map(mean).collect::<Vec<_>>());
+                let count = |pixel: usize| f64::from(self.samples(pixel).max(1));
+                let mean =
+                    |pixel: usize| narrow(sums[pixel].map(|sum| f64::from(sum) / count(pixel)));
+                image.insert_triple(names, &pixels().map(mean).collect::<Vec<_>>());
             }
         };
         for aov in aovs {
@@ -282,7 +316,7 @@ impl Sums {
                     image.insert_triple(["Variance.R", "Variance.G", "Variance.B"], &variances);
                 }
                 Aov::SampleCount => {
-                    let counts = vec![self.sample_count as f32; self.pixel_count()];
+                    let counts = pixels().map(|pixel| self.samples(pixel) as f32).collect();
                     image.channels.insert("SampleCount.Y".to_owned(), counts);
                 }
                 Aov::Visible => {
@@ -307,7 +341,8 @@ impl Sums {
         image
     }
 
-    /// Adds the samples of `other`, which must show the same window of the same film.
+    /// Adds the samples of `other`, which must show the same window of the same film; neither may be
+    /// [`Ahead`] anywhere.
     ///
     /// Adds sums in 64-bit floats and splits them again. Drops a layer that one side lacks.
     ///

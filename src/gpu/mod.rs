@@ -56,8 +56,8 @@ fn vulkan_error(call: &str, result: ash::vk::Result) -> Error {
             reason: format!("Vulkan: {call} failed: the device is lost"),
             help:
                 "the driver crashed, was reset or was replaced: try again, with another --device \
-                   or a newer driver; with --checkpoint-interval a render keeps checkpoints, from \
-                   which --resume continues"
+                   or a newer driver; --resume continues from the last checkpoint, which long renders \
+                   write every minute"
                     .into(),
         };
     }

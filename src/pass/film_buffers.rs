@@ -8,7 +8,7 @@ use crate::{
     error::{Error, Result},
     film::{
         Aov, Sums, Window,
-        sums::{COUNTS, TRIPLES},
+        sums::{BLOCK_EDGE, COUNTS, TRIPLES},
     },
     gpu::{Buffer, Commands, DescriptorSet, Device},
     memory,
@@ -22,9 +22,7 @@ use crate::{
 };
 
 /// Pixels of a block in film order; waves hold whole blocks.
-pub(crate) const BLOCK_PIXELS: u32 = 64;
-/// Edge of a block, pixels.
-const BLOCK_EDGE: u32 = 8;
+pub(crate) const BLOCK_PIXELS: u32 = BLOCK_EDGE * BLOCK_EDGE;
 
 /// Buffers of the layers: name, binding, and bit `AOV_…` that asks for it, 0 for those that every film has.
 /// First [`Sums::triples`], then [`Sums::counts`].

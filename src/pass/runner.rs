@@ -35,8 +35,8 @@ const COUNTER_ROOM: u64 = 1 << 30;
 /// Share of living paths, of all at later vertices, below which the passes there walk lists of them.
 const MOST_LIVING: f64 = 0.4;
 
-/// Called between waves; true stops the sweep under way.
-pub(crate) type Watch = Box<dyn FnMut() -> bool>;
+/// Called after every wave of a sweep; true stops the sweep.
+pub(crate) type Watch = Box<dyn FnMut(&Wave) -> bool>;
 
 /// A scene, a film and the paths in flight on a device. Knows no sampler.
 pub struct Runner {
@@ -98,13 +98,13 @@ impl Runner {
         })
     }
 
-    /// Calls `watch` between the waves of all sweeps from now on.
+    /// Calls `watch` after the waves of all sweeps from now on.
     pub(crate) fn set_watch(&mut self, watch: Watch) {
         self.watch = Some(watch);
+        self.is_stopped = false;
     }
 
-    /// True if the watch has stopped a sweep since [`Runner::look`]: pixels have different numbers of
-    /// samples.
+    /// True if the watch has stopped a sweep since it was set, or since [`Runner::look`].
     pub(crate) fn is_stopped(&self) -> bool {
         self.is_stopped
     }
@@ -148,8 +148,9 @@ impl Runner {
     }
 
     /// Runs waves like `wave` over `pixels` pixels, starting at its first, and takes the counters
-    /// before they overflow. Fails if the device does.
-    pub(crate) fn sweep(&mut self, technique: &dyn Passes, wave: Wave, pixels: u32) -> Result<()> {
+    /// before they overflow. Returns the pixels done, all unless the watch stops it. Fails if the device
+    /// does.
+    pub(crate) fn sweep(&mut self, technique: &dyn Passes, wave: Wave, pixels: u32) -> Result<u32> {
         let mut done = 0;
         let mut uncounted = 0;
         while done < pixels {
@@ -166,7 +167,7 @@ impl Runner {
             let times = self.run(technique, wave, self.settings.depth)?;
             self.steer(&times, wave);
             done += wave.pixel_count;
-            if self.watch.as_mut().is_some_and(|watch| watch()) {
+            if self.watch.as_mut().is_some_and(|watch| watch(&wave)) {
                 self.is_stopped = true;
                 break;
             }
@@ -176,7 +177,7 @@ impl Runner {
                 uncounted = 0;
             }
         }
-        Ok(())
+        Ok(done)
     }
 
     /// Most that one path adds to a counter: energy counts up to 256 at a vertex.

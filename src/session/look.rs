@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::Renderer;
 use crate::{
     error::Result,
+    film::sums::Ahead,
     gpu::DescriptorSet,
     pass::{SceneBuffers, Watch},
     scene::Camera,
@@ -25,11 +26,12 @@ impl Renderer {
         self.settings.seed = seed;
         self.film_size = size;
         self.sample_count = 0;
+        self.ahead = Ahead::default();
         Ok(())
     }
 
-    /// Calls `watch` between waves from now on. Where it returns true, [`Renderer::render_pass`] returns
-    /// early, and the film is of no use until [`Renderer::look`].
+    /// Calls `watch` after waves from now on. Where it returns true, [`Renderer::render_pass`] returns
+    /// early, and some pixels may have more samples than others.
     pub fn set_watch(&mut self, watch: Watch) {
         self.runner.set_watch(watch);
     }

@@ -20,4 +20,4 @@ pub use renderer::Renderer;
 pub(crate) use run::describe;
 pub use run::{Event, Observer, Session};
 pub use settings::{Settings, window_of};
-pub use stop::{Rules, Standing, StopReason};
+pub use stop::{Flag, Rules, Standing, StopReason};

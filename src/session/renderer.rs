@@ -5,11 +5,11 @@ use std::{any::Any, collections::BTreeMap, sync::Arc};
 use super::{Settings, window_of};
 use crate::{
     error::{Error, Result},
-    film::Sums,
+    film::{Sums, sums::Ahead},
     gpu::{Device, PassTimes},
     pass::{
         PassSettings, Progress, Report, Runner, SceneBuffers, Schedule, Technique, Totals,
-        film_buffers::{aov_bits, check_memory},
+        film_buffers::{BLOCK_PIXELS, aov_bits, check_memory},
         wave_buffers::most_paths,
     },
     sampler::Context,
@@ -29,6 +29,8 @@ pub struct Renderer {
     pub(super) settings: Settings,
     pub(super) film_size: [u32; 2],
     pub(super) sample_count: u32,
+    /// Sweep that was stopped on its way.
+    pub(super) ahead: Ahead,
 }
 
 impl Renderer {
@@ -92,7 +94,8 @@ impl Renderer {
                 result => break result?,
             }
         };
-        Ok(Self { runner, technique, settings, film_size, sample_count: 0 })
+        let ahead = Ahead::default();
+        Ok(Self { runner, technique, settings, film_size, sample_count: 0, ahead })
     }
 
     pub(super) fn progress(&self) -> Progress {
@@ -103,7 +106,7 @@ impl Renderer {
         }
     }
 
-    /// Adds `samples` samples to every pixel. Fails if the device does.
+    /// Adds `samples` samples to every pixel, the rest of a stopped sweep first. Fails if the device does.
     pub fn render_pass(&mut self, samples: u32) -> Result<()> {
         let mut left = samples;
         while left > 0 {
@@ -113,7 +116,10 @@ impl Renderer {
             if self.runner.is_stopped() {
                 return Ok(());
             }
+            let before = std::mem::take(&mut self.ahead);
+            let together = if before.is_none() { together } else { before.samples };
             let wave = Wave {
+                first_pixel: before.blocks * BLOCK_PIXELS,
                 first_sample: progress.next_sample(),
                 sample_count: together,
                 seed: progress.seed,
@@ -121,14 +127,19 @@ impl Renderer {
                 ..Wave::default()
             };
             let wave = self.technique.complete(wave, &progress);
-            let pixels = self.runner.film().padded_pixels();
-            self.runner.sweep(self.technique.as_ref(), wave, pixels)?;
+            let pixels = self.runner.film().padded_pixels() - wave.first_pixel;
+            let done = self.runner.sweep(self.technique.as_ref(), wave, pixels)?;
             self.runner.take_counters()?;
+            if done < pixels {
+                let blocks = before.blocks + done / BLOCK_PIXELS;
+                self.ahead = Ahead { blocks, samples: together };
+            } else {
+                self.sample_count += together;
+                left = left.saturating_sub(together);
+            }
             if self.runner.is_stopped() {
                 return Ok(());
             }
-            self.sample_count += together;
-            left -= together;
         }
         Ok(())
     }
@@ -140,6 +151,7 @@ impl Renderer {
         self.technique.restart(&mut self.runner)?;
         self.settings.seed = seed;
         self.sample_count = 0;
+        self.ahead = Ahead::default();
         Ok(())
     }
 
@@ -149,7 +161,8 @@ impl Renderer {
     /// [`Error::Usage`] if window or layers differ, or if the next sample depends on more than the
     /// sums; [`Error::Vulkan`] if the device fails.
     pub fn restore(&mut self, sums: &Sums) -> Result<()> {
-        self.technique.check_resume(sums.sample_count, &self.progress())?;
+        let most_samples = sums.sample_count.saturating_add(sums.ahead.samples);
+        self.technique.check_resume(most_samples, &self.progress())?;
         let window = self.runner.scene().window();
         if sums.film_size != self.film_size
             || sums.origin != [window.x, window.y]
@@ -170,6 +183,7 @@ impl Renderer {
         }
         self.runner.film().upload(sums)?;
         self.sample_count = sums.sample_count;
+        self.ahead = sums.ahead;
         Ok(())
     }
 
@@ -193,7 +207,12 @@ impl Renderer {
         &self.settings
     }
 
-    /// Samples per pixel in the film.
+    /// Further samples of some pixels, where a sweep was stopped.
+    pub fn ahead(&self) -> Ahead {
+        self.ahead
+    }
+
+    /// Samples of every pixel in the film.
     pub fn sample_count(&self) -> u32 {
         self.sample_count
     }
@@ -235,6 +254,7 @@ impl Renderer {
     /// Reads the film. Fails if the device does.
     pub fn sums(&self) -> Result<Sums> {
         let sums = self.runner.sums()?;
-        Ok(Sums { film_size: self.film_size, sample_count: self.sample_count, ..sums })
+        let (film_size, sample_count, ahead) = (self.film_size, self.sample_count, self.ahead);
+        Ok(Sums { film_size, sample_count, ahead, ..sums })
     }
 }

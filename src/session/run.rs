@@ -1,25 +1,36 @@
 //! The loop of a render: passes until a rule is met, looks at the film, checkpoints.
 
 use std::{
+    cell::Cell,
     fmt,
     path::Path,
+    rc::Rc,
     sync::Arc,
     time::{Duration, Instant},
 };
 
-use super::{Renderer, Rules, Settings, Standing, StopReason};
+use super::{Flag, Renderer, Rules, Settings, Standing, StopReason};
 use crate::{
     error::{Error, Result},
-    film::{Aov, Checkpoint, Image, Metadata, SampleRange, Sums, metadata::seconds_of},
+    files::parent_of,
+    film::{
+        Aov, Checkpoint, Image, Metadata, SampleRange, Sums, checkpoint::remove_checkpoint,
+        metadata::seconds_of,
+    },
     gpu::Device,
     pass::Saved,
     scene::{Camera, Scene},
 };
 
-/// Duration aimed at for a pass, and so the delay until stop rules and interrupts are noticed.
+/// Duration aimed at for a pass, and so the delay until stop rules are noticed. An interrupt stops one
+/// that takes longer.
 const PACE: Duration = Duration::from_millis(250);
+/// Duration of a training that an interrupt does not stop, so that there is a picture of small films.
+const SHORT_TRAINING: Duration = Duration::from_secs(4);
 /// Interval of looks at the film, which need it on the host.
 const LOOK_INTERVAL: Duration = Duration::from_secs(1);
+/// Bytes of an image file besides its pixels, at most.
+const IMAGE_BESIDES_PIXELS: u64 = 1 << 20;
 /// Samples per pixel from which a film without light is reported to who waits for an error.
 const DARK_AFTER: u32 = 64;
 
@@ -53,9 +64,10 @@ impl fmt::Display for Event<'_> {
 
 /// Follower of a run.
 pub trait Observer {
-    /// True if the run should end before its next pass, though not before its first.
-    fn is_interrupted(&self) -> bool {
-        false
+    /// Flag that ends the run: before its next pass, or after any wave of a pass that takes long. Some
+    /// pixels may then have more samples than others.
+    fn interrupt(&self) -> Flag {
+        Flag::default()
     }
 
     /// Takes notice of an event.
@@ -78,6 +90,10 @@ pub struct Session {
     pace: Duration,
     /// Samples and seconds of the last pass.
     last_pass: Option<(u32, f64)>,
+    /// True if a checkpoint of this render lies on the disk.
+    has_checkpoint: bool,
+    /// Start of the pass under way, for its watch.
+    pass_start: Rc<Cell<Instant>>,
     /// Wall time that earlier runs spent in passes, seconds.
     earlier_seconds: f64,
     /// Wall time that this run has spent in passes, seconds.
@@ -128,6 +144,8 @@ impl Session {
             description: Metadata { fit_hashes, tracer, ..description },
             pace: PACE,
             last_pass: None,
+            has_checkpoint: false,
+            pass_start: Rc::new(Cell::new(Instant::now())),
             earlier_seconds: 0.0,
             own_seconds: 0.0,
             relative_error: None,
@@ -178,6 +196,7 @@ impl Session {
                 first: settings.first_sample,
                 count: self.renderer.sample_count(),
             }],
+            ahead: self.renderer.ahead(),
             candidates: self.renderer.report().candidates,
             seconds: self.seconds(),
             gpu_seconds: seconds_of(&self.renderer.totals().gpu_ms),
@@ -187,9 +206,14 @@ impl Session {
 
     /// Returns the film as an image with `layers` and its metadata. Fails if the device does.
     pub fn image(&self, layers: &[Aov]) -> Result<Image> {
-        let mut image = self.renderer.sums()?.to_image(layers);
+        Ok(self.image_of(&self.renderer.sums()?, layers))
+    }
+
+    /// Returns sums of the film as [`Session::image`] does.
+    pub(crate) fn image_of(&self, sums: &Sums, layers: &[Aov]) -> Image {
+        let mut image = sums.to_image(layers);
         self.metadata().store(&mut image);
-        Ok(image)
+        image
     }
 
     /// Renders one pass of at most `most` samples: at most twice as many as the last, to take about as long
@@ -199,6 +223,7 @@ impl Session {
         let next = |(samples, took)| next_pass_samples(samples, took, left);
         let samples = self.last_pass.map_or(1, next).min(most);
         let start = Instant::now();
+        self.pass_start.set(start);
         self.renderer.render_pass(samples)?;
         let took = start.elapsed().as_secs_f64();
         self.own_seconds += took;
@@ -206,16 +231,36 @@ impl Session {
         Ok(took)
     }
 
-    /// Renders until a rule is met, or the observer interrupts. Fails if the device does.
+    /// Stops passes that take long once the flag is raised.
+    fn watch(&mut self, interrupt: &Flag) {
+        let (interrupt, start) = (interrupt.clone(), Rc::clone(&self.pass_start));
+        let pace = self.pace;
+        self.renderer.set_watch(Box::new(move |wave| {
+            let patience = if wave.is_training == 0 { pace } else { SHORT_TRAINING };
+            interrupt.is_raised() && start.get().elapsed() > patience
+        }));
+    }
+
+    /// Renders until a rule is met, or the observer interrupts.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] before any pixel has a sample; a failing device.
     pub fn run(&mut self, rules: &Rules, observer: &mut dyn Observer) -> Result<StopReason> {
+        let interrupt = observer.interrupt();
+        self.watch(&interrupt);
         let mut next_look = Instant::now() + LOOK_INTERVAL;
-        let mut last_checkpoint = Instant::now();
+        let mut next_checkpoint =
+            rules.checkpoints.as_ref().map(|(_, interval)| Instant::now() + *interval);
         let mut is_dark = false;
         let looks = rules.looks || rules.error.is_some();
         let reason = loop {
             let before = self.renderer.sample_count();
-            if before > 0 && observer.is_interrupted() {
-                break StopReason::Interrupt;
+            if interrupt.is_raised() {
+                if before > 0 || !self.renderer.ahead().is_none() {
+                    break StopReason::Interrupt;
+                } else if self.renderer.is_stopped() {
+                    return Err(Error::Interrupted);
+                }
             }
             if let Some(reason) = self.met(rules) {
                 break reason;
@@ -237,18 +282,25 @@ impl Session {
                 next_look = Instant::now() + LOOK_INTERVAL.max(20 * start.elapsed());
             }
             if let Some((path, interval)) = &rules.checkpoints
-                && last_checkpoint.elapsed() >= *interval
+                && next_checkpoint.is_some_and(|at| Instant::now() >= at)
             {
+                let start = Instant::now();
                 // A full disk may have room again at the next interval or for the image.
-                if let Err(error) = self.write_checkpoint(path)? {
-                    log::warn!("{error}; the next checkpoint tries again");
+                match self.write_checkpoint(path, self.renderer.sums()?)? {
+                    Ok(()) => self.leave_room_beside(path),
+                    Err(error) => log::warn!("{error}; the next checkpoint tries again"),
                 }
-                last_checkpoint = Instant::now();
+                // A large film takes time from the passes.
+                let pause = (10 * start.elapsed()).clamp(*interval, 10 * *interval);
+                next_checkpoint = Some(Instant::now() + pause);
             }
             observer.notice(&Event::Pass { samples, seconds, standing: self.standing(rules) });
         };
-        if looks {
-            self.look_at_film(observer)?;
+        match reason {
+            // Who interrupts does not wait for the error of a large film.
+            StopReason::Interrupt => self.found_light |= self.renderer.sums()?.found_light(),
+            _ if looks => self.look_at_film(observer)?,
+            _ => {}
         }
         Ok(reason)
     }
@@ -262,11 +314,31 @@ impl Session {
         Ok(())
     }
 
-    /// Writes a checkpoint, with the guide of a sampler that learns. The outer error is the device's, the
-    /// inner one the disk's.
-    pub fn write_checkpoint(&self, path: &Path) -> Result<Result<()>> {
-        let checkpoint = Checkpoint { sums: self.renderer.sums()?, metadata: self.metadata() };
-        Ok(checkpoint.write_with_guide(path, self.renderer.guide()?.as_deref()))
+    /// Writes a checkpoint of the film's sums, with the guide of a sampler that learns. The outer error is
+    /// the device's, the inner one the disk's.
+    pub fn write_checkpoint(&mut self, path: &Path, sums: Sums) -> Result<Result<()>> {
+        let checkpoint = Checkpoint { sums, metadata: self.metadata() };
+        let written = checkpoint.write_with_guide(path, self.renderer.guide()?.as_deref());
+        self.has_checkpoint |= written.is_ok();
+        Ok(written)
+    }
+
+    /// True if a checkpoint of this render lies on the disk: it was resumed from, or has been written.
+    pub(crate) fn has_checkpoint(&self) -> bool {
+        self.has_checkpoint
+    }
+
+    /// Removes the checkpoint again if it leaves too little of the disk for the image.
+    fn leave_room_beside(&mut self, path: &Path) {
+        let settings = self.renderer.settings();
+        let [width, height] = self.renderer.film_size().map(u64::from);
+        let layers = 1 + settings.aovs.len() as u64;
+        let image_bytes = width * height * 12 * layers + IMAGE_BESIDES_PIXELS;
+        if free_bytes(path).is_some_and(|free| free < image_bytes as f64) {
+            log::warn!("{}: removed, the disk has room for the image only", path.display());
+            self.has_checkpoint = false;
+            remove_checkpoint(path).unwrap_or_else(|error| log::warn!("{error}"));
+        }
     }
 
     /// Continues from a checkpoint of the same render, as if it had not stopped.
@@ -283,9 +355,22 @@ impl Session {
                 guide.ok_or_else(|| Error::format(path, "the checkpoint has no guide"))?;
             self.renderer.take_guide(Saved { path: &path, bytes: &bytes, continues: true })?;
         }
+        self.has_checkpoint = true;
         self.earlier_seconds = checkpoint.metadata.seconds;
         Ok(())
     }
+}
+
+/// Bytes that are free on the disk of a file, where the system tells.
+#[cfg(unix)]
+fn free_bytes(path: &Path) -> Option<f64> {
+    let disk = nix::sys::statvfs::statvfs(parent_of(path)).ok()?;
+    Some(disk.blocks_available() as f64 * disk.fragment_size() as f64)
+}
+
+#[cfg(not(unix))]
+fn free_bytes(_: &Path) -> Option<f64> {
+    None
 }
 
 /// Samples of the next pass after one of `samples` that took `took` seconds: at most twice as many, to

@@ -282,7 +282,8 @@ fn render_half(
     let rules = Rules { samples: Some(count), checkpoints, ..Rules::default() };
     let result = watch.run(session, &rules, false);
     if matches!(result, Err(Error::Interrupted)) && session.renderer.sample_count() > 0 {
-        session.write_checkpoint(&checkpoint)?.unwrap_or_else(|error| log::warn!("{error}"));
+        let written = session.write_checkpoint(&checkpoint, session.renderer.sums()?)?;
+        written.unwrap_or_else(|error| log::warn!("{error}"));
     }
     result?;
     session.image(&[Aov::Variance])?.write_exr(path)?;

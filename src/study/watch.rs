@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use crate::{
     error::{Error, Result},
-    session::{Event, Observer, Rules, Session, Standing, StopReason},
+    session::{Event, Flag, Observer, Rules, Session, Standing, StopReason},
 };
 
 /// Seconds per camera path until some are measured.
@@ -51,7 +51,7 @@ impl<'a> Watch<'a> {
     /// # Errors
     /// [`Error::Interrupted`].
     pub(crate) fn check(&self) -> Result<()> {
-        if self.observer.is_interrupted() { Err(Error::Interrupted) } else { Ok(()) }
+        if self.observer.interrupt().is_raised() { Err(Error::Interrupted) } else { Ok(()) }
     }
 
     /// Accounts for a pass.
@@ -104,8 +104,8 @@ struct WatchedRun<'a, 'b> {
 }
 
 impl Observer for WatchedRun<'_, '_> {
-    fn is_interrupted(&self) -> bool {
-        self.watch.observer.is_interrupted()
+    fn interrupt(&self) -> Flag {
+        self.watch.observer.interrupt()
     }
 
     fn notice(&mut self, event: &Event<'_>) {

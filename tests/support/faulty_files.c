@@ -6,6 +6,7 @@
  *   a file, which is before it is renamed, before every fsync of its folder, which is after, and
  *   before every unlink.
  * FAULTY_BYTES: the disk is full once this many bytes are written.
+ * FAULTY_FREE: the bytes that are free on every disk, as programs are told.
  * FAULTY_SYNC: this fsync, counted from 0, and all after it fail.
  *
  * Renaming need not be caught, nor could it be: the program calls the kernel for it directly. */
@@ -20,6 +21,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 static atomic_uint_fast64_t moments, written, syncs;
@@ -91,5 +93,23 @@ ssize_t write(int file, const void *bytes, size_t count)
     }
     ssize_t result = next(file, bytes, count < left ? count : left);
     if (result > 0) atomic_fetch_add(&written, (uint64_t)result);
+    return result;
+}
+
+int statvfs(const char *path, struct statvfs *found)
+{
+    int (*next)(const char *, struct statvfs *) =
+        (int (*)(const char *, struct statvfs *))dlsym(RTLD_NEXT, "statvfs");
+    int result = next(path, found);
+    if (setting("FAULTY_FREE") != UINT64_MAX) found->f_bavail = setting("FAULTY_FREE") / found->f_frsize;
+    return result;
+}
+
+int statvfs64(const char *path, struct statvfs64 *found)
+{
+    int (*next)(const char *, struct statvfs64 *) =
+        (int (*)(const char *, struct statvfs64 *))dlsym(RTLD_NEXT, "statvfs64");
+    int result = next(path, found);
+    if (setting("FAULTY_FREE") != UINT64_MAX) found->f_bavail = setting("FAULTY_FREE") / found->f_frsize;
     return result;
 }

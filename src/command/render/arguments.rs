@@ -74,9 +74,13 @@ pub struct Arguments {
     /// Continue from the output's checkpoint, if there is one.
     #[arg(long)]
     pub resume: bool,
-    /// Write a checkpoint at this interval and at the end.
+    /// Write a checkpoint at this interval and at the end. Without it, one is written every minute and
+    /// removed when the render is done.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
     pub checkpoint_interval: Option<Duration>,
+    /// Write no checkpoint, not even when interrupted.
+    #[arg(long, conflicts_with = "checkpoint_interval")]
+    pub no_checkpoint: bool,
     /// Device and tracer.
     #[command(flatten)]
     pub device: DeviceOptions,
@@ -172,6 +176,11 @@ impl Arguments {
         outputs.retain(|(name, _)| *name != "--save-guide");
         check_replaces_nothing(&outputs, self.load_guide.as_deref().as_slice())?;
         asked.into_iter().filter_map(|(_, path)| path).try_for_each(check_writable)
+    }
+
+    /// True if checkpoints may be written beside the image.
+    pub(super) fn writes_checkpoints(&self, output: &Path) -> bool {
+        !self.no_checkpoint && !is_special_file(output)
     }
 
     /// Translates the options into stop rules; the default number of samples holds where there is none.

@@ -6,22 +6,28 @@ use super::{RenderJob, StopReason, arguments::denoised_path, display};
 use crate::{
     command::denoise::{Denoised, denoise},
     error::Result,
-    files::{is_special_file, write_json},
-    film::{Image, checkpoint::checkpoint_path, png::write_preview},
+    files::write_json,
+    film::{
+        Image,
+        checkpoint::{checkpoint_path, remove_checkpoint},
+        png::write_preview,
+    },
     gpu::Denoiser,
     session::Session,
     terminal::say,
 };
 
 impl RenderJob<'_> {
-    /// Writes the image, then all other files asked for, each of them even if another fails.
+    /// Writes the image, then what it continues from, then all other files asked for, each of them even
+    /// if another fails.
     ///
     /// # Errors
     /// The first failure; others are logged.
-    pub(super) fn finish(&self, session: &Session, reason: StopReason) -> Result<()> {
+    pub(super) fn finish(&self, session: &mut Session, reason: StopReason) -> Result<()> {
         let warnings = session.warnings(self.scene);
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
-        let image = session.image(&self.aovs)?;
+        let sums = session.renderer.sums()?;
+        let image = session.image_of(&sums, &self.aovs);
         let mut written = Vec::new();
         let mut failure = None;
         let mut note = |path: &Path, result: Result<()>| match (result, &failure) {
@@ -29,7 +35,23 @@ impl RenderJob<'_> {
             (Err(error), None) => failure = Some(error),
             (Err(error), Some(_)) => log::error!("{error}"),
         };
-        note(&self.output, image.write_exr(&self.output));
+        let is_interrupted = reason == StopReason::Interrupt;
+        // Compression takes seconds of a large film, and noise is hardly smaller for it.
+        let picture = match is_interrupted {
+            true => image.write_exr_uncompressed(&self.output),
+            false => image.write_exr(&self.output),
+        };
+        let has_picture = picture.is_ok();
+        note(&self.output, picture);
+        let checkpoint = checkpoint_path(&self.output);
+        let is_to_continue = is_interrupted || self.arguments.checkpoint_interval.is_some();
+        if !self.arguments.writes_checkpoints(&self.output) {
+            drop(sums);
+        } else if is_to_continue {
+            note(&checkpoint, session.write_checkpoint(&checkpoint, sums).and_then(|it| it));
+        } else if has_picture && session.has_checkpoint() {
+            remove_checkpoint(&checkpoint).unwrap_or_else(|error| log::warn!("{error}"));
+        }
         if self.arguments.png {
             let path = self.output.with_extension("png");
             let preview = |rgb| write_preview(&path, &rgb, self.arguments.exposure);
@@ -38,17 +60,11 @@ impl RenderJob<'_> {
         if let Some(denoiser) = &self.denoiser {
             self.write_denoised(denoiser, &image, &mut note);
         }
-        drop(image);
         if let Some(path) = &self.arguments.stats {
             let mut statistics = session.statistics(self.scene, reason);
             statistics.warnings.extend(warnings);
             statistics.host_ms.insert("load".into(), self.load_ms);
             note(path, write_json(path, &statistics));
-        }
-        let is_interrupted = reason == StopReason::Interrupt && !is_special_file(&self.output);
-        if is_interrupted || self.arguments.checkpoint_interval.is_some() {
-            let path = checkpoint_path(&self.output);
-            note(&path, session.write_checkpoint(&path).and_then(|written| written));
         }
         if let Some(path) = &self.arguments.save_guide {
             note(path, session.renderer.save_guide(path));

@@ -5,7 +5,7 @@ mod finish;
 
 use std::{
     path::{Path, PathBuf},
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 pub(crate) use arguments::Arguments;
@@ -22,12 +22,14 @@ use crate::{
     gpu::Denoiser,
     pass::Explanation,
     scene::Scene,
-    session::{Event, Observer, Rules, Session, StopReason, pixel},
+    session::{Event, Flag, Observer, Rules, Session, StopReason, pixel},
     terminal::say,
 };
 
 /// Samples per pixel if no stop rule is given.
 const DEFAULT_SPP: u32 = 64;
+/// Time between checkpoints unless given.
+const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
 /// Samples per pixel of `--quick`.
 const QUICK_SPP: u32 = 16;
 
@@ -82,8 +84,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
     let job = RenderJob { arguments, scene: &scene, output, aovs, denoiser, load_ms };
     let reason = job.render(&mut session, &interrupt)?;
+    let finished = job.finish(&mut session, reason);
     device.save_pipeline_cache();
-    job.finish(&session, reason)?;
+    finished?;
     if let Some(at) = arguments.pixel {
         job.explain(session.renderer.explain_pixel(&device, &scene, at)?.as_deref(), at)?;
     }
@@ -109,11 +112,10 @@ struct RenderJob<'a> {
 impl RenderJob<'_> {
     /// Renders passes until a stop rule is met.
     fn render(&self, session: &mut Session, interrupt: &Interrupt) -> Result<StopReason> {
-        let checkpoints = |interval| (checkpoint_path(&self.output), interval);
-        let rules = Rules {
-            checkpoints: self.arguments.checkpoint_interval.map(checkpoints),
-            ..self.arguments.rules()
-        };
+        let interval = self.arguments.checkpoint_interval.unwrap_or(CHECKPOINT_INTERVAL);
+        let writes = self.arguments.writes_checkpoints(&self.output);
+        let checkpoints = writes.then(|| (checkpoint_path(&self.output), interval));
+        let rules = Rules { checkpoints, ..self.arguments.rules() };
         let mut progress = Progress::new(self.scene.name.clone(), self.arguments.quiet);
         let display = self.open_display()?;
         let mut observer =
@@ -159,8 +161,8 @@ struct Display<'a> {
 }
 
 impl Observer for Display<'_> {
-    fn is_interrupted(&self) -> bool {
-        self.interrupt.is_raised()
+    fn interrupt(&self) -> Flag {
+        self.interrupt.flag()
     }
 
     fn notice(&mut self, event: &Event<'_>) {

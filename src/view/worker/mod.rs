@@ -150,7 +150,7 @@ impl Worker {
     /// Attends to the window between the waves of a pass.
     fn watch(&self) -> Watch {
         let panel = Rc::clone(&self.panel);
-        Box::new(move || {
+        Box::new(move |_| {
             let mut panel = panel.borrow_mut();
             panel.attend() && !panel.is_moving
         })
