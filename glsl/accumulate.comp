@@ -7,8 +7,22 @@ READS(paths)
 UPDATES(film_sum)
 UPDATES(film_compensation)
 UPDATES(film_squares)
+UPDATES(film_squares_compensation)
 UPDATES(film_visible)
 UPDATES(counters)
+
+// Adds a value to a sum of two floats. Two-sum (Knuth): `rest` is exactly what rounding `total` lost.
+void add(vec3 value, inout vec3 sum, inout vec3 compensation) {
+    precise vec3 total = sum + value;
+    precise vec3 added = total - sum;
+    precise vec3 rest = (sum - (total - added)) + (value - added);
+    // Keep the compensation below half a unit of the sum: left to grow, it would round too.
+    precise vec3 low = compensation + rest;
+    precise vec3 next_sum = total + low;
+    precise vec3 next_compensation = low - (next_sum - total);
+    sum = next_sum;
+    compensation = next_compensation;
+}
 
 void accumulate_pixel(uint pixel, PathIndex index) {
     // Training rays are counted, but their light stays out of the picture.
@@ -17,6 +31,7 @@ void accumulate_pixel(uint pixel, PathIndex index) {
     vec3 sum = film_sum[place];
     vec3 compensation = film_compensation[place];
     vec3 squares = film_squares[place];
+    vec3 squares_compensation = film_squares_compensation[place];
     uint bounce_rays = 0u;
     uint dropped = 0u;
     uvec2 shadow_rays = uvec2(0u);
@@ -30,22 +45,14 @@ void accumulate_pixel(uint pixel, PathIndex index) {
             dropped += 1u;
             continue;
         }
-        // Two-sum (Knuth): `rest` is exactly what rounding `total` lost.
-        precise vec3 total = sum + radiance;
-        precise vec3 added = total - sum;
-        precise vec3 rest = (sum - (total - added)) + (radiance - added);
-        // Keep the compensation below half a unit of the sum: left to grow, it would round too.
-        precise vec3 low = compensation + rest;
-        precise vec3 next_sum = total + low;
-        precise vec3 next_compensation = low - (next_sum - total);
-        sum = next_sum;
-        compensation = next_compensation;
-        squares += radiance * radiance;
+        add(radiance, sum, compensation);
+        add(radiance * radiance, squares, squares_compensation);
     }
     if (adds) {
         film_sum[place] = sum;
         film_compensation[place] = compensation;
         film_squares[place] = squares;
+        film_squares_compensation[place] = squares_compensation;
         if ((wave.aovs & AOV_VISIBLE) != 0u) {
             film_visible[place] += shadow_rays;
         }

@@ -393,6 +393,21 @@ fn a_million_samples_do_not_drift() {
     assert!(drift < 1e-6, "{drift}");
 }
 
+/// A float alone would drift by 1e-4 after so many samples.
+#[test]
+fn squares_do_not_drift() {
+    let _alone = support::alone();
+    let settings = Settings { sampler: Sampler::Cosine, shadow_rays: 1, ..Settings::default() };
+    let sums = render(&tiny_plane(Vec3::new(0.2, 0.5, 0.9)), settings, 1 << 14);
+    for pixel in 0..sums.pixel_count() {
+        // No variance: the mean of the squares is the square of the mean.
+        let mean = DVec3::from(sums.mean(pixel));
+        let squares = DVec3::from(sums.total_squares(pixel)) / f64::from(sums.sample_count);
+        let drift = (squares / (mean * mean) - 1.0).abs().max_element();
+        assert!(drift < 2e-6, "{drift}");
+    }
+}
+
 /// Compares a million samples of `sampler` with those of `cosine`. A wall hides half of the sky: else
 /// `guided` samples as `mis` does.
 fn million_samples_keep_the_mean(sampler: Sampler) {

@@ -1,8 +1,9 @@
 //! Checkpoints: the film's sums and the metadata of their render, as an OpenEXR file.
 //!
 //! The channels hold the sums bit for bit: `Sum.R/G/B`, `SumCompensation.R/G/B`, `Squares.R/G/B`,
-//! `AlbedoSum.R/G/B`, `NSum.X/Y/Z`, `PSum.X/Y/Z`, `GuideCellSum.R/G/B`, `GuideLevelSum.R/G/B`, and
-//! each count of shadow rays and cache entries as a pair of floats that add up to the integer.
+//! `SquaresCompensation.R/G/B`, `AlbedoSum.R/G/B`, `NSum.X/Y/Z`, `PSum.X/Y/Z`, `GuideCellSum.R/G/B`,
+//! `GuideLevelSum.R/G/B`, and each count of shadow rays and cache entries as a pair of floats that add up
+//! to the integer.
 //! Beside them, the picture `R`, `G`, `B` lets any viewer open the file. An attribute holds the
 //! SHA-256 of window, channels and attributes, so that damage does not pass for radiance.
 //!
@@ -31,7 +32,7 @@ use crate::{
 
 /// Attribute that marks a checkpoint, and the version of its channels.
 const FORMAT_ATTRIBUTE: &str = "fenestra.checkpoint";
-const FORMAT_VERSION: i32 = 2;
+const FORMAT_VERSION: i32 = 3;
 /// SHA-256 of the rest of the file.
 const CHECKSUM_ATTRIBUTE: &str = "fenestra.checksum";
 /// SHA-256 of the guide's file.

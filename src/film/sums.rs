@@ -55,10 +55,14 @@ pub(crate) struct Layer<const N: usize> {
 }
 
 /// Layers of three numbers.
-pub(crate) const TRIPLES: [Layer<3>; 8] = [
+pub(crate) const TRIPLES: [Layer<3>; 9] = [
     Layer { aov: None, channels: ["Sum.R", "Sum.G", "Sum.B"] },
     Layer { aov: None, channels: ["SumCompensation.R", "SumCompensation.G", "SumCompensation.B"] },
     Layer { aov: None, channels: ["Squares.R", "Squares.G", "Squares.B"] },
+    Layer {
+        aov: None,
+        channels: ["SquaresCompensation.R", "SquaresCompensation.G", "SquaresCompensation.B"],
+    },
     Layer { aov: Some(Aov::Albedo), channels: ["AlbedoSum.R", "AlbedoSum.G", "AlbedoSum.B"] },
     Layer { aov: Some(Aov::Normal), channels: ["NSum.X", "NSum.Y", "NSum.Z"] },
     Layer { aov: Some(Aov::Position), channels: ["PSum.X", "PSum.Y", "PSum.Z"] },
@@ -116,7 +120,8 @@ impl Ahead {
 /// Sums over the samples of every pixel of the rendered window, row by row from the top.
 ///
 /// `sum` and `compensation` are the two parts of a two-float sum: the value is their sum taken in
-/// 64-bit floats, and it stays exact to about 2⁻⁴⁸ however many samples are added.
+/// 64-bit floats, and it stays exact to about 2⁻⁴⁸ however many samples are added. So are `squares` and
+/// `squares_compensation`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sums {
     /// Width of the rendered window in pixels.
@@ -135,8 +140,10 @@ pub struct Sums {
     pub sum: Vec<[f32; 3]>,
     /// Rest of Σ radiance.
     pub compensation: Vec<[f32; 3]>,
-    /// Σ radiance², per sample.
+    /// Leading part of Σ radiance², per sample.
     pub squares: Vec<[f32; 3]>,
+    /// Rest of Σ radiance².
+    pub squares_compensation: Vec<[f32; 3]>,
     /// Σ albedo at the first hit, 0 without one; empty if not asked for.
     pub albedo: Vec<[f32; 3]>,
     /// Σ shading normal at the first hit, 0 without one; empty if not asked for.
@@ -170,7 +177,7 @@ macro_rules! layers {
 
 impl Sums {
     layers!(triples triples_mut TRIPLES [f32; 3]:
-        sum compensation squares albedo normal position guide_cell guide_level);
+        sum compensation squares squares_compensation albedo normal position guide_cell guide_level);
     layers!(counts counts_mut COUNTS [u32; 2]: visible cache_entries);
 
     /// Creates sums of no samples, without extra layers.
@@ -183,7 +190,8 @@ impl Sums {
             film_size,
             sum: zeros.clone(),
             compensation: zeros.clone(),
-            squares: zeros,
+            squares: zeros.clone(),
+            squares_compensation: zeros,
             ..Self::default()
         }
     }
@@ -209,8 +217,12 @@ impl Sums {
 
     /// Σ radiance of one pixel in 64-bit floats.
     pub fn total(&self, pixel: usize) -> [f64; 3] {
-        let (sum, rest) = (self.sum[pixel], self.compensation[pixel]);
-        std::array::from_fn(|channel| f64::from(sum[channel]) + f64::from(rest[channel]))
+        joined(self.sum[pixel], self.compensation[pixel])
+    }
+
+    /// Σ radiance² of one pixel in 64-bit floats.
+    pub fn total_squares(&self, pixel: usize) -> [f64; 3] {
+        joined(self.squares[pixel], self.squares_compensation[pixel])
     }
 
     /// Samples of one pixel.
@@ -245,10 +257,9 @@ impl Sums {
             return [0.0; 3];
         }
         let count = f64::from(samples);
-        let total = self.total(pixel);
+        let (total, squares) = (self.total(pixel), self.total_squares(pixel));
         std::array::from_fn(|channel| {
-            let squares = f64::from(self.squares[pixel][channel]);
-            let deviation = squares - total[channel] * total[channel] / count;
+            let deviation = squares[channel] - total[channel] * total[channel] / count;
             deviation.max(0.0) / (count * (count - 1.0))
         })
     }
@@ -356,14 +367,18 @@ impl Sums {
         );
         for pixel in 0..self.pixel_count() {
             let (ours, theirs) = (self.total(pixel), other.total(pixel));
+            let squares = (self.total_squares(pixel), other.total_squares(pixel));
             for channel in 0..3 {
                 let (sum, rest) = split(ours[channel] + theirs[channel]);
                 self.sum[pixel][channel] = sum;
                 self.compensation[pixel][channel] = rest;
+                let (sum, rest) = split(squares.0[channel] + squares.1[channel]);
+                self.squares[pixel][channel] = sum;
+                self.squares_compensation[pixel][channel] = rest;
             }
         }
-        // The two parts of radiance are added.
-        for (ours, theirs) in self.triples_mut().into_iter().zip(other.triples()).skip(2) {
+        // The parts of radiance and of its squares are added.
+        for (ours, theirs) in self.triples_mut().into_iter().zip(other.triples()).skip(4) {
             if theirs.is_empty() {
                 ours.clear();
             }
@@ -392,6 +407,11 @@ fn insert_ratio(image: &mut Image, [ratio, whole]: [&str; 2], counts: &[[u32; 2]
         let wholes = counts.iter().map(|pair| pair[1] as f32).collect();
         image.channels.insert(whole.to_owned(), wholes);
     }
+}
+
+/// The value of a two-float sum.
+fn joined(leading: [f32; 3], rest: [f32; 3]) -> [f64; 3] {
+    std::array::from_fn(|channel| f64::from(leading[channel]) + f64::from(rest[channel]))
 }
 
 /// Splits `value` into the two floats whose sum is nearest to it: its rounding and the rest.

@@ -30,6 +30,7 @@ const LAYERS: [(&str, Binding, u32); TRIPLES.len() + COUNTS.len()] = [
     ("film sum", film::FILM_SUM, 0),
     ("film compensation", film::FILM_COMPENSATION, 0),
     ("film squares", film::FILM_SQUARES, 0),
+    ("film squares compensation", film::FILM_SQUARES_COMPENSATION, 0),
     ("film albedo", film::FILM_ALBEDO, AOV_ALBEDO),
     ("film normal", film::FILM_NORMAL, AOV_NORMAL),
     ("film position", film::FILM_POSITION, AOV_POSITION),
@@ -68,10 +69,10 @@ pub(crate) fn check_memory(device: &Device, window: Window, aovs: u32) -> Result
     let triples = (aovs & (AOV_ALBEDO | AOV_NORMAL | AOV_POSITION)).count_ones()
         + 2 * (aovs & AOV_GUIDE_CELL).count_ones();
     let pairs = (aovs & (AOV_VISIBLE | AOV_CACHE_ENTRIES)).count_ones();
-    // Three sums and the image, in three channels each.
+    // Four sums and the image, in three channels each.
     let copies = if device.capabilities().kind == "software" { 2 } else { 1 };
     let pixel_bytes =
-        u64::from(copies * (36 + 12 * triples + 8 * pairs) + 12 * (1 + triples + pairs));
+        u64::from(copies * (48 + 12 * triples + 8 * pairs) + 12 * (1 + triples + pairs));
     let Window { width, height, .. } = window;
     let asker = format_args!("a film of {width}x{height} pixels");
     memory::check(asker, u64::from(width) * u64::from(height) * pixel_bytes).map_err(Error::memory)

@@ -288,7 +288,7 @@ binding_tables! {
         0 FILM_SUM: array vec3;
         /// Rest of that sum.
         1 FILM_COMPENSATION: array vec3;
-        /// Sum of squared radiance.
+        /// Leading part of the sum of squared radiance.
         2 FILM_SQUARES: array vec3;
         /// Totals over all pixels.
         3 COUNTERS: one Counters;
@@ -306,6 +306,8 @@ binding_tables! {
         9 FILM_GUIDE_CELL: array vec3;
         /// First hits by the kind of their cell: of a face, coarse, fine.
         10 FILM_GUIDE_LEVEL: array vec3;
+        /// Rest of the sum of squared radiance.
+        11 FILM_SQUARES_COMPENSATION: array vec3;
     }
 
     /// Set 3 of the probe kernels in `glsl/test`, which declare their own element types.
