@@ -15,7 +15,7 @@ use fenestra::{
     fit::{EnvironmentOptions, Fit, Method, environment_lobes, read_fit, write_fit},
     sampler::{
         Parameters,
-        guided::{ARRIVAL_DIRECTIONS, GuideState, Origin, SHARE_WORDS},
+        guided::{ARRIVAL_DIRECTIONS, Arm, GuideState, Origin, SHARE_WORDS},
     },
     scene::{EnvironmentMap, files::hexadecimal},
     study::{
@@ -87,8 +87,14 @@ fn guide() -> Vec<u8> {
         origin,
         samples: 5,
         rebuilt_at: 4,
-        candidates: Some(8),
-        share_paths: Some(1),
+        arm: Some(Arm {
+            is_guided: true,
+            guides_bounces: true,
+            shares_paths: false,
+            candidates: 8,
+            rays: [8, 2],
+            roulette_throughput: 0.02,
+        }),
         tag: 5,
         rectangles: vec![[0, 0, 5, 9, 0], [5, 0, 3, 9, 1]],
         keys: vec![u32::MAX, 7, 8],

@@ -2,12 +2,12 @@
 
 mod support;
 
+mod arms;
 mod bad_input;
 mod bench;
 mod brdf;
 mod brdf_data;
 mod brdf_twin;
-mod candidates;
 mod cli;
 mod closed_form;
 mod closed_room;

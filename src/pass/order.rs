@@ -283,10 +283,19 @@ impl<'a> Order<'a> {
         if !self.is_last_vertex() {
             let samples = self.wave.total_shadow_rays > 0;
             let guided = samples.then(|| self.steps.bounce(&self.wave)).flatten();
-            self.add(guided.unwrap_or_else(|| bounce(self.settings, false)));
+            self.add(guided.unwrap_or_else(|| self.bounce_by_brdf(false)));
         } else if self.goes_on() {
-            self.add(bounce(self.settings, !self.settings.surfaces.emits()));
+            self.add(self.bounce_by_brdf(!self.settings.surfaces.emits()));
         }
+    }
+
+    /// The pass that continues paths by the BRDF's own sampling; `only_specular` ends all others.
+    fn bounce_by_brdf(&self, only_specular: bool) -> Kernel {
+        let roulette = self.steps.roulette().unwrap_or(self.settings.roulette);
+        let mut constants = self.settings.surfaces.constants();
+        constants.extend(roulette.constants());
+        constants.push((CONSTANT_ONLY_SPECULAR, u32::from(only_specular)));
+        Kernel::new("bounce", Domain::Surfaces, &constants)
     }
 }
 
@@ -304,12 +313,4 @@ fn path_list(domain: Domain, vertex: u32, first_listed: u32) -> u32 {
 /// least one (docs/experiments.md, rays_to_lamps).
 fn rays_to_lamps(shadow_rays: u32) -> u32 {
     shadow_rays.div_ceil(2).max(1)
-}
-
-/// The pass that continues paths by the BRDF's own sampling; `only_specular` ends all others.
-fn bounce(settings: &PassSettings, only_specular: bool) -> Kernel {
-    let mut constants = settings.surfaces.constants();
-    constants.extend(settings.roulette.constants());
-    constants.push((CONSTANT_ONLY_SPECULAR, u32::from(only_specular)));
-    Kernel::new("bounce", Domain::Surfaces, &constants)
 }

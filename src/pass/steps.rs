@@ -1,6 +1,6 @@
 //! The passes that a sampler adds to a wave, as data, and the buffers that they read.
 
-use super::kernel::Kernel;
+use super::{kernel::Kernel, roulette::Roulette};
 use crate::{gpu::DescriptorSet, shader::structs::Wave};
 
 /// Shadow rays per hit in one group: bounds the work of an invocation and the size of the buffers.
@@ -55,6 +55,11 @@ pub trait Steps {
     /// Specialization of the pass `gather`, if bounce rays that escape are samples of the environment
     /// beside the shadow rays of their vertex.
     fn escape(&self) -> Option<Vec<(u32, u32)>> {
+        None
+    }
+
+    /// Where paths end by chance, if not as the settings say.
+    fn roulette(&self) -> Option<Roulette> {
         None
     }
 

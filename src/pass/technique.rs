@@ -41,6 +41,8 @@ pub struct Report {
     pub fit_hashes: BTreeMap<String, String>,
     /// Candidates per shadow ray, for techniques that choose their number.
     pub candidates: Option<u32>,
+    /// Says in one sentence what was chosen by measurement, and why.
+    pub choice: Option<String>,
     /// Further figures for statistics, by name.
     pub figures: BTreeMap<String, Value>,
 }

@@ -3,7 +3,7 @@
 
 use crate::{
     gpu::{Buffer, DescriptorSet},
-    pass::{Domain, Kernel, Passes, Steps, Surfaces, Technique},
+    pass::{Domain, Kernel, Passes, Roulette, Steps, Surfaces, Technique},
     shader::structs::Wave,
 };
 
@@ -15,6 +15,7 @@ pub struct RaySteps {
     learn: Option<Kernel>,
     rays: Option<[u32; 2]>,
     shares_paths: bool,
+    roulette: Option<Roulette>,
     escape: Option<Vec<(u32, u32)>>,
 }
 
@@ -27,6 +28,7 @@ impl RaySteps {
             learn: None,
             rays: None,
             shares_paths: true,
+            roulette: None,
             escape: None,
         }
     }
@@ -48,6 +50,11 @@ impl RaySteps {
         Self { shares_paths, ..self }
     }
 
+    /// Returns the same steps with another roulette.
+    pub(super) fn with_roulette(self, roulette: Roulette) -> Self {
+        Self { roulette: Some(roulette), ..self }
+    }
+
     /// Returns the same steps where bounce rays that escape are samples of the environment too.
     pub(super) fn with_escape(self, constants: &[(u32, u32)]) -> Self {
         Self { escape: Some(constants.to_vec()), ..self }
@@ -66,6 +73,10 @@ impl Steps for RaySteps {
 
     fn shares_paths(&self) -> bool {
         self.shares_paths
+    }
+
+    fn roulette(&self) -> Option<Roulette> {
+        self.roulette
     }
 
     fn sample(&self, _wave: &Wave) -> Vec<Kernel> {

@@ -26,6 +26,9 @@ impl RenderJob<'_> {
     pub(super) fn finish(&self, session: &mut Session, reason: StopReason) -> Result<()> {
         let warnings = session.warnings(self.scene);
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
+        if let Some(choice) = session.renderer.report().choice.filter(|_| !self.arguments.quiet) {
+            say!("{choice}");
+        }
         let sums = session.renderer.sums()?;
         let image = session.image_of(&sums, &self.aovs);
         let mut written = Vec::new();

@@ -1,9 +1,8 @@
-//! Chooses the number of candidates per shadow ray under `auto`: samples of a few pixels, time per
-//! sample → variance × time → number of candidates.
+//! Decides between arms of an estimator: samples of a few pixels, time of a sample → variance × time → arm.
 //!
-//! The error at equal time is variance × time. The variance of a pixel's samples is taken relative
-//! to the squared mean of its block of pixels, so that dark regions count as much as bright ones;
-//! the geometric mean over the blocks keeps a few fireflies from deciding.
+//! The error at equal time is variance × time. The variance of a pixel's samples is taken relative to the
+//! squared mean of its block, as relMSE does. Few samples with rare bright ones say little: the ratio of two
+//! arms is the median over groups of blocks, and its spread over the groups says how far to trust it.
 
 use std::fmt;
 
@@ -14,189 +13,268 @@ use crate::error::Result;
 /// Numbers of candidates that `guided` can choose a shadow ray from.
 pub const GUIDED_CANDIDATES: [u32; 3] = [1, 4, 8];
 
-/// Ratio of variance × time below which more candidates are chosen over fewer.
-const CLEAR_GAIN: f64 = 0.9;
-/// Standard errors of the logarithm by which the ratio must be below [`CLEAR_GAIN`]: few samples of
-/// pixels with rare bright ones say little.
+/// Most rounds of a race.
+pub const MOST_ROUNDS: u32 = 4;
+/// Groups of blocks.
+const GROUPS: usize = 8;
+/// Share of the pixels that the trimmed figure leaves out.
+const TRIMMED: f64 = 1e-3;
+/// Ratio of variance × time above which an arm leaves a race, however uncertain.
+const CLEAR_LOSS: f64 = 1.5;
+/// Standard errors of its logarithm by which the ratio must lie above 1 for an arm to leave before.
 const CONFIDENCE: f64 = 2.0;
-/// Standard error where it is unknown, so that no gain is clear. Finite, since files cannot hold
-/// infinities.
+/// Logarithm of a ratio that times may be wrong by.
+const ERROR_OF_TIMES: f64 = 0.1;
+/// Ratio of variance × time below which another arm replaces the one in use.
+const CLEAR_GAIN: f64 = 0.95;
+/// Ratio of variance × time below which two rounds are enough.
+const CLOSE: f64 = 1.08;
+/// Standard error of a logarithm where it is unknown. Finite, since files cannot hold infinities.
 const UNKNOWN_ERROR: f64 = 1e3;
-/// Ratio of variance × time above which more candidates are not measured again, however uncertain.
-const CLEAR_LOSS: f64 = 1.4;
-/// Ratio of variance × time above which more candidates are not measured again if it lies above by
-/// [`CONFIDENCE`]. Far from [`CLEAR_GAIN`], since this error knows nothing of the times'.
-const LIKELY_LOSS: f64 = 1.0;
 
-/// Measured cost of a number of candidates.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CandidateCost {
-    /// Candidates per shadow ray.
-    pub candidates: u32,
-    /// Device milliseconds of all passes for one sample of every pixel.
+/// Measured cost of an arm.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ArmCost {
+    /// The arm, in words.
+    pub arm: String,
+    /// Samples per pixel of the film when it was measured.
+    pub at_samples: u32,
+    /// Rounds that it took part in.
+    pub rounds: u32,
+    /// Camera and bounce rays of a path.
+    pub rays: f64,
+    /// Shadow rays of a path.
+    pub shadow_rays: f64,
+    /// Time that this work is worth, microseconds.
+    pub time: f64,
+    /// Device milliseconds for one sample of every pixel, for comparison.
     pub ms_per_sample: f64,
-    /// Variance of a pixel's samples relative to the squared mean of its block, geometric mean over
-    /// the blocks.
+    /// Variance of a pixel's samples relative to the squared mean of its block, mean over the pixels.
     pub relative_variance: f64,
-    /// Standard error over the blocks of the logarithm of the variance relative to that of the
-    /// fewest candidates measured; 0 for these, 1000 if there is only one block.
-    pub log_variance_error: f64,
+    /// The same without the worst 0.1% of the pixels.
+    pub trimmed_variance: f64,
+    /// Variance × time relative to the best of the race in the arm's last round, median over groups.
+    pub relative_cost: f64,
+    /// Standard error of its logarithm by the spread of the variances' ratio over the groups.
+    pub log_error: f64,
+    /// True if the race chose it.
+    pub is_chosen: bool,
 }
 
-impl fmt::Display for CandidateCost {
+impl fmt::Display for ArmCost {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { candidates, ms_per_sample, relative_variance, log_variance_error } = self;
-        let percent = 100.0 * log_variance_error;
+        let Self { arm, time, ms_per_sample, relative_variance, trimmed_variance, .. } = self;
         write!(
             formatter,
-            "{candidates}: {ms_per_sample:.2} ms a sample, relative variance {relative_variance:.3} \
-             (±{percent:.0}%)"
+            "{arm}: {time:.2} µs a path ({ms_per_sample:.2} ms a sample), relative variance \
+             {relative_variance:.3} ({trimmed_variance:.3} trimmed), cost {:.2} ±{:.0}%",
+            self.relative_cost,
+            100.0 * self.log_error
         )
     }
 }
 
-/// Relative variance after a millisecond of samples.
-fn variance_time(cost: &CandidateCost) -> f64 {
-    cost.relative_variance * cost.ms_per_sample
-}
-
-/// Chooses a number of candidates: the fewest, unless more are clearly better. `costs` are in
-/// ascending order of candidates.
-///
-/// # Panics
-/// If there are no costs.
-pub fn choose_candidates(costs: &[CandidateCost]) -> u32 {
-    assert!(!costs.is_empty(), "something was measured");
-    let mut chosen = &costs[0];
-    for more in &costs[1..] {
-        let at_most = variance_time(more) * (CONFIDENCE * more.log_variance_error).exp();
-        if at_most < CLEAR_GAIN * variance_time(chosen) {
-            chosen = more;
-        }
-    }
-    chosen.candidates
-}
-
-/// Returns true if the largest number of candidates has so much more variance × time than a smaller
-/// one that more measurements would hardly change the choice.
-pub fn is_largest_clearly_worse(costs: &[CandidateCost]) -> bool {
-    let Some((largest, fewer)) = costs.split_last() else { return false };
-    let at_least = LIKELY_LOSS * (CONFIDENCE * largest.log_variance_error).exp();
-    let limit = at_least.min(CLEAR_LOSS);
-    fewer.iter().any(|cost| variance_time(largest) > limit * variance_time(cost))
-}
-
-/// Compares numbers of candidates pair by pair, from the fewest up, until more do not pay.
-/// `compare` measures two numbers and returns the costs of all numbers measured so far, in
-/// ascending order, or none if nothing can be measured. Returns the choice and the last costs.
-///
-/// # Errors
-/// Those of `compare`.
-pub fn choose_by_comparison(
-    mut compare: impl FnMut(u32, u32) -> Result<Vec<CandidateCost>>,
-) -> Result<(u32, Vec<CandidateCost>)> {
-    let mut chosen = GUIDED_CANDIDATES[0];
-    let mut costs = Vec::new();
-    for &more in &GUIDED_CANDIDATES[1..] {
-        costs = compare(chosen, more)?;
-        if costs.is_empty() {
-            break;
-        }
-        chosen = choose_candidates(&costs);
-        if chosen != more {
-            break;
-        }
-    }
-    Ok((chosen, costs))
-}
-
-/// Median, the upper one of two middle values: up to half of the timings may be too small by chance
-/// on a machine that is busy with other work.
-///
-/// # Panics
-/// If there are no values.
-pub fn upper_median(values: &[f64]) -> f64 {
-    assert!(!values.is_empty(), "something was measured");
-    let mut sorted = values.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    sorted[sorted.len() / 2]
-}
-
-/// Moments of the samples of the pixels in one block.
-#[derive(Clone, Copy, Debug, Default)]
+/// Samples of the pixels of one block.
+#[derive(Clone, Debug, Default)]
 struct Block {
     count: f64,
     sum: f64,
-    squared_deviations: f64,
-    degrees_of_freedom: f64,
-    has_rays: bool,
+    /// Variance of one sample of every pixel.
+    variances: Vec<f64>,
 }
 
 /// Spread of the samples around the mean of their pixel, by block of pixels.
 #[derive(Clone, Debug, Default)]
-pub struct PixelSpread {
+pub struct Spread {
     blocks: Vec<Block>,
 }
 
-impl PixelSpread {
-    /// Adds the samples of a pixel; `has_rays` is true if any of them traced a shadow ray.
-    pub fn add(&mut self, block: usize, samples: &[f64], has_rays: bool) {
+impl Spread {
+    /// Adds the samples of a pixel, at least two.
+    pub fn add(&mut self, block: usize, samples: &[[f32; 3]]) {
         if self.blocks.len() <= block {
             self.blocks.resize(block + 1, Block::default());
         }
-        let block = &mut self.blocks[block];
-        block.has_rays |= has_rays;
-        if samples.is_empty() || samples.iter().any(|sample| !sample.is_finite()) {
+        if samples.as_flattened().iter().any(|value| !value.is_finite()) {
             return;
         }
         let count = samples.len() as f64;
-        let mean = samples.iter().sum::<f64>() / count;
+        let mut variance = 0.0;
+        let mut mean_of_channels = 0.0;
+        for channel in 0..3 {
+            let values = || samples.iter().map(|sample| f64::from(sample[channel]));
+            let mean = values().sum::<f64>() / count;
+            let squares: f64 = values().map(|value| (value - mean).powi(2)).sum();
+            variance += squares / (count - 1.0) / 3.0;
+            mean_of_channels += mean / 3.0;
+        }
+        let block = &mut self.blocks[block];
         block.count += count;
-        block.sum += count * mean;
-        block.squared_deviations +=
-            samples.iter().map(|sample| (sample - mean).powi(2)).sum::<f64>();
-        block.degrees_of_freedom += count - 1.0;
+        block.sum += count * mean_of_channels;
+        block.variances.push(variance);
+    }
+
+    /// Number of blocks.
+    pub fn block_count(&self) -> usize {
+        self.blocks.len()
     }
 }
 
-/// Relative variance of each of several spreads of the same pixels, and standard error of the
-/// logarithm of its ratio to the first, 1000 if there is only one block.
-///
-/// The relative variance is the geometric mean over the blocks where all spreads vary, each
-/// relative to the squared mean over all spreads. Blocks without a shadow ray are left out, since
-/// no choice of directions changes them; `None` if no block is left.
-pub fn relative_variances(spreads: &[&PixelSpread]) -> Option<Vec<(f64, f64)>> {
-    let block_count = spreads.iter().map(|spread| spread.blocks.len()).min().unwrap_or(0);
-    let mut logarithms = vec![Vec::new(); spreads.len()];
-    for index in 0..block_count {
-        let blocks = || spreads.iter().map(|spread| &spread.blocks[index]);
-        let count: f64 = blocks().map(|block| block.count).sum();
-        let mean = blocks().map(|block| block.sum).sum::<f64>() / count;
-        if !blocks().any(|block| block.has_rays)
-            || !blocks().all(|block| block.squared_deviations > 0.0)
-            || mean <= 0.0
-        {
-            continue;
+/// Relative variance of an arm.
+#[derive(Clone, Debug)]
+struct RelativeVariance {
+    raw: f64,
+    trimmed: f64,
+    /// Logarithm of the mean in every group of blocks.
+    logarithms: Vec<f64>,
+}
+
+/// Relative variances of spreads over the same pixels; none if nothing varies or nothing is lit.
+fn relative_variances(spreads: &[&Spread]) -> Option<Vec<RelativeVariance>> {
+    let block_count = spreads.iter().map(|spread| spread.blocks.len()).min()?;
+    let mean_of = |blocks: &[&Block]| {
+        let count: f64 = blocks.iter().map(|block| block.count).sum();
+        if count > 0.0 { blocks.iter().map(|block| block.sum).sum::<f64>() / count } else { 0.0 }
+    };
+    let at = |index: usize| spreads.iter().map(move |spread| &spread.blocks[index]);
+    let image_mean = mean_of(&(0..block_count).flat_map(at).collect::<Vec<_>>());
+    if image_mean <= 0.0 {
+        return None;
+    }
+    let scales: Vec<f64> = (0..block_count)
+        .map(|index| mean_of(&at(index).collect::<Vec<_>>()).powi(2) + 0.01 * image_mean.powi(2))
+        .collect();
+    let of_spread = |spread: &&Spread| {
+        let mut all = Vec::new();
+        let mut groups = vec![(0.0, 0.0); GROUPS.min(block_count)];
+        let group_count = groups.len();
+        for (index, (block, scale)) in spread.blocks.iter().zip(&scales).enumerate() {
+            let relative = block.variances.iter().map(|variance| variance / scale);
+            let group = &mut groups[index % group_count];
+            group.0 += relative.clone().sum::<f64>();
+            group.1 += block.variances.len() as f64;
+            all.extend(relative);
         }
-        for (logarithms, block) in logarithms.iter_mut().zip(blocks()) {
-            let variance = block.squared_deviations / block.degrees_of_freedom;
-            logarithms.push((variance / (mean * mean)).ln());
+        all.sort_unstable_by(f64::total_cmp);
+        let kept = all.len() - (all.len() as f64 * TRIMMED).ceil() as usize;
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+        RelativeVariance {
+            raw: mean(&all),
+            trimmed: mean(&all[..kept]),
+            logarithms: groups.iter().map(|(sum, count)| (sum / count).ln()).collect(),
+        }
+    };
+    let variances: Vec<RelativeVariance> = spreads.iter().map(of_spread).collect();
+    variances.iter().all(|variance| variance.raw > 0.0).then_some(variances)
+}
+
+/// Logarithm of the ratio of two variances, and its standard error: the median over the groups in which both
+/// vary, and their spread.
+fn log_ratio(variance: &RelativeVariance, other: &RelativeVariance) -> (f64, f64) {
+    let pairs = variance.logarithms.iter().zip(&other.logarithms);
+    let differences: Vec<f64> =
+        pairs.map(|(a, b)| a - b).filter(|difference| difference.is_finite()).collect();
+    let count = differences.len() as f64;
+    if differences.is_empty() {
+        return (0.0, UNKNOWN_ERROR);
+    }
+    let mean = differences.iter().sum::<f64>() / count;
+    let squares: f64 = differences.iter().map(|value| (value - mean).powi(2)).sum();
+    let error = if count > 1.0 {
+        // A median spreads more than a mean, by the root of π/2.
+        1.25 * (squares / (count - 1.0) / count).sqrt()
+    } else {
+        UNKNOWN_ERROR
+    };
+    (median(&differences), error)
+}
+
+/// The mean of the two middle values, of an even number.
+///
+/// # Panics
+/// If there are no values.
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let middle = sorted.len() / 2;
+    if sorted.len() % 2 == 1 { sorted[middle] } else { 0.5 * (sorted[middle - 1] + sorted[middle]) }
+}
+
+/// An arm in a race.
+#[derive(Default)]
+struct Runner {
+    spread: Spread,
+    /// Microseconds of a path, by round.
+    times: Vec<f64>,
+    cost: ArmCost,
+}
+
+/// Races `count` arms, of which the first is in use: in every round `measure` renders the same pixels by each
+/// arm, adds their samples to the spread and returns the time of a path. Arms that lose leave. Returns the
+/// arm of least variance × time, or the one in use where no other is clearly better, and the costs of all.
+///
+/// # Errors
+/// Those of `measure`.
+pub fn race(
+    count: usize,
+    mut measure: impl FnMut(usize, u32, &mut Spread) -> Result<f64>,
+) -> Result<(usize, Vec<ArmCost>)> {
+    let mut runners: Vec<Runner> = (0..count).map(|_| Runner::default()).collect();
+    let mut live: Vec<usize> = (0..count).collect();
+    let mut order: Vec<(usize, f64)> = Vec::new();
+    for round in 0..MOST_ROUNDS {
+        for index in &live {
+            let runner = &mut runners[*index];
+            let time = measure(*index, round, &mut runner.spread)?;
+            runner.times.push(time);
+        }
+        let Some(costs) = costs_of(&mut runners, &live) else { break };
+        order = costs;
+        live.retain(|index| {
+            let cost = &runners[*index].cost;
+            let logarithm = cost.relative_cost.ln();
+            logarithm <= CLEAR_LOSS.ln().min((CONFIDENCE * cost.log_error).max(ERROR_OF_TIMES))
+        });
+        // The rest is too close to pay for another round.
+        if live.len() < 2
+            || round > 0 && live.iter().all(|index| runners[*index].cost.relative_cost < CLOSE)
+        {
+            break;
         }
     }
-    let first = logarithms.first().filter(|first| !first.is_empty())?;
-    let count = first.len() as f64;
-    let of_spread = |logarithms: &Vec<f64>| {
-        let mean = logarithms.iter().sum::<f64>() / count;
-        let differences = || logarithms.iter().zip(first).map(|(more, fewer)| more - fewer);
-        let difference = differences().sum::<f64>() / count;
-        let squares: f64 = differences().map(|value| (value - difference).powi(2)).sum();
-        let error =
-            if count > 1.0 { (squares / (count - 1.0) / count).sqrt() } else { UNKNOWN_ERROR };
-        (mean.exp(), error)
-    };
-    let mut variances: Vec<(f64, f64)> = logarithms.iter().map(of_spread).collect();
-    variances[0].1 = 0.0;
-    Some(variances)
+    let best = order.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(index, _)| *index);
+    let in_use = order.iter().find(|(index, _)| *index == 0);
+    let keeps = in_use.is_some_and(|(_, ratio)| live.contains(&0) && CLEAR_GAIN * ratio <= 1.0);
+    let chosen = if keeps { 0 } else { best };
+    let mut costs: Vec<ArmCost> = runners.into_iter().map(|runner| runner.cost).collect();
+    costs[chosen].is_chosen = true;
+    Ok((chosen, costs))
+}
+
+/// Computes the costs of the arms in a race, relative to the best of them; none if nothing varies.
+fn costs_of(runners: &mut [Runner], live: &[usize]) -> Option<Vec<(usize, f64)>> {
+    let spreads: Vec<&Spread> = live.iter().map(|index| &runners[*index].spread).collect();
+    let variances = relative_variances(&spreads)?;
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let times: Vec<f64> = live.iter().map(|index| mean(&runners[*index].times)).collect();
+    let log_cost = |place: usize| log_ratio(&variances[place], &variances[0]).0 + times[place].ln();
+    let best = (0..live.len()).min_by(|a, b| log_cost(*a).total_cmp(&log_cost(*b)))?;
+    let costs = (0..live.len()).map(|place| {
+        let (ratio, error) = log_ratio(&variances[place], &variances[best]);
+        let relative_cost = (ratio + (times[place] / times[best]).ln()).exp();
+        let runner = &mut runners[live[place]];
+        runner.cost = ArmCost {
+            rounds: runner.times.len() as u32,
+            time: times[place],
+            relative_variance: variances[place].raw,
+            trimmed_variance: variances[place].trimmed,
+            relative_cost,
+            log_error: error,
+            ..ArmCost::default()
+        };
+        (live[place], relative_cost)
+    });
+    Some(costs.collect())
 }
 
 #[cfg(test)]
@@ -204,162 +282,102 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
     use super::*;
+    use crate::math::random::hash_4d;
 
-    fn cost(candidates: u32, ms_per_sample: f64, relative_variance: f64) -> CandidateCost {
-        CandidateCost { candidates, ms_per_sample, relative_variance, log_variance_error: 0.0 }
+    /// An arm whose samples are known: its time, and the deviation of its samples relative to their mean.
+    #[derive(Clone, Copy)]
+    struct Planted {
+        time: f64,
+        deviation: f32,
+        /// One sample in so many is bright; 0 for none.
+        rare: u32,
     }
 
-    fn variances(spreads: &[&PixelSpread]) -> Vec<f64> {
-        relative_variances(spreads).unwrap().into_iter().map(|(variance, _)| variance).collect()
+    fn planted(time: f64, deviation: f32) -> Planted {
+        Planted { time, deviation, rare: 0 }
     }
 
-    #[test]
-    fn the_least_variance_by_time_is_chosen_if_it_is_clearly_less() {
-        let choice =
-            |four: (f64, f64)| choose_candidates(&[cost(1, 2.0, 3.0), cost(4, four.0, four.1)]);
-        assert_eq!(choice((4.0, 2.0)), 1, "a third less variance in twice the time");
-        assert_eq!(choice((2.4, 2.0)), 4, "in a fifth more time");
-        assert_eq!(choice((2.0, 2.75)), 1, "a twelfth less is not clear");
-        assert_eq!(choice((2.0, 2.65)), 4, "an eighth less is");
-        assert_eq!(choice((f64::NAN, 1.0)), 1);
-        assert_eq!(choice((1.0, f64::NAN)), 1);
-        assert_eq!(choose_candidates(&[cost(1, f64::NAN, f64::NAN), cost(4, 1.0, 1.0)]), 1);
-        let four = [cost(1, 2.0, 3.0), cost(4, 2.2, 2.0)];
-        assert_eq!(choose_candidates(&[four[0], four[1], cost(8, 2.6, 1.8)]), 4);
-        assert_eq!(choose_candidates(&[four[0], four[1], cost(8, 2.4, 1.5)]), 8);
-        assert_eq!(choose_candidates(&four[..1]), 1);
-    }
-
-    #[test]
-    fn a_gain_within_the_noise_is_not_clear() {
-        let choice = |error: f64| {
-            let four = CandidateCost { log_variance_error: error, ..cost(4, 2.2, 2.0) };
-            choose_candidates(&[cost(1, 2.0, 3.0), four])
-        };
-        // ln(0.9 · 6 / 4.4) is 0.205.
-        assert_eq!((choice(0.10), choice(0.11)), (4, 1));
-        assert_eq!(choice(UNKNOWN_ERROR), 1);
-        assert_eq!(choice(f64::NAN), 1);
-    }
-
-    #[test]
-    fn the_error_is_that_of_the_difference_over_blocks() {
-        let (mut one, mut four) = (PixelSpread::default(), PixelSpread::default());
-        let pair = |deviation: f64| [1.0 - deviation, 1.0 + deviation];
-        // Variances of 1, 4 and 16 against the same, half and a quarter of it.
-        for (block, (deviation, root)) in
-            [(0.1, 1.0), (0.2, 0.5_f64.sqrt()), (0.4, 0.5)].into_iter().enumerate()
-        {
-            one.add(block, &pair(deviation), true);
-            four.add(block, &pair(deviation * root), true);
-            if block == 0 {
-                let lone = relative_variances(&[&one, &four]).unwrap();
-                assert_eq!((lone[0].1, lone[1].1), (0.0, UNKNOWN_ERROR), "one block says nothing");
+    /// Races arms over 64 blocks of different brightness in every round; returns winner, costs and the number
+    /// of waves.
+    fn race_planted(arms: &[Planted], seed: u32) -> (usize, Vec<ArmCost>, usize) {
+        let mut waves = 0;
+        let result = race(arms.len(), |index, round, spread| {
+            waves += 1;
+            let arm = arms[index];
+            let first = spread.block_count();
+            for pixel in 0..64 * 64 {
+                let block = pixel / 64;
+                let sample = |sample: u32| {
+                    let words = hash_4d([seed + index as u32, round, pixel, sample]);
+                    let noise = words[0] as f32 / u32::MAX as f32 - 0.5;
+                    let is_rare = arm.rare > 0 && words[1].is_multiple_of(arm.rare);
+                    let firefly = if is_rare { 100.0 } else { 0.0 };
+                    [(1.0 + arm.deviation * noise + firefly) * f32::from(block as u8 + 1); 3]
+                };
+                spread.add(first + block as usize, &[0, 1, 2, 3].map(sample));
             }
+            Ok(arm.time)
+        });
+        let (winner, costs) = result.unwrap();
+        (winner, costs, waves)
+    }
+
+    #[test]
+    fn the_cheaper_arm_is_chosen() {
+        for seed in [0, 100, 200] {
+            let winner = |arms: &[Planted]| race_planted(arms, seed).0;
+            assert_eq!(winner(&[planted(1.0, 1.0), planted(0.7, 1.0)]), 1, "the same in less time");
+            assert_eq!(winner(&[planted(1.0, 1.0), planted(0.5, 1.3)]), 1, "1.7 times in half");
+            assert_eq!(winner(&[planted(1.0, 1.0), planted(0.5, 1.6)]), 0, "2.6 times in half");
+            assert_eq!(winner(&[planted(1.0, 1.0), planted(1.0, 0.99)]), 0, "no clear gain");
+            let many = [1.0, 0.9, 0.5, 0.8].map(|time| planted(time, 1.0));
+            assert_eq!(winner(&many), 2);
         }
-        let both = relative_variances(&[&one, &four]).unwrap();
-        assert_eq!(both[0].1, 0.0);
-        // Logarithms differ by 0, ln 2 and 2 ln 2: a deviation of ln 2.
-        let expected = 2.0_f64.ln() / 3.0_f64.sqrt();
-        assert!((both[1].1 / expected - 1.0).abs() < 1e-9, "{both:?}");
-        assert!((both[0].0 / both[1].0 - 2.0).abs() < 1e-9, "{both:?}");
     }
 
     #[test]
-    fn more_candidates_are_tried_as_long_as_they_pay() {
-        let all = [cost(1, 1.0, 8.0), cost(4, 2.0, 2.0), cost(8, 3.0, 1.0)];
-        let try_all = |all: [CandidateCost; 3]| {
-            let mut compared = Vec::new();
-            let result = choose_by_comparison(|chosen, more| {
-                compared.push((chosen, more));
-                Ok(all.iter().filter(|cost| cost.candidates <= more).copied().collect())
-            });
-            (result.unwrap().0, compared)
-        };
-        assert_eq!(try_all(all), (8, vec![(1, 4), (4, 8)]));
-        assert_eq!(try_all([all[0], all[1], cost(8, 4.0, 1.0)]), (4, vec![(1, 4), (4, 8)]));
-        // 8 would be best of all, but the search stops at the first number that does not pay.
-        assert_eq!(try_all([all[0], cost(4, 4.0, 2.0), all[2]]), (1, vec![(1, 4)]));
-        let nothing = choose_by_comparison(|_, _| Ok(Vec::new()));
-        assert_eq!(nothing.unwrap(), (1, Vec::new()));
+    fn clear_losers_leave_after_one_round() {
+        let (winner, costs, waves) = race_planted(&[planted(1.0, 1.0), planted(2.0, 1.0)], 7);
+        assert_eq!((winner, waves), (0, 2));
+        assert!(costs[0].is_chosen && !costs[1].is_chosen);
+        assert!((costs[1].relative_cost / 2.0 - 1.0).abs() < 0.1, "{costs:?}");
+        // A uniform deviate has the variance 1/12; the scale is the squared mean and a floor.
+        assert!((0.6 / 12.0..1.0 / 12.0).contains(&costs[0].relative_variance), "{costs:?}");
     }
 
     #[test]
-    fn two_in_four_may_be_too_small() {
-        assert_eq!(upper_median(&[2.0]), 2.0);
-        assert_eq!(upper_median(&[2.0, 0.1]), 2.0);
-        assert_eq!(upper_median(&[2.0, 9.0, 0.1]), 2.0);
-        assert_eq!(upper_median(&[0.1, 2.1, 0.2, 2.0]), 2.0);
-    }
-
-    #[test]
-    fn only_losses_are_clear_early() {
-        let is_loss = |four: f64, error: f64| {
-            let four = CandidateCost { log_variance_error: error, ..cost(4, four, 3.0) };
-            is_largest_clearly_worse(&[cost(1, 2.0, 3.0), four])
-        };
-        // Ratios of 1.45, 1.35 and 0.05; ln 1.35 is 0.30.
-        assert!(is_loss(2.9, UNKNOWN_ERROR) && !is_loss(2.7, UNKNOWN_ERROR));
-        assert!(is_loss(2.7, 0.14) && !is_loss(2.7, 0.16));
-        assert!(is_loss(2.02, 0.0) && !is_loss(1.98, 0.0) && !is_loss(0.1, 0.0));
-        assert!(!is_largest_clearly_worse(&[cost(1, 2.0, 3.0)]) && !is_largest_clearly_worse(&[]));
-        let best = [cost(1, 4.0, 1.0), cost(4, 2.0, 1.0), cost(8, 3.0, 1.0)];
-        assert!(is_largest_clearly_worse(&best), "against the best of the fewer");
-    }
-
-    #[test]
-    fn evenly_spaced_samples_have_their_variance() {
-        // 0 … n − 1 have the sample variance n (n + 1) / 12 and the mean (n − 1) / 2.
-        let samples = |count: u32| (0..count).map(f64::from).collect::<Vec<_>>();
-        let mut spread = PixelSpread::default();
-        spread.add(0, &samples(7), true);
-        let expected = 7.0 * 8.0 / 12.0 / 9.0;
-        assert!((variances(&[&spread])[0] / expected - 1.0).abs() < 1e-12);
-        // A second pixel of the block, far brighter: the mean is that of the block, deviations are
-        // from the mean of the pixel.
-        let shifted: Vec<f64> = samples(5).iter().map(|value| value + 100.0).collect();
-        spread.add(0, &shifted, true);
-        let (variance, mean) = ((28.0 + 10.0) / 10.0, (7.0 * 3.0 + 5.0 * 102.0) / 12.0);
-        let expected = variance / (mean * mean);
-        assert!((variances(&[&spread])[0] / expected - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn every_block_counts_alike_however_bright() {
-        // Two pixels of samples ±d around m have the relative variance 2 d² / m².
-        let pair = |mean: f64, deviation: f64| [mean - deviation, mean + deviation];
-        let (mut one, mut four) = (PixelSpread::default(), PixelSpread::default());
-        for (block, brightness) in [1.0, 1e4, 1e-4].into_iter().enumerate() {
-            one.add(block, &pair(brightness, 0.4 * brightness), true);
-            four.add(block, &pair(brightness, 0.2 * brightness), true);
+    fn few_fireflies_do_not_decide() {
+        // They carry nearly all of the raw variance, and fall on the cheap arm by chance.
+        let mut wins = 0;
+        for seed in 0..10 {
+            let cheap = Planted { rare: 50_000, ..planted(0.6, 1.0) };
+            let (winner, costs, _) = race_planted(&[planted(1.0, 1.0), cheap], 10 * seed);
+            assert!(costs[1].relative_variance >= costs[1].trimmed_variance);
+            wins += winner;
         }
-        let both = variances(&[&one, &four]);
-        assert!((both[0] - 0.32).abs() < 1e-12 && (both[1] - 0.08).abs() < 1e-12, "{both:?}");
-        // A firefly in one of three blocks multiplies the result by the cube root of its factor
-        // there.
-        four.add(0, &pair(0.0, 0.0), true);
-        let lone = variances(&[&four])[0];
-        four.blocks[0].squared_deviations *= 1000.0;
-        assert!((variances(&[&four])[0] / lone - 10.0).abs() < 1e-9);
+        assert!(wins >= 8, "{wins} of 10");
     }
 
     #[test]
-    fn blocks_that_say_nothing_are_left_out() {
-        let (mut one, mut four) = (PixelSpread::default(), PixelSpread::default());
-        assert_eq!(relative_variances(&[&one, &four]), None);
-        // The environment itself: samples differ, but no choice of directions changes them.
-        one.add(0, &[1.0, 2.0], false);
-        four.add(0, &[1.0, 2.0], false);
-        // A block that is dark, or the same in every sample, for one of the two.
-        one.add(1, &[0.0, 0.0], true);
-        four.add(1, &[0.0, 1.0], true);
-        one.add(2, &[1.0, f64::NAN], true);
-        four.add(2, &[1.0, 2.0], true);
-        assert_eq!(relative_variances(&[&one, &four]), None);
-        one.add(3, &[1.0, 3.0], true);
-        four.add(3, &[1.5, 2.5], true);
-        let both = variances(&[&one, &four]);
-        let [one, four] = [both[0], both[1]];
-        assert!((one - 0.5).abs() < 1e-12 && (four - 0.125).abs() < 1e-12, "{both:?}");
+    fn many_fireflies_do() {
+        let bright = Planted { rare: 50, ..planted(0.6, 1.0) };
+        assert_eq!(race_planted(&[planted(1.0, 1.0), bright], 3).0, 0);
+    }
+
+    #[test]
+    fn who_knows_nothing_keeps_the_arm_in_use() {
+        let (winner, costs, waves) = race_planted(&[planted(1.0, 0.0), planted(0.1, 0.0)], 1);
+        assert_eq!((winner, waves), (0, 2));
+        assert_eq!(costs[1].relative_cost, 0.0);
+        let dark = race(2, |_, _, spread| {
+            spread.add(0, &[[0.0; 3]; 4]);
+            Ok(1.0)
+        });
+        assert_eq!(dark.unwrap().0, 0);
+        let broken = race(2, |index, _, spread| {
+            spread.add(0, &[[1.0; 3], [if index == 1 { f32::NAN } else { 2.0 }; 3]]);
+            Ok(1.0)
+        });
+        assert_eq!(broken.unwrap().0, 0);
     }
 }

@@ -14,13 +14,13 @@
 //! Rectangles, counts → `guide_regions`, `guide_entries`, `guide_arriving`, read by `sample_guided`
 //! and `bounce_guided`.
 
+pub mod arm;
 mod arrival_buffers;
 mod arriving;
 mod budget;
 mod buffers;
 mod cell_readback;
 mod cells;
-mod choice;
 pub mod cost;
 mod counts;
 mod entries;
@@ -31,14 +31,15 @@ mod guide;
 mod key;
 mod packing;
 mod parameters;
+mod race;
 mod readback;
 mod share;
-mod sharing;
 mod snapshot;
 mod state;
 mod steps;
 mod technique;
 
+pub use arm::Arm;
 pub use arriving::{ARRIVAL_DIRECTIONS, ArrivalWords, ArrivingLight, Reflected};
 pub use buffers::{GuideBuffers, GuideSize};
 pub use cell_readback::{CellLevel, CellReadback, RegionReadback};

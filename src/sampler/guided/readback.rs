@@ -37,7 +37,8 @@ pub struct GuideReadback {
     pub normal: Vec3,
     /// Rays of all samples with a hit, in sample order; of more than eight rays a hit, the last group.
     pub rays: Vec<GuidedRay>,
-    /// Cell of the first sample with a ray to trace; `None` if the scene is open or no ray contributed.
+    /// Cell of the first sample with a ray to trace; `None` where samples are those of `mis`,
+    /// or no ray contributed.
     pub cell: Option<CellReadback>,
     /// The regions of the environment.
     pub partition: Partition,
@@ -84,10 +85,10 @@ impl Guided {
         let count = (samples * per_group) as usize;
         let shadow_rays: Vec<ShadowRay> = waves.shadow_rays().download(count)?;
         let visible: Vec<u32> = waves.visibility().download(count)?;
-        let targets = if self.is_open {
-            vec![NOTHING_TO_LEARN; count]
-        } else {
+        let targets = if self.is_guided() {
             self.buffers.targets(count)?
+        } else {
+            vec![NOTHING_TO_LEARN; count]
         };
         let partition = self.buffers.partition();
         let region_count = partition.regions.len() as u32;

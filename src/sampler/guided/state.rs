@@ -9,11 +9,10 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::sampler::guided::{
+    arm::Arm,
     arriving::{ARRIVAL_DIRECTIONS, ArrivalWords},
-    cost::GUIDED_CANDIDATES,
     counts::CountWords,
     packing::{pack, unpack},
-    parameters::AUTO_COHORT_EDGE,
     share::SHARE_WORDS,
 };
 use crate::{
@@ -42,10 +41,12 @@ pub struct GuideState {
     pub rebuilt_at: u32,
     /// True if the scene was found open, so that the renderer learns nothing more.
     pub is_open: bool,
-    /// Candidates per shadow ray, one of [`GUIDED_CANDIDATES`]; `None` where not decided.
-    pub candidates: Option<u32>,
-    /// Edge of the cohorts that share paths, 1 for none, where it was chosen.
-    pub share_paths: Option<u32>,
+    /// The arm that was chosen; `None` before any race.
+    pub arm: Option<Arm>,
+    /// Samples per pixel from which it was in use.
+    pub arm_since: u32,
+    /// Number of races.
+    pub races: u32,
     /// Tag of the guides that this one went on from, see [`GuideState::epoch_tag`]; 0 for none.
     pub tag: u32,
     /// First column and row, number of columns and rows, and parent of every region.
@@ -97,9 +98,9 @@ struct Header {
     samples: u32,
     rebuilt_at: u32,
     is_open: bool,
-    candidates: Option<u32>,
-    #[serde(rename = "share_tiles")]
-    share_paths: Option<u32>,
+    arm: Option<Arm>,
+    arm_since: u32,
+    races: u32,
     #[serde(default)]
     tag: u32,
     cells: usize,
@@ -172,8 +173,9 @@ impl GuideState {
             samples: self.samples,
             rebuilt_at: self.rebuilt_at,
             is_open: self.is_open,
-            candidates: self.candidates,
-            share_paths: self.share_paths,
+            arm: self.arm,
+            arm_since: self.arm_since,
+            races: self.races,
             tag: self.tag,
             cells: self.keys.len(),
             refined: self.refined.len(),
@@ -226,11 +228,8 @@ impl GuideState {
         if header.checksum_with(words).ok().as_ref() != Some(&header.checksum) {
             return Err(damaged("its checksum does not match its content"));
         }
-        if header.candidates.is_some_and(|count| !GUIDED_CANDIDATES.contains(&count)) {
-            return Err(damaged("its header holds an impossible number of candidates"));
-        }
-        if header.share_paths.is_some_and(|edge| ![1, AUTO_COHORT_EDGE].contains(&edge)) {
-            return Err(damaged("its header holds an impossible edge of cohorts"));
+        if header.arm.is_some_and(|arm| !arm.is_possible()) {
+            return Err(damaged("its header holds an impossible arm"));
         }
         let counts = header.cells.checked_mul(header.origin.regions as usize);
         let length = counts.and_then(|counts| {
@@ -272,8 +271,9 @@ impl GuideState {
             samples: header.samples,
             rebuilt_at: header.rebuilt_at,
             is_open: header.is_open,
-            candidates: header.candidates,
-            share_paths: header.share_paths,
+            arm: header.arm,
+            arm_since: header.arm_since,
+            races: header.races,
             tag: header.tag,
             rectangles: take(5 * regions)
                 .chunks_exact(5)
@@ -308,6 +308,17 @@ mod tests {
 
     use super::*;
 
+    fn arm() -> Arm {
+        Arm {
+            is_guided: true,
+            guides_bounces: false,
+            shares_paths: true,
+            candidates: 8,
+            rays: [4, 1],
+            roulette_throughput: 0.1,
+        }
+    }
+
     fn state() -> GuideState {
         let origin = Origin { regions: 2, largest_edge: 0.3, ..Origin::default() };
         GuideState {
@@ -315,8 +326,9 @@ mod tests {
             samples: 5,
             rebuilt_at: 4,
             is_open: true,
-            candidates: Some(8),
-            share_paths: Some(4),
+            arm: Some(arm()),
+            arm_since: 2,
+            races: 3,
             tag: 5,
             rectangles: vec![[0, 0, 5, 9, 0], [5, 0, 3, 9, 1]],
             keys: vec![u32::MAX, 7, 8],
@@ -383,8 +395,14 @@ mod tests {
         };
         assert!(forged(&|header| header.cells = 4).contains("words expected"));
         assert!(forged(&|header| header.cells = usize::MAX).contains("impossible lengths"));
-        let message = forged(&|header| header.candidates = Some(3));
-        assert!(message.contains("impossible number of candidates"));
+        for wrong in [
+            Arm { candidates: 3, ..arm() },
+            Arm { rays: [4097, 1], ..arm() },
+            Arm { roulette_throughput: -1.0, ..arm() },
+        ] {
+            let message = forged(&|header| header.arm = Some(wrong));
+            assert!(message.contains("impossible arm"), "{message}");
+        }
         // Sums that would overflow to infinities, and these to densities that are no numbers
         for light in [f32::INFINITY, f32::NAN, -1.0, 1e30] {
             let arrivals = vec![[3.0_f32.to_bits(), light.to_bits()]];

@@ -21,7 +21,8 @@ pub struct GuidedSteps {
     pub candidates: u32,
     /// True if the pixels of a cohort share paths.
     pub shares_paths: bool,
-    parameters: GuidedParameters,
+    rays: [u32; 2],
+    bounce_candidates: u32,
     guides_bounces: bool,
     surfaces: Surfaces,
     roulette: Roulette,
@@ -33,7 +34,8 @@ impl GuidedSteps {
         Self {
             candidates,
             shares_paths: true,
-            parameters,
+            rays: [settings.shadow_rays, parameters.later_rays_of(settings.shadow_rays)],
+            bounce_candidates: parameters.bounce_candidates,
             guides_bounces: parameters.guides_bounces(settings.depth),
             surfaces: settings.surfaces,
             roulette: settings.roulette,
@@ -43,6 +45,21 @@ impl GuidedSteps {
     /// Returns the same steps with another number of candidates.
     pub fn with_candidates(self, candidates: u32) -> Self {
         Self { candidates, ..self }
+    }
+
+    /// Returns the same steps with other numbers of shadow rays at the first and at later vertices.
+    pub(super) fn with_rays(self, rays: [u32; 2]) -> Self {
+        Self { rays, ..self }
+    }
+
+    /// Returns the same steps with guided bounces, or those of the BRDF.
+    pub(super) fn with_bounces(self, guides_bounces: bool) -> Self {
+        Self { guides_bounces, ..self }
+    }
+
+    /// Returns the same steps with another roulette.
+    pub(super) fn with_roulette(self, roulette: Roulette) -> Self {
+        Self { roulette, ..self }
     }
 
     /// Returns the same steps with or without shared paths.
@@ -57,11 +74,15 @@ impl Steps for GuidedSteps {
     }
 
     fn shadow_rays_at(&self, vertex: u32, most: u32) -> u32 {
-        if vertex == 0 { most } else { self.parameters.later_rays_of(most) }
+        most.min(self.rays[usize::from(vertex > 0)])
     }
 
     fn shares_paths(&self) -> bool {
         self.shares_paths
+    }
+
+    fn roulette(&self) -> Option<Roulette> {
+        Some(self.roulette)
     }
 
     fn sample(&self, wave: &Wave) -> Vec<Kernel> {
@@ -89,7 +110,7 @@ impl Steps for GuidedSteps {
     }
 
     fn bounce(&self, _wave: &Wave) -> Option<Kernel> {
-        let own = [(CONSTANT_BOUNCE_CANDIDATES, self.parameters.bounce_candidates)];
+        let own = [(CONSTANT_BOUNCE_CANDIDATES, self.bounce_candidates)];
         let constants = [&own[..], &self.roulette.constants(), &self.surfaces.constants()].concat();
         self.guides_bounces.then(|| Kernel::new("bounce_guided", Domain::Surfaces, &constants))
     }

@@ -1,18 +1,17 @@
-//! `guided` in one render: its training, rebuilds, choice of candidates, and reports.
+//! `guided` in one render: its training, rebuilds, choice of an arm, and reports.
 
 use std::collections::BTreeMap;
 
 use serde_json::json;
 
 use super::{
+    arm::{Arm, Arms, Axes, first_candidates},
     buffers::{GuideBuffers, GuideSize, SPLIT_AFTER, guide_schedule},
-    choice::{Choice, Trial},
-    cost::GUIDED_CANDIDATES,
-    epoch::{TRAINING_SEED, with_epoch},
+    cost::ArmCost,
+    epoch::{TRAINING_SEED, with_arm, with_epoch},
     parameters::AUTO_COHORT_EDGE,
-    sharing::SharingChoice,
+    race::{Outcome, Race, race_due},
     state::GuideState,
-    steps::GuidedSteps,
 };
 use crate::{
     error::{Error, Result},
@@ -22,7 +21,7 @@ use crate::{
         Explanation, Passes, Progress, Report, Runner, SHADOW_RAYS_PER_GROUP, Saved, Steps,
         Technique,
     },
-    sampler::{Context, Parameters, Room, basic, knob::Knobs, rays::RaySteps},
+    sampler::{Context, Parameters, Room, knob::Knobs},
     shader::{constants::TRAINING_WAVE, structs::Wave},
 };
 
@@ -71,49 +70,47 @@ impl Room for GuidedRoom {
             shadow_rays: settings.shadow_rays.clamp(1, SHADOW_RAYS_PER_GROUP),
             has_bounces: own.guides_bounces(settings.depth),
         };
-        let open_steps = basic::MIS.steps(parameters, settings.surfaces)?;
-        let rays_in_the_open = own.rays_in_the_open(settings.shadow_rays, settings.depth);
-        let mut guided = Guided {
+        let arms = Arms::new(parameters, settings)?;
+        let arm = arms.first(false);
+        Ok(Box::new(Guided {
             buffers: GuideBuffers::new(runner.device(), scene, &own, size)?,
-            steps: GuidedSteps::new(first_candidates(parameters)?, own, settings),
-            open_steps: open_steps
-                .with_rays(rays_in_the_open)
-                .with_sharing(parameters.share_paths.is_some()),
-            given_candidates: parameters.candidates,
-            choice: Choice::default(),
-            chooses_sharing: parameters.share_paths.is_none() && settings.cohort_edge > 1,
-            sharing: SharingChoice::default(),
+            steps: arms.steps(&arm),
+            arms,
+            choice: Choice::of(arm),
+            open_choice: None,
             is_trained: false,
             is_open: false,
             rebuilt_at: 0,
             tag: 0,
-        };
-        guided.forget_choice();
-        guided.forget_sharing();
-        Ok(Box::new(guided))
+        }))
     }
 }
 
-/// Returns the candidates per shadow ray until the choice is made.
-fn first_candidates(parameters: &Parameters) -> Result<u32> {
-    parameters.candidates_among("guided", &GUIDED_CANDIDATES, GUIDED_CANDIDATES[0])
+/// The arm in use, and why.
+#[derive(Clone, Debug)]
+struct Choice {
+    arm: Arm,
+    /// Samples per pixel from which it is in use.
+    since: u32,
+    /// Races so far.
+    races: u32,
+    /// Measurements of these.
+    costs: Vec<ArmCost>,
+    ms: f64,
 }
 
 /// `guided` in one render.
 pub struct Guided {
     pub(super) buffers: GuideBuffers,
-    steps: GuidedSteps,
-    /// Steps of `mis`, for open scenes.
-    open_steps: RaySteps,
-    /// Number of candidates that the user asked for; `None` for `auto`.
-    given_candidates: Option<u32>,
+    arms: Arms,
     choice: Choice,
-    /// True under `share-paths=auto`, where there is anything to share.
-    chooses_sharing: bool,
-    sharing: SharingChoice,
+    /// Passes of the arm in use.
+    steps: Box<dyn Steps>,
+    /// The choice in the open scene that another camera saw.
+    open_choice: Option<Choice>,
     is_trained: bool,
     /// True if too little is blocked to learn anything.
-    pub(super) is_open: bool,
+    is_open: bool,
     /// Samples per pixel at the last rebuild of the guide.
     pub(super) rebuilt_at: u32,
     /// Tag of the guides that this one went on from; 0 for none.
@@ -127,16 +124,17 @@ impl Guided {
             samples,
             rebuilt_at: self.rebuilt_at,
             is_open: self.is_open,
-            candidates: self.candidates(),
-            share_paths: self.share_paths(),
+            arm: (self.choice.races > 0).then_some(self.choice.arm),
+            arm_since: self.choice.since,
+            races: self.choice.races,
             tag: self.tag,
             ..self.buffers.state()?
         })
     }
 
     /// Continues from what an earlier render learned, without training: bit for bit, if the film
-    /// holds as many samples as it did when the state was taken. Under `candidates=auto` takes its
-    /// choice too. Returns true if the geometry differs, so that most was forgotten.
+    /// holds as many samples as it did when the state was taken. Takes its arm too, as far as the settings
+    /// leave a choice. Returns true if the geometry differs, so that most was forgotten.
     ///
     /// # Errors
     /// [`crate::Error::Usage`] if environment or regions differ; [`crate::Error::Vulkan`] if the
@@ -159,57 +157,58 @@ impl Guided {
             self.tag = state.epoch_tag();
         }
         self.is_trained = true;
-        if self.chooses_sharing && state.share_paths.is_some() {
-            self.take_sharing(SharingChoice {
-                edge: state.share_paths,
-                ..SharingChoice::default()
-            });
+        self.start_with(self.arms.first(self.is_open));
+        if let Some(arm) = state.arm.filter(|_| state.is_open == self.is_open) {
+            self.take_arm(self.arms.conform(arm, self.is_open), state.arm_since);
+            self.choice.races = state.races;
         }
-        if let Some(candidates) = state.candidates {
-            self.take_choice(Choice { candidates: Some(candidates), ..Choice::default() });
-            runner.warm_up(self)?;
-        }
+        runner.warm_up(self)?;
         Ok(has_moved)
     }
 
-    /// Undoes the choice, unless the user made it.
-    fn forget_choice(&mut self) {
-        self.choice = Choice { candidates: self.given_candidates, ..Choice::default() };
-        self.steps.candidates = self.given_candidates.unwrap_or(GUIDED_CANDIDATES[0]);
+    /// True if shadow rays follow what was learned.
+    pub(super) fn is_guided(&self) -> bool {
+        self.choice.arm.is_guided
     }
 
-    /// Takes a choice measured here or by an earlier render, unless the user made it.
-    fn take_choice(&mut self, choice: Choice) {
-        if self.given_candidates.is_none() {
-            self.steps.candidates = choice.candidates.unwrap_or(self.steps.candidates);
-            self.choice = choice;
+    /// Forgets what was measured, and renders by `arm`.
+    fn start_with(&mut self, arm: Arm) {
+        self.choice = Choice::of(arm);
+        self.steps = self.arms.steps(&arm);
+    }
+
+    /// Renders by `arm` from so many samples per pixel on.
+    fn take_arm(&mut self, arm: Arm, since: u32) {
+        if arm != self.choice.arm {
+            self.choice.arm = arm;
+            self.choice.since = since;
+            self.steps = self.arms.steps(&arm);
         }
     }
 
-    /// Undoes the choice of cohorts, unless the user made it.
-    fn forget_sharing(&mut self) {
-        self.sharing = SharingChoice::default();
-        self.steps = self.steps.with_sharing(!self.chooses_sharing);
-    }
-
-    /// Takes the edge of cohorts measured here or by an earlier render.
-    fn take_sharing(&mut self, sharing: SharingChoice) {
-        self.steps = self.steps.with_sharing(sharing.edge == Some(AUTO_COHORT_EDGE));
-        self.sharing = sharing;
-    }
-
-    fn trial(&self) -> Trial<'_> {
-        Trial { buffers: &self.buffers, steps: self.steps, tag: self.tag }
-    }
-
-    /// Returns the candidates per shadow ray; `None` while `auto` is undecided, and in open scenes.
+    /// Returns the candidates per shadow ray; `None` while nothing is measured, and where it is not guided.
     fn candidates(&self) -> Option<u32> {
-        self.choice.candidates.filter(|_| !self.is_open)
+        let Choice { arm, races, .. } = &self.choice;
+        (arm.is_guided && *races > 0).then_some(arm.candidates)
     }
 
-    /// Returns the chosen edge of cohorts; `None` where it was given or is undecided, and in open scenes.
-    fn share_paths(&self) -> Option<u32> {
-        self.sharing.edge.filter(|_| !self.is_open)
+    /// Races the arms if it is time. The guide must have been rebuilt just before, if it learns.
+    fn choose(&mut self, runner: &mut Runner, progress: &Progress) -> Result<()> {
+        let samples = progress.sample_count;
+        while race_due(self.choice.races).0 <= samples {
+            let axes = race_due(self.choice.races).1;
+            self.choice.races += 1;
+            let contenders = self.arms.contenders(axes, self.choice.arm, self.is_open);
+            if contenders.len() < 2 || !Race::fits(runner) {
+                continue;
+            }
+            let race = Race { buffers: &self.buffers, arms: &self.arms, tag: self.tag };
+            let Outcome { arm, costs, ms } = race.run(runner, progress, &contenders)?;
+            self.choice.ms += ms;
+            self.choice.costs.extend(costs);
+            self.take_arm(arm, samples);
+        }
+        Ok(())
     }
 
     fn rebuild(&mut self, splits: bool, samples: u32) -> Result<()> {
@@ -243,6 +242,11 @@ impl Guided {
             if sweep == 0 && visible as f64 > OPEN_SHARE * traced as f64 {
                 log::info!("{visible} of {traced} rays of the first sweep are visible: as mis");
                 self.is_open = true;
+                self.start_with(self.arms.first(true));
+                if let Some(choice) = self.open_choice.take() {
+                    self.steps = self.arms.steps(&choice.arm);
+                    self.choice = choice;
+                }
                 return Ok(());
             }
             // Rebuild only after 1, 2, 4 and 8 sweeps: every rebuild costs time.
@@ -255,22 +259,37 @@ impl Guided {
     }
 }
 
-impl Passes for Guided {
-    fn steps(&self) -> &dyn Steps {
-        if self.is_open { &self.open_steps } else { &self.steps }
+impl Choice {
+    fn of(arm: Arm) -> Self {
+        Self { arm, since: 0, races: 0, costs: Vec::new(), ms: 0.0 }
     }
 
+    /// Says in one sentence which arm is in use and why; `None` before any measurement.
+    fn sentence(&self) -> Option<String> {
+        let chosen = self.costs.iter().rev().find(|cost| cost.is_chosen)?;
+        let seconds = 1e-3 * self.ms;
+        let rivals = self.costs.iter().rev().filter(|cost| cost.arm != chosen.arm);
+        let last = rivals.clone().map(|cost| cost.at_samples).next()?;
+        let rivals = rivals.filter(|cost| cost.at_samples == last);
+        let second = rivals.min_by(|a, b| a.relative_cost.total_cmp(&b.relative_cost))?;
+        Some(format!(
+            "chose {} in {seconds:.1} s of measuring; next best {}, with {:.2} times the variance × time",
+            chosen.arm,
+            second.arm,
+            second.relative_cost / chosen.relative_cost
+        ))
+    }
+}
+
+impl Passes for Guided {
+    fn steps(&self) -> &dyn Steps {
+        self.steps.as_ref()
+    }
+
+    /// The arms of the first race; later ones warm up theirs.
     fn other_steps(&self) -> Vec<Box<dyn Steps>> {
-        let mut others: Vec<Box<dyn Steps>> = vec![Box::new(self.open_steps.clone())];
-        if self.chooses_sharing {
-            others.push(Box::new(self.steps.with_sharing(true)));
-        }
-        if self.given_candidates.is_none() {
-            for candidates in &GUIDED_CANDIDATES[..2] {
-                others.push(Box::new(self.steps.with_candidates(*candidates)));
-            }
-        }
-        others
+        let arms = self.arms.contenders(Axes::Techniques, self.arms.first(false), false);
+        arms.iter().chain(&[self.arms.first(true)]).map(|arm| self.arms.steps(arm)).collect()
     }
 
     fn set(&self) -> Option<&DescriptorSet> {
@@ -280,6 +299,7 @@ impl Passes for Guided {
 
 impl Technique for Guided {
     fn complete(&self, wave: Wave, progress: &Progress) -> Wave {
+        let wave = with_arm(wave, self.choice.since);
         with_epoch(wave, progress.first_sample.wrapping_add(self.rebuilt_at), self.tag)
     }
 
@@ -290,22 +310,18 @@ impl Technique for Guided {
             if runner.is_stopped() {
                 return Ok(u32::MAX);
             }
-        } else if self.rebuilt_at != samples && guide_schedule(samples) == samples && !self.is_open
+        } else if self.choice.arm.is_guided
+            && self.rebuilt_at != samples
+            && guide_schedule(samples) == samples
         {
             self.rebuild(samples == SPLIT_AFTER, samples)?;
         }
-        if self.is_open {
-            return Ok(u32::MAX);
+        if !self.choice.arm.is_guided || self.rebuilt_at == samples {
+            self.choose(runner, progress)?;
         }
-        if self.choice.candidates.is_none() {
-            let choice = self.trial().choose(runner, progress)?;
-            self.take_choice(choice);
-        }
-        if self.chooses_sharing && self.sharing.edge.is_none() {
-            let sharing = self.trial().choose_sharing(runner, progress)?;
-            self.take_sharing(sharing);
-        }
-        Ok(guide_schedule(samples + 1) - samples)
+        let next = race_due(self.choice.races).0.max(samples + 1) - samples;
+        let is_guided = self.choice.arm.is_guided;
+        Ok(if is_guided { next.min(guide_schedule(samples + 1) - samples) } else { next })
     }
 
     fn restart(&mut self, _runner: &mut Runner) -> Result<()> {
@@ -314,8 +330,8 @@ impl Technique for Guided {
         self.is_open = false;
         self.rebuilt_at = 0;
         self.tag = 0;
-        self.forget_choice();
-        self.forget_sharing();
+        self.start_with(self.arms.first(false));
+        self.open_choice = None;
         Ok(())
     }
 
@@ -323,13 +339,16 @@ impl Technique for Guided {
     /// places elsewhere, so it is looked at again.
     fn look(&mut self, _runner: &mut Runner, learns: bool) -> Result<()> {
         if self.is_open || !self.is_trained {
+            self.open_choice = self.is_open.then(|| self.choice.clone());
+            self.start_with(self.arms.first(false));
             self.buffers.forget()?;
             self.is_open = false;
             self.is_trained = false;
-        } else if learns {
+        } else if learns && self.choice.arm.is_guided {
             self.buffers.rebuild(false)?;
         }
         self.rebuilt_at = 0;
+        self.choice.since = 0;
         Ok(())
     }
 
@@ -374,15 +393,14 @@ impl Technique for Guided {
         Report {
             host_ms: [
                 ("guide rebuilds".to_owned(), self.buffers.rebuild_ms()),
-                ("choice of candidates".to_owned(), self.choice.ms),
-                ("choice of sharing".to_owned(), self.sharing.ms),
+                ("choice of an arm".to_owned(), self.choice.ms),
             ]
             .into(),
             candidates: self.candidates(),
+            choice: self.choice.sentence(),
             figures: [
-                ("candidate_costs".to_owned(), json!(self.choice.costs)),
-                ("share_paths".to_owned(), json!(self.share_paths())),
-                ("sharing_gain".to_owned(), json!(self.sharing.gain)),
+                ("arm".to_owned(), json!(self.choice.arm.to_string())),
+                ("arms".to_owned(), json!(self.choice.costs)),
             ]
             .into(),
             ..Report::default()

@@ -1,0 +1,310 @@
+//! Arms: settings of the estimator between which `guided` chooses by measurement, and what their work costs.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::{cost::GUIDED_CANDIDATES, parameters::GuidedParameters, steps::GuidedSteps};
+use crate::{
+    error::Result,
+    pass::{PassSettings, Roulette, Steps},
+    sampler::{Parameters, basic, rays::RaySteps},
+};
+
+/// Throughputs below which the paths of an arm may end.
+const ROULETTE_THROUGHPUTS: [f32; 2] = [0.02, 0.1];
+
+/// Settings of the estimator. All have the same expectation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Arm {
+    /// True if shadow rays follow learned visibility; else they are those of `mis`.
+    pub is_guided: bool,
+    /// True if bounces follow the light that cells expect.
+    pub guides_bounces: bool,
+    /// True if the pixels of a cohort share paths.
+    pub shares_paths: bool,
+    /// Candidates for each shadow ray, if it is guided.
+    pub candidates: u32,
+    /// Most shadow rays at the first vertex, and at each later one.
+    pub rays: [u32; 2],
+    /// Throughput below which paths may end.
+    pub roulette_throughput: f32,
+}
+
+impl Arm {
+    /// True if every number is one that a render can have chosen.
+    pub(super) fn is_possible(&self) -> bool {
+        GUIDED_CANDIDATES.contains(&self.candidates)
+            && self.rays.iter().all(|rays| *rays <= 4096)
+            && self.roulette_throughput >= 0.0
+            && self.roulette_throughput.is_finite()
+    }
+}
+
+/// Work of some paths.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Work {
+    pub(super) paths: f64,
+    /// Camera and bounce rays.
+    pub(super) rays: f64,
+    pub(super) shadow_rays: f64,
+}
+
+/// Microseconds of a core for parts of the work, measured on lavapipe; only their ratios count. A clock would
+/// know the machine better, but not be the same in every run.
+struct Prices {
+    ray: f64,
+    shadow_ray: f64,
+    /// Direction chosen as by `mis`.
+    direction: f64,
+    /// Candidate for a guided direction, of the first one and of the others.
+    guided_candidates: [f64; 2],
+    guided_bounce: f64,
+    /// Connections of a path to its cohort.
+    cohort: f64,
+}
+
+const PRICES: Prices = Prices {
+    ray: 2.0,
+    shadow_ray: 0.2,
+    direction: 0.4,
+    guided_candidates: [0.65, 0.28],
+    guided_bounce: 0.3,
+    cohort: 3.0,
+};
+
+impl Arm {
+    /// Returns the microseconds that a path takes on average.
+    pub(super) fn time(&self, work: Work) -> f64 {
+        let [first, later] = self.rays.map(f64::from);
+        let (rays, shadow_rays) = (work.rays / work.paths, work.shadow_rays / work.paths);
+        let directions = first + (rays - 1.0) * later;
+        let direction = if self.is_guided {
+            let [one, more] = PRICES.guided_candidates;
+            one + more * f64::from(self.candidates - 1)
+        } else {
+            PRICES.direction
+        };
+        let bounce = if self.guides_bounces { PRICES.guided_bounce } else { 0.0 };
+        let cohort = if self.shares_paths { PRICES.cohort } else { 0.0 };
+        rays * (PRICES.ray + bounce)
+            + shadow_rays * PRICES.shadow_ray
+            + directions * direction
+            + cohort
+    }
+}
+
+impl fmt::Display for Arm {
+    /// Formats "guided, 8 + 2 rays, guided bounces, 4 candidates, shared paths, roulette below 0.02".
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [first, later] = self.rays;
+        write!(
+            formatter,
+            "{}, {first} + {later} rays",
+            if self.is_guided { "guided" } else { "mis" }
+        )?;
+        if self.is_guided && self.guides_bounces {
+            write!(formatter, ", guided bounces")?;
+        }
+        if self.is_guided && self.candidates > 1 {
+            write!(formatter, ", {} candidates", self.candidates)?;
+        }
+        if self.shares_paths {
+            write!(formatter, ", shared paths")?;
+        }
+        write!(formatter, ", roulette below {}", self.roulette_throughput)
+    }
+}
+
+/// Settings among which a race decides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Axes {
+    /// All ways of choosing directions, with and without sharing.
+    Techniques,
+    /// Half and twice as many shadow rays.
+    Rays,
+    /// Where paths may end.
+    Roulette,
+    /// Arms that choose directions in another way, or share where the one in use does not.
+    OtherTechniques,
+    /// Every arm that differs by one setting.
+    Everything,
+}
+
+/// The arms of one render: settings that are given, and those that a measurement may decide.
+pub(super) struct Arms {
+    guided: GuidedSteps,
+    mis: RaySteps,
+    roulette: Roulette,
+    /// The first arm, and that of open scenes.
+    first: [Arm; 2],
+    /// False where the candidates are given, so that directions are guided.
+    chooses_technique: bool,
+    chooses_bounces: bool,
+    chooses_sharing: bool,
+    chooses_rays: bool,
+    chooses_roulette: bool,
+}
+
+impl Arms {
+    /// Returns the arms of a render. Fails for candidates that `guided` does not support.
+    pub(super) fn new(parameters: &Parameters, settings: &PassSettings) -> Result<Self> {
+        let own = parameters.guided;
+        let candidates = first_candidates(parameters)?;
+        let (most, has_paths) = (settings.shadow_rays, settings.depth > 1);
+        let guides_bounces = own.guides_bounces(settings.depth);
+        let chooses_technique = parameters.candidates.is_none() && most > 0;
+        let chooses_sharing = parameters.share_paths.is_none() && settings.cohort_edge > 1;
+        let first = Arm {
+            is_guided: true,
+            guides_bounces,
+            shares_paths: settings.cohort_edge > 1 && !chooses_sharing,
+            candidates,
+            rays: [most, own.later_rays_of(most)],
+            roulette_throughput: settings.roulette.throughput,
+        };
+        let open = Arm {
+            is_guided: false,
+            guides_bounces: false,
+            rays: own.rays_in_the_open(most, settings.depth),
+            ..first
+        };
+        let has_own_bounces =
+            own.bounce_candidates != GuidedParameters::default().bounce_candidates;
+        Ok(Self {
+            guided: GuidedSteps::new(candidates, own, settings),
+            mis: basic::MIS.steps(parameters, settings.surfaces)?,
+            roulette: settings.roulette,
+            first: [first, open],
+            chooses_technique,
+            chooses_bounces: chooses_technique && guides_bounces && !has_own_bounces,
+            chooses_sharing: chooses_sharing && most > 0,
+            chooses_rays: chooses_technique
+                && has_paths
+                && own.later_rays.is_none()
+                && own.open_rays.is_none(),
+            chooses_roulette: chooses_technique
+                && has_paths
+                && settings.roulette == Roulette::default(),
+        })
+    }
+
+    /// The arm before any measurement.
+    pub(super) fn first(&self, is_open: bool) -> Arm {
+        self.first[usize::from(is_open)]
+    }
+
+    /// Returns the passes of an arm.
+    pub(super) fn steps(&self, arm: &Arm) -> Box<dyn Steps> {
+        let roulette = Roulette { throughput: arm.roulette_throughput, ..self.roulette };
+        if arm.is_guided {
+            let steps = self.guided.with_candidates(arm.candidates).with_sharing(arm.shares_paths);
+            Box::new(
+                steps.with_rays(arm.rays).with_bounces(arm.guides_bounces).with_roulette(roulette),
+            )
+        } else {
+            let steps = self.mis.clone().with_rays(arm.rays).with_sharing(arm.shares_paths);
+            Box::new(steps.with_roulette(roulette))
+        }
+    }
+
+    /// Returns an arm chosen by another render, as far as the settings of this one leave a choice.
+    pub(super) fn conform(&self, arm: Arm, is_open: bool) -> Arm {
+        let mut taken = self.first(is_open || self.chooses_technique && !arm.is_guided);
+        if self.chooses_technique {
+            taken.candidates = arm.candidates;
+        }
+        if self.chooses_bounces && taken.is_guided {
+            taken.guides_bounces = arm.guides_bounces;
+        }
+        if self.chooses_sharing {
+            taken.shares_paths = arm.shares_paths;
+        }
+        if self.chooses_rays {
+            taken.rays = arm.rays;
+        }
+        if self.chooses_roulette {
+            taken.roulette_throughput = arm.roulette_throughput;
+        }
+        taken
+    }
+
+    /// Returns the arms that race along `axes`, `arm` first.
+    pub(super) fn contenders(&self, axes: Axes, arm: Arm, is_open: bool) -> Vec<Arm> {
+        let mut all = vec![arm];
+        match axes {
+            Axes::Techniques => {
+                all.extend(self.other_techniques(arm, is_open));
+                let shared = all.clone().into_iter().flat_map(|arm| self.other_sharing(arm));
+                let shared: Vec<Arm> = shared.collect();
+                all.extend(shared);
+            }
+            Axes::Rays => all.extend(self.other_rays(arm)),
+            Axes::Roulette => all.extend(self.other_roulette(arm)),
+            Axes::OtherTechniques => {
+                all.extend(self.other_techniques(arm, is_open));
+                all.extend(self.other_sharing(arm));
+            }
+            Axes::Everything => {
+                all.extend(self.other_techniques(arm, is_open));
+                all.extend(self.other_sharing(arm));
+                all.extend(self.other_rays(arm));
+                all.extend(self.other_candidates(arm));
+                all.extend(self.other_roulette(arm));
+            }
+        }
+        all
+    }
+
+    /// Arms whose directions are chosen in another way.
+    fn other_techniques(&self, arm: Arm, is_open: bool) -> Vec<Arm> {
+        let mut others = Vec::new();
+        if is_open || !self.chooses_technique {
+            return others;
+        }
+        if arm.is_guided && self.chooses_bounces {
+            others.push(Arm { guides_bounces: !arm.guides_bounces, ..arm });
+        }
+        let other = self.first(arm.is_guided);
+        others.push(Arm {
+            shares_paths: arm.shares_paths,
+            roulette_throughput: arm.roulette_throughput,
+            ..other
+        });
+        others
+    }
+
+    fn other_sharing(&self, arm: Arm) -> Option<Arm> {
+        self.chooses_sharing.then_some(Arm { shares_paths: !arm.shares_paths, ..arm })
+    }
+
+    fn other_rays(&self, arm: Arm) -> Vec<Arm> {
+        let most = self.first(false).rays[0];
+        let half = arm.rays.map(|rays| rays.div_ceil(2));
+        let twice = arm.rays.map(|rays| (2 * rays).min(most));
+        let others =
+            [half, twice].into_iter().filter(|rays| self.chooses_rays && *rays != arm.rays);
+        others.map(|rays| Arm { rays, ..arm }).collect()
+    }
+
+    fn other_candidates(&self, arm: Arm) -> Vec<Arm> {
+        let place = GUIDED_CANDIDATES.iter().position(|count| *count == arm.candidates);
+        let place = place.filter(|_| self.chooses_technique && arm.is_guided);
+        let next_to =
+            |(index, _): &(usize, &u32)| place.is_some_and(|place| place.abs_diff(*index) == 1);
+        let others = GUIDED_CANDIDATES.iter().enumerate().filter(next_to);
+        others.map(|(_, count)| Arm { candidates: *count, ..arm }).collect()
+    }
+
+    fn other_roulette(&self, arm: Arm) -> Option<Arm> {
+        let mut others =
+            ROULETTE_THROUGHPUTS.iter().filter(|other| **other != arm.roulette_throughput);
+        let other = others.next().filter(|_| self.chooses_roulette)?;
+        Some(Arm { roulette_throughput: *other, ..arm })
+    }
+}
+
+/// Returns the candidates per shadow ray that are given, or those before a measurement.
+pub(super) fn first_candidates(parameters: &Parameters) -> Result<u32> {
+    parameters.candidates_among("guided", &GUIDED_CANDIDATES, GUIDED_CANDIDATES[0])
+}

@@ -1,0 +1,214 @@
+//! Measures the arms of a render: the same pixels by each, in turns, with the guide as the next sample of the
+//! picture will find it.
+//!
+//! These rays count as rays and as time, but add nothing to the picture and teach nothing: the arm alone
+//! depends on them. A few pixels of their own are cheaper than samples of the whole picture, whose variance
+//! those of an arm that loses would raise.
+
+use std::time::Instant;
+
+use super::{
+    arm::{Arm, Arms, Axes, Work},
+    buffers::GuideBuffers,
+    cost::{ArmCost, MOST_ROUNDS, race},
+    epoch::{TRAINING_SEED, with_epoch},
+};
+use crate::{
+    error::Result,
+    gpu::DescriptorSet,
+    pass::{BLOCK_PIXELS, Passes, Progress, Runner, Steps},
+    shader::{
+        constants::MEASURED_WAVE,
+        structs::{PathState, Wave},
+    },
+};
+
+/// Races of a render: the samples per pixel from which each is due, and what it decides. The last comes again
+/// whenever the film has four times as many samples.
+const RACES: [(u32, Axes); 5] = [
+    (0, Axes::Techniques),
+    (2, Axes::Rays),
+    (4, Axes::Roulette),
+    (16, Axes::OtherTechniques),
+    (64, Axes::Everything),
+];
+/// Separates the random numbers of measurements from those of the training and of the picture.
+const MEASURING_SEED: u32 = 0x2c1b_3c6d;
+/// Most pixels in a wave; a larger film needs no more to tell which arm is better.
+const MEASURED_PIXELS: u32 = 1024;
+/// Least step between measured blocks, in blocks: a small film is not measured as a whole.
+const LEAST_STRIDE: u32 = 8;
+/// Samples of each pixel in a wave, to see how they differ.
+const SAMPLES: u32 = 4;
+
+/// Returns the samples per pixel from which race number `race` is due, and what it decides.
+pub(super) fn race_due(race: u32) -> (u32, Axes) {
+    let (last, axes) = RACES[RACES.len() - 1];
+    match RACES.get(race as usize) {
+        Some(due) => *due,
+        None => (last.saturating_mul(4_u32.saturating_pow(race + 1 - RACES.len() as u32)), axes),
+    }
+}
+
+/// A race among the arms of a render.
+pub(super) struct Race<'a> {
+    pub(super) buffers: &'a GuideBuffers,
+    pub(super) arms: &'a Arms,
+    /// Tag of the guides that this one went on from.
+    pub(super) tag: u32,
+}
+
+/// Result of a race.
+pub(super) struct Outcome {
+    pub(super) arm: Arm,
+    pub(super) costs: Vec<ArmCost>,
+    pub(super) ms: f64,
+}
+
+/// The passes of one arm.
+struct Trial<'a> {
+    buffers: &'a GuideBuffers,
+    steps: Box<dyn Steps>,
+}
+
+impl Passes for Trial<'_> {
+    fn steps(&self) -> &dyn Steps {
+        self.steps.as_ref()
+    }
+
+    fn set(&self) -> Option<&DescriptorSet> {
+        Some(self.buffers.set())
+    }
+}
+
+/// The blocks of pixels that a wave measures.
+#[derive(Clone, Copy)]
+struct Blocks {
+    count: u32,
+    stride: u32,
+    /// Number of blocks that the first one can be.
+    starts: u32,
+}
+
+impl Blocks {
+    fn of(runner: &Runner) -> Self {
+        let all = runner.film().padded_pixels() / BLOCK_PIXELS;
+        let columns = runner.film().window().width.div_ceil(8);
+        let mut stride = all.div_ceil(MEASURED_PIXELS / BLOCK_PIXELS).max(LEAST_STRIDE).min(all);
+        // Without a common divisor, the blocks lie in all columns.
+        while greatest_common_divisor(stride, columns) > 1 {
+            stride += 1;
+        }
+        let count = (all / stride).max(1);
+        Self { count, stride, starts: stride.min(all - (count - 1) * stride) }
+    }
+}
+
+fn greatest_common_divisor(a: u32, b: u32) -> u32 {
+    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
+}
+
+impl Work {
+    fn add(&mut self, path: &PathState) {
+        self.paths += 1.0;
+        self.rays += f64::from(path.rays_traced);
+        self.shadow_rays += f64::from(path.shadow_rays_traced);
+    }
+}
+
+impl Race<'_> {
+    /// True if a wave has room for a block.
+    pub(super) fn fits(runner: &Runner) -> bool {
+        runner.waves().capacity() >= SAMPLES * BLOCK_PIXELS
+    }
+
+    /// Races `contenders`, of which the first is in use. Forgets the counts since the last rebuild. Fails if
+    /// the device does.
+    pub(super) fn run(
+        self,
+        runner: &mut Runner,
+        progress: &Progress,
+        contenders: &[Arm],
+    ) -> Result<Outcome> {
+        let start = Instant::now();
+        let trials: Vec<Trial<'_>> = contenders
+            .iter()
+            .map(|arm| Trial { buffers: self.buffers, steps: self.arms.steps(arm) })
+            .collect();
+        trials.iter().try_for_each(|trial| runner.warm_up(trial))?;
+        let blocks = Blocks::of(runner);
+        let pixels = f64::from(runner.film().padded_pixels());
+        let mut ms = vec![0.0; contenders.len()];
+        let mut work = vec![Work::default(); contenders.len()];
+        let (chosen, mut costs) = race(contenders.len(), |index, round, spread| {
+            let mut round_work = Work::default();
+            let mut block = spread.block_count();
+            for wave in self.waves(runner, progress, blocks, round) {
+                let depth = runner.settings().depth;
+                let times = runner.run(&trials[index], wave, depth)?;
+                let paths = (wave.pixel_count * SAMPLES) as usize;
+                ms[index] +=
+                    times.values().sum::<f64>() / f64::from(blocks.count * BLOCK_PIXELS * SAMPLES);
+                let paths: Vec<PathState> = runner.waves().paths().download(paths)?;
+                for pixel in 0..wave.pixel_count as usize {
+                    let of_pixel = || paths[pixel..].iter().step_by(wave.pixel_count as usize);
+                    // Pixels in blocks beyond the edge of the film have no paths.
+                    if of_pixel().all(|path| path.rays_traced > 0) {
+                        let samples: Vec<[f32; 3]> = of_pixel().map(|path| path.radiance).collect();
+                        spread.add(block + pixel / BLOCK_PIXELS as usize, &samples);
+                        of_pixel().for_each(|path| round_work.add(path));
+                    }
+                }
+                block += (wave.pixel_count / BLOCK_PIXELS) as usize;
+            }
+            work[index] = round_work;
+            Ok(contenders[index].time(round_work))
+        })?;
+        self.buffers.clear_counts()?;
+        runner.take_counters()?;
+        for (((cost, arm), ms), work) in costs.iter_mut().zip(contenders).zip(ms).zip(work) {
+            cost.arm = arm.to_string();
+            cost.rays = work.rays / work.paths;
+            cost.shadow_rays = work.shadow_rays / work.paths;
+            cost.at_samples = progress.sample_count;
+            cost.ms_per_sample = ms / f64::from(cost.rounds.max(1)) * pixels;
+        }
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        let lines: Vec<String> = costs.iter().map(ToString::to_string).collect();
+        log::info!("{} by measurement in {ms:.0} ms: {}", contenders[chosen], lines.join("; "));
+        Ok(Outcome { arm: contenders[chosen], costs, ms })
+    }
+
+    /// Returns the waves of a round, as many as the buffers make necessary. No round has numbers of another
+    /// one, or of the picture.
+    fn waves(&self, runner: &Runner, progress: &Progress, blocks: Blocks, round: u32) -> Vec<Wave> {
+        let first_sample = progress.next_sample().wrapping_add(round * SAMPLES);
+        let start = round * (blocks.starts / MOST_ROUNDS).max(1) % blocks.starts;
+        let together = runner.waves().capacity() / SAMPLES / BLOCK_PIXELS;
+        let wave = |first: u32| Wave {
+            first_pixel: (start + first * blocks.stride) * BLOCK_PIXELS,
+            pixel_count: together.min(blocks.count - first) * BLOCK_PIXELS,
+            first_sample,
+            sample_count: SAMPLES,
+            seed: progress.seed ^ TRAINING_SEED ^ MEASURING_SEED,
+            pixel_stride: 1,
+            block_stride: blocks.stride,
+            is_training: MEASURED_WAVE,
+            ..Wave::default()
+        };
+        let waves = (0..blocks.count).step_by(together as usize).map(wave);
+        waves.map(|wave| with_epoch(wave, first_sample, self.tag)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn races_become_rare() {
+        let due: Vec<u32> = (0..8).map(|race| race_due(race).0).collect();
+        assert_eq!(due, [0, 2, 4, 16, 64, 256, 1024, 4096]);
+        assert_eq!(race_due(40).0, u32::MAX);
+    }
+}

@@ -1,0 +1,213 @@
+//! Arms of the sampler `guided`: measured, recorded, kept by renders that go on, without influence on the
+//! expectation.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+use std::collections::BTreeMap;
+
+use fenestra::{
+    film::{Attribute, Image, Statistics, Sums},
+    sampler::{
+        Parameters, Sampler,
+        guided::{Arm, GuideState, cost::ArmCost},
+    },
+    scene::Scene,
+    session::Settings,
+};
+use glam::Vec3;
+use serde_json::Value;
+
+use crate::support::{
+    self,
+    command::Folder,
+    guide::Guide as _,
+    renderer,
+    replicates::{LIMIT, replicates},
+    scenes,
+    statistics::Comparison,
+};
+
+fn guided(candidates: Option<u32>) -> Settings {
+    let parameters = Parameters { candidates, ..Parameters::default() };
+    Settings {
+        sampler: Sampler::Guided,
+        parameters,
+        shadow_rays: 8,
+        depth: 3,
+        ..Settings::default()
+    }
+}
+
+/// A film large enough for several blocks.
+fn room() -> Scene {
+    let mut scene = scenes::mixed_room();
+    (scene.film.width, scene.film.height) = (64, 48);
+    scene
+}
+
+fn costs(figures: &BTreeMap<String, Value>) -> Vec<ArmCost> {
+    serde_json::from_value(figures["arms"].clone()).unwrap()
+}
+
+fn assert_same(a: &Sums, b: &Sums) {
+    assert_eq!(a.sample_count, b.sample_count);
+    assert!((0..a.pixel_count()).all(|pixel| a.mean(pixel) == b.mean(pixel)), "bits differ");
+}
+
+#[test]
+fn the_arm_is_measured_and_told() {
+    let _alone = support::alone();
+    let mut auto = renderer(&room(), guided(None));
+    assert_eq!((auto.report().candidates, auto.report().choice), (None, None));
+    auto.render_pass(5).unwrap();
+    let report = auto.report();
+    let found = costs(&report.figures);
+    eprintln!("{:?} of {found:#?}", report.choice);
+    let state = auto.guide_state().unwrap().unwrap();
+    let arm = state.arm.unwrap();
+    assert_eq!(report.figures["arm"], arm.to_string());
+    assert!(report.choice.unwrap().contains(&arm.to_string()));
+    assert_eq!(report.candidates, arm.is_guided.then_some(arm.candidates));
+    // Techniques before the first sample, rays after two, roulette after four.
+    assert_eq!((state.races, found[0].at_samples), (3, 0));
+    let names: Vec<&str> = found.iter().map(|cost| cost.arm.as_str()).collect();
+    for name in
+        ["guided, 8 + 2 rays, guided bounces, roul", "guided, 8 + 2 rays, roul", "mis, 2 + 1"]
+    {
+        assert!(names.iter().any(|arm| arm.starts_with(name)), "{name} of {names:?}");
+    }
+    assert!(found.iter().all(|cost| cost.ms_per_sample > 0.0 && cost.rounds > 0), "{found:?}");
+    for at_samples in [0, 2, 4] {
+        let chosen = found.iter().filter(|cost| cost.at_samples == at_samples && cost.is_chosen);
+        assert_eq!(chosen.count(), 1);
+    }
+    assert!(auto.host_ms()["choice of an arm"] > 0.0);
+    // No clock takes part.
+    let mut again = renderer(&room(), guided(None));
+    again.render_pass(5).unwrap();
+    assert_same(&auto.sums().unwrap(), &again.sums().unwrap());
+    support::assert_silent();
+}
+
+#[test]
+fn whoever_goes_on_takes_the_recorded_arm() {
+    let _alone = support::alone();
+    let scene = room();
+    let mut first = renderer(&scene, guided(None));
+    first.render_pass(9).unwrap();
+    let (sums, state) = (first.sums().unwrap(), first.guide_state().unwrap().unwrap());
+    let go_on = |settings: Settings, state: &GuideState| {
+        let mut second = renderer(&scene, settings);
+        second.restore(&sums).unwrap();
+        second.restore_guide(state).unwrap();
+        second.render_pass(4).unwrap();
+        second
+    };
+    let second = go_on(guided(None), &state);
+    assert!(costs(&second.report().figures).is_empty(), "nothing was measured");
+    first.render_pass(4).unwrap();
+    assert_same(&first.sums().unwrap(), &second.sums().unwrap());
+    // The recorded arm is taken, as far as the settings leave a choice.
+    let lean = Arm {
+        is_guided: false,
+        guides_bounces: false,
+        shares_paths: false,
+        candidates: 1,
+        rays: [1, 1],
+        roulette_throughput: 0.1,
+    };
+    let other = GuideState { arm: Some(lean), arm_since: 8, ..state.clone() };
+    let recorded = |settings| go_on(settings, &other).guide_state().unwrap().unwrap().arm.unwrap();
+    assert_eq!(recorded(guided(None)), lean);
+    let mut settings = guided(None);
+    settings.parameters.guided.later_rays = Some(2);
+    assert_eq!(recorded(settings), Arm { rays: [2, 2], ..lean });
+    let pinned = recorded(guided(Some(8)));
+    assert!(pinned.is_guided && pinned.guides_bounces && pinned.candidates == 8);
+    assert_eq!((pinned.rays, pinned.roulette_throughput), ([8, 2], 0.02));
+    // A restart forgets the arm.
+    let mut again = go_on(guided(None), &other);
+    again.restart(0).unwrap();
+    assert_eq!(again.guide_state().unwrap().unwrap().arm, None);
+    again.render_pass(1).unwrap();
+    assert!(costs(&again.report().figures).len() >= 2);
+    support::assert_silent();
+}
+
+/// Every arm has the expectation of `mis`, though the choice knows the guide, which knows earlier samples.
+/// One of 36 values exceeds the limit with a chance of 3e-6.
+#[test]
+fn the_picture_is_unbiased_whatever_is_chosen() {
+    let _alone = support::alone();
+    let scene = scenes::mixed_room();
+    let mis = Settings { depth: 3, shadow_rays: 16, ..Settings::default() };
+    let reference = replicates(&scene, &mis, 500, 64);
+    let values = replicates(&scene, &guided(None), 500, 18);
+    let Comparison { largest_t, ratio, .. } = Comparison::new(&values, &reference);
+    eprintln!("largest |t| {largest_t:.2}, ratio {ratio:.4}");
+    assert!(largest_t < LIMIT, "|t| = {largest_t}");
+    assert!((ratio - 1.0).abs() < 0.03, "{ratio}");
+}
+
+#[test]
+fn nothing_is_measured_where_there_is_nothing_to_choose() {
+    let _alone = support::alone();
+    let open = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5))]);
+    let direct = Settings { depth: 1, ..guided(None) };
+    let mut auto = renderer(&open, direct.clone());
+    auto.render_pass(5).unwrap();
+    assert!(auto.guide_state().unwrap().unwrap().is_open);
+    assert_eq!(auto.report().candidates, None);
+    assert!(costs(&auto.report().figures).is_empty());
+    let mut mis = renderer(&open, Settings { sampler: Sampler::Mis, ..direct });
+    mis.render_pass(5).unwrap();
+    assert_same(&auto.sums().unwrap(), &mis.sums().unwrap());
+    let mut dark = renderer(&scenes::mixed_room(), Settings { shadow_rays: 0, ..guided(None) });
+    dark.render_pass(2).unwrap();
+    assert!(costs(&dark.report().figures).is_empty());
+    // Given candidates leave only sharing to a choice.
+    let mut pinned = renderer(&room(), guided(Some(4)));
+    pinned.render_pass(3).unwrap();
+    let arms = costs(&pinned.report().figures);
+    assert!(arms.iter().all(|arm| arm.arm.contains("guided") && arm.arm.contains("4 candidates")));
+    support::assert_silent();
+}
+
+#[test]
+fn files_and_figures_tell_the_arm() {
+    let _alone = support::alone();
+    let folder = Folder::new();
+    let scene = format!("{}/scenes/meeting_room.toml", env!("CARGO_MANIFEST_DIR"));
+    let render = |output: &str, options: &[&str]| {
+        let fixed = ["--size", "48x36", "--depth", "2", "--stats", "stats.json"];
+        let arguments = [&["render", &scene, "-o", output][..], &fixed, options].concat();
+        let run = folder.run(&arguments);
+        run.assert(0, &[]);
+        let text = std::fs::read_to_string(folder.path().join("stats.json")).unwrap();
+        let statistics: Statistics = serde_json::from_str(&text).unwrap();
+        (
+            run.output + &run.messages,
+            Image::read_exr(&folder.path().join(output)).unwrap(),
+            statistics,
+        )
+    };
+    let keep = ["--spp", "3", "--save-guide", "room.guide"];
+    let (output, image, statistics) = render("a.exr", &keep);
+    let arm = statistics.sampler_figures["arm"].as_str().unwrap().to_owned();
+    assert!(output.contains(&format!("chose {arm}")), "{output}");
+    let candidates = statistics.candidates.map(|count| Attribute::Text(count.to_string()));
+    assert_eq!(image.attributes.get("fenestra.candidates"), candidates.as_ref());
+
+    // Record another arm, as another machine may have chosen it.
+    let path = folder.path().join("room.guide");
+    let state = GuideState::read(&path).unwrap();
+    let found = state.arm.unwrap();
+    assert_eq!(found.to_string(), arm);
+    let other = Arm { is_guided: true, candidates: 8, ..found };
+    GuideState { arm: Some(other), ..state }.write(&path).unwrap();
+    let (_, image, statistics) = render("b.exr", &["--spp", "2", "--load-guide", "room.guide"]);
+    assert_eq!(statistics.candidates, Some(8));
+    assert_eq!(image.attributes["fenestra.candidates"], Attribute::Text("8".to_owned()));
+    assert!(costs(&statistics.sampler_figures).is_empty());
+    let pinned = ["--spp", "2", "--load-guide", "room.guide", "--set", "candidates=1"];
+    assert_eq!(render("c.exr", &pinned).2.candidates, Some(1));
+}
