@@ -1,13 +1,17 @@
 //! The command line: clap types, dispatch to the commands, exit status.
 
-use std::{io::Write, process::ExitCode};
+use std::{env, ffi::OsString, io::Write, process::ExitCode};
 
-use clap::{Parser, Subcommand};
+use clap::{ArgAction, Parser, Subcommand};
 
 use crate::{
-    command,
+    command::{
+        self,
+        options::{MACHINE, OUTPUT},
+    },
     error::Error,
     memory,
+    sampler::Parameters,
     terminal::{message, say},
 };
 
@@ -21,7 +25,12 @@ pub(crate) struct Cli {
     /// Most memory to use, such as 512M or 8G. Default: three quarters of the machine's. A request
     /// beyond it is an error that says what asked for how much.
     #[arg(long, global = true, value_name = "SIZE", value_parser = memory::parse_size)]
+    #[arg(help_heading = MACHINE, hide_short_help = true)]
     pub max_memory: Option<u64>,
+    /// Log more: once what happens, twice details of the device too.
+    #[arg(short, long, global = true, action = ArgAction::Count, help_heading = OUTPUT)]
+    #[arg(hide_short_help = true)]
+    pub verbose: u8,
 }
 
 /// The commands; each variant holds the arguments that `command/<name>.rs` declares.
@@ -56,9 +65,21 @@ pub enum Command {
     SelfTest(command::self_test::Arguments),
 }
 
+/// True if the arguments hold `--set help`, which needs no scene.
+fn asks_for_parameters(arguments: &[OsString]) -> bool {
+    arguments.iter().any(|argument| argument == "--set=help")
+        || arguments.windows(2).any(|pair| pair[0] == "--set" && pair[1] == "help")
+}
+
 /// Parses the arguments, runs the command and prints the error chain of a failure.
 pub fn run() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let arguments: Vec<OsString> = env::args_os().collect();
+    if asks_for_parameters(&arguments) {
+        // A closed output pipe is not an error.
+        let _ = write!(std::io::stdout(), "{}", Parameters::help());
+        return ExitCode::SUCCESS;
+    }
+    let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => {
             // A closed output pipe is not an error.
@@ -66,7 +87,8 @@ pub fn run() -> ExitCode {
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
-    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn"))
+    let level = ["warn", "info", "debug"][usize::from(cli.verbose.min(2))];
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(level))
         .format(|buffer, record| {
             let (level, style) = (record.level(), buffer.default_level_style(record.level()));
             writeln!(buffer, "[{style}{level:<5}{style:#}] {}", message(&record.args().to_string()))

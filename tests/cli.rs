@@ -53,6 +53,23 @@ fn every_command_has_help() {
 }
 
 #[test]
+fn help_is_short_or_in_groups() {
+    let folder = Folder::new();
+    let [short, long] = ["-h", "--help"].map(|option| folder.run(&["render", option]).output);
+    let groups = ["Scene:", "Camera:", "Sampling:", "Stopping:", "Output:", "Files:", "Machine:"];
+    let places = groups.map(|group| long.find(&format!("\n{group}\n")).expect(group));
+    assert!(places.is_sorted(), "{places:?}");
+    let [short, long] = [short, long].map(|help| help.lines().count());
+    assert!(short < 60 && 2 * short < long, "{short} and {long} lines");
+    // No scene is needed to ask for the parameters.
+    for arguments in [&["render", "--set", "help"][..], &["study", "--set=help"]] {
+        let run = folder.run(arguments);
+        assert_eq!(run.status, Some(0), "{}", run.messages);
+        assert!(run.output.contains("\n  regions=16 to 1024; default 1024\n"), "{}", run.output);
+    }
+}
+
+#[test]
 fn version_is_that_of_the_package() {
     let version = Folder::new().run(&["--version"]);
     assert_eq!(version.status, Some(0));

@@ -246,3 +246,35 @@ fn a_render_keeps_its_film() {
     let [shown, clean] = ["film.png", "film.denoised.png"].map(|name| folder.path().join(name));
     assert_ne!(fs::read(shown).unwrap(), fs::read(clean).unwrap());
 }
+
+#[test]
+fn a_picture_to_show_is_denoised_where_the_library_is_found() {
+    let folder = Folder::new();
+    let library = stub(&folder, false);
+    let empty = folder.path().join("empty");
+    fs::create_dir(&empty).unwrap();
+    folder.write("scene.toml", yard([8, 6], "constant = [1, 1, 1]", CLAY, BALL));
+    let film = ["render", "scene.toml", "--sampler", "mis", "--depth", "1", "-o"];
+    let shown = [&film[..], &["a.exr"]].concat();
+    let told = [
+        "quality good (--quality): stops after 50 s or 1024 spp",
+        "stopped by --quality good",
+        "biased",
+    ];
+    run(&folder, &library, &shown).assert(0, &told);
+    for name in ["a.exr", "a.png", "a.denoised.exr", "a.denoised.png"] {
+        assert!(folder.path().join(name).exists(), "{name}");
+    }
+    let shown = [&film[..], &["b.exr", "--quality", "preview"]].concat();
+    let told = [
+        "quality preview (--quality): stops after 10 s or 64 spp",
+        "not denoised: ",
+        "wrote b.exr, b.png\n",
+    ];
+    run(&folder, &empty, &shown).assert(0, &told);
+    // A stop rule alone makes the film alone.
+    run(&folder, &library, &[&film[..], &["c.exr", "--spp", "1"]].concat())
+        .assert(0, &["wrote c.exr\n"]);
+    let both = [&film[..], &["d.exr", "--quality", "final", "--time", "1s"]].concat();
+    run(&folder, &library, &both).assert(2, &["'--quality <QUALITY>' cannot be used with"]);
+}

@@ -65,7 +65,7 @@ fn count(header: &str, element: &str) -> usize {
 #[test]
 fn a_diffuse_scene_is_written_without_a_warning() {
     let constant = "constant = [1.0, 2.0, 3.0]\nscale = 0.5";
-    let options = ["--depth=3", "--spp=16", "--strict"];
+    let options = ["--depth=3", "--spp=16", "--size=48x24", "--strict"];
     let (folder, xml, messages) = exported(constant, DIFFUSE, &options);
     assert_eq!(messages, "");
     assert_parts(
@@ -77,7 +77,7 @@ fn a_diffuse_scene_is_written_without_a_warning() {
             "<string name=\"fov_axis\" value=\"y\"/>",
             "<float name=\"fov\" value=\"45\"/>",
             "<lookat origin=\"0, 1, 3\" target=\"0, 0.3, 0\" up=\"0, 1, 0\"/>",
-            "<integer name=\"width\" value=\"32\"/>",
+            "<integer name=\"width\" value=\"48\"/>",
             "<rgb name=\"radiance\" value=\"0.5, 1, 1.5\"/>",
             "<bsdf type=\"twosided\" id=\"m00_clay\">",
             "<rgb name=\"reflectance\" value=\"0.5, 0.25, 0.125\"/>",

@@ -27,8 +27,8 @@ fn the_first_rule_that_is_reached_ends_the_render() {
     let folder = folder();
     let run = |options: &[&str]| render(&folder, "out.exr", options).1;
 
-    let default = run(&[]);
-    assert_eq!((default.stop_reason.as_str(), default.samples_per_pixel), ("spp", 64));
+    let quick = run(&["--quick"]);
+    assert_eq!((quick.stop_reason.as_str(), quick.samples_per_pixel), ("spp", 16));
     let both = run(&["--spp", "3", "--time", "1h"]);
     assert_eq!((both.stop_reason.as_str(), both.samples_per_pixel), ("spp", 3));
     let time = run(&["--spp", "100000000", "--time", "300ms"]);

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::options::parse_size;
 use crate::{
     error::{Error, Result},
     export::{Settings, gltf, mitsuba, pbrt},
@@ -24,6 +25,9 @@ pub struct Arguments {
     /// Number of path vertices lit by the environment; 1 is direct light.
     #[arg(long, value_name = "D", default_value_t = 8)]
     pub depth: u32,
+    /// Film size in pixels, overriding the scene's.
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub size: Option<[u32; 2]>,
     /// Samples per pixel.
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: u32,
@@ -60,6 +64,9 @@ impl Format {
 /// An unusable scene, a failing disk; with `--strict`, the first difference.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let mut scene = Scene::load(&arguments.scene)?;
+    if let Some([width, height]) = arguments.size {
+        (scene.film.width, scene.film.height) = (width, height);
+    }
     if !scene.geometry.instances.is_empty() {
         let message = "expected fewer triangles: the export places every instance";
         let flat = scene.geometry.flattened();

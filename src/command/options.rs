@@ -14,15 +14,31 @@ use crate::{
     scene::{Scene, load::LoadOptions},
 };
 
+/// Group of options in help: the scene and what it leaves open.
+pub(super) const SCENE: &str = "Scene";
+/// Group: camera and film.
+pub(super) const CAMERA: &str = "Camera";
+/// Group: how light is sampled.
+pub(super) const SAMPLING: &str = "Sampling";
+/// Group: when a render ends.
+pub(super) const STOPPING: &str = "Stopping";
+/// Group: what is shown and written.
+pub(crate) const OUTPUT: &str = "Output";
+/// Group: files beside the picture.
+pub(super) const FILES: &str = "Files";
+/// Group: what computes.
+pub(crate) const MACHINE: &str = "Machine";
+
 /// Options of what renders.
 #[derive(Clone, Debug, clap::Args)]
 pub struct DeviceOptions {
     /// Device to use, by index or part of its name; see `fenestra devices`.
-    #[arg(long, value_name = "INDEX|NAME")]
+    #[arg(long, value_name = "INDEX|NAME", help_heading = MACHINE, hide_short_help = true)]
     pub device: Option<String>,
     /// Part of the machine that traces rays. The host traces for software devices alone, by the library
     /// Embree.
     #[arg(long, value_enum, value_name = "PART", default_value = "auto")]
+    #[arg(help_heading = MACHINE, hide_short_help = true)]
     pub tracer: Tracer,
 }
 
@@ -40,16 +56,17 @@ impl DeviceOptions {
 #[derive(Debug, clap::Args)]
 pub struct SceneOptions {
     /// Environment map that lights the scene, instead of its own.
-    #[arg(long, value_name = "MAP")]
+    #[arg(long, value_name = "MAP", help_heading = SCENE)]
     environment: Option<PathBuf>,
     /// Turn the environment map about +Y, counter-clockwise seen from above, degrees.
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = SCENE)]
+    #[arg(hide_short_help = true)]
     rotate_environment: Option<f32>,
     /// Camera of a glTF file, by name or number from 0. Default: the first with perspective.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = CAMERA, hide_short_help = true)]
     camera: Option<String>,
     /// Fail if loading the scene gives any warning, such as a part of a file that is left out.
-    #[arg(long)]
+    #[arg(long, help_heading = SCENE, hide_short_help = true)]
     strict: bool,
 }
 

@@ -12,7 +12,7 @@ use crate::{
     stage,
     terminal::{escaped, say},
 };
-use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// Resolution of the bar, steps.
 const STEPS: u64 = 10_000;
@@ -80,11 +80,13 @@ impl Progress {
             Output::Quiet
         } else if std::io::stderr().is_terminal() {
             let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
-            let template = "{prefix} [{bar:30}] {percent:>3}% {msg}";
+            // Text beyond the width of the terminal is cut, so that the line never wraps.
+            let template = "[{bar:12}] {elapsed:>3} {wide_msg}";
             if let Ok(style) = ProgressStyle::with_template(template) {
                 bar.set_style(style.progress_chars("=> "));
             }
-            bar.set_prefix(label.clone());
+            bar.set_message(label.clone());
+            bar.enable_steady_tick(Duration::from_secs(1));
             Output::Bar(bar)
         } else {
             Output::Lines { last: Instant::now(), interval: FIRST_INTERVAL }
@@ -95,24 +97,17 @@ impl Progress {
     /// Updates the display; call it as often as convenient.
     pub(crate) fn update(&mut self, standing: &Standing) {
         let elapsed = self.start.elapsed();
-        let message = || {
-            let remaining = remaining(elapsed, standing.fraction)
-                .map_or_else(String::new, |time| format!(", {} left", HumanDuration(time)));
-            let mut parts = vec![standing.to_string(), HumanDuration(elapsed).to_string()];
-            parts.retain(|part| !part.is_empty());
-            parts.join(", ") + &remaining
-        };
         match &mut self.output {
             Output::Bar(bar) => {
                 bar.set_position((standing.fraction.clamp(0.0, 1.0) * STEPS as f64) as u64);
-                bar.set_message(message());
+                // The name of the scene comes last, where a narrow terminal cuts it.
+                bar.set_message(format!("{}  {}", message(standing, elapsed), self.label));
             }
             Output::Lines { last, interval } => {
                 if last.elapsed() >= *interval {
                     *last = Instant::now();
                     *interval = (*interval * 2).min(LONGEST_INTERVAL);
-                    let percent = 100.0 * standing.fraction.clamp(0.0, 1.0);
-                    say!("{}: {percent:.0}%, {}", self.label, message());
+                    say!("{}: {}", self.label, message(standing, elapsed));
                 }
             }
             Output::Quiet => {}
@@ -142,6 +137,33 @@ impl Progress {
     }
 }
 
+/// Tells a standing: "42% of 50 s, 29 s left, 118 spp, 3.21 Mrays/s, error 4.20%".
+fn message(standing: &Standing, elapsed: Duration) -> String {
+    let percent = 100.0 * standing.fraction.clamp(0.0, 1.0);
+    let share = match standing.limit {
+        Some(limit) => format!("{percent:.0}% of {limit}"),
+        None => format!("{percent:.0}%"),
+    };
+    let left = match standing.limit {
+        Some(_) => standing.seconds_left.and_then(|left| Duration::try_from_secs_f64(left).ok()),
+        None => remaining(elapsed, standing.fraction),
+    };
+    let left = left.map(|time| format!("{} left", duration_text(time))).unwrap_or_default();
+    let mut parts = vec![share, left, standing.to_string()];
+    parts.retain(|part| !part.is_empty());
+    parts.join(", ")
+}
+
+/// Formats a duration as "29 s", "3 min 05 s" or "2 h 03 min".
+fn duration_text(duration: Duration) -> String {
+    let seconds = duration.as_secs_f64().round() as u64;
+    match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
+        (0, 0, seconds) => format!("{seconds} s"),
+        (0, minutes, seconds) => format!("{minutes} min {seconds:02} s"),
+        (hours, minutes, _) => format!("{hours} h {minutes:02} min"),
+    }
+}
+
 /// Estimates the time left from the rate so far; `None` at the start and if the end is unknown.
 fn remaining(elapsed: Duration, fraction: f64) -> Option<Duration> {
     if !(0.001..1.0).contains(&fraction) {
@@ -153,6 +175,7 @@ fn remaining(elapsed: Duration, fraction: f64) -> Option<Duration> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::session::Limit;
 
     #[test]
     fn remaining_time_follows_the_rate_so_far() {
@@ -161,5 +184,19 @@ mod tests {
         assert_eq!(remaining(time(10), 0.0), None);
         assert_eq!(remaining(time(10), 1.0), None);
         assert_eq!(remaining(time(10), f64::NAN), None);
+    }
+
+    #[test]
+    fn the_message_begins_with_the_share_of_the_rule_and_the_time_left() {
+        let elapsed = Duration::from_secs(10);
+        let mut standing = Standing { fraction: 0.42, samples: 118, ..Standing::default() };
+        assert_eq!(message(&standing, elapsed), "42%, 14 s left, 118 spp");
+        standing.limit = Some(Limit::Seconds(50.0));
+        assert_eq!(message(&standing, elapsed), "42% of 50 s, 118 spp");
+        standing.seconds_left = Some(185.0);
+        assert_eq!(message(&standing, elapsed), "42% of 50 s, 3 min 05 s left, 118 spp");
+        standing.limit = Some(Limit::Error(0.02));
+        standing.seconds_left = Some(7380.0);
+        assert_eq!(message(&standing, elapsed), "42% of error 2%, 2 h 03 min left, 118 spp");
     }
 }

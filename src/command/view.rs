@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use super::{
-    options::{DeviceOptions, SceneOptions, parse_size},
+    options::{
+        CAMERA, DeviceOptions, MACHINE, OUTPUT, SAMPLING, STOPPING, SceneOptions, parse_size,
+    },
     progress::Patience,
     self_test,
 };
@@ -21,41 +23,43 @@ pub struct Arguments {
     /// Scene file (.toml, .gltf, .glb, .obj, .pbrt, .xml).
     pub scene: PathBuf,
     /// Sampler at the start; a key changes it.
-    #[arg(long, value_enum, default_value = "guided")]
+    #[arg(long, value_enum, default_value = "guided", help_heading = SAMPLING)]
     pub sampler: Sampler,
     /// Camera paths per pixel at which a picture is finished.
-    #[arg(long, value_name = "N", default_value_t = 65536)]
+    #[arg(long, value_name = "N", default_value_t = 65536, help_heading = STOPPING)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: u32,
-    /// Shadow rays traced at every vertex of a camera path.
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
-    pub shadow_rays: u32,
+    /// Shadow rays traced at every vertex of a camera path: 8 for `guided`, else 5 unless given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(help_heading = SAMPLING, hide_short_help = true)]
+    pub shadow_rays: Option<u32>,
     /// Number of path vertices at the start; 1 is direct light.
-    #[arg(long, value_name = "D", default_value_t = 8)]
+    #[arg(long, value_name = "D", default_value_t = 8, help_heading = SAMPLING)]
     pub depth: u32,
     /// Environment, camera, strictness.
     #[command(flatten)]
     pub scene_options: SceneOptions,
     /// Film size in pixels, overriding the scene's. The window shows the film at any size.
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = CAMERA)]
     pub size: Option<[u32; 2]>,
     /// Random seed.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, help_heading = SAMPLING, hide_short_help = true)]
     pub seed: u32,
     /// Device and tracer.
     #[command(flatten)]
     pub device: DeviceOptions,
     /// Run with the Vulkan validation layers; any message fails the command.
-    #[arg(long)]
+    #[arg(long, help_heading = MACHINE, hide_short_help = true)]
     pub validate: bool,
     /// Exposure at the start, in stops.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(help_heading = OUTPUT)]
     pub exposure: f32,
     /// Tone curve at the start.
-    #[arg(long, value_enum, value_name = "CURVE", default_value = "clip")]
+    #[arg(long, value_enum, value_name = "CURVE", default_value = "clip", help_heading = OUTPUT)]
     pub curve: Curve,
-    /// Sampler parameter, such as candidates=4. May be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
+    /// Sampler parameter, such as candidates=4; `--set help` lists them. May be repeated.
+    #[arg(long, value_name = "KEY=VALUE", help_heading = SAMPLING)]
     pub set: Vec<String>,
 }
 
@@ -74,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let settings = Settings {
         sampler: arguments.sampler,
         parameters,
-        shadow_rays: arguments.shadow_rays,
+        shadow_rays: arguments.shadow_rays.unwrap_or(arguments.sampler.shadow_rays()),
         depth: arguments.depth,
         seed: arguments.seed,
         ..Settings::default()

@@ -14,7 +14,10 @@ use std::{
 use libloading::Library;
 
 use super::library;
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    files,
+};
 
 /// Environment variable with the library's file, or the folder that holds it.
 pub(crate) const LIBRARY_VARIABLE: &str = "FENESTRA_OIDN";
@@ -22,9 +25,8 @@ pub(crate) const LIBRARY_VARIABLE: &str = "FENESTRA_OIDN";
 const NAMES: [&str; 3] =
     ["libOpenImageDenoise.so.2", "libOpenImageDenoise.so.1", "libOpenImageDenoise.so"];
 /// Advice where the library is missing.
-const HELP: &str = "install the library, which `apt search openimagedenoise` finds where the \
-                    distribution has it (Debian 12 has not) and openimagedenoise.org offers for all, and \
-                    name its folder in FENESTRA_OIDN if the system does not find it";
+const HELP: &str = "install the library: `./setup` does where it can, openimagedenoise.org offers it for \
+                    all; name its folder in FENESTRA_OIDN if the system does not find it";
 
 /// `OIDN_DEVICE_TYPE_CPU`
 const DEVICE_CPU: c_int = 1;
@@ -225,9 +227,10 @@ impl Drop for Denoiser {
     }
 }
 
-/// Opens the library that [`LIBRARY_VARIABLE`] names, or the system's.
+/// Opens the library that [`LIBRARY_VARIABLE`] names, or the system's, or that which `./setup` brought.
 fn open_library() -> Result<(Library, PathBuf)> {
-    library::open(LIBRARY_VARIABLE, &NAMES).map_err(|found| Error::Denoiser {
+    let own = files::data_folder("oidn").map(|folder| folder.join("lib"));
+    library::open(LIBRARY_VARIABLE, &NAMES, own.as_deref()).map_err(|found| Error::Denoiser {
         reason: format!(
             "--denoise needs the library Open Image Denoise ({}), which cannot be loaded: {found}",
             NAMES[0]

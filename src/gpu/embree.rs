@@ -98,7 +98,7 @@ impl Embree {
     /// # Errors
     /// [`Error::Device`] if there is no library, if it is of another version, or if it refuses the CPU.
     pub(crate) fn load() -> Result<Arc<Self>> {
-        let (library, path) = library::open(LIBRARY_VARIABLE, &NAMES).map_err(|found| {
+        let (library, path) = library::open(LIBRARY_VARIABLE, &NAMES, None).map_err(|found| {
             missing(format!("the library Embree ({}), which cannot be loaded: {found}", NAMES[1]))
         })?;
         Self::of(library).map_err(|problem| {

@@ -1,20 +1,32 @@
 //! Shared libraries that are loaded when they are first needed, so that nothing of them is needed to build.
 
-use std::{env, path::PathBuf};
+use std::{
+    env,
+    path::{Path, PathBuf},
+};
 
 use libloading::Library;
 
 /// Opens the first library that loads: of those with one of `names` in the folder that the environment
-/// variable `variable` names, or the file that it names, or the system's.
+/// variable `variable` names, or the file that it names; without the variable, the system's, then those in
+/// the folder `own`.
 ///
 /// # Errors
 /// The reason for the first failure.
-pub(super) fn open(variable: &str, names: &[&str]) -> Result<(Library, PathBuf), String> {
+pub(super) fn open(
+    variable: &str,
+    names: &[&str],
+    own: Option<&Path>,
+) -> Result<(Library, PathBuf), String> {
     let named = env::var_os(variable).filter(|value| !value.is_empty()).map(PathBuf::from);
     let candidates: Vec<PathBuf> = match &named {
         Some(folder) if folder.is_dir() => names.iter().map(|name| folder.join(name)).collect(),
         Some(file) => vec![file.clone()],
-        None => names.iter().map(PathBuf::from).collect(),
+        None => {
+            let of_system = names.iter().map(PathBuf::from);
+            let of_folder = own.iter().flat_map(|own| names.iter().map(|name| own.join(name)));
+            of_system.chain(of_folder.filter(|path| path.exists())).collect()
+        }
     };
     let mut failures = Vec::new();
     for path in candidates {

@@ -11,6 +11,8 @@ pub const ON_OR_OFF: &[(&str, bool)] = &[("on", true), ("off", false)];
 pub struct Knob<P> {
     /// Key of `--set`, also in metadata and statistics.
     pub key: &'static str,
+    /// Meaning, as its documentation tells it after the key.
+    pub about: &'static str,
     /// Sets the value, or fails with a description of the expected one.
     pub set: fn(&mut P, &str) -> Result<(), String>,
     /// Returns the value as text.
@@ -18,7 +20,7 @@ pub struct Knob<P> {
 }
 
 /// Parameters that a table of knobs sets.
-pub trait Knobs: Sized + 'static {
+pub trait Knobs: Clone + Sized + 'static {
     /// The table.
     const KNOBS: &'static [Knob<Self>];
 
@@ -28,6 +30,22 @@ pub trait Knobs: Sized + 'static {
         let refused = |expected| Error::usage(format!("--set {key}={value}: expected {expected}"));
         (knob.set)(self, value).map_err(refused)?;
         Ok(true)
+    }
+
+    /// Lists key, expected values, default and meaning of every parameter for `--set help`.
+    fn help(&self) -> String {
+        // A value that none takes makes each say what it expects.
+        let expected =
+            |knob: &Knob<Self>| (knob.set)(&mut self.clone(), "?").err().unwrap_or_default();
+        let entry = |knob: &Knob<Self>| {
+            let (_, about) = knob.about.split_once("`: ").unwrap_or_default();
+            let default = match (knob.get)(self).as_str() {
+                "" => String::new(),
+                default => format!("; default {default}"),
+            };
+            format!("  {}={}{default}\n      {about}\n", knob.key, expected(knob))
+        };
+        Self::KNOBS.iter().map(entry).collect()
     }
 
     /// Returns all parameters by key.
@@ -87,12 +105,12 @@ impl Values<Option<u32>> for Auto {
 /// Declares a struct of parameters with their keys, defaults and [`Values`].
 macro_rules! parameters {
     ($(#[$doc:meta])* pub struct $name:ident {
-        $($(#[$about:meta])* $key:literal $field:ident: $kind:ty = $default:expr, $values:expr;)*
+        $($(#[doc = $about:literal])* $key:literal $field:ident: $kind:ty = $default:expr, $values:expr;)*
     }) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct $name {
-            $($(#[$about])* pub $field: $kind,)*
+            $($(#[doc = $about])* pub $field: $kind,)*
         }
 
         impl Default for $name {
@@ -105,6 +123,7 @@ macro_rules! parameters {
             const KNOBS: &'static [$crate::sampler::knob::Knob<Self>] = &[
                 $($crate::sampler::knob::Knob {
                     key: $key,
+                    about: concat!($($about),*),
                     set: |own, text| {
                         own.$field = $crate::sampler::knob::Values::parse(&$values, text)?;
                         Ok(())

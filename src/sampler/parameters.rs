@@ -49,6 +49,19 @@ macro_rules! parameters {
                     $(|| self.$room.set_knob(key, value)?)*)
             }
 
+            /// Lists every parameter by the sampler that reads it, with values, default and meaning.
+            pub fn help() -> String {
+                let defaults = Self::default();
+                let mut text = format!("several samplers\n{}", Knobs::help(&defaults));
+                $(
+                    let own = Knobs::help(&defaults.$room);
+                    if !own.is_empty() {
+                        text += &format!("\n{}\n{own}", $name);
+                    }
+                )*
+                text
+            }
+
             /// Every key, sorted.
             pub fn keys() -> Vec<&'static str> {
                 let mut keys: Vec<_> = Self::KNOBS.iter().map(|knob| knob.key).collect();
@@ -66,6 +79,8 @@ impl Knobs for Parameters {
     const KNOBS: &'static [Knob<Self>] = &[
         Knob {
             key: "candidates",
+            about: "`candidates`: directions to choose each shadow ray of ris, control-variates or \
+                    guided from",
             set: |parameters, value| {
                 let expected =
                     "auto, 2, 4, 6 or 8 for ris and control-variates, auto, 1, 4 or 8 for guided";
@@ -79,6 +94,8 @@ impl Knobs for Parameters {
         },
         Knob {
             key: "compensation",
+            about: "`compensation`: on if mis, portal and guided in the open leave the dim part of \
+                    the environment to the BRDF",
             set: |parameters, value| {
                 parameters.compensation = ON_OR_OFF.parse(value)?;
                 Ok(())
@@ -87,6 +104,7 @@ impl Knobs for Parameters {
         },
         Knob {
             key: "preset",
+            about: "`preset`: strict sets all parameters of product and visibility as in the thesis",
             set: |parameters, value| {
                 let presets: &[_] = &[
                     ("default", ProductParameters::default()),
@@ -107,6 +125,8 @@ impl Knobs for Parameters {
         },
         Knob {
             key: "share-paths",
+            about: "`share-paths`: edge of the squares whose pixels share second vertices; auto \
+                    measures what it gains under guided",
             set: |parameters, value| {
                 parameters.share_paths = SHARE_PATHS.parse(value)?;
                 Ok(())
@@ -135,7 +155,7 @@ impl Parameters {
             return Ok(());
         }
         Err(Error::usage(format!(
-            "--set {key}: unknown parameter; known: {}",
+            "--set {key}: unknown parameter; known: {}; `--set help` explains them",
             Self::keys().join(", ")
         )))
     }
@@ -172,6 +192,19 @@ mod tests {
             error.contains("candidate:") && error.contains("known: bounce-candidates"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn help_explains_every_key() {
+        let help = Parameters::help();
+        for key in Parameters::keys() {
+            let entry = help.split_once(&format!("  {key}=")).map(|(_, rest)| rest);
+            let mut lines = entry.map(str::lines).unwrap();
+            let (values, about) = (lines.next().unwrap(), lines.next().unwrap().trim());
+            assert!(!values.is_empty() && about.len() > 10, "{key}={values}: {about}");
+        }
+        let regions = "  regions=16 to 1024; default 1024\n      most regions of the environment";
+        assert!(help.contains(regions), "{help}");
     }
 
     #[test]

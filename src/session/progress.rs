@@ -1,6 +1,6 @@
 //! How far a run is from the rules that end it.
 
-use super::{Rules, Session, Standing, StopReason};
+use super::{Limit, Rules, Session, Standing, StopReason};
 
 impl Session {
     /// Samples per pixel at which a run ends for sure: those asked for, or the last of the seed, whose
@@ -31,19 +31,35 @@ impl Session {
         rules.error.is_some_and(reached).then_some(StopReason::Error)
     }
 
-    /// Returns how far the run is.
+    /// Returns how far the run is: by the rule that the rate so far meets first, or as long as that is
+    /// unknown, by the one that is nearest to its limit.
     pub fn standing(&self, rules: &Rules) -> Standing {
         let samples = self.renderer.sample_count();
-        let share = |done: f64, target: f64| (done / target).clamp(0.0, 1.0);
-        let by_samples = rules.samples.map(|target| share(f64::from(samples), f64::from(target)));
-        let by_time = rules.seconds.map(|seconds| share(self.seconds(), seconds));
-        // The error falls with the square root of the work.
-        let by_error = rules.error.zip(self.relative_error).map(|(target, error)| {
-            if error > 0.0 { share((target / error).powi(2), 1.0) } else { 0.0 }
+        let left = |count: f64| self.rate.seconds_of(count).map(|seconds| seconds.max(0.0));
+        let by_samples = rules.samples.map(|target| {
+            let (done, all) = (f64::from(samples), f64::from(target));
+            (Limit::Samples(target), done / all, left(all - done))
         });
-        let fraction = [by_samples, by_time, by_error].into_iter().flatten().fold(0.0, f64::max);
+        let by_time = rules.seconds.map(|seconds| {
+            let left = self.seconds_left(rules).max(0.0) * self.rate.wall_share;
+            (Limit::Seconds(seconds), self.seconds() / seconds, Some(left))
+        });
+        let is_usable = |error: &f64| error.is_finite() && *error > 0.0;
+        let by_error = rules.error.map(|target| {
+            // The error falls with the square root of the samples.
+            let share = self.relative_error.filter(is_usable).map(|error| (target / error).powi(2));
+            let left = share.and_then(|share| left(f64::from(samples) * (1.0 / share - 1.0)));
+            (Limit::Error(target), share.unwrap_or(0.0), left)
+        });
+        let rules = [by_samples, by_time, by_error].into_iter().flatten();
+        let nearest = rules.min_by(|(_, done, left), (_, other_done, other_left)| {
+            let by_left = left.zip(*other_left).map(|(left, other)| left.total_cmp(&other));
+            by_left.unwrap_or_else(|| other_done.total_cmp(done))
+        });
         Standing {
-            fraction,
+            fraction: nearest.map_or(0.0, |(_, done, _)| done.clamp(0.0, 1.0)),
+            limit: nearest.map(|(limit, ..)| limit),
+            seconds_left: nearest.and_then(|(.., left)| left),
             samples,
             rays_per_second: self.renderer.totals().rays() as f64 / self.own_seconds().max(1e-9),
             relative_error: self.relative_error,

@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{Flag, Renderer, Rules, Settings, Standing, StopReason};
+use super::{Flag, Renderer, Rules, Settings, Standing, StopReason, rate::Rate};
 use crate::{
     error::{Error, Result},
     files::parent_of,
@@ -98,6 +98,8 @@ pub struct Session {
     earlier_seconds: f64,
     /// Wall time that this run has spent in passes, seconds.
     own_seconds: f64,
+    /// Rate of the run, for forecasts.
+    pub(super) rate: Rate,
     /// Mean relative standard error at the last look; `None` as long as no sample has found light.
     pub(super) relative_error: Option<f64>,
     /// True if any sample had found light at the last look.
@@ -148,6 +150,7 @@ impl Session {
             pass_start: Rc::new(Cell::new(Instant::now())),
             earlier_seconds: 0.0,
             own_seconds: 0.0,
+            rate: Rate::from(0),
             relative_error: None,
             found_light: false,
         }
@@ -162,6 +165,7 @@ impl Session {
     fn reset(&mut self) {
         (self.earlier_seconds, self.own_seconds) = (0.0, 0.0);
         (self.relative_error, self.found_light) = (None, false);
+        self.rate = Rate::from(0);
     }
 
     /// Starts again with another seed, as [`Renderer::restart`].
@@ -227,6 +231,7 @@ impl Session {
         self.renderer.render_pass(samples)?;
         let took = start.elapsed().as_secs_f64();
         self.own_seconds += took;
+        self.rate.note(self.own_seconds, self.renderer.sample_count());
         self.last_pass = Some((samples, took));
         Ok(took)
     }
@@ -248,6 +253,7 @@ impl Session {
     pub fn run(&mut self, rules: &Rules, observer: &mut dyn Observer) -> Result<StopReason> {
         let interrupt = observer.interrupt();
         self.watch(&interrupt);
+        let (start, seconds_before) = (Instant::now(), self.own_seconds);
         let mut next_look = Instant::now() + LOOK_INTERVAL;
         let mut next_checkpoint =
             rules.checkpoints.as_ref().map(|(_, interval)| Instant::now() + *interval);
@@ -294,6 +300,9 @@ impl Session {
                 let pause = (10 * start.elapsed()).clamp(*interval, 10 * *interval);
                 next_checkpoint = Some(Instant::now() + pause);
             }
+            let share =
+                start.elapsed().as_secs_f64() / (self.own_seconds - seconds_before).max(1e-9);
+            self.rate.wall_share = share;
             observer.notice(&Event::Pass { samples, seconds, standing: self.standing(rules) });
         };
         match reason {
@@ -357,6 +366,7 @@ impl Session {
         }
         self.has_checkpoint = true;
         self.earlier_seconds = checkpoint.metadata.seconds;
+        self.rate = Rate::from(self.renderer.sample_count());
         Ok(())
     }
 }

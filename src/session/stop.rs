@@ -43,6 +43,61 @@ pub struct Rules {
     pub checkpoints: Option<(PathBuf, Duration)>,
 }
 
+/// Named stop rules for a picture to show: a time that suits its purpose, and samples beyond which nobody
+/// sees a difference. None is by error, which would bias the film.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Quality {
+    /// 10 s: light and view, at most 64 samples per pixel.
+    Preview,
+    /// 50 s, so that the picture is on disk within a minute; at most 1024 samples per pixel.
+    Good,
+    /// 10 min, at most 16384 samples per pixel.
+    Final,
+}
+
+impl Quality {
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Preview => "preview",
+            Self::Good => "good",
+            Self::Final => "final",
+        }
+    }
+
+    /// Returns the rules.
+    pub fn rules(self) -> Rules {
+        let (seconds, samples) = match self {
+            Self::Preview => (10.0, 64),
+            Self::Good => (50.0, 1024),
+            Self::Final => (600.0, 16_384),
+        };
+        Rules { seconds: Some(seconds), samples: Some(samples), ..Rules::default() }
+    }
+}
+
+/// Limit of a stop rule.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Limit {
+    /// Camera paths per pixel.
+    Samples(u32),
+    /// Wall time of the passes, seconds.
+    Seconds(f64),
+    /// Mean relative standard error.
+    Error(f64),
+}
+
+impl fmt::Display for Limit {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Samples(samples) => write!(formatter, "{samples} spp"),
+            Self::Seconds(seconds) if seconds < 120.0 => write!(formatter, "{seconds} s"),
+            Self::Seconds(seconds) => write!(formatter, "{} min", seconds / 60.0),
+            Self::Error(error) => write!(formatter, "error {}%", 100.0 * error),
+        }
+    }
+}
+
 /// Rule that ended a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopReason {
@@ -74,8 +129,12 @@ impl StopReason {
 /// State of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Standing {
-    /// Fraction done, 0…1, by the stop rule that is nearest to being met.
+    /// Fraction done, 0…1, by the stop rule that will be met first.
     pub fraction: f64,
+    /// Limit of that rule, if there is one.
+    pub limit: Option<Limit>,
+    /// Wall time until it is met, by the rate of the latter part of the run, seconds; `None` if unknown.
+    pub seconds_left: Option<f64>,
     /// Camera paths per pixel so far.
     pub samples: u32,
     /// Rays per second so far; 0 if unknown.

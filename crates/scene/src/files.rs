@@ -26,8 +26,18 @@ const LEFTOVER_AGE: Duration = Duration::from_secs(60);
 /// Returns `fenestra/<kind>` in the user's cache folder (`$XDG_CACHE_HOME`, else `~/.cache`), or
 /// `None` if neither is set. The folder may not exist yet.
 pub fn cache_folder(kind: &str) -> Option<PathBuf> {
+    user_folder("XDG_CACHE_HOME", ".cache", kind)
+}
+
+/// Returns `fenestra/<kind>` in the user's data folder (`$XDG_DATA_HOME`, else `~/.local/share`), or
+/// `None` if neither is set. The folder may not exist.
+pub fn data_folder(kind: &str) -> Option<PathBuf> {
+    user_folder("XDG_DATA_HOME", ".local/share", kind)
+}
+
+fn user_folder(variable: &str, default: &str, kind: &str) -> Option<PathBuf> {
     let set = |name| env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
-    let base = set("XDG_CACHE_HOME").or_else(|| Some(set("HOME")?.join(".cache")))?;
+    let base = set(variable).or_else(|| Some(set("HOME")?.join(default)))?;
     Some(base.join("fenestra").join(kind))
 }
 

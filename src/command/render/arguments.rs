@@ -7,9 +7,10 @@ use std::{
 
 use super::{
     super::options::{
-        DeviceOptions, SceneOptions, parse_crop, parse_duration, parse_pixel, parse_size,
+        CAMERA, DeviceOptions, FILES, MACHINE, OUTPUT, SAMPLING, STOPPING, SceneOptions,
+        parse_crop, parse_duration, parse_pixel, parse_size,
     },
-    DEFAULT_SPP, QUICK_SPP,
+    QUICK_SPP,
 };
 use crate::{
     error::{Error, Result},
@@ -18,116 +19,146 @@ use crate::{
     pass::Roulette,
     sampler::{Parameters, Sampler},
     scene::{FilmSettings, Scene},
-    session::{Rules, Settings},
+    session::{Quality, Rules, Settings},
 };
 
 /// Arguments of `render`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Scene file (.toml, .gltf, .glb, .obj).
+    /// Scene file (.toml, .gltf, .glb, .obj, .pbrt, .xml).
     pub scene: PathBuf,
-    /// Image to write. Default: the scene's name in the working folder.
-    #[arg(short, long, value_name = "FILE.exr", visible_alias = "outfile")]
-    pub output: Option<PathBuf>,
-    /// Sampler that chooses directions at a hit.
-    #[arg(long, value_enum, default_value = "guided")]
-    pub sampler: Sampler,
-    /// Stop after this many camera paths per pixel (64 if no stop rule is given).
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    pub spp: Option<u32>,
-    /// Stop after rendering for this much wall time: 500ms, 30s, 5m, 1h.
-    #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
-    pub time: Option<Duration>,
-    /// Stop when the mean relative standard error falls below this. Slightly biased, since the data
-    /// decide when to stop.
-    #[arg(long, value_name = "E")]
-    pub error: Option<f64>,
-    /// Shadow rays traced at every vertex of a camera path: 8 for `guided`, which traces a quarter of
-    /// them at later vertices (`--set later-rays=N`), else 5 unless given.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    pub shadow_rays: Option<u32>,
-    /// Number of path vertices lit by the environment; 1 is direct light.
-    #[arg(long, value_name = "D", default_value_t = 8)]
-    pub depth: u32,
-    /// First path vertex, from 0 on, at which Russian roulette may end a path.
-    #[arg(long, value_name = "D", default_value_t = 2)]
-    pub roulette_depth: u32,
-    /// Share of the camera's light that a path still carries, below which Russian roulette may end it; 0 for
-    /// never.
-    #[arg(long, value_name = "T", default_value_t = 0.02)]
-    pub roulette_throughput: f32,
     /// Environment, camera, strictness.
     #[command(flatten)]
     pub scene_options: SceneOptions,
+
     /// Film size in pixels, overriding the scene's.
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = CAMERA)]
     pub size: Option<[u32; 2]>,
     /// Render only pixels x0 ≤ x < x1, y0 ≤ y < y1.
-    #[arg(long, value_name = "x0,y0,x1,y1", value_parser = parse_crop)]
+    #[arg(long, value_name = "x0,y0,x1,y1", value_parser = parse_crop, help_heading = CAMERA)]
+    #[arg(hide_short_help = true)]
     pub crop: Option<Window>,
+
+    /// Sampler that chooses directions at a hit.
+    #[arg(long, value_enum, default_value = "guided", help_heading = SAMPLING)]
+    pub sampler: Sampler,
+    /// Number of path vertices lit by the environment; 1 is direct light.
+    #[arg(long, value_name = "D", default_value_t = 8, help_heading = SAMPLING)]
+    pub depth: u32,
+    /// Shadow rays traced at every vertex of a camera path.
+    ///
+    /// 8 for `guided`, which traces a quarter of them at later vertices (`--set later-rays=N`), else 5
+    /// unless given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(help_heading = SAMPLING, hide_short_help = true)]
+    pub shadow_rays: Option<u32>,
+    /// First path vertex, from 0 on, at which Russian roulette may end a path.
+    #[arg(long, value_name = "D", default_value_t = 2, help_heading = SAMPLING, hide_short_help = true)]
+    pub roulette_depth: u32,
+    /// Share of the camera's light that a path still carries, below which Russian roulette may end it; 0 for
+    /// never.
+    #[arg(long, value_name = "T", default_value_t = 0.02, help_heading = SAMPLING, hide_short_help = true)]
+    pub roulette_throughput: f32,
     /// Random seed.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, help_heading = SAMPLING, hide_short_help = true)]
     pub seed: u32,
     /// Index of each pixel's first sample, to render disjoint parts for `merge`.
-    #[arg(long, value_name = "K", default_value_t = 0)]
+    #[arg(long, value_name = "K", default_value_t = 0, help_heading = SAMPLING, hide_short_help = true)]
     pub sample_offset: u32,
+    /// Sampler parameter, such as candidates=4; `--set help` lists them. May be repeated.
+    #[arg(long, value_name = "KEY=VALUE", help_heading = SAMPLING)]
+    pub set: Vec<String>,
+
+    /// Make a picture to show, in 10 s, 50 s or 10 min.
+    ///
+    /// Beside the image comes a PNG, which grows on disk, and where the library Open Image Denoise is found,
+    /// the picture denoised, as by --denoise. Default: good, if nothing else says when to stop.
+    #[arg(long, value_enum, conflicts_with_all = ["spp", "time", "error", "quick"])]
+    #[arg(help_heading = STOPPING)]
+    pub quality: Option<Quality>,
+    /// Stop after this many camera paths per pixel.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(help_heading = STOPPING)]
+    pub spp: Option<u32>,
+    /// Stop after rendering for this much wall time: 500ms, 30s, 5m, 1h.
+    #[arg(long, value_name = "DURATION", value_parser = parse_duration, help_heading = STOPPING)]
+    pub time: Option<Duration>,
+    /// Stop when the mean relative standard error falls below this.
+    ///
+    /// Slightly biased, since the data decide when to stop.
+    #[arg(long, value_name = "E", help_heading = STOPPING)]
+    pub error: Option<f64>,
+    /// Render a small, fast version: at most 240 pixels wide, 16 samples.
+    #[arg(long, help_heading = STOPPING, hide_short_help = true)]
+    pub quick: bool,
+
+    /// Image to write. Default: the scene's name in the working folder.
+    #[arg(short, long, value_name = "FILE.exr", visible_alias = "outfile", help_heading = OUTPUT)]
+    pub output: Option<PathBuf>,
+    /// Also write a PNG preview beside the image.
+    #[arg(long, help_heading = OUTPUT)]
+    pub png: bool,
+    /// Write the preview at this interval too, and by that ask for it. Default with --quality: 5s.
+    #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
+    #[arg(help_heading = OUTPUT, hide_short_help = true)]
+    pub png_every: Option<Duration>,
+    /// Exposure of the preview, in stops.
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(help_heading = OUTPUT)]
+    pub exposure: f32,
+    /// Also write the picture denoised, as FILE.denoised.exr (and .png).
+    ///
+    /// By the library Open Image Denoise. Biased: the image itself stays as rendered. Adds the layers albedo
+    /// and normal, and leaves `share-paths` off unless set.
+    #[arg(long, help_heading = OUTPUT)]
+    pub denoise: bool,
+    /// Extra layers to store in the image.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
+    #[arg(help_heading = OUTPUT, hide_short_help = true)]
+    pub aov: Vec<Aov>,
+    /// Show the image as it renders in the viewer tev, listening at this address.
+    #[arg(long, value_name = "HOST:PORT", help_heading = OUTPUT, hide_short_help = true)]
+    pub display_server: Option<String>,
+    /// Write a picture that explains what the sampler did at this pixel's first hit.
+    #[arg(long, value_name = "X,Y", value_parser = parse_pixel)]
+    #[arg(help_heading = OUTPUT, hide_short_help = true)]
+    pub pixel: Option<[u32; 2]>,
+    /// Print errors only.
+    #[arg(short, long, help_heading = OUTPUT)]
+    pub quiet: bool,
+
     /// Continue from the output's checkpoint, if there is one.
-    #[arg(long)]
+    #[arg(long, help_heading = FILES)]
     pub resume: bool,
     /// Write a checkpoint at this interval and at the end. Without it, one is written every minute and
     /// removed when the render is done.
-    #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
+    #[arg(long, value_name = "DURATION", value_parser = parse_duration, help_heading = FILES)]
+    #[arg(hide_short_help = true)]
     pub checkpoint_interval: Option<Duration>,
     /// Write no checkpoint, not even when interrupted.
-    #[arg(long, conflicts_with = "checkpoint_interval")]
+    #[arg(long, conflicts_with = "checkpoint_interval", help_heading = FILES)]
+    #[arg(hide_short_help = true)]
     pub no_checkpoint: bool,
+    /// Save the guide that the sampler `guided` has learned.
+    #[arg(long, value_name = "FILE.guide", help_heading = FILES, hide_short_help = true)]
+    pub save_guide: Option<PathBuf>,
+    /// Start from a guide saved under the same environment, instead of training.
+    #[arg(long, value_name = "FILE.guide", help_heading = FILES, hide_short_help = true)]
+    pub load_guide: Option<PathBuf>,
+    /// Write statistics as JSON.
+    #[arg(long, value_name = "FILE.json", help_heading = FILES, hide_short_help = true)]
+    pub stats: Option<PathBuf>,
+
     /// Device and tracer.
     #[command(flatten)]
     pub device: DeviceOptions,
     /// Run with the Vulkan validation layers; any message fails the command.
-    #[arg(long)]
+    #[arg(long, help_heading = MACHINE, hide_short_help = true)]
     pub validate: bool,
-    /// Write statistics as JSON.
-    #[arg(long, value_name = "FILE.json")]
-    pub stats: Option<PathBuf>,
-    /// Also write a PNG preview beside the image.
-    #[arg(long)]
-    pub png: bool,
-    /// Also write the picture denoised by the library Open Image Denoise, as FILE.denoised.exr (and .png).
-    /// Biased: the image itself stays as rendered. Adds the layers albedo and normal, and leaves
-    /// `share-paths` off unless set.
-    #[arg(long)]
-    pub denoise: bool,
-    /// Exposure of the preview, in stops.
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
-    pub exposure: f32,
-    /// Show the image as it renders in the viewer tev, listening at this address.
-    #[arg(long, value_name = "HOST:PORT")]
-    pub display_server: Option<String>,
-    /// Write a picture that explains what the sampler did at this pixel's first hit.
-    #[arg(long, value_name = "X,Y", value_parser = parse_pixel)]
-    pub pixel: Option<[u32; 2]>,
-    /// Extra layers to store in the image.
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
-    pub aov: Vec<Aov>,
-    /// Sampler parameter, such as candidates=4, lobes=64 or cache=pixel. May be repeated.
-    /// (elevation=metropolis and every reading but mixture are biased.)
-    #[arg(long, value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
-    /// Save the guide that the sampler `guided` has learned.
-    #[arg(long, value_name = "FILE.guide")]
-    pub save_guide: Option<PathBuf>,
-    /// Start from a guide saved under the same environment, instead of training.
-    #[arg(long, value_name = "FILE.guide")]
-    pub load_guide: Option<PathBuf>,
-    /// Render a small, fast version: at most 240 pixels wide, 16 samples.
-    #[arg(long)]
-    pub quick: bool,
-    /// Print errors only.
-    #[arg(short, long)]
-    pub quiet: bool,
 }
 
+/// Interval of the preview of a picture to show.
+const PNG_INTERVAL: Duration = Duration::from_secs(5);
 /// Maximum film width of `--quick`, pixels.
 const QUICK_WIDTH: u32 = 240;
 
@@ -137,6 +168,28 @@ pub(super) fn denoised_path(output: &Path, ending: &str) -> PathBuf {
 }
 
 impl Arguments {
+    /// Quality of a picture to show; `None` where another rule stops the render.
+    pub(super) fn quality(&self) -> Option<Quality> {
+        let has_rule =
+            self.spp.is_some() || self.time.is_some() || self.error.is_some() || self.quick;
+        self.quality.or_else(|| (!has_rule).then_some(Quality::Good))
+    }
+
+    /// True if the render makes a picture to show by itself: one that has a quality, and files at all.
+    pub(super) fn shows(&self) -> bool {
+        self.quality().is_some() && !self.output.as_deref().is_some_and(is_special_file)
+    }
+
+    /// True if a preview is written beside the image.
+    pub(super) fn writes_png(&self) -> bool {
+        self.png || self.png_every.is_some() || self.shows()
+    }
+
+    /// Interval at which the preview grows on disk.
+    pub(super) fn png_interval(&self) -> Option<Duration> {
+        self.png_every.or_else(|| self.shows().then_some(PNG_INTERVAL))
+    }
+
     /// Applies `--size` or `--quick` to the film.
     pub(super) fn resize(&self, film: &mut FilmSettings) {
         if let Some([width, height]) = self.size {
@@ -150,14 +203,15 @@ impl Arguments {
 
     /// Checks, before the work, that every file asked for can be written and that none replaces a
     /// file that the scene was read from, or another of them. `--save-guide` may replace the guide
-    /// that it started from.
+    /// that it started from. `denoises` says that there will be a denoised picture.
     ///
     /// # Errors
     /// [`Error::Usage`] for an output that is an input, [`Error::Io`] for one that cannot be written.
-    pub(super) fn check_outputs(&self, scene: &Scene, output: &Path) -> Result<()> {
-        let preview = self.png.then(|| output.with_extension("png"));
-        let denoised = self.denoise.then(|| denoised_path(output, "exr"));
-        let shown = (self.denoise && self.png).then(|| denoised_path(output, "png"));
+    pub(super) fn check_outputs(&self, scene: &Scene, output: &Path, denoises: bool) -> Result<()> {
+        let has_png = self.writes_png();
+        let preview = has_png.then(|| output.with_extension("png"));
+        let denoised = denoises.then(|| denoised_path(output, "exr"));
+        let shown = (denoises && has_png).then(|| denoised_path(output, "png"));
         let asked = [
             ("--output", Some(output)),
             ("--png", preview.as_deref()),
@@ -183,24 +237,25 @@ impl Arguments {
         !self.no_checkpoint && !is_special_file(output)
     }
 
-    /// Translates the options into stop rules; the default number of samples holds where there is none.
+    /// Translates the options into stop rules.
     pub(super) fn rules(&self) -> Rules {
-        let none = self.time.is_none() && self.error.is_none();
-        let default = if self.quick { QUICK_SPP } else { DEFAULT_SPP };
+        let rules = self.quality().map(Quality::rules).unwrap_or_default();
+        let samples = self.spp.or(rules.samples);
+        let is_quick = self.quick && self.time.is_none() && self.error.is_none();
         Rules {
-            samples: self.spp.or_else(|| none.then_some(default)),
-            seconds: self.time.map(|time| time.as_secs_f64()),
+            samples: samples.or_else(|| is_quick.then_some(QUICK_SPP)),
+            seconds: self.time.map(|time| time.as_secs_f64()).or(rules.seconds),
             error: self.error,
             looks: true,
             checkpoints: None,
         }
     }
 
-    /// Translates the options into renderer settings.
+    /// Translates the options into renderer settings, with what a denoiser needs if it `denoises`.
     ///
     /// # Errors
     /// [`Error::Usage`] for options that contradict each other or are out of range.
-    pub(super) fn settings(&self) -> Result<Settings> {
+    pub(super) fn settings(&self, denoises: bool) -> Result<Settings> {
         if let Some(output) = &self.output
             && output.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("exr"))
             && !is_special_file(output)
@@ -215,6 +270,7 @@ impl Arguments {
         {
             let beside = [
                 ("--png", self.png),
+                ("--png-every", self.png_every.is_some()),
                 ("--denoise", self.denoise),
                 ("--resume", self.resume),
                 ("--checkpoint-interval", self.checkpoint_interval.is_some()),
@@ -238,7 +294,7 @@ impl Arguments {
             }
         }
         let mut parameters = Parameters::default();
-        if self.denoise {
+        if denoises {
             // Noise that the pixels of a cohort have in common looks like a pattern to the denoiser.
             parameters.set("share-paths=off")?;
         }
@@ -246,7 +302,7 @@ impl Arguments {
             parameters.set(assignment)?;
         }
         let mut aovs = self.aov.clone();
-        if self.denoise {
+        if denoises {
             aovs.extend([Aov::Albedo, Aov::Normal].iter().filter(|aov| !self.aov.contains(aov)));
         }
         if let Some(error) = self.error
@@ -255,7 +311,7 @@ impl Arguments {
             let message = format!("--error {error}: expected a finite number above 0");
             return Err(Error::usage(message));
         }
-        let spp = self.spp.unwrap_or(DEFAULT_SPP);
+        let spp = self.rules().samples.unwrap_or(1);
         if self.sample_offset.checked_add(spp).is_none() {
             return Err(Error::usage(format!(
                 "--sample-offset {} and {spp} samples per pixel: the last sample must be below {}",

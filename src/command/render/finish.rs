@@ -55,13 +55,15 @@ impl RenderJob<'_> {
         } else if has_picture && session.has_checkpoint() {
             remove_checkpoint(&checkpoint).unwrap_or_else(|error| log::warn!("{error}"));
         }
-        if self.arguments.png {
+        if self.arguments.writes_png() {
             let path = self.output.with_extension("png");
             let preview = |rgb| write_preview(&path, &rgb, self.arguments.exposure);
             note(&path, image.rgb(&self.output).and_then(preview));
         }
         if let Some(denoiser) = &self.denoiser {
             self.write_denoised(denoiser, &image, &mut note);
+        } else if self.arguments.shows() && !self.arguments.quiet {
+            say!("not denoised: Open Image Denoise is not found; ./setup brings it where it can");
         }
         if let Some(path) = &self.arguments.stats {
             let mut statistics = session.statistics(self.scene, reason);
@@ -91,10 +93,10 @@ impl RenderJob<'_> {
             Err(error) => return note(&path, Err(error)),
         };
         if !self.arguments.quiet {
-            say!("{line}");
+            say!("{line}, {} stays as rendered", display(&self.output));
         }
         note(&path, image.write_exr(&path));
-        if self.arguments.png {
+        if self.arguments.writes_png() {
             let shown = denoised_path(&self.output, "png");
             let preview = |rgb| write_preview(&shown, &rgb, self.arguments.exposure);
             note(&shown, image.rgb(&path).and_then(preview));

@@ -2,6 +2,7 @@
 
 mod arguments;
 mod finish;
+mod preview;
 
 use std::{
     path::{Path, PathBuf},
@@ -9,6 +10,7 @@ use std::{
 };
 
 pub(crate) use arguments::Arguments;
+use preview::Preview;
 
 use super::{
     interrupt::Interrupt,
@@ -22,12 +24,10 @@ use crate::{
     gpu::Denoiser,
     pass::Explanation,
     scene::Scene,
-    session::{Event, Flag, Observer, Rules, Session, StopReason, pixel},
+    session::{Event, Flag, Limit, Observer, Quality, Rules, Session, StopReason, pixel},
     terminal::say,
 };
 
-/// Samples per pixel if no stop rule is given.
-const DEFAULT_SPP: u32 = 64;
 /// Time between checkpoints unless given.
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
 /// Samples per pixel of `--quick`.
@@ -40,7 +40,10 @@ const QUICK_SPP: u32 = 16;
 /// after Ctrl-C, once the partial result has been written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let interrupt = Interrupt::listen();
-    let settings = arguments.settings()?;
+    // A picture to show is denoised where the library is found; `--denoise` insists on it.
+    let offered = arguments.shows().then(Denoiser::load);
+    let denoises = arguments.denoise || matches!(offered, Some(Ok(_)));
+    let settings = arguments.settings(denoises)?;
     let start = Instant::now();
     let patience =
         Patience::new(&format!("loading {}", arguments.scene.display()), arguments.quiet);
@@ -50,12 +53,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let output =
         arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.exr", scene.name)));
     // Fail before the work, not after it.
-    arguments.check_outputs(&scene, &output)?;
+    arguments.check_outputs(&scene, &output, denoises)?;
     sweep_leftovers(&output);
     if let Some(at) = arguments.pixel {
         pixel::check(&settings, &scene, &output, at)?;
     }
-    let denoiser = arguments.denoise.then(Denoiser::load).transpose()?;
+    let denoiser = match offered {
+        Some(Ok(denoiser)) => Some(denoiser),
+        _ => arguments.denoise.then(Denoiser::load).transpose()?,
+    };
 
     interrupt.wait_for_caller();
     let device = arguments.device.open(arguments.validate)?;
@@ -103,7 +109,7 @@ struct RenderJob<'a> {
     output: PathBuf,
     /// Layers of the image.
     aovs: Vec<Aov>,
-    /// Denoiser, under `--denoise`.
+    /// Denoiser, if the picture is to be denoised.
     denoiser: Option<Denoiser>,
     /// Time that loading took, milliseconds.
     load_ms: f64,
@@ -118,10 +124,18 @@ impl RenderJob<'_> {
         let rules = Rules { checkpoints, ..self.arguments.rules() };
         let mut progress = Progress::new(self.scene.name.clone(), self.arguments.quiet);
         let display = self.open_display()?;
+        let quality = self.arguments.quality();
+        if let Some(quality) = quality {
+            progress.print(&announce(quality));
+        }
+        let preview = self.arguments.png_interval().map(|interval| {
+            let path = self.output.with_extension("png");
+            Preview::new(path, self.arguments.exposure, interval)
+        });
         let mut observer =
-            Display { progress: &mut progress, display, aovs: &self.aovs, interrupt };
+            Display { progress: &mut progress, display, preview, aovs: &self.aovs, interrupt };
         let reason = session.run(&rules, &mut observer)?;
-        progress.finish(&session.standing(&rules), explain(reason));
+        progress.finish(&session.standing(&rules), &explain(reason, quality));
         Ok(reason)
     }
 
@@ -156,6 +170,7 @@ impl RenderJob<'_> {
 struct Display<'a> {
     progress: &'a mut Progress,
     display: Option<DisplayServer>,
+    preview: Option<Preview>,
     aovs: &'a [Aov],
     interrupt: &'a Interrupt,
 }
@@ -173,20 +188,37 @@ impl Observer for Display<'_> {
                 if let Some(display) = display {
                     display.update(&sums.to_image(self.aovs));
                 }
+                if let Some(preview) = &mut self.preview {
+                    preview.update(sums);
+                }
             }
             Event::Note(line) => self.progress.print(line),
         }
     }
 }
 
+/// Says before the work when a picture to show will be there.
+fn announce(quality: Quality) -> String {
+    let rules = quality.rules();
+    let limits = [rules.seconds.map(Limit::Seconds), rules.samples.map(Limit::Samples)];
+    let limits: Vec<String> = limits.iter().flatten().map(Limit::to_string).collect();
+    format!("quality {} (--quality): stops after {}", quality.name(), limits.join(" or "))
+}
+
 /// Says which option ended the render.
-fn explain(reason: StopReason) -> &'static str {
-    match reason {
+fn explain(reason: StopReason, quality: Option<Quality>) -> String {
+    let option = match reason {
         StopReason::Samples => "stopped by --spp",
         StopReason::Time => "stopped by --time",
         StopReason::Error => "stopped by --error (stopping by the data is slightly biased)",
         StopReason::LastSample => "stopped at the last sample of the seed",
         StopReason::Interrupt => "interrupted",
+    };
+    match (reason, quality) {
+        (StopReason::Samples | StopReason::Time, Some(quality)) => {
+            format!("stopped by --quality {}", quality.name())
+        }
+        _ => option.to_owned(),
     }
 }
 

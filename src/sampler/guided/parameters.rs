@@ -8,18 +8,18 @@ pub const AUTO_COHORT_EDGE: u32 = 4;
 parameters! {
     /// Parameters of `guided`, apart from the number of candidates.
     pub struct GuidedParameters {
-        /// `bounce-candidates`: BRDF directions to choose each bounce from by learned arriving light, 1
-        /// to 16; 1 turns learning and choosing off.
+        /// `bounce-candidates`: BRDF directions to choose each bounce from by learned arriving light;
+        /// 1 turns learning and choosing off.
         "bounce-candidates" bounce_candidates: u32 = 4, 1..=16;
         /// `guide-memory`: most bytes for the cells.
         "guide-memory" guide_memory: u64 = 128 << 20, Bytes;
-        /// `later-rays`: most shadow rays at each vertex after the first; `None` is `auto`, a quarter of
-        /// `--shadow-rays`, rounded up.
+        /// `later-rays`: most shadow rays at each vertex after the first; auto is a quarter of
+        /// --shadow-rays, rounded up.
         "later-rays" later_rays: Option<u32> = None, Auto(1..=4096);
-        /// `open-rays`: most shadow rays at the first vertex in open scenes; `None` is `auto`, a quarter of
-        /// `--shadow-rays`, rounded up, where paths go on, and all of them in direct light.
+        /// `open-rays`: most shadow rays at the first vertex in open scenes; auto is a quarter of
+        /// --shadow-rays, rounded up, where paths go on, and all of them in direct light.
         "open-rays" open_rays: Option<u32> = None, Auto(1..=4096);
-        /// `regions`: most regions of the environment, 16 to 1024; a render starts with 256.
+        /// `regions`: most regions of the environment; a render starts with 256.
         "regions" regions: u32 = 1024, 16..=1024;
     }
 }

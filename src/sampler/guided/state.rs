@@ -24,7 +24,7 @@ use crate::{
 
 const COUNT_WORDS: usize = GUIDE_COUNT_WORDS as usize;
 const FORMAT: &str = "fenestra-guide";
-const VERSION: u32 = 12;
+const VERSION: u32 = 13;
 /// Upper bound of the rays of one cell and direction: each rebuild halves them and adds a word.
 const MAX_ARRIVAL_RAYS: f32 = 1e10;
 /// Upper bound of their light, such that its product with the rays of all cells stays finite.

@@ -109,15 +109,15 @@ parameters! {
         "views" views: u32 = 32, 1..=256;
         /// `lobes`: product lobes kept at a hit.
         "lobes" kept_lobes: u32 = 64, 1..=512;
-        /// `order`: `integral` or `coefficient`.
+        /// `order`: order in which the weakest lobes are dropped.
         "order" order: LobeOrder = LobeOrder::Integral, ORDERS;
         /// `brdf-share`: share of directions from the BRDF's own sampling, more than 0.
         "brdf-share" brdf_share: f32 = 0.25, 0.001..=1.0;
         /// `environment-share`: share of directions from the environment map.
         "environment-share" environment_share: f32 = 0.25, 0.0..=0.999;
-        /// `elevation`: `inverse` or `metropolis`.
+        /// `elevation`: how the elevation within a lobe is drawn; metropolis is biased.
         "elevation" elevation: Elevation = Elevation::Inverse, MAYBE_BIASED_ELEVATIONS;
-        /// `reading`: `mixture`, or a biased reading of the thesis.
+        /// `reading`: density that directions are divided by; all but mixture are biased.
         "reading" reading: Reading = Reading::Mixture, MAYBE_BIASED_READINGS;
     }
 }

@@ -35,9 +35,9 @@ parameters! {
         "k" exponent: f32 = 2.0, 0.0..=16.0;
         /// `tau`: closeness in deviations of a lobe.
         "tau" threshold_scale: f32 = 1.0, 0.0..=100.0;
-        /// `threshold`: `sigma` or `fixed`.
+        /// `threshold`: closeness that counts, by the deviation of each lobe or fixed.
         "threshold" threshold: Threshold = Threshold::Sigma, THRESHOLDS;
-        /// `cache`: `hit` or `pixel`.
+        /// `cache`: lifetime of a cache, one hit as in the thesis or all samples of a pixel.
         "cache" cache: CacheScope = CacheScope::Hit, SCOPES;
         /// `cache-capacity`: directions in a cache.
         "cache-capacity" cache_capacity: u32 = 16, 1..=64;
