@@ -7,9 +7,9 @@ use std::{collections::BTreeMap, fs, io, path::Path};
 use clap::ValueEnum;
 use fenestra::{
     film::{
-        Aov, Attribute, Checkpoint, Image, Metadata, RgbImage, SampleRange, Sums,
+        Aov, Attribute, Checkpoint, Image, Metadata, RgbImage, SampleRange, Sums, Window,
         checkpoint::checkpoint_path,
-        merge::{Part, merge_checkpoints, merge_images},
+        merge::{Part, join_windows, merge_checkpoints, merge_images},
         png,
         sums::Ahead,
     },
@@ -493,6 +493,36 @@ fn merged_images_equal_one_run_up_to_rounding() {
     assert_eq!(metadata.gpu_seconds["trace"], 0.2);
     assert_eq!(merged.attributes["samplesPerPixel"], Attribute::Integer(30));
     assert_eq!((merged.origin, merged.film_size), ([3, 1], [10, 6]));
+}
+
+#[test]
+fn windows_join_to_the_film_to_the_bit() {
+    let (whole, ..) = whole_and_parts();
+    let image = whole.sums.to_image(Aov::value_variants());
+    let at = |x: u32, y: u32, width: u32, height: u32| {
+        let window = Window { x: 3 + x, y: 1 + y, width, height };
+        image.cropped(window, Path::new("whole.exr")).unwrap()
+    };
+    // The second overlaps the first, which gives the pixels of both.
+    let mut windows = [at(0, 0, 2, 2), at(1, 0, 3, 1), at(2, 1, 2, 1)];
+    windows[1].channels.values_mut().for_each(|values| values[0] = -1.0);
+    let names = ["a.exr", "b.exr", "c.exr"].map(Path::new);
+    let parts: Vec<Part<'_>> = (names.iter().zip(&windows))
+        .map(|(path, image)| Part { path, image, metadata: &whole.metadata })
+        .collect();
+    let (joined, metadata) = join_windows(&parts).unwrap();
+    assert_eq!((joined.origin, joined.width, joined.height), (image.origin, 4, 2));
+    assert_eq!(joined.channels, image.channels);
+    assert_eq!(metadata.sample_ranges, whole.metadata.sample_ranges);
+    assert_eq!(metadata.gpu_seconds["trace"], 3.0 * whole.metadata.gpu_seconds["trace"]);
+    let message = |parts: &[Part<'_>]| join_windows(parts).unwrap_err().to_string();
+    let hole = message(&parts[..2]);
+    assert!(hole.contains("pixel 5,2 of its film lies in no part"), "{hole}");
+    let mut other = whole.metadata.clone();
+    other.sample_ranges = vec![range(2, 0, 30)];
+    let differs = message(&[parts[0], Part { metadata: &other, ..parts[1] }]);
+    assert!(differs.contains("b.exr: no window of one film with a.exr: samples: "), "{differs}");
+    assert!(join_windows(&[]).is_err());
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::{
     film::{
         Aov, Checkpoint, Image, Metadata,
         checkpoint::is_checkpoint_path,
-        merge::{Part, merge_checkpoints, merge_images},
+        merge::{Part, join_windows, merge_checkpoints, merge_images},
     },
     terminal::say,
 };
@@ -18,7 +18,8 @@ use crate::{
 /// Arguments of `merge`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Images or checkpoints of one scene, rendered with different seeds or disjoint sample ranges.
+    /// Images or checkpoints of one scene, rendered with different seeds, disjoint sample ranges, or windows
+    /// (`--crop`) of the same samples.
     #[arg(required = true, value_name = "PART.exr")]
     pub parts: Vec<PathBuf>,
     /// Merged image, or a checkpoint if the name ends in .checkpoint.exr and every part is one.
@@ -39,51 +40,92 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let parts: Vec<&Path> = arguments.parts.iter().map(PathBuf::as_path).collect();
     check_replaces_nothing(&[("--output", &arguments.output)], &parts)?;
-    let mut images = Vec::new();
+    let mut groups: Vec<Vec<(&Path, Image)>> = Vec::new();
     for path in &arguments.parts {
-        images.push((path.as_path(), Image::read_exr(path)?));
+        let image = Image::read_exr(path)?;
+        let window = |image: &Image| (image.origin, image.width, image.height);
+        match groups.iter_mut().find(|group| window(&group[0].1) == window(&image)) {
+            Some(group) => group.push((path, image)),
+            None => groups.push(vec![(path, image)]),
+        }
     }
-    let wants_checkpoint = is_checkpoint_path(&arguments.output);
-    let metadata = if images.iter().all(|(_, image)| Checkpoint::is_checkpoint(image)) {
-        let mut checkpoints = Vec::new();
-        for (path, image) in &images {
-            checkpoints.push((*path, Checkpoint::from_image(image, path)?));
-        }
-        drop(images);
-        let parts: Vec<(&Path, &Checkpoint)> =
-            checkpoints.iter().map(|(path, checkpoint)| (*path, checkpoint)).collect();
-        let merged = merge_checkpoints(&parts)?;
-        if wants_checkpoint {
-            merged.write(&arguments.output)?;
-        } else {
-            let mut image = merged.sums.to_image(Aov::value_variants());
-            merged.metadata.store(&mut image);
-            image.write_exr(&arguments.output)?;
-        }
-        merged.metadata
+    if is_checkpoint_path(&arguments.output) {
+        let merged = merge_to_checkpoint(&groups, &arguments.output)?;
+        merged.write(&arguments.output)?;
+        return summarize(arguments, &merged.metadata);
+    }
+    let mut windows = Vec::new();
+    for group in groups {
+        let path = group[0].0;
+        let (image, metadata) = merge_window(group)?;
+        windows.push((path, image, metadata));
+    }
+    let metadata = if let [(_, image, metadata)] = &windows[..] {
+        image.write_exr(&arguments.output)?;
+        metadata.clone()
     } else {
-        if wants_checkpoint {
-            let image = images.iter().find(|(_, image)| !Checkpoint::is_checkpoint(image));
-            let path = image.map_or(arguments.output.as_path(), |(path, _)| path);
-            return Err(Error::usage(format!(
-                "{} would be a checkpoint, but {} is an image without the sums: merge checkpoints, \
-                 or give another name",
-                arguments.output.display(),
-                path.display()
-            )));
-        }
-        let mut parts = Vec::new();
-        for (path, image) in images {
-            parts.push(load_part(path, image)?);
-        }
-        let borrowed: Vec<Part<'_>> =
-            parts.iter().map(|(path, image, metadata)| Part { path, image, metadata }).collect();
-        let (image, metadata) = merge_images(&borrowed)?;
-        warn_of_dropped_channels(&borrowed, &image);
+        let parts = borrowed(&windows);
+        let (image, metadata) = join_windows(&parts)?;
+        warn_of_dropped_channels(&parts, &image);
         image.write_exr(&arguments.output)?;
         metadata
     };
     summarize(arguments, &metadata)
+}
+
+/// Adds the sums of the checkpoints of one window.
+fn merge_to_checkpoint(groups: &[Vec<(&Path, Image)>], output: &Path) -> Result<Checkpoint> {
+    let refuse = |path: &Path, problem: &str| {
+        Err(Error::usage(format!(
+            "{} would be a checkpoint, but {} {problem}, or give another name",
+            output.display(),
+            path.display()
+        )))
+    };
+    let mut images = groups.iter().flatten();
+    if let Some((path, _)) = images.find(|(_, image)| !Checkpoint::is_checkpoint(image)) {
+        return refuse(path, "is an image without the sums: merge checkpoints");
+    }
+    match groups {
+        [group] => merge_exactly(group),
+        [_, other, ..] => refuse(other[0].0, "shows another window: merge those of one window"),
+        [] => Err(Error::usage("nothing to merge")),
+    }
+}
+
+fn merge_exactly(group: &[(&Path, Image)]) -> Result<Checkpoint> {
+    let mut checkpoints = Vec::new();
+    for (path, image) in group {
+        checkpoints.push((*path, Checkpoint::from_image(image, path)?));
+    }
+    let parts: Vec<(&Path, &Checkpoint)> =
+        checkpoints.iter().map(|(path, checkpoint)| (*path, checkpoint)).collect();
+    merge_checkpoints(&parts)
+}
+
+/// Merges the parts that show one window into an image: exactly where all are checkpoints.
+fn merge_window(group: Vec<(&Path, Image)>) -> Result<(Image, Metadata)> {
+    if group.iter().all(|(_, image)| Checkpoint::is_checkpoint(image)) {
+        let merged = merge_exactly(&group)?;
+        let mut image = merged.sums.to_image(Aov::value_variants());
+        merged.metadata.store(&mut image);
+        return Ok((image, merged.metadata));
+    }
+    let mut parts = Vec::new();
+    for (path, image) in group {
+        parts.push(load_part(path, image)?);
+    }
+    if let [(_, image, metadata)] = &parts[..] {
+        return Ok((image.clone(), metadata.clone()));
+    }
+    let parts = borrowed(&parts);
+    let (image, metadata) = merge_images(&parts)?;
+    warn_of_dropped_channels(&parts, &image);
+    Ok((image, metadata))
+}
+
+fn borrowed<'a>(parts: &'a [(&'a Path, Image, Metadata)]) -> Vec<Part<'a>> {
+    parts.iter().map(|(path, image, metadata)| Part { path, image, metadata }).collect()
 }
 
 /// Takes an image as it is, and a checkpoint as the image it gives.

@@ -1,7 +1,8 @@
-//! Combines renders of one scene made with different seeds or sample ranges into one.
+//! Combines renders of one scene made with different seeds, sample ranges or windows into one.
 //!
 //! Checkpoints merge exactly, by adding their sums. Images merge by averaging their means, weighted
-//! by sample count, which equals one run up to rounding.
+//! by sample count, which equals one run up to rounding. Windows of the same samples are joined pixel by
+//! pixel.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -77,13 +78,101 @@ pub fn merge_images(parts: &[Part<'_>]) -> Result<(Image, Metadata)> {
         attributes: first.image.attributes.clone(),
         ..*first.image
     };
-    let is_common =
-        |name: &&String| others.iter().all(|part| part.image.channels.contains_key(name.as_str()));
-    for name in first.image.channels.keys().filter(is_common) {
+    for name in common_channels(parts) {
         merged.channels.insert(name.clone(), merge_channel(name, parts));
     }
     metadata.store(&mut merged);
     Ok((merged, metadata))
+}
+
+/// Joins images of the same samples that show different windows of one film into the smallest window around
+/// them all. Where windows overlap, the first part gives the pixel. Drops channels that some part lacks.
+///
+/// # Errors
+/// [`Error::Format`] names two files that differ in film, scene, sampler or samples, or a pixel that no part
+/// shows. [`Error::Usage`] without parts.
+pub fn join_windows(parts: &[Part<'_>]) -> Result<(Image, Metadata)> {
+    let Some((first, others)) = parts.split_first() else {
+        return Err(Error::usage("nothing to merge"));
+    };
+    let mut metadata = first.metadata.clone();
+    for part in others {
+        let mut differences = part.metadata.differences(first.metadata);
+        let [ours, theirs] = [part, first].map(|part| part.image.film_size);
+        if ours != theirs {
+            differences.push(format!("film: {ours:?} against {theirs:?} pixels"));
+        }
+        let [ours, theirs] = [part.metadata, first.metadata].map(|metadata| {
+            let ranges = metadata.sample_ranges.iter().map(ToString::to_string);
+            ranges.collect::<Vec<_>>().join(", ")
+        });
+        if ours != theirs {
+            differences.push(format!("samples: {ours} against {theirs}"));
+        }
+        if !differences.is_empty() {
+            return Err(Error::format(
+                part.path,
+                format!(
+                    "no window of one film with {}: {}",
+                    first.path.display(),
+                    differences.join("; ")
+                ),
+            ));
+        }
+        add_metadata(&mut metadata, part.metadata);
+    }
+    metadata.sample_ranges.clone_from(&first.metadata.sample_ranges);
+    let start = |axis: usize| parts.iter().map(|part| part.image.origin[axis]).min().unwrap_or(0);
+    let origin = [start(0), start(1)];
+    // Places of a part's columns and rows in the whole.
+    let place = |part: &Part<'_>| {
+        let [x, y] = [0, 1].map(|axis| (part.image.origin[axis] - origin[axis]) as usize);
+        let (width, height) = (part.image.width as usize, part.image.height as usize);
+        (x..x + width, y..y + height)
+    };
+    let ends = || parts.iter().map(place).map(|(columns, rows)| [columns.end, rows.end]);
+    let [width, height] = [0, 1].map(|axis| ends().map(|end| end[axis]).max().unwrap_or(0));
+    let mut sources: Vec<Option<(usize, usize)>> = vec![None; width * height];
+    for (index, part) in parts.iter().enumerate().rev() {
+        let (columns, rows) = place(part);
+        for (pixel, (row, column)) in
+            rows.flat_map(|row| columns.clone().map(move |column| (row, column))).enumerate()
+        {
+            sources[row * width + column] = Some((index, pixel));
+        }
+    }
+    let sources: Vec<(usize, usize)> = sources
+        .iter()
+        .enumerate()
+        .map(|(at, source)| {
+            source.ok_or_else(|| {
+                let [x, y] = [at % width, at / width].map(|at| at as i64);
+                let [x, y] = [x + i64::from(origin[0]), y + i64::from(origin[1])];
+                Error::format(first.path, format!("pixel {x},{y} of its film lies in no part"))
+            })
+        })
+        .collect::<Result<_>>()?;
+    let mut joined = Image {
+        width: width as u32,
+        height: height as u32,
+        origin,
+        film_size: first.image.film_size,
+        channels: BTreeMap::new(),
+        attributes: first.image.attributes.clone(),
+    };
+    for name in common_channels(parts) {
+        let pixel = |(part, pixel): &(usize, usize)| parts[*part].image.channels[name][*pixel];
+        joined.channels.insert(name.clone(), sources.iter().map(pixel).collect());
+    }
+    metadata.store(&mut joined);
+    Ok((joined, metadata))
+}
+
+/// Names of the channels that every part has.
+fn common_channels<'a>(parts: &'a [Part<'a>]) -> impl Iterator<Item = &'a String> {
+    let has = |part: &Part<'_>, name: &String| part.image.channels.contains_key(name);
+    let names = parts.first().into_iter().flat_map(|part| part.image.channels.keys());
+    names.filter(move |name| parts.iter().all(|part| has(part, name)))
 }
 
 /// One channel of one part, with the channel that merging it requires.
