@@ -2,7 +2,7 @@
 
 use std::{env, ffi::OsString, io::Write, process::ExitCode};
 
-use clap::{ArgAction, Parser, Subcommand};
+use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 
 use crate::{
     command::{
@@ -60,6 +60,10 @@ pub enum Command {
     New(command::new::Arguments),
     /// List the Vulkan devices with their relevant limits, and which one would be chosen.
     Devices(command::devices::Arguments),
+    /// Print the script that completes commands and options in a shell.
+    Completions(command::completions::Arguments),
+    /// Write pages for `man`, one for each command.
+    Manual(command::completions::ManualArguments),
     /// Test a device, in a process that its driver may crash.
     #[command(hide = true)]
     SelfTest(command::self_test::Arguments),
@@ -111,6 +115,8 @@ pub fn run() -> ExitCode {
         Command::Export(arguments) => command::export::run(arguments),
         Command::New(arguments) => command::new::run(arguments),
         Command::Devices(arguments) => command::devices::run(arguments),
+        Command::Completions(arguments) => command::completions::run(arguments, Cli::command()),
+        Command::Manual(arguments) => command::completions::manual(arguments, Cli::command()),
         Command::SelfTest(arguments) => command::self_test::run(arguments),
     });
     match result {

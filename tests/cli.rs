@@ -70,6 +70,22 @@ fn help_is_short_or_in_groups() {
 }
 
 #[test]
+fn shells_and_man_are_served() {
+    let folder = Folder::new();
+    for shell in ["bash", "zsh", "fish"] {
+        let run = folder.run(&["completions", shell]);
+        assert_eq!(run.status, Some(0), "{}", run.messages);
+        assert!(run.output.contains("quality"), "{shell}");
+    }
+    folder.run(&["manual", "pages/man1"]).assert(0, &[]);
+    let page = folder.path().join("pages/man1/fenestra-render.1");
+    let page = std::fs::read_to_string(page).unwrap();
+    // A group, and the text of an option that `-h` hides.
+    assert!(page.contains("STOPPING") && page.contains("to render disjoint parts for"), "{page}");
+    assert!(!folder.path().join("pages/man1/fenestra-self-test.1").exists(), "it is hidden");
+}
+
+#[test]
 fn version_is_that_of_the_package() {
     let version = Folder::new().run(&["--version"]);
     assert_eq!(version.status, Some(0));
