@@ -156,6 +156,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let interrupt = Interrupt::listen();
     interrupt.wait_for_caller();
     let plan = plan(arguments)?;
+    if let Some(warning) = plan.missing_verdicts() {
+        log::warn!("{warning}");
+    }
     for path in plan.scenes.iter().filter(|_| arguments.strict) {
         check_strict(true, &Scene::load(path)?)?;
     }

@@ -11,7 +11,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{contender::Contender, rule::Rule};
+use super::{contender::Contender, own_errors::JUDGED_FROM, rule::Rule};
 use crate::{
     error::{Error, Result},
     files::extension,
@@ -362,6 +362,23 @@ impl Plan {
         !self.spp.is_empty() || self.time.is_some()
     }
 
+    /// Says before the work that verdicts will be missing. After n samples a sampler as good as that of the
+    /// reference, which has N, has √(N/n) times its error, and what is too close to it is not judged. `None`
+    /// where verdicts will come out, and where nothing is known of the reference.
+    pub(crate) fn missing_verdicts(&self) -> Option<String> {
+        let ReferencePlan::Render { contender, half_spp } = &self.reference else { return None };
+        let largest = *self.spp.last()?;
+        let needed = (JUDGED_FROM * f64::from(largest)).ceil();
+        let given = 2.0 * f64::from(*half_spp);
+        (given < needed).then(|| {
+            format!(
+                "--reference-spp {given}: no sampler as good as {} will be judged at {largest} samples; \
+                 expected {needed} or more",
+                contender.label
+            )
+        })
+    }
+
     /// Lists every run of a scene in order of execution: by rule (the largest number of samples,
     /// then the time), seed and sampler. The samplers rotate by one from seed to seed, so that none
     /// is always first.
@@ -423,6 +440,21 @@ mod tests {
         let plan = plan(options).unwrap();
         assert_eq!(plan.spp, [200, 400]);
         assert!(matches!(plan.reference, ReferencePlan::Render { half_spp: 3200, .. }));
+    }
+
+    #[test]
+    fn a_reference_too_short_for_verdicts_is_named() {
+        let missing = |reference_spp, spp| {
+            let spp = Some(vec![8, spp]);
+            plan(Options { reference_spp, spp, ..Options::default() }).unwrap().missing_verdicts()
+        };
+        assert_eq!(
+            (missing(None, 64), missing(Some(256), 64), missing(Some(96), 24)),
+            (None, None, None)
+        );
+        let expected = "--reference-spp 96: no sampler as good as mis will be judged at 64 samples; \
+                        expected 256 or more";
+        assert_eq!(missing(Some(96), 64).as_deref(), Some(expected));
     }
 
     #[test]
