@@ -76,6 +76,7 @@
 //! - \[Atanasov et al. 2018\] "Adaptive Environment Sampling on CPU and GPU", SIGGRAPH Talks.
 //! - \[Banerjee et al. 2005\] "Clustering on the Unit Hypersphere using von Mises-Fisher
 //!   Distributions", JMLR 6.
+//! - \[Blanco-Muriel et al. 2001\] "Computing the Solar Vector", Solar Energy 70(5).
 //! - \[Burke et al. 2005\] "Bidirectional Importance Sampling for Direct Illumination",
 //!   Eurographics Symposium on Rendering.
 //! - \[Burley 2020\] "Practical Hash-based Owen Scrambling", JCGT 9(4).
@@ -103,6 +104,10 @@
 //! - \[Gibson 1998\] "Constrained Elastic Surface Nets", MICCAI.
 //! - \[Heitz 2014\] "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", JCGT
 //!   3(2).
+//! - \[Hosek & Wilkie 2012\] "An Analytic Model for Full Spectral Sky-Dome Radiance", ACM Transactions
+//!   on Graphics 31(4).
+//! - \[Hosek & Wilkie 2013\] "Adding a Solar-Radiance Function to the Hošek–Wilkie Skylight Model",
+//!   IEEE Computer Graphics and Applications 33(3).
 //! - \[IEC 61966-2-1:1999\] *Default RGB colour space – sRGB*.
 //! - \[ISO/CIE 11664-2:2022\] *Colorimetry – CIE standard illuminants*.
 //! - \[Jarzynski & Olano 2020\] "Hash Functions for GPU Rendering", JCGT 9(3).

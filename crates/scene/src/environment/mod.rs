@@ -7,6 +7,7 @@
 //! sampling all see that one function.
 
 mod court;
+mod daylight;
 mod load;
 mod procedural;
 mod sky;
@@ -16,6 +17,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 pub use court::CourtParameters;
+pub(crate) use daylight::Daylight;
 pub use sky::SkyParameters;
 pub use table::{EnvironmentTables, mean_sine};
 

@@ -71,55 +71,67 @@ impl EnvironmentMap {
         check_range("sun_azimuth_deg", sun_azimuth_deg, -360.0, 360.0)?;
         check_range("sun_radius_deg", sun_radius_deg, 1e-3, 45.0)?;
 
-        let (width, height) = (parameters.width, parameters.width / 2);
+        let width = parameters.width;
         let (sin_elevation, cos_elevation) = sun_elevation_deg.to_radians().sin_cos();
         let (sin_azimuth, cos_azimuth) = sun_azimuth_deg.to_radians().sin_cos();
         let sun =
             Vec3::new(cos_elevation * sin_azimuth, sin_elevation, -cos_elevation * cos_azimuth);
         let mut texels = render(width, 1, |direction| sky_radiance(parameters, sun, direction));
 
-        // Find the share of each texel that the disc covers, then the ratio of the disc's solid
-        // angle to the solid angle drawn.
-        let radius = sun_radius_deg.to_radians();
-        let cos_reach = (radius + 4.0 * std::f32::consts::PI / width as f32).cos();
-        let chord_squared = 4.0 * (0.5 * radius).sin().powi(2);
-        let covered: Vec<(usize, f32)> = (0..texels.len())
-            .into_par_iter()
-            .filter_map(|index| {
-                let (column, row) = (index % width as usize, index / width as usize);
-                let at = |x: f32, y: f32| texel_direction(width, column as f32 + x, row as f32 + y);
-                if at(0.5, 0.5).dot(sun) < cos_reach {
-                    return None;
-                }
-                let inside = (0..SUN_GRID * SUN_GRID).filter(|sample| {
-                    let x = ((sample % SUN_GRID) as f32 + 0.5) / SUN_GRID as f32;
-                    let y = ((sample / SUN_GRID) as f32 + 0.5) / SUN_GRID as f32;
-                    at(x, y).distance_squared(sun) <= chord_squared
-                });
-                let share = inside.count() as f32 / (SUN_GRID * SUN_GRID) as f32;
-                (share > 0.0).then_some((index, share))
-            })
-            .collect();
-        let covered = if covered.is_empty() {
-            let uv = lat_long_from_direction(sun);
-            let column = ((uv.x * width as f32) as u32).min(width - 1);
-            let row = ((uv.y * height as f32) as u32).min(height - 1);
-            vec![((row * width + column) as usize, 1.0)]
-        } else {
-            covered
-        };
-        let solid_angle = |index: usize| {
-            let row = (index / width as usize) as f32;
-            let edge = |row: f32| sin_cos_pi(row / height as f32).y;
-            2.0 * std::f32::consts::PI / width as f32 * (edge(row) - edge(row + 1.0))
-        };
-        let disc = std::f32::consts::PI * chord_squared;
-        let drawn: f32 = covered.iter().map(|&(index, share)| share * solid_angle(index)).sum();
-        let sun_radiance = Vec3::from(parameters.sun_radiance) * (disc / drawn);
-        for (index, share) in covered {
-            texels[index] += sun_radiance * share;
-        }
+        add_disc(
+            &mut texels,
+            width,
+            sun,
+            sun_radius_deg.to_radians(),
+            parameters.sun_radiance.into(),
+        );
         Ok(Self::procedural("sky", width, texels, scale, rotation_deg))
+    }
+}
+
+/// Adds a disc of the angular radius `radius` and a radiance to a map that is `width` wide. A texel holds its
+/// share of the disc's power, at any resolution.
+pub(super) fn add_disc(texels: &mut [Vec3], width: u32, sun: Vec3, radius: f32, radiance: Vec3) {
+    let height = width / 2;
+    // Find the share of each texel that the disc covers, then the ratio of the disc's solid
+    // angle to the solid angle drawn.
+    let cos_reach = (radius + 4.0 * std::f32::consts::PI / width as f32).cos();
+    let chord_squared = 4.0 * (0.5 * radius).sin().powi(2);
+    let covered: Vec<(usize, f32)> = (0..texels.len())
+        .into_par_iter()
+        .filter_map(|index| {
+            let (column, row) = (index % width as usize, index / width as usize);
+            let at = |x: f32, y: f32| texel_direction(width, column as f32 + x, row as f32 + y);
+            if at(0.5, 0.5).dot(sun) < cos_reach {
+                return None;
+            }
+            let inside = (0..SUN_GRID * SUN_GRID).filter(|sample| {
+                let x = ((sample % SUN_GRID) as f32 + 0.5) / SUN_GRID as f32;
+                let y = ((sample / SUN_GRID) as f32 + 0.5) / SUN_GRID as f32;
+                at(x, y).distance_squared(sun) <= chord_squared
+            });
+            let share = inside.count() as f32 / (SUN_GRID * SUN_GRID) as f32;
+            (share > 0.0).then_some((index, share))
+        })
+        .collect();
+    let covered = if covered.is_empty() {
+        let uv = lat_long_from_direction(sun);
+        let column = ((uv.x * width as f32) as u32).min(width - 1);
+        let row = ((uv.y * height as f32) as u32).min(height - 1);
+        vec![((row * width + column) as usize, 1.0)]
+    } else {
+        covered
+    };
+    let solid_angle = |index: usize| {
+        let row = (index / width as usize) as f32;
+        let edge = |row: f32| sin_cos_pi(row / height as f32).y;
+        2.0 * std::f32::consts::PI / width as f32 * (edge(row) - edge(row + 1.0))
+    };
+    let disc = std::f32::consts::PI * chord_squared;
+    let drawn: f32 = covered.iter().map(|&(index, share)| share * solid_angle(index)).sum();
+    let scaled = radiance * (disc / drawn);
+    for (index, share) in covered {
+        texels[index] += scaled * share;
     }
 }
 
