@@ -131,7 +131,7 @@ fn damaged_and_huge_images_are_refused() {
         let message = Texture::decode("image", bytes, &mut Vec::new()).expect_err(expected);
         assert!(message.contains(expected), "expected `{expected}`, found `{message}`");
     };
-    case(b"", "expected a PNG, JPEG, TGA, HDR or EXR image, found another file");
+    case(b"", "expected a PNG, JPEG, WebP, TGA, HDR or EXR image, found another file");
     case(b"GIF89a", "found another file");
     let image: DynamicImage = image::RgbImage::new(4, 4).into();
     let png = encode(&image, ImageFormat::Png);

@@ -90,7 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     {
         return Err(Error::scene(&arguments.scene, format!("{difference} (--strict)")));
     }
-    for warning in scene.warnings.iter().chain(&export.warnings) {
+    for warning in scene.warnings.iter().chain(&export.summary()) {
         log::warn!("{warning}");
     }
     export.write()?;

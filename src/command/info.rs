@@ -20,8 +20,8 @@ use crate::{
 /// Arguments of `info`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Scene (.toml, .gltf, .glb, .obj), image (.exr), environment map (.hdr, .pfm; .exr with --map),
-    /// measured BRDF (.binary, .brdf) or fit (.fit).
+    /// Scene (.toml, .gltf, .glb, .obj, .pbrt, .xml), image (.exr), environment map (.hdr, .pfm; .exr with
+    /// --map), measured BRDF (.binary, .brdf) or fit (.fit).
     pub file: Option<PathBuf>,
     /// Read an .exr file as an environment map.
     #[arg(long, requires = "file")]

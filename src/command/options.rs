@@ -62,9 +62,21 @@ pub struct SceneOptions {
     #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = SCENE)]
     #[arg(hide_short_help = true)]
     rotate_environment: Option<f32>,
-    /// Camera of a glTF file, by name or number from 0. Default: the first with perspective.
-    #[arg(long, value_name = "NAME", help_heading = CAMERA, hide_short_help = true)]
+    /// Camera of a glTF or Mitsuba file, by name or number from 0. Default: the first with perspective.
+    #[arg(long, value_name = "NAME|N", help_heading = CAMERA, hide_short_help = true)]
     camera: Option<String>,
+    /// Place of the camera, instead of the scene's; it keeps its direction without --look-at.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
+    look_from: Option<[f32; 3]>,
+    /// Point in the middle of the picture, instead of the scene's.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
+    look_at: Option<[f32; 3]>,
+    /// Vertical field of view in degrees, instead of the scene's.
+    #[arg(long, value_name = "DEG")]
+    fov: Option<f32>,
+    /// Folder that files named by a Mitsuba or pbrt scene may lie in, beside the scene's own.
+    #[arg(long, value_name = "FOLDER")]
+    allow_root: Option<PathBuf>,
     /// Fail if loading the scene gives any warning, such as a part of a file that is left out.
     #[arg(long, help_heading = SCENE, hide_short_help = true)]
     strict: bool,
@@ -82,6 +94,10 @@ impl SceneOptions {
                 environment: self.environment.clone(),
                 rotation_deg: self.rotate_environment,
                 camera: self.camera.clone(),
+                look_from: self.look_from,
+                look_at: self.look_at,
+                vertical_fov_deg: self.fov,
+                allow_root: self.allow_root.clone(),
             },
         )?;
         check_strict(self.strict, &scene)?;
@@ -152,6 +168,17 @@ pub(crate) fn parse_pixel(text: &str) -> Result<[u32; 2], String> {
         .ok_or_else(|| format!("expected x,y in pixels from the upper left, found {text:?}"))
 }
 
+/// Parses `x,y,z` in metres.
+fn parse_point(text: &str) -> Result<[f32; 3], String> {
+    let numbers: Option<Vec<f32>> = text
+        .split(',')
+        .map(|part| part.trim().parse().ok().filter(|number: &f32| number.is_finite()))
+        .collect();
+    numbers
+        .and_then(|numbers| numbers.try_into().ok())
+        .ok_or_else(|| format!("expected x,y,z, found {text:?}"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -173,6 +200,14 @@ mod tests {
         assert_eq!(parse_size("640x480"), Ok([640, 480]));
         for wrong in ["640", "0x480", "640x", "640x99999", "640x-1", "axb"] {
             assert!(parse_size(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn points_have_three_coordinates() {
+        assert_eq!(parse_point("1, -2.5,3e1"), Ok([1.0, -2.5, 30.0]));
+        for wrong in ["", "1,2", "1,2,3,4", "1,2,nan", "a,b,c"] {
+            assert!(parse_point(wrong).is_err(), "{wrong}");
         }
     }
 

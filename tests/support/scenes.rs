@@ -61,6 +61,7 @@ fn scene(
         materials,
         geometry,
         inputs: Vec::new(),
+        asked: Default::default(),
         warnings: Vec::new(),
         hash: name.into(),
     }

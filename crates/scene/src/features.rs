@@ -28,8 +28,7 @@ features! {
     GLTF;
     GLTF_CAMERAS "cameras that are not used" "";
     GLTF_ORTHOGRAPHIC "orthographic cameras" "refused if `--camera` names one";
-    GLTF_NO_IMAGE "textures without an image"
-        "or with none but that of an extension which is ignored";
+    GLTF_NO_IMAGE "textures without an image" "";
     GLTF_HIGH_UV "textures with coordinates of the third or a further set" "";
     GLTF_COLORS "further sets of vertex colours" "";
     GLTF_UV "third and further sets of texture coordinates" "";
@@ -42,20 +41,21 @@ features! {
     GLTF_UNLIT_COLOR "vertex colours of unlit materials" "";
     GLTF_SPECULAR_TEXTURE "textures of `KHR_materials_specular`" "";
     GLTF_LOW_TRANSMISSION "transmission of less than half the light" "the surface is opaque";
-    GLTF_TRANSMISSION_TEXTURE "texture of transmission" "its mean counts";
-    GLTF_GLASS_COLOR "base colour texture of glass" "the factor alone tints it";
+    GLTF_TRANSMISSION_TEXTURE "texture of transmission" "a triangle is glass or opaque by its mean there";
+    GLTF_GLASS_COLOR "base colour texture of glass" "its mean tints it";
     GLTF_THIN_ROUGHNESS "roughness of thin glass" "a pane is smooth";
-    GLTF_ABSORPTION "absorption of `KHR_materials_volume`" "";
-    GLTF_GLOSSINESS_TEXTURE "specular colour texture of `KHR_materials_pbrSpecularGlossiness`"
-        "the factor alone counts; its glossiness is read";
+    GLTF_ABSORPTION "absorption of `KHR_materials_volume`"
+        "the surface is tinted as by a path of `thicknessFactor`";
+    GLTF_GLOSSINESS_TEXTURE
+        "specular texture of `KHR_materials_pbrSpecularGlossiness` on other coordinates than the diffuse one"
+        "its mean colour counts; its glossiness is read";
     GLTF_CLEARCOAT "`KHR_materials_clearcoat`" "";
     GLTF_SHEEN "`KHR_materials_sheen`" "";
     GLTF_IRIDESCENCE "`KHR_materials_iridescence`" "";
     GLTF_ANISOTROPY "`KHR_materials_anisotropy`" "";
     GLTF_DISPERSION "`KHR_materials_dispersion`" "";
     GLTF_VARIANTS "`KHR_materials_variants`" "";
-    GLTF_BASISU "`KHR_texture_basisu`" "the other image of the texture is used";
-    GLTF_WEBP "`EXT_texture_webp`" "the other image of the texture is used";
+    GLTF_BASISU "`KHR_texture_basisu`" "the other image of the texture is used; refused if there is none";
     GLTF_EXTENSION "other extensions, by name" "refused where the file requires them";
 }
 
@@ -79,6 +79,8 @@ features! {
     MTL_BUMP "`bump`, `map_bump`" "height maps";
     MTL_KA "`Ka` other than black" "";
     MTL_TF "`Tf` other than white" "of all but thin panes";
+    MTL_OUTSIDE "images whose names are absolute or lead out of the folder of the scene"
+        "rendered without";
     MTL_KEY "other keys, by name" "`map_Ks`, `refl` and `Pc` among them";
 }
 
@@ -94,7 +96,6 @@ features! {
     PBRT_GAMUT "saturation of reflectance spectra beyond Rec.709" "clipped";
     PBRT_FILM "other parameters of the film"
         "`xresolution`, `yresolution` and `iso` are done; open time times `iso`/100 scales all light";
-    PBRT_DEPTH "`maxdepth` of the integrator" "the command line chooses the length of paths";
     PBRT_INTEGRATOR "other integrators than path tracers, by name" "";
     PBRT_FILTER "`PixelFilter` other than a box of 0.5 and a Gaussian of 1.5, by name"
         "a Gaussian of 1.5, or the box";
@@ -114,7 +115,9 @@ features! {
     PBRT_TRANSMISSION "light through `diffusetransmission`" "rendered as diffuse reflection";
     PBRT_SUBSURFACE "light below `subsurface`" "rendered as plastic";
     PBRT_HAIR "parameters of `hair`" "rendered as diffuse of 0.5";
-    PBRT_MIX "the lesser part of other `mix`" "the other one is the whole surface";
+    PBRT_MIX_LOBES "gloss of `mix`"
+        "one lobe of the mean roughness; images on other coordinates than the first count by their means";
+    PBRT_MIX "the lesser part of `mix` with glass" "the other one is the whole surface";
     PBRT_COAT_ALBEDO "`albedo` of coats" "coats are clear";
     PBRT_ANISOTROPY "`uroughness` other than `vroughness`" "their mean α, or the texture";
     PBRT_TEXTURE "other textures, by name" "`fbm`, `marble`, `dots`, `ptex` and others are 0.5";
@@ -134,11 +137,24 @@ features! {
     /// Parts of Mitsuba scene files.
     MITSUBA;
     MI_GAMUT "saturation of reflectance spectra beyond Rec.709" "clipped";
+    MI_SHAPE "shapes of other kinds, by name" "left out";
+    MI_MISSING "files of shapes and textures that are not there" "the shape is left out; the texture is 0.5";
+    MI_FILE_CASE "files whose names are written in another case" "read all the same";
+    MI_MODEL "other reflection models, by name" "diffuse of 0.5";
+    MI_TEXTURE "other textures, by name" "0.5";
+    MI_PHONG "`phong` and `ward`" "a metallic-roughness material of the same colours";
+    MI_POLARIZED "polarisation of `pplastic`" "as `roughplastic`";
+    MI_COATING "`coating` of other models than `diffuse`" "left out";
+    MI_DIFFUSE_TRANSMISSION "light through `difftrans`" "rendered as diffuse reflection";
+    MI_WEIGHTS "sum of `weights` of `mixturebsdf` other than 1" "their ratios count";
     MI_TWO_MODELS "second model of `twosided`" "the first is on both sides";
     MI_SPEC_TRANS "`spec_trans` between 0 and 1"
         "from ½ a rough dielectric, below none of it; as is a metal";
     MI_PRINCIPLED_REST "further parameters of `principled`, by name" "";
-    MI_BLEND "the lesser part of other `blendbsdf`" "the other one is the whole surface";
+    MI_BLEND_LOBES "gloss of `blendbsdf` and `mixturebsdf`"
+        "one lobe of the mean roughness; images on other coordinates than the first count by their means";
+    MI_BLEND "the lesser part of `blendbsdf` and `mixturebsdf` with glass"
+        "the other one is the whole surface";
     MI_BUMP_MAP "`bumpmap`" "";
     MI_BECKMANN "distribution `beckmann`" "`ggx` of the same α";
     MI_ANISOTROPIC "`alpha_u` and `alpha_v` that differ" "their mean, or `alpha_u`";
@@ -147,21 +163,23 @@ features! {
     MI_SPECULAR_TEXTURE "textures of `specular_reflectance` and `specular_transmittance` of dielectrics"
         "white";
     MI_SPOT_TEXTURE "`texture` of a `spot`" "";
+    MI_EMITTER "other emitters, by name" "left out";
     MI_SENSORS "sensors that are not used" "";
     MI_MIRRORED "mirror image of the sensor's `to_world`" "the picture is not mirrored";
     MI_PRINCIPAL_POINT "`principal_point_offset_x`, `principal_point_offset_y`" "";
     MI_CROP "crop of the film off its middle" "the whole film; one in the middle is done";
     MI_FILTER "other `rfilter`s" "`gaussian` of ½";
-    MI_INTEGRATOR "`integrator` and `sampler`"
-        "options of the command line and their defaults, as `--depth` and `--spp`";
+    MI_INTEGRATOR "integrators of other pictures than those of paths, by name" "";
+    MI_HIDE_EMITTERS "`hide_emitters`" "lights are seen";
     MI_MEDIUM "`medium`" "";
     MI_ELEMENT "other elements, by name" "";
     MI_PARAMETER "other parameters, by name" "";
 }
 
 /// Extensions of glTF that are read.
-pub const GLTF_EXTENSIONS: [&str; 11] = [
+pub const GLTF_EXTENSIONS: [&str; 12] = [
     "EXT_mesh_gpu_instancing",
+    "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",

@@ -1,5 +1,7 @@
 //! Triangles of the scene.
 
+use std::path::Path;
+
 use super::{instance::Instance, mesh::Mesh, transform::Transform};
 
 /// Largest magnitude of a coordinate, metres; products of four coordinates stay finite in `f32`.
@@ -62,6 +64,40 @@ impl Dropped {
         .filter(|(count, _)| *count > 0)
         .map(|(count, what)| format!("{label}: dropped {count} {what}"))
         .collect()
+    }
+}
+
+/// Counts of what several meshes of a file lose, with the first of them.
+#[derive(Debug, Default)]
+pub(crate) struct DroppedOfMany {
+    sum: Dropped,
+    /// Triangles of the meshes that lose some.
+    of: usize,
+    meshes: usize,
+    first: String,
+}
+
+impl DroppedOfMany {
+    /// Adds what a mesh of `of` triangles loses; `place` is asked for the first time only.
+    pub(crate) fn add(&mut self, dropped: Dropped, of: usize, place: impl FnOnce() -> String) {
+        if dropped == Dropped::default() {
+            return;
+        }
+        if self.meshes == 0 {
+            self.first = place();
+        }
+        self.sum.add(dropped);
+        self.of += of;
+        self.meshes += 1;
+    }
+
+    /// One warning for each count.
+    pub(crate) fn warnings(&self, path: &Path) -> Vec<String> {
+        let others = match self.meshes {
+            0 | 1 => String::new(),
+            meshes => format!(" and {} others", meshes - 1),
+        };
+        self.sum.warnings(&format!("{}: {}{others}", path.display(), self.first), self.of)
     }
 }
 

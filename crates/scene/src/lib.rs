@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 #![warn(clippy::print_stderr, clippy::print_stdout)]
 
+mod beside;
 mod camera;
 pub mod coat;
 pub mod environment;
@@ -11,6 +12,7 @@ pub mod features;
 mod file;
 pub mod files;
 pub mod geometry;
+mod gloss;
 mod hash;
 mod import;
 pub mod instance;
@@ -82,6 +84,22 @@ impl Default for FilmSettings {
     }
 }
 
+/// Settings of a render that a file asks for, beside its film.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Asked {
+    /// Samples per pixel.
+    pub samples: Option<u32>,
+    /// Vertices of a path that are lit, at most [`Asked::MAX_DEPTH`].
+    pub depth: Option<u32>,
+    /// First vertex, from 0 on, at which Russian roulette may end a path.
+    pub roulette_depth: Option<u32>,
+}
+
+impl Asked {
+    /// Most vertices that are asked for; paths that may go on for ever have so many.
+    pub const MAX_DEPTH: u32 = 64;
+}
+
 /// Validated scene in world space.
 #[derive(Clone, Debug)]
 pub struct Scene {
@@ -105,6 +123,8 @@ pub struct Scene {
     pub geometry: Geometry,
     /// Files that the scene was read from; empty for a scene made in memory.
     pub inputs: Vec<PathBuf>,
+    /// Settings of the render that the file asks for.
+    pub asked: Asked,
     /// Warnings from loading, repairs among them, for the log.
     pub warnings: Vec<String>,
     /// SHA-256 of everything that changes the picture: camera, film, environment texels, materials

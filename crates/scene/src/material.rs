@@ -32,30 +32,7 @@ impl Material {
         let color = mean(&self.surface.color);
         let rough = luminance(mean(&self.surface.roughness));
         let metal = luminance(mean(&self.surface.metallic));
-        let mut kind = self.kind.clone();
-        match &mut kind {
-            MaterialKind::Diffuse { reflectance } | MaterialKind::Mirror { reflectance } => {
-                *reflectance = (*reflectance * color).clamp(Vec3::ZERO, Vec3::ONE);
-            }
-            MaterialKind::Plastic { diffuse, .. } => {
-                *diffuse = (*diffuse * color).clamp(Vec3::ZERO, Vec3::ONE);
-            }
-            MaterialKind::Conductor { alpha, fresnel } => {
-                *alpha = (*alpha * rough * rough).clamp(0.0, 1.0);
-                if let ConductorFresnel::Schlick { reflectance } = fresnel {
-                    *reflectance = (*reflectance * color).clamp(Vec3::ZERO, Vec3::ONE);
-                }
-            }
-            MaterialKind::Principled { base_color, metallic, roughness, .. } => {
-                *base_color = (*base_color * color).clamp(Vec3::ZERO, Vec3::ONE);
-                *metallic = (*metallic * metal).clamp(0.0, 1.0);
-                *roughness = (*roughness * rough).clamp(0.0, 1.0);
-            }
-            MaterialKind::Dielectric { .. }
-            | MaterialKind::ThinDielectric { .. }
-            | MaterialKind::Measured { .. } => {}
-        }
-        kind
+        self.kind.scaled(color, rough, metal)
     }
 }
 
@@ -186,6 +163,32 @@ impl MaterialKind {
                 ("thin_dielectric", 8, vec![vec![*ior], factors])
             }
         }
+    }
+
+    /// The same with factors of its colour, its roughness and its share of metal.
+    pub(crate) fn scaled(&self, color: Vec3, rough: f32, metal: f32) -> Self {
+        let mut kind = self.clone();
+        match &mut kind {
+            Self::Diffuse { reflectance } | Self::Mirror { reflectance } => {
+                *reflectance = (*reflectance * color).clamp(Vec3::ZERO, Vec3::ONE);
+            }
+            Self::Plastic { diffuse, .. } => {
+                *diffuse = (*diffuse * color).clamp(Vec3::ZERO, Vec3::ONE);
+            }
+            Self::Conductor { alpha, fresnel } => {
+                *alpha = (*alpha * rough * rough).clamp(0.0, 1.0);
+                if let ConductorFresnel::Schlick { reflectance } = fresnel {
+                    *reflectance = (*reflectance * color).clamp(Vec3::ZERO, Vec3::ONE);
+                }
+            }
+            Self::Principled { base_color, metallic, roughness, .. } => {
+                *base_color = (*base_color * color).clamp(Vec3::ZERO, Vec3::ONE);
+                *metallic = (*metallic * metal).clamp(0.0, 1.0);
+                *roughness = (*roughness * rough).clamp(0.0, 1.0);
+            }
+            Self::Dielectric { .. } | Self::ThinDielectric { .. } | Self::Measured { .. } => {}
+        }
+        kind
     }
 
     /// True for dielectrics and thin panes, which let light through.

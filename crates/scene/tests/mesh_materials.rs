@@ -34,6 +34,10 @@ fn gltf_material(folder: &Folder, material: &str, rest: &str) -> (Material, Vec<
     (mesh.materials[0].material.clone(), warnings)
 }
 
+fn luminance(color: Vec3) -> f32 {
+    color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+}
+
 fn close(found: Vec3, expected: [f32; 3]) -> bool {
     found.abs_diff_eq(expected.into(), 1e-5)
 }
@@ -120,6 +124,9 @@ fn glass_unlit_and_specular_glossiness_materials_are_mapped() {
     let (found, warnings) = with(&format!("{glass}{volume}"), &rough);
     assert!(matches!(found.kind, MaterialKind::Dielectric { alpha: 0.25, ior: 1.3, .. }));
     assert!(warnings[0].contains("ignored absorption"), "{warnings:?}");
+    // The factor 0.9 of each interface, and the root of the colour to the power of the lengths.
+    let MaterialKind::Dielectric { transmittance, .. } = found.kind else { panic!() };
+    assert!(transmittance.abs_diff_eq(Vec3::new(0.9, 0.0, 0.0), 1e-5), "{transmittance}");
     // A metal transmits nothing, and little transmission stays opaque.
     let (found, warnings) = with(glass, r#""metallicFactor": 1"#);
     assert!(matches!(found.kind, MaterialKind::Principled { .. }) && warnings.is_empty());
@@ -133,7 +140,7 @@ fn glass_unlit_and_specular_glossiness_materials_are_mapped() {
     let MaterialKind::Diffuse { reflectance: Vec3::ZERO } = found.kind else { panic!() };
 
     let gloss = r#""KHR_materials_pbrSpecularGlossiness": {"diffuseFactor": [0.5, 0.4, 0.3, 1],
-        "specularFactor": [0.04, 0.08, 1], "glossinessFactor": 0.75}"#;
+        "specularFactor": [0.04, 0.08, 0.02], "glossinessFactor": 0.75}"#;
     let (found, warnings) = with(gloss, "");
     assert!(warnings.is_empty(), "{warnings:?}");
     let MaterialKind::Principled { base_color, metallic, roughness, ior, specular_color, .. } =
@@ -141,8 +148,16 @@ fn glass_unlit_and_specular_glossiness_materials_are_mapped() {
     else {
         panic!("{found:?}")
     };
-    assert!(close(base_color, [0.5, 0.4, 0.3]) && close(specular_color, [1.0, 2.0, 25.0]));
+    assert!(close(base_color, [0.5, 0.4, 0.3]) && close(specular_color, [1.0, 2.0, 0.5]));
     assert_eq!((metallic, roughness, ior), (0.0, 0.25, 1.5));
+    // No dielectric reflects half the light: a metal with a little diffuse light.
+    let (found, _) = with(&gloss.replace("[0.04, 0.08, 0.02]", "[0.5, 0.5, 0.5]"), "");
+    let MaterialKind::Principled { base_color, metallic, specular_color, .. } = found.kind else {
+        panic!("{found:?}")
+    };
+    assert!(metallic > 0.5 && specular_color == Vec3::ONE, "{metallic}");
+    let normal = Vec3::splat(0.04).lerp(base_color, metallic);
+    assert!((luminance(normal) - 0.5).abs() < 0.02, "{normal}");
 }
 
 #[test]
@@ -171,8 +186,114 @@ fn images_in_buffers_are_read_and_broken_ones_are_warnings() {
         let expected = "rendered without this texture (material `wood`)";
         assert!(warnings.len() == 1 && warnings[0].contains(expected), "{warnings:?}");
     }
-    let message = load(r#"{"uri": "../secret.png"}"#).unwrap_err().to_string();
-    assert!(message.contains("`../secret.png` leads out of that folder"), "{message}");
+    let (color, warnings) = load(r#"{"uri": "../secret.png"}"#).unwrap();
+    assert!(color.is_none() && warnings[0].contains("`../secret.png` leads out of that folder"));
+}
+
+#[test]
+fn a_texture_without_an_image_that_is_read_ends_the_file() {
+    let folder = Folder::new();
+    let material =
+        r#"{"name": "wood", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}"#;
+    let load = |texture: &str| {
+        let rest = format!(
+            r#", "images": [{{"uri": "a.png"}}], "extensionsRequired": ["KHR_texture_basisu"],
+            "textures": [{{{texture}"extensions": {{"KHR_texture_basisu": {{"source": 0}}}}}}]"#
+        );
+        Mesh::read(
+            &folder.write("a.gltf", gltf_of(&[positions()], 3, material, &rest)),
+            &mut Vec::new(),
+        )
+    };
+    folder.write("a.png", png([[255; 4]; 2]));
+    let message = load("").unwrap_err().to_string();
+    assert!(message.contains("material `wood`") && message.contains("ktxdecompress"), "{message}");
+    let mesh = load(r#""source": 0, "#).unwrap();
+    assert!(mesh.materials[0].material.surface.color.is_some());
+
+    let old =
+        gltf(r#"{"mesh": 0}"#, "", "", "").replace(r#""version": "2.0""#, r#""version": "1.0""#);
+    let message =
+        Mesh::read(&folder.write("b.gltf", old), &mut Vec::new()).unwrap_err().to_string();
+    assert!(message.contains("`asset.version`: expected 2.0, found 1.0"), "{message}");
+}
+
+#[test]
+fn specular_glossiness_is_converted_texel_by_texel() {
+    let folder = Folder::new();
+    // A matt red, and silver of half the gloss.
+    folder.write("d.png", png([[200, 20, 20, 255], [0, 0, 0, 255]]));
+    folder.write("s.png", png([[0, 0, 0, 0], [230, 230, 230, 128]]));
+    let rest = r#", "images": [{"uri": "d.png"}, {"uri": "s.png"}],
+        "textures": [{"source": 0}, {"source": 1}]"#;
+    let material = |transform: &str| {
+        format!(
+            r#"{{"extensions": {{"KHR_materials_pbrSpecularGlossiness": {{
+            "diffuseTexture": {{"index": 0}},
+            "specularGlossinessTexture": {{"index": 1{transform}}}}}}}}}"#
+        )
+    };
+    let (found, warnings) = gltf_material(&folder, &material(""), rest);
+    assert!(warnings.is_empty(), "{warnings:?}");
+    let values = |used: &Option<TextureUse>| used.as_ref().unwrap().values();
+    let surface = &found.surface;
+    let (color, metallic) = (values(&surface.color), values(&surface.metallic));
+    let roughness = values(&surface.roughness);
+    assert!((metallic[0][0], roughness[0][0]) == (0.0, 1.0), "{metallic:?} {roughness:?}");
+    assert!(metallic[1][0] > 0.99 && (roughness[1][0] - 0.5).abs() < 0.01, "{metallic:?}");
+    // 200 and 230 in linear light; the coat of 0.04 takes its share from below.
+    assert!((color[0][0] - 0.578 / 0.96).abs() < 0.01 && color[0][1] < 0.01, "{color:?}");
+    assert!((color[1][0] - 0.791).abs() < 0.01, "{color:?}");
+
+    // On other coordinates the mean of the specular colour counts, and the diffuse image stays.
+    let turned = r#", "extensions": {"KHR_texture_transform": {"scale": [2, 2]}}"#;
+    let (found, warnings) = gltf_material(&folder, &material(turned), rest);
+    assert!(warnings[0].contains("its mean colour counts"), "{warnings:?}");
+    let (color, metallic) = (values(&found.surface.color), values(&found.surface.metallic));
+    assert!(metallic[1][0] > 0.99 && (color[1][0] - 0.5 * 0.791).abs() < 0.01, "{color:?}");
+}
+
+#[test]
+fn transmission_by_texture_is_glass_where_it_says_so() {
+    let folder = Folder::new();
+    folder.write("t.png", png([[255, 0, 0, 255], [0, 0, 0, 255]]));
+    let rest = r#", "images": [{"uri": "t.png"}],
+        "samplers": [{"wrapS": 33071, "magFilter": 9728}], "textures": [{"source": 0, "sampler": 0}]"#;
+    let material = r#"{"name": "lamp", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0},
+        "extensions": {"KHR_materials_transmission":
+            {"transmissionFactor": 1, "transmissionTexture": {"index": 0}}}}"#;
+    // The first triangle lies on the left texel, the second on the right one.
+    let corners = [&CORNERS[..], &CORNERS.map(|coordinate| coordinate + 2.0)].concat();
+    let uvs = [0.1, 0.5, 0.2, 0.5, 0.1, 0.6, 0.8, 0.5, 0.9, 0.5, 0.8, 0.6];
+    let attributes = [
+        Attribute("POSITION", 5126, "VEC3", false, floats(&corners)),
+        Attribute("TEXCOORD_0", 5126, "VEC2", false, floats(&uvs)),
+    ];
+    let path = folder.write("a.gltf", gltf_of(&attributes, 6, material, rest));
+    let scene = Scene::load(&path).unwrap();
+    let of = |x: f32| {
+        let is_there =
+            |triangle: &&[u32; 3]| scene.geometry.positions[triangle[0] as usize][0] == x;
+        let at = scene.geometry.triangles.iter().position(|triangle| is_there(&triangle)).unwrap();
+        &scene.materials[scene.geometry.materials[at] as usize]
+    };
+    assert!(matches!(of(0.0).kind, MaterialKind::ThinDielectric { .. }), "{:?}", of(0.0));
+    assert!(matches!(of(2.0).kind, MaterialKind::Principled { .. }), "{:?}", of(2.0));
+    assert_eq!((of(0.0).name.as_str(), of(2.0).name.as_str()), ("lamp, glass", "lamp"));
+    let is_named = |text: &&String| text.contains("glass or opaque by its mean there");
+    assert_eq!(scene.warnings.iter().filter(is_named).count(), 1, "{:?}", scene.warnings);
+}
+
+/// A wall of two faces on the same points: each side shows its own.
+#[test]
+fn faces_back_to_back_look_their_own_way() {
+    let folder = Folder::new();
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl front\nf 1 2 3\nusemtl back\nf 3 2 1\n";
+    let mut warnings = Vec::new();
+    let mesh = Mesh::read(&folder.write("wall.obj", text), &mut warnings).unwrap();
+    let height = |triangle: usize| mesh.positions[mesh.triangles[triangle][0] as usize][2];
+    assert!(height(0) > 0.0 && height(1) < 0.0 && height(0) < 1e-4, "{:?}", mesh.positions);
+    assert!(warnings.iter().any(|text| text.contains("1 pairs of triangles lie back to back")));
 }
 
 #[test]
@@ -377,11 +498,20 @@ fn names_do_not_leave_the_folder_of_the_scene() {
         assert!(message.contains("expected one in the folder of the scene"), "{message}");
         assert!(!message.contains("top secret"), "{message}");
     };
+    // A library or an image elsewhere is a warning.
+    let leave_out = |text: String, expected: &str| {
+        let mut warnings = Vec::new();
+        let mesh = Mesh::read(&folder.write("scene/a.obj", text), &mut warnings).unwrap();
+        warnings.extend(mesh.ignored_in_materials().warnings("a.obj".as_ref()));
+        assert!(warnings.iter().any(|text| text.contains(expected)), "{warnings:?}");
+        assert!(!warnings.iter().any(|text| text.contains("top secret")), "{warnings:?}");
+        assert!(mesh.materials[0].material.surface.color.is_none());
+    };
     let absolute = folder.path().join("secret.txt");
     for name in ["../secret.txt", absolute.to_str().unwrap(), "x/../../secret.txt"] {
-        refuse("scene/a.obj", format!("mtllib {name}\n{obj}"));
+        leave_out(format!("mtllib {name}\n{obj}"), "cannot read the material library");
         folder.write("scene/a.mtl", format!("newmtl a\nmap_Kd {name}\n"));
-        refuse("scene/a.obj", format!("mtllib a.mtl\n{obj}"));
+        leave_out(format!("mtllib a.mtl\n{obj}"), "ignored image `");
         let text = gltf(r#"{"mesh": 0}"#, "", "", "");
         let (before, after) = text.split_once("data:").unwrap();
         let after = after.split_once('"').unwrap().1;

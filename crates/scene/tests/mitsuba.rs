@@ -5,7 +5,7 @@
 use std::{f32::consts::PI, io::Write, path::Path};
 
 use fenestra_scene::{
-    Filter, Scene,
+    Asked, Filter, Scene,
     export::{Settings, mitsuba::export},
     lamp::{LampKind, SpotFalloff},
     load::LoadOptions,
@@ -21,6 +21,14 @@ const SENSOR: &str = r#"<sensor type="perspective"><float name="fov" value="60"/
     <transform name="to_world"><lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform>
     <film type="hdrfilm"><integer name="width" value="40"/><integer name="height" value="20"/></film>
     </sensor>"#;
+
+/// Direction of the sun of Mitsuba's `sunsky` without parameters, with +Y up.
+const DEFAULT_SUN: Vec3 = Vec3::new(0.051_378_17, 0.720_300_1, -0.691_757_2);
+
+/// Mesh of one triangle.
+const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+    property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+    0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
 
 fn document(content: &str) -> String {
     format!("<scene version=\"3.0.0\">\n{content}\n</scene>")
@@ -292,7 +300,30 @@ fn models_become_materials() {
         <bsdf type="dielectric"/></bsdf>"#,
     );
     assert!(matches!(mixed.kind, MaterialKind::Dielectric { .. }));
-    assert!(warnings[0].contains("lesser part of other `blendbsdf`"), "{warnings:?}");
+    assert!(warnings[0].contains("lesser part of `blendbsdf`"), "{warnings:?}");
+    let (mixed, warnings) = material(
+        r#"<bsdf type="mixturebsdf"><string name="weights" value="0.5, 0.25, 0.25"/>
+        <bsdf type="diffuse"><rgb name="reflectance" value="0.8"/></bsdf>
+        <bsdf type="lambertian"><rgb name="reflectance" value="0.4"/></bsdf>
+        <bsdf type="mirror"/></bsdf>"#,
+    );
+    let MaterialKind::Principled { base_color, metallic, .. } = mixed.kind else { panic!() };
+    // Half 0.8, a quarter 0.4, and a quarter of all light.
+    let reflected = base_color.x * (1.0 - metallic) * 0.96 + 0.04 * (1.0 - metallic);
+    let reflected = reflected + base_color.x * metallic;
+    assert!((reflected - 0.75).abs() < 0.02, "{base_color} {metallic}");
+    assert!(warnings[0].contains("gloss of `blendbsdf`"), "{warnings:?}");
+    let (phong, warnings) = material(
+        r#"<bsdf type="phong"><float name="exponent" value="50"/>
+        <rgb name="specularReflectance" value="0.1"/></bsdf>"#,
+    );
+    let MaterialKind::Principled { roughness, specular_color, .. } = phong.kind else { panic!() };
+    assert!((roughness.powi(4) - 2.0 / 202.0).abs() < 1e-5, "{roughness}");
+    assert!((specular_color.x * 0.04 - 0.1).abs() < 1e-5 && warnings.len() == 1, "{warnings:?}");
+    let coated = r#"<bsdf type="coating"><bsdf type="diffuse"/></bsdf>"#;
+    assert!(matches!(material(coated).0.kind, MaterialKind::Plastic { .. }));
+    let plastic = material(r#"<bsdf type="pplastic"><float name="alpha" value="0.2"/></bsdf>"#);
+    let MaterialKind::Plastic { alpha: 0.2, .. } = plastic.0.kind else { panic!() };
     let scene = load("<shape type=\"cube\"/>");
     let MaterialKind::Diffuse { reflectance } = scene.materials[0].kind else { panic!() };
     assert_eq!((reflectance, scene.materials[0].surface.two_sided), (Vec3::splat(0.5), false));
@@ -605,7 +636,7 @@ fn serialized_meshes_of_both_versions_are_read() {
 fn what_is_not_understood_is_named_once_with_its_line() {
     let scene = load(
         r#"
-        <integrator type="volpath"><integer name="max_depth" value="65"/></integrator>
+        <integrator type="depth"/>
         <bsdf type="diffuse" id="paint"><boolean name="shiny" value="true"/></bsdf>
         <shape type="cube"><ref id="paint"/><float name="mass" value="3"/></shape>
         <shape type="cube"><ref id="paint"/><float name="mass" value="3"/>
@@ -617,13 +648,117 @@ fn what_is_not_understood_is_named_once_with_its_line() {
     assert_eq!(
         texts,
         [
-            "integrator `volpath` with `max_depth` 65 (line 6)",
+            "integrator `depth` (line 6)",
             "`shiny` of `diffuse` (line 7)",
             "`mass` of `cube` (2, first in line 8)",
             "`medium` (line 10)",
             "`fog` in `scene` (line 11)",
         ]
     );
+}
+
+/// Files of others rarely hold all that they name; the rest of them renders.
+#[test]
+fn shapes_and_models_that_are_not_there_leave_the_rest() {
+    let folder = Folder::new();
+    folder.write("Ball.ply", PLY);
+    let file = |name: &str| format!("<string name=\"filename\" value=\"{name}\"/>");
+    let texture =
+        format!("<texture type=\"bitmap\" name=\"reflectance\">{}</texture>", file("absent.png"));
+    let text = format!(
+        r#"{SENSOR}<emitter type="area" id="light"><rgb name="radiance" value="3"/></emitter>
+        <emitter type="projector"/>
+        <shape type="hair"/><shape type="hair"/><shape type="ply">{}</shape>
+        <shape type="ply">{}</shape>
+        <shape type="rectangle"><bsdf type="velvet"/></shape>
+        <shape type="rectangle"><ref id="light"/><bsdf type="diffuse">{texture}</bsdf></shape>"#,
+        file("absent.ply"),
+        file("ball.PLY"),
+    );
+    let scene = loaded(&folder.write("a.xml", document(&text)));
+    assert_eq!(scene.geometry.triangles.len(), 1 + 2 + 2);
+    let emission = scene.materials.iter().find_map(|material| material.surface.emission.as_ref());
+    assert_eq!(emission.unwrap().radiance, Vec3::splat(3.0));
+    for expected in [
+        "ignored emitter `projector` (line 6)",
+        "ignored shapes of the kind `hair` (2, first in line 7)",
+        "that are not there (2, first in `absent.ply`, line 7)",
+        "in another case (`ball.PLY`)",
+        "`velvet`, which is diffuse of 0.5 (line 9)",
+    ] {
+        let is_named = |text: &&String| text.contains(expected);
+        let count = scene.warnings.iter().filter(is_named).count();
+        assert_eq!(count, 1, "{expected}: {:#?}", scene.warnings);
+    }
+    assert_eq!(scene.warnings.len(), 5, "{:#?}", scene.warnings);
+}
+
+#[test]
+fn files_beside_the_folder_need_leave() {
+    let folder = Folder::new();
+    for name in ["room", "common"] {
+        std::fs::create_dir(folder.path().join(name)).unwrap();
+    }
+    folder.write("common/ball.ply", PLY);
+    let shape = |name: &str| {
+        format!("<shape type=\"ply\"><string name=\"filename\" value=\"{name}\"/></shape>")
+    };
+    for content in
+        [shape("../common/ball.ply"), format!("<path value=\"../common\"/>{}", shape("ball.ply"))]
+    {
+        let path = folder.write("room/a.xml", document(&format!("{SENSOR}{content}")));
+        let message = Scene::load(&path).unwrap_err().to_string();
+        assert!(message.contains("allow its folder by --allow-root"), "{message}");
+        let allow_root = Some(folder.path().to_path_buf());
+        let scene = loaded_with(&path, LoadOptions { allow_root, ..Default::default() }).unwrap();
+        assert!(!scene.geometry.triangles.is_empty() && scene.warnings.is_empty());
+    }
+}
+
+#[test]
+fn a_file_asks_for_samples_and_depth() {
+    let scene = load(
+        r#"<integrator type="aov"><integrator type="volpath"><integer name="maxDepth" value="13"/>
+        <integer name="rrDepth" value="7"/></integrator></integrator>
+        <sampler type="ldsampler"><integer name="sampleCount" value="256"/></sampler>"#,
+    );
+    let Asked { samples, depth, roulette_depth } = scene.asked;
+    assert_eq!((samples, depth, roulette_depth), (Some(256), Some(12), Some(7)));
+    assert_eq!(scene.warnings, [""; 0]);
+    let asked = |integrator: &str| load(integrator).asked.depth;
+    assert_eq!(asked(r#"<integrator type="direct"/>"#), Some(1));
+    let endless = r#"<integrator type="path"><integer name="max_depth" value="-1"/></integrator>"#;
+    assert_eq!((asked(endless), asked("")), (Some(64), None));
+}
+
+/// Radiances of Mitsuba 3.9.1 from the direction of the sun's place at a date.
+#[test]
+fn daylight_stands_where_mitsuba_has_it() {
+    let sky = |parameters: &str, version: &str| {
+        let folder = Folder::new();
+        let emitter = format!("<emitter type=\"sunsky\">{parameters}</emitter>");
+        let text = document(&format!("{SENSOR}{emitter}")).replace("3.0.0", version);
+        loaded(&folder.write("a.xml", text)).environment
+    };
+    let brightest = |map: &fenestra_scene::EnvironmentMap| {
+        let of = |index: usize| map.texels[index].element_sum();
+        let index = (0..map.texels.len()).max_by(|a, b| of(*a).total_cmp(&of(*b))).unwrap();
+        let (width, height) = (map.width as f32, map.height as f32);
+        let longitude = ((index % map.width as usize) as f32 + 0.5) / width - 0.5;
+        let colatitude = ((index / map.width as usize) as f32 + 0.5) / height;
+        let (sine, cosine) = (colatitude * PI).sin_cos();
+        let (across, along) = (longitude * 2.0 * PI).sin_cos();
+        Vec3::new(sine * across, cosine, -sine * along)
+    };
+    let upright = r#"<transform name="to_world"><rotate x="1" angle="-90"/></transform>"#;
+    let sun = r#"<vector name="sun_direction" value="0.3 0.6 0.5"/>"#;
+    let direction = Vec3::new(0.3, 0.6, 0.5).normalize();
+    for (parameters, version) in [(format!("{upright}{sun}"), "3.0.0"), (sun.to_owned(), "0.6.0")] {
+        let found = brightest(&sky(&parameters, version));
+        assert!(found.dot(direction) > 0.9999, "{version}: {found}");
+    }
+    let found = brightest(&sky(upright, "3.0.0"));
+    assert!(found.dot(DEFAULT_SUN) > 0.9999, "{found}");
 }
 
 #[test]
@@ -639,9 +774,6 @@ fn bad_files_end_in_one_error_with_file_and_line() {
     let deep = "<bsdf type=\"twosided\">".repeat(40) + &"</bsdf>".repeat(40);
     for (content, expected) in [
         (shape("<ref id=\"absent\"/>"), "expected the id of an object, found `absent`"),
-        (shape("<bsdf type=\"velvet\"/>"), "the reflection model `velvet` is not rendered"),
-        ("<shape type=\"hair\"/>".to_owned(), "the shape `hair` is not rendered"),
-        ("<emitter type=\"sunsky\"/>".to_owned(), "the emitter `sunsky` is not rendered"),
         (shape("<emitter type=\"point\"/>"), "cannot stand in a shape"),
         (bsdf("<string name=\"reflectance\" value=\"red\"/>"), "expected a colour, found `string`"),
         (bsdf("<rgb name=\"reflectance\" value=\"2 2 2\"/>"), "expected 0 to 1"),
@@ -651,10 +783,10 @@ fn bad_files_end_in_one_error_with_file_and_line() {
             "<shape type=\"ply\"><string name=\"filename\" value=\"a.xml\"/></shape>".to_owned(),
             "ply: expected a file in .ply, found `a.xml`",
         ),
-        (image("absent.png"), "the file `absent.png` is not there"),
-        (image("../a.png"), "leaves the folder"),
-        (image("/dev/zero"), "is empty, absolute or leaves the folder"),
-        (image("C:\\a.png"), "is empty, absolute or leaves the folder"),
+        (image("../a.png"), "leads out of that folder"),
+        (image("/dev/zero"), "is absolute"),
+        (image("C:\\a.png"), "is absolute"),
+        ("<include filename=\"absent.xml\"/>".to_owned(), "the file `absent.xml` is not there"),
         (image("a.xml"), "expected a PNG"),
         ("<include filename=\"a.xml\"/>".to_owned(), "`a.xml` includes itself"),
         (shape(&deep), "nested deeper than 32"),
@@ -819,7 +951,8 @@ fn our_own_export_comes_back_as_it_was() {
         (sky, "type = \"conductor\"\nalpha = 0.3\neta = [0.2, 0.9, 1.1]\nk = [3.9, 2.4, 2.1]"),
     ] {
         let [ours, read] = exported(environment, clay);
-        assert_eq!(read.warnings.len(), 2, "integrator and sampler: {:?}", read.warnings);
+        assert_eq!(read.warnings, [""; 0]);
+        assert_eq!((read.asked.depth, read.asked.samples), (Some(3), Some(4)));
         assert_eq!((read.film, read.lamps.len()), (ours.film, 0));
         let (camera, expected) = (read.camera, ours.camera);
         assert_close(camera.position, expected.position);
@@ -925,8 +1058,8 @@ fn real_scenes_load() {
         assert_eq!((scene.film.width, scene.film.height), (1280, 720));
         assert_eq!(scene.materials.len(), 19);
         let named = |part: &str| scene.warnings.iter().any(|warning| warning.contains(part));
-        assert!(named("integrator `path` with `max_depth` 65"));
-        assert_eq!(named("`high_quality_edges` of `hdrfilm`"), name == "scene.xml");
+        assert_eq!(scene.asked.depth, Some(64));
+        assert!(!named("integrator") && !named("`high_quality_edges`"));
         let leaves = scene.materials.iter().find(|material| material.name == "Leaves").unwrap();
         assert!(leaves.surface.opacity.texture.is_some() && leaves.surface.color.is_some());
         assert!(leaves.surface.two_sided);

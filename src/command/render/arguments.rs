@@ -18,7 +18,7 @@ use crate::{
     film::{Aov, Window, checkpoint::checkpoint_path},
     pass::Roulette,
     sampler::{Parameters, Sampler},
-    scene::{FilmSettings, Scene},
+    scene::{Asked, FilmSettings, Scene},
     session::{Quality, Rules, Settings},
 };
 
@@ -42,9 +42,10 @@ pub struct Arguments {
     /// Sampler that chooses directions at a hit.
     #[arg(long, value_enum, default_value = "guided", help_heading = SAMPLING)]
     pub sampler: Sampler,
-    /// Number of path vertices lit by the environment; 1 is direct light.
-    #[arg(long, value_name = "D", default_value_t = 8, help_heading = SAMPLING)]
-    pub depth: u32,
+    /// Number of path vertices lit by the environment; 1 is direct light. Default: that of a pbrt or
+    /// Mitsuba file, else 8.
+    #[arg(long, value_name = "D", help_heading = SAMPLING)]
+    pub depth: Option<u32>,
     /// Shadow rays traced at every vertex of a camera path.
     ///
     /// 8 for `guided`, which traces a quarter of them at later vertices (`--set later-rays=N`), else 5
@@ -52,9 +53,10 @@ pub struct Arguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     #[arg(help_heading = SAMPLING, hide_short_help = true)]
     pub shadow_rays: Option<u32>,
-    /// First path vertex, from 0 on, at which Russian roulette may end a path.
-    #[arg(long, value_name = "D", default_value_t = 2, help_heading = SAMPLING, hide_short_help = true)]
-    pub roulette_depth: u32,
+    /// First path vertex, from 0 on, at which Russian roulette may end a path. Default: that of a Mitsuba
+    /// file, else 2.
+    #[arg(long, value_name = "D", help_heading = SAMPLING, hide_short_help = true)]
+    pub roulette_depth: Option<u32>,
     /// Share of the camera's light that a path still carries, below which Russian roulette may end it; 0 for
     /// never.
     #[arg(long, value_name = "T", default_value_t = 0.02, help_heading = SAMPLING, hide_short_help = true)]
@@ -159,6 +161,9 @@ pub struct Arguments {
 
 /// Interval of the preview of a picture to show.
 const PNG_INTERVAL: Duration = Duration::from_secs(5);
+/// Lit vertices of a path, and the first one at which roulette may end it, if nothing says otherwise.
+const DEFAULT_DEPTH: u32 = 8;
+const DEFAULT_ROULETTE_DEPTH: u32 = 2;
 /// Maximum film width of `--quick`, pixels.
 const QUICK_WIDTH: u32 = 240;
 
@@ -237,9 +242,37 @@ impl Arguments {
         !self.no_checkpoint && !is_special_file(output)
     }
 
-    /// Translates the options into stop rules.
-    pub(super) fn rules(&self) -> Rules {
-        let rules = self.quality().map(Quality::rules).unwrap_or_default();
+    /// Takes what the scene's file asks for where no option says otherwise; returns a line on that.
+    pub(super) fn take_asked(&self, scene: &Scene, settings: &mut Settings) -> Option<String> {
+        let Asked { depth, roulette_depth, .. } = scene.asked;
+        let mut taken = Vec::new();
+        if let (None, Some(depth)) = (self.depth, depth) {
+            settings.depth = depth;
+            taken.push(format!("depth {depth}"));
+        }
+        if let (None, Some(vertex)) = (self.roulette_depth, roulette_depth) {
+            settings.roulette.vertex = vertex;
+            taken.push(format!("roulette from vertex {vertex}"));
+        }
+        if let Some(samples) = self.asked_samples(scene.asked) {
+            taken.push(format!("{samples} samples"));
+        }
+        let list = taken.join(", ");
+        (!taken.is_empty()).then(|| format!("{} asks for {list}", scene.path.display()))
+    }
+
+    /// Samples that the scene's file asks for, where no option says when to stop.
+    pub(super) fn asked_samples(&self, asked: Asked) -> Option<u32> {
+        asked.samples.filter(|_| self.quality.is_none() && self.quality().is_some())
+    }
+
+    /// Translates the options into stop rules. The samples that the file asks for replace those of a quality
+    /// that nobody named.
+    pub(super) fn rules(&self, asked: Asked) -> Rules {
+        let rules = match self.asked_samples(asked) {
+            None => self.quality().map(Quality::rules).unwrap_or_default(),
+            samples => Rules { samples, ..Rules::default() },
+        };
         let samples = self.spp.or(rules.samples);
         let is_quick = self.quick && self.time.is_none() && self.error.is_none();
         Rules {
@@ -326,13 +359,13 @@ impl Arguments {
             sampler: self.sampler,
             parameters,
             shadow_rays: self.shadow_rays.unwrap_or(self.sampler.shadow_rays()),
-            depth: self.depth,
+            depth: self.depth.unwrap_or(DEFAULT_DEPTH),
             seed: self.seed,
             first_sample: self.sample_offset,
             window: self.crop,
             aovs,
             roulette: Roulette {
-                vertex: self.roulette_depth,
+                vertex: self.roulette_depth.unwrap_or(DEFAULT_ROULETTE_DEPTH),
                 throughput: self.roulette_throughput,
             },
             ..Settings::default()

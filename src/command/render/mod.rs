@@ -43,13 +43,16 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     // A picture to show is denoised where the library is found; `--denoise` insists on it.
     let offered = arguments.shows().then(Denoiser::load);
     let denoises = arguments.denoise || matches!(offered, Some(Ok(_)));
-    let settings = arguments.settings(denoises)?;
+    let mut settings = arguments.settings(denoises)?;
     let start = Instant::now();
     let patience =
         Patience::new(&format!("loading {}", arguments.scene.display()), arguments.quiet);
     let mut scene = arguments.scene_options.load(&arguments.scene)?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
     arguments.resize(&mut scene.film);
+    if let Some(line) = arguments.take_asked(&scene, &mut settings).filter(|_| !arguments.quiet) {
+        say!("{line}");
+    }
     let output =
         arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.exr", scene.name)));
     // Fail before the work, not after it.
@@ -121,10 +124,11 @@ impl RenderJob<'_> {
         let interval = self.arguments.checkpoint_interval.unwrap_or(CHECKPOINT_INTERVAL);
         let writes = self.arguments.writes_checkpoints(&self.output);
         let checkpoints = writes.then(|| (checkpoint_path(&self.output), interval));
-        let rules = Rules { checkpoints, ..self.arguments.rules() };
+        let rules = Rules { checkpoints, ..self.arguments.rules(self.scene.asked) };
         let mut progress = Progress::new(self.scene.name.clone(), self.arguments.quiet);
         let display = self.open_display()?;
-        let quality = self.arguments.quality();
+        let is_asked = self.arguments.asked_samples(self.scene.asked).is_some();
+        let quality = self.arguments.quality().filter(|_| !is_asked);
         if let Some(quality) = quality {
             progress.print(&announce(quality));
         }

@@ -38,6 +38,26 @@ impl<'a> Export<'a> {
         Self { warnings, write: Box::new(write) }
     }
 
+    /// The warnings with one line for each kind: of those that differ in the material and in numbers alone,
+    /// the first with a count.
+    pub fn summary(&self) -> Vec<String> {
+        let mut kinds: Vec<(String, &str, usize)> = Vec::new();
+        for warning in &self.warnings {
+            let difference = warning.split_once("`: ").map_or(warning.as_str(), |(_, rest)| rest);
+            let is_number = |c: char| c.is_ascii_digit() || matches!(c, '.' | 'e' | '-');
+            let kind = difference.replace(is_number, "");
+            match kinds.iter_mut().find(|(known, ..)| *known == kind) {
+                Some((_, _, count)) => *count += 1,
+                None => kinds.push((kind, warning, 1)),
+            }
+        }
+        let line = |(_, first, count): (String, &str, usize)| match count {
+            1 => first.to_owned(),
+            count => format!("{first} ({} others likewise)", count - 1),
+        };
+        kinds.into_iter().map(line).collect()
+    }
+
     /// Writes the scene file and the folder of the same name beside it.
     ///
     /// # Errors
@@ -61,4 +81,19 @@ fn portal_warning(scene: &Scene) -> Option<String> {
 /// Three numbers with commas.
 fn triple(vector: Vec3) -> String {
     format!("{}, {}, {}", vector.x, vector.y, vector.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_kind_of_difference_is_one_line() {
+        let warnings =
+            ["`a`: darker at alpha = 0.3", "`b`: darker at alpha = 0.25", "`b`: brighter"];
+        let warnings = warnings.map(|text| format!("material {text}")).to_vec();
+        let export = Export::new(warnings.clone(), || Ok(()));
+        let first = format!("{} (1 others likewise)", warnings[0]);
+        assert_eq!(export.summary(), [first, warnings[2].clone()]);
+    }
 }

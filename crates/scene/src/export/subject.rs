@@ -133,14 +133,39 @@ fn reflected_share(table: &MeasuredTable) -> Vec3 {
     (0..STEPS).map(step).sum::<Vec3>().clamp(Vec3::ZERO, Vec3::ONE)
 }
 
+/// Root of the reflectance of the largest refractive index, 4, that is read back.
+const LARGEST_ROOT: f32 = 0.6;
+
+/// Reflectance of a principled dielectric at normal incidence.
+fn reflectance_of(ior: f32, specular: f32, specular_color: Vec3) -> f32 {
+    let ratio = (ior - 1.0) / (ior + 1.0);
+    luminance((ratio * ratio * specular_color).min(Vec3::ONE) * specular).max(0.0)
+}
+
 /// Refractive index, up to 4, whose reflectance at normal incidence is that of a principled dielectric.
 pub(super) fn index_of(ior: f32, specular: f32, specular_color: Vec3) -> f32 {
     if specular == 1.0 && specular_color == Vec3::ONE {
         return ior;
     }
-    let ratio = (ior - 1.0) / (ior + 1.0);
-    let reflectance = (ratio * ratio * specular_color).min(Vec3::ONE) * specular;
-    // At a root of 0.6 the index is 4, the largest that is read back.
-    let root = luminance(reflectance).max(0.0).sqrt().min(0.6);
+    let root = reflectance_of(ior, specular, specular_color).sqrt().min(LARGEST_ROOT);
     (1.0 + root) / (1.0 - root)
+}
+
+/// Difference that the index makes; none for a dielectric that has no strength and colour of its own.
+pub(super) fn difference_of_index(ior: f32, specular: f32, specular_color: Vec3) -> Option<String> {
+    if specular == 1.0 && specular_color == Vec3::ONE {
+        return None;
+    }
+    let reflectance = reflectance_of(ior, specular, specular_color);
+    let most = LARGEST_ROOT * LARGEST_ROOT;
+    Some(if reflectance > most {
+        format!(
+            "its dielectric reflects {reflectance} at normal incidence; the refractive index 4 that \
+             is written reflects {most}, and the base shows more"
+        )
+    } else {
+        "strength and colour of the dielectric's reflection become a refractive index of the same \
+         reflectance at normal incidence"
+            .to_owned()
+    })
 }

@@ -1,4 +1,5 @@
-//! Mixtures of two diffuse materials, which are diffuse too: pbrt's `mix` and Mitsuba's `blendbsdf`.
+//! Mixtures of two materials: pbrt's `mix`, Mitsuba's `blendbsdf` and `mixturebsdf`. Those of diffuse
+//! materials are diffuse, others by one diffuse and one specular colour.
 
 use std::sync::Arc;
 
@@ -6,9 +7,14 @@ use glam::Vec3;
 use half::f16;
 
 use crate::{
-    material::{MaterialKind, Surface},
+    MIN_ALPHA,
+    gloss::{DIELECTRIC, metallic_roughness},
+    material::{ConductorFresnel, MaterialKind, Surface},
     math::colour::luminance,
-    texture::{Channels, Encoding, Texels, Texture, TextureUse},
+    texture::{
+        Channels, Encoding, Texels, Texture, TextureUse,
+        texelwise::{Texelwise, lie_alike},
+    },
 };
 
 /// Share of the second of two materials.
@@ -62,6 +68,207 @@ pub(crate) fn blend(
     };
     let surface = Surface { color, ..rest(own) };
     Some((MaterialKind::Diffuse { reflectance }, surface))
+}
+
+/// Mixes the diffuse and the specular reflection of two materials; none if one is glass or measured, or
+/// their surfaces differ in opacity.
+///
+/// The gloss becomes one lobe. Images that lie as the first of them count texel by texel, others by their
+/// means.
+pub(crate) fn blend_lobes(
+    [(first, own), (second, other)]: [(&MaterialKind, &Surface); 2],
+    share: &Share,
+) -> Option<(MaterialKind, Surface)> {
+    // Materials that have lobes at all have them with any textures.
+    Lobes::of(first)?;
+    Lobes::of(second)?;
+    if own.opacity != other.opacity || own.vertex_color || other.vertex_color {
+        return None;
+    }
+    let share_image = match share {
+        Share::Image(image) => Some(image),
+        Share::Constant(_) => None,
+    };
+    let images = |surface: &'_ Surface| {
+        [surface.color.clone(), surface.roughness.clone(), surface.metallic.clone()]
+    };
+    let (own_images, other_images) = (images(own), images(other));
+    let all = || {
+        [share_image].into_iter().chain(own_images.iter().chain(&other_images).map(Option::as_ref))
+    };
+    let place = all().flatten().next();
+    let alike = |used: &&TextureUse| place.is_some_and(|place| lie_alike(place, used));
+    let grid = Texelwise::of(&all().map(|used| used.filter(alike)).collect::<Vec<_>>());
+    let factor = |used: Option<&TextureUse>| match used {
+        None => Factor::Constant(Vec3::ONE),
+        Some(used) if alike(&used) => Factor::Image(used.clone()),
+        Some(used) => Factor::Constant(used.mean().into()),
+    };
+    let share = match share {
+        Share::Constant(share) => Factor::Constant(Vec3::splat(*share)),
+        Share::Image(image) => factor(Some(image)),
+    };
+    let factors =
+        |images: &[Option<TextureUse>; 3]| images.each_ref().map(|used| factor(used.as_ref()));
+    let (own_factors, other_factors) = (factors(&own_images), factors(&other_images));
+    let lobes = |kind: &MaterialKind, factors: &[Factor; 3], index: usize| {
+        let [color, rough, metal] = factors.each_ref().map(|factor| factor.at(&grid, index));
+        Lobes::of(&kind.scaled(color, luminance(rough), luminance(metal))).unwrap_or_default()
+    };
+    let mixture = |index: usize| {
+        let share = luminance(share.at(&grid, index)).clamp(0.0, 1.0);
+        let pair = [lobes(first, &own_factors, index), lobes(second, &other_factors, index)];
+        Lobes::mixed(pair, share)
+    };
+    let rest = Surface {
+        color: None,
+        roughness: None,
+        metallic: None,
+        normal: own.normal.clone().or(other.normal.clone()),
+        two_sided: own.two_sided || other.two_sided,
+        ..own.clone()
+    };
+    if place.is_none() {
+        return Some((mixture(0).material(), rest));
+    }
+    let images = grid.material(|index| {
+        let lobes = mixture(index);
+        let (base, metallic) = lobes.base_color(DIELECTRIC);
+        (base.extend(1.0), lobes.roughness, metallic)
+    });
+    let color = Some(images.base_color);
+    if let (MaterialKind::Diffuse { .. }, MaterialKind::Diffuse { .. }) = (first, second) {
+        let kind = MaterialKind::Diffuse { reflectance: Vec3::ONE };
+        return Some((kind, Surface { color, ..rest }));
+    }
+    let kind = MaterialKind::Principled {
+        base_color: Vec3::ONE,
+        metallic: 1.0,
+        roughness: 1.0,
+        ior: IOR,
+        specular: 1.0,
+        specular_color: Vec3::ONE,
+    };
+    let (roughness, metallic) = (Some(images.roughness), Some(images.metallic));
+    Some((kind, Surface { color, roughness, metallic, ..rest }))
+}
+
+/// Refractive index of a dielectric whose reflectance is [`DIELECTRIC`].
+const IOR: f32 = 1.5;
+
+/// Factor of a property by place.
+enum Factor {
+    Constant(Vec3),
+    Image(TextureUse),
+}
+
+impl Factor {
+    fn at(&self, grid: &Texelwise, index: usize) -> Vec3 {
+        match self {
+            Self::Constant(value) => *value,
+            Self::Image(used) => grid.texel(used, index).truncate(),
+        }
+    }
+}
+
+/// Reflection of a material as a diffuse and a specular part.
+#[derive(Clone, Copy, Debug, Default)]
+struct Lobes {
+    /// Share of light that is reflected diffusely.
+    diffuse: Vec3,
+    /// Reflectance of the gloss at normal incidence.
+    specular: Vec3,
+    /// Roughness √α of the gloss.
+    roughness: f32,
+}
+
+impl Lobes {
+    fn of(kind: &MaterialKind) -> Option<Self> {
+        let normal = |ior: f32| ((ior - 1.0) / (ior + 1.0)).powi(2);
+        Some(match kind {
+            MaterialKind::Diffuse { reflectance } => {
+                Self { diffuse: *reflectance, specular: Vec3::ZERO, roughness: 1.0 }
+            }
+            MaterialKind::Plastic { diffuse, alpha, ior } => {
+                let coat = normal(*ior);
+                let specular = Vec3::splat(coat);
+                Self { diffuse: *diffuse * (1.0 - coat), specular, roughness: alpha.sqrt() }
+            }
+            MaterialKind::Conductor { alpha, fresnel } => {
+                let specular = match fresnel {
+                    ConductorFresnel::Schlick { reflectance } => *reflectance,
+                    ConductorFresnel::Exact { eta, k } => {
+                        let squared = *k * *k;
+                        let (below, above) = (*eta - 1.0, *eta + 1.0);
+                        (below * below + squared) / (above * above + squared)
+                    }
+                };
+                Self { diffuse: Vec3::ZERO, specular, roughness: alpha.sqrt() }
+            }
+            MaterialKind::Mirror { reflectance } => {
+                let roughness = MIN_ALPHA.sqrt();
+                Self { diffuse: Vec3::ZERO, specular: *reflectance, roughness }
+            }
+            MaterialKind::Principled {
+                base_color,
+                metallic,
+                roughness,
+                ior,
+                specular,
+                specular_color,
+            } => {
+                let coat = (normal(*ior) * *specular_color).min(Vec3::ONE) * *specular;
+                let below = (1.0 - metallic) * (1.0 - coat.max_element());
+                let diffuse = *base_color * below;
+                Self { diffuse, specular: coat.lerp(*base_color, *metallic), roughness: *roughness }
+            }
+            MaterialKind::Dielectric { .. }
+            | MaterialKind::ThinDielectric { .. }
+            | MaterialKind::Measured { .. } => return None,
+        })
+    }
+
+    fn mixed([one, two]: [Self; 2], share: f32) -> Self {
+        let weights = [1.0 - share, share];
+        let gloss = [luminance(one.specular) * weights[0], luminance(two.specular) * weights[1]];
+        let sum = gloss[0] + gloss[1];
+        let roughness = (gloss[0] * one.roughness + gloss[1] * two.roughness) / sum;
+        Self {
+            diffuse: one.diffuse.lerp(two.diffuse, share),
+            specular: one.specular.lerp(two.specular, share),
+            roughness: if sum > 0.0 { roughness } else { 1.0 },
+        }
+    }
+
+    /// Base colour and share of metal, for a dielectric that reflects `coat` at normal incidence. Each
+    /// channel reflects as much as before.
+    fn base_color(&self, coat: f32) -> (Vec3, f32) {
+        let below = (1.0 - self.specular.max_element()).max(f32::MIN_POSITIVE);
+        let (_, metallic) =
+            metallic_roughness((self.diffuse / below).min(Vec3::ONE), self.specular);
+        let dielectric = 1.0 - metallic;
+        let light = self.diffuse + self.specular - coat * dielectric;
+        let base = light / ((1.0 - coat) * dielectric + metallic);
+        (base.clamp(Vec3::ZERO, Vec3::ONE), metallic)
+    }
+
+    fn material(&self) -> MaterialKind {
+        if self.specular == Vec3::ZERO {
+            return MaterialKind::Diffuse { reflectance: self.diffuse };
+        }
+        // A weak gloss is that of a dielectric with a factor.
+        let specular = (self.specular.max_element() / DIELECTRIC).min(1.0);
+        let (base_color, metallic) = self.base_color(specular * DIELECTRIC);
+        let (roughness, specular_color) = (self.roughness, Vec3::ONE);
+        MaterialKind::Principled {
+            base_color,
+            metallic,
+            roughness,
+            ior: IOR,
+            specular,
+            specular_color,
+        }
+    }
 }
 
 /// Returns factor · value + shift.
@@ -131,9 +338,31 @@ mod tests {
         for (texel, found) in texels.iter().zip(found) {
             assert!(found.abs_diff_eq(a.lerp(b, luminance(*texel)), 1e-3), "{found}");
         }
-        let mirror = MaterialKind::Mirror { reflectance: Vec3::ONE };
+        let mirror = MaterialKind::Mirror { reflectance: Vec3::new(0.9, 0.8, 0.7) };
         let plain = Surface::default();
-        let diffuse = MaterialKind::Diffuse { reflectance: Vec3::ONE };
-        assert!(blend([(&mirror, &plain), (&diffuse, &plain)], &quarter).is_none());
+        let diffuse = MaterialKind::Diffuse { reflectance: Vec3::new(0.1, 0.2, 0.3) };
+        let pair = [(&mirror, &plain), (&diffuse, &plain)];
+        assert!(blend(pair, &quarter).is_none());
+        let light = |kind: &MaterialKind| {
+            let Lobes { diffuse, specular, .. } = Lobes::of(kind).unwrap();
+            diffuse + specular
+        };
+        let expected = light(&mirror).lerp(light(&diffuse), 0.25);
+        let (kind, _) = blend_lobes(pair, &quarter).unwrap();
+        assert!(light(&kind).abs_diff_eq(expected, 0.02), "{} and {expected}", light(&kind));
+        // By an image, whose texels have the luminances of red and green.
+        let (kind, surface) = blend_lobes(pair, &Share::Image(image())).unwrap();
+        let [color, metal] = [surface.color, surface.metallic].map(|used| used.unwrap().values());
+        for (index, texel) in texels.iter().enumerate() {
+            let kind = kind.scaled(Vec3::from_slice(&color[index][..3]), 1.0, metal[index][0]);
+            let expected = light(&mirror).lerp(light(&diffuse), luminance(*texel));
+            assert!(light(&kind).abs_diff_eq(expected, 0.02), "{} and {expected}", light(&kind));
+        }
+        let glass = MaterialKind::ThinDielectric {
+            ior: 1.5,
+            reflectance: Vec3::ONE,
+            transmittance: Vec3::ONE,
+        };
+        assert!(blend_lobes([(&glass, &plain), (&diffuse, &plain)], &quarter).is_none());
     }
 }

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use crate::{
-    EnvironmentMap, FilmSettings, Geometry, Lamp,
+    Asked, EnvironmentMap, FilmSettings, Geometry, Lamp,
     features::{Feature, Ignored},
     file::CameraEntry,
     material::Material,
@@ -23,6 +23,8 @@ pub(crate) struct Imported {
     pub camera: CameraEntry,
     /// Image plane.
     pub film: FilmSettings,
+    /// Settings of the render.
+    pub asked: Asked,
     /// Light from everywhere, black if the file has none; `None` for a format without.
     pub environment: Option<EnvironmentMap>,
     /// Lights without a surface.

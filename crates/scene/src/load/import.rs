@@ -2,21 +2,23 @@
 
 use glam::Vec3;
 
-use super::{LoadOptions, Loader, default_material, light::Light, whole};
-use crate::{EnvironmentMap, Scene, error::Result, files, import::Imported, mitsuba, pbrt};
+use super::{LoadOptions, Loader, default_material, light::Light, viewed, whole};
+use crate::{
+    EnvironmentMap, Scene, beside::Folder, error::Result, files, import::Imported, mitsuba, pbrt,
+};
 
 impl Loader<'_> {
     /// Reads the file at the loader's path by its extension, with the camera that is named; `None` for a
     /// format that cannot be a whole scene.
     pub(super) fn import(&self, camera: Option<&str>) -> Result<Option<Imported>> {
         let mut imported = if files::extension(self.path) == "xml" {
-            mitsuba::read(self.path, camera)?
+            mitsuba::read(self.path, camera, Folder::of(self.path).allowing(self.allowed))?
         } else if pbrt::is_pbrt(self.path) {
             if let Some(name) = camera {
                 let message = "a pbrt file has one camera; the option is for glTF files";
                 return Err(self.error(format!("--camera {name}: {message}")));
             }
-            pbrt::read(self.path)?
+            pbrt::read(self.path, Folder::of(self.path).allowing(self.allowed))?
         } else if whole::is_whole(self.path) {
             self.whole(camera)?
         } else {
@@ -32,8 +34,9 @@ impl Loader<'_> {
     /// Makes a scene of an imported file. The map of `--environment` replaces its own; a format without
     /// one is lit by white.
     pub(super) fn imported(&self, imported: Imported, options: &LoadOptions) -> Result<Scene> {
-        let Imported { film, lamps, materials, geometry, mut inputs, mut warnings, .. } = imported;
-        let camera = self.camera(&imported.camera)?;
+        let Imported { film, asked, lamps, materials, geometry, mut inputs, mut warnings, .. } =
+            imported;
+        let camera = self.camera(&viewed(&imported.camera, options))?;
         self.check_film(&film)?;
         let mut environment = match (&options.environment, imported.environment) {
             (Some(map), _) => {
@@ -55,6 +58,7 @@ impl Loader<'_> {
         let light = Light { environment, lamps, portals: Vec::new() };
         let mut scene = self.scene(camera, film, light, materials, geometry, warnings);
         scene.inputs = inputs;
+        scene.asked = asked;
         Ok(scene)
     }
 }

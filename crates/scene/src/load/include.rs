@@ -159,12 +159,13 @@ impl Loader<'_> {
         warnings: &mut Vec<String>,
     ) -> Result<Contents> {
         if !whole::is_whole(path) {
-            let imported = Loader::new(path).import(None)?.ok_or_else(|| {
-                self.error(format!(
+            let imported =
+                Loader::new(path).allowing(self.allowed).import(None)?.ok_or_else(|| {
+                    self.error(format!(
                     "{label}: expected a file in .gltf, .glb, .obj, .pbrt or .xml; other meshes \
                      are objects"
                 ))
-            })?;
+                })?;
             inputs.extend(imported.inputs);
             warnings.extend(imported.warnings);
             if imported.environment.is_some_and(|environment| !environment.is_black()) {

@@ -4,6 +4,7 @@
 
 mod import;
 mod include;
+mod inside;
 mod light;
 mod materials;
 mod objects;
@@ -15,7 +16,7 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 
 use super::{
-    Camera, FilmSettings, Geometry, Scene,
+    Asked, Camera, FilmSettings, Geometry, Scene,
     file::{CameraEntry, SceneFile},
 };
 use crate::{
@@ -27,6 +28,9 @@ use light::Light;
 
 pub use super::{MAX_FILM_SIDE, MIN_ALPHA};
 
+/// Formats of scenes, for messages.
+const SCENE_EXTENSIONS: &str = ".toml, .gltf, .glb, .obj, .pbrt or .xml (Mitsuba)";
+
 /// Options of the command line that add to a scene file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadOptions {
@@ -37,6 +41,15 @@ pub struct LoadOptions {
     pub rotation_deg: Option<f32>,
     /// Name of the camera in a glTF file, or its number from 0.
     pub camera: Option<String>,
+    /// Place of the camera, the point that it looks at, and its vertical field of view in degrees, instead
+    /// of the scene's.
+    pub look_from: Option<[f32; 3]>,
+    /// See [`LoadOptions::look_from`].
+    pub look_at: Option<[f32; 3]>,
+    /// See [`LoadOptions::look_from`].
+    pub vertical_fov_deg: Option<f32>,
+    /// Folder whose files pbrt and Mitsuba scenes may name, beside their own.
+    pub allow_root: Option<PathBuf>,
 }
 
 impl Scene {
@@ -56,9 +69,16 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`], and for a camera that the file does not have.
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self> {
-        let loader = Loader::new(path);
+        let loader = Loader::new(path).allowing(options.allow_root.as_deref());
         if let Some(imported) = loader.import(options.camera.as_deref())? {
             return loader.imported(imported, options);
+        }
+        let extension = files::extension(path);
+        if !matches!(extension.as_str(), "toml" | "") && path.is_file() {
+            return Err(Error::format(
+                path,
+                format!("expected a scene in {SCENE_EXTENSIONS}, found .{extension}"),
+            ));
         }
         Self::parse_with(path, &files::read_text(path)?, options)
     }
@@ -73,13 +93,13 @@ impl Scene {
 
     fn parse_with(path: &Path, text: &str, options: &LoadOptions) -> Result<Self> {
         let file = SceneFile::parse(path, text)?;
-        let loader = Loader::new(path);
+        let loader = Loader::new(path).allowing(options.allow_root.as_deref());
         if let Some(name) = &options.camera {
             let message = "a scene in .toml has one camera; the option is for glTF files";
             return Err(loader.error(format!("--camera {name}: {message}")));
         }
         let mut warnings = Vec::new();
-        let camera = loader.camera(&file.camera)?;
+        let camera = loader.camera(&viewed(&file.camera, options))?;
         loader.check_film(&file.film)?;
         let mut inputs = Vec::new();
         let mut materials = loader.materials(&file.materials, &mut inputs, &mut warnings)?;
@@ -116,14 +136,37 @@ fn default_material() -> Material {
     Material::new("default", MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) })
 }
 
+/// Camera with what the options say of it. A camera that is moved alone keeps its direction.
+fn viewed(camera: &CameraEntry, options: &LoadOptions) -> CameraEntry {
+    let mut viewed = camera.clone();
+    if let Some(place) = options.look_from {
+        let way = Vec3::from(viewed.look_at) - Vec3::from(viewed.position);
+        viewed.position = place;
+        viewed.look_at = (Vec3::from(place) + way).to_array();
+    }
+    if let Some(point) = options.look_at {
+        viewed.look_at = point;
+    }
+    if let Some(fov) = options.vertical_fov_deg {
+        viewed.vertical_fov_deg = fov;
+    }
+    viewed
+}
+
 struct Loader<'a> {
     path: &'a Path,
     folder: &'a Path,
+    /// Folder whose files a scene may name beside its own.
+    allowed: Option<&'a Path>,
 }
 
 impl<'a> Loader<'a> {
     fn new(path: &'a Path) -> Self {
-        Self { path, folder: path.parent().unwrap_or(Path::new("")) }
+        Self { path, folder: path.parent().unwrap_or(Path::new("")), allowed: None }
+    }
+
+    fn allowing(self, allowed: Option<&'a Path>) -> Self {
+        Self { allowed, ..self }
     }
 
     /// Puts the parts together; warns of a scene without any light.
@@ -153,6 +196,7 @@ impl<'a> Loader<'a> {
             materials,
             geometry,
             inputs: vec![self.path.to_path_buf()],
+            asked: Asked::default(),
             warnings,
             hash: String::new(),
         };

@@ -4,13 +4,18 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::{Loader, MAX_FILM_SIDE, default_material, objects::lacking_uvs};
+use super::{
+    Loader, MAX_FILM_SIDE, default_material,
+    inside::{self, View},
+    objects::lacking_uvs,
+};
 use crate::{
-    FilmSettings, Filter, Geometry,
+    Asked, FilmSettings, Filter, Geometry,
     error::Result,
     features::{self, Ignored},
     file::CameraEntry,
     files,
+    geometry::{Dropped, DroppedOfMany},
     import::Imported,
     instance::{Instance, MAX_INSTANCES, bounds},
     material::{Material, MaterialKind},
@@ -25,6 +30,8 @@ const ASPECT_RATIO: f32 = 4.0 / 3.0;
 /// Direction from the middle of the scene to the camera that frames it, and its field of view.
 const FRAMING_DIRECTION: Vec3 = Vec3::new(0.5, 0.4, 1.0);
 const FRAMING_FOV_DEG: f32 = 45.0;
+/// Field of view of a camera in a room.
+const INSIDE_FOV_DEG: f32 = 60.0;
 
 impl Loader<'_> {
     /// Reads the mesh file at the loader's path as a whole scene, with the camera that is named.
@@ -41,11 +48,13 @@ impl Loader<'_> {
                 lens.aspect_ratio.filter(|ratio| *ratio > 0.0).unwrap_or(ASPECT_RATIO),
             ),
             None => {
-                let entry = self.frame(&geometry)?;
+                let (entry, does) = self.frame(&geometry)?;
+                let CameraEntry { position: [x, y, z], look_at: [u, v, w], .. } = entry;
                 warnings.push(format!(
-                    "{}: no perspective camera; one at {:?} frames the bounding box",
+                    "{}: no perspective camera; one that {does} takes its place: --look-from \
+                     {x:.3},{y:.3},{z:.3} --look-at {u:.3},{v:.3},{w:.3} --fov {}",
                     self.path.display(),
-                    entry.position
+                    entry.vertical_fov_deg
                 ));
                 (entry, ASPECT_RATIO)
             }
@@ -58,7 +67,18 @@ impl Loader<'_> {
         };
         let inputs = [vec![self.path.to_path_buf()], mesh.side_files].concat();
         let (environment, lamps) = (None, mesh.lamps);
-        Ok(Imported { camera, film, environment, lamps, materials, geometry, inputs, warnings })
+        let asked = Asked::default();
+        Ok(Imported {
+            camera,
+            film,
+            asked,
+            environment,
+            lamps,
+            materials,
+            geometry,
+            inputs,
+            warnings,
+        })
     }
 
     /// Finds the camera named `name`, else the first with perspective; the others are ignored.
@@ -139,11 +159,15 @@ impl Loader<'_> {
             let run = next.checked_sub(1).and_then(|run| mesh.runs[run].material);
             run.unwrap_or(lacking) as u32
         });
+        let mut dropped_of_repeated = DroppedOfMany::default();
         for repeated in &mesh.repeated {
             let material = repeated.material.unwrap_or(lacking);
             let emits = materials[material].surface.emission.is_some();
-            self.place_repeated(repeated, material as u32, emits, &mut geometry, warnings)?;
+            let dropped = self.place_repeated(repeated, material as u32, emits, &mut geometry)?;
+            let triangles = repeated.mesh.triangles.len();
+            dropped_of_repeated.add(dropped, triangles, || "a mesh of several nodes".to_owned());
         }
+        warnings.extend(dropped_of_repeated.warnings(self.path));
         self.check_extent("the scene", geometry.extent())?;
         let label = self.path.display().to_string();
         let is_repeated =
@@ -161,8 +185,7 @@ impl Loader<'_> {
         material: u32,
         emits: bool,
         geometry: &mut Geometry,
-        warnings: &mut Vec<String>,
-    ) -> Result<()> {
+    ) -> Result<Dropped> {
         let mesh = &*repeated.mesh;
         let count = geometry.instances.len() + repeated.places.len();
         self.check(count <= MAX_INSTANCES, || {
@@ -186,26 +209,37 @@ impl Loader<'_> {
                 }
             }
         }
-        let label = format!("{}: a mesh of several nodes", self.path.display());
-        warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
-        Ok(())
+        Ok(dropped)
     }
 
-    /// Camera that sees the whole bounding sphere of the bounding box.
-    fn frame(&self, geometry: &Geometry) -> Result<CameraEntry> {
+    /// Camera inside a room, else one that sees the whole bounding sphere of the bounding box, with a word
+    /// on it.
+    fn frame(&self, geometry: &Geometry) -> Result<(CameraEntry, &'static str)> {
         let Some([low, high]) = bounds(geometry.used_extent()) else {
             return Err(self.error("expected triangles or a camera, found neither"));
         };
+        if let Some(View { from, at }) = inside::view(geometry, low, high) {
+            let entry = CameraEntry {
+                position: from.to_array(),
+                look_at: at.to_array(),
+                up: [0.0, 1.0, 0.0],
+                vertical_fov_deg: INSIDE_FOV_DEG,
+                aperture_radius: 0.0,
+                focus_distance: None,
+            };
+            return Ok((entry, "stands in the room"));
+        }
         let (centre, radius) = (0.5 * (low + high), 0.5 * (high - low).length());
         let distance = radius / (0.5 * FRAMING_FOV_DEG).to_radians().sin();
-        Ok(CameraEntry {
+        let entry = CameraEntry {
             position: (centre + distance * FRAMING_DIRECTION.normalize()).to_array(),
             look_at: centre.to_array(),
             up: [0.0, 1.0, 0.0],
             vertical_fov_deg: FRAMING_FOV_DEG,
             aperture_radius: 0.0,
             focus_distance: None,
-        })
+        };
+        Ok((entry, "frames the bounding box"))
     }
 }
 

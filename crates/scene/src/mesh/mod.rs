@@ -3,7 +3,7 @@
 //! The extension tells PLY, OBJ and glTF apart. PLY and OBJ are streamed, glTF is read whole. All
 //! keep single precision and leave nothing but the arrays of [`Mesh`] behind.
 
-mod beside;
+mod coincident;
 pub mod gltf;
 mod images;
 mod mtl;
@@ -108,6 +108,8 @@ pub struct MeshMaterial {
     pub material: Material,
     /// Parts of the material that are left out.
     pub ignored: Ignored,
+    /// True if a rasteriser shows only the side from which the triangles are counter-clockwise.
+    pub is_culled: bool,
 }
 
 impl Mesh {

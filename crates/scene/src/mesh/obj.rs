@@ -13,13 +13,13 @@ use std::{
 
 use super::{
     Mesh, MeshMaterial,
-    beside::path_beside,
     images::Images,
     mtl::{Library, LibraryMaterial},
 };
 use glam::Vec3;
 
 use crate::{
+    beside::Folder,
     error::{Error, Result},
     features::{self, Ignored},
     files,
@@ -63,8 +63,9 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
         reader.line = line;
         reader.read_line(text, warnings)
     })?;
-    let (mesh, ignored) = reader.finish();
+    let (mut mesh, ignored) = reader.finish();
     warnings.extend(ignored.warnings(path));
+    mesh.part_coincident(path, warnings);
     Ok(mesh)
 }
 
@@ -282,7 +283,11 @@ impl ObjReader<'_> {
             let place = || format!("`{name}`, line {}", self.line);
             self.ignored.add(features::OBJ_UNDESCRIBED, place);
             let kind = MaterialKind::Diffuse { reflectance: Vec3::ONE };
-            MeshMaterial { material: Material::new(name, kind), ignored: Ignored::default() }
+            MeshMaterial {
+                material: Material::new(name, kind),
+                ignored: Ignored::default(),
+                is_culled: false,
+            }
         };
         let index = self.mesh.materials.len();
         self.mesh.materials.push(material);
@@ -292,29 +297,34 @@ impl ObjReader<'_> {
 
     /// Reads MTL libraries; one line may name several files.
     fn read_library(&mut self, names: &str, warnings: &mut Vec<String>) -> Result<()> {
-        let folder = self.path.parent().unwrap_or(Path::new(""));
-        let beside = |name: &str| {
-            path_beside(folder, Path::new(""), name).map_err(|message| self.error(message))
+        let folder = Folder::of(self.path);
+        let names = match folder.file(names) {
+            Ok(whole) if whole.is_file() => vec![names],
+            _ => names.split_ascii_whitespace().collect(),
         };
-        let paths = match beside(names) {
-            Ok(whole) if whole.is_file() => vec![whole],
-            _ => names.split_ascii_whitespace().map(beside).collect::<Result<_>>()?,
-        };
-        for path in paths {
-            if self.mesh.side_files.contains(&path) {
+        for name in names {
+            let path = folder.file(name);
+            if path.as_ref().is_ok_and(|path| self.mesh.side_files.contains(path)) {
                 continue;
             }
-            let Ok(file) = files::open_regular(&path) else {
-                warnings.push(format!(
-                    "{}:{}: cannot read the material library {}; its materials are white",
-                    self.path.display(),
-                    self.line,
-                    path.display()
-                ));
-                continue;
+            let found = path.and_then(|path| {
+                let file = files::open_regular(&path).map_err(|error| error.to_string())?;
+                Ok((path, file))
+            });
+            let (path, file) = match found {
+                Ok(found) => found,
+                Err(message) => {
+                    warnings.push(format!(
+                        "{}:{}: cannot read the material library `{name}` ({message}); its \
+                         materials are white",
+                        self.path.display(),
+                        self.line,
+                    ));
+                    continue;
+                }
             };
             self.mesh.side_files.push(path.clone());
-            let mut library = Library::new(folder, &path);
+            let mut library = Library::new(&folder, &path);
             for_each_line(&path, BufReader::new(file), |line, text| library.read_line(line, text))?;
             let first = self.library.len();
             self.library.extend(library.materials);

@@ -15,10 +15,7 @@ use crate::{
     coat::albedo_below_coat,
     error::Result,
     features,
-    import::{
-        blend::{Share, blend},
-        media,
-    },
+    import::media,
     material::{ConductorFresnel, MaterialKind, Opacity, Surface},
     math::colour::luminance,
     texture::TextureUse,
@@ -27,16 +24,29 @@ use crate::{
 /// Most models in one another; a model may name itself.
 const MAX_DEPTH: usize = 16;
 /// Index ratio below which a coat reflects next to nothing, and is left out.
-const LEAST_COAT_IOR: f32 = 1.01;
+pub(super) const LEAST_COAT_IOR: f32 = 1.01;
 /// Refractive indices that a coat may have, and those of a dielectric.
-const MAX_COAT_IOR: f32 = 4.0;
+pub(super) const MAX_COAT_IOR: f32 = 4.0;
 const IOR_RANGE: (f32, f32) = (0.1, 10.0);
 
+/// Name of a model of today for one of versions up to 0.2.
+fn current_name(kind: &str) -> &str {
+    match kind {
+        "lambertian" => "diffuse",
+        "mirror" => "conductor",
+        "roughmetal" => "roughconductor",
+        "roughglass" => "roughdielectric",
+        "microfacet" => "roughplastic",
+        "composite" => "mixturebsdf",
+        kind => kind,
+    }
+}
+
 /// Width of the distribution of a rough model.
-struct Width {
-    alpha: f32,
+pub(super) struct Width {
+    pub alpha: f32,
     /// Factor of √α, for which `alpha` is then 1.
-    texture: Option<TextureUse>,
+    pub texture: Option<TextureUse>,
 }
 
 /// Reflection of a material with its textures and opacity.
@@ -54,7 +64,7 @@ impl Model {
     }
 
     /// Model whose first factor is `value`.
-    fn colored(value: Value, kind: impl FnOnce(Vec3) -> MaterialKind) -> Self {
+    pub(super) fn colored(value: Value, kind: impl FnOnce(Vec3) -> MaterialKind) -> Self {
         let is_of_vertices = value.is_of_vertices();
         let (factor, texture) = value.split();
         let mut model = Self::new(kind(factor));
@@ -81,15 +91,17 @@ impl Reader<'_> {
         self.nested(node, MAX_DEPTH)
     }
 
-    fn nested(&mut self, node: Node<'_>, depth_left: usize) -> Result<Model> {
+    pub(super) fn nested(&mut self, node: Node<'_>, depth_left: usize) -> Result<Model> {
         let Some(depth_left) = depth_left.checked_sub(1) else {
             return Err(node.error("a bsdf contains itself, or is nested too deep"));
         };
         let parameters = Parameters::new(node);
-        let model = match node.kind() {
+        let model = match current_name(node.kind()) {
             "twosided" => self.two_sided(&parameters, depth_left)?,
             "mask" => self.mask(&parameters, depth_left)?,
             "blendbsdf" => self.blend(&parameters, depth_left)?,
+            "mixturebsdf" => self.mixture(&parameters, depth_left)?,
+            "coating" | "roughcoating" => self.coating(&parameters, depth_left)?,
             "bumpmap" | "bump" => {
                 self.ignored.add(features::MI_BUMP_MAP, || node.place());
                 let model = self.inner(&parameters, depth_left)?;
@@ -113,8 +125,18 @@ impl Reader<'_> {
                 let value = value.unwrap_or(Value::Color(Vec3::splat(0.5)));
                 Model::colored(value, |reflectance| MaterialKind::Diffuse { reflectance })
             }
+            "difftrans" => {
+                self.ignored.add(features::MI_DIFFUSE_TRANSMISSION, || node.place());
+                let value = self.value(&parameters, "transmittance", Role::Reflectance)?;
+                let value = value.unwrap_or(Value::Color(Vec3::splat(0.5)));
+                Model::colored(value, |reflectance| MaterialKind::Diffuse { reflectance })
+            }
+            "phong" | "ward" => self.phong(&parameters)?,
             "plastic" => self.plastic(&parameters, MIN_ALPHA)?,
-            "roughplastic" => {
+            "roughplastic" | "pplastic" => {
+                if node.kind() == "pplastic" {
+                    self.ignored.add(features::MI_POLARIZED, || node.place());
+                }
                 let Width { alpha, texture } = self.width(&parameters)?;
                 self.plastic(&parameters, alpha)?.of_roughness(texture)
             }
@@ -131,12 +153,9 @@ impl Reader<'_> {
             "thindielectric" => self.thin_dielectric(&parameters)?,
             "principled" => self.principled(&parameters)?,
             found => {
-                return Err(node.error(format!(
-                    "the reflection model `{found}` is not rendered; expected diffuse, plastic, \
-                     roughplastic, conductor, roughconductor, dielectric, roughdielectric, \
-                     thindielectric, principled, twosided, mask, blendbsdf, normalmap, bumpmap or \
-                     null"
-                )));
+                let name = format!("reflection model `{found}`, which is diffuse of 0.5");
+                self.ignored.add_named(features::MI_MODEL, &name, || node.place());
+                return Ok(Model::default_of_shapes());
             }
         };
         parameters.finish(&mut self.ignored);
@@ -144,7 +163,11 @@ impl Reader<'_> {
     }
 
     /// The one model in another.
-    fn inner(&mut self, parameters: &Parameters<'_>, depth_left: usize) -> Result<Model> {
+    pub(super) fn inner(
+        &mut self,
+        parameters: &Parameters<'_>,
+        depth_left: usize,
+    ) -> Result<Model> {
         match parameters.objects("bsdf")?.first() {
             Some(&inner) => self.nested(inner, depth_left),
             None => {
@@ -171,7 +194,7 @@ impl Reader<'_> {
     }
 
     /// Multiplies the opacity of a model; of two textures, names the inner one.
-    fn cut(&mut self, model: &mut Model, node: Node<'_>, opacity: Value) {
+    pub(super) fn cut(&mut self, model: &mut Model, node: Node<'_>, opacity: Value) {
         let (factor, texture) = opacity.split();
         let own = &mut model.surface.opacity;
         own.factor *= luminance(factor);
@@ -182,51 +205,6 @@ impl Reader<'_> {
             }
             own.texture = texture;
         }
-    }
-
-    /// Mixture of two models: an opacity if one of them is `null`, else the greater of them if they do
-    /// not mix.
-    fn blend(&mut self, parameters: &Parameters<'_>, depth_left: usize) -> Result<Model> {
-        let node = parameters.node;
-        let [first, second] = parameters.objects("bsdf")?[..] else {
-            return Err(node.error("blendbsdf: expected two bsdfs in it"));
-        };
-        let weight = self.value(parameters, "weight", Role::Reflectance)?;
-        let weight = weight.unwrap_or(Value::Color(Vec3::splat(0.5)));
-        if second.kind() == "null" {
-            let mut model = self.nested(first, depth_left)?;
-            let opacity = match weight {
-                Value::Color(weight) | Value::Vertices(weight) => Value::Color(Vec3::ONE - weight),
-                Value::Texture(mut texture) => {
-                    texture.scale = texture.scale.map(|scale| -scale);
-                    texture.bias = texture.bias.map(|bias| 1.0 - bias);
-                    Value::Texture(texture)
-                }
-            };
-            self.cut(&mut model, node, opacity);
-            return Ok(model);
-        }
-        if first.kind() == "null" {
-            let mut model = self.nested(second, depth_left)?;
-            self.cut(&mut model, node, weight);
-            return Ok(model);
-        }
-        let [first, second] = [self.nested(first, depth_left)?, self.nested(second, depth_left)?];
-        let share = match weight {
-            Value::Texture(image) => Share::Image(*image),
-            Value::Color(weight) | Value::Vertices(weight) => {
-                Share::Constant(luminance(weight).clamp(0.0, 1.0))
-            }
-        };
-        let pair = [&first, &second].map(|model| (&model.kind, &model.surface));
-        if let Some((kind, surface)) = blend(pair, &share) {
-            return Ok(Model { kind, surface });
-        }
-        let takes_second = matches!(share, Share::Constant(share) if share > 0.5);
-        if !matches!(share, Share::Constant(0.0 | 1.0)) {
-            self.ignored.add(features::MI_BLEND, || node.place());
-        }
-        Ok(if takes_second { second } else { first })
     }
 
     fn normal_map(&mut self, parameters: &Parameters<'_>, depth_left: usize) -> Result<Model> {
@@ -240,7 +218,7 @@ impl Reader<'_> {
     }
 
     /// Width of the distribution of a rough model.
-    fn width(&mut self, parameters: &Parameters<'_>) -> Result<Width> {
+    pub(super) fn width(&mut self, parameters: &Parameters<'_>) -> Result<Width> {
         let node = parameters.node;
         match parameters.string("distribution")? {
             Some("ggx") => {}
@@ -253,6 +231,11 @@ impl Reader<'_> {
             }
         }
         parameters.without_effect(&["sample_visible", "specular_sampling_weight"]);
+        self.width_of(parameters)
+    }
+
+    pub(super) fn width_of(&mut self, parameters: &Parameters<'_>) -> Result<Width> {
+        let node = parameters.node;
         let mut width = |name: &str| self.value(parameters, name, Role::Index);
         let value = match (width("alpha_u")?, width("alpha_v")?) {
             (Some(Value::Color(u)), Some(Value::Color(v))) => {
@@ -284,7 +267,7 @@ impl Reader<'_> {
     }
 
     /// Index of the inside over that of the outside.
-    fn ior(&mut self, parameters: &Parameters<'_>, inside: &str) -> Result<f32> {
+    pub(super) fn ior(&mut self, parameters: &Parameters<'_>, inside: &str) -> Result<f32> {
         let index = |name: &str, default: &str| {
             let Some(node) = parameters.any(name)? else {
                 return Ok(media::dielectric(default).unwrap_or(1.0));

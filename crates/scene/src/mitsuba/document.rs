@@ -2,16 +2,19 @@
 //! those of version 3.
 
 use std::{
-    collections::HashMap,
+    cell::RefCell,
+    collections::{BTreeSet, HashMap},
     fs,
-    path::{Component, Path, PathBuf},
+    path::{Path, PathBuf},
 };
 
 use roxmltree::ParsingOptions;
 
 use super::text::{self, Lines, snake_case};
 use crate::{
+    beside::{Folder, in_another_case},
     error::{Error, Result},
+    features::{self, Ignored},
     files,
 };
 
@@ -32,10 +35,14 @@ pub(super) struct Document {
     elements: Vec<Element>,
     /// Files in the order in which they were met; the scene first.
     pub files: Vec<PathBuf>,
-    /// Folder of the scene, which no path leaves.
-    folder: PathBuf,
-    /// Folders of `path`, within that of the scene.
+    /// Folder of the scene.
+    folder: Folder,
+    /// Folders of `path`, in which names start too.
     search: Vec<PathBuf>,
+    /// Version of the format that the scene states; 3 if it states none.
+    version: f32,
+    /// Files whose names are written in another case.
+    renamed: RefCell<BTreeSet<String>>,
     /// Element of each name.
     ids: HashMap<String, usize>,
 }
@@ -84,6 +91,11 @@ impl<'a> Node<'a> {
         self.attribute("type").unwrap_or_default()
     }
 
+    /// Version of the format that the scene states.
+    pub(super) fn version(self) -> f32 {
+        self.document.version
+    }
+
     /// Elements in this one, in their order.
     pub(super) fn children(self) -> impl Iterator<Item = Node<'a>> {
         let document = self.document;
@@ -124,22 +136,36 @@ impl<'a> Node<'a> {
     /// [`Error::Parse`] for a name that leaves the folder of the scene, or a file that is not there.
     pub(super) fn file(self, name: &str) -> Result<PathBuf> {
         let document = self.document;
-        document.resolve(name).map_err(|message| self.error(message))
+        document.resolve(name).map_err(|missing| self.error(missing.message()))
+    }
+
+    /// As [`Node::file`]; none inside for a file that is not there.
+    ///
+    /// # Errors
+    /// [`Error::Parse`] for a name that leaves the folder of the scene.
+    pub(super) fn file_if_there(self, name: &str) -> Result<Option<PathBuf>> {
+        match self.document.resolve(name) {
+            Ok(path) => Ok(Some(path)),
+            Err(Missing::Absent(_)) => Ok(None),
+            Err(Missing::Forbidden(message)) => Err(self.error(message)),
+        }
     }
 }
 
 impl Document {
-    /// Reads the scene file and all that it includes.
+    /// Reads the scene file and all that it includes; names of files start in `folder`.
     ///
     /// # Errors
     /// [`Error::Parse`] with the line, and errors of reading.
-    pub(super) fn read(path: &Path) -> Result<Self> {
+    pub(super) fn read(path: &Path, folder: Folder) -> Result<Self> {
         let mut builder = Builder {
             document: Self {
                 elements: Vec::new(),
                 files: Vec::new(),
-                folder: files::parent_of(path).to_path_buf(),
+                folder,
                 search: Vec::new(),
+                version: 3.0,
+                renamed: RefCell::default(),
                 ids: HashMap::new(),
             },
             defaults: HashMap::new(),
@@ -162,42 +188,52 @@ impl Document {
         Node { document: self, index: 0 }
     }
 
-    /// Finds a file by its name; the message of an error names it.
-    fn resolve(&self, name: &str) -> Result<PathBuf, String> {
-        let inside = inside(name)?;
-        let mut folders = vec![Path::new("")];
-        folders.extend(self.search.iter().map(PathBuf::as_path));
-        let paths = folders.iter().map(|folder| self.folder.join(folder).join(&inside));
-        let found = paths.clone().find(|path| path.exists());
-        found.ok_or_else(|| {
-            let sought: Vec<_> = paths.map(|path| path.display().to_string()).collect();
-            format!("the file `{name}` is not there; expected {}", sought.join(" or "))
-        })
+    /// Finds a file by its name, in another case if there is none in its own.
+    fn resolve(&self, name: &str) -> Result<PathBuf, Missing> {
+        let own = [PathBuf::new()];
+        let folders = own.iter().chain(&self.search);
+        let paths = folders.map(|folder| self.folder.file_within(folder, name));
+        let (paths, forbidden): (Vec<_>, Vec<_>) = paths.partition(Result::is_ok);
+        let paths: Vec<_> = paths.into_iter().flatten().collect();
+        if let Some(path) = paths.iter().find(|path| path.exists()) {
+            return Ok(path.clone());
+        }
+        if let Some(path) = paths.iter().find_map(|path| in_another_case(path)) {
+            self.renamed.borrow_mut().insert(name.to_owned());
+            return Ok(path);
+        }
+        if let Some(message) = forbidden.into_iter().find_map(Result::err) {
+            return Err(Missing::Forbidden(message));
+        }
+        let sought: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
+        let sought = sought.join(" or ");
+        Err(Missing::Absent(format!("the file `{name}` is not there; expected {sought}")))
+    }
+
+    /// Warnings on files in another case.
+    pub(super) fn renamed(&self) -> Ignored {
+        let mut renamed = Ignored::default();
+        for name in self.renamed.borrow().iter() {
+            renamed.add(features::MI_FILE_CASE, || format!("`{name}`"));
+        }
+        renamed
     }
 }
 
-/// Checks that a name stays in the folder that it is relative to.
-fn inside(name: &str) -> Result<PathBuf, String> {
-    let slashed = name.replace('\\', "/");
-    let mut inside = PathBuf::new();
-    let is_absolute = slashed.starts_with('/')
-        || slashed.split('/').next().is_some_and(|first| first.contains(':'));
-    let mut leaves = is_absolute || slashed.contains('\0');
-    for component in Path::new(&slashed).components() {
-        match component {
-            Component::Normal(part) => inside.push(part),
-            Component::CurDir => {}
-            Component::ParentDir => leaves |= !inside.pop(),
-            Component::RootDir | Component::Prefix(_) => leaves = true,
-        }
+/// Message on a file that cannot be used.
+#[derive(Debug)]
+enum Missing {
+    /// The name is right, but no file has it.
+    Absent(String),
+    /// No file may have the name.
+    Forbidden(String),
+}
+
+impl Missing {
+    fn message(self) -> String {
+        let (Self::Absent(message) | Self::Forbidden(message)) = self;
+        message
     }
-    if leaves || inside.as_os_str().is_empty() {
-        return Err(format!(
-            "the file name `{name}` is empty, absolute or leaves the folder of the scene; expected \
-             a file in that folder or below: put it there and name it relative to the scene"
-        ));
-    }
-    Ok(inside)
 }
 
 struct Builder {
@@ -235,6 +271,12 @@ impl Builder {
                 root.tag_name().name()
             );
             return Err(Error::parse(path, lines.line(root.range().start) as usize, 1, message));
+        }
+        if file == 0
+            && let Some(version) = root.attribute("version")
+        {
+            let first = version.split('.').take(2).collect::<Vec<_>>().join(".");
+            self.document.version = first.parse().unwrap_or(self.document.version);
         }
         let source = Source { path, file, lines: &lines };
         for child in root.children().filter(roxmltree::Node::is_element) {
@@ -280,7 +322,7 @@ impl Builder {
                 return Ok(());
             }
             "path" => {
-                let folder = inside(&attribute("value")?).map_err(error)?;
+                let folder = PathBuf::from(attribute("value")?.replace('\\', "/"));
                 self.document.search.push(folder);
                 return Ok(());
             }
@@ -325,7 +367,7 @@ impl Builder {
         depth: usize,
         error: &dyn Fn(String) -> Error,
     ) -> Result<()> {
-        let path = self.document.resolve(name).map_err(error)?;
+        let path = self.document.resolve(name).map_err(|missing| error(missing.message()))?;
         if self.document.files.len() > MAX_INCLUDES {
             return Err(error(format!("more than {MAX_INCLUDES} files are included")));
         }
@@ -348,7 +390,8 @@ impl Builder {
                 let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_');
                 let name = &rest[..end.unwrap_or(rest.len())];
                 return Err(format!(
-                    "`${name}` has no value; expected `<default name=\"{name}\" value=\"…\"/>` above"
+                    "`${name}` has no value; expected `<default name=\"{name}\" value=\"…\"/>` above, in \
+                     place of Mitsuba's option `-D {name}=…`"
                 ));
             };
             replaced.push_str(default);

@@ -34,15 +34,21 @@ impl Reader<'_> {
                 self.surround(node, map)?;
                 None
             }
+            "sunsky" | "sky" | "sun" => {
+                let map = self.daylight(&parameters)?;
+                self.surround(node, map)?;
+                None
+            }
             "point" => Some(point(&parameters)?),
             "spot" => Some(self.spot(&parameters)?),
             "directional" | "distant" => Some(directional(&parameters)?),
+            // Shapes that refer to it read it.
+            "area" if node.attribute("id").is_some() => return Ok(()),
             "area" => return Err(node.error("an area light must stand in a shape")),
             found => {
-                return Err(node.error(format!(
-                    "the emitter `{found}` is not rendered; expected area, point, spot, \
-                     directional, constant or envmap"
-                )));
+                let name = format!("emitter `{found}`");
+                self.ignored.add_named(features::MI_EMITTER, &name, || node.place());
+                return Ok(());
             }
         };
         parameters.without_effect(&["sampling_weight"]);

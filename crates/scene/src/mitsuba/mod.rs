@@ -5,9 +5,11 @@
 //! Mitsuba 3.9.1, whose documentation is at <https://mitsuba.readthedocs.io>.
 
 mod bsdfs;
+mod daylight;
 mod document;
 mod emitters;
 mod environment;
+mod mixtures;
 mod parameters;
 mod principled;
 mod sensor;
@@ -29,12 +31,15 @@ use glam::Vec3;
 
 use self::{bsdfs::Model, document::Document, shapes::Shape};
 use super::{
-    EnvironmentMap, Geometry, Lamp,
+    Asked, EnvironmentMap, Geometry, Lamp,
     features::{self, Ignored},
+    geometry::DroppedOfMany,
     instance::Budget,
     instances::Prototype,
 };
-use crate::{error::Result, import::Imported, material::Material, texture::TextureCache};
+use crate::{
+    beside::Folder, error::Result, import::Imported, material::Material, texture::TextureCache,
+};
 
 /// Scene on its way from the document.
 struct Reader<'a> {
@@ -54,17 +59,20 @@ struct Reader<'a> {
     /// Triangles of shapes that are not in a file, and of copies.
     repeated_triangles: usize,
     inputs: Vec<PathBuf>,
+    asked: Asked,
     ignored: Ignored,
+    dropped: DroppedOfMany,
     warnings: Vec<String>,
 }
 
-/// Reads a scene file; `camera` is the id or number of its sensor, which is else the first.
+/// Reads a scene file, whose names of files start in `folder`; `camera` is the id or number of its sensor,
+/// which is else the first.
 ///
 /// # Errors
 /// [`crate::Error::Parse`] with file and line for what cannot be read or rendered, and errors of the
 /// readers of meshes, images and maps.
-pub(crate) fn read(path: &Path, camera: Option<&str>) -> Result<Imported> {
-    let document = Document::read(path)?;
+pub(crate) fn read(path: &Path, camera: Option<&str>, folder: Folder) -> Result<Imported> {
+    let document = Document::read(path, folder)?;
     let mut reader = Reader {
         document: &document,
         textures: TextureCache::default(),
@@ -78,7 +86,9 @@ pub(crate) fn read(path: &Path, camera: Option<&str>) -> Result<Imported> {
         budget: Budget::default(),
         repeated_triangles: 0,
         inputs: document.files.clone(),
+        asked: Asked::default(),
         ignored: Ignored::default(),
+        dropped: DroppedOfMany::default(),
         warnings: Vec::new(),
     };
     let mut sensors = Vec::new();
@@ -87,8 +97,8 @@ pub(crate) fn read(path: &Path, camera: Option<&str>) -> Result<Imported> {
             "sensor" | "camera" => sensors.push(node),
             "shape" => reader.shape(node)?,
             "emitter" | "luminaire" => reader.emitter(node)?,
-            "integrator" => reader.not_taken(node, "max_depth", "integrator"),
-            "sampler" => reader.not_taken(node, "sample_count", "sampler"),
+            "integrator" => reader.integrator(node)?,
+            "sampler" => reader.sampler(node)?,
             "medium" => reader.ignored.add(features::MI_MEDIUM, || node.place()),
             // Models and textures are read where a shape uses them.
             "bsdf" | "texture" | "spectrum" | "rgb" => {}
@@ -109,6 +119,8 @@ pub(crate) fn read(path: &Path, camera: Option<&str>) -> Result<Imported> {
             .map_err(|message| document.root().error(message))?,
     };
     let mut warnings = reader.warnings;
+    warnings.extend(reader.dropped.warnings(path));
+    reader.ignored.merge(&document.renamed());
     warnings.extend(reader.ignored.warnings(path));
     let mut inputs = reader.inputs;
     let mut seen = HashSet::new();
@@ -116,6 +128,7 @@ pub(crate) fn read(path: &Path, camera: Option<&str>) -> Result<Imported> {
     Ok(Imported {
         camera,
         film,
+        asked: reader.asked,
         environment: Some(environment),
         lamps: reader.lamps,
         materials: reader.materials,

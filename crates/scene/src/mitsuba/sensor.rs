@@ -3,12 +3,36 @@
 use glam::{DMat4, DVec3};
 
 use super::{Reader, document::Node, parameters::Parameters};
-use crate::{FilmSettings, Filter, MAX_FILM_SIDE, error::Result, features, file::CameraEntry};
+use crate::{
+    Asked, FilmSettings, Filter, MAX_FILM_SIDE, error::Result, features, file::CameraEntry,
+};
 
 /// Diagonal of a film of 36 × 24 mm, millimetres.
 const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
 /// Vertical fields of view that a camera may have, degrees.
 const FOV_RANGE_DEG: (f64, f64) = (0.01, 179.0);
+
+/// Integrators of light along paths, however they find it.
+const PATH_INTEGRATORS: [&str; 16] = [
+    "path",
+    "volpath",
+    "volpathmis",
+    "volpath_simple",
+    "bdpt",
+    "ptracer",
+    "pssmlt",
+    "mlt",
+    "erpt",
+    "photonmapper",
+    "ppm",
+    "sppm",
+    "prb",
+    "prbvolpath",
+    "prb_basic",
+    "path_guided",
+];
+/// Integrators around another, which is in them.
+const AROUND_INTEGRATORS: [&str; 5] = ["aov", "moment", "adaptive", "irrcache", "stokes"];
 
 /// Film with the part of it that is rendered.
 struct Film {
@@ -63,20 +87,48 @@ impl Reader<'_> {
         let film = self.film(&parameters)?;
         let camera = self.camera(&parameters, &film)?;
         for sampler in parameters.objects("sampler")? {
-            self.not_taken(sampler, "sample_count", "sampler");
+            self.sampler(sampler)?;
         }
         parameters.without_effect(&["near_clip", "far_clip", "shutter_open", "shutter_close"]);
         parameters.finish(&mut self.ignored);
         Ok((camera, film.settings))
     }
 
-    /// Names an integrator or sampler with the number that it would set.
-    pub(super) fn not_taken(&mut self, node: Node<'_>, number: &str, tag: &str) {
-        let value = node.children().find(|child| child.name() == number);
-        let value = value.and_then(|child| child.attribute("value"));
-        let value = value.map(|value| format!(" with `{number}` {value}")).unwrap_or_default();
-        let name = format!("{tag} `{}`{value}", node.kind());
-        self.ignored.add_named(features::MI_INTEGRATOR, &name, || node.place());
+    /// Takes the samples that a file asks for.
+    pub(super) fn sampler(&mut self, node: Node<'_>) -> Result<()> {
+        let count = Parameters::new(node).integer("sample_count")?;
+        let count = count.and_then(|count| u32::try_from(count).ok()).filter(|count| *count > 0);
+        self.asked.samples = count.or(self.asked.samples);
+        Ok(())
+    }
+
+    /// Takes the length of paths that a file asks for; names an integrator that makes other pictures.
+    pub(super) fn integrator(&mut self, node: Node<'_>) -> Result<()> {
+        let parameters = Parameters::new(node);
+        for inner in parameters.objects("integrator")? {
+            self.integrator(inner)?;
+        }
+        if parameters.boolean("hide_emitters")? == Some(true) {
+            self.ignored.add(features::MI_HIDE_EMITTERS, || node.place());
+        }
+        let kind = node.kind();
+        if kind == "direct" {
+            self.asked.depth = Some(1);
+        } else if PATH_INTEGRATORS.contains(&kind) {
+            // Mitsuba counts the edges of a path, the one to the light included.
+            self.asked.depth = match parameters.integer("max_depth")? {
+                None => self.asked.depth,
+                Some(-1) => Some(Asked::MAX_DEPTH),
+                Some(edges) => Some((edges - 1).clamp(1, i64::from(Asked::MAX_DEPTH)) as u32),
+            };
+            let roulette = parameters.integer("rr_depth")?;
+            let roulette = roulette.and_then(|depth| u32::try_from(depth).ok());
+            self.asked.roulette_depth = roulette.or(self.asked.roulette_depth);
+        } else if !AROUND_INTEGRATORS.contains(&kind) {
+            let name = format!("integrator `{kind}`");
+            self.ignored.add_named(features::MI_INTEGRATOR, &name, || node.place());
+        }
+        Ok(())
     }
 
     fn camera(&mut self, parameters: &Parameters<'_>, film: &Film) -> Result<CameraEntry> {
@@ -177,6 +229,12 @@ impl Reader<'_> {
                 "compensate",
                 "gamma",
                 "exposure",
+                "high_quality_edges",
+                "attach_log",
+                "label",
+                "tonemap_method",
+                "key",
+                "burn",
             ]);
             parameters.finish(&mut self.ignored);
         }

@@ -17,6 +17,9 @@ use crate::{
     transform::Transform,
 };
 
+/// Shapes that are read, beside instances of groups.
+const SHAPES: [&str; 8] =
+    ["obj", "ply", "serialized", "rectangle", "cube", "sphere", "disk", "cylinder"];
 /// Most groups in one another; Mitsuba allows one.
 const MAX_GROUPS: usize = 4;
 
@@ -82,11 +85,31 @@ impl Reader<'_> {
         self.place(node, DMat4::IDENTITY, MAX_GROUPS)
     }
 
+    /// Tests for a shape that can be read, and names one that cannot: of an unknown kind, or of a file that
+    /// is not there.
+    fn can_be_read(&mut self, node: Node<'_>) -> Result<bool> {
+        let kind = node.kind();
+        if !SHAPES.contains(&kind) {
+            let name = format!("shapes of the kind `{kind}`");
+            self.ignored.add_named(features::MI_SHAPE, &name, || node.place());
+            return Ok(false);
+        }
+        let Some(name) = Parameters::new(node).string("filename")? else { return Ok(true) };
+        let is_there = node.file_if_there(name)?.is_some();
+        if !is_there {
+            self.ignored.add(features::MI_MISSING, || format!("`{name}`, {}", node.place()));
+        }
+        Ok(is_there)
+    }
+
     fn place(&mut self, node: Node<'_>, outer: DMat4, groups_left: usize) -> Result<()> {
         if node.kind() == "instance" {
             return self.instance(node, outer, groups_left);
         }
         let is_shared = groups_left < MAX_GROUPS;
+        if !self.shapes.contains_key(&node.index) && !self.can_be_read(node)? {
+            return Ok(());
+        }
         let shape = match self.shapes.get(&node.index) {
             Some(shape) => Arc::clone(shape),
             None => {
@@ -125,9 +148,8 @@ impl Reader<'_> {
             None => {
                 let mesh = shape.turned(transform.mirrors);
                 let (prototype, dropped) = self.geometry.add_prototype(&mesh, |_| 0);
-                let label =
-                    format!("{}: shape of {}", self.document.files[0].display(), node.place());
-                self.warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
+                self.dropped
+                    .add(dropped, mesh.triangles.len(), || format!("shape of {}", node.place()));
                 self.prototypes.insert(key, prototype);
                 prototype
             }
@@ -175,8 +197,7 @@ impl Reader<'_> {
         }
         let mesh = shape.turned(transform.mirrors);
         let dropped = self.geometry.append(&mesh, &transform, |_| shape.material);
-        let label = format!("{}: shape of {}", self.document.files[0].display(), node.place());
-        self.warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
+        self.dropped.add(dropped, mesh.triangles.len(), || format!("shape of {}", node.place()));
         check_extent(node, self.geometry.positions[first_vertex..].iter().copied().map(Vec3::from))
     }
 
@@ -221,12 +242,8 @@ impl Reader<'_> {
                 };
                 shape.to_world *= DMat4::from(DAffine3::from_mat3_translation(frame, from));
             }
-            found => {
-                return Err(node.error(format!(
-                    "the shape `{found}` is not rendered; expected obj, ply, serialized, \
-                     rectangle, cube, sphere, disk, cylinder, instance or shapegroup"
-                )));
-            }
+            // Others have been left out.
+            _ => {}
         }
         shape.material = self.material(&parameters)?;
         let surface = &self.materials[shape.material as usize].surface;

@@ -49,6 +49,14 @@ impl Value {
         }
     }
 
+    /// Mean, which is that of the factor for colours of vertices.
+    pub(super) fn mean(&self) -> Vec3 {
+        match self {
+            Self::Color(color) | Self::Vertices(color) => *color,
+            Self::Texture(texture) => texture.mean().into(),
+        }
+    }
+
     /// Tests for the colours of vertices.
     pub(super) fn is_of_vertices(&self) -> bool {
         matches!(self, Self::Vertices(_))
@@ -76,7 +84,10 @@ impl Reader<'_> {
     fn texture(&mut self, node: Node<'_>, scales_left: usize) -> Result<Value> {
         let parameters = Parameters::new(node);
         let value = match node.kind() {
-            "bitmap" | "ldrtexture" => Value::Texture(Box::new(self.bitmap(&parameters)?)),
+            "bitmap" | "ldrtexture" => match self.bitmap(&parameters)? {
+                Some(texture) => Value::Texture(Box::new(texture)),
+                None => Value::Color(Vec3::splat(0.5)),
+            },
             "checkerboard" => {
                 Value::Texture(Box::new(checkerboard(&parameters, &mut self.ignored)?))
             }
@@ -91,10 +102,9 @@ impl Reader<'_> {
             }
             "scale" if scales_left > 0 => self.scaled(&parameters, scales_left)?,
             found => {
-                return Err(node.error(format!(
-                    "the texture `{found}` is not read; expected bitmap, checkerboard or \
-                     mesh_attribute"
-                )));
+                let name = format!("texture `{found}`, which is 0.5");
+                self.ignored.add_named(features::MI_TEXTURE, &name, || node.place());
+                return Ok(Value::Color(Vec3::splat(0.5)));
             }
         };
         parameters.finish(&mut self.ignored);
@@ -119,12 +129,16 @@ impl Reader<'_> {
         })
     }
 
-    fn bitmap(&mut self, parameters: &Parameters<'_>) -> Result<TextureUse> {
+    /// Image of a file; none if that is not there.
+    fn bitmap(&mut self, parameters: &Parameters<'_>) -> Result<Option<TextureUse>> {
         let node = parameters.node;
         let Some(name) = parameters.string("filename")? else {
             return Err(node.error("bitmap: expected the parameter `filename`"));
         };
-        let path = node.file(name)?;
+        let Some(path) = node.file_if_there(name)? else {
+            self.ignored.add(features::MI_MISSING, || format!("`{name}`, {}", node.place()));
+            return Ok(None);
+        };
         let loaded = self.textures.load(&path, &mut self.warnings);
         let texture = loaded.map_err(|error| node.error(error.to_string()))?;
         self.inputs.push(path);
@@ -155,13 +169,13 @@ impl Reader<'_> {
             }
         };
         parameters.without_effect(&["format", "cache", "max_anisotropy", "accel"]);
-        Ok(TextureUse {
+        Ok(Some(TextureUse {
             encoding: if is_raw { Encoding::Linear } else { Encoding::Srgb },
             image_from_uv: image_from_uv(parameters)?,
             wrap: [of_axis("wrap_mode_u")?, of_axis("wrap_mode_v")?],
             interpolation,
             ..TextureUse::new(texture)
-        })
+        }))
     }
 
     /// Colour of a value where a texture cannot be used, which `feature` names.

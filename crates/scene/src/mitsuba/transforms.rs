@@ -20,7 +20,7 @@ pub(super) fn transform(node: Node<'_>) -> Result<DMat4> {
             "scale" => DMat4::from_scale(vector(child, [1.0; 3])?),
             "rotate" => rotation(child)?,
             "matrix" => explicit(child)?,
-            "lookat" | "look_at" => look_at(child)?,
+            "lookat" | "look_at" | "lookAt" => look_at(child)?,
             found => {
                 let expected = "expected translate, rotate, scale, matrix or lookat";
                 return Err(child.error(format!("transform: {expected}, found `{found}`")));

@@ -63,6 +63,8 @@ pub(super) struct Description {
     pub filter: Option<Entity>,
     /// `Integrator`.
     pub integrator: Option<Entity>,
+    /// `Sampler`.
+    pub sampler: Option<Entity>,
     /// `Texture` of type `float`, by name.
     pub float_textures: HashMap<String, Entity>,
     /// `Texture` of type `spectrum`, by name.
@@ -394,7 +396,8 @@ impl<'a> Reader<'a> {
             "Film" => self.description.film = Some(entity),
             "PixelFilter" => self.description.filter = Some(entity),
             "Integrator" => self.description.integrator = Some(entity),
-            // The command line chooses samples and trees.
+            "Sampler" => self.description.sampler = Some(entity),
+            // The renderer has its own tree.
             _ => {}
         }
         Ok(())

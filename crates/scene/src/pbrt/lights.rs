@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
-use super::{log::Log, parameters::Entity, source::path_inside, spectra, textures::Textures};
+use super::{log::Log, parameters::Entity, spectra, textures::Textures};
 use crate::{
     EnvironmentMap, Lamp,
     error::Result,
@@ -201,7 +201,7 @@ impl Lights {
             let message = "expected either `L` or `filename`, found both";
             return Err(color.place.error(format!("{}: {message}", entity.label())));
         }
-        let path = path_inside(textures.folder(), file).map_err(|message| entity.error(message))?;
+        let path = textures.folder().file(file).map_err(|message| entity.error(message))?;
         let mut map = read_map(&path, log).map_err(|error| entity.error(error.to_string()))?;
         if map.width != map.height || map.width > MAX_SIDE {
             return Err(entity.error(format!(

@@ -15,7 +15,7 @@ use crate::{
     error::Result,
     features,
     import::{
-        blend::{Share, blend},
+        blend::{Share, blend, blend_lobes},
         media,
     },
     material::{ConductorFresnel, Material, MaterialKind, Surface},
@@ -371,6 +371,10 @@ impl<'a> Materials<'a> {
                 };
                 let pair = [&first, &second].map(|part| (&part.kind, &part.surface));
                 if let Some((kind, surface)) = blend(pair, &share) {
+                    return Ok(Some(Material { name, kind, surface }));
+                }
+                if let Some((kind, surface)) = blend_lobes(pair, &share) {
+                    log.ignore(features::PBRT_MIX_LOBES, &entity.place);
                     return Ok(Some(Material { name, kind, surface }));
                 }
                 let share = match share {

@@ -30,7 +30,7 @@ use std::{collections::HashMap, path::Path, rc::Rc};
 use glam::{DMat4, Vec3};
 
 use super::{
-    Geometry, MIN_ALPHA,
+    Asked, Geometry, MIN_ALPHA,
     features::{self, Ignored},
     geometry::Dropped,
     instance::{Budget, Instance, MAX_INSTANCES},
@@ -38,6 +38,7 @@ use super::{
     transform::Transform,
 };
 use crate::{
+    beside::Folder,
     error::{Error, Result},
     files,
     import::Imported,
@@ -48,6 +49,7 @@ use directives::{Description, Reader, Shape};
 use lights::{AreaLight, Lights};
 use log::Log;
 use materials::{Materials, set_opacity};
+use parameters::Entity;
 use source::Source;
 use state::MaterialChoice;
 use textures::Textures;
@@ -64,17 +66,17 @@ pub(crate) fn is_pbrt(path: &Path) -> bool {
     }
 }
 
-/// Reads a scene description and the files that it names.
+/// Reads a scene description and the files that it names, in `folder`.
 ///
 /// # Errors
 /// [`Error::Parse`] with file, line and column for everything that cannot be read or rendered,
 /// [`Error::Io`] for the main file.
-pub(crate) fn read(path: &Path) -> Result<Imported> {
+pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
     let mut ignored = Ignored::default();
-    let (description, source) = Reader::read(path, Source::open(path)?, &mut ignored)?;
-    let folder = source.folder().to_path_buf();
+    let (description, source) = Reader::read(path, Source::open(path, folder)?, &mut ignored)?;
+    let folder = source.folder().clone();
     let mut log = Log { main: path, ignored, inputs: source.inputs, warnings: Vec::new() };
-    integrator(&description, &mut log);
+    let asked = asked(&description, &mut log);
     let view = camera::view(&description, path, &mut log)?;
     let textures = Textures::new(&description, &folder);
     let mut lights = Lights::default();
@@ -126,6 +128,7 @@ pub(crate) fn read(path: &Path) -> Result<Imported> {
     Ok(Imported {
         camera: view.camera,
         film: view.film,
+        asked,
         environment: Some(environment),
         lamps: lights.lamps,
         materials,
@@ -135,20 +138,26 @@ pub(crate) fn read(path: &Path) -> Result<Imported> {
     })
 }
 
-/// Reports an integrator that makes other pictures than the renderer's.
-fn integrator(description: &Description, log: &mut Log) {
-    let Some(entity) = &description.integrator else { return };
-    if let Some(depth) = entity.find("maxdepth") {
-        let count = depth.numbers().first().copied().unwrap_or(0.0);
-        let name = format!("`maxdepth` {count} of the integrator");
-        log.ignore_named(features::PBRT_DEPTH, &name, &depth.place);
-    }
+/// Takes the samples and the length of paths; reports an integrator that makes other pictures than the
+/// renderer's.
+fn asked(description: &Description, log: &mut Log) -> Asked {
+    let number = |entity: &Option<Entity>, name: &str| {
+        let number = entity.as_ref()?.find(name)?.numbers().first().copied()?;
+        (number >= 1.0).then_some(number as u32)
+    };
+    let asked = Asked {
+        samples: number(&description.sampler, "pixelsamples"),
+        depth: number(&description.integrator, "maxdepth").map(|d| d.min(Asked::MAX_DEPTH)),
+        roulette_depth: None,
+    };
+    let Some(entity) = &description.integrator else { return asked };
     let is_known =
         ["path", "volpath", "simplepath", "simplevolpath", "bdpt", "mlt", "sppm", "lightpath"];
     if !is_known.contains(&entity.name.as_str()) {
         let name = format!("Integrator `{}`", entity.name);
         log.ignore_named(features::PBRT_INTEGRATOR, &name, &entity.place);
     }
+    asked
 }
 
 /// Tells materials apart: the choice, the alpha of the shape and its light.
@@ -163,7 +172,7 @@ struct Kept {
 
 /// Puts shapes in the world.
 struct Builder<'a> {
-    folder: &'a Path,
+    folder: &'a Folder,
     view: View,
     materials: Materials<'a>,
     kept: Kept,

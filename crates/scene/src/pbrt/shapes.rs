@@ -1,17 +1,15 @@
 //! Shapes of a scene description → meshes in the space of the shape, counter-clockwise from the side
 //! of the normal.
 
-use std::path::Path;
-
 use glam::{DVec3, Vec3};
 
 use super::{
     log::Log,
     parameters::{Entity, Kind},
-    source::path_inside,
     subdivision::{MAX_TRIANGLES, subdivide},
 };
 use crate::{
+    beside::Folder,
     error::Result,
     features,
     mesh::{Mesh, ply},
@@ -25,14 +23,14 @@ const PATCH_CELLS: u32 = 16;
 ///
 /// # Errors
 /// With the place for parameters that are no shape, and files that cannot be read.
-pub(super) fn mesh(entity: &Entity, folder: &Path, log: &mut Log) -> Result<Option<Mesh>> {
+pub(super) fn mesh(entity: &Entity, folder: &Folder, log: &mut Log) -> Result<Option<Mesh>> {
     let mut mesh = match entity.name.as_str() {
         "trianglemesh" => triangle_mesh(entity, log)?,
         "plymesh" => {
             let Some(file) = entity.string("filename")? else {
                 return Err(entity.error("expected a `filename`"));
             };
-            let path = path_inside(folder, file).map_err(|message| entity.error(message))?;
+            let path = folder.file(file).map_err(|message| entity.error(message))?;
             let mut mesh = ply::read(&path).map_err(|error| entity.error(error.to_string()))?;
             // pbrt does not read them.
             mesh.colors.clear();

@@ -3,14 +3,14 @@
 use std::{
     fs::File,
     io::{BufReader, Read},
-    path::{Component, Path, PathBuf},
+    path::{Path, PathBuf},
     rc::Rc,
 };
 
 use flate2::read::MultiGzDecoder;
 
 use super::tokens::{Place, Token, Tokens};
-use crate::{error::Result, files};
+use crate::{beside::Folder, error::Result, files};
 
 /// Most files that may include one another.
 const MAX_DEPTH: usize = 32;
@@ -31,7 +31,7 @@ struct Open {
 /// Tokens of the main file and of the files that it includes.
 pub(super) struct Source {
     /// Folder of the main file, to which all paths are relative.
-    folder: PathBuf,
+    folder: Folder,
     stack: Vec<Open>,
     /// Last token, if it is to be read again.
     held: Option<Token>,
@@ -53,19 +53,18 @@ pub(super) enum Part {
 }
 
 impl Source {
-    /// Opens the main file.
+    /// Opens the main file, whose names start in `folder`.
     ///
     /// # Errors
     /// [`Io`](crate::error::Error::Io), and [`Format`](crate::error::Error::Format) for a device.
-    pub(super) fn open(path: &Path) -> Result<Self> {
-        let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+    pub(super) fn open(path: &Path, folder: Folder) -> Result<Self> {
         let first = Open { path: path.into(), tokens: open(path, MAX_BYTES)?, restores: false };
         let inputs = vec![path.into()];
         Ok(Self { folder, stack: vec![first], held: None, bytes_left: MAX_BYTES, inputs })
     }
 
     /// Folder to which paths are relative.
-    pub(super) fn folder(&self) -> &Path {
+    pub(super) fn folder(&self) -> &Folder {
         &self.folder
     }
 
@@ -121,7 +120,7 @@ impl Source {
     pub(super) fn place(&self) -> Place {
         match self.stack.last() {
             Some(open) => open.tokens.place().clone(),
-            None => Place { path: Rc::from(self.folder.as_path()), line: 0, column: 0 },
+            None => Place { path: Rc::from(self.folder.path()), line: 0, column: 0 },
         }
     }
 
@@ -131,7 +130,7 @@ impl Source {
     /// [`Parse`](crate::error::Error::Parse) with the place of the statement for a file outside the
     /// scene's folder, one that includes itself, one that cannot be read, and too many files in one another.
     pub(super) fn include(&mut self, name: &str, restores: bool, place: &Place) -> Result<()> {
-        let path = path_inside(&self.folder, name).map_err(|message| place.error(message))?;
+        let path = self.folder.file(name).map_err(|message| place.error(message))?;
         if self.stack.iter().any(|open| files::is_same_file(&open.path, &path)) {
             return Err(place.error(format!("`{name}` includes itself")));
         }
@@ -150,34 +149,6 @@ impl Source {
     }
 }
 
-/// Path of a file that a scene in `folder` names.
-///
-/// # Errors
-/// A message for a name that is absolute or leaves the folder.
-pub(super) fn path_inside(folder: &Path, name: &str) -> Result<PathBuf, String> {
-    if stays_inside(Path::new(name)) {
-        return Ok(folder.join(name));
-    }
-    Err(format!(
-        "expected a file in the folder of the scene, found `{name}`, which may be elsewhere: copy it \
-         into the folder"
-    ))
-}
-
-/// Checks that a relative path never climbs out of the folder it starts in.
-fn stays_inside(path: &Path) -> bool {
-    let mut depth = 0_i64;
-    path.components().all(|component| {
-        match component {
-            Component::Normal(_) => depth += 1,
-            Component::CurDir => {}
-            Component::ParentDir => depth -= 1,
-            Component::RootDir | Component::Prefix(_) => return false,
-        }
-        depth >= 0
-    })
-}
-
 fn open(path: &Path, most_bytes: u64) -> Result<FileTokens> {
     let file: File = files::open_regular(path)?;
     let reader: Box<dyn Read> = if files::extension(path) == "gz" {
@@ -187,19 +158,4 @@ fn open(path: &Path, most_bytes: u64) -> Result<FileTokens> {
     };
     let reader = BufReader::with_capacity(1 << 16, reader);
     Ok(Tokens::new(Rc::from(path), reader, most_bytes))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn paths_that_climb_out_are_found() {
-        for inside in ["a.pbrt", "a/../b.pbrt", "./a/b.pbrt", "a b.pbrt"] {
-            assert!(stays_inside(Path::new(inside)), "{inside}");
-        }
-        for outside in ["../a.pbrt", "a/../../b.pbrt", "/dev/zero", "a/../../a/b"] {
-            assert!(!stays_inside(Path::new(outside)), "{outside}");
-        }
-    }
 }

@@ -4,16 +4,14 @@
 //! are integrated against the CIE 1931 observer: reflectances under D65, so that grey stays grey,
 //! lights alone, with luminance 1, as pbrt-v4 normalises every light before its `scale`.
 
-use std::path::Path;
-
 use glam::{DVec3, Vec3};
 
 use super::{
     log::Log,
     parameters::{Kind, Parameter, Values},
-    source::path_inside,
 };
 use crate::{
+    beside::Folder,
     error::Result,
     features, files,
     import::{clipped, media},
@@ -31,7 +29,7 @@ enum Source<'a> {
     Name(&'a str),
 }
 
-fn source<'a>(parameter: &'a Parameter, folder: &Path) -> Result<Source<'a>> {
+fn source<'a>(parameter: &'a Parameter, folder: &Folder) -> Result<Source<'a>> {
     let error = |message: String| {
         parameter.place.error(format!("parameter `{}`: {message}", parameter.name))
     };
@@ -56,7 +54,7 @@ fn source<'a>(parameter: &'a Parameter, folder: &Path) -> Result<Source<'a>> {
             if !name.ends_with(".spd") {
                 return Ok(Source::Name(name));
             }
-            let path = path_inside(folder, name).map_err(error)?;
+            let path = folder.file(name).map_err(error)?;
             let text = files::read_text(&path).map_err(|e| error(e.to_string()))?;
             let lines = text.lines().map(|line| line.split('#').next().unwrap_or(""));
             let words = lines.flat_map(str::split_ascii_whitespace);
@@ -78,7 +76,7 @@ fn unknown(parameter: &Parameter, expected: &str) -> crate::error::Error {
 ///
 /// # Errors
 /// With the place for lists that are no spectrum and unknown names.
-pub(super) fn reflectance(parameter: &Parameter, folder: &Path, log: &mut Log) -> Result<Vec3> {
+pub(super) fn reflectance(parameter: &Parameter, folder: &Folder, log: &mut Log) -> Result<Vec3> {
     let color = match source(parameter, folder)? {
         Source::Color(color) => color,
         Source::Samples(samples) => {
@@ -96,7 +94,7 @@ pub(super) fn reflectance(parameter: &Parameter, folder: &Path, log: &mut Log) -
 ///
 /// # Errors
 /// As [`reflectance`].
-pub(super) fn light(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
+pub(super) fn light(parameter: &Parameter, folder: &Folder) -> Result<Vec3> {
     let color = match source(parameter, folder)? {
         Source::Color(color) => color,
         Source::Samples(samples) => light_color(|nm| samples.at(nm)).unwrap_or(DVec3::ZERO),
@@ -111,7 +109,7 @@ pub(super) fn light(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
 ///
 /// # Errors
 /// As [`reflectance`].
-pub(super) fn index(parameter: &Parameter, folder: &Path) -> Result<Vec3> {
+pub(super) fn index(parameter: &Parameter, folder: &Folder) -> Result<Vec3> {
     let color = match source(parameter, folder)? {
         Source::Color(color) => color,
         Source::Samples(samples) => spectrum::reflectance(|nm| samples.at(nm)),

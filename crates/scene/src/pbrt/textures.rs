@@ -1,11 +1,7 @@
 //! Textures of a scene description → constants and [`TextureUse`]s: every texture that is one image,
 //! scaled, inverted, mixed with constants or not.
 
-use std::{
-    collections::HashMap,
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{collections::HashMap, path::PathBuf, sync::Arc};
 
 use glam::Vec3;
 use half::f16;
@@ -14,10 +10,10 @@ use super::{
     directives::Description,
     log::Log,
     parameters::{Entity, Kind, Parameter},
-    source::path_inside,
     spectra,
 };
 use crate::{
+    beside::Folder,
     error::Result,
     features,
     texture::{Channels, Encoding, Interpolation, Texels, Texture, TextureUse, Wrap},
@@ -68,7 +64,7 @@ struct Decoding {
 /// Textures of a scene, with the images read so far.
 pub(super) struct Textures<'a> {
     description: &'a Description,
-    folder: &'a Path,
+    folder: &'a Folder,
     images: HashMap<(PathBuf, String), Arc<Texture>>,
     /// Values of named textures, those of numbers apart.
     values: HashMap<(bool, String), Value>,
@@ -76,12 +72,12 @@ pub(super) struct Textures<'a> {
 
 impl<'a> Textures<'a> {
     /// Takes the textures of `description`; paths are relative to `folder`.
-    pub(super) fn new(description: &'a Description, folder: &'a Path) -> Self {
+    pub(super) fn new(description: &'a Description, folder: &'a Folder) -> Self {
         Self { description, folder, images: HashMap::new(), values: HashMap::new() }
     }
 
     /// Folder to which paths are relative.
-    pub(super) fn folder(&self) -> &'a Path {
+    pub(super) fn folder(&self) -> &'a Folder {
         self.folder
     }
 
@@ -292,7 +288,7 @@ impl<'a> Textures<'a> {
         decoding: &Decoding,
         log: &mut Log,
     ) -> Result<Arc<Texture>> {
-        let path = path_inside(self.folder, file).map_err(|message| entity.error(message))?;
+        let path = self.folder.file(file).map_err(|message| entity.error(message))?;
         let key = (path.clone(), format!("{:?}", decoding.gamma));
         if let Some(texture) = self.images.get(&key) {
             return Ok(Arc::clone(texture));

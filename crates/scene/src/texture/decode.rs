@@ -1,4 +1,4 @@
-//! Image files → [`Texture`]: PNG, JPEG, TGA, Radiance `.hdr` and OpenEXR.
+//! Image files → [`Texture`]: PNG, JPEG, WebP, TGA, Radiance `.hdr` and OpenEXR.
 //!
 //! The uses of a texture say how its colours are encoded. Statements of the file about that, as PNG's
 //! `gAMA`, `cHRM` and `iCCP`, count for nothing, as glTF 2.0 demands (section 3.9.2); an image that is
@@ -72,9 +72,11 @@ fn decode(
         Some(ImageFormat::Tga) => 256,
         // A run of 127 texels of four channels in two bytes each, and four bytes for one.
         Some(ImageFormat::Hdr) => 255 * 4,
+        // An image of one colour takes no more bytes if it is larger.
+        Some(ImageFormat::WebP) => u64::MAX,
         _ => {
             return Err(
-                "expected a PNG, JPEG, TGA, HDR or EXR image, found another file".to_owned()
+                "expected a PNG, JPEG, WebP, TGA, HDR or EXR image, found another file".to_owned()
             );
         }
     };

@@ -33,7 +33,7 @@ impl Texture {
 
 impl TextureUse {
     /// Value that a property reads from a linear texel, by channel, and opacity.
-    pub(super) fn read(&self, [r, g, b, a]: [f32; 4]) -> [f32; 4] {
+    pub(crate) fn read(&self, [r, g, b, a]: [f32; 4]) -> [f32; 4] {
         let color = match self.channels {
             Channels::Color => [r, g, b],
             Channels::Red => [r; 3],

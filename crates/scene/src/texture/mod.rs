@@ -6,6 +6,7 @@ mod decode;
 pub(crate) mod exr;
 mod linear;
 pub mod lookup;
+pub(crate) mod texelwise;
 
 use std::sync::Arc;
 

@@ -8,7 +8,7 @@ use crate::{
     export::{
         folder::Folder,
         images::{Pictures, Recipe},
-        subject::{Opacity, Subject, index_of},
+        subject::{Opacity, Subject, difference_of_index, index_of},
         triple,
     },
     material::{ConductorFresnel, MaterialKind},
@@ -135,12 +135,8 @@ impl Translator<'_> {
                     "Mitsuba's principled differs from glTF's: its diffuse part is Disney's, and its \
                      dielectric reflects by Fresnel's equations instead of Schlick's",
                 );
-                if *specular != 1.0 || *specular_color != Vec3::ONE {
-                    self.subject.warn(
-                        "strength and colour of the dielectric's reflection become a refractive \
-                         index of the same reflectance at normal incidence",
-                    );
-                }
+                let difference = difference_of_index(*ior, *specular, *specular_color);
+                difference.iter().for_each(|difference| self.subject.warn(difference));
                 let content = self.color("base_color", *base_color)
                     + &self.number("metallic", *metallic, self.subject.surface.metallic.as_ref())
                     + &self.roughness(*roughness)

@@ -11,9 +11,9 @@ use gltf::{
 use serde_json::Value;
 
 use crate::{
+    beside::Folder,
     error::{Error, Result},
     features, files,
-    mesh::beside::path_beside,
 };
 
 /// Parses and checks a document; returns it with its binary chunk and its JSON as a tree, which
@@ -29,6 +29,13 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<(Document, Option<Vec<u
     let glb = glb.transpose()?;
     let text = glb.as_ref().map_or(bytes, |glb| &glb.json);
     let json: Value = serde_json::from_slice(text).map_err(not_json)?;
+    if let Some(version) = json["asset"]["version"].as_str()
+        && version.split('.').next() != Some("2")
+    {
+        let message =
+            format!("`asset.version`: expected 2.0, found {version}: convert it to glTF 2.0");
+        return Err(Error::format(path, message));
+    }
     let mut root: Root = match serde_json::from_slice(text) {
         Ok(root) => root,
         // The crate takes extras for objects; they may be anything.
@@ -43,8 +50,10 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<(Document, Option<Vec<u
         let name = format!("`{extension}`");
         let is_left_out = features::GLTF.iter().any(|feature| feature.name == name);
         if !is_left_out && !features::GLTF_EXTENSIONS.contains(&extension.as_str()) {
-            let message =
-                format!("the file requires the extension `{extension}`, which is not supported");
+            let message = format!(
+                "the file requires the extension `{extension}`, which is not supported: export it \
+                 without"
+            );
             return Err(Error::format(path, message));
         }
     }
@@ -115,8 +124,7 @@ fn check_positions(path: &Path, root: &Root) -> Result<()> {
 pub(super) fn beside(path: &Path, uri: &str) -> Result<PathBuf> {
     let name = decode_percent(uri)
         .ok_or_else(|| Error::format(path, format!("cannot read the file name `{uri}`")))?;
-    path_beside(path.parent().unwrap_or(Path::new("")), Path::new(""), &name)
-        .map_err(|message| Error::format(path, message))
+    Folder::of(path).file(&name).map_err(|message| Error::format(path, message))
 }
 
 /// Content of a URI that holds it; none if it names a file, and none inside if it is no base64.

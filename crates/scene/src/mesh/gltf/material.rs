@@ -2,19 +2,21 @@
 
 use std::rc::Rc;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use serde_json::Value;
 
 use super::{
     GltfReader,
     contents::{for_each_extension, ignore_extension, label},
+    glossiness,
 };
 use crate::{
     error::Result,
     features::{self, Feature, Ignored},
+    gloss::metallic_roughness,
     material::{Emission, Material, MaterialKind, Opacity, Surface},
     mesh::{MeshMaterial, images},
-    texture::{Channels, Encoding, TextureUse},
+    texture::{Channels, Encoding, TextureUse, texelwise::lie_alike},
 };
 
 /// Colours of an image.
@@ -35,6 +37,8 @@ const IOR_RANGE: (f32, f32) = (1.01, 4.0);
 /// Refractive index of a material that states none, and its reflectance at normal incidence.
 const DEFAULT_IOR: f32 = 1.5;
 const DEFAULT_REFLECTANCE: f32 = 0.04;
+/// Largest reflectance at normal incidence of a material that is read as a dielectric.
+const STRONGEST_DIELECTRIC: f32 = 0.08;
 
 /// Reads a finite number; `default` if it is absent.
 pub(super) fn number(json: &Value, key: &str, default: f32) -> f32 {
@@ -89,6 +93,36 @@ impl Reading<'_> {
     }
 }
 
+/// Glass that takes the place of a material on some triangles.
+#[derive(Clone, Debug)]
+pub(super) struct Pane {
+    texture: TextureUse,
+    /// Value of the texture from which a triangle is glass.
+    least: f32,
+    /// Index into the materials of the mesh.
+    pub material: usize,
+}
+
+impl Pane {
+    /// Set of texture coordinates that decide.
+    pub(super) fn uv_set(&self) -> usize {
+        self.texture.uv_set as usize
+    }
+
+    /// Tests for glass by the mean of the texture over the points of a triangle that lie in the middle and
+    /// half-way to the corners.
+    pub(super) fn covers(&self, uvs: [Vec2; 3]) -> bool {
+        let middle = (uvs[0] + uvs[1] + uvs[2]) / 3.0;
+        let points =
+            [middle, 0.5 * (middle + uvs[0]), 0.5 * (middle + uvs[1]), 0.5 * (middle + uvs[2])];
+        let value = |uv: Vec2| {
+            let image = self.texture.image_from_uv.map(|[u, v, w]| u * uv.x + v * uv.y + w);
+            self.texture.value(image.into()).x
+        };
+        0.25 * points.into_iter().map(value).sum::<f32>() >= self.least
+    }
+}
+
 /// Reflection model and the properties that come with it.
 struct Reflection {
     kind: MaterialKind,
@@ -104,14 +138,49 @@ impl GltfReader<'_> {
         if let Some(&found) = self.materials.get(&index) {
             return Ok(found);
         }
-        let material = self.material(index)?;
-        self.mesh.materials.push(material);
-        let found = self.mesh.materials.len() - 1;
+        let texture = self.transmission_texture(index)?;
+        let is_glass = texture.as_ref().map(|_| false);
+        let found = self.push_material(index, is_glass)?;
+        if let Some((texture, least)) = texture {
+            let material = self.push_material(index, Some(true))?;
+            self.panes.insert(found, Pane { texture, least, material });
+        }
         self.materials.insert(index, found);
         Ok(found)
     }
 
-    fn material(&mut self, index: usize) -> Result<MeshMaterial> {
+    fn push_material(&mut self, index: usize, is_glass: Option<bool>) -> Result<usize> {
+        let mut material = self.material(index, is_glass)?;
+        if is_glass == Some(true) {
+            material.material.name += ", glass";
+        }
+        self.mesh.materials.push(material);
+        Ok(self.mesh.materials.len() - 1)
+    }
+
+    /// Texture of the share of transmitted light, with its value from which a surface is glass; none where
+    /// that is nowhere reached.
+    fn transmission_texture(&mut self, index: usize) -> Result<Option<(TextureUse, f32)>> {
+        let json = &self.json["materials"][index];
+        let transmission = &json["extensions"]["KHR_materials_transmission"];
+        let pbr = &json["pbrMetallicRoughness"];
+        let has_metallic_texture = !pbr["metallicRoughnessTexture"].is_null();
+        let metallic = if has_metallic_texture { 0.0 } else { share(pbr, "metallicFactor", 1.0) };
+        let factor = share(transmission, "transmissionFactor", 0.0) * (1.0 - metallic);
+        if factor < GLASS || !json["extensions"]["KHR_materials_unlit"].is_null() {
+            return Ok(None);
+        }
+        let place = || label("material", index, json["name"].as_str());
+        let mut ignored = Ignored::default();
+        let info = &transmission["transmissionTexture"];
+        let Some(texture) = self.texture(info, RED, &mut ignored, &place)? else { return Ok(None) };
+        let least = GLASS / factor;
+        let is_reached = texture.values().iter().any(|value| value[0] >= least);
+        Ok(is_reached.then_some((texture, least)))
+    }
+
+    /// Reads a material, which is glass or not, or as its numbers say.
+    fn material(&mut self, index: usize, is_glass: Option<bool>) -> Result<MeshMaterial> {
         let json = &self.json["materials"][index];
         let name = json["name"].as_str();
         let place = Rc::new(move || label("material", index, name));
@@ -127,7 +196,7 @@ impl GltfReader<'_> {
         if !reading.extension("KHR_materials_unlit").is_null() {
             reflection = unlit(reflection);
         } else {
-            self.transmission(&mut reading, &mut reflection)?;
+            self.transmission(&mut reading, &mut reflection, is_glass)?;
             let normal = &json["normalTexture"];
             reflection.surface.normal = self.use_texture(normal, VECTOR, &mut reading)?;
             reflection.surface.normal_scale = number(normal, "scale", 1.0);
@@ -144,7 +213,8 @@ impl GltfReader<'_> {
             _ => Opacity::default(),
         };
         let material = Material { name: name.unwrap_or_default().to_owned(), kind, surface };
-        Ok(MeshMaterial { material, ignored: reading.ignored })
+        let is_culled = !json["doubleSided"].as_bool().unwrap_or(false);
+        Ok(MeshMaterial { material, ignored: reading.ignored, is_culled })
     }
 
     fn use_texture(
@@ -188,28 +258,75 @@ impl GltfReader<'_> {
         Ok(Reflection { kind, surface, base_color, alpha: alpha.clamp(0.0, 1.0) })
     }
 
-    /// `KHR_materials_pbrSpecularGlossiness` as a dielectric of the same reflectance.
+    /// `KHR_materials_pbrSpecularGlossiness`: as a dielectric of the same reflectance where that is a
+    /// dielectric's, else as a metallic-roughness material, texel by texel.
     fn specular_glossiness(&mut self, reading: &mut Reading) -> Result<Reflection> {
         let json = reading.json;
         let model = &json["extensions"]["KHR_materials_pbrSpecularGlossiness"];
         let base_color = color(model, "diffuseFactor", [1.0; 3]);
+        let mut specular_color = color(model, "specularFactor", [1.0; 3]);
         let glossiness = share(model, "glossinessFactor", 1.0);
+        let [_, _, _, alpha] = vector(model, "diffuseFactor", [1.0; 4]);
+        let alpha = alpha.clamp(0.0, 1.0);
         let mut surface = self.colored(&model["diffuseTexture"], reading)?;
-        surface.roughness = self
-            .use_texture(&model["specularGlossinessTexture"], ALPHA, reading)?
-            .map(|texture| TextureUse { scale: [-glossiness; 3], bias: [1.0; 3], ..texture });
-        let has_texture = surface.roughness.is_some();
-        reading.ignore_if(has_texture, features::GLTF_GLOSSINESS_TEXTURE);
-        let kind = MaterialKind::Principled {
-            base_color,
-            metallic: 0.0,
-            roughness: if has_texture { 1.0 } else { 1.0 - glossiness },
+        let specular = self.use_texture(&model["specularGlossinessTexture"], COLOR, reading)?;
+        let mut roughness = 1.0 - glossiness;
+        let lie_alike = match (&surface.color, &specular) {
+            (Some(own), Some(specular)) => lie_alike(own, specular),
+            _ => true,
+        };
+        if let Some(specular) = specular.as_ref().filter(|_| !lie_alike) {
+            reading.ignore(features::GLTF_GLOSSINESS_TEXTURE);
+            specular_color *= Vec3::from(specular.mean());
+            roughness = 1.0;
+            let (channels, encoding) = ALPHA;
+            let (scale, bias) = ([-glossiness; 3], [1.0; 3]);
+            let used = TextureUse { channels, encoding, scale, bias, ..specular.clone() };
+            surface.roughness = Some(used);
+        }
+        let specular = specular.filter(|_| lie_alike);
+        if specular.is_none() && specular_color.max_element() <= STRONGEST_DIELECTRIC {
+            let kind = MaterialKind::Principled {
+                base_color,
+                metallic: 0.0,
+                roughness,
+                ior: DEFAULT_IOR,
+                specular: 1.0,
+                specular_color: specular_color / DEFAULT_REFLECTANCE,
+            };
+            return Ok(Reflection { kind, surface, base_color, alpha });
+        }
+        let mut kind = MaterialKind::Principled {
+            base_color: Vec3::ONE,
+            metallic: 1.0,
+            roughness,
             ior: DEFAULT_IOR,
             specular: 1.0,
-            specular_color: color(model, "specularFactor", [1.0; 3]) / DEFAULT_REFLECTANCE,
+            specular_color: Vec3::ONE,
         };
-        let [_, _, _, alpha] = vector(model, "diffuseFactor", [1.0; 4]);
-        Ok(Reflection { kind, surface, base_color, alpha: alpha.clamp(0.0, 1.0) })
+        let scaled = |used: TextureUse, scale: Vec3| TextureUse { scale: scale.into(), ..used };
+        let diffuse = surface.color.take().map(|own| scaled(own, base_color)).ok_or(base_color);
+        let has_gloss_image = specular.is_some();
+        let specular = specular.map(|own| scaled(own, specular_color)).ok_or(specular_color);
+        if let (
+            Err(diffuse),
+            Err(specular),
+            MaterialKind::Principled { base_color, metallic, .. },
+        ) = (&diffuse, &specular, &mut kind)
+        {
+            (*base_color, *metallic) = metallic_roughness(*diffuse, *specular);
+            let base_color = *base_color;
+            return Ok(Reflection { kind, surface, base_color, alpha });
+        }
+        let converted = glossiness::convert(&diffuse, &specular, glossiness);
+        surface.color = Some(converted.base_color);
+        surface.metallic = Some(converted.metallic);
+        if let (true, MaterialKind::Principled { roughness, .. }) = (has_gloss_image, &mut kind) {
+            surface.roughness = Some(converted.roughness);
+            *roughness = 1.0;
+        }
+        let base_color = Vec3::ONE;
+        Ok(Reflection { kind, surface, base_color, alpha })
     }
 
     /// Surface with a texture of colour and opacity.
@@ -225,44 +342,55 @@ impl GltfReader<'_> {
         Ok(Surface { color, opacity, ..Surface::default() })
     }
 
-    /// Turns a surface that transmits most light into glass.
-    fn transmission(&mut self, reading: &mut Reading, found: &mut Reflection) -> Result<()> {
+    /// Turns a surface that transmits most light into glass, or one that `is_glass` says is.
+    fn transmission(
+        &mut self,
+        reading: &mut Reading,
+        found: &mut Reflection,
+        is_glass: Option<bool>,
+    ) -> Result<()> {
         let json = reading.json;
         let transmission = &json["extensions"]["KHR_materials_transmission"];
         let &MaterialKind::Principled { metallic, roughness, ior, .. } = &found.kind else {
             return Ok(());
         };
-        let mean =
-            |texture: &Option<TextureUse>| texture.as_ref().map_or(1.0, |used| used.mean()[0]);
+        let mean = |texture: &Option<TextureUse>| texture.as_ref().map(TextureUse::mean);
+        let mean_number = |texture: &Option<TextureUse>| mean(texture).map_or(1.0, |mean| mean[0]);
         let texture = self.use_texture(&transmission["transmissionTexture"], RED, reading)?;
+        reading.ignore_if(is_glass.is_some(), features::GLTF_TRANSMISSION_TEXTURE);
         let transmitted = share(transmission, "transmissionFactor", 0.0)
-            * mean(&texture)
-            * (1.0 - metallic * mean(&found.surface.metallic));
-        if transmitted < GLASS {
-            reading.ignore_if(transmitted > 0.0, features::GLTF_LOW_TRANSMISSION);
+            * mean_number(&texture)
+            * (1.0 - metallic * mean_number(&found.surface.metallic));
+        if !is_glass.unwrap_or(transmitted >= GLASS) {
+            let is_lost = is_glass.is_none() && transmitted > 0.0;
+            reading.ignore_if(is_lost, features::GLTF_LOW_TRANSMISSION);
             return Ok(());
         }
-        reading.ignore_if(texture.is_some(), features::GLTF_TRANSMISSION_TEXTURE);
         reading.ignore_if(found.surface.color.is_some(), features::GLTF_GLASS_COLOR);
+        let tint = found.base_color * Vec3::from(mean(&found.surface.color).unwrap_or([1.0; 3]));
         found.surface.color = None;
         found.surface.metallic = None;
         let volume = &json["extensions"]["KHR_materials_volume"];
-        let (reflectance, transmittance) = (Vec3::ONE, found.base_color);
-        found.kind = if number(volume, "thicknessFactor", 0.0) > 0.0 {
+        let thickness = number(volume, "thicknessFactor", 0.0);
+        let reflectance = Vec3::ONE;
+        found.kind = if thickness > 0.0 {
             let attenuation = color(volume, "attenuationColor", [1.0; 3]);
-            let absorbs = !volume["attenuationDistance"].is_null() && attenuation != Vec3::ONE;
+            let distance = number(volume, "attenuationDistance", f32::INFINITY);
+            let absorbs = distance.is_finite() && attenuation != Vec3::ONE;
             reading.ignore_if(absorbs, features::GLTF_ABSORPTION);
+            // Light that crosses the solid passes two interfaces, each with the root of the loss.
+            let length = if absorbs { thickness / distance.max(f32::MIN_POSITIVE) } else { 0.0 };
             MaterialKind::Dielectric {
                 ior,
                 alpha: roughness * roughness,
                 reflectance,
-                transmittance,
+                transmittance: tint * attenuation.powf(0.5 * length),
             }
         } else {
-            let rough = roughness * mean(&found.surface.roughness);
+            let rough = roughness * mean_number(&found.surface.roughness);
             reading.ignore_if(rough > VISIBLE_ROUGHNESS, features::GLTF_THIN_ROUGHNESS);
             found.surface.roughness = None;
-            MaterialKind::ThinDielectric { ior, reflectance, transmittance }
+            MaterialKind::ThinDielectric { ior, reflectance, transmittance: tint }
         };
         Ok(())
     }

@@ -7,6 +7,7 @@
 mod accessors;
 mod contents;
 mod document;
+mod glossiness;
 mod lamps;
 mod material;
 mod primitive;
@@ -18,6 +19,7 @@ use glam::Mat4;
 use gltf::{Document, Node, buffer::Source};
 use serde_json::Value;
 
+use self::material::Pane;
 use super::{Mesh, MeshCamera, images::Images};
 use crate::{
     error::{Error, Result},
@@ -65,6 +67,7 @@ pub fn read(path: &Path, budget: Option<Budget>, warnings: &mut Vec<String>) -> 
         copies: HashMap::new(),
         repeated: HashMap::new(),
         materials: HashMap::new(),
+        panes: HashMap::new(),
         embedded: HashMap::new(),
         images: Images::default(),
         cameras: Vec::new(),
@@ -86,6 +89,7 @@ pub fn read(path: &Path, budget: Option<Budget>, warnings: &mut Vec<String>) -> 
     if mesh.normals.iter().all(|normal| *normal == [0.0; 3]) {
         mesh.normals = Vec::new();
     }
+    mesh.part_coincident(path, warnings);
     mesh.complete_tangents(-1.0);
     let mut repeated = std::mem::take(&mut mesh.repeated);
     for part in &mut repeated {
@@ -113,6 +117,8 @@ struct GltfReader<'a> {
     repeated: HashMap<[usize; 2], Option<usize>>,
     /// Index into `mesh.materials` of the materials that have been used.
     materials: HashMap<usize, usize>,
+    /// Glass on some triangles of a material, by its index into `mesh.materials`.
+    panes: HashMap<usize, Pane>,
     /// Images inside the document by their numbers; none for those that cannot be read.
     embedded: HashMap<usize, Option<Arc<Texture>>>,
     /// Images beside it.

@@ -39,6 +39,11 @@ impl GltfReader<'_> {
             let mut own = std::mem::replace(&mut self.mesh, whole);
             self.mesh.materials = std::mem::take(&mut own.materials);
             read?;
+            if own.runs.len() > 1 {
+                // An instance has one material.
+                self.repeated.insert(key, None);
+                return Ok(None);
+            }
             let material = own.runs.first().and_then(|run| run.material);
             let repeated = RepeatedMesh { mesh: Box::new(own), material, places: Vec::new() };
             self.mesh.repeated.push(repeated);
@@ -115,11 +120,11 @@ impl GltfReader<'_> {
             Some(accessor) => self.indices(&accessor, count)?,
             None => (0..count as u32).collect(),
         };
-        self.mesh.start_run(material);
         let first_vertex = first_vertex as u32;
+        let mut triangles = Vec::with_capacity(indices.len() / 3);
         let mut push = |[a, b, c]: [u32; 3]| {
             let triangle = if mirrors { [a, c, b] } else { [a, b, c] };
-            self.mesh.triangles.push(triangle.map(|index| first_vertex + index));
+            triangles.push(triangle.map(|index| first_vertex + index));
         };
         match primitive.mode() {
             Mode::TriangleStrip => {
@@ -136,6 +141,20 @@ impl GltfReader<'_> {
             _ => indices
                 .chunks_exact(3)
                 .for_each(|corners| push([corners[0], corners[1], corners[2]])),
+        }
+        self.mesh.start_run(material);
+        let Some(pane) = material.and_then(|material| self.panes.get(&material)) else {
+            self.mesh.triangles.append(&mut triangles);
+            return Ok(());
+        };
+        let uvs = &self.mesh.uvs[pane.uv_set()];
+        let uv = |vertex: u32| uvs.get(vertex as usize).copied().unwrap_or_default().into();
+        let (glass, opaque): (Vec<_>, Vec<_>) =
+            triangles.into_iter().partition(|triangle| pane.covers(triangle.map(uv)));
+        self.mesh.triangles.extend(opaque);
+        if !glass.is_empty() {
+            self.mesh.start_run(Some(pane.material));
+            self.mesh.triangles.extend(glass);
         }
         Ok(())
     }

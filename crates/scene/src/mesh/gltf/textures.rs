@@ -38,7 +38,23 @@ impl GltfReader<'_> {
             let index = &info["index"];
             return Err(self.error(format!("{}: the file has no texture {index}", place())));
         };
-        let Some(source) = number_of(&texture["source"]) else {
+        let webp = &texture["extensions"]["EXT_texture_webp"];
+        let Some(source) = number_of(&texture["source"]).or(number_of(&webp["source"])) else {
+            let extensions = texture["extensions"].as_object().into_iter().flatten();
+            // Without its image a surface would look like another one.
+            if let Some((name, _)) = extensions.into_iter().find(|(_, own)| own["source"].is_u64())
+            {
+                let help = match name.as_str() {
+                    "KHR_texture_basisu" => ": `gltf-transform ktxdecompress` writes one",
+                    _ => "",
+                };
+                return Err(self.error(format!(
+                    "{}: texture {} has no image but that of `{name}`, which is not read; expected \
+                     one in PNG, JPEG or WebP{help}",
+                    place(),
+                    info["index"]
+                )));
+            }
             ignored.add(features::GLTF_NO_IMAGE, place);
             return Ok(None);
         };
@@ -86,10 +102,10 @@ impl GltfReader<'_> {
             match document::data_of(uri) {
                 Some(Some(bytes)) => Texture::decode(&name, &bytes, self.warnings),
                 Some(None) => Err("not base64 data".to_owned()),
-                None => {
-                    let path = document::beside(self.path, uri)?;
-                    return Ok(self.images.load(&path, &place(), self.warnings));
-                }
+                None => match document::beside(self.path, uri) {
+                    Ok(path) => return Ok(self.images.load(&path, &place(), self.warnings)),
+                    Err(error) => Err(error.to_string()),
+                },
             }
         } else {
             let view = image["bufferView"].as_u64().and_then(|at| usize::try_from(at).ok());

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-use super::beside::path_beside;
 use crate::{
+    beside::Folder,
     error::{Error, Result},
     features::{self, Feature, Ignored},
 };
@@ -17,7 +17,7 @@ use map::Map;
 /// Material library as far as it has been read.
 pub(super) struct Library<'a> {
     /// Folder of the OBJ file.
-    folder: &'a Path,
+    folder: &'a Folder,
     /// Folder of the library, relative to `folder`.
     within: PathBuf,
     path: &'a Path,
@@ -83,8 +83,8 @@ impl LibraryMaterial {
 
 impl<'a> Library<'a> {
     /// Begins the library at `path`, which belongs to an OBJ file in `folder`.
-    pub(super) fn new(folder: &'a Path, path: &'a Path) -> Self {
-        let within = path.parent().and_then(|own| own.strip_prefix(folder).ok());
+    pub(super) fn new(folder: &'a Folder, path: &'a Path) -> Self {
+        let within = path.parent().and_then(|own| own.strip_prefix(folder.path()).ok());
         let within = within.unwrap_or(Path::new("")).to_owned();
         Self { folder, within, path, materials: Vec::new() }
     }
@@ -92,8 +92,7 @@ impl<'a> Library<'a> {
     /// Reads a line into the last material, or begins one.
     ///
     /// # Errors
-    /// [`Error::Parse`] with the line for a colour that is none, or an image outside the folder of
-    /// the scene.
+    /// [`Error::Parse`] with the line for a colour that is none.
     pub(super) fn read_line(&mut self, line: usize, text: &str) -> Result<()> {
         let text = text.split('#').next().unwrap_or_default().trim();
         let (key, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
@@ -115,14 +114,17 @@ impl<'a> Library<'a> {
             _ => None,
         };
         let color = color.filter(|color| color.is_finite() && color.min_element() >= 0.0);
-        let map = |entry: &mut LibraryMaterial| -> Result<Option<Map>> {
+        let map = |entry: &mut LibraryMaterial| -> Option<Map> {
             let (map, unknown) = map::parse(rest);
             for option in unknown {
                 entry.ignore(features::MTL_OPTION, &format!("option `{option}`"));
             }
             let place = entry.place.clone();
-            let found = path_beside(folder, within, map.name).map_err(error)?;
-            Ok(Some(Map { path: found, place, options: map.options }))
+            let Ok(path) = folder.file_within(within, map.name) else {
+                entry.ignore(features::MTL_OUTSIDE, &format!("image `{}`", map.name));
+                return None;
+            };
+            Some(Map { path, place, options: map.options })
         };
         match key.to_ascii_lowercase().as_str() {
             "kd" => {
@@ -158,12 +160,12 @@ impl<'a> Library<'a> {
             "pm" if share.is_some() => entry.metallic = share,
             "ka" if color == Some(Vec3::ZERO) => {}
             "ka" => entry.ignore(features::MTL_KA, features::MTL_KA.name),
-            "map_kd" => entry.color_map = map(entry)?,
-            "map_d" => entry.opacity_map = map(entry)?,
-            "map_ke" => entry.emission_map = map(entry)?,
-            "map_pr" => entry.roughness_map = map(entry)?,
-            "map_pm" => entry.metallic_map = map(entry)?,
-            "norm" => entry.normal_map = map(entry)?,
+            "map_kd" => entry.color_map = map(entry),
+            "map_d" => entry.opacity_map = map(entry),
+            "map_ke" => entry.emission_map = map(entry),
+            "map_pr" => entry.roughness_map = map(entry),
+            "map_pm" => entry.metallic_map = map(entry),
+            "norm" => entry.normal_map = map(entry),
             "bump" | "map_bump" => entry.ignore(features::MTL_BUMP, features::MTL_BUMP.name),
             _ => entry.ignore(features::MTL_KEY, &format!("`{key}`")),
         }

@@ -117,7 +117,8 @@ impl LibraryMaterial {
             let texture = emission_texture;
             surface.emission = Some(Emission { radiance, texture, two_sided: true });
         }
-        MeshMaterial { material: Material { name: self.name.clone(), kind, surface }, ignored }
+        let material = Material { name: self.name.clone(), kind, surface };
+        MeshMaterial { material, ignored, is_culled: false }
     }
 
     /// Tests for the keys of the metallic-roughness extension.

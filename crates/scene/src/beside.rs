@@ -1,0 +1,157 @@
+//! Names of the files that a scene uses: they lie in its folder or below, or in one that the user allows.
+//!
+//! A scene comes from anywhere, so a name in it must not reach another folder. Symbolic links in the
+//! folder are followed: whoever may make them may read what they lead to.
+
+use std::{
+    fs,
+    path::{Component, Path, PathBuf, absolute},
+};
+
+/// Folder of a scene, in which names of files start.
+#[derive(Clone, Debug)]
+pub(crate) struct Folder {
+    path: PathBuf,
+    /// Folder that names may reach beside.
+    allowed: Option<PathBuf>,
+}
+
+impl Folder {
+    /// Folder of the file at `path`, which allows no other.
+    pub(crate) fn of(path: &Path) -> Self {
+        Self { path: path.parent().unwrap_or(Path::new("")).to_path_buf(), allowed: None }
+    }
+
+    /// The same with a further folder that names may reach.
+    pub(crate) fn allowing(self, allowed: Option<&Path>) -> Self {
+        let allowed = allowed.and_then(|allowed| absolute(allowed).ok());
+        Self { allowed: allowed.map(|allowed| without_parents(&allowed)), ..self }
+    }
+
+    /// The folder itself.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Path of a file by its name. Slashes and backslashes separate folders.
+    ///
+    /// # Errors
+    /// A message for a name that is empty, absolute, or leaves the folder.
+    pub(crate) fn file(&self, name: &str) -> Result<PathBuf, String> {
+        self.file_within(Path::new(""), name)
+    }
+
+    /// As [`Folder::file`], for a name that is relative to the folder `within` of this one.
+    ///
+    /// # Errors
+    /// As [`Folder::file`].
+    pub(crate) fn file_within(&self, within: &Path, name: &str) -> Result<PathBuf, String> {
+        let slashed = name.replace('\\', "/");
+        // A colon begins a URI or names a drive.
+        let is_absolute = slashed.starts_with('/')
+            || slashed.split('/').next().is_some_and(|first| first.contains(':'));
+        let relative = without_parents(&within.join(&slashed));
+        let reason = match relative.components().next() {
+            None => "is empty",
+            _ if is_absolute => "is absolute",
+            Some(Component::ParentDir) => "leads out of that folder",
+            Some(_) => return Ok(self.path.join(relative)),
+        };
+        let whole = self.path.join(&relative);
+        if let Some(allowed) = &self.allowed
+            && let Ok(found) = absolute(&whole)
+            && reason != "is empty"
+            && without_parents(&found).starts_with(allowed)
+        {
+            return Ok(whole);
+        }
+        Err(format!(
+            "the file name `{name}` {reason}; expected one in the folder of the scene or below: put \
+             the file there and name it relative to the scene, or allow its folder by --allow-root"
+        ))
+    }
+}
+
+/// Takes `..` and the folder before it out of a path; those that lead out of it stay in front.
+fn without_parents(path: &Path) -> PathBuf {
+    let mut found = PathBuf::new();
+    for component in path.components() {
+        match component {
+            Component::CurDir => {}
+            Component::ParentDir
+                if matches!(found.components().next_back(), Some(Component::Normal(_))) =>
+            {
+                found.pop();
+            }
+            other => found.push(other),
+        }
+    }
+    found
+}
+
+/// Path of a file that is there with other upper and lower case in its name, or the names of its folders.
+pub(crate) fn in_another_case(path: &Path) -> Option<PathBuf> {
+    let mut found = PathBuf::new();
+    for component in path.components() {
+        let next = found.join(component);
+        if next.exists() || !matches!(component, Component::Normal(_)) {
+            found = next;
+            continue;
+        }
+        let folder = if found.as_os_str().is_empty() { Path::new(".") } else { &found };
+        let own = component.as_os_str();
+        let mut names: Vec<_> =
+            fs::read_dir(folder).ok()?.flatten().map(|e| e.file_name()).collect();
+        names.retain(|name| name.eq_ignore_ascii_case(own));
+        names.sort_unstable();
+        found.push(names.first()?);
+    }
+    Some(found)
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+    use super::*;
+
+    #[test]
+    fn names_stay_in_the_folder() {
+        let folder = Folder::of(Path::new("a/b/room.xml"));
+        let beside = |within: &str, name| folder.file_within(Path::new(within), name);
+        for (within, name, expected) in [
+            ("", "wood.png", "a/b/wood.png"),
+            ("", "maps\\oak wood.png", "a/b/maps/oak wood.png"),
+            ("", "./maps/../wood.png", "a/b/wood.png"),
+            ("materials", "../maps/wood.png", "a/b/maps/wood.png"),
+        ] {
+            assert_eq!(beside(within, name).as_deref(), Ok(Path::new(expected)));
+        }
+        for name in [
+            "/etc/passwd",
+            "\\\\host\\share\\a.png",
+            "C:\\a.png",
+            "file:///etc/passwd",
+            "../a.png",
+            "maps/../../a.png",
+            "",
+            "maps/..",
+        ] {
+            let message = beside("", name).unwrap_err();
+            assert!(message.contains(&format!("`{name}`")), "{message}");
+        }
+        assert!(beside("materials", "../../a.png").is_err());
+    }
+
+    #[test]
+    fn an_allowed_folder_is_reached_and_no_other() {
+        let folder = Folder::of(Path::new("a/b/room.xml")).allowing(Some(Path::new("a")));
+        let inside = folder.file("../common/c.ply");
+        assert_eq!(inside.as_deref(), Ok(Path::new("a/b/../common/c.ply")));
+        let whole = absolute("a/c.ply").unwrap();
+        assert_eq!(folder.file(whole.to_str().unwrap()), Ok(whole));
+        for name in ["../../d.ply", "../../ab/d.ply", "/etc/passwd", "../../a/../d.ply", ""] {
+            assert!(folder.file(name).is_err(), "{name}");
+        }
+    }
+}

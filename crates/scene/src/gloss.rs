@@ -1,0 +1,54 @@
+//! A diffuse and a specular colour → metallic-roughness, by the formulas that Khronos publishes beside
+//! `KHR_materials_pbrSpecularGlossiness`.
+
+use glam::Vec3;
+
+/// Reflectance at normal incidence of the dielectric of refractive index 1.5.
+pub(crate) const DIELECTRIC: f32 = 0.04;
+const TINY: f32 = 1e-6;
+
+/// Base colour and share of metal that reflect as a diffuse and a specular colour do, of which the diffuse
+/// one counts as far as the specular one leaves light.
+pub(crate) fn metallic_roughness(diffuse: Vec3, specular: Vec3) -> (Vec3, f32) {
+    let share_below = 1.0 - specular.max_element();
+    let metallic = metallic(brightness(diffuse), brightness(specular), share_below);
+    let of_diffuse = diffuse * (share_below / (1.0 - DIELECTRIC) / (1.0 - metallic).max(TINY));
+    let of_specular = (specular - Vec3::splat(DIELECTRIC * (1.0 - metallic))) / metallic.max(TINY);
+    let base = of_diffuse.lerp(of_specular, metallic * metallic);
+    (base.clamp(Vec3::ZERO, Vec3::ONE), metallic)
+}
+
+/// Share of metal at which the one base colour has the brightness of both; the root of a parabola.
+fn metallic(diffuse: f32, specular: f32, share_below: f32) -> f32 {
+    if specular < DIELECTRIC {
+        return 0.0;
+    }
+    let b = diffuse * share_below / (1.0 - DIELECTRIC) + specular - 2.0 * DIELECTRIC;
+    let c = DIELECTRIC - specular;
+    let discriminant = (b * b - 4.0 * DIELECTRIC * c).max(0.0);
+    ((discriminant.sqrt() - b) / (2.0 * DIELECTRIC)).clamp(0.0, 1.0)
+}
+
+/// Brightness as it is perceived.
+fn brightness(color: Vec3) -> f32 {
+    (color * color).dot(Vec3::new(0.299, 0.587, 0.114)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A grey material keeps its diffuse reflectance and its reflectance at normal incidence.
+    #[test]
+    fn greys_keep_both_reflectances() {
+        for (diffuse, specular) in [(0.5, 0.04), (0.3, 0.2), (0.8, 0.5), (0.0, 0.9), (0.2, 0.06)] {
+            let (base, metallic) = metallic_roughness(Vec3::splat(diffuse), Vec3::splat(specular));
+            let below = base.x * (1.0 - metallic) * (1.0 - DIELECTRIC);
+            let normal = DIELECTRIC + (base.x - DIELECTRIC) * metallic;
+            let expected = diffuse * (1.0 - specular);
+            assert!((below - expected).abs() < 0.02, "{diffuse} {specular}: {below}");
+            assert!((normal - specular).abs() < 0.02, "{diffuse} {specular}: {normal}");
+        }
+        assert_eq!(metallic_roughness(Vec3::ONE, Vec3::ZERO).1, 0.0);
+    }
+}

@@ -1,0 +1,171 @@
+//! Mixtures and coats of models, and models of version 0.6 with two lobes.
+
+use glam::Vec3;
+
+use super::{
+    Reader,
+    bsdfs::{LEAST_COAT_IOR, MAX_COAT_IOR, Model, Width},
+    document::Node,
+    parameters::Parameters,
+    spectra::Role,
+    textures::Value,
+    values,
+};
+use crate::{
+    MIN_ALPHA,
+    error::Result,
+    features,
+    gloss::DIELECTRIC,
+    import::blend::{Share, blend, blend_lobes},
+    material::MaterialKind,
+    math::colour::luminance,
+};
+
+impl Reader<'_> {
+    /// Mixture of two models: an opacity if one of them is `null`, else the greater of them if they do
+    /// not mix.
+    pub(super) fn blend(
+        &mut self,
+        parameters: &Parameters<'_>,
+        depth_left: usize,
+    ) -> Result<Model> {
+        let node = parameters.node;
+        let [first, second] = parameters.objects("bsdf")?[..] else {
+            return Err(node.error("blendbsdf: expected two bsdfs in it"));
+        };
+        let weight = self.value(parameters, "weight", Role::Reflectance)?;
+        let weight = weight.unwrap_or(Value::Color(Vec3::splat(0.5)));
+        if second.kind() == "null" {
+            let mut model = self.nested(first, depth_left)?;
+            let opacity = match weight {
+                Value::Color(weight) | Value::Vertices(weight) => Value::Color(Vec3::ONE - weight),
+                Value::Texture(mut texture) => {
+                    texture.scale = texture.scale.map(|scale| -scale);
+                    texture.bias = texture.bias.map(|bias| 1.0 - bias);
+                    Value::Texture(texture)
+                }
+            };
+            self.cut(&mut model, node, opacity);
+            return Ok(model);
+        }
+        if first.kind() == "null" {
+            let mut model = self.nested(second, depth_left)?;
+            self.cut(&mut model, node, weight);
+            return Ok(model);
+        }
+        let [first, second] = [self.nested(first, depth_left)?, self.nested(second, depth_left)?];
+        let share = match weight {
+            Value::Texture(image) => Share::Image(*image),
+            Value::Color(weight) | Value::Vertices(weight) => {
+                Share::Constant(luminance(weight).clamp(0.0, 1.0))
+            }
+        };
+        Ok(self.mixed(node, first, second, &share))
+    }
+
+    /// Mixture of two models; the greater of them if they do not mix.
+    fn mixed(&mut self, node: Node<'_>, first: Model, second: Model, share: &Share) -> Model {
+        match share {
+            Share::Constant(0.0) => return first,
+            Share::Constant(1.0) => return second,
+            _ => {}
+        }
+        let pair = [&first, &second].map(|model| (&model.kind, &model.surface));
+        if let Some((kind, surface)) = blend(pair, share) {
+            return Model { kind, surface };
+        }
+        if let Some((kind, surface)) = blend_lobes(pair, share) {
+            self.ignored.add(features::MI_BLEND_LOBES, || node.place());
+            return Model { kind, surface };
+        }
+        self.ignored.add(features::MI_BLEND, || node.place());
+        let takes_second = matches!(share, Share::Constant(share) if *share > 0.5);
+        if takes_second { second } else { first }
+    }
+
+    /// Mixture of models by weights, of version 0.6.
+    pub(super) fn mixture(
+        &mut self,
+        parameters: &Parameters<'_>,
+        depth_left: usize,
+    ) -> Result<Model> {
+        let node = parameters.node;
+        let weights = values::numbers(node, parameters.string("weights")?.unwrap_or_default())?;
+        let models = parameters.objects("bsdf")?;
+        if models.is_empty() || weights.len() != models.len() {
+            return Err(node.error("mixturebsdf: expected as many `weights` as bsdfs in it"));
+        }
+        let (mut sum, mut mixed) = (0.0, None);
+        for (model, weight) in models.into_iter().zip(weights) {
+            let model = self.nested(model, depth_left)?;
+            sum += weight.max(0.0);
+            let share = if sum > 0.0 { weight.max(0.0) / sum } else { 0.0 };
+            mixed = Some(match mixed {
+                None => model,
+                Some(before) => self.mixed(node, before, model, &Share::Constant(share as f32)),
+            });
+        }
+        if (sum - 1.0).abs() > 1e-3 {
+            self.ignored.add(features::MI_WEIGHTS, || node.place());
+        }
+        mixed.ok_or_else(|| node.error("mixturebsdf: expected bsdfs in it"))
+    }
+
+    /// Coat of version 0.6 on another model: a plastic on a diffuse one.
+    pub(super) fn coating(
+        &mut self,
+        parameters: &Parameters<'_>,
+        depth_left: usize,
+    ) -> Result<Model> {
+        let mut model = self.inner(parameters, depth_left)?;
+        let Width { alpha, texture } = if parameters.node.kind() == "coating" {
+            Width { alpha: MIN_ALPHA, texture: None }
+        } else {
+            self.width(parameters)?
+        };
+        let ior = self.ior(parameters, "bk7")?;
+        match model.kind {
+            MaterialKind::Diffuse { reflectance }
+                if (LEAST_COAT_IOR..=MAX_COAT_IOR).contains(&ior) =>
+            {
+                model.kind = MaterialKind::Plastic { diffuse: reflectance, alpha, ior };
+                model.surface.roughness = texture;
+            }
+            _ => self.ignored.add(features::MI_COATING, || parameters.node.place()),
+        }
+        Ok(model)
+    }
+
+    /// Models of version 0.6 with a diffuse and a glossy lobe of given colours, as a metallic-roughness
+    /// material.
+    pub(super) fn phong(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+        let node = parameters.node;
+        self.ignored.add(features::MI_PHONG, || node.place());
+        let alpha = if node.kind() == "ward" {
+            parameters.without_effect(&["variant"]);
+            self.width_of(parameters)?.alpha
+        } else {
+            let exponent = self.value(parameters, "exponent", Role::Index)?;
+            let exponent = exponent.map_or(30.0, |value| value.mean().x).max(0.0);
+            // A cosine power about the mirror direction is one of four times it about the normal.
+            (2.0 / (4.0 * exponent + 2.0)).sqrt()
+        };
+        let mut color = |name: &str, grey: f32| {
+            let value = self.value(parameters, name, Role::Reflectance)?;
+            Ok(value.unwrap_or(Value::Color(Vec3::splat(grey))))
+        };
+        let diffuse = color("diffuse_reflectance", 0.5)?;
+        let specular = color("specular_reflectance", 0.2)?.mean();
+        // The coat takes its light from below, which these models do not.
+        let base = 1.0 - specular.max_element().min(0.99);
+        let diffuse = diffuse.mapped(|share| (share / base).min(1.0));
+        Ok(Model::colored(diffuse, |base_color| MaterialKind::Principled {
+            base_color,
+            metallic: 0.0,
+            roughness: alpha.clamp(MIN_ALPHA, 1.0).sqrt(),
+            ior: 1.5,
+            specular: 1.0,
+            specular_color: specular / DIELECTRIC,
+        }))
+    }
+}
