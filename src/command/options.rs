@@ -67,15 +67,17 @@ pub struct SceneOptions {
     camera: Option<String>,
     /// Place of the camera, instead of the scene's; it keeps its direction without --look-at.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
+    #[arg(help_heading = CAMERA, hide_short_help = true)]
     look_from: Option<[f32; 3]>,
     /// Point in the middle of the picture, instead of the scene's.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
+    #[arg(help_heading = CAMERA, hide_short_help = true)]
     look_at: Option<[f32; 3]>,
     /// Vertical field of view in degrees, instead of the scene's.
-    #[arg(long, value_name = "DEG")]
+    #[arg(long, value_name = "DEG", help_heading = CAMERA, hide_short_help = true)]
     fov: Option<f32>,
     /// Folder that files named by a Mitsuba or pbrt scene may lie in, beside the scene's own.
-    #[arg(long, value_name = "FOLDER")]
+    #[arg(long, value_name = "FOLDER", help_heading = SCENE, hide_short_help = true)]
     allow_root: Option<PathBuf>,
     /// Fail if loading the scene gives any warning, such as a part of a file that is left out.
     #[arg(long, help_heading = SCENE, hide_short_help = true)]

@@ -344,7 +344,7 @@ impl Arguments {
             let message = format!("--error {error}: expected a finite number above 0");
             return Err(Error::usage(message));
         }
-        let spp = self.rules().samples.unwrap_or(1);
+        let spp = self.rules(Asked::default()).samples.unwrap_or(1);
         if self.sample_offset.checked_add(spp).is_none() {
             return Err(Error::usage(format!(
                 "--sample-offset {} and {spp} samples per pixel: the last sample must be below {}",
