@@ -354,6 +354,9 @@ mod tests {
         assert!(instance.starts_with("closest hits: "), "{instance}");
         let no_shadow = fault(|found| found.visibility.fill(1));
         assert!(no_shadow.starts_with("shadow rays: "), "{no_shadow}");
+        // One wrong answer in a hundred is no rounding.
+        let few = fault(|found| found.visibility.iter_mut().step_by(100).for_each(|one| *one ^= 1));
+        assert!(few.starts_with("shadow rays: 41 "), "{few}");
         let unwritten = fault(|found| found.visibility.fill(UNWRITTEN));
         assert!(unwritten.starts_with("shadow rays: "), "{unwritten}");
         let ballot = fault(|found| found.living.truncate(found.living.len() - 1));

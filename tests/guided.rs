@@ -5,16 +5,21 @@
 //! false alarm once in about 440 runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
+use std::collections::BTreeSet;
+
 use fenestra::{
     pass::Roulette,
     sampler::{
         Parameters, Sampler,
-        guided::{CellKey, GuideState, PARTS_PER_RAY, SHARE_WORDS},
+        guided::{CellKey, GuideState, PARTS_PER_RAY, SHARE_WORDS, with_epoch},
         regions::{FACE_COUNT, Partition, face_normal},
     },
     scene::Scene,
     session::{Renderer, Settings},
-    shader::rooms::guided::{GUIDE_COUNT_WORDS, GUIDE_RESPONSE_UNITS},
+    shader::{
+        rooms::guided::{GUIDE_COUNT_WORDS, GUIDE_RESPONSE_UNITS},
+        structs::Wave,
+    },
 };
 use glam::Vec3;
 
@@ -343,6 +348,37 @@ fn a_renderer_goes_on_where_another_stopped() {
         }
     }
     support::assert_silent();
+}
+
+/// Tables shaped by the outcomes of some random numbers are never sampled with the same: those of every
+/// rebuild, guide, training and seed differ, and a guide that goes on remembers the guides it began with.
+#[test]
+fn every_epoch_has_its_own_random_numbers() {
+    let mut seeds = BTreeSet::new();
+    for case in 0..3_u32.pow(4) {
+        let [seed, is_training, sample, tag] = [1, 3, 9, 27].map(|divisor| case / divisor % 3);
+        let wave = with_epoch(Wave { seed, is_training, ..Wave::default() }, sample, tag);
+        assert_eq!(wave.epoch_start, sample);
+        assert!(seeds.insert(wave.epoch_seed), "{wave:?}");
+    }
+
+    let _alone = support::alone();
+    let scene = scenes::mixed_room();
+    let mut renderer = support::renderer(&scene, guided(1));
+    renderer.render_pass(2).unwrap();
+    let (sums, learned) = (renderer.sums().unwrap(), renderer.guide_state().unwrap().unwrap());
+    assert_eq!(learned.tag, 0);
+    let mut tag = |samples: u32, state: &GuideState| {
+        renderer.restart(0).unwrap();
+        if samples > 0 {
+            renderer.restore(&sums).unwrap();
+        }
+        renderer.restore_guide(state).unwrap();
+        renderer.guide_state().unwrap().unwrap().tag
+    };
+    let loaded = tag(0, &learned);
+    assert_eq!(loaded, learned.epoch_tag());
+    assert_eq!(tag(2, &GuideState { tag: loaded, ..learned }), loaded, "resumed");
 }
 
 #[test]

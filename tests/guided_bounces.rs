@@ -123,8 +123,14 @@ fn arriving() -> (GuideState, Vec<f32>) {
     (GuideState { arrivals: words, ..GuideState::default() }, read)
 }
 
-/// Returns direction and throughput of the paths after a bounce off the floor with these beliefs.
-fn bounce(floor: &Floor, candidates: u32, beliefs: &GuideState) -> Vec<(Vec3, Vec3)> {
+/// Returns direction and throughput of the paths after a bounce off the floor with these beliefs, in an epoch
+/// of a render with these seeds.
+fn bounce(
+    floor: &Floor,
+    candidates: u32,
+    beliefs: &GuideState,
+    [epoch_seed, seed]: [u32; 2],
+) -> Vec<(Vec3, Vec3)> {
     let device = support::device();
     let scene = &floor.scene;
     let buffers = SceneBuffers::new(device, scene, window_of(&Settings::default(), scene)).unwrap();
@@ -164,7 +170,8 @@ fn bounce(floor: &Floor, candidates: u32, beliefs: &GuideState) -> Vec<(Vec3, Ve
         sample_count: SAMPLES,
         shadow_ray_count: 1,
         total_shadow_rays: 1,
-        epoch_seed: 0xb0c + candidates,
+        epoch_seed,
+        seed,
         ..Wave::default()
     };
     let sets = [buffers.set(), guide.set(), waves.set()];
@@ -251,7 +258,7 @@ fn bounces_bring_what_the_brdf_reflects() {
     for (name, floor) in floors() {
         let expected = reflected(&floor);
         for candidates in [2, 4, 8] {
-            let bounces = bounce(&floor, candidates, &beliefs);
+            let bounces = bounce(&floor, candidates, &beliefs, [0xb0c + candidates, 0]);
             let mut counts = vec![0.0; ARRIVAL_DIRECTIONS + 1];
             let mut sums = vec![[0.0; 2]; ARRIVAL_DIRECTIONS];
             for (direction, throughput) in &bounces {
@@ -285,6 +292,19 @@ fn bounces_bring_what_the_brdf_reflects() {
             assert!(worst < 5.5 && biased > 10.0, "{name}, {candidates}: {worst}, {biased}");
         }
     }
+}
+
+/// All numbers of a bounce are those of the epoch: of the render's own, some have shaped the beliefs.
+#[test]
+fn bounces_take_the_numbers_of_their_epoch() {
+    let _alone = support::alone();
+    let (beliefs, _) = arriving();
+    let (_, floor) = floors().swap_remove(0);
+    let [first, same, other] =
+        [[1, 1], [1, 2], [2, 1]].map(|seeds| bounce(&floor, 4, &beliefs, seeds));
+    assert!(first == same);
+    let repeated = first.iter().zip(&other).filter(|(one, other)| one.0 == other.0).count();
+    assert!(100 * repeated < first.len(), "{repeated} of {} directions", first.len());
 }
 
 /// Images agree with those of unguided bounces whatever the cells believe, from nothing learned on,

@@ -2,20 +2,26 @@
 //! extreme transforms, bad input, memory, and pictures of textured, normal-mapped and clear instances.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use fenestra::{
     accel::Accel,
+    film::Aov,
     pass::Schedule,
     sampler::Sampler,
-    scene::{Geometry, Instance, Scene, instance::PLACED_TRIANGLES, transform::Transform},
+    scene::{
+        Camera, Geometry, Instance, Scene,
+        instance::PLACED_TRIANGLES,
+        texture::{Encoding, Texels, Texture, TextureUse},
+        transform::Transform,
+    },
     session::Settings,
     shader::{
         constants::{BVH_STACK_ENTRIES, NO_MATERIAL},
         structs::{Hit, Ray, ShadowRay},
     },
 };
-use glam::{DMat3, DMat4, DVec3, Quat, Vec3};
+use glam::{DMat3, DMat4, DVec3, Quat, Vec3, Vec4};
 
 use crate::{
     support::{
@@ -23,6 +29,7 @@ use crate::{
         random::Random,
         rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, soup, sphere},
         replicates::{LIMIT, replicates},
+        scenes,
         statistics::Comparison,
     },
     twin::surface::{surface_at, triangle_material},
@@ -422,4 +429,109 @@ fn instances_enter_the_hash() {
     assert_eq!(a.geometry.instances.len(), 2);
     assert!(a.geometry.positions.is_empty());
     assert_ne!(a.hash, b.hash);
+}
+
+/// Adds a flat quad around `centre` with half edges `right` and `up`, seen from where `right` × `up` points. The
+/// image of its textures stands upright on it.
+fn add_quad(geometry: &mut Geometry, centre: Vec3, [right, up]: [Vec3; 2], has_tangents: bool) {
+    let first = geometry.positions.len() as u32;
+    for [x, y] in [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]] {
+        geometry.positions.push((centre + x * right + y * up).into());
+        geometry.normals.push([0.0; 3]);
+        geometry.uvs[0].push([x, -y]);
+        let tangent = if has_tangents { right.normalize().extend(1.0) } else { Vec4::ZERO };
+        geometry.tangents.push(tangent.into());
+    }
+    geometry.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|corner| first + corner)));
+    geometry.materials.extend([0; 2]);
+}
+
+/// Quads with one bump of a normal map, each in a pixel of its own: placed and as instances, mirrored and
+/// not, from in front and from behind, with tangents of the mesh and without.
+#[test]
+fn bumps_keep_their_side_in_mirrors_and_from_behind() {
+    let _alone = support::alone();
+    let texels = Texels::Bytes(vec![[217, 166, 230, 255]]);
+    let bump = (Vec3::new(217.0, 166.0, 230.0) / 127.5 - 1.0).normalize();
+    let texture = Texture { name: "bump".into(), width: 1, height: 1, texels };
+    let mut material = scenes::diffuse(Vec3::splat(0.5));
+    material.surface.normal =
+        Some(TextureUse { encoding: Encoding::Linear, ..TextureUse::new(Arc::new(texture)) });
+    let mut scene = scenes::plane(Vec3::ONE, scenes::environment(16, |_| Vec3::ONE));
+    scene.materials = vec![material];
+    // What is seen from behind is the bump turned round.
+    let cases = [
+        ("placed", None, Vec3::ONE),
+        ("placed, from behind", None, Vec3::new(1.0, -1.0, 1.0)),
+        ("instance", Some(([1.0; 3], 0.0)), Vec3::ONE),
+        ("instance, from behind", Some(([1.0; 3], 180.0)), Vec3::new(1.0, -1.0, 1.0)),
+        ("mirrored", Some(([-1.0, 1.0, 1.0], 0.0)), Vec3::new(-1.0, 1.0, 1.0)),
+        ("mirrored, from behind", Some(([1.0, 1.0, -1.0], 0.0)), Vec3::new(-1.0, -1.0, 1.0)),
+    ];
+    let mut geometry = Geometry::default();
+    for (row, has_tangents) in [(0_u32, true), (1, false)] {
+        let mut quad = Geometry::default();
+        add_quad(&mut quad, Vec3::ZERO, [0.5 * Vec3::X, 0.5 * Vec3::Y], has_tangents);
+        geometry.prototypes.push(quad);
+        for (column, (name, transform, _)) in cases.iter().enumerate() {
+            let centre = Vec3::new(column as f32, -(row as f32), 0.0);
+            if let Some((scale, turn)) = transform {
+                let place = Transform::new(*scale, [0.0, *turn, 0.0], centre.into());
+                geometry.instances.extend(Instance::new(row, &place, 0, false));
+            } else {
+                let right = if name.contains("behind") { -0.5 } else { 0.5 } * Vec3::X;
+                add_quad(&mut geometry, centre, [right, 0.5 * Vec3::Y], has_tangents);
+            }
+        }
+    }
+    scene.geometry = geometry;
+    (scene.film.width, scene.film.height) = (6, 2);
+    let look_at = Vec3::new(2.5, -0.5, 0.0);
+    scene.camera = Camera {
+        position: look_at + 100.0 * Vec3::Z,
+        look_at,
+        vertical_fov_deg: 2.0 * 0.01_f32.atan().to_degrees(),
+        ..scene.camera
+    };
+    let settings = Settings { shadow_rays: 0, aovs: vec![Aov::Normal], ..Settings::default() };
+    let (sums, _) = support::render(&scene, settings, 1);
+    for (pixel, normal) in sums.normal.iter().enumerate() {
+        let (name, _, signs) = cases[pixel % 6];
+        let (found, expected) = (Vec3::from(*normal), signs * bump);
+        assert!(
+            found.distance(expected) < 1e-3,
+            "{name}, row {}: {found}, not {expected}",
+            pixel / 6
+        );
+    }
+}
+
+/// Shadow rays are dimmed by every sheet, and camera rays go through each by a chance of its own, with the
+/// material that the instance gives it: that of the mesh would stop them.
+#[test]
+fn rays_go_through_each_of_several_sheets() {
+    let _alone = support::alone();
+    let mut scene = scenes::plane(Vec3::splat(0.5), scenes::environment(16, |_| Vec3::ONE));
+    let mut sheet = scenes::diffuse(Vec3::ZERO);
+    sheet.surface.opacity.factor = 0.5;
+    scene.materials.push(sheet);
+    let mut quad = Geometry::default();
+    add_quad(&mut quad, Vec3::ZERO, [5e3 * Vec3::X, 5e3 * Vec3::NEG_Z], false);
+    scene.geometry.prototypes = vec![quad];
+    for (height, replaces) in [(8.0, false), (9.0, true), (10.0, true)] {
+        let place = Transform::new([1.0; 3], [0.0; 3], [0.0, height, 0.0]);
+        scene.geometry.instances.extend(Instance::new(0, &place, 1, replaces));
+    }
+    let settings = Settings { sampler: Sampler::Cosine, ..Settings::default() };
+    // A ray that leaves the scene between two sheets is one in 10⁵.
+    for (height, samples, expected, tolerance) in
+        [(5.0, 1, 0.5 * 0.125, 1e-3), (20.0, 256, 0.125 * 0.5 * 0.125, 0.08)]
+    {
+        scene.camera.position.y = height;
+        let (sums, _) = support::render(&scene, settings.clone(), samples);
+        let pixels = sums.pixel_count();
+        let mean = (0..pixels).map(|pixel| sums.mean(pixel)[0]).sum::<f64>() / pixels as f64;
+        eprintln!("from {height} m: {mean:.5}, expected {expected:.5}");
+        assert!((mean / expected - 1.0).abs() < tolerance, "from {height} m: {mean}");
+    }
 }

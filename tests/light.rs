@@ -2,18 +2,19 @@
 //! surfaces that are not opaque.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use std::f32::consts::PI;
+use std::{f32::consts::PI, sync::Arc};
 
 use fenestra::{
     sampler::Sampler,
     scene::{
-        Lamp, Scene,
+        Geometry, Lamp, Scene,
         lamp::{LampKind, SpotFalloff},
         material::{Emission, Material, MaterialKind},
+        texture::{Interpolation, Texels, Texture, TextureUse},
     },
     session::Settings,
 };
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::support::{self, scenes};
 
@@ -64,14 +65,59 @@ fn glass(transmittance: Vec3) -> MaterialKind {
 fn sheltered_plane(sheet: Material, environment: fenestra::scene::EnvironmentMap) -> Scene {
     let mut scene = scenes::plane(Vec3::splat(0.5), environment);
     scene.materials.push(sheet);
-    let first = scene.geometry.positions.len() as u32;
-    for [x, z] in [[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]] {
-        scene.geometry.positions.push([x * 5e3, 8.0, z * 5e3]);
-        scene.geometry.normals.push([0.0; 3]);
-    }
-    scene.geometry.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
-    scene.geometry.materials.extend([1, 1]);
+    add_square(&mut scene.geometry, Vec3::new(0.0, 8.0, 0.0), 5e3, 1);
     scene
+}
+
+/// Adds a horizontal square, seen from above, with half edges of `half`.
+fn add_square(geometry: &mut Geometry, centre: Vec3, half: f32, material: u32) {
+    let first = geometry.positions.len() as u32;
+    for [x, z] in [[-half, -half], [-half, half], [half, half], [half, -half]] {
+        geometry.positions.push((centre + Vec3::new(x, 0.0, z)).into());
+        geometry.normals.push([0.0; 3]);
+    }
+    geometry.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    geometry.materials.extend([material; 2]);
+}
+
+/// A square at y = 0 that fills the image, seen along about 70° from its normal, between a sky and a ground that
+/// are told apart by their channels.
+fn between_sky_and_ground(surface: MaterialKind) -> Scene {
+    let environment = scenes::environment(64, |to| if to.y > 0.0 { SKY } else { GROUND });
+    let mut scene = scenes::plane(Vec3::ZERO, environment);
+    scene.materials = vec![Material::new("surface", surface)];
+    scene.geometry = Geometry::default();
+    add_square(&mut scene.geometry, Vec3::ZERO, 5.0, 0);
+    scene.camera.position = Vec3::new(0.0, 3.0, 8.0);
+    scene.camera.vertical_fov_deg = 4.0;
+    scene
+}
+
+const SKY: Vec3 = Vec3::new(1.0, 0.0, 1.0);
+const GROUND: Vec3 = Vec3::new(0.0, 1.0, 1.0);
+
+/// Checks every channel of the mean of the image against the mean of a function of the cosine at the surface.
+fn assert_channels(
+    name: &str,
+    scene: &Scene,
+    samples: u32,
+    tolerance: f64,
+    expected: impl Fn(f64) -> DVec3,
+) {
+    let (sums, _) = support::render(scene, settings(Sampler::Mis, 1), samples);
+    let pixels = sums.pixel_count();
+    let mean =
+        (0..pixels).map(|pixel| DVec3::from(sums.mean(pixel))).sum::<DVec3>() / pixels as f64;
+    let of = |channel: usize| {
+        mean_over_plane(scene, |place| {
+            let cosine = (scene.camera.position - place).normalize().y.abs();
+            expected(cosine.into())[channel] as f32
+        })
+    };
+    let expected = DVec3::from_array([0, 1, 2].map(of));
+    eprintln!("{name}: {mean:.4}, expected {expected:.4}");
+    let off = (mean - expected).abs() - tolerance * expected;
+    assert!(off.max_element() < 1e-5, "{name}: {mean}, not {expected}");
 }
 
 #[test]
@@ -107,11 +153,15 @@ fn a_glowing_box_fills_itself_with_light() {
 #[test]
 fn lamps_without_a_surface_light_a_plane() {
     let _alone = support::alone();
-    let position = Vec3::new(0.0, 3.0, 0.0);
+    let position = Vec3::new(1.5, 3.0, 0.0);
     let intensity = Vec3::splat(40.0);
     let down = Vec3::NEG_Y;
     let lit_by = |kind| {
         let mut scene = scenes::plane(Vec3::splat(0.5), black());
+        if !matches!(kind, LampKind::Directional { .. }) {
+            // Rays end at the lamp. The ceiling behind it is beside the camera's view.
+            scenes::add_box(&mut scene.geometry, position + 0.1 * Vec3::Y, Vec3::splat(0.1), 0);
+        }
         scene.lamps.push(Lamp { name: "lamp".into(), kind });
         scene
     };
@@ -200,14 +250,9 @@ fn an_area_lamp_agrees_with_a_point_far_away() {
     let mut lamp = scenes::diffuse(Vec3::ZERO);
     lamp.surface.emission = Some(emission);
     scene.materials.push(lamp);
-    let first = scene.geometry.positions.len() as u32;
-    // The camera stands at x = 0 below the lamp's height; the lamp is beside its view.
-    for [x, z] in [[0.4, -0.1], [0.6, -0.1], [0.6, 0.1], [0.4, 0.1]] {
-        scene.geometry.positions.push([x, 4.0, z]);
-        scene.geometry.normals.push([0.0; 3]);
-    }
-    scene.geometry.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
-    scene.geometry.materials.extend([1, 1]);
+    // The camera stands at x = 0 below the lamp's height; the lamp is beside its view and shines downward.
+    add_square(&mut scene.geometry, Vec3::new(0.5, 4.0, 0.0), 0.1, 1);
+    scene.geometry.triangles.iter_mut().skip(12).for_each(|corners| corners.swap(1, 2));
     let expected = mean_over_plane(&scene, |place| {
         let cells = 20;
         (0..cells * cells)
@@ -245,15 +290,100 @@ fn mirrors_and_glass_lose_nothing_in_a_furnace() {
     }
 }
 
-/// Share of light that a pane of index 1.5 lets through at a cosine: T² Σ R²ⁿ for each polarisation
-/// would differ; panes take the mean reflectance of one side, as scene formats do.
-fn pane_transmittance(cosine: f64) -> f64 {
+/// Reflectance of glass of index 1.5 at a cosine outside.
+fn reflectance_of_glass(cosine: f64) -> f64 {
     let sine = (1.0 - cosine * cosine).sqrt() / 1.5;
     let inside = (1.0 - sine * sine).sqrt();
     let parallel = (1.5 * cosine - inside) / (1.5 * cosine + inside);
     let perpendicular = (cosine - 1.5 * inside) / (cosine + 1.5 * inside);
-    let side = 0.5 * (parallel * parallel + perpendicular * perpendicular);
+    0.5 * (parallel * parallel + perpendicular * perpendicular)
+}
+
+/// Share of light that a pane of index 1.5 lets through at a cosine: T² Σ R²ⁿ for each polarisation
+/// would differ; panes take the mean reflectance of one side, as scene formats do.
+fn pane_transmittance(cosine: f64) -> f64 {
+    let side = reflectance_of_glass(cosine);
     1.0 - 2.0 * side / (1.0 + side)
+}
+
+#[test]
+fn panes_reflect_and_pass_their_tints() {
+    let _alone = support::alone();
+    let [reflectance, transmittance] = [Vec3::new(0.9, 0.7, 0.5), Vec3::new(0.3, 0.8, 0.6)];
+    let pane = MaterialKind::ThinDielectric { ior: 1.5, reflectance, transmittance };
+    let mut scene = between_sky_and_ground(pane);
+    for opacity in [1.0, 0.6] {
+        scene.materials[0].surface.opacity.factor = opacity;
+        let opacity = f64::from(opacity);
+        assert_channels(&format!("opacity {opacity}"), &scene, 512, 0.03, |cosine| {
+            let passed = pane_transmittance(cosine) * opacity;
+            (opacity - passed) * (reflectance * SKY).as_dvec3()
+                + (passed * transmittance.as_dvec3() + (1.0 - opacity)) * GROUND.as_dvec3()
+        });
+    }
+}
+
+/// The inside of glass lies behind its triangles: from there all light is reflected at this angle.
+#[test]
+fn glass_has_its_inside_at_the_back() {
+    let _alone = support::alone();
+    let (reflectance, transmittance) = (Vec3::ONE, Vec3::ONE);
+    let kind = MaterialKind::Dielectric { ior: 1.5, alpha: 0.0, reflectance, transmittance };
+    let mut scene = between_sky_and_ground(kind);
+    let [sky, ground] = [SKY, GROUND].map(|light| light.as_dvec3());
+    assert_channels("from outside", &scene, 512, 0.04, |cosine| {
+        let reflected = reflectance_of_glass(cosine);
+        reflected * sky + (1.0 - reflected) / 2.25 * ground
+    });
+    scene.camera.position.y *= -1.0;
+    assert_channels("from inside", &scene, 1, 1e-4, |_| ground);
+}
+
+/// A bent normal would have the mirror reflect what lies below it.
+#[test]
+fn bent_normals_let_no_light_through_a_mirror() {
+    let _alone = support::alone();
+    let mut scene = between_sky_and_ground(MaterialKind::Mirror { reflectance: Vec3::ONE });
+    assert_channels("flat", &scene, 1, 1e-4, |_| SKY.as_dvec3());
+    // 15° away from the viewer, who looks along 21° above the surface.
+    let (sine, cosine) = 15_f32.to_radians().sin_cos();
+    scene.geometry.normals.fill([0.0, cosine, -sine]);
+    assert_channels("bent", &scene, 1, 1e-4, |_| DVec3::ZERO);
+}
+
+/// Light leaves a lamp by its triangles, whatever normals are interpolated over them.
+#[test]
+fn the_normals_of_a_lamp_do_not_matter() {
+    let _alone = support::alone();
+    let mut lamp = scenes::diffuse(Vec3::ZERO);
+    let emission = Emission { radiance: Vec3::splat(9.0), texture: None, two_sided: false };
+    lamp.surface.emission = Some(emission);
+    let mut scene = scenes::plane(Vec3::splat(0.5), black());
+    scene.materials.push(lamp);
+    scenes::add_sphere(&mut scene.geometry, Vec3::new(1.0, 1.0, 0.0), 0.5, 3, 1);
+    let round = support::render(&scene, settings(Sampler::Mis, 2), 16).0;
+    scene.geometry.normals.fill([0.0; 3]);
+    let flat = support::render(&scene, settings(Sampler::Mis, 2), 16).0;
+    assert!(round.sum == flat.sum);
+    assert!(round.sum.iter().any(|sum| sum[0] > 0.0));
+}
+
+/// A glowing square whose second coordinates lie on the green texel, and the first on the red one.
+#[test]
+fn emission_takes_the_coordinates_that_its_texture_names() {
+    let _alone = support::alone();
+    let texels = Texels::Bytes(vec![[255, 0, 0, 255], [0, 255, 0, 255]]);
+    let texture = Texture { name: "lamp".into(), width: 2, height: 1, texels };
+    let used = TextureUse {
+        uv_set: 1,
+        interpolation: Interpolation::Nearest,
+        ..TextureUse::new(Arc::new(texture))
+    };
+    let mut scene = between_sky_and_ground(MaterialKind::Diffuse { reflectance: Vec3::ZERO });
+    let emission = Emission { radiance: Vec3::ONE, texture: Some(used), two_sided: false };
+    scene.materials[0].surface.emission = Some(emission);
+    scene.geometry.uvs = [0.25, 0.75].map(|u| vec![[u, 0.5]; 4]);
+    assert_channels("green", &scene, 1, 1e-4, |_| DVec3::Y);
 }
 
 #[test]

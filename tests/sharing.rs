@@ -8,8 +8,9 @@ use fenestra::{
     pass::Roulette,
     sampler::Sampler,
     scene::{
-        Scene,
-        material::{Material, MaterialKind},
+        Lamp, Scene,
+        lamp::LampKind,
+        material::{Emission, Material, MaterialKind},
     },
     session::Settings,
 };
@@ -17,6 +18,7 @@ use glam::Vec3;
 
 use crate::support::{
     self,
+    rays::scaled,
     replicates::REPLICATES,
     scenes,
     statistics::{Comparison, Estimate, estimates, largest_t},
@@ -87,6 +89,18 @@ fn agrees(scene: &Scene, shared: &[(Sampler, &str)], samples: u32, base: &Settin
     }
 }
 
+fn paint(base_color: Vec3, metallic: f32, roughness: f32) -> Material {
+    let kind = MaterialKind::Principled {
+        base_color,
+        metallic,
+        roughness,
+        ior: 1.5,
+        specular: 1.0,
+        specular_color: Vec3::ONE,
+    };
+    Material::new("paint", kind)
+}
+
 fn base(depth: u32) -> Settings {
     Settings { depth, ..Settings::default() }
 }
@@ -120,18 +134,9 @@ fn in_a_room_with_glossy_things() {
 #[test]
 fn in_a_room_of_plastic_and_of_paint() {
     let _alone = support::alone();
-    let paint = |roughness| {
-        let kind = MaterialKind::Principled {
-            base_color: Vec3::new(0.7, 0.6, 0.5),
-            metallic: 0.2,
-            roughness,
-            ior: 1.5,
-            specular: 1.0,
-            specular_color: Vec3::ONE,
-        };
-        Material::new("paint", kind)
-    };
-    let scene = scenes::room(vec![paint(0.4), scenes::plastic(0.2), paint(0.1)]);
+    let colour = Vec3::new(0.7, 0.6, 0.5);
+    let [dull, bright] = [0.4, 0.1].map(|roughness| paint(colour, 0.2, roughness));
+    let scene = scenes::room(vec![dull, scenes::plastic(0.2), bright]);
     agrees(&scene, &[(Sampler::Mis, "8"), (Sampler::Guided, "4")], 32, &base(3));
 }
 
@@ -190,6 +195,67 @@ fn the_same_seed_gives_the_same_bits_however_samples_are_grouped() {
     assert!(bounced("off") == bounced("8"));
     let bounced = |edge| render(&scene, settings(Sampler::Mis, edge, 2), &[2]);
     assert!(bounced("off") != bounced("8"));
+}
+
+/// A room of these materials in turn, with a lamp besides the window.
+fn lit_room(materials: Vec<Material>) -> Scene {
+    let mut scene = scenes::room(materials);
+    let position = Vec3::new(0.3, 2.1, 0.4);
+    let kind = LampKind::Point { position, intensity: Vec3::splat(2.0) };
+    scene.lamps.push(Lamp { name: "lamp".into(), kind });
+    scene
+}
+
+/// The channels that no base reflects are those of the same paths without sharing: coats keep their light.
+#[test]
+fn light_that_no_base_reflects_stays_with_its_own_path() {
+    let _alone = support::alone();
+    let red = 0.6 * Vec3::X;
+    let plastic = MaterialKind::Plastic { diffuse: red, alpha: 0.3, ior: 1.5 };
+    for material in [Material::new("plastic", plastic), paint(red, 0.0, 0.5)] {
+        let scene = lit_room(vec![material]);
+        let [alone, shared] = ["off", "8"].map(|edge| {
+            let own = settings(Sampler::Mis, edge, 4);
+            render(&scene, Settings { roulette: Roulette::NEVER, ..own }, &[2])
+        });
+        let mut red_ones = 0;
+        for (pixel, (alone, shared)) in alone.sum.iter().zip(&shared.sum).enumerate() {
+            let is_same = |channel: usize| {
+                let (one, other) = (alone[channel], shared[channel]);
+                (one - other).abs() <= 1e-4 * one.max(other) + 1e-6
+            };
+            let name = &scene.materials[0].name;
+            assert!(is_same(1) && is_same(2), "{name}, {pixel}: {alone:?}, {shared:?}");
+            red_ones += usize::from(!is_same(0));
+        }
+        assert!(red_ones * 2 > alone.sum.len(), "{red_ones} pixels share red light");
+    }
+}
+
+/// No length counts as a direction, and no distance but in square: twice as large a scene, whose lamp is four
+/// times as strong, has the same picture.
+#[test]
+fn a_scene_of_twice_the_size_looks_the_same() {
+    let _alone = support::alone();
+    let mut glowing = paint(Vec3::new(0.7, 0.6, 0.5), 0.2, 0.4);
+    let emission = Emission { radiance: Vec3::new(3.0, 2.0, 1.0), texture: None, two_sided: false };
+    glowing.surface.emission = Some(emission);
+    let scene = lit_room(vec![scenes::plastic(0.1), glowing, scenes::copper(0.3)]);
+    let mut large = scene.clone();
+    large.geometry = scaled(&scene.geometry, 2.0);
+    large.camera.position *= 2.0;
+    large.camera.look_at *= 2.0;
+    for lamp in &mut large.lamps {
+        if let LampKind::Point { position, intensity } = &mut lamp.kind {
+            (*position, *intensity) = (2.0 * *position, 4.0 * *intensity);
+        }
+    }
+    let [small, large] =
+        [scene, large].map(|scene| render(&scene, settings(Sampler::Mis, "8", 3), &[2]));
+    for (pixel, (small, large)) in small.sum.iter().zip(&large.sum).enumerate() {
+        let is_same = |(one, other): (&f32, &f32)| (one - other).abs() <= 1e-4 * one.max(*other);
+        assert!(small.iter().zip(large).all(is_same), "{pixel}: {small:?}, {large:?}");
+    }
 }
 
 /// Films that are no multiple of a cohort, or smaller than one, and crop windows.

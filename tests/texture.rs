@@ -13,12 +13,13 @@ use fenestra::{
     math::colour::luminance,
     scene::{
         Geometry,
-        material::{Material, MaterialKind, Opacity},
+        material::{ConductorFresnel, Material, MaterialKind, Opacity},
         texture::{
             Channels, Encoding, Interpolation, MAX_TEXTURE_SIDE, Texels, Texture, TextureCache,
             TextureUse, Wrap, lookup::gradient_tangent,
         },
     },
+    session::Settings,
     shader::{
         bindings::{Binding, probe, scene},
         constants::{
@@ -34,7 +35,10 @@ use glam::{Vec2, Vec3, Vec4, vec2, vec3, vec4};
 use half::f16;
 use image::{DynamicImage, ImageFormat};
 
-use crate::{support, twin::texture as twin};
+use crate::{
+    support::{self, scenes},
+    twin::texture as twin,
+};
 
 // Image files
 
@@ -600,6 +604,61 @@ fn shader_agrees_with_its_twins_for_some_attributes() {
     compare(ATTRIBUTE_SECOND_UVS | ATTRIBUTE_COLOR);
     compare(ATTRIBUTE_FIRST_UVS);
     compare(0);
+}
+
+/// A texture of one value is a factor of its property: of the colour, of the root of the width, of the share of
+/// metal. The paths are those of a scene without textures, whose materials have the products.
+#[test]
+fn textures_of_one_value_are_factors() {
+    let _alone = support::alone();
+    let metal = |alpha, reflectance| MaterialKind::Conductor {
+        alpha,
+        fresnel: ConductorFresnel::Schlick { reflectance },
+    };
+    let paint = |base_color, metallic, roughness| MaterialKind::Principled {
+        base_color,
+        metallic,
+        roughness,
+        ior: 1.5,
+        specular: 1.0,
+        specular_color: Vec3::ONE,
+    };
+    let (full, half) = (vec3(0.8, 0.6, 0.4), vec3(0.4, 0.15, 0.4));
+    let of = |kind| Material::new("m", kind);
+    let plain = vec![
+        of(MaterialKind::Diffuse { reflectance: half }),
+        of(metal(0.2, half)),
+        of(paint(half, 0.2, 0.25)),
+    ];
+    let used = |value: [f32; 3]| {
+        let [r, g, b] = value.map(f16::from_f32);
+        Some(TextureUse {
+            encoding: Encoding::Linear,
+            ..TextureUse::new(texture(1, 1, Texels::Halves(vec![[r, g, b, f16::ONE]])))
+        })
+    };
+    let mut textured = vec![
+        of(MaterialKind::Diffuse { reflectance: full }),
+        of(metal(0.8, full)),
+        of(paint(full, 0.8, 0.5)),
+    ];
+    for material in &mut textured {
+        material.surface.color = used([0.5, 0.25, 1.0]);
+        material.surface.roughness = used([0.5; 3]);
+        material.surface.metallic = used([0.25; 3]);
+    }
+    let [plain, textured] = [plain, textured].map(|materials| {
+        let mut scene = scenes::room(materials);
+        scene.geometry.uvs[0] = vec![[0.3, 0.7]; scene.geometry.positions.len()];
+        let mut settings = Settings { depth: 3, ..Settings::default() };
+        settings.parameters.set("share-paths=8").unwrap();
+        support::render(&scene, settings, 2).0.sum
+    });
+    let is_same = |(one, other): (&f32, &f32)| (one - other).abs() <= 1e-3 * one.max(*other);
+    let same = |(one, other): &(&[f32; 3], &[f32; 3])| one.iter().zip(*other).all(is_same);
+    let same = plain.iter().zip(&textured).filter(same).count();
+    // Rounding sends a path elsewhere now and then.
+    assert!(100 * same >= 98 * plain.len(), "{same} of {} pixels are the same", plain.len());
 }
 
 #[test]

@@ -130,6 +130,17 @@ fn glass_unlit_and_specular_glossiness_materials_are_mapped() {
     // A metal transmits nothing, and little transmission stays opaque.
     let (found, warnings) = with(glass, r#""metallicFactor": 1"#);
     assert!(matches!(found.kind, MaterialKind::Principled { .. }) && warnings.is_empty());
+    // Its share of metal may come from an image.
+    let inline = base64(&png([[0, 0, 64, 255]; 2]));
+    let images = format!(
+        r#", "images": [{{"uri": "data:image/png;base64,{inline}"}}], "textures": [{{"source": 0}}]"#
+    );
+    let material = format!(
+        r#"{{"pbrMetallicRoughness": {{"metallicRoughnessTexture": {{"index": 0}}}},
+        "extensions": {{{glass}}}}}"#
+    );
+    let (found, _) = gltf_material(&folder, &material, &images);
+    assert!(matches!(found.kind, MaterialKind::ThinDielectric { .. }), "{found:?}");
     let (found, warnings) = with(&glass.replace("Factor\": 1", "Factor\": 0.4"), smooth);
     assert!(matches!(found.kind, MaterialKind::Principled { .. }) && warnings.len() == 1);
 

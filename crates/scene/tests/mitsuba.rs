@@ -265,6 +265,16 @@ fn models_become_materials() {
     assert!((alpha - 0.2).abs() < 1e-6 && copper.surface.two_sided);
     assert_eq!(eta, Vec3::new(0.104, 0.978, 1.204));
     assert_eq!(k, Vec3::new(2.828, 2.625, 2.357));
+    let (sunk, _) = material(
+        r#"<bsdf type="conductor"><string name="material" value="Cu"/>
+        <float name="ext_eta" value="2"/></bsdf>"#,
+    );
+    let MaterialKind::Conductor { fresnel: ConductorFresnel::Exact { eta, k }, .. } = sunk.kind
+    else {
+        panic!()
+    };
+    assert_eq!(eta, Vec3::new(0.052, 0.489, 0.602));
+    assert_eq!(k, Vec3::new(1.414, 1.3125, 1.1785));
     assert_eq!(warnings.len(), 2, "Beckmann and two widths: {warnings:?}");
     let (dull, _) = material(
         r#"<bsdf type="conductor"><rgb name="eta" value="1"/><rgb name="k" value="2"/>

@@ -409,6 +409,15 @@ fn numbers_are_opacity_or_colours_and_roughness_is_mapped() {
     let map = normal.materials[0].surface.normal.clone().unwrap();
     assert_eq!((map.encoding, map.image_from_uv[1]), (Encoding::Linear, [0.0, -1.0, 1.0]));
     assert_eq!(normal.geometry.tangents.len(), 3);
+    // The share of a surface that is not there is what the image leaves: here 1 − (1 − value).
+    let thin = textured(
+        r#"Texture "f" "float" "imagemap" "string filename" "a.png" "bool invert" true
+        MakeNamedMaterial "red" "string type" "diffuse"
+        MakeNamedMaterial "none" "string type" "interface""#,
+        r#""mix" "string materials" ["red" "none"] "texture amount" "f""#,
+    );
+    let opacity = thin.materials[0].surface.opacity.texture.clone().unwrap();
+    assert_eq!((opacity.scale, opacity.bias), ([1.0; 3], [0.0; 3]));
 }
 
 #[test]

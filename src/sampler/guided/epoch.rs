@@ -11,7 +11,7 @@ pub(super) const TRAINING_SEED: u32 = 0x7e11_ab1e;
 
 /// Gives `wave` random numbers of its own for the epoch that begins at `sample`: those of `guided`
 /// start anew after every rebuild. `guide_tag` tells them from those that taught a loaded guide.
-pub(super) fn with_epoch(wave: Wave, sample: u32, guide_tag: u32) -> Wave {
+pub fn with_epoch(wave: Wave, sample: u32, guide_tag: u32) -> Wave {
     let [epoch_seed, ..] = hash_4d([wave.seed, sample, EPOCH_TAG ^ guide_tag, wave.is_training]);
     Wave { epoch_seed, epoch_start: sample, ..wave }
 }

@@ -46,6 +46,7 @@ pub use cell_readback::{CellLevel, CellReadback, RegionReadback};
 pub use cells::MAX_CELLS;
 pub use counts::{Count, CountWords, PARTS_PER_RAY};
 pub use entries::{decode_entry, decode_visibility};
+pub use epoch::with_epoch;
 pub use estimate::Estimates;
 pub use guide::Guide;
 pub use key::CellKey;
