@@ -1,6 +1,6 @@
 //! Paths shared by the pixels of a cohort: the same picture as without, by z-test and in closed form.
 //!
-//! The reference is `mis` without sharing; 15 comparisons raise a false alarm once in about 1,300 runs.
+//! The reference is `mis` without sharing; 16 comparisons raise a false alarm once in about 1,200 runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 use fenestra::{
@@ -156,6 +156,25 @@ fn with_lamps_panes_mirrors_and_sheets() {
     agrees(&scene, &[(Sampler::Mis, "8")], 48, &base(2));
 }
 
+/// A wall stands on the floor, and its normals are bent toward it: from near it looks brighter than its area
+/// tells, and from far darker.
+#[test]
+fn before_a_wall_of_bent_normals() {
+    let _alone = support::alone();
+    let mut scene = scenes::plane(Vec3::splat(0.7), scenes::environment(16, |_| Vec3::ZERO));
+    let first = scene.geometry.positions.len();
+    scenes::add_box(&mut scene.geometry, Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.02, 2.0, 6.0), 0);
+    let (sine, cosine) = 40_f32.to_radians().sin_cos();
+    scene.geometry.normals[first..].fill([cosine, -sine, 0.0]);
+    for x in [-2.5, 2.5] {
+        let kind =
+            LampKind::Point { position: Vec3::new(x, 1.0, 0.0), intensity: Vec3::splat(20.0) };
+        scene.lamps.push(Lamp { name: "lamp".into(), kind });
+    }
+    scene.name = "wall".into();
+    agrees(&scene, &[(Sampler::Mis, "8")], 64, &base(2));
+}
+
 #[test]
 fn a_concave_white_body_vanishes_in_the_furnace() {
     let _alone = support::alone();
@@ -230,6 +249,28 @@ fn light_that_no_base_reflects_stays_with_its_own_path() {
         }
         assert!(red_ones * 2 > alone.sum.len(), "{red_ones} pixels share red light");
     }
+}
+
+/// Nobody else sees a second vertex through a sheet, so its light stays with the path that went through.
+#[test]
+fn light_from_beyond_a_sheet_stays_with_its_own_path() {
+    let _alone = support::alone();
+    let mut scene = scenes::plane(Vec3::splat(0.5), scenes::environment(16, |_| Vec3::ZERO));
+    let mut sheet = scenes::diffuse(Vec3::ZERO);
+    sheet.surface.opacity.factor = 0.5;
+    scene.materials.push(sheet);
+    scenes::add_box(&mut scene.geometry, 8.0 * Vec3::Y, Vec3::new(100.0, 1e-3, 100.0), 1);
+    scenes::add_box(&mut scene.geometry, 12.0 * Vec3::Y, Vec3::new(40.0, 1.0, 40.0), 0);
+    let kind = LampKind::Point { position: 10.0 * Vec3::Y, intensity: Vec3::splat(50.0) };
+    scene.lamps.push(Lamp { name: "lamp".into(), kind });
+    let picture = |edge, depth| render(&scene, settings(Sampler::Mis, edge, depth), &[8]).sum;
+    let [alone, shared, direct] = [("off", 2), ("8", 2), ("off", 1)].map(|(e, d)| picture(e, d));
+    for ((alone, shared), direct) in alone.iter().zip(&shared).zip(&direct) {
+        assert!((alone[0] - shared[0]).abs() <= 1e-4 * alone[0], "{alone:?}, {shared:?}");
+        assert!(alone[0] >= direct[0]);
+    }
+    let sum = |pixels: &[[f32; 3]]| pixels.iter().map(|pixel| pixel[0]).sum::<f32>();
+    assert!(sum(&alone) > 1.02 * sum(&direct));
 }
 
 /// No length counts as a direction, and no distance but in square: twice as large a scene, whose lamp is four
