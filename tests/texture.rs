@@ -287,7 +287,7 @@ fn channels_factors_and_coordinates_come_in_their_order() {
     let lower_left =
         TextureUse { image_from_uv: TextureUse::from_lower_left(image).image_from_uv, ..used };
     assert_eq!((value(&lower_left, vec2(0.1, 0.1)) * 255.0).round(), Vec4::splat(3.0));
-    assert_eq!(twin::texture_value(&[], &[], NO_TEXTURE, Vec2::ZERO, Vec2::ZERO), Vec4::ONE);
+    assert_eq!(twin::texture_value(&[0], &[], NO_TEXTURE, Vec2::ZERO, Vec2::ZERO), Vec4::ONE);
 }
 
 #[test]
@@ -570,7 +570,7 @@ fn compare(bits: u32) {
         if tangent == Vec4::ZERO {
             let used = &textures.uses[use_index as usize];
             let image = [0, 1, 2].map(|corner| {
-                let uv = |bit| twin::corner_uv(&attributes, triangle, corner, bit);
+                let uv = |bit| twin::words(&attributes).corner_uv(triangle, corner, bit);
                 twin::image_coordinates(used, uv(ATTRIBUTE_FIRST_UVS), uv(ATTRIBUTE_SECOND_UVS))
             });
             let [a, b, c] = accel.triangle(triangle).vertices.map(|v| Vec3::from(v.position));

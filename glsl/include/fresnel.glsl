@@ -1,5 +1,5 @@
 // Reflectance of smooth interfaces: dielectrics, conductors, Schlick's approximation, thin panes. No
-// buffers, so that traversal may include it. Twins: src/brdf/fresnel.rs, tests/twin/specular.rs.
+// buffers, so that traversal may include it. Twin: src/brdf/fresnel.rs.
 
 #include "layout.glsl"
 

@@ -1,4 +1,4 @@
-// Textures, attributes of triangles and normal maps. Twins: tests/twin/texture.rs
+// Textures, attributes of triangles and normal maps. Twins: src/surface/lookup.rs, tests/twin/texture.rs
 // and crates/scene/src/texture/lookup.rs.
 //
 // Lookups read the full resolution. A mip level would average texels over an area that the pixel

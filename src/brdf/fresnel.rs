@@ -1,9 +1,10 @@
 //! Twin of `glsl/include/fresnel.glsl`: same names, same order. Reflectance of smooth interfaces:
-//! conductors, Schlick's approximation.
+//! conductors, Schlick's approximation, thin panes.
 
 use glam::{Vec3, vec3};
 
 pub use crate::scene::coat::fresnel_dielectric;
+use crate::shader::structs::Material;
 
 /// Reflectance of a conductor of refractive index eta + i·k; exact Fresnel.
 pub fn fresnel_conductor(cosine: f32, eta: Vec3, k: Vec3) -> Vec3 {
@@ -38,4 +39,33 @@ pub(crate) fn schlick_rise(cosine: f32) -> f32 {
 /// Reflectance of a conductor from that at normal incidence. \[Schlick 1994\].
 pub(crate) fn fresnel_schlick(cosine: f32, reflectance: Vec3) -> Vec3 {
     reflectance + (Vec3::ONE - reflectance) * schlick_rise(cosine)
+}
+
+/// Cosine of the refracted direction with the inverted normal; `eta` is the refractive index beyond
+/// the interface over that of this side. 0 for total reflection.
+pub fn refracted_cosine(cosine: f32, eta: f32) -> f32 {
+    (1.0 - (1.0 - cosine * cosine) / (eta * eta)).max(0.0).sqrt()
+}
+
+/// Reflectance of an interface seen from either side, 1 for total reflection; `eta` as above. Exact
+/// Fresnel.
+pub fn fresnel_interface(cosine: f32, eta: f32) -> f32 {
+    let refracted = refracted_cosine(cosine, eta);
+    let perpendicular = (cosine - eta * refracted) / (cosine + eta * refracted);
+    let parallel = (eta * cosine - refracted) / (eta * cosine + refracted);
+    let reflectance = 0.5 * (perpendicular * perpendicular + parallel * parallel);
+    if refracted > 0.0 { reflectance.min(1.0) } else { 1.0 }
+}
+
+/// Light that a thin pane reflects, R + T²R + T²R³ + … = 2R/(1 + R) for T = 1 − R at each of its two
+/// sides, times its factor. `cosine` may have either sign.
+pub fn pane_reflectance(material: &Material, cosine: f32) -> Vec3 {
+    let reflectance = fresnel_interface(cosine.abs(), material.ior);
+    2.0 * reflectance / (1.0 + reflectance) * Vec3::from(material.reflectance)
+}
+
+/// Light that a thin pane lets straight through, (1 − R)/(1 + R), times its factor.
+pub fn pane_transmittance(material: &Material, cosine: f32) -> Vec3 {
+    let reflectance = fresnel_interface(cosine.abs(), material.ior);
+    (1.0 - reflectance) / (1.0 + reflectance) * Vec3::from(material.eta)
 }

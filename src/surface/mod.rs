@@ -1,5 +1,6 @@
 //! Textures, opacity and emission of the scene's materials → the buffers of the device.
 
+pub mod lookup;
 pub mod textures;
 
 use crate::{

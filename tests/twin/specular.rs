@@ -1,6 +1,6 @@
-//! Twin of `glsl/include/specular.glsl` and of what it alone needs of `fresnel.glsl` and `ggx.glsl`: same
-//! names, same order. Mirrors, dielectrics and thin panes: materials at which paths go on in a sampled
-//! direction, and no light is sampled.
+//! Twin of `glsl/include/specular.glsl` and of what it alone needs of `ggx.glsl`: same names, same order.
+//! Mirrors, dielectrics and thin panes: materials at which paths go on in a sampled direction, and no light
+//! is sampled.
 //!
 //! Directions are unit vectors in the shading frame, whose z points to the side of the viewer, and
 //! point away from the surface: transmitted ones have z < 0. Values are per steradian without the
@@ -10,41 +10,13 @@
 //! an interface is scaled by (index of the viewer's side / index of the light's side)², so that light
 //! that goes in and out again has its former radiance. Values of importance would lack this factor.
 
+pub use fenestra::brdf::fresnel::{fresnel_interface, pane_reflectance, pane_transmittance};
 use fenestra::{
-    brdf::ggx::*,
+    brdf::{fresnel::refracted_cosine, ggx::*},
     math::colour::luminance,
     shader::{constants::*, structs::Material},
 };
 use glam::{Vec3, vec2, vec3};
-
-/// Cosine of the refracted direction with the inverted normal; `eta` is the refractive index beyond
-/// the interface over that of this side. 0 for total reflection.
-fn refracted_cosine(cosine: f32, eta: f32) -> f32 {
-    (1.0 - (1.0 - cosine * cosine) / (eta * eta)).max(0.0).sqrt()
-}
-
-/// Reflectance of an interface seen from either side, 1 for total reflection; `eta` as above. Exact
-/// Fresnel.
-pub fn fresnel_interface(cosine: f32, eta: f32) -> f32 {
-    let refracted = refracted_cosine(cosine, eta);
-    let perpendicular = (cosine - eta * refracted) / (cosine + eta * refracted);
-    let parallel = (eta * cosine - refracted) / (eta * cosine + refracted);
-    let reflectance = 0.5 * (perpendicular * perpendicular + parallel * parallel);
-    if refracted > 0.0 { reflectance.min(1.0) } else { 1.0 }
-}
-
-/// Light that a thin pane reflects, R + T²R + T²R³ + … = 2R/(1 + R) for T = 1 − R at each of its two
-/// sides, times its factor. `cosine` may have either sign.
-pub fn pane_reflectance(material: &Material, cosine: f32) -> Vec3 {
-    let reflectance = fresnel_interface(cosine.abs(), material.ior);
-    2.0 * reflectance / (1.0 + reflectance) * Vec3::from(material.reflectance)
-}
-
-/// Light that a thin pane lets straight through, (1 − R)/(1 + R), times its factor.
-pub fn pane_transmittance(material: &Material, cosine: f32) -> Vec3 {
-    let reflectance = fresnel_interface(cosine.abs(), material.ior);
-    (1.0 - reflectance) / (1.0 + reflectance) * Vec3::from(material.eta)
-}
 
 /// Density of all visible normals, per steradian, over the cosine of outgoing direction and normal:
 /// G₁·D/cosθ_o. \[Heitz 2014\] Eq. 21.
