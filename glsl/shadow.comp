@@ -1,8 +1,7 @@
 // Tests the visibility of the light along every shadow ray of the wave: shadow_rays, hits ->
 // visibility. Surfaces that are not opaque, and thin panes, dim the ray's contribution. Ray
 // direction_index · path_count + path_index starts at hit path_index: neighbouring invocations work
-// on neighbouring paths. As in trace.comp, one traversal loop takes several rays, and only those that the
-// host leaves to this pass where it has answered.
+// on neighbouring paths. As in trace.comp, one traversal loop takes several rays.
 #version 460
 #extension GL_KHR_shader_subgroup_ballot : require
 
@@ -12,24 +11,13 @@
 #include "path_list.glsl"
 #include "wave.glsl"
 
-UPDATES(visibility)
+WRITES(visibility)
 UPDATES(shadow_rays)
 UPDATES(counters)
 
 // At most 32: results are kept as bits until the end.
 layout(constant_id = CONSTANT_RAYS_PER_INVOCATION) const uint RAYS_PER_INVOCATION = 1u;
 layout(constant_id = CONSTANT_REFILL_LANES) const uint REFILL_LANES = 0xffffffffu;
-layout(constant_id = CONSTANT_ANSWERED) const uint ANSWERED = 0u;
-
-// Returns the turn of the next ray that the host has not answered, from `turn` on.
-uint next_turn(uint turn, uint first, uint ray_count, uint path_count) {
-    while (ANSWERED != 0u && turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count
-        && visibility[listed_ray(first + turn * WORKGROUP_SIZE, path_count).ray]
-            != VISIBILITY_LEFT) {
-        turn++;
-    }
-    return turn;
-}
 
 // Starts a ray, or finishes one without a contribution. Returns true if it is traced.
 bool start_ray(uint place, uint path_count, float offset) {
@@ -56,13 +44,13 @@ void main() {
     float offset = ray_offset();
 
     uint visible_bits = 0u;
-    uint turn = next_turn(0u, first, ray_count, path_count);
+    uint turn = 0u;
     uint steps = 0u;
     uint given_up = 0u;
-    bool has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
+    bool has_ray = first < ray_count;
     bool is_traced = false;
     if (has_ray) {
-        is_traced = start_ray(first + turn * WORKGROUP_SIZE, path_count, offset);
+        is_traced = start_ray(first, path_count, offset);
     }
     while (has_ray) {
         bool running = true;
@@ -83,7 +71,7 @@ void main() {
                 uint ray = listed_ray(first + turn * WORKGROUP_SIZE, path_count).ray;
                 shadow_rays[ray].contribution *= bvh_transmittance;
             }
-            turn = next_turn(turn + 1u, first, ray_count, path_count);
+            turn++;
             has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
             if (has_ray) {
                 is_traced = start_ray(first + turn * WORKGROUP_SIZE, path_count, offset);
@@ -96,10 +84,9 @@ void main() {
         uint lost = uint(findLSB(given_up));
         COUNT_GIVEN_UP(listed_ray(first + lost * WORKGROUP_SIZE, path_count).path);
     }
-    for (turn = 0u; turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count; turn++) {
+    uint traced = turn;
+    for (turn = 0u; turn < traced; turn++) {
         uint ray = listed_ray(first + turn * WORKGROUP_SIZE, path_count).ray;
-        if (ANSWERED == 0u || visibility[ray] == VISIBILITY_LEFT) {
-            visibility[ray] = (visible_bits >> turn) & 1u;
-        }
+        visibility[ray] = (visible_bits >> turn) & 1u;
     }
 }

@@ -3,8 +3,7 @@
 // One traversal loop takes RAYS_PER_INVOCATION rays: once enough lanes of the subgroup have finished,
 // all of those take their next ray. Surfaces are evaluated afterwards, with all lanes in step.
 //
-// Where the host has answered (ANSWERED), hits hold the triangles that rays meet, and only the rays that the
-// host leaves to this pass are followed. Scenes with instances have no such host.
+// Where the host has answered (ANSWERED), hits and hit_instances hold what rays meet, and none is followed.
 #version 460
 #extension GL_KHR_shader_subgroup_ballot : require
 
@@ -16,7 +15,7 @@
 #include "wave.glsl"
 
 UPDATES(hits)
-WRITES(hit_instances)
+UPDATES(hit_instances)
 UPDATES(paths)
 UPDATES(counters)
 
@@ -63,15 +62,6 @@ bool goes_through(uint path) {
     return goes_on;
 }
 
-// Returns the turn of the next ray that the host has not answered, from `turn` on.
-uint next_turn(uint turn, uint first, uint ray_count) {
-    while (ANSWERED != 0u && turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count
-        && hits[listed_path(first + turn * WORKGROUP_SIZE)].triangle != TRIANGLE_LEFT) {
-        turn++;
-    }
-    return turn;
-}
-
 void start_ray(uint path) {
     Ray ray = load_ray(path);
     bvh_start(ray.origin, ray.direction, FAR_AWAY, false);
@@ -84,11 +74,10 @@ void main() {
     uint found[RAYS_PER_INVOCATION];
     uint found_instances[RAYS_PER_INVOCATION];
 
-    const bool leaves_none = ANSWERED != 0u && !HAS_PASSAGES;
-    uint turn = leaves_none ? RAYS_PER_INVOCATION : next_turn(0u, first, ray_count);
+    uint turn = 0u;
     uint steps = 0u;
     uint given_up = 0u;
-    bool has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
+    bool has_ray = ANSWERED == 0u && first < ray_count;
     if (has_ray) {
         start_ray(listed_path(first + turn * WORKGROUP_SIZE));
     }
@@ -113,7 +102,7 @@ void main() {
             if (HAS_INSTANCES) {
                 found_instances[turn] = bvh_hit_instance;
             }
-            turn = next_turn(turn + 1u, first, ray_count);
+            turn++;
             has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
             if (has_ray) {
                 start_ray(listed_path(first + turn * WORKGROUP_SIZE));
@@ -130,9 +119,10 @@ void main() {
         uint path = listed_path(first + turn * WORKGROUP_SIZE);
         Ray ray = load_ray(path);
         uint triangle = ANSWERED == 0u ? found[turn] : hits[path].triangle;
-        bool is_answered = ANSWERED != 0u && (!HAS_PASSAGES || triangle != TRIANGLE_LEFT);
-        triangle = is_answered ? triangle : found[turn];
-        uint instance = HAS_INSTANCES ? found_instances[turn] : NO_INSTANCE;
+        uint instance = NO_INSTANCE;
+        if (HAS_INSTANCES) {
+            instance = ANSWERED == 0u ? found_instances[turn] : hit_instances[path];
+        }
         if (triangle == NO_TRIANGLE) {
             hits[path] = no_surface();
         } else {

@@ -161,8 +161,10 @@ struct Bench<'a> {
     shadow_rays: Buffer,
     visibility: Buffer,
     path_lists: Buffer,
-    /// The other buffers of the sets.
-    _others: [Buffer; 3],
+    paths: Buffer,
+    instances: Buffer,
+    /// Bound to the set of the film.
+    _counters: Buffer,
     wave: Wave,
 }
 
@@ -211,7 +213,9 @@ impl<'a> Bench<'a> {
             shadow_rays,
             visibility,
             path_lists,
-            _others: [path_states, instances, counters],
+            paths: path_states,
+            instances,
+            _counters: counters,
             wave,
         })
     }
@@ -225,9 +229,12 @@ impl<'a> Bench<'a> {
         let answers = Answers {
             rays: &self.rays,
             hits: &self.hits,
+            instances: &self.instances,
             shadow_rays: &self.shadow_rays,
             visibility: &self.visibility,
+            paths: &self.paths,
             path_lists: &self.path_lists,
+            parameters: self.scene.parameters(),
         };
         let host = self.scene.geometry().host_tracer().map(|tracer| (tracer, answers));
         let mut recording = Recording::begin(self.device, 1, host)?;
@@ -290,22 +297,23 @@ pub fn measure(
     accel: &Accel,
     plan: &RayPlan,
 ) -> Result<Vec<RayRate>> {
-    let bench = Bench::new(device, scene, plan)?;
+    let mut bench = Bench::new(device, scene, plan)?;
     let yardstick = Yardstick::new(accel, plan.threads)?;
     let (traversal, surfaces) = (scene.geometry().traversal(), scene.surfaces());
     let incoherent = Schedule::incoherent(device.capabilities());
-    let compare = |kind, kernel, any_hit| {
-        compare(kind, &yardstick, &bench, &Pass::new(device, kernel)?, any_hit, plan.repetitions)
+    let compare = |bench: &_, kind, kernel, any_hit| {
+        compare(kind, &yardstick, bench, &Pass::new(device, kernel)?, any_hit, plan.repetitions)
     };
     bench.run_once(Kernel::new("camera", Domain::Paths, &[]))?;
-    let camera = compare("camera", traversal.trace(Schedule::SINGLE, surfaces), None)?;
+    let camera = compare(&bench, "camera", traversal.trace(Schedule::SINGLE, surfaces), None)?;
     let steps = plan.sampler.steps(&Parameters::default(), surfaces)?;
     for kernel in steps.sample(&bench.wave) {
         bench.run_once(kernel)?;
     }
-    let shadow = compare("shadow", traversal.shadow(incoherent, surfaces), Some(accel))?;
+    let shadow = compare(&bench, "shadow", traversal.shadow(incoherent, surfaces), Some(accel))?;
     bench.run_once(Kernel::new("bounce", Domain::Paths, &[]))?;
-    let bounce = compare("bounce", traversal.trace(incoherent, surfaces), None)?;
+    bench.wave.vertex = 1;
+    let bounce = compare(&bench, "bounce", traversal.trace(incoherent, surfaces), None)?;
     Ok(vec![camera, shadow, bounce])
 }
 

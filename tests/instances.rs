@@ -95,14 +95,23 @@ fn aimed_rays(flat: &Geometry, count: usize, seed: u64, scale: f32) -> Vec<Ray> 
         .collect()
 }
 
-/// Compares the two-level tree with the tree over the flattened scene. Returns the share of hits whose
-/// distance is the same to the bit.
-fn check(name: &str, geometry: &Geometry, rays: &[Ray], tolerance: f32) -> f64 {
+/// Tests that the host finds what the device finds, but for a few ties.
+fn check_host(name: &str, accel: &Accel, rays: &[Ray]) {
+    let [(_, device), (_, host)] = &OnDevice::both(accel)[..] else { return };
+    let (ours, theirs) = (device.trace(rays, REFILLING), host.trace(rays, REFILLING));
+    let other = ours.iter().zip(&theirs).filter(|(one, other)| one != other).count();
+    assert!(500 * other <= rays.len(), "{name}: {other} of {} differ", rays.len());
+}
+
+/// Compares the two-level tree with the tree over the flattened scene, and the host on the first `free` rays,
+/// which aim at no edge. Returns the share of hits whose distance is the same to the bit.
+fn check(name: &str, geometry: &Geometry, rays: &[Ray], free: usize, tolerance: f32) -> f64 {
     let flat = geometry.flattened().unwrap();
     let two_levels = Accel::build(geometry, ONE_PAGE).unwrap();
     let one_level = Accel::build(&flat, ONE_PAGE).unwrap();
     assert!(two_levels.is_instanced() && !one_level.is_instanced());
     assert!(two_levels.depth <= BVH_STACK_ENTRIES as usize);
+    check_host(name, &two_levels, &rays[..free]);
     let on_device = OnDevice::new(&two_levels);
     let found = on_device.trace(rays, Schedule::SINGLE);
     assert_eq!(found, on_device.trace(rays, REFILLING), "{name}: the schedule changes hits");
@@ -161,7 +170,7 @@ fn two_levels_find_what_one_level_finds() {
         let flat = geometry.flattened().unwrap();
         let mut rays = random_rays(1500, seed, 6.0);
         rays.extend(aimed_rays(&flat, 1500, seed, 6.0));
-        let same = check(&format!("{count} instances"), &geometry, &rays, 1e-5);
+        let same = check(&format!("{count} instances"), &geometry, &rays, 1500, 1e-5);
         assert!(same > 0.999, "{count} instances: {same} of the distances are the same to the bit");
     }
 }
@@ -175,7 +184,7 @@ fn mirrors_and_extreme_transforms_lose_no_triangle() {
         let flat = geometry.flattened().unwrap();
         let mut rays = random_rays(1500, 5, 1.5 * spread);
         rays.extend(aimed_rays(&flat, 3000, 6, 1.5 * spread));
-        check(&format!("scale {scale} at {spread} m"), &geometry, &rays, tolerance);
+        check(&format!("scale {scale} at {spread} m"), &geometry, &rays, 1500, tolerance);
     }
 }
 
@@ -194,12 +203,14 @@ fn shadow_rays_are_blocked_by_instances() {
             contribution: [1.0; 3],
         })
         .collect();
-    let [two, one] = [&geometry, &flat].map(|geometry| {
-        let accel = Accel::build(geometry, ONE_PAGE).unwrap();
-        OnDevice::new(&accel).shadow(&hits, &directions, REFILLING)
-    });
-    assert_eq!(two, one);
-    let blocked = two.iter().filter(|visible| **visible == 0).count();
+    let flat = OnDevice::new(&Accel::build(&flat, ONE_PAGE).unwrap());
+    let one = flat.shadow(&hits, &directions, REFILLING);
+    for (tracer, on_device) in OnDevice::both(&Accel::build(&geometry, ONE_PAGE).unwrap()) {
+        let two = on_device.shadow(&hits, &directions, REFILLING);
+        let other = two.iter().zip(&one).filter(|(two, one)| two != one).count();
+        assert!(other <= usize::from(tracer == "host"), "{tracer}: {other} differ");
+    }
+    let blocked = one.iter().filter(|visible| **visible == 0).count();
     assert!((200..1800).contains(&blocked), "{blocked}");
 }
 
@@ -231,9 +242,26 @@ fn instances_that_share_edges_do_not_leak() {
             ray(origin, (target - origin).normalize())
         })
         .collect();
-    let hits = OnDevice::new(&Accel::build(&geometry, ONE_PAGE).unwrap()).trace(&rays, REFILLING);
-    let leaks = hits.iter().filter(|hit| hit.material == NO_MATERIAL).count();
-    assert_eq!(leaks, 0, "{leaks} of {} rays leak", rays.len());
+    for (tracer, on_device) in OnDevice::both(&Accel::build(&geometry, ONE_PAGE).unwrap()) {
+        let hits = on_device.trace(&rays, REFILLING);
+        let leaks = hits.iter().filter(|hit| hit.material == NO_MATERIAL).count();
+        // Few slip through a vertex on the host, as in docs/traversal.md.
+        let most = if tracer == "host" { rays.len() / 1000 } else { 0 };
+        assert!(leaks <= most, "{tracer}: {leaks} of {} rays leak", rays.len());
+    }
+}
+
+/// More triangles than the host places unasked are the device's.
+#[test]
+fn the_host_leaves_too_many_copies_to_the_device() {
+    let place = Transform::new([1.0; 3], [0.0; 3], [0.0; 3]);
+    let instance = Instance::new(0, &place, 0, false).unwrap();
+    let tracers = |count: usize| {
+        let (prototypes, instances) = (vec![sphere(64, 1.0)], vec![instance; count]);
+        let geometry = Geometry { prototypes, instances, ..Geometry::default() };
+        OnDevice::both(&Accel::build(&geometry, ONE_PAGE).unwrap()).len()
+    };
+    assert_eq!(tracers(1 + (1 << 23) / (4 * 64 * 63)), 1);
 }
 
 #[test]

@@ -122,7 +122,7 @@ fn picture(scene: &Scene, tracer: Tracer) -> Option<Vec<[f32; 3]>> {
     Some(renderer.sums().unwrap().sum.clone())
 }
 
-/// Cut-out leaves, panes, solid glass and textures: rays that the host leaves to the device among them.
+/// Cut-out leaves, panes, solid glass and textures: the same chances at surfaces that let light pass.
 #[test]
 fn host_and_device_draw_the_same_picture() {
     let mut scene = shipped("reading_room");

@@ -9,29 +9,24 @@ layout(scalar, push_constant) uniform WaveConstants {
     Wave wave;
 };
 
-// Dimensions of random_2d and random_1d along a path: two for the camera, then per vertex.
+// Dimensions of random_2d and random_1d along a path: two for the camera, then DIMENSIONS_PER_VERTEX each
+// from DIMENSION_VERTEX on.
 const uint DIMENSION_FILTER = 0u;
 const uint DIMENSION_LENS = 1u;
-const uint DIMENSION_VERTEX = 2u;
 // Offsets from a vertex's first dimension. Directions of resampling candidates take one each.
 const uint DIMENSION_TECHNIQUE = 0u;
 const uint DIMENSION_RESAMPLING = 1u;
 const uint DIMENSION_BOUNCE = 2u;
 const uint DIMENSION_BOUNCE_LOBE = 3u;
 const uint DIMENSION_ROULETTE = 4u;
-const uint DIMENSION_PASSAGE = 5u;
 const uint DIMENSION_BRDF_LOBE = 8u;
 const uint DIMENSION_BRDF_DIRECTION = 16u;
 const uint DIMENSION_ENVIRONMENT_DIRECTION = 24u;
-const uint DIMENSIONS_PER_VERTEX = 32u;
 // First dimension of the rays of adaptive samplers, which each have three; at most 4096 rays a vertex.
 const uint DIMENSION_ADAPTIVE = 0x10000u;
 const uint DIMENSIONS_PER_ADAPTIVE_RAY = 3u;
 // First dimension of random walks.
 const uint DIMENSION_WALK = 0x8000000u;
-
-// Film order goes block by block, so that neighbouring invocations trace neighbouring rays.
-const uint FILM_BLOCK = 8u;
 
 struct PathIndex {
     uvec2 crop_pixel;

@@ -46,7 +46,8 @@ pub struct Record {
 /// Upper level: the instances in no particular order, with a box in the world for each.
 #[derive(Debug, Default)]
 pub(super) struct Level {
-    pub(super) records: Vec<Record>,
+    /// Each with its mesh, see [`Accel::instance_meshes`](super::Accel::instance_meshes).
+    pub(super) records: Vec<(Record, u32)>,
     pub(super) boxes: Vec<Aabb>,
 }
 
@@ -54,14 +55,15 @@ impl Level {
     /// Adds the triangles that lie in the world, whose tree has its root at `first_node`.
     pub(super) fn add_placed(&mut self, around: [Vec3; 2], first_node: u32) {
         let identity = [Vec4::X, Vec4::Y, Vec4::Z].map(|row| row.to_array());
-        self.records.push(Record {
+        let record = Record {
             object_from_world: identity,
             world_from_object: identity,
             first_node,
             material_mask: u32::MAX,
             // Boxes of placed triangles have their margin.
             ..Record::default()
-        });
+        };
+        self.records.push((record, 0));
         let [low, high] = around.map(Vec3A::from);
         let margin = Vec3A::splat(low.abs().max(high.abs()).max_element() * MARGIN as f32);
         self.boxes.push(Aabb::new(low - margin, high + margin));
@@ -100,7 +102,7 @@ impl Level {
         let spread = inverse.matrix3.x_axis.abs()
             + inverse.matrix3.y_axis.abs()
             + inverse.matrix3.z_axis.abs();
-        self.records.push(Record {
+        let record = Record {
             object_from_world: rows(&inverse),
             world_from_object: instance.world_from_object.map(|row| row.to_array()),
             first_node,
@@ -109,7 +111,8 @@ impl Level {
             flags: if instance.mirrors() { INSTANCE_MIRRORS } else { 0 },
             margin: (MARGIN * spread).as_vec3().to_array(),
             reach: reach as f32,
-        });
+        };
+        self.records.push((record, instance.prototype + 1));
         let margin = Vec3A::splat((MARGIN * reach) as f32);
         let mut aabb = Aabb::empty();
         for corner in instance.corners(around) {

@@ -84,6 +84,8 @@ pub struct Accel {
     pub first_triangles: Vec<u32>,
     /// Instances in the order of the upper level; empty for a tree of one level.
     pub instances: Vec<Record>,
+    /// Mesh of each: its place in [`Accel::first_triangles`].
+    pub instance_meshes: Vec<u32>,
     /// Stack entries that traversal may need, at most [`BVH_STACK_ENTRIES`].
     pub depth: usize,
 }
@@ -105,7 +107,7 @@ impl Accel {
         stage::enter(format_args!("building {asker}"));
         let mut trees = Trees::default();
         let around_placed = trees.add(geometry)?;
-        let mut instances = Vec::new();
+        let (mut instances, mut instance_meshes) = (Vec::new(), Vec::new());
         if !geometry.instances.is_empty() {
             let mut level = Level::default();
             if let Some(around) = around_placed {
@@ -129,7 +131,7 @@ impl Accel {
                     level.add(label, instance, *around, *first_node)?;
                 }
             }
-            instances = trees.put_level_first(level)?;
+            (instances, instance_meshes) = trees.put_level_first(level)?.into_iter().unzip();
         }
         let Trees { mut nodes, scene_triangles, first_triangles, depth } = trees;
         if depth > BVH_STACK_ENTRIES as usize {
@@ -169,6 +171,7 @@ impl Accel {
             scene_triangles,
             first_triangles,
             instances,
+            instance_meshes,
             depth,
         })
     }
@@ -247,8 +250,8 @@ impl Trees {
         self.nodes.append(&mut nodes);
     }
 
-    /// Puts the tree over the instances before all others; returns their records in its order.
-    fn put_level_first(&mut self, level: Level) -> Result<Vec<Record>> {
+    /// Puts the tree over the instances before all others; returns their records and meshes in its order.
+    fn put_level_first(&mut self, level: Level) -> Result<Vec<(Record, u32)>> {
         let Level { mut records, boxes } = level;
         let (upper, order): (Vec<Node>, Vec<u32>) = if boxes.is_empty() {
             (vec![[0; 20]], Vec::new())
@@ -265,7 +268,7 @@ impl Trees {
         let mut lower = std::mem::replace(&mut self.nodes, upper);
         lower.iter_mut().for_each(|node| shift(node, first_node, 0));
         self.nodes.append(&mut lower);
-        records.iter_mut().for_each(|record| record.first_node += first_node);
+        records.iter_mut().for_each(|(record, _)| record.first_node += first_node);
         Ok(order.iter().map(|&index| records[index as usize]).collect())
     }
 }

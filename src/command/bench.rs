@@ -17,12 +17,11 @@ use crate::{
     sampler::{Sampler, basic},
     scene::Scene,
     session::{Renderer, Settings, window_of},
+    shader::constants::FILM_BLOCK,
 };
 
 /// Maximum number of paths in a measurement; larger films are scaled down.
 const MOST_PATHS: u32 = 1 << 19;
-/// Edge length of the blocks in film order, pixels.
-const BLOCK_EDGE: u32 = 8;
 
 /// Arguments of `bench`.
 #[derive(Debug, clap::Args)]
@@ -207,16 +206,16 @@ fn bounded([width, height]: [u32; 2]) -> [u32; 2] {
     }
     let pixels = f64::from(width) * f64::from(height);
     let scale = (0.95 * f64::from(MOST_PATHS) / pixels).sqrt();
-    let shrunk = |side: u32| ((f64::from(side) * scale) as u32 / BLOCK_EDGE * BLOCK_EDGE).max(1);
+    let shrunk = |side: u32| ((f64::from(side) * scale) as u32 / FILM_BLOCK * FILM_BLOCK).max(1);
     let [width, height] = [shrunk(width), shrunk(height)];
     // In a thin strip, rounding up to blocks outweighs the scale.
-    let longest = MOST_PATHS / BLOCK_EDGE;
+    let longest = MOST_PATHS / FILM_BLOCK;
     [width.min(longest), height.min(longest)]
 }
 
 /// Counts the pixels of the film, with blocks at its edges counted whole.
 fn padded_pixels([width, height]: [u32; 2]) -> u32 {
-    width.next_multiple_of(BLOCK_EDGE).saturating_mul(height.next_multiple_of(BLOCK_EDGE))
+    width.next_multiple_of(FILM_BLOCK).saturating_mul(height.next_multiple_of(FILM_BLOCK))
 }
 
 /// Formats the report as text.

@@ -23,11 +23,12 @@ use sha2::{Digest, Sha256};
 use super::{
     Attribute, Image,
     metadata::Metadata,
-    sums::{BLOCK_EDGE, COUNTS, Sums, TRIPLES, split},
+    sums::{COUNTS, Sums, TRIPLES, split},
 };
 use crate::{
     error::{Error, Result},
     files::{self, hexadecimal, write_atomically},
+    shader::constants::FILM_BLOCK,
 };
 
 /// Attribute that marks a checkpoint, and the version of its channels.
@@ -263,7 +264,7 @@ impl Checkpoint {
         }
         let metadata = Metadata::load(image, path)?;
         let ahead = metadata.ahead;
-        let blocks = [image.width, image.height].map(|side| u64::from(side.div_ceil(BLOCK_EDGE)));
+        let blocks = [image.width, image.height].map(|side| u64::from(side.div_ceil(FILM_BLOCK)));
         if u64::from(ahead.blocks) >= blocks[0] * blocks[1] {
             let message = format!("{} blocks of its film have further samples", ahead.blocks);
             return Err(Error::format(path, message));

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use clap::ValueEnum;
 
 use super::Image;
+use crate::shader::constants::FILM_BLOCK;
 
 /// Extra layers of an image file, with pbrt's names and meaning where pbrt has them. The command
 /// line also accepts a layer's name in the file.
@@ -97,9 +98,6 @@ pub(crate) const COUNTS: [Layer<4>; 2] = [
         ],
     },
 ];
-
-/// Edge of the blocks in which the film is rendered, row by row from the top, in pixels.
-pub(crate) const BLOCK_EDGE: u32 = 8;
 
 /// Samples of a sweep over the film that was stopped on its way: the first blocks have them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -231,8 +229,8 @@ impl Sums {
             return self.sample_count;
         }
         let width = self.width as usize;
-        let [column, row] = [pixel % width, pixel / width].map(|at| at as u32 / BLOCK_EDGE);
-        let is_ahead = row * self.width.div_ceil(BLOCK_EDGE) + column < self.ahead.blocks;
+        let [column, row] = [pixel % width, pixel / width].map(|at| at as u32 / FILM_BLOCK);
+        let is_ahead = row * self.width.div_ceil(FILM_BLOCK) + column < self.ahead.blocks;
         self.sample_count + if is_ahead { self.ahead.samples } else { 0 }
     }
 

@@ -2,7 +2,7 @@
 //! software: \[Wald et al. 2014\].
 //!
 //! The functions are those of its C API (`rtcore.h`). Versions 3 and 4 share those that build; those that
-//! follow a ray take other arguments, see [`Queries`].
+//! follow rays take other arguments, see [`Queries`].
 
 use std::{
     ffi::{CStr, c_char, c_int, c_uint, c_void},
@@ -14,7 +14,7 @@ use std::{
 use libloading::Library;
 
 use super::{
-    embree_rays::{Context, Segment, SegmentHit},
+    embree_rays::{Arguments, Context, Lanes, Met, Packet},
     library,
 };
 use crate::{
@@ -52,19 +52,19 @@ type SetBuffer = unsafe extern "C" fn(
     count: usize,
 );
 
-/// Functions that follow a ray, in the order closest hit, any hit.
+/// Function that is asked whether a ray stops at a surface.
+pub(super) type Filter = unsafe extern "C" fn(*const Met);
+type SetFilter = unsafe extern "C" fn(geometry: Handle, Filter);
+/// Functions of version 3 that follow rays take a context before them.
+type QueryOfThree = unsafe extern "C" fn(*const Lanes<c_int>, Handle, *mut Context, *mut Packet);
+/// Those of version 4 take arguments after them.
+type QueryOfFour = unsafe extern "C" fn(*const Lanes<c_int>, Handle, *mut Packet, *mut Arguments);
+
+/// Functions that follow the rays of a packet.
 #[derive(Clone, Copy)]
 pub(super) enum Queries {
-    /// Version 3 takes a context before the ray.
-    Three(
-        unsafe extern "C" fn(Handle, *mut Context, *mut SegmentHit),
-        unsafe extern "C" fn(Handle, *mut Context, *mut Segment),
-    ),
-    /// Version 4 takes optional arguments after the ray.
-    Four(
-        unsafe extern "C" fn(Handle, *mut SegmentHit, *mut c_void),
-        unsafe extern "C" fn(Handle, *mut Segment, *mut c_void),
-    ),
+    Three { closest: QueryOfThree, any: QueryOfThree },
+    Four { closest: QueryOfFour, any: QueryOfFour },
 }
 
 /// The library and a device of it.
@@ -76,6 +76,9 @@ pub(crate) struct Embree {
     pub(super) release_scene: unsafe extern "C" fn(Handle),
     pub(super) new_geometry: unsafe extern "C" fn(Handle, c_int) -> Handle,
     pub(super) set_buffer: SetBuffer,
+    pub(super) set_own: unsafe extern "C" fn(Handle, *const c_void),
+    pub(super) set_closest_filter: SetFilter,
+    pub(super) set_any_filter: SetFilter,
     pub(super) commit_geometry: unsafe extern "C" fn(Handle),
     pub(super) attach_geometry: unsafe extern "C" fn(Handle, Handle, c_uint),
     pub(super) release_geometry: unsafe extern "C" fn(Handle),
@@ -124,14 +127,14 @@ impl Embree {
         let number = unsafe { property(device, PROPERTY_VERSION) };
         let version = format!("{}.{}.{}", number / 10_000, number / 100 % 100, number % 100);
         let queries = match number / 10_000 {
-            3 => Queries::Three(
-                function(&library, "rtcIntersect1")?,
-                function(&library, "rtcOccluded1")?,
-            ),
-            4 => Queries::Four(
-                function(&library, "rtcIntersect1")?,
-                function(&library, "rtcOccluded1")?,
-            ),
+            3 => Queries::Three {
+                closest: function(&library, "rtcIntersect8")?,
+                any: function(&library, "rtcOccluded8")?,
+            },
+            4 => Queries::Four {
+                closest: function(&library, "rtcIntersect8")?,
+                any: function(&library, "rtcOccluded8")?,
+            },
             _ => return Err(format!("found version {version}")),
         };
         // SAFETY: the device is alive; the monitor is a function that touches no state of its own.
@@ -144,6 +147,9 @@ impl Embree {
             release_scene: function(&library, "rtcReleaseScene")?,
             new_geometry: function(&library, "rtcNewGeometry")?,
             set_buffer: function(&library, "rtcSetSharedGeometryBuffer")?,
+            set_own: function(&library, "rtcSetGeometryUserData")?,
+            set_closest_filter: function(&library, "rtcSetGeometryIntersectFilterFunction")?,
+            set_any_filter: function(&library, "rtcSetGeometryOccludedFilterFunction")?,
             commit_geometry: function(&library, "rtcCommitGeometry")?,
             attach_geometry: function(&library, "rtcAttachGeometryByID")?,
             release_geometry: function(&library, "rtcReleaseGeometry")?,

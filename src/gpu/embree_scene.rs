@@ -1,11 +1,17 @@
 //! Triangles that Embree has built a tree over, and the rays that it follows there.
 
-use std::{ffi::c_int, ptr, sync::Arc};
+use std::{
+    ffi::{c_int, c_void},
+    ptr,
+    sync::Arc,
+};
+
+use glam::Vec3;
 
 use super::{
     buffer::Buffer,
-    embree::{Embree, Handle, Queries},
-    embree_rays::{Context, NOTHING, Segment, SegmentHit},
+    embree::{Embree, Filter, Handle, Queries},
+    embree_rays::{Arguments, Context, Met, NOTHING, Packet},
 };
 use crate::error::Result;
 
@@ -25,26 +31,81 @@ const ROBUST: c_int = 1 << 2;
 /// Bytes of a vertex in the buffers of triangles: position and normal.
 const VERTEX_BYTES: usize = 16;
 
-/// Triangles of one buffer, which has three vertices for each.
+/// Positions of triangles, three for each.
+enum Vertices {
+    /// In a buffer whose memory the host shares.
+    Shared(Arc<Buffer>),
+    Own(Arc<Vec<[f32; 3]>>),
+}
+
+/// Triangles whose positions lie together.
 pub(crate) struct Part {
-    vertices: Arc<Buffer>,
-    /// Number of the buffer's first triangle in the scene.
+    vertices: Vertices,
+    /// Number in the scene of the triangle that has the first three.
     first: u32,
     corners: Vec<[u32; 3]>,
+    instance: u32,
+    /// True if rays are asked whether they stop at the triangles.
+    is_passing: bool,
 }
 
 impl Part {
     /// Takes `triangles` of the scene, which lie in a buffer whose memory the host shares; `first` is the
     /// first of the buffer.
-    pub(crate) fn new(
+    pub(crate) fn shared(
         vertices: &Arc<Buffer>,
         first: u32,
+        instance: u32,
+        is_passing: bool,
         triangles: impl Iterator<Item = u32>,
     ) -> Self {
-        let corners = |triangle| [0, 1, 2].map(|corner| 3 * (triangle - first) + corner);
-        Self { vertices: Arc::clone(vertices), first, corners: triangles.map(corners).collect() }
+        let vertices = Vertices::Shared(Arc::clone(vertices));
+        Self { vertices, first, corners: corners(first, triangles), instance, is_passing }
+    }
+
+    /// Takes `triangles` of an instance, whose positions in the world are `vertices`, from those of `first`
+    /// on; one more than there are, since the library reads beyond the last.
+    pub(crate) fn own(
+        vertices: &Arc<Vec<[f32; 3]>>,
+        first: u32,
+        instance: u32,
+        is_passing: bool,
+        triangles: impl Iterator<Item = u32>,
+    ) -> Self {
+        let vertices = Vertices::Own(Arc::clone(vertices));
+        Self { vertices, first, corners: corners(first, triangles), instance, is_passing }
+    }
+
+    fn triangle(&self, primitive: u32) -> u32 {
+        self.first + self.corners[primitive as usize][0] / 3
     }
 }
+
+fn corners(first: u32, triangles: impl Iterator<Item = u32>) -> Vec<[u32; 3]> {
+    triangles.map(|triangle| [0, 1, 2].map(|corner| 3 * (triangle - first) + corner)).collect()
+}
+
+/// A surface of a passing [`Part`] that a ray meets, not always the closest.
+pub(crate) struct Meeting {
+    /// Lane of the ray in its packet.
+    pub lane: usize,
+    pub triangle: u32,
+    pub instance: u32,
+    pub origin: Vec3,
+    pub direction: Vec3,
+    pub distance: f32,
+}
+
+/// Closest hit of a ray.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Found {
+    pub triangle: u32,
+    pub instance: u32,
+    pub distance: f32,
+}
+
+/// Decides whether a ray stops at a surface.
+pub(crate) type Stops<'a> = dyn FnMut(&Meeting) -> bool + 'a;
 
 /// A tree over triangles.
 pub(crate) struct EmbreeScene {
@@ -68,42 +129,53 @@ impl EmbreeScene {
     ///
     /// # Panics
     /// If a triangle lies beyond its buffer.
-    pub(crate) fn new(embree: &Arc<Embree>, parts: Vec<Part>) -> Result<Self> {
+    pub(crate) fn new(embree: &Arc<Embree>, mut parts: Vec<Part>) -> Result<Self> {
+        parts.retain(|part| !part.corners.is_empty());
         // SAFETY: the device is alive.
         let raw = unsafe { (embree.new_scene)(embree.device) };
         let scene = Self { raw, parts, embree: Arc::clone(embree) };
+        let filter: Filter = match embree.queries {
+            Queries::Three { .. } => heed::<true>,
+            Queries::Four { .. } => heed::<false>,
+        };
         for (number, part) in (0..).zip(&scene.parts) {
-            let words = part.vertices.words()?;
-            let vertex_count = size_of_val(words) / VERTEX_BYTES;
+            let (vertices, stride, vertex_count) = match &part.vertices {
+                Vertices::Shared(buffer) => {
+                    let words = buffer.words()?;
+                    (words.as_ptr().cast(), VERTEX_BYTES, size_of_val(words) / VERTEX_BYTES)
+                }
+                Vertices::Own(own) => {
+                    (own.as_ptr().cast(), size_of::<[f32; 3]>(), own.len().saturating_sub(1))
+                }
+            };
             assert!(
                 part.corners.iter().flatten().all(|&vertex| (vertex as usize) < vertex_count),
                 "triangles lie in their buffer"
             );
             // SAFETY: device and scene are alive. Both arrays have the stated size and stride, live in
             // `parts` as long as the scene, and nobody writes to them; reads of 16 bytes at the last
-            // vertex stay within it. The scene keeps the geometry, which nobody uses after this.
+            // vertex stay within them. Filters read `part`, which does not move. The scene keeps the
+            // geometry, which nobody uses after this.
             unsafe {
                 let geometry = (embree.new_geometry)(embree.device, TRIANGLES);
-                (embree.set_buffer)(
-                    geometry,
-                    VERTICES,
-                    0,
-                    FORMAT_FLOAT3,
-                    words.as_ptr().cast(),
-                    0,
-                    VERTEX_BYTES,
-                    vertex_count,
-                );
-                (embree.set_buffer)(
+                let set_buffer = embree.set_buffer;
+                set_buffer(geometry, VERTICES, 0, FORMAT_FLOAT3, vertices, 0, stride, vertex_count);
+                let corners = &part.corners;
+                set_buffer(
                     geometry,
                     INDICES,
                     0,
                     FORMAT_UINT3,
-                    part.corners.as_ptr().cast(),
+                    corners.as_ptr().cast(),
                     0,
                     size_of::<[u32; 3]>(),
-                    part.corners.len(),
+                    corners.len(),
                 );
+                if part.is_passing {
+                    (embree.set_own)(geometry, ptr::from_ref(part).cast());
+                    (embree.set_closest_filter)(geometry, filter);
+                    (embree.set_any_filter)(geometry, filter);
+                }
                 (embree.commit_geometry)(geometry);
                 (embree.attach_geometry)(scene.raw, geometry, number);
                 (embree.release_geometry)(geometry);
@@ -117,36 +189,84 @@ impl EmbreeScene {
         embree.check("the host's tree").map(|()| scene)
     }
 
-    /// Finds the closest hit of a segment: its triangle and distance.
-    pub(crate) fn closest(&self, segment: Segment) -> Option<(u32, f32)> {
-        let mut ray = SegmentHit::new(segment);
-        // SAFETY: the scene is built; ray and context have the layout of the library's version.
-        unsafe {
-            match self.embree.queries {
-                Queries::Three(intersect, _) => intersect(self.raw, &mut Context::new(), &mut ray),
-                Queries::Four(intersect, _) => intersect(self.raw, &mut ray, ptr::null_mut()),
-            }
-        }
-        if ray.geometry == NOTHING {
-            return None;
-        }
-        let part = self.parts.get(ray.geometry as usize)?;
-        let triangle = part.first + part.corners[ray.primitive as usize][0] / 3;
-        Some((triangle, ray.segment.farthest))
+    /// Finds the closest hits of the rays of a packet, for [`EmbreeScene::hit`]. `is_coherent` says that they
+    /// go the same way.
+    pub(crate) fn find_closest(
+        &self,
+        packet: &mut Packet,
+        is_coherent: bool,
+        stops: &mut Stops<'_>,
+    ) {
+        self.find(packet, is_coherent, stops, true);
     }
 
-    /// Tests a segment for any hit.
-    pub(crate) fn is_blocked(&self, mut segment: Segment) -> bool {
-        // SAFETY: the scene is built; ray and context have the layout of the library's version.
+    /// Finds any hit of the rays of a packet, for [`Packet::is_blocked`].
+    pub(crate) fn find_any(&self, packet: &mut Packet, stops: &mut Stops<'_>) {
+        self.find(packet, false, stops, false);
+    }
+
+    fn find(
+        &self,
+        packet: &mut Packet,
+        is_coherent: bool,
+        mut stops: &mut Stops<'_>,
+        finds_closest: bool,
+    ) {
+        let heed = (&raw mut stops).cast::<c_void>();
+        let packet = ptr::from_mut(packet);
+        // SAFETY: the scene is built; packet and context have the layout of the library's version, which
+        // reads `followed` and writes elsewhere. Filters are called in this thread before the function
+        // returns, and find `stops` by `heed`.
         unsafe {
+            let followed = &raw const (*packet).followed;
             match self.embree.queries {
-                Queries::Three(_, occluded) => {
-                    occluded(self.raw, &mut Context::new(), &mut segment);
+                Queries::Three { closest, any } => {
+                    let find = if finds_closest { closest } else { any };
+                    find(followed, self.raw, &mut Context::new(heed, is_coherent), packet);
                 }
-                Queries::Four(_, occluded) => occluded(self.raw, &mut segment, ptr::null_mut()),
+                Queries::Four { closest, any } => {
+                    let find = if finds_closest { closest } else { any };
+                    Arguments::with(heed, is_coherent, |arguments| {
+                        find(followed, self.raw, packet, arguments);
+                    });
+                }
             }
         }
-        segment.farthest < 0.0
+    }
+
+    /// Closest hit of a ray, if it has met anything.
+    pub(crate) fn hit(&self, packet: &Packet, lane: usize) -> Option<Found> {
+        if packet.geometry[lane] == NOTHING {
+            return None;
+        }
+        let part = self.parts.get(packet.geometry[lane] as usize)?;
+        Some(Found {
+            triangle: part.triangle(packet.primitive[lane]),
+            instance: part.instance,
+            distance: packet.distance(lane),
+        })
+    }
+}
+
+/// Asks for every ray that has met a surface of a passing part whether it stops.
+///
+/// # Safety
+/// The library calls it while [`EmbreeScene::find`] runs.
+unsafe extern "C" fn heed<const IS_OF_THREE: bool>(met: *const Met) {
+    // SAFETY: the library has made `met`, the geometry was given its part, and `find` its `stops`.
+    unsafe {
+        let part = &*(*met).own.cast::<Part>();
+        let stops = &mut *(*met).heed(IS_OF_THREE).cast::<&mut Stops<'_>>();
+        (*met).for_each(|lane, [origin, direction], distance, primitive| {
+            stops(&Meeting {
+                lane,
+                triangle: part.triangle(primitive),
+                instance: part.instance,
+                origin: origin.into(),
+                direction: direction.into(),
+                distance,
+            })
+        });
     }
 }
 

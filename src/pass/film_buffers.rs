@@ -8,7 +8,7 @@ use crate::{
     error::{Error, Result},
     film::{
         Aov, Sums, Window,
-        sums::{BLOCK_EDGE, COUNTS, TRIPLES},
+        sums::{COUNTS, TRIPLES},
     },
     gpu::{Buffer, Commands, DescriptorSet, Device},
     memory,
@@ -16,13 +16,14 @@ use crate::{
         bindings::{Binding, FILM, film},
         constants::{
             AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, AOV_NORMAL, AOV_POSITION, AOV_VISIBLE,
+            FILM_BLOCK,
         },
         structs::Counters,
     },
 };
 
 /// Pixels of a block in film order; waves hold whole blocks.
-pub(crate) const BLOCK_PIXELS: u32 = BLOCK_EDGE * BLOCK_EDGE;
+pub(crate) const BLOCK_PIXELS: u32 = FILM_BLOCK * FILM_BLOCK;
 
 /// Buffers of the layers: name, binding, and bit `AOV_…` that asks for it, 0 for those that every film has.
 /// First [`Sums::triples`], then [`Sums::counts`].
@@ -42,8 +43,8 @@ const LAYERS: [(&str, Binding, u32); TRIPLES.len() + COUNTS.len()] = [
 
 /// Returns a pixel's position in film order; twin of `wave_pixel` in `glsl/include/wave.glsl`.
 pub(crate) fn position_in_film_order(window: Window, column: u32, row: u32) -> u32 {
-    let block = row / BLOCK_EDGE * window.width.div_ceil(BLOCK_EDGE) + column / BLOCK_EDGE;
-    block * BLOCK_PIXELS + row % BLOCK_EDGE * BLOCK_EDGE + column % BLOCK_EDGE
+    let block = row / FILM_BLOCK * window.width.div_ceil(FILM_BLOCK) + column / FILM_BLOCK;
+    block * BLOCK_PIXELS + row % FILM_BLOCK * FILM_BLOCK + column % FILM_BLOCK
 }
 
 /// Returns the bits `AOV_…` of the layers that passes write.
@@ -115,18 +116,18 @@ impl FilmBuffers {
     ) -> Result<Self> {
         let page_bytes = page_bytes.min(device.capabilities().max_storage_buffer_range);
         let row_bytes = u64::from(window.width) * size_of::<[f32; 3]>() as u64;
-        let blocks_down = window.height.div_ceil(BLOCK_EDGE);
-        let rows = page_bytes / row_bytes / u64::from(BLOCK_EDGE);
+        let blocks_down = window.height.div_ceil(FILM_BLOCK);
+        let rows = page_bytes / row_bytes / u64::from(FILM_BLOCK);
         let rows = u32::try_from(rows).unwrap_or(blocks_down).clamp(1, blocks_down);
         let counters = Buffer::from_slice(device, "counters", &[Counters::zeroed()])?;
-        let page_positions = rows * window.width.div_ceil(BLOCK_EDGE) * BLOCK_PIXELS;
+        let page_positions = rows * window.width.div_ceil(FILM_BLOCK) * BLOCK_PIXELS;
         let make = |first: u32| {
-            let last = (first + rows * BLOCK_EDGE).min(window.height);
+            let last = (first + rows * FILM_BLOCK).min(window.height);
             Page::new(device, &counters, [first, last].map(|row| row * window.width), aovs)
         };
         Ok(Self {
             pages: (0..window.height)
-                .step_by((rows * BLOCK_EDGE) as usize)
+                .step_by((rows * FILM_BLOCK) as usize)
                 .map(make)
                 .collect::<Result<_>>()?,
             counters,
@@ -199,7 +200,7 @@ impl FilmBuffers {
     /// Number of pixels in film order, counting whole blocks where they reach beyond the window.
     pub(crate) fn padded_pixels(&self) -> u32 {
         let blocks =
-            self.window.width.div_ceil(BLOCK_EDGE) * self.window.height.div_ceil(BLOCK_EDGE);
+            self.window.width.div_ceil(FILM_BLOCK) * self.window.height.div_ceil(FILM_BLOCK);
         blocks * BLOCK_PIXELS
     }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::{
     host_tracer::HostTracer,
     kernel::{Domain, Kernel, Question},
+    passages::{Passages, PassingSurfaces},
     surfaces::Surfaces,
 };
 use crate::{
@@ -16,7 +17,6 @@ use crate::{
         constants::{
             CONSTANT_ANSWERED, CONSTANT_RAYS_PER_INVOCATION, CONSTANT_REFILL_LANES,
             CONSTANT_TRIANGLE_PAGE_SHIFT, CONSTANT_TRIANGLE_PAGES, SURFACES_INSTANCED,
-            SURFACES_PASSING,
         },
     },
 };
@@ -28,7 +28,7 @@ const PAGES: [Binding; MAX_TRIANGLE_PAGES] =
 pub struct GeometryBuffers {
     nodes: Buffer,
     pages: Vec<Arc<Buffer>>,
-    materials: Buffer,
+    materials: Arc<Buffer>,
     instances: Buffer,
     page_shift: u32,
     is_instanced: bool,
@@ -58,7 +58,11 @@ impl GeometryBuffers {
         Ok(Self {
             nodes: Buffer::texels_from_slice(device, "BVH nodes", &accel.nodes)?,
             pages,
-            materials: Buffer::from_slice(device, "triangle materials", &accel.triangle_materials)?,
+            materials: Arc::new(Buffer::from_slice(
+                device,
+                "triangle materials",
+                &accel.triangle_materials,
+            )?),
             instances: Buffer::texels_from_slice(device, "instances", instances)?,
             page_shift: accel.page_shift,
             is_instanced: accel.is_instanced(),
@@ -66,9 +70,9 @@ impl GeometryBuffers {
         })
     }
 
-    /// Lets the host trace where the device is opened for that and there are no instances; `passes` says of
-    /// a material whether light may pass its surfaces. Where memory does not suffice for the host's tree,
-    /// the device traces, unless the host was asked for.
+    /// Lets the host trace where the device is opened for that; `passing` are the surfaces of a scene in
+    /// which light may pass some. Where memory does not suffice for the host's tree, the device traces,
+    /// unless the host was asked for.
     ///
     /// # Errors
     /// The library fails, or memory does not suffice for it and the host was asked for.
@@ -76,18 +80,20 @@ impl GeometryBuffers {
         self,
         device: &Device,
         accel: &Accel,
-        passes: &dyn Fn(u32) -> bool,
+        passing: Option<PassingSurfaces>,
     ) -> Result<Self> {
         let Some(embree) = device.embree() else { return Ok(self) };
-        if self.is_instanced {
-            if device.must_trace_on_host() {
-                log::warn!("--tracer host: the device traces scenes with instances");
-            }
-            return Ok(self);
-        }
-        match HostTracer::new(embree, accel, &self.pages, passes) {
+        let passages = passing.map(|surfaces| Passages {
+            pages: self.pages.clone(),
+            page_shift: self.page_shift,
+            triangle_materials: Arc::clone(&self.materials),
+            instances: accel.instances.clone(),
+            surfaces,
+        });
+        let must_trace = device.must_trace_on_host();
+        match HostTracer::new(embree, accel, &self.pages, passages, must_trace) {
             Ok(tracer) => Ok(Self { host_tracer: Some(tracer), ..self }),
-            Err(Error::Memory { message, .. }) if !device.must_trace_on_host() => {
+            Err(Error::Memory { message, .. }) if !must_trace => {
                 log::warn!("{message}; the device traces");
                 Ok(self)
             }
@@ -106,7 +112,7 @@ impl GeometryBuffers {
             |(index, binding)| (binding, self.pages.get(index).unwrap_or(&self.pages[0]).as_ref());
         let mut bindings = vec![
             (scene::BVH_NODES, &self.nodes),
-            (scene::TRIANGLE_MATERIALS, &self.materials),
+            (scene::TRIANGLE_MATERIALS, self.materials.as_ref()),
             (scene::INSTANCES, &self.instances),
         ];
         bindings.extend(PAGES.into_iter().enumerate().map(page));
@@ -116,7 +122,7 @@ impl GeometryBuffers {
     /// Returns every buffer once, for memory reports.
     pub(crate) fn buffers(&self) -> impl Iterator<Item = &Buffer> {
         let pages = self.pages.iter().map(Arc::as_ref);
-        [&self.nodes, &self.materials, &self.instances].into_iter().chain(pages)
+        [&self.nodes, self.materials.as_ref(), &self.instances].into_iter().chain(pages)
     }
 
     /// Returns the specialization of the passes that traverse this geometry.
@@ -164,9 +170,8 @@ impl Traversal {
         surfaces: Surfaces,
         question: Question,
     ) -> Kernel {
-        let passes = surfaces.features & SURFACES_PASSING != 0;
         // Rays that the host has answered take no turns.
-        let schedule = if self.is_on_host && !passes { Schedule::SINGLE } else { schedule };
+        let schedule = if self.is_on_host { Schedule::SINGLE } else { schedule };
         let own = [
             (CONSTANT_RAYS_PER_INVOCATION, schedule.rays_per_invocation),
             (CONSTANT_REFILL_LANES, schedule.refill_lanes),
@@ -174,10 +179,6 @@ impl Traversal {
         ];
         let constants = [&own[..], &self.constants(surfaces)].concat();
         let per_invocation = schedule.rays_per_invocation;
-        let question = match question {
-            Question::Visible if passes => Question::VisibleIfOpaque,
-            question => question,
-        };
         let question = self.is_on_host.then_some(question);
         Kernel { per_invocation, question, ..Kernel::new(shader, domain, &constants) }
     }

@@ -1,8 +1,5 @@
 //! The passes `trace` and `shadow` on the host, where the device is software: its buffers are the host's
-//! memory, and Embree follows rays several times as fast as the kernels do there.
-//!
-//! The host answers what triangles decide alone. Rays that meet a surface through which light may pass are
-//! left to the kernels, marked in the buffer of the answers.
+//! memory, and Embree follows packets of rays several times as fast as the kernels do there.
 
 use std::{
     mem::offset_of,
@@ -16,52 +13,64 @@ use bytemuck::Pod;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::kernel::Question;
+use super::{
+    host_parts::{check_copies, parts},
+    kernel::Question,
+    passages::{Chances, OpenPassages, Passages},
+};
 use crate::{
     accel::{Accel, traverse::moved_off_surface},
     error::Result,
     gpu::{
         Buffer, Embree,
-        embree_rays::Segment,
-        embree_scene::{EmbreeScene, Part},
+        embree_rays::{LANES, Packet},
+        embree_scene::EmbreeScene,
     },
     shader::{
-        constants::{NO_MATERIAL, NO_TRIANGLE, PATH_LISTS, TRIANGLE_LEFT, VISIBILITY_LEFT},
-        structs::{Hit, Ray, ShadowRay, Wave},
+        constants::{NO_INSTANCE, NO_MATERIAL, NO_TRIANGLE, PATH_LISTS},
+        structs::{Hit, PathState, Ray, ShadowRay, Wave},
     },
 };
 
 /// Distance up to which hits count, as in `bvh.glsl`.
 const FAR_AWAY: f32 = 3.0e38;
-/// Paths that a thread takes at a time.
-const CHUNK: usize = 256;
-
-/// Trees of the host over the triangles of a scene, which lie in buffers of the device.
+/// Most and least paths that a thread takes at a time, and its turns where there are more.
+const MOST_PATHS: usize = 1024;
+const LEAST_PATHS: usize = 64;
+const TURNS: usize = 32;
+/// Tree of the host over the triangles of a scene, which lie in buffers of the device.
 pub struct HostTracer {
-    /// Surfaces that stop all light.
-    opaque: EmbreeScene,
-    /// All others, if there are any.
-    passing: Option<EmbreeScene>,
+    tree: EmbreeScene,
+    /// Surfaces through which light may pass, if there are any.
+    passages: Option<Passages>,
     ray_offset: f32,
+    has_instances: bool,
 }
 
-/// Buffers of a wave that the host reads and answers in.
+/// Buffers that the host reads and answers in: those of a wave, and the scene's parameters.
 pub struct Answers<'a> {
     /// [`Ray`] of every path.
     pub rays: &'a Buffer,
     /// [`Hit`] of every path.
     pub hits: &'a Buffer,
+    /// Instance of every hit.
+    pub instances: &'a Buffer,
     /// [`ShadowRay`]s of the group.
     pub shadow_rays: &'a Buffer,
     /// A word for each of them.
     pub visibility: &'a Buffer,
+    /// [`PathState`] of every path.
+    pub paths: &'a Buffer,
     /// Lists of living paths.
     pub path_lists: &'a Buffer,
+    /// [`crate::shader::structs::SceneParameters`].
+    pub parameters: &'a Buffer,
 }
 
 impl HostTracer {
-    /// Builds the trees over `accel`, which has no instances, and whose triangles lie in `pages`. `passes`
-    /// says of a material whether light may pass its surfaces.
+    /// Builds the tree over `accel`, whose triangles lie in `pages`; `passages` says what light passes, if it
+    /// passes any. Instances are placed: as instances of the library, in the space of their meshes, those
+    /// that share edges would leak. Too many are refused unless the host `must_trace`.
     ///
     /// # Errors
     /// Memory does not suffice, or the library fails.
@@ -69,23 +78,20 @@ impl HostTracer {
         embree: &Arc<Embree>,
         accel: &Accel,
         pages: &[Arc<Buffer>],
-        passes: &dyn Fn(u32) -> bool,
+        passages: Option<Passages>,
+        must_trace: bool,
     ) -> Result<Self> {
-        let build = |passing: bool| {
-            let is_wanted =
-                |place: &u32| passes(accel.triangle_materials[*place as usize]) == passing;
-            let part = |(number, page): (u32, &Arc<Buffer>)| {
-                let first = number << accel.page_shift;
-                let end = (first + (1 << accel.page_shift)).min(accel.triangle_count() as u32);
-                Part::new(page, first, (first..end).filter(is_wanted))
-            };
-            EmbreeScene::new(embree, (0..).zip(pages).map(part).collect())
-        };
-        let any_passes = accel.triangle_materials.iter().any(|material| passes(*material));
+        if !must_trace {
+            check_copies(accel)?;
+        }
+        let may_pass =
+            |material| passages.as_ref().is_some_and(|passages| passages.may_pass(material));
+        let tree = EmbreeScene::new(embree, parts(accel, pages, &may_pass)?)?;
         Ok(Self {
-            opaque: build(false)?,
-            passing: any_passes.then(|| build(true)).transpose()?,
+            tree,
+            passages,
             ray_offset: accel.ray_offset(),
+            has_instances: accel.is_instanced(),
         })
     }
 
@@ -100,72 +106,200 @@ impl HostTracer {
         answers: &Answers<'_>,
     ) -> Result<()> {
         let paths = ListedPaths::new(wave, answers.path_lists)?;
-        let hits = answers.hits.words()?;
+        let passages = self.passages.as_ref().map(Passages::open).transpose()?;
+        let rays = Rays { tree: &self.tree, passages: passages.as_ref() };
         match question {
             Question::Closest => {
-                let rays = answers.rays.words()?;
-                paths.for_each(|path| {
-                    let triangle = &hits[words_of::<Hit>() * path + offset_of!(Hit, triangle) / 4];
-                    triangle.store(self.closest(&read(rays, path)), Ordering::Relaxed);
-                });
+                let closest = Closest {
+                    rays,
+                    chances: Chances::new(wave, answers.parameters.words()?, self.has_instances),
+                    is_coherent: wave.vertex == 0,
+                    from: answers.rays.words()?,
+                    hits: answers.hits.words()?,
+                    instances: self.has_instances.then(|| answers.instances.words()).transpose()?,
+                    paths: answers.paths.words()?,
+                };
+                paths.for_each_chunk(|paths| closest.answer(paths));
             }
-            Question::Visible | Question::VisibleIfOpaque => {
-                let (rays, visibility) =
-                    (answers.shadow_rays.words()?, answers.visibility.words()?);
-                let all_paths = (wave.pixel_count * wave.sample_count) as usize;
-                paths.for_each(|path| {
-                    let hit: Hit = read(hits, path);
-                    for direction in 0..wave.shadow_ray_count as usize {
-                        let ray = direction * all_paths + path;
-                        let answer = self.visibility(wave, &hit, read(rays, ray));
-                        visibility[ray].store(answer, Ordering::Relaxed);
-                    }
-                });
+            Question::Visible => {
+                let visible = Visible {
+                    rays,
+                    wave,
+                    ray_offset: self.ray_offset,
+                    hits: answers.hits.words()?,
+                    shadow_rays: answers.shadow_rays.words()?,
+                    visibility: answers.visibility.words()?,
+                };
+                paths.for_each_chunk(|paths| visible.answer(paths));
             }
         }
         Ok(())
     }
+}
 
-    /// Triangle that a ray meets, as in `trace.comp`.
-    fn closest(&self, ray: &Ray) -> u32 {
-        let Ray { origin, direction, is_active, .. } = *ray;
-        if is_active == 0 || !is_finite(origin, direction) {
-            return NO_TRIANGLE;
+/// The scene that rays are followed in.
+#[derive(Clone, Copy)]
+struct Rays<'a> {
+    tree: &'a EmbreeScene,
+    passages: Option<&'a OpenPassages<'a>>,
+}
+
+/// Search for the surfaces that the rays of paths meet, as in `trace.comp`.
+struct Closest<'a> {
+    rays: Rays<'a>,
+    chances: Chances<'a>,
+    is_coherent: bool,
+    from: &'a [AtomicU32],
+    hits: &'a [AtomicU32],
+    instances: Option<&'a [AtomicU32]>,
+    paths: &'a [AtomicU32],
+}
+
+/// A surface that light may pass, and the decision about it.
+struct Chance {
+    lane: usize,
+    surface: [u32; 2],
+    distance: f32,
+    goes_on: bool,
+    weight: Vec3,
+}
+
+impl Closest<'_> {
+    fn answer(&self, paths: impl Iterator<Item = u32>) {
+        let mut packet = Packet::new();
+        let mut chances = Vec::new();
+        for path in paths {
+            let Ray { origin, direction, is_active, .. } = read(self.from, path);
+            if is_active == 0 || !is_finite(origin, direction) {
+                self.write(path, NO_TRIANGLE, NO_INSTANCE);
+                continue;
+            }
+            packet.push(path, origin, direction, FAR_AWAY);
+            if packet.is_full() {
+                self.follow(&mut packet, &mut chances);
+            }
         }
-        let met = self.opaque.closest(Segment::new(origin, direction, FAR_AWAY));
-        let farthest = met.map_or(FAR_AWAY, |(_, distance)| distance);
-        let before = Segment::new(origin, direction, farthest);
-        match &self.passing {
-            Some(passing) if passing.is_blocked(before) => TRIANGLE_LEFT,
-            _ => met.map_or(NO_TRIANGLE, |(triangle, _)| triangle),
-        }
+        self.follow(&mut packet, &mut chances);
     }
 
-    /// Word of `visibility` for a shadow ray from `hit`, as in `shadow.comp`.
-    fn visibility(&self, wave: &Wave, hit: &Hit, ray: ShadowRay) -> u32 {
+    fn follow(&self, packet: &mut Packet, chances: &mut Vec<Chance>) {
+        let Rays { tree, passages } = self.rays;
+        let mut paths = [0; LANES];
+        paths[..packet.places().len()].copy_from_slice(packet.places());
+        chances.clear();
+        tree.find_closest(packet, self.is_coherent, &mut |met| {
+            let Some(passages) = passages else { return true };
+            let (goes_on, weight) = self.chances.take(paths[met.lane], met, &passages.passing(met));
+            chances.push(Chance {
+                lane: met.lane,
+                surface: [met.triangle, met.instance],
+                distance: met.distance,
+                goes_on,
+                weight,
+            });
+            !goes_on
+        });
+        for (lane, &path) in packet.places().iter().enumerate() {
+            let found = tree.hit(packet, lane);
+            let (surface, distance) = found.map_or(([NO_TRIANGLE, NO_INSTANCE], FAR_AWAY), |hit| {
+                ([hit.triangle, hit.instance], hit.distance)
+            });
+            self.write(path, surface[0], surface[1]);
+            // Surfaces beyond the one where the ray stops do not count.
+            let counts = |chance: &&Chance| {
+                let is_passed = chance.goes_on && chance.distance < distance;
+                chance.lane == lane && (is_passed || !chance.goes_on && chance.surface == surface)
+            };
+            let weight: Vec3 = chances.iter().filter(counts).map(|chance| chance.weight).product();
+            scale(
+                self.paths,
+                path,
+                offset_of!(PathState, throughput),
+                weight,
+                words_of::<PathState>(),
+            );
+        }
+        packet.clear();
+    }
+
+    fn write(&self, path: u32, triangle: u32, instance: u32) {
+        let word = words_of::<Hit>() * path as usize + offset_of!(Hit, triangle) / 4;
+        self.hits[word].store(triangle, Ordering::Relaxed);
+        if let Some(instances) = self.instances {
+            instances[path as usize].store(instance, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Search for anything that blocks shadow rays, as in `shadow.comp`.
+struct Visible<'a> {
+    rays: Rays<'a>,
+    wave: &'a Wave,
+    ray_offset: f32,
+    hits: &'a [AtomicU32],
+    shadow_rays: &'a [AtomicU32],
+    visibility: &'a [AtomicU32],
+}
+
+impl Visible<'_> {
+    fn answer(&self, paths: impl Iterator<Item = u32>) {
+        let wave = self.wave;
+        let all_paths = wave.pixel_count * wave.sample_count;
+        let mut packet = Packet::new();
+        for path in paths {
+            let hit: Hit = read(self.hits, path);
+            for direction in 0..wave.shadow_ray_count {
+                let ray = direction * all_paths + path;
+                let ray_of_path = read(self.shadow_rays, ray);
+                let Some((origin, direction, farthest)) = self.segment(&hit, ray_of_path) else {
+                    self.visibility[ray as usize].store(0, Ordering::Relaxed);
+                    continue;
+                };
+                packet.push(ray, origin, direction, farthest);
+                if packet.is_full() {
+                    self.follow(&mut packet);
+                }
+            }
+        }
+        self.follow(&mut packet);
+    }
+
+    /// Origin, direction and length of a shadow ray from `hit`, unless it needs no tracing.
+    fn segment(&self, hit: &Hit, ray: ShadowRay) -> Option<([f32; 3], [f32; 3], f32)> {
         if hit.material == NO_MATERIAL || ray.contribution == [0.0; 3] {
-            return 0;
+            return None;
         }
         let position = Vec3::from(hit.position);
         let mut direction = Vec3::from(ray.direction);
         let normal = Vec3::from(hit.geometric_normal);
         let origin = moved_off_surface(position, normal, direction, self.ray_offset);
         let mut farthest = FAR_AWAY;
-        if wave.to_lamps != 0 {
+        if self.wave.to_lamps != 0 {
             let to_lamp = direction + (position - origin);
             farthest = to_lamp.length();
             direction = to_lamp / farthest.max(1.0e-20);
         }
         let (origin, direction) = (origin.to_array(), direction.to_array());
-        if !is_finite(origin, direction) {
-            return 0;
+        is_finite(origin, direction).then_some((origin, direction, farthest))
+    }
+
+    fn follow(&self, packet: &mut Packet) {
+        let Rays { tree, passages } = self.rays;
+        let mut passed = [Vec3::ONE; LANES];
+        tree.find_any(packet, &mut |met| {
+            let Some(passages) = passages else { return true };
+            passed[met.lane] *= passages.passing(met).passed;
+            passed[met.lane] == Vec3::ZERO
+        });
+        for (lane, &ray) in packet.places().iter().enumerate() {
+            let is_visible = !packet.is_blocked(lane);
+            self.visibility[ray as usize].store(is_visible.into(), Ordering::Relaxed);
+            if is_visible {
+                let offset = offset_of!(ShadowRay, contribution);
+                scale(self.shadow_rays, ray, offset, passed[lane], words_of::<ShadowRay>());
+            }
         }
-        let segment = Segment::new(origin, direction, farthest);
-        match &self.passing {
-            _ if self.opaque.is_blocked(segment) => 0,
-            Some(passing) if passing.is_blocked(segment) => VISIBILITY_LEFT,
-            _ => 1,
-        }
+        packet.clear();
     }
 }
 
@@ -179,14 +313,26 @@ const fn words_of<T>() -> usize {
 }
 
 /// Reads element `index` of a buffer of `T`, which is at most twelve words.
-fn read<T: Pod>(words: &[AtomicU32], index: usize) -> T {
+fn read<T: Pod>(words: &[AtomicU32], index: u32) -> T {
     let mut element = [0; 12];
     let element = &mut element[..words_of::<T>()];
-    let from = &words[index * element.len()..][..element.len()];
+    let from = &words[index as usize * element.len()..][..element.len()];
     for (to, word) in element.iter_mut().zip(from) {
         *to = word.load(Ordering::Relaxed);
     }
     bytemuck::pod_read_unaligned(bytemuck::cast_slice(element))
+}
+
+/// Multiplies three numbers, at `offset` bytes of an element of `stride` words, by `factor`.
+fn scale(words: &[AtomicU32], index: u32, offset: usize, factor: Vec3, stride: usize) {
+    if factor == Vec3::ONE {
+        return;
+    }
+    let first = index as usize * stride + offset / size_of::<u32>();
+    for (word, factor) in words[first..].iter().zip(factor.to_array()) {
+        let value = f32::from_bits(word.load(Ordering::Relaxed)) * factor;
+        word.store(value.to_bits(), Ordering::Relaxed);
+    }
 }
 
 /// The paths that a dispatch walks, as in `path_list.glsl`.
@@ -208,11 +354,16 @@ impl<'a> ListedPaths<'a> {
         Ok(Self { count, list: Some(&words[start..start + count]) })
     }
 
-    /// Calls `walk` with every path, on all cores.
-    fn for_each(&self, walk: impl Fn(usize) + Sync) {
-        (0..self.count.div_ceil(CHUNK)).into_par_iter().for_each(|chunk| {
-            for place in chunk * CHUNK..self.count.min((chunk + 1) * CHUNK) {
-                walk(self.list.map_or(place, |list| list[place].load(Ordering::Relaxed) as usize));
+    /// Calls `walk` with all paths, some at a time, on all cores.
+    fn for_each_chunk(&self, walk: impl Fn(&mut dyn Iterator<Item = u32>) + Sync) {
+        let size = (self.count / TURNS).clamp(LEAST_PATHS, MOST_PATHS);
+        (0..self.count.div_ceil(size)).into_par_iter().for_each(|chunk| {
+            let places = chunk * size..self.count.min((chunk + 1) * size);
+            match self.list {
+                None => walk(&mut places.map(|place| place as u32)),
+                Some(list) => {
+                    walk(&mut list[places].iter().map(|path| path.load(Ordering::Relaxed)));
+                }
             }
         });
     }

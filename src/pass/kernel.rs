@@ -28,10 +28,8 @@ pub enum Domain {
 pub enum Question {
     /// Closest hits of rays.
     Closest,
-    /// Visibility along shadow rays: the host answers all, and nothing is left to dispatch.
+    /// Visibility along shadow rays: nothing is left to dispatch.
     Visible,
-    /// The same where surfaces let light pass: those rays are left to the dispatch.
-    VisibleIfOpaque,
 }
 
 /// A compute shader with its specialization. The shader names the pass in debug tools and timings.

@@ -6,10 +6,12 @@
 pub(crate) mod explanation;
 pub(crate) mod film_buffers;
 pub mod geometry;
+mod host_parts;
 pub mod host_tracer;
 pub mod kernel;
 pub mod lamps;
 pub mod order;
+mod passages;
 pub mod recording;
 pub mod roulette;
 pub mod runner;

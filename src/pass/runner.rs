@@ -198,7 +198,8 @@ impl Runner {
         let settings = PassSettings { path_lists: self.path_lists(), ..self.settings };
         let order = wave_order(&settings, technique.steps(), wave, vertices);
         let tracer = self.scene.geometry().host_tracer();
-        let host = tracer.map(|tracer| (tracer, self.waves.answers()));
+        let answers = || self.waves.answers(self.scene.parameters());
+        let host = tracer.map(|tracer| (tracer, answers()));
         let mut recording = Recording::begin(&self.device, order.len() as u32, host)?;
         let film = self.film.set(wave.first_pixel);
         let sets = sets(&self.scene, technique, &self.waves, &self.sharing, film);

@@ -7,6 +7,7 @@ use glam::Vec3;
 use super::{
     geometry::{GeometryBuffers, triangle_page_bytes},
     lamps::LampTables,
+    passages::PassingSurfaces,
     surfaces::{self, Surfaces},
     texture_buffers::TextureBuffers,
 };
@@ -30,7 +31,7 @@ pub struct SceneBuffers {
     set: DescriptorSet,
     geometry: GeometryBuffers,
     textures: TextureBuffers,
-    /// The first holds the parameters.
+    /// The first holds the [`SceneParameters`].
     buffers: Vec<Buffer>,
     parameters: SceneParameters,
     surfaces: Surfaces,
@@ -73,7 +74,7 @@ impl SceneBuffers {
         parts: Parts,
         start: Instant,
     ) -> Result<Self> {
-        let Parts { geometry, textures, lamps } = parts;
+        let Parts { geometry, textures, lamps, tables } = parts;
         let mut host_ms = BTreeMap::new();
         let mut buffers = Vec::new();
         let mut places = Vec::new();
@@ -82,7 +83,6 @@ impl SceneBuffers {
             buffers.push(buffer);
         };
 
-        let tables = MaterialTables::new(&scene.materials)?;
         let material_kinds =
             tables.materials.iter().fold(0, |bits, material| bits | 1 << material.kind);
         let surfaces = Surfaces {
@@ -159,7 +159,7 @@ impl SceneBuffers {
             crop_height: height,
             ..with_camera(self.parameters, camera)
         };
-        self.buffers[0].upload(bytemuck::bytes_of(&parameters))
+        self.parameters().upload(bytemuck::bytes_of(&parameters))
     }
 
     /// Descriptor set 0.
@@ -170,6 +170,11 @@ impl SceneBuffers {
     /// Tree and triangles.
     pub(crate) fn geometry(&self) -> &GeometryBuffers {
         &self.geometry
+    }
+
+    /// [`SceneParameters`].
+    pub(crate) fn parameters(&self) -> &Buffer {
+        &self.buffers[0]
     }
 
     /// Specialization of passes by the surfaces of the scene.
@@ -247,21 +252,24 @@ struct Parts {
     geometry: GeometryBuffers,
     textures: TextureBuffers,
     lamps: LampTables,
+    tables: MaterialTables,
 }
 
 impl Parts {
     fn new(device: &Arc<Device>, scene: &Scene, accel: &Accel) -> Result<Self> {
-        let mut tables = SurfaceTables::new(&scene.materials);
+        let mut surfaces = SurfaceTables::new(&scene.materials);
         let lamps = LampTables::new(scene, accel);
-        for (surface, density) in tables.surfaces.iter_mut().zip(&lamps.emission_densities) {
+        for (surface, density) in surfaces.surfaces.iter_mut().zip(&lamps.emission_densities) {
             surface.emission_density = *density;
         }
-        let attributes = TriangleAttributes::new(&scene.geometry, accel, tables.attributes);
-        let textures = TextureBuffers::new(device, &tables, &attributes)?;
-        let materials = &scene.materials;
-        let passes = |index: u32| surfaces::passes(&materials[index as usize]);
+        let attributes = TriangleAttributes::new(&scene.geometry, accel, surfaces.attributes);
+        let textures = TextureBuffers::new(device, &surfaces, &attributes)?;
+        drop(attributes);
+        let tables = MaterialTables::new(&scene.materials)?;
+        let passing =
+            PassingSurfaces::new(&scene.materials, &tables.materials, &surfaces, &textures);
         let geometry =
-            GeometryBuffers::new(device, accel)?.traced_by_host(device, accel, &passes)?;
-        Ok(Self { geometry, textures, lamps })
+            GeometryBuffers::new(device, accel)?.traced_by_host(device, accel, passing)?;
+        Ok(Self { geometry, textures, lamps, tables })
     }
 }

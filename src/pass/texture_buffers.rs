@@ -35,8 +35,8 @@ const ATTRIBUTE_PAGES: [Binding; MAX_PAGES] = [
 /// Buffers that shaders read by `glsl/include/texture.glsl`. A scene without textures has buffers of one
 /// element, which no shader reads.
 pub(crate) struct TextureBuffers {
-    texture_pages: Vec<Buffer>,
-    attribute_pages: Vec<Buffer>,
+    texture_pages: Vec<Arc<Buffer>>,
+    attribute_pages: Vec<Arc<Buffer>>,
     uses: Buffer,
     surfaces: Buffer,
     access: TextureAccess,
@@ -71,7 +71,7 @@ impl TextureBuffers {
             .map(|page| {
                 let mut words = tables.textures.words(page * page_words..(page + 1) * page_words);
                 words.resize(words.len().max(1), 0);
-                Buffer::texels_from_slice(device, &format!("textures {page}"), &words)
+                Buffer::texels_from_slice(device, &format!("textures {page}"), &words).map(Arc::new)
             })
             .collect::<Result<Vec<_>>>()?;
         let words = if attributes.words.is_empty() { &[0] } else { &attributes.words[..] };
@@ -80,6 +80,7 @@ impl TextureBuffers {
             .enumerate()
             .map(|(page, words)| {
                 Buffer::texels_from_slice(device, &format!("triangle attributes {page}"), words)
+                    .map(Arc::new)
             })
             .collect::<Result<Vec<_>>>()?;
         let access = TextureAccess {
@@ -108,7 +109,7 @@ impl TextureBuffers {
         for (names, pages) in
             [(TEXTURE_PAGES, &self.texture_pages), (ATTRIBUTE_PAGES, &self.attribute_pages)]
         {
-            let page = |(index, name)| (name, pages.get(index).unwrap_or(&pages[0]));
+            let page = |(index, name)| (name, pages.get(index).unwrap_or(&pages[0]).as_ref());
             bindings.extend(names.into_iter().enumerate().map(page));
         }
         bindings
@@ -116,10 +117,13 @@ impl TextureBuffers {
 
     /// Returns every buffer once, for memory reports.
     pub(crate) fn buffers(&self) -> impl Iterator<Item = &Buffer> {
-        [&self.uses, &self.surfaces]
-            .into_iter()
-            .chain(&self.texture_pages)
-            .chain(&self.attribute_pages)
+        let pages = self.pages().into_iter().flatten().map(Arc::as_ref);
+        [&self.uses, &self.surfaces].into_iter().chain(pages)
+    }
+
+    /// Texels, and attributes of triangles.
+    pub(crate) fn pages(&self) -> [&[Arc<Buffer>]; 2] {
+        [&self.texture_pages, &self.attribute_pages]
     }
 
     /// Returns the specialization of the passes that read textures.

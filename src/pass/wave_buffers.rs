@@ -155,14 +155,17 @@ impl WaveBuffers {
         &self.paths
     }
 
-    /// Buffers that the host answers in where it traces.
-    pub(crate) fn answers(&self) -> Answers<'_> {
+    /// Buffers that the host answers in where it traces, with the parameters of the scene.
+    pub(crate) fn answers<'a>(&'a self, parameters: &'a Buffer) -> Answers<'a> {
         Answers {
             rays: &self.rays,
             hits: &self.hits,
+            instances: &self.instances,
             shadow_rays: &self.shadow_rays,
             visibility: &self.visibility,
+            paths: &self.paths,
             path_lists: &self.path_lists,
+            parameters,
         }
     }
 

@@ -72,7 +72,7 @@ specializations! {
     CONSTANT_RAYS_PER_INVOCATION;
     /// Finished lanes of a subgroup at which they take their next rays.
     CONSTANT_REFILL_LANES;
-    /// 1 where the host has answered, but for the rays that it leaves to the pass.
+    /// 1 where the host has answered.
     CONSTANT_ANSWERED;
 
     // Specialization constants of the passes that read textures.
@@ -145,6 +145,17 @@ constants! {
     /// Meshes are placed by instances: the tree has two levels.
     SURFACES_INSTANCED = 32;
 
+    // Dimensions of random numbers that the host draws too.
+    /// First dimension of the first vertex of a path.
+    DIMENSION_VERTEX = 2;
+    /// Dimensions of a vertex.
+    DIMENSIONS_PER_VERTEX = 32;
+    /// Offset from a vertex's first dimension: whether a ray goes through a surface that it meets.
+    DIMENSION_PASSAGE = 5;
+    /// Edge of the blocks of pixels that film order goes by, so that neighbouring invocations trace
+    /// neighbouring rays.
+    FILM_BLOCK = 8;
+
     // Bits of `Wave::aovs`: film layers to write.
     /// Albedo.
     AOV_ALBEDO = 1;
@@ -172,10 +183,6 @@ constants! {
     NO_MATERIAL = 0xffff_ffff;
     /// [`Hit::triangle`](super::structs::Hit::triangle) of a ray that met nothing.
     NO_TRIANGLE = 0xffff_ffff;
-    /// The same where the host leaves the ray to the pass `trace`.
-    TRIANGLE_LEFT = 0xffff_fffe;
-    /// Visibility of a shadow ray that the host leaves to the pass `shadow`.
-    VISIBILITY_LEFT = 2;
     /// Instance of a ray in the upper level of the tree, and of hits in scenes without instances.
     NO_INSTANCE = 0xffff_ffff;
 

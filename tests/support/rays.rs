@@ -143,7 +143,7 @@ impl OnDevice {
     pub fn both(accel: &Accel) -> Vec<(&'static str, Self)> {
         let device = super::device();
         let geometry = GeometryBuffers::new(device, accel).unwrap();
-        let geometry = geometry.traced_by_host(device, accel, &|_| false).unwrap();
+        let geometry = geometry.traced_by_host(device, accel, None).unwrap();
         let host = geometry.host_tracer().is_some().then(|| ("host", Self::with(geometry)));
         if host.is_none() {
             eprintln!("not tested: there is no library by which the host traces (./setup)");
@@ -170,8 +170,15 @@ impl OnDevice {
         let device = super::device();
         let ray_buffer = Buffer::from_slice(device, "rays", rays).unwrap();
         let hits = Buffer::zeroed(device, "hits", (size_of::<Hit>() * rays.len()) as u64).unwrap();
-        let own = [(bindings::RAY_TEXELS, &ray_buffer), (bindings::HITS, &hits)];
-        let answers = Answers { rays: &ray_buffer, hits: &hits, ..self.no_answers() };
+        let instances =
+            Buffer::zeroed(device, "instances", (size_of::<u32>() * rays.len()) as u64).unwrap();
+        let own = [
+            (bindings::RAY_TEXELS, &ray_buffer),
+            (bindings::HITS, &hits),
+            (bindings::HIT_INSTANCES, &instances),
+        ];
+        let answers =
+            Answers { rays: &ray_buffer, hits: &hits, instances: &instances, ..self.no_answers() };
         let kernel = self.geometry.traversal().trace(schedule, Surfaces::default());
         self.run(kernel, &own, answers, wave(rays.len(), 0));
         hits.download(rays.len()).unwrap()
@@ -204,7 +211,16 @@ impl OnDevice {
 
     fn no_answers(&self) -> Answers<'_> {
         let none = &self.spare;
-        Answers { rays: none, hits: none, shadow_rays: none, visibility: none, path_lists: none }
+        Answers {
+            rays: none,
+            hits: none,
+            instances: none,
+            shadow_rays: none,
+            visibility: none,
+            paths: none,
+            path_lists: none,
+            parameters: none,
+        }
     }
 
     fn run(&self, kernel: Kernel, own: &[(Binding, &Buffer)], answers: Answers<'_>, wave: Wave) {

@@ -1,0 +1,256 @@
+//! Light that goes straight through surfaces, for rays that the host follows: twin of
+//! `glsl/include/passage.glsl`, and of the chance in `trace.comp` by which paths go on.
+
+use std::{
+    mem::offset_of,
+    sync::{
+        Arc,
+        atomic::{AtomicU32, Ordering},
+    },
+};
+
+use glam::Vec3;
+
+use super::{
+    film_buffers::BLOCK_PIXELS,
+    surfaces,
+    texture_buffers::{TextureAccess, TextureBuffers},
+};
+use crate::{
+    accel::{
+        instances::Record,
+        traverse::{edge_functions, placed},
+    },
+    brdf::fresnel::{pane_reflectance, pane_transmittance},
+    error::Result,
+    gpu::{Buffer, embree_scene::Meeting},
+    math::{
+        colour::luminance,
+        frame::frame_from_normal,
+        random::{hash_4d, unit_float},
+    },
+    scene::material,
+    shader::{
+        constants::{
+            ATTRIBUTE_FIRST_UVS, ATTRIBUTE_SECOND_UVS, DIMENSION_PASSAGE, DIMENSION_VERTEX,
+            DIMENSIONS_PER_VERTEX, FILM_BLOCK, MATERIAL_THIN_DIELECTRIC,
+        },
+        structs::{Material, MaterialSurface, SceneParameters, TextureUse, Wave},
+    },
+    surface::{
+        SurfaceTables,
+        lookup::{AttributeWords, Words, surface_opacity},
+    },
+};
+
+/// Words of a vertex in the buffers of triangles.
+const VERTEX_WORDS: usize = 4;
+
+/// Surfaces of a scene, for the host to know what light passes them.
+pub struct PassingSurfaces {
+    materials: Vec<Material>,
+    surfaces: Vec<MaterialSurface>,
+    uses: Vec<TextureUse>,
+    textures: Vec<Arc<Buffer>>,
+    attributes: Vec<Arc<Buffer>>,
+    access: TextureAccess,
+    passes: Vec<bool>,
+}
+
+impl PassingSurfaces {
+    /// Takes the surfaces of `of`, whose `materials` and `tables` are those of the device; none if light
+    /// passes nothing.
+    pub(super) fn new(
+        of: &[material::Material],
+        materials: &[Material],
+        tables: &SurfaceTables,
+        textures: &TextureBuffers,
+    ) -> Option<Self> {
+        let passes: Vec<bool> = of.iter().map(surfaces::passes).collect();
+        let [texture_pages, attribute_pages] = textures.pages();
+        passes.contains(&true).then(|| Self {
+            materials: materials.to_vec(),
+            surfaces: tables.surfaces.clone(),
+            uses: tables.textures.uses.clone(),
+            textures: texture_pages.to_vec(),
+            attributes: attribute_pages.to_vec(),
+            access: textures.access(),
+            passes,
+        })
+    }
+}
+
+/// Triangles of a scene and their surfaces.
+pub(super) struct Passages {
+    /// Triangles, three vertices each, in pages of `1 << page_shift`.
+    pub(super) pages: Vec<Arc<Buffer>>,
+    pub(super) page_shift: u32,
+    pub(super) triangle_materials: Arc<Buffer>,
+    pub(super) instances: Vec<Record>,
+    pub(super) surfaces: PassingSurfaces,
+}
+
+impl Passages {
+    /// Tests whether light may pass a surface of this material.
+    pub(super) fn may_pass(&self, material: u32) -> bool {
+        self.surfaces.passes[material as usize]
+    }
+
+    /// Looks into the buffers.
+    ///
+    /// # Errors
+    /// The host does not share the memory of a buffer.
+    pub(super) fn open(&self) -> Result<OpenPassages<'_>> {
+        let of = &self.surfaces;
+        let access = of.access;
+        Ok(OpenPassages {
+            of: self,
+            triangles: Pages::open(&self.pages, self.page_shift)?,
+            triangle_materials: self.triangle_materials.words()?,
+            textures: Pages::open(&of.textures, access.page_shift)?,
+            attributes: Pages::open(&of.attributes, access.page_shift)?,
+        })
+    }
+}
+
+/// Buffers as arrays whose words go on from one to the next, `1 << shift` elements each.
+struct Pages<'a> {
+    pages: Vec<&'a [AtomicU32]>,
+    shift: u32,
+}
+
+impl<'a> Pages<'a> {
+    fn open(buffers: &'a [Arc<Buffer>], shift: u32) -> Result<Self> {
+        let pages = buffers.iter().map(|buffer| buffer.words()).collect::<Result<_>>()?;
+        Ok(Self { pages, shift })
+    }
+
+    /// Page of an element, and its index there.
+    fn find(&self, index: usize) -> (&'a [AtomicU32], usize) {
+        (self.pages[index >> self.shift], index & ((1 << self.shift) - 1))
+    }
+}
+
+impl Words for Pages<'_> {
+    fn word(&self, index: usize) -> u32 {
+        let (page, index) = self.find(index);
+        page[index].load(Ordering::Relaxed)
+    }
+}
+
+/// Light at a point of a surface, by what becomes of it.
+pub(super) struct Passing {
+    /// Share that goes straight through.
+    pub(super) passed: Vec3,
+    /// Share that a pane reflects; of other surfaces, the share that meets them.
+    stopped: Vec3,
+}
+
+/// [`Passages`] with their words at hand.
+pub(super) struct OpenPassages<'a> {
+    of: &'a Passages,
+    triangles: Pages<'a>,
+    triangle_materials: &'a [AtomicU32],
+    textures: Pages<'a>,
+    attributes: Pages<'a>,
+}
+
+impl OpenPassages<'_> {
+    /// Light at the point where a ray meets a surface.
+    pub(super) fn passing(&self, met: &Meeting) -> Passing {
+        let Passages { instances, surfaces: of, .. } = self.of;
+        let instance = instances.get(met.instance as usize);
+        let (page, triangle) = self.triangles.find(met.triangle as usize);
+        let frame = frame_from_normal(met.direction);
+        let local = [0, 1, 2].map(|corner| {
+            let first = VERTEX_WORDS * (3 * triangle + corner);
+            let position = [0, 1, 2].map(|axis| page[first + axis].load(Ordering::Relaxed));
+            frame.to_local(placed(instance, position.map(f32::from_bits)) - met.origin)
+        });
+        let areas = edge_functions(local);
+        let weights = areas / (areas.x + areas.y + areas.z);
+
+        let own = self.triangle_materials[met.triangle as usize].load(Ordering::Relaxed);
+        let index = instance.map_or(own, |of| of.first_material + (own & of.material_mask));
+        let attributes = AttributeWords { bits: of.access.attributes, words: &self.attributes };
+        let opacity = surface_opacity(
+            &self.textures,
+            &of.uses,
+            &of.surfaces[index as usize],
+            [ATTRIBUTE_FIRST_UVS, ATTRIBUTE_SECOND_UVS]
+                .map(|set| attributes.interpolated_uv(met.triangle, weights, set)),
+            attributes.color(met.triangle, weights).w,
+        );
+        let mut shares =
+            Passing { passed: Vec3::splat(1.0 - opacity), stopped: Vec3::splat(opacity) };
+        let material = &of.materials[index as usize];
+        if material.kind == MATERIAL_THIN_DIELECTRIC {
+            let [a, b, c] = local;
+            let normal = (b - a).cross(c - a);
+            let cosine = normal.z.abs() / normal.length().max(1e-37);
+            shares.passed += opacity * pane_transmittance(material, cosine);
+            shares.stopped = opacity * pane_reflectance(material, cosine);
+        }
+        shares
+    }
+}
+
+/// Chances that paths of a wave take at the surfaces that their rays meet.
+pub(super) struct Chances<'a> {
+    wave: &'a Wave,
+    crop_width: u32,
+    /// Pixels of the whole film before the crop window, and in a row.
+    crop_start: u32,
+    film_width: u32,
+    has_instances: bool,
+}
+
+impl<'a> Chances<'a> {
+    /// `parameters` holds [`SceneParameters`].
+    pub(super) fn new(wave: &'a Wave, parameters: &[AtomicU32], has_instances: bool) -> Self {
+        let word = |offset: usize| parameters[offset / size_of::<u32>()].load(Ordering::Relaxed);
+        let film_width = word(offset_of!(SceneParameters, film_width));
+        let crop_start = word(offset_of!(SceneParameters, crop_y)) * film_width
+            + word(offset_of!(SceneParameters, crop_x));
+        let crop_width = word(offset_of!(SceneParameters, crop_width));
+        Self { wave, crop_width, crop_start, film_width, has_instances }
+    }
+
+    /// Pixel in the whole film and sample of a path, as `wave_path` in `wave.glsl`.
+    fn pixel_and_sample(&self, path: u32) -> [u32; 2] {
+        let wave = self.wave;
+        let index = path % wave.pixel_count;
+        let skipped = index / BLOCK_PIXELS * (wave.block_stride.max(1) - 1);
+        let position =
+            wave.first_pixel + (index + skipped * BLOCK_PIXELS) * wave.pixel_stride.max(1);
+        let (block, within) = (position / BLOCK_PIXELS, position % BLOCK_PIXELS);
+        let blocks_per_row = self.crop_width.div_ceil(FILM_BLOCK);
+        let row = block / blocks_per_row * FILM_BLOCK + within / FILM_BLOCK;
+        let column = block % blocks_per_row * FILM_BLOCK + within % FILM_BLOCK;
+        [
+            (self.crop_start + row * self.film_width).wrapping_add(column),
+            wave.first_sample + path / wave.pixel_count,
+        ]
+    }
+
+    /// Decides whether the ray of a path goes through a surface that it has met, as `goes_through` in
+    /// `trace.comp`. Returns that, and the weight of the path if the decision counts.
+    pub(super) fn take(&self, path: u32, met: &Meeting, shares: &Passing) -> (bool, Vec3) {
+        let (passed, stopped) = (luminance(shares.passed), luminance(shares.stopped));
+        if passed <= 0.0 {
+            return (false, Vec3::ONE);
+        }
+        let wave = self.wave;
+        let instance = if self.has_instances { met.instance } else { 0 };
+        let [pixel, sample] = self.pixel_and_sample(path);
+        let dimension = DIMENSION_VERTEX + wave.vertex * DIMENSIONS_PER_VERTEX + DIMENSION_PASSAGE;
+        let seed = wave.seed ^ hash_4d([met.triangle, instance, 0, 0])[0];
+        let [bits, ..] = hash_4d([pixel, sample, dimension, seed]);
+        let probability = passed / (passed + stopped);
+        if unit_float(bits) < probability {
+            (true, shares.passed / probability)
+        } else {
+            (false, shares.stopped / (1.0 - probability))
+        }
+    }
+}
