@@ -420,10 +420,10 @@ fn pipes_and_devices_are_no_input() {
     folder.write("quad.obj", obj);
     assert!(Command::new("mkfifo").arg(folder.path().join("pipe.mtl")).status().unwrap().success());
     let run = run_limited(&folder, &RENDER);
-    run.assert(0, &["quad.obj:1: cannot read the material library pipe.mtl"]);
+    run.assert(0, &["quad.obj:1: cannot read the material library `pipe.mtl`"]);
     folder.write("quad.obj", obj.replace("pipe.mtl", "/dev/zero"));
     let run = run_limited(&folder, &RENDER);
-    run.assert(1, &["quad.obj:1:1: the file name `/dev/zero` is absolute"]);
+    run.assert(0, &["quad.obj:1: cannot read the material library `/dev/zero` (", "absolute"]);
 }
 
 #[cfg(unix)]

@@ -459,8 +459,8 @@ fn instances_enter_the_hash() {
     assert_ne!(a.hash, b.hash);
 }
 
-/// Adds a flat quad around `centre` with half edges `right` and `up`, seen from where `right` × `up` points. The
-/// image of its textures stands upright on it.
+/// Adds a flat quad around `centre` with half edges `right` and `up`, seen from where `right` × `up` points.
+/// The image of its textures stands upright on it.
 fn add_quad(geometry: &mut Geometry, centre: Vec3, [right, up]: [Vec3; 2], has_tangents: bool) {
     let first = geometry.positions.len() as u32;
     for [x, y] in [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]] {
@@ -487,7 +487,7 @@ fn bumps_keep_their_side_in_mirrors_and_from_behind() {
         Some(TextureUse { encoding: Encoding::Linear, ..TextureUse::new(Arc::new(texture)) });
     let mut scene = scenes::plane(Vec3::ONE, scenes::environment(16, |_| Vec3::ONE));
     scene.materials = vec![material];
-    // What is seen from behind is the bump turned round.
+    // Seen from behind, the bump is turned round.
     let cases = [
         ("placed", None, Vec3::ONE),
         ("placed, from behind", None, Vec3::new(1.0, -1.0, 1.0)),

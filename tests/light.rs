@@ -80,8 +80,8 @@ fn add_square(geometry: &mut Geometry, centre: Vec3, half: f32, material: u32) {
     geometry.materials.extend([material; 2]);
 }
 
-/// A square at y = 0 that fills the image, seen along about 70° from its normal, between a sky and a ground that
-/// are told apart by their channels.
+/// A square at y = 0 that fills the image, seen along about 70° from its normal, between a sky and a ground
+/// that are told apart by their channels.
 fn between_sky_and_ground(surface: MaterialKind) -> Scene {
     let environment = scenes::environment(64, |to| if to.y > 0.0 { SKY } else { GROUND });
     let mut scene = scenes::plane(Vec3::ZERO, environment);

@@ -606,8 +606,8 @@ fn shader_agrees_with_its_twins_for_some_attributes() {
     compare(0);
 }
 
-/// A texture of one value is a factor of its property: of the colour, of the root of the width, of the share of
-/// metal. The paths are those of a scene without textures, whose materials have the products.
+/// A texture of one value is a factor of its property: of the colour, of the root of the width, of the share
+/// of metal. The paths are those of a scene without textures, whose materials have the products.
 #[test]
 fn textures_of_one_value_are_factors() {
     let _alone = support::alone();
