@@ -265,8 +265,9 @@ fn bad_portals_are_refused_and_ignored_ones_named() {
         assert!(message.contains(expected), "expected `{expected}`, found `{message}`");
     }
     let folder = Folder::new();
-    let ball = "[[object]]\nshape = \"sphere\"\nradius = 1\nmaterial = \"default\"\n";
-    folder.write("room.toml", format!("{SCENE}{ball}"));
+    let clay = "[[material]]\nname = \"clay\"\ntype = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]\n";
+    let ball = "[[object]]\nshape = \"sphere\"\nradius = 1\nmaterial = \"clay\"\n";
+    folder.write("room.toml", format!("{SCENE}{clay}{ball}"));
     let options = ["render", "room.toml", "--quick", "--spp=1", "--sampler=mis", "--stats=s.json"];
     folder.run(&options).assert(0, &[&warning]);
     let statistics = fs::read_to_string(folder.path().join("s.json")).unwrap();
