@@ -18,7 +18,7 @@ use crate::{
     gpu::DescriptorSet,
     pass::{BLOCK_PIXELS, Passes, Progress, Runner, Steps},
     shader::{
-        constants::MEASURED_WAVE,
+        constants::{FILM_BLOCK, MEASURED_WAVE},
         structs::{PathState, Wave},
     },
 };
@@ -93,7 +93,7 @@ struct Blocks {
 impl Blocks {
     fn of(runner: &Runner) -> Self {
         let all = runner.film().padded_pixels() / BLOCK_PIXELS;
-        let columns = runner.film().window().width.div_ceil(8);
+        let columns = runner.film().window().width.div_ceil(FILM_BLOCK);
         let mut stride = all.div_ceil(MEASURED_PIXELS / BLOCK_PIXELS).max(LEAST_STRIDE).min(all);
         // Without a common divisor, the blocks lie in all columns.
         while greatest_common_divisor(stride, columns) > 1 {
