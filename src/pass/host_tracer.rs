@@ -38,6 +38,7 @@ const FAR_AWAY: f32 = 3.0e38;
 const MOST_PATHS: usize = 1024;
 const LEAST_PATHS: usize = 64;
 const TURNS: usize = 32;
+
 /// Tree of the host over the triangles of a scene, which lie in buffers of the device.
 pub struct HostTracer {
     tree: EmbreeScene,

@@ -106,10 +106,9 @@ pub struct Session {
     pub(super) found_light: bool,
 }
 
-/// Describes a render by its settings, without fits, samples and times.
+/// Describes a render by its settings, without fits, tracer, samples and times.
 pub(crate) fn describe(device: &Device, scene: &Scene, settings: &Settings) -> Metadata {
     let capabilities = device.capabilities();
-    let is_instanced = !scene.geometry.instances.is_empty();
     let mut parameters = settings.sampler.describe(&settings.parameters);
     let roulette = settings.roulette;
     if settings.depth > roulette.vertex {
@@ -126,7 +125,6 @@ pub(crate) fn describe(device: &Device, scene: &Scene, settings: &Settings) -> M
         depth: settings.depth,
         device: capabilities.name.clone(),
         driver: capabilities.driver.clone(),
-        tracer: if is_instanced { "device".to_owned() } else { device.tracer() },
         ..Metadata::default()
     }
 }
