@@ -9,6 +9,12 @@ pub fn fresnel_dielectric(cosine: f32, ior: f32) -> f32 {
     (0.5 * perpendicular * perpendicular * (1.0 + ratio * ratio)).min(1.0)
 }
 
+/// The same at normal incidence.
+pub(crate) fn normal_reflectance(ior: f32) -> f32 {
+    let ratio = (ior - 1.0) / (ior + 1.0);
+    ratio * ratio
+}
+
 /// Share of diffuse light below an interface of refractive index `ior` that it throws back:
 /// 1 − (1 − Fd)/ior², where Fd is the share thrown back of diffuse light from above.
 fn internal_reflectance(ior: f32) -> f32 {

@@ -131,6 +131,19 @@ pub enum ConductorFresnel {
     },
 }
 
+impl ConductorFresnel {
+    /// Reflectance at normal incidence.
+    pub fn at_normal_incidence(&self) -> Vec3 {
+        match *self {
+            Self::Schlick { reflectance } => reflectance,
+            Self::Exact { eta, k } => {
+                let (below, above) = (eta - 1.0, eta + 1.0);
+                (below * below + k * k) / (above * above + k * k)
+            }
+        }
+    }
+}
+
 impl MaterialKind {
     /// Name in scene files, number in hashes, and the parameters in groups; the table of a measured one is
     /// not among them.

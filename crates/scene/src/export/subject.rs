@@ -10,6 +10,7 @@ use super::{
     triple,
 };
 use crate::{
+    coat::normal_reflectance,
     material::{Material, Surface},
     math::colour::luminance,
     measured::MeasuredTable,
@@ -138,8 +139,7 @@ const LARGEST_ROOT: f32 = 0.6;
 
 /// Reflectance of a principled dielectric at normal incidence.
 fn reflectance_of(ior: f32, specular: f32, specular_color: Vec3) -> f32 {
-    let ratio = (ior - 1.0) / (ior + 1.0);
-    luminance((ratio * ratio * specular_color).min(Vec3::ONE) * specular).max(0.0)
+    luminance((normal_reflectance(ior) * specular_color).min(Vec3::ONE) * specular).max(0.0)
 }
 
 /// Refractive index, up to 4, whose reflectance at normal incidence is that of a principled dielectric.

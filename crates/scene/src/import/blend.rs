@@ -8,8 +8,9 @@ use half::f16;
 
 use crate::{
     MIN_ALPHA,
+    coat::normal_reflectance,
     gloss::{DIELECTRIC, metallic_roughness},
-    material::{ConductorFresnel, MaterialKind, Surface},
+    material::{MaterialKind, Surface},
     math::colour::luminance,
     texture::{
         Channels, Encoding, Texels, Texture, TextureUse,
@@ -184,25 +185,17 @@ struct Lobes {
 
 impl Lobes {
     fn of(kind: &MaterialKind) -> Option<Self> {
-        let normal = |ior: f32| ((ior - 1.0) / (ior + 1.0)).powi(2);
         Some(match kind {
             MaterialKind::Diffuse { reflectance } => {
                 Self { diffuse: *reflectance, specular: Vec3::ZERO, roughness: 1.0 }
             }
             MaterialKind::Plastic { diffuse, alpha, ior } => {
-                let coat = normal(*ior);
+                let coat = normal_reflectance(*ior);
                 let specular = Vec3::splat(coat);
                 Self { diffuse: *diffuse * (1.0 - coat), specular, roughness: alpha.sqrt() }
             }
             MaterialKind::Conductor { alpha, fresnel } => {
-                let specular = match fresnel {
-                    ConductorFresnel::Schlick { reflectance } => *reflectance,
-                    ConductorFresnel::Exact { eta, k } => {
-                        let squared = *k * *k;
-                        let (below, above) = (*eta - 1.0, *eta + 1.0);
-                        (below * below + squared) / (above * above + squared)
-                    }
-                };
+                let specular = fresnel.at_normal_incidence();
                 Self { diffuse: Vec3::ZERO, specular, roughness: alpha.sqrt() }
             }
             MaterialKind::Mirror { reflectance } => {
@@ -217,7 +210,7 @@ impl Lobes {
                 specular,
                 specular_color,
             } => {
-                let coat = (normal(*ior) * *specular_color).min(Vec3::ONE) * *specular;
+                let coat = (normal_reflectance(*ior) * *specular_color).min(Vec3::ONE) * *specular;
                 let below = (1.0 - metallic) * (1.0 - coat.max_element());
                 let diffuse = *base_color * below;
                 Self { diffuse, specular: coat.lerp(*base_color, *metallic), roughness: *roughness }

@@ -113,15 +113,13 @@ impl<'a> Translator<'a> {
                 alpha,
                 fresnel: ConductorFresnel::Schlick { reflectance },
             } => metal(*reflectance, *alpha),
-            MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } => {
+            MaterialKind::Conductor { alpha, fresnel } => {
                 self.subject.warn(
                     "its refractive index becomes the reflectance at normal incidence, from which \
                      glTF's metal follows Schlick's approximation",
                 );
                 self.subject.without_color("metal of a refractive index");
-                let (below, above) = (*eta - 1.0, *eta + 1.0);
-                let k = *k * *k;
-                metal((below * below + k) / (above * above + k), *alpha)
+                metal(fresnel.at_normal_incidence(), *alpha)
             }
             MaterialKind::Principled {
                 base_color,
