@@ -17,7 +17,7 @@ use fenestra::{
 use glam::Vec3;
 
 use crate::support::{
-    self,
+    self, materials,
     rays::scaled,
     replicates::REPLICATES,
     scenes,
@@ -90,15 +90,7 @@ fn agrees(scene: &Scene, shared: &[(Sampler, &str)], samples: u32, base: &Settin
 }
 
 fn paint(base_color: Vec3, metallic: f32, roughness: f32) -> Material {
-    let kind = MaterialKind::Principled {
-        base_color,
-        metallic,
-        roughness,
-        ior: 1.5,
-        specular: 1.0,
-        specular_color: Vec3::ONE,
-    };
-    Material::new("paint", kind)
+    Material::new("paint", materials::principled(base_color, metallic, roughness))
 }
 
 fn base(depth: u32) -> Settings {

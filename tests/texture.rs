@@ -36,7 +36,7 @@ use half::f16;
 use image::{DynamicImage, ImageFormat};
 
 use crate::{
-    support::{self, scenes},
+    support::{self, materials, scenes},
     twin::texture as twin,
 };
 
@@ -615,20 +615,12 @@ fn textures_of_one_value_are_factors() {
         alpha,
         fresnel: ConductorFresnel::Schlick { reflectance },
     };
-    let paint = |base_color, metallic, roughness| MaterialKind::Principled {
-        base_color,
-        metallic,
-        roughness,
-        ior: 1.5,
-        specular: 1.0,
-        specular_color: Vec3::ONE,
-    };
     let (full, half) = (vec3(0.8, 0.6, 0.4), vec3(0.4, 0.15, 0.4));
     let of = |kind| Material::new("m", kind);
     let plain = vec![
         of(MaterialKind::Diffuse { reflectance: half }),
         of(metal(0.2, half)),
-        of(paint(half, 0.2, 0.25)),
+        of(materials::principled(half, 0.2, 0.25)),
     ];
     let used = |value: [f32; 3]| {
         let [r, g, b] = value.map(f16::from_f32);
@@ -640,7 +632,7 @@ fn textures_of_one_value_are_factors() {
     let mut textured = vec![
         of(MaterialKind::Diffuse { reflectance: full }),
         of(metal(0.8, full)),
-        of(paint(full, 0.8, 0.5)),
+        of(materials::principled(full, 0.8, 0.5)),
     ];
     for material in &mut textured {
         material.surface.color = used([0.5, 0.25, 1.0]);

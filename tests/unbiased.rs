@@ -112,15 +112,7 @@ fn measured() -> Material {
 
 /// Makes a half metallic surface of medium gloss.
 fn principled() -> Material {
-    let kind = MaterialKind::Principled {
-        base_color: Vec3::new(0.8, 0.4, 0.2),
-        metallic: 0.4,
-        roughness: 0.5,
-        ior: 1.5,
-        specular: 1.0,
-        specular_color: Vec3::ONE,
-    };
-    Material::new("principled", kind)
+    Material::new("principled", materials::principled(Vec3::new(0.8, 0.4, 0.2), 0.4, 0.5))
 }
 
 #[test]

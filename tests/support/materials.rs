@@ -33,7 +33,7 @@ fn plastic(diffuse: Vec3, alpha: f32, ior: f32) -> MaterialKind {
 }
 
 /// Makes a principled material of index 1.5 without a tint of the specular part.
-fn principled(base_color: Vec3, metallic: f32, roughness: f32) -> MaterialKind {
+pub fn principled(base_color: Vec3, metallic: f32, roughness: f32) -> MaterialKind {
     MaterialKind::Principled {
         base_color,
         metallic,

@@ -10,6 +10,8 @@ use fenestra::scene::{
 };
 use glam::Vec3;
 
+use super::materials;
+
 /// Makes a diffuse material.
 pub fn diffuse(reflectance: Vec3) -> Material {
     Material::new("diffuse", MaterialKind::Diffuse { reflectance })
@@ -258,14 +260,7 @@ pub fn glazed_room() -> Scene {
         reflectance: Vec3::ONE,
         transmittance: Vec3::new(0.8, 0.9, 0.85),
     };
-    let paint = MaterialKind::Principled {
-        base_color: Vec3::new(0.7, 0.4, 0.3),
-        metallic: 0.3,
-        roughness: 0.5,
-        ior: 1.5,
-        specular: 1.0,
-        specular_color: Vec3::ONE,
-    };
+    let paint = materials::principled(Vec3::new(0.7, 0.4, 0.3), 0.3, 0.5);
     let mut glowing = Material::new("paint", paint);
     let radiance = Vec3::new(6.0, 4.0, 2.0);
     glowing.surface.emission = Some(Emission { radiance, texture: None, two_sided: false });
