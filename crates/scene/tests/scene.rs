@@ -10,8 +10,10 @@ use std::{
 use fenestra_scene::{
     Error, Scene,
     lamp::{LampKind, SpotFalloff},
+    load::{LoadOptions, arrays::Arrays},
     material::{ConductorFresnel, MaterialKind},
     mesh::Mesh,
+    picture::{Image, RgbImage},
     texture::{Channels, Encoding, Interpolation, Wrap},
 };
 use glam::Vec3;
@@ -73,6 +75,45 @@ fn with_box(extra: &str) -> String {
 
 fn read(folder: &Folder, name: &str, bytes: impl AsRef<[u8]>) -> Mesh {
     Mesh::read(&folder.write(name, bytes), &mut Vec::new()).unwrap()
+}
+
+// Arrays
+
+#[test]
+fn arrays_stand_for_files() {
+    let quad = Mesh {
+        positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
+        uvs: [vec![[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]], Vec::new()],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    };
+    let pixels: Vec<[f32; 3]> = (0..8_u8).map(|index| [f32::from(index) * 0.125; 3]).collect();
+    let image = RgbImage { width: 4, height: 2, pixels };
+    let text = format!(
+        "{HEAD}[[material]]\nname = \"print\"\ntype = \"diffuse\"\nreflectance = {{ texture = \"a.exr\" }}\n\
+         [[object]]\nmesh = \"a.obj\"\nmaterial = \"print\"\n"
+    )
+    .replace("constant = [1, 1, 1]", "map = \"a.exr\"");
+    let folder = Folder::new();
+    let obj =
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+    folder.write("a.obj", obj);
+    Image::of_rgb(4, 2, &image.pixels).write_exr(&folder.0.path().join("a.exr")).unwrap();
+    let files = folder.load(&text).unwrap();
+
+    let (mesh, name) = (PathBuf::from("a.obj"), PathBuf::from("a.exr"));
+    let images = [(name, image)].into();
+    let arrays = Arrays { meshes: [(mesh.clone(), quad.clone())].into(), images };
+    let parse = |arrays: &Arrays| {
+        let path = Path::new("nowhere/room");
+        Scene::parse_with(path, &text, &LoadOptions::default(), arrays)
+    };
+    let scene = parse(&arrays).unwrap();
+    assert_eq!(scene.hash, files.hash);
+    assert_eq!(scene.inputs, [Path::new("nowhere/room")]);
+    let meshes = [(mesh, Mesh { uvs: [vec![[0.0; 2]], Vec::new()], ..quad })].into();
+    let message = parse(&Arrays { meshes, ..arrays }).unwrap_err().to_string();
+    assert!(message.ends_with("uvs: expected one for each of 4 positions, found 1"), "{message}");
 }
 
 // Scene files

@@ -10,6 +10,7 @@ use super::{EnvironmentMap, MAX_RADIANCE};
 use crate::{
     error::{Error, Result},
     files, memory,
+    picture::RgbImage,
     texture::exr,
 };
 
@@ -46,18 +47,43 @@ impl EnvironmentMap {
         warnings: &mut Vec<String>,
     ) -> Result<Self> {
         check_placement(scale, rotation_deg).map_err(|message| Error::format(path, message))?;
-        let mut map = Self::read(path, scale, warnings)?;
-        if map.width != 2 * map.height {
+        Ok(Self::read(path, scale, warnings)?.placed(rotation_deg, warnings))
+    }
+
+    /// As [`EnvironmentMap::load`], from an image in memory; `name` serves messages.
+    ///
+    /// # Errors
+    /// A message for an absurd size, or pixels that do not fill it.
+    pub fn of_image(
+        name: &str,
+        image: &RgbImage,
+        scale: f32,
+        rotation_deg: f32,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self, String> {
+        check_placement(scale, rotation_deg)?;
+        let RgbImage { width, height, ref pixels } = *image;
+        check_size(width.into(), height.into())?;
+        if pixels.len() != width as usize * height as usize {
+            return Err(format!("{width}×{height} texels, found {} pixels", pixels.len()));
+        }
+        let texels = pixels.iter().map(|pixel| Vec3::from(*pixel)).collect();
+        let mut map = Self { width, height, texels, rotation_rad: 0.0, source: name.to_owned() };
+        map.clean(scale, warnings);
+        Ok(map.placed(rotation_deg, warnings))
+    }
+
+    /// Turns a lat-long map, and warns of a ratio other than 2:1.
+    fn placed(mut self, rotation_deg: f32, warnings: &mut Vec<String>) -> Self {
+        if self.width != 2 * self.height {
             warnings.push(format!(
                 "{}: {}×{} texels; a lat-long map is expected to be twice as wide as high and is \
                  stretched to the whole sphere",
-                path.display(),
-                map.width,
-                map.height
+                self.source, self.width, self.height
             ));
         }
-        map.rotation_rad = rotation_deg.rem_euclid(360.0).to_radians();
-        Ok(map)
+        self.rotation_rad = rotation_deg.rem_euclid(360.0).to_radians();
+        self
     }
 
     /// As [`EnvironmentMap::load`] without a rotation, for an image of any ratio and mapping.

@@ -36,7 +36,9 @@ impl Loader<'_> {
             EnvironmentMap::load(map, 1.0, options.rotation_deg.unwrap_or(0.0), warnings)?
         } else if let Some(entry) = &file.environment {
             let mut entry = entry.clone();
-            inputs.extend(entry.map.iter().map(|map| self.folder.join(map)));
+            let is_file = |map: &&PathBuf| !self.arrays.images.contains_key(*map);
+            let files = entry.map.iter().filter(is_file);
+            inputs.extend(files.map(|map| self.folder.join(map)));
             entry.rotation_deg = options.rotation_deg.unwrap_or(entry.rotation_deg);
             self.environment(&entry, warnings)?
         } else {
@@ -54,9 +56,14 @@ impl Loader<'_> {
         self.check_range("environment.scale", &[scale], (0.0, f32::MAX))?;
         self.check_range("environment.rotation_deg", &[rotation_deg], (f32::MIN, f32::MAX))?;
         match (&entry.map, &entry.constant, &entry.court, &entry.sky) {
-            (Some(map), None, None, None) => {
-                EnvironmentMap::load(&self.folder.join(map), scale, rotation_deg, warnings)
-            }
+            (Some(map), None, None, None) => match self.arrays.images.get(map) {
+                Some(image) => {
+                    let name = map.display().to_string();
+                    EnvironmentMap::of_image(&name, image, scale, rotation_deg, warnings)
+                        .map_err(|message| self.error(format!("environment.map: {message}")))
+                }
+                None => EnvironmentMap::load(&self.folder.join(map), scale, rotation_deg, warnings),
+            },
             (None, Some(constant), None, None) => {
                 self.check_range("environment.constant", constant, (0.0, f32::MAX))?;
                 EnvironmentMap::constant(Vec3::from_array(*constant), scale)

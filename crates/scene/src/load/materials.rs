@@ -1,7 +1,7 @@
 //! `[[material]]` → validated materials with their textures.
 
 use std::{
-    collections::{BTreeMap, HashMap},
+    collections::{BTreeMap, BTreeSet, HashMap},
     path::PathBuf,
     sync::Arc,
 };
@@ -17,7 +17,7 @@ use crate::{
     },
     material::{ConductorFresnel, Emission, Material, MaterialKind, Opacity, Surface},
     measured::MeasuredTable,
-    texture::{Channels, Encoding, TextureCache, TextureUse},
+    texture::{Channels, Encoding, Texture, TextureCache, TextureUse},
     transform::sine_cosine_deg,
 };
 
@@ -40,8 +40,18 @@ impl Loader<'_> {
         warnings: &mut Vec<String>,
     ) -> Result<Vec<Material>> {
         let mut loaded = Loaded::default();
-        let textures = entries.iter().flat_map(MaterialEntry::textures);
-        let paths = textures.map(|entry| self.folder.join(&entry.texture));
+        let mut paths = Vec::new();
+        for name in entries.iter().flat_map(MaterialEntry::textures).map(|entry| &entry.texture) {
+            let path = self.folder.join(name);
+            if let Some(image) = self.arrays.images.get(name) {
+                let label = path.display().to_string();
+                let texture = Texture::of_image(&label, image, &mut loaded.warnings)
+                    .map_err(|message| self.error(format!("{}: {message}", name.display())))?;
+                loaded.textures.insert(&path, texture);
+            } else {
+                paths.push(path);
+            }
+        }
         loaded.textures.load_all(paths, &mut loaded.warnings)?;
         let mut lines = HashMap::new();
         let mut materials = Vec::with_capacity(entries.len());
@@ -56,7 +66,9 @@ impl Loader<'_> {
             let kind = self.material_kind(&label, &entry.kind, &mut surface, &mut loaded)?;
             materials.push(Material { name: name.clone(), kind, surface });
         }
-        inputs.extend(loaded.textures.files());
+        let of_arrays: BTreeSet<_> =
+            self.arrays.images.keys().map(|name| self.folder.join(name)).collect();
+        inputs.extend(loaded.textures.files().difference(&of_arrays).cloned());
         inputs.extend(loaded.tables.keys().cloned());
         warnings.append(&mut loaded.warnings);
         for (path, table) in &loaded.tables {

@@ -2,6 +2,7 @@
 //!
 //! Messages name the object or material and the line of its entry.
 
+pub mod arrays;
 mod import;
 mod include;
 mod inside;
@@ -24,6 +25,7 @@ use crate::{
     files,
     material::{Material, MaterialKind},
 };
+use arrays::{Arrays, NONE};
 use light::Light;
 
 pub use super::{MAX_FILM_SIDE, MIN_ALPHA};
@@ -80,7 +82,7 @@ impl Scene {
                 format!("expected a scene in {SCENE_EXTENSIONS}, found .{extension}"),
             ));
         }
-        Self::parse_with(path, &files::read_text(path)?, options)
+        Self::parse_with(path, &files::read_text(path)?, options, &NONE)
     }
 
     /// Builds a scene from its text; `path` serves messages, its folder is that of relative paths.
@@ -88,12 +90,23 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`].
     pub fn parse(path: &Path, text: &str) -> Result<Self> {
-        Self::parse_with(path, text, &LoadOptions::default())
+        Self::parse_with(path, text, &LoadOptions::default(), &NONE)
     }
 
-    fn parse_with(path: &Path, text: &str, options: &LoadOptions) -> Result<Self> {
+    /// As [`Scene::parse`], with options of the command line, and arrays in place of files that the text
+    /// would name.
+    ///
+    /// # Errors
+    /// As [`Scene::load_with`], and for arrays that do not fit each other.
+    pub fn parse_with(
+        path: &Path,
+        text: &str,
+        options: &LoadOptions,
+        arrays: &Arrays,
+    ) -> Result<Self> {
         let file = SceneFile::parse(path, text)?;
-        let loader = Loader::new(path).allowing(options.allow_root.as_deref());
+        let allowed = options.allow_root.as_deref();
+        let loader = Loader { arrays, ..Loader::new(path).allowing(allowed) };
         if let Some(name) = &options.camera {
             let message = "a scene in .toml has one camera; the option is for glTF files";
             return Err(loader.error(format!("--camera {name}: {message}")));
@@ -158,11 +171,13 @@ struct Loader<'a> {
     folder: &'a Path,
     /// Folder whose files a scene may name beside its own.
     allowed: Option<&'a Path>,
+    /// Parts of the scene that are in no file.
+    arrays: &'a Arrays,
 }
 
 impl<'a> Loader<'a> {
     fn new(path: &'a Path) -> Self {
-        Self { path, folder: path.parent().unwrap_or(Path::new("")), allowed: None }
+        Self { path, folder: path.parent().unwrap_or(Path::new("")), allowed: None, arrays: &NONE }
     }
 
     fn allowing(self, allowed: Option<&'a Path>) -> Self {

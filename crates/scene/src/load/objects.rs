@@ -75,6 +75,18 @@ impl Loader<'_> {
             let key = self.mesh_key(object);
             if !meshes.contains_key(&key) {
                 let mesh = match &object.source {
+                    ObjectSource::Mesh(name) if self.arrays.meshes.contains_key(name) => {
+                        let label = object_label(index, object);
+                        let mut mesh = self.arrays.meshes[name].clone();
+                        mesh.check()
+                            .map_err(|message| self.error(format!("{label}: {message}")))?;
+                        if !mesh.colors.is_empty() && !colored.contains(&key) {
+                            let remedy = "the material has no `vertex_color = true`";
+                            warnings.push(format!("{label}: ignored the vertex colours: {remedy}"));
+                            mesh.colors.clear();
+                        }
+                        mesh
+                    }
                     ObjectSource::Mesh(_) => {
                         let mut mesh = Mesh::read(&key, warnings)?;
                         inputs.push(key.clone());

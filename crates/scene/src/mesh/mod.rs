@@ -143,6 +143,33 @@ impl Mesh {
         }
     }
 
+    /// Checks the lengths of the arrays of vertices, and that every corner is one of them: files are checked
+    /// as they are read, arrays from elsewhere by this.
+    ///
+    /// # Errors
+    /// A message that names the array.
+    pub fn check(&self) -> Result<(), String> {
+        let vertices = self.positions.len();
+        let lengths = [
+            ("normals", self.normals.len()),
+            ("uvs", self.uvs[0].len()),
+            ("second uvs", self.uvs[1].len()),
+            ("tangents", self.tangents.len()),
+            ("colors", self.colors.len()),
+        ];
+        if let Some((name, length)) = lengths.iter().find(|(_, n)| *n != 0 && *n != vertices) {
+            return Err(format!(
+                "{name}: expected one for each of {vertices} positions, found {length}"
+            ));
+        }
+        match self.triangles.as_flattened().iter().find(|corner| **corner as usize >= vertices) {
+            Some(corner) => {
+                Err(format!("triangles: expected corners below {vertices}, found {corner}"))
+            }
+            None => Ok(()),
+        }
+    }
+
     /// Adds the triangles of a polygon, in the plane of its Newell normal.
     fn push_polygon(&mut self, corners: &[u32]) {
         let positions: Vec<_> =

@@ -65,7 +65,12 @@ impl TextureCache {
         Ok(texture)
     }
 
-    /// Files of the textures, for the inputs of a scene.
+    /// Adds a texture that is in no file, under the path of one.
+    pub(crate) fn insert(&mut self, path: &Path, texture: Texture) {
+        self.textures.insert(key(path), Arc::new(texture));
+    }
+
+    /// Paths of the textures, for the inputs of a scene.
     pub fn files(&self) -> BTreeSet<PathBuf> {
         self.textures.values().map(|texture| PathBuf::from(&texture.name)).collect()
     }

@@ -16,6 +16,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     files,
+    picture::RgbImage,
 };
 
 /// Most bytes that a decoder may allocate: the largest image in floats of 32 bits.
@@ -44,6 +45,24 @@ impl Texture {
     /// A message for bytes that are no image, or a damaged or too large one.
     pub fn decode(name: &str, bytes: &[u8], warnings: &mut Vec<String>) -> Result<Self, String> {
         decode(name, bytes, None, warnings)
+    }
+
+    /// Takes linear values from memory; repairs and warns as [`Texture::load`] does.
+    ///
+    /// # Errors
+    /// A message for more than [`MAX_TEXTURE_SIDE`] texels a side, or pixels that do not fill the image.
+    pub fn of_image(
+        name: &str,
+        image: &RgbImage,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self, String> {
+        let RgbImage { width, height, ref pixels } = *image;
+        let bytes = size_of_val(pixels.as_slice());
+        check_size([width, height].map(u64::from), 12, bytes, 1)?;
+        let mut repairs = Repairs::default();
+        let texels = pixels.iter().map(|[r, g, b]| repairs.texel([*r, *g, *b, 1.0])).collect();
+        repairs.warn(name, warnings);
+        Ok(Self { name: name.to_owned(), width, height, texels: Texels::Halves(texels) })
     }
 }
 
