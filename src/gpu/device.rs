@@ -1,6 +1,9 @@
 //! The logical device.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::{
+    ffi::CStr,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
 
 use ash::{ext, khr, vk};
 use gpu_allocator::{
@@ -122,8 +125,14 @@ impl Device {
             vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true);
         let mut extensions = Vec::new();
         if display.is_some() {
-            check_presents(&instance, physical, &capabilities)?;
+            if !has_extension(&instance, physical, khr::swapchain::NAME)? {
+                return Err(cannot_present(&capabilities));
+            }
             extensions.push(khr::swapchain::NAME.as_ptr());
+        }
+        // A device that lacks a part of Vulkan wants this said.
+        if has_extension(&instance, physical, khr::portability_subset::NAME)? {
+            extensions.push(khr::portability_subset::NAME.as_ptr());
         }
         let info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
@@ -315,19 +324,12 @@ pub(crate) fn tracer_name(embree: Option<&Arc<Embree>>) -> String {
     embree.map_or_else(|| "device".to_owned(), |embree| format!("Embree {}", embree.version()))
 }
 
-/// Checks that a device can show pictures at all.
-fn check_presents(
-    instance: &Instance,
-    physical: vk::PhysicalDevice,
-    capabilities: &Capabilities,
-) -> Result<()> {
+/// Tests whether a device has an extension.
+fn has_extension(instance: &Instance, physical: vk::PhysicalDevice, name: &CStr) -> Result<bool> {
     // SAFETY: `physical` belongs to this instance.
     let extensions = unsafe { instance.raw().enumerate_device_extension_properties(physical) }
         .called("vkEnumerateDeviceExtensionProperties")?;
-    let is_swapchain = |extension: &vk::ExtensionProperties| {
-        extension.extension_name_as_c_str() == Ok(khr::swapchain::NAME)
-    };
-    if extensions.iter().any(is_swapchain) { Ok(()) } else { Err(cannot_present(capabilities)) }
+    Ok(extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name)))
 }
 
 /// Returns the error for a device that cannot show pictures in a window.

@@ -5,7 +5,7 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 use winit::raw_window_handle::RawDisplayHandle;
 
 use super::{Called, vulkan_error};
@@ -96,6 +96,12 @@ impl Instance {
         if has_debug_utils {
             extension_names.push(ext::debug_utils::NAME.as_ptr());
         }
+        // Drivers that lack a part of Vulkan, as MoltenVK does, are listed for those who ask.
+        let mut flags = vk::InstanceCreateFlags::empty();
+        if has(khr::portability_enumeration::NAME) {
+            extension_names.push(khr::portability_enumeration::NAME.as_ptr());
+            flags |= vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
+        }
         if validate {
             extension_names.push(ext::validation_features::NAME.as_ptr());
         }
@@ -113,6 +119,7 @@ impl Instance {
         let mut features =
             vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
         let mut info = vk::InstanceCreateInfo::default()
+            .flags(flags)
             .application_info(&application)
             .enabled_extension_names(&extension_names)
             .enabled_layer_names(&layers);
