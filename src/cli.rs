@@ -1,6 +1,6 @@
 //! The command line: clap types, dispatch to the commands, exit status.
 
-use std::{env, ffi::OsString, io::Write, process::ExitCode};
+use std::{ffi::OsString, io::Write};
 
 use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 
@@ -9,7 +9,7 @@ use crate::{
         self,
         options::{MACHINE, OUTPUT},
     },
-    error::Error,
+    error::{Error, Result},
     memory,
     sampler::Parameters,
     terminal::{message, say},
@@ -75,20 +75,20 @@ fn asks_for_parameters(arguments: &[OsString]) -> bool {
         || arguments.windows(2).any(|pair| pair[0] == "--set" && pair[1] == "help")
 }
 
-/// Parses the arguments, runs the command and prints the error chain of a failure.
-pub fn run() -> ExitCode {
-    let arguments: Vec<OsString> = env::args_os().collect();
+/// Parses the arguments, of which the first is the program's name, runs the command and prints the error
+/// chain of a failure. Returns the exit status.
+pub fn run(arguments: Vec<OsString>) -> u8 {
     if asks_for_parameters(&arguments) {
         // A closed output pipe is not an error.
         let _ = write!(std::io::stdout(), "{}", Parameters::help());
-        return ExitCode::SUCCESS;
+        return 0;
     }
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => {
             // A closed output pipe is not an error.
             let _ = error.print();
-            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+            return u8::try_from(error.exit_code()).unwrap_or(2);
         }
     };
     let level = ["warn", "info", "debug"][usize::from(cli.verbose.min(2))];
@@ -120,21 +120,35 @@ pub fn run() -> ExitCode {
         Command::SelfTest(arguments) => command::self_test::run(arguments),
     });
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(error) => {
-            report(&error);
-            ExitCode::from(error.exit_status())
+            let lines = explain(&error);
+            say!("error: {}", lines[0]);
+            lines[1..].iter().for_each(|line| say!("{line}"));
+            error.exit_status()
         }
     }
 }
 
-/// Prints an error, its causes and, if known, the remedy.
-fn report(error: &Error) {
-    say!("error: {error}");
+/// Parses a command of which the first argument is the program's name, for a program in its place.
+///
+/// # Errors
+/// [`Error::Usage`] with the first paragraph of the message.
+pub fn parse(arguments: &[String]) -> Result<Command> {
+    Cli::try_parse_from(arguments).map(|cli| cli.command).map_err(|error| {
+        let text = error.to_string();
+        let message = text.split("\n\n").next().unwrap_or_default();
+        Error::usage(message.trim_start_matches("error: "))
+    })
+}
+
+/// Lines on an error, its causes and, if known, the remedy; never empty.
+pub fn explain(error: &Error) -> Vec<String> {
+    let mut lines = vec![error.to_string()];
     let mut source = std::error::Error::source(error);
     // `Io` already prints its source in its own line.
     while let Some(cause) = source.filter(|_| !matches!(error, Error::Io { .. })) {
-        say!("  caused by: {cause}");
+        lines.push(format!("  caused by: {cause}"));
         source = cause.source();
     }
     let help = match error {
@@ -142,7 +156,6 @@ fn report(error: &Error) {
         Error::Memory { help, .. } | Error::Denoiser { help, .. } => *help,
         _ => None,
     };
-    if let Some(help) = help {
-        say!("help: {help}");
-    }
+    lines.extend(help.map(|help| format!("help: {help}")));
+    lines
 }

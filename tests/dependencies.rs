@@ -77,9 +77,9 @@ fn dependencies_come_from_the_registry_with_a_checksum() {
     let lock = read("Cargo.lock");
     let packages = lock["package"].as_array().unwrap();
     assert!(packages.len() > 50, "{}", packages.len());
-    let is_own = |package: &toml::Value| {
-        package["name"].as_str().is_some_and(|name| name == "fenestra" || name == "fenestra-scene")
-    };
+    let own = ["fenestra", "fenestra-scene", "fenestra-python"];
+    let is_own =
+        |package: &toml::Value| package["name"].as_str().is_some_and(|name| own.contains(&name));
     for package in packages.iter().filter(|package| !is_own(package)) {
         assert_eq!(
             package.get("source").and_then(toml::Value::as_str),

@@ -47,8 +47,8 @@ struct Circles<'a> {
 }
 
 /// Sources of each crate, by their path from its folder.
-fn crates() -> [Files; 2] {
-    ["", "crates/scene/"].map(|folder| {
+fn crates() -> [Files; 3] {
+    ["", "crates/scene/", "crates/python/"].map(|folder| {
         let files = files_of(&format!("{folder}src")).into_iter();
         files.map(|(name, text)| (name[folder.len()..].to_owned(), text)).collect()
     })

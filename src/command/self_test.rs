@@ -5,6 +5,7 @@ use std::{
     io::{Read, Write},
     path::PathBuf,
     process::{Command, ExitStatus, Stdio},
+    sync::OnceLock,
     thread,
     time::{Duration, Instant},
 };
@@ -122,11 +123,23 @@ fn record(capabilities: &Capabilities) -> Option<PathBuf> {
     Some(files::cache_folder("self-tests")?.join(name))
 }
 
-/// Runs this program's test of a device.
+/// Names the program that runs the test, and its first arguments: this one, if nobody does.
+pub fn set_program(program: Vec<String>) {
+    PROGRAM.set(program).ok();
+}
+
+static PROGRAM: OnceLock<Vec<String>> = OnceLock::new();
+
+/// Runs the program's test of a device.
 fn test(index: usize, longest: Duration) -> Verdict {
-    let mut command = match env::current_exe() {
-        Ok(program) => Command::new(program),
-        Err(error) => return Verdict::NotRun(error.to_string()),
+    let mut command = match (PROGRAM.get().map(Vec::as_slice), env::current_exe()) {
+        (Some([program, arguments @ ..]), _) => {
+            let mut command = Command::new(program);
+            command.args(arguments);
+            command
+        }
+        (_, Ok(program)) => Command::new(program),
+        (_, Err(error)) => return Verdict::NotRun(error.to_string()),
     };
     command.args([NAME, "--device", &index.to_string()]);
     verdict(&mut command, longest)

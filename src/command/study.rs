@@ -155,6 +155,28 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let interrupt = Interrupt::listen();
     interrupt.wait_for_caller();
+    let progress = Progress::new("study", arguments.quiet);
+    run_with(arguments, Display { progress, interrupt: &interrupt }, |display, end| {
+        let reason = match end {
+            None => "finished",
+            Some(Error::Interrupted) => "interrupted; the same command continues it",
+            Some(_) => "failed; the same command continues it",
+        };
+        let fraction = if end.is_none() { 1.0 } else { 0.0 };
+        display.progress.finish(&Standing { fraction, ..Standing::default() }, reason);
+    })
+}
+
+/// As [`run`], for another observer than the terminal. `ended` hears once all runs are done or one has
+/// failed, before the report is written.
+///
+/// # Errors
+/// As [`run`]; [`Error::Interrupted`] if the observer interrupts.
+pub fn run_with<O: Observer>(
+    arguments: &Arguments,
+    mut observer: O,
+    ended: impl FnOnce(O, Option<&Error>),
+) -> Result<()> {
     let plan = plan(arguments)?;
     if let Some(warning) = plan.missing_verdicts() {
         log::warn!("{warning}");
@@ -169,16 +191,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if !arguments.quiet {
         self_test::announce(&device);
     }
-    let mut display =
-        Display { progress: Progress::new("study", arguments.quiet), interrupt: &interrupt };
-    let (results, end) = engine::run(&plan, &folder, &device, &mut display, arguments.redo)?;
-    let reason = match &end {
-        None => "finished",
-        Some(Error::Interrupted) => "interrupted; the same command continues it",
-        Some(_) => "failed; the same command continues it",
-    };
-    let fraction = if end.is_none() { 1.0 } else { 0.0 };
-    display.progress.finish(&Standing { fraction, ..Standing::default() }, reason);
+    let (results, end) = engine::run(&plan, &folder, &device, &mut observer, arguments.redo)?;
+    ended(observer, end.as_ref());
 
     let finished = results.runs.len() + results.rounds.len();
     let report = Report::new(&plan, results, end.is_none(), Circumstances::new(&device));

@@ -6,10 +6,11 @@ mod preview;
 
 use std::{
     path::{Path, PathBuf},
+    sync::Arc,
     time::{Duration, Instant},
 };
 
-pub(crate) use arguments::Arguments;
+pub use arguments::Arguments;
 use preview::Preview;
 
 use super::{
@@ -20,11 +21,11 @@ use super::{
 use crate::{
     error::{Error, Result},
     files::sweep_leftovers,
-    film::{Aov, checkpoint::checkpoint_path, display::DisplayServer},
-    gpu::Denoiser,
+    film::{Aov, Image, checkpoint::checkpoint_path, display::DisplayServer},
+    gpu::{Denoiser, Device},
     pass::Explanation,
     scene::Scene,
-    session::{Event, Flag, Limit, Observer, Quality, Rules, Session, StopReason, pixel},
+    session::{Event, Flag, Limit, Observer, Quality, Rules, Session, Settings, StopReason, pixel},
     terminal::say,
 };
 
@@ -47,7 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
     let patience =
         Patience::new(&format!("loading {}", arguments.scene.display()), arguments.quiet);
-    let mut scene = arguments.scene_options.load(&arguments.scene)?;
+    let mut scene = load(arguments)?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
     arguments.resize(&mut scene.film);
     if let Some(line) = arguments.take_asked(&scene, &mut settings).filter(|_| !arguments.quiet) {
@@ -67,18 +68,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
 
     interrupt.wait_for_caller();
-    let device = arguments.device.open(arguments.validate)?;
-    if !arguments.quiet {
-        self_test::announce(&device);
-    }
-    if let Some(warning) = settings.sampler.portal_warning(&scene) {
-        log::warn!("{warning}");
-    }
     let aovs = settings.aovs.clone();
-    let mut session = Session::new(&device, &scene, settings)?;
-    if let Some(path) = &arguments.load_guide {
-        session.renderer.load_guide(path)?;
-    }
+    let (device, mut session) = open(arguments, &scene, settings)?;
     if arguments.resume {
         let path = checkpoint_path(&output);
         match path.exists() {
@@ -103,6 +94,60 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         device.check_validation()?;
     }
     if reason == StopReason::Interrupt { Err(Error::Interrupted) } else { Ok(()) }
+}
+
+/// Opens the device and prepares to render on it.
+fn open(
+    arguments: &Arguments,
+    scene: &Scene,
+    settings: Settings,
+) -> Result<(Arc<Device>, Session)> {
+    let device = arguments.device.open(arguments.validate)?;
+    if !arguments.quiet {
+        self_test::announce(&device);
+    }
+    if let Some(warning) = settings.sampler.portal_warning(scene) {
+        log::warn!("{warning}");
+    }
+    let mut session = Session::new(&device, scene, settings)?;
+    if let Some(path) = &arguments.load_guide {
+        session.renderer.load_guide(path)?;
+    }
+    Ok((device, session))
+}
+
+/// Loads the scene that the arguments name.
+///
+/// # Errors
+/// As [`Scene::load_with`]; any warning under `--strict`.
+pub fn load(arguments: &Arguments) -> Result<Scene> {
+    arguments.scene_options.load(&arguments.scene)
+}
+
+/// Renders `scene` by the sampler, film, layers and stop rules of the arguments, which otherwise are those
+/// of a picture to show, to an image in memory. No file is written.
+///
+/// # Errors
+/// As [`run`]; [`Error::Interrupted`] only before any pixel has a sample.
+pub fn film(
+    arguments: &Arguments,
+    scene: &mut Scene,
+    observer: &mut dyn Observer,
+) -> Result<(Image, StopReason)> {
+    let mut settings = arguments.settings(false)?;
+    arguments.resize(&mut scene.film);
+    if let Some(line) = arguments.take_asked(scene, &mut settings) {
+        observer.notice(&Event::Note(&line));
+    }
+    let aovs = settings.aovs.clone();
+    let (device, mut session) = open(arguments, scene, settings)?;
+    let reason = session.run(&arguments.rules(scene.asked), observer)?;
+    device.save_pipeline_cache();
+    let image = session.image(&aovs)?;
+    if arguments.validate {
+        device.check_validation()?;
+    }
+    Ok((image, reason))
 }
 
 /// One render, from its first pass to its files.

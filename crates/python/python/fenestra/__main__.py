@@ -1,0 +1,7 @@
+"""``python -m fenestra`` is the program ``fenestra``."""
+
+import sys
+
+from . import main
+
+sys.exit(main())
