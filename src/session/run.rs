@@ -12,7 +12,6 @@ use std::{
 use super::{Flag, Renderer, Rules, Settings, Standing, StopReason, rate::Rate};
 use crate::{
     error::{Error, Result},
-    files::parent_of,
     film::{
         Aov, Checkpoint, Image, Metadata, SampleRange, Sums, checkpoint::remove_checkpoint,
         metadata::seconds_of,
@@ -372,7 +371,7 @@ impl Session {
 /// Bytes that are free on the disk of a file, where the system tells.
 #[cfg(unix)]
 fn free_bytes(path: &Path) -> Option<f64> {
-    let disk = nix::sys::statvfs::statvfs(parent_of(path)).ok()?;
+    let disk = nix::sys::statvfs::statvfs(crate::files::parent_of(path)).ok()?;
     Some(disk.blocks_available() as f64 * disk.fragment_size() as f64)
 }
 
