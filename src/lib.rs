@@ -101,6 +101,8 @@
 //!   Graphics Forum 42(8).
 //! - \[Eto & Tokuyoshi 2023\] "Bounded VNDF Sampling for Smith–GGX Reflections", SIGGRAPH Asia
 //!   Technical Communications.
+//! - \[Fritsch & Butland 1984\] "A Method for Constructing Local Monotone Piecewise Cubic
+//!   Interpolants", SIAM Journal on Scientific and Statistical Computing 5(2).
 //! - \[Gibson 1998\] "Constrained Elastic Surface Nets", MICCAI.
 //! - \[Heitz 2014\] "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", JCGT
 //!   3(2).

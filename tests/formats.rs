@@ -54,7 +54,7 @@ fn everything_that_a_gltf_file_loses_is_named_once() {
     let scene = load("room.gltf", &text);
     let found = warnings(&scene);
     let expected = [
-        "ignored animations (animation `swing`): nodes stand as the file places them",
+        "ignored animations (animation `swing`): played by `--frames`; else nodes stand as the file places them",
         "ignored skins (node 0): the mesh is placed by its node",
         "ignored further sets of vertex colours (mesh `sail`)",
         "ignored third and further sets of texture coordinates (mesh `sail`)",

@@ -239,6 +239,7 @@ fn the_page_has_every_key_of_every_table() {
         write!(text, "### {heading}\n\n{}\n", table(&all, name)).unwrap();
     };
     section("`[camera]`", "CameraEntry");
+    section("`[[camera.keyframe]]`; what it leaves out is that of `[camera]`", "KeyframeEntry");
     section("`[film]`", "FilmSettings");
     section(
         "`[environment]`: exactly one of `map`, `constant`, `court` and `sky`",

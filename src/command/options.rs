@@ -53,7 +53,7 @@ impl DeviceOptions {
 }
 
 /// Options of what a scene file may leave open.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct SceneOptions {
     /// Environment map that lights the scene, instead of its own.
     #[arg(long, value_name = "MAP", help_heading = SCENE)]
@@ -90,6 +90,16 @@ impl SceneOptions {
     /// # Errors
     /// As [`Scene::load_with`]; [`Error::Scene`] for any warning under `--strict`.
     pub(crate) fn load(&self, path: &Path) -> Result<Scene> {
+        let scene = self.load_at(path, None)?;
+        scene.warnings.iter().for_each(|warning| log::warn!("{warning}"));
+        Ok(scene)
+    }
+
+    /// Loads a scene at a time of its animation, seconds, and leaves its warnings to the caller.
+    ///
+    /// # Errors
+    /// As [`SceneOptions::load`].
+    pub(crate) fn load_at(&self, path: &Path, time: Option<f64>) -> Result<Scene> {
         let scene = Scene::load_with(
             path,
             &LoadOptions {
@@ -100,10 +110,10 @@ impl SceneOptions {
                 look_at: self.look_at,
                 vertical_fov_deg: self.fov,
                 allow_root: self.allow_root.clone(),
+                time: time.map(|seconds| seconds as f32),
             },
         )?;
         check_strict(self.strict, &scene)?;
-        scene.warnings.iter().for_each(|warning| log::warn!("{warning}"));
         Ok(scene)
     }
 }

@@ -33,7 +33,8 @@ features! {
     GLTF_COLORS "further sets of vertex colours" "";
     GLTF_UV "third and further sets of texture coordinates" "";
     GLTF_SKIN "skins" "the mesh is placed by its node";
-    GLTF_ANIMATION "animations" "nodes stand as the file places them";
+    GLTF_ANIMATION "animations" "played by `--frames`; else nodes stand as the file places them";
+    GLTF_MORPH_ANIMATION "animated weights of morph targets" "those of the file count";
     GLTF_POINTS "points and lines" "";
     GLTF_SCENES "further scenes" "the default scene is rendered, else the first";
     GLTF_LIGHT_RANGE "range of lights" "light falls off with the squared distance alone";

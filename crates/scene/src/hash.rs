@@ -22,43 +22,16 @@ pub(crate) fn hash(scene: &Scene) -> String {
     let camera = &scene.camera;
     hasher.vectors(&[camera.position, camera.look_at, camera.up]);
     hasher.floats(&[camera.vertical_fov_deg, camera.aperture_radius, camera.focus_distance]);
-    let filter = match scene.film.filter {
-        Filter::Box => 0,
-        Filter::Gaussian => 1,
-    };
-    hasher.integers(&[scene.film.width, scene.film.height, filter]);
-    hasher.environment(scene);
-    hasher.length(scene.materials.len());
-    for material in &scene.materials {
-        hasher.material(&material.kind);
-    }
-    hasher.triangles(&scene.geometry);
-    // These enter only where they are there, tagged, so that scenes without keep their hashes.
-    for (index, material) in scene.materials.iter().enumerate() {
-        if material.surface != Surface::default() {
-            hasher.length(index);
-            hasher.surface(&material.surface);
-        }
-    }
-    hasher.attributes(&scene.geometry);
-    for prototype in &scene.geometry.prototypes {
-        hasher.triangles(prototype);
-        hasher.attributes(prototype);
-    }
-    for instance in &scene.geometry.instances {
-        hasher.instance(instance);
-    }
-    for lamp in &scene.lamps {
-        hasher.lamp(&lamp.kind);
-    }
-    for portal in &scene.portals {
-        hasher.integers(&[PORTAL_TAG]);
-        hasher.vectors(&[portal.corner, portal.axes[0], portal.axes[1]]);
-        hasher.floats(&portal.size);
-    }
+    hasher.still(scene);
     hasher.finish()
 }
 
+/// Hashes all but the camera; lower-case hexadecimal. It is the same as long as the camera alone moves.
+pub fn still_hash(scene: &Scene) -> String {
+    let mut hasher = Hasher(Sha256::new());
+    hasher.still(scene);
+    hasher.finish()
+}
 /// Hashes the environment alone; lower-case hexadecimal.
 pub fn environment_hash(scene: &Scene) -> String {
     let mut hasher = Hasher(Sha256::new());
@@ -87,6 +60,44 @@ const PORTAL_TAG: u32 = 3;
 struct Hasher(Sha256);
 
 impl Hasher {
+    /// All but the camera.
+    fn still(&mut self, scene: &Scene) {
+        let filter = match scene.film.filter {
+            Filter::Box => 0,
+            Filter::Gaussian => 1,
+        };
+        self.integers(&[scene.film.width, scene.film.height, filter]);
+        self.environment(scene);
+        self.length(scene.materials.len());
+        for material in &scene.materials {
+            self.material(&material.kind);
+        }
+        self.triangles(&scene.geometry);
+        // These enter only where they are there, tagged, so that scenes without keep their hashes.
+        for (index, material) in scene.materials.iter().enumerate() {
+            if material.surface != Surface::default() {
+                self.length(index);
+                self.surface(&material.surface);
+            }
+        }
+        self.attributes(&scene.geometry);
+        for prototype in &scene.geometry.prototypes {
+            self.triangles(prototype);
+            self.attributes(prototype);
+        }
+        for instance in &scene.geometry.instances {
+            self.instance(instance);
+        }
+        for lamp in &scene.lamps {
+            self.lamp(&lamp.kind);
+        }
+        for portal in &scene.portals {
+            self.integers(&[PORTAL_TAG]);
+            self.vectors(&[portal.corner, portal.axes[0], portal.axes[1]]);
+            self.floats(&portal.size);
+        }
+    }
+
     fn finish(self) -> String {
         hexadecimal(&self.0.finalize())
     }

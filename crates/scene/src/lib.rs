@@ -44,7 +44,7 @@ pub use camera::Camera;
 pub use environment::EnvironmentMap;
 pub use error::{Error, Result};
 pub use geometry::Geometry;
-pub use hash::{environment_hash, geometry_hash};
+pub use hash::{environment_hash, geometry_hash, still_hash};
 pub use instance::Instance;
 pub use lamp::Lamp;
 pub use material::Material;

@@ -2,6 +2,7 @@
 
 mod support;
 
+mod animation;
 mod brdf_formats;
 mod environment_files;
 mod exr;

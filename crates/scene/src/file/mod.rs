@@ -32,6 +32,8 @@ use crate::error::Result;
 pub(crate) struct SceneFile {
     /// `[camera]`.
     pub camera: CameraEntry,
+    /// Every `[[camera.keyframe]]`, in file order.
+    pub keyframes: Vec<KeyframeEntry>,
     /// `[film]`.
     pub film: FilmSettings,
     /// `[environment]`; black without.
@@ -65,6 +67,26 @@ pub(crate) struct CameraEntry {
     #[serde(default)]
     pub aperture_radius: f32,
     /// Distance to the plane of focus, metres; required with an aperture.
+    pub focus_distance: Option<f32>,
+}
+
+/// One `[[camera.keyframe]]`; what it leaves out is that of `[camera]`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct KeyframeEntry {
+    /// Time at which the camera is here, seconds.
+    pub time: f32,
+    /// Centre of projection, metres.
+    pub position: Option<[f32; 3]>,
+    /// Point at the centre of the image, metres.
+    pub look_at: Option<[f32; 3]>,
+    /// Direction that points up in the image.
+    pub up: Option<[f32; 3]>,
+    /// Angle between the bottom and top edges of the image, degrees.
+    pub vertical_fov_deg: Option<f32>,
+    /// Radius of the thin lens, metres.
+    pub aperture_radius: Option<f32>,
+    /// Distance to the plane of focus, metres.
     pub focus_distance: Option<f32>,
 }
 

@@ -16,9 +16,9 @@ use toml::{
 };
 
 use super::{
-    CameraEntry, EnvironmentEntry, IncludeEntry, LampEntry, LampKindEntry, MaterialEntry,
-    MaterialKeys, MaterialKindEntry, NumberOrVector, ObjectEntry, ObjectSource, PortalEntry,
-    SceneFile,
+    CameraEntry, EnvironmentEntry, IncludeEntry, KeyframeEntry, LampEntry, LampKindEntry,
+    MaterialEntry, MaterialKeys, MaterialKindEntry, NumberOrVector, ObjectEntry, ObjectSource,
+    PortalEntry, SceneFile,
 };
 use crate::{
     FilmSettings,
@@ -82,9 +82,14 @@ pub(super) fn read_root(text: &str) -> Result<SceneFile, TextError> {
     let materials = take_array(&mut table, "material")?;
     let objects = take_array(&mut table, "object")?;
     let includes = take_array(&mut table, "include")?;
+    let keyframes = match table.get_mut("camera").map(Spanned::get_mut) {
+        Some(DeValue::Table(camera)) => take_array(camera, "keyframe")?,
+        _ => Vec::new(),
+    };
     let root_keys: RootKeys = read_table(table, span)?;
     Ok(SceneFile {
         camera: root_keys.camera,
+        keyframes: read_all(keyframes, text, read_keyframe)?,
         film: root_keys.film,
         environment: root_keys.environment,
         lamps: read_all(lamps, text, read_lamp)?,
@@ -175,6 +180,10 @@ fn read_portal(entry: Spanned<DeValue>, text: &str) -> Result<PortalEntry, TextE
 fn read_include(entry: Spanned<DeValue>, text: &str) -> Result<IncludeEntry, TextError> {
     let (line, keys) = read_plain(entry, text, "[[include]]")?;
     Ok(IncludeEntry { line, keys })
+}
+
+fn read_keyframe(entry: Spanned<DeValue>, text: &str) -> Result<KeyframeEntry, TextError> {
+    Ok(read_plain(entry, text, "[[camera.keyframe]]")?.1)
 }
 
 /// Reads an entry of an array of tables that has no kinds, with its line; `header` names it.

@@ -11,7 +11,7 @@ use crate::{
     features,
     file::{IncludeEntry, IncludeKeys},
     import::Imported,
-    instance::Instance,
+    instance::{Budget, Instance},
     lamp::LampKind,
     material::Material,
     mesh::Mesh,
@@ -159,13 +159,12 @@ impl Loader<'_> {
         warnings: &mut Vec<String>,
     ) -> Result<Contents> {
         if !whole::is_whole(path) {
-            let imported =
-                Loader::new(path).allowing(self.allowed).import(None)?.ok_or_else(|| {
-                    self.error(format!(
+            let imported = self.beside(path).import(None)?.ok_or_else(|| {
+                self.error(format!(
                     "{label}: expected a file in .gltf, .glb, .obj, .pbrt or .xml; other meshes \
                      are objects"
                 ))
-                })?;
+            })?;
             inputs.extend(imported.inputs);
             warnings.extend(imported.warnings);
             if imported.environment.is_some_and(|environment| !environment.is_black()) {
@@ -174,7 +173,7 @@ impl Loader<'_> {
             let Imported { materials, geometry, lamps, .. } = imported;
             return Ok(Contents { materials, geometry, lamps });
         }
-        let mut mesh = Mesh::read_whole(path, warnings)?;
+        let mut mesh = Mesh::read_at(path, self.time, Some(Budget::default()), warnings)?;
         inputs.push(path.to_path_buf());
         inputs.extend_from_slice(&mesh.side_files);
         let mut ignored = mesh.ignored_in_materials();
@@ -182,7 +181,7 @@ impl Loader<'_> {
             ignored.add(features::GLTF_CAMERAS, || camera.label(index));
         }
         let lamps = std::mem::take(&mut mesh.lamps);
-        let (materials, geometry) = Loader::new(path).place_whole(&mesh, &mut ignored, warnings)?;
+        let (materials, geometry) = self.beside(path).place_whole(&mesh, &mut ignored, warnings)?;
         warnings.extend(ignored.warnings(path));
         Ok(Contents { materials, geometry, lamps })
     }

@@ -6,6 +6,7 @@ pub mod arrays;
 mod import;
 mod include;
 mod inside;
+mod keyframes;
 mod light;
 mod materials;
 mod objects;
@@ -50,6 +51,8 @@ pub struct LoadOptions {
     pub look_at: Option<[f32; 3]>,
     /// See [`LoadOptions::look_from`].
     pub vertical_fov_deg: Option<f32>,
+    /// Time at which an animation is seen, seconds; none for the scene as it stands without.
+    pub time: Option<f32>,
     /// Folder whose files pbrt and Mitsuba scenes may name, beside their own.
     pub allow_root: Option<PathBuf>,
 }
@@ -71,7 +74,7 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`], and for a camera that the file does not have.
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self> {
-        let loader = Loader::new(path).allowing(options.allow_root.as_deref());
+        let loader = Loader::new(path, options);
         if let Some(imported) = loader.import(options.camera.as_deref())? {
             return loader.imported(imported, options);
         }
@@ -105,14 +108,13 @@ impl Scene {
         arrays: &Arrays,
     ) -> Result<Self> {
         let file = SceneFile::parse(path, text)?;
-        let allowed = options.allow_root.as_deref();
-        let loader = Loader { arrays, ..Loader::new(path).allowing(allowed) };
+        let loader = Loader { arrays, ..Loader::new(path, options) };
         if let Some(name) = &options.camera {
             let message = "a scene in .toml has one camera; the option is for glTF files";
             return Err(loader.error(format!("--camera {name}: {message}")));
         }
         let mut warnings = Vec::new();
-        let camera = loader.camera(&viewed(&file.camera, options))?;
+        let camera = loader.camera(&viewed(&loader.camera_at(&file, options.time)?, options))?;
         loader.check_film(&file.film)?;
         let mut inputs = Vec::new();
         let mut materials = loader.materials(&file.materials, &mut inputs, &mut warnings)?;
@@ -135,8 +137,8 @@ impl Scene {
     }
 }
 
-/// Stem of the file, or the name of its folder if the stem is `scene`.
-fn scene_name(path: &Path) -> String {
+/// Name of a scene: stem of the file, or the name of its folder if the stem is `scene`.
+pub fn scene_name(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default();
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let folder = absolute.parent().and_then(Path::file_name);
@@ -171,17 +173,22 @@ struct Loader<'a> {
     folder: &'a Path,
     /// Folder whose files a scene may name beside its own.
     allowed: Option<&'a Path>,
+    /// Time at which an animation is seen, seconds.
+    time: Option<f32>,
     /// Parts of the scene that are in no file.
     arrays: &'a Arrays,
 }
 
 impl<'a> Loader<'a> {
-    fn new(path: &'a Path) -> Self {
-        Self { path, folder: path.parent().unwrap_or(Path::new("")), allowed: None, arrays: &NONE }
+    fn new(path: &'a Path, options: &'a LoadOptions) -> Self {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let (allowed, time) = (options.allow_root.as_deref(), options.time);
+        Self { path, folder, allowed, time, arrays: &NONE }
     }
 
-    fn allowing(self, allowed: Option<&'a Path>) -> Self {
-        Self { allowed, ..self }
+    /// Loader of another file of the same scene.
+    fn beside(&self, path: &'a Path) -> Self {
+        Self { path, folder: path.parent().unwrap_or(Path::new("")), ..*self }
     }
 
     /// Puts the parts together; warns of a scene without any light.

@@ -17,7 +17,7 @@ use crate::{
     files,
     geometry::{Dropped, DroppedOfMany},
     import::Imported,
-    instance::{Instance, MAX_INSTANCES, bounds},
+    instance::{Budget, Instance, MAX_INSTANCES, bounds},
     material::{Material, MaterialKind},
     mesh::{Mesh, MeshCamera, MeshMaterial, Perspective, RepeatedMesh},
     transform::Transform,
@@ -37,7 +37,7 @@ impl Loader<'_> {
     /// Reads the mesh file at the loader's path as a whole scene, with the camera that is named.
     pub(super) fn whole(&self, camera: Option<&str>) -> Result<Imported> {
         let mut warnings = Vec::new();
-        let mesh = Mesh::read_whole(self.path, &mut warnings)?;
+        let mesh = Mesh::read_at(self.path, self.time, Some(Budget::default()), &mut warnings)?;
         let mut ignored = mesh.ignored_in_materials();
         let chosen = self.choose_camera(&mesh.cameras, camera, &mut ignored)?;
         let (materials, geometry) = self.place_whole(&mesh, &mut ignored, &mut warnings)?;

@@ -3,4 +3,5 @@
 pub mod colour;
 pub mod equal_area;
 pub mod frame;
+pub(crate) mod keys;
 pub mod random;

@@ -119,27 +119,27 @@ impl Mesh {
     /// [`Error::Io`] if the file cannot be read, [`Error::Format`] or [`Error::Parse`] if its
     /// content is invalid: unknown format, truncation, an index out of range.
     pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
+        Self::read_at(path, None, None, warnings)
+    }
+
+    /// As [`Mesh::read`], with the animations of a glTF file at `time` seconds, and with a budget, what it
+    /// repeats in [`Mesh::repeated`].
+    pub(crate) fn read_at(
+        path: &Path,
+        time: Option<f32>,
+        budget: Option<Budget>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self> {
         match files::extension(path).as_str() {
             "ply" => ply::read(path),
             "obj" => obj::read(path, warnings),
-            "gltf" | "glb" => gltf::read(path, None, warnings),
+            "gltf" | "glb" => gltf::read(path, time, budget, warnings),
             found => {
                 let found =
                     if found.is_empty() { "no extension".into() } else { format!(".{found}") };
                 let expected = "expected a mesh in .ply, .obj, .gltf or .glb";
                 Err(Error::format(path, format!("{expected}, found {found}")))
             }
-        }
-    }
-
-    /// As [`Mesh::read`], with what a glTF file repeats in [`Mesh::repeated`].
-    ///
-    /// # Errors
-    /// As [`Mesh::read`].
-    pub fn read_whole(path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
-        match files::extension(path).as_str() {
-            "gltf" | "glb" => gltf::read(path, Some(Budget::default()), warnings),
-            _ => Self::read(path, warnings),
         }
     }
 

@@ -25,6 +25,7 @@ impl<'a> GltfReader<'a> {
     /// Reads vectors of `N` numbers: floats, or integers as `KHR_mesh_quantization` has them.
     pub(super) fn vectors<const N: usize>(&self, accessor: &Accessor) -> Result<Vec<[f32; N]>> {
         let (expected, name) = match N {
+            1 => (Dimensions::Scalar, "one"),
             2 => (Dimensions::Vec2, "two"),
             3 => (Dimensions::Vec3, "three"),
             _ => (Dimensions::Vec4, "four"),

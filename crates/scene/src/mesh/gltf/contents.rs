@@ -73,9 +73,9 @@ pub(super) fn for_each_extension(value: &Value, found: &mut impl FnMut(&str)) {
 
 impl GltfReader<'_> {
     /// Counts the parts of the document that belong to no node.
-    pub(super) fn ignore_contents(&mut self) {
+    pub(super) fn ignore_contents(&mut self, stands_still: bool) {
         let Self { document, json, ignored, .. } = self;
-        for animation in document.animations() {
+        for animation in document.animations().filter(|_| stands_still) {
             let place = || label("animation", animation.index(), animation.name());
             ignored.add(features::GLTF_ANIMATION, place);
         }

@@ -5,6 +5,7 @@
 //! warning, or refuses it. Reads the accessors itself and checks every range.
 
 mod accessors;
+mod animation;
 mod contents;
 mod document;
 mod glossiness;
@@ -33,12 +34,18 @@ use crate::{
 const GLB_HEADER_BYTES: usize = 12;
 
 /// Reads a glTF file with its buffers and images; `warnings` counts the parts that are left out. With a
-/// budget, meshes whose copies exceed it are not copied.
+/// budget, meshes whose copies exceed it are not copied; with a time, in seconds, nodes stand where the
+/// animations move them.
 ///
 /// # Errors
 /// [`Error::Io`] for a file that cannot be read, [`Error::Parse`] for bad JSON, [`Error::Format`]
 /// for any other fault.
-pub fn read(path: &Path, budget: Option<Budget>, warnings: &mut Vec<String>) -> Result<Mesh> {
+pub fn read(
+    path: &Path,
+    time: Option<f32>,
+    budget: Option<Budget>,
+    warnings: &mut Vec<String>,
+) -> Result<Mesh> {
     let bytes = files::read(path)?;
     if let (Some(b"glTF"), Some(&[a, b, c, d])) = (bytes.get(..4), bytes.get(8..12)) {
         let stated = u32::from_le_bytes([a, b, c, d]) as usize;
@@ -79,7 +86,7 @@ pub fn read(path: &Path, budget: Option<Budget>, warnings: &mut Vec<String>) -> 
         _ => None,
     });
     reader.mesh.side_files = buffer_files.collect();
-    reader.read_scene()?;
+    reader.read_scene(time)?;
     let mut mesh = reader.mesh;
     mesh.side_files.extend(reader.images.files());
     reader.cameras.sort_by_key(|(index, _)| *index);
@@ -135,8 +142,9 @@ impl GltfReader<'_> {
     }
 
     /// Walks through the nodes of the default scene, else the first.
-    fn read_scene(&mut self) -> Result<()> {
-        self.ignore_contents();
+    fn read_scene(&mut self, time: Option<f32>) -> Result<()> {
+        self.ignore_contents(time.is_none());
+        let poses = time.map_or(Ok(HashMap::new()), |time| self.poses(time))?;
         let document = self.document;
         let mut visited = vec![false; document.nodes().count()];
         let mut seen_meshes = vec![false; document.meshes().count()];
@@ -159,7 +167,8 @@ impl GltfReader<'_> {
                 let message = format!("node {} has more than one parent", node.index());
                 return Err(self.error(message));
             }
-            let parent_from_node = Mat4::from_cols_array_2d(&node.transform().matrix());
+            let stands = || Mat4::from_cols_array_2d(&node.transform().matrix());
+            let parent_from_node = poses.get(&node.index()).copied().unwrap_or_else(stands);
             let world_from_node = world_from_parent * parent_from_node;
             self.read_node(&node, world_from_node);
             self.read_lamp(&node, world_from_node)?;
