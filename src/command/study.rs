@@ -78,11 +78,11 @@ pub struct Arguments {
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     #[arg(help_heading = CAMERA)]
     pub size: Option<[u32; 2]>,
-    /// Shadow rays traced at every vertex of a camera path (default 5).
+    /// Shadow rays traced at every vertex of a camera path (default 8 for guided, else 5).
     #[arg(long, value_name = "N")]
     #[arg(help_heading = SAMPLING, hide_short_help = true)]
     pub shadow_rays: Option<u32>,
-    /// Number of path vertices lit by the environment (default 1, direct light).
+    /// Number of path vertices lit by the environment (default 8; 1 is direct light).
     #[arg(long, value_name = "D")]
     #[arg(help_heading = SAMPLING)]
     pub depth: Option<u32>,

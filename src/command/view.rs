@@ -13,7 +13,8 @@ use crate::{
     error::{Error, Result},
     film::{Curve, Tone},
     sampler::{Parameters, Sampler},
-    session::Settings,
+    scene::Asked,
+    session::{DEFAULT_DEPTH, Settings},
     view::{Display, Options},
 };
 
@@ -33,9 +34,10 @@ pub struct Arguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     #[arg(help_heading = SAMPLING, hide_short_help = true)]
     pub shadow_rays: Option<u32>,
-    /// Number of path vertices at the start; 1 is direct light.
-    #[arg(long, value_name = "D", default_value_t = 8, help_heading = SAMPLING)]
-    pub depth: u32,
+    /// Number of path vertices at the start; 1 is direct light. Default: that of a pbrt or Mitsuba file,
+    /// else 8.
+    #[arg(long, value_name = "D", help_heading = SAMPLING)]
+    pub depth: Option<u32>,
     /// Environment, camera, strictness.
     #[command(flatten)]
     pub scene_options: SceneOptions,
@@ -75,11 +77,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     for assignment in &arguments.set {
         parameters.set(assignment)?;
     }
-    let settings = Settings {
+    let mut settings = Settings {
         sampler: arguments.sampler,
         parameters,
         shadow_rays: arguments.shadow_rays.unwrap_or(arguments.sampler.shadow_rays()),
-        depth: arguments.depth,
         seed: arguments.seed,
         ..Settings::default()
     };
@@ -89,6 +90,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some([width, height]) = arguments.size {
         (scene.film.width, scene.film.height) = (width, height);
     }
+    let Asked { depth, roulette_depth, .. } = scene.asked;
+    settings.depth = arguments.depth.or(depth).unwrap_or(DEFAULT_DEPTH);
+    settings.roulette.vertex = roulette_depth.unwrap_or(settings.roulette.vertex);
     settings.check([scene.film.width, scene.film.height])?;
     drop(patience);
     let options = Options {

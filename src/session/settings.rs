@@ -9,6 +9,9 @@ use crate::{
     scene::Scene,
 };
 
+/// Lit vertices of a path for the commands, if neither an option nor the scene's file says otherwise.
+pub const DEFAULT_DEPTH: u32 = 8;
+
 /// Settings of a render, apart from its scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {

@@ -176,7 +176,7 @@ impl Study<'_> {
         Settings {
             sampler: contender.sampler,
             parameters: contender.parameters,
-            shadow_rays: self.plan.shadow_rays,
+            shadow_rays: self.plan.shadow_rays_of(contender),
             depth: self.plan.depth,
             ..Settings::default()
         }

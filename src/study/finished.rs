@@ -41,13 +41,15 @@ impl FinishedRuns<'_> {
             (None, Some(overhead)) => ("none".to_owned(), overhead::describe_parameters(overhead)),
             (None, None) => ("none".to_owned(), BTreeMap::new()),
         };
+        let baseline = self.plan.overhead.as_ref().map(|overhead| &overhead.baseline);
+        let of = contender.or(baseline);
         Ok(Conditions {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             scene_hash: scene.hash.clone(),
             film: [scene.film.width, scene.film.height],
             device: capabilities.name.clone(),
             driver: self.device.driver_and_tracer(),
-            shadow_rays: self.plan.shadow_rays,
+            shadow_rays: of.map_or(0, |contender| self.plan.shadow_rays_of(contender)),
             depth: self.plan.depth,
             reference,
             parameters,

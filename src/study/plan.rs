@@ -16,6 +16,7 @@ use crate::{
     error::{Error, Result},
     files::extension,
     sampler::{Parameters, Sampler},
+    session::DEFAULT_DEPTH,
 };
 
 /// Samples per pixel if neither samples nor time are given.
@@ -209,8 +210,8 @@ pub struct Plan {
     pub time: Option<Duration>,
     /// Runs of each sampler.
     pub seeds: u32,
-    /// Directions traced at every vertex.
-    pub shadow_rays: u32,
+    /// Directions traced at every vertex; each sampler's own number if absent.
+    pub shadow_rays: Option<u32>,
     /// Path vertices at which environment light is gathered.
     pub depth: u32,
     /// Source of the reference.
@@ -222,6 +223,11 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// Directions that a contender traces at every vertex.
+    pub(crate) fn shadow_rays_of(&self, contender: &Contender) -> u32 {
+        self.shadow_rays.unwrap_or(contender.sampler.shadow_rays())
+    }
+
     /// Files and folders of the given references.
     pub(crate) fn pictures(&self) -> impl Iterator<Item = &Path> {
         let references: &[PathBuf] = match &self.reference {
@@ -269,8 +275,9 @@ impl Plan {
             range("--spp", count, 1, 1 << 24)?;
         }
         let seeds = range("--seeds", options.seeds.unwrap_or(3), 1, 1000)?;
-        let shadow_rays = range("--shadow-rays", options.shadow_rays.unwrap_or(5), 1, 4096)?;
-        let depth = range("--depth", options.depth.unwrap_or(1), 1, 64)?;
+        let rays = options.shadow_rays.map(|rays| range("--shadow-rays", rays, 1, 4096));
+        let shadow_rays = rays.transpose()?;
+        let depth = range("--depth", options.depth.unwrap_or(DEFAULT_DEPTH), 1, 64)?;
         let compares = !spp.is_empty() || options.time.is_some();
         let largest = spp.last().copied().unwrap_or(0);
         let reference_spp = options.reference_spp.unwrap_or_else(|| {
@@ -427,7 +434,10 @@ mod tests {
     #[test]
     fn defaults_make_a_whole_plan() {
         let plan = plan(Options::default()).unwrap();
-        assert_eq!((&plan.spp[..], plan.seeds, plan.shadow_rays, plan.depth), (&[64][..], 3, 5, 1));
+        assert_eq!(
+            (&plan.spp[..], plan.seeds, plan.shadow_rays, plan.depth),
+            (&[64][..], 3, None, 8)
+        );
         assert!(plan.contenders.iter().any(|contender| contender.label == "mis"));
         assert!(plan.compares() && plan.overhead.is_none());
         let ReferencePlan::Render { contender, half_spp } = plan.reference else { unreachable!() };

@@ -80,8 +80,8 @@ pub struct Report {
     pub is_complete: bool,
     /// Machine, version and command.
     pub circumstances: Circumstances,
-    /// Directions traced at every vertex.
-    pub shadow_rays: u32,
+    /// Directions traced at every vertex; each sampler's own number if absent.
+    pub shadow_rays: Option<u32>,
     /// Path vertices at which environment light is gathered.
     pub depth: u32,
     /// Runs of each sampler.

@@ -216,7 +216,7 @@ fn end(report: &Report) -> String {
         "Rays and depth",
         &format!(
             "{} shadow rays per path vertex, light gathered at {}",
-            report.shadow_rays,
+            report.shadow_rays.map_or("each sampler's own".to_owned(), |rays| rays.to_string()),
             if report.depth == 1 {
                 "the first vertex (direct light)".to_owned()
             } else {
