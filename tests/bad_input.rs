@@ -329,10 +329,10 @@ fn no_device_is_explained() {
         command.args(RENDER).env_remove("VK_DRIVER_FILES").env_remove("VK_ICD_FILENAMES");
         command.env(variable, "/nonexistent");
         let run = Run::of(&command.output().unwrap());
-        run.assert(1, &["finds no driver", "help: ", "./setup"]);
+        run.assert(75, &["finds no driver", "help: ", "./setup"]);
     }
     let run = folder.run(&["render", "scene.toml", "--device=no such device"]);
-    run.assert(1, &["no Vulkan device matches --device no such device", "help: "]);
+    run.assert(75, &["no Vulkan device matches --device no such device", "help: "]);
 }
 
 #[test]
@@ -342,11 +342,11 @@ fn a_full_disk_is_reported_and_the_older_image_kept() {
     let before = folder.files();
     // Every write to this device fails for lack of space.
     let run = folder.run(&["render", "scene.toml", "--spp=2", "--output=/dev/full"]);
-    run.assert(1, &["error: /dev/full: cannot write: No space left on device"]);
+    run.assert(75, &["error: /dev/full: cannot write: No space left on device"]);
     let mut rendering = program(folder.path());
     c_library::fail_in(&mut rendering, folder.path(), ("FAULTY_BYTES", 512));
     let run = Run::of(&rendering.args(RENDER).output().unwrap());
-    run.assert(1, &["error: out.exr: cannot write: No space left on device"]);
+    run.assert(75, &["error: out.exr: cannot write: No space left on device"]);
     assert_eq!(folder.files(), before, "no temporary file is left");
     assert_eq!(fs::read(folder.path().join("out.exr")).unwrap(), b"older image");
 }

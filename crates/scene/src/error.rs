@@ -150,16 +150,35 @@ impl Error {
         Self::Comparison { message: message.into() }
     }
 
-    /// Exit status: 2 for wrong usage, 3 for a metric beyond its threshold, 130 interrupted, else
-    /// 1.
+    /// Exit status: 2 for wrong usage, 3 for a metric beyond its threshold, 75 (`EX_TEMPFAIL`) where another
+    /// machine or a later try may succeed, 130 interrupted, else 1.
     pub fn exit_status(&self) -> u8 {
         match self {
             Self::Usage { .. } => 2,
             Self::Threshold { .. } => 3,
+            Self::Vulkan { .. } | Self::Device { .. } => 75,
+            Self::Io { source, .. } if is_passing(source) => 75,
             Self::Interrupted => 130,
             _ => 1,
         }
     }
+}
+
+/// True for faults of disks and networks that are no fault of a name or a right.
+fn is_passing(error: &std::io::Error) -> bool {
+    use std::io::ErrorKind as Kind;
+    const INPUT_OUTPUT_ERROR: i32 = 5;
+    let passing = [
+        Kind::StorageFull,
+        Kind::QuotaExceeded,
+        Kind::StaleNetworkFileHandle,
+        Kind::TimedOut,
+        Kind::HostUnreachable,
+        Kind::NetworkUnreachable,
+        Kind::NetworkDown,
+    ];
+    passing.contains(&error.kind())
+        || (cfg!(unix) && error.raw_os_error() == Some(INPUT_OUTPUT_ERROR))
 }
 
 /// Message about a range of a text's bytes, before its file is known.
