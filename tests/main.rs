@@ -26,6 +26,7 @@ mod fit;
 mod fit_command;
 mod formats;
 mod frame;
+mod frames;
 mod fuzz;
 mod guide;
 mod guided;

@@ -178,6 +178,15 @@ impl Session {
         self.renderer.look(camera, size, seed, learns)
     }
 
+    /// Goes on with the next frame of an animation in which the camera alone moves, as [`Session::look`]:
+    /// what was learned from earlier frames stays. `seed` must be new.
+    pub fn next_frame(&mut self, scene: &Scene, seed: u32) -> Result<()> {
+        self.look(&scene.camera, [scene.film.width, scene.film.height], seed, true)?;
+        self.description.scene_hash.clone_from(&scene.hash);
+        self.has_checkpoint = false;
+        Ok(())
+    }
+
     /// Wall time of the passes, those of earlier runs included, seconds.
     pub fn seconds(&self) -> f64 {
         self.earlier_seconds + self.own_seconds

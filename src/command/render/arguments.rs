@@ -11,6 +11,7 @@ use super::{
         parse_crop, parse_duration, parse_pixel, parse_size,
     },
     QUICK_SPP,
+    frames::{Frames, parse_frames},
 };
 use crate::{
     error::{Error, Result},
@@ -19,11 +20,11 @@ use crate::{
     pass::Roulette,
     sampler::{Parameters, Sampler},
     scene::{Asked, FilmSettings, Scene},
-    session::{Quality, Rules, Settings},
+    session::{DEFAULT_DEPTH, Quality, Rules, Settings},
 };
 
 /// Arguments of `render`.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct Arguments {
     /// Scene file (.toml, .gltf, .glb, .obj, .pbrt, .xml).
     pub scene: PathBuf,
@@ -38,6 +39,17 @@ pub struct Arguments {
     #[arg(long, value_name = "x0,y0,x1,y1", value_parser = parse_crop, help_heading = CAMERA)]
     #[arg(hide_short_help = true)]
     pub crop: Option<Window>,
+
+    /// Render frames of an animation: 7, 0-47, or every second one, 0-47x2.
+    ///
+    /// Each stops by the same rule. Its number stands in place of #### in the names of files.
+    #[arg(long, value_name = "A-B", value_parser = parse_frames, help_heading = CAMERA)]
+    #[arg(conflicts_with = "pixel", hide_short_help = true)]
+    pub frames: Option<Frames>,
+    /// Frames per second: frame F shows the scene at F / N seconds.
+    #[arg(long, value_name = "N", default_value_t = 24.0, requires = "frames")]
+    #[arg(help_heading = CAMERA, hide_short_help = true)]
+    pub fps: f64,
 
     /// Sampler that chooses directions at a hit.
     #[arg(long, value_enum, default_value = "guided", help_heading = SAMPLING)]
@@ -129,6 +141,9 @@ pub struct Arguments {
     #[arg(short, long, help_heading = OUTPUT)]
     pub quiet: bool,
 
+    /// Skip images that are there; go on with those that have a checkpoint beside them.
+    #[arg(long, help_heading = FILES, hide_short_help = true)]
+    pub skip_existing: bool,
     /// Continue from the output's checkpoint, if there is one.
     #[arg(long, help_heading = FILES)]
     pub resume: bool,
@@ -161,9 +176,6 @@ pub struct Arguments {
 
 /// Interval of the preview of a picture to show.
 const PNG_INTERVAL: Duration = Duration::from_secs(5);
-/// Lit vertices of a path, and the first one at which roulette may end it, if nothing says otherwise.
-const DEFAULT_DEPTH: u32 = 8;
-const DEFAULT_ROULETTE_DEPTH: u32 = 2;
 /// Maximum film width of `--quick`, pixels.
 const QUICK_WIDTH: u32 = 240;
 
@@ -365,7 +377,7 @@ impl Arguments {
             window: self.crop,
             aovs,
             roulette: Roulette {
-                vertex: self.roulette_depth.unwrap_or(DEFAULT_ROULETTE_DEPTH),
+                vertex: self.roulette_depth.unwrap_or(Roulette::default().vertex),
                 throughput: self.roulette_throughput,
             },
             ..Settings::default()

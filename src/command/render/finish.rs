@@ -8,7 +8,7 @@ use crate::{
     error::Result,
     files::write_json,
     film::{
-        Image,
+        Attribute, Image,
         checkpoint::{checkpoint_path, remove_checkpoint},
         png::write_preview,
     },
@@ -30,7 +30,10 @@ impl RenderJob<'_> {
             say!("{choice}");
         }
         let sums = session.renderer.sums()?;
-        let image = session.image_of(&sums, &self.aovs);
+        let mut image = session.image_of(&sums, &self.aovs);
+        if let Some(time) = self.time {
+            image.attributes.insert("fenestra.time".to_owned(), Attribute::Double(time));
+        }
         let mut written = Vec::new();
         let mut failure = None;
         let mut note = |path: &Path, result: Result<()>| match (result, &failure) {
@@ -60,7 +63,7 @@ impl RenderJob<'_> {
             let preview = |rgb| write_preview(&path, &rgb, self.arguments.exposure);
             note(&path, image.rgb(&self.output).and_then(preview));
         }
-        if let Some(denoiser) = &self.denoiser {
+        if let Some(denoiser) = self.denoiser {
             self.write_denoised(denoiser, &image, &mut note);
         } else if self.arguments.shows() && !self.arguments.quiet {
             say!("not denoised: Open Image Denoise is not found; ./setup brings it where it can");

@@ -2,15 +2,18 @@
 
 mod arguments;
 mod finish;
+mod frames;
 mod preview;
 
 use std::{
+    collections::BTreeSet,
     path::{Path, PathBuf},
     sync::Arc,
     time::{Duration, Instant},
 };
 
 pub use arguments::Arguments;
+use frames::is_finished;
 use preview::Preview;
 
 use super::{
@@ -24,7 +27,7 @@ use crate::{
     film::{Aov, Image, checkpoint::checkpoint_path, display::DisplayServer},
     gpu::{Denoiser, Device},
     pass::Explanation,
-    scene::Scene,
+    scene::{Scene, still_hash},
     session::{Event, Flag, Limit, Observer, Quality, Rules, Session, Settings, StopReason, pixel},
     terminal::say,
 };
@@ -34,7 +37,7 @@ const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
 /// Samples per pixel of `--quick`.
 const QUICK_SPP: u32 = 16;
 
-/// Renders a scene.
+/// Renders a scene, or frames of it.
 ///
 /// # Errors
 /// Wrong options, an unusable scene, no device, a failing device or disk; [`Error::Interrupted`]
@@ -44,76 +47,160 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     // A picture to show is denoised where the library is found; `--denoise` insists on it.
     let offered = arguments.shows().then(Denoiser::load);
     let denoises = arguments.denoise || matches!(offered, Some(Ok(_)));
-    let mut settings = arguments.settings(denoises)?;
-    let start = Instant::now();
-    let patience =
-        Patience::new(&format!("loading {}", arguments.scene.display()), arguments.quiet);
-    let mut scene = load(arguments)?;
-    let load_ms = start.elapsed().as_secs_f64() * 1e3;
-    arguments.resize(&mut scene.film);
-    if let Some(line) = arguments.take_asked(&scene, &mut settings).filter(|_| !arguments.quiet) {
-        say!("{line}");
-    }
-    let output =
-        arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.exr", scene.name)));
-    // Fail before the work, not after it.
-    arguments.check_outputs(&scene, &output, denoises)?;
-    sweep_leftovers(&output);
-    if let Some(at) = arguments.pixel {
-        pixel::check(&settings, &scene, &output, at)?;
-    }
-    let denoiser = match offered {
-        Some(Ok(denoiser)) => Some(denoiser),
-        _ => arguments.denoise.then(Denoiser::load).transpose()?,
+    arguments.settings(denoises)?;
+    let denoiser = offered.and_then(Result::ok);
+    let mut sequence = Sequence {
+        interrupt,
+        denoises,
+        denoiser,
+        device: None,
+        carried: None,
+        warned: BTreeSet::new(),
     };
-
-    interrupt.wait_for_caller();
-    let aovs = settings.aovs.clone();
-    let (device, mut session) = open(arguments, &scene, settings)?;
-    if arguments.resume {
-        let path = checkpoint_path(&output);
-        match path.exists() {
-            true => session.resume(&path)?,
-            false => {
-                let path = path.display();
-                log::warn!("--resume: there is no {path}; starting from the beginning");
-            }
-        }
-    }
-    drop(patience);
-
-    let job = RenderJob { arguments, scene: &scene, output, aovs, denoiser, load_ms };
-    let reason = job.render(&mut session, &interrupt)?;
-    let finished = job.finish(&mut session, reason);
-    device.save_pipeline_cache();
-    finished?;
-    if let Some(at) = arguments.pixel {
-        job.explain(session.renderer.explain_pixel(&device, &scene, at)?.as_deref(), at)?;
-    }
-    if arguments.validate {
-        device.check_validation()?;
-    }
-    if reason == StopReason::Interrupt { Err(Error::Interrupted) } else { Ok(()) }
+    arguments.frame_list()?.into_iter().try_for_each(|frame| sequence.render(arguments, frame))
 }
 
-/// Opens the device and prepares to render on it.
-fn open(
-    arguments: &Arguments,
-    scene: &Scene,
-    settings: Settings,
-) -> Result<(Arc<Device>, Session)> {
+/// Renderer of a scene in which the camera alone moves, from one frame to the next.
+struct Carried {
+    session: Session,
+    /// Hash of all that stands still.
+    still_hash: String,
+}
+
+/// All that renders one frame after the other.
+struct Sequence {
+    interrupt: Arc<Interrupt>,
+    /// True if there will be denoised pictures.
+    denoises: bool,
+    denoiser: Option<Denoiser>,
+    /// Device, once it is needed.
+    device: Option<Arc<Device>>,
+    carried: Option<Carried>,
+    /// Warnings given so far.
+    warned: BTreeSet<String>,
+}
+
+impl Sequence {
+    /// Renders one frame, or the scene as it stands.
+    fn render(&mut self, arguments: &Arguments, frame: Option<u32>) -> Result<()> {
+        let arguments = &arguments.of_frame(frame);
+        let output = arguments.image_path(frame);
+        if arguments.skip_existing && is_finished(&output) {
+            if !arguments.quiet {
+                say!("{} is there: skipped", output.display());
+            }
+            return Ok(());
+        }
+        let mut settings = arguments.settings(self.denoises)?;
+        let start = Instant::now();
+        let loading = format!("loading {}", arguments.scene.display());
+        let patience = Patience::new(&loading, arguments.quiet);
+        let time = frame.map(|frame| arguments.time_of(frame));
+        let mut scene = arguments.scene_options.load_at(&arguments.scene, time)?;
+        scene.warnings.iter().for_each(|warning| self.warn(warning));
+        let load_ms = start.elapsed().as_secs_f64() * 1e3;
+        arguments.resize(&mut scene.film);
+        if let Some(line) = arguments.take_asked(&scene, &mut settings).filter(|_| !arguments.quiet)
+        {
+            say!("{line}");
+        }
+        // Fail before the work, not after it.
+        arguments.check_outputs(&scene, &output, self.denoises)?;
+        sweep_leftovers(&output);
+        if let Some(at) = arguments.pixel {
+            pixel::check(&settings, &scene, &output, at)?;
+        }
+        if self.denoises && self.denoiser.is_none() {
+            self.denoiser = Some(Denoiser::load()?);
+        }
+        self.interrupt.wait_for_caller();
+        if frame.is_some() && self.interrupt.flag().is_raised() {
+            return Err(Error::Interrupted);
+        }
+        let device = self.device(arguments)?;
+        if let Some(warning) = settings.sampler.portal_warning(&scene) {
+            self.warn(&warning);
+        }
+        if let (Some(frame), Some(time), false) = (frame, time, arguments.quiet) {
+            say!("frame {frame} at {time:.3} s: {}", output.display());
+        }
+        let aovs = settings.aovs.clone();
+        let checkpoint = checkpoint_path(&output);
+        let resumes = (arguments.resume || arguments.skip_existing) && checkpoint.exists();
+        let still_hash = frame.filter(|_| settings.window.is_none()).map(|_| still_hash(&scene));
+        let carried = self
+            .carried
+            .take()
+            .filter(|carried| Some(&carried.still_hash) == still_hash.as_ref() && !resumes);
+        let mut session = match carried {
+            Some(Carried { mut session, .. }) => {
+                session.next_frame(&scene, settings.seed)?;
+                session
+            }
+            None => prepare(arguments, &device, &scene, settings)?,
+        };
+        if resumes {
+            session.resume(&checkpoint)?;
+        } else if arguments.resume {
+            let path = checkpoint.display();
+            log::warn!("--resume: there is no {path}; starting from the beginning");
+        }
+        drop(patience);
+
+        let denoiser = self.denoiser.as_ref();
+        let job = RenderJob { arguments, scene: &scene, output, aovs, denoiser, load_ms, time };
+        let reason = job.render(&mut session, &self.interrupt)?;
+        let finished = job.finish(&mut session, reason);
+        device.save_pipeline_cache();
+        finished?;
+        if let Some(at) = arguments.pixel {
+            job.explain(session.renderer.explain_pixel(&device, &scene, at)?.as_deref(), at)?;
+        } else {
+            self.carried = still_hash.map(|still_hash| Carried { session, still_hash });
+        }
+        if arguments.validate {
+            device.check_validation()?;
+        }
+        if reason == StopReason::Interrupt { Err(Error::Interrupted) } else { Ok(()) }
+    }
+
+    /// Opens the device before the first frame.
+    fn device(&mut self, arguments: &Arguments) -> Result<Arc<Device>> {
+        if let Some(device) = &self.device {
+            return Ok(Arc::clone(device));
+        }
+        Ok(Arc::clone(self.device.insert(open(arguments)?)))
+    }
+
+    /// Logs a warning, for the first frame that has it.
+    fn warn(&mut self, warning: &str) {
+        if self.warned.insert(warning.to_owned()) {
+            log::warn!("{warning}");
+        }
+    }
+}
+
+/// Opens the device, and says which.
+fn open(arguments: &Arguments) -> Result<Arc<Device>> {
     let device = arguments.device.open(arguments.validate)?;
     if !arguments.quiet {
         self_test::announce(&device);
     }
-    if let Some(warning) = settings.sampler.portal_warning(scene) {
-        log::warn!("{warning}");
-    }
-    let mut session = Session::new(&device, scene, settings)?;
+    Ok(device)
+}
+
+/// Prepares to render on the device.
+fn prepare(
+    arguments: &Arguments,
+    device: &Arc<Device>,
+    scene: &Scene,
+    settings: Settings,
+) -> Result<Session> {
+    let mut session = Session::new(device, scene, settings)?;
     if let Some(path) = &arguments.load_guide {
         session.renderer.load_guide(path)?;
     }
-    Ok((device, session))
+    Ok(session)
 }
 
 /// Loads the scene that the arguments name.
@@ -140,7 +227,11 @@ pub fn film(
         observer.notice(&Event::Note(&line));
     }
     let aovs = settings.aovs.clone();
-    let (device, mut session) = open(arguments, scene, settings)?;
+    let device = open(arguments)?;
+    if let Some(warning) = settings.sampler.portal_warning(scene) {
+        log::warn!("{warning}");
+    }
+    let mut session = prepare(arguments, &device, scene, settings)?;
     let reason = session.run(&arguments.rules(scene.asked), observer)?;
     device.save_pipeline_cache();
     let image = session.image(&aovs)?;
@@ -158,9 +249,11 @@ struct RenderJob<'a> {
     /// Layers of the image.
     aovs: Vec<Aov>,
     /// Denoiser, if the picture is to be denoised.
-    denoiser: Option<Denoiser>,
+    denoiser: Option<&'a Denoiser>,
     /// Time that loading took, milliseconds.
     load_ms: f64,
+    /// Time of the frame in the animation, seconds.
+    time: Option<f64>,
 }
 
 impl RenderJob<'_> {
