@@ -20,6 +20,7 @@ mod device_faults;
 mod display;
 mod environment;
 mod export;
+mod farm;
 mod faults;
 mod film;
 mod fit;

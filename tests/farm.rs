@@ -1,0 +1,73 @@
+//! The scripts of `docs/farm`, run as a scheduler runs them.
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
+
+use std::{
+    env,
+    process::{Child, Command},
+    thread,
+    time::Duration,
+};
+
+use fenestra::film::Image;
+
+use crate::support::command::{self, Folder, program};
+
+const SPP: &str = "400";
+const OPTIONS: &str = "--sampler=mis --depth=2 --checkpoint-interval=1ms";
+
+fn task(folder: &Folder, number: u32) -> Child {
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/farm/task.sh");
+    let binary = std::path::Path::new(env!("CARGO_BIN_EXE_fenestra")).parent().unwrap();
+    let path = format!("{}:{}", binary.display(), env::var("PATH").unwrap());
+    let mut task = Command::new(script);
+    task.current_dir(folder.path())
+        .env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"))
+        .envs([("PATH", &*path), ("SCENE", "scene.toml"), ("OUT", "out"), ("SPP", SPP)])
+        .envs([("WIDTH", "24"), ("HEIGHT", "15"), ("BANDS", "2"), ("OPTIONS", OPTIONS)])
+        .env("SLURM_ARRAY_TASK_ID", number.to_string());
+    task.spawn().unwrap()
+}
+
+#[test]
+fn tasks_of_a_farm_give_the_bits_of_one_process() {
+    let folder = Folder::new();
+    let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
+    folder.write("scene.toml", command::yard([24, 15], "sky = {}", clay, command::BALL));
+    let mut tasks = [0, 1, 2, 3].map(|number| (number, task(&folder, number)));
+    // One is preempted as soon as it has something to lose.
+    let checkpoint = folder.path().join("out/band1.seed1.checkpoint.exr");
+    let preempted = &mut tasks[3].1;
+    while !checkpoint.exists() && preempted.try_wait().unwrap().is_none() {
+        thread::sleep(Duration::from_millis(1));
+    }
+    let kill = format!("kill -TERM {}", preempted.id());
+    Command::new("sh").args(["-c", &kill]).status().unwrap();
+    for (number, mut child) in tasks {
+        let mut status = child.wait().unwrap().code();
+        if number == 3 {
+            assert_eq!(status, Some(130), "retry");
+            status = task(&folder, number).wait().unwrap().code();
+        }
+        assert_eq!(status, Some(0), "task {number}");
+    }
+    let seeds = ["0", "1"];
+    for seed in seeds {
+        let name = format!("whole{seed}.exr");
+        let whole = ["render", "scene.toml", "-q", "--spp", SPP, "--sampler=mis", "--depth=2"];
+        let rest = ["--seed", seed, "-o", &name];
+        assert!(program(folder.path()).args(whole).args(rest).status().unwrap().success());
+    }
+    let merged = |parts: &[&str], name: &str| {
+        folder.run(&[&["merge", "-q", "-o", name], parts].concat()).assert(0, &[]);
+        Image::read_exr(&folder.path().join(name)).unwrap()
+    };
+    let names = |band: u32| seeds.map(|seed| format!("out/band{band}.seed{seed}.exr"));
+    let parts = [names(0), names(1)].concat();
+    let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
+    let farm = merged(&parts, "farm.exr");
+    let whole = merged(&["whole0.exr", "whole1.exr"], "whole.exr");
+    assert!(farm.channels["R"].iter().any(|value| *value > 0.0));
+    assert_eq!((farm.width, farm.height), (24, 15));
+    assert!(farm.channels == whole.channels, "the bits of one process");
+}
