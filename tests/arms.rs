@@ -140,7 +140,7 @@ fn the_picture_is_unbiased_whatever_is_chosen() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
     let mis = Settings { depth: 3, shadow_rays: 16, ..Settings::default() };
-    let reference = replicates(&scene, &mis, 500, 64);
+    let reference = replicates(&scene, &mis, 500, 32);
     let values = replicates(&scene, &guided(None), 500, 18);
     let Comparison { largest_t, ratio, .. } = Comparison::new(&values, &reference);
     eprintln!("largest |t| {largest_t:.2}, ratio {ratio:.4}");

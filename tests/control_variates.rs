@@ -239,7 +239,7 @@ fn parameters_change_no_image() {
     let scene = room();
     let mis = Settings { shadow_rays: 16, ..Settings::default() };
     let mis = Settings { sampler: Sampler::Mis, ..mis };
-    let reference = replicates::replicates(&scene, &mis, 40, 32);
+    let reference = replicates::replicates(&scene, &mis, 40, 16);
     let cases: [&[&str]; 3] = [
         &["candidates=2", "record-side=4", "compensation=off"],
         &["control-choice=off", "record-pixels=4"],
@@ -247,7 +247,7 @@ fn parameters_change_no_image() {
     ];
     for (case, assignments) in cases.into_iter().enumerate() {
         let seed = 100 * (1 + case as u32);
-        let values = replicates::replicates(&scene, &settings(assignments), seed, 16);
+        let values = replicates::replicates(&scene, &settings(assignments), seed, 8);
         let Comparison { largest_t, ratio, largest_t_with_bias } =
             Comparison::new(&values, &reference);
         eprintln!("{assignments:?}: largest |t| {largest_t:.2}, ratio {ratio:.4}");

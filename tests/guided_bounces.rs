@@ -35,7 +35,9 @@ use crate::{
     support::{
         self,
         guide::Guide as _,
-        materials, replicates, scenes,
+        materials,
+        replicates::{self, BLOCK},
+        scenes,
         statistics::{self, estimates, largest_t},
     },
     twin::{brdf, guided::arrival_direction, random::random_2d},
@@ -312,12 +314,13 @@ fn bounces_take_the_numbers_of_their_epoch() {
 #[test]
 fn images_are_those_of_unguided_bounces() {
     let _alone = support::alone();
-    let scene = scenes::mixed_room();
+    let mut scene = scenes::mixed_room();
+    (scene.film.width, scene.film.height) = (16, 16);
     // Estimate the means over blocks and channels.
     let replicates = |candidates: u32, beliefs: Option<&GuideState>, samples: u32| {
         let mut settings = guided(4);
         settings.parameters.guided.bounce_candidates = candidates;
-        let rows = replicates::rows(&scene, &settings, 500..516, samples, |renderer| {
+        let rows = replicates::rows(&scene, &settings, 500..516, samples, BLOCK, |renderer| {
             if let Some(beliefs) = beliefs {
                 renderer.restore_guide(beliefs).unwrap();
             }

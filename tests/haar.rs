@@ -475,13 +475,12 @@ fn pictures_with_other_parameters_agree() {
         let parameters = parameters(assignments);
         Settings { sampler, depth: 2, parameters, ..Settings::default() }
     };
-    let reference = replicates::replicates(&scene, &settings(Sampler::Mis, &[]), 4000, 64);
+    let reference = replicates::replicates(&scene, &settings(Sampler::Mis, &[]), 4000, 32);
     for assignments in [
         &["haar-level=4", "environment-share=0", "brdf-share=0.1"][..],
         &["haar-cache=on", "environment-share=0", "k=4", "tau=2"],
     ] {
-        let values =
-            replicates::replicates(&scene, &settings(Sampler::Haar, assignments), 9000, 16);
+        let values = replicates::replicates(&scene, &settings(Sampler::Haar, assignments), 9000, 8);
         let compared = Comparison::new(&values, &reference);
         eprintln!("{assignments:?}: {compared:?}");
         assert!(compared.largest_t < LIMIT, "{assignments:?}: {compared:?}");

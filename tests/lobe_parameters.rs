@@ -73,7 +73,7 @@ fn parameters_change_no_image_in_a_room() {
     ]);
     agree(
         &scene,
-        24,
+        12,
         &[
             (Sampler::Visibility, &["preset=strict"]),
             (Sampler::Visibility, &["cache=pixel"]),
@@ -96,7 +96,7 @@ fn parameters_change_no_image_of_glossy_things_in_the_open() {
     ]);
     agree(
         &scene,
-        16,
+        8,
         &[
             (Sampler::Visibility, &["order=coefficient", "cache=pixel"]),
             (Sampler::Visibility, &["preset=strict", "brdf-lobes=2", "views=1"]),

@@ -13,7 +13,7 @@ use glam::Vec3;
 use crate::support::{
     self,
     guide::Guide as _,
-    replicates::{LIMIT, REPLICATES, replicates, rows},
+    replicates::{BLOCK, LIMIT, REPLICATES, replicates, rows},
     scenes,
     statistics::{Comparison, estimates},
 };
@@ -114,7 +114,7 @@ fn pictures_after_a_motion_are_unbiased() {
     let reference = replicates(&scene, &reference, 0, 32);
     let mut settings = Settings { depth: 2, ..settings(Sampler::Guided, 0) };
     settings.parameters.set("candidates=1").unwrap();
-    let values = rows(&scene, &settings, 100..100 + REPLICATES, 8, |renderer| {
+    let values = rows(&scene, &settings, 100..100 + REPLICATES, 8, BLOCK, |renderer| {
         let seed = renderer.settings().seed;
         renderer.look(&home, [32, 24], seed + 1000, true).unwrap();
         renderer.render_pass(4).unwrap();

@@ -95,7 +95,7 @@ impl Original {
              -0.5 0.5 0 250 250 90\n4 0 1 2 3\n",
         );
         let scene = Scene::load(&folder.write("scene.toml", text)).unwrap();
-        let reference = replicates(&scene, &settings(), 1, 20);
+        let reference = replicates(&scene, &settings(), 1, 12);
         Self { folder, scene, reference }
     }
 
@@ -134,7 +134,7 @@ impl Original {
         for part in expected {
             assert!(warnings.iter().any(|text| text.contains(part)), "{part}: {warnings:#?}");
         }
-        let values = replicates(&scene, &settings(), 1001, 20);
+        let values = replicates(&scene, &settings(), 1001, 12);
         let comparison = Comparison::new(&values, &self.reference);
         eprintln!("{format}: {comparison:?}");
         let level = self.reference.iter().map(|value| value.mean).sum::<f64>()

@@ -505,7 +505,7 @@ fn parameters_change_no_image() {
     let _alone = support::alone();
     let scene = room();
     let mis = Settings { shadow_rays: 16, ..Settings::default() };
-    let reference = replicates::replicates(&scene, &mis, 40, 32);
+    let reference = replicates::replicates(&scene, &mis, 40, 16);
     let cases: [&[&str]; 3] = [
         &["environment-tiles=8", "sector-pixels=1", "tile-floor=0.001", "pilot-samples=2"],
         &["environment-tiles=1024", "sector-jitter=on", "pilot-samples=1"],
@@ -513,7 +513,7 @@ fn parameters_change_no_image() {
     ];
     for (case, assignments) in cases.into_iter().enumerate() {
         let seed = 100 * (1 + case as u32);
-        let values = replicates::replicates(&scene, &settings(assignments, 1), seed, 16);
+        let values = replicates::replicates(&scene, &settings(assignments, 1), seed, 8);
         let Comparison { largest_t, ratio, largest_t_with_bias } =
             Comparison::new(&values, &reference);
         eprintln!("{assignments:?}: largest |t| {largest_t:.2}, ratio {ratio:.4}");

@@ -19,27 +19,29 @@ pub const BLOCK: u32 = 8;
 /// Largest |t| allowed. A value of 8 + 8 replicates exceeds it with a chance of 3e-6.
 pub const LIMIT: f64 = 7.5;
 
-/// Averages radiance over every block, channels innermost.
-fn block_means(sums: &Sums) -> Vec<f64> {
-    let blocks_per_row = sums.width / BLOCK;
-    let mut means = vec![0.0; 3 * (blocks_per_row * (sums.height / BLOCK)) as usize];
+/// Averages radiance over every block of `edge` pixels, channels innermost, and over the whole film.
+fn block_means(sums: &Sums, edge: u32) -> Vec<f64> {
+    let blocks_per_row = sums.width / edge;
+    let mut means = vec![0.0; 3 * (blocks_per_row * (sums.height / edge)) as usize];
     for pixel in 0..sums.pixel_count() {
         let (x, y) = (pixel as u32 % sums.width, pixel as u32 / sums.width);
-        let block = (y / BLOCK * blocks_per_row + x / BLOCK) as usize;
+        let block = (y / edge * blocks_per_row + x / edge) as usize;
         for (channel, value) in sums.mean(pixel).into_iter().enumerate() {
-            means[3 * block + channel] += value / f64::from(BLOCK * BLOCK);
+            means[3 * block + channel] += value / f64::from(edge * edge);
         }
     }
+    means.push(means.iter().sum::<f64>() / means.len() as f64);
     means
 }
 
 /// Renders a picture per seed, each from nothing learned but what `prepare` gives the renderer, and
-/// returns their block means.
+/// returns their means over blocks of `edge` pixels, the last over all.
 pub fn rows(
     scene: &Scene,
     settings: &Settings,
     seeds: Range<u32>,
     samples: u32,
+    edge: u32,
     prepare: impl Fn(&mut Renderer),
 ) -> Vec<Vec<f64>> {
     let mut renderer = super::renderer(scene, settings.clone());
@@ -49,14 +51,14 @@ pub fn rows(
             prepare(&mut renderer);
             renderer.render_pass(samples).unwrap();
             assert_eq!(renderer.totals().dropped_samples, 0);
-            block_means(&renderer.sums().unwrap())
+            block_means(&renderer.sums().unwrap(), edge)
         })
         .collect();
     super::assert_silent();
     rows
 }
 
-/// Estimates the block means from [`REPLICATES`] pictures with the seeds from `first_seed` on.
+/// Estimates the means over blocks and film from [`REPLICATES`] pictures with the seeds from `first_seed` on.
 pub fn replicates(
     scene: &Scene,
     settings: &Settings,
@@ -64,5 +66,5 @@ pub fn replicates(
     samples: u32,
 ) -> Vec<Estimate> {
     let seeds = first_seed..first_seed + REPLICATES;
-    estimates(&rows(scene, settings, seeds, samples, |_| {}))
+    estimates(&rows(scene, settings, seeds, samples, BLOCK, |_| {}))
 }
