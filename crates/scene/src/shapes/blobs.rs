@@ -51,25 +51,18 @@ enum Part {
 }
 
 impl Part {
-    fn distance(self, point: DVec3) -> f64 {
-        self.distance_and_gradient(point).0
-    }
-
-    fn distance_and_gradient(self, point: DVec3) -> (f64, DVec3) {
+    /// Distance of a point, with what its gradient is made of.
+    fn distance(self, point: DVec3) -> (f64, Slope) {
         match self {
             Self::Ellipsoid { center, radii } => {
                 let scaled = (point - center) / radii;
                 let twice_scaled = scaled / radii;
                 let (length, steep) = (scaled.length(), twice_scaled.length());
-                if steep == 0.0 {
-                    return (-radii.min_element(), DVec3::ZERO);
-                }
-                let distance = length * (length - 1.0) / steep;
-                let length_gradient = twice_scaled / length;
-                let steep_gradient = twice_scaled / (radii * radii * steep);
-                let gradient =
-                    ((2.0 * length - 1.0) * length_gradient - distance * steep_gradient) / steep;
-                (distance, gradient)
+                let distance = match steep {
+                    0.0 => -radii.min_element(),
+                    _ => length * (length - 1.0) / steep,
+                };
+                (distance, Slope::Ellipsoid { twice_scaled, length, steep, radii })
             }
             Self::Cone { from, to, from_radius, to_radius } => {
                 let axis = to - from;
@@ -78,12 +71,9 @@ impl Part {
                 let offset = point - from - along.clamp(0.0, 1.0) * axis;
                 let widening = to_radius - from_radius;
                 let radius = from_radius + along.clamp(0.0, 1.0) * widening;
-                let radius_gradient = if (0.0..=1.0).contains(&along) && squared > 0.0 {
-                    axis * (widening / squared)
-                } else {
-                    DVec3::ZERO
-                };
-                (offset.length() - radius, offset.normalize_or_zero() - radius_gradient)
+                let is_between = (0.0..=1.0).contains(&along) && squared > 0.0;
+                let widening = if is_between { axis * (widening / squared) } else { DVec3::ZERO };
+                (offset.length() - radius, Slope::Cone { offset, widening })
             }
         }
     }
@@ -95,6 +85,27 @@ impl Part {
             Self::Cone { from, to, from_radius, to_radius } => {
                 [(from - from_radius).min(to - to_radius), (from + from_radius).max(to + to_radius)]
             }
+        }
+    }
+}
+
+/// Quantities of a [`Part::distance`] that its gradient shares.
+#[derive(Clone, Copy, Debug)]
+enum Slope {
+    Ellipsoid { twice_scaled: DVec3, length: f64, steep: f64, radii: DVec3 },
+    Cone { offset: DVec3, widening: DVec3 },
+}
+
+impl Slope {
+    fn gradient(self, distance: f64) -> DVec3 {
+        match self {
+            Self::Ellipsoid { steep: 0.0, .. } => DVec3::ZERO,
+            Self::Ellipsoid { twice_scaled, length, steep, radii } => {
+                let length_gradient = twice_scaled / length;
+                let steep_gradient = twice_scaled / (radii * radii * steep);
+                ((2.0 * length - 1.0) * length_gradient - distance * steep_gradient) / steep
+            }
+            Self::Cone { offset, widening } => offset.normalize_or_zero() - widening,
         }
     }
 }
@@ -116,76 +127,80 @@ struct Field {
 
 impl Field {
     fn distance(&self, point: DVec3) -> f64 {
-        let added = self.join(&self.added, point);
+        self.joined(&distances(&self.added, point), &distances(&self.carved, point))
+    }
+
+    /// Joins the distances of the parts.
+    fn joined(&self, added: &[f64], carved: &[f64]) -> f64 {
+        let added = soft_minimum(added, self.blend);
         if self.carved.is_empty() {
             return added;
         }
         // Subtract the carved parts: the softened maximum of `added` and −`carved`.
-        let carved = self.join(&self.carved, point);
-        -soft_minimum([-added, carved].into_iter(), self.blend)
+        -soft_minimum(&[-added, soft_minimum(carved, self.blend)], self.blend)
     }
 
-    fn join(&self, parts: &[Part], point: DVec3) -> f64 {
-        soft_minimum(parts.iter().map(|part| part.distance(point)), self.blend)
-    }
-
-    /// Keeps only the parts that matter within `reach` of `point`; each of the others adds less
-    /// than exp(−18) to the sum.
-    fn near(&self, point: DVec3, reach: f64) -> Self {
-        let keep = |parts: &[Part]| -> Vec<Part> {
-            let distances: Vec<f64> = parts.iter().map(|part| part.distance(point)).collect();
+    /// Returns the distance of `point`, and the field of the parts that matter within `reach` of it unless
+    /// the surface lies farther away. Each of the other parts adds less than exp(−18) to the sum.
+    fn near(&self, point: DVec3, reach: f64) -> (f64, Option<Self>) {
+        let [added, carved] = [&self.added, &self.carved].map(|parts| distances(parts, point));
+        let distance = self.joined(&added, &carved);
+        if distance.abs() > STEEPEST * reach {
+            return (distance, None);
+        }
+        let keep = |parts: &[Part], distances: &[f64]| -> Vec<Part> {
             let least = distances.iter().copied().fold(f64::INFINITY, f64::min);
             let limit = least + 2.0 * STEEPEST * reach + 18.0 * self.blend;
-            let near = parts.iter().zip(distances).filter(|(_, distance)| *distance <= limit);
+            let near = parts.iter().zip(distances).filter(|(_, distance)| **distance <= limit);
             near.map(|(part, _)| *part).collect()
         };
-        Self { added: keep(&self.added), carved: keep(&self.carved), blend: self.blend }
+        let (added, carved) = (keep(&self.added, &added), keep(&self.carved, &carved));
+        (distance, Some(Self { added, carved, blend: self.blend }))
     }
 
-    fn gradient(&self, point: DVec3) -> DVec3 {
-        let (added, added_gradient) = self.join_with_gradient(&self.added, point);
+    fn distance_and_gradient(&self, point: DVec3) -> (f64, DVec3) {
+        let join = |parts: &[Part]| {
+            let slopes = parts.iter().map(|part| part.distance(point));
+            let parts: Vec<_> =
+                slopes.map(|(distance, slope)| (distance, slope.gradient(distance))).collect();
+            soft_minimum_and_gradient(&parts, self.blend)
+        };
+        let (added, added_gradient) = join(&self.added);
         if self.carved.is_empty() {
-            return added_gradient;
+            return (added, added_gradient);
         }
-        let (carved, carved_gradient) = self.join_with_gradient(&self.carved, point);
-        let gradient = soft_minimum_gradient(
-            [(-added, -added_gradient), (carved, carved_gradient)].into_iter(),
-            self.blend,
-        );
-        -gradient.1
+        let (distance, gradient) =
+            soft_minimum_and_gradient(&[(-added, -added_gradient), join(&self.carved)], self.blend);
+        (-distance, -gradient)
     }
+}
 
-    fn join_with_gradient(&self, parts: &[Part], point: DVec3) -> (f64, DVec3) {
-        soft_minimum_gradient(
-            parts.iter().map(|part| part.distance_and_gradient(point)),
-            self.blend,
-        )
-    }
+fn distances(parts: &[Part], point: DVec3) -> Vec<f64> {
+    parts.iter().map(|part| part.distance(point).0).collect()
 }
 
 /// −blend·ln Σ exp(−distance / blend); the minimum if blend is 0.
-fn soft_minimum(distances: impl Iterator<Item = f64> + Clone, blend: f64) -> f64 {
-    let least = distances.clone().fold(f64::INFINITY, f64::min);
+fn soft_minimum(distances: &[f64], blend: f64) -> f64 {
+    let least = distances.iter().copied().fold(f64::INFINITY, f64::min);
     if blend == 0.0 {
         return least;
     }
-    least - blend * distances.map(|distance| ((least - distance) / blend).exp()).sum::<f64>().ln()
+    let weights = distances.iter().map(|distance| ((least - distance) / blend).exp());
+    least - blend * weights.sum::<f64>().ln()
 }
 
 /// [`soft_minimum`] of distances, with its gradient.
-fn soft_minimum_gradient(
-    distances: impl Iterator<Item = (f64, DVec3)> + Clone,
-    blend: f64,
-) -> (f64, DVec3) {
-    let (least, gradient) = distances
-        .clone()
+fn soft_minimum_and_gradient(parts: &[(f64, DVec3)], blend: f64) -> (f64, DVec3) {
+    let (least, gradient) = parts
+        .iter()
+        .copied()
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .unwrap_or((f64::INFINITY, DVec3::ZERO));
     if blend == 0.0 {
         return (least, gradient);
     }
     let (mut sum, mut gradients) = (0.0, DVec3::ZERO);
-    for (distance, gradient) in distances {
+    for (distance, gradient) in parts {
         let weight = ((least - distance) / blend).exp();
         sum += weight;
         gradients += weight * gradient;
@@ -266,11 +281,10 @@ impl Lattice {
             .map(|block| {
                 let first = grid_position(block, block_counts) * BLOCK_CELLS;
                 let center = low + cell * (first.as_dvec3() + 0.5 * BLOCK_CELLS as f64);
-                let distance = field.distance(center);
-                if distance.abs() > STEEPEST * reach {
+                let (distance, near) = field.near(center, reach);
+                let Some(near) = near else {
                     return (distance, None, Vec::new());
-                }
-                let near = field.near(center, reach);
+                };
                 let side = USizeVec3::splat(BLOCK_CELLS);
                 let distances = (0..BLOCK_CELLS.pow(3))
                     .map(|index| {
@@ -326,15 +340,15 @@ impl Lattice {
         let mut position = self.low + self.cell * sum / f64::from(crossings);
         // Take Newton steps, clamped to the cell so that the net does not fold.
         for _ in 0..2 {
-            let gradient = field.gradient(position);
+            let (distance, gradient) = field.distance_and_gradient(position);
             let squared = gradient.length_squared();
             if squared > 0.0 {
-                position -= gradient * (field.distance(position) / squared);
+                position -= gradient * (distance / squared);
             }
             let [low, high] = [cell_low, cell_high].map(|corner| self.low + self.cell * corner);
             position = position.clamp(low, high);
         }
-        Some((position, field.gradient(position)))
+        Some((position, field.distance_and_gradient(position).1))
     }
 }
 
@@ -421,7 +435,8 @@ mod tests {
                 (field.distance(point + 1e-5 * axis) - field.distance(point - 1e-5 * axis)) / 2e-5
             };
             let expected = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z));
-            let found = field.gradient(point);
+            let (distance, found) = field.distance_and_gradient(point);
+            assert_eq!(distance, field.distance(point), "at {point}");
             assert!(found.abs_diff_eq(expected, 1e-4), "{found} for {expected} at {point}");
         }
     }
