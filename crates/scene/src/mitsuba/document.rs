@@ -188,6 +188,14 @@ impl Document {
         Node { document: self, index: 0 }
     }
 
+    /// Files that textures name, as far as they are there.
+    pub(super) fn images(&self) -> Vec<PathBuf> {
+        let nodes = (0..self.elements.len()).map(|index| Node { document: self, index });
+        let parameters = nodes.filter(|node| node.tag() == "texture").flat_map(Node::children);
+        let names = parameters.filter(|node| node.name() == "filename");
+        names.filter_map(|node| self.resolve(node.attribute("value")?).ok()).collect()
+    }
+
     /// Finds a file by its name, in another case if there is none in its own.
     fn resolve(&self, name: &str) -> Result<PathBuf, Missing> {
         let own = [PathBuf::new()];

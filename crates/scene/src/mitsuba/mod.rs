@@ -91,6 +91,7 @@ pub(crate) fn read(path: &Path, camera: Option<&str>, folder: Folder) -> Result<
         dropped: DroppedOfMany::default(),
         warnings: Vec::new(),
     };
+    reader.textures.load_early(document.images());
     let mut sensors = Vec::new();
     for node in document.root().children() {
         match node.tag() {

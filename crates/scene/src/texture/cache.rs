@@ -17,6 +17,9 @@ pub struct TextureCache {
     textures: BTreeMap<PathBuf, Arc<Texture>>,
 }
 
+/// Texture with its warnings.
+type Decoded = (Arc<Texture>, Vec<String>);
+
 impl TextureCache {
     /// Decodes the files among `paths` that are not there yet, on all cores. Adds the warnings of
     /// [`Texture::load`] in the order of the paths.
@@ -28,6 +31,28 @@ impl TextureCache {
         paths: impl IntoIterator<Item = PathBuf>,
         warnings: &mut Vec<String>,
     ) -> Result<()> {
+        for (key, decoded) in self.decode(paths) {
+            let (texture, own) = decoded?;
+            self.textures.insert(key, texture);
+            warnings.extend(own);
+        }
+        Ok(())
+    }
+
+    /// As [`TextureCache::load_all`], for files that may be asked for. Leaves those that fail and those with
+    /// warnings to [`TextureCache::load`].
+    pub fn load_early(&mut self, paths: impl IntoIterator<Item = PathBuf>) {
+        for (key, decoded) in self.decode(paths) {
+            if let Ok((texture, own)) = decoded
+                && own.is_empty()
+            {
+                self.textures.insert(key, texture);
+            }
+        }
+    }
+
+    /// Decodes the files that are not there yet, each with its warnings.
+    fn decode(&self, paths: impl IntoIterator<Item = PathBuf>) -> Vec<(PathBuf, Result<Decoded>)> {
         // A file that is named in two ways is one texture.
         let mut missing = BTreeMap::new();
         for path in paths {
@@ -36,19 +61,11 @@ impl TextureCache {
                 missing.entry(key).or_insert(path);
             }
         }
-        let decoded: Vec<_> = missing
-            .into_par_iter()
-            .map(|(key, path)| {
-                let mut own = Vec::new();
-                Texture::load(&path, &mut own).map(|texture| (key, Arc::new(texture), own))
-            })
-            .collect();
-        for result in decoded {
-            let (key, texture, own) = result?;
-            self.textures.insert(key, texture);
-            warnings.extend(own);
-        }
-        Ok(())
+        let decode = |path: PathBuf| {
+            let mut own = Vec::new();
+            Texture::load(&path, &mut own).map(|texture| (Arc::new(texture), own))
+        };
+        missing.into_par_iter().map(|(key, path)| (key, decode(path))).collect()
     }
 
     /// Returns the texture of a file, which it decodes if it is not there yet.
