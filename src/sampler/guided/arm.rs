@@ -119,14 +119,16 @@ impl fmt::Display for Arm {
 /// Settings among which a race decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Axes {
-    /// All ways of choosing directions, with and without sharing.
-    Techniques,
+    /// How directions are chosen.
+    Technique,
+    /// How paths bounce, and whether they are shared.
+    Paths,
     /// Half and twice as many shadow rays.
     Rays,
     /// Where paths may end.
     Roulette,
-    /// Arms that choose directions in another way, or share where the one in use does not.
-    OtherTechniques,
+    /// Both at once.
+    Techniques,
     /// Every arm that differs by one setting.
     Everything,
 }
@@ -232,46 +234,35 @@ impl Arms {
     /// Returns the arms that race along `axes`, `arm` first.
     pub(super) fn contenders(&self, axes: Axes, arm: Arm, is_open: bool) -> Vec<Arm> {
         let mut all = vec![arm];
-        match axes {
-            Axes::Techniques => {
-                all.extend(self.other_techniques(arm, is_open));
-                let shared = all.clone().into_iter().flat_map(|arm| self.other_sharing(arm));
-                let shared: Vec<Arm> = shared.collect();
-                all.extend(shared);
-            }
-            Axes::Rays => all.extend(self.other_rays(arm)),
-            Axes::Roulette => all.extend(self.other_roulette(arm)),
-            Axes::OtherTechniques => {
-                all.extend(self.other_techniques(arm, is_open));
-                all.extend(self.other_sharing(arm));
-            }
-            Axes::Everything => {
-                all.extend(self.other_techniques(arm, is_open));
-                all.extend(self.other_sharing(arm));
-                all.extend(self.other_rays(arm));
-                all.extend(self.other_candidates(arm));
-                all.extend(self.other_roulette(arm));
-            }
+        let decides = |those: &[Axes]| axes == Axes::Everything || those.contains(&axes);
+        if decides(&[Axes::Technique, Axes::Techniques]) {
+            all.extend(self.other_technique(arm, is_open));
+        }
+        if decides(&[Axes::Paths, Axes::Techniques]) {
+            all.extend(self.other_bounces(arm));
+            all.extend(self.other_sharing(arm));
+        }
+        if decides(&[Axes::Rays]) {
+            all.extend(self.other_rays(arm));
+        }
+        if decides(&[Axes::Roulette]) {
+            all.extend(self.other_roulette(arm));
+        }
+        if decides(&[]) {
+            all.extend(self.other_candidates(arm));
         }
         all
     }
 
-    /// Arms whose directions are chosen in another way.
-    fn other_techniques(&self, arm: Arm, is_open: bool) -> Vec<Arm> {
-        let mut others = Vec::new();
-        if is_open || !self.chooses_technique {
-            return others;
-        }
-        if arm.is_guided && self.chooses_bounces {
-            others.push(Arm { guides_bounces: !arm.guides_bounces, ..arm });
-        }
-        let other = self.first(arm.is_guided);
-        others.push(Arm {
-            shares_paths: arm.shares_paths,
-            roulette_throughput: arm.roulette_throughput,
-            ..other
-        });
-        others
+    fn other_technique(&self, arm: Arm, is_open: bool) -> Option<Arm> {
+        let Arm { shares_paths, roulette_throughput, .. } = arm;
+        let other = Arm { shares_paths, roulette_throughput, ..self.first(arm.is_guided) };
+        (self.chooses_technique && !is_open).then_some(other)
+    }
+
+    fn other_bounces(&self, arm: Arm) -> Option<Arm> {
+        let is_free = arm.is_guided && self.chooses_bounces;
+        is_free.then_some(Arm { guides_bounces: !arm.guides_bounces, ..arm })
     }
 
     fn other_sharing(&self, arm: Arm) -> Option<Arm> {

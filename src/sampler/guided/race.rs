@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use super::{
     arm::{Arm, Arms, Axes, Work},
-    buffers::GuideBuffers,
+    buffers::{GuideBuffers, guide_schedule},
     cost::{ArmCost, MOST_ROUNDS, race},
     epoch::{TRAINING_SEED, with_epoch},
 };
@@ -23,15 +23,18 @@ use crate::{
     },
 };
 
-/// Races of a render: the samples per pixel from which each is due, and what it decides. The last comes again
-/// whenever the film has four times as many samples.
-const RACES: [(u32, Axes); 5] = [
-    (0, Axes::Techniques),
-    (2, Axes::Rays),
-    (4, Axes::Roulette),
-    (16, Axes::OtherTechniques),
-    (64, Axes::Everything),
+/// Races of a render: the samples per pixel from which each is due, what it decides, and among how many arms.
+/// The last comes again whenever the film has four times as many samples.
+const RACES: [(u32, Axes, u64); 6] = [
+    (0, Axes::Technique, 2),
+    (2, Axes::Paths, 3),
+    (2, Axes::Rays, 3),
+    (4, Axes::Roulette, 2),
+    (16, Axes::Techniques, 4),
+    (64, Axes::Everything, 8),
 ];
+/// Paths of the film for each that races after the first measure, if they take two rounds.
+const FILM_PATHS: u64 = 8;
 /// Separates the random numbers of measurements from those of the training and of the picture.
 const MEASURING_SEED: u32 = 0x2c1b_3c6d;
 /// Most pixels in a wave; a larger film needs no more to tell which arm is better.
@@ -41,13 +44,19 @@ const LEAST_STRIDE: u32 = 8;
 /// Samples of each pixel in a wave, to see how they differ.
 const SAMPLES: u32 = 4;
 
-/// Returns the samples per pixel from which race number `race` is due, and what it decides.
-pub(super) fn race_due(race: u32) -> (u32, Axes) {
-    let (last, axes) = RACES[RACES.len() - 1];
-    match RACES.get(race as usize) {
-        Some(due) => *due,
-        None => (last.saturating_mul(4_u32.saturating_pow(race + 1 - RACES.len() as u32)), axes),
-    }
+/// Returns the samples per pixel from which race number `race` is due in a film of `pixels` pixels, and what it
+/// decides. In small films the measured pixels are many, and races come later.
+pub(super) fn race_due(race: u32, pixels: u32) -> (u32, Axes) {
+    let last = RACES.len() - 1;
+    let (due, axes, arms) = RACES[last.min(race as usize)];
+    let again = (race as usize).saturating_sub(last) as u32;
+    let due = due.saturating_mul(4_u32.saturating_pow(again));
+    let before = RACES.iter().take(race as usize).skip(1).map(|(.., arms)| *arms).sum::<u64>();
+    let arms = if race == 0 { 0 } else { before + arms * u64::from(again.max(1)) };
+    let paths = 2 * arms * u64::from(Blocks::over(pixels, 1).count * BLOCK_PIXELS * SAMPLES);
+    let affordable = (FILM_PATHS * paths).div_ceil(u64::from(pixels.max(1)));
+    // Races need a guide that was just rebuilt.
+    (due.max(guide_schedule(affordable.min(1 << 30) as u32)), axes)
 }
 
 /// A race among the arms of a render.
@@ -92,8 +101,12 @@ struct Blocks {
 
 impl Blocks {
     fn of(runner: &Runner) -> Self {
-        let all = runner.film().padded_pixels() / BLOCK_PIXELS;
-        let columns = runner.film().window().width.div_ceil(FILM_BLOCK);
+        Self::over(runner.film().padded_pixels(), runner.film().window().width.div_ceil(FILM_BLOCK))
+    }
+
+    /// The blocks of so many pixels in so many columns.
+    fn over(pixels: u32, columns: u32) -> Self {
+        let all = (pixels / BLOCK_PIXELS).max(1);
         let mut stride = all.div_ceil(MEASURED_PIXELS / BLOCK_PIXELS).max(LEAST_STRIDE).min(all);
         // Without a common divisor, the blocks lie in all columns.
         while greatest_common_divisor(stride, columns) > 1 {
@@ -207,8 +220,11 @@ mod tests {
 
     #[test]
     fn races_become_rare() {
-        let due: Vec<u32> = (0..8).map(|race| race_due(race).0).collect();
-        assert_eq!(due, [0, 2, 4, 16, 64, 256, 1024, 4096]);
-        assert_eq!(race_due(40).0, u32::MAX);
+        let due = |pixels| (0..9).map(|race| race_due(race, pixels).0).collect::<Vec<u32>>();
+        assert_eq!(due(1 << 20), [0, 2, 2, 4, 16, 64, 256, 1024, 4096]);
+        assert_eq!(race_due(40, 1 << 20).0, u32::MAX);
+        // An eighth of the pixels, four samples of each, three arms, two rounds: as much as 24 samples allow;
+        // the guide is next rebuilt after 32.
+        assert_eq!(due(3072)[..3], [0, 32, 64]);
     }
 }

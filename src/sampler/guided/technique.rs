@@ -195,8 +195,9 @@ impl Guided {
     /// Races the arms if it is time. The guide must have been rebuilt just before, if it learns.
     fn choose(&mut self, runner: &mut Runner, progress: &Progress) -> Result<()> {
         let samples = progress.sample_count;
-        while race_due(self.choice.races).0 <= samples {
-            let axes = race_due(self.choice.races).1;
+        let pixels = runner.film().padded_pixels();
+        while race_due(self.choice.races, pixels).0 <= samples {
+            let axes = race_due(self.choice.races, pixels).1;
             self.choice.races += 1;
             let contenders = self.arms.contenders(axes, self.choice.arm, self.is_open);
             if contenders.len() < 2 || !Race::fits(runner) {
@@ -288,7 +289,7 @@ impl Passes for Guided {
 
     /// The arms of the first race; later ones warm up theirs.
     fn other_steps(&self) -> Vec<Box<dyn Steps>> {
-        let arms = self.arms.contenders(Axes::Techniques, self.arms.first(false), false);
+        let arms = self.arms.contenders(Axes::Technique, self.arms.first(false), false);
         arms.iter().chain(&[self.arms.first(true)]).map(|arm| self.arms.steps(arm)).collect()
     }
 
@@ -319,7 +320,8 @@ impl Technique for Guided {
         if !self.choice.arm.is_guided || self.rebuilt_at == samples {
             self.choose(runner, progress)?;
         }
-        let next = race_due(self.choice.races).0.max(samples + 1) - samples;
+        let pixels = runner.film().padded_pixels();
+        let next = race_due(self.choice.races, pixels).0.max(samples + 1) - samples;
         let is_guided = self.choice.arm.is_guided;
         Ok(if is_guided { next.min(guide_schedule(samples + 1) - samples) } else { next })
     }
