@@ -8,6 +8,8 @@
 #include "path_list.glsl"
 #include "wave.glsl"
 
+READS(lamp_clusters)
+READS(lamp_lists)
 UPDATES(paths)
 
 void add_emission(uint path) {
@@ -28,8 +30,11 @@ void add_emission(uint path) {
     float weight = 1.0;
     if (ray.brdf_pdf > 0.0) {
         float cosine = abs(dot(ray.direction, hit.geometric_normal));
-        weight = ray.brdf_pdf
-            / (ray.brdf_pdf + lamp_pdf(surface.emission_density, hit.distance, cosine));
+        float density = surface.emission_density;
+        if (HAS_LAMP_CELLS) {
+            density *= lamp_ratio(lamp_lists[path], lamp_clusters[hit.triangle]);
+        }
+        weight = ray.brdf_pdf / (ray.brdf_pdf + lamp_pdf(density, hit.distance, cosine));
     }
     PathState state = paths[path];
     paths[path].radiance = state.radiance + state.throughput * radiance * weight;

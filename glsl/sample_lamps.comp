@@ -1,6 +1,6 @@
 // Chooses one point on the lamps at every hit of the wave and writes a shadow ray to it, with its
-// unoccluded contribution. Draws candidates by the power of the lamps and keeps one in proportion to
-// what it brings: resampled importance sampling [Talbot et al. 2005]. The candidates of all rays of a
+// unoccluded contribution. Draws candidates from the list of the place and keeps one in proportion to what
+// it brings and how visible its lamps are there: resampled importance sampling [Talbot et al. 2005]. The candidates of all rays of a
 // hit draw from strata of the lamps; their mean density is that of one free candidate, by which each
 // is divided. Where a bounce ray may find the
 // lamp too, the balance heuristic weighs both by the density of one candidate and of the BRDF.
@@ -10,6 +10,8 @@
 #include "path_list.glsl"
 #include "reservoir.glsl"
 #include "vertex.glsl"
+
+WRITES(lamp_lists)
 
 layout(constant_id = CONSTANT_LAMP_CANDIDATES) const uint LAMP_CANDIDATES = 4u;
 
@@ -24,6 +26,11 @@ void sample_vertex(uint path, Vertex vertex) {
     uint dimension = DIMENSION_LAMP + wave.vertex * DIMENSIONS_PER_LAMP_VERTEX
         + wave.first_shadow_ray * DIMENSIONS_PER_LAMP_RAY;
     uint strata = LAMP_CANDIDATES * wave.total_shadow_rays;
+    uint list = 0u;
+    if (HAS_LAMP_CELLS) {
+        list = lamp_list(hit.position, hit.geometric_normal);
+        lamp_lists[path] = list;
+    }
     uint number = vertex.index.sample_index;
     Reservoir reservoir =
         reservoir_start(random_1d(vertex.index.pixel, number, dimension, wave.seed));
@@ -34,7 +41,7 @@ void sample_vertex(uint path, Vertex vertex) {
         uvec2 bits = random_bits_2d(vertex.index.pixel, number, own, wave.seed);
         bits.x = stratified(bits.x, c * wave.total_shadow_rays + wave.first_shadow_ray, strata);
         LampSample lamp = sample_lamp(
-            hit.position, bits, random_2d(vertex.index.pixel, number, own + 1u, wave.seed));
+            list, hit.position, bits, random_2d(vertex.index.pixel, number, own + 1u, wave.seed));
         vec3 incident_local = to_local(vertex.frame, lamp.direction);
         vec3 value;
         float brdf_pdf;
@@ -46,7 +53,7 @@ void sample_vertex(uint path, Vertex vertex) {
         vec3 contribution = is_above
             ? value * lamp.radiance_over_pdf * (incident_local.z * weight)
             : vec3(0.0);
-        float target = luminance(contribution);
+        float target = luminance(contribution) * lamp.visibility;
         if (reservoir_takes(reservoir, target, target)) {
             chosen_to_lamp = lamp.to_lamp;
             chosen_contribution = contribution;

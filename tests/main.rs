@@ -41,6 +41,7 @@ mod inspect;
 mod instances;
 mod interface;
 mod killed;
+mod lamps;
 mod layers;
 mod light;
 mod lobe_options;

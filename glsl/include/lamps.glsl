@@ -1,5 +1,6 @@
-// Lamps: emitting triangles, and lights without a surface. Sampled by an alias table in proportion to
-// their power, triangles uniformly over their area. Twin of src/pass/lamps.rs for the densities.
+// Lamps: emitting triangles, and lights without a surface. Clusters of them are drawn from the list of the
+// place, those of a cluster in proportion to their power, triangles uniformly over their area. Twin of
+// src/pass/lamps.rs and lamp_cells.rs for the densities.
 
 #include "bvh.glsl"
 #include "emission.glsl"
@@ -7,7 +8,9 @@
 #include "parameters.glsl"
 #include "random.glsl"
 
+READS(lamp_cells)
 READS(lamp_choices)
+READS(lamp_entries)
 READS(lamps)
 
 struct LampSample {
@@ -19,6 +22,8 @@ struct LampSample {
     vec3 radiance_over_pdf;
     // Density per steradian; 0 if no other technique finds the lamp.
     float pdf;
+    // Factor on the weight of a candidate.
+    float visibility;
 };
 
 // Density per steradian of sampling a point at `distance` on a triangle of area `area`, which
@@ -40,7 +45,7 @@ float spot_falloff(Lamp lamp, float cosine) {
 LampSample sample_point_lamp(Lamp lamp, vec3 position) {
     if (lamp.kind == LAMP_DIRECTIONAL) {
         // Beyond any scene, and short enough to have a square.
-        return LampSample(-1.0e18 * lamp.direction, -lamp.direction, lamp.intensity, 0.0);
+        return LampSample(-1.0e18 * lamp.direction, -lamp.direction, lamp.intensity, 0.0, 1.0);
     }
     vec3 to_lamp = lamp.position - position;
     float distance = length(to_lamp);
@@ -50,7 +55,7 @@ LampSample sample_point_lamp(Lamp lamp, vec3 position) {
         falloff = spot_falloff(lamp, -dot(direction, lamp.direction));
     }
     vec3 irradiance = lamp.intensity * (falloff / max(distance * distance, 1.0e-20));
-    return LampSample(to_lamp, direction, irradiance, 0.0);
+    return LampSample(to_lamp, direction, irradiance, 0.0, 1.0);
 }
 
 LampSample sample_triangle_lamp(uint triangle, float probability, vec3 position, vec2 u) {
@@ -67,7 +72,7 @@ LampSample sample_triangle_lamp(uint triangle, float probability, vec3 position,
     vec3 normal = cross(b - a, c - a);
     float twice_area = length(normal);
     float cosine = -dot(direction, normal) / max(twice_area, 1.0e-37);
-    LampSample sampled = LampSample(to_lamp, direction, vec3(0.0), 0.0);
+    LampSample sampled = LampSample(to_lamp, direction, vec3(0.0), 0.0, 1.0);
     if (cosine != 0.0 && distance > 0.0) {
         sampled.pdf = lamp_pdf(2.0 * probability / twice_area, distance, abs(cosine));
         sampled.radiance_over_pdf =
@@ -83,20 +88,79 @@ LampSample sample_triangle_lamp(uint triangle, float probability, vec3 position,
     return sampled;
 }
 
-// Draws a lamp with bits.x and bits.y, and a point on it with u.
-LampSample sample_lamp(vec3 position, uvec2 bits, vec2 u) {
-    // Rounding of the product favours no column by more than lamp_count / 2^32.
+// First entry of the list of a place, by the normal on the side of its ray.
+uint lamp_list(vec3 position, vec3 normal) {
+    vec3 place = (position - parameters.lamp_grid_origin) * parameters.lamp_cells_per_metre;
+    uvec3 size = parameters.lamp_grid_size;
+    uvec3 cell = uvec3(clamp(place, vec3(0.0), vec3(size - 1u)));
+    return lamp_cells[((cell.z * size.y + cell.y) * size.x + cell.x) * 6u + cube_face(normal)];
+}
+
+// Last entry of a list whose cluster begins no later than at column `cluster`.
+LampEntry lamp_entry_of(uint list, uint cluster) {
+    for (uint step = parameters.lamp_list_length >> 1u; step > 0u; step >>= 1u) {
+        list += lamp_entries[list + step].first <= cluster ? step : 0u;
+    }
+    return lamp_entries[list];
+}
+
+// Probability of a lamp of a cluster over that by power alone, at the place of a list.
+float lamp_ratio(uint list, uint cluster) {
+    LampEntry entry = lamp_entry_of(list, cluster);
+    return entry.first == cluster ? entry.ratio : lamp_entries[list].ratio;
+}
+
+// Draws an entry of a list.
+LampEntry draw_lamp_entry(uint list, uint bits) {
+    // The last number belongs to entries that fill the list up.
+    bits = min(bits, 0xfffffffeu);
+    for (uint step = parameters.lamp_list_length >> 1u; step > 0u; step >>= 1u) {
+        list += lamp_entries[list + step].before <= bits ? step : 0u;
+    }
+    return lamp_entries[list];
+}
+
+// A lamp without a point on it.
+struct DrawnLamp {
+    uint source;
+    float probability;
+    float visibility;
+};
+
+// Draws a lamp from a list.
+DrawnLamp draw_lamp(uint list, uvec2 bits) {
+    // Rounding of the products favours no column by more than lamp_count / 2^32.
     uint column = scaled(bits.x, parameters.lamp_count);
+    LampEntry entry = LampEntry(0u, 1.0, 0u, 0u, 1.0);
+    if (HAS_LAMP_CELLS) {
+        entry = draw_lamp_entry(list, bits.x);
+        column = entry.first + scaled(bits.y, entry.count);
+        bits.y *= entry.count;
+    }
     LampChoice choice = lamp_choices[column];
     if (bits.y >= choice.threshold) {
-        choice = lamp_choices[choice.alias];
+        choice = lamp_choices[entry.first + choice.alias];
     }
+    if (HAS_LAMP_CELLS && entry.first == 0u) {
+        // Drawn among all lamps: its cluster may have an entry too.
+        LampEntry own = lamp_entry_of(list, choice.cluster);
+        if (own.first == choice.cluster) {
+            entry = own;
+        }
+    }
+    return DrawnLamp(choice.source, choice.probability * entry.ratio, entry.visibility);
+}
+
+// Draws a lamp from the list of the place, and a point on it with u.
+LampSample sample_lamp(uint list, vec3 position, uvec2 bits, vec2 u) {
+    DrawnLamp drawn = draw_lamp(list, bits);
     LampSample sampled;
-    if ((choice.source & LAMP_BIT) != 0u) {
-        sampled = sample_point_lamp(lamps[choice.source & ~LAMP_BIT], position);
-        sampled.radiance_over_pdf /= choice.probability;
+    if ((drawn.source & LAMP_BIT) != 0u) {
+        sampled = sample_point_lamp(lamps[drawn.source & ~LAMP_BIT], position);
+        sampled.radiance_over_pdf /= drawn.probability;
     } else {
-        sampled = sample_triangle_lamp(choice.source, choice.probability, position, u);
+        sampled = sample_triangle_lamp(drawn.source, drawn.probability, position, u);
     }
+    sampled.visibility = drawn.visibility;
     return sampled;
 }

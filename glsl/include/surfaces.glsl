@@ -11,6 +11,7 @@ const bool HAS_SPECULAR = (SURFACES & SURFACES_SPECULAR) != 0u;
 const bool HAS_PASSAGES = (SURFACES & SURFACES_PASSING) != 0u;
 const bool HAS_BACKS = (SURFACES & SURFACES_ONE_SIDED) != 0u;
 const bool HAS_INSTANCES = (SURFACES & SURFACES_INSTANCED) != 0u;
+const bool HAS_LAMP_CELLS = (SURFACES & SURFACES_LAMP_CELLS) != 0u;
 const bool IS_TEXTURED = (SURFACES & SURFACES_TEXTURED) != 0u;
 
 // Tests whether a kind of material is specular: no light is sampled at it.

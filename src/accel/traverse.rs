@@ -44,6 +44,19 @@ impl Accel {
         self.closest_with_work(origin, direction).0
     }
 
+    /// As [`Accel::closest`], before so many metres.
+    pub(crate) fn closest_before(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        farthest: f32,
+    ) -> Option<Intersection> {
+        let mut ray = self.start(origin, direction, false);
+        ray.distance = farthest;
+        while ray.step() {}
+        ray.hit()
+    }
+
     /// As [`Accel::closest`], and returns the work done.
     pub(crate) fn closest_with_work(
         &self,

@@ -1,14 +1,21 @@
-//! Lamps and emitting triangles → an alias table by power, and densities over triangles.
+//! Lamps and emitting triangles → an alias table by power, densities over triangles, and clusters for the
+//! choice by place ([`LampCells`]).
 
-use std::f32::consts::PI;
+use std::{
+    collections::{BTreeMap, BinaryHeap},
+    f32::consts::PI,
+    ops::Range,
+};
 
 use glam::Vec3;
 
+use super::lamp_cells::LampCells;
 use crate::{
     accel::Accel,
     math::{
         alias::{alias_table, probabilities},
         colour::luminance,
+        refinement::Queued,
     },
     scene::{
         Scene, instance,
@@ -26,15 +33,50 @@ use crate::{
 /// Threshold of a column that always keeps its own source.
 const THRESHOLD_SCALE: u64 = u32::MAX as u64;
 
+/// Clusters up to which lamps are drawn by power: so few cost less than the choice by place.
+const FEW_CLUSTERS: usize = 32;
+/// Most clusters of lamps.
+const MOST_CLUSTERS: usize = 1024;
+/// Extent of connected triangles that are not divided further, as a share of the radius of the scene.
+const SMALL_CLUSTER: f32 = 1.0 / 8.0;
+
 /// Contents of the lamp buffers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct LampTables {
-    /// Alias table over emitting triangles and lamps, in proportion to their power.
+    /// Alias table over emitting triangles and lamps, in proportion to their power. With cells, the tables
+    /// of the clusters follow.
     pub choices: Vec<structs::LampChoice>,
+    /// Number of emitting triangles and lamps.
+    pub source_count: u32,
     /// Lights without a surface.
     pub lamps: Vec<structs::Lamp>,
-    /// Density of sampling points on the triangles of each material, per square metre.
+    /// Density of sampling points on the triangles of each material by power, per square metre.
     pub emission_densities: Vec<f32>,
+    /// Choice by place, where there are many clusters.
+    pub cells: Option<LampCells>,
+    /// Cluster of each placed triangle that emits, where there are cells.
+    pub triangle_clusters: Vec<u32>,
+}
+
+/// Lamp or emitting triangle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Source {
+    /// Triangle in BVH order, or `LAMP_BIT` and a lamp.
+    pub(super) source: u32,
+    /// Luminous power.
+    pub(super) power: f64,
+    /// Middle, metres; `None` if it is infinitely far away.
+    pub(super) centre: Option<Vec3>,
+}
+
+/// Lamps that are drawn by power among themselves.
+#[derive(Clone, Debug)]
+pub(super) struct Cluster {
+    /// Columns of its alias table in [`LampTables::choices`]; the first names the cluster.
+    pub(super) columns: Range<u32>,
+    pub(super) power: f64,
+    /// Mean of the middles by power.
+    pub(super) centre: Option<Vec3>,
 }
 
 impl LampTables {
@@ -58,60 +100,189 @@ impl LampTables {
             })
             .collect();
         let mut sources = Vec::new();
-        let mut weights = Vec::new();
         if per_area.iter().any(|&power| power > 0.0) {
             // Surfaces that emit are placed in the world.
             let placed = &accel.triangle_materials[..accel.placed_count()];
             for (triangle, &material) in (0_u32..).zip(placed) {
                 let power = per_area[material as usize];
                 if power > 0.0 {
-                    sources.push(triangle);
-                    weights.push(f64::from(power) * area(accel, triangle));
+                    let power = f64::from(power) * area(accel, triangle);
+                    let centre = corners(accel, triangle).into_iter().sum::<Vec3>() / 3.0;
+                    sources.push(Source { source: triangle, power, centre: Some(centre) });
                 }
             }
         }
         let radius = radius(scene.geometry.extent());
         for (index, lamp) in (0_u32..).zip(&scene.lamps) {
-            sources.push(LAMP_BIT | index);
-            weights.push(power(&lamp.kind, radius));
+            let centre = match lamp.kind {
+                LampKind::Point { position, .. } | LampKind::Spot { position, .. } => {
+                    Some(position)
+                }
+                LampKind::Directional { .. } => None,
+            };
+            let power = power(&lamp.kind, radius);
+            sources.push(Source { source: LAMP_BIT | index, power, centre });
         }
         let lamps = scene.lamps.iter().map(|lamp| convert(&lamp.kind)).collect();
-        let Some(table) = alias_table(&weights, THRESHOLD_SCALE) else {
-            return Self {
-                lamps,
-                emission_densities: vec![0.0; per_area.len()],
-                ..Self::default()
-            };
-        };
+        let all: Vec<u32> = (0..sources.len() as u32).collect();
+        let total: f64 = sources.iter().map(|source| source.power).sum();
+        let mut tables = Self { source_count: sources.len() as u32, lamps, ..Self::default() };
+        if !tables.add_table(&sources, &all, total) {
+            tables.source_count = 0;
+            tables.emission_densities = vec![0.0; per_area.len()];
+            return tables;
+        }
+        tables.emission_densities =
+            per_area.iter().map(|&power| (f64::from(power) / total) as f32).collect();
+        let small = SMALL_CLUSTER * radius;
+        let members = clusters(&sources, connected(accel, &sources), small);
+        if members.len() > FEW_CLUSTERS {
+            tables.add_cells(scene, accel, &sources, &members, total);
+        }
+        tables
+    }
+
+    /// Adds an alias table over `members` of `sources`, in proportion to their power, which is `total` in the
+    /// first table. Returns false if none has any.
+    fn add_table(&mut self, sources: &[Source], members: &[u32], total: f64) -> bool {
+        let weights: Vec<f64> =
+            members.iter().map(|member| sources[*member as usize].power).collect();
+        let Some(table) = alias_table(&weights, THRESHOLD_SCALE) else { return false };
         let drawn = probabilities(&table, THRESHOLD_SCALE);
-        let total: f64 = weights.iter().sum();
-        let choices = table.iter().zip(&sources).zip(&drawn).map(|((entry, &source), &drawn)| {
+        let share = weights.iter().sum::<f64>() / total;
+        let choices = table.iter().zip(members).zip(&drawn).map(|((entry, &member), &drawn)| {
             structs::LampChoice {
                 threshold: entry.threshold as u32,
                 alias: entry.alias,
-                source,
-                probability: drawn as f32,
+                source: sources[member as usize].source,
+                probability: (drawn * share) as f32,
+                cluster: 0,
             }
         });
-        Self {
-            choices: choices.collect(),
-            lamps,
-            emission_densities: per_area.iter().map(|&p| (f64::from(p) / total) as f32).collect(),
+        self.choices.extend(choices);
+        true
+    }
+
+    /// Adds the tables of clusters and the cells that choose among them.
+    fn add_cells(
+        &mut self,
+        scene: &Scene,
+        accel: &Accel,
+        sources: &[Source],
+        members: &[Vec<u32>],
+        total: f64,
+    ) {
+        let mut clusters = Vec::new();
+        self.triangle_clusters = vec![0; accel.placed_count()];
+        for members in members {
+            let first = self.choices.len() as u32;
+            // Nothing is drawn from a cluster without power.
+            if !self.add_table(sources, members, total) {
+                continue;
+            }
+            for member in members {
+                let source = sources[*member as usize].source;
+                self.choices[*member as usize].cluster = first;
+                if let Some(cluster) = self.triangle_clusters.get_mut(source as usize) {
+                    *cluster = first;
+                }
+            }
+            let own = || members.iter().map(|member| &sources[*member as usize]);
+            let power: f64 = own().map(|source| source.power).sum();
+            let weighted =
+                |source: &Source| source.centre.map(|c| c * (source.power / power) as f32);
+            let centre = own().map(weighted).sum();
+            clusters.push(Cluster { columns: first..self.choices.len() as u32, power, centre });
+        }
+        let cells = LampCells::new(scene, accel, self, &clusters, total);
+        self.cells = Some(cells);
+    }
+}
+
+/// Groups the triangles that hang together at their corners; others are groups by themselves.
+fn connected(accel: &Accel, sources: &[Source]) -> Vec<Vec<u32>> {
+    fn root(parents: &mut [u32], mut index: u32) -> u32 {
+        while parents[index as usize] != index {
+            let next = parents[index as usize];
+            parents[index as usize] = parents[next as usize];
+            index = next;
+        }
+        index
+    }
+    let mut parents: Vec<u32> = (0..sources.len() as u32).collect();
+    let mut owners = BTreeMap::new();
+    for (index, Source { source, .. }) in (0_u32..).zip(sources) {
+        let corners = (source & LAMP_BIT == 0).then(|| corners(accel, *source));
+        for corner in corners.into_iter().flatten() {
+            let owner = *owners.entry(corner.to_array().map(f32::to_bits)).or_insert(index);
+            let [a, b] = [owner, index].map(|index| root(&mut parents, index));
+            parents[a.max(b) as usize] = a.min(b);
         }
     }
+    let mut groups: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for index in 0..sources.len() as u32 {
+        groups.entry(root(&mut parents, index)).or_default().push(index);
+    }
+    groups.into_values().collect()
+}
+
+/// Divides groups of sources into clusters no wider than `small` metres, the largest power and extent first,
+/// as long as there are no more than [`MOST_CLUSTERS`]. Begins with one where the groups are too many. Each that
+/// is infinitely far away is one by itself.
+fn clusters(sources: &[Source], groups: Vec<Vec<u32>>, small: f32) -> Vec<Vec<u32>> {
+    let source = |index: &u32| &sources[*index as usize];
+    let (near, mut clusters): (Vec<Vec<u32>>, Vec<Vec<u32>>) = groups
+        .into_iter()
+        .partition(|group| group.iter().all(|index| source(index).centre.is_some()));
+    let are_many = near.len() > MOST_CLUSTERS;
+    let near = if are_many { vec![near.concat()] } else { near };
+    let small = if are_many { 0.0 } else { small };
+    let mut waiting = BinaryHeap::new();
+    let centre = |index: &u32| source(index).centre.unwrap_or_default();
+    let extent = |members: &[u32]| {
+        instance::bounds(members.iter().map(centre)).map_or(Vec3::ZERO, |[low, high]| high - low)
+    };
+    let priority = |members: &[u32]| {
+        let power: f64 = members.iter().map(|index| source(index).power).sum();
+        let width = extent(members).max_element();
+        (width > small).then(|| power * f64::from(width))
+    };
+    for members in near {
+        let index = clusters.len();
+        waiting.extend(priority(&members).map(|priority| Queued { priority, index }));
+        clusters.push(members);
+    }
+    while clusters.len() < MOST_CLUSTERS {
+        let Some(Queued { index, .. }) = waiting.pop() else { break };
+        let mut members = std::mem::take(&mut clusters[index]);
+        let axis = extent(&members).max_position();
+        members.sort_by(|a, b| centre(a)[axis].total_cmp(&centre(b)[axis]).then(a.cmp(b)));
+        let upper = members.split_off(members.len() / 2);
+        for (index, members) in [(index, members), (clusters.len(), upper)] {
+            waiting.extend(priority(&members).map(|priority| Queued { priority, index }));
+            if index == clusters.len() {
+                clusters.push(members);
+            } else {
+                clusters[index] = members;
+            }
+        }
+    }
+    clusters
+}
+
+/// Corners of a placed triangle, metres.
+pub(super) fn corners(accel: &Accel, triangle: u32) -> [Vec3; 3] {
+    accel.triangle(triangle).vertices.map(|vertex| Vec3::from_array(vertex.position))
 }
 
 /// Area of a triangle, square metres.
 fn area(accel: &Accel, triangle: u32) -> f64 {
-    let [a, b, c] = accel
-        .triangle(triangle)
-        .vertices
-        .map(|vertex| Vec3::from_array(vertex.position).as_dvec3());
+    let [a, b, c] = corners(accel, triangle).map(|corner| corner.as_dvec3());
     0.5 * (b - a).cross(c - a).length()
 }
 
 /// Radius of a sphere around all positions, metres.
-fn radius(positions: impl Iterator<Item = Vec3>) -> f32 {
+pub(super) fn radius(positions: impl Iterator<Item = Vec3>) -> f32 {
     instance::bounds(positions).map_or(0.0, |[low, high]| 0.5 * (high - low).length())
 }
 

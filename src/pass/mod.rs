@@ -9,6 +9,7 @@ pub mod geometry;
 mod host_parts;
 pub mod host_tracer;
 pub mod kernel;
+pub(crate) mod lamp_cells;
 pub mod lamps;
 pub mod order;
 mod passages;

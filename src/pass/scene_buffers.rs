@@ -20,7 +20,7 @@ use crate::{
     scene::{Camera, EnvironmentMap, Filter, Scene, environment::EnvironmentTables},
     shader::{
         bindings::{Binding, SCENE, scene as bindings},
-        constants::SURFACES_INSTANCED,
+        constants::{SURFACES_INSTANCED, SURFACES_LAMP_CELLS},
         structs::{self, SceneParameters},
     },
     surface::SurfaceTables,
@@ -88,8 +88,9 @@ impl SceneBuffers {
         let surfaces = Surfaces {
             material_kinds,
             features: surfaces::features(&scene.materials)
-                | if geometry.traversal().is_instanced { SURFACES_INSTANCED } else { 0 },
-            lamp_count: lamps.choices.len() as u32,
+                | if geometry.traversal().is_instanced { SURFACES_INSTANCED } else { 0 }
+                | if lamps.cells.is_some() { SURFACES_LAMP_CELLS } else { 0 },
+            lamp_count: lamps.source_count,
             access: textures.access(),
         };
         let materials = Buffer::from_slice(device, "materials", &tables.materials)?;
@@ -98,8 +99,13 @@ impl SceneBuffers {
 
         let tables = EnvironmentTables::new(&scene.environment);
         let compensated = EnvironmentTables::compensated(&scene.environment);
+        let mut lamp_cells = lamps.cells.unwrap_or_default();
         let parameters = SceneParameters {
-            lamp_count: lamps.choices.len() as u32,
+            lamp_count: lamps.source_count,
+            lamp_grid_origin: lamp_cells.grid.origin.into(),
+            lamp_cells_per_metre: lamp_cells.grid.cells_per_metre,
+            lamp_grid_size: lamp_cells.grid.size,
+            lamp_list_length: lamp_cells.list_length,
             compensated_total: compensated.total,
             ..parameters(scene, &scene.environment, tables.total, window)
         };
@@ -129,11 +135,22 @@ impl SceneBuffers {
         );
         let mut choices = lamps.choices;
         let mut point_lamps = lamps.lamps;
+        let mut clusters = lamps.triangle_clusters;
         // A buffer has at least one element.
+        clusters.resize(clusters.len().max(1), 0);
+        lamp_cells.lists.resize(lamp_cells.lists.len().max(1), 0);
+        let entries = &mut lamp_cells.entries;
+        entries.resize(entries.len().max(1), structs::LampEntry::default());
         choices.resize(choices.len().max(1), structs::LampChoice::default());
         point_lamps.resize(point_lamps.len().max(1), structs::Lamp::default());
         add(bindings::LAMP_CHOICES, Buffer::from_slice(device, "lamp choices", &choices)?);
         add(bindings::LAMPS, Buffer::from_slice(device, "lamps", &point_lamps)?);
+        add(bindings::LAMP_CELLS, Buffer::from_slice(device, "lamp cells", &lamp_cells.lists)?);
+        add(
+            bindings::LAMP_ENTRIES,
+            Buffer::from_slice(device, "lamp entries", &lamp_cells.entries)?,
+        );
+        add(bindings::LAMP_CLUSTERS, Buffer::from_slice(device, "lamp clusters", &clusters)?);
         let mut bound: Vec<_> =
             places.into_iter().zip(&buffers).chain(geometry.bindings()).collect();
         bound.extend(textures.bindings());

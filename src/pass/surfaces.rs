@@ -5,8 +5,8 @@ use crate::{
     scene::material::{Material, MaterialKind},
     shader::constants::{
         CONSTANT_MATERIAL_KINDS, CONSTANT_SURFACES, KINDS_WITH_BASE, SURFACES_EMITTING,
-        SURFACES_INSTANCED, SURFACES_ONE_SIDED, SURFACES_PASSING, SURFACES_SPECULAR,
-        SURFACES_TEXTURED,
+        SURFACES_INSTANCED, SURFACES_LAMP_CELLS, SURFACES_ONE_SIDED, SURFACES_PASSING,
+        SURFACES_SPECULAR, SURFACES_TEXTURED,
     },
 };
 
@@ -17,7 +17,7 @@ pub struct Surfaces {
     pub material_kinds: u32,
     /// Bits `SURFACES_…`.
     pub features: u32,
-    /// Columns of the alias table over lamps and emitting triangles.
+    /// Number of lamps and emitting triangles.
     pub lamp_count: u32,
     /// Access to textures and to attributes of triangles.
     pub access: TextureAccess,
@@ -44,6 +44,11 @@ impl Surfaces {
     /// True if some material emits light.
     pub(crate) fn emits(&self) -> bool {
         self.features & SURFACES_EMITTING != 0
+    }
+
+    /// True if lamps are chosen by place.
+    pub(crate) fn has_lamp_cells(&self) -> bool {
+        self.features & SURFACES_LAMP_CELLS != 0
     }
 
     /// True if some material has a diffuse base, whose light the pixels of a cohort can share.

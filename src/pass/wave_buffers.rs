@@ -42,6 +42,7 @@ pub struct WaveBuffers {
     surfaces: Buffer,
     instances: Buffer,
     path_lists: Buffer,
+    lamp_lists: Buffer,
 }
 
 impl WaveBuffers {
@@ -84,6 +85,8 @@ impl WaveBuffers {
         let surfaces = make("hit surfaces", surface_count, size_of::<Surface>())?;
         let instance_count = if of.is_instanced() { paths } else { 1 };
         let instances = make("hit instances", instance_count, size_of::<u32>())?;
+        let lamp_list_count = if of.has_lamp_cells() { paths } else { 1 };
+        let lamp_lists = make("lamp lists", lamp_list_count, size_of::<u32>())?;
         let path_lists = Buffer::new(device, "path lists", path_list_bytes(paths))?;
         let paths = make("paths", paths, size_of::<PathState>())?;
         let bound = [
@@ -99,6 +102,7 @@ impl WaveBuffers {
             (wave::HIT_INSTANCES, &instances),
             (wave::PATH_LISTS, &path_lists),
             (wave::PATH_LIST_TEXELS, &path_lists),
+            (wave::LAMP_LISTS, &lamp_lists),
         ];
         let set = DescriptorSet::new(device, &WAVE, &bound)?;
         Ok(Self {
@@ -112,6 +116,7 @@ impl WaveBuffers {
             surfaces,
             instances,
             path_lists,
+            lamp_lists,
         })
     }
 
@@ -180,6 +185,7 @@ impl WaveBuffers {
             &self.surfaces,
             &self.instances,
             &self.path_lists,
+            &self.lamp_lists,
         ]
         .map(|buffer| (buffer.name().to_owned(), buffer.size()))
         .into()

@@ -186,6 +186,10 @@ binding_tables! {
         14 LAMP_CHOICES: array LampChoice;
         /// Lights without a surface.
         15 LAMPS: array Lamp;
+        /// First entry of the list of each cell and cube face.
+        16 LAMP_CELLS: array uint;
+        /// Lists of lamps.
+        17 LAMP_ENTRIES: array LampEntry;
         /// `environment_rows` of the compensated density.
         18 COMPENSATED_ROWS: texels R32Float;
         /// `environment_cells` of the compensated density.
@@ -213,6 +217,8 @@ binding_tables! {
         31 TRIANGLE_ATTRIBUTES_3: texels R32Uint;
         /// Instances in the order of the upper level of the tree, eight texels each.
         32 INSTANCES: texels Rgba32Uint;
+        /// Cluster of each placed triangle that emits.
+        33 LAMP_CLUSTERS: array uint;
     }
 
     /// Set 1 of the passes by which pixels share paths.
@@ -268,6 +274,8 @@ binding_tables! {
         10 PATH_LISTS: array uint;
         /// Lists of paths again.
         11 PATH_LIST_TEXELS: texels R32Uint;
+        /// First entry of the list that lamps were drawn from at the last vertex of each path.
+        12 LAMP_LISTS: array uint;
     }
 
     /// Set 1 of the passes that show films in a window.

@@ -144,6 +144,8 @@ constants! {
     SURFACES_EMITTING = 16;
     /// Meshes are placed by instances: the tree has two levels.
     SURFACES_INSTANCED = 32;
+    /// Lamps are chosen by place.
+    SURFACES_LAMP_CELLS = 64;
 
     // Dimensions of random numbers that the host draws too.
     /// First dimension of the first vertex of a path.

@@ -7,6 +7,9 @@ pub type vec2 = [f32; 2];
 /// Three floats in scalar layout: 12 bytes.
 #[expect(non_camel_case_types, reason = "GLSL's name")]
 pub type vec3 = [f32; 3];
+/// Three unsigned words in scalar layout: 12 bytes.
+#[expect(non_camel_case_types, reason = "GLSL's name")]
+pub type uvec3 = [u32; 3];
 /// An unsigned word.
 #[expect(non_camel_case_types, reason = "GLSL's name")]
 pub type uint = u32;
@@ -108,8 +111,16 @@ structs! {
         environment_total: float,
         /// The same of the compensated density.
         compensated_total: float,
-        /// Columns of the alias table over lamps.
+        /// Columns of the alias table over all lamps.
         lamp_count: uint,
+        /// Corner of the grid of cells that choose lamps, metres.
+        lamp_grid_origin: vec3,
+        /// Cells a metre.
+        lamp_cells_per_metre: float,
+        /// Cells along each axis.
+        lamp_grid_size: uvec3,
+        /// Entries of a list, a power of two.
+        lamp_list_length: uint,
     }
 
     /// A ray to trace for its closest hit.
@@ -175,8 +186,24 @@ structs! {
         alias: uint,
         /// Triangle in BVH order, or `LAMP_BIT` and a lamp.
         source: uint,
-        /// Probability with which the table draws `source`.
+        /// Probability with which the table of all draws `source`.
         probability: float,
+        /// First column of the table of its cluster.
+        cluster: uint,
+    }
+
+    /// Entry of a list of lamps: the first stands for all lamps, the others for clusters, by `first`.
+    struct LampEntry {
+        /// Probability of the entries before, in units of 2⁻³².
+        before: uint,
+        /// Probability of a lamp of the cluster, over that by power alone.
+        ratio: float,
+        /// First column of the alias table.
+        first: uint,
+        /// Number of columns.
+        count: uint,
+        /// Factor on the weight of a candidate.
+        visibility: float,
     }
 
     /// Direction sampled at a hit, with its contribution if the environment is visible there.

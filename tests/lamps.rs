@@ -1,0 +1,152 @@
+//! Lamps chosen by place: densities of the draws, and pictures of rooms that other rooms' lamps do not reach.
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
+use std::collections::BTreeMap;
+
+use bytemuck::{Pod, Zeroable};
+use fenestra::{
+    film::Window,
+    gpu::{Buffer, Commands, DescriptorSet, Pipeline},
+    math::random::hash_4d,
+    pass::SceneBuffers,
+    sampler::Sampler,
+    scene::Scene,
+    session::Settings,
+    shader::{
+        bindings::{PROBE, probe},
+        constants::{CONSTANT_SURFACES, SURFACES_LAMP_CELLS},
+    },
+};
+
+use crate::support::{
+    self,
+    command::Folder,
+    replicates::{LIMIT, replicates},
+    statistics::{Comparison, chi_square_p_value},
+};
+
+const DRAWS: u32 = 1 << 15;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Query {
+    position: [f32; 3],
+    normal: [f32; 3],
+    bits: [u32; 2],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+struct Answer {
+    source: u32,
+    probability: f32,
+    found_probability: f32,
+}
+
+/// A row of closed rooms of 4 m × 3 m × 4 m, each with a lamp below its ceiling; the camera is in the first.
+fn rooms(count: i32) -> Scene {
+    let mut text = String::from(
+        "[camera]\nposition = [0.4, 1.6, 0.4]\nlook_at = [2.6, 1.1, 2.6]\nvertical_fov_deg = 70\n\
+         [film]\nwidth = 16\nheight = 16\n\
+         [[material]]\nname = \"wall\"\ntype = \"diffuse\"\nreflectance = [0.6, 0.5, 0.4]\n\
+         [[material]]\nname = \"lamp\"\ntype = \"diffuse\"\nreflectance = [0.1, 0.1, 0.1]\n\
+         emission = [12, 11, 9]\n",
+    );
+    let mut objects = 0_u32..;
+    let mut add = |material: &str, size: [f32; 3], at: [f32; 3]| {
+        let name = objects.next().unwrap();
+        text += &format!(
+            "[[object]]\nname = \"{name}\"\nshape = \"box\"\nmaterial = \"{material}\"\n\
+             size = {size:?}\ntranslate = {at:?}\n"
+        );
+    };
+    let length = 4.0 * count as f32;
+    for height in [-0.05, 3.05] {
+        add("wall", [length + 0.2, 0.1, 4.2], [0.5 * length, height, 2.0]);
+    }
+    for side in [0.0, 4.0] {
+        add("wall", [length, 3.0, 0.1], [0.5 * length, 1.5, side]);
+    }
+    for room in 0..=count {
+        add("wall", [0.1, 3.0, 4.0], [4.0 * room as f32, 1.5, 2.0]);
+    }
+    for room in 0..count {
+        add("lamp", [0.4, 0.02, 0.4], [4.0 * room as f32 + 3.0, 2.8, 2.0]);
+    }
+    let folder = Folder::new();
+    let path = folder.path().join("rooms.toml");
+    std::fs::write(&path, text).unwrap();
+    Scene::load(&path).unwrap()
+}
+
+/// Draws lamps at a place on a floor.
+fn draws(scene: &SceneBuffers, position: [f32; 3]) -> Vec<Answer> {
+    let query = |draw| {
+        let [a, b, ..] = hash_4d([draw, 1, 2, 3]);
+        Query { position, normal: [0.0, 1.0, 0.0], bits: [a, b] }
+    };
+    let device = support::device();
+    let queries: Vec<Query> = (0..DRAWS).map(query).collect();
+    let input = Buffer::from_slice(device, "queries", &queries).unwrap();
+    let bytes = size_of::<Answer>() * queries.len();
+    let output = Buffer::zeroed(device, "answers", bytes as u64).unwrap();
+    let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/lamps.spv"));
+    let constants = [(CONSTANT_SURFACES, scene.surfaces().features)];
+    let pipeline = Pipeline::new(device, "lamps", spirv, &constants).unwrap();
+    let bound = [(probe::PROBE_INPUT, &input), (probe::PROBE_OUTPUT, &output)];
+    let probe = DescriptorSet::new(device, &PROBE, &bound).unwrap();
+    let mut commands = Commands::begin(device).unwrap();
+    commands.dispatch(&pipeline, &[scene.set(), &probe], &[], DRAWS);
+    commands.submit_and_wait().unwrap();
+    output.download(queries.len()).unwrap()
+}
+
+#[test]
+fn lamps_are_drawn_as_their_probabilities_say() {
+    let _alone = support::alone();
+    let scene = rooms(40);
+    let window = Window { x: 0, y: 0, width: 16, height: 16 };
+    let buffers = SceneBuffers::new(support::device(), &scene, window).unwrap();
+    assert_ne!(buffers.surfaces().features & SURFACES_LAMP_CELLS, 0);
+    let mut likely = Vec::new();
+    for position in [[1.0, 0.0, 1.0], [123.0, 0.0, 3.0]] {
+        let mut counts: BTreeMap<u32, (f64, f64)> = BTreeMap::new();
+        for answer in draws(&buffers, position) {
+            let Answer { source, probability, found_probability } = answer;
+            // A bounce that meets the lamp finds the same density.
+            assert!((found_probability / probability - 1.0).abs() < 1e-4, "{answer:?}");
+            counts.entry(source).or_insert((0.0, probability.into())).0 += 1.0;
+        }
+        let sum: f64 = counts.values().map(|(_, probability)| probability).sum();
+        assert!((sum - 1.0).abs() < 1e-5, "{sum}");
+        let (observed, expected): (Vec<f64>, Vec<f64>) = counts
+            .values()
+            .map(|(count, probability)| (*count, probability * f64::from(DRAWS)))
+            .unzip();
+        let p = chi_square_p_value(&observed, &expected);
+        assert!(p > 1e-4, "p = {p}");
+        // The lamp of the room gets nearly all, wherever the others are.
+        let mut shares: Vec<(f64, u32)> =
+            counts.iter().map(|(source, (_, probability))| (*probability, *source)).collect();
+        shares.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let own: f64 = shares[..12].iter().map(|(probability, _)| probability).sum();
+        eprintln!("{} lamps, {own:.3} for those of the room, p = {p:.3}", counts.len());
+        assert!(own > 0.9, "{own}");
+        likely.push(shares[0].1);
+    }
+    assert_ne!(likely[0], likely[1]);
+    support::assert_silent();
+}
+
+/// Alone, its lamp is all there is and drawn by power.
+#[test]
+fn a_room_looks_the_same_beside_others() {
+    let _alone = support::alone();
+    let settings = Settings { sampler: Sampler::Mis, depth: 2, ..Settings::default() };
+    let alone = replicates(&rooms(1), &settings, 0, 128);
+    let beside = replicates(&rooms(40), &settings, 100, 128);
+    let Comparison { largest_t, ratio, .. } = Comparison::new(&beside, &alone);
+    eprintln!("largest |t| {largest_t:.2}, ratio {ratio:.4}");
+    assert!(largest_t < LIMIT, "|t| = {largest_t}");
+    assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
+}
