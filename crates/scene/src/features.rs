@@ -32,7 +32,6 @@ features! {
     GLTF_HIGH_UV "textures with coordinates of the third or a further set" "";
     GLTF_COLORS "further sets of vertex colours" "";
     GLTF_UV "third and further sets of texture coordinates" "";
-    GLTF_SKIN "skins" "the mesh is placed by its node";
     GLTF_ANIMATION "animations" "played by `--frames`; else nodes stand as the file places them";
     GLTF_MORPH_ANIMATION "animated weights of morph targets" "those of the file count";
     GLTF_POINTS "points and lines" "";
@@ -40,7 +39,7 @@ features! {
     GLTF_LIGHT_RANGE "range of lights" "light falls off with the squared distance alone";
     GLTF_OBJECT_LIGHTS "lights of a file in a `.toml` scene" "";
     GLTF_UNLIT_COLOR "vertex colours of unlit materials" "";
-    GLTF_SPECULAR_TEXTURE "textures of `KHR_materials_specular`" "";
+    GLTF_SPECULAR_TEXTURE "textures of `KHR_materials_specular`" "the factors alone count";
     GLTF_LOW_TRANSMISSION "transmission of less than half the light" "the surface is opaque";
     GLTF_TRANSMISSION_TEXTURE "texture of transmission" "a triangle is glass or opaque by its mean there";
     GLTF_GLASS_COLOR "base colour texture of glass" "its mean tints it";
@@ -50,12 +49,12 @@ features! {
     GLTF_GLOSSINESS_TEXTURE
         "specular texture of `KHR_materials_pbrSpecularGlossiness` on other coordinates than the diffuse one"
         "its mean colour counts; its glossiness is read";
-    GLTF_CLEARCOAT "`KHR_materials_clearcoat`" "";
-    GLTF_SHEEN "`KHR_materials_sheen`" "";
-    GLTF_IRIDESCENCE "`KHR_materials_iridescence`" "";
-    GLTF_ANISOTROPY "`KHR_materials_anisotropy`" "";
-    GLTF_DISPERSION "`KHR_materials_dispersion`" "";
-    GLTF_VARIANTS "`KHR_materials_variants`" "";
+    GLTF_CLEARCOAT "`KHR_materials_clearcoat`" "without the gloss of the coat";
+    GLTF_SHEEN "`KHR_materials_sheen`" "without the bright rim of cloth";
+    GLTF_IRIDESCENCE "`KHR_materials_iridescence`" "reflections without the colours of thin films";
+    GLTF_ANISOTROPY "`KHR_materials_anisotropy`" "highlights are round";
+    GLTF_DISPERSION "`KHR_materials_dispersion`" "glass does not part colours";
+    GLTF_VARIANTS "`KHR_materials_variants`" "the materials without a choice";
     GLTF_BASISU "`KHR_texture_basisu`" "the other image of the texture is used; refused if there is none";
     GLTF_EXTENSION "other extensions, by name" "refused where the file requires them";
 }

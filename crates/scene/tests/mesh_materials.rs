@@ -345,6 +345,32 @@ fn morph_targets_move_vertices_by_their_weights() {
 }
 
 #[test]
+fn joints_carry_the_vertices_of_a_skin() {
+    let shift = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0];
+    let twice = [2.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+    let joints = vec![0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0];
+    let weights = [1.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0];
+    let attributes = [
+        positions(),
+        Attribute("JOINTS_0", 5121, "VEC4", false, joints),
+        Attribute("WEIGHTS_0", 5126, "VEC4", false, floats(&weights)),
+        Attribute("_BINDS", 5126, "MAT4", false, floats(&[shift, twice, twice].concat())),
+    ];
+    let skins = r#", "skins": [{"joints": [1, 2], "inverseBindMatrices": 3}]"#;
+    let nodes = r#""nodes": [{"mesh": 0, "skin": 0, "translation": [9, 9, 9]},
+        {"translation": [2, 0, 0], "children": [2]}, {"translation": [0, 0, 4]}]"#;
+    let text = gltf_of(&attributes, 3, "", skins)
+        .replace(r#""nodes": [{"mesh": 0}]"#, nodes)
+        .replace(r#"[{"nodes": [0]}]"#, r#"[{"nodes": [0, 1]}]"#);
+    let folder = Folder::new();
+    let read = |text: String| Mesh::read(&folder.write("a.gltf", text), &mut Vec::new());
+    let mesh = read(text.clone()).unwrap();
+    assert_eq!(mesh.positions, [[2.0, 1.0, 0.0], [3.5, 0.5, 2.0], [2.0, 2.0, 0.0]]);
+    let found = read(text.replace("[1, 2], \"inverse", "[1], \"inverse")).unwrap_err().to_string();
+    assert!(found.contains("vertex 1: joint 1 is out of range, the skin has 1"), "{found}");
+}
+
+#[test]
 fn normal_maps_without_tangents_get_them() {
     let folder = Folder::new();
     folder.write("n.png", png([[128, 128, 255, 255]; 2]));

@@ -5,7 +5,7 @@ use gltf::{
     buffer::View,
 };
 
-use super::GltfReader;
+use super::{GltfReader, document::CONVERSION};
 use crate::{
     error::{Error, Result},
     memory,
@@ -105,7 +105,11 @@ impl<'a> GltfReader<'a> {
     }
 
     /// Reads the elements of an accessor, each from its `accessor.size()` bytes.
-    fn elements<T>(&self, accessor: &Accessor, element: impl Fn(&[u8]) -> T) -> Result<Vec<T>> {
+    pub(super) fn elements<T>(
+        &self,
+        accessor: &Accessor,
+        element: impl Fn(&[u8]) -> T,
+    ) -> Result<Vec<T>> {
         let label = format!("accessor {}", accessor.index());
         let (count, size) = (accessor.count(), accessor.size());
         memory::check_count(
@@ -126,8 +130,11 @@ impl<'a> GltfReader<'a> {
             None => {
                 let compressed = "KHR_draco_mesh_compression";
                 let has_draco = self.document.extensions_used().any(|used| used == compressed);
-                let cause =
-                    if has_draco { format!(" (`{compressed}` is refused)") } else { String::new() };
+                let cause = if has_draco {
+                    format!(" (`{compressed}`: {CONVERSION})")
+                } else {
+                    String::new()
+                };
                 return Err(self.error(format!("{label} has no buffer view{cause}")));
             }
         };

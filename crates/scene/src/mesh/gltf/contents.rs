@@ -96,7 +96,7 @@ impl GltfReader<'_> {
         }
     }
 
-    /// Keeps the camera of a node; counts its lights, skin and other extensions.
+    /// Keeps the camera of a node; counts its other extensions.
     pub(super) fn read_node(&mut self, node: &Node, world_from_node: Mat4) {
         let place = || label("node", node.index(), node.name());
         if let Some(camera) = node.camera() {
@@ -111,9 +111,6 @@ impl GltfReader<'_> {
             let names = names.collect();
             let found = MeshCamera { names, world_from_camera: world_from_node, perspective };
             self.cameras.push((camera.index(), found));
-        }
-        if node.skin().is_some() {
-            self.ignored.add(features::GLTF_SKIN, place);
         }
         let json = &self.json["nodes"][node.index()];
         for_each_extension(json, &mut |name| ignore_extension(&mut self.ignored, name, place));

@@ -16,6 +16,10 @@ use crate::{
     features, files,
 };
 
+/// Remedy for meshes that are compressed.
+pub(super) const CONVERSION: &str =
+    "`npx @gltf-transform/cli copy IN.glb OUT.glb` writes a file without the compression";
+
 /// Parses and checks a document; returns it with its binary chunk and its JSON as a tree, which
 /// holds the extensions.
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>, Value)> {
@@ -50,9 +54,12 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<(Document, Option<Vec<u
         let name = format!("`{extension}`");
         let is_left_out = features::GLTF.iter().any(|feature| feature.name == name);
         if !is_left_out && !features::GLTF_EXTENSIONS.contains(&extension.as_str()) {
+            let remedy = match extension.as_str() {
+                "KHR_draco_mesh_compression" | "EXT_meshopt_compression" => CONVERSION,
+                _ => "export it without",
+            };
             let message = format!(
-                "the file requires the extension `{extension}`, which is not supported: export it \
-                 without"
+                "the file requires the extension `{extension}`, which is not supported: {remedy}"
             );
             return Err(Error::format(path, message));
         }

@@ -12,6 +12,7 @@ mod glossiness;
 mod lamps;
 mod material;
 mod primitive;
+mod skin;
 mod textures;
 
 use std::{collections::HashMap, path::Path, sync::Arc};
@@ -20,7 +21,7 @@ use glam::Mat4;
 use gltf::{Document, Node, buffer::Source};
 use serde_json::Value;
 
-use self::material::Pane;
+use self::{material::Pane, primitive::Place};
 use super::{Mesh, MeshCamera, images::Images};
 use crate::{
     error::{Error, Result},
@@ -146,7 +147,8 @@ impl GltfReader<'_> {
         self.ignore_contents(time.is_none());
         let poses = time.map_or(Ok(HashMap::new()), |time| self.poses(time))?;
         let document = self.document;
-        let mut visited = vec![false; document.nodes().count()];
+        let mut worlds: Vec<Option<Mat4>> = vec![None; document.nodes().count()];
+        let mut skinned = Vec::new();
         let mut seen_meshes = vec![false; document.meshes().count()];
         let scene = document.default_scene().or_else(|| document.scenes().next());
         let scene = scene.ok_or_else(|| self.error("expected a scene with nodes, found none"))?;
@@ -163,18 +165,25 @@ impl GltfReader<'_> {
             scene.nodes().map(|node| (node, Mat4::IDENTITY)).collect();
         stack.reverse();
         while let Some((node, world_from_parent)) = stack.pop() {
-            if std::mem::replace(&mut visited[node.index()], true) {
+            if worlds[node.index()].is_some() {
                 let message = format!("node {} has more than one parent", node.index());
                 return Err(self.error(message));
             }
             let stands = || Mat4::from_cols_array_2d(&node.transform().matrix());
             let parent_from_node = poses.get(&node.index()).copied().unwrap_or_else(stands);
             let world_from_node = world_from_parent * parent_from_node;
+            worlds[node.index()] = Some(world_from_node);
             self.read_node(&node, world_from_node);
             self.read_lamp(&node, world_from_node)?;
+            stack.extend(node.children().map(|child| (child, world_from_node)));
             if let Some(mesh) = node.mesh() {
                 if !std::mem::replace(&mut seen_meshes[mesh.index()], true) {
                     self.ignore_in_mesh(&mesh);
+                }
+                if node.skin().is_some() {
+                    // Joints may stand further on.
+                    skinned.push(node);
+                    continue;
                 }
                 let weights = node.weights().or(mesh.weights()).unwrap_or_default();
                 for world_from_instance in self.instances(&node, world_from_node)? {
@@ -188,14 +197,14 @@ impl GltfReader<'_> {
                         match repeated {
                             Some(at) => self.mesh.repeated[at].places.push(world_from_instance),
                             None => {
-                                self.read_primitive(&primitive, weights, world_from_instance)?;
+                                let place = Place::Node(world_from_instance);
+                                self.read_primitive(&primitive, weights, place)?;
                             }
                         }
                     }
                 }
             }
-            stack.extend(node.children().map(|child| (child, world_from_node)));
         }
-        Ok(())
+        skinned.iter().try_for_each(|node| self.read_skinned(node, &worlds))
     }
 }

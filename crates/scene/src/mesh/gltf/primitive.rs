@@ -6,12 +6,20 @@ use gltf::{
     mesh::{Mode, Semantic},
 };
 
-use super::GltfReader;
+use super::{GltfReader, skin::Posed};
 use crate::{
     error::Result,
     features,
     mesh::{Mesh, RepeatedMesh},
 };
+
+/// Placement of a primitive.
+pub(super) enum Place<'j> {
+    /// By the matrix of a node.
+    Node(Mat4),
+    /// By the matrices of joints.
+    Joints(&'j [Mat4]),
+}
 
 impl GltfReader<'_> {
     /// Place in `mesh.repeated` of a primitive whose copies are too many; none if it is to be copied.
@@ -35,7 +43,7 @@ impl GltfReader<'_> {
             let materials = std::mem::take(&mut self.mesh.materials);
             let own = Mesh { materials, ..Mesh::default() };
             let whole = std::mem::replace(&mut self.mesh, own);
-            let read = self.read_primitive(primitive, weights, Mat4::IDENTITY);
+            let read = self.read_primitive(primitive, weights, Place::Node(Mat4::IDENTITY));
             let mut own = std::mem::replace(&mut self.mesh, whole);
             self.mesh.materials = std::mem::take(&mut own.materials);
             read?;
@@ -60,7 +68,7 @@ impl GltfReader<'_> {
         &mut self,
         primitive: &Primitive,
         weights: &[f32],
-        world_from_node: Mat4,
+        place: Place<'_>,
     ) -> Result<()> {
         if !matches!(primitive.mode(), Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
             return Ok(());
@@ -90,8 +98,18 @@ impl GltfReader<'_> {
         }
         let material = primitive.material().index().map(|index| self.material_index(index));
         let material = material.transpose()?;
+        let (world_from_node, mirrors) = match place {
+            Place::Node(matrix) => (matrix, Mat3::from_mat4(matrix).determinant() < 0.0),
+            Place::Joints(joints) => {
+                let posed = Posed {
+                    positions: &mut positions,
+                    normals: normals.as_deref_mut(),
+                    tangents: tangents.as_deref_mut(),
+                };
+                (Mat4::IDENTITY, self.pose(primitive, joints, posed)?)
+            }
+        };
         let linear = Mat3::from_mat4(world_from_node);
-        let mirrors = linear.determinant() < 0.0;
         let to_world = |position: &[f32; 3]| {
             world_from_node.transform_point3(Vec3::from_array(*position)).to_array()
         };
@@ -160,7 +178,7 @@ impl GltfReader<'_> {
     }
 
     /// Reads an attribute, one vector for each of `count` positions.
-    fn attribute<const N: usize>(
+    pub(super) fn attribute<const N: usize>(
         &self,
         primitive: &Primitive,
         semantic: &Semantic,

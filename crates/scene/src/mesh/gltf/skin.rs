@@ -1,0 +1,118 @@
+//! Skins: vertices where the joints of a node's skin carry them.
+
+use glam::{Mat3, Mat4, Vec3};
+use gltf::{
+    Node, Primitive,
+    accessor::{DataType, Dimensions},
+    mesh::Semantic,
+};
+
+use super::{GltfReader, contents::label, primitive::Place};
+use crate::error::Result;
+
+/// Bytes of a matrix of singles.
+const MATRIX_BYTES: usize = 64;
+
+/// Attributes of a primitive that joints move.
+pub(super) struct Posed<'p> {
+    pub positions: &'p mut [[f32; 3]],
+    pub normals: Option<&'p mut [[f32; 3]]>,
+    pub tangents: Option<&'p mut [[f32; 4]]>,
+}
+
+impl GltfReader<'_> {
+    /// Adds the mesh of a node with a skin; `worlds` places the nodes of the scene. The node itself does not
+    /// place the mesh.
+    pub(super) fn read_skinned(&mut self, node: &Node, worlds: &[Option<Mat4>]) -> Result<()> {
+        let (Some(mesh), Some(skin)) = (node.mesh(), node.skin()) else { return Ok(()) };
+        let place = || label("skin", skin.index(), skin.name());
+        let binds = match skin.inverse_bind_matrices() {
+            Some(accessor) => {
+                let kind = (accessor.data_type(), accessor.dimensions());
+                if kind != (DataType::F32, Dimensions::Mat4) {
+                    let (data_type, dimensions) = kind;
+                    return Err(self.error(format!(
+                        "accessor {}: expected matrices of 4×4 floats, found {dimensions:?} of \
+                         {data_type:?}",
+                        accessor.index()
+                    )));
+                }
+                Some(self.elements(&accessor, |bytes| {
+                    let numbers = bytes[..MATRIX_BYTES].as_chunks::<4>().0;
+                    let number = |index: usize| f32::from_le_bytes(numbers[index]);
+                    Mat4::from_cols_array(&std::array::from_fn(number))
+                })?)
+            }
+            None => None,
+        };
+        let mut joints = Vec::new();
+        for (index, joint) in skin.joints().enumerate() {
+            let world = worlds[joint.index()].ok_or_else(|| {
+                self.error(format!("{}: joint {index} is no node of the scene", place()))
+            })?;
+            let bind = match &binds {
+                Some(binds) => *binds.get(index).ok_or_else(|| {
+                    let found = binds.len();
+                    self.error(format!("{}: {found} matrices for joint {index}", place()))
+                })?,
+                None => Mat4::IDENTITY,
+            };
+            joints.push(world * bind);
+        }
+        let weights = node.weights().or(mesh.weights()).unwrap_or_default();
+        for primitive in mesh.primitives() {
+            self.read_primitive(&primitive, weights, Place::Joints(&joints))?;
+        }
+        Ok(())
+    }
+
+    /// Moves vertices into world space, each by the mean of its joints' matrices; returns true if these
+    /// mirror. A vertex without a joint stays.
+    pub(super) fn pose(
+        &self,
+        primitive: &Primitive,
+        joints: &[Mat4],
+        posed: Posed<'_>,
+    ) -> Result<bool> {
+        let count = posed.positions.len();
+        let mut matrices = vec![(Mat4::ZERO, 0.0); count];
+        for set in 0.. {
+            let names = self.attribute::<4>(primitive, &Semantic::Joints(set), count)?;
+            let weights = self.attribute::<4>(primitive, &Semantic::Weights(set), count)?;
+            let (Some(names), Some(weights)) = (names, weights) else { break };
+            for (vertex, (sum, total)) in matrices.iter_mut().enumerate() {
+                for (&joint, &weight) in names[vertex].iter().zip(&weights[vertex]) {
+                    if weight == 0.0 {
+                        continue;
+                    }
+                    let matrix = joints.get(joint as usize).ok_or_else(|| {
+                        let most = joints.len();
+                        self.error(format!(
+                            "primitive {}, vertex {vertex}: joint {joint} is out of range, the skin \
+                             has {most}",
+                            primitive.index()
+                        ))
+                    })?;
+                    *sum += *matrix * weight;
+                    *total += weight;
+                }
+            }
+        }
+        let of = |(sum, total): (Mat4, f32)| {
+            if total == 0.0 { Mat4::IDENTITY } else { sum * total.recip() }
+        };
+        let matrices: Vec<Mat4> = matrices.into_iter().map(of).collect();
+        for (position, matrix) in posed.positions.iter_mut().zip(&matrices) {
+            *position = matrix.transform_point3((*position).into()).into();
+        }
+        for (normal, matrix) in posed.normals.into_iter().flatten().zip(&matrices) {
+            let turn = Mat3::from_mat4(*matrix).inverse().transpose();
+            *normal = (turn * Vec3::from(*normal)).into();
+        }
+        for (tangent, matrix) in posed.tangents.into_iter().flatten().zip(&matrices) {
+            let [x, y, z, sign] = *tangent;
+            *tangent = matrix.transform_vector3(Vec3::new(x, y, z)).extend(sign).into();
+        }
+        Ok(matrices.first().is_some_and(|matrix| matrix.determinant() < 0.0))
+    }
+}
