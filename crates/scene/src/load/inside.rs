@@ -14,6 +14,8 @@ const EYE_HEIGHT: f32 = 1.6;
 const EYE_SHARE: f32 = 0.55;
 /// Smallest share of cells inside, of all, that makes a room of a scene.
 const ROOM_SHARE: f32 = 0.08;
+/// Smallest height of a room, as a share of the scene's: a shelf of a bookcase is none.
+const HEIGHT_SHARE: f32 = 0.35;
 /// Largest share of surfaces that show the room their back.
 const MOST_BACKS: f32 = 0.3;
 /// Directions that are looked along.
@@ -182,12 +184,14 @@ impl Grid {
             && [Vec3::X, -Vec3::X, Vec3::Z, -Vec3::Z].into_iter().filter(|d| is_hit(*d)).count() > 2
     }
 
+    /// Tests for the height of the eyes in a room that is high enough.
     fn is_at_eye_height(&self, place: IVec3) -> bool {
         let below = self.sight(place, -Vec3::Y).cells * self.cell;
         let room = below + self.sight(place, Vec3::Y).cells * self.cell;
         let (low, high) = ROOM_HEIGHTS;
         let eyes = if (low..=high).contains(&room) { EYE_HEIGHT } else { EYE_SHARE * room };
-        (below - eyes).abs() <= 0.75 * self.cell
+        room >= HEIGHT_SHARE * self.size.y as f32 * self.cell
+            && (below - eyes).abs() <= 0.75 * self.cell
     }
 
     /// Least way to a surface around an eye.
@@ -204,26 +208,31 @@ mod tests {
     use super::*;
     use crate::{mesh::Mesh, quadrics, transform::Transform};
 
-    /// A room of 8 × 3 × 4 m, whose walls look inwards or outwards.
-    fn room(looks_in: bool) -> Geometry {
+    /// Rooms one on the other, together 8 × 3 × 4 m, whose walls look inwards or outwards.
+    fn room(looks_in: bool, storeys: usize) -> Geometry {
         let mut cube: Mesh = quadrics::cube();
         if looks_in {
             cube.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
         let mut geometry = Geometry::default();
-        let place = Transform::new([4.0, 1.5, 2.0], [0.0; 3], [0.0, 1.5, 0.0]);
-        geometry.append(&cube, &place, |_| 0);
+        for storey in 0..storeys {
+            let height = 0.5 * 3.0 / storeys as f32;
+            let middle = [0.0, (2 * storey + 1) as f32 * height, 0.0];
+            let place = Transform::new([4.0, height, 2.0], [0.0; 3], middle);
+            geometry.append(&cube, &place, |_| 0);
+        }
         geometry
     }
 
     #[test]
     fn a_room_is_seen_from_inside_and_a_box_is_not() {
         let (low, high) = (Vec3::new(-4.0, 0.0, -2.0), Vec3::new(4.0, 3.0, 2.0));
-        let View { from, at } = view(&room(true), low, high).unwrap();
+        let View { from, at } = view(&room(true, 1), low, high).unwrap();
         assert!((from.y - EYE_HEIGHT).abs() < 0.2, "{from}");
         assert!(from.cmpgt(low).all() && from.cmplt(high).all(), "{from}");
         let along = (at - from).normalize();
         assert!(along.x.abs() > 0.9 && (at - from).length() > 4.0, "{from} {at}");
-        assert!(view(&room(false), low, high).is_none());
+        assert!(view(&room(false, 1), low, high).is_none());
+        assert!(view(&room(true, 4), low, high).is_none(), "shelves");
     }
 }
