@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     coat::normal_reflectance,
-    material::{Material, Surface},
+    material::{Material, MaterialKind, Surface},
     math::colour::luminance,
     measured::MeasuredTable,
     texture::{Interpolation, TextureUse},
@@ -68,6 +68,14 @@ impl<'a> Subject<'a> {
             triple(share)
         ));
         share
+    }
+
+    /// Share of metal and roughness of a principled material, by the means of its textures.
+    pub(super) fn mean_metal_and_roughness(&self) -> (f32, f32) {
+        match self.material.mean_kind() {
+            MaterialKind::Principled { metallic, roughness, .. } => (metallic, roughness),
+            _ => (0.0, 1.0),
+        }
     }
 
     /// Image of the GGX width, if the roughness has one.

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     MIN_ALPHA,
-    coat::albedo_below_coat,
+    coat::{LossyCoat, albedo_below_coat},
     error::Result,
     features,
     import::media,
@@ -132,13 +132,13 @@ impl Reader<'_> {
                 Model::colored(value, |reflectance| MaterialKind::Diffuse { reflectance })
             }
             "phong" | "ward" => self.phong(&parameters)?,
-            "plastic" => self.plastic(&parameters, MIN_ALPHA)?,
+            "plastic" => self.plastic(&parameters, None)?,
             "roughplastic" | "pplastic" => {
                 if node.kind() == "pplastic" {
                     self.ignored.add(features::MI_POLARIZED, || node.place());
                 }
-                let Width { alpha, texture } = self.width(&parameters)?;
-                self.plastic(&parameters, alpha)?.of_roughness(texture)
+                let width = self.width(&parameters)?;
+                self.plastic(&parameters, Some(width))?
             }
             "conductor" => self.conductor(&parameters, None)?,
             "roughconductor" => {
@@ -292,7 +292,8 @@ impl Reader<'_> {
         )))
     }
 
-    fn plastic(&mut self, parameters: &Parameters<'_>, alpha: f32) -> Result<Model> {
+    /// Plastic; `width` is none for a smooth one.
+    fn plastic(&mut self, parameters: &Parameters<'_>, width: Option<Width>) -> Result<Model> {
         let node = parameters.node;
         let ior = self.ior(parameters, "polypropylene")?;
         let value = self.value(parameters, "diffuse_reflectance", Role::Reflectance)?;
@@ -306,16 +307,19 @@ impl Reader<'_> {
             let message = format!("int_ior over ext_ior: expected at most 4, found {ior}");
             return Err(node.error(message));
         }
-        if is_nonlinear {
+        if ior < LEAST_COAT_IOR {
+            return Ok(Model::colored(value, |reflectance| MaterialKind::Diffuse { reflectance }));
+        }
+        if let Some(width) = &width {
+            let root = width.texture.as_ref().map_or(1.0, |texture| texture.mean()[0]);
+            value =
+                value.mapped(LossyCoat::new(width.alpha * root * root, ior).albedo(is_nonlinear));
+        } else if is_nonlinear {
             value = value.mapped(albedo_below_coat(ior));
         }
-        Ok(Model::colored(value, |diffuse| {
-            if ior < LEAST_COAT_IOR {
-                MaterialKind::Diffuse { reflectance: diffuse }
-            } else {
-                MaterialKind::Plastic { diffuse, alpha, ior }
-            }
-        }))
+        let Width { alpha, texture } = width.unwrap_or(Width { alpha: MIN_ALPHA, texture: None });
+        let plastic = |diffuse| MaterialKind::Plastic { diffuse, alpha, ior };
+        Ok(Model::colored(value, plastic).of_roughness(texture))
     }
 
     /// Metal; `alpha` is none for a smooth one.

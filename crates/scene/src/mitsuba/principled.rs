@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::{Reader, bsdfs::Model, parameters::Parameters, spectra::Role, textures::Value};
 use crate::{
     MIN_ALPHA,
+    coat::{normal_reflectance, principled_base_factor},
     error::Result,
     features,
     material::{MaterialKind, Surface},
@@ -69,6 +70,11 @@ impl Reader<'_> {
             let surface = Surface { roughness: texture, ..Surface::default() };
             return Ok(Model { kind, surface });
         }
+        // The base of metal reflects alike in both.
+        let diffuse_share = 1.0 - metallic.mean().x.clamp(0.0, 1.0);
+        let factor = principled_base_factor(roughness.mean().x, normal_reflectance(ior));
+        let factor = 1.0 + diffuse_share * (factor - 1.0);
+        let base = base.mapped(|albedo| (factor * albedo).clamp(0.0, 1.0));
         let vertex_color = base.is_of_vertices();
         let (base_color, color) = base.split();
         let (metallic, metallic_texture) = metallic.split();

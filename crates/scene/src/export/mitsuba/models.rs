@@ -5,6 +5,7 @@ use std::fmt::Write;
 use glam::Vec3;
 
 use crate::{
+    coat::{LossyCoat, normal_reflectance, principled_base_factor},
     export::{
         folder::Folder,
         images::{Pictures, Recipe},
@@ -94,12 +95,9 @@ impl Translator<'_> {
             }
             MaterialKind::Plastic { diffuse, alpha, ior } => {
                 self.warn_of_masking(*alpha, "plastic");
-                self.subject.warn(
-                    "Mitsuba's plastic loses light below its coat, Fenestra's does not; a white one \
-                     reflects 0.96 there at alpha = 0.05 and 0.69 at 0.3",
-                );
+                let base = self.plastic_base(*diffuse, *alpha, *ior);
                 let mut content = self.ggx(*alpha);
-                content += &self.color("diffuse_reflectance", *diffuse);
+                content += &self.color("diffuse_reflectance", base);
                 content += &float("int_ior", *ior);
                 content += &float("ext_ior", 1.0);
                 content += "    <boolean name=\"nonlinear\" value=\"false\"/>\n";
@@ -132,15 +130,20 @@ impl Translator<'_> {
             } => {
                 self.warn_of_masking(roughness * roughness, "principled");
                 self.subject.warn(
-                    "Mitsuba's principled differs from glTF's: its diffuse part is Disney's, and its \
-                     dielectric reflects by Fresnel's equations instead of Schlick's",
+                    "Mitsuba's principled differs from glTF's: its diffuse part is Disney's, here of the \
+                     same mean, and its dielectric reflects by Fresnel's equations instead of Schlick's",
                 );
                 let difference = difference_of_index(*ior, *specular, *specular_color);
                 difference.iter().for_each(|difference| self.subject.warn(difference));
-                let content = self.color("base_color", *base_color)
+                let eta = index_of(*ior, *specular, *specular_color).max(LEAST_ETA);
+                // The base of metal reflects alike in both.
+                let (metal, rough) = self.subject.mean_metal_and_roughness();
+                let factor = principled_base_factor(rough, normal_reflectance(eta)).recip();
+                let factor = 1.0 + (1.0 - metal) * (factor - 1.0);
+                let content = self.color("base_color", *base_color * factor)
                     + &self.number("metallic", *metallic, self.subject.surface.metallic.as_ref())
                     + &self.roughness(*roughness)
-                    + &float("eta", index_of(*ior, *specular, *specular_color).max(LEAST_ETA));
+                    + &float("eta", eta);
                 element("principled", &content)
             }
             MaterialKind::Mirror { reflectance } => {
@@ -166,6 +169,28 @@ impl Translator<'_> {
                 element("diffuse", &rgb("reflectance", self.subject.measured(path, table)))
             }
         }
+    }
+
+    /// Base of Mitsuba's plastic, which loses light below its coat, that reflects as much as ours.
+    fn plastic_base(&mut self, diffuse: Vec3, alpha: f32, ior: f32) -> Vec3 {
+        let surface = self.subject.surface;
+        let mean = |used: &Option<TextureUse>| used.as_ref().map_or(1.0, |used| used.mean()[0]);
+        let root = mean(&surface.roughness);
+        let factor = LossyCoat::new(alpha * root * root, ior).base_factor();
+        let texels = surface.color.iter().flat_map(|used| used.values());
+        let lightest = texels.map(|[r, g, b, _]| r.max(g).max(b)).reduce(f32::max).unwrap_or(1.0)
+            * diffuse.max_element();
+        let most = factor.min(lightest.max(1e-3).recip().max(1.0));
+        let aim = if most < factor {
+            format!(", {factor} times would have the same mean reflectance, but no base is above 1")
+        } else {
+            " for the same mean reflectance".to_owned()
+        };
+        self.subject.warn(&format!(
+            "Mitsuba's plastic loses light below its coat, Fenestra's does not; its base is {most} \
+             times as light{aim}"
+        ));
+        most * diffuse
     }
 
     /// Main colour of the model, with its texture or the colours of vertices.
