@@ -1,12 +1,14 @@
 //! The same seed gives the same bits, however samples are grouped, cropped, stopped and resumed.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
+use std::time::Duration;
+
 use fenestra::{
     film::{Aov, Sums, Window},
     pass::{PathLists, Roulette},
     sampler::{Parameters, Sampler},
     scene::Scene,
-    session::{Session, Settings},
+    session::{Event, Flag, Observer, Rules, Session, Settings, StopReason},
 };
 use glam::Vec3;
 
@@ -137,7 +139,7 @@ fn a_sweep_that_was_stopped_goes_on_to_the_bit() {
         let folder = Folder::new();
         let path = folder.path().join("room.checkpoint.exr");
         let mut stopped = Session::new(support::device(), &scene, settings.clone()).unwrap();
-        stopped.renderer.render_pass(2).unwrap();
+        [0, 1].map(|_| stopped.pass(1, 1.0).unwrap());
         let mut waves = 0;
         stopped.renderer.set_watch(Box::new(move |_| {
             waves += 1;
@@ -155,12 +157,39 @@ fn a_sweep_that_was_stopped_goes_on_to_the_bit() {
         stopped.write_checkpoint(&path, sums).unwrap().unwrap();
         let mut resumed = Session::new(support::device(), &scene, settings).unwrap();
         resumed.resume(&path).unwrap();
-        stopped.renderer.set_watch(Box::new(|_| false));
+        assert_eq!(resumed.seconds(), stopped.seconds());
+        // A sweep may be stopped again.
+        resumed.renderer.set_watch(Box::new(|_| true));
+        resumed.renderer.render_pass(3).unwrap();
+        assert!(resumed.renderer.ahead().blocks > stopped.renderer.ahead().blocks);
+        [&mut resumed, &mut stopped].map(|it| it.renderer.set_watch(Box::new(|_| false)));
         for Session { renderer, .. } in [&mut resumed, &mut stopped] {
             renderer.render_pass(3).unwrap();
             assert!(renderer.sums().unwrap() == whole, "{} differs", sampler.name());
         }
     }
+}
+
+/// Who interrupts waits for no checkpoint that is due, and a training that was stopped leaves none.
+#[test]
+fn an_interrupt_comes_before_a_checkpoint_that_is_due() {
+    struct Impatient;
+    impl Observer for Impatient {
+        fn interrupt(&self) -> Flag {
+            let flag = Flag::default();
+            flag.raise();
+            flag
+        }
+
+        fn notice(&mut self, _: &Event<'_>) {}
+    }
+    let _alone = support::alone();
+    let folder = Folder::new();
+    let path = folder.path().join("room.checkpoint.exr");
+    let mut session = Session::new(support::device(), &scene(), settings(Sampler::Mis)).unwrap();
+    let rules = Rules { checkpoints: Some((path.clone(), Duration::ZERO)), ..Rules::default() };
+    assert_eq!(session.run(&rules, &mut Impatient).unwrap(), StopReason::Interrupt);
+    assert!(session.renderer.sample_count() > 0 && !path.exists());
 }
 
 /// In a room with lamps, panes, mirrors and sheets, and with roulette, so that paths end for every reason.

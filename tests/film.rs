@@ -175,6 +175,16 @@ fn two_float_sums_stay_exact_where_floats_stagnate() {
     assert_eq!(sums.total(0), [16_778_217.0; 3]);
 }
 
+/// Two blocks a row, the second of which the film cuts.
+#[test]
+fn the_first_blocks_have_the_samples_of_a_stopped_sweep() {
+    let mut sums = Sums::new([0, 0], 12, 16, [12, 16]);
+    sums.sample_count = 4;
+    sums.ahead = Ahead { blocks: 3, samples: 2 };
+    let samples = |x: usize, y: usize| sums.samples(12 * y + x);
+    assert_eq!([samples(11, 7), samples(7, 8), samples(8, 8)], [6, 6, 4]);
+}
+
 #[test]
 fn mean_and_variance_agree_with_64_bit_sums() {
     for (sample_count, scale) in [(2, 1.0), (64, 1e-3), (1000, 1e4), (5000, 1.0)] {
@@ -352,8 +362,8 @@ fn a_checkpoint_without_its_sums_is_refused() {
     plain.attributes.remove("fenestra.checkpoint");
     assert!(message(&plain).contains("not a checkpoint"));
     let mut newer = image.clone();
-    newer.attributes.insert("fenestra.checkpoint".to_owned(), Attribute::Integer(4));
-    assert!(message(&newer).contains("another version: expected 3, found Integer(4)"));
+    newer.attributes.insert("fenestra.checkpoint".to_owned(), Attribute::Integer(5));
+    assert!(message(&newer).contains("another version: expected 4, found Integer(5)"));
     let mut outside = image.clone();
     outside.origin = [-1, 0];
     assert!(message(&outside).contains("outside the film"));
@@ -454,6 +464,9 @@ fn merged_checkpoints_equal_one_run() {
             let (found, expected) =
                 (merged.sums.total(pixel)[channel], whole.sums.total(pixel)[channel]);
             // Both add the same floats, and each two-float sum keeps 48 bits.
+            assert!((found / expected - 1.0).abs() < 1e-12, "{found} against {expected}");
+            let squares = |sums: &Sums| sums.total_squares(pixel)[channel];
+            let (found, expected) = (squares(&merged.sums), squares(&whole.sums));
             assert!((found / expected - 1.0).abs() < 1e-12, "{found} against {expected}");
         }
     }

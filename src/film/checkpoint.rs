@@ -18,6 +18,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use super::{
@@ -33,7 +34,7 @@ use crate::{
 
 /// Attribute that marks a checkpoint, and the version of its channels.
 const FORMAT_ATTRIBUTE: &str = "fenestra.checkpoint";
-const FORMAT_VERSION: i32 = 3;
+const FORMAT_VERSION: i32 = 4;
 /// SHA-256 of the rest of the file.
 const CHECKSUM_ATTRIBUTE: &str = "fenestra.checksum";
 /// SHA-256 of the guide's file.
@@ -153,61 +154,24 @@ impl Checkpoint {
         self.write_with_guide(path, None)
     }
 
-    /// Writes the checkpoint and the file of its guide. Both replace older ones at one moment: at
-    /// every other, and after every failure, the older pair or the newer one is complete.
+    /// Writes the checkpoint and the file of its guide, as [`Encoded::write`].
     ///
     /// # Errors
     /// [`Error::Io`] with the cause.
     pub fn write_with_guide(&self, path: &Path, guide: Option<&[u8]>) -> Result<()> {
-        self.write_in_steps(path, guide, &mut |_| Ok(()))
+        self.encode(guide.map(<[u8]>::to_vec)).write(path)
     }
 
-    /// [`Self::write_with_guide`], which asks `before` each step whether to go on.
-    fn write_in_steps(
-        &self,
-        path: &Path,
-        guide: Option<&[u8]>,
-        before: &mut dyn FnMut(Step) -> Result<()>,
-    ) -> Result<()> {
-        // Others that write this checkpoint would remove the guide before its checkpoint is there.
-        let _lock = locked_folder(path);
+    /// Prepares the files: most of the work of a large film.
+    pub(crate) fn encode(&self, guide: Option<Vec<u8>>) -> Encoded {
         let mut image = self.to_image();
-        let mut kept = None;
-        let mut added = None;
-        if let Some(guide) = guide {
-            let hash = hexadecimal(&Sha256::digest(guide));
-            let guide_path = guide_path(path, &hash);
-            before(Step::Guide)?;
-            let is_new = !guide_path.exists();
-            write_atomically(&guide_path, |file| file.write_all(guide))?;
-            image.attributes.insert(GUIDE_ATTRIBUTE.to_owned(), Attribute::Text(hash));
-            kept = guide_path.file_name().map(ToOwned::to_owned);
-            added = is_new.then_some(guide_path);
+        if let Some(guide) = &guide {
+            let hash = Attribute::Text(hexadecimal(&Sha256::digest(guide)));
+            image.attributes.insert(GUIDE_ATTRIBUTE.to_owned(), hash);
         }
         let checksum = Attribute::Text(checksum(&image));
         image.attributes.insert(CHECKSUM_ATTRIBUTE.to_owned(), checksum);
-        before(Step::Checkpoint)?;
-        if let Err(error) = image.write_exr_uncompressed(path) {
-            // Without its checkpoint a guide only takes space, but the disk may fail after the renaming.
-            let guide_of = |image: &Image| image.attributes.get(GUIDE_ATTRIBUTE).cloned();
-            let is_named =
-                Image::read_exr(path).is_ok_and(|found| guide_of(&found) == guide_of(&image));
-            for guide in added.iter().filter(|_| !is_named) {
-                files::remove(guide).unwrap_or_else(|error| log::warn!("{error}"));
-            }
-            return Err(error);
-        }
-        before(Step::Removal)?;
-        // The checkpoint is safe: a guide that stays behind does no harm.
-        let remove_others = || {
-            let others = guide_paths(path)?;
-            let others = others.iter().filter(|other| other.file_name() != kept.as_deref());
-            others.into_iter().try_for_each(|other| files::remove(other))
-        };
-        if let Err(error) = remove_others() {
-            log::warn!("{error}");
-        }
-        Ok(())
+        Encoded { image, guide }
     }
 
     /// Reads a checkpoint, bit for bit as it was written.
@@ -379,6 +343,68 @@ impl Checkpoint {
     }
 }
 
+/// A checkpoint as the files that it is written to.
+pub(crate) struct Encoded {
+    image: Image,
+    guide: Option<Vec<u8>>,
+}
+
+impl Encoded {
+    /// Writes the checkpoint and the file of its guide. Both replace older ones at one moment: at
+    /// every other, and after every failure, the older pair or the newer one is complete.
+    ///
+    /// # Errors
+    /// [`Error::Io`] with the cause.
+    pub(crate) fn write(&self, path: &Path) -> Result<()> {
+        self.write_in_steps(path, &mut |_| Ok(()))
+    }
+
+    /// [`Self::write`], which asks `before` each step whether to go on.
+    fn write_in_steps(
+        &self,
+        path: &Path,
+        before: &mut dyn FnMut(Step) -> Result<()>,
+    ) -> Result<()> {
+        // Others that write this checkpoint would remove the guide before its checkpoint is there.
+        let _lock = locked_folder(path);
+        let Self { image, guide } = self;
+        let mut kept = None;
+        let mut added = None;
+        if let (Some(guide), Some(Attribute::Text(hash))) =
+            (guide, image.attributes.get(GUIDE_ATTRIBUTE))
+        {
+            let guide_path = guide_path(path, hash);
+            before(Step::Guide)?;
+            let is_new = !guide_path.exists();
+            write_atomically(&guide_path, |file| file.write_all(guide))?;
+            kept = guide_path.file_name().map(ToOwned::to_owned);
+            added = is_new.then_some(guide_path);
+        }
+        before(Step::Checkpoint)?;
+        if let Err(error) = image.write_exr_uncompressed(path) {
+            // Without its checkpoint a guide only takes space, but the disk may fail after the renaming.
+            let guide_of = |image: &Image| image.attributes.get(GUIDE_ATTRIBUTE).cloned();
+            let is_named =
+                Image::read_exr(path).is_ok_and(|found| guide_of(&found) == guide_of(image));
+            for guide in added.iter().filter(|_| !is_named) {
+                files::remove(guide).unwrap_or_else(|error| log::warn!("{error}"));
+            }
+            return Err(error);
+        }
+        before(Step::Removal)?;
+        // The checkpoint is safe: a guide that stays behind does no harm.
+        let remove_others = || {
+            let others = guide_paths(path)?;
+            let others = others.iter().filter(|other| other.file_name() != kept.as_deref());
+            others.into_iter().try_for_each(|other| files::remove(other))
+        };
+        if let Err(error) = remove_others() {
+            log::warn!("{error}");
+        }
+        Ok(())
+    }
+}
+
 /// Inserts four channels for pairs of counts: leading part and rest of the first count, then of the
 /// second. Inserts nothing without pairs.
 fn insert_counts(image: &mut Image, names: [&str; 4], counts: &[[u32; 2]]) {
@@ -390,7 +416,7 @@ fn insert_counts(image: &mut Image, names: [&str; 4], counts: &[[u32; 2]]) {
             let (leading, rest) = split(f64::from(pair[index / 2]));
             if index % 2 == 0 { leading } else { rest }
         };
-        image.channels.insert(name.to_owned(), counts.iter().map(part).collect());
+        image.channels.insert(name.to_owned(), counts.par_iter().map(part).collect());
     }
 }
 
@@ -420,7 +446,20 @@ fn counts(image: &Image, names: [&str; 4], path: &Path) -> Result<Vec<[u32; 2]>>
         .collect()
 }
 
-/// SHA-256 of the window, the channels and all attributes but the checksum itself.
+/// Name of a channel and the SHA-256 of its samples.
+fn hash_of_channel<'a>((name, samples): (&'a String, &Vec<f32>)) -> (&'a str, [u8; 32]) {
+    let mut hasher = Sha256::new();
+    let mut bytes = [[0; 4]; 1024];
+    for samples in samples.chunks(bytes.len()) {
+        for (bytes, sample) in bytes.iter_mut().zip(samples) {
+            *bytes = sample.to_le_bytes();
+        }
+        hasher.update(bytes[..samples.len()].as_flattened());
+    }
+    (name, hasher.finalize().into())
+}
+
+/// SHA-256 of the window, the channels' hashes and all attributes but the checksum itself.
 fn checksum(image: &Image) -> String {
     let mut hasher = Sha256::new();
     for value in [image.width, image.height, image.film_size[0], image.film_size[1]] {
@@ -435,9 +474,10 @@ fn checksum(image: &Image) -> String {
         hasher.update((bytes.len() as u64).to_le_bytes());
         hasher.update(bytes);
     };
-    for (name, samples) in &image.channels {
-        let bytes: Vec<[u8; 4]> = samples.iter().map(|sample| sample.to_le_bytes()).collect();
-        add(0, name, bytes.as_flattened());
+    // Channels have hashes of their own, so that threads share them.
+    let channels: Vec<_> = image.channels.par_iter().map(hash_of_channel).collect();
+    for (name, hash) in channels {
+        add(0, name, &hash);
     }
     for (name, value) in &image.attributes {
         match value {
@@ -479,7 +519,7 @@ mod tests {
             let path = folder.path().join("room.checkpoint.exr");
             let write = |samples: u32, before: &mut dyn FnMut(Step) -> Result<()>| {
                 let (checkpoint, guide) = pair(samples);
-                checkpoint.write_in_steps(&path, Some(&guide), before)
+                checkpoint.encode(Some(guide)).write_in_steps(&path, before)
             };
             let read = || {
                 let (checkpoint, guide) = Checkpoint::read_with_guide(&path).unwrap();
@@ -517,7 +557,10 @@ mod tests {
                 }
                 Ok(())
             };
-            checkpoint(4).write_in_steps(&path, Some(b"first"), &mut before).unwrap();
+            checkpoint(4)
+                .encode(Some(b"first".to_vec()))
+                .write_in_steps(&path, &mut before)
+                .unwrap();
             assert!(Checkpoint::read_with_guide(&path).unwrap().1.is_some());
         });
         assert_eq!(Checkpoint::read_with_guide(&path).unwrap().1.unwrap().1, b"second");

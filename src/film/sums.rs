@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use clap::ValueEnum;
+use rayon::prelude::*;
 
 use super::Image;
 use crate::shader::constants::FILM_BLOCK;
@@ -242,7 +243,7 @@ impl Sums {
 
     /// Tests whether any sample found light.
     pub(crate) fn found_light(&self) -> bool {
-        self.sum.iter().flatten().any(|&sum| sum != 0.0)
+        self.sum.as_flattened().iter().any(|&sum| sum != 0.0)
     }
 
     /// Unbiased estimate of the variance of the pixel's mean, (Σx² − (Σx)²/n) / (n (n − 1)).
@@ -305,7 +306,7 @@ impl Sums {
         let mut image = Image::new(self.width, self.height);
         image.origin = self.origin.map(|value| i32::try_from(value).unwrap_or(i32::MAX));
         image.film_size = self.film_size;
-        let pixels = || 0..self.pixel_count();
+        let pixels = || (0..self.pixel_count()).into_par_iter();
         let narrow = |value: [f64; 3]| value.map(|component| component as f32);
         let means: Vec<[f32; 3]> = pixels().map(|pixel| narrow(self.mean(pixel))).collect();
         image.insert_triple(["R", "G", "B"], &means);

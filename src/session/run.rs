@@ -295,6 +295,7 @@ impl Session {
             }
             if let Some((path, interval)) = &rules.checkpoints
                 && next_checkpoint.is_some_and(|at| Instant::now() >= at)
+                && !interrupt.is_raised()
             {
                 let start = Instant::now();
                 // A full disk may have room again at the next interval or for the image.
@@ -311,19 +312,23 @@ impl Session {
             self.rate.wall_share = share;
             observer.notice(&Event::Pass { samples, seconds, standing: self.standing(rules) });
         };
-        match reason {
-            // Who interrupts does not wait for the error of a large film.
-            StopReason::Interrupt => self.found_light |= self.renderer.sums()?.found_light(),
-            _ if looks => self.look_at_film(observer)?,
-            _ => {}
+        // Who interrupts does not wait for the error of a large film.
+        if looks && reason != StopReason::Interrupt {
+            self.look_at_film(observer)?;
         }
         Ok(reason)
     }
 
-    /// Takes the error and the presence of light from the film. A black film has no error to speak of.
-    fn look_at_film(&mut self, observer: &mut dyn Observer) -> Result<()> {
+    /// Reads the film, and notes whether it has found light.
+    pub fn sums(&mut self) -> Result<Sums> {
         let sums = self.renderer.sums()?;
         self.found_light = sums.found_light();
+        Ok(sums)
+    }
+
+    /// Takes the error and the presence of light from the film. A black film has no error to speak of.
+    fn look_at_film(&mut self, observer: &mut dyn Observer) -> Result<()> {
+        let sums = self.sums()?;
         self.relative_error = self.found_light.then(|| sums.relative_standard_error());
         observer.notice(&Event::Look(&sums));
         Ok(())
@@ -332,10 +337,23 @@ impl Session {
     /// Writes a checkpoint of the film's sums, with the guide of a sampler that learns. The outer error is
     /// the device's, the inner one the disk's.
     pub fn write_checkpoint(&mut self, path: &Path, sums: Sums) -> Result<Result<()>> {
+        self.write_checkpoint_beside(path, sums, || ()).1
+    }
+
+    /// As [`Session::write_checkpoint`]: a thread prepares it beside `work`, after which it is written.
+    pub(crate) fn write_checkpoint_beside<R: Send>(
+        &mut self,
+        path: &Path,
+        sums: Sums,
+        work: impl FnOnce() -> R + Send,
+    ) -> (R, Result<Result<()>>) {
         let checkpoint = Checkpoint { sums, metadata: self.metadata() };
-        let written = checkpoint.write_with_guide(path, self.renderer.guide()?.as_deref());
-        self.has_checkpoint |= written.is_ok();
-        Ok(written)
+        let guide = self.renderer.guide();
+        let prepare = || guide.map(|guide| checkpoint.encode(guide));
+        let (done, encoded) = rayon::join(work, prepare);
+        let written = encoded.map(|encoded| encoded.write(path));
+        self.has_checkpoint |= matches!(written, Ok(Ok(())));
+        (done, written)
     }
 
     /// True if a checkpoint of this render lies on the disk: it was resumed from, or has been written.

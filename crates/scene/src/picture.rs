@@ -30,6 +30,8 @@ use exr::{
     },
 };
 
+use rayon::prelude::*;
+
 use crate::error::{Error, Result};
 use crate::files::{
     EXR_LARGEST_RATIO, check_promise, is_special_file, open_regular, write_atomically,
@@ -133,7 +135,7 @@ impl Image {
     pub fn insert_triple(&mut self, names: [&str; 3], values: &[[f32; 3]]) {
         assert_eq!(values.len(), self.pixel_count(), "one value per pixel of layer {names:?}");
         for (component, name) in names.into_iter().enumerate() {
-            let samples = values.iter().map(|value| value[component]).collect();
+            let samples = values.par_iter().map(|value| value[component]).collect();
             self.channels.insert(name.to_owned(), samples);
         }
     }

@@ -24,12 +24,12 @@ impl RenderJob<'_> {
     /// # Errors
     /// The first failure; others are logged.
     pub(super) fn finish(&self, session: &mut Session, reason: StopReason) -> Result<()> {
+        let sums = session.sums()?;
         let warnings = session.warnings(self.scene);
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
         if let Some(choice) = session.renderer.report().choice.filter(|_| !self.arguments.quiet) {
             say!("{choice}");
         }
-        let sums = session.renderer.sums()?;
         let mut image = session.image_of(&sums, &self.aovs);
         if let Some(time) = self.time {
             image.attributes.insert("fenestra.time".to_owned(), Attribute::Double(time));
@@ -43,20 +43,27 @@ impl RenderJob<'_> {
         };
         let is_interrupted = reason == StopReason::Interrupt;
         // Compression takes seconds of a large film, and noise is hardly smaller for it.
-        let picture = match is_interrupted {
-            true => image.write_exr_uncompressed(&self.output),
-            false => image.write_exr(&self.output),
+        let (image, output) = (&image, self.output.as_path());
+        let write_picture = || match is_interrupted {
+            true => image.write_exr_uncompressed(output),
+            false => image.write_exr(output),
         };
-        let has_picture = picture.is_ok();
-        note(&self.output, picture);
         let checkpoint = checkpoint_path(&self.output);
+        let writes_checkpoints = self.arguments.writes_checkpoints(&self.output);
         let is_to_continue = is_interrupted || self.arguments.checkpoint_interval.is_some();
-        if !self.arguments.writes_checkpoints(&self.output) {
+        if writes_checkpoints && is_to_continue {
+            let (picture, written) =
+                session.write_checkpoint_beside(&checkpoint, sums, write_picture);
+            note(&self.output, picture);
+            note(&checkpoint, written.and_then(|written| written));
+        } else {
             drop(sums);
-        } else if is_to_continue {
-            note(&checkpoint, session.write_checkpoint(&checkpoint, sums).and_then(|it| it));
-        } else if has_picture && session.has_checkpoint() {
-            remove_checkpoint(&checkpoint).unwrap_or_else(|error| log::warn!("{error}"));
+            let picture = write_picture();
+            let has_picture = picture.is_ok();
+            note(&self.output, picture);
+            if has_picture && writes_checkpoints && session.has_checkpoint() {
+                remove_checkpoint(&checkpoint).unwrap_or_else(|error| log::warn!("{error}"));
+            }
         }
         if self.arguments.writes_png() {
             let path = self.output.with_extension("png");
@@ -64,7 +71,7 @@ impl RenderJob<'_> {
             note(&path, image.rgb(&self.output).and_then(preview));
         }
         if let Some(denoiser) = self.denoiser {
-            self.write_denoised(denoiser, &image, &mut note);
+            self.write_denoised(denoiser, image, &mut note);
         } else if self.arguments.shows() && !self.arguments.quiet {
             say!("not denoised: Open Image Denoise is not found; ./setup brings it where it can");
         }
