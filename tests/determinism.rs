@@ -139,7 +139,9 @@ fn a_sweep_that_was_stopped_goes_on_to_the_bit() {
         let folder = Folder::new();
         let path = folder.path().join("room.checkpoint.exr");
         let mut stopped = Session::new(support::device(), &scene, settings.clone()).unwrap();
-        [0, 1].map(|_| stopped.pass(1, 1.0).unwrap());
+        for _ in 0..2 {
+            stopped.pass(1, 1.0).unwrap();
+        }
         let mut waves = 0;
         stopped.renderer.set_watch(Box::new(move |_| {
             waves += 1;
@@ -162,8 +164,8 @@ fn a_sweep_that_was_stopped_goes_on_to_the_bit() {
         resumed.renderer.set_watch(Box::new(|_| true));
         resumed.renderer.render_pass(3).unwrap();
         assert!(resumed.renderer.ahead().blocks > stopped.renderer.ahead().blocks);
-        [&mut resumed, &mut stopped].map(|it| it.renderer.set_watch(Box::new(|_| false)));
         for Session { renderer, .. } in [&mut resumed, &mut stopped] {
+            renderer.set_watch(Box::new(|_| false));
             renderer.render_pass(3).unwrap();
             assert!(renderer.sums().unwrap() == whole, "{} differs", sampler.name());
         }

@@ -535,6 +535,9 @@ fn windows_join_to_the_film_to_the_bit() {
     other.sample_ranges = vec![range(2, 0, 30)];
     let differs = message(&[parts[0], Part { metadata: &other, ..parts[1] }]);
     assert!(differs.contains("b.exr: no window of one film with a.exr: samples: "), "{differs}");
+    let larger = Image { film_size: [11, 6], ..windows[1].clone() };
+    let differs = message(&[parts[0], Part { image: &larger, ..parts[1] }]);
+    assert!(differs.contains("film: [11, 6] against [10, 6] pixels"), "{differs}");
     assert!(join_windows(&[]).is_err());
 }
 

@@ -233,7 +233,7 @@ fn a_texture_without_an_image_that_is_read_ends_the_file() {
 fn specular_glossiness_is_converted_texel_by_texel() {
     let folder = Folder::new();
     // A matt red, and silver of half the gloss.
-    folder.write("d.png", png([[200, 20, 20, 255], [0, 0, 0, 255]]));
+    folder.write("d.png", png([[200, 20, 20, 255], [0, 0, 0, 128]]));
     folder.write("s.png", png([[0, 0, 0, 0], [230, 230, 230, 128]]));
     let rest = r#", "images": [{"uri": "d.png"}, {"uri": "s.png"}],
         "textures": [{"source": 0}, {"source": 1}]"#;
@@ -255,6 +255,7 @@ fn specular_glossiness_is_converted_texel_by_texel() {
     // 200 and 230 in linear light; the coat of 0.04 takes its share from below.
     assert!((color[0][0] - 0.578 / 0.96).abs() < 0.01 && color[0][1] < 0.01, "{color:?}");
     assert!((color[1][0] - 0.791).abs() < 0.01, "{color:?}");
+    assert!(color[0][3] == 1.0 && (color[1][3] - 0.502).abs() < 0.01, "{color:?}");
 
     // On other coordinates the mean of the specular colour counts, and the diffuse image stays.
     let turned = r#", "extensions": {"KHR_texture_transform": {"scale": [2, 2]}}"#;

@@ -284,6 +284,11 @@ mod tests {
     use super::*;
     use crate::math::random::hash_4d;
 
+    #[test]
+    fn a_median_lies_between_the_middle_values() {
+        assert_eq!((median(&[8.0, 1.0, 4.0, 2.0]), median(&[9.0, 1.0, 2.0])), (3.0, 2.0));
+    }
+
     /// An arm whose samples are known: its time, and the deviation of its samples relative to their mean.
     #[derive(Clone, Copy)]
     struct Planted {

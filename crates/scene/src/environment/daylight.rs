@@ -193,6 +193,17 @@ mod tests {
     }
 
     #[test]
+    fn the_sky_shows_the_colour_of_the_ground() {
+        let radiance = |albedo: Vec3| {
+            let sky = Daylight { albedo, ..daylight(Vec3::Z, 3.0) };
+            sky.channels().map(|channel| channel.radiance)
+        };
+        let (grey, white) = (radiance(Vec3::splat(0.2)), radiance(Vec3::ONE));
+        assert_eq!(radiance(Vec3::new(0.2, 1.0, 0.2)), [grey[0], white[1], grey[2]]);
+        assert!(white[1] > grey[1]);
+    }
+
+    #[test]
     fn the_map_has_the_irradiance_of_sky_and_sun() {
         let mut light = daylight(Vec3::new(0.3, 0.5, 0.6), 3.7);
         light.sky_scale = 0.0;

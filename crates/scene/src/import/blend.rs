@@ -343,6 +343,15 @@ mod tests {
         let expected = light(&mirror).lerp(light(&diffuse), 0.25);
         let (kind, _) = blend_lobes(pair, &quarter).unwrap();
         assert!(light(&kind).abs_diff_eq(expected, 0.02), "{} and {expected}", light(&kind));
+        // The gloss is that of the one that has gloss, and either may have bumps.
+        let roughness = Lobes::of(&kind).unwrap().roughness;
+        assert!((roughness - MIN_ALPHA.sqrt()).abs() < 1e-3, "{roughness}");
+        let bumpy = Surface { normal: Some(image()), ..Surface::default() };
+        for pair in
+            [[(&mirror, &bumpy), (&diffuse, &plain)], [(&mirror, &plain), (&diffuse, &bumpy)]]
+        {
+            assert!(blend_lobes(pair, &quarter).unwrap().1.normal.is_some());
+        }
         // By an image, whose texels have the luminances of red and green.
         let (kind, surface) = blend_lobes(pair, &Share::Image(image())).unwrap();
         let [color, metal] = [surface.color, surface.metallic].map(|used| used.unwrap().values());

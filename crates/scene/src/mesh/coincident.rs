@@ -190,6 +190,7 @@ mod tests {
         Mesh {
             positions: vec![[5.0, 0.0, 0.0], [6.0, 0.0, 0.0], [5.0, 1.0, 0.0], [5.0, 0.0, -0.0]],
             uvs: [vec![[0.0; 2], [1.0; 2], [2.0; 2], [3.0; 2]], Vec::new()],
+            colors: vec![[1.0; 4]; 4],
             triangles,
             runs,
             materials: vec![material(1.0), material(1.0), material(0.5)],
@@ -202,7 +203,7 @@ mod tests {
         let mut mesh = mesh(triangles.to_vec(), is_culled);
         let mut warnings = Vec::new();
         mesh.part_coincident(Path::new("a.obj"), &mut warnings);
-        assert_eq!(mesh.uvs[0].len(), mesh.positions.len());
+        assert_eq!([mesh.uvs[0].len(), mesh.colors.len()], [mesh.positions.len(); 2]);
         let height = |triangle: &[u32; 3]| {
             let [a, b, c] = triangle.map(|at| mesh.positions[at as usize][2] / (8.0 * STEP));
             assert_eq!((a, b), (b, c));
