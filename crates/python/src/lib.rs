@@ -235,7 +235,12 @@ fn set_program(program: Vec<String>) {
 
 /// See `python/fenestra/__init__.py`.
 #[pymodule]
-mod _fenestra {
-    #[pymodule_export]
-    use super::{Error, Picture, Scene, Standing, main, run, set_program};
+fn _fenestra(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("Error", module.py().get_type::<Error>())?;
+    module.add_class::<Scene>()?;
+    module.add_class::<Picture>()?;
+    module.add_class::<Standing>()?;
+    module.add_function(wrap_pyfunction!(run, module)?)?;
+    module.add_function(wrap_pyfunction!(main, module)?)?;
+    module.add_function(wrap_pyfunction!(set_program, module)?)
 }

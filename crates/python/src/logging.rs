@@ -1,4 +1,4 @@
-//! What the renderer logs, on its way to Python's logger `fenestra`.
+//! Records of the log on their way to Python's logger `fenestra`.
 
 use std::sync::{Mutex, PoisonError};
 
