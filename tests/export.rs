@@ -314,7 +314,8 @@ fn one_image_serves_all_uses_of_equal_values() {
     assert_same_values(surfaces.map(|surface| (Vec3::ONE, &surface.opacity.texture)));
     let numbers = |scene: &Scene| scene.materials[0].kind.parameters().2.concat();
     let pairs = numbers(&read).into_iter().zip(numbers(&ours));
-    pairs.for_each(|(read, ours)| assert!((read - ours).abs() < 1e-4, "{read} {ours}"));
+    // The base depends on the means of both images.
+    pairs.for_each(|(read, ours)| assert!((read - ours).abs() < 2e-3, "{read} {ours}"));
 }
 
 #[test]

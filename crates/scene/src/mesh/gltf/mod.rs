@@ -21,7 +21,7 @@ use glam::Mat4;
 use gltf::{Document, Node, buffer::Source};
 use serde_json::Value;
 
-use self::{material::Pane, primitive::Place};
+use self::{material::Pane, skin::Place};
 use super::{Mesh, MeshCamera, images::Images};
 use crate::{
     error::{Error, Result},

@@ -6,20 +6,15 @@ use gltf::{
     mesh::{Mode, Semantic},
 };
 
-use super::{GltfReader, skin::Posed};
+use super::{
+    GltfReader,
+    skin::{Place, Posed},
+};
 use crate::{
     error::Result,
     features,
     mesh::{Mesh, RepeatedMesh},
 };
-
-/// Placement of a primitive.
-pub(super) enum Place<'j> {
-    /// By the matrix of a node.
-    Node(Mat4),
-    /// By the matrices of joints.
-    Joints(&'j [Mat4]),
-}
 
 impl GltfReader<'_> {
     /// Place in `mesh.repeated` of a primitive whose copies are too many; none if it is to be copied.

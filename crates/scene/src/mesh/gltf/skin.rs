@@ -7,11 +7,19 @@ use gltf::{
     mesh::Semantic,
 };
 
-use super::{GltfReader, contents::label, primitive::Place};
+use super::{GltfReader, contents::label};
 use crate::error::Result;
 
 /// Bytes of a matrix of singles.
 const MATRIX_BYTES: usize = 64;
+
+/// Placement of a primitive.
+pub(super) enum Place<'j> {
+    /// By the matrix of a node.
+    Node(Mat4),
+    /// By the matrices of joints.
+    Joints(&'j [Mat4]),
+}
 
 /// Attributes of a primitive that joints move.
 pub(super) struct Posed<'p> {
