@@ -54,7 +54,8 @@ fn everything_that_a_gltf_file_loses_is_named_once() {
     let scene = load("room.gltf", &text);
     let found = warnings(&scene);
     let expected = [
-        "ignored animations (animation `swing`): played by `--frames`; else nodes stand as the file places them",
+        "ignored animations (animation `swing`): played by `--frames`; else nodes stand as the file \
+         places them",
         "ignored further sets of vertex colours (mesh `sail`)",
         "ignored third and further sets of texture coordinates (mesh `sail`)",
         "ignored range of lights (node `lamp`): light falls off with the squared distance alone",

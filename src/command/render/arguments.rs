@@ -11,7 +11,7 @@ use super::{
         parse_crop, parse_duration, parse_pixel, parse_size,
     },
     QUICK_SPP,
-    frames::{Frames, parse_frames},
+    frames::{Frames, numbered, parse_frames},
 };
 use crate::{
     error::{Error, Result},
@@ -19,7 +19,7 @@ use crate::{
     film::{Aov, Window, checkpoint::checkpoint_path},
     pass::Roulette,
     sampler::{Parameters, Sampler},
-    scene::{Asked, FilmSettings, Scene},
+    scene::{Asked, FilmSettings, Scene, load::scene_name},
     session::{DEFAULT_DEPTH, Quality, Rules, Settings},
 };
 
@@ -185,6 +185,61 @@ pub(super) fn denoised_path(output: &Path, ending: &str) -> PathBuf {
 }
 
 impl Arguments {
+    /// Lists the frames asked for; one that is none without `--frames`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for several frames with a name that they would share.
+    pub(super) fn frame_list(&self) -> Result<Vec<Option<u32>>> {
+        let Some(frames) = self.frames else { return Ok(vec![None]) };
+        if !(self.fps.is_finite() && self.fps > 0.0) {
+            return Err(Error::usage(format!("--fps {}: expected a number above 0", self.fps)));
+        }
+        for (option, path) in [
+            ("--output", &self.output),
+            ("--stats", &self.stats),
+            ("--save-guide", &self.save_guide),
+        ] {
+            if let Some(path) = path
+                .as_ref()
+                .filter(|path| frames.numbers().count() > 1 && numbered(path, 0) == **path)
+            {
+                return Err(Error::usage(format!(
+                    "{option} {}: every frame would have this name; expected #### in it for the number",
+                    path.display()
+                )));
+            }
+        }
+        Ok(frames.numbers().map(Some).collect())
+    }
+
+    /// Time of a frame, seconds.
+    pub(super) fn time_of(&self, frame: u32) -> f64 {
+        f64::from(frame) / self.fps
+    }
+
+    /// Arguments of one frame, with names and random numbers of its own.
+    pub(super) fn of_frame(&self, frame: Option<u32>) -> Self {
+        let mut own = self.clone();
+        let Some(frame) = frame else { return own };
+        let files = [&mut own.output, &mut own.stats, &mut own.save_guide, &mut own.load_guide];
+        for path in files.into_iter().flatten() {
+            *path = numbered(path, frame);
+        }
+        own.seed = Frames::seed(self.seed, frame);
+        own
+    }
+
+    /// Image of a frame.
+    pub(super) fn image_path(&self, frame: Option<u32>) -> PathBuf {
+        self.output.clone().unwrap_or_else(|| {
+            let name = scene_name(&self.scene);
+            match frame {
+                None => PathBuf::from(format!("{name}.exr")),
+                Some(frame) => numbered(Path::new(&format!("{name}.####.exr")), frame),
+            }
+        })
+    }
+
     /// Quality of a picture to show; `None` where another rule stops the render.
     pub(super) fn quality(&self) -> Option<Quality> {
         let has_rule =

@@ -2,19 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Arguments;
-use crate::{
-    error::{Error, Result},
-    film::checkpoint::checkpoint_path,
-    math::random::hash_4d,
-    scene::load::scene_name,
-};
+use crate::{film::checkpoint::checkpoint_path, math::random::hash_4d};
 
 /// Tells the seeds of frames from other hashes.
 const FRAME_TAG: u32 = 0x2f6e_2b1d;
-/// Digits of a frame's number in the default name.
-const NUMBER: &str = "####";
-
 /// Frames from `first` to `last`, every `step`th.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frames {
@@ -35,7 +26,7 @@ pub(super) fn parse_frames(text: &str) -> Result<Frames, String> {
 }
 
 /// Puts a frame's number in place of the last run of `#` in a file's name, with as many digits at least.
-fn numbered(path: &Path, frame: u32) -> PathBuf {
+pub(super) fn numbered(path: &Path, frame: u32) -> PathBuf {
     let Some(name) = path.file_name().and_then(|name| name.to_str()) else {
         return path.to_path_buf();
     };
@@ -47,59 +38,15 @@ fn numbered(path: &Path, frame: u32) -> PathBuf {
     }
 }
 
-impl Arguments {
-    /// Lists the frames asked for; one that is none without `--frames`.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for several frames with a name that they would share.
-    pub(super) fn frame_list(&self) -> Result<Vec<Option<u32>>> {
-        let Some(Frames { first, last, step }) = self.frames else { return Ok(vec![None]) };
-        if !(self.fps.is_finite() && self.fps > 0.0) {
-            return Err(Error::usage(format!("--fps {}: expected a number above 0", self.fps)));
-        }
-        for (option, path) in [
-            ("--output", &self.output),
-            ("--stats", &self.stats),
-            ("--save-guide", &self.save_guide),
-        ] {
-            if let Some(path) =
-                path.as_ref().filter(|path| first < last && numbered(path, 0) == **path)
-            {
-                return Err(Error::usage(format!(
-                    "{option} {}: every frame would have this name; expected #### in it for the number",
-                    path.display()
-                )));
-            }
-        }
-        Ok((first..=last).step_by(step).map(Some).collect())
+impl Frames {
+    /// Lists the numbers.
+    pub(super) fn numbers(self) -> impl Iterator<Item = u32> {
+        (self.first..=self.last).step_by(self.step)
     }
 
-    /// Time of a frame, seconds.
-    pub(super) fn time_of(&self, frame: u32) -> f64 {
-        f64::from(frame) / self.fps
-    }
-
-    /// Arguments of one frame, with names and random numbers of its own.
-    pub(super) fn of_frame(&self, frame: Option<u32>) -> Self {
-        let mut own = self.clone();
-        let Some(frame) = frame else { return own };
-        let files = [&mut own.output, &mut own.stats, &mut own.save_guide, &mut own.load_guide];
-        for path in files.into_iter().flatten() {
-            *path = numbered(path, frame);
-        }
-        [own.seed, ..] = hash_4d([self.seed, frame, FRAME_TAG, 0]);
-        own
-    }
-
-    /// Image of a frame.
-    pub(super) fn image_path(&self, frame: Option<u32>) -> PathBuf {
-        self.output.clone().unwrap_or_else(|| {
-            let name = scene_name(&self.scene);
-            match frame {
-                None => PathBuf::from(format!("{name}.exr")),
-                Some(frame) => numbered(Path::new(&format!("{name}.{NUMBER}.exr")), frame),
-            }
-        })
+    /// Random seed of a frame, which no other frame has.
+    pub(super) fn seed(seed: u32, frame: u32) -> u32 {
+        hash_4d([seed, frame, FRAME_TAG, 0])[0]
     }
 }
 
