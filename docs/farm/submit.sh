@@ -1,7 +1,6 @@
 #!/bin/sh
-# Submits SEEDS × BANDS tasks to Slurm, and a job that merges them once all are done.
+# Submits SEEDS × BANDS tasks to Slurm. Merge once all are done: a job that depends on them by `afterok`
+# never starts if a task was requeued (seen with Slurm 22.05).
 set -eu
-here=$(dirname "$0")
 last=$((${SEEDS:-2} * ${BANDS:-4} - 1))
-job=$(sbatch --parsable --array="0-$last" --requeue --signal=B:TERM@60 "$here/task.sh")
-sbatch --dependency="afterok:$job" --wrap "fenestra merge $OUT/band*.exr -o $OUT.exr"
+sbatch --array="0-$last" --requeue --signal=B:TERM@60 "$(dirname "$0")/task.sh"
