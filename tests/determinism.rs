@@ -127,7 +127,7 @@ fn pages_of_the_film_make_no_difference() {
     }
 }
 
-/// Every page of the film is a wave of its own.
+/// Every page of the film, of three, is a wave of its own.
 #[test]
 fn a_sweep_that_was_stopped_goes_on_to_the_bit() {
     let _alone = support::alone();
@@ -142,11 +142,7 @@ fn a_sweep_that_was_stopped_goes_on_to_the_bit() {
         for _ in 0..2 {
             stopped.pass(1, 1.0).unwrap();
         }
-        let mut waves = 0;
-        stopped.renderer.set_watch(Box::new(move |_| {
-            waves += 1;
-            waves == 2
-        }));
+        stopped.renderer.set_watch(Box::new(|wave| wave.is_training == 0));
         stopped.renderer.render_pass(3).unwrap();
         let sums = stopped.renderer.sums().unwrap();
         let last = sums.pixel_count() - 1;
@@ -161,7 +157,7 @@ fn a_sweep_that_was_stopped_goes_on_to_the_bit() {
         resumed.resume(&path).unwrap();
         assert_eq!(resumed.seconds(), stopped.seconds());
         // A sweep may be stopped again.
-        resumed.renderer.set_watch(Box::new(|_| true));
+        resumed.renderer.set_watch(Box::new(|wave| wave.is_training == 0));
         resumed.renderer.render_pass(3).unwrap();
         assert!(resumed.renderer.ahead().blocks > stopped.renderer.ahead().blocks);
         for Session { renderer, .. } in [&mut resumed, &mut stopped] {
