@@ -3,7 +3,6 @@
 //
 // A pass reads only tables from earlier passes, so no density changes while it runs.
 
-#include "once.glsl"
 #include "regions.glsl"
 #include "vertex.glsl"
 
@@ -126,7 +125,7 @@ GuideCell guide_cell(vec3 position, uint face, uint bits) {
     uint level = guide_level(position, bits);
     uint key = guide_key(position, face, level);
     GuideCell cell = GuideCell(key, guide_find(key));
-    ONCE_IF(cell.found == GUIDE_NO_KEY) {
+    if (cell.found == GUIDE_NO_KEY) {
         guide_note_missing(key);
         cell.key = guide_coarse_key(key);
         cell.found = guide_find(cell.key);

@@ -9,7 +9,6 @@
 #include "frame.glsl"
 #include "haar/sums.glsl"
 #include "load.glsl"
-#include "once.glsl"
 #include "wave.glsl"
 
 TEXELS(haar_centres)
@@ -68,7 +67,7 @@ void lower_path(uint path) {
             for (uint k = 0u; k < 4u; ++k) {
                 vec3 centre = texelFetch(haar_centres, int(4u * quad + k)).xyz;
                 bool near = reflectances[k] > 0.0 && is_near(centre, direction);
-                ONCE_IF(near) {
+                if (near) {
                     reflectances[k] *= next_factor(path, path_count, recorded, centre);
                     has_near = true;
                 }

@@ -25,11 +25,11 @@ NodeSample haar_sample(Vertex vertex, HaarMixture mixture, MixtureNumbers number
     NodeSample drawn =
         NodeSample(draw_beside_product(vertex, mixture.shares, numbers), 0.0);
     bool from_nodes = is_from_product(mixture.shares, numbers);
-    ONCE_IF(from_nodes) {
+    if (from_nodes) {
         drawn = nodes_sample(
             mixture.path, mixture.path_count, mixture.total, numbers.direction);
     }
-    ONCE_IF(!from_nodes) {
+    if (!from_nodes) {
         drawn.pdf =
             nodes_pdf(mixture.path, mixture.path_count, mixture.total, drawn.direction);
     }

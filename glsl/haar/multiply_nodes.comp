@@ -6,7 +6,6 @@
 #include "haar/sums.glsl"
 #include "hit_surface.glsl"
 #include "load.glsl"
-#include "once.glsl"
 #include "wave.glsl"
 
 TEXELS(haar_centres)
@@ -35,7 +34,7 @@ void multiply_path(uint path) {
                 vec3 centre_local = to_local(frame, centre);
                 bool is_above = centre_local.z > -node_radius() && light[k] > 0.0
                     && dot(hit.geometric_normal, centre) > -node_radius();
-                ONCE_IF(is_above) {
+                if (is_above) {
                     reflectances[k] = node_reflectance(material, outgoing_local, centre_local);
                 }
             }

@@ -64,7 +64,7 @@ vec3 draw_from_lobe(Vertex vertex, uint ray, ProductLobe lobe, vec2 u) {
 // Samples the world direction of one ray. Directions below the horizon contribute nothing.
 vec3 mixture_sample(Vertex vertex, Mixture mixture, uint ray, MixtureNumbers numbers) {
     vec3 direction = draw_beside_product(vertex, mixture.shares, numbers);
-    ONCE_IF(is_from_product(mixture.shares, numbers)) {
+    if (is_from_product(mixture.shares, numbers)) {
         uint l = find_lobe(mixture.lobes, numbers.lobe * mixture.total);
         chosen_lobe = l;
         ProductLobe lobe = unpack_lobe(lobe_words(mixture.lobes, l));

@@ -10,7 +10,6 @@
 #version 460
 
 #include "load.glsl"
-#include "once.glsl"
 #include "product/lobes.glsl"
 #include "visibility/cache.glsl"
 #include "wave.glsl"
@@ -191,7 +190,7 @@ uint note_stronger(View view, float threshold) {
         for (uint e = 0u; e < ENVIRONMENT_LOBES; ++e) {
             vec4 environment = environment_exponents(e);
             uint bits = 0u;
-            ONCE_IF(is_above_horizon(environment, view.normal)) {
+            if (is_above_horizon(environment, view.normal)) {
                 float left = threshold - environment.w;
                 for (uint i = 0u; i < GROUP; ++i) {
                     bits |= is_stronger(environment.xyz, brdf[i], left) ? 1u << i : 0u;
@@ -310,7 +309,7 @@ void multiply_path(uint path) {
         uvec2 words = pack_lobe(ProductLobe(axis, drawn_bandwidth, min(weight, 6e4)));
         sum += unpackHalf2x16(words.y).y;
         lobes[l * path_count + path] = words;
-        ONCE_IF(is_sum_kept(l, count)) {
+        if (is_sum_kept(l, count)) {
             lobe_sums[l / LOBES_PER_SUM * path_count + path] = sum;
         }
     }

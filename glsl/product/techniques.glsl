@@ -1,7 +1,6 @@
 // Techniques of samplers that draw from a product, environment and BRDF: their shares, random numbers and
 // directions. Densities in solid angle measure.
 
-#include "once.glsl"
 #include "vertex.glsl"
 
 layout(constant_id = CONSTANT_BRDF_SHARE) const float BRDF_SHARE = 0.25;
@@ -82,10 +81,10 @@ vec3 draw_beside_product(Vertex vertex, Shares shares, MixtureNumbers numbers) {
     bool from_environment =
         !from_product && numbers.technique < shares.product + shares.environment;
     vec3 direction = vertex.frame.normal;
-    ONCE_IF(from_environment) {
+    if (from_environment) {
         direction = environment_sample(numbers.direction).direction;
     }
-    ONCE_IF(!from_product && !from_environment) {
+    if (!from_product && !from_environment) {
         direction = to_world(
             vertex.frame,
             brdf_sample(

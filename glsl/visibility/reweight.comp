@@ -16,7 +16,7 @@ UPDATES(counters)
 const uint PLACES = CACHE_CAPACITY > 0u ? CACHE_CAPACITY : 1u;
 
 void write_sum(Lobes lobes, uint l, float sum) {
-    ONCE_IF(is_sum_kept(l, lobes.count)) {
+    if (is_sum_kept(l, lobes.count)) {
         lobe_sums[l / LOBES_PER_SUM * lobes.path_count + lobes.path] = sum;
     }
 }

@@ -47,20 +47,20 @@ void sample_vertex(uint path, Vertex vertex) {
         shadow_rays[i * path_count + path] = ray;
         visibility[i * path_count + path] = is_visible ? 1u : 0u;
 
-        ONCE_IF(running) {
+        if (running) {
             COUNT_GIVEN_UP(path);
         }
         // Only the pixel's next sample can use the last ray of a hit.
         bool is_last = index + 1u == wave.total_shadow_rays;
         bool is_learned = is_traced && !is_visible && (CACHE_OF_PIXEL != 0u || !is_last);
-        ONCE_IF(is_learned) {
+        if (is_learned) {
             cache_blocked(mixture.lobes, ray.direction);
             set_shares(mixture);
             grown = is_last ? CACHE_GROWN : 0u;
         }
     }
     uint recorded = mixture.lobes.recorded - recorded_before;
-    ONCE_IF(recorded > 0u) {
+    if (recorded > 0u) {
         store_weights(mixture.lobes, grown);
         atomicAdd(counters.cache_entries, recorded);
         atomicAdd(counters.cdf_rebuilds, grown != 0u ? recorded - 1u : recorded);

@@ -6,7 +6,6 @@
 //
 // Deviation: V = (1 / (1 + Num))^k, not (1 / Num)^k, infinite for lobes without close directions.
 
-#include "once.glsl"
 #include "visibility/cache.glsl"
 #include "wave.glsl"
 
@@ -106,7 +105,7 @@ uint counts_of(Lobes lobes, uint quad) {
 // Returns the bits of 32 lobes for the direction that a full cache forgets for the next.
 uint forgotten_mask(Lobes lobes, uint word) {
     uint mask = 0u;
-    ONCE_IF(lobes.recorded >= CACHE_CAPACITY) {
+    if (lobes.recorded >= CACHE_CAPACITY) {
         uint oldest = lobes.recorded - CACHE_CAPACITY;
         mask = close_lobes[close_lobes_index(lobes.path, lobes.path_count, oldest, word)];
     }
