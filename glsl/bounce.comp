@@ -17,14 +17,14 @@ void bounce_path(uint path) {
         rays[path].is_active = 0u;
         return;
     }
-    Material material = load_surface(path, hit.material);
     Frame frame = frame_from_normal(hit.shading_normal);
-    vec3 outgoing_local = to_local(frame, -rays[path].direction);
+    Reflector reflector = reflector_from(
+        load_surface(path, hit.material), to_local(frame, -rays[path].direction));
     vec3 u = bounce_numbers(index, index.sample_index, wave.seed);
-    vec3 incident_local = brdf_sample(material, outgoing_local, u);
+    vec3 incident_local = brdf_sample(reflector, u);
     vec3 direction = to_world(frame, incident_local);
     float pdf;
-    vec3 factor = bounce_factor(hit, material, outgoing_local, incident_local, direction, pdf);
+    vec3 factor = bounce_factor(hit, reflector, incident_local, direction, pdf);
     follow_bounce(path, index, hit, direction, pdf, factor, index.sample_index, wave.seed);
 }
 

@@ -45,8 +45,7 @@ void sample_vertex(uint path, Vertex vertex) {
         vec3 incident_local = to_local(vertex.frame, lamp.direction);
         vec3 value;
         float brdf_pdf;
-        brdf_evaluate_and_pdf(
-            vertex.material, vertex.outgoing_local, incident_local, value, brdf_pdf);
+        brdf_evaluate_and_pdf(vertex.reflector, incident_local, value, brdf_pdf);
         bool is_above =
             incident_local.z > 0.0 && dot(lamp.direction, hit.geometric_normal) > 0.0;
         float weight = lamp.pdf > 0.0 ? lamp.pdf / (lamp.pdf + brdf_pdf) : 1.0;

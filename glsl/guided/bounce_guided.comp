@@ -23,9 +23,9 @@ void bounce_path(uint path) {
         path_cells[path].teaches = NOTHING_TO_LEARN;
         return;
     }
-    Material material = load_surface(path, hit.material);
     Frame frame = frame_from_normal(hit.shading_normal);
-    vec3 outgoing_local = to_local(frame, -rays[path].direction);
+    Reflector reflector = reflector_from(
+        load_surface(path, hit.material), to_local(frame, -rays[path].direction));
     vec3 u = bounce_numbers(index, number, wave.epoch_seed);
     Reservoir reservoir = reservoir_start(random_1d(
         index.pixel, number, vertex_dimension() + DIMENSION_RESAMPLING, wave.epoch_seed));
@@ -35,7 +35,7 @@ void bounce_path(uint path) {
     vec3 chosen = vec3(0.0, 0.0, 1.0);
     uint chosen_direction = 0u;
     for (uint c = 0u; c < BOUNCE_CANDIDATES; ++c) {
-        vec3 incident_local = brdf_sample(material, outgoing_local, u);
+        vec3 incident_local = brdf_sample(reflector, u);
         uint direction = arrival_direction(to_world(frame, incident_local));
         float light = texelFetch(guide_arriving, int(first + direction)).x;
         if (reservoir_takes(reservoir, light, light)) {
@@ -46,7 +46,7 @@ void bounce_path(uint path) {
     }
     vec3 direction = to_world(frame, chosen);
     float pdf;
-    vec3 factor = bounce_factor(hit, material, outgoing_local, chosen, direction, pdf)
+    vec3 factor = bounce_factor(hit, reflector, chosen, direction, pdf)
         * reservoir_factor(reservoir, BOUNCE_CANDIDATES);
     // The throughput depends on the tables, and so roulette takes the numbers since their rebuild too.
     bool alive =

@@ -122,7 +122,7 @@ void sample_path(uint path) {
         + wave.first_shadow_ray;
 
     if (CANDIDATES == 1u) {
-        uint share = learned_share > 0u ? learned_share : brdf_share(vertex.material);
+        uint share = learned_share > 0u ? learned_share : brdf_share(vertex.reflector.material);
         share = wave.vertex > 0u ? max(share, LEAST_LATER_SHARE) : share;
         // Pixels of a block start alike.
         uint start = hash_4d(uvec4(

@@ -21,8 +21,8 @@ void multiply_path(uint path) {
         return;
     }
     Frame frame = frame_from_normal(hit.shading_normal);
-    Material material = widened(load_surface(path, hit.material));
-    vec3 outgoing_local = to_local(frame, -load_ray(path).direction);
+    Reflector reflector = reflector_from(
+        widened(load_surface(path, hit.material)), to_local(frame, -load_ray(path).direction));
     for (uint group = 0u; group < 1u << 2u * (LEVEL - 2u); ++group) {
         float sum = 0.0;
         for (uint i = 0u; i < 4u; ++i) {
@@ -35,7 +35,7 @@ void multiply_path(uint path) {
                 bool is_above = centre_local.z > -node_radius() && light[k] > 0.0
                     && dot(hit.geometric_normal, centre) > -node_radius();
                 if (is_above) {
-                    reflectances[k] = node_reflectance(material, outgoing_local, centre_local);
+                    reflectances[k] = node_reflectance(reflector, centre_local);
                 }
             }
             uvec2 halves = pack_quad(reflectances);

@@ -33,10 +33,10 @@ float mean_cosine(float cosine) {
 }
 
 // Luminance of BRDF * cosine, in REFLECTANCE_UNIT, for a node that is not wholly below the horizon;
-// `material` is widened.
-float node_reflectance(Material material, vec3 outgoing_local, vec3 centre_local) {
+// the material is widened.
+float node_reflectance(Reflector reflector, vec3 centre_local) {
     float cosine = mean_cosine(centre_local.z);
     vec3 incident_local = normalize(vec3(centre_local.xy, cosine));
-    vec3 value = brdf_evaluate(material, outgoing_local, incident_local);
+    vec3 value = brdf_evaluate(reflector, incident_local);
     return min(dot(value, LUMINANCE_WEIGHTS) * cosine, LARGEST_REFLECTANCE) / REFLECTANCE_UNIT;
 }

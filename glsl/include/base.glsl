@@ -48,11 +48,12 @@ vec3 base_part(Material material, float cosine) {
 }
 
 // Share of the base in what the BRDF reflects from one direction into another.
-vec3 base_share(Material material, vec3 outgoing_local, vec3 incident_local) {
+vec3 base_share(Reflector reflector, vec3 incident_local) {
+    Material material = reflector.material;
     if (is_kind(material, MATERIAL_DIFFUSE)) {
         return vec3(1.0);
     }
-    vec3 value = brdf_evaluate(material, outgoing_local, incident_local);
-    vec3 base = base_view(material, outgoing_local.z) * base_part(material, incident_local.z);
+    vec3 value = brdf_evaluate(reflector, incident_local);
+    vec3 base = base_view(material, reflector.outgoing_local.z) * base_part(material, incident_local.z);
     return mix(vec3(0.0), base / value, greaterThan(value, vec3(0.0)));
 }

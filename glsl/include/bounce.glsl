@@ -30,13 +30,12 @@ vec3 bounce_numbers(PathIndex index, uint number, uint seed) {
 // Returns BRDF * cosine / density of a direction drawn from the BRDF, and that density; 0 below
 // either horizon.
 vec3 bounce_factor(
-    Hit hit, Material material, vec3 outgoing_local, vec3 incident_local, vec3 direction,
-    out float pdf) {
+    Hit hit, Reflector reflector, vec3 incident_local, vec3 direction, out float pdf) {
     vec3 factor = vec3(0.0);
     pdf = 0.0;
     if (incident_local.z > 0.0 && dot(direction, hit.geometric_normal) > 0.0) {
         vec3 value;
-        brdf_evaluate_and_pdf(material, outgoing_local, incident_local, value, pdf);
+        brdf_evaluate_and_pdf(reflector, incident_local, value, pdf);
         factor = pdf > 0.0 ? value * (incident_local.z / pdf) : vec3(0.0);
     }
     return factor;

@@ -171,15 +171,57 @@ vec2 measured_azimuth_axis(vec3 outgoing_local) {
     return sine > 0.0 ? outgoing_local.xy / sine : vec2(1.0, 0.0);
 }
 
+// Material seen from one direction, with what no other direction changes: tables are read once for all
+// incident directions. The twins work it out at each.
+struct Reflector {
+    Material material;
+    vec3 outgoing_local;
+    // Probability of sampling the specular part; of a measured material, the cosine lobe.
+    float share;
+    // Light that enters the base of a plastic from the outgoing direction.
+    float transmission;
+    // ggx_stretched_length and ggx_cap_factor of the outgoing direction.
+    float stretched;
+    float cap_factor;
+    // Bin of the outgoing polar angle of a measured material.
+    uint elevation;
+};
+
+Reflector reflector_from(Material material, vec3 outgoing_local) {
+    Reflector reflector = Reflector(
+        material, outgoing_local, 0.0, 0.0, ggx_stretched_length(outgoing_local, material.alpha),
+        ggx_cap_factor(outgoing_local, material.alpha), 0u);
+    if (is_kind(material, MATERIAL_CONDUCTOR)) {
+        reflector.share = 1.0;
+    }
+    if (is_kind(material, MATERIAL_PLASTIC)) {
+        uint offset = material.table_offset;
+        reflector.share =
+            cosine_table(offset + PLASTIC_SPECULAR_SHARE_OFFSET, 1u, outgoing_local.z);
+        reflector.transmission =
+            cosine_table(offset + PLASTIC_TRANSMISSION_OFFSET, 1u, outgoing_local.z);
+    }
+    if (is_kind(material, MATERIAL_PRINCIPLED)) {
+        reflector.share = principled_specular_share(material, outgoing_local.z);
+    }
+    if (is_kind(material, MATERIAL_MEASURED)) {
+        reflector.elevation = measured_elevation_bin(outgoing_local);
+        reflector.share = table_value(
+            material.table_offset + MEASURED_COSINE_SHARE_OFFSET + reflector.elevation);
+    }
+    return reflector;
+}
+
 // Density of measured_sample: cosine lobe and tabulated half vectors.
-float measured_pdf(uint table_offset, vec3 outgoing_local, vec3 incident_local, float theta_half) {
-    vec3 half_vector = outgoing_local + incident_local;
-    uint elevation = measured_elevation_bin(outgoing_local);
-    float cosine_share = table_value(table_offset + MEASURED_COSINE_SHARE_OFFSET + elevation);
+float measured_pdf(Reflector reflector, vec3 incident_local, float theta_half) {
+    uint table_offset = reflector.material.table_offset;
+    vec3 half_vector = reflector.outgoing_local + incident_local;
+    uint elevation = reflector.elevation;
+    float cosine_share = reflector.share;
     uint polar = min(
         uint(float(MEASURED_POLAR_BINS) * sqrt(theta_half * (2.0 / PI))),
         MEASURED_POLAR_BINS - 1u);
-    vec2 axis = measured_azimuth_axis(outgoing_local);
+    vec2 axis = measured_azimuth_axis(reflector.outgoing_local);
     float y = abs(axis.x * half_vector.y - axis.y * half_vector.x);
     float x = dot(axis, half_vector.xy);
     float phi = (x == 0.0 && y == 0.0) ? 0.0 : atan(y, x);
@@ -194,9 +236,11 @@ float measured_pdf(uint table_offset, vec3 outgoing_local, vec3 incident_local, 
 
 // Samples an incident direction from the cosine lobe or the tabulated half vectors; z ≤ 0 means no
 // sample.
-vec3 measured_sample(uint table_offset, vec3 outgoing_local, vec3 u) {
-    uint elevation = measured_elevation_bin(outgoing_local);
-    float cosine_share = table_value(table_offset + MEASURED_COSINE_SHARE_OFFSET + elevation);
+vec3 measured_sample(Reflector reflector, vec3 u) {
+    uint table_offset = reflector.material.table_offset;
+    vec3 outgoing_local = reflector.outgoing_local;
+    uint elevation = reflector.elevation;
+    float cosine_share = reflector.share;
     if (u.x < cosine_share) {
         return sample_cosine_hemisphere(u.yz);
     }
@@ -234,7 +278,9 @@ vec3 measured_sample(uint table_offset, vec3 outgoing_local, vec3 u) {
 // Value (1/sr, without the cosine) and density of brdf_sample at one pair of directions. The density
 // integrates over the hemisphere to 1 less the share of samples below the surface.
 void brdf_evaluate_and_pdf(
-    Material material, vec3 outgoing_local, vec3 incident_local, out vec3 value, out float pdf) {
+    Reflector reflector, vec3 incident_local, out vec3 value, out float pdf) {
+    Material material = reflector.material;
+    vec3 outgoing_local = reflector.outgoing_local;
     value = vec3(0.0);
     pdf = 0.0;
     if (outgoing_local.z <= 0.0 || incident_local.z <= 0.0) {
@@ -249,25 +295,25 @@ void brdf_evaluate_and_pdf(
     if (is_kind(material, MATERIAL_MEASURED)) {
         vec3 angles = half_difference_angles(outgoing_local, incident_local);
         value = measured_value(material.table_offset, angles);
-        pdf = measured_pdf(material.table_offset, outgoing_local, incident_local, angles.x);
+        pdf = measured_pdf(reflector, incident_local, angles.x);
         return;
     }
     vec3 half_vector = outgoing_local + incident_local;
     float cosine_difference = min(1.0, 0.5 * length(half_vector));
-    float reflection = ggx_reflection(half_vector, outgoing_local, incident_local, material.alpha);
-    pdf = ggx_pdf(half_vector, outgoing_local, material.alpha);
+    float reflection = ggx_reflection(
+        half_vector, outgoing_local, reflector.stretched, incident_local, material.alpha);
+    pdf = ggx_pdf(
+        half_vector, outgoing_local, reflector.stretched, reflector.cap_factor, material.alpha);
     if (is_kind(material, MATERIAL_PLASTIC)) {
-        uint transmission = material.table_offset + PLASTIC_TRANSMISSION_OFFSET;
-        float specular_share = cosine_table(
-            material.table_offset + PLASTIC_SPECULAR_SHARE_OFFSET, 1u, outgoing_local.z);
-        float base = cosine_table(transmission, 1u, outgoing_local.z)
-            * cosine_table(transmission, 1u, incident_local.z) / PI;
+        float base = reflector.transmission
+            * cosine_table(
+                material.table_offset + PLASTIC_TRANSMISSION_OFFSET, 1u, incident_local.z) / PI;
         value = vec3(reflection * fresnel_dielectric(cosine_difference, material.ior))
             + base * material.reflectance;
-        pdf = mix(cosine_pdf, pdf, specular_share);
+        pdf = mix(cosine_pdf, pdf, reflector.share);
     } else if (is_kind(material, MATERIAL_PRINCIPLED)) {
         value = principled_value(material, reflection, cosine_difference);
-        pdf = mix(cosine_pdf, pdf, principled_specular_share(material, outgoing_local.z));
+        pdf = mix(cosine_pdf, pdf, reflector.share);
     } else if (is_kind(material, MATERIAL_CONDUCTOR) && material.ior > 0.0) {
         value = reflection * fresnel_conductor(cosine_difference, material.eta, material.k);
     } else if (is_kind(material, MATERIAL_CONDUCTOR)) {
@@ -278,35 +324,28 @@ void brdf_evaluate_and_pdf(
 }
 
 // Value, 1/sr, without the cosine.
-vec3 brdf_evaluate(Material material, vec3 outgoing_local, vec3 incident_local) {
+vec3 brdf_evaluate(Reflector reflector, vec3 incident_local) {
     vec3 value;
     float pdf;
-    brdf_evaluate_and_pdf(material, outgoing_local, incident_local, value, pdf);
+    brdf_evaluate_and_pdf(reflector, incident_local, value, pdf);
     return value;
 }
 
 // Samples an incident direction with three numbers in [0, 1); z ≤ 0 means no sample, which counts
 // as one with contribution 0.
-vec3 brdf_sample(Material material, vec3 outgoing_local, vec3 u) {
+vec3 brdf_sample(Reflector reflector, vec3 u) {
+    Material material = reflector.material;
     bool is_sampled = is_kind(material, MATERIAL_DIFFUSE) || is_kind(material, MATERIAL_PLASTIC)
         || is_kind(material, MATERIAL_CONDUCTOR) || is_kind(material, MATERIAL_MEASURED)
         || is_kind(material, MATERIAL_PRINCIPLED);
-    if (outgoing_local.z <= 0.0 || !is_sampled) {
+    if (reflector.outgoing_local.z <= 0.0 || !is_sampled) {
         return vec3(0.0, 0.0, -1.0);
     }
     if (is_kind(material, MATERIAL_MEASURED)) {
-        return measured_sample(material.table_offset, outgoing_local, u);
+        return measured_sample(reflector, u);
     }
-    float specular_share = is_kind(material, MATERIAL_CONDUCTOR) ? 1.0 : 0.0;
-    if (is_kind(material, MATERIAL_PLASTIC)) {
-        specular_share = cosine_table(
-            material.table_offset + PLASTIC_SPECULAR_SHARE_OFFSET, 1u, outgoing_local.z);
-    }
-    if (is_kind(material, MATERIAL_PRINCIPLED)) {
-        specular_share = principled_specular_share(material, outgoing_local.z);
-    }
-    if (u.x < specular_share) {
-        return ggx_sample(outgoing_local, material.alpha, u.yz);
+    if (u.x < reflector.share) {
+        return ggx_sample(reflector.outgoing_local, material.alpha, reflector.cap_factor, u.yz);
     }
     return sample_cosine_hemisphere(u.yz);
 }

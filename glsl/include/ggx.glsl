@@ -28,18 +28,18 @@ float ggx_cap_factor(vec3 outgoing_local, float alpha) {
 }
 
 // Microfacet reflection at unit reflectance, per steradian: D·G₂/(4 cosθ_o cosθ_i) with the
-// height-correlated masking of [Heitz 2014] Eq. 99.
-float ggx_reflection(vec3 half_vector, vec3 outgoing_local, vec3 incident_local, float alpha) {
-    float masking = incident_local.z * ggx_stretched_length(outgoing_local, alpha)
+// height-correlated masking of [Heitz 2014] Eq. 99. `stretched` is the outgoing direction's length.
+float ggx_reflection(
+    vec3 half_vector, vec3 outgoing_local, float stretched, vec3 incident_local, float alpha) {
+    float masking = incident_local.z * stretched
         + outgoing_local.z * ggx_stretched_length(incident_local, alpha);
     return 0.5 * ggx_normal_density(half_vector, alpha) / masking;
 }
 
 // Density of ggx_sample. [Eto & Tokuyoshi 2023] Eq. 8 with the Jacobian of the reflection.
-float ggx_pdf(vec3 half_vector, vec3 outgoing_local, float alpha) {
-    float cap = ggx_cap_factor(outgoing_local, alpha) * outgoing_local.z
-        + ggx_stretched_length(outgoing_local, alpha);
-    return 0.5 * ggx_normal_density(half_vector, alpha) / cap;
+float ggx_pdf(
+    vec3 half_vector, vec3 outgoing_local, float stretched, float cap_factor, float alpha) {
+    return 0.5 * ggx_normal_density(half_vector, alpha) / (cap_factor * outgoing_local.z + stretched);
 }
 
 // Samples a normal by its projection toward the outgoing direction, on the spherical cap above
@@ -67,8 +67,7 @@ float ggx_masking_ratio(vec3 outgoing_local, vec3 incident_local, float alpha) {
 // Samples an incident direction by the visible normals of GGX, on the spherical cap that omits most
 // reflections below the surface. Those that remain have z ≤ 0: no sample. [Dupuy & Benyoub 2023],
 // [Eto & Tokuyoshi 2023].
-vec3 ggx_sample(vec3 outgoing_local, float alpha, vec2 u) {
-    float cap_factor = ggx_cap_factor(outgoing_local, alpha);
+vec3 ggx_sample(vec3 outgoing_local, float alpha, float cap_factor, vec2 u) {
     vec3 normal = ggx_normal_sample(outgoing_local, alpha, cap_factor, u);
     return 2.0 * dot(outgoing_local, normal) * normal - outgoing_local;
 }

@@ -15,8 +15,7 @@ WRITES(shadow_rays)
 struct Vertex {
     Hit hit;
     Frame frame;
-    Material material;
-    vec3 outgoing_local;
+    Reflector reflector;
     PathIndex index;
     uint dimension;
 };
@@ -35,8 +34,8 @@ Vertex load_vertex(uint path, Hit hit) {
     vertex.hit = hit;
     vertex.index = wave_path(path);
     vertex.frame = frame_from_normal(hit.shading_normal);
-    vertex.material = load_surface(path, hit.material);
-    vertex.outgoing_local = to_local(vertex.frame, -load_ray(path).direction);
+    vertex.reflector = reflector_from(
+        load_surface(path, hit.material), to_local(vertex.frame, -load_ray(path).direction));
     vertex.dimension = vertex_dimension();
     return vertex;
 }
@@ -45,8 +44,7 @@ DirectionSample evaluate_direction(
     Vertex vertex, vec3 direction, vec3 incident_local, vec3 radiance, float environment_density) {
     DirectionSample sampled = DirectionSample(direction, vec3(0.0), 0.0, environment_density);
     vec3 value;
-    brdf_evaluate_and_pdf(
-        vertex.material, vertex.outgoing_local, incident_local, value, sampled.brdf_pdf);
+    brdf_evaluate_and_pdf(vertex.reflector, incident_local, value, sampled.brdf_pdf);
     // Nothing contributes below the shading or the geometric horizon.
     if (incident_local.z > 0.0 && dot(direction, vertex.hit.geometric_normal) > 0.0) {
         sampled.integrand = value * radiance * incident_local.z;
@@ -84,7 +82,7 @@ DirectionSample draw_from_environment(Vertex vertex, vec2 u) {
 
 // Samples a direction from the BRDF; u in [0, 1)^3.
 DirectionSample draw_from_brdf(Vertex vertex, vec3 u) {
-    return evaluate_local(vertex, brdf_sample(vertex.material, vertex.outgoing_local, u));
+    return evaluate_local(vertex, brdf_sample(vertex.reflector, u));
 }
 
 // Number of the first ray of the group through all samples: they share one sequence.

@@ -86,9 +86,7 @@ vec3 draw_beside_product(Vertex vertex, Shares shares, MixtureNumbers numbers) {
     }
     if (!from_product && !from_environment) {
         direction = to_world(
-            vertex.frame,
-            brdf_sample(
-                vertex.material, vertex.outgoing_local, vec3(numbers.direction, numbers.lobe)));
+            vertex.frame, brdf_sample(vertex.reflector, vec3(numbers.direction, numbers.lobe)));
     }
     return direction;
 }

@@ -51,9 +51,8 @@ void connect_path(uint path) {
     if (first.material == NO_MATERIAL) {
         return;
     }
-    Material material = first_material(first);
     Frame frame = frame_from_normal(first.shading_normal);
-    vec3 outgoing_local = to_local(frame, first.outgoing);
+    Reflector reflector = first_reflector(first, frame);
     Cohort cohort = cohort_of(path);
     float offset = ray_offset();
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
@@ -68,7 +67,7 @@ void connect_path(uint path) {
         vec3 throughput = vec3(0.0);
         float pdf = 0.0;
         if (is_joined) {
-            evaluate_first(first, material, frame, outgoing_local, direction, throughput, pdf);
+            evaluate_first(first, reflector, frame, direction, throughput, pdf);
         }
         vec3 contribution = vec3(0.0);
         if (pdf > 0.0) {

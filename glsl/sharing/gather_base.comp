@@ -22,15 +22,14 @@ void gather_path(uint path) {
         return;
     }
     Frame frame = frame_from_normal(second.shading_normal);
-    vec3 outgoing_local = to_local(frame, second.outgoing);
+    Reflector reflector = reflector_from(material, to_local(frame, second.outgoing));
     vec3 sum = vec3(0.0);
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
         uint index = i * path_count + path;
         ShadowRay ray = load_shadow_ray(index);
         if (ray.contribution != vec3(0.0) && visibility[index] != 0u) {
             vec3 direction = wave.to_lamps != 0u ? normalize(ray.direction) : ray.direction;
-            sum += ray.contribution
-                * base_share(material, outgoing_local, to_local(frame, direction));
+            sum += ray.contribution * base_share(reflector, to_local(frame, direction));
         }
     }
     second_vertices[path].base =

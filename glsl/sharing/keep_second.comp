@@ -28,9 +28,7 @@ void keep_second(uint path) {
     vec3 expected;
     float pdf;
     Frame frame = frame_from_normal(first.shading_normal);
-    evaluate_first(
-        first, first_material(first), frame, to_local(frame, first.outgoing), direction, expected,
-        pdf);
+    evaluate_first(first, first_reflector(first, frame), frame, direction, expected, pdf);
     float most = max(expected.r, max(expected.g, expected.b));
     if (most <= 0.0) {
         return;

@@ -23,7 +23,8 @@ void keep_third(uint path) {
     if (ray.is_active != 0u) {
         Frame frame = frame_from_normal(second.shading_normal);
         second.bounce_share = base_share(
-            material, to_local(frame, second.outgoing), to_local(frame, ray.direction));
+            reflector_from(material, to_local(frame, second.outgoing)),
+            to_local(frame, ray.direction));
     }
     second_vertices[path] = second;
     paths[path].radiance = vec3(0.0);

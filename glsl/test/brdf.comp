@@ -24,9 +24,9 @@ struct BrdfAnswer {
 BrdfAnswer answer(BrdfQuery query) {
     Material material = materials[query.material];
     BrdfAnswer result;
-    brdf_evaluate_and_pdf(
-        material, query.outgoing_local, query.incident_local, result.value, result.pdf);
-    result.sampled_local = brdf_sample(material, query.outgoing_local, query.u);
+    Reflector reflector = reflector_from(material, query.outgoing_local);
+    brdf_evaluate_and_pdf(reflector, query.incident_local, result.value, result.pdf);
+    result.sampled_local = brdf_sample(reflector, query.u);
     result.albedo = brdf_albedo(material, query.outgoing_local);
     return result;
 }
