@@ -172,7 +172,7 @@ fn a_heatmap_is_written_into_a_new_folder() {
 fn a_full_disk_is_reported() {
     // Every write to this device fails for lack of space.
     let run = images().run(&["compare", "b.exr", "a.exr", "--heatmap", "/dev/full"]);
-    run.assert(1, &["error: /dev/full: cannot write: No space left on device"]);
+    run.assert(75, &["error: /dev/full: cannot write: No space left on device"]);
 }
 
 #[test]
@@ -229,7 +229,7 @@ fn devices_lists_the_choice() {
     let chosen = devices.as_array().unwrap().iter().filter(|device| device["chosen"] == true);
     assert_eq!(chosen.count(), 1);
     let parts = ["no Vulkan device matches --device no such device", "help: ", "fenestra devices"];
-    folder.run(&["devices", "--device", "no such device"]).assert(1, &parts);
+    folder.run(&["devices", "--device", "no such device"]).assert(75, &parts);
 }
 
 #[test]
@@ -240,7 +240,7 @@ fn no_driver_is_explained() {
         command.arg("devices").env_remove("VK_DRIVER_FILES").env_remove("VK_ICD_FILENAMES");
         command.env(variable, "/nonexistent");
         let run = Run::of(&command.output().unwrap());
-        run.assert(1, &["finds no driver", "help: ", "./setup", variable]);
+        run.assert(75, &["finds no driver", "help: ", "./setup", variable]);
     }
 }
 
@@ -253,5 +253,5 @@ fn a_missing_loader_is_explained() {
     let mut command = program(folder.path());
     command.arg("devices").env("LD_LIBRARY_PATH", folder.path());
     let run = Run::of(&command.output().unwrap());
-    run.assert(1, &["no Vulkan loader (libvulkan.so.1)", "help: ", "./setup"]);
+    run.assert(75, &["no Vulkan loader (libvulkan.so.1)", "help: ", "./setup"]);
 }

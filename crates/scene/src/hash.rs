@@ -32,6 +32,7 @@ pub fn still_hash(scene: &Scene) -> String {
     hasher.still(scene);
     hasher.finish()
 }
+
 /// Hashes the environment alone; lower-case hexadecimal.
 pub fn environment_hash(scene: &Scene) -> String {
     let mut hasher = Hasher(Sha256::new());

@@ -83,7 +83,7 @@ fn read(folder: &Folder, name: &str, bytes: impl AsRef<[u8]>) -> Mesh {
 fn arrays_stand_for_files() {
     let quad = Mesh {
         positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
-        uvs: [vec![[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]], Vec::new()],
+        uvs: [vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], Vec::new()],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         ..Mesh::default()
     };
@@ -96,7 +96,7 @@ fn arrays_stand_for_files() {
     .replace("constant = [1, 1, 1]", "map = \"a.exr\"");
     let folder = Folder::new();
     let obj =
-        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n";
     folder.write("a.obj", obj);
     Image::of_rgb(4, 2, &image.pixels).write_exr(&folder.0.path().join("a.exr")).unwrap();
     let files = folder.load(&text).unwrap();
