@@ -1,9 +1,9 @@
 // Chooses one point on the lamps at every hit of the wave and writes a shadow ray to it, with its
 // unoccluded contribution. Draws candidates from the list of the place and keeps one in proportion to what
-// it brings and how visible its lamps are there: resampled importance sampling [Talbot et al. 2005]. The candidates of all rays of a
-// hit draw from strata of the lamps; their mean density is that of one free candidate, by which each
-// is divided. Where a bounce ray may find the
-// lamp too, the balance heuristic weighs both by the density of one candidate and of the BRDF.
+// it brings and how visible its lamps are there: resampled importance sampling [Talbot et al. 2005]. The
+// candidates of all rays of a hit draw from strata of the lamps; their mean density is that of one free
+// candidate, by which each is divided. Where a bounce ray may find the lamp too, the balance heuristic weighs
+// both by the density of one candidate and of the BRDF.
 #version 460
 
 #include "lamps.glsl"

@@ -25,7 +25,8 @@ use crate::support::{
     statistics::{Comparison, chi_square_p_value},
 };
 
-const DRAWS: u32 = 1 << 15;
+/// Enough to meet each triangle of each lamp.
+const DRAWS: u32 = 1 << 17;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -71,7 +72,7 @@ fn rooms(count: i32) -> Scene {
         add("wall", [0.1, 3.0, 4.0], [4.0 * room as f32, 1.5, 2.0]);
     }
     for room in 0..count {
-        add("lamp", [0.4, 0.02, 0.4], [4.0 * room as f32 + 3.0, 2.8, 2.0]);
+        add("lamp", [0.3, 0.3, 0.3], [4.0 * room as f32 + 3.0, 2.8, 2.0]);
     }
     let folder = Folder::new();
     let path = folder.path().join("rooms.toml");

@@ -1,6 +1,6 @@
 //! Cells of the scene that choose lamps: for each a list of the clusters that bring most light there, as far
-//! as rays from its surfaces see them. Made once, before the first sample, so that a choice depends on nothing
-//! that a render draws.
+//! as rays from its surfaces see them. Made once, before the first sample, so that a choice depends on
+//! nothing that a render draws.
 //!
 //! Departs from a light tree \[Conty Estevez & Kulla 2018\] by knowing what is blocked: lamps behind a wall
 //! are as near as those before it.
@@ -173,14 +173,9 @@ fn cube_face(normal: Vec3) -> usize {
 }
 
 impl LampCells {
-    /// Makes the lists of a scene for `clusters`, whose sources have the power `total`.
-    pub(super) fn new(
-        scene: &Scene,
-        accel: &Accel,
-        tables: &LampTables,
-        clusters: &[Cluster],
-        total: f64,
-    ) -> Self {
+    /// Makes the lists of a scene for the clusters of `tables`, of which there are some.
+    pub(super) fn new(scene: &Scene, accel: &Accel, tables: &LampTables) -> Self {
+        let (clusters, total) = (&tables.clusters[..], tables.total);
         let rays = MOST_TRIED.min(clusters.len()) * PLACES * RAYS_PER_PLACE as usize;
         let survey = Survey {
             accel,
@@ -249,7 +244,7 @@ impl LampCells {
     }
 }
 
-/// What lists are made from.
+/// Data that lists are made from.
 struct Survey<'a> {
     accel: &'a Accel,
     tables: &'a LampTables,

@@ -1,5 +1,5 @@
 //! Lamps and emitting triangles → an alias table by power, densities over triangles, and clusters for the
-//! choice by place ([`LampCells`]).
+//! choice by place.
 
 use std::{
     collections::{BTreeMap, BinaryHeap},
@@ -9,7 +9,6 @@ use std::{
 
 use glam::Vec3;
 
-use super::lamp_cells::LampCells;
 use crate::{
     accel::Accel,
     math::{
@@ -43,8 +42,8 @@ const SMALL_CLUSTER: f32 = 1.0 / 8.0;
 /// Contents of the lamp buffers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct LampTables {
-    /// Alias table over emitting triangles and lamps, in proportion to their power. With cells, the tables
-    /// of the clusters follow.
+    /// Alias table over emitting triangles and lamps, in proportion to their power. The tables of the
+    /// clusters follow.
     pub choices: Vec<structs::LampChoice>,
     /// Number of emitting triangles and lamps.
     pub source_count: u32,
@@ -52,9 +51,11 @@ pub(crate) struct LampTables {
     pub lamps: Vec<structs::Lamp>,
     /// Density of sampling points on the triangles of each material by power, per square metre.
     pub emission_densities: Vec<f32>,
-    /// Choice by place, where there are many clusters.
-    pub cells: Option<LampCells>,
-    /// Cluster of each placed triangle that emits, where there are cells.
+    /// Luminous power of all.
+    pub(super) total: f64,
+    /// What is drawn by place; empty where few are drawn by power.
+    pub(super) clusters: Vec<Cluster>,
+    /// Cluster of each placed triangle that emits, where there are any.
     pub triangle_clusters: Vec<u32>,
 }
 
@@ -70,7 +71,7 @@ pub(super) struct Source {
 }
 
 /// Lamps that are drawn by power among themselves.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Cluster {
     /// Columns of its alias table in [`LampTables::choices`]; the first names the cluster.
     pub(super) columns: Range<u32>,
@@ -126,8 +127,9 @@ impl LampTables {
         let lamps = scene.lamps.iter().map(|lamp| convert(&lamp.kind)).collect();
         let all: Vec<u32> = (0..sources.len() as u32).collect();
         let total: f64 = sources.iter().map(|source| source.power).sum();
-        let mut tables = Self { source_count: sources.len() as u32, lamps, ..Self::default() };
-        if !tables.add_table(&sources, &all, total) {
+        let mut tables =
+            Self { source_count: sources.len() as u32, total, lamps, ..Self::default() };
+        if !tables.add_table(&sources, &all) {
             tables.source_count = 0;
             tables.emission_densities = vec![0.0; per_area.len()];
             return tables;
@@ -137,19 +139,19 @@ impl LampTables {
         let small = SMALL_CLUSTER * radius;
         let members = clusters(&sources, connected(accel, &sources), small);
         if members.len() > FEW_CLUSTERS {
-            tables.add_cells(scene, accel, &sources, &members, total);
+            tables.add_clusters(accel, &sources, &members);
         }
         tables
     }
 
-    /// Adds an alias table over `members` of `sources`, in proportion to their power, which is `total` in the
-    /// first table. Returns false if none has any.
-    fn add_table(&mut self, sources: &[Source], members: &[u32], total: f64) -> bool {
+    /// Adds an alias table over `members` of `sources`, in proportion to their power. Returns false if none
+    /// has any.
+    fn add_table(&mut self, sources: &[Source], members: &[u32]) -> bool {
         let weights: Vec<f64> =
             members.iter().map(|member| sources[*member as usize].power).collect();
         let Some(table) = alias_table(&weights, THRESHOLD_SCALE) else { return false };
         let drawn = probabilities(&table, THRESHOLD_SCALE);
-        let share = weights.iter().sum::<f64>() / total;
+        let share = weights.iter().sum::<f64>() / self.total;
         let choices = table.iter().zip(members).zip(&drawn).map(|((entry, &member), &drawn)| {
             structs::LampChoice {
                 threshold: entry.threshold as u32,
@@ -163,21 +165,13 @@ impl LampTables {
         true
     }
 
-    /// Adds the tables of clusters and the cells that choose among them.
-    fn add_cells(
-        &mut self,
-        scene: &Scene,
-        accel: &Accel,
-        sources: &[Source],
-        members: &[Vec<u32>],
-        total: f64,
-    ) {
-        let mut clusters = Vec::new();
+    /// Adds clusters and their tables.
+    fn add_clusters(&mut self, accel: &Accel, sources: &[Source], members: &[Vec<u32>]) {
         self.triangle_clusters = vec![0; accel.placed_count()];
         for members in members {
             let first = self.choices.len() as u32;
             // Nothing is drawn from a cluster without power.
-            if !self.add_table(sources, members, total) {
+            if !self.add_table(sources, members) {
                 continue;
             }
             for member in members {
@@ -192,10 +186,9 @@ impl LampTables {
             let weighted =
                 |source: &Source| source.centre.map(|c| c * (source.power / power) as f32);
             let centre = own().map(weighted).sum();
-            clusters.push(Cluster { columns: first..self.choices.len() as u32, power, centre });
+            let columns = first..self.choices.len() as u32;
+            self.clusters.push(Cluster { columns, power, centre });
         }
-        let cells = LampCells::new(scene, accel, self, &clusters, total);
-        self.cells = Some(cells);
     }
 }
 
@@ -227,8 +220,8 @@ fn connected(accel: &Accel, sources: &[Source]) -> Vec<Vec<u32>> {
 }
 
 /// Divides groups of sources into clusters no wider than `small` metres, the largest power and extent first,
-/// as long as there are no more than [`MOST_CLUSTERS`]. Begins with one where the groups are too many. Each that
-/// is infinitely far away is one by itself.
+/// as long as there are no more than [`MOST_CLUSTERS`]. Begins with one where the groups are too many. Each
+/// that is infinitely far away is one by itself.
 fn clusters(sources: &[Source], groups: Vec<Vec<u32>>, small: f32) -> Vec<Vec<u32>> {
     let source = |index: &u32| &sources[*index as usize];
     let (near, mut clusters): (Vec<Vec<u32>>, Vec<Vec<u32>>) = groups

@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use super::{
     geometry::{GeometryBuffers, triangle_page_bytes},
+    lamp_cells::LampCells,
     lamps::LampTables,
     passages::PassingSurfaces,
     surfaces::{self, Surfaces},
@@ -74,7 +75,7 @@ impl SceneBuffers {
         parts: Parts,
         start: Instant,
     ) -> Result<Self> {
-        let Parts { geometry, textures, lamps, tables } = parts;
+        let Parts { geometry, textures, lamps, lamp_cells, tables } = parts;
         let mut host_ms = BTreeMap::new();
         let mut buffers = Vec::new();
         let mut places = Vec::new();
@@ -89,7 +90,7 @@ impl SceneBuffers {
             material_kinds,
             features: surfaces::features(&scene.materials)
                 | if geometry.traversal().is_instanced { SURFACES_INSTANCED } else { 0 }
-                | if lamps.cells.is_some() { SURFACES_LAMP_CELLS } else { 0 },
+                | if lamp_cells.is_some() { SURFACES_LAMP_CELLS } else { 0 },
             lamp_count: lamps.source_count,
             access: textures.access(),
         };
@@ -99,7 +100,7 @@ impl SceneBuffers {
 
         let tables = EnvironmentTables::new(&scene.environment);
         let compensated = EnvironmentTables::compensated(&scene.environment);
-        let mut lamp_cells = lamps.cells.unwrap_or_default();
+        let mut lamp_cells = lamp_cells.unwrap_or_default();
         let parameters = SceneParameters {
             lamp_count: lamps.source_count,
             lamp_grid_origin: lamp_cells.grid.origin.into(),
@@ -269,6 +270,8 @@ struct Parts {
     geometry: GeometryBuffers,
     textures: TextureBuffers,
     lamps: LampTables,
+    /// Choice by place, where there are many clusters.
+    lamp_cells: Option<LampCells>,
     tables: MaterialTables,
 }
 
@@ -276,6 +279,8 @@ impl Parts {
     fn new(device: &Arc<Device>, scene: &Scene, accel: &Accel) -> Result<Self> {
         let mut surfaces = SurfaceTables::new(&scene.materials);
         let lamps = LampTables::new(scene, accel);
+        let has_cells = !lamps.clusters.is_empty();
+        let lamp_cells = has_cells.then(|| LampCells::new(scene, accel, &lamps));
         for (surface, density) in surfaces.surfaces.iter_mut().zip(&lamps.emission_densities) {
             surface.emission_density = *density;
         }
@@ -287,6 +292,6 @@ impl Parts {
             PassingSurfaces::new(&scene.materials, &tables.materials, &surfaces, &textures);
         let geometry =
             GeometryBuffers::new(device, accel)?.traced_by_host(device, accel, passing)?;
-        Ok(Self { geometry, textures, lamps, tables })
+        Ok(Self { geometry, textures, lamps, lamp_cells, tables })
     }
 }

@@ -44,8 +44,8 @@ const LEAST_STRIDE: u32 = 8;
 /// Samples of each pixel in a wave, to see how they differ.
 const SAMPLES: u32 = 4;
 
-/// Returns the samples per pixel from which race number `race` is due in a film of `pixels` pixels, and what it
-/// decides. In small films the measured pixels are many, and races come later.
+/// Returns the samples per pixel from which race number `race` is due in a film of `pixels` pixels, and what
+/// it decides. In small films the measured pixels are many, and races come later.
 pub(super) fn race_due(race: u32, pixels: u32) -> (u32, Axes) {
     let last = RACES.len() - 1;
     let (due, axes, arms) = RACES[last.min(race as usize)];
