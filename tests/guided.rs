@@ -38,7 +38,7 @@ fn guided(candidates: u32) -> Settings {
     Settings { sampler: Sampler::Guided, parameters, ..Settings::default() }
 }
 
-/// A room on a film of four blocks: cells learn as from a larger film, by as many samples.
+/// Shows a scene on a film of four blocks.
 fn small(mut scene: Scene) -> Scene {
     (scene.film.width, scene.film.height) = (16, 16);
     scene
