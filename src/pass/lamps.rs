@@ -53,7 +53,7 @@ pub(crate) struct LampTables {
     pub emission_densities: Vec<f32>,
     /// Luminous power of all.
     pub(super) total: f64,
-    /// What is drawn by place; empty where few are drawn by power.
+    /// Groups that are drawn by place; empty where few are drawn by power.
     pub(super) clusters: Vec<Cluster>,
     /// Cluster of each placed triangle that emits, where there are any.
     pub triangle_clusters: Vec<u32>,
