@@ -265,7 +265,7 @@ impl Survey<'_> {
     fn walk(&self, walk: u32) -> Vec<Place> {
         let mut places = Vec::new();
         let [a, b, c, d] = hash_4d([walk, 0, 0, SEED]);
-        let scaled = |bits: u32, count: usize| (u64::from(bits) * count as u64 >> 32) as u32;
+        let scaled = |bits: u32, count: usize| ((u64::from(bits) * count as u64) >> 32) as u32;
         let sides = [1.0, -1.0][(d & 1) as usize];
         let triangles = self.accel.placed_count();
         let choice = self.choice(0..self.tables.source_count, a, b);
@@ -331,7 +331,7 @@ impl Survey<'_> {
     ) -> crate::shader::structs::LampChoice {
         let count = u64::from(columns.end - columns.start);
         let own =
-            self.tables.choices[(columns.start + (u64::from(a) * count >> 32) as u32) as usize];
+            self.tables.choices[(columns.start + ((u64::from(a) * count) >> 32) as u32) as usize];
         if b < own.threshold {
             own
         } else {

@@ -95,8 +95,8 @@ fn arrays_stand_for_files() {
     )
     .replace("constant = [1, 1, 1]", "map = \"a.exr\"");
     let folder = Folder::new();
-    let obj =
-        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n";
+    let obj = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
+               f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n";
     folder.write("a.obj", obj);
     Image::of_rgb(4, 2, &image.pixels).write_exr(&folder.0.path().join("a.exr")).unwrap();
     let files = folder.load(&text).unwrap();
