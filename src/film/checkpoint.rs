@@ -188,6 +188,8 @@ impl Checkpoint {
     /// # Errors
     /// As [`Checkpoint::read`], for either file.
     pub fn read_with_guide(path: &Path) -> Result<(Self, Option<GuideFile>)> {
+        // Another process may replace the pair between the two files.
+        let _lock = locked_folder(path);
         let image = Image::read_exr(path)?;
         let checkpoint = Self::from_image(&image, path)?;
         let Some(Attribute::Text(hash)) = image.attributes.get(GUIDE_ATTRIBUTE) else {
