@@ -81,5 +81,5 @@ fn what_cannot_be_measured_is_said() {
     let run = folder.run(&["bench", "nowhere.toml"]);
     run.assert(1, &["nowhere.toml"]);
     let run = folder.run(&["bench", "two_boxes.toml", "--device", "no such device"]);
-    run.assert(1, &["no such device"]);
+    run.assert(75, &["no such device"]);
 }

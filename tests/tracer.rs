@@ -165,10 +165,10 @@ reflectance = [0.5, 0.5, 0.5]"#;
     };
     folder.write("libnothing.so", "");
     render("host", "/nonexistent").assert(
-        1,
+        75,
         &["tracing on the host needs the library Embree", "/nonexistent", "help: ", "./setup"],
     );
-    render("host", "libnothing.so").assert(1, &["libnothing.so", "help: "]);
+    render("host", "libnothing.so").assert(75, &["libnothing.so", "help: "]);
     for (tracer, library) in [("auto", "/nonexistent"), ("device", "")] {
         render(tracer, library).assert(0, &[]);
         assert_eq!(tracer_of(&folder), "device");
@@ -178,6 +178,6 @@ reflectance = [0.5, 0.5, 0.5]"#;
         assert!(tracer_of(&folder).starts_with("Embree "), "{}", tracer_of(&folder));
         run.assert(0, &["rays by Embree "]);
     } else {
-        run.assert(1, &["tracing on the host needs the library Embree"]);
+        run.assert(75, &["tracing on the host needs the library Embree"]);
     }
 }
