@@ -1,15 +1,15 @@
-// Adds the finished paths to the film, pixel by pixel and in sample order: grouping never changes a sum.
+// Adds the samples of a sweep to the film, each weighted by the reconstruction filter in the pixels around
+// its own, pixel by pixel and in sample order: grouping never changes a sum.
 #version 460
 
 #include "wave.glsl"
+#include "reconstruction.glsl"
 
-READS(paths)
+READS(film_radiance)
 UPDATES(film_sum)
 UPDATES(film_compensation)
 UPDATES(film_squares)
 UPDATES(film_squares_compensation)
-UPDATES(film_visible)
-UPDATES(counters)
 
 // Adds a value to a sum of two floats. Two-sum (Knuth): `rest` is exactly what rounding `total` lost.
 void add(vec3 value, inout vec3 sum, inout vec3 compensation) {
@@ -24,50 +24,45 @@ void add(vec3 value, inout vec3 sum, inout vec3 compensation) {
     compensation = next_compensation;
 }
 
+// Returns one sample of the filtered picture: those of 3×3 pixels by their weights, which add up to one.
+vec3 filtered(PathIndex index, uint place, uint i) {
+    if (parameters.film_filter != FILTER_GAUSSIAN) {
+        return film_radiance[radiance_place(place, i)];
+    }
+    uvec2 last = uvec2(parameters.crop_width, parameters.crop_height) - 1u;
+    vec2 before = vec2(greaterThan(index.crop_pixel, uvec2(0u)));
+    vec2 after = vec2(lessThan(index.crop_pixel, last));
+    vec2 offset = sample_offset(index.pixel, wave.first_sample + i, wave.seed);
+    vec3 columns = filter_weights(offset.x, vec3(before.x, 1.0, after.x));
+    vec3 rows = filter_weights(offset.y, vec3(before.y, 1.0, after.y));
+    vec3 value = vec3(0.0);
+    for (uint y = 0u; y < 3u; ++y) {
+        for (uint x = 0u; x < 3u; ++x) {
+            float weight = rows[y] * columns[x];
+            if (weight > 0.0) {
+                uint beside = place + y * parameters.crop_width + x - parameters.crop_width - 1u;
+                value += weight * film_radiance[radiance_place(beside, i)];
+            }
+        }
+    }
+    return value;
+}
+
 void accumulate_pixel(uint pixel, PathIndex index) {
-    // Training rays are counted, but their light stays out of the picture.
-    bool adds = wave.is_training == 0u;
-    uint place = adds ? film_place(index) : 0u;
+    uint place = film_place(index);
     vec3 sum = film_sum[place];
     vec3 compensation = film_compensation[place];
     vec3 squares = film_squares[place];
     vec3 squares_compensation = film_squares_compensation[place];
-    uint bounce_rays = 0u;
-    uint dropped = 0u;
-    uvec2 shadow_rays = uvec2(0u);
     for (uint i = 0u; i < wave.sample_count; ++i) {
-        PathState state = paths[i * wave.pixel_count + pixel];
-        bounce_rays += state.rays_traced - 1u;
-        shadow_rays += uvec2(state.shadow_rays_visible, state.shadow_rays_traced);
-        vec3 radiance = state.radiance;
-        // One value that is not finite would spoil the pixel for good.
-        if (any(isnan(radiance)) || any(isinf(radiance))) {
-            dropped += 1u;
-            continue;
-        }
+        vec3 radiance = filtered(index, place, i);
         add(radiance, sum, compensation);
         add(radiance * radiance, squares, squares_compensation);
     }
-    if (adds) {
-        film_sum[place] = sum;
-        film_compensation[place] = compensation;
-        film_squares[place] = squares;
-        film_squares_compensation[place] = squares_compensation;
-        if ((wave.aovs & AOV_VISIBLE) != 0u) {
-            film_visible[place] += shadow_rays;
-        }
-    }
-    atomicAdd(counters.camera_rays, wave.sample_count);
-    if (bounce_rays > 0u) {
-        atomicAdd(counters.bounce_rays, bounce_rays);
-    }
-    if (shadow_rays.y > 0u) {
-        atomicAdd(counters.shadow_rays_visible, shadow_rays.x);
-        atomicAdd(counters.shadow_rays_traced, shadow_rays.y);
-    }
-    if (dropped > 0u) {
-        atomicAdd(counters.dropped_samples, dropped);
-    }
+    film_sum[place] = sum;
+    film_compensation[place] = compensation;
+    film_squares[place] = squares;
+    film_squares_compensation[place] = squares_compensation;
 }
 
 RUN_PIXELS(accumulate_pixel)

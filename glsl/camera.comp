@@ -1,30 +1,14 @@
-// Starts the paths of a wave with one camera ray each, sampling the pixel filter and the thin lens.
+// Starts the paths of a wave with one camera ray each, sampling pixel and thin lens.
 #version 460
 
 #include "frame.glsl"
 #include "random.glsl"
 #include "wave.glsl"
+#include "reconstruction.glsl"
 
 WRITES(rays)
 WRITES(paths)
 WRITES(path_lists)
-
-const uint FILTER_GAUSSIAN = 1u;
-// Gaussian with a standard deviation of half a pixel, cut off at one and a half.
-const float FILTER_SIGMA = 0.5;
-const float FILTER_RADIUS = 1.5;
-
-// Samples an offset from the pixel centre, in pixels, with the density of the filter.
-vec2 sample_filter(vec2 u) {
-    if (parameters.film_filter != FILTER_GAUSSIAN) {
-        return u - 0.5;
-    }
-    const float outside =
-        exp(-FILTER_RADIUS * FILTER_RADIUS / (2.0 * FILTER_SIGMA * FILTER_SIGMA));
-    float radius = FILTER_SIGMA * sqrt(max(0.0, -2.0 * log(1.0 - u.x * (1.0 - outside))));
-    vec2 azimuth = sin_cos_pi(2.0 * u.y);
-    return radius * azimuth.yx;
-}
 
 void main() {
     uint path = gl_GlobalInvocationID.x;
@@ -36,8 +20,7 @@ void main() {
     }
     PathIndex index = wave_path(path);
     vec2 position = vec2(index.crop_pixel + uvec2(parameters.crop_x, parameters.crop_y)) + 0.5
-        + sample_filter(
-            random_2d(index.pixel, index.sample_index, DIMENSION_FILTER, wave.seed));
+        + sample_offset(index.pixel, index.sample_index, wave.seed);
 
     vec2 film_size = vec2(parameters.film_width, parameters.film_height);
     vec2 plane = (2.0 * position - film_size) / film_size.y * parameters.camera_tan_half_fov;

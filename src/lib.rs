@@ -36,7 +36,8 @@
 //! | constants, structs, buffers of both languages | [`shader`] | `include/layout` |
 //! | Vulkan | [`gpu`] | |
 //! | passes of a wave, in their order | [`pass`] | `camera`, `trace`, `texture`, `emit`, `sample`, |
-//! | | | `sample_lamps`, `shadow`, `gather`, `features`, `bounce`, `accumulate` |
+//! | | | `sample_lamps`, `shadow`, `gather`, `features`, `bounce`, `deposit`, |
+//! | | | `accumulate` |
 //! | `product` | [`sampler::product`] | `product/`: `multiply_lobes`, `sample_lobes` |
 //! | `visibility`, on top of it | [`sampler::visibility`] | `visibility/`: `reweight`, `sample_and_trace`, |
 //! | | | `count_entries` |

@@ -570,7 +570,7 @@ fn a_request_beyond_the_memory_limit_says_who_asks_for_how_much() {
         ),
         (&shape, "300M", &[], "a shape asks for 4"),
         (&tree, "300M", &[], "the tree over 10"),
-        (&scene("", ""), "1G", &film, "a film of 8000x8000 pixels asks for 6"),
+        (&scene("", ""), "1G", &film, "a film of 8000x8000 pixels asks for 7"),
     ];
     for (folder, limit, options, who) in cases {
         let limit = format!("--max-memory={limit}");

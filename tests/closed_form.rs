@@ -9,7 +9,7 @@ use fenestra::{
         product::{ProductParameters, Reading},
     },
     scene::{
-        Lamp, Portal, Scene,
+        Filter, Lamp, Portal, Scene,
         lamp::LampKind,
         material::{Emission, Material, MaterialKind},
     },
@@ -71,6 +71,55 @@ fn groups_of_shadow_rays_see_the_environment_once() {
     assert!((DVec3::from(sums.mean(0)) - DVec3::new(1.0, 2.0, 3.0)).abs().max_element() < 1e-5);
 }
 
+/// The weights of the filter add up to one in every pixel and sample: constant light has no noise.
+#[test]
+fn the_filter_adds_no_noise() {
+    let _alone = support::alone();
+    let mut scene = scenes::convex_furnace(diffuse(Vec3::splat(0.5)), Vec3::new(1.0, 2.0, 3.0));
+    scene.film.filter = Filter::Gaussian;
+    (scene.camera.position, scene.camera.look_at) = (Vec3::NEG_Z * 10.0, Vec3::NEG_Z * 20.0);
+    let sums = render(&scene, Settings { shadow_rays: 0, ..Settings::default() }, 64);
+    for pixel in 0..sums.pixel_count() {
+        let difference = DVec3::from(sums.mean(pixel)) / DVec3::new(1.0, 2.0, 3.0) - 1.0;
+        assert!(difference.abs().max_element() < 1e-6, "pixel {pixel}: {difference}");
+        assert!(sums.variance_of_mean(pixel)[2] < 1e-8, "pixel {pixel}");
+    }
+}
+
+/// A Gaussian of ½ spreads every sample over 4π σ² = π pixels: their independent noise has 1/π of its
+/// variance, as the film estimates it and as seeds differ.
+#[test]
+fn pixels_that_share_samples_have_a_third_of_the_variance() {
+    let _alone = support::alone();
+    let mut scene = scenes::room(vec![diffuse(Vec3::splat(0.7))]);
+    let mut variances = |filter: Filter| {
+        scene.film.filter = filter;
+        let settings =
+            Settings { sampler: Sampler::Cosine, shadow_rays: 1, depth: 1, ..Settings::default() };
+        let mut renderer = support::renderer(&scene, settings);
+        let films = [1, 2, 3, 4, 5, 6, 7, 8].map(|seed| {
+            renderer.restart(seed).unwrap();
+            renderer.render_pass(16).unwrap();
+            renderer.sums().unwrap()
+        });
+        let pixels = 0..films[0].pixel_count();
+        let estimated = |film: &Sums| {
+            pixels.clone().map(|pixel| film.variance_of_mean(pixel)[1]).sum::<f64>() / 8.0
+        };
+        let found = |pixel: usize| {
+            let values = films.each_ref().map(|film| film.mean(pixel)[1]);
+            let mean = values.iter().sum::<f64>() / 8.0;
+            values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / 7.0
+        };
+        [films.iter().map(estimated).sum::<f64>(), pixels.clone().map(found).sum()]
+    };
+    let (own, shared) = (variances(Filter::Box), variances(Filter::Gaussian));
+    for kind in 0..2 {
+        let share = shared[kind] / own[kind] * std::f64::consts::PI;
+        assert!((share - 1.0).abs() < 0.1, "{shared:?} of {own:?}");
+    }
+}
+
 /// The border between a dark and a bright half of the sky: pixels left and right of it average what
 /// their filter and the lens see of either half.
 #[test]
@@ -91,21 +140,38 @@ fn an_edge_has_the_blur_of_filter_and_lens() {
         let x = x.clamp(-1.0, 1.0);
         0.5 + (x * (1.0 - x * x).sqrt() + x.asin()) / std::f64::consts::PI
     };
-    for (radius, focus) in [(0.0_f32, 1.0_f32), (1.5, 3.0)] {
+    // Weight of a sample at an offset of the pixel's centre: of all that lie there in their pixels, it is one.
+    let gaussian = |offset: f64| (-2.0 * offset * offset).exp();
+    let shared = |offset: f64| {
+        let [before, after] = [(offset + 0.5).floor(), (offset - 0.5).ceil()];
+        let within = offset - 0.5 * (before + after);
+        let sum: f64 = [-1.0, 0.0, 1.0].map(|pixel| gaussian(within + pixel)).iter().sum();
+        gaussian(offset) / sum
+    };
+    for (filter, radius, focus) in
+        [(Filter::Box, 0.0_f32, 1.0_f32), (Filter::Box, 1.5, 3.0), (Filter::Gaussian, 0.0, 1.0)]
+    {
+        scene.film.filter = filter;
+        let reach = if filter == Filter::Box { 0.5 } else { 1.5 };
         (scene.camera.aperture_radius, scene.camera.focus_distance) = (radius, focus);
         let sums = render(&scene, Settings { shadow_rays: 0, ..Settings::default() }, 4096);
         for column in 0..21 {
             let bright = |step: u32| {
-                let offset = (f64::from(step) + 0.5) / f64::from(STEPS) - 0.5;
+                let offset = ((f64::from(step) + 0.5) / f64::from(STEPS) * 2.0 - 1.0) * reach;
+                let weight = if filter == Filter::Box { 1.0 } else { 3.0 * shared(offset) };
                 let at = (f64::from(column) - 10.0 + offset) * pixel;
-                if radius > 0.0 { disk(at * f64::from(focus / radius)) } else { disk(at * 1e6) }
+                let sharp = if radius > 0.0 { f64::from(focus / radius) } else { 1e6 };
+                weight * disk(at * sharp)
             };
             let expected = (0..STEPS).map(bright).sum::<f64>() / f64::from(STEPS);
             let rows = (0..7).map(|row| sums.mean((row * 21 + column) as usize)[0]);
             let found = rows.sum::<f64>() / 7.0;
             // Interpolation between texels rounds the border off, evenly on both sides.
-            let name = format!("lens of {radius} m, column {column}");
+            let name = format!("{filter:?}, lens of {radius} m, column {column}");
             assert!((found - expected).abs() < 5e-3, "{name}: {found}, not {expected}");
+            if filter == Filter::Gaussian {
+                continue;
+            }
             // A sample is 0 or 1, but for the texels of the border.
             let variance = sums.variance_of_mean((3 * 21 + column) as usize)[0] * 4095.0;
             let of_coin = expected * (1.0 - expected);

@@ -7,20 +7,25 @@ use fenestra::{
     film::{Aov, Sums, Window},
     pass::{PathLists, Roulette},
     sampler::{Parameters, Sampler},
-    scene::Scene,
+    scene::{Filter, Scene},
     session::{Event, Flag, Observer, Rules, Session, Settings, StopReason},
 };
 use glam::Vec3;
 
 use crate::support::{self, command::Folder, renderer, scenes};
 
+/// A room on a film whose pixels share samples.
 fn scene() -> Scene {
-    scenes::room(vec![scenes::diffuse(Vec3::splat(0.7)), scenes::plastic(0.1), scenes::copper(0.2)])
+    let materials =
+        vec![scenes::diffuse(Vec3::splat(0.7)), scenes::plastic(0.1), scenes::copper(0.2)];
+    let mut scene = scenes::room(materials);
+    scene.film.filter = Filter::Gaussian;
+    scene
 }
 
 /// Fixes `candidates`, since `auto` is measured and may differ from run to run.
 fn settings(sampler: Sampler) -> Settings {
-    let mut aovs = vec![Aov::Albedo, Aov::Normal, Aov::Position, Aov::Visible];
+    let mut aovs = vec![Aov::Unfiltered, Aov::Albedo, Aov::Normal, Aov::Position, Aov::Visible];
     match sampler {
         Sampler::Visibility => aovs.push(Aov::CacheEntries),
         Sampler::Guided => aovs.push(Aov::GuideCell),
@@ -143,14 +148,21 @@ fn a_sweep_that_was_stopped_goes_on_to_the_bit() {
             stopped.pass(1, 1.0).unwrap();
         }
         stopped.renderer.set_watch(Box::new(|wave| wave.is_training == 0));
-        stopped.renderer.render_pass(3).unwrap();
+        stopped.renderer.render_pass(1).unwrap();
         let sums = stopped.renderer.sums().unwrap();
         let last = sums.pixel_count() - 1;
-        assert!(sums.samples(0) > 2 && sums.samples(last) == 2, "{:?}", sums.ahead);
+        assert_eq!([sums.samples(0), sums.samples(last)], [3, 2], "{:?}", sums.ahead);
         if sampler == Sampler::Mis {
-            assert_eq!((sums.samples(0), sums.mean(0)), (5, whole.mean(0)));
-            assert_eq!(sums.variance_of_mean(0), whole.variance_of_mean(0));
+            // The host filters with 64 bits. Beside the edge a pixel lacks a part of the sample.
+            let next = render(settings.clone(), &[3]);
+            let difference = |of: &Sums, pixel: usize| {
+                let means = sums.mean(pixel).into_iter().zip(of.mean(pixel));
+                means.map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max)
+            };
+            assert!(difference(&next, 0) < 1e-6 && difference(&half, 0) > 1e-4);
             assert_eq!(sums.mean(last), half.mean(last));
+            let edge = (8 * sums.width) as usize;
+            assert!(difference(&next, edge) > 1e-4 && difference(&half, edge) > 1e-4);
         }
         stopped.write_checkpoint(&path, sums).unwrap().unwrap();
         let mut resumed = Session::new(support::device(), &scene, settings).unwrap();
@@ -158,7 +170,7 @@ fn a_sweep_that_was_stopped_goes_on_to_the_bit() {
         assert_eq!(resumed.seconds(), stopped.seconds());
         // A sweep may be stopped again.
         resumed.renderer.set_watch(Box::new(|wave| wave.is_training == 0));
-        resumed.renderer.render_pass(3).unwrap();
+        resumed.renderer.render_pass(1).unwrap();
         assert!(resumed.renderer.ahead().blocks > stopped.renderer.ahead().blocks);
         for Session { renderer, .. } in [&mut resumed, &mut stopped] {
             renderer.set_watch(Box::new(|_| false));
@@ -239,6 +251,7 @@ fn a_crop_window_shows_the_same_pixels() {
                 let outer = ((y + window.y) * whole.width + x + window.x) as usize;
                 let name = sampler.name();
                 assert_eq!(crop.sum[inner], whole.sum[outer], "{name}: pixel {x},{y}");
+                assert_eq!(crop.unfiltered[inner], whole.unfiltered[outer], "{name}");
                 assert_eq!(crop.normal[inner], whole.normal[outer], "{name}: pixel {x},{y}");
             }
         }

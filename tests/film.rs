@@ -180,9 +180,18 @@ fn two_float_sums_stay_exact_where_floats_stagnate() {
 fn the_first_blocks_have_the_samples_of_a_stopped_sweep() {
     let mut sums = Sums::new([0, 0], 12, 16, [12, 16]);
     sums.sample_count = 4;
-    sums.ahead = Ahead { blocks: 3, samples: 2 };
+    sums.ahead = Ahead { blocks: 3, offset: None };
     let samples = |x: usize, y: usize| sums.samples(12 * y + x);
-    assert_eq!([samples(11, 7), samples(7, 8), samples(8, 8)], [6, 6, 4]);
+    assert_eq!([samples(11, 7), samples(7, 8), samples(8, 8)], [5, 5, 4]);
+    // A constant picture stays constant, by whatever part of a sample a pixel has.
+    sums.sum.fill([4.0; 3]);
+    sums.pending = (0..192).map(|pixel| [(sums.samples(pixel) - 4) as f32; 3]).collect();
+    for offset in [None, Some([-0.4, 0.3])] {
+        sums.ahead.offset = offset;
+        for pixel in 0..192 {
+            assert!((sums.mean(pixel)[1] - 1.0).abs() < 1e-12, "pixel {pixel}");
+        }
+    }
 }
 
 #[test]
@@ -339,7 +348,7 @@ fn checkpoints_come_back_to_the_bit() {
     let picture = Image::read_exr(&path).unwrap().rgb(&path).unwrap();
     assert_eq!(picture.pixels[3][1], checkpoint.sums.mean(3)[1] as f32, "viewers see the picture");
     // The film has one block, which cannot be ahead of others.
-    let metadata = Metadata { ahead: Ahead { blocks: 1, samples: 2 }, ..metadata };
+    let metadata = Metadata { ahead: Ahead { blocks: 1, offset: Some([0.25, -0.5]) }, ..metadata };
     Checkpoint { metadata, ..checkpoint }.write(&path).unwrap();
     let error = Checkpoint::read(&path).unwrap_err().to_string();
     assert!(error.contains("1 blocks of its film have further samples"), "{error}");
@@ -362,8 +371,8 @@ fn a_checkpoint_without_its_sums_is_refused() {
     plain.attributes.remove("fenestra.checkpoint");
     assert!(message(&plain).contains("not a checkpoint"));
     let mut newer = image.clone();
-    newer.attributes.insert("fenestra.checkpoint".to_owned(), Attribute::Integer(5));
-    assert!(message(&newer).contains("another version: expected 4, found Integer(5)"));
+    newer.attributes.insert("fenestra.checkpoint".to_owned(), Attribute::Integer(6));
+    assert!(message(&newer).contains("another version: expected 5, found Integer(6)"));
     let mut outside = image.clone();
     outside.origin = [-1, 0];
     assert!(message(&outside).contains("outside the film"));

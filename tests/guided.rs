@@ -117,7 +117,8 @@ fn places_that_share_a_key_are_unbiased() {
     for (name, edge, memory, candidates, samples) in [
         ("huge cells", 1e3, 1 << 27, 1, 32),
         ("huge cells", 1e3, 1 << 27, 4, 32),
-        ("repeating cells", 1e-3, 1 << 27, 4, 32),
+        // Cells of other places mislead the candidates: a few samples carry much of the light.
+        ("repeating cells", 1e-3, 1 << 27, 4, 96),
         ("repeating cells, little room", 1e-3, 40 * cell_bytes, 1, 32),
         ("faces only", 0.22, 1, 1, 32),
         // Six cells mislead four candidates: one sample in a hundred carries some of the light.

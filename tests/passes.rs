@@ -106,7 +106,7 @@ fn simple_samplers_trace_groups_of_eight_rays() {
     let listed = order(&direct, &mis(), wave(0, 2));
     assert_eq!(
         names(&listed),
-        "camera trace sample shadow gather sample shadow gather features accumulate"
+        "camera trace sample shadow gather sample shadow gather features deposit"
     );
     let counts: Vec<_> = listed.iter().map(|dispatch| dispatch.wave.shadow_ray_count).collect();
     assert_eq!(counts, [0, 0, 8, 8, 8, 1, 1, 1, 1, 1]);
@@ -121,7 +121,7 @@ fn simple_samplers_trace_groups_of_eight_rays() {
 fn without_shadow_rays_the_camera_still_gathers() {
     for steps in [&mis() as &dyn Steps, &product(), &visibility(CacheScope::Hit, 0)] {
         let listed = order(&settings(0, 2), steps, wave(0, 1));
-        assert_eq!(names(&listed), "camera trace gather features bounce trace gather accumulate");
+        assert_eq!(names(&listed), "camera trace gather features bounce trace gather deposit");
     }
 }
 
@@ -130,7 +130,7 @@ fn product_multiplies_lobes_once_per_vertex() {
     assert_eq!(
         names(&order(&settings(9, 2), &product(), wave(0, 1))),
         "camera trace multiply_lobes sample_lobes shadow gather sample_lobes shadow gather features \
-         bounce trace multiply_lobes sample_lobes shadow gather sample_lobes shadow gather accumulate"
+         bounce trace multiply_lobes sample_lobes shadow gather sample_lobes shadow gather deposit"
     );
 }
 
@@ -139,13 +139,13 @@ fn visibility_draws_and_traces_groups_of_eight_rays_in_one_pass() {
     assert_eq!(
         names(&order(&settings(9, 1), &visibility(CacheScope::Hit, 9), wave(0, 1))),
         "camera trace multiply_lobes sample_and_trace gather sample_and_trace gather count_entries \
-         features accumulate"
+         features deposit"
     );
     // The next sample of a pixel begins with the cache that the one before left.
     assert_eq!(
         names(&order(&settings(2, 1), &visibility(CacheScope::Pixel, 2), wave(0, 1))),
         "camera trace multiply_lobes reweight sample_and_trace gather count_entries features \
-         accumulate"
+         deposit"
     );
 }
 
@@ -156,7 +156,7 @@ fn guided_counts_rays_and_bounces_where_samples_teach() {
     assert_eq!(
         names(&listed),
         "camera trace sample_guided shadow learn gather show_cells features bounce_guided trace \
-         sample_guided learn_arrivals shadow learn gather accumulate"
+         sample_guided learn_arrivals shadow learn gather deposit"
     );
     let rays: Vec<_> = [2, 10].map(|pass| listed[pass].wave.total_shadow_rays).into();
     assert_eq!(rays, [5, 2], "half of the rays at later vertices");
@@ -219,7 +219,7 @@ fn paths_are_shared_from_the_second_vertex_on() {
     let listed = |settings: &PassSettings, wave| names(&order(settings, &mis(), wave));
     let start = "camera trace sample shadow gather features keep_first bounce trace keep_second sample \
                  shadow gather gather_base";
-    let end = "offer connect shadow admit weigh share accumulate";
+    let end = "offer connect shadow admit weigh share deposit";
     assert_eq!(listed(&shared(2), wave(0, 1)), format!("{start} keep_third {end}"));
     assert_eq!(
         listed(&shared(3), wave(0, 1)),
@@ -294,21 +294,21 @@ fn paths_end_at_light_that_is_not_sampled() {
     let glass = direct(SURFACES_SPECULAR, 0);
     assert_eq!(
         listed(&glass, wave(0, 1)),
-        "camera trace sample shadow gather features bounce trace gather accumulate"
+        "camera trace sample shadow gather features bounce trace gather deposit"
     );
     let lamp = direct(0, 1);
     assert_eq!(
         listed(&lamp, wave(0, 1)),
-        "camera trace sample_lamps shadow gather sample shadow gather features accumulate"
+        "camera trace sample_lamps shadow gather sample shadow gather features deposit"
     );
     let all = PassSettings { surfaces: everything(), ..settings(1, 1) };
     assert_eq!(
         listed(&all, wave(0, 1)),
         "camera trace texture emit sample_lamps shadow gather sample shadow gather features bounce \
-         trace emit gather accumulate"
+         trace emit gather deposit"
     );
     let training = Wave { is_training: 1, ..wave(0, 1) };
-    assert_eq!(listed(&all, training), "camera trace texture sample shadow gather accumulate");
+    assert_eq!(listed(&all, training), "camera trace texture sample shadow gather deposit");
     // The last ray gathers at a vertex of its own, without shadow rays.
     let order = order(&all, &mis(), wave(0, 1));
     let last = &order[order.len() - 2].wave;
@@ -322,8 +322,9 @@ fn every_pass_is_in_an_order() {
         let is_used = |(_, order): &(_, Vec<Dispatch>)| {
             order.iter().any(|dispatch: &Dispatch| dispatch.kernel.shader == *pass)
         };
-        let is_of_window = ["show", "compose"].contains(pass);
-        assert!(is_of_window || orders.iter().any(is_used), "{pass}: no technique runs it");
+        // Passes over a film, not over a wave.
+        let is_of_film = ["accumulate", "show", "compose"].contains(pass);
+        assert!(is_of_film || orders.iter().any(is_used), "{pass}: no technique runs it");
     }
 }
 

@@ -9,9 +9,8 @@ layout(scalar, push_constant) uniform WaveConstants {
     Wave wave;
 };
 
-// Dimensions of random_2d and random_1d along a path: two for the camera, then DIMENSIONS_PER_VERTEX each
-// from DIMENSION_VERTEX on.
-const uint DIMENSION_FILTER = 0u;
+// Dimensions of random_2d and random_1d along a path: DIMENSION_FILTER and DIMENSION_LENS for the camera, then
+// DIMENSIONS_PER_VERTEX each from DIMENSION_VERTEX on.
 const uint DIMENSION_LENS = 1u;
 // Offsets from a vertex's first dimension. Directions of resampling candidates take one each.
 const uint DIMENSION_TECHNIQUE = 0u;
@@ -76,6 +75,12 @@ PathIndex wave_path(uint path) {
 // Returns the index into the buffers of the film, which hold a page of the crop window.
 uint film_place(PathIndex index) {
     return index.film_index - wave.film_start;
+}
+
+// Returns where the film keeps the radiance of sample `i` of the wave at a place of the page. A row of the page
+// before comes first, and one of the page after last; the place above the first row wraps to them.
+uint radiance_place(uint place, uint i) {
+    return (place + parameters.crop_width) * wave.sample_count + i;
 }
 
 uint vertex_dimension() {

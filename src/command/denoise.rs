@@ -28,6 +28,9 @@ pub(super) fn denoise(denoiser: &Denoiser, film: &Image, path: &Path) -> Result<
     let start = Instant::now();
     let mut picture = film.rgb(path)?;
     let mut guides = Guides::of(film);
+    if let Some(unfiltered) = guides.unfiltered.take() {
+        picture.pixels = unfiltered;
+    }
     let repaired = repair(&mut picture.pixels, picture.width);
     for layer in [&mut guides.albedo, &mut guides.normal].into_iter().flatten() {
         repair(layer, picture.width);
@@ -41,7 +44,7 @@ pub(super) fn denoise(denoiser: &Denoiser, film: &Image, path: &Path) -> Result<
     if guides.normal.is_none() {
         log::warn!(
             "{}: denoised without its surfaces, since it lacks the layer{}; `fenestra render --denoise` or \
-             `--aov albedo,normal` stores them",
+             `--aov unfiltered,albedo,normal` stores them",
             path.display(),
             if guides.albedo.is_none() { "s Albedo and N" } else { " N" }
         );

@@ -1,6 +1,7 @@
 //! Checkpoints: the film's sums and the metadata of their render, as an OpenEXR file.
 //!
 //! The channels hold the sums bit for bit: `Sum.R/G/B`, `SumCompensation.R/G/B`, `Squares.R/G/B`,
+//! `Pending.R/G/B` of a stopped sweep, `UnfilteredSum.R/G/B`,
 //! `SquaresCompensation.R/G/B`, `AlbedoSum.R/G/B`, `NSum.X/Y/Z`, `PSum.X/Y/Z`, `GuideCellSum.R/G/B`,
 //! `GuideLevelSum.R/G/B`, and each count of shadow rays and cache entries as a pair of floats that add up
 //! to the integer.
@@ -34,7 +35,9 @@ use crate::{
 
 /// Attribute that marks a checkpoint, and the version of its channels.
 const FORMAT_ATTRIBUTE: &str = "fenestra.checkpoint";
-const FORMAT_VERSION: i32 = 4;
+const FORMAT_VERSION: i32 = 5;
+/// Channels of [`Sums::pending`].
+const PENDING: [&str; 3] = ["Pending.R", "Pending.G", "Pending.B"];
 /// SHA-256 of the rest of the file.
 const CHECKSUM_ATTRIBUTE: &str = "fenestra.checksum";
 /// SHA-256 of the guide's file.
@@ -138,6 +141,9 @@ impl Checkpoint {
                 image.insert_triple(layer.channels, values);
             }
         }
+        if !sums.ahead.is_none() {
+            image.insert_triple(PENDING, &sums.pending);
+        }
         for (layer, counts) in COUNTS.iter().zip(sums.counts()) {
             insert_counts(&mut image, layer.channels, counts);
         }
@@ -235,9 +241,7 @@ impl Checkpoint {
             let message = format!("{} blocks of its film have further samples", ahead.blocks);
             return Err(Error::format(path, message));
         }
-        let has_samples = |count: &u32| {
-            (*count > 0 || !ahead.is_none()) && count.checked_add(ahead.samples).is_some()
-        };
+        let has_samples = |count: &u32| (*count > 0 || !ahead.is_none()) && *count < u32::MAX;
         let sample_count =
             u32::try_from(metadata.sample_count()).ok().filter(has_samples).ok_or_else(|| {
                 Error::format(path, format!("{} samples per pixel", metadata.sample_count()))
@@ -260,16 +264,19 @@ impl Checkpoint {
             ahead,
             ..Sums::default()
         };
-        for (layer, values) in TRIPLES.iter().zip(sums.triples_mut()) {
-            let names = layer.channels;
-            *values = match image.triple(names) {
-                Some(found) => found,
-                None if layer.aov.is_some() => Vec::new(),
-                None => {
-                    let message = format!("incomplete checkpoint: no channels {names:?}");
-                    return Err(Error::format(path, message));
-                }
-            };
+        let layer = |names: [&str; 3], is_optional: bool| match image.triple(names) {
+            Some(found) => Ok(found),
+            None if is_optional => Ok(Vec::new()),
+            None => {
+                let message = format!("incomplete checkpoint: no channels {names:?}");
+                Err(Error::format(path, message))
+            }
+        };
+        for (known, values) in TRIPLES.iter().zip(sums.triples_mut()) {
+            *values = layer(known.channels, known.aov.is_some())?;
+        }
+        if !ahead.is_none() {
+            sums.pending = layer(PENDING, false)?;
         }
         for (layer, values) in COUNTS.iter().zip(sums.counts_mut()) {
             *values = counts(image, layer.channels, path)?;

@@ -8,9 +8,11 @@ use crate::error::{Error, Result};
 /// Attribute of an image that a denoiser has made, with its name.
 pub(crate) const DENOISED: &str = "fenestra.denoised";
 
-/// Layers of an image that guide a denoiser, those of the first hit.
+/// Layers of an image that a denoiser needs: the noise that it expects, and first hits that guide it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Guides {
+    /// `Unfiltered`: the picture of pixels that share no sample. A denoiser keeps noise that they share.
+    pub unfiltered: Option<Vec<[f32; 3]>>,
     /// `Albedo`.
     pub albedo: Option<Vec<[f32; 3]>>,
     /// `N`, only beside albedo.
@@ -20,9 +22,10 @@ pub struct Guides {
 impl Guides {
     /// Takes the layers that `image` has.
     pub(crate) fn of(image: &Image) -> Self {
+        let unfiltered = image.triple(["Unfiltered.R", "Unfiltered.G", "Unfiltered.B"]);
         let albedo = image.triple(["Albedo.R", "Albedo.G", "Albedo.B"]);
         let normal = albedo.as_ref().and_then(|_| image.triple(["N.X", "N.Y", "N.Z"]));
-        Self { albedo, normal }
+        Self { unfiltered, albedo, normal }
     }
 
     /// Names of the layers: "Albedo, N".

@@ -115,10 +115,17 @@ fn check_ranges(ranges: &[SampleRange]) -> Result<(), String> {
     Ok(())
 }
 
-/// Parses `blocks:samples`.
+/// Parses `blocks` or `blocks:x:y`, with the offset of the sample.
 fn parse_ahead(text: &str) -> Option<Ahead> {
-    let (blocks, samples) = text.split_once(':')?;
-    let ahead = Ahead { blocks: blocks.parse().ok()?, samples: samples.parse().ok()? };
+    let mut parts = text.split(':');
+    let blocks = parts.next()?.parse().ok()?;
+    let offset = parts.map(|part| part.parse().ok().filter(|at: &f32| at.abs() <= 0.5));
+    let offset = match offset.collect::<Option<Vec<f32>>>()?[..] {
+        [] => None,
+        [x, y] => Some([x, y]),
+        _ => return None,
+    };
+    let ahead = Ahead { blocks, offset };
     (!ahead.is_none()).then_some(ahead)
 }
 
@@ -155,8 +162,9 @@ impl Metadata {
         let ranges: Vec<String> = self.sample_ranges.iter().map(ToString::to_string).collect();
         put("fenestra.sample_ranges", Attribute::Text(ranges.join(" ")));
         if !self.ahead.is_none() {
-            let Ahead { blocks, samples } = self.ahead;
-            put("fenestra.ahead", Attribute::Text(format!("{blocks}:{samples}")));
+            let Ahead { blocks, offset } = self.ahead;
+            let offset = offset.map(|[x, y]| format!(":{x}:{y}")).unwrap_or_default();
+            put("fenestra.ahead", Attribute::Text(format!("{blocks}{offset}")));
         }
         put("fenestra.seconds", Attribute::Double(self.seconds));
         put("fenestra.device", text(&self.device));
@@ -227,7 +235,7 @@ impl Metadata {
             })?;
         let ahead = match image.attributes.contains_key("fenestra.ahead") {
             true => parse_ahead(&text("fenestra.ahead")?).ok_or_else(|| {
-                Error::format(path, "attribute fenestra.ahead: expected blocks:samples")
+                Error::format(path, "attribute fenestra.ahead: expected blocks or blocks:x:y")
             })?,
             false => Ahead::default(),
         };

@@ -11,6 +11,7 @@ pub mod merge;
 pub mod metadata;
 pub mod picture;
 pub mod png;
+pub(crate) mod reconstruction;
 pub mod sky;
 pub mod statistics;
 pub mod summary;

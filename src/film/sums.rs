@@ -1,11 +1,11 @@
 //! Sums that the device's film holds after `n` samples of every pixel, and the image they give.
 
-use std::collections::BTreeSet;
+use std::{array, collections::BTreeSet};
 
 use clap::ValueEnum;
 use rayon::prelude::*;
 
-use super::Image;
+use super::{Image, reconstruction::weights};
 use crate::shader::constants::FILM_BLOCK;
 
 /// Extra layers of an image file, with pbrt's names and meaning where pbrt has them. The command
@@ -18,6 +18,10 @@ pub enum Aov {
     /// `SampleCount.Y`: camera paths per pixel.
     #[value(aliases = ["samplecount", "SampleCount"])]
     SampleCount,
+    /// `Unfiltered.R/G/B`: mean radiance of the samples in the pixel itself, whose noise no neighbour
+    /// shares: what denoisers expect.
+    #[value(aliases = ["Unfiltered"])]
+    Unfiltered,
     /// `Albedo.R/G/B`: share of light that the first surface reflects, 0…1.
     #[value(aliases = ["Albedo"])]
     Albedo,
@@ -57,13 +61,17 @@ pub(crate) struct Layer<const N: usize> {
 }
 
 /// Layers of three numbers.
-pub(crate) const TRIPLES: [Layer<3>; 9] = [
+pub(crate) const TRIPLES: [Layer<3>; 10] = [
     Layer { aov: None, channels: ["Sum.R", "Sum.G", "Sum.B"] },
     Layer { aov: None, channels: ["SumCompensation.R", "SumCompensation.G", "SumCompensation.B"] },
     Layer { aov: None, channels: ["Squares.R", "Squares.G", "Squares.B"] },
     Layer {
         aov: None,
         channels: ["SquaresCompensation.R", "SquaresCompensation.G", "SquaresCompensation.B"],
+    },
+    Layer {
+        aov: Some(Aov::Unfiltered),
+        channels: ["UnfilteredSum.R", "UnfilteredSum.G", "UnfilteredSum.B"],
     },
     Layer { aov: Some(Aov::Albedo), channels: ["AlbedoSum.R", "AlbedoSum.G", "AlbedoSum.B"] },
     Layer { aov: Some(Aov::Normal), channels: ["NSum.X", "NSum.Y", "NSum.Z"] },
@@ -100,19 +108,19 @@ pub(crate) const COUNTS: [Layer<4>; 2] = [
     },
 ];
 
-/// Samples of a sweep over the film that was stopped on its way: the first blocks have them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// A sweep over the film that was stopped on its way: the first blocks have one more sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ahead {
     /// Number of blocks of 8×8 pixels, row by row from the top.
     pub blocks: u32,
-    /// Samples per pixel that these have more than the others.
-    pub samples: u32,
+    /// Offset of the sample from the centre of every pixel, where all share it, in pixels.
+    pub offset: Option<[f32; 2]>,
 }
 
 impl Ahead {
     /// Tests whether no pixel has more samples than another.
     pub fn is_none(self) -> bool {
-        self.blocks == 0 || self.samples == 0
+        self.blocks == 0
     }
 }
 
@@ -133,8 +141,10 @@ pub struct Sums {
     pub film_size: [u32; 2],
     /// Samples (camera paths) of every pixel.
     pub sample_count: u32,
-    /// Further samples of some pixels.
+    /// Pixels with a further sample.
     pub ahead: Ahead,
+    /// Radiance of that sample, unfiltered: what the sums lack; empty if no pixel is ahead.
+    pub pending: Vec<[f32; 3]>,
     /// Leading part of Σ radiance, W·sr⁻¹·m⁻².
     pub sum: Vec<[f32; 3]>,
     /// Rest of Σ radiance.
@@ -143,6 +153,8 @@ pub struct Sums {
     pub squares: Vec<[f32; 3]>,
     /// Rest of Σ radiance².
     pub squares_compensation: Vec<[f32; 3]>,
+    /// Σ radiance of the pixel's own samples; empty if not asked for.
+    pub unfiltered: Vec<[f32; 3]>,
     /// Σ albedo at the first hit, 0 without one; empty if not asked for.
     pub albedo: Vec<[f32; 3]>,
     /// Σ shading normal at the first hit, 0 without one; empty if not asked for.
@@ -176,7 +188,8 @@ macro_rules! layers {
 
 impl Sums {
     layers!(triples triples_mut TRIPLES [f32; 3]:
-        sum compensation squares squares_compensation albedo normal position guide_cell guide_level);
+        sum compensation squares squares_compensation unfiltered albedo normal position guide_cell
+        guide_level);
     layers!(counts counts_mut COUNTS [u32; 2]: visible cache_entries);
 
     /// Creates sums of no samples, without extra layers.
@@ -229,21 +242,78 @@ impl Sums {
         if self.ahead.is_none() {
             return self.sample_count;
         }
-        let width = self.width as usize;
-        let [column, row] = [pixel % width, pixel / width].map(|at| at as u32 / FILM_BLOCK);
-        let is_ahead = row * self.width.div_ceil(FILM_BLOCK) + column < self.ahead.blocks;
-        self.sample_count + if is_ahead { self.ahead.samples } else { 0 }
+        self.sample_count + u32::from(self.is_ahead(self.place(pixel)))
+    }
+
+    /// Column and row of a pixel of the window.
+    fn place(&self, pixel: usize) -> [u32; 2] {
+        [pixel % self.width as usize, pixel / self.width as usize].map(|at| at as u32)
+    }
+
+    fn is_ahead(&self, place: [u32; 2]) -> bool {
+        let [column, row] = place.map(|at| at / FILM_BLOCK);
+        row * self.width.div_ceil(FILM_BLOCK) + column < self.ahead.blocks
+    }
+
+    /// Clears what is pending of pixels that are not ahead.
+    pub(crate) fn clear_behind(&mut self) {
+        for pixel in 0..self.pixel_count() {
+            if !self.is_ahead(self.place(pixel)) {
+                self.pending[pixel] = [0.0; 3];
+            }
+        }
     }
 
     /// Mean radiance of one pixel; 0 before the first sample.
     pub fn mean(&self, pixel: usize) -> [f64; 3] {
-        let count = f64::from(self.samples(pixel).max(1));
-        self.total(pixel).map(|total| total / count)
+        let total = self.total(pixel);
+        if self.ahead.is_none() {
+            let count = f64::from(self.sample_count.max(1));
+            return total.map(|total| total / count);
+        }
+        let (pending, weight) = self.pending_at(pixel);
+        let weight = f64::from(self.sample_count) + weight;
+        let weight = if weight > 0.0 { weight } else { 1.0 };
+        array::from_fn(|channel| (total[channel] + pending[channel]) / weight)
+    }
+
+    /// The filtered sample of a stopped sweep at a pixel: Σ weight · radiance over the pixels that have
+    /// one, and the sum of these weights, up to 1.
+    fn pending_at(&self, pixel: usize) -> ([f64; 3], f64) {
+        let place = self.place(pixel);
+        let ends = [self.width, self.height];
+        let weights: [[f64; 3]; 2] = array::from_fn(|axis| match self.ahead.offset {
+            Some(offset) => {
+                let at = place[axis];
+                weights(offset[axis], [at > 0, true, at + 1 < ends[axis]])
+            }
+            None => [0.0, 1.0, 0.0],
+        });
+        let (mut value, mut sum) = ([0.0; 3], 0.0);
+        for (y, row) in weights[1].into_iter().enumerate() {
+            for (x, column) in weights[0].into_iter().enumerate() {
+                let weight = row * column;
+                let [Some(column), Some(row)] =
+                    [(place[0], x), (place[1], y)].map(|(at, by)| (at + by as u32).checked_sub(1))
+                else {
+                    continue;
+                };
+                if weight > 0.0 && self.is_ahead([column, row]) {
+                    let radiance = self.pending[(row * self.width + column) as usize];
+                    sum += weight;
+                    for channel in 0..3 {
+                        value[channel] += weight * f64::from(radiance[channel]);
+                    }
+                }
+            }
+        }
+        (value, sum)
     }
 
     /// Tests whether any sample found light.
     pub(crate) fn found_light(&self) -> bool {
-        self.sum.as_flattened().iter().any(|&sum| sum != 0.0)
+        let found = |values: &[[f32; 3]]| values.as_flattened().iter().any(|&value| value != 0.0);
+        found(&self.sum) || found(&self.pending)
     }
 
     /// Unbiased estimate of the variance of the pixel's mean, (Σx² − (Σx)²/n) / (n (n − 1)).
@@ -251,13 +321,13 @@ impl Sums {
     /// The estimate treats samples as independent. Stratification lowers the true variance, so this
     /// is an upper estimate. It is 0 below two samples, as in pbrt.
     pub fn variance_of_mean(&self, pixel: usize) -> [f64; 3] {
-        let samples = self.samples(pixel);
+        let samples = self.sample_count;
         if samples < 2 {
             return [0.0; 3];
         }
         let count = f64::from(samples);
         let (total, squares) = (self.total(pixel), self.total_squares(pixel));
-        std::array::from_fn(|channel| {
+        array::from_fn(|channel| {
             let deviation = squares[channel] - total[channel] * total[channel] / count;
             deviation.max(0.0) / (count * (count - 1.0))
         })
@@ -290,7 +360,7 @@ impl Sums {
     /// Counts pixels with a non-finite sum in any layer. Passes drop such samples, so anything but 0
     /// is a defect.
     pub fn non_finite_count(&self) -> usize {
-        let layers = self.triples();
+        let layers: Vec<_> = self.triples().into_iter().chain([&self.pending]).collect();
         let is_bad = |value: &[f32; 3]| value.iter().any(|component| !component.is_finite());
         let has_bad =
             |pixel: &usize| layers.iter().any(|sums| sums.get(*pixel).is_some_and(is_bad));
@@ -334,6 +404,10 @@ impl Sums {
                 }
                 Aov::CacheEntries => {
                     insert_ratio(&mut image, ["CacheEntries.Y", "Hits.Y"], &self.cache_entries);
+                }
+                Aov::Unfiltered => {
+                    let names = ["Unfiltered.R", "Unfiltered.G", "Unfiltered.B"];
+                    insert_means(&mut image, names, &self.unfiltered);
                 }
                 Aov::Albedo => {
                     insert_means(&mut image, ["Albedo.R", "Albedo.G", "Albedo.B"], &self.albedo);
@@ -410,7 +484,7 @@ fn insert_ratio(image: &mut Image, [ratio, whole]: [&str; 2], counts: &[[u32; 2]
 
 /// The value of a two-float sum.
 fn joined(leading: [f32; 3], rest: [f32; 3]) -> [f64; 3] {
-    std::array::from_fn(|channel| f64::from(leading[channel]) + f64::from(rest[channel]))
+    array::from_fn(|channel| f64::from(leading[channel]) + f64::from(rest[channel]))
 }
 
 /// Splits `value` into the two floats whose sum is nearest to it: its rounding and the rest.

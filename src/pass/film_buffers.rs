@@ -1,6 +1,6 @@
 //! The film on the device.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{collections::BTreeMap, ops::Range, sync::Arc};
 
 use bytemuck::{Pod, Zeroable};
 
@@ -15,13 +15,15 @@ use crate::{
     shader::{
         bindings::{Binding, FILM, film},
         constants::{
-            AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, AOV_NORMAL, AOV_POSITION, AOV_VISIBLE,
-            FILM_BLOCK,
+            AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, AOV_NORMAL, AOV_POSITION,
+            AOV_UNFILTERED, AOV_VISIBLE, FILM_BLOCK,
         },
         structs::Counters,
     },
 };
 
+/// Rows of other pages that a page keeps the radiance of: one before it and one after.
+const EDGE_ROWS: u64 = 2;
 /// Pixels of a block in film order; waves hold whole blocks.
 pub(crate) const BLOCK_PIXELS: u32 = FILM_BLOCK * FILM_BLOCK;
 
@@ -32,6 +34,7 @@ const LAYERS: [(&str, Binding, u32); TRIPLES.len() + COUNTS.len()] = [
     ("film compensation", film::FILM_COMPENSATION, 0),
     ("film squares", film::FILM_SQUARES, 0),
     ("film squares compensation", film::FILM_SQUARES_COMPENSATION, 0),
+    ("film unfiltered", film::FILM_UNFILTERED, AOV_UNFILTERED),
     ("film albedo", film::FILM_ALBEDO, AOV_ALBEDO),
     ("film normal", film::FILM_NORMAL, AOV_NORMAL),
     ("film position", film::FILM_POSITION, AOV_POSITION),
@@ -40,6 +43,11 @@ const LAYERS: [(&str, Binding, u32); TRIPLES.len() + COUNTS.len()] = [
     ("film visible", film::FILM_VISIBLE, AOV_VISIBLE),
     ("film cache entries", film::FILM_CACHE_ENTRIES, AOV_CACHE_ENTRIES),
 ];
+
+/// Number of pixels of a window in film order, counting whole blocks where they reach beyond it.
+pub(crate) fn padded_pixels(window: Window) -> u32 {
+    window.width.div_ceil(FILM_BLOCK) * window.height.div_ceil(FILM_BLOCK) * BLOCK_PIXELS
+}
 
 /// Returns a pixel's position in film order; twin of `wave_pixel` in `glsl/include/wave.glsl`.
 pub(crate) fn position_in_film_order(window: Window, column: u32, row: u32) -> u32 {
@@ -50,6 +58,7 @@ pub(crate) fn position_in_film_order(window: Window, column: u32, row: u32) -> u
 /// Returns the bits `AOV_…` of the layers that passes write.
 pub(crate) fn aov_bits(aovs: &[Aov]) -> u32 {
     let bit = |aov: &Aov| match aov {
+        Aov::Unfiltered => AOV_UNFILTERED,
         Aov::Albedo => AOV_ALBEDO,
         Aov::Normal => AOV_NORMAL,
         Aov::Position => AOV_POSITION,
@@ -67,13 +76,13 @@ pub(crate) fn aov_bits(aovs: &[Aov]) -> u32 {
 /// # Errors
 /// [`Error::Memory`].
 pub(crate) fn check_memory(device: &Device, window: Window, aovs: u32) -> Result<()> {
-    let triples = (aovs & (AOV_ALBEDO | AOV_NORMAL | AOV_POSITION)).count_ones()
+    let triples = (aovs & (AOV_UNFILTERED | AOV_ALBEDO | AOV_NORMAL | AOV_POSITION)).count_ones()
         + 2 * (aovs & AOV_GUIDE_CELL).count_ones();
     let pairs = (aovs & (AOV_VISIBLE | AOV_CACHE_ENTRIES)).count_ones();
-    // Four sums and the image, in three channels each.
+    // Four sums and the image, in three channels each, and the radiance of a sweep.
     let copies = if device.capabilities().kind == "software" { 2 } else { 1 };
     let pixel_bytes =
-        u64::from(copies * (48 + 12 * triples + 8 * pairs) + 12 * (1 + triples + pairs));
+        u64::from(copies * (48 + 12 * triples + 8 * pairs) + 12 * (2 + triples + pairs));
     let Window { width, height, .. } = window;
     let asker = format_args!("a film of {width}x{height} pixels");
     memory::check(asker, u64::from(width) * u64::from(height) * pixel_bytes).map_err(Error::memory)
@@ -89,6 +98,8 @@ pub(crate) struct FilmBuffers {
     whole: Window,
     /// Window in use; another one lies in the first page.
     window: Window,
+    /// Part of it that is read back.
+    kept: Window,
     /// Positions in film order of every page but the last, which may have fewer: of the whole window, and
     /// of the one in use.
     whole_page_positions: u32,
@@ -103,27 +114,33 @@ struct Page {
     pixels: usize,
     /// One for each of [`LAYERS`].
     layers: Vec<Buffer>,
+    /// Radiance of a sweep, [`EDGE_ROWS`] included.
+    radiance: Buffer,
 }
 
 impl FilmBuffers {
     /// Makes an empty film of the window, with the extra layers in the bits `aovs`, in buffers of at
-    /// most `page_bytes` bytes and what the device allows, but of a row of blocks at least.
+    /// most `page_bytes` bytes and what the device allows, but of a row of blocks at least, for sweeps of up
+    /// to `sweep_samples` samples.
     pub(crate) fn new(
         device: &Arc<Device>,
         window: Window,
         aovs: u32,
         page_bytes: u64,
+        sweep_samples: u32,
     ) -> Result<Self> {
         let page_bytes = page_bytes.min(device.capabilities().max_storage_buffer_range);
-        let row_bytes = u64::from(window.width) * size_of::<[f32; 3]>() as u64;
+        let row_bytes = u64::from(sweep_samples * window.width) * size_of::<[f32; 3]>() as u64;
         let blocks_down = window.height.div_ceil(FILM_BLOCK);
-        let rows = page_bytes / row_bytes / u64::from(FILM_BLOCK);
+        let rows = (page_bytes / row_bytes).saturating_sub(EDGE_ROWS) / u64::from(FILM_BLOCK);
         let rows = u32::try_from(rows).unwrap_or(blocks_down).clamp(1, blocks_down);
         let counters = Buffer::from_slice(device, "counters", &[Counters::zeroed()])?;
         let page_positions = rows * window.width.div_ceil(FILM_BLOCK) * BLOCK_PIXELS;
         let make = |first: u32| {
             let last = (first + rows * FILM_BLOCK).min(window.height);
-            Page::new(device, &counters, [first, last].map(|row| row * window.width), aovs)
+            let radiance = u64::from(last - first) + EDGE_ROWS;
+            let pixels = [first, last].map(|row| row * window.width);
+            Page::new(device, &counters, pixels, aovs, radiance * row_bytes)
         };
         Ok(Self {
             pages: (0..window.height)
@@ -134,6 +151,7 @@ impl FilmBuffers {
             aovs,
             whole: window,
             window,
+            kept: window,
             whole_page_positions: page_positions,
             page_positions,
         })
@@ -146,7 +164,7 @@ impl FilmBuffers {
     /// If a smaller film does not fit into the first page.
     pub(crate) fn reshape(&mut self, [width, height]: [u32; 2]) {
         if [width, height] == [self.whole.width, self.whole.height] {
-            self.window = self.whole;
+            (self.window, self.kept) = (self.whole, self.whole);
             self.page_positions = self.whole_page_positions;
             return;
         }
@@ -156,7 +174,34 @@ impl FilmBuffers {
             "a film of {width}x{height} in {room} pixels"
         );
         self.window = Window { x: 0, y: 0, width, height };
+        self.kept = self.window;
         self.page_positions = self.padded_pixels();
+    }
+
+    /// Reads back, from now on, a part of the window alone.
+    pub(crate) fn keep(&mut self, window: Window) {
+        self.kept = window;
+    }
+
+    /// Window that is read back.
+    pub(crate) fn kept(&self) -> Window {
+        self.kept
+    }
+
+    /// Tests whether the whole window is read back.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.kept == self.window
+    }
+
+    /// Places in the window in use of the rows that are read back.
+    fn kept_rows(&self) -> impl Iterator<Item = Range<usize>> {
+        let Window { x, y, width, height } = self.kept;
+        let (left, top) = ((x - self.window.x) as usize, y - self.window.y);
+        let stride = self.window.width as usize;
+        (top..top + height).map(move |row| {
+            let start = row as usize * stride + left;
+            start..start + width as usize
+        })
     }
 
     /// Window in use.
@@ -197,11 +242,9 @@ impl FilmBuffers {
         self.page_positions - position % self.page_positions
     }
 
-    /// Number of pixels in film order, counting whole blocks where they reach beyond the window.
+    /// Number of pixels in film order, as [`padded_pixels`].
     pub(crate) fn padded_pixels(&self) -> u32 {
-        let blocks =
-            self.window.width.div_ceil(FILM_BLOCK) * self.window.height.div_ceil(FILM_BLOCK);
-        blocks * BLOCK_PIXELS
+        padded_pixels(self.window)
     }
 
     /// Sets everything to zero.
@@ -224,9 +267,9 @@ impl FilmBuffers {
     /// Reads everything but the sample count and the film's size, which the renderer knows.
     pub(crate) fn download(&self) -> Result<Sums> {
         let mut sums = Sums {
-            width: self.window.width,
-            height: self.window.height,
-            origin: [self.window.x, self.window.y],
+            width: self.kept.width,
+            height: self.kept.height,
+            origin: [self.kept.x, self.kept.y],
             ..Sums::default()
         };
         for (index, layer) in sums.triples_mut().into_iter().enumerate() {
@@ -238,8 +281,49 @@ impl FilmBuffers {
         Ok(sums)
     }
 
+    /// Most samples of a sweep over the window in use, 1 at least.
+    pub(crate) fn sweep_samples(&self) -> u32 {
+        let page = &self.pages[0];
+        let pixels = self.pixels_of(page) as u64 + EDGE_ROWS * u64::from(self.window.width);
+        let samples = page.radiance.size() / (pixels * size_of::<[f32; 3]>() as u64);
+        u32::try_from(samples).unwrap_or(u32::MAX).max(1)
+    }
+
+    /// Copies the radiance of `samples` samples along the edges of pages to the pages beside them.
+    pub(crate) fn copy_edges(&self, commands: &mut Commands, samples: u32) {
+        let width = u64::from(self.window.width);
+        let row_bytes = width * u64::from(samples) * size_of::<[f32; 3]>() as u64;
+        let used = self.pages.iter().filter(|page| self.pixels_of(page) > 0);
+        let used: Vec<&Page> = used.collect();
+        for pair in used.windows(2) {
+            let [above, below] = [pair[0], pair[1]];
+            let rows = above.pixels as u64 / width;
+            commands.copy(&above.radiance, rows * row_bytes, &below.radiance, 0, row_bytes);
+            let end = (rows + 1) * row_bytes;
+            commands.copy(&below.radiance, row_bytes, &above.radiance, end, row_bytes);
+        }
+    }
+
+    /// Reads the radiance of a sweep of one sample; what the sweep has not reached means nothing.
+    pub(crate) fn download_radiance(&self) -> Result<Vec<[f32; 3]>> {
+        let mut radiance = Vec::new();
+        for page in &self.pages {
+            let edge = self.window.width as usize;
+            let pixels = self.pixels_of(page);
+            let all: Vec<[f32; 3]> = page.radiance.download(edge + pixels)?;
+            radiance.extend_from_slice(&all[edge..]);
+        }
+        Ok(radiance)
+    }
+
     /// Replaces the content of the film by sums of the same window.
     pub(crate) fn upload(&self, sums: &Sums) -> Result<()> {
+        for page in &self.pages {
+            if let Some(pixels) = sums.pending.get(page.first..page.first + page.pixels) {
+                let edge = vec![[0.0; 3]; self.window.width as usize];
+                page.radiance.upload(bytemuck::cast_slice(&[&edge, pixels].concat()))?;
+            }
+        }
         for (index, layer) in sums.triples().into_iter().enumerate() {
             self.upload_layer(index, layer)?;
         }
@@ -266,11 +350,24 @@ impl FilmBuffers {
                 let add = |piece: &[T]| layer.extend_from_slice(piece);
                 page.layers[index].download_pieces(self.pixels_of(page), add)?;
             }
+            if !self.is_whole() {
+                *layer = self.kept_rows().flat_map(|row| layer[row].iter().copied()).collect();
+            }
         }
         Ok(())
     }
 
     fn upload_layer<T: Pod>(&self, index: usize, layer: &[T]) -> Result<()> {
+        let mut whole = Vec::new();
+        let layer = if self.is_whole() || layer.is_empty() {
+            layer
+        } else {
+            whole.resize(self.window.width as usize * self.window.height as usize, T::zeroed());
+            for (row, values) in self.kept_rows().zip(layer.chunks(self.kept.width as usize)) {
+                whole[row].copy_from_slice(values);
+            }
+            &whole
+        };
         for page in self.pages.iter().filter(|_| is_asked_for(index, self.aovs)) {
             if let Some(pixels) = layer.get(page.first..page.first + page.pixels) {
                 page.layers[index].upload(bytemuck::cast_slice(pixels))?;
@@ -280,7 +377,9 @@ impl FilmBuffers {
     }
 
     fn buffers(&self) -> impl Iterator<Item = &Buffer> {
-        self.pages.iter().flat_map(|page| &page.layers).chain([&self.counters])
+        let radiance = self.pages.iter().map(|page| &page.radiance);
+        let layers = self.pages.iter().flat_map(|page| &page.layers);
+        layers.chain(radiance).chain([&self.counters])
     }
 }
 
@@ -291,17 +390,20 @@ impl Page {
         counters: &Buffer,
         [first, end]: [u32; 2],
         aovs: u32,
+        radiance_bytes: u64,
     ) -> Result<Self> {
         let pixels = u64::from(end - first);
+        let radiance = Buffer::zeroed(device, "film radiance", radiance_bytes)?;
         let make = |(index, (name, ..)): (usize, &(&str, Binding, u32))| {
             let bytes = if index < TRIPLES.len() { 12 } else { 8 };
             Buffer::zeroed(device, name, if is_asked_for(index, aovs) { bytes * pixels } else { 0 })
         };
         let layers = LAYERS.iter().enumerate().map(make).collect::<Result<Vec<_>>>()?;
         let bound = LAYERS.iter().zip(&layers).map(|((_, binding, _), buffer)| (*binding, buffer));
-        let bound: Vec<_> = bound.chain([(film::COUNTERS, counters)]).collect();
+        let others = [(film::COUNTERS, counters), (film::FILM_RADIANCE, &radiance)];
+        let bound: Vec<_> = bound.chain(others).collect();
         let set = DescriptorSet::new(device, &FILM, &bound)?;
-        Ok(Self { set, first: first as usize, pixels: pixels as usize, layers })
+        Ok(Self { set, first: first as usize, pixels: pixels as usize, layers, radiance })
     }
 }
 

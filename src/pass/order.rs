@@ -98,7 +98,7 @@ pub fn wave_order(
     if let Some(sharing) = order.sharing {
         order.dispatches.extend(sharing.connect_and_share(&order.wave));
     }
-    order.add(Kernel::new("accumulate", Domain::Pixels, &[]));
+    order.add(Kernel::new("deposit", Domain::Pixels, &[]));
     order.dispatches
 }
 

@@ -58,6 +58,11 @@ impl<'a> Recording<'a> {
         Ok(())
     }
 
+    /// Commands before the next pass.
+    pub fn commands(&mut self) -> &mut Commands {
+        &mut self.commands
+    }
+
     /// Submits, waits, and returns the time by pass, that of the host included.
     ///
     /// # Errors

@@ -7,8 +7,8 @@ use std::{
 };
 
 use super::{
-    film_buffers::{BLOCK_PIXELS, FilmBuffers},
-    kernel::{Dispatch, Kernel, Pass},
+    film_buffers::{BLOCK_PIXELS, FilmBuffers, padded_pixels},
+    kernel::{Dispatch, Domain, Kernel, Pass},
     order::{PassSettings, PathLists, wave_order},
     recording::Recording,
     scene_buffers::SceneBuffers,
@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    film::Sums,
+    film::{Sums, Window},
     gpu::{Commands, DescriptorSet, Device, PassTimes},
     scene::Camera,
     shader::structs::Wave,
@@ -65,18 +65,25 @@ impl Runner {
         settings: PassSettings,
         demand: PathDemand,
     ) -> Result<Self> {
-        let film =
-            FilmBuffers::new(device, scene.window(), settings.aovs, settings.film_page_bytes)?;
+        let window = scene.window();
+        let padded_pixels = padded_pixels(window);
         let cohort_pixels = settings.cohort_edge * settings.cohort_edge;
         let rays = settings.shadow_rays.max(cohort_pixels).clamp(1, SHADOW_RAYS_PER_GROUP);
         let demand = SharingBuffers::demand(demand, cohort_pixels);
         let waves = WaveBuffers::new(
             device,
-            film.padded_pixels(),
+            padded_pixels,
             settings.most_paths,
             rays,
             demand,
             settings.surfaces,
+        )?;
+        let film = FilmBuffers::new(
+            device,
+            window,
+            settings.aovs,
+            settings.film_page_bytes,
+            (waves.capacity() / padded_pixels).max(1),
         )?;
         let sharing = (cohort_pixels > 1)
             .then(|| SharingBuffers::new(device, waves.capacity(), cohort_pixels))
@@ -96,6 +103,11 @@ impl Runner {
             watch: None,
             is_stopped: false,
         })
+    }
+
+    /// Keeps the samples of a part of the window alone.
+    pub(crate) fn keep(&mut self, window: Window) {
+        self.film.keep(window);
     }
 
     /// Calls `watch` after the waves of all sweeps from now on.
@@ -123,7 +135,8 @@ impl Runner {
         let others = technique.other_steps();
         let all = [technique.steps()].into_iter().chain(others.iter().map(Box::as_ref));
         for steps in all {
-            let order = wave_order(&self.settings, steps, Wave::default(), self.settings.depth);
+            let mut order = wave_order(&self.settings, steps, Wave::default(), self.settings.depth);
+            order.push(Dispatch { kernel: accumulation(), wave: Wave::default() });
             for Dispatch { kernel, wave } in order {
                 let mut add_ms = |name: &str, start: Instant| {
                     let ms = start.elapsed().as_secs_f64() * 1e3;
@@ -148,8 +161,9 @@ impl Runner {
     }
 
     /// Runs waves like `wave` over `pixels` pixels, starting at its first, and takes the counters
-    /// before they overflow. Returns the pixels done, all unless the watch stops it. Fails if the device
-    /// does.
+    /// before they overflow. Once all pixels of the film have their samples, adds these to its sums. Returns
+    /// the pixels done, all unless the watch stops it, for which it waits if they have several samples. Fails
+    /// if the device does.
     pub(crate) fn sweep(&mut self, technique: &dyn Passes, wave: Wave, pixels: u32) -> Result<u32> {
         let mut done = 0;
         let mut uncounted = 0;
@@ -169,7 +183,9 @@ impl Runner {
             done += wave.pixel_count;
             if self.watch.as_mut().is_some_and(|watch| watch(&wave)) {
                 self.is_stopped = true;
-                break;
+                if wave.is_training != 0 || wave.sample_count == 1 {
+                    break;
+                }
             }
             uncounted += u64::from(wave.pixel_count * wave.sample_count) * self.counts_per_path();
             if uncounted > COUNTER_ROOM {
@@ -177,7 +193,35 @@ impl Runner {
                 uncounted = 0;
             }
         }
+        if done == pixels && wave.is_training == 0 {
+            self.accumulate(technique, wave)?;
+        }
         Ok(done)
+    }
+
+    /// Adds the samples of a sweep like `wave` to the sums of the film, page by page.
+    fn accumulate(&mut self, technique: &dyn Passes, wave: Wave) -> Result<()> {
+        let kernel = accumulation();
+        if !self.passes.contains_key(&kernel) {
+            self.passes.insert(kernel.clone(), Pass::new(&self.device, kernel.clone())?);
+        }
+        let pages = self.film.pages().count() as u32;
+        let mut recording = Recording::begin(&self.device, pages, None)?;
+        self.film.copy_edges(recording.commands(), wave.sample_count);
+        let mut first_pixel = 0;
+        while first_pixel < self.film.padded_pixels() {
+            let left = self.film.padded_pixels() - first_pixel;
+            let pixel_count = self.film.left_in_page(first_pixel).min(left);
+            let film_start = self.film.first_pixel(first_pixel);
+            let film = self.film.set(first_pixel);
+            let sets = sets(&self.scene, technique, &self.waves, &self.sharing, film);
+            let wave = Wave { first_pixel, pixel_count, film_start, ..wave };
+            recording.add(&self.passes[&kernel], &sets, &wave)?;
+            first_pixel += pixel_count;
+        }
+        let times = recording.finish()?;
+        self.totals.add_times(&times);
+        Ok(())
     }
 
     /// Most that one path adds to a counter: energy counts up to 256 at a vertex.
@@ -214,9 +258,7 @@ impl Runner {
             recording.add(pass, &sets, &wave)?;
         }
         let times = recording.finish()?;
-        for (pass, ms) in &times {
-            *self.totals.gpu_ms.entry(pass.clone()).or_default() += ms;
-        }
+        self.totals.add_times(&times);
         Ok(times)
     }
 
@@ -242,7 +284,7 @@ impl Runner {
 
     /// Number of samples of all pixels that fit into the next wave.
     pub(crate) fn samples_per_wave(&self) -> u32 {
-        self.wave_paths / self.film.padded_pixels()
+        (self.wave_paths / self.film.padded_pixels()).min(self.film.sweep_samples())
     }
 
     /// Sets the number of shadow rays per hit. Panics if there are more than the buffers can hold.
@@ -333,6 +375,11 @@ impl Runner {
         bytes.extend(self.film.buffer_bytes());
         bytes
     }
+}
+
+/// The pass that adds the samples of a sweep to the film.
+fn accumulation() -> Kernel {
+    Kernel::new("accumulate", Domain::Pixels, &[])
 }
 
 fn sets<'a>(

@@ -21,7 +21,7 @@ use crate::{
     scene::{Camera, EnvironmentMap, Filter, Scene, environment::EnvironmentTables},
     shader::{
         bindings::{Binding, SCENE, scene as bindings},
-        constants::{SURFACES_INSTANCED, SURFACES_LAMP_CELLS},
+        constants::{FILTER_BOX, FILTER_GAUSSIAN, SURFACES_INSTANCED, SURFACES_LAMP_CELLS},
         structs::{self, SceneParameters},
     },
     surface::SurfaceTables,
@@ -235,8 +235,8 @@ fn parameters(
         crop_width: window.width,
         crop_height: window.height,
         film_filter: match scene.film.filter {
-            Filter::Box => 0,
-            Filter::Gaussian => 1,
+            Filter::Box => FILTER_BOX,
+            Filter::Gaussian => FILTER_GAUSSIAN,
         },
         environment_width: map.width,
         environment_height: map.height,

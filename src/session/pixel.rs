@@ -21,7 +21,8 @@ use crate::{
     film::{Window, png::write_rgb8},
     gpu::{Buffer, Device},
     pass::{
-        BLOCK_PIXELS, Explanation, PixelReadback, Progress, RayReadback, explanation::draw_rays,
+        BLOCK_PIXELS, Explanation, PixelReadback, Progress, RayReadback, SceneBuffers,
+        explanation::draw_rays,
     },
     scene::Scene,
     shader::{
@@ -113,7 +114,11 @@ impl Renderer {
             ..self.settings.clone()
         };
         drop(self);
-        let recorded = Self::new(device, scene, settings)?.read_pixel()?;
+        // The pixel alone: its numbers come first in the buffers.
+        let window = super::window_of(&settings, scene);
+        let buffers = Arc::new(SceneBuffers::new(device, scene, window)?);
+        let mut renderer = Self::with_scene_buffers(device, buffers, scene, settings)?;
+        let recorded = renderer.read_pixel()?;
         Ok(recorded.map(|recorded| Box::new(recorded) as Box<dyn Explanation>))
     }
 

@@ -2,10 +2,10 @@
 
 use std::{any::Any, collections::BTreeMap, sync::Arc};
 
-use super::{Settings, window_of};
+use super::{Settings, traced_window, window_of};
 use crate::{
     error::{Error, Result},
-    film::{Sums, sums::Ahead},
+    film::{Sums, reconstruction::shared_offset, sums::Ahead},
     gpu::{Device, PassTimes},
     pass::{
         PassSettings, Progress, Report, Runner, SceneBuffers, Schedule, Technique, Totals,
@@ -13,7 +13,7 @@ use crate::{
         wave_buffers::most_paths,
     },
     sampler::Context,
-    scene::Scene,
+    scene::{Filter, Scene},
     shader::structs::Wave,
 };
 
@@ -28,6 +28,7 @@ pub struct Renderer {
     pub(super) technique: Box<dyn Technique>,
     pub(super) settings: Settings,
     pub(super) film_size: [u32; 2],
+    filter: Filter,
     pub(super) sample_count: u32,
     /// Sweep that was stopped on its way.
     pub(super) ahead: Ahead,
@@ -37,13 +38,14 @@ impl Renderer {
     /// Uploads `scene` and prepares to render it. Fails if an option is out of range, memory runs
     /// out or a limit of the device is exceeded.
     pub fn new(device: &Arc<Device>, scene: &Scene, settings: Settings) -> Result<Self> {
-        let window = window_of(&settings, scene);
         settings.check([scene.film.width, scene.film.height])?;
+        let window = traced_window(&settings, scene);
         let buffers = Arc::new(SceneBuffers::new(device, scene, window)?);
         Self::with_scene_buffers(device, buffers, scene, settings)
     }
 
-    /// As [`Renderer::new`], sharing buffers of the same scene and window.
+    /// As [`Renderer::new`], sharing buffers of the same scene and [`traced_window`]. With those of the
+    /// window alone, the filter of its outermost pixels ends there.
     ///
     /// # Panics
     /// If the buffers were made for another window.
@@ -55,7 +57,11 @@ impl Renderer {
     ) -> Result<Self> {
         let film_size = [scene.film.width, scene.film.height];
         settings.check(film_size)?;
-        assert_eq!(window_of(&settings, scene), buffers.window(), "buffers belong to one window");
+        let window = window_of(&settings, scene);
+        assert!(
+            [window, traced_window(&settings, scene)].contains(&buffers.window()),
+            "buffers belong to one window"
+        );
 
         let surfaces = buffers.surfaces();
         let shares = settings.depth > 1 && surfaces.has_base();
@@ -79,6 +85,7 @@ impl Renderer {
         let attempt = |most_paths| -> Result<_> {
             let passes = PassSettings { most_paths, ..passes };
             let mut runner = Runner::new(device, Arc::clone(&buffers), passes, demand)?;
+            runner.keep(window);
             let context = Context { scene, parameters: &settings.parameters, runner: &runner };
             let technique = settings.sampler.technique(context)?;
             runner.warm_up(technique.as_ref())?;
@@ -94,8 +101,8 @@ impl Renderer {
                 result => break result?,
             }
         };
-        let ahead = Ahead::default();
-        Ok(Self { runner, technique, settings, film_size, sample_count: 0, ahead })
+        let (filter, ahead) = (scene.film.filter, Ahead::default());
+        Ok(Self { runner, technique, settings, film_size, filter, sample_count: 0, ahead })
     }
 
     pub(super) fn progress(&self) -> Progress {
@@ -106,7 +113,8 @@ impl Renderer {
         }
     }
 
-    /// Adds `samples` samples to every pixel, the rest of a stopped sweep first. Fails if the device does.
+    /// Adds `samples` samples to every pixel, the rest of a stopped sweep first. A crop window that needs
+    /// samples around it has nothing of a stopped sweep. Fails if the device does.
     pub fn render_pass(&mut self, samples: u32) -> Result<()> {
         let mut left = samples;
         while left > 0 {
@@ -117,7 +125,7 @@ impl Renderer {
                 return Ok(());
             }
             let before = std::mem::take(&mut self.ahead);
-            let together = if before.is_none() { together } else { before.samples };
+            let together = if before.is_none() { together } else { 1 };
             let wave = Wave {
                 first_pixel: before.blocks * BLOCK_PIXELS,
                 first_sample: progress.next_sample(),
@@ -130,10 +138,11 @@ impl Renderer {
             let pixels = self.runner.film().padded_pixels() - wave.first_pixel;
             let done = self.runner.sweep(self.technique.as_ref(), wave, pixels)?;
             self.runner.take_counters()?;
-            if done < pixels {
+            if done < pixels && self.runner.film().is_whole() {
                 let blocks = before.blocks + done / BLOCK_PIXELS;
-                self.ahead = Ahead { blocks, samples: together };
-            } else {
+                let offset = shared_offset(self.filter, wave.first_sample, wave.seed);
+                self.ahead = Ahead { blocks, offset };
+            } else if done == pixels {
                 self.sample_count += together;
                 left = left.saturating_sub(together);
             }
@@ -161,9 +170,9 @@ impl Renderer {
     /// [`Error::Usage`] if window or layers differ, or if the next sample depends on more than the
     /// sums; [`Error::Vulkan`] if the device fails.
     pub fn restore(&mut self, sums: &Sums) -> Result<()> {
-        let most_samples = sums.sample_count.saturating_add(sums.ahead.samples);
+        let most_samples = sums.sample_count.saturating_add(u32::from(!sums.ahead.is_none()));
         self.technique.check_resume(most_samples, &self.progress())?;
-        let window = self.runner.scene().window();
+        let window = self.runner.film().kept();
         if sums.film_size != self.film_size
             || sums.origin != [window.x, window.y]
             || [sums.width, sums.height] != [window.width, window.height]
@@ -212,6 +221,11 @@ impl Renderer {
         self.ahead
     }
 
+    /// Filter of the film.
+    pub(crate) fn filter(&self) -> Filter {
+        self.filter
+    }
+
     /// Samples of every pixel in the film.
     pub fn sample_count(&self) -> u32 {
         self.sample_count
@@ -253,7 +267,12 @@ impl Renderer {
 
     /// Reads the film. Fails if the device does.
     pub fn sums(&self) -> Result<Sums> {
-        let sums = self.runner.sums()?;
+        let mut sums = self.runner.sums()?;
+        if !self.ahead.is_none() {
+            sums.pending = self.runner.film().download_radiance()?;
+            sums.ahead = self.ahead;
+            sums.clear_behind();
+        }
         let (film_size, sample_count, ahead) = (self.film_size, self.sample_count, self.ahead);
         Ok(Sums { film_size, sample_count, ahead, ..sums })
     }

@@ -6,7 +6,7 @@ use crate::{
     film::Aov,
     pass::{PathLists, Roulette},
     sampler::{Parameters, Sampler},
-    scene::Scene,
+    scene::{Filter, Scene},
 };
 
 /// Lit vertices of a path for the commands, if neither an option nor the scene's file says otherwise.
@@ -66,6 +66,22 @@ pub fn window_of(settings: &Settings, scene: &Scene) -> Window {
         width: scene.film.width,
         height: scene.film.height,
     })
+}
+
+/// Returns the window whose samples the picture needs: around that of `settings`, one pixel more where
+/// the film has one and its filter reaches so far.
+pub fn traced_window(settings: &Settings, scene: &Scene) -> Window {
+    let window = window_of(settings, scene);
+    if scene.film.filter == Filter::Box {
+        return window;
+    }
+    let grown = |start: u32, length: u32, end: u32| {
+        let first = start.saturating_sub(1);
+        (first, start.saturating_add(length).saturating_add(1).min(end) - first)
+    };
+    let (x, width) = grown(window.x, window.width, scene.film.width);
+    let (y, height) = grown(window.y, window.height, scene.film.height);
+    Window { x, y, width, height }
 }
 
 impl Settings {

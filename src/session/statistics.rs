@@ -1,6 +1,6 @@
 //! Statistics and warnings of a render.
 
-use super::{Figures, Session, StopReason, window_of};
+use super::{Figures, Session, StopReason, traced_window, window_of};
 use crate::{
     film::{Statistics, Window},
     scene::Scene,
@@ -65,7 +65,7 @@ impl Session {
             ));
         }
         if let Some([left, top, right, bottom]) = totals.overrun_pixels {
-            let Window { x, y, .. } = window_of(self.renderer.settings(), scene);
+            let Window { x, y, .. } = traced_window(self.renderer.settings(), scene);
             warnings.push(format!(
                 "{} rays were given up after too many steps of traversal, where many triangles meet in \
                  one place: pixels within --crop {},{},{},{} may be wrong",

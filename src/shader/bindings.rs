@@ -316,6 +316,11 @@ binding_tables! {
         10 FILM_GUIDE_LEVEL: array vec3;
         /// Rest of the sum of squared radiance.
         11 FILM_SQUARES_COMPENSATION: array vec3;
+        /// Radiance of the samples of one sweep, pixel by pixel, between one row of the page before and one
+        /// of the page after.
+        12 FILM_RADIANCE: array vec3;
+        /// Sum of the radiance of the pixel's own samples.
+        13 FILM_UNFILTERED: array vec3;
     }
 
     /// Set 3 of the probe kernels in `glsl/test`, which declare their own element types.

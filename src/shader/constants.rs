@@ -154,6 +154,14 @@ constants! {
     DIMENSIONS_PER_VERTEX = 32;
     /// Offset from a vertex's first dimension: whether a ray goes through a surface that it meets.
     DIMENSION_PASSAGE = 5;
+    /// Where a sample lies in its pixel.
+    DIMENSION_FILTER = 0;
+    /// Pixel number of random numbers that all pixels share.
+    EVERY_PIXEL = 0xffff_ffff;
+    /// Value of `Parameters::film_filter`: each sample counts in its pixel alone.
+    FILTER_BOX = 0;
+    /// Value of `Parameters::film_filter`: each sample counts in nine pixels.
+    FILTER_GAUSSIAN = 1;
     /// Edge of the blocks of pixels that film order goes by, so that neighbouring invocations trace
     /// neighbouring rays.
     FILM_BLOCK = 8;
@@ -171,6 +179,8 @@ constants! {
     AOV_CACHE_ENTRIES = 16;
     /// Cells of the guide.
     AOV_GUIDE_CELL = 32;
+    /// Radiance of the pixel's own samples.
+    AOV_UNFILTERED = 64;
 
     // Traversal.
     /// Entries of the traversal stack, one group of nodes per level of the tree.

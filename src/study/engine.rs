@@ -25,7 +25,7 @@ use crate::{
     pass::SceneBuffers,
     sampler::Sampler,
     scene::Scene,
-    session::{Observer, Renderer, Session, Settings, describe, window_of},
+    session::{Observer, Renderer, Session, Settings, describe, traced_window},
 };
 
 /// Everything a study has measured.
@@ -320,7 +320,7 @@ impl SharedBuffers<'_> {
         let buffers = match &self.made {
             Some(buffers) => Arc::clone(buffers),
             None => {
-                let window = window_of(&settings, self.scene);
+                let window = traced_window(&settings, self.scene);
                 let buffers = Arc::new(SceneBuffers::new(self.device, self.scene, window)?);
                 self.made = Some(Arc::clone(&buffers));
                 buffers

@@ -133,7 +133,7 @@ impl Reference {
         }
         let names: Vec<String> =
             images.iter().map(|(path, _)| path.display().to_string()).collect();
-        Self::from_images(&images, format!("read from {}", names.join(" and ")))
+        Self::from_images(&images, format!("read from {}", names.join(" and ")), scene)
     }
 
     /// Renders what `folder` lacks of the two halves and reads both. An interrupted half continues
@@ -175,10 +175,15 @@ impl Reference {
             render_half(session, path, range, watch)?;
         }
         let images = read_images(paths.to_vec(), scene)?;
-        Self::from_images(&images, format!("{}, two halves of {half_spp} spp", contender.label))
+        let description = format!("{}, two halves of {half_spp} spp", contender.label);
+        Self::from_images(&images, description, scene)
     }
 
-    fn from_images(images: &[(PathBuf, Image)], description: String) -> Result<Self> {
+    fn from_images(
+        images: &[(PathBuf, Image)],
+        description: String,
+        scene: &Scene,
+    ) -> Result<Self> {
         let rgb = |index: usize| {
             let (path, image) = &images[index];
             image.rgb(path)
@@ -214,6 +219,7 @@ impl Reference {
             let error = |variances: &Vec<[f32; 3]>| {
                 mean_standard_error(
                     variances.iter().map(|v| v.map(|value| f64::from(value).max(0.0).sqrt())),
+                    scene.film.filter,
                 )
             };
             let errors: Vec<f64> = variances.iter().map(error).collect();

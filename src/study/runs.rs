@@ -142,8 +142,9 @@ impl Measurement {
         };
         let metrics = Metrics::of_halves(&picture, &reference.first, &reference.second)?;
         let variances = (0..sums.pixel_count()).map(|pixel| sums.variance_of_mean(pixel));
-        let error = (sums.sample_count > 1)
-            .then(|| mean_standard_error(variances.map(|v| v.map(f64::sqrt))));
+        let error = (sums.sample_count > 1).then(|| {
+            mean_standard_error(variances.map(|v| v.map(f64::sqrt)), session.renderer.filter())
+        });
         let totals = session.renderer.totals();
         let own = &reference.own;
         let measurement = Self {

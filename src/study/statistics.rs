@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::{film::reconstruction::variance_share, scene::Filter};
+
 /// A value with its 95% confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Interval {
@@ -110,15 +112,15 @@ pub fn slope(points: &[[f64; 2]]) -> Option<f64> {
 }
 
 /// Standard error of the mean over pixels and channels, from the pixels' standard errors; takes
-/// channels as fully correlated and pixels as independent.
-pub(crate) fn mean_standard_error(errors: impl Iterator<Item = [f64; 3]>) -> f64 {
+/// channels as fully correlated, and samples as independent, which `filter` spreads over pixels.
+pub(crate) fn mean_standard_error(errors: impl Iterator<Item = [f64; 3]>, filter: Filter) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0_f64);
     for error in errors {
         let mean = (error[0] + error[1] + error[2]) / 3.0;
         sum += mean * mean;
         count += 1.0;
     }
-    sum.sqrt() / count.max(1.0)
+    (sum / variance_share(filter)).sqrt() / count.max(1.0)
 }
 
 #[cfg(test)]
@@ -177,7 +179,10 @@ mod tests {
 
     #[test]
     fn the_means_error_shrinks_with_the_pixels() {
-        let four = mean_standard_error([[2.0, 2.0, 2.0]; 4].into_iter());
+        let four = mean_standard_error([[2.0, 2.0, 2.0]; 4].into_iter(), Filter::Box);
         assert!((four - 1.0).abs() < 1e-12);
+        // A Gaussian of ½ spreads independent noise over 4π σ² = π pixels.
+        let shared = mean_standard_error([[2.0, 2.0, 2.0]; 4].into_iter(), Filter::Gaussian);
+        assert!((shared / std::f64::consts::PI.sqrt() - 1.0).abs() < 0.02, "{shared}");
     }
 }

@@ -403,7 +403,8 @@ impl Arguments {
         }
         let mut aovs = self.aov.clone();
         if denoises {
-            aovs.extend([Aov::Albedo, Aov::Normal].iter().filter(|aov| !self.aov.contains(aov)));
+            let wanted = [Aov::Unfiltered, Aov::Albedo, Aov::Normal];
+            aovs.extend(wanted.iter().filter(|aov| !self.aov.contains(aov)));
         }
         if let Some(error) = self.error
             && !(error.is_finite() && error > 0.0)

@@ -320,7 +320,7 @@ impl GuideBuffers {
             shares: self.learned.shares().to_vec(),
             pending: self.counts.download(counted)?,
             pending_shares: self.shares.download(self.learned.cell_count() * SHARE_WORDS)?,
-            missing: missing.into_iter().filter(|key| *key != CellKey::NONE.0).collect(),
+            missing: missing.into_iter().map(|key| !key).collect(),
             arrivals: self.learned.arrivals(),
             pending_arrivals: pending_arrivals.unwrap_or_default(),
         })
@@ -384,8 +384,12 @@ impl GuideBuffers {
                 &state.pending_arrivals[..state.pending_arrivals.len().min(room)],
             )?;
         }
-        let missing = &state.missing[..state.missing.len().min(self.missing_slots)];
-        self.missing.upload(bytemuck::cast_slice(missing))?;
+        let mut missing: Vec<u32> = state.missing.iter().map(|word| !word).collect();
+        if missing.len() != self.missing_slots {
+            missing.retain(|key| *key != CellKey::NONE.0);
+            missing.truncate(self.missing_slots);
+        }
+        self.missing.upload(bytemuck::cast_slice(&missing))?;
         self.upload()?;
         Ok(has_moved)
     }

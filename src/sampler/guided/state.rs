@@ -24,7 +24,7 @@ use crate::{
 
 const COUNT_WORDS: usize = GUIDE_COUNT_WORDS as usize;
 const FORMAT: &str = "fenestra-guide";
-const VERSION: u32 = 13;
+const VERSION: u32 = 14;
 /// Upper bound of the rays of one cell and direction: each rebuild halves them and adds a word.
 const MAX_ARRIVAL_RAYS: f32 = 1e10;
 /// Upper bound of their light, such that its product with the rays of all cells stays finite.
@@ -65,7 +65,8 @@ pub struct GuideState {
     pub pending: Vec<CountWords>,
     /// Shares since the last rebuild; empty where there are none.
     pub pending_shares: Vec<u32>,
-    /// Keys that passes looked up and did not find since the last rebuild.
+    /// Slots of the table of keys that passes looked up and did not find since the last rebuild: which keys
+    /// come in a full table depends on where others lie. Complements of keys, so that an empty slot is 0.
     pub missing: Vec<u32>,
     /// Bounce rays and light per cell and direction up to the last rebuild, as bits of floats;
     /// empty where bounces do not teach.

@@ -36,3 +36,45 @@ pub fn random_independent_2d(pixel: u32, sample_index: u32, dimension: u32, seed
 pub fn random_independent_1d(pixel: u32, sample_index: u32, dimension: u32, seed: u32) -> f32 {
     random_independent_2d(pixel, sample_index, dimension, seed)[0]
 }
+
+/// Takes the place of the sample index when [`random_2d`] hashes its keys.
+const RANDOM_KEY_TAG: u32 = 0x9e37_79b9;
+
+/// Laine–Karras permutation: flips every bit depending on the key and the bits below it, which is
+/// Owen scrambling of a bit-reversed number. Constants: Vegdahl 2021.
+fn laine_karras_permutation(mut x: u32, key: u32) -> u32 {
+    x ^= x.wrapping_mul(0x3d20_adea);
+    x = x.wrapping_add(key);
+    x = x.wrapping_mul((key >> 16) | 1);
+    x ^= x.wrapping_mul(0x0552_6c56);
+    x ^= x.wrapping_mul(0x53a2_2864);
+    x
+}
+
+/// Second coordinate of the Sobol sequence, bit-reversed.
+///
+/// The direction numbers of the polynomial x + 1 form Pascal's triangle modulo 2. That is a Kronecker
+/// power of a 2×2 matrix and factors into one step per bit of the bit index.
+pub fn reversed_sobol_1(mut index: u32) -> u32 {
+    index ^= (index >> 1) & 0x5555_5555;
+    index ^= (index >> 2) & 0x3333_3333;
+    index ^= (index >> 4) & 0x0f0f_0f0f;
+    index ^= (index >> 8) & 0x00ff_00ff;
+    index ^= index >> 16;
+    index
+}
+
+/// Keys of one pixel and dimension, for the shuffled index and the two coordinates.
+fn random_keys(pixel: u32, dimension: u32, seed: u32) -> [u32; 4] {
+    hash_4d([pixel, RANDOM_KEY_TAG, dimension, seed])
+}
+
+/// Point `sample_index` of the shuffled, Owen-scrambled Sobol (0,2)-sequence of this pixel and
+/// dimension. Burley 2020.
+pub fn random_2d(pixel: u32, sample_index: u32, dimension: u32, seed: u32) -> [f32; 2] {
+    let keys = random_keys(pixel, dimension, seed);
+    let shuffled = laine_karras_permutation(sample_index.reverse_bits(), keys[0]).reverse_bits();
+    let first = laine_karras_permutation(shuffled, keys[1]).reverse_bits();
+    let second = laine_karras_permutation(reversed_sobol_1(shuffled), keys[2]).reverse_bits();
+    [unit_float(first), unit_float(second)]
+}

@@ -1,0 +1,56 @@
+// Leaves the radiance of finished paths for the pass `accumulate`, and adds what needs no filter to the film.
+#version 460
+
+#include "wave.glsl"
+
+READS(paths)
+WRITES(film_radiance)
+UPDATES(film_unfiltered)
+UPDATES(film_visible)
+UPDATES(counters)
+
+void deposit_pixel(uint pixel, PathIndex index) {
+    // Training rays are counted, but their light stays out of the picture.
+    bool adds = wave.is_training == 0u;
+    uint place = adds ? film_place(index) : 0u;
+    bool wants_unfiltered = adds && (wave.aovs & AOV_UNFILTERED) != 0u;
+    vec3 unfiltered = wants_unfiltered ? film_unfiltered[place] : vec3(0.0);
+    uint bounce_rays = 0u;
+    uint dropped = 0u;
+    uvec2 shadow_rays = uvec2(0u);
+    for (uint i = 0u; i < wave.sample_count; ++i) {
+        PathState state = paths[i * wave.pixel_count + pixel];
+        bounce_rays += state.rays_traced - 1u;
+        shadow_rays += uvec2(state.shadow_rays_visible, state.shadow_rays_traced);
+        vec3 radiance = state.radiance;
+        // One value that is not finite would spoil the pixel for good.
+        if (any(isnan(radiance)) || any(isinf(radiance))) {
+            dropped += 1u;
+            radiance = vec3(0.0);
+        }
+        if (adds) {
+            film_radiance[radiance_place(place, i)] = radiance;
+        }
+        // Add sample by sample: the sum must not depend on how samples are grouped into waves.
+        unfiltered += radiance;
+    }
+    if (wants_unfiltered) {
+        film_unfiltered[place] = unfiltered;
+    }
+    if (adds && (wave.aovs & AOV_VISIBLE) != 0u) {
+        film_visible[place] += shadow_rays;
+    }
+    atomicAdd(counters.camera_rays, wave.sample_count);
+    if (bounce_rays > 0u) {
+        atomicAdd(counters.bounce_rays, bounce_rays);
+    }
+    if (shadow_rays.y > 0u) {
+        atomicAdd(counters.shadow_rays_visible, shadow_rays.x);
+        atomicAdd(counters.shadow_rays_traced, shadow_rays.y);
+    }
+    if (dropped > 0u) {
+        atomicAdd(counters.dropped_samples, dropped);
+    }
+}
+
+RUN_PIXELS(deposit_pixel)
