@@ -37,6 +37,30 @@ pub(crate) fn weights(offset: f32, exists: [bool; 3]) -> [f64; 3] {
     weights.map(|weight| weight / weights.iter().sum::<f64>())
 }
 
+/// Filters a sample of `width` columns of pixels, row by row, which share its `offset`.
+pub(crate) fn filtered(samples: &[[f32; 3]], width: usize, offset: [f32; 2]) -> Vec<[f32; 3]> {
+    let height = samples.len() / width.max(1);
+    let along =
+        |at: usize, end: usize, axis: usize| weights(offset[axis], [at > 0, true, at + 1 < end]);
+    let pixel = |index: usize| {
+        let (row, column) = (index / width, index % width);
+        let (rows, columns) = (along(row, height, 1), along(column, width, 0));
+        let mut value = [0.0; 3];
+        for (beside, weight) in
+            rows.iter().flat_map(|row| columns.map(|column| row * column)).enumerate()
+        {
+            if weight > 0.0 {
+                let sample = samples[index + beside / 3 * width + beside % 3 - width - 1];
+                for channel in 0..3 {
+                    value[channel] += weight as f32 * sample[channel];
+                }
+            }
+        }
+        value
+    };
+    (0..samples.len()).map(pixel).collect()
+}
+
 /// Variance of a pixel over that of its own samples, if those of its neighbours are as noisy and independent.
 /// The variance of a film's mean is too low by this factor if its pixels count as independent.
 pub(crate) fn variance_share(filter: Filter) -> f64 {

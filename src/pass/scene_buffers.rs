@@ -195,6 +195,14 @@ impl SceneBuffers {
         &self.buffers[0]
     }
 
+    /// Filter of the film.
+    pub(crate) fn filter(&self) -> Filter {
+        match self.parameters.film_filter {
+            FILTER_GAUSSIAN => Filter::Gaussian,
+            _ => Filter::Box,
+        }
+    }
+
     /// Specialization of passes by the surfaces of the scene.
     pub fn surfaces(&self) -> Surfaces {
         self.surfaces

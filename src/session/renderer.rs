@@ -28,7 +28,6 @@ pub struct Renderer {
     pub(super) technique: Box<dyn Technique>,
     pub(super) settings: Settings,
     pub(super) film_size: [u32; 2],
-    filter: Filter,
     pub(super) sample_count: u32,
     /// Sweep that was stopped on its way.
     pub(super) ahead: Ahead,
@@ -101,8 +100,8 @@ impl Renderer {
                 result => break result?,
             }
         };
-        let (filter, ahead) = (scene.film.filter, Ahead::default());
-        Ok(Self { runner, technique, settings, film_size, filter, sample_count: 0, ahead })
+        let ahead = Ahead::default();
+        Ok(Self { runner, technique, settings, film_size, sample_count: 0, ahead })
     }
 
     pub(super) fn progress(&self) -> Progress {
@@ -140,7 +139,7 @@ impl Renderer {
             self.runner.take_counters()?;
             if done < pixels && self.runner.film().is_whole() {
                 let blocks = before.blocks + done / BLOCK_PIXELS;
-                let offset = shared_offset(self.filter, wave.first_sample, wave.seed);
+                let offset = shared_offset(self.filter(), wave.first_sample, wave.seed);
                 self.ahead = Ahead { blocks, offset };
             } else if done == pixels {
                 self.sample_count += together;
@@ -223,7 +222,7 @@ impl Renderer {
 
     /// Filter of the film.
     pub(crate) fn filter(&self) -> Filter {
-        self.filter
+        self.runner.scene().filter()
     }
 
     /// Samples of every pixel in the film.

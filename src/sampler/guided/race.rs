@@ -15,6 +15,7 @@ use super::{
 };
 use crate::{
     error::Result,
+    film::reconstruction::{filtered, shared_offset},
     gpu::DescriptorSet,
     pass::{BLOCK_PIXELS, Passes, Progress, Runner, Steps},
     shader::{
@@ -163,16 +164,29 @@ impl Race<'_> {
                 ms[index] +=
                     times.values().sum::<f64>() / f64::from(blocks.count * BLOCK_PIXELS * SAMPLES);
                 let paths: Vec<PathState> = runner.waves().paths().download(paths)?;
-                for pixel in 0..wave.pixel_count as usize {
-                    let of_pixel = || paths[pixel..].iter().step_by(wave.pixel_count as usize);
-                    // Pixels in blocks beyond the edge of the film have no paths.
-                    if of_pixel().all(|path| path.rays_traced > 0) {
-                        let samples: Vec<[f32; 3]> = of_pixel().map(|path| path.radiance).collect();
-                        spread.add(block + pixel / BLOCK_PIXELS as usize, &samples);
-                        of_pixel().for_each(|path| round_work.add(path));
+                let filter = runner.scene().filter();
+                for first in (0..wave.pixel_count as usize).step_by(BLOCK_PIXELS as usize) {
+                    let samples = (0..SAMPLES).zip(paths.chunks(wave.pixel_count as usize));
+                    let films = samples.map(|(sample, paths)| {
+                        let paths = &paths[first..][..BLOCK_PIXELS as usize];
+                        // Pixels in blocks beyond the edge of the film have no paths.
+                        let row = &paths[..FILM_BLOCK as usize];
+                        let width = row.iter().take_while(|path| path.rays_traced > 0).count();
+                        let paths = paths.iter().filter(|path| path.rays_traced > 0);
+                        paths.clone().for_each(|path| round_work.add(path));
+                        let radiance: Vec<[f32; 3]> = paths.map(|path| path.radiance).collect();
+                        match shared_offset(filter, wave.first_sample + sample, wave.seed) {
+                            Some(offset) => filtered(&radiance, width, offset),
+                            None => radiance,
+                        }
+                    });
+                    let films: Vec<Vec<[f32; 3]>> = films.collect();
+                    for pixel in 0..films[0].len() {
+                        let samples: Vec<[f32; 3]> = films.iter().map(|film| film[pixel]).collect();
+                        spread.add(block, &samples);
                     }
+                    block += 1;
                 }
-                block += (wave.pixel_count / BLOCK_PIXELS) as usize;
             }
             work[index] = round_work;
             Ok(contenders[index].time(round_work))
