@@ -140,7 +140,7 @@ fn an_edge_has_the_blur_of_filter_and_lens() {
         let x = x.clamp(-1.0, 1.0);
         0.5 + (x * (1.0 - x * x).sqrt() + x.asin()) / std::f64::consts::PI
     };
-    // Weight of a sample at an offset of the pixel's centre: of all that lie there in their pixels, it is one.
+    // Weights of all samples that lie at one place of their pixels add up to one.
     let gaussian = |offset: f64| (-2.0 * offset * offset).exp();
     let shared = |offset: f64| {
         let [before, after] = [(offset + 0.5).floor(), (offset - 0.5).ceil()];

@@ -9,8 +9,8 @@ layout(scalar, push_constant) uniform WaveConstants {
     Wave wave;
 };
 
-// Dimensions of random_2d and random_1d along a path: DIMENSION_FILTER and DIMENSION_LENS for the camera, then
-// DIMENSIONS_PER_VERTEX each from DIMENSION_VERTEX on.
+// Dimensions of random_2d and random_1d along a path: DIMENSION_FILTER and DIMENSION_LENS for the camera,
+// then DIMENSIONS_PER_VERTEX each from DIMENSION_VERTEX on.
 const uint DIMENSION_LENS = 1u;
 // Offsets from a vertex's first dimension. Directions of resampling candidates take one each.
 const uint DIMENSION_TECHNIQUE = 0u;
@@ -77,8 +77,8 @@ uint film_place(PathIndex index) {
     return index.film_index - wave.film_start;
 }
 
-// Returns where the film keeps the radiance of sample `i` of the wave at a place of the page. A row of the page
-// before comes first, and one of the page after last; the place above the first row wraps to them.
+// Returns where the film keeps the radiance of sample `i` of the wave at a place of the page. A row of the
+// page before comes first, and one of the page after last: places above the first row wrap to it.
 uint radiance_place(uint place, uint i) {
     return (place + parameters.crop_width) * wave.sample_count + i;
 }
