@@ -121,6 +121,7 @@ struct SpecularQuery {
     u: Vec3,
     material: u32,
     is_back: u32,
+    distance: f32,
 }
 
 /// Twin of `SpecularAnswer` in `glsl/test/specular.comp`.
@@ -139,7 +140,8 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
     let query = |index: u32| {
         let material = index % specular().len() as u32;
         let (outgoing_local, u) = (hemisphere(index, 11), uniform(index, 12));
-        SpecularQuery { outgoing_local, u, material, is_back: index / 3 % 2 }
+        let distance = uniform(index, 13).x;
+        SpecularQuery { outgoing_local, u, material, is_back: index / 3 % 2, distance }
     };
     let queries: Vec<SpecularQuery> = (0..20_000).map(query).collect();
     let bytes = support::run_probe(
@@ -159,7 +161,8 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
     for (query, answer) in queries.iter().zip(&answers) {
         let material = &specular()[query.material as usize];
         let is_back = query.is_back == 1;
-        let found = specular::scatter(material, query.outgoing_local, is_back, query.u);
+        let mut found = specular::scatter(material, query.outgoing_local, is_back, query.u);
+        found.weight *= specular::inside_transmittance(material, is_back, query.distance);
         let is_other = found.is_transmitted != (answer.is_transmitted == 1)
             || (found.weight == Vec3::ZERO) != (answer.weight == Vec3::ZERO);
         other_choices += u32::from(is_other);

@@ -404,6 +404,7 @@ fn specular_materials_come_back_as_they_were() {
     for (clay, element) in [
         ("type = \"mirror\"\nreflectance = [0.9, 0.5, 0.25]", "\"conductor\""),
         ("type = \"dielectric\"\nior = 1.25\ntransmittance = [0.5, 1, 1]", "\"dielectric\""),
+        ("type = \"dielectric\"\nabsorption = [3, 0, 0.5]", "\"volpath\""),
         ("type = \"dielectric\"\nalpha = 0.0625\nreflectance = [0.5, 1, 1]", "\"roughdielectric\""),
         ("type = \"thin_dielectric\"\nior = 1.5", "\"thindielectric\""),
     ] {

@@ -401,7 +401,7 @@ fn hopeless_materials_are_refused() {
     let white = Vec3::ONE;
     for kind in [
         MaterialKind::Mirror { reflectance: white },
-        MaterialKind::Dielectric { ior: 1.5, alpha: 0.2, reflectance: white, transmittance: white },
+        MaterialKind::glass(1.5, 0.2),
         MaterialKind::ThinDielectric { ior: 1.5, reflectance: white, transmittance: white },
     ] {
         let error =

@@ -115,7 +115,19 @@ fn assert_channels(
     tolerance: f64,
     expected: impl Fn(f64) -> DVec3,
 ) {
-    let (sums, _) = support::render(scene, settings(Sampler::Mis, 1), samples);
+    assert_channels_at(name, scene, 1, samples, tolerance, expected);
+}
+
+/// The same of paths of up to `depth` vertices.
+fn assert_channels_at(
+    name: &str,
+    scene: &Scene,
+    depth: u32,
+    samples: u32,
+    tolerance: f64,
+    expected: impl Fn(f64) -> DVec3,
+) {
+    let (sums, _) = support::render(scene, settings(Sampler::Mis, depth), samples);
     let pixels = sums.pixel_count();
     let mean =
         (0..pixels).map(|pixel| DVec3::from(sums.mean(pixel))).sum::<DVec3>() / pixels as f64;
@@ -285,12 +297,7 @@ fn an_area_lamp_agrees_with_a_point_far_away() {
 fn mirrors_and_glass_lose_nothing_in_a_furnace() {
     let _alone = support::alone();
     let mirror = MaterialKind::Mirror { reflectance: Vec3::ONE };
-    let solid = MaterialKind::Dielectric {
-        ior: 1.5,
-        alpha: 0.0,
-        reflectance: Vec3::ONE,
-        transmittance: Vec3::ONE,
-    };
+    let solid = MaterialKind::glass(1.5, 0.0);
     for (kind, depth) in [(mirror, 1), (glass(Vec3::ONE), 12), (solid, 24)] {
         let scene = scenes::convex_furnace(Material::new("specular", kind), Vec3::splat(2.0));
         for sampler in [Sampler::Mis, Sampler::Guided] {
@@ -338,9 +345,7 @@ fn panes_reflect_and_pass_their_tints() {
 #[test]
 fn glass_has_its_inside_at_the_back() {
     let _alone = support::alone();
-    let (reflectance, transmittance) = (Vec3::ONE, Vec3::ONE);
-    let kind = MaterialKind::Dielectric { ior: 1.5, alpha: 0.0, reflectance, transmittance };
-    let mut scene = between_sky_and_ground(kind);
+    let mut scene = between_sky_and_ground(MaterialKind::glass(1.5, 0.0));
     let [sky, ground] = [SKY, GROUND].map(|light| light.as_dvec3());
     assert_channels("from outside", &scene, 512, 0.04, |cosine| {
         let reflected = reflectance_of_glass(cosine);
@@ -348,6 +353,30 @@ fn glass_has_its_inside_at_the_back() {
     });
     scene.camera.position.y *= -1.0;
     assert_channels("from inside", &scene, 1, 1e-4, |_| ground);
+}
+
+/// A slab of glass in light that is the same from everywhere: each way through it, at the refracted angle,
+/// keeps exp(−absorption · length), and between its sides light is reflected without end.
+#[test]
+fn slabs_absorb_along_the_way() {
+    let _alone = support::alone();
+    let absorption = Vec3::new(2.0, 0.0, 0.5);
+    let mut glass = MaterialKind::glass(1.5, 0.0);
+    if let MaterialKind::Dielectric { absorption: own, .. } = &mut glass {
+        *own = absorption;
+    }
+    let mut scene = between_sky_and_ground(glass);
+    scene.environment = scenes::environment(16, |_| Vec3::ONE);
+    let thickness = 0.3;
+    add_square(&mut scene.geometry, Vec3::new(0.0, -thickness, 0.0), 5.0, 0);
+    scene.geometry.triangles[2..].iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    let length = |cosine: f64| f64::from(thickness) / (1.0 - (1.0 - cosine * cosine) / 2.25).sqrt();
+    assert_channels_at("slab", &scene, 20, 1024, 0.01, |cosine| {
+        let reflected = reflectance_of_glass(cosine);
+        let kept = (-length(cosine) * absorption.as_dvec3()).exp();
+        let inside = (1.0 - reflected) * kept / (1.0 - reflected * kept);
+        reflected + (1.0 - reflected) * inside
+    });
 }
 
 /// A bent normal would have the mirror reflect what lies below it.

@@ -215,7 +215,7 @@ fn glass_comes_back() {
         VIEW,
         GREY,
         &floor("[0.6, 0.5, 0.3]"),
-        &ball("smooth", -0.8, "type = \"dielectric\"\nior = 1.5"),
+        &ball("smooth", -0.8, "type = \"dielectric\"\nabsorption = [3, 0, 1]"),
         &ball("rough", 0.0, "type = \"dielectric\"\nior = 1.3\nalpha = 0.1"),
         &square("pane", "translate = [0.8, 0.5, 0.3]", pane),
     ]

@@ -92,6 +92,7 @@ bool follow_specular(uint path, PathIndex index, Hit hit, uint number, uint seed
     } else {
         bool is_behind = is_back(hit.triangle, load_hit_instance(path), -outgoing);
         scattered = scatter(material, outgoing_local, is_behind, u);
+        scattered.weight *= inside_transmittance(material, is_behind, hit.distance);
     }
     vec3 direction = to_world(frame, scattered.direction_local);
     bool is_behind = dot(direction, hit.geometric_normal) < 0.0;

@@ -66,6 +66,13 @@ Scatter dielectric_scatter(Material material, vec3 outgoing_local, bool is_back,
     return result;
 }
 
+// Share that is left of light which reaches a surface over `distance`: a viewer at the back of a dielectric
+// is inside. Beer and Lambert's law.
+vec3 inside_transmittance(Material material, bool is_back, float distance) {
+    bool is_inside = is_back && is_kind(material, MATERIAL_DIELECTRIC);
+    return is_inside ? exp(-distance * material.k) : vec3(1.0);
+}
+
 // Pane: reflects as a mirror or lets light straight through.
 Scatter pane_scatter(Material material, vec3 outgoing_local, vec3 u) {
     vec3 reflectance = pane_reflectance(material, outgoing_local.z);

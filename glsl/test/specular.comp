@@ -12,6 +12,7 @@ struct SpecularQuery {
     vec3 u;
     uint material;
     uint is_back;
+    float distance;
 };
 
 struct SpecularAnswer {
@@ -29,7 +30,8 @@ SpecularAnswer answer(SpecularQuery query) {
     SpecularAnswer result;
     result.direction_local = found.direction_local;
     result.is_transmitted = found.is_transmitted ? 1u : 0u;
-    result.weight = found.weight;
+    result.weight =
+        found.weight * inside_transmittance(material, is_back, query.distance);
     result.reflectance = pane_reflectance(material, query.outgoing_local.z);
     result.transmittance = pane_transmittance(material, query.outgoing_local.z);
     return result;

@@ -90,12 +90,13 @@ impl MaterialTables {
                     converted.kind = MATERIAL_MIRROR;
                     converted.reflectance = reflectance.to_array();
                 }
-                MaterialKind::Dielectric { ior, alpha, reflectance, transmittance } => {
+                MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, absorption } => {
                     converted.kind = MATERIAL_DIELECTRIC;
                     converted.alpha = if *alpha > 0.0 { alpha.max(SMALLEST_ALPHA) } else { 0.0 };
                     converted.ior = *ior;
                     converted.reflectance = reflectance.to_array();
                     converted.eta = transmittance.to_array();
+                    converted.k = absorption.to_array();
                 }
                 MaterialKind::ThinDielectric { ior, reflectance, transmittance } => {
                     converted.kind = MATERIAL_THIN_DIELECTRIC;

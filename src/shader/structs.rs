@@ -360,8 +360,8 @@ structs! {
         /// Refractive index of a conductor, factor of light transmitted by a dielectric, or
         /// reflectance of a principled dielectric at normal incidence.
         eta: vec3,
-        /// Extinction coefficient of a conductor, or reflectance of a principled dielectric at
-        /// grazing incidence.
+        /// Extinction coefficient of a conductor, absorption per metre inside a dielectric, or reflectance
+        /// of a principled dielectric at grazing incidence.
         k: vec3,
         /// Zero; pads the last of four texels of four words.
         reserved: vec3,

@@ -126,24 +126,19 @@ pub fn tables() -> &'static MaterialTables {
 /// and below 1.
 pub fn specular_kinds() -> [MaterialKind; 8] {
     let tint = vec3(0.9, 0.6, 0.3);
-    let dielectric = |ior, alpha| MaterialKind::Dielectric {
-        ior,
-        alpha,
-        reflectance: Vec3::ONE,
-        transmittance: Vec3::ONE,
-    };
     [
         MaterialKind::Mirror { reflectance: tint },
-        dielectric(1.5, 0.0),
-        dielectric(1.5, 0.2),
-        dielectric(1.33, 0.5),
-        dielectric(2.4, 0.35),
-        dielectric(0.75, 0.3),
+        MaterialKind::glass(1.5, 0.0),
+        MaterialKind::glass(1.5, 0.2),
+        MaterialKind::glass(1.33, 0.5),
+        MaterialKind::glass(2.4, 0.35),
+        MaterialKind::glass(0.75, 0.3),
         MaterialKind::Dielectric {
             ior: 1.5,
             alpha: 0.3,
             reflectance: 0.5 * tint,
             transmittance: tint,
+            absorption: 2.0 * tint,
         },
         MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance: tint },
     ]

@@ -254,6 +254,7 @@ pub fn glazed_room() -> Scene {
         alpha: 0.0,
         reflectance: Vec3::ONE,
         transmittance: Vec3::splat(0.9),
+        absorption: Vec3::new(2.0, 0.5, 1.0),
     };
     let pane = MaterialKind::ThinDielectric {
         ior: 1.5,

@@ -135,6 +135,13 @@ pub fn dielectric_evaluate_and_pdf(
     }
 }
 
+/// Share that is left of light which reaches a surface over `distance`: a viewer at the back of a dielectric
+/// is inside. Beer and Lambert's law.
+pub fn inside_transmittance(material: &Material, is_back: bool, distance: f32) -> Vec3 {
+    let is_inside = is_back && material.kind == MATERIAL_DIELECTRIC;
+    if is_inside { (-distance * Vec3::from(material.k)).exp() } else { Vec3::ONE }
+}
+
 /// Pane: reflects as a mirror or lets light straight through.
 fn pane_scatter(material: &Material, outgoing_local: Vec3, u: Vec3) -> Scatter {
     let reflectance = pane_reflectance(material, outgoing_local.z);

@@ -44,8 +44,6 @@ features! {
     GLTF_TRANSMISSION_TEXTURE "texture of transmission" "a triangle is glass or opaque by its mean there";
     GLTF_GLASS_COLOR "base colour texture of glass" "its mean tints it";
     GLTF_THIN_ROUGHNESS "roughness of thin glass" "a pane is smooth";
-    GLTF_ABSORPTION "absorption of `KHR_materials_volume`"
-        "the surface is tinted as by a path of `thicknessFactor`";
     GLTF_GLOSSINESS_TEXTURE
         "specular texture of `KHR_materials_pbrSpecularGlossiness` on other coordinates than the diffuse one"
         "its mean colour counts; its glossiness is read";
@@ -103,7 +101,7 @@ features! {
     PBRT_OPTION "`Option`, by name" "";
     PBRT_COLOR_SPACE "`ColorSpace` other than `srgb`" "colours are those of Rec.709";
     PBRT_MOTION "`ActiveTransform`, `TransformTimes`" "nothing moves";
-    PBRT_MEDIUM "`MakeNamedMedium`, `MediumInterface`" "all space is empty";
+    PBRT_MEDIUM "other media" "";
     PBRT_SCREEN_WINDOW "`screenwindow` that is not centred or of another ratio"
         "its height alone counts";
     PBRT_ASPECT "`frameaspectratio` other than that of the film" "pixels are square";
@@ -171,7 +169,7 @@ features! {
     MI_FILTER "other `rfilter`s" "`gaussian` of ½";
     MI_INTEGRATOR "integrators of other pictures than those of paths, by name" "";
     MI_HIDE_EMITTERS "`hide_emitters`" "lights are seen";
-    MI_MEDIUM "`medium`" "";
+    MI_MEDIUM "other uses of `medium`" "";
     MI_ELEMENT "other elements, by name" "";
     MI_PARAMETER "other parameters, by name" "";
 }

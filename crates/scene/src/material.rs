@@ -145,6 +145,12 @@ impl ConductorFresnel {
 }
 
 impl MaterialKind {
+    /// Makes a clear dielectric.
+    pub fn glass(ior: f32, alpha: f32) -> Self {
+        let (reflectance, transmittance) = (Vec3::ONE, Vec3::ONE);
+        Self::Dielectric { ior, alpha, reflectance, transmittance, absorption: Vec3::ZERO }
+    }
+
     /// Name in scene files, number in hashes, and the parameters in groups; the table of a measured one is
     /// not among them.
     pub fn parameters(&self) -> (&'static str, u32, Vec<Vec<f32>>) {
@@ -167,8 +173,8 @@ impl MaterialKind {
                 ("principled", 5, vec![colors(&[base_color, specular_color]), numbers])
             }
             Self::Mirror { reflectance } => ("mirror", 6, vec![colors(&[reflectance])]),
-            Self::Dielectric { ior, alpha, reflectance, transmittance } => {
-                let factors = colors(&[reflectance, transmittance]);
+            Self::Dielectric { ior, alpha, reflectance, transmittance, absorption } => {
+                let factors = colors(&[reflectance, transmittance, absorption]);
                 ("dielectric", 7, vec![vec![*ior, *alpha], factors])
             }
             Self::ThinDielectric { ior, reflectance, transmittance } => {
@@ -202,6 +208,14 @@ impl MaterialKind {
             Self::Dielectric { .. } | Self::ThinDielectric { .. } | Self::Measured { .. } => {}
         }
         kind
+    }
+
+    /// Absorption coefficient of the inside, per metre, of a dielectric that absorbs.
+    pub fn absorption(&self) -> Option<Vec3> {
+        match *self {
+            Self::Dielectric { absorption, .. } if absorption != Vec3::ZERO => Some(absorption),
+            _ => None,
+        }
     }
 
     /// True for dielectrics and thin panes, which let light through.
@@ -279,6 +293,8 @@ pub enum MaterialKind {
         reflectance: Vec3,
         /// Factor of the transmitted light, 0…1.
         transmittance: Vec3,
+        /// Absorption coefficient of the inside, per metre.
+        absorption: Vec3,
     },
     /// Thin pane of a dielectric: reflects as a mirror or lets light straight through, with all
     /// reflections between its two sides.

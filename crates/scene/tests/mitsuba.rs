@@ -662,9 +662,9 @@ fn what_is_not_understood_is_named_once_with_its_line() {
         texts,
         [
             "integrator `depth` (line 6)",
-            "`shiny` of `diffuse` (line 7)",
+            "`shiny` of `diffuse` (2, first in line 7)",
             "`mass` of `cube` (2, first in line 8)",
-            "`medium` (line 10)",
+            "other uses of `medium` (line 10)",
             "`fog` in `scene` (line 11)",
         ]
     );

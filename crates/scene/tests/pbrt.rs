@@ -298,6 +298,23 @@ fn materials_are_the_nearest() {
         panic!()
     };
     assert!((ior - 1.4).abs() < 1e-6 && (alpha - 0.2).abs() < 1e-6);
+    let filled = |medium: &str| {
+        world(&format!(
+            r#"MakeNamedMedium "green" "string type" "homogeneous" "rgb sigma_a" [4 1 2] {medium}
+            AttributeBegin MediumInterface "green" "" Material "dielectric" {TRIANGLE} AttributeEnd
+            Material "dielectric" {TRIANGLE}"#
+        ))
+    };
+    let clear = filled(r#""rgb sigma_s" [0 0 0] "float scale" 0.5"#);
+    let absorption = |index: usize| clear.materials[index].kind.absorption();
+    assert_eq!([absorption(0), absorption(1)], [Some(Vec3::new(2.0, 0.5, 1.0)), None]);
+    assert_eq!(warnings(&clear), [DARK]);
+    for medium in ["", r#""rgb sigma_s" [0 0 0] "string preset" "Milk""#] {
+        let scattering = filled(medium);
+        assert_eq!(scattering.materials[0].kind.absorption(), None);
+        assert!(warnings(&scattering)[0].contains("ignored other media"), "{medium}");
+    }
+    assert!(message(&format!("MediumInterface \"fog\" {TRIANGLE}")).contains("no such medium"));
     assert!(matches!(
         material(r#""thindielectric""#).kind,
         MaterialKind::ThinDielectric { ior: 1.5, .. }
@@ -724,7 +741,7 @@ fn everything_left_out_is_named_once() {
         "ignored Option `seed` (line 1)",
         "ignored ColorSpace `rec2020` (line 2)",
         "ignored `ActiveTransform`, `TransformTimes` (line 7): nothing moves",
-        "ignored `MakeNamedMedium`, `MediumInterface` (2, first in line 8): all space is empty",
+        "ignored other media (3, first in line 8)",
         "ignored sensor `canon_eos_100d` (line 4)",
         "ignored `cropwindow` of the film (line 4)",
         "ignored parameter `halffov` of Camera \"perspective\" (line 5)",

@@ -457,6 +457,7 @@ fn materials_take_textures_opacity_and_emission() {
         ior = 1.33
         roughness = 0.5
         transmittance = [0.5, 0.6, 0.7]
+        absorption = [1, 0, 20]
         [[material]]
         name = \"pane\"
         type = \"thin_dielectric\"
@@ -496,6 +497,7 @@ fn materials_take_textures_opacity_and_emission() {
     assert_eq!(glass.surface.opacity.factor, 0.25);
     assert!(matches!(frosted.kind, MaterialKind::Dielectric { alpha: 0.25, transmittance, .. }
         if transmittance == Vec3::new(0.5, 0.6, 0.7)));
+    assert_eq!(frosted.kind.absorption(), Some(Vec3::new(1.0, 0.0, 20.0)));
     assert!(matches!(pane.kind, MaterialKind::ThinDielectric { ior: 1.5, .. }));
     assert!(matches!(silver.kind, MaterialKind::Mirror { reflectance: Vec3::ONE }));
     let emission = silver.surface.emission.as_ref().unwrap();
@@ -580,6 +582,10 @@ fn what_textures_cannot_do_is_refused_by_name() {
     case(
         "type = \"diffuse\"\nreflectance = { texture = \"text.png\" }",
         "text.png: not a readable image",
+    );
+    case(
+        "type = \"dielectric\"\nabsorption = [0, -1, 0]",
+        "absorption: expected a number from 0 to 1000000, found -1",
     );
     case("type = \"dielectric\"\nior = 1\nalpha = 0.1", "ior: a rough dielectric of index 1");
     case(
@@ -700,6 +706,19 @@ fn an_included_file_is_placed_with_its_materials() {
     case("room.obj", "room.ply", "expected a file in .gltf, .glb, .obj, .pbrt or .xml");
     case("scale = 2", "scale = 0", "include parts/room.obj (line 15): scale must not be 0");
     case("file", "mesh", "unknown field `mesh`, expected one of `file`, `scale`");
+}
+
+/// A file that is included twice as large absorbs half as much per metre, and looks the same.
+#[test]
+fn absorption_of_an_included_file_scales_with_it() {
+    let folder = Folder::new();
+    let glass = r#"<scene version="3.0.0"><sensor type="perspective"/><shape type="sphere"><bsdf type="dielectric"/>
+        <medium name="interior" type="homogeneous"><rgb name="sigma_t" value="2, 0, 1"/>
+        <float name="albedo" value="0"/></medium></shape></scene>"#;
+    folder.write("glass.xml", glass);
+    let include = "[[include]]\nfile = \"glass.xml\"\nscale = 2\n";
+    let scene = folder.load(&format!("{}{include}", with_box(""))).unwrap();
+    assert_eq!(scene.materials[1].kind.absorption(), Some(Vec3::new(1.0, 0.0, 0.5)));
 }
 
 #[test]

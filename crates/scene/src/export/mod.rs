@@ -78,6 +78,11 @@ fn portal_warning(scene: &Scene) -> Option<String> {
     ))
 }
 
+/// Tests for insides that absorb, for which other renderers need an integrator of their own.
+fn has_media(scene: &Scene) -> bool {
+    scene.materials.iter().any(|material| material.kind.absorption().is_some())
+}
+
 /// Three numbers with commas.
 fn triple(vector: Vec3) -> String {
     format!("{}, {}, {}", vector.x, vector.y, vector.z)

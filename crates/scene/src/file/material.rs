@@ -173,6 +173,9 @@ pub(crate) struct DielectricEntry {
     /// Factor of the transmitted light, 0…1.
     #[serde(default = "default_factor")]
     pub transmittance: [f32; 3],
+    /// Absorption coefficient of the inside, per metre, 0…1e6.
+    #[serde(default)]
+    pub absorption: [f32; 3],
 }
 
 /// Keys of a `thin_dielectric` material.

@@ -13,7 +13,7 @@ use crate::{
     import::Imported,
     instance::{Budget, Instance},
     lamp::LampKind,
-    material::Material,
+    material::{Material, MaterialKind},
     mesh::Mesh,
     transform::Transform,
 };
@@ -47,8 +47,13 @@ impl Loader<'_> {
             })?;
         }
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let transform = Transform::new(scale.0, *rotate_deg, *translate);
+        let length_scale = transform.linear.determinant().abs().cbrt();
         let mut places = Vec::with_capacity(own_materials.len());
-        for own in own_materials {
+        for mut own in own_materials {
+            if let MaterialKind::Dielectric { absorption, .. } = &mut own.kind {
+                *absorption /= length_scale;
+            }
             places.push(match replaced.get(&own.name) {
                 Some(name) => self.material_index(&label, name, materials)?,
                 None => {
@@ -61,7 +66,6 @@ impl Loader<'_> {
         let vertices = geometry.positions.len() + placed.positions.len();
         let triangles = geometry.triangles.len() + placed.triangles.len();
         self.check_counts(vertices, triangles)?;
-        let transform = Transform::new(scale.0, *rotate_deg, *translate);
         let first_vertex = geometry.positions.len();
         let count = placed.triangle_count() as usize;
         let Geometry {

@@ -188,8 +188,9 @@ impl Loader<'_> {
                 }
             }
             MaterialKindEntry::Dielectric(entry) => {
-                let (ior, transmittance) = (entry.ior, entry.transmittance);
+                let (ior, absorption) = (entry.ior, entry.absorption);
                 self.check_range(&format!("{label}: ior"), &[ior], (0.2, 5.0))?;
+                self.check_range(&format!("{label}: absorption"), &absorption, (0.0, 1e6))?;
                 let is_smooth = entry.alpha.unwrap_or(0.0) == 0.0 && entry.roughness.is_none();
                 let alpha = if is_smooth {
                     0.0
@@ -206,7 +207,8 @@ impl Loader<'_> {
                     ior,
                     alpha,
                     reflectance: self.share(label, "reflectance", entry.reflectance)?,
-                    transmittance: self.share(label, "transmittance", transmittance)?,
+                    transmittance: self.share(label, "transmittance", entry.transmittance)?,
+                    absorption: Vec3::from_array(absorption),
                 }
             }
             MaterialKindEntry::ThinDielectric(entry) => {

@@ -387,7 +387,8 @@ impl Reader<'_> {
     fn dielectric(&mut self, parameters: &Parameters<'_>, alpha: f32) -> Result<Model> {
         let ior = self.ior(parameters, "bk7")?;
         let [reflectance, transmittance] = self.glass_colors(parameters)?;
-        let kind = MaterialKind::Dielectric { ior, alpha, reflectance, transmittance };
+        let absorption = Vec3::ZERO;
+        let kind = MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, absorption };
         Ok(Model { kind, surface: Surface::default() })
     }
 

@@ -9,6 +9,7 @@ mod daylight;
 mod document;
 mod emitters;
 mod environment;
+mod medium;
 mod mixtures;
 mod parameters;
 mod principled;
@@ -49,7 +50,7 @@ struct Reader<'a> {
     lamps: Vec<Lamp>,
     materials: Vec<Material>,
     /// Material by the elements of its model and of its light.
-    material_numbers: HashMap<[Option<usize>; 2], u32>,
+    material_numbers: HashMap<[Option<usize>; 3], u32>,
     geometry: Geometry,
     /// Shapes of groups by their element.
     shapes: HashMap<usize, Arc<Shape>>,
@@ -100,9 +101,8 @@ pub(crate) fn read(path: &Path, camera: Option<&str>, folder: Folder) -> Result<
             "emitter" | "luminaire" => reader.emitter(node)?,
             "integrator" => reader.integrator(node)?,
             "sampler" => reader.sampler(node)?,
-            "medium" => reader.ignored.add(features::MI_MEDIUM, || node.place()),
-            // Models and textures are read where a shape uses them.
-            "bsdf" | "texture" | "spectrum" | "rgb" => {}
+            // Models, textures and media are read where a shape uses them.
+            "bsdf" | "texture" | "spectrum" | "rgb" | "medium" => {}
             found => {
                 let name = format!("`{found}` in `scene`");
                 reader.ignored.add_named(features::MI_ELEMENT, &name, || node.place());

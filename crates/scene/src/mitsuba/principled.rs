@@ -66,7 +66,9 @@ impl Reader<'_> {
             let (roughness, texture) = roughness.split();
             let alpha = (roughness.x * roughness.x).clamp(MIN_ALPHA, 1.0);
             let reflectance = Vec3::ONE;
-            let kind = MaterialKind::Dielectric { ior, alpha, reflectance, transmittance };
+            let absorption = Vec3::ZERO;
+            let kind =
+                MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, absorption };
             let surface = Surface { roughness: texture, ..Surface::default() };
             return Ok(Model { kind, surface });
         }

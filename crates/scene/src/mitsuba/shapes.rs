@@ -254,9 +254,6 @@ impl Reader<'_> {
         if has_bumps && !shape.mesh.uvs[0].is_empty() {
             shape.mesh.tangents = tangents(&shape.mesh);
         }
-        for medium in parameters.objects("medium")? {
-            self.ignored.add(features::MI_MEDIUM, || medium.place());
-        }
         parameters.finish(&mut self.ignored);
         Ok(shape)
     }
@@ -310,7 +307,8 @@ impl Reader<'_> {
     fn material(&mut self, parameters: &Parameters<'_>) -> Result<u32> {
         let model = parameters.objects("bsdf")?.first().copied();
         let light = parameters.objects("emitter")?.first().copied();
-        let key = [model, light].map(|node| node.map(|node| node.index));
+        let interior = parameters.any("interior")?;
+        let key = [model, light, interior].map(|node| node.map(|node| node.index));
         if let Some(&material) = self.material_numbers.get(&key) {
             return Ok(material);
         }
@@ -322,13 +320,22 @@ impl Reader<'_> {
             Some(node) => node.attribute("id").map_or_else(|| node.place(), str::to_owned),
             None => "default".to_owned(),
         };
-        let mut surface = read.surface;
+        let Model { mut kind, mut surface } = read;
         if let Some(light) = light {
             surface.emission = Some(self.emission(light)?);
             name = format!("{name}, light of {}", light.place());
         }
+        if let Some(medium) = interior {
+            self.fill(&mut kind, medium)?;
+            name = format!("{name}, medium of {}", medium.place());
+        }
+        for medium in parameters.objects("medium")? {
+            if interior.is_none_or(|inside| inside.index != medium.index) {
+                self.ignored.add(features::MI_MEDIUM, || medium.place());
+            }
+        }
         let material = self.materials.len() as u32;
-        self.materials.push(Material { name, kind: read.kind, surface });
+        self.materials.push(Material { name, kind, surface });
         self.material_numbers.insert(key, material);
         Ok(material)
     }

@@ -28,6 +28,8 @@ pub(super) struct Shape {
     pub material: MaterialChoice,
     /// `AreaLightSource`, if the shape emits.
     pub light: Option<Rc<Entity>>,
+    /// Name of the medium inside.
+    pub interior: Option<String>,
 }
 
 /// Use of an object.
@@ -71,6 +73,8 @@ pub(super) struct Description {
     pub spectrum_textures: HashMap<String, Entity>,
     /// `MakeNamedMaterial`.
     pub materials: HashMap<String, Entity>,
+    /// `MakeNamedMedium`.
+    pub media: HashMap<String, Entity>,
     /// Shapes that are no part of an object, in order.
     pub shapes: Vec<Shape>,
     /// Objects in the order in which they are named.
@@ -191,20 +195,25 @@ impl<'a> Reader<'a> {
                 self.entity(name, place)
             }
             "MediumInterface" => {
-                self.text(name)?;
-                if let Some(token) = self.source.next_here()? {
-                    // The outside may be left out.
-                    if token == Token::Word {
-                        self.source.hold(token);
-                    }
+                let inside = self.text(name)?;
+                self.states.now.interior = Some(inside).filter(|name| !name.is_empty());
+                // The outside may be left out, and is then as the inside.
+                let token = self.source.next_here()?;
+                if let Some(token) = token.filter(|token| *token == Token::Word) {
+                    self.source.hold(token);
+                } else if token.is_some() && !self.source.text().is_empty() {
+                    self.ignore(features::PBRT_MEDIUM, features::PBRT_MEDIUM.name, &place);
                 }
-                self.ignore(features::PBRT_MEDIUM, features::PBRT_MEDIUM.name, &place);
                 Ok(())
             }
             "MakeNamedMedium" => {
-                self.text(name)?;
-                read_parameters(&mut self.source)?;
-                self.ignore(features::PBRT_MEDIUM, features::PBRT_MEDIUM.name, &place);
+                let kind = self.text(name)?;
+                let attributes = self.states.now.attributes.clone();
+                let inherited = attributes.of("medium");
+                let directive = "MakeNamedMedium";
+                let entity =
+                    Entity::read(&mut self.source, directive, kind.clone(), place, inherited)?;
+                self.description.media.insert(kind, entity);
                 Ok(())
             }
             _ => Err(place.error(format!(
@@ -419,6 +428,7 @@ impl<'a> Reader<'a> {
                     reverse: now.reverse,
                     material: now.material,
                     light: now.area_light,
+                    interior: now.interior,
                 };
                 match self.object {
                     Some(index) => self.description.objects[index].shapes.push(shape),

@@ -35,7 +35,8 @@ const SOLID_IOR: (f32, f32) = (0.1, 10.0);
 
 /// Materials of a scene.
 pub(super) struct Materials<'a> {
-    description: &'a Description,
+    /// Entities of the file.
+    pub description: &'a Description,
     /// Textures that the materials read.
     pub textures: Textures<'a>,
 }
@@ -124,9 +125,7 @@ impl<'a> Materials<'a> {
                 let roughness = self.roughness(entity, "", log)?;
                 surface.roughness = roughness.texture;
                 let alpha = if roughness.alpha < SMOOTH_ALPHA { 0.0 } else { roughness.alpha };
-                let ior = self.ior(entity, "eta", SOLID_IOR)?;
-                let (reflectance, transmittance) = (Vec3::ONE, Vec3::ONE);
-                MaterialKind::Dielectric { ior, alpha, reflectance, transmittance }
+                MaterialKind::glass(self.ior(entity, "eta", SOLID_IOR)?, alpha)
             }
             "thindielectric" => MaterialKind::ThinDielectric {
                 ior: self.ior(entity, "eta", SOLID_IOR)?,

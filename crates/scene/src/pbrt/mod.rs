@@ -16,6 +16,7 @@ mod directives;
 mod lights;
 mod log;
 mod materials;
+mod medium;
 mod parameters;
 mod shapes;
 mod source;
@@ -160,8 +161,8 @@ fn asked(description: &Description, log: &mut Log) -> Asked {
     asked
 }
 
-/// Tells materials apart: the choice, the alpha of the shape and its light.
-type MaterialKey = (String, String, Option<([u32; 3], bool, String)>);
+/// Tells materials apart: the choice, the alpha of the shape, the medium inside and the light.
+type MaterialKey = (String, String, Option<String>, Option<([u32; 3], bool, String)>);
 
 /// Materials made so far; none for a surface that is not there.
 #[derive(Default)]
@@ -232,11 +233,15 @@ impl Builder<'_> {
             let image = light.image.as_ref().map_or("", |image| &image.texture.name);
             (light.radiance.to_array().map(f32::to_bits), light.two_sided, image.to_owned())
         });
-        let key = (choice, alpha_key, light_key);
+        let key = (choice, alpha_key, shape.interior.clone(), light_key);
         let kept = match self.kept.by_key.get(&key) {
             Some(kept) => *kept,
             None => {
-                let made = self.materials.make(&shape.material, &mut self.log)?;
+                let mut made = self.materials.make(&shape.material, &mut self.log)?;
+                if let Some(medium) = &shape.interior {
+                    let kind = made.as_mut().map(|made| &mut made.kind);
+                    self.materials.fill(kind, medium, &shape.entity.place, &mut self.log)?;
+                }
                 let opacity =
                     self.materials.textures.number(&shape.entity, "alpha", &mut self.log)?;
                 let kept = made.map(|mut material| {

@@ -79,6 +79,8 @@ pub(super) struct State {
     pub material: MaterialChoice,
     /// `AreaLightSource` of the shapes.
     pub area_light: Option<Rc<Entity>>,
+    /// Name of the medium inside shapes, from `MediumInterface`.
+    pub interior: Option<String>,
     /// Parameters from `Attribute`.
     pub attributes: Attributes,
 }
@@ -90,6 +92,7 @@ impl Default for State {
             reverse: false,
             material: MaterialChoice::Default,
             area_light: None,
+            interior: None,
             attributes: Attributes::default(),
         }
     }

@@ -139,10 +139,16 @@ impl<'a> Translator<'a> {
                 }
                 metal(*reflectance, 0.0)
             }
-            MaterialKind::Dielectric { ior, alpha, reflectance, transmittance } => {
+            MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, absorption } => {
                 let core = self.glass(*ior, alpha.sqrt(), *reflectance, *transmittance);
                 // A thickness makes the surface the boundary of a solid.
-                self.extension("KHR_materials_volume", json!({"thicknessFactor": 1.0}));
+                let mut volume = json!({"thicknessFactor": 1.0});
+                let strongest = absorption.max_element();
+                if strongest > 0.0 {
+                    volume["attenuationDistance"] = json!(strongest.recip());
+                    volume["attenuationColor"] = json!((-absorption / strongest).exp().to_array());
+                }
+                self.extension("KHR_materials_volume", volume);
                 core
             }
             MaterialKind::ThinDielectric { ior, reflectance, transmittance } => {

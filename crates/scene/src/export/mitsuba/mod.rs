@@ -20,10 +20,11 @@ mod models;
 
 use std::{fmt::Write, path::Path};
 
-use self::models::{Model, Translator, indented};
+use self::models::{Model, Translator, indented, interior};
 use super::{
     Export, Settings,
     folder::{Folder, identifier},
+    has_media,
     images::Pictures,
     parts::{self, Parts},
     ply::{Attributes, SAME_UV},
@@ -54,10 +55,11 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
     Export::new(warnings, move || {
         let mut xml = format!(
             "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<!-- Written by Fenestra {}. -->\n\
-             <scene version=\"3.0.0\">\n    <integrator type=\"path\">\n        \
+             <scene version=\"3.0.0\">\n    <integrator type=\"{}\">\n        \
              <integer name=\"max_depth\" value=\"{}\"/>\n        \
              <boolean name=\"hide_emitters\" value=\"false\"/>\n    </integrator>\n",
             env!("CARGO_PKG_VERSION"),
+            if has_media(scene) { "volpath" } else { "path" },
             // Mitsuba counts the edges of a path, the one to the light included.
             u64::from(settings.depth) + 1
         );
@@ -89,12 +91,13 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
                     let file = folder.write_mesh(&name, &part, attributes)?;
                     let emitter = model.emitter.as_deref().unwrap_or_default();
                     let emitter = indented(&indented(emitter));
+                    let medium = indented(&indented(&interior(&scene.materials[index].kind)));
                     _ = write!(
                         xml,
                         "    <shape type=\"ply\">\n        \
                          <string name=\"filename\" value=\"{file}\"/>\n        \
                          <boolean name=\"face_normals\" value=\"{is_flat}\"/>\n        \
-                         <ref id=\"{id}\"/>\n{emitter}    </shape>\n"
+                         <ref id=\"{id}\"/>\n{emitter}{medium}    </shape>\n"
                     );
                 }
             }

@@ -151,7 +151,7 @@ impl Translator<'_> {
                     + &self.color("specular_reflectance", *reflectance);
                 element("conductor", &content)
             }
-            MaterialKind::Dielectric { ior, alpha, reflectance, transmittance } => {
+            MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, .. } => {
                 self.subject.without_color("dielectric");
                 let glass = glass(*ior, *reflectance, *transmittance);
                 if *alpha > 0.0 {
@@ -338,6 +338,13 @@ fn around(kind: &str, content: &str, bsdf: &str) -> String {
 
 fn float(name: &str, value: f32) -> String {
     format!("    <float name=\"{name}\" value=\"{value}\"/>\n")
+}
+
+/// Medium inside a dielectric that absorbs.
+pub(super) fn interior(kind: &MaterialKind) -> String {
+    let Some(absorption) = kind.absorption() else { return String::new() };
+    let content = rgb("sigma_t", absorption) + &float("albedo", 0.0);
+    format!("<medium name=\"interior\" type=\"homogeneous\">\n{content}</medium>\n")
 }
 
 fn rgb(name: &str, value: Vec3) -> String {

@@ -137,7 +137,7 @@ impl<'a> Translator<'a> {
                 self.coated(*base_color, roughness * roughness, ior, "its dielectric")
             }
             MaterialKind::Mirror { reflectance } => self.metal(*reflectance, 0.0),
-            MaterialKind::Dielectric { ior, alpha, reflectance, transmittance } => {
+            MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, .. } => {
                 self.colored_glass(*reflectance, *transmittance);
                 ("dielectric", float("eta", *ior) + &self.roughness(*alpha))
             }
@@ -315,6 +315,6 @@ fn float(name: &str, value: f32) -> String {
     format!(" \"float {name}\" {value}")
 }
 
-fn rgb(name: &str, value: Vec3) -> String {
+pub(super) fn rgb(name: &str, value: Vec3) -> String {
     format!(" \"rgb {name}\" [{}]", triple(value))
 }

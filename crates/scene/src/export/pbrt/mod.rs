@@ -18,10 +18,11 @@ use std::{fmt::Write, path::Path};
 
 use glam::Vec3;
 
-use self::materials::{Model, Translator};
+use self::materials::{Model, Translator, rgb};
 use super::{
     Export, Settings,
     folder::{Folder, identifier},
+    has_media,
     images::Pictures,
     parts,
     ply::Attributes,
@@ -66,6 +67,14 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
             let id = identifier(index, &scene.materials[index].name);
             text += &model.text;
             _ = write!(text, "AttributeBegin\nNamedMaterial \"{id}\"\n{}", model.light);
+            if let Some(absorption) = scene.materials[index].kind.absorption() {
+                let sigmas = rgb("sigma_a", absorption) + &rgb("sigma_s", Vec3::ZERO);
+                _ = writeln!(
+                    text,
+                    "MakeNamedMedium \"{id}\" \"string type\" \"homogeneous\"{sigmas}\n\
+                     MediumInterface \"{id}\" \"\""
+                );
+            }
             for (part, is_flat) in parts.each() {
                 let name = format!("{id}{}.ply", if is_flat { "_flat" } else { "" });
                 let attributes = Attributes {
@@ -109,7 +118,7 @@ fn view(scene: &Scene, settings: Settings, name: &str) -> String {
         "\nFilm \"rgb\" \"integer xresolution\" {} \"integer yresolution\" {}\n    \
          \"string sensor\" \"cie1931\" \"string filename\" \"{}.exr\"\nPixelFilter {}\n\
          Sampler \"independent\" \"integer pixelsamples\" {}\n\
-         Integrator \"path\" \"integer maxdepth\" {}\n",
+         Integrator \"{}\" \"integer maxdepth\" {}\n",
         film.width,
         film.height,
         name,
@@ -120,6 +129,7 @@ fn view(scene: &Scene, settings: Settings, name: &str) -> String {
             }
         },
         settings.samples,
+        if has_media(scene) { "volpath" } else { "path" },
         settings.depth,
     )
 }

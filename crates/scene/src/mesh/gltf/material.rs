@@ -376,15 +376,14 @@ impl GltfReader<'_> {
         found.kind = if thickness > 0.0 {
             let attenuation = color(volume, "attenuationColor", [1.0; 3]);
             let distance = number(volume, "attenuationDistance", f32::INFINITY);
-            let absorbs = distance.is_finite() && attenuation != Vec3::ONE;
-            reading.ignore_if(absorbs, features::GLTF_ABSORPTION);
-            // Light that crosses the solid passes two interfaces, each with the root of the loss.
-            let length = if absorbs { thickness / distance.max(f32::MIN_POSITIVE) } else { 0.0 };
+            // A colour of 0 would absorb without bound.
+            let attenuation = attenuation.max(Vec3::splat(f32::MIN_POSITIVE));
             MaterialKind::Dielectric {
                 ior,
                 alpha: roughness * roughness,
                 reflectance,
-                transmittance: tint * attenuation.powf(0.5 * length),
+                transmittance: tint,
+                absorption: (-attenuation.ln() / distance.max(1e-6)).max(Vec3::ZERO),
             }
         } else {
             let rough = roughness * mean_number(&found.surface.roughness);
