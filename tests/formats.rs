@@ -110,6 +110,38 @@ fn compressed_meshes_are_refused_by_name() {
 }
 
 #[test]
+fn a_variant_chooses_the_materials_of_primitives() {
+    let materials = r#"{"name": "beech"}, {"name": "oak"}"#;
+    let mappings = r#", "material": 0, "extensions": {"KHR_materials_variants": {"mappings": [
+        {"material": 0, "variants": [0]}, {"material": 1, "variants": [2, 1]}]}}"#;
+    let rest = r#", "extensions": {"KHR_materials_variants": {"variants": [
+        {"name": "light"}, {"name": "dark"}, {"name": "winter"}]}}"#;
+    let folder = Folder::new();
+    let path = folder.write("chair.gltf", gltf(r#"{"mesh": 0}"#, materials, mappings, rest));
+    let with = |name: &str| {
+        Scene::load_with(&path, &LoadOptions { variant: Some(name.into()), ..Default::default() })
+    };
+    let scene = Scene::load(&path).unwrap();
+    assert_eq!(scene.variants, ["light", "dark", "winter"]);
+    assert!(
+        warnings(&scene).iter().any(|text| text.starts_with("ignored `KHR_materials_variants`"))
+    );
+    for (name, material) in [("light", "beech"), ("dark", "oak"), ("winter", "oak")] {
+        let scene = with(name).unwrap();
+        assert_eq!(scene.materials[0].name, material, "{name}");
+        assert!(!warnings(&scene).iter().any(|text| text.contains("variants")), "{scene:?}");
+    }
+    let message = with("red").unwrap_err().to_string();
+    assert!(
+        message.contains("there is no such variant, the file has light, dark, winter"),
+        "{message}"
+    );
+    let options = LoadOptions { variant: Some("light".into()), ..Default::default() };
+    let message = Scene::load_with(&folder.write("a.obj", ""), &options).unwrap_err().to_string();
+    assert!(message.contains("--variant light: the option is for glTF files"), "{message}");
+}
+
+#[test]
 fn cameras_stand_at_their_nodes() {
     let nodes = r#"{"mesh": 0, "translation": [0, 0, 5], "children": [1, 2, 3]}, {"camera": 0},
         {"name": "side", "camera": 1, "rotation": [0, 0.70710678, 0, 0.70710678]}, {"camera": 2}"#;

@@ -112,6 +112,9 @@ fn scene(path: &Path) -> Result<Description> {
         format!("environment  {} ({}x{} texels)", map.source, map.width, map.height),
         format!("hash         {}", scene.hash),
     ];
+    if !scene.variants.is_empty() {
+        lines.push(format!("variants     {}", scene.variants.join(", ")));
+    }
     let mut materials = Vec::new();
     for (material, count) in scene.materials.iter().zip(&triangle_counts) {
         let (kind, ..) = material.kind.parameters();
@@ -127,6 +130,7 @@ fn scene(path: &Path) -> Result<Description> {
         "instances": scene.geometry.instances.len(),
         "environment": { "source": map.source, "width": map.width, "height": map.height },
         "materials": materials,
+        "variants": scene.variants,
         "hash": scene.hash,
     });
     Ok(Description { value, lines, warnings: scene.warnings })

@@ -65,6 +65,9 @@ pub struct SceneOptions {
     /// Camera of a glTF or Mitsuba file, by name or number from 0. Default: the first with perspective.
     #[arg(long, value_name = "NAME|N", help_heading = CAMERA, hide_short_help = true)]
     camera: Option<String>,
+    /// Variant of the materials of a glTF file, by name; `info` lists them.
+    #[arg(long, value_name = "NAME", help_heading = SCENE, hide_short_help = true)]
+    variant: Option<String>,
     /// Place of the camera, instead of the scene's; it keeps its direction without --look-at.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
     #[arg(help_heading = CAMERA, hide_short_help = true)]
@@ -106,6 +109,7 @@ impl SceneOptions {
                 environment: self.environment.clone(),
                 rotation_deg: self.rotate_environment,
                 camera: self.camera.clone(),
+                variant: self.variant.clone(),
                 look_from: self.look_from,
                 look_at: self.look_at,
                 vertical_fov_deg: self.fov,

@@ -63,6 +63,7 @@ fn scene(
         materials,
         geometry,
         inputs: Vec::new(),
+        variants: Vec::new(),
         asked: Default::default(),
         warnings: Vec::new(),
         hash: name.into(),

@@ -52,7 +52,7 @@ features! {
     GLTF_IRIDESCENCE "`KHR_materials_iridescence`" "reflections without the colours of thin films";
     GLTF_ANISOTROPY "`KHR_materials_anisotropy`" "highlights are round";
     GLTF_DISPERSION "`KHR_materials_dispersion`" "glass does not part colours";
-    GLTF_VARIANTS "`KHR_materials_variants`" "the materials without a choice";
+    GLTF_VARIANTS "`KHR_materials_variants`" "without `--variant NAME`";
     GLTF_BASISU "`KHR_texture_basisu`" "the other image of the texture is used; refused if there is none";
     GLTF_EXTENSION "other extensions, by name" "refused where the file requires them";
 }

@@ -123,6 +123,8 @@ pub struct Scene {
     pub geometry: Geometry,
     /// Files that the scene was read from; empty for a scene made in memory.
     pub inputs: Vec<PathBuf>,
+    /// Names of variants of the materials, one of which [`LoadOptions::variant`] may choose.
+    pub variants: Vec<String>,
     /// Settings of the render that the file asks for.
     pub asked: Asked,
     /// Warnings from loading, repairs among them, for the log.

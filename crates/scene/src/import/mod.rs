@@ -33,6 +33,8 @@ pub(crate) struct Imported {
     pub materials: Vec<Material>,
     /// All triangles.
     pub geometry: Geometry,
+    /// Names of variants of the materials.
+    pub variants: Vec<String>,
     /// Files that were read, the file itself first.
     pub inputs: Vec<PathBuf>,
     /// Repairs, and one warning for each kind of thing that is left out.

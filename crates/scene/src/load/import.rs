@@ -34,8 +34,8 @@ impl Loader<'_> {
     /// Makes a scene of an imported file. The map of `--environment` replaces its own; a format without
     /// one is lit by white.
     pub(super) fn imported(&self, imported: Imported, options: &LoadOptions) -> Result<Scene> {
-        let Imported { film, asked, lamps, materials, geometry, mut inputs, mut warnings, .. } =
-            imported;
+        let Imported { film, asked, lamps, materials, geometry, variants, .. } = imported;
+        let (mut inputs, mut warnings) = (imported.inputs, imported.warnings);
         let camera = self.camera(&viewed(&imported.camera, options))?;
         self.check_film(&film)?;
         let mut environment = match (&options.environment, imported.environment) {
@@ -59,6 +59,7 @@ impl Loader<'_> {
         let mut scene = self.scene(camera, film, light, materials, geometry, warnings);
         scene.inputs = inputs;
         scene.asked = asked;
+        scene.variants = variants;
         Ok(scene)
     }
 }

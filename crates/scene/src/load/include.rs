@@ -177,7 +177,7 @@ impl Loader<'_> {
             let Imported { materials, geometry, lamps, .. } = imported;
             return Ok(Contents { materials, geometry, lamps });
         }
-        let mut mesh = Mesh::read_at(path, self.time, Some(Budget::default()), warnings)?;
+        let mut mesh = Mesh::read_at(path, self.time, None, Some(Budget::default()), warnings)?;
         inputs.push(path.to_path_buf());
         inputs.extend_from_slice(&mesh.side_files);
         let mut ignored = mesh.ignored_in_materials();

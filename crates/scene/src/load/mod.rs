@@ -44,6 +44,8 @@ pub struct LoadOptions {
     pub rotation_deg: Option<f32>,
     /// Name of the camera in a glTF file, or its number from 0.
     pub camera: Option<String>,
+    /// Name of a variant of a glTF file's materials.
+    pub variant: Option<String>,
     /// Place of the camera, the point that it looks at, and its vertical field of view in degrees, instead
     /// of the scene's.
     pub look_from: Option<[f32; 3]>,
@@ -75,6 +77,10 @@ impl Scene {
     /// As [`Scene::load`], and for a camera that the file does not have.
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self> {
         let loader = Loader::new(path, options);
+        if let Some(name) = &options.variant {
+            let is_gltf = matches!(files::extension(path).as_str(), "gltf" | "glb");
+            loader.check(is_gltf, || format!("--variant {name}: the option is for glTF files"))?;
+        }
         if let Some(imported) = loader.import(options.camera.as_deref())? {
             return loader.imported(imported, options);
         }
@@ -175,6 +181,8 @@ struct Loader<'a> {
     allowed: Option<&'a Path>,
     /// Time at which an animation is seen, seconds.
     time: Option<f32>,
+    /// Variant of the materials of a glTF file that is a whole scene.
+    variant: Option<&'a str>,
     /// Parts of the scene that are in no file.
     arrays: &'a Arrays,
 }
@@ -183,7 +191,7 @@ impl<'a> Loader<'a> {
     fn new(path: &'a Path, options: &'a LoadOptions) -> Self {
         let folder = path.parent().unwrap_or(Path::new(""));
         let (allowed, time) = (options.allow_root.as_deref(), options.time);
-        Self { path, folder, allowed, time, arrays: &NONE }
+        Self { path, folder, allowed, time, variant: options.variant.as_deref(), arrays: &NONE }
     }
 
     /// Loader of another file of the same scene.
@@ -218,6 +226,7 @@ impl<'a> Loader<'a> {
             materials,
             geometry,
             inputs: vec![self.path.to_path_buf()],
+            variants: Vec::new(),
             asked: Asked::default(),
             warnings,
             hash: String::new(),

@@ -88,7 +88,7 @@ impl Loader<'_> {
                         mesh
                     }
                     ObjectSource::Mesh(_) => {
-                        let mut mesh = Mesh::read_at(&key, self.time, None, warnings)?;
+                        let mut mesh = Mesh::read_at(&key, self.time, None, None, warnings)?;
                         inputs.push(key.clone());
                         inputs.extend_from_slice(&mesh.side_files);
                         let mut ignored = ignored_in_object(&mesh, own_materials.contains(&key));

@@ -48,6 +48,8 @@ pub struct Mesh {
     pub cameras: Vec<MeshCamera>,
     /// Lamps of the file.
     pub lamps: Vec<Lamp>,
+    /// Names among which `KHR_materials_variants` of a glTF file chooses the materials.
+    pub variants: Vec<String>,
     /// Meshes that the file repeats so often that they are not copied; none by [`Mesh::read`].
     pub repeated: Vec<RepeatedMesh>,
     /// Files beside the mesh file that were read for it: material libraries, buffers, images.
@@ -119,21 +121,22 @@ impl Mesh {
     /// [`Error::Io`] if the file cannot be read, [`Error::Format`] or [`Error::Parse`] if its
     /// content is invalid: unknown format, truncation, an index out of range.
     pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
-        Self::read_at(path, None, None, warnings)
+        Self::read_at(path, None, None, None, warnings)
     }
 
-    /// As [`Mesh::read`], with the animations of a glTF file at `time` seconds, and with a budget, what it
-    /// repeats in [`Mesh::repeated`].
+    /// As [`Mesh::read`], with the animations of a glTF file at `time` seconds, the materials of a
+    /// `variant`, and with a budget, what it repeats in [`Mesh::repeated`].
     pub(crate) fn read_at(
         path: &Path,
         time: Option<f32>,
+        variant: Option<&str>,
         budget: Option<Budget>,
         warnings: &mut Vec<String>,
     ) -> Result<Self> {
         match files::extension(path).as_str() {
             "ply" => ply::read(path),
             "obj" => obj::read(path, warnings),
-            "gltf" | "glb" => gltf::read(path, time, budget, warnings),
+            "gltf" | "glb" => gltf::read(path, time, variant, budget, warnings),
             found => {
                 let found =
                     if found.is_empty() { "no extension".into() } else { format!(".{found}") };

@@ -134,6 +134,7 @@ pub(crate) fn read(path: &Path, camera: Option<&str>, folder: Folder) -> Result<
         lamps: reader.lamps,
         materials: reader.materials,
         geometry: reader.geometry,
+        variants: Vec::new(),
         inputs,
         warnings,
     })

@@ -134,6 +134,7 @@ pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
         lamps: lights.lamps,
         materials,
         geometry,
+        variants: Vec::new(),
         inputs: log.inputs,
         warnings,
     })

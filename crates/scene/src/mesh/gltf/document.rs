@@ -10,6 +10,7 @@ use gltf::{
 };
 use serde_json::Value;
 
+use super::variants;
 use crate::{
     beside::Folder,
     error::{Error, Result},
@@ -21,8 +22,12 @@ pub(super) const CONVERSION: &str =
     "`npx @gltf-transform/cli copy IN.glb OUT.glb` writes a file without the compression";
 
 /// Parses and checks a document; returns it with its binary chunk and its JSON as a tree, which
-/// holds the extensions.
-pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>, Value)> {
+/// holds the extensions. With the name of a variant, primitives have its materials.
+pub(super) fn parse(
+    path: &Path,
+    bytes: &[u8],
+    variant: Option<&str>,
+) -> Result<(Document, Option<Vec<u8>>, Value)> {
     let not_gltf =
         |error: gltf::Error| Error::format(path, format!("not a glTF document: {error}"));
     let not_json = |error: serde_json::Error| {
@@ -32,7 +37,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<(Document, Option<Vec<u
     let glb = bytes.starts_with(b"glTF").then(|| Glb::from_slice(bytes).map_err(not_gltf));
     let glb = glb.transpose()?;
     let text = glb.as_ref().map_or(bytes, |glb| &glb.json);
-    let json: Value = serde_json::from_slice(text).map_err(not_json)?;
+    let mut json: Value = serde_json::from_slice(text).map_err(not_json)?;
     if let Some(version) = json["asset"]["version"].as_str()
         && version.split('.').next() != Some("2")
     {
@@ -69,6 +74,10 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<(Document, Option<Vec<u
         primitive.attributes.retain(|name, _| matches!(name, Checked::Valid(_)));
     }
     check_positions(path, &root)?;
+    if let Some(name) = variant {
+        variants::choose(name, &mut json, &mut root)
+            .map_err(|message| Error::format(path, message))?;
+    }
     let document = Document::from_json(root).map_err(not_gltf)?;
     Ok((document, glb.and_then(|glb| glb.bin).map(|bin| bin.into_owned()), json))
 }

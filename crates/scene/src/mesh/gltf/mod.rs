@@ -14,6 +14,7 @@ mod material;
 mod primitive;
 mod skin;
 mod textures;
+mod variants;
 
 use std::{collections::HashMap, path::Path, sync::Arc};
 
@@ -36,7 +37,7 @@ const GLB_HEADER_BYTES: usize = 12;
 
 /// Reads a glTF file with its buffers and images; `warnings` counts the parts that are left out. With a
 /// budget, meshes whose copies exceed it are not copied; with a time, in seconds, nodes stand where the
-/// animations move them.
+/// animations move them; with the name of a variant, primitives have its materials.
 ///
 /// # Errors
 /// [`Error::Io`] for a file that cannot be read, [`Error::Parse`] for bad JSON, [`Error::Format`]
@@ -44,6 +45,7 @@ const GLB_HEADER_BYTES: usize = 12;
 pub fn read(
     path: &Path,
     time: Option<f32>,
+    variant: Option<&str>,
     budget: Option<Budget>,
     warnings: &mut Vec<String>,
 ) -> Result<Mesh> {
@@ -63,7 +65,7 @@ pub fn read(
             return Err(Error::format(path, message));
         }
     }
-    let (document, blob, json) = document::parse(path, &bytes)?;
+    let (document, blob, json) = document::parse(path, &bytes, variant)?;
     drop(bytes);
     let mut reader = GltfReader {
         path,
@@ -86,6 +88,7 @@ pub fn read(
         Source::Uri(uri) if !uri.starts_with("data:") => document::beside(path, uri).ok(),
         _ => None,
     });
+    reader.mesh.variants = variants::names(&json);
     reader.mesh.side_files = buffer_files.collect();
     reader.read_scene(time)?;
     let mut mesh = reader.mesh;
