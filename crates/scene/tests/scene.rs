@@ -712,7 +712,8 @@ fn an_included_file_is_placed_with_its_materials() {
 #[test]
 fn absorption_of_an_included_file_scales_with_it() {
     let folder = Folder::new();
-    let glass = r#"<scene version="3.0.0"><sensor type="perspective"/><shape type="sphere"><bsdf type="dielectric"/>
+    let glass = r#"<scene version="3.0.0"><sensor type="perspective"/>
+        <shape type="sphere"><bsdf type="dielectric"/>
         <medium name="interior" type="homogeneous"><rgb name="sigma_t" value="2, 0, 1"/>
         <float name="albedo" value="0"/></medium></shape></scene>"#;
     folder.write("glass.xml", glass);
