@@ -6,22 +6,41 @@ use crate::scene::Camera;
 
 /// Least angle between the view and the vertical, radians: there, left and right would swap.
 const POLE: f32 = 0.03;
-/// Share of the first distance to the centre of the picture that flying covers in a second.
-const PACE: f32 = 0.35;
+/// Share of the reach that flying covers in a second.
+const PACE: f32 = 0.6;
+/// Share of the points in the picture that are nearer than the reach.
+const NEAR_SHARE: f32 = 0.1;
+/// Least reach, as a share of the first: in front of a wall the camera still moves.
+const LEAST_REACH: f32 = 0.02;
 
 /// The camera, where it started, and how fast it flies.
 #[derive(Clone, Debug)]
 pub(crate) struct Rig {
     home: Camera,
     camera: Camera,
-    metres_per_second: f32,
+    /// Distance to the nearest things in the picture, metres; at first that to its centre.
+    reach: f32,
+    least_reach: f32,
 }
 
 impl Rig {
     /// Starts at the camera of the scene.
     pub(crate) fn new(camera: Camera) -> Self {
         let distance = (camera.look_at - camera.position).length();
-        Self { home: camera, camera, metres_per_second: PACE * distance.max(1e-3) }
+        let reach = distance.max(1e-3);
+        Self { home: camera, camera, reach, least_reach: LEAST_REACH * reach }
+    }
+
+    /// Adapts the speed to the points that a picture shows, metres: near things are approached slowly, and
+    /// a large scene is crossed as fast as a small one. A picture without any leaves it.
+    pub(crate) fn adapt(&mut self, points: impl Iterator<Item = Vec3>) {
+        let mut distances: Vec<f32> =
+            points.map(|point| point.distance(self.camera.position)).collect();
+        let near = (NEAR_SHARE * distances.len() as f32) as usize;
+        if near < distances.len() {
+            let (_, reach, _) = distances.select_nth_unstable_by(near, f32::total_cmp);
+            self.reach = reach.max(self.least_reach);
+        }
     }
 
     /// The camera now.
@@ -74,7 +93,7 @@ impl Rig {
     pub(crate) fn fly(&mut self, direction: Vec3, seconds: f32) {
         let [right, up, forward] = self.axes();
         let way = direction.x * right + direction.y * up + direction.z * forward;
-        self.shift(way * (seconds * self.metres_per_second));
+        self.shift(way * (seconds * PACE * self.reach));
     }
 
     fn shift(&mut self, way: Vec3) {
@@ -132,6 +151,26 @@ mod tests {
         assert_near(moved.camera().position, [0.0, 1.0, 4.0 - 4.0 * PACE]);
         moved.go_home();
         assert_eq!(moved.camera(), rig().camera());
+    }
+
+    #[test]
+    fn flying_does_not_leave_a_room() {
+        // Walls of a room of four metres, seen through a camera whose centre lies far beyond.
+        let mut moved = rig();
+        moved.camera.look_at.z = -100.0;
+        let wall = || (0..100).map(|i| Vec3::new(0.02 * i as f32 - 1.0, 1.0, 0.0));
+        for _ in 0..100 {
+            moved.adapt(wall());
+            moved.fly(Vec3::Z, 0.02);
+        }
+        let left = moved.camera().position.z;
+        assert!((0.5..2.5).contains(&left), "{left} m before the wall after two seconds");
+        // A scene a thousand times as large is crossed in the same time, and no point changes nothing.
+        let mut far = rig();
+        far.adapt([Vec3::new(0.0, 1.0, -3996.0)].into_iter());
+        far.adapt(std::iter::empty());
+        far.fly(Vec3::Z, 1.0);
+        assert_near(far.camera().position / 1000.0, [0.0, 0.001, 0.004 - 4.0 * PACE]);
     }
 
     #[test]

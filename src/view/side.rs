@@ -2,6 +2,8 @@
 
 use std::{sync::Arc, time::Duration};
 
+use glam::Vec3;
+
 use super::keys::LAYERS;
 use crate::{
     error::Result,
@@ -37,6 +39,7 @@ impl Side {
         let mut aovs: Vec<Aov> = LAYERS.iter().filter_map(|(.., layer)| *layer).collect();
         aovs.retain(|layer| sampler.has_layer(*layer));
         aovs.dedup();
+        aovs.push(Aov::Position);
         let settings = Settings { aovs, ..settings.clone() };
         let renderer = match buffers {
             Some(buffers) => Renderer::with_scene_buffers(device, buffers, scene, settings)?,
@@ -56,6 +59,16 @@ impl Side {
             *known == layer && of_film.is_none_or(|of_film| self.sampler.has_layer(of_film))
         });
         if is_known { layer } else { SHOW_PICTURE }
+    }
+
+    /// Means of the points that its pixels have met, metres, row by row; `None` for a pixel that met none.
+    /// Fails if the device does.
+    pub(crate) fn points(&self) -> Result<Vec<Option<Vec3>>> {
+        let sums = self.session.renderer.sums()?;
+        let mean = |(pixel, sum): (usize, &[f32; 3])| {
+            (*sum != [0.0; 3]).then(|| Vec3::from(*sum) / sums.samples(pixel).max(1) as f32)
+        };
+        Ok(sums.position.iter().enumerate().map(mean).collect())
     }
 
     /// Samples per pixel in the film.

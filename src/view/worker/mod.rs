@@ -43,6 +43,8 @@ const LEARNING_INTERVAL: Duration = Duration::from_millis(500);
 const LEARNING_TIME: Duration = Duration::from_millis(30);
 /// Longest time that one step of flying covers: after a pause the camera must not jump.
 const LONGEST_STEP: f32 = 0.1;
+/// Interval between looks at how near the things before a moving camera are.
+const ADAPT_INTERVAL: Duration = Duration::from_millis(100);
 /// Interval between insets, and between means of the film for its relative error.
 const LOOK_INTERVAL: Duration = Duration::from_millis(400);
 /// Tells the seeds of moved cameras from other hashes.
@@ -81,6 +83,7 @@ pub(crate) struct Worker {
     /// Number of cameras so far, for the seeds.
     looks: u32,
     learned_at: Instant,
+    adapted_at: Instant,
     /// Time that the last rebuild took; none is tried in motion before one at rest.
     learning_time: Option<Duration>,
     shows_inset: bool,
@@ -134,6 +137,7 @@ impl Worker {
             shrinking: if is_software { 8.0 } else { 2.0 },
             looks: 0,
             learned_at: Instant::now(),
+            adapted_at: Instant::now(),
             learning_time: None,
             shows_inset: false,
             saves_at_rest: false,
@@ -250,6 +254,10 @@ impl Worker {
         let took = before.elapsed().as_secs_f32();
         let wanted = (took / MOVING_TIME.as_secs_f32()).sqrt().clamp(0.7, 2.0);
         self.shrinking = (self.shrinking * wanted).clamp(1.0, MOST_SHRINKING);
+        if self.adapted_at.elapsed() >= ADAPT_INTERVAL {
+            self.rig.adapt(self.left.points()?.into_iter().flatten());
+            self.adapted_at = Instant::now();
+        }
         self.show()?;
         let ms = |time: Duration| time.as_secs_f64() * 1e3;
         let (all, looking) = (ms(start.elapsed()), ms(before - start));
