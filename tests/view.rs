@@ -143,7 +143,7 @@ fn samplers_layers_and_insets_can_be_looked_at() {
     view.wait_for("mis 4 spp");
     let line = SIZE[0] as usize / 2;
     view.wait_until(|view| view.picture(SIZE)[line] == [255; 3]);
-    view.tap("Tab");
+    view.tap("z");
     view.tap("4");
     view.wait_for("env 4 spp");
     view.tap("]");
@@ -154,10 +154,88 @@ fn samplers_layers_and_insets_can_be_looked_at() {
     let corner = 479 * 640 + 639;
     view.wait_until(|view| view.picture([640, 480]).get(corner).is_some());
     let before = view.picture([640, 480]);
-    view.point([320, 400]);
+    view.point([320, 380]);
     view.tap("i");
     let line = (480 - 130) * 640 + 500;
     view.wait_until(|view| view.picture([640, 480])[line..line + 9] != before[line..line + 9]);
+    view.tap("Escape");
+    view.end().assert(0, &[]);
+}
+
+/// Size of a window with a panel, and the colours of this and of what lies around the film.
+const WIDE: [u32; 2] = [660, 480];
+const PANEL: [u8; 3] = [27; 3];
+const AROUND: [u8; 3] = [33; 3];
+
+/// Writes the camera and returns the file's text.
+fn bookmark(view: &mut View<'_>, folder: &Folder, number: u32) -> String {
+    let name = format!("yard.view-{number}.toml");
+    view.tap("b");
+    view.wait_for_file(&name);
+    std::fs::read_to_string(folder.path().join(name)).unwrap()
+}
+
+#[test]
+fn controls_change_what_they_say() {
+    let folder = folder();
+    let server = Server::start();
+    let options = ["--sampler", "mis", "--depth", "2", "--spp", "8", "--validate"];
+    let mut view = View::open(&server, &folder, "yard.toml", &options, SIZE);
+    view.wait_for("mis 8 spp");
+    view.resize(WIDE);
+    let at = |view: &View<'_>, [x, y]: [usize; 2]| view.picture(WIDE).get(660 * y + x).copied();
+    // Columns right of the panel, where the film is.
+    let film = |view: &View<'_>| view.picture(WIDE)[660 * 200..660 * 280].to_vec();
+    view.wait_until(|view| at(view, [100, 470]) == Some(PANEL));
+    view.wait_until(|view| at(view, [455, 20]) == Some(AROUND));
+
+    let before = film(&view);
+    view.click([98, 63]);
+    view.wait_until(|view| !view.title().contains("+0.0 stops") && film(view) != before);
+    view.click([84, 83]);
+    let below = |view: &View<'_>| view.picture(WIDE)[660 * 35..660 * 60].to_vec();
+    let closed = below(&view);
+    view.click([57, 15]);
+    view.wait_until(|view| below(view) != closed);
+    view.click([57, 42]);
+    view.wait_until(|view| !view.title().contains("mis") && view.title().contains(" 8 spp"));
+    let noisy = film(&view);
+    view.click([200, 103]);
+    view.wait_until(|view| film(view) != noisy);
+
+    let first = bookmark(&mut view, &folder, 1);
+    view.click([110, 151]);
+    view.wait_for(" 8 spp");
+    let wider = bookmark(&mut view, &folder, 2);
+    assert!(first != wider && wider.contains("vertical_fov_deg = "), "{first}\n{wider}");
+    view.click([60, 171]);
+    view.wait_for(" 8 spp");
+    view.click([455, 240]);
+    view.wait_until(|view| at(view, [100, 450]) == Some(PANEL));
+    let focused = bookmark(&mut view, &folder, 3);
+    let lens: toml::Table = focused.parse().unwrap();
+    let number = |key: &str| lens["camera"][key].as_float().unwrap();
+    assert!(number("aperture_radius") > 0.0 && number("focus_distance") > 0.1, "{focused}");
+
+    // Dragging over the panel moves no camera, and a view that was written is returned to.
+    view.drag([100, 460], [200, 440]);
+    assert_eq!(bookmark(&mut view, &folder, 4), focused);
+    view.click([34, 242]);
+    view.wait_for(" 8 spp");
+    assert_eq!(bookmark(&mut view, &folder, 5), first);
+
+    let before = film(&view);
+    let ask = |view: &View<'_>| {
+        view.press("Shift");
+        view.tap("/");
+        view.release("Shift");
+    };
+    ask(&view);
+    view.wait_until(|view| at(view, [330, 60]) == Some(PANEL) && film(view) != before);
+    ask(&view);
+    view.wait_until(|view| film(view) == before);
+    view.tap("Tab");
+    view.wait_until(|view| at(view, [100, 470]) != Some(PANEL));
     view.tap("Escape");
     view.end().assert(0, &[]);
 }

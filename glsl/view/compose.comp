@@ -1,4 +1,4 @@
-// Draws the window: one film or two side by side, scaled and tone-mapped, with an inset.
+// Draws the window: one film or two side by side, scaled and tone-mapped, with an inset, below the controls.
 #version 460
 
 #include "layout.glsl"
@@ -7,6 +7,7 @@
 READS(shown)
 READS(shown_right)
 READS(inset)
+READS(overlay)
 WRITES(window_pixels)
 
 layout(scalar, push_constant) uniform WindowFrameConstants {
@@ -50,7 +51,12 @@ void main() {
     if (index >= frame.width * frame.height) {
         return;
     }
-    vec3 value = pixel_at(uvec2(index % frame.width, index / frame.width));
+    uvec2 at = uvec2(index % frame.width, index / frame.width);
+    vec3 value = pixel_at(at);
+    if (at.x < frame.overlay_width && at.y < frame.overlay_height) {
+        vec4 over = unpackUnorm4x8(overlay[at.y * frame.overlay_width + at.x]);
+        value = over.rgb + (1.0 - over.a) * value;
+    }
     vec4 ordered = vec4(frame.is_bgra != 0u ? value.bgr : value, 1.0);
     window_pixels[index] = packUnorm4x8(ordered);
 }

@@ -286,6 +286,8 @@ binding_tables! {
         61 SHOWN_RIGHT: array vec3;
         /// A picture over the window, a word of bytes a pixel, red lowest.
         62 INSET: array uint;
+        /// The controls: as the inset, with opacity, by which the colours are multiplied.
+        64 OVERLAY: array uint;
         /// Pixels of the window in its own order of bytes.
         63 WINDOW_PIXELS: array uint;
     }

@@ -518,5 +518,9 @@ structs! {
         inset_width: uint,
         /// Height of the inset, pixels.
         inset_height: uint,
+        /// Width of the controls, pixels; 0 for none. They lie in the upper left corner of the window.
+        overlay_width: uint,
+        /// Height of the controls, pixels.
+        overlay_height: uint,
     }
 }

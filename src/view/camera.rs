@@ -21,6 +21,8 @@ pub(crate) struct Rig {
     /// Distance to the nearest things in the picture, metres; at first that to its centre.
     reach: f32,
     least_reach: f32,
+    /// Factor of the speed of flying.
+    pub(crate) speed: f32,
 }
 
 impl Rig {
@@ -28,7 +30,7 @@ impl Rig {
     pub(crate) fn new(camera: Camera) -> Self {
         let distance = (camera.look_at - camera.position).length();
         let reach = distance.max(1e-3);
-        Self { home: camera, camera, reach, least_reach: LEAST_REACH * reach }
+        Self { home: camera, camera, reach, least_reach: LEAST_REACH * reach, speed: 1.0 }
     }
 
     /// Adapts the speed to the points that a picture shows, metres: near things are approached slowly, and
@@ -46,6 +48,17 @@ impl Rig {
     /// The camera now.
     pub(crate) fn camera(&self) -> &Camera {
         &self.camera
+    }
+
+    /// The camera, to change its lens or to replace it.
+    pub(crate) fn camera_mut(&mut self) -> &mut Camera {
+        &mut self.camera
+    }
+
+    /// Focuses on a point, metres.
+    pub(crate) fn focus(&mut self, point: Vec3) {
+        let [_, _, forward] = self.axes();
+        self.camera.focus_distance = (point - self.camera.position).dot(forward).max(1e-3);
     }
 
     /// Returns to the start.
@@ -93,7 +106,7 @@ impl Rig {
     pub(crate) fn fly(&mut self, direction: Vec3, seconds: f32) {
         let [right, up, forward] = self.axes();
         let way = direction.x * right + direction.y * up + direction.z * forward;
-        self.shift(way * (seconds * PACE * self.reach));
+        self.shift(way * (seconds * PACE * self.speed * self.reach));
     }
 
     fn shift(&mut self, way: Vec3) {

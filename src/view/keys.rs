@@ -37,7 +37,11 @@ pub enum Action {
     Save,
     /// Takes the camera back to the start.
     Home,
-    /// Prints the keys.
+    /// Writes the camera.
+    Bookmark,
+    /// Shows the panel, or hides it.
+    Panel,
+    /// Shows the keys, or hides them.
     Help,
     /// Closes the window.
     Quit,
@@ -79,7 +83,7 @@ const KEYS: &[Key] = &[
     key("e", Action::Fly(1, 1.0), ""),
     key("r", Action::Home, "return to the camera of the scene"),
     key("x", Action::Split, "two samplers side by side at equal time, or one"),
-    key("Tab", Action::Swap, "choose the sampler of the other side"),
+    key("z", Action::Swap, "choose the sampler of the other side"),
     key("[", Action::Depth(-1), "fewer and more path vertices"),
     key("]", Action::Depth(1), ""),
     key("-", Action::Exposure(-0.5), "exposure, half a stop down and up"),
@@ -103,8 +107,10 @@ const KEYS: &[Key] = &[
         "learned sky of the pixel under the cursor: visibility above, density below",
     ),
     key("p", Action::Save, "write the window (PNG), the film (EXR) and the camera (TOML)"),
-    key("?", Action::Help, "print the keys"),
-    key("Escape", Action::Quit, "close the window"),
+    key("b", Action::Bookmark, "write the camera alone, to return to it"),
+    key("Tab", Action::Panel, "show or hide the panel"),
+    key("?", Action::Help, "show or hide these keys"),
+    key("Escape", Action::Quit, "hide these keys, or close the window"),
 ];
 
 /// Returns the effect of a key.

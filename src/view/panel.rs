@@ -11,53 +11,14 @@ use std::{
 
 use super::{
     keys::Action,
-    projector::{Place, Projector, is_picture},
+    message::{Input, Setting},
+    projector::{Overlay, Place, Projector, is_picture},
 };
 use crate::{
     error::{Error, Result},
     film::{Tone, tone::auto_exposure},
     gpu::{Device, Presented, Swapchain, swapchain::Target},
 };
-
-/// Message from the window to the renderer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Input {
-    /// A key was pressed.
-    Key(Action),
-    /// Directions to fly to changed: right, up, forward, −1 to 1 each.
-    Held([f32; 3]),
-    /// The pointer moved with the first button held, in heights of the window.
-    Orbit([f32; 2]),
-    /// The pointer moved with the second button held.
-    Turn([f32; 2]),
-    /// The pointer moved with the third button held.
-    Pan([f32; 2]),
-    /// The wheel turned, notches away from the user.
-    Wheel(f32),
-    /// The pointer is at this pixel of the window.
-    Pointer([f64; 2]),
-    /// The window has this size now, pixels.
-    Resized([u32; 2]),
-    /// The window was uncovered.
-    Redraw,
-    /// The window is closed.
-    Close,
-}
-
-impl Input {
-    /// True if the film has to start again: a pass under way is worth nothing more.
-    fn restarts(self) -> bool {
-        match self {
-            Self::Key(action) => matches!(
-                action,
-                Action::Sampler(_) | Action::Depth(_) | Action::Split | Action::Home | Action::Quit
-            ),
-            Self::Held(direction) => direction != [0.0; 3],
-            Self::Orbit(_) | Self::Turn(_) | Self::Pan(_) | Self::Wheel(_) | Self::Close => true,
-            Self::Pointer(_) | Self::Resized(_) | Self::Redraw => false,
-        }
-    }
-}
 
 /// The window.
 pub(crate) struct Panel {
@@ -75,8 +36,8 @@ pub(crate) struct Panel {
     pub(super) is_moving: bool,
     /// Place of the pointer, pixels of the window.
     pub(super) pointer: Option<[f64; 2]>,
-    /// True if tone has changed since it was announced.
-    pub(super) is_toned: bool,
+    /// True if a setting has changed since it was announced.
+    pub(super) is_changed: bool,
     /// Failure between the waves of a pass, which cannot return it.
     failure: Option<Error>,
 }
@@ -102,7 +63,7 @@ impl Panel {
             has_right: false,
             is_moving: false,
             pointer: None,
-            is_toned: false,
+            is_changed: false,
             failure: None,
         })
     }
@@ -134,17 +95,17 @@ impl Panel {
 
     fn take(&mut self, input: Input) {
         let acted = match input {
-            Input::Key(Action::Exposure(stops)) => {
-                self.tone.exposure += stops;
-                self.is_toned = true;
-                self.present()
-            }
+            Input::Key(Action::Exposure(stops)) => self.change(|tone| tone.exposure += stops),
+            Input::Set(Setting::Exposure(stops)) => self.change(|tone| tone.exposure = stops),
+            Input::Set(Setting::Curve(curve)) => self.change(|tone| tone.curve = curve),
             Input::Key(Action::AutoExposure) => self.expose(),
             Input::Key(Action::Curve) => {
                 let all = crate::film::Curve::ALL;
                 let now = all.iter().position(|curve| *curve == self.tone.curve).unwrap_or(0);
-                self.tone.curve = all[(now + 1) % all.len()];
-                self.present()
+                self.change(|tone| tone.curve = all[(now + 1) % all.len()])
+            }
+            Input::Overlay(overlay) => {
+                self.projector.set_overlay(overlay).and_then(|_| self.present())
             }
             Input::Pointer(at) => {
                 self.pointer = Some(at);
@@ -166,6 +127,13 @@ impl Panel {
         }
     }
 
+    /// Changes exposure or curve of the picture that is there.
+    fn change(&mut self, change: impl FnOnce(&mut Tone)) -> Result<()> {
+        change(&mut self.tone);
+        self.is_changed = true;
+        self.present()
+    }
+
     /// Returns the failure between the waves of the last pass.
     pub(crate) fn take_failure(&mut self) -> Result<()> {
         self.failure.take().map_or(Ok(()), Err)
@@ -175,7 +143,7 @@ impl Panel {
     fn expose(&mut self) -> Result<()> {
         if is_picture(self.layer) {
             self.tone.exposure = auto_exposure(&self.projector.shown(Place::Left)?);
-            self.is_toned = true;
+            self.is_changed = true;
         }
         self.present()
     }
@@ -206,16 +174,19 @@ impl Panel {
         Ok(())
     }
 
-    /// Returns what the window shows: its size, and red, green, blue of each pixel. Fails if the device
+    /// Returns what the window shows without controls: its size, and red, green, blue of each pixel. Fails if the device
     /// does.
     pub(crate) fn picture(&mut self) -> Result<([u32; 2], Vec<[u8; 3]>)> {
-        let size = self.swapchain.size();
+        let mut size = self.swapchain.size();
         if size.contains(&0) {
             return Err(Error::usage("the window has no pixels to write"));
         }
+        let overlay = self.projector.set_overlay(Overlay::default())?;
+        size[0] = size[0].saturating_sub(overlay.reserved).max(1);
         let pixels =
             compose(&mut self.projector, size, self.has_right, self.tone, self.layer, false)?;
         let pixels: Vec<[u8; 4]> = pixels.download(size[0] as usize * size[1] as usize)?;
+        self.projector.set_overlay(overlay)?;
         Ok((size, pixels.into_iter().map(|[red, green, blue, _]| [red, green, blue]).collect()))
     }
 }

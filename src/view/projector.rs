@@ -27,12 +27,21 @@ pub(crate) enum Place {
 }
 
 /// A picture over the window.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Inset {
     /// Width and height, pixels.
     pub size: [u32; 2],
-    /// Red, green, blue, 255: row by row.
+    /// Red, green, blue, each multiplied by the opacity, and this: row by row.
     pub pixels: Vec<[u8; 4]>,
+}
+
+/// The controls over the window.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Overlay {
+    /// Their looks, in the upper left corner.
+    pub picture: Inset,
+    /// Columns to the left that films leave free, pixels.
+    pub reserved: u32,
 }
 
 /// Passes and buffers between films and a window.
@@ -48,7 +57,9 @@ pub(crate) struct Projector {
     sizes: [[u32; 2]; 2],
     inset: Buffer,
     inset_size: [u32; 2],
-    window: Option<(Buffer, DescriptorSet)>,
+    overlay: Overlay,
+    /// Pixels of the window, room for an overlay of its size, and the set of both.
+    window: Option<(Buffer, Buffer, DescriptorSet)>,
     window_size: [u32; 2],
 }
 
@@ -71,6 +82,7 @@ impl Projector {
             sizes: [[1, 1]; 2],
             inset: Buffer::zeroed(device, "inset", 4 * area(inset))?,
             inset_size: [0, 0],
+            overlay: Overlay::default(),
             window: None,
             window_size: [0, 0],
         })
@@ -118,6 +130,30 @@ impl Projector {
         Ok(())
     }
 
+    /// Replaces the controls and returns those before. Fails if the device does.
+    pub(crate) fn set_overlay(&mut self, overlay: Overlay) -> Result<Overlay> {
+        let before = std::mem::replace(&mut self.overlay, overlay);
+        if let Some((_, room, _)) = self.window.as_ref().filter(|_| self.has_overlay()) {
+            room.upload(bytemuck::cast_slice(&self.overlay.picture.pixels))?;
+        }
+        Ok(before)
+    }
+
+    /// True if there are controls, and the window has room for them: it may have shrunk since.
+    pub(crate) fn has_overlay(&self) -> bool {
+        let [width, height] = self.overlay.picture.size;
+        width > 0 && width <= self.window_size[0] && height <= self.window_size[1]
+    }
+
+    /// Left and upper edge, width and height of the films in the window.
+    fn films(&self) -> [u32; 4] {
+        let [width, height] = self.window_size;
+        let reserved = if self.has_overlay() { self.overlay.reserved } else { 0 };
+        let [left, top, shown_width, shown_height] =
+            fit(self.film, [width.saturating_sub(reserved), height]);
+        [left + reserved, top, shown_width, shown_height]
+    }
+
     /// Draws the pixels of a window of `size` pixels: films with this exposure factor and `CURVE_…`,
     /// whole and at the largest size that fits. Fails if the device does.
     pub(crate) fn compose(
@@ -131,9 +167,8 @@ impl Projector {
             Some(window) if self.window_size == [width, height] => window,
             _ => self.make_window([width, height])?,
         };
-        self.window_size = [width, height];
-        let (buffer, set) = self.window.insert(window);
-        let [left, top, shown_width, shown_height] = fit(self.film, [width, height]);
+        let [left, top, shown_width, shown_height] = self.films();
+        let overlay = if self.has_overlay() { self.overlay.picture.size } else { [0, 0] };
         let inset = self.inset_size;
         let has_inset = inset[0] <= shown_width && inset[1] <= shown_height;
         let frame = WindowFrame {
@@ -154,7 +189,10 @@ impl Projector {
             is_bgra: u32::from(is_bgra),
             inset_width: if has_inset { inset[0] } else { 0 },
             inset_height: if has_inset { inset[1] } else { 0 },
+            overlay_width: overlay[0],
+            overlay_height: overlay[1],
         };
+        let (buffer, _, set) = self.window.insert(window);
         let mut commands = Commands::begin(&self.device)?;
         let pixels = width * height;
         for first_index in (0..pixels).step_by(MOST_INVOCATIONS as usize) {
@@ -166,16 +204,31 @@ impl Projector {
         Ok(buffer)
     }
 
-    fn make_window(&self, [width, height]: [u32; 2]) -> Result<(Buffer, DescriptorSet)> {
-        let buffer = Buffer::new(&self.device, "window", 4 * u64::from(width) * u64::from(height))?;
+    fn make_window(
+        &mut self,
+        [width, height]: [u32; 2],
+    ) -> Result<(Buffer, Buffer, DescriptorSet)> {
+        let bytes = 4 * u64::from(width) * u64::from(height);
+        let buffer = Buffer::new(&self.device, "window", bytes)?;
+        let overlay = Buffer::new(&self.device, "controls", bytes)?;
         let bound = [
             (view::SHOWN, &self.shown[0].0),
             (view::SHOWN_RIGHT, &self.shown[1].0),
             (view::INSET, &self.inset),
+            (view::OVERLAY, &overlay),
             (view::WINDOW_PIXELS, &buffer),
         ];
         let set = DescriptorSet::new(&self.device, &VIEW, &bound)?;
-        Ok((buffer, set))
+        self.window_size = [width, height];
+        if self.has_overlay() {
+            overlay.upload(bytemuck::cast_slice(&self.overlay.picture.pixels))?;
+        }
+        Ok((buffer, overlay, set))
+    }
+
+    /// Replaces the linear pixels of a film as it was shown last. Fails if the device does.
+    pub(crate) fn replace(&self, place: Place, pixels: &[[f32; 3]]) -> Result<()> {
+        self.shown[usize::from(place == Place::Right)].0.upload(bytemuck::cast_slice(pixels))
     }
 
     /// Returns the linear pixels of a film as they were shown last. Fails if the device does.
@@ -187,7 +240,7 @@ impl Projector {
 
     /// Returns the pixel of a film of `film` pixels under a place in the window, as composed last.
     pub(crate) fn pixel_under(&self, [x, y]: [f64; 2], film: [u32; 2]) -> Option<[u32; 2]> {
-        let [left, top, width, height] = fit(self.film, self.window_size);
+        let [left, top, width, height] = self.films();
         let at = |place: f64, start: u32, length: u32, pixels: u32| {
             let share = (place - f64::from(start)) / f64::from(length.max(1));
             (0.0..1.0).contains(&share).then_some((share * f64::from(pixels)) as u32)

@@ -8,22 +8,25 @@ use std::{
         mpsc::{Receiver, Sender, channel},
     },
     thread::{self, JoinHandle},
+    time::{Duration, Instant},
 };
 
 use winit::{
     application::ApplicationHandler,
     dpi::PhysicalSize,
     event::{ElementState, MouseButton, MouseScrollDelta, StartCause, WindowEvent},
-    event_loop::{ActiveEventLoop, EventLoop, EventLoopProxy},
+    event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy},
     keyboard::{Key, NamedKey},
     raw_window_handle::HasDisplayHandle,
     window::{Window, WindowId},
 };
 
 use super::{
+    controls::{self, Controls},
     inset,
     keys::{Action, action_of},
-    panel::{Input, Panel},
+    message::{Input, Status},
+    panel::Panel,
     projector::Projector,
     side::Side,
     worker::{Parts, Worker},
@@ -38,6 +41,10 @@ use crate::{
 
 /// Pixels of the wheel's finer events in a notch.
 const PIXELS_PER_NOTCH: f64 = 40.0;
+/// Interval at which the controls follow the renderer.
+const FOLLOWING: Duration = Duration::from_millis(250);
+/// Way of the pointer, pixels, up to which a press and a release are a click.
+const CLICK_WAY: f64 = 4.0;
 /// Advice without a display.
 const NO_DISPLAY_HELP: &str =
     "a window needs DISPLAY to name a running X server; `fenestra render` needs none";
@@ -65,7 +72,7 @@ pub struct Options {
 
 /// Message from the rendering thread.
 enum Report {
-    Title(String),
+    Status(Box<Status>),
     Ended,
 }
 
@@ -99,6 +106,11 @@ impl Display {
             pointer: None,
             buttons: BTreeSet::new(),
             held: Vec::new(),
+            controls: Controls::new(),
+            drawn_at: Instant::now(),
+            is_due: false,
+            is_stale: false,
+            pressed: None,
         };
         let ran = event_loop.run_app(&mut app);
         let App { failure, rendering, sender, .. } = app;
@@ -133,6 +145,15 @@ struct App {
     buttons: BTreeSet<Drag>,
     /// Axes and senses of the flying keys that are held, each with its key.
     held: Vec<(String, usize, f32)>,
+    controls: Controls,
+    /// Time that the controls were drawn last.
+    drawn_at: Instant,
+    /// True if they must be drawn at once.
+    is_due: bool,
+    /// True if the renderer has reported since.
+    is_stale: bool,
+    /// Place at which the first button was pressed, while this may be a click.
+    pressed: Option<[f64; 2]>,
 }
 
 /// Effect of the pointer while a button is held.
@@ -151,7 +172,10 @@ impl App {
 
     fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<()> {
         let Some((scene, options, inputs)) = self.start.take() else { return Ok(()) };
-        let size = PhysicalSize::new(scene.film.width, scene.film.height);
+        let [width, height] = [scene.film.width, scene.film.height];
+        let beside = [width + controls::WIDTH, height];
+        let size = if Controls::fit(beside) { beside } else { [width, height] };
+        let size = PhysicalSize::new(size[0], size[1]);
         let attributes = Window::default_attributes()
             .with_title(format!("{} | preparing {}", scene.name, options.settings.sampler.name()))
             .with_inner_size(size);
@@ -174,10 +198,15 @@ impl App {
     fn press(&mut self, key: &Key, state: ElementState, is_repeat: bool) {
         let name = match key {
             Key::Character(text) => text.to_lowercase(),
-            Key::Named(NamedKey::Escape) => "Escape".to_owned(),
-            Key::Named(NamedKey::Tab) => "Tab".to_owned(),
+            Key::Named(NamedKey::Space) => " ".to_owned(),
+            Key::Named(named) => format!("{named:?}"),
             _ => return,
         };
+        if self.controls.wants_keys() {
+            self.controls.type_in(&name, state == ElementState::Pressed);
+            self.is_due = true;
+            return;
+        }
         match (action_of(&name), state) {
             (Some(Action::Fly(axis, sense)), ElementState::Pressed) if !is_repeat => {
                 self.held.push((name, axis, sense));
@@ -188,8 +217,46 @@ impl App {
                 self.send_held();
             }
             (Some(Action::Fly(..)), ElementState::Pressed) => {}
-            (Some(action), ElementState::Pressed) => self.send(Input::Key(action)),
+            (Some(action), ElementState::Pressed) => self.give(Input::Key(action)),
             _ => {}
+        }
+    }
+
+    /// Gives input to the controls, if it is theirs, or to the renderer.
+    fn give(&mut self, input: Input) {
+        match input {
+            Input::Key(action) if self.controls.act(action) => self.is_due = true,
+            other => self.send(other),
+        }
+    }
+
+    /// Draws the controls anew.
+    fn refresh(&mut self) {
+        let Some(window) = &self.window else { return };
+        let size = window.inner_size();
+        (self.is_due, self.is_stale, self.drawn_at) = (false, false, Instant::now());
+        for input in self.controls.refresh([size.width, size.height]) {
+            self.give(input);
+        }
+    }
+
+    fn press_button(&mut self, drag: Drag, state: ElementState) {
+        // The controls must know where the pointer is.
+        self.refresh();
+        let is_pressed = state == ElementState::Pressed;
+        let is_theirs = self.controls.wants_pointer();
+        if drag == Drag::Orbit {
+            self.controls.click(is_pressed);
+            self.refresh();
+        }
+        if !is_pressed {
+            self.buttons.remove(&drag);
+            if let Some(at) = self.pressed.take().filter(|_| drag == Drag::Orbit) {
+                self.send(Input::Focus(at));
+            }
+        } else if !is_theirs {
+            self.buttons.insert(drag);
+            self.pressed = self.pointer.filter(|_| drag == Drag::Orbit);
         }
     }
 
@@ -202,10 +269,19 @@ impl App {
     }
 
     fn move_pointer(&mut self, to: [f64; 2]) {
+        self.controls.point(to);
+        self.is_due = true;
+        if let Some([x, y]) = self.pressed {
+            if (x - to[0]).abs().max((y - to[1]).abs()) < CLICK_WAY {
+                return;
+            }
+            self.pressed = None;
+        }
         let from = self.pointer.replace(to).unwrap_or(to);
         let height = self.window.as_ref().map_or(1, |window| window.inner_size().height.max(1));
         let way = [0, 1].map(|axis| ((to[axis] - from[axis]) / f64::from(height)) as f32);
         let input = match self.buttons.first() {
+            None if self.controls.wants_pointer() => return,
             None => Input::Pointer(to),
             Some(_) if way == [0.0; 2] => return,
             Some(Drag::Orbit) => Input::Orbit(way),
@@ -228,19 +304,35 @@ impl ApplicationHandler<Report> for App {
 
     fn user_event(&mut self, event_loop: &ActiveEventLoop, report: Report) {
         match report {
-            Report::Title(title) => {
+            Report::Status(status) => {
                 if let Some(window) = &self.window {
-                    window.set_title(&title);
+                    window.set_title(&status.title);
                 }
+                self.controls.report(*status);
+                self.is_stale = true;
             }
             Report::Ended => event_loop.exit(),
         }
     }
 
+    fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
+        if self.is_due || (self.is_stale && self.drawn_at.elapsed() >= FOLLOWING) {
+            self.refresh();
+        }
+        event_loop.set_control_flow(if self.is_stale {
+            ControlFlow::WaitUntil(self.drawn_at + FOLLOWING)
+        } else {
+            ControlFlow::Wait
+        });
+    }
+
     fn window_event(&mut self, _event_loop: &ActiveEventLoop, _id: WindowId, event: WindowEvent) {
         match event {
             WindowEvent::CloseRequested | WindowEvent::Destroyed => self.send(Input::Close),
-            WindowEvent::Resized(size) => self.send(Input::Resized([size.width, size.height])),
+            WindowEvent::Resized(size) => {
+                self.send(Input::Resized([size.width, size.height]));
+                self.is_due = true;
+            }
             WindowEvent::RedrawRequested => self.send(Input::Redraw),
             WindowEvent::Focused(false) => {
                 self.held.clear();
@@ -260,17 +352,17 @@ impl ApplicationHandler<Report> for App {
                     MouseButton::Middle => Drag::Pan,
                     _ => return,
                 };
-                match state {
-                    ElementState::Pressed => self.buttons.insert(drag),
-                    ElementState::Released => self.buttons.remove(&drag),
-                };
+                self.press_button(drag, state);
             }
             WindowEvent::MouseWheel { delta, .. } => {
                 let notches = match delta {
                     MouseScrollDelta::LineDelta(_, lines) => lines,
                     MouseScrollDelta::PixelDelta(way) => (way.y / PIXELS_PER_NOTCH) as f32,
                 };
-                if notches != 0.0 {
+                if self.controls.wants_pointer() {
+                    self.controls.scroll(notches * PIXELS_PER_NOTCH as f32);
+                    self.is_due = true;
+                } else if notches != 0.0 {
                     self.send(Input::Wheel(notches));
                 }
             }
@@ -294,8 +386,8 @@ fn render(
     let left = Side::new(&device, &scene, None, &settings, None)?;
     let size = window.inner_size();
     let panel = Panel::new(&device, window, [size.width, size.height], projector, inputs, tone)?;
-    let announce = Box::new(move |title| {
-        let _ = proxy.send_event(Report::Title(title));
+    let announce = Box::new(move |status| {
+        let _ = proxy.send_event(Report::Status(Box::new(status)));
     });
     let parts =
         Parts { scene, device: Arc::clone(&device), settings, spp, left, panel, folder, announce };

@@ -12,8 +12,9 @@ use x11rb::{
     connection::Connection,
     protocol::{
         xproto::{
-            AtomEnum, ConfigureWindowAux, ConnectionExt as _, ImageFormat, InputFocus,
-            KEY_PRESS_EVENT, KEY_RELEASE_EVENT, MapState, Window,
+            AtomEnum, BUTTON_PRESS_EVENT, BUTTON_RELEASE_EVENT, ConfigureWindowAux,
+            ConnectionExt as _, ImageFormat, InputFocus, KEY_PRESS_EVENT, KEY_RELEASE_EVENT,
+            MapState, Window,
         },
         xtest::ConnectionExt as _,
     },
@@ -202,6 +203,7 @@ impl<'a> View<'a> {
         let symbol = match key {
             "Escape" => 0xff1b,
             "Tab" => 0xff09,
+            "Shift" => 0xffe1,
             // Symbols of Latin characters are their codes.
             character => u32::from(character.chars().next().unwrap()),
         };
@@ -223,6 +225,19 @@ impl<'a> View<'a> {
     pub fn point(&self, [x, y]: [i16; 2]) {
         let moved = self.connection.warp_pointer(x11rb::NONE, self.window, 0, 0, 0, 0, x, y);
         moved.unwrap().check().unwrap();
+    }
+
+    /// Presses the first button of the pointer at a pixel of the window, and releases it at another.
+    pub fn drag(&self, from: [i16; 2], to: [i16; 2]) {
+        self.point(from);
+        self.send(BUTTON_PRESS_EVENT, 1);
+        self.point(to);
+        self.send(BUTTON_RELEASE_EVENT, 1);
+    }
+
+    /// Presses and releases the first button of the pointer at a pixel of the window.
+    pub fn click(&self, at: [i16; 2]) {
+        self.drag(at, at);
     }
 
     /// Gives the window another size, as a window manager does.

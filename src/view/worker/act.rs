@@ -1,18 +1,21 @@
 //! Effects of input: motions of the camera, keys, files.
 
+use std::path::PathBuf;
+
 use super::{Motion, Worker};
 use crate::{
     error::Result,
+    files::write_text,
     sampler::Sampler,
     session::Settings,
     shader::constants::SHOW_PICTURE,
     terminal::say,
     view::{
         inset,
-        keys::{Action, LAYERS, rows},
-        panel::Input,
+        keys::{Action, LAYERS},
+        message::{Input, Setting},
         projector::Inset,
-        save::{Saved, names},
+        save::{Saved, camera_toml, names, read_camera, views},
         side::Side,
     },
 };
@@ -50,8 +53,15 @@ impl Worker {
                 self.update_inset()?;
                 return Ok(false);
             }
+            Input::Focus(at) => {
+                self.clicked = Some(at);
+                return Ok(false);
+            }
+            Input::Set(setting) => return self.set(setting),
             Input::Key(action) => action,
-            Input::Resized(_) | Input::Redraw | Input::Close => return Ok(false),
+            Input::Resized(_) | Input::Redraw | Input::Close | Input::Overlay(_) => {
+                return Ok(false);
+            }
         };
         match action {
             Action::Sampler(number) => self.choose_sampler(number)?,
@@ -71,7 +81,10 @@ impl Worker {
                 }
                 self.look(self.whole(), true)?;
             }
-            Action::Swap => self.chooses_right = self.right.is_some() && !self.chooses_right,
+            Action::Swap => {
+                self.chooses_right = self.right.is_some() && !self.chooses_right;
+                self.tell();
+            }
             Action::Layer(layer) => self.toggle_layer(layer)?,
             Action::NextLayer => {
                 let now = self.panel.borrow().layer;
@@ -89,12 +102,94 @@ impl Worker {
                 self.rig.go_home();
                 return Ok(true);
             }
-            Action::Help => rows().iter().for_each(|(keys, about)| say!("{keys:18} {about}")),
-            // These are done by the panel, or hold as long as the key.
+            Action::Bookmark => {
+                let [.., file] = names(&self.folder, &self.scene.name);
+                let written = write_text(&file, &camera_toml(self.rig.camera()));
+                self.notice_written(written, &[file]);
+            }
+            // These are done by panel or window, or hold as long as the key.
             Action::Exposure(_) | Action::AutoExposure | Action::Curve => {}
-            Action::Fly(..) | Action::Quit => {}
+            Action::Fly(..) | Action::Quit | Action::Panel | Action::Help => {}
         }
         Ok(false)
+    }
+
+    /// Acts on a control. Returns true if the camera has changed.
+    fn set(&mut self, setting: Setting) -> Result<bool> {
+        let camera = self.rig.camera_mut();
+        match setting {
+            Setting::FieldOfView(degrees) => camera.vertical_fov_deg = degrees,
+            Setting::Aperture(radius) => camera.aperture_radius = radius,
+            Setting::Focus(distance) => {
+                camera.focus_distance = distance;
+                return Ok(camera.aperture_radius > 0.0);
+            }
+            Setting::View(number) => match self.views.get(number).map(|file| read_camera(file)) {
+                Some(Ok(view)) => *camera = view,
+                Some(Err(error)) => {
+                    log::error!("{error}");
+                    self.notice = error.to_string();
+                    self.tell();
+                    return Ok(false);
+                }
+                None => return Ok(false),
+            },
+            Setting::Speed(speed) => {
+                self.rig.speed = speed;
+                return Ok(false);
+            }
+            Setting::Denoise(choice) => {
+                self.denoising.choice = choice;
+                self.denoising.start_again();
+                self.show_again()?;
+                return Ok(false);
+            }
+            // These are done by the panel.
+            Setting::Exposure(_) | Setting::Curve(_) => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    /// Focuses on the point that was clicked, once the whole film has samples there.
+    pub(super) fn focus(&mut self) -> Result<()> {
+        if self.motion != Motion::Rest || self.is_stopped() || self.left.sample_count() == 0 {
+            return Ok(());
+        }
+        let Some(at) = self.clicked.take() else { return Ok(()) };
+        let film = self.left.session.renderer.film_size();
+        let pixel = self.panel.borrow().projector.pixel_under(at, film);
+        let Some([x, y]) = pixel else { return Ok(()) };
+        let points = self.left.points()?;
+        match points.get((y * film[0] + x) as usize) {
+            Some(Some(point)) => {
+                self.rig.focus(*point);
+                let camera = self.rig.camera();
+                self.notice = format!("in focus: {:.3} m", camera.focus_distance);
+                if camera.aperture_radius > 0.0 {
+                    self.look(self.whole(), false)?;
+                }
+            }
+            _ => self.notice = "there is nothing to focus on".into(),
+        }
+        self.tell();
+        Ok(())
+    }
+
+    /// Says what was written, or why not: a full disk is no reason to lose the picture on the screen.
+    fn notice_written(&mut self, written: Result<()>, files: &[PathBuf]) {
+        match written {
+            Ok(()) => {
+                let names = files.iter().map(|file| file.display().to_string());
+                self.notice = format!("wrote {}", names.collect::<Vec<_>>().join(", "));
+                say!("{}", self.notice);
+            }
+            Err(error) => {
+                log::error!("{error}");
+                self.notice = error.to_string();
+            }
+        }
+        self.views = views(&self.folder, &self.scene.name);
+        self.tell();
     }
 
     /// Shows what the films have, unless a pass was stopped in them.
@@ -142,7 +237,8 @@ impl Worker {
 
     /// Makes the renderer of a sampler.
     fn make_side(&self, sampler: Sampler) -> Result<Side> {
-        (self.announce)(format!("{} | preparing {}", self.scene.name, sampler.name()));
+        let title = format!("{} | preparing {}", self.scene.name, sampler.name());
+        (self.announce)(self.status(title));
         let settings = Settings { sampler, ..self.settings.clone() };
         let buffers = Some(self.left.session.renderer.scene_buffers());
         let guide = self.guide.as_deref();
@@ -192,13 +288,8 @@ impl Worker {
         let camera = self.rig.camera();
         let files = names(&self.folder, &self.scene.name);
         let saved = Saved { size, pixels: &pixels, film: &film, camera };
-        // A full disk is no reason to lose the picture on the screen.
-        match saved.write(&files) {
-            Ok(()) => {
-                say!("wrote {}", files.map(|file| file.display().to_string()).join(", "))
-            }
-            Err(error) => log::error!("{error}"),
-        }
+        let written = saved.write(&files);
+        self.notice_written(written, &files);
         Ok(())
     }
 }

@@ -1,6 +1,7 @@
 //! The rendering thread: renders what the window asks for, and shows it.
 
 mod act;
+mod denoise;
 
 use std::{
     cell::RefCell,
@@ -12,11 +13,14 @@ use std::{
 
 use glam::Vec3;
 
+use self::denoise::{Denoising, Filtered};
 use super::{
     camera::Rig,
     keys::{Action, LAYERS},
-    panel::{Input, Panel},
+    message::{Input, Status},
+    panel::Panel,
     projector::Place,
+    save::views,
     side::Side,
 };
 use crate::{
@@ -33,7 +37,7 @@ use crate::{
 /// Time without a motion after which the camera is at rest.
 const REST: Duration = Duration::from_millis(150);
 /// Aim for the time between two pictures of a moving camera.
-const MOVING_TIME: Duration = Duration::from_millis(60);
+const MOVING_TIME: Duration = Duration::from_millis(45);
 /// Least side of the film of a moving camera, pixels, and the largest factor by which it shrinks.
 const LEAST_SIDE: u32 = 16;
 const MOST_SHRINKING: f32 = 32.0;
@@ -45,6 +49,10 @@ const LEARNING_TIME: Duration = Duration::from_millis(30);
 const LONGEST_STEP: f32 = 0.1;
 /// Interval between looks at how near the things before a moving camera are.
 const ADAPT_INTERVAL: Duration = Duration::from_millis(100);
+/// Interval between looks at the error of a film at rest, which is read as a whole.
+const ERROR_INTERVAL: Duration = Duration::from_secs(2);
+/// Number of passes whose times are told.
+const TOLD_PASSES: usize = 6;
 /// Interval between insets, and between means of the film for its relative error.
 const LOOK_INTERVAL: Duration = Duration::from_millis(400);
 /// Tells the seeds of moved cameras from other hashes.
@@ -91,8 +99,16 @@ pub(crate) struct Worker {
     saves_at_rest: bool,
     looked_at: Option<Instant>,
     mean_radiance: f32,
+    error: Option<f64>,
+    error_at: Instant,
+    denoising: Denoising,
+    /// Pixel of the window that was clicked, to focus on once the film shows it.
+    clicked: Option<[f64; 2]>,
+    /// Files of cameras that were written.
+    views: Vec<PathBuf>,
+    notice: String,
     folder: PathBuf,
-    announce: Box<dyn Fn(String)>,
+    announce: Box<dyn Fn(Status)>,
 }
 
 /// Parts of a worker.
@@ -111,8 +127,8 @@ pub(super) struct Parts {
     pub panel: Panel,
     /// Folder of the files that are written.
     pub folder: PathBuf,
-    /// Shows a title.
-    pub announce: Box<dyn Fn(String)>,
+    /// Shows what the renderer does.
+    pub announce: Box<dyn Fn(Status)>,
 }
 
 impl Worker {
@@ -143,11 +159,18 @@ impl Worker {
             saves_at_rest: false,
             looked_at: None,
             mean_radiance: 0.0,
+            error: None,
+            error_at: Instant::now(),
+            denoising: Denoising::default(),
+            clicked: None,
+            views: Vec::new(),
+            notice: String::new(),
             folder,
             announce,
         };
         let watch = worker.watch();
         worker.left.session.renderer.set_watch(watch);
+        worker.views = views(&worker.folder, &worker.scene.name);
         worker
     }
 
@@ -165,12 +188,13 @@ impl Worker {
     /// # Errors
     /// A failing device, a lost display, a file that cannot be written.
     pub(crate) fn run(&mut self) -> Result<()> {
+        self.tell();
         let mut last = Instant::now();
         loop {
             self.panel.borrow_mut().attend();
             self.panel.borrow_mut().take_failure()?;
-            if std::mem::take(&mut self.panel.borrow_mut().is_toned) {
-                (self.announce)(self.title());
+            if std::mem::take(&mut self.panel.borrow_mut().is_changed) {
+                self.tell();
             }
             let now = Instant::now();
             let step = (now - last).as_secs_f32().min(LONGEST_STEP);
@@ -183,11 +207,15 @@ impl Worker {
                     input => moved |= self.apply(input)?,
                 }
             }
+            self.focus()?;
             if self.held != Vec3::ZERO {
                 self.rig.fly(self.held, step);
                 moved = true;
             }
             if moved {
+                if self.motion == Motion::Rest {
+                    self.denoising.start_moving();
+                }
                 self.motion = Motion::Moving(Instant::now());
                 self.panel.borrow_mut().is_moving = true;
                 self.move_on()?;
@@ -226,6 +254,7 @@ impl Worker {
     fn look(&mut self, size: [u32; 2], learns: bool) -> Result<()> {
         self.looks = self.looks.wrapping_add(1);
         let [seed, ..] = hash_4d([self.settings.seed, self.looks, MOVED_SEED, 0]);
+        self.error = None;
         let camera = *self.rig.camera();
         let start = Instant::now();
         for side in self.sides() {
@@ -251,14 +280,14 @@ impl Worker {
         for side in self.sides() {
             side.session.pass(1, f64::INFINITY)?;
         }
-        let took = before.elapsed().as_secs_f32();
-        let wanted = (took / MOVING_TIME.as_secs_f32()).sqrt().clamp(0.7, 2.0);
-        self.shrinking = (self.shrinking * wanted).clamp(1.0, MOST_SHRINKING);
         if self.adapted_at.elapsed() >= ADAPT_INTERVAL {
             self.rig.adapt(self.left.points()?.into_iter().flatten());
             self.adapted_at = Instant::now();
         }
         self.show()?;
+        let took = before.elapsed().as_secs_f32();
+        let wanted = (took / MOVING_TIME.as_secs_f32()).sqrt().clamp(0.7, 2.0);
+        self.shrinking = (self.shrinking * wanted).clamp(1.0, MOST_SHRINKING);
         let ms = |time: Duration| time.as_secs_f64() * 1e3;
         let (all, looking) = (ms(start.elapsed()), ms(before - start));
         log::debug!("moving: {size:?} pixels in {all:.0} ms, {looking:.0} of them before the pass");
@@ -300,20 +329,81 @@ impl Worker {
             self.draw_inset()?;
             self.looked_at = Some(Instant::now());
         }
+        self.look_at_error()?;
         let mean = self.mean_radiance;
+        let denoises = layer == SHOW_PICTURE && self.denoises();
         let mut panel = self.panel.borrow_mut();
         panel.has_right = self.right.is_some();
         for (side, place) in [(Some(&self.left), Place::Left), (self.right.as_ref(), Place::Right)]
         {
             // A film without a sample goes on showing what was there before.
             if let Some(side) = side.filter(|side| side.sample_count() > 0) {
-                panel.projector.show(&side.session.renderer, place, side.layer(layer), mean)?;
+                let denoised = if denoises { self.denoising.filter(side, place)? } else { None };
+                match denoised {
+                    Some(Filtered::Now(pixels)) => {
+                        panel.projector.show(&side.session.renderer, place, SHOW_PICTURE, mean)?;
+                        panel.projector.replace(place, &pixels)?;
+                    }
+                    Some(Filtered::Before) => {}
+                    None => {
+                        let layer = side.layer(layer);
+                        panel.projector.show(&side.session.renderer, place, layer, mean)?;
+                    }
+                }
             }
         }
         panel.present()?;
         drop(panel);
-        (self.announce)(self.title());
+        self.tell();
         Ok(())
+    }
+
+    /// Takes the error of the film at rest from its sums, from time to time and at its end.
+    fn look_at_error(&mut self) -> Result<()> {
+        let has_ended = self.left.sample_count() >= self.spp;
+        let is_due = has_ended || self.error_at.elapsed() >= ERROR_INTERVAL;
+        let is_shown = self.panel.borrow().projector.has_overlay();
+        if is_due && is_shown && self.motion == Motion::Rest && self.left.sample_count() > 1 {
+            self.error = Some(self.left.session.renderer.sums()?.relative_standard_error());
+            self.error_at = Instant::now();
+        }
+        Ok(())
+    }
+
+    /// Tells title and controls what is shown.
+    fn tell(&self) {
+        (self.announce)(self.status(self.title()));
+    }
+
+    /// State of everything that the controls show.
+    fn status(&self, title: String) -> Status {
+        let samples = self.left.sample_count();
+        let share = 1.0 / f64::from(samples.max(1));
+        let times = &self.left.session.renderer.totals().gpu_ms;
+        let mut pass_ms: Vec<(String, f64)> =
+            times.iter().map(|(name, ms)| (name.clone(), ms * share)).collect();
+        pass_ms.sort_by(|a, b| b.1.total_cmp(&a.1));
+        pass_ms.truncate(TOLD_PASSES);
+        let name = |path: &PathBuf| {
+            let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+            stem.rsplit('.').next().unwrap_or_default().to_owned()
+        };
+        Status {
+            title,
+            sampler: if self.chooses_right { self.right_sampler } else { self.left.sampler },
+            is_split: self.right.is_some(),
+            depth: self.settings.depth,
+            tone: self.panel.borrow().tone,
+            denoise: self.denoising.choice,
+            speed: self.rig.speed,
+            camera: *self.rig.camera(),
+            samples: [samples, self.spp],
+            seconds: self.left.session.seconds(),
+            error: self.error,
+            pass_ms,
+            views: self.views.iter().map(name).collect(),
+            notice: self.notice.clone(),
+        }
     }
 
     /// One line about what is shown.
