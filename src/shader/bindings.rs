@@ -280,14 +280,14 @@ binding_tables! {
 
     /// Set 1 of the passes that show films in a window.
     VIEW = view: 1 {
+        /// The controls: as the inset, with opacity, by which the colours are multiplied.
+        59 OVERLAY: array uint;
         /// Pixels of a film as they are shown: linear radiance, or the colours of a layer.
         60 SHOWN: array vec3;
         /// The same of the film to its right, if there are two.
         61 SHOWN_RIGHT: array vec3;
         /// A picture over the window, a word of bytes a pixel, red lowest.
         62 INSET: array uint;
-        /// The controls: as the inset, with opacity, by which the colours are multiplied.
-        64 OVERLAY: array uint;
         /// Pixels of the window in its own order of bytes.
         63 WINDOW_PIXELS: array uint;
     }

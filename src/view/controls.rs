@@ -239,14 +239,20 @@ fn panel_of(ui: &mut Ui, status: &mut Status, inputs: &mut Vec<Input>) {
     let camera = &mut status.camera;
     let mut slide = |value: &mut f32, low: f32, high: f32, text: &str, of: fn(f32) -> Setting| {
         let slider = Slider::new(value, low..=high).text(text);
-        let slider = if low * 20.0 < high { slider.logarithmic(true) } else { slider };
+        let slider = if low * 20.0 < high {
+            slider.logarithmic(true).smallest_positive(0.1)
+        } else {
+            slider
+        };
         if ui.add(slider.max_decimals(3).clamping(SliderClamping::Edits)).changed() {
             set(of(*value));
         }
     };
     slide(&mut status.speed, 0.1, 10.0, "speed", Setting::Speed);
     slide(&mut camera.vertical_fov_deg, 10.0, 120.0, "view °", Setting::FieldOfView);
-    slide(&mut camera.aperture_radius, 0.0, 1.0, "lens m", Setting::Aperture);
+    let mut radius_mm = 1e3 * camera.aperture_radius;
+    slide(&mut radius_mm, 0.0, 200.0, "lens mm", |mm| Setting::Aperture(1e-3 * mm));
+    camera.aperture_radius = 1e-3 * radius_mm;
     slide(&mut camera.focus_distance, 0.01, 1000.0, "focus m", Setting::Focus);
     ui.separator();
     ui.horizontal_wrapped(|ui| {

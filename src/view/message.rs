@@ -94,7 +94,7 @@ impl Denoise {
         [(Self::Never, "never"), (Self::Moving, "in motion"), (Self::Always, "always")];
 }
 
-/// What the renderer does, for title and controls.
+/// State of the renderer, for title and controls.
 #[derive(Clone, Debug)]
 pub(super) struct Status {
     /// Title of the window.

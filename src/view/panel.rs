@@ -174,8 +174,8 @@ impl Panel {
         Ok(())
     }
 
-    /// Returns what the window shows without controls: its size, and red, green, blue of each pixel. Fails if the device
-    /// does.
+    /// Returns what the window shows without controls: its size, and red, green, blue of each pixel. Fails
+    /// if the device does.
     pub(crate) fn picture(&mut self) -> Result<([u32; 2], Vec<[u8; 3]>)> {
         let mut size = self.swapchain.size();
         if size.contains(&0) {
