@@ -52,12 +52,18 @@ impl Denoising {
         self.filtered = [None; 2];
     }
 
-    /// Filters the film of a side unless this was done just before. Fails if the device or the filter does.
-    pub(super) fn filter(&mut self, side: &Side, place: Place) -> Result<Option<Filtered>> {
+    /// Filters the film of a side, unless this was done just before and the film has not ended. Fails if
+    /// the device or the filter does.
+    pub(super) fn filter(
+        &mut self,
+        side: &Side,
+        place: Place,
+        has_ended: bool,
+    ) -> Result<Option<Filtered>> {
         let Some(denoiser) = &self.denoiser else { return Ok(None) };
         let filtered = &mut self.filtered[usize::from(place == Place::Right)];
         let pause = REST_INTERVAL.max(REST_SHARE * self.took);
-        if filtered.is_some_and(|at| at.elapsed() < pause) {
+        if !has_ended && filtered.is_some_and(|at| at.elapsed() < pause) {
             return Ok(Some(Filtered::Before));
         }
         let sums = side.session.renderer.sums()?;

@@ -338,7 +338,9 @@ impl Worker {
         {
             // A film without a sample goes on showing what was there before.
             if let Some(side) = side.filter(|side| side.sample_count() > 0) {
-                let denoised = if denoises { self.denoising.filter(side, place)? } else { None };
+                let has_ended = side.sample_count() >= self.spp;
+                let denoised =
+                    if denoises { self.denoising.filter(side, place, has_ended)? } else { None };
                 match denoised {
                     Some(Filtered::Now(pixels)) => {
                         panel.projector.show(&side.session.renderer, place, SHOW_PICTURE, mean)?;
