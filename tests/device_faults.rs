@@ -18,7 +18,7 @@ use crate::support::{
 fn folder() -> Folder {
     let folder = Folder::new();
     let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
-    folder.write("scene.toml", command::yard([64, 48], "sky = {}", clay, command::BALL));
+    folder.write("scene.toml", command::yard([64, 48], command::SKY, clay, command::BALL));
     folder
 }
 

@@ -21,9 +21,8 @@ fn task(folder: &Folder, number: u32) -> Child {
     let binary = std::path::Path::new(env!("CARGO_BIN_EXE_fenestra")).parent().unwrap();
     let path = format!("{}:{}", binary.display(), env::var("PATH").unwrap());
     let mut task = Command::new(script);
-    task.current_dir(folder.path())
-        .env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"))
-        .envs([("PATH", &*path), ("SCENE", "scene.toml"), ("OUT", "out"), ("SPP", SPP)])
+    command::prepare(&mut task, folder.path());
+    task.envs([("PATH", &*path), ("SCENE", "scene.toml"), ("OUT", "out"), ("SPP", SPP)])
         .envs([("WIDTH", "24"), ("HEIGHT", "15"), ("BANDS", "2"), ("OPTIONS", OPTIONS)])
         .env("SLURM_ARRAY_TASK_ID", number.to_string());
     task.spawn().unwrap()
@@ -33,7 +32,7 @@ fn task(folder: &Folder, number: u32) -> Child {
 fn tasks_of_a_farm_give_the_bits_of_one_process() {
     let folder = Folder::new();
     let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
-    folder.write("scene.toml", command::yard([24, 15], "sky = {}", clay, command::BALL));
+    folder.write("scene.toml", command::yard([24, 15], command::SKY, clay, command::BALL));
     let mut tasks = [0, 1, 2, 3].map(|number| (number, task(&folder, number)));
     // One is preempted as soon as it has something to lose.
     let checkpoint = folder.path().join("out/band1.seed1.checkpoint.exr");

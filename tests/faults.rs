@@ -21,7 +21,7 @@ use crate::support::command::{self, Folder, Run, Running, program};
 fn folder() -> Folder {
     let folder = Folder::new();
     let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
-    folder.write("scene.toml", command::yard([24, 16], "sky = {}", clay, command::BALL));
+    folder.write("scene.toml", command::yard([24, 16], command::SKY, clay, command::BALL));
     folder
 }
 
@@ -377,8 +377,8 @@ fn run_after(folder: &Folder, before: &str, arguments: &str) -> Run {
     let program = env!("CARGO_BIN_EXE_fenestra");
     let line = format!("{before}; exec {program} {arguments}");
     let mut shell = Command::new("sh");
-    shell.args(["-c", &line]).current_dir(folder.path());
-    shell.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
+    command::prepare(&mut shell, folder.path());
+    shell.args(["-c", &line]);
     Run::of(&shell.output().unwrap())
 }
 

@@ -15,7 +15,7 @@ fn folder() -> Folder {
     let objects = format!("{}\nmaterial = \"clay\"\n\n[[object]]\n{roof}", command::BALL);
     let keys = "[[camera.keyframe]]\ntime = 0\n[[camera.keyframe]]\ntime = 0.25\n\
                 position = [1.0, 0.8, 2.5]\n";
-    let scene = command::yard([24, 16], "sky = {}", clay, &objects) + keys;
+    let scene = command::yard([24, 16], command::SKY, clay, &objects) + keys;
     folder.write("scene.toml", scene);
     folder
 }

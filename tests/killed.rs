@@ -37,7 +37,7 @@ fn folder() -> Folder {
     let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
     let roof = "shape = \"box\"\nsize = [4.0, 0.1, 4.0]\ntranslate = [0.0, 1.2, 0.0]";
     let objects = format!("{}\nmaterial = \"clay\"\n\n[[object]]\n{roof}", command::BALL);
-    folder.write("scene.toml", command::yard([24, 16], "sky = {}", clay, &objects));
+    folder.write("scene.toml", command::yard([24, 16], command::SKY, clay, &objects));
     render(&folder, None, &["--spp=2", "--checkpoint-interval=1h"]).assert(0, &[]);
     folder
 }

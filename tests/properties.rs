@@ -108,7 +108,7 @@ fn scene_text(random: &mut Random, is_furnace: bool) -> String {
             &[
                 "constant = [0, 0, 0]",
                 "constant = [1e6, 1e6, 1e6]",
-                "sky = {}",
+                "sky = { width = 64 }",
                 "map = \"spot.pfm\"",
                 "map = \"black.pfm\"",
             ],

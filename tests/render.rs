@@ -18,7 +18,7 @@ fn render(folder: &Folder, output: &str, options: &[&str]) -> (Image, Statistics
 fn folder() -> Folder {
     let folder = Folder::new();
     let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
-    folder.write("scene.toml", command::yard([40, 24], "sky = {}", clay, command::BALL));
+    folder.write("scene.toml", command::yard([40, 24], command::SKY, clay, command::BALL));
     folder
 }
 

@@ -38,7 +38,7 @@ const SMALL: [&str; 10] = [
 fn yard(diffuse: &str) -> String {
     let clay = format!("type = \"plastic\"\ndiffuse = {diffuse}\nalpha = 0.2");
     let object = "shape = \"box\"\nsize = [0.6, 0.6, 0.6]\ntranslate = [0.0, 0.3, 0.0]";
-    command::yard([24, 16], "sky = {}", &clay, object)
+    command::yard([24, 16], command::SKY, &clay, object)
 }
 
 fn folder() -> Folder {

@@ -2,26 +2,35 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
 use std::{
+    env,
     ffi::OsStr,
     io::{BufRead, BufReader, Read},
-    path::Path,
+    path::{Path, PathBuf},
     process::{Child, ChildStderr, Command, Output, Stdio},
     thread,
     time::{Duration, Instant},
 };
 
-pub use super::folder::{BALL, Folder, yard};
+pub use super::folder::{BALL, Folder, SKY, yard};
 
-/// Prepares the program to run in `folder`. Its caches lie in the build folder, so that pipelines
-/// are compiled once and the user's own caches stay untouched.
+/// Prepares the program to run in `folder`; see [`prepare`].
 pub fn program(folder: &Path) -> Command {
-    prepared(Command::new(env!("CARGO_BIN_EXE_fenestra")), folder)
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fenestra"));
+    prepare(&mut command, folder);
+    command
 }
 
-fn prepared(mut command: Command, folder: &Path) -> Command {
+/// Prepares a command that runs the program in `folder`. Its caches lie in the build folder, so that the
+/// user's own stay untouched; lavapipe's is that of the tests' own devices, wherever the others are put, so
+/// that each pipeline is compiled once.
+pub fn prepare(command: &mut Command, folder: &Path) {
     command.current_dir(folder).env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
     command.env_remove("RUST_LOG");
-    command
+    let cache = env::var_os("XDG_CACHE_HOME").map(PathBuf::from);
+    let home = || env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache"));
+    if let (None, Some(cache)) = (env::var_os("MESA_SHADER_CACHE_DIR"), cache.or_else(home)) {
+        command.env("MESA_SHADER_CACHE_DIR", cache);
+    }
 }
 
 /// Result of a run of the program.
@@ -68,12 +77,9 @@ impl Running {
     pub fn start(folder: &Path, arguments: &[&str], text: &str) -> Self {
         let mut heeding = Command::new("env");
         heeding.args(["--default-signal=HUP,INT,TERM", env!("CARGO_BIN_EXE_fenestra")]);
-        let mut child = prepared(heeding, folder)
-            .args(arguments)
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        prepare(&mut heeding, folder);
+        let mut child =
+            heeding.args(arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         let mut messages = BufReader::new(child.stderr.take().unwrap());
         let mut line = String::new();
         while !line.contains(text) {

@@ -46,6 +46,9 @@ material = "clay"
 /// Object of a [`yard`]: a ball of 1 m on the floor.
 pub const BALL: &str = "shape = \"sphere\"\nradius = 0.5\ntranslate = [0.0, 0.5, 0.0]";
 
+/// Environment of a [`yard`]: a sky in a map so small that a process makes it in no time.
+pub const SKY: &str = "sky = { width = 64 }";
+
 /// A temporary folder for one test.
 pub struct Folder(TempDir);
 
