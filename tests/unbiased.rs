@@ -1,6 +1,7 @@
 //! Every sampler converges to the same image: z-tests of block means of independent replicates.
 //!
-//! The reference is `cosine`, which knows neither BRDF nor environment. A scene has up to eleven
+//! The reference is `mis`, whose noise is the least of those that learn nothing; `cosine`, which knows
+//! neither BRDF nor environment, is one of those compared with it. A scene has up to eleven
 //! comparisons of 37 values (12 blocks × 3 channels, and the mean). A p-value below 3e-6 is an alarm, by
 //! Student's distribution with Welch's degrees of freedom: the errors of the two sides differ. So a scene
 //! raises a false alarm once in about 820 runs, the three scenes once in 280, the whole file once in 100.
@@ -32,12 +33,12 @@ use crate::support::{
 /// Least p-value allowed, that of |t| = 7.5 where both sides have the same error.
 const LEAST_P_VALUE: f64 = 3e-6;
 
-const ALL_AGAINST_COSINE: [Sampler; 12] = [
+const ALL_AGAINST_MIS: [Sampler; 12] = [
+    Sampler::Mis,
     Sampler::Cosine,
     Sampler::Uniform,
     Sampler::Brdf,
     Sampler::Env,
-    Sampler::Mis,
     Sampler::Ris,
     Sampler::Product,
     Sampler::Visibility,
@@ -52,11 +53,26 @@ fn replicates(scene: &Scene, settings: &Settings, samples: u32) -> Vec<Estimate>
     replicates::replicates(scene, settings, 1000 * settings.sampler as u32, samples)
 }
 
-/// Compares the `samplers` with the first of them, the reference.
+/// Compares the `samplers` with the first of them, the reference. Lobes are fitted to few views, which costs
+/// `product` and `visibility` some noise, and saves most of the time of fits.
 fn samplers_agree(scene: &Scene, depth: u32, samples: u32, samplers: &[Sampler]) {
-    let settings = |sampler: &Sampler| Settings { sampler: *sampler, depth, ..Settings::default() };
+    let mut parameters = Parameters::default();
+    parameters.set("views=8").unwrap();
+    let settings = |sampler: &Sampler| {
+        let parameters = parameters.clone();
+        Settings { sampler: *sampler, parameters, depth, ..Settings::default() }
+    };
     let all: Vec<Settings> = samplers.iter().map(settings).collect();
     settings_agree(scene, samples, &all);
+}
+
+/// Returns how many times the samples of others a sampler that knows not where the light is takes, so that
+/// its noise allows a judgement.
+fn times_the_samples(sampler: Sampler) -> u32 {
+    match sampler {
+        Sampler::Cosine | Sampler::Uniform | Sampler::Brdf => 3,
+        _ => 1,
+    }
 }
 
 /// Compares renders with all `settings` with the first of them, the reference.
@@ -64,7 +80,7 @@ fn settings_agree(scene: &Scene, samples: u32, settings: &[Settings]) {
     let reference = replicates(scene, &settings[0], 4 * samples);
     for settings in &settings[1..] {
         let name = format!("{} depth {} {}", scene.name, settings.depth, settings.sampler.name());
-        let values = replicates(scene, settings, samples);
+        let values = replicates(scene, settings, times_the_samples(settings.sampler) * samples);
         let Comparison { largest_t, ratio, largest_t_with_bias } =
             Comparison::new(&values, &reference);
         let p_value = smallest_p_value(&values, &reference, REPLICATES);
@@ -107,7 +123,7 @@ fn in_the_open() {
         scenes::copper(0.35),
         measured(),
     ]);
-    samplers_agree(&scene, 1, 16, &ALL_AGAINST_COSINE);
+    samplers_agree(&scene, 1, 6, &ALL_AGAINST_MIS);
 }
 
 #[test]
@@ -115,7 +131,7 @@ fn in_a_closed_room() {
     let _alone = support::alone();
     let scene =
         scenes::room(vec![scenes::diffuse(Vec3::splat(0.6)), measured(), scenes::plastic(0.3)]);
-    samplers_agree(&scene, 1, 48, &ALL_AGAINST_COSINE);
+    samplers_agree(&scene, 1, 16, &ALL_AGAINST_MIS);
 }
 
 #[test]
@@ -126,23 +142,23 @@ fn in_a_closed_room_with_bounces() {
     // Samplers that choose directions at later vertices in ways of their own. `haar` draws there as
     // `product` does, and `product` as `visibility` without a cache.
     let samplers = [
-        Sampler::Cosine,
         Sampler::Mis,
+        Sampler::Cosine,
         Sampler::Ris,
         Sampler::Visibility,
         Sampler::Guided,
         Sampler::ControlVariates,
         Sampler::Tiles,
     ];
-    samplers_agree(&scene, 4, 24, &samplers);
+    samplers_agree(&scene, 4, 14, &samplers);
 }
 
 #[test]
 fn in_a_glazed_room_with_lamps() {
     let _alone = support::alone();
     let scene = scenes::glazed_room();
-    let samplers = [Sampler::Cosine, Sampler::Mis, Sampler::Visibility, Sampler::Guided];
-    samplers_agree(&scene, 4, 16, &samplers);
+    // `with_escaped_bounces_past_mirrors_glass_and_lamps` compares `mis` with `cosine`.
+    samplers_agree(&scene, 4, 16, &[Sampler::Mis, Sampler::Visibility, Sampler::Guided]);
 }
 
 /// `cosine`, then `mis` with and without compensation and with one and five shadow rays, then `guided`.
@@ -223,7 +239,7 @@ fn every_sampler_with_every_material() {
     let sighted: Vec<Sampler> = [Sampler::Brdf]
         .into_iter()
         .chain(
-            ALL_AGAINST_COSINE
+            ALL_AGAINST_MIS
                 .into_iter()
                 .filter(|sampler| *sampler != Sampler::Brdf && !blind.contains(sampler)),
         )
@@ -231,7 +247,7 @@ fn every_sampler_with_every_material() {
     let white = scenes::diffuse(Vec3::splat(0.6));
     let wanted = env::var("FENESTRA_MATERIAL_PAIR").ok();
     let wanted = wanted.map(|text| text.parse::<usize>().expect("the number of a pair"));
-    let rough = rough.chunks(2).map(|pair| (pair, &ALL_AGAINST_COSINE[..]));
+    let rough = rough.chunks(2).map(|pair| (pair, &ALL_AGAINST_MIS[..]));
     let pairs = rough.chain(polished.chunks(2).map(|pair| (pair, &sighted[..])));
     for (index, (pair, samplers)) in pairs.enumerate() {
         if wanted.is_some_and(|wanted| wanted != index) {
