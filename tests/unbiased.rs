@@ -61,9 +61,11 @@ fn samplers_agree(scene: &Scene, depth: u32, samples: u32, samplers: &[Sampler])
     for assignment in ["environment-lobes=32", "brdf-lobes=8", "views=8"] {
         parameters.set(assignment).unwrap();
     }
-    let settings = |sampler: &Sampler| {
-        let parameters = parameters.clone();
-        Settings { sampler: *sampler, parameters, depth, ..Settings::default() }
+    let settings = |sampler: &Sampler| Settings {
+        sampler: *sampler,
+        parameters,
+        depth,
+        ..Settings::default()
     };
     let all: Vec<Settings> = samplers.iter().map(settings).collect();
     settings_agree(scene, samples, &all);
