@@ -178,9 +178,11 @@ impl Runner {
             };
             let pixel_count = together.min(pixels - done).min(of_page);
             let wave = Wave { first_pixel, pixel_count, ..wave };
-            let times = self.run(technique, wave, self.settings.depth)?;
-            self.steer(&times, wave);
             done += wave.pixel_count;
+            // The last wave of a picture's sweep ends with its samples in the sums.
+            let is_whole = done == pixels && wave.is_training == 0;
+            let times = self.run_to(technique, wave, self.settings.depth, is_whole)?;
+            self.steer(&times, wave);
             if self.watch.as_mut().is_some_and(|watch| watch(&wave)) {
                 self.is_stopped = true;
                 if wave.is_training != 0 || wave.sample_count == 1 {
@@ -193,20 +195,17 @@ impl Runner {
                 uncounted = 0;
             }
         }
-        if done == pixels && wave.is_training == 0 {
-            self.accumulate(technique, wave)?;
-        }
         Ok(done)
     }
 
-    /// Adds the samples of a sweep like `wave` to the sums of the film, page by page.
-    fn accumulate(&mut self, technique: &dyn Passes, wave: Wave) -> Result<()> {
-        let kernel = accumulation();
-        if !self.passes.contains_key(&kernel) {
-            self.passes.insert(kernel.clone(), Pass::new(&self.device, kernel.clone())?);
-        }
-        let pages = self.film.pages().count() as u32;
-        let mut recording = Recording::begin(&self.device, pages, None)?;
+    /// Records the pass that adds the samples of a sweep like `wave` to the sums of the film, page by page.
+    fn record_accumulation(
+        &self,
+        recording: &mut Recording<'_>,
+        technique: &dyn Passes,
+        wave: Wave,
+    ) -> Result<()> {
+        let pass = &self.passes[&accumulation()];
         self.film.copy_edges(recording.commands(), wave.sample_count);
         let mut first_pixel = 0;
         while first_pixel < self.film.padded_pixels() {
@@ -215,12 +214,9 @@ impl Runner {
             let film_start = self.film.first_pixel(first_pixel);
             let film = self.film.set(first_pixel);
             let sets = sets(&self.scene, technique, &self.waves, &self.sharing, film);
-            let wave = Wave { first_pixel, pixel_count, film_start, ..wave };
-            recording.add(&self.passes[&kernel], &sets, &wave)?;
+            recording.add(pass, &sets, &Wave { first_pixel, pixel_count, film_start, ..wave })?;
             first_pixel += pixel_count;
         }
-        let times = recording.finish()?;
-        self.totals.add_times(&times);
         Ok(())
     }
 
@@ -237,6 +233,17 @@ impl Runner {
         wave: Wave,
         vertices: u32,
     ) -> Result<PassTimes> {
+        self.run_to(technique, wave, vertices, false)
+    }
+
+    /// As [`Runner::run`]; after the last wave of a sweep, `accumulates` its samples.
+    fn run_to(
+        &mut self,
+        technique: &dyn Passes,
+        wave: Wave,
+        vertices: u32,
+        accumulates: bool,
+    ) -> Result<PassTimes> {
         let film_start = self.film.first_pixel(wave.first_pixel);
         let wave = Wave { film_start, ..wave };
         let settings = PassSettings { path_lists: self.path_lists(), ..self.settings };
@@ -244,7 +251,12 @@ impl Runner {
         let tracer = self.scene.geometry().host_tracer();
         let answers = || self.waves.answers(self.scene.parameters());
         let host = tracer.map(|tracer| (tracer, answers()));
-        let mut recording = Recording::begin(&self.device, order.len() as u32, host)?;
+        let pages = if accumulates { self.film.pages().count() } else { 0 };
+        if let Entry::Vacant(vacant) = self.passes.entry(accumulation()) {
+            let pass = Pass::new(&self.device, vacant.key().clone())?;
+            vacant.insert(pass);
+        }
+        let mut recording = Recording::begin(&self.device, (order.len() + pages) as u32, host)?;
         let film = self.film.set(wave.first_pixel);
         let sets = sets(&self.scene, technique, &self.waves, &self.sharing, film);
         for Dispatch { kernel, wave } in order {
@@ -256,6 +268,9 @@ impl Runner {
                 }
             };
             recording.add(pass, &sets, &wave)?;
+        }
+        if accumulates {
+            self.record_accumulation(&mut recording, technique, wave)?;
         }
         let times = recording.finish()?;
         self.totals.add_times(&times);
