@@ -123,7 +123,7 @@ pub struct Scene {
     pub geometry: Geometry,
     /// Files that the scene was read from; empty for a scene made in memory.
     pub inputs: Vec<PathBuf>,
-    /// Names of variants of the materials, one of which [`LoadOptions::variant`] may choose.
+    /// Variants of the materials by name; [`variant`](load::LoadOptions::variant) may choose one of them.
     pub variants: Vec<String>,
     /// Settings of the render that the file asks for.
     pub asked: Asked,
