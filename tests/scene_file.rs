@@ -34,6 +34,7 @@ fn sources() -> String {
         "texture/mod.rs",
         "environment/court.rs",
         "environment/sky.rs",
+        "environment/moment.rs",
         "shapes/mod.rs",
         "shapes/blobs.rs",
         "shapes/extrude.rs",
@@ -111,6 +112,7 @@ fn kind(all: &str, rust: &str) -> String {
         "bool" => "true or false",
         "u32" | "usize" => "whole number",
         "[usize; 2]" => "two whole numbers",
+        "[u32; 3]" => "three whole numbers",
         "String" | "Spanned<String>" => "text",
         "PathBuf" => "path",
         "NumberOrVector" => "number or three numbers",
@@ -118,7 +120,7 @@ fn kind(all: &str, rust: &str) -> String {
         "Textured<f32>" => "number or texture",
         "Textured<[f32; 3]>" => "colour or texture",
         "TextureEntry" => "texture",
-        "CourtParameters" | "SkyParameters" => "table",
+        "CourtParameters" | "SkyParameters" | "DaylightParameters" => "table",
         "BTreeMap<String, String>" => "table of names",
         "Vec<[f32; 2]>" => "list of [x, y]",
         "Vec<[f32; 3]>" => "list of [x, y, z]",
@@ -242,11 +244,12 @@ fn the_page_has_every_key_of_every_table() {
     section("`[[camera.keyframe]]`; what it leaves out is that of `[camera]`", "KeyframeEntry");
     section("`[film]`", "FilmSettings");
     section(
-        "`[environment]`: exactly one of `map`, `constant`, `court` and `sky`",
+        "`[environment]`: exactly one of `map`, `constant`, `court`, `sky` and `daylight`",
         "EnvironmentEntry",
     );
     section("`court` in `[environment]`", "CourtParameters");
     section("`sky` in `[environment]`", "SkyParameters");
+    section("`daylight` in `[environment]`; north is −Z", "DaylightParameters");
     section("`[[lamp]]`", "LampKeys");
     for (name, entry) in kinds("LampKindEntry::", "(", "Entry") {
         section(&format!("`[[lamp]]` with `type = \"{name}\"`"), &entry);

@@ -10,7 +10,9 @@ use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage,
 };
 use fenestra_scene::{
-    environment::{CourtParameters, EnvironmentMap, EnvironmentTables, SkyParameters},
+    environment::{
+        CourtParameters, DaylightParameters, EnvironmentMap, EnvironmentTables, SkyParameters,
+    },
     math::{colour::luminance, frame::direction_from_lat_long},
 };
 use glam::{Vec2, Vec3};
@@ -362,6 +364,10 @@ fn parameters_out_of_range_are_refused_by_name() {
         let parameters: CourtParameters = toml::from_str(text).map_err(|e| e.to_string())?;
         EnvironmentMap::court(&parameters, 1.0, 0.0).map(|_| ())
     };
+    let daylight = |text: &str| {
+        let parameters: DaylightParameters = toml::from_str(text).map_err(|e| e.to_string())?;
+        EnvironmentMap::daylight(&parameters, 1.0, 0.0).map(|_| ())
+    };
     sky("width = 64\nsun_radius_deg = 5").unwrap();
     court("width = 64\nstoreys = 20\nglint_share = 1").unwrap();
     let cases = [
@@ -372,6 +378,11 @@ fn parameters_out_of_range_are_refused_by_name() {
         (sky("zenith = [0, -1, 0]"), "zenith"),
         (sky("sun_radiance = [inf, 1, 1]"), "sun_radiance"),
         (sky("moon = 1"), "unknown field `moon`"),
+        (daylight("turbidity = 0"), "turbidity = 0; expected 1…10"),
+        (daylight("date = [2026, 13, 1]"), "date: month = 13; expected 1…12"),
+        (daylight("date = [2024, 2, 30]"), "date: day = 30; expected 1…29"),
+        (daylight("date = [2025, 12, 32]"), "date: day = 32; expected 1…31"),
+        (daylight("sun_direction = [0, 0, 0]"), "expected a vector other than 0"),
         (court("width = 0"), "width = 0"),
         (court("eye_height = 30"), "eye_height = 30"),
         (court("storeys = 0"), "storeys = 0"),

@@ -779,6 +779,36 @@ fn daylight_stands_where_mitsuba_has_it() {
     assert!(found.dot(DEFAULT_SUN) > 0.9999, "{found}");
 }
 
+/// The zenith of version 0.6 is +Y, and its north −Z, as those of scene files.
+#[test]
+fn daylight_of_scene_files_is_that_of_mitsuba() {
+    let head = "[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\nvertical_fov_deg = 60\n";
+    for (own, theirs) in [
+        (
+            "date = [2026, 3, 21], hour = 9.5, timezone = 1, place = [48.14, 11.58], sun_scale = 0.5",
+            r#"<integer name="year" value="2026"/><integer name="month" value="3"/>
+            <integer name="day" value="21"/><float name="hour" value="9.5"/>
+            <float name="timezone" value="1"/><float name="latitude" value="48.14"/>
+            <float name="longitude" value="11.58"/><float name="sun_scale" value="0.5"/>"#,
+        ),
+        (
+            "sun_direction = [0.3, 0.6, 0.5], turbidity = 4.5",
+            r#"<vector name="sun_direction" value="0.3 0.6 0.5"/>
+            <float name="turbidity" value="4.5"/>"#,
+        ),
+    ] {
+        let folder = Folder::new();
+        let emitter = format!(
+            "<emitter type=\"sunsky\">{theirs}<rgb name=\"albedo\" value=\"0.3\"/></emitter>"
+        );
+        let text = document(&format!("{SENSOR}{emitter}")).replace("3.0.0", "0.6.0");
+        let theirs = loaded(&folder.write("a.xml", text)).environment;
+        let text = format!("{head}[environment]\ndaylight = {{ {own} }}\n");
+        let own = loaded(&folder.write("b.toml", text)).environment;
+        assert!(own.texels == theirs.texels && !own.is_black(), "{own:?}");
+    }
+}
+
 #[test]
 fn bad_files_end_in_one_error_with_file_and_line() {
     let shape = |content: &str| format!("<shape type=\"rectangle\">{content}</shape>");

@@ -331,7 +331,7 @@ fn numbers_that_cannot_be_rendered_are_refused_by_name() {
     );
     case(
         &set("constant = [1, 1, 1]", ""),
-        "environment: expected exactly one of map, constant, court, sky, found none",
+        "environment: expected exactly one of map, constant, court, sky, daylight, found none",
     );
     case(&set("[1, 1, 1]", "[1, 1, 1]\nmap = \"a.hdr\""), "found map and constant");
     case(

@@ -35,7 +35,7 @@ pub struct CourtParameters {
     pub glint: [f32; 3],
     /// Radiance of the sky at the zenith; it brightens toward −Z.
     pub sky: [f32; 3],
-    /// Reflectance of the facades, 0…1; sooty stone is about 0.15.
+    /// Reflectance of the facades, 0…1.
     pub facade: [f32; 3],
     /// Chooses which windows glint and the irregularities of plaster and paving.
     pub seed: u32,

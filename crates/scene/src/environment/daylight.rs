@@ -27,6 +27,9 @@ const SUN_RANGE_DEG: (f32, f32) = (2.0, 88.0);
 /// Width of the map, texels: the sun is three texels wide.
 const WIDTH: u32 = 2048;
 
+/// Angular radius of the sun, degrees.
+pub(crate) const SUN_RADIUS_DEG: f32 = 0.2679;
+
 /// Sky and sun over a ground.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Daylight {
@@ -126,8 +129,8 @@ impl Daylight {
         of(turbidity).lerp(of(turbidity + 1), hazier).max(Vec3::ZERO)
     }
 
-    /// Renders the map; black if the sun is down.
-    pub(crate) fn map(&self) -> EnvironmentMap {
+    /// Renders the map, radiance times `scale`, rotated by `rotation_deg`; black if the sun is down.
+    pub(crate) fn map(&self, scale: f32, rotation_deg: f32) -> EnvironmentMap {
         let mut texels = vec![Vec3::ZERO; (WIDTH * (WIDTH / 2)) as usize];
         if self.sun_elevation() >= 0.0 {
             let channels = self.channels();
@@ -145,7 +148,7 @@ impl Daylight {
             let disc = self.sun_scale * self.sun_irradiance() / solid_angle;
             add_disc(&mut texels, WIDTH, self.sun, self.sun_radius_rad, disc);
         }
-        EnvironmentMap::procedural("daylight", WIDTH, texels, 1.0, 0.0)
+        EnvironmentMap::procedural("daylight", WIDTH, texels, scale, rotation_deg)
     }
 }
 
@@ -207,7 +210,7 @@ mod tests {
     fn the_map_has_the_irradiance_of_sky_and_sun() {
         let mut light = daylight(Vec3::new(0.3, 0.5, 0.6), 3.7);
         light.sky_scale = 0.0;
-        let map = light.map();
+        let map = light.map(1.0, 0.0);
         let (width, height) = (map.width as usize, map.height as usize);
         let edge = |row: usize| (PI * row as f32 / height as f32).cos();
         let row = |row: usize| {
@@ -216,6 +219,6 @@ mod tests {
         };
         let found: Vec3 = (0..height).map(row).sum();
         assert!(found.abs_diff_eq(light.sun_irradiance(), 1e-3), "{found}");
-        assert!(daylight(-Vec3::Z, 3.0).map().is_black());
+        assert!(daylight(-Vec3::Z, 3.0).map(1.0, 0.0).is_black());
     }
 }

@@ -9,6 +9,7 @@
 mod court;
 mod daylight;
 mod load;
+mod moment;
 mod procedural;
 mod sky;
 mod table;
@@ -17,7 +18,9 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 pub use court::CourtParameters;
-pub(crate) use daylight::Daylight;
+pub(crate) use daylight::{Daylight, SUN_RADIUS_DEG};
+pub use moment::DaylightParameters;
+pub(crate) use moment::Moment;
 pub use sky::SkyParameters;
 pub use table::{EnvironmentTables, mean_sine};
 
@@ -40,7 +43,7 @@ pub struct EnvironmentMap {
     pub texels: Vec<Vec3>,
     /// Rotation of the map about +Y, radians, counter-clockwise seen from above.
     pub rotation_rad: f32,
-    /// Source of the map, for messages and metadata: a path, or `constant`, `court`, `sky`.
+    /// Source of the map, for messages and metadata: a path, or `constant`, `court`, `sky`, `daylight`.
     pub source: String,
 }
 

@@ -25,7 +25,7 @@ pub struct SkyParameters {
     pub ground: [f32; 3],
     /// Height of the sun's centre above the horizon, degrees, 0…90.
     pub sun_elevation_deg: f32,
-    /// Azimuth of the sun, degrees from −Z (the map's middle) toward +X, clockwise seen from above.
+    /// Azimuth of the sun, degrees from −Z toward +X.
     pub sun_azimuth_deg: f32,
     /// Angular radius of the sun disc, degrees, above 0 and at most 45.
     pub sun_radius_deg: f32,

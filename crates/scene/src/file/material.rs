@@ -24,16 +24,15 @@ pub(crate) struct MaterialEntry {
 pub(crate) struct MaterialKeys {
     /// Name that objects refer to.
     pub name: String,
-    /// Model; the keys of each are below.
+    /// Model.
     pub r#type: Spanned<String>,
-    /// Normal map: a texture whose red, green and blue are 0…1 for −1…1 along u, v and the normal.
+    /// Red, green and blue, 0…1, stand for −1…1 along u, v and the normal.
     pub normal: Option<TextureEntry>,
     /// Share of light that the surface stops, 0…1; the rest goes straight through. Default: 1.
     pub opacity: Option<Textured<f32>>,
-    /// Opacity from which the surface is opaque, and below which it is not there. Default: none,
-    /// so that a surface may be half there.
+    /// Opacity from which the surface is opaque, and below which it is not there. Default: none.
     pub opacity_cutoff: Option<f32>,
-    /// Radiance that the surface emits on the side from which its triangles are counter-clockwise.
+    /// Radiance that the front emits.
     pub emission: Option<Textured<[f32; 3]>>,
     /// Emits on both sides.
     #[serde(default)]
@@ -197,7 +196,7 @@ pub(crate) struct ThinDielectricEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MeasuredEntry {
-    /// MERL or Cornell file, relative to the scene file.
+    /// MERL or Cornell file.
     pub file: PathBuf,
 }
 

@@ -22,7 +22,7 @@ pub(crate) use value::{ChannelEntry, NumberOrVector, TextureEntry, Textured};
 
 use super::{
     FilmSettings,
-    environment::{CourtParameters, SkyParameters},
+    environment::{CourtParameters, DaylightParameters, SkyParameters},
     shapes::Shape,
 };
 use crate::error::Result;
@@ -94,11 +94,11 @@ fn default_up() -> [f32; 3] {
     [0.0, 1.0, 0.0]
 }
 
-/// `[environment]`; exactly one of `map`, `constant`, `court` and `sky`.
+/// `[environment]`; exactly one of `map`, `constant`, `court`, `sky` and `daylight`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct EnvironmentEntry {
-    /// Lat-long image file, relative to the scene file.
+    /// Lat-long image file.
     pub map: Option<PathBuf>,
     /// Radiance that is the same in every direction.
     pub constant: Option<[f32; 3]>,
@@ -106,6 +106,8 @@ pub(crate) struct EnvironmentEntry {
     pub court: Option<CourtParameters>,
     /// Procedural sky.
     pub sky: Option<SkyParameters>,
+    /// Measured sky and sun.
+    pub daylight: Option<DaylightParameters>,
     /// Factor applied to every radiance.
     #[serde(default = "default_environment_scale")]
     pub scale: f32,
@@ -140,7 +142,7 @@ pub(crate) struct ObjectEntry {
 /// Source of an object's triangles.
 #[derive(Debug)]
 pub(crate) enum ObjectSource {
-    /// A mesh file, relative to the scene file.
+    /// A mesh file.
     Mesh(PathBuf),
     /// A procedural shape.
     Shape {
@@ -164,7 +166,7 @@ pub(crate) struct IncludeEntry {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct IncludeKeys {
-    /// glTF or OBJ file with everything in it but its cameras, relative to the scene file.
+    /// glTF or OBJ file with everything in it but its cameras.
     pub file: PathBuf,
     /// Factor along each axis, or one for all; applied first. Intensities of lamps grow with its
     /// square.

@@ -32,9 +32,9 @@ use crate::{
 struct ObjectKeys {
     /// Name, for messages.
     name: Option<String>,
-    /// PLY, OBJ, glTF or GLB file, relative to the scene file; this or `shape`.
+    /// PLY, OBJ, glTF or GLB file; this or `shape`.
     mesh: Option<PathBuf>,
-    /// Procedural shape; the keys of each are below.
+    /// Procedural shape.
     shape: Option<Spanned<String>>,
     /// Name of a material; may be absent where the mesh file brings its own.
     material: Option<String>,
@@ -55,7 +55,7 @@ struct ObjectKeys {
 struct LampKeys {
     /// Name, for messages.
     name: Option<String>,
-    /// Kind; the keys of each are below.
+    /// Kind.
     r#type: Spanned<String>,
 }
 

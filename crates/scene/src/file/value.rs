@@ -62,7 +62,7 @@ where
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct TextureEntry {
-    /// PNG, JPEG, WebP, TGA, HDR or EXR image, relative to the scene file.
+    /// PNG, JPEG, WebP, TGA, HDR or EXR image.
     pub texture: PathBuf,
     /// Repetitions of the image per unit of the texture coordinates, along u and v or both.
     #[serde(default)]

@@ -55,37 +55,46 @@ impl Loader<'_> {
         let (scale, rotation_deg) = (entry.scale, entry.rotation_deg);
         self.check_range("environment.scale", &[scale], (0.0, f32::MAX))?;
         self.check_range("environment.rotation_deg", &[rotation_deg], (f32::MIN, f32::MAX))?;
-        match (&entry.map, &entry.constant, &entry.court, &entry.sky) {
-            (Some(map), None, None, None) => match self.arrays.images.get(map) {
+        let named = |name: &str, map: Result<EnvironmentMap, String>| {
+            map.map_err(|message| self.error(format!("environment.{name}: {message}")))
+        };
+        match (&entry.map, &entry.constant, &entry.court, &entry.sky, &entry.daylight) {
+            (Some(map), None, None, None, None) => match self.arrays.images.get(map) {
                 Some(image) => {
                     let name = map.display().to_string();
-                    EnvironmentMap::of_image(&name, image, scale, rotation_deg, warnings)
-                        .map_err(|message| self.error(format!("environment.map: {message}")))
+                    let map = EnvironmentMap::of_image(&name, image, scale, rotation_deg, warnings);
+                    named("map", map)
                 }
                 None => EnvironmentMap::load(&self.folder.join(map), scale, rotation_deg, warnings),
             },
-            (None, Some(constant), None, None) => {
+            (None, Some(constant), None, None, None) => {
                 self.check_range("environment.constant", constant, (0.0, f32::MAX))?;
-                EnvironmentMap::constant(Vec3::from_array(*constant), scale)
-                    .map_err(|message| self.error(format!("environment.constant: {message}")))
+                named("constant", EnvironmentMap::constant(Vec3::from_array(*constant), scale))
             }
-            (None, None, Some(court), None) => EnvironmentMap::court(court, scale, rotation_deg)
-                .map_err(|message| self.error(format!("environment.court: {message}"))),
-            (None, None, None, Some(sky)) => EnvironmentMap::sky(sky, scale, rotation_deg)
-                .map_err(|message| self.error(format!("environment.sky: {message}"))),
-            (map, constant, court, sky) => {
+            (None, None, Some(court), None, None) => {
+                named("court", EnvironmentMap::court(court, scale, rotation_deg))
+            }
+            (None, None, None, Some(sky), None) => {
+                named("sky", EnvironmentMap::sky(sky, scale, rotation_deg))
+            }
+            (None, None, None, None, Some(daylight)) => {
+                named("daylight", EnvironmentMap::daylight(daylight, scale, rotation_deg))
+            }
+            (map, constant, court, sky, daylight) => {
                 let found: Vec<_> = [
                     ("map", map.is_some()),
                     ("constant", constant.is_some()),
                     ("court", court.is_some()),
                     ("sky", sky.is_some()),
+                    ("daylight", daylight.is_some()),
                 ]
                 .into_iter()
                 .filter_map(|(name, is_there)| is_there.then_some(name))
                 .collect();
                 let found = if found.is_empty() { "none".to_owned() } else { found.join(" and ") };
                 Err(self.error(format!(
-                    "environment: expected exactly one of map, constant, court, sky, found {found}"
+                    "environment: expected exactly one of map, constant, court, sky, daylight, found \
+                     {found}"
                 )))
             }
         }

@@ -25,8 +25,7 @@ pub(crate) struct Extrude {
     /// Segments of a rounded rim.
     #[serde(default = "default_count::<4>")]
     pub bevel_segments: usize,
-    /// Spline segments between two points of the outline; 1 is straight. A point given twice is a
-    /// corner of the spline.
+    /// Spline segments between two points of the outline; 1 is straight.
     #[serde(default = "default_count::<1>")]
     pub smooth: usize,
     /// Angle above which a corner of the outline is sharp, degrees.

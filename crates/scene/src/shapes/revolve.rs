@@ -78,8 +78,7 @@ pub(crate) struct Lathe {
     /// Joins the profile's last point to its first: a ring.
     #[serde(default)]
     pub closed: bool,
-    /// Spline segments between two points of the profile; 1 is straight. A point given twice is a
-    /// corner of the spline.
+    /// Spline segments between two points of the profile; 1 is straight.
     #[serde(default = "default_count::<1>")]
     pub smooth: usize,
     /// Angle above which a corner is sharp, degrees.
