@@ -123,7 +123,8 @@ features! {
     PBRT_TEXTURE_MIX "mixtures of two images, or by an image" "the greater share counts";
     PBRT_TEXTURE_WRAP "`wrap` other than `repeat` and `clamp`" "as `clamp`";
     PBRT_TEXTURE_MAPPING "`mapping` of textures other than `uv`" "as `uv`";
-    PBRT_LIGHT "`projection`, `goniometric`" "left out";
+    PBRT_LIGHT_IMAGE "image of `goniometric` and `projection`"
+        "its mean from a point, or over a cone as wide";
     PBRT_PORTAL "`portal` of lights" "they hide nothing";
     PBRT_EMISSION_IMAGE "images of bilinear patches that emit" "their area light counts";
     PBRT_INSTANCE_LIGHT "area lights in objects" "dark, as in pbrt";
@@ -160,7 +161,7 @@ features! {
     MI_SPECULAR "`specular_reflectance` of plastic" "white";
     MI_SPECULAR_TEXTURE "textures of `specular_reflectance` and `specular_transmittance` of dielectrics"
         "white";
-    MI_SPOT_TEXTURE "`texture` of a `spot`" "";
+    MI_SPOT_TEXTURE "`texture` of a `spot`" "its mean over the whole cone";
     MI_EMITTER "other emitters, by name" "left out";
     MI_SENSORS "sensors that are not used" "";
     MI_MIRRORED "mirror image of the sensor's `to_world`" "the picture is not mirrored";

@@ -487,6 +487,16 @@ fn lamps_shine_where_they_look() {
     assert_eq!(scene.lamps[1].kind, LampKind::Directional { direction: Vec3::NEG_Y, irradiance });
     let position = Vec3::new(1.0, 0.0, 2.0);
     assert_eq!(scene.lamps[2].kind, LampKind::Point { position, intensity: Vec3::ONE });
+
+    let folder = Folder::new();
+    write_image(&folder, "a.png");
+    let text = r#"<emitter type="spot"><rgb name="intensity" value="2,4,6"/>
+        <texture type="bitmap" name="texture"><string name="filename" value="a.png"/></texture>
+        </emitter>"#;
+    let scene = loaded(&folder.write("a.xml", document(&format!("{SENSOR}{text}"))));
+    let LampKind::Spot { intensity, .. } = scene.lamps[0].kind else { panic!() };
+    assert_close(intensity, Vec3::new(1.0, 2.0, 3.0));
+    assert!(scene.warnings[0].ends_with("its mean over the whole cone"), "{:?}", scene.warnings);
 }
 
 /// Normal of the winding of the first triangle.

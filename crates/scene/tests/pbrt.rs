@@ -443,8 +443,7 @@ fn lamps_have_their_places_and_powers() {
         LightSource "point" "rgb I" [1 2 3] "float scale" 2 "point3 from" [0 1 0]
         LightSource "point" "float power" 12.566371
         LightSource "distant" "point3 from" [0 1 0] "point3 to" [0 0 0] "float illuminance" 3
-        LightSource "spot" "float coneangle" 40 "float conedeltaangle" 10 "point3 to" [1 0 0]
-        LightSource "goniometric" "string filename" "a.exr""#;
+        LightSource "spot" "float coneangle" 40 "float conedeltaangle" 10 "point3 to" [1 0 0]"#;
     let scene = world(text);
     let kinds: Vec<_> = scene.lamps.iter().map(|lamp| lamp.kind).collect();
     assert_eq!(
@@ -463,7 +462,7 @@ fn lamps_have_their_places_and_powers() {
     assert_eq!((direction, falloff), (Vec3::X, SpotFalloff::SmoothCosine));
     assert!((inner_angle_rad - 30_f32.to_radians()).abs() < 1e-6);
     assert!((outer_angle_rad - 40_f32.to_radians()).abs() < 1e-6);
-    assert_eq!(warnings(&scene), ["ignored LightSource `goniometric` (line 8)"]);
+    assert_eq!(warnings(&scene), [""; 0]);
     // A plain camera mirrors the world in z.
     let far = load(VIEW, r#"LightSource "point" "point3 from" [0 0 4]"#);
     assert!(matches!(far.lamps[0].kind, LampKind::Point { position, .. } if position.z == -4.0));
@@ -471,6 +470,45 @@ fn lamps_have_their_places_and_powers() {
     let area = world(r#"AreaLightSource "diffuse" "float power" 3 Shape "disk""#);
     let radiance = area.materials[0].surface.emission.as_ref().unwrap().radiance.x;
     assert!((radiance * std::f32::consts::PI.powi(2) - 3.0).abs() < 0.01, "{radiance}");
+}
+
+#[test]
+fn lamps_with_images_have_their_means() {
+    let folder = Folder::new();
+    image(&folder);
+    let text = format!(
+        r#"{MIRRORED} WorldBegin
+        LightSource "goniometric" "string filename" "a.png" "rgb I" [3 6 9]
+        LightSource "goniometric" "string filename" "a.png" "float power" 12.566371
+        Rotate 90 0 1 0 LightSource "projection" "string filename" "a.png" "float fov" 90
+        LightSource "projection" "string filename" "a.png" "float fov" 90 "float power" 1"#
+    );
+    let scene = Scene::load(&folder.write("room.pbrt", text)).unwrap();
+    let intensity = |lamp: usize| match scene.lamps[lamp].kind {
+        LampKind::Point { intensity, .. } | LampKind::Spot { intensity, .. } => intensity,
+        LampKind::Directional { .. } => panic!(),
+    };
+    assert!(intensity(0).abs_diff_eq(Vec3::new(1.0, 2.0, 3.0), 1e-5), "{}", intensity(0));
+    assert!(intensity(1).abs_diff_eq(Vec3::ONE, 1e-5), "{}", intensity(1));
+    let LampKind::Spot { direction, outer_angle_rad, .. } = scene.lamps[2].kind else { panic!() };
+    assert!(direction.abs_diff_eq(Vec3::X, 1e-6), "{direction}");
+    assert!(intensity(2).abs_diff_eq(Vec3::new(0.5, 0.0, 0.5), 1e-5), "{}", intensity(2));
+    // The frame, 4 wide and 2 high at the distance 1, integrated by its middle points.
+    let middle = |index: usize| (index as f32 + 0.5) / 50.0;
+    let places = (0..100).flat_map(|x| (0..50).map(move |y| (2.0 * middle(x), 2.0 * middle(y))));
+    let solid_angle: f32 = places
+        .map(|(x, y)| 0.04 * 0.04 / (1.0 + (x - 2.0).powi(2) + (y - 1.0).powi(2)).powf(1.5))
+        .sum();
+    let cone = 2.0 * std::f32::consts::PI * (1.0 - outer_angle_rad.cos());
+    assert!((cone / solid_angle - 1.0).abs() < 2e-3, "{cone} {solid_angle}");
+    let power = solid_angle * (0.2126 * intensity(3).x + 0.0722 * intensity(3).z);
+    assert!((power - 1.0).abs() < 2e-3, "{power}");
+    let found = warnings(&scene);
+    assert!(
+        found[0].contains("image of LightSource `goniometric` (2, first in line 2)"),
+        "{found:?}"
+    );
+    assert_eq!(found.len(), 2, "{found:?}");
 }
 
 #[test]

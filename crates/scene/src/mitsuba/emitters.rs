@@ -90,13 +90,15 @@ impl Reader<'_> {
         let matrix = parameters.transform("to_world")?;
         let outer = parameters.float_in("cutoff_angle", (0.01, 179.0))?.unwrap_or(20.0);
         let inner = parameters.float_in("beam_width", (0.0, 179.0))?.unwrap_or(0.75 * outer);
-        if parameters.any("texture")?.is_some() {
+        let texture = self.value(parameters, "texture", Role::Reflectance)?;
+        if matches!(texture, Some(Value::Texture(_))) {
             self.ignored.add(features::MI_SPOT_TEXTURE, || node.place());
         }
+        let factor = texture.map_or(Vec3::ONE, |texture| texture.mean());
         Ok(LampKind::Spot {
             position: matrix.w_axis.truncate().as_vec3(),
             direction: along_z(node, matrix)?,
-            intensity: light(parameters, "intensity")?,
+            intensity: light(parameters, "intensity")? * factor,
             // A sharp edge is a steep one.
             inner_angle_rad: inner.min(0.999 * outer).to_radians(),
             outer_angle_rad: outer.to_radians(),

@@ -104,7 +104,7 @@ impl Lights {
         entity: &Entity,
         world_from_light: DMat4,
         exposure: f32,
-        textures: &Textures,
+        textures: &mut Textures,
         log: &mut Log,
     ) -> Result<()> {
         let scale = entity.number("scale", 1.0)?;
@@ -158,10 +158,35 @@ impl Lights {
                     falloff: SpotFalloff::SmoothCosine,
                 }
             }
-            "projection" | "goniometric" => {
-                let name = format!("LightSource `{}`", entity.name);
-                log.ignore_named(features::PBRT_LIGHT, &name, &entity.place);
-                return Ok(());
+            "goniometric" => {
+                let (mean, _) = mean_of_image(entity, textures, log)?;
+                // pbrt takes the mean of the channels; a given power replaces it.
+                let mean = f64::from(mean.element_sum() / 3.0);
+                let factor = scale * power.map_or(mean, |power| power / (4.0 * PI));
+                let intensity = color(entity, "I", textures)? * factor as f32 * exposure;
+                LampKind::Point { position: place(from), intensity }
+            }
+            "projection" => {
+                let (mean, aspect) = mean_of_image(entity, textures, log)?;
+                let tangent =
+                    (0.5 * entity.number("fov", 90.0)?.clamp(0.01, 179.0)).to_radians().tan();
+                let [wide, high] = [tangent * aspect.max(1.0), tangent * (1.0 / aspect).max(1.0)];
+                // Solid angle of a rectangle seen from above its middle.
+                let solid_angle = 4.0
+                    * (wide * high / (1.0 + wide * wide).sqrt() / (1.0 + high * high).sqrt())
+                        .asin();
+                let outer = (1.0 - solid_angle / (2.0 * PI)).acos();
+                let of_power =
+                    |power: f64| power / (solid_angle * f64::from(luminance(mean)).max(1e-30));
+                let factor = scale * power.map_or(1.0, of_power);
+                LampKind::Spot {
+                    position: place(from),
+                    direction: direction(DVec3::Z)?,
+                    intensity: mean * factor as f32 * exposure,
+                    inner_angle_rad: (outer * (1.0 - 1e-4)) as f32,
+                    outer_angle_rad: outer as f32,
+                    falloff: SpotFalloff::SmoothCosine,
+                }
             }
             other => return Err(entity.error(format!("unknown light `{other}`"))),
         };
@@ -256,6 +281,17 @@ impl Lights {
         }
         Err(format!("{}: radiance that is not finite or negative", sum.source))
     }
+}
+
+/// Mean colour of the image of a lamp, and its width over its height.
+fn mean_of_image(entity: &Entity, textures: &mut Textures, log: &mut Log) -> Result<(Vec3, f64)> {
+    let Some(image) = textures.light_image(entity, log)? else {
+        return Err(entity.error("expected the parameter `filename`"));
+    };
+    let name = format!("image of LightSource `{}`", entity.name);
+    log.ignore_named(features::PBRT_LIGHT_IMAGE, &name, &entity.place);
+    let aspect = f64::from(image.texture.width) / f64::from(image.texture.height);
+    Ok((image.mean().into(), aspect))
 }
 
 /// Repeats texels of a square map so that it has `wanted` rows.

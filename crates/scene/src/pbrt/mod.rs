@@ -79,11 +79,11 @@ pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
     let mut log = Log { main: path, ignored, inputs: source.inputs, warnings: Vec::new() };
     let asked = asked(&description, &mut log);
     let view = camera::view(&description, path, &mut log)?;
-    let textures = Textures::new(&description, &folder);
+    let mut textures = Textures::new(&description, &folder);
     let mut lights = Lights::default();
     for (entity, world_from_light) in &description.lights {
         let placed = view.mirror * *world_from_light;
-        lights.add(entity, placed, view.exposure, &textures, &mut log)?;
+        lights.add(entity, placed, view.exposure, &mut textures, &mut log)?;
     }
     let mut builder = Builder {
         folder: &folder,
