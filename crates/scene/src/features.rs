@@ -105,7 +105,7 @@ features! {
     PBRT_SCREEN_WINDOW "`screenwindow` that is not centred or of another ratio"
         "its height alone counts";
     PBRT_ASPECT "`frameaspectratio` other than that of the film" "pixels are square";
-    PBRT_SHAPE "`curve`" "left out";
+    PBRT_CURVE "exact form of `curve`" "tubes of 3 to 6 sides";
     PBRT_PARTIAL "`phimax`, `zmin`, `zmax`, by shape" "quadrics are whole";
     PBRT_DISPLACEMENT "`displacement`" "";
     PBRT_FLAT "shapes whose transformation flattens space" "left out";
@@ -137,6 +137,7 @@ features! {
     MITSUBA;
     MI_GAMUT "saturation of reflectance spectra beyond Rec.709" "clipped";
     MI_SHAPE "shapes of other kinds, by name" "left out";
+    MI_CURVE "exact form of `bsplinecurve`, `linearcurve` and `hair`" "tubes of 3 to 6 sides";
     MI_MISSING "files of shapes and textures that are not there" "the shape is left out; the texture is 0.5";
     MI_FILE_CASE "files whose names are written in another case" "read all the same";
     MI_MODEL "other reflection models, by name" "diffuse of 0.5";

@@ -32,6 +32,7 @@ mod quadrics;
 mod shapes;
 mod spectrum;
 pub mod stage;
+mod strands;
 pub mod texture;
 pub mod transform;
 mod triangulate;

@@ -499,6 +499,55 @@ fn lamps_shine_where_they_look() {
     assert!(scene.warnings[0].ends_with("its mean over the whole cone"), "{:?}", scene.warnings);
 }
 
+#[test]
+fn strands_of_files_are_tubes_in_the_world() {
+    let folder = Folder::new();
+    folder.write("a.txt", "0 0 0 0.1\n0 0 1 0.1\n0 0 2 0.1\n0 0 3 0.1\n\n5 0 0 .2\n5 0 3 .2\n");
+    folder.write("b.hair", "0 0 0\n0 0 3\n");
+    let mut binary = b"BINARY_HAIR\x04\0\0\0".to_vec();
+    for number in
+        [f32::INFINITY, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0, f32::INFINITY, 5.0, 0.0, 0.0, 5.0, 0.0, 3.0]
+    {
+        binary.extend(number.to_le_bytes());
+    }
+    folder.write("c.hair", binary);
+    // Kind, file, extent along y in the world, and tubes.
+    let cases = [
+        ("bsplinecurve", "a.txt", [2.0, 4.0], 1),
+        ("linearcurve", "a.txt", [0.0, 6.0], 2),
+        ("hair", "b.hair", [0.0, 6.0], 1),
+        ("hair", "c.hair", [0.0, 6.0], 2),
+    ];
+    for (kind, file, extent, tubes) in cases {
+        let text = format!(
+            "{SENSOR}<shape type=\"{kind}\"><string name=\"filename\" value=\"{file}\"/>
+            <transform name=\"to_world\"><rotate x=\"1\" angle=\"-90\"/><scale value=\"2\"/>
+            </transform></shape>"
+        );
+        let scene = loaded(&folder.write("a.xml", document(&text)));
+        let positions = &scene.geometry.positions;
+        let along = |p: &[f32; 3]| p[1];
+        let low = positions.iter().map(along).fold(f32::INFINITY, f32::min);
+        let high = positions.iter().map(along).fold(f32::NEG_INFINITY, f32::max);
+        assert!(
+            (low - extent[0]).abs() < 1e-5 && (high - extent[1]).abs() < 1e-5,
+            "{kind} {low} {high}"
+        );
+        let widest = positions.iter().map(|p| p[0].abs()).filter(|x| *x < 4.0).fold(0.0, f32::max);
+        let radius = if kind == "hair" { 0.025 } else { 0.1 };
+        assert!((0.8..1.05).contains(&(widest / radius)), "{kind}: {widest}");
+        let far = positions.iter().any(|p| p[0] > 4.0);
+        assert_eq!(far, tubes == 2, "{kind}");
+        assert!(scene.warnings[0].contains("exact form of"), "{:?}", scene.warnings);
+        assert_eq!(scene.inputs.len(), 2);
+    }
+    folder.write("a.txt", "0 0 0 0.1\n0 0 x 0.1\n");
+    let text = r#"<shape type="linearcurve"><string name="filename" value="a.txt"/></shape>"#;
+    let path = folder.write("a.xml", document(&format!("{SENSOR}{text}")));
+    let error = Scene::load(&path).unwrap_err().to_string();
+    assert!(error.contains("line 2: expected x y z radius, found `0 0 x 0.1`"), "{error}");
+}
+
 /// Normal of the winding of the first triangle.
 fn winding(scene: &Scene) -> Vec3 {
     let [a, b, c] = scene.geometry.triangles[0]
@@ -691,7 +740,7 @@ fn shapes_and_models_that_are_not_there_leave_the_rest() {
     let text = format!(
         r#"{SENSOR}<emitter type="area" id="light"><rgb name="radiance" value="3"/></emitter>
         <emitter type="projector"/>
-        <shape type="hair"/><shape type="hair"/><shape type="ply">{}</shape>
+        <shape type="sdfgrid"/><shape type="sdfgrid"/><shape type="ply">{}</shape>
         <shape type="ply">{}</shape>
         <shape type="rectangle"><bsdf type="velvet"/></shape>
         <shape type="rectangle"><ref id="light"/><bsdf type="diffuse">{texture}</bsdf></shape>"#,
@@ -704,7 +753,7 @@ fn shapes_and_models_that_are_not_there_leave_the_rest() {
     assert_eq!(emission.unwrap().radiance, Vec3::splat(3.0));
     for expected in [
         "ignored emitter `projector` (line 6)",
-        "ignored shapes of the kind `hair` (2, first in line 7)",
+        "ignored shapes of the kind `sdfgrid` (2, first in line 7)",
         "that are not there (2, first in `absent.ply`, line 7)",
         "in another case (`ball.PLY`)",
         "`velvet`, which is diffuse of 0.5 (line 9)",

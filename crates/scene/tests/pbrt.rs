@@ -542,6 +542,33 @@ fn square_maps_lie_where_pbrt_shows_them() {
 }
 
 #[test]
+fn curves_are_tubes_of_their_widths() {
+    let text = r#"Scale 2 2 2
+        Shape "curve" "point3 P" [0 0 0 0 0 1 0 0 2 0 0 3] "float width0" 0.2 "float width1" 0.1
+        Shape "curve" "point3 P" [3 0 0 3 0 1 3 0 2 3 0 3] "float width0" 0.2 "float width1" 0.1
+            "string basis" "bspline" "string type" "flat""#;
+    let scene = world(text);
+    assert_eq!(warnings(&scene).len(), 2, "{:?}", scene.warnings);
+    // The spline spans the middle third of its points.
+    for (x, from, to) in [(0.0, 0.0, 6.0), (6.0, 2.0, 4.0)] {
+        let own = scene.geometry.positions.iter().filter(|p| (p[0] - x).abs() < 1.0);
+        let width = |p: &[f32; 3]| 2.0 * (p[0] - x).hypot(p[1]);
+        let [first, last] = own.fold([[0.0_f32, 1e9, 0.0], [0.0, -1e9, 0.0]], |[low, high], p| {
+            let at = [0.0, p[2], width(p)];
+            [if p[2] < low[1] { at } else { low }, if p[2] > high[1] { at } else { high }]
+        });
+        assert!(
+            (first[1] - from).abs() < 1e-5 && (last[1] - to).abs() < 1e-5,
+            "{first:?} {last:?}"
+        );
+        // A hexagon of the same perimeter as the circle reaches 4.7% farther out.
+        assert!((first[2] / 0.4 - 1.047).abs() < 1e-3, "{first:?}");
+        assert!((last[2] / 0.2 - 1.047).abs() < 1e-3, "{last:?}");
+    }
+    assert!(message("Shape \"curve\" \"point3 P\" [0 0 0 1 1 1]").contains("2 control points"));
+}
+
+#[test]
 fn other_files_are_included_plain_and_compressed() {
     use std::io::Write;
     let folder = Folder::new();
@@ -785,8 +812,7 @@ fn everything_left_out_is_named_once() {
         "ignored parameter `halffov` of Camera \"perspective\" (line 5)",
         "ignored `phimax` of Shape \"sphere\" (2, first in line 10)",
         "ignored parameter `sharp` of Shape \"sphere\" (2, first in line 10)",
-        "ignored shape `curve` (line 12)",
-        "ignored parameter `P` of Shape \"curve\" (line 12)",
+        "ignored exact form of `curve` (line 12): tubes of 3 to 6 sides",
         "ignored `albedo` of coats (line 13): coats are clear",
         "ignored `uroughness` other than `vroughness` (line 13): their mean α, or the texture",
         "ignored shapes whose transformation flattens space (2, first in line 14): left out",

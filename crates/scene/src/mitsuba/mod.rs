@@ -17,6 +17,7 @@ mod sensor;
 mod serialized;
 mod shapes;
 mod spectra;
+mod strands;
 mod text;
 mod textures;
 mod transforms;

@@ -18,8 +18,19 @@ use crate::{
 };
 
 /// Shapes that are read, beside instances of groups.
-const SHAPES: [&str; 8] =
-    ["obj", "ply", "serialized", "rectangle", "cube", "sphere", "disk", "cylinder"];
+const SHAPES: [&str; 11] = [
+    "obj",
+    "ply",
+    "serialized",
+    "rectangle",
+    "cube",
+    "sphere",
+    "disk",
+    "cylinder",
+    "bsplinecurve",
+    "linearcurve",
+    "hair",
+];
 /// Most groups in one another; Mitsuba allows one.
 const MAX_GROUPS: usize = 4;
 
@@ -241,6 +252,11 @@ impl Reader<'_> {
                     return Err(node.error("cylinder: expected `p0` and `p1` to differ"));
                 };
                 shape.to_world *= DMat4::from(DAffine3::from_mat3_translation(frame, from));
+            }
+            "bsplinecurve" | "linearcurve" | "hair" => {
+                shape.mesh = self.strands(&parameters, to_world)?;
+                shape.to_world = DMat4::IDENTITY;
+                shape.is_file = true;
             }
             // Others have been left out.
             _ => {}

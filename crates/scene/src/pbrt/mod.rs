@@ -44,6 +44,7 @@ use crate::{
     files,
     import::Imported,
     material::{Emission, Material, MaterialKind},
+    strands::Detail,
 };
 use camera::View;
 use directives::{Description, Reader, Shape};
@@ -95,6 +96,11 @@ pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
         dropped: Dropped::default(),
         triangle_count: 0,
         budget: Budget::default(),
+        strands: shapes::detail(
+            (description.objects.iter().flat_map(|object| &object.shapes))
+                .chain(&description.shapes)
+                .map(|shape| &shape.entity),
+        ),
     };
     for shape in &description.shapes {
         if let Some((mesh, material)) = builder.prepare(shape, false)? {
@@ -183,15 +189,13 @@ struct Builder<'a> {
     dropped: Dropped,
     triangle_count: usize,
     budget: Budget,
+    strands: Detail,
 }
 
 impl Builder<'_> {
-    /// Makes the mesh of a shape and finds its material; none for a shape that is left out.
+    /// Makes the mesh of a shape and finds its material; none for a shape without a surface.
     fn prepare(&mut self, shape: &Shape, in_object: bool) -> Result<Option<(Mesh, u32)>> {
-        let Some(mut mesh) = shapes::mesh(&shape.entity, self.folder, &mut self.log)? else {
-            self.log.unused(&shape.entity);
-            return Ok(None);
-        };
+        let mut mesh = shapes::mesh(&shape.entity, self.folder, &mut self.strands, &mut self.log)?;
         let light = match &shape.light {
             Some(entity) if in_object => {
                 self.log.ignore(features::PBRT_INSTANCE_LIGHT, &entity.place);

@@ -1,7 +1,7 @@
 //! Shapes of a scene description → meshes in the space of the shape, counter-clockwise from the side
 //! of the normal.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, DVec4, Vec3};
 
 use super::{
     log::Log,
@@ -14,16 +14,22 @@ use crate::{
     features,
     mesh::{Mesh, ply},
     quadrics,
+    strands::{Basis, Detail},
 };
 
 /// Columns and rows of a bilinear patch that is not flat, or whose coordinates are not linear.
 const PATCH_CELLS: u32 = 16;
 
-/// Makes the mesh of a shape; none for a kind that is left out.
+/// Makes the mesh of a shape.
 ///
 /// # Errors
 /// With the place for parameters that are no shape, and files that cannot be read.
-pub(super) fn mesh(entity: &Entity, folder: &Folder, log: &mut Log) -> Result<Option<Mesh>> {
+pub(super) fn mesh(
+    entity: &Entity,
+    folder: &Folder,
+    strands: &mut Detail,
+    log: &mut Log,
+) -> Result<Mesh> {
     let mut mesh = match entity.name.as_str() {
         "trianglemesh" => triangle_mesh(entity, log)?,
         "plymesh" => {
@@ -54,14 +60,11 @@ pub(super) fn mesh(entity: &Entity, folder: &Folder, log: &mut Log) -> Result<Op
         }
         "bilinearmesh" => bilinear_mesh(entity, log)?,
         "sphere" | "disk" | "cylinder" => quadric(entity, log)?,
-        "curve" => {
-            log.ignore_named(features::PBRT_SHAPE, "shape `curve`", &entity.place);
-            return Ok(None);
-        }
+        "curve" => curve(entity, strands, log)?,
         other => return Err(entity.error(format!("unknown shape `{other}`"))),
     };
     face_normals(&mut mesh);
-    Ok(Some(mesh))
+    Ok(mesh)
 }
 
 fn vector<const N: usize>(numbers: &[f64]) -> Vec<[f32; N]> {
@@ -179,6 +182,63 @@ fn quadric(entity: &Entity, log: &mut Log) -> Result<Mesh> {
             quadrics::cylinder(radius, a.min(b) as f32, a.max(b) as f32)
         }
     })
+}
+
+fn basis(entity: &Entity) -> Result<Basis> {
+    let degree = match entity.number("degree", 3.0)? {
+        2.0 => 2,
+        3.0 => 3,
+        found => return Err(entity.error(format!("expected a degree of 2 or 3, found {found}"))),
+    };
+    match entity.string("basis")?.unwrap_or("bezier") {
+        "bezier" => Ok(Basis::Bezier(degree)),
+        "bspline" => Ok(Basis::Spline(degree)),
+        found => {
+            Err(entity.error(format!("expected the basis bezier or bspline, found `{found}`")))
+        }
+    }
+}
+
+/// Fineness for all curves of a file.
+pub(super) fn detail<'a>(shapes: impl Iterator<Item = &'a Entity>) -> Detail {
+    let spans = |entity: &Entity| {
+        basis(entity).ok()?.spans(entity.numbers("P", Kind::Triple).ok()?.len() / 3)
+    };
+    Detail::of(shapes.filter(|entity| entity.name == "curve").filter_map(spans).sum())
+}
+
+fn curve(entity: &Entity, strands: &mut Detail, log: &mut Log) -> Result<Mesh> {
+    let basis = basis(entity)?;
+    let positions = positions(entity)?;
+    let Some(spans) = basis.spans(positions.len()) else {
+        let message = format!("{} control points make no curve", positions.len());
+        return Err(entity.error(message));
+    };
+    let width = entity.number("width", 1.0)?;
+    let [from, to] = [entity.number("width0", width)?, entity.number("width1", width)?];
+    // All kinds are as wide to a ray.
+    for name in ["type", "N", "splitdepth"] {
+        entity.find(name);
+    }
+    // Widths that are linear in the number of a control point are linear along the curve.
+    let [shift, length] = match basis {
+        Basis::Spline(degree) => [0.5 * (degree as f64 - 1.0), spans as f64],
+        _ => [0.0, positions.len() as f64 - 1.0],
+    };
+    let controls: Vec<DVec4> = (positions.iter().enumerate())
+        .map(|(index, position)| {
+            let along = (index as f64 - shift) / length;
+            Vec3::from_array(*position).as_dvec3().extend(0.5 * (from + (to - from) * along))
+        })
+        .collect();
+    let name = match strands.step() {
+        1 => features::PBRT_CURVE.name.to_owned(),
+        step => format!("exact form of `curve`, and all but one of {step}, thicker by as much"),
+    };
+    log.ignore_named(features::PBRT_CURVE, &name, &entity.place);
+    let mut mesh = Mesh::default();
+    strands.add(&mut mesh, basis, &controls);
+    Ok(mesh)
 }
 
 fn bilinear_mesh(entity: &Entity, log: &mut Log) -> Result<Mesh> {
