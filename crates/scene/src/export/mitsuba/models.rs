@@ -186,9 +186,14 @@ impl Translator<'_> {
         } else {
             " for the same mean reflectance".to_owned()
         };
+        let horizon = if alpha > SEPARATE_MASKING_ALPHA {
+            "; seen along the horizon it may differ by several times"
+        } else {
+            ""
+        };
         self.subject.warn(&format!(
             "Mitsuba's plastic loses light below its coat, Fenestra's does not; its base is {most} \
-             times as light{aim}"
+             times as light{aim}{horizon}"
         ));
         most * diffuse
     }
