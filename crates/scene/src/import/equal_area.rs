@@ -8,7 +8,8 @@ use crate::{
     math::{equal_area::square_from_direction, frame::direction_from_lat_long},
 };
 
-/// Points of a texel of the lat-long map, along each side, whose mean it is.
+/// Points of a texel of the lat-long map, along each side, whose mean it is; toward the poles, where
+/// texels are narrow, fewer in a row.
 const POINTS: u32 = 6;
 
 /// Resamples a square map, whose `texels` are those of `side` rows. `light_from_world` turns a
@@ -31,12 +32,14 @@ pub(crate) fn resample(
     };
     let texel = |index: u32| {
         let corner = Vec2::new((index % width) as f32, (index / width) as f32);
+        let narrow = (std::f32::consts::PI * (corner.y + 0.5) / height as f32).sin();
+        let across = (POINTS as f32 * narrow).ceil() as u32;
         let point = |index: u32| {
-            let inside = Vec2::new((index % POINTS) as f32, (index / POINTS) as f32) + 0.5;
-            let place = corner + inside / POINTS as f32;
+            let inside = Vec2::new((index % across) as f32, (index / across) as f32) + 0.5;
+            let place = corner + inside / Vec2::new(across as f32, POINTS as f32);
             lookup(direction_from_lat_long(place / Vec2::new(width as f32, height as f32)))
         };
-        (0..POINTS * POINTS).map(point).sum::<Vec3>() / (POINTS * POINTS) as f32
+        (0..across * POINTS).map(point).sum::<Vec3>() / (across * POINTS) as f32
     };
     let mut resampled: Vec<Vec3> = (0..width * height).into_par_iter().map(texel).collect();
     let row_mean = |row: usize| -> glam::DVec3 {

@@ -75,11 +75,13 @@ pub(crate) fn is_pbrt(path: &Path) -> bool {
 /// [`Error::Io`] for the main file.
 pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
     let mut ignored = Ignored::default();
-    let (description, source) = Reader::read(path, Source::open(path, folder)?, &mut ignored)?;
+    let (mut description, source) = Reader::read(path, Source::open(path, folder)?, &mut ignored)?;
     let folder = source.folder().clone();
     let mut log = Log { main: path, ignored, inputs: source.inputs, warnings: Vec::new() };
     let asked = asked(&description, &mut log);
     let view = camera::view(&description, path, &mut log)?;
+    // A shape's numbers are dropped when its mesh is made.
+    let shapes = std::mem::take(&mut description.shapes);
     let mut textures = Textures::new(&description, &folder);
     let mut lights = Lights::default();
     for (entity, world_from_light) in &description.lights {
@@ -98,13 +100,13 @@ pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
         budget: Budget::default(),
         strands: shapes::detail(
             (description.objects.iter().flat_map(|object| &object.shapes))
-                .chain(&description.shapes)
+                .chain(&shapes)
                 .map(|shape| &shape.entity),
         ),
     };
-    for shape in &description.shapes {
-        if let Some((mesh, material)) = builder.prepare(shape, false)? {
-            builder.place(&mesh, material, shape, DMat4::IDENTITY)?;
+    for shape in shapes {
+        if let Some((mesh, material)) = builder.prepare(&shape, false)? {
+            builder.place(&mesh, material, &shape, DMat4::IDENTITY)?;
         }
     }
     for object in &description.objects {

@@ -50,7 +50,6 @@ pub(super) enum Token {
 /// Tokeniser that holds one token at a time.
 pub(super) struct Tokens<R> {
     reader: R,
-    path: Rc<Path>,
     line: usize,
     column: usize,
     bytes_left: u64,
@@ -62,9 +61,9 @@ pub(super) struct Tokens<R> {
 impl<R: BufRead> Tokens<R> {
     /// Starts at the first byte; more than `most_bytes` are an error.
     pub(super) fn new(path: Rc<Path>, reader: R, most_bytes: u64) -> Self {
-        let place = Place { path: Rc::clone(&path), line: 1, column: 1 };
+        let place = Place { path, line: 1, column: 1 };
         let (buffer, text) = (Vec::new(), String::new());
-        Self { reader, path, line: 1, column: 1, bytes_left: most_bytes, buffer, text, place }
+        Self { reader, line: 1, column: 1, bytes_left: most_bytes, buffer, text, place }
     }
 
     /// Bytes that may still be read.
@@ -120,27 +119,46 @@ impl<R: BufRead> Tokens<R> {
 
     fn skip_blank(&mut self) -> Result<()> {
         let mut in_comment = false;
-        while let Some(byte) = self.peek()? {
-            match byte {
-                b'\n' | b'\r' => in_comment = false,
-                b'#' => in_comment = true,
-                _ if in_comment || byte.is_ascii_whitespace() => {}
-                _ => return Ok(()),
+        loop {
+            let bytes = available(&mut self.reader, &self.place, self.bytes_left)?;
+            let mut passed = 0;
+            for byte in bytes {
+                match byte {
+                    b'\n' | b'\r' => in_comment = false,
+                    b'#' => in_comment = true,
+                    _ if in_comment || byte.is_ascii_whitespace() => {}
+                    _ => break,
+                }
+                self.column += 1;
+                if *byte == b'\n' {
+                    (self.line, self.column) = (self.line + 1, 1);
+                }
+                passed += 1;
             }
-            self.advance();
+            let is_done = passed < bytes.len() || bytes.is_empty();
+            self.consume(passed);
+            if is_done {
+                return Ok(());
+            }
         }
-        Ok(())
     }
 
     fn read_word(&mut self) -> Result<Token> {
-        while let Some(byte) = self.peek()? {
-            if byte.is_ascii_whitespace() || matches!(byte, b'"' | b'[' | b']') {
-                break;
+        let ends = |byte: &u8| byte.is_ascii_whitespace() || matches!(byte, b'"' | b'[' | b']');
+        loop {
+            let bytes = available(&mut self.reader, &self.place, self.bytes_left)?;
+            let length = bytes.iter().position(ends).unwrap_or(bytes.len());
+            let is_done = length < bytes.len() || bytes.is_empty();
+            if self.buffer.len() + length > MAX_LENGTH {
+                return Err(self.too_long());
             }
-            self.push(byte)?;
-            self.advance();
+            self.buffer.extend_from_slice(&bytes[..length]);
+            self.column += length;
+            self.consume(length);
+            if is_done {
+                return Ok(Token::Word);
+            }
         }
-        Ok(Token::Word)
     }
 
     fn read_text(&mut self) -> Result<Token> {
@@ -178,36 +196,40 @@ impl<R: BufRead> Tokens<R> {
 
     fn push(&mut self, byte: u8) -> Result<()> {
         if self.buffer.len() == MAX_LENGTH {
-            let expected = format!("expected a word or string of at most {MAX_LENGTH} bytes");
-            return Err(self.place.error(expected));
+            return Err(self.too_long());
         }
         self.buffer.push(byte);
         Ok(())
     }
 
-    fn peek(&mut self) -> Result<Option<u8>> {
-        let available = self.reader.fill_buf();
-        let available = available.map_err(|source| Error::io(&self.path, "read", source))?;
-        match available.first() {
-            Some(_) if self.bytes_left == 0 => {
-                Err(self.place.error("the file is larger than a scene description may be"))
-            }
-            first => Ok(first.copied()),
-        }
+    fn too_long(&self) -> Error {
+        self.place.error(format!("expected a word or string of at most {MAX_LENGTH} bytes"))
     }
 
-    /// Passes the byte that `peek` returned.
-    fn advance(&mut self) {
-        // `peek` has filled the buffer, so that this does not read.
-        let is_newline = self.reader.fill_buf().is_ok_and(|bytes| bytes.first() == Some(&b'\n'));
-        self.reader.consume(1);
-        self.bytes_left -= 1;
-        if is_newline {
-            (self.line, self.column) = (self.line + 1, 1);
-        } else {
-            self.column += 1;
-        }
+    fn peek(&mut self) -> Result<Option<u8>> {
+        let bytes = available(&mut self.reader, &self.place, self.bytes_left)?;
+        Ok(bytes.first().copied())
     }
+
+    /// Passes a byte that `peek` returned; it ends no line.
+    fn advance(&mut self) {
+        self.consume(1);
+        self.column += 1;
+    }
+
+    fn consume(&mut self, count: usize) {
+        self.reader.consume(count);
+        self.bytes_left -= count as u64;
+    }
+}
+
+/// Bytes that can be had at once, at most `most`; none at the end of the file.
+fn available<'a>(reader: &'a mut impl BufRead, place: &Place, most: u64) -> Result<&'a [u8]> {
+    let bytes = reader.fill_buf().map_err(|source| Error::io(&place.path, "read", source))?;
+    if most == 0 && !bytes.is_empty() {
+        return Err(place.error("the file is larger than a scene description may be"));
+    }
+    Ok(&bytes[..bytes.len().min(usize::try_from(most).unwrap_or(usize::MAX))])
 }
 
 #[cfg(test)]
