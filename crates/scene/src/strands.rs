@@ -88,7 +88,7 @@ impl Detail {
     pub(crate) fn add(&mut self, mesh: &mut Mesh, basis: Basis, controls: &[DVec4]) {
         self.seen += 1;
         let Some(spans) = basis.spans(controls.len()) else { return };
-        if (self.seen - 1) % self.step != 0 {
+        if !(self.seen - 1).is_multiple_of(self.step) {
             return;
         }
         let pieces = if basis == Basis::Linear { 1 } else { self.pieces };
