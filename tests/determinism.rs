@@ -180,6 +180,37 @@ fn a_sweep_that_was_stopped_goes_on_to_the_bit() {
     }
 }
 
+/// Pages of one row of blocks each: the first has room for 17 × 12 pixels, in more blocks than its own.
+#[test]
+fn a_smaller_film_lies_in_the_first_page() {
+    let _alone = support::alone();
+    let mut scene = scene();
+    let settings = Settings { film_page_bytes: 1, ..settings(Sampler::Mis) };
+    let mut large = renderer(&scene, settings.clone());
+    [scene.film.width, scene.film.height] = [17, 12];
+    large.look(&scene.camera, [17, 12], settings.seed, true).unwrap();
+    let mut small = renderer(&scene, settings);
+    for renderer in [&mut large, &mut small] {
+        renderer.render_pass(2).unwrap();
+    }
+    assert!(large.sums().unwrap() == small.sums().unwrap());
+}
+
+/// A window does not keep the samples around it, without which a stopped sweep cannot go on.
+#[test]
+fn the_sweep_of_a_window_ends() {
+    let _alone = support::alone();
+    let window = Some(Window { x: 5, y: 3, width: 13, height: 9 });
+    let settings = Settings { film_page_bytes: 1, window, ..settings(Sampler::Mis) };
+    let whole = render(settings.clone(), &[2]);
+    let mut stopped = renderer(&scene(), settings);
+    for _ in 0..2 {
+        stopped.set_watch(Box::new(|_| true));
+        stopped.render_pass(1).unwrap();
+    }
+    assert!(stopped.sums().unwrap() == whole, "the window differs");
+}
+
 /// Who interrupts waits for no checkpoint that is due, and a training that was stopped leaves none.
 #[test]
 fn an_interrupt_comes_before_a_checkpoint_that_is_due() {

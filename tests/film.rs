@@ -67,6 +67,7 @@ fn add_two_float(sum: &mut f32, rest: &mut f32, value: f32) {
 fn accumulate(numbers: &mut Random, sample_count: u32, scale: f32) -> (Sums, Vec<Vec<f64>>) {
     let mut sums = Sums::new([3, 1], 4, 2, [10, 6]);
     let mut drawn = vec![Vec::new(); 8];
+    sums.unfiltered = vec![[0.0; 3]; 8];
     sums.albedo = vec![[0.0; 3]; 8];
     sums.normal = vec![[0.0; 3]; 8];
     sums.position = vec![[0.0; 3]; 8];
@@ -85,6 +86,7 @@ fn accumulate(numbers: &mut Random, sample_count: u32, scale: f32) -> (Sums, Vec
                 add_two_float(&mut sum[channel], &mut rest[channel], value);
                 let rest = &mut sums.squares_compensation[pixel][channel];
                 add_two_float(&mut sums.squares[pixel][channel], rest, value * value);
+                sums.unfiltered[pixel][channel] += value;
                 sums.albedo[pixel][channel] += 0.5;
                 sums.normal[pixel][channel] -= numbers.uniform_f32();
                 sums.position[pixel][channel] += 100.0 * numbers.uniform_f32();
@@ -241,7 +243,8 @@ fn image_layers_have_pbrts_names_and_the_means() {
     let names: Vec<&str> = image.channels.keys().map(String::as_str).collect();
     let expected = "Albedo.B Albedo.G Albedo.R B CacheEntries.Y G GuideCell.B GuideCell.G \
                     GuideCell.R GuideLevel.B GuideLevel.G GuideLevel.R Hits.Y N.X N.Y N.Z P.X P.Y \
-                    P.Z R SampleCount.Y ShadowRays.Y Variance.B Variance.G Variance.R Visible.Y";
+                    P.Z R SampleCount.Y ShadowRays.Y Unfiltered.B Unfiltered.G \
+                    Unfiltered.R Variance.B Variance.G Variance.R Visible.Y";
     assert_eq!(names.join(" "), expected);
     assert_eq!((image.origin, image.film_size), ([3, 1], [10, 6]));
     assert_eq!(image.channels["Albedo.G"], [0.5; 8]);

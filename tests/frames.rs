@@ -3,9 +3,12 @@
 
 use std::fs;
 
-use fenestra::film::{Attribute, Image, Metadata, Statistics};
+use fenestra::film::{Attribute as FileAttribute, Image, Metadata, Statistics};
 
-use crate::support::command::{self, Folder};
+use crate::support::{
+    command::{self, Folder},
+    gltf::{self, Attribute},
+};
 
 /// A ball under a roof, before a camera that moves for a quarter of a second.
 fn folder() -> Folder {
@@ -31,7 +34,7 @@ fn frames_follow_the_camera_and_have_numbers_of_their_own() {
     let render = |rest: &[&str]| folder.run(&[&options, rest].concat());
     render(&["--frames=0-2", "-o", "all.##.exr"]).assert(0, &["frame 2 at 0.250 s: all.02.exr"]);
     let frames = ["all.00.exr", "all.01.exr", "all.02.exr"].map(|name| image(&folder, name));
-    assert_eq!(frames[1].attributes["fenestra.time"], Attribute::Double(0.125));
+    assert_eq!(frames[1].attributes["fenestra.time"], FileAttribute::Double(0.125));
     assert!(frames[0].channels != frames[1].channels && frames[1].channels != frames[2].channels);
     // A frame alone is the one of the sequence, as its metadata say.
     render(&["--frames=2", "-o", "alone.#.exr"]).assert(0, &[]);
@@ -71,4 +74,28 @@ fn a_guide_is_carried_and_finished_frames_are_skipped() {
     render(&frames).assert(0, &["f.0.exr is there", "frame 1 at", "f.2.exr is there"]);
     render(&["--spp=2", "--frames=1", "-o", "whole.#.exr"]).assert(0, &[]);
     assert_eq!(image(&folder, "f.1.exr").channels, image(&folder, "whole.1.exr").channels);
+}
+
+/// Where more than the camera moves, no frame is rendered with what is on the device for the one before.
+#[test]
+fn a_scene_that_moves_is_loaded_for_every_frame() {
+    let folder = folder();
+    let attribute =
+        |name, kind, data: &[f32]| Attribute(name, 5126, kind, false, gltf::floats(data));
+    let attributes = [
+        attribute("POSITION", "VEC3", &[-0.5, 0., 1., 0.5, 0., 1., 0., 1., 1.]),
+        attribute("_TIMES", "SCALAR", &[0., 0.1, 0.25]),
+        attribute("_SHIFTS", "VEC3", &[0., 0., 0., 0., 0.2, 0., 0., 0.5, 0.]),
+    ];
+    let ride = r#", "animations": [{"channels": [{"sampler": 0, "target": {"node": 0, "path":
+        "translation"}}], "samplers": [{"input": 1, "output": 2}]}]"#;
+    folder.write("ride.gltf", gltf::gltf_of(&attributes, 3, "", ride));
+    let scene = fs::read_to_string(folder.path().join("scene.toml")).unwrap();
+    folder.write("scene.toml", scene + "[[include]]\nfile = \"ride.gltf\"\n");
+    let options = ["render", "scene.toml", "--fps=8", "--spp=1", "--sampler=mis", "--depth=1"];
+    let render = |rest: &[&str]| folder.run(&[&options, rest].concat()).assert(0, &[]);
+    render(&["--frames=0-2x2", "-o", "both.#.exr"]);
+    render(&["--frames=2", "-o", "alone.#.exr"]);
+    let [both, alone] = ["both.2.exr", "alone.2.exr"].map(|name| image(&folder, name).channels);
+    assert_eq!(both, alone);
 }

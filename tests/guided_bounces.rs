@@ -167,6 +167,7 @@ fn bounce(
     };
     let sample = create("sample_guided", &[kinds]);
     let bounce = create("bounce_guided", &[kinds, (CONSTANT_BOUNCE_CANDIDATES, candidates)]);
+    let learn = create("learn_arrivals", &[kinds]);
     let wave = Wave {
         pixel_count: PIXELS,
         sample_count: SAMPLES,
@@ -183,9 +184,25 @@ fn bounce(
     // Find the cell.
     commands.dispatch(&sample, &sets, push, paths);
     commands.dispatch(&bounce, &sets, push, paths);
+    commands.dispatch(&learn, &sets, push, paths);
     commands.submit_and_wait().unwrap();
     let rays: Vec<Ray> = waves.rays().download(paths as usize).unwrap();
     let states: Vec<PathState> = waves.paths().download(paths as usize).unwrap();
+    // Sixteen samples teach, then one in four, each by the direction of its ray.
+    let mut untaught = [0_i64; ARRIVAL_DIRECTIONS];
+    for (path, ray) in (0_u32..).zip(&rays) {
+        let sample = path / PIXELS;
+        if ray.is_active != 0 && (sample < 16 || sample.is_multiple_of(4)) {
+            untaught[arrival_direction(ray.direction.into())] += 1;
+        }
+    }
+    let taught = guide.state().unwrap().pending_arrivals;
+    for (index, [count, _]) in taught.iter().enumerate() {
+        untaught[index % ARRIVAL_DIRECTIONS] -= i64::from(*count);
+    }
+    // Rounding decides where two directions meet.
+    let difference = untaught.iter().map(|count| count.abs()).sum::<i64>();
+    assert!(!taught.is_empty() && difference < 16, "{difference} of {paths}");
     support::assert_silent();
     rays.iter()
         .zip(&states)

@@ -9,9 +9,10 @@
 use std::{env, fs};
 
 use fenestra::{film::Sums, sampler::Sampler, scene::Scene, session::Settings};
+use glam::Vec3;
 use tempfile::TempDir;
 
-use crate::support::{self, random::Random};
+use crate::support::{self, random::Random, scenes};
 
 /// Standard errors by which the mean of a furnace may pass one.
 const FURNACE_LIMIT: f64 = 6.0;
@@ -202,4 +203,23 @@ fn no_scene_makes_an_impossible_pixel() {
     }
     println!("{rendered} renders of finite pixels, {refused} scenes refused");
     assert!(rendered > refused, "most scenes are sound");
+}
+
+/// Light that no file can hold: samples that meet it are left out, and the statistics tell how many.
+#[test]
+fn samples_that_are_not_finite_are_counted() {
+    let _alone = support::alone();
+    let mut scene = scenes::room(vec![scenes::diffuse(Vec3::splat(0.5))]);
+    scene.camera.position = Vec3::new(20.0, 1.0, 0.0);
+    scene.environment = scenes::environment(16, |direction| {
+        Vec3::splat(if direction.z > 0.0 { f32::INFINITY } else { 1.0 })
+    });
+    let settings = Settings { sampler: Sampler::Cosine, depth: 1, ..Settings::default() };
+    let mut renderer = support::renderer(&scene, settings);
+    renderer.render_pass(2).unwrap();
+    let sums = renderer.sums().unwrap();
+    assert_eq!(sums.non_finite_count(), 0);
+    let dark = (0..sums.pixel_count()).filter(|pixel| sums.mean(*pixel) == [0.0; 3]).count();
+    let dropped = renderer.totals().dropped_samples;
+    assert!(dropped >= 2 * dark as u64 && dark > 50, "{dropped} of {dark} pixels");
 }

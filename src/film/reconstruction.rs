@@ -73,3 +73,26 @@ pub(crate) fn variance_share(filter: Filter) -> f64 {
     };
     ((0..OFFSETS).map(squares).sum::<f64>() / f64::from(OFFSETS)).powi(2)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::{hash_4d, unit_float};
+
+    #[test]
+    fn filtered_noise_has_the_share_of_its_variance() {
+        const EDGE: usize = 64;
+        let mut squares = [0.0_f64; 2];
+        for sample in 0..16 {
+            let noise = |pixel| [unit_float(hash_4d([pixel, sample, 0, 0])[0]) - 0.5; 3];
+            let noise: Vec<[f32; 3]> = (0..(EDGE * EDGE) as u32).map(noise).collect();
+            let offset = shared_offset(Filter::Gaussian, sample, 3).unwrap_or_default();
+            for (sum, film) in squares.iter_mut().zip([&noise, &filtered(&noise, EDGE, offset)]) {
+                *sum += film.iter().map(|[value, ..]| f64::from(value * value)).sum::<f64>();
+            }
+        }
+        // At the edges of this film fewer pixels share.
+        let ratio = squares[1] / squares[0] / variance_share(Filter::Gaussian);
+        assert!((1.0..1.08).contains(&ratio), "{ratio}");
+    }
+}

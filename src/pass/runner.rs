@@ -162,8 +162,8 @@ impl Runner {
 
     /// Runs waves like `wave` over `pixels` pixels, starting at its first, and takes the counters
     /// before they overflow. Once all pixels of the film have their samples, adds these to its sums. Returns
-    /// the pixels done, all unless the watch stops it, for which it waits if they have several samples. Fails
-    /// if the device does.
+    /// the pixels done, all unless the watch stops it, for which it waits if they have several samples, or are
+    /// those of a window whose sums could not go on. Fails if the device does.
     pub(crate) fn sweep(&mut self, technique: &dyn Passes, wave: Wave, pixels: u32) -> Result<u32> {
         let mut done = 0;
         let mut uncounted = 0;
@@ -185,7 +185,8 @@ impl Runner {
             self.steer(&times, wave);
             if self.watch.as_mut().is_some_and(|watch| watch(&wave)) {
                 self.is_stopped = true;
-                if wave.is_training != 0 || wave.sample_count == 1 {
+                let can_go_on = wave.sample_count == 1 && self.film.is_whole();
+                if wave.is_training != 0 || can_go_on {
                     break;
                 }
             }

@@ -113,7 +113,7 @@ impl Renderer {
     }
 
     /// Adds `samples` samples to every pixel, the rest of a stopped sweep first. A crop window that needs
-    /// samples around it has nothing of a stopped sweep. Fails if the device does.
+    /// samples around it ends its sweep: it does not keep those. Fails if the device does.
     pub fn render_pass(&mut self, samples: u32) -> Result<()> {
         let mut left = samples;
         while left > 0 {
@@ -137,11 +137,11 @@ impl Renderer {
             let pixels = self.runner.film().padded_pixels() - wave.first_pixel;
             let done = self.runner.sweep(self.technique.as_ref(), wave, pixels)?;
             self.runner.take_counters()?;
-            if done < pixels && self.runner.film().is_whole() {
+            if done < pixels {
                 let blocks = before.blocks + done / BLOCK_PIXELS;
                 let offset = shared_offset(self.filter(), wave.first_sample, wave.seed);
                 self.ahead = Ahead { blocks, offset };
-            } else if done == pixels {
+            } else {
                 self.sample_count += together;
                 left = left.saturating_sub(together);
             }

@@ -162,6 +162,8 @@ mod tests {
         let mut moved = rig();
         moved.fly(Vec3::Z, 1.0);
         assert_near(moved.camera().position, [0.0, 1.0, 4.0 - 4.0 * PACE]);
+        moved.focus(Vec3::new(3.0, 1.0, 1.0));
+        assert_near(Vec3::X * moved.camera().focus_distance, [3.0 - 4.0 * PACE, 0.0, 0.0]);
         moved.go_home();
         assert_eq!(moved.camera(), rig().camera());
     }

@@ -32,6 +32,10 @@ fn the_camera_follows_its_key_frames() {
     // The first key focuses where it looks: 29^½ away.
     assert!((halfway.focus_distance - 0.5 * (2.0 + 29_f32.sqrt())).abs() < 1e-5);
     assert_eq!(camera(Some(9.0)).position.x, 6.0, "after the last");
+    let focused =
+        ROOM.replace("vertical_fov_deg = 40,", "vertical_fov_deg = 40, focus_distance = 3,");
+    let first = at("room.toml", &focused, Some(1.0)).unwrap().camera;
+    assert_eq!(first.focus_distance, 3.0, "that of the camera");
 
     let [one, other] = [1.0, 2.0].map(|time| at("room.toml", ROOM, Some(time)).unwrap());
     assert_ne!(one.hash, other.hash);

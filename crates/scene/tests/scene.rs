@@ -720,6 +720,10 @@ fn absorption_of_an_included_file_scales_with_it() {
     let include = "[[include]]\nfile = \"glass.xml\"\nscale = 2\n";
     let scene = folder.load(&format!("{}{include}", with_box(""))).unwrap();
     assert_eq!(scene.materials[1].kind.absorption(), Some(Vec3::new(1.0, 0.0, 0.5)));
+    // A medium of Mitsuba scatters three quarters unless it says otherwise, and is left out.
+    folder.write("glass.xml", glass.replace("<float name=\"albedo\" value=\"0\"/>", ""));
+    let scene = folder.load(&format!("{}{include}", with_box(""))).unwrap();
+    assert_eq!(scene.materials[1].kind.absorption(), None);
 }
 
 #[test]

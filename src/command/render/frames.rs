@@ -63,6 +63,7 @@ mod tests {
     fn frames_are_ranges_and_number_the_last_hashes() {
         assert_eq!(parse_frames("7"), Ok(Frames { first: 7, last: 7, step: 1 }));
         assert_eq!(parse_frames("0-47x2"), Ok(Frames { first: 0, last: 47, step: 2 }));
+        assert_ne!(Frames::seed(0, 1), Frames::seed(0, 2));
         for wrong in ["", "-1", "5-4", "0-4x0", "a", "1-2-3", "1x"] {
             assert!(parse_frames(wrong).is_err(), "{wrong}");
         }

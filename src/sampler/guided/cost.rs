@@ -364,6 +364,17 @@ mod tests {
     }
 
     #[test]
+    fn who_is_uncertain_stays() {
+        // A firefly in one group: the arm in use seems a fourth dearer, and nobody can be sure.
+        let rounds = |seed| {
+            let rare = Planted { rare: 20_000, ..planted(0.8, 1.0) };
+            race_planted(&[planted(1.0, 1.0), rare], seed).1[0].rounds
+        };
+        let stays = (0..10).filter(|seed| rounds(10 * seed) > 1).count();
+        assert!(stays >= 3, "{stays} of 10");
+    }
+
+    #[test]
     fn many_fireflies_do() {
         let bright = Planted { rare: 50, ..planted(0.6, 1.0) };
         assert_eq!(race_planted(&[planted(1.0, 1.0), bright], 3).0, 0);

@@ -122,6 +122,13 @@ fn greatest_common_divisor(a: u32, b: u32) -> u32 {
     if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
+/// Returns the paths of a block, and their columns: pixels beyond the edge of the film have none.
+fn inside(block: &[PathState]) -> (Vec<&PathState>, usize) {
+    let is_inside = |path: &&PathState| path.rays_traced > 0;
+    let width = block[..FILM_BLOCK as usize].iter().take_while(is_inside).count();
+    (block.iter().filter(is_inside).collect(), width)
+}
+
 impl Work {
     fn add(&mut self, path: &PathState) {
         self.paths += 1.0;
@@ -168,13 +175,10 @@ impl Race<'_> {
                 for first in (0..wave.pixel_count as usize).step_by(BLOCK_PIXELS as usize) {
                     let samples = (0..SAMPLES).zip(paths.chunks(wave.pixel_count as usize));
                     let films = samples.map(|(sample, paths)| {
-                        let paths = &paths[first..][..BLOCK_PIXELS as usize];
-                        // Pixels in blocks beyond the edge of the film have no paths.
-                        let row = &paths[..FILM_BLOCK as usize];
-                        let width = row.iter().take_while(|path| path.rays_traced > 0).count();
-                        let paths = paths.iter().filter(|path| path.rays_traced > 0);
-                        paths.clone().for_each(|path| round_work.add(path));
-                        let radiance: Vec<[f32; 3]> = paths.map(|path| path.radiance).collect();
+                        let (paths, width) = inside(&paths[first..][..BLOCK_PIXELS as usize]);
+                        paths.iter().for_each(|path| round_work.add(path));
+                        let radiance: Vec<[f32; 3]> =
+                            paths.iter().map(|path| path.radiance).collect();
                         match shared_offset(filter, wave.first_sample + sample, wave.seed) {
                             Some(offset) => filtered(&radiance, width, offset),
                             None => radiance,
@@ -231,6 +235,17 @@ impl Race<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn blocks_end_at_the_edge_of_the_film() {
+        let path = |pixel: u32| PathState {
+            rays_traced: u32::from(pixel % FILM_BLOCK < 5 && pixel / FILM_BLOCK < 3),
+            ..PathState::default()
+        };
+        let block: Vec<PathState> = (0..BLOCK_PIXELS).map(path).collect();
+        let (paths, width) = inside(&block);
+        assert_eq!((paths.len(), width), (15, 5));
+    }
 
     #[test]
     fn races_become_rare() {
