@@ -10,6 +10,7 @@ use fenestra::{
         random::{random_independent_1d, random_independent_2d},
     },
     scene::environment::{EnvironmentMap, EnvironmentTables},
+    session::{Renderer, Settings},
     shader::{
         bindings::{probe, scene},
         constants::CONSTANT_COMPENSATION,
@@ -19,7 +20,7 @@ use fenestra::{
 use glam::{Vec2, Vec3};
 
 use crate::{
-    support::{self, statistics::chi_square_p_value},
+    support::{self, scenes, statistics::chi_square_p_value},
     twin::{environment::EnvironmentSampling as _, random::random_2d},
 };
 
@@ -460,4 +461,13 @@ fn the_shader_agrees() {
             assert!(different_rows <= 4, "{name}: {different_rows} densities differ");
         }
     }
+}
+
+/// The texels of this map are not there: no work is done on them.
+#[test]
+fn a_map_beyond_the_device_is_refused_before_the_work() {
+    let mut scene = scenes::mixed_room();
+    (scene.environment.width, scene.environment.height) = (1 << 20, 1 << 19);
+    let error = Renderer::new(support::device(), &scene, Settings::default()).err().unwrap();
+    assert!(error.to_string().contains("1048576x524288 texels takes"), "{error}");
 }

@@ -22,7 +22,7 @@ use crate::support::{
     self,
     command::Folder,
     replicates::{LIMIT, replicates},
-    statistics::{Comparison, Estimate, chi_square_p_value},
+    statistics::{Comparison, chi_square_p_value},
 };
 
 /// Enough to meet each triangle of each lamp.
@@ -111,8 +111,10 @@ fn lamps_are_drawn_as_their_probabilities_say() {
     let buffers = SceneBuffers::new(support::device(), &scene, window).unwrap();
     assert_ne!(buffers.surfaces().features & SURFACES_LAMP_CELLS, 0);
     let mut likely = Vec::new();
-    // The middle of a room falls back on a larger cell.
-    for position in [[1.0, 0.0, 1.0], [123.0, 0.0, 3.0], [62.0, 1.5, 2.0]] {
+    // The last place is next to a wall: the lamp beyond it is as near as that of the room.
+    for (position, least) in
+        [([1.0, 0.0, 1.0], 0.5), ([123.0, 0.0, 3.0], 0.5), ([7.8, 0.0, 2.0], 0.75)]
+    {
         let mut counts: BTreeMap<u32, (f64, f64)> = BTreeMap::new();
         for answer in draws(&buffers, position) {
             let Answer { source, probability, found_probability } = answer;
@@ -134,7 +136,7 @@ fn lamps_are_drawn_as_their_probabilities_say() {
         shares.sort_by(|a, b| b.0.total_cmp(&a.0));
         let own: f64 = shares[..12].iter().map(|(probability, _)| probability).sum();
         eprintln!("{} lamps, {own:.3} for those of the room, p = {p:.3}", counts.len());
-        assert!(own > 10.0 / 40.0, "{own}");
+        assert!(own > least, "{own}");
         likely.push(shares[0].1);
     }
     assert_ne!(likely[0], likely[1]);
@@ -149,9 +151,7 @@ fn a_room_looks_the_same_beside_others() {
     let alone = replicates(&rooms(1), &settings, 0, 128);
     let beside = replicates(&rooms(40), &settings, 100, 128);
     let Comparison { largest_t, ratio, .. } = Comparison::new(&beside, &alone);
-    let noise = |all: &[Estimate]| all.iter().map(|estimate| estimate.squared_error).sum::<f64>();
-    let noise = noise(&beside) / noise(&alone);
-    eprintln!("largest |t| {largest_t:.2}, ratio {ratio:.4}, of noise {noise:.2}");
+    eprintln!("largest |t| {largest_t:.2}, ratio {ratio:.4}");
     assert!(largest_t < LIMIT, "|t| = {largest_t}");
     assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
 }

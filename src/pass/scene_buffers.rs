@@ -15,7 +15,7 @@ use super::{
 use crate::{
     accel::{Accel, attributes::TriangleAttributes},
     brdf::MaterialTables,
-    error::Result,
+    error::{Error, Result},
     film::Window,
     gpu::{Buffer, DescriptorSet, Device},
     scene::{Camera, EnvironmentMap, Filter, Scene, environment::EnvironmentTables},
@@ -98,8 +98,24 @@ impl SceneBuffers {
         let brdf_table = Buffer::texels_from_slice(device, "BRDF tables", &tables.words)?;
         drop(tables);
 
-        let tables = EnvironmentTables::new(&scene.environment);
-        let compensated = EnvironmentTables::compensated(&scene.environment);
+        // Free each copy of a large map before the next one.
+        let map = &scene.environment;
+        check_environment(device, map)?;
+        let uploaded = |tables: EnvironmentTables, [rows, cells]: [&str; 2]| -> Result<_> {
+            let rows = Buffer::texels_from_slice(device, rows, &tables.rows)?;
+            Ok((rows, Buffer::texels_from_slice(device, cells, &tables.cells)?, tables.total))
+        };
+        let names = ["environment rows", "environment cells"];
+        let (rows, cells, total) = uploaded(EnvironmentTables::new(map), names)?;
+        let compensated = EnvironmentTables::compensated(map);
+        let texels = {
+            let texel = |texel: &Vec3| texel.extend(compensated.weight(*texel)).to_array();
+            let texels: Vec<[f32; 4]> = map.texels.iter().map(texel).collect();
+            Buffer::texels_from_slice(device, "environment texels", &texels)?
+        };
+        let names = ["compensated rows", "compensated cells"];
+        let (compensated_rows, compensated_cells, compensated_total) =
+            uploaded(compensated, names)?;
         let mut lamp_cells = lamp_cells.unwrap_or_default();
         let parameters = SceneParameters {
             lamp_count: lamps.source_count,
@@ -107,33 +123,15 @@ impl SceneBuffers {
             lamp_cells_per_metre: lamp_cells.grid.cells_per_metre,
             lamp_grid_size: lamp_cells.grid.size,
             lamp_list_length: lamp_cells.list_length,
-            compensated_total: compensated.total,
-            ..parameters(scene, &scene.environment, tables.total, window)
+            compensated_total,
+            ..parameters(scene, map, total, window)
         };
         add(bindings::PARAMETERS, Buffer::from_slice(device, "parameters", &[parameters])?);
-        let map = &scene.environment;
-        let texel = |texel: &Vec3| texel.extend(compensated.weight(*texel)).to_array();
-        let texels: Vec<[f32; 4]> = map.texels.iter().map(texel).collect();
-        add(
-            bindings::ENVIRONMENT_TEXELS,
-            Buffer::texels_from_slice(device, "environment texels", &texels)?,
-        );
-        add(
-            bindings::ENVIRONMENT_ROWS,
-            Buffer::texels_from_slice(device, "environment rows", &tables.rows)?,
-        );
-        add(
-            bindings::ENVIRONMENT_CELLS,
-            Buffer::texels_from_slice(device, "environment cells", &tables.cells)?,
-        );
-        add(
-            bindings::COMPENSATED_ROWS,
-            Buffer::texels_from_slice(device, "compensated rows", &compensated.rows)?,
-        );
-        add(
-            bindings::COMPENSATED_CELLS,
-            Buffer::texels_from_slice(device, "compensated cells", &compensated.cells)?,
-        );
+        add(bindings::ENVIRONMENT_TEXELS, texels);
+        add(bindings::ENVIRONMENT_ROWS, rows);
+        add(bindings::ENVIRONMENT_CELLS, cells);
+        add(bindings::COMPENSATED_ROWS, compensated_rows);
+        add(bindings::COMPENSATED_CELLS, compensated_cells);
         let mut choices = lamps.choices;
         let mut point_lamps = lamps.lamps;
         let mut clusters = lamps.triangle_clusters;
@@ -227,6 +225,24 @@ impl SceneBuffers {
             .map(|buffer| (buffer.name().to_owned(), buffer.size()))
             .collect()
     }
+}
+
+/// Refuses a map too large for the device, before the work on it.
+fn check_environment(device: &Device, map: &EnvironmentMap) -> Result<()> {
+    let cells = EnvironmentTables::cell_count(map.width, map.height) as u64;
+    let most = device.capabilities().max_texel_buffer_elements;
+    if cells <= most {
+        return Ok(());
+    }
+    let EnvironmentMap { width, height, source, .. } = map;
+    Err(Error::Device {
+        reason: format!(
+            "the environment map {source} of {width}x{height} texels takes {cells} numbers in one \
+             buffer, but {} allows {most}",
+            device.capabilities().name
+        ),
+        help: "make the map smaller, or choose another device with --device".into(),
+    })
 }
 
 fn parameters(

@@ -119,6 +119,12 @@ fn compensation(map: &EnvironmentMap) -> f32 {
 }
 
 impl EnvironmentTables {
+    /// Number of entries of [`EnvironmentTables::cells`] for a map of so many texels.
+    pub fn cell_count(width: u32, height: u32) -> usize {
+        let width = width as usize;
+        (width + guide_size(width) + 1) * (height as usize + 1)
+    }
+
     /// Builds the tables of `map` in O(texels), in parallel over rows, summed in double precision.
     pub fn new(map: &EnvironmentMap) -> Self {
         Self::with_compensation(map, 0.0)
@@ -132,8 +138,8 @@ impl EnvironmentTables {
     fn with_compensation(map: &EnvironmentMap, compensation: f32) -> Self {
         let (width, height) = (map.width as usize, map.height);
         let row_count = height as usize + 1;
-        let stride = width + guide_size(width) + 1;
-        let mut cells = vec![0.0; stride * row_count];
+        let mut cells = vec![0.0; Self::cell_count(map.width, map.height)];
+        let stride = cells.len() / row_count;
         let row_weights: Vec<f64> = cells
             .par_chunks_mut(stride)
             .enumerate()
