@@ -162,8 +162,8 @@ impl Runner {
 
     /// Runs waves like `wave` over `pixels` pixels, starting at its first, and takes the counters
     /// before they overflow. Once all pixels of the film have their samples, adds these to its sums. Returns
-    /// the pixels done, all unless the watch stops it, for which it waits if they have several samples, or are
-    /// those of a window whose sums could not go on. Fails if the device does.
+    /// the pixels done, all unless the watch stops it, for which it waits if they have several samples or are
+    /// those of a window whose sums cannot go on. Fails if the device does.
     pub(crate) fn sweep(&mut self, technique: &dyn Passes, wave: Wave, pixels: u32) -> Result<u32> {
         let mut done = 0;
         let mut uncounted = 0;
