@@ -1,4 +1,6 @@
-// Adds the albedo, shading normal and position of camera-ray hits to the film, where requested.
+// Keeps what the layers of surfaces show of every path: position of its first hit, albedo and shading
+// normal of the first surface that is no perfect mirror, smooth glass or pane. Denoisers want these of
+// what is seen in mirrors and through glass: https://www.openimagedenoise.org/documentation.html
 #version 460
 
 #include "brdf.glsl"
@@ -6,45 +8,40 @@
 #include "hit_instance.glsl"
 #include "hit_surface.glsl"
 #include "load.glsl"
+#include "path_list.glsl"
 #include "wave.glsl"
 
-READS(rays)
 READS(hits)
-UPDATES(film_albedo)
-UPDATES(film_normal)
-UPDATES(film_position)
+READS(paths)
+UPDATES(features)
 
-void add_features(uint pixel, PathIndex index) {
-    uint place = film_place(index);
-    // Add sample by sample: the sums must not depend on how samples are grouped into waves.
-    bool wants_albedo = (wave.aovs & AOV_ALBEDO) != 0u;
-    bool wants_normal = (wave.aovs & AOV_NORMAL) != 0u;
-    bool wants_position = (wave.aovs & AOV_POSITION) != 0u;
-    vec3 albedo = wants_albedo ? film_albedo[place] : vec3(0.0);
-    vec3 normal = wants_normal ? film_normal[place] : vec3(0.0);
-    vec3 position = wants_position ? film_position[place] : vec3(0.0);
-    for (uint i = 0u; i < wave.sample_count; ++i) {
-        uint path = i * wave.pixel_count + pixel;
-        Hit hit = hits[path];
-        if (hit.triangle == NO_TRIANGLE) {
-            continue;
+// Tests whether paths go on in a single direction of reflection, or of refraction.
+bool is_perfectly_specular(Material material) {
+    return is_specular(material.kind)
+        && (!is_kind(material, MATERIAL_DIELECTRIC) || material.alpha == 0.0);
+}
+
+void keep_features(uint path) {
+    Hit hit = hits[path];
+    Ray ray = load_ray(path);
+    Feature feature = Feature(vec3(0.0), 0u, vec3(0.0), hit.position);
+    if (wave.vertex > 0u) {
+        feature.position = features[path].position;
+        // A path that has ended shows the surface where it did.
+        if (features[path].is_open == 0u || ray.is_active == 0u) {
+            return;
         }
+    }
+    if (hit.triangle != NO_TRIANGLE) {
         Frame frame = frame_from_normal(hit.shading_normal);
         Material material =
             load_surface(path, triangle_material(hit.triangle, load_hit_instance(path)));
-        albedo += brdf_albedo(material, to_local(frame, -rays[path].direction));
-        normal += hit.shading_normal;
-        position += hit.position;
+        feature.albedo = paths[path].throughput
+            * brdf_albedo(material, to_local(frame, -ray.direction));
+        feature.normal = hit.shading_normal;
+        feature.is_open = is_perfectly_specular(material) ? 1u : 0u;
     }
-    if (wants_albedo) {
-        film_albedo[place] = albedo;
-    }
-    if (wants_normal) {
-        film_normal[place] = normal;
-    }
-    if (wants_position) {
-        film_position[place] = position;
-    }
+    features[path] = feature;
 }
 
-RUN_PIXELS(add_features)
+WALK_PATHS(keep_features)

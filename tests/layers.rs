@@ -1,8 +1,8 @@
-//! Image layers that show what samplers learned: the fill of visibility caches, and the cells of
-//! learned visibility that were found.
+//! Image layers: surfaces behind mirrors and glass, and what samplers learned: the fill of visibility
+//! caches, and the cells of learned visibility that were found.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use fenestra::{
     film::Aov,
@@ -11,7 +11,11 @@ use fenestra::{
         guided::CellKey,
         regions::{FACE_COUNT, face_normal},
     },
-    scene::Scene,
+    scene::{
+        Scene,
+        material::{Material, MaterialKind},
+        texture::{Texels, Texture, TextureUse},
+    },
     session::{Renderer, Settings},
 };
 use glam::Vec3;
@@ -50,6 +54,58 @@ fn room() -> Scene {
 /// Sums both counts over all pixels.
 fn total(counts: &[[u32; 2]]) -> [u64; 2] {
     counts.iter().fold([0; 2], |sum, pair| [0, 1].map(|i| sum[i] + u64::from(pair[i])))
+}
+
+/// A textured floor of albedo (0.6, 0, 0.3) below the camera, with a ceiling of the same above it.
+fn hall() -> Scene {
+    let mut scene = scenes::plane(Vec3::new(0.6, 0.4, 0.3), scenes::sky());
+    let texels = Texels::Bytes(vec![[255, 0, 255, 255]]);
+    let texture = Texture { name: "magenta".into(), width: 1, height: 1, texels };
+    scene.materials[0].surface.color = Some(TextureUse::new(Arc::new(texture)));
+    scenes::add_box(&mut scene.geometry, Vec3::new(0.0, 8.5, 0.0), Vec3::new(99.0, 1.0, 99.0), 0);
+    scene
+}
+
+/// Whatever way paths take through white glass, they end at one albedo.
+#[test]
+fn surfaces_are_shown_in_mirrors_and_through_glass() {
+    let _alone = support::alone();
+    let mirror = MaterialKind::Mirror { reflectance: Vec3::splat(0.5) };
+    let pane =
+        MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance: Vec3::ONE };
+    let (smooth, rough) = (MaterialKind::glass(1.5, 0.0), MaterialKind::glass(1.5, 0.3));
+    let seen = Vec3::new(0.6, 0.0, 0.3);
+    for (kind, depth, albedo, normal) in [
+        (mirror, 1, 0.5 * seen, -1.0..=-0.999),
+        (pane, 4, seen, 0.6..=0.95),
+        (smooth, 6, seen, 0.6..=0.95),
+        (rough, 2, Vec3::ONE, 0.999..=1.0),
+    ] {
+        let mut scene = hall();
+        scene.materials.push(Material::new("specular", kind.clone()));
+        scenes::add_box(
+            &mut scene.geometry,
+            Vec3::new(0.0, 1.0, 0.0),
+            Vec3::new(99.0, 1.0, 99.0),
+            1,
+        );
+        scene.geometry.uvs[0] = vec![[0.5; 2]; scene.geometry.positions.len()];
+        let aovs = vec![Aov::Albedo, Aov::Normal, Aov::Position];
+        let settings = Settings { depth, aovs: aovs.clone(), ..Settings::default() };
+        let (sums, _) = render(&scene, settings.clone(), 8);
+        let pixels = sums.pixel_count() as f32;
+        let mean = |layer: &[[f32; 3]]| {
+            layer.iter().map(|value| Vec3::from(*value)).sum::<Vec3>() / (8.0 * pixels)
+        };
+        let found = [&sums.albedo, &sums.normal, &sums.position].map(|layer| mean(layer));
+        assert!((found[0] - albedo).abs().max_element() < 1e-3, "{kind:?}: {found:?}");
+        assert!(normal.contains(&found[1].y), "{kind:?}: {found:?}");
+        let is_pane = matches!(kind, MaterialKind::ThinDielectric { .. });
+        assert!(is_pane || (found[2].y - 1.5).abs() < 1e-3, "{kind:?}: {found:?}");
+        let mut one_by_one = renderer(&scene, settings);
+        (0..8).for_each(|_| one_by_one.render_pass(1).unwrap());
+        assert!(one_by_one.sums().unwrap() == sums, "{kind:?}");
+    }
 }
 
 #[test]

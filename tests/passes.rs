@@ -113,7 +113,7 @@ fn simple_samplers_trace_groups_of_eight_rays() {
     assert!(listed[2..].iter().all(|dispatch| dispatch.wave.total_shadow_rays == 9));
     // A path, a pixel or a shadow ray for each invocation; rays that part share invocations.
     let invocations = |pass: usize| listed[pass].kernel.invocations(&listed[pass].wave);
-    assert_eq!((invocations(0), invocations(2), invocations(8)), (20, 20, 10));
+    assert_eq!((invocations(0), invocations(2), invocations(8)), (20, 20, 20));
     assert_eq!(invocations(3), 64, "160 shadow rays, 16 for each invocation");
 }
 
@@ -232,7 +232,7 @@ fn paths_are_shared_from_the_second_vertex_on() {
     assert!(
         listed(&lit, wave(0, 1)).contains("emit keep_second sample_lamps shadow gather sample")
     );
-    assert!(listed(&lit, wave(0, 1)).contains("bounce keep_third trace emit gather offer"));
+    assert!(listed(&lit, wave(0, 1)).contains("bounce keep_third trace emit texture features gather offer"));
     // Sixteen connections in groups of eight.
     let larger = order(&PassSettings { cohort_edge: 4, ..shared(2) }, &mis(), wave(0, 1));
     let rays: Vec<_> = larger
@@ -294,7 +294,7 @@ fn paths_end_at_light_that_is_not_sampled() {
     let glass = direct(SURFACES_SPECULAR, 0);
     assert_eq!(
         listed(&glass, wave(0, 1)),
-        "camera trace sample shadow gather features bounce trace gather deposit"
+        "camera trace sample shadow gather features bounce trace features gather deposit"
     );
     let lamp = direct(0, 1);
     assert_eq!(
@@ -305,7 +305,7 @@ fn paths_end_at_light_that_is_not_sampled() {
     assert_eq!(
         listed(&all, wave(0, 1)),
         "camera trace texture emit sample_lamps shadow gather sample shadow gather features bounce \
-         trace emit gather deposit"
+         trace emit texture features gather deposit"
     );
     let training = Wave { is_training: 1, ..wave(0, 1) };
     assert_eq!(listed(&all, training), "camera trace texture sample shadow gather deposit");

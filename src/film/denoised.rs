@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 /// Attribute of an image that a denoiser has made, with its name.
 pub(crate) const DENOISED: &str = "fenestra.denoised";
 
-/// Layers of an image that a denoiser needs: the noise that it expects, and first hits that guide it.
+/// Layers of an image that a denoiser needs: the noise that it expects, and surfaces that guide it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Guides {
     /// `Unfiltered`: the picture of pixels that share no sample. A denoiser keeps noise that they share.

@@ -22,10 +22,11 @@ pub enum Aov {
     /// shares: what denoisers expect.
     #[value(aliases = ["Unfiltered"])]
     Unfiltered,
-    /// `Albedo.R/G/B`: share of light that the first surface reflects, 0…1.
+    /// `Albedo.R/G/B`: share of light that a surface reflects, 0…1: the first one that is no perfect
+    /// mirror, smooth glass or pane, times what those on the way let through.
     #[value(aliases = ["Albedo"])]
     Albedo,
-    /// `N.X/Y/Z`: shading normal at the first hit, world space.
+    /// `N.X/Y/Z`: shading normal of that surface, world space.
     #[value(aliases = ["N"])]
     Normal,
     /// `P.X/Y/Z`: position of the first hit, world space, metres.
@@ -155,9 +156,9 @@ pub struct Sums {
     pub squares_compensation: Vec<[f32; 3]>,
     /// Σ radiance of the pixel's own samples; empty if not asked for.
     pub unfiltered: Vec<[f32; 3]>,
-    /// Σ albedo at the first hit, 0 without one; empty if not asked for.
+    /// Σ albedo of surfaces, as [`Aov::Albedo`], 0 without one; empty if not asked for.
     pub albedo: Vec<[f32; 3]>,
-    /// Σ shading normal at the first hit, 0 without one; empty if not asked for.
+    /// Σ shading normal of these surfaces, 0 without one; empty if not asked for.
     pub normal: Vec<[f32; 3]>,
     /// Σ position of the first hit, 0 without one; empty if not asked for.
     pub position: Vec<[f32; 3]>,

@@ -16,8 +16,11 @@ use crate::shader::{
     structs::Wave,
 };
 
-/// Bits of [`Wave::aovs`] that the pass `features` writes.
-const FEATURES: u32 = AOV_ALBEDO | AOV_NORMAL | AOV_POSITION;
+/// Bits of [`Wave::aovs`] that the pass `features` serves.
+pub(super) const FEATURES: u32 = AOV_ALBEDO | AOV_NORMAL | AOV_POSITION;
+/// Vertices at which that pass looks for a surface that is not perfectly specular: enough to see through
+/// a drinking glass and what it holds.
+const FEATURE_VERTICES: u32 = 8;
 
 /// When the passes of later vertices walk lists of the paths that are still alive. The picture is the same
 /// to the bit.
@@ -75,8 +78,12 @@ const STAGES: [fn(&mut Order); 11] = [
 ];
 
 /// Stages where the last vertices' rays arrive, at light that is not sampled, or not sampled alone.
-const LAST_STAGES: [fn(&mut Order); 3] =
-    [|order| order.trace(), |order| order.add_emission(), |order| order.gather(order.wave)];
+const LAST_STAGES: [fn(&mut Order); 4] = [
+    |order| order.trace(),
+    |order| order.add_emission(),
+    |order| order.add_features(),
+    |order| order.gather(order.wave),
+];
 
 /// Returns the dispatches of one wave for the first `vertices` vertices of its paths.
 pub fn wave_order(
@@ -274,8 +281,15 @@ impl<'a> Order<'a> {
 
     fn add_features(&mut self) {
         let Wave { vertex, aovs, is_training, .. } = self.wave;
-        if vertex == 0 && aovs & FEATURES != 0 && is_training == 0 {
-            self.add_over("features", Domain::Pixels);
+        let surfaces = self.settings.surfaces;
+        let is_asked_for = aovs & FEATURES != 0 && is_training == 0;
+        if is_asked_for && vertex == 0 {
+            self.add_over("features", Domain::Arrivals);
+        } else if is_asked_for && vertex < FEATURE_VERTICES && surfaces.has_specular() {
+            if vertex == self.vertices && surfaces.is_textured() {
+                self.add_over("texture", Domain::Arrivals);
+            }
+            self.add_over("features", Domain::Arrivals);
         }
     }
 

@@ -9,7 +9,7 @@ use std::{
 use super::{
     film_buffers::{BLOCK_PIXELS, FilmBuffers, padded_pixels},
     kernel::{Dispatch, Domain, Kernel, Pass},
-    order::{PassSettings, PathLists, wave_order},
+    order::{FEATURES, PassSettings, PathLists, wave_order},
     recording::Recording,
     scene_buffers::SceneBuffers,
     sharing_buffers::SharingBuffers,
@@ -70,12 +70,13 @@ impl Runner {
         let cohort_pixels = settings.cohort_edge * settings.cohort_edge;
         let rays = settings.shadow_rays.max(cohort_pixels).clamp(1, SHADOW_RAYS_PER_GROUP);
         let demand = SharingBuffers::demand(demand, cohort_pixels);
+        let has_features = settings.aovs & FEATURES != 0;
         let waves = WaveBuffers::new(
             device,
             padded_pixels,
             settings.most_paths,
             rays,
-            demand,
+            PathDemand { has_features, ..demand },
             settings.surfaces,
         )?;
         let film = FilmBuffers::new(

@@ -25,6 +25,7 @@ impl SharingBuffers {
         PathDemand {
             bytes: demand.bytes.max(connections * size_of::<Connection>() as u64),
             texels: demand.texels.max(connections),
+            ..demand
         }
     }
 

@@ -69,13 +69,15 @@ pub trait Steps {
     }
 }
 
-/// Memory that a technique takes for every path in flight; limits the size of a wave.
+/// Memory that a render takes for every path in flight; limits the size of a wave.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PathDemand {
     /// Bytes of the widest buffer.
     pub bytes: u64,
     /// Texels of the texel buffer with most of them.
     pub texels: u64,
+    /// True if paths keep what the layers of surfaces show.
+    pub has_features: bool,
 }
 
 /// The passes of a sampler in one render, as the runner sees them.

@@ -9,7 +9,7 @@ use crate::{
     shader::{
         bindings::{WAVE, wave},
         constants::{PATH_LISTS, WORKGROUP_SIZE},
-        structs::{Hit, PathState, Ray, ShadowRay, Surface},
+        structs::{Feature, Hit, PathState, Ray, ShadowRay, Surface},
     },
 };
 
@@ -43,6 +43,7 @@ pub struct WaveBuffers {
     instances: Buffer,
     path_lists: Buffer,
     lamp_lists: Buffer,
+    features: Buffer,
 }
 
 impl WaveBuffers {
@@ -87,6 +88,8 @@ impl WaveBuffers {
         let instances = make("hit instances", instance_count, size_of::<u32>())?;
         let lamp_list_count = if of.has_lamp_cells() { paths } else { 1 };
         let lamp_lists = make("lamp lists", lamp_list_count, size_of::<u32>())?;
+        let feature_count = if demand.has_features { paths } else { 1 };
+        let features = make("features", feature_count, size_of::<Feature>())?;
         let path_lists = Buffer::new(device, "path lists", path_list_bytes(paths))?;
         let paths = make("paths", paths, size_of::<PathState>())?;
         let bound = [
@@ -103,6 +106,7 @@ impl WaveBuffers {
             (wave::PATH_LISTS, &path_lists),
             (wave::PATH_LIST_TEXELS, &path_lists),
             (wave::LAMP_LISTS, &lamp_lists),
+            (wave::FEATURES, &features),
         ];
         let set = DescriptorSet::new(device, &WAVE, &bound)?;
         Ok(Self {
@@ -117,6 +121,7 @@ impl WaveBuffers {
             instances,
             path_lists,
             lamp_lists,
+            features,
         })
     }
 
@@ -186,6 +191,7 @@ impl WaveBuffers {
             &self.instances,
             &self.path_lists,
             &self.lamp_lists,
+            &self.features,
         ]
         .map(|buffer| (buffer.name().to_owned(), buffer.size()))
         .into()

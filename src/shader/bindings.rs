@@ -276,6 +276,8 @@ binding_tables! {
         11 PATH_LIST_TEXELS: texels R32Uint;
         /// First entry of the list that lamps were drawn from at the last vertex of each path.
         12 LAMP_LISTS: array uint;
+        /// Layers of surfaces of each path, where they are asked for.
+        13 FEATURES: array Feature;
     }
 
     /// Set 1 of the passes that show films in a window.
@@ -302,9 +304,9 @@ binding_tables! {
         2 FILM_SQUARES: array vec3;
         /// Totals over all pixels.
         3 COUNTERS: one Counters;
-        /// Sum of the albedo at first hits.
+        /// Sum of the albedo of surfaces, as in `Feature`.
         4 FILM_ALBEDO: array vec3;
-        /// Sum of the shading normal at first hits.
+        /// Sum of the shading normal of surfaces, as in `Feature`.
         5 FILM_NORMAL: array vec3;
         /// Sum of the position of first hits.
         6 FILM_POSITION: array vec3;

@@ -344,9 +344,9 @@ constants! {
     SHOW_PICTURE = 0;
     /// Relative standard error, in false colour from 1% (blue) to 100% (red).
     SHOW_ERROR = 1;
-    /// Albedo at first hits.
+    /// Albedo, as in the image's layer.
     SHOW_ALBEDO = 2;
-    /// Shading normal at first hits, −1 to 1 as 0 to 1.
+    /// Shading normal, as in that layer, −1 to 1 as 0 to 1.
     SHOW_NORMAL = 3;
     /// Share of shadow rays that reached the environment.
     SHOW_VISIBLE = 4;

@@ -162,6 +162,18 @@ structs! {
         metallic: float,
     }
 
+    /// Layers of surfaces at the sample of a path.
+    struct Feature {
+        /// Albedo of the first surface that is not perfectly specular, times the throughput up to it.
+        albedo: vec3,
+        /// 1 as long as every surface was perfectly specular.
+        is_open: uint,
+        /// Shading normal of that surface.
+        normal: vec3,
+        /// Position of the first hit, metres.
+        position: vec3,
+    }
+
     /// Light without a surface.
     struct Lamp {
         /// `LAMP_…`.

@@ -292,7 +292,7 @@ impl Study<'_> {
 /// Settings of the renders that tell surfaces and environment apart.
 fn mask_settings() -> Settings {
     let sampler = Sampler::Cosine;
-    Settings { sampler, shadow_rays: 1, depth: 1, aovs: vec![Aov::Normal], ..Settings::default() }
+    Settings { sampler, shadow_rays: 1, depth: 1, aovs: vec![Aov::Position], ..Settings::default() }
 }
 
 /// Pixels of a scene's film.

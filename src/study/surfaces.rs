@@ -1,7 +1,7 @@
 //! The mask of a scene: pixels that see surfaces alone, and those that see the environment.
 //!
-//! A few camera rays per pixel tell them apart by the film's layer of normals, which grows by a
-//! unit vector for every ray that hits something. A pixel with one ray that escapes counts as
+//! A few camera rays per pixel tell them apart by the film's layer of positions, which grows by that
+//! of every ray that hits something. A pixel with one ray that escapes counts as
 //! environment: its noise is that of smoothing edges. Behind glass the glass is the first hit, and
 //! the pixel counts as surface.
 
@@ -44,7 +44,7 @@ pub struct Parts {
 
 impl Surfaces {
     /// Reads the mask from `folder` or renders it there; `make` gives a session with the layer of
-    /// normals.
+    /// positions.
     ///
     /// # Errors
     /// A failing device or disk.
@@ -114,13 +114,13 @@ fn shares(renderer: &mut Renderer) -> Result<Vec<[f32; 3]>> {
     let mut hits: Vec<u16> = Vec::new();
     for _ in 0..RAY_COUNT {
         renderer.render_pass(1)?;
-        let normals = renderer.sums()?.normal;
-        hits.resize(normals.len(), 0);
-        last.resize(normals.len(), [0.0; 3]);
-        for ((hits, before), now) in hits.iter_mut().zip(&last).zip(&normals) {
+        let positions = renderer.sums()?.position;
+        hits.resize(positions.len(), 0);
+        last.resize(positions.len(), [0.0; 3]);
+        for ((hits, before), now) in hits.iter_mut().zip(&last).zip(&positions) {
             *hits += u16::from(before != now);
         }
-        last = normals;
+        last = positions;
     }
     Ok(hits.into_iter().map(|hits| [f32::from(hits) / RAY_COUNT as f32; 3]).collect())
 }

@@ -46,7 +46,8 @@ impl NodeSize {
     /// Memory per path in flight.
     pub fn demand(self) -> PathDemand {
         let bytes = (8 * self.quads()).max(16 * self.sums()).max(4 * self.cache_words());
-        PathDemand { bytes, texels: self.quads().max(self.sums()) }
+        let texels = self.quads().max(self.sums());
+        PathDemand { bytes, texels, ..PathDemand::default() }
     }
 }
 

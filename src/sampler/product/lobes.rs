@@ -32,7 +32,8 @@ impl LobeSize {
     pub fn demand(self) -> PathDemand {
         let lobes = u64::from(self.kept_lobes);
         let masks = self.mask_words();
-        PathDemand { bytes: (8 * lobes).max(4 * masks), texels: lobes.max(masks) }
+        let (bytes, texels) = ((8 * lobes).max(4 * masks), lobes.max(masks));
+        PathDemand { bytes, texels, ..PathDemand::default() }
     }
 }
 
