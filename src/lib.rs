@@ -102,6 +102,8 @@
 //!   Graphics Forum 42(8).
 //! - \[Eto & Tokuyoshi 2023\] "Bounded VNDF Sampling for Smith–GGX Reflections", SIGGRAPH Asia
 //!   Technical Communications.
+//! - \[Friedman & Jones 2015\] "Fully Automatic ID Mattes with Support for Motion Blur and
+//!   Transparency", SIGGRAPH Posters.
 //! - \[Fritsch & Butland 1984\] "A Method for Constructing Local Monotone Piecewise Cubic
 //!   Interpolants", SIAM Journal on Scientific and Statistical Computing 5(2).
 //! - \[Gibson 1998\] "Constrained Elastic Surface Nets", MICCAI.

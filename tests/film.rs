@@ -45,6 +45,7 @@ fn metadata(ranges: &[SampleRange]) -> Metadata {
         ahead: Ahead::default(),
         seconds: 1.0 / 3.0,
         gpu_seconds: BTreeMap::from([("trace".to_owned(), 0.1)]),
+        mattes: named("3ae39a5/name", "CryptoObject"),
         device: "llvmpipe (LLVM 15, 256 bits) “ä”".to_owned(),
         driver: "Mesa 22.3.6".to_owned(),
         tracer: "Embree 3.13.5".to_owned(),

@@ -5,16 +5,17 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use fenestra::{
-    film::Aov,
+    film::{Aov, Window, cryptomatte::identifier},
     sampler::{
         Parameters, Sampler,
         guided::CellKey,
         regions::{FACE_COUNT, face_normal},
     },
     scene::{
-        Scene,
+        Geometry, Instance, Scene,
         material::{Material, MaterialKind},
         texture::{Texels, Texture, TextureUse},
+        transform::Transform,
     },
     session::{Renderer, Settings},
 };
@@ -105,6 +106,85 @@ fn surfaces_are_shown_in_mirrors_and_through_glass() {
         let mut one_by_one = renderer(&scene, settings);
         (0..8).for_each(|_| one_by_one.render_pass(1).unwrap());
         assert!(one_by_one.sums().unwrap() == sums, "{kind:?}");
+    }
+}
+
+/// A floor under the camera, and a plate on it whose edge crosses a column of pixels: placed, or as an
+/// instance.
+fn half_covered(is_instanced: bool) -> Scene {
+    let mut scene = scenes::plane(Vec3::splat(0.5), scenes::sky());
+    scene.materials.push(Material { name: "paint".into(), ..scenes::copper(0.3) });
+    let mut geometry = Geometry::default();
+    geometry.start_object("floor");
+    scenes::add_box(&mut geometry, Vec3::new(0.0, -0.5, 0.0), Vec3::new(100.0, 1.0, 100.0), 0);
+    geometry.start_object("plate");
+    let (centre, size) = (Vec3::new(EDGE + 20.0, 0.0, 0.0), Vec3::new(40.0, 0.02, 40.0));
+    if is_instanced {
+        let mut mesh = Geometry::default();
+        scenes::add_box(&mut mesh, Vec3::ZERO, size, 0);
+        geometry.prototypes.push(mesh);
+        let place = Transform::new([1.0; 3], [0.0; 3], centre.into());
+        geometry.instances.push(Instance::new(0, &place, 1, true).unwrap());
+    } else {
+        scenes::add_box(&mut geometry, centre, size, 1);
+    }
+    scene.geometry = geometry;
+    scene
+}
+
+/// Place of the edge of the plate, metres.
+const EDGE: f32 = 0.1;
+
+#[test]
+fn mattes_are_the_shares_of_objects_and_materials() {
+    let _alone = support::alone();
+    let aovs = vec![Aov::CryptoObject, Aov::CryptoMaterial];
+    let settings = Settings { depth: 1, shadow_rays: 1, aovs: aovs.clone(), ..Settings::default() };
+    for is_instanced in [false, true] {
+        let scene = half_covered(is_instanced);
+        let (sums, _) = render(&scene, settings.clone(), 128);
+        let image = sums.to_image(&aovs);
+        for (layer, under, over) in
+            [("CryptoObject", "floor", "plate"), ("CryptoMaterial", "diffuse", "paint")]
+        {
+            let names = ["R", "G", "B", "A"].map(|channel| format!("{layer}00.{channel}"));
+            let [first, first_share, second, second_share] =
+                names.each_ref().map(|name| &image.channels[name]);
+            let [under, over] = [under, over].map(|name| f32::from_bits(identifier(name)));
+            // The camera is 4.99 m above the plate: a column is 33 cm wide, and the ninth begins at 0.
+            let covered = 1.0 - EDGE / (2.0 * 4.99 * 15_f32.to_radians().tan() / 8.0);
+            for pixel in 0..sums.pixel_count() {
+                let ids = (first[pixel], second[pixel]);
+                let sum = first_share[pixel] + second_share[pixel];
+                assert!((sum - 1.0).abs() < 1e-6, "{layer}, pixel {pixel}: {sum}");
+                match pixel % 16 {
+                    8 => {
+                        assert_eq!(ids, (over, under), "{layer}, pixel {pixel}");
+                        let share = first_share[pixel];
+                        assert!((share - covered).abs() < 0.04, "{layer}: {share} of {covered}");
+                    }
+                    column => assert_eq!(ids, (if column < 8 { under } else { over }, 0.0)),
+                }
+            }
+            assert!(image.channels[&format!("{layer}02.A")].iter().all(|share| *share == 0.0));
+        }
+        // Neither the grouping of samples nor a window nor a break changes a count.
+        let mut grouped = renderer(&scene, settings.clone());
+        [1, 100, 27].map(|samples| grouped.render_pass(samples).unwrap());
+        assert!(grouped.sums().unwrap() == sums);
+        let window = Some(Window { x: 7, y: 2, width: 3, height: 4 });
+        let (part, _) = render(&scene, Settings { window, ..settings.clone() }, 128);
+        assert_eq!(part.objects[4], sums.objects[3 * 16 + 8]);
+        let (mut first, _) = render(&scene, settings.clone(), 28);
+        let mut resumed = renderer(&scene, settings.clone());
+        resumed.restore(&first).unwrap();
+        resumed.render_pass(100).unwrap();
+        assert!(resumed.sums().unwrap() == sums);
+        first.add(&render(&scene, Settings { first_sample: 28, ..settings.clone() }, 100).0);
+        let added = first.to_image(&aovs);
+        for (name, values) in image.channels.iter().filter(|(name, _)| name.starts_with("Crypto")) {
+            assert_eq!(added.channels[name], *values, "{name}");
+        }
     }
 }
 

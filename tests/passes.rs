@@ -23,8 +23,8 @@ use fenestra::{
     },
     shader::{
         constants::{
-            AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, MATERIAL_PLASTIC, SURFACES_EMITTING,
-            SURFACES_SPECULAR, SURFACES_TEXTURED, TRAINING_WAVE,
+            AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, AOV_OBJECTS, MATERIAL_PLASTIC,
+            SURFACES_EMITTING, SURFACES_SPECULAR, SURFACES_TEXTURED, TRAINING_WAVE,
         },
         spirv::PASSES,
         structs::Wave,
@@ -176,7 +176,8 @@ fn guided_counts_rays_and_bounces_where_samples_teach() {
 fn shown() -> Vec<(&'static str, Vec<Dispatch>)> {
     let deep = settings(2, 2);
     let training = Wave { is_training: TRAINING_WAVE, ..wave(0, 1) };
-    let furnished = PassSettings { surfaces: everything(), ..settings(2, 1) };
+    let aovs = AOV_ALBEDO | AOV_OBJECTS;
+    let furnished = PassSettings { surfaces: everything(), aovs, ..settings(2, 1) };
     let mut shown = vec![
         ("uniform … ris", order(&deep, &mis(), wave(0, 1))),
         ("product", order(&deep, &product(), wave(0, 1))),
@@ -232,7 +233,10 @@ fn paths_are_shared_from_the_second_vertex_on() {
     assert!(
         listed(&lit, wave(0, 1)).contains("emit keep_second sample_lamps shadow gather sample")
     );
-    assert!(listed(&lit, wave(0, 1)).contains("bounce keep_third trace emit texture features gather offer"));
+    assert!(
+        listed(&lit, wave(0, 1))
+            .contains("bounce keep_third trace emit texture features gather offer")
+    );
     // Sixteen connections in groups of eight.
     let larger = order(&PassSettings { cohort_edge: 4, ..shared(2) }, &mis(), wave(0, 1));
     let rays: Vec<_> = larger

@@ -93,13 +93,33 @@ fn layers_preview_and_window_are_written() {
 #[test]
 fn a_render_continued_from_its_checkpoint_has_the_same_bits() {
     let folder = folder();
-    let (whole, _) = render(&folder, "whole.exr", &["--spp", "9", "--depth", "2"]);
-    let keep = ["--spp", "4", "--depth", "2", "--checkpoint-interval", "1h"];
-    render(&folder, "part.exr", &keep);
-    let (part, statistics) =
-        render(&folder, "part.exr", &["--spp", "9", "--depth", "2", "--resume"]);
+    let with = |more: &[&'static str]| [&["--depth", "2", "--aov", "CryptoObject"], more].concat();
+    let (whole, _) = render(&folder, "whole.exr", &with(&["--spp", "9"]));
+    render(&folder, "part.exr", &with(&["--spp", "4", "--checkpoint-interval", "1h"]));
+    let (part, statistics) = render(&folder, "part.exr", &with(&["--spp", "9", "--resume"]));
     assert_eq!(statistics.samples_per_pixel, 9);
     assert_eq!(part.channels, whole.channels);
+    let attribute = |name: &str| part.attributes[&format!("cryptomatte/3ae39a5/{name}")].clone();
+    assert_eq!(attribute("name"), Attribute::Text("CryptoObject".into()));
+    assert_eq!(attribute("conversion"), Attribute::Text("uint32_to_float32".into()));
+    let Attribute::Text(manifest) = attribute("manifest") else { panic!("no text") };
+    let names: serde_json::Map<_, _> = serde_json::from_str(&manifest).unwrap();
+    // Every identifier in the picture has a name.
+    for id in part.channels["CryptoObject00.R"].iter().filter(|id| **id != 0.0) {
+        let found = serde_json::Value::from(format!("{:08x}", id.to_bits()));
+        assert!(names.values().any(|named| *named == found), "{found} in {manifest}");
+    }
+    // Two halves add up to the whole.
+    for (name, offset) in [("a.exr", "0"), ("b.exr", "8")] {
+        render(&folder, name, &with(&["--spp", "8", "--sample-offset", offset]));
+    }
+    folder.run(&["merge", "a.exr", "b.exr", "-o", "ab.exr"]).assert(0, &[]);
+    let merged = Image::read_exr(&folder.path().join("ab.exr")).unwrap();
+    let (both, _) = render(&folder, "both.exr", &with(&["--spp", "16"]));
+    for (name, values) in both.channels.iter().filter(|(name, _)| name.starts_with("Crypto")) {
+        assert_eq!(merged.channels[name], *values, "{name}");
+    }
+    assert_eq!(merged.attributes["cryptomatte/3ae39a5/manifest"], Attribute::Text(manifest));
 }
 
 #[test]

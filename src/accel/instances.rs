@@ -34,7 +34,8 @@ pub struct Record {
     pub first_material: u32,
     /// All bits, or none to replace all materials by the first.
     pub material_mask: u32,
-    /// Bits `INSTANCE_…`.
+    /// Bit `INSTANCE_MIRRORS`; above it 0 for placed triangles, else 1 + the place in
+    /// [`Geometry::instances`].
     pub flags: u32,
     /// Growth of node boxes per axis in the space of the mesh, per metre of the reach of the instance
     /// and the distance of the ray's origin from that of the world.
@@ -108,7 +109,7 @@ impl Level {
             first_node,
             first_material: instance.first_material,
             material_mask: instance.material_mask,
-            flags: if instance.mirrors() { INSTANCE_MIRRORS } else { 0 },
+            flags: (label as u32 + 1) << 1 | if instance.mirrors() { INSTANCE_MIRRORS } else { 0 },
             margin: (MARGIN * spread).as_vec3().to_array(),
             reach: reach as f32,
         };

@@ -3,8 +3,8 @@
 //! The channels hold the sums bit for bit: `Sum.R/G/B`, `SumCompensation.R/G/B`, `Squares.R/G/B`,
 //! `Pending.R/G/B` of a stopped sweep, `UnfilteredSum.R/G/B`,
 //! `SquaresCompensation.R/G/B`, `AlbedoSum.R/G/B`, `NSum.X/Y/Z`, `PSum.X/Y/Z`, `GuideCellSum.R/G/B`,
-//! `GuideLevelSum.R/G/B`, and each count of shadow rays and cache entries as a pair of floats that add up
-//! to the integer.
+//! `GuideLevelSum.R/G/B`, and each count of shadow rays, cache entries and coverages as a pair of floats
+//! that add up to the integer.
 //! Beside them, the picture `R`, `G`, `B` lets any viewer open the file. An attribute holds the
 //! SHA-256 of window, channels and attributes, so that damage does not pass for radiance.
 //!
@@ -25,12 +25,12 @@ use sha2::{Digest, Sha256};
 use super::{
     Attribute, Image,
     metadata::Metadata,
-    sums::{COUNTS, Sums, TRIPLES, split},
+    sums::{COUNTS, COVERAGES, Coverage, Sums, TRIPLES, split},
 };
 use crate::{
     error::{Error, Result},
     files::{self, hexadecimal, write_atomically},
-    shader::constants::FILM_BLOCK,
+    shader::constants::{FILM_BLOCK, MATTE_SLOTS},
 };
 
 /// Attribute that marks a checkpoint, and the version of its channels.
@@ -146,6 +146,13 @@ impl Checkpoint {
         }
         for (layer, counts) in COUNTS.iter().zip(sums.counts()) {
             insert_counts(&mut image, layer.channels, counts);
+        }
+        for ((_, layer), coverages) in COVERAGES.iter().zip(sums.coverages()) {
+            for slot in 0..MATTE_SLOTS as usize {
+                let counts: Vec<_> = coverages.iter().map(|coverage| coverage[slot]).collect();
+                let names = slot_names(layer, slot);
+                insert_counts(&mut image, names.each_ref().map(String::as_str), &counts);
+            }
         }
         self.metadata.store(&mut image);
         image.attributes.insert(FORMAT_ATTRIBUTE.to_owned(), Attribute::Integer(FORMAT_VERSION));
@@ -280,6 +287,14 @@ impl Checkpoint {
         }
         for (layer, values) in COUNTS.iter().zip(sums.counts_mut()) {
             *values = counts(image, layer.channels, path)?;
+        }
+        for ((_, layer), coverages) in COVERAGES.iter().zip(sums.coverages_mut()) {
+            for slot in 0..MATTE_SLOTS as usize {
+                let names = slot_names(layer, slot);
+                let counts = counts(image, names.each_ref().map(String::as_str), path)?;
+                coverages.resize(counts.len(), Coverage::default());
+                coverages.iter_mut().zip(counts).for_each(|(own, count)| own[slot] = count);
+            }
         }
         if sums.non_finite_count() > 0 {
             return Err(Error::format(
@@ -427,6 +442,12 @@ fn insert_counts(image: &mut Image, names: [&str; 4], counts: &[[u32; 2]]) {
         };
         image.channels.insert(name.to_owned(), counts.par_iter().map(part).collect());
     }
+}
+
+/// Channels of a slot of a layer of coverages.
+fn slot_names(layer: &str, slot: usize) -> [String; 4] {
+    ["Id", "IdCompensation", "Samples", "SamplesCompensation"]
+        .map(|part| format!("{layer}{slot}.{part}"))
 }
 
 /// Inverse of [`insert_counts`]; empty if a channel is missing.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Attribute, Image};
+use super::{Attribute, Image, cryptomatte};
 use crate::error::{Error, Result};
 
 /// Attribute of an image that a denoiser has made, with its name.
@@ -68,7 +68,7 @@ pub(crate) fn repair(pixels: &mut [[f32; 3]], width: u32) -> usize {
 pub(crate) fn image_of(film: &Image, pixels: &[[f32; 3]], denoiser: String) -> Image {
     let mut image = Image {
         channels: std::collections::BTreeMap::new(),
-        attributes: film.attributes.clone(),
+        attributes: cryptomatte::without(&film.attributes),
         ..*film
     };
     image.insert_triple(["R", "G", "B"], pixels);

@@ -9,7 +9,7 @@ use std::{
     path::Path,
 };
 
-use super::{Image, checkpoint::Checkpoint, metadata::Metadata};
+use super::{Image, checkpoint::Checkpoint, cryptomatte, metadata::Metadata};
 use crate::error::{Error, Result};
 
 /// One image to merge.
@@ -78,9 +78,12 @@ pub fn merge_images(parts: &[Part<'_>]) -> Result<(Image, Metadata)> {
         attributes: first.image.attributes.clone(),
         ..*first.image
     };
-    for name in common_channels(parts) {
+    for name in common_channels(parts).filter(|name| !cryptomatte::is_channel(name)) {
         merged.channels.insert(name.clone(), merge_channel(name, parts));
     }
+    let images: Vec<_> =
+        parts.iter().map(|part| (part.image, part.metadata.sample_count() as f64)).collect();
+    cryptomatte::merge(&mut merged, &images, metadata.sample_count() as f64);
     metadata.store(&mut merged);
     Ok((merged, metadata))
 }

@@ -11,7 +11,7 @@ use std::{
     str::FromStr,
 };
 
-use super::{Attribute, Image, denoised::check_film, sums::Ahead};
+use super::{Attribute, Image, cryptomatte::PREFIX, denoised::check_film, sums::Ahead};
 use crate::error::{Error, Result};
 
 /// Samples `first … first + count − 1` of every pixel, drawn with one seed.
@@ -91,6 +91,8 @@ pub struct Metadata {
     pub seconds: f64,
     /// Device time by pass, seconds.
     pub gpu_seconds: BTreeMap<String, f64>,
+    /// Attributes of Cryptomatte, as [`cryptomatte::attributes`](super::cryptomatte).
+    pub mattes: BTreeMap<String, String>,
     /// Vulkan device.
     pub device: String,
     /// Its driver.
@@ -178,6 +180,9 @@ impl Metadata {
         }
         for (name, value) in &self.fit_hashes {
             put(&format!("fenestra.fit_hashes.{name}"), text(value));
+        }
+        for (name, value) in &self.mattes {
+            put(&format!("{PREFIX}{name}"), text(value));
         }
         for (name, value) in &self.gpu_seconds {
             put(&format!("fenestra.gpu_seconds.{name}"), Attribute::Double(*value));
@@ -268,6 +273,7 @@ impl Metadata {
             gpu_seconds: named("fenestra.gpu_seconds.")
                 .filter_map(|(name, value)| Some((name, double(value)?)))
                 .collect(),
+            mattes: texts(PREFIX),
             device: text("fenestra.device")?,
             driver: text("fenestra.driver")?,
             // Older files do not say; the device traced.

@@ -5,6 +5,7 @@
 //! which a render continues bit for bit. Every file carries the [`Metadata`] of its render.
 
 pub mod checkpoint;
+pub mod cryptomatte;
 pub mod denoised;
 pub mod display;
 pub mod merge;

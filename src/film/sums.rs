@@ -5,8 +5,12 @@ use std::{array, collections::BTreeSet};
 use clap::ValueEnum;
 use rayon::prelude::*;
 
-use super::{Image, reconstruction::weights};
-use crate::shader::constants::FILM_BLOCK;
+use super::{
+    Image,
+    cryptomatte::{self, MATERIALS, OBJECTS},
+    reconstruction::weights,
+};
+use crate::shader::constants::{FILM_BLOCK, MATTE_SLOTS};
 
 /// Extra layers of an image file, with pbrt's names and meaning where pbrt has them. The command
 /// line also accepts a layer's name in the file.
@@ -45,6 +49,13 @@ pub enum Aov {
     /// (R), a coarse cell (G), a fine one (B).
     #[value(aliases = ["GuideCell"])]
     GuideCell,
+    /// `CryptoObject00…02.R/G/B/A`: Cryptomatte of the objects that camera rays meet first, by the
+    /// pixel's own samples: six of them.
+    #[value(aliases = ["CryptoObject"])]
+    CryptoObject,
+    /// `CryptoMaterial00…02.R/G/B/A`: the same of materials.
+    #[value(aliases = ["CryptoMaterial"])]
+    CryptoMaterial,
 }
 
 impl Aov {
@@ -109,6 +120,14 @@ pub(crate) const COUNTS: [Layer<4>; 2] = [
     },
 ];
 
+/// Identifiers of objects or materials and the samples that meet them, in the order of their discovery; no
+/// samples where there is none.
+pub type Coverage = [[u32; 2]; MATTE_SLOTS as usize];
+
+/// Layers of coverages, with the channels of each slot.
+pub(crate) const COVERAGES: [(Aov, &str); 2] =
+    [(Aov::CryptoObject, "ObjectCounts"), (Aov::CryptoMaterial, "MaterialCounts")];
+
 /// A sweep over the film that was stopped on its way: the first blocks have one more sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ahead {
@@ -172,6 +191,10 @@ pub struct Sums {
     /// Numbers of first hits whose cell was that of their face, a coarse one, a fine one; empty if
     /// not asked for.
     pub guide_level: Vec<[f32; 3]>,
+    /// Samples by object, by [`cryptomatte::identifier`]; empty if not asked for.
+    pub objects: Vec<Coverage>,
+    /// Samples by material; empty if not asked for.
+    pub materials: Vec<Coverage>,
 }
 
 /// Defines a method that returns all layers of a table, and one to change them.
@@ -192,6 +215,7 @@ impl Sums {
         sum compensation squares squares_compensation unfiltered albedo normal position guide_cell
         guide_level);
     layers!(counts counts_mut COUNTS [u32; 2]: visible cache_entries);
+    layers!(coverages coverages_mut COVERAGES Coverage: objects materials);
 
     /// Creates sums of no samples, without extra layers.
     pub fn new(origin: [u32; 2], width: u32, height: u32, film_size: [u32; 2]) -> Self {
@@ -220,7 +244,10 @@ impl Sums {
     fn extra_layers(&self) -> Vec<(Aov, bool)> {
         let triples = TRIPLES.iter().map(|layer| layer.aov).zip(self.triples().map(Vec::is_empty));
         let counts = COUNTS.iter().map(|layer| layer.aov).zip(self.counts().map(Vec::is_empty));
-        triples.chain(counts).filter_map(|(aov, is_empty)| Some((aov?, !is_empty))).collect()
+        let coverages = COVERAGES.iter().map(|layer| Some(layer.0));
+        let coverages = coverages.zip(self.coverages().map(Vec::is_empty));
+        let all = triples.chain(counts).chain(coverages);
+        all.filter_map(|(aov, is_empty)| Some((aov?, !is_empty))).collect()
     }
 
     /// `width * height`.
@@ -421,6 +448,21 @@ impl Sums {
                     let names = ["GuideLevel.R", "GuideLevel.G", "GuideLevel.B"];
                     insert_means(&mut image, names, &self.guide_level);
                 }
+                Aov::CryptoObject | Aov::CryptoMaterial => {
+                    let [objects, materials] = self.coverages();
+                    let (name, coverages) = match aov {
+                        Aov::CryptoObject => (OBJECTS, objects),
+                        _ => (MATERIALS, materials),
+                    };
+                    if !coverages.is_empty() {
+                        let shares = |pixel: usize| {
+                            let count = f64::from(self.samples(pixel).max(1));
+                            coverages[pixel].map(|[id, own]| (id, f64::from(own) / count))
+                        };
+                        let shares: Vec<_> = pixels().map(shares).collect();
+                        cryptomatte::insert(&mut image, name, &shares);
+                    }
+                }
             }
         }
         image
@@ -468,7 +510,24 @@ impl Sums {
                 *value = value.saturating_add(*more);
             }
         }
+        for (ours, theirs) in self.coverages_mut().into_iter().zip(other.coverages()) {
+            if theirs.is_empty() {
+                ours.clear();
+            }
+            for (own, more) in ours.iter_mut().zip(theirs) {
+                add_coverage(own, more);
+            }
+        }
         self.sample_count = self.sample_count.saturating_add(other.sample_count);
+    }
+}
+
+/// Adds the samples of another coverage of a pixel. Drops those that find no slot left, as the device does.
+fn add_coverage(coverage: &mut Coverage, other: &Coverage) {
+    for &[id, count] in other.iter().filter(|[_, count]| *count > 0) {
+        if let Some(own) = coverage.iter_mut().find(|own| own[1] == 0 || own[0] == id) {
+            *own = [id, own[1].saturating_add(count)];
+        }
     }
 }
 

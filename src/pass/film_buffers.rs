@@ -8,15 +8,15 @@ use crate::{
     error::{Error, Result},
     film::{
         Aov, Sums, Window,
-        sums::{COUNTS, TRIPLES},
+        sums::{COUNTS, COVERAGES, Coverage, TRIPLES},
     },
     gpu::{Buffer, Commands, DescriptorSet, Device},
     memory,
     shader::{
         bindings::{Binding, FILM, film},
         constants::{
-            AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, AOV_NORMAL, AOV_POSITION,
-            AOV_UNFILTERED, AOV_VISIBLE, FILM_BLOCK,
+            AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, AOV_MATERIALS, AOV_NORMAL, AOV_OBJECTS,
+            AOV_POSITION, AOV_UNFILTERED, AOV_VISIBLE, FILM_BLOCK,
         },
         structs::Counters,
     },
@@ -28,8 +28,8 @@ const EDGE_ROWS: u64 = 2;
 pub(crate) const BLOCK_PIXELS: u32 = FILM_BLOCK * FILM_BLOCK;
 
 /// Buffers of the layers: name, binding, and bit `AOV_…` that asks for it, 0 for those that every film has.
-/// First [`Sums::triples`], then [`Sums::counts`].
-const LAYERS: [(&str, Binding, u32); TRIPLES.len() + COUNTS.len()] = [
+/// First [`Sums::triples`], then [`Sums::counts`] and [`Sums::coverages`].
+const LAYERS: [(&str, Binding, u32); FIRST_COVERAGE + COVERAGES.len()] = [
     ("film sum", film::FILM_SUM, 0),
     ("film compensation", film::FILM_COMPENSATION, 0),
     ("film squares", film::FILM_SQUARES, 0),
@@ -42,7 +42,11 @@ const LAYERS: [(&str, Binding, u32); TRIPLES.len() + COUNTS.len()] = [
     ("film guide level", film::FILM_GUIDE_LEVEL, AOV_GUIDE_CELL),
     ("film visible", film::FILM_VISIBLE, AOV_VISIBLE),
     ("film cache entries", film::FILM_CACHE_ENTRIES, AOV_CACHE_ENTRIES),
+    ("film objects", film::FILM_OBJECTS, AOV_OBJECTS),
+    ("film materials", film::FILM_MATERIALS, AOV_MATERIALS),
 ];
+/// Place of the first coverage in [`LAYERS`].
+const FIRST_COVERAGE: usize = TRIPLES.len() + COUNTS.len();
 
 /// Number of pixels of a window in film order, counting whole blocks where they reach beyond it.
 pub(crate) fn padded_pixels(window: Window) -> u32 {
@@ -65,6 +69,8 @@ pub(crate) fn aov_bits(aovs: &[Aov]) -> u32 {
         Aov::Visible => AOV_VISIBLE,
         Aov::CacheEntries => AOV_CACHE_ENTRIES,
         Aov::GuideCell => AOV_GUIDE_CELL,
+        Aov::CryptoObject => AOV_OBJECTS,
+        Aov::CryptoMaterial => AOV_MATERIALS,
         Aov::Variance | Aov::SampleCount => 0,
     };
     aovs.iter().map(bit).fold(0, |bits, bit| bits | bit)
@@ -78,7 +84,9 @@ pub(crate) fn aov_bits(aovs: &[Aov]) -> u32 {
 pub(crate) fn check_memory(device: &Device, window: Window, aovs: u32) -> Result<()> {
     let triples = (aovs & (AOV_UNFILTERED | AOV_ALBEDO | AOV_NORMAL | AOV_POSITION)).count_ones()
         + 2 * (aovs & AOV_GUIDE_CELL).count_ones();
-    let pairs = (aovs & (AOV_VISIBLE | AOV_CACHE_ENTRIES)).count_ones();
+    let coverages = (aovs & (AOV_OBJECTS | AOV_MATERIALS)).count_ones();
+    let pairs = (aovs & (AOV_VISIBLE | AOV_CACHE_ENTRIES)).count_ones()
+        + coverages * size_of::<Coverage>() as u32 / 8;
     // Four sums and the image, in three channels each, and the radiance of a sweep.
     let copies = if device.capabilities().kind == "software" { 2 } else { 1 };
     let pixel_bytes =
@@ -278,6 +286,9 @@ impl FilmBuffers {
         for (index, layer) in sums.counts_mut().into_iter().enumerate() {
             self.download_layer(TRIPLES.len() + index, layer)?;
         }
+        for (index, layer) in sums.coverages_mut().into_iter().enumerate() {
+            self.download_layer(FIRST_COVERAGE + index, layer)?;
+        }
         Ok(sums)
     }
 
@@ -329,6 +340,9 @@ impl FilmBuffers {
         }
         for (index, layer) in sums.counts().into_iter().enumerate() {
             self.upload_layer(TRIPLES.len() + index, layer)?;
+        }
+        for (index, layer) in sums.coverages().into_iter().enumerate() {
+            self.upload_layer(FIRST_COVERAGE + index, layer)?;
         }
         Ok(())
     }
@@ -395,7 +409,11 @@ impl Page {
         let pixels = u64::from(end - first);
         let radiance = Buffer::zeroed(device, "film radiance", radiance_bytes)?;
         let make = |(index, (name, ..)): (usize, &(&str, Binding, u32))| {
-            let bytes = if index < TRIPLES.len() { 12 } else { 8 };
+            let bytes = match index {
+                _ if index < TRIPLES.len() => 12,
+                _ if index < FIRST_COVERAGE => 8,
+                _ => size_of::<Coverage>() as u64,
+            };
             Buffer::zeroed(device, name, if is_asked_for(index, aovs) { bytes * pixels } else { 0 })
         };
         let layers = LAYERS.iter().enumerate().map(make).collect::<Result<Vec<_>>>()?;

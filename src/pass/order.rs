@@ -11,7 +11,8 @@ use super::{
 };
 use crate::shader::{
     constants::{
-        AOV_ALBEDO, AOV_NORMAL, AOV_POSITION, CONSTANT_ONLY_SPECULAR, PATH_LISTS, TRAINING_WAVE,
+        AOV_ALBEDO, AOV_MATERIALS, AOV_NORMAL, AOV_OBJECTS, AOV_POSITION, CONSTANT_ONLY_SPECULAR,
+        PATH_LISTS, TRAINING_WAVE,
     },
     structs::Wave,
 };
@@ -282,6 +283,9 @@ impl<'a> Order<'a> {
     fn add_features(&mut self) {
         let Wave { vertex, aovs, is_training, .. } = self.wave;
         let surfaces = self.settings.surfaces;
+        if vertex == 0 && aovs & (AOV_OBJECTS | AOV_MATERIALS) != 0 && is_training == 0 {
+            self.add_over("mattes", Domain::Pixels);
+        }
         let is_asked_for = aovs & FEATURES != 0 && is_training == 0;
         if is_asked_for && vertex == 0 {
             self.add_over("features", Domain::Arrivals);

@@ -8,6 +8,7 @@ use super::{
     geometry::{GeometryBuffers, triangle_page_bytes},
     lamp_cells::LampCells,
     lamps::LampTables,
+    mattes::Mattes,
     passages::PassingSurfaces,
     surfaces::{self, Surfaces},
     texture_buffers::TextureBuffers,
@@ -75,7 +76,7 @@ impl SceneBuffers {
         parts: Parts,
         start: Instant,
     ) -> Result<Self> {
-        let Parts { geometry, textures, lamps, lamp_cells, tables } = parts;
+        let Parts { geometry, textures, lamps, lamp_cells, tables, mattes } = parts;
         let mut host_ms = BTreeMap::new();
         let mut buffers = Vec::new();
         let mut places = Vec::new();
@@ -150,6 +151,13 @@ impl SceneBuffers {
             Buffer::from_slice(device, "lamp entries", &lamp_cells.entries)?,
         );
         add(bindings::LAMP_CLUSTERS, Buffer::from_slice(device, "lamp clusters", &clusters)?);
+        for (binding, name, identifiers) in [
+            (bindings::TRIANGLE_OBJECTS, "triangle objects", &mattes.triangle_objects),
+            (bindings::INSTANCE_OBJECTS, "instance objects", &mattes.instance_objects),
+            (bindings::MATERIAL_IDENTIFIERS, "material identifiers", &mattes.materials),
+        ] {
+            add(binding, Buffer::from_slice(device, name, identifiers)?);
+        }
         let mut bound: Vec<_> =
             places.into_iter().zip(&buffers).chain(geometry.bindings()).collect();
         bound.extend(textures.bindings());
@@ -297,6 +305,7 @@ struct Parts {
     /// Choice by place, where there are many clusters.
     lamp_cells: Option<LampCells>,
     tables: MaterialTables,
+    mattes: Mattes,
 }
 
 impl Parts {
@@ -316,6 +325,7 @@ impl Parts {
             PassingSurfaces::new(&scene.materials, &tables.materials, &surfaces, &textures);
         let geometry =
             GeometryBuffers::new(device, accel)?.traced_by_host(device, accel, passing)?;
-        Ok(Self { geometry, textures, lamps, lamp_cells, tables })
+        let mattes = Mattes::new(scene, accel);
+        Ok(Self { geometry, textures, lamps, lamp_cells, tables, mattes })
     }
 }

@@ -14,7 +14,7 @@ use crate::{
     error::{Error, Result},
     film::{
         Aov, Checkpoint, Image, Metadata, SampleRange, Sums, checkpoint::remove_checkpoint,
-        metadata::seconds_of,
+        cryptomatte, metadata::seconds_of,
     },
     gpu::Device,
     pass::Saved,
@@ -122,6 +122,10 @@ pub(crate) fn describe(device: &Device, scene: &Scene, settings: &Settings) -> M
         sampler_parameters: parameters,
         shadow_rays: settings.shadow_rays,
         depth: settings.depth,
+        mattes: cryptomatte::attributes(
+            scene,
+            [Aov::CryptoObject, Aov::CryptoMaterial].map(|aov| settings.aovs.contains(&aov)),
+        ),
         device: capabilities.name.clone(),
         driver: capabilities.driver.clone(),
         ..Metadata::default()

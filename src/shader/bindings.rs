@@ -219,6 +219,12 @@ binding_tables! {
         32 INSTANCES: texels Rgba32Uint;
         /// Cluster of each placed triangle that emits.
         33 LAMP_CLUSTERS: array uint;
+        /// Cryptomatte's identifier of the object of each triangle in BVH order, where it is placed.
+        34 TRIANGLE_OBJECTS: array uint;
+        /// That of the object of each instance, in the order of the scene.
+        35 INSTANCE_OBJECTS: array uint;
+        /// That of each material.
+        36 MATERIAL_IDENTIFIERS: array uint;
     }
 
     /// Set 1 of the passes by which pixels share paths.
@@ -325,6 +331,10 @@ binding_tables! {
         12 FILM_RADIANCE: array vec3;
         /// Sum of the radiance of the pixel's own samples.
         13 FILM_UNFILTERED: array vec3;
+        /// Identifiers of objects and their numbers of samples: `MATTE_SLOTS` a pixel.
+        14 FILM_OBJECTS: array uvec2;
+        /// The same of materials.
+        15 FILM_MATERIALS: array uvec2;
     }
 
     /// Set 3 of the probe kernels in `glsl/test`, which declare their own element types.

@@ -181,6 +181,12 @@ constants! {
     AOV_GUIDE_CELL = 32;
     /// Radiance of the pixel's own samples.
     AOV_UNFILTERED = 64;
+    /// Coverage by objects.
+    AOV_OBJECTS = 128;
+    /// Coverage by materials.
+    AOV_MATERIALS = 256;
+    /// Objects or materials that a pixel tells apart.
+    MATTE_SLOTS = 6;
 
     // Traversal.
     /// Entries of the traversal stack, one group of nodes per level of the tree.

@@ -2,7 +2,11 @@
 
 use std::path::Path;
 
-use super::{instance::Instance, mesh::Mesh, transform::Transform};
+use super::{
+    instance::Instance,
+    mesh::{Mesh, ObjectStart, start_object},
+    transform::Transform,
+};
 
 /// Largest magnitude of a coordinate, metres; products of four coordinates stay finite in `f32`.
 pub const MAX_COORDINATE: f32 = 1e9;
@@ -28,6 +32,8 @@ pub struct Geometry {
     pub triangles: Vec<[u32; 3]>,
     /// Material index per triangle.
     pub materials: Vec<u32>,
+    /// Starts of objects, in rising order; triangles and instances before the first have no name.
+    pub objects: Vec<ObjectStart>,
     /// Meshes in their own space, each in memory once. They emit no light and have no instances.
     pub prototypes: Vec<Geometry>,
     /// Uses of the prototypes.
@@ -102,7 +108,15 @@ impl DroppedOfMany {
 }
 
 impl Geometry {
-    /// Places a mesh in the world; `material_of` gives the material of each triangle of the mesh.
+    /// Starts an object: it has the triangles and instances that are added from now on.
+    pub fn start_object(&mut self, name: &str) {
+        let (name, first_triangle) = (name.to_owned(), self.triangles.len());
+        let first_instance = self.instances.len();
+        start_object(&mut self.objects, ObjectStart { name, first_triangle, first_instance });
+    }
+
+    /// Places a mesh in the world, with the objects that it names; `material_of` gives the material of
+    /// each triangle of the mesh.
     ///
     /// Keeps every vertex, so that indices stay valid. A vertex whose position is not finite moves
     /// to the object's origin, and no triangle uses it.
@@ -148,7 +162,11 @@ impl Geometry {
         extend(&mut self.colors, &mesh.colors, first_vertex as usize, count, [1.0; 4], |&color| {
             finite_or(color, [1.0; 4]).map(|channel| channel.clamp(0.0, 1.0))
         });
+        let mut objects = mesh.objects.iter().peekable();
         for (index, &triangle) in mesh.triangles.iter().enumerate() {
+            while let Some(object) = objects.next_if(|start| start.first_triangle <= index) {
+                self.start_object(&object.name);
+            }
             let [a, b, c] = triangle.map(|corner| first_vertex + corner);
             let corners = [a, b, c].map(|corner| self.positions[corner as usize]);
             if !corners.iter().all(|corner| is_finite(*corner)) {

@@ -118,6 +118,31 @@ fn arrays_stand_for_files() {
 
 // Scene files
 
+/// Compositors know objects by the names of a scene, or of a file that is one or is included.
+#[test]
+fn objects_keep_their_names() {
+    let folder = Folder::new();
+    let faces = "v 0 0 0\nv 1 0 0\nv 0 1 0\no seat\nf 1 2 3\ng nothing\no back\nf 3 2 1\nf 1 3 2\n";
+    folder.write("chair.obj", faces);
+    let names = |scene: &Scene| {
+        let starts = scene.geometry.objects.iter();
+        starts.map(|start| (start.name.clone(), start.first_triangle)).collect::<Vec<_>>()
+    };
+    let chair = Scene::load(&folder.0.path().join("chair.obj")).unwrap();
+    assert_eq!(names(&chair), [("seat".to_owned(), 0), ("back".to_owned(), 1)]);
+    let text = with_box(
+        "name = \"crate\"\n[[object]]\nmesh = \"chair.obj\"\nmaterial = \"grey\"\n\
+         [[include]]\nfile = \"chair.obj\"",
+    );
+    let found = names(&folder.load(&text).unwrap());
+    assert_eq!(found[0], ("crate".to_owned(), 0), "{found:?}");
+    assert!(found[1].0.starts_with("object 1 (chair.obj"), "the object is one: {found:?}");
+    assert_eq!(
+        found[2..].iter().map(|start| &*start.0).collect::<Vec<_>>(),
+        ["chair/seat", "chair/back"]
+    );
+}
+
 #[test]
 fn defaults_are_those_of_the_format() {
     let folder = Folder::new();

@@ -164,7 +164,7 @@ class Picture:
             groups.setdefault(layer, {})[component] = np.frombuffer(values, "f4").reshape(height, width)
         self.layers = {}
         for layer, parts in groups.items():
-            components = [parts[component] for component in sorted(parts, key="RGBXYZ".index)]
+            components = [parts[component] for component in sorted(parts, key="RGBAXYZ".index)]
             self.layers[layer] = components[0] if len(components) == 1 else np.stack(components, axis=-1)
         self.rgb = self.layers.pop("")
         if "P" in self.layers:
@@ -179,6 +179,14 @@ class Picture:
     def write_exr(self, path: Path) -> None:
         """Writes the image with all layers and metadata, for every command of the program."""
         self._native.write_exr(path)
+
+    def _repr_png_(self) -> bytes:
+        """The picture as notebooks show it."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "picture.png")
+            convert(self, path, curve="filmic")
+            with open(path, "rb") as file:
+                return file.read()
 
 
 def convert(

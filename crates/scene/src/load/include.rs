@@ -14,7 +14,7 @@ use crate::{
     instance::{Budget, Instance},
     lamp::LampKind,
     material::{Material, MaterialKind},
-    mesh::Mesh,
+    mesh::{Mesh, ObjectStart},
     transform::Transform,
 };
 
@@ -76,14 +76,27 @@ impl Loader<'_> {
             colors,
             triangles,
             materials: of,
+            mut objects,
             prototypes,
             instances,
         } = placed;
         let emits: Vec<bool> =
             materials.iter().map(|material| material.surface.emission.is_some()).collect();
         let moved = Moved { transform: &transform, places: &places, emits: &emits };
-        self.include_instances(&label, geometry, prototypes, &instances, &moved)?;
-        let mesh = Mesh { positions, normals, uvs, tangents, colors, triangles, ..Mesh::default() };
+        for start in &mut objects {
+            start.name = format!("{stem}/{}", start.name);
+        }
+        self.include_instances(&label, geometry, prototypes, (&instances, &objects), &moved)?;
+        let mesh = Mesh {
+            positions,
+            normals,
+            uvs,
+            tangents,
+            colors,
+            triangles,
+            objects,
+            ..Mesh::default()
+        };
         let dropped = geometry.append(&mesh, &transform, |index| places[of[index] as usize]);
         let positions = geometry.positions[first_vertex..].iter().copied().map(Vec3::from);
         self.check_extent(&label, positions)?;
@@ -102,14 +115,18 @@ impl Loader<'_> {
         label: &str,
         geometry: &mut Geometry,
         prototypes: Vec<Geometry>,
-        instances: &[Instance],
+        (instances, objects): (&[Instance], &[ObjectStart]),
         moved: &Moved<'_>,
     ) -> Result<()> {
         let Moved { transform, places, emits } = *moved;
         let first_prototype = geometry.prototypes.len() as u32;
         geometry.prototypes.extend(prototypes);
         let boxes = geometry.prototypes();
-        for instance in instances {
+        let mut objects = objects.iter().peekable();
+        for (index, instance) in instances.iter().enumerate() {
+            while let Some(object) = objects.next_if(|start| start.first_instance <= index) {
+                geometry.start_object(&object.name);
+            }
             // In files of other formats an instance has one material.
             let prototype = first_prototype + instance.prototype;
             let first_material = places[instance.first_material as usize];

@@ -89,6 +89,8 @@ impl Loader<'_> {
                     }
                     ObjectSource::Mesh(_) => {
                         let mut mesh = Mesh::read_at(&key, self.time, None, None, warnings)?;
+                        // The object of the scene is one, whatever parts its file has.
+                        mesh.objects.clear();
                         inputs.push(key.clone());
                         inputs.extend_from_slice(&mesh.side_files);
                         let mut ignored = ignored_in_object(&mesh, own_materials.contains(&key));
@@ -280,6 +282,7 @@ impl Loader<'_> {
         materials: &mut Vec<Material>,
         warnings: &mut Vec<String>,
     ) -> Result<()> {
+        geometry.start_object(object.name.as_deref().unwrap_or(label));
         let transform = Transform::new(object.scale, object.rotate_deg, object.translate);
         let first_vertex = geometry.positions.len();
         let named = object

@@ -156,6 +156,7 @@ impl Loader<'_> {
         }
         let mut geometry = Geometry::default();
         let transform = Transform::new([1.0; 3], [0.0; 3], [0.0; 3]);
+        geometry.start_object(&self.path.file_stem().unwrap_or_default().to_string_lossy());
         let dropped = geometry.append(mesh, &transform, |triangle| {
             let next = mesh.runs.partition_point(|run| run.first_triangle <= triangle);
             let run = next.checked_sub(1).and_then(|run| mesh.runs[run].material);
@@ -193,6 +194,7 @@ impl Loader<'_> {
         self.check(count <= MAX_INSTANCES, || {
             format!("{count} instances, at most {MAX_INSTANCES} can be used")
         })?;
+        geometry.start_object(&repeated.name);
         let (prototype, mut dropped) = geometry.add_prototype(mesh, |_| 0);
         for place in &repeated.places {
             let Some(transform) = Transform::from_matrix(place.as_dmat4()) else {

@@ -42,6 +42,8 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// Runs of triangles of one material, in order from triangle 0; empty if the file has no materials.
     pub runs: Vec<MaterialRun>,
+    /// Starts of the objects that the file names, in rising order; may be empty.
+    pub objects: Vec<ObjectStart>,
     /// Materials of the file.
     pub materials: Vec<MeshMaterial>,
     /// Cameras of the file.
@@ -59,6 +61,8 @@ pub struct Mesh {
 /// Mesh that a file places many times.
 #[derive(Clone, Debug)]
 pub struct RepeatedMesh {
+    /// Name in the file.
+    pub name: String,
     /// The mesh in its own space, without materials of its own.
     pub mesh: Box<Mesh>,
     /// Index into [`Mesh::materials`] of the whole; none if the file gives no material.
@@ -74,6 +78,26 @@ pub struct MaterialRun {
     pub first_triangle: usize,
     /// Index into [`Mesh::materials`]; none if the file gives these triangles no material.
     pub material: Option<usize>,
+}
+
+/// Start of an object: it has the triangles and instances up to the start of the next.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ObjectStart {
+    /// Name; objects that share it are one to a compositor.
+    pub name: String,
+    /// Number of triangles before it.
+    pub first_triangle: usize,
+    /// Number of instances before it.
+    pub first_instance: usize,
+}
+
+/// Starts an object, unless one of that name goes on. One without anything gives way.
+pub(crate) fn start_object(objects: &mut Vec<ObjectStart>, start: ObjectStart) {
+    let place = |start: &ObjectStart| (start.first_triangle, start.first_instance);
+    objects.pop_if(|last| place(last) == place(&start));
+    if objects.last().is_none_or(|last| last.name != start.name) {
+        objects.push(start);
+    }
 }
 
 /// Camera of a mesh file.
@@ -203,6 +227,12 @@ impl Mesh {
             used[repeated] = true;
         }
         self.materials.iter().zip(used).filter_map(|(material, used)| used.then_some(material))
+    }
+
+    /// Starts an object at the next triangle.
+    fn start_object(&mut self, name: &str) {
+        let (name, first_triangle) = (name.to_owned(), self.triangles.len());
+        start_object(&mut self.objects, ObjectStart { name, first_triangle, first_instance: 0 });
     }
 
     /// Starts a run of triangles of `material` at the next triangle.

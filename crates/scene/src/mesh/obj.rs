@@ -166,8 +166,8 @@ impl ObjReader<'_> {
                 self.mesh.start_run(Some(material));
             }
             "mtllib" => self.read_library(rest.trim(), warnings)?,
-            // Names of groups and objects change nothing.
-            "" | "o" | "g" => {}
+            "" => {}
+            "o" | "g" => self.mesh.start_object(rest.trim()),
             "s" if matches!(rest.trim(), "off" | "0") => {}
             "s" => self.first_smoothing = self.first_smoothing.or(Some(self.line)),
             "p" | "l" => self.ignore(features::OBJ_POINTS, features::OBJ_POINTS.name),

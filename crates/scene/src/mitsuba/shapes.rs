@@ -131,6 +131,8 @@ impl Reader<'_> {
                 shape
             }
         };
+        let name = node.attribute("id").map_or_else(|| node.place(), str::to_owned);
+        self.geometry.start_object(&name);
         let triangles = shape.mesh.triangles.len();
         let matrix = outer * shape.to_world;
         // Surfaces that emit are placed: lamps are triangles in the world.
@@ -314,6 +316,8 @@ impl Reader<'_> {
         if mesh.normals.is_empty() && !is_flat {
             mesh.normals = smooth_normals(&mesh);
         }
+        // The shape is one object.
+        mesh.objects.clear();
         shape.mesh = mesh;
         shape.is_file = true;
         Ok(())

@@ -285,6 +285,8 @@ impl Builder<'_> {
     ) -> Result<()> {
         let is_instanced =
             places.len() > 1 && self.budget.takes_instances(places.len(), mesh.triangles.len());
+        let Entity { name, place, .. } = &shape.entity;
+        self.geometry.start_object(&format!("{name} of line {}", place.line));
         if !is_instanced {
             self.check_counts(mesh, places.len(), shape)?;
             return places.iter().try_for_each(|place| self.place(mesh, material, shape, *place));

@@ -188,6 +188,9 @@ impl GltfReader<'_> {
                     skinned.push(node);
                     continue;
                 }
+                let name = node.name().or(mesh.name());
+                let name = name.map_or_else(|| format!("node {}", node.index()), str::to_owned);
+                self.mesh.start_object(&name);
                 let weights = node.weights().or(mesh.weights()).unwrap_or_default();
                 for world_from_instance in self.instances(&node, world_from_node)? {
                     for primitive in mesh.primitives() {
@@ -198,7 +201,11 @@ impl GltfReader<'_> {
                             Some(_) => None,
                         };
                         match repeated {
-                            Some(at) => self.mesh.repeated[at].places.push(world_from_instance),
+                            Some(at) => {
+                                let repeated = &mut self.mesh.repeated[at];
+                                repeated.name = mesh.name().unwrap_or(&name).to_owned();
+                                repeated.places.push(world_from_instance);
+                            }
                             None => {
                                 let place = Place::Node(world_from_instance);
                                 self.read_primitive(&primitive, weights, place)?;

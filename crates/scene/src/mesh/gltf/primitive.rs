@@ -48,7 +48,8 @@ impl GltfReader<'_> {
                 return Ok(None);
             }
             let material = own.runs.first().and_then(|run| run.material);
-            let repeated = RepeatedMesh { mesh: Box::new(own), material, places: Vec::new() };
+            let (mesh, places) = (Box::new(own), Vec::new());
+            let repeated = RepeatedMesh { name: String::new(), mesh, material, places };
             self.mesh.repeated.push(repeated);
             Some(self.mesh.repeated.len() - 1)
         } else {

@@ -67,6 +67,7 @@ impl GltfReader<'_> {
             };
             joints.push(world * bind);
         }
+        self.mesh.start_object(node.name().or(mesh.name()).unwrap_or("skin"));
         let weights = node.weights().or(mesh.weights()).unwrap_or_default();
         for primitive in mesh.primitives() {
             self.read_primitive(&primitive, weights, Place::Joints(&joints))?;
