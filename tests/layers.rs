@@ -170,7 +170,7 @@ fn mattes_are_the_shares_of_objects_and_materials() {
         }
         // Neither the grouping of samples nor a window nor a break changes a count.
         let mut grouped = renderer(&scene, settings.clone());
-        [1, 100, 27].map(|samples| grouped.render_pass(samples).unwrap());
+        [1, 100, 27].iter().for_each(|samples| grouped.render_pass(*samples).unwrap());
         assert!(grouped.sums().unwrap() == sums);
         let window = Some(Window { x: 7, y: 2, width: 3, height: 4 });
         let (part, _) = render(&scene, Settings { window, ..settings.clone() }, 128);
