@@ -1,5 +1,6 @@
 """The Python package, as it is installed."""
 
+import json
 import os
 import pathlib
 import signal
@@ -100,6 +101,18 @@ class Package(unittest.TestCase):
         picture = floor(constant=[1, 1, 1]).render(spp=1, depth=1)
         fenestra.convert(picture, path, exposure=-1, curve="filmic")
         self.assertEqual(path.read_bytes()[1:4], b"PNG")
+
+    def test_the_notebook_runs(self):
+        here = pathlib.Path.cwd()
+        self.addCleanup(os.chdir, here)
+        os.chdir(SCENES.parent / "crates/python")
+        names = {}
+        for cell in json.loads(pathlib.Path("example.ipynb").read_text(encoding="utf-8"))["cells"]:
+            if cell["cell_type"] == "code":
+                code = "".join(cell["source"]).replace("SECONDS = 5", "SECONDS = 0.2")
+                exec(code.replace("320, 240", "32, 24"), names)
+        self.assertTrue(names["picture"]._repr_png_().startswith(b"\x89PNG"))
+        self.assertGreater(names["share"], 0)
 
     def test_studies_return_their_results(self):
         quick = {"size": (8, 6), "spp": [1], "seeds": 1, "reference_spp": 4, "reference_check": "off"}
