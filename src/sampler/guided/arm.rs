@@ -157,10 +157,11 @@ impl Arms {
         let guides_bounces = own.guides_bounces(settings.depth);
         let chooses_technique = parameters.candidates.is_none() && most > 0;
         let chooses_sharing = parameters.share_paths.is_none() && settings.cohort_edge > 1;
+        let shares_paths = settings.cohort_edge > 1;
         let first = Arm {
             is_guided: true,
             guides_bounces,
-            shares_paths: settings.cohort_edge > 1 && !chooses_sharing,
+            shares_paths: shares_paths && (most > 0 || !chooses_sharing),
             candidates,
             rays: [most, own.later_rays_of(most)],
             roulette_throughput: settings.roulette.throughput,
@@ -168,6 +169,8 @@ impl Arms {
         let open = Arm {
             is_guided: false,
             guides_bounces: false,
+            // Most paths leave an open scene before others can use them.
+            shares_paths: shares_paths && !chooses_sharing,
             rays: own.rays_in_the_open(most, settings.depth),
             ..first
         };

@@ -34,7 +34,7 @@ const RACES: [(u32, Axes, u64); 6] = [
     (16, Axes::Techniques, 4),
     (64, Axes::Everything, 8),
 ];
-/// Paths of the film for each that races after the first measure, if they take two rounds.
+/// Paths of the film for each that races after the first measure, if they take all rounds.
 const FILM_PATHS: u64 = 8;
 /// Separates the random numbers of measurements from those of the training and of the picture.
 const MEASURING_SEED: u32 = 0x2c1b_3c6d;
@@ -54,7 +54,9 @@ pub(super) fn race_due(race: u32, pixels: u32) -> (u32, Axes) {
     let due = due.saturating_mul(4_u32.saturating_pow(again));
     let before = RACES.iter().take(race as usize).skip(1).map(|(.., arms)| *arms).sum::<u64>();
     let arms = if race == 0 { 0 } else { before + arms * u64::from(again.max(1)) };
-    let paths = 2 * arms * u64::from(Blocks::over(pixels, 1).count * BLOCK_PIXELS * SAMPLES);
+    let paths = u64::from(MOST_ROUNDS)
+        * arms
+        * u64::from(Blocks::over(pixels, 1).count * BLOCK_PIXELS * SAMPLES);
     let affordable = (FILM_PATHS * paths).div_ceil(u64::from(pixels.max(1)));
     // Races need a guide that was just rebuilt.
     (due.max(guide_schedule(affordable.min(1 << 30) as u32)), axes)
@@ -252,8 +254,8 @@ mod tests {
         let due = |pixels| (0..9).map(|race| race_due(race, pixels).0).collect::<Vec<u32>>();
         assert_eq!(due(1 << 20), [0, 2, 2, 4, 16, 64, 256, 1024, 4096]);
         assert_eq!(race_due(40, 1 << 20).0, u32::MAX);
-        // An eighth of the pixels, four samples of each, three arms, two rounds: as much as 24 samples allow;
-        // the guide is next rebuilt after 32.
-        assert_eq!(due(3072)[..3], [0, 32, 64]);
+        // An eighth of the pixels, four samples of each, three arms, four rounds: as much as 48 samples allow;
+        // the guide is next rebuilt after 64.
+        assert_eq!(due(3072)[..3], [0, 64, 128]);
     }
 }
