@@ -254,7 +254,7 @@ mod tests {
         let due = |pixels| (0..9).map(|race| race_due(race, pixels).0).collect::<Vec<u32>>();
         assert_eq!(due(1 << 20), [0, 2, 2, 4, 16, 64, 256, 1024, 4096]);
         assert_eq!(race_due(40, 1 << 20).0, u32::MAX);
-        // An eighth of the pixels, four samples of each, three arms, four rounds: as much as 48 samples allow;
+        // An eighth of the pixels, four samples each, three arms, four rounds: as much as 48 samples allow;
         // the guide is next rebuilt after 64.
         assert_eq!(due(3072)[..3], [0, 64, 128]);
     }
