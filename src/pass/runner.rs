@@ -181,8 +181,8 @@ impl Runner {
             let wave = Wave { first_pixel, pixel_count, ..wave };
             done += wave.pixel_count;
             // The last wave of a picture's sweep ends with its samples in the sums.
-            let is_whole = done == pixels && wave.is_training == 0;
-            let times = self.run_to(technique, wave, self.settings.depth, is_whole)?;
+            let ends_sweep = done == pixels && wave.is_training == 0;
+            let times = self.run_to(technique, wave, self.settings.depth, ends_sweep)?;
             self.steer(&times, wave);
             if self.watch.as_mut().is_some_and(|watch| watch(&wave)) {
                 self.is_stopped = true;
