@@ -90,7 +90,6 @@ pub struct RayRate {
     pub disagreements: usize,
 }
 
-/// A ray of the CPU traversal.
 type CpuRay = obvhs::ray::Ray;
 
 /// obvhs's own traversal of the arrays of an [`Accel`], or the twin's of a tree of two levels.
@@ -242,7 +241,6 @@ impl<'a> Bench<'a> {
         Ok(recording.finish()?.values().sum::<f64>() * 1e-3)
     }
 
-    /// Compiles a kernel and runs it once.
     fn run_once(&self, kernel: Kernel) -> Result<()> {
         self.run(&Pass::new(self.device, kernel)?).map(drop)
     }

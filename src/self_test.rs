@@ -77,7 +77,6 @@ pub(crate) fn faults(device: &Arc<Device>) -> Result<Vec<String>> {
 /// Answers to the rays of the test.
 #[derive(Clone, Debug, PartialEq)]
 struct Answers {
-    /// Hit of each path.
     hits: Vec<Option<Intersection>>,
     /// Paths that have hit something, in ascending order.
     living: Vec<u32>,

@@ -46,7 +46,6 @@ pub struct Lobe {
 const _: () = assert!(size_of::<Lobe>() == 20);
 
 impl From<[f32; 5]> for Lobe {
-    /// Axis, bandwidth, amplitude.
     fn from([x, y, z, bandwidth, amplitude]: [f32; 5]) -> Self {
         Self { axis: Vec3::new(x, y, z), bandwidth, amplitude }
     }

@@ -127,7 +127,6 @@ pub fn depth(areas: Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
     areas.x * a.z + areas.y * b.z + areas.z * c.z
 }
 
-/// Corner of a node's box.
 fn node_corner(node: &Node) -> Vec3 {
     Vec3::new(f32::from_bits(node[0]), f32::from_bits(node[1]), f32::from_bits(node[2]))
 }

@@ -33,7 +33,6 @@ pub(crate) struct Sanity {
 }
 
 impl Sanity {
-    /// Examines a table.
     pub(crate) fn of(table: &MeasuredTable) -> Self {
         let albedo: Vec<[f32; 3]> =
             ELEVATIONS_DEG.iter().map(|&elevation_deg| albedo(table, elevation_deg)).collect();

@@ -16,7 +16,6 @@ pub(crate) struct Interrupt {
 }
 
 impl Interrupt {
-    /// Starts to listen.
     pub(crate) fn listen() -> Arc<Self> {
         let interrupt = Arc::new(Self::default());
         let heard = Arc::clone(&interrupt);

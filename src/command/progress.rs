@@ -64,7 +64,6 @@ enum Output {
     Quiet,
 }
 
-/// Progress of one run.
 pub(crate) struct Progress {
     label: String,
     start: Instant,

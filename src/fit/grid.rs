@@ -47,7 +47,6 @@ struct Rectangle {
     y1: usize,
 }
 
-/// Patch of a map with its colour.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ColouredPatch {
     /// Luminance.

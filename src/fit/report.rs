@@ -60,7 +60,6 @@ fn bandwidths(lobes: impl Iterator<Item = (f32, f32)>) -> (f32, f32) {
         })
 }
 
-/// Describes the fit of a map.
 pub(crate) fn describe_environment(fit: &EnvironmentFit) -> Description {
     let (low, high) = bandwidths(fit.lobes.iter().map(|lobe| (lobe.bandwidth, lobe.amplitude)));
     let mut lines = vec![
@@ -83,7 +82,6 @@ pub(crate) fn describe_environment(fit: &EnvironmentFit) -> Description {
     Description { value, lines, warnings: fit.notes.clone() }
 }
 
-/// Describes the fit of a BRDF.
 pub(crate) fn describe_brdf(fit: &BrdfFit) -> Description {
     let lobes = fit.views.iter().flat_map(|view| &view.lobes);
     let (low, high) = bandwidths(lobes.map(|lobe| (lobe.bandwidth, lobe.amplitude)));

@@ -150,12 +150,10 @@ impl Instance {
         Ok(Self { raw, debug, messages, has_debug_utils, entry })
     }
 
-    /// The ash instance.
     pub(super) fn raw(&self) -> &ash::Instance {
         &self.raw
     }
 
-    /// The loader.
     pub(super) fn entry(&self) -> &ash::Entry {
         &self.entry
     }

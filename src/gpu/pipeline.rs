@@ -34,7 +34,6 @@ impl Pipeline {
         Ok(Self { made, name: name.to_owned(), _device: Arc::clone(device) })
     }
 
-    /// Name of the pass.
     pub(crate) fn name(&self) -> &str {
         &self.name
     }

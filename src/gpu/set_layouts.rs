@@ -31,7 +31,6 @@ impl SetLayouts {
         Ok(Self { tables: tables.collect::<Result<_>>()?, empty: create_layout(device, &[])? })
     }
 
-    /// The layout of the table with the buffer at this set and number.
     pub(super) fn with_buffer(&self, set: u32, number: u32) -> vk::DescriptorSetLayout {
         let has_buffer = |table: &BindingTable| {
             table.set == set && table.bindings.iter().any(|binding| binding.number == number)

@@ -56,7 +56,6 @@ impl FinishedRuns<'_> {
         })
     }
 
-    /// Path of a run's file.
     pub(super) fn run_path(
         &self,
         scene: &Scene,

@@ -130,12 +130,10 @@ impl Folder {
         check_replaces_nothing_in("the report in", &self.path, inputs)
     }
 
-    /// Path of the folder.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Path of the file of a run.
     pub(crate) fn run(&self, scene: &str, stem: &str) -> PathBuf {
         self.path.join("runs").join(scene).join(format!("{stem}.json"))
     }

@@ -93,7 +93,6 @@ pub(crate) fn time_to(looks: &[[f64; 2]], threshold: f64) -> Option<Time> {
     })
 }
 
-/// Time of one run.
 pub(crate) fn time_of_run(run: &Run, figure: Figure, threshold: f64) -> Option<Time> {
     let looks: Vec<[f64; 2]> =
         run.measurements.iter().map(|look| [look.seconds, figure.of(look)]).collect();

@@ -43,7 +43,6 @@ pub(crate) struct Reference {
     pub second: RgbImage,
     /// Sampler, if known.
     pub sampler: Option<String>,
-    /// Its own errors.
     pub own: OwnErrors,
 }
 

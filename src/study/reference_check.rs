@@ -272,7 +272,6 @@ pub(super) fn read(path: &Path, scene: &Scene, reference: &Reference) -> Result<
     ReferenceCheck::of([&reference.first, &reference.second], [&image, &image], description)
 }
 
-/// A check to render.
 pub(super) struct CheckJob<'a> {
     pub(super) folder: &'a Folder,
     pub(super) scene: &'a Scene,
@@ -323,7 +322,6 @@ impl CheckJob<'_> {
         Ok(ReferenceCheck { spp: Some(spp), seconds, ..check })
     }
 
-    /// Reads a half that is finished.
     fn finished(&self, path: &Path, seed: u32) -> Result<Option<Half>> {
         if !path.exists() {
             return Ok(None);
@@ -362,7 +360,6 @@ impl CheckJob<'_> {
     }
 }
 
-/// One half of a check.
 struct Half {
     picture: RgbImage,
     sample_count: u32,

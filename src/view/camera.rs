@@ -45,7 +45,6 @@ impl Rig {
         }
     }
 
-    /// The camera now.
     pub(crate) fn camera(&self) -> &Camera {
         &self.camera
     }

@@ -22,7 +22,6 @@ const LEAST_WINDOW: [u32; 2] = [WIDTH + 160, 200];
 /// Turns after a change that a layout may take to settle.
 const TURNS: usize = 3;
 
-/// The controls.
 pub(super) struct Controls {
     context: Context,
     canvas: Canvas,

@@ -34,7 +34,6 @@ pub(super) enum Input {
     Resized([u32; 2]),
     /// The window was uncovered.
     Redraw,
-    /// The window is closed.
     Close,
 }
 
@@ -61,9 +60,7 @@ impl Input {
 pub(super) enum Setting {
     /// Exposure, stops.
     Exposure(f32),
-    /// Tone curve.
     Curve(Curve),
-    /// Pictures that are denoised.
     Denoise(Denoise),
     /// Factor of the speed of flying.
     Speed(f32),
@@ -80,11 +77,9 @@ pub(super) enum Setting {
 /// Pictures that Open Image Denoise filters for the window; the film is never filtered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Denoise {
-    /// None.
     Never,
     /// Those of a moving camera.
     Moving,
-    /// All.
     Always,
 }
 
@@ -111,7 +106,6 @@ pub(super) struct Status {
     pub denoise: Denoise,
     /// Factor of the speed of flying.
     pub speed: f32,
-    /// The camera.
     pub camera: Camera,
     /// Samples per pixel, and those at which the film is finished.
     pub samples: [u32; 2],

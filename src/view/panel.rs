@@ -20,7 +20,6 @@ use crate::{
     gpu::{Device, Presented, Swapchain, swapchain::Target},
 };
 
-/// The window.
 pub(crate) struct Panel {
     inputs: Receiver<Input>,
     /// Input that waits for the end of a pass.

@@ -22,7 +22,6 @@ const MOST_INVOCATIONS: u32 = 1 << 21;
 pub(crate) enum Place {
     /// The only film, or the one to the left.
     Left,
-    /// The film to the right.
     Right,
 }
 

@@ -106,7 +106,6 @@ pub(crate) struct Saved<'a> {
     pub pixels: &'a [[u8; 3]],
     /// The film to the left, with its metadata.
     pub film: &'a Image,
-    /// The camera.
     pub camera: &'a Camera,
 }
 

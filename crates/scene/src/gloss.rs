@@ -29,7 +29,6 @@ fn metallic(diffuse: f32, specular: f32, share_below: f32) -> f32 {
     ((discriminant.sqrt() - b) / (2.0 * DIELECTRIC)).clamp(0.0, 1.0)
 }
 
-/// Brightness as it is perceived.
 fn brightness(color: Vec3) -> f32 {
     (color * color).dot(Vec3::new(0.299, 0.587, 0.114)).sqrt()
 }

@@ -29,7 +29,6 @@ impl Samples {
         (rises && !pairs.is_empty()).then_some(Self(pairs))
     }
 
-    /// Value at a wavelength.
     pub(crate) fn at(&self, wavelength_nm: f64) -> f64 {
         let next = self.0.partition_point(|sample| sample[0] < wavelength_nm);
         match (next.checked_sub(1).map(|before| self.0[before]), self.0.get(next)) {

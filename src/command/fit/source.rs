@@ -26,7 +26,6 @@ const SCENE: &str = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n\
 pub(crate) struct Source {
     /// Stem of the output files.
     pub name: String,
-    /// Tables of this one material.
     pub tables: MaterialTables,
     /// Files that it was read from.
     pub inputs: Vec<PathBuf>,

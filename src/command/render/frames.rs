@@ -14,7 +14,6 @@ pub struct Frames {
     step: usize,
 }
 
-/// Parses `7`, `0-47` or `0-47x2`.
 pub(super) fn parse_frames(text: &str) -> Result<Frames, String> {
     let (range, step) = text.split_once('x').unwrap_or((text, "1"));
     let (first, last) = range.split_once('-').unwrap_or((range, range));
@@ -39,7 +38,6 @@ pub(super) fn numbered(path: &Path, frame: u32) -> PathBuf {
 }
 
 impl Frames {
-    /// Lists the numbers.
     pub(super) fn numbers(self) -> impl Iterator<Item = u32> {
         (self.first..=self.last).step_by(self.step)
     }

@@ -63,7 +63,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 /// Renderer of a scene in which the camera alone moves, from one frame to the next.
 struct Carried {
     session: Session,
-    /// Hash of all that stands still.
     still_hash: String,
 }
 
@@ -180,7 +179,6 @@ impl Sequence {
     }
 }
 
-/// Opens the device, and says which.
 fn open(arguments: &Arguments) -> Result<Arc<Device>> {
     let device = arguments.device.open(arguments.validate)?;
     if !arguments.quiet {

@@ -37,7 +37,6 @@ pub(crate) fn plots(report: &Report, scene: &StudiedScene) -> String {
            Dashed: the slope of independent samples. Points that are not judged are left out.</p>"
 }
 
-/// Abscissa of the plots.
 struct Abscissa {
     name: &'static str,
     title: &'static str,

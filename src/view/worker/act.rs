@@ -235,7 +235,6 @@ impl Worker {
         Ok(())
     }
 
-    /// Makes the renderer of a sampler.
     fn make_side(&self, sampler: Sampler) -> Result<Side> {
         let title = format!("{} | preparing {}", self.scene.name, sampler.name());
         (self.announce)(self.status(title));

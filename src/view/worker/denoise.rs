@@ -16,7 +16,6 @@ const MOVING_TIME: Duration = Duration::from_millis(25);
 const REST_INTERVAL: Duration = Duration::from_secs(1);
 const REST_SHARE: u32 = 4;
 
-/// A filtered picture.
 pub(super) enum Filtered {
     /// Linear pixels of the film as it is.
     Now(Vec<[f32; 3]>),

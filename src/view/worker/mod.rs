@@ -111,9 +111,7 @@ pub(crate) struct Worker {
     announce: Box<dyn Fn(Status)>,
 }
 
-/// Parts of a worker.
 pub(super) struct Parts {
-    /// The scene.
     pub scene: Scene,
     /// The device, opened for the display.
     pub device: Arc<Device>,

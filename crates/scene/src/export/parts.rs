@@ -27,7 +27,6 @@ pub(super) struct Vertex {
 /// Triangles of one material that are all smooth or all flat, with the vertices they use.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Part {
-    /// Vertices, each once.
     pub(super) vertices: Vec<Vertex>,
     /// Three indices into `vertices` per triangle.
     pub(super) triangles: Vec<[u32; 3]>,
@@ -38,7 +37,6 @@ pub(super) struct Part {
 pub(super) struct Parts {
     /// Shaded by their normals.
     pub(super) smooth: Part,
-    /// Shaded flat.
     pub(super) flat: Part,
 }
 

@@ -9,7 +9,6 @@ use super::parts::{Part, Vertex};
 /// Properties of vertices beside their positions.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Attributes {
-    /// Writes normals.
     pub(super) normals: bool,
     /// Set of texture coordinates to write.
     pub(super) uv_set: Option<usize>,

@@ -4,7 +4,6 @@ use serde::Deserialize;
 
 use crate::lamp::SpotFalloff;
 
-/// One `[[lamp]]`.
 #[derive(Clone, Debug)]
 pub(crate) struct LampEntry {
     /// Line of the entry, from 1.
@@ -18,9 +17,7 @@ pub(crate) struct LampEntry {
 /// Keys of a `[[lamp]]` that depend on its `type`.
 #[derive(Clone, Debug)]
 pub(crate) enum LampKindEntry {
-    /// `point`.
     Point(PointEntry),
-    /// `spot`.
     Spot(SpotEntry),
     /// `directional`.
     Directional(DirectionalEntry),

@@ -7,7 +7,6 @@ use toml::Spanned;
 
 use super::value::{TextureEntry, Textured};
 
-/// One `[[material]]`.
 #[derive(Clone, Debug)]
 pub(crate) struct MaterialEntry {
     /// Line of the entry, from 1.
@@ -18,7 +17,6 @@ pub(crate) struct MaterialEntry {
     pub kind: MaterialKindEntry,
 }
 
-/// Keys of every `[[material]]`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MaterialKeys {
@@ -52,21 +50,13 @@ fn default_two_sided() -> bool {
 /// Keys of a `[[material]]` that depend on its `type`.
 #[derive(Clone, Debug)]
 pub(crate) enum MaterialKindEntry {
-    /// `diffuse`.
     Diffuse(DiffuseEntry),
-    /// `plastic`.
     Plastic(PlasticEntry),
-    /// `conductor`.
     Conductor(ConductorEntry),
-    /// `principled`.
     Principled(PrincipledEntry),
-    /// `mirror`.
     Mirror(MirrorEntry),
-    /// `dielectric`.
     Dielectric(DielectricEntry),
-    /// `thin_dielectric`.
     ThinDielectric(ThinDielectricEntry),
-    /// `measured`.
     Measured(MeasuredEntry),
 }
 
@@ -147,7 +137,6 @@ fn default_factor() -> [f32; 3] {
     [1.0, 1.0, 1.0]
 }
 
-/// Keys of a `mirror`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MirrorEntry {
@@ -201,7 +190,6 @@ pub(crate) struct MeasuredEntry {
 }
 
 impl MaterialEntry {
-    /// Every texture that the entry names.
     pub(crate) fn textures(&self) -> impl Iterator<Item = &TextureEntry> {
         let keys = &self.keys;
         let (color, roughness, metallic) = match &self.kind {

@@ -27,14 +27,11 @@ use super::{
 };
 use crate::error::Result;
 
-/// Scene file as written.
 #[derive(Debug)]
 pub(crate) struct SceneFile {
-    /// `[camera]`.
     pub camera: CameraEntry,
     /// Every `[[camera.keyframe]]`, in file order.
     pub keyframes: Vec<KeyframeEntry>,
-    /// `[film]`.
     pub film: FilmSettings,
     /// `[environment]`; black without.
     pub environment: Option<EnvironmentEntry>,
@@ -50,7 +47,6 @@ pub(crate) struct SceneFile {
     pub includes: Vec<IncludeEntry>,
 }
 
-/// `[camera]`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CameraEntry {
@@ -120,7 +116,6 @@ fn default_environment_scale() -> f32 {
     1.0
 }
 
-/// One `[[object]]`.
 #[derive(Debug)]
 pub(crate) struct ObjectEntry {
     /// Line of the entry, from 1.
@@ -139,30 +134,19 @@ pub(crate) struct ObjectEntry {
     pub source: ObjectSource,
 }
 
-/// Source of an object's triangles.
 #[derive(Debug)]
 pub(crate) enum ObjectSource {
-    /// A mesh file.
     Mesh(PathBuf),
-    /// A procedural shape.
-    Shape {
-        /// Name in the file.
-        name: String,
-        /// Its parameters.
-        shape: Box<dyn Shape>,
-    },
+    Shape { name: String, shape: Box<dyn Shape> },
 }
 
-/// One `[[include]]`.
 #[derive(Debug)]
 pub(crate) struct IncludeEntry {
     /// Line of the entry, from 1.
     pub line: usize,
-    /// Its keys.
     pub keys: IncludeKeys,
 }
 
-/// Keys of `[[include]]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct IncludeKeys {

@@ -2,16 +2,13 @@
 
 use serde::Deserialize;
 
-/// One `[[portal]]`.
 #[derive(Clone, Debug)]
 pub(crate) struct PortalEntry {
     /// Line of the entry, from 1.
     pub line: usize,
-    /// Its keys.
     pub keys: PortalKeys,
 }
 
-/// Keys of `[[portal]]`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PortalKeys {

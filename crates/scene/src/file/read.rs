@@ -26,7 +26,6 @@ use crate::{
     shapes::{self, Shape},
 };
 
-/// Keys of every `[[object]]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ObjectKeys {
@@ -34,7 +33,6 @@ struct ObjectKeys {
     name: Option<String>,
     /// PLY, OBJ, glTF or GLB file; this or `shape`.
     mesh: Option<PathBuf>,
-    /// Procedural shape.
     shape: Option<Spanned<String>>,
     /// Name of a material; may be absent where the mesh file brings its own.
     material: Option<String>,
@@ -49,13 +47,11 @@ struct ObjectKeys {
     translate: [f32; 3],
 }
 
-/// Keys of every `[[lamp]]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LampKeys {
     /// Name, for messages.
     name: Option<String>,
-    /// Kind.
     r#type: Spanned<String>,
 }
 

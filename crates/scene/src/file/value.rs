@@ -90,17 +90,12 @@ pub(crate) struct TextureEntry {
     pub strength: Option<f32>,
 }
 
-/// `channel` of a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum ChannelEntry {
-    /// Red.
     R,
-    /// Green.
     G,
-    /// Blue.
     B,
-    /// Opacity.
     A,
 }
 
@@ -109,12 +104,10 @@ pub(crate) enum ChannelEntry {
 pub(crate) enum Textured<T> {
     /// Same everywhere.
     Uniform(T),
-    /// By place.
     Texture(Box<TextureEntry>),
 }
 
 impl<T> Textured<T> {
-    /// The texture, if it is one.
     pub(crate) fn texture(&self) -> Option<&TextureEntry> {
         match self {
             Self::Uniform(_) => None,

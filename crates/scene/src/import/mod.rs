@@ -29,7 +29,6 @@ pub(crate) struct Imported {
     pub environment: Option<EnvironmentMap>,
     /// Lights without a surface.
     pub lamps: Vec<Lamp>,
-    /// Materials.
     pub materials: Vec<Material>,
     /// All triangles.
     pub geometry: Geometry,

@@ -386,7 +386,6 @@ fn is_textured(object: &ObjectEntry, materials: &[Material]) -> bool {
         .is_some_and(|material| material.surface.textures().next().is_some())
 }
 
-/// Material that an object names.
 fn named_material<'a>(object: &ObjectEntry, materials: &'a [Material]) -> Option<&'a Material> {
     materials.iter().find(|material| Some(&material.name) == object.material.as_ref())
 }

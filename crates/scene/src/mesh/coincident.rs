@@ -80,7 +80,6 @@ impl Mesh {
         }
     }
 
-    /// Material of a triangle.
     fn material_of(&self, triangle: usize) -> Option<usize> {
         let next = self.runs.partition_point(|run| run.first_triangle <= triangle);
         self.runs[..next].last().and_then(|run: &MaterialRun| run.material)

@@ -35,7 +35,6 @@ pub(super) struct Document {
     elements: Vec<Element>,
     /// Files in the order in which they were met; the scene first.
     pub files: Vec<PathBuf>,
-    /// Folder of the scene.
     folder: Folder,
     /// Folders of `path`, in which names start too.
     search: Vec<PathBuf>,
@@ -59,7 +58,6 @@ struct Element {
 /// Element of a [`Document`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node<'a> {
-    /// The document.
     pub document: &'a Document,
     /// Number of the element, by which it is told from others.
     pub index: usize,
@@ -75,7 +73,6 @@ impl<'a> Node<'a> {
         &self.element().tag
     }
 
-    /// Value of an attribute.
     pub(super) fn attribute(self, name: &str) -> Option<&'a str> {
         let found = self.element().attributes.iter().find(|(own, _)| own == name);
         found.map(|(_, value)| value.as_str())
@@ -124,7 +121,6 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// Error at this element.
     pub(super) fn error(self, message: impl Into<String>) -> Error {
         let Element { file, line, .. } = self.element();
         Error::parse(&self.document.files[*file], *line as usize, 1, message)

@@ -16,7 +16,6 @@ const WITHOUT_COUNTERPART: [&str; 5] =
     ["anisotropic", "spec_tint", "sheen", "flatness", "clearcoat"];
 
 impl Reader<'_> {
-    /// Reads a `principled` model.
     pub(super) fn principled(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
         let node = parameters.node;
         let (roughness, metallic) =
@@ -102,7 +101,6 @@ impl Reader<'_> {
         Ok(Model { kind, surface })
     }
 
-    /// Number or texture of a parameter.
     fn number(&mut self, parameters: &Parameters<'_>, name: &str, default: f32) -> Result<Value> {
         let value = self.value(parameters, name, Role::Index)?;
         Ok(value.unwrap_or(Value::Color(Vec3::splat(default))))

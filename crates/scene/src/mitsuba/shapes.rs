@@ -372,7 +372,6 @@ fn frame_along(axis: DVec3) -> Option<DMat3> {
     Some(DMat3::from_cols(x, y, axis))
 }
 
-/// Turns the inside of a mesh out.
 fn turn_inside_out(mesh: &mut Mesh) {
     mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
     mesh.normals.iter_mut().flatten().for_each(|component| *component = -*component);

@@ -210,7 +210,6 @@ fn integrate(node: Node<'_>, list: Vec<[f64; 2]>, role: Role) -> Result<Vec3> {
     Ok(rgb_of(|nm| samples.at(nm), role))
 }
 
-/// Colour of a spectrum.
 fn rgb_of(spectrum: impl Fn(f64) -> f64, role: Role) -> Vec3 {
     match role {
         Role::Light => spectrum::light(spectrum),

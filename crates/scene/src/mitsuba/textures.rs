@@ -25,7 +25,6 @@ const MAX_SCALES: usize = 8;
 pub(super) enum Value {
     /// The same everywhere.
     Color(Vec3),
-    /// By texture coordinates.
     Texture(Box<TextureUse>),
     /// Colours of the vertices, times a factor.
     Vertices(Vec3),

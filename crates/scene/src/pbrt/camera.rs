@@ -20,7 +20,6 @@ use crate::{
 pub(super) struct View {
     /// Camera in the space of the renderer.
     pub camera: CameraEntry,
-    /// Film.
     pub film: FilmSettings,
     /// Radiance of the picture over that of the scene.
     pub exposure: f32,

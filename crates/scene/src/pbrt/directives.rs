@@ -24,7 +24,6 @@ pub(super) struct Shape {
     pub world_from_shape: DMat4,
     /// True if the outside is the inside.
     pub reverse: bool,
-    /// Material.
     pub material: MaterialChoice,
     /// `AreaLightSource`, if the shape emits.
     pub light: Option<Rc<Entity>>,
@@ -44,9 +43,7 @@ pub(super) struct Instance {
 /// Object that may be used many times.
 #[derive(Debug, Default)]
 pub(super) struct Object {
-    /// Its name.
     pub name: String,
-    /// Its shapes.
     pub shapes: Vec<Shape>,
     /// Its uses.
     pub instances: Vec<Instance>,
@@ -59,13 +56,10 @@ pub(super) struct Object {
 pub(super) struct Description {
     /// `Camera`, and camera from world.
     pub camera: Option<(Entity, DMat4)>,
-    /// `Film`.
     pub film: Option<Entity>,
     /// `PixelFilter`.
     pub filter: Option<Entity>,
-    /// `Integrator`.
     pub integrator: Option<Entity>,
-    /// `Sampler`.
     pub sampler: Option<Entity>,
     /// `Texture` of type `float`, by name.
     pub float_textures: HashMap<String, Entity>,
@@ -333,7 +327,6 @@ impl<'a> Reader<'a> {
         Err(place.error(format!("{name}: the transformation leaves the range of numbers")))
     }
 
-    /// Index of an object by name.
     fn object_index(&mut self, name: String) -> usize {
         let objects = &mut self.description.objects;
         *self.object_names.entry(name.clone()).or_insert_with(|| {

@@ -22,10 +22,8 @@ use crate::{
 /// Largest side of an equal-area map, texels.
 const MAX_SIDE: u32 = 8192;
 
-/// Lights of a scene.
 #[derive(Default)]
 pub(super) struct Lights {
-    /// Lamps.
     pub lamps: Vec<Lamp>,
     /// Radiance from everywhere.
     constant: Vec3,

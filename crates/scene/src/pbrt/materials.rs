@@ -33,7 +33,6 @@ const COAT_IOR: (f32, f32) = (1.01, 4.0);
 /// Refractive indices of solids.
 const SOLID_IOR: (f32, f32) = (0.1, 10.0);
 
-/// Materials of a scene.
 pub(super) struct Materials<'a> {
     /// Entities of the file.
     pub description: &'a Description,

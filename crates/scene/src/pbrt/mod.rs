@@ -348,7 +348,6 @@ impl Builder<'_> {
     }
 }
 
-/// Area of a mesh in the world.
 fn area(mesh: &Mesh, world_from_shape: DMat4) -> f64 {
     let corner = |at: u32| {
         let position = Vec3::from_array(mesh.positions[at as usize]).as_dvec3();

@@ -19,25 +19,18 @@ const MAX_PARAMETERS: usize = 256;
 /// Type of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// `bool`
     Boolean,
-    /// `integer`
     Integer,
-    /// `float`
     Float,
     /// `point2`, `vector2`
     Pair,
     /// `point3`, `vector3`, `normal`
     Triple,
-    /// `rgb`
     Rgb,
     /// `spectrum`: pairs of wavelength and value, or a name.
     Spectrum,
-    /// `blackbody`
     Blackbody,
-    /// `string`
     Text,
-    /// `texture`
     Texture,
 }
 
@@ -83,12 +76,9 @@ impl Kind {
     }
 }
 
-/// Values of a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Values {
-    /// Finite numbers.
     Numbers(Vec<f64>),
-    /// Strings.
     Texts(Vec<String>),
     /// Truth values.
     Booleans(Vec<bool>),
@@ -109,7 +99,6 @@ impl Values {
 pub(super) struct Parameter {
     /// Type.
     pub kind: Kind,
-    /// Name.
     pub name: String,
     /// Values, at least one.
     pub values: Values,
@@ -293,7 +282,6 @@ impl Entity {
         self.place.error(format!("{}: {}", self.label(), message.as_ref()))
     }
 
-    /// Parameter with this name.
     pub(super) fn find(&self, name: &str) -> Option<&Parameter> {
         let found = self.parameters.iter().find(|parameter| parameter.name == name);
         found.inspect(|parameter| parameter.used.set(true))
@@ -328,7 +316,6 @@ impl Entity {
         Ok(found.and_then(|parameter| parameter.numbers().first().copied()))
     }
 
-    /// Number, or `otherwise`.
     pub(super) fn number(&self, name: &str, otherwise: f64) -> Result<f64> {
         Ok(self.optional(name)?.unwrap_or(otherwise))
     }
@@ -344,7 +331,6 @@ impl Entity {
         Ok(self.find_of(name, &[Kind::Text])?.map(Parameter::text))
     }
 
-    /// Point or vector, or `otherwise`.
     pub(super) fn point(&self, name: &str, otherwise: DVec3) -> Result<DVec3> {
         match self.numbers(name, Kind::Triple)? {
             [x, y, z, ..] => Ok(DVec3::new(*x, *y, *z)),

@@ -44,7 +44,6 @@ pub(super) struct Source {
 /// Next part of a source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
-    /// Token of a file.
     Token(Token),
     /// End of a file that `Import` named.
     EndOfImport,

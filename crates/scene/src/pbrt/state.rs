@@ -19,9 +19,7 @@ const MAX_SAVED: usize = 1 << 12;
 pub(super) enum MaterialChoice {
     /// That of pbrt where a file chooses none: diffuse, 0.5.
     Default,
-    /// From `Material`.
     Own(Rc<Entity>),
-    /// From `NamedMaterial`.
     Named(Rc<str>, Place),
 }
 
@@ -39,7 +37,6 @@ impl Attributes {
         Self::TARGETS.iter().position(|name| *name == target)
     }
 
-    /// Parameters for a target.
     pub(super) fn of(&self, target: &str) -> &[Parameter] {
         Self::index(target).map_or(&[], |index| &self.lists[index])
     }
@@ -75,7 +72,6 @@ pub(super) struct State {
     pub ctm: DMat4,
     /// True after an odd number of `ReverseOrientation`.
     pub reverse: bool,
-    /// Material.
     pub material: MaterialChoice,
     /// `AreaLightSource` of the shapes.
     pub area_light: Option<Rc<Entity>>,
@@ -101,13 +97,10 @@ impl Default for State {
 /// Directive that saves the state, and that ends at its own counterpart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Saved {
-    /// `AttributeBegin`
     Attribute,
     /// `TransformBegin`: restores the matrix alone.
     Transform,
-    /// `ObjectBegin`
     Object,
-    /// `Import`
     Import,
 }
 

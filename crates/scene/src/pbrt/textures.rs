@@ -27,7 +27,6 @@ const MAX_DEPTH: usize = 16;
 pub(super) enum Value {
     /// The same everywhere; all three are equal for a number.
     Constant(Vec3),
-    /// By place.
     Image(TextureUse),
 }
 

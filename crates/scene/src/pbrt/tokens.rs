@@ -12,7 +12,6 @@ const MAX_LENGTH: usize = 1 << 16;
 pub(super) struct Place {
     /// File.
     pub path: Rc<Path>,
-    /// Line.
     pub line: usize,
     /// Column in bytes.
     pub column: usize,
@@ -39,7 +38,6 @@ impl Place {
 pub(super) enum Token {
     /// `[`
     Open,
-    /// `]`
     Close,
     /// Characters up to a space, quote or bracket.
     Word,

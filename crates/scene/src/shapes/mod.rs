@@ -115,7 +115,6 @@ fn count(key: &str, count: usize, range: RangeInclusive<usize>) -> Result<usize,
     }
 }
 
-/// Vertex of a patch.
 #[derive(Clone, Copy, Debug)]
 struct Vertex {
     position: DVec3,

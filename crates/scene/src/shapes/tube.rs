@@ -39,7 +39,6 @@ pub(crate) struct Tube {
 pub(crate) enum Radius {
     /// Same everywhere.
     Constant(f32),
-    /// One per point.
     PerPoint(Vec<f32>),
 }
 

@@ -17,7 +17,6 @@ pub struct TextureCache {
     textures: BTreeMap<PathBuf, Arc<Texture>>,
 }
 
-/// Texture with its warnings.
 type Decoded = (Arc<Texture>, Vec<String>);
 
 impl TextureCache {

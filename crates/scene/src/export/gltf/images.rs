@@ -53,7 +53,6 @@ impl Sheet {
         self.first.iter().chain(&self.second)
     }
 
-    /// Name of the file.
     pub(super) fn name(&self, index: usize) -> String {
         let name = self.sources().next().map_or("", |used| used.texture.name.as_str());
         let stem = Path::new(name).file_stem().unwrap_or_default();

@@ -33,7 +33,6 @@ struct Core {
 }
 
 impl<'a> Translator<'a> {
-    /// Translates the material.
     pub(super) fn translate(mut self) -> Value {
         let surface = self.subject.surface;
         let is_unlit = self.is_unlit();

@@ -25,7 +25,6 @@ const LEAST_ETA: f32 = 1.001;
 /// Elements of a material.
 #[derive(Debug)]
 pub(super) struct Model {
-    /// `bsdf` element.
     pub(super) bsdf: String,
     /// `emitter` element for the shapes, if they emit.
     pub(super) emitter: Option<String>,

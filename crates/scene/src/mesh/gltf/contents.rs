@@ -29,7 +29,6 @@ const OTHER_PARTS: [&str; 10] = [
     "textures",
 ];
 
-/// Label of a part in warnings.
 pub(super) fn label(part: &str, index: usize, name: Option<&str>) -> String {
     name.map_or_else(|| format!("{part} {index}"), |name| format!("{part} `{name}`"))
 }

@@ -132,7 +132,6 @@ struct GltfReader<'a> {
     panes: HashMap<usize, Pane>,
     /// Images inside the document by their numbers; none for those that cannot be read.
     embedded: HashMap<usize, Option<Arc<Texture>>>,
-    /// Images beside it.
     images: Images,
     /// Cameras of the nodes with their numbers in the file.
     cameras: Vec<(usize, MeshCamera)>,

@@ -15,9 +15,7 @@ const MATRIX_BYTES: usize = 64;
 
 /// Placement of a primitive.
 pub(super) enum Place<'j> {
-    /// By the matrix of a node.
     Node(Mat4),
-    /// By the matrices of joints.
     Joints(&'j [Mat4]),
 }
 

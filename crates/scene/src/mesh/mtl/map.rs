@@ -22,11 +22,8 @@ pub(super) struct Options {
     scale: [f32; 2],
     /// `-o`, along u and v.
     offset: [f32; 2],
-    /// `-clamp on`.
     clamps: bool,
-    /// `-mm`, base and gain.
     base_gain: [f32; 2],
-    /// `-imfchan`.
     pub(super) channels: Option<Channels>,
     /// `-bm`, strength of a normal map.
     pub(super) strength: f32,
