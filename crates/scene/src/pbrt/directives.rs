@@ -204,9 +204,8 @@ impl<'a> Reader<'a> {
                 let kind = self.text(name)?;
                 let attributes = self.states.now.attributes.clone();
                 let inherited = attributes.of("medium");
-                let directive = "MakeNamedMedium";
-                let entity =
-                    Entity::read(&mut self.source, directive, kind.clone(), place, inherited)?;
+                let (source, name) = (&mut self.source, kind.clone());
+                let entity = Entity::read(source, "MakeNamedMedium", name, place, inherited)?;
                 self.description.media.insert(kind, entity);
                 Ok(())
             }
@@ -377,30 +376,22 @@ impl<'a> Reader<'a> {
             }
             return Ok(());
         }
-        let directive = match name {
-            "Camera" => "Camera",
-            "Film" => "Film",
-            "PixelFilter" => "PixelFilter",
-            "Integrator" => "Integrator",
-            "Sampler" => "Sampler",
-            _ => "Accelerator",
-        };
         if self.in_world {
-            return Err(place.error(format!("{directive} after WorldBegin")));
+            return Err(place.error(format!("{name} after WorldBegin")));
         }
-        let entity = Entity::read(&mut self.source, directive, kind, place, &[])?;
-        match directive {
+        let read = |directive| Entity::read(&mut self.source, directive, kind, place, &[]);
+        match name {
             "Camera" => {
                 let ctm = self.states.now.ctm;
                 self.states.named.insert("camera".to_owned(), ctm.inverse());
-                self.description.camera = Some((entity, ctm));
+                self.description.camera = Some((read("Camera")?, ctm));
             }
-            "Film" => self.description.film = Some(entity),
-            "PixelFilter" => self.description.filter = Some(entity),
-            "Integrator" => self.description.integrator = Some(entity),
-            "Sampler" => self.description.sampler = Some(entity),
+            "Film" => self.description.film = Some(read("Film")?),
+            "PixelFilter" => self.description.filter = Some(read("PixelFilter")?),
+            "Integrator" => self.description.integrator = Some(read("Integrator")?),
+            "Sampler" => self.description.sampler = Some(read("Sampler")?),
             // The renderer has its own tree.
-            _ => {}
+            _ => drop(read("Accelerator")?),
         }
         Ok(())
     }
@@ -408,15 +399,16 @@ impl<'a> Reader<'a> {
     fn entity(&mut self, name: &str, place: Place) -> Result<()> {
         let kind = self.text(name)?;
         let now = self.states.now.clone();
-        let source = &mut self.source;
+        let mut read = |directive, target, kind, place| {
+            Entity::read(&mut self.source, directive, kind, place, now.attributes.of(target))
+        };
         match name {
             "NamedMaterial" => {
                 self.states.now.material = MaterialChoice::Named(Rc::from(kind), place);
             }
             "Shape" => {
-                let inherited = now.attributes.of("shape");
                 let shape = Shape {
-                    entity: Entity::read(source, "Shape", kind, place, inherited)?,
+                    entity: read("Shape", "shape", kind, place)?,
                     world_from_shape: now.ctm,
                     reverse: now.reverse,
                     material: now.material,
@@ -429,24 +421,19 @@ impl<'a> Reader<'a> {
                 }
             }
             "LightSource" => {
-                let inherited = now.attributes.of("light");
-                let entity = Entity::read(source, "LightSource", kind, place, inherited)?;
+                let entity = read("LightSource", "light", kind, place)?;
                 self.description.lights.push((entity, now.ctm));
             }
             "AreaLightSource" => {
-                let inherited = now.attributes.of("light");
-                let entity = Entity::read(source, "AreaLightSource", kind, place, inherited)?;
+                let entity = read("AreaLightSource", "light", kind, place)?;
                 self.states.now.area_light = Some(Rc::new(entity));
             }
             "Material" => {
-                let inherited = now.attributes.of("material");
-                let entity = Entity::read(source, "Material", kind, place, inherited)?;
+                let entity = read("Material", "material", kind, place)?;
                 self.states.now.material = MaterialChoice::Own(Rc::new(entity));
             }
             "MakeNamedMaterial" => {
-                let inherited = now.attributes.of("material");
-                let directive = "MakeNamedMaterial";
-                let entity = Entity::read(source, directive, kind.clone(), place, inherited)?;
+                let entity = read("MakeNamedMaterial", "material", kind.clone(), place)?;
                 let error = entity.error("the name is taken by another material");
                 if self.description.materials.insert(kind, entity).is_some() {
                     return Err(error);

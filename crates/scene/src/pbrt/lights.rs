@@ -65,7 +65,6 @@ pub(super) fn area_light(
     area: f64,
     exposure: f32,
     textures: &mut Textures,
-    log: &mut Log,
 ) -> Result<AreaLight> {
     if entity.name != "diffuse" {
         return Err(entity.error("expected a diffuse light"));
@@ -76,13 +75,13 @@ pub(super) fn area_light(
         let sides = if two_sided { 2.0 } else { 1.0 };
         scale *= power / (sides * area * PI);
     }
-    let image = textures.light_image(entity, log)?;
+    let image = textures.light_image(entity)?;
     if let (Some(_), Some(color)) = (&image, entity.find("L")) {
         let message = "expected either `L` or `filename`, found both";
         return Err(color.place.error(format!("{}: {message}", entity.label())));
     }
     let radiance = color(entity, "L", textures)? * scale as f32 * exposure;
-    log.unused(entity);
+    textures.log.unused(entity);
     if !radiance.is_finite() || radiance.min_element() < 0.0 {
         return Err(
             entity.error(format!("expected finite radiance of at least 0, found {radiance}"))
@@ -103,7 +102,6 @@ impl Lights {
         world_from_light: DMat4,
         exposure: f32,
         textures: &mut Textures,
-        log: &mut Log,
     ) -> Result<()> {
         let scale = entity.number("scale", 1.0)?;
         let power = entity.optional("power")?.filter(|power| *power > 0.0);
@@ -118,16 +116,8 @@ impl Lights {
         };
         let kind = match entity.name.as_str() {
             "infinite" => {
-                self.infinite(
-                    entity,
-                    world_from_light,
-                    scale,
-                    illuminance,
-                    exposure,
-                    textures,
-                    log,
-                )?;
-                log.unused(entity);
+                self.infinite(entity, world_from_light, scale, illuminance, exposure, textures)?;
+                textures.log.unused(entity);
                 return Ok(());
             }
             "distant" => {
@@ -157,7 +147,7 @@ impl Lights {
                 }
             }
             "goniometric" => {
-                let (mean, _) = mean_of_image(entity, textures, log)?;
+                let (mean, _) = mean_of_image(entity, textures)?;
                 // pbrt takes the mean of the channels; a given power replaces it.
                 let mean = f64::from(mean.element_sum() / 3.0);
                 let factor = scale * power.map_or(mean, |power| power / (4.0 * PI));
@@ -165,7 +155,7 @@ impl Lights {
                 LampKind::Point { position: place(from), intensity }
             }
             "projection" => {
-                let (mean, aspect) = mean_of_image(entity, textures, log)?;
+                let (mean, aspect) = mean_of_image(entity, textures)?;
                 let tangent =
                     (0.5 * entity.number("fov", 90.0)?.clamp(0.01, 179.0)).to_radians().tan();
                 let [wide, high] = [tangent * aspect.max(1.0), tangent * (1.0 / aspect).max(1.0)];
@@ -188,7 +178,7 @@ impl Lights {
             }
             other => return Err(entity.error(format!("unknown light `{other}`"))),
         };
-        log.unused(entity);
+        textures.log.unused(entity);
         let (LampKind::Point { intensity: color, .. }
         | LampKind::Spot { intensity: color, .. }
         | LampKind::Directional { irradiance: color, .. }) = kind;
@@ -208,11 +198,10 @@ impl Lights {
         scale: f64,
         illuminance: Option<f64>,
         exposure: f32,
-        textures: &Textures,
-        log: &mut Log,
+        textures: &mut Textures,
     ) -> Result<()> {
         if let Some(portal) = entity.find("portal") {
-            log.ignore(features::PBRT_PORTAL, &portal.place);
+            textures.log.ignore(features::PBRT_PORTAL, &portal.place);
         }
         let Some(file) = entity.string("filename")? else {
             // A hemisphere of radiance 1 gives an illuminance of π.
@@ -225,7 +214,8 @@ impl Lights {
             return Err(color.place.error(format!("{}: {message}", entity.label())));
         }
         let path = textures.folder().file(file).map_err(|message| entity.error(message))?;
-        let mut map = read_map(&path, log).map_err(|error| entity.error(error.to_string()))?;
+        let mut map =
+            read_map(&path, &mut textures.log).map_err(|error| entity.error(error.to_string()))?;
         if map.width != map.height || map.width > MAX_SIDE {
             return Err(entity.error(format!(
                 "{}: expected a square equal-area map of at most {MAX_SIDE} texels a side, found \
@@ -248,7 +238,7 @@ impl Lights {
             light_from_world,
             source: path.display().to_string(),
         });
-        log.inputs.push(path);
+        textures.log.inputs.push(path);
         Ok(())
     }
 
@@ -282,12 +272,12 @@ impl Lights {
 }
 
 /// Mean colour of the image of a lamp, and its width over its height.
-fn mean_of_image(entity: &Entity, textures: &mut Textures, log: &mut Log) -> Result<(Vec3, f64)> {
-    let Some(image) = textures.light_image(entity, log)? else {
+fn mean_of_image(entity: &Entity, textures: &mut Textures) -> Result<(Vec3, f64)> {
+    let Some(image) = textures.light_image(entity)? else {
         return Err(entity.error("expected the parameter `filename`"));
     };
     let name = format!("image of LightSource `{}`", entity.name);
-    log.ignore_named(features::PBRT_LIGHT_IMAGE, &name, &entity.place);
+    textures.log.ignore_named(features::PBRT_LIGHT_IMAGE, &name, &entity.place);
     let aspect = f64::from(image.texture.width) / f64::from(image.texture.height);
     Ok((image.mean().into(), aspect))
 }

@@ -4,7 +4,6 @@ use glam::Vec3;
 
 use super::{
     directives::Description,
-    log::Log,
     parameters::{Entity, Kind, Values},
     spectra,
     state::MaterialChoice,
@@ -57,11 +56,7 @@ impl<'a> Materials<'a> {
     ///
     /// # Errors
     /// With the place for unknown names and kinds, and parameters of the wrong type.
-    pub(super) fn make(
-        &mut self,
-        choice: &MaterialChoice,
-        log: &mut Log,
-    ) -> Result<Option<Material>> {
+    pub(super) fn make(&mut self, choice: &MaterialChoice) -> Result<Option<Material>> {
         match choice {
             MaterialChoice::Default => {
                 let kind = MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) };
@@ -69,10 +64,10 @@ impl<'a> Materials<'a> {
             }
             MaterialChoice::Own(entity) => {
                 let name = format!("{} of line {}", entity.name, entity.place.line);
-                self.of_entity(entity, &entity.name, name, 0, log)
+                self.of_entity(entity, &entity.name, name, 0)
             }
             MaterialChoice::Named(name, place) => match self.description.materials.get(&**name) {
-                Some(entity) => self.named(name, entity, 0, log),
+                Some(entity) => self.named(name, entity, 0),
                 None => {
                     let message = format!("NamedMaterial \"{name}\": there is no such material");
                     Err(place.error(message))
@@ -81,17 +76,11 @@ impl<'a> Materials<'a> {
         }
     }
 
-    fn named(
-        &mut self,
-        name: &str,
-        entity: &Entity,
-        depth: usize,
-        log: &mut Log,
-    ) -> Result<Option<Material>> {
+    fn named(&mut self, name: &str, entity: &Entity, depth: usize) -> Result<Option<Material>> {
         let Some(kind) = entity.string("type")? else {
             return Err(entity.error("expected a `type`"));
         };
-        self.of_entity(entity, kind, name.to_owned(), depth, log)
+        self.of_entity(entity, kind, name.to_owned(), depth)
     }
 
     fn of_entity(
@@ -100,28 +89,27 @@ impl<'a> Materials<'a> {
         kind: &str,
         name: String,
         depth: usize,
-        log: &mut Log,
     ) -> Result<Option<Material>> {
         let mut surface = Surface::default();
         let kind = match kind {
-            "diffuse" => self.diffuse(entity, "reflectance", 0.5, 1.0, &mut surface, log)?,
+            "diffuse" => self.diffuse(entity, "reflectance", 0.5, 1.0, &mut surface)?,
             "coateddiffuse" => {
-                self.layers(entity, log)?;
-                self.plastic(entity, &mut surface, log)?
+                self.layers(entity)?;
+                self.plastic(entity, &mut surface)?
             }
-            "conductor" => self.conductor(entity, "", &mut surface, log)?,
+            "conductor" => self.conductor(entity, "", &mut surface)?,
             "coatedconductor" => {
-                log.ignore(features::PBRT_COATED_CONDUCTOR, &entity.place);
-                self.layers(entity, log)?;
+                self.textures.log.ignore(features::PBRT_COATED_CONDUCTOR, &entity.place);
+                self.layers(entity)?;
                 for name in ["interface.roughness", "interface.uroughness", "interface.vroughness"]
                 {
                     entity.find(name);
                 }
                 entity.find("interface.eta");
-                self.conductor(entity, "conductor.", &mut surface, log)?
+                self.conductor(entity, "conductor.", &mut surface)?
             }
             "dielectric" => {
-                let roughness = self.roughness(entity, "", log)?;
+                let roughness = self.roughness(entity, "")?;
                 surface.roughness = roughness.texture;
                 let alpha = if roughness.alpha < SMOOTH_ALPHA { 0.0 } else { roughness.alpha };
                 MaterialKind::glass(self.ior(entity, "eta", SOLID_IOR)?, alpha)
@@ -132,20 +120,20 @@ impl<'a> Materials<'a> {
                 transmittance: Vec3::ONE,
             },
             "diffusetransmission" => {
-                log.ignore(features::PBRT_TRANSMISSION, &entity.place);
-                self.textures.spectrum(entity, "transmittance", log)?;
+                self.textures.log.ignore(features::PBRT_TRANSMISSION, &entity.place);
+                self.textures.spectrum(entity, "transmittance")?;
                 let scale = entity.number("scale", 1.0)? as f32;
-                self.diffuse(entity, "reflectance", 0.25, scale, &mut surface, log)?
+                self.diffuse(entity, "reflectance", 0.25, scale, &mut surface)?
             }
             "subsurface" => {
-                log.ignore(features::PBRT_SUBSURFACE, &entity.place);
+                self.textures.log.ignore(features::PBRT_SUBSURFACE, &entity.place);
                 for name in ["name", "mfp", "sigma_a", "sigma_s", "g", "scale"] {
                     entity.find(name);
                 }
-                self.plastic(entity, &mut surface, log)?
+                self.plastic(entity, &mut surface)?
             }
             "hair" => {
-                log.ignore(features::PBRT_HAIR, &entity.place);
+                self.textures.log.ignore(features::PBRT_HAIR, &entity.place);
                 for name in [
                     "sigma_a",
                     "reflectance",
@@ -161,7 +149,7 @@ impl<'a> Materials<'a> {
                 }
                 MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) }
             }
-            "mix" => return self.mix(entity, name, depth, log),
+            "mix" => return self.mix(entity, name, depth),
             "interface" | "none" | "" => return Ok(None),
             "measured" => {
                 let message = "the material `measured` cannot be rendered; choose another, such as \
@@ -174,26 +162,26 @@ impl<'a> Materials<'a> {
                 )));
             }
         };
-        surface.normal = self.textures.normal_map(entity, log)?;
+        surface.normal = self.textures.normal_map(entity)?;
         if let Some(displacement) = entity.find_of("displacement", &[Kind::Texture, Kind::Float])? {
-            log.ignore(features::PBRT_DISPLACEMENT, &displacement.place);
+            self.textures.log.ignore(features::PBRT_DISPLACEMENT, &displacement.place);
         }
-        log.unused(entity);
+        self.textures.log.unused(entity);
         Ok(Some(Material { name, kind, surface }))
     }
 
     /// Marks the parameters of a coat as read, and reports a coat that absorbs or scatters.
-    fn layers(&mut self, entity: &Entity, log: &mut Log) -> Result<()> {
+    fn layers(&mut self, entity: &Entity) -> Result<()> {
         for name in ["thickness", "maxdepth", "nsamples", "g"] {
             entity.find(name);
         }
-        let is_clear = match self.textures.spectrum(entity, "albedo", log)? {
+        let is_clear = match self.textures.spectrum(entity, "albedo")? {
             Some(Value::Constant(albedo)) => albedo == Vec3::ZERO,
             Some(Value::Image(_)) => false,
             None => true,
         };
         if !is_clear {
-            log.ignore(features::PBRT_COAT_ALBEDO, &entity.place);
+            self.textures.log.ignore(features::PBRT_COAT_ALBEDO, &entity.place);
         }
         Ok(())
     }
@@ -205,21 +193,15 @@ impl<'a> Materials<'a> {
         otherwise: f64,
         scale: f32,
         surface: &mut Surface,
-        log: &mut Log,
     ) -> Result<MaterialKind> {
-        let value = self.textures.spectrum(entity, parameter, log)?;
+        let value = self.textures.spectrum(entity, parameter)?;
         let value = value.unwrap_or(Value::number(otherwise)).scaled(scale);
         let reflectance = color(value, surface);
         Ok(MaterialKind::Diffuse { reflectance: reflectance.clamp(Vec3::ZERO, Vec3::ONE) })
     }
 
-    fn plastic(
-        &mut self,
-        entity: &Entity,
-        surface: &mut Surface,
-        log: &mut Log,
-    ) -> Result<MaterialKind> {
-        let value = self.textures.spectrum(entity, "reflectance", log)?;
+    fn plastic(&mut self, entity: &Entity, surface: &mut Surface) -> Result<MaterialKind> {
+        let value = self.textures.spectrum(entity, "reflectance")?;
         let ior = self.ior(entity, "eta", COAT_IOR)?;
         let below = albedo_below_coat(ior);
         let mut diffuse = color(value.unwrap_or(Value::number(0.5)), surface);
@@ -227,7 +209,7 @@ impl<'a> Materials<'a> {
             Some(texture) => *texture = texture.mapped(below),
             None => diffuse = diffuse.map(below),
         }
-        let roughness = self.roughness(entity, "", log)?;
+        let roughness = self.roughness(entity, "")?;
         surface.roughness = roughness.texture;
         Ok(MaterialKind::Plastic { diffuse, alpha: roughness.alpha, ior })
     }
@@ -237,14 +219,13 @@ impl<'a> Materials<'a> {
         entity: &Entity,
         prefix: &str,
         surface: &mut Surface,
-        log: &mut Log,
     ) -> Result<MaterialKind> {
-        let roughness = self.roughness(entity, prefix, log)?;
+        let roughness = self.roughness(entity, prefix)?;
         surface.roughness = roughness.texture;
         let own = |name: &str| format!("{prefix}{name}");
-        let reflectance = match self.textures.spectrum(entity, &own("reflectance"), log)? {
+        let reflectance = match self.textures.spectrum(entity, &own("reflectance"))? {
             // coatedconductor names this one without a prefix.
-            None => self.textures.spectrum(entity, "reflectance", log)?,
+            None => self.textures.spectrum(entity, "reflectance")?,
             found => found,
         };
         let fresnel = match reflectance {
@@ -299,7 +280,7 @@ impl<'a> Materials<'a> {
     }
 
     /// Width α from `roughness`, or `uroughness` and `vroughness`, and `remaproughness`.
-    fn roughness(&mut self, entity: &Entity, prefix: &str, log: &mut Log) -> Result<Roughness> {
+    fn roughness(&mut self, entity: &Entity, prefix: &str) -> Result<Roughness> {
         // α = √roughness unless the file says that it is α itself.
         let remaps = entity.boolean("remaproughness", true)?;
         let alpha_of = |roughness: f32| {
@@ -308,7 +289,7 @@ impl<'a> Materials<'a> {
         };
         let mut number = |name: &str| {
             let name = format!("{prefix}{name}");
-            self.textures.number(entity, &name, log)
+            self.textures.number(entity, &name)
         };
         let both = number("roughness")?.unwrap_or(Value::number(0.0));
         let along_u = number("uroughness")?.unwrap_or(both.clone());
@@ -316,14 +297,14 @@ impl<'a> Materials<'a> {
         match (along_u, along_v) {
             (Value::Constant(u), Value::Constant(v)) => {
                 if u != v {
-                    log.ignore(features::PBRT_ANISOTROPY, &entity.place);
+                    self.textures.log.ignore(features::PBRT_ANISOTROPY, &entity.place);
                 }
                 let alpha = 0.5 * (alpha_of(u.x) + alpha_of(v.x));
                 Ok(Roughness { alpha: alpha.min(1.0), texture: None })
             }
             (Value::Image(image), other) | (other, Value::Image(image)) => {
                 if !matches!(&other, Value::Image(same) if *same == image) {
-                    log.ignore(features::PBRT_ANISOTROPY, &entity.place);
+                    self.textures.log.ignore(features::PBRT_ANISOTROPY, &entity.place);
                 }
                 let texture = map_numbers(&image, |roughness| alpha_of(roughness).min(1.0).sqrt());
                 Ok(Roughness { alpha: 1.0, texture: Some(texture) })
@@ -333,13 +314,7 @@ impl<'a> Materials<'a> {
 
     /// The mixture, else the material of the greater share; its opacity is the share if the other is
     /// not there.
-    fn mix(
-        &mut self,
-        entity: &Entity,
-        name: String,
-        depth: usize,
-        log: &mut Log,
-    ) -> Result<Option<Material>> {
+    fn mix(&mut self, entity: &Entity, name: String, depth: usize) -> Result<Option<Material>> {
         let names = match entity.find_of("materials", &[Kind::Text])?.map(|found| &found.values) {
             Some(Values::Texts(names)) if names.len() == 2 => names,
             _ => return Err(entity.error("expected two names of `materials`")),
@@ -353,11 +328,11 @@ impl<'a> Materials<'a> {
             let Some(part_entity) = self.description.materials.get(part) else {
                 return Err(entity.error(format!("there is no material `{part}`")));
             };
-            parts.push(self.named(part, part_entity, depth + 1, log)?);
+            parts.push(self.named(part, part_entity, depth + 1)?);
         }
         let (second, first) = (parts.pop().flatten(), parts.pop().flatten());
-        let amount = self.textures.number(entity, "amount", log)?.unwrap_or(Value::number(0.5));
-        log.unused(entity);
+        let amount = self.textures.number(entity, "amount")?.unwrap_or(Value::number(0.5));
+        self.textures.log.unused(entity);
         let (material, opacity) = match (first, second) {
             (None, None) => return Ok(None),
             (Some(first), None) => (first, Some(complement(amount))),
@@ -372,7 +347,7 @@ impl<'a> Materials<'a> {
                     return Ok(Some(Material { name, kind, surface }));
                 }
                 if let Some((kind, surface)) = blend_lobes(pair, &share) {
-                    log.ignore(features::PBRT_MIX_LOBES, &entity.place);
+                    self.textures.log.ignore(features::PBRT_MIX_LOBES, &entity.place);
                     return Ok(Some(Material { name, kind, surface }));
                 }
                 let share = match share {
@@ -380,7 +355,7 @@ impl<'a> Materials<'a> {
                     Share::Image(_) => 0.5,
                 };
                 if share > 0.0 && share < 1.0 {
-                    log.ignore(features::PBRT_MIX, &entity.place);
+                    self.textures.log.ignore(features::PBRT_MIX, &entity.place);
                 }
                 (if share <= 0.5 { first } else { second }, None)
             }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{log::Log, materials::Materials, parameters::Entity, spectra, tokens::Place};
+use super::{materials::Materials, parameters::Entity, spectra, tokens::Place};
 use crate::{error::Result, features, material::MaterialKind};
 
 impl Materials<'_> {
@@ -12,11 +12,10 @@ impl Materials<'_> {
     /// # Errors
     /// With the place for an unknown medium, and parameters of the wrong type.
     pub(super) fn fill(
-        &self,
+        &mut self,
         kind: Option<&mut MaterialKind>,
         medium: &str,
         place: &Place,
-        log: &mut Log,
     ) -> Result<()> {
         let Some(entity) = self.description.media.get(medium) else {
             let message = format!("MediumInterface \"{medium}\": there is no such medium");
@@ -25,9 +24,9 @@ impl Materials<'_> {
         match (kind, self.absorption(entity)?) {
             (Some(MaterialKind::Dielectric { absorption, .. }), Some(found)) => {
                 *absorption = found;
-                log.unused(entity);
+                self.textures.log.unused(entity);
             }
-            _ => log.ignore(features::PBRT_MEDIUM, &entity.place),
+            _ => self.textures.log.ignore(features::PBRT_MEDIUM, &entity.place),
         }
         Ok(())
     }

@@ -82,18 +82,17 @@ pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
     let view = camera::view(&description, path, &mut log)?;
     // A shape's numbers are dropped when its mesh is made.
     let shapes = std::mem::take(&mut description.shapes);
-    let mut textures = Textures::new(&description, &folder);
+    let mut textures = Textures::new(&description, &folder, log);
     let mut lights = Lights::default();
     for (entity, world_from_light) in &description.lights {
         let placed = view.mirror * *world_from_light;
-        lights.add(entity, placed, view.exposure, &mut textures, &mut log)?;
+        lights.add(entity, placed, view.exposure, &mut textures)?;
     }
     let mut builder = Builder {
         folder: &folder,
         view,
         materials: Materials::new(&description, textures),
         kept: Kept::default(),
-        log,
         geometry: Geometry::default(),
         dropped: Dropped::default(),
         triangle_count: 0,
@@ -122,7 +121,8 @@ pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
         }
     }
     let environment = lights.environment().map_err(|message| Error::scene(path, message))?;
-    let Builder { view, kept, mut log, geometry, dropped, triangle_count, .. } = builder;
+    let Builder { view, materials, kept, geometry, dropped, triangle_count, .. } = builder;
+    let mut log = materials.textures.log;
     let mut materials = kept.materials;
     for material in &mut materials {
         if let MaterialKind::Plastic { alpha, .. } | MaterialKind::Conductor { alpha, .. } =
@@ -186,7 +186,6 @@ struct Builder<'a> {
     view: View,
     materials: Materials<'a>,
     kept: Kept,
-    log: Log<'a>,
     geometry: Geometry,
     dropped: Dropped,
     triangle_count: usize,
@@ -197,22 +196,27 @@ struct Builder<'a> {
 impl Builder<'_> {
     /// Makes the mesh of a shape and finds its material; none for a shape without a surface.
     fn prepare(&mut self, shape: &Shape, in_object: bool) -> Result<Option<(Mesh, u32)>> {
-        let mut mesh = shapes::mesh(&shape.entity, self.folder, &mut self.strands, &mut self.log)?;
+        let mut mesh = shapes::mesh(
+            &shape.entity,
+            self.folder,
+            &mut self.strands,
+            &mut self.materials.textures.log,
+        )?;
         let light = match &shape.light {
             Some(entity) if in_object => {
-                self.log.ignore(features::PBRT_INSTANCE_LIGHT, &entity.place);
+                self.materials.textures.log.ignore(features::PBRT_INSTANCE_LIGHT, &entity.place);
                 None
             }
             Some(entity) => {
                 let area = area(&mesh, self.view.mirror * shape.world_from_shape);
                 let exposure = self.view.exposure;
                 let textures = &mut self.materials.textures;
-                Some(lights::area_light(entity, area, exposure, textures, &mut self.log)?)
+                Some(lights::area_light(entity, area, exposure, textures)?)
             }
             None => None,
         };
         let material = self.material(shape, light)?;
-        self.log.unused(&shape.entity);
+        self.materials.textures.log.unused(&shape.entity);
         let Some(material) = material else { return Ok(None) };
         let surface = &self.kept.materials[material as usize].surface;
         if surface.textures().next().is_some() {
@@ -244,13 +248,12 @@ impl Builder<'_> {
         let kept = match self.kept.by_key.get(&key) {
             Some(kept) => *kept,
             None => {
-                let mut made = self.materials.make(&shape.material, &mut self.log)?;
+                let mut made = self.materials.make(&shape.material)?;
                 if let Some(medium) = &shape.interior {
                     let kind = made.as_mut().map(|made| &mut made.kind);
-                    self.materials.fill(kind, medium, &shape.entity.place, &mut self.log)?;
+                    self.materials.fill(kind, medium, &shape.entity.place)?;
                 }
-                let opacity =
-                    self.materials.textures.number(&shape.entity, "alpha", &mut self.log)?;
+                let opacity = self.materials.textures.number(&shape.entity, "alpha")?;
                 let kept = made.map(|mut material| {
                     if let Some(opacity) = opacity {
                         set_opacity(&mut material.surface, opacity);
@@ -270,7 +273,7 @@ impl Builder<'_> {
             }
         };
         if let (None, Some(entity)) = (kept, &shape.light) {
-            self.log.ignore(features::PBRT_INTERFACE_LIGHT, &entity.place);
+            self.materials.textures.log.ignore(features::PBRT_INTERFACE_LIGHT, &entity.place);
         }
         Ok(kept)
     }
@@ -337,7 +340,7 @@ impl Builder<'_> {
     fn place(&mut self, mesh: &Mesh, material: u32, shape: &Shape, outer: DMat4) -> Result<()> {
         let placed = self.view.mirror * outer * shape.world_from_shape;
         let Some(transform) = Transform::from_matrix(placed) else {
-            self.log.ignore(features::PBRT_FLAT, &shape.entity.place);
+            self.materials.textures.log.ignore(features::PBRT_FLAT, &shape.entity.place);
             return Ok(());
         };
         self.check_counts(mesh, 1, shape)?;

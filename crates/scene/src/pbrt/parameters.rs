@@ -35,35 +35,26 @@ pub(super) enum Kind {
 }
 
 impl Kind {
+    /// Names, the one for messages first.
+    const NAMES: [(Self, &[&str]); 10] = [
+        (Self::Boolean, &["bool"]),
+        (Self::Integer, &["integer"]),
+        (Self::Float, &["float"]),
+        (Self::Pair, &["point2", "vector2"]),
+        (Self::Triple, &["point3", "vector3", "normal", "normal3", "point", "vector"]),
+        (Self::Rgb, &["rgb"]),
+        (Self::Spectrum, &["spectrum"]),
+        (Self::Blackbody, &["blackbody"]),
+        (Self::Text, &["string"]),
+        (Self::Texture, &["texture"]),
+    ];
+
     fn from_name(name: &str) -> Option<Self> {
-        Some(match name {
-            "bool" => Self::Boolean,
-            "integer" => Self::Integer,
-            "float" => Self::Float,
-            "point2" | "vector2" => Self::Pair,
-            "point3" | "vector3" | "normal" | "normal3" | "point" | "vector" => Self::Triple,
-            "rgb" => Self::Rgb,
-            "spectrum" => Self::Spectrum,
-            "blackbody" => Self::Blackbody,
-            "string" => Self::Text,
-            "texture" => Self::Texture,
-            _ => return None,
-        })
+        Self::NAMES.iter().find(|(_, names)| names.contains(&name)).map(|(kind, _)| *kind)
     }
 
     fn name(self) -> &'static str {
-        match self {
-            Self::Boolean => "bool",
-            Self::Integer => "integer",
-            Self::Float => "float",
-            Self::Pair => "point2",
-            Self::Triple => "point3",
-            Self::Rgb => "rgb",
-            Self::Spectrum => "spectrum",
-            Self::Blackbody => "blackbody",
-            Self::Text => "string",
-            Self::Texture => "texture",
-        }
+        Self::NAMES[self as usize].1[0]
     }
 
     /// Numbers that belong together.

@@ -64,6 +64,8 @@ struct Decoding {
 pub(super) struct Textures<'a> {
     description: &'a Description,
     folder: &'a Folder,
+    /// Report of all that reads materials and lights.
+    pub log: Log<'a>,
     images: HashMap<(PathBuf, String), Arc<Texture>>,
     /// Values of named textures, those of numbers apart.
     values: HashMap<(bool, String), Value>,
@@ -71,8 +73,8 @@ pub(super) struct Textures<'a> {
 
 impl<'a> Textures<'a> {
     /// Takes the textures of `description`; paths are relative to `folder`.
-    pub(super) fn new(description: &'a Description, folder: &'a Folder) -> Self {
-        Self { description, folder, images: HashMap::new(), values: HashMap::new() }
+    pub(super) fn new(description: &'a Description, folder: &'a Folder, log: Log<'a>) -> Self {
+        Self { description, folder, log, images: HashMap::new(), values: HashMap::new() }
     }
 
     /// Folder to which paths are relative.
@@ -84,26 +86,16 @@ impl<'a> Textures<'a> {
     ///
     /// # Errors
     /// With the place for unknown names, other types and images that cannot be read.
-    pub(super) fn spectrum(
-        &mut self,
-        entity: &Entity,
-        name: &str,
-        log: &mut Log,
-    ) -> Result<Option<Value>> {
-        self.value(entity, name, false, 0, log)
+    pub(super) fn spectrum(&mut self, entity: &Entity, name: &str) -> Result<Option<Value>> {
+        self.value(entity, name, false, 0)
     }
 
     /// Number of a parameter, constant or textured, if it is given.
     ///
     /// # Errors
     /// As [`Textures::spectrum`].
-    pub(super) fn number(
-        &mut self,
-        entity: &Entity,
-        name: &str,
-        log: &mut Log,
-    ) -> Result<Option<Value>> {
-        self.value(entity, name, true, 0, log)
+    pub(super) fn number(&mut self, entity: &Entity, name: &str) -> Result<Option<Value>> {
+        self.value(entity, name, true, 0)
     }
 
     fn value(
@@ -112,7 +104,6 @@ impl<'a> Textures<'a> {
         name: &str,
         is_number: bool,
         depth: usize,
-        log: &mut Log,
     ) -> Result<Option<Value>> {
         let kinds: &[Kind] = if is_number {
             &[Kind::Float, Kind::Integer, Kind::Texture]
@@ -121,22 +112,16 @@ impl<'a> Textures<'a> {
         };
         let Some(parameter) = entity.find_of(name, kinds)? else { return Ok(None) };
         Ok(Some(match parameter.kind {
-            Kind::Texture => self.named(parameter, is_number, depth, log)?,
+            Kind::Texture => self.named(parameter, is_number, depth)?,
             Kind::Float | Kind::Integer => {
                 Value::number(parameter.numbers().first().copied().unwrap_or(0.0))
             }
-            _ => Value::Constant(spectra::reflectance(parameter, self.folder, log)?),
+            _ => Value::Constant(spectra::reflectance(parameter, self.folder, &mut self.log)?),
         }))
     }
 
     /// Texture that a parameter names.
-    fn named(
-        &mut self,
-        parameter: &Parameter,
-        is_number: bool,
-        depth: usize,
-        log: &mut Log,
-    ) -> Result<Value> {
+    fn named(&mut self, parameter: &Parameter, is_number: bool, depth: usize) -> Result<Value> {
         let name = parameter.text();
         let textures = if is_number {
             &self.description.float_textures
@@ -156,51 +141,45 @@ impl<'a> Textures<'a> {
         if let Some(value) = self.values.get(&key) {
             return Ok(value.clone());
         }
-        let value = self.texture(entity, is_number, depth + 1, log)?;
-        log.unused(entity);
+        let value = self.texture(entity, is_number, depth + 1)?;
+        self.log.unused(entity);
         self.values.insert(key, value.clone());
         Ok(value)
     }
 
-    fn texture(
-        &mut self,
-        entity: &Entity,
-        is_number: bool,
-        depth: usize,
-        log: &mut Log,
-    ) -> Result<Value> {
-        let of = |this: &mut Self, name: &str, otherwise: f64, log: &mut Log| {
-            let value = this.value(entity, name, is_number, depth, log)?;
+    fn texture(&mut self, entity: &Entity, is_number: bool, depth: usize) -> Result<Value> {
+        let of = |this: &mut Self, name: &str, otherwise: f64| {
+            let value = this.value(entity, name, is_number, depth)?;
             Ok(value.unwrap_or(Value::number(otherwise)))
         };
         match entity.name.as_str() {
-            "imagemap" => self.image(entity, is_number, log),
-            "constant" => of(self, "value", 1.0, log),
+            "imagemap" => self.image(entity, is_number),
+            "constant" => of(self, "value", 1.0),
             "scale" => {
-                let texture = of(self, "tex", 1.0, log)?;
-                let scale = self.value(entity, "scale", true, depth, log)?;
+                let texture = of(self, "tex", 1.0)?;
+                let scale = self.value(entity, "scale", true, depth)?;
                 Ok(match (texture, scale.unwrap_or(Value::number(1.0))) {
                     (Value::Constant(factor), other) | (other, Value::Constant(factor)) => {
                         other.affine(factor, Vec3::ZERO)
                     }
                     (first, _) => {
-                        log.ignore(features::PBRT_TEXTURE_PRODUCT, &entity.place);
+                        self.log.ignore(features::PBRT_TEXTURE_PRODUCT, &entity.place);
                         first
                     }
                 })
             }
             "mix" | "directionmix" => {
-                let (first, second) = (of(self, "tex1", 0.0, log)?, of(self, "tex2", 1.0, log)?);
-                let amount = match self.value(entity, "amount", true, depth, log)? {
+                let (first, second) = (of(self, "tex1", 0.0)?, of(self, "tex2", 1.0)?);
+                let amount = match self.value(entity, "amount", true, depth)? {
                     Some(Value::Constant(amount)) => amount.x,
                     Some(Value::Image(_)) => {
-                        log.ignore(features::PBRT_TEXTURE_MIX, &entity.place);
+                        self.log.ignore(features::PBRT_TEXTURE_MIX, &entity.place);
                         0.5
                     }
                     None => 0.5,
                 };
                 if entity.name == "directionmix" {
-                    log.ignore_named(features::PBRT_TEXTURE, "directionmix", &entity.place);
+                    self.log.ignore_named(features::PBRT_TEXTURE, "directionmix", &entity.place);
                 }
                 Ok(match (first, second) {
                     (Value::Constant(constant), image) => {
@@ -210,40 +189,44 @@ impl<'a> Textures<'a> {
                         image.affine(Vec3::splat(1.0 - amount), constant * amount)
                     }
                     (first, second) => {
-                        log.ignore(features::PBRT_TEXTURE_MIX, &entity.place);
+                        self.log.ignore(features::PBRT_TEXTURE_MIX, &entity.place);
                         if amount <= 0.5 { first } else { second }
                     }
                 })
             }
             "checkerboard" => {
-                let (first, second) = (of(self, "tex1", 1.0, log)?, of(self, "tex2", 0.0, log)?);
+                let (first, second) = (of(self, "tex1", 1.0)?, of(self, "tex2", 0.0)?);
                 let is_flat = entity.number("dimension", 2.0)? == 2.0;
                 match (first, second) {
                     (Value::Constant(first), Value::Constant(second)) if is_flat => {
-                        let mapping = mapping(entity, log)?;
+                        let mapping = mapping(entity, &mut self.log)?;
                         Ok(Value::Image(checkerboard(first, second, mapping)))
                     }
                     (first, _) => {
-                        log.ignore_named(features::PBRT_TEXTURE, "checkerboard", &entity.place);
+                        self.log.ignore_named(
+                            features::PBRT_TEXTURE,
+                            "checkerboard",
+                            &entity.place,
+                        );
                         Ok(first)
                     }
                 }
             }
             "bilerp" | "dots" | "fbm" | "marble" | "windy" | "wrinkled" | "ptex" => {
-                log.ignore_named(features::PBRT_TEXTURE, &entity.name, &entity.place);
+                self.log.ignore_named(features::PBRT_TEXTURE, &entity.name, &entity.place);
                 Ok(Value::number(0.5))
             }
             _ => Err(entity.error("expected a kind of texture that pbrt-v4 has")),
         }
     }
 
-    fn image(&mut self, entity: &Entity, is_number: bool, log: &mut Log) -> Result<Value> {
+    fn image(&mut self, entity: &Entity, is_number: bool) -> Result<Value> {
         let Some(file) = entity.string("filename")? else {
             return Err(entity.error("expected a `filename`"));
         };
         let decoding = decoding(entity)?;
-        let texture = self.load(entity, file, &decoding, log)?;
-        let ([du, u], [dv, v]) = mapping(entity, log)?;
+        let texture = self.load(entity, file, &decoding)?;
+        let ([du, u], [dv, v]) = mapping(entity, &mut self.log)?;
         let mut image = TextureUse {
             // v points up in pbrt, down in images.
             image_from_uv: [[u, 0.0, du], [0.0, -v, 1.0 - dv]],
@@ -261,7 +244,7 @@ impl<'a> Textures<'a> {
             "clamp" => Wrap::Clamp,
             other @ ("black" | "octahedralsphere") => {
                 let name = format!("wrap `{other}` of a texture");
-                log.ignore_named(features::PBRT_TEXTURE_WRAP, &name, &entity.place);
+                self.log.ignore_named(features::PBRT_TEXTURE_WRAP, &name, &entity.place);
                 Wrap::Clamp
             }
             other => return Err(entity.error(format!("unknown wrap mode `{other}`"))),
@@ -280,19 +263,13 @@ impl<'a> Textures<'a> {
     }
 
     /// Reads an image file once for each way of decoding it.
-    fn load(
-        &mut self,
-        entity: &Entity,
-        file: &str,
-        decoding: &Decoding,
-        log: &mut Log,
-    ) -> Result<Arc<Texture>> {
+    fn load(&mut self, entity: &Entity, file: &str, decoding: &Decoding) -> Result<Arc<Texture>> {
         let path = self.folder.file(file).map_err(|message| entity.error(message))?;
         let key = (path.clone(), format!("{:?}", decoding.gamma));
         if let Some(texture) = self.images.get(&key) {
             return Ok(Arc::clone(texture));
         }
-        let loaded = Texture::load(&path, &mut log.warnings);
+        let loaded = Texture::load(&path, &mut self.log.warnings);
         let mut texture = loaded.map_err(|error| entity.error(error.to_string()))?;
         if let (Some(gamma), Texels::Bytes(_) | Texels::Shorts(_)) =
             (decoding.gamma, &texture.texels)
@@ -305,7 +282,7 @@ impl<'a> Textures<'a> {
             texture.texels = Texels::Halves(texels.collect());
         }
         let texture = Arc::new(texture);
-        log.inputs.push(path);
+        self.log.inputs.push(path);
         self.images.insert(key, Arc::clone(&texture));
         Ok(texture)
     }
@@ -314,14 +291,10 @@ impl<'a> Textures<'a> {
     ///
     /// # Errors
     /// With the place for an image that cannot be read.
-    pub(super) fn normal_map(
-        &mut self,
-        entity: &Entity,
-        log: &mut Log,
-    ) -> Result<Option<TextureUse>> {
+    pub(super) fn normal_map(&mut self, entity: &Entity) -> Result<Option<TextureUse>> {
         let Some(file) = entity.string("normalmap")? else { return Ok(None) };
         let decoding = Decoding { encoding: Encoding::Linear, gamma: None };
-        let texture = self.load(entity, file, &decoding, log)?;
+        let texture = self.load(entity, file, &decoding)?;
         let encoding = Encoding::Linear;
         Ok(Some(TextureUse { encoding, ..TextureUse::from_lower_left(texture) }))
     }
@@ -330,14 +303,10 @@ impl<'a> Textures<'a> {
     ///
     /// # Errors
     /// With the place for an image that cannot be read.
-    pub(super) fn light_image(
-        &mut self,
-        entity: &Entity,
-        log: &mut Log,
-    ) -> Result<Option<TextureUse>> {
+    pub(super) fn light_image(&mut self, entity: &Entity) -> Result<Option<TextureUse>> {
         let Some(file) = entity.string("filename")? else { return Ok(None) };
         let decoding = Decoding { encoding: Encoding::Srgb, gamma: None };
-        let texture = self.load(entity, file, &decoding, log)?;
+        let texture = self.load(entity, file, &decoding)?;
         let wrap = [Wrap::Clamp; 2];
         Ok(Some(TextureUse { wrap, ..TextureUse::from_lower_left(texture) }))
     }
