@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use fenestra::{
     brdf::{MaterialTables, evaluate, fresnel, ggx},
-    scene::material::MaterialKind,
+    scene::material::{MaterialKind, Principled},
     shader::structs,
 };
 use glam::{DVec3, Vec3, vec3};
@@ -103,7 +103,7 @@ fn sampled_albedo(material: usize, outgoing: Vec3, count: u32) -> (DVec3, DVec3)
 /// there the base comes on top.
 fn largest_albedo(material: usize) -> f64 {
     match cases()[material].material.kind {
-        MaterialKind::Principled { base_color, metallic, .. } => {
+        MaterialKind::Principled(Principled { base_color, metallic, .. }) => {
             f64::from(1.0 + (1.0 - metallic) * base_color.max_element())
         }
         _ => 1.0,
@@ -163,14 +163,14 @@ fn smooth_white_conductor_loses_nothing() {
 /// Sums the light that a principled material reflects by the formulas of glTF 2.0, appendix B, and of
 /// its extensions for index and specular, written out for one pair of directions.
 fn principled_by_the_book(material: &MaterialKind, view: DVec3, light: DVec3) -> DVec3 {
-    let &MaterialKind::Principled {
+    let &MaterialKind::Principled(Principled {
         base_color,
         metallic,
         roughness,
         ior,
         specular,
         specular_color,
-    } = material
+    }) = material
     else {
         panic!("not principled")
     };
@@ -199,7 +199,7 @@ fn principled_materials_follow_the_specification() {
     let mut seen = 0;
     for (material, case) in cases().iter().enumerate() {
         // The formulas of the specification cancel for the narrowest lobes.
-        if matches!(case.material.kind, MaterialKind::Principled { roughness, .. } if roughness > 0.1)
+        if matches!(case.material.kind, MaterialKind::Principled(Principled { roughness, .. }) if roughness > 0.1)
         {
             seen += 1;
             for index in 0..2_000 {
@@ -230,7 +230,7 @@ fn albedo_follows_the_colour_of_the_hit() {
         let is_replaced = match case.material.kind {
             MaterialKind::Diffuse { .. } | MaterialKind::Plastic { .. } => true,
             MaterialKind::Conductor { .. } => textured.ior == 0.0,
-            MaterialKind::Principled { .. } => {
+            MaterialKind::Principled(_) => {
                 textured.alpha = 0.5;
                 textured.ior = 0.7;
                 true

@@ -14,7 +14,7 @@ use fenestra::{
     math::frame::direction_from_lat_long,
     scene::{
         EnvironmentMap,
-        material::{ConductorFresnel, Material, MaterialKind},
+        material::{ConductorFresnel, Material, MaterialKind, Principled},
         measured::MeasuredTable,
     },
     srbf::{Lobe, lobe_value},
@@ -341,14 +341,9 @@ fn analytic_materials_fit_and_interpolate() {
     let plastic =
         material(MaterialKind::Plastic { diffuse: Vec3::splat(0.5), alpha: 0.1, ior: 1.5 });
     let principled = |metallic, roughness| {
-        material(MaterialKind::Principled {
-            base_color: Vec3::splat(0.5),
-            metallic,
-            roughness,
-            ior: 1.5,
-            specular: 1.0,
-            specular_color: Vec3::ONE,
-        })
+        let base_color = Vec3::splat(0.5);
+        let own = Principled { base_color, metallic, roughness, ..Principled::default() };
+        material(MaterialKind::Principled(own))
     };
     for (name, tables) in [
         ("diffuse", diffuse),

@@ -66,24 +66,17 @@ impl MaterialTables {
                         }
                     }
                 }
-                MaterialKind::Principled {
-                    base_color,
-                    metallic,
-                    roughness,
-                    ior,
-                    specular,
-                    specular_color,
-                } => {
-                    let ratio = (ior - 1.0) / (ior + 1.0);
+                MaterialKind::Principled(own) => {
+                    let ratio = (own.ior - 1.0) / (own.ior + 1.0);
                     converted.kind = MATERIAL_PRINCIPLED;
-                    converted.reflectance = base_color.to_array();
-                    converted.alpha = (roughness * roughness).max(SMALLEST_ALPHA);
-                    converted.ior = *metallic;
-                    converted.eta = (*specular_color * ratio * ratio)
+                    converted.reflectance = own.base_color.to_array();
+                    converted.alpha = (own.roughness * own.roughness).max(SMALLEST_ALPHA);
+                    converted.ior = own.metallic;
+                    converted.eta = (own.specular_color * ratio * ratio)
                         .min(Vec3::ONE)
-                        .map(|reflectance| reflectance * specular)
+                        .map(|reflectance| reflectance * own.specular)
                         .to_array();
-                    converted.k = [*specular; 3];
+                    converted.k = [own.specular; 3];
                     converted.table_offset = ggx_table(&mut tables.words, &mut ggx_offset);
                 }
                 MaterialKind::Mirror { reflectance } => {

@@ -11,7 +11,7 @@ use fenestra::{
     brdf::{self, MaterialTables},
     math::random::hash_4d,
     scene::{
-        material::{ConductorFresnel, Material, MaterialKind},
+        material::{ConductorFresnel, Material, MaterialKind, Principled},
         measured::MeasuredTable,
     },
     shader::structs,
@@ -34,14 +34,8 @@ fn plastic(diffuse: Vec3, alpha: f32, ior: f32) -> MaterialKind {
 
 /// Makes a principled material of index 1.5 without a tint of the specular part.
 pub fn principled(base_color: Vec3, metallic: f32, roughness: f32) -> MaterialKind {
-    MaterialKind::Principled {
-        base_color,
-        metallic,
-        roughness,
-        ior: 1.5,
-        specular: 1.0,
-        specular_color: Vec3::ONE,
-    }
+    let own = Principled { base_color, metallic, roughness, ..Principled::default() };
+    MaterialKind::Principled(own)
 }
 
 /// Gold near 600, 550 and 450 nm.
@@ -100,14 +94,14 @@ pub fn cases() -> &'static [Case] {
             case(
                 "principled with specular",
                 0.2,
-                MaterialKind::Principled {
+                MaterialKind::Principled(Principled {
                     base_color: vec3(0.2, 0.5, 0.3),
                     metallic: 0.2,
                     roughness: 0.2_f32.sqrt(),
                     ior: 1.8,
                     specular: 0.6,
                     specular_color: vec3(1.0, 2.0, 20.0),
-                },
+                }),
             ),
         ]
     })

@@ -168,9 +168,9 @@ impl MaterialKind {
                 ("conductor", number, vec![vec![*alpha], colors])
             }
             Self::Measured { .. } => ("measured", 4, Vec::new()),
-            Self::Principled { base_color, metallic, roughness, ior, specular, specular_color } => {
-                let numbers = vec![*metallic, *roughness, *ior, *specular];
-                ("principled", 5, vec![colors(&[base_color, specular_color]), numbers])
+            Self::Principled(own) => {
+                let numbers = vec![own.metallic, own.roughness, own.ior, own.specular];
+                ("principled", 5, vec![colors(&[&own.base_color, &own.specular_color]), numbers])
             }
             Self::Mirror { reflectance } => ("mirror", 6, vec![colors(&[reflectance])]),
             Self::Dielectric { ior, alpha, reflectance, transmittance, absorption } => {
@@ -200,10 +200,10 @@ impl MaterialKind {
                     *reflectance = (*reflectance * color).clamp(Vec3::ZERO, Vec3::ONE);
                 }
             }
-            Self::Principled { base_color, metallic, roughness, .. } => {
-                *base_color = (*base_color * color).clamp(Vec3::ZERO, Vec3::ONE);
-                *metallic = (*metallic * metal).clamp(0.0, 1.0);
-                *roughness = (*roughness * rough).clamp(0.0, 1.0);
+            Self::Principled(own) => {
+                own.base_color = (own.base_color * color).clamp(Vec3::ZERO, Vec3::ONE);
+                own.metallic = (own.metallic * metal).clamp(0.0, 1.0);
+                own.roughness = (own.roughness * rough).clamp(0.0, 1.0);
             }
             Self::Dielectric { .. } | Self::ThinDielectric { .. } | Self::Measured { .. } => {}
         }
@@ -231,9 +231,34 @@ impl MaterialKind {
             Self::Diffuse { .. }
             | Self::Plastic { .. }
             | Self::Conductor { .. }
-            | Self::Principled { .. }
+            | Self::Principled(_)
             | Self::Measured { .. } => false,
         }
+    }
+}
+
+/// Metallic-roughness material of glTF 2.0, appendix B, with `KHR_materials_ior` and
+/// `KHR_materials_specular`; by default the white metal that glTF takes where a file states nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Principled {
+    /// Albedo of the dielectric's base, and reflectance of the metal at normal incidence, 0…1.
+    pub base_color: Vec3,
+    /// Share of metal, 0…1.
+    pub metallic: f32,
+    /// Roughness √α, 0…1.
+    pub roughness: f32,
+    /// Refractive index of the dielectric.
+    pub ior: f32,
+    /// Factor of the dielectric's specular reflection, 0…1.
+    pub specular: f32,
+    /// Factor of the dielectric's reflectance at normal incidence.
+    pub specular_color: Vec3,
+}
+
+impl Default for Principled {
+    fn default() -> Self {
+        let (base_color, specular_color) = (Vec3::ONE, Vec3::ONE);
+        Self { base_color, metallic: 1.0, roughness: 1.0, ior: 1.5, specular: 1.0, specular_color }
     }
 }
 
@@ -261,22 +286,8 @@ pub enum MaterialKind {
         /// Fresnel term.
         fresnel: ConductorFresnel,
     },
-    /// Metallic-roughness material of glTF 2.0, appendix B, with `KHR_materials_ior` and
-    /// `KHR_materials_specular`.
-    Principled {
-        /// Albedo of the dielectric's base, and reflectance of the metal at normal incidence, 0…1.
-        base_color: Vec3,
-        /// Share of metal, 0…1.
-        metallic: f32,
-        /// Roughness √α, 0…1.
-        roughness: f32,
-        /// Refractive index of the dielectric.
-        ior: f32,
-        /// Factor of the dielectric's specular reflection, 0…1.
-        specular: f32,
-        /// Factor of the dielectric's reflectance at normal incidence.
-        specular_color: Vec3,
-    },
+    /// Metallic-roughness material.
+    Principled(Principled),
     /// Perfect mirror.
     Mirror {
         /// Reflectance in all directions, 0…1.

@@ -5,7 +5,7 @@
 use fenestra_scene::{
     Scene,
     lamp::{LampKind, SpotFalloff},
-    material::{Material, MaterialKind},
+    material::{Material, MaterialKind, Principled},
     mesh::Mesh,
     texture::{Channels, Encoding, Interpolation, TextureUse, Wrap},
 };
@@ -63,8 +63,14 @@ fn metallic_roughness_materials_come_with_all_their_textures() {
                 {"specularFactor": 0.5, "specularColorFactor": [2, 1, 1]}}}"#;
     let (found, warnings) = gltf_material(&folder, material, &rest);
     assert_eq!(warnings, [""; 0]);
-    let MaterialKind::Principled { base_color, metallic, roughness, ior, specular, specular_color } =
-        found.kind
+    let MaterialKind::Principled(Principled {
+        base_color,
+        metallic,
+        roughness,
+        ior,
+        specular,
+        specular_color,
+    }) = found.kind
     else {
         panic!("{found:?}")
     };
@@ -96,7 +102,10 @@ fn metallic_roughness_materials_come_with_all_their_textures() {
     let (found, _) = gltf_material(&folder, &material.replace("MASK", "BLEND"), &rest);
     assert_eq!((found.surface.opacity.factor, found.surface.opacity.cutoff), (0.9, None));
     let (found, _) = gltf_material(&folder, "{}", "");
-    assert!(matches!(found.kind, MaterialKind::Principled { metallic: 1.0, roughness: 1.0, .. }));
+    assert!(matches!(
+        found.kind,
+        MaterialKind::Principled(Principled { metallic: 1.0, roughness: 1.0, .. })
+    ));
     assert!(found.surface.emission.is_none());
     let one_sided = r#"{"emissiveFactor": [1, 1, 1]}"#;
     assert!(!gltf_material(&folder, one_sided, "").0.surface.emission.unwrap().two_sided);
@@ -133,7 +142,7 @@ fn glass_unlit_and_specular_glossiness_materials_are_mapped() {
     assert!(absorption.z > 40.0 && absorption.is_finite(), "{absorption}");
     // A metal transmits nothing, and little transmission stays opaque.
     let (found, warnings) = with(glass, r#""metallicFactor": 1"#);
-    assert!(matches!(found.kind, MaterialKind::Principled { .. }) && warnings.is_empty());
+    assert!(matches!(found.kind, MaterialKind::Principled(_)) && warnings.is_empty());
     // Its share of metal may come from an image.
     let inline = base64(&png([[0, 0, 64, 255]; 2]));
     let images = format!(
@@ -146,7 +155,7 @@ fn glass_unlit_and_specular_glossiness_materials_are_mapped() {
     let (found, _) = gltf_material(&folder, &material, &images);
     assert!(matches!(found.kind, MaterialKind::ThinDielectric { .. }), "{found:?}");
     let (found, warnings) = with(&glass.replace("Factor\": 1", "Factor\": 0.4"), smooth);
-    assert!(matches!(found.kind, MaterialKind::Principled { .. }) && warnings.len() == 1);
+    assert!(matches!(found.kind, MaterialKind::Principled(_)) && warnings.len() == 1);
 
     let unlit = r#""KHR_materials_unlit": {}"#;
     let (found, warnings) = with(unlit, r#""baseColorFactor": [0.2, 0.4, 0.6, 1]"#);
@@ -158,8 +167,14 @@ fn glass_unlit_and_specular_glossiness_materials_are_mapped() {
         "specularFactor": [0.04, 0.08, 0.02], "glossinessFactor": 0.75}"#;
     let (found, warnings) = with(gloss, "");
     assert!(warnings.is_empty(), "{warnings:?}");
-    let MaterialKind::Principled { base_color, metallic, roughness, ior, specular_color, .. } =
-        found.kind
+    let MaterialKind::Principled(Principled {
+        base_color,
+        metallic,
+        roughness,
+        ior,
+        specular_color,
+        ..
+    }) = found.kind
     else {
         panic!("{found:?}")
     };
@@ -167,7 +182,9 @@ fn glass_unlit_and_specular_glossiness_materials_are_mapped() {
     assert_eq!((metallic, roughness, ior), (0.0, 0.25, 1.5));
     // No dielectric reflects half the light: a metal with a little diffuse light.
     let (found, _) = with(&gloss.replace("[0.04, 0.08, 0.02]", "[0.5, 0.5, 0.5]"), "");
-    let MaterialKind::Principled { base_color, metallic, specular_color, .. } = found.kind else {
+    let MaterialKind::Principled(Principled { base_color, metallic, specular_color, .. }) =
+        found.kind
+    else {
         panic!("{found:?}")
     };
     assert!(metallic > 0.5 && specular_color == Vec3::ONE, "{metallic}");
@@ -294,7 +311,7 @@ fn transmission_by_texture_is_glass_where_it_says_so() {
         &scene.materials[scene.geometry.materials[at] as usize]
     };
     assert!(matches!(of(0.0).kind, MaterialKind::ThinDielectric { .. }), "{:?}", of(0.0));
-    assert!(matches!(of(2.0).kind, MaterialKind::Principled { .. }), "{:?}", of(2.0));
+    assert!(matches!(of(2.0).kind, MaterialKind::Principled(_)), "{:?}", of(2.0));
     assert_eq!((of(0.0).name.as_str(), of(2.0).name.as_str()), ("lamp, glass", "lamp"));
     let is_named = |text: &&String| text.contains("glass or opaque by its mean there");
     assert_eq!(scene.warnings.iter().filter(is_named).count(), 1, "{:?}", scene.warnings);
@@ -522,7 +539,9 @@ fn mtl_materials_become_surfaces() {
         assert!(matches!(kind(keys), MaterialKind::Plastic { .. }), "{keys}");
     }
     let (found, _) = mtl_material(&folder, "Kd 0.5\nPr 0.3\nmap_Pm grey.png\nKs 1\nKe 2 1 0");
-    let MaterialKind::Principled { metallic, roughness, .. } = found.kind else { panic!() };
+    let MaterialKind::Principled(Principled { metallic, roughness, .. }) = found.kind else {
+        panic!()
+    };
     assert_eq!((metallic, roughness), (1.0, 0.3));
     assert_eq!(found.surface.metallic.unwrap().encoding, Encoding::Linear);
     let emission = found.surface.emission.unwrap();
@@ -619,6 +638,6 @@ fn objects_of_a_scene_take_whole_materials_of_their_mesh() {
     let scene = Scene::load(&folder.write("b.toml", own)).unwrap();
     let found = scene.materials.last().unwrap();
     assert_eq!(found.name, "mesh/brass");
-    assert!(matches!(found.kind, MaterialKind::Principled { metallic: 1.0, .. }));
+    assert!(matches!(found.kind, MaterialKind::Principled(Principled { metallic: 1.0, .. })));
     assert_eq!(found.surface.emission.as_ref().unwrap().radiance, Vec3::X);
 }

@@ -9,7 +9,7 @@ use fenestra_scene::{
     export::{Settings, mitsuba::export},
     lamp::{LampKind, SpotFalloff},
     load::LoadOptions,
-    material::{ConductorFresnel, Material, MaterialKind},
+    material::{ConductorFresnel, Material, MaterialKind, Principled},
     texture::{Encoding, Interpolation, Wrap},
 };
 use glam::Vec3;
@@ -318,7 +318,9 @@ fn models_become_materials() {
         <bsdf type="lambertian"><rgb name="reflectance" value="0.4"/></bsdf>
         <bsdf type="mirror"/></bsdf>"#,
     );
-    let MaterialKind::Principled { base_color, metallic, .. } = mixed.kind else { panic!() };
+    let MaterialKind::Principled(Principled { base_color, metallic, .. }) = mixed.kind else {
+        panic!()
+    };
     // Half 0.8, a quarter 0.4, and a quarter of all light.
     let reflected = base_color.x * (1.0 - metallic) * 0.96 + 0.04 * (1.0 - metallic);
     let reflected = reflected + base_color.x * metallic;
@@ -328,7 +330,9 @@ fn models_become_materials() {
         r#"<bsdf type="phong"><float name="exponent" value="50"/>
         <rgb name="specularReflectance" value="0.1"/></bsdf>"#,
     );
-    let MaterialKind::Principled { roughness, specular_color, .. } = phong.kind else { panic!() };
+    let MaterialKind::Principled(Principled { roughness, specular_color, .. }) = phong.kind else {
+        panic!()
+    };
     assert!((roughness.powi(4) - 2.0 / 202.0).abs() < 1e-5, "{roughness}");
     assert!((specular_color.x * 0.04 - 0.1).abs() < 1e-5 && warnings.len() == 1, "{warnings:?}");
     let coated = r#"<bsdf type="coating"><bsdf type="diffuse"/></bsdf>"#;
@@ -348,8 +352,9 @@ fn principled_becomes_the_material_of_gltf() {
         <float name="specular" value="0.5"/><float name="sheen" value="0.5"/>
         <float name="clearcoat" value="0"/><float name="spec_trans" value="0"/></bsdf>"#,
     );
-    let MaterialKind::Principled { base_color, metallic, roughness, ior, specular, .. } =
-        found.kind
+    let MaterialKind::Principled(Principled {
+        base_color, metallic, roughness, ior, specular, ..
+    }) = found.kind
     else {
         panic!()
     };

@@ -11,7 +11,7 @@ use fenestra_scene::{
     Error, Scene,
     lamp::{LampKind, SpotFalloff},
     load::{LoadOptions, arrays::Arrays},
-    material::{ConductorFresnel, MaterialKind},
+    material::{ConductorFresnel, MaterialKind, Principled},
     mesh::Mesh,
     picture::{Image, RgbImage},
     texture::{Channels, Encoding, Interpolation, Wrap},
@@ -495,7 +495,9 @@ fn materials_take_textures_opacity_and_emission() {
     let scene = folder.load(&text).unwrap();
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
     let [_, wood, glass, frosted, pane, silver] = &scene.materials[..] else { unreachable!() };
-    let MaterialKind::Principled { base_color, metallic, roughness, ior, specular, .. } = wood.kind
+    let MaterialKind::Principled(Principled {
+        base_color, metallic, roughness, ior, specular, ..
+    }) = wood.kind
     else {
         unreachable!()
     };
@@ -1107,7 +1109,9 @@ fn gltf_reads_nodes_from_every_kind_of_buffer() {
         assert_eq!(mesh.triangles, [[0, 2, 1]], "{name}: a mirror turns the winding");
         assert_eq!(mesh.normals, [[0.0, 0.0, 1.0]; 3]);
         let kind = &mesh.materials[0].material.kind;
-        let MaterialKind::Principled { base_color, .. } = kind else { panic!("{kind:?}") };
+        let MaterialKind::Principled(Principled { base_color, .. }) = kind else {
+            panic!("{kind:?}")
+        };
         assert_eq!(*base_color, Vec3::new(0.1, 0.6, 0.2));
         assert!(warnings[0].ends_with("ignored points and lines (mesh 0)"), "{warnings:?}");
     }

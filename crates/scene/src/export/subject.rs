@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     coat::normal_reflectance,
-    material::{Material, MaterialKind, Surface},
+    material::{Material, MaterialKind, Principled, Surface},
     math::colour::luminance,
     measured::MeasuredTable,
     texture::{Interpolation, TextureUse},
@@ -73,7 +73,7 @@ impl<'a> Subject<'a> {
     /// Share of metal and roughness of a principled material, by the means of its textures.
     pub(super) fn mean_metal_and_roughness(&self) -> (f32, f32) {
         match self.material.mean_kind() {
-            MaterialKind::Principled { metallic, roughness, .. } => (metallic, roughness),
+            MaterialKind::Principled(own) => (own.metallic, own.roughness),
             _ => (0.0, 1.0),
         }
     }
@@ -146,25 +146,30 @@ fn reflected_share(table: &MeasuredTable) -> Vec3 {
 const LARGEST_ROOT: f32 = 0.6;
 
 /// Reflectance of a principled dielectric at normal incidence.
-fn reflectance_of(ior: f32, specular: f32, specular_color: Vec3) -> f32 {
+fn reflectance_of(&Principled { ior, specular, specular_color, .. }: &Principled) -> f32 {
     luminance((normal_reflectance(ior) * specular_color).min(Vec3::ONE) * specular).max(0.0)
 }
 
+/// Tests for a dielectric that has no strength and colour of its own.
+fn is_plain(principled: &Principled) -> bool {
+    principled.specular == 1.0 && principled.specular_color == Vec3::ONE
+}
+
 /// Refractive index, up to 4, whose reflectance at normal incidence is that of a principled dielectric.
-pub(super) fn index_of(ior: f32, specular: f32, specular_color: Vec3) -> f32 {
-    if specular == 1.0 && specular_color == Vec3::ONE {
-        return ior;
+pub(super) fn index_of(principled: &Principled) -> f32 {
+    if is_plain(principled) {
+        return principled.ior;
     }
-    let root = reflectance_of(ior, specular, specular_color).sqrt().min(LARGEST_ROOT);
+    let root = reflectance_of(principled).sqrt().min(LARGEST_ROOT);
     (1.0 + root) / (1.0 - root)
 }
 
 /// Difference that the index makes; none for a dielectric that has no strength and colour of its own.
-pub(super) fn difference_of_index(ior: f32, specular: f32, specular_color: Vec3) -> Option<String> {
-    if specular == 1.0 && specular_color == Vec3::ONE {
+pub(super) fn difference_of_index(principled: &Principled) -> Option<String> {
+    if is_plain(principled) {
         return None;
     }
-    let reflectance = reflectance_of(ior, specular, specular_color);
+    let reflectance = reflectance_of(principled);
     let most = LARGEST_ROOT * LARGEST_ROOT;
     Some(if reflectance > most {
         format!(

@@ -4,16 +4,15 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use half::f16;
 
 use crate::{
     MIN_ALPHA,
     coat::normal_reflectance,
     gloss::{DIELECTRIC, metallic_roughness},
-    material::{MaterialKind, Surface},
+    material::{MaterialKind, Principled, Surface},
     math::colour::luminance,
     texture::{
-        Channels, Encoding, Texels, Texture, TextureUse,
+        Channels, TextureUse,
         texelwise::{Texelwise, lie_alike},
     },
 };
@@ -47,10 +46,10 @@ pub(crate) fn blend(
     let (reflectance, color) = match (share, &own.color, &other.color) {
         (Share::Constant(share), None, None) => (a.lerp(*b, *share), None),
         (Share::Constant(share), Some(image), None) => {
-            (Vec3::ONE, Some(affine(image, *a * (1.0 - share), *b * *share)))
+            (Vec3::ONE, Some(image.clone().affine(*a * (1.0 - share), *b * *share)))
         }
         (Share::Constant(share), None, Some(image)) => {
-            (Vec3::ONE, Some(affine(image, *b * *share, *a * (1.0 - share))))
+            (Vec3::ONE, Some(image.clone().affine(*b * *share, *a * (1.0 - share))))
         }
         (Share::Constant(share), Some(one), Some(two)) => {
             let (scale, bias) = (Vec3::from(two.scale), Vec3::from(two.bias));
@@ -58,13 +57,11 @@ pub(crate) fn blend(
             if !Arc::ptr_eq(&one.texture, &two.texture) || same != *one {
                 return None;
             }
-            let mixed = affine(one, *a * (1.0 - share), *b * *share * bias);
+            let mixed = one.clone().affine(*a * (1.0 - share), *b * *share * bias);
             let scale = Vec3::from(mixed.scale) + *b * *share * scale;
             (Vec3::ONE, Some(TextureUse { scale: scale.to_array(), ..mixed }))
         }
-        (Share::Image(share), None, None) => {
-            (Vec3::ONE, Some(affine(&numbers(share), *b - *a, *a)))
-        }
+        (Share::Image(share), None, None) => (Vec3::ONE, Some(numbers(share).affine(*b - *a, *a))),
         (Share::Image(_), ..) => return None,
     };
     let surface = Surface { color, ..rest(own) };
@@ -142,14 +139,7 @@ pub(crate) fn blend_lobes(
         let kind = MaterialKind::Diffuse { reflectance: Vec3::ONE };
         return Some((kind, Surface { color, ..rest }));
     }
-    let kind = MaterialKind::Principled {
-        base_color: Vec3::ONE,
-        metallic: 1.0,
-        roughness: 1.0,
-        ior: IOR,
-        specular: 1.0,
-        specular_color: Vec3::ONE,
-    };
+    let kind = MaterialKind::Principled(Principled { ior: IOR, ..Principled::default() });
     let (roughness, metallic) = (Some(images.roughness), Some(images.metallic));
     Some((kind, Surface { color, roughness, metallic, ..rest }))
 }
@@ -202,18 +192,12 @@ impl Lobes {
                 let roughness = MIN_ALPHA.sqrt();
                 Self { diffuse: Vec3::ZERO, specular: *reflectance, roughness }
             }
-            MaterialKind::Principled {
-                base_color,
-                metallic,
-                roughness,
-                ior,
-                specular,
-                specular_color,
-            } => {
-                let coat = (normal_reflectance(*ior) * *specular_color).min(Vec3::ONE) * *specular;
-                let below = (1.0 - metallic) * (1.0 - coat.max_element());
-                let diffuse = *base_color * below;
-                Self { diffuse, specular: coat.lerp(*base_color, *metallic), roughness: *roughness }
+            &MaterialKind::Principled(own) => {
+                let coat = normal_reflectance(own.ior) * own.specular_color;
+                let coat = coat.min(Vec3::ONE) * own.specular;
+                let below = (1.0 - own.metallic) * (1.0 - coat.max_element());
+                let (diffuse, roughness) = (own.base_color * below, own.roughness);
+                Self { diffuse, specular: coat.lerp(own.base_color, own.metallic), roughness }
             }
             MaterialKind::Dielectric { .. }
             | MaterialKind::ThinDielectric { .. }
@@ -252,24 +236,14 @@ impl Lobes {
         // A weak gloss is that of a dielectric with a factor.
         let specular = (self.specular.max_element() / DIELECTRIC).min(1.0);
         let (base_color, metallic) = self.base_color(specular * DIELECTRIC);
-        let (roughness, specular_color) = (self.roughness, Vec3::ONE);
-        MaterialKind::Principled {
+        MaterialKind::Principled(Principled {
             base_color,
             metallic,
-            roughness,
+            roughness: self.roughness,
             ior: IOR,
             specular,
-            specular_color,
-        }
-    }
-}
-
-/// Returns factor · value + shift.
-fn affine(image: &TextureUse, factor: Vec3, shift: Vec3) -> TextureUse {
-    TextureUse {
-        scale: (Vec3::from(image.scale) * factor).to_array(),
-        bias: (Vec3::from(image.bias) * factor + shift).to_array(),
-        ..image.clone()
+            specular_color: Vec3::ONE,
+        })
     }
 }
 
@@ -278,16 +252,8 @@ fn numbers(image: &TextureUse) -> TextureUse {
     if image.channels != Channels::Color {
         return image.clone();
     }
-    let texel = |[r, g, b, _]: [f32; 4]| [f16::from_f32(luminance(Vec3::new(r, g, b))); 4];
-    let texels = Texels::Halves(image.values().into_iter().map(texel).collect());
-    TextureUse {
-        texture: Arc::new(Texture { texels, ..Texture::clone(&image.texture) }),
-        channels: Channels::Red,
-        encoding: Encoding::Linear,
-        scale: [1.0; 3],
-        bias: [0.0; 3],
-        ..image.clone()
-    }
+    let numbers = image.with_texels(|[r, g, b, _]| [luminance(Vec3::new(r, g, b)); 4]);
+    TextureUse { channels: Channels::Red, ..numbers }
 }
 
 #[cfg(test)]
@@ -295,6 +261,7 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
     use super::*;
+    use crate::texture::{Encoding, Texels, Texture};
 
     fn image() -> TextureUse {
         let texels = Texels::Bytes(vec![[255, 0, 0, 255], [0, 255, 0, 255]]);

@@ -15,7 +15,7 @@ use crate::{
         ChannelEntry, ConductorEntry, MaterialEntry, MaterialKeys, MaterialKindEntry, TextureEntry,
         Textured,
     },
-    material::{ConductorFresnel, Emission, Material, MaterialKind, Opacity, Surface},
+    material::{ConductorFresnel, Emission, Material, MaterialKind, Opacity, Principled, Surface},
     measured::MeasuredTable,
     texture::{Channels, Encoding, Texture, TextureCache, TextureUse},
     transform::sine_cosine_deg,
@@ -178,14 +178,14 @@ impl Loader<'_> {
                 let (roughness, texture) =
                     self.number(label, "roughness", &entry.roughness, (0.0, 1.0), loaded)?;
                 surface.roughness = texture;
-                MaterialKind::Principled {
+                MaterialKind::Principled(Principled {
                     base_color,
                     metallic,
                     roughness,
                     ior: entry.ior,
                     specular: entry.specular,
                     specular_color: Vec3::from_array(specular_color),
-                }
+                })
             }
             MaterialKindEntry::Dielectric(entry) => {
                 let (ior, absorption) = (entry.ior, entry.absorption);

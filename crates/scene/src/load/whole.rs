@@ -18,7 +18,7 @@ use crate::{
     geometry::{Dropped, DroppedOfMany},
     import::Imported,
     instance::{Budget, Instance, MAX_INSTANCES, bounds},
-    material::{Material, MaterialKind},
+    material::{Material, MaterialKind, Principled},
     mesh::{Mesh, MeshCamera, MeshMaterial, Perspective, RepeatedMesh},
     transform::Transform,
 };
@@ -143,15 +143,7 @@ impl Loader<'_> {
                 }
                 default_material()
             } else {
-                let kind = MaterialKind::Principled {
-                    base_color: Vec3::ONE,
-                    metallic: 1.0,
-                    roughness: 1.0,
-                    ior: 1.5,
-                    specular: 1.0,
-                    specular_color: Vec3::ONE,
-                };
-                Material::new("default", kind)
+                Material::new("default", MaterialKind::Principled(Principled::default()))
             });
         }
         let mut geometry = Geometry::default();

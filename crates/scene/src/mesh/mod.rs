@@ -205,6 +205,12 @@ impl Mesh {
         self.triangles.extend(triangles.iter().map(|triangle| triangle.map(|at| corners[at])));
     }
 
+    /// Turns the mesh inside out.
+    pub(crate) fn reverse(&mut self) {
+        self.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        self.normals.iter_mut().flatten().for_each(|component| *component = -*component);
+    }
+
     /// Parts that the materials in use hold and that are left out.
     pub fn ignored_in_materials(&self) -> Ignored {
         let mut ignored = Ignored::default();

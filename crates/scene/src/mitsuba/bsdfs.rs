@@ -118,17 +118,17 @@ impl Reader<'_> {
                 },
             },
             "diffuse" => {
-                let mut value = self.value(&parameters, "reflectance", Role::Reflectance)?;
-                if value.is_none() {
-                    value = self.value(&parameters, "diffuse_reflectance", Role::Reflectance)?;
-                }
-                let value = value.unwrap_or(Value::Color(Vec3::splat(0.5)));
+                let value = match self.value(&parameters, "reflectance", Role::Reflectance)? {
+                    Some(value) => value,
+                    None => {
+                        self.value_or(&parameters, "diffuse_reflectance", Role::Reflectance, 0.5)?
+                    }
+                };
                 Model::colored(value, |reflectance| MaterialKind::Diffuse { reflectance })
             }
             "difftrans" => {
                 self.ignored.add(features::MI_DIFFUSE_TRANSMISSION, || node.place());
-                let value = self.value(&parameters, "transmittance", Role::Reflectance)?;
-                let value = value.unwrap_or(Value::Color(Vec3::splat(0.5)));
+                let value = self.value_or(&parameters, "transmittance", Role::Reflectance, 0.5)?;
                 Model::colored(value, |reflectance| MaterialKind::Diffuse { reflectance })
             }
             "phong" | "ward" => self.phong(&parameters)?,
@@ -188,8 +188,8 @@ impl Reader<'_> {
 
     fn mask(&mut self, parameters: &Parameters<'_>, depth_left: usize) -> Result<Model> {
         let mut model = self.inner(parameters, depth_left)?;
-        let opacity = self.value(parameters, "opacity", Role::Reflectance)?;
-        self.cut(&mut model, parameters.node, opacity.unwrap_or(Value::Color(Vec3::splat(0.5))));
+        let opacity = self.value_or(parameters, "opacity", Role::Reflectance, 0.5)?;
+        self.cut(&mut model, parameters.node, opacity);
         Ok(model)
     }
 
@@ -296,13 +296,12 @@ impl Reader<'_> {
     fn plastic(&mut self, parameters: &Parameters<'_>, width: Option<Width>) -> Result<Model> {
         let node = parameters.node;
         let ior = self.ior(parameters, "polypropylene")?;
-        let value = self.value(parameters, "diffuse_reflectance", Role::Reflectance)?;
+        let mut value = self.value_or(parameters, "diffuse_reflectance", Role::Reflectance, 0.5)?;
         let specular = self.value(parameters, "specular_reflectance", Role::Reflectance)?;
         if !matches!(specular, None | Some(Value::Color(Vec3::ONE))) {
             self.ignored.add(features::MI_SPECULAR, || node.place());
         }
         let is_nonlinear = parameters.boolean("nonlinear")?.unwrap_or(false);
-        let mut value = value.unwrap_or(Value::Color(Vec3::splat(0.5)));
         if ior > MAX_COAT_IOR {
             let message = format!("int_ior over ext_ior: expected at most 4, found {ior}");
             return Err(node.error(message));
@@ -348,8 +347,7 @@ impl Reader<'_> {
             ),
             _ => return Err(node.error("expected either `material` or both `eta` and `k`")),
         };
-        let value = self.value(parameters, "specular_reflectance", Role::Reflectance)?;
-        let value = value.unwrap_or(Value::Color(Vec3::ONE));
+        let value = self.value_or(parameters, "specular_reflectance", Role::Reflectance, 1.0)?;
         let width = alpha.unwrap_or(MIN_ALPHA);
         let Some((eta, k)) = metal else {
             return Ok(Model::colored(value, |reflectance| match alpha {

@@ -114,10 +114,9 @@ impl Reader<'_> {
             return Err(node.error(message));
         }
         let parameters = Parameters::new(node);
-        let value = self.value(&parameters, "radiance", Role::Light)?;
+        let value = self.value_or(&parameters, "radiance", Role::Light, 1.0)?;
         parameters.without_effect(&["sampling_weight"]);
         parameters.finish(&mut self.ignored);
-        let value = value.unwrap_or(Value::Color(Vec3::ONE));
         if value.is_of_vertices() {
             return Err(node.error("radiance: expected a colour or a bitmap, found vertex colours"));
         }

@@ -17,7 +17,7 @@ use crate::{
     features,
     gloss::DIELECTRIC,
     import::blend::{Share, blend, blend_lobes},
-    material::MaterialKind,
+    material::{MaterialKind, Principled},
     math::colour::luminance,
 };
 
@@ -33,16 +33,13 @@ impl Reader<'_> {
         let [first, second] = parameters.objects("bsdf")?[..] else {
             return Err(node.error("blendbsdf: expected two bsdfs in it"));
         };
-        let weight = self.value(parameters, "weight", Role::Reflectance)?;
-        let weight = weight.unwrap_or(Value::Color(Vec3::splat(0.5)));
+        let weight = self.value_or(parameters, "weight", Role::Reflectance, 0.5)?;
         if second.kind() == "null" {
             let mut model = self.nested(first, depth_left)?;
             let opacity = match weight {
                 Value::Color(weight) | Value::Vertices(weight) => Value::Color(Vec3::ONE - weight),
-                Value::Texture(mut texture) => {
-                    texture.scale = texture.scale.map(|scale| -scale);
-                    texture.bias = texture.bias.map(|bias| 1.0 - bias);
-                    Value::Texture(texture)
+                Value::Texture(texture) => {
+                    Value::Texture(Box::new(texture.affine(Vec3::NEG_ONE, Vec3::ONE)))
                 }
             };
             self.cut(&mut model, node, opacity);
@@ -145,27 +142,22 @@ impl Reader<'_> {
             parameters.without_effect(&["variant"]);
             self.width_of(parameters)?.alpha
         } else {
-            let exponent = self.value(parameters, "exponent", Role::Index)?;
-            let exponent = exponent.map_or(30.0, |value| value.mean().x).max(0.0);
+            let exponent = self.value_or(parameters, "exponent", Role::Index, 30.0)?;
+            let exponent = exponent.mean().x.max(0.0);
             // A cosine power about the mirror direction is one of four times it about the normal.
             (2.0 / (4.0 * exponent + 2.0)).sqrt()
         };
-        let mut color = |name: &str, grey: f32| {
-            let value = self.value(parameters, name, Role::Reflectance)?;
-            Ok(value.unwrap_or(Value::Color(Vec3::splat(grey))))
-        };
-        let diffuse = color("diffuse_reflectance", 0.5)?;
-        let specular = color("specular_reflectance", 0.2)?.mean();
+        let diffuse = self.value_or(parameters, "diffuse_reflectance", Role::Reflectance, 0.5)?;
+        let specular = self.value_or(parameters, "specular_reflectance", Role::Reflectance, 0.2)?;
+        let specular = specular.mean();
         // The coat takes its light from below, which these models do not.
         let base = 1.0 - specular.max_element().min(0.99);
         let diffuse = diffuse.mapped(|share| (share / base).min(1.0));
-        Ok(Model::colored(diffuse, |base_color| MaterialKind::Principled {
-            base_color,
-            metallic: 0.0,
-            roughness: alpha.clamp(MIN_ALPHA, 1.0).sqrt(),
-            ior: 1.5,
-            specular: 1.0,
-            specular_color: specular / DIELECTRIC,
+        let (roughness, metallic) = (alpha.clamp(MIN_ALPHA, 1.0).sqrt(), 0.0);
+        let specular_color = specular / DIELECTRIC;
+        let rest = Principled { metallic, roughness, specular_color, ..Principled::default() };
+        Ok(Model::colored(diffuse, |base_color| {
+            MaterialKind::Principled(Principled { base_color, ..rest })
         }))
     }
 }

@@ -8,7 +8,7 @@ use crate::{
     coat::{normal_reflectance, principled_base_factor},
     error::Result,
     features,
-    material::{MaterialKind, Surface},
+    material::{MaterialKind, Principled, Surface},
 };
 
 /// Parameters without a counterpart, which change nothing at 0.
@@ -18,11 +18,15 @@ const WITHOUT_COUNTERPART: [&str; 5] =
 impl Reader<'_> {
     pub(super) fn principled(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
         let node = parameters.node;
-        let (roughness, metallic) =
-            (self.number(parameters, "roughness", 0.5)?, self.number(parameters, "metallic", 0.0)?);
-        let spec_trans = self.number(parameters, "spec_trans", 0.0)?;
+        let mut number =
+            |name: &str, default: f32| self.value_or(parameters, name, Role::Index, default);
+        let (roughness, metallic) = (number("roughness", 0.5)?, number("metallic", 0.0)?);
+        let spec_trans = number("spec_trans", 0.0)?;
         for name in WITHOUT_COUNTERPART {
-            if !matches!(self.number(parameters, name, 0.0)?, Value::Color(Vec3::ZERO)) {
+            if !matches!(
+                self.value_or(parameters, name, Role::Index, 0.0)?,
+                Value::Color(Vec3::ZERO)
+            ) {
                 let place = || node.place();
                 self.ignored.add_named(features::MI_PRINCIPLED_REST, &format!("`{name}`"), place);
             }
@@ -34,8 +38,7 @@ impl Reader<'_> {
             "main_specular_sampling_rate",
             "clearcoat_sampling_rate",
         ]);
-        let base = self.value(parameters, "base_color", Role::Reflectance)?;
-        let base = base.unwrap_or(Value::Color(Vec3::splat(0.5)));
+        let base = self.value_or(parameters, "base_color", Role::Reflectance, 0.5)?;
         let ior = match (parameters.float_in("eta", (1.0, 4.0))?, parameters.float("specular")?) {
             (Some(eta), _) => eta,
             // Index whose reflectance at normal incidence is 0.08 times `specular`.
@@ -82,14 +85,14 @@ impl Reader<'_> {
         let (roughness, roughness_texture) = roughness.split();
         // An index of 1 has no reflection at all, which the factor says better.
         let (ior, specular) = if ior < 1.01 { (1.5, 0.0) } else { (ior, 1.0) };
-        let kind = MaterialKind::Principled {
+        let kind = MaterialKind::Principled(Principled {
             base_color,
             metallic: metallic.x.clamp(0.0, 1.0),
             roughness: roughness.x.clamp(0.0, 1.0),
             ior,
             specular,
-            specular_color: Vec3::ONE,
-        };
+            ..Principled::default()
+        });
         let surface = Surface {
             color,
             vertex_color,
@@ -99,10 +102,5 @@ impl Reader<'_> {
             ..Surface::default()
         };
         Ok(Model { kind, surface })
-    }
-
-    fn number(&mut self, parameters: &Parameters<'_>, name: &str, default: f32) -> Result<Value> {
-        let value = self.value(parameters, name, Role::Index)?;
-        Ok(value.unwrap_or(Value::Color(Vec3::splat(default))))
     }
 }

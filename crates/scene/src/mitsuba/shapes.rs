@@ -64,7 +64,7 @@ impl Shape {
         }
         let mut mesh = self.mesh.clone();
         if flips {
-            turn_inside_out(&mut mesh);
+            mesh.reverse();
         }
         if mirrors_tangents {
             // Mitsuba's bitangent is the normal × the tangent in the world.
@@ -152,9 +152,7 @@ impl Reader<'_> {
         if self.geometry.instances.len() >= MAX_INSTANCES {
             return Err(node.error(format!("at most {MAX_INSTANCES} instances can be used")));
         }
-        let Some(transform) = Transform::from_matrix(matrix) else {
-            return Err(node.error("to_world: expected a matrix with an inverse"));
-        };
+        let transform = placement(node, matrix)?;
         let key = (node.index, transform.mirrors);
         let prototype = match self.prototypes.get(&key) {
             Some(prototype) => *prototype,
@@ -196,9 +194,7 @@ impl Reader<'_> {
     }
 
     fn append(&mut self, node: Node<'_>, shape: &Shape, matrix: DMat4) -> Result<()> {
-        let Some(transform) = Transform::from_matrix(matrix) else {
-            return Err(node.error("to_world: expected a matrix with an inverse"));
-        };
+        let transform = placement(node, matrix)?;
         let first_vertex = self.geometry.positions.len();
         let vertices = first_vertex + shape.mesh.positions.len();
         let triangles = self.geometry.triangles.len() + shape.mesh.triangles.len();
@@ -291,10 +287,9 @@ impl Reader<'_> {
         let is_obj = kind == "obj";
         let mut mesh = if kind == "serialized" {
             let index = parameters.integer("shape_index")?.unwrap_or(0);
-            let Ok(index) = usize::try_from(index) else {
-                let message = format!("shape_index: expected 0 or more, found {index}");
-                return Err(node.error(message));
-            };
+            let index = usize::try_from(index).map_err(|_| {
+                node.error(format!("shape_index: expected 0 or more, found {index}"))
+            })?;
             let (mesh, own_flat) = serialized::read(&path, index)?;
             is_flat |= own_flat;
             mesh
@@ -361,6 +356,11 @@ impl Reader<'_> {
     }
 }
 
+fn placement(node: Node<'_>, matrix: DMat4) -> Result<Transform> {
+    let message = "to_world: expected a matrix with an inverse";
+    Transform::from_matrix(matrix).ok_or_else(|| node.error(message))
+}
+
 /// Axes whose z leads along `axis` with its length, as Mitsuba chooses the others \[Duff et al. 2017\].
 fn frame_along(axis: DVec3) -> Option<DMat3> {
     let z = axis.try_normalize()?;
@@ -370,11 +370,6 @@ fn frame_along(axis: DVec3) -> Option<DMat3> {
     let x = DVec3::new(1.0 + sign * z.x * z.x * a, sign * b, -sign * z.x);
     let y = DVec3::new(b, sign + z.y * z.y * a, -z.y);
     Some(DMat3::from_cols(x, y, axis))
-}
-
-fn turn_inside_out(mesh: &mut Mesh) {
-    mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-    mesh.normals.iter_mut().flatten().for_each(|component| *component = -*component);
 }
 
 /// Tangents of vertices along u, as the bumps of a normal map need them: the bitangent is the normal ×

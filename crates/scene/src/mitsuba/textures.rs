@@ -80,6 +80,18 @@ impl Reader<'_> {
         }
     }
 
+    /// As [`Reader::value`]; the same number everywhere if it is not there.
+    pub(super) fn value_or(
+        &mut self,
+        parameters: &Parameters<'_>,
+        name: &str,
+        role: Role,
+        otherwise: f32,
+    ) -> Result<Value> {
+        let value = self.value(parameters, name, role)?;
+        Ok(value.unwrap_or(Value::Color(Vec3::splat(otherwise))))
+    }
+
     fn texture(&mut self, node: Node<'_>, scales_left: usize) -> Result<Value> {
         let parameters = Parameters::new(node);
         let value = match node.kind() {
@@ -120,11 +132,7 @@ impl Reader<'_> {
         Ok(match self.texture(inner, scales_left - 1)? {
             Value::Color(color) => Value::Color(color * factor),
             Value::Vertices(color) => Value::Vertices(color * factor),
-            Value::Texture(mut texture) => {
-                texture.scale = (Vec3::from_array(texture.scale) * factor).to_array();
-                texture.bias = (Vec3::from_array(texture.bias) * factor).to_array();
-                Value::Texture(texture)
-            }
+            Value::Texture(texture) => Value::Texture(Box::new(texture.affine(factor, Vec3::ZERO))),
         })
     }
 

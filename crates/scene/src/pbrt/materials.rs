@@ -335,7 +335,7 @@ impl<'a> Materials<'a> {
         self.textures.log.unused(entity);
         let (material, opacity) = match (first, second) {
             (None, None) => return Ok(None),
-            (Some(first), None) => (first, Some(complement(amount))),
+            (Some(first), None) => (first, Some(amount.affine(Vec3::NEG_ONE, Vec3::ONE))),
             (None, Some(second)) => (second, Some(amount)),
             (Some(first), Some(second)) => {
                 let share = match amount {
@@ -365,18 +365,6 @@ impl<'a> Materials<'a> {
             set_opacity(&mut material.surface, opacity);
         }
         Ok(Some(material))
-    }
-}
-
-/// Returns 1 − value.
-fn complement(value: Value) -> Value {
-    match value {
-        Value::Constant(value) => Value::Constant(Vec3::ONE - value),
-        Value::Image(mut image) => {
-            image.scale = image.scale.map(|scale| -scale);
-            image.bias = image.bias.map(|bias| 1.0 - bias);
-            Value::Image(image)
-        }
     }
 }
 

@@ -224,7 +224,7 @@ impl Builder<'_> {
             shapes::give_coordinates(&mut mesh).map_err(error)?;
         }
         if shape.reverse {
-            shapes::reverse(&mut mesh);
+            mesh.reverse();
         }
         if surface.normal.is_some() {
             shapes::give_tangents(&mut mesh, shape.world_from_shape.determinant() < 0.0);

@@ -50,7 +50,7 @@ pub(super) fn mesh(
         }
         "loopsubdiv" => {
             let positions = positions(entity)?;
-            let triangles = triangles(entity, positions.len())?;
+            let triangles = groups(entity, positions.len())?;
             if let Some(scheme) = entity.find("scheme") {
                 log.ignore_named(features::PBRT_PARAMETER, "parameter `scheme`", &scheme.place);
             }
@@ -101,10 +101,6 @@ fn groups<const N: usize>(entity: &Entity, vertex_count: usize) -> Result<Vec<[u
     Ok(groups.map(|indices| std::array::from_fn(|at| indices[at] as u32)).collect())
 }
 
-fn triangles(entity: &Entity, vertex_count: usize) -> Result<Vec<[u32; 3]>> {
-    groups(entity, vertex_count)
-}
-
 /// Reads an attribute of vertices: nothing, or one for each.
 fn attribute<const N: usize>(
     entity: &Entity,
@@ -129,7 +125,7 @@ fn triangle_mesh(entity: &Entity, log: &mut Log) -> Result<Mesh> {
     // They number faces for Ptex alone.
     entity.find("faceIndices");
     Ok(Mesh {
-        triangles: triangles(entity, count)?,
+        triangles: groups(entity, count)?,
         normals: attribute(entity, "N", Kind::Triple, count)?,
         uvs: [attribute(entity, "uv", Kind::Pair, count)?, Vec::new()],
         positions,
@@ -329,12 +325,6 @@ fn face_normals(mesh: &mut Mesh) {
             triangle.swap(1, 2);
         }
     }
-}
-
-/// Turns a mesh inside out.
-pub(super) fn reverse(mesh: &mut Mesh) {
-    mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-    mesh.normals.iter_mut().for_each(|normal| *normal = normal.map(|part| -part));
 }
 
 /// Gives a mesh without texture coordinates those of pbrt: (0, 0), (1, 0) and (1, 1) on every triangle.

@@ -37,14 +37,10 @@ impl Value {
     }
 
     /// Returns factor · value + shift.
-    fn affine(self, factor: Vec3, shift: Vec3) -> Self {
+    pub(super) fn affine(self, factor: Vec3, shift: Vec3) -> Self {
         match self {
             Self::Constant(value) => Self::Constant(value * factor + shift),
-            Self::Image(mut image) => {
-                image.scale = (Vec3::from_array(image.scale) * factor).to_array();
-                image.bias = (Vec3::from_array(image.bias) * factor + shift).to_array();
-                Self::Image(image)
-            }
+            Self::Image(image) => Self::Image(image.affine(factor, shift)),
         }
     }
 
@@ -371,20 +367,9 @@ fn has_opacity(texture: &Texture) -> bool {
 
 /// Makes a texture of numbers, `of` the numbers of another.
 pub(super) fn map_numbers(image: &TextureUse, of: impl Fn(f32) -> f32) -> TextureUse {
-    let texels = image.values().into_iter();
-    let texels = texels.map(|[red, green, blue, _]| {
-        let number =
-            if image.channels == Channels::Color { (red + green + blue) / 3.0 } else { red };
-        [f16::from_f32(of(number)); 4]
+    let has_color = image.channels == Channels::Color;
+    let numbers = image.with_texels(|[red, green, blue, _]| {
+        [of(if has_color { (red + green + blue) / 3.0 } else { red }); 4]
     });
-    let texels = texels.collect();
-    let texture = Texture { texels: Texels::Halves(texels), ..Texture::clone(&image.texture) };
-    TextureUse {
-        texture: Arc::new(texture),
-        channels: Channels::Red,
-        encoding: Encoding::Linear,
-        scale: [1.0; 3],
-        bias: [0.0; 3],
-        ..image.clone()
-    }
+    TextureUse { channels: Channels::Red, ..numbers }
 }

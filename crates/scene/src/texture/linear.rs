@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use glam::Vec3;
 use half::f16;
 
 use super::{Channels, Encoding, Texels, Texture, TextureUse};
@@ -56,7 +57,12 @@ impl TextureUse {
     /// Makes a texture whose texels are `of` those of this one, by channel; opacity stays. Between
     /// texels it interpolates the new values.
     pub fn mapped(&self, of: impl Fn(f32) -> f32) -> Self {
-        let texel = |[r, g, b, a]: [f32; 4]| [of(r), of(g), of(b), a].map(f16::from_f32);
+        self.with_texels(|[r, g, b, a]| [of(r), of(g), of(b), a])
+    }
+
+    /// As [`TextureUse::mapped`], with all channels and the opacity made of all.
+    pub(crate) fn with_texels(&self, of: impl Fn([f32; 4]) -> [f32; 4]) -> Self {
+        let texel = |value: [f32; 4]| of(value).map(f16::from_f32);
         let texels = Texels::Halves(self.values().into_iter().map(texel).collect());
         Self {
             texture: Arc::new(Texture { texels, ..Texture::clone(&self.texture) }),
@@ -66,6 +72,13 @@ impl TextureUse {
             bias: [0.0; 3],
             ..self.clone()
         }
+    }
+
+    /// Returns factor · value + shift.
+    pub(crate) fn affine(mut self, factor: Vec3, shift: Vec3) -> Self {
+        self.scale = (Vec3::from(self.scale) * factor).to_array();
+        self.bias = (Vec3::from(self.bias) * factor + shift).to_array();
+        self
     }
 
     /// Mean value over the image, by channel. Where a surface shows the image in part or more than

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     export::subject::Subject,
-    material::{ConductorFresnel, Emission, MaterialKind},
+    material::{ConductorFresnel, Emission, MaterialKind, Principled},
     texture::TextureUse,
 };
 
@@ -26,10 +26,8 @@ pub(super) struct Translator<'a> {
 }
 
 /// Factors of the core model.
-struct Core {
-    base_color: Vec3,
-    metallic: f32,
-    roughness: f32,
+fn core(base_color: Vec3, metallic: f32, roughness: f32) -> Principled {
+    Principled { base_color, metallic, roughness, ..Principled::default() }
 }
 
 impl<'a> Translator<'a> {
@@ -39,7 +37,7 @@ impl<'a> Translator<'a> {
         let core = if is_unlit {
             self.extension("KHR_materials_unlit", json!({}));
             let radiance = surface.emission.as_ref().map_or(Vec3::ZERO, |light| light.radiance);
-            Core { base_color: radiance, metallic: 0.0, roughness: 1.0 }
+            core(radiance, 0.0, 1.0)
         } else {
             self.core()
         };
@@ -95,9 +93,8 @@ impl<'a> Translator<'a> {
     }
 
     /// Factors of the model, with the extensions that it needs.
-    fn core(&mut self) -> Core {
-        let metal =
-            |base_color, alpha: f32| Core { base_color, metallic: 1.0, roughness: alpha.sqrt() };
+    fn core(&mut self) -> Principled {
+        let metal = |base_color, alpha: f32| core(base_color, 1.0, alpha.sqrt());
         match &self.subject.material.kind {
             MaterialKind::Diffuse { reflectance } => self.diffuse(*reflectance),
             MaterialKind::Plastic { diffuse, alpha, ior } => {
@@ -106,7 +103,7 @@ impl<'a> Translator<'a> {
                      approximation and darkens its base in another way",
                 );
                 self.dielectric(*ior, 1.0, Vec3::ONE);
-                Core { base_color: *diffuse, metallic: 0.0, roughness: alpha.sqrt() }
+                core(*diffuse, 0.0, alpha.sqrt())
             }
             MaterialKind::Conductor {
                 alpha,
@@ -120,16 +117,9 @@ impl<'a> Translator<'a> {
                 self.subject.without_color("metal of a refractive index");
                 metal(fresnel.at_normal_incidence(), *alpha)
             }
-            MaterialKind::Principled {
-                base_color,
-                metallic,
-                roughness,
-                ior,
-                specular,
-                specular_color,
-            } => {
-                self.dielectric(*ior, *specular, *specular_color);
-                Core { base_color: *base_color, metallic: *metallic, roughness: *roughness }
+            &MaterialKind::Principled(own) => {
+                self.dielectric(own.ior, own.specular, own.specular_color);
+                own
             }
             MaterialKind::Mirror { reflectance } => {
                 if *reflectance != Vec3::ONE || self.subject.surface.color.is_some() {
@@ -160,9 +150,9 @@ impl<'a> Translator<'a> {
         }
     }
 
-    fn diffuse(&mut self, reflectance: Vec3) -> Core {
+    fn diffuse(&mut self, reflectance: Vec3) -> Principled {
         self.dielectric(DEFAULT_IOR, 0.0, Vec3::ONE);
-        Core { base_color: reflectance, metallic: 0.0, roughness: 1.0 }
+        core(reflectance, 0.0, 1.0)
     }
 
     fn dielectric(&mut self, ior: f32, specular: f32, specular_color: Vec3) {
@@ -176,18 +166,24 @@ impl<'a> Translator<'a> {
         }
     }
 
-    fn glass(&mut self, ior: f32, roughness: f32, reflectance: Vec3, transmittance: Vec3) -> Core {
+    fn glass(
+        &mut self,
+        ior: f32,
+        roughness: f32,
+        reflectance: Vec3,
+        transmittance: Vec3,
+    ) -> Principled {
         if reflectance != Vec3::ONE {
             self.subject.warn("the factor of its reflected light has no place in glTF's glass");
         }
         self.subject.without_color("dielectric");
         self.dielectric(ior, 1.0, Vec3::ONE);
         self.extension("KHR_materials_transmission", json!({"transmissionFactor": 1.0}));
-        Core { base_color: transmittance, metallic: 0.0, roughness }
+        core(transmittance, 0.0, roughness)
     }
 
     /// `pbrMetallicRoughness`, with the textures of colour and opacity, roughness and metal.
-    fn pbr(&mut self, core: &Core, color: Option<&TextureUse>) {
+    fn pbr(&mut self, core: &Principled, color: Option<&TextureUse>) {
         let surface = self.subject.surface;
         let largest = peak(color);
         let base_color = (core.base_color * largest).clamp(Vec3::ZERO, Vec3::ONE);

@@ -119,29 +119,26 @@ impl Translator<'_> {
                     + &self.roughness(alpha.sqrt());
                 element("principled", &content)
             }
-            MaterialKind::Principled {
-                base_color,
-                metallic,
-                roughness,
-                ior,
-                specular,
-                specular_color,
-            } => {
-                self.warn_of_masking(roughness * roughness, "principled");
+            MaterialKind::Principled(own) => {
+                self.warn_of_masking(own.roughness * own.roughness, "principled");
                 self.subject.warn(
                     "Mitsuba's principled differs from glTF's: its diffuse part is Disney's, here of the \
                      same mean, and its dielectric reflects by Fresnel's equations instead of Schlick's",
                 );
-                let difference = difference_of_index(*ior, *specular, *specular_color);
+                let difference = difference_of_index(own);
                 difference.iter().for_each(|difference| self.subject.warn(difference));
-                let eta = index_of(*ior, *specular, *specular_color).max(LEAST_ETA);
+                let eta = index_of(own).max(LEAST_ETA);
                 // The base of metal reflects alike in both.
                 let (metal, rough) = self.subject.mean_metal_and_roughness();
                 let factor = principled_base_factor(rough, normal_reflectance(eta)).recip();
                 let factor = 1.0 + (1.0 - metal) * (factor - 1.0);
-                let content = self.color("base_color", *base_color * factor)
-                    + &self.number("metallic", *metallic, self.subject.surface.metallic.as_ref())
-                    + &self.roughness(*roughness)
+                let content = self.color("base_color", own.base_color * factor)
+                    + &self.number(
+                        "metallic",
+                        own.metallic,
+                        self.subject.surface.metallic.as_ref(),
+                    )
+                    + &self.roughness(own.roughness)
                     + &float("eta", eta);
                 element("principled", &content)
             }

@@ -116,25 +116,19 @@ impl<'a> Translator<'a> {
                 alpha,
                 fresnel: ConductorFresnel::Schlick { reflectance },
             } => self.metal(*reflectance, *alpha),
-            MaterialKind::Principled {
-                base_color,
-                metallic,
-                roughness,
-                ior,
-                specular,
-                specular_color,
-            } => {
+            MaterialKind::Principled(own) => {
                 let texture = self.subject.surface.metallic.as_ref();
-                let share = metallic * texture.map_or(1.0, |used| used.mean()[0]);
+                let share = own.metallic * texture.map_or(1.0, |used| used.mean()[0]);
                 if share > 0.0 && share < 1.0 || texture.is_some() {
                     self.subject
                         .warn("pbrt mixes no metal with others; the greater share is all of it");
                 }
+                let alpha = own.roughness * own.roughness;
                 if share >= 0.5 {
-                    return self.metal(*base_color, roughness * roughness);
+                    return self.metal(own.base_color, alpha);
                 }
-                let ior = index_of(*ior, *specular, *specular_color).max(LEAST_COAT_IOR);
-                self.coated(*base_color, roughness * roughness, ior, "its dielectric")
+                let ior = index_of(own).max(LEAST_COAT_IOR);
+                self.coated(own.base_color, alpha, ior, "its dielectric")
             }
             MaterialKind::Mirror { reflectance } => self.metal(*reflectance, 0.0),
             MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, .. } => {

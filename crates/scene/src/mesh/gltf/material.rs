@@ -14,7 +14,7 @@ use crate::{
     error::Result,
     features::{self, Feature, Ignored},
     gloss::metallic_roughness,
-    material::{Emission, Material, MaterialKind, Opacity, Surface},
+    material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
     mesh::{MeshMaterial, images},
     texture::{Channels, Encoding, TextureUse, texelwise::lie_alike},
 };
@@ -241,14 +241,14 @@ impl GltfReader<'_> {
             ior => (ior.clamp(IOR_RANGE.0, IOR_RANGE.1), 1.0),
         };
         let base_color = color(pbr, "baseColorFactor", [1.0; 3]);
-        let kind = MaterialKind::Principled {
+        let kind = MaterialKind::Principled(Principled {
             base_color,
             metallic: share(pbr, "metallicFactor", 1.0),
             roughness: share(pbr, "roughnessFactor", 1.0),
             ior,
             specular: share(specular, "specularFactor", 1.0),
             specular_color: whole * specular_color.max(Vec3::ZERO),
-        };
+        });
         reading.ignore_if(has_textures, features::GLTF_SPECULAR_TEXTURE);
         let packed = &pbr["metallicRoughnessTexture"];
         let mut surface = self.colored(&pbr["baseColorTexture"], reading)?;
@@ -286,47 +286,36 @@ impl GltfReader<'_> {
         }
         let specular = specular.filter(|_| lie_alike);
         if specular.is_none() && specular_color.max_element() <= STRONGEST_DIELECTRIC {
-            let kind = MaterialKind::Principled {
+            let specular_color = specular_color / DEFAULT_REFLECTANCE;
+            let (metallic, rest) = (0.0, Principled::default());
+            let kind = MaterialKind::Principled(Principled {
                 base_color,
-                metallic: 0.0,
+                metallic,
                 roughness,
-                ior: DEFAULT_IOR,
-                specular: 1.0,
-                specular_color: specular_color / DEFAULT_REFLECTANCE,
-            };
+                specular_color,
+                ..rest
+            });
             return Ok(Reflection { kind, surface, base_color, alpha });
         }
-        let mut kind = MaterialKind::Principled {
-            base_color: Vec3::ONE,
-            metallic: 1.0,
-            roughness,
-            ior: DEFAULT_IOR,
-            specular: 1.0,
-            specular_color: Vec3::ONE,
-        };
+        let mut principled = Principled { roughness, ..Principled::default() };
         let scaled = |used: TextureUse, scale: Vec3| TextureUse { scale: scale.into(), ..used };
         let diffuse = surface.color.take().map(|own| scaled(own, base_color)).ok_or(base_color);
         let has_gloss_image = specular.is_some();
         let specular = specular.map(|own| scaled(own, specular_color)).ok_or(specular_color);
-        if let (
-            Err(diffuse),
-            Err(specular),
-            MaterialKind::Principled { base_color, metallic, .. },
-        ) = (&diffuse, &specular, &mut kind)
-        {
-            (*base_color, *metallic) = metallic_roughness(*diffuse, *specular);
-            let base_color = *base_color;
+        if let (Err(diffuse), Err(specular)) = (&diffuse, &specular) {
+            let (base_color, metallic) = metallic_roughness(*diffuse, *specular);
+            let kind = MaterialKind::Principled(Principled { base_color, metallic, ..principled });
             return Ok(Reflection { kind, surface, base_color, alpha });
         }
         let converted = glossiness::convert(&diffuse, &specular, glossiness);
         surface.color = Some(converted.base_color);
         surface.metallic = Some(converted.metallic);
-        if let (true, MaterialKind::Principled { roughness, .. }) = (has_gloss_image, &mut kind) {
+        if has_gloss_image {
             surface.roughness = Some(converted.roughness);
-            *roughness = 1.0;
+            principled.roughness = 1.0;
         }
-        let base_color = Vec3::ONE;
-        Ok(Reflection { kind, surface, base_color, alpha })
+        let kind = MaterialKind::Principled(principled);
+        Ok(Reflection { kind, surface, base_color: Vec3::ONE, alpha })
     }
 
     /// Surface with a texture of colour and opacity.
@@ -351,7 +340,8 @@ impl GltfReader<'_> {
     ) -> Result<()> {
         let json = reading.json;
         let transmission = &json["extensions"]["KHR_materials_transmission"];
-        let &MaterialKind::Principled { metallic, roughness, ior, .. } = &found.kind else {
+        let MaterialKind::Principled(Principled { metallic, roughness, ior, .. }) = found.kind
+        else {
             return Ok(());
         };
         let mean = |texture: &Option<TextureUse>| texture.as_ref().map(TextureUse::mean);

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::{LibraryMaterial, map::Map};
 use crate::{
     features::{self, Feature},
-    material::{Emission, Material, MaterialKind, Opacity, Surface},
+    material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
     mesh::{
         MeshMaterial,
         images::{Images, has_alpha},
@@ -81,14 +81,13 @@ impl LibraryMaterial {
         let kind = if self.is_metallic_roughness() {
             let one_if = |texture: bool, otherwise| if texture { 1.0 } else { otherwise };
             let roughness = one_if(surface.roughness.is_some(), DEFAULT_ROUGHNESS);
-            MaterialKind::Principled {
+            MaterialKind::Principled(Principled {
                 base_color: diffuse,
                 metallic: self.metallic.unwrap_or(one_if(surface.metallic.is_some(), 0.0)),
                 roughness: self.roughness.unwrap_or(roughness),
                 ior,
-                specular: 1.0,
-                specular_color: Vec3::ONE,
-            }
+                ..Principled::default()
+            })
         } else if is_pane {
             let tint = Vec3::ONE.lerp(diffuse, opacity);
             let transmittance = self.filter.unwrap_or(tint);
